@@ -1,0 +1,64 @@
+# Every target sets up what it needs, once: .venv, Python packages, and system packages where apt is at hand.
+# make PYTHON=/path/to/python3.12 setup     chooses the Python that .venv is made with
+# make JOBS=8 test                          runs that many tests at a time
+
+PYTHON ?= python3
+JOBS   ?= 2
+
+VENV     := .venv
+READY    := $(VENV)/.ready
+COMPILED := $(VENV)/.compiled
+
+# An environment knows the place of its checkout: after a move, or when its Python is gone, it is made anew.
+ifneq ($(shell test -x $(VENV)/bin/python && cat $(READY) 2>/dev/null),$(CURDIR))
+.PHONY: $(READY)
+endif
+
+.PHONY: help setup demo test check lint types tests test-slow bench firmware flash clean
+
+help:
+	@echo "make demo       simulate the rig, cross-check it, and leave a review to look at"
+	@echo "make test       style, types and the quick tests ('make check' is the same)"
+	@echo "make test-slow  the tests that take longer"
+	@echo "make bench      how fast the solver is on this machine"
+	@echo "make firmware   build the board's program            (not in this version)"
+	@echo "make flash      build it and load it into the board  (not in this version)"
+	@echo "make setup      only the setting up, which every target does by itself"
+	@echo "make clean      remove caches and builds; keeps $(VENV) and logs"
+
+setup: $(COMPILED)
+	@echo "ready: $(CURDIR)/$(VENV)"
+
+$(READY): pyproject.toml constraints.txt tools/setup.py
+	@command -v "$(PYTHON)" >/dev/null || { echo "Python 3.11 or newer is missing; on Debian type: apt-get install python3 python3-venv" >&2; exit 1; }
+	@"$(PYTHON)" tools/setup.py
+
+$(COMPILED): $(READY) $(wildcard model/flexura/*.py)
+	@$(VENV)/bin/python tools/setup.py compile
+
+demo: $(COMPILED)
+	@$(VENV)/bin/flexura demo
+
+test check: lint types tests
+
+lint: $(READY)
+	@$(VENV)/bin/ruff check model analysis tests tools
+
+types: $(READY)
+	@$(VENV)/bin/mypy
+
+tests: $(COMPILED)
+	@$(VENV)/bin/pytest -n $(JOBS) -m "not slow"
+
+test-slow: $(COMPILED)
+	@$(VENV)/bin/pytest -n $(JOBS) -m slow
+
+bench: $(COMPILED)
+	@$(VENV)/bin/python -m flexlab.bench
+
+firmware flash:
+	@echo "make $@: the board's firmware is not in this version yet; firmware/README.md says what the board is." >&2; exit 2
+
+clean:
+	rm -rf build dist *.egg-info .hypothesis .mypy_cache .pytest_cache .ruff_cache solution $(COMPILED)
+	find model analysis tests tools -name __pycache__ -prune -exec rm -rf {} +

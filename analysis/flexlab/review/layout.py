@@ -1,0 +1,238 @@
+"""The layout of a review: which views there are, and where; built from what was recorded, so that no view is empty."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import rerun.blueprint as rrb
+
+CURVES = 6  # in one plot; further joints or links go to further tabs
+PLOT_PX, LINE_PX, LINE_CHARS = 265, 23, 36  # a plot's height and a legend's line in a window of 900 pixels
+WIDE = 1.2  # from this ratio on, two pictures below each other are larger than two side by side
+WHITE = (255, 255, 255)
+
+
+@dataclass(frozen=True)
+class Signal:
+    """One curve over time: its unit, its name in the legend, its smallest and largest value."""
+
+    unit: str
+    label: str
+    low: float
+    high: float
+
+
+Signals = dict[str, Signal]  # by entity path
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What is recorded: `sources` (root, label, colour's name, has shapes), curves by path, and the arms' bounds [m], y up."""
+
+    sources: tuple[tuple[str, str, str, bool], ...]
+    signals: Signals
+    deviations: Signals
+    events: bool
+    phases: tuple[str, ...]
+    low: tuple[float, float]
+    high: tuple[float, float]
+
+    @property
+    def width(self) -> float:
+        return self.high[0] - self.low[0]
+
+    @property
+    def height(self) -> float:
+        return self.high[1] - self.low[1]
+
+    @property
+    def mark(self) -> float:
+        """Half the length of a joint's mark [m]: the same share of every picture."""
+        return 0.022 * max(self.width, self.height)
+
+
+def blueprint(scene: Scene) -> rrb.Blueprint:
+    """Arms and the about page above, plots over time below."""
+    notes: list[Any] = [rrb.TextDocumentView(origin="/", contents=["/about"], name="about this review")]
+    shares = [2.6]
+    if scene.phases:
+        notes.append(rrb.StateTimelineView(origin="/", contents=[f"/{root}/phase" for root in scene.phases], name="phases"))
+        shares.append(0.6 + 0.4 * len(scene.phases))
+    if scene.events:
+        notes.append(rrb.TextLogView(origin="/", contents=["/events/**"], name="events", columns=_log_columns()))
+        shares.append(1.2)
+    side = rrb.Vertical(*notes, row_shares=shares)
+    upper = rrb.Horizontal(*(drawn := _arms(scene)), side, column_shares=_shares(scene, len(drawn)))
+    columns = _plots(scene)
+    if not columns:
+        root: Any = upper
+    elif not drawn:
+        root = rrb.Vertical(side, rrb.Horizontal(*columns), row_shares=[2, 3])
+    else:
+        root = rrb.Vertical(upper, rrb.Horizontal(*columns), row_shares=[3, 2])
+    return rrb.Blueprint(
+        root,
+        rrb.TimePanel(timeline="time", state="collapsed", play_state="paused"),
+        rrb.BlueprintPanel(state="hidden"),
+        rrb.SelectionPanel(state="hidden"),
+        auto_layout=False,
+        auto_views=False,
+    )
+
+
+def _arms(scene: Scene) -> list[Any]:
+    """The overlaid view, large, and each run alone beside it: below each other when the picture is wide, else side by side."""
+    # Bounds are given in the view's own coordinates, in which y points down.
+    bounds = rrb.VisualBounds2D(x_range=[scene.low[0], scene.high[0]], y_range=[-scene.high[1], -scene.low[1]])
+
+    def arm(name: str, contents: list[str]) -> Any:
+        return rrb.Spatial2DView(
+            origin="/", contents=["/ground/**", *contents], name=name, visual_bounds=bounds, background=WHITE
+        )
+
+    shaped = [(root, label, f"{colour} {label}") for root, label, colour, there in scene.sources if there]
+    alone = [arm(label, [f"/{root}/arm/**"]) for root, label, _ in shaped]
+    if len(shaped) < 2:
+        return alone
+    (a, _, first), (b, _, second) = shaped
+    # One ghost is enough where both arms lie on each other.
+    both = arm(f"overlaid: {first}, {second}", [f"/{a}/arm/**", f"/{b}/arm/**", f"- /{b}/arm/undeformed"])
+    return [both, rrb.Vertical(*alone) if scene.width > WIDE * scene.height else rrb.Horizontal(*alone)]
+
+
+def _shares(scene: Scene, arms: int) -> list[float]:
+    if arms == 2:
+        return [5, 3, 3] if scene.width > WIDE * scene.height else [4, 5, 3]
+    return [5.0, 3.0] if arms else [1.0]
+
+
+def _plots(scene: Scene) -> list[Any]:
+    """Up to four columns of plots: joints that slide, joints that turn, links, deviations; what belongs together in tabs."""
+    signals, columns = scene.signals, []
+    group = CURVES // len(scene.sources)
+    for unit in ("m", "rad"):
+        numbers = _numbers((path for path, s in signals.items() if s.unit == unit), r"/joint/(\d+)/position")
+        views = [
+            v
+            for k, part in enumerate(("position", "velocity", "drive"))
+            for v in _grouped(signals, "joint", part, numbers, group, k == 0)
+        ]
+        if views:
+            columns.append(views)
+    links = _numbers(signals, r"/link/(\d+)/tip_(?:deflection|slope)")
+    tip = _one("tip position", signals, r"/[^/]+/tip/[xy]")
+    bend = [
+        v for k, part in enumerate(("tip_deflection", "tip_slope")) for v in _grouped(signals, "link", part, links, group, k == 0)
+    ]
+    if bend or tip:
+        columns.append(bend + tip)
+    energy = _one("energy", _moving(signals), r"/[^/]+/energy/(kinetic|strain|potential)")
+    energy += _one("work and loss", _moving(signals), r"/[^/]+/energy/(work|loss)")
+    if energy and columns and len(columns) + bool(scene.deviations) >= 4:
+        columns[-1].extend(energy)
+    elif energy:
+        columns.append(energy)
+    shown = re.compile(r"/[^/]+/(joint/\d+/(position|velocity|drive)|link/\d+/tip_(deflection|slope)|energy/\w+|tip/[xy])")
+    rest = {path: s for path, s in signals.items() if not shown.fullmatch(path)}
+    further = [
+        _plot(f"other [{unit}]", {p: s for p, s in rest.items() if s.unit == unit})
+        for unit in dict.fromkeys(s.unit for s in rest.values())
+    ]
+    if further and columns:
+        columns[-1].extend(further)
+    elif further:
+        columns.append(further)
+    if apart := _deviations(scene):
+        columns.append(apart)
+    return [_tabs(views) for views in columns]
+
+
+def _deviations(scene: Scene) -> list[Any]:
+    """Deviations of tip deflections, of the tip, and of joint positions, one unit a plot."""
+    apart = scene.deviations
+    links = _numbers(apart, r"/link/(\d+)/tip_deflection")
+    views = _grouped(apart, "link", "tip_deflection", links, CURVES // 2, True, "deviation of ")
+    views += _one("of the tip" if views else "deviation of the tip", apart, r"/deviation/(tip/[xy]|tip_distance)")
+    for unit in ("m", "rad"):
+        same = {path: s for path, s in apart.items() if s.unit == unit}
+        views += _grouped(
+            same,
+            "joint",
+            "position",
+            _numbers(same, r"/joint/(\d+)/position"),
+            CURVES // 2,
+            True,
+            "" if views else "deviation of ",
+        )
+    return views
+
+
+def _grouped(signals: Signals, kind: str, part: str, numbers: list[int], group: int, full: bool, before: str = "") -> list[Any]:
+    """Plots of one quantity, `group` joints or links at a time; `full`: the name says which even where they are all."""
+    views = []
+    for k in range(0, len(numbers), group):
+        some = numbers[k : k + group]
+        found = {path: s for path, s in signals.items() for i in some if path.endswith(f"/{kind}/{i}/{part}")}
+        which = f", {kind}{'s' if len(some) > 1 else ''} {', '.join(map(str, some))}" if full or len(numbers) > group else ""
+        if found:
+            views.append(_plot(before + part.replace("_", " ") + which, found))
+    return views
+
+
+def _one(name: str, signals: Signals, pattern: str) -> list[Any]:
+    found = {path: s for path, s in signals.items() if re.fullmatch(pattern, path)}
+    return [_plot(name, found)] if found else []
+
+
+def _plot(name: str, signals: Signals) -> Any:
+    return rrb.TimeSeriesView(
+        origin="/",
+        contents=list(signals),
+        name=name,
+        axis_x=rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal),
+        axis_y=rrb.ScalarAxis(range=value_range(signals)),
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop),
+    )
+
+
+def value_range(signals: Signals) -> tuple[float, float]:
+    """The range of a plot's vertical axis: all values, room for the legend above them, and two numbers to read off."""
+    low, high = min(s.low for s in signals.values()), max(s.high for s in signals.values())
+    if high - low <= 1e-9 * max(abs(low), abs(high)):
+        spare = 0.1 * max(abs(low), abs(high)) or 1.0
+        low, high = low - spare, high + spare
+    lines = sum(-(-len(s.label) // LINE_CHARS) for s in signals.values())
+    share = min((LINE_PX * lines + 14) / PLOT_PX, 0.6)
+    low, high = low - 0.05 * (high - low), high + (high - low) * share / (1 - share)
+    # The viewer numbers powers of ten, and tenths of them while there are few: see that two numbers fit.
+    power = 10.0 ** math.floor(math.log10(high - low))
+    if (high - low) / power > 1.2 and math.floor(high / power) - math.ceil(low / power) < 1:
+        up, down = (math.floor(high / power) + 1) * power, (math.ceil(low / power) - 1) * power
+        low, high = (low, up * 1.02) if up - high < low - down else (down - 0.02 * power, high)
+    return low, high
+
+
+def _moving(signals: Signals) -> Signals:
+    """Without those that are 0 all the time, such as the potential energy of a robot in the horizontal plane."""
+    return {path: s for path, s in signals.items() if s.low or s.high}
+
+
+def _tabs(views: list[Any]) -> Any:
+    return views[0] if len(views) == 1 else rrb.Tabs(*views, active_tab=0)
+
+
+def _numbers(paths: Iterable[str], pattern: str) -> list[int]:
+    return sorted({int(found[1]) for path in paths if (found := re.search(pattern + "$", path))})
+
+
+def _log_columns() -> Any:
+    """Level and text: the text itself has the time, which the viewer would cut short, and names the source."""
+    kinds = rrb.encodings.TextLogColumnKind
+    shown = [rrb.encodings.TextLogColumn(kind=kind, visible=True) for kind in (kinds.LogLevel, kinds.Body)]
+    return rrb.TextLogColumns(
+        timeline_columns=[rrb.encodings.TimelineColumn(timeline="time", visible=False)], text_log_columns=shown
+    )

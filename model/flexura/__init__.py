@@ -1,0 +1,53 @@
+"""flexura: planar robots with flexible links, from one robot file.
+
+    import flexura as fx
+    robot = fx.load("model/robots/rig.toml")
+    system = fx.assemble(robot)
+    run = fx.simulate(system, t_eval, drive)
+
+The theory as implemented is in `model/README.md`. Names are loaded when first used, so that `import flexura` costs nothing.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+_HOME = {
+    "Robot": "robot", "load": "robot", "save": "robot",
+    "System": "system", "assemble": "system",
+    "static": "statics", "tip_pose": "statics",
+    "frequencies": "frequencies",
+    "simulate": "forward",
+    "Run": "run",
+    "Drive": "drive", "JointDrive": "drive", "Manoeuvre": "drive", "load_manoeuvre": "drive",
+    "Signal": "signal",
+    "FlexuraError": "errors", "InputError": "errors",
+}  # fmt: skip
+
+__all__ = ["FlexuraError", "InputError", "Robot", "Run", "Signal", "System", "assemble", "frequencies", "load", "save", "simulate", "static"]
+
+if TYPE_CHECKING:
+    from .drive import Drive, JointDrive, Manoeuvre, load_manoeuvre
+    from .errors import FlexuraError, InputError
+    from .forward import simulate
+    from .frequencies import frequencies
+    from .robot import Robot, load, save
+    from .run import Run
+    from .signal import Signal
+    from .statics import static, tip_pose
+    from .system import System, assemble
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'flexura' has no attribute {name!r}")
+    value = getattr(importlib.import_module(f".{_HOME[name]}", __name__), name)
+    globals()[name] = value  # a module of the same name (frequencies) must not hide the function
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_HOME])

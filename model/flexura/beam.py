@@ -1,0 +1,199 @@
+"""Euler-Bernoulli beam elements: Hermite cubics and the integrals that a link's equations need.
+
+A link of length L is clamped to its hub at x = 0 and carries n elements of equal length. Its unknowns are the transverse
+displacement w and the slope w' at nodes 1 ... n (node 0 is the hub: w = w' = 0), so that w(x) = phi(x)^T q, q of
+2n entries. Every matrix is a constant integral, computed once by Gauss quadrature that is exact for the given properties.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .robot import Link
+
+POINTS = 5  # mass points of a flexible link for the geometric stiffening, the tip included
+SLOPES = 2 * POINTS  # slope points
+
+
+def hermite(s: np.ndarray, h: float, derivative: int = 0) -> np.ndarray:
+    """The four cubics N1 ... N4 on an element of length h at s = x/h in [0, 1], or their x-derivatives; (4, *s.shape).
+
+    N1 = 1 - 3 s^2 + 2 s^3, N2 = h (s - 2 s^2 + s^3), N3 = 3 s^2 - 2 s^3, N4 = h (s^3 - s^2)   (dissertation, 2.1).
+    """
+    s = np.asarray(s, dtype=float)
+    if derivative == 0:
+        return np.array([1 - 3 * s**2 + 2 * s**3, h * (s - 2 * s**2 + s**3), 3 * s**2 - 2 * s**3, h * (s**3 - s**2)])
+    if derivative == 1:
+        return np.array([-6 * s + 6 * s**2, h * (1 - 4 * s + 3 * s**2), 6 * s - 6 * s**2, h * (3 * s**2 - 2 * s)]) / h
+    if derivative == 2:
+        return np.array([-6 + 12 * s, h * (-4 + 6 * s), 6 - 12 * s, h * (6 * s - 2)]) / h**2
+    raise ValueError(f"derivative {derivative}: 0, 1 or 2")
+
+
+def shape(length: float, elements: int, x: np.ndarray, derivative: int = 0) -> np.ndarray:
+    """phi(x), phi'(x) or phi''(x) of the clamped link: (2n, *x.shape), unknowns (w_1, w'_1, ..., w_n, w'_n)."""
+    x = np.atleast_1d(np.asarray(x, dtype=float))
+    h = length / elements
+    element = np.clip((x / h).astype(int), 0, elements - 1)
+    values = hermite(x / h - element, h, derivative)
+    out = np.zeros((2 * elements + 2, len(x)))
+    for k in range(4):
+        out[2 * element + k, np.arange(len(x))] = values[k]
+    return out[2:]
+
+
+@dataclass(frozen=True)
+class LinkIntegrals:
+    """Constants of one link in some elastic coordinates q (m of them), with dm = rho A dx plus tip and hub masses.
+
+    mass m0 = int dm [kg]; first moment s1 = int x dm [kg m]; second moment inertia = int x^2 dm [kg m^2], about the hub;
+    S0 = int phi dm, S1 = int x phi dm (m,); M = int phi phi^T dm, K = int EI phi'' phi''^T dx (m, m);
+    G1 = int n1 phi' phi'^T dx, G2 = int n2 phi' phi'^T dx, n1(x) = int_x^L dm, n2(x) = int_x^L X dm, so that the shortening
+    u2 = -1/2 int_0^x w'^2 has int u2 dm = -q^T G1 q / 2, int x u2 dm = -q^T G2 q / 2; and H = int phi' phi'^T dx, u2(L) = -q^T H q / 2.
+    NL = phi(L), SL = phi'(L) (m,); basis (2n, m): nodal unknowns = basis @ q.
+    What is of higher order in the deflection is summed over points (`model/README.md`, section 3): mass points (POINTS,) at x with their masses and
+    phi (m, POINTS), the last one being the tip with the payload; and slope points (SLOPES,), SLOPES / POINTS between two mass points,
+    with weights dx, EI dx, and phi', phi'' (m, SLOPES).
+    """
+
+    length: float
+    mass: float
+    s1: float
+    inertia: float
+    S0: np.ndarray
+    S1: np.ndarray
+    M: np.ndarray
+    K: np.ndarray
+    G1: np.ndarray
+    G2: np.ndarray
+    H: np.ndarray
+    NL: np.ndarray
+    SL: np.ndarray
+    basis: np.ndarray
+    point_x: np.ndarray
+    point_mass: np.ndarray
+    point_phi: np.ndarray
+    slope_dx: np.ndarray
+    slope_EI: np.ndarray
+    slope_d1: np.ndarray
+    slope_d2: np.ndarray
+
+    def changed(self, basis: np.ndarray) -> LinkIntegrals:
+        """The same link in coordinates p with q = basis @ p."""
+        B = basis
+        return LinkIntegrals(
+            self.length, self.mass, self.s1, self.inertia, B.T @ self.S0, B.T @ self.S1,
+            _sandwich(B, self.M), _sandwich(B, self.K), _sandwich(B, self.G1), _sandwich(B, self.G2), _sandwich(B, self.H),
+            B.T @ self.NL, B.T @ self.SL, self.basis @ B,
+            self.point_x, self.point_mass, B.T @ self.point_phi, self.slope_dx, self.slope_EI, B.T @ self.slope_d1, B.T @ self.slope_d2,
+        )  # fmt: skip
+
+
+def link_integrals(link: Link, tip_mass: float = 0.0, tip_inertia: float = 0.0) -> LinkIntegrals:
+    """The integrals of a link, its hub and a payload at its tip, in nodal unknowns; rigid links have none (m = 0)."""
+    L = link.length_m
+    hub = (0.0, 0.0) if link.joint.type == "Pb" else (link.joint.hub_mass_kg, link.joint.hub_inertia_kg_m2)
+    if link.flexible:
+        bare = _flexible(link)
+    else:
+        bare = _rigid(link)
+    mp, Jp, NL, SL = tip_mass, tip_inertia, bare.NL, bare.SL
+    return LinkIntegrals(
+        L,
+        bare.mass + hub[0] + mp,
+        bare.s1 + mp * L,
+        bare.inertia + hub[1] + mp * L**2 + Jp,
+        bare.S0 + mp * NL,
+        bare.S1 + mp * L * NL + Jp * SL,
+        bare.M + mp * np.outer(NL, NL) + Jp * np.outer(SL, SL),
+        bare.K,
+        bare.G1 + mp * bare.H,
+        bare.G2 + mp * L * bare.H,
+        bare.H,
+        NL,
+        SL,
+        bare.basis,
+        bare.point_x,
+        bare.point_mass + mp * (np.arange(POINTS) == POINTS - 1),
+        bare.point_phi,
+        bare.slope_dx,
+        bare.slope_EI,
+        bare.slope_d1,
+        bare.slope_d2,
+    )
+
+
+def _rigid(link: Link) -> LinkIntegrals:
+    none, empty = np.zeros(0), np.zeros((0, 0))
+    if link.mass_kg is not None:
+        centre = link.centre_of_mass_m if link.centre_of_mass_m is not None else link.length_m / 2
+        m, about_centre = link.mass_kg, link.inertia_kg_m2 or 0.0
+        mass, s1, inertia = m, m * centre, about_centre + m * centre**2
+    else:
+        x, dx = _quadrature(np.array(link.breaks()))
+        rho = link.mass_per_length(x)
+        mass, s1, inertia = float(rho @ dx), float((rho * x) @ dx), float((rho * x**2) @ dx)
+    points, slopes = np.zeros(POINTS), np.zeros(SLOPES)
+    return LinkIntegrals(
+        link.length_m, mass, s1, inertia, none, none, empty, empty, empty, empty, empty, none, none, empty,
+        points, points, np.zeros((0, POINTS)), slopes, slopes, np.zeros((0, SLOPES)), np.zeros((0, SLOPES)),
+    )  # fmt: skip
+
+
+def _flexible(link: Link) -> LinkIntegrals:
+    L, n = link.length_m, link.elements
+    cells = np.union1d(np.linspace(0, L, n + 1), np.array(link.breaks()))
+    cells = cells[np.concatenate([[True], np.diff(cells) > 1e-12 * L])]
+    cells[-1] = L
+    x, dx = _quadrature(cells)
+    rho, EI = link.mass_per_length(x), link.bending_stiffness(x)
+    N, S, C = (shape(L, n, x, k) for k in (0, 1, 2))
+    n1, n2 = _outboard(link, cells, x)
+    dm = rho * dx
+    return LinkIntegrals(
+        L, float(dm.sum()), float(dm @ x), float(dm @ x**2), N @ dm, N @ (x * dm), (N * dm) @ N.T, (C * (EI * dx)) @ C.T,
+        (S * (n1 * dx)) @ S.T, (S * (n2 * dx)) @ S.T, (S * dx) @ S.T,
+        shape(L, n, L)[:, 0], shape(L, n, L, 1)[:, 0], np.eye(2 * n), *_points(link),
+    )  # fmt: skip
+
+
+def _outboard(link: Link, cells: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """int_x^L rho A dX and int_x^L rho A X dX at the quadrature points x of `cells`."""
+    count = len(x) // (len(cells) - 1)
+    k = np.arange(len(x)) // count
+    s, weight = np.polynomial.legendre.leggauss(count)
+    half = (cells[k + 1] - x) / 2
+    X = x[:, None] + half[:, None] * (1 + s)
+    rho = link.mass_per_length(X)
+    cell_x, cell_dx = _quadrature(cells)
+    cell_rho = link.mass_per_length(cell_x)
+    out = []
+    for near, f in ((rho, cell_rho), (rho * X, cell_rho * cell_x)):
+        whole = (f * cell_dx).reshape(-1, count).sum(axis=1)
+        beyond = np.append(np.cumsum(whole[::-1])[::-1][1:], 0.0)
+        out.append((half[:, None] * weight * near).sum(axis=1) + beyond[k])
+    return out[0], out[1]
+
+
+def _points(link: Link) -> tuple[np.ndarray, ...]:
+    """Gauss points of the whole link and the tip (x, mass, phi), and Gauss points between them (dx, EI dx, phi', phi'')."""
+    L, n = link.length_m, link.elements
+    s, weight = np.polynomial.legendre.leggauss(POINTS - 1)
+    x = np.append((1 + s) * L / 2, L)
+    mass = np.append(weight * L / 2 * link.mass_per_length(x[:-1]), 0.0)
+    place, dx = _quadrature(np.concatenate([[0.0], x]), SLOPES // POINTS)
+    return x, mass, shape(L, n, x), dx, link.bending_stiffness(place) * dx, shape(L, n, place, 1), shape(L, n, place, 2)
+
+
+def _quadrature(cells: np.ndarray, points: int = 6) -> tuple[np.ndarray, np.ndarray]:
+    """Gauss points and weights on consecutive cells; 6 points are exact to degree 11, the integrands here reach degree 8."""
+    s, weight = np.polynomial.legendre.leggauss(points)
+    half, middle = np.diff(cells) / 2, (cells[1:] + cells[:-1]) / 2
+    return (middle[:, None] + half[:, None] * s).ravel(), (half[:, None] * weight).ravel()
+
+
+def _sandwich(B: np.ndarray, A: np.ndarray) -> np.ndarray:
+    out = B.T @ A @ B
+    return (out + out.T) / 2

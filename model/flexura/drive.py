@@ -1,0 +1,173 @@
+"""Drives: what acts in the joints. Feedforward, and PD control of the joint along a motion.
+
+    tau_i = f_i(t) + kp_i (r_i(t) - eta_i) + kd_i (dr_i/dt - d eta_i/dt)
+
+with eta_i the joint's position [m or rad]; tau_i in N or N m. Drives are data, so that they run inside the compiled loop;
+any Python function `(t) -> forces` or `(t, position, velocity, tip_deflection) -> forces` works in their place, slower.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from . import signal
+from .errors import InputError
+from .files import read_toml
+from .signal import Signal
+
+_NONE = np.zeros((0, signal.COLUMNS))
+
+
+@dataclass(frozen=True)
+class JointDrive:
+    """One joint's drive: feedforward `force` [N or N m], and PD gains `kp`, `kd` on a `motion` [m or rad]."""
+
+    force: Signal | None = None
+    motion: Signal | None = None
+    kp: float = 0.0
+    kd: float = 0.0
+
+    def spec(self) -> dict[str, Any]:
+        out: dict[str, Any] = {}
+        if self.force is not None:
+            out["force"] = self.force.spec
+        if self.motion is not None:
+            out |= {"motion": self.motion.spec, "kp": self.kp, "kd": self.kd}
+        return out
+
+
+@dataclass(frozen=True)
+class Drive:
+    """The drives of all joints, one `JointDrive` a joint; `drive(t, position, velocity, tip_deflection)` gives (n,)."""
+
+    joints: tuple[JointDrive, ...]
+    meta: dict[str, Any] = field(default_factory=dict)
+
+    @staticmethod
+    def none(joints: int) -> Drive:
+        return Drive((JointDrive(),) * joints)
+
+    @staticmethod
+    def force(*signals: Signal | None) -> Drive:
+        """Open loop: a force or torque signal a joint (None: free)."""
+        return Drive(tuple(JointDrive(force=s) for s in signals))
+
+    @staticmethod
+    def pd(motions: Sequence[Signal], kp: Sequence[float], kd: Sequence[float]) -> Drive:
+        """Joint PD control along `motions`."""
+        return Drive(tuple(JointDrive(motion=m, kp=p, kd=d) for m, p, d in zip(motions, kp, kd, strict=True)))
+
+    def __call__(self, t: float, position: Any, velocity: Any, tip_deflection: float = 0.0) -> np.ndarray:
+        out = np.zeros(len(self.joints))
+        for i, joint in enumerate(self.joints):
+            if joint.force is not None:
+                out[i] = joint.force(t)[0]
+            if joint.motion is not None:
+                r, rd, _ = joint.motion(t)
+                out[i] += joint.kp * (r - position[i]) + joint.kd * (rd - velocity[i])
+        return out
+
+    @property
+    def breaks(self) -> np.ndarray:
+        """Instants at which a drive isn't smooth, ascending [s]."""
+        all_breaks = [s.breaks for j in self.joints for s in (j.force, j.motion) if s is not None]
+        return np.unique(np.concatenate(all_breaks)) if all_breaks else np.zeros(0)
+
+    def packed(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Segments (k, 10) of all signals, their index (n, 4) [force from, to; motion from, to], gains (n, 2)."""
+        parts, index, row = [_NONE], np.zeros((len(self.joints), 4), dtype=np.int64), 0
+        gains = np.zeros((len(self.joints), 2))
+        for i, joint in enumerate(self.joints):
+            for k, s in enumerate((joint.force, joint.motion)):
+                index[i, 2 * k] = row
+                if s is not None:
+                    parts.append(s.segments)
+                    row += len(s.segments)
+                index[i, 2 * k + 1] = row
+            if joint.motion is not None:
+                gains[i] = joint.kp, joint.kd
+        return np.ascontiguousarray(np.concatenate(parts)), index, gains
+
+
+@dataclass(frozen=True)
+class Manoeuvre:
+    """What a robot is asked to do: a drive, for how long, and how often the result is stored. Read from a TOML file."""
+
+    name: str
+    duration_s: float
+    output_step_s: float
+    drive: Drive
+
+    @property
+    def t(self) -> np.ndarray:
+        """Times of the result [s], from 0 to the duration."""
+        return np.linspace(0.0, self.duration_s, round(self.duration_s / self.output_step_s) + 1)
+
+    def spec(self) -> dict[str, Any]:
+        joints = [joint.spec() for joint in self.drive.joints]
+        return {"name": self.name, "duration_s": self.duration_s, "output_step_s": self.output_step_s, "joint": joints}
+
+
+_KEYS = ("name", "duration_s", "output_step_s", "joint")
+_JOINT_KEYS = ("force", "motion", "kp", "kd")
+
+
+def load_manoeuvre(path: str | os.PathLike[str], joints: int) -> Manoeuvre:
+    """Read a manoeuvre file for a robot with that many joints. Raises InputError, naming file, key and value."""
+    try:
+        return _manoeuvre(read_toml(path), joints)
+    except InputError as error:
+        raise error if error.file else error.in_file(os.fspath(path)) from None
+
+
+def _manoeuvre(data: dict[str, Any], joints: int) -> Manoeuvre:
+    _known(data, _KEYS, "")
+    duration = _number(data, "duration_s", "a duration above 0 in seconds", low=0.0)
+    step = _number(data, "output_step_s", "a time above 0 in seconds, at most the duration", low=0.0, default=duration / 200)
+    if step > duration:
+        raise InputError(f"expected at most the duration, {duration:g} s", key="output_step_s", value=step)
+    if duration / step > 1e7:
+        raise InputError("expected at most 10 million output steps", key="output_step_s", value=step)
+    tables = data.get("joint", [])
+    if not isinstance(tables, list) or len(tables) != joints:
+        count = len(tables) if isinstance(tables, list) else tables
+        raise InputError(f"expected {joints} tables [[joint]], one for each joint of the robot", key="joint", value=count)
+    drives = []
+    for i, entry in enumerate(tables, 1):
+        key = f"joint[{i}]"
+        if not isinstance(entry, dict):
+            raise InputError("expected a table", key=key, value=entry)
+        _known(entry, _JOINT_KEYS, key + ".")
+        force = signal.from_spec(entry["force"], key=f"{key}.force") if "force" in entry else None
+        motion = signal.from_spec(entry["motion"], key=f"{key}.motion") if "motion" in entry else None
+        gains = [_number(entry, k, "a gain of 0 or more", key=f"{key}.", low=-0.0, default=0.0, closed=True) for k in ("kp", "kd")]
+        if motion is None and any(gains):
+            raise InputError("missing: gains kp and kd need a motion to follow", key=f"{key}.motion")
+        drives.append(JointDrive(force, motion, *gains))
+    name = data.get("name", "")
+    if not isinstance(name, str):
+        raise InputError("expected a text", key="name", value=name)
+    return Manoeuvre(name, duration, step, Drive(tuple(drives)))
+
+
+def _known(data: dict[str, Any], keys: Sequence[str], prefix: str) -> None:
+    for key, value in data.items():
+        if key not in keys:
+            raise InputError(f"an unknown key; known here: {', '.join(keys)}", key=prefix + key, value=value)
+
+
+def _number(
+    data: dict[str, Any], name: str, expected: str, *, key: str = "", low: float, default: float | None = None, closed: bool = False
+) -> float:
+    value = data.get(name, default)
+    if value is None:
+        raise InputError(f"missing: expected {expected}", key=key + name)
+    good = isinstance(value, int | float) and not isinstance(value, bool) and np.isfinite(value)
+    if not good or not (value >= low if closed else value > low):
+        raise InputError(f"expected {expected}", key=key + name, value=value)
+    return float(value)

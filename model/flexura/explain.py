@@ -1,0 +1,74 @@
+"""Pydantic's complaint about a file, said in the project's words: key, value, what was expected."""
+
+from __future__ import annotations
+
+import difflib
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+
+from .errors import InputError, WrongValue
+
+
+def explain(error: ValidationError, model: type[BaseModel], data: Any, file: str = "") -> InputError:
+    """The first problem of `error` as an InputError; keys are counted from 1, as in `link[2].length_m`."""
+    problems = error.errors()
+    first = problems[0]
+    table: type[BaseModel] | None = model
+    keys: list[str] = []
+    expected, value, found = "", data, True
+    for part in first["loc"]:
+        if isinstance(part, int):
+            keys[-1] += f"[{part + 1}]"
+        elif table is not None and part in table.model_fields:
+            field = table.model_fields[part]
+            keys.append(part)
+            expected = field.description or expected
+            table = _table_inside(field.annotation, value, part)
+        elif first["type"] == "extra_forbidden" and part == first["loc"][-1]:
+            keys.append(str(part))
+        else:
+            continue  # a branch of a union, not a key
+        try:
+            value = value[part]
+        except (KeyError, IndexError, TypeError):
+            value, found = None, False
+    more = len({_place(problem) for problem in problems}) - 1
+    wrong = (first.get("ctx") or {}).get("error")
+    if isinstance(wrong, WrongValue):
+        tail = wrong.key.split(".")
+        path = keys[:-1] if keys and keys[-1] == tail[0] else keys
+        return InputError(_worded(wrong.expected), key=".".join(path + tail), value=wrong.value, file=file, more=more)
+    key = ".".join(keys) or "the file"
+    if first["type"] == "extra_forbidden":
+        names = list(table.model_fields) if table is not None else []
+        near = difflib.get_close_matches(keys[-1], names, 1, 0.5)
+        hint = f"did you mean {near[0]}?" if near else f"known here: {', '.join(names)}"
+        return InputError(f"an unknown key; {hint}", key=key, value=value, file=file, more=more)
+    if first["type"] == "missing":
+        return InputError(f"missing: expected {expected}", key=key, file=file, more=more)
+    return InputError(_worded(expected or first["msg"]), key=key, value=value if found else None, file=file, more=more)
+
+
+def _worded(expected: str) -> str:
+    return expected if expected.startswith("missing") else f"expected {expected}"
+
+
+def _place(problem: Any) -> tuple[Any, ...]:
+    """Where a problem is, the branches of unions (upper-case or bracketed names) left out."""
+    return tuple(p for p in problem["loc"] if isinstance(p, int) or not (p[:1].isupper() or "[" in p or p in ("float", "constrained-float")))
+
+
+def _table_inside(annotation: Any, value: Any, part: Any) -> type[BaseModel] | None:
+    """The model that describes a key's table, or the entries of its list."""
+    tables = _tables(annotation)
+    if len(tables) > 1:  # a table or a list of tables: look at what was given
+        given = value.get(part) if isinstance(value, dict) else None
+        return tables[-1] if isinstance(given, list) else tables[0]
+    return tables[0] if tables else None
+
+
+def _tables(annotation: Any) -> list[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [table for arg in get_args(annotation) for table in _tables(arg)]

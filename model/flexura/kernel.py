@@ -1,0 +1,584 @@
+"""The equations of motion, compiled: kinematics along the chain, forward and inverse dynamics, energies.
+
+Notation of `model/README.md`. All vectors are in the axes of the link's hub frame; u = (ax, ay, alpha) is the
+acceleration of the hub frame relative to free fall (gravity enters as an acceleration of the base), t that of the place where the next
+joint is attached. A link's equations are
+
+    F   = Mrr u + Mrq qdd + hr + X^T f             wrench that the joint exerts on the hub
+    0   = Mqr u + Mqq qdd + hq + L q + D qd + Jq^T f   elastic rows; L = diag(omega^2), D diagonal
+    t   = X u + Jq qdd + beta                      acceleration of the attachment, which carries the wrench f = A t + b
+
+Condensing the outboard chain from the tip to the base gives A and b of every attachment (an articulated-body recursion with elastic
+coordinates), and so the accelerations, in time proportional to the number of links.
+No matrix larger than a link's own elastic block is ever factorised.
+
+`gh` makes the same pass an implicit stage: with y = y* + gh^2 a and v = v* + gh a the linear terms (stiffness,
+damping, gains) are taken at y, v and the others at the current iterate. gh = 0 is plain forward dynamics.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .beam import POINTS, SLOPES
+from .compiled import compiled
+
+REVOLUTE, PRISMATIC = 0, 1  # joint kinds; PRISMATIC: Pa on a rigid predecessor
+COULOMB_SPEED = 1e-3  # m/s or rad/s: Coulomb friction is f tanh(v / COULOMB_SPEED)
+
+
+class Chain(NamedTuple):
+    """The constants of a robot. N links, n unknowns; arrays (n,) use the global numbering [eta_1, q_1, eta_2, q_2, ...]."""
+
+    first: np.ndarray  # (N + 1,) int: row of the joint of each link; its elastic rows follow; first[N] = n
+    at: np.ndarray  # (N + 1,) int: where the link's m x m blocks start in G1, G2, H and Work.S
+    kind: np.ndarray  # (N,) int: REVOLUTE or PRISMATIC
+    locked: np.ndarray  # (N,) int
+    angle: np.ndarray  # (N,) gamma [rad]
+    rotor: np.ndarray  # (N,)
+    viscous: np.ndarray  # (N,)
+    coulomb: np.ndarray  # (N,)
+    length: np.ndarray  # (N,)
+    mass: np.ndarray  # (N,)
+    s1: np.ndarray  # (N,)
+    inertia: np.ndarray  # (N,)
+    S0: np.ndarray  # (n,) int phi dm
+    S1: np.ndarray  # (n,) int x phi dm
+    NL: np.ndarray  # (n,) phi(L)
+    SL: np.ndarray  # (n,) phi'(L)
+    lam: np.ndarray  # (n,) omega^2
+    damp: np.ndarray  # (n,) alpha + beta omega^2
+    G1: np.ndarray  # (sum m^2,)
+    G2: np.ndarray  # (sum m^2,)
+    H: np.ndarray  # (sum m^2,)
+    tip_inertia: np.ndarray  # (N,) of the payload [kg m^2]
+    point_x: np.ndarray  # (N, POINTS)
+    point_mass: np.ndarray  # (N, POINTS)
+    point_phi: np.ndarray  # (n, POINTS)
+    slope_dx: np.ndarray  # (N, SLOPES)
+    slope_EI: np.ndarray  # (N, SLOPES)
+    slope_d1: np.ndarray  # (n, SLOPES) phi'
+    slope_d2: np.ndarray  # (n, SLOPES) phi''
+    stiffening: bool
+    gravity: np.ndarray  # (2,)
+
+
+class Work(NamedTuple):
+    """Workspace of one solver: what the outward pass finds and the inward pass needs. N links, n unknowns."""
+
+    cos: np.ndarray  # (N,) of the relative angle psi between a link and its predecessor's attachment
+    sin: np.ndarray  # (N,)
+    omega: np.ndarray  # (N,) angular velocity of the hub frame
+    place: np.ndarray  # (N, 5): attachment r (2) and beta (3)
+    tilt: np.ndarray  # (N,) rate of the tip's tangent over that of w'(L)
+    g1q: np.ndarray  # (n,) -Mrq, x: int h dm
+    mt: np.ndarray  # (n,) Mrq, angle
+    cv: np.ndarray  # (n,) velocity-dependent forces on the elastic rows
+    hq: np.ndarray  # (n,) h at the tip
+    h: np.ndarray  # (n, POINTS) h = -du/dq at the points
+    slope: np.ndarray  # (14, SLOPES)
+    point: np.ndarray  # (7, POINTS)
+    body: np.ndarray  # (N, 6): int w dm, int (x + u) dm, int (x + u)^2 + w^2 dm; hr (3)
+    cond: np.ndarray  # (N, 30) of the condensation: A (6), b (3), (1 + E A)^-1 (9), X - P (9), t0 (3)
+    joint: np.ndarray  # (N, 5): A s (3), 1 / (s^T A s + ...), tau - s^T b
+    u: np.ndarray  # (N, 3)
+    S: np.ndarray  # (sum m^2,) the factor l of each link's elastic block
+    dinv: np.ndarray  # (n,) 1/d of its factorisation
+    rhs: np.ndarray  # (n, 7)
+
+
+def workspace(c: Chain) -> Work:
+    """A fresh workspace for one solver of this chain."""
+    z, links, n = np.zeros, len(c.kind), int(c.first[-1])
+    return Work(
+        cos=z(links), sin=z(links), omega=z(links), place=z((links, 5)), tilt=z(links), g1q=z(n), mt=z(n), cv=z(n), hq=z(n),
+        h=z((n, POINTS)), slope=z((14, SLOPES)), point=z((7, POINTS)),
+        body=z((links, 6)), cond=z((links, 30)), joint=z((links, 5)), u=z((links, 3)), S=z(int(c.at[-1])), dinv=z(n), rhs=z((n, 7)),
+    )  # fmt: skip
+
+
+@compiled
+def outward(c: Chain, w: Work, y: np.ndarray, v: np.ndarray) -> None:
+    """Positions and velocities along the chain, and each link's inertia terms and velocity-dependent forces."""
+    links = c.kind.shape[0]
+    omega, slope = 0.0, 0.0  # of the place where the next joint is attached, relative to its link
+    for i in range(links):
+        e, end = c.first[i], c.first[i + 1]
+        if c.kind[i] == REVOLUTE:
+            psi = slope + y[e]
+            omega += v[e]
+        else:
+            psi = slope + c.angle[i]
+        w.cos[i], w.sin[i], w.omega[i] = np.cos(psi), np.sin(psi), omega
+        om2 = omega * omega
+        slope, spin, wL, wLd, S0q, S0v, qq, qv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for k in range(e + 1, end):
+            slope += c.SL[k] * y[k]
+            spin += c.SL[k] * v[k]
+            wL += c.NL[k] * y[k]
+            wLd += c.NL[k] * v[k]
+            S0q += c.S0[k] * y[k]
+            S0v += c.S0[k] * v[k]
+            qq += y[k] * y[k]
+            qv += y[k] * v[k]
+            w.mt[k] = c.S1[k]
+            w.cv[k] = -om2 * y[k]
+        w.body[i, 0], w.body[i, 1], w.body[i, 2] = S0q, c.s1[i], c.inertia[i] + qq
+        w.body[i, 3], w.body[i, 4], w.body[i, 5] = -2 * omega * S0v - om2 * c.s1[i], -om2 * S0q, 2 * omega * qv
+        u, k_, z, turn = 0.0, 0.0, 0.0, 0.0
+        w.tilt[i] = 1.0
+        if c.stiffening and end > e + 1:
+            u, k_, z = _bend(c, w, i, y, v, omega)
+            # the tip's tangent turns by asin(w'), faster than w' by 1/cos
+            tilt = 1.0 / np.sqrt(1.0 - slope * slope)
+            w.tilt[i] = tilt
+            turn = slope * spin * spin * tilt * tilt * tilt
+            Jp = c.tip_inertia[i]
+            if Jp > 0.0:
+                w.body[i, 5] += Jp * turn
+                for k in range(e + 1, end):
+                    w.mt[k] += Jp * (tilt - 1.0) * c.SL[k]
+                    w.cv[k] += Jp * tilt * turn * c.SL[k]
+            slope = np.arcsin(slope)
+            spin *= tilt
+        if i + 1 < links and c.kind[i + 1] == PRISMATIC:  # the next hub slides along this rigid link
+            w.place[i, 0], w.place[i, 1] = y[end], 0.0
+            w.place[i, 2], w.place[i, 3], w.place[i, 4] = -om2 * y[end], 2 * omega * v[end], 0.0
+        else:
+            rx = c.length[i] + u
+            w.place[i, 0], w.place[i, 1] = rx, wL
+            w.place[i, 2], w.place[i, 3], w.place[i, 4] = -om2 * rx - 2 * omega * wLd - z, -om2 * wL - 2 * omega * k_, turn
+        omega += spin
+
+
+@compiled
+def _bend(c: Chain, w: Work, i: int, y: np.ndarray, v: np.ndarray, omega: float) -> tuple[float, float, float]:
+    """Add the geometry of an inextensible line to link i's inertia terms and forces; returns u, h.v, z of its tip.
+
+    The point at arc length x lies at (x + u, w) in the hub's frame, with u = int_0^x (cos - 1), sin = w', so that
+    du/dt = -h.v, h = int_0^x tan phi', and d2u/dt2 = -h.qdd - z, z = int_0^x (dw'/dt)^2 / cos^3. The curvature is w'' / cos, which
+    adds 1/2 int EI w''^2 tan^2 to the strain energy. What is of second order in (q, v) comes from the exact integrals G1, G2, H;
+    the rest (tan - sin and the like, and products of u) is summed over the link's points.
+    """
+    e, m = c.first[i] + 1, c.first[i + 1] - c.first[i] - 1
+    om2 = omega * omega
+    qGq, qGv, vGv, qG2q, qG2v, qHq, qHv, vHv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    row = c.at[i]
+    for k in range(e, e + m):
+        g, gv, g2, h, hv = 0.0, 0.0, 0.0, 0.0, 0.0
+        for j in range(m):
+            q, qd = y[e + j], v[e + j]
+            g += c.G1[row + j] * q
+            gv += c.G1[row + j] * qd
+            g2 += c.G2[row + j] * q
+            h += c.H[row + j] * q
+            hv += c.H[row + j] * qd
+        row += m
+        w.g1q[k], w.hq[k] = g, h
+        w.cv[k] += om2 * g2
+        qGq += g * y[k]
+        qGv += g * v[k]
+        vGv += gv * v[k]
+        qG2q += g2 * y[k]
+        qG2v += g2 * v[k]
+        qHq += h * y[k]
+        qHv += h * v[k]
+        vHv += hv * v[k]
+    s, sd, bend = w.slope[0], w.slope[1], w.slope[2]
+    wp, wd = w.point[0], w.point[1]
+    for r in range(SLOPES):
+        s[r], sd[r], bend[r] = 0.0, 0.0, 0.0
+    for p in range(POINTS):
+        wp[p], wd[p] = 0.0, 0.0
+    for k in range(e, e + m):
+        q, qd = y[k], v[k]
+        for r in range(SLOPES):
+            s[r] += c.slope_d1[k, r] * q
+            sd[r] += c.slope_d1[k, r] * qd
+            bend[r] += c.slope_d2[k, r] * q
+        for p in range(POINTS):
+            wp[p] += c.point_phi[k, p] * q
+            wd[p] += c.point_phi[k, p] * qd
+    sin, tan, rest = w.slope[3], w.slope[4], w.slope[5]  # times dx; rest = tan - sin
+    fs, fb = w.slope[6], w.slope[7]
+    u, k_, z, du, dk, dz = w.slope[8], w.slope[9], w.slope[10], w.slope[11], w.slope[12], w.slope[13]
+    for r in range(SLOPES):
+        s2 = s[r] * s[r]
+        cos2 = 1.0 - s2
+        cos = np.sqrt(cos2)
+        dx, EI = c.slope_dx[i, r], c.slope_EI[i, r]
+        sin[r] = dx * s[r]
+        rest[r] = dx * s[r] * s2 / (cos * (1.0 + cos))
+        tan[r] = sin[r] + rest[r]
+        u[r] = -dx * s2 / (1.0 + cos)
+        du[r] = -0.5 * dx * s2 * s2 / ((1.0 + cos) * (1.0 + cos))
+        k_[r], dk[r] = tan[r] * sd[r], rest[r] * sd[r]
+        z[r] = dx * sd[r] * sd[r] / (cos2 * cos)
+        dz[r] = z[r] - dx * sd[r] * sd[r]
+        fb[r] = EI * bend[r] * s2 / cos2
+        fs[r] = EI * bend[r] * bend[r] * s[r] / (cos2 * cos2)
+    U, K, Z, dU, dK, dZ = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    b, J, hx, hy, hw = -0.5 * qGq, -qG2q, vGv, qGv, -2 * omega * qG2v
+    along, across, up, wm, ax = w.point[2], w.point[3], w.point[4], w.point[5], w.point[6]
+    for p in range(POINTS):
+        for r in range(p * SLOPES // POINTS, (p + 1) * SLOPES // POINTS):
+            U += u[r]
+            K += k_[r]
+            Z += z[r]
+            dU += du[r]
+            dK += dk[r]
+            dZ += dz[r]
+        mu, x = c.point_mass[i, p], c.point_x[i, p]
+        along[p], across[p] = mu * (om2 * U + 2 * omega * wd[p] + Z), -2 * omega * mu * K
+        up[p], wm[p], ax[p] = mu * U, mu * wp[p], mu * om2 * x
+        b += mu * dU
+        J += mu * (2 * x * dU + U * U)
+        hx += mu * dZ
+        hy += mu * dK
+        hw += mu * (wp[p] * Z - 2 * omega * (K * U + dK * x))
+    w.body[i, 1] += b
+    w.body[i, 2] += J
+    w.body[i, 3] -= om2 * b + hx
+    w.body[i, 4] -= 2 * omega * hy
+    w.body[i, 5] += hw
+    for k in range(e, e + m):
+        h, dh, g, mt, cv = 0.0, 0.0, 0.0, 0.0, 0.0
+        for r in range(SLOPES):
+            cv += fs[r] * c.slope_d1[k, r] + fb[r] * c.slope_d2[k, r]
+        for p in range(POINTS):
+            for r in range(p * SLOPES // POINTS, (p + 1) * SLOPES // POINTS):
+                h += tan[r] * c.slope_d1[k, r]
+                dh += rest[r] * c.slope_d1[k, r]
+            w.h[k, p] = h
+            g += c.point_mass[i, p] * dh
+            mt += up[p] * c.point_phi[k, p] + wm[p] * h
+            cv += along[p] * h + across[p] * c.point_phi[k, p] + ax[p] * dh
+        w.g1q[k] += g
+        w.hq[k] += dh
+        w.mt[k] += mt
+        w.cv[k] += cv
+    return dU - 0.5 * qHq, dK + qHv, dZ + vHv
+
+
+@compiled
+def _rigid_hub(c: Chain, w: Work, i: int, A: tuple, b: tuple) -> tuple:
+    """Condensed inertia (6) and bias (3) at the hub of a rigid link that carries the wrench A t + b at its attachment."""
+    A00, A01, A02, A11, A12, A22 = A
+    rx, ry = w.place[i, 0], w.place[i, 1]
+    bx, by = w.place[i, 2], w.place[i, 3]
+    f0 = b[0] + A00 * bx + A01 * by
+    f1 = b[1] + A01 * bx + A11 * by
+    f2 = b[2] + A02 * bx + A12 * by
+    m02, m12 = A02 - ry * A00 + rx * A01, A12 - ry * A01 + rx * A11
+    inertia = A22 - ry * (A02 + m02) + rx * (A12 + m12)
+    return (
+        c.mass[i] + A00, A01, m02 - w.body[i, 0], c.mass[i] + A11, m12 + w.body[i, 1], w.body[i, 2] + inertia,
+        w.body[i, 3] + f0, w.body[i, 4] + f1, w.body[i, 5] + f2 - ry * f0 + rx * f1,
+    )  # fmt: skip
+
+
+@compiled
+def _elastic(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh: float, columns: int) -> None:
+    """Factorise S = Mqq + gh D + gh^2 L = l d l^T of a flexible link and form l^-1 (Mqr, cq, Jq^T) in the rows of w.rhs.
+
+    Mqq = 1 + sum mu h h^T over the link's points, and the payload's turning. Columns: Mrq (x, y, angle), cq, Jq (x, y, angle); the last three if columns = 7.
+    """
+    e, end = c.first[i], c.first[i + 1]
+    m = end - e - 1
+    S, at = w.S, c.at[i]
+    for k in range(m):
+        for j in range(k):
+            S[at + k * m + j] = 0.0
+        r = e + 1 + k
+        S[at + k * m + k] = 1.0 + gh * c.damp[r] + gh * gh * c.lam[r]
+        w.rhs[r, 0], w.rhs[r, 1], w.rhs[r, 2] = -w.g1q[r], c.S0[r], w.mt[r]
+        w.rhs[r, 3] = c.lam[r] * ys[r] + c.damp[r] * vs[r] + w.cv[r]
+        w.rhs[r, 4], w.rhs[r, 5], w.rhs[r, 6] = -w.hq[r], c.NL[r], w.tilt[i] * c.SL[r]
+    if c.stiffening:
+        turning = c.tip_inertia[i] * (w.tilt[i] * w.tilt[i] - 1.0)
+        for k in range(m):
+            for j in range(k + 1):
+                total = turning * c.SL[e + 1 + k] * c.SL[e + 1 + j]
+                for p in range(POINTS):
+                    total += c.point_mass[i, p] * w.h[e + 1 + k, p] * w.h[e + 1 + j, p]
+                S[at + k * m + j] += total
+    for k in range(m):
+        row = at + k * m
+        for j in range(k):
+            entry = S[row + j]
+            for s in range(j):
+                entry -= S[row + s] * S[at + j * m + s]  # S[row + s] still holds l d
+            S[row + j] = entry
+        d = S[row + k]
+        for j in range(k):
+            ld = S[row + j]
+            lower = ld * w.dinv[e + 1 + j]
+            d -= ld * lower
+            S[row + j] = lower
+            for s in range(columns):
+                w.rhs[e + 1 + k, s] -= lower * w.rhs[e + 1 + j, s]
+        w.dinv[e + 1 + k] = 1.0 / d
+
+
+@compiled
+def _last_hub(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh: float) -> tuple:
+    """The same for the last link if it is flexible: nothing is attached to its tip, the payload is in its own terms."""
+    _elastic(c, w, i, ys, vs, gh, 4)
+    Q00, Q01, Q02, Q11, Q12, Q22, m0, m1, m2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(c.first[i] + 1, c.first[i + 1]):
+        r0, r1, r2, cq = w.rhs[k, 0], w.rhs[k, 1], w.rhs[k, 2], w.rhs[k, 3]
+        d0, d1, d2 = w.dinv[k] * r0, w.dinv[k] * r1, w.dinv[k] * r2
+        Q00 += d0 * r0
+        Q01 += d0 * r1
+        Q02 += d0 * r2
+        Q11 += d1 * r1
+        Q12 += d1 * r2
+        Q22 += d2 * r2
+        m0 += d0 * cq
+        m1 += d1 * cq
+        m2 += d2 * cq
+    return (
+        c.mass[i] - Q00, -Q01, -w.body[i, 0] - Q02, c.mass[i] - Q11, w.body[i, 1] - Q12, w.body[i, 2] - Q22,
+        w.body[i, 3] - m0, w.body[i, 4] - m1, w.body[i, 5] - m2,
+    )  # fmt: skip
+
+
+@compiled
+def _flexible_hub(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh: float, A: tuple, b: tuple) -> tuple:
+    """The same for a flexible link that carries the wrench f = A t + b at its attachment.
+
+    With Q = Mrq S^-1 Mqr, P = Jq S^-1 Mqr, E = Jq S^-1 Jq^T and B = A (1 + E A)^-1, condensing the elastic rows gives
+    t = (1 + E A)^-1 [(X - P) u + t0], t0 = beta - Jq S^-1 cq - E b, and
+    F = [Mrr - Q + (X - P)^T B (X - P)] u + hr - Mrq S^-1 cq + (X - P)^T (B t0 + b).
+    """
+    A00, A01, A02, A11, A12, A22 = A
+    b0, b1, b2 = b
+    _elastic(c, w, i, ys, vs, gh, 7)
+    Q00, Q01, Q02, Q11, Q12, Q22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    P00, P01, P02, P10, P11, P12, P20, P21, P22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    E00, E01, E02, E11, E12, E22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    m0, m1, m2, j0, j1, j2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(c.first[i] + 1, c.first[i + 1]):
+        x, s0, s1, cq = w.rhs[k, 0], w.rhs[k, 1], w.rhs[k, 2], w.rhs[k, 3]
+        jx, jy, jz = w.rhs[k, 4], w.rhs[k, 5], w.rhs[k, 6]
+        dx, d0, d1 = w.dinv[k] * x, w.dinv[k] * s0, w.dinv[k] * s1
+        ex, ey, ez = w.dinv[k] * jx, w.dinv[k] * jy, w.dinv[k] * jz
+        Q00 += dx * x
+        Q01 += dx * s0
+        Q02 += dx * s1
+        Q11 += d0 * s0
+        Q12 += d0 * s1
+        Q22 += d1 * s1
+        m0 += dx * cq
+        m1 += d0 * cq
+        m2 += d1 * cq
+        P00 += jx * dx
+        P01 += jx * d0
+        P02 += jx * d1
+        P10 += jy * dx
+        P11 += jy * d0
+        P12 += jy * d1
+        P20 += jz * dx
+        P21 += jz * d0
+        P22 += jz * d1
+        E00 += ex * jx
+        E01 += ex * jy
+        E02 += ex * jz
+        E11 += ey * jy
+        E12 += ey * jz
+        E22 += ez * jz
+        j0 += ex * cq
+        j1 += ey * cq
+        j2 += ez * cq
+    w00 = 1.0 + E00 * A00 + E01 * A01 + E02 * A02
+    w01 = E00 * A01 + E01 * A11 + E02 * A12
+    w02 = E00 * A02 + E01 * A12 + E02 * A22
+    w10 = E01 * A00 + E11 * A01 + E12 * A02
+    w11 = 1.0 + E01 * A01 + E11 * A11 + E12 * A12
+    w12 = E01 * A02 + E11 * A12 + E12 * A22
+    w20 = E02 * A00 + E12 * A01 + E22 * A02
+    w21 = E02 * A01 + E12 * A11 + E22 * A12
+    w22 = 1.0 + E02 * A02 + E12 * A12 + E22 * A22
+    c00, c01, c02 = w11 * w22 - w12 * w21, w02 * w21 - w01 * w22, w01 * w12 - w02 * w11
+    c10, c11, c12 = w12 * w20 - w10 * w22, w00 * w22 - w02 * w20, w02 * w10 - w00 * w12
+    c20, c21, c22 = w10 * w21 - w11 * w20, w01 * w20 - w00 * w21, w00 * w11 - w01 * w10
+    det = 1.0 / (w00 * c00 + w01 * c10 + w02 * c20)
+    c00, c01, c02 = c00 * det, c01 * det, c02 * det
+    c10, c11, c12 = c10 * det, c11 * det, c12 * det
+    c20, c21, c22 = c20 * det, c21 * det, c22 * det
+    x00, x01, x02 = 1.0 - P00, -P01, -w.place[i, 1] - P02
+    x10, x11, x12 = -P10, 1.0 - P11, w.place[i, 0] - P12
+    x20, x21, x22 = -P20, -P21, 1.0 - P22
+    t0 = w.place[i, 2] - j0 - (E00 * b0 + E01 * b1 + E02 * b2)
+    t1 = w.place[i, 3] - j1 - (E01 * b0 + E11 * b1 + E12 * b2)
+    t2 = w.place[i, 4] - j2 - (E02 * b0 + E12 * b1 + E22 * b2)
+    cond = w.cond[i]
+    cond[0], cond[1], cond[2], cond[3], cond[4], cond[5] = A00, A01, A02, A11, A12, A22
+    cond[6], cond[7], cond[8] = b0, b1, b2
+    cond[9], cond[10], cond[11], cond[12], cond[13], cond[14] = c00, c01, c02, c10, c11, c12
+    cond[15], cond[16], cond[17] = c20, c21, c22
+    cond[18], cond[19], cond[20], cond[21], cond[22], cond[23] = x00, x01, x02, x10, x11, x12
+    cond[24], cond[25], cond[26] = x20, x21, x22
+    cond[27], cond[28], cond[29] = t0, t1, t2
+    B00 = A00 * c00 + A01 * c10 + A02 * c20
+    B01 = A00 * c01 + A01 * c11 + A02 * c21
+    B02 = A00 * c02 + A01 * c12 + A02 * c22
+    B11 = A01 * c01 + A11 * c11 + A12 * c21
+    B12 = A01 * c02 + A11 * c12 + A12 * c22
+    B22 = A02 * c02 + A12 * c12 + A22 * c22
+    f0 = B00 * t0 + B01 * t1 + B02 * t2 + b0
+    f1 = B01 * t0 + B11 * t1 + B12 * t2 + b1
+    f2 = B02 * t0 + B12 * t1 + B22 * t2 + b2
+    y00, y01, y02 = B00 * x00 + B01 * x10 + B02 * x20, B00 * x01 + B01 * x11 + B02 * x21, B00 * x02 + B01 * x12 + B02 * x22
+    y10, y11, y12 = B01 * x00 + B11 * x10 + B12 * x20, B01 * x01 + B11 * x11 + B12 * x21, B01 * x02 + B11 * x12 + B12 * x22
+    y20, y21, y22 = B02 * x00 + B12 * x10 + B22 * x20, B02 * x01 + B12 * x11 + B22 * x21, B02 * x02 + B12 * x12 + B22 * x22
+    return (
+        c.mass[i] - Q00 + x00 * y00 + x10 * y10 + x20 * y20,
+        x00 * y01 + x10 * y11 + x20 * y21 - Q01,
+        x00 * y02 + x10 * y12 + x20 * y22 - w.body[i, 0] - Q02,
+        c.mass[i] - Q11 + x01 * y01 + x11 * y11 + x21 * y21,
+        w.body[i, 1] - Q12 + x01 * y02 + x11 * y12 + x21 * y22,
+        w.body[i, 2] - Q22 + x02 * y02 + x12 * y12 + x22 * y22,
+        w.body[i, 3] - m0 + x00 * f0 + x10 * f1 + x20 * f2,
+        w.body[i, 4] - m1 + x01 * f0 + x11 * f1 + x21 * f2,
+        w.body[i, 5] - m2 + x02 * f0 + x12 * f1 + x22 * f2,
+    )
+
+
+@compiled
+def accelerate(
+    c: Chain, w: Work, y: np.ndarray, v: np.ndarray, ys: np.ndarray, vs: np.ndarray, gh: float,
+    force: np.ndarray, kp: np.ndarray, kd: np.ndarray, a: np.ndarray,
+) -> None:  # fmt: skip
+    """Accelerations a (n,) at (y, v) under joint forces, with the linear terms at ys + gh^2 a, vs + gh a.
+
+    `force` (N,) is what acts in the joints apart from friction, at (ys, vs); kp, kd (N,) are its gains.
+    """
+    outward(c, w, y, v)
+    links = c.kind.shape[0]
+    A, b = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)  # the wrench A t + b at the attachment of link i
+    for i in range(links - 1, -1, -1):
+        e = c.first[i]
+        if c.first[i + 1] - e == 1:
+            I00, I01, I02, I11, I12, I22, p0, p1, p2 = _rigid_hub(c, w, i, A, b)
+        elif i + 1 == links:
+            I00, I01, I02, I11, I12, I22, p0, p1, p2 = _last_hub(c, w, i, ys, vs, gh)
+        else:
+            I00, I01, I02, I11, I12, I22, p0, p1, p2 = _flexible_hub(c, w, i, ys, vs, gh, A, b)
+        # into the axes of the predecessor
+        cs, sn = w.cos[i], w.sin[i]
+        q0, q1 = cs * I00 - sn * I01, cs * I01 - sn * I11
+        r0, r1 = sn * I00 + cs * I01, sn * I01 + cs * I11
+        A00, A01, A11 = q0 * cs - q1 * sn, q0 * sn + q1 * cs, r0 * sn + r1 * cs
+        A02, A12, A22 = cs * I02 - sn * I12, sn * I02 + cs * I12, I22
+        b0, b1, b2 = cs * p0 - sn * p1, sn * p0 + cs * p1, p2
+        # condense the joint
+        if c.kind[i] == REVOLUTE:
+            a0, a1, a2, diagonal, bias = A02, A12, A22, A22, b2
+        else:
+            a0, a1, a2, diagonal, bias = A00, A01, A02, A00, b0
+        dinv, rest = 0.0, 0.0
+        if not c.locked[i]:
+            tau, hold = force[i] - c.viscous[i] * vs[e], 0.0
+            if c.coulomb[i] > 0.0:
+                grip = np.tanh(v[e] / COULOMB_SPEED)
+                hold = c.coulomb[i] * (1.0 - grip * grip) / COULOMB_SPEED
+                tau -= c.coulomb[i] * grip + hold * (vs[e] - v[e])
+            dinv = 1.0 / (diagonal + c.rotor[i] + gh * (c.viscous[i] + hold + kd[i]) + gh * gh * kp[i])
+            rest = tau - bias
+        w.joint[i, 0], w.joint[i, 1], w.joint[i, 2], w.joint[i, 3], w.joint[i, 4] = a0, a1, a2, dinv, rest
+        gain = rest * dinv
+        A = (
+            A00 - a0 * a0 * dinv, A01 - a0 * a1 * dinv, A02 - a0 * a2 * dinv,
+            A11 - a1 * a1 * dinv, A12 - a1 * a2 * dinv, A22 - a2 * a2 * dinv,
+        )  # fmt: skip
+        b = (b0 + a0 * gain, b1 + a1 * gain, b2 + a2 * gain)
+    t0, t1, t2 = -c.gravity[0], -c.gravity[1], 0.0
+    for i in range(links):
+        e, end = c.first[i], c.first[i + 1]
+        a[e] = w.joint[i, 3] * (w.joint[i, 4] - w.joint[i, 0] * t0 - w.joint[i, 1] * t1 - w.joint[i, 2] * t2)
+        if c.kind[i] == REVOLUTE:
+            t2 += a[e]
+        else:
+            t0 += a[e]
+        cs, sn = w.cos[i], w.sin[i]
+        u0, u1, u2 = cs * t0 + sn * t1, cs * t1 - sn * t0, t2
+        cond = w.cond[i]
+        if end - e == 1:
+            t0 = u0 - w.place[i, 1] * u2 + w.place[i, 2]
+            t1 = u1 + w.place[i, 0] * u2 + w.place[i, 3]
+        else:
+            f0, f1, f2 = 0.0, 0.0, 0.0
+            if i + 1 < links:
+                r0 = cond[18] * u0 + cond[19] * u1 + cond[20] * u2 + cond[27]
+                r1 = cond[21] * u0 + cond[22] * u1 + cond[23] * u2 + cond[28]
+                r2 = cond[24] * u0 + cond[25] * u1 + cond[26] * u2 + cond[29]
+                t0 = cond[9] * r0 + cond[10] * r1 + cond[11] * r2
+                t1 = cond[12] * r0 + cond[13] * r1 + cond[14] * r2
+                t2 = cond[15] * r0 + cond[16] * r1 + cond[17] * r2
+                f0 = cond[0] * t0 + cond[1] * t1 + cond[2] * t2 + cond[6]
+                f1 = cond[1] * t0 + cond[3] * t1 + cond[4] * t2 + cond[7]
+                f2 = cond[2] * t0 + cond[4] * t1 + cond[5] * t2 + cond[8]
+            m = end - e - 1
+            for k in range(e + 1, end):  # l a = -dinv l^-1 (Mqr u + cq + Jq^T f)
+                total = w.rhs[k, 0] * u0 + w.rhs[k, 1] * u1 + w.rhs[k, 2] * u2 + w.rhs[k, 3]
+                a[k] = -w.dinv[k] * (total + w.rhs[k, 4] * f0 + w.rhs[k, 5] * f1 + w.rhs[k, 6] * f2)
+            for k in range(m - 1, 0, -1):
+                row = c.at[i] + k * m
+                for j in range(k):
+                    a[e + 1 + j] -= w.S[row + j] * a[e + 1 + k]
+
+
+@compiled
+def inverse(c: Chain, w: Work, y: np.ndarray, v: np.ndarray, a: np.ndarray, gravity: np.ndarray, out: np.ndarray) -> None:
+    """Generalised forces out (n,) = M(y) a + bias(y, v) + gravity, without stiffness, damping and friction (Newton-Euler).
+
+    Exact and independent of the condensation in `accelerate`: the check of one against the other is a test.
+    """
+    outward(c, w, y, v)
+    links = c.kind.shape[0]
+    t0, t1, t2 = -gravity[0], -gravity[1], 0.0
+    for i in range(links):
+        e, end = c.first[i], c.first[i + 1]
+        if c.kind[i] == REVOLUTE:
+            t2 += a[e]
+        else:
+            t0 += a[e]
+        cs, sn = w.cos[i], w.sin[i]
+        u0, u1, u2 = cs * t0 + sn * t1, cs * t1 - sn * t0, t2
+        w.u[i, 0], w.u[i, 1], w.u[i, 2] = u0, u1, u2
+        t0, t1, t2 = u0 - w.place[i, 1] * u2 + w.place[i, 2], u1 + w.place[i, 0] * u2 + w.place[i, 3], u2 + w.place[i, 4]
+        for k in range(e + 1, end):
+            t0 -= w.hq[k] * a[k]
+            t1 += c.NL[k] * a[k]
+            t2 += w.tilt[i] * c.SL[k] * a[k]
+    f0, f1, f2 = 0.0, 0.0, 0.0
+    for i in range(links - 1, -1, -1):
+        e, end = c.first[i], c.first[i + 1]
+        u0, u1, u2 = w.u[i, 0], w.u[i, 1], w.u[i, 2]
+        F0 = c.mass[i] * u0 - w.body[i, 0] * u2 + w.body[i, 3] + f0
+        F1 = c.mass[i] * u1 + w.body[i, 1] * u2 + w.body[i, 4] + f1
+        F2 = -w.body[i, 0] * u0 + w.body[i, 1] * u1 + w.body[i, 2] * u2 + w.body[i, 5] - w.place[i, 1] * f0 + w.place[i, 0] * f1 + f2
+        for k in range(e + 1, end):
+            F0 -= w.g1q[k] * a[k]
+            F1 += c.S0[k] * a[k]
+            F2 += w.mt[k] * a[k]
+            own = a[k] + c.S0[k] * u1 + w.mt[k] * u2 - w.g1q[k] * u0 + w.cv[k]
+            out[k] = own - w.hq[k] * f0 + c.NL[k] * f1 + w.tilt[i] * c.SL[k] * f2
+        if c.stiffening:
+            spin = 0.0
+            for k in range(e + 1, end):
+                spin += c.tip_inertia[i] * (w.tilt[i] * w.tilt[i] - 1.0) * c.SL[k] * a[k]
+            for k in range(e + 1, end):
+                out[k] += spin * c.SL[k]
+            for p in range(POINTS):
+                total = 0.0
+                for k in range(e + 1, end):
+                    total += w.h[k, p] * a[k]
+                for k in range(e + 1, end):
+                    out[k] += c.point_mass[i, p] * total * w.h[k, p]
+        cs, sn = w.cos[i], w.sin[i]
+        f0, f1, f2 = cs * F0 - sn * F1, sn * F0 + cs * F1, F2
+        out[e] = (f2 if c.kind[i] == REVOLUTE else f0) + c.rotor[i] * a[e]

@@ -1,0 +1,356 @@
+"""The time loop, compiled: an explicit and an implicit method with a tolerance, one memory for both, no allocation inside.
+
+Explicit: DOP853 (Dormand and Prince 8(5,3), dense output of order 7; coefficients from SciPy). Implicit: ESDIRK4(3)6L[2]SA of Kennedy and
+Carpenter (2003, Appl. Numer. Math. 44), L-stable; each stage is solved by passes of `kernel.accelerate`, which holds stiffness, damping and
+gains implicitly, so that a pass costs what an explicit evaluation costs and steps follow the motion, not the stiffest mode.
+The local error of joint i is kept below rtol times the largest |eta_i| so far, that of a link's elastic unknowns below rtol times their
+largest norm so far, and so for the velocities; FLOOR replaces these at the start.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.integrate import DOP853
+
+from .compiled import compiled
+from .kernel import COULOMB_SPEED, Chain, Work, accelerate
+from .signal import evaluate
+
+EXPLICIT, IMPLICIT = 0, 1
+RUNNING, DONE, LIMIT, STUCK = 0, 1, 2, 3
+T, H, OUT, BREAK, STEPS, REJECTED, EVALS, ERR, STATUS, FRESH, FAULT = range(11)  # entries of Memory.s
+FLOOR = 1e-3  # m, rad (joints); kg^(1/2) m (elastic, mass-normalised); per second for the velocities
+
+_A, _B, _C = DOP853.A.copy(), DOP853.B.copy(), DOP853.C.copy()
+_E3, _E5 = DOP853.E3.copy(), DOP853.E5.copy()
+_AX, _CX, _D = DOP853.A_EXTRA.copy(), DOP853.C_EXTRA.copy(), DOP853.D.copy()
+
+GAMMA = 0.25
+_EA = np.array([
+    [0, 0, 0, 0, 0, 0],
+    [1 / 4, 1 / 4, 0, 0, 0, 0],
+    [8611 / 62500, -1743 / 31250, 1 / 4, 0, 0, 0],
+    [5012029 / 34652500, -654441 / 2922500, 174375 / 388108, 1 / 4, 0, 0],
+    [15267082809 / 155376265600, -71443401 / 120774400, 730878875 / 902184768, 2285395 / 8070912, 1 / 4, 0],
+    [82889 / 524892, 0, 15625 / 83664, 69875 / 102672, -2260 / 8211, 1 / 4],
+])  # fmt: skip
+_EC = np.array([0, 1 / 2, 83 / 250, 31 / 50, 17 / 20, 1])
+_EE = _EA[5] - np.array([4586570599 / 29645900160, 0, 178811875 / 945068544, 814220225 / 1159782912, -3700637 / 11593932, 61727 / 225920])
+
+
+class Inputs(NamedTuple):
+    """What acts on a robot: packed signals (k, 10), their index (N, 4), gains and limits (N,), instants to step on."""
+
+    segments: np.ndarray
+    index: np.ndarray
+    kp: np.ndarray
+    kd: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    breaks: np.ndarray
+
+
+class Memory(NamedTuple):
+    """All that a run in progress remembers, for n unknowns: state z = (y, v, work, loss) and the stages of one step."""
+
+    s: np.ndarray  # (11,) scalars, see T ... FAULT
+    z: np.ndarray  # (2n + 2,)
+    znew: np.ndarray
+    K: np.ndarray  # (16, 2n + 2) stage derivatives
+    F: np.ndarray  # (7, 2n + 2) dense output
+    big: np.ndarray  # (N, 4) largest |eta|, |eta'|, ||q||, ||q'|| so far
+    scale: np.ndarray  # (2n,) error weights
+    force: np.ndarray  # (N,)
+    ys: np.ndarray  # (n,)
+    vs: np.ndarray
+    a: np.ndarray
+    zero: np.ndarray  # (N,)
+
+
+def memory(links: int, unknowns: int) -> Memory:
+    z, size = np.zeros, 2 * unknowns + 2
+    return Memory(
+        z(11), z(size), z(size), z((16, size)), z((7, size)), z((links, 4)), z(2 * unknowns), z(links), z(unknowns), z(unknowns), z(unknowns),
+        z(links),
+    )  # fmt: skip
+
+
+@compiled
+def _copy(source: np.ndarray, target: np.ndarray) -> None:
+    for k in range(source.shape[0]):
+        target[k] = source[k]
+
+
+@compiled
+def _combine(m: Memory, h: float, weights: np.ndarray, count: int, out: np.ndarray) -> None:
+    """out = z + h sum_j weights_j K_j over the first `count` stages."""
+    size = m.z.shape[0]
+    for k in range(size):
+        out[k] = 0.0
+    for j in range(count):
+        weight = weights[j]
+        for k in range(size):
+            out[k] += weight * m.K[j, k]
+    for k in range(size):
+        out[k] = m.z[k] + h * out[k]
+
+
+@compiled
+def drive(c: Chain, d: Inputs, t: float, y: np.ndarray, v: np.ndarray, force: np.ndarray) -> None:
+    """Joint forces (N,) of the drives at time t."""
+    for i in range(force.shape[0]):
+        f0, f1, r0, r1 = d.index[i]
+        total = 0.0
+        if f1 > f0:
+            total = evaluate(d.segments[f0:f1], t)[0]
+        if r1 > r0:
+            r, rd, _ = evaluate(d.segments[r0:r1], t)
+            e = c.first[i]
+            total += d.kp[i] * (r - y[e]) + d.kd[i] * (rd - v[e])
+        force[i] = total
+
+
+@compiled
+def _powers(c: Chain, v: np.ndarray, force: np.ndarray, dz: np.ndarray) -> None:
+    """Power of the drives and power lost to friction and damping, into the last two entries of dz."""
+    n = v.shape[0]
+    work, loss = 0.0, 0.0
+    for i in range(force.shape[0]):
+        e = c.first[i]
+        work += force[i] * v[e]
+        loss += c.viscous[i] * v[e] * v[e]
+        if c.coulomb[i] > 0.0:
+            loss += c.coulomb[i] * v[e] * np.tanh(v[e] / COULOMB_SPEED)
+    for k in range(n):
+        loss += c.damp[k] * v[k] * v[k]
+    dz[2 * n], dz[2 * n + 1] = work, loss
+
+
+@compiled
+def _slope(c: Chain, w: Work, d: Inputs, m: Memory, t: float, z: np.ndarray, dz: np.ndarray) -> None:
+    n = m.a.shape[0]
+    y, v = z[:n], z[n : 2 * n]
+    drive(c, d, t, y, v, m.force)
+    accelerate(c, w, y, v, y, v, 0.0, m.force, m.zero, m.zero, dz[n : 2 * n])
+    _copy(v, dz[:n])
+    _powers(c, v, m.force, dz)
+    m.s[EVALS] += 1
+
+
+@compiled
+def _weights(c: Chain, m: Memory, rtol: float, z: np.ndarray) -> None:
+    """Error weights 1/(rtol * size) from the largest sizes so far."""
+    n = m.a.shape[0]
+    for i in range(c.kind.shape[0]):
+        e, end = c.first[i], c.first[i + 1]
+        q2, v2 = 0.0, 0.0
+        for k in range(e + 1, end):
+            q2 += z[k] * z[k]
+            v2 += z[n + k] * z[n + k]
+        big = m.big[i]
+        big[0], big[1] = max(big[0], abs(z[e])), max(big[1], abs(z[n + e]))
+        big[2], big[3] = max(big[2], np.sqrt(q2)), max(big[3], np.sqrt(v2))
+        m.scale[e], m.scale[n + e] = 1.0 / (rtol * max(big[0], FLOOR)), 1.0 / (rtol * max(big[1], FLOOR))
+        for k in range(e + 1, end):
+            m.scale[k], m.scale[n + k] = 1.0 / (rtol * max(big[2], FLOOR)), 1.0 / (rtol * max(big[3], FLOOR))
+
+
+@compiled
+def _explicit_step(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, last: float) -> float:
+    """One DOP853 step from m.z to m.znew; returns the error norm (accept below 1)."""
+    K, new = m.K, m.znew
+    for s in range(1, 12):
+        _combine(m, h, _A[s], s, new)
+        _slope(c, w, d, m, min(t + _C[s] * h, last), new, K[s])
+    _combine(m, h, _B, 12, new)
+    _slope(c, w, d, m, min(t + h, last), new, K[12])
+    e5, e3 = 0.0, 0.0
+    for k in range(m.scale.shape[0]):
+        a, b = 0.0, 0.0
+        for j in range(13):
+            a += _E5[j] * K[j, k]
+            b += _E3[j] * K[j, k]
+        a, b = a * m.scale[k], b * m.scale[k]
+        e5 += a * a
+        e3 += b * b
+    if e5 == 0.0:
+        return 0.0
+    return abs(h) * e5 / np.sqrt((e5 + 0.01 * e3) * m.scale.shape[0])
+
+
+@compiled
+def _explicit_dense(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, last: float) -> None:
+    """Coefficients of the order-7 interpolant of the step just made (m.z to m.znew)."""
+    K, F, z = m.K, m.F, m.z
+    size = z.shape[0]
+    for s in range(3):
+        _combine(m, h, _AX[s], 13 + s, F[0])
+        _slope(c, w, d, m, min(t + _CX[s] * h, last), F[0], K[13 + s])
+    for k in range(size):
+        dz = m.znew[k] - z[k]
+        F[0, k] = dz
+        F[1, k] = h * K[0, k] - dz
+        F[2, k] = 2 * dz - h * (K[12, k] + K[0, k])
+        for r in range(4):
+            total = 0.0
+            for j in range(16):
+                total += _D[r, j] * K[j, k]
+            F[3 + r, k] = h * total
+
+
+@compiled
+def _implicit_step(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, last: float) -> float:
+    """One ESDIRK step from m.z to m.znew; returns the error norm, or a large number where a stage does not converge."""
+    K, z, new = m.K, m.z, m.znew
+    n = m.a.shape[0]
+    gh = GAMMA * h
+    for k in range(n):
+        m.a[k] = K[0, n + k]
+    for s in range(1, 6):
+        for k in range(n):
+            ys, vs = z[k], z[n + k]
+            for j in range(s):
+                ys += h * _EA[s, j] * K[j, k]
+                vs += h * _EA[s, j] * K[j, n + k]
+            m.ys[k], m.vs[k] = ys + gh * vs, vs
+        ts = min(t + _EC[s] * h, last)
+        drive(c, d, ts, m.ys, m.vs, m.force)
+        previous = 1e300
+        for iteration in range(10):
+            for k in range(n):
+                new[k], new[n + k] = m.ys[k] + gh * gh * m.a[k], m.vs[k] + gh * m.a[k]
+                K[s, k] = m.a[k]
+            accelerate(c, w, new[:n], new[n : 2 * n], m.ys, m.vs, gh, m.force, d.kp, d.kd, m.a)
+            m.s[EVALS] += 1
+            change = 0.0
+            for k in range(n):
+                diff = gh * (m.a[k] - K[s, k])
+                change = max(change, abs(diff * m.scale[n + k]), abs(gh * diff * m.scale[k]))
+            if change < 0.02:
+                break
+            if not change < 1e12 or (iteration > 2 and change > 0.9 * previous) or iteration == 9:
+                return 1e6
+            previous = change
+        for k in range(n):
+            new[k], new[n + k] = m.ys[k] + gh * gh * m.a[k], m.vs[k] + gh * m.a[k]
+            K[s, k], K[s, n + k] = new[n + k], m.a[k]
+        drive(c, d, ts, new[:n], new[n : 2 * n], m.force)
+        _powers(c, new[n : 2 * n], m.force, K[s])
+    for k in range(2 * n, 2 * n + 2):
+        total = 0.0
+        for j in range(6):
+            total += _EA[5, j] * K[j, k]
+        new[k] = z[k] + h * total
+    error = 0.0
+    for k in range(2 * n):
+        total = 0.0
+        for j in range(6):
+            total += _EE[j] * K[j, k]
+        total *= h * m.scale[k]
+        error += total * total
+    return np.sqrt(error / (2 * n))
+
+
+@compiled
+def _interpolate(m: Memory, method: int, h: float, x: float, out: np.ndarray) -> None:
+    """The state at t + x h inside the step just made: order 7 (explicit), or quintic Hermite from positions to accelerations (implicit)."""
+    z, new = m.z, m.znew
+    size = z.shape[0]
+    if method == EXPLICIT:
+        for k in range(size):
+            total = 0.0
+            for r in range(6, -1, -1):
+                total = (total + m.F[r, k]) * (x if r % 2 == 0 else 1.0 - x)
+            out[k] = z[k] + total
+        return
+    n = m.a.shape[0]
+    for k in range(n):
+        dy = new[k] - z[k]
+        v0, v1, a0, a1 = h * z[n + k], h * new[n + k], h * h * m.K[0, n + k], h * h * m.K[5, n + k]
+        c3 = 10 * dy - 6 * v0 - 4 * v1 - 1.5 * a0 + 0.5 * a1
+        c4 = -15 * dy + 8 * v0 + 7 * v1 + 1.5 * a0 - a1
+        c5 = 6 * dy - 3 * v0 - 3 * v1 - 0.5 * a0 + 0.5 * a1
+        out[k] = z[k] + x * (v0 + x * (0.5 * a0 + x * (c3 + x * (c4 + x * c5))))
+        out[n + k] = (v0 + x * (a0 + x * (3 * c3 + x * (4 * c4 + x * 5 * c5)))) / h
+    for k in range(2 * n, size):
+        dy, f0, f1 = new[k] - z[k], h * m.K[0, k], h * m.K[5, k]
+        out[k] = z[k] + x * (f0 + x * (3 * dy - 2 * f0 - f1 + x * (f0 + f1 - 2 * dy)))
+
+
+@compiled
+def advance(c: Chain, w: Work, d: Inputs, m: Memory, method: int, rtol: float, t_eval: np.ndarray, out: np.ndarray, max_steps: int) -> None:
+    """Go on with the run held in `m` for at most `max_steps` steps, filling rows of `out` (T, 2n + 2) as their times pass."""
+    s, n = m.s, m.a.shape[0]
+    order = 8.0 if method == EXPLICIT else 4.0
+    end = t_eval[-1]
+    for _ in range(max_steps):
+        t = s[T]
+        while int(s[BREAK]) < d.breaks.shape[0] and d.breaks[int(s[BREAK])] <= t:
+            s[BREAK] += 1
+        stop = end
+        if int(s[BREAK]) < d.breaks.shape[0] and d.breaks[int(s[BREAK])] < end:
+            stop = d.breaks[int(s[BREAK])]
+        last = np.nextafter(stop, -1e300)  # drives are read just before the break at which this step may end
+        if s[FRESH] == 0.0:
+            _weights(c, m, rtol, m.z)
+            _slope(c, w, d, m, t, m.z, m.K[0])
+            s[FRESH] = 1.0
+        h = min(s[H], stop - t)
+        if stop - t < 1.5 * h and h < stop - t:
+            h = 0.5 * (stop - t)
+        if method == EXPLICIT:
+            error = _explicit_step(c, w, d, m, t, h, last)
+        else:
+            error = _implicit_step(c, w, d, m, t, h, last)
+        if not error < 1.0:
+            s[REJECTED] += 1
+            if not error < 1e5:
+                s[H] = 0.25 * h
+            else:
+                s[H] = h * max(0.2, 0.9 * error ** (-1.0 / order))
+            if s[H] < 1e-14 * max(1.0, abs(t)) or not np.isfinite(s[H]):
+                s[STATUS] = STUCK
+                return
+            continue
+        s[STEPS] += 1
+        landed = h >= stop - t
+        tn = stop if landed else t + h
+        prepared = False
+        while int(s[OUT]) < t_eval.shape[0] and t_eval[int(s[OUT])] <= tn:
+            row = int(s[OUT])
+            if t_eval[row] == tn:
+                _copy(m.znew, out[row])
+            else:
+                if not prepared and method == EXPLICIT:
+                    _explicit_dense(c, w, d, m, t, h, last)
+                    prepared = True
+                _interpolate(m, method, h, (t_eval[row] - t) / h, out[row])
+            for i in range(c.kind.shape[0]):
+                e = c.first[i]
+                if not (d.low[i] <= out[row, e] <= d.high[i]):
+                    s[STATUS], s[FAULT] = LIMIT, i
+                    return
+            s[OUT] += 1
+        for i in range(c.kind.shape[0]):
+            e = c.first[i]
+            if not (d.low[i] <= m.znew[e] <= d.high[i]):
+                s[STATUS], s[FAULT] = LIMIT, i
+                return
+        factor = 5.0 if error == 0.0 else min(5.0, max(0.3, 0.9 * error ** (-0.7 / order) * max(s[ERR], 1e-4) ** (0.3 / order)))
+        if landed and h < s[H]:
+            s[H] = max(s[H], h * factor)
+        else:
+            s[H] = h * factor
+        s[ERR] = max(error, 1e-4)
+        s[T] = tn
+        _copy(m.znew, m.z)
+        _weights(c, m, rtol, m.z)
+        if landed and stop < end:
+            s[FRESH] = 0.0  # the drive may jump here
+        else:
+            _copy(m.K[12 if method == EXPLICIT else 5], m.K[0])
+        if tn >= end:
+            s[STATUS] = DONE
+            return

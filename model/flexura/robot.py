@@ -1,0 +1,290 @@
+"""The robot: a frozen, validated description in SI units, read from and written to a TOML file.
+
+Every key carries its unit. Whatever is absurd (a modulus in GPa, a negative mass, an unknown key) is refused with
+the file, the key, the value and what was expected. Equations that use these numbers: `model/README.md`.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+
+from .errors import InputError, WrongValue
+from .files import read_toml, write_toml
+
+MAX_ELEMENTS = 200
+MAX_LINKS = 256
+
+_strict = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+Positive = Annotated[float, Field(gt=0)]
+NonNegative = Annotated[float, Field(ge=0)]
+
+
+class _Table(BaseModel):
+    model_config = _strict
+
+
+class Section(_Table):
+    """A rectangular cross-section; `height_m` lies in the plane of bending."""
+
+    width_m: float = Field(gt=0, le=10, description="the section's width in metres, above 0 and at most 10")
+    height_m: float = Field(gt=0, le=10, description="the section's height in the plane of bending in metres, above 0 and at most 10")
+
+
+class SectionAt(Section):
+    at_m: float = Field(ge=0, description="the place of this section along the link in metres, 0 or more")
+
+
+class ValueAt(_Table):
+    at_m: float = Field(ge=0, description="the place of this value along the link in metres, 0 or more")
+    value: float = Field(gt=0, description="a number above 0, in the unit of the key")
+
+
+class Damping(_Table):
+    """Rayleigh damping of the elastic unknowns, D = alpha M + beta K."""
+
+    alpha_1_s: float = Field(0.0, ge=0, description="the mass-proportional factor in 1/s, 0 or more")
+    beta_s: float = Field(0.0, ge=0, le=10, description="the stiffness-proportional factor in seconds, between 0 and 10")
+
+
+class Joint(_Table):
+    """The joint at the proximal side of a link: R, Pa or Pb (dissertation, table 2.1)."""
+
+    type: Literal["R", "Pa", "Pb"] = Field(description='the joint type, "R", "Pa" or "Pb"')
+    angle_rad: float = Field(0.0, ge=-7, le=7, description="the fixed angle gamma of a Pa or Pb in radians, between -7 and 7")
+    hub_mass_kg: float = Field(0.0, ge=0, description="the hub's mass in kilograms, 0 or more")
+    hub_inertia_kg_m2: float = Field(0.0, ge=0, description="the hub's inertia in kg m^2, 0 or more")
+    rotor_inertia: float = Field(0.0, ge=0, description="the rotor's inertia reflected to the joint, kg (Pa, Pb) or kg m^2 (R), 0 or more")
+    viscous_friction: float = Field(0.0, ge=0, description="viscous friction in N s/m or N m s/rad, 0 or more")
+    coulomb_friction: float = Field(0.0, ge=0, description="Coulomb friction in N or N m, 0 or more")
+    limits: tuple[float, float] | None = Field(
+        None, strict=False, description="two numbers, the lower limit and a higher upper limit, in m or rad"
+    )
+    start: float = Field(0.0, description="the joint's position at the start, in m or rad, a finite number")
+    locked: bool = Field(False, description="true (the joint is clamped at its start) or false")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Joint:
+        if self.type == "R" and self.angle_rad != 0:
+            raise WrongValue("angle_rad", self.angle_rad, "no fixed angle: a joint R turns; use start for its first position")
+        if self.limits is not None:
+            if not self.limits[0] < self.limits[1]:
+                raise WrongValue("limits", list(self.limits), "the lower limit first, then a higher upper limit")
+            if not self.limits[0] <= self.start <= self.limits[1]:
+                raise WrongValue("limits", list(self.limits), f"limits that contain the start position, {self.start:g}")
+        return self
+
+
+_LINK_TEXT = {
+    "section": "a table { width_m, height_m } or a list of { at_m, width_m, height_m } in order of at_m",
+    "mass_per_length_kg_m": "mass per length in kg/m, a number above 0 or a list of { at_m, value } in order of at_m",
+    "bending_stiffness_N_m2": "bending stiffness EI in N m^2, a number above 0 or a list of { at_m, value } in order of at_m",
+}
+
+
+class Link(_Table):
+    """One link with the joint at its proximal side; rigid when `elements` is 0."""
+
+    name: str = Field("", max_length=200, description="the link's name, a text")
+    length_m: float = Field(ge=0, le=1000, description="the link's length in metres, above 0 and at most 1000 (0 is allowed for a rigid link)")
+    elements: int = Field(0, ge=0, le=MAX_ELEMENTS, description=f"the number of beam elements, a whole number from 0 (rigid) to {MAX_ELEMENTS}")
+    modes: int | None = Field(None, ge=1, description="how many of the link's own modes to keep, a whole number of 1 or more")
+    section: Section | list[SectionAt] | None = Field(None, description=_LINK_TEXT["section"])
+    young_modulus_Pa: float | None = Field(
+        None, ge=1e5, le=2e12, description="Young's modulus in pascals, between 1e5 and 2e12 (steel: 2.0e11, not 200)"
+    )
+    density_kg_m3: float | None = Field(None, ge=10, le=25000, description="the density in kg/m^3, between 10 and 25000 (steel: 7850)")
+    mass_per_length_kg_m: Positive | list[ValueAt] | None = Field(None, description=_LINK_TEXT["mass_per_length_kg_m"])
+    bending_stiffness_N_m2: Positive | list[ValueAt] | None = Field(None, description=_LINK_TEXT["bending_stiffness_N_m2"])
+    mass_kg: float | None = Field(None, ge=0, description="a rigid link's mass in kilograms, 0 or more")
+    centre_of_mass_m: float | None = Field(None, description="a rigid link's centre of mass from its origin in metres")
+    inertia_kg_m2: float | None = Field(None, ge=0, description="a rigid link's inertia about its centre of mass in kg m^2, 0 or more")
+    damping: Damping = Field(default_factory=Damping, description="a table { alpha_1_s, beta_s }")
+    joint: Joint = Field(description='a table [link.joint] with at least type = "R", "Pa" or "Pb"')
+
+    @property
+    def flexible(self) -> bool:
+        return self.elements > 0
+
+    @field_validator("section", "mass_per_length_kg_m", "bending_stiffness_N_m2")
+    @classmethod
+    def _ordered(cls, value: Any, info: Any) -> Any:
+        if isinstance(value, list):
+            at = [entry.at_m for entry in value]
+            if len(at) < 2:
+                raise WrongValue(info.field_name, at, "a list of at least two entries with at_m")
+            if any(b <= a for a, b in zip(at, at[1:], strict=False)):
+                raise WrongValue(info.field_name, at, "entries in ascending order of at_m")
+        return value
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Link:
+        if self.flexible:
+            self._check_flexible()
+        else:
+            self._check_rigid()
+        for key in ("section", "mass_per_length_kg_m", "bending_stiffness_N_m2"):
+            value = getattr(self, key)
+            if isinstance(value, list) and (value[0].at_m != 0 or abs(value[-1].at_m - self.length_m) > 1e-9 * self.length_m):
+                raise WrongValue(key, [e.at_m for e in value], f"entries from at_m = 0 to the link's length, {self.length_m:g}")
+        if self.section is not None and self.length_m > 0:
+            for s in self.section if isinstance(self.section, list) else [self.section]:
+                if s.height_m >= self.length_m:
+                    raise WrongValue("section.height_m", s.height_m, f"a height below the link's length, {self.length_m:g} (metres, not millimetres?)")
+        return self
+
+    def _check_flexible(self) -> None:
+        if self.length_m <= 0:
+            raise WrongValue("length_m", self.length_m, "a length above 0 for a flexible link (elements > 0)")
+        for key in ("mass_kg", "centre_of_mass_m", "inertia_kg_m2"):
+            if getattr(self, key) is not None:
+                raise WrongValue(key, getattr(self, key), "absent for a flexible link: its mass comes from the section or mass_per_length_kg_m")
+        by_section = (self.section, self.young_modulus_Pa, self.density_kg_m3)
+        by_number = (self.mass_per_length_kg_m, self.bending_stiffness_N_m2)
+        if all(v is None for v in by_section + by_number):
+            raise WrongValue("section", None, "missing: a flexible link needs section, young_modulus_Pa and density_kg_m3, or mass_per_length_kg_m and bending_stiffness_N_m2")
+        if any(v is not None for v in by_section) and any(v is not None for v in by_number):
+            raise WrongValue("mass_per_length_kg_m", None, "either section, young_modulus_Pa and density_kg_m3, or mass_per_length_kg_m and bending_stiffness_N_m2, not some of each")
+        names = ("section", "young_modulus_Pa", "density_kg_m3") if self.section_given else ("mass_per_length_kg_m", "bending_stiffness_N_m2")
+        for key in names:
+            if getattr(self, key) is None:
+                raise WrongValue(key, None, f"missing: {type(self).model_fields[key].description}")
+        if self.modes is not None and self.modes > 2 * self.elements:
+            raise WrongValue("modes", self.modes, f"at most {2 * self.elements}, twice the number of elements")
+
+    def _check_rigid(self) -> None:
+        for key in ("modes", "young_modulus_Pa", "bending_stiffness_N_m2"):
+            if getattr(self, key) is not None:
+                raise WrongValue(key, getattr(self, key), "absent for a rigid link (elements = 0)")
+        spread = self.section is not None or self.mass_per_length_kg_m is not None or self.density_kg_m3 is not None
+        if self.mass_kg is None and not spread:
+            raise WrongValue("mass_kg", None, "missing: a rigid link's mass in kilograms, 0 or more")
+        if spread:
+            if self.mass_kg is not None:
+                raise WrongValue("mass_kg", self.mass_kg, "either mass_kg, or section and density_kg_m3, or mass_per_length_kg_m")
+            if self.mass_per_length_kg_m is None and (self.section is None or self.density_kg_m3 is None):
+                missing = "density_kg_m3" if self.density_kg_m3 is None else "section"
+                raise WrongValue(missing, None, f"missing: {type(self).model_fields[missing].description}")
+
+    @property
+    def section_given(self) -> bool:
+        return self.section is not None or self.young_modulus_Pa is not None or self.density_kg_m3 is not None
+
+    def mass_per_length(self, x: Any) -> np.ndarray:
+        """Mass per length [kg/m] at x [m] from the link's origin, linear between the given places."""
+        x = np.asarray(x, dtype=float)
+        if self.mass_per_length_kg_m is not None:
+            return _spread(self.mass_per_length_kg_m, x)
+        width, height = self._section_at(x)
+        return self.density_kg_m3 * width * height
+
+    def bending_stiffness(self, x: Any) -> np.ndarray:
+        """Bending stiffness EI [N m^2] at x [m] from the link's origin."""
+        x = np.asarray(x, dtype=float)
+        if self.bending_stiffness_N_m2 is not None:
+            return _spread(self.bending_stiffness_N_m2, x)
+        width, height = self._section_at(x)
+        return self.young_modulus_Pa * width * height**3 / 12
+
+    def axial_stiffness(self, x: Any) -> np.ndarray | None:
+        """Axial stiffness EA [N] at x [m], or None where the file gives EI only (the native model has no axial unknowns)."""
+        if self.section is None or self.young_modulus_Pa is None:
+            return None
+        width, height = self._section_at(np.asarray(x, dtype=float))
+        return self.young_modulus_Pa * width * height
+
+    def _section_at(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        if isinstance(self.section, list):
+            at = [s.at_m for s in self.section]
+            return np.interp(x, at, [s.width_m for s in self.section]), np.interp(x, at, [s.height_m for s in self.section])
+        assert self.section is not None
+        return np.full_like(x, self.section.width_m), np.full_like(x, self.section.height_m)
+
+    def breaks(self) -> list[float]:
+        """Places along the link [m] where a given property has a kink, the ends included."""
+        places = {0.0, self.length_m}
+        for value in (self.section, self.mass_per_length_kg_m, self.bending_stiffness_N_m2):
+            if isinstance(value, list):
+                places.update(entry.at_m for entry in value)
+        return sorted(places)
+
+
+class Payload(_Table):
+    """A point mass with inertia at the tip of the last link."""
+
+    mass_kg: float = Field(0.0, ge=0, description="the payload's mass in kilograms, 0 or more")
+    inertia_kg_m2: float = Field(0.0, ge=0, description="the payload's inertia in kg m^2, 0 or more")
+
+
+class Robot(_Table):
+    """A serial planar chain of rigid and flexible links with joints R, Pa and Pb. Frozen; SI units."""
+
+    name: str = Field("", max_length=200, description="the robot's name, a text")
+    gravity_m_s2: tuple[float, float] = Field(
+        (0.0, 0.0), strict=False, description="gravity in the base frame, two numbers [x, y] in m/s^2, y up"
+    )
+    stiffening: bool = Field(True, description="true, or false for the dissertation's linear model")
+    sliding: Literal["continuous", "nodal"] = Field("continuous", description='"continuous" or "nodal"')
+    link: list[Link] = Field(min_length=1, max_length=MAX_LINKS, description=f"1 to {MAX_LINKS} tables [[link]]")
+    payload: Payload = Field(default_factory=Payload, description="a table { mass_kg, inertia_kg_m2 }")
+
+    @property
+    def links(self) -> list[Link]:
+        return self.link
+
+    @property
+    def structure(self) -> str:
+        """The joint types from the base outwards, for example "PaR"."""
+        return "".join(link.joint.type for link in self.link)
+
+    @property
+    def start(self) -> np.ndarray:
+        """Joint positions at the start, (links,) in m or rad."""
+        return np.array([link.joint.start for link in self.link])
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any], *, file: str = "") -> Robot:
+        """A robot from the tables of a robot file. Raises InputError, naming `file`, key, value and what was expected."""
+        from .explain import explain
+
+        try:
+            return cls.model_validate(data)
+        except ValidationError as error:
+            raise explain(error, cls, data, file) from None
+
+    def to_dict(self) -> dict[str, Any]:
+        """The tables of a robot file, without the keys that have their default value."""
+        return self.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
+
+    def replace(self, changes: dict[str, Any]) -> Robot:
+        """A robot with some values changed: `robot.replace({"payload.mass_kg": 0.1, "link.2.length_m": 0.4})`, links counted from 1."""
+        data = self.to_dict()
+        for path, value in changes.items():
+            *parents, last = path.split(".")
+            table: Any = data
+            for part in parents:
+                try:
+                    table = table[int(part) - 1] if isinstance(table, list) else table.setdefault(part, {})
+                except (IndexError, ValueError):
+                    raise InputError("the number of a link of this robot, counted from 1", key=path, value=value) from None
+            table[last] = value
+        return Robot.from_dict(data)
+
+
+def _spread(value: Any, x: np.ndarray) -> np.ndarray:
+    if isinstance(value, list):
+        return np.interp(x, [v.at_m for v in value], [v.value for v in value])
+    return np.full_like(x, value)
+
+
+def load(path: str | os.PathLike[str]) -> Robot:
+    """Read a robot file (TOML). Raises InputError, naming file, key, value and what was expected."""
+    return Robot.from_dict(read_toml(path), file=os.fspath(path))
+
+
+def save(robot: Robot, path: str | os.PathLike[str]) -> None:
+    """Write a robot file (TOML) that `load` reads back to an equal robot."""
+    write_toml(path, robot.to_dict())

@@ -1,0 +1,186 @@
+"""Functions of time with their first two derivatives: motions to follow, forces and torques to apply.
+
+A Signal is a list of segments; on each, with s = t - t0,
+
+    y(s) = c0 + c1 s + ... + c5 s^5 + A sin(w s + phi),
+
+which holds cycloids, harmonics, polynomials, bang-bang profiles and cubic splines in one form that the compiled loop
+evaluates without calling back into Python. Before the first segment y keeps its first value.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from .compiled import compiled
+from .errors import InputError
+
+COLUMNS = 10  # t0, c0 ... c5, A, w, phi
+
+
+@compiled
+def evaluate(segments: np.ndarray, t: float) -> tuple[float, float, float]:
+    """y, dy/dt and d2y/dt2 at t of segments (k, 10); 0 where k = 0."""
+    count = segments.shape[0]
+    if count == 0:
+        return 0.0, 0.0, 0.0
+    low, high = 0, count  # the last segment that starts at or before t
+    while high - low > 1:
+        middle = (low + high) // 2
+        if segments[middle, 0] <= t:
+            low = middle
+        else:
+            high = middle
+    row = segments[low]
+    s = t - row[0]
+    if s < 0.0:  # before the first segment: hold
+        return row[1] + row[7] * np.sin(row[9]), 0.0, 0.0
+    y = row[1] + s * (row[2] + s * (row[3] + s * (row[4] + s * (row[5] + s * row[6]))))
+    yd = row[2] + s * (2 * row[3] + s * (3 * row[4] + s * (4 * row[5] + s * 5 * row[6])))
+    ydd = 2 * row[3] + s * (6 * row[4] + s * (12 * row[5] + s * 20 * row[6]))
+    if row[7] != 0.0:
+        angle = row[8] * s + row[9]
+        sine, cosine = np.sin(angle), np.cos(angle)
+        y += row[7] * sine
+        yd += row[7] * row[8] * cosine
+        ydd -= row[7] * row[8] ** 2 * sine
+    return y, yd, ydd
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A function of time: `signal(t)` gives (y, dy/dt, d2y/dt2); `segments` (k, 10); `breaks` where it isn't smooth."""
+
+    segments: np.ndarray
+    spec: dict[str, Any] = field(default_factory=dict)
+
+    def __call__(self, t: float) -> tuple[float, float, float]:
+        return evaluate(self.segments, float(t))
+
+    @property
+    def breaks(self) -> np.ndarray:
+        return self.segments[:, 0]
+
+
+def _row(t0: float, *c: float, A: float = 0.0, w: float = 0.0, phi: float = 0.0) -> list[float]:
+    return [t0, *c, *([0.0] * (6 - len(c))), A, w, phi]
+
+
+def _signal(rows: list[list[float]], **spec: Any) -> Signal:
+    segments = np.array(rows, dtype=float).reshape(-1, COLUMNS)
+    segments.setflags(write=False)
+    return Signal(segments, spec)
+
+
+def constant(value: float) -> Signal:
+    """y = value."""
+    return _signal([_row(0.0, value)], kind="constant", value=value)
+
+
+def step(value: float, at_s: float = 0.0) -> Signal:
+    """0, then `value` from `at_s` on."""
+    return _signal([_row(-1e300, 0.0), _row(at_s, value)], kind="step", value=value, at_s=at_s)
+
+
+def harmonic(amplitude: float, frequency_Hz: float, phase_rad: float = 0.0, offset: float = 0.0) -> Signal:
+    """y = offset + amplitude cos(2 pi f t + phase), the form of the dissertation's inverse law."""
+    row = _row(0.0, offset, A=amplitude, w=2 * np.pi * frequency_Hz, phi=phase_rad + np.pi / 2)
+    return _signal([row], kind="harmonic", amplitude=amplitude, frequency_Hz=frequency_Hz, phase_rad=phase_rad, offset=offset)
+
+
+def cycloid(end: float, duration_s: float, start: float = 0.0, at_s: float = 0.0) -> Signal:
+    """y = start + A [s/T - sin(2 pi s/T)/(2 pi)], A = end - start, then rest (benchmarks: "Cycloid")."""
+    _positive("duration_s", duration_s)
+    A, T = end - start, duration_s
+    rows = [_row(at_s, start, A / T, A=-A / (2 * np.pi), w=2 * np.pi / T), _row(at_s + T, end)]
+    return _signal(rows, kind="cycloid", end=end, duration_s=duration_s, start=start, at_s=at_s)
+
+
+def polynomial(end: float, duration_s: float, start: float = 0.0, at_s: float = 0.0) -> Signal:
+    """y = start + A (10 u^3 - 15 u^4 + 6 u^5), u = s/T: velocity and acceleration zero at both ends."""
+    _positive("duration_s", duration_s)
+    rows = [_rise(at_s, start, end - start, duration_s), _row(at_s + duration_s, end)]
+    return _signal(rows, kind="polynomial", end=end, duration_s=duration_s, start=start, at_s=at_s)
+
+
+def bang_bang(amplitude: float, duration_s: float, rise_s: float = 0.0, at_s: float = 0.0) -> Signal:
+    """+amplitude for the first half of the duration, -amplitude for the second, then 0.
+
+    With `rise_s` every change takes that long along 10 u^3 - 15 u^4 + 6 u^5 and is centred on the instant of the change,
+    the first and last ones lie inside the duration.
+    """
+    _positive("duration_s", duration_s)
+    a, T, r = amplitude, duration_s, rise_s
+    if not 0 <= r <= T / 4:
+        raise InputError(f"expected a rise between 0 and a quarter of the duration, {T / 4:g} s", key="rise_s", value=r)
+    if r == 0:
+        rows = [_row(at_s, a), _row(at_s + T / 2, -a), _row(at_s + T, 0.0)]
+    else:
+        rows = [
+            _rise(at_s, 0.0, a, r), _row(at_s + r, a),
+            _rise(at_s + T / 2 - r / 2, a, -2 * a, r), _row(at_s + T / 2 + r / 2, -a),
+            _rise(at_s + T - r, -a, a, r), _row(at_s + T, 0.0),
+        ]  # fmt: skip
+    if at_s > 0:
+        rows.insert(0, _row(0.0))
+    return _signal(rows, kind="bang_bang", amplitude=amplitude, duration_s=duration_s, rise_s=rise_s, at_s=at_s)
+
+
+def table(t_s: Any, y: Any) -> Signal:
+    """A cubic spline through (t_s, y), both (k,), k >= 2, with zero second derivative at its ends; then the last value."""
+    from scipy.interpolate import CubicSpline
+
+    times, values = np.asarray(t_s, dtype=float), np.asarray(y, dtype=float)
+    if times.ndim != 1 or times.shape != values.shape or len(times) < 2 or not np.all(np.diff(times) > 0):
+        raise InputError("expected at least two ascending times and as many values", key="table", value=f"{times.shape} and {values.shape}")
+    coefficients = CubicSpline(times, values, bc_type="natural").c  # (4, k - 1), highest power first
+    rows = [_row(times[k], *coefficients[::-1, k]) for k in range(len(times) - 1)] + [_row(times[-1], values[-1])]
+    return _signal(rows, kind="table", t_s=times.tolist(), y=values.tolist())
+
+
+def piecewise(at_s: Any, value: Any) -> Signal:
+    """Constant from each instant of `at_s` (k,) to the next, with the values (k,): the dissertation's bang-bang torques."""
+    times, values = np.asarray(at_s, dtype=float), np.asarray(value, dtype=float)
+    if times.ndim != 1 or times.shape != values.shape or len(times) < 1 or not np.all(np.diff(times) > 0):
+        raise InputError("expected ascending times and as many values", key="piecewise", value=f"{times.shape} and {values.shape}")
+    rows = [_row(t, v) for t, v in zip(times, values, strict=True)]
+    return _signal(rows, kind="piecewise", at_s=times.tolist(), value=values.tolist())
+
+
+KINDS = {f.__name__: f for f in (constant, step, harmonic, cycloid, polynomial, bang_bang, table, piecewise)}
+
+
+def from_spec(spec: Any, *, key: str = "signal") -> Signal:
+    """A signal from its table, for example `{ kind = "cycloid", end = 1.0, duration_s = 0.5 }`."""
+    import inspect
+
+    if not isinstance(spec, dict) or spec.get("kind") not in KINDS:
+        kind = spec.get("kind") if isinstance(spec, dict) else spec
+        raise InputError(f"expected a table with kind, one of {', '.join(KINDS)}", key=f"{key}.kind", value=kind)
+    make = KINDS[spec["kind"]]
+    known = inspect.signature(make).parameters
+    for name, value in spec.items():
+        if name != "kind" and name not in known:
+            raise InputError(f"an unknown key; known for {spec['kind']}: {', '.join(known)}", key=f"{key}.{name}", value=value)
+        numbers = value if isinstance(value, list) else [value]
+        if name != "kind" and not all(isinstance(v, int | float) and not isinstance(v, bool) and np.isfinite(v) for v in numbers):
+            raise InputError("expected a finite number, or a list of them for a table", key=f"{key}.{name}", value=value)
+    for name, parameter in known.items():
+        if parameter.default is parameter.empty and name not in spec:
+            raise InputError("missing: expected a number", key=f"{key}.{name}")
+    try:
+        return make(**{name: value for name, value in spec.items() if name != "kind"})
+    except InputError as error:
+        raise InputError(error.expected, key=f"{key}.{error.key}", value=error.value) from None
+
+
+def _rise(t0: float, start: float, change: float, duration: float) -> list[float]:
+    return _row(t0, start, 0.0, 0.0, 10 * change / duration**3, -15 * change / duration**4, 6 * change / duration**5)
+
+
+def _positive(key: str, value: float) -> None:
+    if not value > 0:
+        raise InputError("expected a duration above 0 in seconds", key=key, value=value)

@@ -1,0 +1,64 @@
+"""Static equilibrium: the elastic unknowns under gravity and a dead load at the tip, joints held."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from . import extended
+from .errors import FlexuraError, InputError
+from .observe import observe
+from .system import System, jacobian
+
+
+def static(
+    system: System, joints: Any = None, tip_force: tuple[float, float] = (0.0, 0.0), tip_moment: float = 0.0
+) -> np.ndarray:
+    """q (n,) with the joints at `joints` (N,) [m or rad] (default: their start) and K q + gravity(q) = J_tip^T (force, moment).
+
+    `tip_force` [N] keeps its direction in the base frame, `tip_moment` [N m]; both act on the last link's tip. A single link under a
+    transverse force P bends by P L^3 / (3 EI), the small-deflection value. Raises FlexuraError where no equilibrium is found
+    (buckling under a load along the link, or deflections beyond the model).
+    """
+    q = system.start()
+    if joints is not None:
+        given = np.asarray(joints, dtype=float)
+        if given.shape != system.joint_rows.shape or not np.all(np.isfinite(given)):
+            raise InputError(f"expected {len(system.joint_rows)} finite joint positions", key="joints", value=joints)
+        q[system.joint_rows] = given
+    load = np.array([*tip_force, tip_moment], dtype=float)
+    if load.shape != (3,) or not np.all(np.isfinite(load)):
+        raise InputError("expected a finite force (x, y) and moment", key="tip_force", value=(tip_force, tip_moment))
+    rows = system.elastic_rows
+    if len(rows) == 0:
+        return q
+
+    K = system.stiffness()
+
+    def residual(z: np.ndarray) -> np.ndarray:
+        return K @ z + system.gravity(z) - _tip_jacobian(system, z).T @ load
+
+    scale = np.sqrt(np.diag(K)[rows])
+    for _ in range(30):
+        r = residual(q)[rows]
+        step = np.linalg.solve(jacobian(residual, q)[np.ix_(rows, rows)], r)
+        q[rows] -= step
+        if not np.all(np.isfinite(q)):
+            break
+        if np.linalg.norm(step * scale) <= 1e-11 * (np.linalg.norm(q[rows] * scale) + 1e-9):
+            return q
+    raise FlexuraError("no static equilibrium found: a link buckles, or the load bends it beyond the range of this model")
+
+
+def _tip_jacobian(system: System, q: np.ndarray) -> np.ndarray:
+    return extended.tip_jacobian(system.chain, system._work(), system.to_solver @ q) @ system.to_solver
+
+
+def tip_pose(system: System, q: np.ndarray) -> np.ndarray:
+    """x, y [m] and angle [rad] of the last link's tip in the base frame at q (n,)."""
+    links = len(system.robot.links)
+    poses, tips, ends, energies = np.zeros((1, links, 3)), np.zeros((1, links, 2)), np.zeros((1, 2)), np.zeros((1, 3))
+    state = np.concatenate([system.to_solver @ np.asarray(q, dtype=float), np.zeros(system.n)])[None]
+    observe(system.chain, system._work(), state, poses, tips, ends, energies)
+    return np.array([ends[0, 0], ends[0, 1], poses[0, -1, 2] + tips[0, -1, 1]])

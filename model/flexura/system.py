@@ -1,0 +1,201 @@
+"""The system: a robot assembled. Constant; the workspace of a solver is apart from it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from . import extended
+from .beam import LinkIntegrals, link_integrals, shape
+from .errors import FlexuraError, InputError
+from .kernel import PRISMATIC, REVOLUTE, Chain, Work, inverse, workspace
+from .modes import modal
+from .robot import Robot
+from .run import STATIONS
+
+
+@dataclass(frozen=True)
+class System:
+    """A robot's equations M(q) qdd + bias(q, qd) + damping qd + stiffness q + gravity(q) = F.
+
+    q (n,) is numbered [eta_1, u_1, eta_2, u_2, ...]: each joint, then the elastic unknowns of its link: deflection [m] and slope [rad] of
+    nodes 1 ... n_i, or, for a link with `modes`, mass-normalised modal coordinates [kg^(1/2) m]. `labels` says which is which. F has entries
+    in the joints' rows. The solver works in modal coordinates y throughout, q = transform @ y (exact for a full mesh).
+    """
+
+    robot: Robot
+    chain: Chain
+    links: tuple[LinkIntegrals, ...]
+    transform: np.ndarray
+    to_solver: np.ndarray
+    labels: tuple[str, ...]
+
+    @property
+    def n(self) -> int:
+        return len(self.labels)
+
+    @property
+    def joint_rows(self) -> np.ndarray:
+        """Rows of the joints in q, (links,)."""
+        return self.chain.first[:-1]
+
+    @cached_property
+    def elastic_rows(self) -> np.ndarray:
+        """Rows of the elastic unknowns in q."""
+        return np.setdiff1d(np.arange(self.n), self.joint_rows)
+
+    @cached_property
+    def free_rows(self) -> np.ndarray:
+        """Rows of q that can move: all but locked joints."""
+        return np.setdiff1d(np.arange(self.n), self.joint_rows[self.chain.locked.astype(bool)])
+
+    def start(self) -> np.ndarray:
+        """The configuration at the start (n,): joints at their `start`, links straight."""
+        q = np.zeros(self.n)
+        q[self.joint_rows] = self.robot.start
+        return q
+
+    def mass(self, q: np.ndarray) -> np.ndarray:
+        """M(q) (n, n) by the extended assembly."""
+        M = extended.mass_matrix(self.chain, self._work(), self.to_solver @ self._check(q))
+        return self.to_solver.T @ M @ self.to_solver
+
+    def stiffness(self, q: np.ndarray | None = None) -> np.ndarray:
+        """K (n, n), constant; with q the tangent stiffness K + d gravity / dq there."""
+        K = self.to_solver.T @ np.diag(self.chain.lam) @ self.to_solver
+        if q is None:
+            return K
+        return K + jacobian(self.gravity, self._check(q))
+
+    @cached_property
+    def damping(self) -> np.ndarray:
+        """D (n, n), constant: Rayleigh damping of the elastic unknowns and viscous friction of the joints."""
+        diagonal = self.chain.damp.copy()
+        diagonal[self.joint_rows] = self.chain.viscous
+        return self.to_solver.T @ np.diag(diagonal) @ self.to_solver
+
+    def gravity(self, q: np.ndarray) -> np.ndarray:
+        """Generalised gravity forces (n,), on the left-hand side."""
+        zero = np.zeros(self.n)
+        return self._inverse(q, zero, zero, self.chain.gravity)
+
+    def bias(self, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
+        """Coriolis and centrifugal forces (n,), on the left-hand side."""
+        return self._inverse(q, qd, np.zeros(self.n), np.zeros(2))
+
+    def forces(self, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
+        """Generalised forces (n,) that the motion needs: the whole left-hand side (Coulomb friction left out), by Newton-Euler."""
+        return self._inverse(q, qd, qdd, self.chain.gravity) + self.damping @ np.asarray(qd) + self.stiffness() @ np.asarray(q)
+
+    def _inverse(self, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, gravity: np.ndarray) -> np.ndarray:
+        out = np.zeros(self.n)
+        y, v, a = (self.to_solver @ self._check(z) for z in (q, qd, qdd))
+        inverse(self.chain, self._work(), y, v, a, gravity, out)
+        return self.to_solver.T @ out
+
+    def _check(self, q: np.ndarray) -> np.ndarray:
+        q = np.asarray(q, dtype=float)
+        if q.shape != (self.n,):
+            raise InputError(f"expected an array of shape ({self.n},), in the order of system.labels", key="q", value=q.shape)
+        return q
+
+    def _work(self) -> Work:
+        return workspace(self.chain)
+
+    def stations(self, link: int) -> np.ndarray:
+        """phi at the places where a Run holds the deflection, in the solver's coordinates: (STATIONS, m); link from 0."""
+        info = self.links[link]
+        x = np.linspace(0, info.length, STATIONS)
+        return shape(info.length, self.robot.links[link].elements, x).T @ info.basis
+
+
+def jacobian(function: Callable[[np.ndarray], np.ndarray], x: np.ndarray) -> np.ndarray:
+    """d function / d x, (m, n), by central differences; exact to about 1e-9 for the smooth functions here."""
+    step = 1e-5 * np.eye(len(x))
+    return np.column_stack([(function(x + e) - function(x - e)) / 2e-5 for e in step])
+
+
+def assemble(robot: Robot) -> System:
+    """The System of a robot. Raises FlexuraError for what the solver does not do, InputError for a singular mass matrix."""
+    links = robot.links
+    for i, link in enumerate(links):
+        before = links[i - 1] if i else None
+        if link.joint.type == "Pb":
+            raise FlexuraError(f"link {i + 1}: a joint Pb (a link through a sleeve) is not in this version; R, and Pa on the base or a rigid link, are")
+        if link.joint.type == "Pa" and before is not None and before.flexible:
+            raise FlexuraError(f"link {i + 1}: a joint Pa on a flexible link is not in this version; R, and Pa on the base or a rigid link, are")
+    first, at, infos, transforms, back, labels = [0], [0], [], [], [], []
+    values: dict[str, list[np.ndarray]] = {name: [] for name in ("S0", "S1", "NL", "SL", "lam", "damp")}
+    matrices: dict[str, list[np.ndarray]] = {name: [] for name in ("G1", "G2", "H")}
+    tables: dict[str, list[np.ndarray]] = {name: [] for name in ("point_phi", "slope_d1", "slope_d2")}
+    for i, link in enumerate(links, 1):
+        last = i == len(links)
+        nodal = link_integrals(link, robot.payload.mass_kg * last, robot.payload.inertia_kg_m2 * last)
+        info, lam = modal(nodal, link.modes, loaded=not last)
+        m = len(lam)
+        unit = "rad" if link.joint.type == "R" else "m"
+        labels.append(f"joint {i} position [{unit}]")
+        if link.modes is not None:
+            labels += [f"link {i} mode {k + 1} [kg^(1/2) m]" for k in range(m)]
+            transforms.append(np.eye(1 + m))
+            back.append(np.eye(1 + m))
+        else:
+            labels += [f"link {i} node {k // 2 + 1} {'slope [rad]' if k % 2 else 'deflection [m]'}" for k in range(m)]
+            transforms.append(block_diag(1.0, info.basis) if m else np.eye(1))
+            back.append(block_diag(1.0, info.basis.T @ nodal.M) if m else np.eye(1))
+        for name, value in (("S0", info.S0), ("S1", info.S1), ("NL", info.NL), ("SL", info.SL), ("lam", lam)):
+            values[name].append(np.concatenate([[0.0], value]))
+        values["damp"].append(np.concatenate([[0.0], link.damping.alpha_1_s + link.damping.beta_s * lam]))
+        for name, parts in matrices.items():
+            parts.append(getattr(info, name).ravel())
+        for name, table in tables.items():
+            shapes = getattr(info, name)
+            table += [np.zeros((1, shapes.shape[1])), shapes]
+        first.append(first[-1] + 1 + m)
+        at.append(at[-1] + m * m)
+        infos.append(info)
+    column = lambda f, kind=float: np.array([f(link) for link in links], dtype=kind)  # noqa: E731
+    of = lambda f: np.array([f(info) for info in infos], dtype=float)  # noqa: E731
+    chain = Chain(
+        first=np.array(first, dtype=np.int64),
+        at=np.array(at, dtype=np.int64),
+        kind=column(lambda k: REVOLUTE if k.joint.type == "R" else PRISMATIC, np.int64),
+        locked=column(lambda k: k.joint.locked, np.int64),
+        angle=column(lambda k: k.joint.angle_rad),
+        rotor=column(lambda k: k.joint.rotor_inertia),
+        viscous=column(lambda k: k.joint.viscous_friction),
+        coulomb=column(lambda k: k.joint.coulomb_friction),
+        length=of(lambda k: k.length),
+        mass=of(lambda k: k.mass),
+        s1=of(lambda k: k.s1),
+        inertia=of(lambda k: k.inertia),
+        **{name: np.concatenate(parts) for name, parts in values.items()},
+        **{name: np.concatenate(parts) for name, parts in (tables | matrices).items()},
+        tip_inertia=np.array([robot.payload.inertia_kg_m2 * (i == len(links) - 1) for i in range(len(links))]),
+        **{name: np.array([getattr(info, name) for info in infos]) for name in ("point_x", "point_mass", "slope_dx", "slope_EI")},
+        stiffening=robot.stiffening,
+        gravity=np.array(robot.gravity_m_s2, dtype=float),
+    )
+    system = System(robot, chain, tuple(infos), block_diag(*transforms), block_diag(*back), tuple(labels))
+    _check_mass(system)
+    return system
+
+
+def _check_mass(system: System) -> None:
+    """Refuse a robot with a joint that moves nothing: its mass matrix is singular."""
+    M = system.mass(system.start())
+    free = system.free_rows
+    if len(free) == 0:
+        return
+    scale = 1 / np.sqrt(np.maximum(np.diag(M)[free], 1e-300))
+    smallest = np.linalg.eigvalsh(M[np.ix_(free, free)] * scale * scale[:, None])[0]
+    if np.any(np.diag(M)[free] <= 0) or smallest < 1e-13:
+        joint = next((i + 1 for i, row in enumerate(system.joint_rows) if row in free and M[row, row] <= 1e-300), len(system.joint_rows))
+        raise InputError(
+            "nothing to accelerate: expected a mass or inertia (link, hub, rotor or payload) that this joint moves",
+            key=f"link[{joint}].joint",
+        )

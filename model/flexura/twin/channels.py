@@ -1,0 +1,96 @@
+"""From recorded coordinates to the channels of a Run."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..run import STATIONS
+from .actuation import Actuation
+from .chain import Chain
+from .part import Ground, Motion
+
+
+def channels(
+    chain: Chain, act: Actuation, t: np.ndarray, q: np.ndarray, v: np.ndarray
+) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    """Channels and their units from total coordinates q and velocities v of the system, both (T, coordinates)."""
+    out: dict[str, tuple[np.ndarray, str]] = {}
+    gravity = np.array(chain.robot.gravity_m_s2)
+    kinetic, strain, potential = np.zeros(len(t)), np.zeros(len(t)), np.zeros(len(t))
+    position, speed = np.zeros((len(t), len(chain.parts))), np.zeros((len(t), len(chain.parts)))
+    origin = tip = Ground.motion(len(t))
+    deflection = np.zeros(len(t))
+    for i, (link, part, index) in enumerate(zip(chain.robot.links, chain.parts, chain.index, strict=True)):
+        mine, rate = q[:, index], v[:, index]
+        hub, end = part.motion_at_origin(mine, rate), part.motion_at_tip(mine, rate)
+        joint = link.joint
+        if joint.type == "R":
+            turned = _unwrap(t, hub.angle - tip.angle, hub.omega - tip.omega, joint.start)
+            position[:, i], speed[:, i] = turned, hub.omega - tip.omega
+            hub = hub._replace(angle=tip.angle + turned)
+        else:
+            position[:, i], speed[:, i] = _slide(origin, hub)
+            hub = hub._replace(angle=origin.angle + joint.angle_rad)
+        slope = _wrap(end.angle - hub.angle)
+        end = end._replace(angle=hub.angle + slope)
+        out |= {
+            f"link/{i + 1}/x": (hub.r[:, 0], "m"), f"link/{i + 1}/y": (hub.r[:, 1], "m"), f"link/{i + 1}/angle": (hub.angle, "rad"),
+        }  # fmt: skip
+        deflection = _transverse(hub, end.r)
+        if link.flexible:
+            out |= {f"link/{i + 1}/tip_deflection": (deflection, "m"), f"link/{i + 1}/tip_slope": (slope, "rad")}
+            for k in range(STATIONS):
+                place = part.point(mine, k * link.length_m / (STATIONS - 1))
+                out[f"link/{i + 1}/deflection/{k}"] = _transverse(hub, place), "m"
+        kinetic += part.kinetic(mine, rate)
+        if not joint.locked:
+            kinetic += 0.5 * joint.rotor_inertia * speed[:, i] ** 2
+        strain += part.strain(mine)
+        potential -= part.moment(mine) @ gravity
+        origin, tip = hub, end
+    out = _joints(chain, act, t, position, speed, deflection * bool(chain.elements[-1])) | out
+    out |= {"tip/x": (tip.r[:, 0], "m"), "tip/y": (tip.r[:, 1], "m")}
+    out |= {"energy/kinetic": (kinetic, "J"), "energy/strain": (strain, "J"), "energy/potential": (potential, "J")}
+    return {name: values for name, (values, _) in out.items()}, {name: unit for name, (_, unit) in out.items()}
+
+
+def _joints(
+    chain: Chain, act: Actuation, t: np.ndarray, position: np.ndarray, speed: np.ndarray, deflection: np.ndarray
+) -> dict[str, tuple[np.ndarray, str]]:
+    drive = np.array([act.call(*sample) for sample in zip(t, position, speed, deflection, strict=True)]).reshape(position.shape)
+    out = {}
+    for i, link in enumerate(chain.robot.links):
+        length, force = ("rad", "N m") if link.joint.type == "R" else ("m", "N")
+        out[f"joint/{i + 1}/position"] = position[:, i], length
+        out[f"joint/{i + 1}/velocity"] = speed[:, i], f"{length}/s"
+        out[f"joint/{i + 1}/drive"] = drive[:, i], force
+    return out
+
+
+def _transverse(hub: Motion, place: np.ndarray) -> np.ndarray:
+    delta = place - hub.r
+    return np.cos(hub.angle) * delta[:, 1] - np.sin(hub.angle) * delta[:, 0]
+
+
+def _slide(rail: Motion, hub: Motion) -> tuple[np.ndarray, np.ndarray]:
+    """Distance of the hub along the rail's axis, and its rate."""
+    axis = np.stack([np.cos(rail.angle), np.sin(rail.angle)], axis=-1)
+    normal = np.stack([-axis[:, 1], axis[:, 0]], axis=-1)
+    delta, rate = hub.r - rail.r, hub.v - rail.v
+    return (axis * delta).sum(axis=-1), (axis * rate + rail.omega[:, None] * normal * delta).sum(axis=-1)
+
+
+def _wrap(angle: np.ndarray) -> np.ndarray:
+    """To (-pi, pi]."""
+    return angle - 2 * np.pi * np.ceil(angle / (2 * np.pi) - 0.5)
+
+
+def _unwrap(t: np.ndarray, angle: np.ndarray, rate: np.ndarray, start: float) -> np.ndarray:
+    """An angle known up to whole turns as a continuous one that begins at `start`; the rate bridges long output steps."""
+    out = np.empty_like(angle)
+    guess = start
+    for k in range(len(t)):
+        if k:
+            guess = out[k - 1] + (rate[k - 1] + rate[k]) / 2 * (t[k] - t[k - 1])
+        out[k] = angle[k] - 2 * np.pi * np.round((angle[k] - guess) / (2 * np.pi))
+    return out

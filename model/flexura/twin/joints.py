@@ -1,0 +1,106 @@
+"""A joint of the twin: constraints that leave one relative coordinate, and what acts on that coordinate.
+
+The coordinate is a marker of Exudyn whose value is the joint's position [m or rad] and whose Jacobian is the direction
+of virtual work: a force on it acts on the hub and back on the previous link, at the point and along the line where they
+touch. Drive, friction, lock and rotor all attach to it. The rotor is a mass of its own with one coordinate that the
+joint's coordinate is tied to, which gives exactly 1/2 I (d eta/dt)^2 between two moving links.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from ..robot import Joint
+from .part import Attachment, Frame
+
+FRICTION_SPEED = 1e-3  # m/s or rad/s: Coulomb friction is f tanh(velocity / this)
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """A joint's coordinate in Exudyn: `marker` measures it, `load` acts on it; `kept` is what Exudyn only refers to."""
+
+    marker: Any
+    load: Any
+    kept: Any = None
+
+
+def start_frame(joint: Joint, previous: Frame, length: float, speed: float) -> Frame:
+    """The straight start of the link behind a joint; `previous` is the link before it, of that length, or the base (0)."""
+    if joint.type == "R":
+        return previous.along(length, turn=joint.start, spin=speed)
+    return previous.along(joint.start, slide=speed, turn=joint.angle_rad)
+
+
+def connect(mbs: Any, joint: Joint, previous: Any, link: Any) -> Any:
+    """Constrain `link` to `previous` (parts) by an R or Pa; returns the marker of the joint's coordinate."""
+    return (_revolute if joint.type == "R" else _prismatic)(mbs, joint, previous.tip, previous.origin, link.origin)
+
+
+def _revolute(mbs: Any, joint: Joint, tip: Attachment, _: Attachment, hub: Attachment) -> Any:
+    from exudyn import itemInterface as eii
+
+    mbs.AddObject(eii.ObjectJointRevolute2D(markerNumbers=[tip.marker, hub.marker]))
+    turns = mbs.AddNode(eii.NodeGenericData(initialCoordinates=[joint.start], numberOfDataCoordinates=1))  # counts whole turns
+    return mbs.AddMarker(
+        eii.MarkerBodiesRelativeRotationCoordinate(
+            bodyNumbers=[tip.body, hub.body], localPosition0=tip.place, localPosition1=hub.place, axis0=[0, 0, 1], nodeNumber=turns
+        )
+    )
+
+
+def _prismatic(mbs: Any, joint: Joint, _: Attachment, rail: Attachment, hub: Attachment) -> Any:
+    from exudyn import itemInterface as eii
+
+    normal = [math.sin(joint.angle_rad), math.cos(joint.angle_rad), 0.0]  # of the rail, in the hub's frame
+    mbs.AddObject(eii.ObjectJointPrismatic2D(markerNumbers=[rail.marker, hub.marker], axisMarker0=[1, 0, 0], normalMarker1=normal))
+    return mbs.AddMarker(
+        eii.MarkerBodiesRelativeTranslationCoordinate(
+            bodyNumbers=[rail.body, hub.body], localPosition0=rail.place, localPosition1=hub.place, axis0=[1, 0, 0]
+        )
+    )
+
+
+def equip(mbs: Any, joint: Joint, marker: Any, fixed: Any, speed: float, stiffness: float, damping: float) -> Coordinate:
+    """Put drive, feedback (stiffness, damping on the coordinate), friction, rotor or lock on a joint's coordinate.
+
+    `fixed` is a marker whose coordinate is always 0, `speed` the joint's velocity at the start.
+    """
+    from exudyn import itemInterface as eii
+
+    load = mbs.AddLoad(eii.LoadCoordinate(markerNumber=marker, load=0.0))
+    if joint.locked:
+        mbs.AddObject(eii.ObjectConnectorCoordinate(markerNumbers=[fixed, marker], offset=joint.start))
+        return Coordinate(marker, load)
+    kept = None
+    damping += joint.viscous_friction
+    if stiffness or damping or joint.coulomb_friction:
+        spring = mbs.AddObject(
+            eii.ObjectConnectorCoordinateSpringDamper(markerNumbers=[fixed, marker], stiffness=stiffness, damping=damping)
+        )
+        if joint.coulomb_friction:
+            kept = _friction(mbs, spring, joint.coulomb_friction)
+            mbs.SetObjectParameter(spring, "springForceUserFunction", kept)
+    if joint.rotor_inertia:
+        rotor = mbs.AddNode(
+            eii.NodeGenericODE2(
+                numberOfODE2Coordinates=1, referenceCoordinates=[0.0], initialCoordinates=[joint.start], initialCoordinates_t=[speed]
+            )
+        )
+        mbs.AddObject(eii.ObjectGenericODE2(nodeNumbers=[rotor], massMatrix=[[joint.rotor_inertia]]))
+        own = mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=rotor, coordinate=0))
+        mbs.AddObject(eii.ObjectConnectorCoordinate(markerNumbers=[own, marker]))
+    return Coordinate(marker, load, kept)
+
+
+def _friction(mbs: Any, spring: Any, coulomb: float) -> Any:
+    """Spring, damper and f tanh(v / v0) as an expression that Exudyn evaluates without calling Python."""
+    from exudyn import symbolic
+    from exudyn.advancedUtilities import CreateSymbolicUserFunction
+
+    def force(mbs, t, itemNumber, displacement, velocity, stiffness, damping, offset):  # type: ignore[no-untyped-def]  # noqa: N803
+        return stiffness * displacement + damping * velocity + coulomb * symbolic.tanh(velocity / FRICTION_SPEED)
+
+    return CreateSymbolicUserFunction(mbs, force, "springForceUserFunction", spring)

@@ -1,0 +1,228 @@
+"""Simulating a robot in Exudyn: settings, the run itself, and what happens when it doesn't get to its end."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from ..errors import FlexuraError, InputError
+from ..robot import MAX_ELEMENTS, Robot
+from ..run import Run
+from . import ancf, exact
+from .actuation import Actuation, Loads, actuation
+from .chain import Chain, build, refuse
+from .channels import channels
+from .stepping import Steps, interpolate, plan, suggest
+
+PROGRAMS = {"ancf": ancf.PROGRAM, "ge": exact.PROGRAM}
+PROGRESS = 0.01  # the fraction of a run between two calls of progress
+
+
+def simulate(
+    robot: Robot,
+    t_eval: Any,
+    drive: Any = None,
+    qd0: Any = None,
+    *,
+    beam: str = "ancf",
+    elements: int | None = None,
+    step_s: float | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Run:
+    """Simulate a robot in Exudyn, as a check on the native solver that shares nothing with it but the robot file.
+
+    The robot starts straight at `robot.start`, at time 0, with the joint velocities `qd0` (n,) [m/s or rad/s] (None: at
+    rest). `t_eval` (T,): ascending times of the result [s]. `drive`: a Drive, or a function `(t)` or
+    `(t, position, velocity, tip_deflection)`, with the last link's tip deflection, that gives n forces [N] or torques
+    [N m]; a function of the state is called in every iteration, so it must depend on its arguments only.
+
+    `beam`: "ancf" (ObjectANCFCable2D, Euler-Bernoulli) or "ge" (ObjectBeamGeometricallyExact2D of three nodes, with shear).
+    `elements`: beam elements a flexible link; None: twice the robot file's and at least 8. `step_s`: Exudyn's longest step;
+    None: from the robot's frequencies, for an error in time below 1e-3 of the tip deflection or so. Steps divide a
+    uniform output step; elsewhere results are interpolated by cubics. `progress`: called with the fraction done.
+
+    The result has the channels of a native run (`flexura.run`) but no energy/work and energy/loss. Ctrl-C ends it early,
+    with `meta["complete"]` false. Links take all unknowns of their mesh (`modes` is not looked at); joint limits don't act.
+
+    Raises InputError for what the twin doesn't contain (Pb, Pa on a flexible link, stiffening = false, damping alpha)
+    or can't be, FlexuraError where Exudyn's solver fails, with the time it got to.
+    """
+    refuse(robot)
+    n = len(robot.links)
+    t = _times(t_eval)
+    speeds = _speeds(robot, qd0)
+    if beam not in PROGRAMS:
+        raise InputError('expected "ancf" or "ge"', key="beam", value=beam)
+    if elements is not None and not 1 <= elements <= 2 * MAX_ELEMENTS:
+        raise InputError(f"expected a whole number from 1 to {2 * MAX_ELEMENTS}", key="elements", value=elements)
+    if step_s is not None and not step_s > 0:
+        raise InputError("expected a time above 0 in seconds", key="step_s", value=step_s)
+    act = actuation(drive, n)
+    with _quiet():
+        chain = build(robot, beam, elements, speeds, act.stiffness, act.damping)
+        longest = step_s or suggest(chain.mbs, _settings(1.0, 1), sum(link.flexible for link in robot.links), t[-1])
+        steps = plan(t, longest, forced=step_s is not None) if t[-1] > 0 else Steps(longest, 0, np.ones(1, dtype=bool), True)
+        record, done, wall = _solve(chain, act, steps, progress)
+    at, q, v, a = (np.array(column) for column in record)
+    q += chain.reference
+    if steps.exact or len(at) == 1:
+        t = at
+    else:
+        t = t[t <= at[-1] + 1e-12]
+        q, v = interpolate(t, at, q, v, a)
+    values, units = channels(chain, act, t, q, v)
+    import exudyn
+
+    meta = {
+        "source": "twin", "program": f"Exudyn {exudyn.__version__} ({PROGRAMS[beam]})", "robot": robot.to_dict(),
+        "complete": done == steps.count, "events": [], "wall_s": wall, "steps": done, "step_s": steps.length,
+        "elements": chain.elements, "labels": [f"joint/{i}" for i in range(1, n + 1)],
+    }  # fmt: skip
+    return Run(t, values, units, meta)
+
+
+def _times(t_eval: Any) -> np.ndarray:
+    t = np.array(t_eval, dtype=float)
+    if t.ndim != 1 or len(t) == 0 or not np.all(np.isfinite(t)) or t[0] < 0 or np.any(np.diff(t) <= 0):
+        raise InputError("expected ascending times in seconds, from 0 on", key="t_eval", value=t)
+    return t
+
+
+def _speeds(robot: Robot, qd0: Any) -> np.ndarray:
+    n = len(robot.links)
+    speeds = np.zeros(n) if qd0 is None else np.array(qd0, dtype=float)
+    if speeds.shape != (n,) or not np.all(np.isfinite(speeds)):
+        raise InputError(f"expected {n} joint velocities in m/s or rad/s", key="qd0", value=speeds)
+    for i, (link, speed) in enumerate(zip(robot.links, speeds, strict=True), 1):
+        if link.joint.locked and speed:
+            raise InputError("expected 0: this joint is locked", key=f"qd0[{i}]", value=float(speed))
+    return speeds
+
+
+def _settings(end: float, steps: int, reach: float = 1.0, flexible: bool = True) -> Any:
+    """Settings that are sound for thin metal strips, and write no files; `reach` is the sum of the links' lengths [m].
+
+    Exudyn's default tolerances on residuals are below round-off for strips (EA/EI ~ 1e7 1/m^2); it would then halve its
+    step a thousand times without a word. With flexible links convergence is judged by increments (residualMode 1)
+    instead, and a step that fails, fails. These are increments of position, so that an error of 1e-12 is one of
+    1e-12/h^2 in acceleration: a fixed tolerance makes errors grow again as the step falls, one with h^2 doesn't.
+    """
+    import exudyn as exu
+
+    settings = exu.SimulationSettings()
+    integration = settings.timeIntegration
+    integration.endTime, integration.numberOfSteps = end, steps
+    newton = integration.newton
+    newton.useModifiedNewton = True
+    if flexible:
+        newton.residualMode = 1
+        newton.relativeTolerance = 1e-10
+        newton.absoluteTolerance = reach * min(2e-12, 2e-4 * (end / steps) ** 2)
+    integration.generalizedAlpha.spectralRadius = 0.9
+    integration.adaptiveStep = False
+    settings.linearSolver.solverType = exu.LinearSolverType.EigenDense
+    settings.solution.file.write = False
+    settings.solution.solverInformationFileName = ""
+    settings.solution.sensors.active = False
+    return settings
+
+
+def _solve(
+    chain: Chain, act: Actuation, steps: Steps, progress: Callable[[float], None] | None
+) -> tuple[tuple[list[float], list[np.ndarray], list[np.ndarray], list[np.ndarray]], int, float]:
+    """Run Exudyn; returns the record (times, coordinates, velocities, accelerations), the steps done, and seconds taken."""
+    record: tuple[list[float], list[np.ndarray], list[np.ndarray], list[np.ndarray]] = ([], [], [], [])
+    errors: list[BaseException] = []
+    data, done = chain.mbs.systemData, 0
+    loads = Loads(chain, act, steps.length, steps.count, errors.append)
+    announce = max(1, round(PROGRESS * steps.count))
+
+    def keep() -> None:
+        record[0].append(done * steps.length)
+        for rows, values in zip(record[1:], (data.GetODE2Coordinates(), data.GetODE2Coordinates_t(), data.GetODE2Coordinates_tt()), strict=True):
+            rows.append(np.array(values))
+
+    def before(mbs: Any, t: float) -> bool:
+        try:
+            loads.before_step(t)
+        except BaseException as error:  # an exception would come out of Exudyn as another one: stop first, raise after
+            errors.append(error)
+        return not errors
+
+    def after(mbs: Any, t: float) -> bool:
+        nonlocal done
+        try:
+            done = round(t / steps.length)
+            if steps.keep[done]:
+                keep()
+            if progress is not None and done % announce == 0:
+                progress(done / max(1, steps.count))
+        except BaseException as error:
+            errors.append(error)
+        return not (errors or interrupted.is_set())
+
+    began = time.perf_counter()
+    with _interruptible() as interrupted:
+        if steps.count == 0:
+            after(chain.mbs, 0.0)
+        else:
+            chain.mbs.SetPreStepUserFunction(before)
+            chain.mbs.SetPostStepUserFunction(after)
+            settings = _settings(steps.count * steps.length, steps.count, chain.reach, any(chain.elements))
+            failed = _run(chain.mbs, settings)
+            if failed and not errors:
+                raise FlexuraError(_reason(chain.mbs, done, steps, failed))
+    if errors:
+        raise errors[0]
+    return record, done, time.perf_counter() - began
+
+
+def _run(mbs: Any, settings: Any) -> str:
+    """Exudyn's own complaint, or "" when it got to the end or was stopped."""
+    try:
+        return "" if mbs.SolveDynamic(settings) else "SolveDynamic returned False"
+    except Exception as error:
+        return str(error) or type(error).__name__
+
+
+def _reason(mbs: Any, done: int, steps: Steps, failed: str) -> str:
+    where = f"Exudyn's solver stopped at t = {done * steps.length:.6g} s of {steps.count * steps.length:.6g} s"
+    solver = mbs.sys.get("dynamicSolver")
+    if solver is not None and solver.conv.linearSolverFailed:
+        return f"{where}: its equations are singular; a link without mass that nothing holds?"
+    if solver is not None and not solver.conv.newtonConverged:
+        return f"{where}: a step of {steps.length:.3g} s did not converge; the motion or the drive is too fast for it, give a smaller step_s"
+    return f"{where}: {failed.splitlines()[0]}"
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep Exudyn's own messages off the user's terminal."""
+    import exudyn as exu
+
+    before = exu.config.printToConsole, exu.config.suppressWarnings
+    exu.config.printToConsole, exu.config.suppressWarnings = False, True
+    try:
+        yield
+    finally:
+        exu.config.printToConsole, exu.config.suppressWarnings = before
+
+
+@contextmanager
+def _interruptible() -> Iterator[threading.Event]:
+    """An event that Ctrl-C sets, instead of an exception in the midst of Exudyn; only the main thread can be asked."""
+    interrupted = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield interrupted
+        return
+    before = signal.signal(signal.SIGINT, lambda *_: interrupted.set())
+    try:
+        yield interrupted
+    finally:
+        signal.signal(signal.SIGINT, before)

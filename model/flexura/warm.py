@@ -1,0 +1,24 @@
+"""Fill the compile cache: `python -m flexura.warm`, about a minute the first time, nothing afterwards."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from . import signal
+from .drive import Drive
+from .forward import simulate
+from .robot import Robot
+from .system import assemble
+
+
+def main() -> None:
+    link = {"length_m": 0.3, "elements": 1, "mass_per_length_kg_m": 0.2, "bending_stiffness_N_m2": 0.3, "joint": {"type": "R"}}
+    system = assemble(Robot.from_dict({"link": [link, link]}))
+    zero = np.zeros(system.n)
+    system.bias(zero, zero)
+    for method in ("explicit", "implicit"):
+        simulate(system, [0.0, 1e-3], Drive.force(signal.step(0.1), None), method=method)
+
+
+if __name__ == "__main__":
+    main()

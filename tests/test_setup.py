@@ -1,0 +1,135 @@
+"""What tools/setup.py decides, given a machine; what it then runs is tried by every `make` on a fresh one."""
+import importlib.util
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+spec = importlib.util.spec_from_file_location("flexura_setup", ROOT / "tools" / "setup.py")
+assert spec and spec.loader
+setup = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(setup)
+
+DEBIAN = setup.Python("/usr/bin/python3", (3, 11), of_system=True, has_venv=True)
+BARE = DEBIAN._replace(has_venv=False)
+LAVAPIPE = ["/usr/share/vulkan/icd.d/lvp_icd.x86_64.json"]
+
+
+def everything(library):
+    return True
+
+
+def nothing(library):
+    return False
+
+
+def packages(needs):
+    return [need.package for need in needs]
+
+
+def test_a_complete_machine_needs_nothing():
+    assert setup.missing(DEBIAN, everything, LAVAPIPE, "linux") == []
+    assert setup.verdict([], apt=True) == (False, "")
+
+
+def test_a_bare_debian_needs_all():
+    needs = setup.missing(BARE, nothing, [], "linux")
+    assert packages(needs) == ["python3.11-venv", "libgl1", "libx11-6", "libvulkan1", "mesa-vulkan-drivers"]
+    assert [need.package for need in needs if need.vital] == ["python3.11-venv", "libgl1", "libx11-6"]
+
+
+@pytest.mark.parametrize("library", setup.LIBRARIES)
+def test_each_library_is_asked_for_by_itself(library):
+    assert packages(setup.missing(DEBIAN, lambda name: name != library.what, LAVAPIPE, "linux")) == [library.package]
+
+
+def test_the_venv_package_follows_the_version_and_only_for_the_system_python():
+    assert packages(setup.missing(BARE._replace(version=(3, 13)), everything, LAVAPIPE, "linux")) == ["python3.13-venv"]
+    own = setup.missing(BARE._replace(path="/opt/python/bin/python3", of_system=False), everything, LAVAPIPE, "linux")
+    assert packages(own) == [""]
+    stop, message = setup.verdict(own, apt=True)
+    assert stop and "/opt/python/bin/python3" in message and "apt-get" not in message
+
+
+def test_macos_needs_no_x11_or_vulkan():
+    assert setup.missing(DEBIAN, nothing, [], "darwin") == []
+
+
+def test_on_debian_without_rights_the_command_to_type_is_exact():
+    needs = setup.missing(BARE, nothing, [], "linux")
+    stop, message = setup.verdict(needs, apt=True, sudo="sudo ")
+    typed = "sudo apt-get install -y --no-install-recommends python3.11-venv libgl1 libx11-6 libvulkan1 mesa-vulkan-drivers"
+    assert stop and message.splitlines().count(f"  sudo apt-get update && {typed}") == 1
+    assert "sudo" not in setup.verdict(needs, apt=True)[1]
+
+
+def test_pictures_alone_never_stop():
+    needs = setup.missing(DEBIAN, lambda name: "vulkan" not in name, [], "linux")
+    for apt in (True, False):
+        stop, message = setup.verdict(needs, apt)
+        assert not stop and "no pictures" in message and "exudyn" not in message
+
+
+def test_elsewhere_the_missing_are_named_with_their_cost_and_the_set_up_goes_on():
+    stop, message = setup.verdict(setup.missing(DEBIAN, nothing, [], "linux"), apt=False)
+    assert not stop and "apt-get" not in message
+    for library in ("libGL.so.1", "libX11.so.6"):
+        assert re.search(rf"{library} .*exudyn cannot be imported", message)
+    for need in ("libvulkan.so.1", "a Vulkan driver"):
+        assert re.search(rf"{need} .*no pictures", message)
+    stop, message = setup.verdict(setup.missing(BARE, everything, LAVAPIPE, "linux"), apt=False)
+    assert stop and "ensurepip" in message
+
+
+def python(path, version, has_venv=True):
+    return setup.Python(path, version, of_system=True, has_venv=has_venv)
+
+
+def test_choice_of_python():
+    machine = {
+        "old": python("old", (3, 9)), "broken shim": None, "bare": python("bare", (3, 11), has_venv=False),
+        "good": python("good", (3, 12)), "too new": python("too new", (3, 99)),
+    }
+    assert setup.choose(["old", "broken shim", "good"], machine.get).path == "good"
+    assert setup.choose(["bare", "good"], machine.get).path == "good"          # no need to install anything
+    assert setup.choose(["bare", "too new"], machine.get).path == "bare"       # its venv can be installed
+    with pytest.raises(setup.Stop, match=r"3\.11 to 3\.\d+ is missing.*old \(3\.9\), too new \(3\.99\)"):
+        setup.choose(["old", "too new", "broken shim"], machine.get)
+    with pytest.raises(setup.Stop, match="Found: none"):
+        setup.choose([], machine.get)
+
+
+def test_a_python_that_does_not_run_is_no_python(tmp_path):
+    shim = tmp_path / "python3.12"
+    shim.write_text("#!/bin/sh\necho 'version 3.12 is not chosen' >&2\nexit 127\n")
+    shim.chmod(0o755)
+    assert setup.inspect(str(shim)) is None
+    assert setup.inspect(str(tmp_path / "absent")) is None
+
+
+def test_drivers_are_found_where_the_loader_looks(tmp_path, monkeypatch):
+    folder = tmp_path / "vulkan" / "icd.d"
+    folder.mkdir(parents=True)
+    (folder / "lvp_icd.json").write_text("{}")
+    for name in ("VK_DRIVER_FILES", "VK_ICD_FILENAMES", "XDG_DATA_DIRS"):
+        monkeypatch.delenv(name, raising=False)
+    before = setup.vulkan_drivers()
+    monkeypatch.setenv("XDG_DATA_DIRS", f"/nowhere:{tmp_path}")
+    assert setup.vulkan_drivers() == [*before, str(folder / "lvp_icd.json")]
+    monkeypatch.delenv("XDG_DATA_DIRS")
+    monkeypatch.setenv("VK_DRIVER_FILES", f"{folder / 'lvp_icd.json'}:{folder / 'absent.json'}")
+    assert setup.vulkan_drivers() == [str(folder / "lvp_icd.json"), *before]
+
+
+def test_every_dependency_has_an_exact_tested_version():
+    import tomllib
+
+    from packaging.requirements import Requirement
+    from packaging.utils import canonicalize_name
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    lines = (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()
+    exact = dict(line.split("==") for line in lines if not line.startswith("#"))
+    for text in project["dependencies"] + project["optional-dependencies"]["test"]:
+        requirement = Requirement(text)
+        assert requirement.specifier.contains(exact[canonicalize_name(requirement.name)]), text

@@ -1,0 +1,200 @@
+"""Makes what the targets of the Makefile need: system packages, the environment .venv, compiled functions.
+
+    python3 tools/setup.py             system packages and .venv; ends with the stamp .venv/.ready
+    python3 tools/setup.py compile     the solver's compiled functions; ends with the stamp .venv/.compiled
+
+Standard library only; an older Python runs it too, to say that a newer one is missing. A stamp is written last and holds
+the checkout's place: with another place in it, the environment was moved.
+"""
+from __future__ import annotations
+
+import ctypes
+import fcntl
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).resolve().parent.parent
+OLDEST, NEWEST = (3, 11), (3, 14)        # Pythons for which everything in constraints.txt has a wheel
+
+
+class Stop(Exception):
+    """A message for the person at the terminal: what is missing, and what to type."""
+
+
+class Need(NamedTuple):
+    what: str            # looked for on the machine
+    package: str         # brings it, on Debian
+    without: str         # what is lost
+    vital: bool          # the project does not work without it
+
+
+class Python(NamedTuple):
+    path: str
+    version: tuple[int, int]
+    of_system: bool      # under /usr: Debian keeps this one's ensurepip in a package of its own
+    has_venv: bool
+
+
+NO_EXUDYN, NO_PICTURE = "exudyn cannot be imported: no cross-check, no demo", "no pictures of the review, only its recording"
+LIBRARIES = [
+    Need("libGL.so.1", "libgl1", NO_EXUDYN, True),
+    Need("libX11.so.6", "libx11-6", NO_EXUDYN, True),
+    Need("libvulkan.so.1", "libvulkan1", NO_PICTURE, False),
+]
+DRIVER = Need("a Vulkan driver", "mesa-vulkan-drivers", NO_PICTURE, False)
+
+
+def loads(library: str) -> bool:
+    """Whether the dynamic loader finds the library."""
+    try:
+        return bool(ctypes.CDLL(library))
+    except OSError:
+        return False
+
+
+def vulkan_drivers() -> list[str]:
+    """The driver descriptions that the Vulkan loader would read."""
+    named = ":".join(os.environ.get(name, "") for name in ("VK_DRIVER_FILES", "VK_ICD_FILENAMES")).split(":")
+    folders = ["/etc", "/usr/share", "/usr/local/share", *os.environ.get("XDG_DATA_DIRS", "").split(":")]
+    return [*filter(os.path.exists, named), *(str(f) for d in filter(None, folders) for f in Path(d).glob("vulkan/icd.d/*.json"))]
+
+
+def missing(python: Python, loads: Callable[[str], bool], drivers: list[str], system: str) -> list[Need]:
+    """The needs that the machine does not meet."""
+    needs = []
+    if not python.has_venv:
+        package = "python{}.{}-venv".format(*python.version) if python.of_system else ""
+        needs.append(Need(f"ensurepip for {python.path}", package, "no environment for the packages can be made", True))
+    if system == "linux":        # on macOS the wheels use the system's own frameworks
+        needs += [need for need in LIBRARIES if not loads(need.what)]
+        needs += [] if drivers else [DRIVER]
+    return needs
+
+
+def inspect(path: str) -> Python | None:
+    """The Python at this path, or None if it does not run (a pyenv shim whose version is not chosen, for example)."""
+    code = ("import sys, importlib.util as u; print(*sys.version_info[:2], int(sys.base_prefix == '/usr'), "
+            "int(bool(u.find_spec('venv') and u.find_spec('ensurepip'))))")
+    try:
+        output = subprocess.run([path, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=True).stdout
+        major, minor, of_system, has_venv = map(int, output.split())
+    except (OSError, ValueError, subprocess.CalledProcessError):
+        return None
+    return Python(path, (major, minor), bool(of_system), bool(has_venv))
+
+
+def choose(paths: list[str], inspect: Callable[[str], Python | None]) -> Python:
+    """The first Python of a fit version; one that can make environments as it is goes before one that cannot."""
+    found = [python for python in map(inspect, dict.fromkeys(paths)) if python]
+    fit = [python for python in found if OLDEST <= python.version <= NEWEST]
+    if not fit:
+        here = ", ".join("{} ({}.{})".format(python.path, *python.version) for python in found) or "none"
+        raise Stop("Python {}.{} to {}.{} is missing. Found: {}.\nInstall one of these versions and run this again, or name "
+                   "one that is not on the PATH: make PYTHON=/path/to/python3.11 ...".format(*OLDEST, *NEWEST, here))
+    return next((python for python in fit if python.has_venv), fit[0])
+
+
+def verdict(needs: list[Need], apt: bool, sudo: str = "") -> tuple[bool, str]:
+    """(stop, message) about needs that stayed unmet. Without apt a library that was not found does not stop: what looks
+    for it later may know better, and the person may do without what it costs. Without ensurepip nothing can go on."""
+    packages = " ".join(need.package for need in needs if need.package)
+    lines = [f"  {need.what}" + (f" (on Debian: {need.package})" if need.package else "") + f": {need.without}" for need in needs]
+    stop = any(need.vital and (apt or need not in LIBRARIES) for need in needs)
+    how = "Install what is missing in this system's own way."
+    if apt and packages:
+        how = (f"To install{'' if sudo else ', as root'}, type:\n"
+               f"  {sudo}apt-get update && {sudo}apt-get install -y --no-install-recommends {packages}")
+    return stop, "\n".join(["Missing on this machine:", *lines, how, *["Then run make again."] * stop]) if needs else ""
+
+
+def step(text: str, command: list[str], may_fail: bool = False) -> None:
+    """Runs a command with its output kept back: one line with the time taken, or the end of the output on failure."""
+    print(f"  {text} ... ", end="", flush=True)
+    start = time.monotonic()
+    done = subprocess.run(command, cwd=ROOT, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    if done.returncode == 0:
+        print(f"{time.monotonic() - start:.0f} s", flush=True)
+        return
+    print("failed\n" + "\n".join(done.stdout.decode(errors="replace").splitlines()[-25:]), flush=True)
+    if not may_fail:
+        raise Stop(f"This failed: {' '.join(command)}")
+
+
+def install(needs: list[Need]) -> None:
+    """Asks apt for the packages, given apt and the right to use it. What came of it is for the caller to look up."""
+    sudo = [] if os.geteuid() == 0 else ["sudo", "-n"]
+    may = not sudo or (shutil.which("sudo") and subprocess.run([*sudo, "true"], stderr=subprocess.DEVNULL).returncode == 0)
+    if not may or not shutil.which("apt-get") or not any(need.package for need in needs):
+        return
+    apt = [*sudo, "env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "-qq", "-y", "-o", "DPkg::Lock::Timeout=300"]
+    step("list of system packages", [*apt, "update"], may_fail=True)     # one bad source must not stop the others
+    for vital in (True, False):                                            # a driver for pictures must not stop the rest
+        if names := [need.package for need in needs if need.package and need.vital == vital]:
+            step(f"system packages {' '.join(names)}", [*apt, "install", "--no-install-recommends", *names], may_fail=True)
+
+
+def set_up(venv: Path) -> None:
+    """System packages, the environment, its packages."""
+    names = ["python3", *(f"python3.{minor}" for minor in range(OLDEST[1], NEWEST[1] + 1))]
+    python = choose([sys.executable, *filter(None, map(shutil.which, names))], inspect)
+    print("Setting up {} with Python {}.{} ({}).".format(venv, *python.version, python.path), flush=True)
+    install(missing(python, loads, vulkan_drivers(), sys.platform))
+    needs = missing(inspect(python.path) or python, loads, vulkan_drivers(), sys.platform)
+    sudo = "sudo " if os.geteuid() and shutil.which("sudo") else ""
+    stop, message = verdict(needs, bool(shutil.which("apt-get")), sudo)
+    if stop:
+        raise Stop(message)
+    print(message, end="\n" * bool(message), flush=True)
+
+    inside, stamp, unfinished = str(venv / "bin/python"), venv / ".ready", venv.with_name(".venv.unfinished")
+    moved, current = stamp.exists() and stamp.read_text().strip() != str(ROOT), inspect(inside)
+    has_pip = current and subprocess.run([inside, "-m", "pip", "--version"], capture_output=True).returncode == 0
+    sound = has_pip and not moved and not unfinished.exists() and OLDEST <= current.version <= NEWEST
+    unfinished.touch()
+    stamp.unlink(missing_ok=True)
+    if not sound:
+        step("environment", [python.path, "-m", "venv", "--clear", str(venv)])
+    step("Python packages (about 400 MB to download the first time)",
+         [inside, "-m", "pip", "install", "-q", "--disable-pip-version-check", "-c", "constraints.txt", "-e", ".[test]"])
+    unfinished.unlink()
+
+
+def compile_solver(venv: Path) -> None:
+    step("compiling the solver (about a minute the first time)", [str(venv / "bin/python"), "-m", "flexura.warm"])
+
+
+def main(argv: list[str]) -> int:
+    work, name = (compile_solver, ".compiled") if argv == ["compile"] else (set_up, ".ready")
+    stamp = ROOT / ".venv" / name
+    signal.signal(signal.SIGTERM, signal.default_int_handler)            # so that what runs below ends with this
+    try:
+        with open(__file__) as lock:                                       # one set-up of this checkout at a time
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                print("waiting for another make that is setting up here", flush=True)
+                fcntl.flock(lock, fcntl.LOCK_EX)
+                if stamp.exists():
+                    return 0
+            start = time.time()
+            work(stamp.parent)
+            stamp.write_text(f"{ROOT}\n")
+            os.utime(stamp, (start, start))                              # a file edited meanwhile is newer than the stamp
+    except Stop as message:
+        print(f"\n{message}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("\ninterrupted; the same command goes on from here", file=sys.stderr)
+        return 130
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main(sys.argv[1:]))
