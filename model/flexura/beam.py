@@ -13,7 +13,7 @@ import numpy as np
 
 from .robot import Link
 
-POINTS = 5  # mass points of a flexible link for the geometric stiffening, the tip included
+POINTS = 4  # mass points of a flexible link for the geometric stiffening, the tip included
 SLOPES = 2 * POINTS  # slope points
 
 
@@ -54,8 +54,8 @@ class LinkIntegrals:
     u2 = -1/2 int_0^x w'^2 has int u2 dm = -q^T G1 q / 2, int x u2 dm = -q^T G2 q / 2; and H = int phi' phi'^T dx, u2(L) = -q^T H q / 2.
     NL = phi(L), SL = phi'(L) (m,); basis (2n, m): nodal unknowns = basis @ q.
     What is of higher order in the deflection is summed over points (`model/README.md`, section 3): mass points (POINTS,) at x with their masses and
-    phi (m, POINTS), the last one being the tip with the payload; and slope points (SLOPES,), SLOPES / POINTS between two mass points,
-    with weights dx, EI dx, and phi', phi'' (m, SLOPES).
+    phi (POINTS, m), the last one being the tip with the payload; and slope points (SLOPES,), SLOPES / POINTS between two mass points,
+    with weights dx, EI dx, and phi', phi'' (SLOPES, m).
     """
 
     length: float
@@ -87,7 +87,7 @@ class LinkIntegrals:
             self.length, self.mass, self.s1, self.inertia, B.T @ self.S0, B.T @ self.S1,
             _sandwich(B, self.M), _sandwich(B, self.K), _sandwich(B, self.G1), _sandwich(B, self.G2), _sandwich(B, self.H),
             B.T @ self.NL, B.T @ self.SL, self.basis @ B,
-            self.point_x, self.point_mass, B.T @ self.point_phi, self.slope_dx, self.slope_EI, B.T @ self.slope_d1, B.T @ self.slope_d2,
+            self.point_x, self.point_mass, self.point_phi @ B, self.slope_dx, self.slope_EI, self.slope_d1 @ B, self.slope_d2 @ B,
         )  # fmt: skip
 
 
@@ -138,7 +138,7 @@ def _rigid(link: Link) -> LinkIntegrals:
     points, slopes = np.zeros(POINTS), np.zeros(SLOPES)
     return LinkIntegrals(
         link.length_m, mass, s1, inertia, none, none, empty, empty, empty, empty, empty, none, none, empty,
-        points, points, np.zeros((0, POINTS)), slopes, slopes, np.zeros((0, SLOPES)), np.zeros((0, SLOPES)),
+        points, points, np.zeros((POINTS, 0)), slopes, slopes, np.zeros((SLOPES, 0)), np.zeros((SLOPES, 0)),
     )  # fmt: skip
 
 
@@ -184,7 +184,7 @@ def _points(link: Link) -> tuple[np.ndarray, ...]:
     x = np.append((1 + s) * L / 2, L)
     mass = np.append(weight * L / 2 * link.mass_per_length(x[:-1]), 0.0)
     place, dx = _quadrature(np.concatenate([[0.0], x]), SLOPES // POINTS)
-    return x, mass, shape(L, n, x), dx, link.bending_stiffness(place) * dx, shape(L, n, place, 1), shape(L, n, place, 2)
+    return x, mass, shape(L, n, x).T, dx, link.bending_stiffness(place) * dx, shape(L, n, place, 1).T, shape(L, n, place, 2).T
 
 
 def _quadrature(cells: np.ndarray, points: int = 6) -> tuple[np.ndarray, np.ndarray]:

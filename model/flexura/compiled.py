@@ -1,10 +1,18 @@
-"""How the inner loops are compiled."""
+"""How the inner loops are compiled, and where the compiled code is kept."""
 
 from __future__ import annotations
 
+import hashlib
+import os
+import shutil
+import tempfile
+from pathlib import Path
 from typing import Any
 
+import numba
 from numba import njit
+
+_HERE = Path(__file__).parent
 
 
 def compiled(function: Any) -> Any:
@@ -13,4 +21,47 @@ def compiled(function: Any) -> Any:
     Without numba's reference counting (`_nrt=False`) an array costs nothing to pass on, which makes the short functions of this
     package about three times faster, and a function that would allocate does not compile. `function.py_func` is the plain Python one.
     """
-    return njit(cache=True, error_model="numpy", _nrt=False)(function)
+    return _cached(function)
+
+
+def inlined(function: Any) -> Any:
+    """The same, and expanded where it is called: passing a robot's constants, some forty arrays, costs more than a short function."""
+    return _cached(function, forceinline=True)
+
+
+def _cached(function: Any, **options: Any) -> Any:
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(_FOLDER)
+    try:
+        return njit(cache=True, error_model="numpy", _nrt=False, fastmath={"contract"}, **options)(function)
+    finally:
+        numba.config.CACHE_DIR = before
+
+
+def _folder() -> Path:
+    """A cache folder named after the content of this package: numba looks only at the file that a function stands in, and would run
+    code that was inlined from an older version of another file."""
+    digest = hashlib.sha256(numba.__version__.encode())
+    for source in sorted(_HERE.glob("*.py")):
+        digest.update(source.read_bytes())
+    name = f"compiled-{digest.hexdigest()[:16]}"
+    for parent in (_HERE / "__pycache__", Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "flexura"):
+        folder = parent / name
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError:
+            continue
+        if os.access(folder, os.W_OK):
+            for old in parent.glob("compiled-*"):
+                if old != folder:
+                    shutil.rmtree(old, ignore_errors=True)
+            return folder
+    return Path(tempfile.mkdtemp(prefix="flexura-"))
+
+
+_FOLDER = _folder()
+
+
+def folder() -> Path:
+    """Where the compiled code is kept."""
+    return _FOLDER

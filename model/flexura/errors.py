@@ -18,7 +18,7 @@ class InputError(FlexuraError):
         where = f"{file}: " if file else ""
         shown = "" if value is None else f" = {_short(value)}"
         tail = f" (and {more} more wrong {'value' if more == 1 else 'values'})" if more else ""
-        super().__init__(f"{where}{key}{shown}{': ' if key else ''}{expected}{tail}")
+        super().__init__(_one_line(f"{where}{_cut(key, 200)}{shown}{': ' if key else ''}{expected}{tail}"))
 
     def in_file(self, file: str) -> InputError:
         """The same error, with the file's name."""
@@ -33,6 +33,17 @@ class WrongValue(ValueError):
         super().__init__(expected)
 
 
-def _short(value: object, limit: int = 60) -> str:
-    text = repr(value).replace("\n", " ")
+def _short(value: object) -> str:
+    try:
+        return _cut(repr(value).replace("\n", " "), 60)
+    except (ValueError, RecursionError):  # a number of thousands of digits, tables in tables without end
+        return f"(a very long {type(value).__name__})"
+
+
+def _cut(text: str, limit: int) -> str:
     return text if len(text) <= limit else text[: limit - 3] + "..."
+
+
+def _one_line(text: str) -> str:
+    """Line ends and what no terminal shows, from a key or a file's name, as escapes."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)

@@ -12,8 +12,8 @@ from .errors import InputError, WrongValue
 
 def explain(error: ValidationError, model: type[BaseModel], data: Any, file: str = "") -> InputError:
     """The first problem of `error` as an InputError; keys are counted from 1, as in `link[2].length_m`."""
-    problems = error.errors()
-    first = problems[0]
+    problems = [problem for problem in error.errors() if _fits(problem["loc"], data)] or error.errors()
+    first = _misspelt(problems) or problems[0]
     table: type[BaseModel] | None = model
     keys: list[str] = []
     expected, value, found = "", data, True
@@ -33,7 +33,7 @@ def explain(error: ValidationError, model: type[BaseModel], data: Any, file: str
             value = value[part]
         except (KeyError, IndexError, TypeError):
             value, found = None, False
-    more = len({_place(problem) for problem in problems}) - 1
+    more = len(problems) - 1
     wrong = (first.get("ctx") or {}).get("error")
     if isinstance(wrong, WrongValue):
         tail = wrong.key.split(".")
@@ -42,11 +42,13 @@ def explain(error: ValidationError, model: type[BaseModel], data: Any, file: str
     key = ".".join(keys) or "the file"
     if first["type"] == "extra_forbidden":
         names = list(table.model_fields) if table is not None else []
-        near = difflib.get_close_matches(keys[-1], names, 1, 0.5)
+        near = difflib.get_close_matches(keys[-1], names, 1, 0.6)
         hint = f"did you mean {near[0]}?" if near else f"known here: {', '.join(names)}"
         return InputError(f"an unknown key; {hint}", key=key, value=value, file=file, more=more)
     if first["type"] == "missing":
         return InputError(f"missing: expected {expected}", key=key, file=file, more=more)
+    if first["type"] == "too_long" and isinstance(value, list):
+        value = len(value)
     return InputError(_worded(expected or first["msg"]), key=key, value=value if found else None, file=file, more=more)
 
 
@@ -54,9 +56,12 @@ def _worded(expected: str) -> str:
     return expected if expected.startswith("missing") else f"expected {expected}"
 
 
-def _place(problem: Any) -> tuple[Any, ...]:
-    """Where a problem is, the branches of unions (upper-case or bracketed names) left out."""
-    return tuple(p for p in problem["loc"] if isinstance(p, int) or not (p[:1].isupper() or "[" in p or p in ("float", "constrained-float")))
+def _fits(loc: tuple[int | str, ...], value: Any) -> bool:
+    """Where a key takes one of several forms, Pydantic says what is wrong for each: is this the form that was given?"""
+    for part in loc:
+        if isinstance(part, str) and not isinstance(value, dict | list) and value is not data_end:
+            return False
+    return True
 
 
 def _table_inside(annotation: Any, value: Any, part: Any) -> type[BaseModel] | None:

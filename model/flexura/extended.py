@@ -18,16 +18,17 @@ def mass_matrix(c: Chain, w: Work, y: np.ndarray) -> np.ndarray:
     M = np.diag(np.where(np.isin(np.arange(len(y)), c.first[:-1]), 0.0, 1.0))
     for i, hub in enumerate(hubs):
         own = slice(c.first[i] + 1, c.first[i + 1])
+        m = own.stop - own.start
         S0q, b, Jt = w.body[i, :3]
         Mrr = np.array([[c.mass[i], 0, -S0q], [0, c.mass[i], b], [-S0q, b, Jt]])
-        scattered = hub.T @ np.vstack([-w.g1q[own], c.S0[own], w.mt[own]])
+        scattered = hub.T @ np.vstack([-w.g1q[i, :m], c.S0[i, :m], w.mt[i, :m]])
         M += hub.T @ Mrr @ hub
         M[:, own] += scattered
         M[own, :] += scattered.T
         M[c.first[i], c.first[i]] += c.rotor[i]
         if c.stiffening:
-            M[own, own] += (w.h[own] * c.point_mass[i]) @ w.h[own].T
-            M[own, own] += c.tip_inertia[i] * (w.tilt[i] ** 2 - 1) * np.outer(c.SL[own], c.SL[own])
+            M[own, own] += (w.h[i, :, :m].T * c.point_mass[i]) @ w.h[i, :, :m]
+            M[own, own] += c.tip_inertia[i] * (w.tilt[i] ** 2 - 1) * np.outer(c.SL[i, :m], c.SL[i, :m])
     return (M + M.T) / 2
 
 
@@ -36,7 +37,8 @@ def tip_jacobian(c: Chain, w: Work, y: np.ndarray) -> np.ndarray:
     _, tip = _jacobians(c, w, y)
     last = len(c.kind) - 1
     own = slice(c.first[last] + 1, c.first[last + 1])
-    tip[:, own] += np.vstack([-w.hq[own], c.NL[own], w.tilt[last] * c.SL[own]])
+    m = own.stop - own.start
+    tip[:, own] += np.vstack([-w.hq[last, :m], c.NL[last, :m], w.tilt[last] * c.SL[last, :m]])
     angle = np.arctan2(w.sin, w.cos).sum()
     cs, sn = np.cos(angle), np.sin(angle)
     return np.array([[cs, -sn, 0], [sn, cs, 0], [0, 0, 1.0]]) @ tip
@@ -57,5 +59,6 @@ def _jacobians(c: Chain, w: Work, y: np.ndarray) -> tuple[list[np.ndarray], np.n
         attachment = np.array([[1, 0, -ry], [0, 1, rx], [0, 0, 1.0]]) @ hub
         if i + 1 < links and c.kind[i + 1] != PRISMATIC:
             own = slice(c.first[i] + 1, c.first[i + 1])
-            attachment[:, own] += np.vstack([-w.hq[own], c.NL[own], w.tilt[i] * c.SL[own]])
+            m = own.stop - own.start
+            attachment[:, own] += np.vstack([-w.hq[i, :m], c.NL[i, :m], w.tilt[i] * c.SL[i, :m]])
     return hubs, attachment

@@ -28,13 +28,15 @@ def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
     if len(raw) > MAX_BYTES:
         raise InputError(f"more than {MAX_BYTES // 10**6} MB: expected a TOML file", file=name)
     try:
-        text = raw.decode("utf-8")
+        text = raw.decode("utf-8-sig")  # some editors begin a file with a byte order mark
     except UnicodeDecodeError as error:
         raise InputError(f"not a text (byte {error.start} is not UTF-8): expected a TOML file", file=name) from None
     try:
         return tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise InputError(f"not valid TOML ({str(error) or 'nested too deeply'})", file=name) from None
+    except RecursionError:
+        raise InputError("not valid TOML (nested too deeply)", file=name) from None
+    except ValueError as error:  # TOMLDecodeError, or a number of thousands of digits
+        raise InputError(f"not valid TOML ({error})", file=name) from None
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:

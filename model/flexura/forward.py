@@ -53,14 +53,13 @@ def simulate(
     _inside_limits(system, state)
     drive = Drive.none(len(system.robot.links)) if drive is None else drive
     chosen = _choose(system, t[-1] - t[0], rtol) if method == "auto" else _METHODS[method]
-    begun = time.perf_counter()
     if isinstance(drive, Drive):
         if len(drive.joints) != len(system.robot.links):
             raise InputError(f"expected {len(system.robot.links)} joint drives, one a joint", key="drive", value=len(drive.joints))
         states, work, meta = _compiled(system, t, drive, state, rtol, chosen, progress)
     else:
         states, work, meta = _python(system, t, drive, state, rtol, chosen)
-    meta |= {"wall_s": time.perf_counter() - begun, "rtol": rtol, "method": "explicit" if chosen == loop.EXPLICIT else "implicit"}
+    meta |= {"rtol": rtol, "method": "explicit" if chosen == loop.EXPLICIT else "implicit"}
     return _record(system, t[: len(states)], states, work, drive, meta)
 
 
@@ -80,6 +79,8 @@ def _compiled(
     m.s[loop.H] = min(t[-1] - t[0], 0.1 / _fastest(system)) if method == loop.EXPLICIT else (t[-1] - t[0]) * 1e-4
     events: list[dict[str, Any]] = []
     complete = len(t) == 1
+    loop.advance(c, w, inputs, m, method, rtol, t, out, 0)  # no step: compile before the clock starts
+    begun = time.perf_counter()
     try:
         while not complete:
             loop.advance(c, w, inputs, m, method, rtol, t, out, _STEPS_A_CALL)
@@ -101,7 +102,8 @@ def _compiled(
     except KeyboardInterrupt:
         events.append({"t": float(m.s[loop.T]), "level": "WARN", "text": "interrupted"})
     rows = int(m.s[loop.OUT])
-    counts = {name: int(m.s[k]) for name, k in (("steps", loop.STEPS), ("rejected", loop.REJECTED), ("evaluations", loop.EVALS))}
+    counts: dict[str, Any] = {name: int(m.s[k]) for name, k in (("steps", loop.STEPS), ("rejected", loop.REJECTED), ("evaluations", loop.EVALS))}
+    counts["wall_s"] = time.perf_counter() - begun
     return out[:rows, : 2 * n], out[:rows, 2 * n :], counts | {"complete": complete, "events": events, "drive": [j.spec() for j in drive.joints]}
 
 
@@ -114,6 +116,7 @@ def _python(
     c, n, links = system.chain, system.n, len(system.robot.links)
     w, zero, a = system._work(), np.zeros(links), np.zeros(n)
     call = as_function(drive)
+    begun = time.perf_counter()
 
     def slope(time_s: float, z: np.ndarray) -> np.ndarray:
         y, v = z[:n], z[n : 2 * n]
@@ -128,7 +131,7 @@ def _python(
     if not result.success:
         raise FlexuraError(f"the simulation ended at t = {result.t[-1] if len(result.t) else t[0]:.6g} s: {result.message}")
     z = result.y.T
-    return z[:, : 2 * n], z[:, 2 * n :], {"steps": int(result.nfev), "complete": True, "events": [], "drive": "Python function"}
+    return z[:, : 2 * n], z[:, 2 * n :], {"steps": int(result.nfev), "wall_s": time.perf_counter() - begun, "complete": True, "events": [], "drive": "Python function"}
 
 
 def as_function(drive: Callable[..., Any]) -> Callable[[float, np.ndarray, np.ndarray, float], np.ndarray]:
@@ -145,7 +148,7 @@ def as_function(drive: Callable[..., Any]) -> Callable[[float, np.ndarray, np.nd
 def _forces(system: System, call: Callable[..., Any], t: float, y: np.ndarray, v: np.ndarray) -> np.ndarray:
     rows = system.joint_rows
     own = slice(rows[-1] + 1, system.n)
-    force = np.asarray(call(t, y[rows], v[rows], float(system.chain.NL[own] @ y[own])), dtype=float)
+    force = np.asarray(call(t, y[rows], v[rows], float(system.links[-1].NL @ y[own])), dtype=float)
     if force.shape != rows.shape or not np.all(np.isfinite(force)):
         raise InputError(f"expected {len(rows)} finite forces from the drive function at t = {t:g} s", key="drive", value=force)
     return force

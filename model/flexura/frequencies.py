@@ -33,8 +33,9 @@ def frequencies(system: System, q: Any = None, joints: str = "locked", *, qd: An
 
     def forces(y: np.ndarray, v: np.ndarray) -> np.ndarray:
         z = T @ y
-        return T.T @ (system._inverse(z, T @ v, zero, system.chain.gravity)) + system.chain.lam * y
+        return T.T @ (system._inverse(z, T @ v, zero, system.chain.gravity)) + K0 @ y
 
+    K0 = T.T @ system.stiffness() @ T
     y, v = S @ at, S @ rates
     M = (T.T @ system.mass(at) @ T)[pick]
     K = jacobian(lambda z: forces(z, v), y)[pick]

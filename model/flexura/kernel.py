@@ -9,7 +9,7 @@ joint is attached. A link's equations are
     t   = X u + Jq qdd + beta                      acceleration of the attachment, which carries the wrench f = A t + b
 
 Condensing the outboard chain from the tip to the base gives A and b of every attachment (an articulated-body recursion with elastic
-coordinates), and so the accelerations, in time proportional to the number of links.
+coordinates), and so, in `passes`, the accelerations, in time proportional to the number of links.
 No matrix larger than a link's own elastic block is ever factorised.
 
 `gh` makes the same pass an implicit stage: with y = y* + gh^2 a and v = v* + gh a the linear terms (stiffness,
@@ -23,17 +23,16 @@ from typing import NamedTuple
 import numpy as np
 
 from .beam import POINTS, SLOPES
-from .compiled import compiled
+from .compiled import compiled, inlined
 
 REVOLUTE, PRISMATIC = 0, 1  # joint kinds; PRISMATIC: Pa on a rigid predecessor
 COULOMB_SPEED = 1e-3  # m/s or rad/s: Coulomb friction is f tanh(v / COULOMB_SPEED)
 
 
 class Chain(NamedTuple):
-    """The constants of a robot. N links, n unknowns; arrays (n,) use the global numbering [eta_1, q_1, eta_2, q_2, ...]."""
+    """The constants of a robot: N links, n unknowns in the global numbering [eta_1, q_1, eta_2, q_2, ...], at most m elastic ones a link."""
 
     first: np.ndarray  # (N + 1,) int: row of the joint of each link; its elastic rows follow; first[N] = n
-    at: np.ndarray  # (N + 1,) int: where the link's m x m blocks start in G1, G2, H and Work.S
     kind: np.ndarray  # (N,) int: REVOLUTE or PRISMATIC
     locked: np.ndarray  # (N,) int
     angle: np.ndarray  # (N,) gamma [rad]
@@ -44,23 +43,23 @@ class Chain(NamedTuple):
     mass: np.ndarray  # (N,)
     s1: np.ndarray  # (N,)
     inertia: np.ndarray  # (N,)
-    S0: np.ndarray  # (n,) int phi dm
-    S1: np.ndarray  # (n,) int x phi dm
-    NL: np.ndarray  # (n,) phi(L)
-    SL: np.ndarray  # (n,) phi'(L)
-    lam: np.ndarray  # (n,) omega^2
-    damp: np.ndarray  # (n,) alpha + beta omega^2
-    G1: np.ndarray  # (sum m^2,)
-    G2: np.ndarray  # (sum m^2,)
-    H: np.ndarray  # (sum m^2,)
+    S0: np.ndarray  # (N, m) int phi dm
+    S1: np.ndarray  # (N, m) int x phi dm
+    NL: np.ndarray  # (N, m) phi(L)
+    SL: np.ndarray  # (N, m) phi'(L)
+    lam: np.ndarray  # (N, m) omega^2
+    damp: np.ndarray  # (N, m) alpha + beta omega^2
+    G1: np.ndarray  # (N, m, m)
+    G2: np.ndarray  # (N, m, m)
+    H: np.ndarray  # (N, m, m)
     tip_inertia: np.ndarray  # (N,) of the payload [kg m^2]
     point_x: np.ndarray  # (N, POINTS)
     point_mass: np.ndarray  # (N, POINTS)
-    point_phi: np.ndarray  # (n, POINTS)
+    point_phi: np.ndarray  # (N, POINTS, m)
     slope_dx: np.ndarray  # (N, SLOPES)
     slope_EI: np.ndarray  # (N, SLOPES)
-    slope_d1: np.ndarray  # (n, SLOPES) phi'
-    slope_d2: np.ndarray  # (n, SLOPES) phi''
+    slope_d1: np.ndarray  # (N, SLOPES, m) phi'
+    slope_d2: np.ndarray  # (N, SLOPES, m) phi''
     stiffening: bool
     gravity: np.ndarray  # (2,)
 
@@ -73,39 +72,41 @@ class Work(NamedTuple):
     omega: np.ndarray  # (N,) angular velocity of the hub frame
     place: np.ndarray  # (N, 5): attachment r (2) and beta (3)
     tilt: np.ndarray  # (N,) rate of the tip's tangent over that of w'(L)
-    g1q: np.ndarray  # (n,) -Mrq, x: int h dm
-    mt: np.ndarray  # (n,) Mrq, angle
-    cv: np.ndarray  # (n,) velocity-dependent forces on the elastic rows
-    hq: np.ndarray  # (n,) h at the tip
-    h: np.ndarray  # (n, POINTS) h = -du/dq at the points
-    slope: np.ndarray  # (14, SLOPES)
-    point: np.ndarray  # (7, POINTS)
+    g1q: np.ndarray  # (N, m) -Mrq, x: int h dm
+    mt: np.ndarray  # (N, m) Mrq, angle
+    cv: np.ndarray  # (N, m) velocity-dependent forces on the elastic rows
+    hq: np.ndarray  # (N, m) h at the tip
+    h: np.ndarray  # (N, POINTS, m) h = -du/dq at the points
+    slope: np.ndarray  # (SLOPES, 4) tan dx, (tan - sin) dx, forces of the strain energy on w', w''
+    point: np.ndarray  # (POINTS, 5) factors of h, phi, phi, h and tan - sin in the inertia forces
     body: np.ndarray  # (N, 6): int w dm, int (x + u) dm, int (x + u)^2 + w^2 dm; hr (3)
     cond: np.ndarray  # (N, 30) of the condensation: A (6), b (3), (1 + E A)^-1 (9), X - P (9), t0 (3)
     joint: np.ndarray  # (N, 5): A s (3), 1 / (s^T A s + ...), tau - s^T b
     u: np.ndarray  # (N, 3)
-    S: np.ndarray  # (sum m^2,) the factor l of each link's elastic block
-    dinv: np.ndarray  # (n,) 1/d of its factorisation
-    rhs: np.ndarray  # (n, 7)
+    S: np.ndarray  # (N, m, m) the factor l of each link's elastic block
+    dinv: np.ndarray  # (N, m) 1/d of its factorisation
+    rhs: np.ndarray  # (N, m, 7)
 
 
 def workspace(c: Chain) -> Work:
     """A fresh workspace for one solver of this chain."""
-    z, links, n = np.zeros, len(c.kind), int(c.first[-1])
+    z, (N, m) = np.zeros, c.S0.shape
     return Work(
-        cos=z(links), sin=z(links), omega=z(links), place=z((links, 5)), tilt=z(links), g1q=z(n), mt=z(n), cv=z(n), hq=z(n),
-        h=z((n, POINTS)), slope=z((14, SLOPES)), point=z((7, POINTS)),
-        body=z((links, 6)), cond=z((links, 30)), joint=z((links, 5)), u=z((links, 3)), S=z(int(c.at[-1])), dinv=z(n), rhs=z((n, 7)),
+        cos=z(N), sin=z(N), omega=z(N), place=z((N, 5)), tilt=z(N), g1q=z((N, m)), mt=z((N, m)), cv=z((N, m)), hq=z((N, m)),
+        h=z((N, POINTS, m)), slope=z((SLOPES, 4)), point=z((POINTS, 5)), body=z((N, 6)), cond=z((N, 30)), joint=z((N, 5)), u=z((N, 3)),
+        S=z((N, m, m)), dinv=z((N, m)), rhs=z((N, m, 7)),
     )  # fmt: skip
 
 
-@compiled
+@inlined
 def outward(c: Chain, w: Work, y: np.ndarray, v: np.ndarray) -> None:
     """Positions and velocities along the chain, and each link's inertia terms and velocity-dependent forces."""
     links = c.kind.shape[0]
     omega, slope = 0.0, 0.0  # of the place where the next joint is attached, relative to its link
     for i in range(links):
         e, end = c.first[i], c.first[i + 1]
+        m = end - e - 1
+        q, qd = y[e + 1 : end], v[e + 1 : end]
         if c.kind[i] == REVOLUTE:
             psi = slope + y[e]
             omega += v[e]
@@ -114,23 +115,23 @@ def outward(c: Chain, w: Work, y: np.ndarray, v: np.ndarray) -> None:
         w.cos[i], w.sin[i], w.omega[i] = np.cos(psi), np.sin(psi), omega
         om2 = omega * omega
         slope, spin, wL, wLd, S0q, S0v, qq, qv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for k in range(e + 1, end):
-            slope += c.SL[k] * y[k]
-            spin += c.SL[k] * v[k]
-            wL += c.NL[k] * y[k]
-            wLd += c.NL[k] * v[k]
-            S0q += c.S0[k] * y[k]
-            S0v += c.S0[k] * v[k]
-            qq += y[k] * y[k]
-            qv += y[k] * v[k]
-            w.mt[k] = c.S1[k]
-            w.cv[k] = -om2 * y[k]
+        for k in range(m):
+            slope += c.SL[i, k] * q[k]
+            spin += c.SL[i, k] * qd[k]
+            wL += c.NL[i, k] * q[k]
+            wLd += c.NL[i, k] * qd[k]
+            S0q += c.S0[i, k] * q[k]
+            S0v += c.S0[i, k] * qd[k]
+            qq += q[k] * q[k]
+            qv += q[k] * qd[k]
+            w.mt[i, k] = c.S1[i, k]
+            w.cv[i, k] = -om2 * q[k]
         w.body[i, 0], w.body[i, 1], w.body[i, 2] = S0q, c.s1[i], c.inertia[i] + qq
         w.body[i, 3], w.body[i, 4], w.body[i, 5] = -2 * omega * S0v - om2 * c.s1[i], -om2 * S0q, 2 * omega * qv
         u, k_, z, turn = 0.0, 0.0, 0.0, 0.0
         w.tilt[i] = 1.0
-        if c.stiffening and end > e + 1:
-            u, k_, z = _bend(c, w, i, y, v, omega)
+        if c.stiffening and m > 0:
+            u, k_, z = _bend(c, w, i, q, qd, omega)
             # the tip's tangent turns by asin(w'), faster than w' by 1/cos
             tilt = 1.0 / np.sqrt(1.0 - slope * slope)
             w.tilt[i] = tilt
@@ -138,9 +139,9 @@ def outward(c: Chain, w: Work, y: np.ndarray, v: np.ndarray) -> None:
             Jp = c.tip_inertia[i]
             if Jp > 0.0:
                 w.body[i, 5] += Jp * turn
-                for k in range(e + 1, end):
-                    w.mt[k] += Jp * (tilt - 1.0) * c.SL[k]
-                    w.cv[k] += Jp * tilt * turn * c.SL[k]
+                for k in range(m):
+                    w.mt[i, k] += Jp * (tilt - 1.0) * c.SL[i, k]
+                    w.cv[i, k] += Jp * tilt * turn * c.SL[i, k]
             slope = np.arcsin(slope)
             spin *= tilt
         if i + 1 < links and c.kind[i + 1] == PRISMATIC:  # the next hub slides along this rigid link
@@ -153,8 +154,8 @@ def outward(c: Chain, w: Work, y: np.ndarray, v: np.ndarray) -> None:
         omega += spin
 
 
-@compiled
-def _bend(c: Chain, w: Work, i: int, y: np.ndarray, v: np.ndarray, omega: float) -> tuple[float, float, float]:
+@inlined
+def _bend(c: Chain, w: Work, i: int, q: np.ndarray, qd: np.ndarray, omega: float) -> tuple[float, float, float]:
     """Add the geometry of an inextensible line to link i's inertia terms and forces; returns u, h.v, z of its tip.
 
     The point at arc length x lies at (x + u, w) in the hub's frame, with u = int_0^x (cos - 1), sin = w', so that
@@ -162,107 +163,88 @@ def _bend(c: Chain, w: Work, i: int, y: np.ndarray, v: np.ndarray, omega: float)
     adds 1/2 int EI w''^2 tan^2 to the strain energy. What is of second order in (q, v) comes from the exact integrals G1, G2, H;
     the rest (tan - sin and the like, and products of u) is summed over the link's points.
     """
-    e, m = c.first[i] + 1, c.first[i + 1] - c.first[i] - 1
+    m = q.shape[0]
     om2 = omega * omega
     qGq, qGv, vGv, qG2q, qG2v, qHq, qHv, vHv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    row = c.at[i]
-    for k in range(e, e + m):
+    for k in range(m):
         g, gv, g2, h, hv = 0.0, 0.0, 0.0, 0.0, 0.0
         for j in range(m):
-            q, qd = y[e + j], v[e + j]
-            g += c.G1[row + j] * q
-            gv += c.G1[row + j] * qd
-            g2 += c.G2[row + j] * q
-            h += c.H[row + j] * q
-            hv += c.H[row + j] * qd
-        row += m
-        w.g1q[k], w.hq[k] = g, h
-        w.cv[k] += om2 * g2
-        qGq += g * y[k]
-        qGv += g * v[k]
-        vGv += gv * v[k]
-        qG2q += g2 * y[k]
-        qG2v += g2 * v[k]
-        qHq += h * y[k]
-        qHv += h * v[k]
-        vHv += hv * v[k]
-    s, sd, bend = w.slope[0], w.slope[1], w.slope[2]
-    wp, wd = w.point[0], w.point[1]
-    for r in range(SLOPES):
-        s[r], sd[r], bend[r] = 0.0, 0.0, 0.0
-    for p in range(POINTS):
-        wp[p], wd[p] = 0.0, 0.0
-    for k in range(e, e + m):
-        q, qd = y[k], v[k]
-        for r in range(SLOPES):
-            s[r] += c.slope_d1[k, r] * q
-            sd[r] += c.slope_d1[k, r] * qd
-            bend[r] += c.slope_d2[k, r] * q
-        for p in range(POINTS):
-            wp[p] += c.point_phi[k, p] * q
-            wd[p] += c.point_phi[k, p] * qd
-    sin, tan, rest = w.slope[3], w.slope[4], w.slope[5]  # times dx; rest = tan - sin
-    fs, fb = w.slope[6], w.slope[7]
-    u, k_, z, du, dk, dz = w.slope[8], w.slope[9], w.slope[10], w.slope[11], w.slope[12], w.slope[13]
-    for r in range(SLOPES):
-        s2 = s[r] * s[r]
-        cos2 = 1.0 - s2
-        cos = np.sqrt(cos2)
-        dx, EI = c.slope_dx[i, r], c.slope_EI[i, r]
-        sin[r] = dx * s[r]
-        rest[r] = dx * s[r] * s2 / (cos * (1.0 + cos))
-        tan[r] = sin[r] + rest[r]
-        u[r] = -dx * s2 / (1.0 + cos)
-        du[r] = -0.5 * dx * s2 * s2 / ((1.0 + cos) * (1.0 + cos))
-        k_[r], dk[r] = tan[r] * sd[r], rest[r] * sd[r]
-        z[r] = dx * sd[r] * sd[r] / (cos2 * cos)
-        dz[r] = z[r] - dx * sd[r] * sd[r]
-        fb[r] = EI * bend[r] * s2 / cos2
-        fs[r] = EI * bend[r] * bend[r] * s[r] / (cos2 * cos2)
-    U, K, Z, dU, dK, dZ = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            g += c.G1[i, k, j] * q[j]
+            gv += c.G1[i, k, j] * qd[j]
+            g2 += c.G2[i, k, j] * q[j]
+            h += c.H[i, k, j] * q[j]
+            hv += c.H[i, k, j] * qd[j]
+        w.g1q[i, k], w.hq[i, k] = g, h
+        w.cv[i, k] += om2 * g2
+        qGq += g * q[k]
+        qGv += g * qd[k]
+        vGv += gv * qd[k]
+        qG2q += g2 * q[k]
+        qG2v += g2 * qd[k]
+        qHq += h * q[k]
+        qHv += h * qd[k]
+        vHv += hv * qd[k]
+    U, K, Z, dU, dK, dZ = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0  # u, h.v, z so far, and their parts of higher order
     b, J, hx, hy, hw = -0.5 * qGq, -qG2q, vGv, qGv, -2 * omega * qG2v
-    along, across, up, wm, ax = w.point[2], w.point[3], w.point[4], w.point[5], w.point[6]
     for p in range(POINTS):
-        for r in range(p * SLOPES // POINTS, (p + 1) * SLOPES // POINTS):
-            U += u[r]
-            K += k_[r]
-            Z += z[r]
-            dU += du[r]
-            dK += dk[r]
-            dZ += dz[r]
+        for r in range(p * (SLOPES // POINTS), (p + 1) * (SLOPES // POINTS)):
+            s, sd, bend = 0.0, 0.0, 0.0
+            for k in range(m):
+                s += c.slope_d1[i, r, k] * q[k]
+                sd += c.slope_d1[i, r, k] * qd[k]
+                bend += c.slope_d2[i, r, k] * q[k]
+            cos = np.sqrt(1.0 - s * s)
+            sec = 1.0 / cos
+            sec2 = sec * sec
+            dx, moment = c.slope_dx[i, r], c.slope_EI[i, r] * bend * s * sec2
+            sin, vv = dx * s, dx * sd * sd
+            rest = sin * (sec - 1.0)
+            u, z = dx * (cos - 1.0), vv * sec2 * sec
+            U += u
+            K += (sin + rest) * sd
+            Z += z
+            dU += u + 0.5 * sin * s
+            dK += rest * sd
+            dZ += z - vv
+            w.slope[r, 0], w.slope[r, 1], w.slope[r, 2], w.slope[r, 3] = sin + rest, rest, moment * bend * sec2, moment * s
+        wp, wd = 0.0, 0.0
+        for k in range(m):
+            wp += c.point_phi[i, p, k] * q[k]
+            wd += c.point_phi[i, p, k] * qd[k]
         mu, x = c.point_mass[i, p], c.point_x[i, p]
-        along[p], across[p] = mu * (om2 * U + 2 * omega * wd[p] + Z), -2 * omega * mu * K
-        up[p], wm[p], ax[p] = mu * U, mu * wp[p], mu * om2 * x
+        w.point[p, 0], w.point[p, 1] = mu * (om2 * U + 2 * omega * wd + Z), -2 * omega * mu * K
+        w.point[p, 2], w.point[p, 3], w.point[p, 4] = mu * U, mu * wp, mu * om2 * x
         b += mu * dU
         J += mu * (2 * x * dU + U * U)
         hx += mu * dZ
         hy += mu * dK
-        hw += mu * (wp[p] * Z - 2 * omega * (K * U + dK * x))
+        hw += mu * (wp * Z - 2 * omega * (K * U + dK * x))
     w.body[i, 1] += b
     w.body[i, 2] += J
     w.body[i, 3] -= om2 * b + hx
     w.body[i, 4] -= 2 * omega * hy
     w.body[i, 5] += hw
-    for k in range(e, e + m):
+    for k in range(m):
         h, dh, g, mt, cv = 0.0, 0.0, 0.0, 0.0, 0.0
-        for r in range(SLOPES):
-            cv += fs[r] * c.slope_d1[k, r] + fb[r] * c.slope_d2[k, r]
         for p in range(POINTS):
-            for r in range(p * SLOPES // POINTS, (p + 1) * SLOPES // POINTS):
-                h += tan[r] * c.slope_d1[k, r]
-                dh += rest[r] * c.slope_d1[k, r]
-            w.h[k, p] = h
+            for r in range(p * (SLOPES // POINTS), (p + 1) * (SLOPES // POINTS)):
+                d1 = c.slope_d1[i, r, k]
+                h += w.slope[r, 0] * d1
+                dh += w.slope[r, 1] * d1
+                cv += w.slope[r, 2] * d1 + w.slope[r, 3] * c.slope_d2[i, r, k]
+            phi = c.point_phi[i, p, k]
+            w.h[i, p, k] = h
             g += c.point_mass[i, p] * dh
-            mt += up[p] * c.point_phi[k, p] + wm[p] * h
-            cv += along[p] * h + across[p] * c.point_phi[k, p] + ax[p] * dh
-        w.g1q[k] += g
-        w.hq[k] += dh
-        w.mt[k] += mt
-        w.cv[k] += cv
+            mt += w.point[p, 2] * phi + w.point[p, 3] * h
+            cv += w.point[p, 0] * h + w.point[p, 1] * phi + w.point[p, 4] * dh
+        w.g1q[i, k] += g
+        w.hq[i, k] += dh
+        w.mt[i, k] += mt
+        w.cv[i, k] += cv
     return dU - 0.5 * qHq, dK + qHv, dZ + vHv
 
 
-@compiled
+@inlined
 def _rigid_hub(c: Chain, w: Work, i: int, A: tuple, b: tuple) -> tuple:
     """Condensed inertia (6) and bias (3) at the hub of a rigid link that carries the wrench A t + b at its attachment."""
     A00, A01, A02, A11, A12, A22 = A
@@ -279,7 +261,7 @@ def _rigid_hub(c: Chain, w: Work, i: int, A: tuple, b: tuple) -> tuple:
     )  # fmt: skip
 
 
-@compiled
+@inlined
 def _elastic(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh: float, columns: int) -> None:
     """Factorise S = Mqq + gh D + gh^2 L = l d l^T of a flexible link and form l^-1 (Mqr, cq, Jq^T) in the rows of w.rhs.
 
@@ -287,49 +269,47 @@ def _elastic(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh: floa
     """
     e, end = c.first[i], c.first[i + 1]
     m = end - e - 1
-    S, at = w.S, c.at[i]
+    S, rhs, qs, qds = w.S[i], w.rhs[i], ys[e + 1 : end], vs[e + 1 : end]
     for k in range(m):
         for j in range(k):
-            S[at + k * m + j] = 0.0
-        r = e + 1 + k
-        S[at + k * m + k] = 1.0 + gh * c.damp[r] + gh * gh * c.lam[r]
-        w.rhs[r, 0], w.rhs[r, 1], w.rhs[r, 2] = -w.g1q[r], c.S0[r], w.mt[r]
-        w.rhs[r, 3] = c.lam[r] * ys[r] + c.damp[r] * vs[r] + w.cv[r]
-        w.rhs[r, 4], w.rhs[r, 5], w.rhs[r, 6] = -w.hq[r], c.NL[r], w.tilt[i] * c.SL[r]
+            S[k, j] = 0.0
+        S[k, k] = 1.0 + gh * c.damp[i, k] + gh * gh * c.lam[i, k]
+        rhs[k, 0], rhs[k, 1], rhs[k, 2] = -w.g1q[i, k], c.S0[i, k], w.mt[i, k]
+        rhs[k, 3] = c.lam[i, k] * qs[k] + c.damp[i, k] * qds[k] + w.cv[i, k]
+        rhs[k, 4], rhs[k, 5], rhs[k, 6] = -w.hq[i, k], c.NL[i, k], w.tilt[i] * c.SL[i, k]
     if c.stiffening:
         turning = c.tip_inertia[i] * (w.tilt[i] * w.tilt[i] - 1.0)
         for k in range(m):
             for j in range(k + 1):
-                total = turning * c.SL[e + 1 + k] * c.SL[e + 1 + j]
+                total = turning * c.SL[i, k] * c.SL[i, j]
                 for p in range(POINTS):
-                    total += c.point_mass[i, p] * w.h[e + 1 + k, p] * w.h[e + 1 + j, p]
-                S[at + k * m + j] += total
+                    total += c.point_mass[i, p] * w.h[i, p, k] * w.h[i, p, j]
+                S[k, j] += total
     for k in range(m):
-        row = at + k * m
         for j in range(k):
-            entry = S[row + j]
+            entry = S[k, j]
             for s in range(j):
-                entry -= S[row + s] * S[at + j * m + s]  # S[row + s] still holds l d
-            S[row + j] = entry
-        d = S[row + k]
+                entry -= S[k, s] * S[j, s]  # S[k, s] still holds l d
+            S[k, j] = entry
+        d = S[k, k]
         for j in range(k):
-            ld = S[row + j]
-            lower = ld * w.dinv[e + 1 + j]
+            ld = S[k, j]
+            lower = ld * w.dinv[i, j]
             d -= ld * lower
-            S[row + j] = lower
+            S[k, j] = lower
             for s in range(columns):
-                w.rhs[e + 1 + k, s] -= lower * w.rhs[e + 1 + j, s]
-        w.dinv[e + 1 + k] = 1.0 / d
+                rhs[k, s] -= lower * rhs[j, s]
+        w.dinv[i, k] = 1.0 / d
 
 
-@compiled
+@inlined
 def _last_hub(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh: float) -> tuple:
     """The same for the last link if it is flexible: nothing is attached to its tip, the payload is in its own terms."""
     _elastic(c, w, i, ys, vs, gh, 4)
     Q00, Q01, Q02, Q11, Q12, Q22, m0, m1, m2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for k in range(c.first[i] + 1, c.first[i + 1]):
-        r0, r1, r2, cq = w.rhs[k, 0], w.rhs[k, 1], w.rhs[k, 2], w.rhs[k, 3]
-        d0, d1, d2 = w.dinv[k] * r0, w.dinv[k] * r1, w.dinv[k] * r2
+    for k in range(c.first[i + 1] - c.first[i] - 1):
+        r0, r1, r2, cq = w.rhs[i, k, 0], w.rhs[i, k, 1], w.rhs[i, k, 2], w.rhs[i, k, 3]
+        d0, d1, d2 = w.dinv[i, k] * r0, w.dinv[i, k] * r1, w.dinv[i, k] * r2
         Q00 += d0 * r0
         Q01 += d0 * r1
         Q02 += d0 * r2
@@ -345,7 +325,7 @@ def _last_hub(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh: flo
     )  # fmt: skip
 
 
-@compiled
+@inlined
 def _flexible_hub(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh: float, A: tuple, b: tuple) -> tuple:
     """The same for a flexible link that carries the wrench f = A t + b at its attachment.
 
@@ -360,11 +340,11 @@ def _flexible_hub(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh:
     P00, P01, P02, P10, P11, P12, P20, P21, P22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     E00, E01, E02, E11, E12, E22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     m0, m1, m2, j0, j1, j2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for k in range(c.first[i] + 1, c.first[i + 1]):
-        x, s0, s1, cq = w.rhs[k, 0], w.rhs[k, 1], w.rhs[k, 2], w.rhs[k, 3]
-        jx, jy, jz = w.rhs[k, 4], w.rhs[k, 5], w.rhs[k, 6]
-        dx, d0, d1 = w.dinv[k] * x, w.dinv[k] * s0, w.dinv[k] * s1
-        ex, ey, ez = w.dinv[k] * jx, w.dinv[k] * jy, w.dinv[k] * jz
+    for k in range(c.first[i + 1] - c.first[i] - 1):
+        x, s0, s1, cq = w.rhs[i, k, 0], w.rhs[i, k, 1], w.rhs[i, k, 2], w.rhs[i, k, 3]
+        jx, jy, jz = w.rhs[i, k, 4], w.rhs[i, k, 5], w.rhs[i, k, 6]
+        dx, d0, d1 = w.dinv[i, k] * x, w.dinv[i, k] * s0, w.dinv[i, k] * s1
+        ex, ey, ez = w.dinv[i, k] * jx, w.dinv[i, k] * jy, w.dinv[i, k] * jz
         Q00 += dx * x
         Q01 += dx * s0
         Q02 += dx * s1
@@ -447,8 +427,8 @@ def _flexible_hub(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh:
     )
 
 
-@compiled
-def accelerate(
+@inlined
+def passes(
     c: Chain, w: Work, y: np.ndarray, v: np.ndarray, ys: np.ndarray, vs: np.ndarray, gh: float,
     force: np.ndarray, kp: np.ndarray, kd: np.ndarray, a: np.ndarray,
 ) -> None:  # fmt: skip
@@ -522,13 +502,22 @@ def accelerate(
                 f1 = cond[1] * t0 + cond[3] * t1 + cond[4] * t2 + cond[7]
                 f2 = cond[2] * t0 + cond[4] * t1 + cond[5] * t2 + cond[8]
             m = end - e - 1
-            for k in range(e + 1, end):  # l a = -dinv l^-1 (Mqr u + cq + Jq^T f)
-                total = w.rhs[k, 0] * u0 + w.rhs[k, 1] * u1 + w.rhs[k, 2] * u2 + w.rhs[k, 3]
-                a[k] = -w.dinv[k] * (total + w.rhs[k, 4] * f0 + w.rhs[k, 5] * f1 + w.rhs[k, 6] * f2)
+            qdd = a[e + 1 : end]
+            for k in range(m):  # l^T qdd = -dinv l^-1 (Mqr u + cq + Jq^T f)
+                total = w.rhs[i, k, 0] * u0 + w.rhs[i, k, 1] * u1 + w.rhs[i, k, 2] * u2 + w.rhs[i, k, 3]
+                qdd[k] = -w.dinv[i, k] * (total + w.rhs[i, k, 4] * f0 + w.rhs[i, k, 5] * f1 + w.rhs[i, k, 6] * f2)
             for k in range(m - 1, 0, -1):
-                row = c.at[i] + k * m
                 for j in range(k):
-                    a[e + 1 + j] -= w.S[row + j] * a[e + 1 + k]
+                    qdd[j] -= w.S[i, k, j] * qdd[k]
+
+
+@compiled
+def accelerate(
+    c: Chain, w: Work, y: np.ndarray, v: np.ndarray, ys: np.ndarray, vs: np.ndarray, gh: float,
+    force: np.ndarray, kp: np.ndarray, kd: np.ndarray, a: np.ndarray,
+) -> None:  # fmt: skip
+    """`passes` as a function to call."""
+    passes(c, w, y, v, ys, vs, gh, force, kp, kd, a)
 
 
 @compiled
@@ -550,10 +539,10 @@ def inverse(c: Chain, w: Work, y: np.ndarray, v: np.ndarray, a: np.ndarray, grav
         u0, u1, u2 = cs * t0 + sn * t1, cs * t1 - sn * t0, t2
         w.u[i, 0], w.u[i, 1], w.u[i, 2] = u0, u1, u2
         t0, t1, t2 = u0 - w.place[i, 1] * u2 + w.place[i, 2], u1 + w.place[i, 0] * u2 + w.place[i, 3], u2 + w.place[i, 4]
-        for k in range(e + 1, end):
-            t0 -= w.hq[k] * a[k]
-            t1 += c.NL[k] * a[k]
-            t2 += w.tilt[i] * c.SL[k] * a[k]
+        for k in range(end - e - 1):
+            t0 -= w.hq[i, k] * a[e + 1 + k]
+            t1 += c.NL[i, k] * a[e + 1 + k]
+            t2 += w.tilt[i] * c.SL[i, k] * a[e + 1 + k]
     f0, f1, f2 = 0.0, 0.0, 0.0
     for i in range(links - 1, -1, -1):
         e, end = c.first[i], c.first[i + 1]
@@ -561,24 +550,24 @@ def inverse(c: Chain, w: Work, y: np.ndarray, v: np.ndarray, a: np.ndarray, grav
         F0 = c.mass[i] * u0 - w.body[i, 0] * u2 + w.body[i, 3] + f0
         F1 = c.mass[i] * u1 + w.body[i, 1] * u2 + w.body[i, 4] + f1
         F2 = -w.body[i, 0] * u0 + w.body[i, 1] * u1 + w.body[i, 2] * u2 + w.body[i, 5] - w.place[i, 1] * f0 + w.place[i, 0] * f1 + f2
-        for k in range(e + 1, end):
-            F0 -= w.g1q[k] * a[k]
-            F1 += c.S0[k] * a[k]
-            F2 += w.mt[k] * a[k]
-            own = a[k] + c.S0[k] * u1 + w.mt[k] * u2 - w.g1q[k] * u0 + w.cv[k]
-            out[k] = own - w.hq[k] * f0 + c.NL[k] * f1 + w.tilt[i] * c.SL[k] * f2
+        for k in range(end - e - 1):
+            F0 -= w.g1q[i, k] * a[e + 1 + k]
+            F1 += c.S0[i, k] * a[e + 1 + k]
+            F2 += w.mt[i, k] * a[e + 1 + k]
+            own = a[e + 1 + k] + c.S0[i, k] * u1 + w.mt[i, k] * u2 - w.g1q[i, k] * u0 + w.cv[i, k]
+            out[e + 1 + k] = own - w.hq[i, k] * f0 + c.NL[i, k] * f1 + w.tilt[i] * c.SL[i, k] * f2
         if c.stiffening:
             spin = 0.0
-            for k in range(e + 1, end):
-                spin += c.tip_inertia[i] * (w.tilt[i] * w.tilt[i] - 1.0) * c.SL[k] * a[k]
-            for k in range(e + 1, end):
-                out[k] += spin * c.SL[k]
+            for k in range(end - e - 1):
+                spin += c.tip_inertia[i] * (w.tilt[i] * w.tilt[i] - 1.0) * c.SL[i, k] * a[e + 1 + k]
+            for k in range(end - e - 1):
+                out[e + 1 + k] += spin * c.SL[i, k]
             for p in range(POINTS):
                 total = 0.0
-                for k in range(e + 1, end):
-                    total += w.h[k, p] * a[k]
-                for k in range(e + 1, end):
-                    out[k] += c.point_mass[i, p] * total * w.h[k, p]
+                for k in range(end - e - 1):
+                    total += w.h[i, p, k] * a[e + 1 + k]
+                for k in range(end - e - 1):
+                    out[e + 1 + k] += c.point_mass[i, p] * total * w.h[i, p, k]
         cs, sn = w.cos[i], w.sin[i]
         f0, f1, f2 = cs * F0 - sn * F1, sn * F0 + cs * F1, F2
         out[e] = (f2 if c.kind[i] == REVOLUTE else f0) + c.rotor[i] * a[e]

@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import DOP853
 
-from .compiled import compiled
-from .kernel import COULOMB_SPEED, Chain, Work, accelerate
+from .compiled import compiled, inlined
+from .kernel import COULOMB_SPEED, Chain, Work, passes
 from .signal import evaluate
 
 EXPLICIT, IMPLICIT = 0, 1
@@ -23,7 +23,8 @@ RUNNING, DONE, LIMIT, STUCK = 0, 1, 2, 3
 T, H, OUT, BREAK, STEPS, REJECTED, EVALS, ERR, STATUS, FRESH, FAULT = range(11)  # entries of Memory.s
 FLOOR = 1e-3  # m, rad (joints); kg^(1/2) m (elastic, mass-normalised); per second for the velocities
 
-_A, _B, _C = DOP853.A.copy(), DOP853.B.copy(), DOP853.C.copy()
+_A, _C = np.zeros((13, 12)), np.append(DOP853.C, 1.0)
+_A[:12], _A[12] = DOP853.A, DOP853.B  # the last stage is the end of the step
 _E3, _E5 = DOP853.E3.copy(), DOP853.E5.copy()
 _AX, _CX, _D = DOP853.A_EXTRA.copy(), DOP853.C_EXTRA.copy(), DOP853.D.copy()
 
@@ -77,13 +78,13 @@ def memory(links: int, unknowns: int) -> Memory:
     )  # fmt: skip
 
 
-@compiled
+@inlined
 def _copy(source: np.ndarray, target: np.ndarray) -> None:
     for k in range(source.shape[0]):
         target[k] = source[k]
 
 
-@compiled
+@inlined
 def _combine(m: Memory, h: float, weights: np.ndarray, count: int, out: np.ndarray) -> None:
     """out = z + h sum_j weights_j K_j over the first `count` stages."""
     size = m.z.shape[0]
@@ -97,7 +98,7 @@ def _combine(m: Memory, h: float, weights: np.ndarray, count: int, out: np.ndarr
         out[k] = m.z[k] + h * out[k]
 
 
-@compiled
+@inlined
 def drive(c: Chain, d: Inputs, t: float, y: np.ndarray, v: np.ndarray, force: np.ndarray) -> None:
     """Joint forces (N,) of the drives at time t."""
     for i in range(force.shape[0]):
@@ -112,7 +113,7 @@ def drive(c: Chain, d: Inputs, t: float, y: np.ndarray, v: np.ndarray, force: np
         force[i] = total
 
 
-@compiled
+@inlined
 def _powers(c: Chain, v: np.ndarray, force: np.ndarray, dz: np.ndarray) -> None:
     """Power of the drives and power lost to friction and damping, into the last two entries of dz."""
     n = v.shape[0]
@@ -123,23 +124,23 @@ def _powers(c: Chain, v: np.ndarray, force: np.ndarray, dz: np.ndarray) -> None:
         loss += c.viscous[i] * v[e] * v[e]
         if c.coulomb[i] > 0.0:
             loss += c.coulomb[i] * v[e] * np.tanh(v[e] / COULOMB_SPEED)
-    for k in range(n):
-        loss += c.damp[k] * v[k] * v[k]
+        for k in range(c.first[i + 1] - e - 1):
+            loss += c.damp[i, k] * v[e + 1 + k] * v[e + 1 + k]
     dz[2 * n], dz[2 * n + 1] = work, loss
 
 
-@compiled
+@inlined
 def _slope(c: Chain, w: Work, d: Inputs, m: Memory, t: float, z: np.ndarray, dz: np.ndarray) -> None:
     n = m.a.shape[0]
     y, v = z[:n], z[n : 2 * n]
     drive(c, d, t, y, v, m.force)
-    accelerate(c, w, y, v, y, v, 0.0, m.force, m.zero, m.zero, dz[n : 2 * n])
+    passes(c, w, y, v, y, v, 0.0, m.force, m.zero, m.zero, dz[n : 2 * n])
     _copy(v, dz[:n])
     _powers(c, v, m.force, dz)
     m.s[EVALS] += 1
 
 
-@compiled
+@inlined
 def _weights(c: Chain, m: Memory, rtol: float, z: np.ndarray) -> None:
     """Error weights 1/(rtol * size) from the largest sizes so far."""
     n = m.a.shape[0]
@@ -157,15 +158,13 @@ def _weights(c: Chain, m: Memory, rtol: float, z: np.ndarray) -> None:
             m.scale[k], m.scale[n + k] = 1.0 / (rtol * max(big[2], FLOOR)), 1.0 / (rtol * max(big[3], FLOOR))
 
 
-@compiled
+@inlined
 def _explicit_step(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, last: float) -> float:
     """One DOP853 step from m.z to m.znew; returns the error norm (accept below 1)."""
     K, new = m.K, m.znew
-    for s in range(1, 12):
+    for s in range(1, 13):
         _combine(m, h, _A[s], s, new)
         _slope(c, w, d, m, min(t + _C[s] * h, last), new, K[s])
-    _combine(m, h, _B, 12, new)
-    _slope(c, w, d, m, min(t + h, last), new, K[12])
     e5, e3 = 0.0, 0.0
     for k in range(m.scale.shape[0]):
         a, b = 0.0, 0.0
@@ -181,13 +180,18 @@ def _explicit_step(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, 
 
 
 @compiled
+def _slope_once(c: Chain, w: Work, d: Inputs, m: Memory, t: float, z: np.ndarray, dz: np.ndarray) -> None:
+    _slope(c, w, d, m, t, z, dz)
+
+
+@compiled
 def _explicit_dense(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, last: float) -> None:
     """Coefficients of the order-7 interpolant of the step just made (m.z to m.znew)."""
     K, F, z = m.K, m.F, m.z
     size = z.shape[0]
     for s in range(3):
         _combine(m, h, _AX[s], 13 + s, F[0])
-        _slope(c, w, d, m, min(t + _CX[s] * h, last), F[0], K[13 + s])
+        _slope_once(c, w, d, m, min(t + _CX[s] * h, last), F[0], K[13 + s])
     for k in range(size):
         dz = m.znew[k] - z[k]
         F[0, k] = dz
@@ -200,7 +204,7 @@ def _explicit_dense(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float,
             F[3 + r, k] = h * total
 
 
-@compiled
+@inlined
 def _implicit_step(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, last: float) -> float:
     """One ESDIRK step from m.z to m.znew; returns the error norm, or a large number where a stage does not converge."""
     K, z, new = m.K, m.z, m.znew
@@ -222,7 +226,7 @@ def _implicit_step(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, 
             for k in range(n):
                 new[k], new[n + k] = m.ys[k] + gh * gh * m.a[k], m.vs[k] + gh * m.a[k]
                 K[s, k] = m.a[k]
-            accelerate(c, w, new[:n], new[n : 2 * n], m.ys, m.vs, gh, m.force, d.kp, d.kd, m.a)
+            passes(c, w, new[:n], new[n : 2 * n], m.ys, m.vs, gh, m.force, d.kp, d.kd, m.a)
             m.s[EVALS] += 1
             change = 0.0
             for k in range(n):
@@ -253,7 +257,7 @@ def _implicit_step(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, 
     return np.sqrt(error / (2 * n))
 
 
-@compiled
+@inlined
 def _interpolate(m: Memory, method: int, h: float, x: float, out: np.ndarray) -> None:
     """The state at t + x h inside the step just made: order 7 (explicit), or quintic Hermite from positions to accelerations (implicit)."""
     z, new = m.z, m.znew
@@ -295,7 +299,7 @@ def advance(c: Chain, w: Work, d: Inputs, m: Memory, method: int, rtol: float, t
         last = np.nextafter(stop, -1e300)  # drives are read just before the break at which this step may end
         if s[FRESH] == 0.0:
             _weights(c, m, rtol, m.z)
-            _slope(c, w, d, m, t, m.z, m.K[0])
+            _slope_once(c, w, d, m, t, m.z, m.K[0])
             s[FRESH] = 1.0
         h = min(s[H], stop - t)
         if stop - t < 1.5 * h and h < stop - t:

@@ -12,14 +12,14 @@ POSE = 3  # x, y, angle of a hub frame
 
 
 @compiled
-def _strain(c: Chain, i: int, y: np.ndarray) -> float:
+def _strain(c: Chain, i: int, q: np.ndarray) -> float:
     """1/2 int EI w''^2 tan^2 dx of link i: what its curvature w'' / cos has beyond w''."""
     total = 0.0
     for r in range(SLOPES):
         s, bend = 0.0, 0.0
-        for k in range(c.first[i] + 1, c.first[i + 1]):
-            s += c.slope_d1[k, r] * y[k]
-            bend += c.slope_d2[k, r] * y[k]
+        for k in range(q.shape[0]):
+            s += c.slope_d1[i, r, k] * q[k]
+            bend += c.slope_d2[i, r, k] * q[k]
         total += 0.5 * c.slope_EI[i, r] * bend * bend * s * s / (1.0 - s * s)
     return total
 
@@ -42,6 +42,7 @@ def observe(
         kinetic, strain, potential = 0.0, 0.0, 0.0
         for i in range(links):
             e, end = c.first[i], c.first[i + 1]
+            q, qd = y[e + 1 : end], v[e + 1 : end]
             if c.kind[i] == REVOLUTE:
                 angle += y[e]
             else:
@@ -54,23 +55,23 @@ def observe(
             omega = w.omega[i]
             body, place = w.body[i], w.place[i]
             S0v, S1v, vv, gv, wL, wLd, slope, spin, hv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-            for k in range(e + 1, end):
-                S0v += c.S0[k] * v[k]
-                S1v += w.mt[k] * v[k]
-                vv += v[k] * v[k]
-                gv += w.g1q[k] * v[k]
-                hv += w.hq[k] * v[k]
-                wL += c.NL[k] * y[k]
-                wLd += c.NL[k] * v[k]
-                slope += c.SL[k] * y[k]
-                spin += c.SL[k] * v[k]
-                strain += 0.5 * c.lam[k] * y[k] * y[k]
+            for k in range(end - e - 1):
+                S0v += c.S0[i, k] * qd[k]
+                S1v += w.mt[i, k] * qd[k]
+                vv += qd[k] * qd[k]
+                gv += w.g1q[i, k] * qd[k]
+                hv += w.hq[i, k] * qd[k]
+                wL += c.NL[i, k] * q[k]
+                wLd += c.NL[i, k] * qd[k]
+                slope += c.SL[i, k] * q[k]
+                spin += c.SL[i, k] * qd[k]
+                strain += 0.5 * c.lam[i, k] * q[k] * q[k]
             if c.stiffening and end > e + 1:
-                strain += _strain(c, i, y)
+                strain += _strain(c, i, q)
                 for p in range(POINTS):
                     rate = 0.0
-                    for k in range(e + 1, end):
-                        rate += w.h[k, p] * v[k]
+                    for k in range(end - e - 1):
+                        rate += w.h[i, p, k] * qd[k]
                     kinetic += 0.5 * c.point_mass[i, p] * rate * rate
                 kinetic += 0.5 * c.tip_inertia[i] * (w.tilt[i] * w.tilt[i] - 1.0) * spin * spin
                 slope = np.arcsin(slope)

@@ -66,7 +66,7 @@ class System:
 
     def stiffness(self, q: np.ndarray | None = None) -> np.ndarray:
         """K (n, n), constant; with q the tangent stiffness K + d gravity / dq there."""
-        K = self.to_solver.T @ np.diag(self.chain.lam) @ self.to_solver
+        K = self.to_solver.T @ np.diag(self._diagonal(self.chain.lam, np.zeros(len(self.links)))) @ self.to_solver
         if q is None:
             return K
         return K + jacobian(self.gravity, self._check(q))
@@ -74,9 +74,12 @@ class System:
     @cached_property
     def damping(self) -> np.ndarray:
         """D (n, n), constant: Rayleigh damping of the elastic unknowns and viscous friction of the joints."""
-        diagonal = self.chain.damp.copy()
-        diagonal[self.joint_rows] = self.chain.viscous
-        return self.to_solver.T @ np.diag(diagonal) @ self.to_solver
+        return self.to_solver.T @ np.diag(self._diagonal(self.chain.damp, self.chain.viscous)) @ self.to_solver
+
+    def _diagonal(self, elastic: np.ndarray, joint: np.ndarray) -> np.ndarray:
+        """A diagonal (n,) from its values per link (N, m) and per joint (N,)."""
+        parts = [np.concatenate([[joint[i]], elastic[i, : len(info.S0)]]) for i, info in enumerate(self.links)]
+        return np.concatenate(parts)
 
     def gravity(self, q: np.ndarray) -> np.ndarray:
         """Generalised gravity forces (n,), on the left-hand side."""
@@ -128,10 +131,7 @@ def assemble(robot: Robot) -> System:
             raise FlexuraError(f"link {i + 1}: a joint Pb (a link through a sleeve) is not in this version; R, and Pa on the base or a rigid link, are")
         if link.joint.type == "Pa" and before is not None and before.flexible:
             raise FlexuraError(f"link {i + 1}: a joint Pa on a flexible link is not in this version; R, and Pa on the base or a rigid link, are")
-    first, at, infos, transforms, back, labels = [0], [0], [], [], [], []
-    values: dict[str, list[np.ndarray]] = {name: [] for name in ("S0", "S1", "NL", "SL", "lam", "damp")}
-    matrices: dict[str, list[np.ndarray]] = {name: [] for name in ("G1", "G2", "H")}
-    tables: dict[str, list[np.ndarray]] = {name: [] for name in ("point_phi", "slope_d1", "slope_d2")}
+    first, infos, spectra, transforms, back, labels = [0], [], [], [], [], []
     for i, link in enumerate(links, 1):
         last = i == len(links)
         nodal = link_integrals(link, robot.payload.mass_kg * last, robot.payload.inertia_kg_m2 * last)
@@ -147,22 +147,13 @@ def assemble(robot: Robot) -> System:
             labels += [f"link {i} node {k // 2 + 1} {'slope [rad]' if k % 2 else 'deflection [m]'}" for k in range(m)]
             transforms.append(block_diag(1.0, info.basis) if m else np.eye(1))
             back.append(block_diag(1.0, info.basis.T @ nodal.M) if m else np.eye(1))
-        for name, value in (("S0", info.S0), ("S1", info.S1), ("NL", info.NL), ("SL", info.SL), ("lam", lam)):
-            values[name].append(np.concatenate([[0.0], value]))
-        values["damp"].append(np.concatenate([[0.0], link.damping.alpha_1_s + link.damping.beta_s * lam]))
-        for name, parts in matrices.items():
-            parts.append(getattr(info, name).ravel())
-        for name, table in tables.items():
-            shapes = getattr(info, name)
-            table += [np.zeros((1, shapes.shape[1])), shapes]
         first.append(first[-1] + 1 + m)
-        at.append(at[-1] + m * m)
+        spectra.append(lam)
         infos.append(info)
     column = lambda f, kind=float: np.array([f(link) for link in links], dtype=kind)  # noqa: E731
     of = lambda f: np.array([f(info) for info in infos], dtype=float)  # noqa: E731
     chain = Chain(
         first=np.array(first, dtype=np.int64),
-        at=np.array(at, dtype=np.int64),
         kind=column(lambda k: REVOLUTE if k.joint.type == "R" else PRISMATIC, np.int64),
         locked=column(lambda k: k.joint.locked, np.int64),
         angle=column(lambda k: k.joint.angle_rad),
@@ -173,16 +164,30 @@ def assemble(robot: Robot) -> System:
         mass=of(lambda k: k.mass),
         s1=of(lambda k: k.s1),
         inertia=of(lambda k: k.inertia),
-        **{name: np.concatenate(parts) for name, parts in values.items()},
-        **{name: np.concatenate(parts) for name, parts in (tables | matrices).items()},
+        **{name: _stack([getattr(info, name) for info in infos]) for name in _PER_LINK},
+        lam=_stack(spectra),
+        damp=_stack([np.where(lam > 0, k.damping.alpha_1_s + k.damping.beta_s * lam, 0.0) for k, lam in zip(links, spectra, strict=True)]),
         tip_inertia=np.array([robot.payload.inertia_kg_m2 * (i == len(links) - 1) for i in range(len(links))]),
-        **{name: np.array([getattr(info, name) for info in infos]) for name in ("point_x", "point_mass", "slope_dx", "slope_EI")},
         stiffening=robot.stiffening,
         gravity=np.array(robot.gravity_m_s2, dtype=float),
     )
     system = System(robot, chain, tuple(infos), block_diag(*transforms), block_diag(*back), tuple(labels))
     _check_mass(system)
     return system
+
+
+_PER_LINK = (
+    "S0", "S1", "NL", "SL", "G1", "G2", "H", "point_x", "point_mass", "point_phi", "slope_dx", "slope_EI", "slope_d1", "slope_d2",
+)  # fmt: skip
+
+
+def _stack(arrays: list[np.ndarray]) -> np.ndarray:
+    """Arrays of the links as one, padded with zeros to the largest."""
+    shape_ = np.max([a.shape for a in arrays], axis=0)
+    out = np.zeros((len(arrays), *shape_))
+    for target, a in zip(out, arrays, strict=True):
+        target[tuple(slice(k) for k in a.shape)] = a
+    return out
 
 
 def _check_mass(system: System) -> None:

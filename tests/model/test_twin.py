@@ -26,9 +26,8 @@ def robot(*links, gravity=(0.0, 0.0), payload=0.0, payload_inertia=0.0, **keys):
 
 
 def rigid(length, mass, centre, inertia, type="R", **joint):
-    return {
-        "length_m": length, "mass_kg": mass, "centre_of_mass_m": centre, "inertia_kg_m2": inertia, "joint": {"type": type} | joint,
-    }  # fmt: skip
+    body = {"mass_kg": mass, "centre_of_mass_m": centre, "inertia_kg_m2": inertia}
+    return {"length_m": length, "joint": {"type": type} | joint} | body
 
 
 def beam(length, mass, stiffness, type="R", elements=4, beta=0.0, **joint):
@@ -98,8 +97,7 @@ def test_free_vibration_has_the_frequency_of_a_cantilever_with_tip_mass():
         rigid(0.0, 1.0, 0.0, 1.0, viscous_friction=0.0), beam(length, mass, stiffness, locked=True), payload=mass * length / 2
     ).replace({"link.1.joint.locked": True})
     t = np.linspace(0, 6 * np.pi / omega, 301)
-    push = lambda t: np.array([0.0, 0.0])
-    assert abs(twin.simulate(arm, [0.0, 0.1], push)["link/2/tip_deflection"]).max() < 1e-12
+    assert abs(twin.simulate(arm, [0.0, 0.1], lambda t: [0.0, 0.0])["link/2/tip_deflection"]).max() < 1e-12
     gravity = arm.replace({"gravity_m_s2": [0.0, -0.05]})  # a sudden uniform load: mostly the first mode, about its static value
     w = twin.simulate(gravity, t)["link/2/tip_deflection"]
     shape = np.column_stack([np.cos(k * t) for k in (omega, 4.111133386**2 * np.sqrt(stiffness / mass) / length**2)])
@@ -144,6 +142,18 @@ def test_a_locked_joint_makes_two_links_one():
     assert abs(one["link/1/deflection/4"] - two["link/1/tip_deflection"]).max() < 2e-5 * abs(one["link/1/tip_deflection"]).max()
 
 
+@pytest.mark.parametrize("kind", ["ancf", "ge"])
+def test_a_locked_joint_stays_at_its_start(kind):
+    arm = robot(
+        rigid(0.2, 0.5, 0.1, 1e-3, "Pa", start=-0.3, locked=True), beam(0.3, 0.2, 0.5, start=0.7, locked=True),
+        rigid(0.1, 0.1, 0.05, 1e-4, start=-0.5, locked=True), gravity=(1.0, -2.0),
+    )  # fmt: skip
+    run = twin.simulate(arm, np.linspace(0, 0.2, 11), beam=kind)
+    for i, start in enumerate((-0.3, 0.7, -0.5), 1):
+        assert abs(run[f"joint/{i}/position"] - start).max() < 1e-9 and abs(run[f"joint/{i}/velocity"]).max() < 1e-6
+    assert abs(run["link/2/tip_deflection"]).max() > 1e-3
+
+
 def test_bending_damping_is_proportional_to_stiffness():
     """D = beta K: the first mode of a clamped link decays with beta omega^2/2."""
     length, mass, stiffness, beta = 0.5, 0.2, 1.0, 2e-3
@@ -175,7 +185,6 @@ def test_a_tapered_link_has_the_exact_static_deflection(kind):
     exact = -np.trapezoid(moment * (length - x) / (2.0 - 3.0 * x), x)
     error, coarse_error = (r["link/1/tip_deflection"][-1] / exact - 1 for r in (run, coarse))
     assert run.meta["elements"] == [24] and abs(error) < 1e-3 and abs(coarse_error) < 1e-2
-    print(error,coarse_error)
 
 
 # Joints and rigid links against textbook equations -------------------------------------------------------------------
@@ -197,7 +206,8 @@ def double_pendulum(m, centre, J, L, rotor=0.0, g=G):
 @pytest.mark.parametrize("rotor", [0.0, 0.05])
 def test_a_rigid_double_pendulum(rotor):
     m, c, J, L = (1.2, 0.8), (0.2, 0.3), (0.02, 0.03), 0.5
-    arm = robot(rigid(L, m[0], c[0], J[0], start=0.4), rigid(0.6, m[1], c[1], J[1], start=0.5, rotor_inertia=rotor), gravity=(0, -G))
+    second = rigid(0.6, m[1], c[1], J[1], start=0.5, rotor_inertia=rotor)
+    arm = robot(rigid(L, m[0], c[0], J[0], start=0.4), second, gravity=(0, -G))
     t = np.linspace(0, 1.5, 151)
     run = twin.simulate(arm, t, qd0=[1.0, 2.0], step_s=5e-5)
     a, b, ad, bd = integrate(double_pendulum(m, c, J, L, rotor), [0.4, 0.9, 1.0, 3.0], t)
@@ -220,7 +230,7 @@ def test_a_cart_with_a_rigid_pendulum():
     run = twin.simulate(cart, t, lambda t: tau, qd0=[0.1, -0.2], step_s=5e-5)
 
     def rates(t, y):
-        x, a, xd, ad = y
+        _, a, xd, ad = y
         matrix = [[M + m, -m * c * np.sin(a)], [-m * c * np.sin(a), J + m * c**2]]
         return [xd, ad, *np.linalg.solve(matrix, [tau[0] + m * c * np.cos(a) * ad**2, tau[1] - m * G * c * np.cos(a)])]
 
@@ -241,7 +251,7 @@ def test_a_slider_on_a_turning_rail_and_its_reaction():
     along, across = c * np.cos(gamma), c * np.sin(gamma)
 
     def rates(t, y):
-        th, d, w, v = y  # T = 1/2 (J1 + J2 + m ((d + along)^2 + across^2)) w^2 + 1/2 m (v^2 - 2 v w across) + 1/2 rotor v^2
+        _, d, w, v = y  # T = 1/2 (J1 + J2 + m ((d + along)^2 + across^2)) w^2 + 1/2 m (v^2 - 2 v w across) + 1/2 rotor v^2
         M = [[J1 + J2 + m * ((d + along) ** 2 + across**2), -m * across], [-m * across, m + rotor]]
         return [w, v, *np.linalg.solve(M, [-2 * m * (d + along) * v * w, f + m * (d + along) * w**2])]
 
@@ -303,6 +313,22 @@ def test_pd_control_is_continuous_and_equals_the_same_law_as_a_function():
                        zip(t, run["joint/1/position"], run["joint/1/velocity"], strict=True)])  # fmt: skip
 
 
+def test_stiff_gains_on_a_light_rotor_as_data_and_as_a_function_and_with_dry_friction():
+    motion = [signal.harmonic(0.012, 1.0, -np.pi / 2), signal.harmonic(0.5, 1.0, -np.pi / 2)]
+    drive = Drive.pd(motion, [900.0, 6.0], [50.0, 0.25])
+    t = np.linspace(0, 0.4, 41)
+    one = twin.simulate(rig(), t, drive)
+    two = twin.simulate(rig(), t, lambda t, *state: drive(t, *state), step_s=one.meta["step_s"])
+    for name in ("joint/2/position", "link/2/tip_deflection", "joint/2/drive"):
+        assert abs(one[name] - two[name]).max() < 1e-5 * abs(one[name]).max(), name
+    rough = rig().replace({"link.1.joint.coulomb_friction": 0.5, "link.2.joint.coulomb_friction": 5e-3})
+    run = twin.simulate(rough, t, drive)
+    assert run.complete and run.meta["step_s"] < one.meta["step_s"]
+    fine = twin.simulate(rough, t, drive, step_s=run.meta["step_s"] / 2)
+    coarse, exact = run["link/2/tip_deflection"], fine["link/2/tip_deflection"]
+    assert abs(coarse - exact).max() < 2e-3 * abs(exact).max()
+
+
 def test_a_function_of_the_state_sees_the_tip_deflection_at_once():
     seen = []
 
@@ -336,6 +362,8 @@ def test_times_between_steps_are_interpolated():
     assert np.array_equal(run.t, t)
     assert np.allclose(run["joint/1/position"], np.sin(10 * t) / 10, atol=1e-6)
     assert np.allclose(run["joint/1/velocity"], np.cos(10 * t), atol=1e-5)
+    late = twin.simulate(cart, [0.5, 0.75, 1.0], qd0=[1.0])
+    assert np.array_equal(late.t, [0.5, 0.75, 1.0]) and np.allclose(late["joint/1/velocity"], 1.0)
     assert twin.simulate(cart, [0.0], qd0=[1.0])["joint/1/velocity"] == pytest.approx([1.0])
 
 
@@ -390,8 +418,9 @@ def test_what_it_does_not_contain_is_refused_by_name(change, key):
 @pytest.mark.parametrize(
     ("arguments", "key"),
     [
-        ({"t_eval": [0.1, 0.0]}, "t_eval"), ({"qd0": [1.0, 2.0]}, "qd0"), ({"beam": "shell"}, "beam"), ({"elements": 0}, "elements"),
-        ({"step_s": 0.0}, "step_s"), ({"step_s": 1e-9}, "step_s"), ({"drive": Drive.none(2)}, "drive"), ({"drive": 3.0}, "drive"),
+        ({"t_eval": [0.1, 0.0]}, "t_eval"), ({"qd0": [1.0, 2.0]}, "qd0"), ({"beam": "shell"}, "beam"),
+        ({"elements": 0}, "elements"), ({"step_s": 0.0}, "step_s"), ({"step_s": 1e-9}, "step_s"),
+        ({"drive": Drive.none(2)}, "drive"), ({"drive": 3.0}, "drive"),
         ({"drive": lambda t: [1.0, 2.0]}, "drive"),
     ],
 )  # fmt: skip

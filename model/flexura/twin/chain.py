@@ -53,7 +53,8 @@ def reach(robot: Robot) -> float:
 def refuse(robot: Robot) -> None:
     """Raise InputError for what the twin doesn't contain."""
     if not robot.stiffening:
-        raise InputError("the twin always contains geometric stiffening; compare with stiffening = true", key="stiffening", value=False)
+        expected = "the twin always contains geometric stiffening; compare with stiffening = true"
+        raise InputError(expected, key="stiffening", value=False)
     for i, link in enumerate(robot.links, 1):
         if link.damping.alpha_1_s:
             raise InputError(
@@ -81,9 +82,9 @@ def element_count(link: Link, elements: int | None) -> int:
 
 
 def build(
-    robot: Robot, beam: str, elements: int | None, speeds: np.ndarray, stiffness: np.ndarray, damping: np.ndarray
+    robot: Robot, beam: str, elements: int | None, speeds: np.ndarray, gains: np.ndarray
 ) -> Chain:
-    """The robot straight at its start, its joints at `speeds` (n,), with `stiffness` and `damping` (n,) on their coordinates."""
+    """The robot straight at its start, its joints at `speeds` (n,), with PD controllers of `gains` (n, 2)."""
     import exudyn as exu
     from exudyn import itemInterface as eii
 
@@ -101,7 +102,7 @@ def build(
         frame = joints.start_frame(link.joint, frame, length, speeds[i])
         part = _part(mbs, robot, i, BEAMS[beam], counts[i], frame)
         marker = joints.connect(mbs, link.joint, previous, part)
-        coordinates.append(joints.equip(mbs, link.joint, marker, fixed, speeds[i], stiffness[i], damping[i]))
+        coordinates.append(joints.equip(mbs, link.joint, marker, fixed, speeds[i], tuple(gains[i])))
         parts.append(part)
         previous, length = part, link.length_m
     mbs.Assemble()

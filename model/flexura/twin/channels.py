@@ -33,9 +33,8 @@ def channels(
             hub = hub._replace(angle=origin.angle + joint.angle_rad)
         slope = _wrap(end.angle - hub.angle)
         end = end._replace(angle=hub.angle + slope)
-        out |= {
-            f"link/{i + 1}/x": (hub.r[:, 0], "m"), f"link/{i + 1}/y": (hub.r[:, 1], "m"), f"link/{i + 1}/angle": (hub.angle, "rad"),
-        }  # fmt: skip
+        out |= {f"link/{i + 1}/x": (hub.r[:, 0], "m"), f"link/{i + 1}/y": (hub.r[:, 1], "m")}
+        out[f"link/{i + 1}/angle"] = hub.angle, "rad"
         deflection = _transverse(hub, end.r)
         if link.flexible:
             out |= {f"link/{i + 1}/tip_deflection": (deflection, "m"), f"link/{i + 1}/tip_slope": (slope, "rad")}

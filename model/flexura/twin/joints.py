@@ -20,10 +20,14 @@ FRICTION_SPEED = 1e-3  # m/s or rad/s: Coulomb friction is f tanh(velocity / thi
 
 @dataclass(frozen=True)
 class Coordinate:
-    """A joint's coordinate in Exudyn: `marker` measures it, `load` acts on it; `kept` is what Exudyn only refers to."""
+    """A joint's coordinate in Exudyn: `marker` measures it, `load` acts on it, `servo` is its PD controller or None.
+
+    `kept` is what Exudyn only refers to.
+    """
 
     marker: Any
     load: Any
+    servo: Any = None
     kept: Any = None
 
 
@@ -46,16 +50,18 @@ def _revolute(mbs: Any, joint: Joint, tip: Attachment, _: Attachment, hub: Attac
     turns = mbs.AddNode(eii.NodeGenericData(initialCoordinates=[joint.start], numberOfDataCoordinates=1))  # counts whole turns
     return mbs.AddMarker(
         eii.MarkerBodiesRelativeRotationCoordinate(
-            bodyNumbers=[tip.body, hub.body], localPosition0=tip.place, localPosition1=hub.place, axis0=[0, 0, 1], nodeNumber=turns
+            bodyNumbers=[tip.body, hub.body], localPosition0=tip.place, localPosition1=hub.place,
+            axis0=[0, 0, 1], nodeNumber=turns,
         )
-    )
+    )  # fmt: skip
 
 
 def _prismatic(mbs: Any, joint: Joint, _: Attachment, rail: Attachment, hub: Attachment) -> Any:
     from exudyn import itemInterface as eii
 
     normal = [math.sin(joint.angle_rad), math.cos(joint.angle_rad), 0.0]  # of the rail, in the hub's frame
-    mbs.AddObject(eii.ObjectJointPrismatic2D(markerNumbers=[rail.marker, hub.marker], axisMarker0=[1, 0, 0], normalMarker1=normal))
+    markers = [rail.marker, hub.marker]
+    mbs.AddObject(eii.ObjectJointPrismatic2D(markerNumbers=markers, axisMarker0=[1, 0, 0], normalMarker1=normal))
     return mbs.AddMarker(
         eii.MarkerBodiesRelativeTranslationCoordinate(
             bodyNumbers=[rail.body, hub.body], localPosition0=rail.place, localPosition1=hub.place, axis0=[1, 0, 0]
@@ -63,8 +69,8 @@ def _prismatic(mbs: Any, joint: Joint, _: Attachment, rail: Attachment, hub: Att
     )
 
 
-def equip(mbs: Any, joint: Joint, marker: Any, fixed: Any, speed: float, stiffness: float, damping: float) -> Coordinate:
-    """Put drive, feedback (stiffness, damping on the coordinate), friction, rotor or lock on a joint's coordinate.
+def equip(mbs: Any, joint: Joint, marker: Any, fixed: Any, speed: float, gains: tuple[float, float]) -> Coordinate:
+    """Put drive, PD gains (stiffness, damping), friction, rotor or lock on a joint's coordinate.
 
     `fixed` is a marker whose coordinate is always 0, `speed` the joint's velocity at the start.
     """
@@ -74,11 +80,18 @@ def equip(mbs: Any, joint: Joint, marker: Any, fixed: Any, speed: float, stiffne
     if joint.locked:
         mbs.AddObject(eii.ObjectConnectorCoordinate(markerNumbers=[fixed, marker], offset=joint.start))
         return Coordinate(marker, load)
-    kept = None
-    damping += joint.viscous_friction
-    if stiffness or damping or joint.coulomb_friction:
+    servo = kept = None
+    if any(gains):
+        # its offsets follow the motion; kp r as a load instead, against a spring without offset, is as good in theory, but
+        # where both are large the turning of their lines of action, which Newton doesn't see, spoils its convergence
+        servo = mbs.AddObject(
+            eii.ObjectConnectorCoordinateSpringDamperExt(
+                markerNumbers=[fixed, marker], stiffness=gains[0], damping=gains[1], frictionProportionalZone=1.0
+            )
+        )
+    if joint.viscous_friction or joint.coulomb_friction:
         spring = mbs.AddObject(
-            eii.ObjectConnectorCoordinateSpringDamper(markerNumbers=[fixed, marker], stiffness=stiffness, damping=damping)
+            eii.ObjectConnectorCoordinateSpringDamper(markerNumbers=[fixed, marker], damping=joint.viscous_friction)
         )
         if joint.coulomb_friction:
             kept = _friction(mbs, spring, joint.coulomb_friction)
@@ -86,21 +99,24 @@ def equip(mbs: Any, joint: Joint, marker: Any, fixed: Any, speed: float, stiffne
     if joint.rotor_inertia:
         rotor = mbs.AddNode(
             eii.NodeGenericODE2(
-                numberOfODE2Coordinates=1, referenceCoordinates=[0.0], initialCoordinates=[joint.start], initialCoordinates_t=[speed]
+                numberOfODE2Coordinates=1, referenceCoordinates=[0.0],
+                initialCoordinates=[joint.start], initialCoordinates_t=[speed],
             )
-        )
+        )  # fmt: skip
         mbs.AddObject(eii.ObjectGenericODE2(nodeNumbers=[rotor], massMatrix=[[joint.rotor_inertia]]))
         own = mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=rotor, coordinate=0))
         mbs.AddObject(eii.ObjectConnectorCoordinate(markerNumbers=[own, marker]))
-    return Coordinate(marker, load, kept)
+    return Coordinate(marker, load, servo, kept)
 
 
 def _friction(mbs: Any, spring: Any, coulomb: float) -> Any:
-    """Spring, damper and f tanh(v / v0) as an expression that Exudyn evaluates without calling Python."""
+    """c v + f tanh(v / v0) as an expression that Exudyn evaluates without calling Python."""
     from exudyn import symbolic
     from exudyn.advancedUtilities import CreateSymbolicUserFunction
 
-    def force(mbs, t, itemNumber, displacement, velocity, stiffness, damping, offset):  # type: ignore[no-untyped-def]  # noqa: N803
-        return stiffness * displacement + damping * velocity + coulomb * symbolic.tanh(velocity / FRICTION_SPEED)
+    tanh: Any = symbolic.tanh
+
+    def force(mbs, t, itemNumber, displacement, velocity, stiffness, damping, offset):  # type: ignore[no-untyped-def]
+        return damping * velocity + coulomb * tanh(velocity / FRICTION_SPEED)
 
     return CreateSymbolicUserFunction(mbs, force, "springForceUserFunction", spring)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -61,7 +62,7 @@ def uniform(link: Link) -> bool:
 def _means(function: Any, ends: np.ndarray, kinks: np.ndarray) -> np.ndarray:
     """Means of function(x) between consecutive ends; pieces between kinks are integrated apart."""
     out = np.empty(len(ends) - 1)
-    for k, (a, b) in enumerate(zip(ends[:-1], ends[1:], strict=True)):
+    for k, (a, b) in enumerate(pairwise(ends)):
         edges = np.concatenate([[a], kinks[(kinks > a) & (kinks < b)], [b]])
         middle, half = (edges[1:] + edges[:-1]) / 2, (edges[1:] - edges[:-1]) / 2
         values = function(middle[:, None] + half[:, None] * _GAUSS_X)

@@ -18,10 +18,19 @@ from . import ancf, exact
 from .actuation import Actuation, Loads, actuation
 from .chain import Chain, build, refuse
 from .channels import channels
-from .stepping import Steps, interpolate, plan, suggest
+from .stepping import Steps, plan, suggest
 
 PROGRAMS = {"ancf": ancf.PROGRAM, "ge": exact.PROGRAM}
+ATTEMPTS = 4  # steps tried, each half the one before, where the user doesn't give one
+SPARSE = 60  # coordinates beyond which sparse matrices are faster (0.25 ms a step against 0.8 at 420)
+COARSE = 4  # elements a link for the frequencies that suggest a step
 PROGRESS = 0.01  # the fraction of a run between two calls of progress
+
+Record = tuple[list[float], list[np.ndarray], list[np.ndarray], list[np.ndarray]]  # times, coordinates, velocities, accelerations
+
+
+class DidNotConverge(FlexuraError):
+    """Exudyn's solver gave up on a step; a shorter one may help."""
 
 
 def simulate(
@@ -44,8 +53,8 @@ def simulate(
 
     `beam`: "ancf" (ObjectANCFCable2D, Euler-Bernoulli) or "ge" (ObjectBeamGeometricallyExact2D of three nodes, with shear).
     `elements`: beam elements a flexible link; None: twice the robot file's and at least 8. `step_s`: Exudyn's longest step;
-    None: from the robot's frequencies, for an error in time below 1e-3 of the tip deflection or so. Steps divide a
-    uniform output step; elsewhere results are interpolated by cubics. `progress`: called with the fraction done.
+    None: from the robot's frequencies, for an error in time below 1e-3 of the tip deflection or so, and shorter if need be.
+    Steps divide a uniform output step; elsewhere results are interpolated by cubics. `progress`: called with the fraction done.
 
     The result has the channels of a native run (`flexura.run`) but no energy/work and energy/loss. Ctrl-C ends it early,
     with `meta["complete"]` false. Links take all unknowns of their mesh (`modes` is not looked at); joint limits don't act.
@@ -63,19 +72,13 @@ def simulate(
         raise InputError(f"expected a whole number from 1 to {2 * MAX_ELEMENTS}", key="elements", value=elements)
     if step_s is not None and not step_s > 0:
         raise InputError("expected a time above 0 in seconds", key="step_s", value=step_s)
-    act = actuation(drive, n)
+    act = actuation(drive, robot.start, speeds)
     with _quiet():
-        chain = build(robot, beam, elements, speeds, act.stiffness, act.damping)
-        longest = step_s or suggest(chain.mbs, _settings(1.0, 1), sum(link.flexible for link in robot.links), t[-1])
-        steps = plan(t, longest, forced=step_s is not None) if t[-1] > 0 else Steps(longest, 0, np.ones(1, dtype=bool), True)
-        record, done, wall = _solve(chain, act, steps, progress)
-    at, q, v, a = (np.array(column) for column in record)
+        chain, steps, record, done, wall = _attempts(
+            lambda count: build(robot, beam, count, speeds, act.gains), elements, act, t, step_s, progress
+        )
+    t, q, v = steps.at_times(t, *(np.array(column) for column in record))
     q += chain.reference
-    if steps.exact or len(at) == 1:
-        t = at
-    else:
-        t = t[t <= at[-1] + 1e-12]
-        q, v = interpolate(t, at, q, v, a)
     values, units = channels(chain, act, t, q, v)
     import exudyn
 
@@ -85,6 +88,26 @@ def simulate(
         "elements": chain.elements, "labels": [f"joint/{i}" for i in range(1, n + 1)],
     }  # fmt: skip
     return Run(t, values, units, meta)
+
+
+def _attempts(
+    new: Callable[[int | None], Chain],
+    elements: int | None,
+    act: Actuation,
+    t: np.ndarray,
+    step_s: float | None,
+    progress: Callable[[float], None] | None,
+) -> tuple[Chain, Steps, Record, int, float]:
+    """Solve with the given step, or with the suggested one, halved where Exudyn doesn't converge with it."""
+    longest = step_s or suggest(new(COARSE), _settings(1.0, 1), t[-1])
+    for attempt in range(1 if step_s else ATTEMPTS):
+        chain = new(elements)
+        steps = plan(t, longest / 2**attempt, forced=step_s is not None)
+        try:
+            return chain, steps, *_solve(chain, act, steps, progress)
+        except DidNotConverge as error:
+            failed = error
+    raise failed
 
 
 def _times(t_eval: Any) -> np.ndarray:
@@ -105,7 +128,7 @@ def _speeds(robot: Robot, qd0: Any) -> np.ndarray:
     return speeds
 
 
-def _settings(end: float, steps: int, reach: float = 1.0, flexible: bool = True) -> Any:
+def _settings(end: float, steps: int, reach: float = 1.0, flexible: bool = True, coordinates: int = 0) -> Any:
     """Settings that are sound for thin metal strips, and write no files; `reach` is the sum of the links' lengths [m].
 
     Exudyn's default tolerances on residuals are below round-off for strips (EA/EI ~ 1e7 1/m^2); it would then halve its
@@ -126,7 +149,8 @@ def _settings(end: float, steps: int, reach: float = 1.0, flexible: bool = True)
         newton.absoluteTolerance = reach * min(2e-12, 2e-4 * (end / steps) ** 2)
     integration.generalizedAlpha.spectralRadius = 0.9
     integration.adaptiveStep = False
-    settings.linearSolver.solverType = exu.LinearSolverType.EigenDense
+    kinds = exu.LinearSolverType
+    settings.linearSolver.solverType = kinds.EigenSparse if coordinates > SPARSE else kinds.EigenDense
     settings.solution.file.write = False
     settings.solution.solverInformationFileName = ""
     settings.solution.sensors.active = False
@@ -135,9 +159,9 @@ def _settings(end: float, steps: int, reach: float = 1.0, flexible: bool = True)
 
 def _solve(
     chain: Chain, act: Actuation, steps: Steps, progress: Callable[[float], None] | None
-) -> tuple[tuple[list[float], list[np.ndarray], list[np.ndarray], list[np.ndarray]], int, float]:
-    """Run Exudyn; returns the record (times, coordinates, velocities, accelerations), the steps done, and seconds taken."""
-    record: tuple[list[float], list[np.ndarray], list[np.ndarray], list[np.ndarray]] = ([], [], [], [])
+) -> tuple[Record, int, float]:
+    """Run Exudyn; returns the record, the steps done, and seconds taken."""
+    record: Record = ([], [], [], [])
     errors: list[BaseException] = []
     data, done = chain.mbs.systemData, 0
     loads = Loads(chain, act, steps.length, steps.count, errors.append)
@@ -145,8 +169,9 @@ def _solve(
 
     def keep() -> None:
         record[0].append(done * steps.length)
-        for rows, values in zip(record[1:], (data.GetODE2Coordinates(), data.GetODE2Coordinates_t(), data.GetODE2Coordinates_tt()), strict=True):
-            rows.append(np.array(values))
+        record[1].append(np.array(data.GetODE2Coordinates()))
+        record[2].append(np.array(data.GetODE2Coordinates_t()))
+        record[3].append(np.array(data.GetODE2Coordinates_tt()))
 
     def before(mbs: Any, t: float) -> bool:
         try:
@@ -174,10 +199,11 @@ def _solve(
         else:
             chain.mbs.SetPreStepUserFunction(before)
             chain.mbs.SetPostStepUserFunction(after)
-            settings = _settings(steps.count * steps.length, steps.count, chain.reach, any(chain.elements))
+            end, size = steps.count * steps.length, len(chain.reference)
+            settings = _settings(end, steps.count, chain.reach, any(chain.elements), size)
             failed = _run(chain.mbs, settings)
             if failed and not errors:
-                raise FlexuraError(_reason(chain.mbs, done, steps, failed))
+                raise _failure(chain.mbs, done, steps, failed)
     if errors:
         raise errors[0]
     return record, done, time.perf_counter() - began
@@ -191,14 +217,15 @@ def _run(mbs: Any, settings: Any) -> str:
         return str(error) or type(error).__name__
 
 
-def _reason(mbs: Any, done: int, steps: Steps, failed: str) -> str:
+def _failure(mbs: Any, done: int, steps: Steps, failed: str) -> FlexuraError:
     where = f"Exudyn's solver stopped at t = {done * steps.length:.6g} s of {steps.count * steps.length:.6g} s"
     solver = mbs.sys.get("dynamicSolver")
     if solver is not None and solver.conv.linearSolverFailed:
-        return f"{where}: its equations are singular; a link without mass that nothing holds?"
+        return FlexuraError(f"{where}: its equations are singular; a link without mass that nothing holds?")
     if solver is not None and not solver.conv.newtonConverged:
-        return f"{where}: a step of {steps.length:.3g} s did not converge; the motion or the drive is too fast for it, give a smaller step_s"
-    return f"{where}: {failed.splitlines()[0]}"
+        cause = f"a step of {steps.length:.3g} s did not converge; the motion or the drive is too fast for it"
+        return DidNotConverge(f"{where}: {cause}, give a smaller step_s")
+    return FlexuraError(f"{where}: {failed.splitlines()[0]}")
 
 
 @contextmanager

@@ -1,0 +1,101 @@
+"""The fastest Exudyn model of the benchmark manoeuvre that we could find: what the native solver is measured against.
+
+Type IV: a carriage on a rail, a rotor, a flexible strip, a payload, driven by smoothed bang-bang forces for 1 s and left alone for another.
+Tuned by hand, unlike the twin: no joints (all inertias sit on the beam's end nodes), 5 ANCF elements, the longest step that gives
+0.1 % of the tip deflection, modified Newton, dense solver, drives set once a step.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+import flexura as fx
+from flexura.signal import bang_bang
+
+CARRIAGE_KG, ROTOR_KG_M2, PAYLOAD_KG, LENGTH_M = 1.0, 1e-3, 0.05, 0.3
+WIDTH_M, HEIGHT_M, YOUNG_PA, DENSITY_KG_M3 = 0.02, 0.001, 2e11, 7850.0
+DURATION_S = 2.0
+T = np.linspace(0.0, DURATION_S, 201)
+FORCE, TORQUE = bang_bang(2.0, 1.0, 0.01), bang_bang(0.05, 1.0, 0.01)
+
+
+def robot(elements: int, modes: int | None = None) -> fx.Robot:
+    """The same robot as a robot file has it."""
+    strip = {
+        "length_m": LENGTH_M, "elements": elements, "section": {"width_m": WIDTH_M, "height_m": HEIGHT_M},
+        "young_modulus_Pa": YOUNG_PA, "density_kg_m3": DENSITY_KG_M3, "joint": {"type": "R", "hub_inertia_kg_m2": ROTOR_KG_M2},
+    }  # fmt: skip
+    carriage = {"length_m": 0.0, "mass_kg": CARRIAGE_KG, "inertia_kg_m2": 0.0, "joint": {"type": "Pa"}}
+    return fx.Robot.from_dict({
+        "name": "benchmark, type IV", "link": [carriage, strip | ({"modes": modes} if modes else {})], "payload": {"mass_kg": PAYLOAD_KG}
+    })  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Result:
+    """Wall time of the solver alone [s], and the tip deflection at T [m]."""
+
+    wall_s: float
+    tip_deflection: np.ndarray
+
+
+def exudyn(elements: int = 5, step_s: float = 2.0 / 6400) -> Result:
+    """2 s of the manoeuvre in Exudyn; the default step is 3.1e-4 s."""
+    import exudyn as exu
+    from exudyn import beams
+    from exudyn import itemInterface as item
+
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    exu.SetWriteToConsole(False)
+    area = WIDTH_M * HEIGHT_M
+    cable = item.ObjectANCFCable2D(
+        massPerLength=DENSITY_KG_M3 * area, bendingStiffness=YOUNG_PA * WIDTH_M * HEIGHT_M**3 / 12, axialStiffness=YOUNG_PA * area
+    )
+    made = beams.GenerateBeamElementsAlongLine(mbs, [0, 0, 0], [LENGTH_M, 0, 0], elements, cable)
+    root, tip = made["nodes"][0], made["nodes"][-1]
+    mbs.AddObject(item.ObjectGenericODE2(nodeNumbers=[root], massMatrix=np.diag([CARRIAGE_KG, CARRIAGE_KG, ROTOR_KG_M2, ROTOR_KG_M2])))
+    mbs.AddObject(item.ObjectGenericODE2(nodeNumbers=[tip], massMatrix=np.diag([PAYLOAD_KG, PAYLOAD_KG, 0, 0])))
+    ground = mbs.AddMarker(item.MarkerNodeCoordinate(nodeNumber=mbs.AddNode(item.NodePointGround()), coordinate=0))
+    x, y = (mbs.AddMarker(item.MarkerNodeCoordinate(nodeNumber=root, coordinate=k)) for k in (0, 1))
+    mbs.AddObject(item.ObjectConnectorCoordinate(markerNumbers=[ground, y]))
+    force = mbs.AddLoad(item.LoadCoordinate(markerNumber=x, load=0.0))
+    torque = mbs.AddLoad(item.LoadTorqueVector(markerNumber=mbs.AddMarker(item.MarkerNodeRigid(nodeNumber=root)), loadVector=[0, 0, 0]))
+
+    def drives(mbs: object, t: float) -> bool:
+        mbs.SetLoadParameter(force, "load", FORCE(t)[0])  # type: ignore[attr-defined]
+        mbs.SetLoadParameter(torque, "loadVector", [0, 0, TORQUE(t)[0]])  # type: ignore[attr-defined]
+        return True
+
+    mbs.SetPreStepUserFunction(drives)
+    kinds, memory = exu.OutputVariableType, {"storeInternal": True, "writeToFile": False}
+    at_root = mbs.AddSensor(item.SensorNode(nodeNumber=root, outputVariableType=kinds.CoordinatesTotal, **memory))
+    at_tip = mbs.AddSensor(item.SensorNode(nodeNumber=tip, outputVariableType=kinds.Position, **memory))
+    mbs.Assemble()
+    settings = exu.SimulationSettings()
+    integration = settings.timeIntegration
+    integration.endTime, integration.numberOfSteps = DURATION_S, round(DURATION_S / step_s)
+    integration.newton.useModifiedNewton = True
+    integration.newton.relativeTolerance = integration.newton.absoluteTolerance = 1e-6
+    integration.generalizedAlpha.spectralRadius = 0.9
+    integration.adaptiveStep = False
+    integration.verboseMode = 0
+    settings.linearSolver.solverType = exu.LinearSolverType.EigenDense
+    settings.solution.file.write = False
+    settings.solution.solverInformationFileName = ""
+    settings.solution.sensors.writePeriod = T[1]
+    begun = time.perf_counter()
+    mbs.SolveDynamic(settings)
+    wall = time.perf_counter() - begun
+    a, b = mbs.GetSensorStoredData(at_root), mbs.GetSensorStoredData(at_tip)
+    angle = np.arctan2(a[:, 4], a[:, 3])
+    return Result(wall, -np.sin(angle) * (b[:, 1] - a[:, 1]) + np.cos(angle) * (b[:, 2] - a[:, 2]))
+
+
+def native(system: fx.System, rtol: float, method: str = "auto") -> Result:
+    """The same 2 s by the native solver."""
+    run = fx.simulate(system, T, fx.Drive.force(FORCE, TORQUE), rtol=rtol, method=method)
+    return Result(run.meta["wall_s"], run["link/2/tip_deflection"])

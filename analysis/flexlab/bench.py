@@ -1,0 +1,76 @@
+"""How fast the solver is on this machine: `make bench`, or python -m flexlab.bench [--json].
+
+Ratios of programs measured side by side: every round times each of them once, in turn, so that whatever else the machine does hits all
+alike. Errors are the largest difference of the tip deflection from each program's own converged model, relative to its largest value.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+import flexura as fx
+
+from . import baseline
+from .baseline import Result
+
+ROUNDS = 15
+BASE = "Exudyn, 5 ANCF elements, tuned"
+
+Case = tuple[str, Callable[[], Result], np.ndarray]
+
+
+def cases() -> list[Case]:
+    """What is timed: a name, the run, and the converged tip deflection it is compared with."""
+    fine = fx.assemble(baseline.robot(12))
+    converged = baseline.native(fine, 1e-10).tip_deflection
+    exact = baseline.exudyn(16, 1e-4).tip_deflection
+    out: list[Case] = [(BASE, baseline.exudyn, exact)]
+    for name, elements, modes, rtol, method in (
+        ("native, 2 modes", 12, 2, 1e-3, "explicit"),
+        ("native, 3 modes", 12, 3, 1e-3, "explicit"),
+        ("native, 3 modes, accurate", 12, 3, 1e-6, "explicit"),
+        ("native, all unknowns of 5 elements", 5, None, 1.5e-5, "implicit"),
+    ):
+        system = fx.assemble(baseline.robot(elements, modes))
+        out.append((name, lambda s=system, r=rtol, m=method: baseline.native(s, r, m), converged))  # type: ignore[misc]
+    return out
+
+
+def measure(rounds: int = ROUNDS) -> list[dict[str, float | str]]:
+    """One row a case: median wall time [s], error, median ratio to Exudyn, and the ratio's quartiles over the rounds."""
+    todo = cases()
+    for _, run, _ in todo:
+        run()  # compiled, loaded, warm
+    walls = np.array([[run().wall_s for _, run, _ in todo] for _ in range(rounds)])
+    ratios = walls[:, :1] / walls
+    rows: list[dict[str, float | str]] = []
+    for k, (name, run, reference) in enumerate(todo):
+        error = np.abs(run().tip_deflection - reference).max() / np.abs(reference).max()
+        low, middle, high = np.percentile(ratios[:, k], (25, 50, 75))
+        row = {"wall_s": float(np.median(walls[:, k])), "error": float(error), "ratio": middle, "ratio_low": low, "ratio_high": high}
+        rows.append({"case": name} | row)
+    return rows
+
+
+def main() -> None:
+    rows = measure()
+    if "--json" in sys.argv[1:]:
+        print(json.dumps(rows, indent=1))
+        return
+    table = Table(title=f"type IV, {baseline.DURATION_S:g} s bang-bang, one core, {ROUNDS} rounds", title_justify="left")
+    for name in ("", "time", "error of the tip deflection", "times as fast", "quartiles"):
+        table.add_column(name, justify="left" if not name else "right", no_wrap=True)
+    for row in rows:
+        quartiles = f"{row['ratio_low']:.0f} ... {row['ratio_high']:.0f}"
+        table.add_row(str(row["case"]), f"{1e3 * float(row['wall_s']):.3g} ms", f"{row['error']:.1e}", f"{row['ratio']:.0f}", quartiles)
+    Console(width=110).print(table)
+
+
+if __name__ == "__main__":
+    main()

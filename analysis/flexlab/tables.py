@@ -1,0 +1,84 @@
+"""Tables for the terminal."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+
+import flexura as fx
+
+from .crosscheck import Check
+
+
+def check_table(check: Check) -> Table:
+    """Deviation per channel, and both run times."""
+    tolerance = 100 * check.tolerance
+    table = Table(title=f"{check.simulation.meta.get('name') or 'robot'}: native against {check.twin.meta['program']}", title_justify="left")
+    for name in ("channel", "peak", "max deviation", "RMS deviation", "max / peak", "RMS / peak", f"within {tolerance:g} %"):
+        table.add_column(name, justify="left" if name == "channel" else "right", no_wrap=True)
+    failed = set(check.failed)
+    for row in check.rows:
+        verdict = "[red]no" if row.channel in failed else "[green]yes"
+        table.add_row(
+            f"{row.channel} \\[{row.unit}]", f"{row.peak:.4g}", f"{row.max:.2e}", f"{row.rms:.2e}",
+            _percent(row.max_relative), _percent(row.rms_relative), verdict,
+        )  # fmt: skip
+    native, other = check.simulation.meta["wall_s"], check.twin.meta["wall_s"]
+    table.caption = f"run times: native {_time(native)}, twin {_time(other)} ({other / native:.0f} times as long)"
+    table.caption_justify = "left"
+    return table
+
+
+def check_json(check: Check) -> dict[str, Any]:
+    rows = {row.channel: {k: _finite(v) for k, v in vars(row).items() if k != "channel"} for row in check.rows}
+    runs = {name: {k: run.meta.get(k) for k in ("program", "wall_s", "steps", "complete")} for name, run in (("simulation", check.simulation), ("twin", check.twin))}
+    return {"passed": check.passed, "failed": check.failed, "tolerance": check.tolerance, "channels": rows, "runs": runs}
+
+
+def run_table(run: fx.Run) -> Table:
+    """What a run did: the range of its main channels, steps and the energy error."""
+    table = Table(title=run.meta.get("name") or "run", title_justify="left")
+    for name in ("channel", "start", "lowest", "highest", "end"):
+        table.add_column(name, justify="left" if name == "channel" else "right", no_wrap=True)
+    for name in run:
+        if "deflection/" in name or name.startswith(("link", "energy")) and not name.endswith(("tip_deflection", "tip_slope")):
+            continue
+        values = run[name]
+        table.add_row(f"{name} \\[{run.units[name]}]", *(f"{v:.5g}" for v in (values[0], values.min(), values.max(), values[-1])))
+    about = run.meta
+    table.caption = (
+        f"{about['structure']}, {about['unknowns']} unknowns, {run.t[-1] - run.t[0]:g} s simulated in {_time(about['wall_s'])}; {about['method']}, "
+        f"{about['steps']} steps, rtol {about['rtol']:g}, energy error {about['energy_error']:.1e}"
+    )
+    table.caption_justify = "left"
+    return table
+
+
+def run_json(run: fx.Run) -> dict[str, Any]:
+    about = {k: v for k, v in run.meta.items() if k not in ("robot", "drive")}
+    channels = {n: {"unit": run.units[n], "start": v[0], "lowest": v.min(), "highest": v.max(), "end": v[-1]} for n, v in run.channels.items()}
+    return about | {"end_s": float(run.t[-1]), "channels": {n: {k: _finite(x) for k, x in c.items()} for n, c in channels.items()}}
+
+
+def frequency_table(locked: np.ndarray, free: np.ndarray, name: str) -> Table:
+    table = Table(title=f"{name}: natural frequencies", title_justify="left")
+    table.add_column("mode", justify="right")
+    table.add_column("joints locked \\[Hz]", justify="right")
+    table.add_column("joints free \\[Hz]", justify="right")
+    for k in range(max(len(locked), len(free))):
+        table.add_row(str(k + 1), *(f"{f[k]:.5g}" if k < len(f) else "" for f in (locked, free)))
+    return table
+
+
+def _percent(value: float) -> str:
+    return "-" if not np.isfinite(value) else f"{100 * value:.2g} %"
+
+
+def _time(seconds: float) -> str:
+    return f"{1e3 * seconds:.3g} ms" if seconds < 1 else f"{seconds:.3g} s"
+
+
+def _finite(value: Any) -> Any:
+    return None if isinstance(value, float | np.floating) and not np.isfinite(value) else value if isinstance(value, str) else float(value)
