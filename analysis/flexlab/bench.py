@@ -1,7 +1,8 @@
 """How fast the solver is on this machine: `make bench`, or python -m flexlab.bench [--json].
 
-Ratios of programs measured side by side: every round times each of them once, in turn, so that whatever else the machine does hits all
-alike. Errors are the largest difference of the tip deflection from each program's own converged model, relative to its largest value.
+Ratios of programs measured side by side: every round times each of them once, in turn, so that whatever else the machine does
+hits all alike. Errors are the largest difference of the tip deflection from each program's own converged model, relative to its
+largest value.
 """
 
 from __future__ import annotations
@@ -53,7 +54,13 @@ def measure(rounds: int = ROUNDS) -> list[dict[str, float | str]]:
     for k, (name, run, reference) in enumerate(todo):
         error = np.abs(run().tip_deflection - reference).max() / np.abs(reference).max()
         low, middle, high = np.percentile(ratios[:, k], (25, 50, 75))
-        row = {"wall_s": float(np.median(walls[:, k])), "error": float(error), "ratio": middle, "ratio_low": low, "ratio_high": high}
+        row = {
+            "wall_s": float(np.median(walls[:, k])),
+            "error": float(error),
+            "ratio": middle,
+            "ratio_low": low,
+            "ratio_high": high,
+        }
         rows.append({"case": name} | row)
     return rows
 
@@ -68,7 +75,9 @@ def main() -> None:
         table.add_column(name, justify="left" if not name else "right", no_wrap=True)
     for row in rows:
         quartiles = f"{row['ratio_low']:.0f} ... {row['ratio_high']:.0f}"
-        table.add_row(str(row["case"]), f"{1e3 * float(row['wall_s']):.3g} ms", f"{row['error']:.1e}", f"{row['ratio']:.0f}", quartiles)
+        table.add_row(
+            str(row["case"]), f"{1e3 * float(row['wall_s']):.3g} ms", f"{row['error']:.1e}", f"{row['ratio']:.0f}", quartiles
+        )
     Console(width=110).print(table)
 
 

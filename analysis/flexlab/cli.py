@@ -13,7 +13,7 @@ import typer
 
 app = typer.Typer(
     name="flexura",
-    help="Planar robots with flexible links: simulate, cross-check with Exudyn, review in Rerun. One robot file describes the robot.",
+    help="Planar robots with flexible links: simulate, cross-check, review. One robot file describes the robot.",
     no_args_is_help=True,
     add_completion=False,
     rich_markup_mode=None,
@@ -22,9 +22,12 @@ app = typer.Typer(
 
 RobotFile = Annotated[Path, typer.Argument(metavar="ROBOT", help="robot file (TOML), for example model/robots/rig.toml")]
 ManoeuvreFile = Annotated[
-    Path | None, typer.Argument(metavar="[MANOEUVRE]", help="manoeuvre file (TOML); without one, a modest back and forth of every joint")
+    Path | None,
+    typer.Argument(metavar="[MANOEUVRE]", help="manoeuvre file (TOML); without one, a modest back and forth of every joint"),
 ]
-Out = Annotated[Path | None, typer.Option("--out", metavar="FOLDER", help="where to leave the results; default logs/<command>-<robot>")]
+Out = Annotated[
+    Path | None, typer.Option("--out", metavar="FOLDER", help="where to leave the results; default logs/<command>-<robot>")
+]
 Json = Annotated[bool, typer.Option("--json", help="print JSON instead of tables, for scripts")]
 Rtol = Annotated[float, typer.Option(help="relative tolerance of the native solver")]
 
@@ -69,7 +72,11 @@ def frequencies(robot: RobotFile, json: Json = False) -> None:
     system = fx.assemble(described)
     locked, free = (fx.frequencies(system, joints=joints) for joints in ("locked", "free"))
     title = described.name or robot.stem
-    _show(json, lambda: tables.frequency_table(locked, free, title), lambda: {"locked_Hz": locked.tolist(), "free_Hz": free.tolist()})
+    _show(
+        json,
+        lambda: tables.frequency_table(locked, free, title),
+        lambda: {"locked_Hz": locked.tolist(), "free_Hz": free.tolist()},
+    )
 
 
 @app.command()
@@ -104,8 +111,12 @@ def crosscheck(
 @app.command()
 def review(
     runs: Annotated[list[Path], typer.Argument(metavar="RUN [RUN]", help="one or two folders of runs")],
-    save: Annotated[Path | None, typer.Option(metavar="FILE.rrd", help="write the review to this file instead of opening it")] = None,
-    picture: Annotated[Path | None, typer.Option(metavar="FILE.png", help="draw the review into this file, without a screen")] = None,
+    save: Annotated[
+        Path | None, typer.Option(metavar="FILE.rrd", help="write the review to this file instead of opening it")
+    ] = None,
+    picture: Annotated[
+        Path | None, typer.Option(metavar="FILE.png", help="draw the review into this file, without a screen")
+    ] = None,
     time_s: Annotated[float | None, typer.Option(help="the picture's instant; default: the largest tip deflection")] = None,
 ) -> None:
     """Look at one run, or at two of them side by side, in Rerun.
@@ -119,7 +130,9 @@ def review(
     if len(runs) > 2:
         raise fx.InputError("expected one or two runs", key="RUN", value=[str(r) for r in runs])
     read = [fx.Run.read(folder) for folder in runs]
-    target = save or (picture.with_suffix(".rrd") if picture else (runs[0] if runs[0].is_dir() else runs[0].parent) / "review.rrd")
+    target = save or (
+        picture.with_suffix(".rrd") if picture else (runs[0] if runs[0].is_dir() else runs[0].parent) / "review.rrd"
+    )
     rerun.write_review(target, read)
     typer.echo(f"stored {target}")
     if picture is not None:
@@ -130,7 +143,10 @@ def review(
 
 
 @app.command()
-def demo(out: Annotated[Path, typer.Option("--out", metavar="FOLDER", help="where to leave the results")] = Path("logs/demo"), json: Json = False) -> None:
+def demo(
+    out: Annotated[Path, typer.Option("--out", metavar="FOLDER", help="where to leave the results")] = Path("logs/demo"),
+    json: Json = False,
+) -> None:
     """The dissertation's rig along its inverse law, natively and in Exudyn, with a review to look at.
 
     Example: flexura demo
@@ -141,7 +157,11 @@ def demo(out: Annotated[Path, typer.Option("--out", metavar="FOLDER", help="wher
     _announce_compiling()
     with _progress("native", "twin") as report:
         check, recording, drawn = demonstrate(out, report)
-    _show(json, lambda: tables.check_table(check), lambda: tables.check_json(check) | {"review": str(recording), "picture": str(drawn)})
+    _show(
+        json,
+        lambda: tables.check_table(check),
+        lambda: tables.check_json(check) | {"review": str(recording), "picture": str(drawn)},
+    )
     lines = [f"stored {out}: the runs, the review {recording.name}" + (f" and its picture {drawn.name}" if drawn else "")]
     if drawn is None:
         lines.append(f"no picture: {check.simulation.meta.get('picture')}")

@@ -42,12 +42,18 @@ Progress = Callable[[str, float], None]
 
 
 def crosscheck(
-    robot: fx.Robot, manoeuvre: Manoeuvre, *, beam: str = "ancf", rtol: float = 1e-8, tolerance: float = TOLERANCE, progress: Progress | None = None
+    robot: fx.Robot,
+    manoeuvre: Manoeuvre,
+    *,
+    beam: str = "ancf",
+    rtol: float = 1e-8,
+    tolerance: float = TOLERANCE,
+    progress: Progress | None = None,
 ) -> Check:
     """Simulate a robot natively and in Exudyn along the same manoeuvre, and compare.
 
-    `beam`: "ancf" or "ge", see `flexura.twin`. `progress` is called with "native" or "twin" and the finished fraction. The table's channels:
-    joint positions, tip deflections, the tip's position.
+    `beam`: "ancf" or "ge", see `flexura.twin`. `progress` is called with "native" or "twin" and the finished fraction. The
+    table's channels: joint positions, tip deflections, the tip's position.
     """
     report = progress or (lambda name, fraction: None)
     native = fx.simulate(fx.assemble(robot), manoeuvre.t, manoeuvre.drive, rtol=rtol, progress=lambda f: report("native", f))

@@ -22,7 +22,9 @@ def demonstrate(folder: Path, progress: Progress | None = None) -> tuple[Check, 
     from .review import picture
 
     if not ROBOT.is_file():
-        raise fx.InputError("no such file: the demonstration needs a checkout of the project, with its model/robots folder", file=str(ROBOT))
+        raise fx.InputError(
+            "no such file: the demonstration needs a checkout of the project, with its model/robots folder", file=str(ROBOT)
+        )
     robot = fx.load(ROBOT)
     check = crosscheck(robot, load_manoeuvre(MANOEUVRE, len(robot.links)), progress=progress)
     review = save(check, folder)

@@ -60,7 +60,12 @@ def _native_libraries() -> Iterator[Finding]:
 
         yield Finding("exudyn's libraries", "ok", "libGL, libX11 load")
     except ImportError as error:
-        yield Finding("exudyn's libraries", "missing", str(error).splitlines()[0], "no cross-check; on Debian type: apt-get install libgl1 libx11-6")
+        yield Finding(
+            "exudyn's libraries",
+            "missing",
+            str(error).splitlines()[0],
+            "no cross-check; on Debian type: apt-get install libgl1 libx11-6",
+        )
     drivers = [icd for place in ("/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d") for icd in Path(place).glob("*.json")]
     if drivers:
         yield Finding("Vulkan driver", "ok", f"{len(drivers)} found")
@@ -75,4 +80,9 @@ def _cache() -> Iterator[Finding]:
     from flexura.compiled import folder
 
     filled = len(list(folder().glob("**/*.nbc")))
-    yield Finding("compiled code", "ok" if filled else "note", str(folder()), "" if filled else "the first simulation compiles for about a minute; or type: python -m flexura.warm")
+    yield Finding(
+        "compiled code",
+        "ok" if filled else "note",
+        str(folder()),
+        "" if filled else "the first simulation compiles for about a minute; or type: python -m flexura.warm",
+    )

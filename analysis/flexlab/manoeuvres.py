@@ -1,4 +1,5 @@
-"""A manoeuvre for a robot that was given none: every free joint back and forth, small enough for the links to stay in their range."""
+"""A manoeuvre for a robot that was given none: every free joint back and forth, small enough for the links to stay in their
+range."""
 
 from __future__ import annotations
 
@@ -29,7 +30,11 @@ def modest(system: fx.System) -> Manoeuvre:
     run = fx.simulate(system, np.linspace(0, 2 * DURATION_S, 401), _drive(hold, unit * trial).drive, rtol=1e-5)
     largest = max(
         [np.ptp(run[f"joint/{i}/position"]) / r for i, r in enumerate(reach, 1)]
-        + [np.abs(run[f"link/{i}/tip_deflection"]).max() / (DEFLECTION * k.length_m) for i, k in enumerate(robot.links, 1) if k.flexible]
+        + [
+            np.abs(run[f"link/{i}/tip_deflection"]).max() / (DEFLECTION * k.length_m)
+            for i, k in enumerate(robot.links, 1)
+            if k.flexible
+        ]
     )
     return _drive(hold, unit * trial / max(largest, 1e-6))
 
@@ -47,4 +52,8 @@ def _drive(hold: np.ndarray, amplitude: np.ndarray) -> Manoeuvre:
 def _reach(joint: object) -> float:
     reach = REACH[joint.type]  # type: ignore[attr-defined]
     limits, start = joint.limits, joint.start  # type: ignore[attr-defined]
-    return reach if limits is None else min(reach, 0.8 * max(min(limits[1] - start, start - limits[0]), 0.05 * (limits[1] - limits[0])))
+    return (
+        reach
+        if limits is None
+        else min(reach, 0.8 * max(min(limits[1] - start, start - limits[0]), 0.05 * (limits[1] - limits[0])))
+    )

@@ -15,7 +15,9 @@ from .crosscheck import Check
 def check_table(check: Check) -> Table:
     """Deviation per channel, and both run times."""
     tolerance = 100 * check.tolerance
-    table = Table(title=f"{check.simulation.meta.get('name') or 'robot'}: native against {check.twin.meta['program']}", title_justify="left")
+    table = Table(
+        title=f"{check.simulation.meta.get('name') or 'robot'}: native against {check.twin.meta['program']}", title_justify="left"
+    )
     for name in ("channel", "peak", "max deviation", "RMS deviation", "max / peak", "RMS / peak", f"within {tolerance:g} %"):
         table.add_column(name, justify="left" if name == "channel" else "right", no_wrap=True)
     failed = set(check.failed)
@@ -33,7 +35,10 @@ def check_table(check: Check) -> Table:
 
 def check_json(check: Check) -> dict[str, Any]:
     rows = {row.channel: {k: _finite(v) for k, v in vars(row).items() if k != "channel"} for row in check.rows}
-    runs = {name: {k: run.meta.get(k) for k in ("program", "wall_s", "steps", "complete")} for name, run in (("simulation", check.simulation), ("twin", check.twin))}
+    runs = {
+        name: {k: run.meta.get(k) for k in ("program", "wall_s", "steps", "complete")}
+        for name, run in (("simulation", check.simulation), ("twin", check.twin))
+    }
     return {"passed": check.passed, "failed": check.failed, "tolerance": check.tolerance, "channels": rows, "runs": runs}
 
 
@@ -43,14 +48,14 @@ def run_table(run: fx.Run) -> Table:
     for name in ("channel", "start", "lowest", "highest", "end"):
         table.add_column(name, justify="left" if name == "channel" else "right", no_wrap=True)
     for name in run:
-        if "deflection/" in name or name.startswith(("link", "energy")) and not name.endswith(("tip_deflection", "tip_slope")):
+        if name.startswith(("link", "energy")) and not name.endswith(("tip_deflection", "tip_slope")):
             continue
         values = run[name]
         table.add_row(f"{name} \\[{run.units[name]}]", *(f"{v:.5g}" for v in (values[0], values.min(), values.max(), values[-1])))
     about = run.meta
     table.caption = (
-        f"{about['structure']}, {about['unknowns']} unknowns, {run.t[-1] - run.t[0]:g} s simulated in {_time(about['wall_s'])}; {about['method']}, "
-        f"{about['steps']} steps, rtol {about['rtol']:g}, energy error {about['energy_error']:.1e}"
+        f"{about['structure']}, {about['unknowns']} unknowns, {run.t[-1] - run.t[0]:g} s simulated in {_time(about['wall_s'])}; "
+        f"{about['method']}, {about['steps']} steps, rtol {about['rtol']:g}, energy error {about['energy_error']:.1e}"
     )
     table.caption_justify = "left"
     return table
@@ -58,8 +63,14 @@ def run_table(run: fx.Run) -> Table:
 
 def run_json(run: fx.Run) -> dict[str, Any]:
     about = {k: v for k, v in run.meta.items() if k not in ("robot", "drive")}
-    channels = {n: {"unit": run.units[n], "start": v[0], "lowest": v.min(), "highest": v.max(), "end": v[-1]} for n, v in run.channels.items()}
-    return about | {"end_s": float(run.t[-1]), "channels": {n: {k: _finite(x) for k, x in c.items()} for n, c in channels.items()}}
+    channels = {
+        n: {"unit": run.units[n], "start": v[0], "lowest": v.min(), "highest": v.max(), "end": v[-1]}
+        for n, v in run.channels.items()
+    }
+    return about | {
+        "end_s": float(run.t[-1]),
+        "channels": {n: {k: _finite(x) for k, x in c.items()} for n, c in channels.items()},
+    }
 
 
 def frequency_table(locked: np.ndarray, free: np.ndarray, name: str) -> Table:
@@ -81,4 +92,10 @@ def _time(seconds: float) -> str:
 
 
 def _finite(value: Any) -> Any:
-    return None if isinstance(value, float | np.floating) and not np.isfinite(value) else value if isinstance(value, str) else float(value)
+    return (
+        None
+        if isinstance(value, float | np.floating) and not np.isfinite(value)
+        else value
+        if isinstance(value, str)
+        else float(value)
+    )

@@ -19,7 +19,7 @@ _HOME = {
     "Robot": "robot", "load": "robot", "save": "robot",
     "System": "system", "assemble": "system",
     "static": "statics", "tip_pose": "statics",
-    "frequencies": "frequencies",
+    "frequencies": "linear",
     "simulate": "forward",
     "Run": "run",
     "Drive": "drive", "JointDrive": "drive", "Manoeuvre": "drive", "load_manoeuvre": "drive",
@@ -27,13 +27,16 @@ _HOME = {
     "FlexuraError": "errors", "InputError": "errors",
 }  # fmt: skip
 
-__all__ = ["FlexuraError", "InputError", "Robot", "Run", "Signal", "System", "assemble", "frequencies", "load", "save", "simulate", "static"]
+__all__ = [
+    "Drive", "FlexuraError", "InputError", "JointDrive", "Manoeuvre", "Robot", "Run", "Signal", "System",
+    "assemble", "frequencies", "load", "load_manoeuvre", "save", "simulate", "static", "tip_pose",
+]  # fmt: skip
 
 if TYPE_CHECKING:
     from .drive import Drive, JointDrive, Manoeuvre, load_manoeuvre
     from .errors import FlexuraError, InputError
     from .forward import simulate
-    from .frequencies import frequencies
+    from .linear import frequencies
     from .robot import Robot, load, save
     from .run import Run
     from .signal import Signal
@@ -45,7 +48,7 @@ def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module 'flexura' has no attribute {name!r}")
     value = getattr(importlib.import_module(f".{_HOME[name]}", __name__), name)
-    globals()[name] = value  # a module of the same name (frequencies) must not hide the function
+    globals()[name] = value
     return value
 
 

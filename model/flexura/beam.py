@@ -8,6 +8,7 @@ displacement w and the slope w' at nodes 1 ... n (node 0 is the hub: w = w' = 0)
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -32,7 +33,7 @@ def hermite(s: np.ndarray, h: float, derivative: int = 0) -> np.ndarray:
     raise ValueError(f"derivative {derivative}: 0, 1 or 2")
 
 
-def shape(length: float, elements: int, x: np.ndarray, derivative: int = 0) -> np.ndarray:
+def shape(length: float, elements: int, x: Any, derivative: int = 0) -> np.ndarray:
     """phi(x), phi'(x) or phi''(x) of the clamped link: (2n, *x.shape), unknowns (w_1, w'_1, ..., w_n, w'_n)."""
     x = np.atleast_1d(np.asarray(x, dtype=float))
     h = length / elements
@@ -51,11 +52,11 @@ class LinkIntegrals:
     mass m0 = int dm [kg]; first moment s1 = int x dm [kg m]; second moment inertia = int x^2 dm [kg m^2], about the hub;
     S0 = int phi dm, S1 = int x phi dm (m,); M = int phi phi^T dm, K = int EI phi'' phi''^T dx (m, m);
     G1 = int n1 phi' phi'^T dx, G2 = int n2 phi' phi'^T dx, n1(x) = int_x^L dm, n2(x) = int_x^L X dm, so that the shortening
-    u2 = -1/2 int_0^x w'^2 has int u2 dm = -q^T G1 q / 2, int x u2 dm = -q^T G2 q / 2; and H = int phi' phi'^T dx, u2(L) = -q^T H q / 2.
-    NL = phi(L), SL = phi'(L) (m,); basis (2n, m): nodal unknowns = basis @ q.
-    What is of higher order in the deflection is summed over points (`model/README.md`, section 3): mass points (POINTS,) at x with their masses and
-    phi (POINTS, m), the last one being the tip with the payload; and slope points (SLOPES,), SLOPES / POINTS between two mass points,
-    with weights dx, EI dx, and phi', phi'' (SLOPES, m).
+    u2 = -1/2 int_0^x w'^2 has int u2 dm = -q^T G1 q / 2, int x u2 dm = -q^T G2 q / 2; and H = int phi' phi'^T dx, u2(L) = -q^T
+    H q / 2. NL = phi(L), SL = phi'(L) (m,); basis (2n, m): nodal unknowns = basis @ q. What is of higher order in the
+    deflection is summed over points (`model/README.md`, section 3): mass points (POINTS,) at x with their masses and phi
+    (POINTS, m), the last one being the tip with the payload; and slope points (SLOPES,), SLOPES / POINTS between two mass
+    points, with weights dx, EI dx, and phi', phi'' (SLOPES, m).
     """
 
     length: float

@@ -19,13 +19,15 @@ def compiled(function: Any) -> Any:
     """Compile for the inner loop: cached on disk, IEEE division, and no memory management at all.
 
     Without numba's reference counting (`_nrt=False`) an array costs nothing to pass on, which makes the short functions of this
-    package about three times faster, and a function that would allocate does not compile. `function.py_func` is the plain Python one.
+    package about three times faster, and a function that would allocate does not compile. `function.py_func` is the plain
+    Python one.
     """
     return _cached(function)
 
 
 def inlined(function: Any) -> Any:
-    """The same, and expanded where it is called: passing a robot's constants, some forty arrays, costs more than a short function."""
+    """The same, and expanded where it is called: passing a robot's constants, some forty arrays, costs more than a short
+    function."""
     return _cached(function, forceinline=True)
 
 
@@ -39,8 +41,8 @@ def _cached(function: Any, **options: Any) -> Any:
 
 
 def _folder() -> Path:
-    """A cache folder named after the content of this package: numba looks only at the file that a function stands in, and would run
-    code that was inlined from an older version of another file."""
+    """A cache folder named after the content of this package: numba looks only at the file that a function stands in, and would
+    run code that was inlined from an older version of another file."""
     digest = hashlib.sha256(numba.__version__.encode())
     for source in sorted(_HERE.glob("*.py")):
         digest.update(source.read_bytes())

@@ -145,7 +145,9 @@ def _manoeuvre(data: dict[str, Any], joints: int) -> Manoeuvre:
         _known(entry, _JOINT_KEYS, key + ".")
         force = signal.from_spec(entry["force"], key=f"{key}.force") if "force" in entry else None
         motion = signal.from_spec(entry["motion"], key=f"{key}.motion") if "motion" in entry else None
-        gains = [_number(entry, k, "a gain of 0 or more", key=f"{key}.", low=-0.0, default=0.0, closed=True) for k in ("kp", "kd")]
+        gains = [
+            _number(entry, k, "a gain of 0 or more", key=f"{key}.", low=-0.0, default=0.0, closed=True) for k in ("kp", "kd")
+        ]
         if motion is None and any(gains):
             raise InputError("missing: gains kp and kd need a motion to follow", key=f"{key}.motion")
         drives.append(JointDrive(force, motion, *gains))
@@ -162,7 +164,14 @@ def _known(data: dict[str, Any], keys: Sequence[str], prefix: str) -> None:
 
 
 def _number(
-    data: dict[str, Any], name: str, expected: str, *, key: str = "", low: float, default: float | None = None, closed: bool = False
+    data: dict[str, Any],
+    name: str,
+    expected: str,
+    *,
+    key: str = "",
+    low: float,
+    default: float | None = None,
+    closed: bool = False,
 ) -> float:
     value = data.get(name, default)
     if value is None:

@@ -26,7 +26,7 @@ def explain(error: ValidationError, model: type[BaseModel], data: Any, file: str
             expected = field.description or expected
             table = _table_inside(field.annotation, value, part)
         elif first["type"] == "extra_forbidden" and part == first["loc"][-1]:
-            keys.append(str(part))
+            keys.append(str(part) or '""')
         else:
             continue  # a branch of a union, not a key
         try:
@@ -56,11 +56,26 @@ def _worded(expected: str) -> str:
     return expected if expected.startswith("missing") else f"expected {expected}"
 
 
+def _misspelt(problems: list[Any]) -> Any:
+    """A missing key may be there under a wrong name, which is then the better thing to say."""
+    if problems[0]["type"] != "missing":
+        return None
+    return next((p for p in problems if p["type"] == "extra_forbidden" and p["loc"][:-1] == problems[0]["loc"][:-1]), None)
+
+
 def _fits(loc: tuple[int | str, ...], value: Any) -> bool:
-    """Where a key takes one of several forms, Pydantic says what is wrong for each: is this the form that was given?"""
+    """Where a key takes a list or something else, Pydantic says what is wrong for both: is this about the one that was given?"""
     for part in loc:
-        if isinstance(part, str) and not isinstance(value, dict | list) and value is not data_end:
+        if isinstance(part, str) and part.startswith("list["):
+            if not isinstance(value, list):
+                return False
+            continue
+        if isinstance(part, str) and isinstance(value, list):
             return False
+        try:
+            value = value[part]
+        except (KeyError, IndexError, TypeError):
+            continue  # a missing key, or the name of a form
     return True
 
 

@@ -1,8 +1,9 @@
 """The extended assembly: one global mass matrix of the whole robot, from link matrices by an index map.
 
 A link's matrix lives in (u, q_i): the velocity u = (vx, vy, omega) of its hub frame and its own elastic unknowns. The hub's
-velocity depends on the joints and elastic unknowns of every link before it, u_i = U_i qd, so the link's matrix is scattered into the
-rows of all of them, not only into those at a shared node: hence "extended" (dissertation, 2.4; `model/README.md`, section 4).
+velocity depends on the joints and elastic unknowns of every link before it, u_i = U_i qd, so the link's matrix is scattered
+into the rows of all of them, not only into those at a shared node: hence "extended" (dissertation, 2.4; `model/README.md`,
+section 4).
 """
 
 from __future__ import annotations
@@ -45,7 +46,8 @@ def tip_jacobian(c: Chain, w: Work, y: np.ndarray) -> np.ndarray:
 
 
 def _jacobians(c: Chain, w: Work, y: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
-    """Hub velocities per unit of each unknown, (3, n) a link, in the hub's axes; and the same for the last tip, its own link rigid."""
+    """Hub velocities per unit of each unknown, (3, n) a link, in the hub's axes; and the same for the last tip, its own link
+    rigid."""
     links, n = len(c.kind), len(y)
     outward(c, w, y, np.zeros(n))
     hubs = []

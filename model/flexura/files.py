@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import tempfile
 import tomllib
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Any
 from .errors import InputError
 
 MAX_BYTES = 10_000_000
+_TOO_DEEP = re.compile(r"""(?:\.[ \t]*[\w"'-]+[ \t]*){300}""")  # a.a.a.a...: tomllib's time and memory grow with the square
 
 
 def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -24,13 +26,17 @@ def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
     except IsADirectoryError:
         raise InputError("a directory: expected the path of a TOML file", file=name) from None
     except (OSError, ValueError) as error:
-        raise InputError(f"cannot be read ({getattr(error, 'strerror', None) or error}): expected a TOML file", file=name) from None
+        raise InputError(
+            f"cannot be read ({getattr(error, 'strerror', None) or error}): expected a TOML file", file=name
+        ) from None
     if len(raw) > MAX_BYTES:
         raise InputError(f"more than {MAX_BYTES // 10**6} MB: expected a TOML file", file=name)
     try:
         text = raw.decode("utf-8-sig")  # some editors begin a file with a byte order mark
     except UnicodeDecodeError as error:
         raise InputError(f"not a text (byte {error.start} is not UTF-8): expected a TOML file", file=name) from None
+    if _TOO_DEEP.search(text):
+        raise InputError("not valid TOML (nested too deeply)", file=name)
     try:
         return tomllib.loads(text)
     except RecursionError:

@@ -35,27 +35,35 @@ def simulate(
 ) -> Run:
     """Integrate the equations of motion from t_eval[0] on; the Run has its channels at t_eval (T,), ascending [s].
 
-    `drive`: a Drive (compiled), or a function (t) -> (N,) or (t, position, velocity, tip_deflection) -> (N,) of forces and torques
-    [N or N m] (slower, by scipy's solve_ivp). `q0`, `qd0` (n,): state at the start, by default `system.start()` at rest.
-    `rtol`: largest local error relative to the largest value so far. `method`: "explicit", "implicit" or "auto".
-    `progress` is called with the finished fraction. A joint that reaches a limit of the robot file ends the run: the Run holds the
-    states before it, an event says so and `meta["complete"]` is false; so it is after a Ctrl-C. `meta["energy_error"]` is the largest
-    |E - E(0) - work + loss| relative to the largest energy, work or loss. Raises InputError for wrong arguments, FlexuraError where the
-    tolerance cannot be kept.
+    `drive`: a Drive (compiled), or a function (t) -> (N,) or (t, position, velocity, tip_deflection) -> (N,) of forces and
+    torques [N or N m] (slower, by scipy's solve_ivp). `q0`, `qd0` (n,): state at the start, by default `system.start()` at
+    rest. `rtol`: largest local error relative to the largest value so far. `method`: "explicit", "implicit" or "auto".
+    `progress` is called with the finished fraction. A joint that reaches a limit of the robot file ends the run: the Run holds
+    the states before it, an event says so and `meta["complete"]` is false; so it is after a Ctrl-C. `meta["energy_error"]` is
+    the largest |E - E(0) - work + loss| relative to the largest energy, work or loss. Raises InputError for wrong arguments,
+    FlexuraError where the tolerance cannot be kept.
     """
     t = _times(t_eval)
     if not 1e-13 <= rtol <= 0.1:
         raise InputError("expected a relative tolerance between 1e-13 and 0.1", key="rtol", value=rtol)
     if method not in ("auto", *_METHODS):
         raise InputError('expected "auto", "explicit" or "implicit"', key="method", value=method)
-    state = np.concatenate([system.to_solver @ _state(system, "q0", q0, system.start()), system.to_solver @ _state(system, "qd0", qd0, np.zeros(system.n)), [0.0, 0.0]])
+    state = np.concatenate(
+        [
+            system.to_solver @ _state(system, "q0", q0, system.start()),
+            system.to_solver @ _state(system, "qd0", qd0, np.zeros(system.n)),
+            [0.0, 0.0],
+        ]
+    )
     state[system.n + system.joint_rows[system.chain.locked.astype(bool)]] = 0.0
     _inside_limits(system, state)
     drive = Drive.none(len(system.robot.links)) if drive is None else drive
     chosen = _choose(system, t[-1] - t[0], rtol) if method == "auto" else _METHODS[method]
     if isinstance(drive, Drive):
         if len(drive.joints) != len(system.robot.links):
-            raise InputError(f"expected {len(system.robot.links)} joint drives, one a joint", key="drive", value=len(drive.joints))
+            raise InputError(
+                f"expected {len(system.robot.links)} joint drives, one a joint", key="drive", value=len(drive.joints)
+            )
         states, work, meta = _compiled(system, t, drive, state, rtol, chosen, progress)
     else:
         states, work, meta = _python(system, t, drive, state, rtol, chosen)
@@ -64,7 +72,13 @@ def simulate(
 
 
 def _compiled(
-    system: System, t: np.ndarray, drive: Drive, state: np.ndarray, rtol: float, method: int, progress: Callable[[float], None] | None
+    system: System,
+    t: np.ndarray,
+    drive: Drive,
+    state: np.ndarray,
+    rtol: float,
+    method: int,
+    progress: Callable[[float], None] | None,
 ) -> tuple[np.ndarray, np.ndarray, dict[str, Any]]:
     c, n, links = system.chain, system.n, len(system.robot.links)
     segments, index, gains = drive.packed()
@@ -89,22 +103,34 @@ def _compiled(
                 progress((m.s[loop.T] - t[0]) / (t[-1] - t[0]))
             if status == loop.STUCK:
                 raise FlexuraError(
-                    f"the simulation got no further than t = {m.s[loop.T]:.6g} s with rtol = {rtol:g}: the deflections may have left the "
-                    "range of this model (slopes up to about 0.3 rad), or a gain or force is too large"
+                    f"the simulation got no further than t = {m.s[loop.T]:.6g} s with rtol = {rtol:g}: the deflections may have left "
+                    "the range of this model (slopes up to about 0.3 rad), or a gain or force is too large"
                 )
             if status == loop.LIMIT:
                 joint = int(m.s[loop.FAULT])
                 low, high = limits[joint]
                 unit = "rad" if system.robot.links[joint].joint.type == "R" else "m"
-                events.append({"t": float(m.s[loop.T]), "level": "ERROR", "text": f"joint {joint + 1} left its limits, {low:g} to {high:g} {unit}: stopped"})
+                events.append(
+                    {
+                        "t": float(m.s[loop.T]),
+                        "level": "ERROR",
+                        "text": f"joint {joint + 1} left its limits, {low:g} to {high:g} {unit}: stopped",
+                    }
+                )
                 break
             complete = status == loop.DONE
     except KeyboardInterrupt:
         events.append({"t": float(m.s[loop.T]), "level": "WARN", "text": "interrupted"})
     rows = int(m.s[loop.OUT])
-    counts: dict[str, Any] = {name: int(m.s[k]) for name, k in (("steps", loop.STEPS), ("rejected", loop.REJECTED), ("evaluations", loop.EVALS))}
+    counts: dict[str, Any] = {
+        name: int(m.s[k]) for name, k in (("steps", loop.STEPS), ("rejected", loop.REJECTED), ("evaluations", loop.EVALS))
+    }
     counts["wall_s"] = time.perf_counter() - begun
-    return out[:rows, : 2 * n], out[:rows, 2 * n :], counts | {"complete": complete, "events": events, "drive": [j.spec() for j in drive.joints]}
+    return (
+        out[:rows, : 2 * n],
+        out[:rows, 2 * n :],
+        counts | {"complete": complete, "events": events, "drive": [j.spec() for j in drive.joints]},
+    )
 
 
 def _python(
@@ -131,7 +157,17 @@ def _python(
     if not result.success:
         raise FlexuraError(f"the simulation ended at t = {result.t[-1] if len(result.t) else t[0]:.6g} s: {result.message}")
     z = result.y.T
-    return z[:, : 2 * n], z[:, 2 * n :], {"steps": int(result.nfev), "wall_s": time.perf_counter() - begun, "complete": True, "events": [], "drive": "Python function"}
+    return (
+        z[:, : 2 * n],
+        z[:, 2 * n :],
+        {
+            "steps": int(result.nfev),
+            "wall_s": time.perf_counter() - begun,
+            "complete": True,
+            "events": [],
+            "drive": "Python function",
+        },
+    )
 
 
 def as_function(drive: Callable[..., Any]) -> Callable[[float, np.ndarray, np.ndarray, float], np.ndarray]:
@@ -197,7 +233,9 @@ def _record(system: System, t: np.ndarray, states: np.ndarray, work: np.ndarray,
         "energy_error": float(np.abs(balance).max() / scale),
         "robot": robot.to_dict(),
     }
-    return Run(t, channels, units, about | meta, np.hstack([states[:, :n] @ system.transform.T, states[:, n:] @ system.transform.T]))
+    return Run(
+        t, channels, units, about | meta, np.hstack([states[:, :n] @ system.transform.T, states[:, n:] @ system.transform.T])
+    )
 
 
 def _applied(system: System, t: np.ndarray, states: np.ndarray, drive: Any) -> np.ndarray:
@@ -229,7 +267,9 @@ def _state(system: System, key: str, value: Any, default: np.ndarray) -> np.ndar
 def _inside_limits(system: System, state: np.ndarray) -> None:
     for i, (link, row) in enumerate(zip(system.robot.links, system.joint_rows, strict=True), 1):
         if link.joint.limits is not None and not link.joint.limits[0] <= state[row] <= link.joint.limits[1]:
-            raise InputError(f"expected a start inside the limits of joint {i}, {list(link.joint.limits)}", key="q0", value=float(state[row]))
+            raise InputError(
+                f"expected a start inside the limits of joint {i}, {list(link.joint.limits)}", key="q0", value=float(state[row])
+            )
 
 
 def _fastest(system: System) -> float:
@@ -249,7 +289,8 @@ def _spectrum(system: System) -> np.ndarray:
 
 
 def _choose(system: System, duration: float, rtol: float) -> int:
-    """The cheaper method by a count of passes: explicit steps follow the fastest mode, implicit ones the slow modes and the tolerance."""
+    """The cheaper method by a count of passes: explicit steps follow the fastest mode, implicit ones the slow modes and the
+    tolerance."""
     spectrum = _spectrum(system)
     elastic = spectrum[spectrum > 1e-3 * max(spectrum[-1], 1e-300)]
     if len(elastic) == 0:

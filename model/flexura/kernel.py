@@ -1,16 +1,16 @@
 """The equations of motion, compiled: kinematics along the chain, forward and inverse dynamics, energies.
 
 Notation of `model/README.md`. All vectors are in the axes of the link's hub frame; u = (ax, ay, alpha) is the
-acceleration of the hub frame relative to free fall (gravity enters as an acceleration of the base), t that of the place where the next
-joint is attached. A link's equations are
+acceleration of the hub frame relative to free fall (gravity enters as an acceleration of the base), t that of the place where
+the next joint is attached. A link's equations are
 
     F   = Mrr u + Mrq qdd + hr + X^T f             wrench that the joint exerts on the hub
     0   = Mqr u + Mqq qdd + hq + L q + D qd + Jq^T f   elastic rows; L = diag(omega^2), D diagonal
     t   = X u + Jq qdd + beta                      acceleration of the attachment, which carries the wrench f = A t + b
 
-Condensing the outboard chain from the tip to the base gives A and b of every attachment (an articulated-body recursion with elastic
-coordinates), and so, in `passes`, the accelerations, in time proportional to the number of links.
-No matrix larger than a link's own elastic block is ever factorised.
+Condensing the outboard chain from the tip to the base gives A and b of every attachment (an articulated-body recursion with
+elastic coordinates), and so, in `passes`, the accelerations, in time proportional to the number of links. No matrix larger than
+a link's own elastic block is ever factorised.
 
 `gh` makes the same pass an implicit stage: with y = y* + gh^2 a and v = v* + gh a the linear terms (stiffness,
 damping, gains) are taken at y, v and the others at the current iterate. gh = 0 is plain forward dynamics.
@@ -30,7 +30,8 @@ COULOMB_SPEED = 1e-3  # m/s or rad/s: Coulomb friction is f tanh(v / COULOMB_SPE
 
 
 class Chain(NamedTuple):
-    """The constants of a robot: N links, n unknowns in the global numbering [eta_1, q_1, eta_2, q_2, ...], at most m elastic ones a link."""
+    """The constants of a robot: N links, n unknowns in the global numbering [eta_1, q_1, eta_2, q_2, ...], at most m elastic
+    ones a link."""
 
     first: np.ndarray  # (N + 1,) int: row of the joint of each link; its elastic rows follow; first[N] = n
     kind: np.ndarray  # (N,) int: REVOLUTE or PRISMATIC
@@ -93,8 +94,8 @@ def workspace(c: Chain) -> Work:
     z, (N, m) = np.zeros, c.S0.shape
     return Work(
         cos=z(N), sin=z(N), omega=z(N), place=z((N, 5)), tilt=z(N), g1q=z((N, m)), mt=z((N, m)), cv=z((N, m)), hq=z((N, m)),
-        h=z((N, POINTS, m)), slope=z((SLOPES, 4)), point=z((POINTS, 5)), body=z((N, 6)), cond=z((N, 30)), joint=z((N, 5)), u=z((N, 3)),
-        S=z((N, m, m)), dinv=z((N, m)), rhs=z((N, m, 7)),
+        h=z((N, POINTS, m)), slope=z((SLOPES, 4)), point=z((POINTS, 5)), body=z((N, 6)), cond=z((N, 30)), joint=z((N, 5)),
+        u=z((N, 3)), S=z((N, m, m)), dinv=z((N, m)), rhs=z((N, m, 7)),
     )  # fmt: skip
 
 
@@ -159,9 +160,9 @@ def _bend(c: Chain, w: Work, i: int, q: np.ndarray, qd: np.ndarray, omega: float
     """Add the geometry of an inextensible line to link i's inertia terms and forces; returns u, h.v, z of its tip.
 
     The point at arc length x lies at (x + u, w) in the hub's frame, with u = int_0^x (cos - 1), sin = w', so that
-    du/dt = -h.v, h = int_0^x tan phi', and d2u/dt2 = -h.qdd - z, z = int_0^x (dw'/dt)^2 / cos^3. The curvature is w'' / cos, which
-    adds 1/2 int EI w''^2 tan^2 to the strain energy. What is of second order in (q, v) comes from the exact integrals G1, G2, H;
-    the rest (tan - sin and the like, and products of u) is summed over the link's points.
+    du/dt = -h.v, h = int_0^x tan phi', and d2u/dt2 = -h.qdd - z, z = int_0^x (dw'/dt)^2 / cos^3. The curvature is w'' / cos,
+    which adds 1/2 int EI w''^2 tan^2 to the strain energy. What is of second order in (q, v) comes from the exact integrals G1,
+    G2, H; the rest (tan - sin and the like, and products of u) is summed over the link's points.
     """
     m = q.shape[0]
     om2 = omega * omega
@@ -265,7 +266,8 @@ def _rigid_hub(c: Chain, w: Work, i: int, A: tuple, b: tuple) -> tuple:
 def _elastic(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh: float, columns: int) -> None:
     """Factorise S = Mqq + gh D + gh^2 L = l d l^T of a flexible link and form l^-1 (Mqr, cq, Jq^T) in the rows of w.rhs.
 
-    Mqq = 1 + sum mu h h^T over the link's points, and the payload's turning. Columns: Mrq (x, y, angle), cq, Jq (x, y, angle); the last three if columns = 7.
+    Mqq = 1 + sum mu h h^T over the link's points, and the payload's turning. Columns: Mrq (x, y, angle), cq, Jq (x, y, angle);
+    the last three if columns = 7.
     """
     e, end = c.first[i], c.first[i + 1]
     m = end - e - 1
@@ -549,7 +551,15 @@ def inverse(c: Chain, w: Work, y: np.ndarray, v: np.ndarray, a: np.ndarray, grav
         u0, u1, u2 = w.u[i, 0], w.u[i, 1], w.u[i, 2]
         F0 = c.mass[i] * u0 - w.body[i, 0] * u2 + w.body[i, 3] + f0
         F1 = c.mass[i] * u1 + w.body[i, 1] * u2 + w.body[i, 4] + f1
-        F2 = -w.body[i, 0] * u0 + w.body[i, 1] * u1 + w.body[i, 2] * u2 + w.body[i, 5] - w.place[i, 1] * f0 + w.place[i, 0] * f1 + f2
+        F2 = (
+            -w.body[i, 0] * u0
+            + w.body[i, 1] * u1
+            + w.body[i, 2] * u2
+            + w.body[i, 5]
+            - w.place[i, 1] * f0
+            + w.place[i, 0] * f1
+            + f2
+        )
         for k in range(end - e - 1):
             F0 -= w.g1q[i, k] * a[e + 1 + k]
             F1 += c.S0[i, k] * a[e + 1 + k]

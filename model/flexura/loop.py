@@ -1,10 +1,10 @@
 """The time loop, compiled: an explicit and an implicit method with a tolerance, one memory for both, no allocation inside.
 
-Explicit: DOP853 (Dormand and Prince 8(5,3), dense output of order 7; coefficients from SciPy). Implicit: ESDIRK4(3)6L[2]SA of Kennedy and
-Carpenter (2003, Appl. Numer. Math. 44), L-stable; each stage is solved by passes of `kernel.accelerate`, which holds stiffness, damping and
-gains implicitly, so that a pass costs what an explicit evaluation costs and steps follow the motion, not the stiffest mode.
-The local error of joint i is kept below rtol times the largest |eta_i| so far, that of a link's elastic unknowns below rtol times their
-largest norm so far, and so for the velocities; FLOOR replaces these at the start.
+Explicit: DOP853 (Dormand and Prince 8(5,3), dense output of order 7; coefficients from SciPy). Implicit: ESDIRK4(3)6L[2]SA of
+Kennedy and Carpenter (2003, Appl. Numer. Math. 44), L-stable; each stage is solved by passes of `kernel.accelerate`, which
+holds stiffness, damping and gains implicitly, so that a pass costs what an explicit evaluation costs and steps follow the
+motion, not the stiffest mode. The local error of joint i is kept below rtol times the largest |eta_i| so far, that of a link's
+elastic unknowns below rtol times their largest norm so far, and so for the velocities; FLOOR replaces these at the start.
 """
 
 from __future__ import annotations
@@ -38,14 +38,16 @@ _EA = np.array([
     [82889 / 524892, 0, 15625 / 83664, 69875 / 102672, -2260 / 8211, 1 / 4],
 ])  # fmt: skip
 _EC = np.array([0, 1 / 2, 83 / 250, 31 / 50, 17 / 20, 1])
-_EE = _EA[5] - np.array([4586570599 / 29645900160, 0, 178811875 / 945068544, 814220225 / 1159782912, -3700637 / 11593932, 61727 / 225920])
+_EE = _EA[5] - np.array(
+    [4586570599 / 29645900160, 0, 178811875 / 945068544, 814220225 / 1159782912, -3700637 / 11593932, 61727 / 225920]
+)
 
 
 class Inputs(NamedTuple):
-    """What acts on a robot: packed signals (k, 10), their index (N, 4), gains and limits (N,), instants to step on."""
+    """What acts on a robot: packed signals (k, 10), their ranges (N, 4), gains and limits (N,), instants to step on."""
 
     segments: np.ndarray
-    index: np.ndarray
+    ranges: np.ndarray
     kp: np.ndarray
     kd: np.ndarray
     low: np.ndarray
@@ -73,8 +75,8 @@ class Memory(NamedTuple):
 def memory(links: int, unknowns: int) -> Memory:
     z, size = np.zeros, 2 * unknowns + 2
     return Memory(
-        z(11), z(size), z(size), z((16, size)), z((7, size)), z((links, 4)), z(2 * unknowns), z(links), z(unknowns), z(unknowns), z(unknowns),
-        z(links),
+        z(11), z(size), z(size), z((16, size)), z((7, size)), z((links, 4)), z(2 * unknowns), z(links),
+        z(unknowns), z(unknowns), z(unknowns), z(links),
     )  # fmt: skip
 
 
@@ -102,7 +104,7 @@ def _combine(m: Memory, h: float, weights: np.ndarray, count: int, out: np.ndarr
 def drive(c: Chain, d: Inputs, t: float, y: np.ndarray, v: np.ndarray, force: np.ndarray) -> None:
     """Joint forces (N,) of the drives at time t."""
     for i in range(force.shape[0]):
-        f0, f1, r0, r1 = d.index[i]
+        f0, f1, r0, r1 = d.ranges[i]
         total = 0.0
         if f1 > f0:
             total = evaluate(d.segments[f0:f1], t)[0]
@@ -259,7 +261,8 @@ def _implicit_step(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, 
 
 @inlined
 def _interpolate(m: Memory, method: int, h: float, x: float, out: np.ndarray) -> None:
-    """The state at t + x h inside the step just made: order 7 (explicit), or quintic Hermite from positions to accelerations (implicit)."""
+    """The state at t + x h inside the step just made: order 7 (explicit), or quintic Hermite from positions to accelerations
+    (implicit)."""
     z, new = m.z, m.znew
     size = z.shape[0]
     if method == EXPLICIT:
@@ -284,9 +287,11 @@ def _interpolate(m: Memory, method: int, h: float, x: float, out: np.ndarray) ->
 
 
 @compiled
-def advance(c: Chain, w: Work, d: Inputs, m: Memory, method: int, rtol: float, t_eval: np.ndarray, out: np.ndarray, max_steps: int) -> None:
+def advance(
+    c: Chain, w: Work, d: Inputs, m: Memory, method: int, rtol: float, t_eval: np.ndarray, out: np.ndarray, max_steps: int
+) -> None:
     """Go on with the run held in `m` for at most `max_steps` steps, filling rows of `out` (T, 2n + 2) as their times pass."""
-    s, n = m.s, m.a.shape[0]
+    s = m.s
     order = 8.0 if method == EXPLICIT else 4.0
     end = t_eval[-1]
     for _ in range(max_steps):

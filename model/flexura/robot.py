@@ -7,6 +7,7 @@ the file, the key, the value and what was expected. Equations that use these num
 from __future__ import annotations
 
 import os
+from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -31,7 +32,9 @@ class Section(_Table):
     """A rectangular cross-section; `height_m` lies in the plane of bending."""
 
     width_m: float = Field(gt=0, le=10, description="the section's width in metres, above 0 and at most 10")
-    height_m: float = Field(gt=0, le=10, description="the section's height in the plane of bending in metres, above 0 and at most 10")
+    height_m: float = Field(
+        gt=0, le=10, description="the section's height in the plane of bending in metres, above 0 and at most 10"
+    )
 
 
 class SectionAt(Section):
@@ -57,7 +60,9 @@ class Joint(_Table):
     angle_rad: float = Field(0.0, ge=-7, le=7, description="the fixed angle gamma of a Pa or Pb in radians, between -7 and 7")
     hub_mass_kg: float = Field(0.0, ge=0, description="the hub's mass in kilograms, 0 or more")
     hub_inertia_kg_m2: float = Field(0.0, ge=0, description="the hub's inertia in kg m^2, 0 or more")
-    rotor_inertia: float = Field(0.0, ge=0, description="the rotor's inertia reflected to the joint, kg (Pa, Pb) or kg m^2 (R), 0 or more")
+    rotor_inertia: float = Field(
+        0.0, ge=0, description="the rotor's inertia reflected to the joint, kg (Pa, Pb) or kg m^2 (R), 0 or more"
+    )
     viscous_friction: float = Field(0.0, ge=0, description="viscous friction in N s/m or N m s/rad, 0 or more")
     coulomb_friction: float = Field(0.0, ge=0, description="Coulomb friction in N or N m, 0 or more")
     limits: tuple[float, float] | None = Field(
@@ -88,21 +93,29 @@ _LINK_TEXT = {
 class Link(_Table):
     """One link with the joint at its proximal side; rigid when `elements` is 0."""
 
-    name: str = Field("", max_length=200, description="the link's name, a text")
-    length_m: float = Field(ge=0, le=1000, description="the link's length in metres, above 0 and at most 1000 (0 is allowed for a rigid link)")
-    elements: int = Field(0, ge=0, le=MAX_ELEMENTS, description=f"the number of beam elements, a whole number from 0 (rigid) to {MAX_ELEMENTS}")
+    name: str = Field("", max_length=200, description="the link's name, a text of at most 200 characters")
+    length_m: float = Field(
+        ge=0, le=1000, description="the link's length in metres, above 0 and at most 1000 (0 is allowed for a rigid link)"
+    )
+    elements: int = Field(
+        0, ge=0, le=MAX_ELEMENTS, description=f"the number of beam elements, a whole number from 0 (rigid) to {MAX_ELEMENTS}"
+    )
     modes: int | None = Field(None, ge=1, description="how many of the link's own modes to keep, a whole number of 1 or more")
     section: Section | list[SectionAt] | None = Field(None, description=_LINK_TEXT["section"])
     young_modulus_Pa: float | None = Field(
         None, ge=1e5, le=2e12, description="Young's modulus in pascals, between 1e5 and 2e12 (steel: 2.0e11, not 200)"
     )
-    density_kg_m3: float | None = Field(None, ge=10, le=25000, description="the density in kg/m^3, between 10 and 25000 (steel: 7850)")
+    density_kg_m3: float | None = Field(
+        None, ge=10, le=25000, description="the density in kg/m^3, between 10 and 25000 (steel: 7850)"
+    )
     mass_per_length_kg_m: Positive | list[ValueAt] | None = Field(None, description=_LINK_TEXT["mass_per_length_kg_m"])
     bending_stiffness_N_m2: Positive | list[ValueAt] | None = Field(None, description=_LINK_TEXT["bending_stiffness_N_m2"])
     mass_kg: float | None = Field(None, ge=0, description="a rigid link's mass in kilograms, 0 or more")
     centre_of_mass_m: float | None = Field(None, description="a rigid link's centre of mass from its origin in metres")
-    inertia_kg_m2: float | None = Field(None, ge=0, description="a rigid link's inertia about its centre of mass in kg m^2, 0 or more")
-    damping: Damping = Field(default_factory=Damping, description="a table { alpha_1_s, beta_s }")
+    inertia_kg_m2: float | None = Field(
+        None, ge=0, description="a rigid link's inertia about its centre of mass in kg m^2, 0 or more"
+    )
+    damping: Damping = Field(default_factory=lambda: Damping(), description="a table { alpha_1_s, beta_s }")
     joint: Joint = Field(description='a table [link.joint] with at least type = "R", "Pa" or "Pb"')
 
     @property
@@ -116,7 +129,7 @@ class Link(_Table):
             at = [entry.at_m for entry in value]
             if len(at) < 2:
                 raise WrongValue(info.field_name, at, "a list of at least two entries with at_m")
-            if any(b <= a for a, b in zip(at, at[1:], strict=False)):
+            if any(b <= a for a, b in pairwise(at)):
                 raise WrongValue(info.field_name, at, "entries in ascending order of at_m")
         return value
 
@@ -133,7 +146,11 @@ class Link(_Table):
         if self.section is not None and self.length_m > 0:
             for s in self.section if isinstance(self.section, list) else [self.section]:
                 if s.height_m >= self.length_m:
-                    raise WrongValue("section.height_m", s.height_m, f"a height below the link's length, {self.length_m:g} (metres, not millimetres?)")
+                    raise WrongValue(
+                        "section.height_m",
+                        s.height_m,
+                        f"a height below the link's length, {self.length_m:g} (metres, not millimetres?)",
+                    )
         return self
 
     def _check_flexible(self) -> None:
@@ -141,14 +158,29 @@ class Link(_Table):
             raise WrongValue("length_m", self.length_m, "a length above 0 for a flexible link (elements > 0)")
         for key in ("mass_kg", "centre_of_mass_m", "inertia_kg_m2"):
             if getattr(self, key) is not None:
-                raise WrongValue(key, getattr(self, key), "absent for a flexible link: its mass comes from the section or mass_per_length_kg_m")
+                raise WrongValue(
+                    key, getattr(self, key), "absent for a flexible link: its mass comes from the section or mass_per_length_kg_m"
+                )
         by_section = (self.section, self.young_modulus_Pa, self.density_kg_m3)
         by_number = (self.mass_per_length_kg_m, self.bending_stiffness_N_m2)
         if all(v is None for v in by_section + by_number):
-            raise WrongValue("section", None, "missing: a flexible link needs section, young_modulus_Pa and density_kg_m3, or mass_per_length_kg_m and bending_stiffness_N_m2")
+            raise WrongValue(
+                "section",
+                None,
+                "missing: a flexible link needs section, young_modulus_Pa, density_kg_m3, or mass_per_length_kg_m, bending_stiffness_N_m2",
+            )
         if any(v is not None for v in by_section) and any(v is not None for v in by_number):
-            raise WrongValue("mass_per_length_kg_m", None, "either section, young_modulus_Pa and density_kg_m3, or mass_per_length_kg_m and bending_stiffness_N_m2, not some of each")
-        names = ("section", "young_modulus_Pa", "density_kg_m3") if self.section_given else ("mass_per_length_kg_m", "bending_stiffness_N_m2")
+            key = "mass_per_length_kg_m" if self.mass_per_length_kg_m is not None else "bending_stiffness_N_m2"
+            raise WrongValue(
+                key,
+                getattr(self, key),
+                "either section, young_modulus_Pa, density_kg_m3, or mass_per_length_kg_m, bending_stiffness_N_m2, not some of each",
+            )
+        names = (
+            ("section", "young_modulus_Pa", "density_kg_m3")
+            if self.section_given
+            else ("mass_per_length_kg_m", "bending_stiffness_N_m2")
+        )
         for key in names:
             if getattr(self, key) is None:
                 raise WrongValue(key, None, f"missing: {type(self).model_fields[key].description}")
@@ -222,14 +254,14 @@ class Payload(_Table):
 class Robot(_Table):
     """A serial planar chain of rigid and flexible links with joints R, Pa and Pb. Frozen; SI units."""
 
-    name: str = Field("", max_length=200, description="the robot's name, a text")
+    name: str = Field("", max_length=200, description="the robot's name, a text of at most 200 characters")
     gravity_m_s2: tuple[float, float] = Field(
         (0.0, 0.0), strict=False, description="gravity in the base frame, two numbers [x, y] in m/s^2, y up"
     )
     stiffening: bool = Field(True, description="true, or false for the dissertation's linear model")
     sliding: Literal["continuous", "nodal"] = Field("continuous", description='"continuous" or "nodal"')
     link: list[Link] = Field(min_length=1, max_length=MAX_LINKS, description=f"1 to {MAX_LINKS} tables [[link]]")
-    payload: Payload = Field(default_factory=Payload, description="a table { mass_kg, inertia_kg_m2 }")
+    payload: Payload = Field(default_factory=lambda: Payload(), description="a table { mass_kg, inertia_kg_m2 }")
 
     @property
     def links(self) -> list[Link]:
@@ -260,18 +292,25 @@ class Robot(_Table):
         return self.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
 
     def replace(self, changes: dict[str, Any]) -> Robot:
-        """A robot with some values changed: `robot.replace({"payload.mass_kg": 0.1, "link.2.length_m": 0.4})`, links counted from 1."""
+        """A robot with some values changed: `robot.replace({"payload.mass_kg": 0.1, "link.2.length_m": 0.4})`, links counted
+        from 1."""
         data = self.to_dict()
         for path, value in changes.items():
             *parents, last = path.split(".")
             table: Any = data
             for part in parents:
-                try:
-                    table = table[int(part) - 1] if isinstance(table, list) else table.setdefault(part, {})
-                except (IndexError, ValueError):
-                    raise InputError("the number of a link of this robot, counted from 1", key=path, value=value) from None
-            table[last] = value
+                table = table[_number(table, part, path, value)] if isinstance(table, list) else table.setdefault(part, {})
+                if not isinstance(table, dict | list):
+                    raise InputError(f"expected a place in a robot file; {part} isn't a table", key=path, value=value)
+            table[_number(table, last, path, value) if isinstance(table, list) else last] = value
         return Robot.from_dict(data)
+
+
+def _number(table: list[Any], part: str, path: str, value: Any) -> int:
+    """The index of an entry of a list, from its number as people count."""
+    if not (part.isascii() and part.isdigit() and 1 <= int(part[:9]) <= len(table)):
+        raise InputError(f"expected a number from 1 to {len(table)}, not {part!r}", key=path, value=value)
+    return int(part) - 1
 
 
 def _spread(value: Any, x: np.ndarray) -> np.ndarray:

@@ -29,7 +29,19 @@ from .files import write_bytes
 FILE = "run.parquet"
 STATIONS = 9  # places along a flexible link at which a Run holds the deflection
 
-_SUFFIX = {"s": "s", "m": "m", "rad": "rad", "m/s": "m_s", "rad/s": "rad_s", "N": "N", "N m": "N_m", "J": "J", "V": "V", "A": "A", "1": "1"}
+_SUFFIX = {
+    "s": "s",
+    "m": "m",
+    "rad": "rad",
+    "m/s": "m_s",
+    "rad/s": "rad_s",
+    "N": "N",
+    "N m": "N_m",
+    "J": "J",
+    "V": "V",
+    "A": "A",
+    "1": "1",
+}
 
 
 @dataclass(frozen=True)
@@ -86,7 +98,9 @@ class Run:
         fields = [pa.field(name, pa.float64(), metadata={"unit": units[name]}) for name in columns]
         schema = pa.schema(fields, metadata={"flexura": json.dumps(self.meta)})
         sink = pa.BufferOutputStream()
-        pq.write_table(pa.table([pa.array(np.asarray(v, dtype=float)) for v in columns.values()], schema=schema), sink, compression="zstd")
+        pq.write_table(
+            pa.table([pa.array(np.asarray(v, dtype=float)) for v in columns.values()], schema=schema), sink, compression="zstd"
+        )
         path = Path(folder) / FILE
         write_bytes(path, sink.getvalue().to_pybytes())
         return path

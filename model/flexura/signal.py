@@ -71,6 +71,8 @@ def _row(t0: float, *c: float, A: float = 0.0, w: float = 0.0, phi: float = 0.0)
 
 def _signal(rows: list[list[float]], **spec: Any) -> Signal:
     segments = np.array(rows, dtype=float).reshape(-1, COLUMNS)
+    if not np.isfinite(segments).all():
+        raise InputError("expected numbers whose derivatives are finite", key="kind", value=spec["kind"])
     segments.setflags(write=False)
     return Signal(segments, spec)
 
@@ -135,7 +137,9 @@ def table(t_s: Any, y: Any) -> Signal:
 
     times, values = np.asarray(t_s, dtype=float), np.asarray(y, dtype=float)
     if times.ndim != 1 or times.shape != values.shape or len(times) < 2 or not np.all(np.diff(times) > 0):
-        raise InputError("expected at least two ascending times and as many values", key="table", value=f"{times.shape} and {values.shape}")
+        raise InputError(
+            "expected at least two ascending times and as many values", key="table", value=f"{times.shape} and {values.shape}"
+        )
     coefficients = CubicSpline(times, values, bc_type="natural").c  # (4, k - 1), highest power first
     rows = [_row(times[k], *coefficients[::-1, k]) for k in range(len(times) - 1)] + [_row(times[-1], values[-1])]
     return _signal(rows, kind="table", t_s=times.tolist(), y=values.tolist())
@@ -145,7 +149,9 @@ def piecewise(at_s: Any, value: Any) -> Signal:
     """Constant from each instant of `at_s` (k,) to the next, with the values (k,): the dissertation's bang-bang torques."""
     times, values = np.asarray(at_s, dtype=float), np.asarray(value, dtype=float)
     if times.ndim != 1 or times.shape != values.shape or len(times) < 1 or not np.all(np.diff(times) > 0):
-        raise InputError("expected ascending times and as many values", key="piecewise", value=f"{times.shape} and {values.shape}")
+        raise InputError(
+            "expected ascending times and as many values", key="piecewise", value=f"{times.shape} and {values.shape}"
+        )
     rows = [_row(t, v) for t, v in zip(times, values, strict=True)]
     return _signal(rows, kind="piecewise", at_s=times.tolist(), value=values.tolist())
 

@@ -17,9 +17,9 @@ def static(
 ) -> np.ndarray:
     """q (n,) with the joints at `joints` (N,) [m or rad] (default: their start) and K q + gravity(q) = J_tip^T (force, moment).
 
-    `tip_force` [N] keeps its direction in the base frame, `tip_moment` [N m]; both act on the last link's tip. A single link under a
-    transverse force P bends by P L^3 / (3 EI), the small-deflection value. Raises FlexuraError where no equilibrium is found
-    (buckling under a load along the link, or deflections beyond the model).
+    `tip_force` [N] keeps its direction in the base frame, `tip_moment` [N m]; both act on the last link's tip. A single link
+    under a transverse force P bends by P L^3 / (3 EI), the small-deflection value. Raises FlexuraError where no equilibrium is
+    found (buckling under a load along the link, or deflections beyond the model).
     """
     q = system.start()
     if joints is not None:

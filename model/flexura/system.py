@@ -22,9 +22,10 @@ from .run import STATIONS
 class System:
     """A robot's equations M(q) qdd + bias(q, qd) + damping qd + stiffness q + gravity(q) = F.
 
-    q (n,) is numbered [eta_1, u_1, eta_2, u_2, ...]: each joint, then the elastic unknowns of its link: deflection [m] and slope [rad] of
-    nodes 1 ... n_i, or, for a link with `modes`, mass-normalised modal coordinates [kg^(1/2) m]. `labels` says which is which. F has entries
-    in the joints' rows. The solver works in modal coordinates y throughout, q = transform @ y (exact for a full mesh).
+    q (n,) is numbered [eta_1, u_1, eta_2, u_2, ...]: each joint, then the elastic unknowns of its link: deflection [m] and
+    slope [rad] of nodes 1 ... n_i, or, for a link with `modes`, mass-normalised modal coordinates [kg^(1/2) m]. `labels` says
+    which is which. F has entries in the joints' rows. The solver works in modal coordinates y throughout, q = transform @ y
+    (exact for a full mesh).
     """
 
     robot: Robot
@@ -91,7 +92,8 @@ class System:
         return self._inverse(q, qd, np.zeros(self.n), np.zeros(2))
 
     def forces(self, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
-        """Generalised forces (n,) that the motion needs: the whole left-hand side (Coulomb friction left out), by Newton-Euler."""
+        """Generalised forces (n,) that the motion needs: the whole left-hand side (Coulomb friction left out), by
+        Newton-Euler."""
         return self._inverse(q, qd, qdd, self.chain.gravity) + self.damping @ np.asarray(qd) + self.stiffness() @ np.asarray(q)
 
     def _inverse(self, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, gravity: np.ndarray) -> np.ndarray:
@@ -128,9 +130,13 @@ def assemble(robot: Robot) -> System:
     for i, link in enumerate(links):
         before = links[i - 1] if i else None
         if link.joint.type == "Pb":
-            raise FlexuraError(f"link {i + 1}: a joint Pb (a link through a sleeve) is not in this version; R, and Pa on the base or a rigid link, are")
+            raise FlexuraError(
+                f"link {i + 1}: a joint Pb is not in this version; R, and Pa on the base or a rigid link, are"
+            )
         if link.joint.type == "Pa" and before is not None and before.flexible:
-            raise FlexuraError(f"link {i + 1}: a joint Pa on a flexible link is not in this version; R, and Pa on the base or a rigid link, are")
+            raise FlexuraError(
+                f"link {i + 1}: a joint Pa on a flexible link is not in this version; R, and Pa on the base or a rigid link, are"
+            )
     first, infos, spectra, transforms, back, labels = [0], [], [], [], [], []
     for i, link in enumerate(links, 1):
         last = i == len(links)
@@ -150,8 +156,8 @@ def assemble(robot: Robot) -> System:
         first.append(first[-1] + 1 + m)
         spectra.append(lam)
         infos.append(info)
-    column = lambda f, kind=float: np.array([f(link) for link in links], dtype=kind)  # noqa: E731
-    of = lambda f: np.array([f(info) for info in infos], dtype=float)  # noqa: E731
+    column = lambda f, kind=float: np.array([f(link) for link in links], dtype=kind)
+    of = lambda f: np.array([f(info) for info in infos], dtype=float)
     chain = Chain(
         first=np.array(first, dtype=np.int64),
         kind=column(lambda k: REVOLUTE if k.joint.type == "R" else PRISMATIC, np.int64),
@@ -166,7 +172,9 @@ def assemble(robot: Robot) -> System:
         inertia=of(lambda k: k.inertia),
         **{name: _stack([getattr(info, name) for info in infos]) for name in _PER_LINK},
         lam=_stack(spectra),
-        damp=_stack([np.where(lam > 0, k.damping.alpha_1_s + k.damping.beta_s * lam, 0.0) for k, lam in zip(links, spectra, strict=True)]),
+        damp=_stack(
+            [np.where(lam > 0, k.damping.alpha_1_s + k.damping.beta_s * lam, 0.0) for k, lam in zip(links, spectra, strict=True)]
+        ),
         tip_inertia=np.array([robot.payload.inertia_kg_m2 * (i == len(links) - 1) for i in range(len(links))]),
         stiffening=robot.stiffening,
         gravity=np.array(robot.gravity_m_s2, dtype=float),
@@ -199,7 +207,9 @@ def _check_mass(system: System) -> None:
     scale = 1 / np.sqrt(np.maximum(np.diag(M)[free], 1e-300))
     smallest = np.linalg.eigvalsh(M[np.ix_(free, free)] * scale * scale[:, None])[0]
     if np.any(np.diag(M)[free] <= 0) or smallest < 1e-13:
-        joint = next((i + 1 for i, row in enumerate(system.joint_rows) if row in free and M[row, row] <= 1e-300), len(system.joint_rows))
+        joint = next(
+            (i + 1 for i, row in enumerate(system.joint_rows) if row in free and M[row, row] <= 1e-300), len(system.joint_rows)
+        )
         raise InputError(
             "nothing to accelerate: expected a mass or inertia (link, hub, rotor or payload) that this joint moves",
             key=f"link[{joint}].joint",

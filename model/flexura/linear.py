@@ -14,10 +14,10 @@ from .system import System, jacobian
 def frequencies(system: System, q: Any = None, joints: str = "locked", *, qd: Any = None) -> np.ndarray:
     """Natural frequencies [Hz], ascending, of the undamped robot linearised about q (n,).
 
-    By default q is the static equilibrium at the start. `joints`: "locked" (only the elastic unknowns move) or "free" (rigid modes come out
-    as 0). `qd` (n,): joint rates of a steady motion about which to linearise, for example a rotation at constant speed, joints locked to it:
-    centrifugal stiffening is then in the result, d(forces)/dq and d(forces)/dqd at (q, qd). Frequencies of unstable directions
-    come out as 0.
+    By default q is the static equilibrium at the start. `joints`: "locked" (only the elastic unknowns move) or "free" (rigid
+    modes come out as 0). `qd` (n,): joint rates of a steady motion about which to linearise, for example a rotation at constant
+    speed, joints locked to it: centrifugal stiffening is then in the result, d(forces)/dq and d(forces)/dqd at (q, qd).
+    Frequencies of unstable directions come out as 0.
     """
     if joints not in ("locked", "free"):
         raise InputError('expected "locked" or "free"', key="joints", value=joints)
