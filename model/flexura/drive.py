@@ -176,7 +176,6 @@ def _number(
     value = data.get(name, default)
     if value is None:
         raise InputError(f"missing: expected {expected}", key=key + name)
-    good = isinstance(value, int | float) and not isinstance(value, bool) and np.isfinite(value)
-    if not good or not (value >= low if closed else value > low):
+    if not signal.finite(value) or not (value >= low if closed else value > low):
         raise InputError(f"expected {expected}", key=key + name, value=value)
     return float(value)

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .kernel import PRISMATIC, REVOLUTE, Chain, Work, outward
+from .chain import PRISMATIC, REVOLUTE, Chain, Work
+from .outward import outward
 
 
 def mass_matrix(c: Chain, w: Work, y: np.ndarray) -> np.ndarray:

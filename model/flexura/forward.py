@@ -103,8 +103,8 @@ def _compiled(
                 progress((m.s[loop.T] - t[0]) / (t[-1] - t[0]))
             if status == loop.STUCK:
                 raise FlexuraError(
-                    f"the simulation got no further than t = {m.s[loop.T]:.6g} s with rtol = {rtol:g}: the deflections may have left "
-                    "the range of this model (slopes up to about 0.3 rad), or a gain or force is too large"
+                    f"the simulation got no further than t = {m.s[loop.T]:.6g} s with rtol = {rtol:g}: a link is bent "
+                    "to a right angle, or a gain or force is too large"
                 )
             if status == loop.LIMIT:
                 joint = int(m.s[loop.FAULT])

@@ -14,8 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import DOP853
 
+from .chain import COULOMB_SPEED, Chain, Work
 from .compiled import compiled, inlined
-from .kernel import COULOMB_SPEED, Chain, Work, passes
+from .kernel import passes
 from .signal import evaluate
 
 EXPLICIT, IMPLICIT = 0, 1

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from .beam import POINTS, SLOPES
+from .chain import PRISMATIC, REVOLUTE, Chain, Work
 from .compiled import compiled
-from .kernel import PRISMATIC, REVOLUTE, Chain, Work, outward
+from .outward import outward
 
 POSE = 3  # x, y, angle of a hub frame
 

@@ -115,7 +115,7 @@ class Link(_Table):
     inertia_kg_m2: float | None = Field(
         None, ge=0, description="a rigid link's inertia about its centre of mass in kg m^2, 0 or more"
     )
-    damping: Damping = Field(default_factory=lambda: Damping(), description="a table { alpha_1_s, beta_s }")
+    damping: Damping = Field(default_factory=Damping, description="a table { alpha_1_s, beta_s }")
     joint: Joint = Field(description='a table [link.joint] with at least type = "R", "Pa" or "Pb"')
 
     @property
@@ -167,14 +167,16 @@ class Link(_Table):
             raise WrongValue(
                 "section",
                 None,
-                "missing: a flexible link needs section, young_modulus_Pa, density_kg_m3, or mass_per_length_kg_m, bending_stiffness_N_m2",
+                "missing: a flexible link needs section, young_modulus_Pa, density_kg_m3, "
+                "or mass_per_length_kg_m, bending_stiffness_N_m2",
             )
         if any(v is not None for v in by_section) and any(v is not None for v in by_number):
             key = "mass_per_length_kg_m" if self.mass_per_length_kg_m is not None else "bending_stiffness_N_m2"
             raise WrongValue(
                 key,
                 getattr(self, key),
-                "either section, young_modulus_Pa, density_kg_m3, or mass_per_length_kg_m, bending_stiffness_N_m2, not some of each",
+                "either section, young_modulus_Pa, density_kg_m3, or mass_per_length_kg_m, bending_stiffness_N_m2, "
+                "not some of each",
             )
         names = (
             ("section", "young_modulus_Pa", "density_kg_m3")
@@ -261,7 +263,7 @@ class Robot(_Table):
     stiffening: bool = Field(True, description="true, or false for the dissertation's linear model")
     sliding: Literal["continuous", "nodal"] = Field("continuous", description='"continuous" or "nodal"')
     link: list[Link] = Field(min_length=1, max_length=MAX_LINKS, description=f"1 to {MAX_LINKS} tables [[link]]")
-    payload: Payload = Field(default_factory=lambda: Payload(), description="a table { mass_kg, inertia_kg_m2 }")
+    payload: Payload = Field(default_factory=Payload, description="a table { mass_kg, inertia_kg_m2 }")
 
     @property
     def links(self) -> list[Link]:

@@ -16,6 +16,7 @@ Archived as Parquet: one column a channel, named channel_unit (`joint/1/position
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -68,6 +69,13 @@ class Run:
                 raise ValueError(f"channel {name} has shape {np.shape(values)}, the times have {np.shape(self.t)}")
             if self.units[name] not in _SUFFIX:
                 raise ValueError(f"channel {name} has the unit {self.units[name]!r}; known: {', '.join(_SUFFIX)}")
+        columns = ["time_s", *map(self._column, self.channels)]
+        twice = sorted(column for column, count in Counter(columns).items() if count > 1)
+        if twice:
+            raise ValueError(f"two channels would share a column: {', '.join(twice)}")
+
+    def _column(self, channel: str) -> str:
+        return f"{channel}_{_SUFFIX[self.units[channel]]}"
 
     def __getitem__(self, channel: str) -> np.ndarray:
         try:
@@ -93,8 +101,8 @@ class Run:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        columns = {"time_s": self.t} | {f"{name}_{_SUFFIX[self.units[name]]}": values for name, values in self.channels.items()}
-        units = {"time_s": "s"} | {f"{name}_{_SUFFIX[unit]}": unit for name, unit in self.units.items()}
+        columns = {"time_s": self.t} | {self._column(name): values for name, values in self.channels.items()}
+        units = {"time_s": "s"} | {self._column(name): unit for name, unit in self.units.items()}
         fields = [pa.field(name, pa.float64(), metadata={"unit": units[name]}) for name in columns]
         schema = pa.schema(fields, metadata={"flexura": json.dumps(self.meta)})
         sink = pa.BufferOutputStream()
@@ -116,16 +124,28 @@ class Run:
         if not path.is_file():
             raise InputError(f"no run here: expected a folder with {FILE}", file=str(folder))
         try:
-            table = pq.read_table(path)
-        except (pa.ArrowException, OSError) as error:
-            raise InputError(f"not a Parquet file ({str(error).splitlines()[0]})", file=str(path)) from None
+            table = pq.read_table(path, partitioning=None)  # a folder named a=b is just a folder
+        except (pa.ArrowException, OSError, ValueError) as error:
+            raise InputError(f"not a Parquet file ({(str(error) or 'damaged').splitlines()[0]})", file=str(path)) from None
+        try:
+            return Run._from_table(table, str(path))
+        except (pa.ArrowException, KeyError, ValueError) as error:  # ValueError: of Run, json and decode too
+            raise InputError(f"a damaged run ({(str(error) or 'unreadable').splitlines()[0]})", file=str(path)) from None
+
+    @staticmethod
+    def _from_table(table: Any, file: str) -> Run:
         stored = (table.schema.metadata or {}).get(b"flexura")
         if stored is None or "time_s" not in table.column_names:
-            raise InputError("a Parquet file, but not a run of flexura: expected a column time_s and metadata", file=str(path))
-        channels, units = {}, {}
+            raise InputError("a Parquet file, but not a run of flexura: expected a column time_s and metadata", file=file)
+        meta, channels, units = json.loads(stored), {}, {}
+        if not isinstance(meta, dict):
+            raise ValueError("its metadata is not a table")
         for column in table.schema:
-            if column.name != "time_s":
+            values = table.column(column.name).cast("float64").to_numpy()
+            if column.name == "time_s":
+                t = values
+            else:
                 unit = (column.metadata or {}).get(b"unit", b"1").decode()
                 name = column.name.removesuffix(f"_{_SUFFIX.get(unit, '')}")
-                channels[name], units[name] = table.column(column.name).to_numpy(), unit
-        return Run(table.column("time_s").to_numpy(), channels, units, json.loads(stored))
+                channels[name], units[name] = values, unit
+        return Run(t, channels, units, meta)

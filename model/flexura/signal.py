@@ -10,6 +10,7 @@ evaluates without calling back into Python. Before the first segment y keeps its
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -137,9 +138,7 @@ def table(t_s: Any, y: Any) -> Signal:
 
     times, values = np.asarray(t_s, dtype=float), np.asarray(y, dtype=float)
     if times.ndim != 1 or times.shape != values.shape or len(times) < 2 or not np.all(np.diff(times) > 0):
-        raise InputError(
-            "expected at least two ascending times and as many values", key="table", value=f"{times.shape} and {values.shape}"
-        )
+        raise InputError("expected at least two ascending times and as many values y", key="t_s", value=times.tolist())
     coefficients = CubicSpline(times, values, bc_type="natural").c  # (4, k - 1), highest power first
     rows = [_row(times[k], *coefficients[::-1, k]) for k in range(len(times) - 1)] + [_row(times[-1], values[-1])]
     return _signal(rows, kind="table", t_s=times.tolist(), y=values.tolist())
@@ -149,38 +148,57 @@ def piecewise(at_s: Any, value: Any) -> Signal:
     """Constant from each instant of `at_s` (k,) to the next, with the values (k,): the dissertation's bang-bang torques."""
     times, values = np.asarray(at_s, dtype=float), np.asarray(value, dtype=float)
     if times.ndim != 1 or times.shape != values.shape or len(times) < 1 or not np.all(np.diff(times) > 0):
-        raise InputError(
-            "expected ascending times and as many values", key="piecewise", value=f"{times.shape} and {values.shape}"
-        )
+        raise InputError("expected ascending times, at least one, and as many values", key="at_s", value=times.tolist())
     rows = [_row(t, v) for t, v in zip(times, values, strict=True)]
     return _signal(rows, kind="piecewise", at_s=times.tolist(), value=values.tolist())
 
 
 KINDS = {f.__name__: f for f in (constant, step, harmonic, cycloid, polynomial, bang_bang, table, piecewise)}
+_LISTS = ("table", "piecewise")
 
 
 def from_spec(spec: Any, *, key: str = "signal") -> Signal:
     """A signal from its table, for example `{ kind = "cycloid", end = 1.0, duration_s = 0.5 }`."""
     import inspect
 
-    if not isinstance(spec, dict) or spec.get("kind") not in KINDS:
-        kind = spec.get("kind") if isinstance(spec, dict) else spec
-        raise InputError(f"expected a table with kind, one of {', '.join(KINDS)}", key=f"{key}.kind", value=kind)
-    make = KINDS[spec["kind"]]
-    known = inspect.signature(make).parameters
+    if not isinstance(spec, dict):
+        raise InputError(f"expected a table with kind, one of {', '.join(KINDS)}", key=key, value=spec)
+    kind = spec.get("kind")
+    if not isinstance(kind, str) or kind not in KINDS:
+        raise InputError(f"{'missing: ' if kind is None else ''}expected one of {', '.join(KINDS)}", key=f"{key}.kind", value=kind)
+    known = inspect.signature(KINDS[kind]).parameters
+    expected, good = ("a list of finite numbers", _numbers) if kind in _LISTS else ("a finite number", finite)
     for name, value in spec.items():
-        if name != "kind" and name not in known:
-            raise InputError(f"an unknown key; known for {spec['kind']}: {', '.join(known)}", key=f"{key}.{name}", value=value)
-        numbers = value if isinstance(value, list) else [value]
-        if name != "kind" and not all(isinstance(v, int | float) and not isinstance(v, bool) and np.isfinite(v) for v in numbers):
-            raise InputError("expected a finite number, or a list of them for a table", key=f"{key}.{name}", value=value)
+        if name == "kind":
+            continue
+        if name not in known:
+            raise InputError(f"an unknown key; known for {kind}: {', '.join(known)}", key=f"{key}.{name}", value=value)
+        if not good(value):
+            raise InputError(f"expected {expected}", key=f"{key}.{name}", value=value)
     for name, parameter in known.items():
         if parameter.default is parameter.empty and name not in spec:
-            raise InputError("missing: expected a number", key=f"{key}.{name}")
+            raise InputError(f"missing: expected {expected}", key=f"{key}.{name}")
     try:
-        return make(**{name: value for name, value in spec.items() if name != "kind"})
+        with np.errstate(all="ignore"):
+            return KINDS[kind](**{name: value for name, value in spec.items() if name != "kind"})
     except InputError as error:
         raise InputError(error.expected, key=f"{key}.{error.key}", value=error.value) from None
+    except (ArithmeticError, ValueError):  # a duration of 1e-200 or 1e200 seconds
+        raise InputError("expected numbers whose derivatives are finite", key=f"{key}.kind", value=kind) from None
+
+
+def finite(value: Any) -> bool:
+    """Is it a finite number, as read from a file?"""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # a whole number that no float can hold
+        return False
+
+
+def _numbers(value: Any) -> bool:
+    return isinstance(value, list) and all(map(finite, value))
 
 
 def _rise(t0: float, start: float, change: float, duration: float) -> list[float]:

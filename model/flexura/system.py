@@ -11,9 +11,10 @@ from scipy.linalg import block_diag
 
 from . import extended
 from .beam import LinkIntegrals, link_integrals, shape
+from .chain import PRISMATIC, REVOLUTE, Chain, Work, workspace
 from .errors import FlexuraError, InputError
-from .kernel import PRISMATIC, REVOLUTE, Chain, Work, inverse, workspace
 from .modes import modal
+from .newton_euler import inverse
 from .robot import Robot
 from .run import STATIONS
 
