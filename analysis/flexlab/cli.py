@@ -81,7 +81,7 @@ def frequencies(robot: RobotFile, json: Json = False) -> None:
 
 @app.command()
 def crosscheck(
-    robot: RobotFile, manoeuvre: ManoeuvreFile = None, out: Out = None, rtol: Rtol = 1e-8,
+    robot: RobotFile, manoeuvre: ManoeuvreFile = None, out: Out = None, rtol: Rtol = 1e-7,
     beam: Annotated[str, typer.Option(help="ancf (Euler-Bernoulli) or ge (geometrically exact, with shear)")] = "ancf",
     tolerance: Annotated[float, typer.Option(help="largest deviation allowed, relative to each channel's peak")] = 0.01,
     json: Json = False,

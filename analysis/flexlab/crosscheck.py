@@ -46,7 +46,7 @@ def crosscheck(
     manoeuvre: Manoeuvre,
     *,
     beam: str = "ancf",
-    rtol: float = 1e-8,
+    rtol: float = 1e-7,
     tolerance: float = TOLERANCE,
     progress: Progress | None = None,
 ) -> Check:

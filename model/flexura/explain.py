@@ -47,7 +47,7 @@ def explain(error: ValidationError, model: type[BaseModel], data: Any, file: str
         return InputError(f"an unknown key; {hint}", key=key, value=value, file=file, more=more)
     if first["type"] == "missing":
         return InputError(f"missing: expected {expected}", key=key, file=file, more=more)
-    if first["type"] == "too_long" and isinstance(value, list):
+    if first["type"] == "too_long" and isinstance(value, list) and isinstance(value[0], dict):
         value = len(value)
     return InputError(_worded(expected or first["msg"]), key=key, value=value if found else None, file=file, more=more)
 

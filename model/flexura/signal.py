@@ -165,7 +165,8 @@ def from_spec(spec: Any, *, key: str = "signal") -> Signal:
         raise InputError(f"expected a table with kind, one of {', '.join(KINDS)}", key=key, value=spec)
     kind = spec.get("kind")
     if not isinstance(kind, str) or kind not in KINDS:
-        raise InputError(f"{'missing: ' if kind is None else ''}expected one of {', '.join(KINDS)}", key=f"{key}.kind", value=kind)
+        missing = "missing: " if kind is None else ""
+        raise InputError(f"{missing}expected one of {', '.join(KINDS)}", key=f"{key}.kind", value=kind)
     known = inspect.signature(KINDS[kind]).parameters
     expected, good = ("a list of finite numbers", _numbers) if kind in _LISTS else ("a finite number", finite)
     for name, value in spec.items():

@@ -17,7 +17,8 @@ from robots import beam, bench_arm, fast, few, forces, largest_difference, rigid
 
 import flexura as fx
 from flexura import signal
-from flexura.kernel import COULOMB_SPEED, accelerate, workspace
+from flexura.chain import COULOMB_SPEED
+from flexura.kernel import accelerate
 
 
 def close(a, b, tolerance: float) -> None:
@@ -64,7 +65,7 @@ def acceleration(sys: fx.System, q: np.ndarray, qd: np.ndarray, tau: np.ndarray)
 def recursion(sys: fx.System, q: np.ndarray, qd: np.ndarray, tau: np.ndarray) -> np.ndarray:
     """qdd from the kernel's recursion along the chain."""
     y, v, a, none = sys.to_solver @ q, sys.to_solver @ qd, np.zeros(sys.n), np.zeros(len(tau))
-    accelerate(sys.chain, workspace(sys.chain), y, v, y, v, 0.0, tau, none, none, a)
+    accelerate(sys.chain, sys._work(), y, v, y, v, 0.0, tau, none, none, a)
     return sys.transform @ a
 
 
@@ -82,7 +83,7 @@ def at_rest_if_locked(sys: fx.System, qd: np.ndarray) -> np.ndarray:
 def test_the_mass_matrix_is_symmetric_and_positive_definite(bot, seed):
     sys = fx.assemble(bot)
     M = sys.mass(state(sys, seed)[0])
-    assert np.array_equal(M, M.T) or np.abs(M - M.T).max() < 1e-14 * np.abs(M).max()
+    assert np.abs(M - M.T).max() < 1e-13 * np.abs(M).max()
     scale = 1 / np.sqrt(np.diag(M))
     assert np.linalg.eigvalsh(M * scale * scale[:, None])[0] > 1e-9
 
@@ -152,12 +153,10 @@ def test_inverse_dynamics_returns_the_forces_that_were_applied(bot, seed):
     q, qd = state(sys, seed)
     tau = forces(sys, seed)
     got = sys.transform.T @ sys.forces(q, qd, recursion(sys, q, qd, tau))
-    elastic = np.abs(sys.chain.lam * 1.0).max() if sys.chain.lam.size else 0.0
-    scale = 1 + np.abs(sys.transform.T @ (sys.stiffness() @ q)).max() + np.abs(sys.transform.T @ (sys.damping @ qd)).max()
-    assert np.isfinite(elastic)
     expected = np.zeros(sys.n)
     expected[sys.joint_rows] = tau
-    assert np.abs(got - expected).max() < 1e-9 * scale
+    parts = [sys.transform.T @ part for part in (sys.stiffness() @ q, sys.damping @ qd, sys.bias(q, qd))]
+    assert np.abs(got - expected).max() < 1e-8 * (1 + np.abs(parts).max())
 
 
 @fast
@@ -370,15 +369,18 @@ def test_a_locked_joint_between_two_halves_of_a_link_changes_no_frequency():
 
 
 def test_a_locked_joint_between_two_halves_of_a_link_changes_nothing():
-    """The geometry of a bent link is exact up to cubics and quadrature, in one frame or in two. They leave errors of the fourth power of the slope:
-    here slopes reach 0.02 (statics) and 0.01, so that 1e-6 is to be kept."""
+    """The geometry of a bent link is that of an inextensible line up to cubics and quadrature, in one frame or in two. What these leave is of the
+    fourth power of the slope in the energies, so of the second in relative errors; slopes reach 0.018 here, then 0.01 and 0.02."""
     one, two = whole_and_halves(8)
     a, b = (fx.tip_pose(s, fx.static(s, tip_force=(0.0, 0.05))) for s in (one, two))
     assert b == pytest.approx(a, rel=1e-6)
     t = np.linspace(0, 1, 51)
-    torque = signal.bang_bang(0.005, 1.0, rise_s=0.05)
-    a, b = (fx.simulate(s, t, fx.Drive.force(torque, *[None] * (len(s.links) - 1)), rtol=1e-9) for s in (one, two))
-    assert largest_difference(a, b, ["joint/1/position", "tip/x", "tip/y"]) < 1e-6
+    difference = []
+    for torque in (0.005, 0.01):
+        drive = signal.bang_bang(torque, 1.0, rise_s=0.05)
+        a, b = (fx.simulate(s, t, fx.Drive.force(drive, *[None] * (len(s.links) - 1)), rtol=1e-10) for s in (one, two))
+        difference.append(largest_difference(a, b, ["joint/1/position", "tip/x", "tip/y"]))
+    assert difference[0] < 1e-6 and difference[1] < 5 * difference[0]
 
 
 # A link's own modes -----------------------------------------------------------------------------------------------------------
@@ -387,7 +389,7 @@ def test_a_locked_joint_between_two_halves_of_a_link_changes_nothing():
 def moved_at_joint_two(modes: int | None) -> fx.Run:
     sys = fx.assemble(two_link_arm(4, **({} if modes is None else {"modes": modes})))
     drive = fx.Drive.force(None, signal.bang_bang(0.1, 1.0, rise_s=0.1))
-    return fx.simulate(sys, np.linspace(0, 1.5, 76), drive, rtol=1e-8)
+    return fx.simulate(sys, np.linspace(0, 1.5, 76), drive, rtol=1e-10, method="explicit")
 
 
 def test_modes_converge_and_all_of_them_are_the_mesh():
@@ -428,16 +430,16 @@ def test_frequencies_are_those_of_the_linearised_accelerations(bot, seed):
 
 
 def test_small_free_vibration_has_the_linearised_frequency():
-    """One period after release in the first mode the link is back: the phase error is the frequency's."""
+    """Ten periods after release in one mode the link is back: the phase error is the frequency's."""
     arm = system(beam(0.6, 0.2355, 0.5, 4, locked=True, modes=4), payload=0.05)
     period = 1 / fx.frequencies(arm)[:3]
     for k, T in enumerate(period):
-        q = np.zeros(arm.n)
-        q[1 + k] = 1e-5
-        run = fx.simulate(arm, [0.0, 10 * T], q0=q, rtol=1e-11, method="explicit")
-        assert run.states[-1, 1 + k] == pytest.approx(1e-5, rel=1e-6)
-        speed = run.states[-1, arm.n + 1 + k] / (1e-5 * 2 * np.pi / T)
-        assert abs(speed) / (20 * np.pi) < 1e-7
+        q, small = np.zeros(arm.n), 1e-6
+        q[1 + k] = small
+        run = fx.simulate(arm, [0.0, 10 * T], q0=q, rtol=1e-12, method="explicit")
+        assert run.states[-1, 1 + k] == pytest.approx(small, rel=1e-9)
+        phase = run.states[-1, arm.n + 1 + k] / (small * 2 * np.pi / T)
+        assert abs(phase) / (20 * np.pi) < 1e-7
 
 
 # Plain Python ----------------------------------------------------------------------------------------------------------------
@@ -446,7 +448,7 @@ _SMALL = """
 import numpy as np, flexura as fx
 from flexura import signal
 from robots import beam, rigid, robot
-bot = robot(rigid(0.1, 0.6, 0.05, 5e-4, "Pa"), beam(0.3, 0.157, 0.333, 2, coulomb_friction=1e-3), beam(0.2, 0.157, 0.333, 1, viscous_friction=1e-3,
+bot = robot(rigid(0.1, 0.6, 0.05, 5e-4, "Pa"), beam(0.3, 0.157, 0.333, 2, rotor_inertia=1e-4), beam(0.2, 0.157, 0.333, 1, viscous_friction=1e-3,
             hub_mass_kg=0.1, damping={"beta_s": 1e-4}), payload=0.02, payload_inertia=1e-5, gravity=(0.0, -1.0))
 sys = fx.assemble(bot)
 for method in ("explicit", "implicit"):
@@ -457,7 +459,7 @@ for method in ("explicit", "implicit"):
 
 
 def test_the_compiled_code_is_the_plain_python_code():
-    """The same file, run with numba off: same numbers to round-off."""
+    """The same file, run with numba off: same numbers but for round-off. (Coulomb friction would turn round-off into other steps.)"""
     numbers = []
     for off in ("0", "1"):
         surroundings = os.environ | {"NUMBA_DISABLE_JIT": off, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
@@ -469,12 +471,11 @@ def test_the_compiled_code_is_the_plain_python_code():
 
 
 def test_a_bench_arm_keeps_its_energy_for_long():
-    """Ten seconds of free vibration, undamped: no drift beyond what the tolerance allows."""
+    """Ten seconds of free vibration, undamped, 15 periods of the first mode: no drift beyond what a hundred times the tolerance allows."""
     arm = bench_arm()
     q = fx.static(arm, tip_force=(0.0, 0.2))
-    for method, bound in (("explicit", 1e-8), ("implicit", 1e-5)):
-        run = fx.simulate(arm, np.linspace(0, 10, 11), q0=q, rtol=1e-8, method=method)
-        assert run.meta["energy_error"] < bound
+    for method, rtol in (("explicit", 1e-10), ("implicit", 1e-8)):
+        assert fx.simulate(arm, np.linspace(0, 10, 11), q0=q, rtol=rtol, method=method).meta["energy_error"] < 100 * rtol
 
 
 def test_a_robot_that_hangs_still_stays_still():
