@@ -20,7 +20,10 @@ few = settings(fast, max_examples=10)
 
 
 def beam(length: float, mass: Any, stiffness: Any, elements: int = 8, type: str = "R", **keys: Any) -> dict[str, Any]:
-    """A flexible link's table: mass per length [kg/m], bending stiffness [N m^2]; `modes` and `damping` go to the link, all else to its joint."""
+    """A flexible link's table: mass per length [kg/m], bending stiffness [N m^2].
+
+    `modes` and `damping` go to the link, all other keys to its joint.
+    """
     link = {k: keys.pop(k) for k in ("modes", "damping") if k in keys}
     numbers = {"length_m": length, "elements": elements, "mass_per_length_kg_m": mass, "bending_stiffness_N_m2": stiffness}
     return numbers | link | {"joint": {"type": type} | keys}
@@ -33,7 +36,11 @@ def rigid(length: float, mass: float, centre: float, inertia: float, type: str =
 
 
 def robot(
-    *links: dict[str, Any], gravity: tuple[float, float] = (0.0, 0.0), payload: float = 0.0, payload_inertia: float = 0.0, **keys: Any
+    *links: dict[str, Any],
+    gravity: tuple[float, float] = (0.0, 0.0),
+    payload: float = 0.0,
+    payload_inertia: float = 0.0,
+    **keys: Any,
 ) -> fx.Robot:
     load = {"mass_kg": float(payload), "inertia_kg_m2": float(payload_inertia)}
     return fx.Robot.from_dict({"link": list(links), "gravity_m_s2": gravity, "payload": load} | keys)

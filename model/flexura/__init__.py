@@ -20,7 +20,7 @@ _HOME = {
     "System": "system", "assemble": "system",
     "static": "statics", "tip_pose": "statics",
     "frequencies": "linear",
-    "simulate": "forward",
+    "simulate": "forward", "inverse": "forward",
     "Run": "run",
     "Drive": "drive", "JointDrive": "drive", "Manoeuvre": "drive", "load_manoeuvre": "drive",
     "Signal": "signal",
@@ -29,13 +29,13 @@ _HOME = {
 
 __all__ = [
     "Drive", "FlexuraError", "InputError", "JointDrive", "Manoeuvre", "Robot", "Run", "Signal", "System",
-    "assemble", "frequencies", "load", "load_manoeuvre", "save", "simulate", "static", "tip_pose",
+    "assemble", "frequencies", "inverse", "load", "load_manoeuvre", "save", "simulate", "static", "tip_pose",
 ]  # fmt: skip
 
 if TYPE_CHECKING:
     from .drive import Drive, JointDrive, Manoeuvre, load_manoeuvre
     from .errors import FlexuraError, InputError
-    from .forward import simulate
+    from .forward import inverse, simulate
     from .linear import frequencies
     from .robot import Robot, load, save
     from .run import Run

@@ -14,10 +14,6 @@ import numpy as np
 
 from .robot import Link
 
-POINTS = 4  # mass points of a flexible link for the geometric stiffening, the tip included
-SLOPES = 2 * POINTS  # slope points
-
-
 def hermite(s: np.ndarray, h: float, derivative: int = 0) -> np.ndarray:
     """The four cubics N1 ... N4 on an element of length h at s = x/h in [0, 1], or their x-derivatives; (4, *s.shape).
 
@@ -54,9 +50,9 @@ class LinkIntegrals:
     G1 = int n1 phi' phi'^T dx, G2 = int n2 phi' phi'^T dx, n1(x) = int_x^L dm, n2(x) = int_x^L X dm, so that the shortening
     u2 = -1/2 int_0^x w'^2 has int u2 dm = -q^T G1 q / 2, int x u2 dm = -q^T G2 q / 2; and H = int phi' phi'^T dx, u2(L) = -q^T
     H q / 2. NL = phi(L), SL = phi'(L) (m,); basis (2n, m): nodal unknowns = basis @ q. What is of higher order in the
-    deflection is summed over points (`model/README.md`, section 3): mass points (POINTS,) at x with their masses and phi
-    (POINTS, m), the last one being the tip with the payload; and slope points (SLOPES,), SLOPES / POINTS between two mass
-    points, with weights dx, EI dx, and phi', phi'' (SLOPES, m).
+    deflection is summed over points (`model/README.md`, section 3): mass points (p,) at x with their masses and phi (p, m), the
+    last one being the tip with the payload; and slope points (2p,), two before each mass point, with weights dx, EI dx, and
+    phi', phi'' (2p, m).
     """
 
     length: float
@@ -117,7 +113,7 @@ def link_integrals(link: Link, tip_mass: float = 0.0, tip_inertia: float = 0.0) 
         SL,
         bare.basis,
         bare.point_x,
-        bare.point_mass + mp * (np.arange(POINTS) == POINTS - 1),
+        bare.point_mass + mp * (bare.point_x == L),
         bare.point_phi,
         bare.slope_dx,
         bare.slope_EI,
@@ -136,10 +132,9 @@ def _rigid(link: Link) -> LinkIntegrals:
         x, dx = _quadrature(np.array(link.breaks()))
         rho = link.mass_per_length(x)
         mass, s1, inertia = float(rho @ dx), float((rho * x) @ dx), float((rho * x**2) @ dx)
-    points, slopes = np.zeros(POINTS), np.zeros(SLOPES)
     return LinkIntegrals(
         link.length_m, mass, s1, inertia, none, none, empty, empty, empty, empty, empty, none, none, empty,
-        points, points, np.zeros((POINTS, 0)), slopes, slopes, np.zeros((SLOPES, 0)), np.zeros((SLOPES, 0)),
+        none, none, empty, none, none, empty, empty,
     )  # fmt: skip
 
 
@@ -179,13 +174,33 @@ def _outboard(link: Link, cells: np.ndarray, x: np.ndarray) -> tuple[np.ndarray,
 
 
 def _points(link: Link) -> tuple[np.ndarray, ...]:
-    """Gauss points of the whole link and the tip (x, mass, phi), and Gauss points between them (dx, EI dx, phi', phi'')."""
+    """The ends of equal cells (x, mass, phi) and two Gauss points in each cell (dx, EI dx, phi', phi'').
+
+    The cells are the elements, so that nothing jumps inside one, but at least 4 and, where only some modes are kept, no more than their
+    shapes need.
+    """
     L, n = link.length_m, link.elements
-    s, weight = np.polynomial.legendre.leggauss(POINTS - 1)
-    x = np.append((1 + s) * L / 2, L)
-    mass = np.append(weight * L / 2 * link.mass_per_length(x[:-1]), 0.0)
-    place, dx = _quadrature(np.concatenate([[0.0], x]), SLOPES // POINTS)
-    return x, mass, shape(L, n, x).T, dx, link.bending_stiffness(place) * dx, shape(L, n, place, 1).T, shape(L, n, place, 2).T
+    count = n if n > 2 else 4
+    if link.modes is not None:
+        count = min(count, 4 if link.modes <= 2 else 2 * link.modes)
+    x = L * np.arange(1, count + 1) / count
+    mass = _newton_cotes(count)[1:] * (L / count) * link.mass_per_length(x)
+    place, dx = _quadrature(np.append(0.0, x), 2)
+    EI = link.bending_stiffness(place)
+    return x, mass, shape(L, n, x).T, dx, EI * dx, shape(L, n, place, 1).T, shape(L, n, place, 2).T
+
+
+def _newton_cotes(cells: int) -> np.ndarray:
+    """Weights (cells + 1,) of a closed rule on cells of length 1: Boole for 4, else Simpson, and 3/8 for the last three of an odd number."""
+    if cells == 4:
+        return np.array([14, 64, 24, 64, 14]) / 45
+    weights = np.zeros(cells + 1)
+    even = cells - 3 * (cells % 2)
+    for k in range(0, even, 2):
+        weights[k : k + 3] += np.array([1, 4, 1]) / 3
+    if cells % 2:
+        weights[even:] += np.array([3, 9, 9, 3]) / 8
+    return weights
 
 
 def _quadrature(cells: np.ndarray, points: int = 6) -> tuple[np.ndarray, np.ndarray]:

@@ -25,19 +25,24 @@ _NONE = np.zeros((0, signal.COLUMNS))
 
 @dataclass(frozen=True)
 class JointDrive:
-    """One joint's drive: feedforward `force` [N or N m], and PD gains `kp`, `kd` on a `motion` [m or rad]."""
+    """One joint's drive: feedforward `force` [N or N m], and PD gains `kp`, `kd` on a `motion` [m or rad].
+
+    With `prescribed` the joint follows its motion exactly, whatever force that takes (inverse dynamics).
+    """
 
     force: Signal | None = None
     motion: Signal | None = None
     kp: float = 0.0
     kd: float = 0.0
+    prescribed: bool = False
 
     def spec(self) -> dict[str, Any]:
+        """This joint's table of a manoeuvre file."""
         out: dict[str, Any] = {}
         if self.force is not None:
             out["force"] = self.force.spec
         if self.motion is not None:
-            out |= {"motion": self.motion.spec, "kp": self.kp, "kd": self.kd}
+            out |= {"motion": self.motion.spec} | ({"prescribed": True} if self.prescribed else {"kp": self.kp, "kd": self.kd})
         return out
 
 
@@ -62,12 +67,25 @@ class Drive:
         """Joint PD control along `motions`."""
         return Drive(tuple(JointDrive(motion=m, kp=p, kd=d) for m, p, d in zip(motions, kp, kd, strict=True)))
 
+    @staticmethod
+    def prescribed(*motions: Signal | None) -> Drive:
+        """Joints that follow their motions exactly (None: free). Raises InputError for a motion that jumps or kinks."""
+        for i, motion in enumerate(motions, 1):
+            if motion is not None:
+                _smooth(motion, f"motion {i}")
+        return Drive(tuple(JointDrive() if m is None else JointDrive(motion=m, prescribed=True) for m in motions))
+
+    @property
+    def follows(self) -> np.ndarray:
+        """Which joints follow a prescribed motion, (n,) bool."""
+        return np.array([joint.prescribed and joint.motion is not None for joint in self.joints])
+
     def __call__(self, t: float, position: Any, velocity: Any, tip_deflection: float = 0.0) -> np.ndarray:
         out = np.zeros(len(self.joints))
         for i, joint in enumerate(self.joints):
             if joint.force is not None:
                 out[i] = joint.force(t)[0]
-            if joint.motion is not None:
+            if joint.motion is not None and not joint.prescribed:
                 r, rd, _ = joint.motion(t)
                 out[i] += joint.kp * (r - position[i]) + joint.kd * (rd - velocity[i])
         return out
@@ -89,9 +107,18 @@ class Drive:
                     parts.append(s.segments)
                     row += len(s.segments)
                 index[i, 2 * k + 1] = row
-            if joint.motion is not None:
+            if joint.motion is not None and not joint.prescribed:
                 gains[i] = joint.kp, joint.kd
         return np.ascontiguousarray(np.concatenate(parts)), index, gains
+
+
+def _smooth(motion: Signal, key: str) -> None:
+    """Refuse a motion whose position or velocity jumps: no finite force follows it."""
+    for at in motion.breaks[1:]:
+        before = np.array(motion(np.nextafter(at, -np.inf))[:2])
+        after = np.array(motion(at)[:2])
+        if not np.allclose(before, after, rtol=1e-7, atol=1e-9):
+            raise InputError(f"expected a motion without jumps in position and velocity; it has one at t = {at:g} s", key=key)
 
 
 @dataclass(frozen=True)
@@ -109,6 +136,7 @@ class Manoeuvre:
         return np.linspace(0.0, self.duration_s, round(self.duration_s / self.output_step_s) + 1)
 
     def spec(self) -> dict[str, Any]:
+        """The tables of a manoeuvre file, every key given."""
         joints = [joint.spec() for joint in self.drive.joints]
         return {"name": self.name, "duration_s": self.duration_s, "output_step_s": self.output_step_s, "joint": joints}
 
@@ -150,7 +178,7 @@ def _manoeuvre(data: dict[str, Any], joints: int) -> Manoeuvre:
         ]
         if motion is None and any(gains):
             raise InputError("missing: gains kp and kd need a motion to follow", key=f"{key}.motion")
-        drives.append(JointDrive(force, motion, *gains))
+        drives.append(JointDrive(force, motion, kp=gains[0], kd=gains[1]))
     name = data.get("name", "")
     if not isinstance(name, str):
         raise InputError("expected a text", key="name", value=name)

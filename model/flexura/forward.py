@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,9 +12,11 @@ import numpy as np
 from . import loop
 from .drive import Drive
 from .errors import FlexuraError, InputError
+from .chain import Work
 from .kernel import accelerate
 from .observe import observe
 from .run import Run
+from .signal import Signal
 from .system import System
 
 PROGRAM = "flexura"
@@ -56,6 +58,8 @@ def simulate(
         ]
     )
     state[system.n + system.joint_rows[system.chain.locked.astype(bool)]] = 0.0
+    if isinstance(drive, Drive):
+        _put_on_motions(system, drive, t[0], state)
     _inside_limits(system, state)
     drive = Drive.none(len(system.robot.links)) if drive is None else drive
     chosen = _choose(system, t[-1] - t[0], rtol) if method == "auto" else _METHODS[method]
@@ -71,6 +75,29 @@ def simulate(
     return _record(system, t[: len(states)], states, work, drive, meta)
 
 
+def inverse(
+    system: System,
+    t_eval: Any,
+    motion: Signal | Sequence[Signal],
+    q0: Any = None,
+    qd0: Any = None,
+    rtol: float = 1e-6,
+    *,
+    method: str = "auto",
+    progress: Callable[[float], None] | None = None,
+) -> Run:
+    """Inverse dynamics: joints follow `motion` (one Signal a joint) exactly; the Run has `joint/i/drive`, the forces that this takes.
+
+    The elastic unknowns are integrated from q0, qd0 (n,), whose joint entries are replaced by the motion's; nothing is approximated by a
+    rigid robot and nothing iterated. Replaying the drives through `simulate` returns the motion. Otherwise as `simulate`; raises
+    InputError for a motion whose position or velocity jumps.
+    """
+    motions = [motion] if isinstance(motion, Signal) else list(motion)
+    if len(motions) != len(system.robot.links) or not all(isinstance(m, Signal) for m in motions):
+        raise InputError(f"expected {len(system.robot.links)} Signals, one a joint", key="motion", value=len(motions))
+    return simulate(system, t_eval, Drive.prescribed(*motions), q0, qd0, rtol, method=method, progress=progress)
+
+
 def _compiled(
     system: System,
     t: np.ndarray,
@@ -81,13 +108,9 @@ def _compiled(
     progress: Callable[[float], None] | None,
 ) -> tuple[np.ndarray, np.ndarray, dict[str, Any]]:
     c, n, links = system.chain, system.n, len(system.robot.links)
-    segments, index, gains = drive.packed()
-    limits = [link.joint.limits or (-np.inf, np.inf) for link in system.robot.links]
-    inputs = loop.Inputs(
-        segments, index, gains[:, 0].copy(), gains[:, 1].copy(),
-        np.array([low for low, _ in limits]), np.array([high for _, high in limits]), drive.breaks,
-    )  # fmt: skip
-    m, w, out = loop.memory(links, n), system._work(), np.zeros((len(t), 2 * n + 2))
+    inputs, m, w = _inputs(system, drive), loop.memory(links, n), _following(system, drive)
+    limits = list(zip(inputs.low, inputs.high, strict=True))
+    out = np.zeros((len(t), 2 * n + 2))
     m.z[:], out[0] = state, state
     m.s[loop.T], m.s[loop.OUT], m.s[loop.ERR] = t[0], 1, 1.0
     m.s[loop.H] = min(t[-1] - t[0], 0.1 / _fastest(system)) if method == loop.EXPLICIT else (t[-1] - t[0]) * 1e-4
@@ -131,6 +154,22 @@ def _compiled(
         out[:rows, 2 * n :],
         counts | {"complete": complete, "events": events, "drive": [j.spec() for j in drive.joints]},
     )
+
+
+def _inputs(system: System, drive: Drive) -> loop.Inputs:
+    segments, ranges, gains = drive.packed()
+    limits = np.array([link.joint.limits or (-np.inf, np.inf) for link in system.robot.links])
+    follows = drive.follows.astype(np.int64)
+    return loop.Inputs(
+        segments, ranges, gains[:, 0].copy(), gains[:, 1].copy(), follows, limits[:, 0].copy(), limits[:, 1].copy(), drive.breaks
+    )
+
+
+def _following(system: System, drive: Drive) -> Work:
+    """A workspace in which the joints with a prescribed motion are held to it."""
+    w = system._work()
+    w.held[:] |= drive.follows
+    return w
 
 
 def _python(
@@ -241,7 +280,8 @@ def _record(system: System, t: np.ndarray, states: np.ndarray, work: np.ndarray,
 def _applied(system: System, t: np.ndarray, states: np.ndarray, drive: Any) -> np.ndarray:
     n, rows = system.n, system.joint_rows
     if isinstance(drive, Drive):
-        out = np.array([drive(s, z[rows], z[n + rows]) for s, z in zip(t, states, strict=True)])
+        out = np.zeros((len(t), len(rows)))
+        loop.forces(system.chain, _following(system, drive), _inputs(system, drive), loop.memory(len(rows), n), t, states, out)
     else:
         call = as_function(drive)
         out = np.array([_forces(system, call, s, z[:n], z[n:]) for s, z in zip(t, states, strict=True)])
@@ -262,6 +302,12 @@ def _state(system: System, key: str, value: Any, default: np.ndarray) -> np.ndar
     if array.shape != (system.n,) or not np.all(np.isfinite(array)):
         raise InputError(f"expected {system.n} finite numbers, in the order of system.labels", key=key, value=value)
     return array
+
+
+def _put_on_motions(system: System, drive: Drive, t: float, state: np.ndarray) -> None:
+    for joint, row in zip(drive.joints, system.joint_rows, strict=False):
+        if joint.prescribed and joint.motion is not None:
+            state[row], state[system.n + row], _ = joint.motion(t)
 
 
 def _inside_limits(system: System, state: np.ndarray) -> None:

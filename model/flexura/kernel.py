@@ -20,7 +20,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from .beam import POINTS
 from .chain import COULOMB_SPEED, REVOLUTE, Chain, Work
 from .compiled import compiled, inlined
 from .outward import outward
@@ -65,7 +64,7 @@ def _elastic(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh: floa
         for k in range(m):
             for j in range(k + 1):
                 total = turning * c.SL[i, k] * c.SL[i, j]
-                for p in range(POINTS):
+                for p in range(c.points[i]):
                     total += c.point_mass[i, p] * w.h[i, p, k] * w.h[i, p, j]
                 S[k, j] += total
     for k in range(m):
@@ -217,7 +216,8 @@ def passes(
 ) -> None:  # fmt: skip
     """Accelerations a (n,) at (y, v) under joint forces, with the linear terms at ys + gh^2 a, vs + gh a.
 
-    `force` (N,) is what acts in the joints apart from friction, at (ys, vs); kp, kd (N,) are its gains.
+    `force` (N,) is what acts in the joints apart from friction, at (ys, vs); kp, kd (N,) are its gains. A joint that is held
+    (`w.held`) has the acceleration `w.given`, and its force is found (`w.reaction`).
     """
     outward(c, w, y, v)
     links = c.kind.shape[0]
@@ -242,17 +242,20 @@ def passes(
             a0, a1, a2, diagonal, bias = A02, A12, A22, A22, b2
         else:
             a0, a1, a2, diagonal, bias = A00, A01, A02, A00, b0
-        dinv, rest = 0.0, 0.0
-        if not c.locked[i]:
+        diagonal += c.rotor[i]
+        if w.held[i]:
+            dinv, rest, gain = 0.0, -bias, w.given[i]
+        else:
             tau, hold = force[i] - c.viscous[i] * vs[e], 0.0
             if c.coulomb[i] > 0.0:
                 grip = np.tanh(v[e] / COULOMB_SPEED)
                 hold = c.coulomb[i] * (1.0 - grip * grip) / COULOMB_SPEED
                 tau -= c.coulomb[i] * grip + hold * (vs[e] - v[e])
-            dinv = 1.0 / (diagonal + c.rotor[i] + gh * (c.viscous[i] + hold + kd[i]) + gh * gh * kp[i])
+            dinv = 1.0 / (diagonal + gh * (c.viscous[i] + hold + kd[i]) + gh * gh * kp[i])
             rest = tau - bias
+            gain = rest * dinv
         w.joint[i, 0], w.joint[i, 1], w.joint[i, 2], w.joint[i, 3], w.joint[i, 4] = a0, a1, a2, dinv, rest
-        gain = rest * dinv
+        w.joint[i, 5] = diagonal
         A = (
             A00 - a0 * a0 * dinv, A01 - a0 * a1 * dinv, A02 - a0 * a2 * dinv,
             A11 - a1 * a1 * dinv, A12 - a1 * a2 * dinv, A22 - a2 * a2 * dinv,
@@ -261,7 +264,12 @@ def passes(
     t0, t1, t2 = -c.gravity[0], -c.gravity[1], 0.0
     for i in range(links):
         e, end = c.first[i], c.first[i + 1]
-        a[e] = w.joint[i, 3] * (w.joint[i, 4] - w.joint[i, 0] * t0 - w.joint[i, 1] * t1 - w.joint[i, 2] * t2)
+        rest = w.joint[i, 4] - w.joint[i, 0] * t0 - w.joint[i, 1] * t1 - w.joint[i, 2] * t2
+        if w.held[i]:
+            a[e] = w.given[i]
+            w.reaction[i] = w.joint[i, 5] * a[e] - rest
+        else:
+            a[e] = w.joint[i, 3] * rest
         if c.kind[i] == REVOLUTE:
             t2 += a[e]
         else:

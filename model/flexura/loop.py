@@ -51,6 +51,7 @@ class Inputs(NamedTuple):
     ranges: np.ndarray
     kp: np.ndarray
     kd: np.ndarray
+    follows: np.ndarray  # (N,) int: joints whose motion is prescribed
     low: np.ndarray
     high: np.ndarray
     breaks: np.ndarray
@@ -117,6 +118,24 @@ def drive(c: Chain, d: Inputs, t: float, y: np.ndarray, v: np.ndarray, force: np
 
 
 @inlined
+def _prescribe(c: Chain, w: Work, d: Inputs, t: float, y: np.ndarray, v: np.ndarray) -> None:
+    """Put prescribed joints where their motion has them at t."""
+    for i in range(d.follows.shape[0]):
+        if d.follows[i]:
+            e = c.first[i]
+            y[e], v[e], w.given[i] = evaluate(d.segments[d.ranges[i, 2] : d.ranges[i, 3]], t)
+
+
+@inlined
+def _find(c: Chain, w: Work, d: Inputs, v: np.ndarray, force: np.ndarray) -> None:
+    """The drive forces that prescribed motions took in the pass just made, friction included."""
+    for i in range(d.follows.shape[0]):
+        if d.follows[i]:
+            speed = v[c.first[i]]
+            force[i] = w.reaction[i] + c.viscous[i] * speed + c.coulomb[i] * np.tanh(speed / COULOMB_SPEED)
+
+
+@inlined
 def _powers(c: Chain, v: np.ndarray, force: np.ndarray, dz: np.ndarray) -> None:
     """Power of the drives and power lost to friction and damping, into the last two entries of dz."""
     n = v.shape[0]
@@ -136,8 +155,10 @@ def _powers(c: Chain, v: np.ndarray, force: np.ndarray, dz: np.ndarray) -> None:
 def _slope(c: Chain, w: Work, d: Inputs, m: Memory, t: float, z: np.ndarray, dz: np.ndarray) -> None:
     n = m.a.shape[0]
     y, v = z[:n], z[n : 2 * n]
+    _prescribe(c, w, d, t, y, v)
     drive(c, d, t, y, v, m.force)
     passes(c, w, y, v, y, v, 0.0, m.force, m.zero, m.zero, dz[n : 2 * n])
+    _find(c, w, d, v, m.force)
     _copy(v, dz[:n])
     _powers(c, v, m.force, dz)
     m.s[EVALS] += 1
@@ -188,6 +209,19 @@ def _slope_once(c: Chain, w: Work, d: Inputs, m: Memory, t: float, z: np.ndarray
 
 
 @compiled
+def forces(c: Chain, w: Work, d: Inputs, m: Memory, t: np.ndarray, states: np.ndarray, out: np.ndarray) -> None:
+    """Drive forces out (T, N) at states (T, 2n); prescribed joints are put on their motion in `states`."""
+    for row in range(t.shape[0]):
+        for k in range(states.shape[1]):
+            m.znew[k] = states[row, k]
+        _slope_once(c, w, d, m, t[row], m.znew, m.K[1])
+        for k in range(states.shape[1]):
+            states[row, k] = m.znew[k]
+        for i in range(out.shape[1]):
+            out[row, i] = m.force[i]
+
+
+@compiled
 def _explicit_dense(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, last: float) -> None:
     """Coefficients of the order-7 interpolant of the step just made (m.z to m.znew)."""
     K, F, z = m.K, m.F, m.z
@@ -229,6 +263,7 @@ def _implicit_step(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, 
             for k in range(n):
                 new[k], new[n + k] = m.ys[k] + gh * gh * m.a[k], m.vs[k] + gh * m.a[k]
                 K[s, k] = m.a[k]
+            _prescribe(c, w, d, ts, new[:n], new[n : 2 * n])
             passes(c, w, new[:n], new[n : 2 * n], m.ys, m.vs, gh, m.force, d.kp, d.kd, m.a)
             m.s[EVALS] += 1
             change = 0.0
@@ -243,7 +278,9 @@ def _implicit_step(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, 
         for k in range(n):
             new[k], new[n + k] = m.ys[k] + gh * gh * m.a[k], m.vs[k] + gh * m.a[k]
             K[s, k], K[s, n + k] = new[n + k], m.a[k]
+        _prescribe(c, w, d, ts, new[:n], new[n : 2 * n])
         drive(c, d, ts, new[:n], new[n : 2 * n], m.force)
+        _find(c, w, d, new[n : 2 * n], m.force)
         _powers(c, new[n : 2 * n], m.force, K[s])
     for k in range(2 * n, 2 * n + 2):
         total = 0.0

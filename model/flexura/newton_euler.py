@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from .beam import POINTS
 from .chain import REVOLUTE, Chain, Work
 from .compiled import compiled
 from .outward import outward
@@ -60,7 +59,7 @@ def inverse(c: Chain, w: Work, y: np.ndarray, v: np.ndarray, a: np.ndarray, grav
                 spin += c.tip_inertia[i] * (w.tilt[i] * w.tilt[i] - 1.0) * c.SL[i, k] * a[e + 1 + k]
             for k in range(end - e - 1):
                 out[e + 1 + k] += spin * c.SL[i, k]
-            for p in range(POINTS):
+            for p in range(c.points[i]):
                 total = 0.0
                 for k in range(end - e - 1):
                     total += w.h[i, p, k] * a[e + 1 + k]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from .beam import POINTS, SLOPES
 from .chain import PRISMATIC, REVOLUTE, Chain, Work
 from .compiled import compiled
 from .outward import outward
@@ -16,7 +15,7 @@ POSE = 3  # x, y, angle of a hub frame
 def _strain(c: Chain, i: int, q: np.ndarray) -> float:
     """1/2 int EI w''^2 tan^2 dx of link i: what its curvature w'' / cos has beyond w''."""
     total = 0.0
-    for r in range(SLOPES):
+    for r in range(2 * c.points[i]):
         s, bend = 0.0, 0.0
         for k in range(q.shape[0]):
             s += c.slope_d1[i, r, k] * q[k]
@@ -69,7 +68,7 @@ def observe(
                 strain += 0.5 * c.lam[i, k] * q[k] * q[k]
             if c.stiffening and end > e + 1:
                 strain += _strain(c, i, q)
-                for p in range(POINTS):
+                for p in range(c.points[i]):
                     rate = 0.0
                     for k in range(end - e - 1):
                         rate += w.h[i, p, k] * qd[k]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from .beam import POINTS, SLOPES
 from .chain import PRISMATIC, REVOLUTE, Chain, Work
 from .compiled import inlined
 
@@ -97,8 +96,8 @@ def _bend(c: Chain, w: Work, i: int, q: np.ndarray, qd: np.ndarray, omega: float
         vHv += hv * qd[k]
     U, K, Z, dU, dK, dZ = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0  # u, h.v, z so far, and their parts of higher order
     b, J, hx, hy, hw = -0.5 * qGq, -qG2q, vGv, qGv, -2 * omega * qG2v
-    for p in range(POINTS):
-        for r in range(p * (SLOPES // POINTS), (p + 1) * (SLOPES // POINTS)):
+    for p in range(c.points[i]):
+        for r in range(2 * p, 2 * p + 2):
             s, sd, bend = 0.0, 0.0, 0.0
             for k in range(m):
                 s += c.slope_d1[i, r, k] * q[k]
@@ -137,8 +136,8 @@ def _bend(c: Chain, w: Work, i: int, q: np.ndarray, qd: np.ndarray, omega: float
     w.body[i, 5] += hw
     for k in range(m):
         h, dh, g, mt, cv = 0.0, 0.0, 0.0, 0.0, 0.0
-        for p in range(POINTS):
-            for r in range(p * (SLOPES // POINTS), (p + 1) * (SLOPES // POINTS)):
+        for p in range(c.points[i]):
+            for r in range(2 * p, 2 * p + 2):
                 d1 = c.slope_d1[i, r, k]
                 h += w.slope[r, 0] * d1
                 dh += w.slope[r, 1] * d1

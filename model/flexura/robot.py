@@ -144,10 +144,11 @@ class Link(_Table):
             if isinstance(value, list) and (value[0].at_m != 0 or abs(value[-1].at_m - self.length_m) > 1e-9 * self.length_m):
                 raise WrongValue(key, [e.at_m for e in value], f"entries from at_m = 0 to the link's length, {self.length_m:g}")
         if self.section is not None and self.length_m > 0:
-            for s in self.section if isinstance(self.section, list) else [self.section]:
+            listed = isinstance(self.section, list)
+            for k, s in enumerate(self.section if isinstance(self.section, list) else [self.section], 1):
                 if s.height_m >= self.length_m:
                     raise WrongValue(
-                        "section.height_m",
+                        f"section[{k}].height_m" if listed else "section.height_m",
                         s.height_m,
                         f"a height below the link's length, {self.length_m:g} (metres, not millimetres?)",
                     )

@@ -184,7 +184,7 @@ def from_spec(spec: Any, *, key: str = "signal") -> Signal:
             return KINDS[kind](**{name: value for name, value in spec.items() if name != "kind"})
     except InputError as error:
         raise InputError(error.expected, key=f"{key}.{error.key}", value=error.value) from None
-    except (ArithmeticError, ValueError):  # a duration of 1e-200 or 1e200 seconds
+    except (ArithmeticError, ValueError):  # numbers near the ends of the range, in scipy's spline too
         raise InputError("expected numbers whose derivatives are finite", key=f"{key}.kind", value=kind) from None
 
 
@@ -203,7 +203,10 @@ def _numbers(value: Any) -> bool:
 
 
 def _rise(t0: float, start: float, change: float, duration: float) -> list[float]:
-    return _row(t0, start, 0.0, 0.0, 10 * change / duration**3, -15 * change / duration**4, 6 * change / duration**5)
+    try:
+        return _row(t0, start, 0.0, 0.0, 10 * change / duration**3, -15 * change / duration**4, 6 * change / duration**5)
+    except ArithmeticError:  # 1e-200 or 1e200 seconds
+        raise InputError("expected a duration that leaves the derivatives finite", key="duration_s", value=duration) from None
 
 
 def _positive(key: str, value: float) -> None:

@@ -176,6 +176,7 @@ def assemble(robot: Robot) -> System:
         damp=_stack(
             [np.where(lam > 0, k.damping.alpha_1_s + k.damping.beta_s * lam, 0.0) for k, lam in zip(links, spectra, strict=True)]
         ),
+        points=of(lambda k: len(k.point_x)).astype(np.int64),
         tip_inertia=np.array([robot.payload.inertia_kg_m2 * (i == len(links) - 1) for i in range(len(links))]),
         stiffening=robot.stiffening,
         gravity=np.array(robot.gravity_m_s2, dtype=float),

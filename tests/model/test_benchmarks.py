@@ -1,18 +1,18 @@
 """Benchmarks B1 to B6 with analytic or published answers, and textbook answers for what acts in the joints.
 
-Frequencies of beams are given as bL, w = (bL)^2 sqrt(EI/rhoA)/L^2; the links here have L = EI = rhoA = 1 unless a benchmark has its own.
-The relative error of the frequency of cubic Hermite elements of length h is (bh)^4/1440, less where masses that are not the beam's move along.
+Frequencies of beams are given as bL, w = (bL)^2 sqrt(EI/rhoA)/L^2; links have L = EI = rhoA = 1 unless a benchmark has its own.
+The relative error of the frequency of cubic Hermite elements of length h is (bh)^4/1440, less where other masses move along.
 """
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from robots import beam, bench_arm, by_hub, rigid, system
 from scipy.special import ellipk
 
 import flexura as fx
 from flexura import signal
+from robots import beam, bench_arm, by_hub, rigid, system
 
 CLAMPED = np.array([1.875104069, 4.694091133, 7.854757438, 10.99554073, 14.13716839])
 
@@ -29,7 +29,8 @@ def unit_link(elements: int, payload: float = 0.0, **keys) -> fx.System:
 
 
 @pytest.mark.parametrize(
-    ("elements", "printed"), [(1, [4.8e-3, 0.58]), (2, [4.8e-4, 8.5e-3, 0.22]), (4, [3.3e-5, 1.2e-3, 7.7e-3]), (8, [2.1e-6, 8.0e-5, 6.1e-4])]
+    ("elements", "printed"),
+    [(1, [4.8e-3, 0.58]), (2, [4.8e-4, 8.5e-3, 0.22]), (4, [3.3e-5, 1.2e-3, 7.7e-3]), (8, [2.1e-6, 8.0e-5, 6.1e-4])],
 )
 def test_clamped_frequencies_have_the_error_of_cubic_elements(elements, printed):
     """B1, table "Elements needed"."""
@@ -82,7 +83,10 @@ def test_frequencies_converge_with_order_four(mode, meshes):
 
 @pytest.mark.parametrize(
     ("payload", "inertia", "published", "exact"),
-    [(1.2, 0.1 + 0.1 * 0.5**2 / 3 + 5e-4 + 0.1 * 0.5**2, [0.48, 1.80], [0.479693, 1.796589, 32.0972]), (0.1, 5e-4, [2.18, 15.91], [2.178334, 15.914513, 40.1008])],
+    [
+        (1.2, 0.1 + 0.1 * 0.5**2 / 3 + 5e-4 + 0.1 * 0.5**2, [0.48, 1.80], [0.479693, 1.796589, 32.0972]),
+        (0.1, 5e-4, [2.18, 15.91], [2.178334, 15.914513, 40.1008]),
+    ],
     ids=["link 1", "link 2"],
 )
 def test_clamped_links_of_the_published_arm_have_its_frequencies(payload, inertia, published, exact):
@@ -126,7 +130,9 @@ def test_without_stiffening_rotation_softens_a_cantilever():
 # B4: static deflection ----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("load", "deflection", "shortening", "slope"), [(0.5, 0.162144, 0.015919, 0.244534), (1.0, 0.301721, 0.056433, 0.461352)])
+@pytest.mark.parametrize(
+    ("load", "deflection", "shortening", "slope"), [(0.5, 0.162144, 0.015919, 0.244534), (1.0, 0.301721, 0.056433, 0.461352)]
+)
 @pytest.mark.parametrize("elements", [2, 4, 8])
 def test_a_dead_tip_load_bends_a_link_like_an_inextensible_line(elements, load, deflection, shortening, slope):
     """B4, to 1e-3."""
@@ -144,7 +150,9 @@ def test_small_loads_give_the_textbook_deflections(stiffening):
     link = beam(length, mass, stiffness, 4)
     arm, heavy = system(link, stiffening=stiffening), system(link, gravity=(0.0, -small), stiffening=stiffening)
     x, y, angle = fx.tip_pose(arm, fx.static(arm, tip_force=(0.0, small)))
-    assert (x, y, angle) == pytest.approx((length, small * length**3 / 3 / stiffness, small * length**2 / 2 / stiffness), rel=1e-6)
+    assert (x, y, angle) == pytest.approx(
+        (length, small * length**3 / 3 / stiffness, small * length**2 / 2 / stiffness), rel=1e-6
+    )
     x, y, angle = fx.tip_pose(arm, fx.static(arm, tip_moment=small))
     assert (x, y, angle) == pytest.approx((length, small * length**2 / 2 / stiffness, small * length / stiffness), rel=1e-6)
     x, y, angle = fx.tip_pose(heavy, fx.static(heavy))
@@ -165,6 +173,7 @@ def test_an_axial_load_stiffens_or_softens_a_link():
 
 def test_the_first_frequency_vanishes_at_the_buckling_weight():
     """A column with a heavy payload buckles at m g = pi^2 EI/(4 L^2); below, w1^2 is nearly linear in the load."""
+
     def first(weight: float) -> float:
         sys = system(beam(1.0, 1e-3, 1.0, 8, start=np.pi / 2), payload=1.0, gravity=(0.0, -weight))
         return angular(sys, q=sys.start())[0]
@@ -279,12 +288,11 @@ def test_coulomb_friction_stops_a_cart_within_its_braking_distance(method):
 
 
 def test_a_rotor_adds_its_inertia_to_its_own_joint_only():
-    """A rotor reflected to joint 2 of a rigid arm: joint 2 alone accelerates by tau/(J2 + Jr), joint 1 is held by its own inertia J1."""
+    """One joint: tau/(J + Jr). Two: M = [[J1 + J2, J2], [J2, J2 + Jr]]. A cart: F/(m + hub + rotor)."""
     shaft = system(rigid(0.0, 0.0, 0.0, 0.02, rotor_inertia=0.03))
     run = fx.simulate(shaft, [0.0, 2.0], fx.Drive.force(signal.constant(0.1)), rtol=1e-10)
     assert run["joint/1/position"][-1] == pytest.approx(0.1 / 0.05 * 2.0, rel=1e-9)
     two = system(rigid(0.0, 0.0, 0.0, 0.02), rigid(0.0, 0.0, 0.0, 0.04, rotor_inertia=0.03))
-    # M = [[J1 + J2, J2], [J2, J2 + Jr]]
     assert two.mass(np.zeros(2)) == pytest.approx(np.array([[0.06, 0.04], [0.04, 0.07]]), rel=1e-12)
     cart = system(rigid(0.1, 0.6, 0.05, 0.0, "Pa", rotor_inertia=0.4, hub_mass_kg=0.5))
     run = fx.simulate(cart, [0.0, 1.0], fx.Drive.force(signal.constant(0.3)), rtol=1e-10)

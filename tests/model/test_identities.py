@@ -6,6 +6,7 @@ assembly written here.
 
 from __future__ import annotations
 
+import itertools
 import os
 import subprocess
 import sys
@@ -13,12 +14,26 @@ import sys
 import numpy as np
 import pytest
 from hypothesis import given
-from robots import beam, bench_arm, fast, few, forces, largest_difference, rigid, robot, robots, seeds, state, system, two_link_arm
 
 import flexura as fx
 from flexura import signal
 from flexura.chain import COULOMB_SPEED
 from flexura.kernel import accelerate
+from robots import (
+    beam,
+    bench_arm,
+    fast,
+    few,
+    forces,
+    largest_difference,
+    rigid,
+    robot,
+    robots,
+    seeds,
+    state,
+    system,
+    two_link_arm,
+)
 
 
 def close(a, b, tolerance: float) -> None:
@@ -108,7 +123,11 @@ def test_bias_forces_follow_from_the_mass_matrix(bot, seed):
     sys = fx.assemble(bot)
     q, qd = state(sys, seed)
     h = 1e-3
-    rate = (8 * (sys.mass(q + h * qd) - sys.mass(q - h * qd)) - (sys.mass(q + 2 * h * qd) - sys.mass(q - 2 * h * qd))) @ qd / (12 * h)
+    rate = (
+        (8 * (sys.mass(q + h * qd) - sys.mass(q - h * qd)) - (sys.mass(q + 2 * h * qd) - sys.mass(q - 2 * h * qd)))
+        @ qd
+        / (12 * h)
+    )
     slope = gradient(lambda z: qd @ sys.mass(z) @ qd / 2, q, steps(sys, 2e-3))
     T = sys.transform.T
     close(T @ (sys.bias(q, qd) - sys.bias(q, 0 * q)), T @ (rate - slope), 1e-7)
@@ -162,15 +181,15 @@ def test_inverse_dynamics_returns_the_forces_that_were_applied(bot, seed):
 @fast
 @given(robots(stiffening=False, modes=False, gravity=False), seeds)
 def test_the_extended_assembly_is_the_dissertations(bot, seed):
-    """M_ij = int m J^T J dx of each element by four Gauss points, J = dr/dq through the chain of homogeneous transforms, scattered over all
-    unknowns; hubs, rotors and the payload added (dissertation, 2.3 and 2.4)."""
+    """M_ij = int m J^T J dx of each element by four Gauss points, J = dr/dq through the chain of homogeneous transforms,
+    scattered over all unknowns; hubs, rotors and the payload added (dissertation, 2.3 and 2.4)."""
     sys = fx.assemble(bot)
     q, _ = state(sys, seed)
     close(sys.mass(q), by_elements(bot, q), 1e-9)
 
 
 def by_elements(bot: fx.Robot, q: np.ndarray) -> np.ndarray:
-    """M(q) of the linear model, from positions of mass points and directions of rotary inertias, differentiated with complex steps."""
+    """M(q) of the linear model: positions of mass points, directions of rotary inertias, differentiated with complex steps."""
     n = len(q)
     first = np.cumsum([0] + [1 + 2 * link.elements for link in bot.links])
     weights, M = [], np.zeros((n, n))
@@ -180,7 +199,7 @@ def by_elements(bot: fx.Robot, q: np.ndarray) -> np.ndarray:
             h = link.length_m / link.elements
             # properties are linear between given places: split elements there, so that Gauss points stay exact
             ends = np.unique(np.round([*np.linspace(0, link.length_m, link.elements + 1), *link.breaks()], 12))
-            for a, b in zip(ends[:-1], ends[1:]):
+            for a, b in itertools.pairwise(ends):
                 for p, w in zip(s, gauss):
                     x = (a + b) / 2 + p * (b - a) / 2
                     element = min(int((a + b) / 2 / h), link.elements - 1)
@@ -232,7 +251,7 @@ def by_elements(bot: fx.Robot, q: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("stiffening", [True, False])
 def test_a_payloads_inertia_turns_with_the_tip_only(stiffening):
-    """A payload without mass turns at the rate of joint and tip: T = J (qd + d asin(w'(L))/dt)^2/2 beyond the bare link's, at any deflection."""
+    """A payload without mass turns at the rate of joint and tip: T = J (qd + d asin(w'(L))/dt)^2/2 beyond the bare link's."""
     J = 0.02
     bare, loaded = (system(beam(0.5, 0.2, 1.0, 2), payload_inertia=j, stiffening=stiffening) for j in (0.0, J))
     q, qd = state(bare, 5, slope=0.3)
@@ -257,7 +276,7 @@ def small_state(sys: fx.System, seed: int) -> dict[str, np.ndarray]:
 
 
 @fast
-@given(robots(max_links=4, locked=True, stiffening=True), seeds)
+@given(robots(max_links=4, locked=True), seeds)
 def test_energy_changes_by_the_work_of_the_drives_less_the_losses(bot, seed):
     """Explicit: to 1e-8 of the largest energy at rtol 1e-10 (B12)."""
     sys = fx.assemble(bot)
@@ -283,7 +302,7 @@ def stiffer(bot: fx.Robot, factor: float) -> fx.Robot:
             value = link["bending_stiffness_N_m2"]
             many = isinstance(value, list)
             link["bending_stiffness_N_m2"] = [v | {"value": v["value"] * factor} for v in value] if many else value * factor
-            link.pop("damping", None)
+            link["damping"] = {"beta_s": 1e-4}  # else the steps follow the ringing that a sudden load starts
     return fx.Robot.from_dict(data)
 
 
@@ -305,7 +324,7 @@ def test_a_very_stiff_robot_moves_like_a_rigid_one(bot, seed):
     q, qd = hard.start(), np.zeros(hard.n)
     rates = 0.5 * forces(hard, seed) * (1 - solid.chain.locked)
     qd[hard.joint_rows] = rates
-    a = fx.simulate(hard, t, drives(hard, seed), q, qd, rtol=1e-7, method="implicit")
+    a = fx.simulate(hard, t, drives(hard, seed), q, qd, rtol=1e-6, method="implicit")
     b = fx.simulate(solid, t, drives(solid, seed), qd0=rates, rtol=1e-9)
     for i in range(1, len(bot.links) + 1):
         size = max(np.abs(b[f"joint/{i}/position"]).max(), 0.1)
@@ -341,13 +360,21 @@ def test_a_mirrored_robot_moves_mirrored(bot, seed):
             link["joint"]["angle_rad"] = -link["joint"].get("angle_rad", 0.0)
     sys, other = fx.assemble(bot), fx.assemble(fx.Robot.from_dict(data))
     # a link with few modes and another link on its tip also has two static shapes
-    sign = np.concatenate([[1.0 if link.joint.type == "Pa" else -1.0] + [-1.0] * len(info.S0) for link, info in zip(bot.links, sys.links)])
+    sign = np.concatenate(
+        [[1.0 if link.joint.type == "Pa" else -1.0] + [-1.0] * len(info.S0) for link, info in zip(bot.links, sys.links)]
+    )
     small, tau = small_state(sys, seed), 0.2 * forces(sys, seed)
     flip = [1.0 if link.joint.type == "Pa" else -1.0 for link in bot.links]
     t = np.linspace(0, 0.1, 6)
     a = fx.simulate(sys, t, fx.Drive.force(*(signal.constant(f) for f in tau)), **small, rtol=1e-9, method="explicit")
     b = fx.simulate(
-        other, t, fx.Drive.force(*(signal.constant(f) for f in tau * flip)), small["q0"] * sign, small["qd0"] * sign, rtol=1e-9, method="explicit"
+        other,
+        t,
+        fx.Drive.force(*(signal.constant(f) for f in tau * flip)),
+        small["q0"] * sign,
+        small["qd0"] * sign,
+        rtol=1e-9,
+        method="explicit",
     )
     close(b["tip/x"], a["tip/x"], 1e-8)
     close(b["tip/y"], -a["tip/y"], 1e-8)
@@ -356,7 +383,10 @@ def test_a_mirrored_robot_moves_mirrored(bot, seed):
 
 def whole_and_halves(elements: int, stiffness: float = 0.5) -> tuple[fx.System, fx.System]:
     whole = beam(0.6, 0.2355, stiffness, elements, hub_inertia_kg_m2=2e-3)
-    first, second = beam(0.3, 0.2355, stiffness, elements // 2, hub_inertia_kg_m2=2e-3), beam(0.3, 0.2355, stiffness, elements // 2, locked=True)
+    first, second = (
+        beam(0.3, 0.2355, stiffness, elements // 2, hub_inertia_kg_m2=2e-3),
+        beam(0.3, 0.2355, stiffness, elements // 2, locked=True),
+    )
     return system(whole, payload=0.05), system(first, second, payload=0.05)
 
 
@@ -369,8 +399,9 @@ def test_a_locked_joint_between_two_halves_of_a_link_changes_no_frequency():
 
 
 def test_a_locked_joint_between_two_halves_of_a_link_changes_nothing():
-    """The geometry of a bent link is that of an inextensible line up to cubics and quadrature, in one frame or in two. What these leave is of the
-    fourth power of the slope in the energies, so of the second in relative errors; slopes reach 0.018 here, then 0.01 and 0.02."""
+    """The geometry of a bent link is that of an inextensible line up to cubics and quadrature, in one frame or in two. What these
+    leave is of the fourth power of the slope in the energies, so of the second in relative errors; slopes reach 0.018 here, then
+    0.01 and 0.02."""
     one, two = whole_and_halves(8)
     a, b = (fx.tip_pose(s, fx.static(s, tip_force=(0.0, 0.05))) for s in (one, two))
     assert b == pytest.approx(a, rel=1e-6)
@@ -419,13 +450,13 @@ def test_frequencies_are_those_of_the_linearised_accelerations(bot, seed):
     S, T = sys.to_solver, sys.transform
     columns = []
     for e in np.eye(sys.n)[free]:
-        a, b = (S @ recursion(sys, q + T @ (h * e), 0 * q, none) for h in (1e-6, -1e-6))
-        columns.append((b - a)[free] / 2e-6)
+        a, b = (S @ recursion(sys, q + T @ (h * e), 0 * q, none) for h in (1e-7, -1e-7))
+        columns.append((b - a)[free] / 2e-7)
     squares = np.sort(np.linalg.eigvals(np.array(columns).T).real)
     found = (2 * np.pi * fx.frequencies(sys, q, joints="free")) ** 2
     # a full mesh has very stiff modes, whose round-off the slow ones share
     assert np.abs(found - squares).max() < 1e-6 * max(1.0, squares[-1])
-    slow = (squares > 1e-5 * squares[-1])
+    slow = squares > 1e-5 * squares[-1]
     assert found[slow] == pytest.approx(squares[slow], rel=1e-5)
 
 
@@ -448,8 +479,11 @@ _SMALL = """
 import numpy as np, flexura as fx
 from flexura import signal
 from robots import beam, rigid, robot
-bot = robot(rigid(0.1, 0.6, 0.05, 5e-4, "Pa"), beam(0.3, 0.157, 0.333, 2, rotor_inertia=1e-4), beam(0.2, 0.157, 0.333, 1, viscous_friction=1e-3,
-            hub_mass_kg=0.1, damping={"beta_s": 1e-4}), payload=0.02, payload_inertia=1e-5, gravity=(0.0, -1.0))
+bot = robot(
+    rigid(0.1, 0.6, 0.05, 5e-4, "Pa"), beam(0.3, 0.157, 0.333, 2, rotor_inertia=1e-4),
+    beam(0.2, 0.157, 0.333, 1, viscous_friction=1e-3, hub_mass_kg=0.1, damping={"beta_s": 1e-4}),
+    payload=0.02, payload_inertia=1e-5, gravity=(0.0, -1.0),
+)
 sys = fx.assemble(bot)
 for method in ("explicit", "implicit"):
     drive = fx.Drive.force(signal.cycloid(0.5, 0.02), signal.constant(1e-2), None)
@@ -459,7 +493,7 @@ for method in ("explicit", "implicit"):
 
 
 def test_the_compiled_code_is_the_plain_python_code():
-    """The same file, run with numba off: same numbers but for round-off. (Coulomb friction would turn round-off into other steps.)"""
+    """The same file, run with numba off: the same numbers but for round-off, which Coulomb friction would turn into other steps."""
     numbers = []
     for off in ("0", "1"):
         surroundings = os.environ | {"NUMBA_DISABLE_JIT": off, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
@@ -471,7 +505,7 @@ def test_the_compiled_code_is_the_plain_python_code():
 
 
 def test_a_bench_arm_keeps_its_energy_for_long():
-    """Ten seconds of free vibration, undamped, 15 periods of the first mode: no drift beyond what a hundred times the tolerance allows."""
+    """Ten seconds of free vibration, undamped: no drift beyond a hundred times the tolerance."""
     arm = bench_arm()
     q = fx.static(arm, tip_force=(0.0, 0.2))
     for method, rtol in (("explicit", 1e-10), ("implicit", 1e-8)):
@@ -481,7 +515,11 @@ def test_a_bench_arm_keeps_its_energy_for_long():
 def test_a_robot_that_hangs_still_stays_still():
     """Static equilibrium under gravity of hanging links is a fixed point of the motion."""
     hang = robot(
-        beam(0.5, 0.2, 1.0, 3, start=-np.pi / 2), rigid(0.3, 0.4, 0.1, 1e-3), beam(0.3, 0.2, 1.0, 2), payload=0.1, gravity=(0.0, -9.81)
+        beam(0.5, 0.2, 1.0, 3, start=-np.pi / 2),
+        rigid(0.3, 0.4, 0.1, 1e-3),
+        beam(0.3, 0.2, 1.0, 2),
+        payload=0.1,
+        gravity=(0.0, -9.81),
     )
     sys = fx.assemble(hang)
     run = fx.simulate(sys, [0.0, 1.0], q0=fx.static(sys), rtol=1e-8)

@@ -159,7 +159,7 @@ VALUES = {
         {STRIP + "section": sections((0.0, 1e-3), (0.3, -1e-3))}, "link[2].section[2].height_m", -1e-3, "above 0",
     ),
     "a list's height in millimetres": (
-        {STRIP + "section": sections((0.0, 1e-3), (0.3, 1.0))}, "link[2].section.height_m", 1.0, "not millimetres?",
+        {STRIP + "section": sections((0.0, 1e-3), (0.3, 1.0))}, "link[2].section[2].height_m", 1.0, "not millimetres?",
     ),
     "a misspelt key in a list": (
         {STRIP + "section": sections((0.0, 1e-3)) + [{"at": 0.3, "width_m": 0.02, "height_m": 1e-3}]},

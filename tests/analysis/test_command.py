@@ -1,0 +1,247 @@
+"""The command `flexura` as a shell sees it: exit status, what stands on stdout and stderr, and what is left on disk."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import flexura as fx
+from flexlab.cli import app
+
+ROOT = Path(__file__).resolve().parents[2]
+RIG = ROOT / "model" / "robots" / "rig.toml"
+LAW = ROOT / "model" / "manoeuvres" / "rig-inverse-law.toml"
+ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join(map(str, (ROOT / "model", ROOT / "analysis"))), "COLUMNS": "120"}
+COMMANDS = {info.name or info.callback.__name__: info.callback for info in app.registered_commands if info.callback}
+HEAVY = ("numba", "exudyn", "rerun", "pyarrow", "scipy", "pydantic", "matplotlib", "numpy")
+
+
+def flexura(*arguments, cwd):
+    command = [sys.executable, "-m", "flexlab.cli", *map(str, arguments)]
+    return subprocess.run(
+        command, cwd=cwd, env=ENVIRONMENT, capture_output=True, text=True, timeout=250, stdin=subprocess.DEVNULL
+    )
+
+
+@pytest.fixture(scope="module")
+def warm(tmp_path_factory):
+    """One short simulation, after which the solver is compiled; its result and its folder."""
+    folder = tmp_path_factory.mktemp("warm")
+    return flexura("simulate", RIG, LAW, "--out", folder / "out", "--json", cwd=folder), folder / "out"
+
+
+# --- help
+
+
+def test_help_imports_nothing_heavy(tmp_path):
+    code = (
+        "import sys; sys.argv = ['flexura', *sys.argv[1:]]; import atexit\n"
+        f"atexit.register(lambda: print('imported:', *[m for m in {HEAVY} if m in sys.modules], file=sys.stderr))\n"
+        "from flexlab.cli import main; main()"
+    )
+    for arguments, own in (
+        (["--help"], ""),
+        (["simulate", "--help"], "pydantic"),
+    ):  # typer checks a command's types with pydantic
+        command = [sys.executable, "-c", code, *arguments]
+        done = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, timeout=60)
+        assert done.returncode == 0 and "Usage:" in done.stdout
+        assert done.stderr.strip() in ("imported:", f"imported: {own}")
+
+
+def test_help_names_every_command(tmp_path):
+    done = flexura("--help", cwd=tmp_path)
+    assert done.returncode == 0 and done.stderr == ""
+    assert {"simulate", "frequencies", "crosscheck", "review", "doctor", "demo"} <= set(COMMANDS)
+    assert all(re.search(rf"^\W*{name}\s+\w", done.stdout, re.MULTILINE) for name in COMMANDS)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_help_of_a_command_shows_an_example_of_files_that_exist(name):
+    from typer.testing import CliRunner
+
+    shown = CliRunner().invoke(app, [name, "--help"])
+    (example,) = re.findall(r"^\s*Example: (flexura .*)$", COMMANDS[name].__doc__, re.MULTILINE)
+    assert shown.exit_code == 0 and "".join(f"Example: {example}".split()) in "".join(shown.output.split())
+    words = example.split()
+    assert words[1] == name
+    assert all((ROOT / word).is_file() for word in words if word.endswith(".toml"))
+    options = [word for word in words if word.startswith("--")]
+    assert all(option in shown.output for option in options)
+
+
+# --- what is wrong is said in one line, and nothing is left
+
+BAD_ROBOT = RIG.read_text().replace("2.0e11", "200.0")
+BAD_LAW = LAW.read_text().replace('"harmonic"', '"sine"')
+WRONG = {
+    "simulate, a modulus in GPa": (["simulate", "bad.toml"], "bad.toml: link[2].young_modulus_Pa = 200.0: expected"),
+    "frequencies, a modulus in GPa": (["frequencies", "bad.toml"], "bad.toml: link[2].young_modulus_Pa = 200.0: expected"),
+    "crosscheck, a modulus in GPa": (["crosscheck", "bad.toml"], "bad.toml: link[2].young_modulus_Pa = 200.0: expected"),
+    "no such file": (["simulate", "absent.toml"], "absent.toml: no such file"),
+    "a folder": (["simulate", "."], ".: a directory"),
+    "a wrong manoeuvre": (["simulate", RIG, "law.toml"], "law.toml: joint[1].motion.kind = 'sine': expected one of"),
+    "a robot for a manoeuvre": (["simulate", RIG, RIG], "an unknown key; known here: name, duration_s"),
+    "a tolerance beyond sense": (["simulate", RIG, LAW, "--rtol", "5"], "rtol = 5.0: expected a relative tolerance"),
+    "an unknown method": (["simulate", RIG, LAW, "--method", "euler"], "method = 'euler': expected"),
+    "an unknown beam": (["crosscheck", RIG, LAW, "--beam", "timoshenko"], "beam = 'timoshenko': expected"),
+    "no run": (["review", "."], ".: no run here: expected a folder with run.parquet"),
+}
+
+
+@pytest.mark.parametrize("arguments, words", WRONG.values(), ids=WRONG)
+def test_wrong_input_is_one_line_on_stderr_with_status_2_and_leaves_nothing(arguments, words, tmp_path, warm):
+    (tmp_path / "bad.toml").write_text(BAD_ROBOT)
+    (tmp_path / "law.toml").write_text(BAD_LAW)
+    before = sorted(tmp_path.rglob("*"))
+    out = [] if arguments[0] in ("frequencies", "review") else ["--out", tmp_path / "out"]
+    done = flexura(*arguments, *out, cwd=tmp_path)
+    assert done.returncode == 2 and done.stdout == ""
+    assert re.fullmatch(r"flexura: [^\n]+\n", done.stderr) and words in done.stderr
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+@pytest.mark.parametrize(
+    "arguments", [["fly"], ["simulate"], ["simulate", RIG, "--speed", "1"], ["simulate", RIG, "--rtol", "a"]]
+)
+def test_a_wrong_command_line_has_status_2_and_says_where_help_is(arguments, tmp_path):
+    done = flexura(*arguments, cwd=tmp_path)
+    assert done.returncode == 2 and done.stdout == ""
+    assert "--help" in done.stderr and "Traceback" not in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+# --- simulate
+
+
+def test_simulate_stores_a_run_and_its_json_parses(warm):
+    done, folder = warm
+    assert done.returncode == 0
+    told, run = json.loads(done.stdout), fx.Run.read(folder)
+    assert told["run"] == str(folder / "run.parquet") and [path.name for path in folder.iterdir()] == ["run.parquet"]
+    assert told["complete"] and run.complete and told["end_s"] == run.t[-1] == 2.0 and len(run) == 401
+    assert run.meta["manoeuvre"] == "inverse law of the dissertation, joint PD" and run.meta["source"] == "simulation"
+    assert fx.Robot.from_dict(run.meta["robot"]) == fx.load(RIG)
+    for name in run:
+        channel = told["channels"][name]
+        assert channel["unit"] == run.units[name]
+        assert (channel["start"], channel["highest"], channel["end"]) == (run[name][0], run[name].max(), run[name][-1])
+    assert abs(run["energy/kinetic"]).max() > 0 and told["energy_error"] < 1e-5
+
+
+def test_simulate_without_a_manoeuvre_moves_every_joint_and_shows_a_table(warm, tmp_path):
+    """Results go to logs/<command>-<robot> under the working folder."""
+    done = flexura("simulate", RIG, cwd=tmp_path)
+    run = fx.Run.read(tmp_path / "logs" / "simulate-rig")
+    assert done.returncode == 0 and done.stderr == ""
+    assert all(np.ptp(run[f"joint/{i}/position"]) > 1e-3 for i in (1, 2))
+    assert all(text in done.stdout for text in ("rig (type IV, PaR)", "joint/1/position", "link/2/tip_deflection", "stored logs"))
+
+
+def test_ctrl_c_stores_what_there_is_and_marks_it_incomplete(warm, tmp_path):
+    """The interrupt comes when the progress bar shows that the solver is at work."""
+    law = (
+        LAW.read_text()
+        .replace("duration_s = 2.0", "duration_s = 50000.0")
+        .replace("output_step_s = 0.005", "output_step_s = 0.5")
+    )
+    (tmp_path / "long.toml").write_text(law)
+    command = [sys.executable, "-m", "flexlab.cli", "simulate", str(RIG), "long.toml", "--out", "out"]
+    terminal, side = os.openpty()
+    environment = ENVIRONMENT | {"TERM": "xterm"}
+    with subprocess.Popen(command, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, stderr=side, text=True) as process:
+        os.close(side)
+        shown, deadline = b"", time.monotonic() + 120
+        try:
+            while not re.search(rb"[1-9]\d? %", shown):
+                assert time.monotonic() < deadline, shown
+                shown += os.read(terminal, 4096)
+            process.send_signal(signal.SIGINT)
+            while True:  # until the other side is closed
+                try:
+                    if not os.read(terminal, 4096):
+                        break
+                except OSError:
+                    break
+            assert process.wait(60) == 130
+        finally:
+            process.kill()
+            os.close(terminal)
+    run = fx.Run.read(tmp_path / "out")
+    assert not run.complete and 1 < len(run) < 100001 and np.isfinite(run["tip/x"]).all()
+    assert run.meta["events"][-1]["text"] == "interrupted"
+
+
+# --- frequencies
+
+LENGTH, MASS, STIFFNESS = 0.5, 0.2, 3.0
+CANTILEVER = f"""
+[[link]]
+length_m = {LENGTH}
+elements = 10
+mass_per_length_kg_m = {MASS}
+bending_stiffness_N_m2 = {STIFFNESS}
+[link.joint]
+type = "R"
+"""
+
+
+def test_frequencies_of_a_cantilever_are_those_of_the_books(tmp_path):
+    """Clamped and free: cos b cosh b = -1. Hinged and free: tan b = tanh b, after the rotation at 0 Hz."""
+    (tmp_path / "cantilever.toml").write_text(CANTILEVER)
+    done = flexura("frequencies", "cantilever.toml", "--json", cwd=tmp_path)
+    told = json.loads(done.stdout)
+    assert done.returncode == 0 and done.stderr == ""
+    scale = np.sqrt(STIFFNESS / (MASS * LENGTH**4)) / (2 * np.pi)
+    np.testing.assert_allclose(told["locked_Hz"][:3], scale * np.array([1.87510407, 4.69409113, 7.85475744]) ** 2, rtol=3e-4)
+    np.testing.assert_allclose(told["free_Hz"][1:3], scale * np.array([3.92660231, 7.06858275]) ** 2, rtol=3e-4)
+    assert abs(told["free_Hz"][0]) < 1e-3
+    table = flexura("frequencies", "cantilever.toml", cwd=tmp_path)
+    assert table.returncode == 0 and f"{told['locked_Hz'][0]:.5g}" in table.stdout and f"{told['free_Hz'][2]:.5g}" in table.stdout
+
+
+@pytest.mark.xfail(strict=False, reason="the Jacobian's step is too long for the highest modes of a fine mesh")
+@pytest.mark.parametrize("elements", [30, 100, 200])
+def test_frequencies_of_a_fine_mesh_are_as_right(elements, tmp_path):
+    (tmp_path / "cantilever.toml").write_text(CANTILEVER.replace("elements = 10", f"elements = {elements}"))
+    system = fx.assemble(fx.load(tmp_path / "cantilever.toml"))
+    scale = np.sqrt(STIFFNESS / (MASS * LENGTH**4)) / (2 * np.pi)
+    np.testing.assert_allclose(fx.frequencies(system)[:2], scale * np.array([1.87510407, 4.69409113]) ** 2, rtol=1e-5)
+    np.testing.assert_allclose(fx.frequencies(system, joints="free")[1], scale * 3.92660231**2, rtol=1e-5)
+
+
+# --- crosscheck, doctor
+
+
+def test_crosscheck_of_the_rig_passes_and_leaves_both_runs_and_their_review(warm, tmp_path):
+    done = flexura("crosscheck", RIG, LAW, "--out", tmp_path / "out", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    told = json.loads(done.stdout)
+    assert told["passed"] and told["failed"] == [] and told["tolerance"] == 0.01
+    assert told["channels"]["link/2/tip_deflection"]["max_relative"] < 0.01
+    native, twin = (fx.Run.read(tmp_path / "out" / name) for name in ("simulation", "twin"))
+    assert (native.meta["source"], twin.meta["source"]) == ("simulation", "twin") and native.complete and twin.complete
+    assert (tmp_path / "out" / "review.rrd").stat().st_size > 10_000 and told["review"].endswith("review.rrd")
+
+
+def test_crosscheck_beyond_its_tolerance_has_status_1_and_names_the_channels(warm, tmp_path):
+    done = flexura("crosscheck", RIG, LAW, "--out", tmp_path / "out", "--tolerance", "1e-12", cwd=tmp_path)
+    assert done.returncode == 1
+    assert "beyond the tolerance" in done.stderr and "link/2/tip_deflection" in done.stderr
+    assert fx.Run.read(tmp_path / "out" / "twin").complete
+
+
+def test_doctor_has_status_0_where_nothing_is_missing(tmp_path):
+    done = flexura("doctor", "--json", cwd=tmp_path)
+    found = {finding["what"]: finding for finding in json.loads(done.stdout)}
+    missing = [finding for finding in found.values() if finding["state"] == "missing"]
+    assert done.returncode == (1 if missing else 0) and all(finding["cost"] for finding in missing)
+    assert found["Python"]["state"] == found["numpy"]["state"] == found["pyarrow"]["state"] == "ok"
+    assert list(tmp_path.iterdir()) == []
