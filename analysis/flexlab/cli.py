@@ -23,7 +23,7 @@ app = typer.Typer(
 RobotFile = Annotated[Path, typer.Argument(metavar="ROBOT", help="robot file (TOML), for example model/robots/rig.toml")]
 ManoeuvreFile = Annotated[
     Path | None,
-    typer.Argument(metavar="[MANOEUVRE]", help="manoeuvre file (TOML); without one, a modest back and forth of every joint"),
+    typer.Argument(metavar="MANOEUVRE", help="manoeuvre file (TOML); without one, a modest back and forth of every joint"),
 ]
 Out = Annotated[
     Path | None, typer.Option("--out", metavar="FOLDER", help="where to leave the results; default logs/<command>-<robot>")
@@ -39,6 +39,7 @@ def simulate(
 ) -> None:  # fmt: skip
     """Simulate a robot natively and store the run.
 
+    \b
     Example: flexura simulate model/robots/rig.toml model/manoeuvres/rig-inverse-law.toml
     """
     import flexura as fx
@@ -62,6 +63,7 @@ def simulate(
 def frequencies(robot: RobotFile, json: Json = False) -> None:
     """Natural frequencies at the start, joints locked and free.
 
+    \b
     Example: flexura frequencies model/robots/two-link-arm.toml
     """
     import flexura as fx
@@ -83,11 +85,12 @@ def frequencies(robot: RobotFile, json: Json = False) -> None:
 def crosscheck(
     robot: RobotFile, manoeuvre: ManoeuvreFile = None, out: Out = None, rtol: Rtol = 1e-7,
     beam: Annotated[str, typer.Option(help="ancf (Euler-Bernoulli) or ge (geometrically exact, with shear)")] = "ancf",
-    tolerance: Annotated[float, typer.Option(help="largest deviation allowed, relative to each channel's peak")] = 0.01,
+    tolerance: Annotated[float, typer.Option(min=0.0, help="largest deviation allowed, relative to each channel's peak")] = 0.01,
     json: Json = False,
 ) -> None:  # fmt: skip
     """Simulate a robot natively and in Exudyn, and compare; exit status 1 when a channel deviates by more than the tolerance.
 
+    \b
     Example: flexura crosscheck model/robots/rig.toml model/manoeuvres/rig-inverse-law.toml --tolerance 0.005
     """
     from . import crosscheck as cross
@@ -121,6 +124,7 @@ def review(
 ) -> None:
     """Look at one run, or at two of them side by side, in Rerun.
 
+    \b
     Example: flexura review logs/demo/simulation logs/demo/twin --picture review.png
     """
     import flexura as fx
@@ -149,6 +153,7 @@ def demo(
 ) -> None:
     """The dissertation's rig along its inverse law, natively and in Exudyn, with a review to look at.
 
+    \b
     Example: flexura demo
     """
     from . import tables
@@ -183,6 +188,7 @@ def demo(
 def doctor(json: Json = False) -> None:
     """What is installed, what is missing, and what that costs.
 
+    \b
     Example: flexura doctor
     """
     from .doctor import examine
@@ -211,13 +217,14 @@ def _prepare(robot: Path, manoeuvre: Path | None) -> Any:
 
     from .manoeuvres import modest
 
-    _announce_compiling()
     described = fx.load(robot)
     try:
         system = fx.assemble(described)
     except fx.InputError as error:
         raise error if error.file else error.in_file(str(robot)) from None
-    return system, modest(system) if manoeuvre is None else fx.load_manoeuvre(manoeuvre, len(described.links))
+    asked = None if manoeuvre is None else fx.load_manoeuvre(manoeuvre, len(described.links))
+    _announce_compiling()
+    return system, asked or modest(system)
 
 
 def _announce_compiling() -> None:
@@ -284,6 +291,9 @@ def main() -> None:
     except KeyboardInterrupt:
         typer.echo("flexura: interrupted", err=True)
         sys.exit(130)
+    except OSError as error:
+        typer.echo(f"flexura: {error.filename or 'a file'}: {error.strerror or error}", err=True)
+        sys.exit(1)
     except Exception as error:
         from flexura.errors import FlexuraError, InputError
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from .robot import Link
 
+
 def hermite(s: np.ndarray, h: float, derivative: int = 0) -> np.ndarray:
     """The four cubics N1 ... N4 on an element of length h at s = x/h in [0, 1], or their x-derivatives; (4, *s.shape).
 
@@ -176,8 +177,8 @@ def _outboard(link: Link, cells: np.ndarray, x: np.ndarray) -> tuple[np.ndarray,
 def _points(link: Link) -> tuple[np.ndarray, ...]:
     """The ends of equal cells (x, mass, phi) and two Gauss points in each cell (dx, EI dx, phi', phi'').
 
-    The cells are the elements, so that nothing jumps inside one, but at least 4 and, where only some modes are kept, no more than their
-    shapes need.
+    The cells are the elements, so that nothing jumps inside one, but at least 4 and, where only some modes are kept, no more
+    than their shapes need.
     """
     L, n = link.length_m, link.elements
     count = n if n > 2 else 4
@@ -191,7 +192,8 @@ def _points(link: Link) -> tuple[np.ndarray, ...]:
 
 
 def _newton_cotes(cells: int) -> np.ndarray:
-    """Weights (cells + 1,) of a closed rule on cells of length 1: Boole for 4, else Simpson, and 3/8 for the last three of an odd number."""
+    """Weights (cells + 1,) of a closed rule on cells of length 1: Boole for 4, else Simpson, and 3/8 for the last three of an
+    odd number."""
     if cells == 4:
         return np.array([14, 64, 24, 64, 14]) / 45
     weights = np.zeros(cells + 1)

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from . import loop
+from .chain import Work
 from .drive import Drive
 from .errors import FlexuraError, InputError
-from .chain import Work
 from .kernel import accelerate
 from .observe import observe
 from .run import Run
@@ -38,7 +38,7 @@ def simulate(
     """Integrate the equations of motion from t_eval[0] on; the Run has its channels at t_eval (T,), ascending [s].
 
     `drive`: a Drive (compiled), or a function (t) -> (N,) or (t, position, velocity, tip_deflection) -> (N,) of forces and
-    torques [N or N m] (slower, by scipy's solve_ivp). `q0`, `qd0` (n,): state at the start, by default `system.start()` at
+    torques [N or N m] (slower, by scipy). `q0`, `qd0` (n,): state at the start, by default `system.start()` at
     rest. `rtol`: largest local error relative to the largest value so far. `method`: "explicit", "implicit" or "auto".
     `progress` is called with the finished fraction. A joint that reaches a limit of the robot file ends the run: the Run holds
     the states before it, an event says so and `meta["complete"]` is false; so it is after a Ctrl-C. `meta["energy_error"]` is
@@ -70,7 +70,7 @@ def simulate(
             )
         states, work, meta = _compiled(system, t, drive, state, rtol, chosen, progress)
     else:
-        states, work, meta = _python(system, t, drive, state, rtol, chosen)
+        states, work, meta = _python(system, t, drive, state, rtol, chosen, progress)
     meta |= {"rtol": rtol, "method": "explicit" if chosen == loop.EXPLICIT else "implicit"}
     return _record(system, t[: len(states)], states, work, drive, meta)
 
@@ -86,11 +86,12 @@ def inverse(
     method: str = "auto",
     progress: Callable[[float], None] | None = None,
 ) -> Run:
-    """Inverse dynamics: joints follow `motion` (one Signal a joint) exactly; the Run has `joint/i/drive`, the forces that this takes.
+    """Inverse dynamics: joints follow `motion` (one Signal a joint) exactly; the Run has `joint/i/drive`, the forces that this
+    takes.
 
-    The elastic unknowns are integrated from q0, qd0 (n,), whose joint entries are replaced by the motion's; nothing is approximated by a
-    rigid robot and nothing iterated. Replaying the drives through `simulate` returns the motion. Otherwise as `simulate`; raises
-    InputError for a motion whose position or velocity jumps.
+    The elastic unknowns are integrated from q0, qd0 (n,), whose joint entries are replaced by the motion's; nothing is
+    approximated by a rigid robot and nothing iterated. Replaying the drives through `simulate` returns the motion. Otherwise as
+    `simulate`; raises InputError for a motion whose position or velocity jumps.
     """
     motions = [motion] if isinstance(motion, Signal) else list(motion)
     if len(motions) != len(system.robot.links) or not all(isinstance(m, Signal) for m in motions):
@@ -109,7 +110,6 @@ def _compiled(
 ) -> tuple[np.ndarray, np.ndarray, dict[str, Any]]:
     c, n, links = system.chain, system.n, len(system.robot.links)
     inputs, m, w = _inputs(system, drive), loop.memory(links, n), _following(system, drive)
-    limits = list(zip(inputs.low, inputs.high, strict=True))
     out = np.zeros((len(t), 2 * n + 2))
     m.z[:], out[0] = state, state
     m.s[loop.T], m.s[loop.OUT], m.s[loop.ERR] = t[0], 1, 1.0
@@ -130,16 +130,7 @@ def _compiled(
                     "to a right angle, or a gain or force is too large"
                 )
             if status == loop.LIMIT:
-                joint = int(m.s[loop.FAULT])
-                low, high = limits[joint]
-                unit = "rad" if system.robot.links[joint].joint.type == "R" else "m"
-                events.append(
-                    {
-                        "t": float(m.s[loop.T]),
-                        "level": "ERROR",
-                        "text": f"joint {joint + 1} left its limits, {low:g} to {high:g} {unit}: stopped",
-                    }
-                )
+                events.append(_limit_event(system, int(m.s[loop.FAULT]), float(m.s[loop.T])))
                 break
             complete = status == loop.DONE
     except KeyboardInterrupt:
@@ -173,10 +164,16 @@ def _following(system: System, drive: Drive) -> Work:
 
 
 def _python(
-    system: System, t: np.ndarray, drive: Callable[..., Any], state: np.ndarray, rtol: float, method: int
+    system: System,
+    t: np.ndarray,
+    drive: Callable[..., Any],
+    state: np.ndarray,
+    rtol: float,
+    method: int,
+    progress: Callable[[float], None] | None,
 ) -> tuple[np.ndarray, np.ndarray, dict[str, Any]]:
     """The same equations under a Python function, by scipy: 100 times slower than a Drive, and as exact."""
-    from scipy.integrate import solve_ivp
+    from scipy.integrate import DOP853, Radau
 
     c, n, links = system.chain, system.n, len(system.robot.links)
     w, zero, a = system._work(), np.zeros(links), np.zeros(n)
@@ -191,22 +188,50 @@ def _python(
         loop._powers(c, v, force, dz)
         return dz
 
-    name = "DOP853" if method == loop.EXPLICIT else "Radau"
-    result = solve_ivp(slope, (t[0], t[-1]), state, method=name, t_eval=t, rtol=max(rtol, 3e-14), atol=rtol * loop.FLOOR)
-    if not result.success:
-        raise FlexuraError(f"the simulation ended at t = {result.t[-1] if len(result.t) else t[0]:.6g} s: {result.message}")
-    z = result.y.T
-    return (
-        z[:, : 2 * n],
-        z[:, 2 * n :],
-        {
-            "steps": int(result.nfev),
-            "wall_s": time.perf_counter() - begun,
-            "complete": True,
-            "events": [],
-            "drive": "Python function",
-        },
+    solver = (DOP853 if method == loop.EXPLICIT else Radau)(
+        slope, t[0], state, t[-1], rtol=max(rtol, 3e-14), atol=rtol * loop.FLOOR
     )
+    events: list[dict[str, Any]] = []
+    out = [state]
+    limits = np.array([link.joint.limits or (-np.inf, np.inf) for link in system.robot.links])
+
+    def beyond(z: np.ndarray) -> list[dict[str, Any]]:
+        outside = (z[system.joint_rows] < limits[:, 0]) | (z[system.joint_rows] > limits[:, 1])
+        return [_limit_event(system, int(np.argmax(outside)), float(solver.t))] if outside.any() else []
+
+    steps = 0
+    try:
+        while len(out) < len(t) and not events:
+            message = solver.step()
+            if solver.status == "failed":
+                raise FlexuraError(f"the simulation got no further than t = {solver.t:.6g} s: {message}")
+            steps += 1
+            dense = solver.dense_output()
+            while len(out) < len(t) and t[len(out)] <= solver.t and not events:
+                z = dense(t[len(out)])
+                events += beyond(z)
+                out += [] if events else [z]
+            events = events or beyond(solver.y)
+            if progress is not None:
+                progress((solver.t - t[0]) / (t[-1] - t[0]))
+    except KeyboardInterrupt:
+        events.append({"t": float(solver.t), "level": "WARN", "text": "interrupted"})
+    z = np.array(out)
+    meta = {
+        "steps": steps,
+        "evaluations": solver.nfev,
+        "wall_s": time.perf_counter() - begun,
+        "events": events,
+        "drive": "Python function",
+    }
+    return z[:, : 2 * n], z[:, 2 * n :], meta | {"complete": len(out) == len(t)}
+
+
+def _limit_event(system: System, joint: int, t: float) -> dict[str, Any]:
+    described = system.robot.links[joint].joint
+    low, high = described.limits or (-np.inf, np.inf)
+    unit = "rad" if described.type == "R" else "m"
+    return {"t": t, "level": "ERROR", "text": f"joint {joint + 1} left its limits, {low:g} to {high:g} {unit}: stopped"}
 
 
 def as_function(drive: Callable[..., Any]) -> Callable[[float, np.ndarray, np.ndarray, float], np.ndarray]:

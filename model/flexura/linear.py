@@ -8,7 +8,7 @@ import numpy as np
 
 from .errors import InputError
 from .statics import static
-from .system import System, jacobian
+from .system import System
 
 
 def frequencies(system: System, q: Any = None, joints: str = "locked", *, qd: Any = None) -> np.ndarray:
@@ -27,25 +27,18 @@ def frequencies(system: System, q: Any = None, joints: str = "locked", *, qd: An
     if len(rows) == 0:
         return np.zeros(0)
     pick = np.ix_(rows, rows)
-    zero = np.zeros(system.n)
-    # in the solver's coordinates the elastic block of M is well scaled
-    T, S = system.transform, system.to_solver
-
-    def forces(y: np.ndarray, v: np.ndarray) -> np.ndarray:
-        z = T @ y
-        return T.T @ (system._inverse(z, T @ v, zero, system.chain.gravity)) + K0 @ y
-
-    K0 = T.T @ system.stiffness() @ T
+    T, S = system.transform, system.to_solver  # in the solver's coordinates the elastic block of M is well scaled
     y, v = S @ at, S @ rates
     M = (T.T @ system.mass(at) @ T)[pick]
-    K = jacobian(lambda z: forces(z, v), y)[pick]
+    K = (T.T @ system.stiffness() @ T + system.differences(lambda z: system.residual(z, v), y))[pick]
     if qd is None:
         from scipy.linalg import eigh
 
         squares = eigh((K + K.T) / 2, M, eigvals_only=True)
-        squares[np.abs(squares) < 1e-7 * max(squares[-1], 1.0) * (joints == "free")] = 0.0
+        rigid = len(system.free_rows) - len(system.elastic_rows) if joints == "free" and not system.chain.gravity.any() else 0
+        squares[:rigid] = 0.0  # without gravity nothing holds a free joint
         return np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)
-    G = jacobian(lambda u: forces(y, u), v)[pick]
+    G = system.differences(lambda u: system.residual(y, u), v, 1e3)[pick]
     n = len(rows)
     A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, G)]])
     values = np.linalg.eigvals(A).imag

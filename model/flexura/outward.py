@@ -1,4 +1,5 @@
-"""The outward pass: positions and velocities from the base to the tip, and every link's inertia terms and velocity-dependent forces."""
+"""The outward pass: positions and velocities from the base to the tip, and every link's inertia terms and velocity-dependent
+forces."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ import numpy as np
 from . import extended
 from .errors import FlexuraError, InputError
 from .observe import observe
-from .system import System, jacobian
+from .system import System
 
 
 def static(
@@ -34,25 +34,26 @@ def static(
     if len(rows) == 0:
         return q
 
-    K = system.stiffness()
+    T, zero = system.transform, np.zeros(system.n)
+    K = T.T @ system.stiffness() @ T
+    pick = np.ix_(rows, rows)
 
     def residual(z: np.ndarray) -> np.ndarray:
-        return K @ z + system.gravity(z) - _tip_jacobian(system, z).T @ load
+        return K @ z + system.residual(z, zero) - extended.tip_jacobian(system.chain, system._work(), z).T @ load
 
+    y = system.to_solver @ q
     scale = np.sqrt(np.diag(K)[rows])
     for _ in range(30):
-        r = residual(q)[rows]
-        step = np.linalg.solve(jacobian(residual, q)[np.ix_(rows, rows)], r)
-        q[rows] -= step
-        if not np.all(np.isfinite(q)):
+        tangent = system.differences(residual, y)[pick]
+        step = np.linalg.solve(tangent, residual(y)[rows])
+        y[rows] -= step
+        if not np.all(np.isfinite(y)):
             break
-        if np.linalg.norm(step * scale) <= 1e-11 * (np.linalg.norm(q[rows] * scale) + 1e-9):
-            return q
-    raise FlexuraError("no static equilibrium found: a link buckles, or the load bends it beyond the range of this model")
-
-
-def _tip_jacobian(system: System, q: np.ndarray) -> np.ndarray:
-    return extended.tip_jacobian(system.chain, system._work(), system.to_solver @ q) @ system.to_solver
+        if np.linalg.norm(step * scale) <= 1e-11 * (np.linalg.norm(y[rows] * scale) + 1e-9):
+            if np.linalg.eigvalsh((tangent + tangent.T) / 2 / scale / scale[:, None])[0] <= 0:
+                break  # an equilibrium, but an unstable one
+            return T @ y
+    raise FlexuraError("no stable static equilibrium found: a link buckles, or the load bends it past a right angle")
 
 
 def tip_pose(system: System, q: np.ndarray) -> np.ndarray:

@@ -67,11 +67,11 @@ class System:
         return self.to_solver.T @ M @ self.to_solver
 
     def stiffness(self, q: np.ndarray | None = None) -> np.ndarray:
-        """K (n, n), constant; with q the tangent stiffness K + d gravity / dq there."""
-        K = self.to_solver.T @ np.diag(self._diagonal(self.chain.lam, np.zeros(len(self.links)))) @ self.to_solver
-        if q is None:
-            return K
-        return K + jacobian(self.gravity, self._check(q))
+        """K (n, n), constant; with q the tangent stiffness there, d (K q + gravity) / dq."""
+        K = np.diag(self._diagonal(self.chain.lam, np.zeros(len(self.links))))
+        if q is not None:
+            K += self.differences(lambda y: self.residual(y, np.zeros(self.n)), self.to_solver @ self._check(q))
+        return self.to_solver.T @ K @ self.to_solver
 
     @cached_property
     def damping(self) -> np.ndarray:
@@ -84,7 +84,7 @@ class System:
         return np.concatenate(parts)
 
     def gravity(self, q: np.ndarray) -> np.ndarray:
-        """Generalised gravity forces (n,), on the left-hand side."""
+        """Generalised gravity forces (n,), on the left-hand side; with stiffening, plus the strain energy's terms beyond K q."""
         zero = np.zeros(self.n)
         return self._inverse(q, zero, zero, self.chain.gravity)
 
@@ -96,6 +96,17 @@ class System:
         """Generalised forces (n,) that the motion needs: the whole left-hand side (Coulomb friction left out), by
         Newton-Euler."""
         return self._inverse(q, qd, qdd, self.chain.gravity) + self.damping @ np.asarray(qd) + self.stiffness() @ np.asarray(q)
+
+    def residual(self, y: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """bias + gravity and the strain energy's higher terms (n,), on the left-hand side, in the solver's coordinates."""
+        out = np.zeros(self.n)
+        inverse(self.chain, self._work(), y, v, np.zeros(self.n), self.chain.gravity, out)
+        return out
+
+    def differences(self, function: Callable[[np.ndarray], np.ndarray], y: np.ndarray, scale: float = 1.0) -> np.ndarray:
+        """d function / dy (m, n) in the solver's coordinates; each step turns a link by about 1e-4 rad, times `scale`."""
+        steep = _stack([np.abs(info.slope_d1).max(axis=0, initial=0.0) for info in self.links])
+        return jacobian(function, y, scale * 1e-4 / self._diagonal(steep, np.ones(len(self.links))))
 
     def _inverse(self, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, gravity: np.ndarray) -> np.ndarray:
         out = np.zeros(self.n)
@@ -119,10 +130,10 @@ class System:
         return shape(info.length, self.robot.links[link].elements, x).T @ info.basis
 
 
-def jacobian(function: Callable[[np.ndarray], np.ndarray], x: np.ndarray) -> np.ndarray:
-    """d function / d x, (m, n), by central differences; exact to about 1e-9 for the smooth functions here."""
-    step = 1e-5 * np.eye(len(x))
-    return np.column_stack([(function(x + e) - function(x - e)) / 2e-5 for e in step])
+def jacobian(function: Callable[[np.ndarray], np.ndarray], x: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """d function / d x, (m, n), by central differences with the given steps (n,)."""
+    shifts = np.diag(steps)
+    return np.column_stack([(function(x + e) - function(x - e)) / (2 * h) for e, h in zip(shifts, steps, strict=True)])
 
 
 def assemble(robot: Robot) -> System:
@@ -131,9 +142,7 @@ def assemble(robot: Robot) -> System:
     for i, link in enumerate(links):
         before = links[i - 1] if i else None
         if link.joint.type == "Pb":
-            raise FlexuraError(
-                f"link {i + 1}: a joint Pb is not in this version; R, and Pa on the base or a rigid link, are"
-            )
+            raise FlexuraError(f"link {i + 1}: a joint Pb is not in this version; R, and Pa on the base or a rigid link, are")
         if link.joint.type == "Pa" and before is not None and before.flexible:
             raise FlexuraError(
                 f"link {i + 1}: a joint Pa on a flexible link is not in this version; R, and Pa on the base or a rigid link, are"
