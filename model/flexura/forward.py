@@ -197,7 +197,14 @@ def _python(
 
     def beyond(z: np.ndarray) -> list[dict[str, Any]]:
         outside = (z[system.joint_rows] < limits[:, 0]) | (z[system.joint_rows] > limits[:, 1])
-        return [_limit_event(system, int(np.argmax(outside)), float(solver.t))] if outside.any() else []
+        if not outside.any():
+            return []
+        joint = int(np.argmax(outside))
+        return [
+            _limit_event(
+                system, joint, _crossing(solver.dense_output(), limits[joint], system.joint_rows[joint], solver.t_old, solver.t)
+            )
+        ]
 
     steps = 0
     try:
@@ -225,6 +232,15 @@ def _python(
         "drive": "Python function",
     }
     return z[:, : 2 * n], z[:, 2 * n :], meta | {"complete": len(out) == len(t)}
+
+
+def _crossing(dense: Callable[[float], np.ndarray], limits: np.ndarray, row: int, before: float, after: float) -> float:
+    """When the unknown in `row` left its limits, by bisection between two times [s]."""
+    for _ in range(60):
+        middle = (before + after) / 2
+        inside = limits[0] <= dense(middle)[row] <= limits[1]
+        before, after = (middle, after) if inside else (before, middle)
+    return before
 
 
 def _limit_event(system: System, joint: int, t: float) -> dict[str, Any]:

@@ -39,6 +39,12 @@ def outward(c: Chain, w: Work, y: np.ndarray, v: np.ndarray) -> None:
             w.cv[i, k] = -om2 * q[k]
         w.body[i, 0], w.body[i, 1], w.body[i, 2] = S0q, c.s1[i], c.inertia[i] + qq
         w.body[i, 3], w.body[i, 4], w.body[i, 5] = -2 * omega * S0v - om2 * c.s1[i], -om2 * S0q, 2 * omega * qv
+        Jp = c.tip_inertia[i]
+        if Jp > 0.0:  # q^T M q has the payload's turning in it, which does not act at a distance
+            w.body[i, 2] -= Jp * slope * slope
+            w.body[i, 5] -= 2 * omega * Jp * slope * spin
+            for k in range(m):
+                w.cv[i, k] += om2 * Jp * slope * c.SL[i, k]
         u, k_, z, turn = 0.0, 0.0, 0.0, 0.0
         w.tilt[i] = 1.0
         if c.stiffening and m > 0:
@@ -47,7 +53,6 @@ def outward(c: Chain, w: Work, y: np.ndarray, v: np.ndarray) -> None:
             tilt = 1.0 / np.sqrt(1.0 - slope * slope)
             w.tilt[i] = tilt
             turn = slope * spin * spin * tilt * tilt * tilt
-            Jp = c.tip_inertia[i]
             if Jp > 0.0:
                 w.body[i, 5] += Jp * turn
                 for k in range(m):

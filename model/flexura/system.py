@@ -21,7 +21,7 @@ from .run import STATIONS
 
 @dataclass(frozen=True)
 class System:
-    """A robot's equations M(q) qdd + bias(q, qd) + damping qd + stiffness q + gravity(q) = F.
+    """A robot's equations M(q) qdd + bias(q, qd) + damping qd + elastic(q) + gravity(q) = F.
 
     q (n,) is numbered [eta_1, u_1, eta_2, u_2, ...]: each joint, then the elastic unknowns of its link: deflection [m] and
     slope [rad] of nodes 1 ... n_i, or, for a link with `modes`, mass-normalised modal coordinates [kg^(1/2) m]. `labels` says
@@ -67,7 +67,7 @@ class System:
         return self.to_solver.T @ M @ self.to_solver
 
     def stiffness(self, q: np.ndarray | None = None) -> np.ndarray:
-        """K (n, n), constant; with q the tangent stiffness there, d (K q + gravity) / dq."""
+        """K (n, n), constant; with q the tangent stiffness there, d (elastic + gravity) / dq."""
         K = np.diag(self._diagonal(self.chain.lam, np.zeros(len(self.links))))
         if q is not None:
             K += self.differences(lambda y: self.residual(y, np.zeros(self.n)), self.to_solver @ self._check(q))
@@ -83,14 +83,20 @@ class System:
         parts = [np.concatenate([[joint[i]], elastic[i, : len(info.S0)]]) for i, info in enumerate(self.links)]
         return np.concatenate(parts)
 
-    def gravity(self, q: np.ndarray) -> np.ndarray:
-        """Generalised gravity forces (n,), on the left-hand side; with stiffening, plus the strain energy's terms beyond K q."""
+    def elastic(self, q: np.ndarray) -> np.ndarray:
+        """Elastic forces (n,), on the left-hand side: K q, and with stiffening the strain energy's terms of higher order."""
         zero = np.zeros(self.n)
-        return self._inverse(q, zero, zero, self.chain.gravity)
+        return self.stiffness() @ self._check(q) + self._inverse(q, zero, zero, np.zeros(2))
+
+    def gravity(self, q: np.ndarray) -> np.ndarray:
+        """Generalised gravity forces (n,), on the left-hand side."""
+        zero = np.zeros(self.n)
+        return self._inverse(q, zero, zero, self.chain.gravity) - self._inverse(q, zero, zero, np.zeros(2))
 
     def bias(self, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
         """Coriolis and centrifugal forces (n,), on the left-hand side."""
-        return self._inverse(q, qd, np.zeros(self.n), np.zeros(2))
+        zero = np.zeros(self.n)
+        return self._inverse(q, qd, zero, np.zeros(2)) - self._inverse(q, zero, zero, np.zeros(2))
 
     def forces(self, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
         """Generalised forces (n,) that the motion needs: the whole left-hand side (Coulomb friction left out), by
