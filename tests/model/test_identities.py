@@ -36,9 +36,9 @@ from robots import (
 )
 
 
-def close(a, b, tolerance: float) -> None:
-    """Agreement of two arrays relative to the largest entry."""
-    assert np.abs(np.asarray(a) - b).max() <= tolerance * max(np.abs(b).max(), np.abs(a).max(), 1e-9)
+def close(a, b, tolerance: float, least: float = 1e-9) -> None:
+    """Agreement of two arrays relative to the largest entry, or to `least`."""
+    assert np.abs(np.asarray(a) - b).max() <= tolerance * max(np.abs(b).max(), np.abs(a).max(), least)
 
 
 def energy(sys: fx.System, name: str, q: np.ndarray, qd: np.ndarray | None = None) -> float:
@@ -133,7 +133,7 @@ def test_bias_forces_follow_from_the_mass_matrix(bot, seed):
     )
     slope = gradient(lambda z: qd @ sys.mass(z) @ qd / 2, q, steps(sys, 2e-3))
     T = sys.transform.T
-    close(T @ (sys.bias(q, qd) - sys.bias(q, 0 * q)), T @ (rate - slope), 1e-7)
+    close(T @ (sys.bias(q, qd) - sys.bias(q, 0 * q)), T @ (rate - slope), 1e-7, least=1e-3)
 
 
 @few
@@ -178,9 +178,10 @@ def test_inverse_dynamics_returns_the_forces_that_were_applied(bot, seed):
     got = sys.transform.T @ sys.forces(q, qd, qdd)
     expected = np.zeros(sys.n)
     expected[sys.joint_rows] = tau
-    # in the solver's coordinates modes have unit mass, so that accelerations are among the forces that cancel
-    parts = [sys.to_solver @ qdd, *(sys.transform.T @ part for part in (sys.elastic(q), sys.bias(q, qd)))]
-    assert np.abs(got - expected).max() < 1e-8 * (1 + np.abs(parts).max())
+    # what cancels: in modes that turn a tip quickly, hubs there count for much more than their own unit mass
+    T, S = sys.transform, sys.to_solver
+    scale = np.abs(T.T @ sys.mass(q) @ T) @ np.abs(S @ qdd) + np.abs(T.T @ sys.stiffness() @ q) + np.abs(T.T @ sys.bias(q, qd))
+    assert np.abs(got - expected).max() < 1e-10 * (1 + scale.max())
 
 
 @fast

@@ -24,7 +24,12 @@ def bench_arm(elements: int = 8, **keys: object) -> fx.System:
 
 def cart_arm() -> fx.System:
     """A carriage, a flexible link, a flexible link; friction in every joint."""
-    cart = {"length_m": 0.1, "mass_kg": 0.5, "inertia_kg_m2": 1e-3, "joint": {"type": "Pa", "viscous_friction": 0.8, "rotor_inertia": 0.1}}
+    cart = {
+        "length_m": 0.1,
+        "mass_kg": 0.5,
+        "inertia_kg_m2": 1e-3,
+        "joint": {"type": "Pa", "viscous_friction": 0.8, "rotor_inertia": 0.1},
+    }
     first = {
         "length_m": 0.4, "elements": 3, "mass_per_length_kg_m": 0.3, "bending_stiffness_N_m2": 4.0, "damping": {"beta_s": 1e-4},
         "joint": {"type": "R", "hub_inertia_kg_m2": 1e-3, "coulomb_friction": 0.02},
@@ -113,7 +118,9 @@ def test_rigid_robot_needs_the_textbook_torque() -> None:
 
 def test_one_joint_may_be_prescribed_and_another_driven() -> None:
     system = cart_arm()
-    drive = fx.Drive((JointDrive(motion=MOTIONS[0], prescribed=True), JointDrive(motion=MOTIONS[1], kp=20.0, kd=0.5), JointDrive()))
+    drive = fx.Drive(
+        (JointDrive(motion=MOTIONS[0], prescribed=True), JointDrive(motion=MOTIONS[1], kp=20.0, kd=0.5), JointDrive())
+    )
     run = fx.simulate(system, np.linspace(0, 0.5, 101), drive, rtol=1e-9)
     assert np.allclose(run["joint/1/position"], [MOTIONS[0](s)[0] for s in run.t], atol=1e-13)
     assert np.abs(run["joint/3/position"]).max() > 0.1  # it falls
