@@ -13,6 +13,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 
 import flexura as fx
+from flexura.beam import shape
 
 SLOPE = 0.1  # rad: largest slope of a random state
 fast = settings(max_examples=25, deadline=None, derandomize=True, database=None)
@@ -164,6 +165,12 @@ def _shape(sys: fx.System, random: np.random.Generator, joints: float, slope: fl
         m = len(info.S0)
         if m:
             kept = min(3, m)
-            steep = np.abs(info.basis[1::2, :kept]).max(axis=0)  # of each mode, at the nodes
-            y[first + 1 : first + 1 + kept] = slope / kept / steep * random.uniform(-1, 1, kept)
+            y[first + 1 : first + 1 + kept] = slope / kept / steepest(sys, i)[:kept] * random.uniform(-1, 1, kept)
     return sys.transform @ y
+
+
+def steepest(sys: fx.System, link: int) -> np.ndarray:
+    """Largest slope of each mode of a link, (m,), per unit of it; inside elements it may be much larger than at the nodes."""
+    info, elements = sys.links[link], sys.robot.links[link].elements
+    x = np.linspace(0, info.length, 16 * elements + 1)
+    return np.abs(shape(info.length, elements, x, 1).T @ info.basis).max(axis=0)

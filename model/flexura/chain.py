@@ -63,7 +63,7 @@ class Work(NamedTuple):
     slope: np.ndarray  # (2p, 4) tan dx, (tan - sin) dx, forces of the strain energy on w', w''
     point: np.ndarray  # (p, 5) factors of h, phi, phi, h and tan - sin in the inertia forces
     body: np.ndarray  # (N, 6): int w dm, int (x + u) dm, int (x + u)^2 + w^2 dm; hr (3)
-    cond: np.ndarray  # (N, 30) of the condensation: A (6), b (3), (1 + E A)^-1 (9), X - P (9), t0 (3)
+    cond: np.ndarray  # (N, 36) of the condensation: A (6), b (3), (1 + E A)^-1 (9), X - P (9), t0 (3), E (6)
     joint: np.ndarray  # (N, 6): A s (3), 1 / (s^T A s + ...), tau - s^T b, s^T A s + rotor
     u: np.ndarray  # (N, 3)
     S: np.ndarray  # (N, m, m) the factor l of each link's elastic block
@@ -79,6 +79,6 @@ def workspace(c: Chain) -> Work:
     z, (N, m), p = np.zeros, c.S0.shape, c.point_x.shape[1]
     return Work(
         cos=z(N), sin=z(N), omega=z(N), place=z((N, 5)), tilt=z(N), g1q=z((N, m)), mt=z((N, m)), cv=z((N, m)), hq=z((N, m)),
-        h=z((N, p, m)), slope=z((2 * p, 4)), point=z((p, 5)), body=z((N, 6)), cond=z((N, 30)), joint=z((N, 6)),
+        h=z((N, p, m)), slope=z((2 * p, 4)), point=z((p, 5)), body=z((N, 6)), cond=z((N, 36)), joint=z((N, 6)),
         u=z((N, 3)), S=z((N, m, m)), dinv=z((N, m)), rhs=z((N, m, 7)), held=c.locked.copy(), given=z(N), reaction=z(N),
     )  # fmt: skip

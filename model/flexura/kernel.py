@@ -184,6 +184,7 @@ def _flexible_hub(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh:
     cond[18], cond[19], cond[20], cond[21], cond[22], cond[23] = x00, x01, x02, x10, x11, x12
     cond[24], cond[25], cond[26] = x20, x21, x22
     cond[27], cond[28], cond[29] = t0, t1, t2
+    cond[30], cond[31], cond[32], cond[33], cond[34], cond[35] = E00, E01, E02, E11, E12, E22
     B00 = A00 * c00 + A01 * c10 + A02 * c20
     B01 = A00 * c01 + A01 * c11 + A02 * c21
     B02 = A00 * c02 + A01 * c12 + A02 * c22
@@ -289,6 +290,16 @@ def passes(
                 t0 = cond[9] * r0 + cond[10] * r1 + cond[11] * r2
                 t1 = cond[12] * r0 + cond[13] * r1 + cond[14] * r2
                 t2 = cond[15] * r0 + cond[16] * r1 + cond[17] * r2
+                # once refined: the inverse has the square of the condition of 1 + E A in its error, which heavy bodies make large
+                f0 = cond[0] * t0 + cond[1] * t1 + cond[2] * t2
+                f1 = cond[1] * t0 + cond[3] * t1 + cond[4] * t2
+                f2 = cond[2] * t0 + cond[4] * t1 + cond[5] * t2
+                r0 -= t0 + cond[30] * f0 + cond[31] * f1 + cond[32] * f2
+                r1 -= t1 + cond[31] * f0 + cond[33] * f1 + cond[34] * f2
+                r2 -= t2 + cond[32] * f0 + cond[34] * f1 + cond[35] * f2
+                t0 += cond[9] * r0 + cond[10] * r1 + cond[11] * r2
+                t1 += cond[12] * r0 + cond[13] * r1 + cond[14] * r2
+                t2 += cond[15] * r0 + cond[16] * r1 + cond[17] * r2
                 f0 = cond[0] * t0 + cond[1] * t1 + cond[2] * t2 + cond[6]
                 f1 = cond[1] * t0 + cond[3] * t1 + cond[4] * t2 + cond[7]
                 f2 = cond[2] * t0 + cond[4] * t1 + cond[5] * t2 + cond[8]

@@ -21,7 +21,7 @@ from .signal import evaluate
 
 EXPLICIT, IMPLICIT = 0, 1
 RUNNING, DONE, LIMIT, STUCK = 0, 1, 2, 3
-T, H, OUT, BREAK, STEPS, REJECTED, EVALS, ERR, STATUS, FRESH, FAULT = range(11)  # entries of Memory.s
+T, H, OUT, BREAK, STEPS, REJECTED, EVALS, ERR, STATUS, FRESH, FAULT, LONGEST = range(12)  # entries of Memory.s
 FLOOR = 1e-3  # m, rad (joints); kg^(1/2) m (elastic, mass-normalised); per second for the velocities
 
 _A, _C = np.zeros((13, 12)), np.append(DOP853.C, 1.0)
@@ -60,7 +60,7 @@ class Inputs(NamedTuple):
 class Memory(NamedTuple):
     """All that a run in progress remembers, for n unknowns: state z = (y, v, work, loss) and the stages of one step."""
 
-    s: np.ndarray  # (11,) scalars, see T ... FAULT
+    s: np.ndarray  # (12,) scalars, see T ... LONGEST
     z: np.ndarray  # (2n + 2,)
     znew: np.ndarray
     K: np.ndarray  # (16, 2n + 2) stage derivatives
@@ -77,7 +77,7 @@ class Memory(NamedTuple):
 def memory(links: int, unknowns: int) -> Memory:
     z, size = np.zeros, 2 * unknowns + 2
     return Memory(
-        z(11), z(size), z(size), z((16, size)), z((7, size)), z((links, 4)), z(2 * unknowns), z(links),
+        z(12), z(size), z(size), z((16, size)), z((7, size)), z((links, 4)), z(2 * unknowns), z(links),
         z(unknowns), z(unknowns), z(unknowns), z(links),
     )  # fmt: skip
 
@@ -344,7 +344,7 @@ def advance(
             _weights(c, m, rtol, m.z)
             _slope_once(c, w, d, m, t, m.z, m.K[0])
             s[FRESH] = 1.0
-        h = min(s[H], stop - t)
+        h = min(s[H], stop - t, s[LONGEST])
         if stop - t < 1.5 * h and h < stop - t:
             h = 0.5 * (stop - t)
         if method == EXPLICIT:

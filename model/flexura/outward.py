@@ -103,7 +103,8 @@ def _bend(c: Chain, w: Work, i: int, q: np.ndarray, qd: np.ndarray, omega: float
     U, K, Z, dU, dK, dZ = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0  # u, h.v, z so far, and their parts of higher order
     b, J, hx, hy, hw = -0.5 * qGq, -qG2q, vGv, qGv, -2 * omega * qG2v
     for p in range(c.points[i]):
-        for r in range(2 * p, 2 * p + 2):
+        for half in range(2):
+            r = 2 * p + half
             s, sd, bend = 0.0, 0.0, 0.0
             for k in range(m):
                 s += c.slope_d1[i, r, k] * q[k]
@@ -143,7 +144,8 @@ def _bend(c: Chain, w: Work, i: int, q: np.ndarray, qd: np.ndarray, omega: float
     for k in range(m):
         h, dh, g, mt, cv = 0.0, 0.0, 0.0, 0.0, 0.0
         for p in range(c.points[i]):
-            for r in range(2 * p, 2 * p + 2):
+            for half in range(2):
+                r = 2 * p + half
                 d1 = c.slope_d1[i, r, k]
                 h += w.slope[r, 0] * d1
                 dh += w.slope[r, 1] * d1

@@ -46,7 +46,7 @@ def test_the_error_falls_with_the_tolerance(method, tolerances, make):
     exact = fx.simulate(sys, t, drive, rtol=1e-12, method="explicit")
     errors = [largest_difference(exact, fx.simulate(sys, t, drive, rtol=rtol, method=method)) for rtol in tolerances]
     assert all(error < 100 * rtol for error, rtol in zip(errors, tolerances)), errors
-    assert all(b < a for a, b in itertools.pairwise(errors)), errors
+    assert all(b < a or b < 1e-12 for a, b in itertools.pairwise(errors)), errors
 
 
 def test_both_methods_agree():
@@ -154,8 +154,8 @@ def test_a_jump_shorter_than_any_step_is_not_missed(method):
 @pytest.mark.parametrize("method", METHODS)
 def test_a_python_function_drives_like_the_same_drive(method):
     links = (rigid(0.1, 0.5, 0.05, 1e-3, viscous_friction=0.01), beam(0.3, 0.2, 0.4, 2, damping={"beta_s": 1e-3}))
-    sys, t = system(*links, payload=0.05), np.linspace(0, 0.3, 16)
-    drive = fx.Drive.force(signal.polynomial(0.05, 0.2), signal.cycloid(0.01, 0.1))
+    sys, t = system(*links, payload=0.05), np.linspace(0, 0.12, 13)
+    drive = fx.Drive.force(signal.polynomial(0.05, 0.1), signal.cycloid(0.01, 0.05))
     compiled = fx.simulate(sys, t, drive, rtol=1e-8, method=method)
     called = fx.simulate(sys, t, lambda s: drive(s, None, None), rtol=1e-8, method=method)
     assert largest_difference(compiled, called) < 1e-6
