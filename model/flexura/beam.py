@@ -183,7 +183,7 @@ def _points(link: Link) -> tuple[np.ndarray, ...]:
     L, n = link.length_m, link.elements
     count = n if n > 2 else 4
     if link.modes is not None:
-        count = min(count, 4 if link.modes <= 2 else 2 * link.modes)
+        count = min(count, max(4, link.modes + 1))
     x = L * np.arange(1, count + 1) / count
     mass = _newton_cotes(count)[1:] * (L / count) * link.mass_per_length(x)
     place, dx = _quadrature(np.append(0.0, x), 2)

@@ -48,7 +48,10 @@ def outward(c: Chain, w: Work, y: np.ndarray, v: np.ndarray) -> None:
         u, k_, z, turn = 0.0, 0.0, 0.0, 0.0
         w.tilt[i] = 1.0
         if c.stiffening and m > 0:
-            u, k_, z = _bend(c, w, i, q, qd, omega)
+            if c.points[i] == 4:  # the usual number as a constant: the compiler unrolls the loops over points
+                u, k_, z = _bend(c, w, i, q, qd, omega, 4)
+            else:
+                u, k_, z = _bend(c, w, i, q, qd, omega, c.points[i])
             # the tip's tangent turns by asin(w'), faster than w' by 1/cos
             tilt = 1.0 / np.sqrt(1.0 - slope * slope)
             w.tilt[i] = tilt
@@ -71,7 +74,7 @@ def outward(c: Chain, w: Work, y: np.ndarray, v: np.ndarray) -> None:
 
 
 @inlined
-def _bend(c: Chain, w: Work, i: int, q: np.ndarray, qd: np.ndarray, omega: float) -> tuple[float, float, float]:
+def _bend(c: Chain, w: Work, i: int, q: np.ndarray, qd: np.ndarray, omega: float, points: int) -> tuple[float, float, float]:
     """Add the geometry of an inextensible line to link i's inertia terms and forces; returns u, h.v, z of its tip.
 
     The point at arc length x lies at (x + u, w) in the hub's frame, with u = int_0^x (cos - 1), sin = w', so that
@@ -102,7 +105,7 @@ def _bend(c: Chain, w: Work, i: int, q: np.ndarray, qd: np.ndarray, omega: float
         vHv += hv * qd[k]
     U, K, Z, dU, dK, dZ = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0  # u, h.v, z so far, and their parts of higher order
     b, J, hx, hy, hw = -0.5 * qGq, -qG2q, vGv, qGv, -2 * omega * qG2v
-    for p in range(c.points[i]):
+    for p in range(points):
         for half in range(2):
             r = 2 * p + half
             s, sd, bend = 0.0, 0.0, 0.0
@@ -143,7 +146,7 @@ def _bend(c: Chain, w: Work, i: int, q: np.ndarray, qd: np.ndarray, omega: float
     w.body[i, 5] += hw
     for k in range(m):
         h, dh, g, mt, cv = 0.0, 0.0, 0.0, 0.0, 0.0
-        for p in range(c.points[i]):
+        for p in range(points):
             for half in range(2):
                 r = 2 * p + half
                 d1 = c.slope_d1[i, r, k]
