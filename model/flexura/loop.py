@@ -348,6 +348,9 @@ def advance(
         if stop - t < 1.5 * h and h < stop - t:
             h = 0.5 * (stop - t)
         if method == EXPLICIT:
+            ahead = t_eval[int(s[OUT])] - t
+            if 0.7 * h < ahead < h:
+                h = ahead  # a full step to an output costs less than the three stages of the interpolant
             error = _explicit_step(c, w, d, m, t, h, last)
         else:
             error = _implicit_step(c, w, d, m, t, h, last)
@@ -364,6 +367,8 @@ def advance(
         s[STEPS] += 1
         landed = h >= stop - t
         tn = stop if landed else t + h
+        if method == EXPLICIT and h == t_eval[int(s[OUT])] - t:
+            tn = t_eval[int(s[OUT])]
         prepared = False
         while int(s[OUT]) < t_eval.shape[0] and t_eval[int(s[OUT])] <= tn:
             row = int(s[OUT])
@@ -386,7 +391,7 @@ def advance(
                 s[STATUS], s[FAULT] = LIMIT, i
                 return
         factor = 5.0 if error == 0.0 else min(5.0, max(0.3, 0.9 * error ** (-0.7 / order) * max(s[ERR], 1e-4) ** (0.3 / order)))
-        if landed and h < s[H]:
+        if h < s[H]:
             s[H] = max(s[H], h * factor)
         else:
             s[H] = h * factor
