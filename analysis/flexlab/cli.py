@@ -165,11 +165,14 @@ def demo(
     _show(
         json,
         lambda: tables.check_table(check),
-        lambda: tables.check_json(check) | {"review": str(recording), "picture": str(drawn)},
+        lambda: tables.check_json(check) | {"review": str(recording), "picture": str(drawn) if isinstance(drawn, Path) else None},
     )
-    lines = [f"stored {out}: the runs, the review {recording.name}" + (f" and its picture {drawn.name}" if drawn else "")]
-    if drawn is None:
-        lines.append(f"no picture: {check.simulation.meta.get('picture')}")
+    lines = [
+        f"stored {out}: the runs, the review {recording.name}"
+        + (f" and its picture {drawn.name}" if isinstance(drawn, Path) else "")
+    ]
+    if not isinstance(drawn, Path):
+        lines.append(f"no picture: {drawn}")
     lines += [
         "next:",
         f"  flexura review {out / 'simulation'} {out / 'twin'}      the review, in a window",

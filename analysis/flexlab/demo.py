@@ -14,10 +14,10 @@ ROBOT = ROOT / "model" / "robots" / "rig.toml"
 MANOEUVRE = ROOT / "model" / "manoeuvres" / "rig-inverse-law.toml"
 
 
-def demonstrate(folder: Path, progress: Progress | None = None) -> tuple[Check, Path, Path | None]:
+def demonstrate(folder: Path, progress: Progress | None = None) -> tuple[Check, Path, Path | str]:
     """Simulate the rig natively and in Exudyn, and leave runs, review and picture in `folder`.
 
-    Returns the check, the review's path and the picture's, or None where this machine cannot draw.
+    Returns the check, the review's path and the picture's, or in its place why this machine cannot draw one.
     """
     from .review import picture
 
@@ -31,5 +31,4 @@ def demonstrate(folder: Path, progress: Progress | None = None) -> tuple[Check, 
     try:
         return check, review, picture(review, folder / "review.png")
     except fx.FlexuraError as error:
-        check.simulation.meta["picture"] = str(error)
-        return check, review, None
+        return check, review, str(error)

@@ -11,15 +11,15 @@ import numpy as np
 
 from . import loop
 from .chain import Work
+from .choice import choose, longest_step
 from .drive import Drive
 from .errors import FlexuraError, InputError
 from .kernel import accelerate
-from .observe import observe
+from .record import record
 from .run import Run
 from .signal import Signal
 from .system import System
 
-PROGRAM = "flexura"
 _METHODS = {"explicit": loop.EXPLICIT, "implicit": loop.IMPLICIT}
 _STEPS_A_CALL = 400  # between two looks at the progress bar and the keyboard
 
@@ -62,7 +62,7 @@ def simulate(
         _put_on_motions(system, drive, t[0], state)
     _inside_limits(system, state)
     drive = Drive.none(len(system.robot.links)) if drive is None else drive
-    chosen = _choose(system, t[-1] - t[0], rtol) if method == "auto" else _METHODS[method]
+    chosen = choose(system, t[-1] - t[0], rtol) if method == "auto" else _METHODS[method]
     if isinstance(drive, Drive):
         if len(drive.joints) != len(system.robot.links):
             raise InputError(
@@ -72,7 +72,8 @@ def simulate(
     else:
         states, work, meta = _python(system, t, drive, state, rtol, chosen, progress)
     meta |= {"rtol": rtol, "method": "explicit" if chosen == loop.EXPLICIT else "implicit"}
-    return _record(system, t[: len(states)], states, work, drive, meta)
+    t = t[: len(states)]
+    return record(system, t, states, work, _applied(system, t, states, drive), meta)
 
 
 def inverse(
@@ -113,7 +114,7 @@ def _compiled(
     out = np.zeros((len(t), 2 * n + 2))
     m.z[:], out[0] = state, state
     m.s[loop.T], m.s[loop.OUT], m.s[loop.ERR] = t[0], 1, 1.0
-    longest = _longest_step(system) if method == loop.EXPLICIT else np.inf
+    longest = longest_step(system) if method == loop.EXPLICIT else np.inf
     m.s[loop.LONGEST], m.s[loop.H] = longest, min(0.02 * longest, (t[-1] - t[0]) * 1e-4)
     events: list[dict[str, Any]] = []
     complete = len(t) == 1
@@ -150,7 +151,7 @@ def _compiled(
 
 def _inputs(system: System, drive: Drive) -> loop.Inputs:
     segments, ranges, gains = drive.packed()
-    limits = np.array([link.joint.limits or (-np.inf, np.inf) for link in system.robot.links])
+    limits = system.limits
     follows = drive.follows.astype(np.int64)
     return loop.Inputs(
         segments, ranges, gains[:, 0].copy(), gains[:, 1].copy(), follows, limits[:, 0].copy(), limits[:, 1].copy(), drive.breaks
@@ -194,7 +195,7 @@ def _python(
     )
     events: list[dict[str, Any]] = []
     out = [state]
-    limits = np.array([link.joint.limits or (-np.inf, np.inf) for link in system.robot.links])
+    limits = system.limits
 
     def beyond(z: np.ndarray) -> list[dict[str, Any]]:
         outside = (z[system.joint_rows] < limits[:, 0]) | (z[system.joint_rows] > limits[:, 1])
@@ -245,9 +246,8 @@ def _crossing(dense: Callable[[float], np.ndarray], limits: np.ndarray, row: int
 
 
 def _limit_event(system: System, joint: int, t: float) -> dict[str, Any]:
-    described = system.robot.links[joint].joint
-    low, high = described.limits or (-np.inf, np.inf)
-    unit = "rad" if described.type == "R" else "m"
+    low, high = system.limits[joint]
+    unit = "rad" if system.robot.links[joint].joint.type == "R" else "m"
     return {"t": t, "level": "ERROR", "text": f"joint {joint + 1} left its limits, {low:g} to {high:g} {unit}: stopped"}
 
 
@@ -269,54 +269,6 @@ def _forces(system: System, call: Callable[..., Any], t: float, y: np.ndarray, v
     if force.shape != rows.shape or not np.all(np.isfinite(force)):
         raise InputError(f"expected {len(rows)} finite forces from the drive function at t = {t:g} s", key="drive", value=force)
     return force
-
-
-def _record(system: System, t: np.ndarray, states: np.ndarray, work: np.ndarray, drive: Any, meta: dict[str, Any]) -> Run:
-    robot, n, links, rows = system.robot, system.n, len(system.robot.links), len(states)
-    poses, tips, ends, energies = np.zeros((rows, links, 3)), np.zeros((rows, links, 2)), np.zeros((rows, 2)), np.zeros((rows, 3))
-    observe(system.chain, system._work(), np.ascontiguousarray(states), poses, tips, ends, energies)
-    forces = _applied(system, t, states, drive)
-    channels: dict[str, np.ndarray] = {}
-    units: dict[str, str] = {}
-
-    def put(name: str, values: np.ndarray, unit: str) -> None:
-        channels[name], units[name] = np.ascontiguousarray(values), unit
-
-    for i, (link, row) in enumerate(zip(robot.links, system.joint_rows, strict=True), 1):
-        turns = link.joint.type == "R"
-        put(f"joint/{i}/position", states[:, row], "rad" if turns else "m")
-        put(f"joint/{i}/velocity", states[:, n + row], "rad/s" if turns else "m/s")
-        put(f"joint/{i}/drive", forces[:, i - 1], "N m" if turns else "N")
-    for i, link in enumerate(robot.links, 1):
-        for k, (name, unit) in enumerate((("x", "m"), ("y", "m"), ("angle", "rad"))):
-            put(f"link/{i}/{name}", poses[:, i - 1, k], unit)
-        if link.flexible:
-            put(f"link/{i}/tip_deflection", tips[:, i - 1, 0], "m")
-            put(f"link/{i}/tip_slope", tips[:, i - 1, 1], "rad")
-            own = slice(system.chain.first[i - 1] + 1, system.chain.first[i])
-            for k, row_shape in enumerate(system.stations(i - 1)):
-                put(f"link/{i}/deflection/{k}", states[:, own] @ row_shape, "m")
-    put("tip/x", ends[:, 0], "m")
-    put("tip/y", ends[:, 1], "m")
-    for k, name in enumerate(("kinetic", "strain", "potential")):
-        put(f"energy/{name}", energies[:, k], "J")
-    put("energy/work", work[:, 0], "J")
-    put("energy/loss", work[:, 1], "J")
-    total = energies.sum(axis=1)
-    balance = total - total[0] - (work[:, 0] - work[0, 0]) + (work[:, 1] - work[0, 1])
-    scale = max(np.abs(energies).max(), np.abs(energies - energies[0]).max(), np.abs(work).max(), 1e-300)
-    about = {
-        "source": "simulation",
-        "program": PROGRAM,
-        "name": robot.name,
-        "structure": robot.structure,
-        "unknowns": n,
-        "energy_error": float(np.abs(balance).max() / scale),
-        "robot": robot.to_dict(),
-    }
-    return Run(
-        t, channels, units, about | meta, np.hstack([states[:, :n] @ system.transform.T, states[:, n:] @ system.transform.T])
-    )
 
 
 def _applied(system: System, t: np.ndarray, states: np.ndarray, drive: Any) -> np.ndarray:
@@ -358,40 +310,3 @@ def _inside_limits(system: System, state: np.ndarray) -> None:
             raise InputError(
                 f"expected a start inside the limits of joint {i}, {list(link.joint.limits)}", key="q0", value=float(state[row])
             )
-
-
-def _longest_step(system: System) -> float:
-    """The explicit method's longest stable step [s], with 10 % to spare for a spectrum that moves with the robot.
-
-    DOP853 is stable for omega h < 5.97 on the imaginary axis and 6.39 on the real one. Beyond, its error estimate alone would
-    let the fastest modes grow for a few steps at a time, far above the tolerance.
-    """
-    fastest = max(_spectrum(system)[-1], 1e-300)
-    beta = max((link.damping.beta_s for link in system.robot.links), default=0.0)
-    return 5.3 / max(fastest, beta * fastest**2)
-
-
-def _spectrum(system: System) -> np.ndarray:
-    from scipy.linalg import eigvalsh
-
-    free = system.free_rows
-    if len(free) == 0:
-        return np.zeros(1)
-    q = system.start()
-    squares = eigvalsh(system.stiffness()[np.ix_(free, free)], system.mass(q)[np.ix_(free, free)])
-    return np.sqrt(np.maximum(squares, 0.0))
-
-
-def _choose(system: System, duration: float, rtol: float) -> int:
-    """The cheaper method by a count of passes: explicit steps follow the fastest mode, implicit ones the slow modes and the
-    tolerance."""
-    spectrum = _spectrum(system)
-    elastic = spectrum[spectrum > 1e-3 * max(spectrum[-1], 1e-300)]
-    if len(elastic) == 0:
-        return loop.EXPLICIT
-    slow = elastic[min(2, len(elastic) - 1)]
-    damped = max((link.damping.beta_s for link in system.robot.links), default=0.0) * spectrum[-1] ** 2
-    # the factors are counts of passes per radian, measured on the rig and on its undamped benchmark
-    explicit = duration * max(2.4 * spectrum[-1], 2 * damped, 0.8 * slow * rtol ** (-1 / 8))
-    implicit = duration * 0.2 * slow * rtol ** (-1 / 4)
-    return loop.EXPLICIT if explicit <= implicit else loop.IMPLICIT

@@ -30,7 +30,7 @@ def frequencies(system: System, q: Any = None, joints: str = "locked", *, qd: An
     T, S = system.transform, system.to_solver  # in the solver's coordinates the elastic block of M is well scaled
     y, v = S @ at, S @ rates
     M = (T.T @ system.mass(at) @ T)[pick]
-    K = (T.T @ system.stiffness() @ T + system.differences(lambda z: system.residual(z, v), y))[pick]
+    K = (system.modal_stiffness + system.differences(lambda z: system.residual(z, v), y))[pick]
     if qd is None:
         from scipy.linalg import eigh
 

@@ -8,8 +8,6 @@ from .chain import PRISMATIC, REVOLUTE, Chain, Work
 from .compiled import compiled
 from .outward import outward
 
-POSE = 3  # x, y, angle of a hub frame
-
 
 @compiled
 def _strain(c: Chain, i: int, q: np.ndarray) -> float:

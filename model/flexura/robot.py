@@ -21,7 +21,6 @@ MAX_LINKS = 256
 
 _strict = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 Positive = Annotated[float, Field(gt=0)]
-NonNegative = Annotated[float, Field(ge=0)]
 
 
 class _Table(BaseModel):

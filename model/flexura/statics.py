@@ -34,8 +34,7 @@ def static(
     if len(rows) == 0:
         return q
 
-    T, zero = system.transform, np.zeros(system.n)
-    K = T.T @ system.stiffness() @ T
+    K, zero = system.modal_stiffness, np.zeros(system.n)
     pick = np.ix_(rows, rows)
 
     def residual(z: np.ndarray) -> np.ndarray:
@@ -52,7 +51,7 @@ def static(
         if np.linalg.norm(step * scale) <= 1e-11 * (np.linalg.norm(y[rows] * scale) + 1e-9):
             if np.linalg.eigvalsh((tangent + tangent.T) / 2 / scale / scale[:, None])[0] <= 0:
                 break  # an equilibrium, but an unstable one
-            return T @ y
+            return system.transform @ y
     raise FlexuraError("no stable static equilibrium found: a link buckles, or the load bends it past a right angle")
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import block_diag
+from scipy.linalg import block_diag, eigvalsh
 
 from . import extended
 from .beam import LinkIntegrals, link_integrals, shape
@@ -55,6 +55,20 @@ class System:
         """Rows of q that can move: all but locked joints."""
         return np.setdiff1d(np.arange(self.n), self.joint_rows[self.chain.locked.astype(bool)])
 
+    @cached_property
+    def limits(self) -> np.ndarray:
+        """Lower and upper limits of the joints (links, 2) [m or rad], infinite where the file gives none."""
+        return np.array([link.joint.limits or (-np.inf, np.inf) for link in self.robot.links])
+
+    @cached_property
+    def spectrum(self) -> np.ndarray:
+        """Natural frequencies at the start, joints free, gravity left out, ascending [rad/s]; [0] where nothing moves."""
+        free = self.free_rows
+        if len(free) == 0:
+            return np.zeros(1)
+        pick = np.ix_(free, free)
+        return np.sqrt(np.maximum(eigvalsh(self.stiffness()[pick], self.mass(self.start())[pick]), 0.0))
+
     def start(self) -> np.ndarray:
         """The configuration at the start (n,): joints at their `start`, links straight."""
         q = np.zeros(self.n)
@@ -68,10 +82,15 @@ class System:
 
     def stiffness(self, q: np.ndarray | None = None) -> np.ndarray:
         """K (n, n), constant; with q the tangent stiffness there, d (elastic + gravity) / dq."""
-        K = np.diag(self._diagonal(self.chain.lam, np.zeros(len(self.links))))
+        K = self.modal_stiffness
         if q is not None:
-            K += self.differences(lambda y: self.residual(y, np.zeros(self.n)), self.to_solver @ self._check(q))
+            K = K + self.differences(lambda y: self.residual(y, np.zeros(self.n)), self.to_solver @ self._check(q))
         return self.to_solver.T @ K @ self.to_solver
+
+    @cached_property
+    def modal_stiffness(self) -> np.ndarray:
+        """K (n, n) in the solver's coordinates: diagonal, omega^2 of each link's own modes."""
+        return np.diag(self._diagonal(self.chain.lam, np.zeros(len(self.links))))
 
     @cached_property
     def damping(self) -> np.ndarray:
