@@ -340,8 +340,8 @@ def _shortest(c: Chain, z: np.ndarray) -> float:
     return least
 
 
-@inlined
-def _outside(c: Chain, d: Inputs, z: np.ndarray) -> int:
+@compiled
+def outside(c: Chain, d: Inputs, z: np.ndarray) -> int:
     """The first joint beyond its limits, or a slider that has run into the sleeve of the link it rides on; -1: none."""
     for i in range(c.kind.shape[0]):
         e = c.first[i]
@@ -361,7 +361,7 @@ def _stop_at_limit(c: Chain, w: Work, d: Inputs, m: Memory, method: int, t: floa
     for _ in range(60):
         middle = 0.5 * (low + high)
         _interpolate(m, method, h, middle, out)
-        joint = _outside(c, d, out)
+        joint = outside(c, d, out)
         if joint >= 0:
             high, m.s[FAULT] = middle, joint
         else:
@@ -426,11 +426,11 @@ def advance(
                     _explicit_dense(c, w, d, m, t, h, last)
                     prepared = True
                 _interpolate(m, method, h, (t_eval[row] - t) / h, out[row])
-            if _outside(c, d, out[row]) >= 0:
+            if outside(c, d, out[row]) >= 0:
                 _stop_at_limit(c, w, d, m, method, t, h, last)
                 return
             s[OUT] += 1
-        joint = _outside(c, d, m.znew)
+        joint = outside(c, d, m.znew)
         if joint >= 0:
             s[FAULT] = joint
             _stop_at_limit(c, w, d, m, method, t, h, last)
