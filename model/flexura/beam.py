@@ -7,8 +7,7 @@ displacement w and the slope w' at nodes 1 ... n (node 0 is the hub: w = w' = 0)
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -43,13 +42,10 @@ def shape(length: float, elements: int, x: Any, derivative: int = 0) -> np.ndarr
     return out[2:]
 
 
-def _none(*shape: int) -> Any:
-    """A field's default: an array with nothing in it."""
-    return field(default_factory=lambda: np.zeros(shape))
+_NONE, _EMPTY = np.zeros(0), np.zeros((0, 0))
 
 
-@dataclass(frozen=True)
-class LinkIntegrals:
+class LinkIntegrals(NamedTuple):
     """Constants of one link in some elastic coordinates q (m of them; 0: a rigid link), with dm = rho A dx plus tip and hub
     masses.
 
@@ -72,30 +68,30 @@ class LinkIntegrals:
     mass: float
     s1: float
     inertia: float
-    S0: np.ndarray = _none(0)
-    S1: np.ndarray = _none(0)
-    M: np.ndarray = _none(0, 0)
-    K: np.ndarray = _none(0, 0)
-    G1: np.ndarray = _none(0, 0)
-    G2: np.ndarray = _none(0, 0)
-    H: np.ndarray = _none(0, 0)
-    NL: np.ndarray = _none(0)
-    SL: np.ndarray = _none(0)
-    basis: np.ndarray = _none(0, 0)
-    point_x: np.ndarray = _none(0)
-    point_mass: np.ndarray = _none(0)
-    point_phi: np.ndarray = _none(0, 0)
-    slope_dx: np.ndarray = _none(0)
-    slope_EI: np.ndarray = _none(0)
-    slope_d1: np.ndarray = _none(0, 0)
-    slope_d2: np.ndarray = _none(0, 0)
-    ride: np.ndarray = _none(1, 3, 0)
+    S0: np.ndarray = _NONE
+    S1: np.ndarray = _NONE
+    M: np.ndarray = _EMPTY
+    K: np.ndarray = _EMPTY
+    G1: np.ndarray = _EMPTY
+    G2: np.ndarray = _EMPTY
+    H: np.ndarray = _EMPTY
+    NL: np.ndarray = _NONE
+    SL: np.ndarray = _NONE
+    basis: np.ndarray = _EMPTY
+    point_x: np.ndarray = _NONE
+    point_mass: np.ndarray = _NONE
+    point_phi: np.ndarray = _EMPTY
+    slope_dx: np.ndarray = _NONE
+    slope_EI: np.ndarray = _NONE
+    slope_d1: np.ndarray = _EMPTY
+    slope_d2: np.ndarray = _EMPTY
+    ride: np.ndarray = np.zeros((1, 3, 0))
     reference: float = 0.0
-    sleeve_xi: np.ndarray = _none(0)
-    sleeve_w: np.ndarray = _none(0)
-    sleeve_phi: np.ndarray = _none(0, 0)
-    sleeve_d1: np.ndarray = _none(0, 0)
-    sleeve_d2: np.ndarray = _none(0, 0)
+    sleeve_xi: np.ndarray = _NONE
+    sleeve_w: np.ndarray = _NONE
+    sleeve_phi: np.ndarray = _EMPTY
+    sleeve_d1: np.ndarray = _EMPTY
+    sleeve_d2: np.ndarray = _EMPTY
 
     def changed(self, basis: np.ndarray) -> LinkIntegrals:
         """The same link in coordinates p with q = basis @ p."""
@@ -103,7 +99,7 @@ class LinkIntegrals:
         new: dict[str, Any] = {name: _sandwich(B, getattr(self, name)) for name in ("M", "K", "G1", "G2", "H")}
         new |= {name: B.T @ getattr(self, name) for name in ("S0", "S1", "NL", "SL")}
         new |= {name: getattr(self, name) @ B for name in _ROWS if getattr(self, name).size}
-        return replace(self, **new)
+        return self._replace(**new)
 
 
 _ROWS = ("basis", "point_phi", "slope_d1", "slope_d2", "ride", "sleeve_phi", "sleeve_d1", "sleeve_d2")
@@ -121,8 +117,7 @@ def link_integrals(link: Link, tip_mass: float = 0.0, tip_inertia: float = 0.0) 
         bare = _flexible(link)
     hub = (0.0 if sleeve else link.joint.hub_mass_kg, link.joint.hub_inertia_kg_m2)
     turn = bare.SL / bare.reference if sleeve and link.flexible else bare.SL
-    return replace(
-        bare,
+    return bare._replace(
         mass=bare.mass + hub[0] + mp,
         s1=bare.s1 + mp * L,
         inertia=bare.inertia + hub[1] + mp * L**2 + Jp,
