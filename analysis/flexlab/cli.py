@@ -60,6 +60,51 @@ def simulate(
 
 
 @app.command()
+def inverse(
+    robot: RobotFile,
+    manoeuvre: Annotated[Path, typer.Argument(metavar="MANOEUVRE", help="manoeuvre file (TOML) with a motion for every joint")],
+    out: Out = None, rtol: Rtol = 1e-7,
+    method: Annotated[str, typer.Option(help="auto, explicit or implicit")] = "auto", json: Json = False,
+) -> None:  # fmt: skip
+    """Inverse dynamics: the forces and torques that the manoeuvre's motions take, exactly followed; gains and forces are ignored.
+
+    \b
+    Example: flexura inverse model/robots/rig.toml model/manoeuvres/rig-inverse-law.toml
+    """
+    import flexura as fx
+
+    from . import tables
+    from .effort import efforts
+
+    system, asked = _prepare(robot, manoeuvre)
+    motions = [joint.motion for joint in asked.drive.joints]
+    for i, (motion, link) in enumerate(zip(motions, system.robot.links, strict=True), 1):
+        if motion is None and not link.joint.locked:
+            raise fx.InputError(
+                "missing: inverse dynamics needs a motion of every joint", key=f"joint[{i}].motion", file=str(manoeuvre)
+            )
+    try:
+        drive = fx.Drive.prescribed(*motions)
+    except fx.InputError as error:
+        raise error.in_file(str(manoeuvre)) from None
+    with _progress("inverse") as report:
+        run = fx.simulate(system, asked.t, drive, rtol=rtol, method=method, progress=lambda f: report("inverse", f))
+    run.meta["manoeuvre"] = asked.name
+    folder = out or _default_folder("inverse", robot)
+    path = run.save(folder)
+    rows = efforts(run)
+    _show(
+        json,
+        lambda: tables.effort_table(rows, run),
+        lambda: tables.run_json(run) | {"drives": [vars(r) for r in rows], "run": str(path)},
+    )
+    _events(run)
+    _say(json, f"stored {path}", f"look at it: flexura review {folder}")
+    if not run.complete:
+        raise typer.Exit(130 if _interrupted(run) else 1)
+
+
+@app.command()
 def frequencies(robot: RobotFile, json: Json = False) -> None:
     """Natural frequencies at the start, joints locked and free.
 

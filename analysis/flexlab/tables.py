@@ -10,6 +10,7 @@ from rich.table import Table
 import flexura as fx
 
 from .crosscheck import Check
+from .effort import Effort
 
 
 def check_table(check: Check) -> Table:
@@ -56,6 +57,28 @@ def run_table(run: fx.Run) -> Table:
     table.caption = (
         f"{about['structure']}, {about['unknowns']} unknowns, {run.t[-1] - run.t[0]:g} s simulated in {_time(about['wall_s'])}; "
         f"{about['method']}, {about['steps']} steps, rtol {about['rtol']:g}, energy error {about['energy_error']:.1e}"
+    )
+    table.caption_justify = "left"
+    return table
+
+
+def effort_table(rows: list[Effort], run: fx.Run) -> Table:
+    """What each drive has to give, and how exact the calculation was."""
+    table = Table(
+        title=f"{run.meta.get('name') or 'robot'}: drives of {run.meta['manoeuvre'] or 'the motion'}", title_justify="left"
+    )
+    for name in ("drive", "peak", "at", "RMS", "peak speed", "peak power", "energy in", "net energy"):
+        table.add_column(name, justify="left" if name == "drive" else "right", no_wrap=True)
+    for row in rows:
+        table.add_row(
+            f"joint {row.joint}", f"{row.peak:.4g} {row.unit}", f"{row.peak_at_s:.4g} s", f"{row.rms:.4g} {row.unit}",
+            f"{row.peak_speed:.3g} {row.speed_unit}", f"{row.peak_power_W:.3g} W", f"{row.energy_in_J:.4g} J",
+            f"{row.energy_net_J:.4g} J",
+        )  # fmt: skip
+    bent = [f"link {n.split('/')[1]} {1e3 * np.abs(run[n]).max():.3g} mm" for n in run if n.endswith("tip_deflection")]
+    table.caption = (
+        f"largest tip deflection: {', '.join(bent) or 'none'}; {_time(run.meta['wall_s'])}, {run.meta['steps']} steps, "
+        f"rtol {run.meta['rtol']:g}, energy error {run.meta['energy_error']:.1e}"
     )
     table.caption_justify = "left"
     return table
