@@ -105,25 +105,36 @@ def inverse(
 
 
 @app.command()
-def frequencies(robot: RobotFile, json: Json = False) -> None:
+def frequencies(
+    robot: RobotFile,
+    zeros: Annotated[
+        bool, typer.Option("--zeros", help="also the transmission zeros from each drive to its joint and the tip")
+    ] = False,
+    json: Json = False,
+) -> None:
     """Natural frequencies at the start, joints locked and free.
 
     \b
-    Example: flexura frequencies model/robots/two-link-arm.toml
+    Example: flexura frequencies model/robots/two-link-arm.toml --zeros
     """
     import flexura as fx
 
     from . import tables
+    from .zeros import transmission
 
     described = fx.load(robot)
     system = fx.assemble(described)
     locked, free = (fx.frequencies(system, joints=joints) for joints in ("locked", "free"))
+    rows = transmission(fx.linearize(system)) if zeros else []
     title = described.name or robot.stem
+    found = {"locked_Hz": locked.tolist(), "free_Hz": free.tolist()}
     _show(
         json,
         lambda: tables.frequency_table(locked, free, title),
-        lambda: {"locked_Hz": locked.tolist(), "free_Hz": free.tolist()},
+        lambda: found | ({"zeros": [row.numbers() for row in rows]} if zeros else {}),
     )
+    if rows and not json:
+        _show(False, lambda: tables.zero_table(rows), dict)
 
 
 @app.command()

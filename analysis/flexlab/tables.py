@@ -11,6 +11,7 @@ import flexura as fx
 
 from .crosscheck import Check
 from .effort import Effort
+from .zeros import Transmission
 
 
 def check_table(check: Check) -> Table:
@@ -103,6 +104,19 @@ def frequency_table(locked: np.ndarray, free: np.ndarray, name: str) -> Table:
     table.add_column("joints free \\[Hz]", justify="right")
     for k in range(max(len(locked), len(free))):
         table.add_row(str(k + 1), *(f"{f[k]:.5g}" if k < len(f) else "" for f in (locked, free)))
+    return table
+
+
+def zero_table(rows: list[Transmission]) -> Table:
+    table = Table(title="transmission zeros", title_justify="left")
+    for name in ("drive", "output", "output at rest at \\[Hz]", "right half plane \\[1/s]"):
+        table.add_column(name, no_wrap=True)
+    for row in rows:
+        still = ", ".join(f"{f:.4g}" for f in row.notches_Hz[:4]) or "-"
+        slow = ", ".join(f"{z.real:.4g}" + (f" ± {z.imag:.4g} i" if z.imag else "") for z in row.unstable[:3]) or "-"
+        table.add_row(row.drive, row.output, *((still, slow) if row.zeros is not None else ("not moved", "")))
+    table.caption = "a zero in the right half plane: feedback of that output cannot be faster than it"
+    table.caption_justify = "left"
     return table
 
 

@@ -252,6 +252,20 @@ def test_frequencies_of_a_cantilever_are_those_of_the_books(tmp_path):
     assert table.returncode == 0 and f"{told['locked_Hz'][0]:.5g}" in table.stdout and f"{told['free_Hz'][2]:.5g}" in table.stdout
 
 
+def test_zeros_of_a_beam_are_in_the_table_and_in_json(tmp_path):
+    """From the torque at its root to its tip: 2 y^2, tan y = -tanh y; to its own angle: the clamped frequencies."""
+    (tmp_path / "cantilever.toml").write_text(CANTILEVER)
+    done = flexura("frequencies", "cantilever.toml", "--zeros", "--json", cwd=tmp_path)
+    told = json.loads(done.stdout)
+    own, along, across = told["zeros"]
+    assert done.returncode == 0 and own["notches_Hz"] == pytest.approx(told["locked_Hz"], rel=1e-6)
+    assert not along["reached"] and across["output"] == "tip/y"
+    scale = np.sqrt(STIFFNESS / (MASS * LENGTH**4))
+    assert across["right_half_plane_1_s"][0] == pytest.approx([2 * 2.36502037**2 * scale, 0], rel=1e-4)
+    table = flexura("frequencies", "cantilever.toml", "--zeros", cwd=tmp_path).stdout
+    assert "not moved" in table and f"{across['right_half_plane_1_s'][0][0]:.4g}" in table
+
+
 @pytest.mark.parametrize("elements", [30, 100, 200])
 def test_frequencies_of_a_fine_mesh_are_as_right(elements, tmp_path):
     (tmp_path / "cantilever.toml").write_text(CANTILEVER.replace("elements = 10", f"elements = {elements}"))
