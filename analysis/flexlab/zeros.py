@@ -33,7 +33,7 @@ class Transmission:
         z = (
             np.zeros(0, dtype=complex)
             if self.zeros is None
-            else self.zeros[np.abs(self.zeros) > 1e-3 * np.abs(self.zeros).max(initial=0)]
+            else self.zeros[np.abs(self.zeros) > 1e-7 * np.abs(self.zeros).max(initial=0)]
         )
         z = z[test(z)]
         return z if whole else np.sort(np.abs(z)) / (2 * np.pi)
