@@ -99,8 +99,8 @@ def links(draw: Any, joint: dict[str, Any], flexible: bool, modes: bool) -> dict
         return rigid(length, draw(numbers(0.1, 1.0)), draw(numbers(0.0, 0.5)) * length, draw(numbers(1e-3, 1e-2)), **joint)
     elements = draw(st.integers(1, 4))
     mass, stiffness = draw(numbers(0.1, 0.5)), draw(numbers(0.5, 5.0))
-    if draw(st.booleans()):  # tapered
-        at = [0.0, 0.4 * length, length]
+    if draw(st.booleans()):  # tapered; a kink that passes a sleeve costs the energy balance what its quadrature costs
+        at = [0.0, length] if joint["type"] == "Pb" else [0.0, 0.4 * length, length]
         mass, stiffness = ([{"at_m": x, "value": v * f} for x, f in zip(at, (1.4, 1.0, 0.7))] for v in (mass, stiffness))
     link = beam(length, mass, stiffness, elements, **joint)
     if modes and draw(st.booleans()):
@@ -112,20 +112,21 @@ def links(draw: Any, joint: dict[str, Any], flexible: bool, modes: bool) -> dict
 @st.composite
 def robots(
     draw: Any, max_links: int = 5, friction: bool = True, coulomb: bool = False, gravity: bool = True, modes: bool = True,
-    locked: bool = False, stiffening: bool | None = None, first: str | None = None,
+    locked: bool = False, stiffening: bool | None = None, first: str | None = None, sliding: bool = True,
 ) -> fx.Robot:  # fmt: skip
-    """1 to `max_links` links, rigid and flexible, joints R anywhere and Pa on the base or a rigid link."""
+    """1 to `max_links` links, rigid and flexible, joints R, Pa and Pb anywhere; without `sliding` no Pb, and Pa on the base or a
+    rigid link only."""
     chain: list[dict[str, Any]] = []
-    before = False  # is the link before flexible?
     for i in range(draw(st.integers(1, max_links))):
-        kind = "R" if before else draw(st.sampled_from(["R", "R", "Pa"]))
+        ridden = sliding or not (i and chain[-1].get("elements"))
+        kind = draw(st.sampled_from(["R", "R", *(["Pa"] if ridden else []), *(["Pb"] if sliding else [])]))
         if i == 0 and first:
             kind = first
         joint: dict[str, Any] = {
             "type": kind, "hub_mass_kg": draw(maybe(numbers(0.05, 0.5))), "hub_inertia_kg_m2": draw(numbers(1e-3, 1e-2)),
             "rotor_inertia": draw(maybe(numbers(1e-3, 1e-2))), "start": draw(numbers(-1.0, 1.0)),
         }  # fmt: skip
-        if kind == "Pa":
+        if kind != "R":
             joint["angle_rad"] = draw(numbers(-2.0, 2.0))
         if friction:
             joint["viscous_friction"] = draw(maybe(numbers(1e-3, 0.1)))
@@ -133,8 +134,15 @@ def robots(
             joint["coulomb_friction"] = draw(maybe(numbers(1e-3, 0.1)))
         if locked:
             joint["locked"] = draw(st.sampled_from([False, False, True]))
-        before = draw(st.booleans())
-        chain.append(draw(links(joint, before, modes)))
+        link = draw(links(joint, draw(st.booleans()), modes))
+        if kind == "Pb":  # the free length
+            link["joint"]["start"] = link["length_m"] * draw(numbers(0.4, 0.8))
+        elif kind == "Pa" and i:  # on the last link, ahead of its sleeve
+            low, length = 0.0, chain[-1]["length_m"]
+            if chain[-1]["joint"]["type"] == "Pb":
+                low = length - chain[-1]["joint"]["start"]
+            link["joint"]["start"] = low + (length - low) * draw(numbers(0.3, 0.8))
+        chain.append(link)
     return robot(
         *chain,
         gravity=(draw(numbers(-3.0, 3.0)), draw(numbers(-9.81, 3.0))) if gravity and draw(st.booleans()) else (0.0, 0.0),
@@ -147,9 +155,15 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 def state(sys: fx.System, seed: int, slope: float = SLOPE, rate: float = 2.0) -> tuple[np.ndarray, np.ndarray]:
-    """q and qd (n,) with joints anywhere, joint rates below `rate`, slopes below `slope` and their rates below `rate`."""
+    """q and qd (n,): R joints anywhere, sliding ones within 5 % of the link around their start, joint rates below `rate` rad/s or
+    `rate` / 4 m/s, slopes below `slope` and their rates below `rate`."""
     random = np.random.default_rng(seed)
-    return _shape(sys, random, 1.5, slope), _shape(sys, random, rate, rate)
+    turns = np.array([link.joint.type == "R" for link in sys.robot.links])
+    around = np.where(turns, 0.0, sys.robot.start)
+    reach = 0.05 * np.array([sys.links[max(i - (k.joint.type == "Pa"), 0)].length for i, k in enumerate(sys.robot.links)])
+    q, qd = _shape(sys, random, np.where(turns, 1.5, reach), slope), _shape(sys, random, np.where(turns, rate, rate / 4), rate)
+    q[sys.joint_rows] += around
+    return q, qd
 
 
 def forces(sys: fx.System, seed: int) -> np.ndarray:
@@ -157,11 +171,11 @@ def forces(sys: fx.System, seed: int) -> np.ndarray:
     return np.random.default_rng(seed + 1).uniform(-1, 1, len(sys.robot.links))
 
 
-def _shape(sys: fx.System, random: np.random.Generator, joints: float, slope: float) -> np.ndarray:
+def _shape(sys: fx.System, random: np.random.Generator, joints: np.ndarray, slope: float) -> np.ndarray:
     y = np.zeros(sys.n)
     for i, info in enumerate(sys.links):
         first = sys.joint_rows[i]
-        y[first] = joints * random.uniform(-1, 1)
+        y[first] = joints[i] * random.uniform(-1, 1)
         m = len(info.S0)
         if m:
             kept = min(3, m)
@@ -170,7 +184,9 @@ def _shape(sys: fx.System, random: np.random.Generator, joints: float, slope: fl
 
 
 def steepest(sys: fx.System, link: int) -> np.ndarray:
-    """Largest slope of each mode of a link, (m,), per unit of it; inside elements it may be much larger than at the nodes."""
+    """Largest slope of each mode of a link, (m,), per unit of it, at the start; inside elements it may be much larger than at the
+    nodes."""
     info, elements = sys.links[link], sys.robot.links[link].elements
     x = np.linspace(0, info.length, 16 * elements + 1)
-    return np.abs(shape(info.length, elements, x, 1).T @ info.basis).max(axis=0)
+    stretch = info.length / (info.reference or info.length)  # the mesh behind a sleeve is as long as the free length
+    return np.abs(shape(info.length, elements, x, 1).T @ info.basis).max(axis=0) * stretch

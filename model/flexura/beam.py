@@ -7,11 +7,12 @@ displacement w and the slope w' at nodes 1 ... n (node 0 is the hub: w = w' = 0)
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
+from .chain import NODES
 from .robot import Link
 
 
@@ -53,7 +54,12 @@ class LinkIntegrals:
     H q / 2. NL = phi(L), SL = phi'(L) (m,); basis (2n, m): nodal unknowns = basis @ q. What is of higher order in the
     deflection is summed over points (`model/README.md`, section 3): mass points (p,) at x with their masses and phi (p, m), the
     last one being the tip with the payload; and slope points (2p,), two before each mass point, with weights dx, EI dx, and
-    phi', phi'' (2p, m).
+    phi', phi'' (2p, m). `ride` (n + 1, 3, m): w, w_xi and the mean of w_xi,xi on both sides of each node, xi = x / length: the
+    quintic Hermite curve through these is the line on which a slider rides.
+
+    A link behind a sleeve (`sleeve.py`): its mesh covers the free length d and moves with it, xi = x / d; s1 and inertia are
+    about the proximal end and have no sleeve in them; M and K hold at the start's d, `reference`; NL = Phi(1), SL = Phi_xi(1);
+    Phi, Phi_xi, Phi_xi,xi (P + 1, m) stand at Gauss points `sleeve_xi` and the tip; G1, G2, H, S0, S1 are not used.
     """
 
     length: float
@@ -77,49 +83,49 @@ class LinkIntegrals:
     slope_EI: np.ndarray
     slope_d1: np.ndarray
     slope_d2: np.ndarray
+    ride: np.ndarray
+    reference: float = 0.0
+    sleeve_xi: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    sleeve_w: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    sleeve_phi: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    sleeve_d1: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    sleeve_d2: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
     def changed(self, basis: np.ndarray) -> LinkIntegrals:
         """The same link in coordinates p with q = basis @ p."""
         B = basis
-        return LinkIntegrals(
-            self.length, self.mass, self.s1, self.inertia, B.T @ self.S0, B.T @ self.S1,
-            _sandwich(B, self.M), _sandwich(B, self.K), _sandwich(B, self.G1), _sandwich(B, self.G2), _sandwich(B, self.H),
-            B.T @ self.NL, B.T @ self.SL, self.basis @ B,
-            self.point_x, self.point_mass, self.point_phi @ B, self.slope_dx, self.slope_EI, self.slope_d1 @ B, self.slope_d2 @ B,
-        )  # fmt: skip
+        squares = {name: _sandwich(B, getattr(self, name)) for name in ("M", "K", "G1", "G2", "H")}
+        vectors = {name: B.T @ getattr(self, name) for name in ("S0", "S1", "NL", "SL")}
+        rows = {name: getattr(self, name) @ B for name in _ROWS if getattr(self, name).size}
+        return replace(self, **squares, **vectors, **rows)
+
+
+_ROWS = ("basis", "point_phi", "slope_d1", "slope_d2", "ride", "sleeve_phi", "sleeve_d1", "sleeve_d2")
 
 
 def link_integrals(link: Link, tip_mass: float = 0.0, tip_inertia: float = 0.0) -> LinkIntegrals:
     """The integrals of a link, its hub and a payload at its tip, in nodal unknowns; rigid links have none (m = 0)."""
-    L = link.length_m
-    hub = (0.0, 0.0) if link.joint.type == "Pb" else (link.joint.hub_mass_kg, link.joint.hub_inertia_kg_m2)
-    if link.flexible:
-        bare = _flexible(link)
-    else:
+    L, mp, Jp = link.length_m, tip_mass, tip_inertia
+    sleeve = link.joint.type == "Pb"
+    if not link.flexible:
         bare = _rigid(link)
-    mp, Jp, NL, SL = tip_mass, tip_inertia, bare.NL, bare.SL
-    return LinkIntegrals(
-        L,
-        bare.mass + hub[0] + mp,
-        bare.s1 + mp * L,
-        bare.inertia + hub[1] + mp * L**2 + Jp,
-        bare.S0 + mp * NL,
-        bare.S1 + mp * L * NL + Jp * SL,
-        bare.M + mp * np.outer(NL, NL) + Jp * np.outer(SL, SL),
-        bare.K,
-        bare.G1 + mp * bare.H,
-        bare.G2 + mp * L * bare.H,
-        bare.H,
-        NL,
-        SL,
-        bare.basis,
-        bare.point_x,
-        bare.point_mass + mp * (bare.point_x == L),
-        bare.point_phi,
-        bare.slope_dx,
-        bare.slope_EI,
-        bare.slope_d1,
-        bare.slope_d2,
+    elif sleeve:
+        bare = _sleeved(link)
+    else:
+        bare = _flexible(link)
+    hub = (0.0 if sleeve else link.joint.hub_mass_kg, link.joint.hub_inertia_kg_m2)
+    turn = bare.SL / bare.reference if sleeve and link.flexible else bare.SL
+    return replace(
+        bare,
+        mass=bare.mass + hub[0] + mp,
+        s1=bare.s1 + mp * L,
+        inertia=bare.inertia + hub[1] + mp * L**2 + Jp,
+        S0=bare.S0 + mp * bare.NL,
+        S1=bare.S1 + mp * L * bare.NL + Jp * bare.SL,
+        M=bare.M + mp * np.outer(bare.NL, bare.NL) + Jp * np.outer(turn, turn),
+        G1=bare.G1 + mp * bare.H,
+        G2=bare.G2 + mp * L * bare.H,
+        point_mass=bare.point_mass + mp * (bare.point_x == L),
     )
 
 
@@ -135,7 +141,7 @@ def _rigid(link: Link) -> LinkIntegrals:
         mass, s1, inertia = float(rho @ dx), float((rho * x) @ dx), float((rho * x**2) @ dx)
     return LinkIntegrals(
         link.length_m, mass, s1, inertia, none, none, empty, empty, empty, empty, empty, none, none, empty,
-        none, none, empty, none, none, empty, empty,
+        none, none, empty, none, none, empty, empty, np.zeros((1, 3, 0)),
     )  # fmt: skip
 
 
@@ -152,8 +158,40 @@ def _flexible(link: Link) -> LinkIntegrals:
     return LinkIntegrals(
         L, float(dm.sum()), float(dm @ x), float(dm @ x**2), N @ dm, N @ (x * dm), (N * dm) @ N.T, (C * (EI * dx)) @ C.T,
         (S * (n1 * dx)) @ S.T, (S * (n2 * dx)) @ S.T, (S * dx) @ S.T,
-        shape(L, n, L)[:, 0], shape(L, n, L, 1)[:, 0], np.eye(2 * n), *_points(link),
+        shape(L, n, L)[:, 0], shape(L, n, L, 1)[:, 0], np.eye(2 * n), *_points(link), _ride(L, n),
     )  # fmt: skip
+
+
+def _sleeved(link: Link) -> LinkIntegrals:
+    """A flexible link behind a sleeve. Its unknowns are the deflections w_k of the moving nodes and their slopes times d / L: the
+    link's own Hermite cubics, compressed from L to d."""
+    L, n, d = link.length_m, link.elements, link.joint.start
+    x, dx = _quadrature(np.linspace(0, L, n + 1), NODES)
+    xi, w = np.append(x / L, 1.0), np.append(dx / L, 0.0)
+    N, S, C = (shape(L, n, xi * L, k) * L**k for k in (0, 1, 2))
+    X = L - d + xi * d
+    mass, EI = w * d * link.mass_per_length(X), w * link.bending_stiffness(X) / d**3
+    whole, weight = _quadrature(np.array(link.breaks()))
+    dm = link.mass_per_length(whole) * weight
+    none, empty = np.zeros(2 * n), np.zeros((2 * n, 2 * n))
+    nothing = np.zeros((0, 2 * n))
+    return LinkIntegrals(
+        L, float(dm.sum()), float(dm @ whole), float(dm @ whole**2), none, none, (N * mass) @ N.T, (C * EI) @ C.T,
+        empty, empty, empty, N[:, -1], S[:, -1], np.eye(2 * n),
+        none[:0], none[:0], nothing, none[:0], none[:0], S.T / d, nothing, _ride(L, n), d, xi, w, N.T, S.T, C.T,
+    )  # fmt: skip
+
+
+def _ride(L: float, n: int) -> np.ndarray:
+    """w, w_xi and the mean w_xi,xi of the elements on both sides of each node: (n + 1, 3, 2n)."""
+    x = np.linspace(0, L, n + 1)
+    ends = np.array([hermite(np.array([0.0, 1.0]), L / n, 2)[:, k] for k in (0, 1)])  # w'' at both ends of an element
+    bend, count = np.zeros((n + 1, 2 * n + 2)), np.zeros(n + 1)
+    for e in range(n):
+        bend[e, 2 * e : 2 * e + 4] += ends[0]
+        bend[e + 1, 2 * e : 2 * e + 4] += ends[1]
+        count[e : e + 2] += 1
+    return np.stack([shape(L, n, x).T, shape(L, n, x, 1).T * L, bend[:, 2:] / count[:, None] * L**2], axis=1)
 
 
 def _outboard(link: Link, cells: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

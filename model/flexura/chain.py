@@ -6,23 +6,29 @@ from typing import NamedTuple
 
 import numpy as np
 
-REVOLUTE, PRISMATIC = 0, 1  # joint kinds; PRISMATIC: Pa on a rigid predecessor
+REVOLUTE, SLIDER, SLEEVE = 0, 1, 2  # joint kinds R, Pa, Pb
 COULOMB_SPEED = 1e-3  # m/s or rad/s: Coulomb friction is f tanh(v / COULOMB_SPEED)
+NODES = 4  # Gauss points an element, where a link is summed at run time
 
 
 class Chain(NamedTuple):
     """The constants of a robot: N links, n unknowns in the global numbering [eta_1, q_1, eta_2, q_2, ...], at most m elastic
-    ones a link."""
+    ones a link.
+
+    Of a link behind a sleeve (Pb), `s1` and `inertia` are about its proximal end and without the sleeve's mass, `NL` and `SL`
+    are Phi and Phi_xi at its tip, and the arrays `sleeve_*` and `law_*` stand for the rest (`sleeve.py`).
+    """
 
     first: np.ndarray  # (N + 1,) int: row of the joint of each link; its elastic rows follow; first[N] = n
-    kind: np.ndarray  # (N,) int: REVOLUTE or PRISMATIC
+    kind: np.ndarray  # (N,) int: REVOLUTE, SLIDER or SLEEVE
     locked: np.ndarray  # (N,) int
     angle: np.ndarray  # (N,) gamma [rad]
     rotor: np.ndarray  # (N,)
     viscous: np.ndarray  # (N,)
     coulomb: np.ndarray  # (N,)
     length: np.ndarray  # (N,)
-    mass: np.ndarray  # (N,)
+    mass: np.ndarray  # (N,) with hub or sleeve, and payload
+    hub: np.ndarray  # (N,) the sleeve's mass, 0 for R and Pa
     s1: np.ndarray  # (N,)
     inertia: np.ndarray  # (N,)
     S0: np.ndarray  # (N, m) int phi dm
@@ -30,11 +36,14 @@ class Chain(NamedTuple):
     NL: np.ndarray  # (N, m) phi(L)
     SL: np.ndarray  # (N, m) phi'(L)
     lam: np.ndarray  # (N, m) omega^2
+    alpha: np.ndarray  # (N,) Rayleigh damping alpha M + beta K [1/s]
+    beta: np.ndarray  # (N,) [s]
     damp: np.ndarray  # (N, m) alpha + beta omega^2
     G1: np.ndarray  # (N, m, m)
     G2: np.ndarray  # (N, m, m)
     H: np.ndarray  # (N, m, m)
     points: np.ndarray  # (N,) int: mass points of each link, at most p; two slope points before each
+    payload: np.ndarray  # (N,) mass at the tip [kg]
     tip_inertia: np.ndarray  # (N,) of the payload [kg m^2]
     point_x: np.ndarray  # (N, p)
     point_mass: np.ndarray  # (N, p)
@@ -43,6 +52,18 @@ class Chain(NamedTuple):
     slope_EI: np.ndarray  # (N, 2p)
     slope_d1: np.ndarray  # (N, 2p, m) phi'
     slope_d2: np.ndarray  # (N, 2p, m) phi''
+    elements: np.ndarray  # (N,) int
+    ride: np.ndarray  # (N, E + 1, 3, m) w, w_xi, w_xi,xi at the nodes: the curve that a slider rides on
+    node: np.ndarray  # (N,) int: the node whose displacement a nodal slider (joint i) takes, 0: it rides on the curve
+    reference: np.ndarray  # (N,) the free length for which a sleeved link's modes are made [m]; 0 elsewhere
+    sleeve_xi: np.ndarray  # (N, P + 1) Gauss points, and the tip
+    sleeve_w: np.ndarray  # (N, P + 1) their weights, 0 at the tip
+    sleeve_phi: np.ndarray  # (N, P + 1, m) Phi
+    sleeve_d1: np.ndarray  # (N, P + 1, m) Phi_xi
+    sleeve_d2: np.ndarray  # (N, P + 1, m) Phi_xi,xi
+    law_x: np.ndarray  # (N, B) where the pieces of the two laws begin, along the material [m]; +inf: no more
+    law_mass: np.ndarray  # (N, B, 3) rho A, polynomials in X - law_x [kg/m]
+    law_EI: np.ndarray  # (N, B, 5) E I [N m^2]
     stiffening: bool
     gravity: np.ndarray  # (2,)
 
@@ -53,22 +74,35 @@ class Work(NamedTuple):
     cos: np.ndarray  # (N,) of the relative angle psi between a link and its predecessor's attachment
     sin: np.ndarray  # (N,)
     omega: np.ndarray  # (N,) angular velocity of the hub frame
-    place: np.ndarray  # (N, 5): attachment r (2) and beta (3)
+    angle: np.ndarray  # (N,) slope angle of the attachment in the link's frame
+    place: np.ndarray  # (N, 2): where the next joint is attached, r
+    beta: np.ndarray  # (N, 3): its acceleration where nothing accelerates
+    rate: np.ndarray  # (N, 3): its velocity relative to the hub frame
+    slide: np.ndarray  # (N, 3): direction of joint i in its predecessor's axes; unused for a sleeve
+    flow: np.ndarray  # (N, 3): velocity of the attachment per unit of a sleeve's d'
     tilt: np.ndarray  # (N,) rate of the tip's tangent over that of w'(L)
-    g1q: np.ndarray  # (N, m) -Mrq, x: int h dm
-    mt: np.ndarray  # (N, m) Mrq, angle
-    cv: np.ndarray  # (N, m) velocity-dependent forces on the elastic rows
-    hq: np.ndarray  # (N, m) h at the tip
+    body: np.ndarray  # (N, 11): int w dm, int (x + u) dm, int (x + u)^2 + w^2 dm; hr (3); a sleeve's column Mxd, Myd, Mtd, Mdd, hd
+    col: np.ndarray  # (N, m, 4) Mqr: x, y, angle, and d of a sleeve
+    jac: np.ndarray  # (N, m, 3) Jq^T: x, y, angle
+    cv: np.ndarray  # (N, m) velocity-dependent and nonlinear elastic forces on the elastic rows
     h: np.ndarray  # (N, p, m) h = -du/dq at the points
     slope: np.ndarray  # (2p, 4) tan dx, (tan - sin) dx, forces of the strain energy on w', w''
     point: np.ndarray  # (p, 5) factors of h, phi, phi, h and tan - sin in the inertia forces
-    body: np.ndarray  # (N, 6): int w dm, int (x + u) dm, int (x + u)^2 + w^2 dm; hr (3)
+    M: np.ndarray  # (N, m, m) Mqq of sleeved links, lower triangle
+    K: np.ndarray  # (N, m, m) their stiffness at d, lower triangle
+    strain: np.ndarray  # (N,) their strain energy
+    sum: np.ndarray  # (P + 1, 12) what a sleeved link has at its points
+    sum_h: np.ndarray  # (P + 1, m) int tan Phi_xi up to each of them
+    ride: np.ndarray  # (E + 1, 9) node values w, w_xi, w_xi,xi of q, of qd, and the weights of their gradients
     cond: np.ndarray  # (N, 36) of the condensation: A (6), b (3), (1 + E A)^-1 (9), X - P (9), t0 (3), E (6)
     joint: np.ndarray  # (N, 6): A s (3), 1 / (s^T A s + ...), tau - s^T b, s^T A s + rotor
+    X: np.ndarray  # (N, 3, 4) X - P of sleeved links
+    inertia: np.ndarray  # (4, 4) of a sleeved link at its sleeve
+    bias: np.ndarray  # (4,)
     u: np.ndarray  # (N, 3)
     S: np.ndarray  # (N, m, m) the factor l of each link's elastic block
     dinv: np.ndarray  # (N, m) 1/d of its factorisation
-    rhs: np.ndarray  # (N, m, 7)
+    rhs: np.ndarray  # (N, m, 8)
     held: np.ndarray  # (N,) int: joints whose acceleration is given, locked ones at 0
     given: np.ndarray  # (N,) that acceleration
     reaction: np.ndarray  # (N,) the force in the joint that it takes, friction left out
@@ -77,8 +111,11 @@ class Work(NamedTuple):
 def workspace(c: Chain) -> Work:
     """A fresh workspace for one solver of this chain."""
     z, (N, m), p = np.zeros, c.S0.shape, c.point_x.shape[1]
+    P, E = c.sleeve_xi.shape[1], c.ride.shape[1]
     return Work(
-        cos=z(N), sin=z(N), omega=z(N), place=z((N, 5)), tilt=z(N), g1q=z((N, m)), mt=z((N, m)), cv=z((N, m)), hq=z((N, m)),
-        h=z((N, p, m)), slope=z((2 * p, 4)), point=z((p, 5)), body=z((N, 6)), cond=z((N, 36)), joint=z((N, 6)),
-        u=z((N, 3)), S=z((N, m, m)), dinv=z((N, m)), rhs=z((N, m, 7)), held=c.locked.copy(), given=z(N), reaction=z(N),
+        cos=z(N), sin=z(N), omega=z(N), angle=z(N), place=z((N, 2)), beta=z((N, 3)), rate=z((N, 3)), slide=z((N, 3)), flow=z((N, 3)),
+        tilt=z(N), body=z((N, 11)), col=z((N, m, 4)), jac=z((N, m, 3)), cv=z((N, m)), h=z((N, p, m)), slope=z((2 * p, 4)),
+        point=z((p, 5)), M=z((N, m, m)), K=z((N, m, m)), strain=z(N), sum=z((P, 12)), sum_h=z((P, m)), ride=z((E, 9)),
+        cond=z((N, 36)), joint=z((N, 6)), X=z((N, 3, 4)), inertia=z((4, 4)), bias=z(4), u=z((N, 3)), S=z((N, m, m)), dinv=z((N, m)), rhs=z((N, m, 8)),
+        held=c.locked.copy(), given=z(N), reaction=z(N),
     )  # fmt: skip

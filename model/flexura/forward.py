@@ -151,11 +151,16 @@ def _compiled(
 
 def _inputs(system: System, drive: Drive) -> loop.Inputs:
     segments, ranges, gains = drive.packed()
-    limits = system.limits
+    limits = _slack(system)
     follows = drive.follows.astype(np.int64)
     return loop.Inputs(
         segments, ranges, gains[:, 0].copy(), gains[:, 1].copy(), follows, limits[:, 0].copy(), limits[:, 1].copy(), drive.breaks
     )
+
+
+def _slack(system: System) -> np.ndarray:
+    """The joints' limits (N, 2), a billionth wider: a motion may end on one, and does so up to round-off."""
+    return system.limits + [-1e-9, 1e-9] * np.maximum(1.0, np.abs(np.where(np.isfinite(system.limits), system.limits, 0.0)))
 
 
 def _following(system: System, drive: Drive) -> Work:
@@ -187,7 +192,7 @@ def _python(
         force = _forces(system, call, time_s, y, v)
         accelerate(c, w, y, v, y, v, 0.0, force, zero, zero, a)
         dz = np.concatenate([v, a, [0.0, 0.0]])
-        loop._powers(c, v, force, dz)
+        loop._powers(c, w, v, force, dz)
         return dz
 
     solver = (DOP853 if method == loop.EXPLICIT else Radau)(
@@ -195,7 +200,7 @@ def _python(
     )
     events: list[dict[str, Any]] = []
     out = [state]
-    limits = system.limits
+    limits = _slack(system)
 
     def beyond(z: np.ndarray) -> list[dict[str, Any]]:
         outside = (z[system.joint_rows] < limits[:, 0]) | (z[system.joint_rows] > limits[:, 1])

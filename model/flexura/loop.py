@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import DOP853
 
-from .chain import COULOMB_SPEED, Chain, Work
+from .chain import COULOMB_SPEED, SLEEVE, SLIDER, Chain, Work
 from .compiled import compiled, inlined
 from .kernel import passes
 from .signal import evaluate
@@ -136,8 +136,8 @@ def _find(c: Chain, w: Work, d: Inputs, v: np.ndarray, force: np.ndarray) -> Non
 
 
 @inlined
-def _powers(c: Chain, v: np.ndarray, force: np.ndarray, dz: np.ndarray) -> None:
-    """Power of the drives and power lost to friction and damping, into the last two entries of dz."""
+def _powers(c: Chain, w: Work, v: np.ndarray, force: np.ndarray, dz: np.ndarray) -> None:
+    """Power of the drives and power lost to friction and damping, into the last two entries of dz, after a pass."""
     n = v.shape[0]
     work, loss = 0.0, 0.0
     for i in range(force.shape[0]):
@@ -147,7 +147,12 @@ def _powers(c: Chain, v: np.ndarray, force: np.ndarray, dz: np.ndarray) -> None:
         if c.coulomb[i] > 0.0:
             loss += c.coulomb[i] * v[e] * np.tanh(v[e] / COULOMB_SPEED)
         for k in range(c.first[i + 1] - e - 1):
-            loss += c.damp[i, k] * v[e + 1 + k] * v[e + 1 + k]
+            if c.kind[i] == SLEEVE:
+                for j in range(k + 1):
+                    both = 1.0 if j == k else 2.0
+                    loss += both * (c.alpha[i] * w.M[i, k, j] + c.beta[i] * w.K[i, k, j]) * v[e + 1 + k] * v[e + 1 + j]
+            else:
+                loss += c.damp[i, k] * v[e + 1 + k] * v[e + 1 + k]
     dz[2 * n], dz[2 * n + 1] = work, loss
 
 
@@ -160,7 +165,7 @@ def _slope(c: Chain, w: Work, d: Inputs, m: Memory, t: float, z: np.ndarray, dz:
     passes(c, w, y, v, y, v, 0.0, m.force, m.zero, m.zero, dz[n : 2 * n])
     _find(c, w, d, v, m.force)
     _copy(v, dz[:n])
-    _powers(c, v, m.force, dz)
+    _powers(c, w, v, m.force, dz)
     m.s[EVALS] += 1
 
 
@@ -281,7 +286,7 @@ def _implicit_step(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, 
         _prescribe(c, w, d, ts, new[:n], new[n : 2 * n])
         drive(c, d, ts, new[:n], new[n : 2 * n], m.force)
         _find(c, w, d, new[n : 2 * n], m.force)
-        _powers(c, new[n : 2 * n], m.force, K[s])
+        _powers(c, w, new[n : 2 * n], m.force, K[s])
     for k in range(2 * n, 2 * n + 2):
         total = 0.0
         for j in range(6):
@@ -324,6 +329,48 @@ def _interpolate(m: Memory, method: int, h: float, x: float, out: np.ndarray) ->
         out[k] = z[k] + x * (f0 + x * (3 * dy - 2 * f0 - f1 + x * (f0 + f1 - 2 * dy)))
 
 
+@inlined
+def _shortest(c: Chain, z: np.ndarray) -> float:
+    """How much shorter than at the start the longest stable step is: frequencies go with 1/d^2 of a sleeved link."""
+    least = 1.0
+    for i in range(c.kind.shape[0]):
+        if c.reference[i] > 0.0:
+            ratio = z[c.first[i]] / c.reference[i]
+            least = min(least, ratio * ratio)
+    return least
+
+
+@inlined
+def _outside(c: Chain, d: Inputs, z: np.ndarray) -> int:
+    """The first joint beyond its limits, or a slider that has run into the sleeve of the link it rides on; -1: none."""
+    for i in range(c.kind.shape[0]):
+        e = c.first[i]
+        if not (d.low[i] <= z[e] <= d.high[i]):
+            return i
+        if i > 0 and c.kind[i] == SLIDER and c.kind[i - 1] == SLEEVE and z[e] + z[c.first[i - 1]] < c.length[i - 1]:
+            return i
+    return -1
+
+
+@compiled
+def _stop_at_limit(c: Chain, w: Work, d: Inputs, m: Memory, method: int, t: float, h: float, last: float) -> None:
+    """Find by bisection where the step just made, from t, leaves a joint's limits; m.z and s[T] are the last state inside."""
+    if method == EXPLICIT:
+        _explicit_dense(c, w, d, m, t, h, last)
+    low, high, out = 0.0, 1.0, m.K[15]
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        _interpolate(m, method, h, middle, out)
+        joint = _outside(c, d, out)
+        if joint >= 0:
+            high, m.s[FAULT] = middle, joint
+        else:
+            low = middle
+    _interpolate(m, method, h, low, out)
+    _copy(out, m.z)
+    m.s[STATUS], m.s[T] = LIMIT, t + low * h
+
+
 @compiled
 def advance(
     c: Chain, w: Work, d: Inputs, m: Memory, method: int, rtol: float, t_eval: np.ndarray, out: np.ndarray, max_steps: int
@@ -344,7 +391,7 @@ def advance(
             _weights(c, m, rtol, m.z)
             _slope_once(c, w, d, m, t, m.z, m.K[0])
             s[FRESH] = 1.0
-        h = min(s[H], stop - t, s[LONGEST])
+        h = min(s[H], stop - t, s[LONGEST] * _shortest(c, m.z))
         if stop - t < 1.5 * h and h < stop - t:
             h = 0.5 * (stop - t)
         if method == EXPLICIT:
@@ -379,17 +426,15 @@ def advance(
                     _explicit_dense(c, w, d, m, t, h, last)
                     prepared = True
                 _interpolate(m, method, h, (t_eval[row] - t) / h, out[row])
-            for i in range(c.kind.shape[0]):
-                e = c.first[i]
-                if not (d.low[i] <= out[row, e] <= d.high[i]):
-                    s[STATUS], s[FAULT] = LIMIT, i
-                    return
-            s[OUT] += 1
-        for i in range(c.kind.shape[0]):
-            e = c.first[i]
-            if not (d.low[i] <= m.znew[e] <= d.high[i]):
-                s[STATUS], s[FAULT] = LIMIT, i
+            if _outside(c, d, out[row]) >= 0:
+                _stop_at_limit(c, w, d, m, method, t, h, last)
                 return
+            s[OUT] += 1
+        joint = _outside(c, d, m.znew)
+        if joint >= 0:
+            s[FAULT] = joint
+            _stop_at_limit(c, w, d, m, method, t, h, last)
+            return
         factor = 5.0 if error == 0.0 else min(5.0, max(0.3, 0.9 * error ** (-0.7 / order) * max(s[ERR], 1e-4) ** (0.3 / order)))
         if h < s[H]:
             s[H] = max(s[H], h * factor)

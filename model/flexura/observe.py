@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .chain import PRISMATIC, REVOLUTE, Chain, Work
+from .chain import REVOLUTE, SLEEVE, Chain, Work
 from .compiled import compiled
+from .hubs import inertia_block
 from .outward import outward
 
 
@@ -28,7 +29,8 @@ def observe(
 ) -> None:
     """Fill, for states (T, 2n): poses (T, N, 3); tip deflection, slope (T, N, 2); robot's tip (T, 2); energies (T, 3) [J].
 
-    Energies: kinetic, strain, gravitational (zero where every mass is at the base's height).
+    The pose of a link behind a sleeve is that of its proximal end. Energies: kinetic, strain, gravitational (zero where every
+    mass is at the base's height).
     """
     links = c.kind.shape[0]
     n = c.first[links]
@@ -36,61 +38,56 @@ def observe(
         y, v = states[s, :n], states[s, n:]
         outward(c, w, y, v)
         x0, y0, angle = 0.0, 0.0, 0.0  # the attachment's pose in the base frame
-        vx, vy, omega = 0.0, 0.0, 0.0  # its velocity, in the predecessor's axes
+        vx, vy = 0.0, 0.0  # its velocity, in the predecessor's axes
         kinetic, strain, potential = 0.0, 0.0, 0.0
         for i in range(links):
             e, end = c.first[i], c.first[i + 1]
+            m = end - e - 1
             q, qd = y[e + 1 : end], v[e + 1 : end]
-            if c.kind[i] == REVOLUTE:
-                angle += y[e]
-            else:
-                angle += c.angle[i]
-                if i == 0:
-                    x0 += y[e]
-                    vx += v[e]
-            cs, sn = w.cos[i], w.sin[i]
+            body, flow = w.body[i], 0.0
+            if c.kind[i] == SLEEVE:
+                flow = v[e]
+            elif i == 0:
+                vx, vy = w.slide[0, 0] * v[e], 0.0
+                x0 = w.slide[0, 0] * y[e]
+            angle += y[e] if c.kind[i] == REVOLUTE else c.angle[i]
+            cs, sn, omega = w.cos[i], w.sin[i], w.omega[i]
             vx, vy = cs * vx + sn * vy, cs * vy - sn * vx
-            omega = w.omega[i]
-            body, place = w.body[i], w.place[i]
-            S0v, S1v, vv, gv, wL, wLd, slope, spin, hv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-            for k in range(end - e - 1):
-                S0v += c.S0[i, k] * qd[k]
-                S1v += w.mt[i, k] * qd[k]
-                vv += qd[k] * qd[k]
-                gv += w.g1q[i, k] * qd[k]
-                hv += w.hq[i, k] * qd[k]
-                wL += c.NL[i, k] * q[k]
-                wLd += c.NL[i, k] * qd[k]
-                slope += c.SL[i, k] * q[k]
-                spin += c.SL[i, k] * qd[k]
-                strain += 0.5 * c.lam[i, k] * q[k] * q[k]
-            if c.stiffening and end > e + 1:
-                strain += _strain(c, i, q)
-                for p in range(c.points[i]):
-                    rate = 0.0
-                    for k in range(end - e - 1):
-                        rate += w.h[i, p, k] * qd[k]
-                    kinetic += 0.5 * c.point_mass[i, p] * rate * rate
-                kinetic += 0.5 * c.tip_inertia[i] * (w.tilt[i] * w.tilt[i] - 1.0) * spin * spin
-                slope = np.arcsin(slope)
-                spin *= w.tilt[i]
-            kinetic += 0.5 * (
-                c.mass[i] * (vx * vx + vy * vy) + body[2] * omega * omega + vv + c.rotor[i] * v[e] * v[e]
-            ) + vy * omega * body[1] - vx * omega * body[0] - vx * gv + vy * S0v + omega * S1v  # fmt: skip
+            # T = 1/2 U^T [[Mrr, Mrq], [Mqr, Mqq]] U, U = (vx, vy, omega, d', qd)
+            inertia_block(c, w, i)
+            for k in range(m):
+                shared = w.col[i, k, 0] * vx + w.col[i, k, 1] * vy + w.col[i, k, 2] * omega
+                if c.kind[i] == SLEEVE:
+                    shared += w.col[i, k, 3] * flow
+                for j in range(k):
+                    shared += w.S[i, k, j] * qd[j]
+                kinetic += qd[k] * (shared + 0.5 * w.S[i, k, k] * qd[k])
+            kinetic += 0.5 * (c.mass[i] * (vx * vx + vy * vy) + body[2] * omega * omega + c.rotor[i] * v[e] * v[e])
+            kinetic += omega * (vy * body[1] - vx * body[0])
+            if c.kind[i] == SLEEVE:
+                kinetic += flow * (body[6] * vx + body[7] * vy + body[8] * omega + 0.5 * body[9] * flow)
+                strain += w.strain[i]
+            else:
+                for k in range(m):
+                    strain += 0.5 * c.lam[i, k] * q[k] * q[k]
+                if c.stiffening and m > 0:
+                    strain += _strain(c, i, q)
             ca, sa = np.cos(angle), np.sin(angle)
             potential -= c.gravity[0] * (c.mass[i] * x0 + ca * body[1] - sa * body[0])
             potential -= c.gravity[1] * (c.mass[i] * y0 + sa * body[1] + ca * body[0])
-            poses[s, i, 0], poses[s, i, 1], poses[s, i, 2] = x0, y0, angle
-            tips[s, i, 0], tips[s, i, 1] = wL, slope
-            rx, ry = place[0], place[1]
+            behind = y[e] - c.length[i] if c.kind[i] == SLEEVE else 0.0
+            poses[s, i, 0], poses[s, i, 1], poses[s, i, 2] = x0 + ca * behind, y0 + sa * behind, angle
+            deflection, sin = 0.0, 0.0
+            for k in range(m):
+                deflection += c.NL[i, k] * q[k]
+                sin += c.SL[i, k] * q[k]
+            if c.kind[i] == SLEEVE and m > 0:
+                sin /= y[e]
+            tips[s, i, 0], tips[s, i, 1] = deflection, np.arcsin(sin) if c.stiffening else sin
+            rx, ry = w.place[i, 0], w.place[i, 1]
             x0 += ca * rx - sa * ry
             y0 += sa * rx + ca * ry
-            angle += slope
-            if i + 1 < links and c.kind[i + 1] == PRISMATIC:
-                rate, across = v[end], 0.0
-            else:
-                rate, across = -hv, wLd
-            vx, vy = vx - omega * ry + rate, vy + omega * rx + across
-            omega += spin
+            angle += w.angle[i]
+            vx, vy = vx - omega * ry + w.rate[i, 0], vy + omega * rx + w.rate[i, 1]
         ends[s, 0], ends[s, 1] = x0, y0
         energies[s, 0], energies[s, 1], energies[s, 2] = kinetic, strain, potential

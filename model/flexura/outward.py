@@ -5,72 +5,93 @@ from __future__ import annotations
 
 import numpy as np
 
-from .chain import PRISMATIC, REVOLUTE, Chain, Work
+from .chain import REVOLUTE, SLEEVE, SLIDER, Chain, Work
 from .compiled import inlined
+from .ride import ride
+from .sleeve import sleeve
 
 
 @inlined
 def outward(c: Chain, w: Work, y: np.ndarray, v: np.ndarray) -> None:
     """Positions and velocities along the chain, and each link's inertia terms and velocity-dependent forces."""
     links = c.kind.shape[0]
-    omega, slope = 0.0, 0.0  # of the place where the next joint is attached, relative to its link
+    omega, slope = 0.0, 0.0  # of the place where the next joint is attached; its slope relative to its link
+    if c.kind[0] == SLIDER:
+        w.slide[0, 0], w.slide[0, 2] = 1.0, 0.0
+    else:
+        w.slide[0, 0], w.slide[0, 2] = 0.0, 1.0
     for i in range(links):
         e, end = c.first[i], c.first[i + 1]
-        m = end - e - 1
-        q, qd = y[e + 1 : end], v[e + 1 : end]
         if c.kind[i] == REVOLUTE:
             psi = slope + y[e]
             omega += v[e]
         else:
             psi = slope + c.angle[i]
         w.cos[i], w.sin[i], w.omega[i] = np.cos(psi), np.sin(psi), omega
-        om2 = omega * omega
-        slope, spin, wL, wLd, S0q, S0v, qq, qv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for k in range(m):
-            slope += c.SL[i, k] * q[k]
-            spin += c.SL[i, k] * qd[k]
-            wL += c.NL[i, k] * q[k]
-            wLd += c.NL[i, k] * qd[k]
-            S0q += c.S0[i, k] * q[k]
-            S0v += c.S0[i, k] * qd[k]
-            qq += q[k] * q[k]
-            qv += q[k] * qd[k]
-            w.mt[i, k] = c.S1[i, k]
-            w.cv[i, k] = -om2 * q[k]
-        w.body[i, 0], w.body[i, 1], w.body[i, 2] = S0q, c.s1[i], c.inertia[i] + qq
-        w.body[i, 3], w.body[i, 4], w.body[i, 5] = -2 * omega * S0v - om2 * c.s1[i], -om2 * S0q, 2 * omega * qv
-        Jp = c.tip_inertia[i]
-        if Jp > 0.0:  # q^T M q has the payload's turning in it, which does not act at a distance
-            w.body[i, 2] -= Jp * slope * slope
-            w.body[i, 5] -= 2 * omega * Jp * slope * spin
-            for k in range(m):
-                w.cv[i, k] += om2 * Jp * slope * c.SL[i, k]
-        u, k_, z, turn = 0.0, 0.0, 0.0, 0.0
-        w.tilt[i] = 1.0
-        if c.stiffening and m > 0:
-            if c.points[i] == 4:  # the usual number as a constant: the compiler unrolls the loops over points
-                u, k_, z = _bend(c, w, i, q, qd, omega, 4)
-            else:
-                u, k_, z = _bend(c, w, i, q, qd, omega, c.points[i])
-            # the tip's tangent turns by asin(w'), faster than w' by 1/cos
-            tilt = 1.0 / np.sqrt(1.0 - slope * slope)
-            w.tilt[i] = tilt
-            turn = slope * spin * spin * tilt * tilt * tilt
-            if Jp > 0.0:
-                w.body[i, 5] += Jp * turn
-                for k in range(m):
-                    w.mt[i, k] += Jp * (tilt - 1.0) * c.SL[i, k]
-                    w.cv[i, k] += Jp * tilt * turn * c.SL[i, k]
-            slope = np.arcsin(slope)
-            spin *= tilt
-        if i + 1 < links and c.kind[i + 1] == PRISMATIC:  # the next hub slides along this rigid link
-            w.place[i, 0], w.place[i, 1] = y[end], 0.0
-            w.place[i, 2], w.place[i, 3], w.place[i, 4] = -om2 * y[end], 2 * omega * v[end], 0.0
+        if c.kind[i] == SLEEVE:
+            slope = sleeve(c, w, i, y[e:end], v[e:end], omega)
         else:
-            rx = c.length[i] + u
-            w.place[i, 0], w.place[i, 1] = rx, wL
-            w.place[i, 2], w.place[i, 3], w.place[i, 4] = -om2 * rx - 2 * omega * wLd - z, -om2 * wL - 2 * omega * k_, turn
-        omega += spin
+            slope = _link(c, w, i, y[e + 1 : end], v[e + 1 : end], omega)
+        if i + 1 < links:
+            if c.kind[i + 1] == SLIDER:
+                slope = ride(c, w, i, y, v, omega)
+            else:
+                w.slide[i + 1, 0], w.slide[i + 1, 1], w.slide[i + 1, 2] = 0.0, 0.0, 1.0
+        w.angle[i] = slope
+        omega += w.rate[i, 2]
+
+
+@inlined
+def _link(c: Chain, w: Work, i: int, q: np.ndarray, qd: np.ndarray, omega: float) -> float:
+    """A link clamped to its hub (R, Pa): its terms, and its tip as the attachment; returns the tip's angle in the link's frame."""
+    m = q.shape[0]
+    om2 = omega * omega
+    slope, spin, wL, wLd, S0q, S0v, qq, qv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(m):
+        slope += c.SL[i, k] * q[k]
+        spin += c.SL[i, k] * qd[k]
+        wL += c.NL[i, k] * q[k]
+        wLd += c.NL[i, k] * qd[k]
+        S0q += c.S0[i, k] * q[k]
+        S0v += c.S0[i, k] * qd[k]
+        qq += q[k] * q[k]
+        qv += q[k] * qd[k]
+        w.col[i, k, 0], w.col[i, k, 1], w.col[i, k, 2] = 0.0, c.S0[i, k], c.S1[i, k]
+        w.jac[i, k, 0], w.jac[i, k, 1], w.jac[i, k, 2] = 0.0, c.NL[i, k], c.SL[i, k]
+        w.cv[i, k] = -om2 * q[k]
+    w.body[i, 0], w.body[i, 1], w.body[i, 2] = S0q, c.s1[i], c.inertia[i] + qq
+    w.body[i, 3], w.body[i, 4], w.body[i, 5] = -2 * omega * S0v - om2 * c.s1[i], -om2 * S0q, 2 * omega * qv
+    Jp = c.tip_inertia[i]
+    if Jp > 0.0:  # q^T M q has the payload's turning in it, which does not act at a distance
+        w.body[i, 2] -= Jp * slope * slope
+        w.body[i, 5] -= 2 * omega * Jp * slope * spin
+        for k in range(m):
+            w.cv[i, k] += om2 * Jp * slope * c.SL[i, k]
+    u, k_, z, turn = 0.0, 0.0, 0.0, 0.0
+    w.tilt[i] = 1.0
+    if c.stiffening and m > 0:
+        if c.points[i] == 4:  # the usual number as a constant: the compiler unrolls the loops over points
+            u, k_, z = _bend(c, w, i, q, qd, omega, 4)
+        else:
+            u, k_, z = _bend(c, w, i, q, qd, omega, c.points[i])
+        # the tip's tangent turns by asin(w'), faster than w' by 1/cos
+        tilt = 1.0 / np.sqrt(1.0 - slope * slope)
+        w.tilt[i] = tilt
+        turn = slope * spin * spin * tilt * tilt * tilt
+        if Jp > 0.0:
+            w.body[i, 5] += Jp * turn
+            for k in range(m):
+                w.col[i, k, 2] += Jp * (tilt - 1.0) * c.SL[i, k]
+                w.cv[i, k] += Jp * tilt * turn * c.SL[i, k]
+        for k in range(m):
+            w.jac[i, k, 2] = tilt * c.SL[i, k]
+        slope = np.arcsin(slope)
+        spin *= tilt
+    rx = c.length[i] + u
+    w.place[i, 0], w.place[i, 1] = rx, wL
+    w.rate[i, 0], w.rate[i, 1], w.rate[i, 2] = -k_, wLd, spin
+    w.beta[i, 0], w.beta[i, 1], w.beta[i, 2] = -om2 * rx - 2 * omega * wLd - z, -om2 * wL - 2 * omega * k_, turn
+    return slope
 
 
 @inlined
@@ -93,7 +114,7 @@ def _bend(c: Chain, w: Work, i: int, q: np.ndarray, qd: np.ndarray, omega: float
             g2 += c.G2[i, k, j] * q[j]
             h += c.H[i, k, j] * q[j]
             hv += c.H[i, k, j] * qd[j]
-        w.g1q[i, k], w.hq[i, k] = g, h
+        w.col[i, k, 0], w.jac[i, k, 0] = -g, -h
         w.cv[i, k] += om2 * g2
         qGq += g * q[k]
         qGv += g * qd[k]
@@ -158,8 +179,8 @@ def _bend(c: Chain, w: Work, i: int, q: np.ndarray, qd: np.ndarray, omega: float
             g += c.point_mass[i, p] * dh
             mt += w.point[p, 2] * phi + w.point[p, 3] * h
             cv += w.point[p, 0] * h + w.point[p, 1] * phi + w.point[p, 4] * dh
-        w.g1q[i, k] += g
-        w.hq[i, k] += dh
-        w.mt[i, k] += mt
+        w.col[i, k, 0] -= g
+        w.jac[i, k, 0] -= dh
+        w.col[i, k, 2] += mt
         w.cv[i, k] += cv
     return dU - 0.5 * qHq, dK + qHv, dZ + vHv

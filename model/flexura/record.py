@@ -34,8 +34,8 @@ def record(system: System, t: np.ndarray, states: np.ndarray, work: np.ndarray, 
             put(f"link/{i}/tip_deflection", tips[:, i - 1, 0], "m")
             put(f"link/{i}/tip_slope", tips[:, i - 1, 1], "rad")
             own = slice(system.chain.first[i - 1] + 1, system.chain.first[i])
-            for k, row_shape in enumerate(system.stations(i - 1)):
-                put(f"link/{i}/deflection/{k}", states[:, own] @ row_shape, "m")
+            for k, values in enumerate(system.deflections(i - 1, states[:, own], states[:, system.joint_rows[i - 1]])):
+                put(f"link/{i}/deflection/{k}", values, "m")
     put("tip/x", ends[:, 0], "m")
     put("tip/y", ends[:, 1], "m")
     for k, name in enumerate(("kinetic", "strain", "potential")):

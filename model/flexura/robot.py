@@ -18,6 +18,7 @@ from .files import read_toml, write_toml
 
 MAX_ELEMENTS = 200
 MAX_LINKS = 256
+LEAST_FREE = 0.02  # of its length that a flexible link keeps out of its sleeve: its mesh is that long
 
 _strict = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 Positive = Annotated[float, Field(gt=0)]
@@ -67,7 +68,7 @@ class Joint(_Table):
     limits: tuple[float, float] | None = Field(
         None, strict=False, description="two numbers, the lower limit and a higher upper limit, in m or rad"
     )
-    start: float = Field(0.0, description="the joint's position at the start, in m or rad, a finite number")
+    start: float = Field(0.0, description="the joint's position at the start, in m or rad (Pb: the free length), a finite number")
     locked: bool = Field(False, description="true (the joint is clamped at its start) or false")
 
     @model_validator(mode="after")
@@ -264,6 +265,34 @@ class Robot(_Table):
     sliding: Literal["continuous", "nodal"] = Field("continuous", description='"continuous" or "nodal"')
     link: list[Link] = Field(min_length=1, max_length=MAX_LINKS, description=f"1 to {MAX_LINKS} tables [[link]]")
     payload: Payload = Field(default_factory=Payload, description="a table { mass_kg, inertia_kg_m2 }")
+
+    @model_validator(mode="after")
+    def _starts_on_its_links(self) -> Robot:
+        for i, link in enumerate(self.link):
+            low, high = self.travel(i)
+            joint, key = link.joint, f"link[{i + 1}].joint"
+            where = f"between {low:g} and {high:g} m, the ends of link {i if joint.type == 'Pa' else i + 1}"
+            if joint.type == "Pa" and low == high:
+                raise WrongValue(f"link[{i}].length_m", 0.0, f"a length above 0: link {i + 1} slides on this link")
+            if not low <= joint.start <= high:
+                free = "the free length at the start, " if joint.type == "Pb" else "a start "
+                raise WrongValue(f"{key}.start", joint.start, free + where)
+            if joint.limits is not None and not (low <= joint.limits[0] and joint.limits[1] <= high):
+                raise WrongValue(f"{key}.limits", list(joint.limits), f"limits {where}")
+            if joint.type == "Pa" and i > 0 and self.link[i - 1].joint.type == "Pb":
+                exit_m = self.link[i - 1].length_m - self.link[i - 1].joint.start
+                if joint.start < exit_m:
+                    raise WrongValue(f"{key}.start", joint.start, f"a start ahead of the sleeve of link {i}, at {exit_m:g} m or more")
+        return self
+
+    def travel(self, i: int) -> tuple[float, float]:
+        """How far joint i (from 0) can go on its links: infinite for R and for a Pa on the base."""
+        link = self.link[i]
+        if link.joint.type == "Pb":
+            return (LEAST_FREE * link.length_m if link.flexible else 0.0), link.length_m
+        if link.joint.type == "Pa" and i > 0:
+            return 0.0, self.link[i - 1].length_m
+        return -np.inf, np.inf
 
     @property
     def links(self) -> list[Link]:

@@ -41,7 +41,7 @@ def static(
         return K @ z + system.residual(z, zero) - extended.tip_jacobian(system.chain, system._work(), z).T @ load
 
     y = system.to_solver @ q
-    scale = np.sqrt(np.diag(K)[rows])
+    scale = np.sqrt(np.diag(system.transform.T @ system.stiffness() @ system.transform)[rows])
     for _ in range(30):
         tangent = system.differences(residual, y)[pick]
         step = np.linalg.solve(tangent, residual(y)[rows])

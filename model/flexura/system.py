@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import block_diag, eigvalsh
 
 from . import extended
 from .beam import LinkIntegrals, link_integrals, shape
-from .chain import PRISMATIC, REVOLUTE, Chain, Work, workspace
-from .errors import FlexuraError, InputError
+from .chain import REVOLUTE, SLEEVE, SLIDER, Chain, Work, workspace
+from .errors import InputError
 from .modes import modal
 from .newton_euler import inverse
-from .robot import Robot
+from .outward import outward
+from .robot import Link, Robot
 from .run import STATIONS
 
 
@@ -57,8 +59,10 @@ class System:
 
     @cached_property
     def limits(self) -> np.ndarray:
-        """Lower and upper limits of the joints (links, 2) [m or rad], infinite where the file gives none."""
-        return np.array([link.joint.limits or (-np.inf, np.inf) for link in self.robot.links])
+        """Lower and upper limits of the joints (links, 2) [m or rad]: those of the file, and the ends of the links that slide."""
+        own = np.array([link.joint.limits or (-np.inf, np.inf) for link in self.robot.links])
+        ends = np.array([self.robot.travel(i) for i in range(len(self.links))])
+        return np.column_stack([np.maximum(own[:, 0], ends[:, 0]), np.minimum(own[:, 1], ends[:, 1])])
 
     @cached_property
     def spectrum(self) -> np.ndarray:
@@ -81,21 +85,38 @@ class System:
         return self.to_solver.T @ M @ self.to_solver
 
     def stiffness(self, q: np.ndarray | None = None) -> np.ndarray:
-        """K (n, n), constant; with q the tangent stiffness there, d (elastic + gravity) / dq."""
-        K = self.modal_stiffness
-        if q is not None:
-            K = K + self.differences(lambda y: self.residual(y, np.zeros(self.n)), self.to_solver @ self._check(q))
+        """K (n, n), at the start (it depends on the free length of a sleeved link, on nothing else); with q the tangent stiffness
+        there, d (elastic + gravity) / dq."""
+        if q is None:
+            K = np.diag(self._diagonal(self.chain.lam, np.zeros(len(self.links))))
+        else:
+            K = self.modal_stiffness + self.differences(lambda y: self.residual(y, np.zeros(self.n)), self.to_solver @ self._check(q))
         return self.to_solver.T @ K @ self.to_solver
 
     @cached_property
     def modal_stiffness(self) -> np.ndarray:
-        """K (n, n) in the solver's coordinates: diagonal, omega^2 of each link's own modes."""
-        return np.diag(self._diagonal(self.chain.lam, np.zeros(len(self.links))))
+        """The constant part of K (n, n) in the solver's coordinates, which `residual` leaves out: omega^2 of each link's own modes,
+        0 for links behind a sleeve."""
+        fixed = np.where(self.chain.kind == SLEEVE, 0.0, 1.0)[:, None]
+        return np.diag(self._diagonal(self.chain.lam * fixed, np.zeros(len(self.links))))
 
     @cached_property
     def damping(self) -> np.ndarray:
-        """D (n, n), constant: Rayleigh damping of the elastic unknowns and viscous friction of the joints."""
-        return self.to_solver.T @ np.diag(self._diagonal(self.chain.damp, self.chain.viscous)) @ self.to_solver
+        """D (n, n) at the start: Rayleigh damping of the elastic unknowns and viscous friction of the joints."""
+        return self.damping_at(self.start())
+
+    def damping_at(self, q: np.ndarray) -> np.ndarray:
+        """D (n, n) at q: it depends on the free length of a sleeved link, on nothing else."""
+        c, w, y = self.chain, self._work(), self.to_solver @ self._check(q)
+        D = np.diag(self._diagonal(c.damp, c.viscous))
+        if SLEEVE in c.kind:
+            outward(c, w, y, np.zeros(self.n))
+        for i in np.flatnonzero(c.kind == SLEEVE):
+            own = slice(c.first[i] + 1, c.first[i + 1])
+            m = own.stop - own.start
+            lower = c.alpha[i] * np.tril(w.M[i, :m, :m]) + c.beta[i] * np.tril(w.K[i, :m, :m])
+            D[own, own] = lower + np.tril(lower, -1).T
+        return self.to_solver.T @ D @ self.to_solver
 
     def _diagonal(self, elastic: np.ndarray, joint: np.ndarray) -> np.ndarray:
         """A diagonal (n,) from its values per link (N, m) and per joint (N,)."""
@@ -105,7 +126,7 @@ class System:
     def elastic(self, q: np.ndarray) -> np.ndarray:
         """Elastic forces (n,), on the left-hand side: K q, and with stiffening the strain energy's terms of higher order."""
         zero = np.zeros(self.n)
-        return self.stiffness() @ self._check(q) + self._inverse(q, zero, zero, np.zeros(2))
+        return self._constant_stiffness @ self._check(q) + self._inverse(q, zero, zero, np.zeros(2))
 
     def gravity(self, q: np.ndarray) -> np.ndarray:
         """Generalised gravity forces (n,), on the left-hand side."""
@@ -120,7 +141,12 @@ class System:
     def forces(self, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
         """Generalised forces (n,) that the motion needs: the whole left-hand side (Coulomb friction left out), by
         Newton-Euler."""
-        return self._inverse(q, qd, qdd, self.chain.gravity) + self.damping @ np.asarray(qd) + self.stiffness() @ np.asarray(q)
+        moving = self._inverse(q, qd, qdd, self.chain.gravity) + self.damping_at(q) @ np.asarray(qd)
+        return moving + self._constant_stiffness @ np.asarray(q)
+
+    @cached_property
+    def _constant_stiffness(self) -> np.ndarray:
+        return self.to_solver.T @ self.modal_stiffness @ self.to_solver
 
     def residual(self, y: np.ndarray, v: np.ndarray) -> np.ndarray:
         """bias + gravity and the strain energy's higher terms (n,), on the left-hand side, in the solver's coordinates."""
@@ -148,11 +174,18 @@ class System:
     def _work(self) -> Work:
         return workspace(self.chain)
 
-    def stations(self, link: int) -> np.ndarray:
-        """phi at the places where a Run holds the deflection, in the solver's coordinates: (STATIONS, m); link from 0."""
-        info = self.links[link]
+    def deflections(self, link: int, y: np.ndarray, eta: np.ndarray) -> np.ndarray:
+        """The deflection [m] at the places where a Run holds it, (STATIONS, T), of states y (T, m) of a link (from 0) and positions
+        eta (T,) of its joint: 0 for what is inside or behind a sleeve."""
+        info, elements = self.links[link], self.robot.links[link].elements
         x = np.linspace(0, info.length, STATIONS)
-        return shape(info.length, self.robot.links[link].elements, x).T @ info.basis
+        if self.chain.kind[link] != SLEEVE:
+            return shape(info.length, elements, x).T @ info.basis @ y.T
+        out = np.zeros((STATIONS, len(eta)))
+        for k in range(1, STATIONS):
+            ahead = np.maximum(x[k] - info.length + eta, 0.0) / eta  # xi
+            out[k] = np.einsum("kt,kt->t", shape(info.length, elements, ahead * info.length), info.basis @ y.T)
+        return out
 
 
 def jacobian(function: Callable[[np.ndarray], np.ndarray], x: np.ndarray, steps: np.ndarray) -> np.ndarray:
@@ -162,16 +195,8 @@ def jacobian(function: Callable[[np.ndarray], np.ndarray], x: np.ndarray, steps:
 
 
 def assemble(robot: Robot) -> System:
-    """The System of a robot. Raises FlexuraError for what the solver does not do, InputError for a singular mass matrix."""
+    """The System of a robot. Raises InputError for a singular mass matrix, and for joints that start beyond a link's end."""
     links = robot.links
-    for i, link in enumerate(links):
-        before = links[i - 1] if i else None
-        if link.joint.type == "Pb":
-            raise FlexuraError(f"link {i + 1}: a joint Pb is not in this version; R, and Pa on the base or a rigid link, are")
-        if link.joint.type == "Pa" and before is not None and before.flexible:
-            raise FlexuraError(
-                f"link {i + 1}: a joint Pa on a flexible link is not in this version; R, and Pa on the base or a rigid link, are"
-            )
     first, infos, spectra, transforms, back, labels = [0], [], [], [], [], []
     for i, link in enumerate(links, 1):
         last = i == len(links)
@@ -185,7 +210,8 @@ def assemble(robot: Robot) -> System:
             transforms.append(np.eye(1 + m))
             back.append(np.eye(1 + m))
         else:
-            labels += [f"link {i} node {k // 2 + 1} {'slope [rad]' if k % 2 else 'deflection [m]'}" for k in range(m)]
+            slope = "slope x d/L [rad]" if link.joint.type == "Pb" else "slope [rad]"
+            labels += [f"link {i} node {k // 2 + 1} {slope if k % 2 else 'deflection [m]'}" for k in range(m)]
             transforms.append(block_diag(1.0, info.basis) if m else np.eye(1))
             back.append(block_diag(1.0, info.basis.T @ nodal.M) if m else np.eye(1))
         first.append(first[-1] + 1 + m)
@@ -193,25 +219,38 @@ def assemble(robot: Robot) -> System:
         infos.append(info)
     column = lambda f, kind=float: np.array([f(link) for link in links], dtype=kind)
     of = lambda f: np.array([f(info) for info in infos], dtype=float)
+    hubs = column(lambda k: k.joint.hub_mass_kg if k.joint.type == "Pb" else 0.0)
+    at_end = np.arange(len(links)) == len(links) - 1
+    laws = [_laws(link) if link.joint.type == "Pb" and link.flexible else _NO_LAWS for link in links]
     chain = Chain(
         first=np.array(first, dtype=np.int64),
-        kind=column(lambda k: REVOLUTE if k.joint.type == "R" else PRISMATIC, np.int64),
+        kind=column(lambda k: {"R": REVOLUTE, "Pa": SLIDER, "Pb": SLEEVE}[k.joint.type], np.int64),
         locked=column(lambda k: k.joint.locked, np.int64),
         angle=column(lambda k: k.joint.angle_rad),
         rotor=column(lambda k: k.joint.rotor_inertia),
         viscous=column(lambda k: k.joint.viscous_friction),
         coulomb=column(lambda k: k.joint.coulomb_friction),
         length=of(lambda k: k.length),
-        mass=of(lambda k: k.mass),
+        mass=of(lambda k: k.mass) + hubs,
+        hub=hubs,
         s1=of(lambda k: k.s1),
         inertia=of(lambda k: k.inertia),
         **{name: _stack([getattr(info, name) for info in infos]) for name in _PER_LINK},
         lam=_stack(spectra),
+        alpha=column(lambda k: k.damping.alpha_1_s),
+        beta=column(lambda k: k.damping.beta_s),
         damp=_stack(
             [np.where(lam > 0, k.damping.alpha_1_s + k.damping.beta_s * lam, 0.0) for k, lam in zip(links, spectra, strict=True)]
         ),
         points=of(lambda k: len(k.point_x)).astype(np.int64),
-        tip_inertia=np.array([robot.payload.inertia_kg_m2 * (i == len(links) - 1) for i in range(len(links))]),
+        payload=robot.payload.mass_kg * at_end,
+        tip_inertia=robot.payload.inertia_kg_m2 * at_end,
+        elements=column(lambda k: k.elements, np.int64),
+        node=np.zeros(len(links), dtype=np.int64),
+        reference=of(lambda k: k.reference),
+        law_x=_stack([x for x, _, _ in laws], np.inf),
+        law_mass=_stack([mass for _, mass, _ in laws]),
+        law_EI=_stack([EI for _, _, EI in laws]),
         stiffening=robot.stiffening,
         gravity=np.array(robot.gravity_m_s2, dtype=float),
     )
@@ -222,13 +261,29 @@ def assemble(robot: Robot) -> System:
 
 _PER_LINK = (
     "S0", "S1", "NL", "SL", "G1", "G2", "H", "point_x", "point_mass", "point_phi", "slope_dx", "slope_EI", "slope_d1", "slope_d2",
+    "ride", "sleeve_xi", "sleeve_w", "sleeve_phi", "sleeve_d1", "sleeve_d2",
 )  # fmt: skip
 
+_NO_LAWS = (np.zeros(1), np.zeros((1, 3)), np.zeros((1, 5)))
 
-def _stack(arrays: list[np.ndarray]) -> np.ndarray:
-    """Arrays of the links as one, padded with zeros to the largest."""
+
+def _laws(link: Link) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """rho A and E I between a link's breaks as polynomials: where they begin (B,), coefficients (B, 3) and (B, 5), exact for
+    sections that taper linearly."""
+    breaks = np.array(link.breaks())
+    pieces = list(pairwise(breaks))
+    mass, EI = np.zeros((len(pieces), 3)), np.zeros((len(pieces), 5))
+    for k, (a, b) in enumerate(pieces):
+        for row, law in ((mass[k], link.mass_per_length), (EI[k], link.bending_stiffness)):
+            s = np.linspace(0, b - a, len(row))
+            row[:] = np.polynomial.polynomial.polyfit(s / (b - a), law(a + s), len(row) - 1) / (b - a) ** np.arange(len(row))
+    return breaks[:-1], mass, EI
+
+
+def _stack(arrays: list[np.ndarray], empty: float = 0.0) -> np.ndarray:
+    """Arrays of the links as one, padded to the largest."""
     shape_ = np.max([a.shape for a in arrays], axis=0)
-    out = np.zeros((len(arrays), *shape_))
+    out = np.full((len(arrays), *shape_), empty)
     for target, a in zip(out, arrays, strict=True):
         target[tuple(slice(k) for k in a.shape)] = a
     return out
