@@ -118,7 +118,7 @@ def linearize(system: System, q: Any = None, qd: Any = None, joints: str = "free
     turns = [link.joint.type == "R" for link in system.robot.links]
     units |= {name: "N m" if turns[i] else "N" for name, i in zip(drives, moved, strict=True)}
     return StateSpace(
-        M=system.mass(T @ at)[np.ix_(rows, rows)], G=back(G) + system.damping[np.ix_(rows, rows)], K=back(K),
+        M=system.mass(T @ at)[np.ix_(rows, rows)], G=back(G) + system.damping_at(T @ at)[np.ix_(rows, rows)], K=back(K),
         E=(np.arange(system.n)[rows, None] == system.joint_rows[moved]).astype(float),
         outlook=(look @ system.to_solver)[np.ix_(np.array(kept), rows)],
         states=(*labels, *(f"rate of {label.replace(']', '/s]')}" for label in labels)),
@@ -134,7 +134,7 @@ def _steady(system: System, v: np.ndarray) -> np.ndarray:
     if len(rows) == 0 or not v.any():
         return y
     pick = np.ix_(rows, rows)
-    scale = np.sqrt(np.diag(K)[rows])
+    scale = _sizes(system)
     balance = lambda z: K @ z + system.residual(z, v)
     for _ in range(30):
         step = np.linalg.solve(system.differences(balance, y)[pick], balance(y)[rows])
@@ -146,14 +146,17 @@ def _steady(system: System, v: np.ndarray) -> np.ndarray:
     raise FlexuraError("no equilibrium found at these rates: the rotation bends a link beyond the model")
 
 
+def _sizes(system: System) -> np.ndarray:
+    """Roots of the elastic rows' stiffness at the start, which make square roots of energies of them, in the solver's coordinates."""
+    return np.sqrt(np.diag(system.transform.T @ system.stiffness() @ system.transform)[system.elastic_rows])
+
+
 def _check_steady(system: System, y: np.ndarray, v: np.ndarray) -> None:
     """Refuse what is no equilibrium: elastic rows out of balance, or a motion along which the robot's equations change."""
     rows = system.elastic_rows
     if len(rows):
         force = (system.modal_stiffness @ y + system.residual(y, v))[rows]
-        bent = force / np.sqrt(np.diag(system.modal_stiffness)[rows])  # sqrt of energy
-        most = np.linalg.norm(y[rows] * np.sqrt(np.diag(system.modal_stiffness)[rows]))
-        if np.linalg.norm(bent) > 1e-5 * most + 1e-8:
+        if np.linalg.norm(force / _sizes(system)) > 1e-5 * np.linalg.norm(y[rows] * _sizes(system)) + 1e-8:
             raise InputError(
                 "expected an equilibrium, as from fx.static(system, joints=...): elastic forces do not balance", key="q"
             )
