@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from rich.console import Group
 from rich.table import Table
 
 import flexura as fx
@@ -97,17 +98,18 @@ def run_json(run: fx.Run) -> dict[str, Any]:
     }
 
 
-def frequency_table(locked: np.ndarray, free: np.ndarray, name: str) -> Table:
+def frequency_tables(locked: np.ndarray, free: np.ndarray, name: str, zeros: list[Transmission]) -> Group:
+    """Natural frequencies, and transmission zeros where they are given."""
     table = Table(title=f"{name}: natural frequencies", title_justify="left")
     table.add_column("mode", justify="right")
     table.add_column("joints locked \\[Hz]", justify="right")
     table.add_column("joints free \\[Hz]", justify="right")
     for k in range(max(len(locked), len(free))):
         table.add_row(str(k + 1), *(f"{f[k]:.5g}" if k < len(f) else "" for f in (locked, free)))
-    return table
+    return Group(table, *([_zero_table(zeros)] if zeros else []))
 
 
-def zero_table(rows: list[Transmission]) -> Table:
+def _zero_table(rows: list[Transmission]) -> Table:
     table = Table(title="transmission zeros", title_justify="left")
     for name in ("drive", "output", "output at rest at \\[Hz]", "right half plane \\[1/s]"):
         table.add_column(name, no_wrap=True)

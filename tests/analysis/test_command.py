@@ -106,6 +106,8 @@ WRONG = {
     ),
     "a motion that jumps": (["inverse", RIG, "jump.toml"], "jump.toml: motion 1: expected a motion without jumps"),
     "a prescribed joint in the twin": (["crosscheck", RIG, "held.toml"], "prescribed = True: expected a force, or gains"),
+    "an unknown study": (["study", "mass", RIG], "KIND = 'mass': expected one of payload"),
+    "a study of nothing": (["study", "boundary", RIG], "expected a robot with a flexible link behind a joint Pb"),
     "a tolerance beyond sense": (["simulate", RIG, LAW, "--rtol", "5"], "rtol = 5.0: expected a relative tolerance"),
     "an unknown method": (["simulate", RIG, LAW, "--method", "euler"], "method = 'euler': expected"),
     "an unknown beam": (["crosscheck", RIG, LAW, "--beam", "timoshenko"], "beam = 'timoshenko': expected"),
@@ -222,6 +224,22 @@ def test_inverse_prints_the_drives_of_the_stored_run(warm, tmp_path):
     table = flexura("inverse", RIG, "law.toml", cwd=tmp_path)
     assert table.returncode == 0 and f"{told['drives'][0]['peak']:.4g} N" in table.stdout
     assert (tmp_path / "logs" / "inverse-rig" / "run.parquet").is_file()
+
+
+# --- study
+
+
+def test_a_study_prints_its_finding_and_stores_its_files(warm, tmp_path):
+    robots = ROOT / "model" / "robots"
+    done = flexura("study", "boundary", robots / "type-3-rpb.toml", "--values", "0.2:0.4:3", cwd=tmp_path)
+    folder = tmp_path / "logs" / "study-boundary-type-3-rpb"
+    assert done.returncode == 0 and done.stderr == "" and "REPRODUCED: sliding" in done.stdout
+    assert sorted(path.name for path in folder.iterdir()) == ["study.parquet", "study.png", "study.svg"]
+    arguments = ("--values", "0.5:2:3", "--keep", "first", "--channels", "--out", "out", "--json")
+    done = flexura("study", "length-ratio", RIG, *arguments, cwd=tmp_path)
+    told = json.loads(done.stdout)
+    assert done.returncode == 0 and told["finding"]["reproduced"] and [row["L1_m"] for row in told["rows"]] == [0.1] * 3
+    assert fx.Run.read(tmp_path / "out" / "runs" / "002").meta["case"]["ratio"] == pytest.approx(2.0)
 
 
 # --- frequencies
