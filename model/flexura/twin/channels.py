@@ -24,13 +24,25 @@ def channels(
         mine, rate = q[:, index], v[:, index]
         hub, end = part.motion_at_origin(mine, rate), part.motion_at_tip(mine, rate)
         joint = link.joint
+        slid = chain.slides[i]
         if joint.type == "R":
             turned = _unwrap(t, hub.angle - tip.angle, hub.omega - tip.omega, joint.start)
             position[:, i], speed[:, i] = turned, hub.omega - tip.omega
             hub = hub._replace(angle=tip.angle + turned)
+        elif joint.type == "Pa":
+            if slid is None:
+                position[:, i], speed[:, i] = _slide(origin, hub)
+            # the tangent turns less than half a turn against the link's start
+            hub = hub._replace(angle=origin.angle + _wrap(hub.angle - origin.angle - joint.angle_rad) + joint.angle_rad)
         else:
-            position[:, i], speed[:, i] = _slide(origin, hub)
-            hub = hub._replace(angle=origin.angle + joint.angle_rad)
+            sleeve = tip._replace(angle=tip.angle + joint.angle_rad)
+            if slid is None:
+                position[:, i], speed[:, i] = _slide(sleeve, end)
+            hub = sleeve
+        if slid is not None:
+            position[:, i], speed[:, i] = q[:, slid], v[:, slid]
+        if joint.type == "Pb":
+            hub = sleeve._replace(r=sleeve.r + (position[:, i] - link.length_m)[:, None] * _axis(sleeve.angle))
         slope = _wrap(end.angle - hub.angle)
         end = end._replace(angle=hub.angle + slope)
         out |= {f"link/{i + 1}/x": (hub.r[:, 0], "m"), f"link/{i + 1}/y": (hub.r[:, 1], "m")}
@@ -73,10 +85,14 @@ def _transverse(hub: Motion, place: np.ndarray) -> np.ndarray:
 
 def _slide(rail: Motion, hub: Motion) -> tuple[np.ndarray, np.ndarray]:
     """Distance of the hub along the rail's axis, and its rate."""
-    axis = np.stack([np.cos(rail.angle), np.sin(rail.angle)], axis=-1)
+    axis = _axis(rail.angle)
     normal = np.stack([-axis[:, 1], axis[:, 0]], axis=-1)
     delta, rate = hub.r - rail.r, hub.v - rail.v
     return (axis * delta).sum(axis=-1), (axis * rate + rail.omega[:, None] * normal * delta).sum(axis=-1)
+
+
+def _axis(angle: np.ndarray) -> np.ndarray:
+    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 
 def _wrap(angle: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from ..robot import Joint
+from ..robot import Joint, Link
 from .part import Attachment, Frame
 
 FRICTION_SPEED = 1e-3  # m/s or rad/s: Coulomb friction is f tanh(velocity / this)
@@ -31,19 +31,26 @@ class Coordinate:
     kept: Any = None
 
 
-def start_frame(joint: Joint, previous: Frame, length: float, speed: float) -> Frame:
-    """The straight start of the link behind a joint; `previous` is the link before it, of that length, or the base (0)."""
+def start_frame(link: Link, previous: Frame, length: float, speed: float) -> Frame:
+    """The straight start of a link; `previous` is the link before it, of that length, or the base (0)."""
+    joint = link.joint
     if joint.type == "R":
         return previous.along(length, turn=joint.start, spin=speed)
-    return previous.along(joint.start, slide=speed, turn=joint.angle_rad)
+    if joint.type == "Pa":
+        return previous.along(joint.start, slide=speed, turn=joint.angle_rad)
+    return previous.along(length, turn=joint.angle_rad).along(joint.start - link.length_m, slide=speed)
 
 
-def connect(mbs: Any, joint: Joint, previous: Any, link: Any) -> Any:
-    """Constrain `link` to `previous` (parts) by an R or Pa; returns the marker of the joint's coordinate."""
-    return (_revolute if joint.type == "R" else _prismatic)(mbs, joint, previous.tip, previous.origin, link.origin)
+def connect(mbs: Any, link: Link, previous: Any, part: Any) -> Any:
+    """Constrain `part` to `previous` by a joint that doesn't slide on a beam; returns the marker of the joint's coordinate."""
+    if link.joint.type == "R":
+        return _revolute(mbs, link.joint, previous.tip, part.origin)
+    if link.joint.type == "Pa":
+        return _prismatic(mbs, previous.origin, part.origin, part.origin, 0.0, link.joint.angle_rad)
+    return _prismatic(mbs, previous.tip, part.origin, part.tip, link.joint.angle_rad, 0.0)  # d is where the tip of link i is
 
 
-def _revolute(mbs: Any, joint: Joint, tip: Attachment, _: Attachment, hub: Attachment) -> Any:
+def _revolute(mbs: Any, joint: Joint, tip: Attachment, hub: Attachment) -> Any:
     from exudyn import itemInterface as eii
 
     mbs.AddObject(eii.ObjectJointRevolute2D(markerNumbers=[tip.marker, hub.marker]))
@@ -56,15 +63,17 @@ def _revolute(mbs: Any, joint: Joint, tip: Attachment, _: Attachment, hub: Attac
     )  # fmt: skip
 
 
-def _prismatic(mbs: Any, joint: Joint, _: Attachment, rail: Attachment, hub: Attachment) -> Any:
+def _prismatic(mbs: Any, rail: Attachment, hub: Attachment, end: Attachment, axis: float, turned: float) -> Any:
+    """`hub` slides on a line at the angle `axis` in the frame of `rail`, and is `turned` to it; the coordinate is that of `end`."""
     from exudyn import itemInterface as eii
 
-    normal = [math.sin(joint.angle_rad), math.cos(joint.angle_rad), 0.0]  # of the rail, in the hub's frame
+    along = [math.cos(axis), math.sin(axis), 0.0]
+    normal = [math.sin(turned), math.cos(turned), 0.0]  # of the line, in the hub's frame
     markers = [rail.marker, hub.marker]
-    mbs.AddObject(eii.ObjectJointPrismatic2D(markerNumbers=markers, axisMarker0=[1, 0, 0], normalMarker1=normal))
+    mbs.AddObject(eii.ObjectJointPrismatic2D(markerNumbers=markers, axisMarker0=along, normalMarker1=normal))
     return mbs.AddMarker(
         eii.MarkerBodiesRelativeTranslationCoordinate(
-            bodyNumbers=[rail.body, hub.body], localPosition0=rail.place, localPosition1=hub.place, axis0=[1, 0, 0]
+            bodyNumbers=[rail.body, end.body], localPosition0=rail.place, localPosition1=end.place, axis0=along
         )
     )
 

@@ -88,12 +88,14 @@ class Inertia(NamedTuple):
 
 
 def rigid_inertia(link: Link, payload: Payload | None) -> Inertia:
-    """A rigid link with its hub, and the payload (None: it is on another link), as one body."""
+    """A rigid link with its hub, and the payload (None: it is on another link), as one body; the sleeve of a Pb is on no link
+    of its own."""
     if link.mass_kg is not None:
         body = Inertia(link.mass_kg, _centre(link), link.inertia_kg_m2 or 0.0)
     else:
         body = _spread_inertia(link)
-    body = body.plus(link.joint.hub_mass_kg, 0.0, link.joint.hub_inertia_kg_m2)
+    if link.joint.type != "Pb":
+        body = body.plus(link.joint.hub_mass_kg, 0.0, link.joint.hub_inertia_kg_m2)
     return body if payload is None else body.plus(payload.mass_kg, link.length_m, payload.inertia_kg_m2)
 
 

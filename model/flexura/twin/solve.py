@@ -42,6 +42,7 @@ def simulate(
     beam: str = "ancf",
     elements: int | None = None,
     step_s: float | None = None,
+    hub_length_m: float | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Run:
     """Simulate a robot in Exudyn, as a check on the native solver that shares nothing with it but the robot file.
@@ -75,7 +76,7 @@ def simulate(
     act = actuation(drive, robot.start, speeds)
     with _quiet():
         chain, steps, record, done, wall = _attempts(
-            lambda count: build(robot, beam, count, speeds, act.gains), elements, act, t, step_s, progress
+            lambda count: build(robot, beam, count, speeds, act.gains, hub_length_m), elements, act, t, step_s, progress
         )
     t, q, v = steps.at_times(t, *(np.array(column) for column in record))
     q += chain.reference
