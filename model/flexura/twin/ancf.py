@@ -16,6 +16,7 @@ from .part import Attachment, Frame, Lump, Motion, hang
 from .properties import BeamValues
 
 PROGRAM = "ObjectANCFCable2D"
+NEAR = 5  # elements of a stub as long as the link's, so that a sleeve's first spans are as stiff there
 LIGHT = 1e-4  # mass per length of a stub, relative to the link's end
 
 # Exudyn's own integration points: more of them would see the axial strain between its points
@@ -111,10 +112,11 @@ class CableLink:
 
 
 def _stub(length: float, size: float) -> np.ndarray:
-    """Ends of a stub's elements on the side of its free end, of about two of the link's: before (length < 0) or after the link."""
-    count = math.ceil(abs(length) / (2 * size) - 1e-9)
-    ends = length * np.arange(1, count + 1) / max(1, count)
-    return ends[::-1] if length < 0 else ends
+    """Ends of a stub's elements away from the link, ascending: NEAR of the link's `size`, then twice as long ones, so that they
+    reach over `length` [m]; before the link if it is negative, else after it."""
+    count = math.ceil(abs(length) / size - 1e-9)
+    ends = size * np.concatenate([np.arange(1, min(count, NEAR) + 1), np.arange(NEAR + 2, count + 2, 2)])
+    return -ends[::-1] if length < 0 else ends
 
 
 def _add_node(mbs: Any, here: Frame) -> Any:

@@ -24,25 +24,23 @@ def channels(
         mine, rate = q[:, index], v[:, index]
         hub, end = part.motion_at_origin(mine, rate), part.motion_at_tip(mine, rate)
         joint = link.joint
-        slid = chain.slides[i]
         if joint.type == "R":
             turned = _unwrap(t, hub.angle - tip.angle, hub.omega - tip.omega, joint.start)
             position[:, i], speed[:, i] = turned, hub.omega - tip.omega
             hub = hub._replace(angle=tip.angle + turned)
-        elif joint.type == "Pa":
-            if slid is None:
-                position[:, i], speed[:, i] = _slide(origin, hub)
-            # the tangent turns less than half a turn against the link's start
-            hub = hub._replace(angle=origin.angle + _wrap(hub.angle - origin.angle - joint.angle_rad) + joint.angle_rad)
+        elif joint.type == "Pa":  # the tangent of a link turns by less than half a turn from its start
+            turned = _wrap(hub.angle - joint.angle_rad - origin.angle)
+            position[:, i], speed[:, i] = _slide(origin, hub)
+            hub = hub._replace(angle=origin.angle + turned + joint.angle_rad)
         else:
             sleeve = tip._replace(angle=tip.angle + joint.angle_rad)
-            if slid is None:
-                position[:, i], speed[:, i] = _slide(sleeve, end)
-            hub = sleeve
-        if slid is not None:
-            position[:, i], speed[:, i] = q[:, slid], v[:, slid]
-        if joint.type == "Pb":
-            hub = sleeve._replace(r=sleeve.r + (position[:, i] - link.length_m)[:, None] * _axis(sleeve.angle))
+            position[:, i], speed[:, i] = _slide(sleeve, end)
+            hub = hub._replace(angle=sleeve.angle)
+        slides = chain.slides[i]
+        if slides is not None:
+            position[:, i], speed[:, i] = q[:, slides], v[:, slides]
+            if joint.type == "Pb":  # what is behind the sleeve's exit is on its axis
+                hub = hub._replace(r=sleeve.r + (position[:, i] - link.length_m)[:, None] * _axis(sleeve.angle))
         slope = _wrap(end.angle - hub.angle)
         end = end._replace(angle=hub.angle + slope)
         out |= {f"link/{i + 1}/x": (hub.r[:, 0], "m"), f"link/{i + 1}/y": (hub.r[:, 1], "m")}
@@ -59,7 +57,7 @@ def channels(
         strain += part.strain(mine)
         potential -= part.moment(mine) @ gravity
         origin, tip = hub, end
-    out = _joints(chain, act, t, position, speed, deflection * bool(chain.elements[-1])) | out
+    out = _joints(chain, act, t, position, speed, deflection * bool(chain.mesh.elements[-1])) | out
     out |= {"tip/x": (tip.r[:, 0], "m"), "tip/y": (tip.r[:, 1], "m")}
     out |= {"energy/kinetic": (kinetic, "J"), "energy/strain": (strain, "J"), "energy/potential": (potential, "J")}
     return {name: values for name, (values, _) in out.items()}, {name: unit for name, (_, unit) in out.items()}

@@ -12,7 +12,10 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from ..robot import Joint, Link
+from . import sliding
 from .part import Attachment, Frame
 
 FRICTION_SPEED = 1e-3  # m/s or rad/s: Coulomb friction is f tanh(velocity / this)
@@ -41,13 +44,42 @@ def start_frame(link: Link, previous: Frame, length: float, speed: float) -> Fra
     return previous.along(length, turn=joint.angle_rad).along(joint.start - link.length_m, slide=speed)
 
 
-def connect(mbs: Any, link: Link, previous: Any, part: Any) -> Any:
-    """Constrain `part` to `previous` by a joint that doesn't slide on a beam; returns the marker of the joint's coordinate."""
-    if link.joint.type == "R":
-        return _revolute(mbs, link.joint, previous.tip, part.origin)
-    if link.joint.type == "Pa":
-        return _prismatic(mbs, previous.origin, part.origin, part.origin, 0.0, link.joint.angle_rad)
-    return _prismatic(mbs, previous.tip, part.origin, part.tip, link.joint.angle_rad, 0.0)  # d is where the tip of link i is
+@dataclass(frozen=True)
+class Site:
+    """Where a joint is built: the start of the previous link's tip and of the link's origin, the joint's speed [m/s or rad/s].
+
+    `tiny`: mass and inertia of bodies that only hold others.
+    """
+
+    mbs: Any
+    tip: Frame
+    origin: Frame
+    speed: float
+    tiny: tuple[float, float]
+
+
+def connect(on: Site, link: Link, previous: Any, part: Any, places: np.ndarray | None) -> tuple[Any, Any]:
+    """Constrain `part` to `previous` by the joint of `link`; returns the marker of its coordinate, and the node if it has one.
+
+    `places`: the points of the hub or sleeve of a joint that slides on a flexible link; None: it doesn't.
+    """
+    joint, mbs = link.joint, on.mbs
+    if joint.type == "R":
+        return _revolute(mbs, joint, previous.tip, part.origin), None
+    if joint.type == "Pa":
+        if places is None:
+            return _prismatic(mbs, previous.origin, part.origin, part.origin, 0.0, joint.angle_rad), None
+        hub = sliding.rigid(mbs, part.origin, on.origin, on.tiny)
+        line = sliding.Line(hub, on.origin, -joint.angle_rad)
+        node = sliding.hold(mbs, line, previous, places, joint.start, on.speed, on.tiny)
+        return sliding.marker_of(mbs, node), node
+    sleeve = sliding.rigid(mbs, previous.tip, on.tip, on.tiny)
+    if places is None:  # d is where the tip of link i is
+        return _prismatic(mbs, sleeve, part.origin, part.tip, joint.angle_rad, 0.0), None
+    line = sliding.Line(sleeve, on.tip, joint.angle_rad)
+    behind = sliding.hold(mbs, line, part, places, link.length_m - joint.start, -on.speed, on.tiny)
+    node = sliding.rest(mbs, behind, link.length_m, joint.start, on.speed)
+    return sliding.marker_of(mbs, node), node
 
 
 def _revolute(mbs: Any, joint: Joint, tip: Attachment, hub: Attachment) -> Any:
@@ -64,7 +96,7 @@ def _revolute(mbs: Any, joint: Joint, tip: Attachment, hub: Attachment) -> Any:
 
 
 def _prismatic(mbs: Any, rail: Attachment, hub: Attachment, end: Attachment, axis: float, turned: float) -> Any:
-    """`hub` slides on a line at the angle `axis` in the frame of `rail`, and is `turned` to it; the coordinate is that of `end`."""
+    """`hub` slides on a line at the angle `axis` in the frame of `rail`, `turned` to it; the coordinate is where `end` is."""
     from exudyn import itemInterface as eii
 
     along = [math.cos(axis), math.sin(axis), 0.0]

@@ -18,25 +18,13 @@ import numpy as np
 
 from .part import Attachment, Frame
 
-CLAMP = 0.5 / math.sqrt(3)  # a beam over points a distance delta apart ends as if clamped this times delta behind the first
-SPANS = 3  # of length delta behind a sleeve's exit; farther back points are up to GUIDE of the link's length apart
-GUIDE = 1 / 8
 
+class Line(NamedTuple):
+    """A line in a rigid carrier: it starts at the carrier's place, which is at `frame`, at `angle` [rad] in the carrier."""
 
-def hub_places(delta: float) -> np.ndarray:
-    """The points of a hub of length delta [m], ahead of its middle."""
-    return np.array([delta / 2, -delta / 2])
-
-
-def sleeve_places(delta: float, length: float) -> np.ndarray:
-    """The points of a sleeve, ahead of its exit: spans of delta [m] near it, and guides for a tail of the link's length [m].
-
-    The first lies so far ahead that the beam is clamped at the exit, but for terms of delta^2.
-    """
-    span = max(delta, GUIDE * length)
-    near = CLAMP * delta - delta * np.arange(SPANS + 1)
-    behind = near[-1] - span * np.arange(1, max(0, math.ceil((length + near[-1]) / span)) + 1)
-    return np.concatenate([near, behind])
+    carrier: Attachment
+    frame: Frame
+    angle: float
 
 
 def rigid(mbs: Any, held: Attachment, frame: Frame, tiny: tuple[float, float]) -> Attachment:
@@ -50,36 +38,33 @@ def rigid(mbs: Any, held: Attachment, frame: Frame, tiny: tuple[float, float]) -
     return mine
 
 
-def hold(
-    mbs: Any, carrier: Attachment, angle: float, line: Frame, beam: Any, places: np.ndarray,
-    shift: float, start: float, speed: float, tiny: tuple[float, float],
-) -> Any:  # fmt: skip
-    """Hold `beam` (a CableLink) at points of a rigid carrier; returns the node of the sliding coordinate.
+def hold(mbs: Any, line: Line, beam: Any, places: np.ndarray, start: float, speed: float, tiny: tuple[float, float]) -> Any:
+    """Hold `beam` (a CableLink) at points of a carrier, `places` [m] ahead on its line; returns the sliding coordinate's node.
 
-    `line`: the line of the points, from the carrier's place, at `angle` in its frame. Point k has the abscissa
-    shift + places[k] + coordinate on the beam [m]; the coordinate is `start` at first [m], at the rate `speed` [m/s].
+    The coordinate is the beam's abscissa at the line's start; it is `start` at first [m], at the rate `speed` [m/s].
     `tiny`: mass and inertia of the bodies that stand for the points free along the line.
     """
     from exudyn import itemInterface as eii
 
     node = coordinate(mbs, start, speed)
     cables = beam.layer(mbs, node)
-    axis = np.array([math.cos(angle), math.sin(angle), 0.0])
+    carrier, axis = line.carrier, np.array([math.cos(line.angle), math.sin(line.angle), 0.0])
+    straight = line.frame.along(0.0, turn=line.angle)
     for k, place in enumerate(places):
         if k == 0:
             there = carrier.place + place * axis
             marker = mbs.AddMarker(eii.MarkerBodyRigid(bodyNumber=carrier.body, localPosition=there))
         else:
-            marker = _body(mbs, line.along(place), tiny).marker
+            marker = _body(mbs, straight.along(place), tiny).marker
             mbs.AddObject(
                 eii.ObjectJointPrismatic2D(markerNumbers=[carrier.marker, marker], axisMarker0=axis, normalMarker1=[0, 1, 0])
             )
-        on = int(np.clip(np.searchsorted(beam.starts, shift + place + start, side="right") - 1, 0, len(cables) - 1))
+        on = int(np.clip(np.searchsorted(beam.starts, place + start, side="right") - 1, 0, len(cables) - 1))
         index = mbs.AddNode(eii.NodeGenericData(initialCoordinates=[on], numberOfDataCoordinates=1))
         mbs.AddObject(
             eii.ObjectJointALEMoving2D(
                 markerNumbers=[marker, cables[on]], slidingMarkerNumbers=cables, slidingMarkerOffsets=beam.starts,
-                slidingOffset=shift + place, nodeNumbers=[index, node],
+                slidingOffset=place, nodeNumbers=[index, node],
             )
         )  # fmt: skip
     return node
@@ -103,13 +88,13 @@ def marker_of(mbs: Any, node: Any) -> Any:
     return mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=node, coordinate=0))
 
 
-def reversed_coordinate(mbs: Any, node: Any, start: float, speed: float) -> Any:
-    """A node whose coordinate is the negative of another one's."""
+def rest(mbs: Any, node: Any, total: float, start: float, speed: float) -> Any:
+    """A node whose coordinate and another one's are `total` together."""
     from exudyn import itemInterface as eii
 
     mine = coordinate(mbs, start, speed)
     markers = [marker_of(mbs, mine), marker_of(mbs, node)]
-    mbs.AddObject(eii.ObjectConnectorCoordinate(markerNumbers=markers, factorValue1=-1.0))
+    mbs.AddObject(eii.ObjectConnectorCoordinate(markerNumbers=markers, factorValue1=-1.0, offset=-total))
     return mine
 
 

@@ -16,14 +16,17 @@ from ..robot import MAX_ELEMENTS, Robot
 from ..run import Run
 from . import ancf, exact
 from .actuation import Actuation, Loads, actuation
-from .chain import Chain, build, refuse
+from .chain import Chain, build
 from .channels import channels
+from .extrapolation import LONGER, extrapolate
+from .mesh import mesh, reach_of, refuse, sliding_kinds
 from .stepping import Steps, plan, suggest
 
 PROGRAMS = {"ancf": ancf.PROGRAM, "ge": exact.PROGRAM}
 ATTEMPTS = 4  # steps tried, each half the one before, where the user doesn't give one
 SPARSE = 60  # coordinates beyond which sparse matrices are faster (0.25 ms a step against 0.8 at 420)
 COARSE = 4  # elements a link for the frequencies that suggest a step
+SLACK = 1e-4  # how far a hub or sleeve may go beyond the end of its link, relative to the link
 PROGRESS = 0.01  # the fraction of a run between two calls of progress
 
 Record = tuple[list[float], list[np.ndarray], list[np.ndarray], list[np.ndarray]]  # times, coordinates, velocities, accelerations
@@ -63,30 +66,53 @@ def simulate(
     Raises InputError for what the twin doesn't contain (Pb, Pa on a flexible link, stiffening = false, damping alpha)
     or can't be, FlexuraError where Exudyn's solver fails, with the time it got to.
     """
-    refuse(robot)
-    n = len(robot.links)
-    t = _times(t_eval)
-    speeds = _speeds(robot, qd0)
+    refuse(robot, beam)
+    t, speeds = _times(t_eval), _speeds(robot, qd0)
     if beam not in PROGRAMS:
         raise InputError('expected "ancf" or "ge"', key="beam", value=beam)
     if elements is not None and not 1 <= elements <= 2 * MAX_ELEMENTS:
         raise InputError(f"expected a whole number from 1 to {2 * MAX_ELEMENTS}", key="elements", value=elements)
-    if step_s is not None and not step_s > 0:
-        raise InputError("expected a time above 0 in seconds", key="step_s", value=step_s)
+    for key, given, unit in (("step_s", step_s, "time in seconds"), ("hub_length_m", hub_length_m, "length in metres")):
+        if given is not None and not given > 0:
+            raise InputError(f"expected a {unit}, above 0", key=key, value=given)
     act = actuation(drive, robot.start, speeds)
+    kinds = sliding_kinds(robot) if hub_length_m is None else []
+    report = progress or (lambda fraction: None)
+
+    def run(number: int, times: dict[str, float], step: float | None) -> Run:
+        def new(count: int | None) -> Chain:
+            return build(robot, beam, mesh(robot, count, hub_length_m, times), speeds, act.gains)
+
+        share = 1 / (1 + len(kinds))
+        return _run_once(new, elements, act, t, step, lambda fraction: report((number + fraction) * share), PROGRAMS[beam])
+
     with _quiet():
-        chain, steps, record, done, wall = _attempts(
-            lambda count: build(robot, beam, count, speeds, act.gains, hub_length_m), elements, act, t, step_s, progress
-        )
+        first = run(0, {}, step_s)
+        if not kinds or not first.complete:
+            return first
+        return extrapolate(first, {kind: run(k, {kind: LONGER}, first.meta["step_s"]) for k, kind in enumerate(kinds, 1)})
+
+
+def _run_once(
+    new: Callable[[int | None], Chain],
+    elements: int | None,
+    act: Actuation,
+    t: np.ndarray,
+    step_s: float | None,
+    progress: Callable[[float], None],
+    program: str,
+) -> Run:
+    import exudyn
+
+    chain, steps, record, done, wall = _attempts(new, elements, act, t, step_s, progress)
     t, q, v = steps.at_times(t, *(np.array(column) for column in record))
     q += chain.reference
     values, units = channels(chain, act, t, q, v)
-    import exudyn
-
     meta = {
-        "source": "twin", "program": f"Exudyn {exudyn.__version__} ({PROGRAMS[beam]})", "robot": robot.to_dict(),
+        "source": "twin", "program": f"Exudyn {exudyn.__version__} ({program})", "robot": chain.robot.to_dict(),
         "complete": done == steps.count, "events": [], "wall_s": wall, "steps": done, "step_s": steps.length,
-        "elements": chain.elements, "labels": [f"joint/{i}" for i in range(1, n + 1)],
+        "elements": chain.mesh.elements, "labels": [f"joint/{i}" for i in range(1, len(chain.parts) + 1)],
+        "hub_length_m": chain.mesh.hubs,
     }  # fmt: skip
     return Run(t, values, units, meta)
 
@@ -158,9 +184,7 @@ def _settings(end: float, steps: int, reach: float = 1.0, flexible: bool = True,
     return settings
 
 
-def _solve(
-    chain: Chain, act: Actuation, steps: Steps, progress: Callable[[float], None] | None
-) -> tuple[Record, int, float]:
+def _solve(chain: Chain, act: Actuation, steps: Steps, progress: Callable[[float], None] | None) -> tuple[Record, int, float]:
     """Run Exudyn; returns the record, the steps done, and seconds taken."""
     record: Record = ([], [], [], [])
     errors: list[BaseException] = []
@@ -185,6 +209,7 @@ def _solve(
         nonlocal done
         try:
             done = round(t / steps.length)
+            _still_on(chain, data.GetODE2Coordinates(), t)
             if steps.keep[done]:
                 keep()
             if progress is not None and done % announce == 0:
@@ -201,13 +226,23 @@ def _solve(
             chain.mbs.SetPreStepUserFunction(before)
             chain.mbs.SetPostStepUserFunction(after)
             end, size = steps.count * steps.length, len(chain.reference)
-            settings = _settings(end, steps.count, chain.reach, any(chain.elements), size)
+            settings = _settings(end, steps.count, chain.reach, any(chain.mesh.elements), size)
             failed = _run(chain.mbs, settings)
             if failed and not errors:
                 raise _failure(chain.mbs, done, steps, failed)
     if errors:
         raise errors[0]
     return record, done, time.perf_counter() - began
+
+
+def _still_on(chain: Chain, q: Any, t: float) -> None:
+    """Raise FlexuraError where a hub or sleeve has come to the end of its link: Exudyn would let it stick there."""
+    for i, place in enumerate(chain.slides):
+        if place is not None:
+            low, high = reach_of(chain.robot, i)
+            if not low - SLACK * high <= q[place] <= high + SLACK * high:
+                where = f"at {q[place]:.6g} m, it can be from {low:g} to {high:g} m"
+                raise FlexuraError(f"joint {i + 1} slid off the end of its link at t = {t:.6g} s: {where}")
 
 
 def _run(mbs: Any, settings: Any) -> str:
