@@ -1,11 +1,11 @@
 """The twin's sliders (Pa on a flexible link) and sleeves (Pb) against rigid chains, published numbers and themselves."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
-import rigid_chain
-from robots import beam, rigid, robot
-from scipy.integrate import solve_ivp
 
+import rigid_chain
 from flexura import signal, twin
 from flexura.drive import Drive
 from flexura.errors import FlexuraError, InputError
@@ -15,6 +15,7 @@ from flexura.twin.actuation import actuation
 from flexura.twin.chain import build
 from flexura.twin.extrapolation import extrapolate
 from flexura.twin.mesh import mesh, sleeve_places
+from robots import beam, rigid, robot
 
 
 def total_energy(run):
@@ -96,47 +97,53 @@ def linear_link_leaving_its_sleeve(t, first, gravity):
     rhoA (w_tt + 2 U w_xt + U^2 w_xx + U' (l - x) w_xx) + EI w_xxxx = -rhoA g, from rest with the first q's given.
     """
     n, mass, stiffness = 7, SLEEVE_MASS, SLEEVE_EI
-    u, weights = np.polynomial.legendre.leggauss(24)
+    u, weights = np.polynomial.legendre.leggauss(20)
     u, weights = (u + 1) / 2, weights / 2
     legendre = (np.polynomial.Legendre.basis(k, domain=[0, 1]).convert(kind=np.polynomial.Polynomial) for k in range(n))
     shapes = [np.polynomial.Polynomial([0, 0, 1]) * p for p in legendre]
     f, f1, f2 = (np.array([(p.deriv(d) if d else p)(u) for p in shapes]) for d in range(3))
+    to_f = np.linalg.solve((f * weights) @ f.T, f * weights)  # a function's components
+    one, first_u, second, second_u, second_uu = (to_f @ g.T for g in (f1, u * f1, f2, u * f2, u**2 * f2))
+    bending = np.linalg.solve((f * weights) @ f.T, (f2 * weights) @ f2.T) * stiffness / mass
+    weight = np.concatenate([np.zeros(n), -gravity * to_f @ np.ones(len(u))])
+    unit = np.eye(n)
 
-    def over(a, b):
-        return (a * weights) @ b.T
-
-    def rates(s, y):
-        q, v = y[:n], y[n:]
+    def matrix(s):
         l, U, a = SLEEVE_LAW(s)
         r = U / l
-        w_tt = -2 * r * over(f, u * f1) @ v + (2 * r**2 - a / l) * over(f, u * f1) @ q + r**2 * over(f, u**2 * f2) @ q
-        w_xt = over(f, f1) @ v / l - r / l * (over(f, f1) + over(f, u * f2)) @ q
-        rest = l * (
-            w_tt + 2 * U * w_xt + (U / l) ** 2 * over(f, f2) @ q + a / l * over(f, (1 - u) * f2) @ q + gravity * f @ weights
-        )
-        return np.concatenate([v, -np.linalg.solve(mass * l * over(f, f), mass * rest + stiffness / l**3 * over(f2, f2) @ q)])
+        w_tt = (2 * r**2 - a / l) * first_u + r**2 * second_uu
+        w_xt = -r / l * (one + second_u)
+        axial = r**2 * second + a / l * (second - second_u)
+        stiffness = w_tt + 2 * U * w_xt + axial + bending / l**4
+        return np.block([[0 * unit, unit], [-stiffness, 2 * r * (first_u - one)]])
 
-    start = np.zeros(2 * n)
-    start[: len(first)] = first
-    y = solve_ivp(rates, (0.0, t[-1]), start, method="DOP853", t_eval=t, rtol=1e-9, atol=1e-12).y
-    return np.array([p(1.0) for p in shapes]) @ y[:n]
+    y, out, h = np.zeros(2 * n), [], 2.5e-4  # implicit midpoint rule
+    y[: len(first)] = first
+    for k in range(round(t[-1] / h) + 1):
+        if np.isclose(k * h, t).any():
+            out.append(y[:n] @ [p(1.0) for p in shapes])
+        half = h / 2 * matrix((k + 0.5) * h)
+        y = np.linalg.solve(np.eye(2 * n) - half, y + half @ y + h * weight)
+    return np.array(out)
 
 
 def test_a_link_leaving_its_sleeve():
-    """B9's equation, checked against B9's numbers, then a sudden weight instead of B9's first deflection; up to the link's end."""
+    """B9's equation, checked against B9's numbers; then with a sudden weight instead, as the twin starts straight."""
     t = np.array([0.25, 0.50, 0.75, 1.00, 1.25, 1.50, 1.75, 2.00, 3.00])
     published = [-0.04204, 0.03550, -0.04940, 0.04403, 0.05059, -0.01513, -0.06383, -0.05753, 0.02941]
     bent = np.array([1.25, -0.25]) * 0.05  # 0.05 (3 u^2 - u^3)/2
     assert linear_link_leaving_its_sleeve(t, bent, 0.0) == pytest.approx(published, abs=1e-3 * 0.0638)
 
     arm = robot(beam(SLEEVE_LENGTH, SLEEVE_MASS, SLEEVE_EI, 4, "Pb", start=1.8), gravity=(0.0, -0.6))
-    t = np.linspace(0, 3, 121)
+    t = np.linspace(0, 2, 81)
     run = twin.simulate(arm, t, Drive.pd([SLEEVE_LAW], [1e7], [1e5]), step_s=1e-3)
     expected = linear_link_leaving_its_sleeve(t, [], 0.6)
     assert abs(run["joint/1/position"] - [SLEEVE_LAW(s)[0] for s in t]).max() < 1e-5
     assert abs(run["link/1/tip_deflection"] - expected).max() < 5e-3 * abs(expected).max()
-    inside = abs(run["link/1/deflection/2"][t < 0.75])  # at 0.9 m of 3.6 m, of which 1.8 m to 1.6 m are inside
-    assert inside.max() < 1e-4 * abs(expected).max() and np.all(run["link/1/angle"] == 0.0)
+    inside = abs(
+        run["link/1/deflection/2"][t < 0.75]
+    )  # at 0.9 m of 3.6 m, of which at least 1.6 m are inside: as straight as its guides
+    assert inside.max() < 5e-4 * abs(expected).max() and np.all(run["link/1/angle"] == 0.0)
 
 
 @pytest.mark.parametrize(
@@ -177,7 +184,7 @@ def test_a_slider_on_a_bent_link(stiffness, published):
         return solve._run_once(from_equilibrium, None, act, t, 1e-3, lambda fraction: None, "ANCF")
 
     slid = extrapolate(run({}), {"Pa": run({"Pa": 2.0})})
-    assert slid["tip/y"] == pytest.approx(published, abs=2e-3 * abs(min(published)))
+    assert slid["link/1/tip_deflection"] == pytest.approx(published, abs=2e-3 * abs(min(published)))
     assert slid["joint/2/position"] == pytest.approx([law(s)[0] for s in t], abs=1e-6)
 
 
@@ -202,7 +209,7 @@ def test_a_sleeve_clamps_at_its_exit():
     """A static beam of Hermite cubics through a sleeve's points ends as a beam clamped at the exit, wherever its nodes are."""
 
     def shift(delta, phase):
-        nodes = np.arange(-20, 7) - phase
+        nodes = np.arange(-30, 7) - phase
         stiffness = np.zeros((2 * len(nodes),) * 2)
         cubic = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]])
         for e in range(len(nodes) - 1):
@@ -246,10 +253,7 @@ def test_a_locked_sleeve_is_a_clamp():
     t = np.linspace(0, 0.5, 51)
     arm = rigid(0.3, 0.5, 0.1, 0.02)
     sleeve = robot(arm, beam(0.4, 0.2, 0.5, 4, "Pb", start=0.25, angle_rad=0.6, locked=True), payload=0.02)
-    behind = {"hub_mass_kg": 0.03}  # the tail of 0.15 m as a mass in its middle, and its inertia
-    tail = rigid(0.0, 0.0, 0.0, 0.03 * 0.15**2 / 12, locked=True, start=0.6)
-    tail |= {"mass_kg": 0.03, "centre_of_mass_m": -0.075}
-    assert behind["hub_mass_kg"] == pytest.approx(tail["mass_kg"])
+    tail = rigid(0.0, 0.03, -0.075, 0.03 * 0.15**2 / 12, locked=True, start=0.6)
     clamped = robot(arm, tail, beam(0.25, 0.2, 0.5, 4, locked=True), payload=0.02)
     drive = [Drive.force(signal.bang_bang(0.1, 0.4, rise_s=0.05), *[None] * k) for k in (1, 2)]
     a, b = twin.simulate(sleeve, t, drive[0]), twin.simulate(clamped, t, drive[1], elements=12, step_s=2.5e-4)
@@ -277,29 +281,30 @@ def test_energy_is_conserved_through_sleeve_and_hub():
 
 
 def test_the_error_is_of_second_order_in_the_step():
-    t = np.linspace(0, 0.2, 21)
-    runs = [twin.simulate(soft(), t, qd0=[0.3, 0.2], hub_length_m=0.0675, step_s=h) for h in (4e-3, 2e-3, 1e-3, 5e-4)]
-    p = [run["joint/2/position"] for run in runs]
-    first, second, third = (abs(a - b).max() for a, b in zip(p[:-1], p[1:], strict=True))
-    assert 2.5 < first / second < 6 and 2.5 < second / third < 6
+    arm, t = soft().replace({"link.1.damping.beta_s": 1e-3}), np.linspace(0, 0.2, 21)
+    runs = [twin.simulate(arm, t, qd0=[0.3, 0.2], hub_length_m=0.0675, step_s=h) for h in (2e-3, 1e-3, 5e-4)]
+    for name in ("joint/1/position", "joint/2/position", "link/1/tip_deflection"):
+        first, second = (abs(a[name] - b[name]).max() for a, b in pairwise(runs))
+        assert 2 < first / second < 5, name
+        assert first < 5e-4 * abs(runs[0][name]).max()
 
 
-def test_hubs_become_exact_with_order_one_and_sleeves_with_order_two():
+def test_the_error_of_a_hub_is_of_first_order_in_its_length_and_that_of_a_sleeve_of_second():
     t = np.linspace(0, 0.4, 41)
     slider = robot(
         beam(0.8, 0.7, 5.0, 4, hub_inertia_kg_m2=0.05, damping={"beta_s": 5e-4}),
         rigid(0.2, 0.2, 0.15, 5e-3, "Pa", start=0.3, angle_rad=1.0),
     )  # fmt: skip
-    sleeve = robot(beam(0.9, 0.7, 5.0, 4, "Pb", start=0.4, damping={"beta_s": 5e-4}), payload=0.2)
-    push = Drive.force(signal.bang_bang(0.5, 0.4, rise_s=0.1), signal.bang_bang(0.5, 0.4, rise_s=0.1))
+    sleeve = robot(
+        beam(0.9, 0.7, 5.0, 4, "Pb", start=0.4, damping={"beta_s": 5e-4}), payload=0.2, gravity=(0.0, -1.0)
+    )  # fmt: skip
+    push = Drive.force(*2 * [signal.bang_bang(0.5, 0.4, rise_s=0.1)])
     pull = Drive.pd([signal.cycloid(0.6, 0.4, start=0.4)], [1e6], [1e4])
-    cases = (("Pa", slider, push, 1.5, (1.6, 2.4)), ("Pb", sleeve.replace({"gravity_m_s2": [0.0, -1.0]}), pull, 1.5, (3.0, 5.5)))
-    for kind, arm, drive, span, ratios in cases:
-        delta = [span * arm.links[0].length_m / 24 * k for k in (1, 2, 4)]
-        runs = [twin.simulate(arm, t, drive, elements=24, hub_length_m=d, step_s=5e-4) for d in delta]
-        w = [run["link/1/tip_deflection"] for run in runs]
-        ratio = np.linalg.norm(w[2] - w[1]) / np.linalg.norm(w[1] - w[0])
-        assert ratios[0] < ratio < ratios[1], kind
+    for arm, drive, delta, name, low, high in (
+        (slider, push, 0.0125, "joint/2/position", 1.8, 2.5), (sleeve, pull, 1.5 * 0.9 / 24, "link/1/tip_deflection", 3.0, 4.5),
+    ):  # fmt: skip
+        y = [twin.simulate(arm, t, drive, elements=24, hub_length_m=k * delta, step_s=5e-4)[name] for k in (1, 2, 4)]
+        assert low < np.linalg.norm(y[2] - y[1]) / np.linalg.norm(y[1] - y[0]) < high, name
 
 
 def test_extrapolation_takes_both_errors_away():
@@ -330,7 +335,7 @@ def test_meta_tells_of_hub_lengths_and_extrapolation():
 
 def test_pd_control_as_data_and_as_a_function_and_the_sensed_deflection():
     seen = []
-    drive = Drive.pd([signal.cycloid(0.6, 0.3, start=0.5), signal.step(0.72)], [300.0, 200.0], [20.0, 10.0])
+    drive = Drive.pd([None, signal.cycloid(0.6, 0.3, start=0.5)], [0.0, 300.0], [0.0, 20.0])
 
     def function(t, position, velocity, tip):
         seen.append(tip)
@@ -341,7 +346,6 @@ def test_pd_control_as_data_and_as_a_function_and_the_sensed_deflection():
         beam(0.9, 0.5, 20.0, 4, "Pb", start=0.5, angle_rad=0.3, coulomb_friction=0.05, viscous_friction=0.5, rotor_inertia=0.1),
         gravity=(0.0, -2.0), payload=0.1,
     )  # fmt: skip
-    drive = Drive.pd([None, signal.cycloid(0.6, 0.3, start=0.5)], [0.0, 300.0], [0.0, 20.0])
     t = np.linspace(0, 0.3, 31)
     one, two = (twin.simulate(arm, t, each, hub_length_m=0.0675, step_s=5e-4) for each in (drive, function))
     for name in ("joint/2/position", "joint/2/drive", "link/2/tip_deflection"):
