@@ -7,7 +7,7 @@ A moment of a hub is carried by a pair of forces, so that a hub is too stiff, by
 A beam over a row of points ends as if clamped delta/(2 sqrt 3) behind the first of them (three-moment equation), so the first is
 put that much ahead of the exit, and the error is of order delta^2. On a mesh of elements of length h the shift is less by 0.0108
 delta (h/delta)^3 on the mean (static solutions, at all places of the points among the elements) and varies by +-0.001 delta at
-delta = 1.5 h, by +-0.02 delta at 0.75 h. A hub of 0.75 h is too stiff by 0.132 h/EI instead of 0.125, +-0.006.
+delta = 1.5 h. A hub of 0.5 h is too stiff by 0.099 h/EI instead of 0.083, +-0.006; twice as long by 0.168 instead of 0.167.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from ..robot import Link, Robot
 from .properties import uniform
 
 MIN_ELEMENTS = 8
-MIN_ELEMENTS_SLIDING = 20  # where a joint slides on the link
+MIN_ELEMENTS_SLIDING = 24  # where a joint slides on the link
 MIN_ELEMENTS_TAPERED = 24  # each is uniform: 3e-3 of the deflection at 8, 4e-4 at 24 for EI falling to a quarter
-DELTA = {"Pa": 0.75, "Pb": 1.5}  # in elements
+DELTA = {"Pa": 0.5, "Pb": 1.5}  # in elements
 ORDER = {"Pa": 1, "Pb": 2}  # of the error in delta
 SPANS = 3  # of length delta behind a sleeve's exit; farther back points are up to GUIDE of the link's length apart
 GUIDE = 1 / 8
