@@ -56,15 +56,19 @@ def simulate(
     [N m]; a function of the state is called in every iteration, so it must depend on its arguments only.
 
     `beam`: "ancf" (ObjectANCFCable2D, Euler-Bernoulli) or "ge" (ObjectBeamGeometricallyExact2D of three nodes, with shear).
-    `elements`: beam elements a flexible link; None: twice the robot file's and at least 8. `step_s`: Exudyn's longest step;
-    None: from the robot's frequencies, for an error in time below 1e-3 of the tip deflection or so, and shorter if need be.
-    Steps divide a uniform output step; elsewhere results are interpolated by cubics. `progress`: called with the fraction done.
+    `elements`: beam elements a flexible link; None: twice the robot file's and at least 8, or 24 where a joint slides on it.
+    `step_s`: Exudyn's longest step; None: from the robot's frequencies, for an error in time below 1e-3 of the tip deflection
+    or so, and shorter if need be. Steps divide a uniform output step; elsewhere results are interpolated by cubics.
+    `hub_length_m`: of the hub of a Pa on a flexible link and of the spans of a flexible Pb's sleeve, see `mesh`. None: short
+    ones, and once more for each of the two types with that type's twice as long, extrapolated to none (`extrapolation`);
+    `meta["extrapolation"]` says how far that went. A function of time or state is called in all these runs.
+    `progress`: called with the fraction done.
 
     The result has the channels of a native run (`flexura.run`) but no energy/work and energy/loss. Ctrl-C ends it early,
     with `meta["complete"]` false. Links take all unknowns of their mesh (`modes` is not looked at); joint limits don't act.
 
-    Raises InputError for what the twin doesn't contain (Pb, Pa on a flexible link, stiffening = false, damping alpha)
-    or can't be, FlexuraError where Exudyn's solver fails, with the time it got to.
+    Raises InputError for what the twin doesn't contain (stiffening = false, damping alpha, sliding on a "ge" beam) or can't be,
+    FlexuraError where Exudyn's solver fails or a joint slides off the end of a flexible link, with the time it got to.
     """
     refuse(robot, beam)
     t, speeds = _times(t_eval), _speeds(robot, qd0)
