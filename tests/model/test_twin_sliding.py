@@ -173,7 +173,7 @@ def test_a_slider_on_a_bent_link(stiffness, published):
         (_, q, v, _), _, _ = solve._solve(new(damped, held), actuation(held, arm.start, np.zeros(2)), settle, None)
         assert abs(v[-1]).max() < 1e-6
 
-        def from_equilibrium(_):
+        def from_equilibrium():
             import exudyn
 
             moving = new(arm, stand(law))
@@ -181,7 +181,7 @@ def test_a_slider_on_a_bent_link(stiffness, published):
             return moving
 
         act = actuation(stand(law), arm.start, np.zeros(2))
-        return solve._run_once(from_equilibrium, None, act, t, 1e-3, lambda fraction: None, "ANCF")
+        return solve._run(from_equilibrium, act, t, 1e-3, 1, lambda fraction: None, "ANCF")
 
     slid = extrapolate(run({}), {"Pa": run({"Pa": 2.0})})
     assert slid["link/1/tip_deflection"] == pytest.approx(published, abs=2e-3 * abs(min(published)))
@@ -319,7 +319,7 @@ def test_extrapolation_takes_both_errors_away():
     assert exact.meta["extrapolation"] == pytest.approx({"Pa": 0.01 / 2.022, "Pb": 0.012 / 2.022}) and exact.meta["wall_s"] == 3.0
 
 
-def test_meta_tells_of_hub_lengths_and_extrapolation():
+def test_meta_tells_of_hub_lengths_and_extrapolation(tmp_path):
     fractions = []
     run = twin.simulate(soft(), [0.0, 0.05], qd0=[0.3, 0.2], progress=fractions.append)
     sleeve, hub = 1.5 * 0.9 / 24, 0.5 * 0.9 / 24
@@ -327,6 +327,8 @@ def test_meta_tells_of_hub_lengths_and_extrapolation():
     assert run.meta["hub_lengths_m"]["Pa"][1] == pytest.approx([sleeve, 2 * hub])
     assert run.meta["hub_lengths_m"]["Pb"][1] == pytest.approx([2 * sleeve, hub])
     assert fractions == sorted(fractions) and fractions[-1] == pytest.approx(1.0)
+    run.save(tmp_path)
+    assert Run.read(tmp_path).meta == run.meta
     assert "extrapolation" not in twin.simulate(soft(), [0.0, 0.05], hub_length_m=0.05).meta
 
 

@@ -81,34 +81,43 @@ def simulate(
             raise InputError(f"expected a {unit}, above 0", key=key, value=given)
     act = actuation(drive, robot.start, speeds)
     kinds = sliding_kinds(robot) if hub_length_m is None else []
-    report = progress or (lambda fraction: None)
+    share, report = 1 / (1 + len(kinds)), progress or (lambda fraction: None)
 
-    def run(number: int, times: dict[str, float], step: float | None) -> Run:
-        def new(count: int | None) -> Chain:
-            return build(robot, beam, mesh(robot, count, hub_length_m, times), speeds, act.gains)
+    def run(number: int, times: dict[str, float], longest: float) -> Run:
+        def new() -> Chain:
+            return build(robot, beam, mesh(robot, elements, hub_length_m, times), speeds, act.gains)
 
-        share = 1 / (1 + len(kinds))
-        return _run_once(new, elements, act, t, step, lambda fraction: report((number + fraction) * share), PROGRAMS[beam])
+        tries = 1 if step_s else ATTEMPTS
+        return _run(new, act, t, longest, tries, lambda fraction: report((number + fraction) * share), PROGRAMS[beam])
 
     with _quiet():
-        first = run(0, {}, step_s)
+        coarse = mesh(robot, COARSE, hub_length_m)
+        first = run(0, {}, step_s or suggest(build(robot, beam, coarse, speeds, act.gains), _settings(1.0, 1), t[-1]))
         if not kinds or not first.complete:
             return first
         return extrapolate(first, {kind: run(k, {kind: LONGER}, first.meta["step_s"]) for k, kind in enumerate(kinds, 1)})
 
 
-def _run_once(
-    new: Callable[[int | None], Chain],
-    elements: int | None,
+def _run(
+    new: Callable[[], Chain],
     act: Actuation,
     t: np.ndarray,
-    step_s: float | None,
+    longest: float,
+    tries: int,
     progress: Callable[[float], None],
     program: str,
 ) -> Run:
+    """Simulate with steps of at most `longest` [s], given by the user if there is one try, else halved where Exudyn fails."""
     import exudyn
 
-    chain, steps, record, done, wall = _attempts(new, elements, act, t, step_s, progress)
+    for attempt in range(tries):
+        chain, steps = new(), plan(t, longest / 2**attempt, forced=tries == 1)
+        try:
+            record, done, wall = _solve(chain, act, steps, progress)
+            break
+        except DidNotConverge:
+            if attempt == tries - 1:
+                raise
     t, q, v = steps.at_times(t, *(np.array(column) for column in record))
     q += chain.reference
     values, units = channels(chain, act, t, q, v)
@@ -119,26 +128,6 @@ def _run_once(
         "hub_length_m": chain.mesh.hubs,
     }  # fmt: skip
     return Run(t, values, units, meta)
-
-
-def _attempts(
-    new: Callable[[int | None], Chain],
-    elements: int | None,
-    act: Actuation,
-    t: np.ndarray,
-    step_s: float | None,
-    progress: Callable[[float], None] | None,
-) -> tuple[Chain, Steps, Record, int, float]:
-    """Solve with the given step, or with the suggested one, halved where Exudyn doesn't converge with it."""
-    longest = step_s or suggest(new(COARSE), _settings(1.0, 1), t[-1])
-    for attempt in range(1 if step_s else ATTEMPTS):
-        chain = new(elements)
-        steps = plan(t, longest / 2**attempt, forced=step_s is not None)
-        try:
-            return chain, steps, *_solve(chain, act, steps, progress)
-        except DidNotConverge as error:
-            failed = error
-    raise failed
 
 
 def _times(t_eval: Any) -> np.ndarray:
@@ -231,7 +220,7 @@ def _solve(chain: Chain, act: Actuation, steps: Steps, progress: Callable[[float
             chain.mbs.SetPostStepUserFunction(after)
             end, size = steps.count * steps.length, len(chain.reference)
             settings = _settings(end, steps.count, chain.reach, any(chain.mesh.elements), size)
-            failed = _run(chain.mbs, settings)
+            failed = _complaint(chain.mbs, settings)
             if failed and not errors:
                 raise _failure(chain.mbs, done, steps, failed)
     if errors:
@@ -249,7 +238,7 @@ def _still_on(chain: Chain, q: Any, t: float) -> None:
                 raise FlexuraError(f"joint {i + 1} slid off the end of its link at t = {t:.6g} s: {where}")
 
 
-def _run(mbs: Any, settings: Any) -> str:
+def _complaint(mbs: Any, settings: Any) -> str:
     """Exudyn's own complaint, or "" when it got to the end or was stopped."""
     try:
         return "" if mbs.SolveDynamic(settings) else "SolveDynamic returned False"
