@@ -139,7 +139,7 @@ def test_a_link_leaving_its_sleeve():
     run = twin.simulate(arm, t, Drive.pd([SLEEVE_LAW], [1e7], [1e5]), step_s=1e-3)
     expected = linear_link_leaving_its_sleeve(t, [], 0.6)
     assert abs(run["joint/1/position"] - [SLEEVE_LAW(s)[0] for s in t]).max() < 1e-5
-    assert abs(run["link/1/tip_deflection"] - expected).max() < 5e-3 * abs(expected).max()
+    assert abs(run["link/1/tip_deflection"] - expected).max() < 2e-3 * abs(expected).max()
     inside = abs(
         run["link/1/deflection/2"][t < 0.75]
     )  # at 0.9 m of 3.6 m, of which at least 1.6 m are inside: as straight as its guides
@@ -199,7 +199,7 @@ def test_a_bent_link_is_pushed_out_of_its_sleeve():
         arm = robot(beam(1.0, 1e-5, 0.5, 4, "Pb", start=start, damping={"beta_s": 0.1}), payload=0.1, gravity=(0.0, -10.0))
         run = twin.simulate(arm, [0.0, 4.0], Drive.pd([signal.constant(start)], [1e5], [1e3]), step_s=4e-3)
         held.append(-run["joint/1/drive"][-1] * (0.5 / start) ** 2)
-    assert np.mean(held) == pytest.approx(0.242104, rel=1e-2)
+    assert np.mean(held) == pytest.approx(0.242104, rel=5e-3)
 
 
 # Identities -----------------------------------------------------------------------------------------------------------
