@@ -139,7 +139,7 @@ def test_a_link_leaving_its_sleeve():
     run = twin.simulate(arm, t, Drive.pd([SLEEVE_LAW], [1e7], [1e5]), step_s=1e-3)
     expected = linear_link_leaving_its_sleeve(t, [], 0.6)
     assert abs(run["joint/1/position"] - [SLEEVE_LAW(s)[0] for s in t]).max() < 1e-5
-    assert abs(run["link/1/tip_deflection"] - expected).max() < 5e-3 * abs(expected).max()
+    assert abs(run["link/1/tip_deflection"] - expected).max() < 2e-3 * abs(expected).max()
     inside = abs(
         run["link/1/deflection/2"][t < 0.75]
     )  # at 0.9 m of 3.6 m, of which at least 1.6 m are inside: as straight as its guides
@@ -169,7 +169,7 @@ def test_a_slider_on_a_bent_link(stiffness, published):
             )
 
         damped, held = arm.replace({"link.1.damping.beta_s": 0.2}), stand(signal.constant(0.1))
-        settle = solve.plan(np.array([0.0, 4.0]), 4e-3, forced=True)
+        settle = solve.plan(np.array([0.0, 4.0]), 2e-3, forced=True)
         (_, q, v, _), _, _ = solve._solve(new(damped, held), actuation(held, arm.start, np.zeros(2)), settle, None)
         assert abs(v[-1]).max() < 1e-6
 
@@ -195,11 +195,11 @@ def test_a_bent_link_is_pushed_out_of_its_sleeve():
     """
     held = []
     for part in range(4):
-        start = 0.5 + part / 4 * 1.0 / 24
+        start = 0.5 + part / 4 * 1.0 / 32
         arm = robot(beam(1.0, 1e-5, 0.5, 4, "Pb", start=start, damping={"beta_s": 0.1}), payload=0.1, gravity=(0.0, -10.0))
         run = twin.simulate(arm, [0.0, 4.0], Drive.pd([signal.constant(start)], [1e5], [1e3]), step_s=4e-3)
         held.append(-run["joint/1/drive"][-1] * (0.5 / start) ** 2)
-    assert np.mean(held) == pytest.approx(0.242104, rel=1e-2)
+    assert np.mean(held) == pytest.approx(0.242104, rel=5e-3)
 
 
 # Identities -----------------------------------------------------------------------------------------------------------
@@ -237,7 +237,7 @@ def test_a_locked_slider_at_the_tip_is_a_locked_revolute():
     slid = robot(first, beam(0.3, 0.2, 0.5, 4, "Pa", start=0.5, angle_rad=0.9, **carries), payload=0.05)
     fixed = robot(first, beam(0.3, 0.2, 0.5, 4, start=0.9, **carries), payload=0.05)
     drive = Drive.force(signal.bang_bang(0.3, 0.4, rise_s=0.05), None)
-    a, b = twin.simulate(slid, t, drive), twin.simulate(fixed, t, drive, elements=24, step_s=2.5e-4)
+    a, b = twin.simulate(slid, t, drive), twin.simulate(fixed, t, drive, elements=32, step_s=2.5e-4)
     for name, within in (
         ("joint/1/position", 1e-3),
         ("link/1/tip_deflection", 5e-3),
@@ -322,7 +322,7 @@ def test_extrapolation_takes_both_errors_away():
 def test_meta_tells_of_hub_lengths_and_extrapolation(tmp_path):
     fractions = []
     run = twin.simulate(soft(), [0.0, 0.05], qd0=[0.3, 0.2], progress=fractions.append)
-    sleeve, hub = 1.5 * 0.9 / 24, 0.5 * 0.9 / 24
+    sleeve, hub = 1.5 * 0.9 / 32, 0.5 * 0.9 / 32
     assert run.meta["hub_length_m"] == pytest.approx([sleeve, hub]) and set(run.meta["extrapolation"]) == {"Pa", "Pb"}
     assert run.meta["hub_lengths_m"]["Pa"][1] == pytest.approx([sleeve, 2 * hub])
     assert run.meta["hub_lengths_m"]["Pb"][1] == pytest.approx([2 * sleeve, hub])

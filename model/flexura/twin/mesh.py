@@ -23,7 +23,7 @@ from ..robot import Link, Robot
 from .properties import uniform
 
 MIN_ELEMENTS = 8
-MIN_ELEMENTS_SLIDING = 24  # where a joint slides on the link
+MIN_ELEMENTS_SLIDING = 32  # where a joint slides on the link
 MIN_ELEMENTS_TAPERED = 24  # each is uniform: 3e-3 of the deflection at 8, 4e-4 at 24 for EI falling to a quarter
 DELTA = {"Pa": 0.5, "Pb": 1.5}  # in elements
 ORDER = {"Pa": 1, "Pb": 2}  # of the error in delta

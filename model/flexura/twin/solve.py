@@ -56,7 +56,7 @@ def simulate(
     [N m]; a function of the state is called in every iteration, so it must depend on its arguments only.
 
     `beam`: "ancf" (ObjectANCFCable2D, Euler-Bernoulli) or "ge" (ObjectBeamGeometricallyExact2D of three nodes, with shear).
-    `elements`: beam elements a flexible link; None: twice the robot file's and at least 8, or 24 where a joint slides on it.
+    `elements`: beam elements a flexible link; None: twice the robot file's and at least 8, or 32 where a joint slides on it.
     `step_s`: Exudyn's longest step; None: from the robot's frequencies, for an error in time below 1e-3 of the tip deflection
     or so, and shorter if need be. Steps divide a uniform output step; elsewhere results are interpolated by cubics.
     `hub_length_m`: of the hub of a Pa on a flexible link and of the spans of a flexible Pb's sleeve, see `mesh`. None: short

@@ -15,7 +15,7 @@ MAX_STEPS = 5_000_000  # refused beyond
 DEFAULT_STEPS = 500_000  # a default step is never so short that it needs more
 LONGEST = 5e-4  # s
 PER_FIRST, PER_HIGHEST = 240, 60  # steps in a period of the lowest and of the highest participating frequency
-RIGID_HZ = 0.02  # frequencies below are rigid motions and their round-off
+RIGID_HZ, ROUND_OFF = 0.02, 3e-8  # frequencies below, and below this part of the highest, are rigid motions and round-off
 SPAN = 2.0  # s, the run for which these hold; phase errors grow with time, so that h goes with 1/sqrt(time)
 GRID = 1e-9  # how far a time may lie from a step, relative to the step, to count as on it
 
@@ -79,7 +79,8 @@ def suggest(chain: Chain, settings: Any, end: float) -> float:
         hertz = np.sort(chain.mbs.ComputeODE2Eigenvalues(simulationSettings=settings, convert2Frequencies=True)[0])
     except Exception:  # a linear solver's complaint about a singular matrix: the step is a proposal only
         return LONGEST
-    hertz = hertz[np.isfinite(hertz) & (hertz > RIGID_HZ)]
+    hertz = hertz[np.isfinite(hertz)]
+    hertz = hertz[hertz > max(RIGID_HZ, ROUND_OFF * hertz.max(initial=0.0))]
     if len(hertz) == 0:
         return LONGEST
     highest = hertz[min(sum(count > 0 for count in chain.mesh.elements), len(hertz) - 1)]
