@@ -41,11 +41,13 @@ def _cached(function: Any, **options: Any) -> Any:
 
 
 def _folder() -> Path:
-    """A cache folder named after the content of this package: numba looks only at the file that a function stands in, and would
-    run code that was inlined from an older version of another file."""
+    """A cache folder named after the content of all modules with compiled functions: numba looks only at the file that a function
+    stands in, and would run code that was inlined from an older version of another file."""
     digest = hashlib.sha256(numba.__version__.encode())
     for source in sorted(_HERE.glob("*.py")):
-        digest.update(source.read_bytes())
+        text = source.read_bytes()
+        if b"from .compiled import" in text or source.name in ("compiled.py", "chain.py"):
+            digest.update(text)
     name = f"compiled-{digest.hexdigest()[:16]}"
     for parent in (_HERE / "__pycache__", Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "flexura"):
         folder = parent / name

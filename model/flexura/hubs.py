@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from .chain import SLEEVE, Chain, Work
-from .compiled import inlined
+from .compiled import compiled, inlined
 
 _COLUMN = (0, 1, 2, 7)  # of w.rhs: Mrq for x, y, angle and d
 
@@ -227,7 +227,7 @@ def flexible_hub(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh: 
     )
 
 
-@inlined
+@compiled
 def sleeve_hub(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh: float, A: tuple, b: tuple) -> None:
     """Condensed inertia (4 x 4) and bias (4) of a link at its sleeve, in x, y, angle and d, into w.inertia and w.bias: the
     equations of `flexible_hub` with a fourth column, rho, in Mrr, Mrq and X."""

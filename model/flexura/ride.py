@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from .chain import NODES, SLEEVE, Chain, Work
-from .compiled import inlined
+from .compiled import compiled, inlined
 
 _S, _W = np.polynomial.legendre.leggauss(NODES)
 _S, _W = (_S + 1) / 2, _W / 2
@@ -78,7 +78,7 @@ def _along(w: Work, e: int, s: float, h: float, column: int, derivative: int) ->
     return total
 
 
-@inlined
+@compiled
 def ride(c: Chain, w: Work, i: int, y: np.ndarray, v: np.ndarray, omega: float) -> float:
     """The attachment of slider i + 1 on link i: r, rate, beta, jac, flow and the direction of the joint; returns its angle."""
     e, end = c.first[i], c.first[i + 1]

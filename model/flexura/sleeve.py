@@ -21,7 +21,7 @@ from __future__ import annotations
 import numpy as np
 
 from .chain import NODES, Chain, Work
-from .compiled import inlined
+from .compiled import compiled, inlined
 
 _S = (np.polynomial.legendre.leggauss(NODES)[0] + 1) / 2
 # int_0^s_g of the polynomial through values at the Gauss points: rows g, columns the values
@@ -30,7 +30,7 @@ _UPTO = (_S[:, None] ** _POWERS / _POWERS) @ np.linalg.inv(np.vander(_S, increas
 C, S, T, G, W, RX, RY, AX, RATE, BEND, UX, WD = range(12)  # columns of Work.sum
 
 
-@inlined
+@compiled
 def sleeve(c: Chain, w: Work, i: int, z: np.ndarray, zd: np.ndarray, omega: float) -> float:
     """Link i's terms and its tip as the attachment, for z = (d, y); returns the tip's angle in the sleeve's frame."""
     d, dd = z[0], zd[0]
