@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from . import loop
+from . import loop, nodal
 from .chain import Work
 from .choice import choose, longest_step
 from .drive import Drive
 from .errors import FlexuraError, InputError
 from .kernel import accelerate
-from .record import record
+from .record import limit_event, record
 from .run import Run
 from .signal import Signal
 from .system import System
@@ -40,8 +40,9 @@ def simulate(
     `drive`: a Drive (compiled), or a function (t) -> (N,) or (t, position, velocity, tip_deflection) -> (N,) of forces and
     torques [N or N m] (slower, by scipy). `q0`, `qd0` (n,): state at the start, by default `system.start()` at
     rest. `rtol`: largest local error relative to the largest value so far. `method`: "explicit", "implicit" or "auto".
-    `progress` is called with the finished fraction. A joint that reaches a limit of the robot file ends the run: the Run holds
-    the states before it, an event says so and `meta["complete"]` is false; so it is after a Ctrl-C. `meta["energy_error"]` is
+    `progress` is called with the finished fraction. A joint that reaches a limit of the robot file or the end of its link ends the
+    run: the Run holds the states before it and, last, the one at that instant, an event says so and `meta["complete"]` is false. A
+    Ctrl-C ends it too. `meta["energy_error"]` is
     the largest |E - E(0) - work + loss| relative to the largest energy, work or loss. Raises InputError for wrong arguments,
     FlexuraError where the tolerance cannot be kept.
     """
@@ -50,29 +51,27 @@ def simulate(
         raise InputError("expected a relative tolerance between 1e-13 and 0.1", key="rtol", value=rtol)
     if method not in ("auto", *_METHODS):
         raise InputError('expected "auto", "explicit" or "implicit"', key="method", value=method)
-    state = np.concatenate(
-        [
-            system.to_solver @ _state(system, "q0", q0, system.start()),
-            system.to_solver @ _state(system, "qd0", qd0, np.zeros(system.n)),
-            [0.0, 0.0],
-        ]
-    )
-    state[system.n + system.joint_rows[system.chain.locked.astype(bool)]] = 0.0
-    if isinstance(drive, Drive):
-        _put_on_motions(system, drive, t[0], state)
-    _inside_limits(system, state)
+    q, qd = _state(system, "q0", q0, system.start()), _state(system, "qd0", qd0, np.zeros(system.n))
+    qd[system.joint_rows[system.chain.locked.astype(bool)]] = 0.0
     drive = Drive.none(len(system.robot.links)) if drive is None else drive
-    chosen = choose(system, t[-1] - t[0], rtol) if method == "auto" else _METHODS[method]
     if isinstance(drive, Drive):
         if len(drive.joints) != len(system.robot.links):
             raise InputError(
                 f"expected {len(system.robot.links)} joint drives, one a joint", key="drive", value=len(drive.joints)
             )
-        states, work, meta = _compiled(system, t, drive, state, rtol, chosen, progress)
+        _put_on_motions(system, drive, t[0], q, qd)
     else:
-        states, work, meta = _python(system, t, drive, state, rtol, chosen, progress)
+        drive = as_function(drive)
+    _inside_limits(system, q)
+    if system.robot.nodal:
+        return nodal.simulate(simulate, system, t, drive, q, qd, rtol, method, progress)
+    state = np.concatenate([system.to_solver @ q, system.to_solver @ qd, [0.0, 0.0]])
+    chosen = choose(system, t[-1] - t[0], rtol) if method == "auto" else _METHODS[method]
+    if isinstance(drive, Drive):
+        t, states, work, meta = _compiled(system, t, drive, state, rtol, chosen, progress)
+    else:
+        t, states, work, meta = _python(system, t, drive, state, rtol, chosen, progress)
     meta |= {"rtol": rtol, "method": "explicit" if chosen == loop.EXPLICIT else "implicit"}
-    t = t[: len(states)]
     return record(system, t, states, work, _applied(system, t, states, drive), meta)
 
 
@@ -108,7 +107,8 @@ def _compiled(
     rtol: float,
     method: int,
     progress: Callable[[float], None] | None,
-) -> tuple[np.ndarray, np.ndarray, dict[str, Any]]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+    """Times, states (T, 2n), work and loss (T, 2), and what the Run's metadata says of the solution."""
     c, n, links = system.chain, system.n, len(system.robot.links)
     inputs, m, w = _inputs(system, drive), loop.memory(links, n), _following(system, drive)
     out = np.zeros((len(t), 2 * n + 2))
@@ -132,7 +132,11 @@ def _compiled(
                     "to a right angle, or a gain or force is too large"
                 )
             if status == loop.LIMIT:
-                events.append(_limit_event(system, int(m.s[loop.FAULT]), float(m.s[loop.T])))
+                joint, at, row = int(m.s[loop.FAULT]), float(m.s[loop.T]), int(m.s[loop.OUT])
+                events.append(limit_event(system, joint, at, m.z[system.joint_rows]))
+                if at > t[row - 1]:  # the last good state
+                    t, out[row] = np.append(t[:row], at), m.z
+                    m.s[loop.OUT] += 1
                 break
             complete = status == loop.DONE
     except KeyboardInterrupt:
@@ -142,11 +146,8 @@ def _compiled(
         name: int(m.s[k]) for name, k in (("steps", loop.STEPS), ("rejected", loop.REJECTED), ("evaluations", loop.EVALS))
     }
     counts["wall_s"] = time.perf_counter() - begun
-    return (
-        out[:rows, : 2 * n],
-        out[:rows, 2 * n :],
-        counts | {"complete": complete, "events": events, "drive": [j.spec() for j in drive.joints]},
-    )
+    about = counts | {"complete": complete, "events": events, "drive": [j.spec() for j in drive.joints]}
+    return t[:rows], out[:rows, : 2 * n], out[:rows, 2 * n :], about
 
 
 def _inputs(system: System, drive: Drive) -> loop.Inputs:
@@ -178,18 +179,17 @@ def _python(
     rtol: float,
     method: int,
     progress: Callable[[float], None] | None,
-) -> tuple[np.ndarray, np.ndarray, dict[str, Any]]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
     """The same equations under a Python function, by scipy: 100 times slower than a Drive, and as exact."""
     from scipy.integrate import DOP853, Radau
 
     c, n, links = system.chain, system.n, len(system.robot.links)
     w, zero, a = system._work(), np.zeros(links), np.zeros(n)
-    call = as_function(drive)
     begun = time.perf_counter()
 
     def slope(time_s: float, z: np.ndarray) -> np.ndarray:
         y, v = z[:n], z[n : 2 * n]
-        force = _forces(system, call, time_s, y, v)
+        force = _forces(system, drive, time_s, y, v)
         accelerate(c, w, y, v, y, v, 0.0, force, zero, zero, a)
         dz = np.concatenate([v, a, [0.0, 0.0]])
         loop._powers(c, w, v, force, dz)
@@ -200,19 +200,22 @@ def _python(
     )
     events: list[dict[str, Any]] = []
     out = [state]
-    limits = _slack(system)
+    inputs = _inputs(system, Drive.none(links))
 
-    def beyond(z: np.ndarray) -> list[dict[str, Any]]:
-        outside = (z[system.joint_rows] < limits[:, 0]) | (z[system.joint_rows] > limits[:, 1])
-        if not outside.any():
-            return []
-        joint = int(np.argmax(outside))
-        return [
-            _limit_event(
-                system, joint, _crossing(solver.dense_output(), limits[joint], system.joint_rows[joint], solver.t_old, solver.t)
-            )
-        ]
+    def beyond(z: np.ndarray) -> bool:
+        return bool(loop.outside(c, inputs, z) >= 0)
 
+    def stop() -> None:
+        """Note the event and keep the last good state."""
+        dense = solver.dense_output()
+        at = _crossing(lambda time_s: beyond(dense(time_s)), solver.t_old, solver.t)
+        joint = int(loop.outside(c, inputs, dense(np.nextafter(at, np.inf) + 1e-12 * abs(solver.t - solver.t_old))))
+        events.append(limit_event(system, joint, at, dense(at)[system.joint_rows]))
+        if at > times[-1]:
+            times.append(at)
+            out.append(dense(at))
+
+    times = [float(t[0])]
     steps = 0
     try:
         while len(out) < len(t) and not events:
@@ -223,9 +226,13 @@ def _python(
             dense = solver.dense_output()
             while len(out) < len(t) and t[len(out)] <= solver.t and not events:
                 z = dense(t[len(out)])
-                events += beyond(z)
-                out += [] if events else [z]
-            events = events or beyond(solver.y)
+                if beyond(z):
+                    stop()
+                else:
+                    times.append(float(t[len(out)]))
+                    out.append(z)
+            if not events and beyond(solver.y):
+                stop()
             if progress is not None:
                 progress((solver.t - t[0]) / (t[-1] - t[0]))
     except KeyboardInterrupt:
@@ -238,22 +245,16 @@ def _python(
         "events": events,
         "drive": "Python function",
     }
-    return z[:, : 2 * n], z[:, 2 * n :], meta | {"complete": len(out) == len(t)}
+    complete = not events and len(out) == len(t)
+    return np.array(times), z[:, : 2 * n], z[:, 2 * n :], meta | {"complete": complete}
 
 
-def _crossing(dense: Callable[[float], np.ndarray], limits: np.ndarray, row: int, before: float, after: float) -> float:
-    """When the unknown in `row` left its limits, by bisection between two times [s]."""
+def _crossing(beyond: Callable[[float], bool], before: float, after: float) -> float:
+    """The last time before `beyond` [s], by bisection between a time inside and one beyond."""
     for _ in range(60):
         middle = (before + after) / 2
-        inside = limits[0] <= dense(middle)[row] <= limits[1]
-        before, after = (middle, after) if inside else (before, middle)
+        before, after = (before, middle) if beyond(middle) else (middle, after)
     return before
-
-
-def _limit_event(system: System, joint: int, t: float) -> dict[str, Any]:
-    low, high = system.limits[joint]
-    unit = "rad" if system.robot.links[joint].joint.type == "R" else "m"
-    return {"t": t, "level": "ERROR", "text": f"joint {joint + 1} left its limits, {low:g} to {high:g} {unit}: stopped"}
 
 
 def as_function(drive: Callable[..., Any]) -> Callable[[float, np.ndarray, np.ndarray, float], np.ndarray]:
@@ -282,8 +283,7 @@ def _applied(system: System, t: np.ndarray, states: np.ndarray, drive: Any) -> n
         out = np.zeros((len(t), len(rows)))
         loop.forces(system.chain, _following(system, drive), _inputs(system, drive), loop.memory(len(rows), n), t, states, out)
     else:
-        call = as_function(drive)
-        out = np.array([_forces(system, call, s, z[:n], z[n:]) for s, z in zip(t, states, strict=True)])
+        out = np.array([_forces(system, drive, s, z[:n], z[n:]) for s, z in zip(t, states, strict=True)])
     return out.reshape(len(t), len(rows))
 
 
@@ -297,21 +297,21 @@ def _times(t_eval: Any) -> np.ndarray:
 def _state(system: System, key: str, value: Any, default: np.ndarray) -> np.ndarray:
     if value is None:
         return default
-    array = np.asarray(value, dtype=float)
+    array = np.array(value, dtype=float)
     if array.shape != (system.n,) or not np.all(np.isfinite(array)):
         raise InputError(f"expected {system.n} finite numbers, in the order of system.labels", key=key, value=value)
     return array
 
 
-def _put_on_motions(system: System, drive: Drive, t: float, state: np.ndarray) -> None:
-    for joint, row in zip(drive.joints, system.joint_rows, strict=False):
+def _put_on_motions(system: System, drive: Drive, t: float, q: np.ndarray, qd: np.ndarray) -> None:
+    for joint, row in zip(drive.joints, system.joint_rows, strict=True):
         if joint.prescribed and joint.motion is not None:
-            state[row], state[system.n + row], _ = joint.motion(t)
+            q[row], qd[row], _ = joint.motion(t)
 
 
-def _inside_limits(system: System, state: np.ndarray) -> None:
+def _inside_limits(system: System, q: np.ndarray) -> None:
     for i, (link, row) in enumerate(zip(system.robot.links, system.joint_rows, strict=True), 1):
-        if link.joint.limits is not None and not link.joint.limits[0] <= state[row] <= link.joint.limits[1]:
+        if link.joint.limits is not None and not link.joint.limits[0] <= q[row] <= link.joint.limits[1]:
             raise InputError(
-                f"expected a start inside the limits of joint {i}, {list(link.joint.limits)}", key="q0", value=float(state[row])
+                f"expected a start inside the limits of joint {i}, {list(link.joint.limits)}", key="q0", value=float(q[row])
             )
