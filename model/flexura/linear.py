@@ -25,7 +25,8 @@ def frequencies(system: System, q: Any = None, joints: str = "locked", *, qd: An
     if system.robot.nodal:
         whole = static(system) if q is None else np.asarray(q, dtype=float)
         piece = nodal.at(system, whole)
-        return frequencies(piece.system, piece.part(whole), joints, qd=None if qd is None else piece.rates(np.asarray(qd, dtype=float)))
+        spin = None if qd is None else piece.rates(np.asarray(qd, dtype=float))
+        return frequencies(piece.system, piece.part(whole), joints, qd=spin)
     at = static(system) if q is None else system._check(q)
     rates = np.zeros(system.n) if qd is None else system._check(qd)
     rows = system.elastic_rows if joints == "locked" else system.free_rows

@@ -1,14 +1,14 @@
 """`sliding = "nodal"`: the dissertation's own treatment of Pa on a flexible link and of Pb, for comparison.
 
-Pa: the hub sits at (d, w_k) of the link it rides on, with the slope of node k = ceil(d / l_e), the one that ends the element under
-it (table 2.1), and without convective terms. Pb: the mesh is fixed to the link, node k at X_k = k L / n; the nodes ahead of the sleeve,
-X_k > L - d, are active, the others at rest on its axis (the time-dependent boundary), so that the link is clamped at X_j, j the last
-node at rest, up to l_e behind the sleeve's exit. d > 0 keeps the last node active, whatever n.
+Pa: the hub sits at (d, w_k) of the link it rides on, with the slope of node k = ceil(d / l_e), which ends the element under it
+(table 2.1), and without convective terms. Pb: the mesh is fixed to the link, node k at X_k = k L / n. Nodes ahead of the sleeve,
+X_k > L - d, are active, the others at rest on its axis (the time-dependent boundary), so that the link is clamped at X_j, j the
+last node at rest: up to l_e behind the sleeve's exit. As d > 0, the last node is active, whatever n.
 
-While k and j stay, the robot is one of fixed structure, a `Piece`, and the ordinary solver takes it: behind a sleeve, a rigid Pb link
-with the mass of [0, X_j] and, on a locked joint, the elements beyond. Where one changes, the joints, the elastic unknowns and their
-rates stay as they are, as in the dissertation's state vector, but those of a node that enters its sleeve become 0; by how much the
-energy jumps is logged. Accuracy is the node spacing's: `model/README.md`.
+While k and j stay, the robot is one of fixed structure, a `Piece`, and the ordinary solver takes it: behind a sleeve, a rigid Pb
+link with the mass of [0, X_j] and, on a locked joint, the elements beyond. Where one changes, the joints, the elastic unknowns
+and their rates stay as they are, as in the dissertation's state vector, but those of a node that enters its sleeve become 0; by
+how much the energy jumps is logged. What this costs in accuracy is measured in `model/README.md`.
 """
 
 from __future__ import annotations
@@ -85,7 +85,8 @@ class Piece:
 
     def channels(self, run: Run, states: np.ndarray) -> tuple[dict[str, np.ndarray], dict[str, str]]:
         """The whole robot's channels and units from the piece's run and the whole robot's states (T, 2n)."""
-        robot, names = self.whole.robot, {}
+        robot = self.whole.robot
+        names: dict[str, str] = {}
         bent: dict[str, np.ndarray] = {}
         for i, (hub, row) in enumerate(zip(self.hubs, self.whole.joint_rows, strict=True), 1):
             names |= {f"joint/{i}/{name}": f"joint/{hub + 1}/{name}" for name in ("position", "velocity", "drive")}
@@ -122,8 +123,8 @@ def simulate(
 ) -> Run:
     """`forward.simulate`, which is also `solve`, for a robot that slides node by node: piece after piece.
 
-    Arguments as checked there; a Python `drive` takes four arguments. q, qd (n,): the nodes of a sleeved link are those fixed to it.
-    `meta["energy_jumps"]` lists the changes, {t, text, J}, and `meta["energy_error"]` leaves them out.
+    Arguments as checked there; a Python `drive` takes four arguments. q, qd (n,): nodes of a sleeved link are fixed to it, and
+    those at rest are left out. `meta["energy_jumps"]` lists the changes, {t, text, J}, and `meta["energy_error"]` leaves them out.
     """
     position = q[system.joint_rows]
     nodes, now = _nodes(system.robot, position), float(t[0])

@@ -291,8 +291,9 @@ class Robot(_Table):
     def _whole_meshes(self) -> Robot:
         if self.sliding == "nodal":
             for i, link in enumerate(self.link):
-                if link.modes is not None and (link.joint.type == "Pb" or (i + 1 < len(self.link) and self.rides(i + 1))):
-                    raise WrongValue(f"link[{i + 1}].modes", link.modes, 'absent with sliding = "nodal": it goes by the nodes of this link')
+                slides = link.joint.type == "Pb" or (i + 1 < len(self.link) and self.rides(i + 1))
+                if link.modes is not None and slides:
+                    raise WrongValue(f"link[{i + 1}].modes", link.modes, 'absent with sliding = "nodal", which goes by its nodes')
         return self
 
     def rides(self, i: int) -> bool:

@@ -168,9 +168,8 @@ class System:
 
     def _check(self, q: np.ndarray) -> np.ndarray:
         if self.robot.nodal:
-            raise InputError(
-                'expected "continuous": a robot that slides node by node has matrices between two nodes only', key="sliding", value="nodal"
-            )
+            text = 'expected "continuous": sliding from node to node has other matrices between every two nodes'
+            raise InputError(text, key="sliding", value="nodal")
         q = np.asarray(q, dtype=float)
         if q.shape != (self.n,):
             raise InputError(f"expected an array of shape ({self.n},), in the order of system.labels", key="q", value=q.shape)

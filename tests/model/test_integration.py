@@ -224,10 +224,36 @@ def test_a_joint_at_its_limit_ends_the_run(method, kind):
     drive = fx.Drive.force(signal.constant(1.0)) if kind == "drive" else lambda t: [1.0]
     run = fx.simulate(cart(2.0, limits=[-0.05, 0.1]), np.linspace(0, 2, 201), drive, method=method)
     assert not run.complete
-    assert run.t[-1] == pytest.approx(0.63, abs=1e-9) and len(run["tip/x"]) == len(run.t) == 64
-    assert np.all(run["joint/1/position"] <= 0.1)
+    assert run.t[-2] == pytest.approx(0.63, abs=1e-9) and len(run["tip/x"]) == len(run.t) == 65
+    assert run.t[-1] == pytest.approx(2 * 0.1**0.5, rel=1e-6) and run["joint/1/position"][-1] == pytest.approx(0.1, rel=1e-7)
     (event,) = run.meta["events"]
-    assert event["level"] == "ERROR" and "joint 1" in event["text"] and event["t"] <= 0.1**0.5 * 2 + 1e-9
+    assert event["level"] == "ERROR" and "joint 1 left its limits" in event["text"] and event["t"] == run.t[-1]
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("kind", ["drive", "function"])
+@pytest.mark.parametrize(
+    "case", ["the tip of link 1", "the root of link 1", "the sleeve's mouth", "out of the sleeve", "into the sleeve"]
+)
+def test_the_end_of_a_link_ends_the_run_with_a_word(method, kind, case):
+    """A slider on a flexible link, or a link in its sleeve, pulled to each end; the last state is there, at the end, and good."""
+    rail = beam(0.4, 0.3, 20.0, 2, damping={"beta_s": 1e-3}, hub_inertia_kg_m2=0.01, locked=True)
+    slider = rigid(0.1, 0.2, 0.0, 1e-3, type="Pa", start=0.2)
+    sleeved = beam(0.4, 0.3, 20.0, 2, type="Pb", start=0.2, damping={"beta_s": 1e-3})
+    robot, pull, joint, end, words = {
+        "the tip of link 1": ([rail, slider], 1.0, 2, 0.4, "joint 2 (Pa) reached the end of link 1, at 0.4 m"),
+        "the root of link 1": ([rail, slider], -1.0, 2, 0.0, "joint 2 (Pa) reached the end of link 1, at 0 m"),
+        "the sleeve's mouth": ([sleeved | {"joint": sleeved["joint"] | {"locked": True}}, slider | {"joint": slider["joint"] |
+                               {"start": 0.3}}], -1.0, 2, 0.2, "joint 2 (Pa) ran into the sleeve of link 1"),
+        "out of the sleeve": ([sleeved], 1.0, 1, 0.4, "joint 1 (Pb) reached the end of link 1, at 0.4 m"),
+        "into the sleeve": ([sleeved], -1.0, 1, 0.008, "joint 1 (Pb) reached the end of link 1, at 0.008 m"),
+    }[case]  # fmt: skip
+    forces = [0.0] * (joint - 1) + [pull]
+    drive = fx.Drive.force(*(signal.constant(f) for f in forces)) if kind == "drive" else lambda t: forces
+    run = fx.simulate(system(*robot), [0.0, 0.1, 5.0], drive, method=method, rtol=1e-7)
+    assert not run.complete and [words in event["text"] for event in run.meta["events"]] == [True]
+    assert run[f"joint/{joint}/position"][-1] == pytest.approx(end, abs=1e-7) and run.t[-1] == run.meta["events"][0]["t"]
+    assert all(np.isfinite(run[name]).all() for name in run) and run.meta["energy_error"] < 1e-5
 
 
 def test_a_joint_that_stays_inside_its_limits_does_not_end_the_run():

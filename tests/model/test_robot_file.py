@@ -258,6 +258,27 @@ VALUES = {
         {CART + "joint.limits": [0.15, -0.05]}, "link[1].joint.limits", [0.15, -0.05], "the lower limit first",
     ),
     "limits at one place": ({CART + "joint.limits": [0.0, 0.0]}, "link[1].joint.limits", [0.0, 0.0], "a higher upper limit"),
+    "a Pb without its free length": (
+        {CART + "joint.type": "Pb", CART + "joint.limits": ABSENT, CART + "joint.start": -0.01}, "link[1].joint.start", -0.01,
+        "the free length at the start, between 0 and 0.1 m, the ends of link 1",
+    ),
+    "a flexible Pb that is all inside": (
+        {STRIP + "joint.type": "Pb"}, "link[2].joint.start", 0.0, "between 0.006 and 0.3 m, the ends of link 2",
+    ),
+    "a Pb with limits beyond its link": (
+        {STRIP + "joint.type": "Pb", STRIP + "joint.start": 0.2, STRIP + "joint.limits": [0.1, 0.31]}, "link[2].joint.limits",
+        [0.1, 0.31], "limits between 0.006 and 0.3 m, the ends of link 2",
+    ),
+    "a Pa that starts beyond its link": (
+        {STRIP + "joint.type": "Pa", STRIP + "joint.start": 0.11}, "link[2].joint.start", 0.11, "between 0 and 0.1 m, the ends of link 1",
+    ),
+    "a Pa on a link without length": (
+        {CART + "length_m": 0.0, STRIP + "joint.type": "Pa"}, "link[1].length_m", 0.0, "a length above 0: link 2 slides on this link",
+    ),
+    "a Pa behind a sleeve": (
+        {CART + "joint.type": "Pb", CART + "joint.limits": ABSENT, CART + "joint.start": 0.04, STRIP + "joint.type": "Pa",
+         STRIP + "joint.start": 0.05}, "link[2].joint.start", 0.05, "ahead of the sleeve of link 1, at 0.06 m or more",
+    ),
     "limits beside the start": (
         {CART + "joint.limits": [0.05, 0.15]}, "link[1].joint.limits", [0.05, 0.15], "contain the start position, 0",
     ),
@@ -410,7 +431,7 @@ EVERY_KEY = {
     "link.1.mass_kg": 0.0,
     "link.1.centre_of_mass_m": -0.01,
     "link.1.inertia_kg_m2": 0.0,
-    "link.1.joint.type": "Pb",
+    "link.1.joint.type": "R",
     "link.1.joint.angle_rad": 1.5,
     "link.1.joint.hub_mass_kg": 0.1,
     "link.1.joint.hub_inertia_kg_m2": 0.1,
@@ -556,10 +577,32 @@ def joints(draw):
     joint["type"] = draw(st.sampled_from(["R", "Pa", "Pb"]))
     if joint["type"] != "R":
         joint["angle_rad"] = draw(number(-7, 7))
-    if draw(st.booleans()):
-        low, start, high = sorted(draw(st.lists(number(-1e6, 1e6), min_size=3, max_size=3, unique=True)))
-        joint |= {"limits": [low, high], "start": start}
     return joint
+
+
+@st.composite
+def chains(draw):
+    """Links whose joints start, and have their limits, on what they slide along."""
+    chain = draw(st.lists(links(), min_size=1, max_size=5))
+    for i, link in enumerate(chain):
+        joint, (low, high) = link["joint"], (-1e6, 1e6)
+        if i and joint["type"] == "Pa":
+            before = chain[i - 1]
+            low, high = 0.0, before["length_m"]
+            if before["joint"]["type"] == "Pb":
+                low = high - before["joint"]["start"]
+            if high == 0:
+                joint["type"], (low, high) = "R", (-1e6, 1e6)
+                joint.pop("angle_rad")
+        elif joint["type"] == "Pb":
+            high = link["length_m"]
+            low = 0.02 * high if link.get("elements") else 0.0
+        if draw(st.booleans()) or joint["type"] != "R":
+            start = low + (high - low) * draw(st.floats(0.25, 0.75))
+            joint["start"] = start
+            if draw(st.booleans()) and low < high:
+                joint["limits"] = [(low + start) / 2, (start + high) / 2]
+    return chain
 
 
 @st.composite
@@ -593,7 +636,7 @@ def links(draw):
 robots = st.builds(
     fx.Robot.from_dict,
     st.fixed_dictionaries(
-        {"link": st.lists(links(), min_size=1, max_size=5)},
+        {"link": chains()},
         optional={
             "name": st.text(max_size=50),
             "gravity_m_s2": st.lists(number(-1e3, 1e3), min_size=2, max_size=2),
