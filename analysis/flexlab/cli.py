@@ -53,32 +53,115 @@ def simulate(
     folder = out or _default_folder("simulate", robot)
     path = run.save(folder)
     _show(json, lambda: tables.run_table(run), lambda: tables.run_json(run) | {"run": str(path)})
-    _events(run)
-    _say(json, f"stored {path}", f"look at it: flexura review {folder}")
-    if not run.complete:
-        raise typer.Exit(130 if _interrupted(run) else 1)
+    _stored(run, path, json)
 
 
 @app.command()
-def frequencies(robot: RobotFile, json: Json = False) -> None:
-    """Natural frequencies at the start, joints locked and free.
+def inverse(
+    robot: RobotFile,
+    manoeuvre: Annotated[Path, typer.Argument(metavar="MANOEUVRE", help="manoeuvre file (TOML) with a motion for every joint")],
+    out: Out = None, rtol: Rtol = 1e-7,
+    method: Annotated[str, typer.Option(help="auto, explicit or implicit")] = "auto", json: Json = False,
+) -> None:  # fmt: skip
+    """Inverse dynamics: the forces and torques that the manoeuvre's motions take, exactly followed; gains and forces are ignored.
 
     \b
-    Example: flexura frequencies model/robots/two-link-arm.toml
+    Example: flexura inverse model/robots/rig.toml model/manoeuvres/rig-inverse-law.toml
     """
     import flexura as fx
 
     from . import tables
+    from .effort import efforts
+
+    system, asked = _prepare(robot, manoeuvre)
+    motions = [joint.motion for joint in asked.drive.joints]
+    for i, (motion, link) in enumerate(zip(motions, system.robot.links, strict=True), 1):
+        if motion is None and not link.joint.locked:
+            raise fx.InputError(
+                "missing: inverse dynamics needs a motion of every joint", key=f"joint[{i}].motion", file=str(manoeuvre)
+            )
+    try:
+        drive = fx.Drive.prescribed(*motions)
+    except fx.InputError as error:
+        raise error.in_file(str(manoeuvre)) from None
+    with _progress("inverse") as report:
+        run = fx.simulate(system, asked.t, drive, rtol=rtol, method=method, progress=lambda f: report("inverse", f))
+    run.meta["manoeuvre"] = asked.name
+    folder = out or _default_folder("inverse", robot)
+    path = run.save(folder)
+    rows = efforts(run)
+    _show(
+        json,
+        lambda: tables.effort_table(rows, run),
+        lambda: tables.run_json(run) | {"drives": [vars(r) for r in rows], "run": str(path)},
+    )
+    _stored(run, path, json)
+
+
+@app.command()
+def frequencies(
+    robot: RobotFile,
+    zeros: Annotated[
+        bool, typer.Option("--zeros", help="also the transmission zeros from each drive to its joint and the tip")
+    ] = False,
+    json: Json = False,
+) -> None:
+    """Natural frequencies at the start, joints locked and free.
+
+    \b
+    Example: flexura frequencies model/robots/two-link-arm.toml --zeros
+    """
+    import flexura as fx
+
+    from . import tables
+    from .zeros import transmission
 
     described = fx.load(robot)
     system = fx.assemble(described)
     locked, free = (fx.frequencies(system, joints=joints) for joints in ("locked", "free"))
+    rows = transmission(fx.linearize(system)) if zeros else []
     title = described.name or robot.stem
+    found = {"locked_Hz": locked.tolist(), "free_Hz": free.tolist()}
     _show(
         json,
-        lambda: tables.frequency_table(locked, free, title),
-        lambda: {"locked_Hz": locked.tolist(), "free_Hz": free.tolist()},
+        lambda: tables.frequency_tables(locked, free, title, rows),
+        lambda: found | ({"zeros": [row.numbers() for row in rows]} if zeros else {}),
     )
+
+
+@app.command()
+def study(
+    kind: Annotated[str, typer.Argument(metavar="KIND", help="payload, length-ratio or boundary")],
+    robot: RobotFile, manoeuvre: ManoeuvreFile = None, out: Out = None, rtol: Rtol = 1e-6,
+    values: Annotated[str | None, typer.Option(metavar="LOW:HIGH:COUNT", help="payloads [kg], ratios, lengths [m]")] = None,
+    keep: Annotated[str, typer.Option(help="lengths: total (L1 + L2), first (L1), density (total, m1 = mu1 L1)")] = "total",
+    channels: Annotated[bool, typer.Option("--channels", help="store the channels of all runs too")] = False,
+    jobs: Annotated[int | None, typer.Option(min=1, help="processes; default: one a core")] = None, json: Json = False,
+) -> None:  # fmt: skip
+    """The dissertation's studies on any robot: payload, ratio of link lengths, with and without a sleeve; table, figure, Parquet.
+
+    \b
+    Example: flexura study payload model/robots/type-1-rr.toml model/manoeuvres/type-1-bang-bang.toml --values 0:0.2:41
+    """
+    import flexura as fx
+
+    from . import study as studies
+
+    described = fx.load(robot)
+    asked = None if manoeuvre is None else fx.load_manoeuvre(manoeuvre, len(described.links))
+    folder = out or _default_folder(f"study-{kind}", robot)
+    _announce_compiling()
+    with _progress(kind) as report:
+        done = studies.run(
+            kind, described, asked, values, keep=keep, rtol=rtol, jobs=jobs, progress=lambda f: report(kind, f),
+            channels=folder / "runs" if channels else None,
+        )  # fmt: skip
+    stored = [str(path) for path in studies.save(done, folder)]
+    _show(json, lambda: studies.table(done), lambda: studies.numbers(done) | {"stored": stored})
+    _say(json, f"stored {', '.join(stored)}")
+    if not done.complete:
+        typer.echo(f"interrupted after {len(done.rows)} runs, which are stored", err=True)
+        raise typer.Exit(130)
 
 
 @app.command()
@@ -156,6 +239,8 @@ def demo(
     \b
     Example: flexura demo
     """
+    import shutil
+
     from . import tables
     from .demo import demonstrate
 
@@ -180,7 +265,7 @@ def demo(
         "  flexura frequencies model/robots/rig.toml                its natural frequencies",
         "  flexura --help                                           everything else",
     ]
-    if not _on_path():
+    if shutil.which("flexura") is None:
         lines.append("(the command is in .venv/bin; to have it at hand: source .venv/bin/activate)")
     _say(json, *lines)
     if not check.passed:
@@ -273,18 +358,20 @@ def _events(run: Any) -> None:
         typer.echo(f"{run.meta['source']}: {event['level'].lower()} at t = {event['t']:.4g} s: {event['text']}", err=True)
 
 
+def _stored(run: Any, path: Path, json: bool) -> None:
+    """What happened to a run and where it is; the status of one that did not come to its end."""
+    _events(run)
+    _say(json, f"stored {path}", f"look at it: flexura review {path.parent}")
+    if not run.complete:
+        raise typer.Exit(130 if _interrupted(run) else 1)
+
+
 def _interrupted(run: Any) -> bool:
     return any(event["text"] == "interrupted" for event in run.meta.get("events", []))
 
 
 def _default_folder(command: str, robot: Path) -> Path:
     return Path("logs") / f"{command}-{robot.stem}"
-
-
-def _on_path() -> bool:
-    import shutil
-
-    return shutil.which("flexura") is not None
 
 
 def main() -> None:

@@ -55,6 +55,10 @@ def crosscheck(
     `beam`: "ancf" or "ge", see `flexura.twin`. `progress` is called with "native" or "twin" and the finished fraction. The
     table's channels: joint positions, tip deflections, the tip's position.
     """
+    if manoeuvre.drive.follows.any():
+        raise fx.InputError(
+            "expected a force, or gains on the motion: the twin has no prescribed joints", key="prescribed", value=True
+        )
     report = progress or (lambda name, fraction: None)
     native = fx.simulate(fx.assemble(robot), manoeuvre.t, manoeuvre.drive, rtol=rtol, progress=lambda f: report("native", f))
     report("native", 1.0)

@@ -5,11 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from rich.console import Group
 from rich.table import Table
 
 import flexura as fx
 
 from .crosscheck import Check
+from .effort import Effort
+from .zeros import Transmission
 
 
 def check_table(check: Check) -> Table:
@@ -61,6 +64,28 @@ def run_table(run: fx.Run) -> Table:
     return table
 
 
+def effort_table(rows: list[Effort], run: fx.Run) -> Table:
+    """What each drive has to give, and how exact the calculation was."""
+    table = Table(
+        title=f"{run.meta.get('name') or 'robot'}: drives of {run.meta['manoeuvre'] or 'the motion'}", title_justify="left"
+    )
+    for name in ("drive", "peak", "at", "RMS", "peak speed", "peak power", "energy in", "net energy"):
+        table.add_column(name, justify="left" if name == "drive" else "right", no_wrap=True)
+    for row in rows:
+        table.add_row(
+            f"joint {row.joint}", f"{row.peak:.4g} {row.unit}", f"{row.peak_at_s:.4g} s", f"{row.rms:.4g} {row.unit}",
+            f"{row.peak_speed:.3g} {row.speed_unit}", f"{row.peak_power_W:.3g} W", f"{row.energy_in_J:.4g} J",
+            f"{row.energy_net_J:.4g} J",
+        )  # fmt: skip
+    bent = [f"link {n.split('/')[1]} {1e3 * np.abs(run[n]).max():.3g} mm" for n in run if n.endswith("tip_deflection")]
+    table.caption = (
+        f"largest tip deflection: {', '.join(bent) or 'none'}; {_time(run.meta['wall_s'])}, {run.meta['steps']} steps, "
+        f"rtol {run.meta['rtol']:g}, energy error {run.meta['energy_error']:.1e}"
+    )
+    table.caption_justify = "left"
+    return table
+
+
 def run_json(run: fx.Run) -> dict[str, Any]:
     about = {k: v for k, v in run.meta.items() if k not in ("robot", "drive")}
     channels = {
@@ -73,13 +98,27 @@ def run_json(run: fx.Run) -> dict[str, Any]:
     }
 
 
-def frequency_table(locked: np.ndarray, free: np.ndarray, name: str) -> Table:
+def frequency_tables(locked: np.ndarray, free: np.ndarray, name: str, zeros: list[Transmission]) -> Group:
+    """Natural frequencies, and transmission zeros where they are given."""
     table = Table(title=f"{name}: natural frequencies", title_justify="left")
     table.add_column("mode", justify="right")
     table.add_column("joints locked \\[Hz]", justify="right")
     table.add_column("joints free \\[Hz]", justify="right")
     for k in range(max(len(locked), len(free))):
         table.add_row(str(k + 1), *(f"{f[k]:.5g}" if k < len(f) else "" for f in (locked, free)))
+    return Group(table, *([_zero_table(zeros)] if zeros else []))
+
+
+def _zero_table(rows: list[Transmission]) -> Table:
+    table = Table(title="transmission zeros", title_justify="left")
+    for name in ("drive", "output", "output at rest at \\[Hz]", "right half plane \\[1/s]"):
+        table.add_column(name, no_wrap=True)
+    for row in rows:
+        still = ", ".join(f"{f:.4g}" for f in row.notches_Hz[:4]) or "-"
+        slow = ", ".join(f"{z.real:.4g}" + (f" ± {z.imag:.4g} i" if z.imag else "") for z in row.unstable[:3]) or "-"
+        table.add_row(row.drive, row.output, *((still, slow) if row.zeros is not None else ("not moved", "")))
+    table.caption = "a zero in the right half plane: feedback of that output cannot be faster than it"
+    table.caption_justify = "left"
     return table
 
 

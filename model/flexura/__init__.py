@@ -20,6 +20,7 @@ _HOME = {
     "System": "system", "assemble": "system",
     "static": "statics", "tip_pose": "statics",
     "frequencies": "linear",
+    "StateSpace": "statespace", "linearize": "statespace",
     "simulate": "forward", "inverse": "forward",
     "Run": "run",
     "Drive": "drive", "JointDrive": "drive", "Manoeuvre": "drive", "load_manoeuvre": "drive",
@@ -28,8 +29,9 @@ _HOME = {
 }  # fmt: skip
 
 __all__ = [
-    "Drive", "FlexuraError", "InputError", "JointDrive", "Manoeuvre", "Robot", "Run", "Signal", "System",
-    "assemble", "frequencies", "inverse", "load", "load_manoeuvre", "save", "simulate", "static", "tip_pose",
+    "Drive", "FlexuraError", "InputError", "JointDrive", "Manoeuvre", "Robot", "Run", "Signal",
+    "StateSpace", "System",
+    "assemble", "frequencies", "inverse", "linearize", "load", "load_manoeuvre", "save", "simulate", "static", "tip_pose",
 ]  # fmt: skip
 
 if TYPE_CHECKING:
@@ -40,6 +42,7 @@ if TYPE_CHECKING:
     from .robot import Robot, load, save
     from .run import Run
     from .signal import Signal
+    from .statespace import StateSpace, linearize
     from .statics import static, tip_pose
     from .system import System, assemble
 

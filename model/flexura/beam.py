@@ -7,8 +7,7 @@ displacement w and the slope w' at nodes 1 ... n (node 0 is the hub: w = w' = 0)
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -43,9 +42,12 @@ def shape(length: float, elements: int, x: Any, derivative: int = 0) -> np.ndarr
     return out[2:]
 
 
-@dataclass(frozen=True)
-class LinkIntegrals:
-    """Constants of one link in some elastic coordinates q (m of them), with dm = rho A dx plus tip and hub masses.
+_NONE, _EMPTY = np.zeros(0), np.zeros((0, 0))
+
+
+class LinkIntegrals(NamedTuple):
+    """Constants of one link in some elastic coordinates q (m of them; 0: a rigid link), with dm = rho A dx plus tip and hub
+    masses.
 
     mass m0 = int dm [kg]; first moment s1 = int x dm [kg m]; second moment inertia = int x^2 dm [kg m^2], about the hub;
     S0 = int phi dm, S1 = int x phi dm (m,); M = int phi phi^T dm, K = int EI phi'' phi''^T dx (m, m);
@@ -66,38 +68,38 @@ class LinkIntegrals:
     mass: float
     s1: float
     inertia: float
-    S0: np.ndarray
-    S1: np.ndarray
-    M: np.ndarray
-    K: np.ndarray
-    G1: np.ndarray
-    G2: np.ndarray
-    H: np.ndarray
-    NL: np.ndarray
-    SL: np.ndarray
-    basis: np.ndarray
-    point_x: np.ndarray
-    point_mass: np.ndarray
-    point_phi: np.ndarray
-    slope_dx: np.ndarray
-    slope_EI: np.ndarray
-    slope_d1: np.ndarray
-    slope_d2: np.ndarray
-    ride: np.ndarray
+    S0: np.ndarray = _NONE
+    S1: np.ndarray = _NONE
+    M: np.ndarray = _EMPTY
+    K: np.ndarray = _EMPTY
+    G1: np.ndarray = _EMPTY
+    G2: np.ndarray = _EMPTY
+    H: np.ndarray = _EMPTY
+    NL: np.ndarray = _NONE
+    SL: np.ndarray = _NONE
+    basis: np.ndarray = _EMPTY
+    point_x: np.ndarray = _NONE
+    point_mass: np.ndarray = _NONE
+    point_phi: np.ndarray = _EMPTY
+    slope_dx: np.ndarray = _NONE
+    slope_EI: np.ndarray = _NONE
+    slope_d1: np.ndarray = _EMPTY
+    slope_d2: np.ndarray = _EMPTY
+    ride: np.ndarray = np.zeros((1, 3, 0))
     reference: float = 0.0
-    sleeve_xi: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    sleeve_w: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    sleeve_phi: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
-    sleeve_d1: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
-    sleeve_d2: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    sleeve_xi: np.ndarray = _NONE
+    sleeve_w: np.ndarray = _NONE
+    sleeve_phi: np.ndarray = _EMPTY
+    sleeve_d1: np.ndarray = _EMPTY
+    sleeve_d2: np.ndarray = _EMPTY
 
     def changed(self, basis: np.ndarray) -> LinkIntegrals:
         """The same link in coordinates p with q = basis @ p."""
         B = basis
-        squares = {name: _sandwich(B, getattr(self, name)) for name in ("M", "K", "G1", "G2", "H")}
-        vectors = {name: B.T @ getattr(self, name) for name in ("S0", "S1", "NL", "SL")}
-        rows = {name: getattr(self, name) @ B for name in _ROWS if getattr(self, name).size}
-        return replace(self, **squares, **vectors, **rows)
+        new: dict[str, Any] = {name: _sandwich(B, getattr(self, name)) for name in ("M", "K", "G1", "G2", "H")}
+        new |= {name: B.T @ getattr(self, name) for name in ("S0", "S1", "NL", "SL")}
+        new |= {name: getattr(self, name) @ B for name in _ROWS if getattr(self, name).size}
+        return self._replace(**new)
 
 
 _ROWS = ("basis", "point_phi", "slope_d1", "slope_d2", "ride", "sleeve_phi", "sleeve_d1", "sleeve_d2")
@@ -115,8 +117,7 @@ def link_integrals(link: Link, tip_mass: float = 0.0, tip_inertia: float = 0.0) 
         bare = _flexible(link)
     hub = (0.0 if sleeve else link.joint.hub_mass_kg, link.joint.hub_inertia_kg_m2)
     turn = bare.SL / bare.reference if sleeve and link.flexible else bare.SL
-    return replace(
-        bare,
+    return bare._replace(
         mass=bare.mass + hub[0] + mp,
         s1=bare.s1 + mp * L,
         inertia=bare.inertia + hub[1] + mp * L**2 + Jp,
@@ -130,7 +131,6 @@ def link_integrals(link: Link, tip_mass: float = 0.0, tip_inertia: float = 0.0) 
 
 
 def _rigid(link: Link) -> LinkIntegrals:
-    none, empty = np.zeros(0), np.zeros((0, 0))
     if link.mass_kg is not None:
         centre = link.centre_of_mass_m if link.centre_of_mass_m is not None else link.length_m / 2
         m, about_centre = link.mass_kg, link.inertia_kg_m2 or 0.0
@@ -139,10 +139,7 @@ def _rigid(link: Link) -> LinkIntegrals:
         x, dx = _quadrature(np.array(link.breaks()))
         rho = link.mass_per_length(x)
         mass, s1, inertia = float(rho @ dx), float((rho * x) @ dx), float((rho * x**2) @ dx)
-    return LinkIntegrals(
-        link.length_m, mass, s1, inertia, none, none, empty, empty, empty, empty, empty, none, none, empty,
-        none, none, empty, none, none, empty, empty, np.zeros((1, 3, 0)),
-    )  # fmt: skip
+    return LinkIntegrals(link.length_m, mass, s1, inertia)
 
 
 def _flexible(link: Link) -> LinkIntegrals:
@@ -156,9 +153,9 @@ def _flexible(link: Link) -> LinkIntegrals:
     n1, n2 = _outboard(link, cells, x)
     dm = rho * dx
     return LinkIntegrals(
-        L, float(dm.sum()), float(dm @ x), float(dm @ x**2), N @ dm, N @ (x * dm), (N * dm) @ N.T, (C * (EI * dx)) @ C.T,
-        (S * (n1 * dx)) @ S.T, (S * (n2 * dx)) @ S.T, (S * dx) @ S.T,
-        shape(L, n, L)[:, 0], shape(L, n, L, 1)[:, 0], np.eye(2 * n), *_points(link), _ride(L, n),
+        L, float(dm.sum()), float(dm @ x), float(dm @ x**2), S0=N @ dm, S1=N @ (x * dm), M=(N * dm) @ N.T,
+        K=(C * (EI * dx)) @ C.T, G1=(S * (n1 * dx)) @ S.T, G2=(S * (n2 * dx)) @ S.T, H=(S * dx) @ S.T,
+        NL=shape(L, n, L)[:, 0], SL=shape(L, n, L, 1)[:, 0], basis=np.eye(2 * n), ride=_ride(L, n), **_points(link),
     )  # fmt: skip
 
 
@@ -174,11 +171,10 @@ def _sleeved(link: Link) -> LinkIntegrals:
     whole, weight = _quadrature(np.array(link.breaks()))
     dm = link.mass_per_length(whole) * weight
     none, empty = np.zeros(2 * n), np.zeros((2 * n, 2 * n))
-    nothing = np.zeros((0, 2 * n))
     return LinkIntegrals(
-        L, float(dm.sum()), float(dm @ whole), float(dm @ whole**2), none, none, (N * mass) @ N.T, (C * EI) @ C.T,
-        empty, empty, empty, N[:, -1], S[:, -1], np.eye(2 * n),
-        none[:0], none[:0], nothing, none[:0], none[:0], S.T / d, nothing, _ride(L, n), d, xi, w, N.T, S.T, C.T,
+        L, float(dm.sum()), float(dm @ whole), float(dm @ whole**2), S0=none, S1=none, M=(N * mass) @ N.T, K=(C * EI) @ C.T,
+        G1=empty, G2=empty, H=empty, NL=N[:, -1], SL=S[:, -1], basis=np.eye(2 * n), ride=_ride(L, n), slope_d1=S.T / d,
+        reference=d, sleeve_xi=xi, sleeve_w=w, sleeve_phi=N.T, sleeve_d1=S.T, sleeve_d2=C.T,
     )  # fmt: skip
 
 
@@ -212,7 +208,7 @@ def _outboard(link: Link, cells: np.ndarray, x: np.ndarray) -> tuple[np.ndarray,
     return out[0], out[1]
 
 
-def _points(link: Link) -> tuple[np.ndarray, ...]:
+def _points(link: Link) -> dict[str, Any]:
     """The ends of equal cells (x, mass, phi) and two Gauss points in each cell (dx, EI dx, phi', phi'').
 
     The cells are the elements, so that nothing jumps inside one, but at least 4 and, where only some modes are kept, no more
@@ -226,7 +222,10 @@ def _points(link: Link) -> tuple[np.ndarray, ...]:
     mass = _newton_cotes(count)[1:] * (L / count) * link.mass_per_length(x)
     place, dx = _quadrature(np.append(0.0, x), 2)
     EI = link.bending_stiffness(place)
-    return x, mass, shape(L, n, x).T, dx, EI * dx, shape(L, n, place, 1).T, shape(L, n, place, 2).T
+    points = {"point_x": x, "point_mass": mass, "point_phi": shape(L, n, x).T}
+    return points | {
+        "slope_dx": dx, "slope_EI": EI * dx, "slope_d1": shape(L, n, place, 1).T, "slope_d2": shape(L, n, place, 2).T,
+    }  # fmt: skip
 
 
 def _newton_cotes(cells: int) -> np.ndarray:

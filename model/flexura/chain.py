@@ -81,7 +81,7 @@ class Work(NamedTuple):
     slide: np.ndarray  # (N, 3): direction of joint i in its predecessor's axes; unused for a sleeve
     flow: np.ndarray  # (N, 3): velocity of the attachment per unit of a sleeve's d'
     tilt: np.ndarray  # (N,) rate of the tip's tangent over that of w'(L)
-    body: np.ndarray  # (N, 11): int w dm, int (x + u) dm, int (x + u)^2 + w^2 dm; hr (3); a sleeve's column Mxd, Myd, Mtd, Mdd, hd
+    body: np.ndarray  # (N, 11): int w dm, int (x + u) dm, int (x + u)^2 + w^2 dm; hr (3); of a sleeve Mxd, Myd, Mtd, Mdd, hd
     col: np.ndarray  # (N, m, 4) Mqr: x, y, angle, and d of a sleeve
     jac: np.ndarray  # (N, m, 3) Jq^T: x, y, angle
     cv: np.ndarray  # (N, m) velocity-dependent and nonlinear elastic forces on the elastic rows
@@ -113,9 +113,9 @@ def workspace(c: Chain) -> Work:
     z, (N, m), p = np.zeros, c.S0.shape, c.point_x.shape[1]
     P, E = c.sleeve_xi.shape[1], c.ride.shape[1]
     return Work(
-        cos=z(N), sin=z(N), omega=z(N), angle=z(N), place=z((N, 2)), beta=z((N, 3)), rate=z((N, 3)), slide=z((N, 3)), flow=z((N, 3)),
-        tilt=z(N), body=z((N, 11)), col=z((N, m, 4)), jac=z((N, m, 3)), cv=z((N, m)), h=z((N, p, m)), slope=z((2 * p, 4)),
-        point=z((p, 5)), M=z((N, m, m)), K=z((N, m, m)), strain=z(N), sum=z((P, 12)), sum_h=z((P, m)), ride=z((E, 9)),
-        cond=z((N, 36)), joint=z((N, 6)), X=z((N, 3, 4)), inertia=z((4, 4)), bias=z(4), u=z((N, 3)), S=z((N, m, m)), dinv=z((N, m)), rhs=z((N, m, 8)),
-        held=c.locked.copy(), given=z(N), reaction=z(N),
+        cos=z(N), sin=z(N), omega=z(N), angle=z(N), place=z((N, 2)), beta=z((N, 3)), rate=z((N, 3)), slide=z((N, 3)),
+        flow=z((N, 3)), tilt=z(N), body=z((N, 11)), col=z((N, m, 4)), jac=z((N, m, 3)), cv=z((N, m)), h=z((N, p, m)),
+        slope=z((2 * p, 4)), point=z((p, 5)), M=z((N, m, m)), K=z((N, m, m)), strain=z(N), sum=z((P, 12)), sum_h=z((P, m)),
+        ride=z((E, 9)), cond=z((N, 36)), joint=z((N, 6)), X=z((N, 3, 4)), inertia=z((4, 4)), bias=z(4), u=z((N, 3)),
+        S=z((N, m, m)), dinv=z((N, m)), rhs=z((N, m, 8)), held=c.locked.copy(), given=z(N), reaction=z(N),
     )  # fmt: skip

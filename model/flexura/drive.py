@@ -142,7 +142,7 @@ class Manoeuvre:
 
 
 _KEYS = ("name", "duration_s", "output_step_s", "joint")
-_JOINT_KEYS = ("force", "motion", "kp", "kd")
+_JOINT_KEYS = ("force", "motion", "kp", "kd", "prescribed")
 
 
 def load_manoeuvre(path: str | os.PathLike[str], joints: int) -> Manoeuvre:
@@ -178,11 +178,28 @@ def _manoeuvre(data: dict[str, Any], joints: int) -> Manoeuvre:
         ]
         if motion is None and any(gains):
             raise InputError("missing: gains kp and kd need a motion to follow", key=f"{key}.motion")
-        drives.append(JointDrive(force, motion, kp=gains[0], kd=gains[1]))
+        drives.append(JointDrive(force, motion, kp=gains[0], kd=gains[1], prescribed=_prescribed(entry, motion, key)))
     name = data.get("name", "")
     if not isinstance(name, str):
         raise InputError("expected a text", key="name", value=name)
     return Manoeuvre(name, duration, step, Drive(tuple(drives)))
+
+
+def _prescribed(entry: dict[str, Any], motion: Signal | None, key: str) -> bool:
+    """Does this joint follow its motion exactly? Such a motion must not jump, and leaves no room for a force of one's own."""
+    value = entry.get("prescribed", False)
+    if not isinstance(value, bool):
+        raise InputError("expected true or false", key=f"{key}.prescribed", value=value)
+    if not value:
+        return False
+    if motion is None:
+        raise InputError("missing: a prescribed joint needs a motion to follow", key=f"{key}.motion")
+    for name in ("force", "kp", "kd"):
+        if name in entry:
+            expected = "expected none: a prescribed joint takes the force that its motion needs"
+            raise InputError(expected, key=f"{key}.{name}", value=entry[name])
+    _smooth(motion, f"{key}.motion")
+    return True
 
 
 def _known(data: dict[str, Any], keys: Sequence[str], prefix: str) -> None:

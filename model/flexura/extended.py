@@ -3,7 +3,7 @@
 A link's matrix lives in (u, q_i): the velocity u = (vx, vy, omega) of its hub frame and its own elastic unknowns. The hub's
 velocity depends on the joints and elastic unknowns of every link before it, u_i = U_i qd, so the link's matrix is scattered
 into the rows of all of them, not only into those at a shared node: hence "extended" (dissertation, 2.4; `model/README.md`,
-section 4).
+section 5).
 """
 
 from __future__ import annotations

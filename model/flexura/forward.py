@@ -40,10 +40,10 @@ def simulate(
     `drive`: a Drive (compiled), or a function (t) -> (N,) or (t, position, velocity, tip_deflection) -> (N,) of forces and
     torques [N or N m] (slower, by scipy). `q0`, `qd0` (n,): state at the start, by default `system.start()` at
     rest. `rtol`: largest local error relative to the largest value so far. `method`: "explicit", "implicit" or "auto".
-    `progress` is called with the finished fraction. A joint that reaches a limit of the robot file or the end of its link ends the
-    run: the Run holds the states before it and, last, the one at that instant, an event says so and `meta["complete"]` is false. A
-    Ctrl-C ends it too. `meta["energy_error"]` is
-    the largest |E - E(0) - work + loss| relative to the largest energy, work or loss. Raises InputError for wrong arguments,
+    `progress` is called with the finished fraction. A joint that reaches a limit of the robot file or the end of its link ends
+    the run: the Run holds the states before it and, last, the one at that instant, an event says so and `meta["complete"]` is
+    false. A Ctrl-C ends it too. `meta["energy_error"]` is the largest |E - E(0) - work + loss| relative to the largest energy,
+    work or loss. Raises InputError for wrong arguments,
     FlexuraError where the tolerance cannot be kept.
     """
     t = _times(t_eval)

@@ -25,6 +25,7 @@ from .compiled import compiled, inlined
 from .hubs import flexible_hub, last_hub, released, rigid_hub, sleeve_hub
 from .outward import outward
 
+
 @inlined
 def _grip(
     c: Chain, w: Work, i: int, v: np.ndarray, vs: np.ndarray, gh: float, force: np.ndarray, kp: np.ndarray, kd: np.ndarray,

@@ -43,7 +43,7 @@ def outward(c: Chain, w: Work, y: np.ndarray, v: np.ndarray) -> None:
 
 @inlined
 def _link(c: Chain, w: Work, i: int, q: np.ndarray, qd: np.ndarray, omega: float) -> float:
-    """A link clamped to its hub (R, Pa): its terms, and its tip as the attachment; returns the tip's angle in the link's frame."""
+    """A link clamped to its hub (R, Pa): its terms, and its tip as the attachment; returns the tip's angle in its frame."""
     m = q.shape[0]
     om2 = omega * omega
     slope, spin, wL, wLd, S0q, S0v, qq, qv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0

@@ -161,7 +161,8 @@ def _on_curve(
                     w.ride[n, 6 + k] += weight * sin * sec * _quintic(s, h, k, 1)
                     w.ride[n + 1, 6 + k] += weight * sin * sec * _quintic(s, h, 3 + k, 1)
     s = xi * elements - last
-    value, N1, N2, N3 = (_along(w, last, s, h, 0, 0), _along(w, last, s, h, 0, 1), _along(w, last, s, h, 0, 2), _along(w, last, s, h, 0, 3))
+    value, N1 = _along(w, last, s, h, 0, 0), _along(w, last, s, h, 0, 1)
+    N2, N3 = _along(w, last, s, h, 0, 2), _along(w, last, s, h, 0, 3)
     vd, V1, V2 = _along(w, last, s, h, 3, 0), _along(w, last, s, h, 3, 1), _along(w, last, s, h, 3, 2)
     sin = N1 / d
     cos, sec, tan, sec3 = 1.0, 1.0, 0.0, 0.0

@@ -284,7 +284,8 @@ class Robot(_Table):
             if joint.type == "Pa" and i > 0 and self.link[i - 1].joint.type == "Pb":
                 exit_m = self.link[i - 1].length_m - self.link[i - 1].joint.start
                 if joint.start < exit_m:
-                    raise WrongValue(f"{key}.start", joint.start, f"a start ahead of the sleeve of link {i}, at {exit_m:g} m or more")
+                    ahead = f"a start ahead of the sleeve of link {i}, at {exit_m:g} m or more"
+                    raise WrongValue(f"{key}.start", joint.start, ahead)
         return self
 
     @model_validator(mode="after")

@@ -5,11 +5,13 @@ A Signal is a list of segments; on each, with s = t - t0,
     y(s) = c0 + c1 s + ... + c5 s^5 + A sin(w s + phi),
 
 which holds cycloids, harmonics, polynomials, bang-bang profiles and cubic splines in one form that the compiled loop
-evaluates without calling back into Python. Before the first segment y keeps its first value.
+evaluates without calling back into Python. Before the first segment y keeps its first value. `shaping.py` adds the signals
+that leave a mode at rest.
 """
 
 from __future__ import annotations
 
+import inspect
 import math
 from dataclasses import dataclass, field
 from typing import Any
@@ -109,6 +111,22 @@ def polynomial(end: float, duration_s: float, start: float = 0.0, at_s: float = 
     return _signal(rows, kind="polynomial", end=end, duration_s=duration_s, start=start, at_s=at_s)
 
 
+def trapezoidal(end: float, duration_s: float, rise_s: float, start: float = 0.0, at_s: float = 0.0) -> Signal:
+    """From start to end with a trapezoid of velocity: constant acceleration for `rise_s`, none, the opposite for `rise_s`."""
+    _positive("duration_s", duration_s)
+    T, r = duration_s, rise_s
+    if not 0 < r <= T / 2:
+        raise InputError(f"expected a rise above 0 and at most half the duration, {T / 2:g} s", key="rise_s", value=r)
+    v = (end - start) / (T - r)
+    a = v / r
+    brake = at_s + max(T - r, r)
+    rows = [
+        _row(at_s, start, 0.0, a / 2), _row(at_s + r, start + v * r / 2, v),
+        _row(brake, end - v * r / 2, v, -a / 2), _row(at_s + T, end),
+    ]  # fmt: skip
+    return _signal(rows, kind="trapezoidal", end=end, duration_s=duration_s, rise_s=rise_s, start=start, at_s=at_s)
+
+
 def bang_bang(amplitude: float, duration_s: float, rise_s: float = 0.0, at_s: float = 0.0) -> Signal:
     """+amplitude for the first half of the duration, -amplitude for the second, then 0.
 
@@ -153,35 +171,37 @@ def piecewise(at_s: Any, value: Any) -> Signal:
     return _signal(rows, kind="piecewise", at_s=times.tolist(), value=values.tolist())
 
 
-KINDS = {f.__name__: f for f in (constant, step, harmonic, cycloid, polynomial, bang_bang, table, piecewise)}
-_LISTS = ("table", "piecewise")
+KINDS = {f.__name__: f for f in (constant, step, harmonic, cycloid, polynomial, trapezoidal, bang_bang, table, piecewise)}
 
 
 def from_spec(spec: Any, *, key: str = "signal") -> Signal:
     """A signal from its table, for example `{ kind = "cycloid", end = 1.0, duration_s = 0.5 }`."""
-    import inspect
+    from . import shaping
 
+    kinds = KINDS | shaping.KINDS
     if not isinstance(spec, dict):
-        raise InputError(f"expected a table with kind, one of {', '.join(KINDS)}", key=key, value=spec)
+        raise InputError(f"expected a table with kind, one of {', '.join(kinds)}", key=key, value=spec)
     kind = spec.get("kind")
-    if not isinstance(kind, str) or kind not in KINDS:
+    if not isinstance(kind, str) or kind not in kinds:
         missing = "missing: " if kind is None else ""
-        raise InputError(f"{missing}expected one of {', '.join(KINDS)}", key=f"{key}.kind", value=kind)
-    known = inspect.signature(KINDS[kind]).parameters
-    expected, good = ("a list of finite numbers", _numbers) if kind in _LISTS else ("a finite number", finite)
+        raise InputError(f"{missing}expected one of {', '.join(kinds)}", key=f"{key}.kind", value=kind)
+    known = inspect.signature(kinds[kind]).parameters
     for name, value in spec.items():
-        if name == "kind":
-            continue
-        if name not in known:
+        if name != "kind" and name not in known:
             raise InputError(f"an unknown key; known for {kind}: {', '.join(known)}", key=f"{key}.{name}", value=value)
-        if not good(value):
-            raise InputError(f"expected {expected}", key=f"{key}.{name}", value=value)
+    given: dict[str, Any] = {}
     for name, parameter in known.items():
-        if parameter.default is parameter.empty and name not in spec:
+        expected, good = _FORMS[str(parameter.annotation)]
+        if name in spec:
+            value = spec[name]
+            if not good(value):
+                raise InputError(f"expected {expected}", key=f"{key}.{name}", value=value)
+            given[name] = from_spec(value, key=f"{key}.{name}") if isinstance(value, dict) else value
+        elif parameter.default is parameter.empty:
             raise InputError(f"missing: expected {expected}", key=f"{key}.{name}")
     try:
         with np.errstate(all="ignore"):
-            return KINDS[kind](**{name: value for name, value in spec.items() if name != "kind"})
+            return kinds[kind](**given)
     except InputError as error:
         raise InputError(error.expected, key=f"{key}.{error.key}", value=error.value) from None
     except (ArithmeticError, ValueError):  # numbers near the ends of the range, in scipy's spline too
@@ -200,6 +220,14 @@ def finite(value: Any) -> bool:
 
 def _numbers(value: Any) -> bool:
     return isinstance(value, list) and all(map(finite, value))
+
+
+_FORMS = {  # what a key takes, by the annotation of the parameter of its name
+    "float": ("a finite number", finite),
+    "int": ("a whole number", lambda value: isinstance(value, int) and not isinstance(value, bool)),
+    "Any": ("a list of finite numbers", _numbers),
+    "Signal": ("a table of a signal, with its kind", lambda value: isinstance(value, dict)),
+}
 
 
 def _rise(t0: float, start: float, change: float, duration: float) -> list[float]:

@@ -11,9 +11,9 @@ Lagrange's equations of this sum (`model/README.md`, section 4) give for a row w
 
     sum mu a (dV/dt + omega x V) + d' V (dmu/dd a - mu (1 - xi) a_tau) (+ the row of d: see below) + dU/d(row)
 
-with a_tau the shape of tau. What the straight link would give is taken off each sum and put back as a rigid body, so that the
-part inside and behind the sleeve needs no points of its own. dU/dd at fixed y is the configurational force: M0^2 / (2 EI) pushes a
-bent link out.
+with a_tau the shape of tau. What the straight link would give is taken off each sum and put back as a rigid body, so that
+the part inside and behind the sleeve needs no points of its own. dU/dd at fixed y is the configurational force: M0^2 / (2 EI)
+pushes a bent link out.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ from .compiled import inlined
 
 _S = (np.polynomial.legendre.leggauss(NODES)[0] + 1) / 2
 # int_0^s_g of the polynomial through values at the Gauss points: rows g, columns the values
-_UPTO = np.array([s ** np.arange(1, NODES + 1) / np.arange(1, NODES + 1) for s in _S]) @ np.linalg.inv(np.vander(_S, increasing=True))
+_POWERS = np.arange(1, NODES + 1)
+_UPTO = (_S[:, None] ** _POWERS / _POWERS) @ np.linalg.inv(np.vander(_S, increasing=True))
 C, S, T, G, W, RX, RY, AX, RATE, BEND, UX, WD = range(12)  # columns of Work.sum
 
 
@@ -63,7 +64,6 @@ def sleeve(c: Chain, w: Work, i: int, z: np.ndarray, zd: np.ndarray, omega: floa
 @inlined
 def _shape(c: Chain, w: Work, i: int, z: np.ndarray, zd: np.ndarray) -> None:
     """Slopes at the points and what accumulates along the line, into w.sum and w.sum_h."""
-    d, dd = z[0], zd[0]
     m, h = z.shape[0] - 1, 1.0 / c.elements[i]
     s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0  # int cos - 1, sec - 1, tan s', sec^3 s'^2 up to this element
     for k in range(m):

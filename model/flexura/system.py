@@ -91,13 +91,14 @@ class System:
             self._check(self.start())
             K = np.diag(self._diagonal(self.chain.lam, np.zeros(len(self.links))))
         else:
-            K = self.modal_stiffness + self.differences(lambda y: self.residual(y, np.zeros(self.n)), self.to_solver @ self._check(q))
+            y, still = self.to_solver @ self._check(q), np.zeros(self.n)
+            K = self.modal_stiffness + self.differences(lambda y: self.residual(y, still), y)
         return self.to_solver.T @ K @ self.to_solver
 
     @cached_property
     def modal_stiffness(self) -> np.ndarray:
-        """The constant part of K (n, n) in the solver's coordinates, which `residual` leaves out: omega^2 of each link's own modes,
-        0 for links behind a sleeve."""
+        """The constant part of K (n, n) in the solver's coordinates, which `residual` leaves out: omega^2 of each link's own
+        modes, 0 for links behind a sleeve."""
         fixed = np.where(self.chain.kind == SLEEVE, 0.0, 1.0)[:, None]
         return np.diag(self._diagonal(self.chain.lam * fixed, np.zeros(len(self.links))))
 
@@ -179,8 +180,8 @@ class System:
         return workspace(self.chain)
 
     def deflections(self, link: int, y: np.ndarray, eta: np.ndarray) -> np.ndarray:
-        """The deflection [m] at the places where a Run holds it, (STATIONS, T), of states y (T, m) of a link (from 0) and positions
-        eta (T,) of its joint: 0 for what is inside or behind a sleeve."""
+        """The deflection [m] at the places where a Run holds it, (STATIONS, T), of states y (T, m) of a link (from 0) and
+        positions eta (T,) of its joint: 0 for what is inside or behind a sleeve."""
         info, elements = self.links[link], self.robot.links[link].elements
         x = np.linspace(0, info.length, STATIONS)
         if self.chain.kind[link] != SLEEVE:

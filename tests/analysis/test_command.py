@@ -37,6 +37,17 @@ def warm(tmp_path_factory):
     return flexura("simulate", RIG, LAW, "--out", folder / "out", "--json", cwd=folder), folder / "out"
 
 
+CYCLOIDS = """
+name = "two cycloids"
+duration_s = 1.0
+[[joint]]
+motion = { kind = "cycloid", end = 0.05, duration_s = 0.8 }
+kp = 5.0
+[[joint]]
+motion = { kind = "zv", signal = { kind = "cycloid", end = 0.7, duration_s = 0.6 }, frequency_Hz = 5.48 }
+prescribed = true
+"""
+
 # --- help
 
 
@@ -89,6 +100,14 @@ WRONG = {
     "a folder": (["simulate", "."], ".: a directory"),
     "a wrong manoeuvre": (["simulate", RIG, "law.toml"], "law.toml: joint[1].motion.kind = 'sine': expected one of"),
     "a robot for a manoeuvre": (["simulate", RIG, RIG], "an unknown key; known here: name, duration_s"),
+    "no motion to invert": (
+        ["inverse", RIG, "free.toml"],
+        "free.toml: joint[2].motion: missing: inverse dynamics needs a motion",
+    ),
+    "a motion that jumps": (["inverse", RIG, "jump.toml"], "jump.toml: motion 1: expected a motion without jumps"),
+    "a prescribed joint in the twin": (["crosscheck", RIG, "held.toml"], "prescribed = True: expected a force, or gains"),
+    "an unknown study": (["study", "mass", RIG], "KIND = 'mass': expected one of payload"),
+    "a study of nothing": (["study", "boundary", RIG], "expected a robot with a flexible link behind a joint Pb"),
     "a tolerance beyond sense": (["simulate", RIG, LAW, "--rtol", "5"], "rtol = 5.0: expected a relative tolerance"),
     "an unknown method": (["simulate", RIG, LAW, "--method", "euler"], "method = 'euler': expected"),
     "an unknown beam": (["crosscheck", RIG, LAW, "--beam", "timoshenko"], "beam = 'timoshenko': expected"),
@@ -100,6 +119,11 @@ WRONG = {
 def test_wrong_input_is_one_line_on_stderr_with_status_2_and_leaves_nothing(arguments, words, tmp_path, warm):
     (tmp_path / "bad.toml").write_text(BAD_ROBOT)
     (tmp_path / "law.toml").write_text(BAD_LAW)
+    (tmp_path / "free.toml").write_text(CYCLOIDS[: CYCLOIDS.rindex("motion =")])
+    (tmp_path / "jump.toml").write_text(
+        CYCLOIDS.replace('"cycloid", end = 0.05, duration_s = 0.8', '"step", value = 1.0, at_s = 0.5')
+    )
+    (tmp_path / "held.toml").write_text(CYCLOIDS)
     before = sorted(tmp_path.rglob("*"))
     out = [] if arguments[0] in ("frequencies", "review") else ["--out", tmp_path / "out"]
     done = flexura(*arguments, *out, cwd=tmp_path)
@@ -179,6 +203,45 @@ def test_ctrl_c_stores_what_there_is_and_marks_it_incomplete(warm, tmp_path):
     assert run.meta["events"][-1]["text"] == "interrupted"
 
 
+# --- inverse
+
+
+def test_inverse_prints_the_drives_of_the_stored_run(warm, tmp_path):
+    """The net energy is the work that the solver integrated along; joints follow their motions whatever gains the file has."""
+    (tmp_path / "law.toml").write_text(CYCLOIDS)
+    done = flexura("inverse", RIG, "law.toml", "--out", "out", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    told, run = json.loads(done.stdout), fx.Run.read(tmp_path / "out")
+    assert [row["joint"] for row in told["drives"]] == [1, 2] and told["energy_error"] < 1e-5
+    for row in told["drives"]:
+        drive, speed = run[f"joint/{row['joint']}/drive"], run[f"joint/{row['joint']}/velocity"]
+        assert abs(row["peak"]) == np.abs(drive).max() and row["unit"] == run.units[f"joint/{row['joint']}/drive"]
+        assert row["peak_power_W"] == (drive * speed).max() and row["energy_in_J"] > row["energy_net_J"]
+        assert row["rms"] == pytest.approx(np.sqrt(np.mean(drive**2)), rel=0.02)
+    net = sum(row["energy_net_J"] for row in told["drives"])
+    assert net == pytest.approx(run["energy/work"][-1], abs=1e-3 * run["energy/work"].max())
+    assert run["joint/1/position"][-1] == pytest.approx(0.05, abs=1e-12)
+    table = flexura("inverse", RIG, "law.toml", cwd=tmp_path)
+    assert table.returncode == 0 and f"{told['drives'][0]['peak']:.4g} N" in table.stdout
+    assert (tmp_path / "logs" / "inverse-rig" / "run.parquet").is_file()
+
+
+# --- study
+
+
+def test_a_study_prints_its_finding_and_stores_its_files(warm, tmp_path):
+    robots = ROOT / "model" / "robots"
+    done = flexura("study", "boundary", robots / "type-3-rpb.toml", "--values", "0.2:0.4:3", cwd=tmp_path)
+    folder = tmp_path / "logs" / "study-boundary-type-3-rpb"
+    assert done.returncode == 0 and done.stderr == "" and "REPRODUCED: sliding" in done.stdout
+    assert sorted(path.name for path in folder.iterdir()) == ["study.parquet", "study.png", "study.svg"]
+    arguments = ("--values", "0.5:2:3", "--keep", "first", "--channels", "--out", "out", "--json")
+    done = flexura("study", "length-ratio", RIG, *arguments, cwd=tmp_path)
+    told = json.loads(done.stdout)
+    assert done.returncode == 0 and told["finding"]["reproduced"] and [row["L1_m"] for row in told["rows"]] == [0.1] * 3
+    assert fx.Run.read(tmp_path / "out" / "runs" / "002").meta["case"]["ratio"] == pytest.approx(2.0)
+
+
 # --- frequencies
 
 LENGTH, MASS, STIFFNESS = 0.5, 0.2, 3.0
@@ -205,6 +268,20 @@ def test_frequencies_of_a_cantilever_are_those_of_the_books(tmp_path):
     assert abs(told["free_Hz"][0]) < 1e-3
     table = flexura("frequencies", "cantilever.toml", cwd=tmp_path)
     assert table.returncode == 0 and f"{told['locked_Hz'][0]:.5g}" in table.stdout and f"{told['free_Hz'][2]:.5g}" in table.stdout
+
+
+def test_zeros_of_a_beam_are_in_the_table_and_in_json(tmp_path):
+    """From the torque at its root to its tip: 2 y^2, tan y = -tanh y; to its own angle: the clamped frequencies."""
+    (tmp_path / "cantilever.toml").write_text(CANTILEVER)
+    done = flexura("frequencies", "cantilever.toml", "--zeros", "--json", cwd=tmp_path)
+    told = json.loads(done.stdout)
+    own, along, across = told["zeros"]
+    assert done.returncode == 0 and own["notches_Hz"] == pytest.approx(told["locked_Hz"], rel=1e-5)
+    assert not along["reached"] and across["output"] == "tip/y"
+    scale = np.sqrt(STIFFNESS / (MASS * LENGTH**4))
+    assert across["right_half_plane_1_s"][0] == pytest.approx([2 * 2.36502037**2 * scale, 0], rel=1e-4)
+    table = flexura("frequencies", "cantilever.toml", "--zeros", cwd=tmp_path).stdout
+    assert "not moved" in table and f"{across['right_half_plane_1_s'][0][0]:.4g}" in table
 
 
 @pytest.mark.parametrize("elements", [30, 100, 200])

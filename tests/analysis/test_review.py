@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flexlab.deviation import deviation
-from flexlab.review import open_viewer, picture, poses, sampling, shapes, write_review
+from flexlab.review import open_viewer, picture, poses, sampling, shapes, write_gallery, write_review
 from flexlab.review.sources import COLOURS, SECOND, sources
 from flexura.errors import FlexuraError, InputError
 from flexura.robot import Robot, load
@@ -70,10 +70,10 @@ def cantilever(x, length, tip):
 
 
 def chain(joints: str, **changes) -> Robot:
-    """A robot of strips with these joints, such as "R R Pa"."""
-    return Robot.from_dict(
-        {"name": f"chain {joints}", "link": [STRIP | {"joint": {"type": j}} for j in joints.split()]} | changes
-    )
+    """A robot of strips with these joints, such as "R R Pa"; a Pb starts a third of its strip out."""
+    start = {"R": 0.0, "Pa": 0.0, "Pb": STRIP["length_m"] / 3}
+    links = [STRIP | {"joint": {"type": j, "start": start[j]}} for j in joints.split()]
+    return Robot.from_dict({"name": f"chain {joints}", "link": links} | changes)
 
 
 # What is in a file.
@@ -382,7 +382,7 @@ def test_rerun_is_imported_only_when_used():
 
 def test_no_rerun_name_in_use_is_deprecated(tmp_path):
     code = (
-        "import sys; from flexura.run import Run; from flexlab.review import write_review; import numpy as np\n"
+        "import sys; from flexura.run import Run; from flexlab.review import write_gallery, write_review; import numpy as np\n"
         "import rerun.experimental, rerun.chunk, flexlab.review.headless\n"
         "meta = {'source': 'simulation', 'phases': [{'t': 0.0, 'name': 'move'}], 'events': [{'t': 0.0, 'text': 'start'}]}\n"
         "write_review(sys.argv[1], [Run(np.arange(3.0), {'joint/1/position': np.zeros(3)}, {'joint/1/position': 'rad'}, meta)])\n"
@@ -472,6 +472,20 @@ def test_a_robot_with_five_links(viewer, tmp_path):
         if k.get("ContainerBlueprint", {}).get("container_kind") == "Tabs"
     ]
     assert tabs
+
+
+def test_a_gallery_shows_every_robot_at_a_glance_and_on_a_page_of_its_own(viewer, pair, tmp_path):
+    groups = {"I RR": [synthetic(chain("R R")), synthetic(chain("R R"), "experiment")], "IV PaR": pair}
+    rrd = write_gallery(tmp_path / "all.rrd", groups)
+    found = entities(rrd)
+    for root in ("/i_rr", "/iv_par"):
+        assert {f"{root}/about", f"{root}/ground/grid", f"{root}/deviation/joint/1/position"} <= found
+    assert {"/i_rr/experiment/joint/2/position", "/iv_par/simulation/arm/deformed"} <= found
+    assert all(path.startswith(("/i_rr", "/iv_par")) for path in found)
+    views = look(viewer, rrd)
+    assert [name for name in ("I RR", "IV PaR") if not any(view.startswith(f"{name}: blue simulation") for view in views)] == []
+    with pytest.raises(InputError, match="one robot or more"):
+        write_gallery(tmp_path / "none.rrd", {})
 
 
 def test_the_picture_has_its_size_and_is_not_blank(viewer, rrd, tmp_path):

@@ -67,8 +67,8 @@ def test_a_mixed_chain_with_a_slider_agrees():
     """Flexible R, rigid R, Pa on it at an angle, flexible: under gravity, with friction and hubs."""
     bot = robot(
         beam(0.4, 0.3, 3.0, 4, hub_inertia_kg_m2=5e-3, start=-1.2, damping={"beta_s": 1e-3}),
-        rigid(0.3, 0.3, 0.12, 2e-3, hub_mass_kg=0.1, viscous_friction=5e-3, start=0.4),
-        beam(0.25, 0.2, 1.0, 4, "Pa", angle_rad=1.1, start=0.15, hub_mass_kg=0.1, viscous_friction=0.5, damping={"beta_s": 1e-3}),
+        rigid(0.5, 0.3, 0.12, 2e-3, hub_mass_kg=0.1, viscous_friction=5e-3, start=0.4),
+        beam(0.25, 0.2, 1.0, 4, "Pa", angle_rad=1.1, start=0.2, hub_mass_kg=0.1, viscous_friction=0.5, damping={"beta_s": 1e-3}),
         payload=0.03, payload_inertia=1e-4, gravity=(0.0, -2.0),
     )  # fmt: skip
     found, bent = differences(bot, jerks(0.1, 0.05, 0.3, duration=0.5), np.linspace(0, 0.6, 61))

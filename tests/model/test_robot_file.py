@@ -270,10 +270,12 @@ VALUES = {
         [0.1, 0.31], "limits between 0.006 and 0.3 m, the ends of link 2",
     ),
     "a Pa that starts beyond its link": (
-        {STRIP + "joint.type": "Pa", STRIP + "joint.start": 0.11}, "link[2].joint.start", 0.11, "between 0 and 0.1 m, the ends of link 1",
+        {STRIP + "joint.type": "Pa", STRIP + "joint.start": 0.11}, "link[2].joint.start", 0.11,
+        "between 0 and 0.1 m, the ends of link 1",
     ),
     "a Pa on a link without length": (
-        {CART + "length_m": 0.0, STRIP + "joint.type": "Pa"}, "link[1].length_m", 0.0, "a length above 0: link 2 slides on this link",
+        {CART + "length_m": 0.0, STRIP + "joint.type": "Pa"}, "link[1].length_m", 0.0,
+        "a length above 0: link 2 slides on this link",
     ),
     "a Pa behind a sleeve": (
         {CART + "joint.type": "Pb", CART + "joint.limits": ABSENT, CART + "joint.start": 0.04, STRIP + "joint.type": "Pa",

@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
 import flexura as fx
-from flexura import signal
+from flexura import shaping, signal
 from flexura.drive import Drive, JointDrive, load_manoeuvre
-from flexura.signal import bang_bang, constant, cycloid, from_spec, harmonic, piecewise, polynomial, step, table
+from flexura.shaping import matched_cycloid, zv, zvd
+from flexura.signal import bang_bang, constant, cycloid, from_spec, harmonic, piecewise, polynomial, step, table, trapezoidal
 
 level = st.floats(-10, 10)
 instant = st.floats(0, 2)
@@ -26,18 +27,31 @@ def points(least):
     return st.builds(lambda start, rows: (start + np.cumsum([gap for gap, _ in rows]), [y for _, y in rows]), instant, pairs)
 
 
-SMOOTH = st.one_of(
+PLAIN = st.one_of(
     st.builds(constant, level),
     st.builds(harmonic, level, st.floats(0, 2), st.floats(-4, 4), level),
     st.builds(cycloid, level, duration, level, instant),
     st.builds(polynomial, level, duration, level, instant),
     st.builds(lambda a, T, part, at: bang_bang(a, T, part * T, at), level, duration, st.floats(0.1, 0.25), instant),
+    st.builds(
+        lambda end, T, part, start, at: trapezoidal(end, T, part * T, start, at),
+        level,
+        duration,
+        st.floats(0.1, 0.5),
+        level,
+        instant,
+    ),
+    st.builds(matched_cycloid, level, st.floats(0.5, 5), st.integers(2, 5), level, instant),
     st.builds(lambda points: table(*points), points(2)),
+)
+SMOOTH = PLAIN | st.builds(
+    lambda shape, s, f, zeta: shape(s, f, zeta), st.sampled_from([zv, zvd]), PLAIN, st.floats(0.5, 5), st.floats(0, 0.5)
 )
 STEPPED = st.one_of(
     st.builds(step, level, instant),
     st.builds(lambda a, T, at: bang_bang(a, T, 0.0, at), level, duration, instant),
     st.builds(lambda points: piecewise(*points), points(1)),
+    st.builds(zv, st.builds(step, level, instant), st.floats(0.5, 5)),
 )
 SIGNALS = st.one_of(SMOOTH, STEPPED)
 
@@ -167,7 +181,7 @@ def test_a_signal_without_segments_is_zero():
     assert signal.Signal(np.zeros((0, signal.COLUMNS)))(1.0) == (0.0, 0.0, 0.0)
 
 
-KINDS = ", ".join(signal.KINDS)
+KINDS = ", ".join(signal.KINDS | shaping.KINDS)
 nan, inf = math.nan, math.inf
 WRONG_SIGNALS = {
     "a number": (3, "signal", 3, "a table with kind"),
@@ -207,6 +221,11 @@ WRONG_SIGNALS = {
     "a duration too long to cube": (
         {"kind": "polynomial", "end": 1, "duration_s": 1e200}, "signal.duration_s", 1e200, "leaves the derivatives finite",
     ),
+    "a rise beyond half": ({"kind": "trapezoidal", "end": 1, "duration_s": 1, "rise_s": 1}, "signal.rise_s", 1, "at most half"),
+    "a number for a signal": ({"kind": "zv", "signal": 1, "frequency_Hz": 1}, "signal.signal", 1, "a table of a signal"),
+    "half a period": (
+        {"kind": "matched_cycloid", "end": 1, "frequency_Hz": 1, "periods": 2.5}, "signal.periods", 2.5, "a whole number",
+    ),
     "a rise too steep": ({"kind": "cycloid", "end": 1e300, "duration_s": 1e-300}, "signal.kind", "cycloid", "are finite"),
     "points too far apart": (
         {"kind": "table", "t_s": [0, 1e-200, 1], "y": [0, 1e300, -1e300]}, "signal.kind", "table", "derivatives are finite",
@@ -222,16 +241,17 @@ def test_a_wrong_signal_is_named(spec, key, value, words):
     assert str(caught.value).isprintable()
 
 
+KEYS = "kind value at_s end duration_s start rise_s amplitude t_s y signal frequency_Hz periods damping_ratio".split()
 scalars = st.one_of(st.floats(), st.integers(), st.booleans(), st.text(max_size=3), st.none())
 
 
 @settings(max_examples=300, deadline=None)
 @given(
     st.dictionaries(
-        st.sampled_from(["kind", "value", "at_s", "end", "duration_s", "start", "rise_s", "amplitude", "t_s", "y"]),
-        scalars | st.lists(scalars, max_size=3) | st.sampled_from([1.0, 0.1]),
+        st.sampled_from(KEYS),
+        scalars | st.lists(scalars, max_size=3) | st.sampled_from([1.0, 0.1, {"kind": "constant", "value": 1.0}]),
     ),
-    st.sampled_from(sorted(signal.KINDS)),
+    st.sampled_from(sorted(signal.KINDS | shaping.KINDS)),
 )  # fmt: skip
 def test_any_table_is_a_signal_or_refused(spec, kind):
     for tried in (spec, spec | {"kind": kind}):
@@ -346,6 +366,16 @@ def test_a_manoeuvre_is_read(tmp_path):
     assert again["joint"][0] == {"force": manoeuvre.drive.joints[0].force.spec}
 
 
+def test_a_prescribed_joint_is_read_and_written(tmp_path):
+    path = tmp_path / "manoeuvre.toml"
+    path.write_text(GOOD.replace("kp = 6.0\nkd = 0.25", "prescribed = true"))
+    drive = load_manoeuvre(path, 2).drive
+    assert drive.follows.tolist() == [False, True] and drive.joints[1].spec() == {
+        "motion": cycloid(1.0, 0.5).spec,
+        "prescribed": True,
+    }
+
+
 def test_the_output_step_is_a_200th_of_the_duration_unless_given(tmp_path):
     path = tmp_path / "manoeuvre.toml"
     path.write_text("duration_s = 3\n[[joint]]\n")
@@ -376,6 +406,12 @@ WRONG_MANOEUVRES = {
     "joints as numbers": (GOOD[GOOD.index("[[joint]]") :], "joint = [1, 2]", "joint[1] = 1: expected a table"),
     "joints as one table": (GOOD[GOOD.index("[[joint]]") :], "[joint]\nkp = 1.0", "expected 2 tables [[joint]]"),
     "an unknown key of a joint": ("kd = 0.25", "ki = 0.25", "joint[2].ki = 0.25: an unknown key; known here: force, motion"),
+    "a gain where the motion is prescribed": ("kd = 0.25", "prescribed = true", "joint[2].kp = 6.0: expected none: a prescribed"),
+    "prescribed by a number": ("kp = 6.0\nkd = 0.25", "prescribed = 1", "joint[2].prescribed = 1: expected true or false"),
+    "prescribed without a motion": (M + "\nkp = 6.0\nkd = 0.25", "prescribed = true", "joint[2].motion: missing: a prescribed"),
+    "prescribed with a jump": (
+        M + "\nkp = 6.0\nkd = 0.25", 'prescribed = true\nmotion = { kind = "step", value = 1.0, at_s = 0.5 }', "jump",
+    ),
     "a negative gain": ("kp = 6.0", "kp = -6.0", "joint[2].kp = -6.0: expected a gain of 0 or more"),
     "a gain as text": ("kd = 0.25", 'kd = "0.25"', "joint[2].kd = '0.25': expected a gain of 0 or more"),
     "an endless gain": ("kd = 0.25", "kd = inf", "joint[2].kd = inf: expected a gain of 0 or more"),

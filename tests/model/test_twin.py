@@ -1,62 +1,11 @@
 """The twin against analytic answers, textbook equations and itself; never against the native solver."""
 
-import os
-import signal as signals
-import subprocess
-import sys
-import threading
-
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from flexura import signal, twin
 from flexura.drive import Drive
-from flexura.errors import FlexuraError, InputError
-from flexura.robot import Robot
-
-STEEL = {"section": {"width_m": 0.03, "height_m": 0.001}, "young_modulus_Pa": 2.0e11, "density_kg_m3": 7850.0}
-G = 9.81
-
-
-def robot(*links, gravity=(0.0, 0.0), payload=0.0, payload_inertia=0.0, **keys):
-    return Robot.from_dict(
-        {"link": list(links), "gravity_m_s2": gravity, "payload": {"mass_kg": payload, "inertia_kg_m2": payload_inertia}} | keys
-    )
-
-
-def rigid(length, mass, centre, inertia, type="R", **joint):
-    body = {"mass_kg": mass, "centre_of_mass_m": centre, "inertia_kg_m2": inertia}
-    return {"length_m": length, "joint": {"type": type} | joint} | body
-
-
-def beam(length, mass, stiffness, type="R", elements=4, beta=0.0, **joint):
-    return {
-        "length_m": length, "elements": elements, "mass_per_length_kg_m": mass, "bending_stiffness_N_m2": stiffness,
-        "damping": {"beta_s": beta}, "joint": {"type": type} | joint,
-    }  # fmt: skip
-
-
-def bench_arm(**joint):
-    return robot(beam(0.6, 0.2355, 0.5, hub_inertia_kg_m2=2e-3, **joint), payload=0.05)
-
-
-def rig():
-    return robot(
-        rigid(0.10, 0.60, 0.05, 5e-4, "Pa"),
-        {"length_m": 0.3, "elements": 4, **STEEL, "section": {"width_m": 0.02, "height_m": 0.001}, "damping": {"beta_s": 2e-4},
-         "joint": {"type": "R", "rotor_inertia": 5.4e-6}},
-        payload=0.02,
-    )  # fmt: skip
-
-
-def total_energy(run):
-    return run["energy/kinetic"] + run["energy/strain"] + run["energy/potential"]
-
-
-def integrate(rates, y0, t):
-    return solve_ivp(rates, (0.0, t[-1]), y0, method="DOP853", t_eval=t, rtol=1e-11, atol=1e-12).y
-
+from twin_robots import G, beam, bench_arm, integrate, rig, rigid, robot, total_energy
 
 # Beams ---------------------------------------------------------------------------------------------------------------
 
@@ -192,6 +141,7 @@ def test_a_tapered_link_has_the_exact_static_deflection(kind):
 
 def double_pendulum(m, centre, J, L, rotor=0.0, g=G):
     """Rates of absolute angles a, b and their velocities; relative rotor inertia in the second joint."""
+
     def rates(t, y):
         a, b, ad, bd = y
         h = m[1] * L * centre[1]
@@ -200,6 +150,7 @@ def double_pendulum(m, centre, J, L, rotor=0.0, g=G):
         f = [-h * np.sin(a - b) * bd**2 - (m[0] * centre[0] + m[1] * L) * g * np.cos(a),
              h * np.sin(a - b) * ad**2 - m[1] * centre[1] * g * np.cos(b)]  # fmt: skip
         return [ad, bd, *np.linalg.solve(M, f)]
+
     return rates
 
 
@@ -292,151 +243,3 @@ def test_a_massless_rigid_link_hangs_a_pendulum():
     run = twin.simulate(arm, t, step_s=1e-4)
     a, _ = integrate(lambda t, y: [y[1], -G / 0.4 * np.cos(y[0])], [-1.5, 0.0], t)
     assert abs(run["joint/2/position"] - a).max() < 1e-5
-
-
-# Drives --------------------------------------------------------------------------------------------------------------
-
-
-def test_pd_control_is_continuous_and_equals_the_same_law_as_a_function():
-    """A carriage under PD is a damped oscillator; the error at the default step is that of the time integration."""
-    cart = robot(rigid(0.1, 2.0, 0.0, 1.0, "Pa"))
-    t = np.linspace(0, 1, 101)
-    drive = Drive.pd([signal.step(0.1)], [200.0], [12.0])
-    run = twin.simulate(cart, t, drive)
-    function = twin.simulate(cart, t, lambda t, position, velocity, tip: drive(t, position, velocity))
-    omega, zeta = 10.0, 0.3
-    damped = omega * np.sqrt(1 - zeta**2)
-    exact = 0.1 - 0.1 * np.exp(-zeta * omega * t) * (np.cos(damped * t) + zeta * omega / damped * np.sin(damped * t))
-    assert abs(run["joint/1/position"] - exact).max() < 1e-6
-    assert abs(run["joint/1/position"] - function["joint/1/position"]).max() < 1e-9
-    assert np.allclose(run["joint/1/drive"], [drive(s, [p], [v])[0] for s, p, v in
-                       zip(t, run["joint/1/position"], run["joint/1/velocity"], strict=True)])  # fmt: skip
-
-
-def test_stiff_gains_on_a_light_rotor_as_data_and_as_a_function_and_with_dry_friction():
-    motion = [signal.harmonic(0.012, 1.0, -np.pi / 2), signal.harmonic(0.5, 1.0, -np.pi / 2)]
-    drive = Drive.pd(motion, [900.0, 6.0], [50.0, 0.25])
-    t = np.linspace(0, 0.4, 41)
-    one = twin.simulate(rig(), t, drive)
-    two = twin.simulate(rig(), t, lambda t, *state: drive(t, *state), step_s=one.meta["step_s"])
-    for name in ("joint/2/position", "link/2/tip_deflection", "joint/2/drive"):
-        assert abs(one[name] - two[name]).max() < 1e-5 * abs(one[name]).max(), name
-    rough = rig().replace({"link.1.joint.coulomb_friction": 0.5, "link.2.joint.coulomb_friction": 5e-3})
-    run = twin.simulate(rough, t, drive)
-    assert run.complete and run.meta["step_s"] < one.meta["step_s"]
-    fine = twin.simulate(rough, t, drive, step_s=run.meta["step_s"] / 2)
-    coarse, exact = run["link/2/tip_deflection"], fine["link/2/tip_deflection"]
-    assert abs(coarse - exact).max() < 2e-3 * abs(exact).max()
-
-
-def test_a_function_of_the_state_sees_the_tip_deflection_at_once():
-    seen = []
-
-    def drive(t, position, velocity, tip):
-        seen.append((t, position[0], velocity[0], tip))
-        return [0.02 - 0.1 * position[0] - 0.5 * tip]
-
-    run = twin.simulate(bench_arm(start=0.3), np.linspace(0, 0.2, 21), drive)
-    last = seen[-1]
-    assert last[0] == pytest.approx(0.2) and last[3] == pytest.approx(run["link/1/tip_deflection"][-1], rel=1e-6)
-    assert last[1] == pytest.approx(run["joint/1/position"][-1], rel=1e-9)
-    assert run["joint/1/position"][0] == pytest.approx(0.3)
-
-
-def test_a_jump_of_the_force_keeps_second_order():
-    """A force that ends within a step: its impulse is exact, as a Drive (instants known); on a step also as a function."""
-    cart = robot(rigid(0.1, 1.0, 0.0, 1.0, "Pa"))
-    for end, drive in ((0.30317, Drive.force(signal.piecewise([0.0, 0.30317], [1.0, 0.0]))), (0.3, lambda t: [1.0 * (t < 0.3)])):
-        run = twin.simulate(cart, [0.0, 1.0], drive, step_s=1e-3)
-        assert run["joint/1/velocity"][-1] == pytest.approx(end, abs=1e-9)
-        assert run["joint/1/position"][-1] == pytest.approx(end**2 / 2 + end * (1 - end), abs=1e-6)
-
-
-# Times, interruption, errors ----------------------------------------------------------------------------------------
-
-
-def test_times_between_steps_are_interpolated():
-    cart = robot(rigid(0.1, 1.0, 0.0, 1.0, "Pa"))
-    t = np.array([0.0, 0.1234567, 0.5, 0.777777, 0.9])
-    run = twin.simulate(cart, t, Drive.pd([signal.constant(0.0)], [100.0], [0.0]), qd0=[1.0], step_s=2e-4)
-    assert np.array_equal(run.t, t)
-    assert np.allclose(run["joint/1/position"], np.sin(10 * t) / 10, atol=1e-6)
-    assert np.allclose(run["joint/1/velocity"], np.cos(10 * t), atol=1e-5)
-    late = twin.simulate(cart, [0.5, 0.75, 1.0], qd0=[1.0])
-    assert np.array_equal(late.t, [0.5, 0.75, 1.0]) and np.allclose(late["joint/1/velocity"], 1.0)
-    assert twin.simulate(cart, [0.0], qd0=[1.0])["joint/1/velocity"] == pytest.approx([1.0])
-
-
-def test_ctrl_c_ends_a_run_with_what_there_is():
-    threading.Timer(0.5, lambda: os.kill(os.getpid(), signals.SIGINT)).start()
-    before = signals.getsignal(signals.SIGINT)
-    fractions = []
-    run = twin.simulate(rig(), np.linspace(0, 20, 2001), lambda t: [0.1, 0.0], step_s=1e-4, progress=fractions.append)
-    assert not run.complete and 0 < run.t[-1] < 20 and len(run.t) > 2
-    assert len(run["tip/x"]) == len(run.t) and np.isfinite(run["tip/x"]).all()
-    assert signals.getsignal(signals.SIGINT) is before and fractions == sorted(fractions)
-
-
-def test_an_error_in_a_drive_or_in_progress_comes_out_as_itself():
-    def broken(t, position, velocity, tip):
-        if t > 0.05:
-            raise ZeroDivisionError("mine")
-        return [0.0]
-
-    with pytest.raises(ZeroDivisionError, match="mine"):
-        twin.simulate(bench_arm(), [0.0, 0.1], broken)
-    with pytest.raises(ZeroDivisionError):
-        twin.simulate(bench_arm(), [0.0, 0.1], lambda t: [1 / 0])
-    with pytest.raises(ZeroDivisionError):
-        twin.simulate(bench_arm(), [0.0, 0.1], progress=lambda fraction: 1 / 0)
-    with pytest.raises(InputError, match="finite"):
-        twin.simulate(bench_arm(), [0.0, 0.1], lambda t, *state: [np.nan if t > 0.05 else 0.0])
-
-
-def test_a_failing_solver_is_an_error_with_its_time(capfd):
-    drive = Drive.force(signal.piecewise([0.0, 0.05], [0.0, 1e7]))
-    with pytest.raises(FlexuraError, match=r"stopped at t = 0\.0.* s of 0.2 s: .* smaller step_s"):
-        twin.simulate(bench_arm(), [0.0, 0.2], drive, step_s=1e-3)
-    assert capfd.readouterr() == ("", "")
-
-
-@pytest.mark.parametrize(
-    ("change", "key"),
-    [
-        ({"stiffening": False}, "stiffening"),
-        ({"link.1.damping.alpha_1_s": 0.1}, r"link\[1\]\.damping\.alpha_1_s"),
-        ({"link.1.joint.type": "Pb"}, r"link\[1\]\.joint\.type"),
-        ({"link.2.joint.type": "Pa"}, r"link\[2\]\.joint\.type"),
-    ],
-)
-def test_what_it_does_not_contain_is_refused_by_name(change, key):
-    arm = robot(beam(0.5, 0.2, 1.0), rigid(0.1, 0.1, 0.0, 1e-3)).replace(change)
-    with pytest.raises(FlexuraError, match=key):
-        twin.simulate(arm, [0.0, 0.1])
-
-
-@pytest.mark.parametrize(
-    ("arguments", "key"),
-    [
-        ({"t_eval": [0.1, 0.0]}, "t_eval"), ({"qd0": [1.0, 2.0]}, "qd0"), ({"beam": "shell"}, "beam"),
-        ({"elements": 0}, "elements"), ({"step_s": 0.0}, "step_s"), ({"step_s": 1e-9}, "step_s"),
-        ({"drive": Drive.none(2)}, "drive"), ({"drive": 3.0}, "drive"),
-        ({"drive": lambda t: [1.0, 2.0]}, "drive"),
-    ],
-)  # fmt: skip
-def test_wrong_arguments_are_refused_by_name(arguments, key):
-    with pytest.raises(InputError, match=key):
-        twin.simulate(bench_arm(), **({"t_eval": [0.0, 0.1]} | arguments))
-
-
-def test_it_is_quiet_and_writes_no_files(tmp_path):
-    code = (
-        "import sys, flexura\nassert 'exudyn' not in sys.modules\n"
-        "from flexura import twin\nfrom flexura.robot import Robot\nassert 'exudyn' not in sys.modules\n"
-        "r = Robot.from_dict({'link': [{'length_m': 0.1, 'mass_kg': 1.0, 'inertia_kg_m2': 1.0, 'joint': {'type': 'Pa'}}]})\n"
-        "assert twin.simulate(r, [0.0, 0.01]).complete\n"
-    )
-    done = subprocess.run([sys.executable, "-W", "error", "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=120,
-                          env=os.environ | {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p)})  # fmt: skip
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
-    assert list(tmp_path.iterdir()) == []

@@ -9,12 +9,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from flexura.errors import InputError
+
 if TYPE_CHECKING:
     import subprocess
 
     from flexura.run import Run
 
-__all__ = ["open_viewer", "picture", "write_review"]
+__all__ = ["open_viewer", "picture", "write_gallery", "write_review"]
 
 
 def write_review(path: str | Path, runs: Sequence[Run]) -> Path:
@@ -25,7 +27,19 @@ def write_review(path: str | Path, runs: Sequence[Run]) -> Path:
     """
     from .record import write
 
-    return write(path, runs)
+    return write(path, {"": runs})
+
+
+def write_gallery(path: str | Path, groups: dict[str, Sequence[Run]]) -> Path:
+    """Write the runs of several robots, one or two each, by name, to one .rrd: all arms at a glance, and a page for each robot.
+
+    Otherwise as `write_review`.
+    """
+    from .record import write
+
+    if not groups:
+        raise InputError("one robot or more", key="groups", value=len(groups))
+    return write(path, groups)
 
 
 def picture(rrd: str | Path, png: str | Path, *, time_s: float | None = None, size: tuple[int, int] = (1600, 900)) -> Path:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,7 +31,8 @@ Signals = dict[str, Signal]  # by entity path
 
 @dataclass(frozen=True)
 class Scene:
-    """What is recorded: `sources` (root, label, colour's name, has shapes), curves by path, and the arms' bounds [m], y up."""
+    """What is recorded of one robot: `sources` (root, label, colour's name, has shapes), curves by path, the arms' bounds [m], y
+    up. In a gallery of several robots `name` is this one's and all its paths begin with `prefix`."""
 
     sources: tuple[tuple[str, str, str, bool], ...]
     signals: Signals
@@ -40,6 +41,8 @@ class Scene:
     phases: tuple[str, ...]
     low: tuple[float, float]
     high: tuple[float, float]
+    prefix: str = ""
+    name: str = ""
 
     @property
     def width(self) -> float:
@@ -55,25 +58,13 @@ class Scene:
         return 0.022 * max(self.width, self.height)
 
 
-def blueprint(scene: Scene) -> rrb.Blueprint:
-    """Arms and the about page above, plots over time below."""
-    notes: list[Any] = [rrb.TextDocumentView(origin="/", contents=["/about"], name="about this review")]
-    shares = [2.6]
-    if scene.phases:
-        notes.append(rrb.StateTimelineView(origin="/", contents=[f"/{root}/phase" for root in scene.phases], name="phases"))
-        shares.append(0.6 + 0.4 * len(scene.phases))
-    if scene.events:
-        notes.append(rrb.TextLogView(origin="/", contents=["/events/**"], name="events", columns=_log_columns()))
-        shares.append(1.2)
-    side = rrb.Vertical(*notes, row_shares=shares)
-    upper = rrb.Horizontal(*(drawn := _arms(scene)), side, column_shares=_shares(scene, len(drawn)))
-    columns = _plots(scene)
-    if not columns:
-        root: Any = upper
-    elif not drawn:
-        root = rrb.Vertical(side, rrb.Horizontal(*columns), row_shares=[2, 3])
+def blueprint(scenes: Sequence[Scene]) -> rrb.Blueprint:
+    """One robot: its page. Several: all of them at a glance, and a tab for the page of each."""
+    if len(scenes) == 1:
+        root = _page(scenes[0])
     else:
-        root = rrb.Vertical(upper, rrb.Horizontal(*columns), row_shares=[3, 2])
+        glance = rrb.Grid(*(_arms(scene)[0] for scene in scenes), name="all")
+        root = rrb.Tabs(glance, *(_page(scene) for scene in scenes), active_tab=0)
     return rrb.Blueprint(
         root,
         rrb.TimePanel(timeline="time", state="collapsed", play_state="paused"),
@@ -84,6 +75,25 @@ def blueprint(scene: Scene) -> rrb.Blueprint:
     )
 
 
+def _page(scene: Scene) -> Any:
+    """Arms and the about page above, plots over time below."""
+    notes: list[Any] = [rrb.TextDocumentView(origin="/", contents=[f"{scene.prefix}/about"], name="about this review")]
+    shares = [2.6]
+    if scene.phases:
+        notes.append(rrb.StateTimelineView(origin="/", contents=[f"/{root}/phase" for root in scene.phases], name="phases"))
+        shares.append(0.6 + 0.4 * len(scene.phases))
+    if scene.events:
+        notes.append(rrb.TextLogView(origin="/", contents=[f"{scene.prefix}/events/**"], name="events", columns=_log_columns()))
+        shares.append(1.2)
+    side = rrb.Vertical(*notes, row_shares=shares)
+    upper = rrb.Horizontal(*(drawn := _arms(scene)), side, column_shares=_shares(scene, len(drawn)))
+    columns = _plots(scene)
+    if not columns:
+        return upper
+    above, height = (upper, 3) if drawn else (side, 2)
+    return rrb.Vertical(above, rrb.Horizontal(*columns), row_shares=[height, 5 - height], name=scene.name or None)
+
+
 def _arms(scene: Scene) -> list[Any]:
     """The overlaid view, large, and each run alone beside it: below each other when the picture is wide, else side by side."""
     # Bounds are given in the view's own coordinates, in which y points down.
@@ -91,7 +101,7 @@ def _arms(scene: Scene) -> list[Any]:
 
     def arm(name: str, contents: list[str]) -> Any:
         return rrb.Spatial2DView(
-            origin="/", contents=["/ground/**", *contents], name=name, visual_bounds=bounds, background=WHITE
+            origin="/", contents=[f"{scene.prefix}/ground/**", *contents], name=name, visual_bounds=bounds, background=WHITE
         )
 
     shaped = [(root, label, f"{colour} {label}") for root, label, colour, there in scene.sources if there]
@@ -100,7 +110,8 @@ def _arms(scene: Scene) -> list[Any]:
         return alone
     (a, _, first), (b, _, second) = shaped
     # One ghost is enough where both arms lie on each other.
-    both = arm(f"overlaid: {first}, {second}", [f"/{a}/arm/**", f"/{b}/arm/**", f"- /{b}/arm/undeformed"])
+    title = f"{scene.name}: {first}, {second}" if scene.name else f"overlaid: {first}, {second}"
+    both = arm(title, [f"/{a}/arm/**", f"/{b}/arm/**", f"- /{b}/arm/undeformed"])
     return [both, rrb.Vertical(*alone) if scene.width > WIDE * scene.height else rrb.Horizontal(*alone)]
 
 
@@ -124,19 +135,19 @@ def _plots(scene: Scene) -> list[Any]:
         if views:
             columns.append(views)
     links = _numbers(signals, r"/link/(\d+)/tip_(?:deflection|slope)")
-    tip = _one("tip position", signals, r"/[^/]+/tip/[xy]")
+    tip = _one("tip position", signals, r"/.+/tip/[xy]")
     bend = [
         v for k, part in enumerate(("tip_deflection", "tip_slope")) for v in _grouped(signals, "link", part, links, group, k == 0)
     ]
     if bend or tip:
         columns.append(bend + tip)
-    energy = _one("energy", _moving(signals), r"/[^/]+/energy/(kinetic|strain|potential)")
-    energy += _one("work and loss", _moving(signals), r"/[^/]+/energy/(work|loss)")
+    energy = _one("energy", _moving(signals), r"/.+/energy/(kinetic|strain|potential)")
+    energy += _one("work and loss", _moving(signals), r"/.+/energy/(work|loss)")
     if energy and columns and len(columns) + bool(scene.deviations) >= 4:
         columns[-1].extend(energy)
     elif energy:
         columns.append(energy)
-    shown = re.compile(r"/[^/]+/(joint/\d+/(position|velocity|drive)|link/\d+/tip_(deflection|slope)|energy/\w+|tip/[xy])")
+    shown = re.compile(r"/.+/(joint/\d+/(position|velocity|drive)|link/\d+/tip_(deflection|slope)|energy/\w+|tip/[xy])")
     rest = {path: s for path, s in signals.items() if not shown.fullmatch(path)}
     further = [
         _plot(f"other [{unit}]", {p: s for p, s in rest.items() if s.unit == unit})
@@ -156,7 +167,7 @@ def _deviations(scene: Scene) -> list[Any]:
     apart = scene.deviations
     links = _numbers(apart, r"/link/(\d+)/tip_deflection")
     views = _grouped(apart, "link", "tip_deflection", links, CURVES // 2, True, "deviation of ")
-    views += _one("of the tip" if views else "deviation of the tip", apart, r"/deviation/(tip/[xy]|tip_distance)")
+    views += _one("of the tip" if views else "deviation of the tip", apart, r".*/deviation/(tip/[xy]|tip_distance)")
     for unit in ("m", "rad"):
         same = {path: s for path, s in apart.items() if s.unit == unit}
         views += _grouped(

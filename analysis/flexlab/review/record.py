@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import os
 import re
@@ -29,22 +30,25 @@ LINES = (226, 228, 232)
 LEVELS = {"INFO", "WARN", "ERROR", "DEBUG", "TRACE", "CRITICAL"}
 
 
-def write(path: str | Path, runs: Sequence[Run]) -> Path:
-    """Write a review; see `flexlab.review.write_review`."""
+def write(path: str | Path, groups: dict[str, Sequence[Run]]) -> Path:
+    """Write the review of one group of runs, or a gallery of several by name; see `flexlab.review`."""
     rr.set_strict_mode(True)  # otherwise wrong lengths and shapes only warn, and the data is dropped
     target = Path(path)
-    shown = sources(runs)
-    scene = _scene(shown)
+    parts = [_part(name if len(groups) > 1 else "", runs) for name, runs in groups.items()]
+    scenes = [scene for _, scene in parts]
     target.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".rrd")
     os.close(handle)
     try:
         # The viewer keeps a layout by application id: reviews with the same layout share one, others must not.
-        key = hashlib.sha1(repr(scene).encode()).hexdigest()[:8]
+        key = hashlib.sha1(repr(scenes).encode()).hexdigest()[:8]
         with rr.RecordingStream(f"flexura-review-{key}") as rec:
-            rec.save(name, default_blueprint=blueprint(scene))
+            rec.save(name, default_blueprint=blueprint(scenes))
             rec.set_log_time_enabled(False)
-            _write(rec, shown, scene)
+            rec.send_recording_name("; ".join(dict.fromkeys(_title(shown) for shown, _ in parts)))
+            rec.send_property("review", rr.AnyValues(picture_time_s=picture_time([s.run for s in parts[0][0]])))
+            for shown, scene in parts:
+                _write(rec, shown, scene)
         os.chmod(name, 0o644)
         os.replace(name, target)
     except BaseException:
@@ -53,7 +57,20 @@ def write(path: str | Path, runs: Sequence[Run]) -> Path:
     return target
 
 
-def _scene(shown: list[Source]) -> Scene:
+def _part(name: str, runs: Sequence[Run]) -> tuple[list[Source], Scene]:
+    """The runs of one robot and what is recorded of them, under a root of their own where `name` is given."""
+    shown = sources(runs)
+    prefix = f"/{re.sub(r'[^a-z0-9]+', '_', name.lower()).strip('_')}" if name else ""
+    shown = [dataclasses.replace(s, root=f"{prefix}/{s.root}".removeprefix("/")) for s in shown]
+    return shown, _scene(shown, prefix, name)
+
+
+def _title(shown: list[Source]) -> str:
+    robot = shown[0].run.meta.get("robot", {}).get("name") or "robot"
+    return f"{robot}: {' and '.join(s.label for s in shown)}"
+
+
+def _scene(shown: list[Source], prefix: str, name: str) -> Scene:
     shaped = [s.run for s in shown if s.shaped]
     low, high = extent(shaped) if shaped else (np.array([-1.0, -1.0]), np.array([1.0, 1.0]))
     pair = [s.run for s in shown]
@@ -69,7 +86,7 @@ def _scene(shown: list[Source]) -> Scene:
             if np.isfinite(s.run[name]).any()
         },
         deviations={
-            f"/deviation/{name}": Signal(
+            f"{prefix}/deviation/{name}": Signal(
                 pair[0].units.get(name, "m"), _apart(name, shown, pair[0].units.get(name, "m")), *_range(values)
             )
             for name, values in apart.items()
@@ -78,32 +95,31 @@ def _scene(shown: list[Source]) -> Scene:
         phases=tuple(s.root for s in shown if s.run.meta.get("phases")),
         low=(float(low[0]), float(low[1])),
         high=(float(high[0]), float(high[1])),
+        prefix=prefix,
+        name=name,
     )
 
 
 def _write(rec: rr.RecordingStream, shown: list[Source], scene: Scene) -> None:
     first = shown[0]
-    robot = first.run.meta.get("robot", {}).get("name") or "robot"
-    rec.send_recording_name(f"{robot}: {' and '.join(s.label for s in shown)}")
-    rec.send_property("review", rr.AnyValues(picture_time_s=picture_time([s.run for s in shown])))
     samples = sum(len(s.run) for s in shown for _ in s.signals) + len(first.run) * len(scene.deviations)
     budget = MAX_SAMPLES if samples <= MAX_SAMPLES else MAX_SAMPLES // max(len(scene.signals) + len(scene.deviations), 1)
     for s in shown:
-        rec.send_property(s.root, rr.AnyValues(**_properties(s)))
+        rec.send_property(s.root.replace("/", "_"), rr.AnyValues(**_properties(s)))
         signals(rec, s, scene, budget)
-        events(rec, s)
+        events(rec, s, scene)
         if s.shaped:
             shape(rec, s, scene, s is not first)
     if any(s.shaped for s in shown):
         ground(rec, scene)
-    places = order([path.removeprefix("/deviation/") for path in scene.deviations], first.run.units)
+    places = order([path.removeprefix(f"{scene.prefix}/deviation/") for path in scene.deviations], first.run.units)
     for path, signal in scene.deviations.items():
-        name = path.removeprefix("/deviation/")
+        name = path.removeprefix(f"{scene.prefix}/deviation/")
         t, values = deviation(first.run, shown[1].run, name)
         step = np.flatnonzero(common(first.run, shown[1].run))
         curve(rec, path, t, values, step, signal, tone(DEVIATION, places[name]), 1.8, budget)
     page = about(shown, thinned_to=budget if samples > MAX_SAMPLES else None)
-    rec.log("about", rr.TextDocument(page, media_type=rr.MediaType.MARKDOWN), static=True)
+    rec.log(f"{scene.prefix}/about", rr.TextDocument(page, media_type=rr.MediaType.MARKDOWN), static=True)
 
 
 def signals(rec: rr.RecordingStream, s: Source, scene: Scene, budget: int) -> None:
@@ -195,17 +211,16 @@ def ground(rec: rr.RecordingStream, scene: Scene) -> None:
     low, high = np.array(scene.low), np.array(scene.high)
     step, lines = grid(low, high)
     line: Any = rr.Radius.ui_points
-    rec.log("/ground", rr.Transform3D(scale=[1.0, -1.0, 1.0]), static=True)
-    rec.log(
-        "/ground/grid", rr.LineStrips2D(lines.astype(np.float32), colors=[LINES], radii=[line(0.5)], draw_order=1.0), static=True
-    )
+    rec.log(f"{scene.prefix}/ground", rr.Transform3D(scale=[1.0, -1.0, 1.0]), static=True)
+    squares = rr.LineStrips2D(lines.astype(np.float32), colors=[LINES], radii=[line(0.5)], draw_order=1.0)
+    rec.log(f"{scene.prefix}/ground/grid", squares, static=True)
     start = low + [0.05, 0.12] * (high - low)
     bar = np.array([start, start + np.array([step, 0.0])], dtype=np.float32)
     style = rr.LineStrips2D([bar], colors=[DARK], radii=[line(1.5)], labels=[f"{step:g} m"], show_labels=True, draw_order=50.0)
-    rec.log("/ground/scale", style, static=True)
+    rec.log(f"{scene.prefix}/ground/scale", style, static=True)
 
 
-def events(rec: rr.RecordingStream, s: Source) -> None:
+def events(rec: rr.RecordingStream, s: Source, scene: Scene) -> None:
     """The run's events, each with the name of its source, and its phases."""
     listed = sorted(s.run.meta.get("events") or [], key=lambda e: e["t"])
     if listed:
@@ -213,7 +228,8 @@ def events(rec: rr.RecordingStream, s: Source) -> None:
         text = [f"{e['t']:.3f} s  {s.label}: {e['text']}" for e in listed]
         levels = [level if (level := str(e.get("level", "INFO")).upper()) in LEVELS else "INFO" for e in listed]
         step = np.clip(np.searchsorted(s.run.t, t), 0, len(s.run) - 1)
-        rec.send_columns(f"/events/{s.root}", times(t, step), rr.TextLog.columns(text=text, level=levels))
+        where = f"{scene.prefix}/events/{s.root.rpartition('/')[2]}"
+        rec.send_columns(where, times(t, step), rr.TextLog.columns(text=text, level=levels))
     phases = sorted(s.run.meta.get("phases") or [], key=lambda p: p["t"])
     if phases:
         t, names = np.array([p["t"] for p in phases], dtype=float), [str(p["name"]) for p in phases]

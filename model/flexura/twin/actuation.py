@@ -22,7 +22,7 @@ import numpy as np
 from ..drive import Drive
 from ..errors import InputError
 from .chain import Chain
-from .part import Part
+from .part import Ground, Motion
 
 DIFFERENCE = 1e-6  # m, rad, m/s, rad/s
 
@@ -171,17 +171,24 @@ class Senses:
 
         self.mbs, self.markers = chain.mbs, [c.marker for c in chain.coordinates]
         self.kinds = exu.OutputVariableType.Coordinates, exu.OutputVariableType.Coordinates_t
-        self.last: Part | None = chain.parts[-1] if chain.elements[-1] else None
-        self.index, self.reference = chain.index[-1], chain.reference
+        self.chain = chain
 
     def __call__(self) -> tuple[np.ndarray, np.ndarray, float]:
         position, velocity = (np.array([self.mbs.GetMarkerOutput(m, kind)[0] for m in self.markers]) for kind in self.kinds)
         return position, velocity, self._deflection()
 
     def _deflection(self) -> float:
-        if self.last is None:
+        chain, last = self.chain, len(self.chain.parts) - 1
+        if not chain.mesh.elements[last]:
             return 0.0
-        q = (self.mbs.systemData.GetODE2Coordinates() + self.reference)[self.index][None, :]
-        hub, tip = self.last.motion_at_origin(q, q), self.last.motion_at_tip(q, q)
+        q = (self.mbs.systemData.GetODE2Coordinates() + chain.reference)[None, :]
+        (hub, tip), turn = self._ends(q, last), 0.0
+        if chain.robot.links[last].joint.type == "Pb":  # in the frame of the sleeve
+            hub = self._ends(q, last - 1)[1] if last else Ground.motion(1)
+            turn = chain.robot.links[last].joint.angle_rad
         dx, dy = tip.r[0] - hub.r[0]
-        return float(np.cos(hub.angle[0]) * dy - np.sin(hub.angle[0]) * dx)
+        return float(np.cos(hub.angle[0] + turn) * dy - np.sin(hub.angle[0] + turn) * dx)
+
+    def _ends(self, q: np.ndarray, i: int) -> tuple[Motion, Motion]:
+        part, mine = self.chain.parts[i], q[:, self.chain.index[i]]
+        return part.motion_at_origin(mine, mine), part.motion_at_tip(mine, mine)

@@ -6,6 +6,8 @@ ObjectGenericODE2 on the end nodes with diag(m, m, J, J): exact for rotation whe
 
 from __future__ import annotations
 
+import math
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,8 @@ from .part import Attachment, Frame, Lump, Motion, hang
 from .properties import BeamValues
 
 PROGRAM = "ObjectANCFCable2D"
+NEAR = 5  # elements of a stub as long as the link's, so that a sleeve's first spans are as stiff there
+LIGHT = 1e-4  # mass per length of a stub, relative to the link's end
 
 # Exudyn's own integration points: more of them would see the axial strain between its points
 _AXIAL = np.polynomial.legendre.leggauss(5)
@@ -26,36 +30,47 @@ class CableLink:
     width = 4
 
     def __init__(
-        self, mbs: Any, values: BeamValues, hub: Lump, payload: Lump, frame: Frame, gravity: tuple[float, float]
-    ) -> None:
-        from exudyn import itemInterface as eii
+        self, mbs: Any, values: BeamValues, hub: Lump, payload: Lump, frame: Frame, gravity: tuple[float, float],
+        stubs: tuple[float, float] = (0.0, 0.0),
+    ) -> None:  # fmt: skip
+        """`stubs`: lengths [m] by which the beam goes on straight and almost without mass before its origin and after its tip.
 
+        A hub or sleeve may then stand at the link's very end. The link's own nodes and energies leave them out.
+        """
         self.values, self.hub, self.payload = values, hub, payload
-        self.nodes, elements = [], []
-        for k in range(len(values) + 1):
-            here = frame.along(k * values.length)
-            (c, s), w = here.axis, here.omega
-            self.nodes.append(
-                mbs.AddNode(
-                    eii.NodePoint2DSlope1(
-                        referenceCoordinates=[here.x, here.y, c, s], initialVelocities=[here.vx, here.vy, -w * s, w * c]
-                    )
-                )
-            )
-        for k in range(len(values)):
-            element = mbs.AddObject(
-                eii.ObjectANCFCable2D(
-                    length=values.length, massPerLength=values.mass[k], bendingStiffness=values.bending[k],
-                    axialStiffness=values.axial[k], bendingDamping=values.beta * values.bending[k],
-                    nodeNumbers=[self.nodes[k], self.nodes[k + 1]],
-                )
-            )  # fmt: skip
+        count, length = len(values), values.length
+        ends = np.concatenate([_stub(-stubs[0], length), np.arange(count + 1) * length, _stub(stubs[1], length) + count * length])
+        nodes = [_add_node(mbs, frame.along(x)) for x in ends]
+        first = int(np.searchsorted(ends, -length / 2))
+        self.nodes = nodes[first : first + count + 1]
+        self.starts, self.lengths = ends[:-1], np.diff(ends)
+        self.pairs = list(pairwise(nodes))
+        elements = [
+            _add_element(mbs, values, k - first, pair, size)
+            for k, (pair, size) in enumerate(zip(self.pairs, self.lengths, strict=True))
+        ]
+        mine = elements[first : first + count]
+        for element in mine:
             hang(mbs, element, gravity)
-            elements.append(element)
         for node, lump in ((self.nodes[0], hub), (self.nodes[-1], payload)):
             _add_lump(mbs, node, lump, gravity)
-        self.origin = _end(mbs, elements[0], 0.0, self.nodes[0])
-        self.tip = _end(mbs, elements[-1], values.length, self.nodes[-1])
+        self.origin = _end(mbs, mine[0], 0.0, self.nodes[0])
+        self.tip = _end(mbs, mine[-1], length, self.nodes[-1])
+
+    def layer(self, mbs: Any, sliding: Any) -> list[Any]:
+        """Markers of new elements without mass and stiffness, along the beam on its nodes, that carry a sliding coordinate."""
+        from exudyn import itemInterface as eii
+
+        elements = [
+            mbs.AddObject(
+                eii.ObjectALEANCFCable2D(
+                    length=size, massPerLength=0.0, movingMassFactor=0.0, bendingStiffness=0.0, axialStiffness=0.0,
+                    nodeNumbers=[*pair, sliding], addALEvariation=False,
+                )
+            )
+            for pair, size in zip(self.pairs, self.lengths, strict=True)
+        ]  # fmt: skip
+        return [mbs.AddMarker(eii.MarkerBodyCable2DCoordinates(bodyNumber=element)) for element in elements]
 
     def motion_at_origin(self, q: np.ndarray, v: np.ndarray) -> Motion:
         return _node_motion(q[:, :4], v[:, :4])
@@ -96,6 +111,36 @@ class CableLink:
         return beam + self.hub.mass * q[:, :2] + self.payload.mass * q[:, -4:-2]
 
 
+def _stub(length: float, size: float) -> np.ndarray:
+    """Ends of a stub's elements away from the link, ascending: NEAR of the link's `size`, then twice as long ones, so that they
+    reach over `length` [m]; before the link if it is negative, else after it."""
+    count = math.ceil(abs(length) / size - 1e-9)
+    ends = size * np.concatenate([np.arange(1, min(count, NEAR) + 1), np.arange(NEAR + 2, count + 2, 2)])
+    return -ends[::-1] if length < 0 else ends
+
+
+def _add_node(mbs: Any, here: Frame) -> Any:
+    from exudyn import itemInterface as eii
+
+    (c, s), w = here.axis, here.omega
+    place, speed = [here.x, here.y, c, s], [here.vx, here.vy, -w * s, w * c]
+    return mbs.AddNode(eii.NodePoint2DSlope1(referenceCoordinates=place, initialVelocities=speed))
+
+
+def _add_element(mbs: Any, values: BeamValues, k: int, nodes: tuple[Any, Any], size: float) -> Any:
+    """Element k of the link; the stubs, which have k < 0 or k >= len(values), are like the link's end, of LIGHT mass."""
+    from exudyn import itemInterface as eii
+
+    near = min(max(k, 0), len(values) - 1)
+    return mbs.AddObject(
+        eii.ObjectANCFCable2D(
+            length=size, massPerLength=values.mass[near] * (1.0 if near == k else LIGHT),
+            bendingStiffness=values.bending[near], axialStiffness=values.axial[near],
+            bendingDamping=values.beta * values.bending[near], nodeNumbers=list(nodes),
+        )
+    )  # fmt: skip
+
+
 def _add_lump(mbs: Any, node: Any, lump: Lump, gravity: tuple[float, float]) -> None:
     from exudyn import itemInterface as eii
 
@@ -111,7 +156,7 @@ def _add_lump(mbs: Any, node: Any, lump: Lump, gravity: tuple[float, float]) -> 
 def _end(mbs: Any, element: Any, x: float, node: Any) -> Attachment:
     from exudyn import itemInterface as eii
 
-    return Attachment(element, [x, 0.0, 0.0], mbs.AddMarker(eii.MarkerNodeRigid(nodeNumber=node)))
+    return Attachment(element, [x, 0.0, 0.0], mbs.AddMarker(eii.MarkerNodeRigid(nodeNumber=node)), rigid=False)
 
 
 def _node_motion(q: np.ndarray, v: np.ndarray) -> Motion:

@@ -7,17 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
 from ..robot import Link, Robot
 from . import joints
 from .ancf import CableLink
 from .exact import ExactLink
+from .mesh import Mesh
 from .part import Frame, Ground, Lump, Part
-from .properties import VANISHING, beam_values, rigid_inertia, total_mass, uniform
+from .properties import VANISHING, beam_values, link_inertia, total_mass
 from .rigid import RigidLink
 
-MIN_ELEMENTS = 8
-MIN_ELEMENTS_TAPERED = 24  # each is uniform: 3e-3 of the deflection at 8, 4e-4 at 24 for EI falling to a quarter
 BEAMS = {"ancf": CableLink, "ge": ExactLink}
 
 
@@ -25,10 +23,10 @@ BEAMS = {"ancf": CableLink, "ge": ExactLink}
 class Chain:
     """An assembled robot: `mbs` is Exudyn's system, `parts` and `coordinates` have one entry a link and joint.
 
-    `index[i]` are the places of part i's coordinates among the system's, `reference` the system's coordinates before any
-    displacement (Exudyn's own sum of both, GetODE2CoordinatesTotal, corrupts memory from about 100 coordinates on in
-    1.13.6), `elements` the beam elements of each link,
-    `container` owns `mbs` and must live as long.
+    `index[i]` are the places of part i's coordinates among the system's, `slides[i]` that of the position of a joint that
+    slides on a flexible link (None for others), `reference` the system's coordinates before any displacement (Exudyn's own sum
+    of both, GetODE2CoordinatesTotal, corrupts memory from about 100 coordinates on in 1.13.6). `container` owns `mbs` and must
+    live as long.
     """
 
     robot: Robot
@@ -36,8 +34,9 @@ class Chain:
     parts: list[Part]
     coordinates: list[joints.Coordinate]
     index: list[np.ndarray]
+    slides: list[int | None]
+    mesh: Mesh
     reference: np.ndarray
-    elements: list[int]
     container: Any
 
     @property
@@ -50,81 +49,54 @@ def reach(robot: Robot) -> float:
     return sum(link.length_m for link in robot.links) or 1.0
 
 
-def refuse(robot: Robot) -> None:
-    """Raise InputError for what the twin doesn't contain."""
-    if not robot.stiffening:
-        expected = "the twin always contains geometric stiffening; compare with stiffening = true"
-        raise InputError(expected, key="stiffening", value=False)
-    for i, link in enumerate(robot.links, 1):
-        if link.damping.alpha_1_s:
-            raise InputError(
-                "expected 0: damping in proportion to mass has no counterpart in the twin; use beta_s",
-                key=f"link[{i}].damping.alpha_1_s", value=link.damping.alpha_1_s,
-            )  # fmt: skip
-        if link.joint.type == "Pb":
-            raise InputError(
-                "the twin does not contain joints Pb yet; it has R anywhere, and Pa on the base or on a rigid link",
-                key=f"link[{i}].joint.type", value="Pb",
-            )  # fmt: skip
-        if link.joint.type == "Pa" and i > 1 and robot.links[i - 2].flexible:
-            raise InputError(
-                "the twin does not contain Pa on a flexible link yet; it has R anywhere, and Pa on the base or on a rigid link",
-                key=f"link[{i}].joint.type", value="Pa",
-            )  # fmt: skip
-
-
-def element_count(link: Link, elements: int | None) -> int:
-    """Elements of a link in the twin: `elements` if given, else twice the robot file's and at least 8, or 24 if it tapers."""
-    if not link.flexible:
-        return 0
-    least = MIN_ELEMENTS if uniform(link) else MIN_ELEMENTS_TAPERED
-    return max(least, 2 * link.elements) if elements is None else elements
-
-
-def build(
-    robot: Robot, beam: str, elements: int | None, speeds: np.ndarray, gains: np.ndarray
-) -> Chain:
+def build(robot: Robot, beam: str, mesh: Mesh, speeds: np.ndarray, gains: np.ndarray) -> Chain:
     """The robot straight at its start, its joints at `speeds` (n,), with PD controllers of `gains` (n, 2)."""
     import exudyn as exu
     from exudyn import itemInterface as eii
 
-    refuse(robot)
     container = exu.SystemContainer()
     mbs = container.AddSystem()
-    ground = Ground.add(mbs)
     fixed = mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=mbs.AddNode(eii.NodePointGround()), coordinate=0))
-    previous: Any = ground
+    scale = total_mass(robot.links, robot.payload) or 1.0
+    tiny = VANISHING * scale, VANISHING * scale * reach(robot) ** 2
+    previous: Any = Ground.add(mbs)
     frame, length = Frame(0.0, 0.0, 0.0), 0.0
     parts: list[Part] = []
-    coordinates = []
-    counts = [element_count(link, elements) for link in robot.links]
+    coordinates, nodes = [], []
     for i, link in enumerate(robot.links):
-        frame = joints.start_frame(link.joint, frame, length, speeds[i])
-        part = _part(mbs, robot, i, BEAMS[beam], counts[i], frame)
-        marker = joints.connect(mbs, link.joint, previous, part)
+        tip, frame = frame.along(length), joints.start_frame(link, frame, length, speeds[i])
+        part = _part(mbs, robot, i, BEAMS[beam], mesh, frame, tiny)
+        on = joints.Site(mbs, tip, frame, speeds[i], tiny)
+        marker, node = joints.connect(on, link, previous, part, mesh.places[i])
         coordinates.append(joints.equip(mbs, link.joint, marker, fixed, speeds[i], tuple(gains[i])))
         parts.append(part)
+        nodes.append(node)
         previous, length = part, link.length_m
     mbs.Assemble()
-    index = [np.concatenate([_places(mbs, node, part) for node in part.nodes]) for part in parts]
+    index = [np.concatenate([_places(mbs, node, part.width) for node in part.nodes]) for part in parts]
+    slides = [None if node is None else int(mbs.GetNodeODE2Index(node)) for node in nodes]
     reference = np.array(mbs.systemData.GetODE2Coordinates(exu.ConfigurationType.Reference))
-    return Chain(robot, mbs, parts, coordinates, index, reference, counts, container)
+    return Chain(robot, mbs, parts, coordinates, index, slides, mesh, reference, container)
 
 
-def _part(mbs: Any, robot: Robot, i: int, beam: Any, count: int, frame: Frame) -> Part:
+def _part(mbs: Any, robot: Robot, i: int, beam: Any, mesh: Mesh, frame: Frame, tiny: tuple[float, float]) -> Part:
     link, last = robot.links[i], i == len(robot.links) - 1
+    ending = Lump(robot.payload.mass_kg, robot.payload.inertia_kg_m2) if last else _hub(robot.links[i + 1], "Pb")
+    hub = _hub(link, "R", "Pa")
     if link.flexible:
-        hub = Lump(link.joint.hub_mass_kg, link.joint.hub_inertia_kg_m2)
-        payload = Lump(robot.payload.mass_kg, robot.payload.inertia_kg_m2) if last else Lump()
-        return beam(mbs, beam_values(link, count), hub, payload, frame, robot.gravity_m_s2)
-    inertia = rigid_inertia(link, robot.payload if last else None)
-    scale = total_mass(robot.links, robot.payload) or 1.0
-    inertia = inertia._replace(
-        mass=max(inertia.mass, VANISHING * scale), inertia=max(inertia.inertia, VANISHING * scale * reach(robot) ** 2)
-    )  # a body without mass or inertia would leave Exudyn's mass matrix singular
-    return RigidLink(mbs, link.length_m, inertia, frame, robot.gravity_m_s2)
+        stubs = [mesh.stubs[i]] if any(mesh.stubs[i]) else []
+        return beam(mbs, beam_values(link, mesh.elements[i]), hub, ending, frame, robot.gravity_m_s2, *stubs)
+    inertia = link_inertia(link).plus(hub.mass, 0.0, hub.inertia).plus(ending.mass, link.length_m, ending.inertia)
+    inertia = inertia._replace(mass=max(inertia.mass, tiny[0]), inertia=max(inertia.inertia, tiny[1]))
+    return RigidLink(mbs, link.length_m, inertia, frame, robot.gravity_m_s2)  # without any its mass matrix would be singular
 
 
-def _places(mbs: Any, node: Any, part: Part) -> np.ndarray:
+def _hub(link: Link, *types: str) -> Lump:
+    """The hub of a link's joint if that is of these types, else nothing: a Pb's, its sleeve, is on the link before."""
+    joint = link.joint
+    return Lump(joint.hub_mass_kg, joint.hub_inertia_kg_m2) if joint.type in types else Lump()
+
+
+def _places(mbs: Any, node: Any, width: int) -> np.ndarray:
     first = mbs.GetNodeODE2Index(node)
-    return np.arange(first, first + part.width)
+    return np.arange(first, first + width)

@@ -28,9 +28,19 @@ def channels(
             turned = _unwrap(t, hub.angle - tip.angle, hub.omega - tip.omega, joint.start)
             position[:, i], speed[:, i] = turned, hub.omega - tip.omega
             hub = hub._replace(angle=tip.angle + turned)
-        else:
+        elif joint.type == "Pa":  # the tangent of a link turns by less than half a turn from its start
+            turned = _wrap(hub.angle - joint.angle_rad - origin.angle)
             position[:, i], speed[:, i] = _slide(origin, hub)
-            hub = hub._replace(angle=origin.angle + joint.angle_rad)
+            hub = hub._replace(angle=origin.angle + turned + joint.angle_rad)
+        else:
+            sleeve = tip._replace(angle=tip.angle + joint.angle_rad)
+            position[:, i], speed[:, i] = _slide(sleeve, end)
+            hub = hub._replace(angle=sleeve.angle)
+        slides = chain.slides[i]
+        if slides is not None:
+            position[:, i], speed[:, i] = q[:, slides], v[:, slides]
+            if joint.type == "Pb":  # what is behind the sleeve's exit is on its axis
+                hub = hub._replace(r=sleeve.r + (position[:, i] - link.length_m)[:, None] * _axis(sleeve.angle))
         slope = _wrap(end.angle - hub.angle)
         end = end._replace(angle=hub.angle + slope)
         out |= {f"link/{i + 1}/x": (hub.r[:, 0], "m"), f"link/{i + 1}/y": (hub.r[:, 1], "m")}
@@ -47,7 +57,7 @@ def channels(
         strain += part.strain(mine)
         potential -= part.moment(mine) @ gravity
         origin, tip = hub, end
-    out = _joints(chain, act, t, position, speed, deflection * bool(chain.elements[-1])) | out
+    out = _joints(chain, act, t, position, speed, deflection * bool(chain.mesh.elements[-1])) | out
     out |= {"tip/x": (tip.r[:, 0], "m"), "tip/y": (tip.r[:, 1], "m")}
     out |= {"energy/kinetic": (kinetic, "J"), "energy/strain": (strain, "J"), "energy/potential": (potential, "J")}
     return {name: values for name, (values, _) in out.items()}, {name: unit for name, (_, unit) in out.items()}
@@ -73,10 +83,14 @@ def _transverse(hub: Motion, place: np.ndarray) -> np.ndarray:
 
 def _slide(rail: Motion, hub: Motion) -> tuple[np.ndarray, np.ndarray]:
     """Distance of the hub along the rail's axis, and its rate."""
-    axis = np.stack([np.cos(rail.angle), np.sin(rail.angle)], axis=-1)
+    axis = _axis(rail.angle)
     normal = np.stack([-axis[:, 1], axis[:, 0]], axis=-1)
     delta, rate = hub.r - rail.r, hub.v - rail.v
     return (axis * delta).sum(axis=-1), (axis * rate + rail.omega[:, None] * normal * delta).sum(axis=-1)
+
+
+def _axis(angle: np.ndarray) -> np.ndarray:
+    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 
 def _wrap(angle: np.ndarray) -> np.ndarray:

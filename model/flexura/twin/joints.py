@@ -12,7 +12,10 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from ..robot import Joint
+import numpy as np
+
+from ..robot import Joint, Link
+from . import sliding
 from .part import Attachment, Frame
 
 FRICTION_SPEED = 1e-3  # m/s or rad/s: Coulomb friction is f tanh(velocity / this)
@@ -31,19 +34,55 @@ class Coordinate:
     kept: Any = None
 
 
-def start_frame(joint: Joint, previous: Frame, length: float, speed: float) -> Frame:
-    """The straight start of the link behind a joint; `previous` is the link before it, of that length, or the base (0)."""
+def start_frame(link: Link, previous: Frame, length: float, speed: float) -> Frame:
+    """The straight start of a link; `previous` is the link before it, of that length, or the base (0)."""
+    joint = link.joint
     if joint.type == "R":
         return previous.along(length, turn=joint.start, spin=speed)
-    return previous.along(joint.start, slide=speed, turn=joint.angle_rad)
+    if joint.type == "Pa":
+        return previous.along(joint.start, slide=speed, turn=joint.angle_rad)
+    return previous.along(length, turn=joint.angle_rad).along(joint.start - link.length_m, slide=speed)
 
 
-def connect(mbs: Any, joint: Joint, previous: Any, link: Any) -> Any:
-    """Constrain `link` to `previous` (parts) by an R or Pa; returns the marker of the joint's coordinate."""
-    return (_revolute if joint.type == "R" else _prismatic)(mbs, joint, previous.tip, previous.origin, link.origin)
+@dataclass(frozen=True)
+class Site:
+    """Where a joint is built: the start of the previous link's tip and of the link's origin, the joint's speed [m/s or rad/s].
+
+    `tiny`: mass and inertia of bodies that only hold others.
+    """
+
+    mbs: Any
+    tip: Frame
+    origin: Frame
+    speed: float
+    tiny: tuple[float, float]
 
 
-def _revolute(mbs: Any, joint: Joint, tip: Attachment, _: Attachment, hub: Attachment) -> Any:
+def connect(on: Site, link: Link, previous: Any, part: Any, places: np.ndarray | None) -> tuple[Any, Any]:
+    """Constrain `part` to `previous` by the joint of `link`; returns the marker of its coordinate, and the node if it has one.
+
+    `places`: the points of the hub or sleeve of a joint that slides on a flexible link; None: it doesn't.
+    """
+    joint, mbs = link.joint, on.mbs
+    if joint.type == "R":
+        return _revolute(mbs, joint, previous.tip, part.origin), None
+    if joint.type == "Pa":
+        if places is None:
+            return _prismatic(mbs, previous.origin, part.origin, part.origin, 0.0, joint.angle_rad), None
+        hub = sliding.rigid(mbs, part.origin, on.origin, on.tiny)
+        line = sliding.Line(hub, on.origin, -joint.angle_rad)
+        node = sliding.hold(mbs, line, previous, places, joint.start, on.speed, on.tiny)
+        return sliding.marker_of(mbs, node), node
+    sleeve = sliding.rigid(mbs, previous.tip, on.tip, on.tiny)
+    if places is None:  # d is where the tip of link i is
+        return _prismatic(mbs, sleeve, part.origin, part.tip, joint.angle_rad, 0.0), None
+    line = sliding.Line(sleeve, on.tip, joint.angle_rad)
+    behind = sliding.hold(mbs, line, part, places, link.length_m - joint.start, -on.speed, on.tiny)
+    node = sliding.rest(mbs, behind, link.length_m, joint.start, on.speed)
+    return sliding.marker_of(mbs, node), node
+
+
+def _revolute(mbs: Any, joint: Joint, tip: Attachment, hub: Attachment) -> Any:
     from exudyn import itemInterface as eii
 
     mbs.AddObject(eii.ObjectJointRevolute2D(markerNumbers=[tip.marker, hub.marker]))
@@ -56,15 +95,17 @@ def _revolute(mbs: Any, joint: Joint, tip: Attachment, _: Attachment, hub: Attac
     )  # fmt: skip
 
 
-def _prismatic(mbs: Any, joint: Joint, _: Attachment, rail: Attachment, hub: Attachment) -> Any:
+def _prismatic(mbs: Any, rail: Attachment, hub: Attachment, end: Attachment, axis: float, turned: float) -> Any:
+    """`hub` slides on a line at the angle `axis` in the frame of `rail`, `turned` to it; the coordinate is where `end` is."""
     from exudyn import itemInterface as eii
 
-    normal = [math.sin(joint.angle_rad), math.cos(joint.angle_rad), 0.0]  # of the rail, in the hub's frame
+    along = [math.cos(axis), math.sin(axis), 0.0]
+    normal = [math.sin(turned), math.cos(turned), 0.0]  # of the line, in the hub's frame
     markers = [rail.marker, hub.marker]
-    mbs.AddObject(eii.ObjectJointPrismatic2D(markerNumbers=markers, axisMarker0=[1, 0, 0], normalMarker1=normal))
+    mbs.AddObject(eii.ObjectJointPrismatic2D(markerNumbers=markers, axisMarker0=along, normalMarker1=normal))
     return mbs.AddMarker(
         eii.MarkerBodiesRelativeTranslationCoordinate(
-            bodyNumbers=[rail.body, hub.body], localPosition0=rail.place, localPosition1=hub.place, axis0=[1, 0, 0]
+            bodyNumbers=[rail.body, end.body], localPosition0=rail.place, localPosition1=end.place, axis0=along
         )
     )
 

@@ -32,11 +32,12 @@ class Frame(NamedTuple):
 
 
 class Attachment(NamedTuple):
-    """Where a joint takes hold: a body, the place in it, and a marker with position and orientation there."""
+    """Where a joint takes hold: a body, the place in it, a marker with position and orientation there, whether it is rigid."""
 
     body: Any
     place: list[float]
     marker: Any
+    rigid: bool = True
 
 
 class Motion(NamedTuple):

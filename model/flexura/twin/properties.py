@@ -87,14 +87,11 @@ class Inertia(NamedTuple):
         return Inertia(total, centre, about)
 
 
-def rigid_inertia(link: Link, payload: Payload | None) -> Inertia:
-    """A rigid link with its hub, and the payload (None: it is on another link), as one body."""
+def link_inertia(link: Link) -> Inertia:
+    """A rigid link itself, without hub and payload."""
     if link.mass_kg is not None:
-        body = Inertia(link.mass_kg, _centre(link), link.inertia_kg_m2 or 0.0)
-    else:
-        body = _spread_inertia(link)
-    body = body.plus(link.joint.hub_mass_kg, 0.0, link.joint.hub_inertia_kg_m2)
-    return body if payload is None else body.plus(payload.mass_kg, link.length_m, payload.inertia_kg_m2)
+        return Inertia(link.mass_kg, _centre(link), link.inertia_kg_m2 or 0.0)
+    return _spread_inertia(link)
 
 
 def _centre(link: Link) -> float:
@@ -116,9 +113,12 @@ def _spread_inertia(link: Link) -> Inertia:
 
 def total_mass(links: list[Link], payload: Payload) -> float:
     """All mass of a robot [kg]; the scale for what has none."""
-    own = payload.mass_kg
+    total = payload.mass_kg
     for link in links:
-        own += rigid_inertia(link, None).mass if not link.flexible else link.joint.hub_mass_kg
+        total += link.joint.hub_mass_kg
         if link.flexible:
-            own += float(_means(link.mass_per_length, np.array([0.0, link.length_m]), np.array(link.breaks()))[0]) * link.length_m
-    return own
+            ends, kinks = np.array([0.0, link.length_m]), np.array(link.breaks())
+            total += float(_means(link.mass_per_length, ends, kinks)[0]) * link.length_m
+        else:
+            total += link_inertia(link).mass
+    return total

@@ -16,14 +16,17 @@ from ..robot import MAX_ELEMENTS, Robot
 from ..run import Run
 from . import ancf, exact
 from .actuation import Actuation, Loads, actuation
-from .chain import Chain, build, refuse
+from .chain import Chain, build
 from .channels import channels
+from .extrapolation import LONGER, extrapolate
+from .mesh import mesh, reach_of, refuse, sliding_kinds
 from .stepping import Steps, plan, suggest
 
 PROGRAMS = {"ancf": ancf.PROGRAM, "ge": exact.PROGRAM}
 ATTEMPTS = 4  # steps tried, each half the one before, where the user doesn't give one
 SPARSE = 60  # coordinates beyond which sparse matrices are faster (0.25 ms a step against 0.8 at 420)
 COARSE = 4  # elements a link for the frequencies that suggest a step
+SLACK = 1e-4  # how far a hub or sleeve may go beyond the end of its link, relative to the link
 PROGRESS = 0.01  # the fraction of a run between two calls of progress
 
 Record = tuple[list[float], list[np.ndarray], list[np.ndarray], list[np.ndarray]]  # times, coordinates, velocities, accelerations
@@ -42,6 +45,7 @@ def simulate(
     beam: str = "ancf",
     elements: int | None = None,
     step_s: float | None = None,
+    hub_length_m: float | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Run:
     """Simulate a robot in Exudyn, as a check on the native solver that shares nothing with it but the robot file.
@@ -52,62 +56,78 @@ def simulate(
     [N m]; a function of the state is called in every iteration, so it must depend on its arguments only.
 
     `beam`: "ancf" (ObjectANCFCable2D, Euler-Bernoulli) or "ge" (ObjectBeamGeometricallyExact2D of three nodes, with shear).
-    `elements`: beam elements a flexible link; None: twice the robot file's and at least 8. `step_s`: Exudyn's longest step;
-    None: from the robot's frequencies, for an error in time below 1e-3 of the tip deflection or so, and shorter if need be.
-    Steps divide a uniform output step; elsewhere results are interpolated by cubics. `progress`: called with the fraction done.
+    `elements`: beam elements a flexible link; None: twice the robot file's and at least 8, or 24 where a joint slides on it.
+    `step_s`: Exudyn's longest step; None: from the robot's frequencies, for an error in time below 1e-3 of the tip deflection
+    or so, and shorter if need be. Steps divide a uniform output step; elsewhere results are interpolated by cubics.
+    `hub_length_m`: of the hub of a Pa on a flexible link and of the spans of a flexible Pb's sleeve, see `mesh`. None: short
+    ones, and once more for each of the two types with that type's twice as long, extrapolated to none (`extrapolation`);
+    `meta["extrapolation"]` says how far that went. A function of time or state is called in all these runs.
+    `progress`: called with the fraction done.
 
     The result has the channels of a native run (`flexura.run`) but no energy/work and energy/loss. Ctrl-C ends it early,
     with `meta["complete"]` false. Links take all unknowns of their mesh (`modes` is not looked at); joint limits don't act.
 
-    Raises InputError for what the twin doesn't contain (Pb, Pa on a flexible link, stiffening = false, damping alpha)
-    or can't be, FlexuraError where Exudyn's solver fails, with the time it got to.
+    Raises InputError for what the twin doesn't contain (stiffening = false, damping alpha, sliding on a "ge" beam) or can't be,
+    FlexuraError where Exudyn's solver fails or a joint slides off the end of a flexible link, with the time it got to.
     """
-    refuse(robot)
-    n = len(robot.links)
-    t = _times(t_eval)
-    speeds = _speeds(robot, qd0)
+    refuse(robot, beam)
+    t, speeds = _times(t_eval), _speeds(robot, qd0)
     if beam not in PROGRAMS:
         raise InputError('expected "ancf" or "ge"', key="beam", value=beam)
     if elements is not None and not 1 <= elements <= 2 * MAX_ELEMENTS:
         raise InputError(f"expected a whole number from 1 to {2 * MAX_ELEMENTS}", key="elements", value=elements)
-    if step_s is not None and not step_s > 0:
-        raise InputError("expected a time above 0 in seconds", key="step_s", value=step_s)
+    for key, given, unit in (("step_s", step_s, "time in seconds"), ("hub_length_m", hub_length_m, "length in metres")):
+        if given is not None and not given > 0:
+            raise InputError(f"expected a {unit}, above 0", key=key, value=given)
     act = actuation(drive, robot.start, speeds)
+    kinds = sliding_kinds(robot) if hub_length_m is None else []
+    share, report = 1 / (1 + len(kinds)), progress or (lambda fraction: None)
+
+    def run(number: int, times: dict[str, float], longest: float) -> Run:
+        def new() -> Chain:
+            return build(robot, beam, mesh(robot, elements, hub_length_m, times), speeds, act.gains)
+
+        tries = 1 if step_s else ATTEMPTS
+        return _run(new, act, t, longest, tries, lambda fraction: report((number + fraction) * share), PROGRAMS[beam])
+
     with _quiet():
-        chain, steps, record, done, wall = _attempts(
-            lambda count: build(robot, beam, count, speeds, act.gains), elements, act, t, step_s, progress
-        )
+        coarse = mesh(robot, COARSE, hub_length_m)
+        first = run(0, {}, step_s or suggest(build(robot, beam, coarse, speeds, act.gains), _settings(1.0, 1), t[-1]))
+        if not kinds or not first.complete:
+            return first
+        return extrapolate(first, {kind: run(k, {kind: LONGER}, first.meta["step_s"]) for k, kind in enumerate(kinds, 1)})
+
+
+def _run(
+    new: Callable[[], Chain],
+    act: Actuation,
+    t: np.ndarray,
+    longest: float,
+    tries: int,
+    progress: Callable[[float], None],
+    program: str,
+) -> Run:
+    """Simulate with steps of at most `longest` [s], given by the user if there is one try, else halved where Exudyn fails."""
+    import exudyn
+
+    for attempt in range(tries):
+        chain, steps = new(), plan(t, longest / 2**attempt, forced=tries == 1)
+        try:
+            record, done, wall = _solve(chain, act, steps, progress)
+            break
+        except DidNotConverge:
+            if attempt == tries - 1:
+                raise
     t, q, v = steps.at_times(t, *(np.array(column) for column in record))
     q += chain.reference
     values, units = channels(chain, act, t, q, v)
-    import exudyn
-
     meta = {
-        "source": "twin", "program": f"Exudyn {exudyn.__version__} ({PROGRAMS[beam]})", "robot": robot.to_dict(),
+        "source": "twin", "program": f"Exudyn {exudyn.__version__} ({program})", "robot": chain.robot.to_dict(),
         "complete": done == steps.count, "events": [], "wall_s": wall, "steps": done, "step_s": steps.length,
-        "elements": chain.elements, "labels": [f"joint/{i}" for i in range(1, n + 1)],
+        "elements": chain.mesh.elements, "labels": [f"joint/{i}" for i in range(1, len(chain.parts) + 1)],
+        "hub_length_m": chain.mesh.hubs,
     }  # fmt: skip
     return Run(t, values, units, meta)
-
-
-def _attempts(
-    new: Callable[[int | None], Chain],
-    elements: int | None,
-    act: Actuation,
-    t: np.ndarray,
-    step_s: float | None,
-    progress: Callable[[float], None] | None,
-) -> tuple[Chain, Steps, Record, int, float]:
-    """Solve with the given step, or with the suggested one, halved where Exudyn doesn't converge with it."""
-    longest = step_s or suggest(new(COARSE), _settings(1.0, 1), t[-1])
-    for attempt in range(1 if step_s else ATTEMPTS):
-        chain = new(elements)
-        steps = plan(t, longest / 2**attempt, forced=step_s is not None)
-        try:
-            return chain, steps, *_solve(chain, act, steps, progress)
-        except DidNotConverge as error:
-            failed = error
-    raise failed
 
 
 def _times(t_eval: Any) -> np.ndarray:
@@ -157,9 +177,7 @@ def _settings(end: float, steps: int, reach: float = 1.0, flexible: bool = True,
     return settings
 
 
-def _solve(
-    chain: Chain, act: Actuation, steps: Steps, progress: Callable[[float], None] | None
-) -> tuple[Record, int, float]:
+def _solve(chain: Chain, act: Actuation, steps: Steps, progress: Callable[[float], None] | None) -> tuple[Record, int, float]:
     """Run Exudyn; returns the record, the steps done, and seconds taken."""
     record: Record = ([], [], [], [])
     errors: list[BaseException] = []
@@ -184,6 +202,7 @@ def _solve(
         nonlocal done
         try:
             done = round(t / steps.length)
+            _still_on(chain, data.GetODE2Coordinates(), t)
             if steps.keep[done]:
                 keep()
             if progress is not None and done % announce == 0:
@@ -200,8 +219,8 @@ def _solve(
             chain.mbs.SetPreStepUserFunction(before)
             chain.mbs.SetPostStepUserFunction(after)
             end, size = steps.count * steps.length, len(chain.reference)
-            settings = _settings(end, steps.count, chain.reach, any(chain.elements), size)
-            failed = _run(chain.mbs, settings)
+            settings = _settings(end, steps.count, chain.reach, any(chain.mesh.elements), size)
+            failed = _complaint(chain.mbs, settings)
             if failed and not errors:
                 raise _failure(chain.mbs, done, steps, failed)
     if errors:
@@ -209,7 +228,17 @@ def _solve(
     return record, done, time.perf_counter() - began
 
 
-def _run(mbs: Any, settings: Any) -> str:
+def _still_on(chain: Chain, q: Any, t: float) -> None:
+    """Raise FlexuraError where a hub or sleeve has come to the end of its link: Exudyn would let it stick there."""
+    for i, place in enumerate(chain.slides):
+        if place is not None:
+            low, high = reach_of(chain.robot, i)
+            if not low - SLACK * high <= q[place] <= high + SLACK * high:
+                where = f"at {q[place]:.6g} m, it can be from {low:g} to {high:g} m"
+                raise FlexuraError(f"joint {i + 1} slid off the end of its link at t = {t:.6g} s: {where}")
+
+
+def _complaint(mbs: Any, settings: Any) -> str:
     """Exudyn's own complaint, or "" when it got to the end or was stopped."""
     try:
         return "" if mbs.SolveDynamic(settings) else "SolveDynamic returned False"

@@ -82,7 +82,7 @@ def suggest(chain: Chain, settings: Any, end: float) -> float:
     hertz = hertz[np.isfinite(hertz) & (hertz > RIGID_HZ)]
     if len(hertz) == 0:
         return LONGEST
-    highest = hertz[min(sum(count > 0 for count in chain.elements), len(hertz) - 1)]
+    highest = hertz[min(sum(count > 0 for count in chain.mesh.elements), len(hertz) - 1)]
     return min(LONGEST, min(1 / (PER_FIRST * hertz[0]), 1 / (PER_HIGHEST * highest)) * math.sqrt(SPAN / max(end, SPAN)))
 
 

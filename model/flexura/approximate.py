@@ -1,0 +1,215 @@
+"""Inverse dynamics in the dissertation's two approximate ways, for comparison with the exact `inverse`.
+
+Both take the motions of the joints, one Signal a joint, and return a Run of the flexible robot under the drives they found:
+how far `joint/i/position` is from the motion is their error.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from . import loop
+from .chain import COULOMB_SPEED
+from .choice import choose, longest_step
+from .drive import Drive
+from .errors import FlexuraError
+from .forward import _inputs, _limit_event, _put_on_motions, _state, _times, simulate
+from .record import record
+from .robot import Robot
+from .run import Run
+from .signal import COLUMNS, Signal, constant
+from .system import System, assemble
+
+MAX_SWEEPS = 60
+
+
+def rigid_robot(robot: Robot) -> Robot:
+    """The same robot with rigid links: masses, hubs, payload and joints as they are."""
+    data = robot.to_dict()
+    for link in data["link"]:
+        for key in ("elements", "modes", "young_modulus_Pa", "bending_stiffness_N_m2", "damping"):
+            link.pop(key, None)
+    return Robot.from_dict(data)
+
+
+def by_rigid_robot(
+    system: System, t_eval: Any, motion: Sequence[Signal], q0: Any = None, qd0: Any = None, rtol: float = 1e-6,
+    *, step_s: float = 1e-3, progress: Callable[[float], None] | None = None,
+) -> Run:  # fmt: skip
+    """Drives of the rigid robot along `motion`, applied open loop to the flexible one (Bien, My and Khoi 2017).
+
+    tau = M_rigid(r) r'' + bias + gravity + friction, exact, as splines through values about `step_s` apart. Neither the
+    elastic displacements nor the joints' errors are compensated. Arguments and errors otherwise as in `inverse`.
+    """
+    t = _times(t_eval)
+    Drive.prescribed(*motion)  # refuses motions that jump
+    rigid = assemble(rigid_robot(system.robot))
+    drive = Drive.force(*_splines(lambda s: _forces(rigid, motion, s), motion, t[0], t[-1], step_s))
+    q0, qd0 = _start(system, t[0], motion, q0, qd0)
+    run = simulate(system, t, drive, q0, qd0, rtol, progress=progress)
+    run.meta["drive"] = "those of the rigid robot"
+    return run
+
+
+def by_bisection(
+    system: System, t_eval: Any, motion: Sequence[Signal], q0: Any = None, qd0: Any = None, rtol: float = 1e-7,
+    *, joint_error: float = 1e-10, progress: Callable[[float], None] | None = None,
+) -> Run:  # fmt: skip
+    """Drives by bisection, step by step; each interval of t_eval is a step.
+
+    After My and Bien (2020, Int. J. Adv. Robot. Syst.), whose abstract names the method; the rest is this project's reading.
+    From the rigid robot's drives on, one forward step of the flexible model under constant drives, each joint's bisected in a
+    bracket until |e| < `joint_error` [m or rad], joint after joint until all are; then the next step.
+
+        e = (eta - r) + h (eta' - r')       at the end of the step, h long
+
+    The second term is needed: position errors alone make the drives alternate, u_k = -u_(k-1) + ..., for a mass under held forces
+    has its sampled zero at -1. `joint/i/drive` at t_k is the value held until t_(k+1). Errors fall as h^3; a step that is long
+    against the period of a mode makes the drives diverge, which raises FlexuraError. Otherwise as in `inverse`.
+    """
+    t, n, rows = _times(t_eval), system.n, system.joint_rows
+    Drive.prescribed(*motion)
+    q0, qd0 = _start(system, t[0], motion, q0, qd0)
+    state = np.concatenate([system.to_solver @ q0, system.to_solver @ qd0, [0.0, 0.0]])
+    trial = _Trial(system, rtol, choose(system, t[-1] - t[0], rtol))
+    rigid = assemble(rigid_robot(system.robot))
+    inertia = np.diag(rigid.mass(rigid.start()))
+    moving = np.flatnonzero(~system.chain.locked.astype(bool))
+    states, forces = [state], []
+    events: list[dict[str, Any]] = []
+    begun = time.perf_counter()
+    try:
+        for a, b in pairwise(t):
+            r, rd = np.array([m(b)[:2] for m in motion]).T
+            drives = _forces(rigid, motion, (a + b) / 2)
+            error = lambda z: (z[rows] - r) + (b - a) * (z[n + rows] - rd)  # noqa: B023
+            width = 0.2 * np.abs(drives) + 1e-3 * inertia
+            for _ in range(MAX_SWEEPS):
+                for i in map(int, moving):
+                    before = drives[i]
+                    after = _bisect(lambda z: error(z)[i], trial, (a, b, states[-1]), drives, i, width[i], joint_error)  # noqa: B023
+                    width[i] = 2 * abs(drives[i] - before) + 1e-9 * inertia[i]
+                if np.abs(error(after)[moving]).max() < joint_error:
+                    break
+            trial.accept()
+            states.append(after)
+            forces.append(drives)
+            if progress is not None:
+                progress((b - t[0]) / (t[-1] - t[0]))
+    except _LeftLimits as left:
+        events.append(_limit_event(system, *left.args))
+    except KeyboardInterrupt:
+        events.append({"t": float(t[len(states) - 1]), "level": "WARN", "text": "interrupted"})
+    z, rows_done = np.array(states), len(states)
+    forces.append(forces[-1] if forces else np.zeros(len(rows)))
+    meta = {
+        "steps": rows_done - 1, "evaluations": trial.count, "wall_s": time.perf_counter() - begun, "events": events,
+        "complete": rows_done == len(t), "drive": "by bisection", "rtol": rtol, "method": "bisection",
+    }  # fmt: skip
+    return record(system, t[:rows_done], z[:, : 2 * n], z[:, 2 * n :], np.array(forces[:rows_done]), meta)
+
+
+class _LeftLimits(Exception):
+    """A joint left its limits: (joint, time)."""
+
+
+class _Trial:
+    """Forward steps from one state under drives that are tried: the compiled loop, started anew each time."""
+
+    def __init__(self, system: System, rtol: float, method: int) -> None:
+        joints = len(system.robot.links)
+        self.system, self.rtol, self.method, self.count = system, rtol, method, 0
+        self.inputs = _inputs(system, Drive.force(*[constant(0.0)] * joints))
+        self.memory, self.work = loop.memory(joints, system.n), system._work()
+        self.big = self.memory.big.copy()  # the sizes so far, which weigh the errors
+        self.longest = longest_step(system) if method == loop.EXPLICIT else np.inf
+
+    def __call__(self, a: float, b: float, state: np.ndarray, drives: np.ndarray) -> np.ndarray:
+        """The state at b under constant drives from `state` at a."""
+        m = self.memory
+        self.inputs.segments[:, 1] = drives
+        m.z[:], m.big[:], m.s[:] = state, self.big, 0.0
+        m.s[loop.T], m.s[loop.H], m.s[loop.LONGEST], m.s[loop.ERR] = a, min(b - a, self.longest), self.longest, 1.0
+        out = np.empty((1, len(state)))
+        while m.s[loop.STATUS] == loop.RUNNING:
+            loop.advance(self.system.chain, self.work, self.inputs, m, self.method, self.rtol, np.array([b]), out, 10_000)
+        self.count += 1
+        if m.s[loop.STATUS] == loop.LIMIT:
+            raise _LeftLimits(int(m.s[loop.FAULT]), float(m.s[loop.T]))
+        if m.s[loop.STATUS] != loop.DONE:
+            raise FlexuraError(
+                f"the bisection diverged at t = {a:.6g} s: expected shorter steps, well below the periods of the modes"
+            )
+        return out[0]
+
+    def accept(self) -> None:
+        """Go on from the state tried last."""
+        self.big = self.memory.big.copy()
+
+
+def _bisect(
+    error: Callable[[np.ndarray], float], trial: _Trial, step: tuple[float, float, np.ndarray], drives: np.ndarray, i: int,
+    width: float, small: float,
+) -> np.ndarray:  # fmt: skip
+    """Put drives[i] where the error is below `small`, or as near as numbers come; returns the state there."""
+    centre = drives[i]
+
+    def at(value: float) -> tuple[float, np.ndarray]:
+        drives[i] = value
+        state = trial(*step, drives)
+        return error(state), state
+
+    while True:
+        low, high = centre - width, centre + width
+        below, _ = at(low)
+        above, state = at(high)
+        if below * above <= 0:
+            break
+        width *= 2
+        if not width < 1e9 * (1 + abs(centre)):
+            raise FlexuraError(f"the bisection found no drive of joint {i + 1} at t = {step[0]:.6g} s: expected shorter steps")
+    while True:
+        middle = (low + high) / 2
+        value, state = at(middle)
+        if abs(value) < small or not low < middle < high:
+            return state
+        low, high = (middle, high) if value * below > 0 else (low, middle)
+
+
+def _forces(rigid: System, motion: Sequence[Signal], t: float) -> np.ndarray:
+    """The rigid robot's drives (N,) along the motions."""
+    q, qd, qdd = np.array([m(t) for m in motion]).T
+    return rigid.forces(q, qd, qdd) + rigid.chain.coulomb * np.tanh(qd / COULOMB_SPEED)
+
+
+def _splines(
+    function: Callable[[float], np.ndarray], motion: Sequence[Signal], start: float, end: float, step: float
+) -> list[Signal]:
+    """Functions of time, one a joint, as splines; where a motion has a break, accelerations may jump and a new spline begins."""
+    from scipy.interpolate import CubicSpline
+
+    breaks = np.concatenate([[start, end], *(m.breaks for m in motion)])
+    parts: list[list[np.ndarray]] = [[] for _ in motion]
+    for a, b in pairwise(np.unique(np.clip(breaks, start, end))):
+        count = max(4, int(np.ceil((b - a) / step)) + 1)
+        x = a + (b - a) * (1 - np.cos(np.linspace(0, np.pi, count))) / 2  # closer at the ends: friction turns where a joint stops
+        x[-1] = b
+        inside = np.append(x[:-1], np.nextafter(b, -np.inf))
+        c = CubicSpline(x, np.array([function(s) for s in inside])).c  # (4, k, joints), highest power first
+        for i, rows in enumerate(parts):
+            new = np.zeros((len(x) - 1, COLUMNS))
+            new[:, 0], new[:, 1:5] = x[:-1], c[::-1, :, i].T
+            rows.append(new)
+    return [Signal(np.concatenate(rows), {"kind": "spline"}) for rows in parts]
+
+
+def _start(system: System, t: float, motion: Sequence[Signal], q0: Any, qd0: Any) -> tuple[np.ndarray, np.ndarray]:
+    """The state at the start, its joints on their motions."""
+    state = np.concatenate([_state(system, "q0", q0, system.start()), _state(system, "qd0", qd0, np.zeros(system.n))])
+    _put_on_motions(system, Drive.prescribed(*motion), t, state)
+    return state[: system.n], state[system.n :]

@@ -1,0 +1,66 @@
+"""Every robot file of the project: it loads, assembles, and does its default manoeuvre inside its limits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import flexura as fx
+from flexlab.manoeuvres import REACH, modest
+from flexura.drive import load_manoeuvre
+
+ROOT = Path(__file__).resolve().parents[2]
+FILES = sorted((ROOT / "model" / "robots").glob("*.toml"))
+
+
+def test_the_nine_structures_are_there():
+    structures = {fx.load(path).structure for path in FILES}
+    assert {a + b for a in ("R", "Pa", "Pb") for b in ("R", "Pa", "Pb")} <= structures
+    assert {"R", "Pa", "Pb", "RPbPa"} <= structures
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_a_robot_file_is_read_and_written_and_says_what_it_is(path, tmp_path):
+    robot = fx.load(path)
+    fx.save(robot, tmp_path / "again.toml")
+    assert fx.load(tmp_path / "again.toml") == robot
+    assert path.read_text().startswith("#") and robot.name and all(link.name for link in robot.links)
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_a_robot_does_its_default_manoeuvre(path):
+    """Every joint moves, none leaves its limits or the link it slides on, links bend by 1 % or so, energy is kept."""
+    robot = fx.load(path)
+    system = fx.assemble(robot)
+    asked = modest(system)
+    run = fx.simulate(system, asked.t, asked.drive, rtol=1e-7)
+    assert run.complete and run.meta["events"] == [] and run.meta["energy_error"] < 1e-5
+    for i, link in enumerate(robot.links, 1):
+        position = run[f"joint/{i}/position"]
+        assert 0.02 * REACH[link.joint.type] < np.ptp(position) < 1.2 * REACH[link.joint.type]
+        assert np.all((position >= system.limits[i - 1, 0]) & (position <= system.limits[i - 1, 1]))
+        if link.joint.type == "Pa" and i > 1 and robot.links[i - 2].joint.type == "Pb":
+            assert np.all(position > robot.links[i - 2].length_m - run[f"joint/{i - 1}/position"])
+        if link.flexible:
+            sag = abs(run[f"link/{i}/tip_deflection"]).max() / link.length_m
+            assert 1e-5 < sag < (0.05 if np.any(robot.gravity_m_s2) else 0.012)
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_a_robot_has_natural_frequencies_and_a_linear_model(path):
+    system = fx.assemble(fx.load(path))
+    locked = fx.frequencies(system)
+    assert np.all(locked > 0.1) and len(locked) == len(system.elastic_rows)
+    linear = fx.linearize(system)
+    zeros = linear.zeros(linear.inputs[0], "joint/1/position")
+    assert len(zeros) >= len(linear.poles) - 2 and np.all(np.isfinite(linear.A))
+
+
+def test_the_cart_of_the_single_link_comes_to_rest():
+    """The manoeuvre file beside it: a cycloid over two periods; the exact geometry and mode 2 leave 0.2 % of the deflection."""
+    system = fx.assemble(fx.load(ROOT / "model" / "robots" / "single-pa.toml"))
+    asked = load_manoeuvre(ROOT / "model" / "manoeuvres" / "single-pa-at-rest.toml", 1)
+    tip = np.abs(fx.simulate(system, asked.t, asked.drive, rtol=1e-8)["link/1/tip_deflection"])
+    assert tip[asked.t > 2 / 1.44972].max() < 2e-3 * tip.max() and tip.max() == pytest.approx(0.0255, abs=2e-4)
