@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json as json_
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+
+from .terminal import announce_compiling, default_folder, events, interrupted, prepare, progress_bars, say, show, stored
 
 app = typer.Typer(
     name="flexura",
@@ -46,14 +45,14 @@ def simulate(
 
     from . import tables
 
-    system, asked = _prepare(robot, manoeuvre)
-    with _progress("native") as report:
+    system, asked = prepare(robot, manoeuvre)
+    with progress_bars("native") as report:
         run = fx.simulate(system, asked.t, asked.drive, rtol=rtol, method=method, progress=lambda f: report("native", f))
     run.meta["manoeuvre"] = asked.name
-    folder = out or _default_folder("simulate", robot)
+    folder = out or default_folder("simulate", robot)
     path = run.save(folder)
-    _show(json, lambda: tables.run_table(run), lambda: tables.run_json(run) | {"run": str(path)})
-    _stored(run, path, json)
+    show(json, lambda: tables.run_table(run), lambda: tables.run_json(run) | {"run": str(path)})
+    stored(run, path, json)
 
 
 @app.command()
@@ -73,7 +72,7 @@ def inverse(
     from . import tables
     from .effort import efforts
 
-    system, asked = _prepare(robot, manoeuvre)
+    system, asked = prepare(robot, manoeuvre)
     motions = [joint.motion for joint in asked.drive.joints]
     for i, (motion, link) in enumerate(zip(motions, system.robot.links, strict=True), 1):
         if motion is None and not link.joint.locked:
@@ -84,18 +83,18 @@ def inverse(
         drive = fx.Drive.prescribed(*motions)
     except fx.InputError as error:
         raise error.in_file(str(manoeuvre)) from None
-    with _progress("inverse") as report:
+    with progress_bars("inverse") as report:
         run = fx.simulate(system, asked.t, drive, rtol=rtol, method=method, progress=lambda f: report("inverse", f))
     run.meta["manoeuvre"] = asked.name
-    folder = out or _default_folder("inverse", robot)
+    folder = out or default_folder("inverse", robot)
     path = run.save(folder)
     rows = efforts(run)
-    _show(
+    show(
         json,
         lambda: tables.effort_table(rows, run),
         lambda: tables.run_json(run) | {"drives": [vars(r) for r in rows], "run": str(path)},
     )
-    _stored(run, path, json)
+    stored(run, path, json)
 
 
 @app.command()
@@ -122,7 +121,7 @@ def frequencies(
     rows = transmission(fx.linearize(system)) if zeros else []
     title = described.name or robot.stem
     found = {"locked_Hz": locked.tolist(), "free_Hz": free.tolist()}
-    _show(
+    show(
         json,
         lambda: tables.frequency_tables(locked, free, title, rows),
         lambda: found | ({"zeros": [row.numbers() for row in rows]} if zeros else {}),
@@ -149,16 +148,16 @@ def study(
 
     described = fx.load(robot)
     asked = None if manoeuvre is None else fx.load_manoeuvre(manoeuvre, len(described.links))
-    folder = out or _default_folder(f"study-{kind}", robot)
-    _announce_compiling()
-    with _progress(kind) as report:
+    folder = out or default_folder(f"study-{kind}", robot)
+    announce_compiling()
+    with progress_bars(kind) as report:
         done = studies.run(
             kind, described, asked, values, keep=keep, rtol=rtol, jobs=jobs, progress=lambda f: report(kind, f),
             channels=folder / "runs" if channels else None,
         )  # fmt: skip
     stored = [str(path) for path in studies.save(done, folder)]
-    _show(json, lambda: studies.table(done), lambda: studies.numbers(done) | {"stored": stored})
-    _say(json, f"stored {', '.join(stored)}")
+    show(json, lambda: studies.table(done), lambda: studies.numbers(done) | {"stored": stored})
+    say(json, f"stored {', '.join(stored)}")
     if not done.complete:
         typer.echo(f"interrupted after {len(done.rows)} runs, which are stored", err=True)
         raise typer.Exit(130)
@@ -166,9 +165,11 @@ def study(
 
 @app.command()
 def crosscheck(
-    robot: RobotFile, manoeuvre: ManoeuvreFile = None, out: Out = None, rtol: Rtol = 1e-7,
+    robot: Annotated[Path | None, typer.Argument(metavar="ROBOT", help="robot file (TOML); or --all")] = None,
+    manoeuvre: ManoeuvreFile = None, out: Out = None, rtol: Rtol = 1e-7,
     beam: Annotated[str, typer.Option(help="ancf (Euler-Bernoulli) or ge (geometrically exact, with shear)")] = "ancf",
     tolerance: Annotated[float, typer.Option(min=0.0, help="largest deviation allowed, relative to each channel's peak")] = 0.01,
+    all_: Annotated[bool, typer.Option("--all", help="the dissertation's nine structures: one table, one review")] = False,
     json: Json = False,
 ) -> None:  # fmt: skip
     """Simulate a robot natively and in Exudyn, and compare; exit status 1 when a channel deviates by more than the tolerance.
@@ -176,27 +177,47 @@ def crosscheck(
     \b
     Example: flexura crosscheck model/robots/rig.toml model/manoeuvres/rig-inverse-law.toml --tolerance 0.005
     """
+    from flexura.errors import InputError
+
     from . import crosscheck as cross
     from . import tables
 
-    system, asked = _prepare(robot, manoeuvre)
-    with _progress("native", "twin") as report:
+    if all_ or robot is None:
+        if not all_ or robot is not None:
+            raise InputError("expected a robot file, or --all without one", key="ROBOT", value=robot and str(robot))
+        _crosscheck_all(out or Path("logs/crosscheck-all"), json)
+        return
+    system, asked = prepare(robot, manoeuvre)
+    with progress_bars("native", "twin") as report:
         check = cross.crosscheck(system.robot, asked, beam=beam, rtol=rtol, tolerance=tolerance, progress=report)
-    folder = out or _default_folder("crosscheck", robot)
+    folder = out or default_folder("crosscheck", robot)
     review = cross.save(check, folder)
-    _show(json, lambda: tables.check_table(check), lambda: tables.check_json(check) | {"review": str(review)})
+    show(json, lambda: tables.check_table(check), lambda: tables.check_json(check) | {"review": str(review)})
     for run in (check.simulation, check.twin):
-        _events(run)
-    _say(json, f"stored {folder}", f"look at it: flexura review {folder / 'simulation'} {folder / 'twin'}")
+        events(run)
+    say(json, f"stored {folder}", f"look at it: flexura review {folder / 'simulation'} {folder / 'twin'}")
     if not check.passed:
         if check.failed:
             typer.echo(f"beyond the tolerance of {100 * tolerance:g} %: {', '.join(check.failed)}", err=True)
-        raise typer.Exit(130 if _interrupted(check.simulation) or _interrupted(check.twin) else 1)
+        raise typer.Exit(130 if interrupted(check.simulation) or interrupted(check.twin) else 1)
+
+
+def _crosscheck_all(folder: Path, json: bool) -> None:
+    from . import nine
+
+    announce_compiling()
+    with progress_bars("all nine") as report:
+        rows = nine.crosscheck_nine(progress=lambda f: report("all nine", f))
+    recording = nine.save(rows, folder)
+    show(json, lambda: nine.table(rows), lambda: nine.numbers(rows) | {"review": str(recording)})
+    say(json, f"stored {folder}", f"look at it: flexura review {recording}")
+    if not all(row.passed for row in rows):
+        raise typer.Exit(1)
 
 
 @app.command()
 def review(
-    runs: Annotated[list[Path], typer.Argument(metavar="RUN [RUN]", help="one or two folders of runs")],
+    runs: Annotated[list[Path], typer.Argument(metavar="RUN [RUN]", help="one or two folders of runs; or a review, .rrd")],
     save: Annotated[
         Path | None, typer.Option(metavar="FILE.rrd", help="write the review to this file instead of opening it")
     ] = None,
@@ -216,12 +237,14 @@ def review(
 
     if len(runs) > 2:
         raise fx.InputError("expected one or two runs", key="RUN", value=[str(r) for r in runs])
-    read = [fx.Run.read(folder) for folder in runs]
-    target = save or (
-        picture.with_suffix(".rrd") if picture else (runs[0] if runs[0].is_dir() else runs[0].parent) / "review.rrd"
-    )
-    rerun.write_review(target, read)
-    typer.echo(f"stored {target}")
+    if runs[0].suffix == ".rrd" and len(runs) == 1 and save is None:
+        target = runs[0]
+    else:
+        read = [fx.Run.read(folder) for folder in runs]
+        beside = (runs[0] if runs[0].is_dir() else runs[0].parent) / "review.rrd"
+        target = save or (picture.with_suffix(".rrd") if picture else beside)
+        rerun.write_review(target, read)
+        typer.echo(f"stored {target}")
     if picture is not None:
         rerun.picture(target, picture, time_s=time_s)
         typer.echo(f"stored {picture}")
@@ -244,10 +267,10 @@ def demo(
     from . import tables
     from .demo import demonstrate
 
-    _announce_compiling()
-    with _progress("native", "twin") as report:
+    announce_compiling()
+    with progress_bars("native", "twin") as report:
         check, recording, drawn = demonstrate(out, report)
-    _show(
+    show(
         json,
         lambda: tables.check_table(check),
         lambda: tables.check_json(check) | {"review": str(recording), "picture": str(drawn) if isinstance(drawn, Path) else None},
@@ -267,9 +290,9 @@ def demo(
     ]
     if shutil.which("flexura") is None:
         lines.append("(the command is in .venv/bin; to have it at hand: source .venv/bin/activate)")
-    _say(json, *lines)
+    say(json, *lines)
     if not check.passed:
-        raise typer.Exit(130 if _interrupted(check.simulation) or _interrupted(check.twin) else 1)
+        raise typer.Exit(130 if interrupted(check.simulation) or interrupted(check.twin) else 1)
 
 
 @app.command()
@@ -294,84 +317,9 @@ def doctor(json: Json = False) -> None:
             out.add_row(f"{mark[f.state]} {f.what}", f.found, f.cost)
         return out
 
-    _show(json, table, lambda: [vars(f) for f in findings])
+    show(json, table, lambda: [vars(f) for f in findings])
     if any(f.state == "missing" for f in findings):
         raise typer.Exit(1)
-
-
-def _prepare(robot: Path, manoeuvre: Path | None) -> Any:
-    """The assembled robot and what it is asked to do."""
-    import flexura as fx
-
-    from .manoeuvres import modest
-
-    described = fx.load(robot)
-    try:
-        system = fx.assemble(described)
-    except fx.InputError as error:
-        raise error if error.file else error.in_file(str(robot)) from None
-    asked = None if manoeuvre is None else fx.load_manoeuvre(manoeuvre, len(described.links))
-    _announce_compiling()
-    return system, asked or modest(system)
-
-
-def _announce_compiling() -> None:
-    from flexura.compiled import folder
-
-    if not any(folder().glob("**/*.nbc")):
-        typer.echo("compiling the solver: once, about half a minute", err=True)
-
-
-@contextmanager
-def _progress(*names: str) -> Iterator[Callable[[str, float], None]]:
-    """Progress bars on a terminal's stderr, nothing elsewhere."""
-    if not sys.stderr.isatty():
-        yield lambda name, fraction: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (TextColumn("{task.description:>8}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
-        tasks = {name: bars.add_task(name, total=1.0) for name in names}
-        yield lambda name, fraction: bars.update(tasks[name], completed=fraction)
-
-
-def _show(json: bool, table: Callable[[], Any], data: Callable[[], Any]) -> None:
-    if json:
-        typer.echo(json_.dumps(data(), indent=1))
-        return
-    from rich.console import Console
-
-    console = Console() if sys.stdout.isatty() else Console(width=120)
-    console.print(table())
-
-
-def _say(json: bool, *lines: str) -> None:
-    if not json:
-        for line in lines:
-            typer.echo(line)
-
-
-def _events(run: Any) -> None:
-    for event in run.meta.get("events", []):
-        typer.echo(f"{run.meta['source']}: {event['level'].lower()} at t = {event['t']:.4g} s: {event['text']}", err=True)
-
-
-def _stored(run: Any, path: Path, json: bool) -> None:
-    """What happened to a run and where it is; the status of one that did not come to its end."""
-    _events(run)
-    _say(json, f"stored {path}", f"look at it: flexura review {path.parent}")
-    if not run.complete:
-        raise typer.Exit(130 if _interrupted(run) else 1)
-
-
-def _interrupted(run: Any) -> bool:
-    return any(event["text"] == "interrupted" for event in run.meta.get("events", []))
-
-
-def _default_folder(command: str, robot: Path) -> Path:
-    return Path("logs") / f"{command}-{robot.stem}"
 
 
 def main() -> None:

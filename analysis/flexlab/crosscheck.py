@@ -48,12 +48,13 @@ def crosscheck(
     beam: str = "ancf",
     rtol: float = 1e-7,
     tolerance: float = TOLERANCE,
+    step_s: float | None = None,
     progress: Progress | None = None,
 ) -> Check:
     """Simulate a robot natively and in Exudyn along the same manoeuvre, and compare.
 
-    `beam`: "ancf" or "ge", see `flexura.twin`. `progress` is called with "native" or "twin" and the finished fraction. The
-    table's channels: joint positions, tip deflections, the tip's position.
+    `beam`: "ancf" or "ge", `step_s`: Exudyn's step, see `flexura.twin`. `progress` is called with "native" or "twin" and the
+    finished fraction. The table's channels: joint positions, tip deflections, the tip's position.
     """
     if manoeuvre.drive.follows.any():
         raise fx.InputError(
@@ -62,7 +63,7 @@ def crosscheck(
     report = progress or (lambda name, fraction: None)
     native = fx.simulate(fx.assemble(robot), manoeuvre.t, manoeuvre.drive, rtol=rtol, progress=lambda f: report("native", f))
     report("native", 1.0)
-    other = twin.simulate(robot, native.t, manoeuvre.drive, beam=beam, progress=lambda f: report("twin", f))
+    other = twin.simulate(robot, native.t, manoeuvre.drive, beam=beam, step_s=step_s, progress=lambda f: report("twin", f))
     report("twin", 1.0)
     for run in (native, other):
         run.meta["manoeuvre"] = manoeuvre.name

@@ -15,8 +15,9 @@ TRIALS = 8
 REACH = {"R": 0.3, "Pa": 0.05, "Pb": 0.05}  # rad, m: how far a joint goes at most
 
 
-def modest(system: fx.System) -> Manoeuvre:
-    """Smoothed bang-bang forces that deflect the links by about 1 % of their length, or move a joint by 0.3 rad or 0.05 m.
+def modest(system: fx.System, duration_s: float = DURATION_S) -> Manoeuvre:
+    """Smoothed bang-bang forces that deflect the links by about 1 % of their length, or move a joint by 0.3 rad or 0.05 m, in
+    `duration_s`, and let the robot alone for as long again.
 
     Forces are proportional to the joints' inertias at the start; trial runs give the scale, from what they have beyond a run
     without these forces where there is gravity. Joints with limits, and those that slide on a link, use at most 80 % of the way
@@ -27,8 +28,9 @@ def modest(system: fx.System) -> Manoeuvre:
     zero = np.zeros(system.n)
     hold = system.forces(fx.static(system), zero, zero)[rows]
     reach = _reach(system)
-    unit = inertia * 4 * reach / DURATION_S**2  # a rigid joint alone goes as far as its reach
-    run = lambda scale: fx.simulate(system, np.linspace(0, 2 * DURATION_S, 401), _drive(hold, scale * unit).drive, rtol=1e-5)
+    unit = inertia * 4 * reach / duration_s**2  # a rigid joint alone goes as far as its reach
+    asked = lambda scale: _manoeuvre(hold, scale * unit, duration_s)
+    run = lambda scale: fx.simulate(system, np.linspace(0, 2 * duration_s, 401), asked(scale).drive, rtol=1e-5)
     still = run(0.0) if np.any(robot.gravity_m_s2) else None
 
     def size(moved: fx.Run) -> float:
@@ -48,17 +50,17 @@ def modest(system: fx.System) -> Manoeuvre:
         if found <= 1.1:
             break
         scale *= max(0.9 / found, 0.6)
-    return _drive(hold, scale * unit)
+    return asked(scale)
 
 
-def _drive(hold: np.ndarray, amplitude: np.ndarray) -> Manoeuvre:
+def _manoeuvre(hold: np.ndarray, amplitude: np.ndarray, duration_s: float) -> Manoeuvre:
     joints = []
     for h, a in zip(hold, amplitude, strict=True):
-        pulse = bang_bang(a, DURATION_S, 0.05)
+        pulse = bang_bang(a, duration_s, 0.05 * duration_s)
         segments = pulse.segments.copy()
         segments[:, 1] += h
         joints.append(JointDrive(force=fx.Signal(segments, pulse.spec | {"offset": float(h)})))
-    return Manoeuvre("a modest back and forth of every joint", 2 * DURATION_S, 0.01, fx.Drive(tuple(joints)))
+    return Manoeuvre("a modest back and forth of every joint", 2 * duration_s, 0.01 * duration_s, fx.Drive(tuple(joints)))
 
 
 def _reach(system: fx.System) -> np.ndarray:

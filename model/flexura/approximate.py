@@ -17,7 +17,7 @@ from . import loop
 from .chain import COULOMB_SPEED
 from .choice import choose, longest_step
 from .drive import Drive
-from .errors import FlexuraError
+from .errors import FlexuraError, InputError
 from .forward import _inputs, _limit_event, _put_on_motions, _state, _times, simulate
 from .record import record
 from .robot import Robot
@@ -25,7 +25,7 @@ from .run import Run
 from .signal import COLUMNS, Signal, constant
 from .system import System, assemble
 
-MAX_SWEEPS = 60
+MAX_SWEEPS = 300  # joint after joint, in one step
 
 
 def rigid_robot(robot: Robot) -> Robot:
@@ -76,10 +76,13 @@ def by_bisection(
     Drive.prescribed(*motion)
     q0, qd0 = _start(system, t[0], motion, q0, qd0)
     state = np.concatenate([system.to_solver @ q0, system.to_solver @ qd0, [0.0, 0.0]])
+    limited = _inputs(system, Drive.none(len(rows)))
     trial = _Trial(system, rtol, choose(system, t[-1] - t[0], rtol))
     rigid = assemble(rigid_robot(system.robot))
     inertia = np.diag(rigid.mass(rigid.start()))
     moving = np.flatnonzero(~system.chain.locked.astype(bool))
+    if not len(moving):
+        raise InputError("expected a joint that is free to move", key="link.joint.locked", value=True)
     states, forces = [state], []
     events: list[dict[str, Any]] = []
     begun = time.perf_counter()
@@ -96,13 +99,17 @@ def by_bisection(
                     width[i] = 2 * abs(drives[i] - before) + 1e-9 * inertia[i]
                 if np.abs(error(after)[moving]).max() < joint_error:
                     break
+            else:
+                raise FlexuraError(f"the bisection of the joints in turn did not settle at t = {a:.6g} s: expected shorter steps")
             trial.accept()
+            joint = loop.outside(system.chain, limited, after)
+            if joint >= 0:
+                events.append(_limit_event(system, joint, float(a), np.clip(after[rows], *system.limits.T)))
+                break
             states.append(after)
             forces.append(drives)
             if progress is not None:
                 progress((b - t[0]) / (t[-1] - t[0]))
-    except _LeftLimits as left:
-        events.append(_limit_event(system, *left.args))
     except KeyboardInterrupt:
         events.append({"t": float(t[len(states) - 1]), "level": "WARN", "text": "interrupted"})
     z, rows_done = np.array(states), len(states)
@@ -114,17 +121,14 @@ def by_bisection(
     return record(system, t[:rows_done], z[:, : 2 * n], z[:, 2 * n :], np.array(forces[:rows_done]), meta)
 
 
-class _LeftLimits(Exception):
-    """A joint left its limits: (joint, time)."""
-
-
 class _Trial:
     """Forward steps from one state under drives that are tried: the compiled loop, started anew each time."""
 
     def __init__(self, system: System, rtol: float, method: int) -> None:
         joints = len(system.robot.links)
         self.system, self.rtol, self.method, self.count = system, rtol, method, 0
-        self.inputs = _inputs(system, Drive.force(*[constant(0.0)] * joints))
+        inputs, free = _inputs(system, Drive.force(*[constant(0.0)] * joints)), np.full(joints, np.inf)
+        self.inputs = inputs._replace(low=-free, high=free)  # a trial may go beyond
         self.memory, self.work = loop.memory(joints, system.n), system._work()
         self.big = self.memory.big.copy()  # the sizes so far, which weigh the errors
         self.longest = longest_step(system) if method == loop.EXPLICIT else np.inf
@@ -139,8 +143,6 @@ class _Trial:
         while m.s[loop.STATUS] == loop.RUNNING:
             loop.advance(self.system.chain, self.work, self.inputs, m, self.method, self.rtol, np.array([b]), out, 10_000)
         self.count += 1
-        if m.s[loop.STATUS] == loop.LIMIT:
-            raise _LeftLimits(int(m.s[loop.FAULT]), float(m.s[loop.T]))
         if m.s[loop.STATUS] != loop.DONE:
             raise FlexuraError(
                 f"the bisection diverged at t = {a:.6g} s: expected shorter steps, well below the periods of the modes"

@@ -147,7 +147,7 @@ def _steady(system: System, v: np.ndarray) -> np.ndarray:
 
 
 def _sizes(system: System) -> np.ndarray:
-    """Roots of the elastic rows' stiffness at the start, which make square roots of energies of them, in the solver's coordinates."""
+    """Roots of the elastic rows' stiffness at the start: times y, roots of energies, in the solver's coordinates."""
     return np.sqrt(np.diag(system.transform.T @ system.stiffness() @ system.transform)[system.elastic_rows])
 
 

@@ -38,6 +38,7 @@ def test_a_payload_near_20_g_bends_type_1_least():
     for grams, mm in SET_I.items():
         assert 1e3 * by_payload[grams]["max_m"] == pytest.approx(mm, rel=0.015)
     assert done.complete and done.finding.reproduced and done.finding.numbers["payload_kg"] == pytest.approx(0.020)
+    assert done.finding.numbers["dips"] == 2 and "narrower dips: 11" in done.finding.words  # the other one is at 3.5 g
     assert 0.010 < done.finding.numbers["from_kg"] < 0.020 < done.finding.numbers["to_kg"] < 0.030
     assert done.finding.numbers["residual_payload_kg"] == pytest.approx(0.020) and by_payload[20]["later_m"] < 2e-3
 
@@ -99,10 +100,19 @@ def test_what_belongs_to_a_length_goes_with_it():
 
 
 @pytest.mark.parametrize(
-    "y, where", [([3, 2, 1, 2, 3], 2), ([1, 2, 3], None), ([3, 2, 1], None), ([2, 1.95, 2], None), ([5, 1, 2, 0.9, 4], 3)]
+    "y, where",
+    [
+        ([3, 2, 1, 2, 3], [2]),
+        ([1, 2, 3], []),
+        ([3, 2, 1], []),
+        ([2, 1.95, 2], []),
+        ([5, 1, 2, 0.9, 4], [1, 3]),
+        ([9, 1, 9, 2, 2.1, 2.05, 2.1, 9], [3, 1]),  # the widest first; the ripple inside it is none
+    ],
 )
 def test_a_dip_lies_between_two_hills(y, where):
-    assert payload._dip(np.array(y, dtype=float)) == where
+    assert sorted(k for k, _, _ in payload._dips(np.arange(len(y)), np.array(y, dtype=float))) == sorted(where)
+    assert [k for k, _, _ in payload._dips(np.arange(len(y)), np.array(y, dtype=float))][:1] == where[:1]
 
 
 def test_the_range_of_a_dip_ends_where_its_sides_have_risen_by_a_tenth():

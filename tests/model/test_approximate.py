@@ -115,9 +115,26 @@ def test_reaching_a_limit_ends_the_run():
     sys = system(rigid(0.1, 0.6, 0.05, 5e-4, "Pa", limits=[-0.01, 0.03]))
     run = by_bisection(sys, np.linspace(0.0, 1.0, 51), [cycloid(0.05, 1.0)])
     assert not run.complete and "left its limits" in run.meta["events"][0]["text"] and run["joint/1/position"].max() <= 0.03
+    assert np.ptp(run["joint/1/position"]) > 0.025 and run.meta["events"][0]["t"] == run.t[-1]
 
 
 def test_a_motion_that_jumps_is_refused():
     for way in (by_bisection, by_rigid_robot):
         with pytest.raises(fx.InputError, match="jumps"):
             way(bench(), [0.0, 1.0], [step(1.0, 0.5)])
+
+
+def test_sleeves_and_sliders_are_bisected_too():
+    """Type III: a sleeved strip, drives in the middles of the steps against the exact ones."""
+    link = beam(0.4, 0.157, 0.3333, 4, "Pb", start=0.25, modes=2)
+    sys = system(rigid(0.2, 0.2, 0.1, 1e-3), link, payload=0.02)
+    t, motion = np.arange(0.0, 0.3, 0.002), [cycloid(0.4, 0.25), cycloid(0.3, 0.25, 0.25)]
+    run, exact = by_bisection(sys, t, motion), fx.inverse(sys, t + 0.001, motion, rtol=1e-9)
+    for i in (1, 2):
+        needed = exact[f"joint/{i}/drive"][:-1]
+        assert run[f"joint/{i}/drive"][:-1] == pytest.approx(needed, abs=0.01 * np.abs(needed).max())
+
+
+def test_a_robot_with_all_joints_locked_is_refused():
+    with pytest.raises(fx.InputError, match="free to move"):
+        by_bisection(system(beam(0.6, 0.2355, 0.5, 2, locked=True)), [0.0, 0.1], [constant(0.0)])

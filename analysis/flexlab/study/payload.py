@@ -17,7 +17,7 @@ NEAR = 0.10  # its range: payloads that bend the link by at most this more
 
 def values(robot: fx.Robot) -> tuple[float, float, int]:
     """Lowest, highest, count: up to ten times the robot's payload, or the mass of its last flexible link."""
-    return 0.0, 10 * robot.payload.mass_kg or _mass(robot), 41
+    return 0.0, 10 * robot.payload.mass_kg or _mass(robot), 81
 
 
 def cases(robot: fx.Robot, manoeuvre: Manoeuvre | None, payloads_kg: np.ndarray) -> list[Case]:
@@ -32,34 +32,42 @@ def cases(robot: fx.Robot, manoeuvre: Manoeuvre | None, payloads_kg: np.ndarray)
 
 
 def finding(rows: list[Row]) -> Finding:
-    """The deepest dip of the largest deflection over the payload, and its range; the same of what is left after the drives."""
+    """The widest dip of the largest deflection over the payload, all others too; and of what is left after the drives."""
     m, largest = np.array([r["payload_kg"] for r in rows]), np.array([r["max_m"] for r in rows])
-    k = _dip(largest)
-    if k is None:
+    found = _dips(m, largest)
+    if not found:
         words = f"the largest deflection has no dip deeper than {100 * DEEP:g} % between {1e3 * m[0]:g} and {1e3 * m[-1]:g} g"
         return Finding(CLAIM, False, words, {})
-    low, high = _around(m, largest, k)
+    (k, low, high), *others = found
     numbers = {
         "payload_kg": m[k], "from_kg": low, "to_kg": high, "max_m": largest[k],
-        "peak_below_m": largest[:k].max(), "peak_above_m": largest[k:].max(),
+        "peak_below_m": largest[:k].max(), "peak_above_m": largest[k:].max(), "dips": len(found),
     }  # fmt: skip
     g, mm = (lambda name: f"{1e3 * numbers[name]:.3g}"), (lambda name: f"{1e3 * numbers[name]:.3g} mm")
     words = (
         f"least at {g('payload_kg')} g: {mm('max_m')}, within {100 * NEAR:g} % of it from {g('from_kg')} to {g('to_kg')} g; "
         f"up to {mm('peak_below_m')} below and {mm('peak_above_m')} above"
     )
+    if others:
+        words += "; narrower dips: " + ", ".join(f"{1e3 * largest[j]:.3g} mm at {1e3 * m[j]:.3g} g" for j, _, _ in others)
     left = np.array([r["later_m"] for r in rows])
-    if np.isfinite(left).all() and (j := _dip(left)) is not None:
+    if np.isfinite(left).all() and (dips := _dips(m, left)):
+        j = dips[0][0]
         numbers |= {"residual_payload_kg": m[j], "residual_m": left[j]}
         words += f"; what is left after the drives is least at {1e3 * m[j]:.3g} g: {1e3 * left[j]:.3g} mm"
     return Finding(CLAIM, True, words, {name: float(v) for name, v in numbers.items()})
 
 
-def _dip(y: np.ndarray) -> int | None:
-    """The inner place below both neighbouring hills by most of its own value, if by more than DEEP of it."""
-    depth = [min(y[:k].max(), y[k + 1 :].max()) / max(y[k], 1e-300) - 1 for k in range(1, len(y) - 1)]
-    k = int(np.argmax(depth)) + 1 if depth else 0
-    return k if k and depth[k - 1] > DEEP else None
+def _dips(x: np.ndarray, y: np.ndarray) -> list[tuple[int, float, float]]:
+    """Minima inside the range from which y rises on both sides by more than DEEP of its value there, before it falls below it.
+
+    The widest first: its index, and from where to where y is at most NEAR above it.
+    """
+    from scipy.signal import find_peaks
+
+    found, about = find_peaks(-y, prominence=0.0)
+    deep = found[about["prominences"] > DEEP * y[found]]
+    return sorted(((int(k), *_around(x, y, k)) for k in deep), key=lambda dip: dip[1] - dip[2])
 
 
 def _around(x: np.ndarray, y: np.ndarray, k: int) -> tuple[float, float]:
