@@ -123,8 +123,9 @@ def simulate(
 ) -> Run:
     """`forward.simulate`, which is also `solve`, for a robot that slides node by node: piece after piece.
 
-    Arguments as checked there; a Python `drive` takes four arguments. q, qd (n,): nodes of a sleeved link are fixed to it, and
-    those at rest are left out. `meta["energy_jumps"]` lists the changes, {t, text, J}, and `meta["energy_error"]` leaves them out.
+    Arguments as checked there; a Python `drive` takes four arguments. In q, qd (n,) the nodes of a sleeved link are fixed to it;
+    what is given for those at rest is left out. `meta["energy_jumps"]` lists the changes, {t, text, J}, and
+    `meta["energy_error"]` leaves them out.
     """
     position = q[system.joint_rows]
     nodes, now = _nodes(system.robot, position), float(t[0])

@@ -61,8 +61,8 @@ def describe(system: System, error: float) -> dict[str, Any]:
 
 
 def energy_error(energies: np.ndarray, work: np.ndarray, jumps: Any = 0.0) -> float:
-    """Largest |E - E(0) - work + loss - jumps| of energies (T, 3), work and loss (T, 2), and E's jumps so far (T,), relative to the
-    largest of these energies, or work or loss."""
+    """Largest |E - E(0) - work + loss - jumps| of energies (T, 3), work and loss (T, 2), and E's jumps so far (T,), relative to
+    the largest of these energies, or work or loss."""
     total = energies.sum(axis=1)
     balance = total - total[0] - (work[:, 0] - work[0, 0]) + (work[:, 1] - work[0, 1]) - jumps
     scale = max(np.abs(energies).max(), np.abs(energies - energies[0]).max(), np.abs(work).max(), 1e-300)
