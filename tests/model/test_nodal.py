@@ -6,11 +6,11 @@ import _thread
 
 import numpy as np
 import pytest
-from robots import beam, largest_difference, rigid, robot, system
 
 import flexura as fx
 from flexura import nodal, signal
 from flexura.approximate import by_bisection
+from robots import beam, largest_difference, rigid, robot, system
 
 TAPER = ([{"at_m": 0.0, "value": 0.3}, {"at_m": 0.8, "value": 0.15}], [{"at_m": 0.0, "value": 2.0}, {"at_m": 0.8, "value": 0.7}])
 KEYS = {"hub_mass_kg": 0.1, "hub_inertia_kg_m2": 2e-3}
