@@ -23,6 +23,8 @@ def modest(system: fx.System, duration_s: float = DURATION_S) -> Manoeuvre:
     without these forces where there is gravity. Joints with limits, and those that slide on a link, use at most 80 % of the way
     to the nearer end. Constant forces hold the robot in its static equilibrium.
     """
+    if system.robot.nodal:  # its mass matrix is that of no single q
+        system = fx.assemble(system.robot.replace({"sliding": "continuous"}))
     robot, rows = system.robot, system.joint_rows
     inertia = np.diag(system.mass(system.start()))[rows] * ~system.chain.locked.astype(bool)
     zero = np.zeros(system.n)

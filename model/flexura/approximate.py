@@ -18,8 +18,8 @@ from .chain import COULOMB_SPEED
 from .choice import choose, longest_step
 from .drive import Drive
 from .errors import FlexuraError, InputError
-from .forward import _inputs, _limit_event, _put_on_motions, _state, _times, simulate
-from .record import record
+from .forward import _inputs, _put_on_motions, _state, _times, simulate
+from .record import limit_event, record
 from .robot import Robot
 from .run import Run
 from .signal import COLUMNS, Signal, constant
@@ -104,7 +104,7 @@ def by_bisection(
             trial.accept()
             joint = loop.outside(system.chain, limited, after)
             if joint >= 0:
-                events.append(_limit_event(system, joint, float(a), np.clip(after[rows], *system.limits.T)))
+                events.append(limit_event(system, joint, float(a), np.clip(after[rows], *system.limits.T)))
                 break
             states.append(after)
             forces.append(drives)
@@ -212,6 +212,6 @@ def _splines(
 
 def _start(system: System, t: float, motion: Sequence[Signal], q0: Any, qd0: Any) -> tuple[np.ndarray, np.ndarray]:
     """The state at the start, its joints on their motions."""
-    state = np.concatenate([_state(system, "q0", q0, system.start()), _state(system, "qd0", qd0, np.zeros(system.n))])
-    _put_on_motions(system, Drive.prescribed(*motion), t, state)
-    return state[: system.n], state[system.n :]
+    q, qd = _state(system, "q0", q0, system.start()), _state(system, "qd0", qd0, np.zeros(system.n))
+    _put_on_motions(system, Drive.prescribed(*motion), t, q, qd)
+    return system._check(q), qd

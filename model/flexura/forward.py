@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from . import loop
+from . import loop, nodal
 from .chain import Work
 from .choice import choose, longest_step
 from .drive import Drive
 from .errors import FlexuraError, InputError
 from .kernel import accelerate
-from .record import record
+from .record import limit_event, record
 from .run import Run
 from .signal import Signal
 from .system import System
@@ -51,24 +51,23 @@ def simulate(
         raise InputError("expected a relative tolerance between 1e-13 and 0.1", key="rtol", value=rtol)
     if method not in ("auto", *_METHODS):
         raise InputError('expected "auto", "explicit" or "implicit"', key="method", value=method)
-    state = np.concatenate(
-        [
-            system.to_solver @ _state(system, "q0", q0, system.start()),
-            system.to_solver @ _state(system, "qd0", qd0, np.zeros(system.n)),
-            [0.0, 0.0],
-        ]
-    )
-    state[system.n + system.joint_rows[system.chain.locked.astype(bool)]] = 0.0
-    if isinstance(drive, Drive):
-        _put_on_motions(system, drive, t[0], state)
-    _inside_limits(system, state)
+    q, qd = _state(system, "q0", q0, system.start()), _state(system, "qd0", qd0, np.zeros(system.n))
+    qd[system.joint_rows[system.chain.locked.astype(bool)]] = 0.0
     drive = Drive.none(len(system.robot.links)) if drive is None else drive
-    chosen = choose(system, t[-1] - t[0], rtol) if method == "auto" else _METHODS[method]
     if isinstance(drive, Drive):
         if len(drive.joints) != len(system.robot.links):
             raise InputError(
                 f"expected {len(system.robot.links)} joint drives, one a joint", key="drive", value=len(drive.joints)
             )
+        _put_on_motions(system, drive, t[0], q, qd)
+    else:
+        drive = as_function(drive)
+    _inside_limits(system, q)
+    if system.robot.nodal:
+        return nodal.simulate(simulate, system, t, drive, q, qd, rtol, method, progress)
+    state = np.concatenate([system.to_solver @ q, system.to_solver @ qd, [0.0, 0.0]])
+    chosen = choose(system, t[-1] - t[0], rtol) if method == "auto" else _METHODS[method]
+    if isinstance(drive, Drive):
         t, states, work, meta = _compiled(system, t, drive, state, rtol, chosen, progress)
     else:
         t, states, work, meta = _python(system, t, drive, state, rtol, chosen, progress)
@@ -134,7 +133,7 @@ def _compiled(
                 )
             if status == loop.LIMIT:
                 joint, at, row = int(m.s[loop.FAULT]), float(m.s[loop.T]), int(m.s[loop.OUT])
-                events.append(_limit_event(system, joint, at, m.z[system.joint_rows]))
+                events.append(limit_event(system, joint, at, m.z[system.joint_rows]))
                 if at > t[row - 1]:  # the last good state
                     t, out[row] = np.append(t[:row], at), m.z
                     m.s[loop.OUT] += 1
@@ -186,12 +185,11 @@ def _python(
 
     c, n, links = system.chain, system.n, len(system.robot.links)
     w, zero, a = system._work(), np.zeros(links), np.zeros(n)
-    call = as_function(drive)
     begun = time.perf_counter()
 
     def slope(time_s: float, z: np.ndarray) -> np.ndarray:
         y, v = z[:n], z[n : 2 * n]
-        force = _forces(system, call, time_s, y, v)
+        force = _forces(system, drive, time_s, y, v)
         accelerate(c, w, y, v, y, v, 0.0, force, zero, zero, a)
         dz = np.concatenate([v, a, [0.0, 0.0]])
         loop._powers(c, w, v, force, dz)
@@ -212,7 +210,7 @@ def _python(
         dense = solver.dense_output()
         at = _crossing(lambda time_s: beyond(dense(time_s)), solver.t_old, solver.t)
         joint = int(loop.outside(c, inputs, dense(np.nextafter(at, np.inf) + 1e-12 * abs(solver.t - solver.t_old))))
-        events.append(_limit_event(system, joint, at, dense(at)[system.joint_rows]))
+        events.append(limit_event(system, joint, at, dense(at)[system.joint_rows]))
         if at > times[-1]:
             times.append(at)
             out.append(dense(at))
@@ -259,21 +257,6 @@ def _crossing(beyond: Callable[[float], bool], before: float, after: float) -> f
     return before
 
 
-def _limit_event(system: System, joint: int, t: float, position: np.ndarray) -> dict[str, Any]:
-    """What stopped joint (from 0) at t, with the joints at `position` (N,)."""
-    robot, (low, high) = system.robot, system.limits[max(joint, 0)]
-    kind, own, travel = robot.links[joint].joint.type, robot.links[joint].joint.limits, robot.travel(joint)
-    bound = low if abs(position[joint] - low) < abs(position[joint] - high) else high
-    if abs(position[joint] - bound) > 1e-6 * max(1.0, abs(bound)):
-        text = f"joint {joint + 1} (Pa) ran into the sleeve of link {joint}: stopped"
-    elif bound in travel and (own is None or bound not in own):
-        link = joint if kind == "Pa" else joint + 1
-        text = f"joint {joint + 1} ({kind}) reached the end of link {link}, at {bound:g} m: stopped"
-    else:
-        text = f"joint {joint + 1} left its limits, {low:g} to {high:g} {'rad' if kind == 'R' else 'm'}: stopped"
-    return {"t": t, "level": "ERROR", "text": text}
-
-
 def as_function(drive: Callable[..., Any]) -> Callable[[float, np.ndarray, np.ndarray, float], np.ndarray]:
     """A drive function of (t) or (t, position, velocity, tip_deflection) as one of four arguments."""
     try:
@@ -300,8 +283,7 @@ def _applied(system: System, t: np.ndarray, states: np.ndarray, drive: Any) -> n
         out = np.zeros((len(t), len(rows)))
         loop.forces(system.chain, _following(system, drive), _inputs(system, drive), loop.memory(len(rows), n), t, states, out)
     else:
-        call = as_function(drive)
-        out = np.array([_forces(system, call, s, z[:n], z[n:]) for s, z in zip(t, states, strict=True)])
+        out = np.array([_forces(system, drive, s, z[:n], z[n:]) for s, z in zip(t, states, strict=True)])
     return out.reshape(len(t), len(rows))
 
 
@@ -315,21 +297,21 @@ def _times(t_eval: Any) -> np.ndarray:
 def _state(system: System, key: str, value: Any, default: np.ndarray) -> np.ndarray:
     if value is None:
         return default
-    array = np.asarray(value, dtype=float)
+    array = np.array(value, dtype=float)
     if array.shape != (system.n,) or not np.all(np.isfinite(array)):
         raise InputError(f"expected {system.n} finite numbers, in the order of system.labels", key=key, value=value)
     return array
 
 
-def _put_on_motions(system: System, drive: Drive, t: float, state: np.ndarray) -> None:
-    for joint, row in zip(drive.joints, system.joint_rows, strict=False):
+def _put_on_motions(system: System, drive: Drive, t: float, q: np.ndarray, qd: np.ndarray) -> None:
+    for joint, row in zip(drive.joints, system.joint_rows, strict=True):
         if joint.prescribed and joint.motion is not None:
-            state[row], state[system.n + row], _ = joint.motion(t)
+            q[row], qd[row], _ = joint.motion(t)
 
 
-def _inside_limits(system: System, state: np.ndarray) -> None:
+def _inside_limits(system: System, q: np.ndarray) -> None:
     for i, (link, row) in enumerate(zip(system.robot.links, system.joint_rows, strict=True), 1):
-        if link.joint.limits is not None and not link.joint.limits[0] <= state[row] <= link.joint.limits[1]:
+        if link.joint.limits is not None and not link.joint.limits[0] <= q[row] <= link.joint.limits[1]:
             raise InputError(
-                f"expected a start inside the limits of joint {i}, {list(link.joint.limits)}", key="q0", value=float(state[row])
+                f"expected a start inside the limits of joint {i}, {list(link.joint.limits)}", key="q0", value=float(q[row])
             )

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from . import nodal
 from .errors import InputError
 from .statics import static
 from .system import System
@@ -21,6 +22,11 @@ def frequencies(system: System, q: Any = None, joints: str = "locked", *, qd: An
     """
     if joints not in ("locked", "free"):
         raise InputError('expected "locked" or "free"', key="joints", value=joints)
+    if system.robot.nodal:
+        whole = static(system) if q is None else np.asarray(q, dtype=float)
+        piece = nodal.at(system, whole)
+        spin = None if qd is None else piece.rates(np.asarray(qd, dtype=float))
+        return frequencies(piece.system, piece.part(whole), joints, qd=spin)
     at = static(system) if q is None else system._check(q)
     rates = np.zeros(system.n) if qd is None else system._check(qd)
     rows = system.elastic_rows if joints == "locked" else system.free_rows

@@ -347,7 +347,12 @@ def outside(c: Chain, d: Inputs, z: np.ndarray) -> int:
         e = c.first[i]
         if not (d.low[i] <= z[e] <= d.high[i]):
             return i
-        if i > 0 and c.kind[i] == SLIDER and c.kind[i - 1] == SLEEVE and z[e] + z[c.first[i - 1]] < c.length[i - 1]:
+        if i == 0 or c.kind[i] != SLIDER or c.locked[i]:
+            continue
+        under, at = i - 1, z[e]
+        if i > 1 and c.kind[under] == SLIDER and c.locked[under] and c.angle[under] == 0.0:
+            under, at = i - 2, at + z[c.first[under]]  # on a link cut in two there
+        if c.kind[under] == SLEEVE and at + z[c.first[under]] < c.length[under]:
             return i
     return -1
 
@@ -357,16 +362,18 @@ def _stop_at_limit(c: Chain, w: Work, d: Inputs, m: Memory, method: int, t: floa
     """Find by bisection where the step just made, from t, leaves a joint's limits; m.z and s[T] are the last state inside."""
     if method == EXPLICIT:
         _explicit_dense(c, w, d, m, t, h, last)
-    low, high, out = 0.0, 1.0, m.K[15]
+    low, high, out, n = 0.0, 1.0, m.K[15], m.a.shape[0]
     for _ in range(60):
         middle = 0.5 * (low + high)
         _interpolate(m, method, h, middle, out)
+        _prescribe(c, w, d, t + middle * h, out[:n], out[n : 2 * n])
         joint = outside(c, d, out)
         if joint >= 0:
             high, m.s[FAULT] = middle, joint
         else:
             low = middle
     _interpolate(m, method, h, low, out)
+    _prescribe(c, w, d, t + low * h, out[:n], out[n : 2 * n])
     _copy(out, m.z)
     m.s[STATUS], m.s[T] = LIMIT, t + low * h
 
@@ -378,6 +385,7 @@ def advance(
     """Go on with the run held in `m` for at most `max_steps` steps, filling rows of `out` (T, 2n + 2) as their times pass."""
     s = m.s
     order = 8.0 if method == EXPLICIT else 4.0
+    n = m.a.shape[0]
     end = t_eval[-1]
     for _ in range(max_steps):
         t = s[T]
@@ -426,6 +434,7 @@ def advance(
                     _explicit_dense(c, w, d, m, t, h, last)
                     prepared = True
                 _interpolate(m, method, h, (t_eval[row] - t) / h, out[row])
+                _prescribe(c, w, d, t_eval[row], out[row, :n], out[row, n : 2 * n])
             if outside(c, d, out[row]) >= 0:
                 _stop_at_limit(c, w, d, m, method, t, h, last)
                 return

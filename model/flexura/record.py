@@ -42,18 +42,43 @@ def record(system: System, t: np.ndarray, states: np.ndarray, work: np.ndarray, 
         put(f"energy/{name}", energies[:, k], "J")
     put("energy/work", work[:, 0], "J")
     put("energy/loss", work[:, 1], "J")
-    total = energies.sum(axis=1)
-    balance = total - total[0] - (work[:, 0] - work[0, 0]) + (work[:, 1] - work[0, 1])
-    scale = max(np.abs(energies).max(), np.abs(energies - energies[0]).max(), np.abs(work).max(), 1e-300)
-    about = {
+    about = describe(system, energy_error(energies, work)) | meta
+    return Run(t, channels, units, about, np.hstack([states[:, :n] @ system.transform.T, states[:, n:] @ system.transform.T]))
+
+
+def describe(system: System, error: float) -> dict[str, Any]:
+    """What the metadata of every simulation says: of what, by what, and how well the energy balances."""
+    robot = system.robot
+    return {
         "source": "simulation",
         "program": "flexura",
         "name": robot.name,
         "structure": robot.structure,
-        "unknowns": n,
-        "energy_error": float(np.abs(balance).max() / scale),
+        "unknowns": system.n,
+        "energy_error": error,
         "robot": robot.to_dict(),
     }
-    return Run(
-        t, channels, units, about | meta, np.hstack([states[:, :n] @ system.transform.T, states[:, n:] @ system.transform.T])
-    )
+
+
+def energy_error(energies: np.ndarray, work: np.ndarray, jumps: Any = 0.0) -> float:
+    """Largest |E - E(0) - work + loss - jumps| of energies (T, 3), work and loss (T, 2), and E's jumps so far (T,), relative to
+    the largest of these energies, or work or loss."""
+    total = energies.sum(axis=1)
+    balance = total - total[0] - (work[:, 0] - work[0, 0]) + (work[:, 1] - work[0, 1]) - jumps
+    scale = max(np.abs(energies).max(), np.abs(energies - energies[0]).max(), np.abs(work).max(), 1e-300)
+    return float(np.abs(balance).max() / scale)
+
+
+def limit_event(system: System, joint: int, t: float, position: np.ndarray) -> dict[str, Any]:
+    """What stopped joint (from 0) at t, with the joints at `position` (N,)."""
+    robot, (low, high) = system.robot, system.limits[max(joint, 0)]
+    kind, own, travel = robot.links[joint].joint.type, robot.links[joint].joint.limits, robot.travel(joint)
+    bound = low if abs(position[joint] - low) < abs(position[joint] - high) else high
+    if abs(position[joint] - bound) > 1e-6 * max(1.0, abs(bound)):
+        text = f"joint {joint + 1} (Pa) ran into the sleeve of link {joint}: stopped"
+    elif bound in travel and (own is None or bound not in own):
+        link = joint if kind == "Pa" else joint + 1
+        text = f"joint {joint + 1} ({kind}) reached the end of link {link}, at {bound:g} m: stopped"
+    else:
+        text = f"joint {joint + 1} left its limits, {low:g} to {high:g} {'rad' if kind == 'R' else 'm'}: stopped"
+    return {"t": t, "level": "ERROR", "text": text}

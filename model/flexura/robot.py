@@ -262,7 +262,9 @@ class Robot(_Table):
         (0.0, 0.0), strict=False, description="gravity in the base frame, two numbers [x, y] in m/s^2, y up"
     )
     stiffening: bool = Field(True, description="true, or false for the dissertation's linear model")
-    sliding: Literal["continuous", "nodal"] = Field("continuous", description='"continuous" or "nodal"')
+    sliding: Literal["continuous", "nodal"] = Field(
+        "continuous", description='"continuous" or "nodal", the dissertation\'s node-by-node Pa and Pb'
+    )
     link: list[Link] = Field(min_length=1, max_length=MAX_LINKS, description=f"1 to {MAX_LINKS} tables [[link]]")
     payload: Payload = Field(default_factory=Payload, description="a table { mass_kg, inertia_kg_m2 }")
 
@@ -285,6 +287,25 @@ class Robot(_Table):
                     ahead = f"a start ahead of the sleeve of link {i}, at {exit_m:g} m or more"
                     raise WrongValue(f"{key}.start", joint.start, ahead)
         return self
+
+    @model_validator(mode="after")
+    def _whole_meshes(self) -> Robot:
+        if self.sliding == "nodal":
+            for i, link in enumerate(self.link):
+                slides = link.joint.type == "Pb" or (i + 1 < len(self.link) and self.rides(i + 1))
+                if link.modes is not None and slides:
+                    raise WrongValue(f"link[{i + 1}].modes", link.modes, 'absent with sliding = "nodal", which goes by its nodes')
+        return self
+
+    def rides(self, i: int) -> bool:
+        """Whether joint i (from 0) slides along a flexible link."""
+        return i > 0 and self.link[i].joint.type == "Pa" and self.link[i - 1].flexible
+
+    @property
+    def nodal(self) -> bool:
+        """Whether something slides node by node: `sliding`, and a flexible link in a sleeve or under a slider."""
+        sleeved = any(link.joint.type == "Pb" and link.flexible for link in self.link)
+        return self.sliding == "nodal" and (sleeved or any(self.rides(i) for i in range(len(self.link))))
 
     def travel(self, i: int) -> tuple[float, float]:
         """How far joint i (from 0) can go on its links: infinite for R and for a Pa on the base."""

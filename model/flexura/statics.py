@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from . import extended
+from . import extended, nodal
 from .errors import FlexuraError, InputError
 from .observe import observe
 from .system import System
@@ -30,6 +30,10 @@ def static(
     load = np.array([*tip_force, tip_moment], dtype=float)
     if load.shape != (3,) or not np.all(np.isfinite(load)):
         raise InputError("expected a finite force (x, y) and moment", key="tip_force", value=(tip_force, tip_moment))
+    if system.robot.nodal:
+        piece = nodal.at(system, q)
+        q = static(piece.system, piece.part(q)[piece.system.joint_rows], tip_force, tip_moment)
+        return piece.states(np.append(q, np.zeros(len(q)))[None])[0, : system.n]
     rows = system.elastic_rows
     if len(rows) == 0:
         return q
@@ -57,6 +61,9 @@ def static(
 
 def tip_pose(system: System, q: np.ndarray) -> np.ndarray:
     """x, y [m] and angle [rad] of the last link's tip in the base frame at q (n,)."""
+    if system.robot.nodal:
+        piece = nodal.at(system, q)
+        return tip_pose(piece.system, piece.part(np.asarray(q, dtype=float)))
     links = len(system.robot.links)
     poses, tips, ends, energies = np.zeros((1, links, 3)), np.zeros((1, links, 2)), np.zeros((1, 2)), np.zeros((1, 3))
     state = np.concatenate([system.to_solver @ np.asarray(q, dtype=float), np.zeros(system.n)])[None]

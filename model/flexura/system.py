@@ -88,6 +88,7 @@ class System:
         """K (n, n), at the start (it depends on the free length of a sleeved link, on nothing else); with q the tangent stiffness
         there, d (elastic + gravity) / dq."""
         if q is None:
+            self._check(self.start())
             K = np.diag(self._diagonal(self.chain.lam, np.zeros(len(self.links))))
         else:
             y, still = self.to_solver @ self._check(q), np.zeros(self.n)
@@ -167,6 +168,9 @@ class System:
         return self.to_solver.T @ out
 
     def _check(self, q: np.ndarray) -> np.ndarray:
+        if self.robot.nodal:
+            text = 'expected "continuous": sliding from node to node has other matrices between every two nodes'
+            raise InputError(text, key="sliding", value="nodal")
         q = np.asarray(q, dtype=float)
         if q.shape != (self.n,):
             raise InputError(f"expected an array of shape ({self.n},), in the order of system.labels", key="q", value=q.shape)
@@ -211,7 +215,7 @@ def assemble(robot: Robot) -> System:
             transforms.append(np.eye(1 + m))
             back.append(np.eye(1 + m))
         else:
-            slope = "slope x d/L [rad]" if link.joint.type == "Pb" else "slope [rad]"
+            slope = "slope x d/L [rad]" if link.joint.type == "Pb" and robot.sliding == "continuous" else "slope [rad]"
             labels += [f"link {i} node {k // 2 + 1} {slope if k % 2 else 'deflection [m]'}" for k in range(m)]
             transforms.append(block_diag(1.0, info.basis) if m else np.eye(1))
             back.append(block_diag(1.0, info.basis.T @ nodal.M) if m else np.eye(1))
@@ -292,7 +296,7 @@ def _stack(arrays: list[np.ndarray], empty: float = 0.0) -> np.ndarray:
 
 def _check_mass(system: System) -> None:
     """Refuse a robot with a joint that moves nothing: its mass matrix is singular."""
-    M = system.mass(system.start())
+    M = system.to_solver.T @ extended.mass_matrix(system.chain, system._work(), system.start()) @ system.to_solver
     free = system.free_rows
     if len(free) == 0:
         return

@@ -635,8 +635,15 @@ def links(draw):
     return link | draw(st.fixed_dictionaries({}, optional={"damping": optional(alpha_1_s=number(0, 1e6), beta_s=number(0, 10))}))
 
 
-robots = st.builds(
-    fx.Robot.from_dict,
+def whole_meshes(tables):
+    """What slides node by node keeps all nodes."""
+    if tables.get("sliding") == "nodal":
+        for link in tables["link"]:
+            link.pop("modes", None)
+    return tables
+
+
+robots = (
     st.fixed_dictionaries(
         {"link": chains()},
         optional={
@@ -646,7 +653,9 @@ robots = st.builds(
             "sliding": st.sampled_from(["continuous", "nodal"]),
             "payload": optional(mass_kg=number(0, 1e3), inertia_kg_m2=number(0, 1e3)),
         },
-    ),
+    )
+    .map(whole_meshes)
+    .map(fx.Robot.from_dict)
 )
 
 
