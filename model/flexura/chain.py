@@ -94,6 +94,7 @@ class Work(NamedTuple):
     sum: np.ndarray  # (P + 1, 12) what a sleeved link has at its points
     sum_h: np.ndarray  # (P + 1, m) int tan Phi_xi up to each of them
     ride: np.ndarray  # (E + 1, 9) node values w, w_xi, w_xi,xi of q, of qd, and the weights of their gradients
+    quintic: np.ndarray  # (4, 6) polynomials of that curve in one element, and their derivatives
     cond: np.ndarray  # (N, 36) of the condensation: A (6), b (3), (1 + E A)^-1 (9), X - P (9), t0 (3), E (6)
     joint: np.ndarray  # (N, 6): A s (3), 1 / (s^T A s + ...), tau - s^T b, s^T A s + rotor
     X: np.ndarray  # (N, 3, 4) X - P of sleeved links
@@ -116,6 +117,6 @@ def workspace(c: Chain) -> Work:
         cos=z(N), sin=z(N), omega=z(N), angle=z(N), place=z((N, 2)), beta=z((N, 3)), rate=z((N, 3)), slide=z((N, 3)),
         flow=z((N, 3)), tilt=z(N), body=z((N, 11)), col=z((N, m, 4)), jac=z((N, m, 3)), cv=z((N, m)), h=z((N, p, m)),
         slope=z((2 * p, 4)), point=z((p, 5)), M=z((N, m, m)), K=z((N, m, m)), strain=z(N), sum=z((P, 12)), sum_h=z((P, m)),
-        ride=z((E, 9)), cond=z((N, 36)), joint=z((N, 6)), X=z((N, 3, 4)), inertia=z((4, 4)), bias=z(4), u=z((N, 3)),
-        S=z((N, m, m)), dinv=z((N, m)), rhs=z((N, m, 8)), held=c.locked.copy(), given=z(N), reaction=z(N),
+        ride=z((E, 9)), quintic=z((4, 6)), cond=z((N, 36)), joint=z((N, 6)), X=z((N, 3, 4)), inertia=z((4, 4)), bias=z(4),
+        u=z((N, 3)),        S=z((N, m, m)), dinv=z((N, m)), rhs=z((N, m, 8)), held=c.locked.copy(), given=z(N), reaction=z(N),
     )  # fmt: skip

@@ -20,61 +20,37 @@ _S, _W = (_S + 1) / 2, _W / 2
 
 
 @inlined
-def _quintic(s: float, h: float, k: int, derivative: int) -> float:
-    """Quintic Hermite polynomials on an element of length h at s in [0, 1]: k = 0, 1, 2 the value, slope and curvature of its
-    start, 3, 4, 5 of its end; or their derivatives up to the third."""
-    t, sign = s, 1.0
-    if k > 2:
-        t, sign = 1.0 - s, -1.0  # the end's polynomials are the start's, mirrored
-    kind = k % 3
-    if derivative == 0:
-        if kind == 0:
-            out = 1.0 - t * t * t * (10.0 - t * (15.0 - 6.0 * t))
-        elif kind == 1:
-            out = t * (1.0 - t * t * (6.0 - t * (8.0 - 3.0 * t)))
-        else:
-            out = 0.5 * t * t * (1.0 - t * (3.0 - t * (3.0 - t)))
-    elif derivative == 1:
-        if kind == 0:
-            out = -30.0 * t * t * (1.0 - t * (2.0 - t))
-        elif kind == 1:
-            out = 1.0 - t * t * (18.0 - t * (32.0 - 15.0 * t))
-        else:
-            out = t * (1.0 - t * (4.5 - t * (6.0 - 2.5 * t)))
-    elif derivative == 2:
-        if kind == 0:
-            out = -60.0 * t * (1.0 - t * (3.0 - 2.0 * t))
-        elif kind == 1:
-            out = -t * (36.0 - t * (96.0 - 60.0 * t))
-        else:
-            out = 1.0 - t * (9.0 - t * (18.0 - 10.0 * t))
-    else:
-        if kind == 0:
-            out = -60.0 * (1.0 - t * (6.0 - 6.0 * t))
-        elif kind == 1:
-            out = -36.0 + t * (192.0 - 180.0 * t)
-        else:
-            out = -9.0 + t * (36.0 - 30.0 * t)
-    if kind == 1:
-        out *= sign * h
-    elif kind == 2:
-        out *= h * h
-    if derivative == 1:
-        out *= sign / h
-    elif derivative == 2:
-        out /= h * h
-    elif derivative == 3:
-        out *= sign / (h * h * h)
-    return out
+def _polynomials(w: Work, s: float, h: float) -> None:
+    """Quintic Hermite polynomials on an element of length h at s in [0, 1], and their derivatives up to the third, into the rows
+    of w.quintic: value, slope and curvature of the start, then of the end, which are the start's, mirrored."""
+    for end in range(2):
+        t, sign = s, 1.0 / h
+        if end == 1:
+            t, sign = 1.0 - s, -1.0 / h  # of one derivative by x
+        k = 3 * end
+        q = w.quintic
+        q[0, k] = 1.0 - t * t * t * (10.0 - t * (15.0 - 6.0 * t))
+        q[1, k] = -30.0 * t * t * (1.0 - t * (2.0 - t)) * sign
+        q[2, k] = -60.0 * t * (1.0 - t * (3.0 - 2.0 * t)) * sign * sign
+        q[3, k] = -60.0 * (1.0 - t * (6.0 - 6.0 * t)) * sign * sign * sign
+        slope = 1.0 / sign  # h, or -h at the end
+        q[0, k + 1] = t * (1.0 - t * t * (6.0 - t * (8.0 - 3.0 * t))) * slope
+        q[1, k + 1] = 1.0 - t * t * (18.0 - t * (32.0 - 15.0 * t))
+        q[2, k + 1] = -t * (36.0 - t * (96.0 - 60.0 * t)) * sign
+        q[3, k + 1] = (-36.0 + t * (192.0 - 180.0 * t)) * sign * sign
+        q[0, k + 2] = 0.5 * t * t * (1.0 - t * (3.0 - t * (3.0 - t))) * h * h
+        q[1, k + 2] = t * (1.0 - t * (4.5 - t * (6.0 - 2.5 * t))) * slope
+        q[2, k + 2] = 1.0 - t * (9.0 - t * (18.0 - 10.0 * t))
+        q[3, k + 2] = (-9.0 + t * (36.0 - 30.0 * t)) * sign
 
 
 @inlined
-def _along(w: Work, e: int, s: float, h: float, column: int, derivative: int) -> float:
-    """The line's w or its derivatives by xi in element e, from node values that start at `column` of w.ride."""
+def _along(w: Work, e: int, column: int, derivative: int) -> float:
+    """The line's w or a derivative of it by xi in element e, from node values that start at `column` of w.ride."""
     total = 0.0
     for k in range(3):
-        total += w.ride[e, column + k] * _quintic(s, h, k, derivative)
-        total += w.ride[e + 1, column + k] * _quintic(s, h, 3 + k, derivative)
+        total += w.ride[e, column + k] * w.quintic[derivative, k]
+        total += w.ride[e + 1, column + k] * w.quintic[derivative, 3 + k]
     return total
 
 
@@ -148,9 +124,10 @@ def _on_curve(
         for n in range(last + 1):
             part = 1.0 if n < last else xi * elements - last
             for g in range(NODES):
-                s, weight = _S[g] * part, _W[g] * part * h
-                sin = _along(w, n, s, h, 0, 1) / d
-                rate = _along(w, n, s, h, 3, 1) / d - sin * dd / d
+                weight = _W[g] * part * h
+                _polynomials(w, _S[g] * part, h)
+                sin = _along(w, n, 0, 1) / d
+                rate = _along(w, n, 3, 1) / d - sin * dd / d
                 cos = np.sqrt(1.0 - sin * sin)
                 sec = 1.0 / cos
                 shrink += weight * (cos - 1.0)
@@ -158,12 +135,11 @@ def _on_curve(
                 T1 += weight * sin * sec * rate
                 T2 += weight * sec * sec * sec * rate * rate
                 for k in range(3):
-                    w.ride[n, 6 + k] += weight * sin * sec * _quintic(s, h, k, 1)
-                    w.ride[n + 1, 6 + k] += weight * sin * sec * _quintic(s, h, 3 + k, 1)
-    s = xi * elements - last
-    value, N1 = _along(w, last, s, h, 0, 0), _along(w, last, s, h, 0, 1)
-    N2, N3 = _along(w, last, s, h, 0, 2), _along(w, last, s, h, 0, 3)
-    vd, V1, V2 = _along(w, last, s, h, 3, 0), _along(w, last, s, h, 3, 1), _along(w, last, s, h, 3, 2)
+                    w.ride[n, 6 + k] += weight * sin * sec * w.quintic[1, k]
+                    w.ride[n + 1, 6 + k] += weight * sin * sec * w.quintic[1, 3 + k]
+    _polynomials(w, xi * elements - last, h)
+    value, N1, N2, N3 = _along(w, last, 0, 0), _along(w, last, 0, 1), _along(w, last, 0, 2), _along(w, last, 0, 3)
+    vd, V1, V2 = _along(w, last, 3, 0), _along(w, last, 3, 1), _along(w, last, 3, 2)
     sin = N1 / d
     cos, sec, tan, sec3 = 1.0, 1.0, 0.0, 0.0
     angle = sin
@@ -179,8 +155,8 @@ def _on_curve(
                 jx += w.ride[n, 6 + j] * c.ride[i, n, j, k]
         for j in range(3):
             a, b = c.ride[i, last, j, k], c.ride[i, last + 1, j, k]
-            jy += a * _quintic(s, h, j, 0) + b * _quintic(s, h, 3 + j, 0)
-            jt += a * _quintic(s, h, j, 1) + b * _quintic(s, h, 3 + j, 1)
+            jy += a * w.quintic[0, j] + b * w.quintic[0, 3 + j]
+            jt += a * w.quintic[1, j] + b * w.quintic[1, 3 + j]
         w.jac[i, k, 0], w.jac[i, k, 1], w.jac[i, k, 2] = -jx, jy, sec * jt / d
     behind = 1.0 - xi if c.kind[i] == SLEEVE else 0.0  # dxi/dd = (1 - xi) / d
     rate = dd / d
