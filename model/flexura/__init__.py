@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 _HOME = {
-    "Robot": "robot", "load": "robot", "save": "robot",
+    "Robot": "robot", "load": "robot", "save": "robot", "cut": "cutting",
     "System": "system", "assemble": "system",
     "static": "statics", "tip_pose": "statics",
     "frequencies": "linear",
@@ -31,10 +31,11 @@ _HOME = {
 __all__ = [
     "Drive", "FlexuraError", "InputError", "JointDrive", "Manoeuvre", "Robot", "Run", "Signal",
     "StateSpace", "System",
-    "assemble", "frequencies", "inverse", "linearize", "load", "load_manoeuvre", "save", "simulate", "static", "tip_pose",
+    "assemble", "cut", "frequencies", "inverse", "linearize", "load", "load_manoeuvre", "save", "simulate", "static", "tip_pose",
 ]  # fmt: skip
 
 if TYPE_CHECKING:
+    from .cutting import cut
     from .drive import Drive, JointDrive, Manoeuvre, load_manoeuvre
     from .errors import FlexuraError, InputError
     from .forward import inverse, simulate
