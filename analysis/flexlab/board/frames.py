@@ -11,32 +11,42 @@ from binascii import crc_hqx
 MAX_PENDING = 4096  # without a zero byte in this many the line carries something else
 
 
-def encode(payload: bytes) -> bytes:
-    """The bytes that go on the line for a payload."""
-    data = payload + crc_hqx(payload, 0xFFFF).to_bytes(2, "little")
+def cobs(data: bytes) -> bytes:
+    """The same information without zero bytes: each block is led by its length plus one; 255 leads 254 bytes and no zero."""
     out = bytearray()
     for block in data.split(b"\0"):
         while len(block) >= 254:
             out += b"\xff" + block[:254]
             block = block[254:]
         out += bytes((len(block) + 1,)) + block
-    return bytes(out) + b"\0"
+    return bytes(out)
+
+
+def uncobs(data: bytes) -> bytes | None:
+    """What `cobs` was given, or None when the data are not its work."""
+    out, at, end = bytearray(), 0, len(data)
+    while at < end:
+        code = data[at]
+        if code == 0 or at + code > end:
+            return None
+        out += data[at + 1 : at + code]
+        at += code
+        if at < end and code < 255:
+            out.append(0)
+    return bytes(out)
+
+
+def encode(payload: bytes) -> bytes:
+    """The bytes that go on the line for a payload."""
+    return cobs(payload + crc_hqx(payload, 0xFFFF).to_bytes(2, "little")) + b"\0"
 
 
 def decode(frame: bytes) -> bytes | None:
     """The payload of what stood before a zero byte, or None when it is no frame or its CRC is wrong."""
-    out, at, end = bytearray(), 0, len(frame)
-    while at < end:
-        code = frame[at]
-        if code == 0 or at + code > end:
-            return None
-        out += frame[at + 1 : at + code]
-        at += code
-        if at < end and code < 255:
-            out.append(0)
-    if len(out) < 3 or crc_hqx(bytes(out[:-2]), 0xFFFF) != int.from_bytes(out[-2:], "little"):
+    data = uncobs(frame)
+    if data is None or len(data) < 3 or crc_hqx(data[:-2], 0xFFFF) != int.from_bytes(data[-2:], "little"):
         return None
-    return bytes(out[:-2])
+    return data[:-2]
 
 
 class Deframer:
