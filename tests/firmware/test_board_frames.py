@@ -4,10 +4,11 @@ import struct
 
 import numpy as np
 import pytest
-from flexlab.board import frames, messages
-from flexlab.board.declaration import CONFIG, MESSAGES
 from hypothesis import given
 from hypothesis import strategies as st
+
+from flexlab.board import frames, messages
+from flexlab.board.declaration import CONFIG, MESSAGES
 from robots import fast
 
 RUN = bytes(range(1, 255))

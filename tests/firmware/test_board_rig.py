@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tomli_w
+
+import flexura as fx
 from flexlab import rig
 from flexlab.board.declaration import CONFIG
 from flexlab.board.emulated import Outputs
 from flexlab.rig.description import DERIVED, tip_per_bend
 from flexlab.rig.drives import Drives
-
-import flexura as fx
 from flexura.signal import harmonic
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -31,7 +31,7 @@ def written(tmp_path):
 
     def write(**changes):
         data = tomllib.loads(FILE.read_text(encoding="utf-8"))
-        data["robot"], data["manoeuvre"] = str(ROOT / "model/robots/rig.toml"), str(ROOT / "model/manoeuvres/rig-inverse-law.toml")
+        data |= {key: str((FILE.parent / data[key]).resolve()) for key in ("robot", "manoeuvre")}
         for path, value in changes.items():
             *parents, last = path.split("__")
             table = data
@@ -53,7 +53,7 @@ def test_every_setting_of_the_board_has_a_value_in_range(bench):
 
 
 def test_settings_that_follow_from_the_rig(bench):
-    """Dissertation reference, section 6: 16 pulses, 10:1, 8 mm are 80 counts a millimetre; theta = steps 1.8 degrees / microsteps."""
+    """16 pulses, 10:1 and 8 mm are 80 counts a millimetre; a full step is 1.8 degrees."""
     settings = rig.configuration(bench)
     assert settings["motor_counts_per_m"] == pytest.approx(80e3)
     assert 1 / settings["stepper_steps_per_rad"] == pytest.approx(math.radians(1.8) / 16)
@@ -62,7 +62,7 @@ def test_settings_that_follow_from_the_rig(bench):
 
 
 def test_flex_chain(bench):
-    """The same section: 0.374 m of tip for a radian, and 1.8 mm of tip for a count of 10 bits."""
+    """By hand: L = 0.3, s = 0.09525 give 0.374 m of tip for a radian, and 1.8 mm of tip for a count of 10 bits."""
     assert tip_per_bend(bench) == pytest.approx(0.374, abs=5e-4)
     flex, fitted = bench.rig.flex, rig.calibration(bench)
     assert 1e3 * abs(fitted.c1_m) / 1024 == pytest.approx(1.8, abs=0.05)
@@ -108,7 +108,7 @@ def test_what_the_rig_cannot_do_is_found(written, change, failing):
 
 
 def test_a_motion_beyond_the_carriage(bench):
-    far = fx.Manoeuvre("far", 2.0, 0.01, fx.Drive.pd([harmonic(0.06, 0.5), harmonic(0.1, 0.5)], [1, 1], [1, 1]))
+    far = fx.Manoeuvre("far", 4.0, 0.01, fx.Drive.pd([harmonic(0.06, 0.25), harmonic(0.1, 0.25)], [1, 1], [1, 1]))
     assert {c.what for c in rig.examine(bench, far) if not c.passed} == {"carriage range"}
 
 
