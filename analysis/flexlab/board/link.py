@@ -96,6 +96,7 @@ class Link:
         self._now: Command | None = None
         self._next = random.SystemRandom().randrange(1 << 16) if self.sequence is None else self.sequence
         self._telemetry: list[bytes] = []
+        self._newest = b""
         self._last_report: int | None = None
         self._last_said = 0.0
         self._open = False
@@ -116,16 +117,22 @@ class Link:
         return found
 
     def listen(self, timeout_s: float = 5.0) -> Identity:
-        """The board's next announcement. A board that does not announce itself is reset once, half the time being over."""
-        self.identity = None
-        begin, again = self.board.now(), True
+        """The board's next announcement, nothing being said before it (a bootloader may be listening).
+
+        A board that keeps silent may be in a session that another program left: after half the time it is told to stop and greeted,
+        after three quarters it is reset.
+        """
+        self._open, self._now, self.identity = False, None, None
+        self._waiting.clear()
+        begin = self.board.now()
+        greet = encode(messages.pack("stop", self._next)) + encode(messages.pack("hello", self._next, declaration=DECLARATION))
+        rest = deque([(0.5, lambda: self.board.write(greet)), (0.75, self.board.reset)])
         while self.identity is None:
             self._step(STEP_S)
-            passed = self.board.now() - begin
-            if again and passed > timeout_s / 2:
-                again = False
-                self.board.reset()
-            if passed > timeout_s:
+            passed = (self.board.now() - begin) / timeout_s
+            if rest and passed > rest[0][0]:
+                rest.popleft()[1]()
+            if passed > 1:
                 raise BoardError(
                     f"{self.board.label}: no good frame within {timeout_s:g} s ({self._deframer.bad} bad ones); is it the rig's "
                     "board, and was its firmware loaded? flexura flash"
@@ -152,10 +159,10 @@ class Link:
         return asked
 
     def stop(self) -> None:
-        """Outputs off, before everything that waits; the board obeys it with any sequence number."""
+        """Outputs off now, before everything that waits: once out of turn, which the board obeys, and once to be acknowledged."""
         self._waiting.clear()
-        self._now = None
-        self.board.write(encode(messages.pack("stop", self._next)))
+        self.board.write(encode(messages.pack("stop", self._next - 2)))
+        self.submit("stop")
 
     @property
     def idle(self) -> bool:
@@ -218,6 +225,7 @@ class Link:
         sequence = found[1]
         if message.name == "telemetry":
             self._telemetry.append(data)
+            self._newest = data
             self.counts.telemetry += 1
             if self._last_report is not None:
                 self.counts.telemetry_lost += (sequence - self._last_report - 1) & 0xFFFF
@@ -260,12 +268,11 @@ class Link:
         return messages.reports(taken)
 
     @property
-    def last(self) -> dict[str, Any]:
-        """The newest report that `telemetry` has not taken yet. Raises BoardError without one."""
-        if not self._telemetry:
+    def newest(self) -> dict[str, Any]:
+        """The newest report, whether `telemetry` has taken it or not. Raises BoardError when there was none."""
+        values = messages.unpack(MESSAGES["telemetry"], self._newest)
+        if values is None:
             raise BoardError(f"{self.board.label}: no telemetry yet")
-        values = messages.unpack(MESSAGES["telemetry"], self._telemetry[-1])
-        assert values is not None
         return values
 
     # ---- configuration
