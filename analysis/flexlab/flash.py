@@ -9,6 +9,7 @@ from binascii import crc_hqx
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from flexura.errors import FlexuraError, InputError
 
@@ -46,6 +47,11 @@ class Flashed:
     identity: Identity
     settings: list[Setting]
     configured: bool
+
+    @property
+    def differing(self) -> list[str]:
+        """Settings of the board that are not the rig file's."""
+        return [setting.name for setting in self.settings if not setting.agrees]
 
 
 def single(value: float) -> float:
@@ -97,9 +103,10 @@ def flash(bench: Bench, port: str | None = None, emulated: bool = False, configu
     finally:
         board.close()
     settings = [Setting(name, found[name], value) for name, value in wanted.items()]
-    if configure and (wrong := [s.name for s in settings if not s.agrees]):
-        raise BoardError(f"{board.label}: read back other values than written: {', '.join(wrong)}")
-    return Flashed(board.label, board.emulated, elf, identity, settings, configure)
+    done = Flashed(board.label, board.emulated, elf, identity, settings, configure)
+    if configure and done.differing:
+        raise BoardError(f"{board.label}: read back other values than written: {', '.join(done.differing)}")
+    return done
 
 
 def _configure(link: Link, wanted: dict[str, float], say: Say) -> Identity:
@@ -116,3 +123,35 @@ def _configure(link: Link, wanted: dict[str, float], say: Say) -> Identity:
         )
     say("reset: the board came up with them")
     return identity
+
+
+def table(done: Flashed) -> Any:
+    """The settings, those of the board and those of the rig file."""
+    from rich.table import Table
+
+    who = done.identity
+    out = Table(title=f"{done.board}: firmware {who.firmware}, {who.state.name}, fault {who.fault.name}", title_justify="left")
+    for name in ("setting", "board", "rig file", ""):
+        out.add_column(name, justify="left" if name == "setting" else "right", no_wrap=True)
+    for s in done.settings:
+        out.add_row(s.name, f"{s.board:.7g}", f"{s.rig:.7g}", "" if s.agrees else "[yellow]differs")
+    return out
+
+
+def data(done: Flashed) -> dict[str, Any]:
+    """The same for scripts."""
+    who = done.identity
+    return {
+        "board": done.board,
+        "emulated": done.emulated,
+        "elf": str(done.elf),
+        "firmware": who.firmware,
+        "compiler": who.compiler,
+        "declaration": f"{who.declaration:08x}",
+        "resets": list(who.resets),
+        "state": who.state.name,
+        "fault": who.fault.name,
+        "configured": done.configured,
+        "differing": done.differing,
+        "settings": {s.name: {"board": s.board, "rig": s.rig} for s in done.settings},
+    }

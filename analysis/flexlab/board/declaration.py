@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 NAME = "flexura-rig"
 VERSION = 1
-DECLARATION = 0xA6FEF1A6
+DECLARATION = 0xF25DCB18
 BAUD_BIT_S = 500000
 CONTROL_HZ = 1000
 TELEMETRY_EVERY_TICKS = 2
@@ -73,6 +73,7 @@ class Result(IntEnum):
     not_referenced = 10
     not_ready = 11
     inconsistent = 12
+    not_stored = 13
 
 
 class Flag(IntEnum):
@@ -215,6 +216,7 @@ RESULTS: dict[Result, str] = {
     Result.not_referenced: "Positions are unknown since the reset: `reference` first.",
     Result.not_ready: "Too few set-points before the start; detail = how many there are.",
     Result.inconsistent: "The configuration contradicts itself or cannot be computed with; detail = item.",
+    Result.not_stored: "The memory does not hold what was written: worn out?",
 }
 
 

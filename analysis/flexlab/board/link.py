@@ -119,8 +119,8 @@ class Link:
     def listen(self, timeout_s: float = 5.0) -> Identity:
         """The board's next announcement, nothing being said before it (a bootloader may be listening).
 
-        A board that keeps silent may be in a session that another program left: after half the time it is told to stop and greeted,
-        after three quarters it is reset.
+        A board that keeps silent may be in a session that another program left: after half the time it is told to stop and
+        greeted, after three quarters it is reset.
         """
         self._open, self._now, self.identity = False, None, None
         self._waiting.clear()
