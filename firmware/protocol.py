@@ -69,7 +69,8 @@ def digest(declared: dict[str, Any]) -> int:
             return {key: bare(inner) for key, inner in value.items() if key not in ("text", "remedy")}
         return [bare(inner) for inner in value] if isinstance(value, list) else value
     # Without sorted keys: the order of fields and of configuration items has a meaning.
-    return int.from_bytes(hashlib.sha256(json.dumps(bare({key: part for key, part in declared.items() if key != "pins"})).encode()).digest()[:4], "little")
+    meant = bare({key: part for key, part in declared.items() if key != "pins"})
+    return int.from_bytes(hashlib.sha256(json.dumps(meant).encode()).digest()[:4], "little")
 
 
 def camel(name: str) -> str:

@@ -44,17 +44,17 @@ struct encoder_1_b {
   static volatile uint8_t &input() { return PIND; }
 };
 
-// 2: INT4, encoder of joint 2; A leads B counter-clockwise
+// 3: INT5, encoder of joint 2; A leads B counter-clockwise
 struct encoder_2_a {
-  static constexpr uint8_t bit = 4, mask = 16;
+  static constexpr uint8_t bit = 5, mask = 32;
   static volatile uint8_t &port() { return PORTE; }
   static volatile uint8_t &direction() { return DDRE; }
   static volatile uint8_t &input() { return PINE; }
 };
 
-// 3: INT5
+// 2: INT4
 struct encoder_2_b {
-  static constexpr uint8_t bit = 5, mask = 32;
+  static constexpr uint8_t bit = 4, mask = 16;
   static volatile uint8_t &port() { return PORTE; }
   static volatile uint8_t &direction() { return DDRE; }
   static volatile uint8_t &input() { return PINE; }
@@ -84,8 +84,8 @@ struct step_disable {
   static volatile uint8_t &input() { return PINC; }
 };
 
-// 26: switch to ground, normally closed: high = hit or broken
-struct limit_low {
+// 26: switch to ground, normally closed: high = pressed or broken
+struct emergency_stop {
   static constexpr uint8_t bit = 4, mask = 16;
   static volatile uint8_t &port() { return PORTA; }
   static volatile uint8_t &direction() { return DDRA; }
@@ -93,15 +93,15 @@ struct limit_low {
 };
 
 // 27: switch to ground, normally closed: high = hit or broken
-struct limit_high {
+struct limit_low {
   static constexpr uint8_t bit = 5, mask = 32;
   static volatile uint8_t &port() { return PORTA; }
   static volatile uint8_t &direction() { return DDRA; }
   static volatile uint8_t &input() { return PINA; }
 };
 
-// 28: switch to ground, normally closed: high = pressed or broken
-struct emergency_stop {
+// 28: switch to ground, normally closed: high = hit or broken
+struct limit_high {
   static constexpr uint8_t bit = 6, mask = 64;
   static volatile uint8_t &port() { return PORTA; }
   static volatile uint8_t &direction() { return DDRA; }

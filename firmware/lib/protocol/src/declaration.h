@@ -4,14 +4,14 @@
 
 namespace flexura {
 
-constexpr uint32_t kDeclaration = 0xC63021A9;
+constexpr uint32_t kDeclaration = 0xF25DCB18;
 constexpr uint8_t kProtocolVersion = 1;
 constexpr uint32_t kBaudBitS = 500000;
 constexpr uint16_t kControlHz = 1000;
 constexpr uint16_t kTelemetryEveryTicks = 2;
 constexpr uint16_t kAnnounceEveryTicks = 100;
 constexpr uint16_t kPayloadMaxBytes = 64;
-constexpr uint16_t kAdcSamples = 8;
+constexpr uint16_t kAdcSamples = 7;
 constexpr uint16_t kLookaheadKnots = 64;
 constexpr uint16_t kDutyFull = 800;
 
@@ -70,6 +70,7 @@ enum class Result : uint8_t {
   not_referenced = 10,  // Positions are unknown since the reset: `reference` first.
   not_ready = 11,  // Too few set-points before the start; detail = how many there are.
   inconsistent = 12,  // The configuration contradicts itself or cannot be computed with; detail = item.
+  not_stored = 13,  // The memory does not hold what was written: worn out?
 };
 
 enum class Flag : uint8_t {
@@ -128,7 +129,7 @@ struct __attribute__((packed)) Telemetry {
   uint8_t buffered;  // set-points waiting
   int32_t position_1;  // count; motor encoder
   int32_t position_2;  // count; encoder of joint 2
-  int32_t steps;  // microstep; pulses given, up minus down
+  int32_t steps;  // microstep; pulses given, counter-clockwise minus clockwise
   int32_t setpoint_1;  // count/256; filtered set-point
   int32_t setpoint_2;  // microstep/256; filtered set-point
   int16_t voltage;  // mV; commanded to the motor
@@ -187,7 +188,7 @@ struct __attribute__((packed)) Arm {
 };
 static_assert(sizeof(Arm) == Arm::kSize, "layout");
 
-// Up to four knots of a trajectory, mode position. Armed and Running.
+// Up to four knots of a trajectory, mode position. Armed and Running. Inside the travel, at most 8191 counts from one to the next.
 struct __attribute__((packed)) Setpoints {
   static constexpr uint8_t kCode = 6;
   static constexpr uint8_t kSize = 52;
@@ -213,7 +214,7 @@ struct __attribute__((packed)) Drives {
 };
 static_assert(sizeof(Drives) == Drives::kSize, "layout");
 
-// Armed to Running. Takes two knots or more, or the final one. Knot 0 is the set-point at the tick of the start.
+// Armed to Running. Takes two knots or more, or the final one. Knot 0 holds at the start and must be where the joints are.
 struct __attribute__((packed)) Start {
   static constexpr uint8_t kCode = 8;
   static constexpr uint8_t kSize = 1;

@@ -1,0 +1,101 @@
+#include "watch.h"
+
+namespace flexura {
+
+namespace {
+constexpr uint8_t kReadings = 4;   // out of range this many ticks in a row: noise is not a fault
+
+bool is_set(uint8_t bits, Flag flag) { return bits >> static_cast<uint8_t>(flag) & 1; }
+
+bool beyond(int32_t value, int32_t limit) { return value > limit || value < -limit; }
+
+Fault switches(uint8_t bits) {
+  if (is_set(bits, Flag::emergency_stop)) return Fault::emergency_stop;
+  if (is_set(bits, Flag::limit_low)) return Fault::limit_low;
+  if (is_set(bits, Flag::limit_high)) return Fault::limit_high;
+  return Fault::none;
+}
+
+Fault supply(const WatchLimits &limits, uint16_t reading) {
+  return reading < limits.supply_low ? Fault::supply_low : reading > limits.supply_high ? Fault::supply_high : Fault::none;
+}
+
+Fault flex(const WatchLimits &limits, uint16_t reading) {
+  return reading < limits.flex_low ? Fault::flex_low : reading > limits.flex_high ? Fault::flex_high : Fault::none;
+}
+
+// Counts moved against a drive of this sign, forgotten as far as the joint moves with it again.
+int32_t against(int32_t before, int8_t drive, int8_t moved) {
+  if (drive == 0) return before;
+  const int32_t sum = before + (drive > 0 ? -moved : moved);
+  return sum < 0 ? 0 : sum;
+}
+}  // namespace
+
+Fault standing(const WatchLimits &limits, const Inputs &in) {
+  Fault fault = switches(in.switches);
+  if (fault == Fault::none) fault = supply(limits, in.supply);
+  if (fault == Fault::none) fault = flex(limits, in.flex);
+  return fault;
+}
+
+void Watch::start() {
+  silent_ = stalled_ = 0;
+  direction_ = 0;
+  flex_out_ = supply_out_ = 0;
+  for (uint8_t j = 0; j < 2; ++j) missed_[j] = 0, against_[j] = 0;
+}
+
+Fault Watch::encoders(const WatchLimits &limits, const Inputs &in, const Watched &now) {
+  const bool driven = now.voltage > limits.stall_voltage || now.voltage < -limits.stall_voltage;
+  for (uint8_t j = 0; j < 2; ++j) {
+    missed_[j] = static_cast<uint16_t>(missed_[j] + in.missed[j]);
+    if (missed_[j] > limits.missed) return j ? Fault::encoder_2 : Fault::encoder_1;
+  }
+  if (driven && in.alone[0] >= limits.alone) return Fault::encoder_1;
+  if (direction_ && in.alone[1] >= limits.alone) return Fault::encoder_2;
+
+  against_[0] = driven ? against(against_[0], now.voltage > 0 ? 1 : -1, in.moved[0]) : 0;
+  if (against_[0] > limits.runaway) return Fault::runaway_1;
+  if (driven && !beyond(now.velocity[0], limits.stall_speed)) {
+    if (++stalled_ >= limits.stall_ticks) return Fault::stall_1;
+  } else {
+    stalled_ = 0;
+  }
+
+  if (in.stepped) direction_ = in.stepped > 0 ? 1 : -1;
+  against_[1] = against(against_[1], direction_, in.moved[1]);
+  if (beyond(now.lag, limits.lost)) {
+    // Why: the encoder went the other way for a good part of it; or only one of its lines moves; or the motor did not follow.
+    if (against_[1] > limits.against) return Fault::runaway_2;
+    return in.alone[1] >= 4 ? Fault::encoder_2 : Fault::stall_2;
+  }
+  return Fault::none;
+}
+
+Fault Watch::check(const WatchLimits &limits, const Inputs &in, const Watched &now) {
+  Fault fault = switches(in.switches);
+  if (fault != Fault::none) return fault;
+
+  fault = supply(limits, in.supply);
+  supply_out_ = fault == Fault::none ? 0 : static_cast<uint8_t>(supply_out_ + 1);
+  if (supply_out_ >= kReadings) return fault;
+
+  fault = encoders(limits, in, now);
+  if (fault != Fault::none) return fault;
+
+  for (uint8_t j = 0; j < 2; ++j) {
+    if (now.position[j] < limits.travel_low[j] || now.position[j] > limits.travel_high[j]) return j ? Fault::travel_2 : Fault::travel_1;
+    if (beyond(now.velocity[j], limits.speed[j])) return j ? Fault::speed_2 : Fault::speed_1;
+    if (now.tracking && beyond(now.error[j], limits.following[j])) return j ? Fault::following_2 : Fault::following_1;
+  }
+
+  fault = flex(limits, in.flex);
+  flex_out_ = fault == Fault::none ? 0 : static_cast<uint8_t>(flex_out_ + 1);
+  if (flex_out_ >= kReadings) return fault;
+
+  if (++silent_ > limits.host_ticks) return Fault::host_silent;
+  return Fault::none;
+}
+
+}  // namespace flexura

@@ -1,0 +1,98 @@
+#include "sensors.h"
+
+#include <avr/interrupt.h>
+
+#include "pins.h"
+#include "quadrature.h"
+#include "stepper.h"
+
+namespace {
+
+flexura::Quadrature encoder[2];
+uint8_t last_count[2], last_missed[2], last_given;
+
+// Both lines in one reading: A is the higher bit of two neighbours.
+uint8_t lines_1() { return PIND >> pin::encoder_1_b::bit & 3; }
+uint8_t lines_2() { return PINE >> pin::encoder_2_b::bit & 3; }
+static_assert(pin::encoder_1_a::bit == pin::encoder_1_b::bit + 1 && pin::encoder_2_a::bit == pin::encoder_2_b::bit + 1, "neighbours");
+static_assert(pin::limit_low::bit == pin::emergency_stop::bit + 1 && pin::limit_high::bit == pin::emergency_stop::bit + 2,
+              "in the order of Flag");
+
+constexpr uint8_t kFlexChannel = pin::flex::bit, kSupplyChannel = pin::supply::bit;
+constexpr uint8_t kReference = _BV(REFS0);           // 5 V, the supply of the flex sensor's divider too: its changes cancel
+uint8_t conversions;
+uint16_t sum;
+volatile uint16_t flex, supply;
+
+void convert(uint8_t channel) {
+  ADMUX = kReference | channel;
+  ADCSRA |= _BV(ADSC);
+}
+
+}  // namespace
+
+ISR(INT2_vect) { encoder[0].update(lines_1()); }
+ISR(INT3_vect, ISR_ALIASOF(INT2_vect));
+ISR(INT4_vect) { encoder[1].update(lines_2()); }
+ISR(INT5_vect, ISR_ALIASOF(INT4_vect));
+
+ISR(ADC_vect) {
+  const uint16_t result = ADC;
+  if (conversions < flexura::kAdcSamples) {
+    sum += result;
+    if (++conversions < flexura::kAdcSamples) {
+      ADCSRA |= _BV(ADSC);
+    } else {
+      convert(kSupplyChannel);
+    }
+  } else {
+    flex = sum;
+    supply = result;
+  }
+}
+
+namespace sensors {
+
+void begin() {
+  constexpr uint8_t kSwitches = pin::emergency_stop::mask | pin::limit_low::mask | pin::limit_high::mask;
+  pin::emergency_stop::port() |= kSwitches;          // pull-ups: a broken wire reads as an open switch
+  PORTD |= pin::encoder_1_a::mask | pin::encoder_1_b::mask;
+  PORTE |= pin::encoder_2_a::mask | pin::encoder_2_b::mask;
+  DIDR0 = pin::flex::mask | pin::supply::mask;
+  ADCSRA = _BV(ADEN) | _BV(ADIE) | _BV(ADPS2) | _BV(ADPS1) | _BV(ADPS0);   // 125 kHz
+  encoder[0].start(lines_1());
+  encoder[1].start(lines_2());
+  EICRA |= _BV(ISC20) | _BV(ISC30);                  // every edge
+  EICRB |= _BV(ISC40) | _BV(ISC50);
+  EIFR = _BV(INTF2) | _BV(INTF3) | _BV(INTF4) | _BV(INTF5);
+  EIMSK |= _BV(INT2) | _BV(INT3) | _BV(INT4) | _BV(INT5);
+}
+
+// A sequence still under way (only the very first may be: it takes longer) goes on, and this tick has none of its own.
+void sample() {
+  if (ADCSRA & _BV(ADSC)) return;
+  sum = 0;
+  conversions = 0;
+  convert(kFlexChannel);
+}
+
+void read(flexura::Inputs &in) {
+  for (uint8_t j = 0; j < 2; ++j) {
+    const uint8_t count = encoder[j].count(), missed = encoder[j].missed();
+    in.moved[j] = static_cast<int8_t>(count - last_count[j]);
+    in.missed[j] = static_cast<uint8_t>(missed - last_missed[j]);
+    in.alone[j] = encoder[j].alone();
+    last_count[j] = count;
+    last_missed[j] = missed;
+  }
+  const uint8_t given = stepper::given();
+  in.stepped = static_cast<int8_t>(given - last_given);
+  last_given = given;
+  in.flex = flex;
+  in.supply = supply;
+  in.switches = PINA >> pin::emergency_stop::bit & 7;
+}
+
+void pair(uint8_t joint) { encoder[joint].pair(); }
+
+}  // namespace sensors

@@ -1,0 +1,13 @@
+// Encoders by external interrupts, the ADC in step with the control tick, the switches.
+#pragma once
+#include "watch.h"
+
+namespace sensors {
+
+void begin();
+void sample();                                       // starts this tick's conversions. Interrupts off.
+// What came in since the last call; readings are those of the tick before. Interrupts off.
+void read(flexura::Inputs &in);
+void pair(uint8_t joint);                            // forget the one-sided edges of an encoder. Interrupts off.
+
+}  // namespace sensors
