@@ -236,11 +236,13 @@ class Link:
             if message.name == "config_value":
                 self._now.answer = values
             elif message.name == "ack" and values["command"] == MESSAGES[self._now.name].code:
+                if self._now.name == "config_read" and values["result"] == Result.ok and self._now.answer is None:
+                    return  # the value was lost on its way: asked again, it comes again
                 self._now.result, self._now.detail = Result(values["result"]), values["detail"]
                 self._now = None
 
     def _introduce(self, said: dict[str, Any]) -> None:
-        if self._open and self.identity and said["tick"] < self.identity.tick:  # it started anew: the session is over
+        if self._open:  # a board announces itself until it is greeted: this one started anew, and the session is over
             self.counts.restarts += 1
             self._open = False
         self.identity = Identity(
@@ -279,7 +281,8 @@ class Link:
 
     def read_configuration(self) -> dict[str, float]:
         """The configuration in use, every item, as the board keeps it (single precision)."""
-        return {name: self._answered(self.command("config_read", item=item.number)) for name, item in CONFIG.items()}
+        asked = {name: self.command("config_read", item=item.number).answer for name, item in CONFIG.items()}
+        return {name: float(answer["value"]) for name, answer in asked.items() if answer is not None}
 
     def write_configuration(self, values: dict[str, float], save: bool = True) -> None:
         """Change items of the configuration in use and store it."""
@@ -287,12 +290,6 @@ class Link:
             self.command("config_write", item=CONFIG[name].number, value=value)
         if save:
             self.command("config_save")
-
-    @staticmethod
-    def _answered(asked: Command) -> float:
-        if asked.answer is None:
-            raise BoardError("the board acknowledged config_read without its value")
-        return float(asked.answer["value"])
 
 
 def seconds(ticks: np.ndarray) -> np.ndarray:

@@ -10,6 +10,7 @@
  *   - a reset forgets the levels of input pins: written again;
  *   - an INTn pin that is low before its edge is chosen is polled every cycle: strict level trigger off;
  *   - fast PWM with OCRnx at TOP, which is always on, shows no level at the pin: read from the registers;
+ *   - a timer's interrupt that falls due while it is masked is forgotten: raised when it is unmasked;
  *   - a byte of the UART takes 11 bit times, not 10 (left as it is: slower than the hardware).
  */
 #include <math.h>
@@ -28,7 +29,7 @@
 #include "sim_avr.h"
 #include "sim_elf.h"
 
-enum { ENCODERS = 2, LINES = 16, VECTORS = 64, PORTS = 12, MCUSR = 0x54 };
+enum { ENCODERS = 2, LINES = 16, VECTORS = 64, PORTS = 12, MCUSR = 0x54, TIMSK0 = 0x6E, TIMERS = 6 };
 enum { ON_PIN, ON_ADC };
 enum { FORWARD = 1, REVERSE, ENABLE, STEP, STEP_UP, STEP_DISABLE }; /* what a line does for the plant; 0: only watched */
 
@@ -232,14 +233,27 @@ static void on_interrupt(struct avr_irq_t *irq, uint32_t value, void *param) {
   const uint64_t now = b->avr->cycle;
   if (b->avr->interrupts.running_ptr == b->depth) { /* about to be entered */
     if (value >= VECTORS || b->depth == VECTORS) return;
+    if (!b->depth) b->entered[0] = now; /* 0 stands for all of them */
     b->stack[b->depth++] = value;
     b->entered[value] = now;
-    ++b->entries[value];
+    ++b->entries[value], ++b->entries[0];
   } else if (b->depth) {
     const uint32_t vector = b->stack[--b->depth];
     const uint64_t took = now - b->entered[vector];
     if (took > b->longest[vector]) b->longest[vector] = took;
     b->total[vector] += took;
+    if (!b->depth) b->total[0] += now - b->entered[0];
+  }
+}
+
+/* A timer's mask was written: what fell due behind it and is let through now is due now, as the flag in TIFRn says. */
+static void on_mask(struct avr_irq_t *irq, uint32_t value, void *param) {
+  (void)irq, (void)value;
+  board_t *b = param;
+  for (int i = 0; i < b->avr->interrupts.vector_count; ++i) {
+    avr_int_vector_t *vector = b->avr->interrupts.vector[i];
+    if (vector->enable.reg < TIMSK0 || vector->enable.reg >= TIMSK0 + TIMERS || vector->pending) continue;
+    if (avr_regbit_get(b->avr, vector->enable) && avr_regbit_get(b->avr, vector->raised)) avr_raise_interrupt(b->avr, vector);
   }
 }
 
@@ -327,6 +341,8 @@ board_t *board_new(const char *elf, uint32_t hz, uint32_t baud) {
     avr_ioctl(avr, AVR_IOCTL_UART_SET_FLAGS(uart), &flags);
   }
   avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUTPUT), on_tx, b);
+  for (int i = 0; i < TIMERS; ++i)
+    avr_irq_register_notify(avr_iomem_getirq(avr, (avr_io_addr_t)(TIMSK0 + i), NULL, AVR_IOMEM_IRQ_ALL), on_mask, b);
   avr_irq_register_notify(avr_get_interrupt_irq(avr, AVR_INT_ANY) + AVR_INT_IRQ_RUNNING, on_interrupt, b);
   return b;
 }

@@ -21,6 +21,7 @@ from flexura.errors import FlexuraError
 CLOCK_HZ = 16_000_000
 ROLES = {name: k for k, name in enumerate(("forward", "reverse", "enable", "step", "step_up", "step_disable"), 1)}
 RESET_CAUSES = {"power-on": 1, "external": 2, "brown-out": 4, "watchdog": 8}  # MCUSR
+_PIN_REGISTERS = {p: 0x20 + 3 * k for k, p in enumerate("ABCDEFG")} | {p: 0x100 + 3 * k for k, p in enumerate("HJKL")}
 _SOURCE = Path(__file__).with_name("shim.c")
 _HEADERS = Path("/usr/include/simavr")
 _INSTALL = "on Debian type: apt-get install gcc libc6-dev simavr libsimavr-dev"
@@ -161,6 +162,10 @@ class Simulator:
         """Drive an input pin, now or at a later cycle."""
         self._lib.board_pin(self._board, self.cycle if cycle is None else cycle, port.encode(), bit, level)
 
+    def level(self, port: str, bit: int) -> bool:
+        """The level at a pin now, as the firmware would read it."""
+        return bool(self.data[_PIN_REGISTERS[port]] >> bit & 1)
+
     def stick(self, port: str, bit: int, level: bool | None) -> None:
         """A wire that broke or shorted: the pin keeps this level whatever drives it; None mends it."""
         self._lib.board_stick(self._board, port.encode(), bit, -1 if level is None else int(level))
@@ -216,9 +221,11 @@ class Simulator:
             self.flash[address + 2 * k], self.flash[address + 2 * k + 1] = word & 255, word >> 8
 
     def interrupts(self) -> dict[int, tuple[int, int, int]]:
-        """By vector number: entries, cycles in all, cycles of the longest; from the start, nested ones included."""
+        """By vector number: entries, cycles in all, cycles of the longest; from the start, nested ones included.
+
+        0 stands for all of them, with the cycles in which any was running."""
         out = {}
-        for vector in range(1, 58):
+        for vector in range(58):
             entries, total, longest = c_uint64(), c_uint64(), c_uint64()
             self._lib.board_vector(self._board, vector, entries, total, longest)
             if entries.value:

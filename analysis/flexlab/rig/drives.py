@@ -20,8 +20,8 @@ STARTS_AT_V = 1.0  # the motor's data: starts to turn
 class Drives:
     """The bench's drives as a plant (see `board.emulated.Plant`). Public fields are there to be set by whoever breaks the rig."""
 
-    def __init__(self, bench: Bench, start_m: float = 0.0) -> None:
-        settings = configuration(bench)
+    def __init__(self, bench: Bench, start_m: float = 0.0, settings: dict[str, float] | None = None) -> None:
+        settings = settings or configuration(bench)
         motor = bench.rig.motor
         self.supply_V = bench.rig.driver.supply_V
         self.carriage_m, self.speed_m_s, self.joint_rad = start_m, 0.0, 0.0
