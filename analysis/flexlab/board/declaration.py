@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 NAME = "flexura-rig"
 VERSION = 1
-DECLARATION = 0xF25DCB18
+DECLARATION = 0x0A3BE240
 BAUD_BIT_S = 500000
 CONTROL_HZ = 1000
 TELEMETRY_EVERY_TICKS = 2
@@ -352,11 +352,11 @@ CONFIG: dict[str, Item] = {
         "above: fault supply_high"),
     "flex_zero": Item(7, 0.5, 0.0, 1.0,
         "reading of the straight strip, fraction of full scale"),
-    "flex_c1_m": Item(8, 0.0, -10.0, 10.0,
+    "flex_c1_m": Item(8, 0.0, -5.0, 5.0,
         "tip deflection = c1 x + c2 x^2 + c3 x^3, x = reading - zero"),
-    "flex_c2_m": Item(9, 0.0, -10.0, 10.0,
+    "flex_c2_m": Item(9, 0.0, -5.0, 5.0,
         "see flex_c1_m"),
-    "flex_c3_m": Item(10, 0.0, -10.0, 10.0,
+    "flex_c3_m": Item(10, 0.0, -5.0, 5.0,
         "see flex_c1_m"),
     "flex_min": Item(11, 0.05, 0.0, 1.0,
         "below: fault flex_low, fraction of full scale"),

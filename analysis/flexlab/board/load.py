@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 from flexura.signal import harmonic
@@ -52,6 +53,7 @@ class Load:
     ram_static: int
     stack_most: int
     times_real_time: float  # emulated / wall time, plant and link included
+    times_real_time_alone: float  # the same of the simulator without plant and link, the firmware in Idle
 
     @property
     def control_share(self) -> float:
@@ -86,7 +88,7 @@ def measure(elf: Path, bench: Bench, seconds: float = 2.0) -> Load:
     span = simulator.cycle - begin
     after = simulator.interrupts()
     starts = [cycle for cycle, _, level in simulator.edges() if level]
-    periods = [b - a for a, b in zip(starts, starts[1:], strict=False)]
+    periods = [b - a for a, b in pairwise(starts)]
     table = link.telemetry()
     window = 25  # reports: 50 ms
     rates = [
@@ -98,10 +100,13 @@ def measure(elf: Path, bench: Bench, seconds: float = 2.0) -> Load:
     link.run(0.02)
     stack = RAM_END - next(a for a in range(RAM_BEGIN + static, RAM_END) if simulator.data[a] != PAINT)
     flash = simulator.symbol("__data_load_end")
+    alone = time.perf_counter()
+    simulator.run(simulator.cycle + CLOCK_HZ)
+    alone = time.perf_counter() - alone
     board.close()
     return Load(
         span / CLOCK_HZ, min(periods), max(periods), after[CONTROL_VECTOR][2],
         (after[CONTROL_VECTOR][1] - before[CONTROL_VECTOR][1]) / ticks,
         (after[0][1] - before[0][1]) / span, rates[2], rates[0] + rates[1], int(table["missed"][-1]),
-        flash, static, stack, span / CLOCK_HZ / wall,
+        flash, static, stack, span / CLOCK_HZ / wall, 1.0 / alone,
     )  # fmt: skip

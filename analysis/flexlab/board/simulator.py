@@ -1,4 +1,4 @@
-"""An ATmega2560 that runs a firmware's ELF file in simavr: `shim.c`, compiled when first used, behind ctypes.
+"""An ATmega2560 that runs a firmware's ELF file in simavr: `shim/`, compiled when first used, behind ctypes.
 
 Nothing here follows the wall clock: the same calls give the same bytes and edges at the same cycles every time. simavr is GPLv3;
 the compiled shim links to it, stays in this user's cache and is not distributed.
@@ -22,14 +22,14 @@ CLOCK_HZ = 16_000_000
 ROLES = {name: k for k, name in enumerate(("forward", "reverse", "enable", "step", "step_up", "step_disable"), 1)}
 RESET_CAUSES = {"power-on": 1, "external": 2, "brown-out": 4, "watchdog": 8}  # MCUSR
 _PIN_REGISTERS = {p: 0x20 + 3 * k for k, p in enumerate("ABCDEFG")} | {p: 0x100 + 3 * k for k, p in enumerate("HJKL")}
-_SOURCE = Path(__file__).with_name("shim.c")
+_SOURCES = sorted(Path(__file__).with_name("shim").glob("*.[ch]"))
 _HEADERS = Path("/usr/include/simavr")
 _INSTALL = "on Debian type: apt-get install gcc libc6-dev simavr libsimavr-dev"
 _ROOM = 1 << 16
 
 
 class Window(ctypes.Structure):
-    """What plant and board exchange, a window of cycles at a time (`window_t` in shim.c)."""
+    """What plant and board exchange, a window of cycles at a time (`window_t` in shim/board.h)."""
 
     _fields_ = (
         ("encoder", ctypes.c_double * 2),
@@ -73,12 +73,12 @@ _INTERFACE: dict[str, tuple[Any, tuple[Any, ...]]] = {
 
 
 def compile_shim() -> Path:
-    """The shared library of shim.c, from the cache or compiled now (under a second). Raises FlexuraError that says what is
+    """The shared library of shim/, from the cache or compiled now (under a second). Raises FlexuraError that says what is
     missing."""
     config = _HEADERS / "sim_core_config.h"
     if not config.is_file():
         raise FlexuraError(f"the emulated board needs simavr, whose headers are not in {_HEADERS}; {_INSTALL}")
-    digest = hashlib.sha256(_SOURCE.read_bytes() + config.read_bytes()).hexdigest()[:16]
+    digest = hashlib.sha256(b"".join(path.read_bytes() for path in (*_SOURCES, config))).hexdigest()[:16]
     folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "flexura"
     target = folder / f"board-{digest}.so"
     if target.exists():
@@ -87,7 +87,8 @@ def compile_shim() -> Path:
     handle, name = tempfile.mkstemp(dir=folder, suffix=".so")
     os.close(handle)
     try:
-        command = ["cc", "-O2", "-shared", "-fPIC", f"-I{_HEADERS}", "-o", name, str(_SOURCE), "-lsimavr", "-lm"]
+        parts = [str(path) for path in _SOURCES if path.suffix == ".c"]
+        command = ["cc", "-O2", "-shared", "-fPIC", f"-I{_HEADERS}", "-o", name, *parts, "-lsimavr", "-lm"]
         done = subprocess.run(command, capture_output=True, text=True)
         if done.returncode:
             raise FlexuraError(f"the emulated board's shim does not compile; {_INSTALL}\n{done.stderr.strip()}")

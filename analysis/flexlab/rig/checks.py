@@ -163,9 +163,9 @@ def _always(bench: Bench) -> list[Check]:
         ),
         Check(
             "flex sensor's resolution",
-            count_mm <= 5.0,
+            count_mm <= 4.0,
             f"{count_mm:.2f} mm of tip deflection for a count of 10 bits ({tip_per_bend(bench):.3f} m for a radian of bend)",
-            "5 mm",
+            "4 mm",
             "a divider_ohm near the sensor's resistance",
         ),
     ]
