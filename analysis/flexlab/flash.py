@@ -86,8 +86,12 @@ def flash(bench: Bench, port: str | None = None, emulated: bool = False, configu
     from .board.serialport import SerialBoard, find
     from .rig.drives import Drives
 
+    if emulated and port:
+        raise InputError("expected either a port or --emulated", key="--port", value=port)
     wanted = configuration(bench)
     device = None if emulated else port or find()
+    if device and not Path(device).exists():
+        raise InputError("no such device: expected the board's serial port", key="--port", value=device)
     say("building the firmware")
     elf = build(*(["--upload-port", device] if device else []))
     say(f"loaded into {device}" if device else "loaded into an emulated ATmega2560: no hardware is touched")
