@@ -21,6 +21,8 @@ from .frames import Deframer, encode
 
 STEP_S = 0.001  # how long the host lets the board's time pass before it looks again
 SLOW = {"config_save": 2.0}  # commands whose answer may take longer than the usual time to repeat, s
+_REPORT_CODE = MESSAGES["telemetry"].code
+_REPORT_BYTES = messages.HEAD_BYTES + messages.TELEMETRY.itemsize
 
 
 class Refused(BoardError):
@@ -179,10 +181,22 @@ class Link:
 
     def poll(self) -> None:
         """Take what has arrived, send what is due; no time passes on an emulated board."""
+        self._receive()
+        self._speak()
+
+    def _step(self, seconds: float) -> None:
+        self._speak()
+        self.board.wait(seconds)
+        self._receive()
+
+    def _receive(self) -> None:
+        if data := self.board.read():
+            for payload in self._deframer.feed(data):
+                self._take(payload)
+            self.counts.bad_frames = self._deframer.bad
+
+    def _speak(self) -> None:
         now = self.board.now()
-        for payload in self._deframer.feed(self.board.read()):
-            self._take(payload)
-        self.counts.bad_frames = self._deframer.bad
         if self._now is None and not self._waiting and self._open and now - self._last_said >= self.keepalive_s:
             self._waiting.append(Command("keepalive", {}))
             self.counts.keepalives += 1
@@ -206,15 +220,12 @@ class Link:
         self._last_said = now
         self.board.write(asked.frame)
 
-    def _step(self, seconds: float) -> None:
-        self.poll()
-        self.board.wait(seconds)
-        for payload in self._deframer.feed(self.board.read()):
-            self._take(payload)
-
     # ---- what arrives
 
     def _take(self, payload: bytes) -> None:
+        if len(payload) == _REPORT_BYTES and payload[0] == _REPORT_CODE:  # most of what comes, and not read here
+            self._report(payload)
+            return
         found = messages.head(payload)
         message = messages.BY_CODE.get(found[0]) if found else None
         data = messages.body(payload)
@@ -222,17 +233,9 @@ class Link:
         if found is None or message is None or values is None:
             self.counts.unknown_frames += 1
             return
-        sequence = found[1]
-        if message.name == "telemetry":
-            self._telemetry.append(data)
-            self._newest = data
-            self.counts.telemetry += 1
-            if self._last_report is not None:
-                self.counts.telemetry_lost += (sequence - self._last_report - 1) & 0xFFFF
-            self._last_report = sequence
-        elif message.name == "identity":
+        if message.name == "identity":
             self._introduce(values)
-        elif self._now is not None and sequence == self._now.sequence:
+        elif self._now is not None and found[1] == self._now.sequence:
             if message.name == "config_value":
                 self._now.answer = values
             elif message.name == "ack" and values["command"] == MESSAGES[self._now.name].code:
@@ -240,6 +243,15 @@ class Link:
                     return  # the value was lost on its way: asked again, it comes again
                 self._now.result, self._now.detail = Result(values["result"]), values["detail"]
                 self._now = None
+
+    def _report(self, payload: bytes) -> None:
+        self._newest = messages.body(payload)
+        self._telemetry.append(self._newest)
+        self.counts.telemetry += 1
+        sequence = payload[1] | payload[2] << 8
+        if self._last_report is not None:
+            self.counts.telemetry_lost += (sequence - self._last_report - 1) & 0xFFFF
+        self._last_report = sequence
 
     def _introduce(self, said: dict[str, Any]) -> None:
         if self._open:  # a board announces itself until it is greeted: this one started anew, and the session is over

@@ -12,6 +12,7 @@ from .declaration import MESSAGES, Message
 
 BY_CODE = {message.code: message for message in MESSAGES.values()}
 _HEAD = struct.Struct("<BH")  # code, sequence number
+HEAD_BYTES = _HEAD.size
 
 
 def pack(name: str, sequence: int, **values: Any) -> bytes:
