@@ -6,10 +6,11 @@
 
 #include "avr_ioport.h"
 #include "avr_timer.h"
+#include "avr_watchdog.h"
 #include "sim_avr.h"
 #include "sim_elf.h"
 
-enum { ENCODERS = 2, LINES = 16, VECTORS = 64, PORTS = 12, MCUSR = 0x54, TIMSK0 = 0x6E, TIMERS = 6 };
+enum { ENCODERS = 2, LINES = 16, VECTORS = 64, PORTS = 12, MCUSR = 0x54, WATCHDOG_RESET = 8, TIMSK0 = 0x6E, TIMERS = 6 };
 enum { ON_PIN, ON_ADC };
 enum { FORWARD = 1, REVERSE, ENABLE, STEP, STEP_UP, STEP_DISABLE }; /* what a line does for the plant; 0: only watched */
 
@@ -59,7 +60,8 @@ typedef struct {
 struct board {
   avr_t *avr;
   void (*core_reset)(avr_t *);
-  int was_reset;
+  int was_reset, bitten;
+  avr_watchdog_t *watchdog;
   window_t window;
   queue_t inputs;   /* input_t in order of cycle */
   queue_t to_uart;  /* bytes that the line still holds */

@@ -11,6 +11,7 @@
  *   - an INTn pin that is low before its edge is chosen is polled every cycle: strict level trigger off;
  *   - fast PWM with OCRnx at TOP, which is always on, shows no level at the pin: read from the registers;
  *   - a timer's interrupt that falls due while it is masked is forgotten: raised when it is unmasked;
+ *   - a watchdog whose interrupt nobody serves never resets: it does with its next time-out;
  *   - a byte of the UART takes 11 bit times, not 10 (left as it is: slower than the hardware).
  */
 #include <stdarg.h>
@@ -47,6 +48,21 @@ static void on_interrupt(struct avr_irq_t *irq, uint32_t value, void *param) {
   }
 }
 
+static avr_cycle_count_t second_bite(avr_t *avr, avr_cycle_count_t when, void *param) {
+  (void)avr, (void)when;
+  ((board_t *)param)->bitten = 1;
+  return 0;
+}
+
+/* The watchdog's interrupt is pending, or no longer. */
+static void on_bite(struct avr_irq_t *irq, uint32_t value, void *param) {
+  (void)irq;
+  board_t *b = param;
+  if (value && avr_regbit_get(b->avr, b->watchdog->wde))
+    avr_cycle_timer_register(b->avr, b->watchdog->cycle_count, second_bite, b);
+  else avr_cycle_timer_cancel(b->avr, second_bite, b);
+}
+
 /* A timer's mask was written: what fell due behind it and is let through now is due now, as the flag in TIFRn says. */
 static void on_mask(struct avr_irq_t *irq, uint32_t value, void *param) {
   (void)irq, (void)value;
@@ -77,7 +93,7 @@ static void no_sleep(avr_t *avr, avr_cycle_count_t cycles) { (void)avr, (void)cy
 static avr_cycle_count_t wake(avr_t *avr, avr_cycle_count_t when, void *param) { return (void)avr, (void)when, (void)param, 0; }
 
 static void after_reset(board_t *b) {
-  b->was_reset = 0;
+  b->was_reset = b->bitten = 0;
   b->depth = 0;
   b->window.resets += 1;
   rest(b);
@@ -119,6 +135,9 @@ board_t *board_new(const char *elf, uint32_t hz, uint32_t baud) {
   avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUTPUT), on_tx, b);
   for (int i = 0; i < TIMERS; ++i)
     avr_irq_register_notify(avr_iomem_getirq(avr, (avr_io_addr_t)(TIMSK0 + i), NULL, AVR_IOMEM_IRQ_ALL), on_mask, b);
+  for (avr_io_t *io = avr->io_port; io; io = io->next)
+    if (!strcmp(io->kind, "watchdog")) b->watchdog = (avr_watchdog_t *)io;
+  avr_irq_register_notify(b->watchdog->watchdog.irq + AVR_INT_IRQ_PENDING, on_bite, b);
   avr_irq_register_notify(avr_get_interrupt_irq(avr, AVR_INT_ANY) + AVR_INT_IRQ_RUNNING, on_interrupt, b);
   return b;
 }
@@ -188,6 +207,7 @@ int board_run(board_t *b, uint64_t until, uint32_t slice) {
     avr->run_cycle_limit = slice;
     avr->run_cycle_count = left < slice ? left : slice;
     const int state = avr_run(avr);
+    if (b->bitten) avr_reset(avr), avr->data[MCUSR] = WATCHDOG_RESET;
     if (b->was_reset) after_reset(b), armed = 0; /* simavr's timers are gone */
     if (state == cpu_Done || state == cpu_Crashed) break;
   }
