@@ -19,6 +19,7 @@ flexura::Rig rig;
 flexura::Build build = {{0, 1, 0}, {__GNUC__, __GNUC_MINOR__, __GNUC_PATCHLEVEL__}, 0};
 flexura::Link link(rig, build);
 
+flexura::Outputs outputs;
 volatile bool in_tick;
 volatile uint16_t longest;             // control interrupt, in counts of timer 5 from when it was due
 
@@ -37,8 +38,6 @@ void outputs_off() {
   stepper::stop();
   stepper::enable(false);
 }
-
-bool active() { return rig.state() == State::armed || rig.state() == State::running; }
 
 void watchdog_on() {
   const uint8_t flags = SREG;
@@ -86,22 +85,20 @@ ISR(TIMER5_COMPA_vect) {
   in_tick = true;
   pin::busy::port() |= pin::busy::mask;
   sensors::sample();
-  static flexura::Inputs in;
-  static flexura::Outputs out;
-  sensors::read(in);
+  sensors::read(rig.inputs());
   sei();                                // encoders, step edges, ADC and serial line go on
-  rig.tick(in, out);
+  rig.tick(outputs);
   cli();
-  if (active()) {                       // nothing has tripped meanwhile
-    motor::drive(out.duty);
-    motor::enable(out.bridge);
-    stepper::enable(out.driver);
-    stepper::queue(out.steps, due + flexura::kTickCounts);
+  if (rig.active()) {                       // nothing has tripped meanwhile
+    motor::drive(outputs.duty);
+    motor::enable(true);
+    stepper::enable(true);
+    stepper::queue(outputs.steps, due + flexura::kTickCounts);
   } else {
     outputs_off();
   }
   for (uint8_t j = 0; j < 2; ++j)
-    if (out.pair[j]) sensors::pair(j);
+    if (outputs.pair[j]) sensors::pair(j);
   pin::busy::port() &= static_cast<uint8_t>(~pin::busy::mask);
   const uint16_t took = TCNT5 - due;
   if (took > longest) longest = took;
@@ -139,7 +136,7 @@ void listen() {
   uint8_t byte, answer[flexura::Link::kAnswerMaxBytes];
   for (uint8_t n = 0; n < 32 && uart::take(byte); ++n) {   // a flooded line must not keep the rest waiting
     uart::send(answer, link.take(byte, answer));
-    if (!active() && (pin::motor_enable::port() & pin::motor_enable::mask)) {
+    if (!rig.active() && (pin::motor_enable::port() & pin::motor_enable::mask)) {
       const uint8_t flags = SREG;
       cli();
       outputs_off();                    // a stop does not wait for the next tick
@@ -185,7 +182,7 @@ void speak(uint32_t now) {
 }
 
 void light(uint32_t now) {
-  const bool on = rig.state() == State::fault ? now >> 8 & 1 : active();
+  const bool on = rig.state() == State::fault ? now >> 8 & 1 : rig.active();
   if (on) {
     pin::lamp::port() |= pin::lamp::mask;
   } else {
@@ -206,6 +203,7 @@ void __attribute__((noinline, used)) loop() {
     before = rig.state();
   }
   listen();
+  if (rig.state() == State::running) rig.prepare();
   keep();
   speak(now);
   light(now);

@@ -3,23 +3,26 @@
 //   u = kp e + ki sum(e) T + kd (r' - q') + kf w + kg w' + kv r' + kc sign(r')        e = r - q, w = tip deflection
 //
 // q' and w' are filtered differences (filter.h, tip.h), T = 1 tick. |u| <= limit, then |u - u of the tick before| <= slew.
-// The sum stands still while limit or slew holds u back and e would push it further (conditional integration).
+// The sum's part of u stays within the limit too, and stands still while limit or slew holds u back and e would push it further.
 #pragma once
 #include "fixed.h"
 
 namespace flexura {
 
-// u is Q16: of mV for joint 1, of 1/8192 microstep per tick for joint 2. "count" stands for either joint's unit of position.
+// u is in 1/16 PWM counts for joint 1, in 1/4096 microsteps per tick for joint 2: 16 bits hold it, and the sum of two of it.
+// "count" stands for either joint's unit of position.
+constexpr int16_t kOutputMost = 16383;
+
 struct PidGains {
   int32_t kp = 0;     // Q16, u per count
   int32_t ki = 0;     // Q24, u per count and tick
   int32_t kd = 0;     // Q8, u per (count / tick)
   int32_t kf = 0;     // Q16, u per 10 um
-  int32_t kg = 0;     // Q8, u per (10 um / tick)
+  int32_t kg = 0;     // Q8, u per (10 um / two ticks)
   int32_t kv = 0;     // Q8, u per (count / tick)
-  int32_t kc = 0;     // Q16, u
-  int32_t limit = 0;  // Q16, u
-  int32_t slew = 0;   // Q16, u per tick
+  int16_t kc = 0;     // u
+  int16_t limit = 0;  // u, at most kOutputMost
+  int16_t slew = 0;   // u per tick, the same
 };
 
 struct PidSignals {
@@ -27,24 +30,23 @@ struct PidSignals {
   int16_t rate;             // q', counts / 256 per tick
   int16_t setpoint_rate;    // r', the same
   int16_t deflection;       // 10 um
-  int16_t deflection_rate;  // 10 um / 256 per tick
+  int16_t deflection_rate;  // 10 um / 256 in two ticks
 };
 
 class Pid {
  public:
-  void start(int32_t output) { integral_ = 0, carry_ = 0, output_ = output; }
-  int32_t update(const PidGains &gains, const PidSignals &in);
+  void start(int16_t output) { integral_ = 0, carry_ = 0, output_ = output; }
+  int16_t update(const PidGains &gains, const PidSignals &in);
   // Without a controller: brings the output to a wish, within limit and slew.
-  int32_t follow(const PidGains &gains, int32_t wish) { return output_ = held(gains, wish); }
-  int32_t output() const { return output_; }
-  int32_t integral() const { return integral_; }
+  int16_t follow(const PidGains &gains, int32_t wish) { return output_ = held(gains, wish); }
+  int16_t output() const { return output_; }
 
  private:
-  int32_t held(const PidGains &gains, int32_t wish) const;
+  int16_t held(const PidGains &gains, int32_t wish) const;
 
   int32_t integral_ = 0;  // Q16, u
   uint8_t carry_ = 0;     // eight bits below it, lest small errors be lost
-  int32_t output_ = 0;
+  int16_t output_ = 0;
 };
 
 }  // namespace flexura

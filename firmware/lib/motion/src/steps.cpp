@@ -3,31 +3,39 @@
 namespace flexura {
 
 namespace {
-constexpr int32_t kStep = 65536, kThreshold = 3 * kStep / 4;
-}
+constexpr int16_t kStep = 4096, kThreshold = 3 * kStep / 4;
 
-void Steps::plan(int32_t rate, StepPlan &plan) {
-  const int32_t advance = rate / 8192;                       // Q16 microsteps in this tick
-  plan.up = advance > 0;
+// part / whole as Q12, rounded down, bit by bit: a third of what a division costs. 0 <= part <= whole < 2^15.
+uint16_t ratio(uint16_t part, uint16_t whole) {
+  uint16_t quotient = 0;
+  for (uint8_t bit = 0; bit < 12; ++bit) {
+    part = static_cast<uint16_t>(part << 1);
+    quotient = static_cast<uint16_t>(quotient << 1);
+    if (part >= whole) part = static_cast<uint16_t>(part - whole), ++quotient;
+  }
+  return quotient;
+}
+}  // namespace
+
+void Steps::plan(int16_t rate, StepPlan &plan) {
+  plan.up = rate > 0;
   plan.count = 0;
   // Mirrored so that the position always rises.
-  const int32_t pace = plan.up ? advance : -advance, from = plan.up ? ahead_ : -ahead_;
-  int32_t first = kThreshold - from, over = from + pace - kThreshold;
-  ahead_ += advance;
+  const int16_t pace = plan.up ? rate : -rate, from = plan.up ? ahead_ : -ahead_;
+  int16_t over = from + pace - kThreshold;
+  ahead_ = static_cast<int16_t>(ahead_ + rate);
   if (over < 0) return;
-  while (over >= 0 && plan.count < kStepsPerTick) ++plan.count, over -= kStep;
-  given_ += plan.up ? plan.count : -plan.count;
-  ahead_ -= plan.up ? plan.count * kStep : -(plan.count * kStep);
-  if (first < 0) first = 0;                                  // after a reversal without a step between
-
-  if (plan.count == 1) {                                     // one division, exact
-    plan.at[0] = static_cast<uint16_t>(static_cast<uint32_t>(first) * kTickCounts / static_cast<uint32_t>(pace));
-    return;
+  for (; over >= 0 && plan.count < kStepsPerTick; over = static_cast<int16_t>(over - kStep)) {
+    ++plan.count;
+    given_ += plan.up ? 1 : -1;
+    ahead_ = static_cast<int16_t>(ahead_ + (plan.up ? -kStep : kStep));
   }
-  // Several: one division for the interval, in 1/256 timer counts; the pace is more than a whole step.
-  const uint32_t interval = (static_cast<uint32_t>(kTickCounts) << 20) / static_cast<uint32_t>(pace >> 4);
-  uint32_t at = (static_cast<uint32_t>(first >> 4) * interval) >> 12;
-  for (uint8_t k = 0; k < plan.count; ++k, at += interval) plan.at[k] = static_cast<uint16_t>(at >> 8);
+  const uint16_t first = from < kThreshold ? kThreshold - from : 0;   // 0: a rate turned round without a step between
+  plan.at[0] = static_cast<uint16_t>(unsigned_product(ratio(first, pace), kTickCounts) >> 12);
+  if (plan.count == 1) return;
+  const uint16_t interval = static_cast<uint16_t>(unsigned_product(ratio(kStep, pace), kTickCounts) >> 8);   // 1/16 counts
+  uint16_t at = static_cast<uint16_t>(plan.at[0] << 4);
+  for (uint8_t k = 1; k < plan.count; ++k) plan.at[k] = (at += interval) >> 4;
 }
 
 }  // namespace flexura

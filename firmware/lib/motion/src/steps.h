@@ -19,14 +19,14 @@ struct StepPlan {
 class Steps {
  public:
   void start(int32_t given) { given_ = given, ahead_ = 0; }
-  // rate: Q29 microsteps per tick, within +-4.
-  void plan(int32_t rate, StepPlan &plan);
+  // rate: microsteps / 4096 per tick, within +-4 microsteps.
+  void plan(int16_t rate, StepPlan &plan);
   int32_t given() const { return given_; }                                     // microsteps, planned ones included
-  int32_t position() const { return q8(given_) + (ahead_ >> 8); }              // microsteps / 256, at the end of the plan
+  int32_t position() const { return q8(given_) + (ahead_ >> 4); }              // microsteps / 256, at the end of the plan
 
  private:
   int32_t given_ = 0;
-  int32_t ahead_ = 0;                    // Q16 microsteps, position - given
+  int16_t ahead_ = 0;                    // microsteps / 4096: position - given
 };
 
 }  // namespace flexura

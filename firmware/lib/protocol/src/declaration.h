@@ -4,7 +4,7 @@
 
 namespace flexura {
 
-constexpr uint32_t kDeclaration = 0xF25DCB18;
+constexpr uint32_t kDeclaration = 0x0A3BE240;
 constexpr uint8_t kProtocolVersion = 1;
 constexpr uint32_t kBaudBitS = 500000;
 constexpr uint16_t kControlHz = 1000;
@@ -332,9 +332,9 @@ static_assert(sizeof(Config) == kConfigItems * sizeof(float), "no gaps");
   X(supply_min_V, 10.0f, 0.0f, 30.0f) \
   X(supply_max_V, 14.0f, 1.0f, 30.0f) \
   X(flex_zero, 0.5f, 0.0f, 1.0f) \
-  X(flex_c1_m, 0.0f, -10.0f, 10.0f) \
-  X(flex_c2_m, 0.0f, -10.0f, 10.0f) \
-  X(flex_c3_m, 0.0f, -10.0f, 10.0f) \
+  X(flex_c1_m, 0.0f, -5.0f, 5.0f) \
+  X(flex_c2_m, 0.0f, -5.0f, 5.0f) \
+  X(flex_c3_m, 0.0f, -5.0f, 5.0f) \
   X(flex_min, 0.05f, 0.0f, 1.0f) \
   X(flex_max, 0.95f, 0.0f, 1.0f) \
   X(position_min_1_m, -0.02f, -10.0f, 10.0f) \

@@ -70,8 +70,8 @@ Result Rig::reference(const Reference &command) {
   const int64_t lag = (exact >> 8) - static_cast<int64_t>(command.steps) * 256;
   if (lag > scales_.limits.lost || lag < -scales_.limits.lost) return Result::out_of_range;
   Section section;
-  joint_[0].position = command.position_1;
-  joint_[1].position = command.position_2;
+  seen_.position[0] = command.position_1;
+  seen_.position[1] = command.position_2;
   steps_given_ = command.steps;
   by_encoder_ = static_cast<int32_t>(exact >> 16);
   by_encoder_rest_ = static_cast<uint16_t>(exact);
@@ -96,13 +96,13 @@ Result Rig::arm(uint8_t mode, uint16_t &detail) {
   player_.clear();
   watch_.start();
   steps_.start(steps_given_);
-  tip_.start(scales_.tip, in_.flex);
-  for (Joint &joint : joint_) {
-    joint.velocity.start();
-    joint.pid.start(0);
+  tip_.start(scales_.tip, static_cast<uint16_t>(2 * in_.flex));
+  flex_before_ = in_.flex;
+  for (uint8_t j = 0; j < 2; ++j) {
+    velocity_[j].start();
+    pid_[j].start(0);
   }
-  joint_[0].setpoint.start(q8(joint_[0].position));
-  joint_[1].setpoint.start(q8(steps_given_));
+  target_ = {{0, 0}};
   final_ = false;
   mode_ = static_cast<Mode>(mode);
   state_ = State::armed;
@@ -110,7 +110,7 @@ Result Rig::arm(uint8_t mode, uint16_t &detail) {
 }
 
 Result Rig::may_add(uint16_t first, uint8_t count, uint8_t most, uint16_t &detail) const {
-  if ((state_ != State::armed && state_ != State::running) || player_.closed()) return Result::wrong_state;
+  if (!active() || player_.closed()) return Result::wrong_state;
   if (count < 1 || count > most) return Result::out_of_range;
   if (first != player_.next_index()) {
     detail = player_.next_index();
@@ -159,22 +159,25 @@ Result Rig::start(uint8_t period_log2, uint16_t &detail) {
     detail = waiting;
     return Result::not_ready;
   }
-  Section section;
-  if (state_ != State::armed) return Result::wrong_state;   // a fault since
-  if (mode_ == Mode::position) {
+  const bool tracks = mode_ == Mode::position;
+  Tick begin = {{0, 0}};
+  if (tracks) {
+    Section section;                                          // positions of one tick
+    begin = {{player_.first().position[0], player_.first().position[1]}};
+    target_ = begin;
     for (uint8_t j = 0; j < 2; ++j) {
-      const Setpoint before = joint_[j].setpoint;
-      joint_[j].setpoint.start(player_.first().position[j]);
       const int32_t off = error(j);
       if (off > scales_.limits.following[j] || off < -scales_.limits.following[j]) {
-        joint_[j].setpoint = before;
         detail = static_cast<uint16_t>(j + 1);
         return Result::out_of_range;
       }
     }
-    joint_[1].pid.start(joint_[1].pid.output());            // it may still be braking
   }
-  player_.start(period_log2, mode_ == Mode::position);
+  player_.start(period_log2, tracks, scales_.setpoint_filter);
+  Section section;
+  if (state_ != State::armed) return Result::wrong_state;     // a fault meanwhile
+  target_ = begin;
+  pid_[1].start(pid_[1].output());                            // it may still be braking
   final_ = false;
   state_ = State::running;
   return Result::ok;

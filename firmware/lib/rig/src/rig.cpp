@@ -4,7 +4,7 @@
 namespace flexura {
 
 namespace {
-constexpr int32_t kRateOfStep = 536871;   // Q29 microsteps per tick in 1 microstep/s
+constexpr int32_t kRateOfStep = 268435;    // Q16, units of u_2 (1/4096 microstep per tick) in 1 microstep/s
 
 bool is_set(uint8_t bits, Reset cause) { return bits >> static_cast<uint8_t>(cause) & 1; }
 }  // namespace
@@ -29,92 +29,86 @@ void Rig::trip(Fault fault) {
   state_ = State::fault;
 }
 
-void Rig::sense(const Inputs &in) {
-  in_ = in;
+void Rig::sense() {
   for (uint8_t j = 0; j < 2; ++j) {
-    joint_[j].position += in.moved[j];
-    joint_[j].velocity.update(in.moved[j], scales_.velocity_filter);
-    missed_ = static_cast<uint16_t>(missed_ + in.missed[j]);
+    seen_.position[j] += in_.moved[j];
+    velocity_[j].update(in_.moved[j], scales_.velocity_filter);
+    seen_.velocity[j] = velocity_[j].value();
+    missed_ = static_cast<uint16_t>(missed_ + in_.missed[j]);
   }
-  steps_given_ += in.stepped;
-  const int32_t rest = by_encoder_rest_ + scales_.ratio * in.moved[1];
-  by_encoder_ += rest >> 16;
-  by_encoder_rest_ = static_cast<uint16_t>(rest);
-  tip_.update(scales_.tip, in.flex);
+  steps_given_ += in_.stepped;
+  const int32_t rest = by_encoder_rest_ + scales_.ratio * in_.moved[1];
+  by_encoder_ += upper(rest);
+  by_encoder_rest_ = lower(rest);
+  seen_.lag = q8(by_encoder_ - steps_given_) + (by_encoder_rest_ >> 8);
+  // The strip's slowness allows two ticks a reading, and noise asks for them.
+  if (tick_ & 1) {
+    flex_before_ = in_.flex;
+  } else {
+    tip_.update(scales_.tip, static_cast<uint16_t>(flex_before_ + in_.flex));
+  }
 }
 
 int32_t Rig::error(uint8_t joint) const {
-  if (joint == 0) return subtract(joint_[0].setpoint.position(), q8(joint_[0].position));
-  const int32_t position = scales_.on_encoder ? q8(by_encoder_) + (by_encoder_rest_ >> 8) : steps_.position();
-  return subtract(joint_[1].setpoint.position(), position);
+  const int32_t position = joint == 0         ? q8(seen_.position[0])
+                           : scales_.on_encoder ? q8(by_encoder_) + (by_encoder_rest_ >> 8)
+                                              : steps_.position();
+  return subtract(target_.of[joint], position);
 }
 
-void Rig::tick(const Inputs &in, Outputs &out) {
+void Rig::tick(Outputs &out) {
   tick_ = tick_ + 1;
-  sense(in);
-
-  int32_t errors[2] = {0, 0};
-  const bool tracking = state_ == State::running && mode_ == Mode::position;
+  sense();
+  out.steps.count = 0;
+  seen_.tracking = false;
   if (state_ == State::running) {
-    const Player::Event event = player_.advance();
+    const Tick before = target_;
+    const Player::Event event = player_.advance(target_);
     if (event == Player::Event::underrun) trip(Fault::underrun);
     final_ = event == Player::Event::final;
-  }
-  if (tracking) {
-    for (uint8_t j = 0; j < 2; ++j) {
-      joint_[j].setpoint.update(player_.position()[j], player_.velocity()[j], scales_.setpoint_filter[j]);
-      errors[j] = error(j);
+    if (mode_ == Mode::position) {
+      seen_.tracking = true;
+      for (uint8_t j = 0; j < 2; ++j) {
+        setpoint_rate_[j] = narrow(target_.of[j] - before.of[j]);
+        seen_.error[j] = error(j);
+      }
     }
   }
-  if (state_ == State::armed || state_ == State::running) {
-    const Watched seen = {{joint_[0].position, joint_[1].position},
-                          {joint_[0].velocity.value(), joint_[1].velocity.value()},
-                          voltage_,
-                          subtract(q8(by_encoder_) + (by_encoder_rest_ >> 8), q8(steps_given_)),
-                          tracking,
-                          {errors[0], errors[1]}};
-    const Fault fault = watch_.check(scales_.limits, in, seen);
+  if (active()) {
+    const Fault fault = watch_.check(scales_.limits, in_, seen_);
     if (fault != Fault::none) trip(fault);
   }
-
-  out.steps.count = 0;
-  if (state_ != State::armed && state_ != State::running) {
-    out.bridge = out.driver = false;
-    out.duty = 0;
-    out.pair[0] = out.pair[1] = true;
-    voltage_ = 0;
-    saturated_ = false;
-    return;
+  if (active()) {
+    control();
+    out.on = true;
+    out.duty = seen_.duty;
+    steps_.plan(pid_[1].output(), out.steps);
+  } else {
+    out.on = false;
+    out.duty = seen_.duty = 0;
   }
-  control(errors, out);
+  // Edges of one line alone say something only while the joint is driven.
+  out.pair[0] = seen_.duty <= scales_.limits.stall_duty && seen_.duty >= -scales_.limits.stall_duty;
+  out.pair[1] = !out.on || pid_[1].output() == 0;
 }
 
-void Rig::control(const int32_t *errors, Outputs &out) {
-  Pid &motor = joint_[0].pid, &stepper = joint_[1].pid;
+void Rig::control() {
   const PidGains *gains = scales_.gains;
   if (state_ == State::armed) {
-    motor.start(0);
-    stepper.follow(gains[1], 0);
+    pid_[0].start(0);
+    pid_[1].follow(gains[1], 0);
   } else if (mode_ == Mode::open_loop) {
-    motor.follow(gains[0], static_cast<int32_t>(player_.velocity()[0]) * 65536);
-    stepper.follow(gains[1], multiply(kRateOfStep, player_.velocity()[1]));
+    pid_[0].follow(gains[0], upper(multiply(scales_.duty, static_cast<int16_t>(target_.of[0]))));
+    pid_[1].follow(gains[1], part(kRateOfStep, static_cast<int16_t>(target_.of[1])));
   } else {
-    PidSignals signals = {errors[0], joint_[0].velocity.value(), joint_[0].setpoint.rate(), tip_.deflection(), tip_.rate()};
-    motor.update(gains[0], signals);
-    signals.error = errors[1];
-    signals.setpoint_rate = joint_[1].setpoint.rate();
-    signals.rate = scales_.on_encoder ? narrow(multiply(scales_.ratio, joint_[1].velocity.value()) >> 16)
-                                      : static_cast<int16_t>(stepper.output() >> 21);
-    stepper.update(gains[1], signals);
+    PidSignals signals = {seen_.error[0], seen_.velocity[0], setpoint_rate_[0], tip_.deflection(), tip_.rate()};
+    pid_[0].update(gains[0], signals);
+    signals.error = seen_.error[1];
+    signals.setpoint_rate = setpoint_rate_[1];
+    signals.rate = scales_.on_encoder ? upper(multiply(scales_.ratio, seen_.velocity[1])) : static_cast<int16_t>(pid_[1].output() >> 4);
+    pid_[1].update(gains[1], signals);
   }
-  const int32_t u = motor.output();
-  saturated_ = u >= gains[0].limit || u <= -gains[0].limit;
-  voltage_ = static_cast<int16_t>(u >> 16);
-  out.bridge = out.driver = true;
-  out.duty = clamp<int16_t>(static_cast<int16_t>(multiply(scales_.duty, voltage_) >> 16), -kDutyFull, kDutyFull);
-  steps_.plan(stepper.output(), out.steps);
-  out.pair[0] = voltage_ <= scales_.limits.stall_voltage && voltage_ >= -scales_.limits.stall_voltage;
-  out.pair[1] = stepper.output() == 0;
+  seen_.duty = static_cast<int16_t>(pid_[0].output() / 16);
 }
 
 uint32_t Rig::now() const {
@@ -130,17 +124,17 @@ void Rig::report(Telemetry &report) const {
   report.fault_tick = fault_tick_;
   report.flags = static_cast<uint8_t>(in_.switches | referenced_ << static_cast<uint8_t>(Flag::referenced) |
                                       final_ << static_cast<uint8_t>(Flag::final) |
-                                      saturated_ << static_cast<uint8_t>(Flag::saturated));
-  if (state_ == State::armed || state_ == State::running)
+                                      saturated() << static_cast<uint8_t>(Flag::saturated));
+  if (active())
     report.flags |= 1 << static_cast<uint8_t>(Flag::bridge_enabled) | 1 << static_cast<uint8_t>(Flag::driver_enabled);
   report.buffered = player_.waiting();
-  report.position_1 = joint_[0].position;
-  report.position_2 = joint_[1].position;
+  report.position_1 = seen_.position[0];
+  report.position_2 = seen_.position[1];
   report.steps = steps_given_;
-  report.setpoint_1 = joint_[0].setpoint.position();
-  report.setpoint_2 = joint_[1].setpoint.position();
-  report.voltage = voltage_;
-  report.rate = static_cast<int16_t>((joint_[1].pid.output() >> 13) * 1000 >> 16);
+  report.setpoint_1 = target_.of[0];
+  report.setpoint_2 = target_.of[1];
+  report.voltage = upper(multiply(scales_.voltage, seen_.duty));
+  report.rate = active() ? static_cast<int16_t>(pid_[1].output() * 1000L / 4096) : 0;
   report.flex = in_.flex;
   report.supply = static_cast<uint16_t>(static_cast<uint32_t>(in_.supply) * scales_.supply >> 6);
   report.missed = missed_;

@@ -32,14 +32,15 @@ constexpr float kTick = 0.001f, kQ8 = 256.0f, kQ16 = 65536.0f, kQ24 = 16777216.0
 constexpr float kFull = 1024.0f * kAdcSamples;   // reading at the reference voltage
 constexpr float kDeflection = 1e5f;              // units of 10 um in a metre
 constexpr float kMilli = 1000.0f;                // mV in a volt
-constexpr float kRate = 8192.0f;                 // units of u_2 in a microstep per tick
+constexpr float kRate = 4096.0f;                 // units of u_2 in a microstep per tick
+constexpr float kDutyUnits = 16.0f * kDutyFull;  // units of u_1 at the supply's voltage
 constexpr float kReference = 5.0f;               // V at the ADC's full scale
 
-// a = 1 - exp(-2 pi f T) as Q15; nothing for f = 0.
-int16_t filter(float frequency_Hz) {
+// a = 1 - exp(-2 pi f T) as Q16; nothing for f = 0.
+uint16_t filter(float frequency_Hz, float period_s = kTick) {
   if (frequency_Hz <= 0) return 0;
-  const float a = 1.0f - expf(-6.2831853f * frequency_Hz * kTick);
-  return static_cast<int16_t>(clamp(a * 32768.0f, 1.0f, 32767.0f));
+  const float a = 1.0f - expf(-6.2831853f * frequency_Hz * period_s);
+  return static_cast<uint16_t>(clamp(a * 65536.0f, 1.0f, 65535.0f));
 }
 
 uint16_t reading(float part) { return static_cast<uint16_t>(part * kFull + 0.5f); }
@@ -48,21 +49,24 @@ uint16_t supply_reading(float volts, const Config &c) {
   return static_cast<uint16_t>(clamp(volts / c.supply_divider / kReference * 1024.0f, 0.0f, 1024.0f));
 }
 
+int16_t change(float u) { return static_cast<int16_t>(clamp(u + 0.5f, 1.0f, static_cast<float>(kOutputMost))); }
+
 int16_t to_16(float value) { return static_cast<int16_t>(clamp(value, -32767.0f, 32767.0f)); }
 
 // u per unit of one joint: all gains in the units of PidGains. `u` is units of output per V or rad/s, `count` counts per m or rad.
 uint8_t joint_1(const Config &c, PidGains &g) {
-  const float u = kMilli, count = c.motor_counts_per_m;
+  const float u = kDutyUnits / c.supply_V, count = c.motor_counts_per_m;
   NEED(to_fixed(c.kp_1_V_m, u / count * kQ16, g.kp), kp_1_V_m);
   NEED(to_fixed(c.ki_1_V_m_s, u / count * kTick * kQ24, g.ki), ki_1_V_m_s);
   NEED(to_fixed(c.kd_1_V_s_m, u / count / kTick * kQ8, g.kd), kd_1_V_s_m);
   NEED(to_fixed(c.kf_1_V_m, u / kDeflection * kQ16, g.kf), kf_1_V_m);
-  NEED(to_fixed(c.kg_1_V_s_m, u / kDeflection / kTick * kQ8, g.kg), kg_1_V_s_m);
+  NEED(to_fixed(c.kg_1_V_s_m, u / kDeflection / (2 * kTick) * kQ8, g.kg), kg_1_V_s_m);
   NEED(to_fixed(c.kv_1_V_s_m, u / count / kTick * kQ8, g.kv), kv_1_V_s_m);
-  NEED(to_fixed(c.kc_1_V, u * kQ16, g.kc), kc_1_V);
-  NEED(to_fixed(c.voltage_max_V, u * kQ16, g.limit), voltage_max_V);
+  NEED(c.kc_1_V <= c.supply_V, kc_1_V);
   NEED(c.voltage_max_V <= c.supply_V, voltage_max_V);
-  NEED(to_fixed(c.voltage_slew_V_s, u * kTick * kQ16, g.slew), voltage_slew_V_s);
+  g.kc = static_cast<int16_t>(c.kc_1_V * u);
+  g.limit = static_cast<int16_t>(c.voltage_max_V * u);
+  g.slew = change(c.voltage_slew_V_s * kTick * u);
   return kConsistent;
 }
 
@@ -72,13 +76,13 @@ uint8_t joint_2(const Config &c, PidGains &g) {
   NEED(to_fixed(c.ki_2_1_s2, u * kTick * kQ24, g.ki), ki_2_1_s2);
   NEED(to_fixed(c.kd_2, kRate * kQ8, g.kd), kd_2);
   NEED(to_fixed(c.kf_2_rad_s_m, u * step / kDeflection * kQ16, g.kf), kf_2_rad_s_m);
-  NEED(to_fixed(c.kg_2_rad_m, kRate * step / kDeflection * kQ8, g.kg), kg_2_rad_m);
+  NEED(to_fixed(c.kg_2_rad_m, kRate * step / kDeflection / 2 * kQ8, g.kg), kg_2_rad_m);
   NEED(to_fixed(c.kv_2, kRate * kQ8, g.kv), kv_2);
   g.kc = 0;
   const float rate = c.rate_max_2_rad_s * step;                    // microsteps/s
   NEED(rate <= 4000.5f, rate_max_2_rad_s);
-  g.limit = static_cast<int32_t>(clamp(rate * u * kQ16, 0.0f, 2147483000.0f));
-  NEED(to_fixed(c.acceleration_max_2_rad_s2, step * u * kTick * kQ16, g.slew), acceleration_max_2_rad_s2);
+  g.limit = static_cast<int16_t>(clamp(rate * u + 0.5f, 0.0f, static_cast<float>(kOutputMost)));
+  g.slew = change(c.acceleration_max_2_rad_s2 * step * kTick * u);
   return kConsistent;
 }
 
@@ -106,7 +110,7 @@ uint8_t travel(const Config &c, Scales &s) {
 
 uint8_t watching(const Config &c, Scales &s) {
   WatchLimits &w = s.limits;
-  w.stall_voltage = to_16(c.stall_voltage_V * kMilli);
+  w.stall_duty = to_16(c.stall_voltage_V * kDutyFull / c.supply_V);
   w.stall_speed = to_16(c.stall_speed_m_s * c.motor_counts_per_m * kTick * kQ8);
   w.stall_ticks = static_cast<uint16_t>(c.stall_time_s / kTick);
   NEED(to_fixed(c.runaway_distance_m, c.motor_counts_per_m, w.runaway), runaway_distance_m);
@@ -123,16 +127,17 @@ uint8_t watching(const Config &c, Scales &s) {
 }
 
 uint8_t sensing(const Config &c, Scales &s) {
-  const float per_x = 32768.0f / 4.0f / kFull;   // x as Q15 counts to 4 kFull only
-  s.tip.zero = static_cast<int16_t>(reading(c.flex_zero));
+  const float per_x = 65536.0f / 4.0f / kFull;   // x as Q16 counts to 4 kFull only: two readings, doubled
+  s.tip.zero = static_cast<int16_t>(reading(2.0f * c.flex_zero));
   NEED(to_fixed(c.flex_c1_m, kDeflection * kQ8 * per_x, s.tip.c1), flex_c1_m);
   NEED(to_fixed(c.flex_c2_m, kDeflection * kQ8 * per_x * per_x, s.tip.c2), flex_c2_m);
   NEED(to_fixed(c.flex_c3_m, kDeflection * kQ8 * per_x * per_x * per_x, s.tip.c3), flex_c3_m);
-  s.tip.filter = filter(c.deflection_Hz);
+  s.tip.filter = filter(c.deflection_Hz, 2 * kTick);
   s.velocity_filter = filter(c.derivative_Hz);
   s.setpoint_filter[0] = filter(c.setpoint_1_Hz);
   s.setpoint_filter[1] = filter(c.setpoint_2_Hz);
-  NEED(to_fixed(kDutyFull / c.supply_V, kQ16 / kMilli, s.duty), supply_V);
+  NEED(to_fixed(kDutyUnits / c.supply_V, kQ16 / kMilli, s.duty), supply_V);
+  NEED(to_fixed(c.supply_V / kDutyFull, kMilli * kQ16, s.voltage), supply_V);
   NEED(to_fixed(c.stepper_steps_per_rad / c.stepper_counts_per_rad, kQ16, s.ratio), stepper_counts_per_rad);
   NEED(s.ratio < (1L << 24), stepper_counts_per_rad);   // 127 counts in a tick times the ratio stay within 32 bits
   s.supply = static_cast<uint16_t>(kReference * c.supply_divider * kMilli / 1024.0f * 64.0f + 0.5f);

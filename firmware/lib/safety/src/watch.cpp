@@ -47,7 +47,7 @@ void Watch::start() {
 }
 
 Fault Watch::encoders(const WatchLimits &limits, const Inputs &in, const Watched &now) {
-  const bool driven = now.voltage > limits.stall_voltage || now.voltage < -limits.stall_voltage;
+  const bool driven = now.duty > limits.stall_duty || now.duty < -limits.stall_duty;
   for (uint8_t j = 0; j < 2; ++j) {
     missed_[j] = static_cast<uint16_t>(missed_[j] + in.missed[j]);
     if (missed_[j] > limits.missed) return j ? Fault::encoder_2 : Fault::encoder_1;
@@ -55,7 +55,7 @@ Fault Watch::encoders(const WatchLimits &limits, const Inputs &in, const Watched
   if (driven && in.alone[0] >= limits.alone) return Fault::encoder_1;
   if (direction_ && in.alone[1] >= limits.alone) return Fault::encoder_2;
 
-  against_[0] = driven ? against(against_[0], now.voltage > 0 ? 1 : -1, in.moved[0]) : 0;
+  against_[0] = driven ? against(against_[0], now.duty > 0 ? 1 : -1, in.moved[0]) : 0;
   if (against_[0] > limits.runaway) return Fault::runaway_1;
   if (driven && !beyond(now.velocity[0], limits.stall_speed)) {
     if (++stalled_ >= limits.stall_ticks) return Fault::stall_1;
@@ -84,7 +84,10 @@ Fault Watch::check(const WatchLimits &limits, const Inputs &in, const Watched &n
   fault = encoders(limits, in, now);
   if (fault != Fault::none) return fault;
 
-  for (uint8_t j = 0; j < 2; ++j) {
+  // One joint in each tick: time is short, and what they watch takes longer than two.
+  turn_ = !turn_;
+  {
+    const uint8_t j = turn_;
     if (now.position[j] < limits.travel_low[j] || now.position[j] > limits.travel_high[j]) return j ? Fault::travel_2 : Fault::travel_1;
     if (beyond(now.velocity[j], limits.speed[j])) return j ? Fault::speed_2 : Fault::speed_1;
     if (now.tracking && beyond(now.error[j], limits.following[j])) return j ? Fault::following_2 : Fault::following_1;

@@ -4,11 +4,11 @@
 
 namespace flexura {
 
-// Joint 1 in encoder counts and mV; joint 2 in encoder counts, its pulses in microsteps.
+// Joint 1 in encoder counts and PWM counts; joint 2 in encoder counts, its pulses in microsteps.
 struct WatchLimits {
   int32_t travel_low[2], travel_high[2];   // counts
   int16_t speed[2];                        // counts / 256 per tick
-  int16_t stall_voltage;                   // mV; below it neither stall, runaway nor a broken encoder wire can be told
+  int16_t stall_duty;                      // PWM counts; below it neither stall, runaway nor a broken encoder wire can be told
   int16_t stall_speed;                     // counts / 256 per tick
   uint16_t stall_ticks;
   int32_t runaway;                         // counts
@@ -33,7 +33,7 @@ struct Inputs {
 struct Watched {
   int32_t position[2];      // counts
   int16_t velocity[2];      // counts / 256 per tick
-  int16_t voltage;          // mV, that the motor had in this tick
+  int16_t duty;             // PWM counts that the motor had in this tick
   int32_t lag;              // microsteps / 256: encoder of joint 2 minus pulses given
   bool tracking;            // the errors below mean something
   int32_t error[2];         // counts / 256, microsteps / 256
@@ -54,6 +54,7 @@ class Watch {
   int32_t against_[2] = {0, 0};            // counts moved against the drive
   int8_t direction_ = 0;                   // of the last pulses
   uint8_t flex_out_ = 0, supply_out_ = 0;
+  bool turn_ = false;
 };
 
 // Faults that a switch or a reading means, whatever moves; they forbid arming and clearing too.

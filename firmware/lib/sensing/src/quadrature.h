@@ -35,7 +35,7 @@ class Quadrature {
   void pair() { alone_ = 0; }
 
  private:
-  volatile uint8_t count_ = 0, missed_ = 0, alone_ = 0;
+  uint8_t count_ = 0, missed_ = 0, alone_ = 0;
   uint8_t last_ = 0, edge_ = 0;
 };
 

@@ -5,11 +5,11 @@
 
 namespace flexura {
 
-// Deflections are in units of 10 um; Q8 adds eight bits of fraction. Readings are sums of kAdcSamples conversions.
+// Deflections are in units of 10 um; Q8 adds eight bits of fraction. Readings are sums of two ticks' conversions.
 struct TipScale {
   int16_t zero = 0;                 // reading of the straight strip
-  int32_t c1 = 0, c2 = 0, c3 = 0;   // Q8, for x as Q15: (reading - zero) x 4
-  int16_t filter = INT16_MAX;       // Q15, of what is new in a tick
+  int32_t c1 = 0, c2 = 0, c3 = 0;   // Q8, for x as Q16: (reading - zero) x 2
+  uint16_t filter = UINT16_MAX;     // Q16, of what is new in two ticks
 };
 
 class Tip {
@@ -23,12 +23,12 @@ class Tip {
   }
 
   static int32_t raw(const TipScale &scale, uint16_t reading) {
-    const int16_t x = narrow((static_cast<int32_t>(reading) - scale.zero) * 4);
-    return fraction(add(fraction(add(fraction(scale.c3, x), scale.c2), x), scale.c1), x);
+    const int16_t x = narrow((static_cast<int32_t>(reading) - scale.zero) * 2);
+    return part(add(part(add(part(scale.c3, x), scale.c2), x), scale.c1), x);
   }
 
   int16_t deflection() const { return narrow(filtered_ >> 8); }   // 10 um
-  int16_t rate() const { return rate_; }                          // 10 um / 256 per tick
+  int16_t rate() const { return rate_; }                          // 10 um / 256 in two ticks
 
  private:
   int32_t filtered_ = 0;
