@@ -55,6 +55,9 @@ int main(void) {
       case 'm': TIMSK5 = 0; break;
       case 'M': TIMSK5 = _BV(OCIE5A); break;
       case 'a': ADMUX = _BV(REFS0), ADCSRA = _BV(ADEN) | _BV(ADSC) | 7; while (ADCSRA & _BV(ADSC)) {} give16(ADC); break;
+      case 'k': { int16_t n = (int16_t)take16(); /* the pairs that simavr takes wrongly; avr-gcc divides by 16, 32, 64 so */
+        __asm__("sbrc %B0, 7 \n adiw %A0, 15 \n sbrs %B0, 7 \n sbiw %A0, 12 \n cpse %A0, %B0 \n adiw %A0, 31" : "+w"(n));
+        give16((uint16_t)n); } break;
       case 'w': eeprom_write_byte((uint8_t *)7, take()); break;
       case 'r': give(eeprom_read_byte((const uint8_t *)7)); break;
     }

@@ -207,6 +207,19 @@ def test_a_hang_and_its_cure(board):
     assert board.read() == b"\1\1"
 
 
+@pytest.mark.parametrize("number", [0, 100, 0x7FFF, 0x8000, 0xFF00, 0xFFF1, 0xFFFE, 12, 0x0C0C, 0x0118])
+def test_skips_pass_over_one_instruction(board, number):
+    """By the instruction set manual: a skip passes over the next instruction, and ADIW and SBIW are one word long."""
+    expected = number
+    if expected & 0x8000:
+        expected = expected + 15 & 0xFFFF
+    if not expected & 0x8000:
+        expected = expected - 12 & 0xFFFF
+    if expected & 255 != expected >> 8:
+        expected = expected + 31 & 0xFFFF
+    assert ask(board, "k", 2, number) == expected
+
+
 def test_the_board_is_a_board_and_says_that_it_is_emulated(board):
     def takes(board: Board) -> str:
         return board.label

