@@ -52,7 +52,7 @@ class Load:
     flash: int
     ram_static: int
     stack_most: int
-    times_real_time: float  # emulated / wall time, plant and link included
+    times_real_time: float  # emulated / processor time, plant and link included
     times_real_time_alone: float  # the same of the simulator without plant and link, the firmware in Idle
 
     @property
@@ -81,10 +81,10 @@ def measure(elf: Path, bench: Bench, seconds: float = 2.0) -> Load:
     carriage, joint = (harmonic(way / 2, 1.0, math.pi, way / 2) for way in (0.0398, 2.498))
     player = Player(link, setpoints(carriage, joint, seconds + 1.0, settings))
     player.start()
-    before, begin, wall = simulator.interrupts(), simulator.cycle, time.perf_counter()
+    before, begin, wall = simulator.interrupts(), simulator.cycle, time.process_time()
     simulator.trace(board.lines["busy"], True)
     player.run(seconds)
-    wall = time.perf_counter() - wall
+    wall = time.process_time() - wall
     span = simulator.cycle - begin
     after = simulator.interrupts()
     starts = [cycle for cycle, _, level in simulator.edges() if level]
@@ -93,7 +93,7 @@ def measure(elf: Path, bench: Bench, seconds: float = 2.0) -> Load:
     window = 25  # reports, some 50 ms
     took = (table["tick"][window:].astype(float) - table["tick"][:-window]) / CONTROL_HZ
     rates = [
-        (abs(table[name][window:].astype(float) - table[name][:-window]) / took).max()
+        float((abs(table[name][window:].astype(float) - table[name][:-window]) / took).max())
         for name in ("position_1", "position_2", "steps")
     ]
     ticks = after[CONTROL_VECTOR][0] - before[CONTROL_VECTOR][0]
@@ -101,9 +101,9 @@ def measure(elf: Path, bench: Bench, seconds: float = 2.0) -> Load:
     link.run(0.02)
     stack = RAM_END - next(a for a in range(RAM_BEGIN + static, RAM_END) if simulator.data[a] != PAINT)
     flash = simulator.symbol("__data_load_end")
-    alone = time.perf_counter()
+    alone = time.process_time()
     simulator.run(simulator.cycle + CLOCK_HZ)
-    alone = time.perf_counter() - alone
+    alone = time.process_time() - alone
     board.close()
     return Load(
         span / CLOCK_HZ, min(periods), max(periods), after[CONTROL_VECTOR][2],
