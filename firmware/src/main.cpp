@@ -86,7 +86,8 @@ ISR(TIMER5_COMPA_vect) {
   pin::busy::port() |= pin::busy::mask;
   sensors::sample();
   sensors::read(rig.inputs());
-  sei();                                // encoders, step edges, ADC and serial line go on
+  uart::pause();                        // what is sent can wait
+  sei();                                // encoders, step edges, ADC and what is received cannot
   rig.tick(outputs);
   cli();
   if (rig.active()) {                       // nothing has tripped meanwhile
@@ -96,12 +97,12 @@ ISR(TIMER5_COMPA_vect) {
     stepper::queue(outputs.steps, due + flexura::kTickCounts);
   } else {
     outputs_off();
+    if (rig.state() == State::idle) sensors::reopen();
   }
-  for (uint8_t j = 0; j < 2; ++j)
-    if (outputs.pair[j]) sensors::pair(j);
   pin::busy::port() &= static_cast<uint8_t>(~pin::busy::mask);
   const uint16_t took = TCNT5 - due;
   if (took > longest) longest = took;
+  uart::resume();
   in_tick = false;
 }
 

@@ -6,6 +6,8 @@
 #include "quadrature.h"
 #include "stepper.h"
 
+using flexura::EncoderLine;
+
 namespace {
 
 flexura::Quadrature encoder[2];
@@ -18,6 +20,7 @@ static_assert(pin::encoder_1_a::bit == pin::encoder_1_b::bit + 1 && pin::encoder
 static_assert(pin::limit_low::bit == pin::emergency_stop::bit + 1 && pin::limit_high::bit == pin::emergency_stop::bit + 2,
               "in the order of Flag");
 
+constexpr uint8_t kLines1 = _BV(INT2) | _BV(INT3), kLines2 = _BV(INT4) | _BV(INT5);
 constexpr uint8_t kFlexChannel = pin::flex::bit, kSupplyChannel = pin::supply::bit;
 constexpr uint8_t kReference = _BV(REFS0);           // 5 V, the supply of the flex sensor's divider too: its changes cancel
 uint8_t conversions;
@@ -31,10 +34,19 @@ void convert(uint8_t channel) {
 
 }  // namespace
 
-ISR(INT2_vect) { encoder[0].update(lines_1()); }
-ISR(INT3_vect, ISR_ALIASOF(INT2_vect));
-ISR(INT4_vect) { encoder[1].update(lines_2()); }
-ISR(INT5_vect, ISR_ALIASOF(INT4_vect));
+// A line that floods shuts its own interrupt: the control interrupt must live to say so.
+ISR(INT3_vect) {
+  if (!encoder[0].update(EncoderLine::a, lines_1())) EIMSK &= static_cast<uint8_t>(~_BV(INT3));
+}
+ISR(INT2_vect) {
+  if (!encoder[0].update(EncoderLine::b, lines_1())) EIMSK &= static_cast<uint8_t>(~_BV(INT2));
+}
+ISR(INT5_vect) {
+  if (!encoder[1].update(EncoderLine::a, lines_2())) EIMSK &= static_cast<uint8_t>(~_BV(INT5));
+}
+ISR(INT4_vect) {
+  if (!encoder[1].update(EncoderLine::b, lines_2())) EIMSK &= static_cast<uint8_t>(~_BV(INT4));
+}
 
 ISR(ADC_vect) {
   const uint16_t result = ADC;
@@ -65,7 +77,7 @@ void begin() {
   EICRA |= _BV(ISC20) | _BV(ISC30);                  // every edge
   EICRB |= _BV(ISC40) | _BV(ISC50);
   EIFR = _BV(INTF2) | _BV(INTF3) | _BV(INTF4) | _BV(INTF5);
-  EIMSK |= _BV(INT2) | _BV(INT3) | _BV(INT4) | _BV(INT5);
+  EIMSK |= kLines1 | kLines2;
 }
 
 // A sequence still under way (only the very first may be: it takes longer) goes on, and this tick has none of its own.
@@ -81,10 +93,14 @@ void read(flexura::Inputs &in) {
     const uint8_t count = encoder[j].count(), missed = encoder[j].missed();
     in.moved[j] = static_cast<int8_t>(count - last_count[j]);
     in.missed[j] = static_cast<uint8_t>(missed - last_missed[j]);
-    in.alone[j] = encoder[j].alone();
+    in.edges[j][0] = encoder[j].take_edges(EncoderLine::a);
+    in.edges[j][1] = encoder[j].take_edges(EncoderLine::b);
     last_count[j] = count;
     last_missed[j] = missed;
   }
+  const uint8_t open = EIMSK;
+  in.flooded[0] = (open & kLines1) != kLines1;
+  in.flooded[1] = (open & kLines2) != kLines2;
   const uint8_t given = stepper::given();
   in.stepped = static_cast<int8_t>(given - last_given);
   last_given = given;
@@ -93,6 +109,6 @@ void read(flexura::Inputs &in) {
   in.switches = PINA >> pin::emergency_stop::bit & 7;
 }
 
-void pair(uint8_t joint) { encoder[joint].pair(); }
+void reopen() { EIMSK |= kLines1 | kLines2; }
 
 }  // namespace sensors

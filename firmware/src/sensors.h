@@ -8,6 +8,6 @@ void begin();
 void sample();                                       // starts this tick's conversions. Interrupts off.
 // What came in since the last call; readings are those of the tick before. Interrupts off.
 void read(flexura::Inputs &in);
-void pair(uint8_t joint);                            // forget the one-sided edges of an encoder. Interrupts off.
+void reopen();                                       // encoder interrupts that a flood of edges has shut. Interrupts off.
 
 }  // namespace sensors

@@ -21,14 +21,14 @@ volatile uint8_t pulses;
 bool passed(uint16_t at) { return static_cast<int16_t>(TCNT5 - at) >= -1; }
 
 // Low by the compare unit's own latch (which a mere disconnection would leave high for the next time) and by the port behind it.
-void low() {
+inline __attribute__((always_inline)) void low() {
   TCCR5A = kClearOnMatch;
   TCCR5C = _BV(FOC5B);
   TCCR5A = 0;
   pin::step::port() &= static_cast<uint8_t>(~pin::step::mask);
 }
 
-void next() {
+inline __attribute__((always_inline)) void next() {
   if (head == tail) {
     TCCR5A = 0;
     return;
@@ -52,8 +52,8 @@ ISR(TIMER5_COMPB_vect) {
   if (TCCR5A == 0 || static_cast<int16_t>(TCNT5 - OCR5B) < 0) return;
   if (TCCR5A == kSetOnMatch) {
     pulses += pin::step_direction::port() & pin::step_direction::mask ? 1 : -1;
-    TCCR5A = kClearOnMatch;
     const uint16_t fall = OCR5B + kPulseCounts;
+    TCCR5A = kClearOnMatch;
     OCR5B = fall;
     if (!passed(fall)) return;
     low();                                           // held up for longer than the pulse

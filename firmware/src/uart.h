@@ -6,6 +6,8 @@ namespace uart {
 
 void begin();
 bool take(uint8_t &byte);
+void pause();                                        // nothing more is sent until resume(). Interrupts off.
+void resume();
 uint8_t room();                                      // bytes that may be sent now
 bool send(const uint8_t *bytes, uint8_t size);       // all of them or none
 

@@ -8,15 +8,14 @@ int16_t Pid::held(const PidGains &gains, int32_t wish) const {
 }
 
 int16_t Pid::update(const PidGains &gains, const PidSignals &in) {
-  const int16_t counts = narrow(in.error >> 8);
-  const uint16_t part_of_count = static_cast<uint16_t>(static_cast<uint8_t>(in.error) << 8);
+  const int16_t error = gains.fine ? narrow(in.error >> 4) : narrow(in.error >> 8);
 
-  const int32_t grown = add(multiply(gains.ki, counts), carry_);
-  int32_t integral = integral_ + (grown >> 8);
-  if (upper(integral) > gains.limit || upper(integral) < -gains.limit) integral = integral_;
+  Sum integral = integral_;
+  integral.add_long(gains.ki, error);
+  if (integral.top() >= gains.limit || integral.top() < -gains.limit) integral = integral_;
 
-  Sum sum(add(integral, fraction(gains.kp, part_of_count)));
-  sum.add(gains.kp, counts);
+  Sum sum(integral.whole());
+  sum.add(gains.kp, error);
   sum.add(gains.kd, narrow(static_cast<int32_t>(in.setpoint_rate) - in.rate));
   sum.add(gains.kf, in.deflection);
   sum.add(gains.kg, in.deflection_rate);
@@ -25,10 +24,8 @@ int16_t Pid::update(const PidGains &gains, const PidSignals &in) {
   if (in.setpoint_rate) u += in.setpoint_rate > 0 ? gains.kc : -gains.kc;
 
   output_ = held(gains, u);
-  if (!(u > output_ && grown > 0) && !(u < output_ && grown < 0)) {
-    integral_ = integral;
-    carry_ = static_cast<uint8_t>(grown);
-  }
+  const bool pushes_up = (error < 0) == (gains.ki < 0);
+  if (!(u > output_ && pushes_up) && !(u < output_ && !pushes_up)) integral_ = integral;
   return output_;
 }
 

@@ -14,8 +14,9 @@ namespace flexura {
 constexpr int16_t kOutputMost = 16383;
 
 struct PidGains {
-  int32_t kp = 0;     // Q16, u per count
-  int32_t ki = 0;     // Q24, u per count and tick
+  bool fine = false;  // errors are taken in 1/16 counts, and end at 2047 counts; else in counts, and end at 32767
+  int32_t kp = 0;     // Q16, u per unit of error
+  int32_t ki = 0;     // Q32, u per unit of error and tick
   int32_t kd = 0;     // Q8, u per (count / tick)
   int32_t kf = 0;     // Q16, u per 10 um
   int32_t kg = 0;     // Q8, u per (10 um / two ticks)
@@ -35,7 +36,7 @@ struct PidSignals {
 
 class Pid {
  public:
-  void start(int16_t output) { integral_ = 0, carry_ = 0, output_ = output; }
+  void start(int16_t output) { integral_ = Sum(), output_ = output; }
   int16_t update(const PidGains &gains, const PidSignals &in);
   // Without a controller: brings the output to a wish, within limit and slew.
   int16_t follow(const PidGains &gains, int32_t wish) { return output_ = held(gains, wish); }
@@ -44,8 +45,7 @@ class Pid {
  private:
   int16_t held(const PidGains &gains, int32_t wish) const;
 
-  int32_t integral_ = 0;  // Q16, u
-  uint8_t carry_ = 0;     // eight bits below it, lest small errors be lost
+  Sum integral_;          // Q32, u
   int16_t output_ = 0;
 };
 

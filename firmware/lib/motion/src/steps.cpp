@@ -31,11 +31,13 @@ void Steps::plan(int16_t rate, StepPlan &plan) {
     ahead_ = static_cast<int16_t>(ahead_ + (plan.up ? -kStep : kStep));
   }
   const uint16_t first = from < kThreshold ? kThreshold - from : 0;   // 0: a rate turned round without a step between
-  plan.at[0] = static_cast<uint16_t>(unsigned_product(ratio(first, pace), kTickCounts) >> 12);
-  if (plan.count == 1) return;
+  if (plan.count == 1) {
+    plan.at[0] = static_cast<uint16_t>(unsigned_product(ratio(first, pace), kTickCounts) >> 12);
+    return;
+  }
   const uint16_t interval = static_cast<uint16_t>(unsigned_product(ratio(kStep, pace), kTickCounts) >> 8);   // 1/16 counts
-  uint16_t at = static_cast<uint16_t>(plan.at[0] << 4);
-  for (uint8_t k = 1; k < plan.count; ++k) plan.at[k] = (at += interval) >> 4;
+  uint16_t at = static_cast<uint16_t>(unsigned_product(first, interval) >> 12);
+  for (uint8_t k = 0; k < plan.count; ++k, at = static_cast<uint16_t>(at + interval)) plan.at[k] = at >> 4;
 }
 
 }  // namespace flexura

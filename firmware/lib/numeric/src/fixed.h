@@ -76,19 +76,42 @@ inline int32_t multiply(int32_t a, int16_t b) {
   return static_cast<int32_t>(static_cast<uint32_t>(top) << 16 | lower(low));
 }
 
-// Sum of products of 32 by 16 bits as Q16, 48 bits wide. One product needs 47 of them: gains are limited so that eight fit.
+// Sum of products, 48 bits wide: those of 24 by 16 bits need 39, of 32 by 16 bits 47. The arithmetic of all controllers.
 class Sum {
  public:
-  explicit Sum(int32_t q16) {                    // starts at this value
+  explicit Sum(int32_t value = 0) {
 #ifdef __AVR__
-    low_ = static_cast<uint32_t>(q16);
-    high_ = q16 < 0 ? -1 : 0;
+    low_ = static_cast<uint32_t>(value);
+    high_ = value < 0 ? -1 : 0;
 #else
-    sum_ = q16;
+    sum_ = value;
 #endif
   }
 
+  // a x b for |a| < 2^23.
   void add(int32_t a, int16_t b) {
+#ifdef __AVR__
+    uint32_t t;
+    uint8_t t4;
+    __asm__(
+        " mul %A4, %A5 \n movw %A2, r0 \n"
+        " mulsu %C4, %A5 \n movw %C2, r0 \n sbc %3, %3 \n"
+        " muls %C4, %B5 \n add %D2, r0 \n adc %3, r1 \n"
+        " mul %B4, %A5 \n add %B2, r0 \n adc %C2, r1 \n adc %D2, %6 \n adc %3, %6 \n"
+        " mulsu %B5, %A4 \n sbc %D2, %6 \n sbc %3, %6 \n add %B2, r0 \n adc %C2, r1 \n adc %D2, %6 \n adc %3, %6 \n"
+        " mulsu %B5, %B4 \n sbc %3, %6 \n add %C2, r0 \n adc %D2, r1 \n adc %3, %6 \n"
+        " clr r1 \n mov r0, %3 \n lsl r0 \n sbc r0, r0 \n"
+        " add %A0, %A2 \n adc %B0, %B2 \n adc %C0, %C2 \n adc %D0, %D2 \n adc %A1, %3 \n adc %B1, r0 \n"
+        : "+r"(low_), "+r"(high_), "=&r"(t), "=&r"(t4)
+        : "a"(a), "a"(b), "r"(static_cast<uint8_t>(0))
+        : "r0");
+#else
+    sum_ += static_cast<int64_t>(a) * b;
+#endif
+  }
+
+  // a x b for any a.
+  void add_long(int32_t a, int16_t b) {
 #ifdef __AVR__
     const int32_t low = mixed_product(lower(a), b), high = signed_product(upper(a), b);
     __asm__(
@@ -100,6 +123,14 @@ class Sum {
         : "r0");
 #else
     sum_ += static_cast<int64_t>(a) * b;
+#endif
+  }
+
+  int16_t top() const {                          // the sum / 2^32, rounded down
+#ifdef __AVR__
+    return high_;
+#else
+    return static_cast<int16_t>(sum_ >> 32);
 #endif
   }
 

@@ -15,6 +15,12 @@ Message fields_as(const uint8_t *fields) {
 
 constexpr int32_t kFarthest = 1L << 22;   // counts, microsteps: as Q8 half of what 31 bits hold
 bool near(int32_t value) { return value < kFarthest && value > -kFarthest; }
+
+// After these nobody knows where the joint is.
+bool loses_position(Fault fault) {
+  return fault == Fault::encoder_1 || fault == Fault::encoder_2 || fault == Fault::stall_2 || fault == Fault::runaway_1 ||
+         fault == Fault::runaway_2;
+}
 }  // namespace
 
 Result Rig::command(uint8_t code, const uint8_t *fields, uint16_t &detail) {
@@ -196,6 +202,7 @@ Result Rig::clear(uint8_t fault, uint16_t &detail) {
     detail = static_cast<uint16_t>(still);
     return Result::fault_persists;
   }
+  if (loses_position(fault_)) referenced_ = false;
   fault_ = Fault::none;
   state_ = State::idle;
   return Result::ok;

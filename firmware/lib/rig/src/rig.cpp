@@ -49,11 +49,12 @@ void Rig::sense() {
   }
 }
 
+// Set-points and positions lie within half of what 32 bits hold (scales.cpp, commands.cpp), so that their differences fit.
 int32_t Rig::error(uint8_t joint) const {
   const int32_t position = joint == 0         ? q8(seen_.position[0])
                            : scales_.on_encoder ? q8(by_encoder_) + (by_encoder_rest_ >> 8)
                                               : steps_.position();
-  return subtract(target_.of[joint], position);
+  return static_cast<int32_t>(static_cast<uint32_t>(target_.of[joint]) - static_cast<uint32_t>(position));
 }
 
 void Rig::tick(Outputs &out) {
@@ -87,9 +88,6 @@ void Rig::tick(Outputs &out) {
     out.on = false;
     out.duty = seen_.duty = 0;
   }
-  // Edges of one line alone say something only while the joint is driven.
-  out.pair[0] = seen_.duty <= scales_.limits.stall_duty && seen_.duty >= -scales_.limits.stall_duty;
-  out.pair[1] = !out.on || pid_[1].output() == 0;
 }
 
 void Rig::control() {
@@ -108,7 +106,7 @@ void Rig::control() {
     signals.rate = scales_.on_encoder ? upper(multiply(scales_.ratio, seen_.velocity[1])) : static_cast<int16_t>(pid_[1].output() >> 4);
     pid_[1].update(gains[1], signals);
   }
-  seen_.duty = static_cast<int16_t>(pid_[0].output() / 16);
+  seen_.duty = static_cast<int16_t>((pid_[0].output() + 8) >> 4);
 }
 
 uint32_t Rig::now() const {
@@ -117,27 +115,35 @@ uint32_t Rig::now() const {
 }
 
 void Rig::report(Telemetry &report) const {
-  Section section;
-  report.tick = tick_;
-  report.state = static_cast<uint8_t>(state_);
-  report.fault = static_cast<uint8_t>(fault_);
-  report.fault_tick = fault_tick_;
-  report.flags = static_cast<uint8_t>(in_.switches | referenced_ << static_cast<uint8_t>(Flag::referenced) |
-                                      final_ << static_cast<uint8_t>(Flag::final) |
-                                      saturated() << static_cast<uint8_t>(Flag::saturated));
-  if (active())
-    report.flags |= 1 << static_cast<uint8_t>(Flag::bridge_enabled) | 1 << static_cast<uint8_t>(Flag::driver_enabled);
+  int16_t duty, rate;
+  bool on;
+  {
+    Section section;                                 // copies only: the control interrupt waits
+    report.tick = tick_;
+    report.state = static_cast<uint8_t>(state_);
+    report.fault = static_cast<uint8_t>(fault_);
+    report.fault_tick = fault_tick_;
+    report.flags = in_.switches;
+    report.position_1 = seen_.position[0];
+    report.position_2 = seen_.position[1];
+    report.steps = steps_given_;
+    report.setpoint_1 = target_.of[0];
+    report.setpoint_2 = target_.of[1];
+    report.flex = in_.flex;
+    report.supply = in_.supply;
+    report.missed = missed_;
+    on = active();
+    duty = pid_[0].output();
+    rate = pid_[1].output();
+  }
+  const bool saturated = on && (duty >= scales_.gains[0].limit || duty <= -scales_.gains[0].limit);
+  const bool bits[] = {on, on, referenced_, final_, saturated};   // from bridge_enabled on, in the order of Flag
+  for (uint8_t k = 0; k < sizeof bits; ++k)
+    if (bits[k]) report.flags = static_cast<uint8_t>(report.flags | 1 << (static_cast<uint8_t>(Flag::bridge_enabled) + k));
   report.buffered = player_.waiting();
-  report.position_1 = seen_.position[0];
-  report.position_2 = seen_.position[1];
-  report.steps = steps_given_;
-  report.setpoint_1 = target_.of[0];
-  report.setpoint_2 = target_.of[1];
-  report.voltage = upper(multiply(scales_.voltage, seen_.duty));
-  report.rate = active() ? static_cast<int16_t>(pid_[1].output() * 1000L / 4096) : 0;
-  report.flex = in_.flex;
-  report.supply = static_cast<uint16_t>(static_cast<uint32_t>(in_.supply) * scales_.supply >> 6);
-  report.missed = missed_;
+  report.voltage = on ? upper(multiply(scales_.voltage, duty)) : 0;
+  report.rate = on ? static_cast<int16_t>(rate * 1000L / 4096) : 0;
+  report.supply = static_cast<uint16_t>(static_cast<uint32_t>(report.supply) * scales_.supply >> 6);
 }
 
 void Rig::host_spoke() {

@@ -28,7 +28,6 @@ struct Outputs {
   bool on = false;                       // motor bridge and stepper driver enabled
   int16_t duty = 0;                      // PWM counts, + up
   StepPlan steps;                        // for the tick that comes next
-  bool pair[2] = {false, false};         // an encoder's count of one-sided edges starts again
 };
 
 class Rig {
@@ -62,7 +61,6 @@ class Rig {
   void sense();
   int32_t error(uint8_t joint) const;    // counts / 256 or microsteps / 256
   void control();
-  bool saturated() const { return active() && (pid_[0].output() >= scales_.gains[0].limit || pid_[0].output() <= -scales_.gains[0].limit); }
   Result reference(const Reference &command);
   Result arm(uint8_t mode, uint16_t &detail);
   Result start(uint8_t period_log2, uint16_t &detail);

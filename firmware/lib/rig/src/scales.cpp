@@ -28,7 +28,7 @@ const Row kRows[] FLEXURA_IN_FLASH = {FLEXURA_CONFIG(ROW)};
 #undef ROW
 static_assert(sizeof kRows / sizeof kRows[0] == kConfigItems, "one row an item");
 
-constexpr float kTick = 0.001f, kQ8 = 256.0f, kQ16 = 65536.0f, kQ24 = 16777216.0f;
+constexpr float kTick = 0.001f, kQ8 = 256.0f, kQ16 = 65536.0f, kQ32 = 4294967296.0f;
 constexpr float kFull = 1024.0f * kAdcSamples;   // reading at the reference voltage
 constexpr float kDeflection = 1e5f;              // units of 10 um in a metre
 constexpr float kMilli = 1000.0f;                // mV in a volt
@@ -49,6 +49,11 @@ uint16_t supply_reading(float volts, const Config &c) {
   return static_cast<uint16_t>(clamp(volts / c.supply_divider / kReference * 1024.0f, 0.0f, 1024.0f));
 }
 
+// A gain in its units, as Sum::add takes it.
+bool gain(float value, float scale, int32_t &fixed) {
+  return to_fixed(value, scale, fixed) && fixed < (1L << 23) && fixed > -(1L << 23);
+}
+
 int16_t change(float u) { return static_cast<int16_t>(clamp(u + 0.5f, 1.0f, static_cast<float>(kOutputMost))); }
 
 int16_t to_16(float value) { return static_cast<int16_t>(clamp(value, -32767.0f, 32767.0f)); }
@@ -56,12 +61,13 @@ int16_t to_16(float value) { return static_cast<int16_t>(clamp(value, -32767.0f,
 // u per unit of one joint: all gains in the units of PidGains. `u` is units of output per V or rad/s, `count` counts per m or rad.
 uint8_t joint_1(const Config &c, PidGains &g) {
   const float u = kDutyUnits / c.supply_V, count = c.motor_counts_per_m;
-  NEED(to_fixed(c.kp_1_V_m, u / count * kQ16, g.kp), kp_1_V_m);
-  NEED(to_fixed(c.ki_1_V_m_s, u / count * kTick * kQ24, g.ki), ki_1_V_m_s);
-  NEED(to_fixed(c.kd_1_V_s_m, u / count / kTick * kQ8, g.kd), kd_1_V_s_m);
-  NEED(to_fixed(c.kf_1_V_m, u / kDeflection * kQ16, g.kf), kf_1_V_m);
-  NEED(to_fixed(c.kg_1_V_s_m, u / kDeflection / (2 * kTick) * kQ8, g.kg), kg_1_V_s_m);
-  NEED(to_fixed(c.kv_1_V_s_m, u / count / kTick * kQ8, g.kv), kv_1_V_s_m);
+  g.fine = false;
+  NEED(gain(c.kp_1_V_m, u / count * kQ16, g.kp), kp_1_V_m);
+  NEED(to_fixed(c.ki_1_V_m_s, u / count * kTick * kQ32, g.ki), ki_1_V_m_s);
+  NEED(gain(c.kd_1_V_s_m, u / count / kTick * kQ8, g.kd), kd_1_V_s_m);
+  NEED(gain(c.kf_1_V_m, u / kDeflection * kQ16, g.kf), kf_1_V_m);
+  NEED(gain(c.kg_1_V_s_m, u / kDeflection / (2 * kTick) * kQ8, g.kg), kg_1_V_s_m);
+  NEED(gain(c.kv_1_V_s_m, u / count / kTick * kQ8, g.kv), kv_1_V_s_m);
   NEED(c.kc_1_V <= c.supply_V, kc_1_V);
   NEED(c.voltage_max_V <= c.supply_V, voltage_max_V);
   g.kc = static_cast<int16_t>(c.kc_1_V * u);
@@ -72,12 +78,13 @@ uint8_t joint_1(const Config &c, PidGains &g) {
 
 uint8_t joint_2(const Config &c, PidGains &g) {
   const float step = c.stepper_steps_per_rad, u = kRate * kTick;   // a gain in rad/s per rad = microsteps/s per microstep
-  NEED(to_fixed(c.kp_2_1_s, u * kQ16, g.kp), kp_2_1_s);
-  NEED(to_fixed(c.ki_2_1_s2, u * kTick * kQ24, g.ki), ki_2_1_s2);
-  NEED(to_fixed(c.kd_2, kRate * kQ8, g.kd), kd_2);
-  NEED(to_fixed(c.kf_2_rad_s_m, u * step / kDeflection * kQ16, g.kf), kf_2_rad_s_m);
-  NEED(to_fixed(c.kg_2_rad_m, kRate * step / kDeflection / 2 * kQ8, g.kg), kg_2_rad_m);
-  NEED(to_fixed(c.kv_2, kRate * kQ8, g.kv), kv_2);
+  g.fine = true;
+  NEED(gain(c.kp_2_1_s, u / 16 * kQ16, g.kp), kp_2_1_s);
+  NEED(to_fixed(c.ki_2_1_s2, u / 16 * kTick * kQ32, g.ki), ki_2_1_s2);
+  NEED(gain(c.kd_2, kRate * kQ8, g.kd), kd_2);
+  NEED(gain(c.kf_2_rad_s_m, u * step / kDeflection * kQ16, g.kf), kf_2_rad_s_m);
+  NEED(gain(c.kg_2_rad_m, kRate * step / kDeflection / 2 * kQ8, g.kg), kg_2_rad_m);
+  NEED(gain(c.kv_2, kRate * kQ8, g.kv), kv_2);
   g.kc = 0;
   const float rate = c.rate_max_2_rad_s * step;                    // microsteps/s
   NEED(rate <= 4000.5f, rate_max_2_rad_s);
@@ -137,7 +144,7 @@ uint8_t sensing(const Config &c, Scales &s) {
   s.setpoint_filter[0] = filter(c.setpoint_1_Hz);
   s.setpoint_filter[1] = filter(c.setpoint_2_Hz);
   NEED(to_fixed(kDutyUnits / c.supply_V, kQ16 / kMilli, s.duty), supply_V);
-  NEED(to_fixed(c.supply_V / kDutyFull, kMilli * kQ16, s.voltage), supply_V);
+  NEED(to_fixed(c.supply_V / kDutyUnits, kMilli * kQ16, s.voltage), supply_V);
   NEED(to_fixed(c.stepper_steps_per_rad / c.stepper_counts_per_rad, kQ16, s.ratio), stepper_counts_per_rad);
   NEED(s.ratio < (1L << 24), stepper_counts_per_rad);   // 127 counts in a tick times the ratio stay within 32 bits
   s.supply = static_cast<uint16_t>(kReference * c.supply_divider * kMilli / 1024.0f * 64.0f + 0.5f);

@@ -12,7 +12,7 @@ struct Scales {
   WatchLimits limits;
   uint16_t velocity_filter, setpoint_filter[2];  // Q16
   int32_t duty;                                  // Q16, units of u_1 (1/16 PWM count) per mV
-  int32_t voltage;                               // Q16, mV in a PWM count
+  int32_t voltage;                               // Q16, mV in a unit of u_1
   int32_t ratio;                                 // Q16, microsteps per count of the encoder of joint 2
   int32_t span_low[2], span_high[2];             // travel in counts / 256, microsteps / 256
   uint16_t supply;                               // mV per 64 readings of the supply

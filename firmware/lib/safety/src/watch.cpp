@@ -43,17 +43,30 @@ void Watch::start() {
   silent_ = stalled_ = 0;
   direction_ = 0;
   flex_out_ = supply_out_ = 0;
-  for (uint8_t j = 0; j < 2; ++j) missed_[j] = 0, against_[j] = 0;
+  for (uint8_t j = 0; j < 2; ++j) missed_[j] = alone_[j] = 0, against_[j] = 0;
+}
+
+// While nothing drives it a shaft may rest on an edge and tremble.
+uint16_t Watch::alone(uint8_t j, const uint8_t *edges, bool driven) {
+  const uint8_t a = edges[0], b = edges[1];
+  if (!driven || (a && b)) return alone_[j] = 0;
+  if (!a && !b) return alone_[j];
+  const EncoderLine line = a ? EncoderLine::a : EncoderLine::b;
+  if (line != alone_line_[j]) alone_[j] = 0;
+  alone_line_[j] = line;
+  return alone_[j] = static_cast<uint16_t>(alone_[j] + a + b);
 }
 
 Fault Watch::encoders(const WatchLimits &limits, const Inputs &in, const Watched &now) {
   const bool driven = now.duty > limits.stall_duty || now.duty < -limits.stall_duty;
   for (uint8_t j = 0; j < 2; ++j) {
     missed_[j] = static_cast<uint16_t>(missed_[j] + in.missed[j]);
-    if (missed_[j] > limits.missed) return j ? Fault::encoder_2 : Fault::encoder_1;
+    if (in.flooded[j] || missed_[j] > limits.missed) return j ? Fault::encoder_2 : Fault::encoder_1;
   }
-  if (driven && in.alone[0] >= limits.alone) return Fault::encoder_1;
-  if (direction_ && in.alone[1] >= limits.alone) return Fault::encoder_2;
+  if (alone(0, in.edges[0], driven) >= limits.alone) return Fault::encoder_1;
+  if (in.stepped) direction_ = in.stepped > 0 ? 1 : -1;
+  const uint16_t alone_2 = alone(1, in.edges[1], direction_ != 0);
+  if (alone_2 >= limits.alone) return Fault::encoder_2;
 
   against_[0] = driven ? against(against_[0], now.duty > 0 ? 1 : -1, in.moved[0]) : 0;
   if (against_[0] > limits.runaway) return Fault::runaway_1;
@@ -63,12 +76,11 @@ Fault Watch::encoders(const WatchLimits &limits, const Inputs &in, const Watched
     stalled_ = 0;
   }
 
-  if (in.stepped) direction_ = in.stepped > 0 ? 1 : -1;
   against_[1] = against(against_[1], direction_, in.moved[1]);
   if (beyond(now.lag, limits.lost)) {
     // Why: the encoder went the other way for a good part of it; or only one of its lines moves; or the motor did not follow.
     if (against_[1] > limits.against) return Fault::runaway_2;
-    return in.alone[1] >= 4 ? Fault::encoder_2 : Fault::stall_2;
+    return alone_2 >= 4 ? Fault::encoder_2 : Fault::stall_2;
   }
   return Fault::none;
 }

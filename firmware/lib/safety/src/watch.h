@@ -1,6 +1,7 @@
 // What is watched while the outputs are on: one verdict a tick.
 #pragma once
 #include "declaration.h"
+#include "quadrature.h"
 
 namespace flexura {
 
@@ -24,7 +25,8 @@ struct WatchLimits {
 struct Inputs {
   int8_t moved[2];          // counts of the encoders
   uint8_t missed[2];        // edges missed
-  uint8_t alone[2];         // edges of one line in a row
+  uint8_t edges[2][2];      // edges of line A and line B of each encoder
+  bool flooded[2];          // an encoder's interrupts had to be shut
   int8_t stepped;           // pulses given
   uint16_t flex, supply;    // readings
   uint8_t switches;         // bits of Flag: emergency_stop, limit_low, limit_high
@@ -47,12 +49,15 @@ class Watch {
   void host_spoke() { silent_ = 0; }
 
  private:
+  uint16_t alone(uint8_t joint, const uint8_t *edges, bool driven);
   Fault encoders(const WatchLimits &limits, const Inputs &in, const Watched &now);
 
   uint16_t silent_ = 0, stalled_ = 0;
   uint16_t missed_[2] = {0, 0};
   int32_t against_[2] = {0, 0};            // counts moved against the drive
   int8_t direction_ = 0;                   // of the last pulses
+  uint16_t alone_[2] = {0, 0};             // edges of one line in a row: a shaft that turns alternates them, a broken wire does not
+  EncoderLine alone_line_[2];
   uint8_t flex_out_ = 0, supply_out_ = 0;
   bool turn_ = false;
 };
