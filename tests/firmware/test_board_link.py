@@ -8,6 +8,8 @@ import time
 
 import numpy as np
 import pytest
+from serial.tools import list_ports
+from serial.tools.list_ports_common import ListPortInfo
 
 from boards import BENCH, Rigged, elf, finish
 from flexlab import rig
@@ -19,9 +21,10 @@ from flexlab.board.emulated import LABEL, EmulatedBoard
 from flexlab.board.frames import Deframer, decode, encode
 from flexlab.board.link import Link, Refused
 from flexlab.board.pty import Pty
-from flexlab.board.serialport import SerialBoard
+from flexlab.board.serialport import SerialBoard, find, ports
 from flexlab.flash import crc, single
 from flexlab.rig.drives import Drives
+from flexura.errors import InputError
 
 
 def test_greeting():
@@ -287,10 +290,35 @@ def test_real_pyserial_at_a_pseudo_terminal():
             assert link.counts.telemetry > 50
             with pytest.raises(Refused, match="arm"):
                 link.command("arm", mode=1)  # it is in Fault: blank EEPROM
-            port.close()
-            with pytest.raises(BoardError, match="the line is gone"):
-                port.write(b"x")
         finally:
             done.set()
             server.join()
+    with pytest.raises(BoardError, match=r"/dev/.*: the line is gone"):  # unplugged
+        link.run(1.0)
+    port.close()
+    with pytest.raises(BoardError, match="the line is gone"):
+        port.write(b"x")
     finish(board)
+
+
+def plugged(*identities):
+    ports = []
+    for k, (vid, pid) in enumerate(identities):
+        port = ListPortInfo(f"/dev/ttyACM{k}")
+        port.vid, port.pid = vid, pid
+        ports.append(port)
+    return lambda: ports[::-1]
+
+
+def test_the_one_mega_that_is_plugged_in_is_found(monkeypatch):
+    monkeypatch.setattr(list_ports, "comports", plugged((0x0403, 0x6015), (0x2341, 0x0042), (None, None)))
+    assert find() == "/dev/ttyACM1" and [p.what for p in ports()] == ["Arduino Mega 2560 R3"]
+
+
+def test_no_board_or_two_of_them_are_named(monkeypatch):
+    monkeypatch.setattr(list_ports, "comports", plugged((None, None)))
+    with pytest.raises(InputError, match=r"--port: no board is plugged in .* or use --emulated"):
+        find()
+    monkeypatch.setattr(list_ports, "comports", plugged((0x1A86, 0x7523), (0x2341, 0x0042)))
+    with pytest.raises(InputError, match=r"more than one board is plugged in: /dev/ttyACM0 \(CH340.*, /dev/ttyACM1 \(Arduino"):
+        find()
