@@ -110,8 +110,8 @@ uint8_t travel(const Config &c, Scales &s) {
   NEED(to_fixed(c.position_max_2_rad, encoder, w.travel_high[1]), position_max_2_rad);
   NEED(to_fixed(c.following_max_1_m, count * kQ8, w.following[0]), following_max_1_m);
   NEED(to_fixed(c.following_max_2_rad, step * kQ8, w.following[1]), following_max_2_rad);
-  w.speed[0] = to_16(c.speed_max_1_m_s * count * kTick * kQ8);
-  w.speed[1] = to_16(c.speed_max_2_rad_s * encoder * kTick * kQ8);
+  w.speed[0] = to_16(c.speed_max_1_m_s * count * kTick * Watch::kWindow + 1);   // and one count of chance
+  w.speed[1] = to_16(c.speed_max_2_rad_s * encoder * kTick * Watch::kWindow + 1);
   return kConsistent;
 }
 

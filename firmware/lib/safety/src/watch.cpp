@@ -42,8 +42,8 @@ Fault standing(const WatchLimits &limits, const Inputs &in) {
 void Watch::start() {
   silent_ = stalled_ = 0;
   direction_ = 0;
-  flex_out_ = supply_out_ = 0;
-  for (uint8_t j = 0; j < 2; ++j) missed_[j] = alone_[j] = 0, against_[j] = 0;
+  flex_out_ = supply_out_ = turn_ = 0;
+  for (uint8_t j = 0; j < 2; ++j) missed_[j] = alone_[j] = 0, against_[j] = travelled_[j] = 0;
 }
 
 // While nothing drives it a shaft may rest on an edge and tremble.
@@ -97,12 +97,16 @@ Fault Watch::check(const WatchLimits &limits, const Inputs &in, const Watched &n
   if (fault != Fault::none) return fault;
 
   // One joint in each tick: time is short, and what they watch takes longer than two.
-  turn_ = !turn_;
-  {
-    const uint8_t j = turn_;
-    if (now.position[j] < limits.travel_low[j] || now.position[j] > limits.travel_high[j]) return j ? Fault::travel_2 : Fault::travel_1;
-    if (beyond(now.velocity[j], limits.speed[j])) return j ? Fault::speed_2 : Fault::speed_1;
-    if (now.tracking && beyond(now.error[j], limits.following[j])) return j ? Fault::following_2 : Fault::following_1;
+  turn_ = static_cast<uint8_t>((turn_ + 1) % (2 * kWindow));
+  travelled_[0] = static_cast<int16_t>(travelled_[0] + in.moved[0]);
+  travelled_[1] = static_cast<int16_t>(travelled_[1] + in.moved[1]);
+  const uint8_t j = turn_ & 1;
+  if (now.position[j] < limits.travel_low[j] || now.position[j] > limits.travel_high[j]) return j ? Fault::travel_2 : Fault::travel_1;
+  if (now.tracking && beyond(now.error[j], limits.following[j])) return j ? Fault::following_2 : Fault::following_1;
+  if (turn_ % kWindow == j) {
+    const int16_t way = travelled_[j];
+    travelled_[j] = 0;
+    if (way > limits.speed[j] || way < -limits.speed[j]) return j ? Fault::speed_2 : Fault::speed_1;
   }
 
   fault = flex(limits, in.flex);

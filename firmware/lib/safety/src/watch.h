@@ -8,7 +8,7 @@ namespace flexura {
 // Joint 1 in encoder counts and PWM counts; joint 2 in encoder counts, its pulses in microsteps.
 struct WatchLimits {
   int32_t travel_low[2], travel_high[2];   // counts
-  int16_t speed[2];                        // counts / 256 per tick
+  int16_t speed[2];                        // counts in kWindow ticks
   int16_t stall_duty;                      // PWM counts; below it neither stall, runaway nor a broken encoder wire can be told
   int16_t stall_speed;                     // counts / 256 per tick
   uint16_t stall_ticks;
@@ -43,6 +43,8 @@ struct Watched {
 
 class Watch {
  public:
+  static constexpr uint8_t kWindow = 16;   // ticks in which a speed is measured: long enough for a coarse encoder
+
   void start();
   // The first of all faults that hold now, in the order in which they explain each other.
   Fault check(const WatchLimits &limits, const Inputs &in, const Watched &now);
@@ -59,7 +61,8 @@ class Watch {
   uint16_t alone_[2] = {0, 0};             // edges of one line in a row: a shaft that turns alternates them, a broken wire does not
   EncoderLine alone_line_[2];
   uint8_t flex_out_ = 0, supply_out_ = 0;
-  bool turn_ = false;
+  uint8_t turn_ = 0;
+  int16_t travelled_[2] = {0, 0};          // counts in this window
 };
 
 // Faults that a switch or a reading means, whatever moves; they forbid arming and clearing too.
