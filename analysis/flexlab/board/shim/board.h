@@ -10,7 +10,7 @@
 #include "sim_avr.h"
 #include "sim_elf.h"
 
-enum { ENCODERS = 2, LINES = 16, VECTORS = 64, PORTS = 12, MCUSR = 0x54, WATCHDOG_RESET = 8, TIMSK0 = 0x6E, TIMERS = 6 };
+enum { ENCODERS = 2, LINES = 16, VECTORS = 64, PORTS = 12, MCUSR = 0x54, WATCHDOG_RESET = 8, GLITCH = 4, TIMSK0 = 0x6E, TIMERS = 6 };
 enum { ON_PIN, ON_ADC };
 enum { FORWARD = 1, REVERSE, ENABLE, STEP, STEP_UP, STEP_DISABLE }; /* what a line does for the plant; 0: only watched */
 
@@ -42,6 +42,7 @@ typedef struct {
   board_t *board;
   avr_irq_t *irq;
   uint32_t index, traced;
+  uint64_t fell;
   uint8_t role, rest, level; /* rest: the level without the firmware, given by the rig's resistors */
 } line_t;
 

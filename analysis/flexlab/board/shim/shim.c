@@ -12,6 +12,7 @@
  *   - fast PWM with OCRnx at TOP, which is always on, shows no level at the pin: read from the registers;
  *   - a timer's interrupt that falls due while it is masked is forgotten: raised when it is unmasked;
  *   - a watchdog whose interrupt nobody serves never resets: it does with its next time-out;
+ *   - a compare pin falls and rises again within an instruction that writes another OCRnx at its match: not counted as a step;
  *   - a byte of the UART takes 11 bit times, not 10 (left as it is: slower than the hardware).
  */
 #include <stdarg.h>

@@ -87,6 +87,13 @@ static void on_edge(struct avr_irq_t *irq, uint32_t value, void *param) {
   const uint8_t level = value & 1;
   if (level == line->level) return;
   line->level = level;
+  if (!level) line->fell = b->avr->cycle;
+  if (line->role == STEP && level && b->avr->cycle - line->fell <= GLITCH) { /* simavr's doing: it did not fall at all */
+    const edge_t *last = b->edges.used > b->edges.head ? (edge_t *)b->edges.at + b->edges.used - 1 : NULL;
+    if (last && last->line == line->index && !last->level) --b->edges.used;
+    b->level_of[STEP] = level;
+    return;
+  }
   if (line->traced) *(edge_t *)push(&b->edges) = (edge_t){b->avr->cycle, line->index, level};
   b->level_of[line->role] = level;
   if (line->role == STEP && level && b->window.stepper_on != 0) b->window.steps += b->level_of[STEP_UP] ? 1 : -1;
@@ -129,7 +136,8 @@ int board_line(board_t *b, char port, int bit, int role, int rest, int traced) {
   if (b->line_count == LINES) return -1;
   line_t *line = &b->lines[b->line_count];
   avr_irq_t *irq = avr_io_getirq(b->avr, AVR_IOCTL_IOPORT_GETIRQ(port), bit);
-  *line = (line_t){b, irq, b->line_count++, (uint32_t)traced, (uint8_t)role, (uint8_t)rest, (uint8_t)rest};
+  *line = (line_t){.board = b, .irq = irq, .index = b->line_count++, .traced = (uint32_t)traced, .role = (uint8_t)role,
+                   .rest = (uint8_t)rest, .level = (uint8_t)rest};
   b->level_of[role] = (uint8_t)rest;
   if (role == FORWARD || role == REVERSE) follow_timer(b, port, bit, role);
   avr_irq_register_notify(irq, on_edge, line);
