@@ -343,8 +343,7 @@ static void tick(uint16_t times = 1) {
 }
 
 static void healthy() {
-  static Rig fresh;
-  rig = fresh;
+  rig = Rig();
   out = Outputs();
   Config config = default_config();
   config.lost_step_rad = 10;   // the encoder of joint 2 stands still in these tests
@@ -465,10 +464,9 @@ static void every_fault_has_its_reason() {
 }
 
 static Fault fault_of_joint_2(void (*moves)(uint16_t)) {
-  static Rig fresh;
   run_open_loop(0, 400);
   const Config config = default_config();   // 0.05 rad may be lost
-  rig = fresh;
+  rig = Rig();
   rig.begin(&config, 1);
   Inputs &in = rig.inputs();
   in.flex = 3500, in.supply = 500, in.switches = 0;
@@ -534,8 +532,7 @@ static void a_configuration_must_make_sense() {
   config = default_config();
   config.voltage_max_V = 13;
   CHECK(make_scales(config, scales) == ITEM(voltage_max_V));
-  static Rig fresh;
-  rig = fresh;
+  rig = Rig();
   rig.begin(nullptr, 1);
   CHECK(rig.fault() == Fault::bad_configuration);
   const Clear clear = {static_cast<uint8_t>(Fault::bad_configuration)};
@@ -548,15 +545,14 @@ static void a_configuration_must_make_sense() {
 }
 
 static void resets_are_told() {
-  static Rig fresh;
   const Config config = default_config();
-  rig = fresh;
+  rig = Rig();
   rig.begin(&config, 1 << static_cast<uint8_t>(Reset::watchdog));
   CHECK(rig.fault() == Fault::watchdog);
-  rig = fresh;
+  rig = Rig();
   rig.begin(&config, 1 << static_cast<uint8_t>(Reset::brown_out));
   CHECK(rig.fault() == Fault::brown_out);
-  rig = fresh;
+  rig = Rig();
   rig.begin(&config, 1 << static_cast<uint8_t>(Reset::brown_out) | 1 << static_cast<uint8_t>(Reset::power_on));
   CHECK(rig.fault() == Fault::none);
 }
