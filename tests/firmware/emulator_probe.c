@@ -50,6 +50,8 @@ int main(void) {
       case 'u': PORTC = (uint8_t)((PORTC & ~3) | 1); break;
       case 'v': PORTC &= (uint8_t)~3; break;
       case 's': PORTL |= _BV(4), PORTL &= (uint8_t)~_BV(4); break;
+      case 'x': TCCR5A = _BV(COM5B1) | _BV(COM5B0), OCR5B = TCNT5 + take16(); break;
+      case 'y': TCCR5A = _BV(COM5B1), OCR5B = TCNT5 + take16(); break;
       case 'n': { cli(); const uint16_t n = edges, t = ticks; sei(); give16(n), give16(t); } break;
       case 't': give16(stamp); break;
       case 'm': TIMSK5 = 0; break;

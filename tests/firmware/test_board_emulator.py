@@ -97,6 +97,19 @@ def test_steps_count_with_their_direction_while_the_driver_is_on(board):
     assert board.outputs.stepper_on
 
 
+def test_a_compare_pin_stays_set_until_it_is_to_be_cleared(board):
+    """Data sheet: without PWM only the match changes the pin; neither the timer's overflow nor a write to OCR5A does."""
+    ask(board, "v")
+    board.simulator.trace(board.lines["step"], True)
+    board.simulator.edges()
+    for k in range(12):
+        ask(board, "x", 0, 200 + 37 * k)
+        board.wait(0.035)  # more than a turn of the timer, and 35 writes to OCR5A
+        ask(board, "y", 0, 200 + 41 * k)
+    levels = [level for _, _, level in board.simulator.edges()]
+    assert levels == [1, 0] * 12 and board.outputs.steps == -12
+
+
 @pytest.mark.parametrize("speed", [12_345.0, -20_000.0])
 def test_every_encoder_edge_arrives(board, speed):
     board.plant.speed = speed
@@ -110,7 +123,7 @@ def test_edges_arrive_at_their_own_cycle(board):
     """The time between two single edges, by the processor's own timer, is that of the plant: windows leave no trace."""
     stamps, speed = [], 37.0  # a count in 27 ms
     board.plant.speed = speed
-    for _ in range(12):
+    for _ in range(8):
         board.wait(1 / speed - 0.003)
         stamps.append(ask(board, "t", 2))
     apart = np.diff(stamps[1:]) & 0xFFFF

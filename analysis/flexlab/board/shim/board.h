@@ -10,7 +10,7 @@
 #include "sim_avr.h"
 #include "sim_elf.h"
 
-enum { ENCODERS = 2, LINES = 16, VECTORS = 64, PORTS = 12, MCUSR = 0x54, WATCHDOG_RESET = 8, GLITCH = 4, TIMSK0 = 0x6E, TIMERS = 6 };
+enum { ENCODERS = 2, LINES = 16, VECTORS = 64, PORTS = 12, MCUSR = 0x54, WATCHDOG_RESET = 8, TIMSK0 = 0x6E, TIMERS = 6 };
 enum { ON_PIN, ON_ADC };
 enum { FORWARD = 1, REVERSE, ENABLE, STEP, STEP_UP, STEP_DISABLE }; /* what a line does for the plant; 0: only watched */
 
@@ -42,7 +42,6 @@ typedef struct {
   board_t *board;
   avr_irq_t *irq;
   uint32_t index, traced;
-  uint64_t fell;
   uint8_t role, rest, level; /* rest: the level without the firmware, given by the rig's resistors */
 } line_t;
 
@@ -73,8 +72,9 @@ struct board {
   line_t lines[LINES];
   uint32_t line_count;
   uint8_t level_of[8]; /* by role */
-  const avr_timer_t *timer[3]; /* of the PWM pins, by role, and their comparators */
-  const avr_timer_comp_t *comparator[3];
+  const avr_timer_t *timer[STEP + 1]; /* of the compare pins, by role, and their comparators */
+  const avr_timer_comp_t *comparator[STEP + 1];
+  int unsettled;       /* a line is not at the level that simavr believes */
   int motor;           /* -1, 0, 1: how the pins drive the motor now */
   uint64_t motor_since;
   double motor_sum;
@@ -117,4 +117,5 @@ void schedule(board_t *b, input_t e);      /* among the inputs, in order of cycl
 void deliver(board_t *b, const input_t *e);
 void turn(board_t *b, encoder_t *encoder, double position, uint64_t begin, uint64_t end);
 void on_drive(board_t *b);                 /* brings the sums up to now */
+void settle(board_t *b);                   /* has simavr believe what the lines are */
 void rest(board_t *b);                     /* as after a reset, when every pin is an input */

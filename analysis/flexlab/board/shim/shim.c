@@ -12,7 +12,7 @@
  *   - fast PWM with OCRnx at TOP, which is always on, shows no level at the pin: read from the registers;
  *   - a timer's interrupt that falls due while it is masked is forgotten: raised when it is unmasked;
  *   - a watchdog whose interrupt nobody serves never resets: it does with its next time-out;
- *   - a compare pin falls and rises again within an instruction that writes another OCRnx at its match: not counted as a step;
+ *   - without PWM, a compare pin that is to be set is cleared when the timer overflows or another OCRnx is written: ignored;
  *   - a byte of the UART takes 11 bit times, not 10 (left as it is: slower than the hardware).
  */
 #include <stdarg.h>
@@ -208,6 +208,7 @@ int board_run(board_t *b, uint64_t until, uint32_t slice) {
     avr->run_cycle_limit = slice;
     avr->run_cycle_count = left < slice ? left : slice;
     const int state = avr_run(avr);
+    if (b->unsettled) settle(b);
     if (b->bitten) avr_reset(avr), avr->data[MCUSR] = WATCHDOG_RESET;
     if (b->was_reset) after_reset(b), armed = 0; /* simavr's timers are gone */
     if (state == cpu_Done || state == cpu_Crashed) break;

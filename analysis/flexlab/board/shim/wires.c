@@ -86,14 +86,14 @@ static void on_edge(struct avr_irq_t *irq, uint32_t value, void *param) {
   board_t *b = line->board;
   const uint8_t level = value & 1;
   if (level == line->level) return;
-  line->level = level;
-  if (!level) line->fell = b->avr->cycle;
-  if (line->role == STEP && level && b->avr->cycle - line->fell <= GLITCH) { /* simavr's doing: it did not fall at all */
-    const edge_t *last = b->edges.used > b->edges.head ? (edge_t *)b->edges.at + b->edges.used - 1 : NULL;
-    if (last && last->line == line->index && !last->level) --b->edges.used;
-    b->level_of[STEP] = level;
-    return;
+  if (line->role == STEP && b->comparator[STEP]) {
+    const uint8_t mode = avr_regbit_get(b->avr, b->comparator[STEP]->com);
+    if (mode == (level ? avr_timer_com_clear : avr_timer_com_set)) { /* not what that mode can do */
+      b->unsettled = 1;
+      return;
+    }
   }
+  line->level = level;
   if (line->traced) *(edge_t *)push(&b->edges) = (edge_t){b->avr->cycle, line->index, level};
   b->level_of[line->role] = level;
   if (line->role == STEP && level && b->window.stepper_on != 0) b->window.steps += b->level_of[STEP_UP] ? 1 : -1;
@@ -117,12 +117,16 @@ static void follow_timer(board_t *b, char port, int bit, int role) {
     avr_irq_register_notify(avr_iomem_getirq(b->avr, registers[i], NULL, AVR_IOMEM_IRQ_ALL), on_timer, b);
 }
 
+/* Has simavr believe what the lines are. */
+void settle(board_t *b) {
+  b->unsettled = 0;
+  for (uint32_t i = 0; i < b->line_count; ++i) b->lines[i].irq->value = b->lines[i].level; /* simavr tells of changes only */
+}
+
 /* After a reset every pin is an input: outputs are pulled to rest by the rig's resistors, inputs keep their levels. */
 void rest(board_t *b) {
-  for (uint32_t i = 0; i < b->line_count; ++i) {
-    on_edge(NULL, b->lines[i].rest, &b->lines[i]);
-    b->lines[i].irq->value = b->lines[i].rest; /* simavr tells of changes only */
-  }
+  for (uint32_t i = 0; i < b->line_count; ++i) on_edge(NULL, b->lines[i].rest, &b->lines[i]);
+  settle(b);
   for (int p = 0; p < PORTS; ++p) {
     avr_ioport_t *port = b->driven[p] ? port_of(b->avr, (char)('A' + p)) : NULL;
     if (port) b->avr->data[port->r_pin] = (uint8_t)((b->avr->data[port->r_pin] & ~b->driven[p]) | (b->level[p] & b->driven[p]));
@@ -139,7 +143,7 @@ int board_line(board_t *b, char port, int bit, int role, int rest, int traced) {
   *line = (line_t){.board = b, .irq = irq, .index = b->line_count++, .traced = (uint32_t)traced, .role = (uint8_t)role,
                    .rest = (uint8_t)rest, .level = (uint8_t)rest};
   b->level_of[role] = (uint8_t)rest;
-  if (role == FORWARD || role == REVERSE) follow_timer(b, port, bit, role);
+  if (role == FORWARD || role == REVERSE || role == STEP) follow_timer(b, port, bit, role);
   avr_irq_register_notify(irq, on_edge, line);
   return (int)line->index;
 }
