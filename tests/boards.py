@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import atexit
 import functools
+import shutil
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -25,8 +28,12 @@ PI = 3.141592653589793
 
 @functools.cache
 def elf(compiler: str = "debian") -> Path:
-    """The firmware, built by PlatformIO."""
-    return build("--compiler", compiler)
+    """The firmware, built by PlatformIO; a copy with its .hex beside it, so that a later build does not take it away."""
+    folder = Path(tempfile.mkdtemp(prefix="flexura-firmware-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    for built in build("--compiler", compiler).parent.glob("firmware.*"):
+        shutil.copy(built, folder)
+    return folder / "firmware.elf"
 
 
 @functools.cache

@@ -24,8 +24,9 @@ def repair(flash: Any, begin: int, end: int) -> int:
 
     Raises FlexuraError where a branch leads into the middle of a pair, which no compiler is known to do.
     """
-    found = [at for at in range(begin, end - 2, 2) if _skips(_word(flash, at)) and _mistaken(_word(flash, at + 2))]
-    targets = set(_targets(flash, begin, end)) if found else set()
+    code = list(_instructions(flash, begin, end))
+    found = [at for at, word in code if _skips(word) and _mistaken(_word(flash, at + 2))]
+    targets = {_target(flash, at, word) for at, word in code}
     place = TOP
     for at in found:
         if at + 2 in targets:
@@ -64,13 +65,21 @@ def _mistaken(word: int) -> bool:
     return word & 0xFE0C == 0x960C
 
 
-def _targets(flash: Any, begin: int, end: int) -> Iterator[int]:
-    """Where relative and absolute jumps, branches and calls lead."""
-    for at in range(begin, end, 2):
+def _instructions(flash: Any, begin: int, end: int) -> Iterator[tuple[int, int]]:
+    """(address, first word) of each instruction; avr-gcc keeps tables out of this part of the flash."""
+    at = begin
+    while at < end - 2:
         word = _word(flash, at)
-        if word & 0xE000 == 0xC000:  # RJMP, RCALL
-            yield at + 2 + 2 * ((word & 0xFFF) - (word << 1 & 0x1000))
-        elif word & 0xF800 == 0xF000:  # BRBS, BRBC
-            yield at + 2 + 2 * ((word >> 3 & 0x7F) - (word >> 2 & 0x80))
-        elif word & 0xFE0C == 0x940C:  # JMP, CALL
-            yield 2 * ((word >> 3 & 0x3E | word & 1) << 16 | _word(flash, at + 2))
+        yield at, word
+        at += 4 if word & 0xFE0C == 0x940C or word & 0xFC0F == 0x9000 else 2  # JMP, CALL; LDS, STS
+
+
+def _target(flash: Any, at: int, word: int) -> int | None:
+    """Where a jump, branch or call leads."""
+    if word & 0xE000 == 0xC000:  # RJMP, RCALL
+        return at + 2 + 2 * ((word & 0xFFF) - (word << 1 & 0x1000))
+    if word & 0xF800 == 0xF000:  # BRBS, BRBC
+        return at + 2 + 2 * ((word >> 3 & 0x7F) - (word >> 2 & 0x80))
+    if word & 0xFE0C == 0x940C:  # JMP, CALL
+        return 2 * ((word >> 3 & 0x3E | word & 1) << 16 | _word(flash, at + 2))
+    return None
