@@ -1,4 +1,4 @@
-"""Makes both sides of the protocol from protocol.toml: C++ headers for the board, a Python module for its host.
+"""Makes both sides of the protocol from protocol.toml: C++ headers for the board, a Python module for its host, README tables.
 
     python firmware/protocol.py            writes them
     python firmware/protocol.py --check    exit status 1 when one of them is stale, and its name
@@ -20,6 +20,7 @@ FIRMWARE = Path(__file__).resolve().parent
 SOURCE = FIRMWARE / "protocol.toml"
 HEADER = FIRMWARE / "lib" / "protocol" / "src" / "declaration.h"
 PINS = FIRMWARE / "src" / "pins.h"
+README = FIRMWARE / "README.md"
 MODULE = FIRMWARE.parent / "analysis" / "flexlab" / "board" / "declaration.py"
 
 ENUMERATIONS = {"states": "State", "modes": "Mode", "faults": "Fault", "results": "Result", "flags": "Flag", "resets": "Reset"}
@@ -166,11 +167,30 @@ def module(declared: dict[str, Any]) -> str:
     return "\n".join([*out, "}", ""])
 
 
+def readme(declared: dict[str, Any], text: str) -> str:
+    """The README with its tables of pins and faults between their marks."""
+    tables = {
+        "pins": ["| name | Mega | port | what |", "| --- | --- | --- | --- |"]
+        + [f"| `{n}` | {e['pin']} | P{e['port']}{e['bit']} | {e['text']} |" for n, e in declared["pins"].items()],
+        "faults": ["| number | fault | meaning | what to do |", "| --- | --- | --- | --- |"]
+        + [f"| {e['code']} | `{n}` | {e['text']} | {e['remedy']} |" for n, e in declared["faults"].items() if e["code"]],
+    }
+    for name, rows in tables.items():
+        begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
+        head, found, rest = text.partition(begin)
+        tail = rest.partition(end)[2]
+        if not found or end not in rest:
+            raise Mistake(f"README.md has no {begin} with {end} after it")
+        text = "\n".join([head + begin, *rows, end + tail])
+    return text
+
+
 def main(argv: list[str]) -> int:
     declared = tomllib.loads(SOURCE.read_text(encoding="utf-8"))
     try:
         check(declared)
         made = {HEADER: header(declared), PINS: pins(declared), MODULE: module(declared)}
+        made[README] = readme(declared, README.read_text(encoding="utf-8"))
     except (Mistake, KeyError) as mistake:
         print(f"{SOURCE.name}: {mistake}", file=sys.stderr)
         return 2
