@@ -93,8 +93,11 @@ def silent(noise: Callable[[Rigged], bytes]) -> Callable[[str], Row]:
     def measured(compiler: str) -> Row:
         with Rigged(compiler, trace=("busy",)) as r:
             r.go(r.back_and_forth(duration_s=1.0))  # all of it fits the look-ahead twice over: no underrun comes first
-            caused, board = r.cycle, r.board
-            asked = r.board.now()
+            board = r.board
+            while board.simulator.unsent:
+                board.wait(0.00025)
+            board.wait(0.002)  # the last word is heard and obeyed
+            caused, asked = r.cycle, board.now()
             while r.driven:
                 board.write(noise(r))
                 board.wait(0.001)

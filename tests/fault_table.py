@@ -19,6 +19,18 @@ def line(what: str, row: Row) -> str:
     return f"| {what} | {fault} | {1e3 * row.after_cause / CLOCK_HZ:.1f} ms | {after} |"
 
 
+def agrees(what: str, row: Row, table: list[str]) -> bool:
+    """Whether the table says this: the same fault, and times that a change of the firmware elsewhere may have moved a little, by
+    a tick and a tenth, and by 0.1 ms within the tick."""
+    now = line(what, row).split(" | ")
+    for told in (old.split(" | ") for old in table):
+        if told[0] == now[0]:
+            times = [[float(cells[k].split()[0]) if cells[k][0] != "-" else 0.0 for cells in (told, now)] for k in (2, 3)]
+            near = abs(times[0][0] - times[0][1]) <= 1.0 + 0.1 * times[0][1] and abs(times[1][0] - times[1][1]) <= 100
+            return told[1] == now[1] and near
+    return False
+
+
 def table_in_readme() -> list[str]:
     """The lines between the two markers."""
     return README.read_text(encoding="utf-8").partition(BEGIN)[2].partition(END)[0].strip().splitlines()

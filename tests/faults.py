@@ -132,7 +132,6 @@ CASES = {
     "cut B": Case(Fault.encoder_1, "wire B of the motor's encoder cut", cut("encoder_1_b"), 0.1, mend("encoder_1_b"), FAST, WIDE),
     "cut A 2": Case(Fault.encoder_2, "wire A of joint 2's encoder cut", cut("encoder_2_a"), 0.2, mend("encoder_2_a"), SLOW_TURN),
     "cut B 2": Case(Fault.encoder_2, "wire B of joint 2's encoder cut", cut("encoder_2_b"), 0.2, mend("encoder_2_b"), SLOW_TURN),
-    "noise 60": Case(Fault.encoder_1, "noise of 60 kHz on the motor's encoder", noise(60e3), 0.008, quiet, SLOW_TURN),
     "noise 100": Case(Fault.encoder_1, "noise of 100 kHz on the motor's encoder", noise(100e3), 0.004, quiet, SLOW_TURN),
     "noise 300": Case(Fault.encoder_1, "noise of 300 kHz on the motor's encoder", noise(300e3), 0.004, quiet, SLOW_TURN),
     "following 1": Case(Fault.following_1, "supply of the motor sags to what the board still takes", supply(10.1), 1.0,
