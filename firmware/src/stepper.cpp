@@ -10,11 +10,8 @@ constexpr uint8_t kRoom = 16;                        // two ticks' worth and mor
 constexpr uint16_t kPulseCounts = 100;               // 50 us: longer than the edge interrupt is ever held up
 constexpr uint8_t kSetOnMatch = _BV(COM5B1) | _BV(COM5B0), kClearOnMatch = _BV(COM5B1);
 
-struct Edge {
-  uint16_t at;
-  bool up;
-};
-Edge edges[kRoom];
+uint16_t edge_at[kRoom];
+bool edge_up[kRoom];
 uint8_t head, tail;
 volatile uint8_t pulses;
 
@@ -33,26 +30,29 @@ inline __attribute__((always_inline)) void next() {
     TCCR5A = 0;
     return;
   }
-  const Edge edge = edges[tail];
-  tail = (tail + 1) % kRoom;
-  if (edge.up) {
+  const uint8_t place = tail;
+  const uint16_t at = edge_at[place];
+  tail = (place + 1) % kRoom;
+  if (edge_up[place]) {
     pin::step_direction::port() |= pin::step_direction::mask;
   } else {
     pin::step_direction::port() &= static_cast<uint8_t>(~pin::step_direction::mask);
   }
   TCCR5A = kSetOnMatch;
-  OCR5B = edge.at;
-  if (passed(edge.at)) OCR5B = TCNT5 + 8;            // late, but not lost
+  OCR5B = at;
+  if (passed(at)) OCR5B = TCNT5 + 8;            // late, but not lost
 }
 
 }  // namespace
 
 // A match with nothing connected, or one left from the last turn of the timer, is no edge.
 ISR(TIMER5_COMPB_vect) {
-  if (TCCR5A == 0 || static_cast<int16_t>(TCNT5 - OCR5B) < 0) return;
-  if (TCCR5A == kSetOnMatch) {
+  const uint8_t mode = TCCR5A;
+  const uint16_t at = OCR5B;
+  if (mode == 0 || static_cast<int16_t>(TCNT5 - at) < 0) return;
+  if (mode == kSetOnMatch) {
     pulses += pin::step_direction::port() & pin::step_direction::mask ? 1 : -1;
-    const uint16_t fall = OCR5B + kPulseCounts;
+    const uint16_t fall = at + kPulseCounts;
     TCCR5A = kClearOnMatch;
     OCR5B = fall;
     if (!passed(fall)) return;
@@ -80,10 +80,13 @@ void enable(bool on) {
 }
 
 void queue(const flexura::StepPlan &plan, uint16_t tick) {
+  uint8_t place = head;
   for (uint8_t k = 0; k < plan.count; ++k) {
-    edges[head] = {static_cast<uint16_t>(tick + plan.at[k]), plan.up};
-    head = (head + 1) % kRoom;
+    edge_at[place] = static_cast<uint16_t>(tick + plan.at[k]);
+    edge_up[place] = plan.up;
+    place = (place + 1) % kRoom;
   }
+  head = place;
   if (TCCR5A == 0) next();
 }
 

@@ -44,14 +44,23 @@ int c_count(const uint8_t *lines, const uint8_t *which, uint32_t size, int *miss
 }
 
 // A run of a PID made from a configuration: errors [counts / 256] in, outputs [units of u] out.
-int c_pid(const float *values, uint8_t joint, const PidSignals *signals, uint32_t size, int16_t *outputs) {
+struct Row {
+  PidSignals signals;
+  int16_t deflection, deflection_rate;
+};
+
+int c_pid(const float *values, uint8_t joint, const Row *rows, uint32_t size, int16_t *outputs) {
   Config config;
   memcpy(&config, values, sizeof config);
   Scales scales;
   const uint8_t wrong = make_scales(config, scales);
   if (wrong != kConsistent) return wrong;
   Pid pid;
-  for (uint32_t k = 0; k < size; ++k) outputs[k] = pid.update(scales.gains[joint], signals[k]);
+  for (uint32_t k = 0; k < size; ++k) {
+    PidSignals signals = rows[k].signals;
+    signals.tip = tip_term(scales.gains[joint], rows[k].deflection, rows[k].deflection_rate);
+    outputs[k] = pid.update(scales.gains[joint], signals);
+  }
   return kConsistent;
 }
 

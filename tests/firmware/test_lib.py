@@ -79,9 +79,9 @@ def settings(**changes):
 
 
 def signals(rows):
-    names = ("rate", "setpoint_rate", "deflection", "deflection_rate")
-    kind = np.dtype([("error", "<i4"), *((name, "<i2") for name in names)])
-    return np.array([tuple(row) for row in rows], kind)
+    names = ("deflection", "deflection_rate")
+    kind = np.dtype([("error", "<i4"), ("rate", "<i2"), ("setpoint_rate", "<i2"), ("tip", "<i4"), *((n, "<i2") for n in names)])
+    return np.array([(*row[:3], 0, *row[3:]) for row in rows], kind)
 
 
 GAINS = st.floats(0, 1, width=32)

@@ -2,6 +2,13 @@
 
 namespace flexura {
 
+int32_t tip_term(const PidGains &gains, int16_t deflection, int16_t rate) {
+  Sum sum;
+  sum.add(gains.kf, deflection);
+  sum.add(gains.kg, rate);
+  return sum.value();
+}
+
 int16_t Pid::held(const PidGains &gains, int32_t wish) const {
   const int16_t limited = clamp<int16_t>(narrow(wish), static_cast<int16_t>(-gains.limit), gains.limit);
   return clamp<int16_t>(limited, static_cast<int16_t>(output_ - gains.slew), static_cast<int16_t>(output_ + gains.slew));
@@ -15,10 +22,9 @@ int16_t Pid::update(const PidGains &gains, const PidSignals &in) {
   if (integral.top() >= gains.limit || integral.top() < -gains.limit) integral = integral_;
 
   Sum sum(integral.whole());
+  sum.add(in.tip);
   sum.add(gains.kp, error);
   sum.add(gains.kd, narrow(static_cast<int32_t>(in.setpoint_rate) - in.rate));
-  sum.add(gains.kf, in.deflection);
-  sum.add(gains.kg, in.deflection_rate);
   sum.add(gains.kv, in.setpoint_rate);
   int32_t u = sum.whole();
   if (in.setpoint_rate) u += in.setpoint_rate > 0 ? gains.kc : -gains.kc;

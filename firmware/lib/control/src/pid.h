@@ -30,9 +30,11 @@ struct PidSignals {
   int32_t error;            // counts / 256
   int16_t rate;             // q', counts / 256 per tick
   int16_t setpoint_rate;    // r', the same
-  int16_t deflection;       // 10 um
-  int16_t deflection_rate;  // 10 um / 256 in two ticks
+  int32_t tip;              // what the strip adds to u, Q16: tip_term(), renewed every second tick
 };
+
+// kf w + kg w', Q16 of u; deflection [10 um], its rate [10 um / 256 in two ticks].
+int32_t tip_term(const PidGains &gains, int16_t deflection, int16_t rate);
 
 class Pid {
  public:

@@ -25,19 +25,25 @@ void Steps::plan(int16_t rate, StepPlan &plan) {
   int16_t over = from + pace - kThreshold;
   ahead_ = static_cast<int16_t>(ahead_ + rate);
   if (over < 0) return;
-  for (; over >= 0 && plan.count < kStepsPerTick; over = static_cast<int16_t>(over - kStep)) {
-    ++plan.count;
-    given_ += plan.up ? 1 : -1;
-    ahead_ = static_cast<int16_t>(ahead_ + (plan.up ? -kStep : kStep));
+  uint8_t count = 1;
+  while ((over = static_cast<int16_t>(over - kStep)) >= 0 && count < kStepsPerTick) ++count;
+  const int16_t way = static_cast<int16_t>(count * kStep);
+  plan.count = count;
+  if (plan.up) {
+    given_ += count;
+    ahead_ = static_cast<int16_t>(ahead_ - way);
+  } else {
+    given_ -= count;
+    ahead_ = static_cast<int16_t>(ahead_ + way);
   }
   const uint16_t first = from < kThreshold ? kThreshold - from : 0;   // 0: a rate turned round without a step between
-  if (plan.count == 1) {
+  if (count == 1) {
     plan.at[0] = static_cast<uint16_t>(unsigned_product(ratio(first, pace), kTickCounts) >> 12);
     return;
   }
   const uint16_t interval = static_cast<uint16_t>(unsigned_product(ratio(kStep, pace), kTickCounts) >> 8);   // 1/16 counts
   uint16_t at = static_cast<uint16_t>(unsigned_product(first, interval) >> 12);
-  for (uint8_t k = 0; k < plan.count; ++k, at = static_cast<uint16_t>(at + interval)) plan.at[k] = at >> 4;
+  for (uint8_t k = 0; k < count; ++k, at = static_cast<uint16_t>(at + interval)) plan.at[k] = at >> 4;
 }
 
 }  // namespace flexura

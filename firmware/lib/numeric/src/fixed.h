@@ -126,6 +126,26 @@ class Sum {
 #endif
   }
 
+  void add(int32_t value) {
+#ifdef __AVR__
+    const uint32_t before = low_;
+    low_ += static_cast<uint32_t>(value);
+    high_ = static_cast<int16_t>(high_ + (value < 0 ? -1 : 0) + (low_ < before));
+#else
+    sum_ += value;
+#endif
+  }
+
+  int32_t value() const {                        // the sum itself, saturated
+#ifdef __AVR__
+    if (high_ == 0 && static_cast<int32_t>(low_) >= 0) return static_cast<int32_t>(low_);
+    if (high_ == -1 && static_cast<int32_t>(low_) < 0) return static_cast<int32_t>(low_);
+    return high_ < 0 ? kLeast : kMost;
+#else
+    return static_cast<int32_t>(clamp<int64_t>(sum_, kLeast, kMost));
+#endif
+  }
+
   int16_t top() const {                          // the sum / 2^32, rounded down
 #ifdef __AVR__
     return high_;

@@ -109,6 +109,7 @@ Result Rig::arm(uint8_t mode, uint16_t &detail) {
     pid_[j].start(0);
   }
   target_ = {{0, 0}};
+  tip_term_[0] = tip_term_[1] = 0;
   final_ = false;
   mode_ = static_cast<Mode>(mode);
   state_ = State::armed;

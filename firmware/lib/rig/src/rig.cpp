@@ -34,7 +34,7 @@ void Rig::sense() {
     seen_.position[j] += in_.moved[j];
     velocity_[j].update(in_.moved[j], scales_.velocity_filter);
     seen_.velocity[j] = velocity_[j].value();
-    missed_ = static_cast<uint16_t>(missed_ + in_.missed[j]);
+    if (in_.missed[j]) missed_ = static_cast<uint16_t>(missed_ + in_.missed[j]);
   }
   steps_given_ += in_.stepped;
   const int32_t rest = by_encoder_rest_ + scales_.ratio * in_.moved[1];
@@ -99,9 +99,13 @@ void Rig::control() {
     pid_[0].follow(gains[0], upper(multiply(scales_.duty, static_cast<int16_t>(target_.of[0]))));
     pid_[1].follow(gains[1], part(kRateOfStep, static_cast<int16_t>(target_.of[1])));
   } else {
-    PidSignals signals = {seen_.error[0], seen_.velocity[0], setpoint_rate_[0], tip_.deflection(), tip_.rate()};
+    // The deflection is new in every second tick; one joint takes it at once, the other in the next.
+    const uint8_t turn = tick_ & 1;
+    tip_term_[turn] = tip_term(gains[turn], tip_.deflection(), tip_.rate());
+    PidSignals signals = {seen_.error[0], seen_.velocity[0], setpoint_rate_[0], tip_term_[0]};
     pid_[0].update(gains[0], signals);
     signals.error = seen_.error[1];
+    signals.tip = tip_term_[1];
     signals.setpoint_rate = setpoint_rate_[1];
     signals.rate = scales_.on_encoder ? upper(multiply(scales_.ratio, seen_.velocity[1])) : static_cast<int16_t>(pid_[1].output() >> 4);
     pid_[1].update(gains[1], signals);

@@ -91,6 +91,7 @@ class Rig {
   Pid pid_[2];
   Steps steps_;
   Tip tip_;
+  int32_t tip_term_[2] = {0, 0};         // pid.h
   Watch watch_;
   Scales scales_;
   Player player_;

@@ -60,6 +60,7 @@ uint16_t Watch::alone(uint8_t j, const uint8_t *edges, bool driven) {
 Fault Watch::encoders(const WatchLimits &limits, const Inputs &in, const Watched &now) {
   const bool driven = now.duty > limits.stall_duty || now.duty < -limits.stall_duty;
   for (uint8_t j = 0; j < 2; ++j) {
+    if (!in.missed[j] && !in.flooded[j]) continue;
     missed_[j] = static_cast<uint16_t>(missed_[j] + in.missed[j]);
     if (in.flooded[j] || missed_[j] > limits.missed) return j ? Fault::encoder_2 : Fault::encoder_1;
   }
