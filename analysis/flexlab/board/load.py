@@ -44,6 +44,7 @@ class Load:
     period_least: int
     period_most: int  # of the control tick
     control_longest: int  # with what interrupted it
+    control_own: int  # without
     control_mean: float
     interrupts_share: float  # of all cycles
     steps_most_per_s: float
@@ -106,7 +107,7 @@ def measure(elf: Path, bench: Bench, seconds: float = 2.0) -> Load:
     alone = time.process_time() - alone
     board.close()
     return Load(
-        span / CLOCK_HZ, min(periods), max(periods), after[CONTROL_VECTOR][2],
+        span / CLOCK_HZ, min(periods), max(periods), after[CONTROL_VECTOR][2], after[CONTROL_VECTOR][3],
         (after[CONTROL_VECTOR][1] - before[CONTROL_VECTOR][1]) / ticks,
         (after[0][1] - before[0][1]) / span, rates[2], rates[0] + rates[1], int(table["missed"][-1]),
         flash, static, stack, span / CLOCK_HZ / wall, 1.0 / alone,

@@ -69,7 +69,7 @@ _INTERFACE: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "board_reset": (None, (c_void_p, c_uint8)),
     "board_eeprom": (c_int, (c_void_p, c_int, c_void_p, c_uint16, c_uint32)),
     "board_symbol": (c_int64, (c_void_p, c_char_p)),
-    "board_vector": (None, (c_void_p, c_int, *[ctypes.POINTER(c_uint64)] * 3)),
+    "board_vector": (None, (c_void_p, c_int, c_uint64 * 4)),
     "board_log": (c_char_p, (c_void_p,)),
 }
 
@@ -224,16 +224,16 @@ class Simulator:
         for k, word in enumerate(words):
             self.flash[address + 2 * k], self.flash[address + 2 * k + 1] = word & 255, word >> 8
 
-    def interrupts(self) -> dict[int, tuple[int, int, int]]:
-        """By vector number: entries, cycles in all, cycles of the longest; from the start, nested ones included.
+    def interrupts(self) -> dict[int, tuple[int, int, int, int]]:
+        """By vector number: entries, cycles in all, cycles of the longest, and of the longest without those that interrupted it.
 
         0 stands for all of them, with the cycles in which any was running."""
         out = {}
         for vector in range(58):
-            entries, total, longest = c_uint64(), c_uint64(), c_uint64()
-            self._lib.board_vector(self._board, vector, entries, total, longest)
-            if entries.value:
-                out[vector] = entries.value, total.value, longest.value
+            values = (c_uint64 * 4)()
+            self._lib.board_vector(self._board, vector, values)
+            if values[0]:
+                out[vector] = values[0], values[1], values[2], values[3]
         return out
 
     def log(self) -> str:

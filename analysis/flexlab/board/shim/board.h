@@ -80,8 +80,9 @@ struct board {
   double motor_sum;
   uint8_t driven[PORTS], level[PORTS]; /* inputs by port letter - 'A' */
   uint64_t stuck[PORTS];               /* bits of pins that ignore what drives them */
-  uint64_t entered[VECTORS], longest[VECTORS], total[VECTORS], entries[VECTORS];
+  uint64_t entered[VECTORS], longest[VECTORS], own[VECTORS], total[VECTORS], entries[VECTORS];
   uint32_t stack[VECTORS], depth;
+  uint64_t nested[VECTORS]; /* by depth: cycles that others took meanwhile */
   avr_symbol_t **symbols;
   uint32_t symbol_count;
   char log[1 << 14];

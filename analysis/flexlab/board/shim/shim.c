@@ -37,6 +37,7 @@ static void on_interrupt(struct avr_irq_t *irq, uint32_t value, void *param) {
   if (b->avr->interrupts.running_ptr == b->depth) { /* about to be entered */
     if (value >= VECTORS || b->depth == VECTORS) return;
     if (!b->depth) b->entered[0] = now; /* 0 stands for all of them */
+    b->nested[b->depth] = 0;
     b->stack[b->depth++] = value;
     b->entered[value] = now;
     ++b->entries[value], ++b->entries[0];
@@ -44,6 +45,8 @@ static void on_interrupt(struct avr_irq_t *irq, uint32_t value, void *param) {
     const uint32_t vector = b->stack[--b->depth];
     const uint64_t took = now - b->entered[vector];
     if (took > b->longest[vector]) b->longest[vector] = took;
+    if (took - b->nested[b->depth] > b->own[vector]) b->own[vector] = took - b->nested[b->depth];
+    if (b->depth) b->nested[b->depth - 1] += took;
     b->total[vector] += took;
     if (!b->depth) b->total[0] += now - b->entered[0];
   }
@@ -246,8 +249,9 @@ int64_t board_symbol(const board_t *b, const char *name) {
   return -1;
 }
 
-void board_vector(const board_t *b, int vector, uint64_t *entries, uint64_t *total, uint64_t *longest) {
-  *entries = b->entries[vector], *total = b->total[vector], *longest = b->longest[vector];
+/* into: entries, cycles in all, cycles of the longest, cycles of the longest without those that interrupted it. */
+void board_vector(const board_t *b, int vector, uint64_t into[4]) {
+  into[0] = b->entries[vector], into[1] = b->total[vector], into[2] = b->longest[vector], into[3] = b->own[vector];
 }
 
 /* What simavr complained about since the last call. */
