@@ -102,6 +102,7 @@ ISR(TIMER5_COMPA_vect) {
   pin::busy::port() &= static_cast<uint8_t>(~pin::busy::mask);
   const uint16_t took = TCNT5 - due;
   if (took > longest) longest = took;
+  sensors::resume();
   uart::resume();
   in_tick = false;
 }

@@ -22,6 +22,7 @@ static_assert(pin::limit_low::bit == pin::emergency_stop::bit + 1 && pin::limit_
 
 constexpr uint8_t kLines1 = _BV(INT2) | _BV(INT3), kLines2 = _BV(INT4) | _BV(INT5);
 constexpr uint8_t kFlexChannel = pin::flex::bit, kSupplyChannel = pin::supply::bit;
+constexpr uint8_t kConverter = _BV(ADEN) | _BV(ADPS2) | _BV(ADPS1) | _BV(ADPS0);   // 125 kHz: 104 us a conversion
 constexpr uint8_t kReference = _BV(REFS0);           // 5 V, the supply of the flex sensor's divider too: its changes cancel
 uint8_t conversions;
 uint16_t sum;
@@ -29,7 +30,17 @@ volatile uint16_t flex, supply;
 
 void convert(uint8_t channel) {
   ADMUX = kReference | channel;
-  ADCSRA |= _BV(ADSC);
+  ADCSRA = kConverter | _BV(ADIE) | _BV(ADSC);
+}
+
+void next(uint16_t result) {
+  if (conversions < flexura::kAdcSamples) {
+    sum += result;
+    convert(++conversions < flexura::kAdcSamples ? kFlexChannel : kSupplyChannel);
+  } else {
+    flex = sum;
+    supply = result;
+  }
 }
 
 }  // namespace
@@ -48,20 +59,7 @@ ISR(INT4_vect) {
   if (!encoder[1].update(EncoderLine::b, lines_2())) EIMSK &= static_cast<uint8_t>(~_BV(INT4));
 }
 
-ISR(ADC_vect) {
-  const uint16_t result = ADC;
-  if (conversions < flexura::kAdcSamples) {
-    sum += result;
-    if (++conversions < flexura::kAdcSamples) {
-      ADCSRA |= _BV(ADSC);
-    } else {
-      convert(kSupplyChannel);
-    }
-  } else {
-    flex = sum;
-    supply = result;
-  }
-}
+ISR(ADC_vect) { next(ADC); }
 
 namespace sensors {
 
@@ -71,7 +69,7 @@ void begin() {
   PORTD |= pin::encoder_1_a::mask | pin::encoder_1_b::mask;
   PORTE |= pin::encoder_2_a::mask | pin::encoder_2_b::mask;
   DIDR0 = pin::flex::mask | pin::supply::mask;
-  ADCSRA = _BV(ADEN) | _BV(ADIE) | _BV(ADPS2) | _BV(ADPS1) | _BV(ADPS0);   // 125 kHz
+  ADCSRA = kConverter;
   encoder[0].start(lines_1());
   encoder[1].start(lines_2());
   EICRA |= _BV(ISC20) | _BV(ISC30);                  // every edge
@@ -80,12 +78,20 @@ void begin() {
   EIMSK |= kLines1 | kLines2;
 }
 
-// A sequence still under way (only the very first may be: it takes longer) goes on, and this tick has none of its own.
+// The first conversion begins with the tick; no interrupt of it disturbs the control interrupt, which goes on with resume().
 void sample() {
-  if (ADCSRA & _BV(ADSC)) return;
   sum = 0;
   conversions = 0;
-  convert(kFlexChannel);
+  ADMUX = kReference | kFlexChannel;
+  ADCSRA = kConverter | _BV(ADSC);
+}
+
+void resume() {
+  if (ADCSRA & _BV(ADSC)) {
+    ADCSRA = kConverter | _BV(ADIE);               // still under way (written as 0, ADSC goes on)
+  } else {
+    next(ADC);
+  }
 }
 
 void read(flexura::Inputs &in) {

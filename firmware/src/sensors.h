@@ -5,7 +5,8 @@
 namespace sensors {
 
 void begin();
-void sample();                                       // starts this tick's conversions. Interrupts off.
+void sample();                                       // begins this tick's conversions. Interrupts off.
+void resume();                                       // goes on with them after the control. Interrupts off.
 // What came in since the last call; readings are those of the tick before. Interrupts off.
 void read(flexura::Inputs &in);
 void reopen();                                       // encoder interrupts that a flood of edges has shut. Interrupts off.

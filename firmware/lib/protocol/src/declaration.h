@@ -4,14 +4,14 @@
 
 namespace flexura {
 
-constexpr uint32_t kDeclaration = 0x0A3BE240;
+constexpr uint32_t kDeclaration = 0x813C4D42;
 constexpr uint8_t kProtocolVersion = 1;
 constexpr uint32_t kBaudBitS = 500000;
 constexpr uint16_t kControlHz = 1000;
 constexpr uint16_t kTelemetryEveryTicks = 2;
 constexpr uint16_t kAnnounceEveryTicks = 100;
 constexpr uint16_t kPayloadMaxBytes = 64;
-constexpr uint16_t kAdcSamples = 7;
+constexpr uint16_t kAdcSamples = 4;
 constexpr uint16_t kLookaheadKnots = 64;
 constexpr uint16_t kDutyFull = 800;
 

@@ -134,7 +134,7 @@ uint8_t watching(const Config &c, Scales &s) {
 }
 
 uint8_t sensing(const Config &c, Scales &s) {
-  const float per_x = 65536.0f / 4.0f / kFull;   // x as Q16 counts to 4 kFull only: two readings, doubled
+  const float per_x = 65536.0f / 8.0f / kFull;   // x as Q16 counts to 8 kFull only: two readings, times four
   s.tip.zero = static_cast<int16_t>(reading(2.0f * c.flex_zero));
   NEED(to_fixed(c.flex_c1_m, kDeflection * kQ8 * per_x, s.tip.c1), flex_c1_m);
   NEED(to_fixed(c.flex_c2_m, kDeflection * kQ8 * per_x * per_x, s.tip.c2), flex_c2_m);

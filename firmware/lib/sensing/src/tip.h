@@ -8,9 +8,11 @@ namespace flexura {
 // Deflections are in units of 10 um; Q8 adds eight bits of fraction. Readings are sums of two ticks' conversions.
 struct TipScale {
   int16_t zero = 0;                 // reading of the straight strip
-  int32_t c1 = 0, c2 = 0, c3 = 0;   // Q8, for x as Q16: (reading - zero) x 2
+  int32_t c1 = 0, c2 = 0, c3 = 0;   // Q8, for x as Q16: (reading - zero) x 4
   uint16_t filter = UINT16_MAX;     // Q16, of what is new in two ticks
 };
+
+static_assert(2L * 1024 * kAdcSamples * 4 <= 32768, "any difference of readings fits");
 
 class Tip {
  public:
@@ -23,7 +25,7 @@ class Tip {
   }
 
   static int32_t raw(const TipScale &scale, uint16_t reading) {
-    const int16_t x = narrow((static_cast<int32_t>(reading) - scale.zero) * 2);
+    const int16_t x = narrow((static_cast<int32_t>(reading) - scale.zero) * 4);
     return part(add(part(add(part(scale.c3, x), scale.c2), x), scale.c1), x);
   }
 
