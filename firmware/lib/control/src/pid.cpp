@@ -18,13 +18,13 @@ int16_t Pid::update(const PidGains &gains, const PidSignals &in) {
   const int16_t error = gains.fine ? narrow(in.error >> 4) : narrow(in.error >> 8);
 
   Sum integral = integral_;
-  integral.add_long(gains.ki, error);
+  if (gains.ki) integral.add_long(gains.ki, error);
   if (integral.top() >= gains.limit || integral.top() < -gains.limit) integral = integral_;
 
   Sum sum(integral.whole());
   sum.add(in.tip);
   sum.add(gains.kp, error);
-  sum.add(gains.kd, narrow(static_cast<int32_t>(in.setpoint_rate) - in.rate));
+  if (gains.kd) sum.add(gains.kd, narrow(static_cast<int32_t>(in.setpoint_rate) - in.rate));
   sum.add(gains.kv, in.setpoint_rate);
   int32_t u = sum.whole();
   if (in.setpoint_rate) u += in.setpoint_rate > 0 ? gains.kc : -gains.kc;

@@ -32,8 +32,10 @@ void Rig::trip(Fault fault) {
 void Rig::sense() {
   for (uint8_t j = 0; j < 2; ++j) {
     seen_.position[j] += in_.moved[j];
-    velocity_[j].update(in_.moved[j], scales_.velocity_filter);
-    seen_.velocity[j] = velocity_[j].value();
+    if (j == 0 || scales_.on_encoder) {                  // else nobody asks
+      velocity_[j].update(in_.moved[j], scales_.velocity_filter);
+      seen_.velocity[j] = velocity_[j].value();
+    }
     if (in_.missed[j]) missed_ = static_cast<uint16_t>(missed_ + in_.missed[j]);
   }
   steps_given_ += in_.stepped;
