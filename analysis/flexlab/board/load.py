@@ -34,6 +34,18 @@ HARD = {  # settings for the fast trajectory: 16 000 + 4000 edges/s, 4000 steps/
     "speed_max_2_rad_s": 10.0,
     "rate_max_2_rad_s": 7.8539,
 }
+EVERY_TERM = {  # of both controllers and both set-point filters, as small as they may be: what the processor can be asked at most
+    "kd_1_V_s_m": -0.5,
+    "kf_1_V_m": 1.0,
+    "kg_1_V_s_m": 0.05,
+    "ki_2_1_s2": 1.0,
+    "kd_2": -0.01,
+    "kf_2_rad_s_m": 0.5,
+    "kg_2_rad_m": 0.02,
+    "feedback_2": 1.0,
+    "setpoint_1_Hz": 100.0,
+    "setpoint_2_Hz": 100.0,
+}
 
 
 @dataclass(frozen=True)
@@ -66,9 +78,9 @@ class Load:
         return (self.ram_static + self.stack_most) / RAM_BYTES
 
 
-def measure(elf: Path, bench: Bench, seconds: float = 2.0) -> Load:
-    """Run the fast trajectory on an emulated board that is configured for it."""
-    settings = configuration(bench) | HARD
+def measure(elf: Path, bench: Bench, seconds: float = 2.0, every_term: bool = False) -> Load:
+    """Run the fast trajectory on an emulated board that is configured for it: the rig's controllers, or every term of them on."""
+    settings = configuration(bench) | HARD | (EVERY_TERM if every_term else {})
     board = EmulatedBoard(elf, Drives(bench, settings=settings))
     simulator = board.simulator
     static = simulator.symbol("_end") - RAM_BEGIN
