@@ -20,9 +20,9 @@ help:
 	@echo "make demo       simulate the rig, cross-check it, and leave a review to look at"
 	@echo "make test       style, types and the quick tests ('make check' is the same)"
 	@echo "make test-slow  the tests that take longer"
-	@echo "make bench      how fast the solver is on this machine"
-	@echo "make firmware   build the board's program            (not in this version)"
-	@echo "make flash      build it and load it into the board  (not in this version)"
+	@echo "make bench      how fast the solver is on this machine, and how busy the board"
+	@echo "make firmware   build the board's program; its ELF file is named at the end"
+	@echo "make flash      build it and load it into the board: make flash PORT=/dev/ttyACM0 CONFIGURE=1"
 	@echo "make setup      only the setting up, which every target does by itself"
 	@echo "make clean      remove caches and builds; keeps $(VENV) and logs"
 
@@ -42,7 +42,7 @@ demo: $(COMPILED)
 test check: lint types tests
 
 lint: $(READY)
-	@$(VENV)/bin/ruff check model analysis tests tools
+	@$(VENV)/bin/ruff check model analysis firmware tests tools
 
 types: $(READY)
 	@$(VENV)/bin/mypy
@@ -56,8 +56,13 @@ test-slow: $(COMPILED)
 bench: $(COMPILED)
 	@$(VENV)/bin/python -m flexlab.bench
 
-firmware flash:
-	@echo "make $@: the board's firmware is not in this version yet; firmware/README.md says what the board is." >&2; exit 2
+# make flash PORT=/dev/ttyACM0, or without PORT the one Mega 2560 that is plugged in; CONFIGURE=1 writes the rig's constants too.
+flash: $(COMPILED)
+	@$(VENV)/bin/flexura flash $(if $(PORT),--port $(PORT)) $(if $(CONFIGURE),--configure)
+
+firmware: $(READY)
+	@$(VENV)/bin/python firmware/protocol.py
+	@$(VENV)/bin/python firmware/build.py
 
 clean:
 	rm -rf build dist *.egg-info .hypothesis .mypy_cache .pytest_cache .ruff_cache solution $(COMPILED)

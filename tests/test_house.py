@@ -21,6 +21,7 @@ MODULES = {
 MAX_LINES = 400
 LONGER = {
     "flexura.loop": "both methods and their step control run in one compiled piece",
+    "flexlab.board.declaration": "generated: tables, not to be read through",
 }
 TWIN_MAY_USE = {"errors", "robot", "run", "drive", "signal", "twin"}
 HEAVY = {"exudyn", "rerun", "pyarrow", "matplotlib", "PIL", "platformio"}

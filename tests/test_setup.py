@@ -35,11 +35,12 @@ def test_a_complete_machine_needs_nothing():
 
 def test_a_bare_debian_needs_all():
     needs = setup.missing(BARE, nothing, [], "linux")
-    assert packages(needs) == ["python3.11-venv", "libgl1", "libx11-6", "libvulkan1", "mesa-vulkan-drivers"]
+    board = ["gcc-avr", "avr-libc", "arduino-core-avr", "avrdude", "g++", "libsimavr-dev", "simavr"]
+    assert packages(needs) == ["python3.11-venv", "libgl1", "libx11-6", "libvulkan1", *board, "mesa-vulkan-drivers"]
     assert [need.package for need in needs if need.vital] == ["python3.11-venv", "libgl1", "libx11-6"]
 
 
-@pytest.mark.parametrize("library", setup.LIBRARIES)
+@pytest.mark.parametrize("library", [*setup.LIBRARIES, *setup.BOARD])
 def test_each_library_is_asked_for_by_itself(library):
     assert packages(setup.missing(DEBIAN, lambda name: name != library.what, LAVAPIPE, "linux")) == [library.package]
 
@@ -59,7 +60,8 @@ def test_macos_needs_no_x11_or_vulkan():
 def test_on_debian_without_rights_the_command_to_type_is_exact():
     needs = setup.missing(BARE, nothing, [], "linux")
     stop, message = setup.verdict(needs, apt=True, sudo="sudo ")
-    typed = "sudo apt-get install -y --no-install-recommends python3.11-venv libgl1 libx11-6 libvulkan1 mesa-vulkan-drivers"
+    packages = "python3.11-venv libgl1 libx11-6 libvulkan1 gcc-avr avr-libc arduino-core-avr avrdude g++ libsimavr-dev simavr"
+    typed = f"sudo apt-get install -y --no-install-recommends {packages} mesa-vulkan-drivers"
     assert stop and message.splitlines().count(f"  sudo apt-get update && {typed}") == 1
     assert "sudo" not in setup.verdict(needs, apt=True)[1]
 

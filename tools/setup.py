@@ -48,13 +48,27 @@ LIBRARIES = [
     Need("libX11.so.6", "libx11-6", NO_EXUDYN, True),
     Need("libvulkan.so.1", "libvulkan1", NO_PICTURE, False),
 ]
+NO_FIRMWARE, NO_EMULATOR = "the board's firmware cannot be built", "no emulated board"
+BOARD = [
+    Need("avr-g++", "gcc-avr", NO_FIRMWARE, False),
+    Need("/usr/lib/avr/include/avr/io.h", "avr-libc", NO_FIRMWARE, False),
+    Need("/usr/share/arduino/hardware/arduino/avr/platform.txt", "arduino-core-avr", NO_FIRMWARE, False),
+    Need("avrdude", "avrdude", "the firmware cannot be loaded into a board", False),
+    Need("g++", "g++", "the firmware's library cannot be tested, and " + NO_EMULATOR, False),
+    Need("/usr/include/simavr/sim_avr.h", "libsimavr-dev", NO_EMULATOR, False),
+    Need("simavr", "simavr", "no unit tests on the AVR", False),
+]
 DRIVER = Need("a Vulkan driver", "mesa-vulkan-drivers", NO_PICTURE, False)
 
 
-def loads(library: str) -> bool:
-    """Whether the dynamic loader finds the library."""
+def has(what: str) -> bool:
+    """Whether the dynamic loader finds a library, the PATH a program, the disk a file."""
+    if what.startswith("/"):
+        return Path(what).exists()
+    if ".so" not in what:
+        return shutil.which(what) is not None
     try:
-        return bool(ctypes.CDLL(library))
+        return bool(ctypes.CDLL(what))
     except OSError:
         return False
 
@@ -66,14 +80,14 @@ def vulkan_drivers() -> list[str]:
     return [*filter(os.path.exists, named), *(str(f) for d in filter(None, folders) for f in Path(d).glob("vulkan/icd.d/*.json"))]
 
 
-def missing(python: Python, loads: Callable[[str], bool], drivers: list[str], system: str) -> list[Need]:
+def missing(python: Python, has: Callable[[str], bool], drivers: list[str], system: str) -> list[Need]:
     """The needs that the machine does not meet."""
     needs = []
     if not python.has_venv:
         package = "python{}.{}-venv".format(*python.version) if python.of_system else ""
         needs.append(Need(f"ensurepip for {python.path}", package, "no environment for the packages can be made", True))
     if system == "linux":        # on macOS the wheels use the system's own frameworks
-        needs += [need for need in LIBRARIES if not loads(need.what)]
+        needs += [need for need in [*LIBRARIES, *BOARD] if not has(need.what)]
         needs += [] if drivers else [DRIVER]
     return needs
 
@@ -145,8 +159,8 @@ def set_up(venv: Path) -> None:
     names = ["python3", *(f"python3.{minor}" for minor in range(OLDEST[1], NEWEST[1] + 1))]
     python = choose([sys.executable, *filter(None, map(shutil.which, names))], inspect)
     print("Setting up {} with Python {}.{} ({}).".format(venv, *python.version, python.path), flush=True)
-    install(missing(python, loads, vulkan_drivers(), sys.platform))
-    needs = missing(inspect(python.path) or python, loads, vulkan_drivers(), sys.platform)
+    install(missing(python, has, vulkan_drivers(), sys.platform))
+    needs = missing(inspect(python.path) or python, has, vulkan_drivers(), sys.platform)
     sudo = "sudo " if os.geteuid() and shutil.which("sudo") else ""
     stop, message = verdict(needs, bool(shutil.which("apt-get")), sudo)
     if stop:

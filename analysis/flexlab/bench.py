@@ -1,4 +1,4 @@
-"""How fast the solver is on this machine: `make bench`, or python -m flexlab.bench [--json].
+"""How fast the solver is on this machine, and how busy the board: `make bench`, or python -m flexlab.bench [--json].
 
 Ratios of programs measured side by side: every round times each of them once, in turn, so that whatever else the machine does
 hits all alike. Errors are the largest difference of the tip deflection from each program's own converged model, relative to its
@@ -17,7 +17,7 @@ from rich.table import Table
 
 import flexura as fx
 
-from . import baseline
+from . import baseline, scaling
 from .baseline import Result
 
 ROUNDS = 15
@@ -65,10 +65,42 @@ def measure(rounds: int = ROUNDS) -> list[dict[str, float | str]]:
     return rows
 
 
+def board_rows() -> list[tuple[str, str, float]]:
+    """What the board's processor does under its hardest load, emulated: a name, the value in words, the number in SI units."""
+    from .board import load
+    from .board.simulator import CLOCK_HZ
+    from .flash import RIG, build
+    from .rig import load as load_rig
+
+    elf, rig = build(), load_rig(RIG)
+    found, most = load.measure(elf, rig), load.measure(elf, rig, every_term=True)
+    period, longest, every = CLOCK_HZ / 1000, found.control_longest, most.control_longest
+    jitter = max(found.period_most - period, period - found.period_least)
+
+    def us(cycles: float) -> str:
+        return f"{1e6 * cycles / CLOCK_HZ:.1f} us"
+
+    return [
+        ("encoder edges at the peak, missed", f"{found.edges_most_per_s:.0f} 1/s, {found.missed}", found.edges_most_per_s),
+        ("steps at the peak", f"{found.steps_most_per_s:.0f} 1/s", found.steps_most_per_s),
+        ("control tick, jitter", f"{us(period)} +- {us(jitter)}", jitter / CLOCK_HZ),
+        ("control interrupt, longest with what interrupts it", f"{us(longest)} = {found.control_share:.1%}", longest / CLOCK_HZ),
+        ("the same, every term of the controllers on", f"{us(every)} = {most.control_share:.1%}", every / CLOCK_HZ),
+        ("control interrupt, longest by itself", us(found.control_own), found.control_own / CLOCK_HZ),
+        ("control interrupt, mean", us(found.control_mean), found.control_mean / CLOCK_HZ),
+        ("processor in interrupts", f"{found.interrupts_share:.1%}", found.interrupts_share),
+        ("flash", f"{found.flash} of {load.FLASH_BYTES} bytes", found.flash),
+        ("RAM, static", f"{found.ram_static} bytes", found.ram_static),
+        ("RAM, deepest stack", f"{found.stack_most} bytes; {found.ram_share:.1%} of {load.RAM_BYTES} in all", found.stack_most),
+        ("emulator, alone", f"{found.times_real_time_alone:.1f} x real time", found.times_real_time_alone),
+        ("emulator, with plant and host", f"{found.times_real_time:.1f} x real time", found.times_real_time),
+    ]
+
+
 def main() -> None:
-    rows = measure()
+    rows, growth, board = measure(), scaling.measure(), board_rows()
     if "--json" in sys.argv[1:]:
-        print(json.dumps(rows, indent=1))
+        print(json.dumps({"solver": rows, "growth": growth, "emulated board": {name: value for name, _, value in board}}, indent=1))
         return
     table = Table(title=f"type IV, {baseline.DURATION_S:g} s bang-bang, one core, {ROUNDS} rounds", title_justify="left")
     for name in ("", "time", "error of the tip deflection", "times as fast", "quartiles"):
@@ -78,7 +110,19 @@ def main() -> None:
         table.add_row(
             str(row["case"]), f"{1e3 * float(row['wall_s']):.3g} ms", f"{row['error']:.1e}", f"{row['ratio']:.0f}", quartiles
         )
-    Console(width=110).print(table)
+    console = Console(width=110)
+    console.print(table)
+    table = Table(title="one evaluation of the equations of motion", title_justify="left")
+    for name in ("", "number", "time", "times that of half as many"):
+        table.add_column(name, justify="left" if not name else "right")
+    for part in growth:
+        ratio = "" if part["ratio"] is None else f"{part['ratio']:.2f}"
+        table.add_row(part["what"], str(part["count"]), f"{part['us']:.3g} us", ratio)
+    console.print(table)
+    table = Table("", "emulated board", title="the board under its hardest load, emulated", title_justify="left")
+    for name, text, _ in board:
+        table.add_row(name, text)
+    console.print(table)
 
 
 if __name__ == "__main__":

@@ -24,6 +24,7 @@ ManoeuvreFile = Annotated[
     Path | None,
     typer.Argument(metavar="MANOEUVRE", help="manoeuvre file (TOML); without one, a modest back and forth of every joint"),
 ]
+RigFile = Annotated[Path | None, typer.Argument(metavar="RIG", help="rig file (TOML); default firmware/rig.toml")]
 Out = Annotated[
     Path | None, typer.Option("--out", metavar="FOLDER", help="where to leave the results; default logs/<command>-<robot>")
 ]
@@ -296,15 +297,37 @@ def demo(
 
 
 @app.command()
-def doctor(json: Json = False) -> None:
-    """What is installed, what is missing, and what that costs.
+def flash(
+    rig: RigFile = None,
+    port: Annotated[str | None, typer.Option(metavar="DEVICE", help="serial port; default: the one that is a Mega 2560")] = None,
+    emulated: Annotated[bool, typer.Option("--emulated", help="into an emulated board instead: no hardware is touched")] = False,
+    configure: Annotated[bool, typer.Option("--configure", help="write the rig's constants, store them, compare")] = False,
+    json: Json = False,
+) -> None:  # fmt: skip
+    """Build the firmware, load it into the board, wait for its first good frame, read back version and settings.
+
+    \b
+    Example: flexura flash --emulated --configure
+    """
+    from . import flash as loader
+    from .rig import load
+
+    done = loader.flash(load(rig or loader.RIG), port, emulated, configure, say=lambda text: say(json, text))
+    show(json, lambda: loader.table(done), lambda: loader.data(done))
+    if done.differing:
+        say(json, f"{len(done.differing)} settings are not the rig file's; to write them: flexura flash --configure")
+
+
+@app.command()
+def doctor(rig: RigFile = None, json: Json = False) -> None:
+    """What is installed, what is missing, what that costs; and whether the rig can do what it is built for.
 
     \b
     Example: flexura doctor
     """
     from .doctor import examine
 
-    findings = examine()
+    findings = examine(rig)
 
     def table() -> Any:
         from rich.table import Table
@@ -312,13 +335,13 @@ def doctor(json: Json = False) -> None:
         out = Table(show_edge=False)
         for name in ("", "found", "what it costs"):
             out.add_column(name, overflow="fold")
-        mark = {"ok": "[green]ok     [/]", "missing": "[red]missing[/]", "note": "note   "}
+        mark = {"ok": "[green]ok     [/]", "missing": "[red]missing[/]", "note": "note   ", "wrong": "[red]wrong  [/]"}
         for f in findings:
             out.add_row(f"{mark[f.state]} {f.what}", f.found, f.cost)
         return out
 
     show(json, table, lambda: [vars(f) for f in findings])
-    if any(f.state == "missing" for f in findings):
+    if any(f.state in ("missing", "wrong") for f in findings):
         raise typer.Exit(1)
 
 

@@ -10,10 +10,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from flexura.errors import FlexuraError
+
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing looked at: `state` is "ok", "missing" or "note"; `cost` says what doesn't work without it."""
+    """One thing looked at: `state` is "ok", "missing", "wrong" or "note"; `cost` says what doesn't work without it."""
 
     what: str
     state: str
@@ -31,12 +33,16 @@ _PACKAGES = {
     "rerun-sdk": "no review and no pictures (flexura review)",
     "matplotlib": "no figures",
     "platformio": "the firmware cannot be built or flashed",
+    "pyserial": "no board at a serial port (flexura flash)",
 }
 
 
-def examine() -> list[Finding]:
-    """Everything that flexura needs on this machine, one finding each."""
-    return [*_python(), *_packages(), *_native_libraries(), *_cache()]
+def examine(rig: Path | None = None) -> list[Finding]:
+    """Everything that flexura needs on this machine, the boards that are plugged in, and what the rig can do; one finding each.
+
+    `rig` is a rig file, the project's own if None. Raises InputError for a wrong one.
+    """
+    return [*_python(), *_packages(), *_native_libraries(), *_cache(), *_board(), *_rig(rig)]
 
 
 def _python() -> Iterator[Finding]:
@@ -86,3 +92,41 @@ def _cache() -> Iterator[Finding]:
         str(folder()),
         "" if filled else "the first simulation compiles for about a minute; or type: python -m flexura.warm",
     )
+
+
+def _board() -> Iterator[Finding]:
+    from .board.simulator import CLOCK_HZ, compile_shim
+
+    try:
+        yield Finding("emulated board", "ok", f"simavr, ATmega2560 at {CLOCK_HZ / 1e6:g} MHz: {compile_shim()}")
+    except FlexuraError as error:
+        yield Finding("emulated board", "missing", str(error).splitlines()[0], "no emulated board (flexura flash --emulated)")
+    try:
+        from .board.serialport import ports
+
+        found = list(ports())
+    except ImportError:  # told above
+        return
+    for port in found:
+        usable = os.access(port.device, os.R_OK | os.W_OK)
+        cost = "" if usable else "not yours to open; on Debian type: sudo adduser $USER dialout, and log in again"
+        yield Finding("board", "ok" if usable else "missing", f"{port.device}: {port.what}", cost)
+    if not found:
+        yield Finding("board", "note", "none plugged in", "experiments run on the emulated board only")
+
+
+def _rig(rig: Path | None) -> Iterator[Finding]:
+    from .flash import RIG
+    from .rig import examine as check
+    from .rig import load
+
+    if rig is None and not RIG.is_file():  # not a checkout
+        return
+    bench = load(rig or RIG)
+    checks = check(bench)
+    for c in checks:
+        if not c.passed:
+            cost = f"cannot follow {bench.manoeuvre.name!r}: {c.advice}"
+            yield Finding(f"rig: {c.what}", "wrong", f"needed: {c.needed}; available: {c.available}", cost)
+    if all(c.passed for c in checks):
+        yield Finding("rig", "ok", f"{bench.file}: can follow {bench.manoeuvre.name!r} ({len(checks)} checks)")

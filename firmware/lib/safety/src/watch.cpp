@@ -1,0 +1,121 @@
+#include "watch.h"
+
+namespace flexura {
+
+namespace {
+constexpr uint8_t kReadings = 4;   // out of range this many ticks in a row: noise is not a fault
+
+bool is_set(uint8_t bits, Flag flag) { return bits >> static_cast<uint8_t>(flag) & 1; }
+
+bool beyond(int32_t value, int32_t limit) { return value > limit || value < -limit; }
+
+Fault switches(uint8_t bits) {
+  if (is_set(bits, Flag::emergency_stop)) return Fault::emergency_stop;
+  if (is_set(bits, Flag::limit_low)) return Fault::limit_low;
+  if (is_set(bits, Flag::limit_high)) return Fault::limit_high;
+  return Fault::none;
+}
+
+Fault supply(const WatchLimits &limits, uint16_t reading) {
+  return reading < limits.supply_low ? Fault::supply_low : reading > limits.supply_high ? Fault::supply_high : Fault::none;
+}
+
+Fault flex(const WatchLimits &limits, uint16_t reading) {
+  return reading < limits.flex_low ? Fault::flex_low : reading > limits.flex_high ? Fault::flex_high : Fault::none;
+}
+
+// Counts moved against a drive of this sign, forgotten as far as the joint moves with it again.
+int32_t against(int32_t before, int8_t drive, int8_t moved) {
+  if (drive == 0) return before;
+  const int32_t sum = before + (drive > 0 ? -moved : moved);
+  return sum < 0 ? 0 : sum;
+}
+}  // namespace
+
+Fault standing(const WatchLimits &limits, const Inputs &in) {
+  Fault fault = switches(in.switches);
+  if (fault == Fault::none) fault = supply(limits, in.supply);
+  if (fault == Fault::none) fault = flex(limits, in.flex);
+  return fault;
+}
+
+void Watch::start() {
+  silent_ = stalled_ = 0;
+  direction_ = 0;
+  flex_out_ = supply_out_ = turn_ = 0;
+  for (uint8_t j = 0; j < 2; ++j) missed_[j] = alone_[j] = 0, against_[j] = travelled_[j] = 0;
+}
+
+// While nothing drives it a shaft may rest on an edge and tremble.
+uint16_t Watch::alone(uint8_t j, const uint8_t *edges, bool driven) {
+  const uint8_t a = edges[0], b = edges[1];
+  if (!driven || (a && b)) return alone_[j] = 0;
+  if (!a && !b) return alone_[j];
+  const EncoderLine line = a ? EncoderLine::a : EncoderLine::b;
+  if (line != alone_line_[j]) alone_[j] = 0;
+  alone_line_[j] = line;
+  return alone_[j] = static_cast<uint16_t>(alone_[j] + a + b);
+}
+
+Fault Watch::encoders(const WatchLimits &limits, const Inputs &in, const Watched &now) {
+  const bool driven = now.duty > limits.stall_duty || now.duty < -limits.stall_duty;
+  for (uint8_t j = 0; j < 2; ++j) {
+    if (!in.missed[j] && !in.flooded[j]) continue;
+    missed_[j] = static_cast<uint16_t>(missed_[j] + in.missed[j]);
+    if (in.flooded[j] || missed_[j] > limits.missed) return j ? Fault::encoder_2 : Fault::encoder_1;
+  }
+  if (alone(0, in.edges[0], driven) >= limits.alone) return Fault::encoder_1;
+  if (in.stepped) direction_ = in.stepped > 0 ? 1 : -1;
+  const uint16_t alone_2 = alone(1, in.edges[1], direction_ != 0);
+  if (alone_2 >= limits.alone) return Fault::encoder_2;
+
+  against_[0] = driven ? against(against_[0], now.duty > 0 ? 1 : -1, in.moved[0]) : 0;
+  if (against_[0] > limits.runaway) return Fault::runaway_1;
+  if (driven && !beyond(now.velocity[0], limits.stall_speed)) {
+    if (++stalled_ >= limits.stall_ticks) return Fault::stall_1;
+  } else {
+    stalled_ = 0;
+  }
+
+  against_[1] = against(against_[1], direction_, in.moved[1]);
+  if (beyond(now.lag, limits.lost)) {
+    // Why: the encoder went the other way for a good part of it; or only one of its lines moves; or the motor did not follow.
+    if (against_[1] > limits.against) return Fault::runaway_2;
+    return alone_2 >= 4 ? Fault::encoder_2 : Fault::stall_2;
+  }
+  return Fault::none;
+}
+
+Fault Watch::check(const WatchLimits &limits, const Inputs &in, const Watched &now) {
+  Fault fault = switches(in.switches);
+  if (fault != Fault::none) return fault;
+
+  fault = supply(limits, in.supply);
+  supply_out_ = fault == Fault::none ? 0 : static_cast<uint8_t>(supply_out_ + 1);
+  if (supply_out_ >= kReadings) return fault;
+
+  fault = encoders(limits, in, now);
+  if (fault != Fault::none) return fault;
+
+  // One joint in each tick: time is short, and what they watch takes longer than two.
+  turn_ = static_cast<uint8_t>((turn_ + 1) % (2 * kWindow));
+  travelled_[0] = static_cast<int16_t>(travelled_[0] + in.moved[0]);
+  travelled_[1] = static_cast<int16_t>(travelled_[1] + in.moved[1]);
+  const uint8_t j = turn_ & 1;
+  if (now.position[j] < limits.travel_low[j] || now.position[j] > limits.travel_high[j]) return j ? Fault::travel_2 : Fault::travel_1;
+  if (now.tracking && beyond(now.error[j], limits.following[j])) return j ? Fault::following_2 : Fault::following_1;
+  if (turn_ % kWindow == j) {
+    const int16_t way = travelled_[j];
+    travelled_[j] = 0;
+    if (way > limits.speed[j] || way < -limits.speed[j]) return j ? Fault::speed_2 : Fault::speed_1;
+  }
+
+  fault = flex(limits, in.flex);
+  flex_out_ = fault == Fault::none ? 0 : static_cast<uint8_t>(flex_out_ + 1);
+  if (flex_out_ >= kReadings) return fault;
+
+  if (++silent_ > limits.host_ticks) return Fault::host_silent;
+  return Fault::none;
+}
+
+}  // namespace flexura

@@ -1,0 +1,53 @@
+#include "store.h"
+
+#include <avr/eeprom.h>
+#include <string.h>
+
+#include "frame.h"
+
+namespace {
+
+struct __attribute__((packed)) Image {
+  uint32_t declaration;
+  flexura::Config config;
+  uint16_t crc;
+};
+uint8_t *const kPlace = reinterpret_cast<uint8_t *>(16);
+constexpr uint16_t kChecked = sizeof(Image) - sizeof(uint16_t);
+
+Image image;
+uint16_t written;
+
+const uint8_t *bytes() { return reinterpret_cast<const uint8_t *>(&image); }
+
+}  // namespace
+
+namespace store {
+
+bool load(flexura::Config &config) {
+  eeprom_read_block(&image, kPlace, sizeof image);
+  if (image.declaration != flexura::kDeclaration || image.crc != flexura::crc16(bytes(), kChecked)) return false;
+  memcpy(&config, &image.config, sizeof config);
+  return true;
+}
+
+void begin_save(const flexura::Config &config) {
+  image.declaration = flexura::kDeclaration;
+  memcpy(&image.config, &config, sizeof config);
+  image.crc = flexura::crc16(bytes(), kChecked);
+  written = 0;
+}
+
+Progress save() {
+  if (!eeprom_is_ready()) return Progress::busy;
+  if (written < sizeof image) {
+    eeprom_update_byte(kPlace + written, bytes()[written]);
+    ++written;
+    return Progress::busy;
+  }
+  for (uint16_t i = 0; i < sizeof image; ++i)
+    if (eeprom_read_byte(kPlace + i) != bytes()[i]) return Progress::failed;
+  return Progress::done;
+}
+
+}  // namespace store

@@ -1,0 +1,78 @@
+// The firmware's library behind a C interface, for test_lib.py.
+#include <cstring>
+
+#include "link.h"
+
+using namespace flexura;
+
+Section::Section() : before_(0) {}
+Section::~Section() { (void)before_; }
+
+extern "C" {
+uint16_t c_crc(const uint8_t *data, uint16_t size) { return crc16(data, size); }
+
+uint8_t c_encode(uint8_t code, uint16_t sequence, const uint8_t *fields, uint8_t size, uint8_t *frame) {
+  return encode(code, sequence, fields, size, frame);
+}
+
+// Bytes into a receiver of their own; the payload of the last good frame, and its length or -1.
+int c_receive(const uint8_t *bytes, uint32_t size, uint8_t *payload) {
+  Receiver receiver;
+  int length = -1;
+  for (uint32_t k = 0; k < size; ++k)
+    if (receiver.take(bytes[k])) {
+      payload[0] = receiver.code();
+      payload[1] = static_cast<uint8_t>(receiver.sequence());
+      payload[2] = static_cast<uint8_t>(receiver.sequence() >> 8);
+      memcpy(payload + kHeadBytes, receiver.fields(), receiver.size());
+      length = receiver.size() + kHeadBytes;
+    }
+  return length;
+}
+
+int c_count(const uint8_t *lines, const uint8_t *which, uint32_t size, int *missed) {
+  Quadrature q;
+  q.start(0);
+  int count = 0;
+  for (uint32_t k = 0; k < size; ++k) {
+    const uint8_t before = q.count();
+    q.update(static_cast<EncoderLine>(which[k]), lines[k]);
+    count += static_cast<int8_t>(q.count() - before);
+  }
+  *missed = q.missed();
+  return count;
+}
+
+// A run of a PID made from a configuration: errors [counts / 256] in, outputs [units of u] out.
+struct Row {
+  PidSignals signals;
+  int16_t deflection, deflection_rate;
+};
+
+int c_pid(const float *values, uint8_t joint, const Row *rows, uint32_t size, int16_t *outputs) {
+  Config config;
+  memcpy(&config, values, sizeof config);
+  Scales scales;
+  const uint8_t wrong = make_scales(config, scales);
+  if (wrong != kConsistent) return wrong;
+  Pid pid;
+  for (uint32_t k = 0; k < size; ++k) {
+    PidSignals signals = rows[k].signals;
+    signals.tip = tip_term(scales.gains[joint], rows[k].deflection, rows[k].deflection_rate);
+    outputs[k] = pid.update(scales.gains[joint], signals);
+  }
+  return kConsistent;
+}
+
+// Rates [microstep / 4096 per tick] in; times of all steps [timer counts] and their directions out.
+int c_steps(const int16_t *rates, uint32_t size, int64_t *at, int8_t *direction) {
+  Steps steps;
+  StepPlan plan;
+  int n = 0;
+  for (uint32_t k = 0; k < size; ++k) {
+    steps.plan(rates[k], plan);
+    for (uint8_t i = 0; i < plan.count; ++i, ++n) at[n] = static_cast<int64_t>(k) * kTickCounts + plan.at[i], direction[n] = plan.up ? 1 : -1;
+  }
+  return n;
+}
+}
