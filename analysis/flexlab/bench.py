@@ -100,7 +100,8 @@ def board_rows() -> list[tuple[str, str, float]]:
 def main() -> None:
     rows, growth, board = measure(), scaling.measure(), board_rows()
     if "--json" in sys.argv[1:]:
-        print(json.dumps({"solver": rows, "growth": growth, "emulated board": {name: value for name, _, value in board}}, indent=1))
+        emulated = {name: value for name, _, value in board}
+        print(json.dumps({"solver": rows, "growth": growth, "emulated board": emulated}, indent=1))
         return
     table = Table(title=f"type IV, {baseline.DURATION_S:g} s bang-bang, one core, {ROUNDS} rounds", title_justify="left")
     for name in ("", "time", "error of the tip deflection", "times as fast", "quartiles"):
