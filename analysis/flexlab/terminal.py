@@ -32,7 +32,7 @@ def announce_compiling() -> None:
     from flexura.compiled import folder
 
     if not any(folder().glob("**/*.nbc")):
-        typer.echo("compiling the solver: once, about half a minute", err=True)
+        typer.echo("compiling the solver: once, one to two minutes", err=True)
 
 
 @contextmanager

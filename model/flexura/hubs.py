@@ -124,10 +124,15 @@ def last_hub(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh: floa
 
 
 @inlined
-def _softened(A: tuple, E: tuple) -> tuple:
-    """(1 + E A)^-1 of symmetric E and A, each its upper triangle by rows; nine entries by rows."""
+def _attached(w: Work, i: int, A: tuple, b: tuple, t: tuple, E: tuple) -> tuple:
+    """B = A (1 + E A)^-1 (6, upper triangle by rows) and B t0 + b (3), with t0 = t - E b for t = beta - Jq S^-1 cq: what the
+    chain beyond link i's attachment is to its hub. Keeps what `released` needs."""
     A00, A01, A02, A11, A12, A22 = A
     E00, E01, E02, E11, E12, E22 = E
+    b0, b1, b2 = b
+    t0 = t[0] - (E00 * b0 + E01 * b1 + E02 * b2)
+    t1 = t[1] - (E01 * b0 + E11 * b1 + E12 * b2)
+    t2 = t[2] - (E02 * b0 + E12 * b1 + E22 * b2)
     w00 = 1.0 + E00 * A00 + E01 * A01 + E02 * A02
     w01 = E00 * A01 + E01 * A11 + E02 * A12
     w02 = E00 * A02 + E01 * A12 + E02 * A22
@@ -141,7 +146,25 @@ def _softened(A: tuple, E: tuple) -> tuple:
     c10, c11, c12 = w12 * w20 - w10 * w22, w00 * w22 - w02 * w20, w02 * w10 - w00 * w12
     c20, c21, c22 = w10 * w21 - w11 * w20, w01 * w20 - w00 * w21, w00 * w11 - w01 * w10
     det = 1.0 / (w00 * c00 + w01 * c10 + w02 * c20)
-    return c00 * det, c01 * det, c02 * det, c10 * det, c11 * det, c12 * det, c20 * det, c21 * det, c22 * det
+    c00, c01, c02, c10, c11, c12 = c00 * det, c01 * det, c02 * det, c10 * det, c11 * det, c12 * det
+    c20, c21, c22 = c20 * det, c21 * det, c22 * det
+    cond = w.cond[i]
+    cond[0], cond[1], cond[2], cond[3], cond[4], cond[5] = A
+    cond[6], cond[7], cond[8] = b
+    cond[9], cond[10], cond[11], cond[12], cond[13], cond[14] = c00, c01, c02, c10, c11, c12
+    cond[15], cond[16], cond[17] = c20, c21, c22
+    cond[27], cond[28], cond[29] = t0, t1, t2
+    cond[30], cond[31], cond[32], cond[33], cond[34], cond[35] = E
+    B00 = A00 * c00 + A01 * c10 + A02 * c20
+    B01 = A00 * c01 + A01 * c11 + A02 * c21
+    B02 = A00 * c02 + A01 * c12 + A02 * c22
+    B11 = A01 * c01 + A11 * c11 + A12 * c21
+    B12 = A01 * c02 + A11 * c12 + A12 * c22
+    B22 = A02 * c02 + A12 * c12 + A22 * c22
+    f0 = B00 * t0 + B01 * t1 + B02 * t2 + b0
+    f1 = B01 * t0 + B11 * t1 + B12 * t2 + b1
+    f2 = B02 * t0 + B12 * t1 + B22 * t2 + b2
+    return B00, B01, B02, B11, B12, B22, f0, f1, f2
 
 
 @inlined
@@ -152,8 +175,6 @@ def flexible_hub(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh: 
     t = (1 + E A)^-1 [(X - P) u + t0], t0 = beta - Jq S^-1 cq - E b, and
     F = [Mrr - Q + (X - P)^T B (X - P)] u + hr - Mrq S^-1 cq + (X - P)^T (B t0 + b).
     """
-    A00, A01, A02, A11, A12, A22 = A
-    b0, b1, b2 = b
     _elastic(c, w, i, ys, vs, gh, 7)
     Q00, Q01, Q02, Q11, Q12, Q22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     P00, P01, P02, P10, P11, P12, P20, P21, P22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -191,26 +212,14 @@ def flexible_hub(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh: 
         j0 += ex * cq
         j1 += ey * cq
         j2 += ez * cq
-    c00, c01, c02, c10, c11, c12, c20, c21, c22 = _softened(A, (E00, E01, E02, E11, E12, E22))
     x00, x01, x02 = 1.0 - P00, -P01, -w.place[i, 1] - P02
     x10, x11, x12 = -P10, 1.0 - P11, w.place[i, 0] - P12
     x20, x21, x22 = -P20, -P21, 1.0 - P22
-    t0 = w.beta[i, 0] - j0 - (E00 * b0 + E01 * b1 + E02 * b2)
-    t1 = w.beta[i, 1] - j1 - (E01 * b0 + E11 * b1 + E12 * b2)
-    t2 = w.beta[i, 2] - j2 - (E02 * b0 + E12 * b1 + E22 * b2)
-    _keep(w, i, A, b, (c00, c01, c02, c10, c11, c12, c20, c21, c22), (t0, t1, t2), (E00, E01, E02, E11, E12, E22))
     cond = w.cond[i]
     cond[18], cond[19], cond[20], cond[21], cond[22], cond[23] = x00, x01, x02, x10, x11, x12
     cond[24], cond[25], cond[26] = x20, x21, x22
-    B00 = A00 * c00 + A01 * c10 + A02 * c20
-    B01 = A00 * c01 + A01 * c11 + A02 * c21
-    B02 = A00 * c02 + A01 * c12 + A02 * c22
-    B11 = A01 * c01 + A11 * c11 + A12 * c21
-    B12 = A01 * c02 + A11 * c12 + A12 * c22
-    B22 = A02 * c02 + A12 * c12 + A22 * c22
-    f0 = B00 * t0 + B01 * t1 + B02 * t2 + b0
-    f1 = B01 * t0 + B11 * t1 + B12 * t2 + b1
-    f2 = B02 * t0 + B12 * t1 + B22 * t2 + b2
+    t = (w.beta[i, 0] - j0, w.beta[i, 1] - j1, w.beta[i, 2] - j2)
+    B00, B01, B02, B11, B12, B22, f0, f1, f2 = _attached(w, i, A, b, t, (E00, E01, E02, E11, E12, E22))
     y00, y01, y02 = B00 * x00 + B01 * x10 + B02 * x20, B00 * x01 + B01 * x11 + B02 * x21, B00 * x02 + B01 * x12 + B02 * x22
     y10, y11, y12 = B01 * x00 + B11 * x10 + B12 * x20, B01 * x01 + B11 * x11 + B12 * x21, B01 * x02 + B11 * x12 + B12 * x22
     y20, y21, y22 = B02 * x00 + B12 * x10 + B22 * x20, B02 * x01 + B12 * x11 + B22 * x21, B02 * x02 + B12 * x12 + B22 * x22
@@ -265,39 +274,13 @@ def sleeve_hub(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh: fl
             t2 -= ez * r[3]
     if i + 1 == c.kind.shape[0]:
         return
-    A00, A01, A02, A11, A12, A22 = A
-    b0, b1, b2 = b
-    t0 -= E00 * b0 + E01 * b1 + E02 * b2
-    t1 -= E01 * b0 + E11 * b1 + E12 * b2
-    t2 -= E02 * b0 + E12 * b1 + E22 * b2
-    c00, c01, c02, c10, c11, c12, c20, c21, c22 = _softened(A, (E00, E01, E02, E11, E12, E22))
-    _keep(w, i, A, b, (c00, c01, c02, c10, c11, c12, c20, c21, c22), (t0, t1, t2), (E00, E01, E02, E11, E12, E22))
-    B00 = A00 * c00 + A01 * c10 + A02 * c20
-    B01 = A00 * c01 + A01 * c11 + A02 * c21
-    B02 = A00 * c02 + A01 * c12 + A02 * c22
-    B11 = A01 * c01 + A11 * c11 + A12 * c21
-    B12 = A01 * c02 + A11 * c12 + A12 * c22
-    B22 = A02 * c02 + A12 * c12 + A22 * c22
-    f0 = B00 * t0 + B01 * t1 + B02 * t2 + b0
-    f1 = B01 * t0 + B11 * t1 + B12 * t2 + b1
-    f2 = B02 * t0 + B12 * t1 + B22 * t2 + b2
+    B00, B01, B02, B11, B12, B22, f0, f1, f2 = _attached(w, i, A, b, (t0, t1, t2), (E00, E01, E02, E11, E12, E22))
     for row in range(4):
         x0, x1, x2 = X[0, row], X[1, row], X[2, row]
         y0, y1, y2 = B00 * x0 + B01 * x1 + B02 * x2, B01 * x0 + B11 * x1 + B12 * x2, B02 * x0 + B12 * x1 + B22 * x2
         for col in range(row, 4):
             I[row, col] += y0 * X[0, col] + y1 * X[1, col] + y2 * X[2, col]
         p[row] += x0 * f0 + x1 * f1 + x2 * f2
-
-
-@inlined
-def _keep(w: Work, i: int, A: tuple, b: tuple, C: tuple, t0: tuple, E: tuple) -> None:
-    """What `released` needs of the condensation of link i."""
-    cond = w.cond[i]
-    cond[0], cond[1], cond[2], cond[3], cond[4], cond[5] = A
-    cond[6], cond[7], cond[8] = b
-    cond[9], cond[10], cond[11], cond[12], cond[13], cond[14], cond[15], cond[16], cond[17] = C
-    cond[27], cond[28], cond[29] = t0
-    cond[30], cond[31], cond[32], cond[33], cond[34], cond[35] = E
 
 
 @inlined
