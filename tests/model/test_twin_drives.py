@@ -139,7 +139,7 @@ def test_what_it_does_not_contain_is_refused_by_name(change, key):
         ({"t_eval": [0.1, 0.0]}, "t_eval"), ({"qd0": [1.0, 2.0]}, "qd0"), ({"beam": "shell"}, "beam"),
         ({"elements": 0}, "elements"), ({"step_s": 0.0}, "step_s"), ({"step_s": 1e-9}, "step_s"),
         ({"drive": Drive.none(2)}, "drive"), ({"drive": 3.0}, "drive"),
-        ({"drive": lambda t: [1.0, 2.0]}, "drive"),
+        ({"drive": lambda t: [1.0, 2.0]}, "drive"), ({"drive": Drive.prescribed(signal.cycloid(0.1, 0.5))}, "prescribed"),
     ],
 )  # fmt: skip
 def test_wrong_arguments_are_refused_by_name(arguments, key):

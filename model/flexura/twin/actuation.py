@@ -52,6 +52,9 @@ def actuation(drive: Any, start: np.ndarray, speeds: np.ndarray) -> Actuation:
     if isinstance(drive, Drive):
         if len(drive.joints) != n:
             raise InputError(f"expected one drive for each of the robot's {n} joints", key="drive", value=len(drive.joints))
+        if drive.follows.any():
+            expected = "expected a force, or gains on the motion: the twin has no prescribed joints"
+            raise InputError(expected, key="prescribed", value=True)
         gains = np.array([(j.kp, j.kd) if j.motion is not None else (0.0, 0.0) for j in drive.joints]).reshape(n, 2)
         return Actuation(gains, drive, lambda t: _plan(drive, t), drive.breaks)
     if not callable(drive):
