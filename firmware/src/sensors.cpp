@@ -2,6 +2,7 @@
 
 #include <avr/interrupt.h>
 
+#include "by_hand.h"
 #include "pins.h"
 #include "quadrature.h"
 #include "stepper.h"
@@ -45,17 +46,41 @@ void next(uint16_t result) {
 
 }  // namespace
 
+// Twenty edges a millisecond: 46 cycles each with entry and exit, where the compiler's own handler takes 84. The ordinary edge,
+// of this line alone and no flood, is done by hand; whatever else may come is left, untouched, to Quadrature in the handlers below.
+// `shift` brings A to bit 3 and B to bit 2; adding 4 then makes bit 3 their exclusive or: counting up after an edge of A.
+#define EDGE(vector, line, lines, shift, joint, changed, skip_if_up, any_edge)                                            \
+  ISR(vector, ISR_NAKED) {                                                                                                \
+    __asm__ volatile(BY_HAND_BEGIN                                                                                        \
+        " in r24, %[pins] \n" shift " andi r24, 0x0C \n"                                                                  \
+        " lds r30, %[last] \n eor r30, r24 \n cpi r30, " changed " \n brne 1f \n"                                         \
+        " lds r30, %[edges] \n inc r30 \n cpi r30, %[most] \n brsh 1f \n sts %[edges], r30 \n"                            \
+        " sts %[last], r24 \n subi r24, -4 \n"                                                                            \
+        " lds r30, %[count] \n inc r30 \n " skip_if_up " r24, 3 \n subi r30, 2 \n sts %[count], r30 \n"                   \
+        BY_HAND_END " reti \n"                                                                                            \
+        "1: \n" BY_HAND_END " jmp " any_edge " \n"                                                                        \
+        :                                                                                                                 \
+        : BY_HAND_KEEPS, [pins] "I"(_SFR_IO_ADDR(lines)), [last] "i"(&encoder[joint].last_),                              \
+          [edges] "i"(&encoder[joint].edges_[line]), [count] "i"(&encoder[joint].count_),                                 \
+          [most] "M"(flexura::Quadrature::kEdgesMost));                                                                   \
+  }
+EDGE(INT3_vect, 0, PIND, "", 0, "8", "sbrs", "__vector_edge_1a")
+EDGE(INT2_vect, 1, PIND, "", 0, "4", "sbrc", "__vector_edge_1b")
+EDGE(INT5_vect, 0, PINE, " lsr r24 \n lsr r24 \n", 1, "8", "sbrs", "__vector_edge_2a")
+EDGE(INT4_vect, 1, PINE, " lsr r24 \n lsr r24 \n", 1, "4", "sbrc", "__vector_edge_2b")
+static_assert(pin::encoder_1_b::bit == 2 && pin::encoder_2_b::bit == 4, "where EDGE looks for them");
+
 // A line that floods shuts its own interrupt: the control interrupt must live to say so.
-ISR(INT3_vect) {
+ISR(__vector_edge_1a) {
   if (!encoder[0].update(EncoderLine::a, lines_1())) EIMSK &= static_cast<uint8_t>(~_BV(INT3));
 }
-ISR(INT2_vect) {
+ISR(__vector_edge_1b) {
   if (!encoder[0].update(EncoderLine::b, lines_1())) EIMSK &= static_cast<uint8_t>(~_BV(INT2));
 }
-ISR(INT5_vect) {
+ISR(__vector_edge_2a) {
   if (!encoder[1].update(EncoderLine::a, lines_2())) EIMSK &= static_cast<uint8_t>(~_BV(INT5));
 }
-ISR(INT4_vect) {
+ISR(__vector_edge_2b) {
   if (!encoder[1].update(EncoderLine::b, lines_2())) EIMSK &= static_cast<uint8_t>(~_BV(INT4));
 }
 

@@ -3,6 +3,7 @@
 #include <avr/interrupt.h>
 #include <avr/io.h>
 
+#include "by_hand.h"
 #include "declaration.h"
 
 namespace {
@@ -12,16 +13,17 @@ volatile uint8_t received_head, received_tail, sent_head, sent_tail;
 constexpr uint8_t kListening = _BV(RXEN0) | _BV(TXEN0) | _BV(RXCIE0);
 }  // namespace
 
-// A byte every 20 us may come while the control interrupt works: 44 cycles with entry and exit, where the compiler's own takes 61.
+// A byte every 20 us may come while the control interrupt works: 38 cycles with entry and exit, where the compiler's own takes 61.
 // The byte goes into the free place that a full ring still has; then the head moves on, unless it would meet the tail.
 ISR(USART0_RX_vect, ISR_NAKED) {
-  __asm__ volatile(
-      " push r24 \n in r24, __SREG__ \n push r24 \n push r30 \n push r31 \n"
+  __asm__ volatile(BY_HAND_BEGIN
+      " push r31 \n"
       " lds r24, %[data] \n lds r30, %[head] \n ldi r31, hi8(%[ring]) \n st Z, r24 \n"
       " subi r30, 0xFF \n lds r24, %[tail] \n cpse r30, r24 \n sts %[head], r30 \n"
-      " pop r31 \n pop r30 \n pop r24 \n out __SREG__, r24 \n pop r24 \n reti \n"
+      " pop r31 \n" BY_HAND_END " reti \n"
       :
-      : [data] "n"(_SFR_MEM_ADDR(UDR0)), [ring] "i"(received), [head] "i"(&received_head), [tail] "i"(&received_tail));
+      : BY_HAND_KEEPS, [data] "n"(_SFR_MEM_ADDR(UDR0)), [ring] "i"(received),
+        [head] "i"(&received_head), [tail] "i"(&received_tail));
 }
 
 ISR(USART0_UDRE_vect) {

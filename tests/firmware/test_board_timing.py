@@ -34,9 +34,9 @@ def test_the_control_interrupt_takes_less_than_40_percent_of_its_period(compiler
 
 @both
 def test_with_every_term_of_the_controllers_on_it_takes_a_little_more(compiler):
-    """All gains, both set-point filters, joint 2 by its encoder: by itself under 40 %, with what interrupts it under 43 %."""
+    """All gains, both set-point filters, joint 2 by its encoder: still under 40 %."""
     found = loaded(compiler, every_term=True)
-    assert found.control_own / TICK < 0.40 and found.control_share < 0.43
+    assert 0.01 < found.control_share < 0.40
     assert found.missed == 0 and 0.95 * TICK <= found.period_least <= found.period_most <= 1.05 * TICK
 
 

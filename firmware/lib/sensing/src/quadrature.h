@@ -38,7 +38,9 @@ class Quadrature {
 
  private:
   static constexpr uint8_t kMissed = 2;
-  uint8_t count_ = 0, missed_ = 0, last_ = 0;
+
+ public:                                 // for the board's interrupts, which do the ordinary edge by hand
+  uint8_t count_ = 0, missed_ = 0, last_ = 0;   // last: the lines, << 2
   uint8_t edges_[2] = {0, 0};
 };
 
