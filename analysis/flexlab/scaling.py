@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from flexura.kernel import accelerate
 LINKS = (1, 2, 4, 8, 16, 32, 64)
 ELEMENTS = (1, 2, 4, 8, 16)
 PART = 4  # elements of each part of a link that is cut
-CALLS, ROUNDS = 20, 70  # short rounds: a longer one is interrupted by whatever else runs
+CALLS, ROUNDS = 20, 60  # many short rounds, each of all in turn: whatever else runs spoils some rounds, not one of the rows
 
 
 def chain(links: int, elements: int) -> fx.System:
@@ -25,33 +26,40 @@ def chain(links: int, elements: int) -> fx.System:
     return fx.assemble(fx.Robot.from_dict({"link": [link] * links}))
 
 
-def evaluation_s(system: fx.System) -> float:
-    """Seconds for one evaluation, the call from Python (about 8 microseconds) in it; the quickest of several rounds."""
+def timed(system: fx.System) -> Callable[[], float]:
+    """A function that times one evaluation [s], the call from Python (about 8 microseconds) in it."""
     state = np.random.default_rng(0).uniform(-1e-3, 1e-3, (2, system.n))
     a, none = np.zeros(system.n), np.zeros(len(system.links))
-    y, v, work, best = state[0], state[1], system._work(), np.inf
-    for _ in range(ROUNDS):
+    y, v, work = state[0], state[1], system._work()
+
+    def once() -> float:
         begun = time.perf_counter()
         for _ in range(CALLS):
             accelerate(system.chain, work, y, v, y, v, 0.0, none, none, none, a)
-        best = min(best, (time.perf_counter() - begun) / CALLS)
-    return best
+        return (time.perf_counter() - begun) / CALLS
+
+    return once
 
 
 def measure() -> list[dict[str, Any]]:
     """Rows: what grows, how many of it, microseconds beyond the call, and how often the time of half as many."""
-    rows: list[dict[str, Any]] = []
-    call = evaluation_s(fx.assemble(fx.Robot.from_dict({"link": [{"length_m": 0.0, "mass_kg": 1.0, "joint": {"type": "Pa"}}]})))
     whole = lambda count: chain(1, count)
     in_parts = lambda count: fx.assemble(fx.cut(whole(count).robot, 1, count // PART))
-    for what, counts, made in (
-        ("links of 2 elements", LINKS, lambda count: chain(count, 2)),
-        ("elements of a link", ELEMENTS, whole),
-        (f"elements of a link, cut into parts of {PART}", [k for k in LINKS if k >= PART], in_parts),
-    ):
-        before = None
-        for count in counts:
-            took = evaluation_s(made(count)) - call
-            rows.append({"what": what, "count": count, "us": 1e6 * took, "ratio": took / before if before else None})
-            before = took
+    cases = [
+        (what, count, timed(made(count)))
+        for what, counts, made in (
+            ("links of 2 elements", LINKS, lambda count: chain(count, 2)),
+            ("elements of a link", ELEMENTS, whole),
+            (f"elements of a link, cut into parts of {PART}", [k for k in LINKS if k >= PART], in_parts),
+        )
+        for count in counts
+    ]
+    nothing = timed(fx.assemble(fx.Robot.from_dict({"link": [{"length_m": 0.0, "mass_kg": 1.0, "joint": {"type": "Pa"}}]})))
+    rounds = np.array([[run() for run in (nothing, *(run for *_, run in cases))] for _ in range(ROUNDS)])
+    best = rounds.min(axis=0)
+    took = 1e6 * (best[1:] - best[0])
+    rows: list[dict[str, Any]] = []
+    for k, (what, count, _) in enumerate(cases):
+        same = k > 0 and cases[k - 1][0] == what
+        rows.append({"what": what, "count": count, "us": float(took[k]), "ratio": float(took[k] / took[k - 1]) if same else None})
     return rows
