@@ -12,9 +12,7 @@ from typing import Any
 import numpy as np
 
 from .errors import InputError
-from .robot import Robot
-
-_LISTS = ("section", "mass_per_length_kg_m", "bending_stiffness_N_m2")
+from .robot import Link, Robot
 
 
 def cut(robot: Robot, link: int, parts: int) -> Robot:
@@ -37,7 +35,8 @@ def cut(robot: Robot, link: int, parts: int) -> Robot:
     pieces: list[dict[str, Any]] = []
     for k in range(parts):
         piece = table | {"length_m": length, "elements": whole.elements // parts}
-        piece |= {key: _slice(table[key], k * length, (k + 1) * length) for key in _LISTS if isinstance(table.get(key), list)}
+        listed = laws(whole, k * length, (k + 1) * length)
+        piece |= {key: [entry.model_dump() for entry in entries] for key, entries in listed.items()}
         if k:
             piece["joint"] = {"type": "R", "locked": True}
         pieces.append(piece)
@@ -58,10 +57,15 @@ def _shifted(joint: dict[str, Any], by: float) -> dict[str, Any]:
     return moved
 
 
-def _slice(entries: list[dict[str, float]], low: float, high: float) -> list[dict[str, float]]:
-    """A list of values along the link between two places, counted from the first."""
-    at = np.array([entry["at_m"] for entry in entries])
-    places = [low, *at[(at > low + 1e-12 * high) & (at < high * (1 - 1e-12))], high]
-    keys = [key for key in entries[0] if key != "at_m"]
-    values = {key: np.interp(places, at, [entry[key] for entry in entries]) for key in keys}
-    return [{"at_m": float(x - low)} | {key: float(values[key][n]) for key in keys} for n, x in enumerate(places)]
+def laws(link: Link, low: float, high: float) -> dict[str, list[Any]]:
+    """The properties of a link that are lists along it, for its part between two places [m], counted from the first."""
+    out: dict[str, list[Any]] = {}
+    for key in ("section", "mass_per_length_kg_m", "bending_stiffness_N_m2"):
+        entries = getattr(link, key)
+        if isinstance(entries, list):
+            at = [entry.at_m for entry in entries]
+            value = lambda name, x, at=at, entries=entries: float(np.interp(x, at, [getattr(entry, name) for entry in entries]))
+            names = [name for name in type(entries[0]).model_fields if name != "at_m"]
+            places = [low, *(x for x in at if low + 1e-12 * high < x < high * (1 - 1e-12)), high]
+            out[key] = [entries[0].model_copy(update={"at_m": x - low} | {k: value(k, x) for k in names}) for x in places]
+    return out

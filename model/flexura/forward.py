@@ -43,8 +43,7 @@ def simulate(
     `progress` is called with the finished fraction. A joint that reaches a limit of the robot file or the end of its link ends
     the run: the Run holds the states before it and, last, the one at that instant, an event says so and `meta["complete"]` is
     false. A Ctrl-C ends it too. `meta["energy_error"]` is the largest |E - E(0) - work + loss| relative to the largest energy,
-    work or loss. Raises InputError for wrong arguments,
-    FlexuraError where the tolerance cannot be kept.
+    work or loss. Raises InputError for wrong arguments, FlexuraError where the tolerance cannot be kept.
     """
     t = _times(t_eval)
     if not 1e-13 <= rtol <= 0.1:
@@ -205,11 +204,10 @@ def _python(
     def beyond(z: np.ndarray) -> bool:
         return bool(loop.outside(c, inputs, z) >= 0)
 
-    def stop() -> None:
-        """Note the event and keep the last good state."""
-        dense = solver.dense_output()
-        at = _crossing(lambda time_s: beyond(dense(time_s)), solver.t_old, solver.t)
-        joint = int(loop.outside(c, inputs, dense(np.nextafter(at, np.inf) + 1e-12 * abs(solver.t - solver.t_old))))
+    def stop(late: float) -> None:
+        """Note the event, which is before `late` [s], and keep the last good state."""
+        at, after = _crossing(lambda time_s: beyond(dense(time_s)), solver.t_old, late)
+        joint = int(loop.outside(c, inputs, dense(after)))
         events.append(limit_event(system, joint, at, dense(at)[system.joint_rows]))
         if at > times[-1]:
             times.append(at)
@@ -227,12 +225,12 @@ def _python(
             while len(out) < len(t) and t[len(out)] <= solver.t and not events:
                 z = dense(t[len(out)])
                 if beyond(z):
-                    stop()
+                    stop(t[len(out)])
                 else:
                     times.append(float(t[len(out)]))
                     out.append(z)
-            if not events and beyond(solver.y):
-                stop()
+            if not events and beyond(dense(solver.t)):
+                stop(solver.t)
             if progress is not None:
                 progress((solver.t - t[0]) / (t[-1] - t[0]))
     except KeyboardInterrupt:
@@ -249,12 +247,12 @@ def _python(
     return np.array(times), z[:, : 2 * n], z[:, 2 * n :], meta | {"complete": complete}
 
 
-def _crossing(beyond: Callable[[float], bool], before: float, after: float) -> float:
-    """The last time before `beyond` [s], by bisection between a time inside and one beyond."""
+def _crossing(beyond: Callable[[float], bool], before: float, after: float) -> tuple[float, float]:
+    """The last time before `beyond` and the first at which it is so [s], by bisection between two such times."""
     for _ in range(60):
         middle = (before + after) / 2
         before, after = (before, middle) if beyond(middle) else (middle, after)
-    return before
+    return before, after
 
 
 def as_function(drive: Callable[..., Any]) -> Callable[[float, np.ndarray, np.ndarray, float], np.ndarray]:

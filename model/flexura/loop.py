@@ -358,11 +358,15 @@ def outside(c: Chain, d: Inputs, z: np.ndarray) -> int:
 
 
 @compiled
-def _stop_at_limit(c: Chain, w: Work, d: Inputs, m: Memory, method: int, t: float, h: float, last: float) -> None:
-    """Find by bisection where the step just made, from t, leaves a joint's limits; m.z and s[T] are the last state inside."""
+def _stop_at_limit(
+    c: Chain, w: Work, d: Inputs, m: Memory, method: int, t: float, h: float, last: float, beyond: float, joint: int
+) -> None:  # fmt: skip
+    """Find by bisection where the step just made, from t, leaves a joint's limits: `joint` is beyond them at the fraction
+    `beyond` of the step. m.z and s[T] are the last state inside."""
     if method == EXPLICIT:
         _explicit_dense(c, w, d, m, t, h, last)
-    low, high, out, n = 0.0, 1.0, m.K[15], m.a.shape[0]
+    low, high, out, n = 0.0, beyond, m.K[15], m.a.shape[0]
+    m.s[FAULT] = joint
     for _ in range(60):
         middle = 0.5 * (low + high)
         _interpolate(m, method, h, middle, out)
@@ -435,14 +439,14 @@ def advance(
                     prepared = True
                 _interpolate(m, method, h, (t_eval[row] - t) / h, out[row])
                 _prescribe(c, w, d, t_eval[row], out[row, :n], out[row, n : 2 * n])
-            if outside(c, d, out[row]) >= 0:
-                _stop_at_limit(c, w, d, m, method, t, h, last)
+            joint = outside(c, d, out[row])
+            if joint >= 0:
+                _stop_at_limit(c, w, d, m, method, t, h, last, (t_eval[row] - t) / h, joint)
                 return
             s[OUT] += 1
         joint = outside(c, d, m.znew)
         if joint >= 0:
-            s[FAULT] = joint
-            _stop_at_limit(c, w, d, m, method, t, h, last)
+            _stop_at_limit(c, w, d, m, method, t, h, last, 1.0, joint)
             return
         factor = 5.0 if error == 0.0 else min(5.0, max(0.3, 0.9 * error ** (-0.7 / order) * max(s[ERR], 1e-4) ** (0.3 / order)))
         if h < s[H]:

@@ -21,6 +21,7 @@ import numpy as np
 
 from .beam import link_integrals, shape
 from .choice import choose
+from .cutting import laws
 from .drive import Drive, JointDrive
 from .errors import InputError
 from .loop import EXPLICIT
@@ -249,7 +250,7 @@ def _inside(link: Link, length: float, joint: Joint) -> Link:
     mass, centre, inertia = 0.0, 0.0, 0.0
     if length > 0.0:
         rigid = {"length_m": length, "elements": 0, "joint": Joint(type="R")}
-        info = link_integrals(link.model_copy(update=rigid | _laws(link, 0.0, length)))
+        info = link_integrals(link.model_copy(update=rigid | laws(link, 0.0, length)))
         mass, centre = info.mass, info.s1 / info.mass
         inertia = max(info.inertia - mass * centre**2, 0.0)
     return Link(length_m=link.length_m, mass_kg=mass, centre_of_mass_m=centre, inertia_kg_m2=inertia, joint=joint)
@@ -259,21 +260,7 @@ def _beyond(link: Link, start: float, node: int) -> Link:
     """The elements of a link after `node`, at `start`, on a joint locked there."""
     joint = Joint(type="Pa", locked=True, start=start)
     size = {"length_m": link.length_m - start, "elements": link.elements - node, "joint": joint}
-    return link.model_copy(update=size | _laws(link, start, link.length_m))
-
-
-def _laws(link: Link, a: float, b: float) -> dict[str, Any]:
-    """The properties of a link given as lists along it, for its part [a, b]."""
-    out: dict[str, Any] = {}
-    for key in ("section", "mass_per_length_kg_m", "bending_stiffness_N_m2"):
-        entries = getattr(link, key)
-        if isinstance(entries, list):
-            at = [entry.at_m for entry in entries]
-            value = lambda name, x, at=at, entries=entries: float(np.interp(x, at, [getattr(entry, name) for entry in entries]))
-            names = [name for name in type(entries[0]).model_fields if name != "at_m"]
-            places = [a, *(x for x in at if a < x < b), b]
-            out[key] = [entries[0].model_copy(update={"at_m": x - a} | {k: value(k, x) for k in names}) for x in places]
-    return out
+    return link.model_copy(update=size | laws(link, start, link.length_m))
 
 
 def _moved(motion: Signal | None, by: float) -> Signal | None:

@@ -71,7 +71,7 @@ def energy_error(energies: np.ndarray, work: np.ndarray, jumps: Any = 0.0) -> fl
 
 def limit_event(system: System, joint: int, t: float, position: np.ndarray) -> dict[str, Any]:
     """What stopped joint (from 0) at t, with the joints at `position` (N,)."""
-    robot, (low, high) = system.robot, system.limits[max(joint, 0)]
+    robot, (low, high) = system.robot, system.limits[joint]
     kind, own, travel = robot.links[joint].joint.type, robot.links[joint].joint.limits, robot.travel(joint)
     bound = low if abs(position[joint] - low) < abs(position[joint] - high) else high
     if abs(position[joint] - bound) > 1e-6 * max(1.0, abs(bound)):

@@ -257,6 +257,16 @@ def test_the_end_of_a_link_ends_the_run_with_a_word(method, kind, case):
     assert all(np.isfinite(run[name]).all() for name in run) and run.meta["energy_error"] < 1e-5
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_a_joint_that_is_beyond_its_limit_only_within_a_step_is_caught_at_an_output(method):
+    """x = 0.1 sin 2 pi t is beyond 0.0999 m from 0.2429 to 0.2571 s, and steps of a rigid cart are longer than that."""
+    sys = cart(2.0, limits=[-0.2, 0.0999])
+    run = fx.inverse(sys, [0.0, 0.25, 1.0], signal.harmonic(0.1, 1.0, -np.pi / 2), method=method, rtol=1e-3)
+    assert not run.complete and "joint 1 left its limits" in run.meta["events"][0]["text"]
+    assert run.t[-1] == pytest.approx(np.arcsin(0.999) / (2 * np.pi), rel=1e-6)
+    assert run["joint/1/position"][-1] == pytest.approx(0.0999, rel=1e-6)
+
+
 def test_a_joint_that_stays_inside_its_limits_does_not_end_the_run():
     run = fx.simulate(cart(2.0, limits=[-0.05, 0.1]), np.linspace(0, 0.63, 64), fx.Drive.force(signal.constant(1.0)))
     assert run.complete and run.meta["events"] == [] and len(run) == 64
