@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from . import loop, nodal
+from . import exponential, loop, nodal
+from .basis import basis
 from .chain import Work
-from .choice import choose, longest_step
+from .choice import choose, longest_step, quickest
 from .drive import Drive
 from .errors import FlexuraError, InputError
 from .kernel import accelerate
@@ -20,7 +21,7 @@ from .run import Run
 from .signal import Signal
 from .system import System
 
-_METHODS = {"explicit": loop.EXPLICIT, "implicit": loop.IMPLICIT}
+_METHODS = {"explicit": loop.EXPLICIT, "implicit": loop.IMPLICIT, "exponential": exponential.EXPONENTIAL}
 _STEPS_A_CALL = 400  # between two looks at the progress bar and the keyboard
 
 
@@ -39,7 +40,8 @@ def simulate(
 
     `drive`: a Drive (compiled), or a function (t) -> (N,) or (t, position, velocity, tip_deflection) -> (N,) of forces and
     torques [N or N m] (slower, by scipy). `q0`, `qd0` (n,): state at the start, by default `system.start()` at
-    rest. `rtol`: largest local error relative to the largest value so far. `method`: "explicit", "implicit" or "auto".
+    rest. `rtol`: largest local error relative to the largest value so far. `method`: "explicit", "implicit", "exponential" or
+    "auto" (`choice.py`).
     `progress` is called with the finished fraction. A joint that reaches a limit of the robot file or the end of its link ends
     the run: the Run holds the states before it and, last, the one at that instant, an event says so and `meta["complete"]` is
     false. A Ctrl-C ends it too. `meta["energy_error"]` is the largest |E - E(0) - work + loss| relative to the largest energy,
@@ -49,7 +51,8 @@ def simulate(
     if not 1e-13 <= rtol <= 0.1:
         raise InputError("expected a relative tolerance between 1e-13 and 0.1", key="rtol", value=rtol)
     if method not in ("auto", *_METHODS):
-        raise InputError('expected "auto", "explicit" or "implicit"', key="method", value=method)
+        names = " or ".join(f'"{name}"' for name in ("auto", *_METHODS))
+        raise InputError(f"expected {names}", key="method", value=method)
     q, qd = _state(system, "q0", q0, system.start()), _state(system, "qd0", qd0, np.zeros(system.n))
     qd[system.joint_rows[system.chain.locked.astype(bool)]] = 0.0
     drive = Drive.none(len(system.robot.links)) if drive is None else drive
@@ -65,12 +68,13 @@ def simulate(
     if system.robot.nodal:
         return nodal.simulate(simulate, system, t, drive, q, qd, rtol, method, progress)
     state = np.concatenate([system.to_solver @ q, system.to_solver @ qd, [0.0, 0.0]])
-    chosen = choose(system, t[-1] - t[0], rtol) if method == "auto" else _METHODS[method]
+    chosen = quickest(system, t[-1] - t[0], rtol) if method == "auto" else _METHODS[method]
     if isinstance(drive, Drive):
         t, states, work, meta = _compiled(system, t, drive, state, rtol, chosen, progress)
     else:
+        chosen = choose(system, t[-1] - t[0], rtol) if method in ("auto", "exponential") else chosen
         t, states, work, meta = _python(system, t, drive, state, rtol, chosen, progress)
-    meta |= {"rtol": rtol, "method": "explicit" if chosen == loop.EXPLICIT else "implicit"}
+    meta |= {"rtol": rtol, "method": next(name for name, number in _METHODS.items() if number == chosen)}
     return record(system, t, states, work, _applied(system, t, states, drive), meta)
 
 
@@ -117,11 +121,19 @@ def _compiled(
     m.s[loop.LONGEST], m.s[loop.H] = longest, min(0.02 * longest, (t[-1] - t[0]) * 1e-4)
     events: list[dict[str, Any]] = []
     complete = len(t) == 1
-    loop.advance(c, w, inputs, m, method, rtol, t, out, 0)  # no step: compile before the clock starts
+    b, p = basis(n), exponential.past(n)
+
+    def advance(steps: int) -> None:
+        if method == exponential.EXPONENTIAL:
+            exponential.advance(c, w, inputs, m, b, p, rtol, t, out, steps)
+        else:
+            loop.advance(c, w, inputs, m, method, rtol, t, out, steps)
+
+    advance(0)  # no step: compile before the clock starts
     begun = time.perf_counter()
     try:
         while not complete:
-            loop.advance(c, w, inputs, m, method, rtol, t, out, _STEPS_A_CALL)
+            advance(_STEPS_A_CALL)
             status = int(m.s[loop.STATUS])
             if progress is not None:
                 progress((m.s[loop.T] - t[0]) / (t[-1] - t[0]))

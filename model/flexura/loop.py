@@ -340,7 +340,7 @@ def _shortest(c: Chain, z: np.ndarray) -> float:
     return least
 
 
-@compiled
+@inlined
 def outside(c: Chain, d: Inputs, z: np.ndarray) -> int:
     """The first joint beyond its limits, or a slider that has run into the sleeve of the link it rides on; -1: none."""
     for i in range(c.kind.shape[0]):
