@@ -15,6 +15,7 @@ from .declaration import BAUD_BIT_S, PINS
 from .simulator import CLOCK_HZ, ROLES, Simulator
 
 LABEL = "emulated ATmega2560"
+WINDOW_S = 250e-6
 _OUTPUTS = {  # pin, role for the plant, level without the firmware
     "motor_forward": ("forward", False),
     "motor_reverse": ("reverse", False),
@@ -61,12 +62,13 @@ class EmulatedBoard:
 
     emulated = True
 
-    def __init__(self, elf: Path, plant: Plant, window_s: float = 250e-6, slice_cycles: int = 1000) -> None:
+    def __init__(self, elf: Path, plant: Plant, window_s: float | None = None, slice_cycles: int = 1000) -> None:
+        """`window_s`: None for the plant's own `window_s`, or 250 us where it has none."""
         self.label = LABEL
         self.plant = plant
         self.simulator = Simulator(elf, BAUD_BIT_S, slice_cycles)
         self.outputs, self.sensors = Outputs(), Sensors()
-        self._window = round(window_s * CLOCK_HZ)
+        self._window = round((window_s or getattr(plant, "window_s", WINDOW_S)) * CLOCK_HZ)
         self._until = 0
         self.lines = {
             name: self.simulator.line(PINS[name].port, PINS[name].bit, ROLES[role], rest=rest)
