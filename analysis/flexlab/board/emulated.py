@@ -68,7 +68,7 @@ class EmulatedBoard:
         self.plant = plant
         self.simulator = Simulator(elf, BAUD_BIT_S, slice_cycles)
         self.outputs, self.sensors = Outputs(), Sensors()
-        self._window = round((window_s or getattr(plant, "window_s", WINDOW_S)) * CLOCK_HZ)
+        self._window = round(CLOCK_HZ * (getattr(plant, "window_s", WINDOW_S) if window_s is None else window_s))
         self._until = 0
         self.lines = {
             name: self.simulator.line(PINS[name].port, PINS[name].bit, ROLES[role], rest=rest)
@@ -78,7 +78,7 @@ class EmulatedBoard:
         self._swapped = {1: False, 2: False}
         for number in self._swapped:
             self.wire_encoder(number)
-        self._volts: tuple[float, float] = (-1.0, -1.0)
+        self._volts = [-1.0, -1.0]
         self._switches: tuple[bool, ...] | None = None
 
     # ---- a board
@@ -111,9 +111,9 @@ class EmulatedBoard:
         simulator = self.simulator
         window = simulator.window
         window.encoder[0], window.encoder[1] = sensors.encoder_1, sensors.encoder_2
-        if self._volts != (volts := (sensors.flex_V, sensors.supply_V)):
-            self._volts = volts
-            for channel, value in enumerate(volts):
+        for channel, value in enumerate((sensors.flex_V, sensors.supply_V)):
+            if self._volts[channel] != value:
+                self._volts[channel] = value
                 simulator.adc(channel, round(1000 * min(max(value, 0.0), 5.0)))
         if self._switches != (switches := (sensors.limit_low, sensors.limit_high, sensors.emergency_stop)):
             self._switches = switches
