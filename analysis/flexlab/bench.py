@@ -74,7 +74,7 @@ def board_rows() -> list[tuple[str, str, float]]:
 
     elf, rig = build(), load_rig(RIG)
     found, most = load.measure(elf, rig), load.measure(elf, rig, every_term=True)
-    fast, alone = max((load.experiment(elf, rig) for _ in range(3)), key=lambda both: both[0] / both[1])
+    fast, alone = sorted((load.experiment(elf, rig) for _ in range(3)), key=lambda both: both[0] / both[1])[1]
     period, longest, every = CLOCK_HZ / 1000, found.control_longest, most.control_longest
     jitter = max(found.period_most - period, period - found.period_least)
 

@@ -22,7 +22,7 @@ from flexura.errors import FlexuraError
 
 ELEMENTS = 3
 AXIAL_RATIO = 1e4  # EA L^2 / EI
-TOLERANCE = 1e-3  # of Newton's residual; what it leaves in a free vibration is 6 um
+TOLERANCE = 3e-4  # of Newton's residual; at 1e-2 a free vibration no longer decays as it should
 FOREVER_S = 1e7
 
 
