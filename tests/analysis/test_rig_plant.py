@@ -373,6 +373,22 @@ def test_a_value_that_cannot_be_is_refused_with_its_key():
         rig_plant(BENCH, carriage__backlash_m=-1.0)
 
 
+@pytest.mark.parametrize(
+    "table, change, key",
+    [
+        ("motor", {"no_load_current_A": 7.5}, "motor.no_load_current_A"),
+        ("motor", {"stall_torque_N_m": 0.8}, "motor.stall_torque_N_m"),
+        ("flex", {"length_m": 0.299}, "emulated.flex.from_m"),
+    ],
+)
+def test_data_that_contradict_each_other_are_refused(table, change, key):
+    part = getattr(BENCH.rig, table).model_copy(update=change)
+    bench = dataclasses.replace(BENCH, rig=BENCH.rig.model_copy(update={table: part}))
+    with pytest.raises(InputError) as caught:
+        rig_plant(bench)
+    assert caught.value.key == key and caught.value.value is not None
+
+
 def test_a_rig_file_without_the_table_has_no_plant():
     bench = dataclasses.replace(BENCH, rig=BENCH.rig.model_copy(update={"emulated": None}))
     with pytest.raises(InputError, match="emulated"):

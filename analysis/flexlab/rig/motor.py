@@ -17,6 +17,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from flexura.errors import InputError
+
 from .description import Bench, Rig
 from .emulation import EmulatedMotor
 
@@ -37,10 +39,17 @@ class MotorData:
 
 
 def motor_data(rig: Rig, more: EmulatedMotor) -> MotorData:
-    """From the data sheet's no-load and stall points."""
+    """From the data sheet's no-load and stall points. Raises InputError where no motor has both."""
     motor = rig.motor
+    if motor.no_load_current_A >= motor.stall_current_A:
+        expected = f"expected less than the current at rest, {motor.stall_current_A:g} A"
+        raise InputError(expected, key="motor.no_load_current_A", value=motor.no_load_current_A)
     resistance = motor.rated_voltage_V / motor.stall_current_A
     constant = (motor.rated_voltage_V - resistance * motor.no_load_current_A) / (motor.no_load_speed_rpm * 2 * math.pi / 60)
+    most = constant * (motor.stall_current_A - motor.no_load_current_A)
+    if motor.stall_torque_N_m > most:
+        expected = f"expected at most {most:.3g} N m, what speed and currents allow without any loss in the gear"
+        raise InputError(expected, key="motor.stall_torque_N_m", value=motor.stall_torque_N_m)
     return MotorData(
         resistance,
         more.inductance_H,
@@ -48,7 +57,7 @@ def motor_data(rig: Rig, more: EmulatedMotor) -> MotorData:
         more.rotor_inertia_kg_m2 * motor.gear_ratio**2,
         constant * motor.no_load_current_A,
         constant * more.starts_at_V / resistance,
-        motor.stall_torque_N_m / (constant * (motor.stall_current_A - motor.no_load_current_A)),
+        motor.stall_torque_N_m / most,
     )
 
 

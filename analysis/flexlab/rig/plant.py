@@ -99,7 +99,10 @@ class RigPlant:
     ) -> None:  # fmt: skip
         rig, settings = bench.rig, configuration(bench)
         robot = true_robot(bench.robot, truth)
-        first = emulated.flex.from_m
+        first, strip = emulated.flex.from_m, robot.links[1]
+        if first + rig.flex.length_m > strip.length_m:
+            expected = f"expected a sensor of {rig.flex.length_m:g} m that ends on the strip of {strip.length_m:g} m"
+            raise InputError(expected, key="emulated.flex.from_m", value=first, file=bench.file)
         self.mechanics = Mechanics(robot, start, step_s, elements, sensor_m=(first, first + rig.flex.length_m))
         screw, carriage = emulated.screw, emulated.carriage
         self.motor = Motor(
