@@ -62,7 +62,7 @@ class EmulatedFlex(Table):
     nonlinearity_1_rad: float = Field(
         ge=-10, le=10, description="by what part a radian of bend changes the ohms for a radian, between -10 and 10"
     )
-    noise_V: float = from_zero("volts", "the standard deviation of the noise at A0, white at 2 kHz", 1)
+    noise_V: float = from_zero("volts", "the standard deviation of the noise at A0, new in every step", 1)
     drift_V: float = from_zero("volts", "the standard deviation of the drift at A0", 1)
     drift_s: float = above("seconds", "the time in which the drift forgets", 1e5)
 

@@ -20,6 +20,7 @@ import numpy as np
 import flexura as fx
 from flexura.errors import FlexuraError
 
+STEP_S = 5e-4
 ELEMENTS = 3
 AXIAL_RATIO = 1e4  # EA L^2 / EI
 TOLERANCE = 3e-4  # of Newton's residual; at 1e-2 a free vibration no longer decays as it should
@@ -34,7 +35,7 @@ class Mechanics:
     """
 
     def __init__(
-        self, robot: fx.Robot, position: tuple[float, float] = (0.0, 0.0), step_s: float = 5e-4, elements: int = ELEMENTS,
+        self, robot: fx.Robot, position: tuple[float, float] = (0.0, 0.0), step_s: float = STEP_S, elements: int = ELEMENTS,
         sensor_m: tuple[float, float] = (0.0, 0.0),
     ) -> None:  # fmt: skip
         import exudyn as exu
