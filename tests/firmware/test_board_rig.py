@@ -123,6 +123,10 @@ def test_a_motion_beyond_the_carriage(bench):
         ({"board__kp_1_V_mm": 1.0}, "board.kp_1_V_mm", 1.0, "did you mean kp_1_V_m?"),
         ({"board__kp_1_V_m": 1e9}, "board.kp_1_V_m", 1e9, "between -100000 and 100000"),
         ({"board__supply_V": 12.0}, "board.supply_V", 12.0, "follows from the other tables"),
+        ({"emulated__flex__nois_V": 0.1}, "emulated.flex.nois_V", 0.1, "did you mean noise_V?"),
+        ({"emulated__carriage__backlash_m": 0.15}, "emulated.carriage.backlash_m", 0.15, "in metres, from 0 to 0.01"),
+        ({"emulated__truth__stiffness": 0.0}, "emulated.truth.stiffness", 0.0, "above 0 and at most 10"),
+        ({"emulated__ranges__payload": [2.0, 1.0]}, "emulated.ranges.payload", [2.0, 1.0], "the lower one first"),
         ({"robot": str(ROOT / "model/robots/two-link-arm.toml")}, "robot", None, "a robot of type IV"),
     ],
 )

@@ -2,5 +2,6 @@
 
 from .checks import Check, examine
 from .description import Bench, Rig, calibration, configuration, load
+from .emulation import Truth, random_truth
 
-__all__ = ["Bench", "Check", "Rig", "calibration", "configuration", "examine", "load"]
+__all__ = ["Bench", "Check", "Rig", "Truth", "calibration", "configuration", "examine", "load", "random_truth"]

@@ -11,9 +11,8 @@ import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 import flexura as fx
 from flexura.errors import InputError, WrongValue
@@ -21,6 +20,8 @@ from flexura.explain import explain
 from flexura.files import read_toml
 
 from ..board.declaration import CONFIG
+from .emulation import Emulated
+from .table import Table, above
 
 DERIVED = (  # settings of the board that follow from the other tables
     "motor_counts_per_m", "stepper_steps_per_rad", "stepper_counts_per_rad", "supply_V", "supply_divider",
@@ -29,29 +30,21 @@ DERIVED = (  # settings of the board that follow from the other tables
 )  # fmt: skip
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
-
-
-def _above(unit: str, what: str, most: float) -> Any:
-    return Field(gt=0, le=most, description=f"{what} in {unit}, above 0 and at most {most:g}")
-
-
-class Motor(_Table):
+class Motor(Table):
     """The geared DC motor of joint 1 with the encoder on its own shaft; torque and speed are the output shaft's."""
 
-    rated_voltage_V: float = _above("volts", "the voltage of the motor's data", 60)
-    no_load_speed_rpm: float = _above("turns a minute", "the output shaft's speed without load at the rated voltage", 2e4)
-    no_load_current_A: float = _above("amperes", "the current without load", 50)
-    stall_torque_N_m: float = _above("newton metres", "the output shaft's torque at rest at the rated voltage", 100)
-    stall_current_A: float = _above("amperes", "the current at rest at the rated voltage", 200)
+    rated_voltage_V: float = above("volts", "the voltage of the motor's data", 60)
+    no_load_speed_rpm: float = above("turns a minute", "the output shaft's speed without load at the rated voltage", 2e4)
+    no_load_current_A: float = above("amperes", "the current without load", 50)
+    stall_torque_N_m: float = above("newton metres", "the output shaft's torque at rest at the rated voltage", 100)
+    stall_current_A: float = above("amperes", "the current at rest at the rated voltage", 200)
     gear_ratio: float = Field(ge=1, le=1e4, description="turns of the motor for one of the output shaft, between 1 and 10000")
     encoder_pulses: int = Field(
         ge=1, le=10000, description="pulses of each encoder line in a turn of the motor, a whole number from 1 to 10000"
     )
 
 
-class Screw(_Table):
+class Screw(Table):
     """The lead screw of joint 1."""
 
     lead_m: float = Field(
@@ -60,20 +53,20 @@ class Screw(_Table):
     efficiency: float = Field(gt=0, le=1, description="force x travel / work at the screw, above 0 and at most 1")
 
 
-class Driver(_Table):
+class Driver(Table):
     """The motor's bridge and supply."""
 
-    supply_V: float = _above("volts", "the motor's supply", 30)
+    supply_V: float = above("volts", "the motor's supply", 30)
     supply_divider: float = Field(ge=1, le=10, description="motor supply / voltage at A1, between 1 and 10")
-    current_max_A: float = _above("amperes", "the current that bridge, supply and fuse give for seconds", 200)
+    current_max_A: float = above("amperes", "the current that bridge, supply and fuse give for seconds", 200)
 
 
-class Stepper(_Table):
+class Stepper(Table):
     """The stepper of joint 2, on the joint's axis, and the joint's encoder."""
 
     full_steps_per_turn: int = Field(ge=4, le=10000, description="full steps in a turn, a whole number from 4 to 10000")
     microsteps: int = Field(ge=1, le=256, description="microsteps in a full step: 1, 2, 4, ... 256")
-    holding_torque_N_m: float = _above("newton metres", "the holding torque", 100)
+    holding_torque_N_m: float = above("newton metres", "the holding torque", 100)
     encoder_pulses: int = Field(
         ge=1, le=100000, description="pulses of each encoder line in a turn of the joint, a whole number from 1 to 100000"
     )
@@ -90,7 +83,7 @@ class Stepper(_Table):
         return self
 
 
-class Calibration(_Table):
+class Calibration(Table):
     """A measured calibration: tip deflection = c1 x + c2 x^2 + c3 x^3 with x = reading - zero, readings as a fraction of 5 V."""
 
     zero: float = Field(gt=0, lt=1, description="the straight strip's reading, a fraction of full scale between 0 and 1")
@@ -99,17 +92,17 @@ class Calibration(_Table):
     c3_m: float = Field(0.0, description="metres for x^3, a finite number")
 
 
-class Flex(_Table):
+class Flex(Table):
     """The flex sensor in its divider: resistance straight_ohm + ohm_per_rad times the bend over its length."""
 
-    length_m: float = _above("metres", "the sensor's active length from the strip's root on", 1)
-    straight_ohm: float = _above("ohms", "the resistance on the straight strip", 1e7)
+    length_m: float = above("metres", "the sensor's active length from the strip's root on", 1)
+    straight_ohm: float = above("ohms", "the resistance on the straight strip", 1e7)
     ohm_per_rad: float = Field(gt=0, le=1e7, description="ohms for a radian of bend over its length, above 0 and at most 1e7")
-    divider_ohm: float = _above("ohms", "the resistor from A0 to ground", 1e7)
+    divider_ohm: float = above("ohms", "the resistor from A0 to ground", 1e7)
     calibration: Calibration | None = Field(None, description="a table { zero, c1_m, c2_m, c3_m }, measured")
 
 
-class Rig(_Table):
+class Rig(Table):
     """The bench of one robot. Frozen; SI units."""
 
     name: str = Field("", max_length=200, description="the rig's name, a text of at most 200 characters")
@@ -120,6 +113,7 @@ class Rig(_Table):
     driver: Driver = Field(description="a table [driver]")
     stepper: Stepper = Field(description="a table [stepper]")
     flex: Flex = Field(description="a table [flex]")
+    emulated: Emulated | None = Field(None, description="a table [emulated], for the emulated rig")
     board: dict[str, float] = Field(
         default_factory=dict, description="a table of the board's settings, numbers by their names in the protocol"
     )
@@ -148,6 +142,13 @@ class Bench:
     robot: fx.Robot
     manoeuvre: fx.Manoeuvre
     limits: tuple[tuple[float, float], tuple[float, float]]
+
+    @property
+    def emulated(self) -> Emulated:
+        """The rig file's table [emulated]; InputError where it has none."""
+        if self.rig.emulated is None:
+            raise InputError("missing: the emulated rig is described in a table [emulated]", key="emulated", file=self.file)
+        return self.rig.emulated
 
 
 def load(path: str | os.PathLike[str]) -> Bench:

@@ -1,0 +1,23 @@
+"""What all tables of a rig file have in common."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class Table(BaseModel):
+    """A frozen table without unknown keys."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+
+def above(unit: str, what: str, most: float) -> Any:
+    """A number above 0."""
+    return Field(gt=0, le=most, description=f"{what} in {unit}, above 0 and at most {most:g}")
+
+
+def from_zero(unit: str, what: str, most: float) -> Any:
+    """A number from 0 on."""
+    return Field(ge=0, le=most, description=f"{what} in {unit}, from 0 to {most:g}")
