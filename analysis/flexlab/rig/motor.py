@@ -18,7 +18,7 @@ import math
 from dataclasses import dataclass
 
 from .description import Bench, Rig
-from .emulation import EmulatedMotor
+from .emulation import Emulated, EmulatedMotor
 
 SUBSTEP_S = 1e-4  # far below L/R and the mechanical time constant
 
@@ -121,8 +121,12 @@ def joint_line(bench: Bench, friction: float = 1.0) -> JointLine:
 
     With r = lead / (2 pi): force K / (R r), back-EMF K^2 / (R r^2), mass J / r^2.
     """
-    more = bench.emulated
-    data, r = motor_data(bench.rig, more.motor), bench.rig.screw.lead_m / (2 * math.pi)
+    return line(bench.rig, bench.emulated, friction)
+
+
+def line(rig: Rig, more: Emulated, friction: float = 1.0) -> JointLine:
+    """As `joint_line`, for a rig file's tables without the files that they name."""
+    data, r = motor_data(rig, more.motor), rig.screw.lead_m / (2 * math.pi)
     coulomb = (data.friction_N_m + more.screw.coulomb_friction_N_m) / r + more.carriage.coulomb_friction_N
     viscous = more.screw.viscous_friction_N_m_s / r**2 + more.carriage.viscous_friction_N_s_m
     return JointLine(
