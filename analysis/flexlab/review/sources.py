@@ -67,6 +67,11 @@ def sources(runs: Sequence[Run]) -> list[Source]:
     return found
 
 
+def against_experiment(shown: Sequence[Source]) -> bool:
+    """Whether these are a calculation and an experiment, in this order."""
+    return len(shown) == 2 and [naming.kind(s.run) == "experiment" for s in shown] == [False, True]
+
+
 def order(names: list[str], units: dict[str, str]) -> dict[str, int]:
     """Which tone each channel gets: its place, from 0, among those that share a plot with it."""
     fixed = {"energy/strain": 1, "energy/potential": 2, "energy/loss": 1, "tip/y": 1, "tip_distance": 2}
