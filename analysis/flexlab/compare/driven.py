@@ -20,6 +20,7 @@ import flexura as fx
 from flexura import signal
 from flexura.errors import InputError
 
+from ..naming import called
 from ..rig.description import Rig
 from ..rig.emulation import Emulated
 from ..rig.motor import JointLine, line
@@ -79,9 +80,7 @@ def simulate(
         run = dataclasses.replace(run, t=run.t[kept], channels={n: v[kept] for n, v in run.channels.items()}, states=None)
     run.meta.pop("drive", None)  # the experiment's own samples once more
     run.meta["driven_by"] = by
-    for key in ("experiment", "label"):
-        if key in experiment.meta:
-            run.meta[f"of_{key}"] = experiment.meta[key]
+    run.meta["simulates"] = " ".join(filter(None, (experiment.meta.get("experiment"), called(experiment))))
     return run
 
 

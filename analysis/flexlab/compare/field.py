@@ -17,6 +17,7 @@ import numpy as np
 
 import flexura as fx
 from flexura.drive import JointDrive
+from flexura.errors import FlexuraError
 from flexura.signal import Signal, table
 
 from ..rig.stepper import MagneticSpring
@@ -36,37 +37,54 @@ def held_by_field(
     rtol: float,
     progress: Callable[[float], None] | None = None,
 ) -> fx.Run:
-    """Simulate with the force on joint 1 [N] and the pulses [rad] given to joint 2; the Run's meta has `relaxation_rounds`."""
+    """Simulate with the force on joint 1 [N] and the pulses [rad] given to joint 2; the Run's meta has `relaxation_rounds`, or None
+    where the torque had to be a Python function."""
     system, q0 = start
     report = progress or (lambda fraction: None)
     parts = max(1, int(np.ceil(np.median(np.diff(t)) / FINE_S - 1e-6)))
     fine = np.interp(np.arange((len(t) - 1) * parts + 1) / parts, np.arange(len(t)), t)
     asked = np.array([pulses(at)[0] for at in fine])
-    k, extra, assumed = spring.on_N_m, None, np.zeros(len(fine))
+    k, extra, assumed = spring.on_N_m, None, np.zeros(len(fine))  # [N m/rad], [N m]
     for n in range(1, ROUNDS + 1):
         held = JointDrive(force=extra, motion=pulses, kp=k)
-        run = fx.simulate(system, fine, fx.Drive((JointDrive(force=force), held)), q0=q0, rtol=rtol)
-        theta = run["joint/2/position"]
-        e = asked[: len(run)] - theta
-        torque = np.array([spring.torque(r, at, on=True) for r, at in zip(asked, theta, strict=False)])
-        left = np.abs(k * e + assumed[: len(run)] - torque).max() / spring.holding_N_m
-        report(1 - 1 / (n + 1))
-        if left < STILL or len(run) < len(fine):  # a joint at its limit ends the run: what comes after is not asked for
-            run = thinned(run, parts)
+        try:
+            run = fx.simulate(system, fine, fx.Drive((JointDrive(force=force), held)), q0=q0, rtol=rtol)
+        except FlexuraError:  # what was assumed has grown beyond all bounds
             break
-        k = float(np.clip(e @ torque / (e @ e), 0.05 * spring.on_N_m, spring.on_N_m)) if e @ e > 0 else k
-        assumed = torque - k * e
+        m = len(run) if run.complete else len(run) - 1  # the last row of a run that a limit ended is at that instant
+        theta = run["joint/2/position"][:m]
+        e, torque = asked[:m] - theta, np.array([spring.torque(r, at, on=True) for r, at in zip(asked, theta, strict=False)])
+        left = np.abs(k * e + assumed[:m] - torque).max(initial=0.0) / spring.holding_N_m
+        report(1 - 1 / (n + 1))
+        if left < STILL:
+            run.meta["relaxation_rounds"] = n
+            return _thinned(run, parts)
+        k = float(np.clip(e @ torque / (e @ e), 0.05 * spring.on_N_m, spring.on_N_m))
+        assumed[:m] = torque - k * e
         extra = table(fine, assumed)
-    else:
+    return _by_function(start, t, force, pulses, spring, rtol, progress)
 
-        def drive(at: float, position: np.ndarray, velocity: np.ndarray, tip: float) -> list[float]:
-            return [force(at)[0], spring.torque(pulses(at)[0], float(position[1]), on=True)]
 
-        run = fx.simulate(system, t, drive, q0=q0, rtol=rtol, progress=progress)
-    run.meta["relaxation_rounds"] = n
+def _by_function(
+    start: Start,
+    t: np.ndarray,
+    force: Signal,
+    pulses: Signal,
+    spring: MagneticSpring,
+    rtol: float,
+    progress: Callable[[float], None] | None,
+) -> fx.Run:
+    """The same, the torque evaluated at every instant: slower, and without a limit to where the rotor may go."""
+
+    def drive(at: float, position: np.ndarray, velocity: np.ndarray, tip: float) -> list[float]:
+        return [force(at)[0], spring.torque(pulses(at)[0], float(position[1]), on=True)]
+
+    system, q0 = start
+    run = fx.simulate(system, t, drive, q0=q0, rtol=rtol, progress=progress)
+    run.meta["relaxation_rounds"] = None
     return run
 
 
-def thinned(run: fx.Run, parts: int) -> fx.Run:
+def _thinned(run: fx.Run, parts: int) -> fx.Run:
     """Every parts-th row of a run."""
     return dataclasses.replace(run, t=run.t[::parts], channels={n: v[::parts] for n, v in run.channels.items()}, states=None)

@@ -12,6 +12,7 @@ from ..naming import called, emulated
 from .measures import Comparison, Difference
 
 BLUE, GREEN, PINK, INK = "#1f6fc4", "#1d9a50", "#c43a80", "#30343b"  # simulation, experiment, deviation, as in the review
+RATIO = [2.3, 1]
 STYLE = {
     "font.family": "DejaVu Sans", "font.size": 9, "axes.edgecolor": "#9aa0a8", "axes.labelcolor": INK, "text.color": INK,
     "xtick.color": INK, "ytick.color": INK, "axes.spines.top": False, "axes.spines.right": False, "axes.linewidth": 0.8,
@@ -27,9 +28,8 @@ def figure(c: Comparison, entry: Difference) -> Any:
 
     with matplotlib.rc_context(STYLE):
         drawing = Figure(figsize=(7.4, 3.9), layout="constrained")
-        upper, lower = drawing.subplots(2, 1, sharex=True, height_ratios=[2.4, 1])
-        draw(c, entry, upper, lower)
-        drawing.suptitle(heading(c, entry), x=0.01, ha="left", fontsize=10, fontweight="bold")
+        draw(c, entry, *drawing.subplots(2, 1, height_ratios=RATIO))
+        drawing.align_ylabels()
     return drawing
 
 
@@ -51,7 +51,11 @@ def draw(c: Comparison, entry: Difference, upper: Any, lower: Any) -> None:
     upper.set_ylabel(f"{name} [{unit}]")
     lower.set_ylabel(f"difference\n[{unit}]")
     lower.set_xlabel("time [s]")
-    upper.margins(x=0.0)
+    ends = min(first.t[0], second.t[0]), max(first.t[-1], second.t[-1])
+    for axes in (upper, lower):
+        axes.set_xlim(*ends)
+    upper.tick_params(labelbottom=False)
+    upper.set_title(heading(c, entry), loc="left", fontsize=9.5, fontweight="bold")
     upper.legend(frameon=False, loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2, borderaxespad=0.2, handlelength=1.6)
 
 
@@ -64,7 +68,7 @@ def symbol(entry: Difference) -> str:
 
 def heading(c: Comparison, entry: Difference) -> str:
     text = entry.quantity[0].upper() + entry.quantity[1:]
-    return text + (f", {c.law} experiment" if c.law else "") + (" (emulated)" if is_emulated(c) else "")
+    return text + (f", {c.law}" if c.law else "") + (" (emulated)" if is_emulated(c) else "")
 
 
 def is_emulated(c: Comparison) -> bool:
@@ -78,10 +82,10 @@ def together(c: Comparison, size: tuple[float, float] = (8.3, 10.2)) -> Any:
 
     with matplotlib.rc_context(STYLE):
         drawing = Figure(figsize=size, layout="constrained")
-        for part, entry in zip(np.atleast_1d(drawing.subfigures(len(c.differences), 1)), c.differences, strict=True):
-            upper, lower = part.subplots(2, 1, sharex=True, height_ratios=[2.2, 1])
-            draw(c, entry, upper, lower)
-            part.suptitle(heading(c, entry), x=0.01, ha="left", fontsize=9.5, fontweight="bold")
+        axes = drawing.subplots(2 * len(c.differences), 1, height_ratios=RATIO * len(c.differences))
+        for k, entry in enumerate(c.differences):
+            draw(c, entry, *axes[2 * k : 2 * k + 2])
+        drawing.align_ylabels()
     return drawing
 
 

@@ -17,6 +17,13 @@ from .measures import COVERED, Comparison
 HEADS = ("quantity", "peak", "largest deviation", "at [s]", "of the peak", "RMS", "dissertation")
 
 
+DRIVEN = {
+    "commanded": "driven by the voltage and the pulses that were commanded",
+    "reference": "follows the set-points exactly, as the dissertation's own",
+    "measured": "follows the encoders",
+}
+
+
 def title(c: Comparison) -> str:
     name = c.simulation.meta.get("robot", {}).get("name") or "robot"
     return f"{name}: {called(c.simulation)} against {called(c.experiment)}" + (f", {c.law}" if c.law else "")
@@ -43,9 +50,9 @@ def rows(c: Comparison) -> list[tuple[str, ...]]:
 
 def notes(c: Comparison) -> list[str]:
     """What a reader must know beside the numbers."""
-    lines = [f"{called(run)}: {EMULATED}" for run in (c.simulation, c.experiment) if emulated(run)]
+    lines = [f"{called(run)}: {EMULATED.removeprefix('emulated: ')}" for run in (c.simulation, c.experiment) if emulated(run)]
     if way := c.simulation.meta.get("driven_by"):
-        lines.append(f"simulation driven by what was {'told to follow' if way == 'reference' else way} ({way})")
+        lines.append(f"simulation {DRIVEN[way]} (--by {way})")
     lines.append("deviation: second minus first, of the first run's peak; the dissertation's figures are of its own rig")
     if c.responses:
         lines.append(

@@ -23,6 +23,7 @@ th:first-child, td:first-child { text-align: left; } table.about td { text-align
 figure { margin: 1.2rem 0; } figure svg { width: 100%; height: auto; } figcaption { font-size: .86rem; color: #5a6069; }
 ul { padding-left: 1.2rem; font-size: .9rem; } @media print { figure, table { break-inside: avoid; } }
 """.strip()
+ROWS = 36  # of the metadata on a page; the rest is in the files
 HIDDEN = {"robot", "rig", "events", "phases", "truth", "drive", "firmware"}
 
 
@@ -120,13 +121,13 @@ def _front(c: Comparison) -> Any:
             bbox={"facecolor": "#fff1d6", "edgecolor": "#f0a020", "pad": 5},
         )  # fmt: skip
         y -= 0.045
-    y = _lay(page, y, [HEADS, *rows(c)], [0.06, 0.42, 0.63, 0.70, 0.80, 0.89, 0.985], 8)
+    y = _lay(page, y, [HEADS, *rows(c)], [0.06, 0.38, 0.58, 0.655, 0.755, 0.87, 0.985], 8)
     for note in notes(c):
         for k, line in enumerate(wrap(note, 118)):
             page.text(0.06, y, ("• " if k == 0 else "   ") + line, fontsize=8, va="top")
             y -= 0.0155
     y -= 0.02
-    cells = [("", called(c.simulation), called(c.experiment)), *about(c)]
+    cells = [("", called(c.simulation), called(c.experiment)), *about(c)[:ROWS]]
     _lay(page, y, [tuple("\n".join(wrap(cell, 44)[:3]) for cell in row) for row in cells], [0.06, 0.28, 0.64], 7.5, left=True)
     return page
 
@@ -137,7 +138,7 @@ def _lay(page: Any, y: float, cells: list[tuple[str, ...]], at: list[float], siz
         height = 0.0185 * size / 8 * max(1, *(cell.count("\n") + 1 for cell in row)) * (0.8 if "\n" in "".join(row) else 1)
         for k, cell in enumerate(row):
             side = "left" if left or k == 0 else "right"
-            page.text(at[k], y, cell, fontsize=size, va="top", ha=side, fontweight="bold" if n == 0 else "normal", linespacing=1.15)
+            page.text(at[k], y - 0.011 * size / 8, cell, fontsize=size, va="baseline", ha=side, fontweight="bold" if n == 0 else "normal", linespacing=1.15)
         y -= height
         line = page.add_artist(_rule(y + 0.004))
         line.set(linewidth=1.0 if n == 0 else 0.5, color="#9aa0a8" if n == 0 else "#e3e6ea")
