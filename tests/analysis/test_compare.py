@@ -1,4 +1,4 @@
-"""Simulation against experiment. The experiments are the Exudyn twin's (tests/experiments.py): a program that the simulation is not."""
+"""Simulation against experiment. The experiments are the Exudyn twin's (experiments.py), another program."""
 
 import io
 import json
@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from experiments import experiment
 
 import flexura as fx
+from experiments import experiment
 from flexlab.compare import field, output, report
 from flexlab.compare.driven import WAYS, simulate
 from flexlab.compare.measures import COVERED, PUBLISHED, compare, delay, ordered, response_time
@@ -50,7 +50,9 @@ def document(compared):
 
 def run(t, **channels):
     names = {name.replace("__", "/"): np.asarray(values, dtype=float) for name, values in channels.items()}
-    return Run(np.asarray(t, dtype=float), names, {n: "rad" if n.startswith("joint/2") else "m" for n in names}, {"source": "experiment"})
+    return Run(
+        np.asarray(t, dtype=float), names, {n: "rad" if n.startswith("joint/2") else "m" for n in names}, {"source": "experiment"}
+    )
 
 
 # --- the simulation of an experiment
@@ -103,7 +105,7 @@ def test_the_robot_may_be_another(forward):
 
 @pytest.mark.parametrize("pulse", [0.02, 0.2])
 def test_the_relaxed_field_is_the_sine(pulse):
-    """Against the same torque as a Python function in the native solver; 0.2 rad at once is beyond the field's hold: steps are lost."""
+    """Against the same torque as a Python function in the native solver; 0.2 rad at once lose steps."""
     bench = load("firmware/rig.toml")
     spring = MagneticSpring(bench.rig.stepper, bench.emulated.stepper)
     robot = bench.robot.replace({"link.1.joint.viscous_friction": 1e3, "link.2.joint.viscous_friction": 2e-3})
@@ -345,7 +347,14 @@ def test_all_tables_have_the_same_cells(compared, page):
 
 def test_the_folder_has_it_all(compared, tmp_path):
     paths = output.save(compared, tmp_path, simulated=True)
-    assert {p.name for p in paths} == {"run.parquet", "comparison.json", "report.html", "report.pdf", "comparison.png", "review.rrd"}
+    assert {p.name for p in paths} == {
+        "run.parquet",
+        "comparison.json",
+        "report.html",
+        "report.pdf",
+        "comparison.png",
+        "review.rrd",
+    }
     stored = json.loads((tmp_path / "comparison.json").read_text())
     assert stored == json.loads(json.dumps(output.numbers(compared)))
     assert [row["published_percent"] for row in stored["deviations"]] == [4.35, 7.5, 7.5]
@@ -384,5 +393,3 @@ def test_the_review_file_says_emulated(compared, tmp_path):
     assert {"simulation", "experiment", "deviation"} <= roots
     (page,) = [p[0] for p in pages]
     assert "experiment (emulated): emulated." in page and "| joint variable 1 |" in page and "7.5 %" in page
-
-

@@ -1,4 +1,4 @@
-"""A run in other formats, read back by programs that did not write it: numpy, DuckDB, a reader by NI's description, Rerun's own."""
+"""A run in other formats, read back by programs that did not write it: numpy, DuckDB, a reader by NI's text, Rerun."""
 
 import json
 import struct
@@ -26,7 +26,7 @@ def run():
     rng, t = np.random.default_rng(7), np.arange(257) / 200
     channels = {name: rng.normal(size=len(t)) * 10.0 ** rng.integers(-12, 9, len(t)) for name in UNITS}
     for k, values in enumerate(channels.values()):
-        values[k : 40 : 11] = np.nan
+        values[k:40:11] = np.nan
         values[100] = -0.0
     meta = {
         "source": "experiment", "kind": "experiment", "emulated": True, "label": "emulated experiment", "experiment": "inverse",
@@ -100,7 +100,7 @@ def test_tdms_without_even_times_has_no_time_base(run, tmp_path):
 
 
 def tdms(data):
-    """Properties and values by object path, after NI's "TDMS File Format Internal Structure": one segment, raw data not interleaved."""
+    """Properties and values by object path, as in NI's "TDMS File Format Internal Structure": one segment, not interleaved."""
     assert data[:4] == b"TDSm"
     mask, version, _, raw_at = struct.unpack_from("<IIQQ", data, 4)
     assert version in (4712, 4713) and mask & 0b1110 == 0b1110 and not mask & (1 << 5) and not mask & (1 << 6)

@@ -18,7 +18,7 @@ def compare(
     by: Annotated[
         str | None, typer.Option(help="the simulation is driven by what was commanded (default), reference or measured")
     ] = None,
-    robot: Annotated[Path | None, typer.Option(metavar="ROBOT", help="robot file (TOML) to simulate instead of the run's own")] = None,
+    robot: Annotated[Path | None, typer.Option(metavar="ROBOT", help="robot file to simulate instead of the run's own")] = None,
     out: Annotated[Path | None, typer.Option("--out", metavar="FOLDER", help="default: comparison, in RUN's folder")] = None,
     picture: Annotated[Path | None, typer.Option(metavar="FILE.png", help="draw the review into this file")] = None,
     rtol: Annotated[float, typer.Option(help="relative tolerance of the native solver")] = 1e-6,
@@ -47,7 +47,8 @@ def compare(
         announce_compiling()
         with progress_bars("native") as report:
             try:
-                first, second = simulate(first, by or "commanded", described, rtol=rtol, progress=lambda f: report("native", f)), first
+                second, by = first, by or "commanded"
+                first = simulate(second, by, described, rtol=rtol, progress=lambda f: report("native", f))
             except fx.InputError as error:
                 raise error if error.file else error.in_file(str(run)) from None
     found = compared(first, second)

@@ -1,10 +1,10 @@
 """The simulation of an experiment: the native model, driven by what the experiment commanded, was told to follow, or measured.
 
-`commanded`: the motor's voltage as a force, with the motor's friction and inertia in the joint, and the stepper's pulses through its
-magnetic spring (`rig.motor`, `field`), with the nominal figures of the rig file: everything is predicted, and every error of the
-drives' data adds up. The nut's play is left out.
-`reference`: the joints follow their set-points exactly, as in the dissertation's own inverse comparison: what the controllers leave
-is in the deviation.
+`commanded`: the motor's voltage as a force, with the motor's friction and inertia in the joint, and the stepper's pulses through
+its magnetic spring (`rig.motor`, `field`), with the nominal figures of the rig file: everything is predicted, and every error of
+the drives' data adds up. The nut's play is left out.
+`reference`: the joints follow their set-points exactly, as in the dissertation's own inverse comparison: what the controllers
+leave is in the deviation.
 `measured`: the joints follow their encoders (smoothed): what is left is the deviation of the elastic model alone.
 """
 
@@ -68,7 +68,8 @@ def simulate(
         volts = np.sign(volts) * np.maximum(np.abs(volts) - more.driver.dead_zone_V, 0.0)
         force = _held(times, carriage.force_N_V * volts)
         at_start = known(t, experiment["joint/1/position"], "joint/1/position")[1][0], pulses(t[0])[0]
-        run = held_by_field(_started(robot, at_start), t, force, pulses, MagneticSpring(rig.stepper, more.stepper), rtol, progress)
+        spring = MagneticSpring(rig.stepper, more.stepper)
+        run = held_by_field(_started(robot, at_start), t, force, pulses, spring, rtol, progress)
     else:
         motions = [_motion(experiment, name, by) for name in NEEDS[by]]
         earlier = rest(t)
@@ -85,7 +86,7 @@ def simulate(
 
 
 def _motion(experiment: fx.Run, name: str, by: str) -> signal.Signal:
-    """The joint's motion from before the start on, where the robot was at rest: it must not start at the joint's speed, unbent."""
+    """The joint's motion from before the start on, where the robot was at rest: it must not start at speed and unbent."""
     t, y = known(experiment.t, experiment[name], name)
     earlier = rest(t)
     t, y = np.concatenate([earlier, t]), np.concatenate([np.full(len(earlier), y[0]), y])
@@ -101,7 +102,7 @@ def _started(robot: fx.Robot, joints: Sequence[float]) -> Start:
 
 
 def _held(t: np.ndarray, y: np.ndarray) -> signal.Signal:
-    """Each sample held from half way after the one before to half way before the next: no lag, whatever the board does between."""
+    """Each sample held from half way after the one before to half way before the next: no lag, whatever happens between."""
     at = np.concatenate([t[:1], (t[1:] + t[:-1]) / 2])
     changes = np.concatenate([[True], np.diff(y) != 0.0])
     return signal.piecewise(at[changes], y[changes])

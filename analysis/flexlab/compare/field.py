@@ -2,10 +2,11 @@
 
     T(e, theta) = T_h sin(N e) - T_d sin(4 N theta) = k e + [T(e, theta) - k e],    e = r - theta
 
-with r the angle of the pulses, T_h the holding and T_d the detent torque, N the pole pairs. It is no prescribed motion: N T_h = 20 N m/rad
-and the strip's 3e-3 kg m^2 make 12 Hz, too near the strip's own 5 Hz for a clamp. The bracket is a torque over time, known from the
-simulation before (waveform relaxation, Lelarasmee 1982), with the k that leaves least of it: repeated until the torque that was
-assumed is the field's. Where the field lets go of the rotor (steps are lost) that ends nowhere, and a Python function takes over.
+with r the angle of the pulses, T_h the holding and T_d the detent torque, N the pole pairs. It is no prescribed motion: N T_h =
+20 N m/rad and the strip's 3e-3 kg m^2 make 12 Hz, too near the strip's own 5 Hz for a clamp. The bracket is a torque over time,
+known from the simulation before (waveform relaxation, Lelarasmee 1982), with the k that leaves least of it: repeated until the
+torque that was assumed is the field's. Where the field lets go of the rotor (steps are lost) that ends nowhere, and a Python
+function takes over.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ ROUNDS = 40
 STILL = 5e-4  # of the holding torque: what the assumed torque may differ by from the field's
 FINE_S = 1e-3  # between two values of the bracket: the detent's period is 10 ms at 3 rad/s
 
+
 def held_by_field(
     start: Start,
     t: np.ndarray,
@@ -37,8 +39,10 @@ def held_by_field(
     rtol: float,
     progress: Callable[[float], None] | None = None,
 ) -> fx.Run:
-    """Simulate with the force on joint 1 [N] and the pulses [rad] given to joint 2; the Run's meta has `relaxation_rounds`, or None
-    where the torque had to be a Python function."""
+    """Simulate with the force on joint 1 [N] and the pulses [rad] given to joint 2.
+
+    The Run's meta has `relaxation_rounds`, None where the torque had to be a Python function.
+    """
     system, q0 = start
     report = progress or (lambda fraction: None)
     parts = max(1, int(np.ceil(np.median(np.diff(t)) / FINE_S - 1e-6)))

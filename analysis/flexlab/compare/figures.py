@@ -1,4 +1,4 @@
-"""Figures in the manner of the dissertation's Figs 4.16 to 4.21: a quantity of simulation and experiment, and their difference."""
+"""Figures in the manner of the dissertation's Figs 4.16 to 4.21: simulation and experiment as two lines, and their difference."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .measures import Comparison, Difference
 
 BLUE, GREEN, PINK, INK = "#1f6fc4", "#1d9a50", "#c43a80", "#30343b"  # simulation, experiment, deviation, as in the review
 RATIO = [2.3, 1]
-STYLE = {
+STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans", "font.size": 9, "axes.edgecolor": "#9aa0a8", "axes.labelcolor": INK, "text.color": INK,
     "xtick.color": INK, "ytick.color": INK, "axes.spines.top": False, "axes.spines.right": False, "axes.linewidth": 0.8,
     "grid.color": "#e3e6ea", "grid.linewidth": 0.7, "axes.grid": True, "axes.axisbelow": True, "svg.fonttype": "none",

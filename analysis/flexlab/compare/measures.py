@@ -1,9 +1,8 @@
 """Simulation against experiment in the dissertation's terms: largest deviations relative to the peak, and the response time.
 
-**Response time**: from the start of execution (t = 0) until a joint variable has first covered 90 % of its largest distance from where
-it started, each run by its own largest distance. The dissertation gives a deviation of "response time" without defining it; this
-definition holds for steps and for periodic motions. It says when something happened to a tenth of a sample, and is not known where a
-dropout hides the instant.
+**Response time**: from the start of execution (t = 0) until a joint variable has first covered 90 % of its largest distance from
+where it started, each run by its own largest distance. The dissertation gives a deviation of "response time" without defining it;
+this definition holds for steps and for periodic motions. It is not known where a dropout hides the instant.
 **Delay**: the shift in time by which the experiment fits the simulation best (least squares), which uses all samples.
 """
 
@@ -141,7 +140,7 @@ def response_time(t: np.ndarray, y: np.ndarray) -> float:
 
 
 def delay(simulation: fx.Run, experiment: fx.Run, channel: str) -> float:
-    """The shift tau [s] that makes sum (y_exp(t) - y_sim(t - tau))^2 smallest, at most LONGEST_DELAY_S; NaN where nothing moves."""
+    """The tau [s] that makes sum (y_exp(t) - y_sim(t - tau))^2 smallest, at most LONGEST_DELAY_S; NaN where nothing moves."""
     from scipy.optimize import minimize_scalar
 
     y, t, known = experiment[channel], experiment.t, simulation[channel]

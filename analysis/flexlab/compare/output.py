@@ -31,7 +31,7 @@ def title(c: Comparison) -> str:
 
 def rows(c: Comparison) -> list[tuple[str, ...]]:
     """The table's cells, HEADS above them: the same in the terminal, the page and the PDF."""
-    out = [
+    out: list[tuple[str, ...]] = [
         (
             d.quantity, _length(d.peak, d.unit), _length(d.max, d.unit), _seconds(d.at_s), _percent(d.max_relative),
             _percent(d.rms_relative), _published(d.published_percent),

@@ -14,7 +14,8 @@ from .measures import Comparison
 from .output import HEADS, notes, rows, title
 
 CSS = """
-body { font: 15px/1.45 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; color: #30343b; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; }
+body { font: 15px/1.45 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; color: #30343b; }
+body { max-width: 60rem; margin: 2rem auto; padding: 0 1rem; }
 h1 { font-size: 1.45rem; margin: 0 0 .3rem; } h2 { font-size: 1.1rem; margin: 2rem 0 .4rem; }
 .emulated { background: #fff1d6; border-left: 5px solid #f0a020; padding: .55rem .9rem; margin: .9rem 0; font-weight: 600; }
 table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; }
@@ -33,16 +34,19 @@ def html(c: Comparison) -> str:
     head = "".join(f"<th>{text(h)}</th>" for h in HEADS)
     body = "".join("<tr>" + "".join(f"<td>{text(cell)}</td>" for cell in row) + "</tr>" for row in rows(c))
     figures = "".join(
-        f"<figure>{_inline(saved(figure(c, d), 'svg', Title=heading(c, d)), f'f{k}-')}<figcaption>{text(caption(c, k))}</figcaption></figure>"
+        f"<figure>{_inline(saved(figure(c, d), 'svg', Title=heading(c, d)), f'f{k}-')}"
+        f"<figcaption>{text(caption(c, k))}</figcaption></figure>"
         for k, d in enumerate(c.differences)
     )
     runs = "".join(f"<tr><td>{text(key)}</td><td>{text(a)}</td><td>{text(b)}</td></tr>" for key, a, b in about(c))
     label = f'<p class="emulated">{text(EMULATED[0].upper() + EMULATED[1:])}.</p>' if is_emulated(c) else ""
     return (
-        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{text(title(c))}</title><style>{CSS}</style></head><body>\n'
+        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{text(title(c))}</title>'
+        f"<style>{CSS}</style></head><body>\n"
         f"<h1>{text(title(c))}</h1>{label}\n<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>\n"
         f"<ul>{''.join(f'<li>{text(line)}</li>' for line in notes(c))}</ul>\n{figures}\n<h2>The runs</h2>\n"
-        f'<table class="about"><thead><tr><th></th><th>{text(called(c.simulation))}</th><th>{text(called(c.experiment))}</th></tr></thead>'
+        f'<table class="about"><thead><tr><th></th><th>{text(called(c.simulation))}</th>'
+        f"<th>{text(called(c.experiment))}</th></tr></thead>"
         f"<tbody>{runs}</tbody></table>\n</body></html>\n"
     )
 
@@ -70,9 +74,9 @@ def png(c: Comparison) -> bytes:
 
 def caption(c: Comparison, k: int) -> str:
     like = {"forward": "Figs 4.16 to 4.18", "inverse": "Figs 4.19 to 4.21"}.get(c.law)
-    return (
-        f"Fig. {k + 1}. {heading(c, c.differences[k])}: {called(c.simulation)} and {called(c.experiment)}; below, their difference."
-        + (f" In the manner of the dissertation's {like}." if like else "")
+    both = f"{called(c.simulation)} and {called(c.experiment)}"
+    return f"Fig. {k + 1}. {heading(c, c.differences[k])}: {both}; below, their difference." + (
+        f" In the manner of the dissertation's {like}." if like else ""
     )
 
 
@@ -133,12 +137,13 @@ def _front(c: Comparison) -> Any:
 
 
 def _lay(page: Any, y: float, cells: list[tuple[str, ...]], at: list[float], size: float, left: bool = False) -> float:
-    """A table's cells at the abscissas `at` (right ends but for the first; `left`: all of them left ends); returns where it ends."""
+    """A table's cells at the abscissas `at` (right ends but for the first; `left`: left ends); returns where it ends."""
     for n, row in enumerate(cells):
         height = 0.0185 * size / 8 * max(1, *(cell.count("\n") + 1 for cell in row)) * (0.8 if "\n" in "".join(row) else 1)
         for k, cell in enumerate(row):
             side = "left" if left or k == 0 else "right"
-            page.text(at[k], y - 0.011 * size / 8, cell, fontsize=size, va="baseline", ha=side, fontweight="bold" if n == 0 else "normal", linespacing=1.15)
+            weight = "bold" if n == 0 else "normal"
+            page.text(at[k], y - 0.011 * size / 8, cell, fontsize=size, va="baseline", ha=side, fontweight=weight)
         y -= height
         line = page.add_artist(_rule(y + 0.004))
         line.set(linewidth=1.0 if n == 0 else 0.5, color="#9aa0a8" if n == 0 else "#e3e6ea")

@@ -1,8 +1,8 @@
-"""Measured positions as motions that a joint can be made to follow: twice differentiable, without lag, as smooth as the noise asks.
+"""Measured positions as motions that a joint can be made to follow: twice differentiable, without lag, as smooth as they may be.
 
-A natural cubic smoothing spline s minimises sum (y - s(t))^2 + lambda int s''^2 dt (Reinsch 1967). It is C2, symmetric in time (no
-phase), and one number decides: lambda is the largest for which the residual is what quantisation leaves, RMS = q / sqrt(12) with q
-the step between the values that were measured (Morozov's discrepancy principle).
+A natural cubic smoothing spline s minimises sum (y - s(t))^2 + lambda int s''^2 dt (Reinsch 1967). It is C2 and symmetric in time
+(no phase), and one number decides: lambda is the largest for which the residual is what quantisation leaves, RMS = q / sqrt(12)
+with q the step between the values that were measured (Morozov's discrepancy principle).
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def onward(t: np.ndarray, y: np.ndarray) -> Signal:
 
 
 def smoothed(t: np.ndarray, y: np.ndarray, step: float | None = None) -> Signal:
-    """The smoothing spline of y (k,) at ascending t (k,) [s]; `step`: of the quantisation, in y's unit, by default `resolution(y)`.
+    """The smoothing spline of y (k,) at ascending t (k,) [s]; `step`: of the quantisation, by default `resolution(y)`.
 
     Without quantisation the spline goes through every sample. Dropouts must have been left out: the spline spans them.
     """

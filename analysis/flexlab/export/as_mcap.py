@@ -19,7 +19,7 @@ SCHEMA = "std_msgs/msg/Float64"
 
 
 def write(run: Run) -> bytes:
-    """Log times are the run's times after its start (`started`; without one after 1970), to a nanosecond; `/time` has them exactly.
+    """Log times are the run's times after its start (`started`, or 1970), to a nanosecond; `/time` has them exactly.
 
     Units stand in the channels' metadata, the run's in the metadata record `flexura`. Raises InputError for a start that is no
     time, or a time before 1970.
@@ -29,7 +29,8 @@ def write(run: Run) -> bytes:
     start = _start_ns(run)
     stamps = start + np.rint(run.t * 1e9).astype(np.int64)
     if len(stamps) and stamps[0] < 0:
-        raise InputError("expected times that are not before 1970: MCAP has no others", key="started", value=run.meta.get("started"))
+        given = run.meta.get("started")
+        raise InputError("expected times that are not before 1970: MCAP has no others", key="started", value=given)
     label = called(run)
     out = io.BytesIO()
     writer = Writer(out)

@@ -1,4 +1,4 @@
-"""TDMS, the format of LabVIEW and DIAdem: one group `run`, a channel for each of the run's, NI's names for units and time bases."""
+"""TDMS, the format of LabVIEW and DIAdem: one group `run`, the run's channels, NI's names for units and times."""
 
 from __future__ import annotations
 
