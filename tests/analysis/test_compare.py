@@ -1,4 +1,4 @@
-"""Simulation against experiment. The experiments are the Exudyn twin's (experiments.py), another program."""
+"""Simulation against experiment. The experiments are the Exudyn twin's (twin_experiments.py), another program."""
 
 import io
 import json
@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import flexura as fx
-from experiments import experiment
 from flexlab.compare import field, output, report
 from flexlab.compare.driven import WAYS, simulate
 from flexlab.compare.measures import COVERED, PUBLISHED, compare, delay, ordered, response_time
@@ -21,6 +20,7 @@ from flexlab.rig.motor import joint_line
 from flexlab.rig.stepper import MagneticSpring
 from flexura.errors import InputError
 from flexura.run import Run
+from twin_experiments import experiment
 
 
 @pytest.fixture(scope="module")
