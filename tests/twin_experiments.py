@@ -57,6 +57,7 @@ def experiment(kind="inverse", rig="firmware/rig.toml", seconds=2.0, seed=1, noi
         torque = data.constant_N_m_A * (u - data.constant_N_m_A * turns) / data.resistance_ohm
         torque -= way * (data.friction_N_m + more.screw.coulomb_friction_N_m) + more.screw.viscous_friction_N_m_s * turns
         rail = way * more.carriage.coulomb_friction_N + more.carriage.viscous_friction_N_s_m * velocity[0]
+        rail /= data.gear_efficiency * figures.screw.efficiency
         hold = figures.stepper.holding_torque_N_m * math.sin(teeth * (turn(t) - position[1]))
         detent = more.stepper.detent_torque_N_m * math.sin(4 * teeth * position[1])
         return [torque / r - rail, hold - detent - more.stepper.damping_N_m_s * velocity[1]]

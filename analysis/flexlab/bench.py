@@ -74,6 +74,7 @@ def board_rows() -> list[tuple[str, str, float]]:
 
     elf, rig = build(), load_rig(RIG)
     found, most = load.measure(elf, rig), load.measure(elf, rig, every_term=True)
+    fast, alone = sorted((load.experiment(elf, rig) for _ in range(3)), key=lambda both: both[0] / both[1])[1]
     period, longest, every = CLOCK_HZ / 1000, found.control_longest, most.control_longest
     jitter = max(found.period_most - period, period - found.period_least)
 
@@ -93,7 +94,8 @@ def board_rows() -> list[tuple[str, str, float]]:
         ("RAM, static", f"{found.ram_static} bytes", found.ram_static),
         ("RAM, deepest stack", f"{found.stack_most} bytes; {found.ram_share:.1%} of {load.RAM_BYTES} in all", found.stack_most),
         ("emulator, alone", f"{found.times_real_time_alone:.1f} x real time", found.times_real_time_alone),
-        ("emulator, with plant and host", f"{found.times_real_time:.1f} x real time", found.times_real_time),
+        ("emulator, with light drives and host", f"{found.times_real_time:.1f} x real time", found.times_real_time),
+        ("emulated experiment, with the rig's plant", f"{fast:.1f} x real time, {fast / alone:.0%} of alone", fast / alone),
     ]
 
 

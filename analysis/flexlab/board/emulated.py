@@ -15,6 +15,7 @@ from .declaration import BAUD_BIT_S, PINS
 from .simulator import CLOCK_HZ, ROLES, Simulator
 
 LABEL = "emulated ATmega2560"
+WINDOW_S = 250e-6
 _OUTPUTS = {  # pin, role for the plant, level without the firmware
     "motor_forward": ("forward", False),
     "motor_reverse": ("reverse", False),
@@ -61,12 +62,13 @@ class EmulatedBoard:
 
     emulated = True
 
-    def __init__(self, elf: Path, plant: Plant, window_s: float = 250e-6, slice_cycles: int = 1000) -> None:
+    def __init__(self, elf: Path, plant: Plant, window_s: float | None = None, slice_cycles: int = 1000) -> None:
+        """`window_s`: None for the plant's own `window_s`, or 250 us where it has none."""
         self.label = LABEL
         self.plant = plant
         self.simulator = Simulator(elf, BAUD_BIT_S, slice_cycles)
         self.outputs, self.sensors = Outputs(), Sensors()
-        self._window = round(window_s * CLOCK_HZ)
+        self._window = round(CLOCK_HZ * (getattr(plant, "window_s", WINDOW_S) if window_s is None else window_s))
         self._until = 0
         self.lines = {
             name: self.simulator.line(PINS[name].port, PINS[name].bit, ROLES[role], rest=rest)
@@ -76,7 +78,7 @@ class EmulatedBoard:
         self._swapped = {1: False, 2: False}
         for number in self._swapped:
             self.wire_encoder(number)
-        self._volts: tuple[float, float] = (-1.0, -1.0)
+        self._volts = [-1.0, -1.0]
         self._switches: tuple[bool, ...] | None = None
 
     # ---- a board
@@ -109,9 +111,9 @@ class EmulatedBoard:
         simulator = self.simulator
         window = simulator.window
         window.encoder[0], window.encoder[1] = sensors.encoder_1, sensors.encoder_2
-        if self._volts != (volts := (sensors.flex_V, sensors.supply_V)):
-            self._volts = volts
-            for channel, value in enumerate(volts):
+        for channel, value in enumerate((sensors.flex_V, sensors.supply_V)):
+            if self._volts[channel] != value:
+                self._volts[channel] = value
                 simulator.adc(channel, round(1000 * min(max(value, 0.0), 5.0)))
         if self._switches != (switches := (sensors.limit_low, sensors.limit_high, sensors.emergency_stop)):
             self._switches = switches

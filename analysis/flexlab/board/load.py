@@ -17,6 +17,7 @@ from flexura.signal import harmonic
 
 from ..rig import Bench, configuration
 from ..rig.drives import Drives
+from ..rig.plant import rig_plant
 from .declaration import CONTROL_HZ
 from .emulated import EmulatedBoard
 from .link import Link
@@ -26,6 +27,7 @@ from .simulator import CLOCK_HZ
 FLASH_BYTES, RAM_BYTES, RAM_BEGIN, RAM_END = 256 * 1024, 8192, 0x200, 0x2200
 CONTROL_VECTOR = 47  # TIMER5_COMPA
 PAINT = 0xA5
+IDLE_S = 1.0
 HARD = {  # settings for the fast trajectory: 16 000 + 4000 edges/s, 4000 steps/s at the peaks
     "motor_counts_per_m": 128e3,
     "stepper_counts_per_rad": 4000 / 7.85,
@@ -114,13 +116,44 @@ def measure(elf: Path, bench: Bench, seconds: float = 2.0, every_term: bool = Fa
     link.run(0.02)
     stack = RAM_END - next(a for a in range(RAM_BEGIN + static, RAM_END) if simulator.data[a] != PAINT)
     flash = simulator.symbol("__data_load_end")
-    alone = time.process_time()
-    simulator.run(simulator.cycle + CLOCK_HZ)
-    alone = time.process_time() - alone
+    alone = _alone(board)
     board.close()
     return Load(
         span / CLOCK_HZ, min(periods), max(periods), after[CONTROL_VECTOR][2], after[CONTROL_VECTOR][3],
         (after[CONTROL_VECTOR][1] - before[CONTROL_VECTOR][1]) / ticks,
         (after[0][1] - before[0][1]) / span, rates[2], rates[0] + rates[1], int(table["missed"][-1]),
-        flash, static, stack, span / CLOCK_HZ / wall, 1.0 / alone,
+        flash, static, stack, span / CLOCK_HZ / wall, IDLE_S / alone,
     )  # fmt: skip
+
+
+def experiment(elf: Path, bench: Bench, seconds: float = 4.0) -> tuple[float, float]:
+    """How fast an emulated experiment runs, and the firmware alone beside it: emulated / processor time, both.
+
+    Both joints back and forth as fast as in the dissertation's inverse law, with the rig's plant, set-points streamed, telemetry
+    received; then the firmware alone, in Idle.
+    """
+    settings, plant = configuration(bench), rig_plant(bench)
+    board = EmulatedBoard(elf, plant)
+    link = Link(board, sequence=1)
+    link.connect()
+    link.write_configuration(settings)
+    link.command("clear", fault=link.newest["fault"])
+    link.command("reference", position_1=0, position_2=0, steps=0)
+    carriage, joint = (harmonic(amplitude, 1.0, math.pi, amplitude) for amplitude in (0.012, math.pi / 6))
+    player = Player(link, setpoints(carriage, joint, seconds + 1.0, settings))
+    player.start()
+    wall = time.process_time()
+    player.run(seconds)
+    wall = time.process_time() - wall
+    link.stop()
+    link.run(0.02)
+    alone = _alone(board)
+    board.close()
+    return seconds / wall, IDLE_S / alone
+
+
+def _alone(board: EmulatedBoard) -> float:
+    """Processor time of the simulator without plant and link, for IDLE_S of the firmware's."""
+    simulator, begun = board.simulator, time.process_time()
+    simulator.run(simulator.cycle + round(IDLE_S * CLOCK_HZ))
+    return time.process_time() - begun

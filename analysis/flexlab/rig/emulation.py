@@ -1,7 +1,7 @@
 """The table `emulated` of a rig file: what the emulated rig has beyond the data of the parts, and how far it is from them.
 
-Nothing of it reaches a board. A simulation of the nominal rig may use all but the truth, which is for the plant behind the emulated
-board only.
+Nothing of it reaches a board. A simulation of the nominal rig may use all but the truth, which is for the plant behind the
+emulated board only.
 """
 
 from __future__ import annotations

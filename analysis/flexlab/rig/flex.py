@@ -10,6 +10,7 @@ x' = x e^(-h/T) + sigma sqrt(1 - e^(-2h/T)) xi.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -29,7 +30,8 @@ class FlexSensor:
         self._noise = more.noise_V
         self._kept = math.exp(-step_s / more.drift_s)
         self._kick = more.drift_V * math.sqrt(1 - self._kept**2)
-        self._random, self._numbers = random, iter(())
+        self._random = random
+        self._numbers: Iterator[float] = iter(())
         self._drift = more.drift_V * self._next()
 
     def voltage(self, bend_rad: float) -> float:

@@ -4,9 +4,9 @@ The twin's own cable elements, without joints: the carriage doesn't turn, so tha
 node, which is held on the rail by one constraint. What drives carriage and hub are two linear springs, implicit in Exudyn's step,
 whose zeros are set before every step; the nut's play, friction and the stepper's magnetic spring are made of them.
 
-Exudyn runs step by step (`MainSolverImplicitSecondOrder`: generalised alpha, spectral radius 0.9, modified Newton), its structures
-made once. The strip is softer along its axis than steel, EA L^2 / EI = 1e5 at most: an axial strain of 1e-6, fewer iterations, and
-less of the locking that cable elements have when they are few.
+Exudyn runs step by step (`MainSolverImplicitSecondOrder`: generalised alpha, spectral radius 0.9, modified Newton) with its
+structures made once. The strip is softer along its axis than steel, EA L^2 / EI = 1e4 at most: axial strains of 1e-5, fewer
+iterations, and less of the locking that cable elements have when they are few.
 """
 
 from __future__ import annotations
@@ -20,8 +20,9 @@ import numpy as np
 import flexura as fx
 from flexura.errors import FlexuraError
 
-ELEMENTS = 4
-TOLERANCE = 1e-4  # of Newton's residual; a tenth of it changes the tip deflection by 5e-5 of its peak
+ELEMENTS = 3
+AXIAL_RATIO = 1e4  # EA L^2 / EI
+TOLERANCE = 3e-4  # of Newton's residual; at 1e-2 a free vibration no longer decays as it should
 FOREVER_S = 1e7
 
 
@@ -44,14 +45,16 @@ class Mechanics:
         self._mbs = self._container.AddSystem()
         self._build(robot, position, elements)
         self._settings = _settings(step_s)
-        self._solver = exu.MainSolverImplicitSecondOrder()
-        if not self._solver.InitializeSolver(self._mbs, self._settings):
+        solver: Any = exu.MainSolverImplicitSecondOrder()
+        if not solver.InitializeSolver(self._mbs, self._settings):
             raise FlexuraError("Exudyn could not initialise the mechanics of the emulated rig")
-        self._solver.it.currentStepSize = step_s
+        solver.it.currentStepSize = step_s
+        self._solver = solver
         self._data = self._mbs.systemData
         self._reference = np.array(self._data.GetODE2Coordinates(exu.ConfigurationType.Reference))
-        self._ends = [self._slope_at(s, robot.links[1].length_m / elements, elements) for s in sensor_m]
-        self._gains: dict[str, tuple[float, float]] = {}
+        self._root_m = float(self._reference[0])
+        self._ends = [_slope_at(s, robot.links[1].length_m / elements, elements) for s in sensor_m]
+        self._carriage = self._joint = 0.0, 0.0
         self._read()
 
     def _build(self, robot: fx.Robot, position: tuple[float, float], elements: int) -> None:
@@ -59,7 +62,7 @@ class Mechanics:
 
         from flexura.twin.ancf import CableLink
         from flexura.twin.part import Frame, Ground, Lump
-        from flexura.twin.properties import AXIAL_RATIO, beam_values
+        from flexura.twin.properties import beam_values
 
         mbs = self._mbs
         (carriage, strip), payload = robot.links, robot.payload
@@ -77,28 +80,32 @@ class Mechanics:
         along, across = (mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=root, coordinate=k)) for k in (0, 1))
         mbs.AddObject(eii.ObjectConnectorCoordinate(markerNumbers=[fixed, across]))
         turns = mbs.AddNode(eii.NodeGenericData(initialCoordinates=[frame.angle], numberOfDataCoordinates=1))
-        self._springs = {
-            "carriage": mbs.AddObject(eii.ObjectConnectorCoordinateSpringDamper(markerNumbers=[fixed, along])),
-            "joint": mbs.AddObject(
-                eii.ObjectConnectorTorsionalSpringDamper(
-                    markerNumbers=[Ground.add(mbs).tip.marker, self.strip.origin.marker], nodeNumber=turns
-                )
-            ),
-        }
+        self._rail = mbs.AddObject(eii.ObjectConnectorCoordinateSpringDamper(markerNumbers=[fixed, along]))
+        markers = [Ground.add(mbs).tip.marker, self.strip.origin.marker]
+        self._hub = mbs.AddObject(eii.ObjectConnectorTorsionalSpringDamper(markerNumbers=markers, nodeNumber=turns))
         mbs.Assemble()
 
-    def hold(self, which: str, stiffness: float, damping: float = 0.0) -> None:
-        """Set the spring of "carriage" [N/m, N s/m] or "joint" [N m/rad, N m s/rad]; Exudyn makes a new Jacobian if need be."""
-        if self._gains.get(which) != (stiffness, damping):
-            self._gains[which] = stiffness, damping
-            self._mbs.SetObjectParameter(self._springs[which], "stiffness", stiffness)
-            self._mbs.SetObjectParameter(self._springs[which], "damping", damping)
+    def hold_carriage(self, stiffness: float, damping: float) -> None:
+        """Set the carriage's spring [N/m, N s/m]; Exudyn makes a new Jacobian if need be."""
+        if (stiffness, damping) != self._carriage:
+            self._carriage = stiffness, damping
+            self._set(self._rail, stiffness, damping)
+
+    def hold_joint(self, stiffness: float, damping: float) -> None:
+        """Set the joint's spring [N m/rad, N m s/rad]."""
+        if (stiffness, damping) != self._joint:
+            self._joint = stiffness, damping
+            self._set(self._hub, stiffness, damping)
+
+    def _set(self, spring: Any, stiffness: float, damping: float) -> None:
+        self._mbs.SetObjectParameter(spring, "stiffness", stiffness)
+        self._mbs.SetObjectParameter(spring, "damping", damping)
 
     def step(self, carriage_m: float, joint_rad: float) -> None:
         """One step with the springs' zeros here. Raises FlexuraError where Exudyn's Newton iteration fails."""
         mbs, solver, settings = self._mbs, self._solver, self._settings
-        mbs.SetObjectParameter(self._springs["carriage"], "offset", carriage_m - self._start)
-        mbs.SetObjectParameter(self._springs["joint"], "offset", joint_rad + self._turned)
+        mbs.SetObjectParameter(self._rail, "offset", carriage_m - self._start)
+        mbs.SetObjectParameter(self._hub, "offset", joint_rad + self._turned)
         solver.UpdateCurrentTime(mbs, settings)
         solver.InitializeStep(mbs, settings)
         if not solver.DiscontinuousIteration(mbs, settings):
@@ -107,46 +114,44 @@ class Mechanics:
         self._read()
 
     def _read(self) -> None:
-        self._q = self._data.GetODE2Coordinates() + self._reference
-        q = self._q.tolist()
-        self.x_m = q[0] - self._reference[0] + self._start
+        q = self._values = (self._data.GetODE2Coordinates() + self._reference).tolist()
+        self.x_m = q[0] - self._root_m + self._start
         angle = math.atan2(q[3], q[2]) - self._turned
-        self.angle_rad = angle + 2 * math.pi * round((self.angle_rad - angle) / (2 * math.pi))
+        turns = (self.angle_rad - angle) / (2 * math.pi)
+        self.angle_rad = angle if abs(turns) < 0.5 else angle + 2 * math.pi * round(turns)
 
     @property
     def bend_rad(self) -> float:
         """The integral of the strip's curvature under the sensor: how far the tangent turns from one end of it to the other."""
-        one, two = (weights @ self._q for weights in self._ends)
-        return math.atan2(one[0] * two[1] - one[1] * two[0], one[0] * two[0] + one[1] * two[1])
+        q, ((i, a, b, c, d), (j, e, f, g, h)) = self._values, self._ends
+        x, y = a * q[i] + b * q[i + 2] + c * q[i + 4] + d * q[i + 6], a * q[i + 1] + b * q[i + 3] + c * q[i + 5] + d * q[i + 7]
+        u, v = e * q[j] + f * q[j + 2] + g * q[j + 4] + h * q[j + 6], e * q[j + 1] + f * q[j + 3] + g * q[j + 5] + h * q[j + 7]
+        return math.atan2(x * v - y * u, x * u + y * v)
 
     @property
     def tip_deflection_m(self) -> float:
         """Of the strip's tip, across the hub's axis."""
-        q = self._q
+        q = self._values
         angle = math.atan2(q[3], q[2])
-        return float(math.cos(angle) * (q[-3] - q[1]) - math.sin(angle) * (q[-4] - q[0]))
+        return math.cos(angle) * (q[-3] - q[1]) - math.sin(angle) * (q[-4] - q[0])
 
     @property
     def tip_m(self) -> tuple[float, float]:
         """The strip's tip in the base frame."""
-        return float(self._q[-4]), float(self._q[-3])
+        return self._values[-4], self._values[-3]
 
     @property
     def energy_J(self) -> float:
         """Kinetic and strain energy, gravity and springs left out."""
-        q, v = self._q[None, :], np.array(self._data.GetODE2Coordinates_t())[None, :]
+        q, v = np.array(self._values)[None, :], np.array(self._data.GetODE2Coordinates_t())[None, :]
         return float((self.strip.kinetic(q, v) + self.strip.strain(q))[0])
 
-    def _slope_at(self, x: float, size: float, elements: int) -> np.ndarray:
-        """Weights (2, coordinates) of the coordinates in the slope vector r' at x [m] from the strip's root."""
-        k = min(int(x / size), elements - 1)
-        s = x / size - k
-        shapes = 6 * (s**2 - s) / size, 1 - 4 * s + 3 * s**2, 6 * (s - s**2) / size, 3 * s**2 - 2 * s  # of Hermite's cubics
-        weights = np.zeros((2, len(self._reference)))
-        for n, shape in enumerate(shapes):
-            for axis in range(2):
-                weights[axis, 4 * k + 2 * n + axis] = shape
-        return weights
+
+def _slope_at(x: float, size: float, elements: int) -> tuple[int, float, float, float, float]:
+    """The slope vector r' at x [m] from the root: the place of its element's coordinates, and the weights of r, r', r, r'."""
+    k = min(int(x / size), elements - 1)
+    s = x / size - k
+    return 4 * k, 6 * (s**2 - s) / size, 1 - 4 * s + 3 * s**2, 6 * (s - s**2) / size, 3 * s**2 - 2 * s  # Hermite's cubics
 
 
 def _carried(robot: fx.Robot) -> float:

@@ -1,18 +1,21 @@
-"""The emulated rig: Exudyn's mechanics behind a motor, a screw with play, a stepper, encoders and a flex sensor, as real rigs have.
+"""The emulated rig: Exudyn's mechanics behind motor, screw with play, stepper, encoders and flex sensor, as real rigs have them.
 
-    from flexlab.rig import load
-    from flexlab.rig.plant import rig_plant
     board = EmulatedBoard(elf, rig_plant(load("firmware/rig.toml"), seed=3))
 
-Time runs in steps of 0.5 ms. A step takes the mean voltage and the newest pulses of the time since the step before, and between
-its ends the shafts move evenly, so that encoder edges come one by one. What the board does thus reaches the mechanics half a
-millisecond late, with exact volt-seconds. The same seed gives the same bytes; see `firmware/rig.toml`, [emulated], for the figures.
+Time runs in steps of h = 0.5 ms. A step takes the mean voltage and the newest pulses of the time since the step before; between
+its ends shafts move evenly, so that encoder edges come one by one. What the board does thus reaches the mechanics up to h late,
+with exact volt-seconds. A jump of the commanded angle at a step's beginning acts in an implicit step as if in its middle, half a
+step late: the command is led by half of its last change. The same seed gives the same bytes. The figures stand in
+`firmware/rig.toml`, [emulated].
 
 The nut touches a flank of the screw (spring and damper), or none while it crosses the play b; the rail holds the carriage by a
-bristle that gives way by d and then slides (Dahl's limit of an elastic-plastic spring):
+bristle that gives way by d and then slides (an elastic-plastic spring):
 
     F_nut  = -k (x - s -+ b/2) - c (x' - s')        where x - s is beyond +-b/2, s = lead angle / (2 pi)
     F_rail = -(F_c / d) (x - z) - c_r x'            z follows x at no more than d
+
+Its error, rms, against steps of 0.025 ms and 8 elements under the same drives: 0.5 % of the peak of the tip deflection (0.26 % at
+most below 100 Hz; the rest is the ripple of the microsteps), 0.02 % of the carriage's, 0.02 % of the joint's travel.
 """
 
 from __future__ import annotations
@@ -21,15 +24,17 @@ import math
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 import flexura as fx
 from flexura.errors import InputError
+from flexura.explain import explain
 
 from ..board.emulated import Outputs, Sensors
 from .description import Bench, configuration
 from .emulation import FACTORS, Emulated, Truth
 from .flex import FlexSensor
-from .mechanics import Mechanics
+from .mechanics import ELEMENTS, Mechanics
 from .motor import Motor, joint_line, motor_data
 from .stepper import MagneticSpring
 
@@ -37,15 +42,16 @@ STEP_S = 5e-4
 
 
 def rig_plant(
-    bench: Bench, seed: int = 0, *, truth: Truth | None = None, start: tuple[float, float] = (0.0, 0.0), **what_differs: Any
-) -> RigPlant:
+    bench: Bench, seed: int = 0, *, truth: Truth | None = None, start: tuple[float, float] = (0.0, 0.0), step_s: float = STEP_S,
+    elements: int = ELEMENTS, **what_differs: Any,
+) -> RigPlant:  # fmt: skip
     """The emulated rig of a bench.
 
     `truth`: the factors by which it differs from its files (None: the rig file's own; `random_truth(seed)` draws some). `start`:
     carriage [m] and joint 2 [rad], at rest. `what_differs`: values of [emulated] by their path, with two underscores for the
     dot, `flex__noise_V=0.0`. Raises InputError for a rig file without [emulated] and for names that are not there.
     """
-    return RigPlant(bench, _changed(bench, what_differs), seed, truth or bench.emulated.truth, start)
+    return RigPlant(bench, _changed(bench, what_differs), seed, truth or bench.emulated.truth, start, step_s, elements)
 
 
 def _changed(bench: Bench, changes: dict[str, Any]) -> Emulated:
@@ -58,8 +64,9 @@ def _changed(bench: Bench, changes: dict[str, Any]) -> Emulated:
         data[table][name] = value
     try:
         return Emulated.model_validate(data)
-    except ValueError as error:
-        raise InputError(str(error), key="emulated", file=bench.file) from None
+    except ValidationError as error:
+        wrong = explain(error, Emulated, data, bench.file)
+        raise InputError(wrong.expected, key=f"emulated.{wrong.key}", value=wrong.value, file=bench.file) from None
 
 
 def true_robot(robot: fx.Robot, truth: Truth) -> fx.Robot:
@@ -86,18 +93,21 @@ class RigPlant:
     """The emulated rig as a plant (see `board.emulated.Plant`). `truth`: its true parameters, which an identification must not
     read. `carriage_m`, `joint_rad`, `tip_deflection_m`: where it truly is. `emergency_stop` may be pressed."""
 
-    def __init__(self, bench: Bench, emulated: Emulated, seed: int, truth: Truth, start: tuple[float, float]) -> None:
+    def __init__(
+        self, bench: Bench, emulated: Emulated, seed: int, truth: Truth, start: tuple[float, float], step_s: float,
+        elements: int,
+    ) -> None:  # fmt: skip
         rig, settings = bench.rig, configuration(bench)
         robot = true_robot(bench.robot, truth)
         first = emulated.flex.from_m
-        self.mechanics = Mechanics(robot, start, STEP_S, sensor_m=(first, first + rig.flex.length_m))
+        self.mechanics = Mechanics(robot, start, step_s, elements, sensor_m=(first, first + rig.flex.length_m))
         screw, carriage = emulated.screw, emulated.carriage
         self.motor = Motor(
             motor_data(rig, emulated.motor), rig.screw.efficiency, screw.coulomb_friction_N_m, screw.viscous_friction_N_m_s,
             truth.friction,
         )  # fmt: skip
         self.spring = MagneticSpring(rig.stepper, emulated.stepper)
-        self.flex = FlexSensor(rig.flex, emulated.flex, np.random.default_rng([seed, 0]), STEP_S, truth.flex_gain)
+        self.flex = FlexSensor(rig.flex, emulated.flex, np.random.default_rng([seed, 0]), step_s, truth.flex_gain)
         self.supply_V, self.emergency_stop = rig.driver.supply_V, False
         self.truth = _told(bench, truth, robot, seed)
         self._dead_V = emulated.driver.dead_zone_V
@@ -110,16 +120,22 @@ class RigPlant:
         self._rotor = emulated.stepper.damping_N_m_s
         self._ends = bench.limits[0]
         self._counts = settings["motor_counts_per_m"], settings["stepper_counts_per_rad"]
+        self._step_s = step_s
         self._left = 0.0  # of the step that was made last [s]
         self._volt_s = self._since = 0.0
         self._anchor = self._x = start[0]
         self._theta = start[1]
-        self._load_N_m = 0.0
+        self._load_N_m = self._steps = 0.0
         self._edges = self._shafts()
         self._before = self._edges
         self._sensors = Sensors(flex_V=self.flex.sample(0.0), supply_V=self.supply_V / rig.driver.supply_divider)
 
     # ---- what it truly does
+
+    @property
+    def window_s(self) -> float:
+        """The windows in which a board is best run with this plant."""
+        return self._step_s
 
     @property
     def carriage_m(self) -> float:
@@ -143,26 +159,29 @@ class RigPlant:
     def advance(self, seconds: float, outputs: Outputs) -> Sensors:
         self._volt_s += outputs.duty * self.supply_V * seconds
         self._since += seconds
-        while self._left < seconds - 1e-9:
-            self._step(outputs)
-            self._left += STEP_S
+        if self._left < seconds - 1e-9:
+            voltage = self._volt_s / self._since
+            self._volt_s = self._since = 0.0
+            while self._left < seconds - 1e-9:
+                self._step(outputs, voltage)
+                self._left += self._step_s
         self._left -= seconds
-        part = 1.0 - self._left / STEP_S
+        part = 1.0 - self._left / self._step_s
         (one, two), (a, b) = self._before, self._edges
         sensors = self._sensors
         sensors.encoder_1, sensors.encoder_2 = one + part * (a - one), two + part * (b - two)
         sensors.emergency_stop = self.emergency_stop
         return sensors
 
-    def _step(self, outputs: Outputs) -> None:
-        voltage = self._volt_s / self._since
-        self._volt_s = self._since = 0.0
+    def _step(self, outputs: Outputs, voltage: float) -> None:
         voltage = math.copysign(max(0.0, abs(voltage) - self._dead_V), voltage)
-        self.motor.advance(STEP_S, voltage if outputs.motor_on else None, self._load_N_m)
+        self.motor.advance(self._step_s, voltage if outputs.motor_on else None, self._load_N_m)
         mechanics = self.mechanics
         here, turned = mechanics.x_m, mechanics.angle_rad
-        on, command = outputs.stepper_on, self._start[1] + outputs.steps * self.spring.rad_per_step
-        mechanics.hold("joint", self.spring.stiffness(on), self._rotor)
+        on, steps = outputs.stepper_on, outputs.steps
+        command = self._start[1] + (1.5 * steps - 0.5 * self._steps) * self.spring.rad_per_step
+        self._steps = steps
+        mechanics.hold_joint(self.spring.stiffness(on), self._rotor)
         centre = self.spring.centre(command, 2 * turned - self._theta, on)
         nut, flank = self._carriage(2 * here - self._x)
         mechanics.step(nut, centre)
@@ -171,7 +190,7 @@ class RigPlant:
             self._load_N_m = 0.0
         else:
             stiffness, damping = self._nut
-            slip = (mechanics.x_m - here) / STEP_S - self._lead * self.motor.speed_rad_s
+            slip = (mechanics.x_m - here) / self._step_s - self._lead * self.motor.speed_rad_s
             self._load_N_m = -self._lead * (stiffness * (mechanics.x_m - flank) + damping * slip)
         sensors = self._sensors
         sensors.flex_V = self.flex.sample(mechanics.bend_rad)
@@ -191,7 +210,7 @@ class RigPlant:
         if flank is not None:
             stiffness, damping = stiffness + self._nut[0], damping + self._nut[1]
             pull += self._nut[0] * flank + self._nut[1] * self._lead * self.motor.speed_rad_s
-        self.mechanics.hold("carriage", stiffness, damping)
+        self.mechanics.hold_carriage(stiffness, damping)
         return pull / stiffness if stiffness else 0.0, flank
 
     def _shafts(self) -> tuple[float, float]:
