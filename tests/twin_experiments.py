@@ -5,6 +5,7 @@ resolution and noise; some samples are lost. They are emulated, and say so.
 """
 
 import math
+from pathlib import Path
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from flexlab.rig.motor import motor_data
 from flexura import twin
 from flexura.run import Run
 
+RIG = Path(__file__).parents[1] / "firmware" / "rig.toml"
 RATE_HZ, FLEX_V_M = 200.0, -2.7
 
 
@@ -40,7 +42,7 @@ def profiles(kind):
     return volts, turn, (lambda t: math.nan, turn)
 
 
-def experiment(kind="inverse", rig="firmware/rig.toml", seconds=2.0, seed=1, noise_m=2e-4, lost=0.01, emulated=True, **differs):
+def experiment(kind="inverse", rig=RIG, seconds=2.0, seed=1, noise_m=2e-4, lost=0.01, emulated=True, **differs):
     """A Run of the bench's form; `differs`: factors of `robot`."""
     bench = load(rig)
     figures, more = bench.rig, bench.emulated

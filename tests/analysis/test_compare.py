@@ -20,7 +20,7 @@ from flexlab.rig.motor import joint_line
 from flexlab.rig.stepper import MagneticSpring
 from flexura.errors import InputError
 from flexura.run import Run
-from twin_experiments import experiment
+from twin_experiments import RIG, experiment
 
 
 @pytest.fixture(scope="module")
@@ -106,7 +106,7 @@ def test_the_robot_may_be_another(forward):
 @pytest.mark.parametrize("pulse", [0.02, 0.2])
 def test_the_relaxed_field_is_the_sine(pulse):
     """Against the same torque as a Python function in the native solver; 0.2 rad at once lose steps."""
-    bench = load("firmware/rig.toml")
+    bench = load(RIG)
     spring = MagneticSpring(bench.rig.stepper, bench.emulated.stepper)
     robot = bench.robot.replace({"link.1.joint.viscous_friction": 1e3, "link.2.joint.viscous_friction": 2e-3})
     system = fx.assemble(robot)
@@ -124,7 +124,7 @@ def test_the_relaxed_field_is_the_sine(pulse):
 
 def test_a_constant_voltage_ends_at_the_lines_speed():
     """v = (a u - f) / b of `rig.motor.joint_line`."""
-    bench = load("firmware/rig.toml")
+    bench = load(RIG)
     line, dead = joint_line(bench), bench.emulated.driver.dead_zone_V
     t = np.arange(201) / 200.0
     still = np.zeros(len(t))
