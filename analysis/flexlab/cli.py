@@ -8,6 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
+from .compare.command import compare
+from .export.command import export
 from .terminal import announce_compiling, default_folder, events, interrupted, prepare, progress_bars, say, show, stored
 
 app = typer.Typer(
@@ -18,6 +20,9 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
+
+app.command()(compare)
+app.command()(export)
 
 RobotFile = Annotated[Path, typer.Argument(metavar="ROBOT", help="robot file (TOML), for example model/robots/rig.toml")]
 ManoeuvreFile = Annotated[

@@ -69,12 +69,13 @@ class Run:
                 raise ValueError(f"channel {name} has shape {np.shape(values)}, the times have {np.shape(self.t)}")
             if self.units[name] not in _SUFFIX:
                 raise ValueError(f"channel {name} has the unit {self.units[name]!r}; known: {', '.join(_SUFFIX)}")
-        columns = ["time_s", *map(self._column, self.channels)]
+        columns = ["time_s", *map(self.column, self.channels)]
         twice = sorted(column for column, count in Counter(columns).items() if count > 1)
         if twice:
             raise ValueError(f"two channels would share a column: {', '.join(twice)}")
 
-    def _column(self, channel: str) -> str:
+    def column(self, channel: str) -> str:
+        """The name of a channel's column in a file, its unit at the end."""
         return f"{channel}_{_SUFFIX[self.units[channel]]}"
 
     def __getitem__(self, channel: str) -> np.ndarray:
@@ -98,20 +99,24 @@ class Run:
 
     def save(self, folder: str | Path) -> Path:
         """Write `run.parquet` into `folder` (made if need be) as a whole or not at all; returns its path."""
+        path = Path(folder) / FILE
+        write_bytes(path, self.parquet())
+        return path
+
+    def parquet(self) -> bytes:
+        """The run as a Parquet file: one column a channel, its unit in the field, the metadata in the schema."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        columns = {"time_s": self.t} | {self._column(name): values for name, values in self.channels.items()}
-        units = {"time_s": "s"} | {self._column(name): unit for name, unit in self.units.items()}
+        columns = {"time_s": self.t} | {self.column(name): values for name, values in self.channels.items()}
+        units = {"time_s": "s"} | {self.column(name): unit for name, unit in self.units.items()}
         fields = [pa.field(name, pa.float64(), metadata={"unit": units[name]}) for name in columns]
         schema = pa.schema(fields, metadata={"flexura": json.dumps(self.meta)})
         sink = pa.BufferOutputStream()
         pq.write_table(
             pa.table([pa.array(np.asarray(v, dtype=float)) for v in columns.values()], schema=schema), sink, compression="zstd"
         )
-        path = Path(folder) / FILE
-        write_bytes(path, sink.getvalue().to_pybytes())
-        return path
+        return bytes(sink.getvalue().to_pybytes())
 
     @staticmethod
     def read(folder: str | Path) -> Run:

@@ -8,11 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from flexura.errors import InputError
 from flexura.robot import Link, Robot
 
+from ..compare import output
+from ..compare.measures import Comparison, compare
 from ..deviation import deviations
 from .sampling import MAX_SAMPLES
-from .sources import Source, tip_meaning
+from .sources import Source, against_experiment, tip_meaning
 
 MAX_ROWS = 40  # of one table: a robot of 200 links is not read link by link
 HANDLED = {"robot", "name", "structure", "events", "phases", "source", "complete", "emulated"}
@@ -50,6 +53,11 @@ def _notes(shown: list[Source]) -> list[str]:
 
 def _deviations(shown: list[Source]) -> list[str]:
     first, second = shown
+    if against_experiment(shown):
+        try:
+            return _experiment(compare(first.run, second.run))
+        except InputError:  # nothing that the dissertation compares
+            pass
     head = (
         f"### Deviation\n\n{second.label} minus {first.label}; in brackets: of the channel's largest magnitude in {first.label}."
     )
@@ -66,6 +74,14 @@ def _deviations(shown: list[Source]) -> list[str]:
         if rows
         else ["### Deviation\n\nThe runs have no channel in common to compare."]
     )
+
+
+def _experiment(found: Comparison) -> list[str]:
+    """The table of `flexura compare`, and its notes."""
+    lines = "\n".join(f"- {note}" for note in output.notes(found))
+    head = "### Simulation against experiment" + (f", {found.law}" if found.law else "")
+    heads = ("", *output.HEADS[1:])
+    return [head, _table(heads, output.rows(found)), lines]
 
 
 def _robot(robot: Robot) -> list[str]:

@@ -43,6 +43,7 @@ class Scene:
     high: tuple[float, float]
     prefix: str = ""
     name: str = ""
+    measured: bool = False  # an experiment beside its simulation: the dissertation's figures, each above its own deviation
 
     @property
     def width(self) -> float:
@@ -86,6 +87,11 @@ def _page(scene: Scene) -> Any:
         notes.append(rrb.TextLogView(origin="/", contents=[f"{scene.prefix}/events/**"], name="events", columns=_log_columns()))
         shares.append(1.2)
     side = rrb.Vertical(*notes, row_shares=shares)
+    if scene.measured and (figures := _figures(scene)):
+        drawn = _arms(scene, apart=False)
+        page = _tabs(notes)
+        above = rrb.Horizontal(_tabs(drawn), page, column_shares=[3, 4]) if drawn else page
+        return rrb.Vertical(above, rrb.Horizontal(*figures), row_shares=[5, 7], name=scene.name or None)
     upper = rrb.Horizontal(*(drawn := _arms(scene)), side, column_shares=_shares(scene, len(drawn)))
     columns = _plots(scene)
     if not columns:
@@ -94,8 +100,9 @@ def _page(scene: Scene) -> Any:
     return rrb.Vertical(above, rrb.Horizontal(*columns), row_shares=[height, 5 - height], name=scene.name or None)
 
 
-def _arms(scene: Scene) -> list[Any]:
-    """The overlaid view, large, and each run alone beside it: below each other when the picture is wide, else side by side."""
+def _arms(scene: Scene, apart: bool = True) -> list[Any]:
+    """The overlaid view, and each run alone: below each other when the picture is wide, else side by side; not `apart`: views
+    that may be tabs."""
     # Bounds are given in the view's own coordinates, in which y points down.
     bounds = rrb.VisualBounds2D(x_range=[scene.low[0], scene.high[0]], y_range=[-scene.high[1], -scene.low[1]])
 
@@ -112,7 +119,43 @@ def _arms(scene: Scene) -> list[Any]:
     # One ghost is enough where both arms lie on each other.
     title = f"{scene.name}: {first}, {second}" if scene.name else f"overlaid: {first}, {second}"
     both = arm(title, [f"/{a}/arm/**", f"/{b}/arm/**", f"- /{b}/arm/undeformed"])
+    if not apart:
+        return [both, *alone]
     return [both, rrb.Vertical(*alone) if scene.width > WIDE * scene.height else rrb.Horizontal(*alone)]
+
+
+def _figures(scene: Scene) -> list[Any]:
+    """The dissertation's Figs 4.19 to 4.21: each joint variable and each tip displacement, below it its deviation.
+
+    The channels of one kind that share a unit share a figure; what else there is stands in tabs behind.
+    """
+    columns = []
+    for kind, part, unit, words in (
+        ("joint", "position", "m", "joint variable"), ("joint", "position", "rad", "joint variable"),
+        ("link", "tip_deflection", "m", "tip flexural displacement, link"),
+    ):  # fmt: skip
+        pattern = rf"/{kind}/(\d+)/{part}"
+        shown = {p: s for p, s in scene.signals.items() if s.unit == unit and re.search(pattern + "$", p)}
+        if not shown:
+            continue
+        numbers = _numbers(shown, pattern)
+        name = f"{words} {', '.join(map(str, numbers))}"
+        below = {p: s for p, s in scene.deviations.items() if s.unit == unit and re.search(pattern + "$", p)}
+        ends = [f"/{kind}/{i}/" for i in numbers]
+        behind = {p: s for p, s in scene.signals.items() if p not in shown and any(end in p for end in ends)}
+        views = [_plot(name, shown), *_by_part(behind)]
+        if kind == "link":
+            views += _one("tip position", scene.signals, r"/.+/tip/[xy]")
+            views += _one("deviation of the tip", scene.deviations, r".*/deviation/(tip/[xy]|tip_distance)")
+        upper = _tabs(views)
+        columns.append(rrb.Vertical(upper, _plot(f"deviation of {name}", below), row_shares=[5, 3]) if below else upper)
+    return columns
+
+
+def _by_part(signals: Signals) -> list[Any]:
+    """A plot for each quantity, by the last part of its path."""
+    parts = dict.fromkeys(path.rsplit("/", 1)[1] for path in signals)
+    return [_plot(part.replace("_", " "), {p: s for p, s in signals.items() if p.endswith(f"/{part}")}) for part in parts]
 
 
 def _shares(scene: Scene, arms: int) -> list[float]:

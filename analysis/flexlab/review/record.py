@@ -21,7 +21,7 @@ from .about import about
 from .layout import Scene, Signal, blueprint
 from .sampling import MAX_SAMPLES, frames, thinned
 from .shapes import curves, extent, grid
-from .sources import DEVIATION, NAMES, Source, entity, loaded, order, sources, tone
+from .sources import DEVIATION, NAMES, Source, against_experiment, entity, loaded, order, sources, tone
 
 CHUNK = 10_000  # rows a chunk: large enough to be quick, small enough to be loaded in parts
 GHOST = (150, 150, 150)
@@ -97,6 +97,7 @@ def _scene(shown: list[Source], prefix: str, name: str) -> Scene:
         high=(float(high[0]), float(high[1])),
         prefix=prefix,
         name=name,
+        measured=against_experiment(shown),
     )
 
 
@@ -127,11 +128,12 @@ def signals(rec: rr.RecordingStream, s: Source, scene: Scene, budget: int) -> No
     places = order(s.signals, s.run.units)
     # The viewer draws curves in the order of their paths: those below are broader, to be seen where both runs agree.
     roots = sorted(root for root, *_ in scene.sources)
-    width = 1.8 if len(roots) == 1 else 4.2 if s.root == roots[0] else 1.5
+    below = len(roots) > 1 and s.root == roots[0]
+    width = 1.8 if len(roots) == 1 else (5.5 if scene.measured else 4.2) if below else 1.5
     for name in s.signals:
         path = f"/{s.root}/{entity(name)}"
         if path in scene.signals:
-            colour = tone(s.colour, places[name])
+            colour = tone(s.colour, places[name] + (3 if below and scene.measured else 0))
             curve(rec, path, s.run.t, s.run[name], np.arange(len(s.run)), scene.signals[path], colour, width, budget)
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from flexura.errors import InputError
 from flexura.run import Run
 
+from .. import naming
 from .poses import with_poses
 from .shapes import has_shapes
 
@@ -54,18 +55,21 @@ def sources(runs: Sequence[Run]) -> list[Source]:
         raise InputError("one run, or two to compare", key="runs", value=len(runs))
     found: list[Source] = []
     for run in runs:
-        kind = str(run.meta.get("source", "simulation"))
+        kind = naming.kind(run)
         if len(run) == 0:
             raise InputError("a run with samples; this one is empty", key="run", value=kind)
         root = re.sub(r"[^a-z0-9_]", "_", kind.lower())
-        colour = COLOURS.get(kind, OTHER)
-        label = kind
+        colour, again = COLOURS.get(kind, OTHER), ""
         if found and found[0].root == root:
-            root, label, colour = f"{root}_2", f"{kind} 2", SECOND
-        notes = [word for word, true in (("emulated", run.meta.get("emulated")), ("incomplete", not run.complete)) if true]
+            root, colour, again = f"{root}_2", SECOND, " 2"
         placed, computed = with_poses(run)
-        found.append(Source(root, label + (f" ({', '.join(notes)})" if notes else ""), colour, placed, computed))
+        found.append(Source(root, naming.called(run, again), colour, placed, computed))
     return found
+
+
+def against_experiment(shown: Sequence[Source]) -> bool:
+    """Whether these are a calculation and an experiment, in this order."""
+    return len(shown) == 2 and [naming.kind(s.run) == "experiment" for s in shown] == [False, True]
 
 
 def order(names: list[str], units: dict[str, str]) -> dict[str, int]:

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from flexura.errors import InputError
 
 from .description import Bench, Rig
-from .emulation import EmulatedMotor
+from .emulation import Emulated, EmulatedMotor
 
 SUBSTEP_S = 2.5e-4  # the current is exact for a constant speed; far below the mechanical time constant of 30 ms
 
@@ -132,9 +132,13 @@ def joint_line(bench: Bench, friction: float = 1.0) -> JointLine:
     With r = lead / (2 pi): force K / (R r), back-EMF K^2 / (R r^2), mass J / r^2. The rail's friction, which the motor always
     drives, counts 1 / (eta_gear eta_screw) times.
     """
-    more = bench.emulated
-    data, r = motor_data(bench.rig, more.motor), bench.rig.screw.lead_m / (2 * math.pi)
-    efficiency = data.gear_efficiency * bench.rig.screw.efficiency
+    return line(bench.rig, bench.emulated, friction)
+
+
+def line(rig: Rig, more: Emulated, friction: float = 1.0) -> JointLine:
+    """As `joint_line`, for a rig file's tables without the files that they name."""
+    data, r = motor_data(rig, more.motor), rig.screw.lead_m / (2 * math.pi)
+    efficiency = data.gear_efficiency * rig.screw.efficiency
     coulomb = (data.friction_N_m + more.screw.coulomb_friction_N_m) / r + more.carriage.coulomb_friction_N / efficiency
     viscous = more.screw.viscous_friction_N_m_s / r**2 + more.carriage.viscous_friction_N_s_m / efficiency
     return JointLine(

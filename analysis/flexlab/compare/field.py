@@ -1,0 +1,94 @@
+"""Joint 2 in the stepper's field, whose torque is a sine of the angle, by a solver whose drives are straight springs.
+
+    T(e, theta) = T_h sin(N e) - T_d sin(4 N theta) = k e + [T(e, theta) - k e],    e = r - theta
+
+with r the angle of the pulses, T_h the holding and T_d the detent torque, N the pole pairs. It is no prescribed motion: N T_h =
+20 N m/rad and the strip's 3e-3 kg m^2 make 12 Hz, too near the strip's own 5 Hz for a clamp. The bracket is a torque over time,
+known from the simulation before (waveform relaxation, Lelarasmee 1982), with the k that leaves least of it: repeated until the
+torque that was assumed is the field's. Where the field lets go of the rotor (steps are lost) that ends nowhere, and a Python
+function takes over.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+
+import flexura as fx
+from flexura.drive import JointDrive
+from flexura.errors import FlexuraError
+from flexura.signal import Signal, table
+
+from ..rig.stepper import MagneticSpring
+
+Start = tuple[fx.System, np.ndarray]  # and its state at the start (n,)
+
+ROUNDS = 40
+STILL = 5e-4  # of the holding torque: what the assumed torque may differ by from the field's
+FINE_S = 1e-3  # between two values of the bracket: the detent's period is 10 ms at 3 rad/s
+
+
+def held_by_field(
+    start: Start,
+    t: np.ndarray,
+    force: Signal,
+    pulses: Signal,
+    spring: MagneticSpring,
+    rtol: float,
+    progress: Callable[[float], None] | None = None,
+) -> fx.Run:
+    """Simulate with the force on joint 1 [N] and the pulses [rad] given to joint 2.
+
+    The Run's meta has `relaxation_rounds`, None where the torque had to be a Python function.
+    """
+    system, q0 = start
+    report = progress or (lambda fraction: None)
+    parts = max(1, int(np.ceil(np.median(np.diff(t)) / FINE_S - 1e-6)))
+    fine = np.interp(np.arange((len(t) - 1) * parts + 1) / parts, np.arange(len(t)), t)
+    asked = np.array([pulses(at)[0] for at in fine])
+    k, extra, assumed = spring.on_N_m, None, np.zeros(len(fine))  # [N m/rad], [N m]
+    for n in range(1, ROUNDS + 1):
+        held = JointDrive(force=extra, motion=pulses, kp=k)
+        try:
+            run = fx.simulate(system, fine, fx.Drive((JointDrive(force=force), held)), q0=q0, rtol=rtol)
+        except FlexuraError:  # what was assumed has grown beyond all bounds
+            break
+        m = len(run) if run.complete else len(run) - 1  # the last row of a run that a limit ended is at that instant
+        theta = run["joint/2/position"][:m]
+        e, torque = asked[:m] - theta, np.array([spring.torque(r, at, on=True) for r, at in zip(asked, theta, strict=False)])
+        left = np.abs(k * e + assumed[:m] - torque).max(initial=0.0) / spring.holding_N_m
+        report(1 - 1 / (n + 1))
+        if left < STILL:
+            run.meta["relaxation_rounds"] = n
+            return _thinned(run, parts)
+        k = float(np.clip(e @ torque / (e @ e), 0.05 * spring.on_N_m, spring.on_N_m))
+        assumed[:m] = torque - k * e
+        extra = table(fine, assumed)
+    return _by_function(start, t, force, pulses, spring, rtol, progress)
+
+
+def _by_function(
+    start: Start,
+    t: np.ndarray,
+    force: Signal,
+    pulses: Signal,
+    spring: MagneticSpring,
+    rtol: float,
+    progress: Callable[[float], None] | None,
+) -> fx.Run:
+    """The same, the torque evaluated at every instant: slower, and without a limit to where the rotor may go."""
+
+    def drive(at: float, position: np.ndarray, velocity: np.ndarray, tip: float) -> list[float]:
+        return [force(at)[0], spring.torque(pulses(at)[0], float(position[1]), on=True)]
+
+    system, q0 = start
+    run = fx.simulate(system, t, drive, q0=q0, rtol=rtol, progress=progress)
+    run.meta["relaxation_rounds"] = None
+    return run
+
+
+def _thinned(run: fx.Run, parts: int) -> fx.Run:
+    """Every parts-th row of a run."""
+    return dataclasses.replace(run, t=run.t[::parts], channels={n: v[::parts] for n, v in run.channels.items()}, states=None)
