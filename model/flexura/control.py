@@ -213,19 +213,17 @@ class Controller:
         flexible = [i for i, link in enumerate(system.robot.links) if link.flexible]
         look, sleeve = np.zeros((2, system.n)), -1
         for i in flexible[-1:]:
-            own = slice(c.first[i] + 1, c.first[i + 1])
-            m = own.stop - own.start
-            look[:, own] = c.NL[i, :m], c.SL[i, :m]
+            first, m = int(c.first[i]) + 1, len(system.links[i].S0)
+            look[:, first : first + m] = c.NL[i, :m], c.SL[i, :m]
             sleeve = int(c.first[i]) if system.robot.links[i].joint.type == "Pb" else -1
-        e, p = np.zeros((0, 0)), 0 if self.linear is None else len(self.linear.F)
-        matrices = Linear(*[e] * 7, np.zeros(0), np.zeros(0)) if self.linear is None else self.linear
+        linear = Linear(*[np.zeros((0, 0))] * 7, *[np.zeros(0)] * 2) if self.linear is None else self.linear  # type: ignore[call-arg]
         late = int(gains[:, law.DELAY].max(initial=0)) + 1
         return Law(
-            float(self.rate_Hz), float(start), kind, gains, rows, np.ascontiguousarray(np.concatenate(parts)), ranges,
-            c.first[:-1].copy(), look, sleeve, float(self.deflection_quantum_m),
-            *[np.ascontiguousarray(getattr(matrices, f.name), dtype=float) for f in fields(Linear)],
-            np.zeros((2, p)), np.zeros(len(matrices.offset)), np.zeros((N, 9)), np.zeros(7), np.zeros((N, late)),
-            np.zeros((ticks, N, law.LOGGED)),
+            rate_Hz=float(self.rate_Hz), start=float(start), kind=kind, gains=gains, rows=rows,
+            segments=np.ascontiguousarray(np.concatenate(parts)), ranges=ranges, first=c.first[:-1].copy(), look=look,
+            sleeve=sleeve, quantum=float(self.deflection_quantum_m), **{f.name: getattr(linear, f.name) for f in fields(Linear)},
+            z=np.zeros((2, len(linear.F))), y=np.zeros(len(linear.offset)), memory=np.zeros((N, 9)), sensor=np.zeros(7),
+            ring=np.zeros((N, late)), log=np.zeros((ticks, N, law.LOGGED)),
         )  # fmt: skip
 
     def _gains(self, joint: PID) -> np.ndarray:

@@ -66,9 +66,9 @@ def simulate(
     else:
         drive = as_function(drive)
     _inside_limits(system, q)
-    if system.robot.nodal and isinstance(drive, Controller):
-        raise InputError('expected a robot with sliding = "continuous" under a Controller', key="sliding", value="nodal")
     if system.robot.nodal:
+        if isinstance(drive, Controller):
+            raise InputError('expected a robot with sliding = "continuous" under a Controller', key="sliding", value="nodal")
         return nodal.simulate(simulate, system, t, drive, q, qd, rtol, method, progress)
     state = np.concatenate([system.to_solver @ q, system.to_solver @ qd, [0.0, 0.0]])
     rate_Hz = drive.rate_Hz if isinstance(drive, Controller) else 0.0

@@ -195,10 +195,10 @@ def _explicit_step(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, 
 
 @compiled
 def _pair_step(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, last: float, method: int) -> float:
-    """One step of a pair from m.z to m.znew; returns the error norm."""
+    """One step of a pair from m.z to m.znew, its first stage included; returns the error norm."""
     K, new, pair = m.K, m.znew, method - PAIR_3
     stages = 3 if method == PAIR_3 else 6
-    for s in range(1, stages):
+    for s in range(stages):
         _combine(m, h, _PA[pair, s], s, new)
         _slope(c, w, d, m, min(t + _PC[pair, s] * h, last), new, K[s])
     _combine(m, h, _PA[pair, stages], stages, new)
@@ -354,8 +354,8 @@ def _shortest(c: Chain, z: np.ndarray) -> float:
     return least
 
 
-@compiled
-def outside(c: Chain, d: Inputs, z: np.ndarray) -> int:
+@inlined
+def _outside(c: Chain, d: Inputs, z: np.ndarray) -> int:
     """The first joint beyond its limits, or a slider that has run into the sleeve of the link it rides on; -1: none."""
     for i in range(c.kind.shape[0]):
         e = c.first[i]
@@ -369,6 +369,12 @@ def outside(c: Chain, d: Inputs, z: np.ndarray) -> int:
         if c.kind[under] == SLEEVE and at + z[c.first[under]] < c.length[under]:
             return i
     return -1
+
+
+@compiled
+def outside(c: Chain, d: Inputs, z: np.ndarray) -> int:
+    """`_outside` as a function to call."""
+    return _outside(c, d, z)
 
 
 @compiled
@@ -419,7 +425,8 @@ def advance(
         last = np.nextafter(stop, -1e300)  # drives are read just before the break at which this step may end
         if s[FRESH] == 0.0:
             _weights(c, m, rtol, m.z)
-            _slope_once(c, w, d, m, t, m.z, m.K[0])
+            if method < PAIR_3:
+                _slope_once(c, w, d, m, t, m.z, m.K[0])
             s[FRESH] = 1.0
         h = min(s[H], stop - t, s[LONGEST] * _shortest(c, m.z))
         if stop - t < 1.5 * h and h < stop - t:
@@ -459,12 +466,12 @@ def advance(
                     prepared = True
                 _interpolate(m, method, h, (t_eval[row] - t) / h, out[row])
                 _prescribe(c, w, d, t_eval[row], out[row, :n], out[row, n : 2 * n])
-            joint = outside(c, d, out[row])
+            joint = _outside(c, d, out[row])
             if joint >= 0:
                 _stop_at_limit(c, w, d, m, method, t, h, last, (t_eval[row] - t) / h, joint)
                 return
             s[OUT] += 1
-        joint = outside(c, d, m.znew)
+        joint = _outside(c, d, m.znew)
         if joint >= 0:
             _stop_at_limit(c, w, d, m, method, t, h, last, 1.0, joint)
             return
@@ -479,9 +486,7 @@ def advance(
         _weights(c, m, rtol, m.z)
         if landed and stop < end:
             s[FRESH] = 0.0  # the drive may jump here
-        elif method >= PAIR_3:
-            s[FRESH] = 0.0  # these have no stage at the end
-        else:
+        elif method < PAIR_3:
             _copy(m.K[12 if method == EXPLICIT else 5], m.K[0])
         if tn >= end:
             s[STATUS] = DONE
