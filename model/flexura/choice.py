@@ -23,9 +23,9 @@ def choose(system: System, duration: float, rtol: float, rate_Hz: float = 0.0) -
     tolerance; under a controller of `rate_Hz` every tick is a step at least."""
     spectrum = system.spectrum
     elastic = spectrum[spectrum > 1e-3 * max(spectrum[-1], 1e-300)]
-    slow = elastic[min(2, len(elastic) - 1)] if len(elastic) else 1e-3
     if rate_Hz > 0.0:
-        steps = {  # a tick: by stability, and by the tolerance along the slow modes
+        slow = elastic[0] if len(elastic) else 1e-3
+        steps = {  # passes of a step, and its length by the tolerance along the slowest mode
             loop.PAIR_3: (3, (100 * rtol) ** (1 / 3) / slow),
             loop.PAIR_5: (6, (4000 * rtol) ** (1 / 5) / slow),
             loop.EXPLICIT: (13, np.inf),
@@ -35,6 +35,7 @@ def choose(system: System, duration: float, rtol: float, rate_Hz: float = 0.0) -
         return min(steps, key=lambda k: steps[k][0] * ticks(k))
     if len(elastic) == 0:
         return loop.EXPLICIT
+    slow = elastic[min(2, len(elastic) - 1)]
     # the factors are counts of passes per radian, measured on the rig and on its undamped benchmark
     explicit = duration * max(2.4 * spectrum[-1], 2 * _damped(system), 0.8 * slow * rtol ** (-1 / 8))
     implicit = duration * 0.2 * slow * rtol ** (-1 / 4)

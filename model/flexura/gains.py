@@ -109,7 +109,7 @@ class Gains:
             raise InputError(expected, key="controller", value=len(kinds), file=self.file)
         joints = []
         for i, (kind, reference) in enumerate(zip(kinds, references, strict=True)):
-            given: dict[str, Any] = {"delay_s": 1 / rate} if kind == "stepper" else {}
+            given: dict[str, Any] = {"delay_s": 1 / rate} if kind == "stepper" and rate > 0 else {}
             given |= {"derivative_Hz": self.settings["derivative_Hz"]} if "derivative_Hz" in self.settings else {}
             for name, value in self.settings.items():
                 if name not in _SHARED:

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .compiled import compiled, inlined
+from .compiled import inlined
 from .signal import evaluate
 
 NONE, EFFORT, STEPPER = 0, 1, 2  # what a joint's output is: not this controller's, a force or voltage, a rate
@@ -171,7 +171,7 @@ def _linear(d: Law, i: int) -> float:
     return wish
 
 
-@compiled
+@inlined
 def tick(d: Law, segments: np.ndarray, t: float, z: np.ndarray) -> None:
     """The tick at t: measure the state z, compute, put what is held until the next tick into the loop's `segments`."""
     k, per_tick, rate_Hz, linear = int(d.sensor[TICK]), 1.0 / d.rate_Hz, d.rate_Hz, d.F.shape[0] > 0

@@ -193,7 +193,7 @@ def _explicit_step(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, 
     return abs(h) * e5 / np.sqrt((e5 + 0.01 * e3) * m.scale.shape[0])
 
 
-@compiled
+@inlined
 def _pair_step(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, last: float, method: int) -> float:
     """One step of a pair from m.z to m.znew, its first stage included; returns the error norm."""
     K, new, pair = m.K, m.znew, method - PAIR_3
@@ -424,8 +424,8 @@ def advance(
             stop = d.breaks[int(s[BREAK])]
         last = np.nextafter(stop, -1e300)  # drives are read just before the break at which this step may end
         if s[FRESH] == 0.0:
-            _weights(c, m, rtol, m.z)
-            if method < PAIR_3:
+            if s[STEPS] == 0.0 or method < PAIR_3:
+                _weights(c, m, rtol, m.z)
                 _slope_once(c, w, d, m, t, m.z, m.K[0])
             s[FRESH] = 1.0
         h = min(s[H], stop - t, s[LONGEST] * _shortest(c, m.z))
