@@ -221,7 +221,8 @@ class Controller:
         return Law(
             rate_Hz=float(self.rate_Hz), start=float(start), kind=kind, gains=gains, rows=rows,
             segments=np.ascontiguousarray(np.concatenate(parts)), ranges=ranges, first=c.first[:-1].copy(), look=look,
-            sleeve=sleeve, quantum=float(self.deflection_quantum_m), **{f.name: getattr(linear, f.name) for f in fields(Linear)},
+            sleeve=sleeve, quantum=float(self.deflection_quantum_m),
+            **{f.name: np.array(getattr(linear, f.name), dtype=float, order="C") for f in fields(Linear)},
             z=np.zeros((2, len(linear.F))), y=np.zeros(len(linear.offset)), memory=np.zeros((N, 9)), sensor=np.zeros(7),
             ring=np.zeros((N, late)), log=np.zeros((ticks, N, law.LOGGED)),
         )  # fmt: skip
