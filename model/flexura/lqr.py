@@ -95,15 +95,23 @@ def lqr(
     R = np.diag(1 / _many(effort, m, "effort") ** 2)
     process = G @ np.diag(_many(disturbance, m, "disturbance") ** 2) @ G.T
     V = np.diag(_many(noise, len(C), "noise") ** 2)
-    try:
-        P = solve_discrete_are(F, G, Q, R)
-        S = solve_discrete_are(F.T, C.T, process, V)
-    except (np.linalg.LinAlgError, ValueError):
-        raise InputError("expected weights and measurements that a stabilising controller exists for", key="effort") from None
+    P, S = _riccati(F, G, Q, R, "effort"), _riccati(F.T, C.T, process, V, "noise")
     K = np.linalg.solve(R + G.T @ P @ G, G.T @ P @ F)
     L = np.linalg.solve(C @ S @ C.T + V, C @ S).T
     design = Design(F, G, C, K, L, P, S, linear.states, tuple(linear.outputs[k] for k in places + bent[-1:]), tuple(driven))
     return replace(controller, linear=_linear(system, design, linear.q, linear.hold, scale, len(joints))), design
+
+
+def _riccati(F: np.ndarray, G: np.ndarray, Q: np.ndarray, R: np.ndarray, key: str) -> np.ndarray:
+    """The stabilising solution of P = Q + F^T P (F - G K). SciPy's balancing sometimes spoils its reordering: then without."""
+    for balanced in (True, False):
+        try:
+            P = solve_discrete_are(F, G, Q, R, balanced=balanced)
+        except (np.linalg.LinAlgError, ValueError):
+            continue
+        if np.abs(np.linalg.eigvals(F - G @ np.linalg.solve(R + G.T @ P @ G, G.T @ P @ F))).max() < 1:
+            return P
+    raise InputError("expected weights and measurements that a stabilising controller exists for", key=key)
 
 
 def _linear(system: System, d: Design, q: np.ndarray, hold: np.ndarray, scale: Sequence[float], joints: int) -> Linear:

@@ -217,6 +217,23 @@ def test_the_models_law_is_the_boards(lib, seed, g, tight, filters):
         assert np.all(np.abs(got[j] - wanted[j])[1:] <= bound[1:])
 
 
+def test_both_stop_their_sums_at_a_limit(lib):
+    """0.3 s against both limits, then back: the sums end alike but for a tick's share where the limit begins and ends to hold."""
+    own = dict(
+        kp_1_V_m=1000, ki_1_V_m_s=8000, voltage_max_V=3, voltage_slew_V_s=300, kp_2_1_s=5, ki_2_1_s2=20, rate_max_2_rad_s=0.5,
+        acceleration_max_2_rad_s2=59.9218, kv_2=0,
+    )  # fmt: skip
+    values, _ = settings_of(**WIDE, **own)
+    rows = np.zeros((900, 4), np.int64)
+    rows[2:300, :2], rows[300:, :2] = (220 * 256, 150 * 256), (-60 * 256, -40 * 256)
+    rows[:, 3] = 2048
+    got, wanted = board(lib, values, rows), model(values, rows)
+    share = 8000 * 280 / 80000 * TICK_S, 20 * 190 / 509 * TICK_S
+    for j in range(2):
+        assert np.abs(wanted[j]).max() == pytest.approx((3, 0.5)[j])
+        assert np.abs(got[j] - wanted[j])[1:].max() < 4 * share[j] + (0.05, 0.01)[j]
+
+
 @given(st.lists(st.integers(-16383, 16383), min_size=1, max_size=60))
 def test_no_step_is_lost_or_added_and_none_is_too_soon(lib, rates):
     rates = np.repeat(rates, 5).astype(np.int16)

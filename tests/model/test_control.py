@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ import flexura as fx
 from flexura import control, gains, law, lqr, signal
 from robots import beam, rigid, robot, system
 
-TICK = 1e-3
+TICK, ROOT = 1e-3, Path(__file__).resolve().parents[2]
 
 
 def cart(mass: float = 2.0, **keys) -> fx.System:
@@ -223,6 +224,14 @@ def test_an_lqr_brings_the_rig_to_rest_where_pd_leaves_it_swinging():
     assert good["joint/2/position"][-1] == pytest.approx(0.4, abs=1e-3)
 
 
+def test_an_lqr_is_found_for_a_light_rotor_too():
+    """On the rig's own file, whose rotor of 5 g cm^2 makes the states' scales differ by six orders."""
+    tables = fx.load(ROOT / "model" / "robots" / "rig.toml").to_dict()
+    tables["link"][1]["modes"] = 2
+    _, d = quiet(fx.assemble(fx.Robot.from_dict(tables)), [signal.constant(0.0)] * 2)
+    assert np.abs(d.poles).max() < 1 and np.abs(d.observer_poles).max() < 1
+
+
 def test_feedforwards_carry_the_motion():
     """Inverse dynamics in place of feedback; gravity in place of a sum."""
     sys, t = rig(), np.arange(0, 0.6, TICK)
@@ -259,6 +268,14 @@ def test_a_law_that_makes_no_sense_is_refused(change, key):
     with pytest.raises(fx.InputError) as caught:
         fx.PID(signal.constant(0.0), **change)
     assert caught.value.key == key
+
+
+def test_the_twin_refuses_a_sampled_controller():
+    from flexura import twin
+
+    c = fx.PID(signal.constant(0.0))
+    with pytest.raises(fx.InputError, match="drive"):
+        twin.simulate(rig().robot, [0.0, 0.1], fx.Controller((c, c)))
 
 
 def test_delays_between_ticks_nodal_robots_and_wrong_counts_are_refused():
