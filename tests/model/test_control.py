@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 import flexura as fx
-from flexura import control, gains, law, lqr, signal
+from flexura import control, gains, law, lqr, shaping, signal
 from robots import beam, rigid, robot, system
 
 TICK, ROOT = 1e-3, Path(__file__).resolve().parents[2]
@@ -247,6 +247,22 @@ def test_feedforwards_carry_the_motion():
     (ahead,) = control.gravity(hanging, [signal.constant(0.3)], [0.0, 5.0])
     arm = fx.PID(signal.constant(0.3), kp=20.0, kd=2.0, feedforward=ahead)
     assert fx.simulate(hanging, [0.0, 5.0], fx.Controller((arm,)))["joint/1/position"][-1] == pytest.approx(0.3, abs=1e-6)
+
+
+def test_shaped_references_leave_the_strip_at_rest():
+    """ZV, ZVD and a matched cycloid at the clamped frequency, given to a stepper that counts its pulses."""
+    sys, t = rig(), np.arange(0, 1.5, TICK)
+    f = fx.frequencies(sys)[0]
+    move = signal.polynomial(0.4, 0.25)
+    held = fx.PID(signal.constant(0.0), kp=9000, kd=500)
+
+    def left(reference) -> float:
+        step = fx.PID(reference, fx.Stepper(), kp=20, kv=1, delay_s=TICK)
+        return float(np.abs(fx.simulate(sys, t, fx.Controller((held, step)))["link/2/tip_deflection"][t > 0.8]).max())
+
+    plain = left(move)
+    for reference in (shaping.zv(move, f), shaping.zvd(move, f), shaping.matched_cycloid(0.4, f)):
+        assert left(reference) < 0.1 * plain
 
 
 def test_slope_terms_are_deflection_terms_on_a_strip_loaded_at_its_tip():
