@@ -40,20 +40,25 @@ Rtol = Annotated[float, typer.Option(help="relative tolerance of the native solv
 @app.command()
 def simulate(
     robot: RobotFile, manoeuvre: ManoeuvreFile = None, out: Out = None, rtol: Rtol = 1e-6,
-    method: Annotated[str, typer.Option(help="auto, explicit or implicit")] = "auto", json: Json = False,
+    method: Annotated[str, typer.Option(help="auto, explicit, explicit-3, explicit-5 or implicit")] = "auto", json: Json = False,
+    controller: Annotated[
+        Path | None, typer.Option(metavar="GAINS", help="gains file (TOML): a sampled controller follows the manoeuvre's motions")
+    ] = None,
 ) -> None:  # fmt: skip
     """Simulate a robot natively and store the run.
 
     \b
-    Example: flexura simulate model/robots/rig.toml model/manoeuvres/rig-inverse-law.toml
+    Example: flexura simulate model/robots/rig.toml model/manoeuvres/rig-step.toml --controller model/controllers/rig.toml
     """
     import flexura as fx
 
     from . import tables
+    from .controlled import controlled
 
     system, asked = prepare(robot, manoeuvre)
+    drive = controlled(system, asked, controller) if controller else asked.drive
     with progress_bars("native") as report:
-        run = fx.simulate(system, asked.t, asked.drive, rtol=rtol, method=method, progress=lambda f: report("native", f))
+        run = fx.simulate(system, asked.t, drive, rtol=rtol, method=method, progress=lambda f: report("native", f))
     run.meta["manoeuvre"] = asked.name
     folder = out or default_folder("simulate", robot)
     path = run.save(folder)

@@ -24,17 +24,19 @@ _HOME = {
     "simulate": "forward", "inverse": "forward",
     "Run": "run",
     "Drive": "drive", "JointDrive": "drive", "Manoeuvre": "drive", "load_manoeuvre": "drive",
+    "Controller": "control", "PID": "control", "Force": "control", "Motor": "control", "Stepper": "control",
     "Signal": "signal",
     "FlexuraError": "errors", "InputError": "errors",
 }  # fmt: skip
 
 __all__ = [
-    "Drive", "FlexuraError", "InputError", "JointDrive", "Manoeuvre", "Robot", "Run", "Signal",
-    "StateSpace", "System",
+    "PID", "Controller", "Drive", "FlexuraError", "Force", "InputError", "JointDrive", "Manoeuvre", "Motor", "Robot", "Run",
+    "Signal", "StateSpace", "Stepper", "System",
     "assemble", "cut", "frequencies", "inverse", "linearize", "load", "load_manoeuvre", "save", "simulate", "static", "tip_pose",
 ]  # fmt: skip
 
 if TYPE_CHECKING:
+    from .control import PID, Controller, Force, Motor, Stepper
     from .cutting import cut
     from .drive import Drive, JointDrive, Manoeuvre, load_manoeuvre
     from .errors import FlexuraError, InputError

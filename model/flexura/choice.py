@@ -8,32 +8,43 @@ from . import exponential, loop
 from .chain import SLIDER
 from .system import System
 
-
-def longest_step(system: System) -> float:
-    """The explicit method's longest stable step [s], with 10 % to spare for a spectrum that moves with the robot.
-
-    DOP853 is stable for omega h < 5.97 on the imaginary axis and 6.39 on the real one. Beyond, its error estimate alone would
-    let the fastest modes grow for a few steps at a time, far above the tolerance.
-    """
-    return 5.3 / max(system.spectrum[-1], _damped(system), 1e-300)
+# |z| of y' = z y up to which a method is stable, with about 10 % to spare for a spectrum that moves with the robot: DOP853 5.97
+# on the imaginary axis, 6.39 on the real one; Ralston's 1.73, 2.51; Cash and Karp's grows by 2e-4 a step at 1.0i
+_STABLE = {loop.EXPLICIT: 5.3, loop.PAIR_3: 1.55, loop.PAIR_5: 1.0, loop.IMPLICIT: np.inf, exponential.EXPONENTIAL: np.inf}
 
 
-def quickest(system: System, duration: float, rtol: float) -> int:
+def quickest(system: System, duration: float, rtol: float, rate_Hz: float = 0.0) -> int:
     """Exponential steps wherever the robot's modes stay much the same from step to step, which under a slider that moves along a
     flexible link they do not, and where their order does not fall behind the explicit method's; else as `choose`."""
     c = system.chain
     bends = np.diff(c.first) > 1
     rides = (c.kind[1:] == SLIDER) & bends[:-1] & (c.locked[1:] == 0)
-    if rides.any() or not bends.any() or rtol < 1e-9:
-        return choose(system, duration, rtol)
+    if rate_Hz > 0.0 or rides.any() or not bends.any() or rtol < 1e-9:
+        return choose(system, duration, rtol, rate_Hz)
     return exponential.EXPONENTIAL
 
 
-def choose(system: System, duration: float, rtol: float) -> int:
-    """Explicit or implicit: the cheaper method by a count of passes: explicit steps follow the fastest mode, implicit ones the slow modes and the
-    tolerance."""
+def longest_step(system: System, method: int = loop.EXPLICIT) -> float:
+    """A method's longest stable step [s]. Beyond, an explicit method's error estimate alone would let the fastest modes grow for
+    a few steps at a time, far above the tolerance."""
+    return _STABLE[method] / max(system.spectrum[-1], _damped(system), 1e-300)
+
+
+def choose(system: System, duration: float, rtol: float, rate_Hz: float = 0.0) -> int:
+    """The cheaper method by a count of passes: explicit steps follow the fastest mode, implicit ones the slow modes and the
+    tolerance; under a controller of `rate_Hz` every tick is a step at least."""
     spectrum = system.spectrum
     elastic = spectrum[spectrum > 1e-3 * max(spectrum[-1], 1e-300)]
+    if rate_Hz > 0.0:
+        slow = elastic[0] if len(elastic) else 1e-3
+        steps = {  # passes of a step, and its length by the tolerance along the slowest mode
+            loop.PAIR_3: (3, (100 * rtol) ** (1 / 3) / slow),
+            loop.PAIR_5: (6, (4000 * rtol) ** (1 / 5) / slow),
+            loop.EXPLICIT: (13, np.inf),
+            loop.IMPLICIT: (12, (rtol ** (1 / 4)) / (0.02 * slow)),
+        }
+        ticks = lambda k: np.ceil(1 / rate_Hz / min(longest_step(system, k), steps[k][1]))
+        return min(steps, key=lambda k: steps[k][0] * ticks(k))
     if len(elastic) == 0:
         return loop.EXPLICIT
     slow = elastic[min(2, len(elastic) - 1)]

@@ -46,7 +46,7 @@ def _folder() -> Path:
     digest = hashlib.sha256(numba.__version__.encode())
     for source in sorted(_HERE.glob("*.py")):
         text = source.read_bytes()
-        if b"from .compiled import" in text or source.name in ("compiled.py", "chain.py"):
+        if b"from .compiled import" in text or source.name in ("compiled.py", "chain.py", "tableaus.py"):
             digest.update(text)
     name = f"compiled-{digest.hexdigest()[:16]}"
     for parent in (_HERE / "__pycache__", Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "flexura"):

@@ -90,6 +90,10 @@ class Drive:
                 out[i] += joint.kp * (r - position[i]) + joint.kd * (rd - velocity[i])
         return out
 
+    def spec(self) -> list[dict[str, Any]]:
+        """The joints' tables of a manoeuvre file."""
+        return [joint.spec() for joint in self.joints]
+
     @property
     def breaks(self) -> np.ndarray:
         """Instants at which a drive isn't smooth, ascending [s]."""
@@ -137,8 +141,8 @@ class Manoeuvre:
 
     def spec(self) -> dict[str, Any]:
         """The tables of a manoeuvre file, every key given."""
-        joints = [joint.spec() for joint in self.drive.joints]
-        return {"name": self.name, "duration_s": self.duration_s, "output_step_s": self.output_step_s, "joint": joints}
+        own = {"name": self.name, "duration_s": self.duration_s, "output_step_s": self.output_step_s}
+        return own | {"joint": self.drive.spec()}
 
 
 _KEYS = ("name", "duration_s", "output_step_s", "joint")

@@ -21,11 +21,11 @@ from .compiled import compiled, inlined
 from .kernel import passes
 from .loop import (
     BREAK, DONE, ERR, EVALS, FAULT, FRESH, LIMIT, OUT, REJECTED, STATUS, STEPS, STUCK, H, Inputs, Memory, T, _copy, _find,
-    _powers, _prescribe, _weights, drive, outside,
+    _outside, _powers, _prescribe, _weights, drive,
 )  # fmt: skip
 from .propagator import free, moments
 
-EXPONENTIAL = 2  # beside loop.EXPLICIT and IMPLICIT
+EXPONENTIAL = 4  # beside the methods of `loop`
 ORDER = 5
 STIFF_ORDER = 2  # of modes that turn by more than STIFF rad a step: extrapolation would blow up what the basis leaves of them
 STIFF = 3.0
@@ -314,7 +314,7 @@ def _stop_at_limit(
         middle = 0.5 * (low + high) if turn < 60 else low
         _inside(m, b, p, h, middle, out)
         _prescribe(c, w, d, t + middle * h, out[:n], out[n : 2 * n])
-        joint = outside(c, d, out)
+        joint = _outside(c, d, out)
         if joint >= 0:
             high, m.s[FAULT] = middle, joint
         else:
@@ -396,12 +396,12 @@ def advance(
                     prepared = True
                 _inside(m, b, p, h, (t_eval[row] - t) / h, out[row])
                 _prescribe(c, w, d, t_eval[row], out[row, :n], out[row, n : 2 * n])
-            joint = outside(c, d, out[row])
+            joint = _outside(c, d, out[row])
             if joint >= 0:
                 _stop_at_limit(c, w, d, m, b, p, t, h, (t_eval[row] - t) / h, joint)
                 return
             s[OUT] += 1
-        joint = outside(c, d, m.znew)
+        joint = _outside(c, d, m.znew)
         if joint >= 0:
             _force_inside(p)
             _stop_at_limit(c, w, d, m, b, p, t, h, 1.0, joint)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,22 +14,24 @@ from . import exponential, loop, nodal
 from .basis import basis
 from .chain import Work
 from .choice import choose, longest_step, quickest
+from .control import PID, Controller, replay
 from .drive import Drive
 from .errors import FlexuraError, InputError
 from .kernel import accelerate
+from .law import none
 from .record import limit_event, record
 from .run import Run
 from .signal import Signal
 from .system import System
 
-_METHODS = {"explicit": loop.EXPLICIT, "implicit": loop.IMPLICIT, "exponential": exponential.EXPONENTIAL}
+_METHODS = {"explicit": loop.EXPLICIT, "implicit": loop.IMPLICIT, "explicit-3": loop.PAIR_3, "explicit-5": loop.PAIR_5, "exponential": exponential.EXPONENTIAL}
 _STEPS_A_CALL = 400  # between two looks at the progress bar and the keyboard
 
 
 def simulate(
     system: System,
     t_eval: Any,
-    drive: Drive | Callable[..., Any] | None = None,
+    drive: Drive | Controller | Callable[..., Any] | None = None,
     q0: Any = None,
     qd0: Any = None,
     rtol: float = 1e-6,
@@ -38,10 +41,10 @@ def simulate(
 ) -> Run:
     """Integrate the equations of motion from t_eval[0] on; the Run has its channels at t_eval (T,), ascending [s].
 
-    `drive`: a Drive (compiled), or a function (t) -> (N,) or (t, position, velocity, tip_deflection) -> (N,) of forces and
-    torques [N or N m] (slower, by scipy). `q0`, `qd0` (n,): state at the start, by default `system.start()` at
-    rest. `rtol`: largest local error relative to the largest value so far. `method`: "explicit", "implicit", "exponential" or
-    "auto" (`choice.py`).
+    `drive`: a Drive or a sampled Controller (compiled), or a function (t) -> (N,) or (t, position, velocity, tip_deflection) ->
+    (N,) of forces and torques [N or N m] (slower, by scipy). `q0`, `qd0` (n,): state at the start, by default `system.start()`
+    at rest. `rtol`: largest local error relative to the largest value so far. `method`: "explicit" (order 8), "explicit-3",
+    "explicit-5" (cheaper where a controller ticks), "implicit", "exponential" or "auto" (`choice.py`).
     `progress` is called with the finished fraction. A joint that reaches a limit of the robot file or the end of its link ends
     the run: the Run holds the states before it and, last, the one at that instant, an event says so and `meta["complete"]` is
     false. A Ctrl-C ends it too. `meta["energy_error"]` is the largest |E - E(0) - work + loss| relative to the largest energy,
@@ -51,12 +54,11 @@ def simulate(
     if not 1e-13 <= rtol <= 0.1:
         raise InputError("expected a relative tolerance between 1e-13 and 0.1", key="rtol", value=rtol)
     if method not in ("auto", *_METHODS):
-        names = " or ".join(f'"{name}"' for name in ("auto", *_METHODS))
-        raise InputError(f"expected {names}", key="method", value=method)
+        raise InputError(f"expected one of auto, {', '.join(_METHODS)}", key="method", value=method)
     q, qd = _state(system, "q0", q0, system.start()), _state(system, "qd0", qd0, np.zeros(system.n))
     qd[system.joint_rows[system.chain.locked.astype(bool)]] = 0.0
     drive = Drive.none(len(system.robot.links)) if drive is None else drive
-    if isinstance(drive, Drive):
+    if isinstance(drive, Drive | Controller):
         if len(drive.joints) != len(system.robot.links):
             raise InputError(
                 f"expected {len(system.robot.links)} joint drives, one a joint", key="drive", value=len(drive.joints)
@@ -66,16 +68,28 @@ def simulate(
         drive = as_function(drive)
     _inside_limits(system, q)
     if system.robot.nodal:
+        if isinstance(drive, Controller):
+            raise InputError('expected a robot with sliding = "continuous" under a Controller', key="sliding", value="nodal")
         return nodal.simulate(simulate, system, t, drive, q, qd, rtol, method, progress)
     state = np.concatenate([system.to_solver @ q, system.to_solver @ qd, [0.0, 0.0]])
-    chosen = quickest(system, t[-1] - t[0], rtol) if method == "auto" else _METHODS[method]
-    if isinstance(drive, Drive):
-        t, states, work, meta = _compiled(system, t, drive, state, rtol, chosen, progress)
+    rate_Hz = drive.rate_Hz if isinstance(drive, Controller) else 0.0
+    if method == "auto" or (method == "exponential" and not isinstance(drive, Drive)):
+        choice = quickest if isinstance(drive, Drive) else choose
+        chosen = choice(system, t[-1] - t[0], rtol, rate_Hz)
     else:
-        chosen = choose(system, t[-1] - t[0], rtol) if method in ("auto", "exponential") else chosen
+        chosen = _METHODS[method]
+    about = {"rtol": rtol, "method": next(name for name, value in _METHODS.items() if value == chosen)}
+    if not isinstance(drive, Drive | Controller):
         t, states, work, meta = _python(system, t, drive, state, rtol, chosen, progress)
-    meta |= {"rtol": rtol, "method": next(name for name, number in _METHODS.items() if number == chosen)}
-    return record(system, t, states, work, _applied(system, t, states, drive), meta)
+        return record(system, t, states, work, _called(system, t, states, drive), meta | about)
+    inputs = _inputs(system, drive, t)
+    t, states, work, meta = _compiled(system, t, drive, inputs, state, rtol, chosen, progress)
+    run = record(system, t, states, work, _applied(system, t, states, drive, inputs), meta | about)
+    if isinstance(drive, Controller):
+        channels, units = drive.channels(inputs.law, t)
+        units = {name: unit or run.units[f"joint/{name.split('/')[1]}/position"] for name, unit in units.items()}
+        run = replace(run, channels=run.channels | channels, units=run.units | units)
+    return run
 
 
 def inverse(
@@ -105,7 +119,8 @@ def inverse(
 def _compiled(
     system: System,
     t: np.ndarray,
-    drive: Drive,
+    drive: Drive | Controller,
+    inputs: loop.Inputs,
     state: np.ndarray,
     rtol: float,
     method: int,
@@ -113,11 +128,11 @@ def _compiled(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
     """Times, states (T, 2n), work and loss (T, 2), and what the Run's metadata says of the solution."""
     c, n, links = system.chain, system.n, len(system.robot.links)
-    inputs, m, w = _inputs(system, drive), loop.memory(links, n), _following(system, drive)
+    m, w = loop.memory(links, n), _following(system, drive)
     out = np.zeros((len(t), 2 * n + 2))
     m.z[:], out[0] = state, state
     m.s[loop.T], m.s[loop.OUT], m.s[loop.ERR] = t[0], 1, 1.0
-    longest = longest_step(system) if method == loop.EXPLICIT else np.inf
+    longest = longest_step(system, method)
     m.s[loop.LONGEST], m.s[loop.H] = longest, min(0.02 * longest, (t[-1] - t[0]) * 1e-4)
     events: list[dict[str, Any]] = []
     complete = len(t) == 1
@@ -157,17 +172,22 @@ def _compiled(
         name: int(m.s[k]) for name, k in (("steps", loop.STEPS), ("rejected", loop.REJECTED), ("evaluations", loop.EVALS))
     }
     counts["wall_s"] = time.perf_counter() - begun
-    about = counts | {"complete": complete, "events": events, "drive": [j.spec() for j in drive.joints]}
+    about = counts | {"complete": complete, "events": events, "drive": drive.spec()}
     return t[:rows], out[:rows, : 2 * n], out[:rows, 2 * n :], about
 
 
-def _inputs(system: System, drive: Drive) -> loop.Inputs:
+def _inputs(system: System, drive: Drive | Controller, t: np.ndarray | None = None) -> loop.Inputs:
+    """What acts on the robot; a controller's ticks begin at t[0] and are logged up to t[-1]."""
     segments, ranges, gains = drive.packed()
     limits = _slack(system)
-    follows = drive.follows.astype(np.int64)
+    law = none()
+    if isinstance(drive, Controller):
+        start, end = (0.0, 0.0) if t is None else (t[0], t[-1])
+        law = drive.law(system, ranges, start, int(np.ceil((end - start) * drive.rate_Hz - 1e-6)) + 1)
     return loop.Inputs(
-        segments, ranges, gains[:, 0].copy(), gains[:, 1].copy(), follows, limits[:, 0].copy(), limits[:, 1].copy(), drive.breaks
-    )
+        segments, ranges, gains[:, 0].copy(), gains[:, 1].copy(), drive.follows.astype(np.int64), limits[:, 0].copy(),
+        limits[:, 1].copy(), drive.breaks, law,
+    )  # fmt: skip
 
 
 def _slack(system: System) -> np.ndarray:
@@ -175,7 +195,7 @@ def _slack(system: System) -> np.ndarray:
     return system.limits + [-1e-9, 1e-9] * np.maximum(1.0, np.abs(np.where(np.isfinite(system.limits), system.limits, 0.0)))
 
 
-def _following(system: System, drive: Drive) -> Work:
+def _following(system: System, drive: Drive | Controller) -> Work:
     """A workspace in which the joints with a prescribed motion are held to it."""
     w = system._work()
     w.held[:] |= drive.follows
@@ -287,14 +307,21 @@ def _forces(system: System, call: Callable[..., Any], t: float, y: np.ndarray, v
     return force
 
 
-def _applied(system: System, t: np.ndarray, states: np.ndarray, drive: Any) -> np.ndarray:
-    n, rows = system.n, system.joint_rows
-    if isinstance(drive, Drive):
-        out = np.zeros((len(t), len(rows)))
-        loop.forces(system.chain, _following(system, drive), _inputs(system, drive), loop.memory(len(rows), n), t, states, out)
-    else:
-        out = np.array([_forces(system, drive, s, z[:n], z[n:]) for s, z in zip(t, states, strict=True)])
-    return out.reshape(len(t), len(rows))
+def _applied(system: System, t: np.ndarray, states: np.ndarray, drive: Drive | Controller, inputs: loop.Inputs) -> np.ndarray:
+    """The drive forces (T, N) at the states (T, 2n) of a run; what a controller held is replayed."""
+    n, links = system.n, len(system.robot.links)
+    if isinstance(drive, Controller):
+        segments, ranges = replay(inputs.law, inputs.segments, inputs.ranges)
+        inputs = inputs._replace(segments=segments, ranges=ranges, law=none())
+    out = np.zeros((len(t), links))
+    loop.forces(system.chain, _following(system, drive), inputs, loop.memory(links, n), t, states, out)
+    return out
+
+
+def _called(system: System, t: np.ndarray, states: np.ndarray, drive: Callable[..., Any]) -> np.ndarray:
+    """The forces (T, N) of a drive function at the states (T, 2n) of a run."""
+    out = [_forces(system, drive, s, z[: system.n], z[system.n :]) for s, z in zip(t, states, strict=True)]
+    return np.array(out).reshape(len(t), len(system.robot.links))
 
 
 def _times(t_eval: Any) -> np.ndarray:
@@ -313,9 +340,11 @@ def _state(system: System, key: str, value: Any, default: np.ndarray) -> np.ndar
     return array
 
 
-def _put_on_motions(system: System, drive: Drive, t: float, q: np.ndarray, qd: np.ndarray) -> None:
+def _put_on_motions(system: System, drive: Drive | Controller, t: float, q: np.ndarray, qd: np.ndarray) -> None:
     for joint, row in zip(drive.joints, system.joint_rows, strict=True):
-        if joint.prescribed and joint.motion is not None:
+        if isinstance(joint, PID):
+            qd[row] = 0.0 if joint.prescribed else qd[row]
+        elif joint.prescribed and joint.motion is not None:
             q[row], qd[row], _ = joint.motion(t)
 
 

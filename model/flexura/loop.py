@@ -3,8 +3,10 @@
 Explicit: DOP853 (Dormand and Prince 8(5,3), dense output of order 7; coefficients from SciPy). Implicit: ESDIRK4(3)6L[2]SA of
 Kennedy and Carpenter (2003, Appl. Numer. Math. 44), L-stable; each stage is solved by passes of `kernel.accelerate`, which
 holds stiffness, damping and gains implicitly, so that a pass costs what an explicit evaluation costs and steps follow the
-motion, not the stiffest mode. The local error of joint i is kept below rtol times the largest |eta_i| so far, that of a link's
-elastic unknowns below rtol times their largest norm so far, and so for the velocities; FLOOR replaces these at the start.
+motion, not the stiffest mode. Under a sampled controller (`law.py`) every tick is an instant to step on, and two pairs without a
+stage at the end of the step are cheaper: Ralston 3(2), and 5(4) of Cash and Karp. The local error of joint i is kept below rtol
+times the largest |eta_i| so far, that of a link's elastic unknowns below rtol times their largest norm so far, and so for the
+velocities; FLOOR replaces these at the start.
 """
 
 from __future__ import annotations
@@ -12,36 +14,18 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.integrate import DOP853
 
 from .chain import COULOMB_SPEED, SLEEVE, SLIDER, Chain, Work
 from .compiled import compiled, inlined
 from .kernel import passes
+from .law import Law, due, tick
 from .signal import evaluate
+from .tableaus import _A, _AX, _C, _CX, _D, _E3, _E5, _EA, _EC, _EE, _PA, _PC, _PE, GAMMA
 
-EXPLICIT, IMPLICIT = 0, 1
+EXPLICIT, IMPLICIT, PAIR_3, PAIR_5 = 0, 1, 2, 3
 RUNNING, DONE, LIMIT, STUCK = 0, 1, 2, 3
 T, H, OUT, BREAK, STEPS, REJECTED, EVALS, ERR, STATUS, FRESH, FAULT, LONGEST = range(12)  # entries of Memory.s
 FLOOR = 1e-3  # m, rad (joints); kg^(1/2) m (elastic, mass-normalised); per second for the velocities
-
-_A, _C = np.zeros((13, 12)), np.append(DOP853.C, 1.0)
-_A[:12], _A[12] = DOP853.A, DOP853.B  # the last stage is the end of the step
-_E3, _E5 = DOP853.E3.copy(), DOP853.E5.copy()
-_AX, _CX, _D = DOP853.A_EXTRA.copy(), DOP853.C_EXTRA.copy(), DOP853.D.copy()
-
-GAMMA = 0.25
-_EA = np.array([
-    [0, 0, 0, 0, 0, 0],
-    [1 / 4, 1 / 4, 0, 0, 0, 0],
-    [8611 / 62500, -1743 / 31250, 1 / 4, 0, 0, 0],
-    [5012029 / 34652500, -654441 / 2922500, 174375 / 388108, 1 / 4, 0, 0],
-    [15267082809 / 155376265600, -71443401 / 120774400, 730878875 / 902184768, 2285395 / 8070912, 1 / 4, 0],
-    [82889 / 524892, 0, 15625 / 83664, 69875 / 102672, -2260 / 8211, 1 / 4],
-])  # fmt: skip
-_EC = np.array([0, 1 / 2, 83 / 250, 31 / 50, 17 / 20, 1])
-_EE = _EA[5] - np.array(
-    [4586570599 / 29645900160, 0, 178811875 / 945068544, 814220225 / 1159782912, -3700637 / 11593932, 61727 / 225920]
-)
 
 
 class Inputs(NamedTuple):
@@ -55,6 +39,7 @@ class Inputs(NamedTuple):
     low: np.ndarray
     high: np.ndarray
     breaks: np.ndarray
+    law: Law  # a sampled controller, which writes into the segments
 
 
 class Memory(NamedTuple):
@@ -208,6 +193,26 @@ def _explicit_step(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, 
     return abs(h) * e5 / np.sqrt((e5 + 0.01 * e3) * m.scale.shape[0])
 
 
+@inlined
+def _pair_step(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, last: float, method: int) -> float:
+    """One step of a pair from m.z to m.znew, its first stage included; returns the error norm."""
+    K, new, pair = m.K, m.znew, method - PAIR_3
+    stages = 3 if method == PAIR_3 else 6
+    for s in range(stages):
+        _combine(m, h, _PA[pair, s], s, new)
+        _slope(c, w, d, m, min(t + _PC[pair, s] * h, last), new, K[s])
+    _combine(m, h, _PA[pair, stages], stages, new)
+    _prescribe(c, w, d, last if t + h > last else t + h, new[: m.a.shape[0]], new[m.a.shape[0] : 2 * m.a.shape[0]])
+    error = 0.0
+    for k in range(m.scale.shape[0]):
+        total = 0.0
+        for j in range(stages):
+            total += _PE[pair, j] * K[j, k]
+        total *= h * m.scale[k]
+        error += total * total
+    return np.sqrt(error / m.scale.shape[0])
+
+
 @compiled
 def _slope_once(c: Chain, w: Work, d: Inputs, m: Memory, t: float, z: np.ndarray, dz: np.ndarray) -> None:
     _slope(c, w, d, m, t, z, dz)
@@ -224,6 +229,15 @@ def forces(c: Chain, w: Work, d: Inputs, m: Memory, t: np.ndarray, states: np.nd
             states[row, k] = m.znew[k]
         for i in range(out.shape[1]):
             out[row, i] = m.force[i]
+
+
+@compiled
+def _dense(c: Chain, w: Work, d: Inputs, m: Memory, method: int, t: float, h: float, last: float) -> None:
+    """What `_interpolate` needs of the step just made beyond its stages."""
+    if method == EXPLICIT:
+        _explicit_dense(c, w, d, m, t, h, last)
+    elif method != IMPLICIT:
+        _slope_once(c, w, d, m, min(t + h, last), m.znew, m.K[5])
 
 
 @compiled
@@ -305,7 +319,7 @@ def _implicit_step(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, 
 @inlined
 def _interpolate(m: Memory, method: int, h: float, x: float, out: np.ndarray) -> None:
     """The state at t + x h inside the step just made: order 7 (explicit), or quintic Hermite from positions to accelerations
-    (implicit)."""
+    (all others)."""
     z, new = m.z, m.znew
     size = z.shape[0]
     if method == EXPLICIT:
@@ -341,7 +355,7 @@ def _shortest(c: Chain, z: np.ndarray) -> float:
 
 
 @inlined
-def outside(c: Chain, d: Inputs, z: np.ndarray) -> int:
+def _outside(c: Chain, d: Inputs, z: np.ndarray) -> int:
     """The first joint beyond its limits, or a slider that has run into the sleeve of the link it rides on; -1: none."""
     for i in range(c.kind.shape[0]):
         e = c.first[i]
@@ -358,13 +372,18 @@ def outside(c: Chain, d: Inputs, z: np.ndarray) -> int:
 
 
 @compiled
+def outside(c: Chain, d: Inputs, z: np.ndarray) -> int:
+    """`_outside` as a function to call."""
+    return _outside(c, d, z)
+
+
+@compiled
 def _stop_at_limit(
     c: Chain, w: Work, d: Inputs, m: Memory, method: int, t: float, h: float, last: float, beyond: float, joint: int
 ) -> None:  # fmt: skip
     """Find by bisection where the step just made, from t, leaves a joint's limits: `joint` is beyond them at the fraction
     `beyond` of the step. m.z and s[T] are the last state inside."""
-    if method == EXPLICIT:
-        _explicit_dense(c, w, d, m, t, h, last)
+    _dense(c, w, d, m, method, t, h, last)
     low, high, out, n = 0.0, beyond, m.K[15], m.a.shape[0]
     m.s[FAULT] = joint
     for _ in range(60):
@@ -388,20 +407,26 @@ def advance(
 ) -> None:
     """Go on with the run held in `m` for at most `max_steps` steps, filling rows of `out` (T, 2n + 2) as their times pass."""
     s = m.s
-    order = 8.0 if method == EXPLICIT else 4.0
+    order = (8.0, 4.0, 3.0, 5.0)[method]
     n = m.a.shape[0]
     end = t_eval[-1]
     for _ in range(max_steps):
         t = s[T]
         while int(s[BREAK]) < d.breaks.shape[0] and d.breaks[int(s[BREAK])] <= t:
             s[BREAK] += 1
+        if d.law.rate_Hz > 0.0 and due(d.law) <= t:
+            tick(d.law, d.segments, t, m.z)
+            s[FRESH] = 0.0
         stop = end
-        if int(s[BREAK]) < d.breaks.shape[0] and d.breaks[int(s[BREAK])] < end:
+        if d.law.rate_Hz > 0.0 and due(d.law) < end:
+            stop = due(d.law)
+        if int(s[BREAK]) < d.breaks.shape[0] and d.breaks[int(s[BREAK])] < stop:
             stop = d.breaks[int(s[BREAK])]
         last = np.nextafter(stop, -1e300)  # drives are read just before the break at which this step may end
         if s[FRESH] == 0.0:
-            _weights(c, m, rtol, m.z)
-            _slope_once(c, w, d, m, t, m.z, m.K[0])
+            if s[STEPS] == 0.0 or method < PAIR_3:
+                _weights(c, m, rtol, m.z)
+                _slope_once(c, w, d, m, t, m.z, m.K[0])
             s[FRESH] = 1.0
         h = min(s[H], stop - t, s[LONGEST] * _shortest(c, m.z))
         if stop - t < 1.5 * h and h < stop - t:
@@ -411,8 +436,10 @@ def advance(
             if 0.7 * h < ahead < h:
                 h = ahead  # a full step to an output costs less than the three stages of the interpolant
             error = _explicit_step(c, w, d, m, t, h, last)
-        else:
+        elif method == IMPLICIT:
             error = _implicit_step(c, w, d, m, t, h, last)
+        else:
+            error = _pair_step(c, w, d, m, t, h, last, method)
         if not error < 1.0:
             s[REJECTED] += 1
             if not error < 1e5:
@@ -434,17 +461,17 @@ def advance(
             if t_eval[row] == tn:
                 _copy(m.znew, out[row])
             else:
-                if not prepared and method == EXPLICIT:
-                    _explicit_dense(c, w, d, m, t, h, last)
+                if not prepared:
+                    _dense(c, w, d, m, method, t, h, last)
                     prepared = True
                 _interpolate(m, method, h, (t_eval[row] - t) / h, out[row])
                 _prescribe(c, w, d, t_eval[row], out[row, :n], out[row, n : 2 * n])
-            joint = outside(c, d, out[row])
+            joint = _outside(c, d, out[row])
             if joint >= 0:
                 _stop_at_limit(c, w, d, m, method, t, h, last, (t_eval[row] - t) / h, joint)
                 return
             s[OUT] += 1
-        joint = outside(c, d, m.znew)
+        joint = _outside(c, d, m.znew)
         if joint >= 0:
             _stop_at_limit(c, w, d, m, method, t, h, last, 1.0, joint)
             return
@@ -459,7 +486,7 @@ def advance(
         _weights(c, m, rtol, m.z)
         if landed and stop < end:
             s[FRESH] = 0.0  # the drive may jump here
-        else:
+        elif method < PAIR_3:
             _copy(m.K[12 if method == EXPLICIT else 5], m.K[0])
         if tn >= end:
             s[STATUS] = DONE

@@ -75,4 +75,64 @@ int c_steps(const int16_t *rates, uint32_t size, int64_t *at, int8_t *direction)
   }
   return n;
 }
+
+// A whole board through a closed run: every tick has its own set-point (counts / 256, microsteps / 256), encoder counts and reading.
+// Out: the motor's voltage [mV] and the stepper's rate [microstep/s] as reported. The first played tick is an even one.
+struct Told {
+  int32_t setpoint[2];
+  int16_t moved, flex;
+};
+struct Done {
+  int16_t voltage, rate;
+};
+
+int c_board(const float *values, const Told *rows, uint32_t size, Done *done) {
+  Rig rig;
+  Config config;
+  memcpy(&config, values, sizeof config);
+  rig.begin(&config, 0);
+  if (rig.state() != State::idle) return 100 + rig.wrong_item();
+  Outputs out;
+  Inputs &in = rig.inputs();
+  uint16_t detail;
+  const auto tell = [&](uint8_t code, const void *fields) {
+    return static_cast<int>(rig.command(code, static_cast<const uint8_t *>(fields), detail));
+  };
+  const uint16_t supply = 502;                     // 12 V / 4.9 of 5 V
+  in = Inputs();
+  in.supply = supply, in.flex = static_cast<uint16_t>(rows[0].flex);
+  rig.tick(out);                                   // the next one is even
+  const Reference here = {rows[0].setpoint[0] / 256, 0, rows[0].setpoint[1] / 256};
+  if (tell(Reference::kCode, &here)) return 1;
+  const Arm arm = {static_cast<uint8_t>(Mode::position)};
+  if (tell(Arm::kCode, &arm)) return 2;
+  uint32_t next = 0;
+  const auto feed = [&] {
+    for (uint8_t n = 0; n < 8 && next < size; ++n, ++next) {
+      Setpoints one = {};
+      one.first = static_cast<uint16_t>(next), one.count = 1, one.final = next + 1 == size;
+      one.position_1[0] = rows[next].setpoint[0], one.position_2[0] = rows[next].setpoint[1];
+      if (tell(Setpoints::kCode, &one)) break;
+    }
+  };
+  feed();
+  const Start start = {0};
+  if (tell(Start::kCode, &start)) return 3;
+  int8_t planned = 0;
+  for (uint32_t k = 1; k < size; ++k) {
+    feed();
+    rig.prepare();
+    rig.host_spoke();
+    in = Inputs();
+    in.supply = supply, in.flex = static_cast<uint16_t>(rows[k].flex);
+    in.moved[0] = static_cast<int8_t>(rows[k].moved), in.stepped = planned;
+    rig.tick(out);
+    planned = static_cast<int8_t>(out.steps.up ? out.steps.count : -out.steps.count);
+    if (rig.state() != State::running) return 1000 + static_cast<int>(rig.fault());
+    Telemetry report;
+    rig.report(report);
+    done[k] = {report.voltage, report.rate};
+  }
+  return 0;
+}
 }

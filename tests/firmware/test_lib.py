@@ -12,11 +12,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import flexura as fx
 from flexlab.board import frames
-from flexlab.board.declaration import CONFIG, CONTROL_HZ, DUTY_FULL
+from flexlab.board.declaration import ADC_SAMPLES, CONFIG, CONTROL_HZ, DUTY_FULL
+from flexura import gains, law, signal
 
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "firmware"
@@ -73,7 +75,7 @@ def test_counts_follow_the_shaft(lib, moves):
     assert lib.c_count(lines, which, len(lines), ctypes.byref(missed)) == sum(moves) and missed.value == 0
 
 
-def settings(**changes):
+def settings_of(**changes):
     values = {name: item.default for name, item in CONFIG.items()} | changes
     return values, (ctypes.c_float * len(values))(*values.values())
 
@@ -85,6 +87,10 @@ def signals(rows):
 
 
 GAINS = st.floats(0, 1, width=32)
+NAMES = (
+    ("kp_1_V_m", "ki_1_V_m_s", "kd_1_V_s_m", "kf_1_V_m", "kg_1_V_s_m", "kv_1_V_s_m"),
+    ("kp_2_1_s", "ki_2_1_s2", "kd_2", "kf_2_rad_s_m", "kg_2_rad_m", "kv_2"),
+)
 ROWS = st.lists(
     st.tuples(st.integers(-(2**19), 2**19), *[st.integers(-3000, 3000)] * 4), min_size=1, max_size=60
 )
@@ -95,16 +101,16 @@ def test_pid_in_si_units_is_its_formula(lib, joint, g, rows):
     """u = kp e + ki sum(e) T + kd (r' - q') + kf w + kg w' + kv r', as firmware/README.md defines it, in V and rad/s."""
     kp, ki, kd, kf, kg, kv = g
     if joint == 0:
-        gains = dict(kp_1_V_m=2000 * kp, ki_1_V_m_s=9000 * ki, kd_1_V_s_m=100 * kd, kf_1_V_m=300 * kf, kg_1_V_s_m=20 * kg)
-        gains |= dict(kv_1_V_s_m=100 * kv, voltage_max_V=12, voltage_slew_V_s=3000)
+        chosen = dict(kp_1_V_m=2000 * kp, ki_1_V_m_s=9000 * ki, kd_1_V_s_m=100 * kd, kf_1_V_m=300 * kf, kg_1_V_s_m=20 * kg)
+        chosen |= dict(kv_1_V_s_m=100 * kv, voltage_max_V=12, voltage_slew_V_s=3000)
     else:
-        gains = dict(kp_2_1_s=100 * kp, ki_2_1_s2=500 * ki, kd_2=kd, kf_2_rad_s_m=50 * kf, kg_2_rad_m=5 * kg, kv_2=kv)
-        gains |= dict(rate_max_2_rad_s=7.8, acceleration_max_2_rad_s2=2000)
-    values, array = settings(**gains)
+        chosen = dict(kp_2_1_s=100 * kp, ki_2_1_s2=500 * ki, kd_2=kd, kf_2_rad_s_m=50 * kf, kg_2_rad_m=5 * kg, kv_2=kv)
+        chosen |= dict(rate_max_2_rad_s=7.8, acceleration_max_2_rad_s2=2000)
+    values, array = settings_of(**chosen)
     given_ = signals(rows)
     out = (ctypes.c_int16 * len(rows))()
     assert lib.c_pid(array, joint, given_.ctypes, len(rows), out) == 255
-    names = list(gains)
+    names = list(chosen)
     count = values["motor_counts_per_m"] if joint == 0 else values["stepper_steps_per_rad"]
     unit = values["supply_V"] / DUTY_FULL / 16 if joint == 0 else CONTROL_HZ / 4096 / count
     limit, slew = values[names[-2]], values[names[-1]] * TICK_S
@@ -124,6 +130,108 @@ def test_pid_in_si_units_is_its_formula(lib, joint, g, rows):
         if abs(u - held) < 2 * unit or (u > held) == (e < 0):
             integral = grown
         last = got * unit
+
+
+def board(lib, values, rows):
+    """Voltages [V] and rates [rad/s] of a whole board, tick by tick: rows (T, 4) of set-points, counts moved, reading."""
+    kind = np.dtype([("setpoint", "<i4", 2), ("moved", "<i2"), ("flex", "<i2")])
+    told = np.array([((a, b), m, f) for a, b, m, f in rows], kind)
+    done = np.zeros(len(rows), np.dtype([("voltage", "<i2"), ("rate", "<i2")]))
+    array = (ctypes.c_float * len(values))(*values.values())
+    assert lib.c_board(array, told.ctypes, len(rows), done.ctypes) == 0
+    return done["voltage"] / 1000, done["rate"] / values["stepper_steps_per_rad"]
+
+
+def model(values, rows):
+    """The same by flexura.law, which knows no integers: all T ticks, without a robot's mechanics."""
+    system = fx.assemble(fx.load(ROOT / "model/robots/rig.toml"))
+    count, step = 1 / values["motor_counts_per_m"], 1 / values["stepper_steps_per_rad"]
+    played = np.arange(len(rows)) * TICK_S
+    reference = [signal.piecewise(played, rows[:, j] / 256 * (count, step)[j]) for j in range(2)]
+    drive = gains.from_board(values).controller(reference, [fx.Motor(1.0, 0.0), fx.Stepper()])
+    segments, index, _ = drive.packed()
+    sampled = drive.law(system, index, TICK_S, len(rows))
+    look, place, out = sampled.look[0], rows[0, 0] // 256, np.zeros((len(rows), 2))
+    for k in range(1, len(rows)):
+        place += rows[k, 2]
+        w = (rows[k, 3] / (1024 * ADC_SAMPLES) - values["flex_zero"]) * values["flex_c1_m"]
+        z = look * (w / (look @ look))
+        z[sampled.first] = place * count, rows[0, 1] // 256 * step
+        law.tick(sampled, segments, k * TICK_S, z)
+        out[k] = sampled.memory[:, law.U]
+    return out.T
+
+
+WIDE = dict(
+    position_min_1_m=-9, position_max_1_m=9, position_min_2_rad=-900, position_max_2_rad=900, speed_max_1_m_s=10,
+    speed_max_2_rad_s=1000, following_max_1_m=10, following_max_2_rad=1000, host_timeout_s=5, stall_voltage_V=30,
+    lost_step_rad=10, flex_min=0, flex_max=1, supply_min_V=5, supply_max_V=20, flex_zero=0.5, flex_c1_m=-0.4,
+)  # fmt: skip
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    seed=st.integers(0, 10**6), g=st.tuples(*[GAINS] * 10), tight=st.booleans(),
+    filters=st.tuples(*[st.sampled_from([0.0, 2.0, 20.0])] * 2),
+)  # fmt: skip
+def test_the_models_law_is_the_boards(lib, seed, g, tight, filters):
+    """Random gains, set-points, encoder counts and readings through the whole board: filters, strip, sum, pulses; and tight
+    limits and slew, then without the sum, whose stop at a limit is a matter of round-off.
+
+    The board's errors are whole counts of joint 1 and 1/16 microsteps of joint 2, rounded down; its rates 1/256 of them a tick,
+    its deflection 10 um; its filters, rounded down too, end 1/256 of a count / a short; gains and slews are rounded to a
+    thousandth. `bound` is these through the gains. (59.9218 rad/s^2 is a whole number of its units.)
+    """
+    r, T = np.random.default_rng(seed), 400
+    kp, ki, kd, kf, kg, kv, p2, i2, f2, g2 = (float(x) for x in g)
+    own = dict(
+        kp_1_V_m=2000 * kp, ki_1_V_m_s=4000 * ki, kd_1_V_s_m=20 * kd, kf_1_V_m=50 * kf, kg_1_V_s_m=kg, kv_1_V_s_m=20 * kv,
+        voltage_max_V=12, voltage_slew_V_s=20000, kp_2_1_s=60 * p2, ki_2_1_s2=100 * i2, kd_2=0.2 * kd, kf_2_rad_s_m=20 * f2,
+        kg_2_rad_m=0.2 * g2, kv_2=kv, rate_max_2_rad_s=7.8, acceleration_max_2_rad_s2=8000,
+        setpoint_1_Hz=filters[0], setpoint_2_Hz=filters[1],
+    )  # fmt: skip
+    if tight:
+        own |= dict(ki_1_V_m_s=0, ki_2_1_s2=0, kp_2_1_s=5 * p2, voltage_max_V=3, voltage_slew_V_s=300)
+        own |= dict(rate_max_2_rad_s=2, acceleration_max_2_rad_s2=59.9218)
+    values, _ = settings_of(**WIDE, **own)
+    t, size = np.arange(T) * TICK_S, 1 if tight else 0.1
+    waves = [size * sum(a * np.sin(2 * np.pi * f * t + p) for a, f, p in r.uniform(size=(3, 3)) * [1, 8, 6]) for _ in range(3)]
+    rows = np.zeros((T, 4), np.int64)
+    rows[:, 0] = 256 * (800 * (waves[0] - waves[0][0])).astype(int) + r.integers(0, 256, T)
+    rows[:, 1] = 256 * (100 * (waves[1] - waves[1][0])).astype(int) + r.integers(0, 256, T)
+    rows[0, :2] = rows[0, :2] // 256 * 256
+    rows[2:, 2] = np.diff(np.round(700 * (waves[2] - waves[2][0])))[1:]
+    rows[:, 3] = 2048 + 60 * waves[2] + r.integers(-3, 4, T)  # faster than 0.64 m/s the board cannot count
+    rows[:2, 3] = rows[1, 3]
+    got, wanted = board(lib, values, rows), model(values, rows)
+    for j, name in enumerate(("motor_counts_per_m", "stepper_steps_per_rad")):
+        P, I, D, F, G, V = (values[gain] for gain in NAMES[j])
+        fine = 1 / values[name] / 256
+        short = 1 / (1 - np.exp(-2 * np.pi * filters[j] * TICK_S)) if filters[j] else 0
+        error, rate, strip = fine * ((256, 18)[j] + short), 2 * fine / TICK_S, 3e-5
+        reported = (0.001, 256 * fine)[j]
+        bound = (P + I * t) * error + (D + V) * rate + F * strip + G * strip / (8 * TICK_S)
+        bound += 2 * reported + 1e-3 * np.abs(wanted[j])
+        if tight:  # a limit hands an earlier error on, and pulses add it up
+            bound = np.maximum.accumulate(bound) * np.exp(P * t if j else 0 * t)
+        assert np.all(np.abs(got[j] - wanted[j])[1:] <= bound[1:])
+
+
+def test_both_stop_their_sums_at_a_limit(lib):
+    """0.3 s against both limits, then back: the sums end alike but for a tick's share where the limit begins and ends to hold."""
+    own = dict(
+        kp_1_V_m=1000, ki_1_V_m_s=8000, voltage_max_V=3, voltage_slew_V_s=300, kp_2_1_s=5, ki_2_1_s2=20, rate_max_2_rad_s=0.5,
+        acceleration_max_2_rad_s2=59.9218, kv_2=0,
+    )  # fmt: skip
+    values, _ = settings_of(**WIDE, **own)
+    rows = np.zeros((900, 4), np.int64)
+    rows[2:300, :2], rows[300:, :2] = (220 * 256, 150 * 256), (-60 * 256, -40 * 256)
+    rows[:, 3] = 2048
+    got, wanted = board(lib, values, rows), model(values, rows)
+    share = 8000 * 280 / 80000 * TICK_S, 20 * 190 / 509 * TICK_S
+    for j in range(2):
+        assert np.abs(wanted[j]).max() == pytest.approx((3, 0.5)[j])
+        assert np.abs(got[j] - wanted[j])[1:].max() < 4 * share[j] + (0.05, 0.01)[j]
 
 
 @given(st.lists(st.integers(-16383, 16383), min_size=1, max_size=60))
