@@ -100,11 +100,16 @@ def test_an_adapter_of_something_heavy_is_itself_imported_where_it_is_used(modul
     assert not [name for name in imports(module, top_only=True) for adapter in ADAPTERS.values() if inside(name, adapter)]
 
 
-@pytest.mark.parametrize("module", ["flexlab.cli", "flexlab.terminal"])
+COMMANDS = ("flexlab.terminal", "flexlab.experiment.command")  # parts of the command that import nothing themselves
+
+
+@pytest.mark.parametrize("module", ["flexlab.cli", *COMMANDS])
 def test_the_command_imports_nothing_of_the_project_at_its_top(module):
     """But what its parts share, which itself imports nothing."""
     found = imports(module, top_only=True)
-    assert not [n for n in found if inside(n, "flexura") or (inside(n, "flexlab") and not inside(n, "flexlab.terminal"))]
+    parts = {package for part in COMMANDS for package in (part, part.rpartition(".")[0])}
+    own = [name for name in found if inside(name, "flexlab") and name not in parts and not any(inside(name, c) for c in COMMANDS)]
+    assert not [n for n in found if inside(n, "flexura")] and not own
 
 
 @pytest.mark.parametrize(

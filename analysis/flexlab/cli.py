@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
+from .experiment import command as bench
 from .terminal import announce_compiling, default_folder, events, interrupted, prepare, progress_bars, say, show, stored
 
 app = typer.Typer(
@@ -18,6 +19,8 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
+
+app.add_typer(bench.app)
 
 RobotFile = Annotated[Path, typer.Argument(metavar="ROBOT", help="robot file (TOML), for example model/robots/rig.toml")]
 ManoeuvreFile = Annotated[
