@@ -41,37 +41,50 @@ class Fit:
 
 
 def fit(readings: np.ndarray, tips_m: np.ndarray) -> Fit:
-    """Least squares; readings (n,) are fractions of full scale, n at least 6. Raises InputError where they tell nothing."""
+    """Least squares; readings (n,) are fractions of full scale, n at least 6. Raises InputError where they tell nothing.
+
+    A highest term within two standard deviations of 0 is left out: what the readings don't tell is not made up.
+    """
     r, w = np.asarray(readings, dtype=float), np.asarray(tips_m, dtype=float)
     if len(r) < LEAST or len(np.unique(r)) < LEAST:
         raise InputError(
             f"expected at least {LEAST} deflections with as many different readings", key="deflections", value=len(r)
         )
+    for degree in (3, 2, 1):
+        found = _fit(r, w, degree)
+        values = found.calibration.model_dump(exclude={"covariance"})
+        highest, variance = values[f"c{degree}_m"], np.array(found.calibration.covariance)[degree, degree]
+        if abs(highest) > 2 * np.sqrt(variance):
+            break
+    return found
+
+
+def _fit(r: np.ndarray, w: np.ndarray, degree: int) -> Fit:
     centre, scale = r.mean(), np.ptp(r) / 2
-    A = np.vander((r - centre) / scale, 4, increasing=True)
+    A = np.vander((r - centre) / scale, degree + 1, increasing=True)
     b, *_ = np.linalg.lstsq(A, w, rcond=None)
     left = w - A @ b
-    variance = float(left @ left) / (len(r) - 4)
+    variance = float(left @ left) / (len(r) - degree - 1)
     spread = variance * np.linalg.inv(A.T @ A)
-    at = _expanded(b, centre, scale)
-    jacobian = np.empty((4, 4))
-    for k in range(4):
-        h = np.zeros(4)
+    jacobian = np.empty((4, degree + 1))
+    for k in range(degree + 1):
+        h = np.zeros(degree + 1)
         h[k] = 1e-6 * np.abs(b).max()
         jacobian[:, k] = (_expanded(b + h, centre, scale) - _expanded(b - h, centre, scale)) / (2 * h[k])
     covariance = jacobian @ spread @ jacobian.T
-    zero, c1, c2, c3 = (float(v) for v in at)
+    zero, c1, c2, c3 = (float(v) for v in _expanded(b, centre, scale))
     rows = ((covariance + covariance.T) / 2).tolist()
     return Fit(Calibration(zero=zero, c1_m=c1, c2_m=c2, c3_m=c3, covariance=rows), r, w, float(np.sqrt(variance)))
 
 
 def _expanded(b: np.ndarray, centre: float, scale: float) -> np.ndarray:
-    """(zero, c1, c2, c3) of the cubic b in (r - centre) / scale: its root nearest to the middle, and its expansion there."""
+    """(zero, c1, c2, c3) of the polynomial b in (r - centre) / scale: its root nearest to the middle, its expansion there."""
     roots = np.roots(b[::-1])
     real = roots[np.abs(roots.imag) < 1e-9].real
     if not len(real):
-        raise InputError("expected deflections to both sides: the fitted cubic has no zero", key="deflections")
+        raise InputError("expected deflections to both sides: the fitted curve has no zero", key="deflections")
     z = real[np.argmin(np.abs(real))]
+    b = np.append(b, np.zeros(4 - len(b)))
     c = np.array([b[1] + 2 * b[2] * z + 3 * b[3] * z**2, b[2] + 3 * b[3] * z, b[3]])
     return np.array([centre + scale * z, *(c / scale ** np.arange(1, 4))])
 

@@ -44,7 +44,7 @@ def rebuild(folder: str | Path) -> fx.Run:
     sensor = Sensor(calibration, **rest) if rest else Sensor(calibration, calibration.zero)
     begun = start_tick(reports, knots, settings)
     start, unsure_s = begun if begun is not None else (float(reports["tick"][0]), 0.0)
-    reports = reports[reports["tick"].astype(np.int64) >= start]
+    reports = _during(reports, start)
     ticks, values = channels(reports, knots.mode, settings, sensor)
     t = (ticks - start) / CONTROL_HZ
     missing = len(t) - len(reports)
@@ -87,6 +87,13 @@ def _reports(payloads: list[bytes]) -> np.ndarray:
     cuts = np.flatnonzero(np.diff(reports["tick"].astype(np.int64)) <= 0) + 1
     parts = [reports[a:b] for a, b in pairwise([0, *cuts, len(reports)])]
     return next((part for part in reversed(parts) if (part["state"] == State.running).any()), parts[-1])
+
+
+def _during(reports: np.ndarray, start: float) -> np.ndarray:
+    """From the start on; to the end where the board had a fault, else as long as it ran."""
+    reports = reports[reports["tick"].astype(np.int64) >= start]
+    running = np.flatnonzero(reports["state"] == State.running)
+    return reports if not len(running) or (reports["state"] == State.fault).any() else reports[: running[-1] + 1]
 
 
 def _told(events: list[dict[str, Any]], start: float, end: float) -> list[dict[str, Any]]:
