@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.signal import savgol_filter
 
 import flexura as fx
 from experiments import BENCH, SETTINGS
@@ -45,9 +46,9 @@ def test_conversions_by_hand():
 
 def test_what_did_not_arrive_is_nan_and_nothing_else_is():
     lost = [10, 11, 12, 50]
-    seen = np.delete(reports(position_1=np.arange(100)), lost)
-    ticks, found = channels(seen, Mode.position, SETTINGS, Sensor(CUBIC, 0.61))
-    assert len(ticks) == 100
+    seen, numbers = (np.delete(a, lost) for a in (reports(position_1=np.arange(100)), (65500 + np.arange(100)) % 65536))
+    ticks, found = channels(seen, Mode.position, SETTINGS, Sensor(CUBIC, 0.61), numbers)
+    np.testing.assert_array_equal(ticks, 1000 + 2 * np.arange(100))
     for name, values in found.items():
         if "velocity" not in name:
             np.testing.assert_array_equal(np.flatnonzero(np.isnan(values)), lost, err_msg=name)
@@ -65,7 +66,7 @@ def test_velocity_has_no_phase_lag():
     """Of a 5 Hz motion, quantised by the encoder: amplitude within 1 %, phase within 0.2 ms, noise some tenths of mm/s."""
     t = np.arange(0, 2, 0.002)
     counts = np.round(80e3 * 0.01 * np.sin(2 * np.pi * 5 * t)) / 80e3
-    found = velocity(counts, 0.002)
+    found = velocity(t, counts)
     true = 0.01 * 2 * np.pi * 5 * np.cos(2 * np.pi * 5 * t)
     inner = slice(50, -50)
     basis = np.stack([np.cos(2 * np.pi * 5 * t), np.sin(2 * np.pi * 5 * t)], axis=1)[inner]
@@ -73,6 +74,15 @@ def test_velocity_has_no_phase_lag():
     assert np.hypot(a, b) == pytest.approx(0.314159, rel=0.01)
     assert abs(np.arctan2(b, a)) / (2 * np.pi * 5) < 2e-4
     assert (found - true)[inner].std() < 0.01 * 0.3142
+
+
+def test_velocity_is_savitzky_and_golays_and_bears_uneven_times():
+    random = np.random.default_rng(2)
+    t, y = 0.002 * np.arange(200), random.normal(size=200)
+    np.testing.assert_allclose(velocity(t, y), savgol_filter(y, 21, 3, deriv=1, delta=0.002), rtol=1e-8, atol=1e-8)
+    uneven = t + 0.001 * random.integers(0, 2, 200)
+    cubic = lambda s: 1 + 2 * s - 3 * s**2 + 4 * s**3
+    np.testing.assert_allclose(velocity(uneven, cubic(uneven)), 2 - 6 * uneven + 12 * uneven**2, rtol=1e-9)
 
 
 def test_the_tip_deflections_uncertainty_is_what_monte_carlo_says():

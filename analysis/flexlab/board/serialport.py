@@ -97,10 +97,13 @@ class SerialBoard:
         return time.monotonic() - self._begin
 
     def reset(self) -> None:
-        self._port.dtr = False
-        time.sleep(0.05)
-        self._port.reset_input_buffer()
-        self._port.dtr = True
+        try:
+            self._port.dtr = False
+            time.sleep(0.05)
+            self._port.reset_input_buffer()
+            self._port.dtr = True
+        except OSError as error:
+            raise BoardError(f"{self.label}: silent, and without a reset line ({error})") from None
         self._early = b""
 
     def close(self) -> None:

@@ -18,7 +18,7 @@ class Delay:
 
 
 def delay(t: np.ndarray, command: np.ndarray, response: np.ndarray, most_s: float = 0.5) -> Delay | None:
-    """Lag of `response` (T,) behind `command` (T,), both at the even times t; None where nothing moves or too little is there.
+    """Lag of `response` (T,) behind `command` (T,), both at (nearly) even times; None where nothing moves.
 
     The peak of the normalised cross-correlation gives the lag to a sample, a parabola through it and its neighbours a start,
     Gauss-Newton on  response(t) = a + b command(t - lag)  the rest. The residual's variance over the slope's energy is the
@@ -31,7 +31,7 @@ def delay(t: np.ndarray, command: np.ndarray, response: np.ndarray, most_s: floa
     part = slice(first, last + 1)
     t, there = t[part], there[part]
     x, y = (np.interp(t, t[there], values[part][there]) for values in (command, response))  # only to correlate, never stored
-    spacing = float(t[1] - t[0])
+    spacing = float(t[-1] - t[0]) / (len(t) - 1)
     if x.std() < 1e-12 or y.std() < 1e-12:
         return None
     most = min(round(most_s / spacing), len(t) // 2)
@@ -55,8 +55,7 @@ def _refined(t: np.ndarray, x: np.ndarray, y: np.ndarray, there: np.ndarray, lag
     from scipy.interpolate import CubicSpline
 
     course = CubicSpline(t, x)
-    spacing = float(t[1] - t[0])
-    solved = None
+    spacing = float(t[-1] - t[0]) / (len(t) - 1)
     for _ in range(20):
         use = there & (t - lag >= t[0]) & (t - lag <= t[-1])
         if use.sum() < 16:

@@ -288,6 +288,7 @@ def _run(
     events(done.run)
     say(json, f"stored {folder}", f"look at it: flexura review {folder}")
     if not done.ended.complete:
+        typer.echo(f"flexura: not complete: {done.ended.text}", err=True)
         raise typer.Exit(130 if done.ended.interrupted else 1)
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..board.base import BoardError
-from ..board.declaration import FAULTS, Fault, State
+from ..board.declaration import ANNOUNCE_EVERY_TICKS, CONTROL_HZ, FAULTS, Fault, State
 from ..board.link import Link, Refused
 from ..board.player import Knots, Player
 from .recording import Recording, RecordingError
@@ -41,22 +42,23 @@ def execute(
     `stop_asked()` says why to end early, or ""; `observe(reports, part)` gets the new reports and which part of the time is over.
     What is wrong with line, board or disk ends the experiment and is in the result, not raised.
     """
-    interrupted = False
+    text, interrupted, wrong = "", False, None
     try:
         text, interrupted = _play(link, knots, settle_s, stop_asked, observe)
-        complete = text == ""
     except (BoardError, RecordingError) as error:
-        complete, text = False, _reason(link) or str(error)
+        wrong = error
     stopped = quiet(link)
-    text = text or "all done"
+    if wrong is not None:
+        text = _behind(link, wrong)
+    complete, text = text == "", text or "all done"
     if not stopped:
         text += "; no answer to the stop: the board stops by itself when it hears nothing"
+    if recording.failed is not None:
+        complete, text = False, str(recording.failed)
     try:
         recording.event(text, "INFO" if complete else "ERROR", _tick(link), ended=True, complete=complete)
     except RecordingError as error:
         complete, text = False, str(error)
-    if recording.failed is not None:
-        complete, text = False, str(recording.failed)
     return Ended(complete, text, stopped, interrupted)
 
 
@@ -95,6 +97,14 @@ def _reason(link: Link) -> str:
         fault = Fault(newest["fault"])
         return f"fault {fault.name}: {' '.join(FAULTS[fault])}"
     return ""
+
+
+def _behind(link: Link, wrong: Exception) -> str:
+    """What is behind an error: a board that refuses was reset or has a fault, and will say so."""
+    if isinstance(wrong, Refused) and not _reason(link):
+        with contextlib.suppress(BoardError, RecordingError):
+            link.run(1.5 * ANNOUNCE_EVERY_TICKS / CONTROL_HZ)
+    return _reason(link) or str(wrong)
 
 
 def quiet(link: Link) -> bool:

@@ -17,7 +17,7 @@ from ..board.player import FRACTION, Knots
 from ..rig.description import Calibration
 
 ADC_COUNTS, ADC_V = 1024, 5.0
-SMOOTH_S = 0.042  # window of the velocity's local cubic: -3 dB at some 36 Hz, no phase lag
+SMOOTH = 21  # reports in the window of the velocity's local cubic: -3 dB at some 36 Hz, no phase lag
 UNITS = {
     "joint/1/position": "m", "joint/2/position": "rad", "joint/1/velocity": "m/s", "joint/2/velocity": "rad/s",
     "joint/1/reference": "m", "joint/2/reference": "rad", "joint/1/voltage": "V", "joint/2/pulses": "rad",
@@ -61,19 +61,24 @@ def reading(flex: np.ndarray) -> np.ndarray:
     return np.asarray(flex, dtype=float) / (ADC_SAMPLES * ADC_COUNTS)
 
 
-def grid(reports: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(ticks on an even grid that holds every report, each report's place in it); places left over are missing reports."""
-    ticks = reports["tick"].astype(np.int64)
-    step = int(np.gcd.reduce(np.diff(ticks))) if len(ticks) > 1 else 1
-    even = np.arange(ticks[0], ticks[-1] + 1, step)
-    return even, (ticks - ticks[0]) // step
+def rows(reports: np.ndarray, numbers: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """(ticks of all reports that the board made (T,), which of them arrived (n,)), by the reports' `numbers` (n,), modulo 2^16.
+
+    A report that did not arrive is given a tick evenly between its neighbours'. Without numbers all are taken to have arrived.
+    """
+    ticks = reports["tick"].astype(float)
+    if numbers is None or len(numbers) < 2:
+        return ticks, np.arange(len(ticks))
+    ahead = np.maximum(np.mod(np.diff(numbers), 1 << 16), 1)
+    place = np.concatenate([[0], np.cumsum(ahead)])
+    return np.interp(np.arange(place[-1] + 1), place, ticks), place
 
 
 def channels(
-    reports: np.ndarray, mode: Mode, settings: dict[str, float], sensor: Sensor
+    reports: np.ndarray, mode: Mode, settings: dict[str, float], sensor: Sensor, numbers: np.ndarray | None = None
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Ticks (T,) and the channels of UNITS (T,) of one session's reports, which ascend in time."""
-    ticks, place = grid(reports)
+    """Ticks (T,) and the channels of UNITS (T,) of one session's reports, which ascend in time; `numbers` as in `rows`."""
+    ticks, place = rows(reports, numbers)
 
     def spread(values: np.ndarray) -> np.ndarray:
         out = np.full(len(ticks), np.nan)
@@ -97,25 +102,31 @@ def channels(
         "link/2/tip_deflection_std": spread(sensor.tip_std(r)),
         "link/2/flex_voltage": spread(ADC_V * r),
     }
-    spacing = float(ticks[1] - ticks[0]) / CONTROL_HZ if len(ticks) > 1 else 1.0 / CONTROL_HZ
     for number in (1, 2):
-        out[f"joint/{number}/velocity"] = velocity(out[f"joint/{number}/position"], spacing)
+        out[f"joint/{number}/velocity"] = velocity(ticks / CONTROL_HZ, out[f"joint/{number}/position"])
     return ticks, {name: out[name] for name in UNITS}
 
 
-def velocity(position: np.ndarray, spacing_s: float, window_s: float = SMOOTH_S) -> np.ndarray:
-    """Derivative of a local cubic (Savitzky and Golay, Anal. Chem. 36 (1964) 1627) that lies evenly about each sample.
+def velocity(t: np.ndarray, position: np.ndarray, samples: int = SMOOTH) -> np.ndarray:
+    """Derivative at t (T,) of the cubic that fits `samples` (odd) values about each, least squares.
 
-    Samples beside a gap use what there is on their side of it; pieces shorter than the window have no velocity (NaN).
+    Where the times are even this is the filter of Savitzky and Golay, Anal. Chem. 36 (1964) 1627. Ends and the sides of a gap use
+    the nearest full window; pieces shorter than that have no velocity (NaN).
     """
-    from scipy.signal import savgol_filter
-
-    window = max(5, 2 * round(window_s / spacing_s / 2) + 1)
     out = np.full(len(position), np.nan)
     there = np.flatnonzero(np.isfinite(position))
+    half = samples // 2
     for piece in np.split(there, np.flatnonzero(np.diff(there) > 1) + 1):
-        if len(piece) >= window:
-            out[piece] = savgol_filter(position[piece], window, 3, deriv=1, delta=spacing_s, mode="interp")
+        if len(piece) < samples:
+            continue
+        at, y = t[piece], position[piece]
+        first = np.clip(np.arange(len(piece)) - half, 0, len(piece) - samples)
+        window = first[:, None] + np.arange(samples)
+        scale = float(at[-1] - at[0]) / (len(at) - 1) * half
+        powers = ((at[window] - at[:, None]) / scale)[..., None] ** np.arange(4)
+        values = y[window] - y[:, None]
+        squares, right = np.einsum("nwi,nwj->nij", powers, powers), np.einsum("nwi,nw->ni", powers, values)
+        out[piece] = np.linalg.solve(squares, right[..., None])[:, 1, 0] / scale
     return out
 
 

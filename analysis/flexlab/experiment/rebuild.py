@@ -37,15 +37,16 @@ def rebuild(folder: str | Path) -> fx.Run:
     knots = knots_from(session["knots"])
     settings, rest = session["settings"], session.get("rest")
     deframer = Deframer()
-    reports = _reports(deframer.feed(kept.received))
+    reports, numbers = _reports(deframer.feed(kept.received))
     if not len(reports):
         raise fx.InputError("no report of the board was received in this recording", file=str(folder))
     calibration = Calibration.model_validate(session["calibration"])
     sensor = Sensor(calibration, **rest) if rest else Sensor(calibration, calibration.zero)
     begun = start_tick(reports, knots, settings)
     start, unsure_s = begun if begun is not None else (float(reports["tick"][0]), 0.0)
-    reports = _during(reports, start)
-    ticks, values = channels(reports, knots.mode, settings, sensor)
+    during = _during(reports, start)
+    reports = reports[during]
+    ticks, values = channels(reports, knots.mode, settings, sensor, numbers[during])
     t = (ticks - start) / CONTROL_HZ
     missing = len(t) - len(reports)
     ended = [event for event in kept.events if event.get("ended")]
@@ -79,21 +80,24 @@ def knots_spec(knots: Knots) -> dict[str, Any]:
     return {"mode": int(knots.mode), "period_log2": knots.period_log2, "columns": columns}
 
 
-def _reports(payloads: list[bytes]) -> np.ndarray:
-    """The reports of the session in which the board ran (of the last one, if in none): from one reset to the next."""
-    code = MESSAGES["telemetry"].code
-    bodies = [messages.body(p) for p in payloads if p[0] == code and len(p) == messages.HEAD_BYTES + messages.TELEMETRY.itemsize]
-    reports = messages.reports(bodies)
+def _reports(payloads: list[bytes]) -> tuple[np.ndarray, np.ndarray]:
+    """The reports, and their numbers, of the time in which the board ran (of the last one, if in none): from reset to reset."""
+    code, size = MESSAGES["telemetry"].code, messages.HEAD_BYTES + messages.TELEMETRY.itemsize
+    kept = [p for p in payloads if p[0] == code and len(p) == size]
+    reports = messages.reports([messages.body(p) for p in kept])
+    numbers = np.array([p[1] | p[2] << 8 for p in kept], dtype=np.int64)
     cuts = np.flatnonzero(np.diff(reports["tick"].astype(np.int64)) <= 0) + 1
-    parts = [reports[a:b] for a, b in pairwise([0, *cuts, len(reports)])]
-    return next((part for part in reversed(parts) if (part["state"] == State.running).any()), parts[-1])
+    parts = [slice(a, b) for a, b in pairwise([0, *cuts, len(reports)])]
+    part = next((part for part in reversed(parts) if (reports[part]["state"] == State.running).any()), parts[-1])
+    return reports[part], numbers[part]
 
 
-def _during(reports: np.ndarray, start: float) -> np.ndarray:
+def _during(reports: np.ndarray, start: float) -> slice:
     """From the start on; to the end where the board had a fault, else as long as it ran."""
-    reports = reports[reports["tick"].astype(np.int64) >= start]
+    first = int(np.searchsorted(reports["tick"].astype(np.int64), start))
     running = np.flatnonzero(reports["state"] == State.running)
-    return reports if not len(running) or (reports["state"] == State.fault).any() else reports[: running[-1] + 1]
+    faulted = (reports["state"][first:] == State.fault).any()
+    return slice(first, len(reports) if faulted or not len(running) else int(running[-1]) + 1)
 
 
 def _told(events: list[dict[str, Any]], start: float, end: float) -> list[dict[str, Any]]:

@@ -57,14 +57,15 @@ class Recording:
         self._append(self._events, EVENTS, line.encode() + b"\n")
 
     def _append(self, handle: int, name: str, data: bytes) -> None:
-        if self.failed is not None:
+        if self.failed is not None and name == RECEIVED:
             return
         try:
             while data:
                 data = data[os.write(handle, data) :]
         except OSError as error:
-            self.failed = RecordingError(f"{self.folder / name}: {error.strerror}; what had been received before is kept")
-            raise self.failed from None
+            if self.failed is None:
+                self.failed = RecordingError(f"{self.folder / name}: {error.strerror}; what had been received before is kept")
+                raise self.failed from None
 
     def close(self) -> None:
         """To the disk itself, and unlocked. May be called twice."""
