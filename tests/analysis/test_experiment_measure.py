@@ -5,16 +5,18 @@ import pytest
 from scipy.signal import savgol_filter
 
 import flexura as fx
-from experiments import BENCH, SETTINGS
+from experiments import BENCH, SETTINGS, board
 from flexlab import rig
 from flexlab.board import messages
 from flexlab.board.declaration import Mode, State
+from flexlab.board.link import Link
 from flexlab.board.player import drives, setpoints
 from flexlab.experiment import calibrate
 from flexlab.experiment.align import delay
+from flexlab.experiment.lead import led, quintic
 from flexlab.experiment.measure import Sensor, channels, commanded, start_tick, velocity
 from flexlab.rig.description import Calibration
-from flexura.signal import harmonic
+from flexura.signal import bang_bang, evaluate, harmonic, polynomial, table
 
 CUBIC = Calibration(zero=0.61, c1_m=-1.85, c2_m=3.0, c3_m=-4.9)
 
@@ -163,7 +165,7 @@ def test_a_known_calibration_is_recovered_and_its_covariance_is_honest():
     """The firmware's cubic from 15 deflections with noise, 300 times: the scatter is what the covariance says."""
     random = np.random.default_rng(3)
     r = np.linspace(0.45, 0.75, 15)
-    true = np.array([0.61, -1.85, 3.0, -4.9])
+    true = np.array([0.61, -1.85, 3.0, -3.0])
     x = r - true[0]
     w = true[1] * x + true[2] * x**2 + true[3] * x**3
     found = [calibrate.fit(r, w + random.normal(0, 5e-4, len(r))) for _ in range(300)]
@@ -181,6 +183,26 @@ def test_terms_that_the_readings_do_not_tell_are_left_out():
     assert found.c3_m == 0.0 and found.covariance[3] == [0.0] * 4 and found.c1_m == pytest.approx(-1.8, abs=0.1)
 
 
+def test_a_term_that_the_board_does_not_take_is_left_out():
+    r = np.linspace(0.59, 0.63, 9)
+    x = r - 0.61
+    assert calibrate.fit(r, -1.8 * x + 900 * x**3 + 1e-7 * np.cos(9 * np.arange(9))).calibration.c3_m == 0.0
+    with pytest.raises(fx.InputError, match="c1_m = -18"):
+        calibrate.fit(r, -18 * x)
+
+
+def test_the_emulated_strip_is_held_and_its_sensor_is_read_through_the_board():
+    """Firmware, ADC and fit against the divider's own derivative: c1 = dw/dr at the straight strip."""
+    made = board()
+    made.plant = calibrate.Held(made.plant, BENCH)
+    found = calibrate.fit(*calibrate.measure(Link(made, sequence=1), calibrate.TIPS_M, made.plant.hold))
+    made.close()
+    true = rig.calibration(BENCH)
+    spread = np.sqrt(np.diag(found.calibration.covariance))
+    assert abs(found.calibration.c1_m - true.c1_m) < 3 * spread[1] < 0.2
+    assert found.residual_m < 1.85 / 1024 and found.calibration.zero == pytest.approx(true.zero, abs=1.5 / 1024)
+
+
 @pytest.mark.parametrize("readings", [[0.6] * 9, list(np.linspace(0.5, 0.6, 4))])
 def test_readings_that_tell_nothing_are_refused(readings):
     with pytest.raises(fx.InputError, match="deflections = "):
@@ -196,3 +218,20 @@ def test_the_boards_cubic_and_the_hosts_are_one(tmp_path):
     with pytest.raises(fx.InputError, match=r"covariance.*four rows"):
         calibrate.read(tmp_path / "wrong.toml")
     assert rig.calibration(BENCH).covariance is None
+
+
+def test_a_motion_is_led_in_and_out_without_a_jump_and_is_itself_in_between():
+    """Position, velocity and acceleration at every join; at rest at both ends; quintics end where they were told to."""
+    for motion in (harmonic(0.3, 1.0, -1.0), polynomial(0.1, 0.5, at_s=0.3), table([-1.0, 0.4, 2.0], [0.1, 0.3, -0.2])):
+        found = led(motion, 1.5, 1.0, 0.7)
+        for t in np.linspace(0.0, 1.4999, 200):
+            np.testing.assert_allclose(found(1.0 + t), motion(t), rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(found(0.0), 0.0, atol=1e-12)
+        np.testing.assert_allclose(found(5.0), [motion(1.5)[0], 0, 0], atol=1e-12)
+        for join in (1.0, 2.5):
+            np.testing.assert_allclose(found(join - 1e-9), found(join + 1e-9), rtol=1e-6, atol=1e-6)
+    row = quintic(2.0, 0.5, (1.0, 2.0, 3.0), (-4.0, 5.0, -6.0))[None]
+    np.testing.assert_allclose(evaluate(row, 2.0), (1.0, 2.0, 3.0))
+    np.testing.assert_allclose(evaluate(row, 2.5), (-4.0, 5.0, -6.0))
+    same = led(bang_bang(1.0, 1.0, 0.1), 1.0, 0.0, 0.0)
+    assert all(same(t) == bang_bang(1.0, 1.0, 0.1)(t) for t in (0.0, 0.3, 0.5, 0.999))

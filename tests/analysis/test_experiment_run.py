@@ -40,7 +40,8 @@ def test_a_run_says_what_it_is_and_where_it_comes_from(tracked):
     assert about["emulated"] is True and about["label"].startswith("emulated") and about["seed"] == 0
     assert about["firmware"]["declaration"] == f"{DECLARATION:08x}" and about["host_version"]
     assert fx.Robot.from_dict(about["robot"]) == BENCH.robot and about["rig"]["screw"]["lead_m"] == 0.008
-    assert about["asked"] == BENCH.manoeuvre.spec() and about["settings"] == SETTINGS and "T" in about["started"]
+    assert about["settings"] == SETTINGS and "T" in about["started"]
+    assert about["asked"] == BENCH.manoeuvre.spec() | {"lead_s": 1.0, "out_s": 1.0}
     assert set(UNITS) | {"tip/x", "tip/y"} == set(run) and run.units["joint/2/pulses"] == "rad"
     assert about["line"] == {"reports": len(run), "missing": 0, "bad_frames": 0, "bytes": about["line"]["bytes"]}
     assert json.loads(json.dumps(about)) == about
@@ -48,16 +49,17 @@ def test_a_run_says_what_it_is_and_where_it_comes_from(tracked):
 
 def test_the_clock_begins_with_the_execution_and_the_reports_follow_each_other(tracked):
     t = tracked.run.t
-    assert 0 < t[0] <= 0.003 and tracked.run.meta["start_uncertainty_s"] == 0.0 and t[-1] >= 2.5
+    assert 0 <= t[0] <= 0.003 and tracked.run.meta["start_uncertainty_s"] == 0.0 and t[-1] >= 4.5
     np.testing.assert_allclose(np.diff(t), 0.002, rtol=1e-9)
 
 
 def test_the_boards_set_points_are_those_that_were_asked(tracked):
     """The manoeuvre's own motion at the run's times: the clock is right to a fraction of a tick, the cubics to a microstep/50."""
     run = tracked.run
-    inside = run.t < BENCH.manoeuvre.duration_s - 0.01
+    begin = next(phase["t"] for phase in run.meta["phases"] if phase["name"] == "manoeuvre")
+    inside = (run.t > begin) & (run.t < begin + BENCH.manoeuvre.duration_s - 0.01)
     for number, (joint, least) in enumerate(zip(BENCH.manoeuvre.drive.joints, (2e-7, 4e-5), strict=True), 1):
-        wanted = np.array([joint.motion(t)[0] for t in run.t[inside]])
+        wanted = np.array([joint.motion(t - begin)[0] for t in run.t[inside]])
         np.testing.assert_allclose(run[f"joint/{number}/reference"][inside], wanted, atol=least)
     kept = recording.read(tracked.folder)
     course = commanded(knots_from(kept.session["knots"]), SETTINGS)
@@ -67,10 +69,8 @@ def test_the_boards_set_points_are_those_that_were_asked(tracked):
 
 def test_the_joints_follow(tracked):
     run = tracked.run
-    for number, most in ((1, 0.0025), (2, 0.11)):  # from rest into a motion that begins at full speed
+    for number, most in ((1, 0.0015), (2, 0.02)):  # 1 ms and a pulse behind at 3.3 rad/s, and the motor's dead zone
         assert np.abs(run[f"joint/{number}/reference"] - run[f"joint/{number}/position"]).max() < most
-    settled = (run.t > 1.0) & (run.t < 2.0)  # then it stops, from full speed too
-    assert np.abs(run["joint/1/reference"] - run["joint/1/position"])[settled].max() < 1.5e-3
     x = 0.1 + run["joint/1/position"] + 0.3 * np.cos(run["joint/2/position"])  # the strip of `Drives` is straight
     np.testing.assert_allclose(run["tip/x"], x, atol=1e-9)
     lag = run.meta["delays"]["joint/2/position"]
@@ -286,10 +286,11 @@ def test_wrong_gains_are_refused_by_file_key_and_value(tmp_path, text, key, valu
     assert (raised.value.file, raised.value.key, raised.value.value) == (str(path), key, value)
 
 
-def test_a_motion_that_does_not_begin_at_zero_is_refused():
-    away = fx.Drive.pd([harmonic(0.01, 1.0), harmonic(0.1, 1.0)], [1, 1], [1, 1])
-    with pytest.raises(fx.InputError, match="begins at 0"):
-        plans.inverse(BENCH, SETTINGS, fx.Manoeuvre("", 1.0, 0.1, away))
+def test_a_joint_without_a_motion_is_refused():
+    alone = fx.Drive.pd([harmonic(0.01, 1.0)], [1], [1])
+    with pytest.raises(fx.InputError, match="missing: expected a motion of every joint") as raised:
+        plans.inverse(BENCH, SETTINGS, fx.Manoeuvre("", 1.0, 0.1, fx.Drive((*alone.joints, fx.JointDrive()))))
+    assert raised.value.key == "joint[2].motion"
 
 
 def _swing(amplitude, duration_s=4.0):

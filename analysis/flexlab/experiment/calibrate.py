@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
@@ -18,7 +19,8 @@ from flexura.errors import InputError
 from flexura.explain import explain
 from flexura.files import read_toml, write_toml
 
-from ..board.emulated import Plant
+from ..board.declaration import CONFIG
+from ..board.emulated import Outputs, Sensors
 from ..board.link import Link
 from ..rig import Bench
 from ..rig.description import Calibration, tip_per_bend
@@ -26,7 +28,8 @@ from ..rig.drives import Drives
 from .measure import ADC_V, reading
 
 SETTLE_S, LOOK_S = 0.1, 0.4
-TIPS_M = tuple(float(w) for w in np.linspace(-0.02, 0.02, 9))  # held one after the other
+_UP = [float(w) for w in np.linspace(-0.02, 0.02, 9)]
+TIPS_M = tuple(_UP + _UP[-2::-1])  # held one after the other, there and back: an even drift cancels
 LEAST = 6  # points: four unknowns, and something left to judge them by
 
 
@@ -43,7 +46,8 @@ class Fit:
 def fit(readings: np.ndarray, tips_m: np.ndarray) -> Fit:
     """Least squares; readings (n,) are fractions of full scale, n at least 6. Raises InputError where they tell nothing.
 
-    A highest term within two standard deviations of 0 is left out: what the readings don't tell is not made up.
+    A highest term within two standard deviations of 0, or beyond what the board takes, is left out: what the readings don't tell
+    is not made up. Raises InputError too where the board would not even take the straight line.
     """
     r, w = np.asarray(readings, dtype=float), np.asarray(tips_m, dtype=float)
     if len(r) < LEAST or len(np.unique(r)) < LEAST:
@@ -54,9 +58,19 @@ def fit(readings: np.ndarray, tips_m: np.ndarray) -> Fit:
         found = _fit(r, w, degree)
         values = found.calibration.model_dump(exclude={"covariance"})
         highest, variance = values[f"c{degree}_m"], np.array(found.calibration.covariance)[degree, degree]
-        if abs(highest) > 2 * np.sqrt(variance):
-            break
+        beyond = [name for name, value in values.items() if not _taken(name, value)]
+        if not beyond and abs(highest) > 2 * np.sqrt(variance):
+            return found
+    if beyond:
+        item, name = CONFIG[f"flex_{beyond[0]}"], beyond[0]
+        expected = f"expected deflections that give the board a value between {item.least:g} and {item.greatest:g}"
+        raise InputError(expected, key=name, value=values[name])
     return found
+
+
+def _taken(name: str, value: float) -> bool:
+    item = CONFIG[f"flex_{name}"]
+    return item.least <= value <= item.greatest
 
 
 def _fit(r: np.ndarray, w: np.ndarray, degree: int) -> Fit:
@@ -102,19 +116,31 @@ def measure(link: Link, tips_m: tuple[float, ...], hold: Callable[[float], float
     return np.array(readings), np.array(held)
 
 
-def held_by(plant: Plant, bench: Bench) -> Callable[[float], float]:
-    """Holds an emulated strip deflected: the plant does it, or, where the strip is always straight, its sensor reads as if."""
-    flex = bench.rig.flex
+class Held:
+    """An emulated rig whose strip is held deflected by a force at its tip (see `board.emulated.Plant`): `tip_m` says how far.
 
-    def hold(tip_m: float) -> float:
-        if isinstance(plant, Drives):
-            ohm = flex.straight_ohm + flex.ohm_per_rad * tip_m / tip_per_bend(bench)
-            plant.flex_V = ADC_V * flex.divider_ohm / (ohm + flex.divider_ohm)
-            return tip_m
-        held: Callable[[float], float] = plant.hold_tip  # type: ignore[attr-defined]
-        return held(tip_m)
+    The sensor is the plant's own, with its noise, drift and nonlinearity, bent as the cantilever is; `Drives` has none, and
+    reads what the sensor's data say.
+    """
 
-    return hold
+    def __init__(self, plant: Any, bench: Bench) -> None:
+        self._plant, self._flex, self._tip_per_bend = plant, bench.rig.flex, tip_per_bend(bench)
+        self.tip_m = 0.0
+
+    def hold(self, tip_m: float) -> float:
+        self.tip_m = tip_m
+        return tip_m
+
+    def advance(self, seconds: float, outputs: Outputs) -> Sensors:
+        sensors: Sensors = self._plant.advance(seconds, outputs)
+        sensors.flex_V = self._voltage(self.tip_m / self._tip_per_bend)
+        return sensors
+
+    def _voltage(self, bend_rad: float) -> float:
+        if not isinstance(self._plant, Drives):
+            return float(self._plant.flex.sample(bend_rad))
+        ohm = self._flex.straight_ohm + self._flex.ohm_per_rad * bend_rad
+        return ADC_V * self._flex.divider_ohm / (ohm + self._flex.divider_ohm)
 
 
 def write(found: Fit, path: Path) -> None:

@@ -116,7 +116,7 @@ def step(
 @app.command("free-vibration")
 def free_vibration(
     rig: RigFile = None,
-    turn_rad: Annotated[float, typer.Option(help="how far joint 2 turns before it stops")] = 0.3,
+    turn_rad: Annotated[float, typer.Option(help="how far joint 2 turns before it stops")] = 0.1,
     duration_s: Annotated[float, typer.Option(help="of the whole")] = 6.0,
     port: Port = None, emulated: Emulated = False, seed: Seed = 0, out: Out = None, yes: Yes = False,
     countdown_s: Countdown = None, calibration: Calibrated = None, configure: Configure = False, live: Live = False,
@@ -177,8 +177,11 @@ def calibrate(
         raise fx.InputError("expected either a port or --emulated", key="--port", value=port)
     tips = fitting.TIPS_M if tips_mm is None else _millimetres(tips_mm)
     bench = rigs.load(rig or RIG)
-    opened = open_board(bench, port, seed, firmware)
-    hold = _held_by_hand if opened.plant is None else fitting.held_by(opened.plant, bench)
+    opened: Any = open_board(bench, port, seed, firmware)
+    hold = _held_by_hand
+    if opened.plant is not None:
+        held = fitting.Held(opened.plant, bench)
+        opened.board.plant, hold = held, held.hold
     with contextlib.closing(opened.board):
         from ..board.link import Link
 

@@ -116,6 +116,7 @@ def session(bench: Bench, plan: Plan, opened: Opened, calibration: Calibration) 
         "seed": opened.seed,
         "started": datetime.datetime.now().astimezone().isoformat(timespec="seconds"),
         "asked": plan.asked,
+        "phases": plan.phases,
         "settings": plan.settings,
         "knots": knots_spec(plan.knots),
         "calibration": calibration.model_dump(mode="json"),

@@ -165,8 +165,8 @@ def start_tick(reports: np.ndarray, knots: Knots, settings: dict[str, float]) ->
     if not len(running):
         return None
     first = running[0]
-    latest = int(reports["tick"][first]) - 1
-    earliest = int(reports["tick"][first - 1]) if first else latest - 1
+    latest = int(reports["tick"][first])  # told before the first tick of it was over
+    earliest = int(reports["tick"][first - 1]) if first else latest - 2
     course = commanded(knots, settings)
     seen = reports[running]
     said = np.stack([seen["setpoint_1"], seen["setpoint_2"]], axis=1).astype(float)

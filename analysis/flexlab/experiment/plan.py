@@ -22,6 +22,7 @@ from ..board.declaration import CONFIG
 from ..board.player import Knots, drives, setpoints
 from ..rig import Bench, Check, examine
 from ..rig.checks import STEP_RATE_MAX_1_S
+from .lead import AT_REST, LEAD_S, led
 
 PERIOD_LOG2 = 3  # knots are 8 ms apart
 ALWAYS = ("motor current", "supply", "flex sensor at rest")  # checks of the bench, whatever it is to do
@@ -32,7 +33,8 @@ GAINS = tuple(name for name in CONFIG if name[:2] in ("kp", "ki", "kd", "kf", "k
 
 @dataclass(frozen=True)
 class Plan:
-    """One experiment: `asked` is its description for the metadata, `settings` what the board must be configured to."""
+    """One experiment: `asked` is its description for the metadata, `settings` what the board must be configured to,
+    `phases` what begins when."""
 
     experiment: str
     knots: Knots
@@ -40,6 +42,7 @@ class Plan:
     settings: dict[str, float]
     checks: list[Check]
     asked: dict[str, Any] = field(default_factory=dict)
+    phases: list[dict[str, Any]] = field(default_factory=list)
 
     @property
     def failed(self) -> list[Check]:
@@ -60,16 +63,24 @@ def gains(path: Path) -> dict[str, float]:
 
 
 def inverse(bench: Bench, settings: dict[str, float], manoeuvre: fx.Manoeuvre | None = None) -> Plan:
-    """The joint motions of a manoeuvre, tracked by the firmware's controllers. Raises InputError unless they begin at 0."""
+    """The joint motions of a manoeuvre, tracked by the firmware's controllers, led into and out of where they are not at rest.
+
+    Raises InputError unless both joints have a motion.
+    """
     asked = manoeuvre or bench.manoeuvre
-    motions = [joint.motion for joint in asked.drive.joints]
-    for number, motion in enumerate(motions, 1):
-        if motion is None:
+    motions = []
+    for number, joint in enumerate(asked.drive.joints, 1):
+        if joint.motion is None:
             raise InputError("missing: expected a motion of every joint", key=f"joint[{number}].motion")
-        if abs(motion(0.0)[0]) > 1e-9:
-            expected = "expected a motion that begins at 0, where the joints are referenced"
-            raise InputError(expected, key=f"joint[{number}].motion", value=motion(0.0)[0])
-    return _tracked("inverse", bench, settings, asked)
+        motions.append(joint.motion)
+    lead_s = LEAD_S if max(abs(v) for motion in motions for v in motion(0.0)[:2]) > AT_REST else 0.0
+    out_s = LEAD_S if any(abs(motion(asked.duration_s)[1]) > AT_REST for motion in motions) else 0.0
+    one, two = (led(motion, asked.duration_s, lead_s, out_s) for motion in motions)
+    whole = _following(asked.name, (one, two), lead_s + asked.duration_s + out_s)
+    parts = ((0.0, "lead in", lead_s), (lead_s, "manoeuvre", True), (lead_s + asked.duration_s, "lead out", out_s))
+    phases = [{"t": t, "name": name} for t, name, there in parts if there]
+    plan = _tracked("inverse", bench, settings, whole)
+    return dataclasses.replace(plan, asked=asked.spec() | {"lead_s": lead_s, "out_s": out_s}, phases=phases)
 
 
 def step(
@@ -92,7 +103,7 @@ def step(
     return dataclasses.replace(plan, checks=able, asked=plan.asked | {"steps": steps})
 
 
-def free_vibration(bench: Bench, settings: dict[str, float], turn_rad: float = 0.3, duration_s: float = 6.0) -> Plan:
+def free_vibration(bench: Bench, settings: dict[str, float], turn_rad: float = 0.1, duration_s: float = 6.0) -> Plan:
     """Joint 2 turns fast, stops and holds: the strip rings."""
     move_s, rise_s, rest_s = 0.18, 0.08, 0.1
     if not duration_s > 1.0:

@@ -32,7 +32,7 @@ PLOTS = {
     "tip deflection [m]": ("link/2/tip_deflection",),
     "motor voltage [V]": ("joint/1/voltage",),
 }
-COLOURS = ((32, 164, 84), (40, 40, 40), (160, 84, 204))
+COLOURS = ((32, 164, 84), (150, 150, 150), (160, 84, 204))  # measured, asked, commanded
 
 
 @contextmanager
@@ -41,7 +41,7 @@ def serve(plan: Plan, sensor: Sensor, robot: fx.Robot, title: str, port: int) ->
     _free(port)
     waiting: queue.Queue[np.ndarray | None] = queue.Queue()
     with rr.RecordingStream("flexura-live") as rec:
-        rec.set_sinks(rr.GrpcServerSink(HOST, port, server_memory_limit=MEMORY), default_blueprint=_blueprint(title))
+        rec.set_sinks(rr.GrpcServerSink(HOST, port, server_memory_limit=MEMORY), default_blueprint=_blueprint(title, robot))
         rec.set_log_time_enabled(False)
         rec.send_recording_name(title)
         _style(rec, title)
@@ -69,11 +69,15 @@ def _free(port: int) -> None:
             raise InputError(expected, key="--live-port", value=port) from None
 
 
-def _blueprint(title: str) -> rrb.Blueprint:
+def _blueprint(title: str, robot: fx.Robot) -> rrb.Blueprint:
+    reach = sum(link.length_m for link in robot.links)
+    low, high = robot.links[0].joint.limits or (0.0, 0.0)
+    half = 0.6 * reach
+    bounds = rrb.VisualBounds2D(x_range=[low - 0.1 * reach, high + 1.1 * reach], y_range=[-half, half])
     plots = [
         rrb.TimeSeriesView(origin="/", contents=[f"/experiment/{c}" for c in names], name=name) for name, names in PLOTS.items()
     ]
-    arm = rrb.Spatial2DView(origin="/", contents=["/experiment/arm"], name=title, background=(255, 255, 255))
+    arm = rrb.Spatial2DView(origin="/", contents=["/experiment/arm"], name=title, visual_bounds=bounds)
     about = rrb.TextDocumentView(origin="/about", name="about")
     return rrb.Blueprint(
         rrb.Vertical(rrb.Horizontal(arm, about, column_shares=[3, 1]), rrb.Grid(*plots)),
@@ -86,7 +90,11 @@ def _blueprint(title: str) -> rrb.Blueprint:
 
 
 def _style(rec: rr.RecordingStream, title: str) -> None:
-    rec.log("about", rr.TextDocument(f"# {title}\n\nLive; the recording itself is in the run's folder."), static=True)
+    text = f"# {title}\n\nLive. The recording itself is in the run's folder.\n\nGreen: measured. Grey: set-point. Violet: pulses."
+    rec.log("about", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
+    thick: Any = rr.Radius.ui_points(3.0)
+    style = rr.LineStrips2D.from_fields(colors=[COLOURS[0]], radii=[thick])
+    rec.log("experiment/arm", style, static=True)
     rec.log("experiment/arm", rr.Transform3D(scale=[1.0, -1.0, 1.0]), static=True)  # a 2D view's y points down
     for names in PLOTS.values():
         for name, colour in zip(names, COLOURS, strict=False):
