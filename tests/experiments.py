@@ -101,8 +101,8 @@ class Line:
 def command(*arguments: object, cwd: Path, **more: object) -> subprocess.Popen[str]:
     """`flexura bench ...` as a process."""
     line = [sys.executable, "-m", "flexlab.cli", "bench", *map(str, arguments)]
-    pipe, none = subprocess.PIPE, subprocess.DEVNULL
-    return subprocess.Popen(line, cwd=cwd, env=ENVIRONMENT, stdin=none, stdout=pipe, stderr=pipe, text=True, **more)
+    pipe, surroundings = subprocess.PIPE, {"stdin": subprocess.DEVNULL} | more
+    return subprocess.Popen(line, cwd=cwd, env=ENVIRONMENT, stdout=pipe, stderr=pipe, text=True, **surroundings)
 
 
 @contextmanager

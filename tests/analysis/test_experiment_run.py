@@ -161,6 +161,16 @@ def test_garbage_in_the_middle_costs_the_frames_that_it_hits(tracked, tmp_path):
     assert any("did not arrive" in event["text"] for event in run.meta["events"])
 
 
+def test_what_another_program_had_left_on_the_line_is_not_of_this_run(tracked, tmp_path):
+    """Reports of an earlier session come first, with other numbers and earlier ticks, then the board's introduction."""
+    folder = cut_at(tracked, tmp_path, tracked.run.meta["line"]["bytes"])
+    data = (folder / recording.RECEIVED).read_bytes()
+    (folder / recording.RECEIVED).write_bytes(data[len(data) // 2 :] + data)
+    run = rebuild(folder)
+    assert len(run) == len(tracked.run) and run.meta["line"]["missing"] == 0
+    np.testing.assert_array_equal(run["joint/2/position"], tracked.run["joint/2/position"])
+
+
 def test_recordings_left_behind_are_found_and_those_under_way_are_not(tracked, tmp_path):
     left = cut_at(tracked, tmp_path, 50_000)
     busy = recording.Recording(tmp_path / "busy", {})

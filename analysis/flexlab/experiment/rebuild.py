@@ -6,7 +6,6 @@ The same function ends every experiment and recovers one whose host was killed.
 from __future__ import annotations
 
 import dataclasses
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -81,15 +80,26 @@ def knots_spec(knots: Knots) -> dict[str, Any]:
 
 
 def _reports(payloads: list[bytes]) -> tuple[np.ndarray, np.ndarray]:
-    """The reports, and their numbers, of the time in which the board ran (of the last one, if in none): from reset to reset."""
-    code, size = MESSAGES["telemetry"].code, messages.HEAD_BYTES + messages.TELEMETRY.itemsize
-    kept = [p for p in payloads if p[0] == code and len(p) == size]
-    reports = messages.reports([messages.body(p) for p in kept])
-    numbers = np.array([p[1] | p[2] << 8 for p in kept], dtype=np.int64)
-    cuts = np.flatnonzero(np.diff(reports["tick"].astype(np.int64)) <= 0) + 1
-    parts = [slice(a, b) for a, b in pairwise([0, *cuts, len(reports)])]
-    part = next((part for part in reversed(parts) if (reports[part]["state"] == State.running).any()), parts[-1])
-    return reports[part], numbers[part]
+    """The reports, and their numbers, of the session in which the board ran; of the last one, if it ran in none.
+
+    The board introduces itself at the beginning of each session and after each reset, and counts its reports anew.
+    """
+    code, size, identity = (
+        MESSAGES["telemetry"].code,
+        messages.HEAD_BYTES + messages.TELEMETRY.itemsize,
+        MESSAGES["identity"].code,
+    )
+    sessions: list[list[bytes]] = [[]]
+    for payload in payloads:
+        if payload[0] == code and len(payload) == size:
+            sessions[-1].append(payload)
+        elif payload[0] == identity and sessions[-1]:
+            sessions.append([])
+    found = [(messages.reports([messages.body(p) for p in kept]), kept) for kept in sessions if kept]
+    if not found:
+        return messages.reports([]), np.zeros(0, dtype=np.int64)
+    reports, kept = next((pair for pair in reversed(found) if (pair[0]["state"] == State.running).any()), found[-1])
+    return reports, np.array([p[1] | p[2] << 8 for p in kept], dtype=np.int64)
 
 
 def _during(reports: np.ndarray, start: float) -> slice:
