@@ -1,8 +1,10 @@
 """The live view: a viewer that joins late sees the past, and what comes after."""
 
 import io
+import os
 import socket
 import time
+from contextlib import ExitStack, contextmanager
 
 import numpy as np
 import pytest
@@ -16,8 +18,22 @@ from flexlab.experiment.conduct import Watch
 from flexlab.experiment.measure import Sensor
 from flexlab.review.headless import free_port, settled, viewer
 from flexlab.review.live import COLOURS, serve
+from flexura.errors import FlexuraError
 
 SENSOR = Sensor(rig.calibration(BENCH), rig.calibration(BENCH).zero)
+
+
+@contextmanager
+def unseen():
+    """A viewer without a screen; CI insists on it."""
+    with ExitStack() as stack:
+        try:
+            client = stack.enter_context(viewer((1600, 900)))
+        except FlexuraError as error:
+            if os.environ.get("REQUIRE_VIEWER") == "1":
+                raise
+            pytest.skip(str(error))
+        yield client
 
 
 def until(condition, seconds=30.0):
@@ -42,7 +58,7 @@ def test_a_viewer_that_joins_late_sees_the_past_and_follows(tmp_path):
     with serve(plan, SENSOR, BENCH.robot, title, port) as observe:
         for reports in seen[:half]:
             observe(reports, 0.0)
-        with viewer((1600, 900)) as client:
+        with unseen() as client:
             client.open(f"rerun+http://127.0.0.1:{port}/proxy")
             until(lambda: title in {view.name for view in client.get_state().views})
             first = settled(client)

@@ -14,7 +14,7 @@ from flexlab.board.player import drives, setpoints
 from flexlab.experiment import calibrate
 from flexlab.experiment.align import delay
 from flexlab.experiment.lead import led, quintic
-from flexlab.experiment.measure import Sensor, channels, commanded, start_tick, velocity
+from flexlab.experiment.measure import Sensor, channels, commanded, rows, start_tick, velocity
 from flexlab.rig.description import Calibration
 from flexura.signal import bang_bang, evaluate, harmonic, polynomial, table
 
@@ -55,6 +55,12 @@ def test_what_did_not_arrive_is_nan_and_nothing_else_is():
         if "velocity" not in name:
             np.testing.assert_array_equal(np.flatnonzero(np.isnan(values)), lost, err_msg=name)
     assert set(np.flatnonzero(np.isnan(found["joint/1/velocity"]))) == {*lost, *range(10)}  # 10 samples are no window
+
+
+def test_reports_that_are_counted_anew_make_no_gap_of_60_000():
+    numbers = np.concatenate([5000 + np.arange(50), np.arange(50)])
+    ticks, place = rows(reports(), numbers)
+    assert len(ticks) <= 101 and (np.diff(ticks) > 0).all() and len(place) == 100
 
 
 def test_set_points_are_none_where_the_board_tracks_nothing():

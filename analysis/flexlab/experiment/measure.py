@@ -70,6 +70,7 @@ def rows(reports: np.ndarray, numbers: np.ndarray | None = None) -> tuple[np.nda
     if numbers is None or len(numbers) < 2:
         return ticks, np.arange(len(ticks))
     ahead = np.maximum(np.mod(np.diff(numbers), 1 << 16), 1)
+    ahead = np.minimum(ahead, np.maximum(np.diff(ticks), 1)).astype(int)  # no more reports than ticks: the count began anew
     place = np.concatenate([[0], np.cumsum(ahead)])
     return np.interp(np.arange(place[-1] + 1), place, ticks), place
 

@@ -22,6 +22,7 @@ from . import recording
 from .align import delay
 from .measure import UNITS, Sensor, channels, start_tick
 
+TICK = slice(messages.HEAD_BYTES, messages.HEAD_BYTES + 4)  # the first field of a report
 UNTOLD = "the host ended without a word; rebuilt from what had been received"
 _FOLLOWED = {  # what a channel follows
     Mode.position: {"joint/1/position": "joint/1/reference", "joint/2/position": "joint/2/reference"},
@@ -82,19 +83,22 @@ def knots_spec(knots: Knots) -> dict[str, Any]:
 def _reports(payloads: list[bytes]) -> tuple[np.ndarray, np.ndarray]:
     """The reports, and their numbers, of the session in which the board ran; of the last one, if it ran in none.
 
-    The board introduces itself at the beginning of each session and after each reset, and counts its reports anew.
+    The board introduces itself at the beginning of each session and after each reset, and counts its reports anew; where that was
+    lost, a tick that is no later than the last tells of a reset.
     """
-    code, size, identity = (
-        MESSAGES["telemetry"].code,
-        messages.HEAD_BYTES + messages.TELEMETRY.itemsize,
-        MESSAGES["identity"].code,
-    )
+    code, size = MESSAGES["telemetry"].code, messages.HEAD_BYTES + messages.TELEMETRY.itemsize
     sessions: list[list[bytes]] = [[]]
+    last = -1
     for payload in payloads:
         if payload[0] == code and len(payload) == size:
+            tick = int.from_bytes(payload[TICK], "little")
+            if tick <= last:
+                sessions.append([])
+            last = tick
             sessions[-1].append(payload)
-        elif payload[0] == identity and sessions[-1]:
+        elif payload[0] == MESSAGES["identity"].code:
             sessions.append([])
+            last = -1
     found = [(messages.reports([messages.body(p) for p in kept]), kept) for kept in sessions if kept]
     if not found:
         return messages.reports([]), np.zeros(0, dtype=np.int64)
