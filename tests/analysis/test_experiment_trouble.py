@@ -64,8 +64,8 @@ def test_over_a_serial_line_all_is_as_in_one_process(line, tmp_path):
     """Real pyserial at a pseudo-terminal, and the board in another process's memory: the motion is the same."""
     ok(line, tmp_path, "run")
     far = fx.Run.read(tmp_path / "run")
-    assert far.meta["label"] == line.device and far.meta["emulated"] is False and "truth" not in far.meta
-    near = experiment(plans.free_vibration(BENCH, SETTINGS, 0.3, 1.1), tmp_path / "near").run
+    assert far.meta["emulated"] is True and far.meta["label"] == f"emulated board at {line.device}"  # a pty is no hardware
+    near = experiment(plans.free_vibration(BENCH, SETTINGS, 0.1, 1.1), tmp_path / "near").run
     n = min(len(far), len(near))
     assert n > 540 and far.meta["line"]["missing"] == 0
     at = np.interp(near.t, far.t, far["joint/2/position"])
@@ -86,6 +86,7 @@ def killed(line, cwd, name, after_s):
     return folder
 
 
+@pytest.mark.timeout(1200)  # 20 times some 13 s on a machine with much else to do
 @pytest.mark.parametrize("count, seed", [(3, 1), pytest.param(20, 2, marks=SLOW)])
 def test_kill_9_at_a_random_moment(line, tmp_path, count, seed):
     moments = random.Random(seed)

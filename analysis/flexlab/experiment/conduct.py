@@ -100,6 +100,7 @@ def plant_of(bench: Bench, seed: int) -> Any:
 def session(bench: Bench, plan: Plan, opened: Opened, calibration: Calibration) -> dict[str, Any]:
     """What is known before the board is greeted; the run's metadata are made of it."""
     board = opened.board
+    assert board.label.startswith("emulated") == board.emulated
     return {
         "kind": "experiment",
         "source": "experiment",
