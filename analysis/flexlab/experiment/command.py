@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import sys
 import time
 from pathlib import Path
@@ -335,7 +336,7 @@ def _countdown(link: Any, seconds: float, stop: Any) -> str:
     end = link.board.now() + seconds
     said = -1
     while (left := end - link.board.now()) > 0:
-        if (whole := int(left) + 1) != said:
+        if (whole := math.ceil(left)) != said:
             said = whole
             typer.echo(f"starts in {whole} s; {TOLD}", err=True)
         link.run(min(0.05, left))

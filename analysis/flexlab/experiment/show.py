@@ -84,17 +84,20 @@ def live_table(report: Any, part: float, plan: Plan, sensor: Sensor, title: str)
 
 def result_table(done: Done) -> Any:
     """The range of every channel, how well set-points were followed, and what the line lost."""
+    from rich.box import SIMPLE
     from rich.table import Table
 
     run = done.run
     about = run.meta
-    out = Table(title=heading(about["label"], about["emulated"], about["experiment"]), title_justify="left")
-    for name in ("channel", "lowest", "highest", "at the end", "largest error", "RMS error", "lag"):
-        out.add_column(name, justify="left" if name == "channel" else "right", no_wrap=True)
+    title = heading(about["label"], about["emulated"], about["experiment"])
+    out = Table(title=title, title_justify="left", box=SIMPLE, padding=(0, 1, 0, 0))
+    out.add_column("channel", overflow="fold")  # this one gives way on a narrow terminal, no number does
+    for name in ("lowest", "highest", "max error", "RMS error", "lag"):
+        out.add_column(name, justify="right", no_wrap=True)
     for name, row in numbers(run).items():
-        cells = [_short(row[key]) for key in ("lowest", "highest", "end", "error_max", "error_rms")]
+        cells = [_short(row[key]) for key in ("lowest", "highest", "error_max", "error_rms")]
         late = run.meta["delays"].get(name)
-        lag = f"{1e3 * late['seconds']:.1f} +- {1e3 * late['std']:.1f} ms" if late else ""
+        lag = f"{1e3 * late['seconds']:.1f} ± {1e3 * late['std']:.1f} ms" if late else ""
         out.add_row(f"{name} \\[{run.units[name]}]", *cells, lag)
     line = about["line"]
     out.caption = (
