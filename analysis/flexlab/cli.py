@@ -10,6 +10,7 @@ import typer
 
 from .compare.command import compare
 from .export.command import export
+from .experiment import command as bench
 from .terminal import announce_compiling, default_folder, events, interrupted, prepare, progress_bars, say, show, stored
 
 app = typer.Typer(
@@ -23,6 +24,7 @@ app = typer.Typer(
 
 app.command()(compare)
 app.command()(export)
+app.add_typer(bench.app)
 
 RobotFile = Annotated[Path, typer.Argument(metavar="ROBOT", help="robot file (TOML), for example model/robots/rig.toml")]
 ManoeuvreFile = Annotated[
