@@ -23,23 +23,26 @@ _HOME = {
     "StateSpace": "statespace", "linearize": "statespace",
     "simulate": "forward", "inverse": "forward",
     "Run": "run",
+    "Batch": "batch", "Population": "population",
     "Drive": "drive", "JointDrive": "drive", "Manoeuvre": "drive", "load_manoeuvre": "drive",
     "Signal": "signal",
     "FlexuraError": "errors", "InputError": "errors",
 }  # fmt: skip
 
 __all__ = [
-    "Drive", "FlexuraError", "InputError", "JointDrive", "Manoeuvre", "Robot", "Run", "Signal",
+    "Batch", "Drive", "FlexuraError", "InputError", "JointDrive", "Manoeuvre", "Population", "Robot", "Run", "Signal",
     "StateSpace", "System",
     "assemble", "cut", "frequencies", "inverse", "linearize", "load", "load_manoeuvre", "save", "simulate", "static", "tip_pose",
 ]  # fmt: skip
 
 if TYPE_CHECKING:
+    from .batch import Batch
     from .cutting import cut
     from .drive import Drive, JointDrive, Manoeuvre, load_manoeuvre
     from .errors import FlexuraError, InputError
     from .forward import inverse, simulate
     from .linear import frequencies
+    from .population import Population
     from .robot import Robot, load, save
     from .run import Run
     from .signal import Signal

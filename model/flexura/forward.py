@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import time
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
@@ -20,10 +20,15 @@ from .run import Run
 from .signal import Signal
 from .system import System
 
-_METHODS = {"explicit": loop.EXPLICIT, "implicit": loop.IMPLICIT}
+if TYPE_CHECKING:
+    from .batch import Batch
+    from .population import Population
+
+METHODS = {"explicit": loop.EXPLICIT, "implicit": loop.IMPLICIT}
 _STEPS_A_CALL = 400  # between two looks at the progress bar and the keyboard
 
 
+@overload
 def simulate(
     system: System,
     t_eval: Any,
@@ -34,7 +39,32 @@ def simulate(
     *,
     method: str = "auto",
     progress: Callable[[float], None] | None = None,
-) -> Run:
+) -> Run: ...
+@overload
+def simulate(
+    system: Batch,
+    t_eval: Any,
+    drive: Drive | None = None,
+    q0: Any = None,
+    qd0: Any = None,
+    rtol: float = 1e-6,
+    *,
+    method: str = "auto",
+    progress: Callable[[float], None] | None = None,
+    **population: Any,
+) -> Population: ...
+def simulate(
+    system: System | Batch,
+    t_eval: Any,
+    drive: Drive | Callable[..., Any] | None = None,
+    q0: Any = None,
+    qd0: Any = None,
+    rtol: float = 1e-6,
+    *,
+    method: str = "auto",
+    progress: Callable[[float], None] | None = None,
+    **population: Any,
+) -> Run | Population:
     """Integrate the equations of motion from t_eval[0] on; the Run has its channels at t_eval (T,), ascending [s].
 
     `drive`: a Drive (compiled), or a function (t) -> (N,) or (t, position, velocity, tip_deflection) -> (N,) of forces and
@@ -43,35 +73,30 @@ def simulate(
     `progress` is called with the finished fraction. A joint that reaches a limit of the robot file or the end of its link ends
     the run: the Run holds the states before it and, last, the one at that instant, an event says so and `meta["complete"]` is
     false. A Ctrl-C ends it too. `meta["energy_error"]` is the largest |E - E(0) - work + loss| relative to the largest energy,
-    work or loss. Raises InputError for wrong arguments, FlexuraError where the tolerance cannot be kept.
+    work or loss. A Batch of robots gives a Population; see `population.simulate` for what else that takes. Raises InputError for
+    wrong arguments, FlexuraError where the tolerance cannot be kept.
     """
-    t = _times(t_eval)
-    if not 1e-13 <= rtol <= 0.1:
-        raise InputError("expected a relative tolerance between 1e-13 and 0.1", key="rtol", value=rtol)
-    if method not in ("auto", *_METHODS):
-        raise InputError('expected "auto", "explicit" or "implicit"', key="method", value=method)
-    q, qd = _state(system, "q0", q0, system.start()), _state(system, "qd0", qd0, np.zeros(system.n))
-    qd[system.joint_rows[system.chain.locked.astype(bool)]] = 0.0
+    if not isinstance(system, System):
+        from . import population as many
+
+        return many.simulate(system, t_eval, drive, q0, qd0, rtol, method=method, progress=progress, **population)
+    if population:
+        raise InputError("expected this of a Batch only, not of one System", key=next(iter(population)))
+    t = check(t_eval, rtol, method)
     drive = Drive.none(len(system.robot.links)) if drive is None else drive
-    if isinstance(drive, Drive):
-        if len(drive.joints) != len(system.robot.links):
-            raise InputError(
-                f"expected {len(system.robot.links)} joint drives, one a joint", key="drive", value=len(drive.joints)
-            )
-        _put_on_motions(system, drive, t[0], q, qd)
-    else:
+    if not isinstance(drive, Drive):
         drive = as_function(drive)
-    _inside_limits(system, q)
+    q, qd = initial(system, t[0], drive, q0, qd0)
     if system.robot.nodal:
         return nodal.simulate(simulate, system, t, drive, q, qd, rtol, method, progress)
-    state = np.concatenate([system.to_solver @ q, system.to_solver @ qd, [0.0, 0.0]])
-    chosen = choose(system, t[-1] - t[0], rtol) if method == "auto" else _METHODS[method]
+    state = to_state(system, q, qd)
+    chosen = choose(system, t[-1] - t[0], rtol) if method == "auto" else METHODS[method]
     if isinstance(drive, Drive):
         t, states, work, meta = _compiled(system, t, drive, state, rtol, chosen, progress)
     else:
         t, states, work, meta = _python(system, t, drive, state, rtol, chosen, progress)
     meta |= {"rtol": rtol, "method": "explicit" if chosen == loop.EXPLICIT else "implicit"}
-    return record(system, t, states, work, _applied(system, t, states, drive), meta)
+    return record(system, t, states, work, applied(system, t, states, drive), meta)
 
 
 def inverse(
@@ -98,6 +123,49 @@ def inverse(
     return simulate(system, t_eval, Drive.prescribed(*motions), q0, qd0, rtol, method=method, progress=progress)
 
 
+def check(t_eval: Any, rtol: float, method: str) -> np.ndarray:
+    """The times (T,) of a request whose tolerance and method are good. Raises InputError."""
+    t = _times(t_eval)
+    if not 1e-13 <= rtol <= 0.1:
+        raise InputError("expected a relative tolerance between 1e-13 and 0.1", key="rtol", value=rtol)
+    if method not in ("auto", *METHODS):
+        raise InputError('expected "auto", "explicit" or "implicit"', key="method", value=method)
+    return t
+
+
+def initial(system: System, t: float, drive: Any, q0: Any, qd0: Any) -> tuple[np.ndarray, np.ndarray]:
+    """q and qd (n,) at the start t [s]: as given, locked joints at rest, prescribed ones on their motion. Raises InputError for
+    wrong shapes, a drive of another number of joints, and a joint outside its limits."""
+    q, qd = _state(system, "q0", q0, system.start()), _state(system, "qd0", qd0, np.zeros(system.n))
+    qd[system.joint_rows[system.chain.locked.astype(bool)]] = 0.0
+    if isinstance(drive, Drive):
+        if len(drive.joints) != len(system.robot.links):
+            raise InputError(
+                f"expected {len(system.robot.links)} joint drives, one a joint", key="drive", value=len(drive.joints)
+            )
+        _put_on_motions(system, drive, t, q, qd)
+    _inside_limits(system, q)
+    return q, qd
+
+
+def to_state(system: System, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
+    """The loop's state (2n + 2,) at q and qd (n,): both in the solver's coordinates, no work done yet."""
+    return np.concatenate([system.to_solver @ q, system.to_solver @ qd, [0.0, 0.0]])
+
+
+def begin(
+    system: System, t: np.ndarray, drive: Drive, state: np.ndarray, method: int
+) -> tuple[Work, loop.Inputs, loop.Memory, np.ndarray]:
+    """A run about to be advanced from state (2n + 2,): workspace, inputs, memory, and its output (T, 2n + 2)."""
+    inputs, m, w = _inputs(system, drive), loop.memory(len(system.robot.links), system.n), _following(system, drive)
+    out = np.zeros((len(t), len(state)))
+    m.z[:], out[0] = state, state
+    m.s[loop.T], m.s[loop.OUT], m.s[loop.ERR] = t[0], 1, 1.0
+    longest = longest_step(system) if method == loop.EXPLICIT else np.inf
+    m.s[loop.LONGEST], m.s[loop.H] = longest, min(0.02 * longest, (t[-1] - t[0]) * 1e-4)
+    return w, inputs, m, out
+
+
 def _compiled(
     system: System,
     t: np.ndarray,
@@ -108,13 +176,8 @@ def _compiled(
     progress: Callable[[float], None] | None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
     """Times, states (T, 2n), work and loss (T, 2), and what the Run's metadata says of the solution."""
-    c, n, links = system.chain, system.n, len(system.robot.links)
-    inputs, m, w = _inputs(system, drive), loop.memory(links, n), _following(system, drive)
-    out = np.zeros((len(t), 2 * n + 2))
-    m.z[:], out[0] = state, state
-    m.s[loop.T], m.s[loop.OUT], m.s[loop.ERR] = t[0], 1, 1.0
-    longest = longest_step(system) if method == loop.EXPLICIT else np.inf
-    m.s[loop.LONGEST], m.s[loop.H] = longest, min(0.02 * longest, (t[-1] - t[0]) * 1e-4)
+    c, n = system.chain, system.n
+    w, inputs, m, out = begin(system, t, drive, state, method)
     events: list[dict[str, Any]] = []
     complete = len(t) == 1
     loop.advance(c, w, inputs, m, method, rtol, t, out, 0)  # no step: compile before the clock starts
@@ -275,7 +338,8 @@ def _forces(system: System, call: Callable[..., Any], t: float, y: np.ndarray, v
     return force
 
 
-def _applied(system: System, t: np.ndarray, states: np.ndarray, drive: Any) -> np.ndarray:
+def applied(system: System, t: np.ndarray, states: np.ndarray, drive: Any) -> np.ndarray:
+    """Drive forces (T, N) [N or N m] at states (T, 2n), whose prescribed joints are put on their motion."""
     n, rows = system.n, system.joint_rows
     if isinstance(drive, Drive):
         out = np.zeros((len(t), len(rows)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -262,6 +262,17 @@ def assemble(robot: Robot) -> System:
     system = System(robot, chain, tuple(infos), block_diag(*transforms), block_diag(*back), tuple(labels))
     _check_mass(system)
     return system
+
+
+def assemble_all(robots: Sequence[Robot]) -> list[System | InputError]:
+    """The Systems of robots of one topology; an InputError in place of one that cannot be assembled."""
+    out: list[System | InputError] = []
+    for robot in robots:
+        try:
+            out.append(assemble(robot))
+        except InputError as error:
+            out.append(error)
+    return out
 
 
 _PER_LINK = (
