@@ -73,8 +73,9 @@ def simulate(
     of a Dask scheduler, whose workers then do the chunks. Raises InputError for wrong arguments; a robot that fails ends alone.
     """
     request = Request.checked(t_eval, drive, q0, qd0, rtol, method, channels, reduce)
-    if isinstance(chunk, bool) or not isinstance(chunk, int) or chunk < 1:
-        raise InputError("expected a whole number of robots, 1 or more", key="chunk", value=chunk)
+    for key, value in (("chunk", chunk), ("threads", 1 if threads is None else threads)):
+        if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+            raise InputError("expected a whole number, 1 or more", key=key, value=value)
     store, units, complete, done = in_memory(), {}, False, 0
     robots = iter(batch)
     try:

@@ -6,17 +6,19 @@ import hashlib
 import pickle
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
 from types import CodeType
 from typing import Any
 
 import numpy as np
 
 from . import __version__, forward
-from .compiled import folder
 from .drive import Drive
 from .errors import InputError
 from .record import channel_units
 from .robot import Robot
+from .system import size
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,10 @@ class Request:
                 raise InputError(f"expected one of {', '.join(known)}", key="channels", value=name)
         if self.drive is not None and len(self.drive.joints) != len(links):
             raise InputError(f"expected {len(links)} joint drives, one a joint", key="drive", value=len(self.drive.joints))
+        n = size(robot)
+        for key, value in (("q0", self.q0), ("qd0", self.qd0)):
+            if value is not None and (value.shape != (n,) or not np.isfinite(value).all()):
+                raise InputError(f"expected {n} finite numbers, in the order of system.labels", key=key, value=value)
         return replace(self, channels=self.channels or tuple(default))
 
     def reduced(self, channels: dict[str, np.ndarray], robot: int) -> dict[str, Any]:
@@ -74,7 +80,7 @@ class Request:
         """The request as JSON can hold it: two requests that are equal here give the same numbers of the same robots."""
         start = [None if q is None else q.tolist() for q in (self.q0, self.qd0)]
         return {
-            "program": f"flexura {__version__} {folder().name}",
+            "program": program(),
             "t_s": self.t.tolist(),
             "drive": None if self.drive is None else [joint.spec() for joint in self.drive.joints],
             "q0": start[0],
@@ -84,6 +90,15 @@ class Request:
             "channels": list(self.channels),
             "reduce": None if self.reduce is None else identity(self.reduce),
         }
+
+
+@cache
+def program() -> str:
+    """The version and a digest of the solver's modules: two equal ones compute the same numbers on one kind of processor."""
+    found = hashlib.sha256()
+    for source in sorted(Path(__file__).parent.glob("*.py")):
+        found.update(source.read_bytes())
+    return f"flexura {__version__} {found.hexdigest()[:16]}"
 
 
 def identity(function: Callable[..., Any]) -> str:

@@ -264,6 +264,12 @@ def assemble(robot: Robot) -> System:
     return system
 
 
+def size(robot: Robot) -> int:
+    """How many unknowns a robot's System has."""
+    own = [2 * k.elements if k.modes is None else min(k.modes + 2 * (i < len(robot.links)), 2 * k.elements) for i, k in enumerate(robot.links, 1)]
+    return len(robot.links) + sum(own)
+
+
 def assemble_all(robots: Sequence[Robot]) -> list[System | InputError]:
     """The Systems of robots of one topology; an InputError in place of one that cannot be assembled."""
     out: list[System | InputError] = []
