@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from typing import TYPE_CHECKING, Any
 
 from .errors import FlexuraError, InputError
@@ -16,7 +16,7 @@ AHEAD = 2  # chunks a worker's thread has waiting, so that it never waits itself
 CONNECT_S = 20
 
 
-def run(request: Request, todo: Iterator[Any], scheduler: str) -> Iterator[Chunk | range]:
+def run(request: Request, todo: Iterator[Any], scheduler: str) -> Generator[Chunk | range, None, None]:
     """The chunks as they come back, each once; a range of `todo`, which is done already, is handed on.
 
     Work that a lost worker had is given to another by the scheduler; what comes back is kept here, by one process. Whatever ends
@@ -33,7 +33,7 @@ def run(request: Request, todo: Iterator[Any], scheduler: str) -> Iterator[Chunk
         raise InputError(text, key="scheduler", value=scheduler) from None
     with client:
         client.wait_for_workers(1, timeout=CONNECT_S)
-        coming, waiting, ended = as_completed(), set(), False
+        coming, waiting, ended = as_completed(loop=client.loop), set(), False
         try:
             while True:
                 room = AHEAD * max(1, sum(client.nthreads().values()))

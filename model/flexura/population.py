@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -84,12 +85,14 @@ def simulate(
         units = {} if request.reduce else {k: v for k, v in channel_units(first[0]).items() if k in request.channels}
         store = in_memory() if folder is None else Store.opened(folder, request.spec() | {"count": batch.count, "chunk": chunk})
         todo = _todo(_chained(first, robots), request, store, chunk)
-        for made in _local(request, todo, threads or cores()) if scheduler is None else _cluster(request, todo, scheduler):
-            if isinstance(made, Chunk):
-                store.put(made)
-            done += len(made)
-            if progress is not None:
-                progress(done / batch.count)
+        source = _local(request, todo, threads or cores()) if scheduler is None else _cluster(request, todo, scheduler)
+        with closing(source) as chunks:
+            for made in chunks:
+                if isinstance(made, Chunk):
+                    store.put(made)
+                done += len(made)
+                if progress is not None:
+                    progress(done / batch.count)
         complete = True
     except KeyboardInterrupt:
         pass
@@ -116,12 +119,12 @@ def _todo(robots: Iterator[Item], request: Request, store: Store, size: int) -> 
         first += len(items)
 
 
-def _local(request: Request, todo: Iterator[Work | range], threads: int) -> Iterator[Chunk | range]:
+def _local(request: Request, todo: Iterator[Work | range], threads: int) -> Generator[Chunk | range, None, None]:
     for work in todo:
         yield work if isinstance(work, range) else compute(request, *work, threads)
 
 
-def _cluster(request: Request, todo: Iterator[Work | range], scheduler: str) -> Iterator[Chunk | range]:
+def _cluster(request: Request, todo: Iterator[Work | range], scheduler: str) -> Generator[Chunk | range, None, None]:
     from . import cluster
 
     return cluster.run(request, todo, scheduler)

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_population import ARM, DRIVE, same
 
 import flexura as fx
+from populations import ARM, DRIVE, no_number, same
 
 ROOT = Path(__file__).resolve().parents[2]
 T = np.linspace(0.0, 2.0, 21)
@@ -23,9 +23,7 @@ BATCH = fx.Batch.vary(ARM, {"payload.mass_kg": np.linspace(0, 0.1, 400)})
 
 
 def start(*arguments: str) -> subprocess.Popen[bytes]:
-    environment = os.environ | {
-        "PYTHONPATH": os.pathsep.join([str(ROOT / "model"), str(ROOT / "tests"), str(Path(__file__).parent)])
-    }
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT / "model"), str(ROOT / "tests")])}
     return subprocess.Popen(
         [sys.executable, "-m", *arguments], env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     )
@@ -119,7 +117,7 @@ def test_what_is_wrong_on_a_worker_is_said_here(cluster):
     address, _ = cluster
     ready(address, 1)
     with pytest.raises(fx.InputError, match="number or a dictionary of numbers of robot 1") as raised:
-        fx.simulate(fx.Batch.of([ARM]), T, DRIVE, reduce=lambda t, c: "no", scheduler=address)
+        fx.simulate(fx.Batch.of([ARM]), T, DRIVE, reduce=no_number, scheduler=address)
     assert raised.value.key == "reduce"
 
 

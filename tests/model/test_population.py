@@ -7,35 +7,20 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
-from robots import beam, few, forces, rigid, robot, robots, seeds
 
 import flexura as fx
 from flexura.batch import digest
-from flexura.signal import bang_bang, constant, cycloid
+from flexura.signal import constant, cycloid
+from populations import ARM, DRIVE, same, varied
+from robots import few, forces, robots, seeds
 
 T = np.linspace(0.0, 0.2, 21)
-ARM = robot(
-    rigid(0.1, 1.0, 0.05, 1e-3, "Pa", hub_mass_kg=0.1),
-    beam(0.3, 0.157, 0.33, 3, modes=2, hub_inertia_kg_m2=1e-3, damping={"beta_s": 1e-4}),
-    payload=0.02,
-)
-DRIVE = fx.Drive.force(bang_bang(2.0, 0.1, 0.01), bang_bang(0.05, 0.1, 0.01))
 ROOT = Path(__file__).resolve().parents[2]
-
-
-def varied(count: int = 20) -> fx.Batch:
-    return fx.Batch.vary(ARM, {"payload.mass_kg": np.linspace(0, 0.1, count), "link.2.length_m": np.linspace(0.25, 0.35, count)})
-
-
-def same(a: fx.Population, b: fx.Population) -> bool:
-    """Equal to the last bit, NaN where NaN is."""
-    return set(a.units) == set(b.units) and all(np.array_equal(a[name], b[name], equal_nan=True) for name in a.units)
 
 
 # The numbers --------------------------------------------------------------------------------------------------------------
@@ -182,7 +167,7 @@ def test_every_number_of_a_robot_and_its_drive_is_in_its_digest():
 SCRIPT = """
 import sys; sys.path[:0] = {path!r}
 import numpy as np, flexura as fx
-from test_population import ARM, DRIVE
+from populations import ARM, DRIVE
 t = np.linspace(0, 2, 21)
 batch = fx.Batch.vary(ARM, {{"payload.mass_kg": np.linspace(0, 0.1, 600)}})
 said = []
@@ -193,7 +178,7 @@ print("complete" if done.complete else f"interrupted {{len(done.robots)}}", flus
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 def test_a_stopped_population_goes_on_where_it_was(tmp_path, how):
-    script = SCRIPT.format(path=[str(Path(__file__).parent), str(ROOT / "tests")], folder=str(tmp_path))
+    script = SCRIPT.format(path=[str(ROOT / "tests")], folder=str(tmp_path))
     environment = os.environ | {"PYTHONPATH": str(ROOT / "model")}
     command = [sys.executable, "-c", script]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment) as process:
@@ -222,7 +207,7 @@ def test_a_stopped_population_goes_on_where_it_was(tmp_path, how):
 MEMORY = """
 import sys; sys.path[:0] = {path!r}
 import resource, numpy as np, flexura as fx
-from test_population import ARM, DRIVE
+from populations import ARM, DRIVE
 draw = lambda k, random: ARM.replace({{"payload.mass_kg": float(random.uniform(0, 0.1))}})
 peak = lambda: resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
 t = np.linspace(0, 0.01, 201)
@@ -237,7 +222,7 @@ print(run(1000, {folder!r} + "/few"), run({count}, {folder!r} + "/many"))
 @pytest.mark.parametrize("count", [10_000, pytest.param(100_000, marks=pytest.mark.slow)])
 def test_memory_does_not_grow_with_the_number_of_robots(tmp_path, count):
     """10 000 robots take no more than 50 MB beyond what 1000 take, 100 000 the same, and less than 2 GiB in all."""
-    script = MEMORY.format(path=[str(Path(__file__).parent), str(ROOT / "tests")], folder=str(tmp_path), count=count)
+    script = MEMORY.format(path=[str(ROOT / "tests")], folder=str(tmp_path), count=count)
     environment = os.environ | {"PYTHONPATH": str(ROOT / "model")}
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=environment, check=True)
     few_bytes, many_bytes = map(int, done.stdout.split())
