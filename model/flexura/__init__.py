@@ -17,7 +17,7 @@ __version__ = "0.1.0"
 
 _HOME = {
     "Robot": "robot", "load": "robot", "save": "robot", "cut": "cutting",
-    "System": "system", "assemble": "system",
+    "System": "system", "assemble": "assembly",
     "static": "statics", "tip_pose": "statics",
     "frequencies": "linear",
     "StateSpace": "statespace", "linearize": "statespace",
@@ -36,6 +36,7 @@ __all__ = [
 ]  # fmt: skip
 
 if TYPE_CHECKING:
+    from .assembly import assemble
     from .batch import Batch
     from .cutting import cut
     from .drive import Drive, JointDrive, Manoeuvre, load_manoeuvre
@@ -48,7 +49,7 @@ if TYPE_CHECKING:
     from .signal import Signal
     from .statespace import StateSpace, linearize
     from .statics import static, tip_pose
-    from .system import System, assemble
+    from .system import System
 
 
 def __getattr__(name: str) -> Any:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from . import loop
+from .assembly import assemble
 from .chain import COULOMB_SPEED
 from .choice import choose, longest_step
 from .drive import Drive
@@ -23,7 +24,7 @@ from .record import limit_event, record
 from .robot import Robot
 from .run import Run
 from .signal import COLUMNS, Signal, constant
-from .system import System, assemble
+from .system import System
 
 MAX_SWEEPS = 300  # joint after joint, in one step
 

@@ -32,7 +32,7 @@ class Batch:
     def of(robots: Any, count: int | None = None, seed: int = 0) -> Batch:
         """A Batch of an iterable of Robot or (Robot, Drive), or of a function (k, random) that makes the k-th.
 
-        `count` is needed where `robots` has no length. A generator is good for one simulation; a list or a function for any number.
+        `count` is needed where `robots` has no length. A generator is good for one simulation, a list or a function for any.
         """
         if count is None:
             if not isinstance(robots, Sized):
@@ -41,7 +41,7 @@ class Batch:
         if isinstance(count, bool) or not isinstance(count, int) or count < 1:
             raise InputError("expected a whole number of robots, 1 or more", key="count", value=count)
         if not callable(robots) and not isinstance(robots, Iterable):
-            raise InputError("expected an iterable of robots, or a function (k, random) that makes one", key="robots", value=robots)
+            raise InputError("expected robots, or a function (k, random) that makes one", key="robots", value=robots)
         return Batch(robots, count, seed)
 
     @staticmethod

@@ -92,7 +92,7 @@ class Store:
 
     @staticmethod
     def opened(folder: str | Path, request: dict[str, Any]) -> Store:
-        """The store of this request: a new folder, or one that the same request began. Raises InputError for another request's."""
+        """The store of this request: a new folder, or one that the same request began. Raises InputError for another's."""
         path = Path(folder) / MANIFEST
         asked = json.loads(json.dumps(request))
         if not path.exists():
@@ -130,7 +130,7 @@ class Store:
         found = _digests(self._path(first))
         for k, (one, other) in enumerate(zip(found, digests, strict=False)):
             if one != other:
-                text = "another robot or drive than the one with which this folder was begun: expected the same, or another folder"
+                text = "another robot or drive than this folder was begun with: expected the same, or another folder"
                 raise InputError(text, key=f"robots[{first + k + 1}]", file=str(self._path(first)))
         return len(found) == len(digests)
 

@@ -33,7 +33,8 @@ def run(request: Request, todo: Iterator[Any], scheduler: str) -> Generator[Chun
         raise InputError(text, key="scheduler", value=scheduler) from None
     with client:
         client.wait_for_workers(1, timeout=CONNECT_S)
-        coming, waiting, ended = as_completed(loop=client.loop), set(), False
+        coming, ended = as_completed(loop=client.loop), False
+        waiting: set[Any] = set()
         try:
             while True:
                 room = AHEAD * max(1, sum(client.nthreads().values()))

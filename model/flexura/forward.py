@@ -79,6 +79,8 @@ def simulate(
     if not isinstance(system, System):
         from . import population as many
 
+        if not (drive is None or isinstance(drive, Drive)):
+            raise InputError("expected a Drive: a population runs in the compiled loop", key="drive", value=drive)
         return many.simulate(system, t_eval, drive, q0, qd0, rtol, method=method, progress=progress, **population)
     if population:
         raise InputError("expected this of a Batch only, not of one System", key=next(iter(population)))

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from . import forward, loop
+from .assembly import assemble_all
 from .batch import Batch, Item, digest
 from .chunks import Chunk, Store, in_memory
 from .drive import Drive
@@ -20,7 +21,7 @@ from .errors import InputError
 from .observe import tips
 from .record import channel_units, limit_event, record
 from .request import Request
-from .system import System, assemble_all
+from .system import System
 
 
 @dataclass(frozen=True)
@@ -165,7 +166,8 @@ def compute(request: Request, first: int, items: list[Item], digests: list[bytes
                 if not values:
                     values = {name: np.full(B, np.nan) for name in kept}
                 if set(values) != set(kept):
-                    raise InputError(f"expected the same numbers of every robot, {sorted(values)}", key="reduce", value=sorted(kept))
+                    text = f"expected the same numbers of every robot, {sorted(values)}"
+                    raise InputError(text, key="reduce", value=sorted(kept))
             for name, value in kept.items():
                 values[name][k] = value
     return Chunk(first, np.array(status), reached, steps, events, digests, values)

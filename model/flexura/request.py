@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from . import __version__, forward
+from .assembly import size
 from .drive import Drive
 from .errors import InputError
 from .record import channel_units
 from .robot import Robot
-from .system import size
 
 
 @dataclass(frozen=True)
@@ -36,12 +36,10 @@ class Request:
 
     @staticmethod
     def checked(
-        t_eval: Any, drive: Any, q0: Any, qd0: Any, rtol: float, method: str, channels: Sequence[str] | None, reduce: Any
+        t_eval: Any, drive: Drive | None, q0: Any, qd0: Any, rtol: float, method: str, channels: Sequence[str] | None, reduce: Any
     ) -> Request:
         """A request whose arguments are good as far as that can be told without a robot. Raises InputError."""
         t = forward.check(t_eval, rtol, method)
-        if not (drive is None or isinstance(drive, Drive)):
-            raise InputError("expected a Drive: a population runs in the compiled loop", key="drive", value=drive)
         if not (reduce is None or callable(reduce)):
             raise InputError("expected a function (t, channels) -> number or {name: number}", key="reduce", value=reduce)
         if isinstance(channels, str):

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from . import signal
+from .assembly import assemble
 from .drive import Drive
 from .forward import simulate
 from .robot import Robot
-from .system import assemble
 
 
 def main() -> None:
