@@ -1,6 +1,6 @@
 """The time loop, compiled: an explicit and an implicit method with a tolerance, one memory for both, no allocation inside.
 
-Explicit: DOP853 (Dormand and Prince 8(5,3), dense output of order 7; coefficients from SciPy). Implicit: ESDIRK4(3)6L[2]SA of
+Explicit: DOP853 (Dormand and Prince 8(5,3), dense output of order 7; coefficients in `dop853.py`). Implicit: ESDIRK4(3)6L[2]SA of
 Kennedy and Carpenter (2003, Appl. Numer. Math. 44), L-stable; each stage is solved by passes of `kernel.accelerate`, which
 holds stiffness, damping and gains implicitly, so that a pass costs what an explicit evaluation costs and steps follow the
 motion, not the stiffest mode. The local error of joint i is kept below rtol times the largest |eta_i| so far, that of a link's
@@ -12,10 +12,16 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.integrate import DOP853
 
 from .chain import COULOMB_SPEED, SLEEVE, SLIDER, Chain, Work
 from .compiled import compiled, inlined
+from .dop853 import AX as _AX
+from .dop853 import CX as _CX
+from .dop853 import E3 as _E3
+from .dop853 import E5 as _E5
+from .dop853 import A as _A
+from .dop853 import C as _C
+from .dop853 import D as _D
 from .kernel import passes
 from .signal import evaluate
 
@@ -23,11 +29,6 @@ EXPLICIT, IMPLICIT = 0, 1
 RUNNING, DONE, LIMIT, STUCK = 0, 1, 2, 3
 T, H, OUT, BREAK, STEPS, REJECTED, EVALS, ERR, STATUS, FRESH, FAULT, LONGEST = range(12)  # entries of Memory.s
 FLOOR = 1e-3  # m, rad (joints); kg^(1/2) m (elastic, mass-normalised); per second for the velocities
-
-_A, _C = np.zeros((13, 12)), np.append(DOP853.C, 1.0)
-_A[:12], _A[12] = DOP853.A, DOP853.B  # the last stage is the end of the step
-_E3, _E5 = DOP853.E3.copy(), DOP853.E5.copy()
-_AX, _CX, _D = DOP853.A_EXTRA.copy(), DOP853.C_EXTRA.copy(), DOP853.D.copy()
 
 GAMMA = 0.25
 _EA = np.array([
