@@ -24,7 +24,7 @@ def grid(robot: fx.Robot, texts: Sequence[str]) -> tuple[fx.Batch, dict[str, np.
             key, values = text.split("=")
             low, high, count = values.split(":")
             ends = np.array([float(low), float(high)])
-            columns[key] = np.linspace(*ends, int(count)) if np.isfinite(ends).all() else ends[:0]
+            columns[key] = np.linspace(float(low), float(high), int(count)) if np.isfinite(ends).all() else ends[:0]
         except ValueError:
             example = "expected KEY=LOW:HIGH:COUNT, for example payload.mass_kg=0:0.1:11"
             raise fx.InputError(example, key="--vary", value=text) from None

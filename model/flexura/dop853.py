@@ -1,6 +1,6 @@
 """The coefficients of DOP853 (Hairer, Norsett, Wanner: Solving Ordinary Differential Equations I, 2nd ed., II.5 and II.6).
 
-The numbers are those of SciPy, which is not loaded for them: it takes a fifth of the time that a whole simulation takes.
+The numbers are those of SciPy, whose integrators are not loaded for them: that takes as long as importing numpy.
 """
 
 from __future__ import annotations
