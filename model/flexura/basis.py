@@ -40,8 +40,9 @@ class Basis(NamedTuple):
 def basis(n: int) -> Basis:
     z = np.zeros
     return Basis(
-        np.eye(n), z((n, n)), z(n), z(n), np.full(n, np.inf), z((n, n)), z((n, n)), z((n, n)), z((n, n)), z(n), z(n), z(n), z(2)
-    )
+        np.eye(n), z((n, n)), z(n), z(n), np.full(n, np.inf), z((n, n)), z((n, n)), z((n, n)), z((n, n)),
+        z(n), z(n), z(n), z(2),
+    )  # fmt: skip
 
 
 @inlined
@@ -64,8 +65,9 @@ def moved(c: Chain, b: Basis, y: np.ndarray) -> bool:
 
 @compiled
 def look(c: Chain, w: Work, b: Basis, kp: np.ndarray, kd: np.ndarray, y: np.ndarray, rate: float) -> bool:
-    """Make the basis again if at y it is poor; true if so. `rate` [rad/s]: slower modes are as good as rigid."""
+    """Make the basis if there is none, or if at y it is poor; true if so. `rate` [rad/s]: slower modes are as good as rigid."""
     n = y.shape[0]
+    none = not b.seen[0] < np.inf
     for k in range(n):
         b.seen[k] = y[k]
     _matrices(c, w, b, kp, kd, y)
@@ -78,7 +80,7 @@ def look(c: Chain, w: Work, b: Basis, kp: np.ndarray, kd: np.ndarray, y: np.ndar
             change = b.K[i, j] - same * b.w2[i]
             mass += (b.M[i, j] - same) ** 2
             stiffness += change * change / (max(b.w2[i], rate * rate) * max(b.w2[j], rate * rate))
-    if max(mass, stiffness) < POOR * POOR:
+    if not none and max(mass, stiffness) < POOR * POOR:
         return False
     _again(b)
     _matrices(c, w, b, kp, kd, y)

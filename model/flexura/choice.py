@@ -13,14 +13,14 @@ from .system import System
 _STABLE = {loop.EXPLICIT: 5.3, loop.PAIR_3: 1.55, loop.PAIR_5: 1.0, loop.IMPLICIT: np.inf, exponential.EXPONENTIAL: np.inf}
 
 
-def quickest(system: System, duration: float, rtol: float, rate_Hz: float = 0.0) -> int:
+def quickest(system: System, duration: float, rtol: float) -> int:
     """Exponential steps wherever the robot's modes stay much the same from step to step, which under a slider that moves along a
     flexible link they do not, and where their order does not fall behind the explicit method's; else as `choose`."""
     c = system.chain
     bends = np.diff(c.first) > 1
     rides = (c.kind[1:] == SLIDER) & bends[:-1] & (c.locked[1:] == 0)
-    if rate_Hz > 0.0 or rides.any() or not bends.any() or rtol < 1e-9:
-        return choose(system, duration, rtol, rate_Hz)
+    if rides.any() or not bends.any() or rtol < 1e-9:
+        return choose(system, duration, rtol)
     return exponential.EXPONENTIAL
 
 

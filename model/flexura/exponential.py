@@ -96,10 +96,9 @@ def past(n: int) -> Past:
 
 @inlined
 def _multiply(A: np.ndarray, x: np.ndarray, out: np.ndarray) -> None:
-    n = x.shape[0]
-    for i in range(n):
+    for i in range(out.shape[0]):
         total = 0.0
-        for k in range(n):
+        for k in range(x.shape[0]):
             total += A[i, k] * x[k]
         out[i] = total
 
@@ -117,21 +116,21 @@ def _force(b: Basis, p: Past, row: int) -> None:
         p.N[row, i] = total + b.w2[i] * eta + b.d2[i] * etad
 
 
-@inlined
-def _sizes(b: Basis, p: Past, m: Memory) -> None:
+@compiled
+def _sizes(phi: np.ndarray, scale: np.ndarray, size: np.ndarray) -> None:
     """Error weights of the modes from those of the unknowns. TIGHT: few long steps add up what many short ones average out."""
-    n = b.w2.shape[0]
+    n = phi.shape[0]
     for i in range(n):
         y, v = 0.0, 0.0
         for k in range(n):
-            own = b.phi[k, i] * m.scale[k]
-            rate = b.phi[k, i] * m.scale[n + k]
+            own = phi[k, i] * scale[k]
+            rate = phi[k, i] * scale[n + k]
             y += own * own
             v += rate * rate
-        p.size[0, i], p.size[1, i] = TIGHT * np.sqrt(y), TIGHT * np.sqrt(v)
+        size[0, i], size[1, i] = TIGHT * np.sqrt(y), TIGHT * np.sqrt(v)
 
 
-@inlined
+@compiled
 def _tables(b: Basis, p: Past, h: float, k: int) -> None:
     """Weights of a step of h from the last k values of N."""
     n = b.w2.shape[0]
@@ -343,7 +342,7 @@ def _stop_at_limit(
     m.s[STATUS], m.s[T] = LIMIT, t + low * h
 
 
-@inlined
+@compiled
 def _settle(b: Basis, m: Memory, p: Past) -> None:
     """Put the state and the past into the basis as it is now."""
     n = m.a.shape[0]
@@ -352,7 +351,7 @@ def _settle(b: Basis, m: Memory, p: Past) -> None:
     _multiply(b.rows, m.z[:n], p.eta)
     _multiply(b.rows, m.z[n : 2 * n], p.etad)
     p.s[SPAN] = 0.0
-    _sizes(b, p, m)
+    _sizes(b.phi, m.scale, p.size)
 
 
 @compiled
@@ -433,8 +432,8 @@ def advance(
         p.s[HEAD] = (int(p.s[HEAD]) + ROWS - 1) % ROWS
         p.s[COUNT] = min(k + 1.0, 1.0 * ORDER)
         p.s[STEADY] += 1.0
-        if factor > 1.4 and h >= s[H] and (k < ORDER or p.s[STEADY] > 2.0):
-            s[H] = h * min(factor, 2.0)
+        if factor * h > 1.4 * s[H] and (k < ORDER or p.s[STEADY] > 2.0):
+            s[H] = min(factor * h, 2.0 * s[H])
         _weights(c, m, rtol, m.z)
         if tn >= end:
             s[STATUS] = DONE
@@ -442,4 +441,4 @@ def advance(
         if left == 1.0:
             s[FRESH], s[H] = 0.0, max(0.1 * s[H], 1e-3 * h)
         elif int(s[STEPS]) % 8 == 0 or k < ORDER:
-            _sizes(b, p, m)
+            _sizes(b.phi, m.scale, p.size)

@@ -154,6 +154,11 @@ def _slope(c: Chain, w: Work, d: Inputs, m: Memory, t: float, z: np.ndarray, dz:
     m.s[EVALS] += 1
 
 
+@compiled
+def _slope_once(c: Chain, w: Work, d: Inputs, m: Memory, t: float, z: np.ndarray, dz: np.ndarray) -> None:
+    _slope(c, w, d, m, t, z, dz)
+
+
 @inlined
 def _weights(c: Chain, m: Memory, rtol: float, z: np.ndarray) -> None:
     """Error weights 1/(rtol * size) from the largest sizes so far."""
@@ -178,7 +183,7 @@ def _explicit_step(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, 
     K, new = m.K, m.znew
     for s in range(1, 13):
         _combine(m, h, _A[s], s, new)
-        _slope(c, w, d, m, min(t + _C[s] * h, last), new, K[s])
+        _slope_once(c, w, d, m, min(t + _C[s] * h, last), new, K[s])
     e5, e3 = 0.0, 0.0
     for k in range(m.scale.shape[0]):
         a, b = 0.0, 0.0
@@ -211,11 +216,6 @@ def _pair_step(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, last
         total *= h * m.scale[k]
         error += total * total
     return np.sqrt(error / m.scale.shape[0])
-
-
-@compiled
-def _slope_once(c: Chain, w: Work, d: Inputs, m: Memory, t: float, z: np.ndarray, dz: np.ndarray) -> None:
-    _slope(c, w, d, m, t, z, dz)
 
 
 @compiled
