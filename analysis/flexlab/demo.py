@@ -1,8 +1,11 @@
-"""The demonstration: the dissertation's rig along its inverse law, in two programs and one picture."""
+"""The demonstration: the dissertation's rig along its inverse law, in two programs, and as an experiment on the emulated board
+beside its simulation."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import flexura as fx
 from flexura.drive import load_manoeuvre
@@ -14,11 +17,27 @@ ROBOT = ROOT / "model" / "robots" / "rig.toml"
 MANOEUVRE = ROOT / "model" / "manoeuvres" / "rig-inverse-law.toml"
 
 
-def demonstrate(folder: Path, progress: Progress | None = None) -> tuple[Check, Path, Path | str]:
-    """Simulate the rig natively and in Exudyn, and leave runs, review and picture in `folder`.
+@dataclass(frozen=True)
+class Demonstration:
+    """The cross-check of two programs, the emulated experiment compared with its simulation, and where what is to be looked at
+    lies; in place of the picture why this machine cannot draw one."""
 
-    Returns the check, the review's path and the picture's, or in its place why this machine cannot draw one.
-    """
+    check: Check
+    comparison: Any
+    review: Path
+    picture: Path | str
+
+    @property
+    def passed(self) -> bool:
+        return self.check.passed and self.comparison.experiment.complete
+
+
+def demonstrate(folder: Path, progress: Progress | None = None) -> Demonstration:
+    """Cross-check the rig in `folder`/crosscheck, run the inverse experiment on the emulated board into `folder`/experiment, and
+    compare it with its simulation in `folder`/comparison."""
+    from .compare import output
+    from .compare.driven import simulate
+    from .compare.measures import compare
     from .review import picture
 
     if not ROBOT.is_file():
@@ -27,8 +46,27 @@ def demonstrate(folder: Path, progress: Progress | None = None) -> tuple[Check, 
         )
     robot = fx.load(ROBOT)
     check = crosscheck(robot, load_manoeuvre(MANOEUVRE, len(robot.links)), progress=progress)
-    review = save(check, folder)
+    save(check, folder / "crosscheck")
+    experiment = _experiment(folder / "experiment", progress)
+    found = compare(simulate(experiment), experiment)
+    review = output.save(found, folder / "comparison", simulated=True)[-1]
     try:
-        return check, review, picture(review, folder / "review.png")
+        return Demonstration(check, found, review, picture(review, folder / "review.png"))
     except fx.FlexuraError as error:
-        return check, review, str(error)
+        return Demonstration(check, found, review, str(error))
+
+
+def _experiment(folder: Path, progress: Progress | None) -> fx.Run:
+    """The inverse law, tracked by the firmware on the emulated board, with the rig's plant behind its wires."""
+    from . import rig
+    from .experiment import conduct, plan
+    from .flash import RIG
+
+    bench = rig.load(RIG)
+    asked = plan.inverse(bench, rig.configuration(bench))
+    opened = conduct.open_board(bench, None)
+    watch = conduct.Watch(observe=lambda reports, part: progress("emulated", part) if progress else None)
+    try:
+        return conduct.conduct(bench, asked, opened, folder, rig.calibration(bench), watch).run
+    finally:
+        opened.board.close()
