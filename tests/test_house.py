@@ -101,7 +101,7 @@ def test_an_adapter_of_something_heavy_is_itself_imported_where_it_is_used(modul
 
 
 # Parts of the command that import nothing themselves.
-COMMANDS = ("flexlab.terminal", "flexlab.compare.command", "flexlab.export.command")
+COMMANDS = ("flexlab.terminal", "flexlab.compare.command", "flexlab.experiment.command", "flexlab.export.command")
 
 
 @pytest.mark.parametrize("module", ["flexlab.cli", *COMMANDS])

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from .compare.command import compare
+from .experiment import command as bench
 from .export.command import export
 from .terminal import announce_compiling, default_folder, events, interrupted, prepare, progress_bars, say, show, stored
 
@@ -23,6 +24,7 @@ app = typer.Typer(
 
 app.command()(compare)
 app.command()(export)
+app.add_typer(bench.app)
 
 RobotFile = Annotated[Path, typer.Argument(metavar="ROBOT", help="robot file (TOML), for example model/robots/rig.toml")]
 ManoeuvreFile = Annotated[

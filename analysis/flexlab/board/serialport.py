@@ -54,9 +54,10 @@ def find() -> str:
 
 
 class SerialBoard:
-    """A board at a serial port, opened for this program alone. Opening resets the board (DTR); outputs are off until armed."""
+    """A board at a serial port, opened for this program alone. Opening resets the board (DTR); outputs are off until armed.
 
-    emulated = False
+    A port without modem lines is a pseudo-terminal: what answers there is a program and is called emulated.
+    """
 
     def __init__(self, device: str, baud: int) -> None:
         import serial
@@ -69,8 +70,18 @@ class SerialBoard:
             reason = getattr(error, "strerror", None) or str(error)
             expected = f"cannot be opened ({reason}): expected the board's serial port"
             raise InputError(expected, key="--port", value=device) from None
+        self.emulated = self._pseudo()
+        if self.emulated:
+            self.label = f"emulated board at {device}"
         self._begin = time.monotonic()
         self._early = b""
+
+    def _pseudo(self) -> bool:
+        try:
+            _ = self._port.cts
+        except OSError:
+            return True
+        return False
 
     def write(self, data: bytes) -> None:
         try:
@@ -97,10 +108,13 @@ class SerialBoard:
         return time.monotonic() - self._begin
 
     def reset(self) -> None:
-        self._port.dtr = False
-        time.sleep(0.05)
-        self._port.reset_input_buffer()
-        self._port.dtr = True
+        try:
+            self._port.dtr = False
+            time.sleep(0.05)
+            self._port.reset_input_buffer()
+            self._port.dtr = True
+        except OSError as error:
+            raise BoardError(f"{self.label}: silent, and without a reset line ({error})") from None
         self._early = b""
 
     def close(self) -> None:

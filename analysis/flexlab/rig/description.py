@@ -90,6 +90,15 @@ class Calibration(Table):
     c1_m: float = Field(description="metres for x, a finite number")
     c2_m: float = Field(0.0, description="metres for x^2, a finite number")
     c3_m: float = Field(0.0, description="metres for x^3, a finite number")
+    covariance: list[list[float]] | None = Field(
+        None, description="four rows of four numbers: the covariance of zero, c1_m, c2_m, c3_m"
+    )
+
+    @model_validator(mode="after")
+    def _square(self) -> Calibration:
+        if self.covariance is not None and [len(row) for row in self.covariance] != [4] * 4:
+            raise WrongValue("covariance", self.covariance, "four rows of four numbers, of zero, c1_m, c2_m, c3_m")
+        return self
 
 
 class Flex(Table):
@@ -192,7 +201,7 @@ def configuration(bench: Bench) -> dict[str, float]:
         "stepper_counts_per_rad": 4 * rig.stepper.encoder_pulses / turn,
         "supply_V": rig.driver.supply_V,
         "supply_divider": rig.driver.supply_divider,
-        **{f"flex_{key}": value for key, value in calibration(bench).model_dump().items()},
+        **{f"flex_{key}": value for key, value in calibration(bench).model_dump(exclude={"covariance"}).items()},
         "position_min_1_m": low_1,
         "position_max_1_m": high_1,
         "position_min_2_rad": low_2,
