@@ -66,7 +66,7 @@ def simulate(
         pulses = onward(*known(t, experiment["joint/2/pulses"], "joint/2/pulses"))
         times, volts = known(t, experiment["joint/1/voltage"], "joint/1/voltage")
         volts = np.sign(volts) * np.maximum(np.abs(volts) - more.driver.dead_zone_V, 0.0)
-        force = _held(times, carriage.force_N_V * volts)
+        force = held(times, carriage.force_N_V * volts)
         at_start = known(t, experiment["joint/1/position"], "joint/1/position")[1][0], pulses(t[0])[0]
         spring = MagneticSpring(rig.stepper, more.stepper)
         run = held_by_field(_started(robot, at_start), t, force, pulses, spring, rtol, progress)
@@ -101,7 +101,7 @@ def _started(robot: fx.Robot, joints: Sequence[float]) -> Start:
     return system, q0
 
 
-def _held(t: np.ndarray, y: np.ndarray) -> signal.Signal:
+def held(t: np.ndarray, y: np.ndarray) -> signal.Signal:
     """Each sample held from half way after the one before to half way before the next: no lag, whatever happens between."""
     at = np.concatenate([t[:1], (t[1:] + t[:-1]) / 2])
     changes = np.concatenate([[True], np.diff(y) != 0.0])

@@ -1,0 +1,81 @@
+"""Joint 1: its friction from voltage and motor speed, its motion on the rail from the motor's encoder and the nut's play.
+
+The motor turns a reflected mass of a hundred kilogrammes; the strip hardly moves it, so that joint 1 is identified by itself:
+
+    (m + J/r^2) v' = F_V u - c v - F_c tanh(v / v_0)         natively simulated, a rigid body on a rail; fitted in v
+
+The nut's play is invisible to the motor's encoder. Rail friction holds the carriage wherever the nut does not push it, so that
+it follows the nut by the play operator  x = min(max(x, s - b/2), s + b/2): true as long as the nut is braked by less than the
+friction brakes the carriage, some 2 m/s^2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+import flexura as fx
+from flexura.signal import Signal
+
+from ..compare.driven import held
+from ..compare.smoothing import known
+from ..experiment.measure import velocity
+from ..rig.motor import JointLine
+from .estimate import Found, Unknown, estimate
+
+STEP_S = 0.002
+MEMORY_S = 0.4
+
+
+def fit(experiment: fx.Run, robot: fx.Robot, line: JointLine, dead_zone_V: float, rtol: float = 1e-5) -> Found:
+    """Coulomb friction [N] and viscous coefficient with the back-EMF [N s/m] of joint 1."""
+    t, x = known(experiment.t, experiment["joint/1/position"], "joint/1/position")
+    times, volts = known(experiment.t, experiment["joint/1/voltage"], "joint/1/voltage")
+    drive = held(times, line.force_N_V * np.sign(volts) * np.maximum(np.abs(volts) - dead_zone_V, 0.0))
+    measured = velocity(t, x)
+    noise = _noise(t, x)
+
+    def model(values: dict[str, float]) -> np.ndarray:
+        run = fx.simulate(_rail(robot, line, values), t, fx.Drive.force(drive), rtol=rtol)
+        return np.nan_to_num((velocity(t, run["joint/1/position"]) - measured) / noise)[None, :]
+
+    unknowns = (
+        Unknown("coulomb_N", line.coulomb_N, 0.01, (line.coulomb_N / 10, 10 * line.coulomb_N)),
+        Unknown("viscous_N_s_m", line.viscous_N_s_m, 0.01, (line.viscous_N_s_m / 10, 10 * line.viscous_N_s_m)),
+    )
+    return estimate(model, unknowns, round(MEMORY_S / STEP_S))
+
+
+def _rail(robot: fx.Robot, line: JointLine, values: dict[str, float]) -> fx.System:
+    """The carriage alone, with all that it carries, from 0 and without limits."""
+    moved = float(fx.assemble(robot).mass(np.zeros(fx.assemble(robot).n))[0, 0]) - robot.links[0].joint.rotor_inertia
+    joint = {
+        "type": "Pa", "rotor_inertia": line.reflected_mass_kg, "viscous_friction": values["viscous_N_s_m"],
+        "coulomb_friction": values["coulomb_N"],
+    }  # fmt: skip
+    body = {"length_m": 0.0, "elements": 0, "mass_kg": moved, "joint": joint}
+    return fx.assemble(fx.Robot.from_dict({"name": "carriage alone", "link": [body]}))
+
+
+def _noise(t: np.ndarray, x: np.ndarray) -> float:
+    """The standard deviation of a velocity by the position's resolution alone [m/s]."""
+    from ..compare.smoothing import resolution
+
+    random = np.random.default_rng(0)
+    white = (resolution(x) or 1e-6) / np.sqrt(12) * random.standard_normal(len(t))
+    return float(np.std(velocity(t, white)))
+
+
+def motion(t: np.ndarray, nut_m: Callable[[float], tuple[float, float, float]], play_m: float) -> np.ndarray:
+    """The carriage's places (T,) [m] behind a nut with that play from flank to flank, in its middle at the start."""
+    s = np.array([nut_m(at)[0] for at in t])
+    x = np.empty(len(t))
+    at, half = s[0], play_m / 2
+    for k, nut in enumerate(s):
+        at = min(max(at, nut - half), nut + half)
+        x[k] = at
+    return x
+
+
+__all__ = ["Signal", "fit", "motion"]
