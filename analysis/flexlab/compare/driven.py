@@ -23,11 +23,12 @@ from flexura.errors import InputError
 from ..naming import called
 from ..rig.description import Rig
 from ..rig.emulation import Emulated
-from ..rig.motor import JointLine, line
+from ..rig.motor import JointLine, line, resistance
 from ..rig.stepper import MagneticSpring
 from .field import Start, held_by_field
 from .smoothing import known, onward, rest, smoothed
 
+SET_S = 1e-3  # from the middle between two reports until a voltage acts: it is set in a tick and stays
 WAYS = ("commanded", "reference", "measured")
 NEEDS = {
     "commanded": ("joint/1/voltage", "joint/2/pulses"),
@@ -66,7 +67,7 @@ def simulate(
         pulses = onward(*known(t, experiment["joint/2/pulses"], "joint/2/pulses"))
         times, volts = known(t, experiment["joint/1/voltage"], "joint/1/voltage")
         volts = np.sign(volts) * np.maximum(np.abs(volts) - more.driver.dead_zone_V, 0.0)
-        force = held(times, carriage.force_N_V * volts)
+        force = held(times + SET_S + more.motor.inductance_H / resistance(rig), carriage.force_N_V * volts)
         at_start = known(t, experiment["joint/1/position"], "joint/1/position")[1][0], pulses(t[0])[0]
         spring = MagneticSpring(rig.stepper, more.stepper)
         run = held_by_field(_started(robot, at_start), t, force, pulses, spring, rtol, progress)
