@@ -4,8 +4,8 @@ The motor turns a reflected mass of a hundred kilogrammes; the strip hardly move
 
     (m + J/r^2) v' = F_V u(t - tau) - c v - F_c tanh(v / v_0)        natively simulated, a rigid body on a rail; fitted in v
 
-tau is the time from a voltage's report to its current. Slower than 5 mm/s static friction may hold, which this line lacks: there
-v is not looked at.
+tau is the time from a voltage's report to its current. Slower than 5 mm/s static friction may hold, and for 2 mm after it has
+turned round the nut crosses its play and drives no rail: this line has neither, and v is not looked at there.
 
 The nut's play is invisible to the motor's encoder. Rail friction holds the carriage wherever the nut does not push it, so that
 it follows the nut by the play operator  x = min(max(x, s - b/2), s + b/2): true as long as the nut is braked by less than the
@@ -13,8 +13,6 @@ friction brakes the carriage, some 2 m/s^2.
 """
 
 from __future__ import annotations
-
-from collections.abc import Callable
 
 import numpy as np
 
@@ -28,7 +26,7 @@ from ..experiment.measure import velocity
 from ..rig.motor import JointLine
 from .estimate import Found, Unknown, estimate
 
-SLIDES_M_S = 5e-3
+SLIDES_M_S, CLEAR_M = 5e-3, 2e-3
 LEAST = 200  # samples that slide
 MEMORY_S = 0.4
 
@@ -39,9 +37,10 @@ def fit(experiment: fx.Run, robot: fx.Robot, line: JointLine, dead_zone_V: float
     times, volts = known(experiment.t, experiment["joint/1/voltage"], "joint/1/voltage")
     drive = held(times, line.force_N_V * np.sign(volts) * np.maximum(np.abs(volts) - dead_zone_V, 0.0))
     measured = velocity(t, x)
-    weight = np.where(np.abs(measured) > SLIDES_M_S, 1 / _noise(t, x), 0.0)
+    clear = np.abs(x - behind(x, CLEAR_M)) > 0.49 * CLEAR_M
+    weight = np.where(clear & (np.abs(measured) > SLIDES_M_S), 1 / _noise(t, x), 0.0)
     if (weight > 0).sum() < LEAST:
-        expected = f"expected at least {LEAST} samples in which the carriage is faster than {SLIDES_M_S:g} m/s"
+        expected = f"expected at least {LEAST} samples faster than {SLIDES_M_S:g} m/s and {CLEAR_M:g} m after a turn"
         raise InputError(expected, key="joint/1/position", value=int((weight > 0).sum()))
 
     def model(values: dict[str, float]) -> np.ndarray:
@@ -78,12 +77,11 @@ def _noise(t: np.ndarray, x: np.ndarray) -> float:
     return float(np.std(velocity(t, white)))
 
 
-def motion(t: np.ndarray, nut_m: Callable[[float], tuple[float, float, float]], play_m: float) -> np.ndarray:
-    """The carriage's places (T,) [m] behind a nut with that play from flank to flank, in its middle at the start."""
-    s = np.array([nut_m(at)[0] for at in t])
-    x = np.empty(len(t))
-    at, half = s[0], play_m / 2
-    for k, nut in enumerate(s):
+def behind(nut_m: np.ndarray, play_m: float) -> np.ndarray:
+    """The carriage's places (T,) [m] behind a nut at (T,) with that play from flank to flank, in its middle at the start."""
+    x = np.empty(len(nut_m))
+    at, half = nut_m[0], play_m / 2
+    for k, nut in enumerate(nut_m):
         at = min(max(at, nut - half), nut + half)
         x[k] = at
     return x

@@ -69,11 +69,11 @@ class Found:
 
 
 def estimate(
-    model: Callable[[dict[str, float]], np.ndarray], unknowns: Sequence[Unknown], memory: int, most: int = 12, tolerance: float = 1e-3
+    model: Callable[[dict[str, float]], np.ndarray], unknowns: Sequence[Unknown], memory: int, most: int = 12
 ) -> Found:
     """Fit `model(values) -> residuals (s, T)` in units of their noise. `memory`: samples over which they may hang together.
 
-    Ends where no inner value moves by more than `tolerance` of its standard deviation by white noise.
+    Ends where a step gains less than 1e-4 of the sum of squares, or after `most` steps.
     """
     from scipy.optimize import least_squares
 
@@ -100,7 +100,7 @@ def estimate(
     scale = np.array([u.step for u in unknowns])
     found = least_squares(
         lambda x: residuals(x).ravel(), start, lambda x: differences(x).reshape(len(x), -1).T, tuple(bounds), x_scale=scale,
-        ftol=1e-5, xtol=1e-9, gtol=1e-9, max_nfev=most,
+        ftol=1e-4, xtol=1e-7, gtol=1e-9, max_nfev=most,
     )  # fmt: skip
     last = residuals(found.x)
     J = differences(found.x)  # (k, s, T)

@@ -1,6 +1,6 @@
 """The strip as the flex sensor and the encoder of joint 2 see it, for given values of what is unknown.
 
-The carriage follows its measured motion behind the play, joint 2 hangs in the stepper's field about the angle of the pulses; the
+The carriage follows the motor behind the play, which the nut's give under the rail's friction widens by 2 F/k; joint 2 hangs in the stepper's field about the angle of the pulses; the
 native simulation of both gives the sensor's voltage,
 
     alpha = angle(s_0 + l) - angle(s_0),   sin angle = w'(s);   U = U_cc R_f / (R_0 + g k alpha (1 + n alpha) + R_f)
@@ -10,6 +10,8 @@ degree over time. Both residuals are in units of their noise.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 
@@ -32,9 +34,11 @@ FINE_S = 2e-3  # between two values of the stepper's torque that the relaxation 
 
 
 class Strip:
-    """One experiment's data and their simulation; `until_s` cuts them off."""
+    """One experiment's data and their simulation; `until_s` cuts them off. `friction`: of the rail, as a factor on its file's."""
 
-    def __init__(self, experiment: fx.Run, rig: Rig, more: Emulated, robot: fx.Robot, until_s: float = np.inf) -> None:
+    def __init__(
+        self, experiment: fx.Run, rig: Rig, more: Emulated, robot: fx.Robot, friction: float = 1.0, until_s: float = np.inf
+    ) -> None:
         part = experiment.t <= experiment.t[0] + until_s
         self.t = experiment.t[part]
         self.rig, self.more, self.robot = rig, more, robot
@@ -42,7 +46,9 @@ class Strip:
         earlier = rest(self.t)
         self._times = np.concatenate([earlier, self.t])
         lead = lambda t, y: (np.concatenate([earlier, t]), np.concatenate([np.full(len(earlier), y[0]), y]))
-        self.nut = smoothed(*lead(*channel("joint/1/position")))
+        nut = smoothed(*lead(*channel("joint/1/position")))
+        self._nut_m = np.array([nut(at)[0] for at in self._times])
+        self._give_m = 2 * friction * more.carriage.coulomb_friction_N / more.carriage.contact_stiffness_N_m
         self.pulses = onward(*lead(*channel("joint/2/pulses")))
         self.flex_V, self.joint_rad = experiment["link/2/flex_voltage"][part], experiment["joint/2/position"][part]
         still = self.t < self.t[0] + 0.3
@@ -61,7 +67,7 @@ class Strip:
     def simulate(self, values: dict[str, float], elements: int | None = None, rtol: float = 1e-4) -> fx.Run:
         """The native simulation at the experiment's times; `values`: factors on the files' figures, play [m], delays [s]."""
         times = self._times
-        x = carriage.motion(times, self.nut, values["backlash_m"])
+        x = carriage.behind(self._nut_m, values["backlash_m"] + self._give_m)
         moved = JointDrive(motion=signal.Signal(signal.table(times, x).segments[:-1]), prescribed=True)
         stepper = self.rig.stepper.model_copy(
             update={"holding_torque_N_m": self.rig.stepper.holding_torque_N_m * values["holding"]}
@@ -97,19 +103,23 @@ class Strip:
 
 
 def changed(robot: fx.Robot, values: dict[str, float]) -> fx.Robot:
-    """The robot with factors on stiffness, damping and payload."""
+    """The robot with factors on stiffness, damping, payload and, if it is there, the strip's `mass`; `gyration_m`: the payload's."""
     strip = robot.links[1]
+    heavy = "density_kg_m3" if strip.density_kg_m3 is not None else "mass_per_length_kg_m"
     given = "young_modulus_Pa" if strip.young_modulus_Pa is not None else "bending_stiffness_N_m2"
-    stiffness = robot.to_dict()["link"][1][given]
-    if isinstance(stiffness, list):
-        stiffness = [entry | {"value": values["stiffness"] * entry["value"]} for entry in stiffness]
-    else:
-        stiffness = values["stiffness"] * stiffness
+    mass = values["payload"] * robot.payload.mass_kg
+    times = lambda key, factor: _times(robot.to_dict()["link"][1][key], factor)
     return robot.replace({
-        f"link.2.{given}": stiffness, "link.2.damping.beta_s": values["damping"] * strip.damping.beta_s,
-        "payload.mass_kg": values["payload"] * robot.payload.mass_kg,
-        "payload.inertia_kg_m2": values["payload"] * robot.payload.inertia_kg_m2,
+        f"link.2.{given}": times(given, values["stiffness"]), f"link.2.{heavy}": times(heavy, values.get("mass", 1.0)),
+        "link.2.damping.beta_s": values["damping"] * strip.damping.beta_s,
+        "payload.mass_kg": mass,
+        "payload.inertia_kg_m2": values["payload"] * robot.payload.inertia_kg_m2 + mass * values.get("gyration_m", 0.0) ** 2,
     })  # fmt: skip
+
+
+def _times(value: Any, factor: float) -> Any:
+    """A number of a robot file, or its list along the link, by a factor."""
+    return [entry | {"value": factor * entry["value"]} for entry in value] if isinstance(value, list) else factor * value
 
 
 def driven(robot: fx.Robot, more: Emulated, elements: int | None = None) -> fx.Robot:
