@@ -32,7 +32,7 @@ MEMORY_S = 0.4
 
 
 def fit(experiment: fx.Run, robot: fx.Robot, line: JointLine, dead_zone_V: float, rtol: float = 1e-5) -> Found:
-    """Coulomb friction [N], viscous coefficient with the back-EMF [N s/m] and delay of joint 1. Raises InputError where it rests."""
+    """Coulomb friction [N], viscous coefficient with the back-EMF [N s/m] and delay [s]. Raises InputError where it rests."""
     t, x = known(experiment.t, experiment["joint/1/position"], "joint/1/position")
     times, volts = known(experiment.t, experiment["joint/1/voltage"], "joint/1/voltage")
     drive = held(times, line.force_N_V * np.sign(volts) * np.maximum(np.abs(volts) - dead_zone_V, 0.0))

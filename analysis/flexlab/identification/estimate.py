@@ -68,9 +68,7 @@ class Found:
         return unknown.outer(middle - wide), unknown.outer(middle + wide)
 
 
-def estimate(
-    model: Callable[[dict[str, float]], np.ndarray], unknowns: Sequence[Unknown], memory: int, most: int = 12
-) -> Found:
+def estimate(model: Callable[[dict[str, float]], np.ndarray], unknowns: Sequence[Unknown], memory: int, most: int = 12) -> Found:
     """Fit `model(values) -> residuals (s, T)` in units of their noise. `memory`: samples over which they may hang together.
 
     Ends where a step gains less than 1e-4 of the sum of squares, or after `most` steps.

@@ -1,8 +1,8 @@
 """Ten seconds, open loop, that show everything the identification asks for.
 
     0.0 to 0.3 s   rest: the flex sensor's noise
-    0.3 to 4.2 s   joint 2 near 0, the strip across the rail's forces: strokes ring the first mode, a chirp through the second; the
-                   carriage meanwhile goes forth and back at many speeds: friction
+    0.3 to 4.2 s   joint 2 near 0, the strip across the rail's forces: strokes ring the first mode, a chirp goes through the
+                   second; the carriage meanwhile goes forth and back at many speeds: friction
     4.2 to 5.4 s   joint 2 turns so that the strip stands across the rail
     5.4 to 9.0 s   the carriage sweeps through the first mode in strokes of some tenths of a millimetre, of which the play of the
                    nut takes its part
@@ -63,7 +63,9 @@ def _rate(t: np.ndarray, first_Hz: float, second_Hz: float) -> np.ndarray:
     a, b = CHIRP
     middle = (a + b) / 2
     chirp = np.where(
-        t < middle, _chirp(t, a, middle, 0.78 * second_Hz, 1.06 * second_Hz), _chirp(t, middle, b, 1.06 * second_Hz, 0.78 * second_Hz)
+        t < middle,
+        _chirp(t, a, middle, 0.78 * second_Hz, 1.06 * second_Hz),
+        _chirp(t, middle, b, 1.06 * second_Hz, 0.78 * second_Hz),
     )
     rate = CHIRP_RAD_S * np.sin(2 * np.pi * chirp) * _between(t, a, b)
     rate += STROKE_RAD_S * _between(t, a, a + 1.5 / first_Hz)  # its beginning and its end ring together

@@ -1,7 +1,7 @@
 """The strip as the flex sensor and the encoder of joint 2 see it, for given values of what is unknown.
 
-The carriage follows the motor behind the play, which the nut's give under the rail's friction widens by 2 F/k; joint 2 hangs in the stepper's field about the angle of the pulses; the
-native simulation of both gives the sensor's voltage,
+The carriage follows the motor behind the play, which the nut's give under the rail's friction widens by 2 F/k; joint 2 hangs in
+the stepper's field about the angle of the pulses; the native simulation of both gives the sensor's voltage,
 
     alpha = angle(s_0 + l) - angle(s_0),   sin angle = w'(s);   U = U_cc R_f / (R_0 + g k alpha (1 + n alpha) + R_f)
 
@@ -55,7 +55,6 @@ class Strip:
         self.flex_noise_V = max(float(np.nanstd(self.flex_V[still])), 1e-4)
         self.joint_noise_rad = 2 * np.pi / (4 * rig.stepper.encoder_pulses) / np.sqrt(12)
         self._guess = Guess(MagneticSpring(rig.stepper, more.stepper).on_N_m)
-        self.rounds = 0
 
     def residuals(self, values: dict[str, float], elements: int | None = None) -> np.ndarray:
         """(2, T): flex voltage and joint 2, 0 where a sample is missing; `elements` of the strip instead of its file's."""
@@ -75,20 +74,21 @@ class Strip:
         system = fx.assemble(driven(changed(self.robot, values), self.more, elements))
         q0 = system.start()
         q0[system.joint_rows] = x[0], self.pulses(times[0])[0]
-        run = held_by_field((system, q0), times, moved, self.pulses, MagneticSpring(stepper, self.more.stepper), rtol, guess=self._guess, fine_s=FINE_S)
-        self.rounds += run.meta["relaxation_rounds"]
+        spring = MagneticSpring(stepper, self.more.stepper)
+        run = held_by_field((system, q0), times, moved, self.pulses, spring, rtol, guess=self._guess, fine_s=FINE_S)
         kept = slice(len(times) - len(self.t), None)
-        states = None if run.states is None else run.states[kept]
-        return fx.Run(self.t, {n: v[kept] for n, v in run.channels.items()}, run.units, run.meta | {"bend": self._bend(system, run)[kept]}, states)
+        channels = run.channels | {"link/2/bend": self._bend(system, run)}
+        return fx.Run(self.t, {n: v[kept] for n, v in channels.items()}, run.units | {"link/2/bend": "rad"}, run.meta)
 
     def _bend(self, system: fx.System, run: fx.Run) -> np.ndarray:
-        info, link = system.links[1], system.robot.links[1]
+        """The bend under the sensor [rad] of a run that holds its states."""
+        assert run.states is not None
+        info, elements = system.links[1], system.robot.links[1].elements
         ends = np.array([self.more.flex.from_m, self.more.flex.from_m + self.rig.flex.length_m])
         h = 1e-5
-        slope = (shape(info.length, link.elements, ends + h) - shape(info.length, link.elements, ends - h)) / (2 * h)
+        slope = (shape(info.length, elements, ends + h) - shape(info.length, elements, ends - h)) / (2 * h)
         rows = np.arange(system.joint_rows[1] + 1, system.n)
-        basis = info.basis if link.modes is not None else np.eye(len(rows))
-        low, high = np.arcsin(slope.T @ basis @ run.states[:, rows].T)
+        low, high = np.arcsin(slope.T @ info.basis @ run.states[:, rows].T)
         return high - low
 
     def voltage(self, run: fx.Run, values: dict[str, float]) -> np.ndarray:
@@ -96,14 +96,14 @@ class Strip:
         from scipy.interpolate import CubicSpline
 
         flex, more = self.rig.flex, self.more.flex
-        a = run.meta["bend"]
+        a = run["link/2/bend"]
         ohm = flex.straight_ohm + values["flex_gain"] * flex.ohm_per_rad * a * (1 + more.nonlinearity_1_rad * a)
         volts = LOGIC_V * flex.divider_ohm / (ohm + flex.divider_ohm)
         return CubicSpline(self.t, volts)(self.t - values["delay_s"])
 
 
 def changed(robot: fx.Robot, values: dict[str, float]) -> fx.Robot:
-    """The robot with factors on stiffness, damping, payload and, if it is there, the strip's `mass`; `gyration_m`: the payload's."""
+    """The robot with factors on stiffness, damping, payload and, where given, the strip's `mass`; `gyration_m` of the payload."""
     strip = robot.links[1]
     heavy = "density_kg_m3" if strip.density_kg_m3 is not None else "mass_per_length_kg_m"
     given = "young_modulus_Pa" if strip.young_modulus_Pa is not None else "bending_stiffness_N_m2"
