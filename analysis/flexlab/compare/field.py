@@ -50,6 +50,8 @@ def held_by_field(
     progress: Callable[[float], None] | None = None,
     guess: Guess | None = None,
     fine_s: float = FINE_S,
+    method: str = "auto",
+    still: float = STILL,
 ) -> fx.Run:
     """Simulate with the force on joint 1 [N], or its drive, and the pulses [rad] given to joint 2.
 
@@ -71,7 +73,7 @@ def held_by_field(
     for n in range(1, ROUNDS + 1):
         held = JointDrive(force=extra, motion=pulses, kp=k)
         try:
-            run = fx.simulate(system, fine, fx.Drive((first, held)), q0=q0, rtol=rtol)
+            run = fx.simulate(system, fine, fx.Drive((first, held)), q0=q0, rtol=rtol, method=method)
         except FlexuraError:  # what was assumed has grown beyond all bounds
             break
         m = len(run) if run.complete else len(run) - 1  # the last row of a run that a limit ended is at that instant
@@ -79,7 +81,7 @@ def held_by_field(
         e, torque = asked[:m] - theta, spring.torques(asked[:m], theta)
         left = np.abs(k * e + assumed[:m] - torque).max(initial=0.0) / spring.holding_N_m
         report(1 - 1 / (n + 1))
-        if left < STILL:
+        if left < still:
             known.stiffness_N_m, known.torque_N_m = k, assumed
             run.meta["relaxation_rounds"] = n
             return _thinned(run, parts)

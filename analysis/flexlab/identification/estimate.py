@@ -68,10 +68,18 @@ class Found:
         return unknown.outer(middle - wide), unknown.outer(middle + wide)
 
 
-def estimate(model: Callable[[dict[str, float]], np.ndarray], unknowns: Sequence[Unknown], memory: int, most: int = 12) -> Found:
+def estimate(
+    model: Callable[[dict[str, float]], np.ndarray],
+    unknowns: Sequence[Unknown],
+    memory: int,
+    together: dict[str, dict[str, float]] | None = None,
+    most: int = 12,
+) -> Found:
     """Fit `model(values) -> residuals (s, T)` in units of their noise. `memory`: samples over which they may hang together.
 
-    Ends where a step gains less than 1e-4 of the sum of squares, or after `most` steps.
+    `together`: for a name, by how much others are moved with it when the derivatives are taken, per unit of its inner value:
+    where two unknowns do nearly the same, the difference between them needs a step of its own, far longer than either alone may
+    be. Ends where a step gains less than 1e-4 of the sum of squares, or after `most` steps.
     """
     from scipy.optimize import least_squares
 
@@ -85,13 +93,16 @@ def estimate(model: Callable[[dict[str, float]], np.ndarray], unknowns: Sequence
         count += 1
         return model(outer(inner))
 
+    names = [u.name for u in unknowns]
+    along = np.diag([u.step for u in unknowns])  # (k, k), a row for each step
+    for name, others in (together or {}).items():
+        for other, share in others.items():
+            along[names.index(name), names.index(other)] = share * along[names.index(name), names.index(name)]
+
     def differences(inner: np.ndarray) -> np.ndarray:
-        base, columns = residuals(inner), []
-        for k, u in enumerate(unknowns):
-            moved = inner.copy()
-            moved[k] += u.step if moved[k] + u.step <= u.inner(u.bounds[1]) else -u.step
-            columns.append((residuals(moved) - base) / (moved[k] - inner[k]))
-        return np.array(columns)
+        base = residuals(inner)
+        changes = np.array([residuals(inner + step) - base for step in along])
+        return np.linalg.solve(along, changes.reshape(len(along), -1)).reshape(changes.shape)
 
     start = np.array([u.inner(u.start) for u in unknowns])
     bounds = np.array([[u.inner(edge) for edge in u.bounds] for u in unknowns]).T

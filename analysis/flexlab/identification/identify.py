@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from pydantic import ValidationError
+from scipy.linalg import eigh
 
 import flexura as fx
 from flexura.errors import InputError
@@ -26,9 +27,10 @@ from flexura.errors import InputError
 from ..rig.description import Rig
 from ..rig.emulation import Emulated
 from ..rig.motor import JointLine, line
+from ..rig.stepper import MagneticSpring
 from . import carriage
 from .estimate import Found, Unknown, estimate
-from .strip import Strip
+from .strip import Strip, changed
 
 NEEDS = ("joint/1/position", "joint/1/voltage", "joint/2/position", "joint/2/pulses", "link/2/flex_voltage")
 BEGINNING_S = 2.0
@@ -98,7 +100,7 @@ def identify(experiment: fx.Run, progress: Callable[[str, float], None] | None =
     values = _beginning(experiment, nominal, lambda part: report("strip", 0.3 * part))
     data = Strip(experiment, nominal.rig, nominal.more, nominal.robot, friction)
     memory = round(MEMORY_S / float(np.median(np.diff(data.t))))
-    strip = estimate(data.residuals, unknowns(values), memory)
+    strip = estimate(data.residuals, unknowns(values), memory, _same_tone(nominal, values))
     report("strip", 1.0)
     elements = nominal.robot.links[1].elements
     doubts: tuple[tuple[dict[str, float], int], ...] = (
@@ -121,16 +123,32 @@ def _beginning(experiment: fx.Run, nominal: Described, report: Callable[[float],
         misfits.append(float((data.residuals(values | {"stiffness": factor})[0] ** 2).sum()))
         report((k + 1) / (len(GRID) + 1))
     values["stiffness"] = float(GRID[np.argmin(misfits)])
-    some = [u for u in unknowns(values) if u.name in ("stiffness", "payload", "flex_gain", "damping")]
+    some = [u for u in unknowns(values) if u.name in ("stiffness", "payload", "flex_gain", "damping", "delay_s")]
     rest = {name: value for name, value in values.items() if name not in {u.name for u in some}}
-    found = estimate(lambda v: data.residuals(rest | v), some, 1)
+    found = estimate(lambda v: data.residuals(rest | v), some, 1, _same_tone(nominal, values))
     return rest | found.values
+
+
+def _same_tone(nominal: Described, values: dict[str, float]) -> dict[str, dict[str, float]]:
+    """How the stiffness goes with the payload for the first frequency to stay, joint 2 in the stepper's field (not clamped)."""
+    field_N_m = MagneticSpring(nominal.rig.stepper, nominal.more.stepper).on_N_m
+
+    def tone(more: dict[str, float]) -> float:
+        system = fx.assemble(changed(nominal.robot, values | more))
+        K, M = system.stiffness(), system.mass(system.start())
+        K[system.joint_rows[1], system.joint_rows[1]] += field_N_m
+        rows = np.arange(system.joint_rows[1], system.n)  # the motor holds the carriage
+        return float(np.log(eigh(K[np.ix_(rows, rows)], M[np.ix_(rows, rows)], eigvals_only=True)[0]))
+
+    base = tone({})
+    payload, stiffness = (tone({name: 1.01 * values[name]}) - base for name in ("payload", "stiffness"))
+    return {"payload": {"stiffness": -payload / stiffness}}
 
 
 def unknowns(values: dict[str, float]) -> list[Unknown]:
     """What is sought about the strip, from `values` on; steps small against what turns a mode's phase over the experiment."""
     steps = {
-        "stiffness": (3e-4, (0.3, 3.0)), "damping": (0.03, (0.02, 50.0)), "payload": (5e-4, (0.1, 10.0)),
+        "stiffness": (3e-4, (0.3, 3.0)), "damping": (0.03, (0.02, 50.0)), "payload": (1e-2, (0.1, 10.0)),
         "flex_gain": (0.01, (0.1, 10.0)), "backlash_m": (0.05, (1e-6, 2e-3)), "holding": (2e-3, (0.2, 5.0)),
         "delay_s": (1e-4, (-5e-3, 0.02)),
     }  # fmt: skip

@@ -30,6 +30,8 @@ from . import carriage
 
 DRIFT = 3  # degree of the polynomial that offset and drift may follow
 MODES = 3
+STILL = 5e-5  # what is left of the relaxation, of the holding torque: derivatives are differences of such simulations
+METHOD, RTOL = "explicit-5", 1e-3  # the cheapest where data break the drives every 2 ms; errs by 2 uV of the sensor
 FINE_S = 2e-3  # between two values of the stepper's torque that the relaxation corrects
 
 
@@ -63,7 +65,7 @@ class Strip:
         joint = (run["joint/2/position"] - self.joint_rad) / self.joint_noise_rad
         return np.stack([_without_drift(self.t, flex, DRIFT), _without_drift(self.t, joint, 0)])
 
-    def simulate(self, values: dict[str, float], elements: int | None = None, rtol: float = 1e-4) -> fx.Run:
+    def simulate(self, values: dict[str, float], elements: int | None = None, rtol: float = RTOL) -> fx.Run:
         """The native simulation at the experiment's times; `values`: factors on the files' figures, play [m], delays [s]."""
         times = self._times
         x = carriage.behind(self._nut_m, values["backlash_m"] + self._give_m)
@@ -75,7 +77,9 @@ class Strip:
         q0 = system.start()
         q0[system.joint_rows] = x[0], self.pulses(times[0])[0]
         spring = MagneticSpring(stepper, self.more.stepper)
-        run = held_by_field((system, q0), times, moved, self.pulses, spring, rtol, guess=self._guess, fine_s=FINE_S)
+        run = held_by_field(
+            (system, q0), times, moved, self.pulses, spring, rtol, guess=self._guess, fine_s=FINE_S, method=METHOD, still=STILL
+        )
         kept = slice(len(times) - len(self.t), None)
         channels = run.channels | {"link/2/bend": self._bend(system, run)}
         return fx.Run(self.t, {n: v[kept] for n, v in channels.items()}, run.units | {"link/2/bend": "rad"}, run.meta)
