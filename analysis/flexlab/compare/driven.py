@@ -67,6 +67,8 @@ def simulate(
         pulses = onward(*known(t, experiment["joint/2/pulses"], "joint/2/pulses"))
         times, volts = known(t, experiment["joint/1/voltage"], "joint/1/voltage")
         volts = np.sign(volts) * np.maximum(np.abs(volts) - more.driver.dead_zone_V, 0.0)
+        turns = np.abs(volts) > more.motor.starts_at_V  # at rest the motor's static friction holds until then
+        volts[: int(np.argmax(turns)) if turns.any() else len(volts)] = 0.0
         force = held(times + SET_S + more.motor.inductance_H / resistance(rig), carriage.force_N_V * volts)
         at_start = known(t, experiment["joint/1/position"], "joint/1/position")[1][0], pulses(t[0])[0]
         spring = MagneticSpring(rig.stepper, more.stepper)
