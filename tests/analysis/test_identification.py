@@ -13,7 +13,6 @@ import pytest
 import flexura as fx
 from boards import BENCH
 from flexlab import rig as rigs
-from flexlab.compare.driven import simulate
 from flexlab.identification import carriage, excitation, files, output
 from flexlab.identification.estimate import Unknown, covariance, estimate
 from flexlab.identification.identify import described, identify
@@ -138,32 +137,46 @@ def test_what_cannot_be_identified_is_refused(excitement):
         assert error.value.key == key
 
 
-@pytest.mark.slow
-def test_a_random_rig_is_found_and_judged_on_other_experiments(excitement, tmp_path):
-    """The issue's figures: stiffness 2 %, damping 10 %, payload 3 %, friction 15 %; joints 1.5 %, tip 4 %, response time 5 %."""
+@pytest.fixture(scope="module")
+def found(excitement):
     run = excitement.run
-    told = dataclasses.replace(run, meta={k: v for k, v in run.meta.items() if k not in ("truth", "seed")})
-    found, truth = identify(told), run.meta["truth"]
-    factors = truth["factors"]
+    return identify(dataclasses.replace(run, meta={k: v for k, v in run.meta.items() if k not in ("truth", "seed")}))
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+def test_a_random_rig_is_found_from_one_run(excitement, found, tmp_path):
+    """The issue's figures: stiffness 2 %, damping 10 %, payload 3 %, friction 15 %."""
+    truth = excitement.run.meta["truth"]
     for name, least in (("stiffness", 0.02), ("damping", 0.10), ("payload", 0.03), ("flex_gain", 0.05)):
-        assert found.strip.values[name] == pytest.approx(factors[name], rel=least), name
+        assert found.strip.values[name] == pytest.approx(truth["factors"][name], rel=least), name
     assert found.carriage.values["coulomb_N"] == pytest.approx(truth["joint_1_coulomb_N"], rel=0.15)
     assert found.strip.values["backlash_m"] == pytest.approx(truth["backlash_m"], abs=5e-5)
+    robot, rig = files.save(found, excitement.run, tmp_path / "robot.toml")
+    assert fx.load(robot).payload.mass_kg == files.robot(found).payload.mass_kg
+    assert rigs.configuration(rigs.load(rig))
+    json.dumps(output.numbers(found, excitement.run))
 
-    robot, rig = files.save(found, run, tmp_path / "robot.toml")
-    bench = rigs.load(rig)
-    assert fx.load(robot).payload.mass_kg == files.robot(found).payload.mass_kg and rigs.configuration(bench)
 
-    for experiment in ("forward", "inverse"):
-        other, seen = ran(experiment, 3, tmp_path / experiment)
-        _, after = output.check(found, other)
-        anew = files.described_anew(other, found)
-        by_name = {d.channel: d for d in after.differences}
-        assert by_name["joint/1/position"].max_relative < 0.015
-        tip, angle = seen.along(other)
-        simulated = simulate(anew, "commanded")
-        peak = lambda y: np.nanmax(np.abs(y))
-        assert peak(angle - simulated["joint/2/position"]) < 0.015 * peak(angle)
-        assert peak(tip - simulated["link/2/tip_deflection"]) < 0.04 * peak(tip)
-        assert after.worst_response < 0.05
-    json.dumps(output.numbers(found, run))
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+@pytest.mark.parametrize("experiment", ["forward", "inverse"])
+def test_what_was_found_predicts_other_experiments(found, experiment, tmp_path):
+    """The issue's figures: joint variables 1.5 %, tip displacement 4 %, response time 5 %, the largest deviation of the peak.
+
+    Joint 2 and the tip are judged by what the plant truly did: a count of its encoder is 1 % of the forward run's stroke, and the
+    flex sensor's noise alone is 15 % of the inverse run's largest deflection.
+    """
+    other, seen = ran(experiment, 3, tmp_path)
+    before, after = output.check(found, other)
+    carriage_, simulated = after.differences[0], after.simulation
+    tip, angle = seen.along(other)
+    off = lambda y, name: np.nanmax(np.abs(y - simulated[name])) / np.nanmax(np.abs(y))
+    figures = {
+        "joint 1": carriage_.max_relative, "joint 2": off(angle, "joint/2/position"),
+        "tip": off(tip, "link/2/tip_deflection"), "response": after.worst_response,
+    }  # fmt: skip
+    print(experiment, {k: round(100 * v, 2) for k, v in figures.items()}, "by the files", before.differences[0].max_relative)
+    for name, most in (("joint 1", 0.015), ("joint 2", 0.015), ("tip", 0.04), ("response", 0.05)):
+        assert figures[name] < most, figures
+    assert carriage_.channel == "joint/1/position" and carriage_.max_relative < before.differences[0].max_relative
