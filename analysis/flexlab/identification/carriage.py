@@ -18,7 +18,7 @@ import numpy as np
 
 import flexura as fx
 from flexura.errors import InputError
-from flexura.signal import Signal
+from flexura.signal import COLUMNS, Signal
 
 from ..compare.driven import held
 from ..compare.smoothing import known
@@ -28,6 +28,7 @@ from .estimate import Found, Unknown, estimate
 
 SLIDES_M_S, CLEAR_M = 5e-3, 2e-3
 LEAST = 200  # samples that slide
+VOLTAGE_DOUBT = 0.005  # the supply is known through a divider of resistors, the motor's constant from its data
 MEMORY_S = 0.4
 
 
@@ -44,8 +45,9 @@ def fit(experiment: fx.Run, robot: fx.Robot, line: JointLine, dead_zone_V: float
         raise InputError(expected, key="joint/1/position", value=int((weight > 0).sum()))
 
     def model(values: dict[str, float]) -> np.ndarray:
-        force = Signal(drive.segments + values["voltage_delay_s"] * (np.arange(drive.segments.shape[1]) == 0))
-        run = fx.simulate(_rail(robot, line, values), t, fx.Drive.force(force), rtol=rtol)
+        force = drive.segments * np.where(np.arange(COLUMNS) == 1, values.get("voltage", 1.0), 1.0)
+        force[:, 0] += values["voltage_delay_s"]
+        run = fx.simulate(_rail(robot, line, values), t, fx.Drive.force(Signal(force)), rtol=rtol)
         return np.nan_to_num((velocity(t, run["joint/1/position"]) - measured) * weight)[None, :]
 
     unknowns = (
@@ -53,7 +55,8 @@ def fit(experiment: fx.Run, robot: fx.Robot, line: JointLine, dead_zone_V: float
         Unknown("viscous_N_s_m", line.viscous_N_s_m, 0.01, (line.viscous_N_s_m / 10, 10 * line.viscous_N_s_m)),
         Unknown("voltage_delay_s", 1e-3, 2e-4, (-5e-3, 0.02), factor=False),
     )
-    return estimate(model, unknowns, round(MEMORY_S / float(np.median(np.diff(t)))))
+    found = estimate(model, unknowns, round(MEMORY_S / float(np.median(np.diff(t)))))
+    return found.doubted(model(found.values | {"voltage": 1 + VOLTAGE_DOUBT}) - found.residuals)
 
 
 def _rail(robot: fx.Robot, line: JointLine, values: dict[str, float]) -> fx.System:
