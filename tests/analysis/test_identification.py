@@ -182,6 +182,6 @@ def test_what_was_found_predicts_other_experiments(found, experiment, tmp_path):
     assert carriage_.channel == "joint/1/position" and carriage_.max_relative < before.differences[0].max_relative
     if experiment == "inverse" and figures["tip"] >= 0.04:
         pytest.xfail(
-            f"tip {100 * figures['tip']:.1f} % of 8 mm: its first mode rings otherwise by part of a microstep's height; open"
+            f"tip {100 * figures['tip']:.1f} % of 8 mm: its first mode rings otherwise by half a millimetre; open"
         )
     assert figures["tip"] < 0.04, figures
