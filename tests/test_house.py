@@ -101,7 +101,10 @@ def test_an_adapter_of_something_heavy_is_itself_imported_where_it_is_used(modul
 
 
 # Parts of the command that import nothing themselves.
-COMMANDS = ("flexlab.terminal", "flexlab.compare.command", "flexlab.experiment.command", "flexlab.export.command")
+COMMANDS = (
+    "flexlab.terminal", "flexlab.compare.command", "flexlab.experiment.command", "flexlab.export.command",
+    "flexlab.identification.command",
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("module", ["flexlab.cli", *COMMANDS])

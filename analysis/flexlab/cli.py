@@ -11,6 +11,7 @@ import typer
 from .compare.command import compare
 from .experiment import command as bench
 from .export.command import export
+from .identification.command import identify
 from .terminal import announce_compiling, default_folder, events, interrupted, prepare, progress_bars, say, show, stored
 
 app = typer.Typer(
@@ -24,6 +25,7 @@ app = typer.Typer(
 
 app.command()(compare)
 app.command()(export)
+app.command()(identify)
 app.add_typer(bench.app)
 
 RobotFile = Annotated[Path, typer.Argument(metavar="ROBOT", help="robot file (TOML), for example model/robots/rig.toml")]

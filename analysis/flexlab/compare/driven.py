@@ -23,11 +23,12 @@ from flexura.errors import InputError
 from ..naming import called
 from ..rig.description import Rig
 from ..rig.emulation import Emulated
-from ..rig.motor import JointLine, line
+from ..rig.motor import JointLine, line, resistance
 from ..rig.stepper import MagneticSpring
 from .field import Start, held_by_field
 from .smoothing import known, onward, rest, smoothed
 
+SET_S = 1e-3  # from the middle between two reports until a voltage acts: it is set in a tick and stays
 WAYS = ("commanded", "reference", "measured")
 NEEDS = {
     "commanded": ("joint/1/voltage", "joint/2/pulses"),
@@ -66,7 +67,9 @@ def simulate(
         pulses = onward(*known(t, experiment["joint/2/pulses"], "joint/2/pulses"))
         times, volts = known(t, experiment["joint/1/voltage"], "joint/1/voltage")
         volts = np.sign(volts) * np.maximum(np.abs(volts) - more.driver.dead_zone_V, 0.0)
-        force = _held(times, carriage.force_N_V * volts)
+        turns = np.abs(volts) > more.motor.starts_at_V  # at rest the motor's static friction holds until then
+        volts[: int(np.argmax(turns)) if turns.any() else len(volts)] = 0.0
+        force = held(times + SET_S + more.motor.inductance_H / resistance(rig), carriage.force_N_V * volts)
         at_start = known(t, experiment["joint/1/position"], "joint/1/position")[1][0], pulses(t[0])[0]
         spring = MagneticSpring(rig.stepper, more.stepper)
         run = held_by_field(_started(robot, at_start), t, force, pulses, spring, rtol, progress)
@@ -101,7 +104,7 @@ def _started(robot: fx.Robot, joints: Sequence[float]) -> Start:
     return system, q0
 
 
-def _held(t: np.ndarray, y: np.ndarray) -> signal.Signal:
+def held(t: np.ndarray, y: np.ndarray) -> signal.Signal:
     """Each sample held from half way after the one before to half way before the next: no lag, whatever happens between."""
     at = np.concatenate([t[:1], (t[1:] + t[:-1]) / 2])
     changes = np.concatenate([[True], np.diff(y) != 0.0])

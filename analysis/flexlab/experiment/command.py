@@ -136,6 +136,24 @@ def free_vibration(
 
 
 @app.command()
+def excite(
+    rig: RigFile = None,
+    port: Port = None, emulated: Emulated = False, seed: Seed = 0, out: Out = None, yes: Yes = False,
+    countdown_s: Countdown = None, calibration: Calibrated = None, configure: Configure = False, live: Live = False,
+    live_port: LivePort = 9876,
+    firmware: Firmware = None, json: Json = False,
+) -> None:  # fmt: skip
+    """Ten seconds, open loop, that show stiffness, damping, payload, friction and play: for flexura identify.
+
+    \b
+    Example: flexura bench excite --emulated --seed 1
+    """
+    from ..identification.excitation import plan
+
+    _run(rig, plan, **_picked(locals()))
+
+
+@app.command()
 def recover(
     folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="of a recording whose host did not come to its end")],
     json: Json = False,

@@ -113,10 +113,10 @@ def free_vibration(bench: Bench, settings: dict[str, float], turn_rad: float = 0
     return dataclasses.replace(plan, asked=plan.asked | {"rings_from_s": rest_s + move_s})
 
 
-def forward(bench: Bench, settings: dict[str, float], profile: Path | None = None) -> Plan:
-    """Voltage and pulse profiles, open loop: of a file, or ones that excite the strip well."""
-    spec = DEFAULT_PROFILE if profile is None else read_toml(profile)
-    where = "" if profile is None else str(profile)
+def forward(bench: Bench, settings: dict[str, float], profile: Path | dict[str, Any] | None = None) -> Plan:
+    """Voltage and pulse profiles, open loop: of a file or its tables, or ones that make the strip ring."""
+    spec = DEFAULT_PROFILE if profile is None else profile if isinstance(profile, dict) else read_toml(profile)
+    where = str(profile) if isinstance(profile, Path) else ""
     try:
         name, duration, (voltage, rate) = _profile(spec)
     except InputError as error:

@@ -44,21 +44,26 @@ def motor_data(rig: Rig, more: EmulatedMotor) -> MotorData:
     if motor.no_load_current_A >= motor.stall_current_A:
         expected = f"expected less than the current at rest, {motor.stall_current_A:g} A"
         raise InputError(expected, key="motor.no_load_current_A", value=motor.no_load_current_A)
-    resistance = motor.rated_voltage_V / motor.stall_current_A
-    constant = (motor.rated_voltage_V - resistance * motor.no_load_current_A) / (motor.no_load_speed_rpm * 2 * math.pi / 60)
+    ohm = resistance(rig)
+    constant = (motor.rated_voltage_V - ohm * motor.no_load_current_A) / (motor.no_load_speed_rpm * 2 * math.pi / 60)
     most = constant * (motor.stall_current_A - motor.no_load_current_A)
     if motor.stall_torque_N_m > most:
         expected = f"expected at most {most:.3g} N m, what speed and currents allow without any loss in the gear"
         raise InputError(expected, key="motor.stall_torque_N_m", value=motor.stall_torque_N_m)
     return MotorData(
-        resistance,
+        ohm,
         more.inductance_H,
         constant,
         more.rotor_inertia_kg_m2 * motor.gear_ratio**2,
         constant * motor.no_load_current_A,
-        constant * more.starts_at_V / resistance,
+        constant * more.starts_at_V / ohm,
         motor.stall_torque_N_m / most,
     )
+
+
+def resistance(rig: Rig) -> float:
+    """R [ohm], of the motor at rest."""
+    return rig.motor.rated_voltage_V / rig.motor.stall_current_A
 
 
 def backwards(efficiency: float) -> float:

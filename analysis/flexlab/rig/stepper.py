@@ -13,6 +13,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from .description import Stepper
 from .emulation import EmulatedStepper
 
@@ -32,6 +34,11 @@ class MagneticSpring:
         n = self.pole_pairs
         detent = -self.detent_N_m * math.sin(4 * n * angle_rad)
         return detent + self.holding_N_m * math.sin(n * (command_rad - angle_rad)) if on else detent
+
+    def torques(self, command_rad: np.ndarray, angle_rad: np.ndarray) -> np.ndarray:
+        """The same of many angles (T,), energised."""
+        n = self.pole_pairs
+        return self.holding_N_m * np.sin(n * (command_rad - angle_rad)) - self.detent_N_m * np.sin(4 * n * angle_rad)
 
     def stiffness(self, on: bool) -> float:
         """The stiffness k of the linear spring [N m/rad]."""
