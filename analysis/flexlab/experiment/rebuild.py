@@ -57,7 +57,7 @@ def rebuild(folder: str | Path) -> fx.Run:
         events.append({"t": float(t[-1]), "text": f"{missing} of {len(t)} reports did not arrive: NaN", "level": "WARN"})
     if not ended:
         events.append({"t": float(t[-1]), "text": UNTOLD, "level": "ERROR"})
-    meta = {key: value for key, value in session.items() if key not in ("knots", "settings")} | {
+    meta = {key: value for key, value in session.items() if key != "settings"} | {
         "complete": bool(ended and ended[-1]["complete"]),
         "events": sorted(events, key=lambda event: event["t"]),
         "settings": settings,
