@@ -20,6 +20,7 @@ import flexura as fx
 from flexura import signal
 from flexura.errors import InputError
 
+from ..experiment.pulses import from_run
 from ..naming import called
 from ..rig.description import Rig
 from ..rig.emulation import Emulated
@@ -64,7 +65,8 @@ def simulate(
         rig, more = _rig(experiment)
         carriage = line(rig, more)
         robot = _with_drives(robot, carriage, more.stepper.damping_N_m_s)
-        pulses = onward(*known(t, experiment["joint/2/pulses"], "joint/2/pulses"))
+        exact = from_run(experiment)  # else a line between the reports, which are 2 ms apart
+        pulses = signal.piecewise(*exact) if exact else onward(*known(t, experiment["joint/2/pulses"], "joint/2/pulses"))
         times, volts = known(t, experiment["joint/1/voltage"], "joint/1/voltage")
         volts = np.sign(volts) * np.maximum(np.abs(volts) - more.driver.dead_zone_V, 0.0)
         turns = np.abs(volts) > more.motor.starts_at_V  # at rest the motor's static friction holds until then
@@ -72,7 +74,8 @@ def simulate(
         force = held(times + SET_S + more.motor.inductance_H / resistance(rig), carriage.force_N_V * volts)
         at_start = known(t, experiment["joint/1/position"], "joint/1/position")[1][0], pulses(t[0])[0]
         spring = MagneticSpring(rig.stepper, more.stepper)
-        run = held_by_field(_started(robot, at_start), t, force, pulses, spring, rtol, progress)
+        method = "explicit-5" if exact else "auto"  # a jump every millisecond
+        run = held_by_field(_started(robot, at_start), t, force, pulses, spring, rtol, progress, method=method)
     else:
         motions = [_motion(experiment, name, by) for name in NEEDS[by]]
         earlier = rest(t)
