@@ -1,7 +1,7 @@
 """When the stepper got each of its pulses: the firmware's own arithmetic for joint 2, replayed on the knots that were sent.
 
-A report has the pulses' number, every 2 ms. Between two of them a pulse may have come 1 ms sooner or later than a line through the
-numbers says; each such error is a blow of one microstep (0.6 mm at the tip) x 1 ms, and hundreds of them make the strip ring by
+A report has the pulses' number, every 2 ms. Between two of them a pulse may have come 1 ms sooner or later than a line through
+the numbers says; each such error is a blow of one microstep (0.6 mm at the tip) x 1 ms, and hundreds of them make the strip ring by
 half a millimetre. Where the controller of joint 2 sees nothing but its own pulses and no strip (`feedback_2`, `kf_2_rad_s_m`,
 `kg_2_rad_m` 0), or there is none, the pulses follow from knots and settings alone: cubics and set-point filter (player.cpp), the
 controller in integers (pid.cpp), and its rate's pulses (steps.cpp), bit for bit. The reports' numbers tell whether that holds.
@@ -10,7 +10,6 @@ controller in integers (pid.cpp), and its rate's pulses (steps.cpp), bit for bit
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
@@ -45,10 +44,12 @@ def from_run(run: fx.Run) -> tuple[np.ndarray, np.ndarray] | None:
     at, up = pulses(knots, settings, int(seen[0]), round(CONTROL_HZ * float(t[-1])) + 1)
     count = seen[0] + np.concatenate([[0], np.cumsum(up)])
     given = lambda late: count[np.searchsorted(at, t + late)]
-    low, high = np.minimum(given(-CLOSE_S), given(CLOSE_S)), np.maximum(given(-CLOSE_S), given(CLOSE_S))
-    if ((seen < low) | (seen > high)).any():
-        return None
-    return np.concatenate([[run.t[0]], at]), count / per_rad
+    unsure = float(meta.get("start_uncertainty_s", 0.0))
+    for late in {0.0, -unsure, unsure}:  # the start may be half a tick from where it was put
+        earlier, later = given(late - CLOSE_S), given(late + CLOSE_S)
+        if ((seen >= np.minimum(earlier, later)) & (seen <= np.maximum(earlier, later))).all():
+            return np.concatenate([[run.t[0]], at - late]), count / per_rad
+    return None
 
 
 def pulses(knots: Knots, settings: dict[str, float], given: int, ticks: int) -> tuple[np.ndarray, np.ndarray]:
