@@ -1,6 +1,6 @@
 """Exponential steps: the linear part of a robot's motion solved exactly, what is left of it summed up as in Adams' method.
 
-In the modes of `basis.Basis`, y = phi eta, the equations of motion are eta'' + d2 eta' + w2 eta = N, where N = rows a + w2 eta +
+In the modes of `basis.Basis`, y = y0 + phi eta, the equations of motion are eta'' + d2 eta' + w2 eta = N, where N = rows a + w2 eta +
 d2 eta' takes the accelerations a from a pass of `kernel.passes`: exact, whatever the basis. N varies with the motion and not with
 the vibration. A polynomial through its last values (at most ORDER of them) is put into the variation-of-constants formula
 (`propagator.py`), the equations are looked at once where that leads, and the polynomial through the new value too makes the step:
@@ -58,6 +58,7 @@ class Past(NamedTuple):
     """What a multistep run remembers for n unknowns, and the tables of the present step. Row HEAD of the rings is the newest."""
 
     s: np.ndarray  # (4,)
+    origin: np.ndarray  # (n,) y0, the state where the basis was taken up: small numbers keep their digits
     eta: np.ndarray  # (n,)
     etad: np.ndarray
     t: np.ndarray  # (ROWS,) a ring, and so below: times
@@ -88,7 +89,7 @@ class Past(NamedTuple):
 def past(n: int) -> Past:
     z, k, r = np.zeros, ORDER, ROWS
     return Past(
-        z(4), z(n), z(n), z(r), z((r, n)), z((r, n)), z((r, n)), z((r, n)), z((r, 2)), z((4, n)), z((k + 1, n)), z((k + 1, n)),
+        z(4), z(n), z(n), z(n), z(r), z((r, n)), z((r, n)), z((r, n)), z((r, n)), z((r, 2)), z((4, n)), z((k + 1, n)), z((k + 1, n)),
         z((2, k, n)), z((4, n)), z((2, k + 2, k + 1)), z((2, k + 1)), np.zeros(n, np.int64), z(k + 1), z(k), z(n), z((4, n)),
         z((2, n)), z((k + 1, n)), z((2, k + 1)), z((2, n)), z((2, 40)),
     )  # fmt: skip
@@ -104,6 +105,14 @@ def _multiply(A: np.ndarray, x: np.ndarray, out: np.ndarray) -> None:
 
 
 @inlined
+def _place(b: Basis, p: Past, eta: np.ndarray, y: np.ndarray) -> None:
+    """y = y0 + phi eta."""
+    _multiply(b.phi, eta, y)
+    for k in range(y.shape[0]):
+        y[k] += p.origin[k]
+
+
+@inlined
 def _force(b: Basis, p: Past, row: int) -> None:
     """N of a row of the rings from its accelerations and state."""
     n = b.w2.shape[0]
@@ -111,7 +120,7 @@ def _force(b: Basis, p: Past, row: int) -> None:
         total, eta, etad = 0.0, 0.0, 0.0
         for k in range(n):
             total += b.rows[i, k] * p.a[row, k]
-            eta += b.rows[i, k] * p.y[row, k]
+            eta += b.rows[i, k] * (p.y[row, k] - p.origin[k])
             etad += b.rows[i, k] * p.v[row, k]
         p.N[row, i] = total + b.w2[i] * eta + b.d2[i] * etad
 
@@ -242,7 +251,7 @@ def _predict(b: Basis, m: Memory, p: Past, h: float) -> None:
         loss += p.area[j] * p.power[row, 1]
         work_gap -= end * p.power[row, 0]
         loss_gap -= end * p.power[row, 1]
-    _multiply(b.phi, eta, m.znew[:n])
+    _place(b, p, eta, m.znew[:n])
     _multiply(b.phi, etad, m.znew[n : 2 * n])
     m.znew[2 * n], m.znew[2 * n + 1] = m.z[2 * n] + h * work, m.z[2 * n + 1] + h * loss
     m.K[1, 0], m.K[1, 1] = work_gap, loss_gap
@@ -264,7 +273,7 @@ def _correct(b: Basis, m: Memory, p: Past, h: float, new: int) -> float:
         p.new[3, i] = etad + p.late[1, i] * gap[i]
         e0, e1 = p.late[2, i] * gap[i] * p.size[0, i], p.late[3, i] * gap[i] * p.size[1, i]
         error += e0 * e0 + e1 * e1
-    _multiply(b.phi, p.new[2], m.znew[:n])
+    _place(b, p, p.new[2], m.znew[:n])
     _multiply(b.phi, p.new[3], m.znew[n : 2 * n])
     m.znew[2 * n] += h * p.area[k] * (p.power[new, 0] + m.K[1, 0])
     m.znew[2 * n + 1] += h * p.area[k] * (p.power[new, 1] + m.K[1, 1])
@@ -314,7 +323,7 @@ def _inside(m: Memory, b: Basis, p: Past, h: float, x: float, out: np.ndarray) -
                 v += p.column[1, q] * power * p.f[q, i]
                 power *= x
             eta[i], etad[i] = y, v
-    _multiply(b.phi, eta[:n], out[:n])
+    _place(b, p, eta[:n], out[:n])
     _multiply(b.phi, etad[:n], out[n : 2 * n])
     head, new = int(p.s[HEAD]), (int(p.s[HEAD]) + ROWS - 1) % ROWS
     for r in range(2):
@@ -346,9 +355,10 @@ def _stop_at_limit(
 def _settle(b: Basis, m: Memory, p: Past) -> None:
     """Put the state and the past into the basis as it is now."""
     n = m.a.shape[0]
+    for k in range(n):
+        p.origin[k], p.eta[k] = m.z[k], 0.0
     for j in range(int(p.s[COUNT])):
         _force(b, p, (int(p.s[HEAD]) + j) % ROWS)
-    _multiply(b.rows, m.z[:n], p.eta)
     _multiply(b.rows, m.z[n : 2 * n], p.etad)
     p.s[SPAN] = 0.0
     _sizes(b.phi, m.scale, p.size)
