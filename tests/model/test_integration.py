@@ -36,7 +36,10 @@ def arm_with_friction() -> fx.System:
 # Accuracy -------------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("method", "tolerances"), [("explicit", [1e-4, 1e-6, 1e-8, 1e-10]), ("implicit", [1e-3, 1e-5, 1e-7]), ("exponential", [1e-3, 1e-5, 1e-7, 1e-9])])
+TOLERANCES = {"explicit": [1e-4, 1e-6, 1e-8, 1e-10], "implicit": [1e-3, 1e-5, 1e-7], "exponential": [1e-3, 1e-5, 1e-7, 1e-9]}
+
+
+@pytest.mark.parametrize(("method", "tolerances"), TOLERANCES.items())
 @pytest.mark.parametrize("make", [bench_arm, arm_with_friction], ids=["bench arm", "two links"])
 def test_the_error_falls_with_the_tolerance(method, tolerances, make):
     """Against rtol = 1e-12, after some periods: below a hundred times rtol, and smaller with every smaller rtol."""
