@@ -109,8 +109,8 @@ def cases() -> list[Case]:
     out = [Case("Exudyn, 5 ANCF elements, tuned", exudyn, lambda: exudyn(16, 1e-4).deflections, repeats=1)]
     for name, elements, modes, rtol, asked in (
         ("native, 2 modes", 12, 2, 1e-3, 400.0),
-        ("native, 3 modes, accurate", 12, 3, 1e-5, None),
-        ("native, all unknowns of 5 elements", 5, None, 1e-4, 200.0),
+        ("native, 3 modes, accurate", 12, 3, 1e-4, None),
+        ("native, all unknowns of 5 elements", 5, None, 5e-4, 200.0),
     ):
         system = fx.assemble(robot(elements, modes))
         out.append(Case(name, partial(native, system, T, drive, rtol), converged, asked))
