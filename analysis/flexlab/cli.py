@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 from pathlib import Path
 from typing import Annotated, Any
@@ -396,6 +397,7 @@ def doctor(rig: RigFile = None, json: Json = False) -> None:
 
 def main() -> None:
     """Run the command; bad input ends in one line on stderr and status 2, whatever else goes wrong in status 1."""
+    gc.set_threshold(100_000)  # looking for garbage among a million objects just imported is a tenth of the start
     try:
         app()
     except KeyboardInterrupt:
