@@ -9,9 +9,10 @@ from typing import Annotated, Any
 import typer
 
 from .compare.command import compare
-from .export.command import export
 from .experiment import command as bench
+from .export.command import export
 from .terminal import announce_compiling, default_folder, events, interrupted, prepare, progress_bars, say, show, stored
+from .tuning.command import tune
 
 app = typer.Typer(
     name="flexura",
@@ -24,6 +25,7 @@ app = typer.Typer(
 
 app.command()(compare)
 app.command()(export)
+app.command()(tune)
 app.add_typer(bench.app)
 
 RobotFile = Annotated[Path, typer.Argument(metavar="ROBOT", help="robot file (TOML), for example model/robots/rig.toml")]

@@ -35,7 +35,7 @@ def _cached(function: Any, **options: Any) -> Any:
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(_FOLDER)
     try:
-        return njit(cache=True, error_model="numpy", _nrt=False, fastmath={"contract"}, **options)(function)
+        return njit(cache=True, nogil=True, error_model="numpy", _nrt=False, fastmath={"contract"}, **options)(function)
     finally:
         numba.config.CACHE_DIR = before
 
