@@ -1,9 +1,9 @@
 """The dissertation's control cases: types III and IV, the elastic displacement ignored (case 1) and considered (case 2).
 
-The dissertation (Duong Xuan Bien, 2019, section 3.4.3) gives the figures of tables 3.10 and 3.12, and neither gains, bounds, limits
-nor the size of its steps, which are therefore this project's: d1 0 -> 0.10 m and q2 0 -> pi/4 (type IV), q1 0 -> pi/4 and d2 0.20 ->
-0.30 m (type III), as steps, 5 s. Both cases have the same drive limits, algorithm, budget, seed and bounds. In case 1 the controller
-has no term in the strip and J no vibration; in case 2 both have.
+The dissertation (Duong Xuan Bien, 2019, section 3.4.3) gives the figures of tables 3.10 and 3.12, and neither gains, bounds,
+limits nor the size of its steps, which are therefore this project's: d1 0 -> 0.10 m and q2 0 -> pi/4 (type IV), q1 0 -> pi/4 and
+d2 0.20 -> 0.30 m (type III), as steps, 5 s. Both cases have the same drive limits, algorithm, budget, seed and bounds. In case 1
+the controller has no term in the strip and J no vibration; in case 2 both have.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import flexura as fx
 from flexura.control import Output
 from flexura.drive import Drive, JointDrive, Manoeuvre
 from flexura.gains import Gains
-from flexura.signal import Signal, step
+from flexura.signal import step
 
 from .free import Free, free
 from .objective import Weights
@@ -26,8 +26,8 @@ from .task import Task
 ROOT = Path(__file__).resolve().parents[3]
 DURATION_S, OUTPUT_STEP_S = 5.0, 0.005
 FIGURES = ("rise", "settling", "overshoot", "error")
-# Rise time [s], settling time [s], overshoot [%], state error, of joint 1 and joint 2; the summary's lost digits restored from the
-# deviations between the cases.
+# Rise time [s], settling time [s], overshoot [%], state error, of joint 1 and joint 2; the summary's lost digits are
+# restored from the deviations between the cases.
 PUBLISHED = {
     ("IV", 1): ((1.3, 5.2, 25.0, 0.0), (0.3, 3.5, 14.6, 0.0)), ("IV", 2): ((1.5, 5.0, 22.0, 0.0), (2.0, 3.5, 0.0, 0.0)),
     ("III", 1): ((0.5, 3.7, 28.3, 0.0), (0.3, 3.8, 43.0, 0.0)), ("III", 2): ((0.5, 3.6, 29.0, 0.0), (0.3, 3.5, 16.7, 0.0)),
@@ -49,8 +49,8 @@ class Structure:
 
     @cached_property
     def manoeuvre(self) -> Manoeuvre:
-        motions: list[Signal] = [step(end) for end in self.ends]
-        return Manoeuvre(f"type {self.name}, steps", DURATION_S, OUTPUT_STEP_S, Drive(tuple(JointDrive(motion=m) for m in motions)))
+        drive = Drive(tuple(JointDrive(motion=step(end)) for end in self.ends))
+        return Manoeuvre(f"type {self.name}, steps", DURATION_S, OUTPUT_STEP_S, drive)
 
     def task(self, case: int, weights: Weights | None = None) -> Task:
         """Case 1 or 2; `weights`: those of case 2."""
@@ -93,7 +93,7 @@ def type_3() -> Structure:
             free("kp_2_N_m", 1, 1000), free("ki_2_N_m_s", 0.1, 1000), free("kd_2_N_s_m", 0.1, 100),
             free("setpoint_1_Hz", 0.2, 50), free("setpoint_2_Hz", 0.2, 50),
         ),
-        (free("kf_1_N_m_m", -50, 50), free("kg_1_N_m_s_m", -5, 5), free("kf_2_N_m", -50, 50), free("kg_2_N_s_m", -5, 5)),
+        (free("kf_1_N_m_m", -200, 200), free("kg_1_N_m_s_m", -10, 10), free("kf_2_N_m", -200, 200), free("kg_2_N_s_m", -10, 10)),
     )  # fmt: skip
 
 

@@ -14,9 +14,13 @@ from ..terminal import announce_compiling, default_folder, say, show
 
 
 def tune(
-    robot: Annotated[Path, typer.Argument(metavar="ROBOT", help="robot file (TOML)")],
-    manoeuvre: Annotated[Path, typer.Argument(metavar="MANOEUVRE", help="manoeuvre file (TOML): the motions are the set-points")],
-    controller: Annotated[Path, typer.Option(metavar="GAINS", help="gains file (TOML): the structure, and what is not free")],
+    robot: Annotated[Path | None, typer.Argument(metavar="ROBOT", help="robot file (TOML)")] = None,
+    manoeuvre: Annotated[
+        Path | None, typer.Argument(metavar="MANOEUVRE", help="manoeuvre file (TOML): the motions are the set-points")
+    ] = None,
+    controller: Annotated[
+        Path | None, typer.Option(metavar="GAINS", help="gains file (TOML): the structure, and what is not free")
+    ] = None,
     free: Annotated[
         list[str] | None, typer.Option(metavar="NAME=LOW:HIGH", help="a free setting; log scale unless 0 is between")
     ] = None,
@@ -30,17 +34,20 @@ def tune(
     effort: Annotated[float, typer.Option(help="weight EFFORT in J")] = 0.01,
     overshoot: Annotated[float, typer.Option(help="weight OVERSHOOT in J")] = 1.0,
     payload_factors: Annotated[str, typer.Option(metavar="LIST", help="robust: the worst over payloads, as 0,1,2")] = "1",
-    stiffness_factors: Annotated[str, typer.Option(metavar="LIST", help="robust: and over the links' stiffness, as 0.9,1.1")] = "1",
+    stiffness_factors: Annotated[str, typer.Option(metavar="LIST", help="robust: and over stiffnesses, as 0.9,1.1")] = "1",
     rig: Annotated[
         Path | None, typer.Option(metavar="RIG", help="rig file: its motor's rotor and friction, its stepper, in the joints")
     ] = None,
     rtol: Annotated[float, typer.Option(help="relative tolerance of the runs of the search; the result is run to 1e-6")] = 1e-4,
-    modes: Annotated[int, typer.Option(min=0, help="that each link keeps in the search; 0: the robot file's mesh, as the result")] = 2,
+    modes: Annotated[int, typer.Option(min=0, help="of each link in the search; 0: the robot file's mesh, as in the result")] = 2,
     scheduler: Annotated[str | None, typer.Option(metavar="ADDRESS", help="a Dask scheduler, tcp://...")] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="threads; default: one a core")] = None,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="FOLDER", help="default logs/tune-<robot>; a search that stopped goes on")
     ] = None,
+    dissertation: Annotated[
+        bool, typer.Option("--dissertation", help="instead of a ROBOT: its control cases, types III and IV, in its tables")
+    ] = False,
     json: Annotated[bool, typer.Option("--json", help="print JSON instead of tables, for scripts")] = False,
 ) -> None:  # fmt: skip
     """Find a controller's gains on the simulator, drive limits and sampling included.
@@ -76,6 +83,13 @@ def tune(
     if free and free_file:
         raise fx.InputError("expected either --free or --free-file", key="--free-file", value=str(free_file))
     how = Search(algorithm, population, generations, seed, patience)
+    if dissertation:
+        if robot is not None or controller is not None:
+            raise fx.InputError("expected --dissertation without a robot: it brings its own", key="ROBOT", value=str(robot))
+        _cases(how, out or Path("logs") / "tune-dissertation", scheduler, jobs, json)
+        return
+    if robot is None or manoeuvre is None or controller is None:
+        raise fx.InputError("expected ROBOT, MANOEUVRE and --controller GAINS, or --dissertation", key="ROBOT", value=str(robot))
     described, given = fx.load(robot), gains_file.load(controller)
     if rig is not None:
         from .. import rig as rigs
@@ -106,6 +120,19 @@ def tune(
         raise typer.Exit(130)
 
 
+def _cases(how: Any, folder: Path, scheduler: str | None, jobs: int | None, json: bool) -> None:
+    from . import dissertation as cases
+
+    announce_compiling()
+    with _bar(how.generations, ("J",)) as report:
+        found, complete = cases.study(["IV", "III"], how, folder, scheduler, jobs, lambda name, history: report(history))
+    if found:
+        show(json, lambda: cases.table(found), lambda: cases.data(found))
+    say(json, f"stored {folder}" + ("" if complete else "; interrupted: the same command goes on"))
+    if not complete:
+        raise typer.Exit(130)
+
+
 def _factors(text: str, key: str) -> list[float]:
     import flexura as fx
 
@@ -114,7 +141,8 @@ def _factors(text: str, key: str) -> list[float]:
     except ValueError:
         values = []
     if not values or not all(0 <= v < 100 for v in values) or (key.startswith("--stiff") and min(values) <= 0):
-        raise fx.InputError("expected factors of 0 or more (stiffness: above 0) with commas between, as 0.5,1,2", key=key, value=text)
+        expected = "expected factors of 0 or more (stiffness: above 0) with commas between, as 0.5,1,2"
+        raise fx.InputError(expected, key=key, value=text)
     return values
 
 

@@ -1,4 +1,4 @@
-"""Where a population's runs are made: on this machine's cores, or on the workers of a Dask scheduler. The numbers are the same."""
+"""Where a population's runs are made: on this machine's cores or a Dask scheduler's workers. The numbers are the same."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """Which settings of a controller are free, between what bounds, and how a point of the unit cube becomes gains.
 
-    [free]
-    kp_1_V_m = [100, 20000]                                    # both of one sign: on a logarithmic scale
-    kg_2_rad_m = { low = -2, high = 2, scale = "linear" }      # through 0: linear
+[free]
+kp_1_V_m = [100, 20000]                                    # both of one sign: on a logarithmic scale
+kg_2_rad_m = { low = -2, high = 2, scale = "linear" }      # through 0: linear
 """
 
 from __future__ import annotations
@@ -56,13 +56,15 @@ class Free:
 def free(name: str, low: Any, high: Any, scale: str | None = None) -> Free:
     """A free setting; by default on a logarithmic scale unless its bounds have 0 between them. Raises InputError."""
     if name not in NAMES and name not in _FILTERS:
-        raise InputError("expected a setting of a gains file, see firmware/README.md, the controller", key=f"free.{name}", value=name)
+        expected = "expected a setting of a gains file, see firmware/README.md, the controller"
+        raise InputError(expected, key=f"free.{name}", value=name)
     if not (finite(low) and finite(high) and low < high):
         raise InputError("expected two finite numbers, LOW below HIGH", key=f"free.{name}", value=[low, high])
     if scale not in (None, *SCALES):
         raise InputError("expected log or linear", key=f"free.{name}.scale", value=scale)
     if scale == "log" and low * high <= 0:
-        raise InputError("expected bounds of one sign and without 0 for a logarithmic scale", key=f"free.{name}", value=[low, high])
+        expected = "expected bounds of one sign and without 0 for a logarithmic scale"
+        raise InputError(expected, key=f"free.{name}", value=[low, high])
     if any(field in ("delay_s", "encoder") for _, _, field in NAMES.get(name, ())):
         raise InputError("expected a gain, a limit or a filter", key=f"free.{name}", value=name)
     return Free(name, float(low), float(high), scale or ("log" if low * high > 0 else "linear"))
@@ -85,7 +87,7 @@ def read(path: Path) -> list[Free]:
 
 def _entry(name: str, entry: Any) -> Free:
     if isinstance(entry, list) and len(entry) == 2:
-        return free(name, *entry)
+        return free(name, entry[0], entry[1])
     if isinstance(entry, dict) and {"low", "high"} <= set(entry) <= {"low", "high", "scale"}:
         return free(name, entry["low"], entry["high"], entry.get("scale"))
     expected = "expected [low, high] or { low, high, scale }"
@@ -107,7 +109,7 @@ def usual(gains: Gains) -> list[Free]:
     out = []
     for name, value in gains.settings.items():
         if value != 0.0 and name in NAMES and NAMES[name][0][2] in GAINS:
-            out.append(free(name, *sorted((value / 10, value * 10))))
+            out.append(free(name, min(value / 10, value * 10), max(value / 10, value * 10)))
     return out
 
 
@@ -142,7 +144,8 @@ def check(frees: Sequence[Free], gains: Gains) -> None:
     for k, f in enumerate(frees):
         known = f.name in _FILTERS or any(i < len(kinds) and kind in ("", kinds[i]) for i, kind, _ in NAMES[f.name])
         if not known:
-            raise InputError(f"expected a setting of joints whose outputs are {', '.join(kinds)}", key=f"free.{f.name}", value=f.name)
+            expected = f"expected a setting of joints whose outputs are {', '.join(kinds)}"
+            raise InputError(expected, key=f"free.{f.name}", value=f.name)
         if f.name in [other.name for other in frees[:k]]:
             raise InputError("expected each setting once", key=f"free.{f.name}", value=f.name)
         if f.low <= 0 and (f.name in _FILTERS or any(field in ("limit", "slew", "setpoint_Hz") for _, _, field in NAMES[f.name])):

@@ -41,7 +41,7 @@ class History:
         except (OSError, ValueError, EOFError) as error:
             raise InputError(f"expected the state of a search ({error})", key="--out", file=str(history.path)) from None
         if str(found.get("digest")) != digest:
-            expected = "expected an empty folder, or one of the same search: robots, manoeuvre, gains, free settings, weights, algorithm, population and seed"
+            expected = "expected an empty folder, or one of this search, of which --generations and --patience alone may change"
             raise InputError(expected, key="--out", value=str(folder))
         history.ends, history.wall_s = found["ends"].tolist(), found["wall_s"].tolist()
         history.stored, begin = len(history.ends), 0

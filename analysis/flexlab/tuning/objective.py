@@ -3,10 +3,10 @@
     J = sum_i ( itae_i / 1 s^2 + overshoot_weight max(0, overshoot_i - overshoot_free) + effort_weight effort_i )
         + vibration_weight vibration / (L 1 s^2)
 
-Figures as in `response.py`; L the length of the last flexible link. A run that doesn't come to its end (a joint limit, a bent link,
-chatter) counts FAILED (2 - the fraction of the time it reached), far above any run that does. Of several robots the worst counts.
-Pareto: settling time of the slowest joint [s] against rms of the tip deflection [mm]; a joint that doesn't settle counts twice the
-duration and its error.
+Figures as in `response.py`; L the length of the last flexible link. A run that doesn't come to its end (a joint limit, a bent
+link, chatter) counts FAILED (2 - the fraction of the time it reached), far above any run that does. Of several robots the worst
+counts. Pareto: settling time of the slowest joint [s] against rms of the tip deflection [mm]; a joint that doesn't settle counts
+twice the duration and its error.
 """
 
 from __future__ import annotations
@@ -21,8 +21,9 @@ from flexura.signal import finite
 from .response import EFFORT, ERROR, ITAE, JOINT, OVERSHOOT, RMS, SETTLING, STRIP, VIBRATION
 
 FAILED = 1e3
-HELP = """J = sum over joints of [ int t |r - q| dt / |step| + OVERSHOOT max(0, overshoot - 5 %) + EFFORT int (u / limit)^2 dt / T ]
-+ VIBRATION int t |w - w(end)| dt / L: times in s, w the tip deflection, L the link's length; capitals are the weights."""
+HELP = """J = sum over joints of [ int t |r - q| dt / |step| + OVERSHOOT max(0, overshoot - 5 %)
++ EFFORT int (u / limit)^2 dt / T ] + VIBRATION int t |w - w(end)| dt / L
+times in s, w the tip deflection, L the link's length; capitals are the weights"""
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ fifth of the time before the end:
 
     peak        largest |w - w(0)| [m]
     residual    half of w's range from b on [m]
-    vibration   int t |w - w(end)| dt [m s^2], w(end) the mean over the last tenth: what a load bends the link by for good counts not
+    vibration   int t |w - w(end)| dt [m s^2], w(end) the mean over the last tenth: what bends the link for good doesn't count
     rms         sqrt(int (w - w(end))^2 dt / T) [m]
 
 What never happens is NaN: the rise of a joint that doesn't arrive, settling of one that doesn't settle.

@@ -166,12 +166,14 @@ def figure(found: Result) -> Any:
         left.plot(goals[front, 0], goals[front, 1], "o-", color="C0", markersize=3, label="front")
         left.plot(*found.best, "D", color="C3", label="balanced")
         far = goals[front].max(axis=0)
-        left.set(xlabel="settling time [s]", ylabel="rms of the tip deflection [mm]", xlim=(0, 1.5 * far[0]), ylim=(0, 2 * far[1]))
+        left.set(xlabel="settling time [s]", ylabel="rms of the tip deflection [mm]")
+        left.set(xlim=(0, 1.5 * far[0]), ylim=(0, 2 * far[1]))
     else:
         best = [goals[:end, 0].min() for end in history.ends]
         starts = [0, *history.ends[:-1]]
         left.plot(history.ends, best, color="C0", label="best so far")
-        left.plot(history.ends, [np.median(goals[a:b, 0]) for a, b in zip(starts, history.ends, strict=True)], color="0.7", label="median")
+        middle = [np.median(goals[a:b, 0]) for a, b in zip(starts, history.ends, strict=True)]
+        left.plot(history.ends, middle, color="0.7", label="median of the generation")
         left.set(xlabel="evaluations", ylabel="J", yscale="log")
     left.legend(frameon=False)
     left.grid(alpha=0.3)

@@ -20,7 +20,7 @@ from .history import History
 from .task import Task
 
 ALGORITHMS = {
-    "ga": "a real-coded genetic algorithm: tournaments of 3, crossover (SBX) 0.8, mutation 0.1 a gene, the best of parents and young stay",
+    "ga": "genetic algorithm, real-coded: tournaments of 3, crossover (SBX) 0.8, mutation 0.1; best of parents and young stay",
     "pso": "particle swarm with adaptive inertia", "cma-es": "covariance matrix adaptation", "nsga2": "Pareto front: two goals",
 }  # fmt: skip
 SAME = 1e-3  # an improvement by less than this fraction is none

@@ -121,7 +121,7 @@ def _figures(x: Trial, figures: np.ndarray) -> None:
 
 @compiled
 def run_rows(x: Trial, gains: np.ndarray, figures: np.ndarray, reached: np.ndarray) -> None:
-    """Runs with gains (B, N, 20): figures (B, PER_JOINT N + OF_STRIP), and the fraction of the time that was reached (B,), 1 for a whole run."""
+    """Runs with gains (B, N, 20): figures (B, PER_JOINT N + OF_STRIP), and what fraction of the time each reached (B,)."""
     end = x.t[-1]
     most = STEPS_A_TICK * end * x.inputs.law.rate_Hz
     for b in range(gains.shape[0]):
