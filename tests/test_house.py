@@ -24,7 +24,7 @@ LONGER = {
     "flexlab.board.declaration": "generated: tables, not to be read through",
 }
 TWIN_MAY_USE = {"errors", "robot", "run", "drive", "signal", "twin"}
-HEAVY = {"exudyn", "rerun", "pyarrow", "matplotlib", "PIL", "platformio", "pymoo"}
+HEAVY = {"distributed", "exudyn", "rerun", "pyarrow", "matplotlib", "PIL", "platformio", "pymoo"}
 ADAPTERS = {"rerun": "flexlab.review"}  # the one package that adapts it, and is itself imported only when used
 
 

@@ -176,7 +176,7 @@ def set_up(venv: Path) -> None:
     if not sound:
         step("environment", [python.path, "-m", "venv", "--clear", str(venv)])
     step("Python packages (about 400 MB to download the first time)",
-         [inside, "-m", "pip", "install", "-q", "--disable-pip-version-check", "-c", "constraints.txt", "-e", ".[test,tune]"])
+         [inside, "-m", "pip", "install", "-q", "--disable-pip-version-check", "-c", "constraints.txt", "-e", ".[test]"])
     unfinished.unlink()
 
 

@@ -17,7 +17,7 @@ from rich.table import Table
 
 import flexura as fx
 
-from . import baseline, scaling
+from . import baseline, crowd, scaling
 from .baseline import Result
 
 ROUNDS = 15
@@ -100,10 +100,10 @@ def board_rows() -> list[tuple[str, str, float]]:
 
 
 def main() -> None:
-    rows, growth, board = measure(), scaling.measure(), board_rows()
+    rows, many, growth, board = measure(), crowd.measure(), scaling.measure(), board_rows()
     if "--json" in sys.argv[1:]:
         emulated = {name: value for name, _, value in board}
-        print(json.dumps({"solver": rows, "growth": growth, "emulated board": emulated}, indent=1))
+        print(json.dumps({"solver": rows, "population": many, "growth": growth, "emulated board": emulated}, indent=1))
         return
     table = Table(title=f"type IV, {baseline.DURATION_S:g} s bang-bang, one core, {ROUNDS} rounds", title_justify="left")
     for name in ("", "time", "error of the tip deflection", "times as fast", "quartiles"):
@@ -114,6 +114,12 @@ def main() -> None:
             str(row["case"]), f"{1e3 * float(row['wall_s']):.3g} ms", f"{row['error']:.1e}", f"{row['ratio']:.0f}", quartiles
         )
     console = Console(width=110)
+    console.print(table)
+    table = Table(title=f"{crowd.ROBOTS} different type IV robots, the same manoeuvre, 3 modes", title_justify="left")
+    for name in ("", "time a robot", "times as fast as one Exudyn run"):
+        table.add_column(name, justify="right" if name else "left")
+    for part in many:
+        table.add_row(part["what"], f"{part['us']:.4g} us", f"{1e6 * float(rows[0]['wall_s']) / part['us']:.0f}")
     console.print(table)
     table = Table(title="one evaluation of the equations of motion", title_justify="left")
     for name in ("", "number", "time", "times that of half as many"):

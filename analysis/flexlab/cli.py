@@ -44,22 +44,34 @@ Rtol = Annotated[float, typer.Option(help="relative tolerance of the native solv
 @app.command()
 def simulate(
     robot: RobotFile, manoeuvre: ManoeuvreFile = None, out: Out = None, rtol: Rtol = 1e-6,
-    method: Annotated[str, typer.Option(help="auto, explicit, explicit-3, explicit-5 or implicit")] = "auto", json: Json = False,
+    method: Annotated[str, typer.Option(help="auto, explicit, explicit-3, explicit-5 implicit or exponential")] = "auto",
     controller: Annotated[
         Path | None, typer.Option(metavar="GAINS", help="gains file (TOML): a sampled controller follows the manoeuvre's motions")
     ] = None,
+    vary: Annotated[
+        list[str] | None, typer.Option(metavar="KEY=LOW:HIGH:COUNT", help="many robots: numbers of the file, in all combinations")
+    ] = None,
+    scheduler: Annotated[str | None, typer.Option(metavar="ADDRESS", help="with --vary: a Dask scheduler, tcp://...")] = None,
+    json: Json = False,
 ) -> None:  # fmt: skip
-    """Simulate a robot natively and store the run.
+    """Simulate a robot natively and store the run; with --vary, a population that goes on where it was stopped.
 
     \b
     Example: flexura simulate model/robots/rig.toml model/manoeuvres/rig-step.toml --controller model/controllers/rig.toml
+    Example: flexura simulate model/robots/rig.toml model/manoeuvres/rig-inverse-law.toml
+    Example: flexura simulate model/robots/rig.toml --vary payload.mass_kg=0:0.1:101 --vary link.2.length_m=0.2:0.3:11
     """
     import flexura as fx
 
+    system, asked = prepare(robot, manoeuvre)
+    if vary:
+        _simulate_many(system.robot, asked, vary, out or default_folder("simulate-many", robot), rtol, method, scheduler, json)
+        return
+    if scheduler is not None:
+        raise fx.InputError("expected together with --vary: one robot is simulated here", key="--scheduler", value=scheduler)
     from . import tables
     from .controlled import controlled
 
-    system, asked = prepare(robot, manoeuvre)
     drive = controlled(system, asked, controller) if controller else asked.drive
     with progress_bars("native") as report:
         run = fx.simulate(system, asked.t, drive, rtol=rtol, method=method, progress=lambda f: report("native", f))
@@ -68,6 +80,23 @@ def simulate(
     path = run.save(folder)
     show(json, lambda: tables.run_table(run), lambda: tables.run_json(run) | {"run": str(path)})
     stored(run, path, json)
+
+
+def _simulate_many(
+    robot: Any, asked: Any, vary: list[str], folder: Path, rtol: float, method: str, scheduler: str | None, json: bool
+) -> None:
+    from . import varying
+
+    with progress_bars("robots") as report:
+        done, chosen = varying.simulate(
+            robot, asked, vary, folder, rtol=rtol, method=method, scheduler=scheduler, progress=lambda f: report("robots", f)
+        )
+    if not done.complete:
+        typer.echo(f"interrupted after {len(done.robots)} of {done.count} robots; the same command goes on", err=True)
+        raise typer.Exit(130)
+    found = varying.numbers(done, chosen, folder)
+    show(json, lambda: varying.table(found), lambda: found)
+    say(json, f"stored {folder}")
 
 
 @app.command()

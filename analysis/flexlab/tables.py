@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Group
@@ -10,9 +10,10 @@ from rich.table import Table
 
 import flexura as fx
 
-from .crosscheck import Check
-from .effort import Effort
-from .zeros import Transmission
+if TYPE_CHECKING:
+    from .crosscheck import Check
+    from .effort import Effort
+    from .zeros import Transmission
 
 
 def check_table(check: Check) -> Table:

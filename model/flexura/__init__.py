@@ -17,12 +17,13 @@ __version__ = "0.1.0"
 
 _HOME = {
     "Robot": "robot", "load": "robot", "save": "robot", "cut": "cutting",
-    "System": "system", "assemble": "system",
+    "System": "system", "assemble": "assembly",
     "static": "statics", "tip_pose": "statics",
     "frequencies": "linear",
     "StateSpace": "statespace", "linearize": "statespace",
     "simulate": "forward", "inverse": "forward",
     "Run": "run",
+    "Batch": "batch", "Population": "population",
     "Drive": "drive", "JointDrive": "drive", "Manoeuvre": "drive", "load_manoeuvre": "drive",
     "Controller": "control", "PID": "control", "Force": "control", "Motor": "control", "Stepper": "control",
     "Signal": "signal",
@@ -30,24 +31,27 @@ _HOME = {
 }  # fmt: skip
 
 __all__ = [
-    "PID", "Controller", "Drive", "FlexuraError", "Force", "InputError", "JointDrive", "Manoeuvre", "Motor", "Robot", "Run",
-    "Signal", "StateSpace", "Stepper", "System",
+    "PID", "Batch", "Controller", "Drive", "FlexuraError", "Force", "InputError", "JointDrive", "Manoeuvre", "Motor",
+    "Population", "Robot", "Run", "Signal", "StateSpace", "Stepper", "System",
     "assemble", "cut", "frequencies", "inverse", "linearize", "load", "load_manoeuvre", "save", "simulate", "static", "tip_pose",
 ]  # fmt: skip
 
 if TYPE_CHECKING:
+    from .assembly import assemble
+    from .batch import Batch
     from .control import PID, Controller, Force, Motor, Stepper
     from .cutting import cut
     from .drive import Drive, JointDrive, Manoeuvre, load_manoeuvre
     from .errors import FlexuraError, InputError
     from .forward import inverse, simulate
     from .linear import frequencies
+    from .population import Population
     from .robot import Robot, load, save
     from .run import Run
     from .signal import Signal
     from .statespace import StateSpace, linearize
     from .statics import static, tip_pose
-    from .system import System, assemble
+    from .system import System
 
 
 def __getattr__(name: str) -> Any:

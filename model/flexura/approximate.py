@@ -14,16 +14,18 @@ from typing import Any
 import numpy as np
 
 from . import loop
+from .assembly import assemble
 from .chain import COULOMB_SPEED
 from .choice import choose, longest_step
+from .course import inputs_of
 from .drive import Drive
 from .errors import FlexuraError, InputError
-from .forward import _inputs, _put_on_motions, _state, _times, simulate
+from .forward import _put_on_motions, _state, _times, simulate
 from .record import limit_event, record
 from .robot import Robot
 from .run import Run
 from .signal import COLUMNS, Signal, constant
-from .system import System, assemble
+from .system import System
 
 MAX_SWEEPS = 300  # joint after joint, in one step
 
@@ -76,7 +78,7 @@ def by_bisection(
     Drive.prescribed(*motion)
     q0, qd0 = _start(system, t[0], motion, q0, qd0)
     state = np.concatenate([system.to_solver @ q0, system.to_solver @ qd0, [0.0, 0.0]])
-    limited = _inputs(system, Drive.none(len(rows)))
+    limited = inputs_of(system, Drive.none(len(rows)))
     trial = _Trial(system, rtol, choose(system, t[-1] - t[0], rtol))
     rigid = assemble(rigid_robot(system.robot))
     inertia = np.diag(rigid.mass(rigid.start()))
@@ -127,7 +129,7 @@ class _Trial:
     def __init__(self, system: System, rtol: float, method: int) -> None:
         joints = len(system.robot.links)
         self.system, self.rtol, self.method, self.count = system, rtol, method, 0
-        inputs, free = _inputs(system, Drive.force(*[constant(0.0)] * joints)), np.full(joints, np.inf)
+        inputs, free = inputs_of(system, Drive.force(*[constant(0.0)] * joints)), np.full(joints, np.inf)
         self.inputs = inputs._replace(low=-free, high=free)  # a trial may go beyond
         self.memory, self.work = loop.memory(joints, system.n), system._work()
         self.big = self.memory.big.copy()  # the sizes so far, which weigh the errors

@@ -1,4 +1,4 @@
-"""The whole robot's own modes at one configuration: the part of its motion that exponential steps (`exponential.py`) solve exactly.
+"""The whole robot's own modes at one configuration: what exponential steps (`exponential.py`) solve exactly.
 
 With M, K and D the mass, stiffness and damping at that configuration (position gains of the drives in K, friction and rate
 gains in D), Phi^T M Phi = 1 and Phi^T K Phi = diag(w2). Of Phi^T D Phi the diagonal d2 is kept. The basis need not be exact and

@@ -20,8 +20,28 @@ from .chain import Chain, Work
 from .compiled import compiled, inlined
 from .kernel import passes
 from .loop import (
-    BREAK, DONE, ERR, EVALS, FAULT, FRESH, LIMIT, OUT, REJECTED, STATUS, STEPS, STUCK, H, Inputs, Memory, T, _copy, _find,
-    _outside, _powers, _prescribe, _weights, drive,
+    BREAK,
+    DONE,
+    EVALS,
+    FAULT,
+    FRESH,
+    LIMIT,
+    OUT,
+    REJECTED,
+    STATUS,
+    STEPS,
+    STUCK,
+    H,
+    Inputs,
+    Memory,
+    T,
+    _copy,
+    _find,
+    _outside,
+    _powers,
+    _prescribe,
+    _weights,
+    drive,
 )  # fmt: skip
 from .propagator import free, moments
 
@@ -69,8 +89,8 @@ def past(n: int) -> Past:
     z, k, r = np.zeros, ORDER, ROWS
     return Past(
         z(4), z(n), z(n), z(r), z((r, n)), z((r, n)), z((r, n)), z((r, n)), z((r, 2)), z((4, n)), z((k + 1, n)), z((k + 1, n)),
-        z((2, k, n)), z((4, n)), z((2, k + 2, k + 1)), z((2, k + 1)), np.zeros(n, np.int64), z(k + 1), z(k), z(n), z((4, n)), z((2, n)), z((k + 1, n)), z((2, k + 1)),
-        z((2, n)), z((2, 40)),
+        z((2, k, n)), z((4, n)), z((2, k + 2, k + 1)), z((2, k + 1)), np.zeros(n, np.int64), z(k + 1), z(k), z(n), z((4, n)),
+        z((2, n)), z((k + 1, n)), z((2, k + 1)), z((2, n)), z((2, 40)),
     )  # fmt: skip
 
 

@@ -2,32 +2,28 @@
 
 from __future__ import annotations
 
-import inspect
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from . import exponential, loop, nodal
-from .basis import basis
-from .chain import Work
-from .choice import choose, longest_step, quickest
-from .control import PID, Controller, replay
+from . import callback, nodal
+from .control import PID, Controller
+from .course import METHODS, applied, compiled, which
 from .drive import Drive
-from .errors import FlexuraError, InputError
-from .kernel import accelerate
-from .law import none
-from .record import limit_event, record
+from .errors import InputError
+from .record import record
 from .run import Run
 from .signal import Signal
 from .system import System
 
-_METHODS = {"explicit": loop.EXPLICIT, "implicit": loop.IMPLICIT, "explicit-3": loop.PAIR_3, "explicit-5": loop.PAIR_5, "exponential": exponential.EXPONENTIAL}
-_STEPS_A_CALL = 400  # between two looks at the progress bar and the keyboard
+if TYPE_CHECKING:
+    from .batch import Batch
+    from .population import Population
 
 
+@overload
 def simulate(
     system: System,
     t_eval: Any,
@@ -38,7 +34,32 @@ def simulate(
     *,
     method: str = "auto",
     progress: Callable[[float], None] | None = None,
-) -> Run:
+) -> Run: ...
+@overload
+def simulate(
+    system: Batch,
+    t_eval: Any,
+    drive: Drive | None = None,
+    q0: Any = None,
+    qd0: Any = None,
+    rtol: float = 1e-6,
+    *,
+    method: str = "auto",
+    progress: Callable[[float], None] | None = None,
+    **population: Any,
+) -> Population: ...
+def simulate(
+    system: System | Batch,
+    t_eval: Any,
+    drive: Drive | Controller | Callable[..., Any] | None = None,
+    q0: Any = None,
+    qd0: Any = None,
+    rtol: float = 1e-6,
+    *,
+    method: str = "auto",
+    progress: Callable[[float], None] | None = None,
+    **population: Any,
+) -> Run | Population:
     """Integrate the equations of motion from t_eval[0] on; the Run has its channels at t_eval (T,), ascending [s].
 
     `drive`: a Drive or a sampled Controller (compiled), or a function (t) -> (N,) or (t, position, velocity, tip_deflection) ->
@@ -48,43 +69,34 @@ def simulate(
     `progress` is called with the finished fraction. A joint that reaches a limit of the robot file or the end of its link ends
     the run: the Run holds the states before it and, last, the one at that instant, an event says so and `meta["complete"]` is
     false. A Ctrl-C ends it too. `meta["energy_error"]` is the largest |E - E(0) - work + loss| relative to the largest energy,
-    work or loss. Raises InputError for wrong arguments, FlexuraError where the tolerance cannot be kept.
+    work or loss. A Batch of robots gives a Population; see `population.simulate` for what else that takes. Raises InputError for
+    wrong arguments, FlexuraError where the tolerance cannot be kept.
     """
-    t = _times(t_eval)
-    if not 1e-13 <= rtol <= 0.1:
-        raise InputError("expected a relative tolerance between 1e-13 and 0.1", key="rtol", value=rtol)
-    if method not in ("auto", *_METHODS):
-        raise InputError(f"expected one of auto, {', '.join(_METHODS)}", key="method", value=method)
-    q, qd = _state(system, "q0", q0, system.start()), _state(system, "qd0", qd0, np.zeros(system.n))
-    qd[system.joint_rows[system.chain.locked.astype(bool)]] = 0.0
+    if not isinstance(system, System):
+        from . import population as many
+
+        if not (drive is None or isinstance(drive, Drive)):
+            raise InputError("expected a Drive: a population runs in the compiled loop", key="drive", value=drive)
+        return many.simulate(system, t_eval, drive, q0, qd0, rtol, method=method, progress=progress, **population)
+    if population:
+        raise InputError("expected this of a Batch only, not of one System", key=next(iter(population)))
+    t = check(t_eval, rtol, method)
     drive = Drive.none(len(system.robot.links)) if drive is None else drive
-    if isinstance(drive, Drive | Controller):
-        if len(drive.joints) != len(system.robot.links):
-            raise InputError(
-                f"expected {len(system.robot.links)} joint drives, one a joint", key="drive", value=len(drive.joints)
-            )
-        _put_on_motions(system, drive, t[0], q, qd)
-    else:
-        drive = as_function(drive)
-    _inside_limits(system, q)
+    if not isinstance(drive, Drive | Controller):
+        drive = callback.as_function(drive)
+    q, qd = initial(system, t[0], drive, q0, qd0)
     if system.robot.nodal:
         if isinstance(drive, Controller):
             raise InputError('expected a robot with sliding = "continuous" under a Controller', key="sliding", value="nodal")
         return nodal.simulate(simulate, system, t, drive, q, qd, rtol, method, progress)
-    state = np.concatenate([system.to_solver @ q, system.to_solver @ qd, [0.0, 0.0]])
-    rate_Hz = drive.rate_Hz if isinstance(drive, Controller) else 0.0
-    if method == "auto" or (method == "exponential" and not isinstance(drive, Drive)):
-        choice = quickest if isinstance(drive, Drive) else choose
-        chosen = choice(system, t[-1] - t[0], rtol, rate_Hz)
-    else:
-        chosen = _METHODS[method]
-    about = {"rtol": rtol, "method": next(name for name, value in _METHODS.items() if value == chosen)}
+    state = to_state(system, q, qd)
+    chosen = which(system, t, drive, rtol, method)
+    about = {"rtol": rtol, "method": next(name for name, value in METHODS.items() if value == chosen)}
     if not isinstance(drive, Drive | Controller):
-        t, states, work, meta = _python(system, t, drive, state, rtol, chosen, progress)
-        return record(system, t, states, work, _called(system, t, states, drive), meta | about)
-    inputs = _inputs(system, drive, t)
-    t, states, work, meta = _compiled(system, t, drive, inputs, state, rtol, chosen, progress)
-    run = record(system, t, states, work, _applied(system, t, states, drive, inputs), meta | about)
+        t, states, work, meta = callback.integrated(system, t, drive, state, rtol, chosen, progress)
+        return record(system, t, states, work, callback.called(system, t, states, drive), meta | about)
+    t, states, work, inputs, meta = compiled(system, t, drive, state, rtol, chosen, progress)
+    run = record(system, t, states, work, applied(system, t, states, drive, inputs), meta | about)
     if isinstance(drive, Controller):
         channels, units = drive.channels(inputs.law, t)
         units = {name: unit or run.units[f"joint/{name.split('/')[1]}/position"] for name, unit in units.items()}
@@ -116,212 +128,34 @@ def inverse(
     return simulate(system, t_eval, Drive.prescribed(*motions), q0, qd0, rtol, method=method, progress=progress)
 
 
-def _compiled(
-    system: System,
-    t: np.ndarray,
-    drive: Drive | Controller,
-    inputs: loop.Inputs,
-    state: np.ndarray,
-    rtol: float,
-    method: int,
-    progress: Callable[[float], None] | None,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-    """Times, states (T, 2n), work and loss (T, 2), and what the Run's metadata says of the solution."""
-    c, n, links = system.chain, system.n, len(system.robot.links)
-    m, w = loop.memory(links, n), _following(system, drive)
-    out = np.zeros((len(t), 2 * n + 2))
-    m.z[:], out[0] = state, state
-    m.s[loop.T], m.s[loop.OUT], m.s[loop.ERR] = t[0], 1, 1.0
-    longest = longest_step(system, method)
-    m.s[loop.LONGEST], m.s[loop.H] = longest, min(0.02 * longest, (t[-1] - t[0]) * 1e-4)
-    events: list[dict[str, Any]] = []
-    complete = len(t) == 1
-    b, p = basis(n), exponential.past(n)
-
-    def advance(steps: int) -> None:
-        if method == exponential.EXPONENTIAL:
-            exponential.advance(c, w, inputs, m, b, p, rtol, t, out, steps)
-        else:
-            loop.advance(c, w, inputs, m, method, rtol, t, out, steps)
-
-    advance(0)  # no step: compile before the clock starts
-    begun = time.perf_counter()
-    try:
-        while not complete:
-            advance(_STEPS_A_CALL)
-            status = int(m.s[loop.STATUS])
-            if progress is not None:
-                progress((m.s[loop.T] - t[0]) / (t[-1] - t[0]))
-            if status == loop.STUCK:
-                raise FlexuraError(
-                    f"the simulation got no further than t = {m.s[loop.T]:.6g} s with rtol = {rtol:g}: a link is bent "
-                    "to a right angle, or a gain or force is too large"
-                )
-            if status == loop.LIMIT:
-                joint, at, row = int(m.s[loop.FAULT]), float(m.s[loop.T]), int(m.s[loop.OUT])
-                events.append(limit_event(system, joint, at, m.z[system.joint_rows]))
-                if at > t[row - 1]:  # the last good state
-                    t, out[row] = np.append(t[:row], at), m.z
-                    m.s[loop.OUT] += 1
-                break
-            complete = status == loop.DONE
-    except KeyboardInterrupt:
-        events.append({"t": float(m.s[loop.T]), "level": "WARN", "text": "interrupted"})
-    rows = int(m.s[loop.OUT])
-    counts: dict[str, Any] = {
-        name: int(m.s[k]) for name, k in (("steps", loop.STEPS), ("rejected", loop.REJECTED), ("evaluations", loop.EVALS))
-    }
-    counts["wall_s"] = time.perf_counter() - begun
-    about = counts | {"complete": complete, "events": events, "drive": drive.spec()}
-    return t[:rows], out[:rows, : 2 * n], out[:rows, 2 * n :], about
+def check(t_eval: Any, rtol: float, method: str) -> np.ndarray:
+    """The times (T,) of a request whose tolerance and method are good. Raises InputError."""
+    t = _times(t_eval)
+    if not 1e-13 <= rtol <= 0.1:
+        raise InputError("expected a relative tolerance between 1e-13 and 0.1", key="rtol", value=rtol)
+    if method not in ("auto", *METHODS):
+        raise InputError(f"expected one of auto, {', '.join(METHODS)}", key="method", value=method)
+    return t
 
 
-def _inputs(system: System, drive: Drive | Controller, t: np.ndarray | None = None) -> loop.Inputs:
-    """What acts on the robot; a controller's ticks begin at t[0] and are logged up to t[-1]."""
-    segments, ranges, gains = drive.packed()
-    limits = _slack(system)
-    law = none()
-    if isinstance(drive, Controller):
-        start, end = (0.0, 0.0) if t is None else (t[0], t[-1])
-        law = drive.law(system, ranges, start, int(np.ceil((end - start) * drive.rate_Hz - 1e-6)) + 1)
-    return loop.Inputs(
-        segments, ranges, gains[:, 0].copy(), gains[:, 1].copy(), drive.follows.astype(np.int64), limits[:, 0].copy(),
-        limits[:, 1].copy(), drive.breaks, law,
-    )  # fmt: skip
+def initial(system: System, t: float, drive: Any, q0: Any, qd0: Any) -> tuple[np.ndarray, np.ndarray]:
+    """q and qd (n,) at the start t [s]: as given, locked joints at rest, prescribed ones on their motion. Raises InputError for
+    wrong shapes, a drive of another number of joints, and a joint outside its limits."""
+    q, qd = _state(system, "q0", q0, system.start()), _state(system, "qd0", qd0, np.zeros(system.n))
+    qd[system.joint_rows[system.chain.locked.astype(bool)]] = 0.0
+    if isinstance(drive, Drive | Controller):
+        if len(drive.joints) != len(system.robot.links):
+            raise InputError(
+                f"expected {len(system.robot.links)} joint drives, one a joint", key="drive", value=len(drive.joints)
+            )
+        _put_on_motions(system, drive, t, q, qd)
+    _inside_limits(system, q)
+    return q, qd
 
 
-def _slack(system: System) -> np.ndarray:
-    """The joints' limits (N, 2), a billionth wider: a motion may end on one, and does so up to round-off."""
-    return system.limits + [-1e-9, 1e-9] * np.maximum(1.0, np.abs(np.where(np.isfinite(system.limits), system.limits, 0.0)))
-
-
-def _following(system: System, drive: Drive | Controller) -> Work:
-    """A workspace in which the joints with a prescribed motion are held to it."""
-    w = system._work()
-    w.held[:] |= drive.follows
-    return w
-
-
-def _python(
-    system: System,
-    t: np.ndarray,
-    drive: Callable[..., Any],
-    state: np.ndarray,
-    rtol: float,
-    method: int,
-    progress: Callable[[float], None] | None,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-    """The same equations under a Python function, by scipy: 100 times slower than a Drive, and as exact."""
-    from scipy.integrate import DOP853, Radau
-
-    c, n, links = system.chain, system.n, len(system.robot.links)
-    w, zero, a = system._work(), np.zeros(links), np.zeros(n)
-    begun = time.perf_counter()
-
-    def slope(time_s: float, z: np.ndarray) -> np.ndarray:
-        y, v = z[:n], z[n : 2 * n]
-        force = _forces(system, drive, time_s, y, v)
-        accelerate(c, w, y, v, y, v, 0.0, force, zero, zero, a)
-        dz = np.concatenate([v, a, [0.0, 0.0]])
-        loop._powers(c, w, v, force, dz)
-        return dz
-
-    solver = (DOP853 if method == loop.EXPLICIT else Radau)(
-        slope, t[0], state, t[-1], rtol=max(rtol, 3e-14), atol=rtol * loop.FLOOR
-    )
-    events: list[dict[str, Any]] = []
-    out = [state]
-    inputs = _inputs(system, Drive.none(links))
-
-    def beyond(z: np.ndarray) -> bool:
-        return bool(loop.outside(c, inputs, z) >= 0)
-
-    def stop(late: float) -> None:
-        """Note the event, which is before `late` [s], and keep the last good state."""
-        at, after = _crossing(lambda time_s: beyond(dense(time_s)), solver.t_old, late)
-        joint = int(loop.outside(c, inputs, dense(after)))
-        events.append(limit_event(system, joint, at, dense(at)[system.joint_rows]))
-        if at > times[-1]:
-            times.append(at)
-            out.append(dense(at))
-
-    times = [float(t[0])]
-    steps = 0
-    try:
-        while len(out) < len(t) and not events:
-            message = solver.step()
-            if solver.status == "failed":
-                raise FlexuraError(f"the simulation got no further than t = {solver.t:.6g} s: {message}")
-            steps += 1
-            dense = solver.dense_output()
-            while len(out) < len(t) and t[len(out)] <= solver.t and not events:
-                z = dense(t[len(out)])
-                if beyond(z):
-                    stop(t[len(out)])
-                else:
-                    times.append(float(t[len(out)]))
-                    out.append(z)
-            if not events and beyond(dense(solver.t)):
-                stop(solver.t)
-            if progress is not None:
-                progress((solver.t - t[0]) / (t[-1] - t[0]))
-    except KeyboardInterrupt:
-        events.append({"t": float(solver.t), "level": "WARN", "text": "interrupted"})
-    z = np.array(out)
-    meta = {
-        "steps": steps,
-        "evaluations": solver.nfev,
-        "wall_s": time.perf_counter() - begun,
-        "events": events,
-        "drive": "Python function",
-    }
-    complete = not events and len(out) == len(t)
-    return np.array(times), z[:, : 2 * n], z[:, 2 * n :], meta | {"complete": complete}
-
-
-def _crossing(beyond: Callable[[float], bool], before: float, after: float) -> tuple[float, float]:
-    """The last time before `beyond` and the first at which it is so [s], by bisection between two such times."""
-    for _ in range(60):
-        middle = (before + after) / 2
-        before, after = (before, middle) if beyond(middle) else (middle, after)
-    return before, after
-
-
-def as_function(drive: Callable[..., Any]) -> Callable[[float, np.ndarray, np.ndarray, float], np.ndarray]:
-    """A drive function of (t) or (t, position, velocity, tip_deflection) as one of four arguments."""
-    try:
-        count = len(inspect.signature(drive).parameters)
-    except (TypeError, ValueError):
-        count = 0
-    if count not in (1, 4):
-        raise InputError("expected a function of (t) or of (t, position, velocity, tip_deflection)", key="drive", value=drive)
-    return drive if count == 4 else lambda t, position, velocity, tip_deflection: drive(t)
-
-
-def _forces(system: System, call: Callable[..., Any], t: float, y: np.ndarray, v: np.ndarray) -> np.ndarray:
-    rows = system.joint_rows
-    own = slice(rows[-1] + 1, system.n)
-    force = np.asarray(call(t, y[rows], v[rows], float(system.links[-1].NL @ y[own])), dtype=float)
-    if force.shape != rows.shape or not np.all(np.isfinite(force)):
-        raise InputError(f"expected {len(rows)} finite forces from the drive function at t = {t:g} s", key="drive", value=force)
-    return force
-
-
-def _applied(system: System, t: np.ndarray, states: np.ndarray, drive: Drive | Controller, inputs: loop.Inputs) -> np.ndarray:
-    """The drive forces (T, N) at the states (T, 2n) of a run; what a controller held is replayed."""
-    n, links = system.n, len(system.robot.links)
-    if isinstance(drive, Controller):
-        segments, ranges = replay(inputs.law, inputs.segments, inputs.ranges)
-        inputs = inputs._replace(segments=segments, ranges=ranges, law=none())
-    out = np.zeros((len(t), links))
-    loop.forces(system.chain, _following(system, drive), inputs, loop.memory(links, n), t, states, out)
-    return out
-
-
-def _called(system: System, t: np.ndarray, states: np.ndarray, drive: Callable[..., Any]) -> np.ndarray:
-    """The forces (T, N) of a drive function at the states (T, 2n) of a run."""
-    out = [_forces(system, drive, s, z[: system.n], z[system.n :]) for s, z in zip(t, states, strict=True)]
-    return np.array(out).reshape(len(t), len(system.robot.links))
+def to_state(system: System, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
+    """The loop's state (2n + 2,) at q and qd (n,): both in the solver's coordinates, no work done yet."""
+    return np.concatenate([system.to_solver @ q, system.to_solver @ qd, [0.0, 0.0]])
 
 
 def _times(t_eval: Any) -> np.ndarray:

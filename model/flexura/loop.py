@@ -1,6 +1,6 @@
 """The time loop, compiled: an explicit and an implicit method with a tolerance, one memory for both, no allocation inside.
 
-Explicit: DOP853 (Dormand and Prince 8(5,3), dense output of order 7; coefficients from SciPy). Implicit: ESDIRK4(3)6L[2]SA of
+Explicit: DOP853 (Dormand and Prince 8(5,3), dense output of order 7; coefficients in `dop853.py`). Implicit: ESDIRK4(3)6L[2]SA of
 Kennedy and Carpenter (2003, Appl. Numer. Math. 44), L-stable; each stage is solved by passes of `kernel.accelerate`, which
 holds stiffness, damping and gains implicitly, so that a pass costs what an explicit evaluation costs and steps follow the
 motion, not the stiffest mode. Under a sampled controller (`law.py`) every tick is an instant to step on, and two pairs without a

@@ -79,3 +79,18 @@ def inverse(c: Chain, w: Work, y: np.ndarray, v: np.ndarray, a: np.ndarray, grav
         else:
             f0, f1, f2 = cs * F0 - sn * F1, sn * F0 + cs * F1, F2
             out[e] = w.slide[i, 0] * f0 + w.slide[i, 1] * f1 + w.slide[i, 2] * f2 + c.rotor[i] * a[e]
+
+
+@compiled
+def mass(
+    c: Chain, w: Work, y: np.ndarray, v: np.ndarray, a: np.ndarray, gravity: np.ndarray, bias: np.ndarray, M: np.ndarray
+) -> None:  # fmt: skip
+    """M(y) (n, n), column by column: what accelerations a of 1 add to the forces at rest, `bias` (n,), where v, a and gravity
+    are 0 on entry."""
+    inverse(c, w, y, v, a, gravity, bias)
+    for k in range(y.shape[0]):
+        a[k] = 1.0
+        inverse(c, w, y, v, a, gravity, M[k])
+        a[k] = 0.0
+        for j in range(y.shape[0]):
+            M[k, j] -= bias[j]

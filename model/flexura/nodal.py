@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from .assembly import assemble
 from .beam import link_integrals, shape
 from .choice import choose
 from .cutting import laws
@@ -29,7 +30,7 @@ from .record import describe, energy_error, limit_event
 from .robot import Joint, Link, Robot
 from .run import STATIONS, Run
 from .signal import Signal
-from .system import System, assemble
+from .system import System
 
 _SAME = 1e-9  # of an element: on the node
 _ENERGIES = ("energy/kinetic", "energy/strain", "energy/potential")

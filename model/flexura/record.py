@@ -7,8 +7,25 @@ from typing import Any
 import numpy as np
 
 from .observe import observe
-from .run import Run
+from .robot import Robot
+from .run import STATIONS, Run
 from .system import System
+
+
+def channel_units(robot: Robot) -> dict[str, str]:
+    """The channels that a simulation of this robot has, in their order, with their units."""
+    units: dict[str, str] = {}
+    for i, link in enumerate(robot.links, 1):
+        turns = link.joint.type == "R"
+        kinds = ("rad", "rad/s", "N m") if turns else ("m", "m/s", "N")
+        units |= {f"joint/{i}/{what}": unit for what, unit in zip(("position", "velocity", "drive"), kinds, strict=True)}
+    for i, link in enumerate(robot.links, 1):
+        units |= {f"link/{i}/x": "m", f"link/{i}/y": "m", f"link/{i}/angle": "rad"}
+        if link.flexible:
+            units |= {f"link/{i}/tip_deflection": "m", f"link/{i}/tip_slope": "rad"}
+            units |= {f"link/{i}/deflection/{k}": "m" for k in range(STATIONS)}
+    energies = ("kinetic", "strain", "potential", "work", "loss")
+    return units | {"tip/x": "m", "tip/y": "m"} | {f"energy/{name}": "J" for name in energies}
 
 
 def record(system: System, t: np.ndarray, states: np.ndarray, work: np.ndarray, forces: np.ndarray, meta: dict[str, Any]) -> Run:
@@ -16,32 +33,17 @@ def record(system: System, t: np.ndarray, states: np.ndarray, work: np.ndarray, 
     robot, n, links, rows = system.robot, system.n, len(system.robot.links), len(states)
     poses, tips, ends, energies = np.zeros((rows, links, 3)), np.zeros((rows, links, 2)), np.zeros((rows, 2)), np.zeros((rows, 3))
     observe(system.chain, system._work(), np.ascontiguousarray(states), poses, tips, ends, energies)
-    channels: dict[str, np.ndarray] = {}
-    units: dict[str, str] = {}
-
-    def put(name: str, values: np.ndarray, unit: str) -> None:
-        channels[name], units[name] = np.ascontiguousarray(values), unit
-
-    for i, (link, row) in enumerate(zip(robot.links, system.joint_rows, strict=True), 1):
-        turns = link.joint.type == "R"
-        put(f"joint/{i}/position", states[:, row], "rad" if turns else "m")
-        put(f"joint/{i}/velocity", states[:, n + row], "rad/s" if turns else "m/s")
-        put(f"joint/{i}/drive", forces[:, i - 1], "N m" if turns else "N")
-    for i, link in enumerate(robot.links, 1):
-        for k, (name, unit) in enumerate((("x", "m"), ("y", "m"), ("angle", "rad"))):
-            put(f"link/{i}/{name}", poses[:, i - 1, k], unit)
+    found: list[np.ndarray] = []
+    for i, row in enumerate(system.joint_rows):
+        found += [states[:, row], states[:, n + row], forces[:, i]]
+    for i, link in enumerate(robot.links):
+        found += list(poses[:, i].T)
         if link.flexible:
-            put(f"link/{i}/tip_deflection", tips[:, i - 1, 0], "m")
-            put(f"link/{i}/tip_slope", tips[:, i - 1, 1], "rad")
-            own = slice(system.chain.first[i - 1] + 1, system.chain.first[i])
-            for k, values in enumerate(system.deflections(i - 1, states[:, own], states[:, system.joint_rows[i - 1]])):
-                put(f"link/{i}/deflection/{k}", values, "m")
-    put("tip/x", ends[:, 0], "m")
-    put("tip/y", ends[:, 1], "m")
-    for k, name in enumerate(("kinetic", "strain", "potential")):
-        put(f"energy/{name}", energies[:, k], "J")
-    put("energy/work", work[:, 0], "J")
-    put("energy/loss", work[:, 1], "J")
+            own = slice(system.chain.first[i] + 1, system.chain.first[i + 1])
+            found += [*tips[:, i].T, *system.deflections(i, states[:, own], states[:, system.joint_rows[i]])]
+    found += [*ends.T, *energies.T, *work.T]
+    units = channel_units(robot)
+    channels = {name: np.ascontiguousarray(values) for name, values in zip(units, found, strict=True)}
     about = describe(system, energy_error(energies, work)) | meta
     return Run(t, channels, units, about, np.hstack([states[:, :n] @ system.transform.T, states[:, n:] @ system.transform.T]))
 

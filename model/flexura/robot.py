@@ -210,33 +210,31 @@ class Link(_Table):
 
     def mass_per_length(self, x: Any) -> np.ndarray:
         """Mass per length [kg/m] at x [m] from the link's origin, linear between the given places."""
-        x = np.asarray(x, dtype=float)
         if self.mass_per_length_kg_m is not None:
             return _spread(self.mass_per_length_kg_m, x)
         width, height = self._section_at(x)
-        return self.density_kg_m3 * width * height
+        return _spread(self.density_kg_m3 * width * height, x)
 
     def bending_stiffness(self, x: Any) -> np.ndarray:
         """Bending stiffness EI [N m^2] at x [m] from the link's origin."""
-        x = np.asarray(x, dtype=float)
         if self.bending_stiffness_N_m2 is not None:
             return _spread(self.bending_stiffness_N_m2, x)
         width, height = self._section_at(x)
-        return self.young_modulus_Pa * width * height**3 / 12
+        return _spread(self.young_modulus_Pa * width * height**3 / 12, x)
 
     def axial_stiffness(self, x: Any) -> np.ndarray | None:
         """Axial stiffness EA [N] at x [m], or None where the file gives EI only (the native model has no axial unknowns)."""
         if self.section is None or self.young_modulus_Pa is None:
             return None
-        width, height = self._section_at(np.asarray(x, dtype=float))
-        return self.young_modulus_Pa * width * height
+        width, height = self._section_at(x)
+        return _spread(self.young_modulus_Pa * width * height, x)
 
-    def _section_at(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _section_at(self, x: Any) -> tuple[Any, Any]:
         if isinstance(self.section, list):
             at = [s.at_m for s in self.section]
             return np.interp(x, at, [s.width_m for s in self.section]), np.interp(x, at, [s.height_m for s in self.section])
         assert self.section is not None
-        return np.full_like(x, self.section.width_m), np.full_like(x, self.section.height_m)
+        return self.section.width_m, self.section.height_m
 
     def breaks(self) -> list[float]:
         """Places along the link [m] where a given property has a kink, the ends included."""
@@ -366,10 +364,11 @@ def _number(table: list[Any], part: str, path: str, value: Any) -> int:
     return int(part) - 1
 
 
-def _spread(value: Any, x: np.ndarray) -> np.ndarray:
+def _spread(value: Any, x: Any) -> np.ndarray:
+    """A list of values as an array at x, or one value for all of it."""
     if isinstance(value, list):
         return np.interp(x, [v.at_m for v in value], [v.value for v in value])
-    return np.full_like(x, value)
+    return value if isinstance(value, np.ndarray) else np.full(np.shape(x), value)
 
 
 def load(path: str | os.PathLike[str]) -> Robot:

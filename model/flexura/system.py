@@ -5,19 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
-from scipy.linalg import block_diag, eigvalsh
 
 from . import extended
-from .beam import LinkIntegrals, link_integrals, shape
-from .chain import REVOLUTE, SLEEVE, SLIDER, Chain, Work, workspace
+from .beam import LinkIntegrals, shape
+from .chain import SLEEVE, Chain, Work, workspace
 from .errors import InputError
-from .modes import modal
 from .newton_euler import inverse
 from .outward import outward
-from .robot import Link, Robot
+from .robot import Robot
 from .run import STATIONS
 
 
@@ -37,6 +34,7 @@ class System:
     transform: np.ndarray
     to_solver: np.ndarray
     labels: tuple[str, ...]
+    spectrum: np.ndarray  # natural frequencies at the start, joints free, gravity left out, ascending [rad/s]; [0]: nothing moves
 
     @property
     def n(self) -> int:
@@ -63,15 +61,6 @@ class System:
         own = np.array([link.joint.limits or (-np.inf, np.inf) for link in self.robot.links])
         ends = np.array([self.robot.travel(i) for i in range(len(self.links))])
         return np.column_stack([np.maximum(own[:, 0], ends[:, 0]), np.minimum(own[:, 1], ends[:, 1])])
-
-    @cached_property
-    def spectrum(self) -> np.ndarray:
-        """Natural frequencies at the start, joints free, gravity left out, ascending [rad/s]; [0] where nothing moves."""
-        free = self.free_rows
-        if len(free) == 0:
-            return np.zeros(1)
-        pick = np.ix_(free, free)
-        return np.sqrt(np.maximum(eigvalsh(self.stiffness()[pick], self.mass(self.start())[pick]), 0.0))
 
     def start(self) -> np.ndarray:
         """The configuration at the start (n,): joints at their `start`, links straight."""
@@ -158,7 +147,7 @@ class System:
 
     def differences(self, function: Callable[[np.ndarray], np.ndarray], y: np.ndarray, scale: float = 1.0) -> np.ndarray:
         """d function / dy (m, n) in the solver's coordinates; each step turns a link by about 1e-4 rad, times `scale`."""
-        steep = _stack([np.abs(info.slope_d1).max(axis=0, initial=0.0) for info in self.links])
+        steep = stack([np.abs(info.slope_d1).max(axis=0, initial=0.0) for info in self.links])
         return jacobian(function, y, scale * 1e-4 / self._diagonal(steep, np.ones(len(self.links))))
 
     def _inverse(self, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, gravity: np.ndarray) -> np.ndarray:
@@ -199,114 +188,10 @@ def jacobian(function: Callable[[np.ndarray], np.ndarray], x: np.ndarray, steps:
     return np.column_stack([(function(x + e) - function(x - e)) / (2 * h) for e, h in zip(shifts, steps, strict=True)])
 
 
-def assemble(robot: Robot) -> System:
-    """The System of a robot. Raises InputError for a singular mass matrix, and for joints that start beyond a link's end."""
-    links = robot.links
-    first, infos, spectra, transforms, back, labels = [0], [], [], [], [], []
-    for i, link in enumerate(links, 1):
-        last = i == len(links)
-        nodal = link_integrals(link, robot.payload.mass_kg * last, robot.payload.inertia_kg_m2 * last)
-        info, lam = modal(nodal, link.modes, loaded=not last)
-        m = len(lam)
-        unit = "rad" if link.joint.type == "R" else "m"
-        labels.append(f"joint {i} position [{unit}]")
-        if link.modes is not None:
-            labels += [f"link {i} mode {k + 1} [kg^(1/2) m]" for k in range(m)]
-            transforms.append(np.eye(1 + m))
-            back.append(np.eye(1 + m))
-        else:
-            slope = "slope x d/L [rad]" if link.joint.type == "Pb" and robot.sliding == "continuous" else "slope [rad]"
-            labels += [f"link {i} node {k // 2 + 1} {slope if k % 2 else 'deflection [m]'}" for k in range(m)]
-            transforms.append(block_diag(1.0, info.basis) if m else np.eye(1))
-            back.append(block_diag(1.0, info.basis.T @ nodal.M) if m else np.eye(1))
-        first.append(first[-1] + 1 + m)
-        spectra.append(lam)
-        infos.append(info)
-    column = lambda f, kind=float: np.array([f(link) for link in links], dtype=kind)
-    of = lambda f: np.array([f(info) for info in infos], dtype=float)
-    hubs = column(lambda k: k.joint.hub_mass_kg if k.joint.type == "Pb" else 0.0)
-    at_end = np.arange(len(links)) == len(links) - 1
-    laws = [_laws(link) if link.joint.type == "Pb" and link.flexible else _NO_LAWS for link in links]
-    chain = Chain(
-        first=np.array(first, dtype=np.int64),
-        kind=column(lambda k: {"R": REVOLUTE, "Pa": SLIDER, "Pb": SLEEVE}[k.joint.type], np.int64),
-        locked=column(lambda k: k.joint.locked, np.int64),
-        angle=column(lambda k: k.joint.angle_rad),
-        rotor=column(lambda k: k.joint.rotor_inertia),
-        viscous=column(lambda k: k.joint.viscous_friction),
-        coulomb=column(lambda k: k.joint.coulomb_friction),
-        length=of(lambda k: k.length),
-        mass=of(lambda k: k.mass) + hubs,
-        hub=hubs,
-        s1=of(lambda k: k.s1),
-        inertia=of(lambda k: k.inertia),
-        **{name: _stack([getattr(info, name) for info in infos]) for name in _PER_LINK},
-        lam=_stack(spectra),
-        alpha=column(lambda k: k.damping.alpha_1_s),
-        beta=column(lambda k: k.damping.beta_s),
-        damp=_stack(
-            [np.where(lam > 0, k.damping.alpha_1_s + k.damping.beta_s * lam, 0.0) for k, lam in zip(links, spectra, strict=True)]
-        ),
-        points=of(lambda k: len(k.point_x)).astype(np.int64),
-        payload=robot.payload.mass_kg * at_end,
-        tip_inertia=robot.payload.inertia_kg_m2 * at_end,
-        elements=column(lambda k: k.elements, np.int64),
-        node=np.zeros(len(links), dtype=np.int64),
-        reference=of(lambda k: k.reference),
-        law_x=_stack([x for x, _, _ in laws], np.inf),
-        law_mass=_stack([mass for _, mass, _ in laws]),
-        law_EI=_stack([EI for _, _, EI in laws]),
-        stiffening=robot.stiffening,
-        gravity=np.array(robot.gravity_m_s2, dtype=float),
-    )
-    system = System(robot, chain, tuple(infos), block_diag(*transforms), block_diag(*back), tuple(labels))
-    _check_mass(system)
-    return system
-
-
-_PER_LINK = (
-    "S0", "S1", "NL", "SL", "G1", "G2", "H", "point_x", "point_mass", "point_phi", "slope_dx", "slope_EI", "slope_d1", "slope_d2",
-    "ride", "sleeve_xi", "sleeve_w", "sleeve_phi", "sleeve_d1", "sleeve_d2",
-)  # fmt: skip
-
-_NO_LAWS = (np.zeros(1), np.zeros((1, 3)), np.zeros((1, 5)))
-
-
-def _laws(link: Link) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """rho A and E I between a link's breaks as polynomials: where they begin (B,), coefficients (B, 3) and (B, 5), exact for
-    sections that taper linearly."""
-    breaks = np.array(link.breaks())
-    pieces = list(pairwise(breaks))
-    mass, EI = np.zeros((len(pieces), 3)), np.zeros((len(pieces), 5))
-    for k, (a, b) in enumerate(pieces):
-        for row, law in ((mass[k], link.mass_per_length), (EI[k], link.bending_stiffness)):
-            s = np.linspace(0, b - a, len(row))
-            row[:] = np.polynomial.polynomial.polyfit(s / (b - a), law(a + s), len(row) - 1) / (b - a) ** np.arange(len(row))
-    return breaks[:-1], mass, EI
-
-
-def _stack(arrays: list[np.ndarray], empty: float = 0.0) -> np.ndarray:
+def stack(arrays: list[np.ndarray], empty: float = 0.0) -> np.ndarray:
     """Arrays of the links as one, padded to the largest."""
     shape_ = np.max([a.shape for a in arrays], axis=0)
     out = np.full((len(arrays), *shape_), empty)
     for target, a in zip(out, arrays, strict=True):
         target[tuple(slice(k) for k in a.shape)] = a
     return out
-
-
-def _check_mass(system: System) -> None:
-    """Refuse a robot with a joint that moves nothing: its mass matrix is singular."""
-    M = system.to_solver.T @ extended.mass_matrix(system.chain, system._work(), system.start()) @ system.to_solver
-    free = system.free_rows
-    if len(free) == 0:
-        return
-    scale = 1 / np.sqrt(np.maximum(np.diag(M)[free], 1e-300))
-    smallest = np.linalg.eigvalsh(M[np.ix_(free, free)] * scale * scale[:, None])[0]
-    if np.any(np.diag(M)[free] <= 0) or smallest < 1e-13:
-        joint = next(
-            (i + 1 for i, row in enumerate(system.joint_rows) if row in free and M[row, row] <= 1e-300), len(system.joint_rows)
-        )
-        raise InputError(
-            "nothing to accelerate: expected a mass or inertia (link, hub, rotor or payload) that this joint moves",
-            key=f"link[{joint}].joint",
-        )

@@ -1,17 +1,15 @@
 """Coefficients of the time loop's methods: A, C of the stages, E of the error estimates, and what the dense output takes.
 
-DOP853 (Dormand and Prince 8(5,3); from SciPy), ESDIRK4(3)6L[2]SA (Kennedy and Carpenter 2003, Appl. Numer. Math. 44), and two
+DOP853 (Dormand and Prince 8(5,3); `dop853.py`), ESDIRK4(3)6L[2]SA (Kennedy and Carpenter 2003, Appl. Numer. Math. 44), and two
 pairs for sampled controllers: Ralston's third order with a member of second order, and 5(4) of Cash and Karp (1990, ACM Trans.
 Math. Softw. 16, 201-222).
 """
 
 import numpy as np
-from scipy.integrate import DOP853
 
-_A, _C = np.zeros((13, 12)), np.append(DOP853.C, 1.0)
-_A[:12], _A[12] = DOP853.A, DOP853.B  # the last stage is the end of the step
-_E3, _E5 = DOP853.E3.copy(), DOP853.E5.copy()
-_AX, _CX, _D = DOP853.A_EXTRA.copy(), DOP853.C_EXTRA.copy(), DOP853.D.copy()
+from . import dop853
+
+_A, _C, _E3, _E5, _AX, _CX, _D = dop853.A, dop853.C, dop853.E3, dop853.E5, dop853.AX, dop853.CX, dop853.D
 
 GAMMA = 0.25
 _EA = np.array([

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from . import signal
+from .assembly import assemble
+from .batch import Batch
 from .drive import Drive
 from .forward import simulate
 from .robot import Robot
-from .system import assemble
 
 
 def main() -> None:
@@ -18,6 +19,7 @@ def main() -> None:
     system.bias(zero, zero)
     for method in ("explicit", "implicit"):
         simulate(system, [0.0, 1e-3], Drive.force(signal.step(0.1), None), method=method)
+    simulate(Batch.of([system.robot]), [0.0, 1e-3])
 
 
 if __name__ == "__main__":

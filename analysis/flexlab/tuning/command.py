@@ -125,7 +125,7 @@ def _cases(how: Any, folder: Path, scheduler: str | None, jobs: int | None, json
 
     announce_compiling()
     with _bar(how.generations, ("J",)) as report:
-        found, complete = cases.study(["IV", "III"], how, folder, scheduler, jobs, lambda name, history: report(history))
+        found, complete = cases.study(["IV", "III"], how, folder, scheduler, jobs, report)
     if found:
         show(json, lambda: cases.table(found), lambda: cases.data(found))
     say(json, f"stored {folder}" + ("" if complete else "; interrupted: the same command goes on"))

@@ -1,7 +1,7 @@
-"""`flexura tune --dissertation`: both cases of types III and IV tuned, in the layout of tables 3.10 and 3.12, beside their figures.
+"""`flexura tune --dissertation`: both cases of types III and IV tuned, in the layout of tables 3.10 and 3.12, with their figures.
 
-What is demanded of case 2 is compared with what was reached, and with what the drives allow at all: the shortest time in which each
-joint can go its way within its limits.
+What is demanded of case 2 is compared with what was reached, and with what the drives allow at all: the shortest time in which
+each joint can go its way within its limits.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Both:
             ("overshoot at most 5 %", bool(most <= OVERSHOOT_MOST), f"{100 * most:.2g} %"),
             (
                 "settling at most half the dissertation's", bool((parts <= SETTLING_PART).all()),
-                ", ".join(f"joint {i} {s:.3g} s of {p:g} s" for i, (s, p) in enumerate(zip(joints[:, SETTLING], published[:, 1]), 1)),
+                ", ".join(f"{s:.3g} s of {p:g} s" for s, p in zip(joints[:, SETTLING], published[:, 1], strict=True)),
             ),
             ("no state error (0.1 %)", bool(error <= ERROR_MOST), f"{100 * error:.1g} %"),
             ("residual vibration at most a tenth of case 1", bool(ratio <= RESIDUAL_PART), f"{ratio:.2g} of it"),
@@ -61,18 +61,18 @@ class Both:
 
 
 def study(
-    names: list[str], how: Search, folder: Path, scheduler: str | None, jobs: int | None,
-    report: Callable[[str, History], None] = lambda name, history: None,
+    names: list[str], how: Search, folder: Path, scheduler: str | None = None, jobs: int | None = None,
+    report: Callable[[History], None] = lambda history: None,
 ) -> tuple[list[Both], bool]:  # fmt: skip
     """Tune both cases of the named structures, each stored in a folder of its own; False: interrupted."""
-    out = []
+    out: list[Both] = []
     for name in names:
         structure, found = STRUCTURES[name](), []
         for case in (1, 2):
             task, own = structure.task(case), folder / f"type-{name}-case-{case}"
             history = History.open(own, task.digest(how.identity()))
             with engine(task, scheduler, jobs) as runs:
-                if not search(task, how, runs, history, lambda h, label=f"type {name}, case {case}": report(label, h)):
+                if not search(task, how, runs, history, report):
                     return out, False
             found.append(result(task, how, history, True))
             save(found[-1], own)
@@ -103,9 +103,8 @@ def _shortest(task: Task) -> tuple[float, ...]:
     times = []
     for i in range(len(task.robots[0].links)):
         controller = under(fx.assemble(task.robots[0]), task.manoeuvre, task.gains)
-        full = {"kp": 1e9, "ki": 0.0, "kd": 0.0, "slew": controller.joints[i].slew}  # the output is at its limit at once
         joints = list(controller.joints)
-        joints[i] = replace(joints[i], **full)  # type: ignore[arg-type]
+        joints[i] = replace(joints[i], kp=1e9, ki=0.0, kd=0.0)  # type: ignore[call-arg]  # at its limit until it is there
         run = fx.simulate(fx.assemble(task.robots[0]), task.manoeuvre.t, replace(controller, joints=tuple(joints)), rtol=1e-5)
         y = run[f"joint/{i + 1}/position"]
         end = run[f"joint/{i + 1}/reference"][-1]
@@ -145,10 +144,8 @@ def _tables(each: Both) -> list[Any]:
     lines += [f"zeros in the right half plane, drive to tip: {', '.join(f'{n} {z:.3g} 1/s' for n, z in each.zeros_1_s.items())}"]
     for case, r in enumerate(each.results, 1):
         lines.append(f"case {case}: J = {r.best[0]:.4g}, {r.history.evaluations} evaluations; {r.task.weights.text()}")
-    lines.append(
-        "rise: 10 to 90 %; settling: to within 2 %; state error: mean of the last tenth of the time; residual: half of w's"
-    )
-    lines.append("range from the instant at which the later of both cases has settled. Dissertation: definitions not given.")
+    lines.append("rise: 10 to 90 %; settling: to within 2 %; state error: mean of the last tenth of the time; residual: half of")
+    lines.append("w's range from the instant at which the later of both cases has settled. The dissertation defines none.")
     out.caption, out.caption_justify = "\n".join(lines), "left"
     return [out]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import queue
 import threading
 from concurrent.futures import ThreadPoolExecutor
@@ -12,7 +11,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from flexura.errors import InputError
+from flexura.engine import cores
+from flexura.errors import FlexuraError, InputError
+from flexura.request import program
 
 from .task import Task
 
@@ -26,11 +27,6 @@ class Engine(Protocol):
     def __call__(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]: ...
     def __enter__(self) -> Engine: ...
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None: ...
-
-
-def cores() -> int:
-    """The cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 class Threads:
@@ -82,7 +78,9 @@ class Cluster:
         self.task = task
 
     def __call__(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        futures = [self.client.submit(_on_worker, self.task, chunk, pure=False, retries=3) for chunk in _chunks(points)]
+        futures = [
+            self.client.submit(_on_worker, program(), self.task, chunk, pure=False, retries=3) for chunk in _chunks(points)
+        ]
         try:
             return _joined(self.client.gather(futures))
         finally:
@@ -108,7 +106,10 @@ def _joined(parts: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.
     return np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts])
 
 
-def _on_worker(task: Task, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _on_worker(version: str, task: Task, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A chunk, on a worker. Another solver would give other numbers."""
+    if program() != version:
+        raise FlexuraError(f"a worker runs another version of the solver, {program()}; this is {version}")
     held = _held(task.digest(), threading.get_ident())
     if not held:
         held += [task, task.trials()]

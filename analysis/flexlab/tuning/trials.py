@@ -11,10 +11,12 @@ from typing import NamedTuple
 import numpy as np
 
 import flexura as fx
-from flexura import forward, loop
+from flexura import loop
 from flexura.chain import Chain, Work
-from flexura.choice import choose, longest_step
+from flexura.choice import longest_step
 from flexura.compiled import compiled
+from flexura.course import following, inputs_of, which
+from flexura.forward import initial, to_state
 from flexura.law import LIMIT, NONE, Law
 from flexura.signal import evaluate
 
@@ -47,15 +49,12 @@ def trial(system: fx.System, controller: fx.Controller, duration_s: float, outpu
     rate = controller.rate_Hz
     every = max(1, round(output_step_s * rate))
     t = np.arange(0, round(duration_s * rate) + 1, every) / rate
-    q, qd = system.start(), np.zeros(system.n)
-    forward._put_on_motions(system, controller, 0.0, q, qd)
-    forward._inside_limits(system, q)
-    start = np.concatenate([system.to_solver @ q, system.to_solver @ qd, [0.0, 0.0]])
-    method = choose(system, t[-1], rtol, rate)
+    start = to_state(system, *initial(system, 0.0, controller, None, None))
+    method = which(system, t, controller, rtol, "auto")
     longest = longest_step(system, method)
-    inputs = forward._inputs(system, controller, t)
+    inputs = inputs_of(system, controller, t)
     return Trial(
-        system.chain, forward._following(system, controller), inputs, loop.memory(len(system.links), system.n), method, rtol,
+        system.chain, following(system, controller), inputs, loop.memory(len(system.links), system.n), method, rtol,
         start, np.array([longest, min(0.02 * longest, t[-1] * 1e-4)]), t, np.zeros((len(t), len(start))),
         np.zeros((2, len(t))), inputs.segments.copy(),
     )  # fmt: skip

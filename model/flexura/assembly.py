@@ -1,0 +1,202 @@
+"""From robots to their Systems: many of one topology at once, the same numbers as one at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from .beam import LinkIntegrals, integrals
+from .chain import REVOLUTE, SLEEVE, SLIDER, Chain, workspace
+from .errors import InputError
+from .modes import eigh, modal
+from .newton_euler import mass
+from .robot import Link, Robot
+from .system import System
+
+
+def assemble(robot: Robot) -> System:
+    """The System of a robot. Raises InputError for a singular mass matrix, and for joints that start beyond a link's end."""
+    system = assemble_all([robot])[0]
+    if isinstance(system, InputError):
+        raise system
+    return system
+
+
+def size(robot: Robot) -> int:
+    """How many unknowns a robot's System has."""
+    counts = [(k.modes, 2 * k.elements, 2 * (i < len(robot.links))) for i, k in enumerate(robot.links, 1)]
+    return len(robot.links) + sum(whole if modes is None else min(modes + static, whole) for modes, whole, static in counts)
+
+
+def assemble_all(robots: Sequence[Robot]) -> list[System | InputError]:
+    """The Systems of robots of one topology; an InputError in place of one that cannot be assembled.
+
+    What one robot gets does not depend on the others, to the last bit.
+    """
+    first, B = robots[0], len(robots)
+    rows, infos, spectra, transforms, back = [0], [], [], [], []
+    for i, link in enumerate(first.links):
+        last = i == len(first.links) - 1
+        own = [robot.links[i] for robot in robots]
+        load = np.array([(robot.payload.mass_kg, robot.payload.inertia_kg_m2) for robot in robots]) * last
+        nodal = integrals(own, load[:, 0], load[:, 1])
+        info, lam = modal(nodal, link.modes, loaded=not last)
+        m = lam.shape[1]
+        rows.append(rows[-1] + 1 + m)
+        kept = link.modes is not None or m == 0
+        transforms.append(np.tile(np.eye(m), (B, 1, 1)) if kept else info.basis)
+        back.append(transforms[-1] if kept else np.swapaxes(info.basis, 1, 2) @ nodal.M)
+        spectra.append(lam)
+        infos.append(info)
+    chains = _chains(robots, rows, infos, spectra)
+    to_file, to_solver = _blocks(transforms), _blocks(back)
+    labels, lists = _labels(first, rows), [list(zip(*info, strict=True)) for info in infos]
+    rigs = [Chain(*(field[b] for field in chains)) for b in range(B)]
+    start = np.zeros((B, rows[-1]))
+    start[:, rows[:-1]] = [robot.start for robot in robots]
+    free = np.setdiff1d(np.arange(rows[-1]), np.array(rows[:-1])[rigs[0].locked.astype(bool)])
+    M = _masses(rigs, start)[:, free[:, None], free]
+    still = _massless(M, free, rows)
+    M[list(still)] = np.eye(len(free))
+    spectrum = _spectra(M, _blocks([np.eye(lam.shape[1]) * lam[:, None, :] for lam in spectra], 0.0)[:, free[:, None], free])
+    return [
+        InputError(
+            "nothing to accelerate: expected a mass or inertia (link, hub, rotor or payload) that this joint moves",
+            key=f"link[{still[b]}].joint",
+        ) if b in still else System(
+            robot, rigs[b], tuple(LinkIntegrals(*of[b]) for of in lists), to_file[b], to_solver[b], labels, spectrum[b]
+        )
+        for b, robot in enumerate(robots)
+    ]  # fmt: skip
+
+
+def _chains(
+    robots: Sequence[Robot], rows: list[int], infos: list[LinkIntegrals], spectra: list[np.ndarray]
+) -> list[np.ndarray]:
+    """The fields of `Chain`, in its order, of all robots: every one with a leading axis (B,)."""
+    links = [robot.links for robot in robots]
+    B, N = len(robots), len(links[0])
+    column = lambda f, kind=float: np.array([[f(link) for link in of] for of in links], dtype=kind)
+    joint = lambda name, kind=float: column(lambda k: getattr(k.joint, name), kind)
+    of = lambda name: np.stack([getattr(info, name) for info in infos], axis=1)
+    each = lambda values: np.tile(np.array(values), (B, 1))
+    ends = np.arange(N) == N - 1
+    kinds = [{"R": REVOLUTE, "Pa": SLIDER, "Pb": SLEEVE}[link.joint.type] for link in links[0]]
+    hubs = joint("hub_mass_kg") * (np.array(kinds) == SLEEVE)
+    alpha, beta = column(lambda k: k.damping.alpha_1_s), column(lambda k: k.damping.beta_s)
+    lam = _padded(spectra)
+    sleeved = np.array([link.joint.type == "Pb" and link.flexible for link in links[0]])
+    laws = [[_laws(link) if sleeved[i] else _NO_LAWS for i, link in enumerate(row)] for row in links] if sleeved.any() else None
+    pieces = max(len(law[0]) for row in laws for law in row) if laws else 1
+    fields: dict[str, Any] = {
+        "first": each(rows).astype(np.int64), "kind": each(kinds).astype(np.int64), "locked": joint("locked", np.int64),
+        "angle": joint("angle_rad"), "rotor": joint("rotor_inertia"), "viscous": joint("viscous_friction"),
+        "coulomb": joint("coulomb_friction"), "length": of("length"), "mass": of("mass") + hubs, "hub": hubs, "s1": of("s1"),
+        "inertia": of("inertia"), "lam": lam, "alpha": alpha, "beta": beta,
+        "damp": np.where(lam > 0, alpha[:, :, None] + beta[:, :, None] * lam, 0.0),
+        "points": each([info.point_x.shape[1] for info in infos]).astype(np.int64),
+        "payload": np.array([[robot.payload.mass_kg] for robot in robots]) * ends,
+        "tip_inertia": np.array([[robot.payload.inertia_kg_m2] for robot in robots]) * ends,
+        "elements": each([link.elements for link in links[0]]).astype(np.int64), "node": np.zeros((B, N), dtype=np.int64),
+        "reference": of("reference"), "stiffening": [robot.stiffening for robot in robots],
+        "gravity": np.array([robot.gravity_m_s2 for robot in robots], dtype=float),
+    }  # fmt: skip
+    fields |= {name: _padded([getattr(info, name) for info in infos]) for name in _PER_LINK}
+    for k, (name, columns, empty) in enumerate((("law_x", (), np.inf), ("law_mass", (3,), 0.0), ("law_EI", (5,), 0.0))):
+        fields[name] = np.full((B, N, pieces, *columns), empty)
+        if laws is None:
+            fields[name][:, :, 0] = 0.0
+            continue
+        for b, row in enumerate(laws):
+            for i, law in enumerate(row):
+                fields[name][b, i, : len(law[k])] = law[k]
+    return [fields[name] for name in Chain._fields]
+
+
+_PER_LINK = (
+    "S0", "S1", "NL", "SL", "G1", "G2", "H", "point_x", "point_mass", "point_phi", "slope_dx", "slope_EI", "slope_d1", "slope_d2",
+    "ride", "sleeve_xi", "sleeve_w", "sleeve_phi", "sleeve_d1", "sleeve_d2",
+)  # fmt: skip
+
+_NO_LAWS = (np.zeros(1), np.zeros((1, 3)), np.zeros((1, 5)))
+
+
+def _laws(link: Link) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """rho A and E I between a link's breaks as polynomials: where they begin (B,), coefficients (B, 3) and (B, 5), exact for
+    sections that taper linearly."""
+    breaks = np.array(link.breaks())
+    pieces = list(pairwise(breaks))
+    mass, EI = np.zeros((len(pieces), 3)), np.zeros((len(pieces), 5))
+    for k, (a, b) in enumerate(pieces):
+        for row, law in ((mass[k], link.mass_per_length), (EI[k], link.bending_stiffness)):
+            s = np.linspace(0, b - a, len(row))
+            row[:] = np.polynomial.polynomial.polyfit(s / (b - a), law(a + s), len(row) - 1) / (b - a) ** np.arange(len(row))
+    return breaks[:-1], mass, EI
+
+
+def _padded(arrays: list[np.ndarray]) -> np.ndarray:
+    """Arrays (B, ...) of the links as one (B, N, ...), padded with zeros to the largest."""
+    largest = [max(sizes) for sizes in zip(*(a.shape[1:] for a in arrays), strict=True)]
+    out = np.zeros((len(arrays[0]), len(arrays), *largest))
+    for i, a in enumerate(arrays):
+        out[:, i][(slice(None), *(slice(size) for size in a.shape[1:]))] = a
+    return out
+
+
+def _blocks(parts: list[np.ndarray], joint: float = 1.0) -> np.ndarray:
+    """Matrices (B, n, n) with `joint` for each joint and the links' own (B, m, m) after it on their diagonals."""
+    n = sum(1 + part.shape[1] for part in parts)
+    out, row = np.zeros((len(parts[0]), n, n)), 0
+    for part in parts:
+        end = row + 1 + part.shape[1]
+        out[:, row, row] = joint
+        out[:, row + 1 : end, row + 1 : end] = part
+        row = end
+    return out
+
+
+def _labels(robot: Robot, rows: list[int]) -> tuple[str, ...]:
+    labels = []
+    for i, link in enumerate(robot.links, 1):
+        m = rows[i] - rows[i - 1] - 1
+        labels.append(f"joint {i} position [{'rad' if link.joint.type == 'R' else 'm'}]")
+        if link.modes is not None:
+            labels += [f"link {i} mode {k + 1} [kg^(1/2) m]" for k in range(m)]
+        else:
+            slope = "slope x d/L [rad]" if link.joint.type == "Pb" and robot.sliding == "continuous" else "slope [rad]"
+            labels += [f"link {i} node {k // 2 + 1} {slope if k % 2 else 'deflection [m]'}" for k in range(m)]
+    return tuple(labels)
+
+
+def _masses(chains: Sequence[Chain], y: np.ndarray) -> np.ndarray:
+    """Mass matrices (B, n, n) at y (B, n), in the solver's coordinates."""
+    B, n = y.shape
+    M, work = np.zeros((B, n, n)), workspace(chains[0])
+    v, a, gravity, bias = np.zeros(n), np.zeros(n), np.zeros(2), np.zeros(n)
+    for b, chain in enumerate(chains):
+        mass(chain, work, y[b], v, a, gravity, bias, M[b])
+    return (M + np.swapaxes(M, 1, 2)) / 2
+
+
+def _massless(M: np.ndarray, free: np.ndarray, rows: list[int]) -> dict[int, int]:
+    """The robots (from 0) whose mass matrix, of the free rows, is singular, each with a joint (from 1) that moves nothing."""
+    if len(free) == 0:
+        return {}
+    diagonal = np.einsum("bii->bi", M)
+    scale = 1 / np.sqrt(np.maximum(diagonal, 1e-300))
+    smallest = np.linalg.eigvalsh(M * scale[:, None, :] * scale[:, :, None])[:, 0]
+    out = {}
+    for b in np.flatnonzero((diagonal <= 0).any(axis=1) | (smallest < 1e-13)):
+        nothing = {int(row) for row, value in zip(free, diagonal[b], strict=True) if value <= 1e-300}
+        out[int(b)] = next((i for i, row in enumerate(rows[:-1], 1) if row in nothing), len(rows) - 1)
+    return out
+
+
+def _spectra(M: np.ndarray, K: np.ndarray) -> np.ndarray:
+    """Natural frequencies (B, n) [rad/s], ascending; 0 where nothing moves (B, 1)."""
+    if M.shape[1] == 0:
+        return np.zeros((len(M), 1))
+    return np.sqrt(np.maximum(eigh(K, M)[0], 0.0))
