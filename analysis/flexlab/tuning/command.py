@@ -30,7 +30,7 @@ def tune(
     generations: Annotated[int, typer.Option(help="at most so many")] = 100,
     patience: Annotated[int, typer.Option(help="generations without 0.1 % of improvement that end the search")] = 30,
     seed: Annotated[int, typer.Option(help="the same seed, the same result")] = 1,
-    vibration: Annotated[float, typer.Option(help="weight VIBRATION in J; 0: the elastic displacement is ignored")] = 10.0,
+    vibration: Annotated[float, typer.Option(help="weight VIBRATION in J; 0: the elastic displacement is ignored")] = 100.0,
     effort: Annotated[float, typer.Option(help="weight EFFORT in J")] = 0.01,
     overshoot: Annotated[float, typer.Option(help="weight OVERSHOOT in J")] = 1.0,
     payload_factors: Annotated[str, typer.Option(metavar="LIST", help="robust: the worst over payloads, as 0,1,2")] = "1",

@@ -104,7 +104,7 @@ def _shortest(task: Task) -> tuple[float, ...]:
     for i in range(len(task.robots[0].links)):
         controller = under(fx.assemble(task.robots[0]), task.manoeuvre, task.gains)
         joints = list(controller.joints)
-        joints[i] = replace(joints[i], kp=1e9, ki=0.0, kd=0.0)  # type: ignore[call-arg]  # at its limit until it is there
+        joints[i] = replace(joints[i], kp=1e9, ki=0.0, kd=0.0)  # type: ignore[arg-type]  # at its limit until it is there
         run = fx.simulate(fx.assemble(task.robots[0]), task.manoeuvre.t, replace(controller, joints=tuple(joints)), rtol=1e-5)
         y = run[f"joint/{i + 1}/position"]
         end = run[f"joint/{i + 1}/reference"][-1]

@@ -30,7 +30,7 @@ times in s, w the tip deflection, L the link's length; capitals are the weights"
 class Weights:
     """The weights of J's terms, all numbers of 0 or more."""
 
-    vibration: float = 10.0
+    vibration: float = 100.0
     effort: float = 0.01
     overshoot: float = 1.0
     overshoot_free: float = 0.05

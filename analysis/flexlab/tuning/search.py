@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from flexura.errors import FlexuraError, InputError
+from flexura.request import program
 
 from .engine import Engine
 from .history import History
@@ -44,8 +45,8 @@ class Search:
                 raise InputError(f"expected {least} or more", key=f"--{name}", value=getattr(self, name))
 
     def identity(self) -> dict[str, Any]:
-        """What makes its generations what they are; its ends do not."""
-        return {"algorithm": self.algorithm, "population": self.population, "seed": self.seed}
+        """What makes its generations what they are, the solver too; its ends do not."""
+        return {"algorithm": self.algorithm, "population": self.population, "seed": self.seed, "program": program()}
 
 
 def search(task: Task, how: Search, engine: Engine, history: History, progress: Callable[[History], None]) -> bool:
