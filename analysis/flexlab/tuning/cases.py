@@ -14,7 +14,7 @@ from functools import cached_property
 from pathlib import Path
 
 import flexura as fx
-from flexura.control import Output
+from flexura.control import Motor, Output
 from flexura.drive import Drive, JointDrive, Manoeuvre
 from flexura.gains import Gains
 from flexura.signal import step
@@ -61,15 +61,19 @@ class Structure:
 
 
 def type_4() -> Structure:
-    """PaR: the rig, its motor with 12 V, its stepper with 6 rad/s and 60 rad/s^2."""
+    """PaR: the rig, its stepper with 6 rad/s and 60 rad/s^2, its motor with the voltage that takes the carriage to 90 % of the
+    speed at which the board switches off."""
     from .. import rig as rigs
     from ..rig.driven import driven
 
     bench = rigs.load(ROOT / "firmware" / "rig.toml")
     robot, outputs = driven(fx.load(ROOT / "model" / "robots" / "rig.toml"), bench)
     board = rigs.configuration(bench)
-    limits = ("voltage_max_V", "voltage_slew_V_s", "rate_max_2_rad_s", "acceleration_max_2_rad_s2")
-    settings = {name: board[name] for name in limits} | {"kp_1_V_m": 1000.0, "kp_2_1_s": 8.0}
+    settings = {name: board[name] for name in ("voltage_slew_V_s", "rate_max_2_rad_s", "acceleration_max_2_rad_s2")}
+    motor, friction_N = outputs[0], robot.links[0].joint.coulomb_friction
+    assert isinstance(motor, Motor)
+    most = (0.9 * board["speed_max_1_m_s"] * motor.damping + friction_N) / motor.force_per_V
+    settings |= {"voltage_max_V": min(board["voltage_max_V"], round(most, 1)), "kp_1_V_m": 1000.0, "kp_2_1_s": 8.0}
     return Structure(
         "IV", robot, (0.10, math.pi / 4), settings, outputs,
         (
