@@ -22,7 +22,12 @@ from flexlab.tuning.engine import Threads
 from flexlab.tuning.free import free
 from flexlab.tuning.history import FILE, History
 from flexlab.tuning.objective import FAILED, Weights
-from flexlab.tuning.response import (
+from flexlab.tuning.result import figures, result
+from flexlab.tuning.search import Search, search
+from flexlab.tuning.task import varied
+from flexura import gains
+from flexura.errors import InputError
+from flexura.response import (
     ERROR,
     ITAE,
     OVERSHOOT,
@@ -35,11 +40,6 @@ from flexlab.tuning.response import (
     joint_figures,
     strip_figures,
 )
-from flexlab.tuning.result import figures, result
-from flexlab.tuning.search import Search, search
-from flexlab.tuning.task import varied
-from flexura import gains
-from flexura.errors import InputError
 from tunings import FREE, GAINS, ROBOT, SWING, task
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -102,7 +102,7 @@ def tune(
     weights = Weights(vibration, effort, overshoot)
     robots = varied(described, _factors(payload_factors, "--payload-factors"), _factors(stiffness_factors, "--stiffness-factors"))
     task = Task(robots, asked, given, tuple(frees), weights, algorithm == "nsga2", rtol, modes)
-    announce_compiling()
+    announce_compiling("run_rows")
     task.controllers  # noqa: B018 - refuses what can't be before anything is written
     folder = out or default_folder("tune", robot)
     history = History.open(folder, task.digest(how.identity()))
@@ -123,7 +123,7 @@ def tune(
 def _cases(how: Any, folder: Path, scheduler: str | None, jobs: int | None, json: bool) -> None:
     from . import dissertation as cases
 
-    announce_compiling()
+    announce_compiling("run_rows")
     with _bar(how.generations, ("J",)) as report:
         found, complete = cases.study(["IV", "III"], how, folder, scheduler, jobs, report)
     if found:

@@ -16,13 +16,13 @@ from rich.console import Group
 from rich.table import Table
 
 import flexura as fx
+from flexura.response import ERROR, OVERSHOOT, RESIDUAL, SETTLING, Response, strip_figures
 
 from ..controlled import under
 from ..zeros import transmission
 from .cases import PUBLISHED, STRUCTURES, TABLE
 from .engine import engine
 from .history import History
-from .response import ERROR, OVERSHOOT, RESIDUAL, SETTLING, Response, strip_figures
 from .result import Result, number, numbers, result, save
 from .search import Search, search
 from .task import Task

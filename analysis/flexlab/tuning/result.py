@@ -13,12 +13,12 @@ from rich.table import Table
 import flexura as fx
 from flexura.files import write_bytes
 from flexura.gains import Gains
+from flexura.response import Response, of_run
 
 from ..controlled import under
 from . import free as freedom
 from .history import History
 from .objective import HELP
-from .response import Response, of_run
 from .search import Search
 from .task import Task
 
@@ -97,7 +97,7 @@ def table(found: Result) -> Table:
     """The tuned settings, and the figures on every robot."""
     history, task = found.history, found.task
     out = Table(title=f"{task.robots[0].name or 'robot'}: {task.manoeuvre.name}, {found.how.algorithm}", title_justify="left")
-    for name in ("robot", "joint", "rise [s]", "settling [s]", "overshoot [%]", "error [%]", "peak w [mm]", "residual w [mm]"):
+    for name in ("robot", "joint", "rise [s]", "settling [s]", "overshoot [%]", "error [%]", "peak [mm]", "residual [mm]"):
         out.add_column(name.replace("[", "\\["), justify="left" if name == "robot" else "right", no_wrap=True)
     for k, response in enumerate(found.responses):
         for i, row in enumerate(response.joints):
@@ -128,7 +128,7 @@ def _robot(found: Result, k: int) -> str:
         parts.append(f"payload x {one.payload.mass_kg / nominal.payload.mass_kg:.3g}")
     for a, b in zip(one.links, nominal.links, strict=True):
         if a.flexible:
-            parts.append(f"stiffness x {_stiffness(a) / _stiffness(b):.3g}")
+            parts.append(f"EI x {_stiffness(a) / _stiffness(b):.3g}")
             break
     return ", ".join(parts)
 

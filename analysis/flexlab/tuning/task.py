@@ -15,14 +15,14 @@ import flexura as fx
 from flexura.control import PID
 from flexura.errors import InputError
 from flexura.gains import Gains
+from flexura.response import JOINT, STRIP
+from flexura.trials import Trial, run_rows, trial
 
 from ..controlled import under
 from . import free as freedom
 from . import objective
 from .free import Free
 from .objective import Weights
-from .response import JOINT, STRIP
-from .trials import Trial, run_rows, trial
 
 RTOL, MODES = 1e-4, 2  # of a search's runs; what comes out is simulated again to 1e-6, with the mesh of the robot file
 

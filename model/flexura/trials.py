@@ -10,17 +10,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-import flexura as fx
-from flexura import loop
-from flexura.chain import Chain, Work
-from flexura.choice import longest_step
-from flexura.compiled import compiled
-from flexura.course import following, inputs_of, which
-from flexura.forward import initial, to_state
-from flexura.law import LIMIT, NONE, Law
-from flexura.signal import evaluate
-
+from . import loop
+from .chain import Chain, Work
+from .choice import longest_step
+from .compiled import compiled
+from .control import Controller
+from .course import following, inputs_of, which
+from .forward import initial, to_state
+from .law import LIMIT, NONE, Law
 from .response import EFFORT, JOINT, SETTLING, STRIP, joint_figures, strip_figures
+from .signal import evaluate
+from .system import System
 
 CALL = 1000  # steps between two looks at how many a row has taken
 PER_JOINT, OF_STRIP = len(JOINT), len(STRIP)
@@ -44,7 +44,7 @@ class Trial(NamedTuple):
     fixed: np.ndarray  # (k, 10) the signals that the law overwrites, as they were
 
 
-def trial(system: fx.System, controller: fx.Controller, duration_s: float, output_step_s: float, rtol: float) -> Trial:
+def trial(system: System, controller: Controller, duration_s: float, output_step_s: float, rtol: float) -> Trial:
     """What rows of gains are run with, from the robot's start at rest. Samples lie on ticks."""
     rate = controller.rate_Hz
     every = max(1, round(output_step_s * rate))

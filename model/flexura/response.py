@@ -26,8 +26,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-import flexura as fx
-from flexura.compiled import compiled
+from .compiled import compiled
+from .run import Run
 
 LOW, HIGH, BAND = 0.1, 0.9, 0.02
 RISE, SETTLING, OVERSHOOT, ERROR, ITAE, EFFORT = range(6)  # columns of a joint's figures
@@ -101,7 +101,7 @@ class Response:
         return out | {name: clean(x) for name, x in zip(STRIP, self.strip, strict=True)}
 
 
-def of_run(run: fx.Run, references: list[np.ndarray], limits: list[float], settled: float | None = None) -> Response:
+def of_run(run: Run, references: list[np.ndarray], limits: list[float], settled: float | None = None) -> Response:
     """The figures of a Run without gaps: `references` the unfiltered set-points (T,) a joint, `limits` of the outputs.
 
     `settled` [s] replaces the instant from which the residual counts, to compare two runs from the same instant on.
@@ -117,7 +117,7 @@ def of_run(run: fx.Run, references: list[np.ndarray], limits: list[float], settl
     return Response(joints, strip)
 
 
-def _effort(run: fx.Run, joint: int, limit: float) -> float:
+def _effort(run: Run, joint: int, limit: float) -> float:
     """From the voltage, the rate of the pulses, or the force, whichever the run has first."""
     if not np.isfinite(limit):
         return 0.0
