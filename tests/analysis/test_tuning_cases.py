@@ -20,7 +20,7 @@ from flexlab.tuning.result import simulated
 from flexlab.tuning.search import Search, search
 from flexlab.tuning.task import varied
 from flexura import gains
-from flexura.response import OVERSHOOT, RESIDUAL, SETTLING
+from flexura.response import ERROR, OVERSHOOT, RESIDUAL, SETTLING
 
 ROOT = Path(__file__).resolve().parents[2]
 CONTROLLERS = ROOT / "model" / "controllers"
@@ -67,7 +67,7 @@ def test_ga_pso_and_cma_es_reach_the_same_objective_within_2_percent_from_five_s
     task = cases.type_4().task(2)
     least = {}
     print()
-    for name, population, generations in (("ga", 50, 100), ("pso", 40, 100), ("cma-es", 16, 150)):
+    for name, population, generations in (("ga", 30, 60), ("pso", 30, 60), ("cma-es", 12, 90)):
         for seed in range(1, 6):
             history, begun = History(""), time.perf_counter()
             with Threads(task, 2) as engine:
@@ -121,4 +121,5 @@ def test_the_emulated_rig_does_what_the_simulation_says(tmp_path):
     _, expected = simulated(system, asked, settings)
     print("emulated", measured.joints, measured.strip, "simulated", expected.joints, expected.strip, sep="\n")
     assert measured.joints[:, :2] == pytest.approx(expected.joints[:, :2], rel=0.1)
-    assert measured.joints[:, OVERSHOOT].max() < 0.05
+    assert measured.joints[:, OVERSHOOT] == pytest.approx(expected.joints[:, OVERSHOOT], abs=0.01)
+    assert measured.joints[:, ERROR].max() < 0.005  # backlash, and what the sensor says of a strip at rest

@@ -97,7 +97,7 @@ def table(found: Result) -> Table:
     """The tuned settings, and the figures on every robot."""
     history, task = found.history, found.task
     out = Table(title=f"{task.robots[0].name or 'robot'}: {task.manoeuvre.name}, {found.how.algorithm}", title_justify="left")
-    for name in ("robot", "joint", "rise [s]", "settling [s]", "overshoot [%]", "error [%]", "peak [mm]", "residual [mm]"):
+    for name in ("robot", "", "rise [s]", "settling [s]", "overshoot [%]", "error [%]", "peak [mm]", "residual [mm]"):
         out.add_column(name.replace("[", "\\["), justify="left" if name == "robot" else "right", no_wrap=True)
     for k, response in enumerate(found.responses):
         for i, row in enumerate(response.joints):
