@@ -70,10 +70,10 @@ def test_ga_pso_and_cma_es_reach_the_same_objective_within_2_percent_from_five_s
     least = {}
     print()
     for seed in range(1, 6):
-        for name, population, generations in (("ga", 30, 60), ("pso", 30, 60), ("cma-es", 12, 90)):
+        for name, population, generations in (("ga", 30, 50), ("pso", 30, 50), ("cma-es", 16, 140)):
             history, begun = History(""), time.perf_counter()
             with Threads(task, 2) as engine:
-                assert search(task, Search(name, population, generations, seed), engine, history, lambda h: None)
+                assert search(task, Search(name, population, generations, seed, polish=60), engine, history, lambda h: None)
             least[name, seed] = history.all("goals").min()
             wall = time.perf_counter() - begun
             print(f"| {name} | {seed} | {least[name, seed]:.5f} | {history.evaluations} | {wall:.1f} s |", flush=True)

@@ -29,6 +29,7 @@ def tune(
     population: Annotated[int, typer.Option(help="individuals of a generation")] = 50,
     generations: Annotated[int, typer.Option(help="at most so many")] = 100,
     patience: Annotated[int, typer.Option(help="generations without 0.1 % of improvement that end the search")] = 30,
+    polish: Annotated[int, typer.Option(help="generations of a local CMA-ES from the best, at the end")] = 0,
     seed: Annotated[int, typer.Option(help="the same seed, the same result")] = 1,
     vibration: Annotated[float, typer.Option(help="weight VIBRATION in J; 0: the elastic displacement is ignored")] = 100.0,
     effort: Annotated[float, typer.Option(help="weight EFFORT in J")] = 0.01,
@@ -82,7 +83,7 @@ def tune(
 
     if free and free_file:
         raise fx.InputError("expected either --free or --free-file", key="--free-file", value=str(free_file))
-    how = Search(algorithm, population, generations, seed, patience)
+    how = Search(algorithm, population, generations, seed, patience, polish)
     if dissertation:
         if robot is not None or controller is not None:
             raise fx.InputError("expected --dissertation without a robot: it brings its own", key="ROBOT", value=str(robot))
@@ -108,7 +109,7 @@ def tune(
     history = History.open(folder, task.digest(how.identity()))
     if history.stored:
         say(json, f"going on after generation {history.stored} in {folder}")
-    with engine(task, scheduler, jobs) as runs, _bar(how.generations, task.goals) as report:
+    with engine(task, scheduler, jobs) as runs, _bar(how.generations + how.polish, task.goals) as report:
         complete = search(task, how, runs, history, report)
     if not len(history):
         raise typer.Exit(130)
@@ -124,7 +125,7 @@ def _cases(how: Any, folder: Path, scheduler: str | None, jobs: int | None, json
     from . import dissertation as cases
 
     announce_compiling("run_rows")
-    with _bar(how.generations, ("J",)) as report:
+    with _bar(how.generations + how.polish, ("J",)) as report:
         found, complete = cases.study(["IV", "III"], how, folder, scheduler, jobs, report)
     if found:
         show(json, lambda: cases.table(found), lambda: cases.data(found))

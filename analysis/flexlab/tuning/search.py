@@ -24,67 +24,86 @@ ALGORITHMS = {
     "ga": "genetic algorithm, real-coded: tournaments of 3, crossover (SBX) 0.8, mutation 0.1; best of parents and young stay",
     "pso": "particle swarm with adaptive inertia", "cma-es": "covariance matrix adaptation", "nsga2": "Pareto front: two goals",
 }  # fmt: skip
+POLISHERS = 12  # individuals of a polish
 SAME = 1e-3  # an improvement by less than this fraction is none
 
 
 @dataclass(frozen=True)
 class Search:
-    """How to search; `patience`: generations without an improvement after which it ends."""
+    """How to search; `patience`: generations without an improvement after which it ends; `polish`: generations of a local
+    CMA-ES from the best point after that."""
 
     algorithm: str = "ga"
     population: int = 50
     generations: int = 100
     seed: int = 1
     patience: int = 30
+    polish: int = 0
 
     def __post_init__(self) -> None:
         if self.algorithm not in ALGORITHMS:
             raise InputError(f"expected one of {', '.join(ALGORITHMS)}", key="--algorithm", value=self.algorithm)
-        for name, least in (("population", 4), ("generations", 1), ("seed", 0), ("patience", 1)):
+        for name, least in (("population", 4), ("generations", 1), ("seed", 0), ("patience", 1), ("polish", 0)):
             if getattr(self, name) < least:
                 raise InputError(f"expected {least} or more", key=f"--{name}", value=getattr(self, name))
 
     def identity(self) -> dict[str, Any]:
         """What makes its generations what they are, the solver too; its ends do not."""
-        return {"algorithm": self.algorithm, "population": self.population, "seed": self.seed, "program": program()}
+        own = {"algorithm": self.algorithm, "population": self.population, "seed": self.seed, "program": program()}
+        return own | ({"generations": self.generations, "patience": self.patience} if self.polish else {})
 
 
 def search(task: Task, how: Search, engine: Engine, history: History, progress: Callable[[History], None]) -> bool:
     """Go on from what `history` holds to the end of the search; every generation is stored as it is done. True: to its end, not
     interrupted. Raises InputError where the stored generations are not this search's."""
-    from pymoo.core.evaluator import Evaluator
-    from pymoo.core.problem import Problem
-    from pymoo.problems.static import StaticProblem
+    from pymoo.algorithms.soo.nonconvex.cmaes import CMAES
 
     if task.pareto != (how.algorithm == "nsga2"):
         raise InputError("expected nsga2 for two goals, and only for them", key="--algorithm", value=how.algorithm)
-    d = len(task.free)
-    problem = Problem(n_var=d, n_obj=len(task.goals), xl=np.zeros(d), xu=np.ones(d))
-    algorithm = _algorithm(how, task.start())
-    algorithm.setup(problem, termination=("n_gen", how.generations), seed=how.seed, verbose=False)
-    generation = 0
+    if task.pareto and how.polish:
+        raise InputError("expected none where there are two goals", key="--polish", value=how.polish)
     try:
-        while algorithm.has_next() and not _stagnant(history, generation, how.patience):
-            asked = algorithm.ask()
-            if asked is None or len(asked) == 0:
-                break
-            points = np.asarray(asked.get("X"), dtype=float)
-            if generation < len(history):
-                goals = history.told(generation, points)
-            else:
-                begun = time.perf_counter()
-                figures, reached = engine(points)
-                goals = task.score(figures, reached)
-                history.add(points, goals, figures, reached, time.perf_counter() - begun)
-                progress(history)
-            Evaluator().eval(StaticProblem(problem, F=goals), asked)
-            algorithm.tell(infills=asked)
-            generation += 1
+        done = _stage(_algorithm(how, task.start()), how.generations, how, task, engine, history, progress, 0)
+        if how.polish:
+            best = history.all("points")[int(history.all("goals")[: history.ends[done - 1], 0].argmin())]
+            local = CMAES(x0=best, sigma=0.1, popsize=POLISHERS, tolfun=1e-6, tolx=1e-5)
+            _stage(local, how.polish, how, task, engine, history, progress, done)
     except KeyboardInterrupt:
         return False
     if not len(history):
         raise FlexuraError("the search made no generation")
     return True
+
+
+def _stage(
+    algorithm: Any, generations: int, how: Search, task: Task, engine: Engine, history: History,
+    progress: Callable[[History], None], first: int,
+) -> int:  # fmt: skip
+    """One algorithm to its end, its generations being the history's from `first` on; how many there are after it."""
+    from pymoo.core.evaluator import Evaluator
+    from pymoo.core.problem import Problem
+    from pymoo.problems.static import StaticProblem
+
+    d, generation = len(task.free), first
+    problem = Problem(n_var=d, n_obj=len(task.goals), xl=np.zeros(d), xu=np.ones(d))
+    algorithm.setup(problem, termination=("n_gen", generations), seed=how.seed, verbose=False)
+    while algorithm.has_next() and not (generation - first > how.patience and _stagnant(history, generation, how.patience)):
+        asked = algorithm.ask()
+        if asked is None or len(asked) == 0:
+            break
+        points = np.asarray(asked.get("X"), dtype=float)
+        if generation < len(history):
+            goals = history.told(generation, points)
+        else:
+            begun = time.perf_counter()
+            figures, reached = engine(points)
+            goals = task.score(figures, reached)
+            history.add(points, goals, figures, reached, time.perf_counter() - begun)
+            progress(history)
+        Evaluator().eval(StaticProblem(problem, F=goals), asked)
+        algorithm.tell(infills=asked)
+        generation += 1
+    return generation
 
 
 def _algorithm(how: Search, start: np.ndarray) -> Any:
@@ -113,7 +132,5 @@ def _algorithm(how: Search, start: np.ndarray) -> Any:
 
 def _stagnant(history: History, generation: int, patience: int) -> bool:
     """Was there no improvement in the last `patience` generations before this one? Of two goals: of the front's area."""
-    if generation <= patience:
-        return False
     now, before = history.merit(generation), history.merit(generation - patience)
     return bool(before - now <= SAME * abs(before))
