@@ -70,7 +70,7 @@ def test_ga_pso_and_cma_es_reach_the_same_objective_within_2_percent_from_five_s
     least = {}
     print()
     for seed in range(1, 6):
-        for name, population, generations in (("ga", 30, 50), ("pso", 30, 50), ("cma-es", 16, 140)):
+        for name, population, generations in (("ga", 50, 60), ("pso", 30, 50), ("cma-es", 16, 140)):
             history, begun = History(""), time.perf_counter()
             with Threads(task, 2) as engine:
                 assert search(task, Search(name, population, generations, seed, polish=60), engine, history, lambda h: None)

@@ -121,7 +121,7 @@ def _algorithm(how: Search, start: np.ndarray) -> Any:
         return CMAES(x0=start, sigma=0.3, popsize=how.population, tolfun=1e-6, tolx=1e-5)
     first = qmc.LatinHypercube(len(start), seed=how.seed).random(how.population)
     first[0] = start
-    cross, change = SBX(prob=0.8, eta=10), PM(prob=1.0, prob_var=max(0.1, 1 / len(start)), eta=15)
+    cross, change = SBX(prob=0.8, eta=10), PM(prob=1.0, prob_var=max(0.1, 1 / len(start)), eta=5)
     if how.algorithm == "ga":
         select = TournamentSelection(pressure=3, func_comp=comp_by_cv_and_fitness)
         return GA(pop_size=how.population, sampling=first, selection=select, crossover=cross, mutation=change)
