@@ -3,10 +3,10 @@
 In the modes of `basis.Basis`, y = y0 + phi eta, the equations of motion are eta'' + d2 eta' + w2 eta = N, where N = rows a +
 w2 eta + d2 eta' takes the accelerations a from a pass of `kernel.passes`: exact, whatever the basis. N varies with the motion
 and not with the vibration. A polynomial through its last values (at most ORDER of them) is put into the variation-of-constants
-formula (`propagator.py`), the equations are looked at once where that leads, and the polynomial through the new value too makes the step:
-a variable-step Adams method (predict, evaluate, correct) for an oscillating system, of order ORDER + 1, at one evaluation a step.
-Steps need not resolve any frequency of the robot. Hochbruck and Ostermann, Acta Numerica 19 (2010), 2.5 (exponential multistep
-methods); the error is estimated as Shampine and Gordon do, by leaving out the oldest value.
+formula (`propagator.py`), the equations are looked at once where that leads, and the polynomial through the new value too makes
+the step: a variable-step Adams method (predict, evaluate, correct) for an oscillating system, of order ORDER + 1, at one
+evaluation a step. Steps need not resolve any frequency of the robot. Hochbruck and Ostermann, Acta Numerica 19 (2010), 2.5
+(exponential multistep methods); the error is estimated as Shampine and Gordon do, by leaving out the oldest value.
 """
 
 from __future__ import annotations
@@ -18,29 +18,9 @@ from .chain import Chain, Work
 from .compiled import compiled, inlined
 from .kernel import passes
 from .loop import (
-    BREAK,
-    DONE,
-    EVALS,
-    FAULT,
-    FRESH,
-    LIMIT,
-    OUT,
-    REJECTED,
-    STATUS,
-    STEPS,
-    STUCK,
-    H,
-    Inputs,
-    Memory,
-    T,
-    _copy,
-    _find,
-    _outside,
-    _powers,
-    _prescribe,
-    _weights,
-    drive,
-)
+    BREAK, DONE, EVALS, FAULT, FRESH, LIMIT, OUT, REJECTED, STATUS, STEPS, STUCK, H, Inputs, Memory, T, _copy, _find, _outside,
+    _powers, _prescribe, _weights, drive,
+)  # fmt: skip
 from .past import COUNT, HEAD, ORDER, ROWS, SPAN, STEADY, Past, tables
 from .propagator import free, moments
 
