@@ -18,8 +18,28 @@ from .chain import Chain, Work
 from .compiled import compiled, inlined
 from .kernel import passes
 from .loop import (
-    BREAK, DONE, EVALS, FAULT, FRESH, LIMIT, OUT, REJECTED, STATUS, STEPS, STUCK, H, Inputs, Memory, T, _copy, _find, _outside,
-    _powers, _prescribe, _weights, drive,
+    BREAK,
+    DONE,
+    EVALS,
+    FAULT,
+    FRESH,
+    LIMIT,
+    OUT,
+    REJECTED,
+    STATUS,
+    STEPS,
+    STUCK,
+    H,
+    Inputs,
+    Memory,
+    T,
+    _copy,
+    _find,
+    _outside,
+    _powers,
+    _prescribe,
+    _weights,
+    drive,
 )  # fmt: skip
 from .past import COUNT, HEAD, ORDER, ROWS, SPAN, STEADY, Past, tables
 from .propagator import free, moments
