@@ -67,6 +67,6 @@ def cases(name: str) -> list[Case]:
     chosen = CHOICES[name]
     ours = partial(native, system, manoeuvre.t, manoeuvre.drive)
     return [
-        Case("Exudyn twin", lambda: exudyn(name), lambda: exudyn(name, FINER).deflections, repeats=1),
+        Case("Exudyn twin", lambda: exudyn(name), lambda: exudyn(name, FINER).deflections, repeats=2),
         Case("native", partial(ours, chosen.rtol, chosen.method), cache(lambda: ours(1e-8).deflections), ASKED),
     ]
