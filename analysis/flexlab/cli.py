@@ -63,8 +63,8 @@ def simulate(
 
     \b
     Example: flexura simulate model/robots/rig.toml model/manoeuvres/rig-step.toml --controller model/controllers/rig.toml
-    Example: flexura simulate model/robots/rig.toml model/manoeuvres/rig-inverse-law.toml
-    Example: flexura simulate model/robots/rig.toml --vary payload.mass_kg=0:0.1:101 --vary link.2.length_m=0.2:0.3:11
+    And: flexura simulate model/robots/rig.toml model/manoeuvres/rig-inverse-law.toml
+    And: flexura simulate model/robots/rig.toml --vary payload.mass_kg=0:0.1:101 --vary link.2.length_m=0.2:0.3:11
     """
     import flexura as fx
 

@@ -45,7 +45,7 @@ from .past import COUNT, HEAD, ORDER, ROWS, SPAN, STEADY, Past, tables
 from .propagator import free, moments
 
 EXPONENTIAL = 4  # beside the methods of `loop`
-TIGHT = 10.0  # what the local error is kept below rtol by: few long steps add up what many short ones average out
+TIGHT = 20.0  # what the local error is kept below rtol by: few long steps add up what many short ones average out
 
 
 @inlined
