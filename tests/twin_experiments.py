@@ -72,7 +72,7 @@ def experiment(kind="inverse", rig=RIG, seconds=2.0, seed=1, noise_m=2e-4, lost=
     quantised = lambda y, step: np.round(y / step) * step
     x, q = moved["joint/1/position"], moved["joint/2/position"]
     acting = np.array([limited(volts(*k)) for k in zip(t, x, moved["joint/1/velocity"], strict=True)])
-    late_s = 1e-3 + more.motor.inductance_H / data.resistance_ohm  # a board reports a voltage a tick before it sets it; the current lags
+    late_s = 1e-3 + more.motor.inductance_H / data.resistance_ohm  # set a tick later; the current lags
     tip = quantised(moved["link/2/tip_deflection"] + rng.normal(0, noise_m, len(t)), 2e-4)
     angle, length = quantised(q, 2 * math.pi / 2400), bench.robot.links[1].length_m
     at = quantised(x, 0.008 / 640)

@@ -38,7 +38,7 @@ class Choice:
 
 CHOICES = {
     "type-2-rpa": Choice(8, 0.03, 4e-3 / 26, 3e-6, "auto"),
-    "type-7-pbr": Choice(4, 0.10, 4e-3 / 30, 2e-4, "auto"),
+    "type-7-pbr": Choice(4, 0.10, 4e-3 / 30, 4e-4, "auto"),
 }
 ASKED, FINER = 50.0, 3
 
