@@ -24,7 +24,7 @@ LONGER = {
     "flexlab.board.declaration": "generated: tables, not to be read through",
 }
 TWIN_MAY_USE = {"errors", "robot", "run", "drive", "signal", "twin"}
-HEAVY = {"distributed", "exudyn", "rerun", "pyarrow", "matplotlib", "PIL", "platformio"}
+HEAVY = {"distributed", "exudyn", "rerun", "pyarrow", "matplotlib", "PIL", "platformio", "pymoo"}
 ADAPTERS = {"rerun": "flexlab.review"}  # the one package that adapts it, and is itself imported only when used
 
 
@@ -103,7 +103,7 @@ def test_an_adapter_of_something_heavy_is_itself_imported_where_it_is_used(modul
 # Parts of the command that import nothing themselves.
 COMMANDS = (
     "flexlab.terminal", "flexlab.compare.command", "flexlab.experiment.command", "flexlab.export.command",
-    "flexlab.identification.command",
+    "flexlab.identification.command", "flexlab.tuning.command", "flexlab.demo_command",
 )  # fmt: skip
 
 

@@ -71,6 +71,8 @@ def experiment(kind="inverse", rig=RIG, seconds=2.0, seed=1, noise_m=2e-4, lost=
     rng = np.random.default_rng(seed)
     quantised = lambda y, step: np.round(y / step) * step
     x, q = moved["joint/1/position"], moved["joint/2/position"]
+    acting = np.array([limited(volts(*k)) for k in zip(t, x, moved["joint/1/velocity"], strict=True)])
+    late_s = 1e-3 + more.motor.inductance_H / data.resistance_ohm  # set a tick later; the current lags
     tip = quantised(moved["link/2/tip_deflection"] + rng.normal(0, noise_m, len(t)), 2e-4)
     angle, length = quantised(q, 2 * math.pi / 2400), bench.robot.links[1].length_m
     at = quantised(x, 0.008 / 640)
@@ -78,7 +80,7 @@ def experiment(kind="inverse", rig=RIG, seconds=2.0, seed=1, noise_m=2e-4, lost=
         "joint/1/position": at, "joint/2/position": angle,
         "joint/1/velocity": moved["joint/1/velocity"], "joint/2/velocity": moved["joint/2/velocity"],
         "joint/1/reference": np.array([points[0](s) for s in t]), "joint/2/reference": np.array([points[1](s) for s in t]),
-        "joint/1/voltage": np.array([limited(volts(*k)) for k in zip(t, x, moved["joint/1/velocity"], strict=True)]),
+        "joint/1/voltage": np.interp(t + late_s, t, acting),
         "joint/2/pulses": np.array([turn(s) for s in t]),
         "link/2/tip_deflection": tip, "link/2/flex_voltage": 3.0 + FLEX_V_M * tip,
         "tip/x": at + 0.1 + length * np.cos(angle) - tip * np.sin(angle), "tip/y": length * np.sin(angle) + tip * np.cos(angle),

@@ -8,13 +8,15 @@ step that gives 0.1 % of the tip deflection, modified Newton, dense solver, driv
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
 
 import flexura as fx
 from flexura.signal import bang_bang
+
+from .sidebyside import Case, Result, native
 
 CARRIAGE_KG, ROTOR_KG_M2, PAYLOAD_KG, LENGTH_M = 1.0, 1e-3, 0.05, 0.3
 WIDTH_M, HEIGHT_M, YOUNG_PA, DENSITY_KG_M3 = 0.02, 0.001, 2e11, 7850.0
@@ -35,12 +37,23 @@ def robot(elements: int, modes: int | None = None) -> fx.Robot:
     return fx.Robot.from_dict({"name": "benchmark, type IV", "link": [carriage, strip], "payload": {"mass_kg": PAYLOAD_KG}})
 
 
-@dataclass(frozen=True)
-class Result:
-    """Wall time of the solver alone [s], and the tip deflection at T [m]."""
+def settings(duration_s: float, step_s: float, period_s: float) -> Any:
+    """What is fastest in Exudyn for thin strips at this accuracy; sensors are read every `period_s`."""
+    import exudyn as exu
 
-    wall_s: float
-    tip_deflection: np.ndarray
+    chosen = exu.SimulationSettings()
+    integration = chosen.timeIntegration
+    integration.endTime, integration.numberOfSteps = duration_s, round(duration_s / step_s)
+    integration.newton.useModifiedNewton = True
+    integration.newton.relativeTolerance = integration.newton.absoluteTolerance = 1e-6
+    integration.generalizedAlpha.spectralRadius = 0.9
+    integration.adaptiveStep = False
+    integration.verboseMode = 0
+    chosen.linearSolver.solverType = exu.LinearSolverType.EigenDense
+    chosen.solution.file.write = False
+    chosen.solution.solverInformationFileName = ""
+    chosen.solution.sensors.writePeriod = period_s
+    return chosen
 
 
 def exudyn(elements: int = 5, step_s: float = 2.0 / 6400) -> Result:
@@ -80,27 +93,25 @@ def exudyn(elements: int = 5, step_s: float = 2.0 / 6400) -> Result:
     at_root = mbs.AddSensor(item.SensorNode(nodeNumber=root, outputVariableType=kinds.CoordinatesTotal, **memory))
     at_tip = mbs.AddSensor(item.SensorNode(nodeNumber=tip, outputVariableType=kinds.Position, **memory))
     mbs.Assemble()
-    settings = exu.SimulationSettings()
-    integration = settings.timeIntegration
-    integration.endTime, integration.numberOfSteps = DURATION_S, round(DURATION_S / step_s)
-    integration.newton.useModifiedNewton = True
-    integration.newton.relativeTolerance = integration.newton.absoluteTolerance = 1e-6
-    integration.generalizedAlpha.spectralRadius = 0.9
-    integration.adaptiveStep = False
-    integration.verboseMode = 0
-    settings.linearSolver.solverType = exu.LinearSolverType.EigenDense
-    settings.solution.file.write = False
-    settings.solution.solverInformationFileName = ""
-    settings.solution.sensors.writePeriod = T[1]
+    chosen = settings(DURATION_S, step_s, T[1])
     begun = time.perf_counter()
-    mbs.SolveDynamic(settings)
+    mbs.SolveDynamic(chosen)
     wall = time.perf_counter() - begun
     a, b = np.asarray(mbs.GetSensorStoredData(at_root)), np.asarray(mbs.GetSensorStoredData(at_tip))
     angle = np.arctan2(a[:, 4], a[:, 3])
-    return Result(wall, -np.sin(angle) * (b[:, 1] - a[:, 1]) + np.cos(angle) * (b[:, 2] - a[:, 2]))
+    return Result(wall, np.array([-np.sin(angle) * (b[:, 1] - a[:, 1]) + np.cos(angle) * (b[:, 2] - a[:, 2])]))
 
 
-def native(system: fx.System, rtol: float, method: str = "auto") -> Result:
-    """The same 2 s by the native solver."""
-    run = fx.simulate(system, T, fx.Drive.force(FORCE, TORQUE), rtol=rtol, method=method)
-    return Result(run.meta["wall_s"], run["link/2/tip_deflection"])
+def cases() -> list[Case]:
+    """Exudyn, and the native solver with reduced links and with all unknowns of a mesh like Exudyn's."""
+    drive = fx.Drive.force(FORCE, TORQUE)
+    converged = cache(lambda: native(fx.assemble(robot(12)), T, drive, 1e-10).deflections)
+    out = [Case("Exudyn, 5 ANCF elements, tuned", exudyn, lambda: exudyn(16, 1e-4).deflections)]
+    for name, elements, modes, rtol, asked in (
+        ("native, 2 modes", 12, 2, 2e-3, 400.0),
+        ("native, 3 modes, accurate", 12, 3, 1e-4, None),
+        ("native, all unknowns of 5 elements", 5, None, 1e-3, 200.0),
+    ):
+        system = fx.assemble(robot(elements, modes))
+        out.append(Case(name, partial(native, system, T, drive, rtol), converged, asked))
+    return out

@@ -1,68 +1,29 @@
 """How fast the solver is on this machine, and how busy the board: `make bench`, or python -m flexlab.bench [--json].
 
-Ratios of programs measured side by side: every round times each of them once, in turn, so that whatever else the machine does
-hits all alike. Errors are the largest difference of the tip deflection from each program's own converged model, relative to its
-largest value.
+Ratios of programs measured side by side (`sidebyside.py`), each beside what is asked of it. Errors are the largest difference of
+a tip deflection from each program's own converged model, relative to its largest value.
 """
 
 from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable
+from typing import Any
 
-import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-import flexura as fx
+from . import baseline, crowd, scaling, sidebyside, sliders, twolink
 
-from . import baseline, crowd, scaling
-from .baseline import Result
+ROUNDS = 7
+GROWTH = 2.3  # asked: at most, at the large end of links
 
-ROUNDS = 15
-BASE = "Exudyn, 5 ANCF elements, tuned"
-
-Case = tuple[str, Callable[[], Result], np.ndarray]
-
-
-def cases() -> list[Case]:
-    """What is timed: a name, the run, and the converged tip deflection it is compared with."""
-    fine = fx.assemble(baseline.robot(12))
-    converged = baseline.native(fine, 1e-10).tip_deflection
-    exact = baseline.exudyn(16, 1e-4).tip_deflection
-    out: list[Case] = [(BASE, baseline.exudyn, exact)]
-    for name, elements, modes, rtol, method in (
-        ("native, 2 modes", 12, 2, 1e-3, "explicit"),
-        ("native, 3 modes", 12, 3, 1e-3, "explicit"),
-        ("native, 3 modes, accurate", 12, 3, 1e-6, "explicit"),
-        ("native, all unknowns of 5 elements", 5, None, 1.5e-5, "implicit"),
-    ):
-        system = fx.assemble(baseline.robot(elements, modes))
-        out.append((name, lambda s=system, r=rtol, m=method: baseline.native(s, r, m), converged))  # type: ignore[misc]
-    return out
-
-
-def measure(rounds: int = ROUNDS) -> list[dict[str, float | str]]:
-    """One row a case: median wall time [s], error, median ratio to Exudyn, and the ratio's quartiles over the rounds."""
-    todo = cases()
-    for _, run, _ in todo:
-        run()  # compiled, loaded, warm
-    walls = np.array([[run().wall_s for _, run, _ in todo] for _ in range(rounds)])
-    ratios = walls[:, :1] / walls
-    rows: list[dict[str, float | str]] = []
-    for k, (name, run, reference) in enumerate(todo):
-        error = np.abs(run().tip_deflection - reference).max() / np.abs(reference).max()
-        low, middle, high = np.percentile(ratios[:, k], (25, 50, 75))
-        row = {
-            "wall_s": float(np.median(walls[:, k])),
-            "error": float(error),
-            "ratio": middle,
-            "ratio_low": low,
-            "ratio_high": high,
-        }
-        rows.append({"case": name} | row)
-    return rows
+WORKS = {
+    "type IV, 2 s bang-bang": baseline.cases,
+    "RR with two flexible links, 2 s bang-bang": twolink.cases,
+    "RPa, all unknowns, 0.8 s": lambda: sliders.cases("type-2-rpa"),
+    "PbR, all unknowns, 0.8 s": lambda: sliders.cases("type-7-pbr"),
+}
 
 
 def board_rows() -> list[tuple[str, str, float]]:
@@ -99,35 +60,44 @@ def board_rows() -> list[tuple[str, str, float]]:
     ]
 
 
+def against(rows: list[dict[str, Any]], title: str) -> Table:
+    """Ratios with their spread beside what is asked."""
+    table = Table(title=title, title_justify="left")
+    for name in ("", "time", "error", "times as fast", "quartiles", "asked"):
+        table.add_column(name, justify="right" if name else "left", no_wrap=True)
+    for row in rows:
+        took = f"{1e3 * row['wall_s']:.3g} ms" if "wall_s" in row else f"{row['us']:.4g} us"
+        error = f"{row['error']:.1e}" if "error" in row else ""
+        asked = "" if row["asked"] is None else f"{row['asked']:.0f}"
+        quartiles = f"{row['low']:.0f} ... {row['high']:.0f}"
+        table.add_row(row.get("case") or row["what"], took, error, f"{row['ratio']:.0f}", quartiles, asked)
+    return table
+
+
+def growing(rows: list[dict[str, Any]]) -> Table:
+    table = Table(title="one evaluation of the equations of motion", title_justify="left")
+    for name in ("", "number", "time", "times that of half as many", "asked, at most"):
+        table.add_column(name, justify="right" if name else "left")
+    for k, row in enumerate(rows):
+        last = row["what"].startswith("links") and (k + 1 == len(rows) or rows[k + 1]["what"] != row["what"])
+        ratio = "" if row["ratio"] is None else f"{row['ratio']:.2f}"
+        table.add_row(row["what"], str(row["count"]), f"{row['us']:.3g} us", ratio, f"{GROWTH}" if last else "")
+    return table
+
+
 def main() -> None:
-    rows, many, growth, board = measure(), crowd.measure(), scaling.measure(), board_rows()
+    works = {title: sidebyside.measure(cases(), ROUNDS) for title, cases in WORKS.items()}
+    many, growth, board = crowd.measure(), scaling.measure(), board_rows()
     if "--json" in sys.argv[1:]:
         emulated = {name: value for name, _, value in board}
-        print(json.dumps({"solver": rows, "population": many, "growth": growth, "emulated board": emulated}, indent=1))
+        print(json.dumps({"solver": works, "population": many, "growth": growth, "emulated board": emulated}, indent=1))
         return
-    table = Table(title=f"type IV, {baseline.DURATION_S:g} s bang-bang, one core, {ROUNDS} rounds", title_justify="left")
-    for name in ("", "time", "error of the tip deflection", "times as fast", "quartiles"):
-        table.add_column(name, justify="left" if not name else "right", no_wrap=True)
-    for row in rows:
-        quartiles = f"{row['ratio_low']:.0f} ... {row['ratio_high']:.0f}"
-        table.add_row(
-            str(row["case"]), f"{1e3 * float(row['wall_s']):.3g} ms", f"{row['error']:.1e}", f"{row['ratio']:.0f}", quartiles
-        )
-    console = Console(width=110)
-    console.print(table)
-    table = Table(title=f"{crowd.ROBOTS} different type IV robots, the same manoeuvre, 3 modes", title_justify="left")
-    for name in ("", "time a robot", "times as fast as one Exudyn run"):
-        table.add_column(name, justify="right" if name else "left")
-    for part in many:
-        table.add_row(part["what"], f"{part['us']:.4g} us", f"{1e6 * float(rows[0]['wall_s']) / part['us']:.0f}")
-    console.print(table)
-    table = Table(title="one evaluation of the equations of motion", title_justify="left")
-    for name in ("", "number", "time", "times that of half as many"):
-        table.add_column(name, justify="left" if not name else "right")
-    for part in growth:
-        ratio = "" if part["ratio"] is None else f"{part['ratio']:.2f}"
-        table.add_row(part["what"], str(part["count"]), f"{part['us']:.3g} us", ratio)
-    console.print(table)
+    console = Console(width=120)
+    for title, rows in works.items():
+        console.print(against(rows, f"{title}, one core, {ROUNDS} rounds"))
+    title = f"{crowd.ROBOTS} different type IV robots, the same manoeuvre, 2 modes: a robot's share against one Exudyn run"
+    console.print(against(many, title))
+    console.print(growing(growth))
     table = Table("", "emulated board", title="the board under its hardest load, emulated", title_justify="left")
     for name, text, _ in board:
         table.add_row(name, text)

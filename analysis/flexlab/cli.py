@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 from pathlib import Path
 from typing import Annotated, Any
@@ -9,10 +10,12 @@ from typing import Annotated, Any
 import typer
 
 from .compare.command import compare
+from .demo_command import demo
 from .experiment import command as bench
 from .export.command import export
 from .identification.command import identify
 from .terminal import announce_compiling, default_folder, events, interrupted, prepare, progress_bars, say, show, stored
+from .tuning.command import tune
 
 app = typer.Typer(
     name="flexura",
@@ -24,8 +27,10 @@ app = typer.Typer(
 )
 
 app.command()(compare)
+app.command()(demo)
 app.command()(export)
 app.command()(identify)
+app.command()(tune)
 app.add_typer(bench.app)
 
 RobotFile = Annotated[Path, typer.Argument(metavar="ROBOT", help="robot file (TOML), for example model/robots/rig.toml")]
@@ -58,8 +63,8 @@ def simulate(
 
     \b
     Example: flexura simulate model/robots/rig.toml model/manoeuvres/rig-step.toml --controller model/controllers/rig.toml
-    Example: flexura simulate model/robots/rig.toml model/manoeuvres/rig-inverse-law.toml
-    Example: flexura simulate model/robots/rig.toml --vary payload.mass_kg=0:0.1:101 --vary link.2.length_m=0.2:0.3:11
+    And: flexura simulate model/robots/rig.toml model/manoeuvres/rig-inverse-law.toml
+    And: flexura simulate model/robots/rig.toml --vary payload.mass_kg=0:0.1:101 --vary link.2.length_m=0.2:0.3:11
     """
     import flexura as fx
 
@@ -297,55 +302,6 @@ def review(
 
 
 @app.command()
-def demo(
-    out: Annotated[Path, typer.Option("--out", metavar="FOLDER", help="where to leave the results")] = Path("logs/demo"),
-    json: Json = False,
-) -> None:
-    """The dissertation's rig along its inverse law: natively, in Exudyn, and as an experiment on the emulated board.
-
-    \b
-    Example: flexura demo
-    """
-    import shutil
-
-    from . import tables
-    from .compare import output
-    from .demo import demonstrate
-
-    announce_compiling()
-    with progress_bars("native", "twin", "emulated") as report:
-        done = demonstrate(out, report)
-    drawn = done.picture if isinstance(done.picture, Path) else None
-    show(
-        json,
-        lambda: tables.check_table(done.check),
-        lambda: (
-            tables.check_json(done.check)
-            | {"experiment": output.numbers(done.comparison), "review": str(done.review), "picture": drawn and str(drawn)}
-        ),
-    )
-    if not json:
-        show(json, lambda: output.table(done.comparison), dict)
-    lines = [f"stored {out}: the runs, a report, the review" + (f" and its picture {drawn.name}" if drawn else "")]
-    if drawn is None:
-        lines.append(f"no picture: {done.picture}")
-    lines += [
-        "next:",
-        f"  flexura review {done.review}      the review, in a window",
-        f"  open {done.review.parent / 'report.html'}             the report, in a browser",
-        "  flexura bench forward                                    another experiment, emulated",
-        "  flexura crosscheck model/robots/two-link-arm.toml        another robot, in two programs",
-        "  flexura --help                                           everything else",
-    ]
-    if shutil.which("flexura") is None:
-        lines.append("(the command is in .venv/bin; to have it at hand: source .venv/bin/activate)")
-    say(json, *lines)
-    if not done.passed:
-        runs = (done.check.simulation, done.check.twin, done.comparison.experiment)
-        raise typer.Exit(130 if any(map(interrupted, runs)) else 1)
-
-
-@app.command()
 def flash(
     rig: RigFile = None,
     port: Annotated[str | None, typer.Option(metavar="DEVICE", help="serial port; default: the one that is a Mega 2560")] = None,
@@ -396,6 +352,7 @@ def doctor(rig: RigFile = None, json: Json = False) -> None:
 
 def main() -> None:
     """Run the command; bad input ends in one line on stderr and status 2, whatever else goes wrong in status 1."""
+    gc.set_threshold(100_000)  # looking for garbage among a million objects just imported is a tenth of the start
     try:
         app()
     except KeyboardInterrupt:

@@ -7,11 +7,17 @@ from pathlib import Path
 
 import flexura as fx
 from flexura import gains
+from flexura.gains import Gains
 from flexura.signal import constant
 
 
 def controlled(system: fx.System, asked: fx.Manoeuvre, file: Path) -> fx.Controller:
-    """The controller of `file` along the manoeuvre's motions, its gains unused; a joint without a motion is held at its start.
+    """`under` the gains of a file."""
+    return under(system, asked, gains.load(file))
+
+
+def under(system: fx.System, asked: fx.Manoeuvre, settings: Gains) -> fx.Controller:
+    """The controller along the manoeuvre's motions, whose own gains are unused; a joint without a motion is held at its start.
 
     The manoeuvre's forces are fed forward where the controller's output is a force or torque. Raises InputError for a joint that
     the manoeuvre prescribes, and for gains of another number of joints.
@@ -22,7 +28,7 @@ def controlled(system: fx.System, asked: fx.Manoeuvre, file: Path) -> fx.Control
             expected = "expected no prescribed joint under a controller"
             raise fx.InputError(expected, key=f"joint[{i}].prescribed", value=True)
         motions.append(joint.motion or constant(float(start)))
-    made = gains.load(file).controller(motions)
+    made = settings.controller(motions)
     pids = []
     for joint, pid in zip(asked.drive.joints, made.joints, strict=True):
         assert isinstance(pid, fx.PID)

@@ -26,12 +26,14 @@ def modest(system: fx.System, duration_s: float = DURATION_S) -> Manoeuvre:
     if system.robot.nodal:  # its mass matrix is that of no single q
         system = fx.assemble(system.robot.replace({"sliding": "continuous"}))
     robot, rows = system.robot, system.joint_rows
-    inertia = np.diag(system.mass(system.start()))[rows] * ~system.chain.locked.astype(bool)
-    zero = np.zeros(system.n)
+    start, zero, unit = system.start(), np.zeros(system.n), np.eye(system.n)
+    weight = system.forces(start, zero, zero)
+    inertia = np.array([(system.forces(start, zero, unit[row]) - weight)[row] for row in rows])
+    inertia[system.chain.locked.astype(bool)] = 0.0
     hold = system.forces(fx.static(system), zero, zero)[rows]
     reach = _reach(system)
-    unit = inertia * 4 * reach / duration_s**2  # a rigid joint alone goes as far as its reach
-    asked = lambda scale: _manoeuvre(hold, scale * unit, duration_s)
+    whole = inertia * 4 * reach / duration_s**2  # a rigid joint alone goes as far as its reach
+    asked = lambda scale: _manoeuvre(hold, scale * whole, duration_s)
     run = lambda scale: fx.simulate(system, np.linspace(0, 2 * duration_s, 401), asked(scale).drive, rtol=1e-5)
     still = run(0.0) if np.any(robot.gravity_m_s2) else None
 

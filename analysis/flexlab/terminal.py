@@ -28,10 +28,11 @@ def prepare(robot: Path, manoeuvre: Path | None) -> Any:
     return system, asked or modest(system)
 
 
-def announce_compiling() -> None:
+def announce_compiling(function: str = "") -> None:
+    """A word before the solver, or one compiled function of it, is compiled."""
     from flexura.compiled import folder
 
-    if not any(folder().glob("**/*.nbc")):
+    if not any(folder().rglob(f"*{function}*.nbc")):
         typer.echo("compiling the solver: once, one to two minutes", err=True)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.linalg import eigh
 
 from . import exponential, loop
 from .chain import SLIDER
@@ -13,15 +14,35 @@ from .system import System
 _STABLE = {loop.EXPLICIT: 5.3, loop.PAIR_3: 1.55, loop.PAIR_5: 1.0, loop.IMPLICIT: np.inf, exponential.EXPONENTIAL: np.inf}
 
 
-def quickest(system: System, duration: float, rtol: float) -> int:
+def quickest(system: System, duration: float, rtol: float, gains: np.ndarray) -> int:
     """Exponential steps wherever the robot's modes stay much the same from step to step, which under a slider that moves along a
-    flexible link they do not, and where their order does not fall behind the explicit method's; else as `choose`."""
+    flexible link they do not, where their order does not fall behind the explicit method's, and where no strong damper couples
+    the modes; else as `choose`. `gains` (N, 2): of position and rate in the drives."""
     c = system.chain
     bends = np.diff(c.first) > 1
     rides = (c.kind[1:] == SLIDER) & bends[:-1] & (c.locked[1:] == 0)
+    others = choose(system, duration, rtol)
     if rides.any() or not bends.any() or rtol < 1e-9:
-        return choose(system, duration, rtol)
+        return others
+    # coupling by damping is integrated like a force; extrapolating it is stable for about rate h < 1/35
+    if 35 * _coupled(system, gains) > _implicit(system, rtol):
+        return others
     return exponential.EXPONENTIAL
+
+
+def _coupled(system: System, gains: np.ndarray) -> float:
+    """The rate [1/s] at which dampers couple the modes at the start: the norm of what Phi^T D Phi has off its diagonal."""
+    damping = [link.damping for link in system.robot.links if link.flexible]
+    alike = all(d.alpha_1_s == 0.0 and d.beta_s == damping[0].beta_s for d in damping)
+    if alike and not gains.any() and not system.chain.viscous.any():
+        return 0.0
+    K, D, rows = system.stiffness(), system.damping.copy(), system.joint_rows
+    K[rows, rows] += gains[:, 0]
+    D[rows, rows] += gains[:, 1]
+    free = np.ix_(system.free_rows, system.free_rows)
+    _, phi = eigh(K[free], system.mass(system.start())[free])
+    modal = phi.T @ D[free] @ phi
+    return float(np.linalg.norm(modal - np.diag(np.diag(modal)), 2))
 
 
 def longest_step(system: System, method: int = loop.EXPLICIT) -> float:
@@ -50,8 +71,14 @@ def choose(system: System, duration: float, rtol: float, rate_Hz: float = 0.0) -
     slow = elastic[min(2, len(elastic) - 1)]
     # the factors are counts of passes per radian, measured on the rig and on its undamped benchmark
     explicit = duration * max(2.4 * spectrum[-1], 2 * _damped(system), 0.8 * slow * rtol ** (-1 / 8))
-    implicit = duration * 0.2 * slow * rtol ** (-1 / 4)
+    implicit = duration * _implicit(system, rtol)
     return loop.EXPLICIT if explicit <= implicit else loop.IMPLICIT
+
+
+def _implicit(system: System, rtol: float) -> float:
+    """Implicit passes a second."""
+    elastic = system.spectrum[system.spectrum > 1e-3 * max(system.spectrum[-1], 1e-300)]
+    return float(0.2 * elastic[min(2, len(elastic) - 1)] * rtol ** (-1 / 4))
 
 
 def _damped(system: System) -> float:

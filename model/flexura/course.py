@@ -16,6 +16,7 @@ from .control import Controller, replay
 from .drive import Drive
 from .errors import FlexuraError
 from .law import none
+from .past import past
 from .record import limit_event
 from .system import System
 
@@ -31,7 +32,7 @@ def which(system: System, t: np.ndarray, drive: Any, rtol: float, method: str) -
     if method != "auto" and (method != "exponential" or isinstance(drive, Drive)):
         return METHODS[method]
     if isinstance(drive, Drive):
-        return quickest(system, t[-1] - t[0], rtol)
+        return quickest(system, t[-1] - t[0], rtol, drive.packed()[2])
     return choose(system, t[-1] - t[0], rtol, drive.rate_Hz if isinstance(drive, Controller) else 0.0)
 
 
@@ -47,7 +48,7 @@ class Course:
         s[loop.LONGEST], s[loop.H] = longest, min(0.02 * longest, (t[-1] - t[0]) * 1e-4)
         self._t, self._method = t, method
         self._robot = system.chain, following(system, drive), self.inputs, self.m
-        self._modes = (basis(system.n), exponential.past(system.n)) if method == exponential.EXPONENTIAL else None
+        self._modes = (basis(system.n), past(system.n)) if method == exponential.EXPONENTIAL else None
 
     def advance(self, rtol: float, steps: int) -> int:
         """At most so many steps further; the status, `loop.RUNNING` where it may go on."""

@@ -1,17 +1,15 @@
 """Exponential steps: the linear part of a robot's motion solved exactly, what is left of it summed up as in Adams' method.
 
-In the modes of `basis.Basis`, y = phi eta, the equations of motion are eta'' + d2 eta' + w2 eta = N, where N = rows a + w2 eta +
-d2 eta' takes the accelerations a from a pass of `kernel.passes`: exact, whatever the basis. N varies with the motion and not with
-the vibration. A polynomial through its last values (at most ORDER of them) is put into the variation-of-constants formula
-(`propagator.py`), the equations are looked at once where that leads, and the polynomial through the new value too makes the step:
-a variable-step Adams method (predict, evaluate, correct) for an oscillating system, of order ORDER + 1, at one evaluation a step.
-Steps need not resolve any frequency of the robot. Hochbruck and Ostermann, Acta Numerica 19 (2010), 2.5 (exponential multistep
-methods); the error is estimated as Shampine and Gordon do, by leaving out the oldest value.
+In the modes of `basis.Basis`, y = y0 + phi eta, the equations of motion are eta'' + d2 eta' + w2 eta = N, where N = rows a +
+w2 eta + d2 eta' takes the accelerations a from a pass of `kernel.passes`: exact, whatever the basis. N varies with the motion
+and not with the vibration. A polynomial through its last values (at most ORDER of them) is put into the variation-of-constants
+formula (`propagator.py`), the equations are looked at once where that leads, and the polynomial through the new value too makes
+the step: a variable-step Adams method (predict, evaluate, correct) for an oscillating system, of order ORDER + 1, at one
+evaluation a step. Steps need not resolve any frequency of the robot. Hochbruck and Ostermann, Acta Numerica 19 (2010), 2.5
+(exponential multistep methods); the error is estimated as Shampine and Gordon do, by leaving out the oldest value.
 """
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 import numpy as np
 
@@ -43,55 +41,11 @@ from .loop import (
     _weights,
     drive,
 )  # fmt: skip
+from .past import COUNT, HEAD, ORDER, ROWS, SPAN, STEADY, Past, tables
 from .propagator import free, moments
 
 EXPONENTIAL = 4  # beside the methods of `loop`
-ORDER = 5
-STIFF_ORDER = 2  # of modes that turn by more than STIFF rad a step: extrapolation would blow up what the basis leaves of them
-STIFF = 3.0
-TIGHT = 10.0
-ROWS = ORDER + 1  # of the rings: the new value has a row of its own until the step is accepted
-COUNT, SPAN, STEADY, HEAD = range(4)  # entries of Past.s: values held, step of the tables, steps since it changed, newest row
-
-
-class Past(NamedTuple):
-    """What a multistep run remembers for n unknowns, and the tables of the present step. Row HEAD of the rings is the newest."""
-
-    s: np.ndarray  # (4,)
-    eta: np.ndarray  # (n,)
-    etad: np.ndarray
-    t: np.ndarray  # (ROWS,) a ring, and so below: times
-    a: np.ndarray  # (ROWS, n) accelerations where the equations were looked at,
-    y: np.ndarray  # and there the state
-    v: np.ndarray
-    N: np.ndarray
-    power: np.ndarray  # (ROWS, 2) power of the drives, and lost
-    step: np.ndarray  # (4, n) free motion
-    A: np.ndarray  # (ORDER + 1, n) moments
-    B: np.ndarray
-    ahead: np.ndarray  # (2, ORDER, n) weights of the old values in eta, eta' predicted; rows by age
-    late: np.ndarray  # (4, n) weights of new less extrapolated N: correction of eta, eta'; error of both
-    poly: np.ndarray  # (2, ORDER + 2, ORDER + 1) by age, coefficients of Lagrange's polynomials; of the new one; of the error's
-    end: np.ndarray  # (2, ORDER + 1) the values of the old ones at the end of the step
-    low: np.ndarray  # (n,) int: 1 for modes of low order
-    area: np.ndarray  # (ORDER + 1,) integrals of the polynomials over the step
-    node: np.ndarray  # (ORDER,) the values' times by age, in steps from the newest
-    gap: np.ndarray  # (n,) new less extrapolated N
-    new: np.ndarray  # (4, n) eta, eta' predicted; eta, eta' corrected
-    size: np.ndarray  # (2, n) error weights of eta, eta'
-    f: np.ndarray  # (ORDER + 1, n) N as a polynomial inside the step
-    column: np.ndarray  # (2, ORDER + 1)
-    work: np.ndarray  # (2, n)
-    tables: np.ndarray  # (2, 40)
-
-
-def past(n: int) -> Past:
-    z, k, r = np.zeros, ORDER, ROWS
-    return Past(
-        z(4), z(n), z(n), z(r), z((r, n)), z((r, n)), z((r, n)), z((r, n)), z((r, 2)), z((4, n)), z((k + 1, n)), z((k + 1, n)),
-        z((2, k, n)), z((4, n)), z((2, k + 2, k + 1)), z((2, k + 1)), np.zeros(n, np.int64), z(k + 1), z(k), z(n), z((4, n)),
-        z((2, n)), z((k + 1, n)), z((2, k + 1)), z((2, n)), z((2, 40)),
-    )  # fmt: skip
+TIGHT = 20.0  # what the local error is kept below rtol by: few long steps add up what many short ones average out
 
 
 @inlined
@@ -104,6 +58,14 @@ def _multiply(A: np.ndarray, x: np.ndarray, out: np.ndarray) -> None:
 
 
 @inlined
+def _place(b: Basis, p: Past, eta: np.ndarray, y: np.ndarray) -> None:
+    """y = y0 + phi eta."""
+    _multiply(b.phi, eta, y)
+    for k in range(y.shape[0]):
+        y[k] += p.origin[k]
+
+
+@inlined
 def _force(b: Basis, p: Past, row: int) -> None:
     """N of a row of the rings from its accelerations and state."""
     n = b.w2.shape[0]
@@ -111,14 +73,14 @@ def _force(b: Basis, p: Past, row: int) -> None:
         total, eta, etad = 0.0, 0.0, 0.0
         for k in range(n):
             total += b.rows[i, k] * p.a[row, k]
-            eta += b.rows[i, k] * p.y[row, k]
+            eta += b.rows[i, k] * (p.y[row, k] - p.origin[k])
             etad += b.rows[i, k] * p.v[row, k]
         p.N[row, i] = total + b.w2[i] * eta + b.d2[i] * etad
 
 
 @compiled
 def _sizes(phi: np.ndarray, scale: np.ndarray, size: np.ndarray) -> None:
-    """Error weights of the modes from those of the unknowns. TIGHT: few long steps add up what many short ones average out."""
+    """Error weights of the modes from those of the unknowns."""
     n = phi.shape[0]
     for i in range(n):
         y, v = 0.0, 0.0
@@ -128,80 +90,6 @@ def _sizes(phi: np.ndarray, scale: np.ndarray, size: np.ndarray) -> None:
             y += own * own
             v += rate * rate
         size[0, i], size[1, i] = TIGHT * np.sqrt(y), TIGHT * np.sqrt(v)
-
-
-@compiled
-def _tables(b: Basis, p: Past, h: float, k: int) -> None:
-    """Weights of a step of h from the last k values of N."""
-    n = b.w2.shape[0]
-    head = int(p.s[HEAD])
-    if h != p.s[SPAN]:
-        A, B = p.column[0], p.column[1]
-        for i in range(n):
-            g, dg = free(b.w2[i], b.d2[i], h)
-            p.step[0, i], p.step[1, i], p.step[2, i], p.step[3, i] = dg + b.d2[i] * g, g, -b.w2[i] * g, dg
-            moments(b.w2[i], b.d2[i], h, g, dg, A, B, p.tables)
-            for m in range(ORDER + 1):
-                p.A[m, i], p.B[m, i] = A[m], B[m]
-            p.low[i] = 1 if b.w2[i] * h * h > STIFF * STIFF else 0
-        p.s[SPAN], p.s[STEADY] = h, 0.0
-    for j in range(k):
-        p.node[j] = (p.t[(head + j) % ROWS] - p.t[head]) / h
-    short = min(k, STIFF_ORDER)
-    _polynomials(p, 0, k)
-    _polynomials(p, 1, short)
-    for j in range(k + 2):
-        for i in range(n):
-            low, y, v = p.low[i], 0.0, 0.0
-            for m in range(k + 1):
-                y += p.poly[low, j, m] * p.A[m, i]
-                v += p.poly[low, j, m] * p.B[m, i]
-            if j < k:
-                p.ahead[0, j, i], p.ahead[1, j, i] = y, v
-            else:
-                p.late[2 * (j - k), i], p.late[2 * (j - k) + 1, i] = y, v
-    for j in range(k + 1):
-        p.area[j] = 0.0
-        for m in range(k + 1):
-            p.area[j] += p.poly[0, j, m] / (m + 1)
-
-
-@inlined
-def _polynomials(p: Past, low: int, used: int) -> None:
-    """Polynomials through the last `used` values: Lagrange's, the one for the gap and the one for the error."""
-    k = int(p.s[COUNT])
-    for j in range(k + 2):
-        c = p.poly[low, j]
-        for m in range(ORDER + 1):
-            c[m] = 0.0
-        if used <= j < k:
-            continue
-        c[0] = 1.0
-        degree = 0
-        for i in range(used if j != k + 1 else used - 1):
-            if i != j:
-                degree = _times(c, degree, p.node[i])
-        if j == k + 1:
-            degree = _times(c, degree, 1.0)
-        below = 1.0
-        for i in range(used):
-            if i != j:
-                below *= (p.node[j] if j < used else 1.0) - p.node[i]
-        for m in range(degree + 1):
-            c[m] /= below
-    for j in range(k):
-        p.end[low, j] = 0.0
-        for m in range(k):
-            p.end[low, j] += p.poly[low, j, m]
-
-
-@inlined
-def _times(c: np.ndarray, degree: int, root: float) -> int:
-    """c(s) <- (s - root) c(s)."""
-    for m in range(degree + 1, 0, -1):
-        c[m] = c[m - 1] - root * c[m]
-    c[0] *= -root
-    return degree + 1
 
 
 @inlined
@@ -225,7 +113,7 @@ def _predict(b: Basis, m: Memory, p: Past, h: float) -> None:
     the extrapolated N in p.gap, and minus the powers in m.K[1]."""
     n, k, head = b.w2.shape[0], int(p.s[COUNT]), int(p.s[HEAD])
     if h != p.s[SPAN] or p.s[STEADY] <= ORDER:
-        _tables(b, p, h, k)
+        tables(b, p, h, k)
     eta, etad, gap = p.new[0], p.new[1], p.gap
     for i in range(n):
         eta[i] = p.step[0, i] * p.eta[i] + p.step[1, i] * p.etad[i]
@@ -242,7 +130,7 @@ def _predict(b: Basis, m: Memory, p: Past, h: float) -> None:
         loss += p.area[j] * p.power[row, 1]
         work_gap -= end * p.power[row, 0]
         loss_gap -= end * p.power[row, 1]
-    _multiply(b.phi, eta, m.znew[:n])
+    _place(b, p, eta, m.znew[:n])
     _multiply(b.phi, etad, m.znew[n : 2 * n])
     m.znew[2 * n], m.znew[2 * n + 1] = m.z[2 * n] + h * work, m.z[2 * n + 1] + h * loss
     m.K[1, 0], m.K[1, 1] = work_gap, loss_gap
@@ -264,7 +152,7 @@ def _correct(b: Basis, m: Memory, p: Past, h: float, new: int) -> float:
         p.new[3, i] = etad + p.late[1, i] * gap[i]
         e0, e1 = p.late[2, i] * gap[i] * p.size[0, i], p.late[3, i] * gap[i] * p.size[1, i]
         error += e0 * e0 + e1 * e1
-    _multiply(b.phi, p.new[2], m.znew[:n])
+    _place(b, p, p.new[2], m.znew[:n])
     _multiply(b.phi, p.new[3], m.znew[n : 2 * n])
     m.znew[2 * n] += h * p.area[k] * (p.power[new, 0] + m.K[1, 0])
     m.znew[2 * n + 1] += h * p.area[k] * (p.power[new, 1] + m.K[1, 1])
@@ -314,7 +202,7 @@ def _inside(m: Memory, b: Basis, p: Past, h: float, x: float, out: np.ndarray) -
                 v += p.column[1, q] * power * p.f[q, i]
                 power *= x
             eta[i], etad[i] = y, v
-    _multiply(b.phi, eta[:n], out[:n])
+    _place(b, p, eta[:n], out[:n])
     _multiply(b.phi, etad[:n], out[n : 2 * n])
     head, new = int(p.s[HEAD]), (int(p.s[HEAD]) + ROWS - 1) % ROWS
     for r in range(2):
@@ -346,9 +234,10 @@ def _stop_at_limit(
 def _settle(b: Basis, m: Memory, p: Past) -> None:
     """Put the state and the past into the basis as it is now."""
     n = m.a.shape[0]
+    for k in range(n):
+        p.origin[k], p.eta[k] = m.z[k], 0.0
     for j in range(int(p.s[COUNT])):
         _force(b, p, (int(p.s[HEAD]) + j) % ROWS)
-    _multiply(b.rows, m.z[:n], p.eta)
     _multiply(b.rows, m.z[n : 2 * n], p.etad)
     p.s[SPAN] = 0.0
     _sizes(b.phi, m.scale, p.size)

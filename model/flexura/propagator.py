@@ -9,8 +9,8 @@ for f = sum_m f_m (t/h)^m. By parts, B_m = m A_(m-1) / h (m > 0), B_0 = g, and
 
     w2 h^2 a_m + d2 h m a_(m-1) + m (m - 1) a_(m-2) = 1,        a_m = A_m / h^2, m > 1,
 
-a recurrence that is run upwards where w2 h^2 is large, downwards where everything is small, and else solved as the boundary
-value problem that it is (Olver).
+a recurrence that is run upwards where w2 h^2 is large, downwards where everything is small, and where damping is strong solved as
+the boundary value problem that it is (Olver; without pivoting, which an overdamped mode does not need).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 
 from .compiled import compiled
 
-_FROM = 26  # where the downward recurrence begins: what is left of its guess is below round-off
+_FROM = 40  # where the downward recurrence begins: what is left of its guess is below round-off
 
 
 @compiled
@@ -50,18 +50,18 @@ def moments(w2: float, d2: float, h: float, g: float, dg: float, A: np.ndarray, 
     count = A.shape[0]
     x2, dd = w2 * h * h, d2 * h
     a = work[0]
-    if x2 < 8.9 and dd < 3.0:
+    if x2 >= 9.0 and dd < 0.6 * x2:
+        a[0] = (1.0 - dg - d2 * g) / x2
+        a[1] = (1.0 - g / h - dd * a[0]) / x2
+        for m in range(2, count):
+            a[m] = (1.0 - dd * m * a[m - 1] - m * (m - 1) * a[m - 2]) / x2
+    elif dd < 3.0 or dd * dd < 4.2 * x2:
         above, here = 1.0 / (_FROM * _FROM), 1.0 / ((_FROM - 1) * (_FROM - 1))
         for m in range(_FROM, 1, -1):
             below = (1.0 - x2 * above - dd * m * here) / (m * (m - 1))
             above, here = here, below
             if m - 2 < count:
                 a[m - 2] = below
-    elif x2 >= 8.9 and dd < 0.6 * x2:
-        a[0] = (1.0 - dg - d2 * g) / x2
-        a[1] = (1.0 - g / h - dd * a[0]) / x2
-        for m in range(2, count):
-            a[m] = (1.0 - dd * m * a[m - 1] - m * (m - 1) * a[m - 2]) / x2
     else:  # b_m = B_m / h: x2 b_(m+1) / (m + 1) + dd b_m + m b_(m-1) = 1, from b_0 = g / h to nearly 1 / (dd + m)
         size = 36
         low = work[1]

@@ -42,7 +42,8 @@ def static(
     pick = np.ix_(rows, rows)
 
     def residual(z: np.ndarray) -> np.ndarray:
-        return K @ z + system.residual(z, zero) - extended.tip_jacobian(system.chain, system._work(), z).T @ load
+        inner = K @ z + system.residual(z, zero)
+        return inner - extended.tip_jacobian(system.chain, system._work(), z).T @ load if load.any() else inner
 
     y = system.to_solver @ q
     scale = np.sqrt(np.diag(system.transform.T @ system.stiffness() @ system.transform)[rows])

@@ -7,9 +7,11 @@ import numpy as np
 from . import signal
 from .assembly import assemble
 from .batch import Batch
+from .control import PID, Controller
 from .drive import Drive
 from .forward import simulate
 from .robot import Robot
+from .trials import OF_STRIP, PER_JOINT, run_rows, trial
 
 
 def main() -> None:
@@ -17,9 +19,12 @@ def main() -> None:
     system = assemble(Robot.from_dict({"link": [link, link]}))
     zero = np.zeros(system.n)
     system.bias(zero, zero)
-    for method in ("explicit", "implicit"):
+    for method in ("explicit", "exponential"):
         simulate(system, [0.0, 1e-3], Drive.force(signal.step(0.1), None), method=method)
     simulate(Batch.of([system.robot]), [0.0, 1e-3])
+    controller = Controller((PID(signal.step(0.1)), PID(signal.step(0.1))))
+    one = trial(system, controller, 0.01, 1e-3, 1e-4)
+    run_rows(one, one.inputs.law.gains[None].copy(), np.zeros((1, PER_JOINT * 2 + OF_STRIP)), np.zeros(1))
 
 
 if __name__ == "__main__":

@@ -96,21 +96,22 @@ def step(
     rig: RigFile = None,
     step_1_m: Annotated[float, typer.Option(help="height of joint 1's step")] = 0.005,
     step_2_rad: Annotated[float, typer.Option(help="height of joint 2's step")] = 0.1,
-    duration_s: Annotated[float, typer.Option(help="of both steps together, half for each")] = 4.0,
+    duration_s: Annotated[float, typer.Option(help="of both steps together")] = 4.0,
+    apart_s: Annotated[float | None, typer.Option(help="joint 2's step after joint 1's; default: half the duration")] = None,
     gains: Gains = None,
     port: Port = None, emulated: Emulated = False, seed: Seed = 0, out: Out = None, yes: Yes = False,
     countdown_s: Countdown = None, calibration: Calibrated = None, configure: Configure = False, live: Live = False,
     live_port: LivePort = 9876,
     firmware: Firmware = None, json: Json = False,
 ) -> None:  # fmt: skip
-    """A step of each joint's set-point, one after the other.
+    """A step of each joint's set-point.
 
     \b
     Example: flexura bench step --gains gains.toml --step-1-m 0.004
     """
     from . import plan
 
-    ask = lambda bench, settings: plan.step(bench, settings, step_1_m, step_2_rad, duration_s)
+    ask = lambda bench, settings: plan.step(bench, settings, step_1_m, step_2_rad, duration_s, apart_s)
     _run(rig, ask, **_picked(locals()))
 
 

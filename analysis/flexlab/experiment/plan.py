@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 import flexura as fx
+from flexura import gains as model_gains
 from flexura import signal
 from flexura.errors import InputError
 from flexura.files import read_toml
@@ -29,6 +30,8 @@ ALWAYS = ("motor current", "supply", "flex sensor at rest")  # checks of the ben
 GAINS = tuple(name for name in CONFIG if name[:2] in ("kp", "ki", "kd", "kf", "kg", "kv", "kc")) + (
     "derivative_Hz", "deflection_Hz", "setpoint_1_Hz", "setpoint_2_Hz", "feedback_2",
 )  # fmt: skip
+# The law of a gains file that says nothing, as `flexura.Controller` has it.
+LAW = dict.fromkeys(GAINS, 0.0) | {"derivative_Hz": 50.0, "deflection_Hz": 50.0}
 
 
 @dataclass(frozen=True)
@@ -50,10 +53,15 @@ class Plan:
 
 
 def gains(path: Path) -> dict[str, float]:
-    """Controller settings by the firmware's names, from a TOML file. Raises InputError, naming file, key and value."""
-    data = read_toml(path)
+    """Controller settings by the firmware's names, from a TOML file. Raises InputError, naming file, key and value.
+
+    A gains file of the model and of `flexura tune`, with a table [controller], is the whole law: what it doesn't name is off.
+    """
+    data, known = read_toml(path), GAINS
+    if "controller" in data:
+        data, known = LAW | model_gains.load(path).board(), model_gains.BOARD
     for name, value in data.items():
-        if name not in GAINS:
+        if name not in known:
             raise InputError(f"expected a setting of the controllers: {', '.join(GAINS)}", key=name, value=value, file=str(path))
         item = CONFIG[name]
         if not signal.finite(value) or not item.least <= value <= item.greatest:
@@ -84,12 +92,17 @@ def inverse(bench: Bench, settings: dict[str, float], manoeuvre: fx.Manoeuvre | 
 
 
 def step(
-    bench: Bench, settings: dict[str, float], step_1_m: float = 0.005, step_2_rad: float = 0.1, duration_s: float = 4.0
-) -> Plan:
-    """A step of each joint's set-point, the carriage's first, joint 2's half the duration later; each within one knot period."""
+    bench: Bench, settings: dict[str, float], step_1_m: float = 0.005, step_2_rad: float = 0.1, duration_s: float = 4.0,
+    apart_s: float | None = None,
+) -> Plan:  # fmt: skip
+    """A step of each joint's set-point, the carriage's first, joint 2's `apart_s` (half the duration) later; each within one knot
+    period."""
     if not duration_s > 0.8:
         raise InputError("expected more than 0.8 s", key="--duration_s", value=duration_s)
-    first, second = 0.2, 0.2 + duration_s / 2
+    apart_s = duration_s / 2 if apart_s is None else apart_s
+    if not 0 <= apart_s < duration_s - 0.4:
+        raise InputError("expected 0 or more, and 0.4 s less than the duration", key="--apart-s", value=apart_s)
+    first, second = 0.2, 0.2 + apart_s
     motions = signal.step(step_1_m, first), signal.step(step_2_rad, second)
     settings = settings | {  # a step is an error of its whole height, and no fault
         "following_max_1_m": max(settings["following_max_1_m"], 1.5 * abs(step_1_m)),

@@ -25,7 +25,7 @@ def identify(
     """Stiffness, damping, payload, friction, play and sensor from an experiment, with intervals; new robot and rig files.
 
     \b
-    Example: flexura identify logs/excite --check logs/inverse --out identified/robot.toml
+    Example: flexura identify logs/excite --check logs/inverse
     """
     import flexura as fx
 

@@ -1,0 +1,165 @@
+"""`flexura tune --dissertation`: both cases of types III and IV tuned, in the layout of tables 3.10 and 3.12, with their figures.
+
+What is demanded of case 2 is compared with what was reached, and with what the drives allow at all: the shortest time in which
+each joint can go its way within its limits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Group
+from rich.table import Table
+
+import flexura as fx
+from flexura.response import ERROR, OVERSHOOT, RESIDUAL, SETTLING, Response, strip_figures
+
+from ..controlled import under
+from ..zeros import transmission
+from .cases import PUBLISHED, STRUCTURES, TABLE
+from .engine import engine
+from .history import History
+from .result import Result, number, numbers, result, save
+from .search import Search, search
+from .task import Task
+
+OVERSHOOT_MOST, SETTLING_PART, ERROR_MOST, RESIDUAL_PART = 0.05, 0.5, 1e-3, 0.1
+
+
+@dataclass(frozen=True)
+class Both:
+    """Both cases of a structure. `residual_m` of each, from the instant at which the later of both has settled."""
+
+    name: str
+    results: tuple[Result, Result]
+    residual_m: tuple[float, float]
+    shortest_s: tuple[float, ...]
+    zeros_1_s: dict[str, float]
+
+    def response(self, case: int) -> Response:
+        return self.results[case - 1].responses[0]
+
+    def verdicts(self) -> list[tuple[str, bool, str]]:
+        """What is demanded of case 2, whether it is reached, and the numbers."""
+        joints, published = self.response(2).joints, np.array(PUBLISHED[self.name, 2])
+        parts = joints[:, SETTLING] / published[:, 1]
+        ratio = self.residual_m[1] / self.residual_m[0]
+        most, error = joints[:, OVERSHOOT].max(), joints[:, ERROR].max()
+        return [
+            ("overshoot at most 5 %", bool(most <= OVERSHOOT_MOST), f"{100 * most:.2g} %"),
+            (
+                "settling at most half the dissertation's", bool((parts <= SETTLING_PART).all()),
+                ", ".join(f"{s:.3g} s of {p:g} s" for s, p in zip(joints[:, SETTLING], published[:, 1], strict=True)),
+            ),
+            ("no state error (0.1 %)", bool(error <= ERROR_MOST), f"{100 * error:.1g} %"),
+            ("residual vibration at most a tenth of case 1", bool(ratio <= RESIDUAL_PART), f"{ratio:.2g} of it"),
+        ]  # fmt: skip
+
+
+def study(
+    names: list[str], how: Search, folder: Path, scheduler: str | None = None, jobs: int | None = None,
+    report: Callable[[History], None] = lambda history: None,
+) -> tuple[list[Both], bool]:  # fmt: skip
+    """Tune both cases of the named structures, each stored in a folder of its own; False: interrupted."""
+    out: list[Both] = []
+    for name in names:
+        structure, found = STRUCTURES[name](), []
+        for case in (1, 2):
+            task, own = structure.task(case), folder / f"type-{name}-case-{case}"
+            history = History.open(own, task.digest(how.identity()))
+            with engine(task, scheduler, jobs) as runs:
+                if not search(task, how, runs, history, report):
+                    return out, False
+            found.append(result(task, how, history, True))
+            save(found[-1], own)
+        out.append(both(name, found[0], found[1]))
+    return out, True
+
+
+def both(name: str, first: Result, second: Result) -> Both:
+    """The two cases side by side, with what limits both."""
+    settled = float(np.nanmax([r.responses[0].joints[:, SETTLING] for r in (first, second)]))
+    left = []
+    for each in (first, second):
+        run, strip = each.runs[0], np.zeros(4)
+        strip_figures(run.t, np.ascontiguousarray(run["link/2/tip_deflection"]), settled, strip)
+        left.append(float(strip[RESIDUAL]))
+    zeros = {row.drive: float(row.unstable.real.min()) for row in _zeros(first.task) if len(row.unstable)}
+    return Both(name, (first, second), (left[0], left[1]), _shortest(first.task), zeros)
+
+
+def _zeros(task: Task) -> list[Any]:
+    """The tip's transmission zeros, across a link that lies in the way of joint 1."""
+    system = fx.assemble(task.robots[0])
+    return [row for row in transmission(fx.linearize(system)) if row.output == "tip/y"]
+
+
+def _shortest(task: Task) -> tuple[float, ...]:
+    """The time that each joint takes to 98 % of its way with its output at its limit, the others locked [s]."""
+    times = []
+    for i in range(len(task.robots[0].links)):
+        data = task.robots[0].to_dict()
+        for k, link in enumerate(data["link"]):
+            link["joint"]["locked"] = k != i
+        system = fx.assemble(fx.Robot.from_dict(data))
+        controller = under(system, task.manoeuvre, task.gains)
+        joints = list(controller.joints)
+        joints[i] = replace(joints[i], kp=1e9, ki=0.0, kd=0.0)  # type: ignore[arg-type]  # at its limit until it is there
+        run = fx.simulate(system, task.manoeuvre.t, replace(controller, joints=tuple(joints)), rtol=1e-5)
+        y = run[f"joint/{i + 1}/position"]
+        there = (y - y[0]) / (run[f"joint/{i + 1}/reference"][-1] - y[0]) >= 0.98
+        times.append(float(run.t[there.argmax()]) if there.any() else float("nan"))
+    return tuple(times)
+
+
+def table(found: list[Both]) -> Group:
+    """Tables 3.10 and 3.12, each figure with the dissertation's in brackets, and the verdicts."""
+    return Group(*(part for each in found for part in _tables(each)))
+
+
+def _tables(each: Both) -> list[Any]:
+    task = each.results[0].task
+    kinds = ["turns" if link.joint.type == "R" else "translates" for link in task.robots[0].links]
+    out = Table(title=f"type {each.name}: this project (the dissertation's {TABLE[each.name]})", title_justify="left")
+    out.add_column("")
+    for i, kind in enumerate(kinds, 1):
+        for head in (f"link {i} ({kind})\ncase 1", "\ncase 2", "\ndeviation"):
+            out.add_column(head, justify="right", no_wrap=True)
+    rows = (("rise time [s]", 1.0), ("settling time [s]", 1.0), ("overshoot [%]", 100.0), ("state error [%]", 100.0))
+    for k, (text, factor) in enumerate(rows):
+        cells = []
+        for i in range(len(kinds)):
+            ours = [factor * each.response(case).joints[i, k] for case in (1, 2)]
+            theirs = [PUBLISHED[each.name, case][i][k] for case in (1, 2)]
+            pairs = [*zip(ours, theirs, strict=True), (abs(ours[0] - ours[1]), abs(theirs[0] - theirs[1]))]
+            cells += [f"{number(a) if a > 5e-4 else '0.000'} ({b:.3g})" for a, b in pairs]
+        out.add_row(text.replace("[", "\\["), *cells)
+    peaks = [1e3 * each.response(case).strip[0] for case in (1, 2)]
+    for text, values in (("largest w [mm]", peaks), ("residual w [mm]", [1e3 * x for x in each.residual_m])):
+        out.add_row(text.replace("[", "\\["), "", "", "", *map(number, values), number(abs(values[0] - values[1])))
+    lines = [f"{'reached' if ok else 'NOT reached'}: {demand} ({words})" for demand, ok, words in each.verdicts()]
+    drives = ", ".join(f"joint {i} {s:.3g} s" for i, s in enumerate(each.shortest_s, 1))
+    lines += [f"a drive at its limit, the other joint locked: {drives} to 98 %"]
+    lines += [f"zeros in the right half plane, drive to tip: {', '.join(f'{n} {z:.3g} 1/s' for n, z in each.zeros_1_s.items())}"]
+    for case, r in enumerate(each.results, 1):
+        lines.append(f"case {case}: J = {r.best[0]:.4g}, {r.history.evaluations} evaluations; {r.task.weights.text()}")
+    lines.append("rise: 10 to 90 %; settling: to within 2 %; state error: mean of the last tenth of the time; residual: half of")
+    lines.append("w's range from the instant at which the later of both cases has settled. The dissertation defines none.")
+    out.caption, out.caption_justify = "\n".join(lines), "left"
+    return [out]
+
+
+def data(found: list[Both]) -> dict[str, Any]:
+    """For JSON."""
+    return {
+        f"type {each.name}": {
+            "cases": [numbers(r) for r in each.results], "residual_m": list(each.residual_m), "shortest_s": list(each.shortest_s),
+            "right_half_plane_zeros_1_s": each.zeros_1_s, "published": [PUBLISHED[each.name, case] for case in (1, 2)],
+            "verdicts": [{"demand": d, "reached": ok, "words": w} for d, ok, w in each.verdicts()],
+        }
+        for each in found
+    }  # fmt: skip

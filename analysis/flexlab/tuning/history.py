@@ -1,0 +1,131 @@
+"""What a search was told, generation by generation: stored after each as a whole, and as a Run."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import flexura as fx
+from flexura.errors import InputError
+from flexura.files import write_bytes
+
+FILE = "state.npz"
+_ARRAYS = ("points", "goals", "figures", "reached")
+
+
+class History:
+    """All points of the unit cube that were tried, their goals and figures; `wall_s` of each generation."""
+
+    def __init__(self, digest: str, path: Path | None = None) -> None:
+        self.digest, self.path = digest, path
+        self.ends: list[int] = []
+        self.wall_s: list[float] = []
+        self._parts: dict[str, list[np.ndarray]] = {name: [] for name in _ARRAYS}
+        self.stored = 0  # generations that were there already
+
+    @staticmethod
+    def open(folder: Path, digest: str) -> History:
+        """The history stored in `folder`, empty where there is none. Raises InputError for one of another search."""
+        history = History(digest, folder / FILE)
+        assert history.path is not None
+        for rest in folder.glob(f".{FILE}.*"):  # of a process that was killed while it wrote
+            rest.unlink(missing_ok=True)
+        if not history.path.exists():
+            return history
+        try:
+            with np.load(history.path) as data:
+                found = {name: data[name] for name in data.files}
+        except (OSError, ValueError, EOFError) as error:
+            raise InputError(f"expected the state of a search ({error})", key="--out", file=str(history.path)) from None
+        if str(found.get("digest")) != digest:
+            expected = "expected an empty folder, or one of this search, of which --generations and --patience alone may change"
+            raise InputError(expected, key="--out", value=str(folder))
+        history.ends, history.wall_s = found["ends"].tolist(), found["wall_s"].tolist()
+        history.stored, begin = len(history.ends), 0
+        for end in history.ends:
+            for name in _ARRAYS:
+                history._parts[name].append(found[name][begin:end])
+            begin = end
+        return history
+
+    def __len__(self) -> int:
+        return len(self.ends)
+
+    def add(self, points: np.ndarray, goals: np.ndarray, figures: np.ndarray, reached: np.ndarray, wall_s: float) -> None:
+        """One generation more, stored."""
+        for name, array in zip(_ARRAYS, (points, goals, figures, reached), strict=True):
+            self._parts[name].append(np.array(array))
+        self.ends.append(len(points) + (self.ends[-1] if self.ends else 0))
+        self.wall_s.append(wall_s)
+        if self.path is not None:
+            sink = io.BytesIO()
+            arrays: dict[str, Any] = {name: self.all(name) for name in _ARRAYS}
+            np.savez(sink, digest=self.digest, ends=self.ends, wall_s=self.wall_s, **arrays)
+            write_bytes(self.path, sink.getvalue())
+
+    def told(self, generation: int, points: np.ndarray) -> np.ndarray:
+        """The goals of a stored generation. Raises InputError where the search asks for other points than were stored."""
+        stored = self._parts["points"][generation]
+        if stored.shape != points.shape or not np.array_equal(stored, points):
+            expected = "expected a search stored by the same version of pymoo: this one takes another way"
+            raise InputError(expected, key="--out", value=f"generation {generation + 1}", file=str(self.path))
+        return self._parts["goals"][generation]
+
+    def all(self, name: str) -> np.ndarray:
+        """points (E, d), goals (E, 1 or 2), figures (E, R, k) or reached (E, R) of all evaluations."""
+        return np.concatenate(self._parts[name])
+
+    @property
+    def evaluations(self) -> int:
+        return self.ends[-1] if self.ends else 0
+
+    @property
+    def best(self) -> int:
+        """Which evaluation is best; of two goals the one nearest to both of the front's ends, each goal over its range."""
+        goals = self.all("goals")
+        if goals.shape[1] == 1:
+            return int(goals[:, 0].argmin())
+        front = self.front()
+        low, high = goals[front].min(axis=0), goals[front].max(axis=0)
+        return int(front[np.linalg.norm((goals[front] - low) / np.maximum(high - low, 1e-300), axis=1).argmin()])
+
+    def front(self) -> np.ndarray:
+        """The evaluations that none other beats in all goals, by their first goal."""
+        goals = self.all("goals")
+        order, kept, least = np.lexsort(goals.T[::-1]), [], np.inf
+        for k in order:
+            if goals[k, -1] < least:
+                kept.append(k)
+                least = goals[k, -1]
+        return np.array(kept)
+
+    def merit(self, generation: int) -> float:
+        """The best J after so many generations; of two goals minus the area between the front and the first median."""
+        goals = self.all("goals")
+        seen = goals[: self.ends[generation - 1]]
+        if goals.shape[1] == 1:
+            return float(seen[:, 0].min())
+        corner = np.median(self._parts["goals"][0], axis=0)
+        inside = seen[(seen < corner).all(axis=1)]
+        order, area, top = inside[np.argsort(inside[:, 0])], 0.0, corner[1]
+        for x, y in order:
+            if y < top:
+                area += (corner[0] - x) * (top - y)
+                top = y
+        return -area
+
+    def run(self, names: list[str], values: np.ndarray, goals: tuple[str, ...], meta: dict[str, Any]) -> fx.Run:
+        """As a Run whose "time" is the number of the generation: the best so far, the generation's median, its settings."""
+        every, count = self.all("goals"), len(self)
+        starts = [0, *self.ends[:-1]]
+        channels, best = {}, np.array([int(every[:end, 0].argmin()) for end in self.ends])
+        for k, goal in enumerate(goals):
+            channels[f"goal/{goal}/best"] = np.array([every[:end, k].min() for end in self.ends])
+            channels[f"goal/{goal}/median"] = np.array([np.median(every[a:b, k]) for a, b in zip(starts, self.ends, strict=True)])
+        channels["evaluations"] = np.array(self.ends, dtype=float)
+        channels |= {f"setting/{name}": values[best, k] for k, name in enumerate(names)}
+        about = {"source": "tuning", "complete": True, "events": [], "t": "generation"} | meta
+        return fx.Run(np.arange(1.0, count + 1), channels, dict.fromkeys(channels, "1"), about)

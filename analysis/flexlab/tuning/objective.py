@@ -1,0 +1,76 @@
+"""What a controller is judged by: one number from the figures of a run, or two for a Pareto front.
+
+    J = sum_i ( itae_i / 1 s^2 + overshoot_weight max(0, overshoot_i - overshoot_free) + effort_weight effort_i )
+        + vibration_weight vibration / (L 1 s^2)
+
+Figures as in `response.py`; L the length of the last flexible link. A run that doesn't come to its end (a joint limit, a bent
+link, chatter) counts FAILED (2 - the fraction of the time it reached), far above any run that does. Of several robots the worst
+counts. Pareto: settling time of the slowest joint [s] against rms of the tip deflection [mm]; a joint that doesn't settle counts
+twice the duration and its error.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexura.errors import InputError
+from flexura.response import EFFORT, ERROR, ITAE, JOINT, OVERSHOOT, RMS, SETTLING, STRIP, VIBRATION
+from flexura.signal import finite
+
+FAILED = 1e3
+HELP = """J = sum over joints of [ int t |r - q| dt / |step| + OVERSHOOT max(0, overshoot - 5 %)
++ EFFORT int (u / limit)^2 dt / T ] + VIBRATION int t |w - w(end)| dt / L
+times in s, w the tip deflection, L the link's length; capitals are the weights"""
+
+
+@dataclass(frozen=True)
+class Weights:
+    """The weights of J's terms, all numbers of 0 or more."""
+
+    vibration: float = 100.0
+    effort: float = 0.01
+    overshoot: float = 1.0
+    overshoot_free: float = 0.05
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not (finite(value) and value >= 0):
+                raise InputError("expected a finite number of 0 or more", key=f"--{name.replace('_', '-')}", value=value)
+
+    def text(self) -> str:
+        """J with its numbers, for results."""
+        terms = ["itae_i / s^2"]
+        terms += [f"{self.overshoot:g} max(0, overshoot_i - {self.overshoot_free:g})"] if self.overshoot else []
+        terms += [f"{self.effort:g} effort_i"] if self.effort else []
+        strip = f" + {self.vibration:g} vibration / (L s^2)" if self.vibration else ""
+        return f"J = sum_i [ {' + '.join(terms)} ]{strip}"
+
+
+def split(figures: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Figures (..., 6 N + 4) as those of the joints (..., N, 6) and of the strip (..., 4)."""
+    shape = figures.shape[:-1]
+    return figures[..., : -len(STRIP)].reshape(*shape, -1, len(JOINT)), figures[..., -len(STRIP) :]
+
+
+def single(figures: np.ndarray, reached: np.ndarray, weights: Weights, length_m: float) -> np.ndarray:
+    """J (B, 1) of figures (B, R, 6 N + 4) of R robots, the worst of them, and the fractions reached (B, R)."""
+    joints, strip = split(figures)
+    J = joints[..., ITAE] + weights.effort * joints[..., EFFORT]
+    J += weights.overshoot * np.maximum(0.0, joints[..., OVERSHOOT] - weights.overshoot_free)
+    total = J.sum(axis=-1) + weights.vibration * np.nan_to_num(strip[..., VIBRATION]) / length_m
+    return _worst(total[..., None], reached)
+
+
+def double(figures: np.ndarray, reached: np.ndarray, duration_s: float) -> np.ndarray:
+    """Settling time [s] and rms of the deflection [mm], (B, 2), the worst of R robots of each."""
+    joints, strip = split(figures)
+    late = duration_s * (2 + joints[..., ERROR])
+    settling = np.where(np.isfinite(joints[..., SETTLING]), joints[..., SETTLING], late).max(axis=-1)
+    return _worst(np.stack([settling, 1e3 * strip[..., RMS]], axis=-1), reached)
+
+
+def _worst(values: np.ndarray, reached: np.ndarray) -> np.ndarray:
+    whole = np.where((reached < 1.0)[..., None] | ~np.isfinite(values), FAILED * (2.0 - reached)[..., None], values)
+    return whole.max(axis=1)

@@ -1,0 +1,191 @@
+"""What a search comes to: the best gains, simulated again to a tighter tolerance, their figures, files, table and drawing."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+
+import flexura as fx
+from flexura.files import write_bytes
+from flexura.gains import Gains
+from flexura.response import Response, of_run
+
+from ..controlled import under
+from . import free as freedom
+from .history import History
+from .objective import HELP
+from .search import Search
+from .task import Task
+
+RTOL = 1e-6
+
+
+@dataclass(frozen=True)
+class Result:
+    """The best gains (of a front: the balanced ones), their runs on every robot of the task, and the history."""
+
+    task: Task
+    how: Search
+    history: History
+    complete: bool
+    gains: Gains
+    runs: tuple[fx.Run, ...]
+    responses: tuple[Response, ...]
+
+    @property
+    def best(self) -> np.ndarray:
+        """Its goals."""
+        return np.asarray(self.history.all("goals")[self.history.best])
+
+    def meta(self) -> dict[str, Any]:
+        """Everything that the outcome depends on, in the result too."""
+        own = {"objective": self.task.weights.text(), "objective_terms": HELP} if not self.task.pareto else {}
+        return own | {"search": vars(self.how), "task": self.task.spec(), "complete": self.complete}
+
+
+def result(task: Task, how: Search, history: History, complete: bool) -> Result:
+    """Simulate the best gains on every robot of the task with its own mesh, to RTOL."""
+    values = task.values(history.all("points")[history.best][None])[0]
+    tuned = task.tuned(values)
+    both = [simulated(fx.assemble(robot), task.manoeuvre, tuned) for robot in task.robots]
+    return Result(task, how, history, complete, tuned, tuple(b[0] for b in both), tuple(b[1] for b in both))
+
+
+def simulated(
+    system: fx.System, asked: fx.Manoeuvre, gains: Gains, settled: float | None = None
+) -> tuple[fx.Run, Response]:  # fmt: skip
+    """A run under gains, and its figures."""
+    controller = under(system, asked, gains)
+    run = fx.simulate(system, asked.t, controller, rtol=RTOL)
+    run.meta["manoeuvre"] = asked.name
+    return run, figures(run, controller, settled)
+
+
+def figures(run: fx.Run, controller: fx.Controller, settled: float | None = None) -> Response:
+    """The figures of a run, simulated or not, under the controller that it had."""
+    references = [np.array([pid.reference(t)[0] for t in run.t]) for pid in controller.joints if isinstance(pid, fx.PID)]
+    return of_run(run, references, [pid.limit for pid in controller.joints if isinstance(pid, fx.PID)], settled)
+
+
+def save(found: Result, folder: Path) -> list[Path]:
+    """gains.toml, best/ (the nominal run), history/ (a Run), tuning.png and .svg; of a front also front/gains-NN.toml."""
+    paths = [folder / "gains.toml", folder / "best", folder / "history"]
+    found.gains.write(paths[0])
+    found.runs[0].save(paths[1])
+    task, history = found.task, found.history
+    values = task.values(history.all("points"))
+    history.run([f.name for f in task.free], values, task.goals, found.meta()).save(paths[2])
+    if task.pareto:
+        for number, k in enumerate(history.front(), 1):
+            task.tuned(values[k]).write(folder / "front" / f"gains-{number:02d}.toml")
+        paths.append(folder / "front")
+    drawing = figure(found)
+    for kind in ("png", "svg"):
+        buffer = io.BytesIO()
+        drawing.savefig(buffer, format=kind, dpi=150)
+        paths.append(folder / f"tuning.{kind}")
+        write_bytes(paths[-1], buffer.getvalue())
+    return paths
+
+
+def table(found: Result) -> Table:
+    """The tuned settings, and the figures on every robot."""
+    history, task = found.history, found.task
+    out = Table(title=f"{task.robots[0].name or 'robot'}: {task.manoeuvre.name}, {found.how.algorithm}", title_justify="left")
+    for name in ("robot", "", "rise [s]", "settling [s]", "overshoot [%]", "error [%]", "peak [mm]", "residual [mm]"):
+        out.add_column(name.replace("[", "\\["), justify="left" if name == "robot" else "right", no_wrap=True)
+    for k, response in enumerate(found.responses):
+        for i, row in enumerate(response.joints):
+            strip = [number(1e3 * x) for x in response.strip[:2]] if i == 0 else ["", ""]
+            name = _robot(found, k) if i == 0 else ""
+            out.add_row(name, str(i + 1), number(row[0]), number(row[1]), number(100 * row[2]), number(100 * row[3]), *strip)
+    goals = ", ".join(f"{n} = {v:.5g}" for n, v in zip(task.goals, found.best, strict=True))
+    done = f"{history.evaluations} evaluations in {len(history)} generations, {sum(history.wall_s):.3g} s; seed {found.how.seed}"
+    lines = [f"{goals}; {done}" + ("" if found.complete else "; interrupted: the same command goes on")]
+    lines += [f"worst of {len(task.robots)} robots"] if len(task.robots) > 1 else []
+    lines += [f"{len(history.front())} gains on the front, these are the balanced ones"] if task.pareto else [task.weights.text()]
+    tuned = freedom.named(task.free, task.values(history.all("points")[history.best][None])[0])
+    lines += [", ".join(f"{name} = {value:.4g}" for name, value in tuned.items())]
+    out.caption, out.caption_justify = "\n".join(lines), "left"
+    return out
+
+
+def number(value: float) -> str:
+    return f"{value:.3g}" if np.isfinite(value) else "never"
+
+
+def _robot(found: Result, k: int) -> str:
+    if k == 0:
+        return "nominal"
+    one, nominal = found.task.robots[k], found.task.robots[0]
+    parts = []
+    if nominal.payload.mass_kg:
+        parts.append(f"payload x {one.payload.mass_kg / nominal.payload.mass_kg:.3g}")
+    for a, b in zip(one.links, nominal.links, strict=True):
+        if a.flexible:
+            parts.append(f"EI x {_stiffness(a) / _stiffness(b):.3g}")
+            break
+    return ", ".join(parts)
+
+
+def _stiffness(link: Any) -> float:
+    data = link.model_dump() if hasattr(link, "model_dump") else vars(link)
+    if data.get("young_modulus_Pa"):
+        return float(data["young_modulus_Pa"])
+    EI = data["bending_stiffness_N_m2"]
+    return float(EI if not isinstance(EI, list | tuple) else EI[0]["value"])
+
+
+def numbers(found: Result) -> dict[str, Any]:
+    """For JSON."""
+    tuned = freedom.named(found.task.free, found.task.values(found.history.all("points")[found.history.best][None])[0])
+    return {
+        "goals": dict(zip(found.task.goals, map(float, found.best), strict=True)), "settings": tuned,
+        "evaluations": found.history.evaluations, "generations": len(found.history), "wall_s": sum(found.history.wall_s),
+        "robots": [{"robot": _robot(found, k)} | r.numbers() for k, r in enumerate(found.responses)],
+        "front": [list(map(float, found.history.all("goals")[k])) for k in found.history.front()] if found.task.pareto else None,
+    } | found.meta()  # fmt: skip
+
+
+def figure(found: Result) -> Any:
+    """The search's progress (or the front), and what the best gains do."""
+    from matplotlib.figure import Figure
+
+    history, run = found.history, found.runs[0]
+    drawing = Figure(figsize=(10, 4.2), layout="constrained")
+    left, right = drawing.subplots(1, 2)
+    goals = history.all("goals")
+    if found.task.pareto:
+        front = history.front()
+        left.plot(goals[:, 0], goals[:, 1], ".", color="0.8", markersize=3, label="all tried")
+        left.plot(goals[front, 0], goals[front, 1], "o-", color="C0", markersize=3, label="front")
+        left.plot(*found.best, "D", color="C3", label="balanced")
+        far = goals[front].max(axis=0)
+        left.set(xlabel="settling time [s]", ylabel="rms of the tip deflection [mm]")
+        left.set(xlim=(0, 1.5 * far[0]), ylim=(0, 2 * far[1]))
+    else:
+        best = [goals[:end, 0].min() for end in history.ends]
+        starts = [0, *history.ends[:-1]]
+        left.plot(history.ends, best, color="C0", label="best so far")
+        middle = [np.median(goals[a:b, 0]) for a, b in zip(starts, history.ends, strict=True)]
+        left.plot(history.ends, middle, color="0.7", label="median of the generation")
+        left.set(xlabel="evaluations", ylabel="J", yscale="log")
+    left.legend(frameon=False)
+    left.grid(alpha=0.3)
+    for i in range(1, len(found.responses[0].joints) + 1):
+        y = run[f"joint/{i}/position"]
+        end = run[f"joint/{i}/reference"][-1]
+        right.plot(run.t, (y - y[0]) / (end - y[0]), label=f"joint {i}, of its way")
+    right.axhspan(0.98, 1.02, color="0.9")
+    right.set(xlabel="time [s]")
+    bent = [name for name in run if name.endswith("tip_deflection")]
+    if bent:
+        right.plot(run.t, 10 * run[bent[-1]], color="C3", linewidth=0.9, label="tip deflection [dm]")
+    right.legend(frameon=False)
+    right.grid(alpha=0.3)
+    return drawing

@@ -1,0 +1,82 @@
+"""A search on a real Dask scheduler: the same bits as here, also when a worker dies on the way."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flexlab.tuning import engine as engines
+from flexlab.tuning.engine import Cluster, Threads
+from flexlab.tuning.history import History
+from flexlab.tuning.search import Search, search
+from flexura.errors import InputError
+from tunings import task
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def start(*arguments: str) -> subprocess.Popen[bytes]:
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(str(ROOT / name) for name in ("model", "analysis"))}
+    quiet = subprocess.DEVNULL
+    return subprocess.Popen([sys.executable, "-m", *arguments], env=environment, stdout=quiet, stderr=quiet)
+
+
+@pytest.fixture
+def cluster(tmp_path):
+    """The address of a scheduler and its two workers of one thread each."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = str(free.getsockname()[1])
+    address = f"tcp://127.0.0.1:{port}"
+    processes = [start("distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard", "--no-show")]
+    worker = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory", str(tmp_path / "dask"))
+    processes += [start("distributed.cli.dask_worker", address, *worker) for _ in range(2)]
+    try:
+        yield address, processes[1:]
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
+
+
+def connected(one, address: str) -> Cluster:
+    until = time.monotonic() + 60
+    while True:
+        try:
+            engine = Cluster(one, address)
+            engine.client.wait_for_workers(2, timeout=60)
+            return engine
+        except InputError:
+            if time.monotonic() > until:
+                raise
+
+
+def test_a_cluster_gives_the_same_bits_and_survives_a_worker(cluster):
+    one, how = task(), Search("ga", population=12, generations=6, seed=4)
+    address, workers = cluster
+    here, there = History(""), History("")
+    with Threads(one, 1) as engine:
+        assert search(one, how, engine, here, lambda h: None)
+
+    def kill(history: History) -> None:
+        if len(history) == 2:
+            workers[0].send_signal(signal.SIGKILL)
+
+    with connected(one, address) as engine:
+        assert search(one, how, engine, there, kill)
+    for name in ("points", "goals", "figures", "reached"):
+        assert np.array_equal(here.all(name), there.all(name), equal_nan=True)
+
+
+def test_no_scheduler_there(monkeypatch):
+    monkeypatch.setattr(engines, "CONNECT_S", 1)
+    with pytest.raises(InputError, match="Dask scheduler"):
+        Cluster(task(), "tcp://127.0.0.1:1")
