@@ -2,7 +2,7 @@
 
     board = EmulatedBoard(elf, rig_plant(load("firmware/rig.toml"), seed=3))
 
-Time runs in steps of h = 0.5 ms. A step takes the mean voltage and the newest pulses of the time since the step before; between
+Time runs in steps of h = 0.25 ms. A step takes the mean voltage and the newest pulses of the time since the step before; between
 its ends shafts move evenly, so that encoder edges come one by one. What the board does thus reaches the mechanics up to h late,
 with exact volt-seconds. A jump of the commanded angle at a step's beginning acts in an implicit step as if in its middle, half a
 step late: the command is led by half of its last change. The same seed gives the same bytes. The figures stand in
