@@ -1,8 +1,8 @@
 """When the stepper got each of its pulses: the firmware's own arithmetic for joint 2, replayed on the knots that were sent.
 
 A report has the pulses' number, every 2 ms. Between two of them a pulse may have come 1 ms sooner or later than a line through
-the numbers says; each such error is a blow of one microstep (0.6 mm at the tip) x 1 ms, and hundreds of them make the strip ring by
-half a millimetre. Where the controller of joint 2 sees nothing but its own pulses and no strip (`feedback_2`, `kf_2_rad_s_m`,
+the numbers says; each such error is a blow of one microstep (0.6 mm at the tip) x 1 ms, and hundreds of them make the strip ring
+by half a millimetre. Where the controller of joint 2 sees nothing but its own pulses and no strip (`feedback_2`, `kf_2_rad_s_m`,
 `kg_2_rad_m` 0), or there is none, the pulses follow from knots and settings alone: cubics and set-point filter (player.cpp), the
 controller in integers (pid.cpp), and its rate's pulses (steps.cpp), bit for bit. The reports' numbers tell whether that holds.
 """
