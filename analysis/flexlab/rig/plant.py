@@ -15,7 +15,8 @@ bristle that gives way by d and then slides (an elastic-plastic spring):
     F_rail = -(F_c / d) (x - z) - c_r x'            z follows x at no more than d
 
 With steps of 0.5 ms its error against steps of 0.025 ms and 8 elements under the same drives, relative to the peak, is: tip
-deflection 0.5 % rms, 0.3 % at most below 100 Hz (the rest is the ripple of the microsteps), carriage and joint 0.04 % rms. With steps of 1 ms it is more than
+deflection 0.5 % rms, 0.3 % at most below 100 Hz (the rest is the ripple of the microsteps),
+carriage and joint 0.04 % rms. With steps of 1 ms it is more than
 twice as large.
 """
 
