@@ -32,7 +32,7 @@ def announce_compiling(function: str = "") -> None:
     """A word before the solver, or one compiled function of it, is compiled."""
     from flexura.compiled import folder
 
-    if not any(folder().rglob(f"*{function}*.nbc")):
+    if not any(folder().rglob(f"*{function}-*.nbc")):
         typer.echo("compiling the solver: once, one to two minutes", err=True)
 
 

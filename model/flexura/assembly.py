@@ -11,6 +11,7 @@ import numpy as np
 from .beam import LinkIntegrals, integrals
 from .chain import REVOLUTE, SLEEVE, SLIDER, Chain, workspace
 from .errors import InputError
+from .extended import mass_matrix
 from .modes import eigh, modal
 from .newton_euler import mass
 from .robot import Link, Robot
@@ -175,6 +176,8 @@ def _masses(chains: Sequence[Chain], y: np.ndarray) -> np.ndarray:
     """Mass matrices (B, n, n) at y (B, n), in the solver's coordinates."""
     B, n = y.shape
     M, work = np.zeros((B, n, n)), workspace(chains[0])
+    if n > 60:  # column by column takes n times a pass, whose cost grows faster than n
+        return np.array([mass_matrix(chain, work, y[b]) for b, chain in enumerate(chains)])
     v, a, gravity, bias = np.zeros(n), np.zeros(n), np.zeros(2), np.zeros(n)
     for b, chain in enumerate(chains):
         mass(chain, work, y[b], v, a, gravity, bias, M[b])

@@ -46,7 +46,7 @@ class Course:
         s, longest = self.m.s, longest_step(system, method)
         s[loop.T], s[loop.OUT], s[loop.ERR] = t[0], 1, 1.0
         s[loop.LONGEST], s[loop.H] = longest, min(0.02 * longest, (t[-1] - t[0]) * 1e-4)
-        self._t, self._method = t, method
+        self._system, self._t, self._method = system, t, method
         self._robot = system.chain, following(system, drive), self.inputs, self.m
         self._modes = (basis(system.n), past(system.n)) if method == exponential.EXPONENTIAL else None
 
@@ -54,9 +54,19 @@ class Course:
         """At most so many steps further; the status, `loop.RUNNING` where it may go on."""
         if self._modes is not None:
             exponential.advance(*self._robot, *self._modes, rtol, self._t, self.out, steps)
+            if self.m.s[loop.STATUS] == loop.STUCK:
+                self._give_way(rtol)
         else:
             loop.advance(*self._robot, self._method, rtol, self._t, self.out, steps)
         return int(self.m.s[loop.STATUS])
+
+    def _give_way(self, rtol: float) -> None:
+        """Go on from here without exponential steps: what their basis leaves out can be too stiff for them."""
+        s = self.m.s
+        self._modes, self._method = None, choose(self._system, self._t[-1] - s[loop.T], rtol)
+        s[loop.LONGEST] = longest_step(self._system, self._method)
+        s[loop.H] = min(0.02 * s[loop.LONGEST], (self._t[-1] - self._t[0]) * 1e-4)
+        s[loop.STATUS], s[loop.FRESH], s[loop.ERR] = loop.RUNNING, 0.0, 1.0
 
 
 def compiled(
