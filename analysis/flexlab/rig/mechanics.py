@@ -20,7 +20,7 @@ import numpy as np
 import flexura as fx
 from flexura.errors import FlexuraError
 
-STEP_S = 2.5e-4
+STEP_S = 5e-4
 ELEMENTS = 3
 AXIAL_RATIO = 1e4  # EA L^2 / EI
 TOLERANCE = 3e-4  # of Newton's residual; at 1e-2 a free vibration no longer decays as it should
