@@ -13,7 +13,7 @@ import numpy as np
 
 from .chain import SLEEVE, SLIDER, Chain, Work
 from .compiled import compiled, inlined
-from .newton_euler import inverse
+from .newton_euler import mass
 
 POOR = 0.25  # Frobenius' norm of Phi^T (M - M0) Phi, and of the change of K against w_i w_j, that is put up with
 TURN_RAD, TRAVEL = 0.3, 0.02  # a configuration this far from the last looked at is looked at: an angle, a share of a length
@@ -29,8 +29,10 @@ class Basis(NamedTuple):
     seen: np.ndarray  # (n,): the configuration looked at last
     M: np.ndarray  # (n, n), and below, workspace
     K: np.ndarray
-    X: np.ndarray
     D: np.ndarray
+    X: np.ndarray
+    A: np.ndarray  # M and
+    B: np.ndarray  # K in the modes
     unit: np.ndarray  # (n,)
     force: np.ndarray
     still: np.ndarray
@@ -41,7 +43,7 @@ def basis(n: int) -> Basis:
     z = np.zeros
     return Basis(
         np.eye(n), z((n, n)), z(n), z(n), np.full(n, np.inf), z((n, n)), z((n, n)), z((n, n)), z((n, n)),
-        z(n), z(n), z(n), z(2),
+        z((n, n)), z((n, n)), z(n), z(n), z(n), z(2),
     )  # fmt: skip
 
 
@@ -71,19 +73,18 @@ def look(c: Chain, w: Work, b: Basis, kp: np.ndarray, kd: np.ndarray, y: np.ndar
     for k in range(n):
         b.seen[k] = y[k]
     _matrices(c, w, b, kp, kd, y)
-    _congruence(b, b.M)
-    _congruence(b, b.K)
-    mass, stiffness = 0.0, 0.0
+    _congruence(b, b.M, b.A)
+    _congruence(b, b.K, b.B)
+    inertia, stiffness = 0.0, 0.0
     for i in range(n):
         for j in range(n):
             same = 1.0 if i == j else 0.0
-            change = b.K[i, j] - same * b.w2[i]
-            mass += (b.M[i, j] - same) ** 2
+            change = b.B[i, j] - same * b.w2[i]
+            inertia += (b.A[i, j] - same) ** 2
             stiffness += change * change / (max(b.w2[i], rate * rate) * max(b.w2[j], rate * rate))
-    if not none and max(mass, stiffness) < POOR * POOR:
+    if not none and max(inertia, stiffness) < POOR * POOR:
         return False
     _again(b)
-    _matrices(c, w, b, kp, kd, y)
     for i in range(n):
         for j in range(n):
             total = 0.0
@@ -105,7 +106,7 @@ def _matrices(c: Chain, w: Work, b: Basis, kp: np.ndarray, kd: np.ndarray, y: np
     n = y.shape[0]
     for k in range(n):
         b.unit[k], b.still[k] = 0.0, 0.0
-    inverse(c, w, y, b.still, b.unit, b.gravity, b.force)
+    mass(c, w, y, b.still, b.unit, b.gravity, b.force, b.X)
     for k in range(n):
         for j in range(n):
             b.K[k, j], b.D[k, j] = 0.0, 0.0
@@ -122,12 +123,6 @@ def _matrices(c: Chain, w: Work, b: Basis, kp: np.ndarray, kd: np.ndarray, y: np
             else:
                 b.K[row, row], b.D[row, row] = c.lam[i, k], c.damp[i, k]
     for k in range(n):
-        b.unit[k] = 1.0
-        inverse(c, w, y, b.still, b.unit, b.gravity, b.X[k])
-        b.unit[k] = 0.0
-        for j in range(n):
-            b.X[k, j] -= b.force[j]
-    for k in range(n):
         for j in range(n):
             b.M[k, j] = 0.5 * (b.X[k, j] + b.X[j, k])
     for i in range(c.kind.shape[0]):
@@ -139,8 +134,8 @@ def _matrices(c: Chain, w: Work, b: Basis, kp: np.ndarray, kd: np.ndarray, y: np
 
 
 @compiled
-def _congruence(b: Basis, A: np.ndarray) -> None:
-    """A <- phi^T A phi."""
+def _congruence(b: Basis, A: np.ndarray, out: np.ndarray) -> None:
+    """phi^T A phi."""
     n = A.shape[0]
     for i in range(n):
         for j in range(n):
@@ -153,14 +148,14 @@ def _congruence(b: Basis, A: np.ndarray) -> None:
             total = 0.0
             for k in range(n):
                 total += b.phi[k, i] * b.X[k, j]
-            A[i, j] = total
+            out[i, j] = total
 
 
 @compiled
 def _again(b: Basis) -> None:
-    """A new basis from the old one, in which M and K are already nearly diagonal: Cholesky's M = l l^T, then Jacobi's rotations
-    of l^-1 K l^-T."""
-    n, M, K, phi = b.w2.shape[0], b.M, b.K, b.phi
+    """A new basis from the old one, in which M and K (A, B) are already nearly diagonal: Cholesky's M = l l^T, then Jacobi's
+    rotations of l^-1 K l^-T."""
+    n, M, K, phi = b.w2.shape[0], b.A, b.B, b.phi
     for i in range(n):
         for j in range(i + 1):
             total = M[i, j]

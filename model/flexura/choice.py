@@ -54,8 +54,7 @@ def longest_step(system: System, method: int = loop.EXPLICIT) -> float:
 def choose(system: System, duration: float, rtol: float, rate_Hz: float = 0.0) -> int:
     """The cheaper method by a count of passes: explicit steps follow the fastest mode, implicit ones the slow modes and the
     tolerance; under a controller of `rate_Hz` every tick is a step at least."""
-    spectrum = system.spectrum
-    elastic = spectrum[spectrum > 1e-3 * max(spectrum[-1], 1e-300)]
+    spectrum, elastic = system.spectrum, _elastic(system)
     if rate_Hz > 0.0:
         slow = elastic[0] if len(elastic) else 1e-3
         steps = {  # passes of a step, and its length by the tolerance along the slowest mode
@@ -75,9 +74,14 @@ def choose(system: System, duration: float, rtol: float, rate_Hz: float = 0.0) -
     return loop.EXPLICIT if explicit <= implicit else loop.IMPLICIT
 
 
+def _elastic(system: System) -> np.ndarray:
+    """The frequencies at which links bend, ascending [rad/s]."""
+    return system.spectrum[system.spectrum > 1e-3 * max(system.spectrum[-1], 1e-300)]
+
+
 def _implicit(system: System, rtol: float) -> float:
     """Implicit passes a second."""
-    elastic = system.spectrum[system.spectrum > 1e-3 * max(system.spectrum[-1], 1e-300)]
+    elastic = _elastic(system)
     return float(0.2 * elastic[min(2, len(elastic) - 1)] * rtol ** (-1 / 4))
 
 
