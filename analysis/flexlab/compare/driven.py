@@ -14,7 +14,6 @@ import dataclasses
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from pydantic import ValidationError
 
 import flexura as fx
 from flexura import signal
@@ -22,7 +21,7 @@ from flexura.errors import InputError
 
 from ..experiment.pulses import from_run
 from ..naming import called
-from ..rig.description import Rig
+from ..rig.description import Rig, recorded
 from ..rig.emulation import Emulated
 from ..rig.motor import JointLine, line, resistance
 from ..rig.stepper import MagneticSpring
@@ -138,12 +137,7 @@ def _rig(experiment: fx.Run) -> tuple[Rig, Emulated]:
     tables = experiment.meta.get("rig")
     if not isinstance(tables, dict):
         raise InputError("missing: the run has no rig file in its metadata, which `commanded` needs", key="rig")
-    try:
-        rig = Rig.model_validate(tables)
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
-        raise InputError(f"expected the rig file's tables ({first['msg']})", key=f"rig.{where}", value=first["input"]) from None
+    rig = recorded(tables)
     if rig.emulated is None:
         raise InputError("missing: `commanded` needs the rotor's inertia and the rig's friction from there", key="rig.emulated")
     return rig, rig.emulated

@@ -18,13 +18,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from pydantic import ValidationError
 from scipy.linalg import eigh
 
 import flexura as fx
 from flexura.errors import InputError
 
-from ..rig.description import Rig
+from ..rig.description import Rig, recorded
 from ..rig.emulation import Emulated
 from ..rig.motor import JointLine, line
 from ..rig.stepper import MagneticSpring
@@ -73,12 +72,7 @@ def described(experiment: fx.Run) -> Described:
     for key, value in (("rig", tables), ("robot", robot)):
         if not isinstance(value, dict):
             raise InputError(f"missing: the run has no {key} file in its metadata", key=key)
-    try:
-        rig = Rig.model_validate(tables)
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
-        raise InputError(f"expected the rig file's tables ({first['msg']})", key=f"rig.{where}", value=first["input"]) from None
+    rig = recorded(tables)
     if rig.emulated is None:
         raise InputError("missing: the rotor's inertia, the rig's friction and play to begin with", key="rig.emulated")
     assert isinstance(robot, dict)

@@ -11,6 +11,7 @@ import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from pydantic import Field, ValidationError, model_validator
 
@@ -158,6 +159,16 @@ class Bench:
         if self.rig.emulated is None:
             raise InputError("missing: the emulated rig is described in a table [emulated]", key="emulated", file=self.file)
         return self.rig.emulated
+
+
+def recorded(tables: Any) -> Rig:
+    """The rig of a run's metadata. Raises InputError."""
+    try:
+        return Rig.model_validate(tables)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        raise InputError(f"expected the rig file's tables ({first['msg']})", key=f"rig.{where}", value=first["input"]) from None
 
 
 def load(path: str | os.PathLike[str]) -> Bench:

@@ -2,7 +2,7 @@
 
     board = EmulatedBoard(elf, rig_plant(load("firmware/rig.toml"), seed=3))
 
-Time runs in steps of h = 0.25 ms. A step takes the mean voltage and the newest pulses of the time since the step before; between
+Time runs in steps of h = 0.5 ms. A step takes the mean voltage and the newest pulses of the time since the step before; between
 its ends shafts move evenly, so that encoder edges come one by one. What the board does thus reaches the mechanics up to h late,
 with exact volt-seconds. A jump of the commanded angle at a step's beginning acts in an implicit step as if in its middle, half a
 step late: the command is led by half of its last change. The same seed gives the same bytes. The figures stand in
@@ -14,9 +14,8 @@ bristle that gives way by d and then slides (an elastic-plastic spring):
     F_nut  = -k (x - s -+ b/2) - c (x' - s')        where x - s is beyond +-b/2, s = lead angle / (2 pi)
     F_rail = -(F_c / d) (x - z) - c_r x'            z follows x at no more than d
 
-With steps of 0.5 ms its error against steps of 0.025 ms and 8 elements under the same drives, relative to the peak, is: tip
-deflection 0.5 % rms, 0.3 % at most below 100 Hz (the rest is the ripple of the microsteps),
-carriage and joint 0.04 % rms. With steps of 1 ms it is more than
+Its error against steps of 0.025 ms and 8 elements under the same drives, relative to the peak: tip deflection 0.5 % rms, 0.3 % at
+most below 100 Hz (the rest is the ripple of the microsteps), carriage and joint 0.04 % rms. With steps of 1 ms it is more than
 twice as large.
 """
 
