@@ -198,22 +198,27 @@ def tuned(one, how, folder=None, engine=None, generations=None):
     return history, done
 
 
+def stopped(one, how, folder, at):
+    """A search that is interrupted in its generation `at`."""
+    calls = []
+    with Threads(one, 1) as runs:
+
+        def interrupted(points):
+            calls.append(len(points))
+            if len(calls) == at:
+                raise KeyboardInterrupt
+            return runs(points)
+
+        assert tuned(one, how, folder, interrupted)[1] is False
+
+
 def test_a_polish_goes_on_from_the_best_and_is_stored_like_the_rest(tmp_path):
     one, how = task(), Search("ga", population=8, generations=4, seed=5, polish=6)
     whole, _ = tuned(one, how)
     assert len(whole) == 10 and whole.merit(10) < whole.merit(4)
     best = whole.all("goals")[: whole.ends[3], 0].argmin()
     assert np.array_equal(whole.all("points")[whole.ends[3]], whole.all("points")[best])
-    calls = []
-    with Threads(one, 1) as runs:
-
-        def interrupted(points):
-            calls.append(len(points))
-            if len(calls) == 8:
-                raise KeyboardInterrupt
-            return runs(points)
-
-        assert tuned(one, how, tmp_path, interrupted)[1] is False
+    stopped(one, how, tmp_path, at=8)
     parts, done = tuned(one, how, tmp_path)
     assert done and parts.stored == 7 and np.array_equal(parts.all("points"), whole.all("points"))
 
@@ -223,16 +228,7 @@ def test_an_interrupted_search_goes_on_to_the_same_end(tmp_path, algorithm):
     one = task(pareto=algorithm == "nsga2")
     how = Search(algorithm, population=8, generations=7, seed=5)
     whole, _ = tuned(one, how)
-    calls = []
-    with Threads(one, 1) as runs:
-
-        def interrupted(points):
-            calls.append(len(points))
-            if len(calls) == 4:
-                raise KeyboardInterrupt
-            return runs(points)
-
-        assert tuned(one, how, tmp_path, interrupted)[1] is False
+    stopped(one, how, tmp_path, at=4)
     parts, done = tuned(one, how, tmp_path)
     assert done and parts.stored == 3 and len(parts) == len(whole) == 7
     for name in ("points", "goals", "figures", "reached"):

@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import signal
-import socket
-import subprocess
-import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,31 +15,7 @@ from flexlab.tuning.search import Search, search
 from flexura.errors import InputError
 from tunings import task
 
-ROOT = Path(__file__).resolve().parents[2]
-
-
-def start(*arguments: str) -> subprocess.Popen[bytes]:
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(str(ROOT / name) for name in ("model", "analysis"))}
-    quiet = subprocess.DEVNULL
-    return subprocess.Popen([sys.executable, "-m", *arguments], env=environment, stdout=quiet, stderr=quiet)
-
-
-@pytest.fixture
-def cluster(tmp_path):
-    """The address of a scheduler and its two workers of one thread each."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = str(free.getsockname()[1])
-    address = f"tcp://127.0.0.1:{port}"
-    processes = [start("distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard", "--no-show")]
-    worker = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory", str(tmp_path / "dask"))
-    processes += [start("distributed.cli.dask_worker", address, *worker) for _ in range(2)]
-    try:
-        yield address, processes[1:]
-    finally:
-        for process in processes:
-            process.kill()
-            process.wait()
+pytest_plugins = ["dask_cluster"]
 
 
 def connected(one, address: str) -> Cluster:

@@ -169,3 +169,19 @@ def test_the_basis_is_made_again_where_the_robot_has_changed():
     assert np.abs(course._modes[0].w2 / np.maximum(first, 1.0) - 1).max() > 0.05
     exact = fx.simulate(sys, t, drive, rtol=1e-9, method="explicit")
     assert largest(fx.simulate(sys, t, drive, rtol=1e-5, method="exponential"), exact) < 1e-4
+
+
+def test_a_run_that_gets_stuck_goes_on_with_another_method():
+    """Handed over in the middle, as where exponential steps give way: the state, the breaks and the outputs go on."""
+    sys, t = CASES["a carriage with a damped strip"], np.linspace(0, 0.6, 61)
+    drive = fx.Drive.force(signal.bang_bang(0.2, 0.4, 0.04), signal.bang_bang(0.02, 0.4, 0.04))
+    course = Course(sys, t, drive, to_state(sys, *initial(sys, 0.0, drive, None, None)), exponential.EXPONENTIAL)
+    assert course.advance(1e-8, 40) == RUNNING
+    course._give_way(1e-8)
+    while course.advance(1e-8, 400) == RUNNING:
+        pass
+    exact = fx.simulate(sys, t, drive, rtol=1e-10, method="explicit")
+    rows = sys.joint_rows
+    for i, row in enumerate(rows, 1):
+        wanted = exact[f"joint/{i}/position"]
+        assert course.out[:, row] == pytest.approx(wanted, abs=1e-5 * np.ptp(wanted))
