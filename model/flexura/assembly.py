@@ -12,6 +12,7 @@ from .beam import LinkIntegrals, integrals
 from .chain import REVOLUTE, SLEEVE, SLIDER, Chain, workspace
 from .errors import InputError
 from .extended import mass_matrix
+from .lanes import padded
 from .modes import eigh, modal
 from .newton_euler import mass
 from .robot import Link, Robot
@@ -106,6 +107,12 @@ def _chains(
         "gravity": np.array([robot.gravity_m_s2 for robot in robots], dtype=float),
     }  # fmt: skip
     fields |= {name: _padded([getattr(info, name) for info in infos]) for name in _PER_LINK}
+    for name in ("slope_dx", "slope_EI", "slope_d1", "slope_d2"):  # two slope points before each mass point
+        fields[name] = _padded([_halves(getattr(info, name), info.point_x.shape[1]) for info in infos])
+    fields["ride"] = np.moveaxis(fields["ride"], 3, 4)
+    fields |= {name: _in_fours(fields[name], axes) for name, axes in _IN_FOURS.items()}
+    for name in ("point_phi", "slope_d1", "slope_d2"):
+        fields[name + "_T"] = np.ascontiguousarray(np.moveaxis(fields[name], -1, 2))
     for k, (name, columns, empty) in enumerate((("law_x", (), np.inf), ("law_mass", (3,), 0.0), ("law_EI", (5,), 0.0))):
         fields[name] = np.full((B, N, pieces, *columns), empty)
         if laws is None:
@@ -118,9 +125,27 @@ def _chains(
 
 
 _PER_LINK = (
-    "S0", "S1", "NL", "SL", "G1", "G2", "H", "point_x", "point_mass", "point_phi", "slope_dx", "slope_EI", "slope_d1", "slope_d2",
-    "ride", "sleeve_xi", "sleeve_w", "sleeve_phi", "sleeve_d1", "sleeve_d2",
+    "S0", "S1", "NL", "SL", "G1", "G2", "H", "point_x", "point_mass", "point_phi", "ride", "sleeve_xi", "sleeve_w", "sleeve_phi",
+    "sleeve_d1", "sleeve_d2",
 )  # fmt: skip
+_IN_FOURS = {  # axes that end on a multiple of four in the compiled code
+    "S0": (2,), "S1": (2,), "NL": (2,), "SL": (2,), "lam": (2,), "damp": (2,), "G1": (2, 3), "G2": (2, 3), "H": (2, 3),
+    "point_x": (2,), "point_mass": (2,), "point_phi": (2, 3), "slope_dx": (3,), "slope_EI": (3,), "slope_d1": (3, 4),
+    "slope_d2": (3, 4), "ride": (3, 4), "sleeve_phi": (3,), "sleeve_d1": (3,), "sleeve_d2": (3,),
+}  # fmt: skip
+
+
+def _halves(a: np.ndarray, gaps: int) -> np.ndarray:
+    """Values at the slope points (B, 2 gaps, ...), two in each gap, as (B, 2, gaps, ...): the nearer ones, the farther ones."""
+    return np.moveaxis(a[:, : 2 * gaps].reshape(len(a), gaps, 2, *a.shape[2:]), 2, 1)
+
+
+def _in_fours(a: np.ndarray, axes: tuple[int, ...]) -> np.ndarray:
+    """An array with zeros after the ends of some axes, up to the next multiple of four."""
+    out = np.zeros([padded(size) if axis in axes else size for axis, size in enumerate(a.shape)])
+    out[tuple(map(slice, a.shape))] = a
+    return out
+
 
 _NO_LAWS = (np.zeros(1), np.zeros((1, 3)), np.zeros((1, 5)))
 

@@ -1,7 +1,7 @@
 """The whole robot's own modes at one configuration: what exponential steps (`exponential.py`) solve exactly.
 
 With M, K and D the mass, stiffness and damping at that configuration (position gains of the drives in K, friction and rate
-gains in D), Phi^T M Phi = 1 and Phi^T K Phi = diag(w2). Of Phi^T D Phi the diagonal d2 is kept. The basis need not be exact and
+gains in D), Phi M Phi^T = 1 and Phi K Phi^T = diag(w2), a mode a row of Phi. Of Phi D Phi^T the diagonal d2 is kept. The basis need not be exact and
 need not follow the robot: what it leaves out is integrated as a force. It is made again where it has become poor.
 """
 
@@ -12,22 +12,25 @@ from typing import NamedTuple
 import numpy as np
 
 from .chain import SLEEVE, SLIDER, Chain, Work
-from .compiled import compiled, inlined
+from .compiled import compiled, inlined, internal
+from .lanes import WIDTH, lanes, load, padded, store, total
 from .newton_euler import mass
+from .pinned import pinned
 
-POOR = 0.25  # Frobenius' norm of Phi^T (M - M0) Phi, and of the change of K against w_i w_j, that is put up with
+POOR = 0.25  # Frobenius' norm of Phi (M - M0) Phi^T, and of the change of K against w_i w_j, that is put up with
 TURN_RAD, TRAVEL = 0.3, 0.02  # a configuration this far from the last looked at is looked at: an angle, a share of a length
 
 
 class Basis(NamedTuple):
-    """n unknowns in the solver's coordinates; joints whose motion is given have a mode of their own, e_k."""
+    """n unknowns in the solver's coordinates; joints whose motion is given have a mode of their own, e_k. Rows of matrices and
+    the vectors below are made N long, a multiple of four, by zeros: modes that stay at rest."""
 
-    phi: np.ndarray  # (n, n): y = phi eta
-    rows: np.ndarray  # (n, n): eta = rows y, phi^T M
-    w2: np.ndarray  # (n,) omega^2
-    d2: np.ndarray  # (n,) twice the decay rate
+    phi: np.ndarray  # (n, N) the modes, one a row: y = sum_k eta_k phi_k
+    rows: np.ndarray  # (n, N): eta = sum_i y_i rows_i, M phi^T
+    w2: np.ndarray  # (N,) omega^2
+    d2: np.ndarray  # (N,) twice the decay rate
     seen: np.ndarray  # (n,): the configuration looked at last
-    M: np.ndarray  # (n, n), and below, workspace
+    M: np.ndarray  # (n, N), and below, workspace
     K: np.ndarray
     D: np.ndarray
     X: np.ndarray
@@ -40,14 +43,14 @@ class Basis(NamedTuple):
 
 
 def basis(n: int) -> Basis:
-    z = np.zeros
+    z, N = np.zeros, padded(n)
     return Basis(
-        np.eye(n), z((n, n)), z(n), z(n), np.full(n, np.inf), z((n, n)), z((n, n)), z((n, n)), z((n, n)),
-        z((n, n)), z((n, n)), z(n), z(n), z(n), z(2),
+        np.eye(n, N), z((n, N)), z(N), z(N), np.full(n, np.inf), z((n, N)), z((n, N)), z((n, N)), z((n, N)),
+        z((n, N)), z((n, N)), z(n), z(n), z(n), z(2),
     )  # fmt: skip
 
 
-@inlined
+@internal
 def moved(c: Chain, b: Basis, y: np.ndarray) -> bool:
     """Has the robot gone far since the basis was last looked at?"""
     turned = 0.0
@@ -68,7 +71,7 @@ def moved(c: Chain, b: Basis, y: np.ndarray) -> bool:
 @compiled
 def look(c: Chain, w: Work, b: Basis, kp: np.ndarray, kd: np.ndarray, y: np.ndarray, rate: float) -> bool:
     """Make the basis if there is none, or if at y it is poor; true if so. `rate` [rad/s]: slower modes are as good as rigid."""
-    n = y.shape[0]
+    c, w, b, n = pinned(c), pinned(w), pinned(b), y.shape[0]
     none = not b.seen[0] < np.inf
     for k in range(n):
         b.seen[k] = y[k]
@@ -85,22 +88,23 @@ def look(c: Chain, w: Work, b: Basis, kp: np.ndarray, kd: np.ndarray, y: np.ndar
     if not none and max(inertia, stiffness) < POOR * POOR:
         return False
     _again(b)
-    for i in range(n):
-        for j in range(n):
-            total = 0.0
-            for k in range(n):
-                total += b.phi[k, i] * b.M[k, j]
-            b.rows[i, j] = total
-    for i in range(n):
-        total = 0.0
-        for k in range(n):
-            for j in range(n):
-                total += b.phi[k, i] * b.D[k, j] * b.phi[j, i]
-        b.d2[i] = total
+    for k in range(n):
+        decay = lanes(0.0)
+        for block in range(0, n, WIDTH):
+            row, across = lanes(0.0), lanes(0.0)
+            for i in range(n):
+                row += b.phi[k, i] * load(b.M[i], block)
+                across += b.phi[k, i] * load(b.D[i], block)
+            store(b.X[k], block, row)
+            decay += across * load(b.phi[k], block)
+        b.d2[k] = total(decay)
+    for k in range(n):
+        for i in range(n):
+            b.rows[i, k] = b.X[k, i]
     return True
 
 
-@compiled
+@internal
 def _matrices(c: Chain, w: Work, b: Basis, kp: np.ndarray, kd: np.ndarray, y: np.ndarray) -> None:
     """M, K and D at y: M by one inverse dynamics for each unknown."""
     n = y.shape[0]
@@ -116,10 +120,9 @@ def _matrices(c: Chain, w: Work, b: Basis, kp: np.ndarray, kd: np.ndarray, y: np
         for k in range(end - e - 1):
             row = e + 1 + k
             if c.kind[i] == SLEEVE:
-                for j in range(k + 1):
-                    damping = c.alpha[i] * w.M[i, k, j] + c.beta[i] * w.K[i, k, j]
-                    b.K[row, e + 1 + j] = b.K[e + 1 + j, row] = w.K[i, k, j]
-                    b.D[row, e + 1 + j] = b.D[e + 1 + j, row] = damping
+                for j in range(end - e - 1):
+                    b.K[row, e + 1 + j] = w.K[i, k, j]
+                    b.D[row, e + 1 + j] = c.alpha[i] * w.M[i, k, j] + c.beta[i] * w.K[i, k, j]
             else:
                 b.K[row, row], b.D[row, row] = c.lam[i, k], c.damp[i, k]
     for k in range(n):
@@ -133,47 +136,47 @@ def _matrices(c: Chain, w: Work, b: Basis, kp: np.ndarray, kd: np.ndarray, y: np
             b.M[e, e] = 1.0
 
 
-@compiled
+@internal
 def _congruence(b: Basis, A: np.ndarray, out: np.ndarray) -> None:
-    """phi^T A phi."""
+    """phi A phi^T of a symmetric A."""
     n = A.shape[0]
-    for i in range(n):
-        for j in range(n):
-            total = 0.0
-            for k in range(n):
-                total += A[i, k] * b.phi[k, j]
-            b.X[i, j] = total
-    for i in range(n):
-        for j in range(n):
-            total = 0.0
-            for k in range(n):
-                total += b.phi[k, i] * b.X[k, j]
-            out[i, j] = total
+    for k in range(n):
+        for block in range(0, n, WIDTH):
+            row = lanes(0.0)
+            for i in range(n):
+                row += b.phi[k, i] * load(A[i], block)
+            store(b.X[k], block, row)
+    for k in range(n):
+        for j in range(k + 1):
+            both = lanes(0.0)
+            for block in range(0, n, WIDTH):
+                both += load(b.X[k], block) * load(b.phi[j], block)
+            out[k, j] = out[j, k] = total(both)
 
 
-@compiled
+@internal
 def _again(b: Basis) -> None:
     """A new basis from the old one, in which M and K (A, B) are already nearly diagonal: Cholesky's M = l l^T, then Jacobi's
     rotations of l^-1 K l^-T."""
-    n, M, K, phi = b.w2.shape[0], b.A, b.B, b.phi
+    n, M, K, phi = b.seen.shape[0], b.A, b.B, b.phi
     for i in range(n):
         for j in range(i + 1):
-            total = M[i, j]
+            rest = M[i, j]
             for k in range(j):
-                total -= M[i, k] * M[j, k]
-            M[i, j] = np.sqrt(total) if i == j else total / M[j, j]
-    for i in range(n):  # rows of l^-1 K, then columns; phi l^-T
-        for j in range(n):
-            for k in range(i):
-                K[i, j] -= M[i, k] * K[k, j]
-            K[i, j] /= M[i, i]
+                rest -= M[i, k] * M[j, k]
+            M[i, j] = np.sqrt(rest) if i == j else rest / M[j, j]
+    for i in range(n):  # rows of l^-1 K and of l^-1 phi, then columns
+        for k in range(i):
+            _less(K, i, k, M[i, k], n)
+            _less(phi, i, k, M[i, k], n)
+        for block in range(0, n, WIDTH):
+            store(K[i], block, load(K[i], block) / M[i, i])
+            store(phi[i], block, load(phi[i], block) / M[i, i])
     for j in range(n):
         for i in range(n):
             for k in range(j):
                 K[i, j] -= M[j, k] * K[i, k]
-                phi[i, j] -= M[j, k] * phi[i, k]
             K[i, j] /= M[j, j]
-            phi[i, j] /= M[j, j]
     for _ in range(30):
         off, size = 0.0, 0.0
         for i in range(n):
@@ -189,7 +192,23 @@ def _again(b: Basis) -> None:
         b.w2[i] = max(K[i, i], 0.0)
 
 
-@compiled
+@inlined
+def _less(A: np.ndarray, i: int, k: int, factor: float, n: int) -> None:
+    """Row i of A less a multiple of row k."""
+    for block in range(0, n, WIDTH):
+        store(A[i], block, load(A[i], block) - factor * load(A[k], block))
+
+
+@inlined
+def _turn(A: np.ndarray, p: int, q: int, cos: float, sin: float) -> None:
+    """Rows p and q of A, turned against each other."""
+    for block in range(0, A.shape[1], WIDTH):
+        a, b = load(A[p], block), load(A[q], block)
+        store(A[p], block, cos * a - sin * b)
+        store(A[q], block, sin * a + cos * b)
+
+
+@internal
 def _rotate(K: np.ndarray, phi: np.ndarray, p: int, q: int) -> None:
     """Jacobi's rotation that makes K[p, q] zero."""
     if K[p, q] == 0.0:
@@ -202,6 +221,5 @@ def _rotate(K: np.ndarray, phi: np.ndarray, p: int, q: int) -> None:
     sin = tan * cos
     for k in range(K.shape[0]):
         K[k, p], K[k, q] = cos * K[k, p] - sin * K[k, q], sin * K[k, p] + cos * K[k, q]
-        phi[k, p], phi[k, q] = cos * phi[k, p] - sin * phi[k, q], sin * phi[k, p] + cos * phi[k, q]
-    for k in range(K.shape[0]):
-        K[p, k], K[q, k] = cos * K[p, k] - sin * K[q, k], sin * K[p, k] + cos * K[q, k]
+    _turn(K, p, q, cos, sin)
+    _turn(phi, p, q, cos, sin)

@@ -39,7 +39,7 @@ def integrated(
         force = _forces(system, drive, time_s, y, v)
         accelerate(c, w, y, v, y, v, 0.0, force, zero, zero, a)
         dz = np.concatenate([v, a, [0.0, 0.0]])
-        loop._powers(c, w, v, force, dz)
+        loop.powers(c, w, v, force, dz)
         return dz
 
     solver = (DOP853 if method == loop.EXPLICIT else Radau)(

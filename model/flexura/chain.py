@@ -13,7 +13,7 @@ NODES = 4  # Gauss points an element, where a link is summed at run time
 
 class Chain(NamedTuple):
     """The constants of a robot: N links, n unknowns in the global numbering [eta_1, q_1, eta_2, q_2, ...], at most m elastic
-    ones a link.
+    ones and p mass points a link, m and p made multiples of four by zeros (`lanes.py`).
 
     Of a link behind a sleeve (Pb), `s1` and `inertia` are about its proximal end and without the sleeve's mass, `NL` and `SL`
     are Phi and Phi_xi at its tip, and the arrays `sleeve_*` and `law_*` stand for the rest (`sleeve.py`).
@@ -42,18 +42,21 @@ class Chain(NamedTuple):
     G1: np.ndarray  # (N, m, m)
     G2: np.ndarray  # (N, m, m)
     H: np.ndarray  # (N, m, m)
-    points: np.ndarray  # (N,) int: mass points of each link, at most p; two slope points before each
+    points: np.ndarray  # (N,) int: mass points of each link; two slope points before each, the nearer ones first below
     payload: np.ndarray  # (N,) mass at the tip [kg]
     tip_inertia: np.ndarray  # (N,) of the payload [kg m^2]
     point_x: np.ndarray  # (N, p)
     point_mass: np.ndarray  # (N, p)
     point_phi: np.ndarray  # (N, p, m)
-    slope_dx: np.ndarray  # (N, 2p)
-    slope_EI: np.ndarray  # (N, 2p)
-    slope_d1: np.ndarray  # (N, 2p, m) phi'
-    slope_d2: np.ndarray  # (N, 2p, m) phi''
+    point_phi_T: np.ndarray  # (N, m, p): the same for four points at a time
+    slope_dx: np.ndarray  # (N, 2, p)
+    slope_EI: np.ndarray  # (N, 2, p)
+    slope_d1: np.ndarray  # (N, 2, p, m) phi'
+    slope_d2: np.ndarray  # (N, 2, p, m) phi''
+    slope_d1_T: np.ndarray  # (N, m, 2, p)
+    slope_d2_T: np.ndarray  # (N, m, 2, p)
     elements: np.ndarray  # (N,) int
-    ride: np.ndarray  # (N, E + 1, 3, m) w, w_xi, w_xi,xi at the nodes: the curve that a slider rides on
+    ride: np.ndarray  # (N, E + 1, m, 4) w, w_xi, w_xi,xi at the nodes, 0: the curve that a slider rides on
     node: np.ndarray  # (N,) int: the node whose displacement a nodal slider (joint i) takes, 0: it rides on the curve
     reference: np.ndarray  # (N,) the free length for which a sleeved link's modes are made [m]; 0 elsewhere
     sleeve_xi: np.ndarray  # (N, P + 1) Gauss points, and the tip
@@ -82,28 +85,28 @@ class Work(NamedTuple):
     flow: np.ndarray  # (N, 3): velocity of the attachment per unit of a sleeve's d'
     tilt: np.ndarray  # (N,) rate of the tip's tangent over that of w'(L)
     body: np.ndarray  # (N, 11): int w dm, int (x + u) dm, int (x + u)^2 + w^2 dm; hr (3); of a sleeve Mxd, Myd, Mtd, Mdd, hd
-    col: np.ndarray  # (N, m, 4) Mqr: x, y, angle, and d of a sleeve
-    jac: np.ndarray  # (N, m, 3) Jq^T: x, y, angle
-    cv: np.ndarray  # (N, m) velocity-dependent and nonlinear elastic forces on the elastic rows
+    terms: np.ndarray  # (N, m, 8) of each elastic row: Mqr x, y, angle; nonlinear forces; Jq^T x, y, angle; Mqr d of a sleeve
     h: np.ndarray  # (N, p, m) h = -du/dq at the points
-    slope: np.ndarray  # (2p, 4) tan dx, (tan - sin) dx, forces of the strain energy on w', w''
-    point: np.ndarray  # (p, 5) factors of h, phi, phi, h and tan - sin in the inertia forces
-    M: np.ndarray  # (N, m, m) Mqq of sleeved links, lower triangle
-    K: np.ndarray  # (N, m, m) their stiffness at d, lower triangle
+    slope: np.ndarray  # (4, 2, p) tan dx, (tan - sin) dx, forces of the strain energy on w', w''
+    point: np.ndarray  # (5, p) factors of h, phi, phi, h and tan - sin in the inertia forces
+    M: np.ndarray  # (N, m, m) Mqq of sleeved links
+    K: np.ndarray  # (N, m, m) their stiffness at d
     strain: np.ndarray  # (N,) their strain energy
     sum: np.ndarray  # (P + 1, 12) what a sleeved link has at its points
     sum_h: np.ndarray  # (P + 1, m) int tan Phi_xi up to each of them
-    ride: np.ndarray  # (E + 1, 9) node values w, w_xi, w_xi,xi of q, of qd, and the weights of their gradients
-    quintic: np.ndarray  # (4, 6) polynomials of that curve in one element, and their derivatives
+    ride: np.ndarray  # (E + 1, 3, 4) node values w, w_xi, w_xi,xi, 0 of q, of qd, and the weights of their gradients
+    quintic: np.ndarray  # (4, 8) polynomials of that curve in one element, and their derivatives: of its start, 0, its end, 0
     cond: np.ndarray  # (N, 36) of the condensation: A (6), b (3), (1 + E A)^-1 (9), X - P (9), t0 (3), E (6)
     joint: np.ndarray  # (N, 6): A s (3), 1 / (s^T A s + ...), tau - s^T b, s^T A s + rotor
     X: np.ndarray  # (N, 3, 4) X - P of sleeved links
     inertia: np.ndarray  # (4, 4) of a sleeved link at its sleeve
     bias: np.ndarray  # (4,)
     u: np.ndarray  # (N, 3)
-    S: np.ndarray  # (N, m, m) the factor l of each link's elastic block
-    dinv: np.ndarray  # (N, m) 1/d of its factorisation
-    rhs: np.ndarray  # (N, m, 8)
+    S: np.ndarray  # (N, m, m) each link's elastic block, upper triangle
+    L: np.ndarray  # (N, m, m) the factor l of it, below its diagonal of 1
+    dinv: np.ndarray  # (N, m) 1/d of the factorisation
+    rhs: np.ndarray  # (N, m, 8) l^-1 terms, with the linear forces
+    qdd: np.ndarray  # (m,)
     held: np.ndarray  # (N,) int: joints whose acceleration is given, locked ones at 0
     given: np.ndarray  # (N,) that acceleration
     reaction: np.ndarray  # (N,) the force in the joint that it takes, friction left out
@@ -115,8 +118,8 @@ def workspace(c: Chain) -> Work:
     P, E = c.sleeve_xi.shape[1], c.ride.shape[1]
     return Work(
         cos=z(N), sin=z(N), omega=z(N), angle=z(N), place=z((N, 2)), beta=z((N, 3)), rate=z((N, 3)), slide=z((N, 3)),
-        flow=z((N, 3)), tilt=z(N), body=z((N, 11)), col=z((N, m, 4)), jac=z((N, m, 3)), cv=z((N, m)), h=z((N, p, m)),
-        slope=z((2 * p, 4)), point=z((p, 5)), M=z((N, m, m)), K=z((N, m, m)), strain=z(N), sum=z((P, 12)), sum_h=z((P, m)),
-        ride=z((E, 9)), quintic=z((4, 6)), cond=z((N, 36)), joint=z((N, 6)), X=z((N, 3, 4)), inertia=z((4, 4)), bias=z(4),
-        u=z((N, 3)),        S=z((N, m, m)), dinv=z((N, m)), rhs=z((N, m, 8)), held=c.locked.copy(), given=z(N), reaction=z(N),
+        flow=z((N, 3)), tilt=z(N), body=z((N, 11)), terms=z((N, m, 8)), h=z((N, p, m)), slope=z((4, 2, p)), point=z((5, p)),
+        M=z((N, m, m)), K=z((N, m, m)), strain=z(N), sum=z((P, 12)), sum_h=z((P, m)), ride=z((E, 3, 4)), quintic=z((4, 8)),
+        cond=z((N, 36)), joint=z((N, 6)), X=z((N, 3, 4)), inertia=z((4, 4)), bias=z(4), u=z((N, 3)), S=z((N, m, m)),
+        L=z((N, m, m)), dinv=z((N, m)), rhs=z((N, m, 8)), qdd=z(m), held=c.locked.copy(), given=z(N), reaction=z(N),
     )  # fmt: skip

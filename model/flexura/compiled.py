@@ -25,10 +25,15 @@ def compiled(function: Any) -> Any:
     return _cached(function)
 
 
+def internal(function: Any) -> Any:
+    """The same for a function that only compiled ones call: none is made for Python, whose unpacking of a robot's hundred arrays
+    is more code than most functions."""
+    return _cached(function, no_cpython_wrapper=True)
+
+
 def inlined(function: Any) -> Any:
-    """The same, and expanded where it is called: passing a robot's constants, some forty arrays, costs more than a short
-    function."""
-    return _cached(function, forceinline=True)
+    """An internal one that is expanded where it is called."""
+    return _cached(function, forceinline=True, no_cpython_wrapper=True)
 
 
 def _cached(function: Any, **options: Any) -> Any:
@@ -46,7 +51,7 @@ def _folder() -> Path:
     digest = hashlib.sha256(numba.__version__.encode())
     for source in sorted(_HERE.glob("*.py")):
         text = source.read_bytes()
-        if b"from .compiled import" in text or source.name in ("compiled.py", "chain.py", "tableaus.py"):
+        if b"from .compiled import" in text or source.name in ("compiled.py", "chain.py", "lanes.py", "pinned.py", "tableaus.py"):
             digest.update(text)
     name = f"compiled-{digest.hexdigest()[:16]}"
     for parent in (_HERE / "__pycache__", Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "flexura"):

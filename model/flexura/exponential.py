@@ -15,8 +15,9 @@ import numpy as np
 
 from .basis import Basis, look, moved
 from .chain import Chain, Work
-from .compiled import compiled, inlined
+from .compiled import compiled, internal
 from .kernel import passes
+from .lanes import WIDTH, lanes, load, load_some, store, total
 from .loop import (
     BREAK,
     DONE,
@@ -36,70 +37,71 @@ from .loop import (
     _copy,
     _find,
     _outside,
-    _powers,
     _prescribe,
     _weights,
     drive,
+    powers,
+    quintic,
 )  # fmt: skip
-from .past import COUNT, HEAD, ORDER, ROWS, SPAN, STEADY, Past, tables
+from .past import COUNT, HEAD, ORDER, ROWS, SPAN, STEADY, Past, coefficient, ring, tables
+from .pinned import pinned
 from .propagator import free, moments
 
 EXPONENTIAL = 4  # beside the methods of `loop`
 TIGHT = 20.0  # what the local error is kept below rtol by: few long steps add up what many short ones average out
 
 
-@inlined
-def _multiply(A: np.ndarray, x: np.ndarray, out: np.ndarray) -> None:
-    for i in range(out.shape[0]):
-        total = 0.0
-        for k in range(x.shape[0]):
-            total += A[i, k] * x[k]
-        out[i] = total
+@internal
+def _place(b: Basis, p: Past, eta: np.ndarray, etad: np.ndarray, z: np.ndarray) -> None:
+    """y = y0 + sum eta_k phi_k and v = sum eta'_k phi_k, into z, which has room for three numbers more."""
+    n = b.seen.shape[0]
+    for i in range(0, n, WIDTH):
+        y = load(p.origin, i)
+        for k in range(n):
+            y += eta[k] * load(b.phi[k], i)
+        store(z, i, y)
+    for i in range(0, n, WIDTH):
+        v = lanes(0.0)
+        for k in range(n):
+            v += etad[k] * load(b.phi[k], i)
+        store(z, n + i, v)
 
 
-@inlined
-def _place(b: Basis, p: Past, eta: np.ndarray, y: np.ndarray) -> None:
-    """y = y0 + phi eta."""
-    _multiply(b.phi, eta, y)
-    for k in range(y.shape[0]):
-        y[k] += p.origin[k]
-
-
-@inlined
+@internal
 def _force(b: Basis, p: Past, row: int) -> None:
     """N of a row of the rings from its accelerations and state."""
-    n = b.w2.shape[0]
-    for i in range(n):
-        total, eta, etad = 0.0, 0.0, 0.0
-        for k in range(n):
-            total += b.rows[i, k] * p.a[row, k]
-            eta += b.rows[i, k] * (p.y[row, k] - p.origin[k])
-            etad += b.rows[i, k] * p.v[row, k]
-        p.N[row, i] = total + b.w2[i] * eta + b.d2[i] * etad
+    for i in range(0, b.w2.shape[0], WIDTH):
+        sums, eta, etad = lanes(0.0), lanes(0.0), lanes(0.0)
+        for k in range(b.seen.shape[0]):
+            rows = load(b.rows[k], i)
+            sums += p.a[row, k] * rows
+            eta += (p.y[row, k] - p.origin[k]) * rows
+            etad += p.v[row, k] * rows
+        store(p.N[row], i, sums + load(b.w2, i) * eta + load(b.d2, i) * etad)
 
 
-@compiled
-def _sizes(phi: np.ndarray, scale: np.ndarray, size: np.ndarray) -> None:
+@internal
+def _sizes(b: Basis, scale: np.ndarray, size: np.ndarray) -> None:
     """Error weights of the modes from those of the unknowns."""
-    n = phi.shape[0]
-    for i in range(n):
-        y, v = 0.0, 0.0
-        for k in range(n):
-            own = phi[k, i] * scale[k]
-            rate = phi[k, i] * scale[n + k]
+    n = b.seen.shape[0]
+    for k in range(n):
+        y, v = lanes(0.0), lanes(0.0)
+        for i in range(0, n, WIDTH):
+            phi = load(b.phi[k], i)
+            own, rate = phi * load_some(scale, i, n - i), phi * load_some(scale, n + i, n - i)
             y += own * own
             v += rate * rate
-        size[0, i], size[1, i] = TIGHT * np.sqrt(y), TIGHT * np.sqrt(v)
+        size[0, k], size[1, k] = TIGHT * np.sqrt(total(y)), TIGHT * np.sqrt(total(v))
 
 
-@inlined
+@internal
 def _look(c: Chain, w: Work, d: Inputs, m: Memory, p: Past, t: float, y: np.ndarray, v: np.ndarray, row: int) -> None:
     """Accelerations and powers at (t, y, v) into a row of the rings."""
     _prescribe(c, w, d, t, y, v)
     drive(c, d, t, y, v, m.force)
     passes(c, w, y, v, y, v, 0.0, m.force, m.zero, m.zero, p.a[row])
     _find(c, w, d, v, m.force)
-    _powers(c, w, v, m.force, m.K[0])
+    powers(c, w, v, m.force, m.K[0])
     n = y.shape[0]
     p.power[row, 0], p.power[row, 1] = m.K[0, 2 * n], m.K[0, 2 * n + 1]
     for k in range(n):
@@ -107,115 +109,131 @@ def _look(c: Chain, w: Work, d: Inputs, m: Memory, p: Past, t: float, y: np.ndar
     m.s[EVALS] += 1
 
 
-@inlined
+@internal
 def _predict(b: Basis, m: Memory, p: Past, h: float) -> None:
     """The state a step of h leads to without a look at the equations there: p.new[:2], and y, v, work and loss in m.znew; minus
     the extrapolated N in p.gap, and minus the powers in m.K[1]."""
-    n, k, head = b.w2.shape[0], int(p.s[COUNT]), int(p.s[HEAD])
+    n, k, head = b.seen.shape[0], int(p.s[COUNT]), int(p.s[HEAD])
     if h != p.s[SPAN] or p.s[STEADY] <= ORDER:
         tables(b, p, h, k)
-    eta, etad, gap = p.new[0], p.new[1], p.gap
-    for i in range(n):
-        eta[i] = p.step[0, i] * p.eta[i] + p.step[1, i] * p.etad[i]
-        etad[i] = p.step[2, i] * p.eta[i] + p.step[3, i] * p.etad[i]
-        gap[i] = 0.0
+    for i in range(0, n, WIDTH):
+        y, v, gap = load(p.eta, i), load(p.etad, i), lanes(0.0)
+        eta, etad = load(p.step[0], i) * y + load(p.step[1], i) * v, load(p.step[2], i) * y + load(p.step[3], i) * v
+        for j in range(k):
+            force = load(p.N[ring(head, j)], i)
+            eta += load(p.ahead[0, j], i) * force
+            etad += load(p.ahead[1, j], i) * force
+            gap -= load(p.ahead[2, j], i) * force
+        store(p.new[0], i, eta)
+        store(p.new[1], i, etad)
+        store(p.gap, i, gap)
+    _place(b, p, p.new[0], p.new[1], m.znew)
     work, loss, work_gap, loss_gap = 0.0, 0.0, 0.0, 0.0
     for j in range(k):
-        row, end = (head + j) % ROWS, p.end[0, j]
-        for i in range(n):
-            eta[i] += p.ahead[0, j, i] * p.N[row, i]
-            etad[i] += p.ahead[1, j, i] * p.N[row, i]
-            gap[i] -= p.end[p.low[i], j] * p.N[row, i]
+        row, end = ring(head, j), p.end[j]
         work += p.area[j] * p.power[row, 0]
         loss += p.area[j] * p.power[row, 1]
         work_gap -= end * p.power[row, 0]
         loss_gap -= end * p.power[row, 1]
-    _place(b, p, eta, m.znew[:n])
-    _multiply(b.phi, etad, m.znew[n : 2 * n])
     m.znew[2 * n], m.znew[2 * n + 1] = m.z[2 * n] + h * work, m.z[2 * n + 1] + h * loss
     m.K[1, 0], m.K[1, 1] = work_gap, loss_gap
 
 
-@inlined
+@internal
 def _correct(b: Basis, m: Memory, p: Past, h: float, new: int) -> float:
     """The step with what was found where `_predict` led, in a row of the rings: to p.new[2:] and m.znew. Returns the error norm
     (accept below 1)."""
-    n, k = b.w2.shape[0], int(p.s[COUNT])
-    gap = p.gap
-    _multiply(b.rows, p.a[new], p.N[new])
-    error = 0.0
-    for i in range(n):
-        eta, etad = p.new[0, i], p.new[1, i]
-        p.N[new, i] += b.w2[i] * eta + b.d2[i] * etad
-        gap[i] += p.N[new, i]
-        p.new[2, i] = eta + p.late[0, i] * gap[i]
-        p.new[3, i] = etad + p.late[1, i] * gap[i]
-        e0, e1 = p.late[2, i] * gap[i] * p.size[0, i], p.late[3, i] * gap[i] * p.size[1, i]
-        error += e0 * e0 + e1 * e1
-    _place(b, p, p.new[2], m.znew[:n])
-    _multiply(b.phi, p.new[3], m.znew[n : 2 * n])
-    m.znew[2 * n] += h * p.area[k] * (p.power[new, 0] + m.K[1, 0])
-    m.znew[2 * n + 1] += h * p.area[k] * (p.power[new, 1] + m.K[1, 1])
-    return np.sqrt(error / (2 * n))
+    n, k = b.seen.shape[0], int(p.s[COUNT])
+    work, loss = m.znew[2 * n], m.znew[2 * n + 1]
+    squares = lanes(0.0)
+    for i in range(0, n, WIDTH):
+        eta, etad = load(p.new[0], i), load(p.new[1], i)
+        force = load(b.w2, i) * eta + load(b.d2, i) * etad
+        for j in range(n):
+            force += p.a[new, j] * load(b.rows[j], i)
+        gap = load(p.gap, i) + force
+        store(p.N[new], i, force)
+        store(p.gap, i, gap)
+        store(p.new[2], i, eta + load(p.late[0], i) * gap)
+        store(p.new[3], i, etad + load(p.late[1], i) * gap)
+        e0, e1 = load(p.late[2], i) * gap * load(p.size[0], i), load(p.late[3], i) * gap * load(p.size[1], i)
+        squares += e0 * e0 + e1 * e1
+    _place(b, p, p.new[2], p.new[3], m.znew)
+    m.znew[2 * n] = work + h * p.area[k] * (p.power[new, 0] + m.K[1, 0])
+    m.znew[2 * n + 1] = loss + h * p.area[k] * (p.power[new, 1] + m.K[1, 1])
+    return np.sqrt(total(squares) / (2 * n))
 
 
-@inlined
-def _force_inside(p: Past) -> None:
-    """N over the step just made as a polynomial, f."""
+@internal
+def _force_inside(b: Basis, p: Past, h: float) -> None:
+    """N over the step just made as a polynomial, f, and what `_inside` needs of it."""
     k, head = int(p.s[COUNT]), int(p.s[HEAD])
-    for q in range(k + 1):
-        for i in range(p.gap.shape[0]):
-            p.f[q, i] = p.gap[i] * p.poly[p.low[i], k, q]
-    for j in range(k):
-        row = (head + j) % ROWS
-        for q in range(k):
-            for i in range(p.gap.shape[0]):
-                p.f[q, i] += p.poly[p.low[i], j, q] * p.N[row, i]
+    for i in range(0, b.w2.shape[0], WIDTH):
+        gap, end = load(p.gap, i), lanes(0.0)
+        for q in range(k + 1):
+            f = gap * coefficient(p, k, q, i)
+            for j in range(k):
+                f += coefficient(p, j, q, i) * load(p.N[ring(head, j)], i)
+            store(p.f[q], i, f)
+            end += f
+        w2, d2 = load(b.w2, i), load(b.d2, i)
+        store(p.bent[0], i, h * h * (load(p.f[0], i) - w2 * load(p.eta, i) - d2 * load(p.etad, i)))
+        store(p.bent[1], i, h * h * (end - w2 * load(p.new[2], i) - d2 * load(p.new[3], i)))
+        above, here = lanes(0.0), lanes(0.0)
+        for q in range(k, -1, -1):
+            below = (h * h * load(p.f[q], i) - (q + 1) * h * d2 * here - (q + 1) * (q + 2) * above) / (h * h * w2)
+            above, here = here, below
+            store(p.slow[q], i, below)
 
 
-@inlined
+@internal
 def _inside(m: Memory, b: Basis, p: Past, h: float, x: float, out: np.ndarray) -> None:
     """The state at the fraction x of the step just made, after `_force_inside`: modes that turn by less than 1 rad a step by
-    Hermite's quintic, the others exactly."""
-    n, k = b.w2.shape[0], int(p.s[COUNT])
-    eta, etad = p.work[0], p.work[1]
+    Hermite's quintic, the others exactly, stiff ones as free motion about the one that N alone makes of them."""
+    n, k = b.seen.shape[0], int(p.s[COUNT])
+    eta, etad, place = p.work[0], p.work[1], m.K[14]
+    for i in range(0, n, WIDTH):
+        y0, y1 = load(p.eta, i), load(p.new[2], i)
+        y, v = quintic(x, y1 - y0, h * load(p.etad, i), h * load(p.new[3], i), load(p.bent[0], i), load(p.bent[1], i))
+        store(eta, i, y0 + y)
+        store(etad, i, v * (1.0 / h))
     for i in range(n):
-        y0, v0, w2, d2 = p.eta[i], p.etad[i], b.w2[i], b.d2[i]
+        w2, d2 = b.w2[i], b.d2[i]
         if w2 * h * h < 1.0 and d2 * h < 1.0:
-            end = 0.0
-            for q in range(k + 1):
-                end += p.f[q, i]
-            y1, v1 = p.new[2, i], p.new[3, i]
-            a0, a1 = h * h * (p.f[0, i] - w2 * y0 - d2 * v0), h * h * (end - w2 * y1 - d2 * v1)
-            dy, v0, v1 = y1 - y0, h * v0, h * v1
-            c3 = 10 * dy - 6 * v0 - 4 * v1 - 1.5 * a0 + 0.5 * a1
-            c4 = -15 * dy + 8 * v0 + 7 * v1 + 1.5 * a0 - a1
-            c5 = 6 * dy - 3 * v0 - 3 * v1 - 0.5 * a0 + 0.5 * a1
-            eta[i] = y0 + x * (v0 + x * (0.5 * a0 + x * (c3 + x * (c4 + x * c5))))
-            etad[i] = (v0 + x * (a0 + x * (3 * c3 + x * (4 * c4 + x * 5 * c5)))) / h
-        else:
-            g, dg = free(w2, d2, x * h)
-            moments(w2, d2, x * h, g, dg, p.column[0], p.column[1], p.tables)
-            y, v, power = (dg + d2 * g) * y0 + g * v0, dg * v0 - w2 * g * y0, 1.0
-            for q in range(k + 1):
-                y += p.column[0, q] * power * p.f[q, i]
-                v += p.column[1, q] * power * p.f[q, i]
-                power *= x
-            eta[i], etad[i] = y, v
-    _place(b, p, eta[:n], out[:n])
-    _multiply(b.phi, etad[:n], out[n : 2 * n])
-    head, new = int(p.s[HEAD]), (int(p.s[HEAD]) + ROWS - 1) % ROWS
+            continue
+        g, dg = free(w2, d2, x * h)
+        if w2 * h * h >= 1.0 and d2 < 0.6 * h * w2:
+            y, v = 0.0, 0.0
+            for q in range(k, -1, -1):
+                v = v * x + y
+                y = y * x + p.slow[q, i]
+            y0, v0 = p.eta[i] - p.slow[0, i], p.etad[i] - (p.slow[1, i] / h if k > 0 else 0.0)
+            eta[i], etad[i] = y + (dg + d2 * g) * y0 + g * v0, v / h + dg * v0 - w2 * g * y0
+            continue
+        moments(w2, d2, x * h, g, dg, p.column[0], p.column[1], p.tables)
+        y0, v0, power = p.eta[i], p.etad[i], 1.0
+        y, v = (dg + d2 * g) * y0 + g * v0, dg * v0 - w2 * g * y0
+        for q in range(k + 1):
+            y += p.column[0, q] * power * p.f[q, i]
+            v += p.column[1, q] * power * p.f[q, i]
+            power *= x
+        eta[i], etad[i] = y, v
+    _place(b, p, eta, etad, place)
+    for j in range(2 * n):
+        out[j] = place[j]
+    head = int(p.s[HEAD])
+    new = ring(head, ROWS - 1)
     for r in range(2):
         dz, f0, f1 = m.znew[2 * n + r] - m.z[2 * n + r], h * p.power[head, r], h * p.power[new, r]
         out[2 * n + r] = m.z[2 * n + r] + x * (f0 + x * (3 * dz - 2 * f0 - f1 + x * (f0 + f1 - 2 * dz)))
 
 
-@compiled
+@internal
 def _stop_at_limit(
     c: Chain, w: Work, d: Inputs, m: Memory, b: Basis, p: Past, t: float, h: float, beyond: float, joint: int
 ) -> None:
     """As `loop._stop_at_limit`."""
-    low, high, out, n = 0.0, beyond, m.K[15], m.a.shape[0]
+    low, high, out, n = 0.0, beyond, m.K[15, : m.z.shape[0]], m.a.shape[0]
     m.s[FAULT] = joint
     for turn in range(61):
         middle = 0.5 * (low + high) if turn < 60 else low
@@ -230,17 +248,21 @@ def _stop_at_limit(
     m.s[STATUS], m.s[T] = LIMIT, t + low * h
 
 
-@compiled
+@internal
 def _settle(b: Basis, m: Memory, p: Past) -> None:
     """Put the state and the past into the basis as it is now."""
     n = m.a.shape[0]
     for k in range(n):
         p.origin[k], p.eta[k] = m.z[k], 0.0
     for j in range(int(p.s[COUNT])):
-        _force(b, p, (int(p.s[HEAD]) + j) % ROWS)
-    _multiply(b.rows, m.z[n : 2 * n], p.etad)
+        _force(b, p, ring(int(p.s[HEAD]), j))
+    for i in range(0, n, WIDTH):
+        etad = lanes(0.0)
+        for k in range(n):
+            etad += m.z[n + k] * load(b.rows[k], i)
+        store(p.etad, i, etad)
     p.s[SPAN] = 0.0
-    _sizes(b.phi, m.scale, p.size)
+    _sizes(b, m.scale, p.size)
 
 
 @compiled
@@ -248,6 +270,7 @@ def advance(
     c: Chain, w: Work, d: Inputs, m: Memory, b: Basis, p: Past, rtol: float, t_eval: np.ndarray, out: np.ndarray, max_steps: int
 ) -> None:  # fmt: skip
     """As `loop.advance`: at most `max_steps` steps of the run held in `m` and `p`, filling rows of `out` (T, 2n + 2)."""
+    c, w, d, m, b, p = pinned(c), pinned(w), pinned(d), pinned(m), pinned(b), pinned(p)
     s, n, end = m.s, m.a.shape[0], t_eval[-1]
     for _ in range(max_steps):
         t = s[T]
@@ -271,7 +294,7 @@ def advance(
                 h = p.s[SPAN]
             tn = stop if left == 1.0 else t + h
             _predict(b, m, p, h)
-        new = 0 if fresh else (int(p.s[HEAD]) + ROWS - 1) % ROWS
+        new = 0 if fresh else ring(int(p.s[HEAD]), ROWS - 1)
         y, v = m.znew[:n], m.znew[n : 2 * n]
         _look(c, w, d, m, p, t if fresh else min(tn, np.nextafter(stop, -1e300)), y, v, new)
         p.t[new] = tn
@@ -300,7 +323,7 @@ def advance(
                 _copy(m.znew, out[row])
             else:
                 if not prepared:
-                    _force_inside(p)
+                    _force_inside(b, p, h)
                     prepared = True
                 _inside(m, b, p, h, (t_eval[row] - t) / h, out[row])
                 _prescribe(c, w, d, t_eval[row], out[row, :n], out[row, n : 2 * n])
@@ -311,14 +334,15 @@ def advance(
             s[OUT] += 1
         joint = _outside(c, d, m.znew)
         if joint >= 0:
-            _force_inside(p)
+            _force_inside(b, p, h)
             _stop_at_limit(c, w, d, m, b, p, t, h, 1.0, joint)
             return
         s[T] = tn
         _copy(m.znew, m.z)
-        _copy(p.new[2], p.eta)
-        _copy(p.new[3], p.etad)
-        p.s[HEAD] = (int(p.s[HEAD]) + ROWS - 1) % ROWS
+        for i in range(0, n, WIDTH):
+            store(p.eta, i, load(p.new[2], i))
+            store(p.etad, i, load(p.new[3], i))
+        p.s[HEAD] = ring(int(p.s[HEAD]), ROWS - 1)
         p.s[COUNT] = min(k + 1.0, 1.0 * ORDER)
         p.s[STEADY] += 1.0
         if factor * h > 1.4 * s[H] and (k < ORDER or p.s[STEADY] > 2.0):
@@ -330,4 +354,4 @@ def advance(
         if left == 1.0:
             s[FRESH], s[H] = 0.0, max(0.1 * s[H], 1e-3 * h)
         elif int(s[STEPS]) % 8 == 0 or k < ORDER:
-            _sizes(b.phi, m.scale, p.size)
+            _sizes(b, m.scale, p.size)

@@ -26,21 +26,21 @@ def mass_matrix(c: Chain, w: Work, y: np.ndarray) -> np.ndarray:
         m = own.stop - own.start
         S0q, b, Jt = w.body[i, :3]
         Mrr = np.array([[c.mass[i], 0, -S0q], [0, c.mass[i], b], [-S0q, b, Jt]])
-        scattered = hub.T @ w.col[i, :m, :3].T
+        scattered = hub.T @ w.terms[i, :m, :3].T
         M += hub.T @ Mrr @ hub
         M[:, own] += scattered
         M[own, :] += scattered.T
         M[e, e] += c.rotor[i]
         inertia_block(c, w, i)
-        lower = np.tril(w.S[i, :m, :m])
-        M[own, own] += lower + np.tril(lower, -1).T
+        upper = np.triu(w.S[i, :m, :m])
+        M[own, own] += upper + np.triu(upper, 1).T
         if c.kind[i] == SLEEVE:
             flowing = hub.T @ w.body[i, 6:9]
             M[:, e] += flowing
             M[e, :] += flowing
             M[e, e] += w.body[i, 9]
-            M[own, e] += w.col[i, :m, 3]
-            M[e, own] += w.col[i, :m, 3]
+            M[own, e] += w.terms[i, :m, 7]
+            M[e, own] += w.terms[i, :m, 7]
     return (M + M.T) / 2
 
 
@@ -68,7 +68,7 @@ def _jacobians(c: Chain, w: Work, y: np.ndarray) -> tuple[list[np.ndarray], np.n
         rx, ry = w.place[i]
         attachment = np.array([[1, 0, -ry], [0, 1, rx], [0, 0, 1.0]]) @ hub
         own = slice(e + 1, c.first[i + 1])
-        attachment[:, own] += w.jac[i, : own.stop - own.start].T
+        attachment[:, own] += w.terms[i, : own.stop - own.start, 4:7].T
         if c.kind[i] == SLEEVE:
             attachment[:, e] += w.flow[i]
     return hubs, attachment

@@ -8,9 +8,12 @@ from __future__ import annotations
 import numpy as np
 
 from .chain import SLEEVE, Chain, Work
-from .compiled import compiled, inlined
+from .compiled import compiled, inlined, internal
+from .lanes import WIDTH, lanes, load, load_some, pack, parts, store, total
+from .pinned import pinned
 
 _COLUMN = (0, 1, 2, 7)  # of w.rhs: Mrq for x, y, angle and d
+_UNIT = np.eye(2 * WIDTH)[WIDTH - 1]  # 1 in lane k of what is loaded from WIDTH - 1 - k
 
 
 @inlined
@@ -30,93 +33,82 @@ def rigid_hub(c: Chain, w: Work, i: int, A: tuple, b: tuple) -> tuple:
     )  # fmt: skip
 
 
-@inlined
-def inertia_block(c: Chain, w: Work, i: int) -> None:
-    """Mqq of a flexible link into the lower triangle of w.S[i]: 1 + sum mu h h^T over its points, and the payload's turning; of
-    a sleeved link what the outward pass has summed."""
-    m, S = c.first[i + 1] - c.first[i] - 1, w.S[i]
+@internal
+def formed_block(c: Chain, w: Work, i: int, gh: float) -> None:
+    """Mqq + gh D + gh^2 K of a flexible link into the upper triangle of w.S[i], rows from a multiple of four on: Mqq = 1 + sum mu
+    h h^T over its points, and the payload's turning; of a sleeved link what the outward pass has summed."""
+    m = c.first[i + 1] - c.first[i] - 1
     if c.kind[i] == SLEEVE:
+        inertia, stiffness = 1.0 + gh * c.alpha[i], gh * (c.beta[i] + gh)
         for k in range(m):
-            for j in range(k + 1):
-                S[k, j] = w.M[i, k, j]
+            for b in range(k - k % WIDTH, m, WIDTH):
+                store(w.S[i, k], b, inertia * load(w.M[i, k], b) + stiffness * load(w.K[i, k], b))
         return
+    turning = c.tip_inertia[i] * (w.tilt[i] * w.tilt[i] - 1.0)
     for k in range(m):
-        for j in range(k):
-            S[k, j] = 0.0
-        S[k, k] = 1.0
-    if c.stiffening:
-        turning = c.tip_inertia[i] * (w.tilt[i] * w.tilt[i] - 1.0)
-        for k in range(m):
-            for j in range(k + 1):
-                total = turning * c.SL[i, k] * c.SL[i, j]
+        lane = k % WIDTH
+        row = (1.0 + gh * (c.damp[i, k] + gh * c.lam[i, k])) * load(_UNIT, WIDTH - 1 - lane)
+        for b in range(k - lane, m, WIDTH):
+            if c.stiffening:
+                row += turning * c.SL[i, k] * load(c.SL[i], b)
                 for p in range(c.points[i]):
-                    total += c.point_mass[i, p] * w.h[i, p, k] * w.h[i, p, j]
-                S[k, j] += total
+                    row += c.point_mass[i, p] * w.h[i, p, k] * load(w.h[i, p], b)
+            store(w.S[i, k], b, row)
+            row = lanes(0.0)
 
 
-@inlined
-def _elastic(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh: float, columns: int) -> None:
-    """Factorise S = Mqq + gh D + gh^2 K = l d l^T of a flexible link and form l^-1 (Mqr, cq, Jq^T) in the rows of w.rhs.
+@compiled
+def inertia_block(c: Chain, w: Work, i: int) -> None:
+    """Mqq of a flexible link, of which w.S[i] is to have the upper triangle."""
+    formed_block(pinned(c), pinned(w), i, 0.0)
 
-    Columns: Mrq (x, y, angle), cq, Jq (x, y, angle), Mrq (d of a sleeve); `columns` of them are wanted.
-    """
+
+@internal
+def _elastic(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh: float) -> None:
+    """Factorise S = Mqq + gh D + gh^2 K = l d l^T of a flexible link and form l^-1 of its terms in the rows of w.rhs."""
     e, end = c.first[i], c.first[i + 1]
     m = end - e - 1
-    S, rhs, qs, qds = w.S[i], w.rhs[i], ys[e + 1 : end], vs[e + 1 : end]
-    inertia_block(c, w, i)
+    S, L, rhs, terms, qs, qds = w.S[i], w.L[i], w.rhs[i], w.terms[i], ys[e + 1 : end], vs[e + 1 : end]
+    formed_block(c, w, i, gh)
+    alpha, beta = c.alpha[i], c.beta[i]
     for k in range(m):
-        rhs[k, 0], rhs[k, 1], rhs[k, 2] = w.col[i, k, 0], w.col[i, k, 1], w.col[i, k, 2]
-        rhs[k, 4], rhs[k, 5], rhs[k, 6] = w.jac[i, k, 0], w.jac[i, k, 1], w.jac[i, k, 2]
-        rhs[k, 3] = w.cv[i, k]
-    if c.kind[i] == SLEEVE:
-        alpha, beta = c.alpha[i], c.beta[i]
-        for k in range(m):
-            rhs[k, 7] = w.col[i, k, 3]
-            for j in range(k + 1):
-                M, K = w.M[i, k, j], w.K[i, k, j]
-                D = alpha * M + beta * K
-                rhs[k, 3] += K * qs[j] + D * qds[j]
-                if j < k:
-                    rhs[j, 3] += K * qs[k] + D * qds[k]
-                S[k, j] += gh * D + gh * gh * K
-    else:
-        for k in range(m):
-            rhs[k, 3] += c.lam[i, k] * qs[k] + c.damp[i, k] * qds[k]
-            S[k, k] += gh * c.damp[i, k] + gh * gh * c.lam[i, k]
-    for k in range(m):
-        for j in range(k):
-            entry = S[k, j]
-            for s in range(j):
-                entry -= S[k, s] * S[j, s]  # S[k, s] still holds l d
-            S[k, j] = entry
-        d = S[k, k]
-        for j in range(k):
-            ld = S[k, j]
-            lower = ld * w.dinv[i, j]
-            d -= ld * lower
-            S[k, j] = lower
-            for s in range(columns):
-                rhs[k, s] -= lower * rhs[j, s]
-        w.dinv[i, k] = 1.0 / d
+        if c.kind[i] == SLEEVE:
+            sums = lanes(0.0)
+            for b in range(0, m, WIDTH):
+                q, qd = load_some(qs, b, m - b), load_some(qds, b, m - b)
+                M, K = load(w.M[i, k], b), load(w.K[i, k], b)
+                sums += K * q + (alpha * M + beta * K) * qd
+            linear = total(sums)
+        else:
+            linear = c.lam[i, k] * qs[k] + c.damp[i, k] * qds[k]
+        store(rhs[k], 0, load(terms[k], 0) + pack(0.0, 0.0, 0.0, linear))
+        store(rhs[k], 4, load(terms[k], 4))
+    for j in range(m):
+        inverse = 1.0 / S[j, j]
+        w.dinv[i, j] = inverse
+        near, far = load(rhs[j], 0), load(rhs[j], 4)
+        for k in range(j + 1, m):
+            lower = S[j, k] * inverse
+            L[k, j] = lower
+            for b in range(k - k % WIDTH, m, WIDTH):
+                store(S[k], b, load(S[k], b) - lower * load(S[j], b))
+            store(rhs[k], 0, load(rhs[k], 0) - lower * near)
+            store(rhs[k], 4, load(rhs[k], 4) - lower * far)
 
 
 @inlined
 def last_hub(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh: float) -> tuple:
     """The same for the last link if it is flexible: nothing is attached to its tip, the payload is in its own terms."""
-    _elastic(c, w, i, ys, vs, gh, 4)
-    Q00, Q01, Q02, Q11, Q12, Q22, m0, m1, m2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    _elastic(c, w, i, ys, vs, gh)
+    x, y, angle = lanes(0.0), lanes(0.0), lanes(0.0)
     for k in range(c.first[i + 1] - c.first[i] - 1):
-        r0, r1, r2, cq = w.rhs[i, k, 0], w.rhs[i, k, 1], w.rhs[i, k, 2], w.rhs[i, k, 3]
-        d0, d1, d2 = w.dinv[i, k] * r0, w.dinv[i, k] * r1, w.dinv[i, k] * r2
-        Q00 += d0 * r0
-        Q01 += d0 * r1
-        Q02 += d0 * r2
-        Q11 += d1 * r1
-        Q12 += d1 * r2
-        Q22 += d2 * r2
-        m0 += d0 * cq
-        m1 += d1 * cq
-        m2 += d2 * cq
+        r, own = w.rhs[i, k], load(w.rhs[i, k], 0)
+        x += w.dinv[i, k] * r[0] * own
+        y += w.dinv[i, k] * r[1] * own
+        angle += w.dinv[i, k] * r[2] * own
+    Q00, Q01, Q02, m0 = parts(x)
+    _, Q11, Q12, m1 = parts(y)
+    _, _, Q22, m2 = parts(angle)
     return (
         c.mass[i] - Q00, -Q01, -w.body[i, 0] - Q02, c.mass[i] - Q11, w.body[i, 1] - Q12, w.body[i, 2] - Q22,
         w.body[i, 3] - m0, w.body[i, 4] - m1, w.body[i, 5] - m2,
@@ -175,43 +167,29 @@ def flexible_hub(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh: 
     t = (1 + E A)^-1 [(X - P) u + t0], t0 = beta - Jq S^-1 cq - E b, and
     F = [Mrr - Q + (X - P)^T B (X - P)] u + hr - Mrq S^-1 cq + (X - P)^T (B t0 + b).
     """
-    _elastic(c, w, i, ys, vs, gh, 7)
-    Q00, Q01, Q02, Q11, Q12, Q22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    P00, P01, P02, P10, P11, P12, P20, P21, P22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    E00, E01, E02, E11, E12, E22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    m0, m1, m2, j0, j1, j2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    _elastic(c, w, i, ys, vs, gh)
+    zero = lanes(0.0)
+    qx, qy, qt, px, py, pt, ex, ey, et = zero, zero, zero, zero, zero, zero, zero, zero, zero
     for k in range(c.first[i + 1] - c.first[i] - 1):
-        x, s0, s1, cq = w.rhs[i, k, 0], w.rhs[i, k, 1], w.rhs[i, k, 2], w.rhs[i, k, 3]
-        jx, jy, jz = w.rhs[i, k, 4], w.rhs[i, k, 5], w.rhs[i, k, 6]
-        dx, d0, d1 = w.dinv[i, k] * x, w.dinv[i, k] * s0, w.dinv[i, k] * s1
-        ex, ey, ez = w.dinv[i, k] * jx, w.dinv[i, k] * jy, w.dinv[i, k] * jz
-        Q00 += dx * x
-        Q01 += dx * s0
-        Q02 += dx * s1
-        Q11 += d0 * s0
-        Q12 += d0 * s1
-        Q22 += d1 * s1
-        m0 += dx * cq
-        m1 += d0 * cq
-        m2 += d1 * cq
-        P00 += jx * dx
-        P01 += jx * d0
-        P02 += jx * d1
-        P10 += jy * dx
-        P11 += jy * d0
-        P12 += jy * d1
-        P20 += jz * dx
-        P21 += jz * d0
-        P22 += jz * d1
-        E00 += ex * jx
-        E01 += ex * jy
-        E02 += ex * jz
-        E11 += ey * jy
-        E12 += ey * jz
-        E22 += ez * jz
-        j0 += ex * cq
-        j1 += ey * cq
-        j2 += ez * cq
+        r, inverse, own, tip = w.rhs[i, k], w.dinv[i, k], load(w.rhs[i, k], 0), load(w.rhs[i, k], 4)
+        qx += inverse * r[0] * own
+        qy += inverse * r[1] * own
+        qt += inverse * r[2] * own
+        px += inverse * r[4] * own
+        py += inverse * r[5] * own
+        pt += inverse * r[6] * own
+        ex += inverse * r[4] * tip
+        ey += inverse * r[5] * tip
+        et += inverse * r[6] * tip
+    Q00, Q01, Q02, m0 = parts(qx)
+    _, Q11, Q12, m1 = parts(qy)
+    _, _, Q22, m2 = parts(qt)
+    P00, P01, P02, j0 = parts(px)
+    P10, P11, P12, j1 = parts(py)
+    P20, P21, P22, j2 = parts(pt)
+    E00, E01, E02, _ = parts(ex)
+    _, E11, E12, _ = parts(ey)
+    _, _, E22, _ = parts(et)
     x00, x01, x02 = 1.0 - P00, -P01, -w.place[i, 1] - P02
     x10, x11, x12 = -P10, 1.0 - P11, w.place[i, 0] - P12
     x20, x21, x22 = -P20, -P21, 1.0 - P22
@@ -236,7 +214,7 @@ def flexible_hub(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh: 
     )
 
 
-@compiled
+@internal
 def sleeve_hub(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh: float, A: tuple, b: tuple) -> None:
     """Condensed inertia (4 x 4) and bias (4) of a link at its sleeve, in x, y, angle and d, into w.inertia and w.bias: the
     equations of `flexible_hub` with a fourth column, rho, in Mrr, Mrq and X."""
@@ -252,26 +230,38 @@ def sleeve_hub(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh: fl
     E00, E01, E02, E11, E12, E22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     t0, t1, t2 = w.beta[i, 0], w.beta[i, 1], w.beta[i, 2]
     if m > 0:
-        _elastic(c, w, i, ys, vs, gh, 8)
+        _elastic(c, w, i, ys, vs, gh)
+        for row in range(4):
+            near, far = lanes(0.0), lanes(0.0)
+            for k in range(m):
+                own = w.dinv[i, k] * w.rhs[i, k, _COLUMN[row]]
+                near += own * load(w.rhs[i, k], 0)
+                far += own * load(w.rhs[i, k], 4)
+            q0, q1, q2, force = parts(near)
+            x0, x1, x2, q3 = parts(far)
+            I[row, 0] -= q0
+            I[row, 1] -= q1
+            I[row, 2] -= q2
+            I[row, 3] -= q3
+            p[row] -= force
+            X[0, row] -= x0
+            X[1, row] -= x1
+            X[2, row] -= x2
+        ex, ey, et, tx, ty, tt = lanes(0.0), lanes(0.0), lanes(0.0), lanes(0.0), lanes(0.0), lanes(0.0)
         for k in range(m):
-            r, inverse = w.rhs[i, k], w.dinv[i, k]
-            for row in range(4):
-                own = inverse * r[_COLUMN[row]]
-                for col in range(row, 4):
-                    I[row, col] -= own * r[_COLUMN[col]]
-                p[row] -= own * r[3]
-                for axis in range(3):
-                    X[axis, row] -= own * r[4 + axis]
-            ex, ey, ez = inverse * r[4], inverse * r[5], inverse * r[6]
-            E00 += ex * r[4]
-            E01 += ex * r[5]
-            E02 += ex * r[6]
-            E11 += ey * r[5]
-            E12 += ey * r[6]
-            E22 += ez * r[6]
-            t0 -= ex * r[3]
-            t1 -= ey * r[3]
-            t2 -= ez * r[3]
+            r, inverse, own, tip = w.rhs[i, k], w.dinv[i, k], load(w.rhs[i, k], 0), load(w.rhs[i, k], 4)
+            ex += inverse * r[4] * tip
+            ey += inverse * r[5] * tip
+            et += inverse * r[6] * tip
+            tx += inverse * r[4] * own
+            ty += inverse * r[5] * own
+            tt += inverse * r[6] * own
+        E00, E01, E02, _ = parts(ex)
+        _, E11, E12, _ = parts(ey)
+        _, _, E22, _ = parts(et)
+        t0 -= parts(tx)[3]
+        t1 -= parts(ty)[3]
+        t2 -= parts(tt)[3]
     if i + 1 == c.kind.shape[0]:
         return
     B00, B01, B02, B11, B12, B22, f0, f1, f2 = _attached(w, i, A, b, (t0, t1, t2), (E00, E01, E02, E11, E12, E22))

@@ -21,9 +21,11 @@ from __future__ import annotations
 import numpy as np
 
 from .chain import COULOMB_SPEED, REVOLUTE, SLEEVE, Chain, Work
-from .compiled import compiled, inlined
+from .compiled import compiled, inlined, internal
 from .hubs import flexible_hub, last_hub, released, rigid_hub, sleeve_hub
-from .outward import outward
+from .lanes import WIDTH, load, pack, store, total
+from .outward import passed_outward
+from .pinned import pinned
 
 
 @inlined
@@ -47,7 +49,7 @@ def _grip(
     return dinv, rest, rest * dinv
 
 
-@inlined
+@internal
 def passes(
     c: Chain, w: Work, y: np.ndarray, v: np.ndarray, ys: np.ndarray, vs: np.ndarray, gh: float,
     force: np.ndarray, kp: np.ndarray, kd: np.ndarray, a: np.ndarray,
@@ -57,7 +59,7 @@ def passes(
     `force` (N,) is what acts in the joints apart from friction, at (ys, vs); kp, kd (N,) are its gains. A joint that is held
     (`w.held`) has the acceleration `w.given`, and its force is found (`w.reaction`).
     """
-    outward(c, w, y, v)
+    passed_outward(c, w, y, v)
     links = c.kind.shape[0]
     A, b = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)  # the wrench A t + b at the attachment of link i
     for i in range(links - 1, -1, -1):
@@ -133,17 +135,15 @@ def passes(
             r1 = cond[21] * u0 + cond[22] * u1 + cond[23] * u2 + cond[28]
             r2 = cond[24] * u0 + cond[25] * u1 + cond[26] * u2 + cond[29]
             t0, t1, t2, f0, f1, f2 = released(w, i, r0, r1, r2)
-        m = end - e - 1
-        qdd = a[e + 1 : end]
+        m, qdd = end - e - 1, w.qdd
+        hub, tip = pack(u0, u1, u2, 1.0), pack(f0, f1, f2, a[e] if c.kind[i] == SLEEVE else 0.0)
         for k in range(m):  # l^T qdd = -dinv l^-1 (Mqr u + cq + Jq^T f)
-            r = w.rhs[i, k]
-            total = r[0] * u0 + r[1] * u1 + r[2] * u2 + r[3]
-            if c.kind[i] == SLEEVE:
-                total += r[7] * a[e]
-            qdd[k] = -w.dinv[i, k] * (total + r[4] * f0 + r[5] * f1 + r[6] * f2)
+            qdd[k] = -w.dinv[i, k] * total(load(w.rhs[i, k], 0) * hub + load(w.rhs[i, k], 4) * tip)
         for k in range(m - 1, 0, -1):
-            for j in range(k):
-                qdd[j] -= w.S[i, k, j] * qdd[k]
+            for b in range(0, k, WIDTH):
+                store(qdd, b, load(qdd, b) - qdd[k] * load(w.L[i, k], b))
+        for k in range(m):
+            a[e + 1 + k] = qdd[k]
 
 
 @inlined
@@ -161,5 +161,5 @@ def accelerate(
     c: Chain, w: Work, y: np.ndarray, v: np.ndarray, ys: np.ndarray, vs: np.ndarray, gh: float,
     force: np.ndarray, kp: np.ndarray, kd: np.ndarray, a: np.ndarray,
 ) -> None:  # fmt: skip
-    """`passes` as a function to call."""
-    passes(c, w, y, v, ys, vs, gh, force, kp, kd, a)
+    """`passes` for Python."""
+    passes(pinned(c), pinned(w), y, v, ys, vs, gh, force, kp, kd, a)

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .compiled import inlined
+from .compiled import compiled, inlined, internal
 from .signal import evaluate
 
 NONE, EFFORT, STEPPER = 0, 1, 2  # what a joint's output is: not this controller's, a force or voltage, a rate
@@ -133,7 +133,7 @@ def pid(g: np.ndarray, m: np.ndarray, e: float, rate: float, setpoint_rate: floa
     return u
 
 
-@inlined
+@internal
 def _estimate(d: Law) -> None:
     """z^ = z + L (y - C z)."""
     p = d.F.shape[0]
@@ -147,7 +147,7 @@ def _estimate(d: Law) -> None:
             d.z[1, a] += d.L[a, b] * new
 
 
-@inlined
+@internal
 def _predict(d: Law) -> None:
     """z = F z^ + G u, with the outputs as given."""
     p = d.F.shape[0]
@@ -160,7 +160,7 @@ def _predict(d: Law) -> None:
         d.z[0, a] = total
 
 
-@inlined
+@internal
 def _linear(d: Law, i: int) -> float:
     """-K z^ + Kr r + Kv r' + what holds the robot where it was linearised; R and V of the memory hold r and r'."""
     joints, wish = d.kind.shape[0], d.hold[i]
@@ -171,7 +171,7 @@ def _linear(d: Law, i: int) -> float:
     return wish
 
 
-@inlined
+@compiled
 def tick(d: Law, segments: np.ndarray, t: float, z: np.ndarray) -> None:
     """The tick at t: measure the state z, compute, put what is held until the next tick into the loop's `segments`."""
     k, per_tick, rate_Hz, linear = int(d.sensor[TICK]), 1.0 / d.rate_Hz, d.rate_Hz, d.F.shape[0] > 0

@@ -11,14 +11,16 @@ velocities; FLOOR replaces these at the start.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from .chain import COULOMB_SPEED, SLEEVE, SLIDER, Chain, Work
-from .compiled import compiled, inlined
+from .compiled import compiled, inlined, internal
 from .kernel import passes
+from .lanes import WIDTH, lanes, load, load_some, padded, store, store_some, total
 from .law import Law, due, tick
+from .pinned import pinned
 from .signal import evaluate
 from .tableaus import _A, _AX, _C, _CX, _D, _E3, _E5, _EA, _EC, _EE, _PA, _PC, _PE, GAMMA
 
@@ -60,10 +62,12 @@ class Memory(NamedTuple):
 
 
 def memory(links: int, unknowns: int) -> Memory:
+    """Fresh memory; four numbers may be read or written from every place of the vectors, and rows end on a multiple of four."""
     z, size = np.zeros, 2 * unknowns + 2
+    v, wide = lambda count: z(padded(count) + WIDTH)[:count], padded(size) + WIDTH
     return Memory(
-        z(12), z(size), z(size), z((16, size)), z((7, size)), z((links, 4)), z(2 * unknowns), z(links),
-        z(unknowns), z(unknowns), z(unknowns), z(links),
+        z(12), v(size), v(size), z((16, wide)), z((7, wide)), z((links, 4)), v(2 * unknowns), z(links),
+        v(unknowns), v(unknowns), v(unknowns), z(links),
     )  # fmt: skip
 
 
@@ -76,18 +80,27 @@ def _copy(source: np.ndarray, target: np.ndarray) -> None:
 @inlined
 def _combine(m: Memory, h: float, weights: np.ndarray, count: int, out: np.ndarray) -> None:
     """out = z + h sum_j weights_j K_j over the first `count` stages."""
-    size = m.z.shape[0]
-    for k in range(size):
-        out[k] = 0.0
-    for j in range(count):
-        weight = weights[j]
-        for k in range(size):
-            out[k] += weight * m.K[j, k]
-    for k in range(size):
-        out[k] = m.z[k] + h * out[k]
+    for b in range(0, m.z.shape[0], WIDTH):
+        sums = lanes(0.0)
+        for j in range(count):
+            sums += weights[j] * load(m.K[j], b)
+        store(out, b, load(m.z, b) + h * sums)
 
 
 @inlined
+def _error(m: Memory, weights: np.ndarray, count: int) -> float:
+    """Sum of the squares of what `weights` make of the first `count` stages, over the error weights."""
+    squares = lanes(0.0)
+    for b in range(0, m.scale.shape[0], WIDTH):
+        sums = lanes(0.0)
+        for j in range(count):
+            sums += weights[j] * load(m.K[j], b)
+        sums *= load_some(m.scale, b, m.scale.shape[0] - b)
+        squares += sums * sums
+    return total(squares)
+
+
+@compiled
 def drive(c: Chain, d: Inputs, t: float, y: np.ndarray, v: np.ndarray, force: np.ndarray) -> None:
     """Joint forces (N,) of the drives at time t."""
     for i in range(force.shape[0]):
@@ -120,8 +133,8 @@ def _find(c: Chain, w: Work, d: Inputs, v: np.ndarray, force: np.ndarray) -> Non
             force[i] = w.reaction[i] + c.viscous[i] * speed + c.coulomb[i] * np.tanh(speed / COULOMB_SPEED)
 
 
-@inlined
-def _powers(c: Chain, w: Work, v: np.ndarray, force: np.ndarray, dz: np.ndarray) -> None:
+@compiled
+def powers(c: Chain, w: Work, v: np.ndarray, force: np.ndarray, dz: np.ndarray) -> None:
     """Power of the drives and power lost to friction and damping, into the last two entries of dz, after a pass."""
     n = v.shape[0]
     work, loss = 0.0, 0.0
@@ -133,15 +146,14 @@ def _powers(c: Chain, w: Work, v: np.ndarray, force: np.ndarray, dz: np.ndarray)
             loss += c.coulomb[i] * v[e] * np.tanh(v[e] / COULOMB_SPEED)
         for k in range(c.first[i + 1] - e - 1):
             if c.kind[i] == SLEEVE:
-                for j in range(k + 1):
-                    both = 1.0 if j == k else 2.0
-                    loss += both * (c.alpha[i] * w.M[i, k, j] + c.beta[i] * w.K[i, k, j]) * v[e + 1 + k] * v[e + 1 + j]
+                for j in range(c.first[i + 1] - e - 1):
+                    loss += (c.alpha[i] * w.M[i, k, j] + c.beta[i] * w.K[i, k, j]) * v[e + 1 + k] * v[e + 1 + j]
             else:
                 loss += c.damp[i, k] * v[e + 1 + k] * v[e + 1 + k]
     dz[2 * n], dz[2 * n + 1] = work, loss
 
 
-@inlined
+@internal
 def _slope(c: Chain, w: Work, d: Inputs, m: Memory, t: float, z: np.ndarray, dz: np.ndarray) -> None:
     n = m.a.shape[0]
     y, v = z[:n], z[n : 2 * n]
@@ -150,16 +162,11 @@ def _slope(c: Chain, w: Work, d: Inputs, m: Memory, t: float, z: np.ndarray, dz:
     passes(c, w, y, v, y, v, 0.0, m.force, m.zero, m.zero, dz[n : 2 * n])
     _find(c, w, d, v, m.force)
     _copy(v, dz[:n])
-    _powers(c, w, v, m.force, dz)
+    powers(c, w, v, m.force, dz)
     m.s[EVALS] += 1
 
 
-@compiled
-def _slope_once(c: Chain, w: Work, d: Inputs, m: Memory, t: float, z: np.ndarray, dz: np.ndarray) -> None:
-    _slope(c, w, d, m, t, z, dz)
-
-
-@inlined
+@internal
 def _weights(c: Chain, m: Memory, rtol: float, z: np.ndarray) -> None:
     """Error weights 1/(rtol * size) from the largest sizes so far."""
     n = m.a.shape[0]
@@ -173,32 +180,25 @@ def _weights(c: Chain, m: Memory, rtol: float, z: np.ndarray) -> None:
         big[0], big[1] = max(big[0], abs(z[e])), max(big[1], abs(z[n + e]))
         big[2], big[3] = max(big[2], np.sqrt(q2)), max(big[3], np.sqrt(v2))
         m.scale[e], m.scale[n + e] = 1.0 / (rtol * max(big[0], FLOOR)), 1.0 / (rtol * max(big[1], FLOOR))
+        place, rate = 1.0 / (rtol * max(big[2], FLOOR)), 1.0 / (rtol * max(big[3], FLOOR))
         for k in range(e + 1, end):
-            m.scale[k], m.scale[n + k] = 1.0 / (rtol * max(big[2], FLOOR)), 1.0 / (rtol * max(big[3], FLOOR))
+            m.scale[k], m.scale[n + k] = place, rate
 
 
-@inlined
+@internal
 def _explicit_step(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, last: float) -> float:
     """One DOP853 step from m.z to m.znew; returns the error norm (accept below 1)."""
     K, new = m.K, m.znew
     for s in range(1, 13):
         _combine(m, h, _A[s], s, new)
-        _slope_once(c, w, d, m, min(t + _C[s] * h, last), new, K[s])
-    e5, e3 = 0.0, 0.0
-    for k in range(m.scale.shape[0]):
-        a, b = 0.0, 0.0
-        for j in range(13):
-            a += _E5[j] * K[j, k]
-            b += _E3[j] * K[j, k]
-        a, b = a * m.scale[k], b * m.scale[k]
-        e5 += a * a
-        e3 += b * b
+        _slope(c, w, d, m, min(t + _C[s] * h, last), new, K[s])
+    e5, e3 = _error(m, _E5, 13), _error(m, _E3, 13)
     if e5 == 0.0:
         return 0.0
     return abs(h) * e5 / np.sqrt((e5 + 0.01 * e3) * m.scale.shape[0])
 
 
-@inlined
+@internal
 def _pair_step(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, last: float, method: int) -> float:
     """One step of a pair from m.z to m.znew, its first stage included; returns the error norm."""
     K, new, pair = m.K, m.znew, method - PAIR_3
@@ -208,59 +208,61 @@ def _pair_step(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, last
         _slope(c, w, d, m, min(t + _PC[pair, s] * h, last), new, K[s])
     _combine(m, h, _PA[pair, stages], stages, new)
     _prescribe(c, w, d, last if t + h > last else t + h, new[: m.a.shape[0]], new[m.a.shape[0] : 2 * m.a.shape[0]])
-    error = 0.0
-    for k in range(m.scale.shape[0]):
-        total = 0.0
-        for j in range(stages):
-            total += _PE[pair, j] * K[j, k]
-        total *= h * m.scale[k]
-        error += total * total
-    return np.sqrt(error / m.scale.shape[0])
+    return h * np.sqrt(_error(m, _PE[pair], stages) / m.scale.shape[0])
 
 
 @compiled
 def forces(c: Chain, w: Work, d: Inputs, m: Memory, t: np.ndarray, states: np.ndarray, out: np.ndarray) -> None:
     """Drive forces out (T, N) at states (T, 2n); prescribed joints are put on their motion in `states`."""
+    c, w, d, m = pinned(c), pinned(w), pinned(d), pinned(m)
     for row in range(t.shape[0]):
         for k in range(states.shape[1]):
             m.znew[k] = states[row, k]
-        _slope_once(c, w, d, m, t[row], m.znew, m.K[1])
+        _slope(c, w, d, m, t[row], m.znew, m.K[1])
         for k in range(states.shape[1]):
             states[row, k] = m.znew[k]
         for i in range(out.shape[1]):
             out[row, i] = m.force[i]
 
 
-@compiled
+@internal
 def _dense(c: Chain, w: Work, d: Inputs, m: Memory, method: int, t: float, h: float, last: float) -> None:
     """What `_interpolate` needs of the step just made beyond its stages."""
     if method == EXPLICIT:
         _explicit_dense(c, w, d, m, t, h, last)
     elif method != IMPLICIT:
-        _slope_once(c, w, d, m, min(t + h, last), m.znew, m.K[5])
+        _slope(c, w, d, m, min(t + h, last), m.znew, m.K[5])
 
 
-@compiled
+@internal
 def _explicit_dense(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, last: float) -> None:
     """Coefficients of the order-7 interpolant of the step just made (m.z to m.znew)."""
     K, F, z = m.K, m.F, m.z
-    size = z.shape[0]
     for s in range(3):
         _combine(m, h, _AX[s], 13 + s, F[0])
-        _slope_once(c, w, d, m, min(t + _CX[s] * h, last), F[0], K[13 + s])
-    for k in range(size):
-        dz = m.znew[k] - z[k]
-        F[0, k] = dz
-        F[1, k] = h * K[0, k] - dz
-        F[2, k] = 2 * dz - h * (K[12, k] + K[0, k])
+        _slope(c, w, d, m, min(t + _CX[s] * h, last), F[0], K[13 + s])
+    for b in range(0, z.shape[0], WIDTH):
+        dz, start, end = load(m.znew, b) - load(z, b), h * load(K[0], b), h * load(K[12], b)
+        store(F[0], b, dz)
+        store(F[1], b, start - dz)
+        store(F[2], b, 2 * dz - (end + start))
         for r in range(4):
-            total = 0.0
+            sums = lanes(0.0)
             for j in range(16):
-                total += _D[r, j] * K[j, k]
-            F[3 + r, k] = h * total
+                sums += _D[r, j] * load(K[j], b)
+            store(F[3 + r], b, h * sums)
 
 
 @inlined
+def _stage(m: Memory, gh: float) -> None:
+    """The state at an implicit stage from its accelerations, into m.znew."""
+    n = m.a.shape[0]
+    for b in range(0, n, WIDTH):
+        store_some(m.znew, b, load(m.ys, b) + gh * gh * load(m.a, b), n - b)
+        store_some(m.znew, n + b, load(m.vs, b) + gh * load(m.a, b), n - b)
+
+
+@internal
 def _implicit_step(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, last: float) -> float:
     """One ESDIRK step from m.z to m.znew; returns the error norm, or a large number where a stage does not converge."""
     K, z, new = m.K, m.z, m.znew
@@ -269,19 +271,19 @@ def _implicit_step(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, 
     for k in range(n):
         m.a[k] = K[0, n + k]
     for s in range(1, 6):
-        for k in range(n):
-            ys, vs = z[k], z[n + k]
+        for b in range(0, n, WIDTH):
+            ys, vs = load(z, b), load(z, n + b)
             for j in range(s):
-                ys += h * _EA[s, j] * K[j, k]
-                vs += h * _EA[s, j] * K[j, n + k]
-            m.ys[k], m.vs[k] = ys + gh * vs, vs
+                ys += h * _EA[s, j] * load(K[j], b)
+                vs += h * _EA[s, j] * load_some(K[j], n + b, n - b)
+            store(m.ys, b, ys + gh * vs)
+            store(m.vs, b, vs)
         ts = min(t + _EC[s] * h, last)
         drive(c, d, ts, m.ys, m.vs, m.force)
         previous = 1e300
         for iteration in range(10):
-            for k in range(n):
-                new[k], new[n + k] = m.ys[k] + gh * gh * m.a[k], m.vs[k] + gh * m.a[k]
-                K[s, k] = m.a[k]
+            _stage(m, gh)
+            _copy(m.a, K[s, :n])
             _prescribe(c, w, d, ts, new[:n], new[n : 2 * n])
             passes(c, w, new[:n], new[n : 2 * n], m.ys, m.vs, gh, m.force, d.kp, d.kd, m.a)
             m.s[EVALS] += 1
@@ -294,53 +296,53 @@ def _implicit_step(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, 
             if not change < 1e12 or (iteration > 2 and change > 0.9 * previous) or iteration == 9:
                 return 1e6
             previous = change
-        for k in range(n):
-            new[k], new[n + k] = m.ys[k] + gh * gh * m.a[k], m.vs[k] + gh * m.a[k]
-            K[s, k], K[s, n + k] = new[n + k], m.a[k]
+        _stage(m, gh)
+        _copy(new[n : 2 * n], K[s, :n])
+        _copy(m.a, K[s, n : 2 * n])
         _prescribe(c, w, d, ts, new[:n], new[n : 2 * n])
         drive(c, d, ts, new[:n], new[n : 2 * n], m.force)
         _find(c, w, d, new[n : 2 * n], m.force)
-        _powers(c, w, new[n : 2 * n], m.force, K[s])
+        powers(c, w, new[n : 2 * n], m.force, K[s])
     for k in range(2 * n, 2 * n + 2):
-        total = 0.0
+        sums = 0.0
         for j in range(6):
-            total += _EA[5, j] * K[j, k]
-        new[k] = z[k] + h * total
-    error = 0.0
-    for k in range(2 * n):
-        total = 0.0
-        for j in range(6):
-            total += _EE[j] * K[j, k]
-        total *= h * m.scale[k]
-        error += total * total
-    return np.sqrt(error / (2 * n))
+            sums += _EA[5, j] * K[j, k]
+        new[k] = z[k] + h * sums
+    return h * np.sqrt(_error(m, _EE, 6) / (2 * n))
 
 
-@inlined
+@internal
 def _interpolate(m: Memory, method: int, h: float, x: float, out: np.ndarray) -> None:
     """The state at t + x h inside the step just made: order 7 (explicit), or quintic Hermite from positions to accelerations
     (all others)."""
-    z, new = m.z, m.znew
-    size = z.shape[0]
+    z, new, n, size = m.z, m.znew, m.a.shape[0], m.z.shape[0]
     if method == EXPLICIT:
-        for k in range(size):
-            total = 0.0
+        for b in range(0, size, WIDTH):
+            sums = lanes(0.0)
             for r in range(6, -1, -1):
-                total = (total + m.F[r, k]) * (x if r % 2 == 0 else 1.0 - x)
-            out[k] = z[k] + total
+                sums = (sums + load(m.F[r], b)) * (x if r % 2 == 0 else 1.0 - x)
+            store_some(out, b, load(z, b) + sums, size - b)
         return
-    n = m.a.shape[0]
-    for k in range(n):
-        dy = new[k] - z[k]
-        v0, v1, a0, a1 = h * z[n + k], h * new[n + k], h * h * m.K[0, n + k], h * h * m.K[5, n + k]
-        c3 = 10 * dy - 6 * v0 - 4 * v1 - 1.5 * a0 + 0.5 * a1
-        c4 = -15 * dy + 8 * v0 + 7 * v1 + 1.5 * a0 - a1
-        c5 = 6 * dy - 3 * v0 - 3 * v1 - 0.5 * a0 + 0.5 * a1
-        out[k] = z[k] + x * (v0 + x * (0.5 * a0 + x * (c3 + x * (c4 + x * c5))))
-        out[n + k] = (v0 + x * (a0 + x * (3 * c3 + x * (4 * c4 + x * 5 * c5)))) / h
+    for b in range(0, n, WIDTH):
+        y0, v0, v1 = load(z, b), h * load(z, n + b), h * load(new, n + b)
+        dy, a0, a1 = load(new, b) - y0, h * h * load_some(m.K[0], n + b, n - b), h * h * load_some(m.K[5], n + b, n - b)
+        y, v = quintic(x, dy, v0, v1, a0, a1)
+        store_some(out, b, y0 + y, n - b)
+        store_some(out, n + b, v * (1.0 / h), n - b)
     for k in range(2 * n, size):
         dy, f0, f1 = new[k] - z[k], h * m.K[0, k], h * m.K[5, k]
         out[k] = z[k] + x * (f0 + x * (3 * dy - 2 * f0 - f1 + x * (f0 + f1 - 2 * dy)))
+
+
+@inlined
+def quintic(x: float, dy: Any, v0: Any, v1: Any, a0: Any, a1: Any) -> tuple:
+    """What a quintic rises by up to the fraction x, and its slope there, from its whole rise dy and its slopes and curvatures by
+    x at both ends."""
+    c3 = 10.0 * dy - 6.0 * v0 - 4.0 * v1 - 1.5 * a0 + 0.5 * a1
+    c4 = -15.0 * dy + 8.0 * v0 + 7.0 * v1 + 1.5 * a0 - a1
+    c5 = 6.0 * dy - 3.0 * v0 - 3.0 * v1 - 0.5 * a0 + 0.5 * a1
+    y = x * (v0 + x * (0.5 * a0 + x * (c3 + x * (c4 + x * c5))))
+    return y, v0 + x * (a0 + x * (3.0 * c3 + x * (4.0 * c4 + 5.0 * x * c5)))
 
 
 @inlined
@@ -354,7 +356,7 @@ def _shortest(c: Chain, z: np.ndarray) -> float:
     return least
 
 
-@inlined
+@internal
 def _outside(c: Chain, d: Inputs, z: np.ndarray) -> int:
     """The first joint beyond its limits, or a slider that has run into the sleeve of the link it rides on; -1: none."""
     for i in range(c.kind.shape[0]):
@@ -373,24 +375,24 @@ def _outside(c: Chain, d: Inputs, z: np.ndarray) -> int:
 
 @compiled
 def outside(c: Chain, d: Inputs, z: np.ndarray) -> int:
-    """`_outside` as a function to call."""
-    return _outside(c, d, z)
+    """`_outside` for Python."""
+    return _outside(pinned(c), pinned(d), z)
 
 
-@compiled
+@internal
 def _stop_at_limit(
     c: Chain, w: Work, d: Inputs, m: Memory, method: int, t: float, h: float, last: float, beyond: float, joint: int
 ) -> None:  # fmt: skip
     """Find by bisection where the step just made, from t, leaves a joint's limits: `joint` is beyond them at the fraction
     `beyond` of the step. m.z and s[T] are the last state inside."""
     _dense(c, w, d, m, method, t, h, last)
-    low, high, out, n = 0.0, beyond, m.K[15], m.a.shape[0]
+    low, high, out, n = 0.0, beyond, m.K[15, : m.z.shape[0]], m.a.shape[0]
     m.s[FAULT] = joint
     for _ in range(60):
         middle = 0.5 * (low + high)
         _interpolate(m, method, h, middle, out)
         _prescribe(c, w, d, t + middle * h, out[:n], out[n : 2 * n])
-        joint = outside(c, d, out)
+        joint = _outside(c, d, out)
         if joint >= 0:
             high, m.s[FAULT] = middle, joint
         else:
@@ -406,6 +408,7 @@ def advance(
     c: Chain, w: Work, d: Inputs, m: Memory, method: int, rtol: float, t_eval: np.ndarray, out: np.ndarray, max_steps: int
 ) -> None:
     """Go on with the run held in `m` for at most `max_steps` steps, filling rows of `out` (T, 2n + 2) as their times pass."""
+    c, w, d, m = pinned(c), pinned(w), pinned(d), pinned(m)
     s = m.s
     order = (8.0, 4.0, 3.0, 5.0)[method]
     n = m.a.shape[0]
@@ -426,7 +429,7 @@ def advance(
         if s[FRESH] == 0.0:
             if s[STEPS] == 0.0 or method < PAIR_3:
                 _weights(c, m, rtol, m.z)
-                _slope_once(c, w, d, m, t, m.z, m.K[0])
+                _slope(c, w, d, m, t, m.z, m.K[0])
             s[FRESH] = 1.0
         h = min(s[H], stop - t, s[LONGEST] * _shortest(c, m.z))
         if stop - t < 1.5 * h and h < stop - t:

@@ -6,8 +6,9 @@ import numpy as np
 
 from .chain import SLEEVE, Chain, Work
 from .compiled import compiled
-from .hubs import inertia_block
-from .outward import outward
+from .hubs import formed_block
+from .outward import passed_outward
+from .pinned import pinned
 
 
 @compiled
@@ -17,7 +18,8 @@ def inverse(c: Chain, w: Work, y: np.ndarray, v: np.ndarray, a: np.ndarray, grav
 
     Exact and independent of the condensation in `accelerate`: the check of one against the other is a test.
     """
-    outward(c, w, y, v)
+    c, w = pinned(c), pinned(w)
+    passed_outward(c, w, y, v)
     links = c.kind.shape[0]
     t0, t1, t2 = -gravity[0], -gravity[1], 0.0
     for i in range(links):
@@ -35,9 +37,9 @@ def inverse(c: Chain, w: Work, y: np.ndarray, v: np.ndarray, a: np.ndarray, grav
             t1 += w.flow[i, 1] * a[e]
             t2 += w.flow[i, 2] * a[e]
         for k in range(end - e - 1):
-            t0 += w.jac[i, k, 0] * a[e + 1 + k]
-            t1 += w.jac[i, k, 1] * a[e + 1 + k]
-            t2 += w.jac[i, k, 2] * a[e + 1 + k]
+            t0 += w.terms[i, k, 4] * a[e + 1 + k]
+            t1 += w.terms[i, k, 5] * a[e + 1 + k]
+            t2 += w.terms[i, k, 6] * a[e + 1 + k]
     f0, f1, f2 = 0.0, 0.0, 0.0
     for i in range(links - 1, -1, -1):
         e, end = c.first[i], c.first[i + 1]
@@ -47,18 +49,18 @@ def inverse(c: Chain, w: Work, y: np.ndarray, v: np.ndarray, a: np.ndarray, grav
         F0 = c.mass[i] * u0 - body[0] * u2 + body[3] + f0
         F1 = c.mass[i] * u1 + body[1] * u2 + body[4] + f1
         F2 = -body[0] * u0 + body[1] * u1 + body[2] * u2 + body[5] - w.place[i, 1] * f0 + w.place[i, 0] * f1 + f2
-        inertia_block(c, w, i)
+        formed_block(c, w, i, 0.0)
         for k in range(m):
             qdd = a[e + 1 + k]
-            F0 += w.col[i, k, 0] * qdd
-            F1 += w.col[i, k, 1] * qdd
-            F2 += w.col[i, k, 2] * qdd
-            out[e + 1 + k] = w.col[i, k, 0] * u0 + w.col[i, k, 1] * u1 + w.col[i, k, 2] * u2 + w.cv[i, k]
-            out[e + 1 + k] += w.jac[i, k, 0] * f0 + w.jac[i, k, 1] * f1 + w.jac[i, k, 2] * f2
+            F0 += w.terms[i, k, 0] * qdd
+            F1 += w.terms[i, k, 1] * qdd
+            F2 += w.terms[i, k, 2] * qdd
+            out[e + 1 + k] = w.terms[i, k, 0] * u0 + w.terms[i, k, 1] * u1 + w.terms[i, k, 2] * u2 + w.terms[i, k, 3]
+            out[e + 1 + k] += w.terms[i, k, 4] * f0 + w.terms[i, k, 5] * f1 + w.terms[i, k, 6] * f2
         for k in range(m):
-            for j in range(k + 1):
+            for j in range(k, m):
                 out[e + 1 + k] += w.S[i, k, j] * a[e + 1 + j]
-                if j < k:
+                if j > k:
                     out[e + 1 + j] += w.S[i, k, j] * a[e + 1 + k]
         cs, sn = w.cos[i], w.sin[i]
         if c.kind[i] == SLEEVE:
@@ -68,12 +70,10 @@ def inverse(c: Chain, w: Work, y: np.ndarray, v: np.ndarray, a: np.ndarray, grav
             F1 += body[7] * a[e]
             F2 += body[8] * a[e]
             for k in range(m):
-                own += w.col[i, k, 3] * a[e + 1 + k]
-                out[e + 1 + k] += w.col[i, k, 3] * a[e]
-                for j in range(k + 1):
+                own += w.terms[i, k, 7] * a[e + 1 + k]
+                out[e + 1 + k] += w.terms[i, k, 7] * a[e]
+                for j in range(m):
                     out[e + 1 + k] += w.K[i, k, j] * y[e + 1 + j]
-                    if j < k:
-                        out[e + 1 + j] += w.K[i, k, j] * y[e + 1 + k]
             f0, f1, f2 = cs * F0 - sn * F1, sn * F0 + cs * F1, F2
             out[e] = own + c.rotor[i] * a[e]
         else:
@@ -87,6 +87,7 @@ def mass(
 ) -> None:  # fmt: skip
     """M(y) (n, n), column by column: what accelerations a of 1 add to the forces at rest, `bias` (n,), where v, a and gravity
     are 0 on entry."""
+    c, w = pinned(c), pinned(w)
     inverse(c, w, y, v, a, gravity, bias)
     for k in range(y.shape[0]):
         a[k] = 1.0

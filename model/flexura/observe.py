@@ -5,21 +5,23 @@ from __future__ import annotations
 import numpy as np
 
 from .chain import REVOLUTE, SLEEVE, Chain, Work
-from .compiled import compiled, inlined
-from .hubs import inertia_block
-from .outward import outward
+from .compiled import compiled, inlined, internal
+from .hubs import formed_block
+from .outward import passed_outward
+from .pinned import pinned
 
 
-@compiled
+@internal
 def _strain(c: Chain, i: int, q: np.ndarray) -> float:
     """1/2 int EI w''^2 tan^2 dx of link i: what its curvature w'' / cos has beyond w''."""
     total = 0.0
-    for r in range(2 * c.points[i]):
-        s, bend = 0.0, 0.0
-        for k in range(q.shape[0]):
-            s += c.slope_d1[i, r, k] * q[k]
-            bend += c.slope_d2[i, r, k] * q[k]
-        total += 0.5 * c.slope_EI[i, r] * bend * bend * s * s / (1.0 - s * s)
+    for half in range(2):
+        for p in range(c.points[i]):
+            s, bend = 0.0, 0.0
+            for k in range(q.shape[0]):
+                s += c.slope_d1[i, half, p, k] * q[k]
+                bend += c.slope_d2[i, half, p, k] * q[k]
+            total += 0.5 * c.slope_EI[i, half, p] * bend * bend * s * s / (1.0 - s * s)
     return total
 
 
@@ -50,11 +52,12 @@ def observe(
     The pose of a link behind a sleeve is that of its proximal end. Energies: kinetic, strain, gravitational (zero where every
     mass is at the base's height).
     """
+    c, w = pinned(c), pinned(w)
     links = c.kind.shape[0]
     n = c.first[links]
     for s in range(states.shape[0]):
         y, v = states[s, :n], states[s, n:]
-        outward(c, w, y, v)
+        passed_outward(c, w, y, v)
         x0, y0, angle = 0.0, 0.0, 0.0  # the attachment's pose in the base frame
         vx, vy = 0.0, 0.0  # its velocity, in the predecessor's axes
         kinetic, strain, potential = 0.0, 0.0, 0.0
@@ -72,12 +75,12 @@ def observe(
             cs, sn, omega = w.cos[i], w.sin[i], w.omega[i]
             vx, vy = cs * vx + sn * vy, cs * vy - sn * vx
             # T = 1/2 U^T [[Mrr, Mrq], [Mqr, Mqq]] U, U = (vx, vy, omega, d', qd)
-            inertia_block(c, w, i)
+            formed_block(c, w, i, 0.0)
             for k in range(m):
-                shared = w.col[i, k, 0] * vx + w.col[i, k, 1] * vy + w.col[i, k, 2] * omega
+                shared = w.terms[i, k, 0] * vx + w.terms[i, k, 1] * vy + w.terms[i, k, 2] * omega
                 if c.kind[i] == SLEEVE:
-                    shared += w.col[i, k, 3] * flow
-                for j in range(k):
+                    shared += w.terms[i, k, 7] * flow
+                for j in range(k + 1, m):
                     shared += w.S[i, k, j] * qd[j]
                 kinetic += qd[k] * (shared + 0.5 * w.S[i, k, k] * qd[k])
             kinetic += 0.5 * (c.mass[i] * (vx * vx + vy * vy) + body[2] * omega * omega + c.rotor[i] * v[e] * v[e])

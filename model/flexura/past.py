@@ -3,12 +3,13 @@ values of N in the variation-of-constants formula of each mode (`propagator.py`)
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from .basis import Basis
-from .compiled import compiled, inlined
+from .compiled import inlined, internal
+from .lanes import WIDTH, lanes, load, padded, store
 from .propagator import free, moments
 
 ORDER = 5
@@ -19,116 +20,133 @@ COUNT, SPAN, STEADY, HEAD = range(4)  # entries of Past.s: values held, step of 
 
 
 class Past(NamedTuple):
-    """What a multistep run remembers for n unknowns, and the tables of the present step. Row HEAD of the rings is the newest."""
+    """What a multistep run remembers for n unknowns and as many modes, and the tables of the present step: rows N long, a multiple
+    of four, zeros after their own values. Row HEAD of the rings is the newest."""
 
     s: np.ndarray  # (4,)
-    origin: np.ndarray  # (n,) y0, the state where the basis was taken up: small numbers keep their digits
-    eta: np.ndarray  # (n,)
+    origin: np.ndarray  # (N,) y0, the state where the basis was taken up: small numbers keep their digits
+    eta: np.ndarray  # (N,)
     etad: np.ndarray
     t: np.ndarray  # (ROWS,) a ring, and so below: times
-    a: np.ndarray  # (ROWS, n) accelerations where the equations were looked at,
+    a: np.ndarray  # (ROWS, N) accelerations where the equations were looked at,
     y: np.ndarray  # and there the state
     v: np.ndarray
     N: np.ndarray
     power: np.ndarray  # (ROWS, 2) power of the drives, and lost
-    step: np.ndarray  # (4, n) free motion
-    A: np.ndarray  # (ORDER + 1, n) moments
+    step: np.ndarray  # (4, N) free motion
+    A: np.ndarray  # (ORDER + 1, N) moments
     B: np.ndarray
-    ahead: np.ndarray  # (2, ORDER, n) weights of the old values in eta, eta' predicted; rows by age
-    late: np.ndarray  # (4, n) weights of new less extrapolated N: correction of eta, eta'; error of both
+    ahead: np.ndarray  # (3, ORDER, N) weights of the old values by age in eta, eta' predicted, and in N extrapolated
+    late: np.ndarray  # (4, N) weights of new less extrapolated N: correction of eta, eta'; error of both
     poly: np.ndarray  # (2, ORDER + 2, ORDER + 1) by age, coefficients of Lagrange's polynomials; of the new one; of the error's
-    end: np.ndarray  # (2, ORDER + 1) the values of the old ones at the end of the step
-    low: np.ndarray  # (n,) int: 1 for modes of low order
-    area: np.ndarray  # (ORDER + 1,) integrals of the polynomials over the step
+    low: np.ndarray  # (N,) 1 for modes of low order
+    end: np.ndarray  # (ORDER + 1,) the polynomials at the end of the step
+    area: np.ndarray  # (ORDER + 1,) their integrals over it
     node: np.ndarray  # (ORDER,) the values' times by age, in steps from the newest
-    gap: np.ndarray  # (n,) new less extrapolated N
-    new: np.ndarray  # (4, n) eta, eta' predicted; eta, eta' corrected
-    size: np.ndarray  # (2, n) error weights of eta, eta'
-    f: np.ndarray  # (ORDER + 1, n) N as a polynomial inside the step
+    gap: np.ndarray  # (N,) new less extrapolated N
+    new: np.ndarray  # (4, N) eta, eta' predicted; eta, eta' corrected
+    size: np.ndarray  # (2, N) error weights of eta, eta'
+    f: np.ndarray  # (ORDER + 1, N) N as a polynomial inside the step
+    bent: np.ndarray  # (2, N) h^2 eta'' at both ends of the step
+    slow: np.ndarray  # (ORDER + 1, N) the motion that N alone makes of stiff modes, as a polynomial
+    work: np.ndarray  # (2, N)
     column: np.ndarray  # (2, ORDER + 1)
-    work: np.ndarray  # (2, n)
     tables: np.ndarray  # (2, 40)
 
 
 def past(n: int) -> Past:
-    z, k, r = np.zeros, ORDER, ROWS
+    z, k, r, N = np.zeros, ORDER, ROWS, padded(n)
     return Past(
-        z(4), z(n), z(n), z(n), z(r), z((r, n)), z((r, n)), z((r, n)), z((r, n)), z((r, 2)), z((4, n)), z((k + 1, n)),
-        z((k + 1, n)),
-        z((2, k, n)), z((4, n)), z((2, k + 2, k + 1)), z((2, k + 1)), np.zeros(n, np.int64), z(k + 1), z(k), z(n), z((4, n)),
-        z((2, n)), z((k + 1, n)), z((2, k + 1)), z((2, n)), z((2, 40)),
+        s=z(4), origin=z(N), eta=z(N), etad=z(N), t=z(r), a=z((r, N)), y=z((r, N)), v=z((r, N)), N=z((r, N)), power=z((r, 2)),
+        step=z((4, N)), A=z((k + 1, N)), B=z((k + 1, N)), ahead=z((3, k, N)), late=z((4, N)), poly=z((2, k + 2, k + 1)), low=z(N),
+        end=z(k + 1), area=z(k + 1), node=z(k), gap=z(N), new=z((4, N)), size=z((2, N)), f=z((k + 1, N)), bent=z((2, N)), slow=z((k + 1, N)), work=z((2, N)),
+        column=z((2, k + 1)), tables=z((2, 40)),
     )  # fmt: skip
 
 
-@compiled
+@inlined
+def ring(head: int, age: int) -> int:
+    """The row of a value, so many steps old."""
+    return head + age if head + age < ROWS else head + age - ROWS
+
+
+@internal
 def tables(b: Basis, p: Past, h: float, k: int) -> None:
     """Weights of a step of h from the last k values of N."""
     n = b.w2.shape[0]
     head = int(p.s[HEAD])
     if h != p.s[SPAN]:
         A, B = p.column[0], p.column[1]
-        for i in range(n):
+        for i in range(b.seen.shape[0]):
             g, dg = free(b.w2[i], b.d2[i], h)
             p.step[0, i], p.step[1, i], p.step[2, i], p.step[3, i] = dg + b.d2[i] * g, g, -b.w2[i] * g, dg
             moments(b.w2[i], b.d2[i], h, g, dg, A, B, p.tables)
             for m in range(ORDER + 1):
                 p.A[m, i], p.B[m, i] = A[m], B[m]
-            p.low[i] = 1 if b.w2[i] * h * h > STIFF * STIFF else 0
+            p.low[i] = 1.0 if b.w2[i] * h * h > STIFF * STIFF else 0.0
         p.s[SPAN], p.s[STEADY] = h, 0.0
     for j in range(k):
-        p.node[j] = (p.t[(head + j) % ROWS] - p.t[head]) / h
-    short = min(k, STIFF_ORDER)
-    _polynomials(p, 0, k)
-    _polynomials(p, 1, short)
+        p.node[j] = (p.t[ring(head, j)] - p.t[head]) / h
+    _polynomials(p, 0, k, k)
+    _polynomials(p, 1, min(k, STIFF_ORDER), k)
     for j in range(k + 2):
-        for i in range(n):
-            low, y, v = p.low[i], 0.0, 0.0
+        for i in range(0, n, WIDTH):
+            y, v, end = lanes(0.0), lanes(0.0), lanes(0.0)
             for m in range(k + 1):
-                y += p.poly[low, j, m] * p.A[m, i]
-                v += p.poly[low, j, m] * p.B[m, i]
+                value = coefficient(p, j, m, i)
+                y += value * load(p.A[m], i)
+                v += value * load(p.B[m], i)
+                end += value
             if j < k:
-                p.ahead[0, j, i], p.ahead[1, j, i] = y, v
+                store(p.ahead[0, j], i, y)
+                store(p.ahead[1, j], i, v)
+                store(p.ahead[2, j], i, end)
             else:
-                p.late[2 * (j - k), i], p.late[2 * (j - k) + 1, i] = y, v
+                store(p.late[2 * (j - k)], i, y)
+                store(p.late[2 * (j - k) + 1], i, v)
     for j in range(k + 1):
-        p.area[j] = 0.0
+        p.end[j], p.area[j] = 0.0, 0.0
         for m in range(k + 1):
+            p.end[j] += p.poly[0, j, m]
             p.area[j] += p.poly[0, j, m] / (m + 1)
 
 
 @inlined
-def _polynomials(p: Past, low: int, used: int) -> None:
-    """Polynomials through the last `used` values: Lagrange's, the one for the gap and the one for the error."""
-    k = int(p.s[COUNT])
-    for j in range(k + 2):
-        c = p.poly[low, j]
-        for m in range(ORDER + 1):
-            c[m] = 0.0
-        if used <= j < k:
-            continue
-        c[0] = 1.0
-        degree = 0
-        for i in range(used if j != k + 1 else used - 1):
-            if i != j:
-                degree = _times(c, degree, p.node[i])
-        if j == k + 1:
-            degree = _times(c, degree, 1.0)
-        below = 1.0
-        for i in range(used):
-            if i != j:
-                below *= (p.node[j] if j < used else 1.0) - p.node[i]
-        for m in range(degree + 1):
-            c[m] /= below
-    for j in range(k):
-        p.end[low, j] = 0.0
-        for m in range(k):
-            p.end[low, j] += p.poly[low, j, m]
+def coefficient(p: Past, j: int, m: int, i: int) -> Any:
+    """Coefficient m of the polynomial of value j, for the modes i to i + 3."""
+    low = load(p.low, i)
+    return (1.0 - low) * p.poly[0, j, m] + low * p.poly[1, j, m]
 
 
 @inlined
-def _times(c: np.ndarray, degree: int, root: float) -> int:
-    """c(s) <- (s - root) c(s)."""
-    for m in range(degree + 1, 0, -1):
-        c[m] = c[m - 1] - root * c[m]
-    c[0] *= -root
-    return degree + 1
+def _polynomials(p: Past, low: int, used: int, k: int) -> None:
+    """Polynomials through the last `used` of k values: Lagrange's, the one for the gap and the one for the error, from the product
+    w(s) of s less each node, divided by its factors."""
+    for j in range(k + 2):
+        for m in range(ORDER + 1):
+            p.poly[low, j, m] = 0.0
+    w, error = p.poly[low, k], p.poly[low, k + 1]
+    w[0] = 1.0
+    for i in range(used):
+        for m in range(i + 1, 0, -1):
+            w[m] = w[m - 1] - p.node[i] * w[m]
+        w[0] *= -p.node[i]
+    for j in range(used):
+        row, node = p.poly[low, j], p.node[j]
+        value, slope = 0.0, 0.0  # the quotient's coefficients from the highest on, and its value at the node
+        for m in range(used, 0, -1):
+            value = w[m] + node * value
+            row[m - 1] = value
+            slope = value + node * slope
+        for m in range(used):
+            row[m] /= slope
+        if j == used - 1:  # without the oldest value, and 0 at the end
+            for m in range(used, 0, -1):
+                error[m] = slope * (row[m - 1] - row[m])
+            error[0] = -slope * row[0]
+    end = 0.0
+    for m in range(used + 1):
+        end += w[m]
+    for m in range(used + 1):
+        w[m] /= end
+        error[m] /= end

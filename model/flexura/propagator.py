@@ -20,6 +20,8 @@ import numpy as np
 from .compiled import compiled
 
 _FROM = 40  # where the downward recurrence begins: what is left of its guess is below round-off
+_BELOW = np.array([0.0, 0.0, *(1.0 / (m * (m - 1)) for m in range(2, _FROM + 1))])
+_DRAG = np.array([0.0, 0.0, *(1.0 / (m - 1) for m in range(2, _FROM + 1))])
 
 
 @compiled
@@ -58,7 +60,7 @@ def moments(w2: float, d2: float, h: float, g: float, dg: float, A: np.ndarray, 
     elif dd < 3.0 or dd * dd < 4.2 * x2:
         above, here = 1.0 / (_FROM * _FROM), 1.0 / ((_FROM - 1) * (_FROM - 1))
         for m in range(_FROM, 1, -1):
-            below = (1.0 - x2 * above - dd * m * here) / (m * (m - 1))
+            below = (1.0 - x2 * above) * _BELOW[m] - dd * _DRAG[m] * here
             above, here = here, below
             if m - 2 < count:
                 a[m - 2] = below

@@ -21,7 +21,8 @@ from __future__ import annotations
 import numpy as np
 
 from .chain import NODES, Chain, Work
-from .compiled import compiled, inlined
+from .compiled import inlined, internal
+from .lanes import WIDTH, lanes, load, pack, store
 
 _S = (np.polynomial.legendre.leggauss(NODES)[0] + 1) / 2
 # int_0^s_g of the polynomial through values at the Gauss points: rows g, columns the values
@@ -30,7 +31,7 @@ _UPTO = (_S[:, None] ** _POWERS / _POWERS) @ np.linalg.inv(np.vander(_S, increas
 C, S, T, G, W, RX, RY, AX, RATE, BEND, UX, WD = range(12)  # columns of Work.sum
 
 
-@compiled
+@internal
 def sleeve(c: Chain, w: Work, i: int, z: np.ndarray, zd: np.ndarray, omega: float) -> float:
     """Link i's terms and its tip as the attachment, for z = (d, y); returns the tip's angle in the sleeve's frame."""
     d, dd = z[0], zd[0]
@@ -52,9 +53,11 @@ def sleeve(c: Chain, w: Work, i: int, z: np.ndarray, zd: np.ndarray, omega: floa
         return 0.0
     _shape(c, w, i, z, zd)
     for k in range(m):
-        w.col[i, k, 0], w.col[i, k, 1], w.col[i, k, 2], w.col[i, k, 3], w.cv[i, k] = 0.0, 0.0, 0.0, 0.0, 0.0
-        for j in range(k + 1):
-            w.M[i, k, j], w.K[i, k, j] = 0.0, 0.0
+        store(w.terms[i, k], 0, lanes(0.0))
+        store(w.terms[i, k], 4, lanes(0.0))
+        for b in range(0, m, WIDTH):
+            store(w.M[i, k], b, lanes(0.0))
+            store(w.K[i, k], b, lanes(0.0))
     points = c.elements[i] * NODES
     for p in range(points + 1):
         _point(c, w, i, p, points, d, dd, omega)
@@ -140,7 +143,7 @@ def _law(c: Chain, i: int, X: float) -> tuple:
     )  # fmt: skip
 
 
-@inlined
+@internal
 def _point(c: Chain, w: Work, i: int, p: int, points: int, d: float, dd: float, omega: float) -> None:
     """Add point p: a piece of the link at a Gauss point, or the payload at the tip (p = points)."""
     f, phi, d1, h = w.sum[p], c.sleeve_phi[i, p], c.sleeve_d1[i, p], w.sum_h[p]
@@ -189,16 +192,15 @@ def _point(c: Chain, w: Work, i: int, p: int, points: int, d: float, dd: float, 
     ax, ay = mu * Bx + dmu * dd * Vx, mu * By + dmu * dd * Vy
     tx, ty = flux * tan * Vx / d, -flux * Vy / d
     for k in range(m):
-        hk, fk = h[k], phi[k]
-        w.col[i, k, 0] -= mu * hk
-        w.col[i, k, 1] += mu * fk
-        w.col[i, k, 2] += mu * (rx * fk + ry * hk)
-        w.col[i, k, 3] += mu * (py * fk - px * hk)
-        w.cv[i, k] += ay * fk - ax * hk + (tx + ty + force1) * d1[k] + force2 * c.sleeve_d2[i, p, k]
-        mh, mf, sk = mu * hk, mu * fk, stiff * c.sleeve_d2[i, p, k]
-        for j in range(k + 1):
-            w.M[i, k, j] += mh * h[j] + mf * phi[j]
-            w.K[i, k, j] += sk * c.sleeve_d2[i, p, j]
+        hk, fk, bent_k, terms = h[k], phi[k], c.sleeve_d2[i, p, k], w.terms[i, k]
+        force = ay * fk - ax * hk + (tx + ty + force1) * d1[k] + force2 * bent_k
+        column = pack(-mu * hk, mu * fk, mu * (rx * fk + ry * hk), force)
+        store(terms, 0, load(terms, 0) + column)
+        terms[7] += mu * (py * fk - px * hk)
+        mh, mf, sk = mu * hk, mu * fk, stiff * bent_k
+        for b in range(0, m, WIDTH):
+            store(w.M[i, k], b, load(w.M[i, k], b) + mh * load(h, b) + mf * load(phi, b))
+            store(w.K[i, k], b, load(w.K[i, k], b) + sk * load(c.sleeve_d2[i, p], b))
 
 
 @inlined
@@ -217,7 +219,7 @@ def _tip(c: Chain, w: Work, i: int, tip: int, d: float, dd: float, omega: float)
     w.flow[i, 0], w.flow[i, 1], w.flow[i, 2] = 1.0 + f[RY], 0.0, lean
     Jp, m = c.tip_inertia[i], c.first[i + 1] - c.first[i] - 1
     for k in range(m):
-        w.jac[i, k, 0], w.jac[i, k, 1], w.jac[i, k, 2] = -w.sum_h[tip, k], c.NL[i, k], sec * c.SL[i, k] / d
+        w.terms[i, k, 4], w.terms[i, k, 5], w.terms[i, k, 6] = -w.sum_h[tip, k], c.NL[i, k], sec * c.SL[i, k] / d
     if Jp > 0.0:
         body = w.body[i]
         body[5] += Jp * turn
@@ -225,10 +227,10 @@ def _tip(c: Chain, w: Work, i: int, tip: int, d: float, dd: float, omega: float)
         body[9] += Jp * lean * lean
         body[10] += Jp * lean * turn
         for k in range(m):
-            jk = Jp * w.jac[i, k, 2]
-            w.col[i, k, 2] += jk
-            w.col[i, k, 3] += jk * lean
-            w.cv[i, k] += jk * turn
-            for j in range(k + 1):
-                w.M[i, k, j] += jk * w.jac[i, j, 2]
+            jk = Jp * w.terms[i, k, 6]
+            w.terms[i, k, 2] += jk
+            w.terms[i, k, 7] += jk * lean
+            w.terms[i, k, 3] += jk * turn
+            for j in range(m):
+                w.M[i, k, j] += jk * w.terms[i, j, 6]
     return np.arcsin(sin) if c.stiffening else sin

@@ -105,8 +105,7 @@ class System:
         for i in np.flatnonzero(c.kind == SLEEVE):
             own = slice(c.first[i] + 1, c.first[i + 1])
             m = own.stop - own.start
-            lower = c.alpha[i] * np.tril(w.M[i, :m, :m]) + c.beta[i] * np.tril(w.K[i, :m, :m])
-            D[own, own] = lower + np.tril(lower, -1).T
+            D[own, own] = c.alpha[i] * w.M[i, :m, :m] + c.beta[i] * w.K[i, :m, :m]
         return self.to_solver.T @ D @ self.to_solver
 
     def _diagonal(self, elastic: np.ndarray, joint: np.ndarray) -> np.ndarray:

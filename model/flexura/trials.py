@@ -13,11 +13,12 @@ import numpy as np
 from . import loop
 from .chain import Chain, Work
 from .choice import longest_step
-from .compiled import compiled
+from .compiled import compiled, inlined, internal
 from .control import Controller
 from .course import following, inputs_of, which
 from .forward import initial, to_state
 from .law import LIMIT, NONE, Law
+from .pinned import pinned
 from .response import EFFORT, JOINT, SETTLING, STRIP, joint_figures, strip_figures
 from .signal import evaluate
 from .system import System
@@ -60,7 +61,7 @@ def trial(system: System, controller: Controller, duration_s: float, output_step
     )  # fmt: skip
 
 
-@compiled
+@internal
 def _set_back(x: Trial) -> None:
     """Memory, law and signals as before the first tick."""
     m, law = x.memory, x.inputs.law
@@ -78,14 +79,14 @@ def _set_back(x: Trial) -> None:
     _copy(x.fixed, x.inputs.segments)
 
 
-@compiled
+@inlined
 def _copy(source: np.ndarray, target: np.ndarray) -> None:
     for i in range(source.shape[0]):
         for k in range(source.shape[1]):
             target[i, k] = source[i, k]
 
 
-@compiled
+@internal
 def _effort(law: Law, i: int, limit: float) -> float:
     """Mean square of joint i's outputs over its limit, from the log of all ticks but the last."""
     total, ticks = 0.0, law.log.shape[0] - 1
@@ -96,7 +97,7 @@ def _effort(law: Law, i: int, limit: float) -> float:
     return total / ticks
 
 
-@compiled
+@internal
 def _figures(x: Trial, figures: np.ndarray) -> None:
     """A finished run's figures: those of each joint, then the strip's."""
     law, settled = x.inputs.law, 0.0
@@ -121,6 +122,7 @@ def _figures(x: Trial, figures: np.ndarray) -> None:
 @compiled
 def run_rows(x: Trial, gains: np.ndarray, figures: np.ndarray, reached: np.ndarray) -> None:
     """Runs with gains (B, N, 20): figures (B, PER_JOINT N + OF_STRIP), and what fraction of the time each reached (B,)."""
+    x = pinned(x)
     end = x.t[-1]
     most = STEPS_A_TICK * end * x.inputs.law.rate_Hz
     for b in range(gains.shape[0]):
