@@ -25,7 +25,7 @@ class Basis(NamedTuple):
     """n unknowns in the solver's coordinates; joints whose motion is given have a mode of their own, e_k. Rows of matrices and
     the vectors below are made N long, a multiple of four, by zeros: modes that stay at rest."""
 
-    phi: np.ndarray  # (n, N) the modes, one a row: y = sum_k eta_k phi_k
+    phi: np.ndarray  # (n, N) the modes, one a row, slow ones first: y = sum_k eta_k phi_k
     rows: np.ndarray  # (n, N): eta = sum_i y_i rows_i, M phi^T
     w2: np.ndarray  # (N,) omega^2
     d2: np.ndarray  # (N,) twice the decay rate
@@ -188,8 +188,13 @@ def _again(b: Basis) -> None:
         for p in range(n):
             for q in range(p + 1, n):
                 _rotate(K, phi, p, q)
-    for i in range(n):
+    for i in range(n):  # slow modes first
         b.w2[i] = max(K[i, i], 0.0)
+        for k in range(i, 0, -1):
+            if b.w2[k] >= b.w2[k - 1]:
+                break
+            b.w2[k], b.w2[k - 1] = b.w2[k - 1], b.w2[k]
+            _turn(phi, k - 1, k, 0.0, 1.0)
 
 
 @inlined

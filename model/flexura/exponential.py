@@ -43,7 +43,7 @@ from .loop import (
     powers,
     quintic,
 )  # fmt: skip
-from .past import COUNT, HEAD, ORDER, ROWS, SPAN, STEADY, Past, coefficient, ring, tables
+from .past import COUNT, HEAD, ORDER, ROWS, SPAN, STEADY, Past, coefficient, order_of, ring, tables
 from .pinned import pinned
 from .propagator import free, moments
 
@@ -169,10 +169,10 @@ def _force_inside(b: Basis, p: Past, h: float) -> None:
     """N over the step just made as a polynomial, f, and what `_inside` needs of it."""
     k, head = int(p.s[COUNT]), int(p.s[HEAD])
     for i in range(0, b.w2.shape[0], WIDTH):
-        gap, end = load(p.gap, i), lanes(0.0)
+        gap, end, order = load(p.gap, i), lanes(0.0), order_of(p, k, i)
         for q in range(k + 1):
             f = gap * coefficient(p, k, q, i)
-            for j in range(k):
+            for j in range(order):
                 f += coefficient(p, j, q, i) * load(p.N[ring(head, j)], i)
             store(p.f[q], i, f)
             end += f

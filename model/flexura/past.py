@@ -15,15 +15,17 @@ from .propagator import free, moments
 ORDER = 5
 STIFF_ORDER = 2  # of modes that turn by more than STIFF rad a step: extrapolation would blow up what the basis leaves of them
 STIFF = 3.0
+_OVER = 1.0 / np.arange(1, ORDER + 2)
 ROWS = ORDER + 1  # of the rings: the new value has a row of its own until the step is accepted
-COUNT, SPAN, STEADY, HEAD = range(4)  # entries of Past.s: values held, step of the tables, steps since it changed, newest row
+COUNT, SPAN, STEADY, HEAD, STIFFER = range(5)  # entries of Past.s: values held, step of the tables, steps since it changed, newest
+# row, and the first of the stiff modes, which are last
 
 
 class Past(NamedTuple):
     """What a multistep run remembers for n unknowns and as many modes, and the tables of the present step: rows N long, a multiple
     of four, zeros after their own values. Row HEAD of the rings is the newest."""
 
-    s: np.ndarray  # (4,)
+    s: np.ndarray  # (5,)
     origin: np.ndarray  # (N,) y0, the state where the basis was taken up: small numbers keep their digits
     eta: np.ndarray  # (N,)
     etad: np.ndarray
@@ -39,7 +41,7 @@ class Past(NamedTuple):
     ahead: np.ndarray  # (3, ORDER, N) weights of the old values by age in eta, eta' predicted, and in N extrapolated
     late: np.ndarray  # (4, N) weights of new less extrapolated N: correction of eta, eta'; error of both
     poly: np.ndarray  # (2, ORDER + 2, ORDER + 1) by age, coefficients of Lagrange's polynomials; of the new one; of the error's
-    low: np.ndarray  # (N,) 1 for modes of low order
+    low: np.ndarray  # (N,) 1 for modes of low order, the last ones
     end: np.ndarray  # (ORDER + 1,) the polynomials at the end of the step
     area: np.ndarray  # (ORDER + 1,) their integrals over it
     node: np.ndarray  # (ORDER,) the values' times by age, in steps from the newest
@@ -57,7 +59,7 @@ class Past(NamedTuple):
 def past(n: int) -> Past:
     z, k, r, N = np.zeros, ORDER, ROWS, padded(n)
     return Past(
-        s=z(4), origin=z(N), eta=z(N), etad=z(N), t=z(r), a=z((r, N)), y=z((r, N)), v=z((r, N)), N=z((r, N)), power=z((r, 2)),
+        s=z(5), origin=z(N), eta=z(N), etad=z(N), t=z(r), a=z((r, N)), y=z((r, N)), v=z((r, N)), N=z((r, N)), power=z((r, 2)),
         step=z((4, N)), A=z((k + 1, N)), B=z((k + 1, N)), ahead=z((3, k, N)), late=z((4, N)), poly=z((2, k + 2, k + 1)), low=z(N),
         end=z(k + 1), area=z(k + 1), node=z(k), gap=z(N), new=z((4, N)), size=z((2, N)), f=z((k + 1, N)), bent=z((2, N)), slow=z((k + 1, N)), work=z((2, N)),
         column=z((2, k + 1)), tables=z((2, 40)),
@@ -76,23 +78,28 @@ def tables(b: Basis, p: Past, h: float, k: int) -> None:
     n = b.w2.shape[0]
     head = int(p.s[HEAD])
     if h != p.s[SPAN]:
-        A, B = p.column[0], p.column[1]
+        A, B, stiffer = p.column[0], p.column[1], 0
         for i in range(b.seen.shape[0]):
             g, dg = free(b.w2[i], b.d2[i], h)
             p.step[0, i], p.step[1, i], p.step[2, i], p.step[3, i] = dg + b.d2[i] * g, g, -b.w2[i] * g, dg
             moments(b.w2[i], b.d2[i], h, g, dg, A, B, p.tables)
             for m in range(ORDER + 1):
                 p.A[m, i], p.B[m, i] = A[m], B[m]
-            p.low[i] = 1.0 if b.w2[i] * h * h > STIFF * STIFF else 0.0
-        p.s[SPAN], p.s[STEADY] = h, 0.0
+            if b.w2[i] * h * h <= STIFF * STIFF:
+                stiffer = i + 1
+        for i in range(n):
+            p.low[i] = 0.0 if i < stiffer else 1.0
+        p.s[SPAN], p.s[STEADY], p.s[STIFFER] = h, 0.0, stiffer
     for j in range(k):
         p.node[j] = (p.t[ring(head, j)] - p.t[head]) / h
     _polynomials(p, 0, k, k)
-    _polynomials(p, 1, min(k, STIFF_ORDER), k)
-    for j in range(k + 2):
-        for i in range(0, n, WIDTH):
+    if p.s[STIFFER] < b.seen.shape[0]:
+        _polynomials(p, 1, min(k, STIFF_ORDER), k)
+    for i in range(0, n, WIDTH):
+        order = order_of(p, k, i)
+        for j in range(k + 2):
             y, v, end = lanes(0.0), lanes(0.0), lanes(0.0)
-            for m in range(k + 1):
+            for m in range(order + 1 if j < order or j >= k else 0):
                 value = coefficient(p, j, m, i)
                 y += value * load(p.A[m], i)
                 v += value * load(p.B[m], i)
@@ -108,12 +115,20 @@ def tables(b: Basis, p: Past, h: float, k: int) -> None:
         p.end[j], p.area[j] = 0.0, 0.0
         for m in range(k + 1):
             p.end[j] += p.poly[0, j, m]
-            p.area[j] += p.poly[0, j, m] / (m + 1)
+            p.area[j] += p.poly[0, j, m] * _OVER[m]
+
+
+@inlined
+def order_of(p: Past, k: int, i: int) -> int:
+    """The highest order of the modes i to i + 3."""
+    return k if i < p.s[STIFFER] else min(k, STIFF_ORDER)
 
 
 @inlined
 def coefficient(p: Past, j: int, m: int, i: int) -> Any:
     """Coefficient m of the polynomial of value j, for the modes i to i + 3."""
+    if i + WIDTH <= p.s[STIFFER]:
+        return lanes(p.poly[0, j, m])
     low = load(p.low, i)
     return (1.0 - low) * p.poly[0, j, m] + low * p.poly[1, j, m]
 
@@ -138,8 +153,9 @@ def _polynomials(p: Past, low: int, used: int, k: int) -> None:
             value = w[m] + node * value
             row[m - 1] = value
             slope = value + node * slope
+        inverse = 1.0 / slope
         for m in range(used):
-            row[m] /= slope
+            row[m] *= inverse
         if j == used - 1:  # without the oldest value, and 0 at the end
             for m in range(used, 0, -1):
                 error[m] = slope * (row[m - 1] - row[m])
@@ -147,6 +163,7 @@ def _polynomials(p: Past, low: int, used: int, k: int) -> None:
     end = 0.0
     for m in range(used + 1):
         end += w[m]
+    inverse = 1.0 / end
     for m in range(used + 1):
-        w[m] /= end
-        error[m] /= end
+        w[m] *= inverse
+        error[m] *= inverse

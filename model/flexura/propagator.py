@@ -19,7 +19,7 @@ import numpy as np
 
 from .compiled import compiled
 
-_FROM = 40  # where the downward recurrence begins: what is left of its guess is below round-off
+_FROM, _NEAR = 40, 20  # where the downward recurrence begins: what is left of its guess is below round-off
 _BELOW = np.array([0.0, 0.0, *(1.0 / (m * (m - 1)) for m in range(2, _FROM + 1))])
 _DRAG = np.array([0.0, 0.0, *(1.0 / (m - 1) for m in range(2, _FROM + 1))])
 
@@ -58,8 +58,9 @@ def moments(w2: float, d2: float, h: float, g: float, dg: float, A: np.ndarray, 
         for m in range(2, count):
             a[m] = (1.0 - dd * m * a[m - 1] - m * (m - 1) * a[m - 2]) / x2
     elif dd < 3.0 or dd * dd < 4.2 * x2:
-        above, here = 1.0 / (_FROM * _FROM), 1.0 / ((_FROM - 1) * (_FROM - 1))
-        for m in range(_FROM, 1, -1):
+        begin = _NEAR if x2 < 1.0 and dd < 0.1 else _FROM
+        above, here = 1.0 / (begin * begin), 1.0 / ((begin - 1) * (begin - 1))
+        for m in range(begin, 1, -1):
             below = (1.0 - x2 * above) * _BELOW[m] - dd * _DRAG[m] * here
             above, here = here, below
             if m - 2 < count:
