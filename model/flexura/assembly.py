@@ -12,7 +12,7 @@ from .beam import LinkIntegrals, integrals
 from .chain import REVOLUTE, SLEEVE, SLIDER, Chain, workspace
 from .errors import InputError
 from .extended import mass_matrix
-from .lanes import padded
+from .lanes import padded, zeros
 from .modes import eigh, modal
 from .newton_euler import mass
 from .robot import Link, Robot
@@ -112,7 +112,7 @@ def _chains(
     fields["ride"] = np.moveaxis(fields["ride"], 3, 4)
     fields |= {name: _in_fours(fields[name], axes) for name, axes in _IN_FOURS.items()}
     for name in ("point_phi", "slope_d1", "slope_d2"):
-        fields[name + "_T"] = np.ascontiguousarray(np.moveaxis(fields[name], -1, 2))
+        fields[name + "_T"] = _in_fours(np.moveaxis(fields[name], -1, 2), ())
     for k, (name, columns, empty) in enumerate((("law_x", (), np.inf), ("law_mass", (3,), 0.0), ("law_EI", (5,), 0.0))):
         fields[name] = np.full((B, N, pieces, *columns), empty)
         if laws is None:
@@ -142,7 +142,7 @@ def _halves(a: np.ndarray, gaps: int) -> np.ndarray:
 
 def _in_fours(a: np.ndarray, axes: tuple[int, ...]) -> np.ndarray:
     """An array with zeros after the ends of some axes, up to the next multiple of four."""
-    out = np.zeros([padded(size) if axis in axes else size for axis, size in enumerate(a.shape)])
+    out = zeros(tuple(padded(size) if axis in axes else size for axis, size in enumerate(a.shape)))
     out[tuple(map(slice, a.shape))] = a
     return out
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from .chain import SLEEVE, SLIDER, Chain, Work
 from .compiled import compiled, inlined, internal
-from .lanes import WIDTH, lanes, load, padded, store, total
+from .lanes import WIDTH, lanes, load, padded, store, total, zeros
 from .newton_euler import mass
 from .pinned import pinned
 
@@ -43,11 +43,13 @@ class Basis(NamedTuple):
 
 
 def basis(n: int) -> Basis:
-    z, N = np.zeros, padded(n)
-    return Basis(
-        np.eye(n, N), z((n, N)), z(N), z(N), np.full(n, np.inf), z((n, N)), z((n, N)), z((n, N)), z((n, N)),
+    z, N = zeros, padded(n)
+    b = Basis(
+        z((n, N)), z((n, N)), z(N), z(N), np.full(n, np.inf), z((n, N)), z((n, N)), z((n, N)), z((n, N)),
         z((n, N)), z((n, N)), z(n), z(n), z(n), z(2),
     )  # fmt: skip
+    b.phi[:] = np.eye(n, N)
+    return b
 
 
 @internal

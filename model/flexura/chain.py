@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .lanes import zeros
+
 REVOLUTE, SLIDER, SLEEVE = 0, 1, 2  # joint kinds R, Pa, Pb
 COULOMB_SPEED = 1e-3  # m/s or rad/s: Coulomb friction is f tanh(v / COULOMB_SPEED)
 NODES = 4  # Gauss points an element, where a link is summed at run time
@@ -114,7 +116,7 @@ class Work(NamedTuple):
 
 def workspace(c: Chain) -> Work:
     """A fresh workspace for one solver of this chain."""
-    z, (N, m), p = np.zeros, c.S0.shape, c.point_x.shape[1]
+    z, (N, m), p = zeros, c.S0.shape, c.point_x.shape[1]
     P, E = c.sleeve_xi.shape[1], c.ride.shape[1]
     return Work(
         cos=z(N), sin=z(N), omega=z(N), angle=z(N), place=z((N, 2)), beta=z((N, 3)), rate=z((N, 3)), slide=z((N, 3)),

@@ -119,7 +119,7 @@ def _predict(b: Basis, m: Memory, p: Past, h: float) -> None:
     for i in range(0, n, WIDTH):
         y, v, gap = load(p.eta, i), load(p.etad, i), lanes(0.0)
         eta, etad = load(p.step[0], i) * y + load(p.step[1], i) * v, load(p.step[2], i) * y + load(p.step[3], i) * v
-        for j in range(k):
+        for j in range(order_of(p, k, i)):
             force = load(p.N[ring(head, j)], i)
             eta += load(p.ahead[0, j], i) * force
             etad += load(p.ahead[1, j], i) * force
@@ -179,9 +179,10 @@ def _force_inside(b: Basis, p: Past, h: float) -> None:
         w2, d2 = load(b.w2, i), load(b.d2, i)
         store(p.bent[0], i, h * h * (load(p.f[0], i) - w2 * load(p.eta, i) - d2 * load(p.etad, i)))
         store(p.bent[1], i, h * h * (end - w2 * load(p.new[2], i) - d2 * load(p.new[3], i)))
-        above, here = lanes(0.0), lanes(0.0)
+        above, here, inverse, drag = lanes(0.0), lanes(0.0), 1.0 / w2, d2 * (1.0 / h)
+        bend = inverse * (1.0 / (h * h))
         for q in range(k, -1, -1):
-            below = (h * h * load(p.f[q], i) - (q + 1) * h * d2 * here - (q + 1) * (q + 2) * above) / (h * h * w2)
+            below = inverse * (load(p.f[q], i) - (q + 1.0) * drag * here) - (q + 1.0) * (q + 2.0) * bend * above
             above, here = here, below
             store(p.slow[q], i, below)
 

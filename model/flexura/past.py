@@ -9,7 +9,7 @@ import numpy as np
 
 from .basis import Basis
 from .compiled import inlined, internal
-from .lanes import WIDTH, lanes, load, padded, store
+from .lanes import WIDTH, lanes, load, padded, store, zeros
 from .propagator import free, moments
 
 ORDER = 5
@@ -57,7 +57,7 @@ class Past(NamedTuple):
 
 
 def past(n: int) -> Past:
-    z, k, r, N = np.zeros, ORDER, ROWS, padded(n)
+    z, k, r, N = zeros, ORDER, ROWS, padded(n)
     return Past(
         s=z(5), origin=z(N), eta=z(N), etad=z(N), t=z(r), a=z((r, N)), y=z((r, N)), v=z((r, N)), N=z((r, N)), power=z((r, 2)),
         step=z((4, N)), A=z((k + 1, N)), B=z((k + 1, N)), ahead=z((3, k, N)), late=z((4, N)), poly=z((2, k + 2, k + 1)), low=z(N),
