@@ -104,10 +104,9 @@ class Work(NamedTuple):
     inertia: np.ndarray  # (4, 4) of a sleeved link at its sleeve
     bias: np.ndarray  # (4,)
     u: np.ndarray  # (N, 3)
-    S: np.ndarray  # (N, m, m) each link's elastic block, upper triangle
+    S: np.ndarray  # (N, m, m + 8) each link's elastic block, upper triangle, and l^-1 terms, with the linear forces
     L: np.ndarray  # (N, m, m) the factor l of it, below its diagonal of 1
     dinv: np.ndarray  # (N, m) 1/d of the factorisation
-    rhs: np.ndarray  # (N, m, 8) l^-1 terms, with the linear forces
     qdd: np.ndarray  # (m,)
     held: np.ndarray  # (N,) int: joints whose acceleration is given, locked ones at 0
     given: np.ndarray  # (N,) that acceleration
@@ -122,6 +121,6 @@ def workspace(c: Chain) -> Work:
         cos=z(N), sin=z(N), omega=z(N), angle=z(N), place=z((N, 2)), beta=z((N, 3)), rate=z((N, 3)), slide=z((N, 3)),
         flow=z((N, 3)), tilt=z(N), body=z((N, 11)), terms=z((N, m, 8)), h=z((N, p, m)), slope=z((4, 2, p)), point=z((5, p)),
         M=z((N, m, m)), K=z((N, m, m)), strain=z(N), sum=z((P, 12)), sum_h=z((P, m)), ride=z((E, 3, 4)), quintic=z((4, 8)),
-        cond=z((N, 36)), joint=z((N, 6)), X=z((N, 3, 4)), inertia=z((4, 4)), bias=z(4), u=z((N, 3)), S=z((N, m, m)),
-        L=z((N, m, m)), dinv=z((N, m)), rhs=z((N, m, 8)), qdd=z(m), held=c.locked.copy(), given=z(N), reaction=z(N),
+        cond=z((N, 36)), joint=z((N, 6)), X=z((N, 3, 4)), inertia=z((4, 4)), bias=z(4), u=z((N, 3)), S=z((N, m, m + 8)),
+        L=z((N, m, m)), dinv=z((N, m)), qdd=z(m), held=c.locked.copy(), given=z(N), reaction=z(N),
     )  # fmt: skip

@@ -12,7 +12,7 @@ from .compiled import compiled, inlined, internal
 from .lanes import WIDTH, lanes, load, load_some, pack, parts, store, total
 from .pinned import pinned
 
-_COLUMN = (0, 1, 2, 7)  # of w.rhs: Mrq for x, y, angle and d
+_COLUMN = (0, 1, 2, 7)  # of the terms: Mrq for x, y, angle and d
 _UNIT = np.eye(2 * WIDTH)[WIDTH - 1]  # 1 in lane k of what is loaded from WIDTH - 1 - k
 
 
@@ -65,35 +65,34 @@ def inertia_block(c: Chain, w: Work, i: int) -> None:
 
 @internal
 def _elastic(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh: float) -> None:
-    """Factorise S = Mqq + gh D + gh^2 K = l d l^T of a flexible link and form l^-1 of its terms in the rows of w.rhs."""
+    """Factorise S = Mqq + gh D + gh^2 K = l d l^T of a flexible link and form l^-1 of its terms at the ends of the rows of w.S."""
     e, end = c.first[i], c.first[i + 1]
     m = end - e - 1
-    S, L, rhs, terms, qs, qds = w.S[i], w.L[i], w.rhs[i], w.terms[i], ys[e + 1 : end], vs[e + 1 : end]
+    S, L, dinv, M = w.S[i], w.L[i], w.dinv[i], w.dinv.shape[1]
+    qs, qds, alpha, beta = ys[e + 1 : end], vs[e + 1 : end], c.alpha[i], c.beta[i]
     formed_block(c, w, i, gh)
-    alpha, beta = c.alpha[i], c.beta[i]
     for k in range(m):
+        row, terms = S[k], w.terms[i, k]
         if c.kind[i] == SLEEVE:
             sums = lanes(0.0)
             for b in range(0, m, WIDTH):
                 q, qd = load_some(qs, b, m - b), load_some(qds, b, m - b)
-                M, K = load(w.M[i, k], b), load(w.K[i, k], b)
-                sums += K * q + (alpha * M + beta * K) * qd
+                inertia, stiffness = load(w.M[i, k], b), load(w.K[i, k], b)
+                sums += stiffness * q + (alpha * inertia + beta * stiffness) * qd
             linear = total(sums)
         else:
             linear = c.lam[i, k] * qs[k] + c.damp[i, k] * qds[k]
-        store(rhs[k], 0, load(terms[k], 0) + pack(0.0, 0.0, 0.0, linear))
-        store(rhs[k], 4, load(terms[k], 4))
+        store(row, M, load(terms, 0) + pack(0.0, 0.0, 0.0, linear))
+        store(row, M + 4, load(terms, 4))
     for j in range(m):
-        inverse = 1.0 / S[j, j]
-        w.dinv[i, j] = inverse
-        near, far = load(rhs[j], 0), load(rhs[j], 4)
+        pivot = S[j]
+        inverse = 1.0 / pivot[j]
+        dinv[j] = inverse
         for k in range(j + 1, m):
-            lower = S[j, k] * inverse
+            row, lower = S[k], pivot[k] * inverse
             L[k, j] = lower
-            for b in range(k - k % WIDTH, m, WIDTH):
-                store(S[k], b, load(S[k], b) - lower * load(S[j], b))
-            store(rhs[k], 0, load(rhs[k], 0) - lower * near)
-            store(rhs[k], 4, load(rhs[k], 4) - lower * far)
+            for b in range(k - k % WIDTH, M + 8, WIDTH):
+                store(row, b, load(row, b) - lower * load(pivot, b))
 
 
 @inlined
@@ -102,7 +101,8 @@ def last_hub(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh: floa
     _elastic(c, w, i, ys, vs, gh)
     x, y, angle = lanes(0.0), lanes(0.0), lanes(0.0)
     for k in range(c.first[i + 1] - c.first[i] - 1):
-        r, own = w.rhs[i, k], load(w.rhs[i, k], 0)
+        r = w.S[i, k, w.dinv.shape[1] :]
+        own = load(r, 0)
         x += w.dinv[i, k] * r[0] * own
         y += w.dinv[i, k] * r[1] * own
         angle += w.dinv[i, k] * r[2] * own
@@ -171,7 +171,8 @@ def flexible_hub(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh: 
     zero = lanes(0.0)
     qx, qy, qt, px, py, pt, ex, ey, et = zero, zero, zero, zero, zero, zero, zero, zero, zero
     for k in range(c.first[i + 1] - c.first[i] - 1):
-        r, inverse, own, tip = w.rhs[i, k], w.dinv[i, k], load(w.rhs[i, k], 0), load(w.rhs[i, k], 4)
+        r, inverse = w.S[i, k, w.dinv.shape[1] :], w.dinv[i, k]
+        own, tip = load(r, 0), load(r, 4)
         qx += inverse * r[0] * own
         qy += inverse * r[1] * own
         qt += inverse * r[2] * own
@@ -234,9 +235,10 @@ def sleeve_hub(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh: fl
         for row in range(4):
             near, far = lanes(0.0), lanes(0.0)
             for k in range(m):
-                own = w.dinv[i, k] * w.rhs[i, k, _COLUMN[row]]
-                near += own * load(w.rhs[i, k], 0)
-                far += own * load(w.rhs[i, k], 4)
+                r = w.S[i, k, w.dinv.shape[1] :]
+                own = w.dinv[i, k] * r[_COLUMN[row]]
+                near += own * load(r, 0)
+                far += own * load(r, 4)
             q0, q1, q2, force = parts(near)
             x0, x1, x2, q3 = parts(far)
             I[row, 0] -= q0
@@ -249,7 +251,8 @@ def sleeve_hub(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh: fl
             X[2, row] -= x2
         ex, ey, et, tx, ty, tt = lanes(0.0), lanes(0.0), lanes(0.0), lanes(0.0), lanes(0.0), lanes(0.0)
         for k in range(m):
-            r, inverse, own, tip = w.rhs[i, k], w.dinv[i, k], load(w.rhs[i, k], 0), load(w.rhs[i, k], 4)
+            r, inverse = w.S[i, k, w.dinv.shape[1] :], w.dinv[i, k]
+            own, tip = load(r, 0), load(r, 4)
             ex += inverse * r[4] * tip
             ey += inverse * r[5] * tip
             et += inverse * r[6] * tip

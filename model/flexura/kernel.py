@@ -138,7 +138,8 @@ def passes(
         m, qdd = end - e - 1, w.qdd
         hub, tip = pack(u0, u1, u2, 1.0), pack(f0, f1, f2, a[e] if c.kind[i] == SLEEVE else 0.0)
         for k in range(m):  # l^T qdd = -dinv l^-1 (Mqr u + cq + Jq^T f)
-            qdd[k] = -w.dinv[i, k] * total(load(w.rhs[i, k], 0) * hub + load(w.rhs[i, k], 4) * tip)
+            r = w.S[i, k, w.dinv.shape[1] :]
+            qdd[k] = -w.dinv[i, k] * total(load(r, 0) * hub + load(r, 4) * tip)
         for k in range(m - 1, 0, -1):
             for b in range(0, k, WIDTH):
                 store(qdd, b, load(qdd, b) - qdd[k] * load(w.L[i, k], b))
