@@ -12,7 +12,7 @@ from .beam import LinkIntegrals, integrals
 from .chain import REVOLUTE, SLEEVE, SLIDER, Chain, workspace
 from .errors import InputError
 from .extended import mass_matrix
-from .lanes import padded, zeros
+from .lanes import padded, room
 from .modes import eigh, modal
 from .newton_euler import mass
 from .robot import Link, Robot
@@ -142,7 +142,7 @@ def _halves(a: np.ndarray, gaps: int) -> np.ndarray:
 
 def _in_fours(a: np.ndarray, axes: tuple[int, ...]) -> np.ndarray:
     """An array with zeros after the ends of some axes, up to the next multiple of four."""
-    out = zeros(tuple(padded(size) if axis in axes else size for axis, size in enumerate(a.shape)))
+    out = room(a=tuple(padded(size) if axis in axes else size for axis, size in enumerate(a.shape)))["a"]
     out[tuple(map(slice, a.shape))] = a
     return out
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from .chain import SLEEVE, SLIDER, Chain, Work
 from .compiled import compiled, inlined, internal
-from .lanes import WIDTH, lanes, load, padded, store, total, zeros
+from .lanes import WIDTH, lanes, load, padded, room, store, total
 from .newton_euler import mass
 from .pinned import pinned
 
@@ -43,12 +43,12 @@ class Basis(NamedTuple):
 
 
 def basis(n: int) -> Basis:
-    z, N = zeros, padded(n)
-    b = Basis(
-        z((n, N)), z((n, N)), z(N), z(N), np.full(n, np.inf), z((n, N)), z((n, N)), z((n, N)), z((n, N)),
-        z((n, N)), z((n, N)), z(n), z(n), z(n), z(2),
-    )  # fmt: skip
-    b.phi[:] = np.eye(n, N)
+    N = padded(n)
+    b = Basis(**room(
+        phi=(n, N), rows=(n, N), w2=N, d2=N, seen=n, M=(n, N), K=(n, N), D=(n, N), X=(n, N), A=(n, N), B=(n, N), unit=n, force=n,
+        still=n, gravity=2,
+    ))  # fmt: skip
+    b.phi[:], b.seen[:] = np.eye(n, N), np.inf
     return b
 
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .lanes import zeros
+from .lanes import room
 
 REVOLUTE, SLIDER, SLEEVE = 0, 1, 2  # joint kinds R, Pa, Pb
 COULOMB_SPEED = 1e-3  # m/s or rad/s: Coulomb friction is f tanh(v / COULOMB_SPEED)
@@ -115,12 +115,10 @@ class Work(NamedTuple):
 
 def workspace(c: Chain) -> Work:
     """A fresh workspace for one solver of this chain."""
-    z, (N, m), p = zeros, c.S0.shape, c.point_x.shape[1]
-    P, E = c.sleeve_xi.shape[1], c.ride.shape[1]
-    return Work(
-        cos=z(N), sin=z(N), omega=z(N), angle=z(N), place=z((N, 2)), beta=z((N, 3)), rate=z((N, 3)), slide=z((N, 3)),
-        flow=z((N, 3)), tilt=z(N), body=z((N, 11)), terms=z((N, m, 8)), h=z((N, p, m)), slope=z((4, 2, p)), point=z((5, p)),
-        M=z((N, m, m)), K=z((N, m, m)), strain=z(N), sum=z((P, 12)), sum_h=z((P, m)), ride=z((E, 3, 4)), quintic=z((4, 8)),
-        cond=z((N, 36)), joint=z((N, 6)), X=z((N, 3, 4)), inertia=z((4, 4)), bias=z(4), u=z((N, 3)), S=z((N, m, m + 8)),
-        L=z((N, m, m)), dinv=z((N, m)), qdd=z(m), held=c.locked.copy(), given=z(N), reaction=z(N),
-    )  # fmt: skip
+    (N, m), p, P, E = c.S0.shape, c.point_x.shape[1], c.sleeve_xi.shape[1], c.ride.shape[1]
+    return Work(**room(
+        cos=N, sin=N, omega=N, angle=N, place=(N, 2), beta=(N, 3), rate=(N, 3), slide=(N, 3), flow=(N, 3), tilt=N, body=(N, 11),
+        terms=(N, m, 8), h=(N, p, m), slope=(4, 2, p), point=(5, p), M=(N, m, m), K=(N, m, m), strain=N, sum=(P, 12),
+        sum_h=(P, m), ride=(E, 3, 4), quintic=(4, 8), cond=(N, 36), joint=(N, 6), X=(N, 3, 4), inertia=(4, 4), bias=4, u=(N, 3),
+        S=(N, m, m + 8), L=(N, m, m), dinv=(N, m), qdd=m, given=N, reaction=N,
+    ), held=c.locked.copy())  # fmt: skip

@@ -25,10 +25,10 @@ def compiled(function: Any) -> Any:
     return _cached(function)
 
 
-def internal(function: Any) -> Any:
+def internal(function: Any, **options: Any) -> Any:
     """The same for a function that only compiled ones call: none is made for Python, whose unpacking of a robot's hundred arrays
     is more code than most functions."""
-    return _cached(function, no_cpython_wrapper=True)
+    return _cached(function, no_cpython_wrapper=True, **options)
 
 
 def inlined(function: Any) -> Any:
@@ -40,7 +40,8 @@ def _cached(function: Any, **options: Any) -> Any:
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(_FOLDER)
     try:
-        return njit(cache=True, nogil=True, error_model="numpy", _nrt=False, fastmath={"contract"}, **options)(function)
+        settings = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False, "fastmath": {"contract"}} | options
+        return njit(**settings)(function)
     finally:
         numba.config.CACHE_DIR = before
 

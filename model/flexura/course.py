@@ -24,6 +24,7 @@ METHODS = {
     "explicit": loop.EXPLICIT, "implicit": loop.IMPLICIT, "explicit-3": loop.PAIR_3, "explicit-5": loop.PAIR_5,
     "exponential": exponential.EXPONENTIAL,
 }  # fmt: skip
+FIRST = 1e-4  # the first step, in whole runs
 _STEPS_A_CALL = 400  # between two looks at the progress bar and the keyboard
 
 
@@ -45,7 +46,7 @@ class Course:
         self.m.z[:], self.out[0] = state, state
         s, longest = self.m.s, longest_step(system, method)
         s[loop.T], s[loop.OUT], s[loop.ERR] = t[0], 1, 1.0
-        s[loop.LONGEST], s[loop.H] = longest, min(0.02 * longest, (t[-1] - t[0]) * 1e-4)
+        s[loop.LONGEST], s[loop.H] = longest, min(0.02 * longest, (t[-1] - t[0]) * FIRST)
         self._system, self._t, self._method = system, t, method
         self._robot = system.chain, following(system, drive), self.inputs, self.m
         self._modes = (basis(system.n), past(system.n)) if method == exponential.EXPONENTIAL else None
@@ -65,7 +66,7 @@ class Course:
         s = self.m.s
         self._modes, self._method = None, choose(self._system, self._t[-1] - s[loop.T], rtol)
         s[loop.LONGEST] = longest_step(self._system, self._method)
-        s[loop.H] = min(0.02 * s[loop.LONGEST], (self._t[-1] - self._t[0]) * 1e-4)
+        s[loop.H] = min(0.02 * s[loop.LONGEST], (self._t[-1] - self._t[0]) * FIRST)
         s[loop.STATUS], s[loop.FRESH], s[loop.ERR] = loop.RUNNING, 0.0, 1.0
 
 
@@ -128,6 +129,11 @@ def inputs_of(system: System, drive: Drive | Controller, t: np.ndarray | None = 
         segments, ranges, gains[:, 0].copy(), gains[:, 1].copy(), drive.follows.astype(np.int64), limits[:, 0].copy(),
         limits[:, 1].copy(), drive.breaks, law,
     )  # fmt: skip
+
+
+def slack(system: System) -> np.ndarray:
+    """The joints' limits (N, 2), a billionth wider: a motion may end on one, and does so up to round-off."""
+    return system.limits + [-1e-9, 1e-9] * np.maximum(1.0, np.abs(np.where(np.isfinite(system.limits), system.limits, 0.0)))
 
 
 def slack(system: System) -> np.ndarray:

@@ -3,32 +3,20 @@
 from __future__ import annotations
 
 import os
-import threading
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import NamedTuple
 
 import numpy as np
 
 from . import loop
 from .course import Course, which
 from .drive import Drive
+from .exponential import EXPONENTIAL
+from .many import Histories, collected, run, workplace
 from .system import System
 
-STEPS_A_CALL = 2000  # between two looks at whether to stop
+STEPS_A_CALL, ROBOTS_A_CALL = 2000, 64  # between two looks at whether to stop, and of one piece of work
 WORDS = {loop.DONE: "done", loop.LIMIT: "limit", loop.STUCK: "stuck"}
-
-
-class Histories(NamedTuple):
-    """What the engine gives for B robots: states NaN from where a robot stopped, and how each ended."""
-
-    states: np.ndarray  # (B, T, 2n) in the solver's coordinates
-    work: np.ndarray  # (B, T, 2) of the drives, and lost [J]
-    status: np.ndarray  # (B,) int: loop.DONE, LIMIT or STUCK
-    reached: np.ndarray  # (B,) the last good instant [s]
-    joint: np.ndarray  # (B,) int: the joint that reached its limit (from 0), -1
-    position: np.ndarray  # (B, N) of the joints, at the last good instant
-    steps: np.ndarray  # (B,) int
 
 
 def engine(
@@ -50,33 +38,39 @@ def engine(
         np.full((B, len(t), size - 2), np.nan), np.full((B, len(t), 2), np.nan), np.full(B, loop.DONE), np.full(B, t[-1]),
         np.full(B, -1), np.zeros((B, len(systems[0].links))), np.zeros(B, dtype=np.int64),
     )  # fmt: skip
-    stop = threading.Event()
+    stop = np.zeros(1, dtype=bool)
 
-    def one(k: int) -> None:
-        if stop.is_set():
-            return
-        system = systems[k]
-        course = Course(system, t, drives[k], states[k], which(system, t, drives[k], rtol, method))
+    def some(rows: range) -> None:
+        """A block of robots: those that take exponential steps in one compiled call, the others, and who gets stuck, singly."""
+        methods = [which(systems[k], t, drives[k], rtol, method) for k in rows]
+        together = [k for k, chosen in zip(rows, methods, strict=True) if chosen == EXPONENTIAL and len(t) > 1]
+        if together:
+            x = collected([systems[k] for k in together], [drives[k] for k in together], states[together])
+            w, m, b, p, law, history = workplace(systems[together[0]], len(t))
+            run(x, w, m, b, p, law, rtol, t, stop, history, np.array(together), out)
+        for k, chosen in zip(rows, methods, strict=True):
+            if k not in together or out.status[k] == loop.STUCK:
+                one(k, chosen)
+
+    def one(k: int, chosen: int) -> None:
+        course = Course(systems[k], t, drives[k], states[k], chosen)
         m, history = course.m, course.out
-        while len(t) > 1 and m.s[loop.STATUS] == loop.RUNNING and not stop.is_set():
+        while len(t) > 1 and m.s[loop.STATUS] == loop.RUNNING and not stop[0]:
             course.advance(rtol, STEPS_A_CALL)
-        rows = int(m.s[loop.OUT])
+        rows, ended = int(m.s[loop.OUT]), int(m.s[loop.STATUS])
         out.states[k, :rows], out.work[k, :rows] = history[:rows, : size - 2], history[:rows, size - 2 :]
-        out.position[k] = m.z[system.joint_rows]
-        out.steps[k] = int(m.s[loop.STEPS])
-        if m.s[loop.STATUS] in (loop.LIMIT, loop.STUCK):
-            out.status[k], out.reached[k] = int(m.s[loop.STATUS]), m.s[loop.T]
-            out.joint[k] = int(m.s[loop.FAULT]) if m.s[loop.STATUS] == loop.LIMIT else -1
+        out.position[k] = m.z[systems[k].joint_rows]
+        out.steps[k], out.status[k] = int(m.s[loop.STEPS]), loop.DONE
+        if ended in (loop.LIMIT, loop.STUCK):
+            out.status[k], out.reached[k] = ended, m.s[loop.T]
+            out.joint[k] = int(m.s[loop.FAULT]) if ended == loop.LIMIT else -1
 
-    if threads == 1:
-        for k in range(B):
-            one(k)
-        return out
+    block = max(1, min(ROBOTS_A_CALL, -(-B // threads)))
     with ThreadPoolExecutor(threads) as pool:
         try:
-            list(pool.map(one, range(B)))
+            list(pool.map(some, (range(k, min(k + block, B)) for k in range(0, B, block))))
         except BaseException:
-            stop.set()
+            stop[0] = True
             raise
     return out
 

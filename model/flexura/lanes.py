@@ -8,8 +8,10 @@ works on lanes and on lanes with a number. Every function here is plain Python o
 
 from __future__ import annotations
 
+import math
 import operator
 from collections.abc import Callable
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -20,6 +22,7 @@ from numba.core.typing.templates import AbstractTemplate, infer_global, signatur
 from numba.extending import lower_builtin, models, register_model, type_callable
 
 WIDTH = 4
+_LINE = 8  # numbers on a cache line
 _I32, _I64, _F64 = ir.IntType(32), ir.IntType(64), ir.DoubleType()
 _VECTOR, _MASK = ir.VectorType(_F64, WIDTH), ir.VectorType(ir.IntType(1), WIDTH)
 _NONE = ir.Constant(_VECTOR, ir.Undefined)
@@ -40,12 +43,17 @@ def _plain(values: Any) -> Any:
     return np.array(values, dtype=float).view(_Plain)
 
 
-def zeros(shape: int | tuple[int, ...]) -> np.ndarray:
-    """Zeros that begin on a cache line, so that four neighbours never lie on two of them where rows are `padded`."""
-    count = int(np.prod(shape))
-    room = np.zeros(count + 8)
-    start = -room.ctypes.data % 64 // 8
-    return room[start : start + count].reshape(shape)
+def room(**shapes: int | tuple[int, ...]) -> dict[str, np.ndarray]:
+    """Zeros of these shapes in one piece of memory, each beginning on a cache line, so that four neighbours never lie on two of
+    them where rows are `padded`; four may be read or written from the last place of each."""
+    counts = [shape if isinstance(shape, int) else math.prod(shape) for shape in shapes.values()]
+    starts = list(accumulate([-(-(count + WIDTH) // _LINE) * _LINE for count in counts], initial=0))
+    memory = np.zeros(starts[-1] + _LINE)
+    first = -memory.ctypes.data % 64 // 8
+    return {
+        name: memory[first + start : first + start + count].reshape(shape)
+        for (name, shape), start, count in zip(shapes.items(), starts, counts, strict=False)
+    }
 
 
 def load(a: np.ndarray, k: int) -> Any:

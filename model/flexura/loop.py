@@ -18,7 +18,7 @@ import numpy as np
 from .chain import COULOMB_SPEED, SLEEVE, SLIDER, Chain, Work
 from .compiled import compiled, inlined, internal
 from .kernel import passes
-from .lanes import WIDTH, lanes, load, load_some, padded, store, store_some, total, zeros
+from .lanes import WIDTH, lanes, load, load_some, padded, room, store, store_some, total
 from .law import Law, due, tick
 from .pinned import pinned
 from .signal import evaluate
@@ -62,13 +62,11 @@ class Memory(NamedTuple):
 
 
 def memory(links: int, unknowns: int) -> Memory:
-    """Fresh memory; four numbers may be read or written from every place of the vectors, and rows end on a multiple of four."""
-    z, size = zeros, 2 * unknowns + 2
-    v, wide = lambda count: z(padded(count) + WIDTH)[:count], padded(size) + WIDTH
-    return Memory(
-        z(12), v(size), v(size), z((16, wide)), z((7, wide)), z((links, 4)), v(2 * unknowns), z(links),
-        v(unknowns), v(unknowns), v(unknowns), z(links),
-    )  # fmt: skip
+    n, size = unknowns, 2 * unknowns + 2
+    wide = padded(size) + WIDTH
+    return Memory(**room(
+        s=12, z=size, znew=size, K=(16, wide), F=(7, wide), big=(links, 4), scale=2 * n, force=links, ys=n, vs=n, a=n, zero=links,
+    ))  # fmt: skip
 
 
 @inlined

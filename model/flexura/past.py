@@ -9,7 +9,7 @@ import numpy as np
 
 from .basis import Basis
 from .compiled import inlined, internal
-from .lanes import WIDTH, lanes, load, padded, store, zeros
+from .lanes import WIDTH, lanes, load, padded, room, store
 from .propagator import free, moments
 
 ORDER = 5
@@ -57,13 +57,12 @@ class Past(NamedTuple):
 
 
 def past(n: int) -> Past:
-    z, k, r, N = zeros, ORDER, ROWS, padded(n)
-    return Past(
-        s=z(5), origin=z(N), eta=z(N), etad=z(N), t=z(r), a=z((r, N)), y=z((r, N)), v=z((r, N)), N=z((r, N)), power=z((r, 2)),
-        step=z((4, N)), A=z((k + 1, N)), B=z((k + 1, N)), ahead=z((3, k, N)), late=z((4, N)), poly=z((2, k + 2, k + 1)), low=z(N),
-        end=z(k + 1), area=z(k + 1), node=z(k), gap=z(N), new=z((4, N)), size=z((2, N)), f=z((k + 1, N)), bent=z((2, N)), slow=z((k + 1, N)), work=z((2, N)),
-        column=z((2, k + 1)), tables=z((2, 40)),
-    )  # fmt: skip
+    k, r, N = ORDER, ROWS, padded(n)
+    return Past(**room(
+        s=5, origin=N, eta=N, etad=N, t=r, a=(r, N), y=(r, N), v=(r, N), N=(r, N), power=(r, 2), step=(4, N), A=(k + 1, N),
+        B=(k + 1, N), ahead=(3, k, N), late=(4, N), poly=(2, k + 2, k + 1), low=N, end=k + 1, area=k + 1, node=k, gap=N,
+        new=(4, N), size=(2, N), f=(k + 1, N), bent=(2, N), slow=(k + 1, N), work=(2, N), column=(2, k + 1), tables=(2, 40),
+    ))  # fmt: skip
 
 
 @inlined
