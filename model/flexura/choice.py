@@ -21,12 +21,12 @@ def quickest(system: System, duration: float, rtol: float, gains: np.ndarray) ->
     c = system.chain
     bends = np.diff(c.first) > 1
     rides = (c.kind[1:] == SLIDER) & bends[:-1] & (c.locked[1:] == 0)
-    others = choose(system, duration, rtol)
     if rides.any() or not bends.any() or rtol < 1e-9:
-        return others
+        return choose(system, duration, rtol)
     # coupling by damping is integrated like a force; extrapolating it is stable for about rate h < 1/35
-    if 35 * _coupled(system, gains) > _implicit(system, rtol):
-        return others
+    coupled = _coupled(system, gains)
+    if coupled > 0.0 and 35 * coupled > _implicit(system, rtol):
+        return choose(system, duration, rtol)
     return exponential.EXPONENTIAL
 
 

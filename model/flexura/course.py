@@ -33,7 +33,7 @@ def which(system: System, t: np.ndarray, drive: Any, rtol: float, method: str) -
     if method != "auto" and (method != "exponential" or isinstance(drive, Drive)):
         return METHODS[method]
     if isinstance(drive, Drive):
-        return quickest(system, t[-1] - t[0], rtol, drive.packed()[2])
+        return quickest(system, t[-1] - t[0], rtol, drive.gains)
     return choose(system, t[-1] - t[0], rtol, drive.rate_Hz if isinstance(drive, Controller) else 0.0)
 
 

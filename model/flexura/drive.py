@@ -100,10 +100,14 @@ class Drive:
         all_breaks = [s.breaks for j in self.joints for s in (j.force, j.motion) if s is not None]
         return np.unique(np.concatenate(all_breaks)) if all_breaks else np.zeros(0)
 
+    @property
+    def gains(self) -> np.ndarray:
+        """Of position and rate, (n, 2); 0 where a joint follows no motion, or follows it exactly."""
+        return np.array([(j.kp, j.kd) if j.motion is not None and not j.prescribed else (0.0, 0.0) for j in self.joints])
+
     def packed(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Segments (k, 10) of all signals, their index (n, 4) [force from, to; motion from, to], gains (n, 2)."""
         parts, index, row = [_NONE], np.zeros((len(self.joints), 4), dtype=np.int64), 0
-        gains = np.zeros((len(self.joints), 2))
         for i, joint in enumerate(self.joints):
             for k, s in enumerate((joint.force, joint.motion)):
                 index[i, 2 * k] = row
@@ -111,9 +115,7 @@ class Drive:
                     parts.append(s.segments)
                     row += len(s.segments)
                 index[i, 2 * k + 1] = row
-            if joint.motion is not None and not joint.prescribed:
-                gains[i] = joint.kp, joint.kd
-        return np.ascontiguousarray(np.concatenate(parts)), index, gains
+        return np.ascontiguousarray(np.concatenate(parts)), index, self.gains
 
 
 def _smooth(motion: Signal, key: str) -> None:

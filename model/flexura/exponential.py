@@ -36,6 +36,7 @@ from .loop import (
     T,
     _copy,
     _find,
+    _grown,
     _outside,
     _prescribe,
     _weights,
@@ -167,21 +168,25 @@ def _correct(b: Basis, m: Memory, p: Past, h: float, new: int) -> float:
 @internal
 def _force_inside(b: Basis, p: Past, h: float) -> None:
     """N over the step just made as a polynomial, f, and what `_inside` needs of it."""
-    k, head = int(p.s[COUNT]), int(p.s[HEAD])
-    for i in range(0, b.w2.shape[0], WIDTH):
+    n, k, head = b.seen.shape[0], int(p.s[COUNT]), int(p.s[HEAD])
+    for i in range(0, n, WIDTH):
         gap, end, order = load(p.gap, i), lanes(0.0), order_of(p, k, i)
         for q in range(k + 1):
-            f = gap * coefficient(p, k, q, i)
-            for j in range(order):
-                f += coefficient(p, j, q, i) * load(p.N[ring(head, j)], i)
+            f = lanes(0.0)
+            if q <= order:
+                f = gap * coefficient(p, k, q, i)
+                for j in range(order):
+                    f += coefficient(p, j, q, i) * load(p.N[ring(head, j)], i)
             store(p.f[q], i, f)
             end += f
         w2, d2 = load(b.w2, i), load(b.d2, i)
         store(p.bent[0], i, h * h * (load(p.f[0], i) - w2 * load(p.eta, i) - d2 * load(p.etad, i)))
         store(p.bent[1], i, h * h * (end - w2 * load(p.new[2], i) - d2 * load(p.new[3], i)))
+        if b.w2[min(i + WIDTH, n) - 1] * h * h < 1.0:
+            continue
         above, here, inverse, drag = lanes(0.0), lanes(0.0), 1.0 / w2, d2 * (1.0 / h)
         bend = inverse * (1.0 / (h * h))
-        for q in range(k, -1, -1):
+        for q in range(order, -1, -1):
             below = inverse * (load(p.f[q], i) - (q + 1.0) * drag * here) - (q + 1.0) * (q + 2.0) * bend * above
             above, here = here, below
             store(p.slow[q], i, below)
@@ -205,10 +210,10 @@ def _inside(m: Memory, b: Basis, p: Past, h: float, x: float, out: np.ndarray) -
         g, dg = free(w2, d2, x * h)
         if w2 * h * h >= 1.0 and d2 < 0.6 * h * w2:
             y, v = 0.0, 0.0
-            for q in range(k, -1, -1):
+            for q in range(order_of(p, k, i - i % WIDTH), -1, -1):
                 v = v * x + y
                 y = y * x + p.slow[q, i]
-            y0, v0 = p.eta[i] - p.slow[0, i], p.etad[i] - (p.slow[1, i] / h if k > 0 else 0.0)
+            y0, v0 = p.eta[i] - p.slow[0, i], p.etad[i] - p.slow[1, i] / h
             eta[i], etad[i] = y + (dg + d2 * g) * y0 + g * v0, v / h + dg * v0 - w2 * g * y0
             continue
         moments(w2, d2, x * h, g, dg, p.column[0], p.column[1], p.tables)
@@ -348,11 +353,14 @@ def advance(
         p.s[STEADY] += 1.0
         if factor * h > 1.4 * s[H] and (k < ORDER or p.s[STEADY] > 2.0):
             s[H] = min(factor * h, 2.0 * s[H])
-        _weights(c, m, rtol, m.z)
         if tn >= end:
             s[STATUS] = DONE
             return
         if left == 1.0:
+            _grown(c, m, m.z)
             s[FRESH], s[H] = 0.0, max(0.1 * s[H], 1e-3 * h)
         elif int(s[STEPS]) % 8 == 0 or k < ORDER:
+            _weights(c, m, rtol, m.z)
             _sizes(b, m.scale, p.size)
+        else:
+            _grown(c, m, m.z)

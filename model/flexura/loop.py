@@ -52,7 +52,7 @@ class Memory(NamedTuple):
     znew: np.ndarray
     K: np.ndarray  # (16, 2n + 2) stage derivatives
     F: np.ndarray  # (7, 2n + 2) dense output
-    big: np.ndarray  # (N, 4) largest |eta|, |eta'|, ||q||, ||q'|| so far
+    big: np.ndarray  # (N, 4) largest |eta|, |eta'|, ||q||^2, ||q'||^2 so far
     scale: np.ndarray  # (2n,) error weights
     force: np.ndarray  # (N,)
     ys: np.ndarray  # (n,)
@@ -164,21 +164,30 @@ def _slope(c: Chain, w: Work, d: Inputs, m: Memory, t: float, z: np.ndarray, dz:
     m.s[EVALS] += 1
 
 
+@inlined
+def _grown(c: Chain, m: Memory, z: np.ndarray) -> None:
+    """The largest sizes so far, with state z."""
+    n = m.a.shape[0]
+    for i in range(c.kind.shape[0]):
+        e, count, big = c.first[i], c.first[i + 1] - c.first[i] - 1, m.big[i]
+        big[0], big[1] = max(big[0], abs(z[e])), max(big[1], abs(z[n + e]))
+        q2, v2 = lanes(0.0), lanes(0.0)
+        for b in range(0, count, WIDTH):
+            q, v = load_some(z, e + 1 + b, count - b), load_some(z, n + e + 1 + b, count - b)
+            q2 += q * q
+            v2 += v * v
+        big[2], big[3] = max(big[2], total(q2)), max(big[3], total(v2))
+
+
 @internal
 def _weights(c: Chain, m: Memory, rtol: float, z: np.ndarray) -> None:
     """Error weights 1/(rtol * size) from the largest sizes so far."""
+    _grown(c, m, z)
     n = m.a.shape[0]
     for i in range(c.kind.shape[0]):
-        e, end = c.first[i], c.first[i + 1]
-        q2, v2 = 0.0, 0.0
-        for k in range(e + 1, end):
-            q2 += z[k] * z[k]
-            v2 += z[n + k] * z[n + k]
-        big = m.big[i]
-        big[0], big[1] = max(big[0], abs(z[e])), max(big[1], abs(z[n + e]))
-        big[2], big[3] = max(big[2], np.sqrt(q2)), max(big[3], np.sqrt(v2))
+        e, end, big = c.first[i], c.first[i + 1], m.big[i]
         m.scale[e], m.scale[n + e] = 1.0 / (rtol * max(big[0], FLOOR)), 1.0 / (rtol * max(big[1], FLOOR))
-        place, rate = 1.0 / (rtol * max(big[2], FLOOR)), 1.0 / (rtol * max(big[3], FLOOR))
+        place, rate = 1.0 / (rtol * max(np.sqrt(big[2]), FLOOR)), 1.0 / (rtol * max(np.sqrt(big[3]), FLOOR))
         for k in range(e + 1, end):
             m.scale[k], m.scale[n + k] = place, rate
 

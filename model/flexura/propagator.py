@@ -53,10 +53,11 @@ def moments(w2: float, d2: float, h: float, g: float, dg: float, A: np.ndarray, 
     x2, dd = w2 * h * h, d2 * h
     a = work[0]
     if x2 >= 9.0 and dd < 0.6 * x2:
-        a[0] = (1.0 - dg - d2 * g) / x2
-        a[1] = (1.0 - g / h - dd * a[0]) / x2
+        inverse = 1.0 / x2
+        a[0] = (1.0 - dg - d2 * g) * inverse
+        a[1] = (1.0 - g / h - dd * a[0]) * inverse
         for m in range(2, count):
-            a[m] = (1.0 - dd * m * a[m - 1] - m * (m - 1) * a[m - 2]) / x2
+            a[m] = (1.0 - dd * m * a[m - 1] - m * (m - 1) * a[m - 2]) * inverse
     elif dd < 3.0 or dd * dd < 4.2 * x2:
         begin = _NEAR if x2 < 1.0 and dd < 0.1 else _FROM
         above, here = 1.0 / (begin * begin), 1.0 / ((begin - 1) * (begin - 1))
