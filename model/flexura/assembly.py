@@ -75,9 +75,7 @@ def assemble_all(robots: Sequence[Robot]) -> list[System | InputError]:
     ]  # fmt: skip
 
 
-def _chains(
-    robots: Sequence[Robot], rows: list[int], infos: list[LinkIntegrals], spectra: list[np.ndarray]
-) -> list[np.ndarray]:
+def _chains(robots: Sequence[Robot], rows: list[int], infos: list[LinkIntegrals], spectra: list[np.ndarray]) -> list[np.ndarray]:
     """The fields of `Chain`, in its order, of all robots: every one with a leading axis (B,)."""
     links = [robot.links for robot in robots]
     B, N = len(robots), len(links[0])

@@ -51,9 +51,7 @@ class Batch:
         counts = {len(values) for values in columns.values()}
         if len(counts) != 1:
             raise InputError("expected one or more keys with equally many values", key="changes", value=sorted(counts))
-        return Batch(
-            lambda k, random: robot.replace({key: float(values[k]) for key, values in columns.items()}), counts.pop()
-        )
+        return Batch(lambda k, random: robot.replace({key: float(values[k]) for key, values in columns.items()}), counts.pop())
 
     def __iter__(self) -> Iterator[Item]:
         """The robots in their order, each checked against the first one's topology."""

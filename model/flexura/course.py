@@ -136,11 +136,6 @@ def slack(system: System) -> np.ndarray:
     return system.limits + [-1e-9, 1e-9] * np.maximum(1.0, np.abs(np.where(np.isfinite(system.limits), system.limits, 0.0)))
 
 
-def slack(system: System) -> np.ndarray:
-    """The joints' limits (N, 2), a billionth wider: a motion may end on one, and does so up to round-off."""
-    return system.limits + [-1e-9, 1e-9] * np.maximum(1.0, np.abs(np.where(np.isfinite(system.limits), system.limits, 0.0)))
-
-
 def following(system: System, drive: Drive | Controller) -> Work:
     """A workspace in which the joints with a prescribed motion are held to it."""
     w = system._work()

@@ -72,4 +72,3 @@ def _jacobians(c: Chain, w: Work, y: np.ndarray) -> tuple[list[np.ndarray], np.n
         if c.kind[i] == SLEEVE:
             attachment[:, e] += w.flow[i]
     return hubs, attachment
-

@@ -65,7 +65,7 @@ def inertia_block(c: Chain, w: Work, i: int) -> None:
 
 @internal
 def _elastic(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh: float) -> None:
-    """Factorise S = Mqq + gh D + gh^2 K = l d l^T of a flexible link and form l^-1 of its terms at the ends of the rows of w.S."""
+    """Factorise S = Mqq + gh D + gh^2 K = l d l^T of a flexible link, and form l^-1 of its terms at the ends of its rows."""
     e, end = c.first[i], c.first[i + 1]
     m = end - e - 1
     S, L, dinv, M = w.S[i], w.L[i], w.dinv[i], w.dinv.shape[1]

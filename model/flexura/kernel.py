@@ -141,8 +141,8 @@ def passes(
             r = w.S[i, k, w.dinv.shape[1] :]
             qdd[k] = -w.dinv[i, k] * total(load(r, 0) * hub + load(r, 4) * tip)
         for k in range(m - 1, 0, -1):
-            for b in range(0, k, WIDTH):
-                store(qdd, b, load(qdd, b) - qdd[k] * load(w.L[i, k], b))
+            for j in range(0, k, WIDTH):
+                store(qdd, j, load(qdd, j) - qdd[k] * load(w.L[i, k], j))
         for k in range(m):
             a[e + 1 + k] = qdd[k]
 

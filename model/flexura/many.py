@@ -16,8 +16,8 @@ from .chain import Chain, Work, workspace
 from .compiled import compiled, internal
 from .course import FIRST, slack
 from .drive import Drive
-from .law import Law, none
 from .lanes import room
+from .law import Law, none
 from .loop import Inputs, Memory
 from .past import Past, past
 from .pinned import pinned
@@ -55,7 +55,7 @@ class Histories(NamedTuple):
 
 def collected(systems: Sequence[System], drives: Sequence[Drive], states: np.ndarray) -> Many:
     """The robots' constants side by side; a drive that several have stands there once."""
-    chains = Chain(*(np.array(field) for field in zip(*(s.chain for s in systems), strict=True)))
+    chains = Chain(*(np.array(field) for field in zip(*(s.chain for s in systems), strict=True)))  # type: ignore[arg-type]
     known: dict[int, int] = {}
     packed: list[tuple[Any, ...]] = []
     for drive in drives:

@@ -17,13 +17,15 @@ STIFF_ORDER = 2  # of modes that turn by more than STIFF rad a step: extrapolati
 STIFF = 3.0
 _OVER = 1.0 / np.arange(1, ORDER + 2)
 ROWS = ORDER + 1  # of the rings: the new value has a row of its own until the step is accepted
-COUNT, SPAN, STEADY, HEAD, STIFFER = range(5)  # entries of Past.s: values held, step of the tables, steps since it changed, newest
+COUNT, SPAN, STEADY, HEAD, STIFFER = range(
+    5
+)  # entries of Past.s: values held, step of the tables, steps since it changed, newest
 # row, and the first of the stiff modes, which are last
 
 
 class Past(NamedTuple):
-    """What a multistep run remembers for n unknowns and as many modes, and the tables of the present step: rows N long, a multiple
-    of four, zeros after their own values. Row HEAD of the rings is the newest."""
+    """What a multistep run remembers for n unknowns and as many modes, and the tables of the present step: rows N long, a
+    multiple of four, zeros after their own values. Row HEAD of the rings is the newest."""
 
     s: np.ndarray  # (5,)
     origin: np.ndarray  # (N,) y0, the state where the basis was taken up: small numbers keep their digits
@@ -134,8 +136,8 @@ def coefficient(p: Past, j: int, m: int, i: int) -> Any:
 
 @inlined
 def _polynomials(p: Past, low: int, used: int, k: int) -> None:
-    """Polynomials through the last `used` of k values: Lagrange's, the one for the gap and the one for the error, from the product
-    w(s) of s less each node, divided by its factors."""
+    """Polynomials through the last `used` of k values: Lagrange's, the one for the gap and the one for the error, from the
+    product w(s) of s less each node, divided by its factors."""
     for j in range(k + 2):
         for m in range(ORDER + 1):
             p.poly[low, j, m] = 0.0

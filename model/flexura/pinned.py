@@ -41,7 +41,7 @@ class _Model(models.PrimitiveModel):
 
 @type_callable(pinned)
 def _type(context: Any) -> Any:
-    return lambda fields: _Pinned(fields) if isinstance(fields, types.NamedTuple) else fields if isinstance(fields, _Pinned) else None
+    return lambda fields: _Pinned(fields) if isinstance(fields, types.NamedTuple) else fields
 
 
 @lower_builtin(pinned, types.NamedTuple)
