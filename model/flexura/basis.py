@@ -1,8 +1,9 @@
 """The whole robot's own modes at one configuration: what exponential steps (`exponential.py`) solve exactly.
 
 With M, K and D the mass, stiffness and damping at that configuration (position gains of the drives in K, friction and rate
-gains in D), Phi M Phi^T = 1 and Phi K Phi^T = diag(w2), a mode a row of Phi. Of Phi D Phi^T the diagonal d2 is kept. The basis need not be exact and
-need not follow the robot: what it leaves out is integrated as a force. It is made again where it has become poor.
+gains in D), and a mode a row of Phi, Phi M Phi^T = 1 and Phi K Phi^T = diag(w2). Of Phi D Phi^T the diagonal d2 is kept. The
+basis need not be exact and need not follow the robot: what it leaves out is integrated as a force. It is made again where it has
+become poor.
 """
 
 from __future__ import annotations

@@ -35,6 +35,7 @@ def integrated(
     begun = time.perf_counter()
 
     def slope(time_s: float, z: np.ndarray) -> np.ndarray:
+        z = np.ascontiguousarray(z)  # a column of a matrix, of Radau's Jacobian
         y, v = z[:n], z[n : 2 * n]
         force = _forces(system, drive, time_s, y, v)
         accelerate(c, w, y, v, y, v, 0.0, force, zero, zero, a)

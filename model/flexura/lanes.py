@@ -57,8 +57,8 @@ def room(**shapes: int | tuple[int, ...]) -> dict[str, np.ndarray]:
 
 
 def load(a: np.ndarray, k: int) -> Any:
-    """a[k : k + 4]."""
-    return _plain(a[k : k + WIDTH])
+    """a[k : k + 4]; where a ends before that, of which `room` takes care, the rest is anything."""
+    return load_some(a, k, min(WIDTH, len(a) - k))
 
 
 def load_some(a: np.ndarray, k: int, count: int) -> Any:
@@ -68,8 +68,8 @@ def load_some(a: np.ndarray, k: int, count: int) -> Any:
 
 
 def store(a: np.ndarray, k: int, x: Any) -> None:
-    """a[k : k + 4] = x."""
-    a[k : k + WIDTH] = x
+    """a[k : k + 4] = x; where a ends before that, what follows in its `room` is overwritten."""
+    store_some(a, k, x, min(WIDTH, len(a) - k))
 
 
 def store_some(a: np.ndarray, k: int, x: Any, count: int) -> None:

@@ -17,10 +17,8 @@ STIFF_ORDER = 2  # of modes that turn by more than STIFF rad a step: extrapolati
 STIFF = 3.0
 _OVER = 1.0 / np.arange(1, ORDER + 2)
 ROWS = ORDER + 1  # of the rings: the new value has a row of its own until the step is accepted
-COUNT, SPAN, STEADY, HEAD, STIFFER = range(
-    5
-)  # entries of Past.s: values held, step of the tables, steps since it changed, newest
-# row, and the first of the stiff modes, which are last
+# entries of Past.s: values held, step of the tables, steps since it changed, newest row, and the first of the stiff modes
+COUNT, SPAN, STEADY, HEAD, STIFFER = range(5)
 
 
 class Past(NamedTuple):

@@ -32,6 +32,7 @@ def test_a_robot_among_others_is_the_robot_alone(described):
 
 def test_kinks_in_other_places_are_no_matter():
     """Tapered links whose kinks lie in different elements, and one whose kink lies on a node."""
+
     def kinked(at: float) -> fx.Robot:
         taper = [{"at_m": x, "value": v} for x, v in ((0.0, 0.3), (at, 0.2), (0.6, 0.1))]
         return robot(beam(0.6, taper, 0.5, 3, modes=2, hub_inertia_kg_m2=1e-3))

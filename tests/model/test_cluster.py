@@ -41,9 +41,7 @@ def test_a_killed_worker_loses_nothing_and_counts_nothing_twice(cluster, tmp_pat
         if len(seen) == 8:
             workers[0].send_signal(signal.SIGKILL)
 
-    done = fx.simulate(
-        BATCH, T, DRIVE, rtol=1e-9, folder=tmp_path / "there", chunk=10, progress=progress, scheduler=address
-    )
+    done = fx.simulate(BATCH, T, DRIVE, rtol=1e-9, folder=tmp_path / "there", chunk=10, progress=progress, scheduler=address)
     assert workers[0].wait(10) == -signal.SIGKILL and workers[1].poll() is None
     assert done.complete and list(done.robots) == list(range(400)) and len(seen) == 40 and seen[-1] == 1.0
     here = fx.simulate(BATCH, T, DRIVE, rtol=1e-9, folder=tmp_path / "here", chunk=10)

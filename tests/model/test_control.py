@@ -270,9 +270,9 @@ def test_slope_terms_are_deflection_terms_on_a_strip_loaded_at_its_tip():
     one = c.one_sensor(0.3)
     assert (one.kf, one.kg, one.ks, one.kt) == pytest.approx((1.0 + 2.0 * 5.0, 0.5 + 0.1 * 5.0, 0.0, 0.0))
     bent = fx.static(rig(), tip_force=(0.0, 0.1))
-    pulled = fx.simulate(
-        rig(), [0.0, TICK], fx.Controller((fx.PID(signal.constant(0.0)), c), deflection_Hz=0.0), q0=bent
-    )["joint/2/drive"][0]
+    pulled = fx.simulate(rig(), [0.0, TICK], fx.Controller((fx.PID(signal.constant(0.0)), c), deflection_Hz=0.0), q0=bent)[
+        "joint/2/drive"
+    ][0]
     same = fx.simulate(rig(), [0.0, TICK], fx.Controller((fx.PID(signal.constant(0.0)), one), deflection_Hz=0.0), q0=bent)
     assert pulled == 0.0 and same["joint/2/drive"][0] == 0.0  # joint 2 takes the strip in odd ticks
 

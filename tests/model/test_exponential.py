@@ -59,7 +59,7 @@ def test_a_step_of_one_mode_is_exact(dd):
 @few
 @given(robots(), st.randoms(use_true_random=False))
 def test_the_basis_is_that_of_the_robot(made, random):
-    """Phi M Phi^T = 1, Phi K Phi^T = diag(w2), ascending, rows = Phi^-1; w2 are LAPACK's; and again from another configuration's basis."""
+    """Phi M Phi^T = 1, Phi K Phi^T = diag(w2), ascending, rows = Phi^-1, w2 LAPACK's; and again from another's basis."""
     sys = fx.assemble(made)
     b, gains = modal.basis(sys.n), np.zeros(len(sys.links))
     to_user = np.linalg.inv(sys.to_solver)

@@ -129,9 +129,7 @@ def structure(name: str, elements: int = 3, **keys) -> fx.System:
 def motions(sys: fx.System, size: float = 1.0) -> list[fx.Signal]:
     """Joints that go 0.5 rad or 0.12 m: over two nodes of the link they slide on."""
     reach = {"R": 0.5, "Pa": 0.12, "Pb": 0.12}
-    return [
-        cycloid(link.joint.start + size * reach[link.joint.type], 0.5, start=link.joint.start) for link in sys.robot.links
-    ]
+    return [cycloid(link.joint.start + size * reach[link.joint.type], 0.5, start=link.joint.start) for link in sys.robot.links]
 
 
 @pytest.mark.parametrize("name", NINE)
