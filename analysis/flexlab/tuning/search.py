@@ -2,6 +2,9 @@
 
 The algorithms are deterministic for a seed, so that what is stored is not their state but what they were told: a search that goes
 on asks again for the stored generations and tells their goals instead of running them. That holds for all four alike.
+
+A run is abandoned where it is certain that the search has no use for it: one worse than every parent does not survive in the
+genetic algorithm, one worse than its particle's own best changes nothing in the swarm. The search goes the same way as without.
 """
 
 from __future__ import annotations
@@ -18,6 +21,7 @@ from flexura.request import program
 
 from .engine import Engine
 from .history import History
+from .objective import FAILED
 from .task import Task
 
 ALGORITHMS = {
@@ -96,7 +100,7 @@ def _stage(
             goals = history.told(generation, points)
         else:
             begun = time.perf_counter()
-            figures, reached = engine(points)
+            figures, reached = engine(points, limits(algorithm, len(points)))
             goals = task.score(figures, reached)
             history.add(points, goals, figures, reached, time.perf_counter() - begun)
             progress(history)
@@ -128,6 +132,22 @@ def _algorithm(how: Search, start: np.ndarray) -> Any:
     if how.algorithm == "pso":
         return PSO(pop_size=how.population, sampling=first)
     return NSGA2(pop_size=how.population, sampling=first, crossover=cross, mutation=change)
+
+
+def limits(algorithm: Any, count: int) -> np.ndarray:
+    """The J (count,) above which each of the points just asked for is of no use, inf where every J is: CMA-ES ranks all."""
+    from pymoo.algorithms.soo.nonconvex.ga import GA
+    from pymoo.algorithms.soo.nonconvex.pso import PSO
+
+    out = np.full(count, np.inf)
+    if not algorithm.is_initialized or not isinstance(algorithm, GA | PSO):
+        return out
+    known = algorithm.pop.get("F")[:, 0]
+    if isinstance(algorithm, PSO):
+        out[:] = known  # a particle's own best
+    elif len(known) == algorithm.pop_size:
+        out[:] = known.max()  # of equals the parents survive
+    return np.where(out < FAILED, out, np.inf)  # what a failure costs is not known before
 
 
 def _stagnant(history: History, generation: int, patience: int) -> bool:
