@@ -130,8 +130,8 @@ def _figures(x: Trial, figures: np.ndarray) -> None:
 def _cost_so_far(
     x: Trial, prices: np.ndarray, limit: float, seen: int, count: int, spent: int, ticks: int, figures: np.ndarray
 ) -> float:  # fmt: skip
-    """What a run costs at least. `figures` are its lower bounds, with the samples from `seen` to before `count` and the ticks from
-    `spent` to before `ticks` added to them."""
+    """What a run costs at least. Adds to the lower bounds `figures` the samples from `seen` to before `count` and the ticks from
+    `spent` to before `ticks`."""
     law, strip = x.inputs.law, figures.shape[0] - OF_STRIP
     for i in range(law.kind.shape[0]):
         if law.kind[i] == NONE:

@@ -9,10 +9,12 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from itertools import permutations
 from pathlib import Path
 
 import numpy as np
 import pytest
+from pymoo.core.population import Population
 from scipy.optimize import differential_evolution, minimize_scalar
 
 import flexura as fx
@@ -23,7 +25,7 @@ from flexlab.tuning.free import free
 from flexlab.tuning.history import FILE, History
 from flexlab.tuning.objective import FAILED, Weights
 from flexlab.tuning.result import figures, result
-from flexlab.tuning.search import Search, search
+from flexlab.tuning.search import Search, _winners, search
 from flexlab.tuning.task import varied
 from flexura import gains
 from flexura.errors import InputError
@@ -312,6 +314,13 @@ def test_a_search_ends_when_nothing_gets_better():
     flat = lambda points, limits: (np.zeros((len(points), 1, 10)), np.ones((len(points), 1)))
     history, done = tuned(task(), Search("ga", 6, generations=50, patience=4), engine=flat)
     assert done and len(history) == 5
+
+
+def test_a_tournament_is_won_by_the_best_of_all_three():
+    population = Population.new(X=np.zeros((9, 1)), F=np.random.default_rng(1).random((9, 1)))
+    drawn = np.array(list(permutations(range(9), 3)))
+    won = _winners(population, drawn)[:, 0]
+    assert all(J == min(three) for J, three in zip(population.get("F")[won, 0], population.get("F")[drawn, 0], strict=True))
 
 
 @pytest.mark.parametrize("algorithm", ["ga", "pso", "cma-es"])

@@ -21,10 +21,15 @@ ROWS = 4  # that a worker of a cluster gets at a time; a core here gets one, so 
 CONNECT_S = 20
 
 
-class Engine(Protocol):
+class Runs(Protocol):
     """Figures (B, R, k) and fractions reached (B, R) of points (B, d) with limits (B,), in their order: `Task.run`."""
 
     def __call__(self, points: np.ndarray, limits: np.ndarray) -> tuple[np.ndarray, np.ndarray]: ...
+
+
+class Engine(Runs, Protocol):
+    """Those of a task, while it is open."""
+
     def __enter__(self) -> Engine: ...
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None: ...
 

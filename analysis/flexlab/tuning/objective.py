@@ -5,8 +5,8 @@
 
 Figures as in `response.py`; L the length of the last flexible link. A run that doesn't come to its end (a joint limit, a bent
 link, chatter) counts FAILED (2 - the fraction of the time it reached), far above any run that does. Of several robots the worst
-counts. A run that was abandoned as worse than what a search can use counts what J had come to by then. Pareto: settling time of the slowest joint [s] against rms of the tip deflection [mm]; a joint that doesn't settle counts
-twice the duration and its error.
+counts. A run that was abandoned as worse than what a search can use counts what J had come to by then. Pareto: settling time of
+the slowest joint [s] against rms of the tip deflection [mm]; a joint that doesn't settle counts twice the duration and its error.
 """
 
 from __future__ import annotations

@@ -23,7 +23,8 @@ from . import objective
 from .free import Free
 from .objective import Weights
 
-RTOL, MODES = 1e-3, 2  # of a search's runs, whose steps the ticks bound; what comes out is simulated again to 1e-6, with the robot file's mesh
+# of a search's runs, whose steps the ticks bound; what comes out is simulated again to 1e-6, with the mesh of the robot file
+RTOL, MODES = 1e-3, 2
 
 
 @dataclass(frozen=True)
