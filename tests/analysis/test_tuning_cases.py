@@ -15,6 +15,7 @@ from flexlab import rig
 from flexlab.controlled import under
 from flexlab.rig.driven import driven
 from flexlab.tuning import cases, dissertation
+from flexlab.tuning import free as freedom
 from flexlab.tuning.engine import Threads
 from flexlab.tuning.free import settings
 from flexlab.tuning.history import History
@@ -54,15 +55,18 @@ def test_case_1_knows_nothing_of_the_strip_and_is_else_the_same():
 
 
 def test_robust_gains_overshoot_by_at_most_10_percent_over_payloads_of_0_to_2_times():
-    """The gains that come along (found with --payload-factors 0,1,2 --stiffness-factors 0.9,1.1), also between these."""
+    """The gains that come along (found with --payload-factors 0,1,2 --stiffness-factors 0.9,1.1), also between these, within the
+    bounds that leave the flex sensor's error aside."""
     robot, outputs = driven(fx.load(ROOT / "model" / "robots" / "rig.toml"), rig.load(ROOT / "firmware" / "rig.toml"))
     given = gains.load(CONTROLLERS / "rig-robust.toml")
+    for free in freedom.read(CONTROLLERS / "rig-free.toml"):
+        assert free.low <= given.settings[free.name] <= free.high, free.name
     tuned = gains.Gains(given.settings, outputs)
     asked = cases.type_4().manoeuvre
     for one in varied(robot, (0.0, 0.5, 1.5, 2.0), (0.9, 1.0, 1.1)):
         _, response = simulated(fx.assemble(one), asked, tuned)
-        assert response.joints[:, OVERSHOOT].max() <= 0.10 and response.joints[:, SETTLING].max() < 1.75
-        assert response.strip[RESIDUAL] < 2e-3
+        assert response.joints[:, OVERSHOOT].max() <= 0.10 and response.joints[:, SETTLING].max() < 1.4
+        assert response.joints[:, ERROR].max() < 1e-3 and response.strip[RESIDUAL] < 1e-4
 
 
 def test_an_lqrs_figures_are_those_of_its_run_within_the_cases_drive_limits(monkeypatch):
@@ -75,7 +79,8 @@ def test_an_lqrs_figures_are_those_of_its_run_within_the_cases_drive_limits(monk
     run = fx.simulate(designs.system, designs.structure.manoeuvre.t, controller, rtol=designs.task.rtol)
     direct = figures(run, controller)
     joints, strip = split(found)
-    assert np.array_equal(direct.joints[:, :5], joints[0, 0, :, :5]) and np.array_equal(direct.strip, strip[0, 0])
+    assert np.array_equal(direct.joints[:, :5], joints[0, 0, :, :5], equal_nan=True)
+    assert np.array_equal(direct.strip, strip[0, 0])
     for name, limit in (("joint/1/voltage", "voltage_max_V"), ("joint/2/drive", "torque_max_2_N_m")):
         assert np.abs(run[name]).max() <= designs.structure.reference.settings[limit] * (1 + 1e-9)
 
