@@ -1,9 +1,10 @@
 """What is possible on a structure of the cases: an LQR with observer (`flexura.lqr`), its weights tuned for case 2's J.
 
-It knows the linear model about the end of the way, measures what the rig does (joints and tip deflection), and has the same step,
+It knows the linear model about a place on the way, measures what the rig does (joints and tip deflection), and has the same step,
 sampling and drive limits. It needs a force in every joint: where the cases have a stepper's rate, it has the torque up to which
-the stepper's field holds, with no limit to rate and acceleration. Free are the filters of the set-points and the weights: of each
-output in parts of its limit, of the strip's deflection and rate, and of the measurements' noise. A joint's weight is its way.
+the stepper's field holds, with no limit to rate and acceleration. Free are that place, the filters of the set-points, and the
+weights: of each output in parts of its limit, of the strip's deflection and rate, and of the measurements' noise. A joint's
+weight is its way.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from .history import History
 from .result import RTOL, figures
 from .search import Search, search
 
-HOW = Search("cma-es", population=14, generations=80, seed=1)
+HOW = Search("ga", population=30, generations=30, seed=1, polish=40)
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,8 @@ class Designs:
         self.free = (
             *[Free(f"effort_{i}", 0.01, 100.0, "log") for i in numbers],
             *[Free(f"setpoint_{i}_Hz", 0.2, 50.0, "log") for i in numbers],
-            Free("deflection_m", 1e-4, 1.0, "log"), Free("damping_s", 1e-3, 1.0, "log"), Free("noise", 1e-6, 1e-2, "log"),
+            Free("place", 0.0, 1.0, "linear"), Free("deflection_m", 1e-4, 1.0, "log"), Free("damping_s", 1e-3, 1.0, "log"),
+            Free("noise", 1e-6, 1e-2, "log"),
         )  # fmt: skip
         self.pareto, self.goals, self.score = False, self.task.goals, self.task.score
 
@@ -74,12 +76,13 @@ class Designs:
         own = {name: named[name] for name in named if name.startswith("setpoint")}
         plain = under(system, self.structure.manoeuvre, Gains(given.settings | own, given.outputs))
         limits = np.array([pid.limit for pid in plain.joints if isinstance(pid, fx.PID)])
-        end, rows = np.zeros(system.n), system.joint_rows
-        end[rows] = self.structure.ends
+        start, rows = system.start(), system.joint_rows
+        way = np.zeros(system.n)
+        way[rows] = self.structure.ends - start[rows]
         return lqr.lqr(
             system, plain, limits * [named[f"effort_{i + 1}"] for i in range(count)],
-            position=np.abs(end - system.start())[rows], deflection=named["deflection_m"],
-            damping=named["damping_s"], disturbance=limits, noise=named["noise"], q=end,
+            position=np.abs(way[rows]), deflection=named["deflection_m"],
+            damping=named["damping_s"], disturbance=limits, noise=named["noise"], q=start + named["place"] * way,
         )[0]  # fmt: skip
 
     def __call__(self, points: np.ndarray, limits: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
