@@ -16,7 +16,10 @@ _HERE = Path(__file__).parent
 
 
 def compiled(function: Any) -> Any:
-    """Compile for the inner loop: cached on disk, IEEE division, and no memory management at all.
+    """Compile for the inner loop: cached on disk, IEEE arithmetic, and no memory management at all.
+
+    Nothing is fused: where a compiler fuses products and sums (`fastmath={"contract"}`) depends on what the process has compiled
+    before, so that the process that compiled computed other last digits than those that read its cache.
 
     Without numba's reference counting (`_nrt=False`) an array costs nothing to pass on, which makes the short functions of this
     package about three times faster, and a function that would allocate does not compile. `function.py_func` is the plain
@@ -40,7 +43,7 @@ def _cached(function: Any, **options: Any) -> Any:
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(_FOLDER)
     try:
-        settings = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False, "fastmath": {"contract"}} | options
+        settings = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False} | options
         return njit(**settings)(function)
     finally:
         numba.config.CACHE_DIR = before

@@ -254,7 +254,7 @@ def _operator(key: Any, name: str) -> None:
             x if kind == _lanes else _spread(builder, context.cast(builder, x, kind, types.float64))
             for x, kind in zip(args, sig.args, strict=True)
         ]
-        return getattr(builder, name)(*wide, flags=("contract",))
+        return getattr(builder, name)(*wide)
 
     for other in (types.Float, types.Integer):
         lower_builtin(key, _lanes, other)(lower)

@@ -18,6 +18,9 @@ fifth of the time before the end:
     rms         sqrt(int (w - w(end))^2 dt / T) [m]
 
 What never happens is NaN: the rise of a joint that doesn't arrive, settling of one that doesn't settle.
+
+Overshoot, ITAE and effort only grow with the samples, so that a run under way has a lower bound of each. So has the vibration,
+whatever w(end) will be: int t |w - w(end)| dt >= min_c int_0^now t |w - c| dt.
 """
 
 from __future__ import annotations
@@ -26,7 +29,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .compiled import compiled
+from .compiled import compiled, inlined
 from .run import Run
 
 LOW, HIGH, BAND = 0.1, 0.9, 0.02
@@ -85,6 +88,58 @@ def strip_figures(t: np.ndarray, w: np.ndarray, settled: float, out: np.ndarray)
             vibration += 0.5 * dt * ((t[k - 1] - t[0]) * abs(a) + (t[k] - t[0]) * abs(b))
             square += 0.5 * dt * (a * a + b * b)
     out[PEAK], out[RESIDUAL], out[VIBRATION], out[RMS] = peak, 0.5 * (most - least), vibration, np.sqrt(square / end)
+
+
+@compiled
+def joint_so_far(t: np.ndarray, r: np.ndarray, q: np.ndarray, begin: int, end: int, out: np.ndarray) -> None:
+    """Add the samples from `begin` to before `end` to a joint's overshoot and ITAE so far, in out (6,); r is known to its end."""
+    way = r[-1] - q[0]
+    for k in range(begin, end):
+        out[OVERSHOOT] = max(out[OVERSHOOT], (q[k] - q[0]) / way - 1.0)
+        if k > 0:
+            a, b = (t[k - 1] - t[0]) * abs(r[k - 1] - q[k - 1]), (t[k] - t[0]) * abs(r[k] - q[k])
+            out[ITAE] += 0.5 * (t[k] - t[k - 1]) * (a + b) / abs(way)
+
+
+@compiled
+def least_vibration(t: np.ndarray, w: np.ndarray, count: int, enough: float) -> float:
+    """What the strip's vibration comes to at least, from its first `count` samples.
+
+    g(c) = int t |w - c| dt is convex: the tangents on both sides of its least value meet below it. They are drawn nearer until
+    the bound is above `enough` or g, and with it every bound, is not.
+    """
+    weight, moment, low, high = 0.0, 0.0, np.inf, -np.inf
+    for k in range(count):
+        own = _weight(t, k, count)
+        weight += own
+        moment += own * w[k]
+        low, high = min(low, w[k]), max(high, w[k])
+    if not high > low or weight == 0.0:
+        return 0.0
+    a, ga, sa, b, gb, sb = low, moment - weight * low, -weight, high, weight * high - moment, weight
+    floor, blur = 0.0, 1e-9 * weight * (high - low)  # far more than the rounding of these sums
+    for _ in range(12):
+        c = (gb - ga + sa * a - sb * b) / (sa - sb)
+        floor = ga + sa * (c - a) - blur
+        g, slope = 0.0, 0.0
+        for k in range(count):
+            own, off = _weight(t, k, count), w[k] - c
+            g += own * abs(off)
+            slope -= own if off > 0.0 else -own
+        if floor > enough or g <= enough or g - floor < 1e-3 * g:
+            break
+        if slope < 0.0:
+            a, ga, sa = c, g, slope
+        else:
+            b, gb, sb = c, g, slope
+    return max(floor, 0.0)
+
+
+@inlined
+def _weight(t: np.ndarray, k: int, count: int) -> float:
+    """Of sample k of `count` in int t f(t) dt by the trapezoidal rule."""
+    dt = (t[k] - t[k - 1] if k > 0 else 0.0) + (t[k + 1] - t[k] if k + 1 < count else 0.0)
+    return 0.5 * (t[k] - t[0]) * dt
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,8 @@ def main() -> None:
     simulate(Batch.of([system.robot]), [0.0, 1e-3])
     controller = Controller((PID(signal.step(0.1)), PID(signal.step(0.1))))
     one = trial(system, controller, 0.01, 1e-3, 1e-4)
-    run_rows(one, one.inputs.law.gains[None].copy(), np.zeros((1, PER_JOINT * 2 + OF_STRIP)), np.zeros(1))
+    width = PER_JOINT * 2 + OF_STRIP
+    run_rows(one, np.zeros((2, width)), one.inputs.law.gains[None].copy(), np.full(1, np.inf), np.zeros((1, width)), np.zeros(1))
 
 
 if __name__ == "__main__":

@@ -9,11 +9,13 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from itertools import permutations
 from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.optimize import differential_evolution
+from pymoo.core.population import Population
+from scipy.optimize import differential_evolution, minimize_scalar
 
 import flexura as fx
 from flexlab.controlled import under
@@ -23,7 +25,7 @@ from flexlab.tuning.free import free
 from flexlab.tuning.history import FILE, History
 from flexlab.tuning.objective import FAILED, Weights
 from flexlab.tuning.result import figures, result
-from flexlab.tuning.search import Search, search
+from flexlab.tuning.search import Search, _winners, search
 from flexlab.tuning.task import varied
 from flexura import gains
 from flexura.errors import InputError
@@ -38,6 +40,7 @@ from flexura.response import (
     SETTLING,
     VIBRATION,
     joint_figures,
+    least_vibration,
     strip_figures,
 )
 from tunings import FREE, GAINS, ROBOT, SWING, task
@@ -100,7 +103,7 @@ def test_a_row_is_the_run_of_simulate_and_rows_do_not_know_of_each_other():
     found, reached = one.run(one.trials(), points)
     again, _ = one.run(one.trials(), points[::-1])
     with Threads(one, 2) as engine:
-        shared, _ = engine(points)
+        shared, _ = engine(points, np.full(9, np.inf))
     assert np.array_equal(found, again[::-1], equal_nan=True) and np.array_equal(found, shared, equal_nan=True)
     for k in (0, 4):
         tuned = one.tuned(one.values(points[k : k + 1])[0])
@@ -143,6 +146,74 @@ def test_of_several_robots_the_worst_counts():
     point = many.start()[None]
     worst = many.score(*many.run(many.trials(), point))[0, 0]
     assert worst == max(one.score(*one.run(one.trials(), point))[0, 0] for one in each)
+
+
+# -- runs that a search has no use for ------------------------------------------------------------------------------------
+
+
+def test_the_least_vibration_is_below_that_of_any_rest_and_close():
+    """Against SciPy's search for the best rest, at every length of the record; it stops early only where that is enough."""
+    rng, t = np.random.default_rng(7), np.linspace(0, 3, 601)
+    for _ in range(5):
+        a, b, d, f = rng.uniform([-1e-2, -5e-3, 0.1, 1], [1e-2, 5e-3, 3, 9])
+        w = b + a * np.exp(-d * t) * np.sin(2 * np.pi * f * t) + 1e-4 * rng.standard_normal(len(t))
+        for count in (3, 20, 200, 601):
+            of = lambda c, n=count, w=w: np.trapezoid(t[:n] * np.abs(w[:n] - c), t[:n])
+            least = minimize_scalar(of, bounds=(w.min(), w.max()), method="bounded", options={"xatol": 1e-9}).fun
+            assert 0.999 * least < least_vibration(t, w, count, 0.999 * least) <= least * (1 + 1e-9)
+            assert least_vibration(t, w, count, 2 * least) <= least * (1 + 1e-9)
+        assert least_vibration(t, w, 2, 0.0) == 0.0  # the first sample, at t = 0, has no weight
+    assert least_vibration(t, np.full(601, 3e-3), 601, 0.0) == 0.0
+
+
+def test_a_run_is_abandoned_exactly_where_its_j_exceeds_the_limit():
+    """For limits about every run's own J, and what an abandoned run has of J is between the limit and it."""
+    one = task()
+    points = np.random.default_rng(8).random((40, 3))
+    whole, reached = one.run(one.trials(), points)
+    J = one.score(whole, reached)[:, 0]
+    fine = J < FAILED
+    assert fine.sum() > 30
+    for part in (0.3, 0.9, 1 - 1e-6, 1.0, 1 + 1e-6):
+        found, far = one.run(one.trials(), points, np.where(fine, part * J, np.inf))
+        goals = one.score(found, far)[:, 0]
+        if part >= 1:
+            assert np.array_equal(found, whole, equal_nan=True)
+            continue
+        assert (goals[fine] > part * J[fine]).all() and (goals[fine] <= J[fine] * (1 + 1e-9)).all()
+        assert part > 0.9 or (far[fine] < 1).mean() > 0.5
+
+
+def test_on_several_robots_none_is_tried_after_one_that_was_too_bad():
+    many = task(robots=varied(ROBOT, (1.0, 2.0), (0.9,)))
+    points = np.random.default_rng(9).random((12, 3))
+    J = many.score(*many.run(many.trials(), points))[:, 0]
+    limits = np.full(12, np.median(J))
+    found, reached = many.run(many.trials(), points, limits)
+    goals = many.score(found, reached)[:, 0]
+    kept = limits >= J
+    assert np.array_equal(goals[kept], J[kept]) and (goals[~kept] > limits[~kept]).all() and (reached[~kept, -1] == 0).any()
+
+
+@pytest.mark.parametrize("algorithm", ["ga", "pso", "cma-es"])
+def test_a_search_that_abandons_goes_the_same_way_to_the_bit(algorithm):
+    """Points of every generation, survivors and best J, with limits and without; limits too low by a tenth are noticed."""
+    one, how = task(), Search(algorithm, population=10, generations=25, seed=6)
+    trials = one.trials()
+    with_limits, _ = tuned(one, how, engine=lambda points, limits: one.run(trials, points, limits))
+    without, _ = tuned(one, how, engine=lambda points, limits: one.run(trials, points))
+    assert np.array_equal(with_limits.all("points"), without.all("points"))
+    assert [with_limits.merit(k) for k in range(1, 26)] == [without.merit(k) for k in range(1, 26)]
+    cut = with_limits.all("reached")[:, 0] < 1
+    kept = ~cut
+    assert np.array_equal(with_limits.all("goals")[kept], without.all("goals")[kept])
+    assert (with_limits.all("goals")[cut] <= without.all("goals")[cut] * (1 + 1e-9)).all()
+    if algorithm == "cma-es":
+        assert not cut.any()
+        return
+    assert cut.mean() > 0.1
+    wrong, _ = tuned(one, how, engine=lambda points, limits: one.run(trials, points, 0.9 * limits))
+    assert not np.array_equal(wrong.all("points"), without.all("points"))
 
 
 # -- what is free ------------------------------------------------------------------------------------------------------
@@ -203,11 +274,11 @@ def stopped(one, how, folder, at):
     calls = []
     with Threads(one, 1) as runs:
 
-        def interrupted(points):
+        def interrupted(points, limits):
             calls.append(len(points))
             if len(calls) == at:
                 raise KeyboardInterrupt
-            return runs(points)
+            return runs(points, limits)
 
         assert tuned(one, how, folder, interrupted)[1] is False
 
@@ -240,9 +311,16 @@ def test_an_interrupted_search_goes_on_to_the_same_end(tmp_path, algorithm):
 
 
 def test_a_search_ends_when_nothing_gets_better():
-    flat = lambda points: (np.zeros((len(points), 1, 10)), np.ones((len(points), 1)))
+    flat = lambda points, limits: (np.zeros((len(points), 1, 10)), np.ones((len(points), 1)))
     history, done = tuned(task(), Search("ga", 6, generations=50, patience=4), engine=flat)
     assert done and len(history) == 5
+
+
+def test_a_tournament_is_won_by_the_best_of_all_three():
+    population = Population.new(X=np.zeros((9, 1)), F=np.random.default_rng(1).random((9, 1)))
+    drawn = np.array(list(permutations(range(9), 3)))
+    won = _winners(population, drawn)[:, 0]
+    assert all(J == min(three) for J, three in zip(population.get("F")[won, 0], population.get("F")[drawn, 0], strict=True))
 
 
 @pytest.mark.parametrize("algorithm", ["ga", "pso", "cma-es"])

@@ -46,6 +46,7 @@ class Structure:
     outputs: tuple[Output, ...]
     free: tuple[Free, ...]  # both cases
     strip: tuple[Free, ...]  # case 2: the terms in the strip
+    reference: Gains  # limits and outputs of an LQR, which has a force in every joint
 
     @cached_property
     def manoeuvre(self) -> Manoeuvre:
@@ -84,6 +85,10 @@ def type_4() -> Structure:
         # the flex sensor is wrong by 1 to 2 mm for long and as much in noise: with more than these the joints would be too, and
         # ki_2 is at least what integrates the former away in a few seconds
         (free("kf_1_V_m", -50, 50), free("kf_2_rad_s_m", -30, 30), free("kg_2_rad_m", -0.3, 0.3)),
+        Gains(
+            {name: value for name, value in settings.items() if "_2_" not in name}
+            | {"kp_2_N_m_rad": 1.0, "torque_max_2_N_m": bench.rig.stepper.holding_torque_N_m}, outputs[:1],
+        ),
     )  # fmt: skip
 
 
@@ -100,6 +105,7 @@ def type_3() -> Structure:
             free("setpoint_1_Hz", 0.2, 50), free("setpoint_2_Hz", 0.2, 50),
         ),
         (free("kf_1_N_m_m", -200, 200), free("kg_1_N_m_s_m", -10, 10), free("kf_2_N_m", -200, 200), free("kg_2_N_s_m", -10, 10)),
+        Gains(settings),
     )  # fmt: skip
 
 

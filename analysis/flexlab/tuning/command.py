@@ -39,7 +39,7 @@ def tune(
     rig: Annotated[
         Path | None, typer.Option(metavar="RIG", help="rig file: its motor's rotor and friction, its stepper, in the joints")
     ] = None,
-    rtol: Annotated[float, typer.Option(help="relative tolerance of the runs of the search; the result is run to 1e-6")] = 1e-4,
+    rtol: Annotated[float, typer.Option(help="relative tolerance of the runs of the search; the result is run to 1e-6")] = 1e-3,
     modes: Annotated[int, typer.Option(min=0, help="of each link in the search; 0: the robot file's mesh, as in the result")] = 2,
     scheduler: Annotated[str | None, typer.Option(metavar="ADDRESS", help="a Dask scheduler, tcp://...")] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="threads; default: one a core")] = None,

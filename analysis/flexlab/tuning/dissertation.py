@@ -1,7 +1,7 @@
 """`flexura tune --dissertation`: both cases of types III and IV tuned, in the layout of tables 3.10 and 3.12, with their figures.
 
-What is demanded of case 2 is compared with what was reached, and with what the drives allow at all: the shortest time in which
-each joint can go its way within its limits.
+What is demanded of case 2 is compared with what was reached, with an LQR tuned for the same objective (`reference.py`), and with
+what the drives allow at all: the shortest time in which each joint can go its way within its limits.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from ..zeros import transmission
 from .cases import PUBLISHED, STRUCTURES, TABLE
 from .engine import engine
 from .history import History
+from .reference import Reference, reference
 from .result import Result, number, numbers, result, save
 from .search import Search, search
 from .task import Task
@@ -32,11 +33,12 @@ OVERSHOOT_MOST, SETTLING_PART, ERROR_MOST, RESIDUAL_PART = 0.05, 0.5, 1e-3, 0.1
 
 @dataclass(frozen=True)
 class Both:
-    """Both cases of a structure. `residual_m` of each, from the instant at which the later of both has settled."""
+    """Both cases of a structure, and an LQR; `residual_m` of each, from when the later of both cases has settled."""
 
     name: str
     results: tuple[Result, Result]
-    residual_m: tuple[float, float]
+    lqr: Reference
+    residual_m: tuple[float, float, float]
     shortest_s: tuple[float, ...]
     zeros_1_s: dict[str, float]
 
@@ -64,7 +66,7 @@ def study(
     names: list[str], how: Search, folder: Path, scheduler: str | None = None, jobs: int | None = None,
     report: Callable[[History], None] = lambda history: None,
 ) -> tuple[list[Both], bool]:  # fmt: skip
-    """Tune both cases of the named structures, each stored in a folder of its own; False: interrupted."""
+    """Tune both cases of the named structures and an LQR, each stored in a folder of its own; False: interrupted."""
     out: list[Both] = []
     for name in names:
         structure, found = STRUCTURES[name](), []
@@ -76,20 +78,22 @@ def study(
                     return out, False
             found.append(result(task, how, history, True))
             save(found[-1], own)
-        out.append(both(name, found[0], found[1]))
+        possible = reference(structure, folder / f"type-{name}-lqr", report)
+        if possible is None:
+            return out, False
+        out.append(both(name, found[0], found[1], possible))
     return out, True
 
 
-def both(name: str, first: Result, second: Result) -> Both:
+def both(name: str, first: Result, second: Result, possible: Reference) -> Both:
     """The two cases side by side, with what limits both."""
-    settled = float(np.nanmax([r.responses[0].joints[:, SETTLING] for r in (first, second)]))
-    left = []
-    for each in (first, second):
-        run, strip = each.runs[0], np.zeros(4)
+    settled, left = float(np.nanmax([r.responses[0].joints[:, SETTLING] for r in (first, second)])), []
+    for run in (first.runs[0], second.runs[0], possible.run):
+        strip = np.zeros(4)
         strip_figures(run.t, np.ascontiguousarray(run["link/2/tip_deflection"]), settled, strip)
         left.append(float(strip[RESIDUAL]))
     zeros = {row.drive: float(row.unstable.real.min()) for row in _zeros(first.task) if len(row.unstable)}
-    return Both(name, (first, second), (left[0], left[1]), _shortest(first.task), zeros)
+    return Both(name, (first, second), possible, (left[0], left[1], left[2]), _shortest(first.task), zeros)
 
 
 def _zeros(task: Task) -> list[Any]:
@@ -124,10 +128,11 @@ def table(found: list[Both]) -> Group:
 def _tables(each: Both) -> list[Any]:
     task = each.results[0].task
     kinds = ["turns" if link.joint.type == "R" else "translates" for link in task.robots[0].links]
-    out = Table(title=f"type {each.name}: this project (the dissertation's {TABLE[each.name]})", title_justify="left")
-    out.add_column("")
+    title = f"type {each.name}: this project (the dissertation's {TABLE[each.name]})"
+    out = Table(title=title, title_justify="left", padding=(0, 1, 0, 0), pad_edge=False)
+    out.add_column("", no_wrap=True)
     for i, kind in enumerate(kinds, 1):
-        for head in (f"link {i} ({kind})\ncase 1", "\ncase 2", "\ndeviation"):
+        for head in (f"link {i}\n{kind}\ncase 1", "\n\ncase 2", "\n\ndeviation", "\n\nLQR"):
             out.add_column(head, justify="right", no_wrap=True)
     rows = (("rise time [s]", 1.0), ("settling time [s]", 1.0), ("overshoot [%]", 100.0), ("state error [%]", 100.0))
     for k, (text, factor) in enumerate(rows):
@@ -136,21 +141,34 @@ def _tables(each: Both) -> list[Any]:
             ours = [factor * each.response(case).joints[i, k] for case in (1, 2)]
             theirs = [PUBLISHED[each.name, case][i][k] for case in (1, 2)]
             pairs = [*zip(ours, theirs, strict=True), (abs(ours[0] - ours[1]), abs(theirs[0] - theirs[1]))]
-            cells += [f"{number(a) if a > 5e-4 else '0.000'} ({b:.3g})" for a, b in pairs]
+            cells += [f"{_figure(a)} ({b:.3g})" for a, b in pairs] + [_figure(factor * each.lqr.response.joints[i, k])]
         out.add_row(text.replace("[", "\\["), *cells)
-    peaks = [1e3 * each.response(case).strip[0] for case in (1, 2)]
+    peaks = [1e3 * r.strip[0] for r in (each.response(1), each.response(2), each.lqr.response)]
     for text, values in (("largest w [mm]", peaks), ("residual w [mm]", [1e3 * x for x in each.residual_m])):
-        out.add_row(text.replace("[", "\\["), "", "", "", *map(number, values), number(abs(values[0] - values[1])))
+        one, two, possible = values
+        out.add_row(text.replace("[", "\\["), "", "", "", "", number(one), number(two), number(abs(one - two)), number(possible))
     lines = [f"{'reached' if ok else 'NOT reached'}: {demand} ({words})" for demand, ok, words in each.verdicts()]
     drives = ", ".join(f"joint {i} {s:.3g} s" for i, s in enumerate(each.shortest_s, 1))
     lines += [f"a drive at its limit, the other joint locked: {drives} to 98 %"]
     lines += [f"zeros in the right half plane, drive to tip: {', '.join(f'{n} {z:.3g} 1/s' for n, z in each.zeros_1_s.items())}"]
     for case, r in enumerate(each.results, 1):
         lines.append(f"case {case}: J = {r.best[0]:.4g}, {r.history.evaluations} evaluations; {r.task.weights.text()}")
+    lines.append(f"LQR, what is possible: J = {each.lqr.J:.4g}, {each.lqr.evaluations} designs{_other(each)}")
     lines.append("rise: 10 to 90 %; settling: to within 2 %; state error: mean of the last tenth of the time; residual: half of")
     lines.append("w's range from the instant at which the later of both cases has settled. The dissertation defines none.")
     out.caption, out.caption_justify = "\n".join(lines), "left"
     return [out]
+
+
+def _figure(value: float) -> str:
+    return "0.000" if value <= 5e-4 else number(value)
+
+
+def _other(each: Both) -> str:
+    """Where the LQR's drives are not those of the cases."""
+    theirs, ours = STRUCTURES[each.name]().reference.settings, each.results[0].task.gains.settings
+    limits = [f"{name} = {value:g}" for name, value in theirs.items() if "_max_" in name and name not in ours]
+    return f"; in place of the stepper's rate {', '.join(limits)}" if limits else ""
 
 
 def data(found: list[Both]) -> dict[str, Any]:
@@ -158,7 +176,9 @@ def data(found: list[Both]) -> dict[str, Any]:
     return {
         f"type {each.name}": {
             "cases": [numbers(r) for r in each.results], "residual_m": list(each.residual_m), "shortest_s": list(each.shortest_s),
-            "right_half_plane_zeros_1_s": each.zeros_1_s, "published": [PUBLISHED[each.name, case] for case in (1, 2)],
+            "right_half_plane_zeros_1_s": each.zeros_1_s,
+            "published": [PUBLISHED[each.name, case] for case in (1, 2)],
+            "lqr": {"J": each.lqr.J, "weights": each.lqr.weights} | each.lqr.response.numbers(),
             "verdicts": [{"demand": d, "reached": ok, "words": w} for d, ok, w in each.verdicts()],
         }
         for each in found

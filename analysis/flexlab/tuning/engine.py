@@ -17,14 +17,19 @@ from flexura.request import program
 
 from .task import Task
 
-ROWS = 4  # of a chunk: a Ctrl-C waits for no more than these, and cores are done at about the same time
+ROWS = 4  # that a worker of a cluster gets at a time; a core here gets one, so that all are done at about the same time
 CONNECT_S = 20
 
 
-class Engine(Protocol):
-    """Figures (B, R, k) and fractions reached (B, R) of points (B, d), in their order."""
+class Runs(Protocol):
+    """Figures (B, R, k) and fractions reached (B, R) of points (B, d) with limits (B,), in their order: `Task.run`."""
 
-    def __call__(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]: ...
+    def __call__(self, points: np.ndarray, limits: np.ndarray) -> tuple[np.ndarray, np.ndarray]: ...
+
+
+class Engine(Runs, Protocol):
+    """Those of a task, while it is open."""
+
     def __enter__(self) -> Engine: ...
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None: ...
 
@@ -39,15 +44,15 @@ class Threads:
         for _ in range(threads):
             self.memories.put(task.trials())
 
-    def __call__(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return _joined(list(self.pool.map(self._chunk, _chunks(points))))
+    def __call__(self, points: np.ndarray, limits: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return _joined(list(self.pool.map(self._chunk, _chunks(points, 1), _chunks(limits, 1))))
 
-    def _chunk(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _chunk(self, points: np.ndarray, limits: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         if self.stopped.is_set():
             raise KeyboardInterrupt
         memory = self.memories.get()
         try:
-            return self.task.run(memory, points)
+            return self.task.run(memory, points, limits)
         finally:
             self.memories.put(memory)
 
@@ -77,9 +82,10 @@ class Cluster:
         self.client.wait_for_workers(1, timeout=CONNECT_S)
         self.task = task
 
-    def __call__(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def __call__(self, points: np.ndarray, limits: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         futures = [
-            self.client.submit(_on_worker, program(), self.task, chunk, pure=False, retries=3) for chunk in _chunks(points)
+            self.client.submit(_on_worker, program(), self.task, *chunk, pure=False, retries=3)
+            for chunk in zip(_chunks(points, ROWS), _chunks(limits, ROWS), strict=True)
         ]
         try:
             return _joined(self.client.gather(futures))
@@ -98,22 +104,22 @@ def engine(task: Task, scheduler: str | None = None, threads: int | None = None)
     return Cluster(task, scheduler) if scheduler else Threads(task, threads or cores())
 
 
-def _chunks(points: np.ndarray) -> list[np.ndarray]:
-    return [points[k : k + ROWS] for k in range(0, len(points), ROWS)]
+def _chunks(rows: np.ndarray, size: int) -> list[np.ndarray]:
+    return [rows[k : k + size] for k in range(0, len(rows), size)]
 
 
 def _joined(parts: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts])
 
 
-def _on_worker(version: str, task: Task, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _on_worker(version: str, task: Task, points: np.ndarray, limits: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """A chunk, on a worker. Another solver would give other numbers."""
     if program() != version:
         raise FlexuraError(f"a worker runs another version of the solver, {program()}; this is {version}")
     held = _held(task.digest(), threading.get_ident())
     if not held:
         held += [task, task.trials()]
-    return held[0].run(held[1], points)
+    return held[0].run(held[1], points, limits)
 
 
 @lru_cache(maxsize=8)

@@ -5,8 +5,8 @@
 
 Figures as in `response.py`; L the length of the last flexible link. A run that doesn't come to its end (a joint limit, a bent
 link, chatter) counts FAILED (2 - the fraction of the time it reached), far above any run that does. Of several robots the worst
-counts. Pareto: settling time of the slowest joint [s] against rms of the tip deflection [mm]; a joint that doesn't settle counts
-twice the duration and its error.
+counts. A run that was abandoned as worse than what a search can use counts what J had come to by then. Pareto: settling time of
+the slowest joint [s] against rms of the tip deflection [mm]; a joint that doesn't settle counts twice the duration and its error.
 """
 
 from __future__ import annotations
@@ -54,12 +54,21 @@ def split(figures: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return figures[..., : -len(STRIP)].reshape(*shape, -1, len(JOINT)), figures[..., -len(STRIP) :]
 
 
-def single(figures: np.ndarray, reached: np.ndarray, weights: Weights, length_m: float) -> np.ndarray:
+def prices(weights: Weights, joints: int, length_m: float) -> np.ndarray:
+    """J as sum_k price_k max(0, figure_k - free_k): the prices and what is free, (2, 6 N + 4)."""
+    out = np.zeros((2, len(JOINT) * joints + len(STRIP)))
+    each, strip = split(out)
+    each[0, :, ITAE], each[0, :, OVERSHOOT], each[0, :, EFFORT] = 1.0, weights.overshoot, weights.effort
+    each[1, :, OVERSHOOT] = weights.overshoot_free
+    strip[0, VIBRATION] = weights.vibration / length_m
+    return out
+
+
+def single(figures: np.ndarray, reached: np.ndarray, prices: np.ndarray) -> np.ndarray:
     """J (B, 1) of figures (B, R, 6 N + 4) of R robots, the worst of them, and the fractions reached (B, R)."""
-    joints, strip = split(figures)
-    J = joints[..., ITAE] + weights.effort * joints[..., EFFORT]
-    J += weights.overshoot * np.maximum(0.0, joints[..., OVERSHOOT] - weights.overshoot_free)
-    total = J.sum(axis=-1) + weights.vibration * np.nan_to_num(strip[..., VIBRATION]) / length_m
+    paid = prices[0] > 0
+    price, free = prices[:, paid]
+    total = (price * np.maximum(0.0, figures[..., paid] - free)).sum(axis=-1)
     return _worst(total[..., None], reached)
 
 
@@ -72,5 +81,5 @@ def double(figures: np.ndarray, reached: np.ndarray, duration_s: float) -> np.nd
 
 
 def _worst(values: np.ndarray, reached: np.ndarray) -> np.ndarray:
-    whole = np.where((reached < 1.0)[..., None] | ~np.isfinite(values), FAILED * (2.0 - reached)[..., None], values)
+    whole = np.where(np.isfinite(values), values, FAILED * (2.0 - reached)[..., None])  # figures that failed are NaN
     return whole.max(axis=1)

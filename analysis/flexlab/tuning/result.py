@@ -173,7 +173,7 @@ def figure(found: Result) -> Any:
         starts = [0, *history.ends[:-1]]
         left.plot(history.ends, best, color="C0", label="best so far")
         middle = [np.median(goals[a:b, 0]) for a, b in zip(starts, history.ends, strict=True)]
-        left.plot(history.ends, middle, color="0.7", label="median of the generation")
+        left.plot(history.ends, middle, color="0.7", label="median of the generation, abandoned ones as far as they came")
         left.set(xlabel="evaluations", ylabel="J", yscale="log")
     left.legend(frameon=False)
     left.grid(alpha=0.3)

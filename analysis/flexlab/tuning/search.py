@@ -2,23 +2,26 @@
 
 The algorithms are deterministic for a seed, so that what is stored is not their state but what they were told: a search that goes
 on asks again for the stored generations and tells their goals instead of running them. That holds for all four alike.
+
+A run is abandoned where it is certain that the search has no use for it: one worse than every parent does not survive in the
+genetic algorithm, one worse than its particle's own best changes nothing in the swarm. The search goes the same way as without.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sized
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from flexura.errors import FlexuraError, InputError
 from flexura.request import program
 
-from .engine import Engine
+from .engine import Runs
 from .history import History
-from .task import Task
+from .objective import FAILED
 
 ALGORITHMS = {
     "ga": "genetic algorithm, real-coded: tournaments of 3, crossover (SBX) 0.8, mutation 0.1; best of parents and young stay",
@@ -53,7 +56,20 @@ class Search:
         return own | ({"generations": self.generations, "patience": self.patience} if self.polish else {})
 
 
-def search(task: Task, how: Search, engine: Engine, history: History, progress: Callable[[History], None]) -> bool:
+class Sought(Protocol):
+    """What a search asks of a task: how many settings are free, where to start, and the goals of an engine's figures."""
+
+    @property
+    def free(self) -> Sized: ...
+    @property
+    def pareto(self) -> bool: ...
+    @property
+    def goals(self) -> tuple[str, ...]: ...
+    def start(self) -> np.ndarray: ...
+    def score(self, figures: np.ndarray, reached: np.ndarray) -> np.ndarray: ...
+
+
+def search(task: Sought, how: Search, engine: Runs, history: History, progress: Callable[[History], None]) -> bool:
     """Go on from what `history` holds to the end of the search; every generation is stored as it is done. True: to its end, not
     interrupted. Raises InputError where the stored generations are not this search's."""
     from pymoo.algorithms.soo.nonconvex.cmaes import CMAES
@@ -76,7 +92,7 @@ def search(task: Task, how: Search, engine: Engine, history: History, progress: 
 
 
 def _stage(
-    algorithm: Any, generations: int, how: Search, task: Task, engine: Engine, history: History,
+    algorithm: Any, generations: int, how: Search, task: Sought, engine: Runs, history: History,
     progress: Callable[[History], None], first: int,
 ) -> int:  # fmt: skip
     """One algorithm to its end, its generations being the history's from `first` on; how many there are after it."""
@@ -96,7 +112,7 @@ def _stage(
             goals = history.told(generation, points)
         else:
             begun = time.perf_counter()
-            figures, reached = engine(points)
+            figures, reached = engine(points, limits(algorithm, len(points)))
             goals = task.score(figures, reached)
             history.add(points, goals, figures, reached, time.perf_counter() - begun)
             progress(history)
@@ -110,7 +126,7 @@ def _algorithm(how: Search, start: np.ndarray) -> Any:
     """pymoo's algorithm; its first generation is a Latin hypercube with `start` in it, CMA-ES begins there."""
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.algorithms.soo.nonconvex.cmaes import CMAES
-    from pymoo.algorithms.soo.nonconvex.ga import GA, comp_by_cv_and_fitness
+    from pymoo.algorithms.soo.nonconvex.ga import GA
     from pymoo.algorithms.soo.nonconvex.pso import PSO
     from pymoo.operators.crossover.sbx import SBX
     from pymoo.operators.mutation.pm import PM
@@ -123,11 +139,33 @@ def _algorithm(how: Search, start: np.ndarray) -> Any:
     first[0] = start
     cross, change = SBX(prob=0.8, eta=10), PM(prob=1.0, prob_var=max(0.1, 1 / len(start)), eta=5)
     if how.algorithm == "ga":
-        select = TournamentSelection(pressure=3, func_comp=comp_by_cv_and_fitness)
+        select = TournamentSelection(pressure=3, func_comp=_winners)
         return GA(pop_size=how.population, sampling=first, selection=select, crossover=cross, mutation=change)
     if how.algorithm == "pso":
         return PSO(pop_size=how.population, sampling=first)
     return NSGA2(pop_size=how.population, sampling=first, crossover=cross, mutation=change)
+
+
+def _winners(population: Any, drawn: np.ndarray, **_: Any) -> np.ndarray:
+    """The best (k, 1) of each tournament (k, 3); pymoo's own comparison looks at the first two only."""
+    J = population.get("F")[:, 0]
+    return drawn[np.arange(len(drawn)), J[drawn].argmin(axis=1)][:, None]
+
+
+def limits(algorithm: Any, count: int) -> np.ndarray:
+    """The J (count,) above which each of the points just asked for is of no use, inf where every J is: CMA-ES ranks all."""
+    from pymoo.algorithms.soo.nonconvex.ga import GA
+    from pymoo.algorithms.soo.nonconvex.pso import PSO
+
+    out = np.full(count, np.inf)
+    if not algorithm.is_initialized or not isinstance(algorithm, GA | PSO):
+        return out
+    known = algorithm.pop.get("F")[:, 0]
+    if isinstance(algorithm, PSO):
+        out[:] = known  # a particle's own best
+    elif len(known) == algorithm.pop_size:
+        out[:] = known.max()  # of equals the parents survive
+    return np.where(out < FAILED, out, np.inf)  # what a failure costs is not known before
 
 
 def _stagnant(history: History, generation: int, patience: int) -> bool:

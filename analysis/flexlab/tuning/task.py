@@ -15,7 +15,6 @@ import flexura as fx
 from flexura.control import PID
 from flexura.errors import InputError
 from flexura.gains import Gains
-from flexura.response import JOINT, STRIP
 from flexura.trials import Trial, run_rows, trial
 
 from ..controlled import under
@@ -24,7 +23,8 @@ from . import objective
 from .free import Free
 from .objective import Weights
 
-RTOL, MODES = 1e-4, 2  # of a search's runs; what comes out is simulated again to 1e-6, with the mesh of the robot file
+# of a search's runs, whose steps the ticks bound; what comes out is simulated again to 1e-6, with the mesh of the robot file
+RTOL, MODES = 1e-3, 2
 
 
 @dataclass(frozen=True)
@@ -82,11 +82,21 @@ class Task:
         """The gains file with the free settings at `values` (d,)."""
         return Gains(self.gains.settings | freedom.named(self.free, values), self.gains.outputs, self.gains.file)
 
+    @cached_property
+    def prices(self) -> np.ndarray:
+        """Of J."""
+        return objective.prices(self.weights, len(self.robots[0].links), self.length_m)
+
+    @cached_property
+    def _rows(self) -> list[np.ndarray]:
+        """`Law.gains` (N, 20) of each robot's controller."""
+        return [np.array([c._gains(joint) for joint in c.joints if isinstance(joint, PID)]) for c in self.controllers]
+
     def score(self, figures: np.ndarray, reached: np.ndarray) -> np.ndarray:
         """The goals (B, 1 or 2) from figures (B, R, k) and fractions reached (B, R)."""
         if self.pareto:
             return objective.double(figures, reached, self.manoeuvre.duration_s)
-        return objective.single(figures, reached, self.weights, self.length_m)
+        return objective.single(figures, reached, self.prices)
 
     def trials(self) -> list[Trial]:
         """One core's memory for all robots."""
@@ -94,16 +104,20 @@ class Task:
         both = zip(self.systems, self.controllers, strict=True)
         return [trial(system, controller, m.duration_s, m.output_step_s, self.rtol) for system, controller in both]
 
-    def run(self, trials: Sequence[Trial], points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Figures (B, R, k) and fractions reached (B, R) at points (B, d) of the unit cube."""
-        values = self.values(points)
-        width = len(JOINT) * len(self.robots[0].links) + len(STRIP)
+    def run(
+        self, trials: Sequence[Trial], points: np.ndarray, limits: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+        """Figures (B, R, k) and fractions reached (B, R) at points (B, d) of the unit cube, each abandoned where J exceeds its
+        limit (B,), inf for none: its figures are then lower bounds, 0 on the robots that it was not tried on any more."""
+        limits = np.full(len(points), np.inf) if limits is None else limits
+        values, left = self.values(points), np.arange(len(points))
+        width = self.prices.shape[1]
         figures, reached = np.zeros((len(points), len(trials), width)), np.zeros((len(points), len(trials)))
-        for k, (one, controller) in enumerate(zip(trials, self.controllers, strict=True)):
-            base = np.array([controller._gains(joint) for joint in controller.joints if isinstance(joint, PID)])
-            found, far = np.zeros((len(points), width)), np.zeros(len(points))
-            run_rows(one, freedom.rows(self.free, values, controller, base), found, far)
-            figures[:, k], reached[:, k] = found, far
+        for k, (one, controller, base) in enumerate(zip(trials, self.controllers, self._rows, strict=True)):
+            found, far = np.zeros((len(left), width)), np.zeros(len(left))
+            run_rows(one, self.prices, freedom.rows(self.free, values[left], controller, base), limits[left], found, far)
+            figures[left, k], reached[left, k] = found, far
+            left = left[(far == 1.0) | np.isinf(limits[left])]
         return figures, reached
 
     def spec(self) -> dict[str, Any]:
