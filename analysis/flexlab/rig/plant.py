@@ -127,7 +127,7 @@ class RigPlant:
         self._volt_s = self._microstep_s = self._since = 0.0
         self._anchor = self._x = start[0]
         self._theta = start[1]
-        self._load_N_m = self._steps = 0.0
+        self._load_N_m = self._steps = self._bend = 0.0
         self._turned = self._shafts()
         self._before = self._shown = self._turned  # what the encoders say at the ends of the step that the board is in
         self._sensors = Sensors(flex_V=self.flex.sample(0.0), supply_V=self.supply_V / rig.driver.supply_divider)
@@ -180,7 +180,7 @@ class RigPlant:
         voltage = math.copysign(max(0.0, abs(voltage) - self._dead_V), voltage)
         self.motor.advance(self._step_s, voltage if outputs.motor_on else None, self._load_N_m)
         mechanics = self.mechanics
-        here, turned, bend = mechanics.x_m, mechanics.angle_rad, mechanics.bend_rad
+        here, turned = mechanics.x_m, mechanics.angle_rad
         on = outputs.stepper_on
         command = self._start[1] + (1.5 * steps - 0.5 * self._steps) * self.spring.rad_per_step
         self._steps = steps
@@ -196,7 +196,8 @@ class RigPlant:
             slip = (mechanics.x_m - here) / self._step_s - self._lead * self.motor.speed_rad_s
             self._load_N_m = -self._lead * (stiffness * (mechanics.x_m - flank) + damping * slip)
         sensors = self._sensors
-        sensors.flex_V = self.flex.sample(1.5 * mechanics.bend_rad - 0.5 * bend)
+        before, self._bend = self._bend, mechanics.bend_rad
+        sensors.flex_V = self.flex.sample(1.5 * self._bend - 0.5 * before)  # in the middle of the step that the board is in
         sensors.limit_low, sensors.limit_high = mechanics.x_m <= self._ends[0], mechanics.x_m >= self._ends[1]
         now, (one, two) = self._shafts(), self._turned
         self._before, self._shown, self._turned = self._shown, (2 * now[0] - one, 2 * now[1] - two), now
