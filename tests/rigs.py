@@ -19,24 +19,30 @@ from flexlab.rig.plant import rig_plant
 
 
 class Seen:
-    """A plant with its own tip deflection and angle of joint 2 written down at every step."""
+    """A plant with its own tip deflection and angle of joint 2, and what encoder 1 says, written down at every step."""
 
     def __init__(self, plant: Any) -> None:
         self.plant, self.window_s, self.truth = plant, plant.window_s, plant.truth
-        self.rows: list[tuple[float, float, float]] = [(0.0, plant.tip_deflection_m, plant.joint_rad)]
+        self.rows: list[tuple[float, ...]] = [(0.0, plant.tip_deflection_m, plant.joint_rad, 0.0)]
 
     def advance(self, seconds: float, outputs: Outputs) -> Sensors:
-        sensors = self.plant.advance(seconds, outputs)
-        self.rows.append((self.rows[-1][0] + seconds, self.plant.tip_deflection_m, self.plant.joint_rad))
+        sensors, plant = self.plant.advance(seconds, outputs), self.plant
+        self.rows.append((self.rows[-1][0] + seconds, plant.tip_deflection_m, plant.joint_rad, sensors.encoder_1))
         return sensors
 
     def along(self, run: fx.Run) -> tuple[np.ndarray, np.ndarray]:
-        """Tip deflection [m] and angle [rad] (T,) at the run's times; its clock is found by the encoder of joint 2."""
-        t, tip, angle = np.array(self.rows).T
-        there = np.isfinite(run["joint/2/position"])
-        left = lambda late: np.std(np.interp(run.t[there] + late, t, angle) - run["joint/2/position"][there])
-        late = min(np.arange(0.0, t[-1] - run.t[-1], 0.002), key=left)
-        late = min(late + np.arange(-0.002, 0.002, 1e-4), key=left)
+        """Tip deflection [m] and angle [rad] (T,) at the run's times. Its clock is where most reports have the very count that
+        the encoder of joint 1 had; the mechanics are a window behind the encoders."""
+        t, tip, angle, encoder = np.array(self.rows).T
+        there = np.isfinite(run["joint/1/position"])
+        counts = np.round(run["joint/1/position"][there] * run.meta["settings"]["motor_counts_per_m"])
+
+        def wrong(late: float) -> int:
+            off = np.floor(np.interp(run.t[there] + late, t, encoder)) - counts
+            return int((off != np.median(off)).sum())  # where the run has its zero is its own affair
+
+        late = min(np.arange(0.0, t[-1] - run.t[-1], 1e-3), key=wrong)
+        late = min(late + np.arange(-1e-3, 1e-3, 2e-5), key=wrong) + self.window_s
         return np.interp(run.t + late, t, tip), np.interp(run.t + late, t, angle)
 
 

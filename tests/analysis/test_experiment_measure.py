@@ -31,15 +31,16 @@ def reports(count=100, first=1000, **columns):
 
 
 def test_conversions_by_hand():
-    """80 counts a millimetre, 2400 counts and 3200 microsteps a turn; 12 V told, 11.4 V there; 2500 of 4096 at the sensor."""
+    """80 counts a millimetre, 2400 counts and 3200 microsteps a turn; 12 V told, 11.4 V there and
+    half a conversion, which rounds down; 2500 of 4096 at the sensor."""
     places = {"position_1": 800, "position_2": 600, "steps": 800, "setpoint_1": 256 * 400, "setpoint_2": 256 * 1600}
     seen = reports(**places, voltage=6000, supply=11400)
     ticks, found = channels(seen, Mode.position, SETTINGS, Sensor(CUBIC, 0.61))
     x = 2500 / 4096 - 0.61
     expected = {
         "joint/1/position": 0.01, "joint/2/position": np.pi / 2, "joint/2/pulses": np.pi / 2, "joint/1/reference": 0.005,
-        "joint/2/reference": np.pi, "joint/1/voltage": 5.7, "link/2/flex_voltage": 5 * 2500 / 4096,
-        "link/2/tip_deflection": -1.85 * x + 3.0 * x**2 - 4.9 * x**3,
+        "joint/2/reference": np.pi, "joint/1/voltage": 6.0 * (11.4 + 4.9 * 5 / 1024 / 2) / 12,
+        "link/2/flex_voltage": 5 * 2500 / 4096, "link/2/tip_deflection": -1.85 * x + 3.0 * x**2 - 4.9 * x**3,
     }  # fmt: skip
     for name, value in expected.items():
         np.testing.assert_allclose(found[name], value, rtol=1e-6, err_msg=name)

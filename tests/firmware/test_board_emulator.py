@@ -97,6 +97,26 @@ def test_steps_count_with_their_direction_while_the_driver_is_on(board):
     assert board.outputs.stepper_on
 
 
+def test_steps_of_a_window_count_for_the_time_that_they_were_there(board):
+    """The mean over the window of a count that each rising edge changes at its own cycle."""
+    ask(board, "s"), ask(board, "u")
+    board.simulator.trace(board.lines["step"], True)
+    board.simulator.edges()
+    board.write(b"s" * 40)
+    before, stepped = 0, 0
+    while before < 40:
+        begin = board.simulator.cycle
+        board.step()
+        end = board.simulator.cycle
+        ups = [cycle for cycle, _, level in board.simulator.edges() if level]
+        assert board.outputs.steps == pytest.approx(before + sum(end - cycle for cycle in ups) / (end - begin), abs=1e-9)
+        stepped += bool(ups)
+        before += len(ups)
+    assert stepped >= 3  # the bytes come 22 us apart, a window has 250 us
+    board.step()
+    assert board.outputs.steps == 40.0 == board.simulator.window.steps
+
+
 def test_a_compare_pin_stays_set_until_it_is_to_be_cleared(board):
     """Data sheet: without PWM only the match changes the pin; neither the timer's overflow nor a write to OCR5A does."""
     ask(board, "v")

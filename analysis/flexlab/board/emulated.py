@@ -2,7 +2,7 @@
 
 Time is the processor's cycles. For each window the plant is given what the board did during the window before and returns what
 the rig's sensors say at the end of this one; between the two ends shafts move evenly, so that every encoder edge comes at a cycle
-of its own. What the board does thus reaches the plant at most one window late.
+of its own. A plant may go one window behind and draw its sensors on (`rig.plant`), or take what the board did a window late.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Outputs:
     """What the board did to the rig during a window."""
 
     duty: float = 0.0  # mean voltage at the motor / supply, -1 to 1; 0 while the bridge is off
-    steps: float = 0.0  # microsteps since the start, up minus down, those that found the driver enabled
+    steps: float = 0.0  # mean of the microsteps since the start, up minus down, those that found the driver enabled
     motor_on: bool = False  # bridge enabled at the window's end
     stepper_on: bool = False  # stepper driver enabled at the window's end
 
@@ -122,7 +122,7 @@ class EmulatedBoard:
         self._until += self._window
         simulator.run(self._until)
         out = self.outputs
-        out.duty, out.steps = window.duty, window.steps
+        out.duty, out.steps = window.duty, window.steps_mean
         out.motor_on, out.stepper_on = window.motor_on != 0, window.stepper_on != 0
         self.sensors = sensors
 

@@ -37,7 +37,7 @@ class Window(ctypes.Structure):
         ("encoder", ctypes.c_double * 2),
         *[
             (name, ctypes.c_double)
-            for name in ("duty", "steps", "motor_on", "stepper_on", "driven_cycle", "step_cycle", "resets")
+            for name in ("duty", "steps", "steps_mean", "motor_on", "stepper_on", "driven_cycle", "step_cycle", "resets")
         ],
     )
 

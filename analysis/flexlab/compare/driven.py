@@ -1,8 +1,8 @@
 """The simulation of an experiment: the native model, driven by what the experiment commanded, was told to follow, or measured.
 
-`commanded`: the motor's voltage as a force, with the motor's friction and inertia in the joint, and the stepper's pulses through
-its magnetic spring (`rig.motor`, `field`), with the nominal figures of the rig file: everything is predicted, and every error of
-the drives' data adds up. The nut's play is left out.
+`commanded`: the motor's voltage moves the nut and this the carriage behind its play (`screw`), the stepper's pulses act through
+its magnetic spring (`rig.motor`, `field`), with the figures of the rig file: everything is predicted, and every error of the
+drives' data adds up. Joint 1 is then what its encoder would say, the nut.
 `reference`: the joints follow their set-points exactly, as in the dissertation's own inverse comparison: what the controllers
 leave is in the deviation.
 `measured`: the joints follow their encoders (smoothed): what is left is the deviation of the elastic model alone.
@@ -17,6 +17,7 @@ import numpy as np
 
 import flexura as fx
 from flexura import signal
+from flexura.drive import JointDrive
 from flexura.errors import InputError
 
 from ..experiment.pulses import from_run
@@ -25,10 +26,11 @@ from ..rig.description import Rig, recorded
 from ..rig.emulation import Emulated
 from ..rig.motor import JointLine, line, resistance
 from ..rig.stepper import MagneticSpring
+from . import screw
 from .field import Start, held_by_field
-from .smoothing import known, onward, rest, smoothed
+from .smoothing import from_rest, known, onward, rest, smoothed
 
-SET_S = 1e-3  # from the middle between two reports until a voltage acts: it is set in a tick and stays
+SET_S = 5e-4  # a voltage holds for the tick after its report, in mid-course; the one of the tick between is not reported
 WAYS = ("commanded", "reference", "measured")
 NEEDS = {
     "commanded": ("joint/1/voltage", "joint/2/pulses"),
@@ -64,17 +66,22 @@ def simulate(
         rig, more = _rig(experiment)
         carriage = line(rig, more)
         robot = _with_drives(robot, carriage, more.stepper.damping_N_m_s)
-        exact = from_run(experiment)  # else a line between the reports, which are 2 ms apart
-        pulses = signal.piecewise(*exact) if exact else onward(*known(t, experiment["joint/2/pulses"], "joint/2/pulses"))
+        pulses, jumps = given(experiment)
         times, volts = known(t, experiment["joint/1/voltage"], "joint/1/voltage")
         volts = np.sign(volts) * np.maximum(np.abs(volts) - more.driver.dead_zone_V, 0.0)
-        turns = np.abs(volts) > more.motor.starts_at_V  # at rest the motor's static friction holds until then
-        volts[: int(np.argmax(turns)) if turns.any() else len(volts)] = 0.0
         force = held(times + SET_S + more.motor.inductance_H / resistance(rig), carriage.force_N_V * volts)
         at_start = known(t, experiment["joint/1/position"], "joint/1/position")[1][0], pulses(t[0])[0]
         spring = MagneticSpring(rig.stepper, more.stepper)
-        method = "explicit-5" if exact else "auto"  # a jump every millisecond
-        run = held_by_field(_started(robot, at_start), t, force, pulses, spring, rtol, progress, method=method)
+        method = "explicit-5" if jumps else "auto"  # one every millisecond
+        start = _started(robot, at_start)
+        mass_kg = float(start[0].mass(start[1])[0, 0])
+        fine = np.arange(t[0], t[-1] + screw.STEP_S, screw.STEP_S)
+        nut, speed, x = screw.driven(fine, force, carriage, mass_kg, screw.play(more.carriage), at_start[0])
+        moved = JointDrive(force=force, motion=onward(t, np.interp(t, fine, x)), prescribed=True)
+        run = held_by_field(start, t, moved, pulses, spring, rtol, progress, method=method)
+        if run.meta["relaxation_rounds"] is not None:
+            seen = {"joint/1/position": np.interp(run.t, fine, nut), "joint/1/velocity": np.interp(run.t, fine, speed)}
+            run = dataclasses.replace(run, channels=run.channels | seen)
     else:
         motions = [_motion(experiment, name, by) for name in NEEDS[by]]
         earlier = rest(t)
@@ -90,11 +97,20 @@ def simulate(
     return run
 
 
+def given(experiment: fx.Run) -> tuple[signal.Signal, bool]:
+    """Joint 2's angle by its pulses [rad], from before the start on; whether it jumps: each pulse when the firmware gave it,
+    where that follows from what the run holds, else a spline through the reports."""
+    exact = from_run(experiment)
+    if exact is None:
+        return _motion(experiment, "joint/2/pulses", "commanded"), False
+    at, angle = exact
+    at[0] = rest(experiment.t)[0]
+    return signal.piecewise(at, angle), True
+
+
 def _motion(experiment: fx.Run, name: str, by: str) -> signal.Signal:
     """The joint's motion from before the start on, where the robot was at rest: it must not start at speed and unbent."""
-    t, y = known(experiment.t, experiment[name], name)
-    earlier = rest(t)
-    t, y = np.concatenate([earlier, t]), np.concatenate([np.full(len(earlier), y[0]), y])
+    t, y = from_rest(*known(experiment.t, experiment[name], name))
     return smoothed(t, y) if by == "measured" else onward(t, y)
 
 

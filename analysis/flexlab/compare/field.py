@@ -56,7 +56,7 @@ def held_by_field(
     """Simulate with the force on joint 1 [N], or its drive, and the pulses [rad] given to joint 2.
 
     The Run's meta has `relaxation_rounds`, None where the torque had to be a Python function. `guess` is begun with and left at
-    what was found. Raises FlexuraError where steps are lost and joint 1 has more than a force.
+    what was found. Where steps are lost joint 1 goes by its force alone; raises FlexuraError where it has none.
     """
     system, q0 = start
     report = progress or (lambda fraction: None)
@@ -94,7 +94,7 @@ def held_by_field(
             history.append((assumed.copy(), came - assumed))
             assumed = _ahead(history[-DEPTH:])
         extra = table(fine, assumed)
-    if first.force is None or first.motion is not None:
+    if first.force is None:
         raise FlexuraError("the stepper loses steps in this simulation: no torque of its field is consistent with its motion")
     return _by_function(start, t, first.force, pulses, spring, rtol, progress)
 

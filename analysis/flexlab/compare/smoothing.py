@@ -31,6 +31,12 @@ def rest(t: np.ndarray) -> np.ndarray:
     return t[0] - step * np.arange(round(REST_S / step), 0, -1)
 
 
+def from_rest(t: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A motion with the rest before it."""
+    earlier = rest(t)
+    return np.concatenate([earlier, t]), np.concatenate([np.full(len(earlier), y[0]), y])
+
+
 def resolution(y: np.ndarray) -> float:
     """The step between the values that occur: their smallest difference, 0 where all are the same or none occurs twice."""
     values = np.unique(y)

@@ -89,6 +89,7 @@ def channels(
     per_m, per_rad, per_step = (
         settings[name] for name in ("motor_counts_per_m", "stepper_counts_per_rad", "stepper_steps_per_rad")
     )
+    half_V = settings["supply_divider"] * ADC_V / ADC_COUNTS / 2  # a conversion rounds down
     tracked = (reports["state"] == State.running) & (mode is Mode.position)
     r = reading(reports["flex"])
     out = {
@@ -97,7 +98,7 @@ def channels(
         "joint/1/reference": spread(np.where(tracked, reports["setpoint_1"] / (FRACTION * per_m), np.nan)),
         "joint/2/reference": spread(np.where(tracked, reports["setpoint_2"] / (FRACTION * per_step), np.nan)),
         # the board's figure is its duty times the supply it was told of; the motor gets the duty of the supply there is
-        "joint/1/voltage": spread(reports["voltage"] / 1000 * (reports["supply"] / 1000 / settings["supply_V"])),
+        "joint/1/voltage": spread(reports["voltage"] / 1000 * ((reports["supply"] / 1000 + half_V) / settings["supply_V"])),
         "joint/2/pulses": spread(reports["steps"] / per_step),
         "link/2/tip_deflection": spread(sensor.tip(r)),
         "link/2/tip_deflection_std": spread(sensor.tip_std(r)),

@@ -1,4 +1,4 @@
-"""Joint 1: its friction from voltage and motor speed, its motion on the rail from the motor's encoder and the nut's play.
+"""Joint 1: its friction from voltage and motor speed.
 
 The motor turns a reflected mass of a hundred kilogrammes; the strip hardly moves it, so that joint 1 is identified by itself:
 
@@ -6,10 +6,6 @@ The motor turns a reflected mass of a hundred kilogrammes; the strip hardly move
 
 tau is the time from a voltage's report to its current. Slower than 5 mm/s static friction may hold, and for 2 mm after it has
 turned round the nut crosses its play and drives no rail: this line has neither, and v is not looked at there.
-
-The nut's play is invisible to the motor's encoder. Rail friction holds the carriage wherever the nut does not push it, so that
-it follows the nut by the play operator  x = min(max(x, s - b/2), s + b/2): true as long as the nut is braked by less than the
-friction brakes the carriage, some 2 m/s^2.
 """
 
 from __future__ import annotations
@@ -21,6 +17,7 @@ from flexura.errors import InputError
 from flexura.signal import COLUMNS, Signal
 
 from ..compare.driven import held
+from ..compare.screw import behind
 from ..compare.smoothing import known
 from ..experiment.measure import velocity
 from ..rig.motor import JointLine
@@ -78,13 +75,3 @@ def _noise(t: np.ndarray, x: np.ndarray) -> float:
     random = np.random.default_rng(0)
     white = (resolution(x) or 1e-6) / np.sqrt(12) * random.standard_normal(len(t))
     return float(np.std(velocity(t, white)))
-
-
-def behind(nut_m: np.ndarray, play_m: float) -> np.ndarray:
-    """The carriage's places (T,) [m] behind a nut at (T,) with that play from flank to flank, in its middle at the start."""
-    x = np.empty(len(nut_m))
-    at, half = nut_m[0], play_m / 2
-    for k, nut in enumerate(nut_m):
-        at = min(max(at, nut - half), nut + half)
-        x[k] = at
-    return x

@@ -34,7 +34,7 @@ from .strip import Strip, changed
 NEEDS = ("joint/1/position", "joint/1/voltage", "joint/2/position", "joint/2/pulses", "link/2/flex_voltage")
 BEGINNING_S = 2.0
 GRID = np.exp(np.linspace(np.log(0.7), np.log(1.4), 15))  # 5 % of stiffness are 2 % of frequency, a sixth of a turn in 2 s
-MASS_DOUBT, GYRATION_DOUBT_M = 0.005, 5.6e-3
+MASS_DOUBT, GYRATION_DOUBT_M, GIVE_DOUBT = 0.005, 5.6e-3, 0.5
 MEMORY_S = 0.4  # two periods of the first mode
 
 
@@ -98,7 +98,8 @@ def identify(experiment: fx.Run, progress: Callable[[str, float], None] | None =
     report("strip", 1.0)
     elements = nominal.robot.links[1].elements
     doubts: tuple[tuple[dict[str, float], int], ...] = (
-        ({}, elements - 1), ({"mass": 1 + MASS_DOUBT}, elements), ({"gyration_m": GYRATION_DOUBT_M}, elements)
+        ({}, elements - 1), ({"mass": 1 + MASS_DOUBT}, elements), ({"gyration_m": GYRATION_DOUBT_M}, elements),
+        ({"give": 1 + GIVE_DOUBT}, elements),
     )  # fmt: skip
     for more, mesh in doubts:
         strip = strip.doubted(data.residuals(strip.values | more, mesh) - strip.residuals)

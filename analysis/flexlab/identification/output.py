@@ -80,7 +80,7 @@ def table(found: Identified, experiment: fx.Run) -> Table:
     rms = np.sqrt(np.mean(found.strip.residuals**2, axis=1))
     notes = [
         f"residuals / noise: flex sensor {rms[0]:.2f}, joint 2 {rms[1]:.2f}",
-        "intervals: noise (Newey-West), mesh, strip's mass to 0.5 %, payload's radius of gyration to 5.6 mm",
+        "intervals: noise (Newey-West), mesh, strip's mass to 0.5 %, payload's radius of gyration to 5.6 mm, nut's give to half",
     ]
     out.caption, out.caption_justify = "\n".join(([EMULATED] if emulated(experiment) else []) + notes), "left"
     return out

@@ -20,13 +20,14 @@ from flexura import signal
 from flexura.beam import shape
 from flexura.drive import JointDrive
 
+from ..compare import screw
+from ..compare.driven import given
 from ..compare.field import Guess, held_by_field
-from ..compare.smoothing import known, onward, rest, smoothed
+from ..compare.smoothing import from_rest, known, rest, smoothed
 from ..rig.description import Rig
 from ..rig.emulation import Emulated
 from ..rig.flex import LOGIC_V
 from ..rig.stepper import MagneticSpring
-from . import carriage
 
 DRIFT = 3  # degree of the polynomial that offset and drift may follow
 MODES = 3
@@ -44,14 +45,11 @@ class Strip:
         part = experiment.t <= experiment.t[0] + until_s
         self.t = experiment.t[part]
         self.rig, self.more, self.robot = rig, more, robot
-        channel = lambda name: known(self.t, experiment[name][part], name)
-        earlier = rest(self.t)
-        self._times = np.concatenate([earlier, self.t])
-        lead = lambda t, y: (np.concatenate([earlier, t]), np.concatenate([np.full(len(earlier), y[0]), y]))
-        nut = smoothed(*lead(*channel("joint/1/position")))
+        self._times = np.concatenate([rest(self.t), self.t])
+        nut = smoothed(*from_rest(*known(self.t, experiment["joint/1/position"][part], "joint/1/position")))
         self._nut_m = np.array([nut(at)[0] for at in self._times])
-        self._give_m = 2 * friction * more.carriage.coulomb_friction_N / more.carriage.contact_stiffness_N_m
-        self.pulses = onward(*lead(*channel("joint/2/pulses")))
+        self._friction = friction
+        self.pulses, _ = given(experiment)
         self.flex_V, self.joint_rad = experiment["link/2/flex_voltage"][part], experiment["joint/2/position"][part]
         still = self.t < self.t[0] + 0.3
         self.flex_noise_V = max(float(np.nanstd(self.flex_V[still])), 1e-4)
@@ -68,7 +66,8 @@ class Strip:
     def simulate(self, values: dict[str, float], elements: int | None = None, rtol: float = RTOL) -> fx.Run:
         """The native simulation at the experiment's times; `values`: factors on the files' figures, play [m], delays [s]."""
         times = self._times
-        x = carriage.behind(self._nut_m, values["backlash_m"] + self._give_m)
+        nut = self.more.carriage.model_copy(update={"backlash_m": values["backlash_m"]})
+        x = screw.behind(self._nut_m, screw.play(nut, self._friction * values.get("give", 1.0)))
         moved = JointDrive(motion=signal.Signal(signal.table(times, x).segments[:-1]), prescribed=True)
         stepper = self.rig.stepper.model_copy(
             update={"holding_torque_N_m": self.rig.stepper.holding_torque_N_m * values["holding"]}

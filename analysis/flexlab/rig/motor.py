@@ -123,12 +123,15 @@ class Motor:
 @dataclass(frozen=True)
 class JointLine:
     """Joint 1 as a linear motor with friction, F = force_N_V u - viscous v - coulomb sign v on mass `reflected_mass_kg` and
-    the robot's own: what the rig's data come to at the joint, its inductance, dead zone and the nut's play left out."""
+    the robot's own: what the rig's data come to at the joint, its inductance, dead zone and the nut's play left out. `static_N`
+    holds at rest; `rail_N` of it and of `coulomb_N` is the rail's, which the nut crossing its play does not feel."""
 
     force_N_V: float
     viscous_N_s_m: float
     coulomb_N: float
     reflected_mass_kg: float
+    static_N: float
+    rail_N: float
 
 
 def joint_line(bench: Bench, friction: float = 1.0) -> JointLine:
@@ -144,11 +147,15 @@ def line(rig: Rig, more: Emulated, friction: float = 1.0) -> JointLine:
     """As `joint_line`, for a rig file's tables without the files that they name."""
     data, r = motor_data(rig, more.motor), rig.screw.lead_m / (2 * math.pi)
     efficiency = data.gear_efficiency * rig.screw.efficiency
-    coulomb = (data.friction_N_m + more.screw.coulomb_friction_N_m) / r + more.carriage.coulomb_friction_N / efficiency
+    rail = more.carriage.coulomb_friction_N / efficiency
+    coulomb = (data.friction_N_m + more.screw.coulomb_friction_N_m) / r + rail
+    static = (max(data.starts_N_m, data.friction_N_m) + more.screw.coulomb_friction_N_m) / r + rail
     viscous = more.screw.viscous_friction_N_m_s / r**2 + more.carriage.viscous_friction_N_s_m / efficiency
     return JointLine(
         data.constant_N_m_A / (data.resistance_ohm * r),
         data.constant_N_m_A**2 / (data.resistance_ohm * r**2) + friction * viscous,
         friction * coulomb,
         data.inertia_kg_m2 / r**2,
+        friction * static,
+        friction * rail,
     )

@@ -18,6 +18,7 @@ typedef struct { /* shared with Python: all doubles, see simulator.py */
   double encoder[ENCODERS]; /* in: position at the window's end [counts, x4] */
   double duty;              /* out: mean of forward minus reverse while the bridge is enabled, over the window, -1..1 */
   double steps;             /* out: steps taken since the start, with sign, counted while the driver was enabled */
+  double steps_mean;        /* out: mean of `steps` over the window's time */
   double motor_on;          /* out: 1 while the motor's driver is enabled */
   double stepper_on;        /* out: 1 while the stepper's driver is enabled */
   double driven_cycle;      /* out: the last cycle at which the bridge was enabled */
@@ -78,6 +79,8 @@ struct board {
   int motor;           /* -1, 0, 1: how the pins drive the motor now */
   uint64_t motor_since;
   double motor_sum;
+  uint64_t begin;           /* the window's first cycle */
+  double steps_late;        /* sum of the window's steps, each by how long after its begin it came [cycles] */
   uint8_t driven[PORTS], level[PORTS]; /* inputs by port letter - 'A' */
   uint64_t stuck[PORTS];               /* bits of pins that ignore what drives them */
   uint64_t entered[VECTORS], longest[VECTORS], own[VECTORS], total[VECTORS], entries[VECTORS];

@@ -96,8 +96,11 @@ static void on_edge(struct avr_irq_t *irq, uint32_t value, void *param) {
   line->level = level;
   if (line->traced) *(edge_t *)push(&b->edges) = (edge_t){b->avr->cycle, line->index, level};
   b->level_of[line->role] = level;
-  if (line->role == STEP && level && b->window.stepper_on != 0) b->window.steps += b->level_of[STEP_UP] ? 1 : -1;
-  else if (line->role) on_drive(b);
+  if (line->role == STEP && level && b->window.stepper_on != 0) {
+    const double step = b->level_of[STEP_UP] ? 1 : -1;
+    b->window.steps += step;
+    b->steps_late += step * (double)(b->avr->cycle - b->begin);
+  } else if (line->role) on_drive(b);
 }
 
 static void on_timer(struct avr_irq_t *irq, uint32_t value, void *param) { (void)irq, (void)value, on_drive(param); }
