@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from . import loop
+from . import acting, loop
 from .assembly import assemble
 from .chain import COULOMB_SPEED
 from .choice import choose, longest_step
@@ -104,7 +104,7 @@ def by_bisection(
             else:
                 raise FlexuraError(f"the bisection of the joints in turn did not settle at t = {a:.6g} s: expected shorter steps")
             trial.accept()
-            joint = loop.outside(system.chain, limited, after)
+            joint = acting.outside(system.chain, limited, after)
             if joint >= 0:
                 events.append(limit_event(system, joint, float(a), np.clip(after[rows], *system.limits.T)))
                 break

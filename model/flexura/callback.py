@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from . import loop
+from . import acting, loop
 from .course import inputs_of
 from .drive import Drive
 from .errors import FlexuraError, InputError
@@ -40,7 +40,7 @@ def integrated(
         force = _forces(system, drive, time_s, y, v)
         accelerate(c, w, y, v, y, v, 0.0, force, zero, zero, a)
         dz = np.concatenate([v, a, [0.0, 0.0]])
-        loop.powers(c, w, v, force, dz)
+        acting.powers(c, w, v, force, dz)
         return dz
 
     solver = (DOP853 if method == loop.EXPLICIT else Radau)(
@@ -51,12 +51,12 @@ def integrated(
     inputs = inputs_of(system, Drive.none(links))
 
     def beyond(z: np.ndarray) -> bool:
-        return bool(loop.outside(c, inputs, z) >= 0)
+        return bool(acting.outside(c, inputs, z) >= 0)
 
     def stop(late: float) -> None:
         """Note the event, which is before `late` [s], and keep the last good state."""
         at, after = _crossing(lambda time_s: beyond(dense(time_s)), solver.t_old, late)
-        joint = int(loop.outside(c, inputs, dense(after)))
+        joint = int(acting.outside(c, inputs, dense(after)))
         events.append(limit_event(system, joint, at, dense(at)[system.joint_rows]))
         if at > times[-1]:
             times.append(at)

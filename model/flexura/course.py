@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from . import exponential, loop
+from . import acting, exponential, loop
 from .basis import basis
 from .chain import Work
 from .choice import choose, longest_step, quickest
@@ -78,7 +78,7 @@ def compiled(
     rtol: float,
     method: int,
     progress: Callable[[float], None] | None,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, loop.Inputs, dict[str, Any]]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, acting.Inputs, dict[str, Any]]:
     """Times, states (T, 2n), work and loss (T, 2), the inputs with what a controller logged, and what the Run's metadata says of
     the solution."""
     n = system.n
@@ -117,7 +117,7 @@ def compiled(
     return t[:rows], out[:rows, : 2 * n], out[:rows, 2 * n :], course.inputs, about
 
 
-def inputs_of(system: System, drive: Drive | Controller, t: np.ndarray | None = None) -> loop.Inputs:
+def inputs_of(system: System, drive: Drive | Controller, t: np.ndarray | None = None) -> acting.Inputs:
     """What acts on the robot; a controller's ticks begin at t[0] and are logged up to t[-1]."""
     segments, ranges, gains = drive.packed()
     limits = slack(system)
@@ -125,7 +125,7 @@ def inputs_of(system: System, drive: Drive | Controller, t: np.ndarray | None = 
     if isinstance(drive, Controller):
         start, end = (0.0, 0.0) if t is None else (t[0], t[-1])
         law = drive.law(system, ranges, start, int(np.ceil((end - start) * drive.rate_Hz - 1e-6)) + 1)
-    return loop.Inputs(
+    return acting.Inputs(
         segments, ranges, gains[:, 0].copy(), gains[:, 1].copy(), drive.follows.astype(np.int64), limits[:, 0].copy(),
         limits[:, 1].copy(), drive.breaks, law,
     )  # fmt: skip
@@ -143,7 +143,7 @@ def following(system: System, drive: Drive | Controller) -> Work:
     return w
 
 
-def applied(system: System, t: np.ndarray, states: np.ndarray, drive: Drive | Controller, inputs: loop.Inputs) -> np.ndarray:
+def applied(system: System, t: np.ndarray, states: np.ndarray, drive: Drive | Controller, inputs: acting.Inputs) -> np.ndarray:
     """The drive forces (T, N) at the states (T, 2n) of a run; what a controller held is replayed."""
     n, links = system.n, len(system.robot.links)
     if isinstance(drive, Controller):

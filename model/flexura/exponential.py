@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .acting import Inputs, beyond, drive, found, powers, prescribe
 from .basis import Basis, look, moved
 from .chain import Chain, Work
 from .compiled import compiled, internal
@@ -31,17 +32,11 @@ from .loop import (
     STEPS,
     STUCK,
     H,
-    Inputs,
     Memory,
     T,
     _copy,
-    _find,
     _grown,
-    _outside,
-    _prescribe,
     _weights,
-    drive,
-    powers,
     quintic,
 )  # fmt: skip
 from .past import COUNT, HEAD, ORDER, ROWS, SPAN, STEADY, Past, coefficient, order_of, ring, tables
@@ -98,10 +93,10 @@ def _sizes(b: Basis, scale: np.ndarray, size: np.ndarray) -> None:
 @internal
 def _look(c: Chain, w: Work, d: Inputs, m: Memory, p: Past, t: float, y: np.ndarray, v: np.ndarray, row: int) -> None:
     """Accelerations and powers at (t, y, v) into a row of the rings."""
-    _prescribe(c, w, d, t, y, v)
+    prescribe(c, w, d, t, y, v)
     drive(c, d, t, y, v, m.force)
     passes(c, w, y, v, y, v, 0.0, m.force, m.zero, m.zero, p.a[row])
-    _find(c, w, d, v, m.force)
+    found(c, w, d, v, m.force)
     powers(c, w, v, m.force, m.K[0])
     n = y.shape[0]
     p.power[row, 0], p.power[row, 1] = m.K[0, 2 * n], m.K[0, 2 * n + 1]
@@ -236,16 +231,16 @@ def _inside(m: Memory, b: Basis, p: Past, h: float, x: float, out: np.ndarray) -
 
 @internal
 def _stop_at_limit(
-    c: Chain, w: Work, d: Inputs, m: Memory, b: Basis, p: Past, t: float, h: float, beyond: float, joint: int
+    c: Chain, w: Work, d: Inputs, m: Memory, b: Basis, p: Past, t: float, h: float, past_it: float, joint: int
 ) -> None:
     """As `loop._stop_at_limit`."""
-    low, high, out, n = 0.0, beyond, m.K[15, : m.z.shape[0]], m.a.shape[0]
+    low, high, out, n = 0.0, past_it, m.K[15, : m.z.shape[0]], m.a.shape[0]
     m.s[FAULT] = joint
     for turn in range(61):
         middle = 0.5 * (low + high) if turn < 60 else low
         _inside(m, b, p, h, middle, out)
-        _prescribe(c, w, d, t + middle * h, out[:n], out[n : 2 * n])
-        joint = _outside(c, d, out)
+        prescribe(c, w, d, t + middle * h, out[:n], out[n : 2 * n])
+        joint = beyond(c, d, out)
         if joint >= 0:
             high, m.s[FAULT] = middle, joint
         else:
@@ -311,7 +306,7 @@ def advance(
             s[FRESH] = 1.0
             continue
         error = _correct(b, m, p, h, new)
-        _prescribe(c, w, d, tn, y, v)
+        prescribe(c, w, d, tn, y, v)
         k = p.s[COUNT]
         factor = 2.0 if error == 0.0 else 0.85 * error ** (-1.0 / (k + 1.0))
         if not error < 1.0:
@@ -332,13 +327,13 @@ def advance(
                     _force_inside(b, p, h)
                     prepared = True
                 _inside(m, b, p, h, (t_eval[row] - t) / h, out[row])
-                _prescribe(c, w, d, t_eval[row], out[row, :n], out[row, n : 2 * n])
-            joint = _outside(c, d, out[row])
+                prescribe(c, w, d, t_eval[row], out[row, :n], out[row, n : 2 * n])
+            joint = beyond(c, d, out[row])
             if joint >= 0:
                 _stop_at_limit(c, w, d, m, b, p, t, h, (t_eval[row] - t) / h, joint)
                 return
             s[OUT] += 1
-        joint = _outside(c, d, m.znew)
+        joint = beyond(c, d, m.znew)
         if joint >= 0:
             _force_inside(b, p, h)
             _stop_at_limit(c, w, d, m, b, p, t, h, 1.0, joint)

@@ -15,33 +15,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .chain import COULOMB_SPEED, SLEEVE, SLIDER, Chain, Work
+from .acting import Inputs, beyond, drive, found, powers, prescribe
+from .chain import Chain, Work
 from .compiled import compiled, inlined, internal
 from .kernel import passes
 from .lanes import WIDTH, lanes, load, load_some, padded, room, store, store_some, total
-from .law import Law, due, tick
+from .law import due, tick
 from .pinned import pinned
-from .signal import evaluate
 from .tableaus import _A, _AX, _C, _CX, _D, _E3, _E5, _EA, _EC, _EE, _PA, _PC, _PE, GAMMA
 
 EXPLICIT, IMPLICIT, PAIR_3, PAIR_5 = 0, 1, 2, 3
 RUNNING, DONE, LIMIT, STUCK = 0, 1, 2, 3
 T, H, OUT, BREAK, STEPS, REJECTED, EVALS, ERR, STATUS, FRESH, FAULT, LONGEST = range(12)  # entries of Memory.s
 FLOOR = 1e-3  # m, rad (joints); kg^(1/2) m (elastic, mass-normalised); per second for the velocities
-
-
-class Inputs(NamedTuple):
-    """What acts on a robot: packed signals (k, 10), their ranges (N, 4), gains and limits (N,), instants to step on."""
-
-    segments: np.ndarray
-    ranges: np.ndarray
-    kp: np.ndarray
-    kd: np.ndarray
-    follows: np.ndarray  # (N,) int: joints whose motion is prescribed
-    low: np.ndarray
-    high: np.ndarray
-    breaks: np.ndarray
-    law: Law  # a sampled controller, which writes into the segments
 
 
 class Memory(NamedTuple):
@@ -98,67 +84,14 @@ def _error(m: Memory, weights: np.ndarray, count: int) -> float:
     return total(squares)
 
 
-@compiled
-def drive(c: Chain, d: Inputs, t: float, y: np.ndarray, v: np.ndarray, force: np.ndarray) -> None:
-    """Joint forces (N,) of the drives at time t."""
-    for i in range(force.shape[0]):
-        f0, f1, r0, r1 = d.ranges[i]
-        total = 0.0
-        if f1 > f0:
-            total = evaluate(d.segments[f0:f1], t)[0]
-        if r1 > r0:
-            r, rd, _ = evaluate(d.segments[r0:r1], t)
-            e = c.first[i]
-            total += d.kp[i] * (r - y[e]) + d.kd[i] * (rd - v[e])
-        force[i] = total
-
-
-@inlined
-def _prescribe(c: Chain, w: Work, d: Inputs, t: float, y: np.ndarray, v: np.ndarray) -> None:
-    """Put prescribed joints where their motion has them at t."""
-    for i in range(d.follows.shape[0]):
-        if d.follows[i]:
-            e = c.first[i]
-            y[e], v[e], w.given[i] = evaluate(d.segments[d.ranges[i, 2] : d.ranges[i, 3]], t)
-
-
-@inlined
-def _find(c: Chain, w: Work, d: Inputs, v: np.ndarray, force: np.ndarray) -> None:
-    """The drive forces that prescribed motions took in the pass just made, friction included."""
-    for i in range(d.follows.shape[0]):
-        if d.follows[i]:
-            speed = v[c.first[i]]
-            force[i] = w.reaction[i] + c.viscous[i] * speed + c.coulomb[i] * np.tanh(speed / COULOMB_SPEED)
-
-
-@compiled
-def powers(c: Chain, w: Work, v: np.ndarray, force: np.ndarray, dz: np.ndarray) -> None:
-    """Power of the drives and power lost to friction and damping, into the last two entries of dz, after a pass."""
-    n = v.shape[0]
-    work, loss = 0.0, 0.0
-    for i in range(force.shape[0]):
-        e = c.first[i]
-        work += force[i] * v[e]
-        loss += c.viscous[i] * v[e] * v[e]
-        if c.coulomb[i] > 0.0:
-            loss += c.coulomb[i] * v[e] * np.tanh(v[e] / COULOMB_SPEED)
-        for k in range(c.first[i + 1] - e - 1):
-            if c.kind[i] == SLEEVE:
-                for j in range(c.first[i + 1] - e - 1):
-                    loss += (c.alpha[i] * w.M[i, k, j] + c.beta[i] * w.K[i, k, j]) * v[e + 1 + k] * v[e + 1 + j]
-            else:
-                loss += c.damp[i, k] * v[e + 1 + k] * v[e + 1 + k]
-    dz[2 * n], dz[2 * n + 1] = work, loss
-
-
 @internal
 def _slope(c: Chain, w: Work, d: Inputs, m: Memory, t: float, z: np.ndarray, dz: np.ndarray) -> None:
     n = m.a.shape[0]
     y, v = z[:n], z[n : 2 * n]
-    _prescribe(c, w, d, t, y, v)
+    prescribe(c, w, d, t, y, v)
     drive(c, d, t, y, v, m.force)
     passes(c, w, y, v, y, v, 0.0, m.force, m.zero, m.zero, dz[n : 2 * n])
-    _find(c, w, d, v, m.force)
+    found(c, w, d, v, m.force)
     _copy(v, dz[:n])
     powers(c, w, v, m.force, dz)
     m.s[EVALS] += 1
@@ -214,7 +147,7 @@ def _pair_step(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, last
         _combine(m, h, _PA[pair, s], s, new)
         _slope(c, w, d, m, min(t + _PC[pair, s] * h, last), new, K[s])
     _combine(m, h, _PA[pair, stages], stages, new)
-    _prescribe(c, w, d, last if t + h > last else t + h, new[: m.a.shape[0]], new[m.a.shape[0] : 2 * m.a.shape[0]])
+    prescribe(c, w, d, last if t + h > last else t + h, new[: m.a.shape[0]], new[m.a.shape[0] : 2 * m.a.shape[0]])
     return h * np.sqrt(_error(m, _PE[pair], stages) / m.scale.shape[0])
 
 
@@ -291,7 +224,7 @@ def _implicit_step(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, 
         for iteration in range(10):
             _stage(m, gh)
             _copy(m.a, K[s, :n])
-            _prescribe(c, w, d, ts, new[:n], new[n : 2 * n])
+            prescribe(c, w, d, ts, new[:n], new[n : 2 * n])
             passes(c, w, new[:n], new[n : 2 * n], m.ys, m.vs, gh, m.force, d.kp, d.kd, m.a)
             m.s[EVALS] += 1
             change = 0.0
@@ -306,9 +239,9 @@ def _implicit_step(c: Chain, w: Work, d: Inputs, m: Memory, t: float, h: float, 
         _stage(m, gh)
         _copy(new[n : 2 * n], K[s, :n])
         _copy(m.a, K[s, n : 2 * n])
-        _prescribe(c, w, d, ts, new[:n], new[n : 2 * n])
+        prescribe(c, w, d, ts, new[:n], new[n : 2 * n])
         drive(c, d, ts, new[:n], new[n : 2 * n], m.force)
-        _find(c, w, d, new[n : 2 * n], m.force)
+        found(c, w, d, new[n : 2 * n], m.force)
         powers(c, w, new[n : 2 * n], m.force, K[s])
     for k in range(2 * n, 2 * n + 2):
         sums = 0.0
@@ -364,48 +297,25 @@ def _shortest(c: Chain, z: np.ndarray) -> float:
 
 
 @internal
-def _outside(c: Chain, d: Inputs, z: np.ndarray) -> int:
-    """The first joint beyond its limits, or a slider that has run into the sleeve of the link it rides on; -1: none."""
-    for i in range(c.kind.shape[0]):
-        e = c.first[i]
-        if not (d.low[i] <= z[e] <= d.high[i]):
-            return i
-        if i == 0 or c.kind[i] != SLIDER or c.locked[i]:
-            continue
-        under, at = i - 1, z[e]
-        if i > 1 and c.kind[under] == SLIDER and c.locked[under] and c.angle[under] == 0.0:
-            under, at = i - 2, at + z[c.first[under]]  # on a link cut in two there
-        if c.kind[under] == SLEEVE and at + z[c.first[under]] < c.length[under]:
-            return i
-    return -1
-
-
-@compiled
-def outside(c: Chain, d: Inputs, z: np.ndarray) -> int:
-    """`_outside` for Python."""
-    return _outside(pinned(c), pinned(d), z)
-
-
-@internal
 def _stop_at_limit(
-    c: Chain, w: Work, d: Inputs, m: Memory, method: int, t: float, h: float, last: float, beyond: float, joint: int
+    c: Chain, w: Work, d: Inputs, m: Memory, method: int, t: float, h: float, last: float, past_it: float, joint: int
 ) -> None:  # fmt: skip
     """Find by bisection where the step just made, from t, leaves a joint's limits: `joint` is beyond them at the fraction
-    `beyond` of the step. m.z and s[T] are the last state inside."""
+    `past_it` of the step. m.z and s[T] are the last state inside."""
     _dense(c, w, d, m, method, t, h, last)
-    low, high, out, n = 0.0, beyond, m.K[15, : m.z.shape[0]], m.a.shape[0]
+    low, high, out, n = 0.0, past_it, m.K[15, : m.z.shape[0]], m.a.shape[0]
     m.s[FAULT] = joint
     for _ in range(60):
         middle = 0.5 * (low + high)
         _interpolate(m, method, h, middle, out)
-        _prescribe(c, w, d, t + middle * h, out[:n], out[n : 2 * n])
-        joint = _outside(c, d, out)
+        prescribe(c, w, d, t + middle * h, out[:n], out[n : 2 * n])
+        joint = beyond(c, d, out)
         if joint >= 0:
             high, m.s[FAULT] = middle, joint
         else:
             low = middle
     _interpolate(m, method, h, low, out)
-    _prescribe(c, w, d, t + low * h, out[:n], out[n : 2 * n])
+    prescribe(c, w, d, t + low * h, out[:n], out[n : 2 * n])
     _copy(out, m.z)
     m.s[STATUS], m.s[T] = LIMIT, t + low * h
 
@@ -475,13 +385,13 @@ def advance(
                     _dense(c, w, d, m, method, t, h, last)
                     prepared = True
                 _interpolate(m, method, h, (t_eval[row] - t) / h, out[row])
-                _prescribe(c, w, d, t_eval[row], out[row, :n], out[row, n : 2 * n])
-            joint = _outside(c, d, out[row])
+                prescribe(c, w, d, t_eval[row], out[row, :n], out[row, n : 2 * n])
+            joint = beyond(c, d, out[row])
             if joint >= 0:
                 _stop_at_limit(c, w, d, m, method, t, h, last, (t_eval[row] - t) / h, joint)
                 return
             s[OUT] += 1
-        joint = _outside(c, d, m.znew)
+        joint = beyond(c, d, m.znew)
         if joint >= 0:
             _stop_at_limit(c, w, d, m, method, t, h, last, 1.0, joint)
             return

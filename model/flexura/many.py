@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import exponential, loop
+from .acting import Inputs
 from .basis import Basis, basis
 from .chain import Chain, Work, workspace
 from .compiled import compiled, internal
@@ -18,7 +19,7 @@ from .course import FIRST, slack
 from .drive import Drive
 from .lanes import room
 from .law import Law, none
-from .loop import Inputs, Memory
+from .loop import Memory
 from .past import Past, past
 from .pinned import pinned
 from .system import System

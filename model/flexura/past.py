@@ -134,35 +134,24 @@ def coefficient(p: Past, j: int, m: int, i: int) -> Any:
 
 @inlined
 def _polynomials(p: Past, low: int, used: int, k: int) -> None:
-    """Polynomials through the last `used` of k values: Lagrange's, the one for the gap and the one for the error, from the
-    product w(s) of s less each node, divided by its factors."""
+    """Polynomials through the last `used` of k values: Lagrange's, the one for the gap and the one for the error. Multiplied up
+    from their roots: dividing the product of all would lose four digits where nodes lie far apart."""
     for j in range(k + 2):
+        row = p.poly[low, j]
         for m in range(ORDER + 1):
-            p.poly[low, j, m] = 0.0
-    w, error = p.poly[low, k], p.poly[low, k + 1]
-    w[0] = 1.0
-    for i in range(used):
-        for m in range(i + 1, 0, -1):
-            w[m] = w[m - 1] - p.node[i] * w[m]
-        w[0] *= -p.node[i]
-    for j in range(used):
-        row, node = p.poly[low, j], p.node[j]
-        value, slope = 0.0, 0.0  # the quotient's coefficients from the highest on, and its value at the node
-        for m in range(used, 0, -1):
-            value = w[m] + node * value
-            row[m - 1] = value
-            slope = value + node * slope
-        inverse = 1.0 / slope
-        for m in range(used):
+            row[m] = 0.0
+        if used <= j < k:
+            continue
+        degree, below = 0, 1.0
+        row[0] = 1.0
+        for i in range(used):
+            if i != j:
+                below *= (p.node[j] if j < used else 1.0) - p.node[i]
+                root = p.node[i] if j <= k or i < used - 1 else 1.0  # the error's: the end in place of the oldest
+                degree += 1
+                for m in range(degree, 0, -1):
+                    row[m] = row[m - 1] - root * row[m]
+                row[0] *= -root
+        inverse = 1.0 / below
+        for m in range(degree + 1):
             row[m] *= inverse
-        if j == used - 1:  # without the oldest value, and 0 at the end
-            for m in range(used, 0, -1):
-                error[m] = slope * (row[m - 1] - row[m])
-            error[0] = -slope * row[0]
-    end = 0.0
-    for m in range(used + 1):
-        end += w[m]
-    inverse = 1.0 / end
-    for m in range(used + 1):
-        w[m] *= inverse
-        error[m] *= inverse

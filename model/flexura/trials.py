@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from . import loop
+from . import acting, loop
 from .chain import Chain, Work
 from .choice import longest_step
 from .compiled import compiled, inlined, internal
@@ -35,7 +35,7 @@ class Trial(NamedTuple):
 
     chain: Chain
     work: Work
-    inputs: loop.Inputs
+    inputs: acting.Inputs
     memory: loop.Memory
     method: int
     rtol: float

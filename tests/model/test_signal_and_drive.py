@@ -305,7 +305,7 @@ def system():
 
 
 def test_the_compiled_loop_evaluates_a_packed_drive_alike(system):
-    from flexura import course, loop
+    from flexura import course
 
     rows, force = np.asarray(system.chain.first[:3]), np.empty(3)
     assert rows.tolist() == [0, 3, 6]
@@ -315,7 +315,7 @@ def test_the_compiled_loop_evaluates_a_packed_drive_alike(system):
     def alike(joints, t, seed):
         drive = Drive(joints)
         y, v = np.random.default_rng(seed).normal(size=(2, system.n))
-        loop.drive(system.chain, course.inputs_of(system, drive), t, y, v, force)
+        acting.drive(system.chain, course.inputs_of(system, drive), t, y, v, force)
         np.testing.assert_allclose(force, drive(t, y[rows], v[rows]), rtol=1e-12, atol=1e-10)
 
     alike()
