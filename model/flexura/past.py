@@ -142,12 +142,16 @@ def _polynomials(p: Past, low: int, used: int, k: int) -> None:
             row[m] = 0.0
         if used <= j < k:
             continue
-        degree, below = 0, 1.0
-        row[0] = 1.0
-        for i in range(used):
+        if j > k and used == 1:  # the error's: the end in place of the oldest
+            row[0], row[1] = -1.0, 1.0
+            continue
+        at = p.node[j] if j < used else 1.0  # where it is to be 1
+        degree, below = (0, 1.0) if j == 0 else (1, at)  # the newest node is at 0
+        row[degree] = 1.0
+        for i in range(1, used):
             if i != j:
-                below *= (p.node[j] if j < used else 1.0) - p.node[i]
-                root = p.node[i] if j <= k or i < used - 1 else 1.0  # the error's: the end in place of the oldest
+                below *= at - p.node[i]
+                root = p.node[i] if j <= k or i < used - 1 else 1.0
                 degree += 1
                 for m in range(degree, 0, -1):
                     row[m] = row[m - 1] - root * row[m]
