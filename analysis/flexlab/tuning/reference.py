@@ -1,10 +1,10 @@
 """What is possible on a structure of the cases: an LQR with observer (`flexura.lqr`), its weights tuned for case 2's J.
 
-It knows the linear model about a place on the way, measures what the rig does (joints and tip deflection), and has the same step,
-sampling and drive limits. It needs a force in every joint: where the cases have a stepper's rate, it has the torque up to which
-the stepper's field holds, with no limit to rate and acceleration. Free are that place, the filters of the set-points, and the
-weights: of each output in parts of its limit, of the strip's deflection and rate, and of the measurements' noise. A joint's
-weight is its way.
+It knows two modes of the strip, linear about a place on the way, measures what the rig does (joints and tip deflection), and has
+the same step, sampling and drive limits; it runs on the whole mesh, whose other modes it may not stir up. It needs a force in
+every joint: where the cases have a stepper's rate, it has the torque up to which the stepper's field holds, with no limit to rate
+and acceleration. Free are that place, the filters of the set-points, and the weights: of each output in parts of its limit, of
+the strip's deflection and rate, and of the measurements' noise. A joint's weight is its way.
 """
 
 from __future__ import annotations
@@ -64,13 +64,13 @@ class Designs:
         return np.full(len(self.free), 0.5)
 
     @cached_property
-    def system(self) -> fx.System:
-        """As the search has it."""
-        return self.task.systems[0]
+    def plant(self) -> fx.System:
+        """With the mesh of the robot file."""
+        return fx.assemble(self.structure.robot)
 
     def controller(self, values: np.ndarray) -> fx.Controller:
-        """The design (d,) on the search's model. Raises InputError where there is none."""
-        system = self.system
+        """The design (d,), on two modes. Raises InputError where there is none."""
+        system = self.task.systems[0]
         named = {f.name: float(v) for f, v in zip(self.free, values, strict=True)}
         given, count = self.structure.reference, len(self.structure.ends)
         own = {name: named[name] for name in named if name.startswith("setpoint")}
@@ -94,7 +94,7 @@ class Designs:
                 drive = self.controller(values)
             except InputError:
                 continue
-            one = trial(self.system, drive, m.duration_s, m.output_step_s, self.task.rtol)
+            one = trial(self.plant, drive, m.duration_s, m.output_step_s, self.task.rtol)
             run_rows(one, prices, one.inputs.law.gains[None].copy(), limits[k : k + 1], out[k], reached[k])
         return out, reached
 
@@ -112,7 +112,7 @@ def reference(structure: Structure, folder: Path, report: Any = lambda history: 
         return None
     values = settings(designs.free, history.all("points")[history.best][None])[0]
     controller = designs.controller(values)
-    run = fx.simulate(fx.assemble(structure.robot), structure.manoeuvre.t, controller, rtol=RTOL)
+    run = fx.simulate(designs.plant, structure.manoeuvre.t, controller, rtol=RTOL)
     run.meta["manoeuvre"] = structure.manoeuvre.name
     run.save(folder / "best")
     weights = {f.name: float(v) for f, v in zip(designs.free, values, strict=True)}
