@@ -1,10 +1,11 @@
 """What is possible on a structure of the cases: an LQR with observer (`flexura.lqr`), its weights tuned for case 2's J.
 
 It knows two modes of the strip, linear about a place on the way, measures what the rig does (joints and tip deflection), and has
-the same step, sampling and drive limits; it runs on the whole mesh, whose other modes it may not stir up. It needs a force in
-every joint: where the cases have a stepper's rate, it has the torque up to which the stepper's field holds, with no limit to rate
-and acceleration. Free are that place, the filters of the set-points, and the weights: of each output in parts of its limit, of
-the strip's deflection and rate, and of the measurements' noise. A joint's weight is its way.
+the same step, sampling and drive limits; it is tried on three modes, as it may not stir up one that it doesn't know, and what
+comes out runs on the whole mesh. It needs a force in every joint: where the cases have a stepper's rate, it has the torque up to
+which the stepper's field holds, with no limit to rate and acceleration. Free are that place, the filters of the set-points, and
+the weights: of each output in parts of its limit, of the strip's deflection and rate, and of the measurements' noise. A joint's
+weight is its way.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ from .free import Free, settings
 from .history import History
 from .result import RTOL, figures
 from .search import Search, search
+from .task import reduced
 
 HOW = Search("ga", population=30, generations=30, seed=1, polish=40)
 
@@ -65,8 +67,8 @@ class Designs:
 
     @cached_property
     def plant(self) -> fx.System:
-        """With the mesh of the robot file."""
-        return fx.assemble(self.structure.robot)
+        """With a mode that the design doesn't know."""
+        return fx.assemble(reduced(self.structure.robot, self.task.modes + 1))
 
     def controller(self, values: np.ndarray) -> fx.Controller:
         """The design (d,), on two modes. Raises InputError where there is none."""
@@ -112,7 +114,7 @@ def reference(structure: Structure, folder: Path, report: Any = lambda history: 
         return None
     values = settings(designs.free, history.all("points")[history.best][None])[0]
     controller = designs.controller(values)
-    run = fx.simulate(designs.plant, structure.manoeuvre.t, controller, rtol=RTOL)
+    run = fx.simulate(fx.assemble(structure.robot), structure.manoeuvre.t, controller, rtol=RTOL)
     run.meta["manoeuvre"] = structure.manoeuvre.name
     run.save(folder / "best")
     weights = {f.name: float(v) for f, v in zip(designs.free, values, strict=True)}

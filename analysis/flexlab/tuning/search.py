@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sized
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -83,7 +83,7 @@ def search(task: Sought, how: Search, engine: Runs, history: History, progress: 
         if how.polish:
             best = history.all("points")[int(history.all("goals")[: history.ends[done - 1], 0].argmin())]
             local = CMAES(x0=best, sigma=NEAR, popsize=POLISHERS, tolfun=1e-6, tolx=1e-5)
-            _stage(local, how.polish, how, task, engine, history, progress, done)
+            _stage(local, how.polish, replace(how, patience=how.polish), task, engine, history, progress, done)
     except KeyboardInterrupt:
         return False
     if not len(history):
