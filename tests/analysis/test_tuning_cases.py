@@ -76,7 +76,7 @@ def test_an_lqrs_figures_are_those_of_its_run_within_the_cases_drive_limits(monk
     found, reached = designs(points, np.full(2, np.inf))
     assert (reached == 1).all()
     controller = designs.controller(settings(designs.free, points)[0])
-    run = fx.simulate(designs.system, designs.structure.manoeuvre.t, controller, rtol=designs.task.rtol)
+    run = fx.simulate(designs.plant, designs.structure.manoeuvre.t, controller, rtol=designs.task.rtol)
     direct = figures(run, controller)
     joints, strip = split(found)
     assert direct.joints[:, :5] == pytest.approx(joints[0, 0, :, :5], rel=1e-7, abs=1e-9, nan_ok=True)
@@ -102,7 +102,7 @@ def test_ga_pso_and_cma_es_reach_the_same_objective_within_2_percent_from_five_s
         for name, population, generations in (("ga", 50, 60), ("pso", 30, 50), ("cma-es", 16, 140)):
             history, begun = History(""), time.perf_counter()
             with Threads(task, 2) as engine:
-                assert search(task, Search(name, population, generations, seed, polish=60), engine, history, lambda h: None)
+                assert search(task, Search(name, population, generations, seed, polish=80), engine, history, lambda h: None)
             least[name, seed] = history.all("goals").min()
             wall = time.perf_counter() - begun
             print(f"| {name} | {seed} | {least[name, seed]:.5f} | {history.evaluations} | {wall:.1f} s |", flush=True)
@@ -124,6 +124,7 @@ def test_the_dissertations_cases(tmp_path):
             u = controls.runs[0]["joint/1/voltage" if each.name == "IV" else "joint/1/drive"]
             limit = controls.gains.settings["voltage_max_V" if each.name == "IV" else "torque_max_1_N_m"]
             assert np.abs(u).max() <= limit * (1 + 1e-9)
+        assert each.lqr.J < each.results[1].best[0] and np.nanmax(each.lqr.response.joints[:, ERROR]) < 1e-3
     assert dissertation.table(found)
     print(json.dumps(dissertation.data(found), indent=1))
 

@@ -1,9 +1,10 @@
 """What is possible on a structure of the cases: an LQR with observer (`flexura.lqr`), its weights tuned for case 2's J.
 
-It knows the linear model about a place on the way, measures what the rig does (joints and tip deflection), and has the same step,
-sampling and drive limits. It needs a force in every joint: where the cases have a stepper's rate, it has the torque up to which
-the stepper's field holds, with no limit to rate and acceleration. Free are that place, the filters of the set-points, and the
-weights: of each output in parts of its limit, of the strip's deflection and rate, and of the measurements' noise. A joint's
+It knows two modes of the strip, linear about a place on the way, measures what the rig does (joints and tip deflection), and has
+the same step, sampling and drive limits; it is tried on three modes, as it may not stir up one that it doesn't know, and what
+comes out runs on the whole mesh. It needs a force in every joint: where the cases have a stepper's rate, it has the torque up to
+which the stepper's field holds, with no limit to rate and acceleration. Free are that place, the filters of the set-points, and
+the weights: of each output in parts of its limit, of the strip's deflection and rate, and of the measurements' noise. A joint's
 weight is its way.
 """
 
@@ -31,6 +32,7 @@ from .free import Free, settings
 from .history import History
 from .result import RTOL, figures
 from .search import Search, search
+from .task import reduced
 
 HOW = Search("ga", population=30, generations=30, seed=1, polish=40)
 
@@ -64,13 +66,13 @@ class Designs:
         return np.full(len(self.free), 0.5)
 
     @cached_property
-    def system(self) -> fx.System:
-        """As the search has it."""
-        return self.task.systems[0]
+    def plant(self) -> fx.System:
+        """With a mode that the design doesn't know."""
+        return fx.assemble(reduced(self.structure.robot, self.task.modes + 1))
 
     def controller(self, values: np.ndarray) -> fx.Controller:
-        """The design (d,) on the search's model. Raises InputError where there is none."""
-        system = self.system
+        """The design (d,), on two modes. Raises InputError where there is none."""
+        system = self.task.systems[0]
         named = {f.name: float(v) for f, v in zip(self.free, values, strict=True)}
         given, count = self.structure.reference, len(self.structure.ends)
         own = {name: named[name] for name in named if name.startswith("setpoint")}
@@ -94,7 +96,7 @@ class Designs:
                 drive = self.controller(values)
             except InputError:
                 continue
-            one = trial(self.system, drive, m.duration_s, m.output_step_s, self.task.rtol)
+            one = trial(self.plant, drive, m.duration_s, m.output_step_s, self.task.rtol)
             run_rows(one, prices, one.inputs.law.gains[None].copy(), limits[k : k + 1], out[k], reached[k])
         return out, reached
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sized
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -27,7 +27,7 @@ ALGORITHMS = {
     "ga": "genetic algorithm, real-coded: tournaments of 3, crossover (SBX) 0.8, mutation 0.1; best of parents and young stay",
     "pso": "particle swarm with adaptive inertia", "cma-es": "covariance matrix adaptation", "nsga2": "Pareto front: two goals",
 }  # fmt: skip
-POLISHERS = 12  # individuals of a polish
+POLISHERS, NEAR = 16, 0.2  # individuals of a polish, and how far they begin from the best
 SAME = 1e-3  # an improvement by less than this fraction is none
 
 
@@ -82,8 +82,8 @@ def search(task: Sought, how: Search, engine: Runs, history: History, progress: 
         done = _stage(_algorithm(how, task.start()), how.generations, how, task, engine, history, progress, 0)
         if how.polish:
             best = history.all("points")[int(history.all("goals")[: history.ends[done - 1], 0].argmin())]
-            local = CMAES(x0=best, sigma=0.1, popsize=POLISHERS, tolfun=1e-6, tolx=1e-5)
-            _stage(local, how.polish, how, task, engine, history, progress, done)
+            local = CMAES(x0=best, sigma=NEAR, popsize=POLISHERS, tolfun=1e-6, tolx=1e-5)
+            _stage(local, how.polish, replace(how, patience=how.polish), task, engine, history, progress, done)
     except KeyboardInterrupt:
         return False
     if not len(history):

@@ -49,7 +49,7 @@ class Task:
     @cached_property
     def systems(self) -> list[fx.System]:
         """As the search has them."""
-        return [fx.assemble(_reduced(robot, self.modes)) for robot in self.robots]
+        return [fx.assemble(reduced(robot, self.modes)) for robot in self.robots]
 
     @cached_property
     def controllers(self) -> list[fx.Controller]:
@@ -134,7 +134,8 @@ class Task:
         return hashlib.sha256(json.dumps([self.spec(), more], sort_keys=True, default=str).encode()).hexdigest()
 
 
-def _reduced(robot: fx.Robot, modes: int) -> fx.Robot:
+def reduced(robot: fx.Robot, modes: int) -> fx.Robot:
+    """The robot with so many modes of each flexible link, 0: as it is."""
     data = robot.to_dict()
     for table, link in zip(data["link"], robot.links, strict=True):
         if modes and link.flexible:
