@@ -16,7 +16,7 @@ import numpy as np
 from .acting import Inputs, beyond, drive, found, powers, prescribe
 from .basis import Basis, look, moved
 from .chain import Chain, Work
-from .compiled import compiled, internal
+from .compiled import compiled, inlined, internal
 from .kernel import passes
 from .lanes import WIDTH, lanes, load, load_some, store, total
 from .loop import (
@@ -39,9 +39,9 @@ from .loop import (
     _weights,
     quintic,
 )  # fmt: skip
-from .past import COUNT, HEAD, ORDER, ROWS, SPAN, STEADY, Past, coefficient, order_of, ring, tables
+from .past import COUNT, GAP, HEAD, ORDER, ROWS, SPAN, STEADY, Past, coefficient, order_of, ring, tables
 from .pinned import pinned
-from .propagator import free, moments
+from .propagator import free, free_waves, moments
 
 EXPONENTIAL = 4  # beside the methods of `loop`
 TIGHT = 20.0  # what the local error is kept below rtol by: few long steps add up what many short ones average out
@@ -155,8 +155,8 @@ def _correct(b: Basis, m: Memory, p: Past, h: float, new: int) -> float:
         e0, e1 = load(p.late[2], i) * gap * load(p.size[0], i), load(p.late[3], i) * gap * load(p.size[1], i)
         squares += e0 * e0 + e1 * e1
     _place(b, p, p.new[2], p.new[3], m.znew)
-    m.znew[2 * n] = work + h * p.area[k] * (p.power[new, 0] + m.K[1, 0])
-    m.znew[2 * n + 1] = loss + h * p.area[k] * (p.power[new, 1] + m.K[1, 1])
+    m.znew[2 * n] = work + h * p.area[GAP] * (p.power[new, 0] + m.K[1, 0])
+    m.znew[2 * n + 1] = loss + h * p.area[GAP] * (p.power[new, 1] + m.K[1, 1])
     return np.sqrt(total(squares) / (2 * n))
 
 
@@ -169,7 +169,7 @@ def _force_inside(b: Basis, p: Past, h: float) -> None:
         for q in range(k + 1):
             f = lanes(0.0)
             if q <= order:
-                f = gap * coefficient(p, k, q, i)
+                f = gap * coefficient(p, GAP, q, i)
                 for j in range(order):
                     f += coefficient(p, j, q, i) * load(p.N[ring(head, j)], i)
             store(p.f[q], i, f)
@@ -187,6 +187,38 @@ def _force_inside(b: Basis, p: Past, h: float) -> None:
             store(p.slow[q], i, below)
 
 
+@inlined
+def _stiff(b: Basis, first: int, last: int, h: float) -> bool:
+    """Do all these modes turn by 1 rad a step or more, underdamped?"""
+    for i in range(first, last):
+        w2, d2 = b.w2[i], b.d2[i]
+        if not (w2 * h * h >= 1.0 and d2 < 0.6 * h * w2 and d2 * d2 < 3.9 * w2):
+            return False
+    return True
+
+
+@inlined
+def _exactly(b: Basis, p: Past, i: int, h: float, x: float, k: int) -> tuple[float, float]:
+    """eta, eta' of mode i at the fraction x of the step: free motion about the one that N alone makes of a stiff mode, or by its
+    moments."""
+    w2, d2, y0, v0 = b.w2[i], b.d2[i], p.eta[i], p.etad[i]
+    g, dg = free(w2, d2, x * h)
+    if _stiff(b, i, i + 1, h):
+        y, v = 0.0, 0.0
+        for q in range(order_of(p, k, i - i % WIDTH), -1, -1):
+            v = v * x + y
+            y = y * x + p.slow[q, i]
+        y0, v0 = y0 - p.slow[0, i], v0 - p.slow[1, i] / h
+        return y + (dg + d2 * g) * y0 + g * v0, v / h + dg * v0 - w2 * g * y0
+    moments(w2, d2, x * h, g, dg, p.column[0], p.column[1], p.tables)
+    y, v, power = (dg + d2 * g) * y0 + g * v0, dg * v0 - w2 * g * y0, 1.0
+    for q in range(k + 1):
+        y += p.column[0, q] * power * p.f[q, i]
+        v += p.column[1, q] * power * p.f[q, i]
+        power *= x
+    return y, v
+
+
 @internal
 def _inside(m: Memory, b: Basis, p: Past, h: float, x: float, out: np.ndarray) -> None:
     """The state at the fraction x of the step just made, after `_force_inside`: modes that turn by less than 1 rad a step by
@@ -194,31 +226,23 @@ def _inside(m: Memory, b: Basis, p: Past, h: float, x: float, out: np.ndarray) -
     n, k = b.seen.shape[0], int(p.s[COUNT])
     eta, etad, place = p.work[0], p.work[1], m.K[14]
     for i in range(0, n, WIDTH):
-        y0, y1 = load(p.eta, i), load(p.new[2], i)
+        y0, y1, last = load(p.eta, i), load(p.new[2], i), min(i + WIDTH, n)
+        if last == i + WIDTH and _stiff(b, i, last, h):
+            w2, d2, y, v = load(b.w2, i), load(b.d2, i), lanes(0.0), lanes(0.0)
+            for q in range(order_of(p, k, i), -1, -1):
+                v = v * x + y
+                y = y * x + load(p.slow[q], i)
+            g, dg = free_waves(w2, d2, x * h)
+            y0, v0 = y0 - load(p.slow[0], i), load(p.etad, i) - load(p.slow[1], i) * (1.0 / h)
+            store(eta, i, y + (dg + d2 * g) * y0 + g * v0)
+            store(etad, i, v * (1.0 / h) + dg * v0 - w2 * g * y0)
+            continue
         y, v = quintic(x, y1 - y0, h * load(p.etad, i), h * load(p.new[3], i), load(p.bent[0], i), load(p.bent[1], i))
         store(eta, i, y0 + y)
         store(etad, i, v * (1.0 / h))
-    for i in range(n):
-        w2, d2 = b.w2[i], b.d2[i]
-        if w2 * h * h < 1.0 and d2 * h < 1.0:
-            continue
-        g, dg = free(w2, d2, x * h)
-        if w2 * h * h >= 1.0 and d2 < 0.6 * h * w2:
-            y, v = 0.0, 0.0
-            for q in range(order_of(p, k, i - i % WIDTH), -1, -1):
-                v = v * x + y
-                y = y * x + p.slow[q, i]
-            y0, v0 = p.eta[i] - p.slow[0, i], p.etad[i] - p.slow[1, i] / h
-            eta[i], etad[i] = y + (dg + d2 * g) * y0 + g * v0, v / h + dg * v0 - w2 * g * y0
-            continue
-        moments(w2, d2, x * h, g, dg, p.column[0], p.column[1], p.tables)
-        y0, v0, power = p.eta[i], p.etad[i], 1.0
-        y, v = (dg + d2 * g) * y0 + g * v0, dg * v0 - w2 * g * y0
-        for q in range(k + 1):
-            y += p.column[0, q] * power * p.f[q, i]
-            v += p.column[1, q] * power * p.f[q, i]
-            power *= x
-        eta[i], etad[i] = y, v
+        for j in range(i, last):
+            if b.w2[j] * h * h >= 1.0 or b.d2[j] * h >= 1.0:
+                eta[j], etad[j] = _exactly(b, p, j, h, x, k)
     _place(b, p, eta, etad, place)
     for j in range(2 * n):
         out[j] = place[j]

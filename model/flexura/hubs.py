@@ -84,15 +84,21 @@ def _elastic(c: Chain, w: Work, i: int, ys: np.ndarray, vs: np.ndarray, gh: floa
             linear = c.lam[i, k] * qs[k] + c.damp[i, k] * qds[k]
         store(row, M, load(terms, 0) + pack(0.0, 0.0, 0.0, linear))
         store(row, M + 4, load(terms, 4))
-    for j in range(m):
-        pivot = S[j]
-        inverse = 1.0 / pivot[j]
-        dinv[j] = inverse
-        for k in range(j + 1, m):
-            row, lower = S[k], pivot[k] * inverse
-            L[k, j] = lower
+    for j in range(0, m, 2):  # two pivots at a time: what is beyond is read and written half as often
+        first = S[j]
+        dinv[j] = 1.0 / first[j]
+        if j + 1 == m:
+            break
+        second, lower = S[j + 1], first[j + 1] * dinv[j]
+        L[j + 1, j] = lower
+        for b in range(j + 1 - (j + 1) % WIDTH, M + 8, WIDTH):
+            store(second, b, load(second, b) - lower * load(first, b))
+        dinv[j + 1] = 1.0 / second[j + 1]
+        for k in range(j + 2, m):
+            row, lower, lower_2 = S[k], first[k] * dinv[j], second[k] * dinv[j + 1]
+            L[k, j], L[k, j + 1] = lower, lower_2
             for b in range(k - k % WIDTH, M + 8, WIDTH):
-                store(row, b, load(row, b) - lower * load(pivot, b))
+                store(row, b, load(row, b) - lower * load(first, b) - lower_2 * load(second, b))
 
 
 @inlined

@@ -105,6 +105,11 @@ def root(x: Any) -> Any:
     return np.sqrt(x)
 
 
+def nearest(x: Any) -> Any:
+    """Whole numbers, halves to even ones."""
+    return np.rint(x).view(_Plain)
+
+
 def turned(a: Any, b: Any, c: Any, d: Any) -> tuple[Any, Any, Any, Any]:
     """The columns of the rows a, b, c, d."""
     return tuple(_plain(column) for column in zip(a, b, c, d, strict=True))  # type: ignore[return-value]
@@ -228,6 +233,12 @@ def _(context: Any, builder: Any, x: Any) -> Any:
 def _(context: Any, builder: Any, x: Any) -> Any:
     kind = ir.FunctionType(_VECTOR, [_VECTOR])
     return builder.call(cgutils.get_or_insert_function(builder.module, kind, f"llvm.sqrt.v{WIDTH}f64"), [x])
+
+
+@_function(nearest, _lanes, _lanes)
+def _(context: Any, builder: Any, x: Any) -> Any:
+    kind = ir.FunctionType(_VECTOR, [_VECTOR])
+    return builder.call(cgutils.get_or_insert_function(builder.module, kind, f"llvm.rint.v{WIDTH}f64"), [x])
 
 
 @_function(turned, types.UniTuple(_lanes, 4), *[_lanes] * 4)

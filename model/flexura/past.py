@@ -9,13 +9,15 @@ import numpy as np
 
 from .basis import Basis
 from .compiled import inlined, internal
-from .lanes import WIDTH, lanes, load, padded, room, store
+from .lanes import WIDTH, lanes, load, pack, padded, room, store
 from .propagator import free, moments
 
 ORDER = 5
 STIFF_ORDER = 2  # of modes that turn by more than STIFF rad a step: extrapolation would blow up what the basis leaves of them
 STIFF = 3.0
 _OVER = 1.0 / np.arange(1, ORDER + 2)
+_UNIT = np.eye(2 * WIDTH)[WIDTH - 1]  # 1 in lane k of what is loaded from WIDTH - 1 - k
+GAP, ERROR = ORDER, ORDER + 1  # the polynomials of the new less the extrapolated value, and of the error of a step
 ROWS = ORDER + 1  # of the rings: the new value has a row of its own until the step is accepted
 # entries of Past.s: values held, step of the tables, steps since it changed, newest row, and the first of the stiff modes
 COUNT, SPAN, STEADY, HEAD, STIFFER = range(5)
@@ -40,11 +42,11 @@ class Past(NamedTuple):
     B: np.ndarray
     ahead: np.ndarray  # (3, ORDER, N) weights of the old values by age in eta, eta' predicted, and in N extrapolated
     late: np.ndarray  # (4, N) weights of new less extrapolated N: correction of eta, eta'; error of both
-    poly: np.ndarray  # (2, ORDER + 2, ORDER + 1) by age, coefficients of Lagrange's polynomials; of the new one; of the error's
+    poly: np.ndarray  # (2, ORDER + 1, 8) coefficients of Lagrange's polynomials, a column each, by age; of GAP's; of ERROR's
     low: np.ndarray  # (N,) 1 for modes of low order, the last ones
-    end: np.ndarray  # (ORDER + 1,) the polynomials at the end of the step
-    area: np.ndarray  # (ORDER + 1,) their integrals over it
-    node: np.ndarray  # (ORDER,) the values' times by age, in steps from the newest
+    end: np.ndarray  # (8,) the polynomials at the end of the step
+    area: np.ndarray  # (8,) their integrals over it
+    node: np.ndarray  # (8,) the values' times by age, in steps from the newest
     gap: np.ndarray  # (N,) new less extrapolated N
     new: np.ndarray  # (4, N) eta, eta' predicted; eta, eta' corrected
     size: np.ndarray  # (2, N) error weights of eta, eta'
@@ -60,7 +62,7 @@ def past(n: int) -> Past:
     k, r, N = ORDER, ROWS, padded(n)
     return Past(**room(
         s=5, origin=N, eta=N, etad=N, t=r, a=(r, N), y=(r, N), v=(r, N), N=(r, N), power=(r, 2), step=(4, N), A=(k + 1, N),
-        B=(k + 1, N), ahead=(3, k, N), late=(4, N), poly=(2, k + 2, k + 1), low=N, end=k + 1, area=k + 1, node=k, gap=N,
+        B=(k + 1, N), ahead=(3, k, N), late=(4, N), poly=(2, k + 1, 8), low=N, end=8, area=8, node=8, gap=N,
         new=(4, N), size=(2, N), f=(k + 1, N), bent=(2, N), slow=(k + 1, N), work=(2, N), column=(2, k + 1), tables=(2, 40),
     ))  # fmt: skip
 
@@ -91,30 +93,49 @@ def tables(b: Basis, p: Past, h: float, k: int) -> None:
         p.s[SPAN], p.s[STEADY], p.s[STIFFER] = h, 0.0, stiffer
     for j in range(k):
         p.node[j] = (p.t[ring(head, j)] - p.t[head]) / h
-    _polynomials(p, 0, k, k)
+    _polynomials(p, 0, k)
     if p.s[STIFFER] < b.seen.shape[0]:
-        _polynomials(p, 1, min(k, STIFF_ORDER), k)
+        _polynomials(p, 1, min(k, STIFF_ORDER))
+    for j in range(0, 8, WIDTH):
+        end, area = lanes(0.0), lanes(0.0)
+        for m in range(ORDER + 1):
+            row = load(p.poly[0, m], j)
+            end += row
+            area += _OVER[m] * row
+        store(p.end, j, end)
+        store(p.area, j, area)
     for i in range(0, n, WIDTH):
         order = order_of(p, k, i)
-        for j in range(k + 2):
-            y, v, end = lanes(0.0), lanes(0.0), lanes(0.0)
-            for m in range(order + 1 if j < order or j >= k else 0):
-                value = coefficient(p, j, m, i)
-                y += value * load(p.A[m], i)
-                v += value * load(p.B[m], i)
-                end += value
-            if j < k:
-                store(p.ahead[0, j], i, y)
-                store(p.ahead[1, j], i, v)
-                store(p.ahead[2, j], i, end)
-            else:
-                store(p.late[2 * (j - k)], i, y)
-                store(p.late[2 * (j - k) + 1], i, v)
-    for j in range(k + 1):
-        p.end[j], p.area[j] = 0.0, 0.0
-        for m in range(k + 1):
-            p.end[j] += p.poly[0, j, m]
-            p.area[j] += p.poly[0, j, m] * _OVER[m]
+        if order == ORDER:  # as a constant, for which the compiler unrolls the loops
+            _weigh(p, k, ORDER, i)
+        else:
+            _weigh(p, k, order, i)
+
+
+@inlined
+def _weigh(p: Past, k: int, order: int, i: int) -> None:
+    """The weights of k values for the modes i to i + 3, from the last `order` ones."""
+    for j in range(order):
+        y, v, end = lanes(0.0), lanes(0.0), lanes(0.0)
+        for m in range(order):
+            value = coefficient(p, j, m, i)
+            y += value * load(p.A[m], i)
+            v += value * load(p.B[m], i)
+            end += value
+        store(p.ahead[0, j], i, y)
+        store(p.ahead[1, j], i, v)
+        store(p.ahead[2, j], i, end)
+    for j in range(order, k):
+        for row in range(3):
+            store(p.ahead[row, j], i, lanes(0.0))
+    for r in range(2):
+        y, v = lanes(0.0), lanes(0.0)
+        for m in range(order + 1):
+            value = coefficient(p, GAP + r, m, i)
+            y += value * load(p.A[m], i)
+            v += value * load(p.B[m], i)
+        store(p.late[2 * r], i, y)
+        store(p.late[2 * r + 1], i, v)
 
 
 @inlined
@@ -127,35 +148,42 @@ def order_of(p: Past, k: int, i: int) -> int:
 def coefficient(p: Past, j: int, m: int, i: int) -> Any:
     """Coefficient m of the polynomial of value j, for the modes i to i + 3."""
     if i + WIDTH <= p.s[STIFFER]:
-        return lanes(p.poly[0, j, m])
+        return lanes(p.poly[0, m, j])
     low = load(p.low, i)
-    return (1.0 - low) * p.poly[0, j, m] + low * p.poly[1, j, m]
+    return (1.0 - low) * p.poly[0, m, j] + low * p.poly[1, m, j]
 
 
 @inlined
-def _polynomials(p: Past, low: int, used: int, k: int) -> None:
-    """Polynomials through the last `used` of k values: Lagrange's, the one for the gap and the one for the error. Multiplied up
-    from their roots: dividing the product of all would lose four digits where nodes lie far apart."""
-    for j in range(k + 2):
-        row = p.poly[low, j]
-        for m in range(ORDER + 1):
-            row[m] = 0.0
-        if used <= j < k:
-            continue
-        if j > k and used == 1:  # the error's: the end in place of the oldest
-            row[0], row[1] = -1.0, 1.0
-            continue
-        at = p.node[j] if j < used else 1.0  # where it is to be 1
-        degree, below = (0, 1.0) if j == 0 else (1, at)  # the newest node is at 0
-        row[degree] = 1.0
-        for i in range(1, used):
-            if i != j:
-                below *= at - p.node[i]
-                root = p.node[i] if j <= k or i < used - 1 else 1.0
-                degree += 1
-                for m in range(degree, 0, -1):
-                    row[m] = row[m - 1] - root * row[m]
-                row[0] *= -root
-        inverse = 1.0 / below
-        for m in range(degree + 1):
-            row[m] *= inverse
+def _polynomials(p: Past, low: int, used: int) -> None:
+    """Polynomials through the last `used` values: Lagrange's, GAP's and ERROR's, eight side by side, each multiplied up from its
+    roots. (Dividing the product of all would lose four digits where nodes lie far apart.)"""
+    C, skipped = p.poly[low], load(_UNIT, 0)
+    for m in range(ORDER + 1):
+        store(C[m], 0, lanes(1.0 if m == 0 else 0.0))
+        store(C[m], WIDTH, lanes(1.0 if m == 0 else 0.0))
+    at, at_end = load(p.node, 0), pack(p.node[WIDTH], 1.0, 1.0, 0.0)  # where each is to be 1
+    below, below_end = lanes(1.0), lanes(1.0)
+    for i in range(used):
+        node = p.node[i]
+        own = load(_UNIT, WIDTH - 1 - i) if i < WIDTH else lanes(0.0)  # Lagrange's i-th has no root at its own node
+        own_end = skipped + load(_UNIT, WIDTH - 1) if i == WIDTH else skipped
+        other, other_end = 1.0 - own, 1.0 - own_end
+        below *= own + other * (at - node)
+        below_end *= own_end + other_end * (at_end - node)
+        root = node * other - own
+        # the error's: the end in place of the oldest
+        root_end = pack(node, node, node if i < used - 1 else 1.0, 0.0) * other_end - own_end
+        for m in range(i + 1, 0, -1):
+            store(C[m], 0, other * load(C[m - 1], 0) - root * load(C[m], 0))
+            store(C[m], WIDTH, other_end * load(C[m - 1], WIDTH) - root_end * load(C[m], WIDTH))
+        store(C[0], 0, -root * load(C[0], 0))
+        store(C[0], WIDTH, -root_end * load(C[0], WIDTH))
+    none, none_end = lanes(0.0), skipped  # no value of that age
+    for j in range(used, WIDTH):
+        none += load(_UNIT, WIDTH - 1 - j)
+    if used <= WIDTH:
+        none_end += load(_UNIT, WIDTH - 1)
+    scale, scale_end = (1.0 - none) / (below + none), (1.0 - none_end) / (below_end + none_end)
+    for m in range(used + 1):
+        store(C[m], 0, scale * load(C[m], 0))
+        store(C[m], WIDTH, scale_end * load(C[m], WIDTH))
