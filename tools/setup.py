@@ -181,7 +181,7 @@ def set_up(venv: Path) -> None:
 
 
 def compile_solver(venv: Path) -> None:
-    step("compiling the solver (two to four minutes the first time)", [str(venv / "bin/python"), "-m", "flexura.warm"])
+    step("compiling the solver (one to two minutes the first time)", [str(venv / "bin/python"), "-m", "flexura.warm"])
 
 
 def main(argv: list[str]) -> int:

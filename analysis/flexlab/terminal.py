@@ -33,7 +33,7 @@ def announce_compiling(function: str = "") -> None:
     from flexura.compiled import folder
 
     if not any(folder().rglob(f"*{function}-*.nbc")):
-        typer.echo("compiling the solver: once, two to four minutes", err=True)
+        typer.echo("compiling the solver: once, one to two minutes", err=True)
 
 
 @contextmanager

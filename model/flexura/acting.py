@@ -10,7 +10,7 @@ from .chain import COULOMB_SPEED, SLEEVE, SLIDER, Chain, Work
 from .compiled import compiled, inlined, internal
 from .law import Law
 from .pinned import pinned
-from .signal import evaluate
+from .signal import evaluate, evaluated
 
 
 class Inputs(NamedTuple):
@@ -34,7 +34,7 @@ def drive(c: Chain, d: Inputs, t: float, y: np.ndarray, v: np.ndarray, force: np
         f0, f1, r0, r1 = d.ranges[i]
         total = 0.0
         if f1 > f0:
-            total = evaluate(d.segments[f0:f1], t)[0]
+            total = evaluated(d.segments[f0:f1], t)[0]
         if r1 > r0:
             r, rd, _ = evaluate(d.segments[r0:r1], t)
             e = c.first[i]

@@ -19,9 +19,9 @@ def quickest(system: System, duration: float, rtol: float, gains: np.ndarray) ->
     flexible link they do not, where their order does not fall behind the explicit method's, and where no strong damper couples
     the modes; else as `choose`. `gains` (N, 2): of position and rate in the drives."""
     c = system.chain
-    bends = np.diff(c.first) > 1
-    rides = (c.kind[1:] == SLIDER) & bends[:-1] & (c.locked[1:] == 0)
-    if rides.any() or not bends.any() or rtol < 1e-9:
+    bends = [link.flexible for link in system.robot.links]
+    rides = any(bends[i - 1] and c.kind[i] == SLIDER and not c.locked[i] for i in range(1, len(bends)))
+    if rides or not any(bends) or rtol < 1e-9:
         return choose(system, duration, rtol)
     # coupling by damping is integrated like a force; extrapolating it is stable for about rate h < 1/35
     coupled = _coupled(system, gains)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -100,7 +101,7 @@ class Drive:
         all_breaks = [s.breaks for j in self.joints for s in (j.force, j.motion) if s is not None]
         return np.unique(np.concatenate(all_breaks)) if all_breaks else np.zeros(0)
 
-    @property
+    @cached_property
     def gains(self) -> np.ndarray:
         """Of position and rate, (n, 2); 0 where a joint follows no motion, or follows it exactly."""
         return np.array([(j.kp, j.kd) if j.motion is not None and not j.prescribed else (0.0, 0.0) for j in self.joints])
@@ -115,7 +116,7 @@ class Drive:
                     parts.append(s.segments)
                     row += len(s.segments)
                 index[i, 2 * k + 1] = row
-        return np.ascontiguousarray(np.concatenate(parts)), index, self.gains
+        return np.ascontiguousarray(np.concatenate(parts)), index, self.gains.copy()
 
 
 def _smooth(motion: Signal, key: str) -> None:

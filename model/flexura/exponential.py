@@ -44,6 +44,8 @@ from .pinned import pinned
 from .propagator import free, free_waves, moments
 
 EXPONENTIAL = 4  # beside the methods of `loop`
+GROWTH = 1.4  # the least that a step may grow by
+_SAFE = (0.85 / GROWTH) ** np.arange(1.0, ORDER + 2.0)  # errors above are too large for that
 TIGHT = 20.0  # what the local error is kept below rtol by: few long steps add up what many short ones average out
 
 
@@ -321,7 +323,8 @@ def advance(
             _predict(b, m, p, h)
         new = 0 if fresh else ring(int(p.s[HEAD]), ROWS - 1)
         y, v = m.znew[:n], m.znew[n : 2 * n]
-        _look(c, w, d, m, p, t if fresh else min(tn, np.nextafter(stop, -1e300)), y, v, new)
+        at = np.nextafter(stop, -1e300) if left == 1.0 and not fresh else tn  # drives are read just before a break
+        _look(c, w, d, m, p, at, y, v, new)
         p.t[new] = tn
         if fresh:
             if moved(c, b, m.z):
@@ -332,7 +335,9 @@ def advance(
         error = _correct(b, m, p, h, new)
         prescribe(c, w, d, tn, y, v)
         k = p.s[COUNT]
-        factor = 2.0 if error == 0.0 else 0.85 * error ** (-1.0 / (k + 1.0))
+        factor = 1.0  # not enough to change the step
+        if not _SAFE[int(k)] <= error < 1.0:
+            factor = 2.0 if error == 0.0 else 0.85 * error ** (-1.0 / (k + 1.0))
         if not error < 1.0:
             s[REJECTED] += 1
             s[H] = h * max(0.25, factor) if error < 1e300 else 0.1 * h
@@ -370,7 +375,7 @@ def advance(
         p.s[HEAD] = ring(int(p.s[HEAD]), ROWS - 1)
         p.s[COUNT] = min(k + 1.0, 1.0 * ORDER)
         p.s[STEADY] += 1.0
-        if factor * h > 1.4 * s[H] and (k < ORDER or p.s[STEADY] > 2.0):
+        if factor * h > GROWTH * s[H] and (k < ORDER or p.s[STEADY] > 2.0):
             s[H] = min(factor * h, 2.0 * s[H])
         if tn >= end:
             s[STATUS] = DONE

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .chain import SLEEVE, Chain, Work
-from .compiled import compiled
+from .compiled import compiled, internal
 from .hubs import formed_block
 from .outward import passed_outward
 from .pinned import pinned
@@ -19,7 +19,21 @@ def inverse(c: Chain, w: Work, y: np.ndarray, v: np.ndarray, a: np.ndarray, grav
     Exact and independent of the condensation in `accelerate`: the check of one against the other is a test.
     """
     c, w = pinned(c), pinned(w)
+    _prepare(c, w, y, v)
+    _inverse(c, w, y, a, gravity, out)
+
+
+@internal
+def _prepare(c: Chain, w: Work, y: np.ndarray, v: np.ndarray) -> None:
+    """What does not depend on the accelerations."""
     passed_outward(c, w, y, v)
+    for i in range(c.kind.shape[0]):
+        formed_block(c, w, i, 0.0)
+
+
+@internal
+def _inverse(c: Chain, w: Work, y: np.ndarray, a: np.ndarray, gravity: np.ndarray, out: np.ndarray) -> None:
+    """`inverse` after `_prepare`."""
     links = c.kind.shape[0]
     t0, t1, t2 = -gravity[0], -gravity[1], 0.0
     for i in range(links):
@@ -49,7 +63,6 @@ def inverse(c: Chain, w: Work, y: np.ndarray, v: np.ndarray, a: np.ndarray, grav
         F0 = c.mass[i] * u0 - body[0] * u2 + body[3] + f0
         F1 = c.mass[i] * u1 + body[1] * u2 + body[4] + f1
         F2 = -body[0] * u0 + body[1] * u1 + body[2] * u2 + body[5] - w.place[i, 1] * f0 + w.place[i, 0] * f1 + f2
-        formed_block(c, w, i, 0.0)
         for k in range(m):
             qdd = a[e + 1 + k]
             F0 += w.terms[i, k, 0] * qdd
@@ -88,10 +101,11 @@ def mass(
     """M(y) (n, n), column by column: what accelerations a of 1 add to the forces at rest, `bias` (n,), where v, a and gravity
     are 0 on entry."""
     c, w = pinned(c), pinned(w)
-    inverse(c, w, y, v, a, gravity, bias)
+    _prepare(c, w, y, v)
+    _inverse(c, w, y, a, gravity, bias)
     for k in range(y.shape[0]):
         a[k] = 1.0
-        inverse(c, w, y, v, a, gravity, M[k])
+        _inverse(c, w, y, a, gravity, M[k])
         a[k] = 0.0
         for j in range(y.shape[0]):
             M[k, j] -= bias[j]

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from .compiled import compiled
+from .compiled import compiled, inlined
 from .errors import InputError
 
 COLUMNS = 10  # t0, c0 ... c5, A, w, phi
@@ -27,6 +27,12 @@ COLUMNS = 10  # t0, c0 ... c5, A, w, phi
 @compiled
 def evaluate(segments: np.ndarray, t: float) -> tuple[float, float, float]:
     """y, dy/dt and d2y/dt2 at t of segments (k, 10); 0 where k = 0."""
+    return evaluated(segments, t)
+
+
+@inlined
+def evaluated(segments: np.ndarray, t: float) -> tuple[float, float, float]:
+    """`evaluate` expanded where it is called: what is not used of it is not computed."""
     count = segments.shape[0]
     if count == 0:
         return 0.0, 0.0, 0.0

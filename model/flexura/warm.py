@@ -1,4 +1,4 @@
-"""Fill the compile cache: `python -m flexura.warm`, two to four minutes the first time, nothing afterwards."""
+"""Fill the compile cache: `python -m flexura.warm`, one to two minutes the first time, nothing afterwards."""
 
 from __future__ import annotations
 
