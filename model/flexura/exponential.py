@@ -141,7 +141,7 @@ def _predict(b: Basis, m: Memory, p: Past, h: float) -> None:
 def _correct(b: Basis, m: Memory, p: Past, h: float, new: int) -> float:
     """The step with what was found where `_predict` led, in a row of the rings: to p.new[2:] and m.znew. Returns the error norm
     (accept below 1)."""
-    n, k = b.seen.shape[0], int(p.s[COUNT])
+    n = b.seen.shape[0]
     work, loss = m.znew[2 * n], m.znew[2 * n + 1]
     squares = lanes(0.0)
     for i in range(0, n, WIDTH):

@@ -305,7 +305,7 @@ def system():
 
 
 def test_the_compiled_loop_evaluates_a_packed_drive_alike(system):
-    from flexura import course
+    from flexura import acting, course
 
     rows, force = np.asarray(system.chain.first[:3]), np.empty(3)
     assert rows.tolist() == [0, 3, 6]
