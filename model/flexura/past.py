@@ -88,6 +88,8 @@ def tables(b: Basis, p: Past, h: float, k: int) -> None:
                 p.A[m, i], p.B[m, i] = A[m], B[m]
             if b.w2[i] * h * h <= STIFF * STIFF:
                 stiffer = i + 1
+        if stiffer == b.seen.shape[0]:
+            stiffer = n
         for i in range(n):
             p.low[i] = 0.0 if i < stiffer else 1.0
         p.s[SPAN], p.s[STEADY], p.s[STIFFER] = h, 0.0, stiffer
@@ -183,7 +185,8 @@ def _polynomials(p: Past, low: int, used: int) -> None:
         none += load(_UNIT, WIDTH - 1 - j)
     if used <= WIDTH:
         none_end += load(_UNIT, WIDTH - 1)
-    scale, scale_end = (1.0 - none) / (below + none), (1.0 - none_end) / (below_end + none_end)
+    some, some_end = 1.0 - none, 1.0 - none_end
+    scale, scale_end = some / (some * below + none), some_end / (some_end * below_end + none_end)
     for m in range(used + 1):
         store(C[m], 0, scale * load(C[m], 0))
         store(C[m], WIDTH, scale_end * load(C[m], WIDTH))
