@@ -153,7 +153,7 @@ class Noisy:
     def __init__(self, inner, every=400):
         self.inner, self.random, self.every = inner, random.Random(7), every
         self.label, self.emulated = inner.label, inner.emulated
-        self.bad = False
+        self.bad, self.commands = False, 0
 
     def read(self):
         data = bytearray(self.inner.read())
@@ -166,7 +166,8 @@ class Noisy:
         return bytes(data)
 
     def write(self, data):
-        self.inner.write(data if not self.bad or self.random.randrange(10) else data[:-3] + self.random.randbytes(3))
+        self.commands += self.bad  # never two in a row: at the third the board would stop by itself, as it should
+        self.inner.write(data if self.commands % 10 != 5 or not self.bad else data[:-3] + self.random.randbytes(3))
 
     def wait(self, seconds):
         self.inner.wait(seconds)

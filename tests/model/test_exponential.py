@@ -6,14 +6,17 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numba import njit
 from scipy.linalg import eigh, expm
 
 import flexura as fx
 from flexura import basis as modal
-from flexura import exponential, signal
+from flexura import exponential, past, propagator, signal
 from flexura.course import Course
 from flexura.forward import initial, to_state
+from flexura.lanes import WIDTH, load, store
 from flexura.loop import RUNNING
+from flexura.past import ORDER
 from flexura.propagator import free, moments
 from robots import beam, bench_arm, few, rigid, robot, robots, system, two_link_arm
 
@@ -78,6 +81,46 @@ def test_the_basis_is_that_of_the_robot(made, random):
         assert phi @ M @ phi.T == pytest.approx(np.eye(sys.n), abs=good + 1e-12)
         assert phi @ rows == pytest.approx(np.eye(sys.n), abs=good + 1e-12)
         assert found == pytest.approx(np.maximum(eigh(K, M, eigvals_only=True), 0), abs=(good + 1e-9) * found[-1] + 1e-9)
+
+
+@few
+@given(st.integers(1, ORDER), st.lists(st.floats(0.05, 4.0), min_size=ORDER, max_size=ORDER), st.integers(1, ORDER))
+def test_the_polynomials_of_a_step_are_those_through_its_values(k, apart, used):
+    """Lagrange's are 1 at their own node and 0 at the others, GAP's 1 at the end, ERROR's the same but for the oldest node, and
+    their sum is 1; a value that is not there has none, whatever its place in the memory held before."""
+    p, used = past.past(4), min(used, k)
+    p.node[:], p.poly[:] = -np.pi, np.nan
+    p.node[:k] = np.append(0.0, -np.cumsum(apart))[:k]
+    _polynomials_of(p, used)
+    at = lambda j, s: np.polyval(p.poly[0, ::-1, j], s)
+    nodes = p.node[:used]
+    size = np.abs(p.poly[0][:, : past.ERROR + 1]).sum() * 1e-13 * (1 + np.abs(nodes).max()) ** used
+    assert np.array([at(j, nodes) for j in range(used)]) == pytest.approx(np.eye(used), abs=size)
+    assert at(past.GAP, np.append(nodes, 1.0)) == pytest.approx(np.append(np.zeros(used), 1.0), abs=size)
+    assert at(past.ERROR, np.append(nodes[:-1], 1.0)) == pytest.approx(np.zeros(used), abs=size)
+    assert p.poly[0, used, past.ERROR] == pytest.approx(p.poly[0, used, past.GAP], rel=1e-12)
+    assert (p.poly[0, :, used:ORDER] == 0.0).all()
+
+
+@njit
+def _polynomials_of(p, used):
+    past._polynomials(p, 0, used)
+
+
+@njit
+def _waves(x, sine, cosine):
+    for k in range(0, len(x), WIDTH):
+        s, c = propagator.waves(load(x, k))
+        store(sine, k, s)
+        store(cosine, k, c)
+
+
+def test_waves_are_the_librarys_sine_and_cosine():
+    """From 0 to 1e5 and back, near multiples of pi / 2 too: the error is that of rounding x and a few last digits."""
+    x = np.concatenate([np.linspace(-1e5, 1e5, 4000), np.linspace(-7, 7, 4000), np.arange(-2000, 2000) * (np.pi / 2)])
+    found = np.zeros((2, len(x)))
+    _waves(x, *found)
+    assert np.abs(found - [np.sin(x), np.cos(x)]).max() < 5e-16
 
 
 # Runs -----------------------------------------------------------------------------------------------------------------------
