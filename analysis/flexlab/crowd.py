@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import flexura as fx
 from flexura.assembly import assemble_all
 from flexura.engine import cores, engine
 from flexura.forward import initial, to_state
+from flexura.population import BLOCK
 
 from . import baseline
 
@@ -37,16 +39,17 @@ def measure(rounds: int = ROUNDS) -> list[dict[str, Any]]:
     """Rows: what is timed, its median time a robot [us], and how often one Exudyn run takes that, with the quartiles over
     `rounds`, in turn, and what is asked."""
     many, drive, threads = batch(), fx.Drive.force(baseline.FORCE, baseline.TORQUE), cores()
-    robots = [robot for robot, _ in many]
-    systems = [system for system in assemble_all(robots) if isinstance(system, fx.System)]
-    states = np.array([to_state(s, *initial(s, 0.0, drive, None, None)) for s in systems])
-    whole: Callable[[], Any] = lambda: fx.simulate(many, baseline.T, drive, rtol=RTOL, method=METHOD)
+    robots, stop = [robot for robot, _ in many], np.zeros(1, dtype=bool)
+    blocks = [assemble_all(robots[k : k + BLOCK]) for k in range(0, ROBOTS, BLOCK)]
+    states = [np.array([to_state(s, *initial(s, 0.0, drive, None, None)) for s in systems]) for systems in blocks]
+    run = lambda systems, y: engine(systems, range(len(y)), baseline.T, [drive] * len(y), y, RTOL, METHOD, stop)
+    pool = ThreadPoolExecutor(threads)
     parts: dict[str, Callable[[], Any]] = {
-        f"whole, from robots made anew to their channels, {threads} cores": whole,
-        f"time loop alone, {threads} cores": lambda: engine(
-            systems, baseline.T, [drive] * len(systems), states, RTOL, METHOD, threads
+        f"whole, from robots made anew to their channels, {threads} cores": lambda: fx.simulate(
+            many, baseline.T, drive, rtol=RTOL, method=METHOD
         ),
-        "assembly alone, one core": lambda: assemble_all(robots),
+        f"time loop alone, {threads} cores": lambda: list(pool.map(run, blocks, states)),
+        "assembly alone, one core": lambda: [assemble_all(robots[k : k + BLOCK]) for k in range(0, ROBOTS, BLOCK)],
         "making the robots alone, one core": lambda: list(many),
     }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -13,18 +14,41 @@ from .chain import REVOLUTE, SLEEVE, SLIDER, Chain, workspace
 from .errors import InputError
 from .extended import mass_matrix
 from .lanes import padded, room
-from .modes import eigh, modal
-from .newton_euler import mass
+from .modes import modal
+from .newton_euler import masses
 from .robot import Link, Robot
 from .system import System
 
 
+@dataclass(frozen=True)
+class Systems(Sequence[System]):
+    """The Systems of B robots of one topology, their constants side by side: every array has a leading axis (B,).
+
+    `systems[b]` is one of them, and raises the InputError of a robot that is `refused`.
+    """
+
+    robots: Sequence[Robot]
+    chains: Chain
+    links: tuple[LinkIntegrals, ...]
+    transform: np.ndarray
+    to_solver: np.ndarray
+    labels: tuple[str, ...]
+    refused: dict[int, InputError]
+
+    def __len__(self) -> int:
+        return len(self.robots)
+
+    def __getitem__(self, b: Any) -> System:
+        if b in self.refused:
+            raise self.refused[b]
+        own = lambda fields: (field[b] for field in fields)
+        links = tuple(LinkIntegrals(*own(link)) for link in self.links)
+        return System(self.robots[b], Chain(*own(self.chains)), links, self.transform[b], self.to_solver[b], self.labels)
+
+
 def assemble(robot: Robot) -> System:
     """The System of a robot. Raises InputError for a singular mass matrix, and for joints that start beyond a link's end."""
-    system = assemble_all([robot])[0]
-    if isinstance(system, InputError):
-        raise system
-    return system
+    return assemble_all([robot])[0]
 
 
 def size(robot: Robot) -> int:
@@ -33,11 +57,8 @@ def size(robot: Robot) -> int:
     return len(robot.links) + sum(whole if modes is None else min(modes + static, whole) for modes, whole, static in counts)
 
 
-def assemble_all(robots: Sequence[Robot]) -> list[System | InputError]:
-    """The Systems of robots of one topology; an InputError in place of one that cannot be assembled.
-
-    What one robot gets does not depend on the others, to the last bit.
-    """
+def assemble_all(robots: Sequence[Robot]) -> Systems:
+    """The Systems of robots of one topology. What one robot gets does not depend on the others, to the last bit."""
     first, B = robots[0], len(robots)
     rows, infos, spectra, transforms, back = [0], [], [], [], []
     for i, link in enumerate(first.links):
@@ -53,26 +74,18 @@ def assemble_all(robots: Sequence[Robot]) -> list[System | InputError]:
         back.append(transforms[-1] if kept else np.swapaxes(info.basis, 1, 2) @ nodal.M)
         spectra.append(lam)
         infos.append(info)
-    chains = _chains(robots, rows, infos, spectra)
-    to_file, to_solver = _blocks(transforms), _blocks(back)
-    labels, lists = _labels(first, rows), [list(zip(*info, strict=True)) for info in infos]
-    rigs = [Chain(*(field[b] for field in chains)) for b in range(B)]
+    chains = Chain(*_chains(robots, rows, infos, spectra))
     start = np.zeros((B, rows[-1]))
     start[:, rows[:-1]] = [robot.start for robot in robots]
-    free = np.setdiff1d(np.arange(rows[-1]), np.array(rows[:-1])[rigs[0].locked.astype(bool)])
-    M = _masses(rigs, start)[:, free[:, None], free]
-    still = _massless(M, free, rows)
-    M[list(still)] = np.eye(len(free))
-    spectrum = _spectra(M, _blocks([np.eye(lam.shape[1]) * lam[:, None, :] for lam in spectra], 0.0)[:, free[:, None], free])
-    return [
-        InputError(
+    free = np.setdiff1d(np.arange(rows[-1]), np.array(rows[:-1])[chains.locked[0].astype(bool)])
+    refused = {
+        b: InputError(
             "nothing to accelerate: expected a mass or inertia (link, hub, rotor or payload) that this joint moves",
-            key=f"link[{still[b]}].joint",
-        ) if b in still else System(
-            robot, rigs[b], tuple(LinkIntegrals(*of[b]) for of in lists), to_file[b], to_solver[b], labels, spectrum[b]
+            key=f"link[{joint}].joint",
         )
-        for b, robot in enumerate(robots)
-    ]  # fmt: skip
+        for b, joint in _massless(_masses(chains, start)[:, free[:, None], free], free, rows).items()
+    }
+    return Systems(robots, chains, tuple(infos), _blocks(transforms), _blocks(back), _labels(first, rows), refused)
 
 
 def _chains(robots: Sequence[Robot], rows: list[int], infos: list[LinkIntegrals], spectra: list[np.ndarray]) -> list[np.ndarray]:
@@ -101,7 +114,7 @@ def _chains(robots: Sequence[Robot], rows: list[int], infos: list[LinkIntegrals]
         "payload": np.array([[robot.payload.mass_kg] for robot in robots]) * ends,
         "tip_inertia": np.array([[robot.payload.inertia_kg_m2] for robot in robots]) * ends,
         "elements": each([link.elements for link in links[0]]).astype(np.int64), "node": np.zeros((B, N), dtype=np.int64),
-        "reference": of("reference"), "stiffening": [robot.stiffening for robot in robots],
+        "reference": of("reference"), "stiffening": np.array([robot.stiffening for robot in robots]),
         "gravity": np.array([robot.gravity_m_s2 for robot in robots], dtype=float),
     }  # fmt: skip
     fields |= {name: _padded([getattr(info, name) for info in infos]) for name in _PER_LINK}
@@ -170,13 +183,13 @@ def _padded(arrays: list[np.ndarray]) -> np.ndarray:
     return out
 
 
-def _blocks(parts: list[np.ndarray], joint: float = 1.0) -> np.ndarray:
-    """Matrices (B, n, n) with `joint` for each joint and the links' own (B, m, m) after it on their diagonals."""
+def _blocks(parts: list[np.ndarray]) -> np.ndarray:
+    """Matrices (B, n, n) with 1 for each joint and the links' own (B, m, m) after it on their diagonals."""
     n = sum(1 + part.shape[1] for part in parts)
     out, row = np.zeros((len(parts[0]), n, n)), 0
     for part in parts:
         end = row + 1 + part.shape[1]
-        out[:, row, row] = joint
+        out[:, row, row] = 1.0
         out[:, row + 1 : end, row + 1 : end] = part
         row = end
     return out
@@ -195,15 +208,14 @@ def _labels(robot: Robot, rows: list[int]) -> tuple[str, ...]:
     return tuple(labels)
 
 
-def _masses(chains: Sequence[Chain], y: np.ndarray) -> np.ndarray:
+def _masses(chains: Chain, y: np.ndarray) -> np.ndarray:
     """Mass matrices (B, n, n) at y (B, n), in the solver's coordinates."""
     B, n = y.shape
-    M, work = np.zeros((B, n, n)), workspace(chains[0])
+    chain = lambda b: Chain(*(field[b] for field in chains))
     if n > 60:  # column by column takes n times a pass, whose cost grows faster than n
-        return np.array([mass_matrix(chain, work, y[b]) for b, chain in enumerate(chains)])
-    v, a, gravity, bias = np.zeros(n), np.zeros(n), np.zeros(2), np.zeros(n)
-    for b, chain in enumerate(chains):
-        mass(chain, work, y[b], v, a, gravity, bias, M[b])
+        return np.array([mass_matrix(chain(b), workspace(chain(b)), y[b]) for b in range(B)])
+    M = np.zeros((B, n, n))
+    masses(chains, workspace(chain(0)), y, np.zeros((4, max(n, 2))), M)
     return (M + np.swapaxes(M, 1, 2)) / 2
 
 
@@ -213,16 +225,16 @@ def _massless(M: np.ndarray, free: np.ndarray, rows: list[int]) -> dict[int, int
         return {}
     diagonal = np.einsum("bii->bi", M)
     scale = 1 / np.sqrt(np.maximum(diagonal, 1e-300))
-    smallest = np.linalg.eigvalsh(M * scale[:, None, :] * scale[:, :, None])[:, 0]
+    scaled = M * scale[:, None, :] * scale[:, :, None]
+    if (diagonal > 0).all():
+        try:
+            np.linalg.cholesky(scaled - 1e-13 * np.eye(len(free)))
+            return {}
+        except np.linalg.LinAlgError:
+            pass  # one of them; which, their eigenvalues say
+    smallest = np.linalg.eigvalsh(scaled)[:, 0]
     out = {}
     for b in np.flatnonzero((diagonal <= 0).any(axis=1) | (smallest < 1e-13)):
         nothing = {int(row) for row, value in zip(free, diagonal[b], strict=True) if value <= 1e-300}
         out[int(b)] = next((i for i, row in enumerate(rows[:-1], 1) if row in nothing), len(rows) - 1)
     return out
-
-
-def _spectra(M: np.ndarray, K: np.ndarray) -> np.ndarray:
-    """Natural frequencies (B, n) [rad/s], ascending; 0 where nothing moves (B, 1)."""
-    if M.shape[1] == 0:
-        return np.zeros((len(M), 1))
-    return np.sqrt(np.maximum(eigh(K, M)[0], 0.0))

@@ -11,7 +11,7 @@ import numpy as np
 
 from .drive import Drive
 from .errors import InputError
-from .robot import Robot
+from .robot import Robot, changed
 
 Item = tuple[Robot, Drive | None]  # None: the drive that all share
 
@@ -51,7 +51,9 @@ class Batch:
         counts = {len(values) for values in columns.values()}
         if len(counts) != 1:
             raise InputError("expected one or more keys with equally many values", key="changes", value=sorted(counts))
-        return Batch(lambda k, random: robot.replace({key: float(values[k]) for key, values in columns.items()}), counts.pop())
+        tables = robot.to_dict()
+        one = lambda k, random: Robot.from_dict(changed(tables, {key: float(values[k]) for key, values in columns.items()}))
+        return Batch(one, counts.pop())
 
     def __iter__(self) -> Iterator[Item]:
         """The robots in their order, each checked against the first one's topology."""

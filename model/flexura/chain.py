@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .compiled import internal
 from .lanes import room
 
 REVOLUTE, SLIDER, SLEEVE = 0, 1, 2  # joint kinds R, Pa, Pb
@@ -71,6 +72,10 @@ class Chain(NamedTuple):
     law_EI: np.ndarray  # (N, B, 5) E I [N m^2]
     stiffening: bool
     gravity: np.ndarray  # (2,)
+
+
+# robot k of chains whose fields have a leading axis; made from the fields so that a new one is not forgotten
+of_many = internal(eval(f"lambda chains, k: Chain({', '.join(f'chains.{name}[k]' for name in Chain._fields)})"), cache=False)
 
 
 class Work(NamedTuple):

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from . import exponential, loop
-from .chain import SLIDER
+from .chain import SLIDER, Chain
 from .system import System
 
 # |z| of y' = z y up to which a method is stable, with about 10 % to spare for a spectrum that moves with the robot: DOP853 5.97
@@ -18,24 +18,32 @@ def quickest(system: System, duration: float, rtol: float, gains: np.ndarray) ->
     """Exponential steps wherever the robot's modes stay much the same from step to step, which under a slider that moves along a
     flexible link they do not, where their order does not fall behind the explicit method's, and where no strong damper couples
     the modes; else as `choose`. `gains` (N, 2): of position and rate in the drives."""
-    c = system.chain
-    bends = [link.flexible for link in system.robot.links]
-    rides = any(bends[i - 1] and c.kind[i] == SLIDER and not c.locked[i] for i in range(1, len(bends)))
-    if rides or not any(bends) or rtol < 1e-9:
+    if not keeps_modes(system.chain, rtol):
         return choose(system, duration, rtol)
     # coupling by damping is integrated like a force; extrapolating it is stable for about rate h < 1/35
-    coupled = _coupled(system, gains)
-    if coupled > 0.0 and 35 * coupled > _implicit(system, rtol):
+    if not uncoupled(system.chain, gains) and 35 * _coupling(system, gains) > _implicit(system, rtol):
         return choose(system, duration, rtol)
     return exponential.EXPONENTIAL
 
 
-def _coupled(system: System, gains: np.ndarray) -> float:
+def keeps_modes(c: Chain, rtol: float) -> bool:
+    """The first two of these conditions, the same for all robots of a topology (fields of c with a leading axis (B,), or not)."""
+    kind, locked, elements = (field.reshape(-1, c.kind.shape[-1])[0] for field in (c.kind, c.locked, c.elements))
+    rides = (kind[1:] == SLIDER) & (locked[1:] == 0) & (elements[:-1] > 0)
+    return bool((elements > 0).any() and not rides.any() and rtol >= 1e-9)
+
+
+def uncoupled(c: Chain, gains: np.ndarray) -> np.ndarray:
+    """Is there nothing that could couple a robot's modes by damping: no gains (..., N, 2), no viscous friction, and one beta in all
+    flexible links? For one robot, or for each of many, (B,)."""
+    bends = c.elements.reshape(-1, c.kind.shape[-1])[0] > 0
+    alpha, beta = c.alpha[..., bends], c.beta[..., bends]
+    alike = (alpha == 0.0).all(axis=-1) & (beta == beta[..., :1]).all(axis=-1)
+    return np.asarray(alike & ~gains.any(axis=(-2, -1)) & ~c.viscous.any(axis=-1))
+
+
+def _coupling(system: System, gains: np.ndarray) -> float:
     """The rate [1/s] at which dampers couple the modes at the start: the norm of what Phi^T D Phi has off its diagonal."""
-    damping = [link.damping for link in system.robot.links if link.flexible]
-    alike = all(d.alpha_1_s == 0.0 and d.beta_s == damping[0].beta_s for d in damping)
-    if alike and not gains.any() and not system.chain.viscous.any():
-        return 0.0
     K, D, rows = system.stiffness(), system.damping.copy(), system.joint_rows
     K[rows, rows] += gains[:, 0]
     D[rows, rows] += gains[:, 1]
@@ -48,7 +56,8 @@ def _coupled(system: System, gains: np.ndarray) -> float:
 def longest_step(system: System, method: int = loop.EXPLICIT) -> float:
     """A method's longest stable step [s]. Beyond, an explicit method's error estimate alone would let the fastest modes grow for
     a few steps at a time, far above the tolerance."""
-    return _STABLE[method] / max(system.spectrum[-1], _damped(system), 1e-300)
+    stable = _STABLE[method]
+    return stable if stable == np.inf else stable / max(system.spectrum[-1], _damped(system), 1e-300)
 
 
 def choose(system: System, duration: float, rtol: float, rate_Hz: float = 0.0) -> int:

@@ -64,4 +64,4 @@ def _chunk(version: str, request: Request, first: int, items: list[Any], digests
 
     if program() != version:
         raise FlexuraError(f"a worker runs another version of the solver, {program()}; this is {version}")
-    return compute(request, first, items, digests, 1)
+    return compute(request, first, items, digests)

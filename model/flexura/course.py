@@ -120,7 +120,7 @@ def compiled(
 def inputs_of(system: System, drive: Drive | Controller, t: np.ndarray | None = None) -> acting.Inputs:
     """What acts on the robot; a controller's ticks begin at t[0] and are logged up to t[-1]."""
     segments, ranges, gains = drive.packed()
-    limits = slack(system)
+    limits = slack(system.limits)
     law = none()
     if isinstance(drive, Controller):
         start, end = (0.0, 0.0) if t is None else (t[0], t[-1])
@@ -131,9 +131,9 @@ def inputs_of(system: System, drive: Drive | Controller, t: np.ndarray | None = 
     )  # fmt: skip
 
 
-def slack(system: System) -> np.ndarray:
-    """The joints' limits (N, 2), a billionth wider: a motion may end on one, and does so up to round-off."""
-    return system.limits + [-1e-9, 1e-9] * np.maximum(1.0, np.abs(np.where(np.isfinite(system.limits), system.limits, 0.0)))
+def slack(limits: np.ndarray) -> np.ndarray:
+    """Limits (..., 2) a billionth wider: a motion may end on one, and does so up to round-off."""
+    return limits + [-1e-9, 1e-9] * np.maximum(1.0, np.abs(np.where(np.isfinite(limits), limits, 0.0)))
 
 
 def following(system: System, drive: Drive | Controller) -> Work:

@@ -12,17 +12,19 @@ import numpy as np
 
 from . import exponential, loop
 from .acting import Inputs
+from .assembly import Systems
 from .basis import Basis, basis
-from .chain import Chain, Work, workspace
+from .chain import Chain, Work, of_many, workspace
 from .compiled import compiled, internal
 from .course import FIRST, slack
 from .drive import Drive
 from .lanes import room
 from .law import Law, none
 from .loop import Memory
+from .observe import tip
 from .past import Past, past
 from .pinned import pinned
-from .system import System
+from .system import limits
 
 
 class Many(NamedTuple):
@@ -54,9 +56,8 @@ class Histories(NamedTuple):
     steps: np.ndarray  # (B,) int
 
 
-def collected(systems: Sequence[System], drives: Sequence[Drive], states: np.ndarray) -> Many:
-    """The robots' constants side by side; a drive that several have stands there once."""
-    chains = Chain(*(np.array(field) for field in zip(*(s.chain for s in systems), strict=True)))  # type: ignore[arg-type]
+def collected(systems: Systems, drives: Sequence[Drive], states: np.ndarray) -> Many:
+    """The robots' drives and limits beside their constants; a drive that several have stands there once."""
     known: dict[int, int] = {}
     packed: list[tuple[Any, ...]] = []
     for drive in drives:
@@ -65,18 +66,14 @@ def collected(systems: Sequence[System], drives: Sequence[Drive], states: np.nda
             packed.append((*drive.packed(), drive.breaks, drive.follows.astype(np.int64)))
     segments, ranges, gains, breaks, follows = zip(*packed, strict=True)
     which = np.array([known[id(drive)] for drive in drives])
-    limits = np.array([slack(s) for s in systems])
+    ends = slack(limits(systems.robots))
     of = lambda parts: np.array([np.cumsum([0, *map(len, parts)])[k : k + 2] for k in range(len(parts))])[which]
     each = lambda parts: np.array(parts)[which]
     return Many(
-        chains, np.concatenate(segments), of(segments), np.concatenate(breaks), of(breaks), each(ranges),
+        systems.chains, np.concatenate(segments), of(segments), np.concatenate(breaks), of(breaks), each(ranges),
         np.ascontiguousarray(each(gains)[:, :, 0]), np.ascontiguousarray(each(gains)[:, :, 1]), each(follows),
-        np.ascontiguousarray(limits[:, :, 0]), np.ascontiguousarray(limits[:, :, 1]), states,
+        np.ascontiguousarray(ends[:, :, 0]), np.ascontiguousarray(ends[:, :, 1]), states,
     )  # fmt: skip
-
-
-# the chain of one of them, field by field; made from the fields so that a new one is not forgotten
-_chain = internal(eval(f"lambda c, k: Chain({', '.join(f'c.{name}[k]' for name in Chain._fields)})"), cache=False)
 
 
 @internal
@@ -107,14 +104,14 @@ def run(
     x: Many, w: Work, m: Memory, b: Basis, p: Past, law: Law, rtol: float, t: np.ndarray, stop: np.ndarray, history: np.ndarray,
     rows: np.ndarray, out: Histories,
 ) -> None:  # fmt: skip
-    """All runs of x along t (T,), into the `rows` (B,) of `out`, by way of `history` (T, 2n + 2), until `stop` (1,) is set."""
+    """The runs `rows` of x along t (T,), into `out`, by way of `history` (T, 2n + 2), until `stop` (1,) is set."""
     n, x, out = m.a.shape[0], pinned(x), pinned(out)
-    for k in range(x.states.shape[0]):
+    for k in rows:
         if stop[0]:
             return
         _begin(x, k, w, m, b, p, t)
         f, g = x.of_segments[k], x.of_breaks[k]
-        chain = _chain(x.chains, k)
+        chain = of_many(x.chains, k)
         inputs = Inputs(
             x.segments[f[0] : f[1]], x.ranges[k], x.kp[k], x.kd[k], x.follows[k], x.low[k], x.high[k], x.breaks[g[0] : g[1]], law
         )
@@ -122,22 +119,31 @@ def run(
             history[0, j] = x.states[k, j]
         while m.s[loop.STATUS] == loop.RUNNING and not stop[0]:
             exponential.advance(chain, w, inputs, m, b, p, rtol, t, history, 2000)
-        row = rows[k]
         for r in range(int(m.s[loop.OUT])):
             for j in range(2 * n):
-                out.states[row, r, j] = history[r, j]
-            out.work[row, r, 0], out.work[row, r, 1] = history[r, 2 * n], history[r, 2 * n + 1]
+                out.states[k, r, j] = history[r, j]
+            out.work[k, r, 0], out.work[k, r, 1] = history[r, 2 * n], history[r, 2 * n + 1]
         for i in range(out.position.shape[1]):
-            out.position[row, i] = m.z[chain.first[i]]
-        out.status[row], out.steps[row] = int(m.s[loop.STATUS]), int(m.s[loop.STEPS])
-        if out.status[row] != loop.DONE:
-            out.reached[row] = m.s[loop.T]
-        if out.status[row] == loop.LIMIT:
-            out.joint[row] = int(m.s[loop.FAULT])
+            out.position[k, i] = m.z[chain.first[i]]
+        out.status[k], out.steps[k] = int(m.s[loop.STATUS]), int(m.s[loop.STEPS])
+        if out.status[k] != loop.DONE:
+            out.reached[k] = m.s[loop.T]
+        if out.status[k] == loop.LIMIT:
+            out.joint[k] = int(m.s[loop.FAULT])
 
 
-def workplace(system: System, times: int) -> tuple[Work, Memory, Basis, Past, Law, np.ndarray]:
+@compiled
+def tips(chains: Chain, states: np.ndarray, deflections: np.ndarray) -> None:
+    """Tip deflections (B, N, T) [m] of states (B, T, 2n), as `observe` finds them, without all the rest."""
+    for k in range(states.shape[0]):
+        chain = pinned(of_many(chains, k))
+        for i in range(deflections.shape[1]):
+            for s in range(states.shape[1]):
+                deflections[k, i, s] = tip(chain, i, states[k, s, chain.first[i] + 1 : chain.first[i + 1]])[0]
+
+
+def workplace(systems: Systems, times: int) -> tuple[Work, Memory, Basis, Past, Law, np.ndarray]:
     """What `run` needs beside the robots, for such ones and so many times of output."""
-    n = system.n
+    n, chain = len(systems.labels), Chain(*(field[0] for field in systems.chains))
     history = room(a=(times, 2 * n + 2))["a"]
-    return workspace(system.chain), loop.memory(len(system.links), n), basis(n), past(n), none(), history
+    return workspace(chain), loop.memory(len(systems.links), n), basis(n), past(n), none(), history

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .chain import SLEEVE, Chain, Work
+from .chain import SLEEVE, Chain, Work, of_many
 from .compiled import compiled, internal
 from .hubs import formed_block
 from .outward import passed_outward
@@ -109,3 +109,12 @@ def mass(
         a[k] = 0.0
         for j in range(y.shape[0]):
             M[k, j] -= bias[j]
+
+
+@compiled
+def masses(chains: Chain, w: Work, y: np.ndarray, zero: np.ndarray, M: np.ndarray) -> None:
+    """M(y) (B, n, n) of many robots, fields of `chains` with a leading axis, at y (B, n); `zero` (4, n or more) is workspace."""
+    n = y.shape[1]
+    v, a, gravity, bias = zero[0, :n], zero[1, :n], zero[2, :2], zero[3, :n]
+    for k in range(y.shape[0]):
+        mass(of_many(chains, k), w, y[k], v, a, gravity, bias, M[k])

@@ -26,21 +26,13 @@ def _strain(c: Chain, i: int, q: np.ndarray) -> float:
 
 
 @inlined
-def _tip(c: Chain, i: int, q: np.ndarray) -> tuple[float, float]:
+def tip(c: Chain, i: int, q: np.ndarray) -> tuple[float, float]:
     """The deflection of link i's tip [m] and sin of its slope (behind a sleeve: times the free length)."""
     deflection, sin = 0.0, 0.0
     for k in range(q.shape[0]):
         deflection += c.NL[i, k] * q[k]
         sin += c.SL[i, k] * q[k]
     return deflection, sin
-
-
-@compiled
-def tips(c: Chain, states: np.ndarray, deflections: np.ndarray) -> None:
-    """Tip deflections (T, N) [m] of states (T, 2n), as `observe` finds them, without all the rest."""
-    for s in range(states.shape[0]):
-        for i in range(c.kind.shape[0]):
-            deflections[s, i] = _tip(c, i, states[s, c.first[i] + 1 : c.first[i + 1]])[0]
 
 
 @compiled
@@ -98,7 +90,7 @@ def observe(
             potential -= c.gravity[1] * (c.mass[i] * y0 + sa * body[1] + ca * body[0])
             behind = y[e] - c.length[i] if c.kind[i] == SLEEVE else 0.0
             poses[s, i, 0], poses[s, i, 1], poses[s, i, 2] = x0 + ca * behind, y0 + sa * behind, angle
-            deflection, sin = _tip(c, i, q)
+            deflection, sin = tip(c, i, q)
             if c.kind[i] == SLEEVE and m > 0:
                 sin /= y[e]
             tips[s, i, 0], tips[s, i, 1] = deflection, np.arcsin(sin) if c.stiffening else sin

@@ -2,27 +2,31 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from . import forward, loop
-from .assembly import assemble_all
+from .assembly import Systems, assemble_all
 from .batch import Batch, Item, digest
 from .chunks import Chunk, Store, in_memory
 from .course import applied, inputs_of
 from .drive import Drive
 from .engine import WORDS, Histories, cores, engine
 from .errors import InputError
-from .observe import tips
+from .many import tips
 from .record import channel_units, limit_event, record
 from .request import Request
 from .system import System
+
+BLOCK = 128  # robots that are assembled together
 
 
 @dataclass(frozen=True)
@@ -110,10 +114,11 @@ Work = tuple[int, list[Item], list[bytes]]
 
 
 def _todo(robots: Iterator[Item], request: Request, store: Store, size: int) -> Iterator[Work | range]:
-    """Chunks to be done: (first robot, robots, digests); a range stands for one that the store has."""
+    """Chunks to be done: (first robot, robots, their digests, which only a folder needs); a range stands for one that the store
+    has."""
     first = 0
     while items := list(islice(robots, size)):
-        digests = [digest(robot, drive) for robot, drive in items]
+        digests = [b"" if store.folder is None else digest(robot, drive) for robot, drive in items]
         if store.has(first, digests):
             yield range(len(items))
         else:
@@ -122,8 +127,24 @@ def _todo(robots: Iterator[Item], request: Request, store: Store, size: int) -> 
 
 
 def _local(request: Request, todo: Iterator[Work | range], threads: int) -> Generator[Chunk | range, None, None]:
-    for work in todo:
-        yield work if isinstance(work, range) else compute(request, *work, threads)
+    """The chunks, each worked on by all threads; the robots of the next one are made meanwhile."""
+    stop = np.zeros(1, dtype=bool)
+    waiting: deque[Any] = deque()
+    finished = lambda work: work if isinstance(work, range) else _chunk(request, *work[0], [part.result() for part in work[1]])
+    with ThreadPoolExecutor(threads) as pool:
+        try:
+            for work in todo:
+                blocks = [] if isinstance(work, range) else _blocks(*work[:2], threads)
+                own = [pool.submit(simulated, request, *block, stop) for block in blocks]
+                waiting.append((work, own) if own else work)
+                if len(waiting) > 1:
+                    yield finished(waiting.popleft())
+            while waiting:
+                yield finished(waiting.popleft())
+        except BaseException:
+            stop[0] = True
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
 
 
 def _cluster(request: Request, todo: Iterator[Work | range], scheduler: str) -> Generator[Chunk | range, None, None]:
@@ -132,74 +153,112 @@ def _cluster(request: Request, todo: Iterator[Work | range], scheduler: str) -> 
     return cluster.run(request, todo, scheduler)
 
 
-def compute(request: Request, first: int, items: list[Item], digests: list[bytes], threads: int) -> Chunk:
-    """Simulate the robots of one chunk; `first` is the number of its first robot, from 0."""
-    B, t = len(items), request.t
-    events, status = [""] * B, ["refused"] * B
-    reached, steps = np.full(B, np.nan), np.zeros(B, dtype=np.int64)
-    starts: list[tuple[int, System, Drive, np.ndarray]] = []
-    for k, system in enumerate(assemble_all([robot for robot, _ in items])):
-        own = items[k][1] or request.drive or Drive.none(len(items[k][0].links))
-        if len(own.joints) != len(items[k][0].links):
-            raise InputError(
-                f"expected {len(items[k][0].links)} joint drives, one a joint", key=f"robots[{first + k + 1}].drive",
-                value=len(own.joints),
-            )  # fmt: skip
-        try:
-            if isinstance(system, InputError):
-                raise system
-            q, qd = forward.initial(system, t[0], own, request.q0, request.qd0)
-            starts.append((k, system, own, forward.to_state(system, q, qd)))
-        except InputError as error:
-            events[k] = str(error)
-    values: dict[str, np.ndarray] = {}
-    if not request.reduce:
-        values = {name: np.full((B, len(t)), np.nan) for name in request.channels}
-    if starts:
-        rows, systems, drives, states = zip(*starts, strict=True)
-        done = engine(systems, t, drives, np.array(states), request.rtol, request.method, threads)
-        for j, k in enumerate(rows):
-            status[k], reached[k], steps[k] = WORDS[int(done.status[j])], done.reached[j], done.steps[j]
-            events[k] = _event(systems[j], done, j)
-            kept = observed(systems[j], t, done.states[j], done.work[j], drives[j], request.channels)
-            if request.reduce:
-                kept = request.reduced(kept, first + k)
-                if not values:
-                    values = {name: np.full(B, np.nan) for name in kept}
-                if set(values) != set(kept):
-                    text = f"expected the same numbers of every robot, {sorted(values)}"
-                    raise InputError(text, key="reduce", value=sorted(kept))
+def compute(request: Request, first: int, items: list[Item], digests: list[bytes]) -> Chunk:
+    """Simulate the robots of one chunk in this thread; `first` is the number of its first robot, from 0."""
+    parts = [simulated(request, *block, np.zeros(1, dtype=bool)) for block in _blocks(first, items, 1)]
+    return _chunk(request, first, items, digests, parts)
+
+
+def _blocks(first: int, items: list[Item], threads: int) -> Iterator[tuple[int, list[Item]]]:
+    """Shares of a chunk for the threads, each with the number of its first robot."""
+    size = min(BLOCK, -(-len(items) // threads))
+    for k in range(0, len(items), size):
+        yield first + k, items[k : k + size]
+
+
+class Part(NamedTuple):
+    """A block of robots, simulated: as in a Chunk, with the channels (b, T) of all that were started."""
+
+    status: list[str]
+    reached: np.ndarray
+    steps: np.ndarray
+    events: list[str]
+    channels: dict[str, np.ndarray]
+
+
+def simulated(request: Request, first: int, items: list[Item], stop: np.ndarray) -> Part:
+    """Make, run and observe a block of robots, or begin to, where `stop` (1,) is set meanwhile."""
+    B, t, N = len(items), request.t, len(items[0][0].links)
+    systems = assemble_all([robot for robot, _ in items])
+    drives = [drive or request.drive or Drive.none(N) for _, drive in items]
+    for k, drive in enumerate(drives, 1):
+        if len(drive.joints) != N:
+            key = f"robots[{first + k}].drive"
+            raise InputError(f"expected {N} joint drives, one a joint", key=key, value=len(drive.joints))
+    states, refused = _starts(systems, t[0], drives, request)
+    started = [k for k in range(B) if k not in refused]
+    done = engine(systems, started, t, drives, states, request.rtol, request.method, stop)
+    status, reached, steps, events = [WORDS[int(k)] for k in done.status], done.reached, done.steps, [""] * B
+    for k in np.flatnonzero(done.status != loop.DONE):
+        events[k] = _event(systems[k], done, k)
+    for k, error in refused.items():
+        status[k], reached[k], events[k] = "refused", np.nan, str(error)
+    return Part(status, reached, steps, events, _observed(systems, started, t, done, drives, request.channels))
+
+
+def _starts(systems: Systems, t: float, drives: list[Drive], request: Request) -> tuple[np.ndarray, dict[int, InputError]]:
+    """The states (B, 2n + 2) at t, and why robots are refused."""
+    n, rows, refused = len(systems.labels), systems.chains.first[0, :-1], dict(systems.refused)
+    states = np.zeros((len(systems), 2 * n + 2))
+    states[:, rows] = [robot.start for robot in systems.robots]
+    given = request.q0 is not None or request.qd0 is not None
+    for k, drive in enumerate(drives):
+        if k not in refused and (given or drive.follows.any()):  # from elsewhere than the robot's start, at rest
+            try:
+                states[k] = forward.to_state(systems[k], *forward.initial(systems[k], t, drive, request.q0, request.qd0))
+            except InputError as error:
+                refused[k] = error
+    return states, refused
+
+
+def _chunk(request: Request, first: int, items: list[Item], digests: list[bytes], parts: list[Part]) -> Chunk:
+    """The blocks of a chunk in one, reduced if so asked."""
+    status = [word for part in parts for word in part.status]
+    values = {name: np.concatenate([part.channels[name] for part in parts]) for name in request.channels}
+    if request.reduce:
+        channels, values = values, {}
+        for k in range(len(items)):
+            if status[k] == "refused":
+                continue
+            kept = request.reduced({name: rows[k] for name, rows in channels.items()}, first + k)
+            values = values or {name: np.full(len(items), np.nan) for name in kept}
+            if set(values) != set(kept):
+                text = f"expected the same numbers of every robot, {sorted(values)}"
+                raise InputError(text, key="reduce", value=sorted(kept))
             for name, value in kept.items():
                 values[name][k] = value
+    reached, steps = (np.concatenate(arrays) for arrays in ([p.reached for p in parts], [p.steps for p in parts]))
+    events = [event for part in parts for event in part.events]
     return Chunk(first, np.array(status), reached, steps, events, digests, values)
 
 
 def _event(system: System, done: Histories, j: int) -> str:
     if done.status[j] == loop.STUCK:
         return f"got no further than t = {done.reached[j]:.6g} s"
-    if done.status[j] != loop.LIMIT:
-        return ""
     joint = int(done.joint[j])
     return str(limit_event(system, joint, float(done.reached[j]), done.position[j])["text"])
 
 
-def observed(
-    system: System, t: np.ndarray, states: np.ndarray, work: np.ndarray, drive: Drive, names: Sequence[str]
+def _observed(
+    systems: Systems, rows: list[int], t: np.ndarray, done: Histories, drives: list[Drive], names: Sequence[str]
 ) -> dict[str, np.ndarray]:
-    """The channels `names` (T,) of states (T, 2n): the same numbers as a Run has, NaN where the states are."""
-    good = int(np.count_nonzero(~np.isnan(states[:, 0])))
-    out = {name: np.full(len(t), np.nan) for name in names}
-    direct = {f"joint/{i}/position": row for i, row in enumerate(system.joint_rows, 1)}
-    direct |= {f"joint/{i}/velocity": system.n + row for i, row in enumerate(system.joint_rows, 1)}
-    ends = {f"link/{i}/tip_deflection": i - 1 for i, link in enumerate(system.robot.links, 1) if link.flexible}
-    if drive.follows.any() or not all(name in direct or name in ends for name in names):
-        part = states[:good].copy()
-        run = record(system, t[:good], part, work[:good], applied(system, t[:good], part, drive, inputs_of(system, drive)), {})
-        for name in names:
-            out[name][:good] = run[name]
-        return out
-    deflection = np.zeros((good, len(system.links)))
-    tips(system.chain, states[:good], deflection)
-    for name in names:
-        out[name][:good] = states[:good, direct[name]] if name in direct else deflection[:, ends[name]]
+    """The channels `names` (B, T) of the robots `rows`: the same numbers as a Run has, NaN where the states are."""
+    n, first = len(systems.labels), systems.chains.first[0]
+    direct = {f"joint/{i}/position": row for i, row in enumerate(first[:-1], 1)}
+    direct |= {f"joint/{i}/velocity": n + row for i, row in enumerate(first[:-1], 1)}
+    ends = {f"link/{i}/tip_deflection": i - 1 for i, link in enumerate(systems.robots[0].links, 1) if link.flexible}
+    plain = all(name in direct or name in ends for name in names)
+    deflections = np.zeros((len(systems), len(systems.links), len(t)))
+    if plain and any(name in ends for name in names):
+        tips(systems.chains, done.states, deflections)
+    out = {name: np.full((len(systems), len(t)), np.nan) for name in names}
+    for name in names if plain else ():
+        out[name][rows] = done.states[rows, :, direct[name]] if name in direct else deflections[rows, ends[name]]
+    for k in rows:
+        if not plain or drives[k].follows.any():
+            system, good = systems[k], int(np.count_nonzero(~np.isnan(done.states[k, :, 0])))
+            part, work = done.states[k, :good].copy(), done.work[k, :good]
+            run = record(system, t[:good], part, work, applied(system, t[:good], part, drives[k], inputs_of(system, drives[k])), {})
+            for name in names:
+                out[name][k, :good] = run[name]
     return out

@@ -7,6 +7,7 @@ the file, the key, the value and what was expected. Equations that use these num
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
@@ -345,16 +346,24 @@ class Robot(_Table):
     def replace(self, changes: dict[str, Any]) -> Robot:
         """A robot with some values changed: `robot.replace({"payload.mass_kg": 0.1, "link.2.length_m": 0.4})`, links counted
         from 1."""
-        data = self.to_dict()
-        for path, value in changes.items():
-            *parents, last = path.split(".")
-            table: Any = data
-            for part in parents:
-                table = table[_number(table, part, path, value)] if isinstance(table, list) else table.setdefault(part, {})
-                if not isinstance(table, dict | list):
-                    raise InputError(f"expected a place in a robot file; {part} isn't a table", key=path, value=value)
-            table[_number(table, last, path, value) if isinstance(table, list) else last] = value
-        return Robot.from_dict(data)
+        return Robot.from_dict(changed(self.to_dict(), changes))
+
+
+def changed(tables: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Tables of a robot file with some values changed, as in `Robot.replace`; what does not change is shared with `tables`."""
+    out = dict(tables)
+    for path, value in changes.items():
+        *parents, last = path.split(".")
+        table: Any = out
+        for part in parents:
+            key = _number(table, part, path, value) if isinstance(table, list) else part
+            inner = table[key] if isinstance(table, list) else table.get(key, {})
+            if not isinstance(inner, dict | list):
+                raise InputError(f"expected a place in a robot file; {part} isn't a table", key=path, value=value)
+            table[key] = inner.copy()
+            table = table[key]
+        table[_number(table, last, path, value) if isinstance(table, list) else last] = value
+    return out
 
 
 def _number(table: list[Any], part: str, path: str, value: Any) -> int:

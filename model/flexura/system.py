@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,6 +12,7 @@ from . import extended
 from .beam import LinkIntegrals, shape
 from .chain import SLEEVE, Chain, Work, workspace
 from .errors import InputError
+from .modes import eigh
 from .newton_euler import inverse
 from .outward import outward
 from .robot import Robot
@@ -34,7 +35,6 @@ class System:
     transform: np.ndarray
     to_solver: np.ndarray
     labels: tuple[str, ...]
-    spectrum: np.ndarray  # natural frequencies at the start, joints free, gravity left out, ascending [rad/s]; [0]: nothing moves
 
     @property
     def n(self) -> int:
@@ -58,9 +58,17 @@ class System:
     @cached_property
     def limits(self) -> np.ndarray:
         """Lower and upper limits of the joints (links, 2) [m or rad]: those of the file, and the ends of the links that slide."""
-        own = np.array([link.joint.limits or (-np.inf, np.inf) for link in self.robot.links])
-        ends = np.array([self.robot.travel(i) for i in range(len(self.links))])
-        return np.column_stack([np.maximum(own[:, 0], ends[:, 0]), np.minimum(own[:, 1], ends[:, 1])])
+        return limits([self.robot])[0]
+
+    @cached_property
+    def spectrum(self) -> np.ndarray:
+        """Natural frequencies at the start, joints free, gravity left out, ascending [rad/s]; [0]: nothing moves."""
+        free, y = np.ix_(self.free_rows, self.free_rows), self.start()
+        if y[self.free_rows].size == 0:
+            return np.zeros(1)
+        K = np.diag(self._diagonal(self.chain.lam, np.zeros(len(self.links))))
+        values, _ = eigh(K[free][None], extended.mass_matrix(self.chain, self._work(), y)[free][None])
+        return np.sqrt(np.maximum(values[0], 0.0))
 
     def start(self) -> np.ndarray:
         """The configuration at the start (n,): joints at their `start`, links straight."""
@@ -179,6 +187,14 @@ class System:
             ahead = np.maximum(x[k] - info.length + eta, 0.0) / eta  # xi
             out[k] = np.einsum("kt,kt->t", shape(info.length, elements, ahead * info.length), info.basis @ y.T)
         return out
+
+
+def limits(robots: Sequence[Robot]) -> np.ndarray:
+    """`System.limits` of robots with equally many links, (B, links, 2)."""
+    endless = (-np.inf, np.inf)
+    own = np.array([[link.joint.limits or endless for link in robot.links] for robot in robots])
+    ends = np.array([[robot.travel(i) for i in range(len(robot.links))] for robot in robots])
+    return np.stack([np.maximum(own[..., 0], ends[..., 0]), np.minimum(own[..., 1], ends[..., 1])], axis=-1)
 
 
 def jacobian(function: Callable[[np.ndarray], np.ndarray], x: np.ndarray, steps: np.ndarray) -> np.ndarray:
