@@ -7,6 +7,7 @@ from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -127,7 +128,8 @@ def _todo(robots: Iterator[Item], request: Request, store: Store, size: int) -> 
 
 
 def _local(request: Request, todo: Iterator[Work | range], threads: int) -> Generator[Chunk | range, None, None]:
-    """The chunks, each worked on by all threads; the robots of the next one are made meanwhile."""
+    """The chunks, each worked on by all threads. The robots of the next one are made while they run: not while they are assembled,
+    for Python, asking for its lock between two short calls of numpy, would hold up the threads by 5 ms every time."""
     stop = np.zeros(1, dtype=bool)
     waiting: deque[Any] = deque()
     finished = lambda work: work if isinstance(work, range) else _chunk(request, *work[0], [part.result() for part in work[1]])
@@ -135,7 +137,8 @@ def _local(request: Request, todo: Iterator[Work | range], threads: int) -> Gene
         try:
             for work in todo:
                 blocks = [] if isinstance(work, range) else _blocks(*work[:2], threads)
-                own = [pool.submit(simulated, request, *block, stop) for block in blocks]
+                ready = list(pool.map(partial(prepared, request), blocks))
+                own = [pool.submit(simulated, request, block, stop) for block in ready]
                 waiting.append((work, own) if own else work)
                 if len(waiting) > 1:
                     yield finished(waiting.popleft())
@@ -155,7 +158,8 @@ def _cluster(request: Request, todo: Iterator[Work | range], scheduler: str) -> 
 
 def compute(request: Request, first: int, items: list[Item], digests: list[bytes]) -> Chunk:
     """Simulate the robots of one chunk in this thread; `first` is the number of its first robot, from 0."""
-    parts = [simulated(request, *block, np.zeros(1, dtype=bool)) for block in _blocks(first, items, 1)]
+    stop = np.zeros(1, dtype=bool)
+    parts = [simulated(request, prepared(request, block), stop) for block in _blocks(first, items, 1)]
     return _chunk(request, first, items, digests, parts)
 
 
@@ -164,6 +168,15 @@ def _blocks(first: int, items: list[Item], threads: int) -> Iterator[tuple[int, 
     size = min(BLOCK, -(-len(items) // threads))
     for k in range(0, len(items), size):
         yield first + k, items[k : k + size]
+
+
+class Block(NamedTuple):
+    """Robots that are ready to run: their Systems and drives, states (b, 2n + 2) at the start, and why robots are refused."""
+
+    systems: Systems
+    drives: list[Drive]
+    states: np.ndarray
+    refused: dict[int, InputError]
 
 
 class Part(NamedTuple):
@@ -176,16 +189,23 @@ class Part(NamedTuple):
     channels: dict[str, np.ndarray]
 
 
-def simulated(request: Request, first: int, items: list[Item], stop: np.ndarray) -> Part:
-    """Make, run and observe a block of robots, or begin to, where `stop` (1,) is set meanwhile."""
-    B, t, N = len(items), request.t, len(items[0][0].links)
-    systems = assemble_all([robot for robot, _ in items])
+def prepared(request: Request, block: tuple[int, list[Item]]) -> Block:
+    """A block assembled. Raises InputError for drives of another number of joints."""
+    first, items = block
+    N = len(items[0][0].links)
     drives = [drive or request.drive or Drive.none(N) for _, drive in items]
     for k, drive in enumerate(drives, 1):
         if len(drive.joints) != N:
             key = f"robots[{first + k}].drive"
             raise InputError(f"expected {N} joint drives, one a joint", key=key, value=len(drive.joints))
-    states, refused = _starts(systems, t[0], drives, request)
+    systems = assemble_all([robot for robot, _ in items])
+    return Block(systems, drives, *_starts(systems, request.t[0], drives, request))
+
+
+def simulated(request: Request, block: Block, stop: np.ndarray) -> Part:
+    """Run and observe a block, or begin to, where `stop` (1,) is set meanwhile."""
+    systems, drives, states, refused = block
+    B, t = len(systems), request.t
     started = [k for k in range(B) if k not in refused]
     done = engine(systems, started, t, drives, states, request.rtol, request.method, stop)
     status, reached, steps, events = [WORDS[int(k)] for k in done.status], done.reached, done.steps, [""] * B
