@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from .beam import LinkIntegrals, integrals
-from .chain import REVOLUTE, SLEEVE, SLIDER, Chain, workspace
+from .beam import LinkIntegrals, integrals, uniform
+from .chain import REVOLUTE, SLEEVE, SLIDER, Chain, one_of, workspace
 from .errors import InputError
 from .extended import mass_matrix
 from .lanes import padded, room
@@ -18,10 +18,11 @@ from .modes import modal
 from .newton_euler import masses
 from .robot import Link, Robot
 from .system import System
+from .uniform import meshed, reduced
 
 
 @dataclass(frozen=True)
-class Systems(Sequence[System]):
+class Systems:
     """The Systems of B robots of one topology, their constants side by side: every array has a leading axis (B,).
 
     `systems[b]` is one of them, and raises the InputError of a robot that is `refused`.
@@ -38,12 +39,14 @@ class Systems(Sequence[System]):
     def __len__(self) -> int:
         return len(self.robots)
 
-    def __getitem__(self, b: Any) -> System:
+    def __iter__(self) -> Iterator[System]:
+        return (self[b] for b in range(len(self)))
+
+    def __getitem__(self, b: int) -> System:
         if b in self.refused:
             raise self.refused[b]
-        own = lambda fields: (field[b] for field in fields)
-        links = tuple(LinkIntegrals(*own(link)) for link in self.links)
-        return System(self.robots[b], Chain(*own(self.chains)), links, self.transform[b], self.to_solver[b], self.labels)
+        links = tuple(LinkIntegrals(*(field[b] for field in link)) for link in self.links)
+        return System(self.robots[b], one_of(self.chains, b), links, self.transform[b], self.to_solver[b], self.labels)
 
 
 def assemble(robot: Robot) -> System:
@@ -61,20 +64,18 @@ def assemble_all(robots: Sequence[Robot]) -> Systems:
     """The Systems of robots of one topology. What one robot gets does not depend on the others, to the last bit."""
     first, B = robots[0], len(robots)
     rows, infos, spectra, transforms, back = [0], [], [], [], []
-    for i, link in enumerate(first.links):
+    for i in range(len(first.links)):
         last = i == len(first.links) - 1
         own = [robot.links[i] for robot in robots]
         load = np.array([(robot.payload.mass_kg, robot.payload.inertia_kg_m2) for robot in robots]) * last
-        nodal = integrals(own, load[:, 0], load[:, 1])
-        info, lam = modal(nodal, link.modes, loaded=not last)
+        info, lam, to_modes = _link(own, load[:, 0], load[:, 1], loaded=not last)
         m = lam.shape[1]
         rows.append(rows[-1] + 1 + m)
-        kept = link.modes is not None or m == 0
-        transforms.append(np.tile(np.eye(m), (B, 1, 1)) if kept else info.basis)
-        back.append(transforms[-1] if kept else np.swapaxes(info.basis, 1, 2) @ nodal.M)
+        transforms.append(np.tile(np.eye(m), (B, 1, 1)) if to_modes is None else info.basis)
+        back.append(transforms[-1] if to_modes is None else to_modes)
         spectra.append(lam)
         infos.append(info)
-    chains = Chain(*_chains(robots, rows, infos, spectra))
+    chains = _chains(robots, rows, infos, spectra)
     start = np.zeros((B, rows[-1]))
     start[:, rows[:-1]] = [robot.start for robot in robots]
     free = np.setdiff1d(np.arange(rows[-1]), np.array(rows[:-1])[chains.locked[0].astype(bool)])
@@ -88,8 +89,27 @@ def assemble_all(robots: Sequence[Robot]) -> Systems:
     return Systems(robots, chains, tuple(infos), _blocks(transforms), _blocks(back), _labels(first, rows), refused)
 
 
-def _chains(robots: Sequence[Robot], rows: list[int], infos: list[LinkIntegrals], spectra: list[np.ndarray]) -> list[np.ndarray]:
-    """The fields of `Chain`, in its order, of all robots: every one with a leading axis (B,)."""
+def _link(
+    links: Sequence[Link], tip_mass: np.ndarray, tip_inertia: np.ndarray, loaded: bool
+) -> tuple[LinkIntegrals, np.ndarray, np.ndarray | None]:
+    """Links with payloads (B,) in their own modes, omega^2 (B, m), and from nodal unknowns to modes (B, m, m) if all are kept."""
+    one = links[0]
+    kinds = [uniform(link) for link in links]
+    if len(set(kinds)) > 1:
+        parts = [_link([link], tip_mass[k : k + 1], tip_inertia[k : k + 1], loaded) for k, link in enumerate(links)]
+        infos, values, to_modes = zip(*parts, strict=True)
+        info = LinkIntegrals(*(np.concatenate(fields) for fields in zip(*infos, strict=True)))
+        return info, np.concatenate(values), None if to_modes[0] is None else np.concatenate(to_modes)
+    plain = kinds[0] and one.flexible and one.joint.type != "Pb"
+    if plain and one.modes is not None and one.modes + 2 * loaded < 2 * one.elements:
+        return *reduced(links, tip_mass, tip_inertia, loaded), None
+    nodal = (meshed if plain else integrals)(links, tip_mass, tip_inertia)
+    info, lam = modal(nodal, one.modes, loaded)
+    return info, lam, None if one.modes is not None or lam.shape[1] == 0 else np.swapaxes(info.basis, 1, 2) @ nodal.M
+
+
+def _chains(robots: Sequence[Robot], rows: list[int], infos: list[LinkIntegrals], spectra: list[np.ndarray]) -> Chain:
+    """The Chain of all robots: every field with a leading axis (B,)."""
     links = [robot.links for robot in robots]
     B, N = len(robots), len(links[0])
     column = lambda f, kind=float: np.array([[f(link) for link in of] for of in links], dtype=kind)
@@ -132,7 +152,7 @@ def _chains(robots: Sequence[Robot], rows: list[int], infos: list[LinkIntegrals]
         for b, row in enumerate(laws):
             for i, law in enumerate(row):
                 fields[name][b, i, : len(law[k])] = law[k]
-    return [fields[name] for name in Chain._fields]
+    return Chain(**fields)
 
 
 _PER_LINK = (
@@ -211,11 +231,11 @@ def _labels(robot: Robot, rows: list[int]) -> tuple[str, ...]:
 def _masses(chains: Chain, y: np.ndarray) -> np.ndarray:
     """Mass matrices (B, n, n) at y (B, n), in the solver's coordinates."""
     B, n = y.shape
-    chain = lambda b: Chain(*(field[b] for field in chains))
+    work = workspace(one_of(chains, 0))
     if n > 60:  # column by column takes n times a pass, whose cost grows faster than n
-        return np.array([mass_matrix(chain(b), workspace(chain(b)), y[b]) for b in range(B)])
+        return np.array([mass_matrix(one_of(chains, b), work, y[b]) for b in range(B)])
     M = np.zeros((B, n, n))
-    masses(chains, workspace(chain(0)), y, np.zeros((4, max(n, 2))), M)
+    masses(chains, work, y, np.zeros((4, max(n, 2))), M)
     return (M + np.swapaxes(M, 1, 2)) / 2
 
 

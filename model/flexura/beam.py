@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .chain import NODES
-from .robot import Joint, Link
+from .robot import Link
 
 
 def hermite(s: np.ndarray, h: Any, derivative: int = 0) -> np.ndarray:
@@ -128,11 +128,17 @@ def integrals(links: Sequence[Link], tip_mass: np.ndarray, tip_inertia: np.ndarr
 
     What one link gets does not depend on the others, to the last bit.
     """
-    if len(links) > 1 and (len(set(map(_uniform, links))) > 1 or _cells(links) is None):  # kinks in some, or in other places
+    if len(links) > 1 and (len(set(map(uniform, links))) > 1 or _cells(links) is None):  # kinks in some, or in other places
         parts = [integrals([link], tip_mass[k : k + 1], tip_inertia[k : k + 1]) for k, link in enumerate(links)]
         return LinkIntegrals(*(np.concatenate(fields) for fields in zip(*parts, strict=True)))
     sleeve = links[0].joint.type == "Pb"
-    bare = (_sleeved if sleeve else _flexible)(links) if links[0].flexible else _rigid(links)
+    bare = (_sleeved if sleeve else flexible)(links) if links[0].flexible else _rigid(links)
+    return with_ends(bare, links, tip_mass, tip_inertia)
+
+
+def with_ends(bare: LinkIntegrals, links: Sequence[Link], tip_mass: np.ndarray, tip_inertia: np.ndarray) -> LinkIntegrals:
+    """The same links, in whatever coordinates, with their hubs and payloads (B,)."""
+    sleeve = links[0].joint.type == "Pb"
     L, mp, Jp = bare.length, np.asarray(tip_mass, dtype=float), np.asarray(tip_inertia, dtype=float)
     hub = np.array([0.0 if sleeve else link.joint.hub_mass_kg for link in links])
     turn = bare.SL / bare.reference[:, None] if sleeve and links[0].flexible else bare.SL
@@ -151,11 +157,11 @@ def integrals(links: Sequence[Link], tip_mass: np.ndarray, tip_inertia: np.ndarr
     )
 
 
-def _bare(links: Sequence[Link], **fields: Any) -> LinkIntegrals:
+def bare_integrals(links: Sequence[Link], **fields: Any) -> LinkIntegrals:
     """Fields (B, ...), and empty ones for the rest."""
     B = len(links)
     empty = {name: np.broadcast_to(value, (B, *np.shape(value))) for name, value in LinkIntegrals._field_defaults.items()}
-    return LinkIntegrals(**(empty | {"length": _lengths(links)} | fields))
+    return LinkIntegrals(**(empty | {"length": lengths(links)} | fields))
 
 
 def _rigid(links: Sequence[Link]) -> LinkIntegrals:
@@ -167,14 +173,14 @@ def _rigid(links: Sequence[Link]) -> LinkIntegrals:
             moments[k] = m, m * centre, about_centre + m * centre**2
         else:
             moments[k] = _moments([link])[0]
-    return _bare(links, mass=moments[:, 0], s1=moments[:, 1], inertia=moments[:, 2])
+    return bare_integrals(links, mass=moments[:, 0], s1=moments[:, 1], inertia=moments[:, 2])
 
 
 def _moments(links: Sequence[Link]) -> np.ndarray:
     """int dm, int x dm and int x^2 dm of links whose properties have equally many kinks: (B, 3)."""
-    if _uniform(links[0]):
-        L, rho = (values[:, None] for values in (_lengths(links), _numbers(links, "mass_per_length")))
-        return rho * np.concatenate([L, L**2 / 2, L**3 / 3], axis=1)
+    if uniform(links[0]):
+        L, rho = lengths(links)[:, None], numbers(links, "mass_per_length")[:, None]
+        return np.asarray(rho * np.concatenate([L, L**2 / 2, L**3 / 3], axis=1))
     mesh = _cells(links)
     assert mesh is not None
     x, dx = _quadrature(mesh[0])
@@ -182,42 +188,8 @@ def _moments(links: Sequence[Link]) -> np.ndarray:
     return np.stack([dm.sum(axis=1), (dm * x).sum(axis=1), (dm * x * x).sum(axis=1)], axis=1)
 
 
-def _flexible(links: Sequence[Link]) -> LinkIntegrals:
-    """Flexible links clamped to their hubs: uniform ones from the link of length, mass and stiffness 1 with as many elements.
-
-    With xi = x / L and T = diag(1, L, 1, L, ...), phi(x) = T phi_1(xi): every integral of the unit link takes T for each phi in it
-    and the dimensions of the rest.
-    """
-    if not _uniform(links[0]):
-        return _meshed(links)
-    one, n = _unit(links[0].elements, links[0].modes), links[0].elements
-    L, rho, EI = _lengths(links), _numbers(links, "mass_per_length"), _numbers(links, "bending_stiffness")
-    of = lambda values: values[:, None]
-    T = np.tile([1.0, 0.0], n) + of(L) * np.tile([0.0, 1.0], n)
-    rows = T[:, None, :]
-    both = T[:, :, None] * rows
-    matrix = lambda a, factor: a * (factor[:, None, None] * both)
-    return _bare(
-        links, mass=rho * L, s1=rho * L**2 * one.s1, inertia=rho * L**3 * one.inertia, S0=of(rho * L) * T * one.S0,
-        S1=of(rho * L**2) * T * one.S1, M=matrix(one.M, rho * L), K=matrix(one.K, EI / L**3), G1=matrix(one.G1, rho),
-        G2=matrix(one.G2, rho * L), H=matrix(one.H, 1 / L), NL=T * one.NL, SL=T * one.SL / of(L),
-        basis=np.tile(np.eye(2 * n), (len(links), 1, 1)), ride=one.ride * T[:, None, None, :], point_x=of(L) * one.point_x,
-        point_mass=of(rho * L) * one.point_mass, point_phi=one.point_phi * rows, slope_dx=of(L) * one.slope_dx,
-        slope_EI=of(EI * L) * one.slope_EI, slope_d1=one.slope_d1 * (rows / L[:, None, None]),
-        slope_d2=one.slope_d2 * (rows / L[:, None, None] ** 2),
-    )  # fmt: skip
-
-
-@cache
-def _unit(elements: int, modes: int | None) -> LinkIntegrals:
-    """The integrals of a uniform link of length 1 m, 1 kg/m and 1 N m^2."""
-    link = Link(
-        length_m=1.0, elements=elements, modes=modes, mass_per_length_kg_m=1.0, bending_stiffness_N_m2=1.0, joint=Joint(type="R")
-    )
-    return LinkIntegrals(*(field[0] for field in _meshed([link])))
-
-
-def _meshed(links: Sequence[Link]) -> LinkIntegrals:
+def flexible(links: Sequence[Link]) -> LinkIntegrals:
+    """Flexible links clamped to their hubs, without these and their payloads."""
     n, mesh = links[0].elements, _cells(links)
     assert mesh is not None
     cells, element = mesh
@@ -231,7 +203,7 @@ def _meshed(links: Sequence[Link]) -> LinkIntegrals:
     N, S, C = (np.moveaxis(hermite(s, h, k), 0, -1).reshape(len(links), len(element), 6, 4) for k in (0, 1, 2))
     joined = lambda shapes, weight: _joined(shapes, weight.reshape(*shapes.shape[:3], 1), element, n)
     tip = L[:, None]
-    return _bare(
+    return bare_integrals(
         links, mass=dm.sum(axis=1), s1=(dm * x).sum(axis=1), inertia=(dm * x * x).sum(axis=1), S0=joined(N, dm)[0],
         S1=joined(N, dm * x)[0], M=joined(N, dm)[1], K=joined(C, EI * dx)[1], G1=joined(S, n1 * dx)[1], G2=joined(S, n2 * dx)[1],
         H=joined(S, dx)[1], NL=_shapes(L, n, tip)[:, :, 0], SL=_shapes(L, n, tip, 1)[:, :, 0],
@@ -252,15 +224,15 @@ def _joined(shapes: np.ndarray, weight: np.ndarray, element: np.ndarray, n: int)
     return vector[:, 2:], (matrix + np.swapaxes(matrix, 1, 2))[:, 2:, 2:] / 2
 
 
-def _uniform(link: Link) -> bool:
+def uniform(link: Link) -> bool:
     return not any(isinstance(p, list) for p in (link.section, link.mass_per_length_kg_m, link.bending_stiffness_N_m2))
 
 
-def _lengths(links: Sequence[Link]) -> np.ndarray:
+def lengths(links: Sequence[Link]) -> np.ndarray:
     return np.array([link.length_m for link in links], dtype=float)
 
 
-def _numbers(links: Sequence[Link], name: str) -> np.ndarray:
+def numbers(links: Sequence[Link], name: str) -> np.ndarray:
     """`mass_per_length` or `bending_stiffness` of uniform links (B,)."""
     return np.array([getattr(link, name)(0.0) for link in links], dtype=float)
 
@@ -270,9 +242,9 @@ def _cells(links: Sequence[Link]) -> tuple[np.ndarray, np.ndarray] | None:
     those behind a sleeve only their breaks. None where the links differ in it."""
     one, n = links[0], links[0].elements
     meshed = one.flexible and one.joint.type != "Pb"
-    if _uniform(links[0]):
+    if uniform(one):
         n = n if meshed else 1
-        return _lengths(links)[:, None] * np.linspace(0, 1, n + 1), np.arange(n)
+        return lengths(links)[:, None] * np.linspace(0, 1, n + 1), np.arange(n)
     found = []
     for link in links:
         cells, L = np.array(link.breaks()), link.length_m
@@ -290,8 +262,8 @@ def _cells(links: Sequence[Link]) -> tuple[np.ndarray, np.ndarray] | None:
 
 def _law(links: Sequence[Link], name: str, x: np.ndarray) -> np.ndarray:
     """`mass_per_length` or `bending_stiffness` of the links at x (B, ...): all are uniform, or none."""
-    if _uniform(links[0]):
-        return np.broadcast_to(_numbers(links, name).reshape(-1, *[1] * (x.ndim - 1)), x.shape)
+    if uniform(links[0]):
+        return np.broadcast_to(numbers(links, name).reshape(-1, *[1] * (x.ndim - 1)), x.shape)
     return np.array([getattr(link, name)(x[k]) for k, link in enumerate(links)])
 
 
@@ -308,7 +280,7 @@ def _sleeved(links: Sequence[Link]) -> LinkIntegrals:
     moments = _moments(links)
     none, empty = np.zeros((count, 2 * n)), np.zeros((count, 2 * n, 2 * n))
     turned = lambda a: np.swapaxes(a, 1, 2)
-    return _bare(
+    return bare_integrals(
         links, mass=moments[:, 0], s1=moments[:, 1], inertia=moments[:, 2], S0=none, S1=none,
         M=(N * mass[:, None, :]) @ turned(N), K=(C * EI[:, None, :]) @ turned(C), G1=empty, G2=empty, H=empty, NL=N[:, :, -1],
         SL=S[:, :, -1], basis=np.tile(np.eye(2 * n), (count, 1, 1)), ride=_ride(L[:, 0], n), slope_d1=turned(S) / d[:, :, None],
@@ -356,11 +328,11 @@ def _points(links: Sequence[Link]) -> dict[str, Any]:
     than their shapes need.
     """
     n, modes = links[0].elements, links[0].modes
-    L = _lengths(links)
+    L = lengths(links)
     count = n if n > 2 else 4
     if modes is not None:
         count = min(count, max(4, modes + 1))
-    x = L[:, None] * np.arange(1, count + 1) / count
+    x = L[:, None] * (np.arange(1, count + 1) / count)  # the last one is L to the last digit: there is the payload
     mass = _newton_cotes(count)[1:] * (L / count)[:, None] * _law(links, "mass_per_length", x)
     place, dx = _quadrature(np.concatenate([np.zeros((len(L), 1)), x], axis=1), 2)
     EI = _law(links, "bending_stiffness", place)

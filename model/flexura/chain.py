@@ -74,7 +74,12 @@ class Chain(NamedTuple):
     gravity: np.ndarray  # (2,)
 
 
-# robot k of chains whose fields have a leading axis; made from the fields so that a new one is not forgotten
+def one_of(chains: Chain, k: int) -> Chain:
+    """Robot k of chains whose fields have a leading axis (B,)."""
+    return Chain(*(field[k] for field in chains))  # type: ignore[index, arg-type]
+
+
+# the same, compiled; made from the fields so that a new one is not forgotten
 of_many = internal(eval(f"lambda chains, k: Chain({', '.join(f'chains.{name}[k]' for name in Chain._fields)})"), cache=False)
 
 

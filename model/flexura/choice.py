@@ -34,8 +34,8 @@ def keeps_modes(c: Chain, rtol: float) -> bool:
 
 
 def uncoupled(c: Chain, gains: np.ndarray) -> np.ndarray:
-    """Is there nothing that could couple a robot's modes by damping: no gains (..., N, 2), no viscous friction, and one beta in all
-    flexible links? For one robot, or for each of many, (B,)."""
+    """Is there nothing by which damping could couple a robot's modes: no gains (..., N, 2), no viscous friction, and one beta in
+    all flexible links? For one robot, or for each of many, (B,)."""
     bends = c.elements.reshape(-1, c.kind.shape[-1])[0] > 0
     alpha, beta = c.alpha[..., bends], c.beta[..., bends]
     alike = (alpha == 0.0).all(axis=-1) & (beta == beta[..., :1]).all(axis=-1)

@@ -23,8 +23,8 @@ MANIFEST = "population.json"
 
 @dataclass(frozen=True)
 class Chunk:
-    """Robots `first`, `first` + 1, ... from 0: how each ended and when, and its channels (b, T) or reduced numbers (b,). In memory
-    their digests are empty."""
+    """Robots `first`, `first` + 1, ... from 0: how each ended and when, and its channels (b, T) or reduced numbers (b,). Only in
+    a folder have they digests."""
 
     first: int
     status: np.ndarray

@@ -20,8 +20,8 @@ _HERE = Path(__file__).parent
 
 
 class _Indexed(Compiler):  # type: ignore[misc]
-    """Numba's compiler, but an index or an end of a slice counts from the end only where it is a negative constant, and the slices
-    lie within their arrays: the code that asks of every number whether it does was a seventh of the time loop's instructions."""
+    """Numba's compiler, but an index or an end of a slice counts from the end only where it is a negative constant, and slices
+    lie within their arrays: the code that asks of every number whether it does was a ninth of the time loop's instructions."""
 
     def compile_extra(self, function: Any) -> Any:
         with patch.multiple(slicing, fix_index=_index, fix_slice=_slice):

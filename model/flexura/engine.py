@@ -31,8 +31,8 @@ def engine(
 ) -> Histories:
     """Advance the robots `rows` from their rows of states (B, 2n + 2) along t (T,), as `simulate` does one, to the last bit.
 
-    The compiled loop leaves Python's lock, and ends early once `stop` (1,) is set. A robot that gets stuck or reaches a limit ends
-    alone.
+    The compiled loop leaves Python's lock, and ends early once `stop` (1,) is set. A robot that gets stuck or reaches a limit
+    ends alone.
     """
     B, size = states.shape
     out = Histories(

@@ -14,7 +14,7 @@ from . import exponential, loop
 from .acting import Inputs
 from .assembly import Systems
 from .basis import Basis, basis
-from .chain import Chain, Work, of_many, workspace
+from .chain import Chain, Work, of_many, one_of, workspace
 from .compiled import compiled, internal
 from .course import FIRST, slack
 from .drive import Drive
@@ -144,6 +144,6 @@ def tips(chains: Chain, states: np.ndarray, deflections: np.ndarray) -> None:
 
 def workplace(systems: Systems, times: int) -> tuple[Work, Memory, Basis, Past, Law, np.ndarray]:
     """What `run` needs beside the robots, for such ones and so many times of output."""
-    n, chain = len(systems.labels), Chain(*(field[0] for field in systems.chains))
+    n, chain = len(systems.labels), one_of(systems.chains, 0)
     history = room(a=(times, 2 * n + 2))["a"]
     return workspace(chain), loop.memory(len(systems.links), n), basis(n), past(n), none(), history

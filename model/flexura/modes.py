@@ -23,6 +23,8 @@ def modal(links: LinkIntegrals, modes: int | None, loaded: bool) -> tuple[LinkIn
         basis, values = vectors[:, :, :modes], values[:, :modes]
         if loaded:
             static = np.linalg.solve(links.K, np.stack([links.NL, links.SL], axis=2))
+            for _ in range(2):  # what the modes have of them left out, so that M stays 1 to round-off
+                static = static - basis @ (np.swapaxes(basis, 1, 2) @ (links.M @ static))
             weight = (static * (links.M @ static)).sum(axis=1)
             basis = np.concatenate([basis, static / np.sqrt(weight)[:, None, :]], axis=2)
             reduced = links.changed(basis)

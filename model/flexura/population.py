@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass
-from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -128,22 +127,24 @@ def _todo(robots: Iterator[Item], request: Request, store: Store, size: int) -> 
 
 
 def _local(request: Request, todo: Iterator[Work | range], threads: int) -> Generator[Chunk | range, None, None]:
-    """The chunks, each worked on by all threads. The robots of the next one are made while they run: not while they are assembled,
-    for Python, asking for its lock between two short calls of numpy, would hold up the threads by 5 ms every time."""
+    """The chunks, each worked on by all threads; the robots of the next one are made and assembled here meanwhile."""
     stop = np.zeros(1, dtype=bool)
-    waiting: deque[Any] = deque()
-    finished = lambda work: work if isinstance(work, range) else _chunk(request, *work[0], [part.result() for part in work[1]])
+    waiting: deque[tuple[Work | range, list[Future[Part]]]] = deque()
+
+    def finished() -> Chunk | range:
+        work, parts = waiting.popleft()
+        return work if isinstance(work, range) else _chunk(request, *work, [part.result() for part in parts])
+
     with ThreadPoolExecutor(threads) as pool:
         try:
             for work in todo:
                 blocks = [] if isinstance(work, range) else _blocks(*work[:2], threads)
-                ready = list(pool.map(partial(prepared, request), blocks))
-                own = [pool.submit(simulated, request, block, stop) for block in ready]
-                waiting.append((work, own) if own else work)
+                own = [pool.submit(simulated, request, prepared(request, block), stop) for block in blocks]
+                waiting.append((work, own))
                 if len(waiting) > 1:
-                    yield finished(waiting.popleft())
+                    yield finished()
             while waiting:
-                yield finished(waiting.popleft())
+                yield finished()
         except BaseException:
             stop[0] = True
             pool.shutdown(wait=False, cancel_futures=True)
@@ -209,8 +210,8 @@ def simulated(request: Request, block: Block, stop: np.ndarray) -> Part:
     started = [k for k in range(B) if k not in refused]
     done = engine(systems, started, t, drives, states, request.rtol, request.method, stop)
     status, reached, steps, events = [WORDS[int(k)] for k in done.status], done.reached, done.steps, [""] * B
-    for k in np.flatnonzero(done.status != loop.DONE):
-        events[k] = _event(systems[k], done, k)
+    for j in np.flatnonzero(done.status != loop.DONE):
+        events[j] = _event(systems[int(j)], done, int(j))
     for k, error in refused.items():
         status[k], reached[k], events[k] = "refused", np.nan, str(error)
     return Part(status, reached, steps, events, _observed(systems, started, t, done, drives, request.channels))
@@ -278,7 +279,8 @@ def _observed(
         if not plain or drives[k].follows.any():
             system, good = systems[k], int(np.count_nonzero(~np.isnan(done.states[k, :, 0])))
             part, work = done.states[k, :good].copy(), done.work[k, :good]
-            run = record(system, t[:good], part, work, applied(system, t[:good], part, drives[k], inputs_of(system, drives[k])), {})
+            forces = applied(system, t[:good], part, drives[k], inputs_of(system, drives[k]))
+            run = record(system, t[:good], part, work, forces, {})
             for name in names:
                 out[name][k, :good] = run[name]
     return out

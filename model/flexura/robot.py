@@ -356,7 +356,7 @@ def changed(tables: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any
         *parents, last = path.split(".")
         table: Any = out
         for part in parents:
-            key = _number(table, part, path, value) if isinstance(table, list) else part
+            key: Any = _number(table, part, path, value) if isinstance(table, list) else part
             inner = table[key] if isinstance(table, list) else table.get(key, {})
             if not isinstance(inner, dict | list):
                 raise InputError(f"expected a place in a robot file; {part} isn't a table", key=path, value=value)
