@@ -11,6 +11,8 @@ evaluation a step. Steps need not resolve any frequency of the robot. Hochbruck 
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from .acting import Inputs, beyond, drive, found, powers, prescribe
@@ -46,6 +48,7 @@ from .propagator import free, free_waves, moments
 EXPONENTIAL = 4  # beside the methods of `loop`
 GROWTH = 1.4  # the least that a step may grow by
 _SAFE = (0.85 / GROWTH) ** np.arange(1.0, ORDER + 2.0)  # errors above are too large for that
+SLOW, WAVE, DAMPED = 0.0, 1.0, 2.0  # modes inside a step: turning by less than 1 rad; by more, underdamped; the others
 TIGHT = 20.0  # what the local error is kept below rtol by: few long steps add up what many short ones average out
 
 
@@ -164,10 +167,25 @@ def _correct(b: Basis, m: Memory, p: Past, h: float, new: int) -> float:
 
 @internal
 def _force_inside(b: Basis, p: Past, h: float) -> None:
-    """N over the step just made as a polynomial, f, and what `_inside` needs of it."""
+    """What `_inside` needs of the step just made: eta'' at its ends, which modes turn how fast, and of those that turn by 1 rad or
+    more N as a polynomial, f, and the motion that N alone makes, slow."""
     n, k, head = b.seen.shape[0], int(p.s[COUNT]), int(p.s[HEAD])
+    first, last = p.N[head], p.N[ring(head, ROWS - 1)]
     for i in range(0, n, WIDTH):
-        gap, end, order = load(p.gap, i), lanes(0.0), order_of(p, k, i)
+        gap, order, w2, d2 = load(p.gap, i), order_of(p, k, i), load(b.w2, i), load(b.d2, i)
+        store(p.bent[0], i, h * h * (load(first, i) - w2 * load(p.eta, i) - d2 * load(p.etad, i)))
+        store(p.bent[1], i, h * h * (load(last, i) - w2 * load(p.new[2], i) - d2 * load(p.new[3], i)))
+        fast = 0.0
+        for j in range(i, i + WIDTH):
+            turn, drag = b.w2[j] * h * h, b.d2[j] * h
+            p.kind[j] = SLOW
+            if turn >= 1.0 and drag < 0.6 * turn and drag * drag < 3.9 * turn:
+                p.kind[j] = WAVE
+            elif turn >= 1.0 or drag >= 1.0:
+                p.kind[j] = DAMPED
+            fast += p.kind[j]
+        if fast == 0.0:
+            continue
         for q in range(k + 1):
             f = lanes(0.0)
             if q <= order:
@@ -175,12 +193,7 @@ def _force_inside(b: Basis, p: Past, h: float) -> None:
                 for j in range(order):
                     f += coefficient(p, j, q, i) * load(p.N[ring(head, j)], i)
             store(p.f[q], i, f)
-            end += f
-        w2, d2 = load(b.w2, i), load(b.d2, i)
-        store(p.bent[0], i, h * h * (load(p.f[0], i) - w2 * load(p.eta, i) - d2 * load(p.etad, i)))
-        store(p.bent[1], i, h * h * (end - w2 * load(p.new[2], i) - d2 * load(p.new[3], i)))
-        if b.w2[min(i + WIDTH, n) - 1] * h * h < 1.0:
-            continue
+        w2, _ = _waving(b, p, i)
         above, here, inverse, drag = lanes(0.0), lanes(0.0), 1.0 / w2, d2 * (1.0 / h)
         bend = inverse * (1.0 / (h * h))
         for q in range(order, -1, -1):
@@ -190,28 +203,18 @@ def _force_inside(b: Basis, p: Past, h: float) -> None:
 
 
 @inlined
-def _stiff(b: Basis, first: int, last: int, h: float) -> bool:
-    """Do all these modes turn by 1 rad a step or more, underdamped?"""
-    for i in range(first, last):
-        w2, d2 = b.w2[i], b.d2[i]
-        if not (w2 * h * h >= 1.0 and d2 < 0.6 * h * w2 and d2 * d2 < 3.9 * w2):
-            return False
-    return True
+def _waving(b: Basis, p: Past, i: int) -> tuple[Any, Any]:
+    """w2 and d2 of the modes i to i + 3 that are waves, 1 and 0 of the others."""
+    kind = load(p.kind, i)
+    wave = kind * (2.0 - kind)
+    return wave * load(b.w2, i) + (1.0 - wave), wave * load(b.d2, i)
 
 
 @inlined
 def _exactly(b: Basis, p: Past, i: int, h: float, x: float, k: int) -> tuple[float, float]:
-    """eta, eta' of mode i at the fraction x of the step: free motion about the one that N alone makes of a stiff mode, or by its
-    moments."""
+    """eta, eta' of mode i at the fraction x of the step, by its moments."""
     w2, d2, y0, v0 = b.w2[i], b.d2[i], p.eta[i], p.etad[i]
     g, dg = free(w2, d2, x * h)
-    if _stiff(b, i, i + 1, h):
-        y, v = 0.0, 0.0
-        for q in range(order_of(p, k, i - i % WIDTH), -1, -1):
-            v = v * x + y
-            y = y * x + p.slow[q, i]
-        y0, v0 = y0 - p.slow[0, i], v0 - p.slow[1, i] / h
-        return y + (dg + d2 * g) * y0 + g * v0, v / h + dg * v0 - w2 * g * y0
     moments(w2, d2, x * h, g, dg, p.column[0], p.column[1], p.tables)
     y, v, power = (dg + d2 * g) * y0 + g * v0, dg * v0 - w2 * g * y0, 1.0
     for q in range(k + 1):
@@ -228,23 +231,24 @@ def _inside(m: Memory, b: Basis, p: Past, h: float, x: float, out: np.ndarray) -
     n, k = b.seen.shape[0], int(p.s[COUNT])
     eta, etad, place = p.work[0], p.work[1], m.K[14]
     for i in range(0, n, WIDTH):
-        y0, y1, last = load(p.eta, i), load(p.new[2], i), min(i + WIDTH, n)
-        if last == i + WIDTH and _stiff(b, i, last, h):
-            w2, d2, y, v = load(b.w2, i), load(b.d2, i), lanes(0.0), lanes(0.0)
+        y0, y1, kind = load(p.eta, i), load(p.new[2], i), load(p.kind, i)
+        if total((kind - WAVE) * (kind - WAVE)) > 0.0:
+            y, v = quintic(x, y1 - y0, h * load(p.etad, i), h * load(p.new[3], i), load(p.bent[0], i), load(p.bent[1], i))
+            store(eta, i, y0 + y)
+            store(etad, i, v * (1.0 / h))
+        if total(kind) > 0.0:
+            (w2, d2), y, v = _waving(b, p, i), lanes(0.0), lanes(0.0)
             for q in range(order_of(p, k, i), -1, -1):
                 v = v * x + y
                 y = y * x + load(p.slow[q], i)
             g, dg = free_waves(w2, d2, x * h)
             y0, v0 = y0 - load(p.slow[0], i), load(p.etad, i) - load(p.slow[1], i) * (1.0 / h)
-            store(eta, i, y + (dg + d2 * g) * y0 + g * v0)
-            store(etad, i, v * (1.0 / h) + dg * v0 - w2 * g * y0)
-            continue
-        y, v = quintic(x, y1 - y0, h * load(p.etad, i), h * load(p.new[3], i), load(p.bent[0], i), load(p.bent[1], i))
-        store(eta, i, y0 + y)
-        store(etad, i, v * (1.0 / h))
-        for j in range(i, last):
-            if b.w2[j] * h * h >= 1.0 or b.d2[j] * h >= 1.0:
-                eta[j], etad[j] = _exactly(b, p, j, h, x, k)
+            wave = kind * (2.0 - kind)
+            store(eta, i, wave * (y + (dg + d2 * g) * y0 + g * v0) + (1.0 - wave) * load(eta, i))
+            store(etad, i, wave * (v * (1.0 / h) + dg * v0 - w2 * g * y0) + (1.0 - wave) * load(etad, i))
+            for j in range(i, min(i + WIDTH, n)):
+                if p.kind[j] == DAMPED:
+                    eta[j], etad[j] = _exactly(b, p, j, h, x, k)
     _place(b, p, eta, etad, place)
     for j in range(2 * n):
         out[j] = place[j]
