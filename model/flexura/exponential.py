@@ -167,8 +167,8 @@ def _correct(b: Basis, m: Memory, p: Past, h: float, new: int) -> float:
 
 @internal
 def _force_inside(b: Basis, p: Past, h: float) -> None:
-    """What `_inside` needs of the step just made: eta'' at its ends, which modes turn how fast, and of those that turn by 1 rad or
-    more N as a polynomial, f, and the motion that N alone makes, slow."""
+    """What `_inside` needs of the step just made: eta'' at its ends, which modes turn how fast, and where some turn by 1 rad or
+    more, N as a polynomial, f, and the motion that N alone makes, slow."""
     n, k, head = b.seen.shape[0], int(p.s[COUNT]), int(p.s[HEAD])
     first, last = p.N[head], p.N[ring(head, ROWS - 1)]
     for i in range(0, n, WIDTH):

@@ -64,7 +64,8 @@ def past(n: int) -> Past:
     return Past(**room(
         s=5, origin=N, eta=N, etad=N, t=r, a=(r, N), y=(r, N), v=(r, N), N=(r, N), power=(r, 2), step=(4, N), A=(k + 1, N),
         B=(k + 1, N), ahead=(3, k, N), late=(4, N), poly=(2, k + 1, 8), low=N, end=8, area=8, node=8, gap=N,
-        new=(4, N), size=(2, N), f=(k + 1, N), bent=(2, N), slow=(k + 1, N), kind=N, work=(2, N), column=(2, k + 1), tables=(2, 40),
+        new=(4, N), size=(2, N), f=(k + 1, N), bent=(2, N), slow=(k + 1, N), kind=N, work=(2, N), column=(2, k + 1),
+        tables=(2, 40),
     ))  # fmt: skip
 
 
