@@ -11,7 +11,7 @@ import numpy as np
 
 from .drive import Drive
 from .errors import InputError
-from .robot import Robot, changed
+from .robot import Robot
 
 Item = tuple[Robot, Drive | None]  # None: the drive that all share
 
@@ -51,9 +51,7 @@ class Batch:
         counts = {len(values) for values in columns.values()}
         if len(counts) != 1:
             raise InputError("expected one or more keys with equally many values", key="changes", value=sorted(counts))
-        tables = robot.to_dict()
-        one = lambda k, random: Robot.from_dict(changed(tables, {key: float(values[k]) for key, values in columns.items()}))
-        return Batch(one, counts.pop())
+        return Batch(_Varied(robot, columns), counts.pop())
 
     def __iter__(self) -> Iterator[Item]:
         """The robots in their order, each checked against the first one's topology."""
@@ -79,6 +77,18 @@ class Batch:
         if callable(self.source):
             return (self.source(k, np.random.default_rng([self.seed, k])) for k in range(self.count))
         return iter(self.source)
+
+
+@dataclass(frozen=True)
+class _Varied:
+    """A robot with values from columns of numbers, again and again; no generator is made where none is used."""
+
+    robot: Robot
+    columns: Mapping[str, np.ndarray]
+
+    def __iter__(self) -> Iterator[Robot]:
+        for row in zip(*(values.tolist() for values in self.columns.values()), strict=True):
+            yield self.robot.replace(dict(zip(self.columns, row, strict=True)))
 
 
 def topology(robot: Robot) -> tuple[Any, ...]:

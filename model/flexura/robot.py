@@ -7,7 +7,6 @@ the file, the key, the value and what was expected. Equations that use these num
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
@@ -346,21 +345,27 @@ class Robot(_Table):
     def replace(self, changes: dict[str, Any]) -> Robot:
         """A robot with some values changed: `robot.replace({"payload.mass_kg": 0.1, "link.2.length_m": 0.4})`, links counted
         from 1."""
-        return Robot.from_dict(changed(self.to_dict(), changes))
+        try:
+            return Robot.model_validate(_changed(self, changes))
+        except ValidationError:
+            return Robot.from_dict(_changed(self.to_dict(), changes))  # says what is wrong in a file's words
 
 
-def changed(tables: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Tables of a robot file with some values changed, as in `Robot.replace`; what does not change is shared with `tables`."""
-    out = dict(tables)
+def _changed(tables: Any, changes: dict[str, Any]) -> dict[str, Any]:
+    """A robot, or the tables of its file, with some values changed: tables along the way, and as they are the parts that do not
+    change, which are not validated again."""
+    copied = lambda table: dict(table.__dict__) if isinstance(table, BaseModel) else table.copy()
+    out: dict[str, Any] = copied(tables)
     for path, value in changes.items():
         *parents, last = path.split(".")
         table: Any = out
         for part in parents:
             key: Any = _number(table, part, path, value) if isinstance(table, list) else part
-            inner = table[key] if isinstance(table, list) else table.get(key, {})
-            if not isinstance(inner, dict | list):
+            inner = table[key] if isinstance(table, list) else table.get(key)
+            inner = {} if inner is None else list(inner) if isinstance(inner, tuple) else inner
+            if not isinstance(inner, dict | list | BaseModel):
                 raise InputError(f"expected a place in a robot file; {part} isn't a table", key=path, value=value)
-            table[key] = inner.copy()
+            table[key] = copied(inner)
             table = table[key]
         table[_number(table, last, path, value) if isinstance(table, list) else last] = value
     return out
