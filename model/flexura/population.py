@@ -133,7 +133,7 @@ def _local(request: Request, todo: Iterator[Work | range], threads: int) -> Gene
 
     def finished() -> Chunk | range:
         work, parts = waiting.popleft()
-        return work if isinstance(work, range) else _chunk(request, *work, [part.result() for part in parts])
+        return work if isinstance(work, range) else _joined(request, *work, [part.result() for part in parts])
 
     with ThreadPoolExecutor(threads) as pool:
         try:
@@ -161,7 +161,7 @@ def compute(request: Request, first: int, items: list[Item], digests: list[bytes
     """Simulate the robots of one chunk in this thread; `first` is the number of its first robot, from 0."""
     stop = np.zeros(1, dtype=bool)
     parts = [simulated(request, prepared(request, block), stop) for block in _blocks(first, items, 1)]
-    return _chunk(request, first, items, digests, parts)
+    return _joined(request, first, items, digests, parts)
 
 
 def _blocks(first: int, items: list[Item], threads: int) -> Iterator[tuple[int, list[Item]]]:
@@ -232,7 +232,7 @@ def _starts(systems: Systems, t: float, drives: list[Drive], request: Request) -
     return states, refused
 
 
-def _chunk(request: Request, first: int, items: list[Item], digests: list[bytes], parts: list[Part]) -> Chunk:
+def _joined(request: Request, first: int, items: list[Item], digests: list[bytes], parts: list[Part]) -> Chunk:
     """The blocks of a chunk in one, reduced if so asked."""
     status = [word for part in parts for word in part.status]
     values = {name: np.concatenate([part.channels[name] for part in parts]) for name in request.channels}

@@ -44,3 +44,26 @@ def test_a_simulation_needs_no_integrators_of_scipy_and_no_twin(tmp_path):
     assert {"flexura.loop", "numba", "pyarrow"} <= loaded
     unneeded = {"scipy.integrate", "scipy.optimize", "exudyn", "rerun", "matplotlib", "distributed"}
     assert (unneeded | {"flexura.twin", "flexura.population", "flexura.statespace"}) & loaded == set()
+
+
+def test_the_set_up_compiles_what_simulations_need():
+    """After what `python -m flexura.warm` does, the rig, its modes and a population with payloads call nothing that was not
+    called before, or with other types."""
+    code = """
+import sys, numpy as np, flexura as fx
+from flexura import warm
+from numba.core.dispatcher import Dispatcher
+def known():
+    each = [(m.__name__, name, v) for m in list(sys.modules.values()) for name, v in vars(m).items() if isinstance(v, Dispatcher)]
+    return {f"{module}.{name} {k}" for module, name, v in each if module.startswith("flexura") for k in v.signatures}
+warm.main()
+before, rig, t = known(), fx.load("model/robots/rig.toml"), np.linspace(0, 0.02, 3)
+few = rig.replace({"link.2.modes": 2})
+fx.simulate(fx.assemble(rig), t)
+fx.simulate(fx.assemble(few), t)
+fx.simulate(fx.Batch.vary(few, {"payload.mass_kg": [0.01, 0.1]}), t)
+print(len(before), *sorted(known() - before), sep=chr(10))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    count, *new = done.stdout.splitlines()
+    assert int(count) > 5 and [line.split()[0] for line in new] == []
