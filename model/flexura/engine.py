@@ -39,13 +39,14 @@ def engine(
         np.full((B, len(t), size - 2), np.nan), np.full((B, len(t), 2), np.nan), np.full(B, loop.DONE), np.full(B, t[-1]),
         np.full(B, -1), np.zeros((B, len(systems.links))), np.zeros(B, dtype=np.int64),
     )  # fmt: skip
-    together = np.array([k for k, plain in zip(rows, _plain(systems, t, drives, rtol, method)[rows], strict=True) if plain], int)
-    if len(together):
+    plain = _plain(systems, t, drives, rtol, method)
+    together = [k for k in rows if plain[k]]
+    if together:
         x = collected(systems, drives, states)
         w, m, b, p, law, history = workplace(systems, len(t))
-        run(x, w, m, b, p, law, rtol, t, stop, history, together, out)
+        run(x, w, m, b, p, law, rtol, t, stop, history, np.array(together), out)
     for k in rows:
-        if k not in together or out.status[k] == loop.STUCK:
+        if not plain[k] or out.status[k] == loop.STUCK:
             _one(systems, k, t, drives[k], states[k], rtol, method, stop, out)
     return out
 
