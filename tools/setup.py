@@ -79,6 +79,11 @@ def has(what: str) -> bool:
         return False
 
 
+def without_compiler(has: Callable[[str], bool]) -> list[Need]:
+    """The need of a C++ compiler, if none of those that CMake would take is there."""
+    return [] if any(has(name) for name in [*os.environ.get("CXX", "").split()[:1], *COMPILERS]) else [COMPILER]
+
+
 def vulkan_drivers() -> list[str]:
     """The driver descriptions that the Vulkan loader would read."""
     named = ":".join(os.environ.get(name, "") for name in ("VK_DRIVER_FILES", "VK_ICD_FILENAMES")).split(":")
@@ -92,8 +97,7 @@ def missing(python: Python, has: Callable[[str], bool], drivers: list[str], syst
     if not python.has_venv:
         package = "python{}.{}-venv".format(*python.version) if python.of_system else ""
         needs.append(Need(f"ensurepip for {python.path}", package, "no environment for the packages can be made", True))
-    if not any(has(name) for name in [*os.environ.get("CXX", "").split()[:1], *COMPILERS]):
-        needs.append(COMPILER)
+    needs += without_compiler(has)
     if system == "linux":        # on macOS the wheels use the system's own frameworks
         needs += [need for need in [*LIBRARIES, *BOARD] if not has(need.what)]
         needs += [] if drivers else [DRIVER]
@@ -182,6 +186,7 @@ def set_up(venv: Path) -> None:
     unfinished.touch()
     stamp.unlink(missing_ok=True)
     if not sound:
+        shutil.rmtree(ROOT / "build", ignore_errors=True)                # CMake's folders know the place and the Python too
         step("environment", [python.path, "-m", "venv", "--clear", str(venv)])
     pip = [inside, "-m", "pip", "install", "-q", "--disable-pip-version-check", "-c", "constraints.txt"]
     step("what compiles the core", [*pip, *BUILDERS])
@@ -192,13 +197,9 @@ def set_up(venv: Path) -> None:
 def build_core(venv: Path) -> None:
     """Compiles what is new in the core and puts its modules beside flexura/core.py."""
     python, cmake = str(venv / "bin/python"), str(venv / "bin/cmake")
-    if COMPILER in (needs := missing(Python(python, OLDEST, False, True), has, [""], sys.platform)):
-        raise Stop(verdict([need for need in needs if need == COMPILER], bool(shutil.which("apt-get")))[1])
+    if needs := without_compiler(has):
+        raise Stop(verdict(needs, bool(shutil.which("apt-get")), "sudo " if os.geteuid() else "")[1])
     folder = ROOT / "build" / "module-{}.{}".format(*sys.version_info)
-    cache = folder / "CMakeCache.txt"
-    known = cache.read_text(errors="replace").splitlines() if cache.exists() else []
-    if known and f"CMAKE_HOME_DIRECTORY:INTERNAL={ROOT}" not in known:     # the checkout was moved
-        shutil.rmtree(folder)
     step("configuring the core", [cmake, "-S", str(ROOT), "-B", str(folder), "-G", "Ninja", "-DFLEXURA_MODULE=ON",
                                   f"-DCMAKE_MAKE_PROGRAM={venv / 'bin/ninja'}", f"-DPython_EXECUTABLE={python}"])
     step("compiling the core (half a minute the first time)", [cmake, "--build", str(folder), "--parallel", str(os.cpu_count() or 1)])
