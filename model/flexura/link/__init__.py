@@ -1,0 +1,1 @@
+"""One flexible link by finite elements: quadrature, shapes, section, modes, and the pieces of its line."""
