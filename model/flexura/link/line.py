@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
 from ..robot import Link
-from .modes import clamped_modes
+from .modes import clamped_matrices, clamped_modes
 from .quadrature import collocation, gauss, lagrange_integrals
 from .section import Material, material
 from .shapes import ElementShapes, WholeShapes
 
 ELEMENT_POINTS = 3
-LEAST_SHAPES = 10  # of a whole-link piece: polynomials of its angle
+MOST_SHAPES = 20  # polynomials of a whole link: more gain nothing in double precision
 
 
 @dataclass(frozen=True)
@@ -78,28 +79,46 @@ class Piece:
         return self.w.T @ (self.mass[:, None] * self.w)
 
 
-def orders(link: Link) -> tuple[int, int]:
+def orders(link: Link, followed: bool) -> tuple[int, int]:
     """How many polynomials (7) and how many points a whole-link piece has."""
-    count = LEAST_SHAPES if link.modes is None else max(LEAST_SHAPES, link.modes + 6)
-    return count, count + 2
+    mesh, sleeve = min(2 * link.elements, MOST_SHAPES), link.joint.type == "Pb"
+    if link.modes is None:
+        return mesh, mesh + 1
+    few = min(link.modes, MOST_SHAPES - 5) + 5
+    count = few if material(link).uniform else max(few, mesh)
+    return count, count + (1 if followed or sleeve else 0)
 
 
 def whole(link: Link, beyond: Link | None) -> bool:
     """Whether a flexible link is one piece: it has `modes`, it slides in a sleeve, or the link `beyond` slides on it."""
-    return link.modes is not None or link.joint.type == "Pb" or (beyond is not None and beyond.joint.type == "Pa")
+    return (
+        link.modes is not None
+        or link.joint.type == "Pb"
+        or (beyond is not None and beyond.joint.type == "Pa")
+    )
 
 
-def pieces(link: Link, beyond: Link | None = None, mass: float = 0.0, inertia: float = 0.0) -> tuple[Piece, ...]:
+def pieces(
+    link: Link, beyond: Link | None = None, mass: float = 0.0, inertia: float = 0.0
+) -> tuple[Piece, ...]:
     """The pieces of a flexible link that the link `beyond` follows (None: with a payload of this mass and inertia)."""
     law = material(link)
     if not whole(link, beyond):
         return _mesh(law, link.elements)
-    count, points = orders(link)
+    count, points = orders(link, beyond is not None)
     sleeve = link.joint.type == "Pb"
     if sleeve and link.modes is None:
         return (whole_piece(law, points, np.eye(count), np.zeros(0)),)
-    free, kept = (link.joint.start if sleeve else link.length_m), (count if link.modes is None else link.modes)
-    return (whole_piece(law, points, *clamped_modes(law, free, count, kept, beyond is not None, mass, inertia)),)
+    free = link.joint.start if sleeve else link.length_m
+    kept = count if link.modes is None else min(link.modes, count)
+    matrices = clamped_matrices(law, free, count, points, mass, inertia)
+    return (
+        whole_piece(
+            law,
+            points,
+            *clamped_modes(*matrices, kept, link.modes is not None and beyond is not None),
+        ),
+    )
 
 
 def whole_piece(law: Material, points: int, coefficients: np.ndarray, K: np.ndarray) -> Piece:
@@ -111,7 +130,7 @@ def whole_piece(law: Material, points: int, coefficients: np.ndarray, K: np.ndar
 
 def _mesh(law: Material, elements: int) -> tuple[Piece, ...]:
     ends = np.linspace(0, law.length, elements + 1)
-    return tuple(_element(law, a, b) for a, b in zip(ends[:-1], ends[1:], strict=True))
+    return tuple(_element(law, a, b) for a, b in pairwise(ends))
 
 
 def _element(law: Material, a: float, b: float) -> Piece:
@@ -120,6 +139,10 @@ def _element(law: Material, a: float, b: float) -> Piece:
     s, ds = law.quadrature(a, b, ELEMENT_POINTS + 2)
     curvature, EI = ElementShapes()((s - a) / h, 1) / h, law.bending_stiffness(s) * ds
     (K11, K12), (_, K22) = curvature.T @ (EI[:, None] * curvature)
-    ratio = K12 / K22 if np.ptp(law.stiffness[:, 0]) or law.stiffness[:, 1:].any() else 0.0
+    if law.uniform:
+        K11, K12, K22 = law.stiffness[0, 0] / h, 0.0, 12 * law.stiffness[0, 0] / h
+    ratio = K12 / K22
     dm = law.mass_per_length(s) * ds
-    return Piece(h, ELEMENT_POINTS, ElementShapes(ratio), np.array([K11 - ratio * K12, K22]), (s - a) / h, dm)
+    return Piece(
+        h, ELEMENT_POINTS, ElementShapes(ratio), np.array([K11 - ratio * K12, K22]), (s - a) / h, dm
+    )

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import ArrayLike
 from numpy.polynomial.polynomial import polyder, polyval
 
 from ..robot import Link
@@ -28,11 +30,18 @@ class Material:
     def length(self) -> float:
         return float(self.breaks[-1])
 
-    def mass_per_length(self, s: np.ndarray, derivative: int = 0) -> np.ndarray:
+    @property
+    def uniform(self) -> bool:
+        """Whether nothing changes along the link."""
+        return (
+            len(self.mass) == 1 and not self.mass[0, 1:].any() and not self.stiffness[0, 1:].any()
+        )
+
+    def mass_per_length(self, s: ArrayLike, derivative: int = 0) -> np.ndarray:
         """rho A at s (S,), or its derivative by s."""
         return self._values(self.mass, s, derivative)
 
-    def bending_stiffness(self, s: np.ndarray, derivative: int = 0) -> np.ndarray:
+    def bending_stiffness(self, s: ArrayLike, derivative: int = 0) -> np.ndarray:
         """EI at s (S,), or its derivative by s."""
         return self._values(self.stiffness, s, derivative)
 
@@ -41,7 +50,7 @@ class Material:
         inner = self.breaks[(self.breaks > start) & (self.breaks < end)]
         return cells(np.concatenate([[start], inner, [end]]), count)
 
-    def _values(self, rows: np.ndarray, s: np.ndarray, derivative: int) -> np.ndarray:
+    def _values(self, rows: np.ndarray, s: ArrayLike, derivative: int) -> np.ndarray:
         s = np.atleast_1d(np.asarray(s, dtype=float))
         k = np.clip(np.searchsorted(self.breaks, s, side="right") - 1, 0, len(rows) - 1)
         powers = polyder(rows.T, derivative) if derivative else rows.T
@@ -51,11 +60,15 @@ class Material:
 def material(link: Link) -> Material:
     """The material of a link of the robot file: tapers are linear in the section's dimensions."""
     breaks = np.array(link.breaks())
-    parts = list(zip(breaks[:-1], breaks[1:], strict=True))
+    parts = list(pairwise(breaks))
     mass = [_powers(link.mass_per_length, a, b, MASS_DEGREE) for a, b in parts]
     if not link.flexible:
         return Material(breaks, np.array(mass), np.zeros((len(parts), STIFFNESS_DEGREE + 1)))
-    return Material(breaks, np.array(mass), np.array([_powers(link.bending_stiffness, a, b, STIFFNESS_DEGREE) for a, b in parts]))
+    return Material(
+        breaks,
+        np.array(mass),
+        np.array([_powers(link.bending_stiffness, a, b, STIFFNESS_DEGREE) for a, b in parts]),
+    )
 
 
 def _powers(law, a: float, b: float, degree: int) -> np.ndarray:  # type: ignore[no-untyped-def]

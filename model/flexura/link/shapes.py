@@ -47,13 +47,3 @@ def legendre_shapes(count: int, xi: np.ndarray, derivative: int = 0) -> np.ndarr
     if derivative == 0:
         return legendre_integrals(count, xi)
     return 2.0**derivative * legendre(count, xi, derivative - 1)
-
-
-def legendre_deflections(count: int, xi: np.ndarray) -> np.ndarray:
-    """Integrals of the space (7) by xi from 0 to xi, the transverse deflections of a link of length 1: (S, count)."""
-    phi = legendre_integrals(count + 1, xi)
-    out = np.empty((len(phi), count))
-    out[:, 0] = phi[:, 1] + phi[:, 0]
-    for k in range(1, count):
-        out[:, k] = (phi[:, k + 1] - phi[:, k - 1]) / (2 * k + 1)
-    return out / 2

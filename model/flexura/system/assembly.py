@@ -1,6 +1,6 @@
 """The extended assembly: the equations of motion of any chain, dense and without a recursion. Equations: docs/theory/mechanics.md.
 
-    M(q) qdd + bias(q, qd) + damping(q) qd + elastic(q) + gravity(q) = force                                                (15)
+M(q) qdd + bias(q, qd) + damping(q) qd + elastic(q) + gravity(q) = force                                                (15)
 """
 
 from __future__ import annotations
@@ -34,7 +34,12 @@ class Assembly:
 
     def __init__(self, robot: Robot | Structure, linear: bool | None = None) -> None:
         self.structure = robot if isinstance(robot, Structure) else structure(robot, linear)
-        self.robot, self.labels, self.n, self.rows = self.structure.robot, self.structure.labels, self.structure.n, self.structure.rows
+        self.robot, self.labels, self.n, self.rows = (
+            self.structure.robot,
+            self.structure.labels,
+            self.structure.n,
+            self.structure.rows,
+        )
         self._g = complex(*self.robot.gravity_m_s2)
 
     def mass(self, q: np.ndarray) -> np.ndarray:
@@ -100,12 +105,20 @@ class Assembly:
     def coulomb(self, qd: np.ndarray) -> np.ndarray:
         """Coulomb friction of the joints (n,), on the left-hand side (21)."""
         out = np.zeros(self.n)
-        out[self.rows] = [link.joint.coulomb_friction for link in self.robot.links] * np.tanh(qd[self.rows] / COULOMB_RATE)
+        out[self.rows] = [link.joint.coulomb_friction for link in self.robot.links] * np.tanh(
+            qd[self.rows] / COULOMB_RATE
+        )
         return out
 
     def forces(self, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
         """The generalised forces (n,) that a motion needs: the left-hand side of (15), Coulomb friction left out."""
-        return self.mass(q) @ qdd + self.bias(q, qd) + self.damping(q) @ qd + self.elastic(q) + self.gravity(q)
+        return (
+            self.mass(q) @ qdd
+            + self.bias(q, qd)
+            + self.damping(q) @ qd
+            + self.elastic(q)
+            + self.gravity(q)
+        )
 
     def energies(self, q: np.ndarray, qd: np.ndarray) -> Energies:
         """The energies in a state (4), (6), (18)."""
@@ -124,15 +137,19 @@ class Assembly:
         """The frame of the robot's tip, with the columns of its place and angle (1)."""
         return self.structure.states(q, np.zeros(self.n) if qd is None else qd)[-1].tip
 
-    def line(self, q: np.ndarray, link: int, s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def line(
+        self, q: np.ndarray, link: int, s: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """x [m], y [m] and the tangent's angle [rad] of link `link` (from 1) at arc lengths s (S,) from its proximal end (3)."""
         state = self.structure.states(q, np.zeros(self.n))[link - 1]
         frames = [self.structure.at(state, float(x)) for x in np.atleast_1d(s)]
         place = np.array([f.place for f in frames])
         return place.real, place.imag, np.array([f.angle for f in frames])
 
-    def _parts(self, q: np.ndarray, qd: np.ndarray) -> list[masses.Masses | masses.Turning]:
-        return [part for state in self.structure.states(q, qd) for part in self.structure.masses(state)]
+    def _parts(self, q: np.ndarray, qd: np.ndarray) -> list[masses.Part]:
+        return [
+            part for state in self.structure.states(q, qd) for part in self.structure.masses(state)
+        ]
 
     def _sleeves(self, q: np.ndarray, qd: np.ndarray) -> list[tuple[LinkState, Material]]:
         """The flexible links in a sleeve, with their materials."""

@@ -94,7 +94,11 @@ def line(piece: Piece, start: Frame, axis: Frame, own: slice, free: float, row: 
     t, spin, bent = axis.tangent, axis.turning @ qd, columns - axis.turning
     e = t * (1 + 1j * (angle - axis.angle))
     E = 1j * e[:, None] * axis.turning + 1j * t * bent
-    N = e * (1j * axis.rest_turning - spin**2) - 2 * spin * t * (bent @ qd) + 1j * t * (start.rest_turning - axis.rest_turning)
+    N = (
+        e * (1j * axis.rest_turning - spin**2)
+        - 2 * spin * t * (bent @ qd)
+        + 1j * t * (start.rest_turning - axis.rest_turning)
+    )
     return Line(piece, start, own, free, row, e, E, N, q, qd)
 
 
@@ -105,7 +109,14 @@ def station(line: Line, xi: float, slider: int | None = None) -> Frame:
     """
     d, start, shapes = line.free, line.start, line.piece.shapes
     at = np.array([xi])
-    w, l, dl = (f[0] for f in (lagrange_integrals(line.piece.points, at), lagrange(line.piece.points, at), lagrange(line.piece.points, at, 1)))
+    w, l, dl = (
+        f[0]
+        for f in (
+            lagrange_integrals(line.piece.points, at),
+            lagrange(line.piece.points, at),
+            lagrange(line.piece.points, at, 1),
+        )
+    )
     b, db, ddb = (shapes(at, k)[0] for k in range(3))
     flow = np.zeros(len(line.qd))
     if slider is not None:
@@ -120,6 +131,20 @@ def station(line: Line, xi: float, slider: int | None = None) -> Frame:
     turning[line.own] += b
     if line.row is not None:
         velocity[line.row] += w @ line.e
-    rest = start.rest + d * w @ line.N + 2 * line.rate * (w @ spin) + d * run * (2 * l @ spin + run * (dl @ line.e))
-    rest_turning = start.rest_turning + run * (2 * db @ yd + run * ddb @ y - 2 * line.rate / d * (db @ y))
-    return Frame(complex(start.place + d * w @ line.e), float(start.angle + b @ y), velocity, turning, complex(rest), float(rest_turning))
+    rest = (
+        start.rest
+        + d * w @ line.N
+        + 2 * line.rate * (w @ spin)
+        + d * run * (2 * l @ spin + run * (dl @ line.e))
+    )
+    rest_turning = start.rest_turning + run * (
+        2 * db @ yd + run * ddb @ y - 2 * line.rate / d * (db @ y)
+    )
+    return Frame(
+        complex(start.place + d * w @ line.e),
+        float(start.angle + b @ y),
+        velocity,
+        turning,
+        complex(rest),
+        float(rest_turning),
+    )

@@ -28,9 +28,14 @@ class Turning:
     rest: float
 
 
+Part = Masses | Turning
+
+
 def lump(mass: float, frame: Frame) -> Masses:
     """A point mass in a frame's origin."""
-    return Masses(np.array([mass]), np.array([frame.place]), frame.velocity[None], np.array([frame.rest]))
+    return Masses(
+        np.array([mass]), np.array([frame.place]), frame.velocity[None], np.array([frame.rest])
+    )
 
 
 def turning(inertia: float, frame: Frame) -> Turning:
@@ -41,7 +46,12 @@ def turning(inertia: float, frame: Frame) -> Turning:
 def line_masses(line: Line) -> Masses:
     """The mass points of a piece of constant length (4)."""
     start, w = line.start, line.piece.w
-    return Masses(line.piece.mass, start.place + w @ line.e, start.velocity + w @ line.E, start.rest + w @ line.N)
+    return Masses(
+        line.piece.mass,
+        start.place + w @ line.e,
+        start.velocity + w @ line.E,
+        start.rest + w @ line.N,
+    )
 
 
 def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -49,7 +59,7 @@ def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.real(a.conj().T @ b)
 
 
-def mass_matrix(n: int, parts: list[Masses | Turning]) -> np.ndarray:
+def mass_matrix(n: int, parts: list[Part]) -> np.ndarray:
     """M (n, n), the sum of J^T m J (15)."""
     M = np.zeros((n, n))
     for p in parts:
@@ -60,19 +70,29 @@ def mass_matrix(n: int, parts: list[Masses | Turning]) -> np.ndarray:
     return M
 
 
-def inertia_forces(n: int, parts: list[Masses | Turning]) -> np.ndarray:
+def inertia_forces(n: int, parts: list[Part]) -> np.ndarray:
     """The sum of J^T m (second derivatives at rest), (n,) (16)."""
     h = np.zeros(n)
     for p in parts:
-        h += dot(p.columns, p.mass * p.rest) if isinstance(p, Masses) else p.inertia * p.rest * p.columns
+        h += (
+            dot(p.columns, p.mass * p.rest)
+            if isinstance(p, Masses)
+            else p.inertia * p.rest * p.columns
+        )
     return h
 
 
-def weight(n: int, parts: list[Masses | Turning], gravity: complex) -> np.ndarray:
+def weight(n: int, parts: list[Part], gravity: complex) -> np.ndarray:
     """Generalised gravity forces on the left-hand side, (n,) (17)."""
-    return -sum((dot(p.columns, p.mass * gravity) for p in parts if isinstance(p, Masses)), np.zeros(n))
+    return -sum(
+        (dot(p.columns, p.mass * gravity) for p in parts if isinstance(p, Masses)), np.zeros(n)
+    )
 
 
-def potential(parts: list[Masses | Turning], gravity: complex) -> float:
+def potential(parts: list[Part], gravity: complex) -> float:
     """The potential energy of gravity [J] (17)."""
-    return -sum(float(np.real(np.conj(gravity) * (p.mass @ p.place))) for p in parts if isinstance(p, Masses))
+    return -sum(
+        float(np.real(np.conj(gravity) * (p.mass @ p.place)))
+        for p in parts
+        if isinstance(p, Masses)
+    )

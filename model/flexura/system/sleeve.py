@@ -6,7 +6,18 @@ import numpy as np
 
 from ..link.section import Material
 from .kinematics import Frame, Line, ahead
-from .masses import Masses, dot
+from .masses import Masses, Part, dot, lump
+
+
+def masses(line: Line, law: Material) -> list[Part]:
+    """The masses of a sleeved link: its free length, the rod behind, and at the exit what quadrature misses of its mass (12)."""
+    assert line.row is not None
+    free, rod = free_masses(line, law), rod_behind(line.start, line.free, line.row, law, line.qd)
+    return [
+        free,
+        rod,
+        lump(float(line.piece.mass.sum() - free.mass.sum() - rod.mass.sum()), line.start),
+    ]
 
 
 def free_masses(line: Line, law: Material) -> Masses:
@@ -35,7 +46,9 @@ def flow_forces(line: Line, law: Material) -> np.ndarray:
     exit_density = float(law.mass_per_length(law.length - line.free)[0])
     out = d_rate * (dot(masses.columns, mu_d * V) - dot(line.E, left * V))
     out -= exit_density * d_rate**2 * np.real(start.velocity.conj() * start.tangent)
-    out[row] += float(np.real(np.sum(left * (line.E @ line.qd).conj() * V)) - 0.5 * mu_d @ np.abs(V) ** 2)
+    out[row] += float(
+        np.real(np.sum(left * (line.E @ line.qd).conj() * V)) - 0.5 * mu_d @ np.abs(V) ** 2
+    )
     out[row] -= 0.5 * exit_density * d_rate**2
     return out
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -11,8 +12,9 @@ from ..link.line import Piece, pieces
 from ..link.section import Material, material
 from ..link.shapes import ElementShapes
 from ..robot import Robot
-from . import masses, sleeve
+from . import sleeve
 from .kinematics import Frame, Line, ahead, base, line, station, turned
+from .masses import Part, line_masses, lump, turning
 
 
 @dataclass(frozen=True)
@@ -44,8 +46,11 @@ class Structure:
     @cached_property
     def own(self) -> list[list[slice]]:
         """The unknowns of each piece of each link."""
-        ends = [[row + 1 + sum(p.count for p in link[:k]) for k in range(len(link) + 1)] for row, link in zip(self.rows, self.links, strict=True)]
-        return [[slice(a, b) for a, b in zip(e[:-1], e[1:], strict=True)] for e in ends]
+        ends = [
+            [row + 1 + sum(p.count for p in link[:k]) for k in range(len(link) + 1)]
+            for row, link in zip(self.rows, self.links, strict=True)
+        ]
+        return [[slice(a, b) for a, b in pairwise(e)] for e in ends]
 
     @cached_property
     def labels(self) -> tuple[str, ...]:
@@ -86,7 +91,9 @@ class Structure:
         """Link i in a state, from the frame of its hub to its tip (2)."""
         row = self.rows[i]
         if not self.links[i]:
-            return LinkState(i, q, qd, hub, (), ahead(hub, *self._along(i, self.robot.links[i].length_m, q), qd))
+            return LinkState(
+                i, q, qd, hub, (), ahead(hub, *self._along(i, self.robot.links[i].length_m, q), qd)
+            )
         lines, frame = [], hub
         for piece, own in zip(self.links[i], self.own[i], strict=True):
             free, free_row = (q[row], row) if self.sleeved(i) else (piece.length, None)
@@ -96,7 +103,11 @@ class Structure:
 
     def _along(self, i: int, s: float, q: np.ndarray) -> tuple[float, list[int]]:
         """How far s on link i is ahead of its hub or exit, and the unknowns that this depends on (11)."""
-        return (s - self.robot.links[i].length_m + q[self.rows[i]], [self.rows[i]]) if self.sleeved(i) else (s, [])
+        return (
+            (s - self.robot.links[i].length_m + q[self.rows[i]], [self.rows[i]])
+            if self.sleeved(i)
+            else (s, [])
+        )
 
     def _hub(self, i: int, before: LinkState | None, q: np.ndarray, qd: np.ndarray) -> Frame:
         """The frame of link i's hub (of Pb: of the sleeve's exit) on the link before it (1)."""
@@ -122,26 +133,29 @@ class Structure:
         k = min(int(x / h), len(state.lines) - 1)
         return station(state.lines[k], x / h - k)
 
-    def masses(self, state: LinkState) -> list[masses.Masses | masses.Turning]:
+    def masses(self, state: LinkState) -> list[Part]:
         """A link's masses: its material, its hub, and the payload of the last one (4), (12)."""
         joint = self.robot.links[state.index].joint
-        return self.own_masses(state) + [masses.lump(joint.hub_mass_kg, state.hub), masses.turning(joint.hub_inertia_kg_m2, state.hub)]
+        return self.own_masses(state) + [
+            lump(joint.hub_mass_kg, state.hub),
+            turning(joint.hub_inertia_kg_m2, state.hub),
+        ]
 
-    def own_masses(self, state: LinkState) -> list[masses.Masses | masses.Turning]:
+    def own_masses(self, state: LinkState) -> list[Part]:
         """A link's masses without its hub."""
-        i, law, parts = state.index, self.laws[state.index], list[masses.Masses | masses.Turning]()
+        i, law = state.index, self.laws[state.index]
+        parts: list[Part] = []
         if law is None:
             mass, centre, inertia = rigid_body(self.robot, i)
             frame = ahead(state.hub, *self._along(i, centre, state.q), state.qd)
-            parts += [masses.lump(mass, frame), masses.turning(inertia, frame)]
+            parts += [lump(mass, frame), turning(inertia, frame)]
         elif self.sleeved(i):
-            parts.append(sleeve.free_masses(state.lines[0], law))
-            parts.append(sleeve.rod_behind(state.hub, state.lines[0].free, self.rows[i], law, state.qd))
+            parts += sleeve.masses(state.lines[0], law)
         else:
-            parts += [masses.line_masses(x) for x in state.lines]
+            parts += [line_masses(x) for x in state.lines]
         if i == len(self.links) - 1:
             load = self.robot.payload
-            parts += [masses.lump(load.mass_kg, state.tip), masses.turning(load.inertia_kg_m2, state.tip)]
+            parts += [lump(load.mass_kg, state.tip), turning(load.inertia_kg_m2, state.tip)]
         return parts
 
 
@@ -150,7 +164,9 @@ def structure(robot: Robot, linear: bool | None = None) -> Structure:
     links, load = robot.links, robot.payload
     beyond = [*links[1:], None]
     made = tuple(
-        pieces(link, after, *((load.mass_kg, load.inertia_kg_m2) if after is None else (0.0, 0.0))) if link.flexible else ()
+        pieces(link, after, *((load.mass_kg, load.inertia_kg_m2) if after is None else (0.0, 0.0)))
+        if link.flexible
+        else ()
         for link, after in zip(links, beyond, strict=True)
     )
     return Structure(robot, made, not robot.stiffening if linear is None else linear)
