@@ -1,1 +1,1 @@
-"""One flexible link by finite elements: quadrature, shapes, section, modes, and the pieces of its line."""
+"""One link: quadrature, shapes, section, modes, and the pieces of its line."""

@@ -15,15 +15,16 @@ from .section import Material, material
 from .shapes import ElementShapes, WholeShapes
 
 ELEMENT_POINTS = 3
-MOST_SHAPES = 20  # polynomials of a whole link: more gain nothing in double precision
+MOST_SHAPES = 20  # polynomials of a whole link
 
 
 @dataclass(frozen=True)
 class Piece:
-    """A stretch of line on 0 <= xi <= 1 whose tangent's angle is linear in m unknowns (2).
+    """A stretch of line on 0 <= xi <= 1 whose tangent's angle is linear in m unknowns (1).
 
-    length [m] (of a sleeved link: all of it); points P; shapes b(xi), (S,) -> (S, m); K (m,) [N m, or 1/s^2 for modes] (6), of a
-    sleeved link only at the start's free length; mass_xi (G,) and mass (G,) [kg]: points whose sums integrate dm exactly.
+    length [m]: of a sleeved link all of it. points: P. shapes: b(xi), (S,) -> (S, m). K (m,) (5) in
+    N m, for modes in 1/s^2; of a sleeved link in modes that at the start's free length, else empty.
+    mass_xi (G,), mass (G,) [kg]: points whose sums are the integrals (3).
     """
 
     length: float
@@ -50,12 +51,12 @@ class Piece:
 
     @cached_property
     def C(self) -> np.ndarray:
-        """Integrals of Lagrange's polynomials to the points by xi (5): (P, P)."""
+        """Integrals of Lagrange's polynomials to the points by xi (8): (P, P)."""
         return collocation(self.points)
 
     @cached_property
     def B(self) -> np.ndarray:
-        """The shapes at the points (2): (P, m)."""
+        """The shapes at the points (1): (P, m)."""
         return self.shapes(self.xi)
 
     @cached_property
@@ -65,17 +66,17 @@ class Piece:
 
     @cached_property
     def w(self) -> np.ndarray:
-        """The weights w_j of the mass points (3): (G, P) [m]."""
+        """The weights w_j of the mass points (2): (G, P) [m]."""
         return self.length * lagrange_integrals(self.points, self.mass_xi)
 
     @cached_property
     def s(self) -> np.ndarray:
-        """First moments s_j, the integral of w_j dm (4): (P,) [kg m]."""
+        """First moments s_j, the integral of w_j dm (3): (P,) [kg m]."""
         return self.mass @ self.w
 
     @cached_property
     def W(self) -> np.ndarray:
-        """Second moments W_jl, the integral of w_j w_l dm (4): (P, P) [kg m^2]."""
+        """Second moments W_jl, the integral of w_j w_l dm (3): (P, P) [kg m^2]."""
         return self.w.T @ (self.mass[:, None] * self.w)
 
 
@@ -90,7 +91,7 @@ def orders(link: Link, followed: bool) -> tuple[int, int]:
 
 
 def whole(link: Link, beyond: Link | None) -> bool:
-    """Whether a flexible link is one piece: it has `modes`, it slides in a sleeve, or the link `beyond` slides on it."""
+    """Whether a flexible link is one piece: in modes, in a sleeve, or `beyond` slides on it (7)."""
     return (
         link.modes is not None
         or link.joint.type == "Pb"
@@ -101,7 +102,7 @@ def whole(link: Link, beyond: Link | None) -> bool:
 def pieces(
     link: Link, beyond: Link | None = None, mass: float = 0.0, inertia: float = 0.0
 ) -> tuple[Piece, ...]:
-    """The pieces of a flexible link that the link `beyond` follows (None: with a payload of this mass and inertia)."""
+    """The pieces of a flexible link that `beyond` follows (None: it carries the payload)."""
     law = material(link)
     if not whole(link, beyond):
         return _mesh(law, link.elements)
@@ -122,7 +123,7 @@ def pieces(
 
 
 def whole_piece(law: Material, points: int, coefficients: np.ndarray, K: np.ndarray) -> Piece:
-    """A link as one piece with the given shapes (N, m) in the space (7) and their diagonal stiffness (m,)."""
+    """A link as one piece with shapes (N, m) in the space (7) and diagonal stiffness (m,)."""
     s, ds = law.quadrature(0.0, law.length, points + 2)
     dm = law.mass_per_length(s) * ds
     return Piece(law.length, points, WholeShapes(coefficients), K, s / law.length, dm)

@@ -1,4 +1,4 @@
-"""A link's own clamped modes in the space of polynomials (7)."""
+"""A link's own clamped modes in the space of polynomials (7), equation (10)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .shapes import legendre_shapes
 def clamped_matrices(
     law: Material, free: float, count: int, points: int, mass: float = 0.0, inertia: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """M [kg m^2] and K [N m] (count, count) of a straight link clamped at its last `free` metres (9).
+    """M [kg m^2] and K [N m] (count, count) of a straight link's clamped last `free` metres (10).
 
     The unknowns are the coefficients in the space (7); a payload of `mass` and `inertia` is at the
     tip. The third array has the tip's deflection and angle of each shape, (2, count) [m, rad].
@@ -36,8 +36,8 @@ def clamped_modes(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The lowest `kept` modes, mass-normalised, as columns (count, m), and omega^2 (m,) (10).
 
-    With `statics` the static shapes of a tip force and a tip moment join them, and the modes of this
-    smaller space are given. Each mode moves the tip to the left.
+    With `statics` the static shapes of a tip force and a tip moment join them, and the modes of
+    this smaller space are given. Each mode moves the tip to the left.
     """
     lam, V = eigh(K, M)
     if kept < len(K):

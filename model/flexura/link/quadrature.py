@@ -1,4 +1,4 @@
-"""Gauss points, Legendre's polynomials and the integrals of Lagrange's polynomials through the points. Equations: docs/theory."""
+"""Gauss points, Legendre's polynomials, and Lagrange's through the points (docs/theory)."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from numpy.polynomial.legendre import legder, leggauss, legvander
 
 @cache
 def gauss(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Gauss points xi and weights (count,) on [0, 1], exact for polynomials of degree 2 count - 1."""
+    """Gauss points xi and weights (count,) on [0, 1], exact to the degree 2 count - 1."""
     u, w = leggauss(count)
     return (u + 1) / 2, w / 2
 
 
 def cells(breaks: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Gauss points and weights (cells * count,) on consecutive cells between `breaks` (cells + 1,), in the unit of `breaks`."""
+    """Gauss points and weights (cells * count,) between `breaks` (cells + 1,), in their unit."""
     xi, w = gauss(count)
     widths = np.diff(breaks)[:, None]
     return (breaks[:-1, None] + widths * xi).ravel(), (widths * w).ravel()
@@ -30,7 +30,7 @@ def legendre(count: int, xi: np.ndarray, derivative: int = 0) -> np.ndarray:
 
 
 def legendre_integrals(count: int, xi: np.ndarray) -> np.ndarray:
-    """Integrals of P_0 ... P_(count-1) by u from -1 to 2 xi - 1, which are the shapes (7): (S, count)."""
+    """Integrals of P_0 ... P_(count-1) by u from -1 to 2 xi - 1, the shapes (7): (S, count)."""
     P = legendre(count + 1, xi)
     out = np.empty((len(P), count))
     out[:, 0] = P[:, 1] + 1.0
@@ -40,21 +40,21 @@ def legendre_integrals(count: int, xi: np.ndarray) -> np.ndarray:
 
 
 def _lagrange(points: int) -> np.ndarray:
-    """Lagrange's polynomials through the Gauss points as sums of Legendre's: (points, points), column j is l_j (5)."""
+    """Lagrange's polynomials as sums of Legendre's (2): (points, points), column j is l_j."""
     xi, w = gauss(points)
     return (2 * np.arange(points)[:, None] + 1) * legendre(points, xi).T * w
 
 
 def lagrange(points: int, xi: np.ndarray, derivative: int = 0) -> np.ndarray:
-    """Lagrange's l_j through the Gauss points, at xi, or their derivatives by xi (5): (S, points)."""
+    """Lagrange's l_j through the Gauss points, or their derivatives by xi (2): (S, points)."""
     return 2.0**derivative * legendre(points, xi, derivative) @ _lagrange(points)
 
 
 def lagrange_integrals(points: int, xi: np.ndarray) -> np.ndarray:
-    """w_j(xi), the integrals of l_j from 0 to xi (5): (S, points)."""
+    """w_j(xi), the integrals of l_j from 0 to xi (2): (S, points)."""
     return 0.5 * legendre_integrals(points, xi) @ _lagrange(points)
 
 
 def collocation(points: int) -> np.ndarray:
-    """C, the integrals of l_j from 0 to Gauss point p (5): (points p, points j)."""
+    """C, the integrals of l_j from 0 to Gauss point p (8): (points p, points j)."""
     return lagrange_integrals(points, gauss(points)[0])

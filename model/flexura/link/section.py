@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike
 from numpy.polynomial.polynomial import polyder, polyval
+from numpy.typing import ArrayLike
 
 from ..robot import Link
 from .quadrature import cells
@@ -17,9 +17,10 @@ MASS_DEGREE, STIFFNESS_DEGREE = 2, 4  # of rho A and EI, if a section's dimensio
 
 @dataclass(frozen=True)
 class Material:
-    """rho A(s) [kg/m] and EI(s) [N m^2] (4): row k holds the powers of s - breaks[k] on breaks[k] <= s <= breaks[k + 1].
+    """rho A(s) [kg/m] and EI(s) [N m^2] as polynomials between breaks.
 
-    breaks (I + 1,) [m], from 0 to the link's length; mass (I, 3); stiffness (I, 5); lowest power first.
+    breaks (I + 1,) [m], from 0 to the link's length; mass (I, 3) and stiffness (I, 5): row k holds
+    the powers of s - breaks[k], lowest first.
     """
 
     breaks: np.ndarray

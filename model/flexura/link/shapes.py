@@ -11,7 +11,7 @@ from .quadrature import legendre, legendre_integrals
 
 @dataclass(frozen=True)
 class ElementShapes:
-    """The two shapes of an element (6): a ramp, from which `ratio` bubbles are taken, and a bubble."""
+    """The two shapes of an element (6): a ramp less `ratio` bubbles, and a bubble."""
 
     ratio: float = 0.0
 
@@ -29,7 +29,7 @@ class ElementShapes:
 
 @dataclass(frozen=True)
 class WholeShapes:
-    """Shapes of a whole link: column k of `coefficients` (N, m) is the k-th one in the Legendre space (7)."""
+    """Shapes of a whole link: column k of `coefficients` (N, m) is one in the space (7)."""
 
     coefficients: np.ndarray
 
@@ -43,7 +43,7 @@ class WholeShapes:
 
 
 def legendre_shapes(count: int, xi: np.ndarray, derivative: int = 0) -> np.ndarray:
-    """The space (7): integrals of Legendre's polynomials that vanish at xi = 0, or their derivatives by xi: (S, count)."""
+    """The space (7) at xi (S,), or its derivatives by xi: (S, count)."""
     if derivative == 0:
         return legendre_integrals(count, xi)
     return 2.0**derivative * legendre(count, xi, derivative - 1)

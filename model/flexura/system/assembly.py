@@ -1,6 +1,6 @@
-"""The extended assembly: the equations of motion of any chain, dense and without a recursion. Equations: docs/theory/mechanics.md.
+"""The extended assembly: the equations of any chain, dense (docs/theory/mechanics.md).
 
-M(q) qdd + bias(q, qd) + damping(q) qd + elastic(q) + gravity(q) = force                                                (15)
+M(q) qdd + bias(q, qd) + damping(q) qd + elastic(q) + gravity(q) = force                   (19)
 """
 
 from __future__ import annotations
@@ -27,40 +27,36 @@ class Energies(NamedTuple):
 
 
 class Assembly:
-    """A robot's equations as dense sums over its pieces. q and qd have `n` entries, named by `labels`; SI units, angles in rad.
+    """A robot's equations as dense sums over its pieces; q and qd (n,) are named by `labels`.
 
-    A `Structure` in place of a robot brings its own shapes, so that two programs can use the same ones.
+    A `Structure` in place of a robot brings its own shapes, so that two programs can use one set.
     """
 
     def __init__(self, robot: Robot | Structure, linear: bool | None = None) -> None:
         self.structure = robot if isinstance(robot, Structure) else structure(robot, linear)
-        self.robot, self.labels, self.n, self.rows = (
-            self.structure.robot,
-            self.structure.labels,
-            self.structure.n,
-            self.structure.rows,
-        )
+        self.robot, self.rows = self.structure.robot, self.structure.rows
+        self.labels, self.n = self.structure.labels, self.structure.n
         self._g = complex(*self.robot.gravity_m_s2)
 
     def mass(self, q: np.ndarray) -> np.ndarray:
-        """M(q) (n, n) (16)."""
+        """M(q) (n, n) (14)."""
         M = masses.mass_matrix(self.n, self._parts(q, np.zeros(self.n)))
         M[self.rows, self.rows] += [link.joint.rotor_inertia for link in self.robot.links]
         return M
 
     def bias(self, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
-        """Coriolis, centrifugal and convective forces (n,), on the left-hand side (17)."""
+        """Coriolis, centrifugal and convective forces (n,), on the left-hand side (15)."""
         h = masses.inertia_forces(self.n, self._parts(q, qd))
         for state, law in self._sleeves(q, qd):
             h += sleeve.flow_forces(state.lines[0], law)
         return h
 
     def gravity(self, q: np.ndarray) -> np.ndarray:
-        """Generalised gravity forces (n,), on the left-hand side (18)."""
+        """Generalised gravity forces (n,), on the left-hand side (16)."""
         return masses.weight(self.n, self._parts(q, np.zeros(self.n)), self._g)
 
     def elastic(self, q: np.ndarray) -> np.ndarray:
-        """The derivative of the strain energy (n,): K q, and of a sleeved link also dU/dd (6), (13)."""
+        """The derivative of the strain energy (n,): K q, and of a sleeved link also dU/dd (17)."""
         out = self.stiffness_blocks(q) @ q
         for state, law in self._sleeves(q, np.zeros(self.n)):
             y = q[state.lines[0].own]
@@ -68,7 +64,7 @@ class Assembly:
         return out
 
     def stiffness_blocks(self, q: np.ndarray) -> np.ndarray:
-        """K (n, n) of (6), with K(d) of (13) for sleeved links: twice the strain energy is q^T K q."""
+        """K (n, n), with K(d) of sleeved links: twice the strain energy is q^T K q (5), (17)."""
         K = np.zeros((self.n, self.n))
         for link, owns in zip(self.structure.links, self.structure.own, strict=True):
             for piece, own in zip(link, owns, strict=True):
@@ -80,7 +76,7 @@ class Assembly:
         return K
 
     def stiffness(self, q: np.ndarray) -> np.ndarray:
-        """The second derivative of the strain energy (n, n), without the geometric stiffness of loads (13), (26)."""
+        """The second derivative of the strain energy (n, n), without loads (17)."""
         K = self.stiffness_blocks(q)
         for state, law in self._sleeves(q, np.zeros(self.n)):
             own, row = state.lines[0].own, self.rows[state.index]
@@ -91,7 +87,7 @@ class Assembly:
         return K
 
     def damping(self, q: np.ndarray) -> np.ndarray:
-        """D (n, n): viscous friction of the joints, alpha M + beta K of a link's elastic unknowns (20)."""
+        """D (n, n): viscous friction of joints, alpha M + beta K of elastic unknowns (18)."""
         D, K = np.zeros((self.n, self.n)), self.stiffness_blocks(q)
         for i, (link, row) in enumerate(zip(self.robot.links, self.rows, strict=True)):
             D[row, row] = link.joint.viscous_friction
@@ -103,7 +99,7 @@ class Assembly:
         return D
 
     def coulomb(self, qd: np.ndarray) -> np.ndarray:
-        """Coulomb friction of the joints (n,), on the left-hand side (21)."""
+        """Coulomb friction of the joints (n,), on the left-hand side (18)."""
         out = np.zeros(self.n)
         out[self.rows] = [link.joint.coulomb_friction for link in self.robot.links] * np.tanh(
             qd[self.rows] / COULOMB_RATE
@@ -111,7 +107,7 @@ class Assembly:
         return out
 
     def forces(self, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
-        """The generalised forces (n,) that a motion needs: the left-hand side of (15), Coulomb friction left out."""
+        """The forces (n,) that a motion needs (19), without Coulomb friction."""
         return (
             self.mass(q) @ qdd
             + self.bias(q, qd)
@@ -121,7 +117,7 @@ class Assembly:
         )
 
     def energies(self, q: np.ndarray, qd: np.ndarray) -> Energies:
-        """The energies in a state (4), (6), (18)."""
+        """The energies in a state (29)."""
         parts = self._parts(q, qd)
         return Energies(
             float(0.5 * qd @ self.mass(q) @ qd),
@@ -130,17 +126,17 @@ class Assembly:
         )
 
     def loss(self, q: np.ndarray, qd: np.ndarray) -> float:
-        """The power that damping and friction take [W] (29)."""
+        """The power that damping and friction take [W] (30)."""
         return float(qd @ (self.damping(q) @ qd + self.coulomb(qd)))
 
     def tip(self, q: np.ndarray, qd: np.ndarray | None = None) -> Frame:
-        """The frame of the robot's tip, with the columns of its place and angle (1)."""
+        """The frame of the robot's tip, with the columns of its place and angle (13)."""
         return self.structure.states(q, np.zeros(self.n) if qd is None else qd)[-1].tip
 
     def line(
         self, q: np.ndarray, link: int, s: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """x [m], y [m] and the tangent's angle [rad] of link `link` (from 1) at arc lengths s (S,) from its proximal end (3)."""
+        """x, y [m] and the tangent's angle [rad] of a link (from 1) at s (S,) [m] along it (2)."""
         state = self.structure.states(q, np.zeros(self.n))[link - 1]
         frames = [self.structure.at(state, float(x)) for x in np.atleast_1d(s)]
         place = np.array([f.place for f in frames])
@@ -161,7 +157,7 @@ class Assembly:
         return out
 
     def _clamped_mass(self, i: int, q: np.ndarray) -> np.ndarray:
-        """M (n, n) of link i alone, straight and clamped to the base, with the payload if it is the last one (20)."""
+        """M (n, n) of link i alone, straight and clamped, with the payload of the last one (18)."""
         straight, still = np.zeros(self.n), np.zeros(self.n)
         straight[self.rows[i]] = q[self.rows[i]]
         state = self.structure.link(i, base(self.n), straight, still)

@@ -1,6 +1,7 @@
-"""Frames and lines of a chain, each with its columns: the rates of its place and angle with respect to all unknowns.
+"""Frames and lines of a chain with their columns: rates of place and angle by all unknowns.
 
-Places are complex numbers x + iy in the base's axes, so that i turns a vector to the left. n unknowns; P points of a line.
+Places are complex numbers x + iy in the base's axes, so that i turns a vector to the left.
+n unknowns; P points of a line. Equations: docs/theory/mechanics.md.
 """
 
 from __future__ import annotations
@@ -15,10 +16,10 @@ from ..link.quadrature import lagrange, lagrange_integrals
 
 @dataclass(frozen=True)
 class Frame:
-    """A place and an angle that move with the robot (1).
+    """A place and an angle that move with the robot (13).
 
-    place [m], angle [rad]; velocity (n,) complex and turning (n,): columns of their rates; rest and rest_turning: their second
-    derivatives at zero accelerations of the unknowns.
+    place [m], angle [rad]; velocity (n,) complex and turning (n,): columns of their rates; rest and
+    rest_turning: their second derivatives at zero accelerations of the unknowns.
     """
 
     place: complex
@@ -40,7 +41,7 @@ def base(n: int) -> Frame:
 
 
 def turned(frame: Frame, angle: float, row: int | None = None) -> Frame:
-    """The frame turned by an angle, which is the unknown `row` (None: a constant) (1)."""
+    """The frame turned by an angle, which is the unknown `row` (None: a constant)."""
     turning = frame.turning.copy()
     if row is not None:
         turning[row] += 1.0
@@ -48,7 +49,7 @@ def turned(frame: Frame, angle: float, row: int | None = None) -> Frame:
 
 
 def ahead(frame: Frame, x: float, rows: list[int], qd: np.ndarray) -> Frame:
-    """The frame moved by x along its own x axis, where x changes at the rate of the sum of the unknowns `rows` (1)."""
+    """The frame moved by x [m] along its x axis; the unknowns `rows` are summands of x."""
     t, spin = frame.tangent, frame.turning @ qd
     velocity = frame.velocity + 1j * x * t * frame.turning
     velocity[rows] += t
@@ -58,10 +59,12 @@ def ahead(frame: Frame, x: float, rows: list[int], qd: np.ndarray) -> Frame:
 
 @dataclass(frozen=True)
 class Line:
-    """A piece's line in a state: tangents e (P,), their columns E (P, n) and their second derivatives at rest N (P,) (2), (3).
+    """A piece's line in a state: tangents e (P,), their columns E (P, n), and N (P,) (1), (2).
 
-    start: the frame at xi = 0. free [m]: the length d on which xi = s/d runs; row: the unknown that d is (None: constant).
-    own: the slice of the piece's unknowns.
+    N: second derivatives of e at zero accelerations of the unknowns.
+
+    start: the frame at xi = 0. free [m]: the length d on which xi = s/d runs. row: the unknown that
+    d is (None: constant). own: the slice of the piece's unknowns.
     """
 
     piece: Piece
@@ -81,9 +84,18 @@ class Line:
         return 0.0 if self.row is None else float(self.qd[self.row])
 
 
-def line(piece: Piece, start: Frame, axis: Frame, own: slice, free: float, row: int | None, q: np.ndarray, qd: np.ndarray,
-         linear: bool = False) -> Line:  # fmt: skip
-    """The line of a piece that begins at a frame; with `linear` the dissertation's, on the x axis of the link's hub `axis` (3), (26)."""
+def line(
+    piece: Piece,
+    start: Frame,
+    axis: Frame,
+    own: slice,
+    free: float,
+    row: int | None,
+    q: np.ndarray,
+    qd: np.ndarray,
+    linear: bool = False,
+) -> Line:
+    """The line of a piece that begins at a frame (1); with `linear` (12) on the hub's frame `axis`."""
     angle = start.angle + piece.B @ q[own]
     columns = np.tile(start.turning, (piece.points, 1))
     columns[:, own] += piece.B
@@ -103,9 +115,9 @@ def line(piece: Piece, start: Frame, axis: Frame, own: slice, free: float, row: 
 
 
 def station(line: Line, xi: float, slider: int | None = None) -> Frame:
-    """The frame of a line at xi (11): of a material point, or of a slider whose position is the unknown `slider`.
+    """The frame of a line at xi (11): of a material point, or of a slider at the unknown `slider`.
 
-    d xi' = eta' + (1 - xi) d', so that a material point behind the tip of a sleeved link runs through the mesh.
+    d xi' = eta' + (1 - xi) d', so that a material point of a sleeved link runs through the mesh.
     """
     d, start, shapes = line.free, line.start, line.piece.shapes
     at = np.array([xi])

@@ -1,4 +1,4 @@
-"""Moving masses: points and turning lumps with their columns, whose sum is M(q), the bias and gravity."""
+"""Moving masses with their columns: their sums are M(q), the bias and gravity."""
 
 from __future__ import annotations
 
@@ -11,7 +11,11 @@ from .kinematics import Frame, Line
 
 @dataclass(frozen=True)
 class Masses:
-    """Masses (G,) [kg] at places (G,), with columns (G, n) of their velocities and second derivatives at rest (G,) (4)."""
+    """Point masses and their motion (13).
+
+    mass (G,) [kg], place (G,) [m]; columns (G, n) of their velocities; rest (G,): accelerations at
+    zero accelerations of the unknowns.
+    """
 
     mass: np.ndarray
     place: np.ndarray
@@ -21,7 +25,7 @@ class Masses:
 
 @dataclass(frozen=True)
 class Turning:
-    """A moment of inertia [kg m^2] that turns with a frame, with the columns (n,) of its angle (4)."""
+    """A moment of inertia [kg m^2] that turns with a frame, with columns (n,) (13)."""
 
     inertia: float
     columns: np.ndarray
@@ -44,7 +48,7 @@ def turning(inertia: float, frame: Frame) -> Turning:
 
 
 def line_masses(line: Line) -> Masses:
-    """The mass points of a piece of constant length (4)."""
+    """The mass points of a piece of constant length (2)."""
     start, w = line.start, line.piece.w
     return Masses(
         line.piece.mass,
@@ -55,12 +59,12 @@ def line_masses(line: Line) -> Masses:
 
 
 def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Scalar products of vectors as complex numbers, summed over the points: (G, n) and (G,) or (G, k)."""
+    """Scalar products of columns a (G, n) with b (G,) or (G, k), summed over the points."""
     return np.real(a.conj().T @ b)
 
 
 def mass_matrix(n: int, parts: list[Part]) -> np.ndarray:
-    """M (n, n), the sum of J^T m J (15)."""
+    """M (n, n), the sum of J^T m J (14)."""
     M = np.zeros((n, n))
     for p in parts:
         if isinstance(p, Masses):
@@ -71,7 +75,7 @@ def mass_matrix(n: int, parts: list[Part]) -> np.ndarray:
 
 
 def inertia_forces(n: int, parts: list[Part]) -> np.ndarray:
-    """The sum of J^T m (second derivatives at rest), (n,) (16)."""
+    """The sum of J^T m a, a the accelerations at zero ones of the unknowns (15): (n,)."""
     h = np.zeros(n)
     for p in parts:
         h += (
@@ -83,14 +87,14 @@ def inertia_forces(n: int, parts: list[Part]) -> np.ndarray:
 
 
 def weight(n: int, parts: list[Part], gravity: complex) -> np.ndarray:
-    """Generalised gravity forces on the left-hand side, (n,) (17)."""
+    """Generalised gravity forces on the left-hand side, (n,) (16)."""
     return -sum(
         (dot(p.columns, p.mass * gravity) for p in parts if isinstance(p, Masses)), np.zeros(n)
     )
 
 
 def potential(parts: list[Part], gravity: complex) -> float:
-    """The potential energy of gravity [J] (17)."""
+    """The potential energy of gravity [J] (16)."""
     return -sum(
         float(np.real(np.conj(gravity) * (p.mass @ p.place)))
         for p in parts

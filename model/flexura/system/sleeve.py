@@ -1,4 +1,4 @@
-"""A flexible link that slides through a sleeve (Pb): its mesh covers the free length d, xi = s/d, and moves with it."""
+"""A flexible link that slides through a sleeve (Pb): its mesh covers the free length (8), (9)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .masses import Masses, Part, dot, lump
 
 
 def masses(line: Line, law: Material) -> list[Part]:
-    """The masses of a sleeved link: its free length, the rod behind, and at the exit what quadrature misses of its mass (12)."""
+    """The masses of a sleeved link: free length, rod, and at the exit what the sums miss (9)."""
     assert line.row is not None
     free, rod = free_masses(line, law), rod_behind(line.start, line.free, line.row, law, line.qd)
     return [
@@ -21,7 +21,7 @@ def masses(line: Line, law: Material) -> list[Part]:
 
 
 def free_masses(line: Line, law: Material) -> Masses:
-    """The masses of the Gauss points on the free length, with the velocity of the material that is there (12), (13)."""
+    """The Gauss points on the free length, with the velocity of the material there (8), (9)."""
     d, piece, start = line.free, line.piece, line.start
     flow = piece.C + np.diag(1 - piece.xi)
     columns = start.velocity + d * piece.C @ line.E
@@ -31,7 +31,7 @@ def free_masses(line: Line, law: Material) -> Masses:
 
 
 def _mass(line: Line, law: Material) -> tuple[np.ndarray, np.ndarray]:
-    """mu = rho A d w of the Gauss points and d mu / dd at fixed xi (12): (P,), (P,)."""
+    """mu = rho A d w of the Gauss points and d mu / dd at fixed xi (8): (P,), (P,)."""
     d, xi, w = line.free, line.piece.xi, line.piece.weights
     X = law.length - d + d * xi
     density, slope = law.mass_per_length(X), law.mass_per_length(X, 1)
@@ -39,7 +39,7 @@ def _mass(line: Line, law: Material) -> tuple[np.ndarray, np.ndarray]:
 
 
 def flow_forces(line: Line, law: Material) -> np.ndarray:
-    """What Lagrange's equations of the free length and the rod behind have beside J^T mu times accelerations, (n,) (14)."""
+    """The terms of (9) beside columns times mass times accelerations, without dU: (n,)."""
     d_rate, start, row = line.rate, line.start, line.row
     masses, (mu, mu_d) = free_masses(line, law), _mass(line, law)
     V, left = (masses.columns - start.velocity) @ line.qd, mu * (1 - line.piece.xi)
@@ -54,17 +54,19 @@ def flow_forces(line: Line, law: Material) -> np.ndarray:
 
 
 def rod_behind(start: Frame, free: float, row: int, law: Material, qd: np.ndarray) -> Masses:
-    """The masses of the straight rest of the link behind the exit, on the sleeve's axis (12)."""
+    """The masses of the straight rod inside and behind the sleeve, on its axis (9)."""
     s, ds = law.quadrature(0.0, law.length - free, 4)
     frames = [ahead(start, x, [row], qd) for x in s - law.length + free]
     return Masses(
-        law.mass_per_length(s) * ds, np.array([f.place for f in frames]), np.array([f.velocity for f in frames]),
+        law.mass_per_length(s) * ds,
+        np.array([f.place for f in frames]),
+        np.array([f.velocity for f in frames]),
         np.array([f.rest for f in frames]),
-    )  # fmt: skip
+    )
 
 
 def stiffness(line: Line, law: Material, derivative: int = 0) -> np.ndarray:
-    """K(d) [N m] of the free length, or its first or second derivative by d (12): (m, m)."""
+    """K(d) [N m] of the free length, or its first or second derivative by d (17): (m, m)."""
     d, xi, w = line.free, line.piece.xi, line.piece.weights
     X, left = law.length - d + d * xi, 1 - xi
     EI, slope, bend = (law.bending_stiffness(X, k) for k in range(3))

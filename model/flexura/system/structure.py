@@ -1,4 +1,4 @@
-"""The chain of links of a robot: numbering of the unknowns, and the frames, lines and masses of every link in a state."""
+"""The chain of a robot: numbering, and the frames, lines and masses of every link in a state."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .masses import Part, line_masses, lump, turning
 
 @dataclass(frozen=True)
 class LinkState:
-    """A link in a state q, qd: the frame of its hub (of Pb: of the sleeve's exit), its lines (none: rigid), its tip."""
+    """A link in a state q, qd: frame of its hub (Pb: exit), its lines (none: rigid), its tip."""
 
     index: int
     q: np.ndarray
@@ -31,7 +31,10 @@ class LinkState:
 
 @dataclass(frozen=True)
 class Structure:
-    """A robot's links as pieces, numbered q = [joint 1, elastic unknowns of link 1, joint 2, ...]; `linear`: the line r = (s, psi)."""
+    """A robot's links as pieces, numbered q = [joint 1, elastic unknowns of link 1, joint 2, ...].
+
+    `linear`: the dissertation's line (12).
+    """
 
     robot: Robot
     links: tuple[tuple[Piece, ...], ...]
@@ -81,14 +84,14 @@ class Structure:
         return self.robot.links[i].joint.type == "Pb"
 
     def states(self, q: np.ndarray, qd: np.ndarray) -> list[LinkState]:
-        """The links in a state, from the base outwards (1), (2), (11)."""
+        """The links in a state, from the base outwards (13)."""
         out: list[LinkState] = []
         for i in range(len(self.links)):
             out.append(self.link(i, self._hub(i, out[-1] if out else None, q, qd), q, qd))
         return out
 
     def link(self, i: int, hub: Frame, q: np.ndarray, qd: np.ndarray) -> LinkState:
-        """Link i in a state, from the frame of its hub to its tip (2)."""
+        """Link i in a state, from the frame of its hub to its tip (1), (2)."""
         row = self.rows[i]
         if not self.links[i]:
             return LinkState(
@@ -102,7 +105,7 @@ class Structure:
         return LinkState(i, q, qd, hub, tuple(lines), frame)
 
     def _along(self, i: int, s: float, q: np.ndarray) -> tuple[float, list[int]]:
-        """How far s on link i is ahead of its hub or exit, and the unknowns that this depends on (11)."""
+        """How far s on link i is ahead of its hub or exit [m], and the unknowns in it."""
         return (
             (s - self.robot.links[i].length_m + q[self.rows[i]], [self.rows[i]])
             if self.sleeved(i)
@@ -110,7 +113,7 @@ class Structure:
         )
 
     def _hub(self, i: int, before: LinkState | None, q: np.ndarray, qd: np.ndarray) -> Frame:
-        """The frame of link i's hub (of Pb: of the sleeve's exit) on the link before it (1)."""
+        """The frame of link i's hub (of Pb: of the sleeve's exit) on the link before it (11)."""
         joint, row = self.robot.links[i].joint, self.rows[i]
         tip = before.tip if before else base(self.n)
         if joint.type == "R":
@@ -125,7 +128,7 @@ class Structure:
         return turned(ahead(before.hub, x, [row, *rows], qd), joint.angle_rad)
 
     def at(self, state: LinkState, s: float) -> Frame:
-        """The frame of a link at arc length s from its proximal end; behind the exit of a sleeve it is on the sleeve's axis."""
+        """The frame of a link at arc length s [m] from its proximal end (2), (11)."""
         x, rows = self._along(state.index, s, state.q)
         if not state.lines or x < 0:
             return ahead(state.hub, x, rows, state.qd)
@@ -134,7 +137,7 @@ class Structure:
         return station(state.lines[k], x / h - k)
 
     def masses(self, state: LinkState) -> list[Part]:
-        """A link's masses: its material, its hub, and the payload of the last one (4), (12)."""
+        """A link's masses: its material, its hub, and the payload of the last one (3)."""
         joint = self.robot.links[state.index].joint
         return self.own_masses(state) + [
             lump(joint.hub_mass_kg, state.hub),
@@ -173,7 +176,7 @@ def structure(robot: Robot, linear: bool | None = None) -> Structure:
 
 
 def rigid_body(robot: Robot, i: int) -> tuple[float, float, float]:
-    """Mass [kg], centre from the proximal end [m] and inertia about the centre [kg m^2] of rigid link i."""
+    """Mass [kg], centre [m] from the proximal end, inertia [kg m^2] about it, of rigid link i."""
     link = robot.links[i]
     if link.mass_kg is not None:
         centre = link.length_m / 2 if link.centre_of_mass_m is None else link.centre_of_mass_m
