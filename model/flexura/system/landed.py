@@ -8,15 +8,15 @@ from functools import cached_property
 
 import numpy as np
 
-from . import extended
-from .beam import LinkIntegrals, shape
-from .chain import SLEEVE, Chain, Work, workspace
-from .errors import InputError
-from .modes import eigh
-from .newton_euler import inverse
-from .outward import outward
-from .robot import Robot
-from .run import STATIONS
+from .. import extended
+from ..beam import LinkIntegrals, shape
+from ..chain import SLEEVE, Chain, Work, workspace
+from ..errors import InputError
+from ..modes import eigh
+from ..newton_euler import inverse
+from ..outward import outward
+from ..robot import Robot
+from ..run import STATIONS
 
 
 @dataclass(frozen=True)
