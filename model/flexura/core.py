@@ -42,3 +42,6 @@ _core = load(os.environ.get("FLEXURA_CORE", ""))
 
 level: str = _core.level  # the build in use, a key of BUILDS
 compiler: str = _core.compiler  # what compiled it
+
+Mechanics = _core.Mechanics  # the equations of one robot, from the rows of system/constants.py
+Fault = _core.Fault  # what the core refuses: args are the link (from 0; -1: none), the key and what was expected
