@@ -22,13 +22,17 @@ struct Search {
 Search newton(Still &still, const TipLoad &load, double share, bool descend, Numbers &q) {
   Search out;
   const std::size_t n = q.size();
-  Numbers step(n), trial(n);
-  double size, V = still.energy(q.data(), load, share, size), slope;
+  Numbers slope(n), step(n), trial(n);
+  double size, V = still.energy(q.data(), load, share, size);
   const int most = descend ? 20 * MOST_SWEEPS : MOST_SWEEPS;
   while (out.sweeps++ < most) {
-    const int wrong = still.newton(q.data(), load, share, descend, step.data(), slope);
+    const int wrong = still.tangent(load, share, 0.0, descend);
     out.falls = wrong > 0;
     if (wrong > 0 && !descend) return out;
+    still.gradient(q.data(), load, share, slope.data());
+    still.solve(slope.data(), step.data());
+    double fall = 0.0;
+    for (std::size_t i = 0; i < n; ++i) step[i] = -step[i], fall += slope[i] * step[i];
     out.residual = still.turn(step.data());
     if (!(out.residual < 1e6)) return out;
     if (out.residual < SMALL && wrong == 0) {
@@ -40,7 +44,7 @@ Search newton(Still &still, const TipLoad &load, double share, bool descend, Num
       }
       continue;
     }
-    if (slope == 0.0) {  // in balance at a place that is no minimum
+    if (fall == 0.0) {  // in balance at a place that is no minimum
       out.found = wrong == 0;
       return out;
     }
@@ -48,7 +52,7 @@ Search newton(Still &still, const TipLoad &load, double share, bool descend, Num
     for (int halvings = 0; halvings < 30; ++halvings, length *= 0.5) {  // V falls by a tenth of what the tangent says, or more
       for (std::size_t i = 0; i < n; ++i) trial[i] = q[i] + length * step[i];
       trial_V = still.energy(trial.data(), load, share, size);
-      if (trial_V - V <= 0.1 * length * (1.0 - 0.5 * length) * slope + 1e-15 * size) break;
+      if (trial_V - V <= 0.1 * length * (1.0 - 0.5 * length) * fall + 1e-15 * size) break;
     }
     q = trial, V = trial_V;
   }

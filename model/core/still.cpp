@@ -28,19 +28,20 @@ void next_hub(const Piece<double> &c, const Piece<double> *next, const double *q
   out.a.assign(at + c.P, at + c.P + c.m);
 }
 
-// First moments and stiffness of a sleeved piece at its free length d, (8).
+// First moments, inertia and stiffness of a sleeved piece at its free length d, (8).
 void sleeve_constants(const Piece<double> &c, double d, bool last, StillPiece &out) {
   const int m = c.m, P = c.P;
   for (int p = 0; p < P; ++p) {
     const Matter<double> here = matter_at(c, c.length + d * (c.xi[p] - 1.0));
     const double mu = here.mass * d * c.weight[p], stiffness = here.stiffness * c.weight[p] / d;
-    for (int j = 0; j < P; ++j) out.s[j] += mu * d * c.C[p * P + j];
+    for (int j = 0; j < P; ++j) out.s[j] += mu * d * c.C[p * P + j], out.R.push_back(std::sqrt(mu) * d * c.C[p * P + j]);
     for (int i = 0; i < m; ++i)
       for (int k = 0; k < m; ++k) out.K[i * m + k] += stiffness * c.bend[i * padded(P) + p] * c.bend[k * padded(P) + p];
   }
   if (last)
-    for (int j = 0; j < P; ++j) out.s[j] += c.payload * d * c.w[j];
-  out.rod = behind(c, c.length - d).first;
+    for (int j = 0; j < P; ++j) out.s[j] += c.payload * d * c.w[j], out.R.push_back(std::sqrt(c.payload) * d * c.w[j]);
+  const Behind<double> inside = behind(c, c.length - d);
+  out.rod = inside.first, out.hub += inside.second;
 }
 
 }  // namespace
@@ -52,7 +53,8 @@ Still::Still(const Model<double> &model, const double *q, const char *free)
     const Piece<double> &c = model.pieces[i];
     const int m = c.m, P = c.P;
     StillPiece out;
-    out.m = m, out.P = P, out.own = c.own(), out.B = c.B, out.mass = c.mass, out.angle = c.angle;
+    out.m = m, out.P = P, out.own = c.own(), out.B = c.B, out.angle = c.angle;
+    out.mass = c.mass, out.hub = c.hub, out.rotor = c.rotor, out.tip = i + 1 == count ? c.tip : 0.0;
     if (c.joint == At::revolute) {
       if (free && free[c.link])
         out.joint = c.first;
@@ -65,11 +67,12 @@ Still::Still(const Model<double> &model, const double *q, const char *free)
     if (c.joint == At::sleeve) {
       sleeve_constants(c, q[c.first], i + 1 == count, out);
     } else {
-      out.s.assign(c.moment, c.moment + P);
+      out.s.assign(c.moment, c.moment + P), out.R.assign(c.R, c.R + P * P);
       for (int k = 0; k < m; ++k) out.K[k * m + k] = c.K[k];
     }
     out.sine.assign(padded(P), 0.0), out.cosine.assign(padded(P), 0.0), out.J.assign(3 * (m + 1), 0.0);
-    out.L.assign(m * m, 0.0), out.D.assign(m, 0.0), out.tail.assign(4 * m, 0.0);
+    std::copy(out.a.begin(), out.a.end(), out.J.begin() + 2 * (m + 1) + 1), out.J[2 * (m + 1)] = 1.0;
+    out.L.assign(m * m, 0.0), out.D.assign(m, 0.0), out.tail.assign(3 * m, 0.0);
     pieces_.push_back(std::move(out));
   }
 }
@@ -112,108 +115,168 @@ double Still::energy(const double *q, const TipLoad &load, double share, double 
   return V - px - py - turned;
 }
 
-int Still::newton(const double *q, const TipLoad &load, double share, bool descend, double *step, double &slope) {
+void Still::gradient(const double *q, const TipLoad &load, double share, double *out) const {
+  const double gx = share * gravity_[0], gy = share * gravity_[1];
+  Vec3<double> b{-share * load.force[0], -share * load.force[1], -share * load.moment};  // V by the next hub's place and angle
+  std::fill(out, out + n_, 0.0);
+  for (std::size_t i = pieces_.size(); i-- > 0;) {
+    const StillPiece &c = pieces_[i];
+    const int m = c.m, P = c.P;
+    double *own = out + c.own;
+    for (int k = 0; k < m; ++k) {
+      own[k] = c.a[k] * b.t;
+      for (int l = 0; l < m; ++l) own[k] += c.K[k * m + l] * q[c.own + l];
+    }
+    if (c.rod != 0.0) b.t += c.rod * (gx * c.hub_sine - gy * c.hub_cosine);
+    for (int j = 0; j < P; ++j) {  // V by Theta_j
+      const double moment = (c.s[j] * gx - c.w[j] * b.x) * c.sine[j] - (c.s[j] * gy - c.w[j] * b.y) * c.cosine[j];
+      b.t += moment;
+      for (int k = 0; k < m; ++k) own[k] += moment * c.B[k * padded(P) + j];
+    }
+    b.x -= c.mass * gx, b.y -= c.mass * gy;
+    if (c.joint >= 0) out[c.joint] = b.t;
+  }
+}
+
+namespace {
+
+// Rows of a piece: turning and own unknowns (a and k from 0), upper triangle, and their coupling with the hub's place.
+struct StillRows {
+  int wide;
+  std::vector<double> H, x, y, parts;  // parts (wide): the sizes of what was added to the diagonal
+  explicit StillRows(int count) : wide(count), H(count * count, 0.0), x(count, 0.0), y(count, 0.0), parts(count, 0.0) {}
+};
+
+// Second derivatives by Theta of a point: `curved` Theta' Theta'; turning (wide): Theta' by columns.
+void add_curved(StillRows &rows, double curved, const double *turning) {
+  for (int a = 0; a < rows.wide; ++a) {
+    rows.parts[a] += std::fabs(curved) * turning[a] * turning[a];
+    for (int k = a; k < rows.wide; ++k) rows.H[a * rows.wide + k] += curved * turning[a] * turning[k];
+  }
+}
+
+// shift times the piece's M: the sum of squares (4), first moments, inertias of hub and payload. T (P, wide): Theta' of the points.
+void add_mass(StillRows &rows, const StillPiece &c, double shift, const double *T) {
+  const int wide = rows.wide, P = c.P;
+  std::vector<double> zx(wide), zy(wide);
+  for (std::size_t p = 0; p < c.R.size(); p += std::size_t(P)) {
+    std::fill(zx.begin(), zx.end(), 0.0), std::fill(zy.begin(), zy.end(), 0.0);
+    for (int j = 0; j < P; ++j)
+      for (int a = 0; a < wide; ++a)
+        zx[a] += c.R[p + j] * c.cosine[j] * T[j * wide + a], zy[a] += c.R[p + j] * c.sine[j] * T[j * wide + a];
+    for (int a = 0; a < wide; ++a)
+      for (int k = a; k < wide; ++k) rows.H[a * wide + k] += shift * (zx[a] * zx[k] + zy[a] * zy[k]);
+  }
+  for (int j = 0; j < P; ++j)
+    for (int a = 0; a < wide; ++a)
+      rows.x[a] -= shift * c.s[j] * c.sine[j] * T[j * wide + a], rows.y[a] += shift * c.s[j] * c.cosine[j] * T[j * wide + a];
+  rows.x[0] -= shift * c.rod * c.hub_sine, rows.y[0] += shift * c.rod * c.hub_cosine;
+  rows.H[0] += shift * c.hub;
+  const double *jt = c.J.data() + 2 * wide;
+  for (int a = 0; a < wide; ++a)
+    for (int k = a; k < wide; ++k) rows.H[a * wide + k] += shift * c.tip * jt[a] * jt[k];
+}
+
+}  // namespace
+
+int Still::tangent(const TipLoad &load, double share, double shift, bool descend) {
   const double gx = share * gravity_[0], gy = share * gravity_[1];
   double fx = -share * load.force[0], fy = -share * load.force[1];  // the true force on the next hub: V by its place
   Sym3<double> A{0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
-  Vec3<double> b{fx, fy, -share * load.moment};
   int wrong = 0;
-  auto watched = [&](double pivot, double parts) {  // a pivot, and what it is made of
-    if (pivot > NONE * parts) return pivot;
+  auto inverse_of = [&](double pivot, double parts) {  // a pivot, and the size of what it is made of
+    if (pivot > NONE * parts) return 1.0 / pivot;
     ++wrong;
-    return descend ? std::max(std::fabs(pivot), 1e-6 * parts + 1e-300) : (pivot == 0.0 ? 1e-300 : pivot);
+    return 1.0 / (descend ? std::max(std::fabs(pivot), 1e-6 * parts + 1e-300) : (pivot == 0.0 ? 1e-300 : pivot));
   };
-  std::vector<double> H, parts, F;
+  std::vector<double> T;
   for (std::size_t i = pieces_.size(); i-- > 0;) {
     StillPiece &c = pieces_[i];
     const int m = c.m, P = c.P, wide = m + 1;
     double *jx = c.J.data(), *jy = jx + wide, *jt = jy + wide;
-    std::fill(c.J.begin(), c.J.end(), 0.0);
-    H.assign(wide * (wide + 1), 0.0), parts.assign(wide, 0.0), F.assign(3 * wide, 0.0);  // H: last column the gradient
-    auto add_point = [&](double moment, double w, double sine, double cosine, auto turning) {
-      const double across = moment * (gx * sine - gy * cosine);  // gradient by Theta of -g . s e
-      const double curved = (moment * gx - w * fx) * cosine + (moment * gy - w * fy) * sine;
-      for (int a = 0; a < wide; ++a) {
-        const double ta = turning(a);
-        jx[a] -= w * sine * ta, jy[a] += w * cosine * ta;
-        H[a * (wide + 1) + wide] += across * ta;
-        parts[a] += std::fabs(curved) * ta * ta;
-        for (int k = a; k < wide; ++k) H[a * (wide + 1) + k] += curved * ta * turning(k);
-      }
-    };
-    for (int j = 0; j < P; ++j)
-      add_point(c.s[j], c.w[j], c.sine[j], c.cosine[j], [&](int a) { return a == 0 ? 1.0 : c.B[(a - 1) * padded(P) + j]; });
-    if (c.rod != 0.0) add_point(c.rod, 0.0, c.hub_sine, c.hub_cosine, [](int a) { return a == 0 ? 1.0 : 0.0; });
-    jt[0] = 1.0;
-    for (int k = 0; k < m; ++k) jt[1 + k] = c.a[k];
-    for (int a = 0; a < wide; ++a) {
+    StillRows rows(wide);
+    T.assign(P * wide, 1.0);
+    std::fill(jx, jt, 0.0);
+    for (int j = 0; j < P; ++j) {
+      double *turning = T.data() + j * wide;
+      for (int k = 0; k < m; ++k) turning[1 + k] = c.B[k * padded(P) + j];
+      for (int a = 0; a < wide; ++a) jx[a] -= c.w[j] * c.sine[j] * turning[a], jy[a] += c.w[j] * c.cosine[j] * turning[a];
+      add_curved(rows, (c.s[j] * gx - c.w[j] * fx) * c.cosine[j] + (c.s[j] * gy - c.w[j] * fy) * c.sine[j], turning);
+    }
+    const double behind = c.rod * (gx * c.hub_cosine + gy * c.hub_sine);
+    rows.H[0] += behind, rows.parts[0] += std::fabs(behind);
+    if (shift != 0.0) add_mass(rows, c, shift, T.data());
+    for (int a = 0; a < wide; ++a) {  // J^T A J
       const Vec3<double> pull = A * Vec3<double>{jx[a], jy[a], jt[a]};
-      F[a] = pull.x, F[wide + a] = pull.y, F[2 * wide + a] = pull.t;
-      H[a * (wide + 1) + wide] += jx[a] * b.x + jy[a] * b.y + jt[a] * b.t;
-      for (int k = 0; k <= a; ++k) H[k * (wide + 1) + a] += jx[k] * pull.x + jy[k] * pull.y + jt[k] * pull.t;
+      rows.x[a] += pull.x, rows.y[a] += pull.y;
+      for (int k = 0; k <= a; ++k) rows.H[k * wide + a] += jx[k] * pull.x + jy[k] * pull.y + jt[k] * pull.t;
     }
     for (int k = 0; k < m; ++k) {
-      double bent = 0.0;
-      for (int l = 0; l < m; ++l) bent += c.K[k * m + l] * q[c.own + l];
-      H[(1 + k) * (wide + 1) + wide] += bent, parts[1 + k] += c.K[k * m + k];
-      for (int l = k; l < m; ++l) H[(1 + k) * (wide + 1) + 1 + l] += c.K[k * m + l];
+      rows.parts[1 + k] += c.K[k * m + k];
+      for (int l = k; l < m; ++l) rows.H[(1 + k) * wide + 1 + l] += c.K[k * m + l];
     }
     fx -= c.mass * gx, fy -= c.mass * gy;
-    b.x -= c.mass * gx, b.y -= c.mass * gy;
-    Sym3<double> I{A.xx, A.xy, F[0], A.yy, F[wide], H[0]};
-    Vec3<double> p{b.x, b.y, H[wide]};
-    double *tail = c.tail.data();
-    for (int k = 0; k < m; ++k) {
-      tail[4 * k] = F[1 + k], tail[4 * k + 1] = F[wide + 1 + k], tail[4 * k + 2] = H[1 + k];
-      tail[4 * k + 3] = H[(1 + k) * (wide + 1) + wide];
-    }
+    Sym3<double> I{A.xx + shift * c.mass, A.xy, rows.x[0], A.yy + shift * c.mass, rows.y[0], rows.H[0]};
+    for (int k = 0; k < m; ++k)
+      c.tail[3 * k] = rows.x[1 + k], c.tail[3 * k + 1] = rows.y[1 + k], c.tail[3 * k + 2] = rows.H[1 + k];
     for (int j = 0; j < m; ++j) {  // own rows: L D L^T
-      const double *row = H.data() + (1 + j) * (wide + 1) + 1;
-      const double pivot = watched(row[j], parts[1 + j] + std::fabs(row[j])), inverse = 1.0 / pivot;
+      const double *row = rows.H.data() + (1 + j) * wide + 1, *coupled = c.tail.data() + 3 * j;
+      const double inverse = inverse_of(row[j], rows.parts[1 + j] + std::fabs(row[j]));
       c.D[j] = inverse;
       for (int k = j + 1; k < m; ++k) {
         const double lower = row[k] * inverse;
         c.L[k * m + j] = lower;
-        for (int l = k; l < m; ++l) H[(1 + k) * (wide + 1) + 1 + l] -= lower * row[l];
-        for (int l = 0; l < 4; ++l) tail[4 * k + l] -= lower * tail[4 * j + l];
+        for (int l = k; l < m; ++l) rows.H[(1 + k) * wide + 1 + l] -= lower * row[l];
+        for (int l = 0; l < 3; ++l) c.tail[3 * k + l] -= lower * coupled[l];
       }
-      const Vec3<double> hub{tail[4 * j], tail[4 * j + 1], tail[4 * j + 2]};
-      subtract(I, hub, inverse);
-      p = p + (-inverse * tail[4 * j + 3]) * hub;
+      subtract(I, Vec3<double>{coupled[0], coupled[1], coupled[2]}, inverse);
     }
-    A = I, b = p;
-    if (c.joint >= 0) {  // a free joint turns the hub; the hub before keeps its own angle
-      const double pivot = watched(A.tt, std::fabs(H[0]) + parts[0] + std::fabs(A.tt));
-      c.joint_pivot = 1.0 / pivot, c.joint_rest = b.t;
-      c.joint_pull[0] = A.xt, c.joint_pull[1] = A.yt, c.joint_pull[2] = A.tt;
-      const Vec3<double> pull{A.xt, A.yt, A.tt};
-      subtract(A, pull, c.joint_pivot);
-      b = b + (-c.joint_pivot * c.joint_rest) * pull;
-    }
+    A = I;
+    if (c.joint < 0) continue;
+    c.pull = {A.xt, A.yt, A.tt};  // a free joint turns the hub
+    c.inverse = inverse_of(A.tt + shift * c.rotor, std::fabs(rows.H[0]) + rows.parts[0] + std::fabs(A.tt));
+    subtract(A, c.pull, c.inverse);
   }
-  std::fill(step, step + n_, 0.0);
-  slope = 0.0;
+  return wrong;
+}
+
+void Still::solve(const double *r, double *x) const {
+  std::fill(x, x + n_, 0.0);
+  Vec3<double> b{0.0, 0.0, 0.0};  // what is asked of the next hub
+  for (std::size_t i = pieces_.size(); i-- > 0;) {
+    const StillPiece &c = pieces_[i];
+    const int m = c.m, wide = m + 1;
+    const double *jx = c.J.data(), *jy = jx + wide, *jt = jy + wide;
+    double *own = x + c.own;
+    for (int k = 0; k < m; ++k) own[k] = r[c.own + k] + jx[1 + k] * b.x + jy[1 + k] * b.y + jt[1 + k] * b.t;
+    b.t = jx[0] * b.x + jy[0] * b.y + b.t;
+    for (int j = 0; j < m; ++j) {
+      const double share = c.D[j] * own[j], *tail = c.tail.data() + 3 * j;
+      for (int k = j + 1; k < m; ++k) own[k] -= c.L[k * m + j] * own[j];
+      b.x -= share * tail[0], b.y -= share * tail[1], b.t -= share * tail[2];
+    }
+    if (c.joint < 0) continue;
+    x[c.joint] = r[c.joint] + b.t;
+    b = b + (-c.inverse * x[c.joint]) * c.pull;
+  }
   Vec3<double> u{0.0, 0.0, 0.0};
   for (const StillPiece &c : pieces_) {
     const int m = c.m, wide = m + 1;
+    const double *jx = c.J.data(), *jy = jx + wide, *jt = jy + wide;
     if (c.joint >= 0) {
-      const double turning = -c.joint_pivot * (c.joint_rest + c.joint_pull[0] * u.x + c.joint_pull[1] * u.y + c.joint_pull[2] * u.t);
-      slope -= c.joint_rest * c.joint_rest * c.joint_pivot;
-      step[c.joint] = turning, u.t += turning;
+      x[c.joint] = c.inverse * (x[c.joint] - dot(c.pull, u));
+      u.t += x[c.joint];
     }
-    double *own = step + c.own;
+    double *own = x + c.own;
     for (int k = m - 1; k >= 0; --k) {
-      const double *tail = c.tail.data() + 4 * k;
-      slope -= tail[3] * tail[3] * c.D[k];
-      own[k] = -c.D[k] * (tail[0] * u.x + tail[1] * u.y + tail[2] * u.t + tail[3]);
+      const double *tail = c.tail.data() + 3 * k;
+      own[k] = c.D[k] * (own[k] - tail[0] * u.x - tail[1] * u.y - tail[2] * u.t);
       for (int j = k + 1; j < m; ++j) own[k] -= c.L[j * m + k] * own[j];
     }
-    const double *jx = c.J.data(), *jy = jx + wide, *jt = jy + wide;
     Vec3<double> t{u.x + jx[0] * u.t, u.y + jy[0] * u.t, u.t};
-    for (int k = 0; k < m; ++k) t.x += jx[1 + k] * own[k], t.y += jy[1 + k] * own[k], t.t += jt[1 + k] * own[k];
+    for (int k = 0; k < m; ++k) t = t + own[k] * Vec3<double>{jx[1 + k], jy[1 + k], jt[1 + k]};
     u = t;
   }
-  return wrong;
 }
 
 double Still::turn(const double *step) const {
