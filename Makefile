@@ -64,7 +64,7 @@ core: SETTINGS := -DFLEXURA_LEVEL=$(LEVEL)
 core-sanitize: FOLDER := build/core-sanitize
 core-sanitize: SETTINGS := -DFLEXURA_SANITIZE=ON
 core core-sanitize: $(READY)
-	@$(VENV)/bin/cmake -S . -B $(FOLDER) -G Ninja -DCMAKE_MAKE_PROGRAM=$(CURDIR)/$(VENV)/bin/ninja -DFLEXURA_STRICT=ON $(SETTINGS) --log-level=WARNING
+	@$(VENV)/bin/cmake -S . -B $(FOLDER) -G Ninja -DCMAKE_MAKE_PROGRAM=$(CURDIR)/$(VENV)/bin/ninja -DFLEXURA_STRICT=ON $(SETTINGS) >/dev/null
 	@$(VENV)/bin/cmake --build $(FOLDER) --parallel $(JOBS)
 	@$(VENV)/bin/ctest --test-dir $(FOLDER) --parallel $(JOBS) --output-on-failure
 
