@@ -72,7 +72,7 @@ def test_one_compiler_of_any_name_is_enough_for_the_core(name, monkeypatch):
     assert setup.without_compiler(lambda what: what == "g++-13") == []
 
 
-@pytest.mark.parametrize(("apt", "command"), [(True, "sudo apt-get install -y --no-install-recommends g++"), (False, "xcode-select --install")])
+@pytest.mark.parametrize(("apt", "command"), [(True, "apt-get install -y"), (False, "xcode-select --install")])
 def test_without_a_compiler_nothing_goes_on_and_a_command_brings_one(apt, command):
     stop, message = setup.verdict(setup.without_compiler(nothing), apt, "sudo ")
     assert stop and "the core of the solver cannot be compiled" in message and command in message
@@ -162,7 +162,8 @@ def test_what_compiles_the_core_has_a_tested_version():
 def test_the_core_is_compiled_again_when_a_file_of_it_changes():
     """What the Makefile says is needed for the stamp of the core: the files, and their folders for those that come and go."""
     text = (ROOT / "Makefile").read_text(encoding="utf-8")
-    assert "$(CORE): $(READY) CMakeLists.txt $(shell find model/core)" in text and "$(COMPILED): $(CORE)" in text
+    assert "$(CORE): $(READY) CMakeLists.txt $(shell find model/core)" in text
+    assert "$(COMPILED): $(CORE)" in text
 
 
 def test_every_dependency_has_an_exact_tested_version():
@@ -174,7 +175,8 @@ def test_every_dependency_has_an_exact_tested_version():
     project, wanted = tables["project"], tables["build-system"]
     lines = (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()
     exact = dict(line.split("==") for line in lines if not line.startswith("#"))
-    for text in project["dependencies"] + wanted["requires"] + [text for extra in project["optional-dependencies"].values() for text in extra]:
+    extras = [text for extra in project["optional-dependencies"].values() for text in extra]
+    for text in project["dependencies"] + wanted["requires"] + extras:
         requirement = Requirement(text)
         if requirement.name == project["name"]:  # an extra that takes in others
             continue

@@ -51,7 +51,7 @@ LIBRARIES = [
 ]
 COMPILER = Need("a C++ compiler", "g++", "the core of the solver cannot be compiled", True)
 COMPILERS = ["c++", "g++", "clang++"]
-ELSEWHERE = "A C++ compiler comes with `xcode-select --install` on macOS, `dnf install gcc-c++` on Fedora, `pacman -S gcc` on Arch."
+ELSEWHERE = "For a C++ compiler type `xcode-select --install` on macOS, `dnf install gcc-c++` on Fedora, `pacman -S gcc` on Arch."
 NO_FIRMWARE, NO_EMULATOR = "the board's firmware cannot be built", "no emulated board"
 BOARD = [
     Need("avr-g++", "gcc-avr", NO_FIRMWARE, False),
@@ -200,13 +200,20 @@ def set_up(venv: Path) -> None:
     unfinished.unlink()
 
 
+def level() -> str:
+    """The instructions that the core's C++ tests may use here; the Python module is built for each level anyway."""
+    flags = Path("/proc/cpuinfo")
+    return "x86-64-v3" if flags.exists() and {"avx2", "bmi2", "fma", "movbe"} <= set(flags.read_text().split()) else ""
+
+
 def build_core(venv: Path) -> None:
     """Compiles what is new in the core and puts its modules beside flexura/core.py."""
     python, cmake = str(venv / "bin/python"), str(venv / "bin/cmake")
     if needs := without_compiler(has):
-        raise Stop(verdict(needs, bool(shutil.which("apt-get")), "sudo " if os.geteuid() else "")[1])
-    folder = ROOT / "build" / "module-{}.{}".format(*sys.version_info)
-    settings = ["-DFLEXURA_MODULE=ON", f"-DCMAKE_MAKE_PROGRAM={venv / 'bin/ninja'}", f"-DPython_EXECUTABLE={python}"]
+        raise Stop(verdict(needs, bool(shutil.which("apt-get")), "sudo " if os.geteuid() and shutil.which("sudo") else "")[1])
+    folder, strict = ROOT / "build" / "core", "ON" if os.environ.get("STRICT") else "OFF"
+    settings = ["-DFLEXURA_MODULE=ON", f"-DFLEXURA_LEVEL={level()}", f"-DFLEXURA_STRICT={strict}",
+                f"-DCMAKE_MAKE_PROGRAM={venv / 'bin/ninja'}", f"-DPython_EXECUTABLE={python}"]
     step("configuring the core", [cmake, "-S", str(ROOT), "-B", str(folder), "-G", "Ninja", *settings])
     jobs = str(os.cpu_count() or 1)
     step("compiling the core (a minute the first time)", [cmake, "--build", str(folder), "--parallel", jobs])

@@ -34,8 +34,8 @@ class Build:
         self.run(CMAKE, "-S", ROOT, "-B", self.folder, "-G", "Ninja", *settings)
 
     def run(self, *command: object) -> str:
-        done = subprocess.run([*map(str, command)], env=self.environment, stdin=subprocess.DEVNULL, capture_output=True, text=True,
-                              cwd=self.programs)
+        arguments = {"stdin": subprocess.DEVNULL, "capture_output": True, "text": True}
+        done = subprocess.run([*map(str, command)], env=self.environment, cwd=self.programs, **arguments)
         assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-4000:]
         return done.stdout
 
@@ -106,8 +106,8 @@ def test_a_vector_of_another_type_or_order_is_converted(other):
 
 
 def in_a_new_process(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    path = os.pathsep.join([str(ROOT / "model"), str(ROOT / "analysis")])
-    return subprocess.run([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": path} | environment, capture_output=True, text=True)
+    surroundings = os.environ | {"PYTHONPATH": str(ROOT / "model")} | environment
+    return subprocess.run([sys.executable, "-c", code], env=surroundings, capture_output=True, text=True)
 
 
 def test_the_environment_chooses_the_build():
