@@ -28,7 +28,7 @@ template <class Real> class Acts {
         set_lane(stiffness[i], k, d.kp), set_lane(damping[i], k, d.kd);
       }
       gains.push_back(stiffness[i]), gains.push_back(damping[i]);
-      damping[i] += plant.viscous[i];
+      if (!held[i]) damping[i] += plant.viscous[i];  // of a held joint the reaction is all that there is
     }
     for (int k = 0; k < LANES; ++k) calls |= static_cast<bool>(of[k]->function);
     scratch.assign(2 * plant.n + plant.joints, 0.0);
@@ -65,6 +65,7 @@ template <class Real> class Acts {
   void load(const Real *q, const Real *v) {
     call(q, v);
     for (int i = 0; i < plant.joints; ++i) {
+      if (held[i]) continue;
       force[plant.first[i]] = constant(i);
       if (rubs(i)) force[plant.first[i]] -= plant.coulomb[i] * tanh(v[plant.first[i]] * (1.0 / COULOMB_SPEED));
       damping[i] = gains[2 * i + 1] + plant.viscous[i];
@@ -77,6 +78,7 @@ template <class Real> class Acts {
   void load_stage(const Real *q, const Real *v, bool first) {
     call(q, v);
     for (int i = 0; i < plant.joints; ++i) {
+      if (held[i]) continue;
       Real &f = force[plant.first[i]];
       f = constant(i), damping[i] = gains[2 * i + 1] + plant.viscous[i];
       if (!rubs(i)) continue;
