@@ -96,26 +96,34 @@ template <class Real> inline Real hyperbolic_tangent(Real x) {
   return choose_less(x, Real(0.0), -t, t);
 }
 
-// The exponent k and the fraction f of a normal number x = 2^k f with sqrt(1/2) <= f < sqrt(2).
-inline double exponent_of(double x) {
-  return static_cast<double>(static_cast<std::int64_t>((bits(x) - 0x3fe6a09e667f3bcdu) >> 52 << 52) / (std::int64_t{1} << 52));
+// A normal number x > 0 is 2^k f with sqrt(1/2) <= f < sqrt(2): gives k, and puts f in the place of x.
+inline double split_exponent(double &x) {
+  const std::uint64_t whole = (bits(x) - 0x3fe6a09e667f3bcdu) >> 52 << 52;
+  x = from_bits(bits(x) - whole);
+  return static_cast<double>(static_cast<std::int64_t>(whole) / (std::int64_t{1} << 52));
 }
-template <int N> inline Pack<N> exponent_of(Pack<N> x) {
-  return lanewise(x, [](double z) { return exponent_of(z); });
+template <int N> inline Pack<N> split_exponent(Pack<N> &x) {
+  Pack<N> k;
+  for (int lane = 0; lane < N; ++lane) {
+    double f = x[lane];
+    k.set(lane, split_exponent(f));
+    x.set(lane, f);
+  }
+  return k;
 }
 
 // ln x of a normal number x > 0 (2.2e-308 and more), within 1.5 units in the last place. With f = x/2^k - 1 and s = f/(2 + f),
-// ln(1 + f) = 2 s + s R(s^2); the series is that of fdlibm. Zero, negative numbers and infinity give what is not a number.
+// ln(1 + f) = 2 s + s R(s^2); the series is that of fdlibm. Zero, subnormal and negative numbers and infinity give
+// what is not a number.
 template <class Real> inline Real natural_logarithm(Real x) {
-  const Real k = exponent_of(x), f = x * power_of_two(-k) - 1.0, s = f / (2.0 + f), z = s * s;
+  Real fraction = x;
+  const Real k = split_exponent(fraction), f = fraction - 1.0, s = f / (2.0 + f), z = s * s;
   const Real r5 = 0x1.7466496cb03dep-3 + z * (0x1.39a09d078c69fp-3 + z * 0x1.2f112df3e5244p-3);
   const Real r3 = 0x1.2492494229359p-2 + z * (0x1.c71c51d8e78afp-3 + z * r5);
   const Real r = z * (0x1.5555555555593p-1 + z * (0x1.999999997fa04p-2 + z * r3));
   const Real half = 0.5 * f * f;
   const Real y = k * 0x1.62e42feep-1 - ((half - (s * (half + r) + k * 0x1.a39ef35793c76p-33)) - f);
-  const Real none = (x - x) / (x - x);
-  const Real top = choose_less(x, Real(0x1.fffffffffffffp+1023), y, choose_less(Real(0x1.fffffffffffffp+1023), x, none, y));
-  return choose_less(x, Real(0x1p-1022), none, top);
+  return choose_less(x, Real(0x1p-1022), Real(NAN), choose_less(x, Real(INFINITY), y, Real(NAN)));
 }
 
 inline double exp(double x) { return exponential(x); }
