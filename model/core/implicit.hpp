@@ -57,9 +57,10 @@ template <class Real> class Implicit : public Method<Real> {
     std::copy(K[0] + n, K[0] + 2 * n, a.data());
     for (int s = 1; s < 6; ++s) {
       known(h, s);
-      const Real missed = solve(smaller(t + h * esdirk::C[s], last), h * esdirk::GAMMA);
-      refused = larger(refused, missed);
-      if (least(refused) > 0.0) return Real(this->REFUSED);
+      refused = larger(refused, solve(smaller(t + h * esdirk::C[s], last), h * esdirk::GAMMA));
+      bool none = true;
+      for (int k = 0; k < this->LANES; ++k) none = none && lane(refused, k) != 0.0;
+      if (none) return refused;
       std::copy(znew + n, znew + 2 * n, K[s]);
       std::copy(a.begin(), a.begin() + n, K[s] + n);
       c.rates(znew, znew + n, K[s] + 2 * n);
@@ -70,7 +71,7 @@ template <class Real> class Implicit : public Method<Real> {
       znew[k] = c.z[k] + h * sum;
     }
     K.sum(nullptr, h, esdirk::E, 6, c.error.data());
-    return choose_less(Real(0.5), refused, Real(this->REFUSED), c.weights.norm(c.error.data(), znew));
+    return larger(refused, c.weights.norm(c.error.data(), znew));
   }
 
   void accept(const Real &which) override { take(which, K[5], K[0], c.size); }
@@ -112,7 +113,8 @@ template <class Real> class Implicit : public Method<Real> {
     c.acts.prescribe(c.znew.data(), c.znew.data() + n);
   }
 
-  // Passes until a, which comes as a guess, moves no more; a lane that is done keeps its numbers. 1 for lanes that did not converge.
+  // Passes until a, which comes as a guess, moves no more; a lane that is done keeps its numbers.
+  // REFUSED where they did not converge, what is not a number where the equations gave that; else 0.
   Real solve(const Real &time, const Real &gh) {
     const int n = c.n;
     Real *q = c.znew.data(), *v = q + n;
@@ -136,7 +138,7 @@ template <class Real> class Implicit : public Method<Real> {
         const bool near = m < TIGHT || (turn && rate < 0.9 && m * rate / (1.0 - rate) < TIGHT);
         const bool far = !(m < 1e12) || (turn > 2 && rate > 0.9) || turn == MOST - 1;
         if (near || far) set_lane(open, k, 0.0);
-        if (far && !near) set_lane(missed, k, 1.0);
+        if (far && !near) set_lane(missed, k, std::isfinite(m) ? this->REFUSED : m - m);
       }
       before = moved;
       if (worst(open) == 0.0) break;
