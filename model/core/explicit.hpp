@@ -122,8 +122,8 @@ template <class Real> class Explicit : public Method<Real> {
   // The longest stable step where the lanes `due` are.
   void look(const Real &due) {
     if (!(worst(due) > 0.0)) return;
-    const Real fastest = c.plant.fastest(c.z.data());
-    const Real limit = STABLE / fastest;
+    const Real *q = c.z.data(), *v = q + c.n;
+    const Real limit = STABLE / c.plant.fastest(q, c.acts.pass(q, v, q, v, Real(0.0), Real(0.0)));
     take(due, &limit, &longest, 1);
     for (int k = 0; k < this->LANES; ++k)
       if (lane(due, k) > 0.0) age[k] = 0;

@@ -17,7 +17,8 @@ template <class Real> struct Masses : Plant<Real> {
     for (int i = 0; i <= joints; ++i) this->first.push_back(i * (1 + elastic));
     this->locked.assign(joints, false);
     this->viscous.assign(joints, Real(0.0)), this->coulomb.assign(joints, Real(0.0));
-    this->lever.assign(this->n, Real(1.0));
+    this->lever.assign(this->n, Real(1.0)), this->deflect = this->lever;
+    for (int i = 0; i < joints; ++i) this->deflect[this->first[i]] = Real(0.0);
     stiffness.assign(this->n, Real(0.0)), damping = gravity = stiffness;
   }
 
@@ -26,11 +27,11 @@ template <class Real> struct Masses : Plant<Real> {
     for (int i = 0; i < this->joints; ++i)
       for (int k = this->first[i]; k < this->first[i + 1]; ++k) {
         const bool joint = k == this->first[i];
-        const Real s = joint ? stiffness[k] + p.stiffness[i] : stiffness[k], d = joint ? damping[k] + p.damping[i] : damping[k];
+        const Real s = joint ? stiffness[k] + p.stiffness[i] : stiffness[k], d = joint ? damping[k] + p.damping[i] + this->viscous[i] : damping[k];
         Real sine, cosine;
         sincos(p.q[k], sine, cosine);
         const Real rest = p.force[k] - s * p.ys[k] - d * p.vs[k] - gravity[k] * sine;
-        if (joint && p.held[i]) a[k] = p.given[i], reaction[i] = a[k] + stiffness[k] * p.q[k] + damping[k] * p.v[k] + gravity[k] * sine;
+        if (joint && p.held[i]) a[k] = p.given[i], reaction[i] = a[k] + stiffness[k] * p.q[k] + (damping[k] + this->viscous[i]) * p.v[k] + gravity[k] * sine;
         else a[k] = rest / (1.0 + p.gq * s + p.gv * d);
       }
   }
@@ -43,7 +44,7 @@ template <class Real> struct Masses : Plant<Real> {
     for (int k = 0; k < this->n; ++k) sum += 0.5 * (v[k] * v[k] + stiffness[k] * q[k] * q[k]);
     return sum;
   }
-  Real fastest(const Real *) override {
+  Real fastest(const Real *, const Pass<Real> &) override {
     Real most = 0.0;
     for (int k = 0; k < this->n; ++k) most = larger(most, larger(root(stiffness[k]), damping[k]));
     return most;

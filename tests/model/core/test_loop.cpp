@@ -65,7 +65,7 @@ template <class M> double order(int coarse) { return std::log2(oscillator_error<
 struct Recorder : Sampler {
   std::vector<double> t, place;
   double gain = 0.0;
-  void tick(long k, double now, const double *q, const double *v, Held &held) override {
+  void tick(long k, double now, const double *q, const double *v, SampledOutput &held) override {
     CHECK(k == static_cast<long>(t.size()));
     t.push_back(now), place.push_back(q[0]);
     held.force[0] = -gain * q[0] - 0.1 * gain * v[0];
