@@ -9,4 +9,5 @@ MODULE(FLEXURA_MODULE_NAME, module) {
   module.attr("compiler") = flexura::build_compiler();
   module.attr("portable") = flexura::build_portable();
   flexura::bind_numbers(module);
+  flexura::bind_mechanics(module);
 }
