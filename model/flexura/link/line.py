@@ -5,17 +5,29 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
 from ..robot import Link
 from .modes import clamped_matrices, clamped_modes
-from .quadrature import collocation, gauss, lagrange_integrals
+from .quadrature import collocation, gauss, lagrange, lagrange_integrals
 from .section import Material, material
 from .shapes import ElementShapes, WholeShapes
 
 ELEMENT_POINTS = 3
 MOST_SHAPES = 20  # polynomials of a whole link
+
+
+class Place(NamedTuple):
+    """Weights w_j / length (P,) and shapes b_k (m,) at a place xi, with derivatives by xi (2), (11)."""
+
+    w: np.ndarray
+    l: np.ndarray
+    dl: np.ndarray
+    b: np.ndarray
+    db: np.ndarray
+    ddb: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -59,10 +71,21 @@ class Piece:
         """The shapes at the points (1): (P, m)."""
         return self.shapes(self.xi)
 
+    def at(self, xi: float) -> Place:
+        """Weights and shapes at a place xi."""
+        s = np.array([xi])
+        lines = [lagrange_integrals(self.points, s), *(lagrange(self.points, s, k) for k in (0, 1))]
+        return Place(*(f[0] for f in lines), *(self.shapes(s, k)[0] for k in (0, 1, 2)))
+
+    @cached_property
+    def tip(self) -> Place:
+        """Weights and shapes at the tip."""
+        return self.at(1.0)
+
     @cached_property
     def B_tip(self) -> np.ndarray:
         """The shapes at the tip: (m,)."""
-        return self.shapes(np.ones(1))[0]
+        return self.tip.b
 
     @cached_property
     def w(self) -> np.ndarray:

@@ -39,14 +39,21 @@ def clamped_modes(
     With `statics` the static shapes of a tip force and a tip moment join them, and the modes of
     this smaller space are given. Each mode moves the tip to the left.
     """
-    lam, V = eigh(K, M)
+    lam, V = _modes(M, K)
     if kept < len(K):
         lam, V = lam[:kept], V[:, :kept]
         if statics:
             V = np.column_stack([V, _rest_of_static_shapes(K, tip, lam, V)])
-            lam, X = eigh(V.T @ K @ V, V.T @ M @ V)
+            lam, X = _modes(V.T @ M @ V, V.T @ K @ V)
             V = V @ X
     return V * np.where(tip[0] @ V < 0, -1.0, 1.0), lam
+
+
+def _modes(M: np.ndarray, K: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """omega^2 (m,) ascending and mass-normalised modes (m, m); M x = mu K x keeps low ones exact."""
+    mu, X = eigh(M, K)
+    mu, X = np.maximum(mu[::-1], 1e-300), X[:, ::-1]
+    return 1 / mu, X / np.sqrt(mu)
 
 
 def _rest_of_static_shapes(

@@ -25,8 +25,14 @@ def cells(breaks: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
 def legendre(count: int, xi: np.ndarray, derivative: int = 0) -> np.ndarray:
     """Legendre's P_0 ... P_(count-1) at u = 2 xi - 1, or their derivatives by u: (S, count)."""
     u = 2 * np.atleast_1d(xi) - 1.0
-    lower = legder(np.eye(max(count, derivative + 1)), derivative, axis=0)[:, :count]
+    lower = _derivatives(count, derivative)
     return legvander(u, len(lower) - 1) @ lower
+
+
+@cache
+def _derivatives(count: int, order: int) -> np.ndarray:
+    """Derivatives of P_0 ... P_(count-1) as sums of Legendre's polynomials, in columns."""
+    return legder(np.eye(max(count, order + 1)), order, axis=0)[:, :count]
 
 
 def legendre_integrals(count: int, xi: np.ndarray) -> np.ndarray:
@@ -39,6 +45,7 @@ def legendre_integrals(count: int, xi: np.ndarray) -> np.ndarray:
     return out
 
 
+@cache
 def _lagrange(points: int) -> np.ndarray:
     """Lagrange's polynomials as sums of Legendre's (2): (points, points), column j is l_j."""
     xi, w = gauss(points)

@@ -36,12 +36,13 @@ class Assembly:
         self.structure = robot if isinstance(robot, Structure) else structure(robot, linear)
         self.robot, self.rows = self.structure.robot, self.structure.rows
         self.labels, self.n = self.structure.labels, self.structure.n
+        self._rotors = np.array([link.joint.rotor_inertia for link in self.robot.links])
         self._g = complex(*self.robot.gravity_m_s2)
 
     def mass(self, q: np.ndarray) -> np.ndarray:
         """M(q) (n, n) (14)."""
         M = masses.mass_matrix(self.n, self._parts(q, np.zeros(self.n)))
-        M[self.rows, self.rows] += [link.joint.rotor_inertia for link in self.robot.links]
+        M[self.rows, self.rows] += self._rotors
         return M
 
     def bias(self, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
@@ -120,7 +121,7 @@ class Assembly:
         """The energies in a state (29)."""
         parts = self._parts(q, qd)
         return Energies(
-            float(0.5 * qd @ self.mass(q) @ qd),
+            masses.kinetic(parts, qd) + 0.5 * float(self._rotors @ qd[self.rows] ** 2),
             float(0.5 * q @ self.stiffness_blocks(q) @ q),
             masses.potential(parts, self._g),
         )

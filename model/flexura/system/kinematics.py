@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..link.line import Piece
-from ..link.quadrature import lagrange, lagrange_integrals
 
 
 @dataclass(frozen=True)
@@ -119,17 +118,8 @@ def station(line: Line, xi: float, slider: int | None = None) -> Frame:
 
     d xi' = eta' + (1 - xi) d', so that a material point of a sleeved link runs through the mesh.
     """
-    d, start, shapes = line.free, line.start, line.piece.shapes
-    at = np.array([xi])
-    w, l, dl = (
-        f[0]
-        for f in (
-            lagrange_integrals(line.piece.points, at),
-            lagrange(line.piece.points, at),
-            lagrange(line.piece.points, at, 1),
-        )
-    )
-    b, db, ddb = (shapes(at, k)[0] for k in range(3))
+    d, start = line.free, line.start
+    w, l, dl, b, db, ddb = line.piece.tip if xi == 1.0 else line.piece.at(xi)
     flow = np.zeros(len(line.qd))
     if slider is not None:
         flow[slider] += 1.0

@@ -74,6 +74,15 @@ def mass_matrix(n: int, parts: list[Part]) -> np.ndarray:
     return M
 
 
+def kinetic(parts: list[Part], qd: np.ndarray) -> float:
+    """The kinetic energy of the masses [J] (14)."""
+    total = 0.0
+    for p in parts:
+        square = np.abs(p.columns @ qd) ** 2
+        total += 0.5 * float(p.mass @ square if isinstance(p, Masses) else p.inertia * square)
+    return total
+
+
 def inertia_forces(n: int, parts: list[Part]) -> np.ndarray:
     """The sum of J^T m a, a the accelerations at zero ones of the unknowns (15): (n,)."""
     h = np.zeros(n)
