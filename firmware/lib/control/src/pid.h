@@ -1,11 +1,7 @@
-// The extended PID of one joint, in integers.
-//
-//   u = kp e + ki sum(e) T + kd (r' - q') + kf w + kg w' + kv r' + kc sign(r')        e = r - q, w = tip deflection
-//
-// q' and w' are filtered differences (filter.h, tip.h), T = 1 tick. |u| <= limit, then |u - u of the tick before| <= slew.
-// The sum's part of u stays within the limit too, and stands still while limit or slew holds u back and e would push it further.
+// The extended PID of one joint (law.h) in integers.
 #pragma once
 #include "fixed.h"
+#include "law.h"
 
 namespace flexura {
 
@@ -36,19 +32,20 @@ struct PidSignals {
 // kf w + kg w', Q16 of u; deflection [10 um], its rate [10 um / 256 in two ticks].
 int32_t tip_term(const PidGains &gains, int16_t deflection, int16_t rate);
 
-class Pid {
- public:
-  void start(int16_t output) { integral_ = Sum(), output_ = output; }
-  int16_t update(const PidGains &gains, const PidSignals &in);
-  // Without a controller: brings the output to a wish, within limit and slew.
-  int16_t follow(const PidGains &gains, int32_t wish) { return output_ = held(gains, wish); }
-  int16_t output() const { return output_; }
+// The board's numbers. The law's sum is Q32 of u, its parts Q16.
+struct Integers {
+  using Output = int16_t;
+  using Wish = int32_t;
+  using Gains = PidGains;
+  using Signals = PidSignals;
+  using Sum = flexura::Sum;
 
- private:
-  int16_t held(const PidGains &gains, int32_t wish) const;
-
-  Sum integral_;          // Q32, u
-  int16_t output_ = 0;
+  static int16_t error(const PidGains &gains, const PidSignals &in) { return gains.fine ? flexura::narrow(in.error >> 4) : flexura::narrow(in.error >> 8); }
+  static int16_t difference(int16_t a, int16_t b) { return flexura::narrow(static_cast<int32_t>(a) - b); }
+  static int16_t narrow(int32_t wish) { return flexura::narrow(wish); }
 };
+
+extern template class Law<Integers>;
+using Pid = Law<Integers>;
 
 }  // namespace flexura
