@@ -81,6 +81,7 @@ class Controller : public Sampler {
   // The same from what is measured: positions of the joints (N), bend of the last flexible link.
   void step(long k, double t, const double *positions, const Bend &bend, SampledOutput &held);
 
+  const Model<double> &robot() const { return *robot_; }
   int count() const { return int(joints_.size()); }
   double rate_Hz() const { return rate_; }
   long ticks() const { return ticks_; }

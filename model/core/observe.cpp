@@ -1,6 +1,7 @@
 #include "observe.hpp"
 
 #include "quadrature.hpp"
+#include "tip.hpp"
 
 namespace flexura {
 namespace {
@@ -85,13 +86,10 @@ void Observer::observe(const double *y, const double *v, double *row) {
     if (!bends(model_, link)) continue;
     const auto &stations = stations_[std::size_t(link)];
     const int end = model_.begin[std::size_t(link) + 1], first = model_.kind[std::size_t(link)] == JointKind::sleeve ? end - 1 : model_.begin[std::size_t(link)];
-    double sine, cosine, slope = 0.0;
+    double sine, cosine;
     sincos(pose.angle, sine, cosine);
-    for (int i = first; i < end; ++i) {
-      const Piece<double> &c = model_.pieces[std::size_t(i)];
-      for (int l = 0; l < c.m; ++l) slope += c.tip_angle[l] * y[c.own() + l];
-    }
-    *out++ = across(hubs, stations.back(), y, first, sine, cosine), *out++ = slope;
+    const Bend tip = bend(model_, link, y);
+    *out++ = tip.deflection, *out++ = tip.slope;
     for (const Station &station : stations) *out++ = across(hubs, station, y, first, sine, cosine);
   }
   const Pose<double> &tip = poses[std::size_t(model_.links())];

@@ -15,15 +15,6 @@ constexpr double STEPS_A_TICK = 12.0;   // more than that on average, and a row 
 constexpr double FIRST = 1e-4;          // first step, in whole runs
 constexpr double CERTAIN = 1.0 + 1e-9;  // by which a cost must exceed its limit
 
-// The method for runs under a controller, by the robot's highest and lowest frequencies at the start.
-std::string chosen(const Plan &plan, Plant<double> &plant, const Acts<double> &acts) {
-  const std::vector<double> still(plan.start.size(), 0.0);
-  const double fast = plant.fastest(plan.start.data(), acts.pass(plan.start.data(), still.data(), plan.start.data(), still.data(), 0.0, 0.0));
-  const Modes lowest = natural_modes(*plan.robot, plan.start.data(), nullptr, 1);
-  const double slow = lowest.count > 0 ? std::sqrt(std::fmax(lowest.squares[0], 0.0)) : 0.0;
-  return quickest_between_ticks(1.0 / plan.controller.rate_Hz(), fast, slow, plan.rtol);
-}
-
 std::unique_ptr<Method<double>> made(const std::string &name, Course<double> &course) {
   if (name == "explicit-3") return std::make_unique<Pair<double>>(course, pairs::RALSTON);
   if (name == "explicit-5") return std::make_unique<Pair<double>>(course, pairs::CASH_KARP);
@@ -39,6 +30,18 @@ Acting driven(const Plan &plan, Controller &controller) {
 
 }  // namespace
 
+std::string method_between_ticks(const Model<double> &robot, Acting &acting, const double *q, double rtol) {
+  Workspace<double> work(robot);
+  ModelPlant<double> plant(robot, work);
+  Acting *list = &acting;
+  const Acts<double> acts(plant, &list);
+  const std::vector<double> still(std::size_t(robot.n), 0.0);
+  const double fast = plant.fastest(q, acts.pass(q, still.data(), q, still.data(), 0.0, 0.0));
+  const Modes lowest = natural_modes(robot, q, nullptr, 1);
+  const double slow = lowest.count > 0 ? std::sqrt(std::fmax(lowest.squares[0], 0.0)) : 0.0;
+  return quickest_between_ticks(1.0 / acting.rate_Hz, fast, slow, rtol);
+}
+
 // The memory of one run at a time.
 class Trial {
  public:
@@ -47,7 +50,7 @@ class Trial {
         list(&acting), loop(plant, &list, plan.t, plan.rtol), still(plan.start.size(), 0.0), at{plan.t.data(), int(plan.t.size())},
         samples((std::size_t(plan.joints()) + 1) * plan.t.size(), 0.0), strip(last_bending(*plan.robot)),
         end(plan.t.back() - plan.t.front()), ticks(long(std::ceil(end * controller.rate_Hz() - 1e-6))) {
-    method = plan.method == "auto" ? chosen(plan, plant, loop.course.acts) : plan.method;
+    method = plan.method == "auto" ? method_between_ticks(*plan.robot, acting, plan.start.data(), plan.rtol) : plan.method;
   }
 
   std::string method;

@@ -34,6 +34,10 @@ struct Plan {
   int figures() const { return JOINT_FIGURES * joints() + STRIP_FIGURES; }
 };
 
+// The method for a run from q (n) under a controller: that with the fewest passes between its ticks (pairs.hpp), by the robot's highest
+// and lowest frequencies there. `acting` is as the controller's `start` has left it.
+std::string method_between_ticks(const Model<double> &robot, Acting &acting, const double *q, double rtol);
+
 class Trial;
 
 class Trials {
