@@ -366,6 +366,37 @@ TEST("a budget of steps, an interruption") {
   CHECK(other.loop.clock[0].status == Status::interrupted);
 }
 
+TEST("a rehearsal leaves no trace") {
+  Masses<double> plant(1, 1);
+  plant.stiffness = {4.0, 900.0};
+  auto run = [&](bool rehearse) {
+    Recorder recorder;
+    recorder.gain = 5.0;
+    Acting acting(1);
+    acting.sampler = &recorder, acting.rate_Hz = 3.0;
+    Acting *list = &acting;
+    Loop<double> loop(plant, &list, grid(0.0, 2.0, 21), 1e-6);
+    Explicit<double> explicit_steps(loop.course);
+    Implicit<double> implicit_steps(loop.course);
+    const double q0[2] = {1.0, 0.1}, v0[2] = {0.0, 0.0};
+    loop.start(q0, v0, 1e-3);
+    while (loop.advance(explicit_steps, 20)) {
+      if (!rehearse) {
+        loop.restore(loop.snapshot());
+        continue;
+      }
+      const auto here = loop.snapshot();
+      loop.rehearsal = true;
+      loop.advance(implicit_steps, 30);
+      loop.rehearsal = false;
+      loop.restore(here);
+    }
+    CHECK(recorder.t.size() == 6);
+    return loop.record[0].state;
+  };
+  CHECK(run(true) == run(false));
+}
+
 TEST("a pack gives each robot the digits that it has alone") {
   for (bool implicit : {false, true}) {
     Masses<Pack<4>> four(1, 1);
