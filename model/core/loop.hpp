@@ -14,21 +14,11 @@
 #include <vector>
 
 #include "clock.hpp"
+#include "limits.hpp"
 #include "method.hpp"
+#include "record.hpp"
 
 namespace flexura {
-
-// What a run gives: rows of times, states (q, v, accounts) and drive forces.
-struct Record {
-  int rows = 0, size = 0, joints = 0;
-  std::vector<double> t, state, drive;
-
-  void open(int most, int state_size, int joint_count) {
-    size = state_size, joints = joint_count, rows = 0;
-    t.assign(most, 0.0), state.assign(static_cast<std::size_t>(most) * size, 0.0);
-    drive.assign(static_cast<std::size_t>(most) * joints, 0.0);
-  }
-};
 
 template <class Real> class Loop {
  public:
@@ -59,7 +49,7 @@ template <class Real> class Loop {
     for (int k = 0; k < LANES; ++k) {
       clock[k] = Clock();
       clock[k].t = clock[k].start = outputs.front(), clock[k].end = outputs.back(), clock[k].wish = first_step;
-      record[k].open(static_cast<int>(outputs.size()) + 1, course.size, course.plant.joints);
+      record[k].open(outputs.size() + 1, course.size, course.plant.joints);
     }
   }
 
@@ -70,6 +60,7 @@ template <class Real> class Loop {
     current = &method;
     for (long s = 0; s < steps && any(); ++s) {
       if (interrupt && interrupt->load(std::memory_order_relaxed)) end_all(Status::interrupted);
+      if (rehearsal && tick_due()) break;
       arrive(method);
       if (!any()) break;
       attempt(method);
@@ -84,6 +75,25 @@ template <class Real> class Loop {
     return std::any_of(clock.begin(), clock.end(), [](const Clock &c) { return c.running(); });
   }
 
+  // A rehearsal goes on from where the run is until the next tick, and is then undone: to try methods without telling a controller.
+  // (The caller's own functions would see time run backwards: do not rehearse with them.)
+  struct Snapshot {
+    std::array<Clock, LANES> clock;
+    std::array<int, LANES> rows;
+    std::vector<Real> z;
+    typename Weights<Real>::Sizes sizes;
+  };
+  Snapshot snapshot() const {
+    Snapshot out{clock, {}, course.z, course.weights.sizes()};
+    for (int k = 0; k < LANES; ++k) out.rows[k] = record[k].rows;
+    return out;
+  }
+  void restore(const Snapshot &from) {
+    clock = from.clock, course.z = from.z, course.weights.resume(from.sizes), current = nullptr;
+    for (int k = 0; k < LANES; ++k) record[k].rows = from.rows[k];
+  }
+  bool rehearsal = false;
+
  private:
   std::vector<double> outputs;
   std::array<std::vector<double>, LANES> breaks;
@@ -92,6 +102,14 @@ template <class Real> class Loop {
   Method<Real> *current = nullptr;
   Real at, length, last, error, good;
   bool prepared = false;
+
+  bool tick_due() const {
+    for (int k = 0; k < LANES; ++k)
+      if (clock[k].running() && clock[k].due(course.acts_of(k)) <= clock[k].t && clock[k].t < clock[k].end) return true;
+    return false;
+  }
+
+  int count() const { return int(outputs.size()); }
 
   void end_all(Status status) {
     for (Clock &c : clock)
@@ -130,9 +148,9 @@ template <class Real> class Loop {
     }
     for (int k = 0; k < LANES; ++k) {
       Clock &c = clock[k];
-      if (!c.running() || c.row >= static_cast<int>(outputs.size()) || outputs[c.row] > c.t) continue;
+      if (!c.running() || c.row >= count() || outputs[std::size_t(c.row)] > c.t) continue;
       keep(k, c.t, course.z.data());
-      if (c.row >= static_cast<int>(outputs.size())) c.status = Status::done;
+      if (c.row >= count()) c.status = Status::done;
     }
   }
 
@@ -157,7 +175,7 @@ template <class Real> class Loop {
     const double e = lane(error, k);
     if (!(e < 1.0)) return reject(method, k, e);
     const double passed_at = first_beyond(method, k);
-    while (c.row < static_cast<int>(outputs.size()) && outputs[c.row] < std::fmin(c.next, passed_at)) {
+    while (c.row < count() && outputs[c.row] < std::fmin(c.next, passed_at)) {
       between(method, k, outputs[c.row]);
       keep(k, outputs[c.row], row_state.data());
     }
@@ -177,7 +195,8 @@ template <class Real> class Loop {
     const bool over = c.steps + c.rejected >= most_steps;
     if (!over && !c.too_short(c.wish)) return;
     c.status = over ? Status::exhausted : std::isfinite(e) ? Status::stuck : Status::diverged;
-    blame(k);
+    const Spot spot = course.weights.worst_spot(course.error.data(), k);
+    c.joint = spot.joint, c.elastic = spot.elastic, c.rate = spot.rate;
   }
 
   // After all robots are judged: good steps are taken.
@@ -185,12 +204,12 @@ template <class Real> class Loop {
     if (worst(good) > 0.0) {
       method.accept(good);
       take(good, course.znew.data(), course.z.data(), course.size);
-      bool look = false;
+      Real look = 0.0;
       for (int k = 0; k < LANES; ++k) {
         if (lane(good, k) == 0.0) continue;
         Clock &c = clock[k];
         c.t = c.next;
-        look = look || c.steps % 8 == 0 || c.t == c.stop;
+        if (c.steps % 8 == 0 || c.t == c.stop) set_lane(look, k, 1.0);
         if (c.t == c.stop && c.t < c.end) c.fresh = true;
         if (c.t >= c.end) finish(k);
       }
@@ -205,7 +224,7 @@ template <class Real> class Loop {
 
   void finish(int k) {
     Clock &c = clock[k];
-    while (c.row < static_cast<int>(outputs.size())) keep(k, c.t, course.z.data());
+    while (c.row < count()) keep(k, c.t, course.z.data());
     if (c.running()) c.status = Status::done;
   }
 
@@ -237,60 +256,16 @@ template <class Real> class Loop {
     ++c.row;
   }
 
-  // A joint of robot k that is outside its limits in the state z, or -1.
-  int beyond(int k, const Real *z) {
-    const Acting &a = course.acts.acting(k);
-    for (int i = 0; i < course.plant.joints; ++i) {
-      const double place = lane(z[course.plant.first[i]], k);
-      if (!course.plant.locked[i] && !(a.low[i] <= place && place <= a.high[i])) return i;
-    }
-    return course.plant.blocked(k, z);
-  }
-
-  // The time inside the step at which robot k leaves its limits first, to a part in 1e13 of the step; NEVER: it does not.
-  // Looked for at the step's end, at the outputs on its way and, where a joint turns round in the step, at seven instants between.
+  // The time inside the step at which robot k leaves its limits first; NEVER: it does not.
   double first_beyond(Method<Real> &method, int k) {
     Clock &c = clock[k];
-    double inside = c.t, outside = Clock::NEVER;
-    auto look = [&](double t) {
-      if (outside < Clock::NEVER) return;
-      if (t < c.next) between(method, k, t);
-      (beyond(k, t < c.next ? row_state.data() : course.znew.data()) >= 0 ? outside : inside) = t;
-    };
-    if (turns(k))
-      for (int j = 1; j < 8; ++j) look(c.t + c.step * j / 8.0);
-    else
-      for (int j = c.row; j < static_cast<int>(outputs.size()) && outputs[j] < c.next && limited(k); ++j)
-        if (outputs[j] > inside) look(outputs[j]);
-    look(c.next);
-    if (outside == Clock::NEVER) return outside;
-    while (outside - inside > 1e-13 * c.step) {
-      const double middle = 0.5 * (inside + outside);
-      if (!(inside < middle && middle < outside)) break;
-      between(method, k, middle);
-      (beyond(k, row_state.data()) >= 0 ? outside : inside) = middle;
-    }
-    between(method, k, outside < c.next ? outside : inside);
-    c.joint = std::max(beyond(k, outside < c.next ? row_state.data() : course.znew.data()), 0);
-    return inside;
-  }
-
-  bool limited(int k) const {
-    const Acting &a = course.acts_of(k);
-    for (int i = 0; i < course.plant.joints; ++i)
-      if (std::isfinite(a.low[i]) || std::isfinite(a.high[i])) return true;
-    return false;
-  }
-
-  // Does a joint with limits turn round within the step?
-  bool turns(int k) const {
-    const Acting &a = course.acts_of(k);
-    for (int i = 0; i < course.plant.joints; ++i) {
-      if (!std::isfinite(a.low[i]) && !std::isfinite(a.high[i])) continue;
-      const int e = course.n + course.plant.first[i];
-      if (lane(course.z[e], k) * lane(course.znew[e], k) < 0.0) return true;
-    }
-    return false;
+    const Limits<Real> limits(course, k);
+    const Stretch step{c.t, c.next, outputs.data() + c.row, outputs.data() + outputs.size()};
+    return limits.first_beyond(step, c.joint, [&](double t) {
+      if (t >= c.next) return static_cast<const Real *>(course.znew.data());
+      between(method, k, t);
+      return static_cast<const Real *>(row_state.data());
+    });
   }
 
   void stop_at_limit(Method<Real> &method, int k, double t) {
@@ -301,24 +276,6 @@ template <class Real> class Loop {
       for (int j = 0; j < course.size; ++j) set_lane(course.z[j], k, lane(row_state[j], k));
     }
     c.t = t, c.status = Status::limit;
-  }
-
-  // Where robot k's last error was worst.
-  void blame(int k) {
-    Clock &c = clock[k];
-    double most = -1.0;
-    const auto &w = course.weights.weight;
-    for (int half = 0; half < 2; ++half)
-      for (int i = 0; i < course.plant.joints; ++i)
-        for (int elastic = 0; elastic < 2; ++elastic) {
-          const int e = half * course.n + course.plant.first[i], end = half * course.n + course.plant.first[i + 1];
-          double sum = 0.0;
-          for (int j = elastic ? e + 1 : e; j < (elastic ? end : e + 1); ++j) {
-            const double x = lane(course.error[j] * w[j], k);
-            sum += std::isfinite(x) ? x * x : 1e300;
-          }
-          if (sum > most) most = sum, c.joint = i, c.elastic = elastic, c.rate = half;
-        }
   }
 };
 

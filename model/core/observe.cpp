@@ -1,7 +1,6 @@
 #include "observe.hpp"
 
 #include "quadrature.hpp"
-#include "tip.hpp"
 
 namespace flexura {
 namespace {
@@ -19,6 +18,30 @@ std::vector<double> weights_at(int P, double x) {
 bool bends(const Model<double> &model, int link) { return model.elastic[std::size_t(link)] > 0; }
 
 }  // namespace
+
+int last_flexible(const Model<double> &model) {
+  int link = model.links() - 1;
+  while (link >= 0 && !bends(model, link)) --link;
+  return link;
+}
+
+Bend bend(const Model<double> &model, Workspace<double> &work, const double *y, int link) {
+  const int end = model.begin[std::size_t(link) + 1];
+  const int first = model.kind[std::size_t(link)] == JointKind::sleeve ? end - 1 : model.begin[std::size_t(link)];
+  Bend out;
+  double phi = 0.0, up = 0.0;  // in the hub's own axes
+  for (int i = first; i < end; ++i) {
+    const Piece<double> &c = model.pieces[std::size_t(i)];
+    Kept<double> &k = work.kept[std::size_t(i)];
+    const double *q = y + c.own(), scale = c.joint == At::sleeve ? y[c.first] : 1.0;
+    k.phi = phi, k.omega = 0.0;
+    turn(c, k, q, q, Free{c.m}, Free{c.P});
+    for (int j = 0; j < c.P; ++j) up += scale * c.w[j] * k.sine[j];
+    for (int l = 0; l < c.m; ++l) phi += c.tip_angle[l] * q[l];
+  }
+  out.deflection = up, out.slope = phi;
+  return out;
+}
 
 Observer::Observer(const Model<double> &model, int stations) : model_(model), work_(model), stations_(std::size_t(model.links())) {
   for (int link = 0; link < model.links(); ++link) {
@@ -66,6 +89,8 @@ double Observer::across(const std::vector<Hub<double>> &hubs, const Station &sta
 }
 
 void Observer::observe(const double *y, const double *v, double *row) {
+  std::vector<Bend> tips;
+  for (int link = 0; link < model_.links(); ++link) tips.push_back(bends(model_, link) ? bend(model_, work_, y, link) : Bend());
   const Energies<double> energy = energies(model_, work_, y, v);  // leaves the sweep without rates
   outward_kinematics(model_, work_, y, v);
   std::vector<Pose<double>> poses(std::size_t(model_.links()) + 1);
@@ -88,8 +113,7 @@ void Observer::observe(const double *y, const double *v, double *row) {
     const int end = model_.begin[std::size_t(link) + 1], first = model_.kind[std::size_t(link)] == JointKind::sleeve ? end - 1 : model_.begin[std::size_t(link)];
     double sine, cosine;
     sincos(pose.angle, sine, cosine);
-    const Bend tip = bend(model_, link, y);
-    *out++ = tip.deflection, *out++ = tip.slope;
+    *out++ = tips[std::size_t(link)].deflection, *out++ = tips[std::size_t(link)].slope;
     for (const Station &station : stations) *out++ = across(hubs, station, y, first, sine, cosine);
   }
   const Pose<double> &tip = poses[std::size_t(model_.links())];

@@ -3,9 +3,7 @@
 #include <atomic>
 #include <thread>
 
-#include "loop.hpp"
-#include "pairs.hpp"
-#include "spectrum.hpp"
+#include "methods.hpp"
 
 namespace flexura {
 namespace {
@@ -15,13 +13,6 @@ constexpr double STEPS_A_TICK = 12.0;   // more than that on average, and a row 
 constexpr double FIRST = 1e-4;          // first step, in whole runs
 constexpr double CERTAIN = 1.0 + 1e-9;  // by which a cost must exceed its limit
 
-std::unique_ptr<Method<double>> made(const std::string &name, Course<double> &course) {
-  if (name == "explicit-3") return std::make_unique<Pair<double>>(course, pairs::RALSTON);
-  if (name == "explicit-5") return std::make_unique<Pair<double>>(course, pairs::CASH_KARP);
-  if (name == "explicit") return std::make_unique<Explicit<double>>(course);
-  return std::make_unique<Implicit<double>>(course);
-}
-
 Acting driven(const Plan &plan, Controller &controller) {
   Acting acting = plan.acting;
   controller.start(acting, plan.start.data());
@@ -30,27 +21,17 @@ Acting driven(const Plan &plan, Controller &controller) {
 
 }  // namespace
 
-std::string method_between_ticks(const Model<double> &robot, Acting &acting, const double *q, double rtol) {
-  Workspace<double> work(robot);
-  ModelPlant<double> plant(robot, work);
-  Acting *list = &acting;
-  const Acts<double> acts(plant, &list);
-  const std::vector<double> still(std::size_t(robot.n), 0.0);
-  const double fast = plant.fastest(q, acts.pass(q, still.data(), q, still.data(), 0.0, 0.0));
-  const Modes lowest = natural_modes(robot, q, nullptr, 1);
-  const double slow = lowest.count > 0 ? std::sqrt(std::fmax(lowest.squares[0], 0.0)) : 0.0;
-  return quickest_between_ticks(1.0 / acting.rate_Hz, fast, slow, rtol);
-}
-
 // The memory of one run at a time.
 class Trial {
  public:
   explicit Trial(const Plan &shared)
       : plan(shared), work(*plan.robot), plant(*plan.robot, work), controller(plan.controller), acting(driven(plan, controller)),
         list(&acting), loop(plant, &list, plan.t, plan.rtol), still(plan.start.size(), 0.0), at{plan.t.data(), int(plan.t.size())},
-        samples((std::size_t(plan.joints()) + 1) * plan.t.size(), 0.0), strip(last_bending(*plan.robot)),
-        end(plan.t.back() - plan.t.front()), ticks(long(std::ceil(end * controller.rate_Hz() - 1e-6))) {
-    method = plan.method == "auto" ? method_between_ticks(*plan.robot, acting, plan.start.data(), plan.rtol) : plan.method;
+        samples((std::size_t(plan.joints()) + 1) * plan.t.size(), 0.0), strip(last_flexible(*plan.robot)),
+        end(plan.t.back() - plan.t.front()), ticks(long(std::ceil(end * controller.law().rate_Hz - 1e-6))) {
+    const double *q = plan.start.data();
+    const double fastest = plant.fastest(q, loop.course.acts.pass(q, still.data(), q, still.data(), 0.0, 0.0));
+    method = plan.method == "auto" ? explicit_for_ticks(1.0 / acting.rate_Hz, fastest, plan.rtol) : plan.method;
   }
 
   std::string method;
@@ -59,9 +40,9 @@ class Trial {
   double run(const Prices &prices, const double *gains, double limit, double *figures) {
     controller.set_gains(gains);
     controller.start(acting, plan.start.data());
-    loop.most_steps = long(STEPS_A_TICK * end * controller.rate_Hz());
+    loop.most_steps = long(STEPS_A_TICK * end * controller.law().rate_Hz);
     loop.start(plan.start.data(), still.data(), end * FIRST);
-    const std::unique_ptr<Method<double>> steps = made(method, loop.course);
+    const std::unique_ptr<Method<double>> steps = make_method(method, loop.course);
     const bool limited = std::isfinite(limit);
     bool lost = false;
     seen = counted = 0, spent = 0;
@@ -98,7 +79,6 @@ class Trial {
 
   double *row(int i) { return samples.data() + std::size_t(i) * plan.t.size(); }
   const double *reference(int i) const { return plan.reference.data() + std::size_t(i) * plan.t.size(); }
-  bool own(int i) const { return controller.joint(i).output != Output::none; }
 
   // Positions and deflection of the rows that the run has since got.
   void sample() {
@@ -106,17 +86,17 @@ class Trial {
     for (; seen < record.rows; ++seen) {
       const double *q = record.state.data() + std::size_t(seen) * std::size_t(record.size);
       for (int i = 0; i < plan.joints(); ++i) row(i)[seen] = q[plan.robot->first[std::size_t(i)]];
-      row(plan.joints())[seen] = strip < 0 ? 0.0 : bend(*plan.robot, strip, q).deflection;
+      row(plan.joints())[seen] = strip < 0 ? 0.0 : bend(*plan.robot, work, q, strip).deflection;
     }
   }
 
   // Sum of the squares of joint i's outputs over its limit, of the ticks from `begin` to before `end_`.
   double effort(int i, long begin, long end_) const {
     double sum = 0.0;
-    const double limit = controller.joint(i).gain[LIMIT];
+    const double limit = controller.law().joints[std::size_t(i)].gains.limit;
     if (!std::isfinite(limit)) return sum;
     for (long k = begin; k < end_; ++k) {
-      const double u = controller.log()[std::size_t((k * plan.joints() + i) * Controller::LOGGED + 1)] / limit;
+      const double u = controller.logged(k, i).output / limit;
       sum += u * u;
     }
     return sum;
@@ -127,7 +107,7 @@ class Trial {
     const int joints = plan.joints(), vibration = JOINT_FIGURES * joints + VIBRATION;
     const long done = std::min(controller.ticks(), ticks);
     for (int i = 0; i < joints; ++i) {
-      if (!own(i)) continue;
+      if (!controller.owns(i)) continue;
       double *each = figures + JOINT_FIGURES * i;
       joint_so_far(at, reference(i), row(i), counted, seen, each);
       each[EFFORT] += effort(i, spent, done) / double(ticks);
@@ -145,7 +125,7 @@ class Trial {
     sample();
     double settled = 0.0;
     for (int i = 0; i < plan.joints(); ++i) {
-      if (!own(i)) continue;
+      if (!controller.owns(i)) continue;
       double *each = figures + JOINT_FIGURES * i;
       joint_figures(at, reference(i), row(i), each);
       each[EFFORT] = effort(i, 0, ticks) / double(ticks);

@@ -28,15 +28,11 @@ struct Plan {
   std::vector<double> start;      // (n) at rest
   std::vector<double> reference;  // (N, T) of each joint, before any filter
   double rtol;
-  std::string method;             // "explicit-3", "explicit-5", "explicit", "implicit", or "auto"
+  std::string method;             // of `make_method`, or "auto": by the ticks
 
   int joints() const { return robot->links(); }
   int figures() const { return JOINT_FIGURES * joints() + STRIP_FIGURES; }
 };
-
-// The method for a run from q (n) under a controller: that with the fewest passes between its ticks (pairs.hpp), by the robot's highest
-// and lowest frequencies there. `acting` is as the controller's `start` has left it.
-std::string method_between_ticks(const Model<double> &robot, Acting &acting, const double *q, double rtol);
 
 class Trial;
 

@@ -13,7 +13,9 @@ void expect(bool good, const char *text) {
   if (!good) throw std::invalid_argument(text);
 }
 
-std::vector<double> numbers(const Numbers &array) { return std::vector<double>(array.data(), array.data() + array.size()); }
+using Cube = nb::ndarray<const double, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
+
+template <class Any> std::vector<double> numbers(const Any &array) { return std::vector<double>(array.data(), array.data() + array.size()); }
 
 Signal signal_of(const Matrix &segments, std::int64_t from, std::int64_t to) {
   expect(segments.shape(1) == 10, "segments have ten numbers");
@@ -22,39 +24,44 @@ Signal signal_of(const Matrix &segments, std::int64_t from, std::int64_t to) {
   return Signal(rows + from, rows + to);
 }
 
-LinearLaw linear_of(const std::vector<Numbers> &matrices, std::size_t joints) {
+// (F, G, L, C, K, Kr, Kv), (offset, hold); none: there is no linear law.
+LinearLaw linear_of(const std::vector<Matrix> &matrices, const std::vector<Vector> &about, std::size_t joints) {
   LinearLaw law;
   if (matrices.empty()) return law;
-  expect(matrices.size() == 9, "a linear law is F, G, L, C, K, Kr, Kv, offset, hold");
-  std::vector<double> *const to[] = {&law.F, &law.G, &law.L, &law.C, &law.K, &law.Kr, &law.Kv, &law.offset, &law.hold};
+  expect(matrices.size() == 7 && about.size() == 2, "a linear law is F, G, L, C, K, Kr, Kv, and offset, hold");
+  std::vector<double> *const to[] = {&law.F, &law.G, &law.L, &law.C, &law.K, &law.Kr, &law.Kv};
   for (std::size_t k = 0; k < matrices.size(); ++k) *to[k] = numbers(matrices[k]);
+  law.offset = numbers(about[0]), law.hold = numbers(about[1]);
   const std::size_t p = matrices[0].shape(0), m = law.offset.size();
   expect(law.F.size() == p * p && law.G.size() == p * joints && law.L.size() == p * m && law.C.size() == m * p && law.K.size() == joints * p,
          "the matrices of a linear law do not fit each other");
   expect(law.Kr.size() == joints * joints && law.Kv.size() == law.Kr.size() && law.hold.size() == joints && (m == joints || m == joints + 1),
          "the matrices of a linear law do not fit the joints");
-  law.states = int(p), law.joints = int(joints), law.measured = int(m);
+  law.states = int(p), law.measurements = int(m);
   return law;
 }
 
 // index (N, 5): output, reference from, to, feedforward from, to; gains (N, GAINS); springs (N, 2): stiffness, damping.
 std::unique_ptr<Controller> controller_of(const Mechanics &mechanics, double rate_Hz, double quantum, const Matrix &segments, const Counts &index,
-                                          const Matrix &gains, const Matrix &springs, const std::vector<Numbers> &linear) {
+                                          const Matrix &gains, const Matrix &springs, const std::vector<Matrix> &linear,
+                                          const std::vector<Vector> &about) {
   const std::size_t joints = mechanics.model->first.size();
   expect(index.shape(0) == joints && index.shape(1) == 5, "index has five numbers a joint");
   expect(gains.shape(0) == joints && gains.shape(1) == GAINS && springs.shape(0) == joints && springs.shape(1) == 2, "gains and springs need a row a joint");
-  std::vector<ControlledJoint> all;
+  std::vector<JointLaw> all;
+  std::vector<Coupling> couplings;
   for (std::size_t i = 0; i < joints; ++i) {
     const std::int64_t *row = index.data() + 5 * i;
     expect(0 <= row[0] && row[0] <= 2, "there is no such output");
-    ControlledJoint joint;
-    joint.output = Output(row[0]);
+    JointLaw joint;
+    joint.output = JointLaw::Output(row[0]);
     joint.reference = signal_of(segments, row[1], row[2]), joint.feedforward = signal_of(segments, row[3], row[4]);
-    std::copy(gains.data() + GAINS * i, gains.data() + GAINS * (i + 1), joint.gain);
-    joint.stiffness = springs.data()[2 * i], joint.damping = springs.data()[2 * i + 1];
     all.push_back(std::move(joint));
+    couplings.push_back({springs.data()[2 * i], springs.data()[2 * i + 1]});
   }
-  return std::make_unique<Controller>(mechanics.model, std::move(all), rate_Hz, quantum, linear_of(linear, joints));
+  auto made = std::make_unique<Controller>(mechanics.model, std::move(all), std::move(couplings), rate_Hz, quantum, linear_of(linear, about, joints));
+  made->set_gains(gains.data());
+  return made;
 }
 
 // The drives of joints that are not a controller's. index (N, 5): force from, to, motion from, to, prescribed; gains (N, 2): kp, kd.
@@ -104,30 +111,24 @@ nb::tuple step(Controller &self, long k, double t, const Vector &positions, doub
   return left(acting.held);
 }
 
+// (ticks, N, 6): reference, output as given, three coefficients of what is held, deflection.
 Array log_of(const Controller &self) {
-  Array out = new_array({std::size_t(self.ticks()), std::size_t(self.count()), std::size_t(Controller::LOGGED)});
-  std::copy(self.log().begin(), self.log().end(), out.data());
-  return out;
-}
-
-Array each(const Controller &self, double (Controller::*value)(int) const) {
-  Array out = new_array({std::size_t(self.count())});
-  for (int i = 0; i < self.count(); ++i) out.data()[i] = (self.*value)(i);
+  const std::vector<Tick> &log = self.law().log;
+  Array out = new_array({std::size_t(self.ticks()), std::size_t(self.count()), 6});
+  double *row = out.data();
+  for (const Tick &tick : log) {
+    *row++ = tick.reference, *row++ = tick.output;
+    for (double x : tick.held) *row++ = x;
+    *row++ = tick.deflection;
+  }
   return out;
 }
 
 Array prediction(const Controller &self) {
-  const std::vector<double> &z = self.linear().predicted;
+  const std::vector<double> &z = self.law().predicted();
   Array out = new_array({z.size()});
   std::copy(z.begin(), z.end(), out.data());
   return out;
-}
-
-std::string method_of(Controller &self, const Vector &q, double rtol) {
-  check_state(self, q);
-  Acting acting(self.count());
-  self.start(acting, q.data());
-  return method_between_ticks(self.robot(), acting, q.data(), rtol);
 }
 
 std::unique_ptr<Trials> trials_of(const Mechanics &mechanics, const Controller &controller, const Matrix &segments, const Counts &index,
@@ -135,16 +136,15 @@ std::unique_ptr<Trials> trials_of(const Mechanics &mechanics, const Controller &
                                   double rtol, const std::string &method) {
   check_state(controller, q);
   expect(t.shape(0) > 1 && references.shape(0) == std::size_t(controller.count()) && references.shape(1) == t.shape(0), "references need a row a joint");
-  Plan plan{mechanics.model, acting_of(segments, index, gains, limits), controller, numbers(Numbers(t)), numbers(Numbers(q)),
-            numbers(Numbers(references)), rtol, method};
+  Plan plan{mechanics.model, acting_of(segments, index, gains, limits), controller, numbers(t), numbers(q), numbers(references), rtol, method};
   nb::gil_scoped_release release;
   return std::make_unique<Trials>(std::move(plan));
 }
 
-nb::tuple run(Trials &self, const Matrix &prices, const Numbers &gains, const Vector &limits, int threads) {
+nb::tuple run(Trials &self, const Matrix &prices, const Cube &gains, const Vector &limits, int threads) {
   const std::size_t rows = limits.shape(0), width = std::size_t(self.plan().figures());
   expect(prices.shape(0) == 2 && prices.shape(1) == width, "prices and what is free need an entry a figure");
-  expect(gains.ndim() == 3 && gains.shape(0) == rows && gains.shape(1) == std::size_t(self.plan().joints()) && gains.shape(2) == GAINS,
+  expect(gains.shape(0) == rows && gains.shape(1) == std::size_t(self.plan().joints()) && gains.shape(2) == GAINS,
          "gains need a row a joint, and limits an entry a run");
   Array figures = new_array({rows, width}), reached = new_array({rows});
   {
@@ -181,16 +181,13 @@ double least_vibration_of(const Vector &t, const Vector &w, int seen, double eno
 
 void bind_control(nb::module_ &module) {
   using namespace nb::literals;
-  nb::class_<Controller>(module, "Controller", "A sampled controller of all joints of one robot, with its memory and log.")
-      .def(nb::new_(&controller_of), "mechanics"_a, "rate_Hz"_a, "quantum"_a, "segments"_a, "index"_a, "gains"_a, "springs"_a, "linear"_a)
+  nb::class_<Controller, Sampler>(module, "Controller", "A sampled controller of all joints of one robot, with its memory and log.")
+      .def(nb::new_(&controller_of), "mechanics"_a, "rate_Hz"_a, "quantum"_a, "segments"_a, "index"_a, "gains"_a, "springs"_a, "linear"_a,
+           "about"_a)
       .def("start", &start, "q"_a, "As before tick 0, on a robot that starts at q.")
       .def("tick", &tick, "k"_a, "t"_a, "q"_a, "Tick k at the state q: forces (N,), and motions (N, 3) that hold from then on.")
       .def("step", &step, "k"_a, "t"_a, "positions"_a, "deflection"_a, "slope"_a, "The same from what is measured.")
-      .def("method", &method_of, "q"_a, "rtol"_a, "The method with the fewest passes between two ticks.")
       .def_prop_ro("log", &log_of, "Of all ticks since the start, (ticks, N, 6).")
-      .def_prop_ro("ticks", &Controller::ticks)
-      .def_prop_ro("outputs", [](const Controller &self) { return each(self, &Controller::output); }, "u of the last tick, before its delay (N,).")
-      .def_prop_ro("given", [](const Controller &self) { return each(self, &Controller::given); }, "The same after its delay.")
       .def_prop_ro("prediction", &prediction, "z of a linear law for the next tick.");
   nb::class_<Trials>(module, "Trials", "One robot under many controllers; may be called from several threads.")
       .def(nb::new_(&trials_of), "mechanics"_a, "controller"_a, "segments"_a, "index"_a, "gains"_a, "limits"_a, "t"_a, "q"_a, "references"_a, "rtol"_a,

@@ -11,5 +11,6 @@ MODULE(FLEXURA_MODULE_NAME, module) {
   module.attr("portable") = flexura::build_portable();
   flexura::bind_numbers(module);
   flexura::bind_mechanics(module);
+  flexura::bind_simulation(module);
   flexura::bind_control(module);
 }

@@ -3,9 +3,12 @@
 namespace flexura {
 
 int32_t tip_term(const PidGains &gains, int16_t deflection, int16_t rate) {
-  return strip_term<Sum>(gains.kf, gains.kg, deflection, rate);
+  Sum sum;
+  sum.add(gains.kf, deflection);
+  sum.add(gains.kg, rate);
+  return sum.value();
 }
 
-template class Law<Integers>;
+template class PidOf<BoardNumbers>;
 
 }  // namespace flexura
