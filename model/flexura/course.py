@@ -15,7 +15,7 @@ from .choice import choose, longest_step, quickest
 from .control import Controller, replay
 from .drive import Drive
 from .errors import FlexuraError
-from .law import none
+
 from .past import past
 from .record import limit_event
 from .system import System
