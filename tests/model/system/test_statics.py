@@ -1,13 +1,13 @@
 """Equilibria: the elastica under a dead tip load, roll-up, and the geometric stiffness (26)."""
 
-import chains
 import numpy as np
 import pytest
-from robots import beam, rigid, robot
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
+import chains
 from flexura.system.assembly import Assembly
+from robots import beam, rigid, robot
 
 # all 20 polynomials of a link: a slider without mass stands on its tip
 WHOLE = robot(beam(1.0, 1.0, 1.0, 10), rigid(0.0, 0.0, 0.0, 0.0, "Pa", start=1.0))
@@ -20,7 +20,9 @@ def geometric(assembly, q, force):
     load = assembly.robot.payload.mass_kg * g + force
     for state in reversed(states):
         for line in reversed(state.lines):
-            gamma = np.real(np.conj(line.piece.weights * line.free * load + line.piece.s * g) * line.e)
+            gamma = np.real(
+                np.conj(line.piece.weights * line.free * load + line.piece.s * g) * line.e
+            )
             turning = np.real(-1j * line.E / line.e[:, None])
             S += turning.T @ (gamma[:, None] * turning)
             load += line.piece.mass.sum() * g
@@ -53,7 +55,11 @@ def elastica(load):
     reach = lambda k: ellipk(k**2) - ellipkinc(first(k), k**2)
     k = brentq(lambda k: reach(k) - np.sqrt(load), np.sqrt(0.5) + 1e-12, 1 - 1e-12, xtol=1e-15)
     sine, a = 2 * k**2 - 1, np.sqrt(load)
-    return np.sqrt(2 * sine) / a, 1 - 2 * (ellipe(k**2) - ellipeinc(first(k), k**2)) / a, np.arcsin(sine)
+    return (
+        np.sqrt(2 * sine) / a,
+        1 - 2 * (ellipe(k**2) - ellipeinc(first(k), k**2)) / a,
+        np.arcsin(sine),
+    )
 
 
 def test_the_elliptic_integrals_give_the_published_elastica():
@@ -61,7 +67,9 @@ def test_the_elliptic_integrals_give_the_published_elastica():
     assert (1 - x, y, slope) == pytest.approx((0.160642, 0.493457, 0.781750), abs=1e-6)
 
 
-@pytest.mark.parametrize("load, error", [(1.0, 1e-5), (2.0, 1e-5), (5.0, 1e-5), (10.0, 1e-5), (25.0, 3e-5)])
+@pytest.mark.parametrize(
+    "load, error", [(1.0, 1e-5), (2.0, 1e-5), (5.0, 1e-5), (10.0, 1e-5), (25.0, 3e-5)]
+)
 def test_the_elastica(load, error):
     assembly = Assembly(robot(beam(1.0, 1.0, 1.0, 8)))
     tip = assembly.tip(equilibrium(assembly, 1j * load, steps=1 if load < 5 else 4))
@@ -89,8 +97,12 @@ def test_euler_s_load_makes_the_tangent_singular():
         assembly = Assembly(chain)
         q = np.append(np.zeros(assembly.n - 1), chain.start[-1])
         own = slice(1, assembly.rows[1] if len(assembly.rows) > 1 else None)
-        tangent = lambda P, a=assembly, q=q, own=own: (a.stiffness(q) + geometric(a, q, -P + 0j))[own, own]
-        assert brentq(lambda P, t=tangent: np.linalg.eigvalsh(t(P))[0], 2.0, 3.0) == pytest.approx(np.pi**2 / 4, rel=error)
+        tangent = lambda P, a=assembly, q=q, own=own: (a.stiffness(q) + geometric(a, q, -P + 0j))[
+            own, own
+        ]
+        assert brentq(lambda P, t=tangent: np.linalg.eigvalsh(t(P))[0], 2.0, 3.0) == pytest.approx(
+            np.pi**2 / 4, rel=error
+        )
 
 
 @pytest.mark.parametrize("name", ["R", "R, kink", "R, modes, R"])
