@@ -1,4 +1,5 @@
-// The Python module: entry point and how the core was built. Each subject has a file with a function that adds what it binds.
+// The Python module: entry point and how the core was built. Each subject has a file with a function that
+// adds what it binds.
 #include "bind.hpp"
 #include "build.hpp"
 
@@ -9,4 +10,5 @@ MODULE(FLEXURA_MODULE_NAME, module) {
   module.attr("compiler") = flexura::build_compiler();
   module.attr("portable") = flexura::build_portable();
   flexura::bind_numbers(module);
+  flexura::bind_mechanics(module);
 }

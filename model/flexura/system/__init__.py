@@ -1,5 +1,15 @@
-"""The system: a robot's equations of motion. `landed` serves the solvers; `assembly` is the same theory, dense and readable."""
+"""Robot -> System: a robot's equations, its equilibria, its small motions.
 
-from .landed import System, jacobian, limits, stack
+`assembly` is the theory, dense and readable; `system` serves it to everybody, with the compiled core where that is faster.
+"""
 
-__all__ = ["System", "jacobian", "limits", "stack"]
+from .assembly import Assembly
+from .frequencies import Modes, frequencies, modes
+from .statespace import StateSpace, linearize
+from .statics import NoEquilibrium, static, tip_pose
+from .system import System, assemble, system_of
+
+__all__ = [
+    "Assembly", "Modes", "NoEquilibrium", "StateSpace", "System",
+    "assemble", "frequencies", "linearize", "modes", "static", "system_of", "tip_pose",
+]  # fmt: skip

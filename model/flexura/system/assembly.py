@@ -143,6 +143,11 @@ class Assembly:
         place = np.array([f.place for f in frames])
         return place.real, place.imag, np.array([f.angle for f in frames])
 
+    def tip_deflections(self, q: np.ndarray) -> np.ndarray:
+        """The tips of the flexible links across the tangents at their hubs (k,) [m]: r_y (2)."""
+        states = [state for state in self.structure.states(q, np.zeros(self.n)) if state.lines]
+        return np.array([((s.tip.place - s.hub.place) * s.hub.tangent.conjugate()).imag for s in states])
+
     def _parts(self, q: np.ndarray, qd: np.ndarray) -> list[masses.Part]:
         return [
             part for state in self.structure.states(q, qd) for part in self.structure.masses(state)
