@@ -1,4 +1,4 @@
-"""Chains for the tests of the assembly: small ones of every kind, random ones, random states, differences of energies."""
+"""Chains for the tests of the assembly, their states, and differences of energies."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ SMALL = {
 
 
 def random_chain(rng: np.random.Generator, links: int = 3) -> Robot:
-    """A chain of random joints, lengths from 0.01 to 10 m, mostly flexible links, a third of them on bare hubs."""
+    """A chain of random joints, lengths from 0.01 to 10 m, a third of the hubs bare."""
     tables: list[dict[str, Any]] = []
     for _ in range(links):
         kind = str(rng.choice(["R", "Pa", "Pb"]))
@@ -74,7 +74,7 @@ def random_chain(rng: np.random.Generator, links: int = 3) -> Robot:
 def random_state(
     assembly: Assembly, rng: np.random.Generator, slope: float = 1.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """q and qd (n,): joints at their start (R: anywhere), every link with tip angles up to about `slope` rad."""
+    """q and qd (n,): joints at their start (R: anywhere), links bent by about `slope` rad."""
     q, qd = rng.normal(size=assembly.n), rng.normal(size=assembly.n)
     structure = assembly.structure
     for i, (row, link) in enumerate(zip(assembly.rows, assembly.robot.links, strict=True)):

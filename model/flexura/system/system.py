@@ -195,15 +195,15 @@ class System:
         return self.assembly.damping(at) + gyroscopic
 
     def _shapes(self, link: int, pieces: tuple[Piece, ...]) -> tuple[Piece, ...]:
-        """The pieces of a link; one that is the whole link gets the core's shapes in place of its own."""
-        if len(pieces) != 1 or not hasattr(pieces[0].shapes, "coefficients"):
+        """The pieces of a link; one in modes gets the core's modes in place of its own. All else is the same to the last digits."""
+        if len(pieces) != 1 or not hasattr(pieces[0].shapes, "coefficients") or not pieces[0].K.size:
             return pieces
         B, K, _ = self.equations.whole_link(link)
         own = legendre_shapes(len(pieces[0].shapes.coefficients), pieces[0].xi)
         coefficients = np.linalg.lstsq(own, B.T, rcond=None)[0]
         law = structure(self.robot).laws[link]
         assert law is not None
-        return (whole_piece(law, pieces[0].points, coefficients, K if pieces[0].K.size else np.zeros(0)),)
+        return (whole_piece(law, pieces[0].points, coefficients, K),)
 
     def _unit(self, name: str) -> str:
         parts = name.split("/")

@@ -71,7 +71,7 @@ def test_the_stiffness_of_an_element_is_diagonal(section):
 
 @pytest.mark.parametrize("keys", [{}, {"modes": 2}])
 def test_moments_of_the_mass_are_those_of_a_straight_link(keys):
-    """A straight piece lies at sum w_j = s: the sums of s_j and W_jl are the integrals of s and s^2."""
+    """A straight piece: the sums of s_j and W_jl are the integrals of s dm and s^2 dm."""
     link = Link.model_validate(beam(0.8, 1.5, 2.0, 3, **keys))
     made = pieces(link)
     h = 0.8 / len(made)

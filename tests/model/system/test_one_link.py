@@ -1,4 +1,4 @@
-"""One link and two: the assembly against other derivations, clamped frequencies, the linear line."""
+"""One link and two against other derivations, clamped frequencies, the linear line."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def clamped_frequencies(elements, **keys):
 
 
 def test_clamped_frequencies_converge_in_the_fourth_order():
-    """Relative errors of a mesh of beam elements; the exact ones are the squares of the roots of cos x cosh x = -1."""
+    """The exact ones are the squares of the roots of cos x cosh x = -1."""
     error = {n: clamped_frequencies(n) / CLAMPED**2 - 1 for n in (2, 4, 8)}
     assert (np.abs(error[2][:2]) < (5e-4, 1e-2)).all()
     assert (np.abs(error[4]) < (3.5e-5, 1.3e-3, 8.5e-3)).all()
@@ -52,7 +52,7 @@ def test_a_double_pendulum_is_the_textbooks():
 
 
 def fine_forces(assembly, q, qd, qdd):
-    """Newton's law for every point of a bent link on a turning hub: r = int e^(i Theta) by 60 cells, forces by virtual work."""
+    """Newton's law for every point of a bent link, r = int e^(i Theta) by 60 cells; virtual work."""
     (piece,) = assembly.structure.links[0]
     L, breaks = piece.length, np.linspace(0, 1, 61)
     x, dx = cells(breaks, 4)

@@ -1,4 +1,4 @@
-"""Links in sleeves and sliders on them: invariance, the force that pushes a bent link out, momentum, limits."""
+"""Sleeves and sliders: invariance, the force that pushes a bent link out, momentum, limits."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ KINDS = {
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_nothing_depends_on_the_sleeves_own_velocity(kind):
-    """A sleeve on a carriage: a constant velocity of the carriage changes neither the mass matrix nor the bias."""
+    """A constant velocity of the carriage under a sleeve changes neither M nor the bias."""
     assembly = Assembly(robot(CARRIAGE, KINDS[kind], payload=0.3, payload_inertia=0.1))
     q, qd = chains.random_state(assembly, np.random.default_rng(1))
     faster, elsewhere = qd.copy(), q.copy()
@@ -41,7 +41,7 @@ def test_the_carriage_carries_the_whole_mass(kind):
 
 @pytest.mark.parametrize("kind", ["uniform", "taper", "modes"])
 def test_momentum_is_kept_where_nothing_holds_the_carriage(kind):
-    """d/dt (M qd)_1 = 0 in a free motion along the rail: row 1 of the bias is the rate of row 1 of M, times qd."""
+    """The momentum along the rail is (M qd)_1: its rate at qdd = 0 is row 1 of the bias."""
     assembly = Assembly(robot(CARRIAGE, KINDS[kind], payload=0.3))
     q, qd = chains.random_state(assembly, np.random.default_rng(2))
     rate = chains.slopes(lambda t: assembly.mass(q + t[0] * qd)[0] @ qd, np.zeros(1), 1e-4)[0]
@@ -89,7 +89,7 @@ def bent(assembly, d, force):
     "force, d, published", [(1, 0.5, 0.242104), (1, 1.0, 0.704522), (5, 1.0, 4.950723)]
 )
 def test_the_force_that_pushes_a_bent_link_out(force, d, published):
-    """M0^2 / (2 EI), M0 the bending moment at the exit: force times the tip's distance along the sleeve."""
+    """M0^2 / (2 EI), M0 at the exit: force times the tip's distance along the sleeve."""
     assembly = Assembly(robot(beam(2.0, 1.0, 0.5, 8, "Pb", start=d)))
     q, row = bent(assembly, d, 1j * force)
     moment = force * assembly.tip(q).place.real

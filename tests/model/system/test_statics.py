@@ -14,7 +14,7 @@ WHOLE = robot(beam(1.0, 1.0, 1.0, 10), rigid(0.0, 0.0, 0.0, 0.0, "Pa", start=1.0
 
 
 def geometric(assembly, q, force):
-    """The geometric stiffness (n, n) of a chain of joints R under a dead tip force (complex), by (26)."""
+    """The geometric stiffness (n, n) of joints R under a dead tip force (complex), by (26)."""
     S, g = np.zeros((assembly.n, assembly.n)), complex(*assembly.robot.gravity_m_s2)
     states = assembly.structure.states(q, 0 * q)
     load = assembly.robot.payload.mass_kg * g + force
@@ -31,7 +31,7 @@ def geometric(assembly, q, force):
 
 
 def equilibrium(assembly, force, moment=0.0, steps=1):
-    """q with all joints held at their start under a dead tip force and moment, by Newton's method (25)."""
+    """q with joints held at their start under a dead tip force and moment (25)."""
     q, free = np.zeros(assembly.n), np.setdiff1d(np.arange(assembly.n), assembly.rows)
     q[assembly.rows] = assembly.robot.start
     for share in np.arange(1, steps + 1) / steps:
@@ -50,7 +50,7 @@ def equilibrium(assembly, force, moment=0.0, steps=1):
 
 
 def elastica(load):
-    """x, y and slope of the tip of a cantilever (L = EI = 1) under a dead transverse force, by elliptic integrals."""
+    """x, y, slope of a cantilever's tip (L = EI = 1) under a dead transverse force."""
     first = lambda k: np.arcsin(1 / (k * np.sqrt(2)))
     reach = lambda k: ellipk(k**2) - ellipkinc(first(k), k**2)
     k = brentq(lambda k: reach(k) - np.sqrt(load), np.sqrt(0.5) + 1e-12, 1 - 1e-12, xtol=1e-15)
