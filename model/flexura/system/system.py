@@ -98,7 +98,7 @@ class System:
         return self.assembly.mass(self.check(q))
 
     def stiffness(self, q: Any = None) -> np.ndarray:
-        """K (n, n) at the start; with q the tangent stiffness there, the derivative of elastic and gravity forces by q (17), (26)."""
+        """K (n, n) at the start; with q the tangent stiffness there, the slope of elastic and gravity forces (17), (26)."""
         if q is None:
             return self.assembly.stiffness_blocks(self.check(self.start()))
         return self.tangent(q)
