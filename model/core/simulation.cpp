@@ -2,13 +2,12 @@
 
 #include <algorithm>
 
-#include "explicit.hpp"
-#include "implicit.hpp"
+#include "methods.hpp"
 
 namespace flexura {
 
 std::unique_ptr<Method<double>> make_method(const std::string &name, Course<double> &course) {
-  if (name == "explicit") return std::make_unique<Explicit<double>>(course);
+  if (auto named = make_method<double>(name, course)) return named;
   return std::make_unique<Implicit<double>>(course);
 }
 

@@ -21,6 +21,16 @@ Acting driven(const Plan &plan, Controller &controller) {
 
 }  // namespace
 
+std::string method_for_ticks(const Model<double> &robot, Acting &acting, const double *q, double rtol) {
+  Workspace<double> work(robot);
+  ModelPlant<double> plant(robot, work);
+  Acting *list = &acting;
+  const Acts<double> acts(plant, &list);
+  const std::vector<double> still(std::size_t(robot.n), 0.0);
+  const double fastest = plant.fastest(q, acts.pass(q, still.data(), q, still.data(), 0.0, 0.0));
+  return explicit_for_ticks(1.0 / acting.rate_Hz, fastest, rtol);
+}
+
 // The memory of one run at a time.
 class Trial {
  public:
@@ -29,9 +39,7 @@ class Trial {
         list(&acting), loop(plant, &list, plan.t, plan.rtol), still(plan.start.size(), 0.0), at{plan.t.data(), int(plan.t.size())},
         samples((std::size_t(plan.joints()) + 1) * plan.t.size(), 0.0), strip(last_flexible(*plan.robot)),
         end(plan.t.back() - plan.t.front()), ticks(long(std::ceil(end * controller.law().rate_Hz - 1e-6))) {
-    const double *q = plan.start.data();
-    const double fastest = plant.fastest(q, loop.course.acts.pass(q, still.data(), q, still.data(), 0.0, 0.0));
-    method = plan.method == "auto" ? explicit_for_ticks(1.0 / acting.rate_Hz, fastest, plan.rtol) : plan.method;
+    method = plan.method == "auto" ? method_for_ticks(*plan.robot, acting, plan.start.data(), plan.rtol) : plan.method;
   }
 
   std::string method;

@@ -34,6 +34,10 @@ struct Plan {
   int figures() const { return JOINT_FIGURES * joints() + STRIP_FIGURES; }
 };
 
+// The method for a run from q (n) under a controller, by its ticks and the robot's highest frequency there. `acting` is as the
+// controller's `start` has left it.
+std::string method_for_ticks(const Model<double> &robot, Acting &acting, const double *q, double rtol);
+
 class Trial;
 
 class Trials {

@@ -131,6 +131,13 @@ Array prediction(const Controller &self) {
   return out;
 }
 
+std::string method_of(Controller &self, const Vector &q, double rtol) {
+  check_state(self, q);
+  Acting acting(self.count());
+  self.start(acting, q.data());
+  return method_for_ticks(self.robot(), acting, q.data(), rtol);
+}
+
 std::unique_ptr<Trials> trials_of(const Mechanics &mechanics, const Controller &controller, const Matrix &segments, const Counts &index,
                                   const Matrix &gains, const Matrix &limits, const Vector &t, const Vector &q, const Matrix &references,
                                   double rtol, const std::string &method) {
@@ -187,6 +194,7 @@ void bind_control(nb::module_ &module) {
       .def("start", &start, "q"_a, "As before tick 0, on a robot that starts at q.")
       .def("tick", &tick, "k"_a, "t"_a, "q"_a, "Tick k at the state q: forces (N,), and motions (N, 3) that hold from then on.")
       .def("step", &step, "k"_a, "t"_a, "positions"_a, "deflection"_a, "slope"_a, "The same from what is measured.")
+      .def("method", &method_of, "q"_a, "rtol"_a, "The method for a run from q, by the ticks; sets the controller back.")
       .def_prop_ro("log", &log_of, "Of all ticks since the start, (ticks, N, 6).")
       .def_prop_ro("prediction", &prediction, "z of a linear law for the next tick.");
   nb::class_<Trials>(module, "Trials", "One robot under many controllers; may be called from several threads.")
