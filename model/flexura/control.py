@@ -138,9 +138,11 @@ GAINS = ("kp", "ki", "kd", "kf", "kg", "ks", "kt", "kv", "kc")
 
 @dataclass(frozen=True)
 class Linear:
-    """A linear law in place of the PID's terms: made by `lqr.lqr`: z^ = z + L (y - C z), u = hold - K z^ +
-    Kr r + Kv r' + f(t), limits as in a PID, z of the next tick = F z^ + G (u - hold) with the u that the limits left; y is measured
-    from `offset`."""
+    """A linear law in place of the PID's terms, as `lqr.lqr` makes it.
+
+    z^ = z + L (y - C z), u = hold - K z^ + Kr r + Kv r' + f(t), limited as a PID's; z of the next tick = F z^ + G (u - hold) with the
+    u that the limits left. y: positions and deflection, less `offset`.
+    """
 
     F: np.ndarray
     G: np.ndarray
@@ -197,13 +199,13 @@ class Controller:
         return Drive(tuple(JointDrive() if isinstance(joint, PID) else joint for joint in self.joints))
 
     def core_drives(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """What acts on the joints that are not this controller's: segments, ranges (N, 4) and gains (N, 2) as `Drive.packed`, which
-        joints follow their motion, and (as the core sets this) which the controller moves, (N,) each."""
+        """What acts on the joints that are not this controller's: segments, ranges (N, 4) and gains (N, 2) as `Drive.packed`,
+        which joints follow their motion, and, for the core to fill in, which this controller moves, (N,) each."""
         drive = self._open()
         return *drive.packed(), drive.follows.astype(np.uint8), np.zeros(len(self.joints), dtype=np.uint8)
 
     def sampler(self, system: System) -> Any:
-        """All that the core needs of this controller on a robot, as a `core.Controller`, with the memory and the log of one run."""
+        """All that the core needs of this controller on a robot: a `core.Controller`, with the memory and the log of one run."""
         index, parts = np.zeros((len(self.joints), 5), dtype=np.int64), [np.zeros((0, signal.COLUMNS))]
         springs, count = np.zeros((len(self.joints), 2)), 0
         for i, joint in enumerate(self.joints):
@@ -221,8 +223,8 @@ class Controller:
                 springs[i, 1] = joint.output.damping
         linear = [] if self.linear is None else [np.array(getattr(self.linear, f.name), dtype=float) for f in fields(Linear)]
         return core.Controller(
-            system.equations, float(self.rate_Hz), float(self.deflection_quantum_m), np.concatenate(parts), index, self.gains(), springs,
-            linear[:7], linear[7:],
+            system.equations, float(self.rate_Hz), float(self.deflection_quantum_m), np.concatenate(parts), index, self.gains(),
+            springs, linear[:7], linear[7:],
         )  # fmt: skip
 
     def gains(self) -> np.ndarray:
@@ -243,8 +245,8 @@ class Controller:
         return g
 
     def recorded(self, run: Run, sampler: Any) -> Run:
-        """A Run with the law's own channels besides, from the log of the `sampler` that ran in it: joint/i/reference, joint/i/voltage,
-        joint/i/pulses."""
+        """A Run with the law's own channels besides, joint/i/reference, joint/i/voltage and joint/i/pulses, from the log of the
+        `sampler` that ran in it."""
         log, start = np.asarray(sampler.log), float(run.t[0]) if len(run.t) else 0.0
         if len(log) == 0:  # no tick in it: a run of one instant
             log = np.zeros((1, len(self.joints), 6))

@@ -1,7 +1,7 @@
 """One robot under many controllers, in the core: each row of gains is a run, of which only its figures are kept.
 
-Nothing of Python runs between two rows, and a call leaves Python's lock. What a row gives does not depend on the others, nor on the
-number of threads. Several threads of the caller's may use one `Trials` at the same time.
+Nothing of Python runs between two rows, and a call leaves Python's lock. What a row gives does not depend on the others, nor on
+the number of threads. Several threads of the caller's may use one `Trials` at the same time.
 
 A row may have a limit to its cost, sum_k price_k max(0, figure_k - free_k) with prices on overshoot, ITAE, effort and vibration:
 it is abandoned as soon as it is certain to cost more.
@@ -70,7 +70,7 @@ def trials(
     segments, ranges, gains, follows, _ = controller.core_drives()
     index = np.column_stack([ranges, follows]).astype(np.int64)
     runs = core.Trials(
-        system.equations, controller.sampler(system), segments, index, gains, np.ascontiguousarray(system.limits), t, system.start(),
-        references, rtol, method,
+        system.equations, controller.sampler(system), segments, index, gains, np.ascontiguousarray(system.limits), t,
+        system.start(), references, rtol, method,
     )  # fmt: skip
     return Trials(len(controller.joints), runs)
