@@ -140,8 +140,8 @@ GAINS = ("kp", "ki", "kd", "kf", "kg", "ks", "kt", "kv", "kc")
 class Linear:
     """A linear law in place of the PID's terms, as `lqr.lqr` makes it.
 
-    z^ = z + L (y - C z), u = hold - K z^ + Kr r + Kv r' + f(t), limited as a PID's; z of the next tick = F z^ + G (u - hold) with the
-    u that the limits left. y: positions and deflection, less `offset`.
+    z^ = z + L (y - C z), u = hold - K z^ + Kr r + Kv r' + f(t), limited as a PID's; z of the next tick = F z^ + G (u - hold)
+    with the u that the limits left. y: positions and deflection, less `offset`.
     """
 
     F: np.ndarray
