@@ -41,25 +41,25 @@ std::vector<double> rest(const Model<double> &model) {
   return q;
 }
 // A joint's law: output, reference, row of gains, coupling.
-struct Joint {
+struct Driven {
   JointLaw::Output output = JointLaw::Output::force;
   Signal reference;
   double gain[GAINS] = {};
   Coupling coupling;
 };
-Joint effort(double kp, double kd, Signal reference) {
-  Joint joint;
+Driven effort(double kp, double kd, Signal reference) {
+  Driven joint;
   joint.reference = std::move(reference);
   joint.gain[KP] = kp, joint.gain[KD] = kd;
   joint.gain[LIMIT] = joint.gain[SLEW] = INFINITE;
   joint.gain[FORCE] = joint.gain[SETPOINT] = joint.gain[DERIVATIVE] = joint.gain[DEFLECTION] = 1.0;
   return joint;
 }
-Controller controlled(const Shared &robot, const std::vector<Joint> &joints, double quantum = 0.0) {
+Controller controlled(const Shared &robot, const std::vector<Driven> &joints, double quantum = 0.0) {
   std::vector<JointLaw> laws;
   std::vector<Coupling> couplings;
   std::vector<double> gains;
-  for (const Joint &joint : joints) {
+  for (const Driven &joint : joints) {
     JointLaw law;
     law.output = joint.output, law.reference = joint.reference;
     laws.push_back(law), couplings.push_back(joint.coupling);
@@ -96,7 +96,7 @@ struct Run {
   double at(int row, int k) const { return loop->record[0].state[std::size_t(row * loop->record[0].size + k)]; }
 };
 
-Plan plan_of(Shared robot, const std::vector<Joint> &joints, int count, double rtol = 1e-6) {
+Plan plan_of(Shared robot, const std::vector<Driven> &joints, int count, double rtol = 1e-6) {
   Acting acting(robot->links());
   Plan plan{robot, acting, controlled(robot, joints), ticks(count, 5), rest(*robot), {}, rtol, "auto"};
   for (int i = 0; i < robot->links(); ++i)
@@ -137,7 +137,7 @@ TEST("a cart follows the recursion written out") {
   check::Random random{3};
   for (int trial = 0; trial < 12; ++trial) {
     const double mass = 2.0, reference = 0.3;
-    Joint joint = effort(random(50.0, 400.0), random(0.0, 25.0), step_to(reference));
+    Driven joint = effort(random(50.0, 400.0), random(0.0, 25.0), step_to(reference));
     double *g = joint.gain;
     g[KI] = random(0.0, 900.0), g[KV] = random(0.0, 3.0), g[KC] = 0.5, g[SETPOINT] = random(0.01, 1.0), g[DERIVATIVE] = random(0.1, 1.0);
     g[DELAY] = trial % 3;
@@ -167,7 +167,7 @@ TEST("a cart follows the recursion written out") {
 
 TEST("a stepper's pulses are the integral of its rate, and a joint without a spring is held to them") {
   const Shared robot = made({rigid(JointKind::revolute, 0.1, 0.5), strip(JointKind::revolute, 0.3, 4, 2)});
-  Joint held = effort(900.0, 50.0, constant(0.0)), step = effort(20.0, 0.0, step_to(0.4));
+  Driven held = effort(900.0, 50.0, constant(0.0)), step = effort(20.0, 0.0, step_to(0.4));
   step.output = JointLaw::Output::stepper;
   double *g = step.gain;
   g[LIMIT] = 2.0, g[SLEW] = 60.0, g[DELAY] = 1.0, g[RIGID] = 1.0;
@@ -185,7 +185,7 @@ TEST("a stepper's pulses are the integral of its rate, and a joint without a spr
 
 TEST("a robot that starts elsewhere is not moved by a stepper that stands still") {
   const Shared robot = made({strip(JointKind::sleeve, 0.4, 4)});
-  Joint step = effort(5.0, 0.0, constant(robot->start[0]));
+  Driven step = effort(5.0, 0.0, constant(robot->start[0]));
   step.output = JointLaw::Output::stepper, step.gain[RIGID] = 1.0;
   Controller controller = controlled(robot, {step});
   const Run run(*robot, controller, ticks(20), 1e-6, "explicit");
@@ -234,7 +234,7 @@ TEST("a strip bent to a circle has a circle's tip") {
 
 TEST("the strip's terms: the mean of two ticks, every second tick, each joint in its turn") {
   const Shared robot = made({rigid(JointKind::revolute, 0.1, 0.5), strip(JointKind::revolute, 0.3, 4, 2)});
-  Joint one = effort(0.0, 0.0, constant(0.0)), two = one;
+  Driven one = effort(0.0, 0.0, constant(0.0)), two = one;
   one.gain[KF] = 3.0, one.gain[KG] = 0.01, two.gain[KS] = 2.0, two.gain[KT] = 0.02;
   one.gain[DEFLECTION] = 0.3;
   Controller controller = controlled(robot, {one, two}, 1e-3);
@@ -261,7 +261,7 @@ TEST("the strip's terms: the mean of two ticks, every second tick, each joint in
 
 TEST("every method gives the same motion under a controller, also between its ticks") {
   const Shared robot = made({rigid(JointKind::slider, 0.1, 0.6), strip(JointKind::revolute, 0.3, 4, 2)});
-  Joint motor = effort(300.0, 0.0, step_to(0.05)), turn = effort(3.0, 0.1, step_to(0.4));
+  Driven motor = effort(300.0, 0.0, step_to(0.05)), turn = effort(3.0, 0.1, step_to(0.4));
   motor.gain[FORCE] = 13.0, motor.coupling.damping = 120.0, motor.gain[SETPOINT] = turn.gain[SETPOINT] = 0.02;
   std::vector<double> t;
   for (int k = 0; k <= 100; ++k) t.push_back(0.004 * k + 0.0001 * (k % 3));  // not on ticks
@@ -287,7 +287,7 @@ TEST("a first-order rise has its formulas") {
 
 TEST("a row of gains is its run; rows, order and threads do not matter; a row is given up where it costs too much") {
   const Shared robot = made({strip(JointKind::revolute, 0.3, 2)});
-  Joint joint = effort(2.0, 0.1, step_to(PI / 4.0));
+  Driven joint = effort(2.0, 0.1, step_to(PI / 4.0));
   joint.gain[LIMIT] = 0.5, joint.gain[SETPOINT] = 0.02, joint.gain[DEFLECTION] = 0.5;
   Plan plan = plan_of(robot, {joint}, 1000);
   Trials trials(plan);
