@@ -216,7 +216,7 @@ def build_core(venv: Path) -> None:
                 f"-DCMAKE_MAKE_PROGRAM={venv / 'bin/ninja'}", f"-DPython_EXECUTABLE={python}"]
     step("configuring the core", [cmake, "-S", str(ROOT), "-B", str(folder), "-G", "Ninja", *settings])
     jobs = str(os.cpu_count() or 1)
-    step("compiling the core (a minute the first time)", [cmake, "--build", str(folder), "--parallel", jobs])
+    step("compiling the core (half a minute the first time)", [cmake, "--build", str(folder), "--parallel", jobs])
     step("installing the core", [cmake, "--install", str(folder), "--component", "module", "--prefix", f"{ROOT / 'model'}"])
 
 
