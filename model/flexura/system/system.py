@@ -152,6 +152,16 @@ class System:
             return tuple(np.ascontiguousarray(self.equations.line(self.check(q), link - 1, places).T))  # type: ignore[return-value]
         return self.assembly.line(self.check(q), link, places)
 
+    def angles(self, link: int, s: Any) -> np.ndarray:
+        """What each unknown turns the tangent by (S, n), against the hub, at s (S,) [m] along a link (from 1) of constant
+        length: B of (1)."""
+        places = np.atleast_1d(np.asarray(s, dtype=float))
+        out, start = np.zeros((len(places), self.n)), 0.0
+        for piece, own in zip(*(x[link - 1] for x in (self.assembly.structure.links, self.assembly.structure.own)), strict=True):
+            out[:, own] = piece.shapes(np.clip((places - start) / piece.length, 0.0, 1.0))
+            start += piece.length
+        return out
+
     def observe(self, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
         """What a Run shows of states q, qd (T, n): rows of poses, deflections, tip and energies, as `record.channel_units` names
         them from `link/1/x` to `energy/potential` (2), (29)."""
