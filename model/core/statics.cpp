@@ -25,7 +25,7 @@ Search newton(Still &still, const TipLoad &load, double share, bool descend, Num
   Numbers slope(n), step(n), trial(n);
   double size, V = still.energy(q.data(), load, share, size);
   const int most = descend ? 20 * MOST_SWEEPS : MOST_SWEEPS;
-  while (out.sweeps++ < most) {
+  while (std::isfinite(V) && out.sweeps++ < most) {
     const int wrong = still.tangent(load, share, 0.0, descend);
     out.falls = wrong > 0;
     if (wrong > 0 && !descend) return out;
