@@ -109,7 +109,8 @@ void turn_diagonal(int n, double *d, double *e, double *Q) {
 void arrange(int n, double *values, double *shapes) {
   std::vector<int> order(sized(n));
   std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return values[a] < values[b]; });
+  auto key = [&](int k) { return values[k] == values[k] ? values[k] : HUGE_VAL; };  // what is not a number comes last
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return key(a) < key(b); });
   Numbers old_values(values, values + n), old(shapes, shapes + n * n);
   for (int k = 0; k < n; ++k) {
     const int from = order[k];
@@ -125,8 +126,9 @@ void eigen_symmetric(int n, const double *A, double *values, double *vectors) {
   if (n == 0) return;
   std::vector<int> order(sized(n));
   std::iota(order.begin(), order.end(), 0);
+  auto key = [&](int k) { return A[k * n + k] == A[k * n + k] ? std::fabs(A[k * n + k]) : HUGE_VAL; };
   std::stable_sort(order.begin(), order.end(),
-                   [&](int a, int b) { return std::fabs(A[a * n + a]) < std::fabs(A[b * n + b]); });
+                   [&](int a, int b) { return key(a) < key(b); });
   double largest = 0.0;
   for (int k = 0; k < n * n; ++k) largest = std::max(largest, std::fabs(A[k]));
   const double unit = largest > 0.0 ? largest : 1.0;

@@ -139,6 +139,7 @@ Modes lowest_modes(const Model<double> &model, const double *q, const char *free
       check += 4 + check / 8;
     }
     ritz = project(krylov, most);
+    if (krylov.Q.empty()) return Modes{};  // nothing has mass
     const int size_now = int(krylov.H.size()), found = std::min(most, size_now);
     const bool closed = krylov.H.size() == krylov.Q.size();
     if (ritz.good < found && !closed) continue;

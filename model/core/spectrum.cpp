@@ -9,8 +9,7 @@ namespace flexura {
 namespace {
 
 using Numbers = std::vector<double>;
-constexpr int MANY = 80;         // unknowns from which on a few modes are not taken from the matrices
-constexpr double NOISE = 1e-13;  // of the largest square: what round-off leaves of a direction that nothing holds
+constexpr int MANY = 80;  // unknowns from which on a few modes are not taken from the matrices
 
 // Columns k ... k + 3 of the derivatives of the forces at (q, v) and the load, by the rows of `by` (of q or v), for all k.
 template <class Set>

@@ -286,3 +286,11 @@ TEST("the linearised motion: M da/df = 1, M da/dq = -K at rest, -D by the rates,
   const Linear held = linearise(model, q.data(), zero.data(), hold.data(), free);
   for (int j = 0; j < n; ++j) CHECK(held.by_force[j] == 0.0 && held.by_position[j] == 0.0);
 }
+
+TEST("numbers that are none end every search") {
+  const Model<double> model = cantilever(60);
+  Numbers q(model.n, std::nan(""));
+  CHECK(natural_modes(model, q.data(), nullptr, 5).squares.size() <= 5);
+  CHECK(natural_modes(model, q.data(), nullptr, 0).squares.size() <= std::size_t(model.n));
+  CHECK(equilibrium(model, q.data()).balance != Balance::stable);
+}
