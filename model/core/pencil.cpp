@@ -28,7 +28,7 @@ void pivoted(int n, double *A, int length, double *G) {
     const int p = order[j];
     const double pivot = A[p * n + p];
     double *g = G + j * length;
-    if (!(pivot > 8.0 * n * epsilon * first[p])) continue;
+    if (!(pivot > std::max(16, n) * epsilon * first[p])) continue;
     const double size = std::sqrt(pivot);
     g[p] = size;
     for (int i = j + 1; i < n; ++i) g[order[i]] = A[p * n + order[i]] / size;
@@ -113,6 +113,29 @@ bool definite(int n, const double *K) {
   return cholesky(n, L.data()) > 1e-9;
 }
 
+Numbers sum_of(int n, const double *K, double shift, const Numbers &M) {
+  Numbers S(K, K + n * n);
+  for (int k = 0; k < n * n; ++k) S[k] += shift * M[k];
+  return S;
+}
+
+// A shift, `from` or more, that makes K + shift M safely positive definite: more than the most negative square. If M is so badly conditioned
+// that there is none, its diagonal is raised by what is round-off then.
+double raised(int n, const double *K, Numbers &M, double from) {
+  for (int times = 0; times < 2; ++times) {
+    double shift = from;
+    for (int tries = 0; tries < 16; ++tries, shift *= 16.0) {
+      Numbers S = sum_of(n, K, shift, M);
+      bool positive = true;
+      for (int i = 0; i < n; ++i) positive = positive && S[i * n + i] > 0.0;
+      if (positive && cholesky(n, S.data()) > 1e-12) return shift;
+    }
+    if (times == 0)
+      for (int i = 0; i < n; ++i) M[i * n + i] *= 1.0 + 1e-11;
+  }
+  return from;
+}
+
 }  // namespace
 
 void eigen_definite(int n, const double *K, const double *M, double *squares, double *shapes) {
@@ -145,28 +168,22 @@ void eigen_definite(int n, const double *K, const double *M, double *squares, do
 
 int eigen_pencil(int n, const double *K, const double *M, double *squares, double *shapes) {
   if (n == 0) return 0;
-  double shift = definite(n, K) ? 0.0 : first_shift(n, K, M);
-  bool refined = false;
-  Numbers S(K, K + n * n);
-  for (int tries = 0;; ++tries) {
-    for (int k = 0; k < n * n; ++k) S[k] = K[k] + shift * M[k];
-    Numbers L(S);
-    bool positive = true;
-    for (int i = 0; i < n; ++i) positive = positive && S[i * n + i] > 0.0;
-    if (shift > 0.0 && !(positive && cholesky(n, L.data()) > 1e-12) && tries < 60) {
-      shift *= 16.0;  // K falls in some direction: below -shift
-      continue;
+  Numbers mass(M, M + n * n);
+  if (definite(n, K)) {
+    eigen_definite(n, K, mass.data(), squares, shapes);
+  } else {
+    double shift = first_shift(n, K, M);
+    for (int times = 0; times < 2; ++times) {
+      shift = raised(n, K, mass, shift);
+      eigen_definite(n, sum_of(n, K, shift, mass).data(), mass.data(), squares, shapes);
+      double lowest = shift;  // the smallest square that is no round-off
+      for (int k = 0; k < n; ++k) {
+        squares[k] -= shift;
+        if (std::fabs(squares[k]) > 1e-7 * shift) lowest = std::min(lowest, std::fabs(squares[k]));
+      }
+      if (lowest >= 1e-5 * shift) break;
+      shift = 100.0 * lowest;  // once more with a shift closer to it, so that the low squares keep their digits
     }
-    eigen_definite(n, S.data(), M, squares, shapes);
-    if (shift == 0.0) break;
-    double lowest = shift;  // the smallest square that is no round-off
-    for (int k = 0; k < n; ++k) {
-      squares[k] -= shift;
-      if (std::fabs(squares[k]) > 1e-7 * shift) lowest = std::min(lowest, std::fabs(squares[k]));
-    }
-    if (lowest >= 1e-5 * shift || refined) break;
-    refined = true;  // once more with a shift closer to it, so that the low squares keep their digits
-    shift = 100.0 * lowest;
   }
   int finite = 0;
   while (finite < n && squares[finite] <= 1.7976931348623157e308) ++finite;
