@@ -13,8 +13,9 @@ constexpr double epsilon = 0x1p-52;
 
 std::size_t sized(int n) { return static_cast<std::size_t>(n); }
 
-// Householder's reduction of A (n, n), symmetric and full, from the last row up: A = Q T Q^T with T tridiagonal, `diagonal` (n) and
-// `off` (n), off[k] between k and k + 1. A becomes Q^T: row k is the k-th column of Q.
+// Householder's reduction of A (n, n), symmetric and full, from the last row up: A = Q T Q^T with T
+// tridiagonal, `diagonal` (n) and `off` (n), off[k] between k and k + 1. A becomes Q^T: row k is the k-th
+// column of Q.
 void reduce(int n, double *A, double *diagonal, double *off) {
   Numbers half(sized(n), 0.0), push(sized(n));
   for (int i = n - 1; i > 0; --i) {
@@ -26,7 +27,8 @@ void reduce(int n, double *A, double *diagonal, double *off) {
       continue;
     }
     for (int k = 0; k < i; ++k) square += (u[k] / largest) * (u[k] / largest);
-    const double length = largest * std::sqrt(square), last = u[i - 1], turned = last > 0.0 ? -length : length;
+    const double length = largest * std::sqrt(square), last = u[i - 1],
+                 turned = last > 0.0 ? -length : length;
     off[i - 1] = turned;
     u[i - 1] = last - turned;
     const double h = -turned * u[i - 1];  // u . u / 2
@@ -46,7 +48,8 @@ void reduce(int n, double *A, double *diagonal, double *off) {
     }
   }
   for (int i = 0; i < n; ++i) diagonal[i] = A[i * n + i];
-  // Q = P_{n-1} ... P_2: a reflection changes what the smaller ones have built before it. Rows of Q^T are built in place.
+  // Q = P_{n-1} ... P_2: a reflection changes what the smaller ones have built before it. Rows of Q^T are
+  // built in place.
   Numbers u(sized(n)), g(sized(n));
   for (int i = 0; i < n; ++i) {
     double *row = A + i * n;
@@ -64,8 +67,9 @@ void reduce(int n, double *A, double *diagonal, double *off) {
   }
 }
 
-// QL steps with implicit shifts on a tridiagonal matrix until it is diagonal; the rows of `Q` (n, n) turn with it.
-// (Bowdler, Martin, Reinsch, Wilkinson, Numer. Math. 11 (1968) 293.) Off-diagonals end when they are small beside their neighbours.
+// QL steps with implicit shifts on a tridiagonal matrix until it is diagonal; the rows of `Q` (n, n) turn
+// with it. (Bowdler, Martin, Reinsch, Wilkinson, Numer. Math. 11 (1968) 293.) Off-diagonals end when they are
+// small beside their neighbours.
 void turn_diagonal(int n, double *d, double *e, double *Q) {
   e[n - 1] = 0.0;
   for (int l = 0; l < n; ++l)
@@ -109,7 +113,9 @@ void turn_diagonal(int n, double *d, double *e, double *Q) {
 void arrange(int n, double *values, double *shapes) {
   std::vector<int> order(sized(n));
   std::iota(order.begin(), order.end(), 0);
-  auto key = [&](int k) { return values[k] == values[k] ? values[k] : HUGE_VAL; };  // what is not a number comes last
+  auto key = [&](int k) {
+    return values[k] == values[k] ? values[k] : HUGE_VAL;
+  };  // what is not a number comes last
   std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return key(a) < key(b); });
   Numbers old_values(values, values + n), old(shapes, shapes + n * n);
   for (int k = 0; k < n; ++k) {
@@ -127,8 +133,7 @@ void eigen_symmetric(int n, const double *A, double *values, double *vectors) {
   std::vector<int> order(sized(n));
   std::iota(order.begin(), order.end(), 0);
   auto key = [&](int k) { return A[k * n + k] == A[k * n + k] ? std::fabs(A[k * n + k]) : HUGE_VAL; };
-  std::stable_sort(order.begin(), order.end(),
-                   [&](int a, int b) { return key(a) < key(b); });
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return key(a) < key(b); });
   double largest = 0.0;
   for (int k = 0; k < n * n; ++k) largest = std::max(largest, std::fabs(A[k]));
   const double unit = largest > 0.0 ? largest : 1.0;

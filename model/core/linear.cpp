@@ -1,10 +1,12 @@
+// Three sets of dual numbers: by q, v and forces (linear.hpp).
 #include "linear.hpp"
 
 #include <algorithm>
 
 namespace flexura {
 
-Linear linearise(const Model<double> &model, const double *q, const double *v, const double *force, const char *held) {
+Linear linearise(const Model<double> &model, const double *q, const double *v, const double *force,
+                 const char *held) {
   using Number = Dual<4>;
   const int n = model.n;
   const Model<Number> moved = dual(model);

@@ -1,4 +1,5 @@
-// K x = w^2 M x: by rotations that make the columns of L^-1 G orthogonal, and of a stiffness that may be singular or indefinite.
+// K x = w^2 M x: by rotations that make the columns of L^-1 G orthogonal, and of a stiffness that may be
+// singular or indefinite.
 #include <algorithm>
 #include <numeric>
 
@@ -13,8 +14,9 @@ constexpr double epsilon = 0x1p-52;
 
 std::size_t sized(int n) { return static_cast<std::size_t>(n); }
 
-// A = G G^T for a semidefinite A (n, n), which is overwritten, its pivots in descending order. Columns of G are rows of `G`
-// (n, length), length >= n; from the first pivot on that is round-off beside the first of all they are zero.
+// A = G G^T for a semidefinite A (n, n), which is overwritten, its pivots in descending order. Columns of G
+// are rows of `G` (n, length), length >= n; from the first pivot on that is round-off beside the first of all
+// they are zero.
 void pivoted(int n, double *A, int length, double *G) {
   std::vector<int> order(sized(n));
   std::iota(order.begin(), order.end(), 0);
@@ -40,8 +42,9 @@ void pivoted(int n, double *A, int length, double *G) {
   }
 }
 
-// Rotates `count` vectors of `length` (a multiple of four), one a row of X, until all are orthogonal: X = W X with W orthogonal. The
-// squares of their lengths, by which a rotation is chosen, are kept up to date, and formed anew before each sweep.
+// Rotates `count` vectors of `length` (a multiple of four), one a row of X, until all are orthogonal: X = W X
+// with W orthogonal. The squares of their lengths, by which a rotation is chosen, are kept up to date, and
+// formed anew before each sweep.
 void orthogonalise(int count, int length, double *X) {
   const double enough = 0x1p-50;  // a cosine between two vectors that is round-off
   Numbers squares(sized(count));
@@ -73,9 +76,11 @@ void orthogonalise(int count, int length, double *X) {
   }
 }
 
-// The same for many vectors: by the eigenvectors of the matrix of their products, to the digits of the largest of them.
+// The same for many vectors: by the eigenvectors of the matrix of their products, to the digits of the
+// largest of them.
 void orthogonalise_many(int count, int length, double *X) {
-  Numbers C(sized(count) * sized(count), 0.0), mu(sized(count)), W(C.size()), Y(sized(count) * sized(length), 0.0);
+  Numbers C(sized(count) * sized(count), 0.0), mu(sized(count)), W(C.size()),
+      Y(sized(count) * sized(length), 0.0);
   for (int i = 0; i < count; ++i)
     for (int j = 0; j <= i; ++j) {
       double sum[4] = {0.0, 0.0, 0.0, 0.0};
@@ -92,7 +97,8 @@ void orthogonalise_many(int count, int length, double *X) {
   std::copy(Y.begin(), Y.end(), X);
 }
 
-// The stiffness over the mass of the lower quarter of the unknowns that have a stiffness: near the lowest elastic w^2, rather above.
+// The stiffness over the mass of the lower quarter of the unknowns that have a stiffness: near the lowest
+// elastic w^2, rather above.
 double first_shift(int n, const double *K, const double *M) {
   double largest = 0.0;
   for (int i = 0; i < n; ++i) largest = std::max(largest, K[i * n + i]);
@@ -119,8 +125,8 @@ Numbers sum_of(int n, const double *K, double shift, const Numbers &M) {
   return S;
 }
 
-// A shift, `from` or more, that makes K + shift M safely positive definite: more than the most negative square. If M is so badly conditioned
-// that there is none, its diagonal is raised by what is round-off then.
+// A shift, `from` or more, that makes K + shift M safely positive definite: more than the most negative
+// square. If M is so badly conditioned that there is none, its diagonal is raised by what is round-off then.
 double raised(int n, const double *K, Numbers &M, double from) {
   for (int times = 0; times < 2; ++times) {
     double shift = from;
@@ -182,7 +188,8 @@ int eigen_pencil(int n, const double *K, const double *M, double *squares, doubl
         if (std::fabs(squares[k]) > 1e-7 * shift) lowest = std::min(lowest, std::fabs(squares[k]));
       }
       if (lowest >= 1e-5 * shift) break;
-      shift = 100.0 * lowest;  // once more with a shift closer to it, so that the low squares keep their digits
+      shift =
+          100.0 * lowest;  // once more with a shift closer to it, so that the low squares keep their digits
     }
   }
   int finite = 0;

@@ -1,4 +1,5 @@
-// M, K, frequencies and modes: positivity at any bending, exact frequencies, free and massless directions, many unknowns.
+// M, K, frequencies and modes: positivity at any bending, exact frequencies, free and massless directions,
+// many unknowns.
 #include "spectrum.hpp"
 
 #include "check.hpp"
@@ -33,9 +34,12 @@ Model<double> cantilever(int elements, double mass = 1.0, double stiffness = 1.0
 Robot mixed() {
   Robot robot;
   robot.gravity[0] = 1.0, robot.gravity[1] = -6.0;
-  Link slender = strip(0.5, 0.4, 2.0, 3), rider = strip(0.4, 0.2, 1.0, 2), sleeved = strip(0.6, 0.3, 1.5, 2), few = strip(0.3, 0.2, 0.4, 4), rigid;
-  rider.joint.kind = JointKind::slider, rider.joint.angle = 1.1, rider.joint.hub_mass = 0.2, rider.joint.hub_inertia = 1e-4;
-  sleeved.joint.kind = JointKind::sleeve, sleeved.joint.angle = -0.6, sleeved.joint.start = 0.4, sleeved.joint.hub_mass = 0.1;
+  Link slender = strip(0.5, 0.4, 2.0, 3), rider = strip(0.4, 0.2, 1.0, 2), sleeved = strip(0.6, 0.3, 1.5, 2),
+       few = strip(0.3, 0.2, 0.4, 4), rigid;
+  rider.joint.kind = JointKind::slider, rider.joint.angle = 1.1, rider.joint.hub_mass = 0.2,
+  rider.joint.hub_inertia = 1e-4;
+  sleeved.joint.kind = JointKind::sleeve, sleeved.joint.angle = -0.6, sleeved.joint.start = 0.4,
+  sleeved.joint.hub_mass = 0.1;
   few.modes = 2, few.beta = 1e-3, few.joint.viscous = 0.02;
   rigid.length = 0.2, rigid.mass = 0.3, rigid.centre = 0.1, rigid.inertia = 1e-3;
   robot.links = {slender, rider, sleeved, rigid, few};
@@ -86,7 +90,9 @@ TEST("M is positive definite at any bending, with a bare hub; v.M v / 2 is the k
   }
 }
 
-TEST("K is symmetric, and the derivative of the static forces and of the gradient of V; all kinds of joints and links") {
+TEST(
+    "K is symmetric, and the derivative of the static forces and of the gradient of V; all kinds of joints "
+    "and links") {
   check::Random random;
   const Model<double> model = assemble(mixed());
   const int n = model.n;
@@ -109,7 +115,8 @@ TEST("K is symmetric, and the derivative of the static forces and of the gradien
     for (int j = 0; j < n; ++j) {
       const double at = q[j], step = 1e-5;
       q[j] = at + step, force_at(plus), q[j] = at - step, force_at(minus), q[j] = at;
-      for (int i = 0; i < n; ++i) CHECK_NEAR((plus[i] - minus[i]) / (2.0 * step), K[i * n + j], 1e-6 * largest);
+      for (int i = 0; i < n; ++i)
+        CHECK_NEAR((plus[i] - minus[i]) / (2.0 * step), K[i * n + j], 1e-6 * largest);
     }
     // the sweeps of statics, joints held
     Still still(model, q.data(), nullptr);
@@ -125,7 +132,9 @@ TEST("K is symmetric, and the derivative of the static forces and of the gradien
     still.tangent(load, 1.0, 50.0, false), still.solve(r.data(), x.data());
     for (int i : rows) {
       double sum = -r[i], parts = 0.0;
-      for (int j : rows) sum += (K[i * n + j] + 50.0 * M[i * n + j]) * x[j], parts += std::fabs((K[i * n + j] + 50.0 * M[i * n + j]) * x[j]);
+      for (int j : rows)
+        sum += (K[i * n + j] + 50.0 * M[i * n + j]) * x[j],
+            parts += std::fabs((K[i * n + j] + 50.0 * M[i * n + j]) * x[j]);
       CHECK_NEAR(sum, 0.0, 1e-11 * (1.0 + parts));
     }
   }
@@ -194,7 +203,8 @@ TEST("a level link on a bare pin that sags by a tenth of its length: frequencies
   mass_matrix(model, q.data(), M.data());
   CHECK(definiteness(model.n, M) > 0.0);
   const char free[1] = {1};
-  for (const Modes &modes : {natural_modes(model, q.data(), nullptr, 0), natural_modes(model, q.data(), free, 0)}) {
+  for (const Modes &modes :
+       {natural_modes(model, q.data(), nullptr, 0), natural_modes(model, q.data(), free, 0)}) {
     for (double square : modes.squares) CHECK(square > -30.0 && std::isfinite(square));
     const int n = model.n, count = modes.count;
     double worst = 0.0;
@@ -202,7 +212,8 @@ TEST("a level link on a bare pin that sags by a tenth of its length: frequencies
       for (int b = 0; b < count; ++b) {
         double sum = a == b ? -1.0 : 0.0;
         for (int i = 0; i < n; ++i)
-          for (int j = 0; j < n; ++j) sum += modes.shapes[i * count + a] * M[i * n + j] * modes.shapes[j * count + b];
+          for (int j = 0; j < n; ++j)
+            sum += modes.shapes[i * count + a] * M[i * n + j] * modes.shapes[j * count + b];
         worst = std::fmax(worst, std::fabs(sum));
       }
     CHECK_NEAR(worst, 0.0, 1e-8);
@@ -238,12 +249,16 @@ TEST("the lowest 20 of many: as from the matrices; two equal arms; rigid motions
       Numbers q(model.n, 0.0);
       q[0] = -1.2, q[model.first[1]] = 0.6, q[model.first[2]] = -0.3;
       CHECK(equilibrium(model, q.data()).balance == Balance::stable);
-      const Modes some = lowest_modes(model, q.data(), free, 20, {}), all = natural_modes(model, q.data(), free, 0);
+      const Modes some = lowest_modes(model, q.data(), free, 20, {}),
+                  all = natural_modes(model, q.data(), free, 0);
       CHECK(some.count == 20);
-      for (int k = 0; k < some.count; ++k) CHECK_NEAR(some.squares[k], all.squares[k], 1e-9 * std::fabs(all.squares[k]) + 1e-7 * std::fabs(all.squares[4]));
+      for (int k = 0; k < some.count; ++k)
+        CHECK_NEAR(some.squares[k], all.squares[k],
+                   1e-9 * std::fabs(all.squares[k]) + 1e-7 * std::fabs(all.squares[4]));
       double worst = 0.0;  // shapes: as far as they are apart
       for (int k = 6; k < 12; ++k)
-        for (int i = 0; i < model.n; ++i) worst = std::fmax(worst, std::fabs(some.shapes[i * 20 + k] - all.shapes[i * all.count + k]));
+        for (int i = 0; i < model.n; ++i)
+          worst = std::fmax(worst, std::fabs(some.shapes[i * 20 + k] - all.shapes[i * all.count + k]));
       CHECK_NEAR(worst, 0.0, 1e-5);
     }
   Robot light;
@@ -276,7 +291,8 @@ TEST("the linearised motion: M da/df = 1, M da/dq = -K at rest, -D by the rates,
       double unit = i == j ? -1.0 : 0.0, stiff = K[i * n + j], damped = D[i * n + j];
       for (int k = 0; k < n; ++k) {
         unit += M[i * n + k] * linear.by_force[k * n + j];
-        stiff += M[i * n + k] * linear.by_position[k * n + j], damped += M[i * n + k] * linear.by_rate[k * n + j];
+        stiff += M[i * n + k] * linear.by_position[k * n + j],
+            damped += M[i * n + k] * linear.by_rate[k * n + j];
       }
       CHECK_NEAR(unit, 0.0, 1e-8);
       CHECK_NEAR(stiff, 0.0, 1e-9 * largest);

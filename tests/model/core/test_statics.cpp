@@ -27,12 +27,15 @@ Model<double> cantilever(int elements, int modes = -1) {
   return assemble(robot);
 }
 
-// The elastica by Runge-Kutta and the secant method: theta'' = -P cos theta, theta(0) = 0, theta'(1) = 0; x, y, theta of the tip.
+// The elastica by Runge-Kutta and the secant method: theta'' = -P cos theta, theta(0) = 0, theta'(1) = 0; x,
+// y, theta of the tip.
 void elastica(double P, double tip[3]) {
   const int steps = 4000;
   auto shoot = [&](double curvature, double out[3]) {
     double z[4] = {0.0, 0.0, 0.0, curvature};  // x, y, theta, theta'
-    auto slope = [&](const double *s, double *d) { d[0] = std::cos(s[2]), d[1] = std::sin(s[2]), d[2] = s[3], d[3] = -P * std::cos(s[2]); };
+    auto slope = [&](const double *s, double *d) {
+      d[0] = std::cos(s[2]), d[1] = std::sin(s[2]), d[2] = s[3], d[3] = -P * std::cos(s[2]);
+    };
     for (int k = 0; k < steps; ++k) {
       double a[4], b[4], c[4], d[4], w[4];
       const double h = 1.0 / steps;
@@ -48,14 +51,16 @@ void elastica(double P, double tip[3]) {
     for (int i = 0; i < 3; ++i) out[i] = z[i];
     return z[3];
   };
-  double low = 0.0, high = P;  // the curvature at the root is P x_tip: between these, and theta'(1) rises with it
+  double low = 0.0,
+         high = P;  // the curvature at the root is P x_tip: between these, and theta'(1) rises with it
   for (int k = 0; k < 60; ++k) {
     const double middle = 0.5 * (low + high);
     (shoot(middle, tip) > 0.0 ? high : low) = middle;
   }
 }
 
-// Slope a of the tip of a column under `share` of its buckling load: K(sin a/2) = sqrt(share) pi/2, K by the arithmetic-geometric mean.
+// Slope a of the tip of a column under `share` of its buckling load: K(sin a/2) = sqrt(share) pi/2, K by the
+// arithmetic-geometric mean.
 double buckled_slope(double share) {
   double low = 0.0, high = pi;
   for (int k = 0; k < 60; ++k) {
@@ -183,10 +188,14 @@ TEST("gravity sag of soft links: forces in balance at any softness, by inverse d
 TEST("sliders, sleeves, rigid links, modes: held, and in balance") {
   Robot robot;
   robot.gravity[0] = 2.0, robot.gravity[1] = -7.0;
-  Link carriage, slender = strip(0.5, 0.4, 0.8, 4), rider = strip(0.4, 0.2, 0.3, 3), sleeved = strip(0.6, 0.3, 0.5, 3), last = strip(0.3, 0.2, 0.2, 4);
-  carriage.length = 0.1, carriage.mass = 0.6, carriage.centre = 0.05, carriage.inertia = 5e-4, carriage.joint.kind = JointKind::slider;
-  rider.joint.kind = JointKind::slider, rider.joint.angle = 1.1, rider.joint.hub_mass = 0.2, rider.joint.hub_inertia = 1e-4;
-  sleeved.joint.kind = JointKind::sleeve, sleeved.joint.angle = -0.6, sleeved.joint.start = 0.4, sleeved.joint.hub_mass = 0.1;
+  Link carriage, slender = strip(0.5, 0.4, 0.8, 4), rider = strip(0.4, 0.2, 0.3, 3),
+                 sleeved = strip(0.6, 0.3, 0.5, 3), last = strip(0.3, 0.2, 0.2, 4);
+  carriage.length = 0.1, carriage.mass = 0.6, carriage.centre = 0.05, carriage.inertia = 5e-4,
+  carriage.joint.kind = JointKind::slider;
+  rider.joint.kind = JointKind::slider, rider.joint.angle = 1.1, rider.joint.hub_mass = 0.2,
+  rider.joint.hub_inertia = 1e-4;
+  sleeved.joint.kind = JointKind::sleeve, sleeved.joint.angle = -0.6, sleeved.joint.start = 0.4,
+  sleeved.joint.hub_mass = 0.1;
   last.joint.hub_inertia = 1e-4, last.modes = 3;
   for (int order = 0; order < 3; ++order) {
     robot.links = order == 0   ? std::vector<Link>{carriage, slender, rider, sleeved}
@@ -197,7 +206,9 @@ TEST("sliders, sleeves, rigid links, modes: held, and in balance") {
     Numbers q(model.n, 0.0);
     for (int i = 0; i < model.links(); ++i) {
       const JointKind kind = model.kind[i];
-      q[model.first[i]] = kind == JointKind::revolute ? 0.3 * i + 0.2 : kind == JointKind::slider ? 0.31 : 0.37;
+      q[model.first[i]] = kind == JointKind::revolute ? 0.3 * i + 0.2
+                          : kind == JointKind::slider ? 0.31
+                                                      : 0.37;
     }
     const Equilibrium found = equilibrium(model, q.data());
     CHECK(found.balance == Balance::stable);
