@@ -27,9 +27,9 @@ struct Equilibrium {
 };
 
 // The equilibrium with the joints at their positions in q (n), its elastic unknowns put into q. They are 0 on
-// entry, or a first guess for the full load (to choose a branch). `free` (links) or null: revolute joints
-// that turn until nothing turns them, from their position in q; sliders and sleeves are held. Gravity is the
-// model's.
+// entry, or a first guess for the full load (to choose a branch). `free` (links) or null: revolute joints that
+// turn until nothing turns them, from their position in q; sliders and sleeves are held. A free joint that
+// nothing holds makes the answer unstable. Gravity is the model's.
 Equilibrium equilibrium(const Model<double> &model, double *q, const TipLoad &load = {},
                         const char *free = nullptr);
 
