@@ -14,7 +14,7 @@ from .demo_command import demo
 from .experiment import command as bench
 from .export.command import export
 from .identification.command import identify
-from .terminal import announce_compiling, default_folder, events, interrupted, prepare, progress_bars, say, show, stored
+from .terminal import default_folder, events, interrupted, prepare, progress_bars, say, show, stored
 from .tuning.command import tune
 
 app = typer.Typer(
@@ -198,7 +198,6 @@ def study(
     described = fx.load(robot)
     asked = None if manoeuvre is None else fx.load_manoeuvre(manoeuvre, len(described.links))
     folder = out or default_folder(f"study-{kind}", robot)
-    announce_compiling()
     with progress_bars(kind) as report:
         done = studies.run(
             kind, described, asked, values, keep=keep, rtol=rtol, jobs=jobs, progress=lambda f: report(kind, f),
@@ -253,8 +252,6 @@ def crosscheck(
 
 def _crosscheck_all(folder: Path, json: bool) -> None:
     from . import nine
-
-    announce_compiling()
     with progress_bars("all nine") as report:
         rows = nine.crosscheck_nine(progress=lambda f: report("all nine", f))
     recording = nine.save(rows, folder)

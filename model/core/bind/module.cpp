@@ -10,4 +10,6 @@ MODULE(FLEXURA_MODULE_NAME, module) {
   module.attr("compiler") = flexura::build_compiler();
   module.attr("portable") = flexura::build_portable();
   flexura::bind_numbers(module);
+  flexura::bind_mechanics(module);
+  flexura::bind_simulation(module);
 }

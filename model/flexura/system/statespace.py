@@ -1,0 +1,222 @@
+"""The robot linearised: state-space matrices, poles and zeros about an equilibrium or a steady rotation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.linalg import cholesky, eig, eigvals, null_space, solve_triangular
+
+from ..errors import FlexuraError, InputError
+from .statics import static
+from .system import System, jacobian, system_of
+
+
+@dataclass(frozen=True)
+class StateSpace:
+    """Small motions x = (dq, d dq/dt) about q, qd (n,): x' = A x + B u, y = C x + D u, with u, y as deviations too.
+
+    From M dq'' + G dq' + K dq = E u, of which the fields are the matrices (m, m), (m, inputs): bias and gravity are in G and K.
+    `states`, `inputs`, `outputs` are names, `units` their units: inputs `joint/i/drive`, outputs `joint/i/position`,
+    `link/i/tip_deflection`, `tip/x`, `tip/y`, as in a Run. `hold` (N,): the drives [N or N m] that keep the robot there. Coulomb
+    friction is left out.
+    """
+
+    M: np.ndarray
+    G: np.ndarray
+    K: np.ndarray
+    E: np.ndarray
+    outlook: np.ndarray
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    units: dict[str, str]
+    q: np.ndarray
+    qd: np.ndarray
+    hold: np.ndarray
+
+    @property
+    def A(self) -> np.ndarray:
+        """(2m, 2m)."""
+        m = len(self.M)
+        return np.block([[np.zeros((m, m)), np.eye(m)], [-np.linalg.solve(self.M, np.hstack([self.K, self.G]))]])
+
+    @property
+    def B(self) -> np.ndarray:
+        """(2m, inputs)."""
+        return np.vstack([np.zeros_like(self.E), np.linalg.solve(self.M, self.E)])
+
+    @property
+    def C(self) -> np.ndarray:
+        """(outputs, 2m)."""
+        return np.hstack([self.outlook, np.zeros_like(self.outlook)])
+
+    @property
+    def D(self) -> np.ndarray:
+        """(outputs, inputs), zero: forces act through the masses."""
+        return np.zeros((len(self.outputs), len(self.inputs)))
+
+    @property
+    def poles(self) -> np.ndarray:
+        """Eigenvalues of A (2m,) [1/s], by magnitude."""
+        R = cholesky(self.M)
+        return _roots(np.eye(len(self.M)), _scaled(R, self.G), _scaled(R, self.K))
+
+    def zeros(self, drive: str, output: str) -> np.ndarray:
+        """Transmission zeros from an input to an output [1/s], by magnitude: where the output stays 0 while the drive acts.
+
+        Motions with c dq = 0 in the directions that the drive does not push, L^T (s^2 M + s G + K) N z = 0, N = ker c, L = ker b:
+        the finite invariant zeros of the pencil [[A - s, B], [C, 0]], without its infinite ones. Those with a positive real
+        part (non-minimum phase) bound what feedback of that output can do. Raises InputError for unknown names, and for an
+        output that the drive does not move.
+        """
+        b = self.E[:, _find(drive, self.inputs, "drive")]
+        c = self.outlook[_find(output, self.outputs, "output")]
+        R = cholesky(self.M)  # coordinates in which M = 1
+        b, c = solve_triangular(R, b, trans="T"), solve_triangular(R, c, trans="T")
+        G, K, one = _scaled(R, self.G), _scaled(R, self.K), np.eye(len(self.M))
+        for s in (1 + 1j, 37 + 5j):  # anywhere: only a transfer function that is zero is zero at both
+            moved = np.linalg.solve(s * s * one + s * G + K, b)
+            if abs(c @ moved) <= 1e-10 * float(np.linalg.norm(moved)) * max(float(np.linalg.norm(c)), 1e-9):
+                raise InputError(f"expected an output that {drive} moves about this position", key="output", value=output)
+        N, L = null_space(c[None]), null_space(b[None])
+        return _roots(L.T @ N, L.T @ G @ N, L.T @ K @ N)
+
+    def transfer(self, s: complex) -> np.ndarray:
+        """C (s - A)^-1 B at a complex frequency s [1/s], (outputs, inputs)."""
+        return self.outlook @ np.linalg.solve(s * s * self.M + s * self.G + self.K, self.E)
+
+
+def linearize(robot: Any, q: Any = None, qd: Any = None, joints: str = "free") -> StateSpace:
+    """The robot linearised about an equilibrium q (n,), by default the static one at the start, or about a steady motion (27).
+
+    Args: robot: a System, a Robot, or a robot file; q (n,); qd (n,): joint rates of a steady motion, a rotation or translation of the
+        whole robot, whose elastic equilibrium is found where q is not given; `tip/x`, `tip/y` are then along axes that turn with
+        it; joints: "free", or "locked": only the elastic unknowns move, and there are no inputs.
+
+    Raises: InputError: q, qd are no equilibrium. FlexuraError: none is found.
+    """
+    system = system_of(robot)
+    if joints not in ("free", "locked"):
+        raise InputError('expected "free" or "locked"', key="joints", value=joints)
+    rates = np.zeros(system.n) if qd is None else system.check(qd, "qd")
+    at = _steady(system, rates) if q is None else system.check(q)
+    _check_steady(system, at, rates)
+    rows = system.free_rows if joints == "free" else system.elastic_rows
+    pick = np.ix_(rows, rows)
+    moved = [i for i, row in enumerate(system.joint_rows) if row in rows]
+    K = system.tangent(at, rates if rates.any() else None)
+    K = K if rates.any() else (K + K.T) / 2
+    look, outputs, units = _outputs(system, at)
+    kept = [k for k, name in enumerate(outputs) if not name.startswith("joint") or int(name.split("/")[1]) - 1 in moved]
+    labels = [system.labels[row] for row in rows]
+    drives = [f"joint/{i + 1}/drive" for i in moved]
+    turns = [link.joint.type == "R" for link in system.robot.links]
+    units |= {name: "N m" if turns[i] else "N" for name, i in zip(drives, moved, strict=True)}
+    return StateSpace(
+        M=system.mass(at)[pick], G=system.rate(at, rates)[pick], K=K[pick],
+        E=(np.arange(system.n)[rows, None] == system.joint_rows[moved]).astype(float),
+        outlook=look[np.ix_(np.array(kept), rows)],
+        states=(*labels, *(f"rate of {label.replace(']', '/s]')}" for label in labels)),
+        inputs=tuple(drives), outputs=tuple(outputs[k] for k in kept), units=units, q=at, qd=rates,
+        hold=system.forces(at, rates, np.zeros(system.n))[system.joint_rows],
+    )  # fmt: skip
+
+
+def _steady(system: System, rates: np.ndarray) -> np.ndarray:
+    """The elastic equilibrium at the start, turning with the rates (n,), by Newton's method."""
+    q = static(system)
+    rows, size = system.elastic_rows, _sizes(system)
+    if len(rows) == 0 or not rates.any():
+        return q
+    pick = np.ix_(rows, rows)
+    for _ in range(30):
+        step = np.linalg.solve(system.tangent(q, rates)[pick], _balance(system, q, rates)[rows])
+        q[rows] -= step
+        if not np.all(np.isfinite(q)):
+            break
+        if np.linalg.norm(step * size) <= 1e-11 * (np.linalg.norm(q[rows] * size) + 1e-9):
+            return q
+    raise FlexuraError("no equilibrium found at these rates: the rotation bends a link ever further")
+
+
+def _balance(system: System, q: np.ndarray, rates: np.ndarray) -> np.ndarray:
+    """What does not balance at rates (n,) that do not change: bias, elastic and gravity forces (n,)."""
+    return system.elastic(q) + system.gravity(q) + (system.bias(q, rates) if rates.any() else 0.0)
+
+
+def _sizes(system: System) -> np.ndarray:
+    """Roots of the elastic rows' stiffness at the start: times q, roots of energies."""
+    return np.sqrt(np.diag(system.stiffness())[system.elastic_rows])
+
+
+def _check_steady(system: System, q: np.ndarray, rates: np.ndarray) -> None:
+    """Refuse what is no equilibrium: elastic rows out of balance, or a motion along which the robot's equations change."""
+    rows = system.elastic_rows
+    if len(rows):
+        force, size = _balance(system, q, rates)[rows], _sizes(system)
+        if np.linalg.norm(force / size) > 1e-5 * np.linalg.norm(q[rows] * size) + 1e-8:
+            raise InputError(
+                "expected an equilibrium, as from fx.static(system, joints=...): elastic forces do not balance", key="q"
+            )
+    if not rates.any():
+        return
+    if rates[rows].any():
+        raise InputError("expected rates of joints only", key="qd")
+    later = q + rates / np.abs(rates).max()  # a radian or a metre on
+    for function in (lambda z: _balance(system, z, rates), system.mass):
+        now, then = function(q), function(later)
+        if np.abs(then - now).max() > 1e-9 * np.abs(now).max():
+            raise InputError(
+                "expected a steady motion: rates of a first joint that turns or moves the whole robot, no gravity", key="qd"
+            )
+
+
+def _outputs(system: System, q: np.ndarray) -> tuple[np.ndarray, list[str], dict[str, str]]:
+    """d (joint positions, tip deflections, tip x, tip y) / dq (outputs, n), their names and units."""
+    links = system.robot.links
+    flexible = [i for i, link in enumerate(links) if link.flexible]
+    names = [f"joint/{i + 1}/position" for i in range(len(links))] + [f"link/{i + 1}/tip_deflection" for i in flexible]
+    units = {name: "rad" if "joint" in name and links[i].joint.type == "R" else "m" for i, name in enumerate(names)}
+
+    def look(z: np.ndarray) -> np.ndarray:
+        return np.concatenate([z[system.joint_rows], *system.places(z)])
+
+    slopes = jacobian(look, q, np.full(system.n, 1e-5) / np.maximum(_steep(system), 1e-300))
+    return slopes, [*names, "tip/x", "tip/y"], units | {"tip/x": "m", "tip/y": "m"}
+
+
+def _steep(system: System) -> np.ndarray:
+    """How far a unit of each unknown turns a link [rad], (n,); 1 for joints."""
+    out = np.ones(system.n)
+    for owns, pieces in zip(system.assembly.structure.own, system.assembly.structure.links, strict=True):
+        for own, piece in zip(owns, pieces, strict=True):
+            out[own] = np.abs(piece.B).max(axis=0, initial=0.0)
+    return out
+
+
+def _scaled(R: np.ndarray, X: np.ndarray) -> np.ndarray:
+    """R^-T X R^-1."""
+    return solve_triangular(R, solve_triangular(R, X, trans="T").T, trans="T").T
+
+
+def _roots(M: np.ndarray, G: np.ndarray, K: np.ndarray) -> np.ndarray:
+    """Finite s with det(s^2 M + s G + K) = 0, by magnitude; without G as the roots of s^2."""
+    n = len(M)
+    if n == 0:
+        return np.zeros(0, dtype=complex)
+    if not G.any():
+        squares = eigvals(-K, M).astype(complex)
+        found = np.concatenate([np.sqrt(squares), -np.sqrt(squares)])
+    else:
+        zero, one = np.zeros((n, n)), np.eye(n)
+        found = eig(np.block([[zero, one], [-K, -G]]), np.block([[one, zero], [zero, M]]), right=False)
+    found = found[np.isfinite(found)]
+    return found[np.argsort(np.abs(found), kind="stable")]
+
+
+def _find(name: str, names: tuple[str, ...], key: str) -> int:
+    if name not in names:
+        raise InputError(f"expected one of {', '.join(names)}", key=key, value=name)
+    return names.index(name)
