@@ -23,9 +23,7 @@ class Modes:
     labels: tuple[str, ...]
 
 
-def frequencies(
-    robot: Any, q: Any = None, joints: str = "locked", *, count: int | None = None, qd: Any = None
-) -> np.ndarray:
+def frequencies(robot: Any, q: Any = None, joints: str = "locked", *, count: int | None = None, qd: Any = None) -> np.ndarray:
     """Natural frequencies [Hz], ascending, of the undamped robot linearised about q (n,) (27), (28).
 
     Args: robot: a System, a Robot, or a robot file; q (n,): by default the static equilibrium at the start; joints: "locked" (only

@@ -278,6 +278,19 @@ TEST("a function of the caller's is never asked for a time before the step's sta
   }
 }
 
+TEST("a steep function of the caller's costs implicit steps little") {
+  Masses<double> plant(1, 1);
+  plant.stiffness = {0.0, 4.0};
+  Acting acting(1);
+  long asked = 0;
+  acting.function = [&](double, const double *q, const double *v, double *force) { ++asked, force[0] += -1e6 * (q[0] - 1.0) - 2e3 * v[0]; };
+  Run run(plant, acting, grid(0.0, 5.0, 11), 1e-5, true);
+  CHECK(run({0.0, 1.0}, {0.0, 0.0}) == Status::done);
+  CHECK_NEAR(run.at(10, 0), 1.0, 1e-9);
+  CHECK_NEAR(run.at(10, 1), std::cos(10.0), 1e-3);
+  CHECK(asked < 4000);
+}
+
 TEST("a prescribed joint is on its motion, and its drive is what that takes") {
   for (bool implicit : {false, true}) {
     Masses<double> plant(1, 1);
