@@ -195,8 +195,8 @@ void bind_control(nb::module_ &module) {
       .def("tick", &tick, "k"_a, "t"_a, "q"_a, "Tick k at the state q: forces (N,), and motions (N, 3) that hold from then on.")
       .def("step", &step, "k"_a, "t"_a, "positions"_a, "deflection"_a, "slope"_a, "The same from what is measured.")
       .def("method", &method_of, "q"_a, "rtol"_a, "The method for a run from q, by the ticks; sets the controller back.")
-      .def_prop_ro("log", &log_of, "Of all ticks since the start, (ticks, N, 6).")
-      .def_prop_ro("prediction", &prediction, "z of a linear law for the next tick.");
+      .def_prop_ro("log", &log_of, nb::rv_policy::move, "Of all ticks since the start, (ticks, N, 6).")
+      .def_prop_ro("prediction", &prediction, nb::rv_policy::move, "z of a linear law for the next tick.");
   nb::class_<Trials>(module, "Trials", "One robot under many controllers; may be called from several threads.")
       .def(nb::new_(&trials_of), "mechanics"_a, "controller"_a, "segments"_a, "index"_a, "gains"_a, "limits"_a, "t"_a, "q"_a, "references"_a, "rtol"_a,
            "method"_a)
