@@ -109,7 +109,9 @@ class Chain:
     def _lump(self, node: int, mass: float, inertia: float) -> None:
         """A mass and an inertia on the end of a beam: the slope of an ANCF node turns with it, and has length 1."""
         if mass or inertia:
-            self.mbs.AddObject(self.item.ObjectGenericODE2(nodeNumbers=[node], massMatrix=np.diag([mass, mass, inertia, inertia])))
+            self.mbs.AddObject(
+                self.item.ObjectGenericODE2(nodeNumbers=[node], massMatrix=np.diag([mass, mass, inertia, inertia]))
+            )
         if mass and any(self.gravity):
             weight = [mass * self.gravity[0], mass * self.gravity[1], 0]
             at = self._marker("NodePosition", nodeNumber=node)

@@ -103,10 +103,14 @@ def _twin(problem: Problem, choice: Choice, step: float) -> tuple[float, Channel
     drive = fx.Drive.force(*problem.work.force)
     begun = time.process_time()
     done = twin.simulate(
-        fx.Robot.from_dict(problem.robot), problem.t, drive, elements=choice.elements, hub_length_m=problem.hub_length_m, step_s=step
+        fx.Robot.from_dict(problem.robot),
+        problem.t,
+        drive,
+        elements=choice.elements,
+        hub_length_m=problem.hub_length_m,
+        step_s=step,
     )
     took = min(time.process_time() - begun, done.meta["wall_s"])
     if not done.meta["complete"]:
         raise RuntimeError("the twin did not reach the end")
-    names = ["tip/x", "tip/y"] + [f"link/{k}/tip_deflection" for k, link in enumerate(problem.robot["link"], 1) if link["elements"]]
-    return took, {name: np.asarray(done[name]) for name in names}
+    return took, {name: np.asarray(done[name]) for name in problem.names}

@@ -11,7 +11,22 @@ import flexura as fx
 
 from .problem import Problem, Work
 from .robots import (
-    beam, chain, damped, meshed, published_arm, rig, robot, sleeve, slider, strip, tokhi_arm, turning, two_strips, type_4, upright_arm,
+    beam,
+    boom,
+    chain,
+    damped,
+    meshed,
+    published_arm,
+    rig,
+    robot,
+    sleeve,
+    slider,
+    strip,
+    tokhi_arm,
+    turning,
+    two_strips,
+    type_4,
+    upright_arm,
     wrist,
 )  # fmt: skip
 from .signals import bang_bang, cycloid, harmonic, piecewise, spin_up
@@ -71,8 +86,6 @@ def more_links() -> list[Problem]:
     raised = [cycloid(0.8, 1.0), cycloid(-1.0, 1.0), cycloid(0.6, 1.0)]
     upright = Work(motion=raised, kp=[3000.0, 1200.0, 400.0], kd=[60.0, 20.0, 5.0])
     bangs = lambda links: Work(force=[bang_bang(0.3 * (1 - k / links) ** 2, 1.0, 0.05) for k in range(links)])
-    boom = robot([beam(6.4, 3.8e6, 22.0, 4, turning(hub_inertia_kg_m2=400.0), **damped(2e-3)),
-                  beam(7.0, 2.9e6, 17.0, 4, turning(hub_mass_kg=60.0, hub_inertia_kg_m2=50.0), **damped(2e-3))], 200.0)  # fmt: skip
     slow = Work(motion=[cycloid(0.9, 40.0), cycloid(-1.2, 40.0)], kp=[6e4, 2e4], kd=[3e4, 1e4])
     return [
         Problem("rr", "RR, 2 and 4 modes, smooth bang-bang, undamped, 2 s", two_strips(8, (2, 4)), times(2, 200),
@@ -86,7 +99,7 @@ def more_links() -> list[Problem]:
         Problem("rrr-gravity", "three links under gravity, stiff PD, damped, 2 s", upright_arm(4), times(2, 200), upright, 4),
         Problem("six-links", "six links, smooth bang-bang, damped, 2 s", chain(6, 3), times(2, 200), bangs(6), 3),
         Problem("twelve-links", "twelve links, smooth bang-bang, damped, 2 s", chain(12, 2), times(2, 200), bangs(12), 2),
-        Problem("minute", "a 13 m boom of two links, slow PD, damped, 60 s", boom, times(60, 600), slow, 4),
+        Problem("minute", "a 13 m boom of two links, slow PD, damped, 60 s", boom(), times(60, 600), slow, 4),
     ]  # fmt: skip
 
 
@@ -131,8 +144,8 @@ def in_python() -> list[Problem]:
     return [
         Problem("python-time", "the published arm, a Python function f(t), 3 s", own, times(3, 300), Work(of_time=open_loop), 4,
                 finer=meshed(own, 8), finer_elements=12, same=sines),
-        Problem("python-law", "Tokhi's arm, a feedback law in Python, 2 s", tokhi_arm(4), times(2, 200), Work(of_state=feedback), 4,
-                same=sine),
+        Problem("python-law", "Tokhi's arm, a feedback law in Python, 2 s", tokhi_arm(4), times(2, 200),
+                Work(of_state=feedback), 4, same=sine),
         Problem("python-tick", "rig-sampled with its law in Python", rig(1e-3), times(2, 200),
                 Work(tick=controller, rate_Hz=1000.0), 4, same=Work(motion=swing, kp=kp, kd=kd, rate_Hz=1000.0), needs="Sampled"),
     ]  # fmt: skip

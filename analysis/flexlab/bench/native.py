@@ -31,6 +31,11 @@ class Answer:
     channels: Channels
 
 
+def default_rtol() -> float:
+    """The tolerance of a user who sets none."""
+    return float(inspect.signature(fx.simulate).parameters["rtol"].default)
+
+
 def system(tables: Tables) -> fx.System:
     """The assembled robot of these tables."""
     return fx.assemble(fx.Robot.from_dict(tables))
@@ -54,12 +59,18 @@ def drive(work: Work) -> Any:
 
 def methods(problem: Problem) -> tuple[str, ...]:
     """The methods that can run this problem."""
-    known = METHODS if not problem.work.python or hasattr(fx, "Sampled") else METHODS[:3]
-    return tuple(method for method in known if not (problem.work.rate_Hz and method == "exponential" and not hasattr(fx, "Sampled")))
+    return METHODS[:3] if problem.work.python else METHODS
 
 
 def run(
-    problem: Problem, made: fx.System, rtol: float, method: str = "auto", *, work: Work | None = None, limit_s: float = 0.0, **keys: Any
+    problem: Problem,
+    made: fx.System,
+    rtol: float,
+    method: str = "auto",
+    *,
+    work: Work | None = None,
+    limit_s: float = 0.0,
+    **keys: Any,
 ) -> Answer:
     """One run from the straight robot at its start. Raises TooSlow after `limit_s` processor seconds, RuntimeError if it does
     not reach the end, and what flexura raises. `work` replaces the problem's; `keys` are handed on."""
@@ -87,9 +98,9 @@ def run(
 
 def channels(problem: Problem, done: fx.Run) -> Channels:
     """What is compared."""
-    names = ["tip/x", "tip/y"] + [f"link/{k}/tip_deflection" for k, link in enumerate(problem.robot["link"], 1) if link["elements"]]
+    names = problem.names
     if problem.inverse:
-        names += [f"joint/{k}/drive" for k in range(1, len(problem.robot["link"]) + 1)]
+        names = names + [f"joint/{k}/drive" for k in range(1, len(problem.robot["link"]) + 1)]
     return {name: np.asarray(done[name]) for name in names}
 
 

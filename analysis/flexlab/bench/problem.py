@@ -72,6 +72,12 @@ class Problem:
         return not self.needs or hasattr(fx, self.needs)
 
     @property
+    def names(self) -> list[str]:
+        """The channels of its motion that are compared."""
+        bent = [f"link/{k}/tip_deflection" for k, link in enumerate(self.robot["link"], 1) if link["elements"]]
+        return ["tip/x", "tip/y", *bent]
+
+    @property
     def ticks(self) -> int:
         """Ticks of a sampled controller in an output step; 1 without one."""
         return max(1, round(self.work.rate_Hz * (self.t[1] - self.t[0])))

@@ -71,7 +71,7 @@ def rig(hub: float) -> Tables:
 
 def type_4(elements: int, modes: int = 0) -> Tables:
     """Type IV (PaR) of the benchmark: a carriage on a rail, a rotor, a steel strip, a payload; undamped."""
-    keys = {"modes": modes} if modes else {}
+    keys: Tables = {"modes": modes} if modes else {}
     return robot([carriage(1.0), strip(0.3, (0.02, 0.001), elements, turning(hub_inertia_kg_m2=1e-3), **keys)], 0.05)
 
 
@@ -98,6 +98,12 @@ def chain(links: int, elements: int) -> Tables:
     """Equal damped links between joints R."""
     hub = turning(hub_mass_kg=0.1, hub_inertia_kg_m2=1e-3)
     return robot([beam(0.3, 2.0, 0.2, elements, hub, **damped(1e-3)) for _ in range(links)], 0.1)
+
+
+def boom() -> Tables:
+    """Two long tubes with a payload of 200 kg, as on a spacecraft."""
+    first = beam(6.4, 3.8e6, 22.0, 4, turning(hub_inertia_kg_m2=400.0), **damped(2e-3))
+    return robot([first, beam(7.0, 2.9e6, 17.0, 4, turning(hub_mass_kg=60.0, hub_inertia_kg_m2=50.0), **damped(2e-3))], 200.0)
 
 
 def slider(elements: int = 8) -> Tables:
