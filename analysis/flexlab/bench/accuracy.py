@@ -59,7 +59,7 @@ def first_steps() -> list[dict[str, float]]:
 
 
 def passes(problem: Problem) -> Row:
-    """The fewest evaluations by which each method holds each error, its tolerance chosen by hand; medians over the first steps."""
+    """The fewest evaluations by which each method holds each error, its tolerance chosen by hand; medians over first steps."""
     system, exact = native.system(problem.robot), native.converged(problem)
     methods = native.methods(problem)
     curves: dict[str, list[list[tuple[float, int]]]] = {method: [] for method in methods}

@@ -65,16 +65,16 @@ def summary(rows: Rows) -> str:
 
 def stills(rows: Rows) -> Table:
     """Statics and frequencies."""
-    table = _table("name", "what", "ratio", "quartiles", "asked", "apart", "ms", "Exudyn")
+    table = _table("name", "ratio", "quartiles", "asked", "apart", "ms", "Exudyn")
     for row in rows:
         asked = "" if row["asked"] is None else figure(row["asked"])
         if "auto" not in row:
-            table.add_row(row["name"], row["what"], "-", "", asked, "", "", "")
+            table.add_row(row["name"], "-", "", asked, "", "", "")
             continue
         found = row["auto"]
         quartiles = f"{figure(found['ratio']['low'])}-{figure(found['ratio']['high'])}"
         numbers = (small(found["error"]), figure(found["ms"]), figure(row["exudyn"]["ms"]))
-        table.add_row(row["name"], row["what"], spread(found), quartiles, asked, *numbers)
+        table.add_row(row["name"], spread(found), quartiles, asked, *numbers)
     return table
 
 
@@ -133,10 +133,10 @@ def _times(each: dict[str, Any]) -> str:
 
 
 def _table(*columns: str) -> Table:
-    """A table without a frame whose first column is on the left, the others on the right."""
-    table = Table(box=None, padding=(0, 1, 0, 0), collapse_padding=True)
+    """A table without a frame whose first column is on the left, the others on the right; what is too long is folded."""
+    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
     for k, name in enumerate(columns):
-        table.add_column(name, justify="right" if k else "left", no_wrap=k > 1, overflow="fold")
+        table.add_column(name, justify="right" if k else "left", overflow="fold")
     return table
 
 

@@ -19,7 +19,7 @@ from .problem import Tables
 from .robots import beam, chain, robot, turning, upright_arm
 
 COUNT = 20  # lowest frequencies
-HINGE_N_M = 1e7  # of springs in place of hinges: sparse eigenvalues come without constraints only
+HINGE_N_M = 1e9  # of springs in place of hinges: sparse eigenvalues come without constraints only
 STATIC = Choice(0, 1, tolerance=1e-8)
 LOAD_STEPS = (1, 2, 3, 5, 10, 20, 50)
 Program = Callable[[], tuple[float, np.ndarray]]  # processor seconds and the answer
