@@ -32,6 +32,7 @@ VARIANTS: tuple[dict[str, Any], ...] = (
     {"spectral_radius": 0.99}, {"spectral_radius": 0.8}, {"spectral_radius": 0.6}, {"reduced": 2}, {"sparse": True},
     {"trapezoidal": True},
 )  # fmt: skip
+NEWTON: tuple[dict[str, Any], ...] = ({}, {"increments": True, "tolerance": 1e-8})  # the second where the first never holds
 Log = Callable[[str], None]
 
 
@@ -100,9 +101,12 @@ def meshes(problem: Problem) -> list[int]:
 def cheapest(problem: Problem, exact: Channels, log: Log) -> Found:
     """The cheapest choice that holds the target. Raises RuntimeError if there is none."""
     ladder = list(LADDER)
-    tried = (longest_step(problem, Choice(elements, 1), exact, ladder) for elements in meshes(problem))
-    found = [each for each in tried if each is not None]
-    if not found:
+    for newton in NEWTON:
+        tried = (longest_step(problem, Choice(elements, 1, **newton), exact, ladder) for elements in meshes(problem))
+        found = [each for each in tried if each is not None]
+        if found:
+            break
+    else:
         raise RuntimeError(f"{problem.name}: Exudyn does not hold {TARGET:g}")
     best = min(found, key=lambda each: each[1])
     log(f"  {best[0].to_dict()}: {best[1]:.3f} s, error {best[2]:.1e}")
