@@ -71,6 +71,8 @@ def passes(problem: Problem) -> Row:
                 if found is None:
                     break
                 runs.append(found)
+                if found[0] <= min(ERRORS):
+                    break
             curves[method].append(runs)
     fewest = lambda runs, target: min((count for off, count in runs if off <= target), default=None)
     rows: list[Row] = []

@@ -1,10 +1,10 @@
 """Exudyn's cheapest settings for a given error, found by search: python -m flexlab.bench search [PROBLEM ...].
 
-The converged model: steps are halved, with Newton's method converged, until two runs differ by less than a tenth of the target;
-Richardson's extrapolation of the last two counts. The search takes the longest step that holds the target on each mesh, then
-tries one setting after another on the best of them, with the longest step that holds the target there, and keeps what is
-cheaper. What it finds is in `settings.json`: the choice, its error, its time, and how far the converged models of the two
-programs are apart.
+The converged model: steps are halved, with Newton's method converged, until a third of what the last halving changed is less
+than a tenth of the target; Richardson's extrapolation of the last two counts. The search takes the longest step that holds the
+target on each mesh, then tries one setting after another on the best of them, with the longest step that holds the target there,
+and keeps what is cheaper. What it finds is in `settings.json`: the choice, its error, its processor time, the error of the
+converged model, and how far the converged models of the two programs are apart.
 """
 
 from __future__ import annotations
@@ -55,25 +55,27 @@ def doubled(problem: Problem, choice: Choice) -> Iterator[tuple[int, float, Chan
         substeps *= 2
 
 
-def converged(problem: Problem, log: Log) -> tuple[Channels, float]:
-    """Exudyn's converged channels on the problem's fine mesh, and an estimate of their own error. Raises RuntimeError."""
+def converged(problem: Problem, log: Log) -> tuple[Channels, float, int]:
+    """Exudyn's converged channels on the problem's fine mesh, an estimate of their own error, and the most steps in an output
+    step that did not hold the target. Raises RuntimeError."""
     start = Choice(problem.finer_elements or problem.elements, 1)
     before: Channels | None = None
     best: Channels | None = None
-    estimate = float("inf")
+    estimate, runs = float("inf"), []
     for substeps, seconds, found in doubled(problem, start if problem.hub_length_m else start.tight()):
+        runs.append((substeps, found))
         if before is not None:
             change = error(before, found)
             log(f"  converged: {substeps} steps, {seconds:.2f} s, change {change:.1e}")
             if best is not None and change > 1.2 * 3 * estimate:  # round-off
                 break
             best, estimate = {name: v + (v - before[name]) / 3 for name, v in found.items()}, change / 3
-            if estimate < 0.03 * TARGET:
+            if estimate < 0.1 * TARGET:
                 break
         before = found
     if best is None:
         raise RuntimeError(f"{problem.name}: Exudyn's converged model was not reached")
-    return best, estimate
+    return best, estimate, max((substeps for substeps, found in runs if error(found, best) > TARGET), default=0)
 
 
 Found = tuple[Choice, float, float]  # a choice, its processor seconds and its error
@@ -98,11 +100,12 @@ def meshes(problem: Problem) -> list[int]:
     return [problem.elements + k for k in ((0, 1, 2, 4) if problem.finer_elements else (0,))]
 
 
-def cheapest(problem: Problem, exact: Channels, log: Log) -> Found:
-    """The cheapest choice that holds the target. Raises RuntimeError if there is none."""
+def cheapest(problem: Problem, exact: Channels, coarse: int, log: Log) -> Found:
+    """The cheapest choice that holds the target, with more steps than `coarse`. Raises RuntimeError if there is none."""
     ladder = list(LADDER)
+    finer = [count for count in ladder if count * problem.ticks > coarse]
     for newton in NEWTON:
-        tried = (longest_step(problem, Choice(elements, 1, **newton), exact, ladder) for elements in meshes(problem))
+        tried = (longest_step(problem, Choice(elements, 1, **newton), exact, finer) for elements in meshes(problem))
         found = [each for each in tried if each is not None]
         if found:
             break
@@ -132,8 +135,8 @@ def cheapest(problem: Problem, exact: Channels, log: Log) -> Found:
 
 def search(problem: Problem, log: Log) -> dict[str, Any]:
     """The entry of `settings.json`."""
-    exact, own = converged(problem, log)
-    choice, seconds, off = cheapest(problem, exact, log)
+    exact, own, coarse = converged(problem, log)
+    choice, seconds, off = cheapest(problem, exact, coarse, log)
     apart = error(native.converged(problem, problem.finer), exact)
     log(f"  the converged models of the two programs are {apart:.1e} apart")
     numbers = {"error": off, "seconds": seconds, "converged_within": own, "apart": apart}
