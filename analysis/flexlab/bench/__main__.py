@@ -103,7 +103,7 @@ def main() -> None:
     if not parts:
         parts = [part for part, some in (("motions", chosen), ("still", quiet)) if some] or list(PARTS)
     if "search" in parts:
-        search.main([p for p in chosen or motions.values() if p.available], lambda line: print(line, file=sys.stderr, flush=True))
+        search.main(chosen or list(motions.values()), lambda line: print(line, file=sys.stderr, flush=True))
         return
     found = measured(parts, chosen or list(motions.values()), quiet or list(stills.values()), given.rounds)
     if given.json:
