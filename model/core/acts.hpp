@@ -1,0 +1,152 @@
+// What acts on the robots of a pack at one instant, as numbers for a pass. Each lane has its own `Acting` and its own time.
+#pragma once
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "acting.hpp"
+#include "lane.hpp"
+#include "plant.hpp"
+
+namespace flexura {
+
+template <class Real> class Acts {
+ public:
+  static constexpr int LANES = LanesOf<Real>::value;
+  std::vector<Real> reaction;  // (joints) of the pass just made
+
+  Acts(const Plant<Real> &robot, Acting *const *acting)
+      : reaction(robot.joints, Real(0.0)), plant(robot), held(new bool[robot.joints]), force(robot.n, Real(0.0)) {
+    for (auto *x : {&stiffness, &damping, &given, &steady, &asked, &asked_rate, &place, &rate, &applied, &like})
+      x->assign(robot.joints, Real(0.0));
+    for (int k = 0; k < LANES; ++k) of[k] = acting[k];
+    for (int i = 0; i < plant.joints; ++i) {
+      held[i] = plant.locked[i] || follows(i);
+      for (int k = 0; k < LANES && !held[i]; ++k) {
+        const JointDrive &d = of[k]->joints[i];
+        if (!d.follows()) continue;
+        set_lane(stiffness[i], k, d.kp), set_lane(damping[i], k, d.kd);
+      }
+      gains.push_back(stiffness[i]), gains.push_back(damping[i]);
+      damping[i] += plant.viscous[i];
+    }
+    for (int k = 0; k < LANES; ++k) calls |= static_cast<bool>(of[k]->function);
+    scratch.assign(2 * plant.n + plant.joints, 0.0);
+  }
+
+  Acting &acting(int k) const { return *of[k]; }
+  bool any_prescribed() const {
+    for (int i = 0; i < plant.joints; ++i)
+      if (follows(i)) return true;
+    return false;
+  }
+
+  // Signals and what is held, at time t.
+  void at(const Real &t) {
+    time = t;
+    for (int i = 0; i < plant.joints; ++i)
+      for (int k = 0; k < LANES; ++k) {
+        const Acting &a = *of[k];
+        set_lane(steady[i], k, a.force(i, lane(t, k)));
+        if (!a.joints[i].follows()) continue;
+        const Motion m = a.motion(i, lane(t, k));
+        if (a.joints[i].prescribed) set_lane(place[i], k, m.y), set_lane(rate[i], k, m.yd), set_lane(given[i], k, m.ydd);
+        else set_lane(asked[i], k, m.y), set_lane(asked_rate[i], k, m.yd);
+      }
+  }
+
+  // Puts prescribed joints where their motion has them.
+  void prescribe(Real *q, Real *v) const {
+    for (int i = 0; i < plant.joints; ++i)
+      if (follows(i)) q[plant.first[i]] = place[i], v[plant.first[i]] = rate[i];
+  }
+
+  // The forces of a plain pass at (q, v).
+  void load(const Real *q, const Real *v) {
+    call(q, v);
+    for (int i = 0; i < plant.joints; ++i) {
+      force[plant.first[i]] = constant(i);
+      if (rubs(i)) force[plant.first[i]] -= plant.coulomb[i] * tanh(v[plant.first[i]] * (1.0 / COULOMB_SPEED));
+      damping[i] = gains[2 * i + 1] + plant.viscous[i];
+    }
+  }
+
+  // The forces of a pass of an implicit stage whose last iterate is (q, v): Coulomb friction is taken as linear in the speed to come,
+  // by the tangent where the speed has settled to a fraction of v0 between iterates, else by the line through zero, which
+  // never overshoots.
+  void load_stage(const Real *q, const Real *v, bool first) {
+    call(q, v);
+    for (int i = 0; i < plant.joints; ++i) {
+      Real &f = force[plant.first[i]];
+      f = constant(i), damping[i] = gains[2 * i + 1] + plant.viscous[i];
+      if (!rubs(i)) continue;
+      const Real speed = v[plant.first[i]], x = speed * (1.0 / COULOMB_SPEED), r = tanh(x), steep = plant.coulomb[i] * (1.0 / COULOMB_SPEED);
+      const Real chord = choose_less(abs(x), Real(1e-4), steep, steep * (r / x)), tangent = steep * (1.0 - r * r);
+      const Real moved = first ? Real(1.0) : abs(speed - like[i]) * (1.0 / COULOMB_SPEED);
+      const Real slope = choose_less(moved, Real(0.3), tangent, chord);
+      damping[i] += slope, f += slope * speed - plant.coulomb[i] * r;
+      like[i] = speed;
+    }
+  }
+
+  Pass<Real> pass(const Real *q, const Real *v, const Real *ys, const Real *vs, const Real &gq, const Real &gv) const {
+    return {q, v, ys, vs, gq, gv, force.data(), stiffness.data(), damping.data(), held.get(), given.data()};
+  }
+
+  // The force of joint i's drive at (q, v), after `load` and, if it is prescribed, after the pass.
+  Real drive(int i, const Real *q, const Real *v) const {
+    const int e = plant.first[i];
+    if (follows(i)) return reaction[i] + resistance(i, v[e]);
+    return constant(i) - gains[2 * i] * q[e] - gains[2 * i + 1] * v[e];
+  }
+
+  // Power of all drives [W].
+  Real work(const Real *q, const Real *v) const {
+    Real sum = 0.0;
+    for (int i = 0; i < plant.joints; ++i)
+      if (!plant.locked[i]) sum += drive(i, q, v) * v[plant.first[i]];
+    return sum;
+  }
+
+  // Power lost to friction in the joints [W].
+  Real friction(const Real *v) const {
+    Real sum = 0.0;
+    for (int i = 0; i < plant.joints; ++i) sum += resistance(i, v[plant.first[i]]) * v[plant.first[i]];
+    return sum;
+  }
+
+ private:
+  const Plant<Real> &plant;
+  std::array<Acting *, LANES> of;
+  std::unique_ptr<bool[]> held;
+  std::vector<Real> force, stiffness, damping, given, steady, asked, asked_rate, place, rate, applied, like;
+  std::vector<Real> gains;  // kp, kd of each joint
+  std::vector<double> scratch;
+  Real time = 0.0;
+  bool calls = false;
+
+  // (All lanes of a pack prescribe the same joints.)
+  bool follows(int i) const { return of[0]->joints[i].prescribed && of[0]->joints[i].follows() && !plant.locked[i]; }
+  bool rubs(int i) const { return worst(plant.coulomb[i]) > 0.0 && !held[i]; }
+  Real constant(int i) const { return steady[i] + applied[i] + gains[2 * i] * asked[i] + gains[2 * i + 1] * asked_rate[i]; }
+  Real resistance(int i, const Real &speed) const {
+    Real r = plant.viscous[i] * speed;
+    if (worst(plant.coulomb[i]) > 0.0) r += plant.coulomb[i] * tanh(speed * (1.0 / COULOMB_SPEED));
+    return r;
+  }
+
+  // The caller's functions at (q, v).
+  void call(const Real *q, const Real *v) {
+    if (!calls) return;
+    double *place_ = scratch.data(), *rate_ = place_ + plant.n, *out = rate_ + plant.n;
+    for (int k = 0; k < LANES; ++k) {
+      if (!of[k]->function) continue;
+      for (int j = 0; j < plant.n; ++j) place_[j] = lane(q[j], k), rate_[j] = lane(v[j], k);
+      for (int i = 0; i < plant.joints; ++i) out[i] = 0.0;
+      of[k]->function(lane(time, k), place_, rate_, out);
+      for (int i = 0; i < plant.joints; ++i) set_lane(applied[i], k, out[i]);
+    }
+  }
+};
+
+}  // namespace flexura

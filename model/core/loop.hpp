@@ -1,0 +1,325 @@
+// The time loop, for every method: outputs, breaks, ticks of a sampled controller, control of the step, limits, failures.
+//
+//     Loop<double> loop(plant, &acting, times, rtol);   Explicit<double> method(loop.course);
+//     loop.start(q0, v0, first_step);
+//     while (loop.advance(method, 1000)) ...            // progress, interruption, another method
+//
+// A step never crosses a break (a signal's corner, a tick). The state at a tick is the state of the step that ends there, so that a
+// controller is called once a tick in order of time. Outputs between are taken from the method's dense output.
+#pragma once
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <memory>
+#include <vector>
+
+#include "clock.hpp"
+#include "method.hpp"
+
+namespace flexura {
+
+// What a run gives: rows of times, states (q, v, accounts) and drive forces.
+struct Record {
+  int rows = 0, size = 0, joints = 0;
+  std::vector<double> t, state, drive;
+
+  void open(int most, int state_size, int joint_count) {
+    size = state_size, joints = joint_count, rows = 0;
+    t.assign(most, 0.0), state.assign(static_cast<std::size_t>(most) * size, 0.0);
+    drive.assign(static_cast<std::size_t>(most) * joints, 0.0);
+  }
+};
+
+template <class Real> class Loop {
+ public:
+  static constexpr int LANES = LanesOf<Real>::value;
+  Course<Real> course;
+  std::array<Clock, LANES> clock;
+  std::array<Record, LANES> record;
+  long most_steps = std::numeric_limits<long>::max();  // budget: accepted and rejected steps of a robot
+  double longest = Clock::NEVER;                       // no step is longer [s]
+  const std::atomic<bool> *interrupt = nullptr;        // stops the run where it is
+  std::atomic<double> *progress = nullptr;             // the time reached by the slowest robot
+
+  // acting: one for each robot. times: of the outputs, ascending; the first is the start.
+  Loop(Plant<Real> &plant, Acting *const *acting, std::vector<double> times, double rtol)
+      : course(plant, acting, rtol), outputs(std::move(times)), row_state(padded(course.size), Real(0.0)),
+        plain(course.size, 0.0) {
+    for (int k = 0; k < LANES; ++k) breaks[k] = acting[k]->breaks();
+  }
+
+  void start(const Real *q0, const Real *v0, double first_step) {
+    for (int k = 0; k < course.n; ++k) course.z[k] = q0[k], course.z[course.n + k] = v0[k];
+    for (int k = 0; k < ACCOUNTS; ++k) course.z[2 * course.n + k] = Real(0.0);
+    course.acts.at(Real(outputs.front()));
+    course.acts.prescribe(course.z.data(), course.z.data() + course.n);
+    course.weights.start(course.z.data());
+    course.znew = course.z;
+    current = nullptr;
+    for (int k = 0; k < LANES; ++k) {
+      clock[k] = Clock();
+      clock[k].t = clock[k].start = outputs.front(), clock[k].end = outputs.back(), clock[k].wish = first_step;
+      record[k].open(static_cast<int>(outputs.size()) + 1, course.size, course.plant.joints);
+    }
+  }
+
+  // At most so many steps further with that method; is any robot still running?
+  bool advance(Method<Real> &method, long steps) {
+    if (current != &method)
+      for (Clock &c : clock) c.fresh = true;
+    current = &method;
+    for (long s = 0; s < steps && any(); ++s) {
+      if (interrupt && interrupt->load(std::memory_order_relaxed)) end_all(Status::interrupted);
+      arrive(method);
+      if (!any()) break;
+      attempt(method);
+      for (int k = 0; k < LANES; ++k)
+        if (clock[k].running()) judge(method, k);
+      settle(method);
+    }
+    return any();
+  }
+
+  bool any() const {
+    return std::any_of(clock.begin(), clock.end(), [](const Clock &c) { return c.running(); });
+  }
+
+ private:
+  std::vector<double> outputs;
+  std::array<std::vector<double>, LANES> breaks;
+  std::vector<Real> row_state;
+  std::vector<double> plain;  // one robot's state
+  Method<Real> *current = nullptr;
+  Real at, length, last, error, good;
+  bool prepared = false;
+
+  void end_all(Status status) {
+    for (Clock &c : clock)
+      if (c.running()) c.status = status;
+  }
+
+  const double *state_of(int k, const Real *z) {
+    for (int j = 0; j < course.size; ++j) plain[j] = lane(z[j], k);
+    return plain.data();
+  }
+
+  // At the start of a step: ticks, the equations after a jump, outputs that are due now.
+  void arrive(Method<Real> &method) {
+    Real which = 0.0, now = 0.0;
+    bool jumped = false;
+    for (int k = 0; k < LANES; ++k) {
+      Clock &c = clock[k];
+      set_lane(now, k, c.t);
+      if (!c.running()) continue;
+      Acting &a = course.acts.acting(k);
+      if (c.due(a) <= c.t && c.t < c.end) {
+        const double *z = state_of(k, course.z.data());
+        a.sampler->tick(c.tick++, c.t, z, z + course.n, a.held);
+        c.fresh = true;
+      }
+      c.look_ahead(breaks[k], a);
+      if (c.fresh) set_lane(which, k, 1.0), jumped = true;
+    }
+    if (jumped) {
+      method.begin(which, now);
+      for (int k = 0; k < LANES; ++k) {
+        if (lane(which, k) == 0.0) continue;
+        clock[k].wish = method.restart(k, clock[k].wish, clock[k].steps == 0);
+        clock[k].fresh = false;
+      }
+    }
+    for (int k = 0; k < LANES; ++k) {
+      Clock &c = clock[k];
+      if (!c.running() || c.row >= static_cast<int>(outputs.size()) || outputs[c.row] > c.t) continue;
+      keep(k, c.t, course.z.data());
+      if (c.row >= static_cast<int>(outputs.size())) c.status = Status::done;
+    }
+  }
+
+  // One step of every robot; the lanes that are not running step by nothing.
+  void attempt(Method<Real> &method) {
+    for (int k = 0; k < LANES; ++k) {
+      Clock &c = clock[k];
+      set_lane(at, k, c.t), set_lane(length, k, 0.0), set_lane(last, k, c.t);
+      if (!c.running()) continue;
+      const double left = c.stop - c.t, ahead = outputs[c.row] - c.t;
+      c.step = method.fit(k, std::fmin(c.wish, longest), left, ahead);
+      c.next = c.step >= left ? c.stop : c.step == ahead ? outputs[c.row] : c.t + c.step;
+      set_lane(length, k, c.step), set_lane(last, k, std::fmax(c.t, c.last()));
+    }
+    error = method.attempt(at, length, last);
+    prepared = false, good = Real(0.0);
+  }
+
+  // Robot k: was the step good? If so, the outputs on its way, and limits.
+  void judge(Method<Real> &method, int k) {
+    Clock &c = clock[k];
+    const double e = lane(error, k);
+    if (!(e < 1.0)) return reject(method, k, e);
+    const double passed_at = first_beyond(method, k);
+    while (c.row < static_cast<int>(outputs.size()) && outputs[c.row] < std::fmin(c.next, passed_at)) {
+      between(method, k, outputs[c.row]);
+      keep(k, outputs[c.row], row_state.data());
+    }
+    if (passed_at <= c.next) return stop_at_limit(method, k, passed_at);
+    ++c.steps, c.failed = 0;
+    const double wish = method.next(k, c.step, e, c.before, true);
+    c.wish = c.step < c.wish ? std::fmax(c.wish, wish) : wish;
+    c.before = std::fmax(e, 1e-4);
+    set_lane(good, k, 1.0);
+    if (c.steps + c.rejected >= most_steps) c.status = Status::exhausted;
+  }
+
+  void reject(Method<Real> &method, int k, double e) {
+    Clock &c = clock[k];
+    ++c.rejected, ++c.failed;
+    c.wish = std::isfinite(e) ? method.next(k, c.step, e, c.before, false) : 0.1 * c.step;
+    const bool over = c.steps + c.rejected >= most_steps;
+    if (!over && !c.too_short(c.wish)) return;
+    c.status = over ? Status::exhausted : std::isfinite(e) ? Status::stuck : Status::diverged;
+    blame(k);
+  }
+
+  // After all robots are judged: good steps are taken.
+  void settle(Method<Real> &method) {
+    if (worst(good) > 0.0) {
+      method.accept(good);
+      take(good, course.znew.data(), course.z.data(), course.size);
+      bool look = false;
+      for (int k = 0; k < LANES; ++k) {
+        if (lane(good, k) == 0.0) continue;
+        Clock &c = clock[k];
+        c.t = c.next;
+        look = look || c.steps % 8 == 0 || c.t == c.stop;
+        if (c.t == c.stop && c.t < c.end) c.fresh = true;
+        if (c.t >= c.end) finish(k);
+      }
+      course.weights.grow(course.z.data(), look);
+    }
+    if (progress) {
+      double slowest = Clock::NEVER;
+      for (const Clock &c : clock) slowest = std::fmin(slowest, c.status == Status::running ? c.t : c.end);
+      progress->store(slowest, std::memory_order_relaxed);
+    }
+  }
+
+  void finish(int k) {
+    Clock &c = clock[k];
+    while (c.row < static_cast<int>(outputs.size())) keep(k, c.t, course.z.data());
+    if (c.running()) c.status = Status::done;
+  }
+
+  // The state at time t inside the step just attempted, into row_state; prescribed joints are on their motion.
+  void between(Method<Real> &method, int k, double t) {
+    if (!prepared) method.prepare(at, length, last), prepared = true;
+    Real x = 0.0, now = at;
+    set_lane(x, k, (t - clock[k].t) / clock[k].step), set_lane(now, k, t);
+    method.between(length, x, row_state.data());
+    course.acts.at(now);
+    course.acts.prescribe(row_state.data(), row_state.data() + course.n);
+  }
+
+  // A row of robot k's record: the state z at time t, and the forces of the drives there.
+  void keep(int k, double t, const Real *z) {
+    Clock &c = clock[k];
+    Record &r = record[k];
+    Real now = at;
+    set_lane(now, k, t);
+    if (z != row_state.data()) std::copy(z, z + course.size, row_state.data());
+    Real *q = row_state.data(), *v = q + course.n;
+    course.acts.at(now);
+    course.acts.load(q, v);
+    if (course.acts.any_prescribed()) course.react(q, v);
+    const std::size_t row = static_cast<std::size_t>(r.rows++);
+    r.t[row] = t;
+    for (int j = 0; j < course.size; ++j) r.state[row * r.size + j] = lane(row_state[j], k);
+    for (int i = 0; i < r.joints; ++i) r.drive[row * r.joints + i] = lane(course.acts.drive(i, q, v), k);
+    ++c.row;
+  }
+
+  // A joint of robot k that is outside its limits in the state z, or -1.
+  int beyond(int k, const Real *z) {
+    const Acting &a = course.acts.acting(k);
+    for (int i = 0; i < course.plant.joints; ++i) {
+      const double place = lane(z[course.plant.first[i]], k);
+      if (!course.plant.locked[i] && !(a.low[i] <= place && place <= a.high[i])) return i;
+    }
+    return course.plant.blocked(k, z);
+  }
+
+  // The time inside the step at which robot k leaves its limits first, to a part in 1e13 of the step; NEVER: it does not.
+  // Looked for at the step's end, at the outputs on its way and, where a joint turns round in the step, at seven instants between.
+  double first_beyond(Method<Real> &method, int k) {
+    Clock &c = clock[k];
+    double inside = c.t, outside = Clock::NEVER;
+    auto look = [&](double t) {
+      if (outside < Clock::NEVER) return;
+      if (t < c.next) between(method, k, t);
+      (beyond(k, t < c.next ? row_state.data() : course.znew.data()) >= 0 ? outside : inside) = t;
+    };
+    if (turns(k))
+      for (int j = 1; j < 8; ++j) look(c.t + c.step * j / 8.0);
+    else
+      for (int j = c.row; j < static_cast<int>(outputs.size()) && outputs[j] < c.next && limited(k); ++j)
+        if (outputs[j] > inside) look(outputs[j]);
+    look(c.next);
+    if (outside == Clock::NEVER) return outside;
+    while (outside - inside > 1e-13 * c.step) {
+      const double middle = 0.5 * (inside + outside);
+      if (!(inside < middle && middle < outside)) break;
+      between(method, k, middle);
+      (beyond(k, row_state.data()) >= 0 ? outside : inside) = middle;
+    }
+    between(method, k, outside < c.next ? outside : inside);
+    c.joint = std::max(beyond(k, outside < c.next ? row_state.data() : course.znew.data()), 0);
+    return inside;
+  }
+
+  bool limited(int k) const {
+    const Acting &a = course.acts_of(k);
+    for (int i = 0; i < course.plant.joints; ++i)
+      if (std::isfinite(a.low[i]) || std::isfinite(a.high[i])) return true;
+    return false;
+  }
+
+  // Does a joint with limits turn round within the step?
+  bool turns(int k) const {
+    const Acting &a = course.acts_of(k);
+    for (int i = 0; i < course.plant.joints; ++i) {
+      if (!std::isfinite(a.low[i]) && !std::isfinite(a.high[i])) continue;
+      const int e = course.n + course.plant.first[i];
+      if (lane(course.z[e], k) * lane(course.znew[e], k) < 0.0) return true;
+    }
+    return false;
+  }
+
+  void stop_at_limit(Method<Real> &method, int k, double t) {
+    Clock &c = clock[k];
+    if (t > c.t) {
+      between(method, k, t);
+      if (record[k].rows == 0 || t > record[k].t[record[k].rows - 1]) keep(k, t, row_state.data());
+      for (int j = 0; j < course.size; ++j) set_lane(course.z[j], k, lane(row_state[j], k));
+    }
+    c.t = t, c.status = Status::limit;
+  }
+
+  // Where robot k's last error was worst.
+  void blame(int k) {
+    Clock &c = clock[k];
+    double most = -1.0;
+    const auto &w = course.weights.weight;
+    for (int half = 0; half < 2; ++half)
+      for (int i = 0; i < course.plant.joints; ++i)
+        for (int elastic = 0; elastic < 2; ++elastic) {
+          const int e = half * course.n + course.plant.first[i], end = half * course.n + course.plant.first[i + 1];
+          double sum = 0.0;
+          for (int j = elastic ? e + 1 : e; j < (elastic ? end : e + 1); ++j) {
+            const double x = lane(course.error[j] * w[j], k);
+            sum += std::isfinite(x) ? x * x : 1e300;
+          }
+          if (sum > most) most = sum, c.joint = i, c.elastic = elastic, c.rate = half;
+        }
+  }
+};
+
+}  // namespace flexura

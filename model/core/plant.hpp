@@ -1,0 +1,50 @@
+// What the time loop sees of a robot: how many unknowns, which are whose, accelerations, powers. `model_plant.hpp` makes one of a Model;
+// tests make others. With Real = Pack<N> it is N robots of one topology.
+//
+// The state is z = (q, v, accounts): q (n) all unknowns, v (n) their rates, and integrals over time that are kept with them.
+#pragma once
+#include <memory>
+#include <vector>
+
+#include "real.hpp"
+
+namespace flexura {
+
+// Integrals over time, under the same error control as the motion but for STRAIN [J].
+enum Account { WORK, LOSS, NUMERICAL, STRAIN, ACCOUNTS };
+// WORK of the drives; LOSS to friction and to the material's damping; NUMERICAL: what the method itself takes out on purpose;
+// STRAIN: the rise of the strain energy.
+
+// A pass that a plant is asked for: linear terms at ys + gq a, vs + gv a, all else at (q, v). Plain forward dynamics has ys = q,
+// vs = v, gq = gv = 0.
+template <class Real> struct Pass {
+  const Real *q, *v, *ys, *vs;         // (n)
+  Real gq, gv;
+  const Real *force;                   // (n) generalised forces
+  const Real *stiffness, *damping;     // (joints) linear about 0: gains and friction of the joints, viscous friction included
+  const bool *held;                    // (joints) accelerations are given, reactions come out
+  const Real *given;                   // (joints)
+};
+
+template <class Real> struct Plant {
+  int n = 0, joints = 0;
+  std::vector<int> first;              // (joints + 1) row of joint i's position; its link's elastic unknowns follow it
+  std::vector<bool> locked;            // (joints)
+  std::vector<Real> viscous, coulomb;  // (joints) friction
+  std::vector<Real> lever;             // (n) metres that the tips move a unit of an unknown, at most: what an error weighs
+  Real reach = Real(1.0);              // length of the whole robot [m]
+
+  virtual ~Plant() = default;
+  // Accelerations a (n), and reactions (joints) of held joints: the force that the joint's own drive must give, friction not counted.
+  virtual void accelerate(const Pass<Real> &pass, Real *a, Real *reaction) = 0;
+  // The rate of the strain energy (K q) . q', and the power lost to the material's damping [W].
+  virtual void powers(const Real *q, const Real *v, Real &strain, Real &loss) = 0;
+  // Kinetic and strain energy [J].
+  virtual Real energy(const Real *q, const Real *v) = 0;
+  // Largest angular frequency at q with all joints as they are, from above [1/s]; 0: no limit. For explicit steps.
+  virtual Real fastest(const Real *q) = 0;
+  // A joint that stands where it cannot be beyond its own limits, or -1; of robot `lane`.
+  virtual int blocked(int lane, const Real *q) const { return (void)lane, (void)q, -1; }
+};
+
+}  // namespace flexura

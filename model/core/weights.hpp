@@ -1,0 +1,87 @@
+// What an error weighs: metres at the robot's tips over the tolerance, rtol times the size of what the run is asked for.
+//
+// That size is the largest deflection of a tip so far, or a thousandth of the tips' path, whichever is larger; for rates the same of
+// their speeds. An error of unknown k moves a tip by at most lever_k. Errors are summed (root of squares) over a joint's
+// position, over a link's elastic unknowns, over their rates, and the worst of these groups decides.
+#pragma once
+#include <vector>
+
+#include "plant.hpp"
+
+namespace flexura {
+
+template <class Real> class Weights {
+ public:
+  std::vector<Real> weight;  // (2 n) metres over the tolerance
+  static constexpr double PATH = 1e-3, START = 1e-6;  // of a tip's path; of the robot's length, before anything has moved
+
+  Weights(Plant<Real> &robot, double tolerance)
+      : weight(padded(2 * robot.n), Real(0.0)), plant(robot), rtol(tolerance), n(robot.n), begun(n, Real(0.0)),
+        deflection(0.0), path(0.0), deflecting(0.0), speed(0.0), energy(0.0) {}
+
+  // Forgets all sizes: a run begins at (q, v).
+  void start(const Real *z) {
+    for (int k = 0; k < n; ++k) begun[k] = z[k];
+    deflection = path = deflecting = speed = energy = Real(0.0);
+    grow(z, true);
+  }
+
+  // Sizes with the state z too; `weight` is 1 / tolerance of each number of a state. `look`: at its energy too.
+  void grow(const Real *z, bool look) {
+    Real way = 0.0, fast = 0.0;
+    for (int i = 0; i < plant.joints; ++i) {
+      const int e = plant.first[i], end = plant.first[i + 1];
+      way += plant.lever[e] * abs(z[e] - begun[e]), fast += plant.lever[e] * abs(z[n + e]);
+      Real bent = 0.0, bending = 0.0;
+      for (int k = e + 1; k < end; ++k) {
+        const Real x = plant.lever[k] * z[k], y = plant.lever[k] * z[n + k];
+        bent += x * x, bending += y * y;
+      }
+      deflection = larger(deflection, root(bent)), deflecting = larger(deflecting, root(bending));
+    }
+    path = larger(path, way), speed = larger(speed, fast);
+    for (int k : {WORK, LOSS}) energy = larger(energy, abs(z[2 * n + k]));
+    if (look) energy = larger(energy, plant.energy(z, z + n));
+    renew();
+  }
+
+  // The worst group of an error e (2 n + ACCOUNTS) of a step to znew, over its tolerance. What is not a number stays so.
+  Real norm(const Real *e, const Real *znew) const {
+    const Real sizes = larger(energy, larger(abs(znew[2 * n + WORK]), abs(znew[2 * n + LOSS])));
+    const Real joules = 1.0 / (larger(sizes, Real(1e-280)) * rtol);
+    Real most = 0.0;
+    for (int half = 0; half < 2; ++half)
+      for (int i = 0; i < plant.joints; ++i) {
+        const int from = half * n + plant.first[i], end = half * n + plant.first[i + 1];
+        most = larger(most, size(e, from, from + 1));
+        if (end > from + 1) most = larger(most, size(e, from + 1, end));
+      }
+    for (int k : {WORK, LOSS, NUMERICAL}) most = larger(most, abs(e[2 * n + k] * joules));
+    return most;
+  }
+
+  Real size(const Real *e, int from, int end) const {
+    Real sum = 0.0;
+    for (int k = from; k < end; ++k) {
+      const Real x = e[k] * weight[k];
+      sum += x * x;
+    }
+    return root(sum);
+  }
+
+ private:
+  Plant<Real> &plant;
+  double rtol;
+  int n;
+  std::vector<Real> begun;
+  Real deflection, path, deflecting, speed, energy;
+
+  void renew() {
+    const Real size_ = larger(larger(deflection, path * PATH), plant.reach * START);
+    const Real rate = larger(larger(deflecting, speed * PATH), plant.reach * START);
+    const Real place_weight = 1.0 / (size_ * rtol), rate_weight = 1.0 / (rate * rtol);
+    for (int k = 0; k < n; ++k) weight[k] = plant.lever[k] * place_weight, weight[n + k] = plant.lever[k] * rate_weight;
+  }
+};
+
+}  // namespace flexura
