@@ -16,8 +16,9 @@ template <class Real> inline void interpolate(int used, const Real *node, Real C
   Real below[COLUMNS], at[COLUMNS];  // the product at the column's own node
   for (int j = 0; j < COLUMNS; ++j) {
     for (int m = 1; m <= ORDER; ++m) C[m][j] = 0.0;
-    C[0][j] = below[j] = 1.0, at[j] = j < used ? node[j] : Real(1.0);
+    C[0][j] = below[j] = at[j] = 1.0;
   }
+  for (int j = 0; j < used && j < ORDER; ++j) at[j] = node[j];
   for (int i = 0; i < used; ++i) {
     const Real end = i == used - 1 ? Real(1.0) : node[i];  // OLDEST's polynomial has a root at x = 1 in place of the oldest node
     for (int j = 0; j < COLUMNS; ++j) {

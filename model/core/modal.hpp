@@ -5,24 +5,15 @@
 #include <cstring>
 #include <vector>
 
-#include "real.hpp"
+#include "lane.hpp"
 
 namespace flexura {
 
 using Lanes = Pack<4>;
 
-// How many robots stand side by side, and one robot's number.
-template <class Real> struct Robots;
-template <> struct Robots<double> { static constexpr int count = 1, modes_a_chunk = 4; };
-template <> struct Robots<Lanes> { static constexpr int count = 4, modes_a_chunk = 1; };
-inline double lane(const double &x, int) { return x; }
-inline double lane(const Lanes &x, int robot) { return x[robot]; }
-inline void set_lane(double &x, int, double value) { x = value; }
-inline void set_lane(Lanes &x, int robot, double value) { x.set(robot, value); }
-
 // Chunks that n numbers take, and numbers that these have room for.
-template <class Real> constexpr int chunks_of(int n) { return (n + Robots<Real>::modes_a_chunk - 1) / Robots<Real>::modes_a_chunk; }
-template <class Real> constexpr int room_of(int n) { return chunks_of<Real>(n) * Robots<Real>::modes_a_chunk; }
+template <class Real> constexpr int chunks_of(int n) { return LanesOf<Real>::value == 1 ? padded(n) / 4 : n; }
+template <class Real> constexpr int room_of(int n) { return LanesOf<Real>::value == 1 ? padded(n) : n; }
 
 inline Lanes get(const double *at, int chunk) {
   Lanes x;
@@ -54,6 +45,18 @@ template <class Real> inline void add_rows(int n, int chunks, const Real *x, con
     for (int k = 0; k < n; ++k) s += wide(x[k]) * get(rows + static_cast<std::ptrdiff_t>(k) * stride, c);
     put(out, c, s);
   }
+}
+
+// sum_k x_k y_k over n modes: in both layouts four sums, which are added in the same order.
+inline double dot(int n, const double *x, const double *y) {
+  Lanes s = 0.0;
+  for (int c = 0; c < padded(n) / 4; ++c) s += get(x, c) * get(y, c);
+  return (s[0] + s[1]) + (s[2] + s[3]);
+}
+inline Lanes dot(int n, const Lanes *x, const Lanes *y) {
+  Lanes s[4] = {0.0, 0.0, 0.0, 0.0};
+  for (int k = 0; k < n; ++k) s[k % 4] += x[k] * y[k];
+  return (s[0] + s[1]) + (s[2] + s[3]);
 }
 
 // A block of memory from which arrays are taken one after the other, zeros at first.
