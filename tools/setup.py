@@ -1,6 +1,7 @@
 """Makes what the targets of the Makefile need: system packages, the environment .venv, compiled functions.
 
     python3 tools/setup.py             system packages and .venv; ends with the stamp .venv/.ready
+    python3 tools/setup.py core        the compiled core, beside flexura/core.py; ends with the stamp .venv/.core
     python3 tools/setup.py compile     the solver's compiled functions; ends with the stamp .venv/.compiled
 
 Standard library only; an older Python runs it too, to say that a newer one is missing. A stamp is written last and holds
@@ -48,6 +49,9 @@ LIBRARIES = [
     Need("libX11.so.6", "libx11-6", NO_EXUDYN, True),
     Need("libvulkan.so.1", "libvulkan1", NO_PICTURE, False),
 ]
+COMPILER = Need("a C++ compiler", "g++", "the core of the solver cannot be compiled", True)
+COMPILERS = ["c++", "g++", "clang++"]
+ELSEWHERE = "A C++ compiler comes with `xcode-select --install` on macOS, `dnf install gcc-c++` on Fedora, `pacman -S gcc` on Arch."
 NO_FIRMWARE, NO_EMULATOR = "the board's firmware cannot be built", "no emulated board"
 BOARD = [
     Need("avr-g++", "gcc-avr", NO_FIRMWARE, False),
@@ -58,6 +62,8 @@ BOARD = [
     Need("/usr/include/simavr/sim_avr.h", "libsimavr-dev", NO_EMULATOR, False),
     Need("simavr", "simavr", "no unit tests on the AVR", False),
 ]
+BUILDERS = ["cmake", "nanobind", "ninja", "scikit-build-core"]
+LINKED = ["--no-build-isolation", "-C", "editable.mode=inplace", "-C", "wheel.cmake=false"]    # Python as it stands here; the core follows
 DRIVER = Need("a Vulkan driver", "mesa-vulkan-drivers", NO_PICTURE, False)
 
 
@@ -73,6 +79,11 @@ def has(what: str) -> bool:
         return False
 
 
+def without_compiler(has: Callable[[str], bool]) -> list[Need]:
+    """The need of a C++ compiler, if none of those that CMake would take is there."""
+    return [] if any(has(name) for name in [*os.environ.get("CXX", "").split()[:1], *COMPILERS]) else [COMPILER]
+
+
 def vulkan_drivers() -> list[str]:
     """The driver descriptions that the Vulkan loader would read."""
     named = ":".join(os.environ.get(name, "") for name in ("VK_DRIVER_FILES", "VK_ICD_FILENAMES")).split(":")
@@ -86,6 +97,7 @@ def missing(python: Python, has: Callable[[str], bool], drivers: list[str], syst
     if not python.has_venv:
         package = "python{}.{}-venv".format(*python.version) if python.of_system else ""
         needs.append(Need(f"ensurepip for {python.path}", package, "no environment for the packages can be made", True))
+    needs += without_compiler(has)
     if system == "linux":        # on macOS the wheels use the system's own frameworks
         needs += [need for need in [*LIBRARIES, *BOARD] if not has(need.what)]
         needs += [] if drivers else [DRIVER]
@@ -118,10 +130,10 @@ def choose(paths: list[str], inspect: Callable[[str], Python | None]) -> Python:
 def verdict(needs: list[Need], apt: bool, sudo: str = "") -> tuple[bool, str]:
     """(stop, message) about needs that stayed unmet. Without apt a library that was not found does not stop: what looks
     for it later may know better, and the person may do without what it costs. Without ensurepip nothing can go on."""
-    packages = " ".join(need.package for need in needs if need.package)
+    packages = " ".join(dict.fromkeys(need.package for need in needs if need.package))
     lines = [f"  {need.what}" + (f" (on Debian: {need.package})" if need.package else "") + f": {need.without}" for need in needs]
     stop = any(need.vital and (apt or need not in LIBRARIES) for need in needs)
-    how = "Install what is missing in this system's own way."
+    how = "Install what is missing in this system's own way." + f"\n{ELSEWHERE}" * (COMPILER in needs)
     if apt and packages:
         how = (f"To install{'' if sudo else ', as root'}, type:\n"
                f"  {sudo}apt-get update && {sudo}apt-get install -y --no-install-recommends {packages}")
@@ -150,7 +162,7 @@ def install(needs: list[Need]) -> None:
     apt = [*sudo, "env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "-qq", "-y", "-o", "DPkg::Lock::Timeout=300"]
     step("list of system packages", [*apt, "update"], may_fail=True)     # one bad source must not stop the others
     for vital in (True, False):                                            # a driver for pictures must not stop the rest
-        if names := [need.package for need in needs if need.package and need.vital == vital]:
+        if names := list(dict.fromkeys(need.package for need in needs if need.package and need.vital == vital)):
             step(f"system packages {' '.join(names)}", [*apt, "install", "--no-install-recommends", *names], may_fail=True)
 
 
@@ -174,10 +186,24 @@ def set_up(venv: Path) -> None:
     unfinished.touch()
     stamp.unlink(missing_ok=True)
     if not sound:
+        shutil.rmtree(ROOT / "build", ignore_errors=True)                # CMake's folders know the place and the Python too
         step("environment", [python.path, "-m", "venv", "--clear", str(venv)])
-    step("Python packages (about 400 MB to download the first time)",
-         [inside, "-m", "pip", "install", "-q", "--disable-pip-version-check", "-c", "constraints.txt", "-e", ".[test]"])
+    pip = [inside, "-m", "pip", "install", "-q", "--disable-pip-version-check", "-c", "constraints.txt"]
+    step("what compiles the core", [*pip, *BUILDERS])
+    step("Python packages (about 400 MB to download the first time)", [*pip, *LINKED, "-e", ".[test]"])
     unfinished.unlink()
+
+
+def build_core(venv: Path) -> None:
+    """Compiles what is new in the core and puts its modules beside flexura/core.py."""
+    python, cmake = str(venv / "bin/python"), str(venv / "bin/cmake")
+    if needs := without_compiler(has):
+        raise Stop(verdict(needs, bool(shutil.which("apt-get")), "sudo " if os.geteuid() else "")[1])
+    folder = ROOT / "build" / "module-{}.{}".format(*sys.version_info)
+    step("configuring the core", [cmake, "-S", str(ROOT), "-B", str(folder), "-G", "Ninja", "-DFLEXURA_MODULE=ON",
+                                  f"-DCMAKE_MAKE_PROGRAM={venv / 'bin/ninja'}", f"-DPython_EXECUTABLE={python}"])
+    step("compiling the core (half a minute the first time)", [cmake, "--build", str(folder), "--parallel", str(os.cpu_count() or 1)])
+    step("installing the core", [cmake, "--install", str(folder), "--component", "module", "--prefix", str(ROOT / "model")])
 
 
 def compile_solver(venv: Path) -> None:
@@ -185,7 +211,8 @@ def compile_solver(venv: Path) -> None:
 
 
 def main(argv: list[str]) -> int:
-    work, name = (compile_solver, ".compiled") if argv == ["compile"] else (set_up, ".ready")
+    works = {"": (set_up, ".ready"), "core": (build_core, ".core"), "compile": (compile_solver, ".compiled")}
+    work, name = works["".join(argv)]
     stamp = ROOT / ".venv" / name
     signal.signal(signal.SIGTERM, signal.default_int_handler)            # so that what runs below ends with this
     try:

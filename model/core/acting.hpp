@@ -15,10 +15,8 @@
 
 namespace flexura {
 
-constexpr double COULOMB_SPEED = 1e-3;  // v0 of Coulomb friction f tanh(v / v0) [m/s, rad/s]
-
 // What a sampled controller holds from one tick to the next, an entry a joint.
-struct Held {
+struct SampledOutput {
   std::vector<double> force;    // [N m or N]
   std::vector<Segment> motion;  // to follow, by joints with JointDrive::sampled (a stepper's pulses)
 };
@@ -27,7 +25,7 @@ struct Held {
 // rejected; q, v (n) is the state there. It changes what is held from t on. It is not called at the end of the run.
 struct Sampler {
   virtual ~Sampler() = default;
-  virtual void tick(long k, double t, const double *q, const double *v, Held &held) = 0;
+  virtual void tick(long k, double t, const double *q, const double *v, SampledOutput &held) = 0;
 };
 
 // Adds forces (one a joint) at a state q, v (n). Called often, also again for times within a step, never before the step's start.
@@ -47,7 +45,7 @@ struct Acting {
   ForceFunction function;         // empty: none
   Sampler *sampler = nullptr;
   double rate_Hz = 0.0;           // of the sampler
-  Held held;
+  SampledOutput held;
 
   explicit Acting(int count = 0)
       : joints(count), low(count, -std::numeric_limits<double>::infinity()), high(count, std::numeric_limits<double>::infinity()) {

@@ -16,7 +16,7 @@ template <class Real> class Acts {
   std::vector<Real> reaction;  // (joints) of the pass just made
 
   Acts(const Plant<Real> &robot, Acting *const *acting)
-      : reaction(robot.joints, Real(0.0)), plant(robot), held(new bool[robot.joints]), force(robot.n, Real(0.0)) {
+      : reaction(robot.joints, Real(0.0)), plant(robot), held(new char[robot.joints]), force(robot.n, Real(0.0)) {
     for (auto *x : {&stiffness, &damping, &given, &steady, &asked, &asked_rate, &place, &rate, &applied, &like})
       x->assign(robot.joints, Real(0.0));
     for (int k = 0; k < LANES; ++k) of[k] = acting[k];
@@ -28,7 +28,6 @@ template <class Real> class Acts {
         set_lane(stiffness[i], k, d.kp), set_lane(damping[i], k, d.kd);
       }
       gains.push_back(stiffness[i]), gains.push_back(damping[i]);
-      damping[i] += plant.viscous[i];
     }
     for (int k = 0; k < LANES; ++k) calls |= static_cast<bool>(of[k]->function);
     scratch.assign(2 * plant.n + plant.joints, 0.0);
@@ -65,9 +64,10 @@ template <class Real> class Acts {
   void load(const Real *q, const Real *v) {
     call(q, v);
     for (int i = 0; i < plant.joints; ++i) {
+      if (held[i]) continue;
       force[plant.first[i]] = constant(i);
-      if (rubs(i)) force[plant.first[i]] -= plant.coulomb[i] * tanh(v[plant.first[i]] * (1.0 / COULOMB_SPEED));
-      damping[i] = gains[2 * i + 1] + plant.viscous[i];
+      if (rubs(i)) force[plant.first[i]] -= rubbing(i, v[plant.first[i]]);
+      damping[i] = gains[2 * i + 1];
     }
   }
 
@@ -77,12 +77,13 @@ template <class Real> class Acts {
   void load_stage(const Real *q, const Real *v, bool first) {
     call(q, v);
     for (int i = 0; i < plant.joints; ++i) {
+      if (held[i]) continue;
       Real &f = force[plant.first[i]];
-      f = constant(i), damping[i] = gains[2 * i + 1] + plant.viscous[i];
+      f = constant(i), damping[i] = gains[2 * i + 1];
       if (!rubs(i)) continue;
-      const Real speed = v[plant.first[i]], x = speed * (1.0 / COULOMB_SPEED), r = tanh(x), steep = plant.coulomb[i] * (1.0 / COULOMB_SPEED);
+      const Real speed = v[plant.first[i]], x = speed * (1.0 / plant.slow), r = tanh(x), steep = plant.coulomb[i] * (1.0 / plant.slow);
       const Real chord = choose_less(abs(x), Real(1e-4), steep, steep * (r / x)), tangent = steep * (1.0 - r * r);
-      const Real moved = first ? Real(1.0) : abs(speed - like[i]) * (1.0 / COULOMB_SPEED);
+      const Real moved = first ? Real(1.0) : abs(speed - like[i]) * (1.0 / plant.slow);
       const Real slope = choose_less(moved, Real(0.3), tangent, chord);
       damping[i] += slope, f += slope * speed - plant.coulomb[i] * r;
       like[i] = speed;
@@ -96,7 +97,7 @@ template <class Real> class Acts {
   // The force of joint i's drive at (q, v), after `load` and, if it is prescribed, after the pass.
   Real drive(int i, const Real *q, const Real *v) const {
     const int e = plant.first[i];
-    if (follows(i)) return reaction[i] + resistance(i, v[e]);
+    if (follows(i)) return reaction[i] + rubbing(i, v[e]);
     return constant(i) - gains[2 * i] * q[e] - gains[2 * i + 1] * v[e];
   }
 
@@ -111,14 +112,17 @@ template <class Real> class Acts {
   // Power lost to friction in the joints [W].
   Real friction(const Real *v) const {
     Real sum = 0.0;
-    for (int i = 0; i < plant.joints; ++i) sum += resistance(i, v[plant.first[i]]) * v[plant.first[i]];
+    for (int i = 0; i < plant.joints; ++i) {
+      const Real &speed = v[plant.first[i]];
+      sum += (plant.viscous[i] * speed + rubbing(i, speed)) * speed;
+    }
     return sum;
   }
 
  private:
   const Plant<Real> &plant;
   std::array<Acting *, LANES> of;
-  std::unique_ptr<bool[]> held;
+  std::unique_ptr<char[]> held;
   std::vector<Real> force, stiffness, damping, given, steady, asked, asked_rate, place, rate, applied, like;
   std::vector<Real> gains;  // kp, kd of each joint
   std::vector<double> scratch;
@@ -129,10 +133,8 @@ template <class Real> class Acts {
   bool follows(int i) const { return of[0]->joints[i].prescribed && of[0]->joints[i].follows() && !plant.locked[i]; }
   bool rubs(int i) const { return worst(plant.coulomb[i]) > 0.0 && !held[i]; }
   Real constant(int i) const { return steady[i] + applied[i] + gains[2 * i] * asked[i] + gains[2 * i + 1] * asked_rate[i]; }
-  Real resistance(int i, const Real &speed) const {
-    Real r = plant.viscous[i] * speed;
-    if (worst(plant.coulomb[i]) > 0.0) r += plant.coulomb[i] * tanh(speed * (1.0 / COULOMB_SPEED));
-    return r;
+  Real rubbing(int i, const Real &speed) const {  // Coulomb friction
+    return worst(plant.coulomb[i]) > 0.0 ? plant.coulomb[i] * tanh(speed * (1.0 / plant.slow)) : Real(0.0);
   }
 
   // The caller's functions at (q, v).

@@ -21,8 +21,8 @@ template <class Real> struct Pass {
   const Real *q, *v, *ys, *vs;         // (n)
   Real gq, gv;
   const Real *force;                   // (n) generalised forces
-  const Real *stiffness, *damping;     // (joints) linear about 0: gains and friction of the joints, viscous friction included
-  const bool *held;                    // (joints) accelerations are given, reactions come out
+  const Real *stiffness, *damping;     // (joints) gains, linear about 0; the robot's own viscous friction comes on top
+  const char *held;                    // (joints) accelerations are given, reactions come out
   const Real *given;                   // (joints)
 };
 
@@ -30,19 +30,22 @@ template <class Real> struct Plant {
   int n = 0, joints = 0;
   std::vector<int> first;              // (joints + 1) row of joint i's position; its link's elastic unknowns follow it
   std::vector<bool> locked;            // (joints)
-  std::vector<Real> viscous, coulomb;  // (joints) friction
-  std::vector<Real> lever;             // (n) metres that the tips move a unit of an unknown, at most: what an error weighs
+  std::vector<Real> viscous, coulomb;  // (joints) friction c eta' + f tanh(eta' / slow)
+  double slow = 1e-3;                  // [rad/s or m/s]
+  std::vector<Real> lever;             // (n) metres that a tip moves a unit of an unknown, at most: what an error weighs
+  std::vector<Real> deflect;           // (n) metres that the tip of its own link deflects; 0 for joints
   Real reach = Real(1.0);              // length of the whole robot [m]
 
   virtual ~Plant() = default;
-  // Accelerations a (n), and reactions (joints) of held joints: the force that the joint's own drive must give, friction not counted.
+  // Accelerations a (n), and reactions (joints) of held joints: the force that a drive must give
+  // there, viscous friction included.
   virtual void accelerate(const Pass<Real> &pass, Real *a, Real *reaction) = 0;
   // The rate of the strain energy (K q) . q', and the power lost to the material's damping [W].
   virtual void powers(const Real *q, const Real *v, Real &strain, Real &loss) = 0;
   // Kinetic and strain energy [J].
   virtual Real energy(const Real *q, const Real *v) = 0;
-  // Largest angular frequency at q with all joints as they are, from above [1/s]; 0: no limit. For explicit steps.
-  virtual Real fastest(const Real *q) = 0;
+  // The largest angular frequency or rate of decay at q with the gains of `pass` [1/s], from above: what limits explicit steps.
+  virtual Real fastest(const Real *q, const Pass<Real> &pass) = 0;
   // A joint that stands where it cannot be beyond its own limits, or -1; of robot `lane`.
   virtual int blocked(int lane, const Real *q) const { return (void)lane, (void)q, -1; }
 };

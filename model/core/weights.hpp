@@ -33,11 +33,8 @@ template <class Real> class Weights {
       const int e = plant.first[i], end = plant.first[i + 1];
       way += plant.lever[e] * abs(z[e] - begun[e]), fast += plant.lever[e] * abs(z[n + e]);
       Real bent = 0.0, bending = 0.0;
-      for (int k = e + 1; k < end; ++k) {
-        const Real x = plant.lever[k] * z[k], y = plant.lever[k] * z[n + k];
-        bent += x * x, bending += y * y;
-      }
-      deflection = larger(deflection, root(bent)), deflecting = larger(deflecting, root(bending));
+      for (int k = e + 1; k < end; ++k) bent += plant.deflect[k] * z[k], bending += plant.deflect[k] * z[n + k];
+      deflection = larger(deflection, abs(bent)), deflecting = larger(deflecting, abs(bending));
     }
     path = larger(path, way), speed = larger(speed, fast);
     for (int k : {WORK, LOSS}) energy = larger(energy, abs(z[2 * n + k]));

@@ -1,0 +1,34 @@
+// What all files of the Python module share.
+//
+// Arrays go in as `Numbers`: float64, contiguous, any shape that the signature names; nanobind refuses the rest with a TypeError.
+// They are neither copied nor kept. Arrays come out as `new_array`, which Python then owns. A function that takes longer than
+// microseconds releases Python's lock: nb::call_guard<nb::gil_scoped_release>(), and touches no Python object meanwhile.
+#pragma once
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+
+#include <cstddef>
+#include <initializer_list>
+
+namespace flexura {
+
+namespace nb = nanobind;
+
+using Numbers = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;         // any shape
+using Vector = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Matrix = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using Array = nb::ndarray<nb::numpy, double, nb::c_contig>;
+
+// An array of zeros that NumPy owns.
+inline Array new_array(std::initializer_list<std::size_t> shape) {
+  std::size_t count = 1;
+  for (std::size_t n : shape) count *= n;
+  double *data = new double[count]();
+  nb::capsule owner(data, [](void *p) noexcept { delete[] static_cast<double *>(p); });
+  return Array(data, shape.size(), shape.begin(), owner);
+}
+
+void bind_numbers(nb::module_ &module);    // numbers.cpp
+void bind_mechanics(nb::module_ &module);  // mechanics.cpp
+
+}  // namespace flexura

@@ -1,0 +1,139 @@
+// A robot's equations: from flat arrays of its constants to forward and inverse dynamics, energies, places.
+#include "mechanics.hpp"
+
+#include <nanobind/stl/vector.h>
+
+#include "fault.hpp"
+#include "observe.hpp"
+
+namespace flexura {
+namespace {
+
+constexpr std::size_t NUMBERS = 15, COUNTS = 5, MATERIAL = 10;  // columns, as flexura/core.py names them
+
+void expect(bool good, const char *text) {
+  if (!good) throw std::invalid_argument(text);
+}
+
+Array accelerations(const Mechanics &self, const Vector &q, const Vector &v, const Vector &force) {
+  const Model<double> &model = *self.model;
+  const std::size_t n = std::size_t(model.n), links = model.first.size();
+  expect(q.shape(0) == n && v.shape(0) == n && force.shape(0) == n, "q, v and force need an entry an unknown");
+  Workspace<double> work(model);
+  const std::vector<double> given(links, 0.0);
+  std::vector<double> reaction(links, 0.0);
+  Array a = new_array({n});
+  const Stage<double> plain{q.data(), v.data(), 0.0, 0.0, nullptr, nullptr};
+  accelerate(model, work, q.data(), v.data(), plain, force.data(), Held<double>{model.locked.data(), given.data(), reaction.data()}, a.data());
+
+  return a;
+}
+
+Array inverse_dynamics(const Mechanics &self, const Vector &q, const Vector &v, const Vector &a, bool gravity, bool stiffness, bool damping) {
+  const Model<double> &model = *self.model;
+  const std::size_t n = std::size_t(model.n);
+  expect(q.shape(0) == n && v.shape(0) == n && a.shape(0) == n, "q, v and a need an entry an unknown");
+  Workspace<double> work(model);
+  Array out = new_array({n});
+  forces(model, work, q.data(), v.data(), a.data(), Terms{gravity, stiffness, damping}, out.data());
+  return out;
+}
+
+Array observations(const Mechanics &self, const Matrix &q, const Matrix &v, int stations) {
+  const Model<double> &model = *self.model;
+  expect(q.shape(1) == std::size_t(model.n) && v.shape(1) == q.shape(1) && v.shape(0) == q.shape(0), "q and v need a column an unknown");
+  Observer observer(model, stations);
+  Array out = new_array({q.shape(0), std::size_t(observer.columns())});
+  {
+    nb::gil_scoped_release free;
+    for (std::size_t k = 0; k < q.shape(0); ++k)
+      observer.observe(q.data() + k * q.shape(1), v.data() + k * q.shape(1), out.data() + k * std::size_t(observer.columns()));
+  }
+  return out;
+}
+
+Array line_of(const Mechanics &self, const Vector &q, int link, const Vector &s) {
+  const Model<double> &model = *self.model;
+  expect(q.shape(0) == std::size_t(model.n), "q needs an entry an unknown");
+  expect(0 <= link && link < model.links(), "there is no such link");
+  Workspace<double> work(model);
+  const std::vector<double> still(std::size_t(model.n), 0.0);
+  outward_kinematics(model, work, q.data(), still.data());
+  std::vector<Pose<double>> poses(s.shape(0));
+  line(model, work, q.data(), link, s.data(), int(s.shape(0)), poses.data());
+  Array out = new_array({s.shape(0), 3});
+  for (std::size_t k = 0; k < poses.size(); ++k)
+    out.data()[3 * k] = poses[k].x, out.data()[3 * k + 1] = poses[k].y, out.data()[3 * k + 2] = poses[k].angle;
+  return out;
+}
+
+double loss_of(const Mechanics &self, const Vector &q, const Vector &v) {
+  expect(q.shape(0) == std::size_t(self.model->n) && v.shape(0) == q.shape(0), "q and v need an entry an unknown");
+  return loss(*self.model, q.data(), v.data());
+}
+
+// Constants of the piece that a whole link is: B (m, P), K (m), shapes at the tip (m).
+nb::tuple whole_link(const Mechanics &self, int link) {
+  const Model<double> &model = *self.model;
+  expect(0 <= link && link < model.links(), "there is no such link");
+  const Piece<double> &c = model.pieces[std::size_t(model.begin[std::size_t(link) + 1]) - 1];
+  Array B = new_array({std::size_t(c.m), std::size_t(c.P)}), K = new_array({std::size_t(c.m)}), tip = new_array({std::size_t(c.m)});
+  for (int i = 0; i < c.m; ++i) {
+    for (int j = 0; j < c.P; ++j) B.data()[i * c.P + j] = c.B[i * padded(c.P) + j];
+    K.data()[i] = c.K[i], tip.data()[i] = c.tip_angle[i];
+  }
+  return nb::make_tuple(B, K, tip);
+}
+
+}  // namespace
+
+Robot robot_of(const Numbers &gravity, const Numbers &payload, const Counts &counts, const Matrix &numbers, const Matrix &material) {
+  Robot robot;
+  expect(gravity.size() == 2 && payload.size() == 2, "gravity and payload have two numbers each");
+  expect(counts.shape(1) == COUNTS && numbers.shape(1) == NUMBERS && material.shape(1) == MATERIAL, "rows of other lengths were expected");
+  expect(counts.shape(0) == numbers.shape(0), "counts and numbers need a row a link");
+  robot.gravity[0] = gravity.data()[0], robot.gravity[1] = gravity.data()[1];
+  robot.payload_mass = payload.data()[0], robot.payload_inertia = payload.data()[1];
+  std::size_t row = 0;
+  for (std::size_t i = 0; i < counts.shape(0); ++i) {
+    const std::int64_t *c = counts.data() + i * COUNTS;
+    const double *x = numbers.data() + i * NUMBERS;
+    Link link;
+    link.joint.kind = JointKind(c[0]), link.joint.locked = c[1] != 0;
+    link.elements = int(c[2]), link.modes = int(c[3]);
+    link.length = x[0], link.mass = x[1], link.centre = x[2], link.inertia = x[3], link.alpha = x[4], link.beta = x[5];
+    link.joint.angle = x[6], link.joint.start = x[7], link.joint.hub_mass = x[8], link.joint.hub_inertia = x[9];
+    link.joint.rotor = x[10], link.joint.viscous = x[11], link.joint.coulomb = x[12], link.joint.low = x[13], link.joint.high = x[14];
+    for (std::int64_t k = 0; k < c[4]; ++k, ++row) {
+      expect(row < material.shape(0), "there are fewer rows of material than counted");
+      const double *m = material.data() + row * MATERIAL;
+      Interval part;
+      part.from = m[0], part.to = m[1];
+      for (int p = 0; p < 3; ++p) part.mass[p] = m[2 + p];
+      for (int p = 0; p < 5; ++p) part.stiffness[p] = m[5 + p];
+      link.material.push_back(part);
+    }
+    robot.links.push_back(std::move(link));
+  }
+  return robot;
+}
+
+void bind_mechanics(nb::module_ &module) {
+  using namespace nb::literals;
+  nb::exception<Fault>(module, "Fault", PyExc_ValueError);
+  nb::class_<Mechanics>(module, "Mechanics", "The equations of one robot.")
+      .def(nb::init<const Numbers &, const Numbers &, const Counts &, const Matrix &, const Matrix &>(), "gravity"_a, "payload"_a, "counts"_a,
+           "numbers"_a, "material"_a)
+      .def_prop_ro("n", [](const Mechanics &self) { return self.model->n; }, "How many unknowns there are.")
+      .def_prop_ro("first", [](const Mechanics &self) { return self.model->first; }, "Rows of the joints.")
+      .def_prop_ro("elastic", [](const Mechanics &self) { return self.model->elastic; }, "Elastic unknowns of each link.")
+      .def("pieces", [](const Mechanics &self, int link) { return self.model->begin.at(std::size_t(link) + 1) - self.model->begin.at(std::size_t(link)); })
+      .def("accelerations", &accelerations, "q"_a, "v"_a, "force"_a)
+      .def("forces", &inverse_dynamics, "q"_a, "v"_a, "a"_a, "gravity"_a, "stiffness"_a, "damping"_a)
+      .def("observe", &observations, "q"_a, "v"_a, "stations"_a)
+      .def("line", &line_of, "q"_a, "link"_a, "s"_a)
+      .def("loss", &loss_of, "q"_a, "v"_a)
+      .def("whole_link", &whole_link, "link"_a);
+}
+
+}  // namespace flexura

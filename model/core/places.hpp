@@ -1,0 +1,155 @@
+// Where a chain is: hubs, tips, any place along a link; its energies, and the power that damping takes.
+#pragma once
+#include "newton_euler.hpp"
+
+namespace flexura {
+
+template <class Real>
+struct Pose {
+  Real x, y, angle;
+};
+
+// Place, angle and their rates of a hub on its way along the chain.
+template <class Real>
+struct Hub {
+  Real x = 0.0, y = 0.0, vx = 0.0, vy = 0.0;
+};
+
+// Where a piece's tip, or the slider on it, is from its hub; and its velocity, from the columns that `outward_kinematics` has left.
+template <class Real>
+inline void go_on(const Piece<Real> &c, const Kept<Real> &k, const Real *y, const Real *v, const Piece<Real> *next, Hub<Real> &hub) {
+  const int stride = padded(columns_of(c)), g = c.joint == At::sleeve;
+  const Real *tx = k.tip, *ty = tx + stride;
+  hub.x += ty[0], hub.y -= tx[0];  // a quarter turn of the way is what turning moves
+  hub.vx += tx[0] * k.omega, hub.vy += ty[0] * k.omega;
+  for (int i = 0; i < c.m; ++i) hub.vx += tx[1 + i] * v[c.own() + i], hub.vy += ty[1 + i] * v[c.own() + i];
+  if (g) hub.vx += tx[c.m + 1] * v[c.first], hub.vy += ty[c.m + 1] * v[c.first];
+  if (next == nullptr || next->joint != At::slider) return;
+  hub.vx += k.slide.x * v[next->first], hub.vy += k.slide.y * v[next->first];
+  (void)y;
+}
+
+// Poses of the links' hubs (links + 1; the last: the tip of the last link), and the velocity of that tip. After
+// `outward_kinematics`. Of a sleeved link the pose of its proximal end, which is inside or behind the sleeve.
+template <class Real>
+void places(const Model<Real> &model, const Workspace<Real> &work, const Real *y, const Real *v, Pose<Real> *poses, Real *tip_velocity) {
+  Hub<Real> hub;
+  const std::size_t count = model.pieces.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    const Piece<Real> &c = model.pieces[i];
+    const Kept<Real> &k = work.kept[i];
+    if (i == 0 && c.joint == At::slider) hub.x += y[c.first] + c.offset, hub.vx += v[c.first];
+    const bool begins = int(i) == model.begin[std::size_t(c.link)];
+    const bool sleeved = model.kind[std::size_t(c.link)] == JointKind::sleeve;
+    if (sleeved ? !begins : begins) {
+      Real back = 0.0, sine, cosine;
+      if (c.joint == At::sleeve) back = y[c.first] - c.length;
+      sincos(k.phi, sine, cosine);
+      poses[c.link] = {hub.x + back * cosine, hub.y + back * sine, k.phi};
+    }
+    go_on(c, k, y, v, i + 1 < count ? &model.pieces[i + 1] : nullptr, hub);
+    if (i + 1 == count) {
+      Real angle = k.phi;
+      for (int l = 0; l < c.m; ++l) angle += c.tip_angle[l] * y[c.own() + l];
+      poses[model.links()] = {hub.x, hub.y, angle};
+      tip_velocity[0] = hub.vx, tip_velocity[1] = hub.vy;
+    }
+  }
+}
+
+template <class Real>
+struct Energies {
+  Real kinetic = 0.0, strain = 0.0, potential = 0.0;
+};
+
+// First moment of a piece's mass about its hub, in the base's axes.
+template <class Real>
+void first_moment(const Piece<Real> &c, const Kept<Real> &k, const Real *y, Real &x, Real &up) {
+  x = up = 0.0;
+  if (c.joint != At::sleeve) {
+    for (int j = 0; j < c.P; ++j) x += c.moment[j] * k.cosine[j], up += c.moment[j] * k.sine[j];
+    return;
+  }
+  const Real d = y[c.first], first = behind(c, Real(c.length - d)).first;
+  Real sine, cosine;
+  sincos(k.phi, sine, cosine);
+  x = first * cosine, up = first * sine;
+  for (int p = 0; p < c.P; ++p) {
+    const Real mu = matter_at(c, Real(c.length + d * (c.xi[p] - 1.0))).mass * d * c.weight[p];
+    for (int j = 0; j < c.P; ++j) {
+      const Real lever = d * (mu * c.C[p * c.P + j] + (p == 0 ? c.payload * c.w[j] : Real(0.0)));
+      x += lever * k.cosine[j], up += lever * k.sine[j];
+    }
+  }
+}
+
+// Strain energy of a sleeved piece: 1/2 q K(d) q.
+template <class Real>
+Real sleeve_strain(const Piece<Real> &c, const Real *y) {
+  Real bent[Free::most], out = 0.0;
+  bending(c, y + c.own(), bent);
+  const Real d = y[c.first];
+  for (int p = 0; p < c.P; ++p)
+    out += 0.5 * matter_at(c, Real(c.length + d * (c.xi[p] - 1.0))).stiffness * c.weight[p] * bent[p] * bent[p] / d;
+  return out;
+}
+
+// Energies at (y, v) (n). Kinetic: 1/2 v.M v, M v by `forces`; strain (5); potential of gravity, 0 with all mass at the origin.
+template <class Real>
+Energies<Real> energies(const Model<Real> &model, Workspace<Real> &work, const Real *y, const Real *v) {
+  Energies<Real> out;
+  std::vector<Real> zero(std::size_t(model.n), Real(0.0)), momentum(zero);
+  forces(model, work, y, zero.data(), v, Terms{false, false, false}, momentum.data());
+  for (int i = 0; i < model.n; ++i) out.kinetic += 0.5 * momentum[std::size_t(i)] * v[i];
+  Hub<Real> hub;
+  for (std::size_t i = 0; i < model.pieces.size(); ++i) {
+    const Piece<Real> &c = model.pieces[i];
+    const Kept<Real> &k = work.kept[i];
+    if (i == 0 && c.joint == At::slider) hub.x += y[c.first] + c.offset;
+    Real x, up;
+    first_moment(c, k, y, x, up);
+    out.potential -= model.gravity[0] * (c.mass * hub.x + x) + model.gravity[1] * (c.mass * hub.y + up);
+    go_on(c, k, y, v, i + 1 < model.pieces.size() ? &model.pieces[i + 1] : nullptr, hub);
+    if (c.joint == At::sleeve) out.strain += sleeve_strain(c, y);
+    else
+      for (int l = 0; l < c.m; ++l) out.strain += 0.5 * c.K[l] * y[c.own() + l] * y[c.own() + l];
+  }
+  return out;
+}
+
+// Coulomb friction f tanh(eta' / v0) [N m or N].
+constexpr double COULOMB_SPEED = 1e-3;  // v0 [rad/s or m/s]
+
+// Power [W] that damping and friction take at (y, v) (n).
+template <class Real>
+Real loss(const Model<Real> &model, const Real *y, const Real *v) {
+  Real out = 0.0;
+  for (const Piece<Real> &c : model.pieces) {
+    if (c.joint != At::none) {
+      const std::size_t link = std::size_t(c.link);
+      const Real speed = v[c.first];
+      out += model.viscous[link] * speed * speed + model.coulomb[link] * speed * tanh(speed * (1.0 / COULOMB_SPEED));
+    }
+    if (c.joint == At::sleeve) {
+      Real moving[Free::most];
+      bending(c, v + c.own(), moving);
+      const Real d = y[c.first];
+      for (int p = 0; p < c.P; ++p)
+        out += c.beta * matter_at(c, Real(c.length + d * (c.xi[p] - 1.0))).stiffness * c.weight[p] * moving[p] * moving[p] / d;
+    } else {
+      for (int l = 0; l < c.m; ++l) out += c.D[l] * v[c.own() + l] * v[c.own() + l];
+    }
+  }
+  if (model.mass_damped) {
+    std::vector<Real> force(std::size_t(model.n), Real(0.0));
+    add_mass_damping(model, y, v, force.data());
+    for (int i = 0; i < model.n; ++i) out += force[std::size_t(i)] * v[i];
+  }
+  return out;
+}
+
+// Places x, y and angles theta of a link's line at the abscissas s (count) [m] of its material, in the base's axes, after
+// `outward_kinematics`. Of a sleeved link what is inside or behind the sleeve lies on its axis.
+void line(const Model<double> &model, const Workspace<double> &work, const double *y, int link, const double *s, int count, Pose<double> *out);
+
+}  // namespace flexura
