@@ -67,6 +67,8 @@ template <class Real> class Adams {
   int new_row() const { return row(ROWS - 1); }
   int newest() const { return head; }
 
+  double length(int k) const { return span[k]; }  // of the step that robot k's tables are for
+
   // Robot k has one value, now in row(0), and modes that are new.
   void restart(int k, double t) { count[k] = 1, set_lane(time[head], k, t), span[k] = -1.0; }
   void forget_tables(int k) { span[k] = -1.0; }
