@@ -2,7 +2,8 @@
 //
 // That size is the largest deflection of a tip so far, or a thousandth of the tips' path, whichever is larger; for rates the same of
 // their speeds. An error of unknown k moves a tip by at most lever_k. Errors are summed (root of squares) over a joint's
-// position, over a link's elastic unknowns, over their rates, and the worst of these groups decides.
+// position, over a link's elastic unknowns, over their rates, and the worst of these groups decides. Work and losses weigh by the
+// largest energy so far.
 #pragma once
 #include <vector>
 
@@ -21,8 +22,12 @@ template <class Real> class Weights {
 
   // Forgets all sizes: a run begins at (q, v).
   void start(const Real *z) {
+    std::vector<Real> slow(n, Real(0.0));  // every joint moves the tips at START of the robot's length a second
+    for (int i = 0; i < plant.joints; ++i)
+      if (!plant.locked[i]) slow[plant.first[i]] = plant.reach * START / plant.lever[plant.first[i]];
     for (int k = 0; k < n; ++k) begun[k] = z[k];
-    deflection = path = deflecting = speed = energy = Real(0.0);
+    deflection = path = deflecting = speed = Real(0.0);
+    energy = plant.energy(z, slow.data());
     grow(z, true);
   }
 
