@@ -56,6 +56,7 @@ template <class Real> class Adams {
       for (double **vector : {&w2, &d2, &lag}) take(*vector, padded(n));
       take(one_step, 4 * padded(n)), take(one_A, POWERS * padded(n)), take(one_B, POWERS * padded(n));
     });
+    kinds.assign(static_cast<std::size_t>(chunks), SLOW_ONES);
     for (auto &x : time) x = 0.0;
     for (int k = 0; k < LANES; ++k) count[k] = 0, steady[k] = 0, span[k] = -1.0;
     for (auto &set : poly) for (auto &power : set) for (Real &x : power) x = 0.0;
@@ -101,7 +102,7 @@ template <class Real> class Adams {
     for (int c = 0; c < chunks; ++c) {
       const Lanes y = get(eta, c), v = get(etad, c);
       Lanes p = get(step[0], c) * y + get(step[1], c) * v, q = get(step[2], c) * y + get(step[3], c) * v, g = 0.0;
-      for (int j = 0; j < most; ++j) {
+      for (int j = 0, end = smaller_of(most, order_of(c)); j < end; ++j) {
         const Lanes value = get(N[row(j)], c);
         p += get(ahead[0][j], c) * value, q += get(ahead[1][j], c) * value, g -= get(ahead[2][j], c) * value;
       }
@@ -151,9 +152,12 @@ template <class Real> class Adams {
 
   // Coefficient m of the polynomial of a column, for the modes of a chunk.
   Lanes coefficient(int column, int m, int c) const {
-    const Lanes turning = get(fast, c), slow = wide(poly[0][m][column]);
-    return slow + turning * (wide(poly[1][m][column]) - slow);
+    const char kind = kinds[static_cast<std::size_t>(c)];
+    if (kind != MIXED) return wide(poly[kind == FAST_ONES][m][column]);
+    return choose_less(Lanes(0.5), get(fast, c), wide(poly[1][m][column]), wide(poly[0][m][column]));
   }
+  // How many values, and which power of time at most, the modes of a chunk use.
+  int order_of(int c) const { return kinds[static_cast<std::size_t>(c)] == FAST_ONES ? FAST_ORDER : ORDER; }
 
  private:
   Block<Real> memory;
@@ -162,6 +166,10 @@ template <class Real> class Adams {
   double *w2, *d2, *lag, *one_step, *one_A, *one_B;
   double span[LANES];                             // length of the step that the tables are for
   int head = 0;
+  enum : char { SLOW_ONES, FAST_ONES, MIXED };
+  std::vector<char> kinds;                        // (chunks) of the modes in a chunk
+
+  static int smaller_of(int a, int b) { return a < b ? a : b; }
 
   // Free motion and moments of robot k's modes over a step of h.
   void tabulate_modes(int k, double h) {
@@ -175,6 +183,12 @@ template <class Real> class Adams {
         set_lane(B[m * stride + i], k, h > 0.0 ? one_B[m * room + i] : 0.0);
       }
       set_lane(fast[i], k, w2[i] * h * h > FAST * FAST ? 1.0 : 0.0);
+    }
+    if (LANES == 1)
+      for (int i = n; i < room; ++i) fast[i] = fast[n - 1];  // what fills up the last chunk is of its kind
+    for (int c = 0; c < chunks; ++c) {
+      const Lanes turning = get(fast, c);
+      kinds[static_cast<std::size_t>(c)] = worst(turning) < 0.5 ? SLOW_ONES : least(turning) > 0.5 ? FAST_ONES : MIXED;
     }
   }
 
@@ -207,9 +221,10 @@ template <class Real> class Adams {
   // The weights of the values in a step, from the polynomials and the moments.
   void weigh_values(Lanes changed, int c) {
     auto keep = [&](Real *at, Lanes x) { put(at, c, choose_less(Lanes(0.5), changed, x, get(at, c))); };
-    for (int j = 0; j < ORDER; ++j) {
+    const int order = order_of(c);
+    for (int j = 0; j < order; ++j) {
       Lanes p = 0.0, q = 0.0, end = 0.0;
-      for (int m = 0; m < ORDER; ++m) {
+      for (int m = 0; m < order; ++m) {
         const Lanes C = coefficient(j, m, c);
         p += C * get(A + m * stride, c), q += C * get(B + m * stride, c), end += C;
       }
@@ -217,7 +232,7 @@ template <class Real> class Adams {
     }
     for (int r = 0; r < 2; ++r) {
       Lanes p = 0.0, q = 0.0;
-      for (int m = 0; m <= ORDER; ++m) {
+      for (int m = 0; m <= order; ++m) {
         const Lanes C = coefficient(GAP + r, m, c);
         p += C * get(A + m * stride, c), q += C * get(B + m * stride, c);
       }

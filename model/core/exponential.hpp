@@ -66,7 +66,7 @@ template <class Real> class Exponential : public Method<Real> {
     c.acts.prescribe(c.znew.data(), c.znew.data() + n);
     within.build(h);
     Real uncertain[2];
-    account(h, Real(1.0), c.znew.data(), uncertain);
+    account(h, Real(1.0), true, c.znew.data(), uncertain);
     Real squares[2];
     for (int e = 0; e < 2; ++e) {
       Real *x = e ? v_ : y;
@@ -74,11 +74,8 @@ template <class Real> class Exponential : public Method<Real> {
       squares[e] = dot(n, x, x);
     }
     const Real error = root((squares[0] + squares[1]) * (1.0 / (2 * n))) * TIGHT;
-    std::fill(c.error.begin(), c.error.end(), Real(0.0));
-    c.error[2 * n + WORK] = uncertain[0], c.error[2 * n + LOSS] = uncertain[1];
-    const Real energy = c.weights.norm(c.error.data(), c.znew.data());
     if (!(worst(error) < 1.0)) blame();
-    return larger(error, energy);
+    return larger(error, larger(abs(uncertain[0]), abs(uncertain[1])) * c.weights.joules(c.znew.data()));
   }
 
   void accept(const Real &which) override {
@@ -101,7 +98,7 @@ template <class Real> class Exponential : public Method<Real> {
     place(y, v_, state);
     std::copy(state, state + 2 * n, out);
     Real uncertain[2];
-    account(h, x, out, uncertain);
+    account(h, x, false, out, uncertain);
   }
 
   double restart(int k, double wish, bool first) override { return first ? wish : larger(0.1 * wish, 1e-3 * wishes[k]); }
@@ -194,8 +191,8 @@ template <class Real> class Exponential : public Method<Real> {
   }
 
   // The accounts of the state at the fraction x of the step, q its place.
-  void account(const Real &h, const Real &x, Real *z, Real *uncertain) {
-    const auto sums = accounts.over(h, x, c.z.data(), z);
+  void account(const Real &h, const Real &x, bool whole, Real *z, Real *uncertain) {
+    const auto sums = accounts.over(h, x, whole, c.z.data(), z);
     const Real *before = c.z.data() + 2 * n;
     Real *now = z + 2 * n, strain, old, unused;
     c.plant.powers(z, z, strain, unused), c.plant.powers(c.z.data(), c.z.data(), old, unused);
@@ -274,6 +271,7 @@ template <class Real> class Exponential : public Method<Real> {
       modes.cutoff[k] = options.cutoff > 0.0 ? options.cutoff : find_cutoff(k, m, q, v, t);
       modes.damp(k, options.zeta);
     }
+    accounts.take_rows();
     return true;
   }
 

@@ -38,7 +38,8 @@ template <class Real> class ModalAccounts {
       : s(steps), w(motion), joints(std::move(free)) {
     memory.lay([this](auto take) {
       for (Real *&row : L) take(row, s.stride);
-      for (Real **vector : {&Qz, &phi_j, &square, &added}) take(*vector, s.stride);
+      for (Real **vector : {&Qz, &square, &added}) take(*vector, s.stride);
+      take(phi, 2 * static_cast<int>(joints.size()) * s.stride);
     });
   }
 
@@ -54,7 +55,7 @@ template <class Real> class ModalAccounts {
       extra[j] = force[j] + x.kp * q[x.row] + x.kd * v[x.row];
       rest -= x.viscous * v[x.row] * v[x.row];
     }
-    if (material()) {
+    if (s.b.lossy) {
       for (int c = 0; c < s.chunks; ++c) put(square, c, get(etad, c) * get(etad, c));
       rest -= dot(s.n, s.b.material, square);
     }
@@ -62,32 +63,35 @@ template <class Real> class ModalAccounts {
   }
 
   // Integrals from the start of the step of length h to its fraction x, where the joints' places are q1; q0 at the start.
-  Sums over(const Real &h, const Real &x, const Real *q0, const Real *q1) {
+  // whole: x = 1.
+  Sums over(const Real &h, const Real &x, bool whole, const Real *q0, const Real *q1) {
     Sums sum{0.0, 0.0, 0.0, 0.0, 0.0};
-    free_motion(h, x);
-    Real power[2 * POWERS];  // x^k
-    power[0] = 1.0;
-    for (int k = 1; k < 2 * POWERS; ++k) power[k] = power[k - 1] * x;
+    free_motion(h, x, whole);
+    Real area[2 * POWERS], power = x;  // int_0^x x^k dx
+    for (int k = 0; k < 2 * POWERS; ++k) area[k] = power * (1.0 / (k + 1)), power *= x;
     const Real per = 1.0 / choose_less(Real(0.0), h, h, Real(1.0));
     const int count = static_cast<int>(joints.size());
     for (int j = 0; j < count; ++j) {
       const Joint &joint = joints[static_cast<std::size_t>(j)];
-      for (int k = 0; k < s.n; ++k) phi_j[k] = s.b.phi[k * s.stride + joint.row];
+      const Real *phi_j = phi + 2 * j * s.stride;
       Real P[ORDER], Z[POWERS], U[POWERS], uncertain[POWERS];
       for (int q = 0; q < ORDER; ++q) P[q] = double(q + 1) * dot(s.n, phi_j, w.p[q + 1]);
       for (int m = 0; m < POWERS; ++m) Z[m] = dot(s.n, phi_j, L[m]);
       polynomial(j, U, uncertain);
       for (int m = 0; m < POWERS; ++m) {
         Real moment = Z[m];
-        for (int q = 0; q < ORDER; ++q) moment += P[q] * power[m + q + 1] * (1.0 / (m + q + 1));
+        for (int q = 0; q < ORDER; ++q) moment += P[q] * area[m + q];
         sum.work += U[m] * moment, sum.work_error += uncertain[m] * moment;
       }
       Real squares = 0.0;
-      for (int c = 0; c < s.chunks; ++c) put(square, c, get(phi_j, c) * get(phi_j, c));
-      squares = dot(s.n, square, Qz);
+      if (!(worst(abs(joint.kd) + abs(joint.viscous)) > 0.0)) {
+        sum.work -= 0.5 * joint.kp * (q1[joint.row] - q0[joint.row]) * (q1[joint.row] + q0[joint.row]);
+        continue;
+      }
+      squares = dot(s.n, phi_j + s.stride, Qz);
       for (int q = 0; q < ORDER; ++q) {
         Real row = 2.0 * Z[q];
-        for (int r = 0; r < ORDER; ++r) row += P[r] * power[q + r + 1] * (1.0 / (q + r + 1));
+        for (int r = 0; r < ORDER; ++r) row += P[r] * area[q + r];
         squares += per * P[q] * row;
       }
       const Real a = q0[joint.row], b = q1[joint.row];
@@ -95,20 +99,26 @@ template <class Real> class ModalAccounts {
       sum.loss += joint.viscous * squares;
     }
     for (int e = 0; e < 2; ++e) {  // powers that are taken as polynomials themselves
-      Real U[POWERS], uncertain[POWERS], area = 0.0, error = 0.0;
+      Real U[POWERS], uncertain[POWERS], all = 0.0, error = 0.0;
       polynomial(count + e, U, uncertain);
       for (int m = 0; m < POWERS; ++m) {
-        const Real moment = h * power[m + 1] * (1.0 / (m + 1));
-        area += U[m] * moment, error += uncertain[m] * moment;
+        const Real moment = h * area[m];
+        all += U[m] * moment, error += uncertain[m] * moment;
       }
-      (e == 0 ? sum.loss : sum.work) += area, (e == 0 ? sum.loss_error : sum.work_error) += error;
+      (e == 0 ? sum.loss : sum.work) += all, (e == 0 ? sum.loss_error : sum.work_error) += error;
     }
-    if (material() || damped()) of_modes(h, power, sum);
+    if (s.b.lossy || s.b.damped) of_modes(h, area, sum);
     return sum;
   }
 
-  bool material() const { return any(s.b.material); }
-  bool damped() const { return any(s.b.lag); }
+  // To be called when modes were taken: the joints' rows of the modes, and their squares.
+  void take_rows() {
+    for (int j = 0; j < static_cast<int>(joints.size()); ++j)
+      for (int k = 0; k < s.n; ++k) {
+        const Real x = s.b.phi[k * s.stride + joints[static_cast<std::size_t>(j)].row];
+        phi[2 * j * s.stride + k] = x, phi[(2 * j + 1) * s.stride + k] = x * x;
+      }
+  }
 
  private:
   const Adams<Real> &s;
@@ -116,14 +126,8 @@ template <class Real> class ModalAccounts {
   std::vector<Joint> joints;
   Block<Real> memory;
   Real *L[POWERS], *Qz;              // (stride): int x^m z' dt, int z'^2 dt
-  Real *phi_j, *square, *added;      // (stride) scratch; `square` is written by record() too
-  static bool any_of(const Real *x, int n) {
-    for (int k = 0; k < n; ++k)
-      if (worst(x[k]) > 0.0) return true;
-    return false;
-  }
-  bool any(const Real *x) const { return any_of(x, s.n); }
-
+  Real *phi;                         // (2 joints, stride): of each joint phi_kj, and squared
+  Real *square, *added;              // (stride) scratch; `square` is written by record() too
   // The polynomial through an extra number's last values and its newest, and the part of it that is uncertain.
   void polynomial(int number, Real *U, Real *uncertain) const {
     Real values[ORDER], gap = s.extra(s.new_row())[number];
@@ -155,7 +159,7 @@ template <class Real> class ModalAccounts {
     squares = choose_less(Number(0.0), d2, energy / choose_less(Number(0.0), d2, d2, Number(1.0)), Number(0.0));
   }
 
-  void free_motion(const Real &h, const Real &x) {
+  void free_motion(const Real &h, const Real &x, bool whole) {
     for (int c = 0; c < s.chunks; ++c) {
       if (!w.oscillates(c)) {
         for (Real *row : L) put(row, c, Lanes(0.0));
@@ -164,7 +168,7 @@ template <class Real> class ModalAccounts {
       }
       const Lanes H = wide(choose_less(Real(0.0), h, h, Real(1.0)));
       Lanes z, zd, moment[POWERS], squares;
-      w.free_at(h, x, c, z, zd);
+      whole ? w.free_at_end(h, c, z, zd) : w.free_at(h, x, c, z, zd);
       moments_of(w.w2_of(c), w.d2_of(c), H, wide(x), get(w.z0, c), get(w.zd0, c), z, zd, moment, squares);
       for (int m = 0; m < POWERS; ++m) put(L[m], c, moment[m]);
       put(Qz, c, squares);
@@ -189,17 +193,17 @@ template <class Real> class ModalAccounts {
   }
 
   // What the modes lose to the links' material and to the added damping.
-  void of_modes(const Real &h, const Real *power, Sums &sum) {
+  void of_modes(const Real &h, const Real *area, Sums &sum) {
     const Lanes per = wide(1.0 / choose_less(Real(0.0), h, h, Real(1.0)));
     for (int c = 0; c < s.chunks; ++c) {
+      const int degree = w.degree(c);
       Lanes P[ORDER], squares = get(Qz, c), pumped = 0.0;
-      for (int q = 0; q < ORDER; ++q) P[q] = double(q + 1) * get(w.p[q + 1], c);
-      for (int q = 0; q < ORDER; ++q) {
-        Lanes moment = get(L[q], c);  // int x^q eta' dt
-        Lanes row = moment + moment;
-        for (int r = 0; r < ORDER; ++r) {
-          const Lanes area = P[r] * wide(power[q + r + 1]) * (1.0 / (q + r + 1));
-          row += area, moment += area;
+      for (int q = 0; q < degree; ++q) P[q] = double(q + 1) * get(w.p[q + 1], c);
+      for (int q = 0; q < degree; ++q) {
+        Lanes moment = get(L[q], c), row = moment + moment;  // moment: int x^q eta' dt
+        for (int r = 0; r < degree; ++r) {
+          const Lanes part = P[r] * wide(area[q + r]);
+          row += part, moment += part;
         }
         squares += per * P[q] * row;
         pumped += double(q + 1) * per * get(w.f[q + 1], c) * moment;

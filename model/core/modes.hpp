@@ -38,6 +38,7 @@ template <class Real> class Modes {
   Real *d2, *lag;             // (stride): damping with what is added above the cutoff; added / w2
   double cutoff[LANES];       // modes above this frequency are damped [rad/s]; infinity: none
   int taken[LANES];           // how often modes were taken
+  bool lossy = false, damped = false;  // does any robot's material have damping, is any added?
 
   explicit Modes(int count) : n(count), chunks(chunks_of<Real>(count)), stride(room_of<Real>(count)) {
     memory.lay([this](auto take_) {
@@ -93,6 +94,7 @@ template <class Real> class Modes {
         decay += x * Dx;
         if (!held_row[i]) joints += x * x * m.joint_damping[std::size_t(i)];
       }
+      lossy = lossy || decay > 0.0;
       set_lane(material[mode], k, decay), set_lane(own[mode], k, decay + joints);
     }
     damp(k, zeta);
@@ -104,6 +106,7 @@ template <class Real> class Modes {
   void damp(int k, double zeta) {
     for (int mode = 0; mode < n; ++mode) {
       const double square = lane(w2[mode], k), w = root(square), added = square > 0.0 && w > cutoff[k] ? 2.0 * zeta * w : 0.0;
+      damped = damped || added > 0.0;
       set_lane(d2[mode], k, lane(own[mode], k) + added), set_lane(lag[mode], k, added > 0.0 ? added / square : 0.0);
     }
   }

@@ -43,12 +43,14 @@ template <class Real> class Within {
     memory.lay([this](auto take) {
       for (Real *&power : p) take(power, s.stride);
       for (Real *&power : f) take(power, s.stride);
-      for (Real **vector : {&z0, &zd0, &safe_w2, &safe_d2}) take(*vector, s.stride);
+      for (Real **vector : {&z0, &zd0, &safe_w2, &safe_d2, &safe_wave}) take(*vector, s.stride);
     });
     damped.reserve(static_cast<std::size_t>(s.n * LANES));
-    waves.assign(static_cast<std::size_t>(s.chunks), 0);
+    waves.assign(static_cast<std::size_t>(s.chunks), 0), all_waves = waves;
   }
 
+  // The highest power in p of a chunk.
+  int degree(int chunk) const { return all_waves[static_cast<std::size_t>(chunk)] ? s.order_of(chunk) : ORDER; }
   bool oscillates(int chunk) const { return waves[static_cast<std::size_t>(chunk)] != 0; }
 
   // The step of length h just corrected; 0: the state at its start.
@@ -63,6 +65,12 @@ template <class Real> class Within {
     Lanes g, dg;
     impulse_responses(w2, d2, wide(x) * wide(h), g, dg);
     z = (dg + d2 * g) * z_ + g * zd_, zd = dg * zd_ - w2 * g * z_;
+  }
+  void free_at_end(const Real &h, int c, Lanes &z, Lanes &zd) const {  // from the corrected state
+    const Lanes H = wide(choose_less(Real(0.0), h, h, Real(1.0))), wave = get(safe_wave, c);
+    Lanes e = get(p[ORDER], c), d = 0.0;
+    for (int q = ORDER - 1; q >= 0; --q) d = d + e, e = e + get(p[q], c);
+    z = wave * (get(s.corrected[0], c) - e), zd = wave * (get(s.corrected[1], c) - d / H);
   }
   Lanes w2_of(int c) const { return get(safe_w2, c); }
   Lanes d2_of(int c) const { return get(safe_d2, c); }
@@ -91,8 +99,8 @@ template <class Real> class Within {
 
  private:
   Block<Real> memory;
-  Real *safe_w2, *safe_d2;   // (stride) of what oscillates, else 1 and 0
-  std::vector<char> waves;   // (chunks) does any mode oscillate?
+  Real *safe_w2, *safe_d2, *safe_wave;  // (stride) of what oscillates, else 1 and 0; 1 where it does
+  std::vector<char> waves, all_waves;  // (chunks) does any mode oscillate, do all?
 
   enum class Kind { slow, wave, decay, decays };
   static Kind kind_of(double w2, double d2, double h) {
@@ -113,13 +121,15 @@ template <class Real> class Within {
       if (kinds[l] == Kind::wave) wave.set(l, 1.0);
     }
     const bool any = worst(wave) > 0.0, all = least(wave) > 0.0;
-    waves[static_cast<std::size_t>(c)] = any;
+    waves[static_cast<std::size_t>(c)] = any, all_waves[static_cast<std::size_t>(c)] = all;
     const Lanes y = get(a.eta, c), v = get(a.etad, c), y1 = get(a.corrected[0], c), v1 = get(a.corrected[1], c);
     Lanes F[ORDER + 2], P[ORDER + 3];
     const Lanes gap = get(a.gap, c);
-    for (int q = 0; q <= ORDER; ++q) {
+    const int order = a.order_of(c);
+    for (int q = order + 1; q <= ORDER; ++q) F[q] = P[q] = 0.0, put(f[q], c, Lanes(0.0));
+    for (int q = 0; q <= order; ++q) {
       Lanes sum = a.coefficient(GAP, q, c) * gap;
-      for (int j = 0; j < ORDER; ++j) sum += a.coefficient(j, q, c) * get(a.N[a.row(j)], c);
+      for (int j = 0; j < order; ++j) sum += a.coefficient(j, q, c) * get(a.N[a.row(j)], c);
       F[q] = sum, put(f[q], c, sum);
     }
     F[ORDER + 1] = 0.0;
@@ -138,13 +148,13 @@ template <class Real> class Within {
       const Lanes W = choose_less(Lanes(0.5), wave, w2, Lanes(1.0)), D = choose_less(Lanes(0.5), wave, d2, Lanes(0.0));
       const Lanes inverse = 1.0 / W, drag = D * per, bend = inverse * per * per;
       Lanes above = 0.0, here = 0.0;
-      for (int q = ORDER; q >= 0; --q) {
+      for (int q = all ? order : ORDER; q >= 0; --q) {
         const Lanes force = F[q] + double(q + 1) * behind * F[q + 1];
         const Lanes below = inverse * (force - double(q + 1) * drag * here) - double((q + 1) * (q + 2)) * bend * above;
         above = here, here = below;
         P[q] = all ? below : choose_less(Lanes(0.5), wave, below, P[q]);
       }
-      put(safe_w2, c, W), put(safe_d2, c, D);
+      put(safe_w2, c, W), put(safe_d2, c, D), put(safe_wave, c, wave);
       put(z0, c, wave * (y - P[0])), put(zd0, c, wave * (v - P[1] * per));
     } else {
       put(z0, c, Lanes(0.0)), put(zd0, c, Lanes(0.0));
