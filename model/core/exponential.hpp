@@ -46,6 +46,9 @@ template <class Real> class Exponential : public Method<Real> {
       put_origin(k, q, v);
     }
     std::copy(c.z.begin(), c.z.begin() + 2 * n, state);
+    Real unused;
+    c.plant.powers(q, q, strain, unused);
+    strain_before = choose_less(Real(0.5), which, strain, strain_before);
     look(t, steps.eta, steps.etad);
     const int from = steps.new_row(), to = steps.newest();
     for (int k = 0; k < LANES; ++k) {
@@ -67,6 +70,7 @@ template <class Real> class Exponential : public Method<Real> {
     within.build(h);
     Real uncertain[2];
     account(h, Real(1.0), true, c.znew.data(), uncertain);
+    strain_after = strain;
     Real squares[2];
     for (int e = 0; e < 2; ++e) {
       Real *x = e ? v_ : y;
@@ -80,6 +84,7 @@ template <class Real> class Exponential : public Method<Real> {
 
   void accept(const Real &which) override {
     steps.accept(which, end);
+    strain_before = choose_less(Real(0.5), which, strain_after, strain_before);
     for (int k = 0; k < LANES; ++k) {
       if (lane(which, k) < 0.5) continue;
       const Real *q = c.znew.data(), *v = q + n;
@@ -135,6 +140,7 @@ template <class Real> class Exponential : public Method<Real> {
   Real *origin, *size[2], *y, *v_, *forces, *state, *slope;  // y = origin + sum eta phi; error weights of the modes; scratch
   std::unique_ptr<bool[]> held;                              // (n) rows of joints whose motion is given
   Real end = 0.0;                                            // of the step being tried
+  Real strain = 0.0, strain_before = 0.0, strain_after = 0.0;  // twice the strain energy
   double wishes[LANES] = {};
   long since[LANES] = {};                                    // steps since the start or a break
 
@@ -194,11 +200,11 @@ template <class Real> class Exponential : public Method<Real> {
   void account(const Real &h, const Real &x, bool whole, Real *z, Real *uncertain) {
     const auto sums = accounts.over(h, x, whole, c.z.data(), z);
     const Real *before = c.z.data() + 2 * n;
-    Real *now = z + 2 * n, strain, old, unused;
-    c.plant.powers(z, z, strain, unused), c.plant.powers(c.z.data(), c.z.data(), old, unused);
+    Real *now = z + 2 * n, unused;
+    c.plant.powers(z, z, strain, unused);
     now[WORK] = before[WORK] + sums.work, now[LOSS] = before[LOSS] + sums.loss;
     now[NUMERICAL] = before[NUMERICAL] + sums.numerical;
-    now[STRAIN] = before[STRAIN] + 0.5 * (strain - old);  // (K q) . q is twice the energy
+    now[STRAIN] = before[STRAIN] + 0.5 * (strain - strain_before);  // (K q) . q is twice the energy
     uncertain[0] = sums.work_error, uncertain[1] = sums.loss_error;
   }
 

@@ -116,16 +116,18 @@ template <class Real> class Within {
     const Lanes w2 = get(a.b.w2, c), d2 = get(a.b.d2, c), lag = get(a.b.lag, c), per = 1.0 / h, behind = lag * per;
     Lanes wave = 0.0;
     Kind kinds[4];
+    bool forced = worst(lag) > 0.0;  // is N needed as a polynomial?
     for (int l = 0; l < 4; ++l) {
       kinds[l] = kind_of(w2[l], d2[l], h[l]);
       if (kinds[l] == Kind::wave) wave.set(l, 1.0);
+      forced = forced || kinds[l] != Kind::slow;
     }
     const bool any = worst(wave) > 0.0, all = least(wave) > 0.0;
     waves[static_cast<std::size_t>(c)] = any, all_waves[static_cast<std::size_t>(c)] = all;
     const Lanes y = get(a.eta, c), v = get(a.etad, c), y1 = get(a.corrected[0], c), v1 = get(a.corrected[1], c);
     Lanes F[ORDER + 2], P[ORDER + 3];
     const Lanes gap = get(a.gap, c);
-    const int order = a.order_of(c);
+    const int order = forced ? a.order_of(c) : -1;
     for (int q = order + 1; q <= ORDER; ++q) F[q] = P[q] = 0.0, put(f[q], c, Lanes(0.0));
     for (int q = 0; q <= order; ++q) {
       Lanes sum = a.coefficient(GAP, q, c) * gap;

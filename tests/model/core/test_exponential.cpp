@@ -33,11 +33,18 @@ template <class Real> struct Shaken : Plant<Real> {
       f[std::size_t(i)] = p.force[i] - K[std::size_t(i)] * (p.ys[i] + beta * p.vs[i]) - cubic * K[std::size_t(i)] * p.q[i] * p.q[i] * p.q[i];
     }
     f[0] -= p.stiffness[0] * p.ys[0] + (p.damping[0] + this->viscous[0]) * p.vs[0];
+    const Real asked = f[0];
+    if (p.held[0]) {
+      for (int i = 1; i < n; ++i) f[std::size_t(i)] -= M[std::size_t(i * n)] * p.given[0], L[std::size_t(i * n)] = L[std::size_t(i)] = 0.0;
+      f[0] = p.given[0], L[0] = 1.0;
+    }
     cholesky(n, L.data());
     solve_lower(n, L.data(), f.data());
     solve_upper(n, L.data(), f.data());
     for (int i = 0; i < n; ++i) a[i] = f[std::size_t(i)];
-    reaction[0] = Real(0.0);
+    reaction[0] = -asked;
+    for (int j = 0; j < n; ++j) reaction[0] += M[std::size_t(j)] * a[j];
+    reaction[0] += p.force[0];
   }
   void powers(const Real *q, const Real *v, Real &strain, Real &loss) override {
     strain = loss = Real(0.0);
@@ -191,4 +198,135 @@ TEST("order: halving the tolerance sixfold costs what a method of order six asks
     if (passes_before > 0.0 && rtol < 1e-5) CHECK(double(result.passes) < 1.9 * passes_before);
     passes_before = double(result.passes);
   }
+}
+
+namespace {
+
+// The largest gap in the balance of a run, over its rows [J].
+double imbalance(Shaken<double> &plant, const Result &result) {
+  double worst_gap = 0.0;
+  const int n = plant.n;
+  const double *z0 = result.row(0), start = plant.energy(z0, z0 + n);
+  for (int row = 0; row < result.record.rows; ++row) {
+    const double *z = result.row(row), *a = z + 2 * n;
+    worst_gap = std::fmax(worst_gap, std::fabs(plant.energy(z, z + n) - start - a[WORK] + a[LOSS] + a[NUMERICAL]));
+  }
+  return worst_gap;
+}
+
+}  // namespace
+
+TEST("accounts of a linear robot with gains, friction, material damping and added damping, steps in which modes turn many times") {
+  Shaken<double> plant(6, 3e-6, 0.0);
+  plant.viscous[0] = 0.7;
+  Acting acting(1);
+  acting.joints[0].motion = {segment(0.0, {0.4}), segment(1.0, {-0.2})};
+  acting.joints[0].kp = 30.0, acting.joints[0].kd = 2.0;
+  for (double beta : {0.0, 3e-6, 1e-2}) {  // 1e-2: overdamped modes
+    plant.beta = beta;
+    for (bool damped : {false, true}) {
+      const auto result = run(plant, acting, grid(2.0, 101), 1e-6, std::vector<double>(6, 0.0), std::vector<double>(6, 0.0),
+                              ExponentialOptions{damped, 0.05, damped ? 30.0 : 0.0});
+      const double *a = result.row(result.record.rows - 1) + 12;
+      const double gap = imbalance(plant, result);
+      std::printf("      beta %.0e, %s: %ld passes, balance %.1e; work %.4g, loss %.4g, numerical %.3g J\n", beta, damped ? "damped" : "plain",
+                  result.passes, gap, a[WORK], a[LOSS], a[NUMERICAL]);
+      CHECK(result.status == Status::done);
+      CHECK(gap < 1e-5 * std::fmax(a[WORK], a[LOSS]));
+      CHECK(damped ? a[NUMERICAL] > 0.0 : a[NUMERICAL] == 0.0);
+      CHECK(a[LOSS] > 0.1);
+    }
+  }
+}
+
+TEST("Coulomb friction is a loss that closes the balance") {
+  Shaken<double> plant(4, 0.0, 0.0);
+  plant.coulomb[0] = 0.2, plant.slow = 0.2;
+  Acting acting(1);
+  acting.joints[0].force = {segment(0.0, {2.0}), segment(0.7, {-1.0})};
+  const auto result = run(plant, acting, grid(1.5, 31), 1e-6, std::vector<double>(4, 0.0), std::vector<double>(4, 0.0), PLAIN);
+  const double *a = result.row(result.record.rows - 1) + 8;
+  std::printf("      %ld passes, balance %.1e; work %.4g, loss %.4g J\n", result.passes, imbalance(plant, result), a[WORK], a[LOSS]);
+  CHECK(imbalance(plant, result) < 2e-5 * a[WORK]);
+}
+
+TEST("added damping acts about the quasi-static motion: slow motion is unchanged, ringing dies at zeta w") {
+  Shaken<double> plant(4, 0.0, 0.0);
+  Acting acting(1);
+  acting.joints[0].force = {segment(0.0, {0.0, 0.0, 0.0, 10.0, -15.0, 6.0}), segment(1.0, {1.0})};  // rises in 1 s
+  const std::vector<double> zero(4, 0.0);
+  const auto plain = run(plant, acting, grid(2.0, 41), 1e-8, zero, zero, PLAIN);
+  const auto damped = run(plant, acting, grid(2.0, 41), 1e-8, zero, zero, ExponentialOptions{true, 0.2, 0.5 * std::sqrt(plant.K[2] / 4.0)});
+  double difference = 0.0, size = 0.0;
+  for (int row = 0; row < plain.record.rows; ++row)
+    for (int i = 1; i < 4; ++i) difference = std::fmax(difference, std::fabs(plain.row(row)[i] - damped.row(row)[i])), size = std::fmax(size, std::fabs(plain.row(row)[i]));
+  std::printf("      difference %.1e of %.2g\n", difference, size);
+  CHECK(difference < 2e-3 * size);
+  const std::vector<double> bent{0.0, 0.0, 0.0, 0.01};
+  Acting free(1);
+  const double w = std::sqrt(plant.K[3] / 5.0);
+  const auto ringing = run(plant, free, {0.0, 20.0 / w, 60.0 / w}, 1e-8, bent, zero, ExponentialOptions{true, 0.02, 0.5 * w});
+  double energy[3];
+  for (int row = 0; row < 3; ++row) energy[row] = plant.energy(ringing.row(row), ringing.row(row) + 4);
+  std::printf("      energy %.3e %.3e %.3e, numerical %.3e\n", energy[0], energy[1], energy[2], ringing.row(2)[8 + NUMERICAL]);
+  CHECK(energy[2] < 0.2 * energy[0]);
+  CHECK_NEAR(energy[0] - energy[2], ringing.row(2)[8 + NUMERICAL], 1e-9 * energy[0]);
+}
+
+TEST("the cutoff: lower for loose tolerances, above harmonic forces, none for robots at rest") {
+  Shaken<double> plant(6, 0.0, 0.0);
+  Acting acting(1), still(1);
+  acting.joints[0].force = {segment(0.0, {1.0})};
+  const std::vector<double> zero(6, 0.0);
+  double before = 0.0;
+  for (double rtol : {1e-2, 1e-3, 1e-4, 1e-5}) {
+    const double cutoff = run(plant, acting, grid(0.01, 2), rtol, zero, zero).cutoff;
+    CHECK(cutoff >= before);
+    before = cutoff;
+  }
+  Acting humming = acting;
+  humming.joints[0].force[0].A = 0.1, humming.joints[0].force[0].w = 50.0;
+  CHECK(run(plant, humming, grid(0.01, 2), 1e-2, zero, zero).cutoff >= 250.0);
+  CHECK(std::isinf(run(plant, still, grid(0.01, 2), 1e-2, zero, zero).cutoff));
+}
+
+TEST("four robots in a pack, each with its own steps, have the bits of single ones") {
+  const auto t = grid(1.5, 31);
+  Shaken<Pack<4>> four(5, 1e-5, 0.3);
+  Acting acting[4] = {Acting(1), Acting(1), Acting(1), Acting(1)};
+  Acting *all[4];
+  for (int k = 0; k < 4; ++k) {
+    acting[k].joints[0].force = {segment(0.0, {0.5 + 0.3 * k, 0.1}), segment(0.4 + 0.1 * k, {-0.5})};
+    acting[k].joints[0].motion = {segment(0.0, {0.1 * k})}, acting[k].joints[0].kp = 2.0 + k, acting[k].joints[0].kd = 0.1 * k;
+    all[k] = &acting[k];
+  }
+  const double rtol = 1e-4;
+  Loop<Pack<4>> loop(four, all, t, rtol);
+  Exponential<Pack<4>> method(loop.course, rtol, ExponentialOptions{true, 0.05, 60.0});
+  std::vector<Pack<4>> q(5, Pack<4>(0.0)), v(5, Pack<4>(0.0));
+  for (int k = 0; k < 4; ++k) q[2].set(k, 0.02 * k);
+  loop.start(q.data(), v.data(), 1e-4);
+  while (loop.advance(method, 1000)) {}
+  for (int k = 0; k < 4; ++k) {
+    Shaken<double> one(5, 1e-5, 0.3);
+    std::vector<double> q1(5, 0.0);
+    q1[2] = 0.02 * k;
+    const auto single = run(one, acting[k], t, rtol, q1, std::vector<double>(5, 0.0), ExponentialOptions{true, 0.05, 60.0});
+    CHECK(single.steps == loop.clock[std::size_t(k)].steps);
+    const Record &packed = loop.record[std::size_t(k)];
+    CHECK(packed.rows == single.record.rows && packed.state.size() == single.record.state.size());
+    int different = 0;
+    for (std::size_t i = 0; i < std::size_t(packed.rows * packed.size); ++i) different += packed.state[i] != single.record.state[i];
+    std::printf("      robot %d: %ld steps, %d of %d numbers differ\n", k, single.steps, different, packed.rows * packed.size);
+    CHECK(different == 0);
+  }
+}
+
+TEST("a locked and a prescribed joint: the motion is followed, the balance closes") {
+  Shaken<double> plant(4, 1e-4, 0.0);
+  plant.locked[0] = true;
+  Acting acting(1);
+  const auto locked = run(plant, acting, grid(1.0, 21), 1e-6, {0.3, 0.1, 0.0, 0.0}, std::vector<double>(4, 0.0), PLAIN);
+  CHECK(locked.status == Status::done);
+  for (int row = 0; row < locked.record.rows; ++row) CHECK(locked.row(row)[0] == 0.3);
 }
