@@ -10,9 +10,6 @@ READY    := $(VENV)/.ready
 CORE     := $(VENV)/.core
 COMPILED := $(VENV)/.compiled
 
-# The C++ tests use the instructions that the core's faster build uses, if this machine has them.
-LEVEL ?= $(shell grep -qw avx2 /proc/cpuinfo 2>/dev/null && echo x86-64-v3)
-
 # An environment knows the place of its checkout: after a move, or when its Python is gone, it is made anew.
 ifneq ($(shell test -x $(VENV)/bin/python && cat $(READY) 2>/dev/null),$(CURDIR))
 .PHONY: $(READY)
@@ -59,14 +56,14 @@ types: $(READY)
 tests: $(COMPILED)
 	@$(VENV)/bin/pytest -n $(JOBS) -m "not slow"
 
-core: FOLDER := build/core
-core: SETTINGS := -DFLEXURA_LEVEL=$(LEVEL)
-core-sanitize: FOLDER := build/core-sanitize
-core-sanitize: SETTINGS := -DFLEXURA_SANITIZE=ON
-core core-sanitize: $(READY)
-	@$(VENV)/bin/cmake -S . -B $(FOLDER) -G Ninja -DCMAKE_MAKE_PROGRAM=$(CURDIR)/$(VENV)/bin/ninja -DFLEXURA_STRICT=ON $(SETTINGS) --log-level=WARNING
-	@$(VENV)/bin/cmake --build $(FOLDER) --parallel $(JOBS)
-	@$(VENV)/bin/ctest --test-dir $(FOLDER) --parallel $(JOBS) --output-on-failure
+core: $(CORE)
+	@$(VENV)/bin/cmake --build build/core --target core_tests --parallel $(JOBS)
+	@$(VENV)/bin/ctest --test-dir build/core --parallel $(JOBS) --output-on-failure
+
+core-sanitize: $(READY)
+	@$(VENV)/bin/cmake -S . -B build/sanitize -G Ninja -DCMAKE_MAKE_PROGRAM=$(CURDIR)/$(VENV)/bin/ninja -DFLEXURA_SANITIZE=ON -DFLEXURA_STRICT=ON
+	@$(VENV)/bin/cmake --build build/sanitize --parallel $(JOBS)
+	@$(VENV)/bin/ctest --test-dir build/sanitize --parallel $(JOBS) --output-on-failure
 
 test-slow: $(COMPILED)
 	@$(VENV)/bin/pytest -n $(JOBS) -m slow

@@ -24,6 +24,12 @@ def nothing(library):
     return False
 
 
+@pytest.fixture(autouse=True)
+def no_choice_of_compiler(monkeypatch):
+    for name in ("CXX", "REQUIRE_CLANG"):
+        monkeypatch.delenv(name, raising=False)
+
+
 def packages(needs):
     return [need.package for need in needs]
 
@@ -36,8 +42,8 @@ def test_a_complete_machine_needs_nothing():
 def test_a_bare_debian_needs_all():
     needs = setup.missing(BARE, nothing, [], "linux")
     board = ["gcc-avr", "avr-libc", "arduino-core-avr", "avrdude", "g++", "libsimavr-dev", "simavr"]
-    assert packages(needs) == ["python3.11-venv", "libgl1", "libx11-6", "libvulkan1", *board, "mesa-vulkan-drivers"]
-    assert [need.package for need in needs if need.vital] == ["python3.11-venv", "libgl1", "libx11-6"]
+    assert packages(needs) == ["python3.11-venv", "g++", "libgl1", "libx11-6", "libvulkan1", *board, "mesa-vulkan-drivers"]
+    assert [need.package for need in needs if need.vital] == ["python3.11-venv", "g++", "libgl1", "libx11-6"]
 
 
 @pytest.mark.parametrize("library", [*setup.LIBRARIES, *setup.BOARD])
@@ -54,13 +60,37 @@ def test_the_venv_package_follows_the_version_and_only_for_the_system_python():
 
 
 def test_macos_needs_no_x11_or_vulkan():
-    assert setup.missing(DEBIAN, nothing, [], "darwin") == []
+    assert setup.missing(DEBIAN, nothing, [], "darwin") == [setup.COMPILER]
+    assert setup.missing(DEBIAN, lambda name: name == "clang++", [], "darwin") == []
+
+
+@pytest.mark.parametrize("name", setup.COMPILERS)
+def test_one_compiler_of_any_name_is_enough_for_the_core(name, monkeypatch):
+    assert setup.without_compiler(lambda what: what == name) == []
+    assert setup.without_compiler(lambda what: what == "g++-13") == [setup.COMPILER]
+    monkeypatch.setenv("CXX", "g++-13 -m64")
+    assert setup.without_compiler(lambda what: what == "g++-13") == []
+
+
+@pytest.mark.parametrize(("apt", "command"), [(True, "apt-get install -y"), (False, "xcode-select --install")])
+def test_without_a_compiler_nothing_goes_on_and_a_command_brings_one(apt, command):
+    stop, message = setup.verdict(setup.without_compiler(nothing), apt, "sudo ")
+    assert stop and "the core of the solver cannot be compiled" in message and command in message
+    assert ("dnf install gcc-c++" in message) is not apt
+
+
+def test_a_second_compiler_is_for_those_who_ask(monkeypatch):
+    def no_clang(name):
+        return name != "clang++"
+    assert setup.missing(DEBIAN, no_clang, LAVAPIPE, "linux") == []
+    monkeypatch.setenv("REQUIRE_CLANG", "1")
+    assert setup.missing(DEBIAN, no_clang, LAVAPIPE, "linux") == [setup.CLANG]
 
 
 def test_on_debian_without_rights_the_command_to_type_is_exact():
     needs = setup.missing(BARE, nothing, [], "linux")
     stop, message = setup.verdict(needs, apt=True, sudo="sudo ")
-    packages = "python3.11-venv libgl1 libx11-6 libvulkan1 gcc-avr avr-libc arduino-core-avr avrdude g++ libsimavr-dev simavr"
+    packages = "python3.11-venv g++ libgl1 libx11-6 libvulkan1 gcc-avr avr-libc arduino-core-avr avrdude libsimavr-dev simavr"
     typed = f"sudo apt-get install -y --no-install-recommends {packages} mesa-vulkan-drivers"
     assert stop and message.splitlines().count(f"  sudo apt-get update && {typed}") == 1
     assert "sudo" not in setup.verdict(needs, apt=True)[1]
@@ -74,7 +104,7 @@ def test_pictures_alone_never_stop():
 
 
 def test_elsewhere_the_missing_are_named_with_their_cost_and_the_set_up_goes_on():
-    stop, message = setup.verdict(setup.missing(DEBIAN, nothing, [], "linux"), apt=False)
+    stop, message = setup.verdict(setup.missing(DEBIAN, lambda name: name == "c++", [], "linux"), apt=False)
     assert not stop and "apt-get" not in message
     for library in ("libGL.so.1", "libX11.so.6"):
         assert re.search(rf"{library} .*exudyn cannot be imported", message)
@@ -124,15 +154,29 @@ def test_drivers_are_found_where_the_loader_looks(tmp_path, monkeypatch):
     assert setup.vulkan_drivers() == [str(folder / "lvp_icd.json"), *before]
 
 
+def test_what_compiles_the_core_has_a_tested_version():
+    exact = dict(line.split("==") for line in (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()[1:])
+    assert set(setup.BUILDERS) <= set(exact)
+
+
+def test_the_core_is_compiled_again_when_a_file_of_it_changes():
+    """What the Makefile says is needed for the stamp of the core: the files, and their folders for those that come and go."""
+    text = (ROOT / "Makefile").read_text(encoding="utf-8")
+    assert "$(CORE): $(READY) CMakeLists.txt $(shell find model/core)" in text
+    assert "$(COMPILED): $(CORE)" in text
+
+
 def test_every_dependency_has_an_exact_tested_version():
     import tomllib
 
     from packaging.requirements import Requirement
     from packaging.utils import canonicalize_name
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    tables = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    project, wanted = tables["project"], tables["build-system"]
     lines = (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()
     exact = dict(line.split("==") for line in lines if not line.startswith("#"))
-    for text in project["dependencies"] + [text for extra in project["optional-dependencies"].values() for text in extra]:
+    extras = [text for extra in project["optional-dependencies"].values() for text in extra]
+    for text in project["dependencies"] + wanted["requires"] + extras:
         requirement = Requirement(text)
         if requirement.name == project["name"]:  # an extra that takes in others
             continue

@@ -51,7 +51,7 @@ LIBRARIES = [
 ]
 COMPILER = Need("a C++ compiler", "g++", "the core of the solver cannot be compiled", True)
 COMPILERS = ["c++", "g++", "clang++"]
-ELSEWHERE = "A C++ compiler comes with `xcode-select --install` on macOS, `dnf install gcc-c++` on Fedora, `pacman -S gcc` on Arch."
+ELSEWHERE = "For a C++ compiler type `xcode-select --install` on macOS, `dnf install gcc-c++` on Fedora, `pacman -S gcc` on Arch."
 NO_FIRMWARE, NO_EMULATOR = "the board's firmware cannot be built", "no emulated board"
 BOARD = [
     Need("avr-g++", "gcc-avr", NO_FIRMWARE, False),
@@ -62,8 +62,10 @@ BOARD = [
     Need("/usr/include/simavr/sim_avr.h", "libsimavr-dev", NO_EMULATOR, False),
     Need("simavr", "simavr", "no unit tests on the AVR", False),
 ]
+CLANG = Need("clang++", "clang", "the core is not tried with a second compiler", False)     # for continuous integration
 BUILDERS = ["cmake", "nanobind", "ninja", "scikit-build-core"]
-LINKED = ["--no-build-isolation", "-C", "editable.mode=inplace", "-C", "wheel.cmake=false"]    # Python as it stands here; the core follows
+# The environment is linked to the Python files in this checkout; build_core puts the compiled modules beside them.
+LINKED = ["--no-build-isolation", "-C", "editable.mode=inplace", "-C", "wheel.cmake=false"]
 DRIVER = Need("a Vulkan driver", "mesa-vulkan-drivers", NO_PICTURE, False)
 
 
@@ -101,6 +103,7 @@ def missing(python: Python, has: Callable[[str], bool], drivers: list[str], syst
     if system == "linux":        # on macOS the wheels use the system's own frameworks
         needs += [need for need in [*LIBRARIES, *BOARD] if not has(need.what)]
         needs += [] if drivers else [DRIVER]
+        needs += [CLANG] if os.environ.get("REQUIRE_CLANG") and not has(CLANG.what) else []
     return needs
 
 
@@ -191,19 +194,30 @@ def set_up(venv: Path) -> None:
     pip = [inside, "-m", "pip", "install", "-q", "--disable-pip-version-check", "-c", "constraints.txt"]
     step("what compiles the core", [*pip, *BUILDERS])
     step("Python packages (about 400 MB to download the first time)", [*pip, *LINKED, "-e", ".[test]"])
+    for link in venv.glob("lib/python*/site-packages/_editable_*flexura.pth"):
+        paths = [line for line in link.read_text().splitlines() if not line.startswith("import ")]
+        link.write_text("\n".join([*paths, ""]))     # the hook that the first line loads would go before PYTHONPATH
     unfinished.unlink()
+
+
+def level() -> str:
+    """The instructions that the core's C++ tests may use here; the Python module is built for each level anyway."""
+    flags = Path("/proc/cpuinfo")
+    return "x86-64-v3" if flags.exists() and {"avx2", "bmi2", "fma", "movbe"} <= set(flags.read_text().split()) else ""
 
 
 def build_core(venv: Path) -> None:
     """Compiles what is new in the core and puts its modules beside flexura/core.py."""
     python, cmake = str(venv / "bin/python"), str(venv / "bin/cmake")
     if needs := without_compiler(has):
-        raise Stop(verdict(needs, bool(shutil.which("apt-get")), "sudo " if os.geteuid() else "")[1])
-    folder = ROOT / "build" / "module-{}.{}".format(*sys.version_info)
-    step("configuring the core", [cmake, "-S", str(ROOT), "-B", str(folder), "-G", "Ninja", "-DFLEXURA_MODULE=ON",
-                                  f"-DCMAKE_MAKE_PROGRAM={venv / 'bin/ninja'}", f"-DPython_EXECUTABLE={python}"])
-    step("compiling the core (half a minute the first time)", [cmake, "--build", str(folder), "--parallel", str(os.cpu_count() or 1)])
-    step("installing the core", [cmake, "--install", str(folder), "--component", "module", "--prefix", str(ROOT / "model")])
+        raise Stop(verdict(needs, bool(shutil.which("apt-get")), "sudo " if os.geteuid() and shutil.which("sudo") else "")[1])
+    folder, strict = ROOT / "build" / "core", "ON" if os.environ.get("STRICT") else "OFF"
+    settings = ["-DFLEXURA_MODULE=ON", f"-DFLEXURA_LEVEL={level()}", f"-DFLEXURA_STRICT={strict}",
+                f"-DCMAKE_MAKE_PROGRAM={venv / 'bin/ninja'}", f"-DPython_EXECUTABLE={python}"]
+    step("configuring the core", [cmake, "-S", str(ROOT), "-B", str(folder), "-G", "Ninja", *settings])
+    jobs = str(os.cpu_count() or 1)
+    step("compiling the core (a minute the first time)", [cmake, "--build", str(folder), "--parallel", jobs])
+    step("installing the core", [cmake, "--install", str(folder), "--component", "module", "--prefix", f"{ROOT / 'model'}"])
 
 
 def compile_solver(venv: Path) -> None:

@@ -3,7 +3,8 @@
 
 namespace flexura {
 
-// The processor's instructions that it uses: "plain" (all processors of the architecture have them) or a level, "x86-64-v3".
+// The processor's instructions that it uses: "plain" (all processors of the architecture have them) or a
+// level, "x86-64-v3".
 const char *build_level();
 
 // Name and version of the compiler.

@@ -1,8 +1,9 @@
-// Pack<N>: N doubles that go through the equations together, in one register of the processor where it has one that wide.
+// Pack<N>: N doubles that go through the equations together, in one register of the processor where it has
+// one that wide.
 //
-// The register is a vector type of GCC and clang, or with FLEXURA_PORTABLE a plain array, for any other compiler. Every lane
-// sees the operations that a double would see, in the same order, so the digits are the same in both and in a double.
-// This is the only file of the core that is not standard C++.
+// The register is a vector type of GCC and clang, or with FLEXURA_PORTABLE a plain array, for any other
+// compiler. Every lane sees the operations that a double would see, in the same order, so the digits are the
+// same in both and in a double. This is the only file of the core that is not standard C++.
 #pragma once
 #include <cmath>
 #include <cstdint>
@@ -20,8 +21,8 @@ template <int N> struct RegisterOf {
   };
 };
 template <int N, class Operation>
-inline typename RegisterOf<N>::type each(const typename RegisterOf<N>::type &a, const typename RegisterOf<N>::type &b,
-                                         Operation operation) {
+inline typename RegisterOf<N>::type each(const typename RegisterOf<N>::type &a,
+                                         const typename RegisterOf<N>::type &b, Operation operation) {
   typename RegisterOf<N>::type c;
   for (int k = 0; k < N; ++k) c[k] = operation(a[k], b[k]);
   return c;
@@ -33,8 +34,12 @@ template <int N> struct Arithmetic {
     for (int k = 0; k < N; ++k) a[k] = x;
     return a;
   }
-  static Register minus(const Register &a) { return each<N>(a, a, [](double x, double) { return -x; }); }
-  static Register sum(const Register &a, const Register &b) { return each<N>(a, b, [](double x, double y) { return x + y; }); }
+  static Register minus(const Register &a) {
+    return each<N>(a, a, [](double x, double) { return -x; });
+  }
+  static Register sum(const Register &a, const Register &b) {
+    return each<N>(a, b, [](double x, double y) { return x + y; });
+  }
   static Register difference(const Register &a, const Register &b) {
     return each<N>(a, b, [](double x, double y) { return x - y; });
   }
@@ -60,13 +65,21 @@ template <int N> struct Arithmetic {
 #else
 
 template <int N> struct RegisterOf;  // GCC takes no template parameter as the size of a vector
-template <> struct RegisterOf<2> { typedef double type __attribute__((vector_size(16))); };
-template <> struct RegisterOf<4> { typedef double type __attribute__((vector_size(32))); };
-template <> struct RegisterOf<8> { typedef double type __attribute__((vector_size(64))); };
+template <> struct RegisterOf<2> {
+  typedef double type __attribute__((vector_size(16)));
+};
+template <> struct RegisterOf<4> {
+  typedef double type __attribute__((vector_size(32)));
+};
+template <> struct RegisterOf<8> {
+  typedef double type __attribute__((vector_size(64)));
+};
 
 template <int N> struct Arithmetic {
   using Register = typename RegisterOf<N>::type;
-  static Register fill(double x) { return x - Register{}; }  // minus zero: x + 0 would lose the sign of a zero
+  static Register fill(double x) {
+    return x - Register{};
+  }  // minus zero: x + 0 would lose the sign of a zero
   static Register minus(Register a) { return -a; }
   static Register sum(Register a, Register b) { return a + b; }
   static Register difference(Register a, Register b) { return a - b; }
@@ -138,11 +151,16 @@ template <int N> inline Pack<N> abs(Pack<N> x) {
   return lanewise(x, [](double z) { return std::fabs(z); });
 }
 
-// The larger and the smaller of two numbers. What is not a number stays visible: it is the answer, wherever it stands.
+// The larger and the smaller of two numbers. What is not a number stays visible: it is the answer, wherever
+// it stands.
 inline double larger(double a, double b) { return a > b || a != a ? a : b; }
 inline double smaller(double a, double b) { return a < b || a != a ? a : b; }
-template <int N> inline Pack<N> larger(Pack<N> a, Pack<N> b) { return Pack<N>(Arithmetic<N>::larger(a.v, b.v)); }
-template <int N> inline Pack<N> smaller(Pack<N> a, Pack<N> b) { return Pack<N>(Arithmetic<N>::smaller(a.v, b.v)); }
+template <int N> inline Pack<N> larger(Pack<N> a, Pack<N> b) {
+  return Pack<N>(Arithmetic<N>::larger(a.v, b.v));
+}
+template <int N> inline Pack<N> smaller(Pack<N> a, Pack<N> b) {
+  return Pack<N>(Arithmetic<N>::smaller(a.v, b.v));
+}
 
 // The largest and the smallest lane.
 inline double worst(double x) { return x; }

@@ -1,15 +1,16 @@
-// The kinds of numbers that the equations are instantiated with: double; Pack<N>, N robots side by side; Dual<N>, a number with its
-// derivatives in N directions. And Row<Real, N>, several such numbers that take part in the same operation.
+// The kinds of numbers that the equations are instantiated with: double; Pack<N>, N robots side by side;
+// Dual<N>, a number with its derivatives in N directions. And Row<Real, N>, several such numbers that take
+// part in the same operation.
 //
-// All know + - * / and the functions below, which are arithmetic alone: no library decides a digit, and a lane of a pack
-// has the bits of a double. No equation may branch on a value of type Real; use choose_less, larger, smaller, abs.
+// All know + - * / and the functions below, which are arithmetic alone: no library decides a digit, and a
+// lane of a pack has the bits of a double. No equation may branch on a value of type Real; use choose_less,
+// larger, smaller, abs.
 #pragma once
 #include "lanes.hpp"
 
 namespace flexura {
 
-// ---------------------------------------------------------------- a value and its derivatives in N directions (forward mode)
-
+// A value and its derivatives in N directions (forward mode).
 template <int N> struct Dual {
   double v;
   Pack<N> d;
@@ -32,7 +33,9 @@ template <int N> struct Dual {
   Dual &operator/=(Dual b) { return *this = *this / b; }
 };
 
-template <int N> inline Dual<N> choose_less(Dual<N> a, Dual<N> b, Dual<N> x, Dual<N> y) { return a.v < b.v ? x : y; }
+template <int N> inline Dual<N> choose_less(Dual<N> a, Dual<N> b, Dual<N> x, Dual<N> y) {
+  return a.v < b.v ? x : y;
+}
 template <int N> inline Dual<N> larger(Dual<N> a, Dual<N> b) { return a.v > b.v || a.v != a.v ? a : b; }
 template <int N> inline Dual<N> smaller(Dual<N> a, Dual<N> b) { return a.v < b.v || a.v != a.v ? a : b; }
 template <int N> inline double worst(Dual<N> x) { return x.v; }
@@ -43,14 +46,15 @@ template <int N> inline Dual<N> root(Dual<N> x) {
   return {r, x.d * (0.5 / r)};
 }
 
-// ---------------------------------------------------------------- elementary functions
+// ---- elementary functions
 
 // The nearest whole number of |x| < 2^51, halves to even: adding 1.5 * 2^52 rounds to it.
 template <class Real> inline Real nearest(Real x) { return (x + 0x1.8p52) - 0x1.8p52; }
 
-// sin x and cos x, within 1.5 units in the last place for |x| < 100 and 2.5 for |x| < 1e5; beyond, errors grow as x^2.
-// With k the nearest multiple of pi/2 and r = x - k pi/2, sin x = sin r cos(k pi/2) + cos r sin(k pi/2). pi/2 is taken in three
-// parts, so that the products with k are exact. The two series are those of Sun's fdlibm.
+// sin x and cos x, within 1.5 units in the last place for |x| < 100 and 2.5 for |x| < 1e5; beyond, errors
+// grow as x^2. With k the nearest multiple of pi/2 and r = x - k pi/2, sin x = sin r cos(k pi/2) + cos r
+// sin(k pi/2). pi/2 is taken in three parts, so that the products with k are exact. The two series are those
+// of Sun's fdlibm.
 template <class Real> inline void sincos(Real x, Real &sine, Real &cosine) {
   const Real k = nearest(x * 0x1.45f306dc9c883p-1);
   const Real r = ((x - k * 0x1.921fb544p+0) - k * 0x1.0b4611a6p-34) - k * 0x1.3198a2e037073p-69;
@@ -71,7 +75,7 @@ template <class Real> inline void sincos(Real x, Real &sine, Real &cosine) {
   cosine = even * c - odd * s;
 }
 
-// e^r - 1 = high - low for x = k ln 2 + r, |r| <= ln(2)/2; the series for r coth(r/2) is that of fdlibm.
+// e^r - 1 and k for x = k ln 2 + r, |r| <= ln(2)/2; the series, of r coth(r/2), is that of fdlibm.
 template <class Real> inline Real reduced_exponential(Real x, Real &k) {
   k = nearest(x * 0x1.71547652b82fep+0);
   const Real high = x - k * 0x1.62e42feep-1, low = k * 0x1.a39ef35793c76p-33, r = high - low, z = r * r;
@@ -80,7 +84,8 @@ template <class Real> inline Real reduced_exponential(Real x, Real &k) {
   return high - (low - r * c / (2.0 - c));
 }
 
-// e^x within 1.5 units in the last place, for every x: infinity above 709.78, towards zero through the subnormals below -708.
+// e^x within 1.5 units in the last place, for every x: infinity above 709.78, towards zero through the
+// subnormals below -708.
 template <class Real> inline Real exponential(Real x) {
   Real k;
   const Real e = 1.0 + reduced_exponential(smaller(larger(x, Real(-800.0)), Real(800.0)), k);
@@ -112,9 +117,9 @@ template <int N> inline Pack<N> split_exponent(Pack<N> &x) {
   return k;
 }
 
-// ln x of a normal number x > 0 (2.2e-308 and more), within 1.5 units in the last place. With f = x/2^k - 1 and s = f/(2 + f),
-// ln(1 + f) = 2 s + s R(s^2); the series is that of fdlibm. Zero, subnormal and negative numbers and infinity give
-// what is not a number.
+// ln x of a normal number x > 0 (2.2e-308 and more), within 1.5 units in the last place. With f = x/2^k - 1
+// and s = f/(2 + f), ln(1 + f) = 2 s + s R(s^2); the series is that of fdlibm. Zero, subnormal and negative
+// numbers and infinity give what is not a number.
 template <class Real> inline Real natural_logarithm(Real x) {
   Real fraction = x;
   const Real k = split_exponent(fraction), f = fraction - 1.0, s = f / (2.0 + f), z = s * s;
@@ -133,7 +138,8 @@ template <int N> inline Pack<N> exp(Pack<N> x) { return exponential(x); }
 template <int N> inline Pack<N> log(Pack<N> x) { return natural_logarithm(x); }
 template <int N> inline Pack<N> tanh(Pack<N> x) { return hyperbolic_tangent(x); }
 
-// x^p for x > 0 within 1e-15 (1 + |p ln x|), relative: for the lengths of steps, where the library's pow may differ between machines.
+// x^p for x > 0 within 1e-15 (1 + |p ln x|), relative: for the lengths of steps, where the library's pow may
+// differ between machines.
 template <class Real> inline Real power(Real x, double p) { return exp(Real(p) * log(x)); }
 
 template <int N> inline void sincos(Dual<N> x, Dual<N> &sine, Dual<N> &cosine) {
@@ -152,13 +158,15 @@ template <int N> inline Dual<N> tanh(Dual<N> x) {
   return {t, x.d * ((1.0 - t) * (1.0 + t))};
 }
 
-// ---------------------------------------------------------------- rows
+// ---- rows
 
-// N numbers in a row: columns of a small matrix, or points along a link. Of doubles four are taken at a time, so that one robot
-// uses the processor's lanes too; each number sees the same operations in the same order as in any other layout.
+// N numbers in a row: columns of a small matrix, or points along a link. Of doubles four are taken at a time,
+// so that one robot uses the processor's lanes too; each number sees the same operations in the same order as
+// in any other layout.
 //
-// The functions take `count`, how many of the N are used, and work on whole chunks of four doubles. Memory that a row is
-// loaded from or stored to therefore has padded(count) numbers; what stands behind count must be initialised and never matters.
+// The functions take `count`, how many of the N are used, and work on whole chunks of four doubles. Memory
+// that a row is loaded from or stored to therefore has padded(count) numbers; what stands behind count must
+// be initialised and never matters.
 constexpr int padded(int count) { return (count + 3) / 4 * 4; }
 
 template <class Real, int N> struct Row {
@@ -208,17 +216,20 @@ template <class Real, int N> inline void times(Row<Real, N> &x, Real s, const Re
   for (int k = 0; k < x.chunks(count); ++k) x.c[k] = x.load(at, k) * s;
 }
 // x = y z, number by number
-template <class Real, int N> inline void times(Row<Real, N> &x, const Row<Real, N> &y, const Row<Real, N> &z, int count) {
+template <class Real, int N>
+inline void times(Row<Real, N> &x, const Row<Real, N> &y, const Row<Real, N> &z, int count) {
   for (int k = 0; k < x.chunks(count); ++k) x.c[k] = y.c[k] * z.c[k];
 }
 // x += s y, from the number `from` on (or from a little before it: whole chunks)
-template <class Real, int N> inline void add(Row<Real, N> &x, Real s, const Row<Real, N> &y, int count, int from = 0) {
+template <class Real, int N>
+inline void add(Row<Real, N> &x, Real s, const Row<Real, N> &y, int count, int from = 0) {
   for (int k = x.chunk_of(from); k < x.chunks(count); ++k) x.c[k] += y.c[k] * s;
 }
 template <class Real, int N> inline void add(Row<Real, N> &x, Real s, const Real *at, int count) {
   for (int k = 0; k < x.chunks(count); ++k) x.c[k] += x.load(at, k) * s;
 }
-template <class Real, int N> inline void sincos(const Row<Real, N> &x, Row<Real, N> &sine, Row<Real, N> &cosine, int count) {
+template <class Real, int N>
+inline void sincos(const Row<Real, N> &x, Row<Real, N> &sine, Row<Real, N> &cosine, int count) {
   for (int k = 0; k < x.chunks(count); ++k) sincos(x.c[k], sine.c[k], cosine.c[k]);
 }
 

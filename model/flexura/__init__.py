@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 _HOME = {
-    "Robot": "robot", "load": "robot", "save": "robot", "cut": "cutting",
-    "System": "system", "assemble": "assembly",
-    "static": "statics", "tip_pose": "statics",
-    "frequencies": "linear",
-    "StateSpace": "statespace", "linearize": "statespace",
+    "Robot": "robot", "load": "robot", "save": "robot",
+    "System": "system", "assemble": "system",
+    "static": "system", "tip_pose": "system", "NoEquilibrium": "system",
+    "frequencies": "system", "modes": "system", "Modes": "system",
+    "StateSpace": "system", "linearize": "system",
     "simulate": "forward", "inverse": "forward",
     "Run": "run",
     "Batch": "batch", "Population": "population",
@@ -31,27 +31,33 @@ _HOME = {
 }  # fmt: skip
 
 __all__ = [
-    "PID", "Batch", "Controller", "Drive", "FlexuraError", "Force", "InputError", "JointDrive", "Manoeuvre", "Motor",
-    "Population", "Robot", "Run", "Signal", "StateSpace", "Stepper", "System",
-    "assemble", "cut", "frequencies", "inverse", "linearize", "load", "load_manoeuvre", "save", "simulate", "static", "tip_pose",
+    "PID", "Batch", "Controller", "Drive", "FlexuraError", "Force", "InputError", "JointDrive", "Manoeuvre", "Modes", "Motor",
+    "NoEquilibrium", "Population", "Robot", "Run", "Signal", "StateSpace", "Stepper", "System",
+    "assemble", "frequencies", "inverse", "linearize", "load", "load_manoeuvre", "modes", "save", "simulate", "static", "tip_pose",
 ]  # fmt: skip
 
 if TYPE_CHECKING:
-    from .assembly import assemble
     from .batch import Batch
     from .control import PID, Controller, Force, Motor, Stepper
-    from .cutting import cut
     from .drive import Drive, JointDrive, Manoeuvre, load_manoeuvre
     from .errors import FlexuraError, InputError
     from .forward import inverse, simulate
-    from .linear import frequencies
     from .population import Population
     from .robot import Robot, load, save
     from .run import Run
     from .signal import Signal
-    from .statespace import StateSpace, linearize
-    from .statics import static, tip_pose
-    from .system import System
+    from .system import (
+        Modes,
+        NoEquilibrium,
+        StateSpace,
+        System,
+        assemble,
+        frequencies,
+        linearize,
+        modes,
+        static,
+        tip_pose,
+    )
 
 
 def __getattr__(name: str) -> Any:

@@ -1,8 +1,8 @@
 """The one door to the compiled core: flat arrays of float64 in, flat arrays out.
 
 The core (`model/core`, C++) is compiled when flexura is installed, never later. On x86-64 there are two builds of it: one for
-processors of the level x86-64-v3 (most since 2013) and a plain one for all others. The digits are the same. The environment variable
-FLEXURA_CORE, "plain" or "x86-64-v3", overrides the choice.
+processors of the level x86-64-v3 (most since 2013) and a plain one for all others. Both give the same digits. The environment
+variable FLEXURA_CORE, "plain" or "x86-64-v3", overrides the choice.
 """
 
 from __future__ import annotations
@@ -14,6 +14,11 @@ from types import ModuleType
 BUILDS = {"plain": "_core_plain", "x86-64-v3": "_core_v3"}
 
 
+def levels() -> list[str]:
+    """The builds that this processor can run, keys of BUILDS, the best last."""
+    return list(BUILDS) if _module("_processor").has_v3() else ["plain"]
+
+
 def load(level: str) -> ModuleType:
     """The build of the core for processors of a level.
 
@@ -23,10 +28,10 @@ def load(level: str) -> ModuleType:
     """
     if level and level not in BUILDS:
         raise ImportError(f"FLEXURA_CORE is {level!r}: expected {' or '.join(BUILDS)}")
-    able = _module("_processor").has_v3()
-    if level == "x86-64-v3" and not able:
-        raise ImportError("FLEXURA_CORE asks for x86-64-v3, whose instructions this processor does not have")
-    return _module(BUILDS[level or ("x86-64-v3" if able else "plain")])
+    able = levels()
+    if level and level not in able:
+        raise ImportError(f"FLEXURA_CORE asks for {level}, whose instructions this processor does not have")
+    return _module(BUILDS[level or able[-1]])
 
 
 def _module(name: str) -> ModuleType:
@@ -42,3 +47,6 @@ _core = load(os.environ.get("FLEXURA_CORE", ""))
 
 level: str = _core.level  # the build in use, a key of BUILDS
 compiler: str = _core.compiler  # what compiled it
+
+Mechanics = _core.Mechanics  # the equations of one robot, from the rows of system/constants.py
+Fault = _core.Fault  # what the core refuses: args are the link (from 0; -1: none), the key and what was expected

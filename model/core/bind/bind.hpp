@@ -1,8 +1,10 @@
 // What all files of the Python module share.
 //
-// Arrays go in as `Numbers`: float64, contiguous, any shape that the signature names; nanobind refuses the rest with a TypeError.
-// They are neither copied nor kept. Arrays come out as `new_array`, which Python then owns. A function that takes longer than
-// microseconds releases Python's lock: nb::call_guard<nb::gil_scoped_release>(), and touches no Python object meanwhile.
+// Arrays go in as Vector or Matrix: contiguous float64 in memory that C++ reads in place. nanobind copies
+// arrays of another type or order first, and refuses another number of dimensions, lists and None with a
+// TypeError; an array that C++ writes to must therefore be bound with .noconvert(). Arrays come out as
+// `new_array`, which Python then owns. A function that takes longer than microseconds releases Python's lock
+// (nb::gil_scoped_release) and touches no Python object meanwhile.
 #pragma once
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
@@ -14,7 +16,6 @@ namespace flexura {
 
 namespace nb = nanobind;
 
-using Numbers = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;         // any shape
 using Vector = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using Matrix = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using Array = nb::ndarray<nb::numpy, double, nb::c_contig>;

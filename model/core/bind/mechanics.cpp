@@ -1,6 +1,7 @@
 // A robot's equations: from flat arrays of its constants to forward and inverse dynamics, energies, places.
 #include "mechanics.hpp"
 
+#include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
 #include "fault.hpp"
@@ -120,9 +121,16 @@ Robot robot_of(const Numbers &gravity, const Numbers &payload, const Counts &cou
 
 void bind_mechanics(nb::module_ &module) {
   using namespace nb::literals;
-  nb::exception<Fault>(module, "Fault", PyExc_ValueError);
-  nb::class_<Mechanics>(module, "Mechanics", "The equations of one robot.")
-      .def(nb::init<const Numbers &, const Numbers &, const Counts &, const Matrix &, const Matrix &>(), "gravity"_a, "payload"_a, "counts"_a,
+  static nb::exception<Fault> fault(module, "Fault", PyExc_ValueError);
+  nb::register_exception_translator([](const std::exception_ptr &thrown, void *) {
+    try {
+      std::rethrow_exception(thrown);
+    } catch (const Fault &what) {
+      PyErr_SetObject(fault.ptr(), nb::make_tuple(what.link, what.key, what.what()).ptr());
+    }
+  });
+  nb::class_<Mechanics> type(module, "Mechanics", "The equations of one robot.");
+  type.def(nb::init<const Numbers &, const Numbers &, const Counts &, const Matrix &, const Matrix &>(), "gravity"_a, "payload"_a, "counts"_a,
            "numbers"_a, "material"_a)
       .def_prop_ro("n", [](const Mechanics &self) { return self.model->n; }, "How many unknowns there are.")
       .def_prop_ro("first", [](const Mechanics &self) { return self.model->first; }, "Rows of the joints.")
@@ -134,6 +142,7 @@ void bind_mechanics(nb::module_ &module) {
       .def("line", &line_of, "q"_a, "link"_a, "s"_a)
       .def("loss", &loss_of, "q"_a, "v"_a)
       .def("whole_link", &whole_link, "link"_a);
+  add_solve(type);
 }
 
 }  // namespace flexura

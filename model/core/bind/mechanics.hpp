@@ -20,4 +20,6 @@ struct Mechanics {
       : model(std::make_shared<const Model<double>>(assemble(robot_of(gravity, payload, counts, numbers, material)))) {}
 };
 
+void add_solve(nb::class_<Mechanics> &type);  // solve.cpp
+
 }  // namespace flexura

@@ -1,4 +1,5 @@
-// The Python module: entry point and how the core was built. Each subject has a file with a function that adds what it binds.
+// The Python module: entry point and how the core was built. Each subject has a file with a function that
+// adds what it binds.
 #include "bind.hpp"
 #include "build.hpp"
 

@@ -14,9 +14,11 @@ template <class Function> void apply(const double *x, double *y, std::size_t cou
   }
   for (std::size_t k = 0; k < count; k += 4) {
     Pack<4> pack(0.0);
-    for (std::size_t lane = 0; lane < 4 && k + lane < count; ++lane) pack.set(static_cast<int>(lane), x[k + lane]);
+    for (std::size_t lane = 0; lane < 4 && k + lane < count; ++lane)
+      pack.set(static_cast<int>(lane), x[k + lane]);
     const Pack<4> result = f(pack);
-    for (std::size_t lane = 0; lane < 4 && k + lane < count; ++lane) y[k + lane] = result[static_cast<int>(lane)];
+    for (std::size_t lane = 0; lane < 4 && k + lane < count; ++lane)
+      y[k + lane] = result[static_cast<int>(lane)];
   }
 }
 

@@ -3,8 +3,9 @@
 //     #include "check.hpp"
 //     TEST("what must hold") { CHECK(1 + 1 == 2); CHECK_NEAR(0.1 + 0.2, 0.3, 1e-15); }
 //
-// It runs every test, prints what failed with its place, and ends with status 1 if anything did. A word on the command line
-// chooses the tests whose names contain it. CHECK_NEAR: the difference is at most the third number; not a number fails.
+// It runs every test, prints what failed with its place, and ends with status 1 if anything did. A word on
+// the command line chooses the tests whose names contain it. CHECK_NEAR: the difference is at most the third
+// number; not a number fails.
 #pragma once
 #include <cmath>
 #include <cstdint>
@@ -40,10 +41,12 @@ inline void that(bool holds, const char *file, int line, const char *text) {
 inline void near(double a, double b, double most, const char *file, int line, const char *text) {
   if (std::fabs(a - b) <= most) return;
   failed(file, line, text);
-  if (failures() <= 50) std::printf("    %.17g and %.17g differ by %.3g, more than %.3g\n", a, b, std::fabs(a - b), most);
+  if (failures() <= 50)
+    std::printf("    %.17g and %.17g differ by %.3g, more than %.3g\n", a, b, std::fabs(a - b), most);
 }
 
-// Random numbers that are the same everywhere (the standard's distributions are not): x_k = 6364136223846793005 x_{k-1} + 1.
+// Random numbers that are the same everywhere (the standard's distributions are not): x_k =
+// 6364136223846793005 x_{k-1} + 1.
 struct Random {
   std::uint64_t state = 1;
   double operator()(double from, double to) {
@@ -52,7 +55,8 @@ struct Random {
   }
 };
 
-// One number for the bits of many: whether a build, a compiler or a machine gives the same digits. All that is not a number is one.
+// One number for the bits of many: whether a build, a compiler or a machine gives the same digits. All that
+// is not a number is one.
 struct Digest {
   std::uint64_t value = 0xcbf29ce484222325u;
   void add(double x) {
@@ -85,9 +89,9 @@ inline int run(int argc, char **argv) {
 
 #define CHECK_JOIN_(a, b) a##b
 #define CHECK_JOIN(a, b) CHECK_JOIN_(a, b)
-#define TEST(name)                                                                                  \
-  static void CHECK_JOIN(test_, __LINE__)();                                                        \
-  static const check::Entry CHECK_JOIN(entry_, __LINE__)(name, CHECK_JOIN(test_, __LINE__));        \
+#define TEST(name)                                                                           \
+  static void CHECK_JOIN(test_, __LINE__)();                                                 \
+  static const check::Entry CHECK_JOIN(entry_, __LINE__)(name, CHECK_JOIN(test_, __LINE__)); \
   static void CHECK_JOIN(test_, __LINE__)()
 #define CHECK(...) check::that(static_cast<bool>(__VA_ARGS__), __FILE__, __LINE__, #__VA_ARGS__)
 #define CHECK_NEAR(a, b, most) check::near(a, b, most, __FILE__, __LINE__, #a " near " #b)

@@ -19,7 +19,8 @@ const double LEAST = std::numeric_limits<double>::denorm_min();
 double units(double y, long double exact) {
   int exponent;
   std::frexp(static_cast<double>(exact), &exponent);
-  return static_cast<double>(std::fabs((static_cast<long double>(y) - exact) / std::ldexp(1.0L, std::max(exponent - 53, -1074))));
+  return static_cast<double>(
+      std::fabs((static_cast<long double>(y) - exact) / std::ldexp(1.0L, std::max(exponent - 53, -1074))));
 }
 
 double sine(double x) {
@@ -33,7 +34,8 @@ double cosine(double x) {
   return c;
 }
 
-template <class Ours, class Exact> double worst_units(Ours ours, Exact exact, double from, double to, int count) {
+template <class Ours, class Exact>
+double worst_units(Ours ours, Exact exact, double from, double to, int count) {
   check::Random random;
   double worst = 0.0;
   for (int k = 0; k < count; ++k) {
@@ -90,14 +92,17 @@ TEST("ends of the range") {
   CHECK(flexura::log(1.0) == 0.0 && std::isnan(flexura::log(0.0)));
   CHECK(std::isnan(flexura::log(-1.0)) && std::isnan(flexura::log(INFINITE)));
   CHECK(flexura::tanh(0.0) == 0.0 && flexura::tanh(INFINITE) == 1.0 && flexura::tanh(-300.0) == -1.0);
-  CHECK(std::isnan(flexura::exp(NONE)) && std::isnan(flexura::log(NONE)) && std::isnan(flexura::tanh(NONE)) && std::isnan(sine(NONE)));
-  for (int k = -1022; k <= 1023; ++k) CHECK(flexura::power_of_two(static_cast<double>(k)) == std::ldexp(1.0, k));
+  CHECK(std::isnan(flexura::exp(NONE)) && std::isnan(flexura::log(NONE)) && std::isnan(flexura::tanh(NONE)) &&
+        std::isnan(sine(NONE)));
+  for (int k = -1022; k <= 1023; ++k)
+    CHECK(flexura::power_of_two(static_cast<double>(k)) == std::ldexp(1.0, k));
 }
 
 TEST("larger, smaller, worst and least keep what is not a number") {
   using flexura::larger, flexura::smaller;
   CHECK(larger(1.0, 2.0) == 2.0 && smaller(1.0, 2.0) == 1.0 && larger(-INFINITE, 3.0) == 3.0);
-  CHECK(std::isnan(larger(NONE, 1.0)) && std::isnan(larger(1.0, NONE)) && std::isnan(smaller(NONE, 1.0)) && std::isnan(smaller(1.0, NONE)));
+  CHECK(std::isnan(larger(NONE, 1.0)) && std::isnan(larger(1.0, NONE)) && std::isnan(smaller(NONE, 1.0)) &&
+        std::isnan(smaller(1.0, NONE)));
   for (int lane = 0; lane < 4; ++lane) {
     Pack<4> x(1.0);
     x.set(lane, 3.0);
@@ -115,15 +120,32 @@ template <class Real> std::vector<Real> everything(Real x, Real y) {
   using namespace flexura;
   Real s, c;
   flexura::sincos(x, s, c);
-  return {x + y, x - y, x * y, x / y, -x, s, c, flexura::exp(x), flexura::log(y), flexura::tanh(x), flexura::power(y, 0.2),
-          root(y), flexura::abs(x), larger(x, y), smaller(x, y), choose_less(x, y, s, c), nearest(x)};
+  return {x + y,
+          x - y,
+          x * y,
+          x / y,
+          -x,
+          s,
+          c,
+          flexura::exp(x),
+          flexura::log(y),
+          flexura::tanh(x),
+          flexura::power(y, 0.2),
+          root(y),
+          flexura::abs(x),
+          larger(x, y),
+          smaller(x, y),
+          choose_less(x, y, s, c),
+          nearest(x)};
 }
 
 // x_k and y_k, with the numbers at which something could go another way.
 std::vector<double> arguments() {
-  std::vector<double> x = {0.0, -0.0, 1.0, -1.0, INFINITE, -INFINITE, NONE, LEAST, 1e-310, 709.0, -708.5, -744.0, 1e5};
+  std::vector<double> x = {0.0,   -0.0,   1.0,   -1.0,   INFINITE, -INFINITE, NONE,
+                           LEAST, 1e-310, 709.0, -708.5, -744.0,   1e5};
   check::Random random;
-  while (x.size() < 4000) x.push_back(random(-1.0, 1.0) * std::ldexp(1.0, static_cast<int>(random(-30.0, 12.0))));
+  while (x.size() < 4000)
+    x.push_back(random(-1.0, 1.0) * std::ldexp(1.0, static_cast<int>(random(-30.0, 12.0))));
   return x;
 }
 
@@ -167,7 +189,8 @@ TEST("derivatives agree with differences") {
     const auto f = [](auto a, auto b, auto c, auto d) {
       decltype(a) s, k;
       flexura::sincos(a * b - c, s, k);
-      return s / (1.5 + k * k) + flexura::root(b + c * d) * flexura::exp(-a) - flexura::tanh(c - d) * flexura::log(d) +
+      return s / (1.5 + k * k) + flexura::root(b + c * d) * flexura::exp(-a) -
+             flexura::tanh(c - d) * flexura::log(d) +
              flexura::abs(a - 5.0) * flexura::larger(b, decltype(b)(-1.0)) + flexura::power(c, 0.3);
     };
     D x[4];
@@ -178,11 +201,14 @@ TEST("derivatives agree with differences") {
     }
     const D y = f(x[0], x[1], x[2], x[3]);
     const auto along = [&](double h) {
-      return f(at[0] + h * direction[0], at[1] + h * direction[1], at[2] + h * direction[2], at[3] + h * direction[3]);
+      return f(at[0] + h * direction[0], at[1] + h * direction[1], at[2] + h * direction[2],
+               at[3] + h * direction[3]);
     };
     const double h = 2e-3;  // eighth order
-    const double slope = (4.0 / 5.0 * (along(h) - along(-h)) - 1.0 / 5.0 * (along(2 * h) - along(-2 * h)) +
-                          4.0 / 105.0 * (along(3 * h) - along(-3 * h)) - 1.0 / 280.0 * (along(4 * h) - along(-4 * h))) / h;
+    const double slope =
+        (4.0 / 5.0 * (along(h) - along(-h)) - 1.0 / 5.0 * (along(2 * h) - along(-2 * h)) +
+         4.0 / 105.0 * (along(3 * h) - along(-3 * h)) - 1.0 / 280.0 * (along(4 * h) - along(-4 * h))) /
+        h;
     double exact = 0.0;
     for (int k = 0; k < 4; ++k) exact += y.d[k] * direction[k];
     CHECK(check::same_bits(y.v, along(0.0)));
@@ -212,7 +238,8 @@ template <class Real> std::vector<double> of_rows(int count) {
   add(y, Real(3.0), x, count);
   store(y, out, count);
   std::vector<double> all;
-  for (int k = 0; k < count; ++k) all.insert(all.end(), {first(x[k]), first(y[k]), first(z[k]), first(out[k]), first(c[k])});
+  for (int k = 0; k < count; ++k)
+    all.insert(all.end(), {first(x[k]), first(y[k]), first(z[k]), first(out[k]), first(c[k])});
   return all;
 }
 
@@ -220,8 +247,10 @@ template <class Real> std::vector<double> of_rows(int count) {
 
 TEST("a row has the same bits of doubles, of packs and of duals") {
   for (int count = 1; count <= 11; ++count) {
-    const std::vector<double> doubles = of_rows<double>(count), packs = of_rows<Pack<4>>(count), duals = of_rows<Dual<4>>(count);
-    for (std::size_t k = 0; k < doubles.size(); ++k) CHECK(check::same_bits(doubles[k], packs[k]) && check::same_bits(doubles[k], duals[k]));
+    const std::vector<double> doubles = of_rows<double>(count), packs = of_rows<Pack<4>>(count),
+                              duals = of_rows<Dual<4>>(count);
+    for (std::size_t k = 0; k < doubles.size(); ++k)
+      CHECK(check::same_bits(doubles[k], packs[k]) && check::same_bits(doubles[k], duals[k]));
   }
 }
 

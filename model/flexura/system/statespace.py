@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 from scipy.linalg import cholesky, eig, eigvals, null_space, solve_triangular
 
-from .errors import FlexuraError, InputError
-from .observe import observe
+from ..errors import FlexuraError, InputError
 from .statics import static
-from .system import System
+from .system import System, jacobian, system_of
 
 
 @dataclass(frozen=True)
@@ -89,28 +88,26 @@ class StateSpace:
         return self.outlook @ np.linalg.solve(s * s * self.M + s * self.G + self.K, self.E)
 
 
-def linearize(system: System, q: Any = None, qd: Any = None, joints: str = "free") -> StateSpace:
-    """The robot linearised about an equilibrium q (n,), by default the static one at the start, or about a steady motion.
+def linearize(robot: Any, q: Any = None, qd: Any = None, joints: str = "free") -> StateSpace:
+    """The robot linearised about an equilibrium q (n,), by default the static one at the start, or about a steady motion (24).
 
-    `qd` (n,): joint rates of a steady motion, a rotation or translation of the whole robot; without q its elastic equilibrium
-    is found. `tip/x`, `tip/y` are then along axes that turn with it. `joints`: "free", or "locked": only the elastic unknowns
-    move, and there are no inputs. Raises InputError where q, qd are no equilibrium, FlexuraError where none is found.
+    Args: robot: a System, a Robot, or a robot file; q (n,); qd (n,): joint rates of a steady motion, a rotation or translation of the
+        whole robot, whose elastic equilibrium is found where q is not given; `tip/x`, `tip/y` are then along axes that turn with
+        it; joints: "free", or "locked": only the elastic unknowns move, and there are no inputs.
+
+    Raises: InputError: q, qd are no equilibrium. FlexuraError: none is found.
     """
+    system = system_of(robot)
     if joints not in ("free", "locked"):
         raise InputError('expected "free" or "locked"', key="joints", value=joints)
-    rates = np.zeros(system.n) if qd is None else system._check(qd)
-    v = system.to_solver @ rates
-    at = system.to_solver @ system._check(q) if q is not None else None
-    at = _steady(system, v) if at is None else at
-    _check_steady(system, at, v)
+    rates = np.zeros(system.n) if qd is None else system.check(qd, "qd")
+    at = _steady(system, rates) if q is None else system.check(q)
+    _check_steady(system, at, rates)
     rows = system.free_rows if joints == "free" else system.elastic_rows
+    pick = np.ix_(rows, rows)
     moved = [i for i, row in enumerate(system.joint_rows) if row in rows]
-    T = system.transform
-    back = lambda X: (system.to_solver.T @ X @ system.to_solver)[np.ix_(rows, rows)]
-    K = system.modal_stiffness + system.differences(lambda y: system.residual(y, v), at)
-    if not v.any():
-        K = (K + K.T) / 2
-    G = system.differences(lambda u: system.residual(at, u), v, 1e3) if v.any() else np.zeros_like(K)
+    K = system.tangent(at, rates if rates.any() else None)
+    K = K if rates.any() else (K + K.T) / 2
     look, outputs, units = _outputs(system, at)
     kept = [k for k, name in enumerate(outputs) if not name.startswith("joint") or int(name.split("/")[1]) - 1 in moved]
     labels = [system.labels[row] for row in rows]
@@ -118,74 +115,85 @@ def linearize(system: System, q: Any = None, qd: Any = None, joints: str = "free
     turns = [link.joint.type == "R" for link in system.robot.links]
     units |= {name: "N m" if turns[i] else "N" for name, i in zip(drives, moved, strict=True)}
     return StateSpace(
-        M=system.mass(T @ at)[np.ix_(rows, rows)], G=back(G) + system.damping_at(T @ at)[np.ix_(rows, rows)], K=back(K),
+        M=system.mass(at)[pick], G=system.rate(at, rates)[pick], K=K[pick],
         E=(np.arange(system.n)[rows, None] == system.joint_rows[moved]).astype(float),
-        outlook=(look @ system.to_solver)[np.ix_(np.array(kept), rows)],
+        outlook=look[np.ix_(np.array(kept), rows)],
         states=(*labels, *(f"rate of {label.replace(']', '/s]')}" for label in labels)),
-        inputs=tuple(drives), outputs=tuple(outputs[k] for k in kept), units=units, q=T @ at, qd=rates,
-        hold=system.forces(T @ at, rates, np.zeros(system.n))[system.joint_rows],
+        inputs=tuple(drives), outputs=tuple(outputs[k] for k in kept), units=units, q=at, qd=rates,
+        hold=system.forces(at, rates, np.zeros(system.n))[system.joint_rows],
     )  # fmt: skip
 
 
-def _steady(system: System, v: np.ndarray) -> np.ndarray:
-    """The elastic equilibrium at the start, turning with the rates v, in the solver's coordinates; by Newton's method."""
-    y = system.to_solver @ static(system)
-    rows, K = system.elastic_rows, system.modal_stiffness
-    if len(rows) == 0 or not v.any():
-        return y
+def _steady(system: System, rates: np.ndarray) -> np.ndarray:
+    """The elastic equilibrium at the start, turning with the rates (n,), by Newton's method."""
+    q = static(system)
+    rows, size = system.elastic_rows, _sizes(system)
+    if len(rows) == 0 or not rates.any():
+        return q
     pick = np.ix_(rows, rows)
-    scale = _sizes(system)
-    balance = lambda z: K @ z + system.residual(z, v)
     for _ in range(30):
-        step = np.linalg.solve(system.differences(balance, y)[pick], balance(y)[rows])
-        y[rows] -= step
-        if not np.all(np.isfinite(y)):
+        step = np.linalg.solve(system.tangent(q, rates)[pick], _balance(system, q, rates)[rows])
+        q[rows] -= step
+        if not np.all(np.isfinite(q)):
             break
-        if np.linalg.norm(step * scale) <= 1e-11 * (np.linalg.norm(y[rows] * scale) + 1e-9):
-            return y
-    raise FlexuraError("no equilibrium found at these rates: the rotation bends a link beyond the model")
+        if np.linalg.norm(step * size) <= 1e-11 * (np.linalg.norm(q[rows] * size) + 1e-9):
+            return q
+    raise FlexuraError("no equilibrium found at these rates: the rotation bends a link ever further")
+
+
+def _balance(system: System, q: np.ndarray, rates: np.ndarray) -> np.ndarray:
+    """What does not balance at rates (n,) that do not change: bias, elastic and gravity forces (n,)."""
+    return system.elastic(q) + system.gravity(q) + (system.bias(q, rates) if rates.any() else 0.0)
 
 
 def _sizes(system: System) -> np.ndarray:
-    """Roots of the elastic rows' stiffness at the start: times y, roots of energies, in the solver's coordinates."""
-    return np.sqrt(np.diag(system.transform.T @ system.stiffness() @ system.transform)[system.elastic_rows])
+    """Roots of the elastic rows' stiffness at the start: times q, roots of energies."""
+    return np.sqrt(np.diag(system.stiffness())[system.elastic_rows])
 
 
-def _check_steady(system: System, y: np.ndarray, v: np.ndarray) -> None:
+def _check_steady(system: System, q: np.ndarray, rates: np.ndarray) -> None:
     """Refuse what is no equilibrium: elastic rows out of balance, or a motion along which the robot's equations change."""
     rows = system.elastic_rows
     if len(rows):
-        force = (system.modal_stiffness @ y + system.residual(y, v))[rows]
-        if np.linalg.norm(force / _sizes(system)) > 1e-5 * np.linalg.norm(y[rows] * _sizes(system)) + 1e-8:
+        force, size = _balance(system, q, rates)[rows], _sizes(system)
+        if np.linalg.norm(force / size) > 1e-5 * np.linalg.norm(q[rows] * size) + 1e-8:
             raise InputError(
                 "expected an equilibrium, as from fx.static(system, joints=...): elastic forces do not balance", key="q"
             )
-    if not v.any():
+    if not rates.any():
         return
-    if v[rows].any():
+    if rates[rows].any():
         raise InputError("expected rates of joints only", key="qd")
-    later = y + v / np.abs(v).max()  # a radian or a metre on
-    for function in (lambda z: system.residual(z, v), lambda z: system.mass(system.transform @ z)):
-        now, then = function(y), function(later)
+    later = q + rates / np.abs(rates).max()  # a radian or a metre on
+    for function in (lambda z: _balance(system, z, rates), system.mass):
+        now, then = function(q), function(later)
         if np.abs(then - now).max() > 1e-9 * np.abs(now).max():
             raise InputError(
                 "expected a steady motion: rates of a first joint that turns or moves the whole robot, no gravity", key="qd"
             )
 
 
-def _outputs(system: System, y: np.ndarray) -> tuple[np.ndarray, list[str], dict[str, str]]:
-    """d (joint positions, tip deflections, tip x, tip y) / dy (outputs, n), their names and units."""
+def _outputs(system: System, q: np.ndarray) -> tuple[np.ndarray, list[str], dict[str, str]]:
+    """d (joint positions, tip deflections, tip x, tip y) / dq (outputs, n), their names and units."""
     links = system.robot.links
     flexible = [i for i, link in enumerate(links) if link.flexible]
     names = [f"joint/{i + 1}/position" for i in range(len(links))] + [f"link/{i + 1}/tip_deflection" for i in flexible]
     units = {name: "rad" if "joint" in name and links[i].joint.type == "R" else "m" for i, name in enumerate(names)}
-    poses, tips, ends, energies = (np.zeros((1, *shape)) for shape in ((len(links), 3), (len(links), 2), (2,), (3,)))
 
     def look(z: np.ndarray) -> np.ndarray:
-        observe(system.chain, system._work(), np.concatenate([z, np.zeros(system.n)])[None], poses, tips, ends, energies)
-        return np.concatenate([z[system.joint_rows], tips[0, flexible, 0], ends[0]])
+        return np.concatenate([z[system.joint_rows], *system.places(z)])
 
-    return system.differences(look, y), [*names, "tip/x", "tip/y"], units | {"tip/x": "m", "tip/y": "m"}
+    slopes = jacobian(look, q, np.full(system.n, 1e-5) / np.maximum(_steep(system), 1e-300))
+    return slopes, [*names, "tip/x", "tip/y"], units | {"tip/x": "m", "tip/y": "m"}
+
+
+def _steep(system: System) -> np.ndarray:
+    """How far a unit of each unknown turns a link [rad], (n,); 1 for joints."""
+    out = np.ones(system.n)
+    for owns, pieces in zip(system.assembly.structure.own, system.assembly.structure.links, strict=True):
+        for own, piece in zip(owns, pieces, strict=True):
+            out[own] = np.abs(piece.B).max(axis=0, initial=0.0)
+    return out
 
 
 def _scaled(R: np.ndarray, X: np.ndarray) -> np.ndarray:

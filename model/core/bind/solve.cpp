@@ -1,0 +1,92 @@
+// Statics and small motions of a robot's equations.
+#include <nanobind/stl/vector.h>
+
+#include "mechanics.hpp"
+#include "spectrum.hpp"
+#include "statics.hpp"
+
+namespace flexura {
+namespace {
+
+using Flags = nb::ndarray<const std::uint8_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+
+void check_state(const Mechanics &self, const Vector &q) {
+  if (q.shape(0) != std::size_t(self.model->n)) throw std::invalid_argument("q needs an entry an unknown");
+}
+
+TipLoad load_of(const Vector &load) {
+  if (load.shape(0) != 3) throw std::invalid_argument("a load is two forces and a moment");
+  TipLoad out;
+  out.force[0] = load.data()[0], out.force[1] = load.data()[1], out.moment = load.data()[2];
+  return out;
+}
+
+std::vector<char> free_joints(const Mechanics &self, const Flags &free) {
+  if (free.shape(0) != self.model->first.size()) throw std::invalid_argument("a flag a joint was expected");
+  std::vector<char> out(free.data(), free.data() + free.shape(0));
+  for (std::size_t i = 0; i < out.size(); ++i) out[i] = out[i] && !self.model->locked[i];
+  return out;
+}
+
+nb::tuple equilibrium_of(const Mechanics &self, const Vector &q, const Vector &load, const Flags &free) {
+  check_state(self, q);
+  Array out = new_array({q.shape(0)});
+  std::copy(q.data(), q.data() + q.shape(0), out.data());
+  const std::vector<char> turning = free_joints(self, free);
+  const TipLoad held = load_of(load);
+  Equilibrium found;
+  {
+    nb::gil_scoped_release release;
+    found = equilibrium(*self.model, out.data(), held, turning.data());
+  }
+  return nb::make_tuple(out, int(found.balance), found.share, found.sweeps);
+}
+
+nb::tuple modes_of(const Mechanics &self, const Vector &q, const Flags &free, int most, const Vector &load) {
+  check_state(self, q);
+  const std::vector<char> moving = free_joints(self, free);
+  const TipLoad held = load_of(load);
+  Modes found;
+  {
+    nb::gil_scoped_release release;
+    found = natural_modes(*self.model, q.data(), moving.data(), most, held);
+  }
+  Array squares = new_array({std::size_t(found.count)}), shapes = new_array({q.shape(0), std::size_t(found.count)});
+  std::copy(found.squares.begin(), found.squares.end(), squares.data());
+  std::copy(found.shapes.begin(), found.shapes.end(), shapes.data());
+  return nb::make_tuple(squares, shapes);
+}
+
+Array mass_of(const Mechanics &self, const Vector &q) {
+  check_state(self, q);
+  Array out = new_array({q.shape(0), q.shape(0)});
+  mass_matrix(*self.model, q.data(), out.data());
+  return out;
+}
+
+Array stiffness_of(const Mechanics &self, const Vector &q, const Vector &v) {
+  check_state(self, q);
+  Array out = new_array({q.shape(0), q.shape(0)});
+  stiffness_matrix(*self.model, q.data(), v.shape(0) ? v.data() : nullptr, TipLoad{}, out.data());
+  return out;
+}
+
+Array rates_of(const Mechanics &self, const Vector &q, const Vector &v) {
+  check_state(self, q), check_state(self, v);
+  Array out = new_array({q.shape(0), q.shape(0)});
+  rate_matrix(*self.model, q.data(), v.data(), out.data());
+  return out;
+}
+
+}  // namespace
+
+void add_solve(nb::class_<Mechanics> &type) {
+  using namespace nb::literals;
+  type.def("equilibrium", &equilibrium_of, "q"_a, "load"_a, "free"_a, "q, balance (0 stable, 1 unstable, 2 missing), share borne, sweeps.")
+      .def("modes", &modes_of, "q"_a, "free"_a, "count"_a, "load"_a, "Squares [rad^2/s^2] and shapes of the lowest `count`; 0: all.")
+      .def("mass", &mass_of, "q"_a, "M(q) (n, n).")
+      .def("stiffness", &stiffness_of, "q"_a, "v"_a, "Derivative of the forces at q (and rates v, if any) by q, (n, n).")
+      .def("rates", &rates_of, "q"_a, "v"_a, "Derivative of the forces by v, (n, n).");
+}
+
+}  // namespace flexura

@@ -1,0 +1,1 @@
+"""One link: quadrature, shapes, section, modes, and the pieces of its line."""

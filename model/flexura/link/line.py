@@ -1,0 +1,172 @@
+"""The pieces of a link's line: what the equations need to know of each, as numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from ..robot import Link
+from .modes import clamped_matrices, clamped_modes
+from .quadrature import collocation, gauss, lagrange, lagrange_integrals
+from .section import Material, material
+from .shapes import ElementShapes, WholeShapes
+
+ELEMENT_POINTS = 3
+MOST_SHAPES = 20  # polynomials of a whole link
+
+
+class Place(NamedTuple):
+    """Weights w_j / length (P,) and shapes b_k (m,) at a place xi, with derivatives by xi (2), (11)."""
+
+    w: np.ndarray
+    l: np.ndarray
+    dl: np.ndarray
+    b: np.ndarray
+    db: np.ndarray
+    ddb: np.ndarray
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A stretch of line on 0 <= xi <= 1 whose tangent's angle is linear in m unknowns (1).
+
+    length [m]: of a sleeved link all of it. points: P. shapes: b(xi), (S,) -> (S, m). K (m,) (5) in
+    N m, for modes in 1/s^2; of a sleeved link in modes that at the start's free length, else empty.
+    mass_xi (G,), mass (G,) [kg]: points whose sums are the integrals (3).
+    """
+
+    length: float
+    points: int
+    shapes: ElementShapes | WholeShapes
+    K: np.ndarray
+    mass_xi: np.ndarray
+    mass: np.ndarray
+
+    @property
+    def count(self) -> int:
+        """The number m of unknowns."""
+        return self.shapes.count
+
+    @cached_property
+    def xi(self) -> np.ndarray:
+        """The points of the angle, (P,)."""
+        return gauss(self.points)[0]
+
+    @cached_property
+    def weights(self) -> np.ndarray:
+        """Their weights on [0, 1], (P,): the tip's w_j over the length."""
+        return gauss(self.points)[1]
+
+    @cached_property
+    def C(self) -> np.ndarray:
+        """Integrals of Lagrange's polynomials to the points by xi (8): (P, P)."""
+        return collocation(self.points)
+
+    @cached_property
+    def B(self) -> np.ndarray:
+        """The shapes at the points (1): (P, m)."""
+        return self.shapes(self.xi)
+
+    def at(self, xi: float) -> Place:
+        """Weights and shapes at a place xi."""
+        s = np.array([xi])
+        lines = [lagrange_integrals(self.points, s), *(lagrange(self.points, s, k) for k in (0, 1))]
+        return Place(*(f[0] for f in lines), *(self.shapes(s, k)[0] for k in (0, 1, 2)))
+
+    @cached_property
+    def tip(self) -> Place:
+        """Weights and shapes at the tip."""
+        return self.at(1.0)
+
+    @cached_property
+    def B_tip(self) -> np.ndarray:
+        """The shapes at the tip: (m,)."""
+        return self.tip.b
+
+    @cached_property
+    def w(self) -> np.ndarray:
+        """The weights w_j of the mass points (2): (G, P) [m]."""
+        return self.length * lagrange_integrals(self.points, self.mass_xi)
+
+    @cached_property
+    def s(self) -> np.ndarray:
+        """First moments s_j, the integral of w_j dm (3): (P,) [kg m]."""
+        return self.mass @ self.w
+
+    @cached_property
+    def W(self) -> np.ndarray:
+        """Second moments W_jl, the integral of w_j w_l dm (3): (P, P) [kg m^2]."""
+        return self.w.T @ (self.mass[:, None] * self.w)
+
+
+def orders(link: Link, followed: bool) -> tuple[int, int]:
+    """How many polynomials (7) and how many points a whole-link piece has."""
+    mesh, sleeve = min(2 * link.elements, MOST_SHAPES), link.joint.type == "Pb"
+    if link.modes is None:
+        return mesh, mesh + 1
+    few = min(link.modes, MOST_SHAPES - 5) + 5
+    count = few if material(link).uniform else max(few, mesh)
+    return count, count + (1 if followed or sleeve else 0)
+
+
+def whole(link: Link, beyond: Link | None) -> bool:
+    """Whether a flexible link is one piece: in modes, in a sleeve, or `beyond` slides on it (7)."""
+    return (
+        link.modes is not None
+        or link.joint.type == "Pb"
+        or (beyond is not None and beyond.joint.type == "Pa")
+    )
+
+
+def pieces(
+    link: Link, beyond: Link | None = None, mass: float = 0.0, inertia: float = 0.0
+) -> tuple[Piece, ...]:
+    """The pieces of a flexible link that `beyond` follows (None: it carries the payload)."""
+    law = material(link)
+    if not whole(link, beyond):
+        return _mesh(law, link.elements)
+    count, points = orders(link, beyond is not None)
+    sleeve = link.joint.type == "Pb"
+    if sleeve and link.modes is None:
+        return (whole_piece(law, points, np.eye(count), np.zeros(0)),)
+    free = link.joint.start if sleeve else link.length_m
+    kept = count if link.modes is None else min(link.modes, count)
+    matrices = clamped_matrices(law, free, count, points, mass, inertia)
+    return (
+        whole_piece(
+            law,
+            points,
+            *clamped_modes(*matrices, kept, link.modes is not None and beyond is not None),
+        ),
+    )
+
+
+def whole_piece(law: Material, points: int, coefficients: np.ndarray, K: np.ndarray) -> Piece:
+    """A link as one piece with shapes (N, m) in the space (7) and diagonal stiffness (m,)."""
+    s, ds = law.quadrature(0.0, law.length, points + 2)
+    dm = law.mass_per_length(s) * ds
+    return Piece(law.length, points, WholeShapes(coefficients), K, s / law.length, dm)
+
+
+def _mesh(law: Material, elements: int) -> tuple[Piece, ...]:
+    ends = np.linspace(0, law.length, elements + 1)
+    return tuple(_element(law, a, b) for a, b in pairwise(ends))
+
+
+def _element(law: Material, a: float, b: float) -> Piece:
+    """The piece of an element between a and b [m], with shapes that make K diagonal (6)."""
+    h = b - a
+    s, ds = law.quadrature(a, b, ELEMENT_POINTS + 2)
+    curvature, EI = ElementShapes()((s - a) / h, 1) / h, law.bending_stiffness(s) * ds
+    (K11, K12), (_, K22) = curvature.T @ (EI[:, None] * curvature)
+    if law.uniform:
+        K11, K12, K22 = law.stiffness[0, 0] / h, 0.0, 12 * law.stiffness[0, 0] / h
+    ratio = K12 / K22
+    dm = law.mass_per_length(s) * ds
+    return Piece(
+        h, ELEMENT_POINTS, ElementShapes(ratio), np.array([K11 - ratio * K12, K22]), (s - a) / h, dm
+    )

@@ -1,0 +1,67 @@
+"""Gauss points, Legendre's polynomials, and Lagrange's through the points (docs/theory)."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from numpy.polynomial.legendre import legder, leggauss, legvander
+
+
+@cache
+def gauss(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Gauss points xi and weights (count,) on [0, 1], exact to the degree 2 count - 1."""
+    u, w = leggauss(count)
+    return (u + 1) / 2, w / 2
+
+
+def cells(breaks: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Gauss points and weights (cells * count,) between `breaks` (cells + 1,), in their unit."""
+    xi, w = gauss(count)
+    widths = np.diff(breaks)[:, None]
+    return (breaks[:-1, None] + widths * xi).ravel(), (widths * w).ravel()
+
+
+def legendre(count: int, xi: np.ndarray, derivative: int = 0) -> np.ndarray:
+    """Legendre's P_0 ... P_(count-1) at u = 2 xi - 1, or their derivatives by u: (S, count)."""
+    u = 2 * np.atleast_1d(xi) - 1.0
+    lower = _derivatives(count, derivative)
+    return legvander(u, len(lower) - 1) @ lower
+
+
+@cache
+def _derivatives(count: int, order: int) -> np.ndarray:
+    """Derivatives of P_0 ... P_(count-1) as sums of Legendre's polynomials, in columns."""
+    return legder(np.eye(max(count, order + 1)), order, axis=0)[:, :count]
+
+
+def legendre_integrals(count: int, xi: np.ndarray) -> np.ndarray:
+    """Integrals of P_0 ... P_(count-1) by u from -1 to 2 xi - 1, the shapes (7): (S, count)."""
+    P = legendre(count + 1, xi)
+    out = np.empty((len(P), count))
+    out[:, 0] = P[:, 1] + 1.0
+    for k in range(1, count):
+        out[:, k] = (P[:, k + 1] - P[:, k - 1]) / (2 * k + 1)
+    return out
+
+
+@cache
+def _lagrange(points: int) -> np.ndarray:
+    """Lagrange's polynomials as sums of Legendre's (2): (points, points), column j is l_j."""
+    xi, w = gauss(points)
+    return (2 * np.arange(points)[:, None] + 1) * legendre(points, xi).T * w
+
+
+def lagrange(points: int, xi: np.ndarray, derivative: int = 0) -> np.ndarray:
+    """Lagrange's l_j through the Gauss points, or their derivatives by xi (2): (S, points)."""
+    return 2.0**derivative * legendre(points, xi, derivative) @ _lagrange(points)
+
+
+def lagrange_integrals(points: int, xi: np.ndarray) -> np.ndarray:
+    """w_j(xi), the integrals of l_j from 0 to xi (2): (S, points)."""
+    return 0.5 * legendre_integrals(points, xi) @ _lagrange(points)
+
+
+def collocation(points: int) -> np.ndarray:
+    """C, the integrals of l_j from 0 to Gauss point p (8): (points p, points j)."""
+    return lagrange_integrals(points, gauss(points)[0])

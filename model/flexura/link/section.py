@@ -1,0 +1,81 @@
+"""A link's mass per length and bending stiffness as polynomials between its breaks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.polynomial.polynomial import polyder, polyval
+from numpy.typing import ArrayLike
+
+from ..robot import Link
+from .quadrature import cells
+
+MASS_DEGREE, STIFFNESS_DEGREE = 2, 4  # of rho A and EI, if a section's dimensions are linear
+
+
+@dataclass(frozen=True)
+class Material:
+    """rho A(s) [kg/m] and EI(s) [N m^2] as polynomials between breaks.
+
+    breaks (I + 1,) [m], from 0 to the link's length; mass (I, 3) and stiffness (I, 5): row k holds
+    the powers of s - breaks[k], lowest first.
+    """
+
+    breaks: np.ndarray
+    mass: np.ndarray
+    stiffness: np.ndarray
+
+    @property
+    def length(self) -> float:
+        return float(self.breaks[-1])
+
+    @property
+    def uniform(self) -> bool:
+        """Whether nothing changes along the link."""
+        return (
+            len(self.mass) == 1 and not self.mass[0, 1:].any() and not self.stiffness[0, 1:].any()
+        )
+
+    def mass_per_length(self, s: ArrayLike, derivative: int = 0) -> np.ndarray:
+        """rho A at s (S,), or its derivative by s."""
+        return self._values(self.mass, s, derivative)
+
+    def bending_stiffness(self, s: ArrayLike, derivative: int = 0) -> np.ndarray:
+        """EI at s (S,), or its derivative by s."""
+        return self._values(self.stiffness, s, derivative)
+
+    def quadrature(self, start: float, end: float, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """`count` Gauss points and weights [m] on each smooth part of start <= s <= end."""
+        inner = self.breaks[(self.breaks > start) & (self.breaks < end)]
+        return cells(np.concatenate([[start], inner, [end]]), count)
+
+    def _values(self, rows: np.ndarray, s: ArrayLike, derivative: int) -> np.ndarray:
+        s = np.atleast_1d(np.asarray(s, dtype=float))
+        k = np.clip(np.searchsorted(self.breaks, s, side="right") - 1, 0, len(rows) - 1)
+        powers = polyder(rows.T, derivative) if derivative else rows.T
+        return polyval(s - self.breaks[k], powers[:, k], tensor=False)
+
+
+def material(link: Link) -> Material:
+    """The material of a link of the robot file: tapers are linear in the section's dimensions."""
+    breaks = np.array(link.breaks())
+    parts = list(pairwise(breaks))
+    mass = [_powers(link.mass_per_length, a, b, MASS_DEGREE) for a, b in parts]
+    if not link.flexible:
+        return Material(breaks, np.array(mass), np.zeros((len(parts), STIFFNESS_DEGREE + 1)))
+    return Material(
+        breaks,
+        np.array(mass),
+        np.array([_powers(link.bending_stiffness, a, b, STIFFNESS_DEGREE) for a, b in parts]),
+    )
+
+
+def _powers(law, a: float, b: float, degree: int) -> np.ndarray:  # type: ignore[no-untyped-def]
+    """A polynomial's powers of s - a (degree + 1,) from its values between a and b."""
+    t = np.linspace(0, 1, degree + 1)
+    values = law(a + (b - a) * t)
+    if np.ptp(values) == 0:
+        return np.append(values[0], np.zeros(degree))
+    return np.linalg.solve(np.vander(t, increasing=True), values) / (b - a) ** np.arange(degree + 1)

@@ -1,0 +1,49 @@
+"""Shapes of the tangent's angle: two on an element, and polynomials on a whole link."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .quadrature import legendre, legendre_integrals
+
+
+@dataclass(frozen=True)
+class ElementShapes:
+    """The two shapes of an element (6): a ramp less `ratio` bubbles, and a bubble."""
+
+    ratio: float = 0.0
+
+    @property
+    def count(self) -> int:
+        return 2
+
+    def __call__(self, xi: np.ndarray, derivative: int = 0) -> np.ndarray:
+        """Their values at xi, or their derivatives by xi: (S, 2)."""
+        x = np.atleast_1d(np.asarray(xi, dtype=float))
+        ramp = (x, np.ones_like(x), np.zeros_like(x))[derivative]
+        bubble = (6 * x * (1 - x), 6 - 12 * x, np.full_like(x, -12.0))[derivative]
+        return np.column_stack([ramp - self.ratio * bubble, bubble])
+
+
+@dataclass(frozen=True)
+class WholeShapes:
+    """Shapes of a whole link: column k of `coefficients` (N, m) is one in the space (7)."""
+
+    coefficients: np.ndarray
+
+    @property
+    def count(self) -> int:
+        return self.coefficients.shape[1]
+
+    def __call__(self, xi: np.ndarray, derivative: int = 0) -> np.ndarray:
+        """Their values at xi, or their derivatives by xi: (S, m)."""
+        return legendre_shapes(len(self.coefficients), xi, derivative) @ self.coefficients
+
+
+def legendre_shapes(count: int, xi: np.ndarray, derivative: int = 0) -> np.ndarray:
+    """The space (7) at xi (S,), or its derivatives by xi: (S, count)."""
+    if derivative == 0:
+        return legendre_integrals(count, xi)
+    return 2.0**derivative * legendre(count, xi, derivative - 1)

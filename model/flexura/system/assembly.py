@@ -1,0 +1,170 @@
+"""The extended assembly: the equations of any chain, dense (docs/theory/mechanics.md).
+
+M(q) qdd + bias(q, qd) + damping(q) qd + elastic(q) + gravity(q) = force                   (19)
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..link.section import Material
+from ..robot import Robot
+from . import masses, sleeve
+from .kinematics import Frame, base
+from .structure import LinkState, Structure, structure
+
+COULOMB_RATE = 1e-3  # m/s or rad/s
+
+
+class Energies(NamedTuple):
+    """Kinetic energy, strain energy and the potential of gravity [J]."""
+
+    kinetic: float
+    strain: float
+    potential: float
+
+
+class Assembly:
+    """A robot's equations as dense sums over its pieces; q and qd (n,) are named by `labels`.
+
+    A `Structure` in place of a robot brings its own shapes, so that two programs can use one set.
+    """
+
+    def __init__(self, robot: Robot | Structure, linear: bool | None = None) -> None:
+        self.structure = robot if isinstance(robot, Structure) else structure(robot, linear)
+        self.robot, self.rows = self.structure.robot, self.structure.rows
+        self.labels, self.n = self.structure.labels, self.structure.n
+        self._rotors = np.array([link.joint.rotor_inertia for link in self.robot.links])
+        self._g = complex(*self.robot.gravity_m_s2)
+
+    def mass(self, q: np.ndarray) -> np.ndarray:
+        """M(q) (n, n) (14)."""
+        M = masses.mass_matrix(self.n, self._parts(q, np.zeros(self.n)))
+        M[self.rows, self.rows] += self._rotors
+        return M
+
+    def bias(self, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
+        """Coriolis, centrifugal and convective forces (n,), on the left-hand side (15)."""
+        h = masses.inertia_forces(self.n, self._parts(q, qd))
+        for state, law in self._sleeves(q, qd):
+            h += sleeve.flow_forces(state.lines[0], law)
+        return h
+
+    def gravity(self, q: np.ndarray) -> np.ndarray:
+        """Generalised gravity forces (n,), on the left-hand side (16)."""
+        return masses.weight(self.n, self._parts(q, np.zeros(self.n)), self._g)
+
+    def elastic(self, q: np.ndarray) -> np.ndarray:
+        """The derivative of the strain energy (n,): K q, and of a sleeved link also dU/dd (17)."""
+        out = self.stiffness_blocks(q) @ q
+        for state, law in self._sleeves(q, np.zeros(self.n)):
+            y = q[state.lines[0].own]
+            out[self.rows[state.index]] += 0.5 * y @ sleeve.stiffness(state.lines[0], law, 1) @ y
+        return out
+
+    def stiffness_blocks(self, q: np.ndarray) -> np.ndarray:
+        """K (n, n), with K(d) of sleeved links: twice the strain energy is q^T K q (5), (17)."""
+        K = np.zeros((self.n, self.n))
+        for link, owns in zip(self.structure.links, self.structure.own, strict=True):
+            for piece, own in zip(link, owns, strict=True):
+                if piece.K.size:
+                    K[own, own] = np.diag(piece.K)
+        for state, law in self._sleeves(q, np.zeros(self.n)):
+            own = state.lines[0].own
+            K[own, own] = sleeve.stiffness(state.lines[0], law)
+        return K
+
+    def stiffness(self, q: np.ndarray) -> np.ndarray:
+        """The second derivative of the strain energy (n, n), without loads (17)."""
+        K = self.stiffness_blocks(q)
+        for state, law in self._sleeves(q, np.zeros(self.n)):
+            own, row = state.lines[0].own, self.rows[state.index]
+            slope = sleeve.stiffness(state.lines[0], law, 1) @ q[own]
+            K[own, row] += slope
+            K[row, own] += slope
+            K[row, row] += 0.5 * q[own] @ sleeve.stiffness(state.lines[0], law, 2) @ q[own]
+        return K
+
+    def damping(self, q: np.ndarray) -> np.ndarray:
+        """D (n, n): viscous friction of joints, alpha M + beta K of elastic unknowns (18)."""
+        D, K = np.zeros((self.n, self.n)), self.stiffness_blocks(q)
+        for i, (link, row) in enumerate(zip(self.robot.links, self.rows, strict=True)):
+            D[row, row] = link.joint.viscous_friction
+            if self.structure.own[i]:
+                own = slice(row + 1, self.structure.own[i][-1].stop)
+                D[own, own] = link.damping.beta_s * K[own, own]
+                if link.damping.alpha_1_s:
+                    D[own, own] += link.damping.alpha_1_s * self._clamped_mass(i, q)[own, own]
+        return D
+
+    def coulomb(self, qd: np.ndarray) -> np.ndarray:
+        """Coulomb friction of the joints (n,), on the left-hand side (18)."""
+        out = np.zeros(self.n)
+        out[self.rows] = [link.joint.coulomb_friction for link in self.robot.links] * np.tanh(
+            qd[self.rows] / COULOMB_RATE
+        )
+        return out
+
+    def forces(self, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
+        """The forces (n,) that a motion needs (19), without Coulomb friction."""
+        return (
+            self.mass(q) @ qdd
+            + self.bias(q, qd)
+            + self.damping(q) @ qd
+            + self.elastic(q)
+            + self.gravity(q)
+        )
+
+    def energies(self, q: np.ndarray, qd: np.ndarray) -> Energies:
+        """The energies in a state (29)."""
+        parts = self._parts(q, qd)
+        return Energies(
+            masses.kinetic(parts, qd) + 0.5 * float(self._rotors @ qd[self.rows] ** 2),
+            float(0.5 * q @ self.stiffness_blocks(q) @ q),
+            masses.potential(parts, self._g),
+        )
+
+    def loss(self, q: np.ndarray, qd: np.ndarray) -> float:
+        """The power that damping and friction take [W] (30)."""
+        return float(qd @ (self.damping(q) @ qd + self.coulomb(qd)))
+
+    def tip(self, q: np.ndarray, qd: np.ndarray | None = None) -> Frame:
+        """The frame of the robot's tip, with the columns of its place and angle (13)."""
+        return self.structure.states(q, np.zeros(self.n) if qd is None else qd)[-1].tip
+
+    def line(
+        self, q: np.ndarray, link: int, s: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """x, y [m] and the tangent's angle [rad] of a link (from 1) at s (S,) [m] along it (2)."""
+        state = self.structure.states(q, np.zeros(self.n))[link - 1]
+        frames = [self.structure.at(state, float(x)) for x in np.atleast_1d(s)]
+        place = np.array([f.place for f in frames])
+        return place.real, place.imag, np.array([f.angle for f in frames])
+
+    def tip_deflections(self, q: np.ndarray) -> np.ndarray:
+        """The tips of the flexible links across the tangents at their hubs (k,) [m]: r_y (2)."""
+        states = [state for state in self.structure.states(q, np.zeros(self.n)) if state.lines]
+        return np.array([((s.tip.place - s.hub.place) * s.hub.tangent.conjugate()).imag for s in states])
+
+    def _parts(self, q: np.ndarray, qd: np.ndarray) -> list[masses.Part]:
+        return [
+            part for state in self.structure.states(q, qd) for part in self.structure.masses(state)
+        ]
+
+    def _sleeves(self, q: np.ndarray, qd: np.ndarray) -> list[tuple[LinkState, Material]]:
+        """The flexible links in a sleeve, with their materials."""
+        out = []
+        for state in self.structure.states(q, qd):
+            law = self.structure.laws[state.index]
+            if law is not None and self.structure.sleeved(state.index):
+                out.append((state, law))
+        return out
+
+    def _clamped_mass(self, i: int, q: np.ndarray) -> np.ndarray:
+        """M (n, n) of link i alone, straight and clamped, with the payload of the last one (18)."""
+        straight, still = np.zeros(self.n), np.zeros(self.n)
+        straight[self.rows[i]] = q[self.rows[i]]
+        state = self.structure.link(i, base(self.n), straight, still)
+        return masses.mass_matrix(self.n, self.structure.own_masses(state))

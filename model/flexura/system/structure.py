@@ -1,0 +1,188 @@
+"""The chain of a robot: numbering, and the frames, lines and masses of every link in a state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from ..link.line import Piece, pieces
+from ..link.section import Material, material
+from ..link.shapes import ElementShapes
+from ..robot import Robot
+from . import sleeve
+from .kinematics import Frame, Line, ahead, base, line, station, turned
+from .masses import Part, line_masses, lump, turning
+
+
+@dataclass(frozen=True)
+class LinkState:
+    """A link in a state q, qd: frame of its hub (Pb: exit), its lines (none: rigid), its tip."""
+
+    index: int
+    q: np.ndarray
+    qd: np.ndarray
+    hub: Frame
+    lines: tuple[Line, ...]
+    tip: Frame
+
+
+@dataclass(frozen=True)
+class Structure:
+    """A robot's links as pieces, numbered q = [joint 1, elastic unknowns of link 1, joint 2, ...].
+
+    `linear`: the dissertation's line (12).
+    """
+
+    robot: Robot
+    links: tuple[tuple[Piece, ...], ...]
+    linear: bool = False
+
+    @cached_property
+    def rows(self) -> list[int]:
+        """The unknown of each joint."""
+        sizes = [1 + sum(p.count for p in link) for link in self.links]
+        return [sum(sizes[:i]) for i in range(len(sizes))]
+
+    @cached_property
+    def own(self) -> list[list[slice]]:
+        """The unknowns of each piece of each link."""
+        ends = [
+            [row + 1 + sum(p.count for p in link[:k]) for k in range(len(link) + 1)]
+            for row, link in zip(self.rows, self.links, strict=True)
+        ]
+        return [[slice(a, b) for a, b in pairwise(e)] for e in ends]
+
+    @cached_property
+    def labels(self) -> tuple[str, ...]:
+        """The names of the unknowns."""
+        out: list[str] = []
+        for i, link in enumerate(self.links, 1):
+            out.append(f"joint/{i}")
+            for k, piece in enumerate(link, 1):
+                if isinstance(piece.shapes, ElementShapes):
+                    out += [f"link/{i}/element/{k}/rotation", f"link/{i}/element/{k}/bubble"]
+                else:
+                    kind = "mode" if piece.K.size else "shape"
+                    out += [f"link/{i}/{kind}/{j}" for j in range(1, piece.count + 1)]
+        return tuple(out)
+
+    @property
+    def n(self) -> int:
+        """The number of unknowns."""
+        return len(self.labels)
+
+    @cached_property
+    def laws(self) -> list[Material | None]:
+        """The material of each link; None for rigid ones."""
+        return [material(link) if link.flexible else None for link in self.robot.links]
+
+    def sleeved(self, i: int) -> bool:
+        """Whether link i slides through a sleeve."""
+        return self.robot.links[i].joint.type == "Pb"
+
+    def states(self, q: np.ndarray, qd: np.ndarray) -> list[LinkState]:
+        """The links in a state, from the base outwards (13)."""
+        out: list[LinkState] = []
+        for i in range(len(self.links)):
+            out.append(self.link(i, self._hub(i, out[-1] if out else None, q, qd), q, qd))
+        return out
+
+    def link(self, i: int, hub: Frame, q: np.ndarray, qd: np.ndarray) -> LinkState:
+        """Link i in a state, from the frame of its hub to its tip (1), (2)."""
+        row = self.rows[i]
+        if not self.links[i]:
+            return LinkState(
+                i, q, qd, hub, (), ahead(hub, *self._along(i, self.robot.links[i].length_m, q), qd)
+            )
+        lines, frame = [], hub
+        for piece, own in zip(self.links[i], self.own[i], strict=True):
+            free, free_row = (q[row], row) if self.sleeved(i) else (piece.length, None)
+            lines.append(line(piece, frame, hub, own, free, free_row, q, qd, self.linear))
+            frame = station(lines[-1], 1.0)
+        return LinkState(i, q, qd, hub, tuple(lines), frame)
+
+    def _along(self, i: int, s: float, q: np.ndarray) -> tuple[float, list[int]]:
+        """How far s on link i is ahead of its hub or exit [m], and the unknowns in it."""
+        return (
+            (s - self.robot.links[i].length_m + q[self.rows[i]], [self.rows[i]])
+            if self.sleeved(i)
+            else (s, [])
+        )
+
+    def _hub(self, i: int, before: LinkState | None, q: np.ndarray, qd: np.ndarray) -> Frame:
+        """The frame of link i's hub (of Pb: of the sleeve's exit) on the link before it (11)."""
+        joint, row = self.robot.links[i].joint, self.rows[i]
+        tip = before.tip if before else base(self.n)
+        if joint.type == "R":
+            return turned(tip, q[row], row)
+        if joint.type == "Pb":
+            return turned(tip, joint.angle_rad)
+        if before is None:
+            return turned(ahead(tip, q[row], [row], qd), joint.angle_rad)
+        x, rows = self._along(before.index, q[row], q)
+        if before.lines:
+            return turned(station(before.lines[0], x / before.lines[0].free, row), joint.angle_rad)
+        return turned(ahead(before.hub, x, [row, *rows], qd), joint.angle_rad)
+
+    def at(self, state: LinkState, s: float) -> Frame:
+        """The frame of a link at arc length s [m] from its proximal end (2), (11)."""
+        x, rows = self._along(state.index, s, state.q)
+        if not state.lines or x < 0:
+            return ahead(state.hub, x, rows, state.qd)
+        h = state.lines[0].free
+        k = min(int(x / h), len(state.lines) - 1)
+        return station(state.lines[k], x / h - k)
+
+    def masses(self, state: LinkState) -> list[Part]:
+        """A link's masses: its material, its hub, and the payload of the last one (3)."""
+        joint = self.robot.links[state.index].joint
+        return self.own_masses(state) + [
+            lump(joint.hub_mass_kg, state.hub),
+            turning(joint.hub_inertia_kg_m2, state.hub),
+        ]
+
+    def own_masses(self, state: LinkState) -> list[Part]:
+        """A link's masses without its hub."""
+        i, law = state.index, self.laws[state.index]
+        parts: list[Part] = []
+        if law is None:
+            mass, centre, inertia = rigid_body(self.robot, i)
+            frame = ahead(state.hub, *self._along(i, centre, state.q), state.qd)
+            parts += [lump(mass, frame), turning(inertia, frame)]
+        elif self.sleeved(i):
+            parts += sleeve.masses(state.lines[0], law)
+        else:
+            parts += [line_masses(x) for x in state.lines]
+        if i == len(self.links) - 1:
+            load = self.robot.payload
+            parts += [lump(load.mass_kg, state.tip), turning(load.inertia_kg_m2, state.tip)]
+        return parts
+
+
+def structure(robot: Robot, linear: bool | None = None) -> Structure:
+    """The structure of a robot, with shapes computed here."""
+    links, load = robot.links, robot.payload
+    beyond = [*links[1:], None]
+    made = tuple(
+        pieces(link, after, *((load.mass_kg, load.inertia_kg_m2) if after is None else (0.0, 0.0)))
+        if link.flexible
+        else ()
+        for link, after in zip(links, beyond, strict=True)
+    )
+    return Structure(robot, made, not robot.stiffening if linear is None else linear)
+
+
+def rigid_body(robot: Robot, i: int) -> tuple[float, float, float]:
+    """Mass [kg], centre [m] from the proximal end, inertia [kg m^2] about it, of rigid link i."""
+    link = robot.links[i]
+    if link.mass_kg is not None:
+        centre = link.length_m / 2 if link.centre_of_mass_m is None else link.centre_of_mass_m
+        return link.mass_kg, centre, link.inertia_kg_m2 or 0.0
+    s, ds = material(link).quadrature(0.0, link.length_m, 3)
+    dm = link.mass_per_length(s) * ds
+    mass = float(dm.sum())
+    centre = float(dm @ s) / mass
+    return mass, centre, float(dm @ (s - centre) ** 2)

@@ -1,0 +1,238 @@
+"""A robot assembled: numbering, matrices and forces in any state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..link.line import Piece, whole_piece
+from ..link.shapes import legendre_shapes
+from ..robot import Robot, load
+from .assembly import Assembly
+from .constants import equations
+from .structure import Structure, structure
+
+_UNITS = {"rotation": "rad", "bubble": "rad", "shape": "rad", "mode": "kg^(1/2) m"}
+
+
+@dataclass(frozen=True)
+class System:
+    """A robot's equations M(q) qdd + bias(q, qd) + damping qd + elastic(q) + gravity(q) = F (19).
+
+    q (n,) is numbered [joint 1, elastic unknowns of link 1, joint 2, ...], named by `labels`: of a mesh the rotation across each
+    element and its bubble [rad] (6), of a link in its own modes mass-normalised coordinates [kg^(1/2) m], of a sleeved link its
+    shapes [rad] (7). F has entries in the joints' rows. Constant; solvers keep their memory apart from it.
+    """
+
+    robot: Robot
+
+    @cached_property
+    def assembly(self) -> Assembly:
+        """The same equations as dense sums, to be read; with the shapes that the core uses."""
+        made = structure(self.robot)
+        if made.linear or self.robot.nodal:
+            return Assembly(made)
+        links = tuple(self._shapes(i, pieces) for i, pieces in enumerate(made.links))
+        return Assembly(Structure(self.robot, links))
+
+    @cached_property
+    def equations(self) -> Any:
+        """The compiled equations, `core.Mechanics`. Raises InputError where the core refuses the robot."""
+        return equations(self.robot)
+
+    @property
+    def n(self) -> int:
+        """How many unknowns there are."""
+        return len(self.labels)
+
+    @cached_property
+    def labels(self) -> tuple[str, ...]:
+        """Names and units of the unknowns, for example "link/1/element/2/rotation [rad]"."""
+        names = structure(self.robot).labels
+        return tuple(f"{name} [{self._unit(name)}]" for name in names)
+
+    @cached_property
+    def joint_rows(self) -> np.ndarray:
+        """Rows of the joints in q, (links,)."""
+        return np.array([row for row, name in enumerate(self.labels) if name.startswith("joint/")])
+
+    @cached_property
+    def elastic_rows(self) -> np.ndarray:
+        """Rows of the elastic unknowns in q."""
+        return np.setdiff1d(np.arange(self.n), self.joint_rows)
+
+    @cached_property
+    def locked(self) -> np.ndarray:
+        """Which joints are locked, (links,) bool."""
+        return np.array([link.joint.locked for link in self.robot.links])
+
+    @cached_property
+    def free_rows(self) -> np.ndarray:
+        """Rows of q that can move: all but locked joints."""
+        return np.setdiff1d(np.arange(self.n), self.joint_rows[self.locked])
+
+    def own_rows(self, link: int) -> np.ndarray:
+        """Rows of the elastic unknowns of a link (from 0)."""
+        ends = np.append(self.joint_rows, self.n)
+        return np.arange(ends[link] + 1, ends[link + 1])
+
+    @cached_property
+    def limits(self) -> np.ndarray:
+        """Lower and upper limits of the joints (links, 2) [m or rad]: those of the file, and the ends of the links that slide."""
+        own = np.array([link.joint.limits or (-np.inf, np.inf) for link in self.robot.links])
+        ends = np.array([self.robot.travel(i) for i in range(len(self.robot.links))])
+        return np.column_stack([np.maximum(own[:, 0], ends[:, 0]), np.minimum(own[:, 1], ends[:, 1])])
+
+    def start(self) -> np.ndarray:
+        """The configuration at the start (n,): joints at their `start`, links straight."""
+        q = np.zeros(self.n)
+        q[self.joint_rows] = self.robot.start
+        return q
+
+    def mass(self, q: Any) -> np.ndarray:
+        """M(q) (n, n) (14)."""
+        return self.assembly.mass(self.check(q))
+
+    def stiffness(self, q: Any = None) -> np.ndarray:
+        """K (n, n) at the start; with q the tangent stiffness there, the derivative of elastic and gravity forces by q (24)."""
+        if q is None:
+            return self.assembly.stiffness_blocks(self.check(self.start()))
+        return self.tangent(q)
+
+    @cached_property
+    def damping(self) -> np.ndarray:
+        """D (n, n) at the start: Rayleigh damping of the elastic unknowns and viscous friction of the joints (18)."""
+        return self.damping_at(self.start())
+
+    def damping_at(self, q: Any) -> np.ndarray:
+        """D (n, n) at q: it depends on the free length of a sleeved link, on nothing else (18)."""
+        return self.assembly.damping(self.check(q))
+
+    def elastic(self, q: Any) -> np.ndarray:
+        """Elastic forces (n,), on the left-hand side (17)."""
+        return self.assembly.elastic(self.check(q))
+
+    def gravity(self, q: Any) -> np.ndarray:
+        """Generalised gravity forces (n,), on the left-hand side (16)."""
+        return self.assembly.gravity(self.check(q))
+
+    def bias(self, q: Any, qd: Any) -> np.ndarray:
+        """Coriolis and centrifugal forces (n,), on the left-hand side (15)."""
+        return self.assembly.bias(self.check(q), self.check(qd, "qd"))
+
+    def forces(self, q: Any, qd: Any, qdd: Any) -> np.ndarray:
+        """Generalised forces (n,) that the motion needs: the whole left-hand side, Coulomb friction left out (19)."""
+        return self.assembly.forces(self.check(q), self.check(qd, "qd"), self.check(qdd, "qdd"))
+
+    def accelerations(self, q: Any, qd: Any, force: Any) -> np.ndarray:
+        """qdd (n,) under generalised forces (n,), locked joints at rest; Coulomb friction left out (20)-(22)."""
+        return np.asarray(self.equations.accelerations(self.check(q), self.check(qd, "qd"), self.check(force, "force")))
+
+    def line(self, q: Any, link: int, s: Any = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """x, y [m] and the tangent's angle theta [rad] in the base's axes of a link (from 1) at q.
+
+        Args: q (n,); link: its number; s (S,) [m] along it from its proximal end, by default 101 places from end to end.
+
+        Returns: three arrays (S,). Of a sleeved link what is inside or behind the sleeve lies on its axis.
+
+        Raises: InputError: there is no such link, or a place is not on it.
+        """
+        if not 1 <= link <= len(self.robot.links):
+            raise InputError(f"expected a link from 1 to {len(self.robot.links)}", key="link", value=link)
+        length = self.robot.links[link - 1].length_m
+        places = np.linspace(0.0, length, 101) if s is None else np.atleast_1d(np.asarray(s, dtype=float))
+        if places.ndim != 1 or not np.all((places >= 0) & (places <= length * (1 + 1e-12))):
+            raise InputError(f"expected places from 0 to the link's length, {length:g} m", key="s", value=s)
+        if self.exact:
+            return tuple(np.ascontiguousarray(self.equations.line(self.check(q), link - 1, places).T))  # type: ignore[return-value]
+        return self.assembly.line(self.check(q), link, places)
+
+    def places(self, q: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Tip deflections of the flexible links (k,) [m] and the last tip's x, y [m] at q: what a Run shows of them."""
+        at = self.check(q)
+        if self.exact:
+            row = self.equations.observe(at[None], np.zeros((1, self.n)), 2)[0]
+            first = np.cumsum([0] + [3 + 4 * link.flexible for link in self.robot.links])
+            return row[[first[i] + 3 for i, link in enumerate(self.robot.links) if link.flexible]], row[first[-1] : first[-1] + 2]
+        return self.assembly.tip_deflections(at), np.array([(tip := self.assembly.tip(at)).place.real, tip.place.imag])
+
+    @property
+    def exact(self) -> bool:
+        """Whether the robot is on the exact line, which the compiled core has; else the dissertation's model is asked for."""
+        return self.robot.stiffening and not self.robot.nodal
+
+    def check(self, q: Any, key: str = "q") -> np.ndarray:
+        """An array (n,) of floats. Raises InputError for another shape, and for robots that slide from node to node."""
+        if self.robot.nodal:
+            text = 'expected "continuous": sliding from node to node has other matrices between every two nodes'
+            raise InputError(text, key="sliding", value="nodal")
+        array = np.ascontiguousarray(q, dtype=float)
+        if array.shape != (self.n,):
+            raise InputError(f"expected an array of shape ({self.n},), in the order of system.labels", key=key, value=array.shape)
+        return array
+
+    def tangent(self, q: Any, qd: Any = None) -> np.ndarray:
+        """The derivative of bias, elastic and gravity forces by q (n, n), at rest or at rates qd (n,) (24)."""
+        at, rates = self.check(q), None if qd is None else self.check(qd, "qd")
+        if self.exact:
+            return np.asarray(self.equations.stiffness(at, np.zeros(0) if rates is None else rates))
+        forces = lambda z: self.assembly.elastic(z) + self.assembly.gravity(z)
+        if rates is not None:
+            still = forces
+            forces = lambda z: still(z) + self.assembly.bias(z, rates)
+        return jacobian(forces, at, np.full(self.n, 1e-6))
+
+    def rate(self, q: Any, qd: Any) -> np.ndarray:
+        """The derivative of all forces by qd (n, n) at (q, qd): damping, friction, and the gyroscopic terms of a motion (24)."""
+        at, rates = self.check(q), self.check(qd, "qd")
+        if self.exact:
+            return np.asarray(self.equations.rates(at, rates))
+        gyroscopic = jacobian(lambda v: self.assembly.bias(at, v), rates, np.full(self.n, 1e-3)) if rates.any() else 0.0
+        return self.assembly.damping(at) + gyroscopic
+
+    def _shapes(self, link: int, pieces: tuple[Piece, ...]) -> tuple[Piece, ...]:
+        """The pieces of a link; one that is the whole link gets the core's shapes in place of its own."""
+        if len(pieces) != 1 or not hasattr(pieces[0].shapes, "coefficients"):
+            return pieces
+        B, K, _ = self.equations.whole_link(link)
+        own = legendre_shapes(len(pieces[0].shapes.coefficients), pieces[0].xi)
+        coefficients = np.linalg.lstsq(own, B.T, rcond=None)[0]
+        law = structure(self.robot).laws[link]
+        assert law is not None
+        return (whole_piece(law, pieces[0].points, coefficients, K if pieces[0].K.size else np.zeros(0)),)
+
+    def _unit(self, name: str) -> str:
+        parts = name.split("/")
+        if parts[0] != "joint":
+            return _UNITS[parts[-1] if parts[2] == "element" else parts[2]]
+        return "rad" if self.robot.links[int(parts[1]) - 1].joint.type == "R" else "m"
+
+
+def assemble(robot: Robot) -> System:
+    """The System of a robot.
+
+    Args: robot: its description.
+
+    Raises: InputError: a joint moves no mass.
+    """
+    system = System(robot)
+    if system.exact:
+        _ = system.equations
+    return system
+
+
+def jacobian(function: Any, x: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """The derivative of a function of x (n,) by x, (m, n), by central differences with the given steps (n,)."""
+    shifts = np.diag(steps)
+    return np.column_stack([(function(x + e) - function(x - e)) / (2 * h) for e, h in zip(shifts, steps, strict=True)])
+
+
+def system_of(robot: Any) -> System:
+    """The System of what a function was given: a System, a Robot, or the path or name of a robot file."""
+    if isinstance(robot, System):
+        return robot
+    return assemble(robot if isinstance(robot, Robot) else load(robot))
