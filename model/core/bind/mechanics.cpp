@@ -88,7 +88,7 @@ nb::tuple whole_link(const Mechanics &self, int link) {
 
 }  // namespace
 
-Robot robot_of(const Numbers &gravity, const Numbers &payload, const Counts &counts, const Matrix &numbers, const Matrix &material) {
+Robot robot_of(const Vector &gravity, const Vector &payload, const Counts &counts, const Matrix &numbers, const Matrix &material) {
   Robot robot;
   expect(gravity.size() == 2 && payload.size() == 2, "gravity and payload have two numbers each");
   expect(counts.shape(1) == COUNTS && numbers.shape(1) == NUMBERS && material.shape(1) == MATERIAL, "rows of other lengths were expected");
@@ -130,7 +130,7 @@ void bind_mechanics(nb::module_ &module) {
     }
   });
   nb::class_<Mechanics> type(module, "Mechanics", "The equations of one robot.");
-  type.def(nb::init<const Numbers &, const Numbers &, const Counts &, const Matrix &, const Matrix &>(), "gravity"_a, "payload"_a, "counts"_a,
+  type.def(nb::init<const Vector &, const Vector &, const Counts &, const Matrix &, const Matrix &>(), "gravity"_a, "payload"_a, "counts"_a,
            "numbers"_a, "material"_a)
       .def_prop_ro("n", [](const Mechanics &self) { return self.model->n; }, "How many unknowns there are.")
       .def_prop_ro("first", [](const Mechanics &self) { return self.model->first; }, "Rows of the joints.")

@@ -38,7 +38,7 @@ private:
 class PythonSampler : public Sampler {
 public:
   PythonSampler(const Mechanics &robot, nb::callable f) : seen_(robot.model), f_(std::move(f)) {}
-  void tick(long, double t, const double *q, const double *v, Held &held) override {
+  void tick(long, double t, const double *q, const double *v, SampledOutput &held) override {
     nb::gil_scoped_acquire lock;
     seen_.call(f_, t, q, v, held.force.data());
   }

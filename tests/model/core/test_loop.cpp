@@ -2,6 +2,7 @@
 #include "check.hpp"
 #include "implicit.hpp"
 #include "loop.hpp"
+#include "pairs.hpp"
 #include "plants.hpp"
 
 using namespace flexura;
@@ -40,13 +41,13 @@ struct Run {
 };
 
 // The error at t = 1 of `count` equal steps of q'' + q = 0 from q = 1.
-template <class M> double oscillator_error(int count) {
+template <class M, class... Arguments> double oscillator_error(int count, const Arguments &...more) {
   Masses<double> plant(1);
   plant.stiffness[0] = 1.0;
   Acting acting(1);
   Acting *list = &acting;
   Course<double> c(plant, &list, 1e-8);
-  M method(c);
+  M method(c, more...);
   c.z[0] = 1.0;
   c.weights.start(c.z.data());
   const double h = 1.0 / count;
@@ -59,7 +60,9 @@ template <class M> double oscillator_error(int count) {
   return std::hypot(c.z[0] - std::cos(1.0), c.z[1] + std::sin(1.0));
 }
 
-template <class M> double order(int coarse) { return std::log2(oscillator_error<M>(coarse) / oscillator_error<M>(2 * coarse)); }
+template <class M, class... Arguments> double order(int coarse, const Arguments &...more) {
+  return std::log2(oscillator_error<M>(coarse, more...) / oscillator_error<M>(2 * coarse, more...));
+}
 
 // A controller that remembers what it was called for.
 struct Recorder : Sampler {
@@ -77,6 +80,8 @@ struct Recorder : Sampler {
 TEST("steps have the order that is theirs") {
   CHECK_NEAR(order<Explicit<double>>(2), 8.0, 0.5);
   CHECK_NEAR(order<Implicit<double>>(32), 4.0, 0.3);
+  CHECK_NEAR(order<PairSteps<double>>(16, PAIR_3), 3.0, 0.2);
+  CHECK_NEAR(order<PairSteps<double>>(8, PAIR_5), 5.0, 0.3);
 }
 
 TEST("an oscillator, at outputs between steps") {
@@ -159,6 +164,35 @@ TEST("a sampled controller is called once a tick, in order, whatever steps are r
       CHECK_NEAR(recorder.place[k], run.at(static_cast<int>(k), 0), 1e-6);  // outputs lie on the ticks here
       CHECK_NEAR(run.drive(static_cast<int>(k), 0), -300.0 * recorder.place[k] - 30.0 * run.at(static_cast<int>(k), 1) + 3.0 * std::sin(300.0 * recorder.t[k]), 1e-9);
     }
+  }
+}
+
+TEST("a controller of short ticks by steps of order 3 and 5: three and six passes a tick") {
+  Masses<double> plant(1, 1);
+  plant.stiffness = {0.0, 400.0};
+  Recorder recorder;
+  recorder.gain = 30.0;
+  Acting acting(1);
+  acting.sampler = &recorder, acting.rate_Hz = 1000.0;
+  Acting *list = &acting;
+  Loop<double> loop(plant, &list, grid(0.0, 1.0, 101), 1e-5);
+  for (const Pair *pair : {&PAIR_3, &PAIR_5}) {
+    recorder.t.clear(), recorder.place.clear();
+    PairSteps<double> method(loop.course, *pair);
+    const double q0[2] = {1.0, 0.1}, v0[2] = {0.0, 0.0};
+    loop.course.passes = 0;
+    loop.start(q0, v0, 1e-3);
+    while (loop.advance(method, 100)) {}
+    CHECK(loop.clock[0].status == Status::done && recorder.t.size() == 1000);
+    CHECK(loop.course.passes < 1050 * pair->stages);  // a few more where the motion begins
+    const double *last = loop.record[0].state.data() + 100 * loop.record[0].size;
+    CHECK_NEAR(last[1], 0.1 * std::cos(20.0), 1e-5);
+    double q = 1.0, v = 0.0;
+    for (int k = 0; k < 1000; ++k) {
+      const double a = -30.0 * q - 3.0 * v;
+      q += 1e-3 * v + 0.5e-6 * a, v += 1e-3 * a;
+    }
+    CHECK_NEAR(last[0], q, 1e-10);
   }
 }
 

@@ -113,6 +113,7 @@ TEST("the balance of sliders, sleeves, dampers and friction; a broken account sh
   robot.links[2].joint.kind = JointKind::sleeve, robot.links[2].joint.hub_mass = 0.1, robot.links[2].joint.hub_inertia = 1e-3;
   robot.payload_mass = 0.1;
   for (Link &link : robot.links) link.joint.rotor = 0.01;
+  robot.links[1].joint.start = robot.links[2].joint.start = 0.5;
   Acting acting(3);
   const double at[] = {0.2, 0.5, 0.5};
   for (int i = 0; i < 3; ++i) {
