@@ -3,7 +3,7 @@
 //
 // A step costs one pass. It begins anew, with one value and a short step, where what acts may jump.
 #pragma once
-#include "cutoff.hpp"
+#include "loads.hpp"
 #include "matrices.hpp"
 #include "method.hpp"
 #include "modal_accounts.hpp"
@@ -31,7 +31,7 @@ template <class Real> class Exponential : public Method<Real> {
       take(state, 2 * modes.stride + 8), take(slope, 2 * modes.stride + 8);
     });
     held.reset(new bool[static_cast<std::size_t>(n)]());
-    for (int i = 0; i < c.plant.joints; ++i) held[c.plant.first[i]] = held_joint(c, i);
+    for (int i = 0; i < c.plant.joints; ++i) held[c.plant.first[i]] = given_motion(c, i);
   }
 
   const char *name() const override { return "exponential"; }
@@ -144,20 +144,16 @@ template <class Real> class Exponential : public Method<Real> {
   double wishes[LANES] = {};
   long since[LANES] = {};                                    // steps since the start or a break
 
-  static bool held_joint(const Course<Real> &c, int i) {
-    const JointDrive &d = c.acts.acting(0).joints[i];
-    return c.plant.locked[i] || (d.prescribed && d.follows());
-  }
   // Behind N, a row of the history keeps the accounts' numbers, then a, y and v.
   static int extras_of(const Course<Real> &c) {
     int count = 0;
-    for (int i = 0; i < c.plant.joints; ++i) count += !held_joint(c, i);
+    for (int i = 0; i < c.plant.joints; ++i) count += !given_motion(c, i);
     return ModalAccounts<Real>::extras(count) + 3 * c.n;
   }
   static std::vector<typename ModalAccounts<Real>::Joint> free_joints(const Course<Real> &c) {
     std::vector<typename ModalAccounts<Real>::Joint> out;
     for (int i = 0; i < c.plant.joints; ++i) {
-      if (held_joint(c, i)) continue;
+      if (given_motion(c, i)) continue;
       typename ModalAccounts<Real>::Joint j{c.plant.first[i], 0.0, 0.0, c.plant.viscous[i]};
       for (int k = 0; k < LANES; ++k) {
         const JointDrive &d = c.acts.acting(k).joints[i];
@@ -274,68 +270,15 @@ template <class Real> class Exponential : public Method<Real> {
     const bool first = modes.taken[k] == 0;
     if (!modes.take(k, m, q, held.get(), wishes[k] > 0.0 ? 1.0 / wishes[k] : 1.0, options.zeta)) return false;
     if (first && options.damping) {
-      modes.cutoff[k] = options.cutoff > 0.0 ? options.cutoff : find_cutoff(k, m, q, v, t);
+      modes.cutoff[k] = options.cutoff > 0.0 ? options.cutoff : find_cutoff(c, modes, held.get(), rtol, k, m, q, v, t);
       modes.damp(k, options.zeta);
     }
     accounts.take_rows();
     return true;
   }
-
-  // The cutoff of robot k that starts at (q, v) [rad/s].
-  double find_cutoff(int k, const Matrices &m, const Real *q, const Real *v, double t) {
-    const int outputs = c.plant.joints + 2;
-    std::vector<Real> place_(q, q + n), still(n, Real(0.0)), rest(n), none(c.plant.joints, Real(0.0)), reaction(c.plant.joints);
-    std::vector<double> w2(n), share(n), struck(n, 0.0), low(outputs), high(outputs);
-    std::vector<std::vector<double>> seen(n, std::vector<double>(outputs, 0.0)), loads;
-    auto row_of = [&](int mode, int i) { return lane(modes.rows[i * modes.stride + mode], k); };
-    auto phi_of = [&](int mode, int i) { return lane(modes.phi[mode * modes.stride + i], k); };
-    for (int mode = 0; mode < n; ++mode) {
-      w2[mode] = lane(modes.w2[mode], k);
-      double most = 0.0;
-      for (int i = 0; i < n; ++i) {
-        struck[mode] += row_of(mode, i) * lane(v[i], k);
-        most = larger(most, abs(phi_of(mode, i)) * lane(c.plant.lever[i], k));
-      }
-      const double e = 1e-6 * lane(c.plant.reach, k) / larger(most, 1e-300);
-      auto look_at = [&](double by, std::vector<double> &out) {
-        for (int i = 0; i < n; ++i) set_lane(place_[i], k, lane(q[i], k) + by * phi_of(mode, i));
-        return c.plant.observe(k, place_.data(), out.data());
-      };
-      if (!look_at(-e, low) || !look_at(e, high)) return std::numeric_limits<double>::infinity();
-      for (int o = 0; o < outputs; ++o) seen[mode][o] = (high[o] - low[o]) / (2.0 * e);
-    }
-    double harmonic = 0.0;
-    const Acting &acting = c.acts.acting(k);
-    for (int i = 0; i < c.plant.joints; ++i) {
-      const JointDrive &d = acting.joints[i];
-      const int e = c.plant.first[i];
-      const Extremes force = extremes(d.force, t, 0.0), motion = extremes(d.motion, t, lane(q[e], k));
-      harmonic = larger(harmonic, larger(force.frequency, motion.frequency));
-      std::vector<double> load(n, 0.0);
-      double most = force.value + d.kp * motion.value;
-      if (acting.function || acting.sampler) most = larger(most, 1.0);  // not known: as good as any, shares being relative
-      for (int mode = 0; mode < n; ++mode) {
-        if (!held[e]) load[mode] = most * phi_of(mode, e);
-        else if (d.prescribed)
-          for (int j = 0; j < n; ++j) load[mode] += held[j] ? 0.0 : phi_of(mode, j) * m.M[j * n + e] * motion.acceleration;
-      }
-      loads.push_back(load);
-    }
-    const Pass<Real> pass{q, still.data(), q, still.data(), Real(0.0), Real(0.0), still.data(), none.data(), none.data(), held_joints().data(), none.data()};
-    c.plant.accelerate(pass, rest.data(), reaction.data());
-    ++c.passes;
-    loads.emplace_back(n, 0.0);
-    for (int mode = 0; mode < n; ++mode)
-      for (int i = 0; i < n; ++i) loads.back()[mode] += row_of(mode, i) * lane(rest[i], k);
-    if (!shares(n, w2.data(), loads, struck.data(), seen, c.plant.joints, share.data())) return std::numeric_limits<double>::infinity();
-    return cutoff_of(n, w2.data(), share.data(), rtol, harmonic);
-  }
-
-  std::vector<char> held_joints() const {
-    std::vector<char> out(c.plant.joints, 0);
-    for (int i = 0; i < c.plant.joints; ++i) out[i] = held_joint(c, i);
-    return out;
-  }
 };
+
+extern template class Exponential<double>;
+extern template class Exponential<Pack<4>>;
 
 }  // namespace flexura
