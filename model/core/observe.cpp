@@ -53,7 +53,7 @@ Observer::Observer(const Model<double> &model, int stations) : model_(model), wo
     for (int i = begin; i < end; ++i) length += model.pieces[std::size_t(i)].length;
     for (int k = 0; k < stations; ++k) {
       double s = length * k / (stations - 1);
-      int i = begin;
+      int i = model.kind[std::size_t(link)] == JointKind::sleeve ? end - 1 : begin;
       while (i + 1 < end && s > model.pieces[std::size_t(i)].length) s -= model.pieces[std::size_t(i)].length, ++i;
       const Piece<double> &c = model.pieces[std::size_t(i)];
       if (k + 1 == stations) i = end - 1, s = model.pieces[std::size_t(i)].length;

@@ -11,6 +11,7 @@ namespace {
 constexpr int CALL = 1000, LOOK = 50;   // steps between two looks at a run: at how many there are; at what it costs so far
 constexpr double STEPS_A_TICK = 12.0;   // more than that on average, and a row is given up: its gains make the robot chatter
 constexpr double FIRST = 1e-4;          // first step, in whole runs
+constexpr double SHARPEST = 1e-9;       // tolerances below are for the method of the highest order
 constexpr double CERTAIN = 1.0 + 1e-9;  // by which a cost must exceed its limit
 
 Acting driven(const Plan &plan, Controller &controller) {
@@ -28,6 +29,8 @@ std::string method_for_ticks(const Model<double> &robot, Acting &acting, const d
   const Acts<double> acts(plant, &list);
   const std::vector<double> still(std::size_t(robot.n), 0.0);
   const double fastest = plant.fastest(q, acts.pass(q, still.data(), q, still.data(), 0.0, 0.0));
+  if (rtol < SHARPEST) return "explicit";
+  if (fastest > 2.0 * Explicit<double>::STABLE * acting.rate_Hz) return "implicit";  // explicit steps would be many a tick
   return explicit_for_ticks(1.0 / acting.rate_Hz, fastest, rtol);
 }
 
