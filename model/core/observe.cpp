@@ -7,11 +7,8 @@ namespace {
 
 // Weights (P) of the place at the fraction x of a line of length 1 with P Gauss points (2).
 std::vector<double> weights_at(int P, double x) {
-  const auto integrals = lagrange_integrals(gauss(P));
-  std::vector<double> value(std::size_t(P) + 1), first(value.size()), second(value.size()), out(std::size_t(P), 0.0);
-  legendre(2.0 * x - 1.0, P, value.data(), first.data(), second.data());
-  for (int n = 0; n <= P; ++n)
-    for (int j = 0; j < P; ++j) out[std::size_t(j)] += 0.5 * integrals[std::size_t(n)][std::size_t(j)] * value[std::size_t(n)];
+  std::vector<double> out(static_cast<std::size_t>(P));
+  line_weights(line_rule(P), 2.0 * x - 1.0, 0.5, out.data());
   return out;
 }
 
