@@ -16,6 +16,30 @@ bool bends(const Model<double> &model, int link) { return model.elastic[std::siz
 
 }  // namespace
 
+int last_flexible(const Model<double> &model) {
+  int link = model.links() - 1;
+  while (link >= 0 && !bends(model, link)) --link;
+  return link;
+}
+
+Bend bend(const Model<double> &model, Workspace<double> &work, const double *y, int link) {
+  const int end = model.begin[std::size_t(link) + 1];
+  const int first = model.kind[std::size_t(link)] == JointKind::sleeve ? end - 1 : model.begin[std::size_t(link)];
+  Bend out;
+  double phi = 0.0, up = 0.0;  // in the hub's own axes
+  for (int i = first; i < end; ++i) {
+    const Piece<double> &c = model.pieces[std::size_t(i)];
+    Kept<double> &k = work.kept[std::size_t(i)];
+    const double *q = y + c.own(), scale = c.joint == At::sleeve ? y[c.first] : 1.0;
+    k.phi = phi, k.omega = 0.0;
+    turn(c, k, q, q, Free{c.m}, Free{c.P});
+    for (int j = 0; j < c.P; ++j) up += scale * c.w[j] * k.sine[j];
+    for (int l = 0; l < c.m; ++l) phi += c.tip_angle[l] * q[l];
+  }
+  out.deflection = up, out.slope = phi;
+  return out;
+}
+
 Observer::Observer(const Model<double> &model, int stations) : model_(model), work_(model), stations_(std::size_t(model.links())) {
   for (int link = 0; link < model.links(); ++link) {
     columns_ += 3;

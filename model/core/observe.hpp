@@ -6,6 +6,15 @@
 
 namespace flexura {
 
+// How a link's tip stands to the tangent at its hub (of a sleeved link: at the exit): distance across it, angle to it.
+struct Bend {
+  double deflection = 0.0, slope = 0.0;  // [m], [rad]
+};
+Bend bend(const Model<double> &model, Workspace<double> &work, const double *y, int link);
+
+// The last link that bends, or -1.
+int last_flexible(const Model<double> &model);
+
 // Columns of an observation, link by link: x, y, angle of the hub's frame (of a sleeved link its proximal end); of a link that bends also the
 // tip's distance across the tangent at its hub (sleeve), the tip's angle to it, and that distance at `stations` equally spaced
 // abscissas of the material; then tip x, y; kinetic, strain, potential energy.

@@ -11,4 +11,5 @@ MODULE(FLEXURA_MODULE_NAME, module) {
   module.attr("portable") = flexura::build_portable();
   flexura::bind_numbers(module);
   flexura::bind_mechanics(module);
+  flexura::bind_simulation(module);
 }

@@ -1,0 +1,184 @@
+// The time loop: a run that is begun, advanced and read from Python.
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include "mechanics.hpp"
+#include "observe.hpp"
+#include "simulation.hpp"
+
+namespace flexura {
+namespace {
+
+using Flags = nb::ndarray<const std::uint8_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Ranges = nb::ndarray<const std::int64_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+
+// Arrays of a state as a Python function of a drive sees it.
+class Seen {
+public:
+  explicit Seen(std::shared_ptr<const Model<double>> model) : model_(std::move(model)), work_(*model_), link_(last_flexible(*model_)) {}
+
+  // f(t, position, velocity, tip_deflection) -> forces (joints).
+  void call(const nb::callable &f, double t, const double *q, const double *v, double *force) {
+    const std::size_t joints = model_->first.size();
+    Array position = new_array({joints}), velocity = new_array({joints});
+    for (std::size_t i = 0; i < joints; ++i) position.data()[i] = q[model_->first[i]], velocity.data()[i] = v[model_->first[i]];
+    const double deflection = link_ < 0 ? 0.0 : bend(*model_, work_, q, link_).deflection;
+    const Vector out = nb::cast<Vector>(f(t, position, velocity, deflection));
+    if (out.shape(0) != joints) throw std::invalid_argument("the drive function gives another number of forces");
+    for (std::size_t i = 0; i < joints; ++i) force[i] = out.data()[i];
+  }
+
+private:
+  std::shared_ptr<const Model<double>> model_;
+  Workspace<double> work_;
+  int link_;
+};
+
+// A Python function that is called once a tick.
+class PythonSampler : public Sampler {
+public:
+  PythonSampler(const Mechanics &robot, nb::callable f) : seen_(robot.model), f_(std::move(f)) {}
+  void tick(long, double t, const double *q, const double *v, Held &held) override {
+    nb::gil_scoped_acquire lock;
+    seen_.call(f_, t, q, v, held.force.data());
+  }
+
+private:
+  Seen seen_;
+  nb::callable f_;
+};
+
+Signal signal_of(const Matrix &segments, std::int64_t from, std::int64_t to) {
+  Signal out;
+  for (std::int64_t k = from; k < to; ++k) {
+    Segment row;
+    std::copy_n(segments.data() + 10 * k, 10, reinterpret_cast<double *>(&row));
+    out.push_back(row);
+  }
+  return out;
+}
+
+// Drives of the joints: rows of signals, their ranges (joints, 4) [force from, to; motion from, to], gains (joints, 2), flags.
+Acting acting_of(const Matrix &segments, const Ranges &ranges, const Matrix &gains, const Flags &prescribed, const Flags &sampled,
+                 const Matrix &limits) {
+  const std::size_t joints = ranges.shape(0);
+  if (segments.shape(1) != 10 || ranges.shape(1) != 4 || gains.shape(0) != joints || limits.shape(0) != joints)
+    throw std::invalid_argument("drives of another shape were expected");
+  Acting acting((int(joints)));
+  for (std::size_t i = 0; i < joints; ++i) {
+    JointDrive &joint = acting.joints[i];
+    const std::int64_t *r = ranges.data() + 4 * i;
+    joint.force = signal_of(segments, r[0], r[1]), joint.motion = signal_of(segments, r[2], r[3]);
+    joint.kp = gains.data()[2 * i], joint.kd = gains.data()[2 * i + 1];
+    joint.prescribed = prescribed.data()[i] != 0, joint.sampled = sampled.data()[i] != 0;
+    acting.limit(int(i), limits.data()[2 * i], limits.data()[2 * i + 1]);
+  }
+  return acting;
+}
+
+const char *word(Status status) {
+  switch (status) {
+    case Status::running: return "running";
+    case Status::done: return "done";
+    case Status::limit: return "limit";
+    case Status::stuck: return "stuck";
+    case Status::diverged: return "diverged";
+    case Status::exhausted: return "exhausted";
+    case Status::interrupted: return "interrupted";
+  }
+  return "";
+}
+
+// A run and what Python objects it needs.
+struct Running {
+  nb::object function, sampler;  // kept alive
+  std::unique_ptr<Seen> seen;
+  std::unique_ptr<Simulation> run;
+
+  Running(const Mechanics &robot, const Vector &t, const Vector &q, const Vector &v, double rtol, const std::string &method,
+          const Matrix &segments, const Ranges &ranges, const Matrix &gains, const Flags &prescribed, const Flags &sampled,
+          const Matrix &limits, nb::object function_, nb::object sampler_, double rate_Hz, double first_step, long most_steps)
+      : function(std::move(function_)), sampler(std::move(sampler_)) {
+    const std::size_t n = std::size_t(robot.model->n);
+    if (q.shape(0) != n || v.shape(0) != n || t.shape(0) < 1 || ranges.shape(0) != robot.model->first.size())
+      throw std::invalid_argument("a run of another robot was expected");
+    Acting acting = acting_of(segments, ranges, gains, prescribed, sampled, limits);
+    if (!function.is_none()) {
+      seen = std::make_unique<Seen>(robot.model);
+      acting.function = [this](double at, const double *place, const double *rate, double *force) {
+        nb::gil_scoped_acquire lock;
+        seen->call(nb::borrow<nb::callable>(function), at, place, rate, force);
+      };
+    }
+    if (!sampler.is_none()) acting.sampler = nb::cast<Sampler *>(sampler), acting.rate_Hz = rate_Hz;
+    Request request;
+    request.times = {t.data(), t.data() + t.shape(0)}, request.q = {q.data(), q.data() + n}, request.v = {v.data(), v.data() + n};
+    request.rtol = rtol, request.method = method, request.first_step = first_step, request.most_steps = most_steps;
+    run = std::make_unique<Simulation>(robot.model, std::move(acting), request);
+  }
+
+  bool advance(long steps) {
+    nb::gil_scoped_release release;
+    return run->advance(steps);
+  }
+
+  nb::dict progress() const {
+    const Clock &c = run->clock();
+    nb::dict out;
+    out["status"] = word(c.status), out["t"] = c.t, out["steps"] = c.steps, out["rejected"] = c.rejected;
+    out["passes"] = run->passes(), out["method"] = run->method();
+    out["joint"] = c.joint, out["elastic"] = c.elastic, out["rate"] = c.rate;
+    return out;
+  }
+
+  // Times (R,), states (R, 2 n), accounts (R, 4), drive forces (R, joints) of the rows so far.
+  nb::tuple rows() const {
+    const Record &r = run->record();
+    const std::size_t R = std::size_t(r.rows), size = std::size_t(r.size), wide = 2 * std::size_t(run->model().n), joints = std::size_t(r.joints);
+    Array t = new_array({R}), states = new_array({R, wide}), accounts = new_array({R, size - wide}), drive = new_array({R, joints});
+    std::copy_n(r.t.begin(), R, t.data()), std::copy_n(r.drive.begin(), R * joints, drive.data());
+    for (std::size_t k = 0; k < R; ++k) {
+      std::copy_n(r.state.begin() + std::ptrdiff_t(k * size), wide, states.data() + k * wide);
+      std::copy_n(r.state.begin() + std::ptrdiff_t(k * size + wide), size - wide, accounts.data() + k * (size - wide));
+    }
+    return nb::make_tuple(t, states, accounts, drive);
+  }
+
+  Array state() const {
+    const std::vector<double> z = run->state();
+    Array out = new_array({z.size()});
+    std::copy(z.begin(), z.end(), out.data());
+    return out;
+  }
+};
+
+Array bends_of(const Mechanics &self, const Matrix &q, int link) {
+  Workspace<double> work(*self.model);
+  Array out = new_array({q.shape(0), 2});
+  for (std::size_t k = 0; k < q.shape(0); ++k) {
+    const Bend b = bend(*self.model, work, q.data() + k * q.shape(1), link);
+    out.data()[2 * k] = b.deflection, out.data()[2 * k + 1] = b.slope;
+  }
+  return out;
+}
+
+}  // namespace
+
+void bind_simulation(nb::module_ &module) {
+  using namespace nb::literals;
+  nb::class_<Sampler>(module, "Sampler", "A sampled controller.");
+  nb::class_<PythonSampler, Sampler>(module, "PythonSampler", "A function (t, position, velocity, tip_deflection) -> forces, once a tick.")
+      .def(nb::init<const Mechanics &, nb::callable>(), "robot"_a, "function"_a);
+  nb::class_<Running>(module, "Simulation", "A run in progress.")
+      .def(nb::init<const Mechanics &, const Vector &, const Vector &, const Vector &, double, const std::string &, const Matrix &,
+                    const Ranges &, const Matrix &, const Flags &, const Flags &, const Matrix &, nb::object, nb::object, double, double, long>(),
+           "robot"_a, "t"_a, "q"_a, "v"_a, "rtol"_a, "method"_a, "segments"_a, "ranges"_a, "gains"_a, "prescribed"_a, "sampled"_a,
+           "limits"_a, "function"_a.none(), "sampler"_a.none(), "rate_Hz"_a, "first_step"_a, "most_steps"_a)
+      .def("advance", &Running::advance, "steps"_a, "At most so many steps further; may it go on?")
+      .def("progress", &Running::progress, "How far the run is, and how it ended.")
+      .def("rows", &Running::rows, "Times, states, accounts and drive forces so far.")
+      .def("state", &Running::state, "The state where the run is, accounts included.");
+  module.def("bends", &bends_of, "robot"_a, "q"_a, "link"_a, "Tip deflection and slope (T, 2) of a link at q (T, n).");
+}
+
+}  // namespace flexura

@@ -1,0 +1,51 @@
+// One robot's run from a request to its record: the time loop, the methods that it may take, how far it is.
+#pragma once
+#include <atomic>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "loop.hpp"
+#include "model_plant.hpp"
+
+namespace flexura {
+
+// Names of methods: "auto", "explicit", "implicit", "exponential".
+std::unique_ptr<Method<double>> make_method(const std::string &name, Course<double> &course);
+
+struct Request {
+  std::vector<double> times;       // of the outputs; the first is the start
+  std::vector<double> q, v;        // (n) at the start
+  double rtol = 1e-6;
+  std::string method = "auto";
+  double first_step = 0.0;         // 0: chosen
+  long most_steps = 0;             // 0: no budget
+};
+
+class Simulation {
+public:
+  // `acting` and what it names must outlive the run.
+  Simulation(std::shared_ptr<const Model<double>> model, Acting acting, const Request &request);
+
+  // At most so many steps further; may it go on?
+  bool advance(long steps);
+
+  const Clock &clock() const { return loop_.clock[0]; }
+  const Record &record() const { return loop_.record[0]; }
+  const Model<double> &model() const { return *model_; }
+  long passes() const { return loop_.course.passes; }
+  std::string method() const { return method_->name(); }
+  std::vector<double> state() const { return {loop_.course.z.begin(), loop_.course.z.begin() + loop_.course.size}; }
+  std::atomic<bool> interrupt{false};
+
+private:
+  std::shared_ptr<const Model<double>> model_;
+  Workspace<double> work_;
+  ModelPlant<double> plant_;
+  Acting acting_;
+  Acting *acting_pointer_;
+  Loop<double> loop_;
+  std::unique_ptr<Method<double>> method_;
+};
+
+}  // namespace flexura
