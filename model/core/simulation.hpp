@@ -10,9 +10,6 @@
 
 namespace flexura {
 
-// Names of methods: "auto", "explicit", "implicit", "exponential".
-std::unique_ptr<Method<double>> make_method(const std::string &name, Course<double> &course);
-
 struct Request {
   std::vector<double> times;       // of the outputs; the first is the start
   std::vector<double> q, v;        // (n) at the start

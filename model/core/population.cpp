@@ -1,0 +1,229 @@
+#include "population.hpp"
+
+#include <algorithm>
+#include <exception>
+#include <limits>
+#include <mutex>
+#include <thread>
+
+#include "fault.hpp"
+#include "loop.hpp"
+#include "methods.hpp"
+#include "model_plant.hpp"
+#include "observe.hpp"
+
+namespace flexura {
+namespace {
+
+using Four = Pack<4>;
+constexpr int LANES = 4;
+constexpr long STEPS = 1000;  // between two looks at whether a robot still runs
+
+// A robot that is about to run.
+struct Starter {
+  int robot = 0;  // number in the population
+  Model<double> model;
+  Acting acting;
+  std::vector<double> q, v;
+};
+
+bool same_equations(const Shape &a, const Shape &b) {
+  return a.joint == b.joint && a.m == b.m && a.P == b.P && a.first == b.first && a.rail == b.rail && a.intervals == b.intervals;
+}
+
+// Whether two robots can share a pack.
+bool alike(const Starter &a, const Starter &b) {
+  bool out = a.model.pieces.size() == b.model.pieces.size() && a.model.mass_damped == b.model.mass_damped;
+  for (std::size_t i = 0; out && i < a.model.pieces.size(); ++i) out = same_equations(a.model.pieces[i], b.model.pieces[i]);
+  for (std::size_t i = 0; out && i < a.acting.joints.size(); ++i) {
+    const JointDrive &one = a.acting.joints[i], &other = b.acting.joints[i];
+    out = (one.prescribed && one.follows()) == (other.prescribed && other.follows());
+  }
+  return out;
+}
+
+class Worker {
+public:
+  Worker(const Population &population, double *values, const std::atomic<bool> &stop, std::vector<Ending> &endings)
+      : all_(population), values_(values), stop_(stop), endings_(endings) {}
+
+  // Robots `first` to `end`, at most four.
+  void run(int first, int end) {
+    std::vector<Robot> robots;
+    const Robot *pointers[LANES];
+    Model<double> models[LANES];
+    std::unique_ptr<Fault> faults[LANES];
+    for (int k = first; k < end; ++k) robots.push_back(robot_of(all_.robots, k));
+    for (int k = 0; k < end - first; ++k) pointers[k] = &robots[std::size_t(k)];
+    assemble(pointers, end - first, models, faults);
+    std::vector<Starter> starters;
+    for (int k = first; k < end; ++k) {
+      Ending &ending = endings_[std::size_t(k)];
+      if (const Fault *fault = faults[k - first].get()) {
+        ending.refusal = Ending::fault, ending.joint = fault->link, ending.key = fault->key, ending.expected = fault->what();
+        continue;
+      }
+      Starter starter = ready(k, std::move(models[k - first]));
+      if (inside_limits(starter, ending)) starters.push_back(std::move(starter));
+    }
+    while (!starters.empty()) {  // those like the first share a pack
+      std::vector<Starter> rest, together;
+      for (Starter &s : starters) (together.empty() || alike(together.front(), s) ? together : rest).push_back(std::move(s));
+      run_together(together);
+      starters = std::move(rest);
+    }
+  }
+
+private:
+  const Population &all_;
+  double *values_;
+  const std::atomic<bool> &stop_;
+  std::vector<Ending> &endings_;
+
+  Starter ready(int k, Model<double> model) const {
+    Starter out;
+    out.robot = k, out.model = std::move(model), out.acting = all_.drives[std::size_t(all_.drive_of[std::size_t(k)])];
+    const std::size_t n = std::size_t(out.model.n);
+    const bool own = all_.q.empty();
+    out.q = own ? std::vector<double>(n, 0.0) : all_.q, out.v = all_.v.empty() ? std::vector<double>(n, 0.0) : all_.v;
+    if (out.q.size() != n || out.v.size() != n) throw std::invalid_argument("the start needs an entry an unknown");
+    for (int i = 0; i < out.model.links(); ++i) {
+      const std::size_t link = std::size_t(i), row = std::size_t(out.model.first[link]);
+      const double *limits = all_.limits + 2 * (std::size_t(k) * out.model.first.size() + link);
+      out.acting.limit(i, limits[0], limits[1]);
+      if (own) out.q[row] = out.model.start[link];
+      if (out.model.locked[link]) out.v[row] = 0.0;
+      const JointDrive &drive = out.acting.joints[link];
+      if (!drive.prescribed || !drive.follows() || out.model.locked[link]) continue;
+      const Motion motion = out.acting.motion(i, all_.times.front());
+      out.q[row] = motion.y, out.v[row] = motion.yd;
+    }
+    return out;
+  }
+
+  static bool inside_limits(const Starter &starter, Ending &ending) {
+    const Model<double> &model = starter.model;
+    for (std::size_t i = 0; i < model.first.size(); ++i) {
+      const double place = starter.q[std::size_t(model.first[i])];
+      ending.position.push_back(place);
+      if (ending.refusal != Ending::none || (model.low[i] <= place && place <= model.high[i])) continue;
+      ending.refusal = Ending::start, ending.joint = int(i);
+    }
+    return ending.refusal == Ending::none;
+  }
+
+  // Robots that are alike; lanes without a robot run the first again.
+  void run_together(std::vector<Starter> &starters) {
+    const int count = int(starters.size());
+    auto starter = [&](int k) -> Starter & { return starters[std::size_t(k < count ? k : 0)]; };
+    const Model<double> *models[LANES];
+    Acting *acting[LANES];
+    for (int k = 0; k < LANES; ++k) models[k] = &starter(k).model, acting[k] = &starter(k).acting;
+    const Model<Four> model = pack(models);
+    const std::size_t n = std::size_t(model.n);
+    std::vector<Four> q(n), v(n);
+    for (std::size_t i = 0; i < n; ++i)
+      for (int k = 0; k < LANES; ++k) q[i].set(k, starter(k).q[i]), v[i].set(k, starter(k).v[i]);
+    Workspace<Four> work(model);
+    ModelPlant<Four> plant(model, work);
+    Loop<Four> loop(plant, acting, all_.times, all_.rtol);
+    const auto method = make_method(all_.method, loop.course);
+    loop.interrupt = &stop_;
+    if (all_.most_steps > 0) loop.most_steps = all_.most_steps;
+    loop.start(q.data(), v.data(), FIRST_STEP * (all_.times.back() - all_.times.front()));
+    while (loop.advance(*method, STEPS)) {
+    }
+    for (int k = 0; k < count; ++k) end(loop, starters[std::size_t(k)], k);
+    observe(model, loop, starters);
+  }
+
+  void end(const Loop<Four> &loop, const Starter &starter, int k) {
+    const Clock &clock = loop.clock[std::size_t(k)];
+    const Record &record = loop.record[std::size_t(k)];
+    Ending &ending = endings_[std::size_t(starter.robot)];
+    ending.status = clock.status, ending.reached = clock.t, ending.joint = clock.joint, ending.steps = clock.steps;
+    for (std::size_t i = 0; i < ending.position.size(); ++i) {
+      const std::size_t row = std::size_t(starter.model.first[i]);
+      const bool last = clock.status == Status::limit && record.rows > 0;  // the state there is the record's last row
+      ending.position[i] = last ? record.state[std::size_t(record.rows - 1) * std::size_t(record.size) + row] : loop.course.z[row][k];
+    }
+  }
+
+  // The channels of robots that have run. A row of times that a robot has not reached shows its first one and is not written.
+  void observe(const Model<Four> &model, const Loop<Four> &loop, const std::vector<Starter> &starters) {
+    const int n = model.n, count = int(starters.size()), size = 2 * n + ACCOUNTS;
+    Observer<Four> observer(model, all_.stations);
+    int parts = 0, most = 0, rows[LANES];
+    for (const Channel &channel : all_.channels) parts |= channel.of == Channel::seen ? observer.part_of(channel.index) : 0;
+    for (int k = 0; k < LANES; ++k) rows[k] = k < count ? reached(loop.record[std::size_t(k)]) : 0, most = std::max(most, rows[k]);
+    std::vector<Four> state(static_cast<std::size_t>(2 * n)), seen(static_cast<std::size_t>(observer.columns()));
+    for (int row = 0; row < most; ++row) {
+      const double *z[LANES], *drive[LANES];
+      for (int k = 0; k < LANES; ++k) {
+        const Record &record = loop.record[std::size_t(k)];
+        const std::size_t at = row < rows[k] ? std::size_t(row) : 0;
+        z[k] = record.state.data() + at * std::size_t(size), drive[k] = record.drive.data() + at * std::size_t(record.joints);
+        for (int j = 0; j < 2 * n; ++j) state[std::size_t(j)].set(k, z[k][j]);
+      }
+      if (parts != 0) observer.observe(state.data(), state.data() + n, seen.data(), parts);
+      for (std::size_t c = 0; c < all_.channels.size(); ++c)
+        for (int k = 0; k < count; ++k)
+          if (row < rows[k]) *value(c, starters[std::size_t(k)].robot, row) = number(all_.channels[c], model, z[k], drive[k], seen, k);
+    }
+  }
+
+  static double number(const Channel &channel, const Model<Four> &model, const double *z, const double *drive, const std::vector<Four> &seen, int k) {
+    const std::size_t i = std::size_t(channel.index);
+    switch (channel.of) {
+      case Channel::position: return z[model.first[i]];
+      case Channel::velocity: return z[model.n + model.first[i]];
+      case Channel::drive: return drive[i];
+      case Channel::account: return z[2 * model.n + channel.index];
+      case Channel::seen: return seen[i][k];
+    }
+    return 0.0;
+  }
+
+  double *value(std::size_t channel, int robot, int row) const {
+    return values_ + (channel * std::size_t(all_.robots.count) + std::size_t(robot)) * all_.times.size() + std::size_t(row);
+  }
+
+  // Rows of a record that are outputs; after a limit one more follows.
+  int reached(const Record &record) const {
+    int row = 0;
+    while (row < record.rows && row < int(all_.times.size()) && record.t[std::size_t(row)] == all_.times[std::size_t(row)]) ++row;
+    return row;
+  }
+};
+
+}  // namespace
+
+std::vector<Ending> run(const Population &population, int threads, double *values, const std::atomic<bool> &stop, std::atomic<long> &done) {
+  const int robots = population.robots.count;
+  std::vector<Ending> endings(static_cast<std::size_t>(robots));
+  std::fill_n(values, population.channels.size() * std::size_t(robots) * population.times.size(), std::numeric_limits<double>::quiet_NaN());
+  std::atomic<int> next{0};
+  std::mutex lock;
+  std::exception_ptr failure;
+  auto work = [&] {
+    try {
+      Worker worker(population, values, stop, endings);
+      for (int first; (first = next.fetch_add(LANES)) < robots && !stop.load(std::memory_order_relaxed);) {
+        const int end = std::min(first + LANES, robots);
+        worker.run(first, end);
+        done.fetch_add(end - first, std::memory_order_relaxed);
+      }
+    } catch (...) {
+      const std::lock_guard<std::mutex> guard(lock);
+      failure = std::current_exception(), next = robots;
+    }
+  };
+  std::vector<std::thread> others;
+  for (int k = 1; k < std::min(threads, (robots + LANES - 1) / LANES); ++k) others.emplace_back(work);
+  work();
+  for (std::thread &other : others) other.join();
+  if (failure) std::rethrow_exception(failure);
+  return endings;
+}
+
+}  // namespace flexura
