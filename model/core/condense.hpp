@@ -19,7 +19,6 @@ struct Stage {
 // Rows of a piece by columns (see kinematics.hpp). Rows 0: turning, 1 ... m: its own, m + 1: the flow of a sleeve; x, y: the hub's place.
 template <class Real, int M, int G>
 struct Rows {
-  static constexpr int unknowns = M;
   using Columns = Row<Real, M + 2 + G>;
   Columns row[M + 1 + G], x, y;
   Real xx, xy, yy;
@@ -52,12 +51,13 @@ inline void add_beyond(R &rows, const Kept<Real> &k, int m, int flow, int stride
 
 // Eliminates the piece's own rows, H = L D L^T, and leaves the wrench on the hub in `beyond`; `flow`: (x, y, angle, flow, rest) of a
 // sleeve's row of d. Every pivot is positive: the rows are sums of squares (5).
-template <class Real, class R>
-inline void eliminate(R &rows, Kept<Real> &k, int m, Beyond<Real> &beyond, Real *flow) {
-  const int g = flow != nullptr, rest = m + 1 + g, wide = 4 + g;  // what a row couples with: x, y, angle, (flow,) rest
+template <class Real, int M, int G>
+inline void eliminate(Rows<Real, M, G> &rows, Kept<Real> &k, int m, Beyond<Real> &beyond, Real *flow) {
+  constexpr int g = G, wide = 4 + G;  // what a row couples with: x, y, angle, (flow,) rest
+  const int rest = m + 1 + g;
   Sym3<Real> I{rows.xx, rows.xy, rows.x[0], rows.yy, rows.y[0], rows.row[0][0]};
   Vec3<Real> p{rows.x[rest], rows.y[rest], rows.row[0][rest]};
-  Row<Real, 8> tail[R::unknowns + 1];
+  Row<Real, 8> tail[M + 1];
   for (int j = 0; j < m; ++j) {
     fill(tail[j], Real(0.0), wide);
     tail[j].set(0, rows.x[1 + j]), tail[j].set(1, rows.y[1 + j]), tail[j].set(2, rows.row[0][1 + j]);

@@ -23,16 +23,6 @@ constexpr double E[6] = {  // the last row of A less the weights of third order
 };
 }  // namespace esdirk
 
-// What a quintic rises by up to the fraction x, and its slope there, from its whole rise and its slopes and curvatures by x at both ends.
-template <class Real>
-inline void quintic(const Real &x, const Real &rise, const Real &v0, const Real &v1, const Real &a0, const Real &a1, Real &y, Real &v) {
-  const Real c3 = 10.0 * rise - 6.0 * v0 - 4.0 * v1 - 1.5 * a0 + 0.5 * a1;
-  const Real c4 = -15.0 * rise + 8.0 * v0 + 7.0 * v1 + 1.5 * a0 - a1;
-  const Real c5 = 6.0 * rise - 3.0 * v0 - 3.0 * v1 - 0.5 * a0 + 0.5 * a1;
-  y = x * (v0 + x * (0.5 * a0 + x * (c3 + x * (c4 + x * c5))));
-  v = v0 + x * (a0 + x * (3.0 * c3 + x * (4.0 * c4 + 5.0 * x * c5)));
-}
-
 template <class Real> class Implicit : public Method<Real> {
  public:
   static constexpr double TIGHT = 0.02;  // of the tolerance: what may be left of a stage
@@ -78,14 +68,10 @@ template <class Real> class Implicit : public Method<Real> {
 
   void prepare(const Real &, const Real &, const Real &) override {}
 
+  // By cubics through states and slopes at both ends. (A quintic of the positions would take the accelerations in, which of modes
+  // that the step does not resolve say nothing.)
   void between(const Real &h, const Real &x, Real *state) override {
-    const int n = c.n;
-    for (int k = 0; k < n; ++k) {
-      Real y, v;
-      quintic(x, c.znew[k] - c.z[k], h * c.z[n + k], h * c.znew[n + k], h * h * K[0][n + k], h * h * K[5][n + k], y, v);
-      state[k] = c.z[k] + y, state[n + k] = v / h;
-    }
-    for (int k = 2 * n; k < c.size; ++k) {
+    for (int k = 0; k < c.size; ++k) {
       const Real rise = c.znew[k] - c.z[k], f0 = h * K[0][k], f1 = h * K[5][k];
       state[k] = c.z[k] + x * (f0 + x * (3.0 * rise - 2.0 * f0 - f1 + x * (f0 + f1 - 2.0 * rise)));
     }

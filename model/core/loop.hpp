@@ -15,20 +15,9 @@
 
 #include "clock.hpp"
 #include "method.hpp"
+#include "record.hpp"
 
 namespace flexura {
-
-// What a run gives: rows of times, states (q, v, accounts) and drive forces.
-struct Record {
-  int rows = 0, size = 0, joints = 0;
-  std::vector<double> t, state, drive;
-
-  void open(int most, int state_size, int joint_count) {
-    size = state_size, joints = joint_count, rows = 0;
-    t.assign(most, 0.0), state.assign(static_cast<std::size_t>(most) * size, 0.0);
-    drive.assign(static_cast<std::size_t>(most) * joints, 0.0);
-  }
-};
 
 template <class Real> class Loop {
  public:
@@ -59,7 +48,7 @@ template <class Real> class Loop {
     for (int k = 0; k < LANES; ++k) {
       clock[k] = Clock();
       clock[k].t = clock[k].start = outputs.front(), clock[k].end = outputs.back(), clock[k].wish = first_step;
-      record[k].open(static_cast<int>(outputs.size()) + 1, course.size, course.plant.joints);
+      record[k].open(outputs.size() + 1, course.size, course.plant.joints);
     }
   }
 
@@ -92,6 +81,8 @@ template <class Real> class Loop {
   Method<Real> *current = nullptr;
   Real at, length, last, error, good;
   bool prepared = false;
+
+  int count() const { return int(outputs.size()); }
 
   void end_all(Status status) {
     for (Clock &c : clock)
@@ -130,9 +121,9 @@ template <class Real> class Loop {
     }
     for (int k = 0; k < LANES; ++k) {
       Clock &c = clock[k];
-      if (!c.running() || c.row >= static_cast<int>(outputs.size()) || outputs[c.row] > c.t) continue;
+      if (!c.running() || c.row >= count() || outputs[std::size_t(c.row)] > c.t) continue;
       keep(k, c.t, course.z.data());
-      if (c.row >= static_cast<int>(outputs.size())) c.status = Status::done;
+      if (c.row >= count()) c.status = Status::done;
     }
   }
 
@@ -157,7 +148,7 @@ template <class Real> class Loop {
     const double e = lane(error, k);
     if (!(e < 1.0)) return reject(method, k, e);
     const double passed_at = first_beyond(method, k);
-    while (c.row < static_cast<int>(outputs.size()) && outputs[c.row] < std::fmin(c.next, passed_at)) {
+    while (c.row < count() && outputs[c.row] < std::fmin(c.next, passed_at)) {
       between(method, k, outputs[c.row]);
       keep(k, outputs[c.row], row_state.data());
     }
@@ -177,7 +168,8 @@ template <class Real> class Loop {
     const bool over = c.steps + c.rejected >= most_steps;
     if (!over && !c.too_short(c.wish)) return;
     c.status = over ? Status::exhausted : std::isfinite(e) ? Status::stuck : Status::diverged;
-    blame(k);
+    const Spot spot = course.weights.worst_spot(course.error.data(), k);
+    c.joint = spot.joint, c.elastic = spot.elastic, c.rate = spot.rate;
   }
 
   // After all robots are judged: good steps are taken.
@@ -205,7 +197,7 @@ template <class Real> class Loop {
 
   void finish(int k) {
     Clock &c = clock[k];
-    while (c.row < static_cast<int>(outputs.size())) keep(k, c.t, course.z.data());
+    while (c.row < count()) keep(k, c.t, course.z.data());
     if (c.running()) c.status = Status::done;
   }
 
@@ -260,7 +252,7 @@ template <class Real> class Loop {
     if (turns(k))
       for (int j = 1; j < 8; ++j) look(c.t + c.step * j / 8.0);
     else
-      for (int j = c.row; j < static_cast<int>(outputs.size()) && outputs[j] < c.next && limited(k); ++j)
+      for (int j = c.row; j < count() && outputs[j] < c.next && limited(k); ++j)
         if (outputs[j] > inside) look(outputs[j]);
     look(c.next);
     if (outside == Clock::NEVER) return outside;
@@ -301,24 +293,6 @@ template <class Real> class Loop {
       for (int j = 0; j < course.size; ++j) set_lane(course.z[j], k, lane(row_state[j], k));
     }
     c.t = t, c.status = Status::limit;
-  }
-
-  // Where robot k's last error was worst.
-  void blame(int k) {
-    Clock &c = clock[k];
-    double most = -1.0;
-    const auto &w = course.weights.weight;
-    for (int half = 0; half < 2; ++half)
-      for (int i = 0; i < course.plant.joints; ++i)
-        for (int elastic = 0; elastic < 2; ++elastic) {
-          const int e = half * course.n + course.plant.first[i], end = half * course.n + course.plant.first[i + 1];
-          double sum = 0.0;
-          for (int j = elastic ? e + 1 : e; j < (elastic ? end : e + 1); ++j) {
-            const double x = lane(course.error[j] * w[j], k);
-            sum += std::isfinite(x) ? x * x : 1e300;
-          }
-          if (sum > most) most = sum, c.joint = i, c.elastic = elastic, c.rate = half;
-        }
   }
 };
 

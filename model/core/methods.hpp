@@ -1,21 +1,34 @@
-// The methods of the time loop by name, the same for one robot and for four at once.
+// The methods of the time loop by their names. Loops and methods are compiled once, in methods.cpp, for one robot and for four.
 #pragma once
 #include <memory>
 #include <string>
 
 #include "explicit.hpp"
 #include "implicit.hpp"
+#include "loop.hpp"
+#include "model_plant.hpp"
 
 namespace flexura {
 
-// The first step to try, as a share of the time of the whole run.
+// The first step to try, as a share of the whole run's time.
 constexpr double FIRST_STEP = 1e-4;
 
-// Names: "auto", "explicit", "implicit".
-template <class Real>
-std::unique_ptr<Method<Real>> make_method(const std::string &name, Course<Real> &course) {
-  if (name == "explicit") return std::make_unique<Explicit<Real>>(course);
-  return std::make_unique<Implicit<Real>>(course);
-}
+// The method that a name asks for: "auto" leaves it to the core.
+inline std::string chosen(const std::string &name) { return name == "auto" ? "implicit" : name; }
+
+// "explicit" or "implicit"; null for any other name.
+template <class Real> std::unique_ptr<Method<Real>> make_method(const std::string &name, Course<Real> &course);
+
+// Why a run ended where it did, in a sentence, and what to try: for every status but `running` and `done`. `joint` counts from 1.
+std::string explain(const Clock &clock, const std::string &method, double rtol);
+
+extern template class Loop<double>;
+extern template class Loop<Pack<4>>;
+extern template class Explicit<double>;
+extern template class Explicit<Pack<4>>;
+extern template class Implicit<double>;
+extern template class Implicit<Pack<4>>;
+extern template class ModelPlant<double>;
+extern template class ModelPlant<Pack<4>>;
 
 }  // namespace flexura

@@ -7,9 +7,7 @@
 #include <thread>
 
 #include "fault.hpp"
-#include "loop.hpp"
 #include "methods.hpp"
-#include "model_plant.hpp"
 #include "observe.hpp"
 
 namespace flexura {
@@ -60,7 +58,7 @@ public:
     for (int k = first; k < end; ++k) {
       Ending &ending = endings_[std::size_t(k)];
       if (const Fault *fault = faults[k - first].get()) {
-        ending.refusal = Ending::fault, ending.joint = fault->link, ending.key = fault->key, ending.expected = fault->what();
+        ending.refusal = Ending::fault, ending.joint = fault->link, ending.key = fault->key, ending.text = fault->what();
         continue;
       }
       Starter starter = ready(k, std::move(models[k - first]));
@@ -127,21 +125,22 @@ private:
     Workspace<Four> work(model);
     ModelPlant<Four> plant(model, work);
     Loop<Four> loop(plant, acting, all_.times, all_.rtol);
-    const auto method = make_method(all_.method, loop.course);
+    const auto method = make_method<Four>(chosen(all_.method), loop.course);
     loop.interrupt = &stop_;
     if (all_.most_steps > 0) loop.most_steps = all_.most_steps;
     loop.start(q.data(), v.data(), FIRST_STEP * (all_.times.back() - all_.times.front()));
     while (loop.advance(*method, STEPS)) {
     }
-    for (int k = 0; k < count; ++k) end(loop, starters[std::size_t(k)], k);
+    for (int k = 0; k < count; ++k) end(loop, method->name(), starters[std::size_t(k)], k);
     observe(model, loop, starters);
   }
 
-  void end(const Loop<Four> &loop, const Starter &starter, int k) {
+  void end(const Loop<Four> &loop, const char *method, const Starter &starter, int k) {
     const Clock &clock = loop.clock[std::size_t(k)];
     const Record &record = loop.record[std::size_t(k)];
     Ending &ending = endings_[std::size_t(starter.robot)];
     ending.status = clock.status, ending.reached = clock.t, ending.joint = clock.joint, ending.steps = clock.steps;
+    if (clock.status != Status::done) ending.text = explain(clock, method, all_.rtol);
     for (std::size_t i = 0; i < ending.position.size(); ++i) {
       const std::size_t row = std::size_t(starter.model.first[i]);
       const bool last = clock.status == Status::limit && record.rows > 0;  // the state there is the record's last row

@@ -40,7 +40,7 @@ struct Ending {
   int joint = -1;                // that met its limit, starts outside of it, or where the run got stuck; of a fault: the link
   long steps = 0;
   std::vector<double> position;  // (links) of the joints at the end
-  std::string key, expected;     // of a fault
+  std::string key, text;         // of a fault the key and what was expected; else why the run ended early
 };
 
 // Runs all robots in so many threads. values (channels, robots, times): NaN from where a robot stopped. `stop` ends it early: endings that

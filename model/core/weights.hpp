@@ -5,11 +5,19 @@
 // position, over a link's elastic unknowns, over their rates, and the worst of these groups decides. Work and losses weigh by the
 // largest energy so far.
 #pragma once
+#include <cmath>
 #include <vector>
 
+#include "lane.hpp"
 #include "plant.hpp"
 
 namespace flexura {
+
+// A group: joint `joint` or (elastic) its link's own unknowns, their values or rates.
+struct Spot {
+  int joint = -1;
+  bool elastic = false, rate = false;
+};
 
 template <class Real> class Weights {
  public:
@@ -69,6 +77,20 @@ template <class Real> class Weights {
       sum += x * x;
     }
     return root(sum);
+  }
+
+  // Where the error e is worst for robot `which`.
+  Spot worst_spot(const Real *e, int which) const {
+    Spot spot;
+    double most = -1.0;
+    for (int half = 0; half < 2; ++half)
+      for (int i = 0; i < plant.joints; ++i)
+        for (int elastic = 0; elastic < 2; ++elastic) {
+          const int from = half * n + plant.first[i], end = elastic ? half * n + plant.first[i + 1] : from + 1;
+          const double here = lane(size(e, from + elastic, end), which), x = std::isfinite(here) ? here : 1e300;
+          if (x > most) most = x, spot = {i, elastic != 0, half != 0};
+        }
+    return spot;
   }
 
  private:

@@ -50,3 +50,7 @@ compiler: str = _core.compiler  # what compiled it
 
 Mechanics = _core.Mechanics  # the equations of one robot, from the rows of system/constants.py
 Fault = _core.Fault  # what the core refuses: args are the link (from 0; -1: none), the key and what was expected
+Simulation = _core.Simulation  # a run in progress
+Sampler = _core.Sampler  # what is called once a tick: a PythonSampler, or a controller of the core
+PythonSampler = _core.PythonSampler
+bends = _core.bends  # tip deflection [m] and slope [rad] of a link

@@ -1,131 +1,172 @@
-"""Forward dynamics: drives in, motion out, to a tolerance."""
+"""Forward and inverse dynamics: drives in, motion out, to a tolerance."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from . import callback, nodal
+from . import core, dense
 from .control import PID, Controller
-from .course import METHODS, applied, compiled, which
 from .drive import Drive
 from .errors import InputError
-from .record import record
+from .record import limit_event, record
 from .run import Run
-from .signal import Signal
-from .system import System
+from .sampled import Sampled, as_function
+from .signal import COLUMNS, Signal
+from .system import System, system_of
 
 if TYPE_CHECKING:
     from .batch import Batch
     from .population import Population
 
+METHODS = ("auto", "explicit", "implicit", "exponential")
+STEPS_A_CALL = 400  # between two looks at the progress bar and the keyboard
+MOST_STEPS = 50_000_000  # of a run
+
 
 @overload
 def simulate(
-    system: System,
-    t_eval: Any,
-    drive: Drive | Controller | Callable[..., Any] | None = None,
-    q0: Any = None,
-    qd0: Any = None,
-    rtol: float = 1e-6,
-    *,
-    method: str = "auto",
-    progress: Callable[[float], None] | None = None,
-) -> Run: ...
+    robot: Batch, t_eval: Any, drive: Drive | None = None, q0: Any = None, qd0: Any = None, rtol: float = 1e-6, *,
+    method: str = "auto", progress: Callable[[float], None] | None = None, **population: Any,
+) -> Population: ...  # fmt: skip
 @overload
 def simulate(
-    system: Batch,
-    t_eval: Any,
-    drive: Drive | None = None,
-    q0: Any = None,
-    qd0: Any = None,
-    rtol: float = 1e-6,
-    *,
-    method: str = "auto",
-    progress: Callable[[float], None] | None = None,
-    **population: Any,
-) -> Population: ...
+    robot: Any, t_eval: Any, drive: Drive | Controller | Sampled | Callable[..., Any] | None = None, q0: Any = None, qd0: Any = None,
+    rtol: float = 1e-6, *, method: str = "auto", progress: Callable[[float], None] | None = None,
+) -> Run: ...  # fmt: skip
 def simulate(
-    system: System | Batch,
-    t_eval: Any,
-    drive: Drive | Controller | Callable[..., Any] | None = None,
-    q0: Any = None,
-    qd0: Any = None,
-    rtol: float = 1e-6,
-    *,
-    method: str = "auto",
-    progress: Callable[[float], None] | None = None,
-    **population: Any,
-) -> Run | Population:
-    """Integrate the equations of motion from t_eval[0] on; the Run has its channels at t_eval (T,), ascending [s].
+    robot: Any, t_eval: Any, drive: Drive | Controller | Sampled | Callable[..., Any] | None = None, q0: Any = None, qd0: Any = None,
+    rtol: float = 1e-6, *, method: str = "auto", progress: Callable[[float], None] | None = None, **population: Any,
+) -> Run | Population:  # fmt: skip
+    """Integrate the equations of motion from t_eval[0] on; the Run has its channels at t_eval (T,).
 
-    `drive`: a Drive or a sampled Controller (compiled), or a function (t) -> (N,) or (t, position, velocity, tip_deflection) ->
-    (N,) of forces and torques [N or N m] (slower, by scipy). `q0`, `qd0` (n,): state at the start, by default `system.start()`
-    at rest. `rtol`: largest local error relative to the largest value so far. `method`: "explicit" (order 8), "explicit-3",
-    "explicit-5" (cheaper where a controller ticks), "implicit", "exponential" or "auto" (`choice.py`).
-    `progress` is called with the finished fraction. A joint that reaches a limit of the robot file or the end of its link ends
-    the run: the Run holds the states before it and, last, the one at that instant, an event says so and `meta["complete"]` is
-    false. A Ctrl-C ends it too. `meta["energy_error"]` is the largest |E - E(0) - work + loss| relative to the largest energy,
-    work or loss. A Batch of robots gives a Population; see `population.simulate` for what else that takes. Raises InputError for
-    wrong arguments, FlexuraError where the tolerance cannot be kept.
+    A joint that reaches a limit of the robot file or the end of its link ends the run, and so does a tolerance that cannot be kept, a
+    state that is not a number, and Ctrl-C: the Run then has what was computed until there, an event says what happened and where,
+    and `meta["complete"]` is false. `meta["energy_error"]` is how far the energies are from balancing, relative to the
+    largest; beyond 1e-3 an event says so, beyond 0.1 the run is not complete.
+
+    Args: robot: a System, a Robot, a robot file, or a Batch of robots, which gives a Population (`population.simulate` says what else
+        that takes); t_eval (T,): ascending times [s]; drive: a Drive, a sampled Controller, `Sampled(f, rate_Hz)`, or a function
+        of (t) or (t, position, velocity, tip_deflection) that gives (links,) forces and torques [N or N m]: such a function may be
+        called again for times within a step, never before its start, and must have no memory; q0, qd0 (n,): the state at the
+        start, by default `system.start()` at rest; rtol: the error that is asked for, of deflections and of a thousandth of
+        the tip's path; method: "auto", "explicit" (order 8), "implicit", or "exponential"; progress: called with the finished
+        fraction.
+
+    Raises: InputError: an argument is not what is expected.
     """
-    if not isinstance(system, System):
+    from .batch import Batch
+
+    if isinstance(robot, Batch):
         from . import population as many
 
         if not (drive is None or isinstance(drive, Drive)):
-            raise InputError("expected a Drive: a population runs in the compiled loop", key="drive", value=drive)
-        return many.simulate(system, t_eval, drive, q0, qd0, rtol, method=method, progress=progress, **population)
+            raise InputError("expected a Drive: a population runs in the core alone", key="drive", value=drive)
+        return many.simulate(robot, t_eval, drive, q0, qd0, rtol, method=method, progress=progress, **population)
     if population:
-        raise InputError("expected this of a Batch only, not of one System", key=next(iter(population)))
-    t = check(t_eval, rtol, method)
-    drive = Drive.none(len(system.robot.links)) if drive is None else drive
-    if not isinstance(drive, Drive | Controller):
-        drive = callback.as_function(drive)
-    q, qd = initial(system, t[0], drive, q0, qd0)
-    if system.robot.nodal:
-        if isinstance(drive, Controller):
-            raise InputError('expected a robot with sliding = "continuous" under a Controller', key="sliding", value="nodal")
-        return nodal.simulate(simulate, system, t, drive, q, qd, rtol, method, progress)
-    state = to_state(system, q, qd)
-    chosen = which(system, t, drive, rtol, method)
-    about = {"rtol": rtol, "method": next(name for name, value in METHODS.items() if value == chosen)}
-    if not isinstance(drive, Drive | Controller):
-        t, states, work, meta = callback.integrated(system, t, drive, state, rtol, chosen, progress)
-        return record(system, t, states, work, callback.called(system, t, states, drive), meta | about)
-    t, states, work, inputs, meta = compiled(system, t, drive, state, rtol, chosen, progress)
-    run = record(system, t, states, work, applied(system, t, states, drive, inputs), meta | about)
-    if isinstance(drive, Controller):
-        channels, units = drive.channels(inputs.law, t)
-        units = {name: unit or run.units[f"joint/{name.split('/')[1]}/position"] for name, unit in units.items()}
-        run = replace(run, channels=run.channels | channels, units=run.units | units)
-    return run
+        raise InputError("expected this of a Batch only, not of one robot", key=next(iter(population)))
+    system, t = system_of(robot), check(t_eval, rtol, method)
+    joints = len(system.robot.links)
+    acting = Drive.none(joints) if drive is None else drive
+    if not isinstance(acting, Drive | Controller | Sampled):
+        acting = as_function(acting, joints)
+    q, qd = initial(system, t[0], acting, q0, qd0)
+    if not system.exact:
+        return dense.simulate(system, t, acting, q, qd, rtol, method, progress)
+    return _Course(system, t, acting, q, qd, rtol, method).run(progress)
 
 
 def inverse(
-    system: System,
-    t_eval: Any,
-    motion: Signal | Sequence[Signal],
-    q0: Any = None,
-    qd0: Any = None,
-    rtol: float = 1e-6,
-    *,
-    method: str = "auto",
-    progress: Callable[[float], None] | None = None,
-) -> Run:
-    """Inverse dynamics: joints follow `motion` (one Signal a joint) exactly; the Run has `joint/i/drive`, the forces that this
-    takes.
+    robot: Any, t_eval: Any, motion: Signal | Sequence[Signal], q0: Any = None, qd0: Any = None, rtol: float = 1e-6, *,
+    method: str = "auto", progress: Callable[[float], None] | None = None,
+) -> Run:  # fmt: skip
+    """Inverse dynamics: joints follow `motion` exactly; the Run has `joint/i/drive`, the forces that this takes.
 
-    The elastic unknowns are integrated from q0, qd0 (n,), whose joint entries are replaced by the motion's; nothing is
-    approximated by a rigid robot and nothing iterated. Replaying the drives through `simulate` returns the motion. Otherwise as
-    `simulate`; raises InputError for a motion whose position or velocity jumps.
+    The elastic unknowns are integrated from q0, qd0 (n,), whose joint entries are replaced by the motion's; nothing is approximated by
+    a rigid robot and nothing iterated. Replaying the drives through `simulate` returns the motion.
+
+    Args: motion: one Signal a joint; else as in `simulate`.
+
+    Raises: InputError: an argument is not what is expected; a motion whose position or velocity jumps.
     """
+    system = system_of(robot)
     motions = [motion] if isinstance(motion, Signal) else list(motion)
     if len(motions) != len(system.robot.links) or not all(isinstance(m, Signal) for m in motions):
         raise InputError(f"expected {len(system.robot.links)} Signals, one a joint", key="motion", value=len(motions))
     return simulate(system, t_eval, Drive.prescribed(*motions), q0, qd0, rtol, method=method, progress=progress)
+
+
+class _Course:
+    """A run of the core in progress."""
+
+    def __init__(self, system: System, t: np.ndarray, drive: Any, q: np.ndarray, qd: np.ndarray, rtol: float, method: str) -> None:
+        self.system, self.t, self.drive, self.rtol = system, t, drive, rtol
+        joints = len(system.robot.links)
+        follows, function, sampler, rate = np.zeros(joints, dtype=np.uint8), None, None, 0.0
+        segments, ranges, gains = np.zeros((0, COLUMNS)), np.zeros((joints, 4), dtype=np.int64), np.zeros((joints, 2))
+        sampled = np.zeros(joints, dtype=np.uint8)
+        if isinstance(drive, Drive):
+            segments, ranges, gains = drive.packed()
+            follows = drive.follows.astype(np.uint8)
+        elif isinstance(drive, Controller):
+            segments, ranges, gains, follows, sampled = drive.core_drives()
+            sampler, rate = drive.sampler(system, t), float(drive.rate_Hz)
+        elif isinstance(drive, Sampled):
+            sampler, rate = core.PythonSampler(system.equations, as_function(drive.function, joints)), float(drive.rate_Hz)
+        else:
+            function = drive
+        self.sampler = sampler
+        self.core = core.Simulation(
+            system.equations, t, q, qd, rtol, method, np.ascontiguousarray(segments), ranges, np.ascontiguousarray(gains), follows,
+            sampled, np.ascontiguousarray(system.limits), function, sampler, rate, 0.0, MOST_STEPS,
+        )  # fmt: skip
+
+    def run(self, progress: Callable[[float], None] | None) -> Run:
+        begun, t = time.perf_counter(), self.t
+        interrupted = False
+        try:
+            while len(t) > 1 and self.core.advance(STEPS_A_CALL):
+                if progress is not None:
+                    progress((self.core.progress()["t"] - t[0]) / (t[-1] - t[0]))
+            if len(t) == 1:
+                self.core.advance(1)
+        except KeyboardInterrupt:
+            interrupted = True
+        about = self.core.progress()
+        times, states, accounts, forces = (np.asarray(a) for a in self.core.rows())
+        events = [] if interrupted else self._events(about)
+        if interrupted or about["status"] == "interrupted":
+            events = [{"t": about["t"], "level": "WARN", "text": "interrupted"}]
+        meta: dict[str, Any] = {
+            "steps": about["steps"], "rejected": about["rejected"], "evaluations": about["passes"],
+            "wall_s": time.perf_counter() - begun, "complete": about["status"] == "done" and not interrupted, "events": events,
+            "drive": self.drive.spec() if hasattr(self.drive, "spec") else "Python function",
+            "rtol": self.rtol, "method": about["method"],
+        }  # fmt: skip
+        run = record(self.system, times, states, accounts, forces, meta)
+        if isinstance(self.drive, Controller):
+            run = self.drive.recorded(run, self.sampler)
+        return run
+
+    def _events(self, about: dict[str, Any]) -> list[dict[str, Any]]:
+        """What ended the run, if it is not its time."""
+        status, at = about["status"], float(about["t"])
+        if status == "done":
+            return []
+        z = np.asarray(self.core.state())
+        if status == "limit":
+            return [limit_event(self.system, int(about["joint"]), at, z[self.system.joint_rows])]
+        i = int(about["joint"]) + 1
+        where = "" if i == 0 else f" in {'the bending of link' if about['elastic'] else 'joint'} {i}"
+        what = {
+            "stuck": f"no step is short enough for rtol = {self.rtol:g}{where}; try another tolerance or method, look at gains and forces",
+            "diverged": f"the state is not a number any more{where}; a gain, a force or a start value is too large",
+            "exhausted": f"{MOST_STEPS} steps are used up{where}; try method = \"implicit\", a larger rtol or a shorter time",
+        }[status]  # fmt: skip
+        return [{"t": at, "level": "ERROR", "text": f"the simulation got no further than t = {at:.6g} s: {what}"}]
 
 
 def check(t_eval: Any, rtol: float, method: str) -> np.ndarray:
@@ -133,8 +174,8 @@ def check(t_eval: Any, rtol: float, method: str) -> np.ndarray:
     t = _times(t_eval)
     if not 1e-13 <= rtol <= 0.1:
         raise InputError("expected a relative tolerance between 1e-13 and 0.1", key="rtol", value=rtol)
-    if method not in ("auto", *METHODS):
-        raise InputError(f"expected one of auto, {', '.join(METHODS)}", key="method", value=method)
+    if method not in METHODS:
+        raise InputError(f"expected one of {', '.join(METHODS)}", key="method", value=method)
     return t
 
 
@@ -142,7 +183,7 @@ def initial(system: System, t: float, drive: Any, q0: Any, qd0: Any) -> tuple[np
     """q and qd (n,) at the start t [s]: as given, locked joints at rest, prescribed ones on their motion. Raises InputError for
     wrong shapes, a drive of another number of joints, and a joint outside its limits."""
     q, qd = _state(system, "q0", q0, system.start()), _state(system, "qd0", qd0, np.zeros(system.n))
-    qd[system.joint_rows[system.chain.locked.astype(bool)]] = 0.0
+    qd[system.joint_rows[system.locked]] = 0.0
     if isinstance(drive, Drive | Controller):
         if len(drive.joints) != len(system.robot.links):
             raise InputError(
@@ -153,13 +194,8 @@ def initial(system: System, t: float, drive: Any, q0: Any, qd0: Any) -> tuple[np
     return q, qd
 
 
-def to_state(system: System, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
-    """The loop's state (2n + 2,) at q and qd (n,): both in the solver's coordinates, no work done yet."""
-    return np.concatenate([system.to_solver @ q, system.to_solver @ qd, [0.0, 0.0]])
-
-
 def _times(t_eval: Any) -> np.ndarray:
-    t = np.asarray(t_eval, dtype=float)
+    t = np.ascontiguousarray(t_eval, dtype=float)
     if t.ndim != 1 or len(t) < 1 or not np.all(np.isfinite(t)) or not np.all(np.diff(t) > 0):
         raise InputError("expected ascending finite times in seconds, one or more", key="t_eval", value=t_eval)
     return t

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from .observe import observe
 from .robot import Robot
 from .run import STATIONS, Run
 from .system import System
@@ -24,28 +23,47 @@ def channel_units(robot: Robot) -> dict[str, str]:
         if link.flexible:
             units |= {f"link/{i}/tip_deflection": "m", f"link/{i}/tip_slope": "rad"}
             units |= {f"link/{i}/deflection/{k}": "m" for k in range(STATIONS)}
-    energies = ("kinetic", "strain", "potential", "work", "loss")
+    energies = ("kinetic", "strain", "potential", "work", "loss", "numerical_loss")
     return units | {"tip/x": "m", "tip/y": "m"} | {f"energy/{name}": "J" for name in energies}
 
 
-def record(system: System, t: np.ndarray, states: np.ndarray, work: np.ndarray, forces: np.ndarray, meta: dict[str, Any]) -> Run:
-    """The Run of states (T, 2n) in the solver's coordinates, work and loss (T, 2) [J], and drive forces (T, N)."""
-    robot, n, links, rows = system.robot, system.n, len(system.robot.links), len(states)
-    poses, tips, ends, energies = np.zeros((rows, links, 3)), np.zeros((rows, links, 2)), np.zeros((rows, 2)), np.zeros((rows, 3))
-    observe(system.chain, system._work(), np.ascontiguousarray(states), poses, tips, ends, energies)
+WORK, LOSS, NUMERICAL, STRAIN = range(4)  # columns of the accounts, as Account of model/core/plant.hpp counts them
+NOTED, DOUBTED, REFUSED = 1e-3, 1e-2, 0.1  # of the energies: a balance beyond is a note, an event, the end of trust in a run
+
+
+def record(system: System, t: np.ndarray, states: np.ndarray, accounts: np.ndarray, forces: np.ndarray, meta: dict[str, Any]) -> Run:
+    """The Run of a simulation.
+
+    Args: t (T,) [s]; states (T, 2n); accounts (T, 4): work of the drives, losses, what the method took out, and the rise of the
+        strain energy, each from its own integral [J]; forces (T, links) of the drives; meta: what else the metadata says.
+    """
+    robot, n = system.robot, system.n
+    q, v = np.ascontiguousarray(states[:, :n]), np.ascontiguousarray(states[:, n:])
+    seen = system.observe(q, v)
     found: list[np.ndarray] = []
     for i, row in enumerate(system.joint_rows):
-        found += [states[:, row], states[:, n + row], forces[:, i]]
-    for i, link in enumerate(robot.links):
-        found += list(poses[:, i].T)
-        if link.flexible:
-            own = slice(system.chain.first[i] + 1, system.chain.first[i + 1])
-            found += [*tips[:, i].T, *system.deflections(i, states[:, own], states[:, system.joint_rows[i]])]
-    found += [*ends.T, *energies.T, *work.T]
+        found += [q[:, row], v[:, row], forces[:, i]]
+    energies = seen[:, -3:]
+    found += [*seen.T, *accounts[:, :STRAIN].T]
     units = channel_units(robot)
     channels = {name: np.ascontiguousarray(values) for name, values in zip(units, found, strict=True)}
-    about = describe(system, energy_error(energies, work)) | meta
-    return Run(t, channels, units, about, np.hstack([states[:, :n] @ system.transform.T, states[:, n:] @ system.transform.T]))
+    about = describe(system, energy_error(energies, accounts)) | meta
+    if len(t):
+        about["numerical_loss_J"] = float(accounts[-1, NUMERICAL])
+    return judged(Run(t, channels, units, about, states))
+
+
+def judged(run: Run) -> Run:
+    """The Run with what its energy balance says of it: nothing, a note, a warning, or that it is not to be trusted."""
+    error, end = run.meta["energy_error"], float(run.t[-1]) if len(run.t) else 0.0
+    if not error > NOTED:
+        return run
+    text = f"the energies do not balance: {error:.1%} of the largest of them is missing"
+    level = "INFO" if error <= DOUBTED else "WARN" if error <= REFUSED else "ERROR"
+    run.meta["events"] = [*run.meta.get("events", []), {"t": end, "level": level, "text": text}]
+    if not error <= REFUSED:
+        run.meta["complete"] = False
+    return run
 
 
 def describe(system: System, error: float) -> dict[str, Any]:
@@ -62,13 +80,20 @@ def describe(system: System, error: float) -> dict[str, Any]:
     }
 
 
-def energy_error(energies: np.ndarray, work: np.ndarray, jumps: Any = 0.0) -> float:
-    """Largest |E - E(0) - work + loss - jumps| of energies (T, 3), work and loss (T, 2), and E's jumps so far (T,), relative to
-    the largest of these energies, or work or loss."""
-    total = energies.sum(axis=1)
-    balance = total - total[0] - (work[:, 0] - work[0, 0]) + (work[:, 1] - work[0, 1]) - jumps
-    scale = max(np.abs(energies).max(), np.abs(energies - energies[0]).max(), np.abs(work).max(), 1e-300)
-    return float(np.abs(balance).max() / scale)
+def energy_error(energies: np.ndarray, accounts: np.ndarray, jumps: Any = 0.0) -> float:
+    """How far the energies (T, 3) and accounts (T, 4) of a run are from balancing, relative to the largest of them.
+
+    The larger of |E - E(0) - work + loss + numerical loss - jumps| and |strain - strain(0) - its own integral|; `jumps` (T,): what E
+    has jumped by so far.
+    """
+    if not len(energies):
+        return 0.0
+    since = accounts - accounts[0]
+    change = energies - energies[0]
+    balance = change.sum(axis=1) - since[:, WORK] + since[:, LOSS] + since[:, NUMERICAL] - jumps
+    strain = change[:, 1] - since[:, STRAIN] if not np.any(jumps) else np.zeros(1)
+    scale = max(np.abs(energies).max(), np.abs(change).max(), np.abs(accounts[:, :STRAIN]).max(), 1e-300)
+    return float(max(np.abs(balance).max(), np.abs(strain).max()) / scale)
 
 
 def limit_event(system: System, joint: int, t: float, position: np.ndarray) -> dict[str, Any]:

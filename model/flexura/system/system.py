@@ -12,6 +12,7 @@ from ..errors import InputError
 from ..link.line import Piece, whole_piece
 from ..link.shapes import legendre_shapes
 from ..robot import Robot, load
+from ..run import STATIONS
 from .assembly import Assembly
 from .constants import equations
 from .structure import Structure, structure
@@ -150,6 +151,13 @@ class System:
         if self.exact:
             return tuple(np.ascontiguousarray(self.equations.line(self.check(q), link - 1, places).T))  # type: ignore[return-value]
         return self.assembly.line(self.check(q), link, places)
+
+    def observe(self, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
+        """What a Run shows of states q, qd (T, n): rows of poses, deflections, tip and energies, as `record.channel_units` names
+        them from `link/1/x` to `energy/potential` (2), (29)."""
+        if self.exact:
+            return np.asarray(self.equations.observe(q, qd, STATIONS))
+        return np.array([self.assembly.observe(a, b, STATIONS) for a, b in zip(q, qd, strict=True)])
 
     def places(self, q: Any) -> tuple[np.ndarray, np.ndarray]:
         """Tip deflections of the flexible links (k,) [m] and the last tip's x, y [m] at q: what a Run shows of them."""
