@@ -92,7 +92,7 @@ private:
       if (own) out.q[row] = out.model.start[link];
       if (out.model.locked[link]) out.v[row] = 0.0;
       const JointDrive &drive = out.acting.joints[link];
-      if (!drive.prescribed || !drive.follows() || out.model.locked[link]) continue;
+      if (!drive.prescribed || !drive.follows()) continue;
       const Motion motion = out.acting.motion(i, all_.times.front());
       out.q[row] = motion.y, out.v[row] = motion.yd;
     }

@@ -54,3 +54,6 @@ Simulation = _core.Simulation  # a run in progress
 Sampler = _core.Sampler  # what is called once a tick: a PythonSampler, or a controller of the core
 PythonSampler = _core.PythonSampler
 bends = _core.bends  # tip deflection [m] and slope [rad] of a link
+population = _core.population  # many robots at once, from rows of numbers to rows of channels
+Drive = _core.Drive  # what acts on robots of a population
+Watch = _core.Watch  # what another thread sees of a population, and stops it by

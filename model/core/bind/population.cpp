@@ -35,14 +35,6 @@ Channel::Of kind_of(const std::string &name) {
   throw std::invalid_argument("there is no channel " + name);
 }
 
-nb::dict ended(const Ending &ending) {
-  nb::dict out;
-  out["status"] = ending.refusal == Ending::none ? word(ending.status) : "refused";
-  out["reached"] = ending.reached, out["steps"] = ending.steps, out["joint"] = ending.joint, out["position"] = ending.position;
-  out["key"] = ending.key, out["text"] = ending.text;
-  return out;
-}
-
 nb::tuple run_population(const Counts &counts, const Cube &numbers, const Cube &material, const Matrix &gravity, const Matrix &payload,
                          const Cube &limits, const std::vector<PackedDrive *> &drives, const Indices &drive_of, const Vector &t, const Vector &q,
                          const Vector &v, double rtol, const std::string &method, long most_steps,
@@ -76,9 +68,19 @@ nb::tuple run_population(const Counts &counts, const Cube &numbers, const Cube &
     nb::gil_scoped_release release;
     endings = run(population, threads, values.data(), watch.stop, watch.done);
   }
-  nb::list out;
-  for (const Ending &ending : endings) out.append(ended(ending));
-  return nb::make_tuple(values, out);
+  const std::size_t count = endings.size();
+  Array reached = new_array({count}), steps = new_array({count}), joint = new_array({count}), position = new_array({count, links});
+  nb::list words;
+  nb::dict texts;
+  for (std::size_t k = 0; k < count; ++k) {
+    const Ending &end = endings[k];
+    words.append(end.refusal == Ending::none ? word(end.status) : "refused");
+    reached.data()[k] = end.reached, steps.data()[k] = double(end.steps), joint.data()[k] = end.joint;
+    std::copy(end.position.begin(), end.position.end(), position.data() + k * links);
+    if (end.refusal == Ending::fault) texts[nb::int_(k)] = nb::make_tuple(end.joint, end.key, end.text);
+    else if (end.status != Status::done && end.refusal == Ending::none) texts[nb::int_(k)] = nb::make_tuple(-1, "", end.text);
+  }
+  return nb::make_tuple(values, words, reached, steps, joint, position, texts);
 }
 
 }  // namespace
@@ -88,13 +90,14 @@ void bind_population(nb::module_ &module) {
   nb::class_<Watch>(module, "Watch", "What another thread sees of a population that runs.")
       .def(nb::init<>())
       .def("stop", [](Watch &self) { self.stop = true; }, "Ends every robot where it is.")
+      .def_prop_ro("stopped", [](const Watch &self) { return self.stop.load(); })
       .def_prop_ro("done", [](const Watch &self) { return self.done.load(); }, "How many robots are done.");
   nb::class_<PackedDrive>(module, "Drive", "What acts on robots that share it.")
       .def(nb::init<const Matrix &, const Ranges &, const Matrix &, const Flags &, const Flags &, const Matrix &>(), "segments"_a, "ranges"_a,
            "gains"_a, "prescribed"_a, "sampled"_a, "limits"_a);
   module.def("population", &run_population, "counts"_a, "numbers"_a, "material"_a, "gravity"_a, "payload"_a, "limits"_a, "drives"_a, "drive_of"_a,
              "t"_a, "q"_a, "v"_a, "rtol"_a, "method"_a, "most_steps"_a, "channels"_a, "stations"_a, "threads"_a, "watch"_a,
-             "Values (channels, robots, times) and how each robot ended.");
+             "Values (channels, robots, times); of each robot how it ended, the time reached, steps, joint, positions of the joints; texts by robot.");
 }
 
 }  // namespace flexura
