@@ -126,7 +126,10 @@ def _local(request: Request, todo: Iterator[Work | range], threads: int) -> Gene
 
     def finished() -> Chunk | range:
         work, part = waiting.popleft()
-        return work if isinstance(work, range) or part is None else _chunk(request, *work, part.result())
+        if isinstance(work, range):
+            return work
+        assert part is not None
+        return _chunk(request, *work, part.result())
 
     with ThreadPoolExecutor(1) as pool:
         try:
@@ -170,7 +173,10 @@ class Part(NamedTuple):
 
 
 def simulated(request: Request, share: Share, threads: int, watch: Any) -> Part:
-    """Run and observe robots, or begin to, if `watch` is stopped meanwhile. Raises InputError for drives of another number of joints."""
+    """Run and observe robots, or begin to, if `watch` is stopped meanwhile.
+
+    Raises: InputError: a drive has another number of joints.
+    """
     b, T, N = len(share), len(request.t), len(share.robots[0].links)
     for k, drive in enumerate(share.drives, 1):
         if drive is not None and len(drive.joints) != N:
@@ -204,11 +210,20 @@ def _packed(drive: Drive) -> Any:
     segments, ranges, gains = drive.packed()
     N = len(drive.joints)
     flags = drive.follows.astype(np.uint8)
-    return core.Drive(segments, ranges, np.ascontiguousarray(gains), flags, np.zeros(N, dtype=np.uint8), np.tile([-np.inf, np.inf], (N, 1)))
+    return core.Drive(
+        segments, ranges, np.ascontiguousarray(gains), flags, np.zeros(N, dtype=np.uint8), np.tile([-np.inf, np.inf], (N, 1))
+    )
 
 
 def _together(
-    request: Request, share: Share, members: np.ndarray, rows: Rows, columns: list[tuple[str, int]], threads: int, watch: Any, part: Part
+    request: Request,
+    share: Share,
+    members: np.ndarray,
+    rows: Rows,
+    columns: list[tuple[str, int]],
+    threads: int,
+    watch: Any,
+    part: Part,
 ) -> None:
     """Robots of the same counts through the core, into their places of `part`."""
     common = request.drive or Drive.none(rows.numbers.shape[1])
@@ -254,7 +269,9 @@ def _one_by_one(request: Request, share: Share, watch: Any, part: Part) -> None:
             return
         drive = share.drives[k] or request.drive
         try:
-            run = forward.simulate(share.robots[k], request.t, drive, request.q0, request.qd0, request.rtol, method=request.method)
+            run = forward.simulate(
+                share.robots[k], request.t, drive, request.q0, request.qd0, request.rtol, method=request.method
+            )
         except InputError as error:
             part.status[k], part.events[k] = "refused", str(error)
             continue

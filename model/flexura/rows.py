@@ -39,7 +39,9 @@ class Rows:
 
     def of(self, some: Sequence[int] | slice) -> Rows:
         """The rows of some robots."""
-        return Rows(self.counts, *(np.ascontiguousarray(a[some]) for a in (self.numbers, self.material, self.gravity, self.payload)))
+        return Rows(
+            self.counts, *(np.ascontiguousarray(a[some]) for a in (self.numbers, self.material, self.gravity, self.payload))
+        )
 
     def contents(self, k: int) -> bytes:
         """All numbers of robot k, to the last bit."""
@@ -72,7 +74,10 @@ def one(robot: Robot) -> Rows:
 def joined(parts: Sequence[Rows]) -> Rows:
     """Robots of the same counts in one."""
     first = parts[0]
-    return Rows(first.counts, *(np.concatenate([getattr(p, name) for p in parts]) for name in ("numbers", "material", "gravity", "payload")))
+    return Rows(
+        first.counts,
+        *(np.concatenate([getattr(p, name) for p in parts]) for name in ("numbers", "material", "gravity", "payload")),
+    )
 
 
 def varied(robot: Robot, columns: Mapping[str, np.ndarray]) -> Rows | None:
