@@ -93,7 +93,7 @@ def varied(robot: Robot, columns: Mapping[str, np.ndarray]) -> Rows | None:
     for key, values in columns.items():
         parts = key.split(".")
         if parts[0] == "payload" and parts[1:] in (["mass_kg"], ["inertia_kg_m2"]):
-            out.payload[:, parts[1] == "inertia_kg_m2"] = values
+            out.payload[:, int(parts[1] == "inertia_kg_m2")] = values
         elif parts[0] == "gravity_m_s2" and parts[1:] in (["1"], ["2"]):
             out.gravity[:, int(parts[1]) - 1] = values
         elif parts[0] == "link" and len(parts) > 2 and parts[1].isdigit() and 1 <= int(parts[1]) <= len(robot.links):
