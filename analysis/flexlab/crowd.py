@@ -9,9 +9,9 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from flexura.assembly import assemble_all
 
 import flexura as fx
-from flexura.assembly import assemble_all
 from flexura.engine import cores, engine
 from flexura.forward import initial, to_state
 from flexura.population import BLOCK

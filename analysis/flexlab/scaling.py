@@ -7,9 +7,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from flexura.kernel import accelerate
 
 import flexura as fx
-from flexura.kernel import accelerate
 
 LINKS = (1, 2, 4, 8, 16, 32, 64)
 ELEMENTS = (1, 2, 4, 8, 16)

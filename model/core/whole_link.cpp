@@ -31,13 +31,13 @@ Shapes computed_shapes(int count, int P) {
   for (int k = 1; k < count; ++k) out.sums[at(k + 1, k, count)] = 1.0 / (2 * k + 1), out.sums[at(k - 1, k, count)] = -1.0 / (2 * k + 1);
   out.B.assign(at(count, 0, P), 0.0), out.bend = out.B, out.tip.assign(std::size_t(count), 0.0);
   Numbers value(std::size_t(count) + 2), first(value.size()), second(value.size());
-  for (int p = 0; p <= P; ++p) {  // P: the tip
-    legendre(p < P ? line_rule(P).u[std::size_t(p)] : 1.0, count, value.data(), first.data(), second.data());
+  out.tip[0] = 2.0;  // all others vanish at the tip; by their sums they would to the last digit only
+  for (int p = 0; p < P; ++p) {
+    legendre(line_rule(P).u[std::size_t(p)], count, value.data(), first.data(), second.data());
     for (int k = 0; k < count; ++k)
       for (int n = 0; n <= count; ++n) {
         const double part = out.sums[at(n, k, count)];
-        if (p == P) out.tip[std::size_t(k)] += part * value[std::size_t(n)];
-        else out.B[at(k, p, P)] += part * value[std::size_t(n)], out.bend[at(k, p, P)] += 2.0 * part * first[std::size_t(n)];
+        out.B[at(k, p, P)] += part * value[std::size_t(n)], out.bend[at(k, p, P)] += 2.0 * part * first[std::size_t(n)];
       }
   }
   return out;

@@ -102,7 +102,9 @@ def inverse(
 class _Course:
     """A run of the core in progress."""
 
-    def __init__(self, system: System, t: np.ndarray, drive: Any, q: np.ndarray, qd: np.ndarray, rtol: float, method: str) -> None:
+    def __init__(
+        self, system: System, t: np.ndarray, drive: Any, q: np.ndarray, qd: np.ndarray, rtol: float, method: str
+    ) -> None:
         self.system, self.t, self.drive, self.rtol = system, t, drive, rtol
         joints = len(system.robot.links)
         follows, function, sampler, rate = np.zeros(joints, dtype=np.uint8), None, None, 0.0

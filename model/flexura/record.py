@@ -37,7 +37,9 @@ WORK, LOSS, NUMERICAL, STRAIN = range(4)  # columns of the accounts, as Account 
 NOTED, DOUBTED, REFUSED = 1e-3, 1e-2, 0.1  # of the energies: a balance beyond is a note, an event, the end of trust in a run
 
 
-def record(system: System, t: np.ndarray, states: np.ndarray, accounts: np.ndarray, forces: np.ndarray, meta: dict[str, Any]) -> Run:
+def record(
+    system: System, t: np.ndarray, states: np.ndarray, accounts: np.ndarray, forces: np.ndarray, meta: dict[str, Any]
+) -> Run:
     """The Run of a simulation.
 
     Args: t (T,) [s]; states (T, 2n); accounts (T, 4): work of the drives, losses, what the method took out, and the rise of the

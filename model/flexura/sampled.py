@@ -57,7 +57,9 @@ def as_function(drive: Callable[..., Any], joints: int) -> Function:
         given = drive(t) if count == 1 else drive(t, position, velocity, tip_deflection)
         force = np.ascontiguousarray(given, dtype=float)
         if force.shape != (joints,) or not np.all(np.isfinite(force)):
-            raise InputError(f"expected {joints} finite forces from the drive function at t = {t:g} s", key="drive", value=given)
+            raise InputError(
+                f"expected {joints} finite forces from the drive function at t = {t:g} s", key="drive", value=given
+            )
         return force
 
     return call

@@ -23,10 +23,8 @@ class Modes:
     labels: tuple[str, ...]
 
 
-def frequencies(
-    robot: Any, q: Any = None, joints: str = "locked", *, count: int | None = None, qd: Any = None
-) -> np.ndarray:
-    """Natural frequencies [Hz], ascending, of the undamped robot linearised about q (n,) (24), (25).
+def frequencies(robot: Any, q: Any = None, joints: str = "locked", *, count: int | None = None, qd: Any = None) -> np.ndarray:
+    """Natural frequencies [Hz], ascending, of the undamped robot linearised about q (n,) (27), (28).
 
     Args: robot: a System, a Robot, or a robot file; q (n,): by default the static equilibrium at the start; joints: "locked" (only
         the elastic unknowns move) or "free" (rigid motions come out as 0); count: the lowest so many, by default all; qd (n,):

@@ -89,7 +89,7 @@ class StateSpace:
 
 
 def linearize(robot: Any, q: Any = None, qd: Any = None, joints: str = "free") -> StateSpace:
-    """The robot linearised about an equilibrium q (n,), by default the static one at the start, or about a steady motion (24).
+    """The robot linearised about an equilibrium q (n,), by default the static one at the start, or about a steady motion (27).
 
     Args: robot: a System, a Robot, or a robot file; q (n,); qd (n,): joint rates of a steady motion, a rotation or translation of the
         whole robot, whose elastic equilibrium is found where q is not given; `tip/x`, `tip/y` are then along axes that turn with
