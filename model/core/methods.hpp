@@ -14,8 +14,9 @@ namespace flexura {
 // The first step to try, as a share of the whole run's time.
 constexpr double FIRST_STEP = 1e-4;
 
-// The method that a name asks for: "auto" leaves it to the core.
-inline std::string chosen(const std::string &name) { return name == "auto" ? "implicit" : name; }
+// The method of a run by the name that is asked for. "auto" stays "auto" only if the method is found within the run: then no pack shares
+// it.
+inline std::string decided(const std::string &name) { return name == "auto" ? "implicit" : name; }
 
 // "explicit" or "implicit"; under a sampled controller also "explicit-3" and "explicit-5". Null for any other name.
 template <class Real> std::unique_ptr<Method<Real>> make_method(const std::string &name, Course<Real> &course);

@@ -9,6 +9,7 @@
 #include "fault.hpp"
 #include "methods.hpp"
 #include "observe.hpp"
+#include "simulation.hpp"
 
 namespace flexura {
 namespace {
@@ -20,9 +21,19 @@ constexpr long STEPS = 1000;  // between two looks at whether a robot still runs
 // A robot that is about to run.
 struct Starter {
   int robot = 0;  // number in the population
-  Model<double> model;
+  std::shared_ptr<const Model<double>> shared;
   Acting acting;
+  std::string method;
   std::vector<double> q, v;
+  const Model<double> &model() const { return *shared; }
+};
+
+// How a robot's run went.
+struct Ran {
+  const Clock *clock;
+  const Record *record;
+  std::vector<double> q;  // where it ended
+  std::string method;
 };
 
 bool same_equations(const Shape &a, const Shape &b) {
@@ -31,8 +42,9 @@ bool same_equations(const Shape &a, const Shape &b) {
 
 // Whether two robots can share a pack.
 bool alike(const Starter &a, const Starter &b) {
-  bool out = a.model.pieces.size() == b.model.pieces.size() && a.model.mass_damped == b.model.mass_damped;
-  for (std::size_t i = 0; out && i < a.model.pieces.size(); ++i) out = same_equations(a.model.pieces[i], b.model.pieces[i]);
+  const Model<double> &p = a.model(), &q = b.model();
+  bool out = a.method == b.method && p.pieces.size() == q.pieces.size() && p.mass_damped == q.mass_damped;
+  for (std::size_t i = 0; out && i < p.pieces.size(); ++i) out = same_equations(p.pieces[i], q.pieces[i]);
   for (std::size_t i = 0; out && i < a.acting.joints.size(); ++i) {
     const JointDrive &one = a.acting.joints[i], &other = b.acting.joints[i];
     out = (one.prescribed && one.follows()) == (other.prescribed && other.follows());
@@ -80,27 +92,28 @@ private:
 
   Starter ready(int k, Model<double> model) const {
     Starter out;
-    out.robot = k, out.model = std::move(model), out.acting = all_.drives[std::size_t(all_.drive_of[std::size_t(k)])];
-    const std::size_t n = std::size_t(out.model.n);
+    out.robot = k, out.method = decided(all_.method), out.acting = all_.drives[std::size_t(all_.drive_of[std::size_t(k)])];
+    const std::size_t n = std::size_t(model.n);
     const bool own = all_.q.empty();
     out.q = own ? std::vector<double>(n, 0.0) : all_.q, out.v = all_.v.empty() ? std::vector<double>(n, 0.0) : all_.v;
     if (out.q.size() != n || out.v.size() != n) throw std::invalid_argument("the start needs an entry an unknown");
-    for (int i = 0; i < out.model.links(); ++i) {
-      const std::size_t link = std::size_t(i), row = std::size_t(out.model.first[link]);
-      const double *limits = all_.limits + 2 * (std::size_t(k) * out.model.first.size() + link);
+    for (int i = 0; i < model.links(); ++i) {
+      const std::size_t link = std::size_t(i), row = std::size_t(model.first[link]);
+      const double *limits = all_.limits + 2 * (std::size_t(k) * model.first.size() + link);
       out.acting.limit(i, limits[0], limits[1]);
-      if (own) out.q[row] = out.model.start[link];
-      if (out.model.locked[link]) out.v[row] = 0.0;
+      if (own) out.q[row] = model.start[link];
+      if (model.locked[link]) out.v[row] = 0.0;
       const JointDrive &drive = out.acting.joints[link];
       if (!drive.prescribed || !drive.follows()) continue;
       const Motion motion = out.acting.motion(i, all_.times.front());
       out.q[row] = motion.y, out.v[row] = motion.yd;
     }
+    out.shared = std::make_shared<const Model<double>>(std::move(model));
     return out;
   }
 
   static bool inside_limits(const Starter &starter, Ending &ending) {
-    const Model<double> &model = starter.model;
+    const Model<double> &model = starter.model();
     for (std::size_t i = 0; i < model.first.size(); ++i) {
       const double place = starter.q[std::size_t(model.first[i])];
       ending.position.push_back(place);
@@ -110,64 +123,88 @@ private:
     return ending.refusal == Ending::none;
   }
 
-  // Robots that are alike; lanes without a robot run the first again.
+  // Robots that are alike: as one pack; each alone if its method is found within the run.
   void run_together(std::vector<Starter> &starters) {
+    if (starters[0].method == "auto") {
+      for (const Starter &each : starters) run_alone(each);
+      return;
+    }
     const int count = int(starters.size());
-    auto starter = [&](int k) -> Starter & { return starters[std::size_t(k < count ? k : 0)]; };
+    auto starter = [&](int k) -> Starter & { return starters[std::size_t(k < count ? k : 0)]; };  // lanes without a robot run the first again
     const Model<double> *models[LANES];
-    Acting *acting[LANES];
-    for (int k = 0; k < LANES; ++k) models[k] = &starter(k).model, acting[k] = &starter(k).acting;
+    for (int k = 0; k < LANES; ++k) models[k] = starter(k).shared.get();
     const Model<Four> model = pack(models);
+    Acting *acting[LANES];
     const std::size_t n = std::size_t(model.n);
     std::vector<Four> q(n), v(n);
-    for (std::size_t i = 0; i < n; ++i)
-      for (int k = 0; k < LANES; ++k) q[i].set(k, starter(k).q[i]), v[i].set(k, starter(k).v[i]);
+    for (int k = 0; k < LANES; ++k) {
+      acting[k] = &starter(k).acting;
+      for (std::size_t i = 0; i < n; ++i) q[i].set(k, starter(k).q[i]), v[i].set(k, starter(k).v[i]);
+    }
     Workspace<Four> work(model);
     ModelPlant<Four> plant(model, work);
     Loop<Four> loop(plant, acting, all_.times, all_.rtol);
-    const auto method = make_method<Four>(chosen(all_.method), loop.course);
+    const auto method = make_method<Four>(starter(0).method, loop.course);
+    if (!method) throw std::invalid_argument("there is no method " + all_.method);
     loop.interrupt = &stop_;
     if (all_.most_steps > 0) loop.most_steps = all_.most_steps;
     loop.start(q.data(), v.data(), FIRST_STEP * (all_.times.back() - all_.times.front()));
     while (loop.advance(*method, STEPS)) {
     }
-    for (int k = 0; k < count; ++k) end(loop, method->name(), starters[std::size_t(k)], k);
-    observe(model, loop, starters);
-  }
-
-  void end(const Loop<Four> &loop, const char *method, const Starter &starter, int k) {
-    const Clock &clock = loop.clock[std::size_t(k)];
-    const Record &record = loop.record[std::size_t(k)];
-    Ending &ending = endings_[std::size_t(starter.robot)];
-    ending.status = clock.status, ending.reached = clock.t, ending.joint = clock.joint, ending.steps = clock.steps;
-    if (clock.status != Status::done) ending.text = explain(clock, method, all_.rtol);
-    for (std::size_t i = 0; i < ending.position.size(); ++i) {
-      const std::size_t row = std::size_t(starter.model.first[i]);
-      const bool last = clock.status == Status::limit && record.rows > 0;  // the state there is the record's last row
-      ending.position[i] = last ? record.state[std::size_t(record.rows - 1) * std::size_t(record.size) + row] : loop.course.z[row][k];
+    std::vector<Ran> ran;
+    std::vector<int> robots;
+    for (int k = 0; k < count; ++k) {
+      ran.push_back({&loop.clock[std::size_t(k)], &loop.record[std::size_t(k)], {}, method->name()});
+      for (std::size_t i = 0; i < n; ++i) ran.back().q.push_back(loop.course.z[i][k]);
+      robots.push_back(starter(k).robot);
     }
+    finish(model, robots, ran);
   }
 
-  // The channels of robots that have run. A row of times that a robot has not reached shows its first one and is not written.
-  void observe(const Model<Four> &model, const Loop<Four> &loop, const std::vector<Starter> &starters) {
-    const int n = model.n, count = int(starters.size()), size = 2 * n + ACCOUNTS;
+  void run_alone(const Starter &starter) {
+    Request request;
+    request.times = all_.times, request.q = starter.q, request.v = starter.v, request.rtol = all_.rtol, request.method = all_.method;
+    request.most_steps = all_.most_steps;
+    Simulation run(starter.shared, starter.acting, request);
+    while (run.advance(STEPS) && !stop_.load(std::memory_order_relaxed)) {
+    }
+    const Model<double> *four[LANES] = {starter.shared.get(), starter.shared.get(), starter.shared.get(), starter.shared.get()};
+    finish(pack(four), {starter.robot}, {{&run.clock(), &run.record(), run.state(), run.method()}});
+  }
+
+  // How robots ended, and their channels. A row of times that a robot has not reached shows its first one and is not written.
+  void finish(const Model<Four> &model, const std::vector<int> &robots, const std::vector<Ran> &ran) {
+    const int n = model.n, count = int(robots.size()), size = 2 * n + ACCOUNTS;
+    for (int k = 0; k < count; ++k) end(model, ran[std::size_t(k)], endings_[std::size_t(robots[std::size_t(k)])]);
     Observer<Four> observer(model, all_.stations);
     int parts = 0, most = 0, rows[LANES];
     for (const Channel &channel : all_.channels) parts |= channel.of == Channel::seen ? observer.part_of(channel.index) : 0;
-    for (int k = 0; k < LANES; ++k) rows[k] = k < count ? reached(loop.record[std::size_t(k)]) : 0, most = std::max(most, rows[k]);
+    auto record = [&](int k) -> const Record & { return *ran[std::size_t(k < count ? k : 0)].record; };
+    for (int k = 0; k < LANES; ++k) rows[k] = k < count ? reached(record(k)) : 0, most = std::max(most, rows[k]);
     std::vector<Four> state(static_cast<std::size_t>(2 * n)), seen(static_cast<std::size_t>(observer.columns()));
     for (int row = 0; row < most; ++row) {
       const double *z[LANES], *drive[LANES];
       for (int k = 0; k < LANES; ++k) {
-        const Record &record = loop.record[std::size_t(k)];
         const std::size_t at = row < rows[k] ? std::size_t(row) : 0;
-        z[k] = record.state.data() + at * std::size_t(size), drive[k] = record.drive.data() + at * std::size_t(record.joints);
+        z[k] = record(k).state.data() + at * std::size_t(size), drive[k] = record(k).drive.data() + at * std::size_t(record(k).joints);
         for (int j = 0; j < 2 * n; ++j) state[std::size_t(j)].set(k, z[k][j]);
       }
       if (parts != 0) observer.observe(state.data(), state.data() + n, seen.data(), parts);
       for (std::size_t c = 0; c < all_.channels.size(); ++c)
         for (int k = 0; k < count; ++k)
-          if (row < rows[k]) *value(c, starters[std::size_t(k)].robot, row) = number(all_.channels[c], model, z[k], drive[k], seen, k);
+          if (row < rows[k]) *value(c, robots[std::size_t(k)], row) = number(all_.channels[c], model, z[k], drive[k], seen, k);
+    }
+  }
+
+  void end(const Model<Four> &model, const Ran &ran, Ending &ending) const {
+    const Clock &clock = *ran.clock;
+    const Record &record = *ran.record;
+    ending.status = clock.status, ending.reached = clock.t, ending.joint = clock.joint, ending.steps = clock.steps;
+    if (clock.status != Status::done) ending.text = explain(clock, ran.method, all_.rtol);
+    for (std::size_t i = 0; i < ending.position.size(); ++i) {
+      const std::size_t row = std::size_t(model.first[i]);
+      const bool last = clock.status == Status::limit && record.rows > 0;  // the state there is the record's last row
+      ending.position[i] = last ? record.state[std::size_t(record.rows - 1) * std::size_t(record.size) + row] : ran.q[row];
     }
   }
 

@@ -8,7 +8,7 @@ namespace flexura {
 
 Simulation::Simulation(std::shared_ptr<const Model<double>> model, Acting acting, const Request &request)
     : model_(std::move(model)), work_(*model_), plant_(*model_, work_), acting_(std::move(acting)), acting_pointer_(&acting_),
-      loop_(plant_, &acting_pointer_, request.times, request.rtol), method_(make_method<double>(chosen(request.method), loop_.course)) {
+      loop_(plant_, &acting_pointer_, request.times, request.rtol), method_(make_method<double>(decided(request.method), loop_.course)) {
   loop_.interrupt = &interrupt;
   if (request.most_steps > 0) loop_.most_steps = request.most_steps;
   const double span = request.times.back() - request.times.front();
