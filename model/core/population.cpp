@@ -1,6 +1,7 @@
 #include "population.hpp"
 
 #include <algorithm>
+#include <array>
 #include <exception>
 #include <limits>
 #include <mutex>
@@ -24,6 +25,7 @@ struct Starter {
   std::shared_ptr<const Model<double>> shared;
   Acting acting;
   std::string method;
+  bool open = false;  // "auto": the run goes on alone unless its exponential steps have no rival (pace.hpp)
   std::vector<double> q, v;
   const Model<double> &model() const { return *shared; }
 };
@@ -92,7 +94,7 @@ private:
 
   Starter ready(int k, Model<double> model) const {
     Starter out;
-    out.robot = k, out.method = decided(all_.method), out.acting = all_.drives[std::size_t(all_.drive_of[std::size_t(k)])];
+    out.robot = k, out.method = all_.method, out.acting = all_.drives[std::size_t(all_.drive_of[std::size_t(k)])];
     const std::size_t n = std::size_t(model.n);
     const bool own = all_.q.empty();
     out.q = own ? std::vector<double>(n, 0.0) : all_.q, out.v = all_.v.empty() ? std::vector<double>(n, 0.0) : all_.v;
@@ -107,6 +109,11 @@ private:
       if (!drive.prescribed || !drive.follows()) continue;
       const Motion motion = out.acting.motion(i, all_.times.front());
       out.q[row] = motion.y, out.v[row] = motion.yd;
+    }
+    if (all_.method == "auto") {
+      const auto resistance = [&](int i) { return larger(model.viscous[std::size_t(i)], model.coulomb[std::size_t(i)]); };
+      out.open = !for_explicit(all_.rtol, model.n > model.links(), model.links(), out.acting, resistance);
+      out.method = out.open ? "exponential" : "explicit";
     }
     out.shared = std::make_shared<const Model<double>>(std::move(model));
     return out;
@@ -123,12 +130,8 @@ private:
     return ending.refusal == Ending::none;
   }
 
-  // Robots that are alike: as one pack; each alone if its method is found within the run.
+  // Robots that are alike, as one pack; one whose method is found within the run goes alone after that.
   void run_together(std::vector<Starter> &starters) {
-    if (starters[0].method == "auto") {
-      for (const Starter &each : starters) run_alone(each);
-      return;
-    }
     const int count = int(starters.size());
     auto starter = [&](int k) -> Starter & { return starters[std::size_t(k < count ? k : 0)]; };  // lanes without a robot run the first again
     const Model<double> *models[LANES];
@@ -144,21 +147,37 @@ private:
     Workspace<Four> work(model);
     ModelPlant<Four> plant(model, work);
     Loop<Four> loop(plant, acting, all_.times, all_.rtol);
-    const auto method = make_method<Four>(starter(0).method, loop.course);
+    const auto method = make_method<Four>(starter(0).method, loop.course, all_.rtol);
     if (!method) throw std::invalid_argument("there is no method " + all_.method);
     loop.interrupt = &stop_;
     if (all_.most_steps > 0) loop.most_steps = all_.most_steps;
     loop.start(q.data(), v.data(), FIRST_STEP * (all_.times.back() - all_.times.front()));
+    std::array<Pace, LANES> pace;
+    for (bool more = starter(0).open; more && loop.advance(*method, 1);) {
+      more = false;
+      for (std::size_t k = 0; k < LANES; ++k) more |= pace[k].look(loop.clock[k]);
+    }
+    std::array<bool, LANES> alone{};
+    for (std::size_t k = 0; k < LANES; ++k) {
+      alone[k] = starter(0).open && !pace[k].settled(loop.clock[k]);
+      if (alone[k]) loop.clock[k].status = Status::interrupted;
+    }
     while (loop.advance(*method, STEPS)) {
     }
     std::vector<Ran> ran;
     std::vector<int> robots;
     for (int k = 0; k < count; ++k) {
-      ran.push_back({&loop.clock[std::size_t(k)], &loop.record[std::size_t(k)], {}, method->name()});
+      const Clock &clock = loop.clock[std::size_t(k)];
+      const bool failed = clock.status == Status::stuck || clock.status == Status::diverged;
+      if (alone[std::size_t(k)] || (starter(0).open && (failed || Pace::attempts(clock) > Auto::AGAIN))) {
+        run_alone(starter(k));
+        continue;
+      }
+      ran.push_back({&clock, &loop.record[std::size_t(k)], {}, method->name()});
       for (std::size_t i = 0; i < n; ++i) ran.back().q.push_back(loop.course.z[i][k]);
       robots.push_back(starter(k).robot);
     }
-    finish(model, robots, ran);
+    if (!ran.empty()) finish(model, robots, ran);
   }
 
   void run_alone(const Starter &starter) {

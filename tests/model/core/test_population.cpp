@@ -92,7 +92,7 @@ bool same(const Results &a, int i, const Results &b, int j) {
 }  // namespace
 
 TEST("threads, order and neighbours change no bit") {
-  for (const char *method : {"explicit", "implicit"})
+  for (const char *method : {"explicit", "implicit", "exponential", "auto"})
     for (int modes : {2, -1}) {
       const Many many(10, modes, modes < 0 ? 2 : 4);
       const Results whole = results(many.population(method, 1e-4), 1), threads = results(many.population(method, 1e-4), 3);
@@ -105,7 +105,7 @@ TEST("threads, order and neighbours change no bit") {
 
 TEST("a robot of a population is the robot of a single run") {
   const Many many(3, 2);
-  for (const char *method : {"explicit", "implicit"}) {
+  for (const char *method : {"explicit", "implicit", "exponential", "auto"}) {
     const Population population = many.population(method, 1e-5);
     const Results all = results(population, 1);
     for (int k = 0; k < 3; ++k) {
