@@ -54,6 +54,13 @@ bool alike(const Starter &a, const Starter &b) {
   return out;
 }
 
+// One to four models as a pack; lanes without a robot have the first again.
+Model<Four> side_by_side(const std::vector<const Model<double> *> &models) {
+  const Model<double> *four[LANES];
+  for (std::size_t k = 0; k < LANES; ++k) four[k] = models[k < models.size() ? k : 0];
+  return pack(four);
+}
+
 class Worker {
 public:
   Worker(const Population &population, double *values, const std::atomic<bool> &stop, std::vector<Ending> &endings)
@@ -134,9 +141,9 @@ private:
   void run_together(std::vector<Starter> &starters) {
     const int count = int(starters.size());
     auto starter = [&](int k) -> Starter & { return starters[std::size_t(k < count ? k : 0)]; };  // lanes without a robot run the first again
-    const Model<double> *models[LANES];
-    for (int k = 0; k < LANES; ++k) models[k] = starter(k).shared.get();
-    const Model<Four> model = pack(models);
+    std::vector<const Model<double> *> models;
+    for (const Starter &each : starters) models.push_back(each.shared.get());
+    const Model<Four> model = side_by_side(models);
     Acting *acting[LANES];
     const std::size_t n = std::size_t(model.n);
     std::vector<Four> q(n), v(n);
@@ -166,6 +173,7 @@ private:
     }
     std::vector<Ran> ran;
     std::vector<int> robots;
+    std::vector<const Model<double> *> of;
     for (int k = 0; k < count; ++k) {
       const Clock &clock = loop.clock[std::size_t(k)];
       const bool failed = clock.status == Status::stuck || clock.status == Status::diverged;
@@ -175,9 +183,10 @@ private:
       }
       ran.push_back({&clock, &loop.record[std::size_t(k)], {}, method->name()});
       for (std::size_t i = 0; i < n; ++i) ran.back().q.push_back(loop.course.z[i][k]);
-      robots.push_back(starter(k).robot);
+      robots.push_back(starter(k).robot), of.push_back(models[std::size_t(k)]);
     }
-    if (!ran.empty()) finish(model, robots, ran);
+    if (int(ran.size()) == count) finish(model, robots, ran);
+    else if (!ran.empty()) finish(side_by_side(of), robots, ran);
   }
 
   void run_alone(const Starter &starter) {
@@ -187,8 +196,7 @@ private:
     Simulation run(starter.shared, starter.acting, request);
     while (run.advance(STEPS) && !stop_.load(std::memory_order_relaxed)) {
     }
-    const Model<double> *four[LANES] = {starter.shared.get(), starter.shared.get(), starter.shared.get(), starter.shared.get()};
-    finish(pack(four), {starter.robot}, {{&run.clock(), &run.record(), run.state(), run.method()}});
+    finish(side_by_side({starter.shared.get()}), {starter.robot}, {{&run.clock(), &run.record(), run.state(), run.method()}});
   }
 
   // How robots ended, and their channels. A row of times that a robot has not reached shows its first one and is not written.
