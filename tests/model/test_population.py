@@ -27,7 +27,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 @few
-@given(robots(max_links=3, coulomb=True, locked=True), seeds)
+@given(robots(max_links=3, coulomb=True, locked=True, stiffening=True), seeds)
 def test_a_population_has_the_numbers_of_single_runs(described, seed):
     """Any robot, any channel, to the last bit; where the run ends at a limit, up to there."""
     drive = fx.Drive.force(*map(constant, forces(fx.assemble(described), seed)))
