@@ -13,7 +13,6 @@ from hypothesis import settings
 from hypothesis import strategies as st
 
 import flexura as fx
-from flexura.beam import shape
 
 SLOPE = 0.1  # rad: largest slope of a random state
 fast = settings(max_examples=25, deadline=None, derandomize=True, database=None)
@@ -160,7 +159,7 @@ def state(sys: fx.System, seed: int, slope: float = SLOPE, rate: float = 2.0) ->
     random = np.random.default_rng(seed)
     turns = np.array([link.joint.type == "R" for link in sys.robot.links])
     around = np.where(turns, 0.0, sys.robot.start)
-    reach = 0.05 * np.array([sys.links[max(i - (k.joint.type == "Pa"), 0)].length for i, k in enumerate(sys.robot.links)])
+    reach = 0.05 * np.array([sys.robot.links[max(i - (k.joint.type == "Pa"), 0)].length_m for i, k in enumerate(sys.robot.links)])
     q, qd = _shape(sys, random, np.where(turns, 1.5, reach), slope), _shape(sys, random, np.where(turns, rate, rate / 4), rate)
     q[sys.joint_rows] += around
     return q, qd
@@ -173,20 +172,17 @@ def forces(sys: fx.System, seed: int) -> np.ndarray:
 
 def _shape(sys: fx.System, random: np.random.Generator, joints: np.ndarray, slope: float) -> np.ndarray:
     y = np.zeros(sys.n)
-    for i, info in enumerate(sys.links):
-        first = sys.joint_rows[i]
-        y[first] = joints[i] * random.uniform(-1, 1)
-        m = len(info.S0)
-        if m:
-            kept = min(3, m)
-            y[first + 1 : first + 1 + kept] = slope / kept / steepest(sys, i)[:kept] * random.uniform(-1, 1, kept)
-    return sys.transform @ y
+    ends = [*sys.joint_rows, sys.n]
+    for i, row in enumerate(sys.joint_rows):
+        y[row] = joints[i] * random.uniform(-1, 1)
+        if m := ends[i + 1] - row - 1:
+            y[row + 1 : row + 1 + m] = slope / m / steepest(sys, i) * random.uniform(-1, 1, m)
+    return y
 
 
 def steepest(sys: fx.System, link: int) -> np.ndarray:
-    """Largest slope of each mode of a link, (m,), per unit of it, at the start; inside elements it may be much larger than at the
-    nodes."""
-    info, elements = sys.links[link], sys.robot.links[link].elements
-    x = np.linspace(0, info.length, 16 * elements + 1)
-    stretch = info.length / (info.reference or info.length)  # the mesh behind a sleeve is as long as the free length
-    return np.abs(shape(info.length, elements, x, 1).T @ info.basis).max(axis=0) * stretch
+    """The largest slope that each elastic unknown of a link gives, (m,), per unit of it: of a mesh that of one element."""
+    rows = slice(sys.joint_rows[link] + 1, [*sys.joint_rows, sys.n][link + 1])
+    if "/element/" in sys.labels[rows][0]:
+        return np.where([label.endswith("bubble") for label in sys.labels[rows]], 1.5, 1.0)
+    return np.abs(sys.equations.whole_link(link)[0]).max(axis=1)

@@ -59,3 +59,6 @@ Trials = _core.Trials  # one robot under many controllers
 joint_figures = _core.joint_figures
 strip_figures = _core.strip_figures
 least_vibration = _core.least_vibration
+population = _core.population  # many robots at once, from rows of numbers to rows of channels
+Drive = _core.Drive  # what acts on robots of a population
+Watch = _core.Watch  # what another thread sees of a population, and stops it by

@@ -235,6 +235,9 @@ def _put_on_motions(system: System, drive: Drive | Controller, t: float, q: np.n
 def _inside_limits(system: System, q: np.ndarray) -> None:
     for i, (link, row) in enumerate(zip(system.robot.links, system.joint_rows, strict=True), 1):
         if link.joint.limits is not None and not link.joint.limits[0] <= q[row] <= link.joint.limits[1]:
-            raise InputError(
-                f"expected a start inside the limits of joint {i}, {list(link.joint.limits)}", key="q0", value=float(q[row])
-            )
+            raise outside(i - 1, link.joint.limits, float(q[row]))
+
+
+def outside(joint: int, limits: tuple[float, float], position: float) -> InputError:
+    """Why a joint (from 0) cannot start at a position."""
+    return InputError(f"expected a start inside the limits of joint {joint + 1}, {list(limits)}", key="q0", value=position)

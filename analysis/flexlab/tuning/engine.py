@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from flexura.engine import cores
+from flexura.population import cores
 from flexura.errors import FlexuraError, InputError
 from flexura.request import program
 

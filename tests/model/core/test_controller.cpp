@@ -211,7 +211,7 @@ TEST("what the law measures of a tip is what a run shows of it") {
       for (int link = 0; link < robot->links(); ++link) {
         at += 3;
         if (robot->elastic[std::size_t(link)] == 0) continue;
-        const Bend tip = bend(*robot, work, q.data(), link);
+        const Bend<double> tip = bend(*robot, work, q.data(), link);
         CHECK(tip.deflection == row[at] && tip.slope == row[at + 1]);
         CHECK_NEAR(tip.deflection, row[at + 3], 1e-15);  // the last of two stations, by another way
         at += 4;
@@ -226,7 +226,7 @@ TEST("a strip bent to a circle has a circle's tip") {
   Workspace<double> work(*robot);
   for (double angle : {0.01, 1.0, 3.0}) {
     for (int e = 0; e < 8; ++e) q[std::size_t(1 + 2 * e)] = angle / 8.0;
-    const Bend tip = bend(*robot, work, q.data(), 0);
+    const Bend<double> tip = bend(*robot, work, q.data(), 0);
     CHECK_NEAR(tip.slope, angle, 1e-14);
     CHECK_NEAR(tip.deflection, 0.3 / angle * (1.0 - std::cos(angle)), 1e-9 * angle);
   }
@@ -243,7 +243,7 @@ TEST("the strip's terms: the mean of two ticks, every second tick, each joint in
   check::Random random{11};
   double w = 0.0, s = 0.0, dw = 0.0, ds = 0.0, w1 = 0.0, s1 = 0.0, u[2] = {0.0, 0.0};
   for (long k = 0; k < 40; ++k) {
-    const Bend seen{random(-0.01, 0.01), random(-0.1, 0.1)};
+    const Bend<double> seen{random(-0.01, 0.01), random(-0.1, 0.1)};
     const double still[2] = {0.0, 0.0}, reading = 1e-3 * std::floor(seen.deflection / 1e-3 + 0.5);
     if (k == 0) w = w1 = reading, s = s1 = seen.slope;
     if (k % 2 == 0) {
