@@ -85,7 +85,7 @@ template <class Real> class Method {
   // Give `left` itself to end there.
   virtual double fit(int lane, double wish, double left, double ahead) {
     (void)lane, (void)ahead;
-    return left <= wish ? left : left < 1.5 * wish ? 0.5 * left : wish;
+    return left <= 1.000001 * wish ? left : left < 1.5 * wish ? 0.5 * left : wish;
   }
 
   // The wish after a step of length h with that error; `accepted`: it was taken. `before`: the error of the step before.

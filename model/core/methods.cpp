@@ -1,5 +1,6 @@
 #include "methods.hpp"
 
+#include <cmath>
 #include <cstdio>
 
 namespace flexura {
@@ -7,7 +8,15 @@ namespace flexura {
 template <class Real> std::unique_ptr<Method<Real>> make_method(const std::string &name, Course<Real> &course) {
   if (name == "explicit") return std::make_unique<Explicit<Real>>(course);
   if (name == "implicit") return std::make_unique<Implicit<Real>>(course);
+  if (name == PAIR_3.name) return std::make_unique<PairSteps<Real>>(course, PAIR_3);
+  if (name == PAIR_5.name) return std::make_unique<PairSteps<Real>>(course, PAIR_5);
   return nullptr;
+}
+
+const char *explicit_for_ticks(double tick_s, double fastest, double rtol) {
+  const double three = 3.0 * std::ceil(tick_s * fastest / PAIR_3.stable), eight = 13.0 * std::ceil(tick_s * fastest / Explicit<double>::STABLE);
+  if (eight < three) return "explicit";
+  return rtol >= 1e-6 ? PAIR_3.name : PAIR_5.name;
 }
 
 template std::unique_ptr<Method<double>> make_method(const std::string &, Course<double> &);
@@ -57,6 +66,8 @@ template class Explicit<double>;
 template class Explicit<Pack<4>>;
 template class Implicit<double>;
 template class Implicit<Pack<4>>;
+template class PairSteps<double>;
+template class PairSteps<Pack<4>>;
 template class ModelPlant<double>;
 template class ModelPlant<Pack<4>>;
 

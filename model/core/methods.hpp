@@ -7,11 +7,15 @@
 #include "implicit.hpp"
 #include "loop.hpp"
 #include "model_plant.hpp"
+#include "pairs.hpp"
 
 namespace flexura {
 
-// "explicit" or "implicit"; null for any other name.
+// "explicit" or "implicit"; under a sampled controller also "explicit-3" and "explicit-5". Null for any other name.
 template <class Real> std::unique_ptr<Method<Real>> make_method(const std::string &name, Course<Real> &course);
+
+// Which of the explicit methods suits a run under a controller of short ticks, by passes a tick: `fastest` of the robot [1/s].
+const char *explicit_for_ticks(double tick_s, double fastest, double rtol);
 
 // Why a run ended where it did, in a sentence, and what to try: for every status but `running` and `done`. `joint` counts from 1.
 std::string explain(const Clock &clock, const std::string &method, double rtol);
@@ -22,6 +26,8 @@ extern template class Explicit<double>;
 extern template class Explicit<Pack<4>>;
 extern template class Implicit<double>;
 extern template class Implicit<Pack<4>>;
+extern template class PairSteps<double>;
+extern template class PairSteps<Pack<4>>;
 extern template class ModelPlant<double>;
 extern template class ModelPlant<Pack<4>>;
 

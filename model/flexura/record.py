@@ -87,7 +87,8 @@ def describe(system: System, error: float) -> dict[str, Any]:
 def energy_error(energies: np.ndarray, accounts: np.ndarray, jumps: Any = 0.0) -> float:
     """How far the energies (T, 3) and accounts (T, 4) of a run are from balancing, relative to the largest of them.
 
-    The larger of |E - E(0) - work + loss + numerical loss - jumps| and |strain - strain(0) - its own integral|; `jumps` (T,): what E
+    The larger of |E - E(0) - work + loss + numerical loss - jumps| and |strain - strain(0) - its own integral|; `jumps` (T,):
+    what E
     has jumped by so far.
     """
     if not len(energies):

@@ -2,6 +2,7 @@
 #include "check.hpp"
 #include "implicit.hpp"
 #include "loop.hpp"
+#include "pairs.hpp"
 #include "plants.hpp"
 
 using namespace flexura;
@@ -40,13 +41,13 @@ struct Run {
 };
 
 // The error at t = 1 of `count` equal steps of q'' + q = 0 from q = 1.
-template <class M> double oscillator_error(int count) {
+template <class M, class... Arguments> double oscillator_error(int count, const Arguments &...more) {
   Masses<double> plant(1);
   plant.stiffness[0] = 1.0;
   Acting acting(1);
   Acting *list = &acting;
   Course<double> c(plant, &list, 1e-8);
-  M method(c);
+  M method(c, more...);
   c.z[0] = 1.0;
   c.weights.start(c.z.data());
   const double h = 1.0 / count;
@@ -59,7 +60,9 @@ template <class M> double oscillator_error(int count) {
   return std::hypot(c.z[0] - std::cos(1.0), c.z[1] + std::sin(1.0));
 }
 
-template <class M> double order(int coarse) { return std::log2(oscillator_error<M>(coarse) / oscillator_error<M>(2 * coarse)); }
+template <class M, class... Arguments> double order(int coarse, const Arguments &...more) {
+  return std::log2(oscillator_error<M>(coarse, more...) / oscillator_error<M>(2 * coarse, more...));
+}
 
 // A controller that remembers what it was called for.
 struct Recorder : Sampler {
@@ -77,6 +80,8 @@ struct Recorder : Sampler {
 TEST("steps have the order that is theirs") {
   CHECK_NEAR(order<Explicit<double>>(2), 8.0, 0.5);
   CHECK_NEAR(order<Implicit<double>>(32), 4.0, 0.3);
+  CHECK_NEAR(order<PairSteps<double>>(16, PAIR_3), 3.0, 0.2);
+  CHECK_NEAR(order<PairSteps<double>>(8, PAIR_5), 5.0, 0.3);
 }
 
 TEST("an oscillator, at outputs between steps") {
@@ -162,6 +167,35 @@ TEST("a sampled controller is called once a tick, in order, whatever steps are r
   }
 }
 
+TEST("a controller of short ticks by steps of order 3 and 5: three and six passes a tick") {
+  Masses<double> plant(1, 1);
+  plant.stiffness = {0.0, 400.0};
+  Recorder recorder;
+  recorder.gain = 30.0;
+  Acting acting(1);
+  acting.sampler = &recorder, acting.rate_Hz = 1000.0;
+  Acting *list = &acting;
+  Loop<double> loop(plant, &list, grid(0.0, 1.0, 101), 1e-5);
+  for (const Pair *pair : {&PAIR_3, &PAIR_5}) {
+    recorder.t.clear(), recorder.place.clear();
+    PairSteps<double> method(loop.course, *pair);
+    const double q0[2] = {1.0, 0.1}, v0[2] = {0.0, 0.0};
+    loop.course.passes = 0;
+    loop.start(q0, v0, 1e-3);
+    while (loop.advance(method, 100)) {}
+    CHECK(loop.clock[0].status == Status::done && recorder.t.size() == 1000);
+    CHECK(loop.course.passes < 1050 * pair->stages);  // a few more where the motion begins
+    const double *last = loop.record[0].state.data() + 100 * loop.record[0].size;
+    CHECK_NEAR(last[1], 0.1 * std::cos(20.0), 1e-5);
+    double q = 1.0, v = 0.0;
+    for (int k = 0; k < 1000; ++k) {
+      const double a = -30.0 * q - 3.0 * v;
+      q += 1e-3 * v + 0.5e-6 * a, v += 1e-3 * a;
+    }
+    CHECK_NEAR(last[0], q, 1e-10);
+  }
+}
+
 TEST("what is held between ticks is held: exact motion under steps of force") {
   Masses<double> plant(1);
   Recorder recorder;
@@ -242,6 +276,19 @@ TEST("a function of the caller's is never asked for a time before the step's sta
     const double w = std::sqrt(35.0 - 0.25), t = 5.0;
     CHECK_NEAR(run.at(100, 0), std::exp(-0.5 * t) * (std::cos(w * t) + 0.5 / w * std::sin(w * t)), 1e-5);
   }
+}
+
+TEST("a steep function of the caller's costs implicit steps little") {
+  Masses<double> plant(1, 1);
+  plant.stiffness = {0.0, 4.0};
+  Acting acting(1);
+  long asked = 0;
+  acting.function = [&](double, const double *q, const double *v, double *force) { ++asked, force[0] += -1e6 * (q[0] - 1.0) - 2e3 * v[0]; };
+  Run run(plant, acting, grid(0.0, 5.0, 11), 1e-5, true);
+  CHECK(run({0.0, 1.0}, {0.0, 0.0}) == Status::done);
+  CHECK_NEAR(run.at(10, 0), 1.0, 1e-9);
+  CHECK_NEAR(run.at(10, 1), std::cos(10.0), 1e-3);
+  CHECK(asked < 4000);
 }
 
 TEST("a prescribed joint is on its motion, and its drive is what that takes") {
@@ -330,6 +377,37 @@ TEST("a budget of steps, an interruption") {
   stop = true;
   CHECK(!other.loop.advance(*other.method, 5));
   CHECK(other.loop.clock[0].status == Status::interrupted);
+}
+
+TEST("a rehearsal leaves no trace") {
+  Masses<double> plant(1, 1);
+  plant.stiffness = {4.0, 900.0};
+  auto run = [&](bool rehearse) {
+    Recorder recorder;
+    recorder.gain = 5.0;
+    Acting acting(1);
+    acting.sampler = &recorder, acting.rate_Hz = 3.0;
+    Acting *list = &acting;
+    Loop<double> loop(plant, &list, grid(0.0, 2.0, 21), 1e-6);
+    Explicit<double> explicit_steps(loop.course);
+    Implicit<double> implicit_steps(loop.course);
+    const double q0[2] = {1.0, 0.1}, v0[2] = {0.0, 0.0};
+    loop.start(q0, v0, 1e-3);
+    while (loop.advance(explicit_steps, 20)) {
+      if (!rehearse) {
+        loop.restore(loop.snapshot());
+        continue;
+      }
+      const auto here = loop.snapshot();
+      loop.rehearsal = true;
+      loop.advance(implicit_steps, 30);
+      loop.rehearsal = false;
+      loop.restore(here);
+    }
+    CHECK(recorder.t.size() == 6);
+    return loop.record[0].state;
+  };
+  CHECK(run(true) == run(false));
 }
 
 TEST("a pack gives each robot the digits that it has alone") {
