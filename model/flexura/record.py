@@ -44,9 +44,8 @@ def record(
     """The Run of a simulation.
 
     Args: t (T,) [s]; states (T, 2n); accounts (T, 4): work of the drives, losses, what the method took out, and the rise of the
-        strain energy, each from its own integral [J]; forces (T, links) of the drives; meta: what else the metadata says; seen
-        (T, k): what
-        `system.observe` gives, if it is known; jumps (T,): what the energy has jumped by so far [J].
+        strain energy, each from its own integral [J]; forces (T, links) of the drives; meta: what else the metadata says;
+        seen (T, k): what `system.observe` gives, if it is known; jumps (T,): what the energy has jumped by so far [J].
     """
     robot, n = system.robot, system.n
     q, v = np.ascontiguousarray(states[:, :n]), np.ascontiguousarray(states[:, n:])

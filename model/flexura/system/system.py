@@ -25,8 +25,7 @@ _UNITS = {"rotation": "rad", "bubble": "rad", "shape": "rad", "mode": "kg^(1/2) 
 class System:
     """A robot's equations M(q) qdd + bias(q, qd) + damping qd + elastic(q) + gravity(q) = F (19).
 
-    q (n,) is numbered [joint 1, elastic unknowns of link 1, joint 2, ...], named by `labels`: of a mesh the rotation across
-    each
+    q (n,) is numbered [joint 1, elastic unknowns of link 1, joint 2, ...], named by `labels`: of a mesh the rotation across each
     element and its bubble [rad] (6), of a link in its own modes mass-normalised coordinates [kg^(1/2) m], of a sleeved link its
     shapes [rad] (7). F has entries in the joints' rows. Constant; solvers keep their memory apart from it.
     """
@@ -35,8 +34,7 @@ class System:
     nodes: tuple[int, ...] | None = None  # that sliders and sleeves keep, where they go from node to node: `nodes.Nodes`
 
     def fixed(self, q: Any) -> System:
-        """The robot of fixed structure at q (n,): itself, but where it slides from node to node with the nodes that it has
-        there."""
+        """The robot of fixed structure at q (n,): itself; where it slides from node to node, with the nodes that it has there."""
         if not self.robot.nodal:
             return self
         at = self._array(q, "q")
@@ -100,8 +98,7 @@ class System:
 
     @cached_property
     def limits(self) -> np.ndarray:
-        """Lower and upper limits of the joints (links, 2) [m or rad]: those of the file, and the ends of the links that
-        slide."""
+        """Lower and upper limits of the joints (links, 2) [m or rad]: those of the file, and the ends of the links that slide."""
         own = np.array([link.joint.limits or (-np.inf, np.inf) for link in self.robot.links])
         ends = np.array([self.robot.travel(i) for i in range(len(self.robot.links))])
         return np.column_stack([np.maximum(own[:, 0], ends[:, 0]), np.minimum(own[:, 1], ends[:, 1])])
@@ -173,8 +170,7 @@ class System:
         if places.ndim != 1 or not np.all((places >= 0) & (places <= length * (1 + 1e-12))):
             raise InputError(f"expected places from 0 to the link's length, {length:g} m", key="s", value=s)
         if self.exact:
-            return tuple(np.ascontiguousarray(self.equations.line(self.check(q), link - 1, places).T))  # type:
-            ignore[return-value]
+            return tuple(np.ascontiguousarray(self.equations.line(self.check(q), link - 1, places).T))  # type: ignore[return-value]
         return self.assembly.line(self.check(q), link, places)
 
     def angles(self, link: int, s: Any) -> np.ndarray:
@@ -190,8 +186,7 @@ class System:
         return out
 
     def observe(self, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
-        """What a Run shows of states q, qd (T, n): rows of poses, deflections, tip and energies, as `record.channel_units`
-        names
+        """What a Run shows of states q, qd (T, n): rows of poses, deflections, tip and energies, as `record.channel_units` names
         them from `link/1/x` to `energy/potential` (2), (29)."""
         if self.exact:
             return np.asarray(self.equations.observe(q, qd, STATIONS))
@@ -240,8 +235,7 @@ class System:
         return jacobian(forces, at, np.full(self.n, 1e-6))
 
     def rate(self, q: Any, qd: Any) -> np.ndarray:
-        """The derivative of all forces by qd (n, n) at (q, qd): damping, friction, and the gyroscopic terms of a motion
-        (27)."""
+        """The derivative of all forces by qd (n, n) at (q, qd): damping, friction, and the gyroscopic terms of a motion (27)."""
         at, rates = self.check(q), self.check(qd, "qd")
         if self.exact:
             return np.asarray(self.equations.rates(at, rates))
@@ -249,8 +243,7 @@ class System:
         return self.assembly.damping(at) + gyroscopic
 
     def _shapes(self, link: int, pieces: tuple[Piece, ...]) -> tuple[Piece, ...]:
-        """The pieces of a link; one in modes gets the core's modes in place of its own (all else is equal to the last
-        digits)."""
+        """The pieces of a link; one in modes gets the core's modes in place of its own (all else is equal to the last digits)."""
         if len(pieces) != 1 or not hasattr(pieces[0].shapes, "coefficients") or not pieces[0].K.size:
             return pieces
         B, K, _ = self.equations.whole_link(link)
