@@ -49,7 +49,7 @@ Rtol = Annotated[float, typer.Option(help="relative tolerance of the native solv
 @app.command()
 def simulate(
     robot: RobotFile, manoeuvre: ManoeuvreFile = None, out: Out = None, rtol: Rtol = 1e-6,
-    method: Annotated[str, typer.Option(help="auto, explicit, explicit-3, explicit-5 implicit or exponential")] = "auto",
+    method: Annotated[str, typer.Option(help="auto, explicit, implicit or exponential")] = "auto",
     controller: Annotated[
         Path | None, typer.Option(metavar="GAINS", help="gains file (TOML): a sampled controller follows the manoeuvre's motions")
     ] = None,

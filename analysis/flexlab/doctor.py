@@ -26,7 +26,6 @@ class Finding:
 _PACKAGES = {
     "numpy": "nothing works",
     "scipy": "nothing works",
-    "numba": "nothing works",
     "pydantic": "robot files cannot be read",
     "pyarrow": "runs cannot be stored or read",
     "exudyn": "no cross-check (flexura crosscheck, flexura demo)",

@@ -71,6 +71,9 @@ template <class Real> class Loop {
     return any();
   }
 
+  // Goes on with a method whose last step led to where the loop now is again (choice.hpp).
+  void resume(Method<Real> &method) { current = &method; }
+
   bool any() const {
     return std::any_of(clock.begin(), clock.end(), [](const Clock &c) { return c.running(); });
   }

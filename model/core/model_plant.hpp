@@ -80,6 +80,54 @@ template <class Real> class ModelPlant : public Plant<Real> {
     return MARGIN * most;
   }
 
+  bool matrices(int lane_, const Real *q, double *M, double *K, double *D) override {
+    const int n = this->n;
+    std::vector<Real> unit(zero), column(zero), lost(zero);
+    for (int i = 0; i < n; ++i) {
+      unit[std::size_t(i)] = Real(1.0);
+      forces(model, work, q, zero.data(), unit.data(), Terms{false, false, false}, column.data());
+      for (int j = 0; j < n; ++j) M[j * n + i] = lane(column[std::size_t(j)], lane_), K[j * n + i] = D[j * n + i] = 0.0;
+      if (model.mass_damped) {
+        std::fill(lost.begin(), lost.end(), Real(0.0));
+        add_mass_damping(model, q, unit.data(), lost.data());
+        for (int j = 0; j < n; ++j) D[j * n + i] = lane(lost[std::size_t(j)], lane_);
+      }
+      unit[std::size_t(i)] = Real(0.0);
+    }
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j < i; ++j) M[i * n + j] = M[j * n + i] = 0.5 * (M[i * n + j] + M[j * n + i]);
+    for (const Piece<Real> &c : model.pieces)
+      for (int l = 0; l < c.m; ++l) {
+        const int row = c.own() + l;
+        if (c.joint != At::sleeve) {
+          K[row * n + row] = lane(c.K[l], lane_), D[row * n + row] += lane(c.D[l], lane_);
+          continue;
+        }
+        for (int p = 0; p < c.P; ++p) {
+          const Matter<Real> here = matter_at(c, Real(c.length + q[c.first] * (c.xi[p] - 1.0)));
+          const Real moment = here.stiffness * c.weight[p] * c.bend[l * padded(c.P) + p] / q[c.first];
+          for (int k = 0; k < c.m; ++k) {
+            const double entry = lane(Real(moment * c.bend[k * padded(c.P) + p]), lane_);
+            K[row * n + c.own() + k] += entry, D[row * n + c.own() + k] += lane(c.beta, lane_) * entry;
+          }
+        }
+      }
+    return true;
+  }
+
+  bool observe(int lane_, const Real *q, double *out) override {
+    std::vector<Pose<Real>> poses(std::size_t(this->joints) + 1);
+    Real speed[2];
+    outward_kinematics(model, work, q, zero.data());
+    places(model, work, q, zero.data(), poses.data(), speed);
+    for (int i = 0; i < this->joints; ++i) {
+      out[i] = 0.0;
+      for (int k = this->first[std::size_t(i)]; k < this->first[std::size_t(i) + 1]; ++k) out[i] += lane(this->deflect[std::size_t(k)] * q[k], lane_);
+    }
+    out[this->joints] = lane(poses.back().x, lane_), out[this->joints + 1] = lane(poses.back().y, lane_);
+    return true;
+  }
+
   // A slider that has run into the sleeve of the link it rides on.
   int blocked(int lane_, const Real *q) const override {
     for (std::size_t i = 1; i < model.pieces.size(); ++i) {

@@ -46,6 +46,14 @@ template <class Real> struct Plant {
   virtual Real energy(const Real *q, const Real *v) = 0;
   // The largest angular frequency or rate of decay at q with the gains of `pass` [1/s], from above: what limits explicit steps.
   virtual Real fastest(const Real *q, const Pass<Real> &pass) = 0;
+  // For methods that step in modes, of robot `lane` at q: the mass, the stiffness and the damping of the links' material (n, n) each, row by
+  // row, joints' friction not included. False: not known (matrices.hpp then finds them from passes).
+  virtual bool matrices(int lane, const Real *q, double *M, double *K, double *D) {
+    return (void)lane, (void)q, (void)M, (void)K, (void)D, false;
+  }
+  // What a mode must not change if it is to be damped: the tips' deflections (joints), then x, y of the last tip [m]; room for joints + 2.
+  // False: not known, then no mode is damped.
+  virtual bool observe(int lane, const Real *q, double *out) { return (void)lane, (void)q, (void)out, false; }
   // A joint that stands where it cannot be beyond its own limits, or -1; of robot `lane`.
   virtual int blocked(int lane, const Real *q) const { return (void)lane, (void)q, -1; }
 };

@@ -62,10 +62,15 @@ template <class Real> class Weights {
     renew();
   }
 
+  // 1 / tolerance of the accounts of a step to znew [1/J].
+  Real joules(const Real *znew) const {
+    const Real sizes = larger(largest.energy, larger(abs(znew[2 * n + WORK]), abs(znew[2 * n + LOSS])));
+    return 1.0 / (larger(sizes, Real(1e-280)) * rtol);
+  }
+
   // The worst group of an error e (2 n + ACCOUNTS) of a step to znew, over its tolerance. What is not a number stays so.
   Real norm(const Real *e, const Real *znew) const {
-    const Real most_energy = larger(largest.energy, larger(abs(znew[2 * n + WORK]), abs(znew[2 * n + LOSS])));
-    const Real joules = 1.0 / (larger(most_energy, Real(1e-280)) * rtol);
+    const Real joule = joules(znew);
     Real most = 0.0;
     for (int half = 0; half < 2; ++half)
       for (int i = 0; i < plant.joints; ++i) {
@@ -73,7 +78,7 @@ template <class Real> class Weights {
         most = larger(most, size(e, from, from + 1));
         if (end > from + 1) most = larger(most, size(e, from + 1, end));
       }
-    for (int k : {WORK, LOSS, NUMERICAL}) most = larger(most, abs(e[2 * n + k] * joules));
+    for (int k : {WORK, LOSS, NUMERICAL}) most = larger(most, abs(e[2 * n + k] * joule));
     return most;
   }
 

@@ -157,7 +157,9 @@ class System:
         length: B of (1)."""
         places = np.atleast_1d(np.asarray(s, dtype=float))
         out, start = np.zeros((len(places), self.n)), 0.0
-        for piece, own in zip(*(x[link - 1] for x in (self.assembly.structure.links, self.assembly.structure.own)), strict=True):
+        for piece, own in zip(
+            *(x[link - 1] for x in (self.assembly.structure.links, self.assembly.structure.own)), strict=True
+        ):
             out[:, own] = piece.shapes(np.clip((places - start) / piece.length, 0.0, 1.0))
             start += piece.length
         return out
@@ -175,7 +177,9 @@ class System:
         if self.exact:
             row = self.equations.observe(at[None], np.zeros((1, self.n)), 2)[0]
             first = np.cumsum([0] + [3 + 4 * link.flexible for link in self.robot.links])
-            return row[[first[i] + 3 for i, link in enumerate(self.robot.links) if link.flexible]], row[first[-1] : first[-1] + 2]
+            return row[[first[i] + 3 for i, link in enumerate(self.robot.links) if link.flexible]], row[
+                first[-1] : first[-1] + 2
+            ]
         return self.assembly.tip_deflections(at), np.array([(tip := self.assembly.tip(at)).place.real, tip.place.imag])
 
     @property
@@ -190,7 +194,9 @@ class System:
             raise InputError(text, key="sliding", value="nodal")
         array = np.ascontiguousarray(q, dtype=float)
         if array.shape != (self.n,):
-            raise InputError(f"expected an array of shape ({self.n},), in the order of system.labels", key=key, value=array.shape)
+            raise InputError(
+                f"expected an array of shape ({self.n},), in the order of system.labels", key=key, value=array.shape
+            )
         return array
 
     def tangent(self, q: Any, qd: Any = None) -> np.ndarray:

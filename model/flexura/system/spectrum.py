@@ -23,12 +23,11 @@ class Modes:
     labels: tuple[str, ...]
 
 
-def frequencies(
-    robot: Any, q: Any = None, joints: str = "locked", *, count: int | None = None, qd: Any = None
-) -> np.ndarray:
+def frequencies(robot: Any, q: Any = None, joints: str = "locked", *, count: int | None = None, qd: Any = None) -> np.ndarray:
     """Natural frequencies [Hz], ascending, of the undamped robot linearised about q (n,) (27), (28).
 
-    Args: robot: a System, a Robot, or a robot file; q (n,): by default the static equilibrium at the start; joints: "locked" (only
+    Args: robot: a System, a Robot, or a robot file; q (n,): by default the static equilibrium at the start; joints: "locked"
+    (only
         the elastic unknowns move) or "free" (rigid motions come out as 0); count: the lowest so many, by default all; qd (n,):
         joint rates of a steady motion, for example a rotation at constant speed, joints locked to it.
 

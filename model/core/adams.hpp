@@ -1,0 +1,244 @@
+// Steps of the modes: the linear part solved exactly, what is left of it summed up as in Adams' method.
+//
+// With y = origin + sum_k eta_k phi_k the equations of motion are
+//
+//     eta'' + own eta' + w2 eta = N,      N = rows a + own eta' + w2 eta,
+//
+// a the accelerations of a pass: exact, whatever the modes. N varies with the motion and not with the vibration. A polynomial in time
+// through its last values goes into the variation-of-constants formula of each mode (propagator.hpp), the equations are looked
+// at once where that leads, and the polynomial through the new value too makes the step: predict, evaluate, correct (exponential
+// multistep methods: Hochbruck, Ostermann, Acta Numerica 19 (2010), 2.5). The error is estimated as Shampine and Gordon do, by leaving out
+// the oldest value. Steps need not resolve any frequency of the robot.
+//
+// Damping that is added to modes above a cutoff acts on the motion about the quasi-static one, N / w2:
+//
+//     eta'' + own eta' + added (eta' - N' / w2) + w2 eta = N,   so   d2 = own + added,   f = N + lag N',   lag = added / w2.
+#pragma once
+#include "interpolation.hpp"
+#include "modes.hpp"
+#include "propagator.hpp"
+
+namespace flexura {
+
+template <class Real> class Adams {
+ public:
+  static constexpr int LANES = LanesOf<Real>::value, ROWS = ORDER + 1;
+  // Modes that turn by more than FAST rad a step look back on two values only: five would blow up, by 31, what the modes leave of their
+  // own force; two do by 3. Their forces being smooth, that costs no accuracy.
+  static constexpr int FAST_ORDER = 2;
+  static constexpr double FAST = 3.0;
+
+  const Modes<Real> &b;
+  const int n, chunks, stride;
+  Real *eta, *etad;                  // (stride) the state at the start of the step
+  Real *N[ROWS];                     // (stride + extras) the last values, row(age); behind them other numbers found at the same times
+  Real *predicted[2], *corrected[2]; // (stride) eta, eta' at its end
+  Real *gap;                         // (stride) new less extrapolated N
+  Real *late[4];                     // (stride) what a gap adds to eta, eta'; its share that is uncertain
+  Real poly[2][ORDER + 1][COLUMNS];  // [slow, fast modes][power][value by age, GAP, OLDEST] (interpolation.hpp)
+  Real *fast;                        // (stride) 1 for modes that turn fast, else 0
+  Real time[ROWS];
+  int count[LANES], steady[LANES];   // values held; steps since the length of the step changed
+
+  const int extras;
+
+  Adams(const Modes<Real> &modes, int extra_numbers)
+      : b(modes), n(modes.n), chunks(modes.chunks), stride(modes.stride), extras(extra_numbers) {
+    memory.lay([this](auto take) {
+      auto vectors = [&](auto &...all) { (take(all, stride), ...); };
+      vectors(eta, etad, predicted[0], predicted[1], corrected[0], corrected[1], gap, fast);
+      for (auto *group : {late, step}) for (int r = 0; r < 4; ++r) take(group[r], stride);
+      for (Real *&row_ : N) take(row_, stride + room_of<Real>(extras));
+      for (auto &table : ahead) for (Real *&row_ : table) take(row_, stride);
+      take(A, POWERS * stride), take(B, POWERS * stride);
+    });
+    one.lay([this](auto take) {
+      for (double **vector : {&w2, &d2, &lag}) take(*vector, padded(n));
+      take(one_step, 4 * padded(n)), take(one_A, POWERS * padded(n)), take(one_B, POWERS * padded(n));
+    });
+    kinds.assign(static_cast<std::size_t>(chunks), SLOW_ONES);
+    for (auto &x : time) x = 0.0;
+    for (int k = 0; k < LANES; ++k) count[k] = 0, steady[k] = 0, span[k] = -1.0;
+    for (auto &set : poly) for (auto &power : set) for (Real &x : power) x = 0.0;
+  }
+
+  Real *extra(int row_) { return N[row_] + stride; }
+  const Real *extra(int row_) const { return N[row_] + stride; }
+  int row(int age) const { return head + age < ROWS ? head + age : head + age - ROWS; }
+  int new_row() const { return row(ROWS - 1); }
+  int newest() const { return head; }
+
+  double length(int k) const { return span[k]; }  // of the step that robot k's tables are for
+
+  // Robot k has one value, now in row(0), and modes that are new.
+  void restart(int k, double t) { count[k] = 1, set_lane(time[head], k, t), span[k] = -1.0; }
+  void forget_tables(int k) { span[k] = -1.0; }
+
+  // The tables of a step of length h; 0: nothing moves.
+  void tabulate(const Real &h) {
+    Real changed = 0.0;
+    bool any = false;
+    for (int k = 0; k < LANES; ++k) {
+      const double own = lane(h, k);
+      if (own != span[k]) tabulate_modes(k, own), span[k] = own, steady[k] = 0;
+      else if (steady[k] > ORDER) continue;
+      set_lane(changed, k, 1.0), any = true;
+    }
+    if (!any) return;
+    Real node[ORDER];
+    for (int j = 0; j < ORDER; ++j)
+      for (int k = 0; k < LANES; ++k) {
+        const double own = lane(h, k);
+        set_lane(node[j], k, own > 0.0 ? (lane(time[row(j)], k) - lane(time[head], k)) / own : -j);
+      }
+    polynomials(changed, node);
+    for (int c = 0; c < chunks; ++c) weigh_values(wide(changed), c);
+  }
+
+  // Where a step leads without a look at the equations there; minus the extrapolated N in `gap`.
+  void predict() {
+    int most = 0;
+    for (int k = 0; k < LANES; ++k) most = count[k] > most ? count[k] : most;
+    for (int c = 0; c < chunks; ++c) {
+      const Lanes y = get(eta, c), v = get(etad, c);
+      Lanes p = get(step[0], c) * y + get(step[1], c) * v, q = get(step[2], c) * y + get(step[3], c) * v, g = 0.0;
+      for (int j = 0, end = smaller_of(most, order_of(c)); j < end; ++j) {
+        const Lanes value = get(N[row(j)], c);
+        p += get(ahead[0][j], c) * value, q += get(ahead[1][j], c) * value, g -= get(ahead[2][j], c) * value;
+      }
+      put(predicted[0], c, p), put(predicted[1], c, q), put(gap, c, g);
+    }
+  }
+
+  // N from accelerations a (n) at a state of the modes, into `out`.
+  void force(const Real *a, const Real *y, const Real *v, Real *out) const {
+    for (int c = 0; c < chunks; ++c) put(out, c, get(b.w2, c) * get(y, c) + get(b.own, c) * get(v, c));
+    add_rows(n, chunks, a, b.rows, stride, out);
+  }
+
+  // The step, with N found where `predict` led, in the new row.
+  void correct() {
+    const Real *found = N[new_row()];
+    for (int c = 0; c < chunks; ++c) {
+      const Lanes g = get(gap, c) + get(found, c);
+      put(gap, c, g);
+      put(corrected[0], c, get(predicted[0], c) + get(late[0], c) * g);
+      put(corrected[1], c, get(predicted[1], c) + get(late[1], c) * g);
+    }
+  }
+
+  // Robots `which` go on from the end of their steps at the times t.
+  void accept(const Real &which, const Real &t) {
+    const Lanes go = wide(which);
+    for (int c = 0; c < chunks; ++c) {
+      put(eta, c, choose_less(Lanes(0.5), go, get(corrected[0], c), get(eta, c)));
+      put(etad, c, choose_less(Lanes(0.5), go, get(corrected[1], c), get(etad, c)));
+    }
+    head = new_row();
+    time[head] = t;
+    for (int k = 0; k < LANES; ++k) {
+      if (lane(which, k) > 0.5) {
+        if (count[k] < ORDER) ++count[k];
+        ++steady[k];
+      } else {  // its values keep their ages
+        for (int age = 0; age < ORDER; ++age) {
+          const int to = row(age), from = row(age + 1);
+          set_lane(time[to], k, lane(time[from], k));
+          for (int i = 0; i < stride + extras; ++i) set_lane(N[to][i], k, lane(N[from][i], k));
+        }
+      }
+    }
+  }
+
+  // Coefficient m of the polynomial of a column, for the modes of a chunk.
+  Lanes coefficient(int column, int m, int c) const {
+    const char kind = kinds[static_cast<std::size_t>(c)];
+    if (kind != MIXED) return wide(poly[kind == FAST_ONES][m][column]);
+    return choose_less(Lanes(0.5), get(fast, c), wide(poly[1][m][column]), wide(poly[0][m][column]));
+  }
+  // How many values, and which power of time at most, the modes of a chunk use.
+  int order_of(int c) const { return kinds[static_cast<std::size_t>(c)] == FAST_ONES ? FAST_ORDER : ORDER; }
+
+ private:
+  Block<Real> memory;
+  Block<double> one;                              // one robot's, for tabulate_modes
+  Real *step[4], *A, *B, *ahead[3][ORDER];        // free motion; moments; weights of old values in eta, eta' and in N extrapolated
+  double *w2, *d2, *lag, *one_step, *one_A, *one_B;
+  double span[LANES];                             // length of the step that the tables are for
+  int head = 0;
+  enum : char { SLOW_ONES, FAST_ONES, MIXED };
+  std::vector<char> kinds;                        // (chunks) of the modes in a chunk
+
+  static int smaller_of(int a, int b) { return a < b ? a : b; }
+
+  // Free motion and moments of robot k's modes over a step of h.
+  void tabulate_modes(int k, double h) {
+    const int room = padded(n);
+    for (int i = 0; i < n; ++i) w2[i] = lane(b.w2[i], k), d2[i] = lane(b.d2[i], k), lag[i] = lane(b.lag[i], k);
+    if (h > 0.0) propagate(room / 4, room, w2, d2, lag, h, one_step, one_A, one_B);
+    for (int i = 0; i < n; ++i) {
+      for (int r = 0; r < 4; ++r) set_lane(step[r][i], k, h > 0.0 ? one_step[r * room + i] : r == 0 || r == 3 ? 1.0 : 0.0);
+      for (int m = 0; m < POWERS; ++m) {
+        set_lane(A[m * stride + i], k, h > 0.0 ? one_A[m * room + i] : 0.0);
+        set_lane(B[m * stride + i], k, h > 0.0 ? one_B[m * room + i] : 0.0);
+      }
+      set_lane(fast[i], k, w2[i] * h * h > FAST * FAST ? 1.0 : 0.0);
+    }
+    if (LANES == 1)
+      for (int i = n; i < room; ++i) fast[i] = fast[n - 1];  // what fills up the last chunk is of its kind
+    for (int c = 0; c < chunks; ++c) {
+      const Lanes turning = get(fast, c);
+      kinds[static_cast<std::size_t>(c)] = worst(turning) < 0.5 ? SLOW_ONES : least(turning) > 0.5 ? FAST_ONES : MIXED;
+    }
+  }
+
+  // Polynomials through the values that each robot holds, for the robots that changed.
+  void polynomials(const Real &changed, const Real *node) {
+    Real fresh[ORDER + 1][COLUMNS];
+    auto set = [&](int turning, int k, const auto &from, auto pick) {
+      for (int m = 0; m <= ORDER; ++m)
+        for (int j = 0; j < COLUMNS; ++j)
+          if (lane(changed, k) > 0.5) set_lane(poly[turning][m][j], k, pick(from[m][j]));
+    };
+    bool alike = true;
+    for (int k = 1; k < LANES; ++k) alike = alike && count[k] == count[0];
+    for (int turning = 0; turning < 2; ++turning) {
+      auto used = [&](int k) { return turning && count[k] > FAST_ORDER ? FAST_ORDER : count[k]; };
+      if (alike) {
+        interpolate(used(0), node, fresh);
+        for (int k = 0; k < LANES; ++k) set(turning, k, fresh, [k](const Real &x) { return lane(x, k); });
+        continue;
+      }
+      for (int k = 0; k < LANES; ++k) {
+        double own[ORDER], C[ORDER + 1][COLUMNS];
+        for (int j = 0; j < ORDER; ++j) own[j] = lane(node[j], k);
+        interpolate(used(k), own, C);
+        set(turning, k, C, [](double x) { return x; });
+      }
+    }
+  }
+
+  // The weights of the values in a step, from the polynomials and the moments.
+  void weigh_values(Lanes changed, int c) {
+    auto keep = [&](Real *at, Lanes x) { put(at, c, choose_less(Lanes(0.5), changed, x, get(at, c))); };
+    const int order = order_of(c);
+    for (int j = 0; j < order; ++j) {
+      Lanes p = 0.0, q = 0.0, end = 0.0;
+      for (int m = 0; m < order; ++m) {
+        const Lanes C = coefficient(j, m, c);
+        p += C * get(A + m * stride, c), q += C * get(B + m * stride, c), end += C;
+      }
+      keep(ahead[0][j], p), keep(ahead[1][j], q), keep(ahead[2][j], end);
+    }
+    for (int r = 0; r < 2; ++r) {
+      Lanes p = 0.0, q = 0.0;
+      for (int m = 0; m <= order; ++m) {
+        const Lanes C = coefficient(GAP + r, m, c);
+        p += C * get(A + m * stride, c), q += C * get(B + m * stride, c);
+      }
+      keep(late[2 * r], p), keep(late[2 * r + 1], q);
+    }
+  }
+};
+
+}  // namespace flexura

@@ -1,0 +1,175 @@
+// The method "auto": which method takes fewest passes is measured, not guessed.
+//
+// From the state where a run begins each candidate goes on for TRIAL passes. The one that gets furthest a pass, in the second half of its
+// trial, goes on from where its trial ended; what the others did is forgotten. The race is held again where progress a pass has fallen
+// to a quarter, at most once in AGAIN passes. Passes are counted, not time: a run's digits do not depend on the machine's load.
+//
+// There is no race either where exponential steps end soon (pace.hpp), or where it would not be allowed or is decided beforehand: a sampled controller must see each tick once, and a caller's
+// function no time before one it has seen; rigid robots without gains or friction and tolerances below 1e-9 are for explicit steps.
+#pragma once
+#include <array>
+#include <memory>
+
+#include "exponential.hpp"
+#include "implicit.hpp"
+#include "loop.hpp"
+#include "pace.hpp"
+
+namespace flexura {
+
+class Auto {
+ public:
+  static constexpr long TRIAL = 100, SHORT = 60, AGAIN = 1500;  // SHORT: of those that begin where the first one has got to
+  static constexpr double SLOWER = 4.0;
+
+  Auto(Loop<double> &run, double tolerance, const ExponentialOptions &options = ExponentialOptions())
+      : loop(run), rtol(tolerance), exponential(run.course, tolerance, options), implicit(run.course), explicit_(run.course) {}
+
+  // At most so many steps further; is the robot still running?
+  bool advance(long steps) {
+    if (!chosen) choose();
+    while (steps > 0 && loop.any()) {
+      const long some = std::min(steps, CHECK), before = loop.course.passes;
+      const double t = loop.clock[0].t;
+      loop.advance(*chosen, some);
+      steps -= some;
+      if (gives_way()) continue;
+      const double progress = (loop.clock[0].t - t) / static_cast<double>(std::max(loop.course.passes - before, 1L));
+      if (raced && loop.any() && progress * SLOWER < speed && since_race() > AGAIN) race();
+    }
+    return loop.any();
+  }
+
+  const char *name() const { return chosen ? chosen->name() : "auto"; }
+  int races() const { return held; }
+  const Exponential<double> &exponential_steps() const { return exponential; }
+
+ private:
+  static constexpr long CHECK = 50;  // steps between two looks at the progress
+  Loop<double> &loop;
+  const double rtol;
+  Exponential<double> exponential;
+  Implicit<double> implicit;
+  Explicit<double> explicit_;
+  Method<double> *chosen = nullptr;
+  bool raced = false, unrivalled = false;
+  int held = 0;
+  long last_race = 0;
+  double speed = 0.0;  // seconds a pass, when chosen
+
+  // A state of the loop to come back to, with the rows recorded since another one.
+  struct Mark {
+    std::vector<double> z, t, state, drive;
+    Clock clock;
+    int rows = 0;
+  };
+  Mark mark(int since) const {
+    const Record &r = loop.record[0];
+    Mark m;
+    m.z = loop.course.z, m.clock = loop.clock[0], m.rows = r.rows;
+    m.t.assign(r.t.begin() + since, r.t.begin() + r.rows);
+    m.state.assign(r.state.begin() + static_cast<std::ptrdiff_t>(since) * r.size, r.state.begin() + static_cast<std::ptrdiff_t>(r.rows) * r.size);
+    m.drive.assign(r.drive.begin() + static_cast<std::ptrdiff_t>(since) * r.joints, r.drive.begin() + static_cast<std::ptrdiff_t>(r.rows) * r.joints);
+    return m;
+  }
+  void go_back(const Mark &m, int since) {
+    Record &r = loop.record[0];
+    loop.course.z = m.z, loop.clock[0] = m.clock, r.rows = m.rows;
+    std::copy(m.t.begin(), m.t.end(), r.t.begin() + since);
+    std::copy(m.state.begin(), m.state.end(), r.state.begin() + static_cast<std::ptrdiff_t>(since) * r.size);
+    std::copy(m.drive.begin(), m.drive.end(), r.drive.begin() + static_cast<std::ptrdiff_t>(since) * r.joints);
+  }
+
+  void choose() {
+    Course<double> &c = loop.course;
+    const Acting &acting = c.acts_of(0);
+    const bool bends = c.n > c.plant.joints;
+    const auto resistance = [&](int i) { return larger(c.plant.viscous[i], c.plant.coulomb[i]); };
+    if (for_explicit(rtol, bends, c.plant.joints, acting, resistance)) chosen = &explicit_;
+    else if (acting.sampler) chosen = stiffer_than(acting.rate_Hz) ? static_cast<Method<double> *>(&implicit) : &explicit_;
+    else if (acting.function) chosen = bends ? static_cast<Method<double> *>(&exponential) : &explicit_;
+    else race();
+  }
+
+  // The highest frequency or rate of decay where the run is [rad/s].
+  double fastest() {
+    Course<double> &c = loop.course;
+    const double *q = c.z.data(), *v = q + c.n;
+    c.acts.at(loop.clock[0].t), c.acts.load(q, v);
+    return c.plant.fastest(q, c.acts.pass(q, v, q, v, 0.0, 0.0));
+  }
+  // Would explicit steps between two ticks be many more than one? A step of either method costs a dozen passes.
+  bool stiffer_than(double rate_Hz) { return fastest() > 2.0 * Explicit<double>::STABLE * rate_Hz; }
+  // Are explicit steps, of 12 passes and as long as they may be, slower than that?
+  bool hopeless(double speed_) { return Explicit<double>::STABLE < 12.0 * speed_ * fastest(); }
+
+  // A run without a rival is looked at again after so many attempts of its own; else passes are counted.
+  long since_race() const { return unrivalled ? Pace::attempts(loop.clock[0]) : loop.course.passes - last_race; }
+
+  // Do exponential steps, from the start of the run, have no rival?
+  bool without_rival() {
+    Pace pace;
+    while (loop.advance(exponential, 1) && pace.look(loop.clock[0])) {
+    }
+    if (!pace.settled(loop.clock[0])) return false;
+    const Clock &c = loop.clock[0];
+    chosen = &exponential, raced = unrivalled = true, speed = (c.t - pace.half) / (Pace::ATTEMPTS / 2);
+    return true;
+  }
+
+  void race() {
+    const int since = loop.record[0].rows;
+    const Mark start = mark(since);
+    Mark best;
+    Method<double> *winner = nullptr;
+    double furthest = -1.0, step = start.clock.wish;
+    const bool begun = chosen == nullptr;  // exponential steps have made the first part of their trial already
+    const long before = loop.course.passes;
+    if (begun && without_rival()) return;
+    unrivalled = false;
+    for (Method<double> *method : std::array<Method<double> *, 3>{&exponential, &implicit, &explicit_}) {
+      if (method == &explicit_ && hopeless(furthest)) break;
+      const bool goes_on = begun && method == &exponential;
+      if (!goes_on) {
+        go_back(start, since);
+        loop.clock[0].fresh = true;
+        loop.clock[0].wish = std::max(step, start.clock.wish);
+      }
+      const long most = goes_on ? std::max(TRIAL - (loop.course.passes - before), TRIAL / 4) : method == &exponential ? TRIAL : SHORT;
+      const double got = trial(*method, most);
+      if (loop.clock[0].status == Status::limit || loop.clock[0].status == Status::interrupted || loop.clock[0].status == Status::done) {
+        best = mark(since), winner = method, furthest = got;
+        break;  // the run is over
+      }
+      if (method == &exponential) step = loop.clock[0].wish;
+      if (got > furthest) best = mark(since), winner = method, furthest = got;
+    }
+    go_back(best, since);
+    loop.resume(*winner);
+    chosen = winner, speed = furthest, raced = true, last_race = loop.course.passes, ++held;
+  }
+
+  // Seconds a pass in the second half of `most` passes; -1: the method got stuck.
+  double trial(Method<double> &method, long most) {
+    const long begin = loop.course.passes;
+    long half = begin;
+    double t = loop.clock[0].t;
+    while (loop.course.passes - begin < most && loop.advance(method, 1))
+      if (2 * (loop.course.passes - begin) <= most) half = loop.course.passes, t = loop.clock[0].t;
+    const Status status = loop.clock[0].status;
+    if (status == Status::stuck || status == Status::diverged) return -1.0;
+    return (loop.clock[0].t - t) / static_cast<double>(std::max(loop.course.passes - half, 1L));
+  }
+
+  // Where exponential steps get stuck, implicit ones may not.
+  bool gives_way() {
+    Clock &c = loop.clock[0];
+    if (chosen != &exponential || (c.status != Status::stuck && c.status != Status::diverged)) return false;
+    chosen = &implicit, raced = false;
+    c.status = Status::running, c.fresh = true, c.failed = 0;
+    c.wish = 1e-6 * (c.end - c.t);
+    return true;
+  }
+};
+
+}  // namespace flexura

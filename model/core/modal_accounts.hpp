@@ -1,0 +1,219 @@
+// Work, loss and what the added damping takes, within a step of the modes: integrals of the motion that `Within` describes, in closed
+// form however often a mode turns within the step.
+//
+// With P_j, Z_j the parts of joint j's rate that are a polynomial in x = t/h and free motion (within.hpp), u_j its drive's force without
+// the part of the gains, and H_mq = 1 / (m + q + 1),
+//
+//     int x^m v_j dt = sum_q H_mq P_jq x^(m+q+1) + sum_k phi_kj L_km,        L_km = int x^m z_k' dt,
+//     int v_j^2 dt   = (P_j H P_j) / h + 2/h sum_q P_jq sum_k phi_kj L_kq + sum_k phi_kj^2 int z_k'^2 dt,
+//     work           = sum_j int u_j v_j dt - kp_j [eta_j^2] / 2 - kd_j int v_j^2 dt,      u_j a polynomial through its last values,
+//     loss           = sum_j c_j int v_j^2 dt + sum_k material_k int eta_k'^2 dt + int rest dt,
+//     numerical      = sum_k added_k int eta_k'^2 dt - lag_k int N_k' eta_k' dt.
+//
+// `rest` is the power lost less the first two terms at the same instant (Coulomb friction, material whose damping couples modes). What
+// is left out are products of two different free motions, which average out.
+#pragma once
+#include "within.hpp"
+
+namespace flexura {
+
+template <class Real> class ModalAccounts {
+ public:
+  static constexpr int LANES = LanesOf<Real>::value;
+
+  // One joint that is free to move: its row; gains of its drive; viscous friction.
+  struct Joint {
+    int row;
+    Real kp, kd, viscous;
+  };
+  // The extra numbers of a row of the history: u_j, then the rest of the loss, then the power of prescribed joints.
+  static int extras(int joints) { return joints + 2; }
+
+  struct Sums {
+    Real work, loss, numerical;      // over the first part of the step [J]
+    Real work_error, loss_error;     // their uncertain part
+  };
+
+  ModalAccounts(const Adams<Real> &steps, const Within<Real> &motion, std::vector<Joint> free)
+      : s(steps), w(motion), joints(std::move(free)) {
+    memory.lay([this](auto take) {
+      for (Real *&row : L) take(row, s.stride);
+      for (Real **vector : {&Qz, &square, &added}) take(*vector, s.stride);
+      take(phi, 2 * static_cast<int>(joints.size()) * s.stride);
+    });
+  }
+
+  const std::vector<Joint> &free_joints() const { return joints; }
+
+  // The numbers of a row at a state with the rates v (n) and eta' (stride): forces (joints) of the drives there with their gains' part,
+  // the joints' places and rates in q, v; the power lost, and the power of prescribed joints.
+  void record(Real *extra, const Real *force, const Real *q, const Real *v, const Real *etad, const Real &lost, const Real &prescribed) const {
+    const int count = static_cast<int>(joints.size());
+    Real rest = lost;
+    for (int j = 0; j < count; ++j) {
+      const Joint &x = joints[static_cast<std::size_t>(j)];
+      extra[j] = force[j] + x.kp * q[x.row] + x.kd * v[x.row];
+      rest -= x.viscous * v[x.row] * v[x.row];
+    }
+    if (s.b.lossy) {
+      for (int c = 0; c < s.chunks; ++c) put(square, c, get(etad, c) * get(etad, c));
+      rest -= dot(s.n, s.b.material, square);
+    }
+    extra[count] = rest, extra[count + 1] = prescribed;
+  }
+
+  // Integrals from the start of the step of length h to its fraction x, where the joints' places are q1; q0 at the start.
+  // whole: x = 1.
+  Sums over(const Real &h, const Real &x, bool whole, const Real *q0, const Real *q1) {
+    Sums sum{0.0, 0.0, 0.0, 0.0, 0.0};
+    free_motion(h, x, whole);
+    Real area[2 * POWERS], power = x;  // int_0^x x^k dx
+    for (int k = 0; k < 2 * POWERS; ++k) area[k] = power * (1.0 / (k + 1)), power *= x;
+    const Real per = 1.0 / choose_less(Real(0.0), h, h, Real(1.0));
+    const int count = static_cast<int>(joints.size());
+    for (int j = 0; j < count; ++j) {
+      const Joint &joint = joints[static_cast<std::size_t>(j)];
+      const Real *phi_j = phi + 2 * j * s.stride;
+      Real P[ORDER], Z[POWERS], U[POWERS], uncertain[POWERS];
+      for (int q = 0; q < ORDER; ++q) P[q] = double(q + 1) * dot(s.n, phi_j, w.p[q + 1]);
+      for (int m = 0; m < POWERS; ++m) Z[m] = dot(s.n, phi_j, L[m]);
+      polynomial(j, U, uncertain);
+      for (int m = 0; m < POWERS; ++m) {
+        Real moment = Z[m];
+        for (int q = 0; q < ORDER; ++q) moment += P[q] * area[m + q];
+        sum.work += U[m] * moment, sum.work_error += uncertain[m] * moment;
+      }
+      Real squares = 0.0;
+      if (!(worst(abs(joint.kd) + abs(joint.viscous)) > 0.0)) {
+        sum.work -= 0.5 * joint.kp * (q1[joint.row] - q0[joint.row]) * (q1[joint.row] + q0[joint.row]);
+        continue;
+      }
+      squares = dot(s.n, phi_j + s.stride, Qz);
+      for (int q = 0; q < ORDER; ++q) {
+        Real row = 2.0 * Z[q];
+        for (int r = 0; r < ORDER; ++r) row += P[r] * area[q + r];
+        squares += per * P[q] * row;
+      }
+      const Real a = q0[joint.row], b = q1[joint.row];
+      sum.work -= 0.5 * joint.kp * (b - a) * (b + a) + joint.kd * squares;
+      sum.loss += joint.viscous * squares;
+    }
+    for (int e = 0; e < 2; ++e) {  // powers that are taken as polynomials themselves
+      Real U[POWERS], uncertain[POWERS], all = 0.0, error = 0.0;
+      polynomial(count + e, U, uncertain);
+      for (int m = 0; m < POWERS; ++m) {
+        const Real moment = h * area[m];
+        all += U[m] * moment, error += uncertain[m] * moment;
+      }
+      (e == 0 ? sum.loss : sum.work) += all, (e == 0 ? sum.loss_error : sum.work_error) += error;
+    }
+    if (s.b.lossy || s.b.damped) of_modes(h, area, sum);
+    return sum;
+  }
+
+  // To be called when modes were taken: the joints' rows of the modes, and their squares.
+  void take_rows() {
+    for (int j = 0; j < static_cast<int>(joints.size()); ++j)
+      for (int k = 0; k < s.n; ++k) {
+        const Real x = s.b.phi[k * s.stride + joints[static_cast<std::size_t>(j)].row];
+        phi[2 * j * s.stride + k] = x, phi[(2 * j + 1) * s.stride + k] = x * x;
+      }
+  }
+
+ private:
+  const Adams<Real> &s;
+  const Within<Real> &w;
+  std::vector<Joint> joints;
+  Block<Real> memory;
+  Real *L[POWERS], *Qz;              // (stride): int x^m z' dt, int z'^2 dt
+  Real *phi;                         // (2 joints, stride): of each joint phi_kj, and squared
+  Real *square, *added;              // (stride) scratch; `square` is written by record() too
+  // The polynomial through an extra number's last values and its newest, and the part of it that is uncertain.
+  void polynomial(int number, Real *U, Real *uncertain) const {
+    Real values[ORDER], gap = s.extra(s.new_row())[number];
+    for (int j = 0; j < ORDER; ++j) {
+      values[j] = s.extra(s.row(j))[number];
+      Real end = 0.0;
+      for (int m = 0; m < ORDER; ++m) end += s.poly[0][m][j];
+      gap -= end * values[j];
+    }
+    for (int m = 0; m < POWERS; ++m) {
+      Real sum = s.poly[0][m][GAP] * gap;
+      for (int j = 0; j < ORDER; ++j) sum += s.poly[0][m][j] * values[j];
+      U[m] = sum, uncertain[m] = s.poly[0][m][OLDEST] * gap;
+    }
+  }
+
+  // L and Qz of z from 0 to x, from z at both ends: by parts, L_m = x^m z - m J_(m-1), and z'' + d2 z' + w2 z = 0 gives J_m = int x^m z dx.
+  template <class Number>
+  static void moments_of(Number w2, Number d2, Number h, Number x, Number z0, Number zd0, Number z1, Number zd1, Number *moment, Number &squares) {
+    const Number per = 1.0 / h, inverse = per / w2;
+    Number before = 0.0, J = 0.0, power = 1.0;
+    for (int m = 0; m < POWERS; ++m) {
+      const Number here = m ? power * z1 - double(m) * J : z1 - z0;
+      J = -(d2 * here + power * zd1 - (m ? double(m) * per * before : zd0)) * inverse;
+      moment[m] = before = here;
+      power = power * x;
+    }
+    const Number energy = 0.5 * ((zd0 - zd1) * (zd0 + zd1) + w2 * (z0 - z1) * (z0 + z1));
+    squares = choose_less(Number(0.0), d2, energy / choose_less(Number(0.0), d2, d2, Number(1.0)), Number(0.0));
+  }
+
+  void free_motion(const Real &h, const Real &x, bool whole) {
+    for (int c = 0; c < s.chunks; ++c) {
+      if (!w.oscillates(c)) {
+        for (Real *row : L) put(row, c, Lanes(0.0));
+        put(Qz, c, Lanes(0.0));
+        continue;
+      }
+      const Lanes H = wide(choose_less(Real(0.0), h, h, Real(1.0)));
+      Lanes z, zd, moment[POWERS], squares;
+      whole ? w.free_at_end(h, c, z, zd) : w.free_at(h, x, c, z, zd);
+      moments_of(w.w2_of(c), w.d2_of(c), H, wide(x), get(w.z0, c), get(w.zd0, c), z, zd, moment, squares);
+      for (int m = 0; m < POWERS; ++m) put(L[m], c, moment[m]);
+      put(Qz, c, squares);
+    }
+    for (const auto &one : w.damped) {
+      const double own_h = lane(h, one.robot), own_x = lane(x, one.robot);
+      double moment[POWERS], squares, z, zd;
+      one.at(own_x * own_h, z, zd);
+      if (one.both) {
+        moments_of(one.w2, one.d2, own_h, own_x, one.z, one.zd, z, zd, moment, squares);
+      } else {  // z = z0 e^(-d2 t): int x^m z' dt = z x^m + ... by parts, upwards, d2 h being large
+        double power = 1.0;
+        for (int m = 0; m < POWERS; ++m) {
+          moment[m] = m ? power * z + m * moment[m - 1] / (one.d2 * own_h) : z - one.z;
+          power *= own_x;
+        }
+        squares = 0.5 * one.d2 * (one.z - z) * (one.z + z);
+      }
+      for (int m = 0; m < POWERS; ++m) set_lane(L[m][one.mode], one.robot, moment[m]);
+      set_lane(Qz[one.mode], one.robot, squares);
+    }
+  }
+
+  // What the modes lose to the links' material and to the added damping.
+  void of_modes(const Real &h, const Real *area, Sums &sum) {
+    const Lanes per = wide(1.0 / choose_less(Real(0.0), h, h, Real(1.0)));
+    for (int c = 0; c < s.chunks; ++c) {
+      const int degree = w.degree(c);
+      Lanes P[ORDER], squares = get(Qz, c), pumped = 0.0;
+      for (int q = 0; q < degree; ++q) P[q] = double(q + 1) * get(w.p[q + 1], c);
+      for (int q = 0; q < degree; ++q) {
+        Lanes moment = get(L[q], c), row = moment + moment;  // moment: int x^q eta' dt
+        for (int r = 0; r < degree; ++r) {
+          const Lanes part = P[r] * wide(area[q + r]);
+          row += part, moment += part;
+        }
+        squares += per * P[q] * row;
+        pumped += double(q + 1) * per * get(w.f[q + 1], c) * moment;
+      }
+      const Lanes w2 = get(s.b.w2, c), lag = get(s.b.lag, c);
+      put(square, c, squares), put(added, c, lag * (w2 * squares - pumped));
+    }
+    sum.loss += dot(s.n, s.b.material, square);
+    for (int k = 0; k < s.n; ++k) sum.numerical += added[k];
+  }
+};
+
+}  // namespace flexura
