@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from . import core, dense
+from . import core, dense, nodal
 from .control import PID, Controller
 from .drive import Drive
 from .errors import InputError
@@ -83,7 +83,8 @@ def simulate(
         acting = as_function(acting, joints)
     q, qd = initial(system, t[0], acting, q0, qd0)
     if not system.exact:
-        return dense.simulate(system, t, acting, q, qd, rtol, method, progress)
+        slow = nodal if system.robot.nodal else dense
+        return slow.simulate(system, t, acting, q, qd, rtol, method, progress)
     return _Course(system, t, acting, q, qd, rtol, method).run(progress)
 
 

@@ -10,8 +10,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from flexura.population import cores
 from flexura.errors import FlexuraError, InputError
+from flexura.population import cores
 from flexura.request import program
 
 from .task import Task
