@@ -4,7 +4,7 @@
 // trial, goes on from where its trial ended; what the others did is forgotten. The race is held again where progress a pass has fallen
 // to a quarter, at most once in AGAIN passes. Passes are counted, not time: a run's digits do not depend on the machine's load.
 //
-// There is no race where it would not be allowed or is decided beforehand: a sampled controller must see each tick once, and a caller's
+// There is no race either where exponential steps end soon (pace.hpp), or where it would not be allowed or is decided beforehand: a sampled controller must see each tick once, and a caller's
 // function no time before one it has seen; rigid robots without gains or friction and tolerances below 1e-9 are for explicit steps.
 #pragma once
 #include <array>
@@ -13,13 +13,14 @@
 #include "exponential.hpp"
 #include "implicit.hpp"
 #include "loop.hpp"
+#include "pace.hpp"
 
 namespace flexura {
 
 class Auto {
  public:
   static constexpr long TRIAL = 100, SHORT = 60, AGAIN = 1500;  // SHORT: of those that begin where the first one has got to
-  static constexpr double SLOWER = 4.0, SHARPEST = 1e-9;
+  static constexpr double SLOWER = 4.0;
 
   Auto(Loop<double> &run, double tolerance, const ExponentialOptions &options = ExponentialOptions())
       : loop(run), rtol(tolerance), exponential(run.course, tolerance, options), implicit(run.course), explicit_(run.course) {}
@@ -34,7 +35,7 @@ class Auto {
       steps -= some;
       if (gives_way()) continue;
       const double progress = (loop.clock[0].t - t) / static_cast<double>(std::max(loop.course.passes - before, 1L));
-      if (raced && loop.any() && progress * SLOWER < speed && loop.course.passes - last_race > AGAIN) race();
+      if (raced && loop.any() && progress * SLOWER < speed && since_race() > AGAIN) race();
     }
     return loop.any();
   }
@@ -51,7 +52,7 @@ class Auto {
   Implicit<double> implicit;
   Explicit<double> explicit_;
   Method<double> *chosen = nullptr;
-  bool raced = false;
+  bool raced = false, unrivalled = false;
   int held = 0;
   long last_race = 0;
   double speed = 0.0;  // seconds a pass, when chosen
@@ -83,12 +84,8 @@ class Auto {
     Course<double> &c = loop.course;
     const Acting &acting = c.acts_of(0);
     const bool bends = c.n > c.plant.joints;
-    bool resisted = false;  // gains or friction
-    for (int i = 0; i < c.plant.joints; ++i) {
-      const JointDrive &d = acting.joints[i];
-      resisted = resisted || c.plant.viscous[i] > 0.0 || c.plant.coulomb[i] > 0.0 || (d.follows() && !d.prescribed && (d.kp > 0.0 || d.kd > 0.0));
-    }
-    if (rtol < SHARPEST || (!bends && !resisted)) chosen = &explicit_;
+    const auto resistance = [&](int i) { return larger(c.plant.viscous[i], c.plant.coulomb[i]); };
+    if (for_explicit(rtol, bends, c.plant.joints, acting, resistance)) chosen = &explicit_;
     else if (acting.sampler) chosen = stiffer_than(acting.rate_Hz) ? static_cast<Method<double> *>(&implicit) : &explicit_;
     else if (acting.function) chosen = bends ? static_cast<Method<double> *>(&exponential) : &explicit_;
     else race();
@@ -106,18 +103,40 @@ class Auto {
   // Are explicit steps, of 12 passes and as long as they may be, slower than that?
   bool hopeless(double speed_) { return Explicit<double>::STABLE < 12.0 * speed_ * fastest(); }
 
+  // A run without a rival is looked at again after so many attempts of its own; else passes are counted.
+  long since_race() const { return unrivalled ? Pace::attempts(loop.clock[0]) : loop.course.passes - last_race; }
+
+  // Do exponential steps, from the start of the run, have no rival?
+  bool without_rival() {
+    Pace pace;
+    while (loop.advance(exponential, 1) && pace.look(loop.clock[0])) {
+    }
+    if (!pace.settled(loop.clock[0])) return false;
+    const Clock &c = loop.clock[0];
+    chosen = &exponential, raced = unrivalled = true, speed = (c.t - pace.half) / (Pace::ATTEMPTS / 2);
+    return true;
+  }
+
   void race() {
     const int since = loop.record[0].rows;
     const Mark start = mark(since);
     Mark best;
     Method<double> *winner = nullptr;
     double furthest = -1.0, step = start.clock.wish;
+    const bool begun = chosen == nullptr;  // exponential steps have made the first part of their trial already
+    const long before = loop.course.passes;
+    if (begun && without_rival()) return;
+    unrivalled = false;
     for (Method<double> *method : std::array<Method<double> *, 3>{&exponential, &implicit, &explicit_}) {
       if (method == &explicit_ && hopeless(furthest)) break;
-      go_back(start, since);
-      loop.clock[0].fresh = true;
-      loop.clock[0].wish = std::max(step, start.clock.wish);
-      const double got = trial(*method, method == &exponential ? TRIAL : SHORT);
+      const bool goes_on = begun && method == &exponential;
+      if (!goes_on) {
+        go_back(start, since);
+        loop.clock[0].fresh = true;
+        loop.clock[0].wish = std::max(step, start.clock.wish);
+      }
+      const long most = goes_on ? std::max(TRIAL - (loop.course.passes - before), TRIAL / 4) : method == &exponential ? TRIAL : SHORT;
+      const double got = trial(*method, most);
       if (loop.clock[0].status == Status::limit || loop.clock[0].status == Status::interrupted || loop.clock[0].status == Status::done) {
         best = mark(since), winner = method, furthest = got;
         break;  // the run is over

@@ -1,25 +1,17 @@
 #include "simulation.hpp"
 
+#include "methods.hpp"
+
 namespace flexura {
-namespace {
-
-std::unique_ptr<Method<double>> make_method(const std::string &name, Course<double> &course, double rtol) {
-  if (name == "explicit") return std::make_unique<Explicit<double>>(course);
-  if (name == "implicit") return std::make_unique<Implicit<double>>(course);
-  if (name == "exponential") return std::make_unique<Exponential<double>>(course, rtol);
-  return nullptr;
-}
-
-}  // namespace
 
 Simulation::Simulation(std::shared_ptr<const Model<double>> model, Acting acting, const Request &request)
     : model_(std::move(model)), work_(*model_), plant_(*model_, work_), acting_(std::move(acting)), acting_pointer_(&acting_),
-      loop_(plant_, &acting_pointer_, request.times, request.rtol), method_(make_method(request.method, loop_.course, request.rtol)) {
+      loop_(plant_, &acting_pointer_, request.times, request.rtol), method_(make_method<double>(request.method, loop_.course, request.rtol)) {
   if (!method_) auto_ = std::make_unique<Auto>(loop_, request.rtol);
   loop_.interrupt = &interrupt;
   if (request.most_steps > 0) loop_.most_steps = request.most_steps;
   const double span = request.times.back() - request.times.front();
-  loop_.start(request.q.data(), request.v.data(), request.first_step > 0.0 ? request.first_step : 1e-4 * span);
+  loop_.start(request.q.data(), request.v.data(), request.first_step > 0.0 ? request.first_step : FIRST_STEP * span);
 }
 
 bool Simulation::advance(long steps) { return method_ ? loop_.advance(*method_, steps) : auto_->advance(steps); }

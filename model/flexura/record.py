@@ -27,6 +27,12 @@ def channel_units(robot: Robot) -> dict[str, str]:
     return units | {"tip/x": "m", "tip/y": "m"} | {f"energy/{name}": "J" for name in energies}
 
 
+def observed(robot: Robot) -> list[str]:
+    """The channels that the core reads from a state, in the order of `System.observe`."""
+    accounts = ("energy/work", "energy/loss", "energy/numerical_loss")
+    return [name for name in channel_units(robot) if not name.startswith("joint/") and name not in accounts]
+
+
 WORK, LOSS, NUMERICAL, STRAIN = range(4)  # columns of the accounts, as Account of model/core/plant.hpp counts them
 NOTED, DOUBTED, REFUSED = 1e-3, 1e-2, 0.1  # of the energies: a balance beyond is a note, an event, the end of trust in a run
 
@@ -38,8 +44,8 @@ def record(
     """The Run of a simulation.
 
     Args: t (T,) [s]; states (T, 2n); accounts (T, 4): work of the drives, losses, what the method took out, and the rise of the
-        strain energy, each from its own integral [J]; forces (T, links) of the drives; meta: what else the metadata says; seen (T, k): what
-        `system.observe` gives, if it is known; jumps (T,): what the energy has jumped by so far [J].
+        strain energy, each from its own integral [J]; forces (T, links) of the drives; meta: what else the metadata says;
+        seen (T, k): what `system.observe` gives, if it is known; jumps (T,): what the energy has jumped by so far [J].
     """
     robot, n = system.robot, system.n
     q, v = np.ascontiguousarray(states[:, :n]), np.ascontiguousarray(states[:, n:])

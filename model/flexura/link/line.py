@@ -16,7 +16,8 @@ from .section import Material, material
 from .shapes import ElementShapes, MeshShapes, WholeShapes
 
 ELEMENT_POINTS = 3
-MOST_SHAPES = 20  # polynomials of a whole link
+MOST_SHAPES = 20  # unknowns of a whole link
+SPARE_SHAPES = 3  # polynomials beyond the modes that are kept: the last modes of a space are none of the link
 
 
 class Place(NamedTuple):
@@ -121,14 +122,15 @@ class Piece:
         return self.w.T @ (self.mass[:, None] * self.w)
 
 
-def orders(link: Link, followed: bool) -> tuple[int, int]:
-    """How many polynomials (7) and how many points a whole-link piece has."""
+def orders(link: Link, followed: bool) -> tuple[int, int, int]:
+    """How many polynomials (7), points and own modes a whole-link piece has."""
     mesh, sleeve = min(2 * link.elements, MOST_SHAPES), link.joint.type == "Pb"
     if link.modes is None:
-        return mesh, mesh + 1
+        count = mesh if sleeve else mesh + SPARE_SHAPES
+        return count, count + 1, mesh
     few = min(link.modes, MOST_SHAPES - 5) + 5
     count = few if material(link).uniform else max(few, mesh)
-    return count, count + (1 if followed or sleeve else 0)
+    return count, count + (1 if followed or sleeve else 0), min(link.modes, count)
 
 
 def whole(link: Link, beyond: Link | None) -> bool:
@@ -147,12 +149,11 @@ def pieces(
     law = material(link)
     if not whole(link, beyond):
         return mesh(law, link.elements)
-    count, points = orders(link, beyond is not None)
+    count, points, kept = orders(link, beyond is not None)
     sleeve = link.joint.type == "Pb"
     if sleeve and link.modes is None:
         return (whole_piece(law, points, np.eye(count), np.zeros(0)),)
     free = link.joint.start if sleeve else link.length_m
-    kept = count if link.modes is None else min(link.modes, count)
     matrices = clamped_matrices(law, free, count, points, mass, inertia)
     return (
         whole_piece(

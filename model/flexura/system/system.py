@@ -34,7 +34,7 @@ class System:
     nodes: tuple[int, ...] | None = None  # that sliders and sleeves keep, where they go from node to node: `nodes.Nodes`
 
     def fixed(self, q: Any) -> System:
-        """The robot of fixed structure at q (n,): itself, but where it slides from node to node with the nodes that it has there."""
+        """The robot of fixed structure at q (n,): itself; where it slides from node to node, with the nodes that it has there."""
         if not self.robot.nodal:
             return self
         at = self._array(q, "q")
