@@ -2,7 +2,7 @@
 //
 // From the state where a run begins each candidate goes on for TRIAL passes. The one that gets furthest a pass, in the second half of its
 // trial, goes on from where its trial ended; what the others did is forgotten. The race is held again where progress a pass has fallen
-// to a quarter, at most once in AGAIN passes. Passes are counted, not time: a run's digits do not depend on the machine's load.
+// to a quarter, at most once in AGAIN passes. A set of modes that exponential steps take on their way counts as SET n passes. Passes are counted, not time: a run's digits do not depend on the machine's load.
 //
 // There is no race where it would not be allowed or is decided beforehand: a sampled controller must see each tick once, and a caller's
 // function no time before one it has seen; rigid robots without gains or friction and tolerances below 1e-9 are for explicit steps.
@@ -19,7 +19,7 @@ namespace flexura {
 class Auto {
  public:
   static constexpr long TRIAL = 100, SHORT = 60, AGAIN = 1500;  // SHORT: of those that begin where the first one has got to
-  static constexpr double SLOWER = 4.0, SHARPEST = 1e-9;
+  static constexpr double SLOWER = 4.0, SHARPEST = 1e-9, SET = 4.0;
 
   Auto(Loop<double> &run, double tolerance, const ExponentialOptions &options = ExponentialOptions())
       : loop(run), rtol(tolerance), exponential(run.course, tolerance, options), implicit(run.course), explicit_(run.course) {}
@@ -28,13 +28,14 @@ class Auto {
   bool advance(long steps) {
     if (!chosen) choose();
     while (steps > 0 && loop.any()) {
-      const long some = std::min(steps, CHECK), before = loop.course.passes;
+      const long some = std::min(steps, CHECK);
+      const double before = cost();
       const double t = loop.clock[0].t;
       loop.advance(*chosen, some);
       steps -= some;
       if (gives_way()) continue;
-      const double progress = (loop.clock[0].t - t) / static_cast<double>(std::max(loop.course.passes - before, 1L));
-      if (raced && loop.any() && progress * SLOWER < speed && loop.course.passes - last_race > AGAIN) race();
+      const double progress = (loop.clock[0].t - t) / std::max(cost() - before, 1.0);
+      if (raced && loop.any() && progress * SLOWER < speed && cost() - last_race > AGAIN) race();
     }
     return loop.any();
   }
@@ -53,19 +54,26 @@ class Auto {
   Method<double> *chosen = nullptr;
   bool raced = false;
   int held = 0;
-  long last_race = 0;
-  double speed = 0.0;  // seconds a pass, when chosen
+  double last_race = 0.0;  // what had been spent by then
+  double speed = 0.0;      // seconds a pass, when chosen
+
+  // Passes so far, sets of modes after the first counted as such.
+  double cost() const {
+    return static_cast<double>(loop.course.passes) + SET * loop.course.n * std::max(exponential.modes_taken(0) - 1, 0);
+  }
 
   // A state of the loop to come back to, with the rows recorded since another one.
   struct Mark {
     std::vector<double> z, t, state, drive;
     Clock clock;
+    std::vector<Weights<double>> weights;  // one
     int rows = 0;
   };
   Mark mark(int since) const {
     const Record &r = loop.record[0];
     Mark m;
     m.z = loop.course.z, m.clock = loop.clock[0], m.rows = r.rows;
+    m.weights.push_back(loop.course.weights);
     m.t.assign(r.t.begin() + since, r.t.begin() + r.rows);
     m.state.assign(r.state.begin() + static_cast<std::ptrdiff_t>(since) * r.size, r.state.begin() + static_cast<std::ptrdiff_t>(r.rows) * r.size);
     m.drive.assign(r.drive.begin() + static_cast<std::ptrdiff_t>(since) * r.joints, r.drive.begin() + static_cast<std::ptrdiff_t>(r.rows) * r.joints);
@@ -74,6 +82,7 @@ class Auto {
   void go_back(const Mark &m, int since) {
     Record &r = loop.record[0];
     loop.course.z = m.z, loop.clock[0] = m.clock, r.rows = m.rows;
+    loop.course.weights = m.weights.front();
     std::copy(m.t.begin(), m.t.end(), r.t.begin() + since);
     std::copy(m.state.begin(), m.state.end(), r.state.begin() + static_cast<std::ptrdiff_t>(since) * r.size);
     std::copy(m.drive.begin(), m.drive.end(), r.drive.begin() + static_cast<std::ptrdiff_t>(since) * r.joints);
@@ -127,19 +136,18 @@ class Auto {
     }
     go_back(best, since);
     loop.resume(*winner);
-    chosen = winner, speed = furthest, raced = true, last_race = loop.course.passes, ++held;
+    chosen = winner, speed = furthest, raced = true, last_race = cost(), ++held;
   }
 
   // Seconds a pass in the second half of `most` passes; -1: the method got stuck.
   double trial(Method<double> &method, long most) {
-    const long begin = loop.course.passes;
-    long half = begin;
-    double t = loop.clock[0].t;
-    while (loop.course.passes - begin < most && loop.advance(method, 1))
-      if (2 * (loop.course.passes - begin) <= most) half = loop.course.passes, t = loop.clock[0].t;
+    const double begin = cost();
+    double half = begin, t = loop.clock[0].t;
+    while (cost() - begin < static_cast<double>(most) && loop.advance(method, 1))
+      if (2.0 * (cost() - begin) <= static_cast<double>(most)) half = cost(), t = loop.clock[0].t;
     const Status status = loop.clock[0].status;
     if (status == Status::stuck || status == Status::diverged) return -1.0;
-    return (loop.clock[0].t - t) / static_cast<double>(std::max(loop.course.passes - half, 1L));
+    return (loop.clock[0].t - t) / std::max(cost() - half, 1.0);
   }
 
   // Where exponential steps get stuck, implicit ones may not.

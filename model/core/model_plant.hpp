@@ -213,6 +213,12 @@ template <class Real> class ModelPlant : public Plant<Real> {
       if (model.kind[std::size_t(link)] == JointKind::revolute) this->lever[std::size_t(this->first[std::size_t(link)])] = beyond;
     }
     this->reach = beyond;
+    this->travel.assign(std::size_t(this->joints), Real(0.0));  // sleeves and sliders on links that bend
+    for (std::size_t i = 0; i < model.pieces.size(); ++i) {
+      const Piece<Real> &c = model.pieces[i];
+      if (c.joint == At::sleeve) this->travel[std::size_t(c.link)] = 0.01 * c.length;
+      else if (c.joint == At::slider && i > 0 && model.pieces[i - 1].m > 0) this->travel[std::size_t(c.link)] = 0.02 * model.pieces[i - 1].length;
+    }
   }
 };
 

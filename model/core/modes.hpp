@@ -57,6 +57,10 @@ template <class Real> class Modes {
       double bent = 0.0;
       for (int j = e; j < end; ++j) {
         const double x = lane(plant.lever[j] * (q[j] - seen[j]), k);
+        if (j == e && !plant.travel.empty()) {
+          const double most = lane(plant.travel[i], k);
+          if (most > 0.0 && abs(lane(q[j] - seen[j], k)) > most) return true;
+        }
         if (j == e) way += i > 0 ? abs(x) : 0.0;  // turning the whole robot changes no mode
         else bent += x * x;
       }

@@ -25,33 +25,33 @@ template <class Real> class Weights {
   static constexpr double PATH = 1e-3, START = 1e-6;  // of a tip's path; of the robot's length, before anything has moved
 
   Weights(Plant<Real> &robot, double tolerance)
-      : weight(padded(2 * robot.n), Real(0.0)), plant(robot), rtol(tolerance), n(robot.n), begun(n, Real(0.0)),
+      : weight(padded(2 * robot.n), Real(0.0)), robot_(&robot), rtol(tolerance), n(robot.n), begun(n, Real(0.0)),
         deflection(0.0), path(0.0), deflecting(0.0), speed(0.0), energy(0.0) {}
 
   // Forgets all sizes: a run begins at (q, v).
   void start(const Real *z) {
     std::vector<Real> slow(n, Real(0.0));  // every joint moves the tips at START of the robot's length a second
-    for (int i = 0; i < plant.joints; ++i)
-      if (!plant.locked[i]) slow[plant.first[i]] = plant.reach * START / plant.lever[plant.first[i]];
+    for (int i = 0; i < robot_->joints; ++i)
+      if (!robot_->locked[i]) slow[robot_->first[i]] = robot_->reach * START / robot_->lever[robot_->first[i]];
     for (int k = 0; k < n; ++k) begun[k] = z[k];
     deflection = path = deflecting = speed = Real(0.0);
-    energy = plant.energy(z, slow.data());
+    energy = robot_->energy(z, slow.data());
     grow(z, true);
   }
 
   // Sizes with the state z too; `weight` is 1 / tolerance of each number of a state. `look`: at its energy too.
   void grow(const Real *z, bool look) {
     Real way = 0.0, fast = 0.0;
-    for (int i = 0; i < plant.joints; ++i) {
-      const int e = plant.first[i], end = plant.first[i + 1];
-      way += plant.lever[e] * abs(z[e] - begun[e]), fast += plant.lever[e] * abs(z[n + e]);
+    for (int i = 0; i < robot_->joints; ++i) {
+      const int e = robot_->first[i], end = robot_->first[i + 1];
+      way += robot_->lever[e] * abs(z[e] - begun[e]), fast += robot_->lever[e] * abs(z[n + e]);
       Real bent = 0.0, bending = 0.0;
-      for (int k = e + 1; k < end; ++k) bent += plant.deflect[k] * z[k], bending += plant.deflect[k] * z[n + k];
+      for (int k = e + 1; k < end; ++k) bent += robot_->deflect[k] * z[k], bending += robot_->deflect[k] * z[n + k];
       deflection = larger(deflection, abs(bent)), deflecting = larger(deflecting, abs(bending));
     }
     path = larger(path, way), speed = larger(speed, fast);
     for (int k : {WORK, LOSS}) energy = larger(energy, abs(z[2 * n + k]));
-    if (look) energy = larger(energy, plant.energy(z, z + n));
+    if (look) energy = larger(energy, robot_->energy(z, z + n));
     renew();
   }
 
@@ -66,8 +66,8 @@ template <class Real> class Weights {
     const Real joule = joules(znew);
     Real most = 0.0;
     for (int half = 0; half < 2; ++half)
-      for (int i = 0; i < plant.joints; ++i) {
-        const int from = half * n + plant.first[i], end = half * n + plant.first[i + 1];
+      for (int i = 0; i < robot_->joints; ++i) {
+        const int from = half * n + robot_->first[i], end = half * n + robot_->first[i + 1];
         most = larger(most, size(e, from, from + 1));
         if (end > from + 1) most = larger(most, size(e, from + 1, end));
       }
@@ -89,9 +89,9 @@ template <class Real> class Weights {
     Spot spot;
     double most = -1.0;
     for (int half = 0; half < 2; ++half)
-      for (int i = 0; i < plant.joints; ++i)
+      for (int i = 0; i < robot_->joints; ++i)
         for (int elastic = 0; elastic < 2; ++elastic) {
-          const int from = half * n + plant.first[i], end = elastic ? half * n + plant.first[i + 1] : from + 1;
+          const int from = half * n + robot_->first[i], end = elastic ? half * n + robot_->first[i + 1] : from + 1;
           const double here = lane(size(e, from + elastic, end), which), x = std::isfinite(here) ? here : 1e300;
           if (x > most) most = x, spot = {i, elastic != 0, half != 0};
         }
@@ -99,17 +99,17 @@ template <class Real> class Weights {
   }
 
  private:
-  Plant<Real> &plant;
+  Plant<Real> *robot_;  // (a pointer, so that weights can be put back: choice.hpp)
   double rtol;
   int n;
   std::vector<Real> begun;
   Real deflection, path, deflecting, speed, energy;
 
   void renew() {
-    const Real size_ = larger(larger(deflection, path * PATH), plant.reach * START);
-    const Real rate = larger(larger(deflecting, speed * PATH), plant.reach * START);
+    const Real size_ = larger(larger(deflection, path * PATH), robot_->reach * START);
+    const Real rate = larger(larger(deflecting, speed * PATH), robot_->reach * START);
     const Real place_weight = 1.0 / (size_ * rtol), rate_weight = 1.0 / (rate * rtol);
-    for (int k = 0; k < n; ++k) weight[k] = plant.lever[k] * place_weight, weight[n + k] = plant.lever[k] * rate_weight;
+    for (int k = 0; k < n; ++k) weight[k] = robot_->lever[k] * place_weight, weight[n + k] = robot_->lever[k] * rate_weight;
   }
 };
 
