@@ -5,7 +5,7 @@
 // to a quarter, at most once in AGAIN passes. A set of modes that exponential steps take on their way counts as SET n passes. Passes are counted, not time: a run's digits do not depend on the machine's load.
 //
 // There is no race where it would not be allowed or is decided beforehand: a sampled controller must see each tick once, and a caller's
-// function no time before one it has seen; rigid robots without gains or friction and tolerances below 1e-9 are for explicit steps.
+// function no time before one it has seen; under a slider that rides on a bending link modes change too fast; rigid robots without gains or friction and tolerances below 1e-9 are for explicit steps.
 #pragma once
 #include <array>
 #include <memory>
@@ -28,14 +28,14 @@ class Auto {
   bool advance(long steps) {
     if (!chosen) choose();
     while (steps > 0 && loop.any()) {
-      const long some = std::min(steps, CHECK);
-      const double before = cost();
-      const double t = loop.clock[0].t;
+      if (in_window == 0) window_cost = cost(), window_t = loop.clock[0].t;
+      const long some = std::min(steps, WINDOW - in_window);  // windows do not depend on how many steps are asked for
       loop.advance(*chosen, some);
-      steps -= some;
+      steps -= some, in_window = (in_window + some) % WINDOW;
       if (gives_way()) continue;
-      const double progress = (loop.clock[0].t - t) / std::max(cost() - before, 1.0);
-      if (raced && loop.any() && progress * SLOWER < speed && cost() - last_race > AGAIN) race();
+      if (in_window > 0 || !raced || !loop.any()) continue;
+      const double progress = (loop.clock[0].t - window_t) / std::max(cost() - window_cost, 1.0);
+      if (progress * SLOWER < speed && cost() - last_race > AGAIN) race();
     }
     return loop.any();
   }
@@ -45,7 +45,7 @@ class Auto {
   const Exponential<double> &exponential_steps() const { return exponential; }
 
  private:
-  static constexpr long CHECK = 50;  // steps between two looks at the progress
+  static constexpr long WINDOW = 50;  // steps between two looks at the progress
   Loop<double> &loop;
   const double rtol;
   Exponential<double> exponential;
@@ -54,6 +54,8 @@ class Auto {
   Method<double> *chosen = nullptr;
   bool raced = false;
   int held = 0;
+  long in_window = 0;
+  double window_cost = 0.0, window_t = 0.0;
   double last_race = 0.0;  // what had been spent by then
   double speed = 0.0;      // seconds a pass, when chosen
 
@@ -99,7 +101,7 @@ class Auto {
     }
     if (rtol < SHARPEST || (!bends && !resisted)) chosen = &explicit_;
     else if (acting.sampler) chosen = stiffer_than(acting.rate_Hz) ? static_cast<Method<double> *>(&implicit) : &explicit_;
-    else if (acting.function) chosen = bends ? static_cast<Method<double> *>(&exponential) : &explicit_;
+    else if (acting.function) chosen = !bends ? static_cast<Method<double> *>(&explicit_) : c.plant.rides ? static_cast<Method<double> *>(&implicit) : &exponential;
     else race();
   }
 
@@ -122,11 +124,12 @@ class Auto {
     Method<double> *winner = nullptr;
     double furthest = -1.0, step = start.clock.wish;
     for (Method<double> *method : std::array<Method<double> *, 3>{&exponential, &implicit, &explicit_}) {
+      if (method == &exponential && loop.course.plant.rides) continue;
       if (method == &explicit_ && hopeless(furthest)) break;
       go_back(start, since);
       loop.clock[0].fresh = true;
       loop.clock[0].wish = std::max(step, start.clock.wish);
-      const double got = trial(*method, method == &exponential ? TRIAL : SHORT);
+      const double got = trial(*method, winner == nullptr ? TRIAL : SHORT);
       if (loop.clock[0].status == Status::limit || loop.clock[0].status == Status::interrupted || loop.clock[0].status == Status::done) {
         best = mark(since), winner = method, furthest = got;
         break;  // the run is over
@@ -154,7 +157,7 @@ class Auto {
   bool gives_way() {
     Clock &c = loop.clock[0];
     if (chosen != &exponential || (c.status != Status::stuck && c.status != Status::diverged)) return false;
-    chosen = &implicit, raced = false;
+    chosen = &implicit, raced = false, in_window = 0;
     c.status = Status::running, c.fresh = true, c.failed = 0;
     c.wish = 1e-6 * (c.end - c.t);
     return true;

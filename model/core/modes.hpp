@@ -29,7 +29,7 @@ template <class Real> class Modes {
  public:
   static constexpr int LANES = LanesOf<Real>::value;
   static constexpr double POOR = 0.25;   // the change of Phi M Phi^T, and of Phi K Phi^T against w_i w_j, that is put up with
-  static constexpr double TURN = 0.25;   // the configuration is looked at after so many radians (metres of the tips over the reach)
+  static constexpr double TURN = 0.05;   // the configuration is looked at after so many radians (metres of the tips over the reach)
   static constexpr double FREE = 1e-4;   // w2 below this is none [rad^2/s^2]
 
   const int n, chunks, stride;
