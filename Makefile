@@ -8,7 +8,6 @@ JOBS   ?= 2
 VENV     := .venv
 READY    := $(VENV)/.ready
 CORE     := $(VENV)/.core
-COMPILED := $(VENV)/.compiled
 
 # An environment knows the place of its checkout: after a move, or when its Python is gone, it is made anew.
 ifneq ($(shell test -x $(VENV)/bin/python && cat $(READY) 2>/dev/null),$(CURDIR))
@@ -28,7 +27,7 @@ help:
 	@echo "make setup      only the setting up, which every target does by itself"
 	@echo "make clean      remove caches and builds; keeps $(VENV) and logs"
 
-setup: $(COMPILED)
+setup: $(CORE)
 	@echo "ready: $(CURDIR)/$(VENV)"
 
 $(READY): pyproject.toml constraints.txt tools/setup.py
@@ -39,10 +38,7 @@ $(READY): pyproject.toml constraints.txt tools/setup.py
 $(CORE): $(READY) CMakeLists.txt $(shell find model/core)
 	@$(VENV)/bin/python tools/setup.py core
 
-$(COMPILED): $(CORE) $(wildcard model/flexura/*.py)
-	@$(VENV)/bin/python tools/setup.py compile
-
-demo: $(COMPILED)
+demo: $(CORE)
 	@$(VENV)/bin/flexura demo
 
 test check: lint types core tests
@@ -53,7 +49,7 @@ lint: $(READY)
 types: $(READY)
 	@$(VENV)/bin/mypy
 
-tests: $(COMPILED)
+tests: $(CORE)
 	@$(VENV)/bin/pytest -n $(JOBS) -m "not slow"
 
 core: $(CORE)
@@ -65,14 +61,15 @@ core-sanitize: $(READY)
 	@$(VENV)/bin/cmake --build build/sanitize --parallel $(JOBS)
 	@$(VENV)/bin/ctest --test-dir build/sanitize --parallel $(JOBS) --output-on-failure
 
-test-slow: $(COMPILED)
+test-slow: $(CORE)
 	@$(VENV)/bin/pytest -n $(JOBS) -m slow
 
-bench: $(COMPILED)
-	@$(VENV)/bin/python -m flexlab.bench
+# make bench BENCH="type4 pendulum --rounds 3" times a few problems; BENCH=--help says what there is.
+bench: $(CORE)
+	@$(VENV)/bin/python -m flexlab.bench $(BENCH)
 
 # make flash PORT=/dev/ttyACM0, or without PORT the one Mega 2560 that is plugged in; CONFIGURE=1 writes the rig's constants too.
-flash: $(COMPILED)
+flash: $(CORE)
 	@$(VENV)/bin/flexura flash $(if $(PORT),--port $(PORT)) $(if $(CONFIGURE),--configure)
 
 firmware: $(READY)
@@ -80,5 +77,5 @@ firmware: $(READY)
 	@$(VENV)/bin/python firmware/build.py
 
 clean:
-	rm -rf build dist *.egg-info .hypothesis .mypy_cache .pytest_cache .ruff_cache solution $(CORE) $(COMPILED) model/flexura/*.so
+	rm -rf build dist *.egg-info .hypothesis .mypy_cache .pytest_cache .ruff_cache solution $(CORE) $(CORE) model/flexura/*.so
 	find model analysis tests tools -name __pycache__ -prune -exec rm -rf {} +

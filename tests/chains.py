@@ -1,14 +1,14 @@
-"""Chains for the tests of the assembly: small ones of every kind, random ones, random states, differences of energies."""
+"""Chains for the tests of the assembly, their states, and differences of energies."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
-from robots import beam, rigid, robot
 
 from flexura.robot import Robot
 from flexura.system.assembly import Assembly
+from robots import beam, rigid, robot
 
 LOAD: dict[str, Any] = {"gravity": (1.0, -9.81), "payload": 0.3, "payload_inertia": 0.1}
 HUB = {"hub_mass_kg": 0.7, "hub_inertia_kg_m2": 0.2, "rotor_inertia": 0.1, "viscous_friction": 0.2}
@@ -40,7 +40,7 @@ SMALL = {
 
 
 def random_chain(rng: np.random.Generator, links: int = 3) -> Robot:
-    """A chain of random joints, lengths from 0.01 to 10 m, mostly flexible links, a third of them on bare hubs."""
+    """A chain of random joints, lengths from 0.01 to 10 m, a third of the hubs bare."""
     tables: list[dict[str, Any]] = []
     for _ in range(links):
         kind = str(rng.choice(["R", "Pa", "Pb"]))
@@ -48,30 +48,45 @@ def random_chain(rng: np.random.Generator, links: int = 3) -> Robot:
         joint: dict[str, Any] = {"rotor_inertia": float(rng.uniform(0, 0.1))}
         if kind != "R":
             span = L if kind == "Pb" else before
-            joint |= {"angle_rad": float(rng.uniform(-1, 1)), "start": float(span * rng.uniform(0.3, 0.9))}
+            joint |= {
+                "angle_rad": float(rng.uniform(-1, 1)),
+                "start": float(span * rng.uniform(0.3, 0.9)),
+            }
         if kind == "Pa" and tables and tables[-1]["joint"]["type"] == "Pb":
             low = before - tables[-1]["joint"]["start"]
             joint["start"] = float(low + (before - low) * rng.uniform(0.1, 0.9))
         if rng.random() < 0.6:
-            joint |= {"hub_mass_kg": float(rng.uniform(0, 1)), "hub_inertia_kg_m2": float(rng.uniform(0, 0.1) * L**2)}
+            joint |= {
+                "hub_mass_kg": float(rng.uniform(0, 1)),
+                "hub_inertia_kg_m2": float(rng.uniform(0, 0.1) * L**2),
+            }
         if rng.random() < 0.25:
             tables.append(rigid(L, 1.0, 0.4 * L, 0.05 * L**2, kind, **joint))
             continue
         more = {"modes": int(rng.integers(1, 4))} if rng.random() < 0.3 else {}
         rho, EI = float(10 ** rng.uniform(-1, 1)), float(10 ** rng.uniform(-3, 6))
         tables.append(beam(L, rho, EI, int(rng.integers(2, 5)), kind, **more, **joint))
-    return robot(*tables, gravity=(0.3, -9.81), payload=float(rng.uniform(0, 5)), payload_inertia=0.01)
+    return robot(
+        *tables, gravity=(0.3, -9.81), payload=float(rng.uniform(0, 5)), payload_inertia=0.01
+    )
 
 
-def random_state(assembly: Assembly, rng: np.random.Generator, slope: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
-    """q and qd (n,): joints at their start (R: anywhere), every link with tip angles up to about `slope` rad."""
+def random_state(
+    assembly: Assembly, rng: np.random.Generator, slope: float = 1.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """q and qd (n,): joints at their start (R: anywhere), links bent by about `slope` rad."""
     q, qd = rng.normal(size=assembly.n), rng.normal(size=assembly.n)
     structure = assembly.structure
     for i, (row, link) in enumerate(zip(assembly.rows, assembly.robot.links, strict=True)):
         if link.joint.type != "R":
             q[row], qd[row] = link.joint.start, 0.3 * link.length_m * qd[row]
         for piece, own in zip(structure.links[i], structure.own[i], strict=True):
-            size = slope / len(structure.links[i]) / piece.count / np.maximum(np.abs(piece.B).max(axis=0), 1e-9)
+            size = (
+                slope
+                / len(structure.links[i])
+                / piece.count
+                / np.maximum(np.abs(piece.B).max(axis=0), 1e-9)
+            )
             size = size / np.arange(1, piece.count + 1) ** 2
             q[own], qd[own] = size * q[own], size * qd[own]
     return q, qd

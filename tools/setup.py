@@ -1,8 +1,7 @@
-"""Makes what the targets of the Makefile need: system packages, the environment .venv, compiled functions.
+"""Makes what the targets of the Makefile need: system packages, the environment .venv, the compiled core.
 
     python3 tools/setup.py             system packages and .venv; ends with the stamp .venv/.ready
     python3 tools/setup.py core        the compiled core, beside flexura/core.py; ends with the stamp .venv/.core
-    python3 tools/setup.py compile     the solver's compiled functions; ends with the stamp .venv/.compiled
 
 Standard library only; an older Python runs it too, to say that a newer one is missing. A stamp is written last and holds
 the checkout's place: with another place in it, the environment was moved.
@@ -216,16 +215,12 @@ def build_core(venv: Path) -> None:
                 f"-DCMAKE_MAKE_PROGRAM={venv / 'bin/ninja'}", f"-DPython_EXECUTABLE={python}"]
     step("configuring the core", [cmake, "-S", str(ROOT), "-B", str(folder), "-G", "Ninja", *settings])
     jobs = str(os.cpu_count() or 1)
-    step("compiling the core (a minute the first time)", [cmake, "--build", str(folder), "--parallel", jobs])
+    step("compiling the core (half a minute the first time)", [cmake, "--build", str(folder), "--parallel", jobs])
     step("installing the core", [cmake, "--install", str(folder), "--component", "module", "--prefix", f"{ROOT / 'model'}"])
 
 
-def compile_solver(venv: Path) -> None:
-    step("compiling the solver (one to two minutes the first time)", [str(venv / "bin/python"), "-m", "flexura.warm"])
-
-
 def main(argv: list[str]) -> int:
-    works = {"": (set_up, ".ready"), "core": (build_core, ".core"), "compile": (compile_solver, ".compiled")}
+    works = {"": (set_up, ".ready"), "core": (build_core, ".core")}
     work, name = works["".join(argv)]
     stamp = ROOT / ".venv" / name
     signal.signal(signal.SIGTERM, signal.default_int_handler)            # so that what runs below ends with this

@@ -14,7 +14,7 @@ from .demo_command import demo
 from .experiment import command as bench
 from .export.command import export
 from .identification.command import identify
-from .terminal import announce_compiling, default_folder, events, interrupted, prepare, progress_bars, say, show, stored
+from .terminal import default_folder, events, interrupted, prepare, progress_bars, say, show, stored
 from .tuning.command import tune
 
 app = typer.Typer(
@@ -49,7 +49,7 @@ Rtol = Annotated[float, typer.Option(help="relative tolerance of the native solv
 @app.command()
 def simulate(
     robot: RobotFile, manoeuvre: ManoeuvreFile = None, out: Out = None, rtol: Rtol = 1e-6,
-    method: Annotated[str, typer.Option(help="auto, explicit, explicit-3, explicit-5 implicit or exponential")] = "auto",
+    method: Annotated[str, typer.Option(help="auto, explicit, implicit or exponential")] = "auto",
     controller: Annotated[
         Path | None, typer.Option(metavar="GAINS", help="gains file (TOML): a sampled controller follows the manoeuvre's motions")
     ] = None,
@@ -198,7 +198,6 @@ def study(
     described = fx.load(robot)
     asked = None if manoeuvre is None else fx.load_manoeuvre(manoeuvre, len(described.links))
     folder = out or default_folder(f"study-{kind}", robot)
-    announce_compiling()
     with progress_bars(kind) as report:
         done = studies.run(
             kind, described, asked, values, keep=keep, rtol=rtol, jobs=jobs, progress=lambda f: report(kind, f),
@@ -253,8 +252,6 @@ def crosscheck(
 
 def _crosscheck_all(folder: Path, json: bool) -> None:
     from . import nine
-
-    announce_compiling()
     with progress_bars("all nine") as report:
         rows = nine.crosscheck_nine(progress=lambda f: report("all nine", f))
     recording = nine.save(rows, folder)

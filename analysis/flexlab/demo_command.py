@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .terminal import announce_compiling, interrupted, progress_bars, say, show
+from .terminal import interrupted, progress_bars, say, show
 
 
 def demo(
@@ -24,8 +24,6 @@ def demo(
     from . import tables
     from .compare import output
     from .demo import demonstrate
-
-    announce_compiling()
     with progress_bars("native", "twin", "emulated") as report:
         done = demonstrate(out, report)
     drawn = done.picture if isinstance(done.picture, Path) else None

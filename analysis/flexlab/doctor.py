@@ -26,7 +26,6 @@ class Finding:
 _PACKAGES = {
     "numpy": "nothing works",
     "scipy": "nothing works",
-    "numba": "nothing works",
     "pydantic": "robot files cannot be read",
     "pyarrow": "runs cannot be stored or read",
     "exudyn": "no cross-check (flexura crosscheck, flexura demo)",
@@ -42,7 +41,7 @@ def examine(rig: Path | None = None) -> list[Finding]:
 
     `rig` is a rig file, the project's own if None. Raises InputError for a wrong one.
     """
-    return [*_python(), *_packages(), *_native_libraries(), *_cache(), *_board(), *_rig(rig)]
+    return [*_python(), *_packages(), *_native_libraries(), *_core(), *_board(), *_rig(rig)]
 
 
 def _python() -> Iterator[Finding]:
@@ -82,16 +81,12 @@ def _native_libraries() -> Iterator[Finding]:
         yield Finding("display", "note", "none", "the review can be saved (--save) and drawn (--picture), not opened in a window")
 
 
-def _cache() -> Iterator[Finding]:
-    from flexura.compiled import folder
+def _core() -> Iterator[Finding]:
+    from flexura import core
 
-    filled = len(list(folder().glob("**/*.nbc")))
-    yield Finding(
-        "compiled code",
-        "ok" if filled else "note",
-        str(folder()),
-        "" if filled else "the first simulation compiles for about a minute; or type: python -m flexura.warm",
-    )
+    slow = "x86-64-v3" in core.BUILDS and core.level == "plain"
+    cost = "3 to 8 times slower than on a processor with AVX2" if slow else ""
+    yield Finding("compiled core", "note" if slow else "ok", f"{core.level}, {core.compiler}", cost)
 
 
 def _board() -> Iterator[Finding]:

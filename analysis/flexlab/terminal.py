@@ -24,16 +24,7 @@ def prepare(robot: Path, manoeuvre: Path | None) -> Any:
     except fx.InputError as error:
         raise error if error.file else error.in_file(str(robot)) from None
     asked = None if manoeuvre is None else fx.load_manoeuvre(manoeuvre, len(described.links))
-    announce_compiling()
     return system, asked or modest(system)
-
-
-def announce_compiling(function: str = "") -> None:
-    """A word before the solver, or one compiled function of it, is compiled."""
-    from flexura.compiled import folder
-
-    if not any(folder().rglob(f"*{function}-*.nbc")):
-        typer.echo("compiling the solver: once, one to two minutes", err=True)
 
 
 @contextmanager

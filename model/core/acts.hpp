@@ -17,7 +17,7 @@ template <class Real> class Acts {
 
   Acts(const Plant<Real> &robot, Acting *const *acting)
       : reaction(robot.joints, Real(0.0)), plant(robot), held(new char[robot.joints]), force(robot.n, Real(0.0)) {
-    for (auto *x : {&stiffness, &damping, &given, &steady, &asked, &asked_rate, &place, &rate, &applied, &like})
+    for (auto *x : {&stiffness, &damping, &given, &steady, &asked, &asked_rate, &place, &rate, &applied, &like, &stiff, &sticky})
       x->assign(robot.joints, Real(0.0));
     for (int k = 0; k < LANES; ++k) of[k] = acting[k];
     for (int i = 0; i < plant.joints; ++i) {
@@ -67,7 +67,7 @@ template <class Real> class Acts {
       if (held[i]) continue;
       force[plant.first[i]] = constant(i);
       if (rubs(i)) force[plant.first[i]] -= rubbing(i, v[plant.first[i]]);
-      damping[i] = gains[2 * i + 1];
+      stiffness[i] = gains[2 * i], damping[i] = gains[2 * i + 1];
     }
   }
 
@@ -79,7 +79,8 @@ template <class Real> class Acts {
     for (int i = 0; i < plant.joints; ++i) {
       if (held[i]) continue;
       Real &f = force[plant.first[i]];
-      f = constant(i), damping[i] = gains[2 * i + 1];
+      f = constant(i) + stiff[i] * q[plant.first[i]] + sticky[i] * v[plant.first[i]];
+      stiffness[i] = gains[2 * i] + stiff[i], damping[i] = gains[2 * i + 1] + sticky[i];
       if (!rubs(i)) continue;
       const Real speed = v[plant.first[i]], x = speed * (1.0 / plant.slow), r = tanh(x), steep = plant.coulomb[i] * (1.0 / plant.slow);
       const Real chord = choose_less(abs(x), Real(1e-4), steep, steep * (r / x)), tangent = steep * (1.0 - r * r);
@@ -87,6 +88,26 @@ template <class Real> class Acts {
       const Real slope = choose_less(moved, Real(0.3), tangent, chord);
       damping[i] += slope, f += slope * speed - plant.coulomb[i] * r;
       like[i] = speed;
+    }
+  }
+
+  // Looks how the caller's functions change with each joint's own position and speed at (q, v), so that stages converge under a steep
+  // one; for the lanes `which`. (A slope that is wrong costs passes, never the answer.)
+  void learn(const Real &which, const Real &t, const Real *q, const Real *v) {
+    if (!calls) return;
+    at(t);
+    call(q, v);
+    const std::vector<Real> here = applied;
+    std::vector<Real> moved(q, q + plant.n), faster(v, v + plant.n);
+    for (int i = 0; i < plant.joints; ++i) {
+      if (held[i]) continue;
+      const int e = plant.first[i];
+      const Real small = 1e-6 * larger(abs(q[e]), Real(1e-2)), little = 1e-6 * larger(abs(v[e]), Real(1e-2));
+      moved[e] = q[e] + small, call(moved.data(), v), moved[e] = q[e];
+      const Real s = larger(Real(0.0), (here[i] - applied[i]) / small);
+      faster[e] = v[e] + little, call(q, faster.data()), faster[e] = v[e];
+      const Real d = larger(Real(0.0), (here[i] - applied[i]) / little);
+      take(which, &s, &stiff[i], 1), take(which, &d, &sticky[i], 1);
     }
   }
 
@@ -124,6 +145,7 @@ template <class Real> class Acts {
   std::array<Acting *, LANES> of;
   std::unique_ptr<char[]> held;
   std::vector<Real> force, stiffness, damping, given, steady, asked, asked_rate, place, rate, applied, like;
+  std::vector<Real> stiff, sticky;  // how the caller's functions fall with a joint's own position and speed
   std::vector<Real> gains;  // kp, kd of each joint
   std::vector<double> scratch;
   Real time = 0.0;

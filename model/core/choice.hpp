@@ -68,14 +68,14 @@ class Auto {
   struct Mark {
     std::vector<double> z, t, state, drive;
     Clock clock;
-    std::vector<Weights<double>> weights;  // one
+    Weights<double>::Sizes sizes;
     int rows = 0;
   };
   Mark mark(int since) const {
     const Record &r = loop.record[0];
     Mark m;
     m.z = loop.course.z, m.clock = loop.clock[0], m.rows = r.rows;
-    m.weights.push_back(loop.course.weights);
+    m.sizes = loop.course.weights.sizes();
     m.t.assign(r.t.begin() + since, r.t.begin() + r.rows);
     m.state.assign(r.state.begin() + static_cast<std::ptrdiff_t>(since) * r.size, r.state.begin() + static_cast<std::ptrdiff_t>(r.rows) * r.size);
     m.drive.assign(r.drive.begin() + static_cast<std::ptrdiff_t>(since) * r.joints, r.drive.begin() + static_cast<std::ptrdiff_t>(r.rows) * r.joints);
@@ -84,7 +84,7 @@ class Auto {
   void go_back(const Mark &m, int since) {
     Record &r = loop.record[0];
     loop.course.z = m.z, loop.clock[0] = m.clock, r.rows = m.rows;
-    loop.course.weights = m.weights.front();
+    loop.course.weights.resume(m.sizes);
     std::copy(m.t.begin(), m.t.end(), r.t.begin() + since);
     std::copy(m.state.begin(), m.state.end(), r.state.begin() + static_cast<std::ptrdiff_t>(since) * r.size);
     std::copy(m.drive.begin(), m.drive.end(), r.drive.begin() + static_cast<std::ptrdiff_t>(since) * r.joints);

@@ -57,7 +57,7 @@ inline void eliminate(Rows<Real, M, G> &rows, Kept<Real> &k, int m, Beyond<Real>
   const int rest = m + 1 + g;
   Sym3<Real> I{rows.xx, rows.xy, rows.x[0], rows.yy, rows.y[0], rows.row[0][0]};
   Vec3<Real> p{rows.x[rest], rows.y[rest], rows.row[0][rest]};
-  Row<Real, 8> tail[M + 1];
+  Row<Real, 4 + 4 * G> tail[M + 1] = {};
   for (int j = 0; j < m; ++j) {
     fill(tail[j], Real(0.0), wide);
     tail[j].set(0, rows.x[1 + j]), tail[j].set(1, rows.y[1 + j]), tail[j].set(2, rows.row[0][1 + j]);

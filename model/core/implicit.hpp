@@ -27,6 +27,7 @@ template <class Real> class Implicit : public Method<Real> {
  public:
   static constexpr double TIGHT = 0.02;  // of the tolerance: what may be left of a stage
   static constexpr int MOST = 10;        // passes of a stage
+  static constexpr double CAUTION = 2.0; // errors of steps add up over a run more than those of order 8 do
 
   explicit Implicit(Course<Real> &course)
       : Method<Real>(course), K(6, course.size), ys(padded(course.n), Real(0.0)), vs(ys), a(ys), next(ys),
@@ -44,6 +45,7 @@ template <class Real> class Implicit : public Method<Real> {
     const int n = c.n;
     Real *znew = c.znew.data();
     Real refused = 0.0;
+    if (worst(steep) > 0.0) c.acts.learn(steep, t, c.z.data(), c.z.data() + n), steep = Real(0.0);
     std::copy(K[0] + n, K[0] + 2 * n, a.data());
     for (int s = 1; s < 6; ++s) {
       known(h, s);
@@ -61,7 +63,7 @@ template <class Real> class Implicit : public Method<Real> {
       znew[k] = c.z[k] + h * sum;
     }
     K.sum(nullptr, h, esdirk::E, 6, c.error.data());
-    return larger(refused, c.weights.norm(c.error.data(), znew));
+    return larger(refused, CAUTION * c.weights.norm(c.error.data(), znew));
   }
 
   void accept(const Real &which) override { take(which, K[5], K[0], c.size); }
@@ -84,6 +86,7 @@ template <class Real> class Implicit : public Method<Real> {
   using Method<Real>::c;
   Stages<Real> K;
   std::vector<Real> ys, vs, a, next, other;
+  Real steep = 0.0;  // 1: a stage did not converge, perhaps for a steep function of the caller's
 
   // What stage s knows of its state: with the accelerations a that it looks for, ys + g^2 h^2 a and vs + g h a.
   void known(const Real &h, int s) {
@@ -124,7 +127,7 @@ template <class Real> class Implicit : public Method<Real> {
         const bool near = m < TIGHT || (turn && rate < 0.9 && m * rate / (1.0 - rate) < TIGHT);
         const bool far = !(m < 1e12) || (turn > 2 && rate > 0.9) || turn == MOST - 1;
         if (near || far) set_lane(open, k, 0.0);
-        if (far && !near) set_lane(missed, k, std::isfinite(m) ? this->REFUSED : m - m);
+        if (far && !near) set_lane(missed, k, std::isfinite(m) ? this->REFUSED : m - m), set_lane(steep, k, 1.0);
       }
       before = moved;
       if (worst(open) == 0.0) break;

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "clock.hpp"
+#include "limits.hpp"
 #include "method.hpp"
 #include "record.hpp"
 
@@ -59,6 +60,7 @@ template <class Real> class Loop {
     current = &method;
     for (long s = 0; s < steps && any(); ++s) {
       if (interrupt && interrupt->load(std::memory_order_relaxed)) end_all(Status::interrupted);
+      if (rehearsal && tick_due()) break;
       arrive(method);
       if (!any()) break;
       attempt(method);
@@ -76,6 +78,25 @@ template <class Real> class Loop {
     return std::any_of(clock.begin(), clock.end(), [](const Clock &c) { return c.running(); });
   }
 
+  // A rehearsal goes on from where the run is until the next tick, and is then undone: to try methods without telling a controller.
+  // (The caller's own functions would see time run backwards: do not rehearse with them.)
+  struct Snapshot {
+    std::array<Clock, LANES> clock;
+    std::array<int, LANES> rows;
+    std::vector<Real> z;
+    typename Weights<Real>::Sizes sizes;
+  };
+  Snapshot snapshot() const {
+    Snapshot out{clock, {}, course.z, course.weights.sizes()};
+    for (int k = 0; k < LANES; ++k) out.rows[k] = record[k].rows;
+    return out;
+  }
+  void restore(const Snapshot &from) {
+    clock = from.clock, course.z = from.z, course.weights.resume(from.sizes), current = nullptr;
+    for (int k = 0; k < LANES; ++k) record[k].rows = from.rows[k];
+  }
+  bool rehearsal = false;
+
  private:
   std::vector<double> outputs;
   std::array<std::vector<double>, LANES> breaks;
@@ -84,6 +105,12 @@ template <class Real> class Loop {
   Method<Real> *current = nullptr;
   Real at, length, last, error, good;
   bool prepared = false;
+
+  bool tick_due() const {
+    for (int k = 0; k < LANES; ++k)
+      if (clock[k].running() && clock[k].due(course.acts_of(k)) <= clock[k].t && clock[k].t < clock[k].end) return true;
+    return false;
+  }
 
   int count() const { return int(outputs.size()); }
 
@@ -180,12 +207,12 @@ template <class Real> class Loop {
     if (worst(good) > 0.0) {
       method.accept(good);
       take(good, course.znew.data(), course.z.data(), course.size);
-      bool look = false;
+      Real look = 0.0;
       for (int k = 0; k < LANES; ++k) {
         if (lane(good, k) == 0.0) continue;
         Clock &c = clock[k];
         c.t = c.next;
-        look = look || c.steps % 8 == 0 || c.t == c.stop;
+        if (c.steps % 8 == 0 || c.t == c.stop) set_lane(look, k, 1.0);
         if (c.t == c.stop && c.t < c.end) c.fresh = true;
         if (c.t >= c.end) finish(k);
       }
@@ -232,60 +259,16 @@ template <class Real> class Loop {
     ++c.row;
   }
 
-  // A joint of robot k that is outside its limits in the state z, or -1.
-  int beyond(int k, const Real *z) {
-    const Acting &a = course.acts.acting(k);
-    for (int i = 0; i < course.plant.joints; ++i) {
-      const double place = lane(z[course.plant.first[i]], k);
-      if (!course.plant.locked[i] && !(a.low[i] <= place && place <= a.high[i])) return i;
-    }
-    return course.plant.blocked(k, z);
-  }
-
-  // The time inside the step at which robot k leaves its limits first, to a part in 1e13 of the step; NEVER: it does not.
-  // Looked for at the step's end, at the outputs on its way and, where a joint turns round in the step, at seven instants between.
+  // The time inside the step at which robot k leaves its limits first; NEVER: it does not.
   double first_beyond(Method<Real> &method, int k) {
     Clock &c = clock[k];
-    double inside = c.t, outside = Clock::NEVER;
-    auto look = [&](double t) {
-      if (outside < Clock::NEVER) return;
-      if (t < c.next) between(method, k, t);
-      (beyond(k, t < c.next ? row_state.data() : course.znew.data()) >= 0 ? outside : inside) = t;
-    };
-    if (turns(k))
-      for (int j = 1; j < 8; ++j) look(c.t + c.step * j / 8.0);
-    else
-      for (int j = c.row; j < count() && outputs[j] < c.next && limited(k); ++j)
-        if (outputs[j] > inside) look(outputs[j]);
-    look(c.next);
-    if (outside == Clock::NEVER) return outside;
-    while (outside - inside > 1e-13 * c.step) {
-      const double middle = 0.5 * (inside + outside);
-      if (!(inside < middle && middle < outside)) break;
-      between(method, k, middle);
-      (beyond(k, row_state.data()) >= 0 ? outside : inside) = middle;
-    }
-    between(method, k, outside < c.next ? outside : inside);
-    c.joint = std::max(beyond(k, outside < c.next ? row_state.data() : course.znew.data()), 0);
-    return inside;
-  }
-
-  bool limited(int k) const {
-    const Acting &a = course.acts_of(k);
-    for (int i = 0; i < course.plant.joints; ++i)
-      if (std::isfinite(a.low[i]) || std::isfinite(a.high[i])) return true;
-    return false;
-  }
-
-  // Does a joint with limits turn round within the step?
-  bool turns(int k) const {
-    const Acting &a = course.acts_of(k);
-    for (int i = 0; i < course.plant.joints; ++i) {
-      if (!std::isfinite(a.low[i]) && !std::isfinite(a.high[i])) continue;
-      const int e = course.n + course.plant.first[i];
-      if (lane(course.z[e], k) * lane(course.znew[e], k) < 0.0) return true;
-    }
-    return false;
+    const Limits<Real> limits(course, k);
+    const Stretch step{c.t, c.next, outputs.data() + c.row, outputs.data() + outputs.size()};
+    return limits.first_beyond(step, c.joint, [&](double t) {
+      if (t >= c.next) return static_cast<const Real *>(course.znew.data());
+      between(method, k, t);
+      return static_cast<const Real *>(row_state.data());
+    });
   }
 
   void stop_at_limit(Method<Real> &method, int k, double t) {

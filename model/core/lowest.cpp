@@ -1,7 +1,9 @@
-// The lowest modes of a robot with many unknowns, without a matrix of that size: Lanczos' method (J. Res. Nat. Bur. Stand. 45 (1950) 255).
+// The lowest modes of a robot with many unknowns, without a matrix of that size: Lanczos' method (J. Res.
+// Nat. Bur. Stand. 45 (1950) 255).
 //
-// T = (K + s M)^-1 M is symmetric in the inner product x . M y; its largest eigenvalues mu = 1/(w^2 + s) are the lowest frequencies. A
-// basis Q, Q^T M Q = 1, grows by T times each of its vectors, made orthogonal to all that are there; H = Q^T M T Q is small.
+// T = (K + s M)^-1 M is symmetric in the inner product x . M y; its largest eigenvalues mu = 1/(w^2 + s) are
+// the lowest frequencies. A basis Q, Q^T M Q = 1, grows by T times each of its vectors, made orthogonal to
+// all that are there; H = Q^T M T Q is small.
 #include <algorithm>
 #include <cmath>
 
@@ -12,7 +14,7 @@ namespace flexura {
 namespace {
 
 using Numbers = std::vector<double>;
-constexpr int FIRST = 4;         // vectors to begin with: equal frequencies of equal links come several at a time
+constexpr int FIRST = 4;  // vectors to begin with: equal frequencies of equal links come several at a time
 constexpr double ENOUGH = 1e-9;  // residual of a mode beside its mu; the error of mu is its square
 constexpr double NOTHING = 1e-10;
 
@@ -23,7 +25,7 @@ double inner(const Numbers &a, const Numbers &b) {
 }
 
 class Krylov {
-public:
+ public:
   std::vector<Numbers> Q, MQ, H;  // H[j]: Q^T M T q_j, as far as the basis went when T q_j joined it
 
   Krylov(const Model<double> &model, const double *q, const std::vector<int> &rows)
@@ -36,7 +38,8 @@ public:
     return out;
   }
 
-  // Joins what x has beside the basis; returns the products of x with the basis before and the vector that joined, if any.
+  // Joins what x has beside the basis; returns the products of x with the basis before and the vector that
+  // joined, if any.
   Numbers join(Numbers x) {
     Numbers products(Q.size(), 0.0);
     double before = 0.0;  // x . M x, as far as it lies in the basis
@@ -67,7 +70,7 @@ public:
     return out;
   }
 
-private:
+ private:
   const Model<double> &model_;
   Workspace<double> work_;
   Numbers q_, zero_;
@@ -80,8 +83,10 @@ double estimate(const Model<double> &model, Still &still, Krylov &krylov, const 
   Numbers z(model.n, 0.0), bent(q, q + model.n), slope(model.n);
   for (const Piece<double> &c : model.pieces)
     for (int k = 0; k < c.m; ++k)
-      if (c.joint != At::sleeve) z[c.own() + k] = c.tip_angle[k] / c.K[k];
-      else if (k == 0) z[c.own()] = q[c.first] / matter_at(c, c.length).stiffness;
+      if (c.joint != At::sleeve)
+        z[c.own() + k] = c.tip_angle[k] / c.K[k];
+      else if (k == 0)
+        z[c.own()] = q[c.first] / matter_at(c, c.length).stiffness;
   for (int k = 0; k < model.n; ++k) bent[k] = z[k];
   still.gradient(bent.data(), TipLoad{}, 0.0, slope.data());
   const double inertia = inner(z, krylov.mass_times(z));
@@ -99,7 +104,8 @@ Ritz project(const Krylov &krylov, int most) {
   out.mu.resize(size), out.vectors.resize(size * size);
   Numbers H(size * size, 0.0);
   for (int j = 0; j < size; ++j)
-    for (int i = 0; i < size && i < int(krylov.H[j].size()); ++i) H[i * size + j] = H[j * size + i] = krylov.H[j][i];
+    for (int i = 0; i < size && i < int(krylov.H[j].size()); ++i)
+      H[i * size + j] = H[j * size + i] = krylov.H[j][i];
   eigen_symmetric(size, H.data(), out.mu.data(), out.vectors.data());
   for (int k = size - 1; k >= 0 && out.good < most; --k, ++out.good) {
     double outside = 0.0;  // T x has this beside the basis that H is of
@@ -116,15 +122,18 @@ Ritz project(const Krylov &krylov, int most) {
 
 }  // namespace
 
-Modes lowest_modes(const Model<double> &model, const double *q, const char *free, int most, const TipLoad &load) {
+Modes lowest_modes(const Model<double> &model, const double *q, const char *free, int most,
+                   const TipLoad &load) {
   const std::vector<int> rows = moving_rows(model, free);
   const int n = model.n, moving = int(rows.size());
   Still still(model, q, free);
   Krylov krylov(model, q, rows);
   const double near = estimate(model, still, krylov, q);
-  double size, shift = moving > n - model.links() ? near : 0.0;  // free joints may have nothing that holds them
+  double size,
+      shift = moving > n - model.links() ? near : 0.0;  // free joints may have nothing that holds them
   still.energy(q, load, 1.0, size);
-  for (int tries = 0; still.tangent(load, 1.0, shift, false) > 0 && tries < 60; ++tries) shift = std::max(near, 16.0 * shift);
+  for (int tries = 0; still.tangent(load, 1.0, shift, false) > 0 && tries < 60; ++tries)
+    shift = std::max(near, 16.0 * shift);
   for (int k = 0; k < FIRST; ++k) krylov.join(krylov.start(still));
 
   Ritz ritz;
@@ -139,13 +148,15 @@ Modes lowest_modes(const Model<double> &model, const double *q, const char *free
       check += 4 + check / 8;
     }
     ritz = project(krylov, most);
+    if (krylov.Q.empty()) return Modes{};  // nothing has mass
     const int size_now = int(krylov.H.size()), found = std::min(most, size_now);
     const bool closed = krylov.H.size() == krylov.Q.size();
     if (ritz.good < found && !closed) continue;
     // is any below the last? Counted halfway to the next square, or just above if there is none
     const double last = 1.0 / ritz.mu[size_now - found] - shift;
     const double above = found < size_now ? 1.0 / ritz.mu[size_now - found - 1] - shift : HUGE_VAL;
-    const double gap = 1e-6 * (std::fabs(last) + shift), x = last + std::min(std::max(0.5 * (above - last), gap), 1e-2 * (std::fabs(last) + near));
+    const double gap = 1e-6 * (std::fabs(last) + shift),
+                 x = last + std::min(std::max(0.5 * (above - last), gap), 1e-2 * (std::fabs(last) + near));
     int below = 0;
     for (double mu : ritz.mu) below += 1.0 / mu - shift < x && mu > 0.0;
     const int really = still.tangent(load, 1.0, -x, false);
@@ -159,7 +170,8 @@ Modes lowest_modes(const Model<double> &model, const double *q, const char *free
   }
   Modes out;
   const int size_now = int(krylov.H.size());
-  for (int k = size_now - 1; k >= 0 && out.count < most && ritz.mu[k] > 0.0; --k, ++out.count) out.squares.push_back(1.0 / ritz.mu[k] - shift);
+  for (int k = size_now - 1; k >= 0 && out.count < most && ritz.mu[k] > 0.0; --k, ++out.count)
+    out.squares.push_back(1.0 / ritz.mu[k] - shift);
   out.shapes.assign(n * out.count, 0.0);
   for (int k = 0; k < out.count; ++k) {
     Numbers x(n, 0.0);

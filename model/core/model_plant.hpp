@@ -10,6 +10,7 @@ template <class Real> class ModelPlant : public Plant<Real> {
  public:
   static constexpr int TURNS = 12;         // of the power iteration for the highest frequency
   static constexpr double MARGIN = 1.08;   // by which it may fall short
+  static constexpr double LEAST = 0.01;    // of the robot's length: the lever of a joint that turns nothing long
   static constexpr double INSIDE = 0.1;    // what a shape that leaves the tip where it is still weighs
 
   ModelPlant(const Model<Real> &robot, Workspace<Real> &memory)
@@ -212,7 +213,11 @@ template <class Real> class ModelPlant : public Plant<Real> {
       beyond += own;
       if (model.kind[std::size_t(link)] == JointKind::revolute) this->lever[std::size_t(this->first[std::size_t(link)])] = beyond;
     }
-    this->reach = beyond;
+    this->reach = choose_less(beyond, Real(1e-9), Real(1.0), beyond);
+    for (int i = 0; i < this->joints; ++i) {
+      Real &own = this->lever[std::size_t(this->first[std::size_t(i)])];
+      if (model.kind[std::size_t(i)] == JointKind::revolute) own = larger(own, LEAST * this->reach);
+    }
     this->travel.assign(std::size_t(this->joints), Real(0.0));  // sleeves and sliders on links that bend
     for (std::size_t i = 0; i < model.pieces.size(); ++i) {
       const Piece<Real> &c = model.pieces[i];

@@ -1,3 +1,4 @@
+// Matrices by unit accelerations and dual numbers, and the modes from them (spectrum.hpp).
 #include "spectrum.hpp"
 
 #include <algorithm>
@@ -9,13 +10,12 @@ namespace flexura {
 namespace {
 
 using Numbers = std::vector<double>;
-constexpr int MANY = 80;         // unknowns from which on a few modes are not taken from the matrices
-constexpr double NOISE = 1e-13;  // of the largest square: what round-off leaves of a direction that nothing holds
+constexpr int MANY = 80;  // unknowns from which on a few modes are not taken from the matrices
 
-// Columns k ... k + 3 of the derivatives of the forces at (q, v) and the load, by the rows of `by` (of q or v), for all k.
-template <class Set>
-void differentiate(const Model<double> &model, const double *q, const double *v, const TipLoad &load, const Terms &terms, double *out,
-                   Set set) {
+// Columns k ... k + 3 of the derivatives of the forces at (q, v) and the load, by the rows of `by` (of q or
+// v), for all k.
+template <class Set> void differentiate(const Model<double> &model, const double *q, const double *v,
+                                        const TipLoad &load, const Terms &terms, double *out, Set set) {
   const int n = model.n;
   const Model<Dual<4>> moved = dual(model);
   Workspace<Dual<4>> work(moved);
@@ -68,12 +68,15 @@ void mass_matrix(const Model<double> &model, const double *q, double *M) {
     for (int j = 0; j < i; ++j) M[i * n + j] = M[j * n + i] = 0.5 * (M[i * n + j] + M[j * n + i]);
 }
 
-void stiffness_matrix(const Model<double> &model, const double *q, const double *v, const TipLoad &load, double *K) {
-  differentiate(model, q, v, load, Terms{true, true, v != nullptr}, K, [](auto &y, auto &, int k) -> Dual<4> & { return y[k]; });
+void stiffness_matrix(const Model<double> &model, const double *q, const double *v, const TipLoad &load,
+                      double *K) {
+  differentiate(model, q, v, load, Terms{true, true, v != nullptr}, K,
+                [](auto &y, auto &, int k) -> Dual<4> & { return y[k]; });
 }
 
 void rate_matrix(const Model<double> &model, const double *q, const double *v, double *D) {
-  differentiate(model, q, v, TipLoad{}, Terms{true, true, true}, D, [](auto &, auto &rate, int k) -> Dual<4> & { return rate[k]; });
+  differentiate(model, q, v, TipLoad{}, Terms{true, true, true}, D,
+                [](auto &, auto &rate, int k) -> Dual<4> & { return rate[k]; });
 }
 
 std::vector<int> moving_rows(const Model<double> &model, const char *free) {
@@ -91,17 +94,20 @@ std::vector<double> Modes::frequencies() const {
   return out;
 }
 
-Modes natural_modes(const Model<double> &model, const double *q, const char *free, int most, const TipLoad &load) {
+Modes natural_modes(const Model<double> &model, const double *q, const char *free, int most,
+                    const TipLoad &load) {
   const int n = model.n;
   const std::vector<int> rows = moving_rows(model, free);
   const int moving = int(rows.size());
-  if (most > 0 && moving >= MANY && 4 * most < moving && only_revolute(model, free)) return lowest_modes(model, q, free, most, load);
+  if (most > 0 && moving >= MANY && 4 * most < moving && only_revolute(model, free))
+    return lowest_modes(model, q, free, most, load);
   Numbers M(n * n), K(n * n);
   mass_matrix(model, q, M.data());
   stiffness_matrix(model, q, nullptr, load, K.data());
   M = picked(M, n, rows), K = picked(K, n, rows);
   for (int i = 0; i < moving; ++i)
-    for (int j = 0; j < i; ++j) K[i * moving + j] = K[j * moving + i] = 0.5 * (K[i * moving + j] + K[j * moving + i]);
+    for (int j = 0; j < i; ++j)
+      K[i * moving + j] = K[j * moving + i] = 0.5 * (K[i * moving + j] + K[j * moving + i]);
   Numbers squares(moving), shapes(moving * moving);
   const int finite = eigen_pencil(moving, K.data(), M.data(), squares.data(), shapes.data());
   Modes out;

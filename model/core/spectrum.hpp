@@ -1,7 +1,9 @@
-// The robot linearised about a configuration at rest: M(q), the tangent stiffness, natural frequencies and modes.
+// The robot linearised about a configuration at rest: M(q), the tangent stiffness, natural frequencies and
+// modes.
 //
-// The tangent stiffness is the derivative by q of all static forces: elastic, gravity, and a load that is held at the tip. In a bent
-// equilibrium it has the geometric stiffness of what the links carry; a negative square of a frequency says that it is none.
+// The tangent stiffness is the derivative by q of all static forces: elastic, gravity, and a load that is
+// held at the tip. In a bent equilibrium it has the geometric stiffness of what the links carry; a negative
+// square of a frequency says that it is none.
 #pragma once
 #include <vector>
 
@@ -10,12 +12,15 @@
 
 namespace flexura {
 
-// M(q) (n, n), held joints and all: columns are the forces (3) of unit accelerations. Positive definite at any bending.
+// M(q) (n, n), held joints and all: columns are the forces (3) of unit accelerations. Positive definite at
+// any bending.
 void mass_matrix(const Model<double> &model, const double *q, double *M);
 
-// d/dq (n, n) of what the static forces at q and the load at the tip leave: elastic - gravity - J_tip^T load. `v` (n) or null: about a
-// steady motion of the joints at these rates instead, the forces of its motion included (centrifugal stiffening).
-void stiffness_matrix(const Model<double> &model, const double *q, const double *v, const TipLoad &load, double *K);
+// d/dq (n, n) of what the static forces at q and the load at the tip leave: elastic - gravity - J_tip^T load.
+// `v` (n) or null: about a steady motion of the joints at these rates instead, the forces of its motion
+// included (centrifugal stiffening).
+void stiffness_matrix(const Model<double> &model, const double *q, const double *v, const TipLoad &load,
+                      double *K);
 
 // d/dv (n, n) of the forces at (q, v): damping D, viscous friction, and the gyroscopic terms of a motion.
 void rate_matrix(const Model<double> &model, const double *q, const double *v, double *D);
@@ -28,7 +33,9 @@ void add_tip_load(const Model<Real> &model, const Workspace<Real> &work, const T
     const Piece<Real> &c = model.pieces[i];
     const Kept<Real> &k = work.kept[i];
     const int stride = padded(columns_of(c)), sleeve = c.joint == At::sleeve;
-    auto meets = [&](int column) { return k.tip[column] * b.x + k.tip[stride + column] * b.y + k.tip[2 * stride + column] * b.t; };
+    auto meets = [&](int column) {
+      return k.tip[column] * b.x + k.tip[stride + column] * b.y + k.tip[2 * stride + column] * b.t;
+    };
     for (int l = 0; l < c.m; ++l) out[c.own() + l] += meets(1 + l);
     if (sleeve) out[c.first] += meets(c.m + 1);
     b.t = meets(0);
@@ -36,11 +43,12 @@ void add_tip_load(const Model<Real> &model, const Workspace<Real> &work, const T
   }
 }
 
-// Rows of the unknowns that move: the elastic ones, and the joints that `free` (links) names; null: all joints are held.
+// Rows of the unknowns that move: the elastic ones, and the joints that `free` (links) names; null: all
+// joints are held.
 std::vector<int> moving_rows(const Model<double> &model, const char *free);
 
-// Natural motions: squares (count) of w [rad^2/s^2], ascending; shapes (n, count), by columns, 0 in the rows of held joints,
-// x . M x = 1, the largest component positive. Directions without mass are left out.
+// Natural motions: squares (count) of w [rad^2/s^2], ascending; shapes (n, count), by columns, 0 in the rows
+// of held joints, x . M x = 1, the largest component positive. Directions without mass are left out.
 struct Modes {
   int count = 0;
   std::vector<double> squares, shapes;
@@ -49,12 +57,16 @@ struct Modes {
   std::vector<double> frequencies() const;
 };
 
-// The lowest `most` modes at q (n) (all of them: most <= 0) under gravity and a load held at the tip. Few of many unknowns, joints held or
-// revolute, are found in time proportional to the number of pieces (`lowest_modes`), others from the matrices.
-Modes natural_modes(const Model<double> &model, const double *q, const char *free, int most, const TipLoad &load = {});
+// The lowest `most` modes at q (n) (all of them: most <= 0) under gravity and a load held at the tip. Few of
+// many unknowns, joints held or revolute, are found in time proportional to the number of pieces
+// (`lowest_modes`), others from the matrices.
+Modes natural_modes(const Model<double> &model, const double *q, const char *free, int most,
+                    const TipLoad &load = {});
 
-// Lanczos' method with the operator (K + s M)^-1 M, by two sweeps of `Still`: of joints only revolute ones may be free. That no mode
-// is missing is known from the pivots of K - x M: as many are negative as squares are below x (Sylvester's law).
-Modes lowest_modes(const Model<double> &model, const double *q, const char *free, int most, const TipLoad &load);
+// Lanczos' method with the operator (K + s M)^-1 M, by two sweeps of `Still`: of joints only revolute ones
+// may be free. That no mode is missing is known from the pivots of K - x M: as many are negative as squares
+// are below x (Sylvester's law).
+Modes lowest_modes(const Model<double> &model, const double *q, const char *free, int most,
+                   const TipLoad &load);
 
 }  // namespace flexura

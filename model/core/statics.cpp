@@ -1,3 +1,4 @@
+// Newton's method with load steps (statics.hpp).
 #include "statics.hpp"
 
 #include <algorithm>
@@ -7,25 +8,28 @@ namespace flexura {
 namespace {
 
 using Numbers = std::vector<double>;
-constexpr double DONE = 1e-8;        // rad: after a Newton step as small as that the error is its square
-constexpr double SMALL = 1e-3;       // rad: where V has too few digits to judge a step, and Newton's method needs no judge
+constexpr double DONE = 1e-8;  // rad: after a Newton step as small as that the error is its square
+constexpr double SMALL =
+    1e-3;  // rad: where V has too few digits to judge a step, and Newton's method needs no judge
 constexpr int MOST_SWEEPS = 40;      // of one load
 constexpr double LEAST_STEP = 1e-6;  // of the load: how closely the load that is lost is found
 
 struct Search {
-  bool found = false, falls = false;  // falls: V was not at a minimum in every direction, somewhere on the way
+  bool found = false,
+       falls = false;  // falls: V was not at a minimum in every direction, somewhere on the way
   int sweeps = 0;
   double residual = 0.0;
 };
 
-// Newton's method from q for one load. With `descend`, on where V falls in some direction: to a minimum, wherever it is.
+// Newton's method from q for one load. With `descend`, on where V falls in some direction: to a minimum,
+// wherever it is.
 Search newton(Still &still, const TipLoad &load, double share, bool descend, Numbers &q) {
   Search out;
   const std::size_t n = q.size();
   Numbers slope(n), step(n), trial(n);
   double size, V = still.energy(q.data(), load, share, size);
   const int most = descend ? 20 * MOST_SWEEPS : MOST_SWEEPS;
-  while (out.sweeps++ < most) {
+  while (std::isfinite(V) && out.sweeps++ < most) {
     const int wrong = still.tangent(load, share, 0.0, descend);
     out.falls = wrong > 0;
     if (wrong > 0 && !descend) return out;
@@ -49,7 +53,8 @@ Search newton(Still &still, const TipLoad &load, double share, bool descend, Num
       return out;
     }
     double length = descend ? std::min(1.0, 1.0 / out.residual) : 1.0, trial_V = V;
-    for (int halvings = 0; halvings < 30; ++halvings, length *= 0.5) {  // V falls by a tenth of what the tangent says, or more
+    for (int halvings = 0; halvings < 30;
+         ++halvings, length *= 0.5) {  // V falls by a tenth of what the tangent says, or more
       for (std::size_t i = 0; i < n; ++i) trial[i] = q[i] + length * step[i];
       trial_V = still.energy(trial.data(), load, share, size);
       if (trial_V - V <= 0.1 * length * (1.0 - 0.5 * length) * fall + 1e-15 * size) break;
@@ -89,7 +94,8 @@ Equilibrium equilibrium(const Model<double> &model, double *q, const TipLoad &lo
     const double next = share + increase < 1.0 ? share + increase : 1.0;
     trial = here;
     if (!before.empty())  // on along the line through the last two
-      for (std::size_t i = 0; i < n; ++i) trial[i] += (here[i] - before[i]) * ((next - share) / (share - before_share));
+      for (std::size_t i = 0; i < n; ++i)
+        trial[i] += (here[i] - before[i]) * ((next - share) / (share - before_share));
     const Search search = newton(still, load, next, false, trial);
     out.sweeps += search.sweeps;
     if (search.found) {

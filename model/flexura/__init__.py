@@ -26,14 +26,15 @@ _HOME = {
     "Batch": "batch", "Population": "population",
     "Drive": "drive", "JointDrive": "drive", "Manoeuvre": "drive", "load_manoeuvre": "drive",
     "Controller": "control", "PID": "control", "Force": "control", "Motor": "control", "Stepper": "control",
-    "Signal": "signal",
+    "Signal": "signal", "Sampled": "sampled",
     "FlexuraError": "errors", "InputError": "errors",
 }  # fmt: skip
 
 __all__ = [
     "PID", "Batch", "Controller", "Drive", "FlexuraError", "Force", "InputError", "JointDrive", "Manoeuvre", "Modes", "Motor",
-    "NoEquilibrium", "Population", "Robot", "Run", "Signal", "StateSpace", "Stepper", "System",
-    "assemble", "frequencies", "inverse", "linearize", "load", "load_manoeuvre", "modes", "save", "simulate", "static", "tip_pose",
+    "NoEquilibrium", "Population", "Robot", "Run", "Sampled", "Signal", "StateSpace", "Stepper", "System",
+    "assemble", "frequencies", "inverse", "linearize", "load", "load_manoeuvre", "modes", "save", "simulate", "static",
+    "tip_pose",
 ]  # fmt: skip
 
 if TYPE_CHECKING:
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
     from .population import Population
     from .robot import Robot, load, save
     from .run import Run
+    from .sampled import Sampled
     from .signal import Signal
     from .system import (
         Modes,

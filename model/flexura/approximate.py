@@ -13,20 +13,17 @@ from typing import Any
 
 import numpy as np
 
-from . import acting, loop
-from .assembly import assemble
-from .chain import COULOMB_SPEED
-from .choice import choose, longest_step
-from .course import inputs_of
+from . import core
 from .drive import Drive
 from .errors import FlexuraError, InputError
 from .forward import _put_on_motions, _state, _times, simulate
 from .record import limit_event, record
 from .robot import Robot
 from .run import Run
-from .signal import COLUMNS, Signal, constant
-from .system import System
+from .signal import COLUMNS, Signal
+from .system import System, assemble
 
+ACCOUNTS = 4  # numbers of a state beyond q and qd
 MAX_SWEEPS = 300  # joint after joint, in one step
 
 
@@ -76,13 +73,11 @@ def by_bisection(
     """
     t, n, rows = _times(t_eval), system.n, system.joint_rows
     Drive.prescribed(*motion)
-    q0, qd0 = _start(system, t[0], motion, q0, qd0)
-    state = np.concatenate([system.to_solver @ q0, system.to_solver @ qd0, [0.0, 0.0]])
-    limited = inputs_of(system, Drive.none(len(rows)))
-    trial = _Trial(system, rtol, choose(system, t[-1] - t[0], rtol))
+    state = np.concatenate([*_start(system, t[0], motion, q0, qd0), np.zeros(ACCOUNTS)])
+    trial = _Trial(system, rtol)
     rigid = assemble(rigid_robot(system.robot))
     inertia = np.diag(rigid.mass(rigid.start()))
-    moving = np.flatnonzero(~system.chain.locked.astype(bool))
+    moving = np.flatnonzero(~system.locked)
     if not len(moving):
         raise InputError("expected a joint that is free to move", key="link.joint.locked", value=True)
     states, forces = [state], []
@@ -103,10 +98,9 @@ def by_bisection(
                     break
             else:
                 raise FlexuraError(f"the bisection of the joints in turn did not settle at t = {a:.6g} s: expected shorter steps")
-            trial.accept()
-            joint = acting.outside(system.chain, limited, after)
-            if joint >= 0:
-                events.append(limit_event(system, joint, float(a), np.clip(after[rows], *system.limits.T)))
+            low, high = system.limits.T
+            if np.any(beyond := (after[rows] < low) | (after[rows] > high)):
+                events.append(limit_event(system, int(np.argmax(beyond)), float(a), np.clip(after[rows], low, high)))
                 break
             states.append(after)
             forces.append(drives)
@@ -124,36 +118,35 @@ def by_bisection(
 
 
 class _Trial:
-    """Forward steps from one state under drives that are tried: the compiled loop, started anew each time."""
+    """Forward steps from one state under drives that are tried, without limits."""
 
-    def __init__(self, system: System, rtol: float, method: int) -> None:
+    def __init__(self, system: System, rtol: float) -> None:
         joints = len(system.robot.links)
-        self.system, self.rtol, self.method, self.count = system, rtol, method, 0
-        inputs, free = inputs_of(system, Drive.force(*[constant(0.0)] * joints)), np.full(joints, np.inf)
-        self.inputs = inputs._replace(low=-free, high=free)  # a trial may go beyond
-        self.memory, self.work = loop.memory(joints, system.n), system._work()
-        self.big = self.memory.big.copy()  # the sizes so far, which weigh the errors
-        self.longest = longest_step(system) if method == loop.EXPLICIT else np.inf
+        self.system, self.rtol, self.count = system, rtol, 0
+        self.rows = np.zeros((joints, COLUMNS))  # a constant force a joint
+        ranges = [(i, i + 1, 0, 0) for i in range(joints)]
+        self.ranges = np.array(ranges, dtype=np.int64)
+        self.gains, self.none = np.zeros((joints, 2)), np.zeros(joints, dtype=np.uint8)
+        self.free = np.tile([-np.inf, np.inf], (joints, 1))
 
     def __call__(self, a: float, b: float, state: np.ndarray, drives: np.ndarray) -> np.ndarray:
-        """The state at b under constant drives from `state` at a."""
-        m = self.memory
-        self.inputs.segments[:, 1] = drives
-        m.z[:], m.big[:], m.s[:] = state, self.big, 0.0
-        m.s[loop.T], m.s[loop.H], m.s[loop.LONGEST], m.s[loop.ERR] = a, min(b - a, self.longest), self.longest, 1.0
-        out = np.empty((1, len(state)))
-        while m.s[loop.STATUS] == loop.RUNNING:
-            loop.advance(self.system.chain, self.work, self.inputs, m, self.method, self.rtol, np.array([b]), out, 10_000)
+        """The state at b (2n + 4,), accounts included, under constant drives from `state` at a."""
+        n = self.system.n
+        self.rows[:, 0], self.rows[:, 1] = a, drives
+        run = core.Simulation(
+            self.system.equations, np.array([a, b]), state[:n].copy(), state[n : 2 * n].copy(), self.rtol, "implicit", self.rows,
+            self.ranges, self.gains, self.none, self.none, self.free, None, None, 0.0, b - a, 0,
+        )  # fmt: skip
+        while run.advance(10_000):
+            pass
         self.count += 1
-        if m.s[loop.STATUS] != loop.DONE:
+        if run.progress()["status"] != "done":
             raise FlexuraError(
                 f"the bisection diverged at t = {a:.6g} s: expected shorter steps, well below the periods of the modes"
             )
-        return out[0]
-
-    def accept(self) -> None:
-        """Go on from the state tried last."""
-        self.big = self.memory.big.copy()
+        after = np.array(run.state())
+        after[2 * n :] += state[2 * n :]
+        return after
 
 
 def _bisect(
@@ -188,7 +181,7 @@ def _bisect(
 def _forces(rigid: System, motion: Sequence[Signal], t: float) -> np.ndarray:
     """The rigid robot's drives (N,) along the motions."""
     q, qd, qdd = np.array([m(t) for m in motion]).T
-    return rigid.forces(q, qd, qdd) + rigid.chain.coulomb * np.tanh(qd / COULOMB_SPEED)
+    return rigid.forces(q, qd, qdd) + rigid.assembly.coulomb(qd)
 
 
 def _splines(
@@ -216,4 +209,4 @@ def _start(system: System, t: float, motion: Sequence[Signal], q0: Any, qd0: Any
     """The state at the start, its joints on their motions."""
     q, qd = _state(system, "q0", q0, system.start()), _state(system, "qd0", qd0, np.zeros(system.n))
     _put_on_motions(system, Drive.prescribed(*motion), t, q, qd)
-    return system._check(q), qd
+    return system.check(q), qd

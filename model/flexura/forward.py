@@ -34,23 +34,30 @@ def simulate(
 ) -> Population: ...  # fmt: skip
 @overload
 def simulate(
-    robot: Any, t_eval: Any, drive: Drive | Controller | Sampled | Callable[..., Any] | None = None, q0: Any = None, qd0: Any = None,
+    robot: Any, t_eval: Any, drive: Drive | Controller | Sampled | Callable[..., Any] | None = None, q0: Any = None, qd0: Any =
+    None,
     rtol: float = 1e-6, *, method: str = "auto", progress: Callable[[float], None] | None = None,
 ) -> Run: ...  # fmt: skip
 def simulate(
-    robot: Any, t_eval: Any, drive: Drive | Controller | Sampled | Callable[..., Any] | None = None, q0: Any = None, qd0: Any = None,
+    robot: Any, t_eval: Any, drive: Drive | Controller | Sampled | Callable[..., Any] | None = None, q0: Any = None, qd0: Any =
+    None,
     rtol: float = 1e-6, *, method: str = "auto", progress: Callable[[float], None] | None = None, **population: Any,
 ) -> Run | Population:  # fmt: skip
     """Integrate the equations of motion from t_eval[0] on; the Run has its channels at t_eval (T,).
 
-    A joint that reaches a limit of the robot file or the end of its link ends the run, and so does a tolerance that cannot be kept, a
-    state that is not a number, and Ctrl-C: the Run then has what was computed until there, an event says what happened and where,
+    A joint that reaches a limit of the robot file or the end of its link ends the run, and so does a tolerance that cannot be
+    kept, a
+    state that is not a number, and Ctrl-C: the Run then has what was computed until there, an event says what happened and
+    where,
     and `meta["complete"]` is false. `meta["energy_error"]` is how far the energies are from balancing, relative to the
     largest; beyond 1e-3 an event says so, beyond 0.1 the run is not complete.
 
-    Args: robot: a System, a Robot, a robot file, or a Batch of robots, which gives a Population (`population.simulate` says what else
-        that takes); t_eval (T,): ascending times [s]; drive: a Drive, a sampled Controller, `Sampled(f, rate_Hz)`, or a function
-        of (t) or (t, position, velocity, tip_deflection) that gives (links,) forces and torques [N or N m]: such a function may be
+    Args: robot: a System, a Robot, a robot file, or a Batch of robots, which gives a Population (`population.simulate` says
+    what else
+        that takes); t_eval (T,): ascending times [s]; drive: a Drive, a sampled Controller, `Sampled(f, rate_Hz)`, or a
+        function
+        of (t) or (t, position, velocity, tip_deflection) that gives (links,) forces and torques [N or N m]: such a function
+        may be
         called again for times within a step, never before its start, and must have no memory; q0, qd0 (n,): the state at the
         start, by default `system.start()` at rest; rtol: the error that is asked for, of deflections and of a thousandth of
         the tip's path; method: "auto", "explicit" (order 8), "implicit", or "exponential"; progress: called with the finished
@@ -85,7 +92,8 @@ def inverse(
 ) -> Run:  # fmt: skip
     """Inverse dynamics: joints follow `motion` exactly; the Run has `joint/i/drive`, the forces that this takes.
 
-    The elastic unknowns are integrated from q0, qd0 (n,), whose joint entries are replaced by the motion's; nothing is approximated by
+    The elastic unknowns are integrated from q0, qd0 (n,), whose joint entries are replaced by the motion's; nothing is
+    approximated by
     a rigid robot and nothing iterated. Replaying the drives through `simulate` returns the motion.
 
     Args: motion: one Signal a joint; else as in `simulate`.
@@ -102,7 +110,9 @@ def inverse(
 class _Course:
     """A run of the core in progress."""
 
-    def __init__(self, system: System, t: np.ndarray, drive: Any, q: np.ndarray, qd: np.ndarray, rtol: float, method: str) -> None:
+    def __init__(
+        self, system: System, t: np.ndarray, drive: Any, q: np.ndarray, qd: np.ndarray, rtol: float, method: str
+    ) -> None:
         self.system, self.t, self.drive, self.rtol = system, t, drive, rtol
         joints = len(system.robot.links)
         follows, function, sampler, rate = np.zeros(joints, dtype=np.uint8), None, None, 0.0
@@ -120,7 +130,8 @@ class _Course:
             function = drive
         self.sampler = sampler
         self.core = core.Simulation(
-            system.equations, t, q, qd, rtol, method, np.ascontiguousarray(segments), ranges, np.ascontiguousarray(gains), follows,
+            system.equations, t, q, qd, rtol, method, np.ascontiguousarray(segments), ranges, np.ascontiguousarray(gains),
+            follows,
             sampled, np.ascontiguousarray(system.limits), function, sampler, rate, 0.0, MOST_STEPS,
         )  # fmt: skip
 
@@ -162,10 +173,11 @@ class _Course:
         i = int(about["joint"]) + 1
         where = "" if i == 0 else f" in {'the bending of link' if about['elastic'] else 'joint'} {i}"
         what = {
-            "stuck": f"no step is short enough for rtol = {self.rtol:g}{where}; try another tolerance or method, look at gains and forces",
+            "stuck": f"no step is short enough for rtol = {self.rtol:g}{where}; try another tolerance or method, look at gains "
+            "and forces",
             "diverged": f"the state is not a number any more{where}; a gain, a force or a start value is too large",
-            "exhausted": f"{MOST_STEPS} steps are used up{where}; try method = \"implicit\", a larger rtol or a shorter time",
-        }[status]  # fmt: skip
+            "exhausted": f'{MOST_STEPS} steps are used up{where}; try method = "implicit", a larger rtol or a shorter time',
+        }[status]
         return [{"t": at, "level": "ERROR", "text": f"the simulation got no further than t = {at:.6g} s: {what}"}]
 
 

@@ -31,7 +31,9 @@ WORK, LOSS, NUMERICAL, STRAIN = range(4)  # columns of the accounts, as Account 
 NOTED, DOUBTED, REFUSED = 1e-3, 1e-2, 0.1  # of the energies: a balance beyond is a note, an event, the end of trust in a run
 
 
-def record(system: System, t: np.ndarray, states: np.ndarray, accounts: np.ndarray, forces: np.ndarray, meta: dict[str, Any]) -> Run:
+def record(
+    system: System, t: np.ndarray, states: np.ndarray, accounts: np.ndarray, forces: np.ndarray, meta: dict[str, Any]
+) -> Run:
     """The Run of a simulation.
 
     Args: t (T,) [s]; states (T, 2n); accounts (T, 4): work of the drives, losses, what the method took out, and the rise of the
@@ -83,7 +85,8 @@ def describe(system: System, error: float) -> dict[str, Any]:
 def energy_error(energies: np.ndarray, accounts: np.ndarray, jumps: Any = 0.0) -> float:
     """How far the energies (T, 3) and accounts (T, 4) of a run are from balancing, relative to the largest of them.
 
-    The larger of |E - E(0) - work + loss + numerical loss - jumps| and |strain - strain(0) - its own integral|; `jumps` (T,): what E
+    The larger of |E - E(0) - work + loss + numerical loss - jumps| and |strain - strain(0) - its own integral|; `jumps` (T,):
+    what E
     has jumped by so far.
     """
     if not len(energies):

@@ -21,7 +21,8 @@ class Sampled:
 
     f(t, position, velocity, tip_deflection), or f(t), is called at t = k / rate_Hz, k = 0, 1, 2, ..., counted from the start of
     the run, each exactly once and in order of time, with the state at that instant; steps that are rejected, events and an
-    interruption change nothing of this. The forces that it gives are held to the next tick. position and velocity have one entry a
+    interruption change nothing of this. The forces that it gives are held to the next tick. position and velocity have one
+    entry a
     joint [m or rad]; tip_deflection is the last flexible link's [m]. An error in f ends the run and reaches the caller.
     """
 
@@ -57,7 +58,9 @@ def as_function(drive: Callable[..., Any], joints: int) -> Function:
         given = drive(t) if count == 1 else drive(t, position, velocity, tip_deflection)
         force = np.ascontiguousarray(given, dtype=float)
         if force.shape != (joints,) or not np.all(np.isfinite(force)):
-            raise InputError(f"expected {joints} finite forces from the drive function at t = {t:g} s", key="drive", value=given)
+            raise InputError(
+                f"expected {joints} finite forces from the drive function at t = {t:g} s", key="drive", value=given
+            )
         return force
 
     return call

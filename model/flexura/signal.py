@@ -4,7 +4,7 @@ A Signal is a list of segments; on each, with s = t - t0,
 
     y(s) = c0 + c1 s + ... + c5 s^5 + A sin(w s + phi),
 
-which holds cycloids, harmonics, polynomials, bang-bang profiles and cubic splines in one form that the compiled loop
+which holds cycloids, harmonics, polynomials, bang-bang profiles and cubic splines in one form that the core
 evaluates without calling back into Python. Before the first segment y keeps its first value. `shaping.py` adds the signals
 that leave a mode at rest.
 """
@@ -18,44 +18,26 @@ from typing import Any
 
 import numpy as np
 
-from .compiled import compiled, inlined
 from .errors import InputError
 
 COLUMNS = 10  # t0, c0 ... c5, A, w, phi
 
 
-@compiled
 def evaluate(segments: np.ndarray, t: float) -> tuple[float, float, float]:
     """y, dy/dt and d2y/dt2 at t of segments (k, 10); 0 where k = 0."""
-    return evaluated(segments, t)
-
-
-@inlined
-def evaluated(segments: np.ndarray, t: float) -> tuple[float, float, float]:
-    """`evaluate` expanded where it is called: what is not used of it is not computed."""
-    count = segments.shape[0]
-    if count == 0:
+    if len(segments) == 0:
         return 0.0, 0.0, 0.0
-    low, high = 0, count  # the last segment that starts at or before t
-    while high - low > 1:
-        middle = (low + high) // 2
-        if segments[middle, 0] <= t:
-            low = middle
-        else:
-            high = middle
-    row = segments[low]
-    s = t - row[0]
+    low = max(int(np.searchsorted(segments[:, 0], t, side="right")) - 1, 0)  # the last segment that starts at or before t
+    t0, c0, c1, c2, c3, c4, c5, A, w, phi = segments[low].tolist()
+    s = t - t0
     if s < 0.0:  # before the first segment: hold
-        return row[1] + row[7] * np.sin(row[9]), 0.0, 0.0
-    y = row[1] + s * (row[2] + s * (row[3] + s * (row[4] + s * (row[5] + s * row[6]))))
-    yd = row[2] + s * (2 * row[3] + s * (3 * row[4] + s * (4 * row[5] + s * 5 * row[6])))
-    ydd = 2 * row[3] + s * (6 * row[4] + s * (12 * row[5] + s * 20 * row[6]))
-    if row[7] != 0.0:
-        angle = row[8] * s + row[9]
-        sine, cosine = np.sin(angle), np.cos(angle)
-        y += row[7] * sine
-        yd += row[7] * row[8] * cosine
-        ydd -= row[7] * row[8] ** 2 * sine
+        return c0 + A * math.sin(phi), 0.0, 0.0
+    y = c0 + s * (c1 + s * (c2 + s * (c3 + s * (c4 + s * c5))))
+    yd = c1 + s * (2 * c2 + s * (3 * c3 + s * (4 * c4 + s * 5 * c5)))
+    ydd = 2 * c2 + s * (6 * c3 + s * (12 * c4 + s * 20 * c5))
+    if A != 0.0:
+        sine, cosine = math.sin(w * s + phi), math.cos(w * s + phi)
+        y, yd, ydd = y + A * sine, yd + A * w * cosine, ydd - A * w * w * sine
     return y, yd, ydd
 
 

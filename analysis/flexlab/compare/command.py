@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ..terminal import announce_compiling, events, interrupted, progress_bars, say, show
+from ..terminal import events, interrupted, progress_bars, say, show
 
 
 def compare(
@@ -44,7 +44,6 @@ def compare(
         first, second = ordered(first, fx.Run.read(other))
     else:
         described = None if robot is None else fx.load(robot)
-        announce_compiling()
         with progress_bars("native") as report:
             try:
                 second, by = first, by or "commanded"

@@ -72,7 +72,7 @@ def simulate(
         force = held(times + SET_S + more.motor.inductance_H / resistance(rig), carriage.force_N_V * volts)
         at_start = known(t, experiment["joint/1/position"], "joint/1/position")[1][0], pulses(t[0])[0]
         spring = MagneticSpring(rig.stepper, more.stepper)
-        method = "explicit-5" if jumps else "auto"  # one every millisecond
+        method = "implicit" if jumps else "auto"  # one every millisecond
         start = _started(robot, at_start)
         mass_kg = float(start[0].mass(start[1])[0, 0])
         fine = np.arange(t[0], t[-1] + screw.STEP_S, screw.STEP_S)

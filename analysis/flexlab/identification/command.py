@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ..terminal import announce_compiling, progress_bars, say, show
+from ..terminal import progress_bars, say, show
 
 
 def identify(
@@ -35,7 +35,6 @@ def identify(
 
     experiment = fx.Run.read(run)
     other = None if check is None else fx.Run.read(check)
-    announce_compiling()
     try:
         with progress_bars("joint 1", "strip") as report:
             found = identified(experiment, report)

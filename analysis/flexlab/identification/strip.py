@@ -17,7 +17,6 @@ import numpy as np
 
 import flexura as fx
 from flexura import signal
-from flexura.beam import shape
 from flexura.drive import JointDrive
 
 from ..compare import screw
@@ -32,7 +31,7 @@ from ..rig.stepper import MagneticSpring
 DRIFT = 3  # degree of the polynomial that offset and drift may follow
 MODES = 3
 STILL = 5e-5  # what is left of the relaxation, of the holding torque: derivatives are differences of such simulations
-METHOD, RTOL = "explicit-5", 1e-3  # the cheapest where data break the drives every 2 ms; errs by 2 uV of the sensor
+METHOD, RTOL = "implicit", 1e-3  # the cheapest where data break the drives every 2 ms
 FINE_S = 2e-3  # between two values of the stepper's torque that the relaxation corrects
 
 
@@ -86,13 +85,9 @@ class Strip:
     def _bend(self, system: fx.System, run: fx.Run) -> np.ndarray:
         """The bend under the sensor [rad] of a run that holds its states."""
         assert run.states is not None
-        info, elements = system.links[1], system.robot.links[1].elements
         ends = np.array([self.more.flex.from_m, self.more.flex.from_m + self.rig.flex.length_m])
-        h = 1e-5
-        slope = (shape(info.length, elements, ends + h) - shape(info.length, elements, ends - h)) / (2 * h)
-        rows = np.arange(system.joint_rows[1] + 1, system.n)
-        low, high = np.arcsin(slope.T @ info.basis @ run.states[:, rows].T)
-        return high - low
+        low, high = system.angles(2, ends) @ run.states[:, : system.n].T
+        return np.asarray(high - low)
 
     def voltage(self, run: fx.Run, values: dict[str, float]) -> np.ndarray:
         """The sensor's voltage (T,) without offset and noise."""

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ..terminal import announce_compiling, default_folder, say, show
+from ..terminal import default_folder, say, show
 
 
 def tune(
@@ -103,7 +103,6 @@ def tune(
     weights = Weights(vibration, effort, overshoot)
     robots = varied(described, _factors(payload_factors, "--payload-factors"), _factors(stiffness_factors, "--stiffness-factors"))
     task = Task(robots, asked, given, tuple(frees), weights, algorithm == "nsga2", rtol, modes)
-    announce_compiling("run_rows")
     task.controllers  # noqa: B018 - refuses what can't be before anything is written
     folder = out or default_folder("tune", robot)
     history = History.open(folder, task.digest(how.identity()))
@@ -123,8 +122,6 @@ def tune(
 
 def _cases(how: Any, folder: Path, scheduler: str | None, jobs: int | None, json: bool) -> None:
     from . import dissertation as cases
-
-    announce_compiling("run_rows")
     with _bar(how.generations + how.polish, ("J",)) as report:
         found, complete = cases.study(["IV", "III"], how, folder, scheduler, jobs, report)
     if found:

@@ -20,7 +20,7 @@ MOST_SHAPES = 20  # polynomials of a whole link
 
 
 class Place(NamedTuple):
-    """Weights w_j / length (P,) and shapes b_k (m,) at a place xi, with derivatives by xi (2), (11)."""
+    """Weights w_j / length (P,) and shapes b_k (m,) at xi, and derivatives by xi (2), (11)."""
 
     w: np.ndarray
     l: np.ndarray

@@ -50,7 +50,7 @@ def clamped_modes(
 
 
 def _modes(M: np.ndarray, K: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """omega^2 (m,) ascending and mass-normalised modes (m, m); M x = mu K x keeps low ones exact."""
+    """omega^2 (m,) ascending, mass-normalised modes (m, m); M x = mu K x keeps low ones exact."""
     mu, X = eigh(M, K)
     mu, X = np.maximum(mu[::-1], 1e-300), X[:, ::-1]
     return 1 / mu, X / np.sqrt(mu)

@@ -4,7 +4,7 @@
 """
 
 from .assembly import Assembly
-from .frequencies import Modes, frequencies, modes
+from .spectrum import Modes, frequencies, modes
 from .statespace import StateSpace, linearize
 from .statics import NoEquilibrium, static, tip_pose
 from .system import System, assemble, system_of

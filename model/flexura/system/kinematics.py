@@ -94,7 +94,7 @@ def line(
     qd: np.ndarray,
     linear: bool = False,
 ) -> Line:
-    """The line of a piece that begins at a frame (1); with `linear` (12) on the hub's frame `axis`."""
+    """The line of a piece that begins at `start` (1); with `linear` (12) on the hub's frame `axis`."""
     angle = start.angle + piece.B @ q[own]
     columns = np.tile(start.turning, (piece.points, 1))
     columns[:, own] += piece.B

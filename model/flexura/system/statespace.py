@@ -19,7 +19,8 @@ class StateSpace:
 
     From M dq'' + G dq' + K dq = E u, of which the fields are the matrices (m, m), (m, inputs): bias and gravity are in G and K.
     `states`, `inputs`, `outputs` are names, `units` their units: inputs `joint/i/drive`, outputs `joint/i/position`,
-    `link/i/tip_deflection`, `tip/x`, `tip/y`, as in a Run. `hold` (N,): the drives [N or N m] that keep the robot there. Coulomb
+    `link/i/tip_deflection`, `tip/x`, `tip/y`, as in a Run. `hold` (N,): the drives [N or N m] that keep the robot there.
+    Coulomb
     friction is left out.
     """
 
@@ -66,7 +67,8 @@ class StateSpace:
     def zeros(self, drive: str, output: str) -> np.ndarray:
         """Transmission zeros from an input to an output [1/s], by magnitude: where the output stays 0 while the drive acts.
 
-        Motions with c dq = 0 in the directions that the drive does not push, L^T (s^2 M + s G + K) N z = 0, N = ker c, L = ker b:
+        Motions with c dq = 0 in the directions that the drive does not push, L^T (s^2 M + s G + K) N z = 0, N = ker c, L = ker
+        b:
         the finite invariant zeros of the pencil [[A - s, B], [C, 0]], without its infinite ones. Those with a positive real
         part (non-minimum phase) bound what feedback of that output can do. Raises InputError for unknown names, and for an
         output that the drive does not move.
@@ -89,10 +91,12 @@ class StateSpace:
 
 
 def linearize(robot: Any, q: Any = None, qd: Any = None, joints: str = "free") -> StateSpace:
-    """The robot linearised about an equilibrium q (n,), by default the static one at the start, or about a steady motion (24).
+    """The robot linearised about an equilibrium q (n,), by default the static one at the start, or about a steady motion (27).
 
-    Args: robot: a System, a Robot, or a robot file; q (n,); qd (n,): joint rates of a steady motion, a rotation or translation of the
-        whole robot, whose elastic equilibrium is found where q is not given; `tip/x`, `tip/y` are then along axes that turn with
+    Args: robot: a System, a Robot, or a robot file; q (n,); qd (n,): joint rates of a steady motion, a rotation or translation
+    of the
+        whole robot, whose elastic equilibrium is found where q is not given; `tip/x`, `tip/y` are then along axes that turn
+        with
         it; joints: "free", or "locked": only the elastic unknowns move, and there are no inputs.
 
     Raises: InputError: q, qd are no equilibrium. FlexuraError: none is found.

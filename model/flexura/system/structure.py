@@ -139,10 +139,7 @@ class Structure:
     def masses(self, state: LinkState) -> list[Part]:
         """A link's masses: its material, its hub, and the payload of the last one (3)."""
         joint = self.robot.links[state.index].joint
-        return self.own_masses(state) + [
-            lump(joint.hub_mass_kg, state.hub),
-            turning(joint.hub_inertia_kg_m2, state.hub),
-        ]
+        return [*self.own_masses(state), lump(joint.hub_mass_kg, state.hub), turning(joint.hub_inertia_kg_m2, state.hub)]
 
     def own_masses(self, state: LinkState) -> list[Part]:
         """A link's masses without its hub."""

@@ -99,7 +99,7 @@ class System:
         return self.assembly.mass(self.check(q))
 
     def stiffness(self, q: Any = None) -> np.ndarray:
-        """K (n, n) at the start; with q the tangent stiffness there, the derivative of elastic and gravity forces by q (24)."""
+        """K (n, n) at the start; with q the tangent stiffness there, the slope of elastic and gravity forces (17), (26)."""
         if q is None:
             return self.assembly.stiffness_blocks(self.check(self.start()))
         return self.tangent(q)
@@ -130,7 +130,7 @@ class System:
         return self.assembly.forces(self.check(q), self.check(qd, "qd"), self.check(qdd, "qdd"))
 
     def accelerations(self, q: Any, qd: Any, force: Any) -> np.ndarray:
-        """qdd (n,) under generalised forces (n,), locked joints at rest; Coulomb friction left out (20)-(22)."""
+        """qdd (n,) under generalised forces (n,), locked joints at rest; Coulomb friction left out (20) to (23)."""
         return np.asarray(self.equations.accelerations(self.check(q), self.check(qd, "qd"), self.check(force, "force")))
 
     def line(self, q: Any, link: int, s: Any = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -152,6 +152,18 @@ class System:
             return tuple(np.ascontiguousarray(self.equations.line(self.check(q), link - 1, places).T))  # type: ignore[return-value]
         return self.assembly.line(self.check(q), link, places)
 
+    def angles(self, link: int, s: Any) -> np.ndarray:
+        """What each unknown turns the tangent by (S, n), against the hub, at s (S,) [m] along a link (from 1) of constant
+        length: B of (1)."""
+        places = np.atleast_1d(np.asarray(s, dtype=float))
+        out, start = np.zeros((len(places), self.n)), 0.0
+        for piece, own in zip(
+            *(x[link - 1] for x in (self.assembly.structure.links, self.assembly.structure.own)), strict=True
+        ):
+            out[:, own] = piece.shapes(np.clip((places - start) / piece.length, 0.0, 1.0))
+            start += piece.length
+        return out
+
     def observe(self, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
         """What a Run shows of states q, qd (T, n): rows of poses, deflections, tip and energies, as `record.channel_units` names
         them from `link/1/x` to `energy/potential` (2), (29)."""
@@ -165,7 +177,9 @@ class System:
         if self.exact:
             row = self.equations.observe(at[None], np.zeros((1, self.n)), 2)[0]
             first = np.cumsum([0] + [3 + 4 * link.flexible for link in self.robot.links])
-            return row[[first[i] + 3 for i, link in enumerate(self.robot.links) if link.flexible]], row[first[-1] : first[-1] + 2]
+            return row[[first[i] + 3 for i, link in enumerate(self.robot.links) if link.flexible]], row[
+                first[-1] : first[-1] + 2
+            ]
         return self.assembly.tip_deflections(at), np.array([(tip := self.assembly.tip(at)).place.real, tip.place.imag])
 
     @property
@@ -180,11 +194,13 @@ class System:
             raise InputError(text, key="sliding", value="nodal")
         array = np.ascontiguousarray(q, dtype=float)
         if array.shape != (self.n,):
-            raise InputError(f"expected an array of shape ({self.n},), in the order of system.labels", key=key, value=array.shape)
+            raise InputError(
+                f"expected an array of shape ({self.n},), in the order of system.labels", key=key, value=array.shape
+            )
         return array
 
     def tangent(self, q: Any, qd: Any = None) -> np.ndarray:
-        """The derivative of bias, elastic and gravity forces by q (n, n), at rest or at rates qd (n,) (24)."""
+        """The derivative of bias, elastic and gravity forces by q (n, n), at rest or at rates qd (n,) (27)."""
         at, rates = self.check(q), None if qd is None else self.check(qd, "qd")
         if self.exact:
             return np.asarray(self.equations.stiffness(at, np.zeros(0) if rates is None else rates))
@@ -195,7 +211,7 @@ class System:
         return jacobian(forces, at, np.full(self.n, 1e-6))
 
     def rate(self, q: Any, qd: Any) -> np.ndarray:
-        """The derivative of all forces by qd (n, n) at (q, qd): damping, friction, and the gyroscopic terms of a motion (24)."""
+        """The derivative of all forces by qd (n, n) at (q, qd): damping, friction, and the gyroscopic terms of a motion (27)."""
         at, rates = self.check(q), self.check(qd, "qd")
         if self.exact:
             return np.asarray(self.equations.rates(at, rates))
@@ -203,15 +219,15 @@ class System:
         return self.assembly.damping(at) + gyroscopic
 
     def _shapes(self, link: int, pieces: tuple[Piece, ...]) -> tuple[Piece, ...]:
-        """The pieces of a link; one that is the whole link gets the core's shapes in place of its own."""
-        if len(pieces) != 1 or not hasattr(pieces[0].shapes, "coefficients"):
+        """The pieces of a link; one in modes gets the core's modes in place of its own (all else is equal to the last digits)."""
+        if len(pieces) != 1 or not hasattr(pieces[0].shapes, "coefficients") or not pieces[0].K.size:
             return pieces
         B, K, _ = self.equations.whole_link(link)
         own = legendre_shapes(len(pieces[0].shapes.coefficients), pieces[0].xi)
         coefficients = np.linalg.lstsq(own, B.T, rcond=None)[0]
         law = structure(self.robot).laws[link]
         assert law is not None
-        return (whole_piece(law, pieces[0].points, coefficients, K if pieces[0].K.size else np.zeros(0)),)
+        return (whole_piece(law, pieces[0].points, coefficients, K),)
 
     def _unit(self, name: str) -> str:
         parts = name.split("/")

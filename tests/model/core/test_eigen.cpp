@@ -1,4 +1,5 @@
-// Eigenproblems: residuals and orthogonality on random and graded matrices, exact spectra, free and massless directions.
+// Eigenproblems: residuals and orthogonality on random and graded matrices, exact spectra, free and massless
+// directions.
 #include "eigen.hpp"
 
 #include "check.hpp"
@@ -60,7 +61,8 @@ TEST("A x = l x: residual, orthonormal vectors, ascending values, the sign of ve
       double largest = 0.0;
       for (int i = 0; i < n; ++i) {
         double sum = -values[sized(k)] * at(x, n, i, k), dot = i == k ? -1.0 : 0.0;
-        for (int j = 0; j < n; ++j) sum += at(A, n, i, j) * at(x, n, j, k), dot += at(x, n, j, i) * at(x, n, j, k);
+        for (int j = 0; j < n; ++j)
+          sum += at(A, n, i, j) * at(x, n, j, k), dot += at(x, n, j, i) * at(x, n, j, k);
         residual = std::fmax(residual, std::fabs(sum)), apart = std::fmax(apart, std::fabs(dot));
         if (std::fabs(at(x, n, i, k)) > std::fabs(largest)) largest = at(x, n, i, k);
       }
@@ -100,17 +102,21 @@ TEST("graded matrices keep their small values: D A D with D over twelve decades"
   CHECK_NEAR(values[0] / 1.5e-12, 1.0, 1e-11);
   check::Random random;
   for (int n : {6, 26, 50}) {  // and K x = w^2 M x with both graded, each its own way
-    Numbers K = random_definite(n, 6.0, random), M = random_definite(n, 4.0, random), squares(sized(n)), shapes(sized(n * n));
+    Numbers K = random_definite(n, 6.0, random), M = random_definite(n, 4.0, random), squares(sized(n)),
+            shapes(sized(n * n));
     CHECK(eigen_pencil(n, K.data(), M.data(), squares.data(), shapes.data()) == n);
     CHECK_NEAR(off(n, M, shapes, Numbers(sized(n), 1.0)), 0.0, 1e-6);  // w spans ten decades
     CHECK_NEAR(off(n, K, shapes, squares), 0.0, 2e-9);
   }
 }
 
-TEST("K x = w^2 M x: products of the squares are det K / det M; large sizes go another way, to the same values") {
+TEST(
+    "K x = w^2 M x: products of the squares are det K / det M; large sizes go another way, to the same "
+    "values") {
   check::Random random;
   const int n = 90;
-  Numbers K = random_definite(n, 2.0, random), M = random_definite(n, 2.0, random), a(sized(n)), b(sized(n)), shapes(sized(n * n));
+  Numbers K = random_definite(n, 2.0, random), M = random_definite(n, 2.0, random), a(sized(n)), b(sized(n)),
+          shapes(sized(n * n));
   CHECK(eigen_pencil(n, K.data(), M.data(), a.data(), shapes.data()) == n);
   CHECK_NEAR(off(n, M, shapes, Numbers(sized(n), 1.0)), 0.0, 1e-8);
   eigen_definite(n, K.data(), M.data(), b.data(), shapes.data());
@@ -119,7 +125,8 @@ TEST("K x = w^2 M x: products of the squares are det K / det M; large sizes go a
   Numbers LK = K, LM = M;
   cholesky(n, LK.data()), cholesky(n, LM.data());
   double product = 0.0;
-  for (int k = 0; k < n; ++k) product += std::log(b[sized(k)]) - 2.0 * std::log(at(LK, n, k, k) / at(LM, n, k, k));
+  for (int k = 0; k < n; ++k)
+    product += std::log(b[sized(k)]) - 2.0 * std::log(at(LK, n, k, k) / at(LM, n, k, k));
   CHECK_NEAR(product, 0.0, 1e-9);
 }
 
@@ -142,7 +149,8 @@ TEST("free directions have w = 0, unstable ones w^2 < 0, massless ones w infinit
 }
 
 TEST("a rigid motion beside stiff and soft modes does not spoil the soft ones") {
-  // K = diag(0, 1, 1e8, 1e12), M = 1 + a a^T: compare with the same without the free row, and the free one moved by 1e-6
+  // K = diag(0, 1, 1e8, 1e12), M = 1 + a a^T: compare with the same without the free row, and the free one
+  // moved by 1e-6
   const int n = 4;
   Numbers K(16, 0.0), M(16), w(4), x(16);
   const double a[4] = {1.0, 0.5, 0.25, 0.125};
@@ -163,7 +171,8 @@ TEST("four pencils in a pack: each lane has the digits of a double") {
     Numbers k[4], m[4], v(sized(n)), y(sized(n * n));
     for (int lane = 0; lane < 4; ++lane) {
       k[lane] = random_definite(n, 3.0 * lane, random), m[lane] = random_definite(n, 2.0, random);
-      for (int i = 0; i < n * n; ++i) K[sized(i)].set(lane, k[lane][sized(i)]), M[sized(i)].set(lane, m[lane][sized(i)]);
+      for (int i = 0; i < n * n; ++i)
+        K[sized(i)].set(lane, k[lane][sized(i)]), M[sized(i)].set(lane, m[lane][sized(i)]);
     }
     eigen_definite(n, K.data(), M.data(), w.data(), x.data());
     for (int lane = 0; lane < 4; ++lane) {

@@ -278,6 +278,19 @@ TEST("a function of the caller's is never asked for a time before the step's sta
   }
 }
 
+TEST("a steep function of the caller's costs implicit steps little") {
+  Masses<double> plant(1, 1);
+  plant.stiffness = {0.0, 4.0};
+  Acting acting(1);
+  long asked = 0;
+  acting.function = [&](double, const double *q, const double *v, double *force) { ++asked, force[0] += -1e6 * (q[0] - 1.0) - 2e3 * v[0]; };
+  Run run(plant, acting, grid(0.0, 5.0, 11), 1e-5, true);
+  CHECK(run({0.0, 1.0}, {0.0, 0.0}) == Status::done);
+  CHECK_NEAR(run.at(10, 0), 1.0, 1e-9);
+  CHECK_NEAR(run.at(10, 1), std::cos(10.0), 1e-3);
+  CHECK(asked < 4000);
+}
+
 TEST("a prescribed joint is on its motion, and its drive is what that takes") {
   for (bool implicit : {false, true}) {
     Masses<double> plant(1, 1);
@@ -364,6 +377,37 @@ TEST("a budget of steps, an interruption") {
   stop = true;
   CHECK(!other.loop.advance(*other.method, 5));
   CHECK(other.loop.clock[0].status == Status::interrupted);
+}
+
+TEST("a rehearsal leaves no trace") {
+  Masses<double> plant(1, 1);
+  plant.stiffness = {4.0, 900.0};
+  auto run = [&](bool rehearse) {
+    Recorder recorder;
+    recorder.gain = 5.0;
+    Acting acting(1);
+    acting.sampler = &recorder, acting.rate_Hz = 3.0;
+    Acting *list = &acting;
+    Loop<double> loop(plant, &list, grid(0.0, 2.0, 21), 1e-6);
+    Explicit<double> explicit_steps(loop.course);
+    Implicit<double> implicit_steps(loop.course);
+    const double q0[2] = {1.0, 0.1}, v0[2] = {0.0, 0.0};
+    loop.start(q0, v0, 1e-3);
+    while (loop.advance(explicit_steps, 20)) {
+      if (!rehearse) {
+        loop.restore(loop.snapshot());
+        continue;
+      }
+      const auto here = loop.snapshot();
+      loop.rehearsal = true;
+      loop.advance(implicit_steps, 30);
+      loop.rehearsal = false;
+      loop.restore(here);
+    }
+    CHECK(recorder.t.size() == 6);
+    return loop.record[0].state;
+  };
+  CHECK(run(true) == run(false));
 }
 
 TEST("a pack gives each robot the digits that it has alone") {

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from robots import beam
 from scipy.optimize import brentq
 from scipy.special import iv, jv
 
@@ -10,10 +9,13 @@ from flexura.link.line import pieces
 from flexura.link.modes import clamped_matrices, clamped_modes
 from flexura.link.section import Material
 from flexura.robot import Link
+from robots import beam
 
 UNIT = Material(np.array([0.0, 1.0]), np.array([[1.0, 0, 0]]), np.array([[1.0, 0, 0, 0, 0]]))
 # constant width, height that falls to nothing at the tip
-WEDGE = Material(np.array([0.0, 1.0]), np.array([[1.0, -1.0, 0]]), np.array([[1.0, -3.0, 3.0, -1.0, 0]]))
+WEDGE = Material(
+    np.array([0.0, 1.0]), np.array([[1.0, -1.0, 0]]), np.array([[1.0, -3.0, 3.0, -1.0, 0]])
+)
 
 
 def roots(function, start, end, count):
@@ -35,7 +37,9 @@ def test_a_uniform_cantilever():
 
 @pytest.mark.parametrize("mass", [0.1, 1.0, 100.0])
 def test_a_cantilever_with_a_mass_at_its_tip(mass):
-    tip = lambda x: 1 + np.cos(x) * np.cosh(x) + mass * x * (np.cos(x) * np.sinh(x) - np.sin(x) * np.cosh(x))
+    tip = lambda x: (
+        1 + np.cos(x) * np.cosh(x) + mass * x * (np.cos(x) * np.sinh(x) - np.sin(x) * np.cosh(x))
+    )
     assert modes(UNIT, mass=mass)[2] ** 0.25 == pytest.approx(roots(tip, 0.1, 15, 4), rel=1e-10)
 
 

@@ -2,18 +2,29 @@
 
 import numpy as np
 import pytest
-from robots import beam
 
 from flexura.link.line import pieces
 from flexura.link.quadrature import cells
 from flexura.link.section import material
 from flexura.link.shapes import ElementShapes, WholeShapes
 from flexura.robot import Link
+from robots import beam
 
-SHAPES = [ElementShapes(), ElementShapes(0.2), WholeShapes(np.eye(6)), WholeShapes(np.arange(8.0).reshape(4, 2))]
+SHAPES = [
+    ElementShapes(),
+    ElementShapes(0.2),
+    WholeShapes(np.eye(6)),
+    WholeShapes(np.arange(8.0).reshape(4, 2)),
+]
 SECTIONS = [{"at_m": 0.0, "width_m": 0.03, "height_m": 0.004}, {"at_m": 0.2, "width_m": 0.02, "height_m": 0.004},
             {"at_m": 0.5, "width_m": 0.02, "height_m": 0.001}]  # fmt: skip
-STEEL = {"length_m": 0.5, "young_modulus_Pa": 2e11, "density_kg_m3": 7850.0, "section": SECTIONS, "joint": {"type": "R"}}
+STEEL = {
+    "length_m": 0.5,
+    "young_modulus_Pa": 2e11,
+    "density_kg_m3": 7850.0,
+    "section": SECTIONS,
+    "joint": {"type": "R"},
+}
 
 
 @pytest.mark.parametrize("shapes", SHAPES)
@@ -35,13 +46,19 @@ def test_a_taper_is_a_polynomial_of_its_dimensions():
     assert law.mass_per_length(s) == pytest.approx(link.mass_per_length(s), rel=1e-13)
     assert law.bending_stiffness(s) == pytest.approx(link.bending_stiffness(s), rel=1e-12)
     x, dx = law.quadrature(0.0, 0.5, 4)
-    assert dx @ law.mass_per_length(x, 1) == pytest.approx(np.diff(law.mass_per_length(np.array([0, 0.5])))[0], rel=1e-12)
-    assert dx @ law.bending_stiffness(x, 1) == pytest.approx(np.diff(link.bending_stiffness(np.array([0, 0.5])))[0], rel=1e-12)
+    assert dx @ law.mass_per_length(x, 1) == pytest.approx(
+        np.diff(law.mass_per_length(np.array([0, 0.5])))[0], rel=1e-12
+    )
+    assert dx @ law.bending_stiffness(x, 1) == pytest.approx(
+        np.diff(link.bending_stiffness(np.array([0, 0.5])))[0], rel=1e-12
+    )
 
 
 @pytest.mark.parametrize("section", [SECTIONS, SECTIONS[0] | {}])
 def test_the_stiffness_of_an_element_is_diagonal(section):
-    section = section if isinstance(section, list) else {k: v for k, v in section.items() if k != "at_m"}
+    section = (
+        section if isinstance(section, list) else {k: v for k, v in section.items() if k != "at_m"}
+    )
     link = Link.model_validate(STEEL | {"elements": 3, "section": section})
     law, h = material(link), 0.5 / 3
     for e, piece in enumerate(pieces(link)):
@@ -54,7 +71,7 @@ def test_the_stiffness_of_an_element_is_diagonal(section):
 
 @pytest.mark.parametrize("keys", [{}, {"modes": 2}])
 def test_moments_of_the_mass_are_those_of_a_straight_link(keys):
-    """A straight piece lies at sum w_j = s: the sums of s_j and W_jl are the integrals of s and s^2."""
+    """A straight piece: the sums of s_j and W_jl are the integrals of s dm and s^2 dm."""
     link = Link.model_validate(beam(0.8, 1.5, 2.0, 3, **keys))
     made = pieces(link)
     h = 0.8 / len(made)

@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from flexura.link.quadrature import cells, collocation, gauss, lagrange, lagrange_integrals, legendre_integrals
+from flexura.link.quadrature import (
+    cells,
+    collocation,
+    gauss,
+    lagrange,
+    lagrange_integrals,
+    legendre_integrals,
+)
 
 
 @pytest.mark.parametrize("count", [1, 3, 8, 21])

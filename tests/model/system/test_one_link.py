@@ -1,25 +1,32 @@
-"""One link and two: the assembly against other derivations, clamped frequencies, the linear line."""
+"""One link and two against other derivations, clamped frequencies, the linear line."""
 
 import numpy as np
 import pytest
-from robots import beam, rigid, robot
 from scipy.linalg import eigh
 from scipy.optimize import brentq
 
 from flexura.link.quadrature import cells, collocation, gauss
 from flexura.system.assembly import Assembly
+from robots import beam, rigid, robot
 
-CLAMPED = np.array([brentq(lambda x: np.cos(x) * np.cosh(x) + 1, a, b, xtol=1e-15) for a, b in ((1, 3), (4, 5), (7, 9))])
+CLAMPED = np.array(
+    [
+        brentq(lambda x: np.cos(x) * np.cosh(x) + 1, a, b, xtol=1e-15)
+        for a, b in ((1, 3), (4, 5), (7, 9))
+    ]
+)
 
 
 def clamped_frequencies(elements, **keys):
     assembly = Assembly(robot(beam(1.0, 1.0, 1.0, elements, **keys)))
     q = np.zeros(assembly.n)
-    return np.sqrt(eigh(assembly.stiffness(q)[1:, 1:], assembly.mass(q)[1:, 1:], eigvals_only=True)[:3])
+    return np.sqrt(
+        eigh(assembly.stiffness(q)[1:, 1:], assembly.mass(q)[1:, 1:], eigvals_only=True)[:3]
+    )
 
 
 def test_clamped_frequencies_converge_in_the_fourth_order():
-    """Relative errors of a mesh of beam elements; the exact ones are the squares of the roots of cos x cosh x = -1."""
+    """The exact ones are the squares of the roots of cos x cosh x = -1."""
     error = {n: clamped_frequencies(n) / CLAMPED**2 - 1 for n in (2, 4, 8)}
     assert (np.abs(error[2][:2]) < (5e-4, 1e-2)).all()
     assert (np.abs(error[4]) < (3.5e-5, 1.3e-3, 8.5e-3)).all()
@@ -35,13 +42,17 @@ def test_a_double_pendulum_is_the_textbooks():
     M11 = J1 + m1 * c1**2 + J2 + m2 * (L1**2 + c2**2) + 2 * k * np.cos(b)
     M12, M22 = J2 + m2 * c2**2 + k * np.cos(b), J2 + m2 * c2**2
     assert assembly.mass(q) == pytest.approx(np.array([[M11, M12], [M12, M22]]), rel=1e-13)
-    assert assembly.bias(q, qd) == pytest.approx(k * np.sin(b) * np.array([-v * (2 * u + v), u**2]), rel=1e-13)
+    assert assembly.bias(q, qd) == pytest.approx(
+        k * np.sin(b) * np.array([-v * (2 * u + v), u**2]), rel=1e-13
+    )
     outer = m2 * c2 * g * np.cos(a + b)
-    assert assembly.gravity(q) == pytest.approx([(m1 * c1 + m2 * L1) * g * np.cos(a) + outer, outer], rel=1e-13)
+    assert assembly.gravity(q) == pytest.approx(
+        [(m1 * c1 + m2 * L1) * g * np.cos(a) + outer, outer], rel=1e-13
+    )
 
 
 def fine_forces(assembly, q, qd, qdd):
-    """Newton's law for every point of a bent link on a turning hub: r = int e^(i Theta) by 60 cells, forces by virtual work."""
+    """Newton's law for every point of a bent link, r = int e^(i Theta) by 60 cells; virtual work."""
     (piece,) = assembly.structure.links[0]
     L, breaks = piece.length, np.linspace(0, 1, 61)
     x, dx = cells(breaks, 4)
@@ -51,7 +62,9 @@ def fine_forces(assembly, q, qd, qdd):
     total = lambda f: _integrals(f, L, breaks)
     A, J = total(acceleration), total(columns)
     rho = assembly.robot.links[0].mass_per_length(L * x)
-    return np.real(J.conj().T @ (rho * L * dx * A)), np.real(J.conj().T @ ((rho * L * dx)[:, None] * J))
+    return np.real(J.conj().T @ (rho * L * dx * A)), np.real(
+        J.conj().T @ ((rho * L * dx)[:, None] * J)
+    )
 
 
 def _integrals(f, L, breaks):
@@ -83,7 +96,9 @@ def test_a_bent_link_on_a_turning_hub_obeys_newtons_law():
 @pytest.mark.parametrize("keys", [{}, {"modes": 2}])
 def test_the_linear_line_is_the_dissertations(keys):
     """T = 1/2 w^2 (J + q Mc q) + w S q' + 1/2 q' Mc q' with constant J, S, Mc, at any q."""
-    assembly = Assembly(robot(beam(1.0, 1.2, 1.0, 3, **keys), payload=0.2, payload_inertia=0.1, stiffening=False))
+    assembly = Assembly(
+        robot(beam(1.0, 1.2, 1.0, 3, **keys), payload=0.2, payload_inertia=0.1, stiffening=False)
+    )
     n = assembly.n
     rng = np.random.default_rng(4)
     q, qd = rng.normal(size=n), rng.normal(size=n)
@@ -93,9 +108,13 @@ def test_the_linear_line_is_the_dissertations(keys):
     if keys:
         assert Mc == pytest.approx(np.eye(2), abs=1e-12)
     y, v, w = q[1:], qd[1:], qd[0]
-    turn = 0.1 * np.outer(*2 * [[*assembly.tip(np.zeros(n)).turning[1:]]])  # the payload turns with w', not with the place
+    turn = 0.1 * np.outer(
+        *2 * [[*assembly.tip(np.zeros(n)).turning[1:]]]
+    )  # the payload turns with w', not with the place
     assert assembly.mass(q)[0, 0] == pytest.approx(J + y @ (Mc - turn) @ y)
-    assert assembly.mass(q)[0, 1:] == pytest.approx(S) and assembly.mass(q)[1:, 1:] == pytest.approx(Mc)
+    assert assembly.mass(q)[0, 1:] == pytest.approx(S) and assembly.mass(q)[
+        1:, 1:
+    ] == pytest.approx(Mc)
     bias = np.append(2 * w * y @ (Mc - turn) @ v, -(w**2) * (Mc - turn) @ y)
     assert assembly.bias(q, qd) == pytest.approx(bias, abs=1e-12 * np.abs(bias).max())
 

@@ -1,12 +1,12 @@
-"""Links in sleeves and sliders on them: invariance, the force that pushes a bent link out, momentum, limits."""
+"""Sleeves and sliders: invariance, the force that pushes a bent link out, momentum, limits."""
 
-import chains
 import numpy as np
 import pytest
-from robots import beam, rigid, robot
 from scipy.integrate import solve_ivp
 
+import chains
 from flexura.system.assembly import Assembly
+from robots import beam, rigid, robot
 
 CARRIAGE = rigid(0.0, 0.5, 0.0, 0.01, "Pa")
 KINDS = {
@@ -19,7 +19,7 @@ KINDS = {
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_nothing_depends_on_the_sleeves_own_velocity(kind):
-    """A sleeve on a carriage: a constant velocity of the carriage changes neither the mass matrix nor the bias."""
+    """A constant velocity of the carriage under a sleeve changes neither M nor the bias."""
     assembly = Assembly(robot(CARRIAGE, KINDS[kind], payload=0.3, payload_inertia=0.1))
     q, qd = chains.random_state(assembly, np.random.default_rng(1))
     faster, elsewhere = qd.copy(), q.copy()
@@ -41,7 +41,7 @@ def test_the_carriage_carries_the_whole_mass(kind):
 
 @pytest.mark.parametrize("kind", ["uniform", "taper", "modes"])
 def test_momentum_is_kept_where_nothing_holds_the_carriage(kind):
-    """d/dt (M qd)_1 = 0 in a free motion along the rail: row 1 of the bias is the rate of row 1 of M, times qd."""
+    """The momentum along the rail is (M qd)_1: its rate at qdd = 0 is row 1 of the bias."""
     assembly = Assembly(robot(CARRIAGE, KINDS[kind], payload=0.3))
     q, qd = chains.random_state(assembly, np.random.default_rng(2))
     rate = chains.slopes(lambda t: assembly.mass(q + t[0] * qd)[0] @ qd, np.zeros(1), 1e-4)[0]
@@ -53,7 +53,12 @@ def test_a_held_sleeve_is_a_clamped_link_of_the_free_length():
     clamped = Assembly(robot(beam(0.4, 1.0, 1.0, 4), rigid(0.0, 0.3, 0.0, 0.0, "Pa", start=0.4)))
     (piece,) = clamped.structure.links[0]
     V = piece.shapes.coefficients
-    own, low, q, qd = slice(1, 9), slice(0, 4), np.zeros(10), np.zeros(10)  # the sum is exact for low modes only
+    own, low, q, qd = (
+        slice(1, 9),
+        slice(0, 4),
+        np.zeros(10),
+        np.zeros(10),
+    )  # the sum is exact for low modes only
     rng = np.random.default_rng(3)
     q[1:5], qd[1:5] = (rng.normal(size=4) * 0.3 / np.sqrt(piece.K[low]) for _ in range(2))
     q[0], q[-1] = 0.7, 0.4
@@ -80,9 +85,11 @@ def bent(assembly, d, force):
     raise AssertionError("Newton's method does not converge")
 
 
-@pytest.mark.parametrize("force, d, published", [(1, 0.5, 0.242104), (1, 1.0, 0.704522), (5, 1.0, 4.950723)])
+@pytest.mark.parametrize(
+    "force, d, published", [(1, 0.5, 0.242104), (1, 1.0, 0.704522), (5, 1.0, 4.950723)]
+)
 def test_the_force_that_pushes_a_bent_link_out(force, d, published):
-    """M0^2 / (2 EI), M0 the bending moment at the exit: force times the tip's distance along the sleeve."""
+    """M0^2 / (2 EI), M0 at the exit: force times the tip's distance along the sleeve."""
     assembly = Assembly(robot(beam(2.0, 1.0, 0.5, 8, "Pb", start=d)))
     q, row = bent(assembly, d, 1j * force)
     moment = force * assembly.tip(q).place.real
@@ -91,15 +98,30 @@ def test_the_force_that_pushes_a_bent_link_out(force, d, published):
 
 
 def test_a_bent_link_that_pushes_itself_out_keeps_its_energy():
-    assembly = Assembly(robot(beam(2.0, [{"at_m": 0.0, "value": 0.3}, {"at_m": 2.0, "value": 0.1}], 0.5, 1, "Pb", start=0.6)))
+    assembly = Assembly(
+        robot(
+            beam(
+                2.0,
+                [{"at_m": 0.0, "value": 0.3}, {"at_m": 2.0, "value": 0.1}],
+                0.5,
+                1,
+                "Pb",
+                start=0.6,
+            )
+        )
+    )
     n = assembly.n
     q0, _ = bent(assembly, 0.6, 1.5j)
 
     def rates(t, z):
         q, qd = z[:n], z[n:]
-        return np.append(qd, np.linalg.solve(assembly.mass(q), -assembly.bias(q, qd) - assembly.elastic(q)))
+        return np.append(
+            qd, np.linalg.solve(assembly.mass(q), -assembly.bias(q, qd) - assembly.elastic(q))
+        )
 
-    z = solve_ivp(rates, (0, 0.03), np.append(q0, np.zeros(n)), method="DOP853", rtol=1e-9, atol=1e-12).y
+    z = solve_ivp(
+        rates, (0, 0.03), np.append(q0, np.zeros(n)), method="DOP853", rtol=1e-9, atol=1e-12
+    ).y
     energy = [sum(assembly.energies(y[:n], y[n:])) for y in z.T[:: max(1, z.shape[1] // 8)]]
     assert z[0, -1] > 0.6001  # it moves
     assert np.ptp(energy) < 1e-8 * energy[0]
@@ -110,13 +132,23 @@ def test_a_rigid_rod_in_a_turning_sleeve():
     m, c, J, L, d, w, u = 1.3, 0.4, 0.07, 1.0, 0.7, 1.1, -0.6
     assembly = Assembly(robot(rigid(0.0, 0.0, 0.0, 0.2), rigid(L, m, c, J, "Pb", start=d)))
     x = d - L + c
-    assert assembly.mass(np.array([0.3, d])) == pytest.approx(np.diag([0.2 + J + m * x**2, m]), rel=1e-13)
-    assert assembly.bias(np.array([0.3, d]), np.array([w, u])) == pytest.approx([2 * m * x * u * w, -m * x * w**2], rel=1e-13)
+    assert assembly.mass(np.array([0.3, d])) == pytest.approx(
+        np.diag([0.2 + J + m * x**2, m]), rel=1e-13
+    )
+    assert assembly.bias(np.array([0.3, d]), np.array([w, u])) == pytest.approx(
+        [2 * m * x * u * w, -m * x * w**2], rel=1e-13
+    )
 
 
 def test_a_straight_stiff_link_in_a_sleeve_moves_like_a_rigid_one():
-    flexible = Assembly(robot(chains.ARM, beam(1.0, 1.3, 1.0, 2, "Pb", start=0.7, angle_rad=0.4), payload=0.2))
-    stiff = Assembly(robot(chains.ARM, rigid(1.0, 1.3, 0.5, 1.3 / 12, "Pb", start=0.7, angle_rad=0.4), payload=0.2))
+    flexible = Assembly(
+        robot(chains.ARM, beam(1.0, 1.3, 1.0, 2, "Pb", start=0.7, angle_rad=0.4), payload=0.2)
+    )
+    stiff = Assembly(
+        robot(
+            chains.ARM, rigid(1.0, 1.3, 0.5, 1.3 / 12, "Pb", start=0.7, angle_rad=0.4), payload=0.2
+        )
+    )
     q, qd = np.array([0.3, 0.7, 0, 0, 0, 0]), np.array([1.1, -0.6, 0, 0, 0, 0])
     assert flexible.mass(q)[:2, :2] == pytest.approx(stiff.mass(q[:2]), rel=1e-12)
     assert flexible.bias(q, qd)[:2] == pytest.approx(stiff.bias(q[:2], qd[:2]), rel=1e-12)
@@ -124,7 +156,9 @@ def test_a_straight_stiff_link_in_a_sleeve_moves_like_a_rigid_one():
 
 def test_a_slider_held_at_the_tip_stands_where_a_joint_at_the_tip_does():
     at_tip = Assembly(robot(beam(1.0, 1.0, 1.0, 4, modes=4), rigid(0.5, 1.0, 0.2, 0.1)))
-    slides = Assembly(robot(beam(1.0, 1.0, 1.0, 4, modes=4), rigid(0.5, 1.0, 0.2, 0.1, "Pa", start=1.0)))
+    slides = Assembly(
+        robot(beam(1.0, 1.0, 1.0, 4, modes=4), rigid(0.5, 1.0, 0.2, 0.1, "Pa", start=1.0))
+    )
     q, qd = chains.random_state(at_tip, np.random.default_rng(4))
     q[-1], qd[-1] = 0.0, 0.0
     p, v = np.append(q[:-1], 1.0), np.append(qd[:-1], 0.0)

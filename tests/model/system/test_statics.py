@@ -1,26 +1,28 @@
 """Equilibria: the elastica under a dead tip load, roll-up, and the geometric stiffness (26)."""
 
-import chains
 import numpy as np
 import pytest
-from robots import beam, rigid, robot
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
+import chains
 from flexura.system.assembly import Assembly
+from robots import beam, rigid, robot
 
 # all 20 polynomials of a link: a slider without mass stands on its tip
 WHOLE = robot(beam(1.0, 1.0, 1.0, 10), rigid(0.0, 0.0, 0.0, 0.0, "Pa", start=1.0))
 
 
 def geometric(assembly, q, force):
-    """The geometric stiffness (n, n) of a chain of joints R under a dead tip force (complex), by (26)."""
+    """The geometric stiffness (n, n) of joints R under a dead tip force (complex), by (26)."""
     S, g = np.zeros((assembly.n, assembly.n)), complex(*assembly.robot.gravity_m_s2)
     states = assembly.structure.states(q, 0 * q)
     load = assembly.robot.payload.mass_kg * g + force
     for state in reversed(states):
         for line in reversed(state.lines):
-            gamma = np.real(np.conj(line.piece.weights * line.free * load + line.piece.s * g) * line.e)
+            gamma = np.real(
+                np.conj(line.piece.weights * line.free * load + line.piece.s * g) * line.e
+            )
             turning = np.real(-1j * line.E / line.e[:, None])
             S += turning.T @ (gamma[:, None] * turning)
             load += line.piece.mass.sum() * g
@@ -29,7 +31,7 @@ def geometric(assembly, q, force):
 
 
 def equilibrium(assembly, force, moment=0.0, steps=1):
-    """q with all joints held at their start under a dead tip force and moment, by Newton's method (25)."""
+    """q with joints held at their start under a dead tip force and moment (25)."""
     q, free = np.zeros(assembly.n), np.setdiff1d(np.arange(assembly.n), assembly.rows)
     q[assembly.rows] = assembly.robot.start
     for share in np.arange(1, steps + 1) / steps:
@@ -48,12 +50,16 @@ def equilibrium(assembly, force, moment=0.0, steps=1):
 
 
 def elastica(load):
-    """x, y and slope of the tip of a cantilever (L = EI = 1) under a dead transverse force, by elliptic integrals."""
+    """x, y, slope of a cantilever's tip (L = EI = 1) under a dead transverse force."""
     first = lambda k: np.arcsin(1 / (k * np.sqrt(2)))
     reach = lambda k: ellipk(k**2) - ellipkinc(first(k), k**2)
     k = brentq(lambda k: reach(k) - np.sqrt(load), np.sqrt(0.5) + 1e-12, 1 - 1e-12, xtol=1e-15)
     sine, a = 2 * k**2 - 1, np.sqrt(load)
-    return np.sqrt(2 * sine) / a, 1 - 2 * (ellipe(k**2) - ellipeinc(first(k), k**2)) / a, np.arcsin(sine)
+    return (
+        np.sqrt(2 * sine) / a,
+        1 - 2 * (ellipe(k**2) - ellipeinc(first(k), k**2)) / a,
+        np.arcsin(sine),
+    )
 
 
 def test_the_elliptic_integrals_give_the_published_elastica():
@@ -61,7 +67,9 @@ def test_the_elliptic_integrals_give_the_published_elastica():
     assert (1 - x, y, slope) == pytest.approx((0.160642, 0.493457, 0.781750), abs=1e-6)
 
 
-@pytest.mark.parametrize("load, error", [(1.0, 1e-5), (2.0, 1e-5), (5.0, 1e-5), (10.0, 1e-5), (25.0, 3e-5)])
+@pytest.mark.parametrize(
+    "load, error", [(1.0, 1e-5), (2.0, 1e-5), (5.0, 1e-5), (10.0, 1e-5), (25.0, 3e-5)]
+)
 def test_the_elastica(load, error):
     assembly = Assembly(robot(beam(1.0, 1.0, 1.0, 8)))
     tip = assembly.tip(equilibrium(assembly, 1j * load, steps=1 if load < 5 else 4))
@@ -89,8 +97,12 @@ def test_euler_s_load_makes_the_tangent_singular():
         assembly = Assembly(chain)
         q = np.append(np.zeros(assembly.n - 1), chain.start[-1])
         own = slice(1, assembly.rows[1] if len(assembly.rows) > 1 else None)
-        tangent = lambda P, a=assembly, q=q, own=own: (a.stiffness(q) + geometric(a, q, -P + 0j))[own, own]
-        assert brentq(lambda P, t=tangent: np.linalg.eigvalsh(t(P))[0], 2.0, 3.0) == pytest.approx(np.pi**2 / 4, rel=error)
+        tangent = lambda P, a=assembly, q=q, own=own: (a.stiffness(q) + geometric(a, q, -P + 0j))[
+            own, own
+        ]
+        assert brentq(lambda P, t=tangent: np.linalg.eigvalsh(t(P))[0], 2.0, 3.0) == pytest.approx(
+            np.pi**2 / 4, rel=error
+        )
 
 
 @pytest.mark.parametrize("name", ["R", "R, kink", "R, modes, R"])
