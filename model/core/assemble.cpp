@@ -62,27 +62,76 @@ void check_masses(const Model<double> &model, const Robot &robot) {
   }
 }
 
-}  // namespace
+// A robot in the making, link by link.
+struct Blank {
+  std::vector<LinkDraft> links;
+};
 
-Model<double> assemble(const Robot &robot) {
-  Model<double> model;
+void begin(const Robot &robot, Blank &out) {
   const std::size_t links = robot.links.size();
   if (links == 0) throw Fault(-1, "link", "expected a link at least");
-  std::vector<Draft> drafts;
   for (std::size_t i = 0; i < links; ++i) {
-    const Link &link = robot.links[i];
     const bool last = i + 1 == links;
     Carried carried;
     carried.follower = !last, carried.slider = !last && robot.links[i + 1].joint.kind == JointKind::slider;
     if (last) carried.payload_mass = robot.payload_mass, carried.payload_inertia = robot.payload_inertia;
+    out.links.push_back(begin_link(robot.links[i], int(i), carried));
+  }
+}
+
+// Numbers of four robots as packs; a robot that is missing is taken for the first.
+template <class Get>
+std::vector<Pack<4>> side_by_side(Get get) {
+  std::vector<Pack<4>> out(get(0).size());
+  for (int k = 0; k < 4; ++k)
+    for (std::size_t i = 0; i < out.size(); ++i) out[i].set(k, get(k)[i]);
+  return out;
+}
+
+// Finishes link `index` of the robots `blanks` (1 to 4), whose modes are found together where their spaces are alike.
+void finish_together(std::size_t index, const std::vector<Blank *> &blanks, const std::vector<const Robot *> &robots) {
+  auto whole = [&](int k) -> const WholeLink & { return blanks[std::size_t(k) < blanks.size() ? std::size_t(k) : 0]->links[index].whole; };
+  const int count = int(blanks.size());
+  bool alike = count > 1 && blanks[0]->links[index].has_whole && whole(0).own;
+  for (int k = 1; k < count; ++k) alike = alike && whole(k).clamped.m == whole(0).clamped.m && whole(k).modes == whole(0).modes;
+  OwnModes<Pack<4>> four;
+  if (alike) {
+    Clamped<Pack<4>> links;
+    links.m = whole(0).clamped.m;
+    links.K = side_by_side([&](int k) -> const Numbers & { return whole(k).clamped.K; });
+    links.M = side_by_side([&](int k) -> const Numbers & { return whole(k).clamped.M; });
+    links.deflection = side_by_side([&](int k) -> const Numbers & { return whole(k).clamped.deflection; });
+    links.angle = side_by_side([&](int k) -> const Numbers & { return whole(k).clamped.angle; });
+    four = own_modes(links, whole(0).modes, whole(0).follower);
+  }
+  for (int k = 0; k < count; ++k) {
+    LinkDraft &draft = blanks[std::size_t(k)]->links[index];
+    OwnModes<double> one;
+    if (alike) {
+      one.count = four.count;
+      for (const Pack<4> &x : four.X) one.X.push_back(x[k]);
+      for (const Pack<4> &x : four.squares) one.squares.push_back(x[k]);
+    } else if (draft.has_whole && draft.whole.own) {
+      one = own_modes(draft.whole.clamped, draft.whole.modes, draft.whole.follower);
+    }
+    finish_link(draft, robots[std::size_t(k)]->links[index], one);
+  }
+}
+
+// Numbers the unknowns and puts the pieces into a model.
+Model<double> numbered(const Robot &robot, Blank &blank) {
+  Model<double> model;
+  std::vector<Draft *> drafts;
+  for (std::size_t i = 0; i < robot.links.size(); ++i) {
+    const Link &link = robot.links[i];
     model.begin.push_back(int(drafts.size()));
     model.first.push_back(model.n);
     int elastic = 0;
-    for (Draft &piece : pieces_of(link, int(i), carried)) {
+    for (Draft &piece : blank.links[i].pieces) {
       piece.first = model.n;
       model.n += piece.m + (piece.joint != At::none);
       elastic += piece.m;
-      drafts.push_back(std::move(piece));
+      drafts.push_back(&piece);
     }
     model.elastic.push_back(elastic);
     model.kind.push_back(link.joint.kind), model.locked.push_back(link.joint.locked);
@@ -95,16 +144,51 @@ Model<double> assemble(const Robot &robot) {
   std::size_t size = 0;
   model.pieces.resize(drafts.size());
   for (std::size_t i = 0; i < drafts.size(); ++i) {
-    static_cast<Shape &>(model.pieces[i]) = drafts[i];
+    static_cast<Shape &>(model.pieces[i]) = *drafts[i];
     size += place_arrays(model.pieces[i], static_cast<const double *>(nullptr));
   }
   model.numbers.assign(size, 0.0);
   double *at = model.numbers.data();
   for (std::size_t i = 0; i < drafts.size(); ++i) {
-    fill_piece(model.pieces[i], drafts[i], at);
+    fill_piece(model.pieces[i], *drafts[i], at);
     at += place_arrays(model.pieces[i], static_cast<const double *>(at));
   }
   check_masses(model, robot);
+  return model;
+}
+
+}  // namespace
+
+void assemble(const Robot *const *robots, int count, Model<double> *models, std::unique_ptr<Fault> *faults) {
+  std::vector<Blank> blanks(static_cast<std::size_t>(count));
+  std::vector<Blank *> good;
+  std::vector<const Robot *> of;
+  for (int k = 0; k < count; ++k) {
+    faults[k].reset();
+    try {
+      begin(*robots[k], blanks[std::size_t(k)]);
+      good.push_back(&blanks[std::size_t(k)]), of.push_back(robots[k]);
+    } catch (const Fault &fault) {
+      faults[k] = std::make_unique<Fault>(fault);
+    }
+  }
+  for (std::size_t i = 0; !good.empty() && i < of[0]->links.size(); ++i) finish_together(i, good, of);
+  for (int k = 0; k < count; ++k) {
+    if (faults[k]) continue;
+    try {
+      models[k] = numbered(*robots[k], blanks[std::size_t(k)]);
+    } catch (const Fault &fault) {
+      faults[k] = std::make_unique<Fault>(fault);
+    }
+  }
+}
+
+Model<double> assemble(const Robot &robot) {
+  const Robot *one = &robot;
+  Model<double> model;
+  std::unique_ptr<Fault> fault;
+  assemble(&one, 1, &model, &fault);
+  if (fault) throw *fault;
   return model;
 }
 

@@ -2,10 +2,12 @@
 //
 // From the state where a run begins each candidate goes on for TRIAL passes. The one that gets furthest a pass, in the second half of its
 // trial, goes on from where its trial ended; what the others did is forgotten. The race is held again where progress a pass has fallen
-// to a quarter, at most once in AGAIN passes. A set of modes that exponential steps take on their way counts as SET n passes. Passes are counted, not time: a run's digits do not depend on the machine's load.
+// to a quarter, at most once in AGAIN passes. Passes are counted, not time: a run's digits do not depend on the machine's load.
 //
-// There is no race where it would not be allowed or is decided beforehand: a sampled controller must see each tick once, and a caller's
-// function no time before one it has seen; under a slider that rides on a bending link modes change too fast; rigid robots without gains or friction and tolerances below 1e-9 are for explicit steps.
+// There is no race either where exponential steps end soon (pace.hpp), or where it would not be allowed or is decided beforehand: a
+// sampled controller must see each tick once, and a caller's function no time before one it has seen; rigid robots without gains or
+// friction and tolerances below 1e-9 are for explicit steps. Exponential steps do not take part where a slider moves along a link that
+// bends: the modes change with every step.
 #pragma once
 #include <array>
 #include <memory>
@@ -13,13 +15,14 @@
 #include "exponential.hpp"
 #include "implicit.hpp"
 #include "loop.hpp"
+#include "pace.hpp"
 
 namespace flexura {
 
 class Auto {
  public:
   static constexpr long TRIAL = 100, SHORT = 60, AGAIN = 1500;  // SHORT: of those that begin where the first one has got to
-  static constexpr double SLOWER = 4.0, SHARPEST = 1e-9, SET = 4.0;
+  static constexpr double SLOWER = 4.0;
 
   Auto(Loop<double> &run, double tolerance, const ExponentialOptions &options = ExponentialOptions())
       : loop(run), rtol(tolerance), exponential(run.course, tolerance, options), implicit(run.course), explicit_(run.course) {}
@@ -28,14 +31,13 @@ class Auto {
   bool advance(long steps) {
     if (!chosen) choose();
     while (steps > 0 && loop.any()) {
-      if (in_window == 0) window_cost = cost(), window_t = loop.clock[0].t;
+      if (in_window == 0) window_passes = loop.course.passes, window_t = loop.clock[0].t;
       const long some = std::min(steps, WINDOW - in_window);  // windows do not depend on how many steps are asked for
       loop.advance(*chosen, some);
       steps -= some, in_window = (in_window + some) % WINDOW;
-      if (gives_way()) continue;
-      if (in_window > 0 || !raced || !loop.any()) continue;
-      const double progress = (loop.clock[0].t - window_t) / std::max(cost() - window_cost, 1.0);
-      if (progress * SLOWER < speed && cost() - last_race > AGAIN) race();
+      if (gives_way() || in_window > 0) continue;
+      const double progress = (loop.clock[0].t - window_t) / static_cast<double>(std::max(loop.course.passes - window_passes, 1L));
+      if (raced && loop.any() && progress * SLOWER < speed && since_race() > AGAIN) race();
     }
     return loop.any();
   }
@@ -52,17 +54,11 @@ class Auto {
   Implicit<double> implicit;
   Explicit<double> explicit_;
   Method<double> *chosen = nullptr;
-  bool raced = false;
+  bool raced = false, unrivalled = false;
   int held = 0;
-  long in_window = 0;
-  double window_cost = 0.0, window_t = 0.0;
-  double last_race = 0.0;  // what had been spent by then
-  double speed = 0.0;      // seconds a pass, when chosen
-
-  // Passes so far, sets of modes after the first counted as such.
-  double cost() const {
-    return static_cast<double>(loop.course.passes) + SET * loop.course.n * std::max(exponential.modes_taken(0) - 1, 0);
-  }
+  long last_race = 0, in_window = 0, window_passes = 0;
+  double window_t = 0.0;
+  double speed = 0.0;  // seconds a pass, when chosen
 
   // A state of the loop to come back to, with the rows recorded since another one.
   struct Mark {
@@ -74,8 +70,7 @@ class Auto {
   Mark mark(int since) const {
     const Record &r = loop.record[0];
     Mark m;
-    m.z = loop.course.z, m.clock = loop.clock[0], m.rows = r.rows;
-    m.sizes = loop.course.weights.sizes();
+    m.z = loop.course.z, m.clock = loop.clock[0], m.rows = r.rows, m.sizes = loop.course.weights.sizes();
     m.t.assign(r.t.begin() + since, r.t.begin() + r.rows);
     m.state.assign(r.state.begin() + static_cast<std::ptrdiff_t>(since) * r.size, r.state.begin() + static_cast<std::ptrdiff_t>(r.rows) * r.size);
     m.drive.assign(r.drive.begin() + static_cast<std::ptrdiff_t>(since) * r.joints, r.drive.begin() + static_cast<std::ptrdiff_t>(r.rows) * r.joints);
@@ -84,7 +79,7 @@ class Auto {
   void go_back(const Mark &m, int since) {
     Record &r = loop.record[0];
     loop.course.z = m.z, loop.clock[0] = m.clock, r.rows = m.rows;
-    loop.course.weights.resume(m.sizes);
+    loop.course.weights.resume(m.sizes);  // what another trial has seen must not loosen the tolerance
     std::copy(m.t.begin(), m.t.end(), r.t.begin() + since);
     std::copy(m.state.begin(), m.state.end(), r.state.begin() + static_cast<std::ptrdiff_t>(since) * r.size);
     std::copy(m.drive.begin(), m.drive.end(), r.drive.begin() + static_cast<std::ptrdiff_t>(since) * r.joints);
@@ -94,12 +89,8 @@ class Auto {
     Course<double> &c = loop.course;
     const Acting &acting = c.acts_of(0);
     const bool bends = c.n > c.plant.joints;
-    bool resisted = false;  // gains or friction
-    for (int i = 0; i < c.plant.joints; ++i) {
-      const JointDrive &d = acting.joints[i];
-      resisted = resisted || c.plant.viscous[i] > 0.0 || c.plant.coulomb[i] > 0.0 || (d.follows() && !d.prescribed && (d.kp > 0.0 || d.kd > 0.0));
-    }
-    if (rtol < SHARPEST || (!bends && !resisted)) chosen = &explicit_;
+    const auto resistance = [&](int i) { return larger(c.plant.viscous[i], c.plant.coulomb[i]); };
+    if (for_explicit(rtol, bends, c.plant.joints, acting, resistance)) chosen = &explicit_;
     else if (acting.sampler) chosen = stiffer_than(acting.rate_Hz) ? static_cast<Method<double> *>(&implicit) : &explicit_;
     else if (acting.function) chosen = !bends ? static_cast<Method<double> *>(&explicit_) : c.plant.rides ? static_cast<Method<double> *>(&implicit) : &exponential;
     else race();
@@ -117,19 +108,42 @@ class Auto {
   // Are explicit steps, of 12 passes and as long as they may be, slower than that?
   bool hopeless(double speed_) { return Explicit<double>::STABLE < 12.0 * speed_ * fastest(); }
 
+  // A run without a rival is looked at again after so many attempts of its own; else passes are counted.
+  long since_race() const { return unrivalled ? Pace::attempts(loop.clock[0]) : loop.course.passes - last_race; }
+
+  // Do exponential steps, from the start of the run, have no rival?
+  bool without_rival() {
+    Pace pace;
+    while (loop.advance(exponential, 1) && pace.look(loop.clock[0])) {
+    }
+    if (!pace.settled(loop.clock[0])) return false;
+    const Clock &c = loop.clock[0];
+    chosen = &exponential, raced = unrivalled = true, speed = (c.t - pace.half) / (Pace::ATTEMPTS / 2);
+    return true;
+  }
+
   void race() {
     const int since = loop.record[0].rows;
     const Mark start = mark(since);
     Mark best;
     Method<double> *winner = nullptr;
     double furthest = -1.0, step = start.clock.wish;
+    const bool begun = chosen == nullptr;  // exponential steps have made the first part of their trial already
+    const long before = loop.course.passes;
+    const bool rides = loop.course.plant.rides;
+    if (begun && !rides && without_rival()) return;
+    unrivalled = false;
     for (Method<double> *method : std::array<Method<double> *, 3>{&exponential, &implicit, &explicit_}) {
-      if (method == &exponential && loop.course.plant.rides) continue;
+      if (method == &exponential && rides) continue;
       if (method == &explicit_ && hopeless(furthest)) break;
-      go_back(start, since);
-      loop.clock[0].fresh = true;
-      loop.clock[0].wish = std::max(step, start.clock.wish);
-      const double got = trial(*method, winner == nullptr ? TRIAL : SHORT);
+      const bool goes_on = begun && method == &exponential;
+      if (!goes_on) {
+        go_back(start, since);
+        loop.clock[0].fresh = true;
+        loop.clock[0].wish = std::max(step, start.clock.wish);
+      }
+      const long most = goes_on ? std::max(TRIAL - (loop.course.passes - before), TRIAL / 4) : method == &exponential ? TRIAL : SHORT;
+      const double got = trial(*method, most);
       if (loop.clock[0].status == Status::limit || loop.clock[0].status == Status::interrupted || loop.clock[0].status == Status::done) {
         best = mark(since), winner = method, furthest = got;
         break;  // the run is over
@@ -139,18 +153,19 @@ class Auto {
     }
     go_back(best, since);
     loop.resume(*winner);
-    chosen = winner, speed = furthest, raced = true, last_race = cost(), ++held;
+    chosen = winner, speed = furthest, raced = true, last_race = loop.course.passes, ++held;
   }
 
   // Seconds a pass in the second half of `most` passes; -1: the method got stuck.
   double trial(Method<double> &method, long most) {
-    const double begin = cost();
-    double half = begin, t = loop.clock[0].t;
-    while (cost() - begin < static_cast<double>(most) && loop.advance(method, 1))
-      if (2.0 * (cost() - begin) <= static_cast<double>(most)) half = cost(), t = loop.clock[0].t;
+    const long begin = loop.course.passes;
+    long half = begin;
+    double t = loop.clock[0].t;
+    while (loop.course.passes - begin < most && loop.advance(method, 1))
+      if (2 * (loop.course.passes - begin) <= most) half = loop.course.passes, t = loop.clock[0].t;
     const Status status = loop.clock[0].status;
     if (status == Status::stuck || status == Status::diverged) return -1.0;
-    return (loop.clock[0].t - t) / std::max(cost() - half, 1.0);
+    return (loop.clock[0].t - t) / static_cast<double>(std::max(loop.course.passes - half, 1L));
   }
 
   // Where exponential steps get stuck, implicit ones may not.

@@ -5,9 +5,10 @@
 
 namespace flexura {
 
-template <class Real> std::unique_ptr<Method<Real>> make_method(const std::string &name, Course<Real> &course) {
+template <class Real> std::unique_ptr<Method<Real>> make_method(const std::string &name, Course<Real> &course, double rtol) {
   if (name == "explicit") return std::make_unique<Explicit<Real>>(course);
   if (name == "implicit") return std::make_unique<Implicit<Real>>(course);
+  if (name == "exponential") return std::make_unique<Exponential<Real>>(course, rtol);
   if (name == PAIR_3.name) return std::make_unique<PairSteps<Real>>(course, PAIR_3);
   if (name == PAIR_5.name) return std::make_unique<PairSteps<Real>>(course, PAIR_5);
   return nullptr;
@@ -19,8 +20,8 @@ const char *explicit_for_ticks(double tick_s, double fastest, double rtol) {
   return rtol >= 1e-6 ? PAIR_3.name : PAIR_5.name;
 }
 
-template std::unique_ptr<Method<double>> make_method(const std::string &, Course<double> &);
-template std::unique_ptr<Method<Pack<4>>> make_method(const std::string &, Course<Pack<4>> &);
+template std::unique_ptr<Method<double>> make_method(const std::string &, Course<double> &, double);
+template std::unique_ptr<Method<Pack<4>>> make_method(const std::string &, Course<Pack<4>> &, double);
 
 namespace {
 

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "explicit.hpp"
+#include "exponential.hpp"
 #include "implicit.hpp"
 #include "loop.hpp"
 #include "model_plant.hpp"
@@ -11,8 +12,11 @@
 
 namespace flexura {
 
-// "explicit" or "implicit"; under a sampled controller also "explicit-3" and "explicit-5". Null for any other name.
-template <class Real> std::unique_ptr<Method<Real>> make_method(const std::string &name, Course<Real> &course);
+// The first step to try, as a share of the whole run's time.
+constexpr double FIRST_STEP = 1e-4;
+
+// "explicit", "implicit" or "exponential"; under a sampled controller also "explicit-3" and "explicit-5". Null for any other name.
+template <class Real> std::unique_ptr<Method<Real>> make_method(const std::string &name, Course<Real> &course, double rtol = 1e-6);
 
 // Which of the explicit methods suits a run under a controller of short ticks, by passes a tick: `fastest` of the robot [1/s].
 const char *explicit_for_ticks(double tick_s, double fastest, double rtol);

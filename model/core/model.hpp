@@ -14,6 +14,7 @@
 
 namespace flexura {
 
+struct Fault;
 enum class At { none, revolute, slider, sleeve };  // the joint at a piece's hub; none: it goes on where the piece before ends
 
 // What a piece has in common with the same piece of every robot of its topology.
@@ -105,6 +106,9 @@ std::size_t place_arrays(Piece<Real> &c, const Real *block) {
 
 // The equations of a robot. Throws Fault for what cannot be one.
 Model<double> assemble(const Robot &robot);
+
+// The equations of up to four robots of one topology, each with the digits that it has alone. faults[k] says why robot k is none.
+void assemble(const Robot *const *robots, int count, Model<double> *models, std::unique_ptr<Fault> *faults);
 
 // Four robots of one topology side by side, and a robot whose numbers have no derivatives.
 Model<Pack<4>> pack(const Model<double> *const robots[4]);

@@ -1,21 +1,22 @@
 #include "observe.hpp"
 
+#include <algorithm>
+
 #include "quadrature.hpp"
 
 namespace flexura {
 namespace {
 
-// Weights (P) of the place at the fraction x of a line of length 1 with P Gauss points (2).
-std::vector<double> weights_at(int P, double x) {
-  const auto integrals = lagrange_integrals(gauss(P));
-  std::vector<double> value(std::size_t(P) + 1), first(value.size()), second(value.size()), out(std::size_t(P), 0.0);
-  legendre(2.0 * x - 1.0, P, value.data(), first.data(), second.data());
-  for (int n = 0; n <= P; ++n)
-    for (int j = 0; j < P; ++j) out[std::size_t(j)] += 0.5 * integrals[std::size_t(n)][std::size_t(j)] * value[std::size_t(n)];
-  return out;
+template <class Real>
+bool bends(const Model<Real> &model, int link) {
+  return model.elastic[std::size_t(link)] > 0;
 }
 
-bool bends(const Model<double> &model, int link) { return model.elastic[std::size_t(link)] > 0; }
+// The first piece of a link that moves with it: behind its sleeve, if it has one.
+template <class Real>
+int first_moving(const Model<Real> &model, int link) {
+  return model.begin[std::size_t(link)] + (model.kind[std::size_t(link)] == JointKind::sleeve);
+}
 
 }  // namespace
 
@@ -25,102 +26,98 @@ int last_flexible(const Model<double> &model) {
   return link;
 }
 
-Bend bend(const Model<double> &model, Workspace<double> &work, const double *y, int link) {
-  const int end = model.begin[std::size_t(link) + 1];
-  const int first = model.kind[std::size_t(link)] == JointKind::sleeve ? end - 1 : model.begin[std::size_t(link)];
-  Bend out;
-  double phi = 0.0, up = 0.0;  // in the hub's own axes
-  for (int i = first; i < end; ++i) {
-    const Piece<double> &c = model.pieces[std::size_t(i)];
-    Kept<double> &k = work.kept[std::size_t(i)];
-    const double *q = y + c.own(), scale = c.joint == At::sleeve ? y[c.first] : 1.0;
+template <class Real>
+Bend<Real> bend(const Model<Real> &model, Workspace<Real> &work, const Real *y, int link) {
+  Real phi = 0.0, up = 0.0;  // in the hub's own axes
+  for (int i = first_moving(model, link); i < model.begin[std::size_t(link) + 1]; ++i) {
+    const Piece<Real> &c = model.pieces[std::size_t(i)];
+    Kept<Real> &k = work.kept[std::size_t(i)];
+    const Real *q = y + c.own();
+    const Real scale = c.joint == At::sleeve ? y[c.first] : Real(1.0);
     k.phi = phi, k.omega = 0.0;
-    turn(c, k, q, q, Free{c.m}, Free{c.P});
+    sized(c.m, c.P, [&](auto m, auto P) { turn(c, k, q, q, m, P); });
     for (int j = 0; j < c.P; ++j) up += scale * c.w[j] * k.sine[j];
     for (int l = 0; l < c.m; ++l) phi += c.tip_angle[l] * q[l];
   }
-  out.deflection = up, out.slope = phi;
-  return out;
+  return {up, phi};
 }
 
-Observer::Observer(const Model<double> &model, int stations) : model_(model), work_(model), stations_(std::size_t(model.links())) {
+template <class Real>
+Observer<Real>::Observer(const Model<Real> &model, int stations)
+    : model_(model), work_(model), stations_(std::size_t(model.links())), poses_(std::size_t(model.links()) + 1) {
   for (int link = 0; link < model.links(); ++link) {
-    columns_ += 3;
+    part_.insert(part_.end(), 3, POSES);
     if (!bends(model, link)) continue;
-    columns_ += 2 + stations;
-    const int begin = model.begin[std::size_t(link)], end = model.begin[std::size_t(link) + 1];
-    double length = 0.0;
-    for (int i = begin; i < end; ++i) length += model.pieces[std::size_t(i)].length;
+    part_.insert(part_.end(), 2, BENDS), part_.insert(part_.end(), std::size_t(stations), STATIONS);
+    const int first = first_moving(model, link), count = model.begin[std::size_t(link) + 1] - first;  // pieces of equal length
+    const bool sleeved = model.kind[std::size_t(link)] == JointKind::sleeve;
     for (int k = 0; k < stations; ++k) {
-      double s = length * k / (stations - 1);
-      int i = begin;
-      while (i + 1 < end && s > model.pieces[std::size_t(i)].length) s -= model.pieces[std::size_t(i)].length, ++i;
-      const Piece<double> &c = model.pieces[std::size_t(i)];
-      if (k + 1 == stations) i = end - 1, s = model.pieces[std::size_t(i)].length;
-      Station station{i, s, {}};
-      const Piece<double> &on = model.pieces[std::size_t(i)];
-      if (c.joint != At::sleeve && on.length > 0.0) {
-        station.weight = weights_at(on.P, s / on.length);
-        for (double &w : station.weight) w *= on.length;
-      }
-      stations_[std::size_t(link)].push_back(station);
+      const double along = double(k * count) / (stations - 1);
+      const int piece = std::min(int(along), count - 1), P = model.pieces[std::size_t(first + piece)].P;
+      Station station{first + piece, along - piece, std::vector<double>(std::size_t(P))};
+      if (!sleeved) line_weights(line_rule(P), 2.0 * station.share - 1.0, 0.5, station.weight.data());
+      stations_[std::size_t(link)].push_back(std::move(station));
     }
   }
-  columns_ += 5;
+  part_.insert(part_.end(), 2, POSES), part_.insert(part_.end(), 3, ENERGIES);
 }
 
-// How far a station lies from the hub `first` across its tangent.
-double Observer::across(const std::vector<Hub<double>> &hubs, const Station &station, const double *y, int first, double sine,
-                        double cosine) const {
-  const std::size_t i = std::size_t(station.piece);
-  const Piece<double> &c = model_.pieces[i];
-  const Kept<double> &k = work_.kept[i];
-  double x = hubs[i].x - hubs[std::size_t(first)].x, up = hubs[i].y - hubs[std::size_t(first)].y;
-  if (c.joint == At::sleeve) {
-    const double d = y[c.first], xi = (station.abscissa - c.length + d) / d;
-    if (xi <= 0.0) return 0.0;
-    double at[2 * Free::most], by[2 * Free::most], twice[2 * Free::most];
-    rail_values(c, 2.0 * xi - 1.0, at, by, twice);
-    for (int j = 0; j < c.P; ++j) x += d * at[j] * k.cosine[j], up += d * at[j] * k.sine[j];
-  } else {
-    for (int j = 0; j < c.P; ++j) x += station.weight[std::size_t(j)] * k.cosine[j], up += station.weight[std::size_t(j)] * k.sine[j];
+// How far the stations of a link lie from the tangent at its hub; after `outward_kinematics`.
+template <class Real>
+void Observer<Real>::place_stations(const Real *y, int link, Real *out) {
+  const int first = first_moving(model_, link);
+  Real sine, cosine, x = 0.0, up = 0.0;  // of the hub's axes; from the hub to the piece's, in the base's axes
+  sincos(work_.kept[std::size_t(first)].phi, sine, cosine);
+  int i = first;
+  auto go = [&](const Piece<Real> &c, const Kept<Real> &k, const auto &weight, const Real &scale, Real &along, Real &across) {
+    for (int j = 0; j < c.P; ++j) along += scale * weight[j] * k.cosine[j], across += scale * weight[j] * k.sine[j];
+  };
+  for (const Station &station : stations_[std::size_t(link)]) {
+    for (; i < station.piece; ++i) go(model_.pieces[std::size_t(i)], work_.kept[std::size_t(i)], model_.pieces[std::size_t(i)].w, Real(1.0), x, up);
+    const Piece<Real> &c = model_.pieces[std::size_t(i)];
+    const Kept<Real> &k = work_.kept[std::size_t(i)];
+    Real along = x, across = up;
+    if (c.joint == At::sleeve) {
+      const Real d = y[c.first], free = (c.length * (station.share - 1.0) + d) / d, xi = larger(free, Real(0.0));  // 0: in or behind the sleeve
+      Real w[2 * MOST_POINTS], by[2 * MOST_POINTS], twice[2 * MOST_POINTS];
+      rail_values(c, Real(2.0 * xi - 1.0), w, by, twice);
+      go(c, k, w, d, along, across);
+      across = choose_less(Real(0.0), free, across * cosine - along * sine, Real(0.0));
+    } else {
+      go(c, k, station.weight, c.length, along, across);
+      across = across * cosine - along * sine;
+    }
+    *out++ = across;
   }
-  return up * cosine - x * sine;
 }
 
-void Observer::observe(const double *y, const double *v, double *row) {
-  const Energies<double> energy = energies(model_, work_, y, v);  // leaves the sweep without rates
-  outward_kinematics(model_, work_, y, v);
-  std::vector<Pose<double>> poses(std::size_t(model_.links()) + 1);
-  double rate[2];
-  places(model_, work_, y, v, poses.data(), rate);
-  std::vector<Hub<double>> hubs;
-  Hub<double> hub;
-  for (std::size_t i = 0; i < model_.pieces.size(); ++i) {
-    const Piece<double> &c = model_.pieces[i];
-    if (i == 0 && c.joint == At::slider) hub.x += y[c.first] + c.offset;
-    hubs.push_back(hub);
-    go_on(c, work_.kept[i], y, v, i + 1 < model_.pieces.size() ? &model_.pieces[i + 1] : nullptr, hub);
-  }
-  double *out = row;
-  for (int link = 0; link < model_.links(); ++link) {
-    const Pose<double> &pose = poses[std::size_t(link)];
-    *out++ = pose.x, *out++ = pose.y, *out++ = pose.angle;
-    if (!bends(model_, link)) continue;
+template <class Real>
+void Observer<Real>::observe(const Real *y, const Real *v, Real *row, int parts) {
+  Energies<Real> energy;
+  Real rate[2];
+  if (parts & ENERGIES) energy = energies(model_, work_, y, v);
+  if (parts & (POSES | STATIONS)) outward_kinematics(model_, work_, y, v), places(model_, work_, y, v, poses_.data(), rate);
+  Real *out = row;
+  for (int link = 0; link < model_.links(); ++link) {  // stations first: a bend is found in other axes
     const auto &stations = stations_[std::size_t(link)];
-    const int end = model_.begin[std::size_t(link) + 1], first = model_.kind[std::size_t(link)] == JointKind::sleeve ? end - 1 : model_.begin[std::size_t(link)];
-    double sine, cosine, slope = 0.0;
-    sincos(pose.angle, sine, cosine);
-    for (int i = first; i < end; ++i) {
-      const Piece<double> &c = model_.pieces[std::size_t(i)];
-      for (int l = 0; l < c.m; ++l) slope += c.tip_angle[l] * y[c.own() + l];
+    const Pose<Real> &pose = poses_[std::size_t(link)];
+    if (parts & POSES) out[0] = pose.x, out[1] = pose.y, out[2] = pose.angle;
+    out += 3;
+    if (!bends(model_, link)) continue;
+    if (parts & STATIONS) place_stations(y, link, out + 2);
+    if (parts & BENDS) {
+      const Bend<Real> tip = bend(model_, work_, y, link);
+      out[0] = tip.deflection, out[1] = tip.slope;
     }
-    *out++ = across(hubs, stations.back(), y, first, sine, cosine), *out++ = slope;
-    for (const Station &station : stations) *out++ = across(hubs, station, y, first, sine, cosine);
+    out += 2 + stations.size();
   }
-  const Pose<double> &tip = poses[std::size_t(model_.links())];
-  *out++ = tip.x, *out++ = tip.y;
-  *out++ = energy.kinetic, *out++ = energy.strain, *out++ = energy.potential;
+  const Pose<Real> &tip = poses_[std::size_t(model_.links())];
+  if (parts & POSES) out[0] = tip.x, out[1] = tip.y;
+  if (parts & ENERGIES) out[2] = energy.kinetic, out[3] = energy.strain, out[4] = energy.potential;
 }
+
+template Bend<double> bend(const Model<double> &, Workspace<double> &, const double *, int);
+template class Observer<double>;
+template class Observer<Pack<4>>;
 
 }  // namespace flexura

@@ -7,8 +7,7 @@ namespace {
 
 // Place of the abscissa `x` of a piece's line from its hub, and the angle there: (2) with Lagrange's polynomials through its points.
 Pose<double> on_piece(const Piece<double> &c, const Kept<double> &k, const double *q, double x, double length) {
-  const GaussRule rule = gauss(c.P);
-  const auto integrals = lagrange_integrals(rule);
+  const LineRule &rule = line_rule(c.P);
   std::vector<double> value(std::size_t(c.P) + 1), first(value.size()), second(value.size());
   const double u = length > 0.0 ? 2.0 * x / length - 1.0 : -1.0;
   legendre(u, c.P, value.data(), first.data(), second.data());
@@ -16,8 +15,8 @@ Pose<double> on_piece(const Piece<double> &c, const Kept<double> &k, const doubl
   for (int j = 0; j < c.P; ++j) {
     double w = 0.0, l = 0.0, turned = 0.0;
     for (int n = 0; n <= c.P; ++n) {
-      w += 0.5 * length * integrals[std::size_t(n)][std::size_t(j)] * value[std::size_t(n)];
-      l += integrals[std::size_t(n)][std::size_t(j)] * first[std::size_t(n)];
+      w += 0.5 * length * rule.integrals[std::size_t(n * c.P + j)] * value[std::size_t(n)];
+      l += rule.integrals[std::size_t(n * c.P + j)] * first[std::size_t(n)];
     }
     for (int i = 0; i < c.m; ++i) turned += c.B[i * padded(c.P) + j] * q[i];
     out.x += w * k.cosine[j], out.y += w * k.sine[j], out.angle += l * turned;

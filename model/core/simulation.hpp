@@ -5,19 +5,16 @@
 #include <string>
 #include <vector>
 
-#include "loop.hpp"
+#include "choice.hpp"
 #include "model_plant.hpp"
 
 namespace flexura {
-
-// Names of methods: "auto", "explicit", "implicit", "exponential".
-std::unique_ptr<Method<double>> make_method(const std::string &name, Course<double> &course);
 
 struct Request {
   std::vector<double> times;       // of the outputs; the first is the start
   std::vector<double> q, v;        // (n) at the start
   double rtol = 1e-6;
-  std::string method = "auto";
+  std::string method = "auto";    // or "explicit", "implicit", "exponential"
   double first_step = 0.0;         // 0: chosen
   long most_steps = 0;             // 0: no budget
 };
@@ -34,7 +31,7 @@ public:
   const Record &record() const { return loop_.record[0]; }
   const Model<double> &model() const { return *model_; }
   long passes() const { return loop_.course.passes; }
-  std::string method() const { return method_->name(); }
+  std::string method() const { return method_ ? method_->name() : auto_->name(); }
   std::vector<double> state() const { return {loop_.course.z.begin(), loop_.course.z.begin() + loop_.course.size}; }
   std::atomic<bool> interrupt{false};
 
@@ -45,7 +42,8 @@ private:
   Acting acting_;
   Acting *acting_pointer_;
   Loop<double> loop_;
-  std::unique_ptr<Method<double>> method_;
+  std::unique_ptr<Method<double>> method_;  // or
+  std::unique_ptr<Auto> auto_;
 };
 
 }  // namespace flexura

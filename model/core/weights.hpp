@@ -64,8 +64,8 @@ template <class Real> class Weights {
 
   // 1 / tolerance of the accounts of a step to znew [1/J].
   Real joules(const Real *znew) const {
-    const Real most_energy = larger(largest.energy, larger(abs(znew[2 * n + WORK]), abs(znew[2 * n + LOSS])));
-    return 1.0 / (larger(most_energy, Real(1e-280)) * rtol);
+    const Real sizes = larger(largest.energy, larger(abs(znew[2 * n + WORK]), abs(znew[2 * n + LOSS])));
+    return 1.0 / (larger(sizes, Real(1e-280)) * rtol);
   }
 
   // The worst group of an error e (2 n + ACCOUNTS) of a step to znew, over its tolerance. What is not a number stays so.

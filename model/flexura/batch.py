@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sized
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Sized
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -12,8 +14,35 @@ import numpy as np
 from .drive import Drive
 from .errors import InputError
 from .robot import Robot
+from .rows import Rows, good, joined, one, varied
 
 Item = tuple[Robot, Drive | None]  # None: the drive that all share
+
+
+@dataclass(frozen=True)
+class Share:
+    """Some robots of a batch in their order; `first` is the number of the first, from 0.
+
+    `groups`: the numbers, from 0 within the share, of robots that have the same counts, and their rows.
+    """
+
+    first: int
+    robots: Sequence[Robot]
+    drives: Sequence[Drive | None]
+    groups: list[tuple[np.ndarray, Rows]]
+
+    def __len__(self) -> int:
+        return len(self.drives)
+
+    @property
+    def digests(self) -> list[bytes]:
+        """16 bytes a robot that tell it and its drive from any other."""
+        out = [b""] * len(self)
+        exact = self.robots[0].stiffening
+        for members, rows in self.groups:
+            for j, k in enumerate(members):
+                out[k] = _digest(rows, j, exact, self.drives[k])
+        return out
 
 
 @dataclass(frozen=True)
@@ -73,22 +102,58 @@ class Batch:
         if k + 1 < self.count:
             raise InputError(f"expected {self.count} robots, but there are only {k + 1}", key="robots")
 
+    def shares(self, size: int) -> Iterator[Share]:
+        """The robots in shares of `size`; those of `vary` as rows of numbers, without making them."""
+        source = self.source
+        if isinstance(source, _Varied) and source.quick:
+            for k in range(0, self.count, size):
+                part = _Varied(source.robot, {key: values[k : k + size] for key, values in source.columns.items()})
+                rows = varied(part.robot, part.columns)
+                assert rows is not None
+                yield Share(k, part, [None] * len(part), [(np.arange(len(part)), rows)])
+            return
+        items, first = iter(self), 0
+        while some := list(islice(items, size)):
+            robots = [robot for robot, _ in some]
+            yield Share(first, robots, [drive for _, drive in some], _grouped(robots))
+            first += len(some)
+
     def _given(self) -> Iterator[Any]:
         if callable(self.source):
             return (self.source(k, np.random.default_rng([self.seed, k])) for k in range(self.count))
         return iter(self.source)
 
 
+def _grouped(robots: Sequence[Robot]) -> list[tuple[np.ndarray, Rows]]:
+    """The rows of robots, those of the same counts together."""
+    members: dict[bytes, list[int]] = {}
+    parts = [one(robot) for robot in robots]
+    for k, part in enumerate(parts):
+        members.setdefault(part.counts.tobytes(), []).append(k)
+    return [(np.array(group), joined([parts[k] for k in group])) for group in members.values()]
+
+
 @dataclass(frozen=True)
-class _Varied:
-    """A robot with values from columns of numbers, again and again; no generator is made where none is used."""
+class _Varied(Sequence[Robot]):
+    """A robot with values from columns of numbers, again and again; made when it is asked for."""
 
     robot: Robot
     columns: Mapping[str, np.ndarray]
 
-    def __iter__(self) -> Iterator[Robot]:
-        for row in zip(*(values.tolist() for values in self.columns.values()), strict=True):
-            yield self.robot.replace(dict(zip(self.columns, row, strict=True)))
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values())))
+
+    def __getitem__(self, k: Any) -> Any:
+        if not -len(self) <= k < len(self):
+            raise IndexError(k)
+        return self.robot.replace({key: float(values[k]) for key, values in self.columns.items()})
+
+    @cached_property
+    def quick(self) -> bool:
+        """Whether rows of numbers can be made without the robots."""
+        some = {key: values[:1] for key, values in self.columns.items()}
+        plain = not self.robot.nodal and good(self.robot, self.columns)
+        return plain and varied(self.robot, some) is not None
 
 
 def topology(robot: Robot) -> tuple[Any, ...]:
@@ -98,7 +163,11 @@ def topology(robot: Robot) -> tuple[Any, ...]:
 
 def digest(robot: Robot, drive: Drive | None) -> bytes:
     """16 bytes that tell this robot and drive from any other: of all numbers, to the last bit."""
-    found = hashlib.blake2b(robot.model_dump_json().encode(), digest_size=16)
+    return _digest(one(robot), 0, robot.stiffening, drive)
+
+
+def _digest(rows: Rows, k: int, stiffening: bool, drive: Drive | None) -> bytes:
+    found = hashlib.blake2b(rows.contents(k) + bytes([stiffening]), digest_size=16)
     if drive is not None:
         segments, ranges, gains = drive.packed()
         for array in (segments, ranges, gains, drive.follows):

@@ -9,6 +9,7 @@ from .errors import FlexuraError, InputError
 from .request import program
 
 if TYPE_CHECKING:
+    from .batch import Share
     from .chunks import Chunk
     from .request import Request
 
@@ -58,10 +59,10 @@ def run(request: Request, todo: Iterator[Any], scheduler: str) -> Generator[Chun
             client.cancel(list(waiting))
 
 
-def _chunk(version: str, request: Request, first: int, items: list[Any], digests: list[bytes]) -> Chunk:
-    """One chunk, on a worker, one robot at a time: a worker has its own threads. Another solver would give other numbers."""
+def _chunk(version: str, request: Request, share: Share, digests: list[bytes]) -> Chunk:
+    """One chunk, on a worker, in one thread: a worker has its own. Another solver would give other numbers."""
     from .population import compute
 
     if program() != version:
         raise FlexuraError(f"a worker runs another version of the solver, {program()}; this is {version}")
-    return compute(request, first, items, digests)
+    return compute(request, share, digests)

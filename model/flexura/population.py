@@ -2,31 +2,31 @@
 
 from __future__ import annotations
 
+import os
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass
-from itertools import islice
+from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from . import forward, loop
-from .assembly import Systems, assemble_all
-from .batch import Batch, Item, digest
+from . import core, forward
+from .batch import Batch, Share
 from .chunks import Chunk, Store, in_memory
-from .course import applied, inputs_of
 from .drive import Drive
-from .engine import WORDS, Histories, cores, engine
 from .errors import InputError
-from .many import tips
-from .record import channel_units, limit_event, record
+from .record import LOSS, NUMERICAL, WORK, channel_units, limit_event, observed
 from .request import Request
+from .robot import Robot
+from .rows import Rows
+from .run import STATIONS
 from .system import System
 
-BLOCK = 128  # robots that are assembled together
+WORDS = ("done", "limit", "stuck", "refused")
 
 
 @dataclass(frozen=True)
@@ -84,13 +84,14 @@ def simulate(
         if isinstance(value, bool) or not isinstance(value, int) or value < 1:
             raise InputError("expected a whole number, 1 or more", key=key, value=value)
     store, units, complete, done = in_memory(), {}, False, 0
-    robots = iter(batch)
+    shares = batch.shares(chunk)
     try:
-        first = next(robots)
-        request = request.fitted(first[0])
-        units = {} if request.reduce else {k: v for k, v in channel_units(first[0]).items() if k in request.channels}
+        first = next(shares)
+        example = first.robots[0]
+        request = request.fitted(example)
+        units = {} if request.reduce else {k: v for k, v in channel_units(example).items() if k in request.channels}
         store = in_memory() if folder is None else Store.opened(folder, request.spec() | {"count": batch.count, "chunk": chunk})
-        todo = _todo(_chained(first, robots), request, store, chunk)
+        todo = _todo(chain([first], shares), store)
         source = _local(request, todo, threads or cores()) if scheduler is None else _cluster(request, todo, scheduler)
         with closing(source) as chunks:
             for made in chunks:
@@ -105,48 +106,42 @@ def simulate(
     return Population(request.t, units, batch.count, complete, store)
 
 
-def _chained(first: Item, rest: Iterator[Item]) -> Iterator[Item]:
-    yield first
-    yield from rest
+Work = tuple[Share, list[bytes]]
 
 
-Work = tuple[int, list[Item], list[bytes]]
-
-
-def _todo(robots: Iterator[Item], request: Request, store: Store, size: int) -> Iterator[Work | range]:
-    """Chunks to be done: (first robot, robots, their digests, which only a folder needs); a range stands for one that the store
-    has."""
-    first = 0
-    while items := list(islice(robots, size)):
-        digests = [b"" if store.folder is None else digest(robot, drive) for robot, drive in items]
-        if store.has(first, digests):
-            yield range(len(items))
+def _todo(shares: Iterator[Share], store: Store) -> Iterator[Work | range]:
+    """Chunks to be done: robots and their digests, which only a folder needs; a range stands for one that the store has."""
+    for share in shares:
+        digests = [b""] * len(share) if store.folder is None else share.digests
+        if store.has(share.first, digests):
+            yield range(len(share))
         else:
-            yield first, items, digests
-        first += len(items)
+            yield share, digests
 
 
 def _local(request: Request, todo: Iterator[Work | range], threads: int) -> Generator[Chunk | range, None, None]:
-    """The chunks, each worked on by all threads; the robots of the next one are made and assembled here meanwhile."""
-    stop = np.zeros(1, dtype=bool)
-    waiting: deque[tuple[Work | range, list[Future[Part]]]] = deque()
+    """The chunks, each worked on by all threads of the core; the rows of the next one are made here meanwhile."""
+    watch = core.Watch()
+    waiting: deque[tuple[Work | range, Future[Part] | None]] = deque()
 
     def finished() -> Chunk | range:
-        work, parts = waiting.popleft()
-        return work if isinstance(work, range) else _joined(request, *work, [part.result() for part in parts])
+        work, part = waiting.popleft()
+        if isinstance(work, range):
+            return work
+        assert part is not None
+        return _chunk(request, *work, part.result())
 
-    with ThreadPoolExecutor(threads) as pool:
+    with ThreadPoolExecutor(1) as pool:
         try:
             for work in todo:
-                blocks = [] if isinstance(work, range) else _blocks(*work[:2], threads)
-                own = [pool.submit(simulated, request, prepared(request, block), stop) for block in blocks]
-                waiting.append((work, own))
-                if len(waiting) > 1:
+                part = None if isinstance(work, range) else pool.submit(simulated, request, work[0], threads, watch)
+                waiting.append((work, part))
+                if len(waiting) > 2:
                     yield finished()
             while waiting:
                 yield finished()
         except BaseException:
-            stop[0] = True
+            watch.stop()
             pool.shutdown(wait=False, cancel_futures=True)
             raise
 
@@ -157,31 +152,18 @@ def _cluster(request: Request, todo: Iterator[Work | range], scheduler: str) -> 
     return cluster.run(request, todo, scheduler)
 
 
-def compute(request: Request, first: int, items: list[Item], digests: list[bytes]) -> Chunk:
-    """Simulate the robots of one chunk in this thread; `first` is the number of its first robot, from 0."""
-    stop = np.zeros(1, dtype=bool)
-    parts = [simulated(request, prepared(request, block), stop) for block in _blocks(first, items, 1)]
-    return _joined(request, first, items, digests, parts)
+def cores() -> int:
+    """The cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _blocks(first: int, items: list[Item], threads: int) -> Iterator[tuple[int, list[Item]]]:
-    """Shares of a chunk for the threads, each with the number of its first robot."""
-    size = min(BLOCK, -(-len(items) // threads))
-    for k in range(0, len(items), size):
-        yield first + k, items[k : k + size]
-
-
-class Block(NamedTuple):
-    """Robots that are ready to run: their Systems and drives, states (b, 2n + 2) at the start, and why robots are refused."""
-
-    systems: Systems
-    drives: list[Drive]
-    states: np.ndarray
-    refused: dict[int, InputError]
+def compute(request: Request, share: Share, digests: list[bytes]) -> Chunk:
+    """Simulate the robots of one chunk in this thread."""
+    return _chunk(request, share, digests, simulated(request, share, 1, core.Watch()))
 
 
 class Part(NamedTuple):
-    """A block of robots, simulated: as in a Chunk, with the channels (b, T) of all that were started."""
+    """The robots of a chunk, simulated: as in a Chunk, with the channels (b, T) of them all."""
 
     status: list[str]
     reached: np.ndarray
@@ -190,97 +172,130 @@ class Part(NamedTuple):
     channels: dict[str, np.ndarray]
 
 
-def prepared(request: Request, block: tuple[int, list[Item]]) -> Block:
-    """A block assembled. Raises InputError for drives of another number of joints."""
-    first, items = block
-    N = len(items[0][0].links)
-    drives = [drive or request.drive or Drive.none(N) for _, drive in items]
-    for k, drive in enumerate(drives, 1):
-        if len(drive.joints) != N:
-            key = f"robots[{first + k}].drive"
-            raise InputError(f"expected {N} joint drives, one a joint", key=key, value=len(drive.joints))
-    systems = assemble_all([robot for robot, _ in items])
-    return Block(systems, drives, *_starts(systems, request.t[0], drives, request))
+def simulated(request: Request, share: Share, threads: int, watch: Any) -> Part:
+    """Run and observe robots, or begin to, if `watch` is stopped meanwhile.
+
+    Raises: InputError: a drive has another number of joints.
+    """
+    b, T, N = len(share), len(request.t), len(share.robots[0].links)
+    for k, drive in enumerate(share.drives, 1):
+        if drive is not None and len(drive.joints) != N:
+            raise InputError(
+                f"expected {N} joint drives, one a joint", key=f"robots[{share.first + k}].drive", value=len(drive.joints)
+            )
+    part = Part([""] * b, np.full(b, np.nan), np.zeros(b, dtype=np.int64), [""] * b,
+                {name: np.full((b, T), np.nan) for name in request.channels})  # fmt: skip
+    columns = _columns(share.robots[0], request.channels)
+    if columns is None or not share.robots[0].stiffening:
+        _one_by_one(request, share, watch, part)
+        return part
+    for members, rows in share.groups:
+        _together(request, share, members, rows, columns, threads, watch, part)
+    return part
 
 
-def simulated(request: Request, block: Block, stop: np.ndarray) -> Part:
-    """Run and observe a block, or begin to, where `stop` (1,) is set meanwhile."""
-    systems, drives, states, refused = block
-    B, t = len(systems), request.t
-    started = [k for k in range(B) if k not in refused]
-    done = engine(systems, started, t, drives, states, request.rtol, request.method, stop)
-    status, reached, steps, events = [WORDS[int(k)] for k in done.status], done.reached, done.steps, [""] * B
-    for j in np.flatnonzero(done.status != loop.DONE):
-        events[j] = _event(systems[int(j)], done, int(j))
-    for k, error in refused.items():
-        status[k], reached[k], events[k] = "refused", np.nan, str(error)
-    return Part(status, reached, steps, events, _observed(systems, started, t, done, drives, request.channels))
+def _columns(robot: Robot, names: Sequence[str]) -> list[tuple[str, int]] | None:
+    """The channels as the core names them; None if it does not have one of them."""
+    known: dict[str, tuple[str, int]] = {}
+    for i in range(len(robot.links)):
+        known |= {f"joint/{i + 1}/{what}": (what, i) for what in ("position", "velocity", "drive")}
+    accounts = {"energy/work": WORK, "energy/loss": LOSS, "energy/numerical_loss": NUMERICAL}
+    seen = [name for name in observed(robot)]
+    known |= {name: ("account", k) for name, k in accounts.items()} | {name: ("seen", k) for k, name in enumerate(seen)}
+    return [known[name] for name in names] if all(name in known for name in names) else None
 
 
-def _starts(systems: Systems, t: float, drives: list[Drive], request: Request) -> tuple[np.ndarray, dict[int, InputError]]:
-    """The states (B, 2n + 2) at t, and why robots are refused."""
-    n, rows, refused = len(systems.labels), systems.chains.first[0, :-1], dict(systems.refused)
-    states = np.zeros((len(systems), 2 * n + 2))
-    states[:, rows] = [robot.start for robot in systems.robots]
-    given = request.q0 is not None or request.qd0 is not None
-    for k, drive in enumerate(drives):
-        if k not in refused and (given or drive.follows.any()):  # from elsewhere than the robot's start, at rest
-            try:
-                states[k] = forward.to_state(systems[k], *forward.initial(systems[k], t, drive, request.q0, request.qd0))
-            except InputError as error:
-                refused[k] = error
-    return states, refused
+def _packed(drive: Drive) -> Any:
+    """A drive as the core takes it. Limits are each robot's own."""
+    segments, ranges, gains = drive.packed()
+    N = len(drive.joints)
+    flags = drive.follows.astype(np.uint8)
+    return core.Drive(
+        segments, ranges, np.ascontiguousarray(gains), flags, np.zeros(N, dtype=np.uint8), np.tile([-np.inf, np.inf], (N, 1))
+    )
 
 
-def _joined(request: Request, first: int, items: list[Item], digests: list[bytes], parts: list[Part]) -> Chunk:
-    """The blocks of a chunk in one, reduced if so asked."""
-    status = [word for part in parts for word in part.status]
-    values = {name: np.concatenate([part.channels[name] for part in parts]) for name in request.channels}
+def _together(
+    request: Request,
+    share: Share,
+    members: np.ndarray,
+    rows: Rows,
+    columns: list[tuple[str, int]],
+    threads: int,
+    watch: Any,
+    part: Part,
+) -> None:
+    """Robots of the same counts through the core, into their places of `part`."""
+    common = request.drive or Drive.none(rows.numbers.shape[1])
+    drives = [share.drives[k] or common for k in members]
+    number = {id(drive): j for j, drive in enumerate({id(drive): drive for drive in drives}.values())}
+    packed = [_packed(drive) for drive in {id(drive): drive for drive in drives}.values()]
+    start = [np.zeros(0) if q is None else q for q in (request.q0, request.qd0)]
+    values, words, reached, steps, joints, positions, texts = core.population(
+        rows.counts, rows.numbers, rows.material, rows.gravity, rows.payload, rows.limits, packed,
+        np.array([number[id(drive)] for drive in drives]), request.t, *start, request.rtol, request.method, forward.MOST_STEPS,
+        columns, STATIONS, threads, watch,
+    )  # fmt: skip
+    for name, found in zip(request.channels, values, strict=True):
+        part.channels[name][members] = found
+    part.steps[members] = steps
+    for j, k in enumerate(members):
+        word = words[j]
+        part.status[k] = word if word in WORDS else "stuck"
+        if word != "refused":
+            part.reached[k] = reached[j]
+        if word != "done":
+            part.events[k] = _event(share.robots[k], word, int(joints[j]), float(reached[j]), positions[j], texts.get(j))
+
+
+def _event(robot: Robot, word: str, joint: int, t: float, position: np.ndarray, text: tuple[int, str, str] | None) -> str:
+    """Why a robot has not run to the end."""
+    if word == "limit":
+        return str(limit_event(System(robot), joint, t, position)["text"])
+    if word == "refused" and text is None:
+        limits = robot.links[joint].joint.limits
+        assert limits is not None
+        return str(forward.outside(joint, limits, float(position[joint])))
+    link, key, said = text or (-1, "", "")
+    if word != "refused":
+        return said
+    return str(InputError(said, key=key if link < 0 else f"link[{link + 1}].{key}"))
+
+
+def _one_by_one(request: Request, share: Share, watch: Any, part: Part) -> None:
+    """Robots by `simulate`: of the dissertation's model, and for channels that the core does not have."""
+    for k in range(len(share)):
+        if watch.stopped:
+            return
+        drive = share.drives[k] or request.drive
+        try:
+            run = forward.simulate(
+                share.robots[k], request.t, drive, request.q0, request.qd0, request.rtol, method=request.method
+            )
+        except InputError as error:
+            part.status[k], part.events[k] = "refused", str(error)
+            continue
+        texts = [event["text"] for event in run.meta["events"] if event["level"] == "ERROR"]
+        part.status[k] = "done" if run.complete else "limit" if any("stopped" in text for text in texts) else "stuck"
+        part.reached[k], part.steps[k], part.events[k] = run.t[-1], run.meta["steps"], "" if run.complete else "; ".join(texts)
+        rows = int(np.count_nonzero(np.isin(run.t, request.t)))
+        for name in request.channels:
+            part.channels[name][k, :rows] = run[name][:rows]
+
+
+def _chunk(request: Request, share: Share, digests: list[bytes], part: Part) -> Chunk:
+    """The chunk, reduced if so asked."""
+    values = {name: part.channels[name] for name in request.channels}
     if request.reduce:
         channels, values = values, {}
-        for k in range(len(items)):
-            if status[k] == "refused":
+        for k in range(len(share)):
+            if part.status[k] == "refused":
                 continue
-            kept = request.reduced({name: rows[k] for name, rows in channels.items()}, first + k)
-            values = values or {name: np.full(len(items), np.nan) for name in kept}
+            kept = request.reduced({name: rows[k] for name, rows in channels.items()}, share.first + k)
+            values = values or {name: np.full(len(share), np.nan) for name in kept}
             if set(values) != set(kept):
                 text = f"expected the same numbers of every robot, {sorted(values)}"
                 raise InputError(text, key="reduce", value=sorted(kept))
             for name, value in kept.items():
                 values[name][k] = value
-    reached, steps = (np.concatenate(arrays) for arrays in ([p.reached for p in parts], [p.steps for p in parts]))
-    events = [event for part in parts for event in part.events]
-    return Chunk(first, np.array(status), reached, steps, events, digests, values)
-
-
-def _event(system: System, done: Histories, j: int) -> str:
-    if done.status[j] == loop.STUCK:
-        return f"got no further than t = {done.reached[j]:.6g} s"
-    joint = int(done.joint[j])
-    return str(limit_event(system, joint, float(done.reached[j]), done.position[j])["text"])
-
-
-def _observed(
-    systems: Systems, rows: list[int], t: np.ndarray, done: Histories, drives: list[Drive], names: Sequence[str]
-) -> dict[str, np.ndarray]:
-    """The channels `names` (B, T) of the robots `rows`: the same numbers as a Run has, NaN where the states are."""
-    n, first = len(systems.labels), systems.chains.first[0]
-    direct = {f"joint/{i}/position": row for i, row in enumerate(first[:-1], 1)}
-    direct |= {f"joint/{i}/velocity": n + row for i, row in enumerate(first[:-1], 1)}
-    ends = {f"link/{i}/tip_deflection": i - 1 for i, link in enumerate(systems.robots[0].links, 1) if link.flexible}
-    plain = all(name in direct or name in ends for name in names)
-    deflections = np.zeros((len(systems), len(systems.links), len(t)))
-    if plain and any(name in ends for name in names):
-        tips(systems.chains, done.states, deflections)
-    out = {name: np.full((len(systems), len(t)), np.nan) for name in names}
-    for name in names if plain else ():
-        out[name][rows] = done.states[rows, :, direct[name]] if name in direct else deflections[rows, ends[name]]
-    for k in rows:
-        if not plain or drives[k].follows.any():
-            system, good = systems[k], int(np.count_nonzero(~np.isnan(done.states[k, :, 0])))
-            part, work = done.states[k, :good].copy(), done.work[k, :good]
-            forces = applied(system, t[:good], part, drives[k], inputs_of(system, drives[k]))
-            run = record(system, t[:good], part, work, forces, {})
-            for name in names:
-                out[name][k, :good] = run[name]
-    return out
+    return Chunk(share.first, np.array(part.status), part.reached, part.steps, part.events, digests, values)

@@ -27,21 +27,29 @@ def channel_units(robot: Robot) -> dict[str, str]:
     return units | {"tip/x": "m", "tip/y": "m"} | {f"energy/{name}": "J" for name in energies}
 
 
+def observed(robot: Robot) -> list[str]:
+    """The channels that the core reads from a state, in the order of `System.observe`."""
+    accounts = ("energy/work", "energy/loss", "energy/numerical_loss")
+    return [name for name in channel_units(robot) if not name.startswith("joint/") and name not in accounts]
+
+
 WORK, LOSS, NUMERICAL, STRAIN = range(4)  # columns of the accounts, as Account of model/core/plant.hpp counts them
 NOTED, DOUBTED, REFUSED = 1e-3, 1e-2, 0.1  # of the energies: a balance beyond is a note, an event, the end of trust in a run
 
 
 def record(
-    system: System, t: np.ndarray, states: np.ndarray, accounts: np.ndarray, forces: np.ndarray, meta: dict[str, Any]
-) -> Run:
+    system: System, t: np.ndarray, states: np.ndarray, accounts: np.ndarray, forces: np.ndarray, meta: dict[str, Any],
+    seen: np.ndarray | None = None, jumps: Any = 0.0,
+) -> Run:  # fmt: skip
     """The Run of a simulation.
 
     Args: t (T,) [s]; states (T, 2n); accounts (T, 4): work of the drives, losses, what the method took out, and the rise of the
-        strain energy, each from its own integral [J]; forces (T, links) of the drives; meta: what else the metadata says.
+        strain energy, each from its own integral [J]; forces (T, links) of the drives; meta: what else the metadata says;
+        seen (T, k): what `system.observe` gives, if it is known; jumps (T,): what the energy has jumped by so far [J].
     """
     robot, n = system.robot, system.n
     q, v = np.ascontiguousarray(states[:, :n]), np.ascontiguousarray(states[:, n:])
-    seen = system.observe(q, v)
+    seen = system.observe(q, v) if seen is None else seen
     found: list[np.ndarray] = []
     for i, row in enumerate(system.joint_rows):
         found += [q[:, row], v[:, row], forces[:, i]]
@@ -49,7 +57,7 @@ def record(
     found += [*seen.T, *accounts[:, :STRAIN].T]
     units = channel_units(robot)
     channels = {name: np.ascontiguousarray(values) for name, values in zip(units, found, strict=True)}
-    about = describe(system, energy_error(energies, accounts)) | meta
+    about = describe(system, energy_error(energies, accounts, jumps)) | meta
     if len(t):
         about["numerical_loss_J"] = float(accounts[-1, NUMERICAL])
     return judged(Run(t, channels, units, about, states))

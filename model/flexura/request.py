@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from . import __version__, forward
-from .assembly import size
 from .drive import Drive
 from .errors import InputError
 from .record import channel_units
 from .robot import Robot
+from .system.structure import structure
 
 
 @dataclass(frozen=True)
@@ -57,8 +57,8 @@ class Request:
                 raise InputError(f"expected one of {', '.join(known)}", key="channels", value=name)
         if self.drive is not None and len(self.drive.joints) != len(links):
             raise InputError(f"expected {len(links)} joint drives, one a joint", key="drive", value=len(self.drive.joints))
-        n = size(robot)
         for key, value in (("q0", self.q0), ("qd0", self.qd0)):
+            n = 0 if value is None else structure(robot).n
             if value is not None and (value.shape != (n,) or not np.isfinite(value).all()):
                 raise InputError(f"expected {n} finite numbers, in the order of system.labels", key=key, value=value)
         return replace(self, channels=self.channels or tuple(default))
@@ -92,9 +92,9 @@ class Request:
 
 @cache
 def program() -> str:
-    """The version and a digest of the solver's modules: two equal ones compute the same numbers on one kind of processor."""
-    found = hashlib.sha256()
-    for source in sorted(Path(__file__).parent.glob("*.py")):
+    """The version and a digest of the solver: two equal ones compute the same numbers."""
+    found, folder = hashlib.sha256(), Path(__file__).parent
+    for source in [*sorted(folder.rglob("*.py")), *sorted(folder.glob("_core_*"))]:  # the core in all builds that are installed
         found.update(source.read_bytes())
     return f"flexura {__version__} {found.hexdigest()[:16]}"
 

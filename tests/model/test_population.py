@@ -17,7 +17,7 @@ import flexura as fx
 from flexura.batch import digest
 from flexura.signal import constant, cycloid
 from populations import ARM, DRIVE, same, varied
-from robots import few, forces, robots, seeds
+from robots import beam, few, forces, robot, robots, seeds
 
 T = np.linspace(0.0, 0.2, 21)
 ROOT = Path(__file__).resolve().parents[2]
@@ -27,7 +27,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 @few
-@given(robots(max_links=3, coulomb=True, locked=True), seeds)
+@given(robots(max_links=3, coulomb=True, locked=True, stiffening=True), seeds)
 def test_a_population_has_the_numbers_of_single_runs(described, seed):
     """Any robot, any channel, to the last bit; where the run ends at a limit, up to there."""
     drive = fx.Drive.force(*map(constant, forces(fx.assemble(described), seed)))
@@ -51,6 +51,59 @@ def test_each_robot_has_its_own_drive_gains_or_prescribed_motion():
         run = fx.simulate(fx.assemble(ARM), T, drive)
         assert all(np.array_equal(done[name][k], run[name]) for name in done.units)
     assert np.array_equal(done["joint/1/position"][2], [motion(t)[0] for t in T])
+
+
+def test_a_varied_robot_has_the_rows_of_the_robot_made_anew():
+    """To the last bit, for every key that the rows know; for others the robots are made."""
+    from flexura.rows import one
+    from flexura.rows import varied as vary
+
+    B = 5
+    up = lambda value: value * np.linspace(0.9, 1.1, B)
+    section = ARM.replace({
+        "link.2.mass_per_length_kg_m": None, "link.2.bending_stiffness_N_m2": None, "link.2.density_kg_m3": 2700.0,
+        "link.2.section": {"width_m": 0.02, "height_m": 0.003}, "link.2.young_modulus_Pa": 7.1e10,
+    })  # fmt: skip
+    cases = [
+        (ARM, {"payload.mass_kg": up(0.3), "payload.inertia_kg_m2": up(1e-3), "link.2.length_m": up(0.3)}),
+        (ARM, {"gravity_m_s2.2": up(-9.81), "link.2.joint.hub_mass_kg": up(0.1), "link.1.joint.viscous_friction": up(0.1)}),
+        (ARM, {"link.2.mass_per_length_kg_m": up(0.37), "link.2.bending_stiffness_N_m2": up(0.7)}),
+        (ARM, {"link.1.length_m": up(0.1), "link.1.mass_kg": up(1.3), "link.2.damping.beta_s": up(1e-4)}),
+        (section, {"link.2.section.height_m": up(0.003), "link.2.section.width_m": up(0.02)}),
+        (section, {"link.2.density_kg_m3": up(2700.0), "link.2.young_modulus_Pa": up(7e10), "link.1.centre_of_mass_m": up(0.03)}),
+    ]  # fmt: skip
+    for template, columns in cases:
+        rows = vary(template, columns)
+        assert rows is not None
+        for k, (each, _) in enumerate(fx.Batch.vary(template, columns)):
+            assert rows.contents(k) == one(each).contents(0), (k, columns)
+            assert np.array_equal(rows.limits[k], fx.System(each).limits)
+    assert vary(ARM, {"link.2.joint.start": np.zeros(2)}) is None and vary(ARM, {"link.3.length_m": np.ones(2)}) is None
+
+
+def test_a_varied_value_out_of_its_range_is_refused_as_a_robots():
+    for changes in ({"payload.mass_kg": [0.1, -1.0]}, {"link.2.length_m": [0.1, np.nan]}, {"link.2.nothing": [1.0, 2.0]}):
+        with pytest.raises(fx.InputError):
+            fx.simulate(fx.Batch.vary(ARM, changes), T)
+
+
+def test_robots_of_other_tapers_are_one_batch():
+    """Kinks in other places and in another number: each robot has its own numbers all the same."""
+
+    def kinked(*at: float) -> fx.Robot:
+        taper = [{"at_m": x, "value": 0.3 - 0.2 * x} for x in (0.0, *at, 0.6)]
+        return robot(beam(0.6, taper, 0.5, 3, modes=2, hub_inertia_kg_m2=1e-3))
+
+    items = [kinked(0.1), kinked(0.2), kinked(0.25, 0.5), kinked(0.5)]
+    drive = fx.Drive.force(constant(0.1))
+    done = fx.simulate(fx.Batch.of(items), T, drive)
+    for k, each in enumerate(items):
+        assert np.array_equal(done["joint/1/position"][k], fx.simulate(each, T, drive)["joint/1/position"])
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_threads_do_not_change_the_numbers(threads):
+    assert same(fx.simulate(varied(), T, DRIVE, threads=threads), fx.simulate(varied(), T, DRIVE, chunk=3))
 
 
 def test_robots_are_drawn_with_a_generator_of_their_own():

@@ -6,11 +6,10 @@
 
 #include "fault.hpp"
 #include "observe.hpp"
+#include "table.hpp"
 
 namespace flexura {
 namespace {
-
-constexpr std::size_t NUMBERS = 15, COUNTS = 5, MATERIAL = 10;  // columns, as flexura/core.py names them
 
 void expect(bool good, const char *text) {
   if (!good) throw std::invalid_argument(text);
@@ -43,7 +42,7 @@ Array inverse_dynamics(const Mechanics &self, const Vector &q, const Vector &v, 
 Array observations(const Mechanics &self, const Matrix &q, const Matrix &v, int stations) {
   const Model<double> &model = *self.model;
   expect(q.shape(1) == std::size_t(model.n) && v.shape(1) == q.shape(1) && v.shape(0) == q.shape(0), "q and v need a column an unknown");
-  Observer observer(model, stations);
+  Observer<double> observer(model, stations);
   Array out = new_array({q.shape(0), std::size_t(observer.columns())});
   {
     nb::gil_scoped_release free;
@@ -89,34 +88,14 @@ nb::tuple whole_link(const Mechanics &self, int link) {
 }  // namespace
 
 Robot robot_of(const Vector &gravity, const Vector &payload, const Counts &counts, const Matrix &numbers, const Matrix &material) {
-  Robot robot;
   expect(gravity.size() == 2 && payload.size() == 2, "gravity and payload have two numbers each");
   expect(counts.shape(1) == COUNTS && numbers.shape(1) == NUMBERS && material.shape(1) == MATERIAL, "rows of other lengths were expected");
   expect(counts.shape(0) == numbers.shape(0), "counts and numbers need a row a link");
-  robot.gravity[0] = gravity.data()[0], robot.gravity[1] = gravity.data()[1];
-  robot.payload_mass = payload.data()[0], robot.payload_inertia = payload.data()[1];
-  std::size_t row = 0;
-  for (std::size_t i = 0; i < counts.shape(0); ++i) {
-    const std::int64_t *c = counts.data() + i * COUNTS;
-    const double *x = numbers.data() + i * NUMBERS;
-    Link link;
-    link.joint.kind = JointKind(c[0]), link.joint.locked = c[1] != 0;
-    link.elements = int(c[2]), link.modes = int(c[3]);
-    link.length = x[0], link.mass = x[1], link.centre = x[2], link.inertia = x[3], link.alpha = x[4], link.beta = x[5];
-    link.joint.angle = x[6], link.joint.start = x[7], link.joint.hub_mass = x[8], link.joint.hub_inertia = x[9];
-    link.joint.rotor = x[10], link.joint.viscous = x[11], link.joint.coulomb = x[12], link.joint.low = x[13], link.joint.high = x[14];
-    for (std::int64_t k = 0; k < c[4]; ++k, ++row) {
-      expect(row < material.shape(0), "there are fewer rows of material than counted");
-      const double *m = material.data() + row * MATERIAL;
-      Interval part;
-      part.from = m[0], part.to = m[1];
-      for (int p = 0; p < 3; ++p) part.mass[p] = m[2 + p];
-      for (int p = 0; p < 5; ++p) part.stiffness[p] = m[5 + p];
-      link.material.push_back(part);
-    }
-    robot.links.push_back(std::move(link));
-  }
-  return robot;
+  Table table;
+  table.links = int(counts.shape(0)), table.intervals = int(material.shape(0));
+  table.counts = counts.data(), table.numbers = numbers.data(), table.material = material.data();
+  table.gravity = gravity.data(), table.payload = payload.data();
+  return robot_of(table, 0);
 }
 
 void bind_mechanics(nb::module_ &module) {

@@ -2,15 +2,14 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include "controller.hpp"
 #include "mechanics.hpp"
 #include "observe.hpp"
+#include "packed.hpp"
 #include "simulation.hpp"
 
 namespace flexura {
 namespace {
-
-using Flags = nb::ndarray<const std::uint8_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Ranges = nb::ndarray<const std::int64_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
 // Arrays of a state as a Python function of a drive sees it.
 class Seen {
@@ -48,47 +47,6 @@ private:
   nb::callable f_;
 };
 
-Signal signal_of(const Matrix &segments, std::int64_t from, std::int64_t to) {
-  Signal out;
-  for (std::int64_t k = from; k < to; ++k) {
-    Segment row;
-    std::copy_n(segments.data() + 10 * k, 10, reinterpret_cast<double *>(&row));
-    out.push_back(row);
-  }
-  return out;
-}
-
-// Drives of the joints: rows of signals, their ranges (joints, 4) [force from, to; motion from, to], gains (joints, 2), flags.
-Acting acting_of(const Matrix &segments, const Ranges &ranges, const Matrix &gains, const Flags &prescribed, const Flags &sampled,
-                 const Matrix &limits) {
-  const std::size_t joints = ranges.shape(0);
-  if (segments.shape(1) != 10 || ranges.shape(1) != 4 || gains.shape(0) != joints || limits.shape(0) != joints)
-    throw std::invalid_argument("drives of another shape were expected");
-  Acting acting((int(joints)));
-  for (std::size_t i = 0; i < joints; ++i) {
-    JointDrive &joint = acting.joints[i];
-    const std::int64_t *r = ranges.data() + 4 * i;
-    joint.force = signal_of(segments, r[0], r[1]), joint.motion = signal_of(segments, r[2], r[3]);
-    joint.kp = gains.data()[2 * i], joint.kd = gains.data()[2 * i + 1];
-    joint.prescribed = prescribed.data()[i] != 0, joint.sampled = sampled.data()[i] != 0;
-    acting.limit(int(i), limits.data()[2 * i], limits.data()[2 * i + 1]);
-  }
-  return acting;
-}
-
-const char *word(Status status) {
-  switch (status) {
-    case Status::running: return "running";
-    case Status::done: return "done";
-    case Status::limit: return "limit";
-    case Status::stuck: return "stuck";
-    case Status::diverged: return "diverged";
-    case Status::exhausted: return "exhausted";
-    case Status::interrupted: return "interrupted";
-  }
-  return "";
-}
-
 // A run and what Python objects it needs.
 struct Running {
   nb::object function, sampler;  // kept alive
@@ -111,6 +69,7 @@ struct Running {
       };
     }
     if (!sampler.is_none()) acting.sampler = nb::cast<Sampler *>(sampler), acting.rate_Hz = rate_Hz;
+    if (auto *controller = dynamic_cast<Controller *>(acting.sampler)) controller->start(acting, q.data());
     Request request;
     request.times = {t.data(), t.data() + t.shape(0)}, request.q = {q.data(), q.data() + n}, request.v = {v.data(), v.data() + n};
     request.rtol = rtol, request.method = method, request.first_step = first_step, request.most_steps = most_steps;
@@ -156,7 +115,7 @@ Array bends_of(const Mechanics &self, const Matrix &q, int link) {
   Workspace<double> work(*self.model);
   Array out = new_array({q.shape(0), 2});
   for (std::size_t k = 0; k < q.shape(0); ++k) {
-    const Bend b = bend(*self.model, work, q.data() + k * q.shape(1), link);
+    const Bend<double> b = bend(*self.model, work, q.data() + k * q.shape(1), link);
     out.data()[2 * k] = b.deflection, out.data()[2 * k + 1] = b.slope;
   }
   return out;

@@ -1,0 +1,41 @@
+// When "auto" holds no race: what can be told of one robot, whether it runs alone or in a pack.
+#pragma once
+#include "clock.hpp"
+
+namespace flexura {
+
+// Tolerances below are for explicit steps.
+constexpr double SHARPEST = 1e-9;
+
+// Explicit steps for sure: a sharp tolerance, or a rigid robot without gains or friction.
+template <class Number>
+bool for_explicit(double rtol, bool bends, int joints, const Acting &acting, Number resistance) {
+  if (rtol < SHARPEST) return true;
+  if (bends) return false;
+  for (int i = 0; i < joints; ++i) {
+    const JointDrive &d = acting.joints[std::size_t(i)];
+    if (resistance(i) > 0.0 || (d.follows() && !d.prescribed && (d.kp > 0.0 || d.kd > 0.0))) return false;
+  }
+  return true;
+}
+
+// The first exponential steps of a run. If the rest takes no more of them than the trials of the other methods would take passes, they
+// have no rival. What is counted are a robot's own attempts, accepted or not.
+struct Pace {
+  static constexpr long ATTEMPTS = 80, REST = 120;
+  double half = 0.0;  // time after half of the attempts
+
+  static long attempts(const Clock &c) { return c.steps + c.rejected; }
+
+  // To be called after each attempt; is another one to be made before it can be told?
+  bool look(const Clock &c) {
+    if (attempts(c) <= ATTEMPTS / 2) half = c.t;
+    return c.running() && attempts(c) < ATTEMPTS;
+  }
+  bool settled(const Clock &c) const {
+    if (!c.running()) return c.status == Status::done || c.status == Status::limit || c.status == Status::interrupted;
+    return (c.end - c.t) * (ATTEMPTS / 2) <= REST * (c.t - half);
+  }
+};
+
+}  // namespace flexura
