@@ -14,12 +14,13 @@ ifneq ($(shell test -x $(VENV)/bin/python && cat $(READY) 2>/dev/null),$(CURDIR)
 .PHONY: $(READY)
 endif
 
-.PHONY: help setup demo test check lint types tests core core-sanitize test-slow bench firmware flash clean
+.PHONY: help setup demo test check lint types tests core core-sanitize test-slow test-long bench firmware flash clean
 
 help:
 	@echo "make demo       simulate the rig, cross-check it, and leave a review to look at"
 	@echo "make test       style, types and the quick tests ('make check' is the same)"
 	@echo "make test-slow  the tests that take longer"
+	@echo "make test-long  those that take hours; make test-long TESTS=tests/model/core/test_chains.py runs one part"
 	@echo "make core       only the C++ tests of the core; make core-sanitize the same, with memory and arithmetic watched"
 	@echo "make bench      how fast the solver is on this machine, and how busy the board"
 	@echo "make firmware   build the board's program; its ELF file is named at the end"
@@ -50,7 +51,7 @@ types: $(READY)
 	@$(VENV)/bin/mypy
 
 tests: $(CORE)
-	@$(VENV)/bin/pytest -n $(JOBS) -m "not slow"
+	@$(VENV)/bin/pytest -n $(JOBS) -m "not slow and not long"
 
 core: $(CORE)
 	@$(VENV)/bin/cmake --build build/core --target core_tests --parallel $(JOBS)
@@ -62,7 +63,10 @@ core-sanitize: $(READY)
 	@$(VENV)/bin/ctest --test-dir build/sanitize --parallel $(JOBS) --output-on-failure
 
 test-slow: $(CORE)
-	@$(VENV)/bin/pytest -n $(JOBS) -m slow
+	@$(VENV)/bin/pytest -n $(JOBS) -m "slow and not long"
+
+test-long: $(CORE)
+	@$(VENV)/bin/pytest -m long $(TESTS)
 
 # make bench BENCH="type4 pendulum --rounds 3" times a few problems; BENCH=--help says what there is.
 bench: $(CORE)

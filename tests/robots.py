@@ -1,7 +1,7 @@
 """Robots for the tests: short builders, the benchmarks' arms, and random robots with random states (hypothesis).
 
-A state from `states` is physically small: each flexible link is bent in its three lowest modes, its slopes below `SLOPE`. Random
-numbers on all nodal unknowns would bend an element by many radians.
+A state from `state` is physically small: each flexible link is bent in shapes like its three lowest modes, its slopes below `SLOPE`.
+Random numbers on all unknowns would bend a link in shapes that no motion takes.
 """
 
 from __future__ import annotations
@@ -157,11 +157,12 @@ def state(sys: fx.System, seed: int, slope: float = SLOPE, rate: float = 2.0) ->
     """q and qd (n,): R joints anywhere, sliding ones within 5 % of the link around their start, joint rates below `rate` rad/s or
     `rate` / 4 m/s, slopes below `slope` and their rates below `rate`."""
     random = np.random.default_rng(seed)
-    turns = np.array([link.joint.type == "R" for link in sys.robot.links])
-    around = np.where(turns, 0.0, sys.robot.start)
-    reach = 0.05 * np.array([sys.robot.links[max(i - (k.joint.type == "Pa"), 0)].length_m for i, k in enumerate(sys.robot.links)])
-    q, qd = _shape(sys, random, np.where(turns, 1.5, reach), slope), _shape(sys, random, np.where(turns, rate, rate / 4), rate)
-    q[sys.joint_rows] += around
+    links = sys.robot.links
+    turns = np.array([link.joint.type == "R" for link in links])
+    reach = 0.05 * np.array([links[max(i - (link.joint.type == "Pa"), 0)].length_m for i, link in enumerate(links)])
+    q = _motion(sys, random, np.where(turns, 1.5, reach), slope)
+    qd = _motion(sys, random, np.where(turns, rate, rate / 4), rate)
+    q[sys.joint_rows] += np.where(turns, 0.0, sys.robot.start)
     return q, qd
 
 
@@ -170,19 +171,31 @@ def forces(sys: fx.System, seed: int) -> np.ndarray:
     return np.random.default_rng(seed + 1).uniform(-1, 1, len(sys.robot.links))
 
 
-def _shape(sys: fx.System, random: np.random.Generator, joints: np.ndarray, slope: float) -> np.ndarray:
+def bending(sys: fx.System, link: int, sizes: Any) -> np.ndarray:
+    """Elastic unknowns (m,) of a link (from 0) whose tangent turns by sum_k sizes_k sin((k - 1/2) pi s / L), k = 1, 2, ..., the
+    angles of a clamped link's modes nearly, as closely as its own shapes come to them."""
+    x = np.linspace(0, 1, 8 * (sys.robot.links[link].elements or 1) + 1)
+    shapes = sys.angles(link + 1, x * sys.robot.links[link].length_m)[:, sys.own_rows(link)]
+    angle = sum(size * np.sin((k + 0.5) * np.pi * x) for k, size in enumerate(sizes))
+    scale = np.abs(shapes).max(axis=0)
+    return np.linalg.lstsq(shapes / scale, angle, rcond=None)[0] / scale
+
+
+def turning(sys: fx.System) -> np.ndarray:
+    """How far a unit of each unknown turns a tangent [rad], (n,); 1 for joints."""
+    out = np.ones(sys.n)
+    for i, link in enumerate(sys.robot.links):
+        own = sys.own_rows(i)
+        if len(own):
+            out[own] = np.abs(sys.angles(i + 1, np.linspace(0, link.length_m, 64 * link.elements + 1))[:, own]).max(axis=0)
+    return out
+
+
+def _motion(sys: fx.System, random: np.random.Generator, joints: np.ndarray, slope: float) -> np.ndarray:
     y = np.zeros(sys.n)
-    ends = [*sys.joint_rows, sys.n]
     for i, row in enumerate(sys.joint_rows):
         y[row] = joints[i] * random.uniform(-1, 1)
-        if m := ends[i + 1] - row - 1:
-            y[row + 1 : row + 1 + m] = slope / m / steepest(sys, i) * random.uniform(-1, 1, m)
+        if len(own := sys.own_rows(i)):
+            kept = min(3, len(own))
+            y[own] = bending(sys, i, slope / kept * random.uniform(-1, 1, kept))
     return y
-
-
-def steepest(sys: fx.System, link: int) -> np.ndarray:
-    """The largest slope that each elastic unknown of a link gives, (m,), per unit of it: of a mesh that of one element."""
-    rows = slice(sys.joint_rows[link] + 1, [*sys.joint_rows, sys.n][link + 1])
-    if "/element/" in sys.labels[rows][0]:
-        return np.where([label.endswith("bubble") for label in sys.labels[rows]], 1.5, 1.0)
-    return np.abs(sys.equations.whole_link(link)[0]).max(axis=1)

@@ -1,4 +1,15 @@
-"""Sampled controllers as drives: one law for the model, the emulated board and the board (`law.py`, firmware/README.md).
+"""Sampled controllers as drives: one law for the model, the emulated board and the board (firmware/README.md).
+
+The law of one joint, with T the tick, e = r - q, w the tip deflection and s the tip slope (12):
+
+    u = kp e + ki sum(e) T + kd (r' - q') + kf w + kg w' + ks s + kt s' + kv r' + kc sign r' + f(t)
+
+r: the reference through a first-order filter; r': its change / T; q': the filtered change of q / T, and of a stepper that counts
+its own pulses u of the tick before; w, s: the mean of two ticks, every second tick, through a filter of their own, w' its
+change / 2T; joint i takes them in ticks k with k mod 2 = i mod 2 (i from 0). |u| <= limit, and changes by at most slew T a tick.
+The sum's part of u stays within the limit, and stands still while limit or slew holds u back and e pushes it further. Filters:
+y += a (x - y), a = 1 - exp(-2 pi f T). u becomes a force, or a stepper's rate, after a whole number of ticks. The board's library
+(firmware/lib/control) computes it, in integers there and in floating point in the core.
 
     carriage = fx.PID(step(0.1), fx.Motor(force_per_V=13.1, damping=1180.0), kp=2000, ki=4000, limit=12)
     drive = fx.Controller((carriage, fx.PID(step(0.7), kp=6, kd=0.2)))
@@ -16,12 +27,17 @@ from typing import Any
 
 import numpy as np
 
-from . import law, signal
+from . import core, signal
 from .drive import Drive, JointDrive
 from .errors import InputError
-from .law import Law
+from .run import Run
 from .signal import Signal
 from .system import System
+
+NONE, EFFORT, STEPPER = 0, 1, 2  # what a joint's output is: not the controller's, a force or voltage, a rate
+(
+    KP, KI, KD, KF, KG, KS, KT, KV, KC, LIMIT, SLEW, FORCE, SETPOINT, DERIVATIVE, DEFLECTION, COUNT, DUTY, ENCODER, RIGID, DELAY,
+) = range(20)  # fmt: skip  # columns of `Controller.gains`, as Gain of model/core/controller.hpp counts them
 
 
 @dataclass(frozen=True)
@@ -60,7 +76,7 @@ Output = Force | Motor | Stepper
 
 @dataclass(frozen=True)
 class PID:
-    """One joint's law; gains in units of its output (N, N m, V, rad/s or m/s) per m or rad, s, as the formula in `law.py` says.
+    """One joint's law; gains in units of its output (N, N m, V, rad/s or m/s) per m or rad, s, as the formula above says.
 
     `reference` [m or rad] through a filter of `setpoint_Hz` (0: none), `feedforward` [units of the output], `derivative_Hz`
     (0: none) for the measured velocity. `limit`, `slew` (per second) of the output. `delay_s`, a whole number of ticks, from
@@ -122,7 +138,11 @@ GAINS = ("kp", "ki", "kd", "kf", "kg", "ks", "kt", "kv", "kc")
 
 @dataclass(frozen=True)
 class Linear:
-    """A linear law in place of the PID's terms: matrices of `law.Law`, made by `lqr`."""
+    """A linear law in place of the PID's terms, as `lqr.lqr` makes it.
+
+    z^ = z + L (y - C z), u = hold - K z^ + Kr r + Kv r' + f(t), limited as a PID's; z of the next tick = F z^ + G (u - hold)
+    with the u that the limits left. y: positions and deflection, less `offset`.
+    """
 
     F: np.ndarray
     G: np.ndarray
@@ -178,84 +198,72 @@ class Controller:
     def _open(self) -> Drive:
         return Drive(tuple(JointDrive() if isinstance(joint, PID) else joint for joint in self.joints))
 
-    def packed(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """As `Drive.packed`: a row of the segments for each force or motion that the law holds, and a motor's zero motion."""
-        segments, index, gains = self._open().packed()
-        rows = len(segments)
-        for i, joint in enumerate(self.joints):
-            if not isinstance(joint, PID):
-                continue
-            force, motion = not isinstance(joint.output, Stepper), not isinstance(joint.output, Force)
-            index[i] = rows, rows + force, rows + force, rows + force + motion
-            rows += force + motion
-            if isinstance(joint.output, Motor):
-                gains[i, 1] = joint.output.damping
-            elif isinstance(joint.output, Stepper):
-                gains[i] = joint.output.stiffness or 0.0, joint.output.damping
-        return np.vstack([segments, np.zeros((rows - len(segments), signal.COLUMNS))]), index, gains
+    def core_drives(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """What acts on the joints that are not this controller's: segments, ranges (N, 4) and gains (N, 2) as `Drive.packed`,
+        which joints follow their motion, and, for the core to fill in, which this controller moves, (N,) each."""
+        drive = self._open()
+        return *drive.packed(), drive.follows.astype(np.uint8), np.zeros(len(self.joints), dtype=np.uint8)
 
-    def law(self, system: System, index: np.ndarray, start: float, ticks: int) -> Law:
-        """The compiled loop's part: `index` (N, 4) of `packed`, the time of the first tick, and how many ticks to log."""
-        N, count, c = len(self.joints), 0, system.chain
-        kind, ranges, parts = np.zeros(N, np.int64), np.zeros((N, 4), np.int64), [np.zeros((0, signal.COLUMNS))]
-        gains, rows = np.zeros((N, 20)), np.full((N, 2), -1, np.int64)
+    def sampler(self, system: System) -> Any:
+        """All that the core needs of this controller on a robot: a `core.Controller`, with the memory and the log of one run."""
+        index, parts = np.zeros((len(self.joints), 5), dtype=np.int64), [np.zeros((0, signal.COLUMNS))]
+        springs, count = np.zeros((len(self.joints), 2)), 0
         for i, joint in enumerate(self.joints):
             if not isinstance(joint, PID):
                 continue
-            kind[i] = law.STEPPER if isinstance(joint.output, Stepper) else law.EFFORT
-            rows[i] = index[i, 0] if index[i, 1] > index[i, 0] else -1, index[i, 2] if index[i, 3] > index[i, 2] else -1
+            index[i, 0] = STEPPER if isinstance(joint.output, Stepper) else EFFORT
             for k, wave in enumerate((joint.reference, joint.feedforward)):
-                own = 0 if wave is None else len(wave.segments)
-                ranges[i, 2 * k], ranges[i, 2 * k + 1] = count, count + own
-                count += own
-                parts += [] if wave is None else [wave.segments]
-            gains[i] = self._gains(joint)
-        flexible = [i for i, link in enumerate(system.robot.links) if link.flexible]
-        look, sleeve = np.zeros((2, system.n)), -1
-        for i in flexible[-1:]:
-            first, m = int(c.first[i]) + 1, len(system.links[i].S0)
-            look[:, first : first + m] = c.NL[i, :m], c.SL[i, :m]
-            sleeve = int(c.first[i]) if system.robot.links[i].joint.type == "Pb" else -1
-        linear = Linear(*[np.zeros((0, 0))] * 7, *[np.zeros(0)] * 2) if self.linear is None else self.linear  # type: ignore[call-arg]
-        late = int(gains[:, law.DELAY].max(initial=0)) + 1
-        return Law(
-            rate_Hz=float(self.rate_Hz), start=float(start), kind=kind, gains=gains, rows=rows,
-            segments=np.ascontiguousarray(np.concatenate(parts)), ranges=ranges, first=c.first[:-1].copy(), look=look,
-            sleeve=sleeve, quantum=float(self.deflection_quantum_m),
-            **{f.name: np.array(getattr(linear, f.name), dtype=float, order="C") for f in fields(Linear)},
-            z=np.zeros((2, len(linear.F))), y=np.zeros(len(linear.offset)), memory=np.zeros((N, 9)), sensor=np.zeros(7),
-            ring=np.zeros((N, late)), log=np.zeros((ticks, N, law.LOGGED)),
+                segments = parts[0] if wave is None else wave.segments
+                index[i, 1 + 2 * k : 3 + 2 * k] = count, count + len(segments)
+                count += len(segments)
+                parts.append(segments)
+            if isinstance(joint.output, Stepper):
+                springs[i] = joint.output.stiffness or 0.0, joint.output.damping
+            elif isinstance(joint.output, Motor):
+                springs[i, 1] = joint.output.damping
+        linear = [] if self.linear is None else [np.array(getattr(self.linear, f.name), dtype=float) for f in fields(Linear)]
+        return core.Controller(
+            system.equations, float(self.rate_Hz), float(self.deflection_quantum_m), np.concatenate(parts), index, self.gains(),
+            springs, linear[:7], linear[7:],
         )  # fmt: skip
 
-    def _gains(self, joint: PID) -> np.ndarray:
-        """Row of `Law.gains`."""
-        g = np.zeros(20)
-        g[: law.LIMIT] = [getattr(joint, name) for name in GAINS]
-        g[law.LIMIT], g[law.SLEW] = joint.limit, joint.slew
-        g[law.FORCE] = joint.output.force_per_V if isinstance(joint.output, Motor) else 1.0
-        g[law.SETPOINT] = smoothing(joint.setpoint_Hz, 1 / self.rate_Hz)
-        g[law.DERIVATIVE] = smoothing(joint.derivative_Hz, 1 / self.rate_Hz)
-        g[law.DEFLECTION] = smoothing(self.deflection_Hz, 2 / self.rate_Hz)
-        g[law.COUNT], g[law.DUTY], g[law.DELAY] = joint.count, joint.duty, round(joint.delay_s * self.rate_Hz)
-        g[law.RIGID] = joint.prescribed
-        g[law.ENCODER] = isinstance(joint.output, Stepper) and joint.output.encoder
+    def gains(self) -> np.ndarray:
+        """The numbers of the law that a search may change, (N, 20): columns KP to DELAY."""
+        g = np.zeros((len(self.joints), 20))
+        for row, joint in zip(g, self.joints, strict=True):
+            row[DEFLECTION] = smoothing(self.deflection_Hz, 2 / self.rate_Hz)
+            if not isinstance(joint, PID):
+                continue
+            row[:LIMIT] = [getattr(joint, name) for name in GAINS]
+            row[LIMIT], row[SLEW] = joint.limit, joint.slew
+            row[FORCE] = joint.output.force_per_V if isinstance(joint.output, Motor) else 1.0
+            row[SETPOINT] = smoothing(joint.setpoint_Hz, 1 / self.rate_Hz)
+            row[DERIVATIVE] = smoothing(joint.derivative_Hz, 1 / self.rate_Hz)
+            row[COUNT], row[DUTY], row[DELAY] = joint.count, joint.duty, round(joint.delay_s * self.rate_Hz)
+            row[RIGID] = joint.prescribed
+            row[ENCODER] = isinstance(joint.output, Stepper) and joint.output.encoder
         return g
 
-    def channels(self, d: Law, t: np.ndarray) -> tuple[dict[str, np.ndarray], dict[str, str]]:
-        """The law's own channels at t (T,) from its log, and their units without those of the joints' positions ("")."""
-        k, s = logged(d, t)
-        out: dict[str, np.ndarray] = {}
-        units: dict[str, str] = {}
+    def recorded(self, run: Run, sampler: Any) -> Run:
+        """A Run with the law's own channels besides, joint/i/reference, joint/i/voltage and joint/i/pulses, from the log of the
+        `sampler` that ran in it."""
+        log, start = np.asarray(sampler.log), float(run.t[0]) if len(run.t) else 0.0
+        if len(log) == 0:  # no tick in it: a run of one instant
+            log = np.zeros((1, len(self.joints), 6))
+        k = np.clip(np.floor((run.t - start) * self.rate_Hz + 1e-6).astype(int), 0, len(log) - 1)
+        s = np.maximum(run.t - (start + k / self.rate_Hz), 0.0)
+        channels, units = dict(run.channels), dict(run.units)
         for i, joint in enumerate(self.joints):
-            if isinstance(joint, PID):
-                row = d.log[k, i]
-                out[f"joint/{i + 1}/reference"], units[f"joint/{i + 1}/reference"] = row[:, 0], ""
-                if isinstance(joint.output, Motor):
-                    out[f"joint/{i + 1}/voltage"], units[f"joint/{i + 1}/voltage"] = row[:, 1], "V"
-                elif isinstance(joint.output, Stepper):
-                    place = row[:, 2] + s * (row[:, 3] + s * row[:, 4])
-                    out[f"joint/{i + 1}/pulses"], units[f"joint/{i + 1}/pulses"] = place, ""
-        return out, units
+            if not isinstance(joint, PID):
+                continue
+            row, unit = log[k, i], run.units[f"joint/{i + 1}/position"]
+            channels[f"joint/{i + 1}/reference"], units[f"joint/{i + 1}/reference"] = row[:, 0], unit
+            if isinstance(joint.output, Motor):
+                channels[f"joint/{i + 1}/voltage"], units[f"joint/{i + 1}/voltage"] = row[:, 1], "V"
+            elif isinstance(joint.output, Stepper):
+                place = row[:, 2] + s * (row[:, 3] + s * row[:, 4])
+                channels[f"joint/{i + 1}/pulses"], units[f"joint/{i + 1}/pulses"] = place, unit
+        return replace(run, channels=channels, units=units)
 
     def spec(self) -> dict[str, Any]:
         """What it is, for a Run's metadata."""
@@ -266,28 +274,6 @@ class Controller:
 def smoothing(frequency_Hz: float, period_s: float) -> float:
     """a of y += a (x - y): 1 - exp(-2 pi f T); 1, no filter, for f = 0."""
     return 1.0 if frequency_Hz == 0 else -math.expm1(-2 * math.pi * frequency_Hz * period_s)
-
-
-def logged(d: Law, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The ticks (T,) whose outputs hold at t, and the times since them [s]."""
-    done = max(1, min(int(d.sensor[law.TICK]), len(d.log)))
-    k = np.clip(np.floor((t - d.start) * d.rate_Hz + 1e-6).astype(int), 0, done - 1)
-    return k, np.maximum(t - (d.start + k / d.rate_Hz), 0.0)
-
-
-def replay(d: Law, segments: np.ndarray, index: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Segments and index (N, 4) that hold, one after another, what the law held in a run: an open-loop copy of its outputs."""
-    index, parts, count = index.copy(), [segments], len(segments)
-    done = min(int(d.sensor[law.TICK]), len(d.log))
-    start = d.start + np.arange(done) / d.rate_Hz
-    for i in np.flatnonzero(d.kind != law.NONE):
-        rows = np.zeros((done, signal.COLUMNS))
-        rows[:, 0], rows[:, 1:4] = start, d.log[:done, i, 2:5]
-        at = 0 if d.kind[i] == law.EFFORT else 2
-        index[i, at : at + 2] = count, count + done
-        parts.append(rows)
-        count += done
-    return np.ascontiguousarray(np.concatenate(parts)), index
 
 
 def gravity(system: System, motions: Sequence[Signal], t_s: Any) -> list[Signal]:

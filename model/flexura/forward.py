@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from . import core, dense
+from . import core, dense, nodal
 from .control import PID, Controller
 from .drive import Drive
 from .errors import InputError
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .population import Population
 
 METHODS = ("auto", "explicit", "implicit", "exponential")
+SHORT = ("explicit-3", "explicit-5")  # what "auto" takes under a Controller whose ticks are short
 STEPS_A_CALL = 400  # between two looks at the progress bar and the keyboard
 MOST_STEPS = 50_000_000  # of a run
 
@@ -82,7 +83,8 @@ def simulate(
         acting = as_function(acting, joints)
     q, qd = initial(system, t[0], acting, q0, qd0)
     if not system.exact:
-        return dense.simulate(system, t, acting, q, qd, rtol, method, progress)
+        slow = nodal if system.robot.nodal else dense
+        return slow.simulate(system, t, acting, q, qd, rtol, method, progress)
     return _Course(system, t, acting, q, qd, rtol, method).run(progress)
 
 
@@ -123,7 +125,8 @@ class _Course:
             follows = drive.follows.astype(np.uint8)
         elif isinstance(drive, Controller):
             segments, ranges, gains, follows, sampled = drive.core_drives()
-            sampler, rate = drive.sampler(system, t), float(drive.rate_Hz)
+            sampler, rate = drive.sampler(system), float(drive.rate_Hz)
+            method = sampler.method(q, rtol) if method == "auto" else method
         elif isinstance(drive, Sampled):
             sampler, rate = core.PythonSampler(system.equations, as_function(drive.function, joints)), float(drive.rate_Hz)
         else:
@@ -186,7 +189,7 @@ def check(t_eval: Any, rtol: float, method: str) -> np.ndarray:
     t = _times(t_eval)
     if not 1e-13 <= rtol <= 0.1:
         raise InputError("expected a relative tolerance between 1e-13 and 0.1", key="rtol", value=rtol)
-    if method not in METHODS:
+    if method not in METHODS + SHORT:
         raise InputError(f"expected one of {', '.join(METHODS)}", key="method", value=method)
     return t
 

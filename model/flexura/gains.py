@@ -13,7 +13,7 @@
     damping = 1180.0           # N s/m
 
 A name says its joint and, by its units, what the output is: V, rad/s, and in the model only N or N m (`kp_1_N_m_rad`). The terms
-are those of `law.py`.
+are those of `control.py`.
 """
 
 from __future__ import annotations

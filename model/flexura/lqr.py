@@ -24,8 +24,7 @@ from scipy.linalg import expm, solve_discrete_are
 
 from .control import PID, Controller, Linear, Motor, Stepper
 from .errors import InputError
-from .statespace import linearize
-from .system import System
+from .system import System, linearize
 
 
 @dataclass(frozen=True)
@@ -128,9 +127,7 @@ def _linear(system: System, d: Design, q: np.ndarray, hold: np.ndarray, scale: S
     offset[:joints] = q[system.joint_rows]
     if len(measured) > joints:
         L[:, joints], measured[joints] = d.L[:, -1], d.C[-1]
-        y, own = system.to_solver @ q, [i for i, link in enumerate(system.robot.links) if link.flexible][-1]
-        first, m = int(system.chain.first[own]) + 1, len(system.links[own].S0)
-        offset[joints] = system.chain.NL[own, :m] @ y[first : first + m]
+        offset[joints] = system.places(q)[0][-1]
     return Linear(d.F, G, L, measured, K, Kr, Kv, offset, held)
 
 

@@ -38,16 +38,18 @@ NOTED, DOUBTED, REFUSED = 1e-3, 1e-2, 0.1  # of the energies: a balance beyond i
 
 
 def record(
-    system: System, t: np.ndarray, states: np.ndarray, accounts: np.ndarray, forces: np.ndarray, meta: dict[str, Any]
-) -> Run:
+    system: System, t: np.ndarray, states: np.ndarray, accounts: np.ndarray, forces: np.ndarray, meta: dict[str, Any],
+    seen: np.ndarray | None = None, jumps: Any = 0.0,
+) -> Run:  # fmt: skip
     """The Run of a simulation.
 
     Args: t (T,) [s]; states (T, 2n); accounts (T, 4): work of the drives, losses, what the method took out, and the rise of the
-        strain energy, each from its own integral [J]; forces (T, links) of the drives; meta: what else the metadata says.
+        strain energy, each from its own integral [J]; forces (T, links) of the drives; meta: what else the metadata says;
+        seen (T, k): what `system.observe` gives, if it is known; jumps (T,): what the energy has jumped by so far [J].
     """
     robot, n = system.robot, system.n
     q, v = np.ascontiguousarray(states[:, :n]), np.ascontiguousarray(states[:, n:])
-    seen = system.observe(q, v)
+    seen = system.observe(q, v) if seen is None else seen
     found: list[np.ndarray] = []
     for i, row in enumerate(system.joint_rows):
         found += [q[:, row], v[:, row], forces[:, i]]
@@ -55,7 +57,7 @@ def record(
     found += [*seen.T, *accounts[:, :STRAIN].T]
     units = channel_units(robot)
     channels = {name: np.ascontiguousarray(values) for name, values in zip(units, found, strict=True)}
-    about = describe(system, energy_error(energies, accounts)) | meta
+    about = describe(system, energy_error(energies, accounts, jumps)) | meta
     if len(t):
         about["numerical_loss_J"] = float(accounts[-1, NUMERICAL])
     return judged(Run(t, channels, units, about, states))

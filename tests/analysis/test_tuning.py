@@ -51,9 +51,7 @@ ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join(map(str, (MODEL, ROOT 
 
 
 def joint(t, y, r=None):
-    out = np.full(6, np.nan)
-    joint_figures(t, np.ones_like(t) if r is None else r, y, out)
-    return out
+    return joint_figures(t, np.ones_like(t) if r is None else r, y)
 
 
 # -- figures -----------------------------------------------------------------------------------------------------------
@@ -86,8 +84,7 @@ def test_what_never_happens_is_not_a_number():
 def test_the_strips_figures_of_a_decaying_vibration_about_a_bend():
     t, d, w = np.linspace(0, 5, 50_001), 2.0, 2 * np.pi * 5
     y = 1e-3 + 4e-3 * np.exp(-d * t) * np.sin(w * t)
-    out = np.zeros(4)
-    strip_figures(t, y, 1.0, out)
+    out = strip_figures(t, y, 1.0)
     assert out[PEAK] == pytest.approx(np.abs(y - y[0]).max()) and out[RESIDUAL] == pytest.approx(np.ptp(y[t >= 1]) / 2)
     assert out[RMS] == pytest.approx(4e-3 * np.sqrt((1 / (4 * d) - 0.25 * d / (d**2 + w**2)) / 5), rel=1e-3)
     assert out[VIBRATION] == pytest.approx(4e-3 * (2 / np.pi) / d**2, rel=1e-2)  # the mean of |sin| is 2 / pi
@@ -233,9 +230,9 @@ def test_rows_of_the_law_are_those_of_a_controller_with_the_same_settings():
     frees = [free(name, value / 2, value * 2) for name, value in settings.items()]
     system = fx.assemble(ROBOT)
     made, plain = (under(system, SWING, gains.Gains(GAINS.settings | more)) for more in (settings, {}))
-    base = plain._gains(plain.joints[0])[None]
+    base = plain.gains()
     row = freedom.rows(frees, np.array([list(settings.values())]), plain, base)
-    assert np.array_equal(row[0, 0], made._gains(made.joints[0]))
+    assert np.array_equal(row[0], made.gains())
 
 
 @pytest.mark.parametrize("text, said", [

@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from hypothesis import strategies as st
 import flexura as fx
 from flexlab.board import frames
 from flexlab.board.declaration import ADC_SAMPLES, CONFIG, CONTROL_HZ, DUTY_FULL
-from flexura import gains, law, signal
+from flexura import gains, signal
 
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "firmware"
@@ -143,22 +144,20 @@ def board(lib, values, rows):
 
 
 def model(values, rows):
-    """The same by flexura.law, which knows no integers: all T ticks, without a robot's mechanics."""
+    """The same by the model's law, which knows no integers: all T ticks, without a robot's mechanics, before their delays."""
     system = fx.assemble(fx.load(ROOT / "model/robots/rig.toml"))
     count, step = 1 / values["motor_counts_per_m"], 1 / values["stepper_steps_per_rad"]
     played = np.arange(len(rows)) * TICK_S
     reference = [signal.piecewise(played, rows[:, j] / 256 * (count, step)[j]) for j in range(2)]
     drive = gains.from_board(values).controller(reference, [fx.Motor(1.0, 0.0), fx.Stepper()])
-    segments, index, _ = drive.packed()
-    sampled = drive.law(system, index, TICK_S, len(rows))
-    look, place, out = sampled.look[0], rows[0, 0] // 256, np.zeros((len(rows), 2))
+    sampled = replace(drive, joints=tuple(replace(joint, delay_s=0.0) for joint in drive.joints)).sampler(system)
+    sampled.start(system.start())
+    place, out = rows[0, 0] // 256, np.zeros((len(rows), 2))
     for k in range(1, len(rows)):
         place += rows[k, 2]
         w = (rows[k, 3] / (1024 * ADC_SAMPLES) - values["flex_zero"]) * values["flex_c1_m"]
-        z = look * (w / (look @ look))
-        z[sampled.first] = place * count, rows[0, 1] // 256 * step
-        law.tick(sampled, segments, k * TICK_S, z)
-        out[k] = sampled.memory[:, law.U]
+        sampled.step(k - 1, k * TICK_S, np.array([place * count, rows[0, 1] // 256 * step]), w, 0.0)
+    out[1:] = sampled.log[:, :, 1]
     return out.T
 
 

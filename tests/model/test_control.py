@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 import flexura as fx
-from flexura import control, gains, law, lqr, shaping, signal
+from flexura import control, gains, lqr, shaping, signal, trials
 from robots import beam, rigid, robot, system
 
 TICK, ROOT = 1e-3, Path(__file__).resolve().parents[2]
@@ -76,6 +76,99 @@ def test_a_cart_follows_the_recursion_written_out(data):
         assert np.abs(run["joint/1/position"] - wanted).max() < 1e-5
     else:
         np.testing.assert_allclose(run["joint/1/position"], wanted, atol=1e-11)
+
+
+def law_by_hand(pids, drive, positions, w, s):
+    """Outputs (K, N) of the law as control.py states it, from measured positions (K, N), deflections and slopes (K,)."""
+    T, smooth = 1 / drive.rate_Hz, lambda f, T: 1 - np.exp(-2 * np.pi * f * T) if f else 1.0
+    strip = [np.zeros(2), np.zeros(2)]  # value and rate of deflection, of slope
+    m = [dict(sum=0.0, u=0.0, r=p.reference(-1e-9)[0], speed=0.0, last=x, pulses=x, tip=0.0) for p, x in zip(pids, positions[0])]
+    out = np.zeros(positions.shape)
+    for k in range(len(positions)):
+        readings = np.array([[rounded(w[j], drive.deflection_quantum_m), s[j]] for j in (max(k - 1, 0), k)])
+        if k == 0:
+            strip[0][0], strip[1][0] = readings[1]
+        if k % 2 == 0:
+            for value, mean in zip(strip, readings.mean(axis=0)):
+                change = smooth(drive.deflection_Hz, 2 * T) * (mean - value[0])
+                value += [change, change / (2 * T) - value[1]]
+        for i, (p, own) in enumerate(zip(pids, m)):
+            before, own["r"] = own["r"], own["r"] + smooth(p.setpoint_Hz, T) * (p.reference(k * T)[0] - own["r"])
+            rate = (own["r"] - before) / T
+            own["speed"] += smooth(p.derivative_Hz, T) * ((positions[k, i] - own["last"]) / T - own["speed"])
+            own["last"] = positions[k, i]
+            counts = isinstance(p.output, fx.Stepper) and not p.output.encoder
+            q, speed = (own["pulses"], own["u"]) if counts else (positions[k, i], own["speed"])
+            if k % 2 == i % 2:
+                own["tip"] = p.kf * strip[0][0] + p.kg * strip[0][1] + p.ks * strip[1][0] + p.kt * strip[1][1]
+            e = own["r"] - q
+            grown = own["sum"] + p.ki * e * T
+            grown = grown if abs(grown) <= p.limit else own["sum"]
+            ahead = p.feedforward(k * T)[0] if p.feedforward else 0.0
+            wish = p.kp * e + grown + p.kd * (rate - speed) + own["tip"] + p.kv * rate + p.kc * np.sign(rate) + ahead
+            u = np.clip(np.clip(wish, -p.limit, p.limit), own["u"] - p.slew * T, own["u"] + p.slew * T)
+            if not ((wish > u and (e < 0) == (p.ki < 0)) or (wish < u and (e < 0) != (p.ki < 0))):
+                own["sum"] = grown
+            own["u"], own["pulses"] = u, own["pulses"] + u * T
+            out[k, i] = u
+    return out
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_every_term_is_that_of_the_law_written_out(seed):
+    """A force, a stepper that counts and one by its encoder, each with all terms, on random measurements."""
+    r, count = np.random.default_rng(seed), 120
+    sys = system(rigid(0.1, 0.6, 0.05, 5e-4, "Pa"), rigid(0.1, 0.2, 0.05, 5e-4), beam(0.3, 0.157, 0.3333, 4, modes=2))
+    pids = tuple(
+        fx.PID(
+            signal.harmonic(*r.uniform(0.1, 2.0, 2)), output, feedforward=signal.harmonic(*r.uniform(0.1, 2.0, 2)),
+            setpoint_Hz=r.choice([0.0, 5.0]), derivative_Hz=r.choice([0.0, 50.0]),
+            limit=r.choice([3.0, np.inf]), slew=r.choice([500.0, np.inf]), **dict(zip(control.GAINS, r.uniform(-2.0, 3.0, 9))),
+        )
+        for output in (fx.Force(), fx.Stepper(), fx.Stepper(encoder=True))
+    )  # fmt: skip
+    drive = fx.Controller(pids, rate_Hz=500.0, deflection_Hz=20.0, deflection_quantum_m=1e-4)
+    positions = np.cumsum(r.normal(0, 1e-3, (count, 3)), axis=0)
+    w, s = np.cumsum(r.normal(0, 1e-3, (2, count)), axis=1)
+    sampler = drive.sampler(sys)
+    sampler.start(sys.start())
+    for k in range(count):
+        force, motion = sampler.step(k, k / 500, positions[k], w[k], s[k])
+        assert force[0] == sampler.log[k, 0, 1] and motion[1, 0] == sampler.log[k, 1, 2]
+    np.testing.assert_allclose(sampler.log[:, :, 1], law_by_hand(pids, drive, positions, w, s), rtol=1e-9, atol=1e-9)
+
+
+def test_the_law_measures_what_a_run_shows():
+    """Tip deflection and slope are those of the exact line: with kf and ks alone, forces are the Run's channels."""
+    sys = system(beam(0.3, 0.157, 0.3333, 4), payload=0.02)
+    bent = fx.static(sys, tip_force=(0.0, 2.0))
+    for gain, channel in (("kf", "tip_deflection"), ("ks", "tip_slope")):
+        c = fx.PID(signal.constant(0.0), **{gain: 3.0})
+        run = fx.simulate(sys, [0.0, TICK], fx.Controller((c,), deflection_Hz=0.0), q0=bent)
+        assert run["joint/1/drive"][0] == pytest.approx(3.0 * run[f"link/1/{channel}"][0], rel=1e-15)
+        assert abs(run[f"link/1/{channel}"][0]) > 0.03
+
+
+def test_a_run_begins_where_the_robot_stands():
+    """A stepper that holds a joint which does not start at 0."""
+    sys = system(beam(0.3, 0.157, 0.3333, 4, "Pb", start=0.2), payload=0.02)
+    run = fx.simulate(sys, [0.0, 0.01], fx.Controller((fx.PID(signal.constant(0.2), fx.Stepper(), kp=5.0),)))
+    np.testing.assert_array_equal(run["joint/1/position"], [0.2, 0.2])
+
+
+def test_rows_of_gains_are_runs_whatever_their_order_and_threads():
+    sys = rig()
+    drive = fx.Controller((
+        fx.PID(signal.step(0.05), fx.Motor(13.0, 120.0), kp=300, limit=6, setpoint_Hz=2.0),
+        fx.PID(signal.step(0.4), fx.Stepper(20.0, 0.01), kp=20, limit=6, slew=60, setpoint_Hz=2.0, delay_s=TICK),
+    ))  # fmt: skip
+    rows = np.repeat(drive.gains()[None], 6, axis=0)
+    rows[:, 0, control.KP] = np.linspace(100, 600, 6)
+    many = trials.trials(sys, drive, 1.0, 0.005, 1e-5)
+    figures, reached = many.run(rows)
+    assert (reached == 1.0).all()
+    again, _ = many.run(rows[::-1], threads=3)
+    np.testing.assert_array_equal(again[::-1], figures)
 
 
 def test_the_sum_does_not_wind_up():
@@ -197,19 +290,19 @@ def test_the_lqrs_cost_is_its_riccati_matrix():
 
 
 def test_the_observers_error_falls_with_its_poles():
-    """The compiled law on the linear plant, from a state that it does not know: z - x = (F (1 - L C))^k (z0 - x0)."""
+    """The law on the linear plant, from a small state that it does not know: z - x = (F (1 - L C))^k (z0 - x0)."""
     sys = rig()
     drive, d = quiet(sys, [signal.constant(0.0)] * 2)
-    segments, index, _ = drive.packed()
-    sampled = drive.law(sys, index, 0.0, 0)
-    x, wrong = np.linspace(1, 2, len(d.F)) * 1e-4, None
+    sampled = drive.sampler(sys)
+    sampled.start(sys.start())
+    x, wrong = np.linspace(1, 2, len(d.F)) * 1e-6, None
     half = len(d.F) // 2
     for k in range(200):
-        error = sampled.z[0] - x
+        error = np.asarray(sampled.prediction) - x
         wrong = error if wrong is None else d.F @ (np.eye(len(d.F)) - d.L @ d.C) @ wrong
         np.testing.assert_allclose(error, wrong, rtol=1e-7, atol=1e-9 * np.abs(x).max())
-        law.tick(sampled, segments, k * TICK, np.concatenate([sys.to_solver @ x[:half], np.zeros(half)]))
-        x = d.F @ x + d.G @ sampled.memory[:, law.GIVEN]
+        force, _ = sampled.tick(k, k * TICK, x[:half].copy())
+        x = d.F @ x + d.G @ force
     assert np.abs(d.observer_poles).max() < 1
 
 

@@ -89,9 +89,7 @@ def both(name: str, first: Result, second: Result, possible: Reference) -> Both:
     """The two cases side by side, with what limits both."""
     settled, left = float(np.nanmax([r.responses[0].joints[:, SETTLING] for r in (first, second)])), []
     for run in (first.runs[0], second.runs[0], possible.run):
-        strip = np.zeros(4)
-        strip_figures(run.t, np.ascontiguousarray(run["link/2/tip_deflection"]), settled, strip)
-        left.append(float(strip[RESIDUAL]))
+        left.append(float(strip_figures(run.t, run["link/2/tip_deflection"], settled)[RESIDUAL]))
     zeros = {row.drive: float(row.unstable.real.min()) for row in _zeros(first.task) if len(row.unstable)}
     return Both(name, (first, second), possible, (left[0], left[1], left[2]), _shortest(first.task), zeros)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import queue
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
@@ -11,8 +10,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from flexura.population import cores
 from flexura.errors import FlexuraError, InputError
+from flexura.population import cores
 from flexura.request import program
 
 from .task import Task
@@ -35,14 +34,11 @@ class Engine(Runs, Protocol):
 
 
 class Threads:
-    """On this machine: a thread a core, each with its own memory; the compiled runs leave Python's lock."""
+    """On this machine: a thread a core; the runs leave Python's lock."""
 
     def __init__(self, task: Task, threads: int) -> None:
-        self.task, self.stopped = task, threading.Event()
+        self.task, self.trials, self.stopped = task, task.trials(), threading.Event()
         self.pool = ThreadPoolExecutor(threads)
-        self.memories: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        for _ in range(threads):
-            self.memories.put(task.trials())
 
     def __call__(self, points: np.ndarray, limits: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return _joined(list(self.pool.map(self._chunk, _chunks(points, 1), _chunks(limits, 1))))
@@ -50,11 +46,7 @@ class Threads:
     def _chunk(self, points: np.ndarray, limits: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         if self.stopped.is_set():
             raise KeyboardInterrupt
-        memory = self.memories.get()
-        try:
-            return self.task.run(memory, points, limits)
-        finally:
-            self.memories.put(memory)
+        return self.task.run(self.trials, points, limits)
 
     def __enter__(self) -> Threads:
         return self

@@ -15,17 +15,16 @@ from typing import Any
 import numpy as np
 
 import flexura as fx
-from flexura import law
-from flexura.control import GAINS, smoothing
+from flexura.control import DEFLECTION, DERIVATIVE, GAINS, LIMIT, SETPOINT, SLEW, smoothing
 from flexura.errors import InputError
 from flexura.files import read_toml
 from flexura.gains import NAMES, Gains
 from flexura.signal import finite
 
 COLUMNS = {name: k for k, name in enumerate(GAINS)} | {
-    "limit": law.LIMIT, "slew": law.SLEW, "setpoint_Hz": law.SETPOINT,
+    "limit": LIMIT, "slew": SLEW, "setpoint_Hz": SETPOINT,
 }  # fmt: skip
-_FILTERS = {"derivative_Hz": law.DERIVATIVE, "deflection_Hz": law.DEFLECTION}  # of all joints
+_FILTERS = {"derivative_Hz": DERIVATIVE, "deflection_Hz": DEFLECTION}  # of all joints
 SCALES = ("log", "linear")
 
 
@@ -123,7 +122,7 @@ def named(frees: Sequence[Free], values: np.ndarray) -> dict[str, float]:
 
 
 def rows(frees: Sequence[Free], values: np.ndarray, controller: fx.Controller, base: np.ndarray) -> np.ndarray:
-    """`Law.gains` (B, N, 20) of values (B, d): those of `controller`, `base` (N, 20), but for the free settings."""
+    """`Controller.gains` (B, N, 20) of values (B, d): those of `controller`, `base` (N, 20), but for the free settings."""
     out, period = np.repeat(base[None], len(values), axis=0), 1 / controller.rate_Hz
     for k, f in enumerate(frees):
         column = values[:, k]

@@ -24,7 +24,7 @@ from flexura import lqr
 from flexura.errors import InputError
 from flexura.gains import Gains
 from flexura.response import Response
-from flexura.trials import run_rows, trial
+from flexura.trials import trials
 
 from ..controlled import under
 from .cases import Structure
@@ -96,8 +96,8 @@ class Designs:
                 drive = self.controller(values)
             except InputError:
                 continue
-            one = trial(self.plant, drive, m.duration_s, m.output_step_s, self.task.rtol)
-            run_rows(one, prices, one.inputs.law.gains[None].copy(), limits[k : k + 1], out[k], reached[k])
+            one = trials(self.plant, drive, m.duration_s, m.output_step_s, self.task.rtol)
+            out[k], reached[k] = one.run(drive.gains()[None], prices, limits[k : k + 1])
         return out, reached
 
     def digest(self) -> str:

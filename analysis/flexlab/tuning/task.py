@@ -15,7 +15,7 @@ import flexura as fx
 from flexura.control import PID
 from flexura.errors import InputError
 from flexura.gains import Gains
-from flexura.trials import Trial, run_rows, trial
+from flexura.trials import Trials, trials
 
 from ..controlled import under
 from . import free as freedom
@@ -89,8 +89,8 @@ class Task:
 
     @cached_property
     def _rows(self) -> list[np.ndarray]:
-        """`Law.gains` (N, 20) of each robot's controller."""
-        return [np.array([c._gains(joint) for joint in c.joints if isinstance(joint, PID)]) for c in self.controllers]
+        """The gains (N, 20) of each robot's controller."""
+        return [c.gains() for c in self.controllers]
 
     def score(self, figures: np.ndarray, reached: np.ndarray) -> np.ndarray:
         """The goals (B, 1 or 2) from figures (B, R, k) and fractions reached (B, R)."""
@@ -98,24 +98,23 @@ class Task:
             return objective.double(figures, reached, self.manoeuvre.duration_s)
         return objective.single(figures, reached, self.prices)
 
-    def trials(self) -> list[Trial]:
-        """One core's memory for all robots."""
+    def trials(self) -> list[Trials]:
+        """What runs are made with, one for each robot; for any number of threads."""
         m = self.manoeuvre
         both = zip(self.systems, self.controllers, strict=True)
-        return [trial(system, controller, m.duration_s, m.output_step_s, self.rtol) for system, controller in both]
+        return [trials(system, controller, m.duration_s, m.output_step_s, self.rtol) for system, controller in both]
 
     def run(
-        self, trials: Sequence[Trial], points: np.ndarray, limits: np.ndarray | None = None
+        self, robots: Sequence[Trials], points: np.ndarray, limits: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
         """Figures (B, R, k) and fractions reached (B, R) at points (B, d) of the unit cube, each abandoned where J exceeds its
         limit (B,), inf for none: its figures are then lower bounds, 0 on the robots that it was not tried on any more."""
         limits = np.full(len(points), np.inf) if limits is None else limits
         values, left = self.values(points), np.arange(len(points))
         width = self.prices.shape[1]
-        figures, reached = np.zeros((len(points), len(trials), width)), np.zeros((len(points), len(trials)))
-        for k, (one, controller, base) in enumerate(zip(trials, self.controllers, self._rows, strict=True)):
-            found, far = np.zeros((len(left), width)), np.zeros(len(left))
-            run_rows(one, self.prices, freedom.rows(self.free, values[left], controller, base), limits[left], found, far)
+        figures, reached = np.zeros((len(points), len(robots), width)), np.zeros((len(points), len(robots)))
+        for k, (one, controller, base) in enumerate(zip(robots, self.controllers, self._rows, strict=True)):
+            found, far = one.run(freedom.rows(self.free, values[left], controller, base), self.prices, limits[left])
             figures[left, k], reached[left, k] = found, far
             left = left[(far == 1.0) | np.isinf(limits[left])]
         return figures, reached

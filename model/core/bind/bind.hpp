@@ -32,6 +32,7 @@ inline Array new_array(std::initializer_list<std::size_t> shape) {
 void bind_numbers(nb::module_ &module);    // numbers.cpp
 void bind_mechanics(nb::module_ &module);   // mechanics.cpp
 void bind_simulation(nb::module_ &module);  // simulation.cpp
+void bind_control(nb::module_ &module);     // control.cpp, after simulation.cpp
 void bind_population(nb::module_ &module);  // population.cpp
 
 }  // namespace flexura

@@ -12,5 +12,6 @@ MODULE(FLEXURA_MODULE_NAME, module) {
   flexura::bind_numbers(module);
   flexura::bind_mechanics(module);
   flexura::bind_simulation(module);
+  flexura::bind_control(module);
   flexura::bind_population(module);
 }

@@ -2,6 +2,7 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include "controller.hpp"
 #include "mechanics.hpp"
 #include "observe.hpp"
 #include "packed.hpp"
@@ -68,6 +69,7 @@ struct Running {
       };
     }
     if (!sampler.is_none()) acting.sampler = nb::cast<Sampler *>(sampler), acting.rate_Hz = rate_Hz;
+    if (auto *controller = dynamic_cast<Controller *>(acting.sampler)) controller->start(acting, q.data());
     Request request;
     request.times = {t.data(), t.data() + t.shape(0)}, request.q = {q.data(), q.data() + n}, request.v = {v.data(), v.data() + n};
     request.rtol = rtol, request.method = method, request.first_step = first_step, request.most_steps = most_steps;

@@ -10,13 +10,14 @@ from typing import NamedTuple
 import numpy as np
 
 from ..robot import Link
-from .modes import clamped_matrices, clamped_modes
+from .modes import clamped_matrices, clamped_modes, orthogonal_shapes
 from .quadrature import collocation, gauss, lagrange, lagrange_integrals
 from .section import Material, material
-from .shapes import ElementShapes, WholeShapes
+from .shapes import ElementShapes, MeshShapes, WholeShapes
 
 ELEMENT_POINTS = 3
-MOST_SHAPES = 20  # polynomials of a whole link
+MOST_SHAPES = 20  # polynomials of a link in modes
+MOST_WHOLE = 16  # unknowns of a link that is one piece
 
 
 class Place(NamedTuple):
@@ -41,7 +42,7 @@ class Piece:
 
     length: float
     points: int
-    shapes: ElementShapes | WholeShapes
+    shapes: ElementShapes | MeshShapes | WholeShapes
     K: np.ndarray
     mass_xi: np.ndarray
     mass: np.ndarray
@@ -71,10 +72,28 @@ class Piece:
         """The shapes at the points (1): (P, m)."""
         return self.shapes(self.xi)
 
+    def lagrange(self, xi: np.ndarray, derivative: int = 0) -> np.ndarray:
+        """Lagrange's polynomials at xi (S,), or their derivatives by xi (2): (S, P)."""
+        return lagrange(self.points, xi, derivative)
+
+    def integrals(self, xi: np.ndarray) -> np.ndarray:
+        """The weights w_j over the length at xi (S,) (2): (S, P)."""
+        return lagrange_integrals(self.points, xi)
+
+    def kept_integrals(self, xi: tuple[float, ...]) -> np.ndarray:
+        """`integrals` at places that are asked for again."""
+        if xi not in self._integrals:
+            self._integrals[xi] = self.integrals(np.array(xi))
+        return self._integrals[xi]
+
+    @cached_property
+    def _integrals(self) -> dict[tuple[float, ...], np.ndarray]:
+        return {}
+
     def at(self, xi: float) -> Place:
         """Weights and shapes at a place xi."""
         s = np.array([xi])
-        lines = [lagrange_integrals(self.points, s), *(lagrange(self.points, s, k) for k in (0, 1))]
+        lines = [self.integrals(s), *(self.lagrange(s, k) for k in (0, 1))]
         return Place(*(f[0] for f in lines), *(self.shapes(s, k)[0] for k in (0, 1, 2)))
 
     @cached_property
@@ -90,7 +109,7 @@ class Piece:
     @cached_property
     def w(self) -> np.ndarray:
         """The weights w_j of the mass points (2): (G, P) [m]."""
-        return self.length * lagrange_integrals(self.points, self.mass_xi)
+        return self.length * self.integrals(self.mass_xi)
 
     @cached_property
     def s(self) -> np.ndarray:
@@ -105,7 +124,7 @@ class Piece:
 
 def orders(link: Link, followed: bool) -> tuple[int, int]:
     """How many polynomials (7) and how many points a whole-link piece has."""
-    mesh, sleeve = min(2 * link.elements, MOST_SHAPES), link.joint.type == "Pb"
+    mesh, sleeve = min(2 * link.elements, MOST_WHOLE), link.joint.type == "Pb"
     if link.modes is None:
         return mesh, mesh + 1
     few = min(link.modes, MOST_SHAPES - 5) + 5
@@ -128,21 +147,17 @@ def pieces(
     """The pieces of a flexible link that `beyond` follows (None: it carries the payload)."""
     law = material(link)
     if not whole(link, beyond):
-        return _mesh(law, link.elements)
+        return mesh(law, link.elements)
     count, points = orders(link, beyond is not None)
     sleeve = link.joint.type == "Pb"
     if sleeve and link.modes is None:
         return (whole_piece(law, points, np.eye(count), np.zeros(0)),)
     free = link.joint.start if sleeve else link.length_m
-    kept = count if link.modes is None else min(link.modes, count)
-    matrices = clamped_matrices(law, free, count, points, mass, inertia)
-    return (
-        whole_piece(
-            law,
-            points,
-            *clamped_modes(*matrices, kept, link.modes is not None and beyond is not None),
-        ),
-    )
+    M, K, tip = clamped_matrices(law, free, count, points, mass, inertia)
+    if link.modes is None:
+        return (whole_piece(law, points, *orthogonal_shapes(K)),)
+    kept = min(link.modes, count)
+    return (whole_piece(law, points, *clamped_modes(M, K, tip, kept, beyond is not None)),)
 
 
 def whole_piece(law: Material, points: int, coefficients: np.ndarray, K: np.ndarray) -> Piece:
@@ -152,7 +167,8 @@ def whole_piece(law: Material, points: int, coefficients: np.ndarray, K: np.ndar
     return Piece(law.length, points, WholeShapes(coefficients), K, s / law.length, dm)
 
 
-def _mesh(law: Material, elements: int) -> tuple[Piece, ...]:
+def mesh(law: Material, elements: int) -> tuple[Piece, ...]:
+    """The pieces of a link of equal elements (6)."""
     ends = np.linspace(0, law.length, elements + 1)
     return tuple(_element(law, a, b) for a, b in pairwise(ends))
 

@@ -28,6 +28,32 @@ class ElementShapes:
 
 
 @dataclass(frozen=True)
+class MeshShapes:
+    """The shapes of n equal elements on a whole link (6): those behind a place have turned it."""
+
+    elements: tuple[ElementShapes, ...]
+
+    @property
+    def count(self) -> int:
+        return 2 * len(self.elements)
+
+    def __call__(self, xi: np.ndarray, derivative: int = 0) -> np.ndarray:
+        """Their values at xi, or their derivatives by xi: (S, 2 n)."""
+        n, xi = len(self.elements), np.atleast_1d(np.asarray(xi, dtype=float))
+        out, on = np.zeros((len(xi), n, 2)), element_of(n, xi)
+        for k, shapes in enumerate(self.elements):
+            out[on == k, k] = n**derivative * shapes(n * xi[on == k] - k, derivative)
+            if derivative == 0:
+                out[on > k, k] = shapes(np.ones(1))[0]
+        return out.reshape(len(xi), 2 * n)
+
+
+def element_of(n: int, xi: np.ndarray) -> np.ndarray:
+    """Which of n equal elements a place xi (S,) on the link lies on, from 0."""
+    return np.clip((n * xi).astype(int), 0, n - 1)
+
+
+@dataclass(frozen=True)
 class WholeShapes:
     """Shapes of a whole link: column k of `coefficients` (N, m) is one in the space (7)."""
 

@@ -5,6 +5,7 @@ M(q) qdd + bias(q, qd) + damping(q) qd + elastic(q) + gravity(q) = force        
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +25,15 @@ class Energies(NamedTuple):
     kinetic: float
     strain: float
     potential: float
+
+
+class Terms(NamedTuple):
+    """The parts of (19) in a state: `forces` (n,) of inertia and gravity, `elastic` (n,), `damping` (n, n)."""
+
+    mass: np.ndarray
+    forces: np.ndarray
+    elastic: np.ndarray
+    damping: np.ndarray
 
 
 class Assembly:
@@ -48,7 +58,7 @@ class Assembly:
     def bias(self, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
         """Coriolis, centrifugal and convective forces (n,), on the left-hand side (15)."""
         h = masses.inertia_forces(self.n, self._parts(q, qd))
-        for state, law in self._sleeves(q, qd):
+        for state, law in self._sleeves(self.structure.states(q, qd)):
             h += sleeve.flow_forces(state.lines[0], law)
         return h
 
@@ -59,7 +69,7 @@ class Assembly:
     def elastic(self, q: np.ndarray) -> np.ndarray:
         """The derivative of the strain energy (n,): K q, and of a sleeved link also dU/dd (17)."""
         out = self.stiffness_blocks(q) @ q
-        for state, law in self._sleeves(q, np.zeros(self.n)):
+        for state, law in self._sleeves(self.structure.states(q, np.zeros(self.n))):
             y = q[state.lines[0].own]
             out[self.rows[state.index]] += 0.5 * y @ sleeve.stiffness(state.lines[0], law, 1) @ y
         return out
@@ -71,7 +81,7 @@ class Assembly:
             for piece, own in zip(link, owns, strict=True):
                 if piece.K.size:
                     K[own, own] = np.diag(piece.K)
-        for state, law in self._sleeves(q, np.zeros(self.n)):
+        for state, law in self._sleeves(self.structure.states(q, np.zeros(self.n))):
             own = state.lines[0].own
             K[own, own] = sleeve.stiffness(state.lines[0], law)
         return K
@@ -79,7 +89,7 @@ class Assembly:
     def stiffness(self, q: np.ndarray) -> np.ndarray:
         """The second derivative of the strain energy (n, n), without loads (17)."""
         K = self.stiffness_blocks(q)
-        for state, law in self._sleeves(q, np.zeros(self.n)):
+        for state, law in self._sleeves(self.structure.states(q, np.zeros(self.n))):
             own, row = state.lines[0].own, self.rows[state.index]
             slope = sleeve.stiffness(state.lines[0], law, 1) @ q[own]
             K[own, row] += slope
@@ -117,9 +127,50 @@ class Assembly:
             + self.gravity(q)
         )
 
+    def terms(self, q: np.ndarray, qd: np.ndarray) -> Terms:
+        """All of (19) but drives and Coulomb friction, in one sweep for a time loop."""
+        states = self.structure.states(q, qd)
+        parts = [part for state in states for part in self.structure.masses(state)]
+        M = masses.mass_matrix(self.n, parts)
+        M[self.rows, self.rows] += self._rotors
+        forces = masses.inertia_forces(self.n, parts) + masses.weight(self.n, parts, self._g)
+        sleeves = self._sleeves(states)
+        if not sleeves:
+            K, D = self._constant
+            return Terms(M, forces, K @ q, D)
+        for state, law in sleeves:
+            forces += sleeve.flow_forces(state.lines[0], law)
+        return Terms(M, forces, self.elastic(q), self.damping(q))
+
+    @cached_property
+    def _constant(self) -> tuple[np.ndarray, np.ndarray]:
+        """K and D (n, n) of a robot without flexible links in sleeves, whose matrices depend on no q."""
+        return self.stiffness_blocks(np.zeros(self.n)), self.damping(np.zeros(self.n))
+
+    def observe(self, q: np.ndarray, qd: np.ndarray, stations: int) -> np.ndarray:
+        """What a Run shows of a state, in the order of `record.channel_units` (2), (29).
+
+        Link by link x, y [m], angle [rad] of its proximal end; if it bends its tip's distance across the tangent at its hub
+        (sleeve) [m], the tip's angle to it [rad], and that distance at `stations` equally spaced abscissas [m]; then x, y of the
+        tip; kinetic, strain and potential energy [J].
+        """
+        states, out = self.structure.states(q, qd), []
+        for state, link in zip(states, self.robot.links, strict=True):
+            root, hub = self.structure.root(state), state.hub
+            out += [root.real, root.imag, hub.angle]
+            if state.lines:
+                places = self.structure.places(state, np.linspace(0.0, link.length_m, stations))
+                across = ((np.append(state.tip.place, places) - hub.place) * hub.tangent.conjugate()).imag
+                out += [across[0], state.tip.angle - hub.angle, *across[1:]]
+        tip = states[-1].tip.place
+        return np.array([*out, tip.real, tip.imag, *self._energies(states, q, qd)])
+
     def energies(self, q: np.ndarray, qd: np.ndarray) -> Energies:
         """The energies in a state (29)."""
-        parts = self._parts(q, qd)
+        return self._energies(self.structure.states(q, qd), q, qd)
+
+    def _energies(self, states: list[LinkState], q: np.ndarray, qd: np.ndarray) -> Energies:
+        parts = [part for state in states for part in self.structure.masses(state)]
         return Energies(
             masses.kinetic(parts, qd) + 0.5 * float(self._rotors @ qd[self.rows] ** 2),
             float(0.5 * q @ self.stiffness_blocks(q) @ q),
@@ -153,10 +204,10 @@ class Assembly:
             part for state in self.structure.states(q, qd) for part in self.structure.masses(state)
         ]
 
-    def _sleeves(self, q: np.ndarray, qd: np.ndarray) -> list[tuple[LinkState, Material]]:
+    def _sleeves(self, states: list[LinkState]) -> list[tuple[LinkState, Material]]:
         """The flexible links in a sleeve, with their materials."""
         out = []
-        for state in self.structure.states(q, qd):
+        for state in states:
             law = self.structure.laws[state.index]
             if law is not None and self.structure.sleeved(state.index):
                 out.append((state, law))

@@ -38,9 +38,8 @@ def frequencies(robot: Any, q: Any = None, joints: str = "locked", *, count: int
     system = system_of(robot)
     _check(joints, count)
     if system.robot.nodal:
-        from .. import nodal
-
-        return nodal.frequencies(system, q, joints, qd)[:count]
+        q = static(system) if q is None else q
+        system = system.fixed(q)
     if qd is not None:
         return _steady(system, static(system) if q is None else system.check(q), system.check(qd, "qd"), joints)[:count]
     return modes(system, q, joints, count=count).frequencies_Hz

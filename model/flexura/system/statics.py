@@ -39,12 +39,8 @@ def static(
     q, load = held(system, joints), np.array([*tip_force, tip_moment], dtype=float)
     if load.shape != (3,) or not np.all(np.isfinite(load)):
         raise InputError("expected a finite force (x, y) and moment", key="tip_force", value=(tip_force, tip_moment))
-    if system.robot.nodal:
-        from .. import nodal
-
-        return nodal.equilibrium(system, q, load)
     if not system.exact:
-        return _dense(system, q, load)
+        return _dense(system.fixed(q), q, load)
     free = np.zeros(len(system.joint_rows), dtype=np.uint8)
     found, balance, share, _ = system.equations.equilibrium(q, load, free)
     if balance == STABLE:
@@ -70,10 +66,7 @@ def held(system: System, joints: Any) -> np.ndarray:
 def tip_pose(robot: Any, q: Any) -> np.ndarray:
     """x, y [m] and angle [rad] of the last link's tip in the base's axes at q (n,)."""
     system = system_of(robot)
-    if system.robot.nodal:
-        from .. import nodal
-
-        return nodal.tip_pose(system, np.asarray(q, dtype=float))
+    system = system.fixed(q)
     x, y, angle = system.line(q, len(system.robot.links), [system.robot.links[-1].length_m])
     return np.array([x[0], y[0], angle[0]])
 

@@ -8,10 +8,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..link.line import Piece, pieces
+from ..link.line import Piece, mesh, pieces
+from ..link.mesh import joined
 from ..link.section import Material, material
-from ..link.shapes import ElementShapes
-from ..robot import Robot
+from ..link.shapes import WholeShapes
+from ..robot import Link, Robot
 from . import sleeve
 from .kinematics import Frame, Line, ahead, base, line, station, turned
 from .masses import Part, line_masses, lump, turning
@@ -61,12 +62,12 @@ class Structure:
         out: list[str] = []
         for i, link in enumerate(self.links, 1):
             out.append(f"joint/{i}")
-            for k, piece in enumerate(link, 1):
-                if isinstance(piece.shapes, ElementShapes):
-                    out += [f"link/{i}/element/{k}/rotation", f"link/{i}/element/{k}/bubble"]
-                else:
-                    kind = "mode" if piece.K.size else "shape"
-                    out += [f"link/{i}/{kind}/{j}" for j in range(1, piece.count + 1)]
+            if link and isinstance(link[0].shapes, WholeShapes):
+                kind = "mode" if link[0].K.size else "shape"
+                out += [f"link/{i}/{kind}/{j}" for j in range(1, link[0].count + 1)]
+                continue
+            for k in range(1, sum(piece.count for piece in link) // 2 + 1):
+                out += [f"link/{i}/element/{k}/rotation", f"link/{i}/element/{k}/bubble"]
         return tuple(out)
 
     @property
@@ -136,6 +137,22 @@ class Structure:
         k = min(int(x / h), len(state.lines) - 1)
         return station(state.lines[k], x / h - k)
 
+    def places(self, state: LinkState, s: np.ndarray) -> np.ndarray:
+        """Places of a flexible link at arc lengths s (S,) [m] from its proximal end (2)."""
+        if len(state.lines) > 1:
+            return np.array([self.at(state, float(x)).place for x in s])
+        line, x = state.lines[0], s + self._along(state.index, 0.0, state.q)[0]
+        if line.row is None:
+            return line.start.place + line.free * line.piece.kept_integrals(tuple(x / line.free)) @ line.e
+        reach = line.free * line.piece.integrals(np.maximum(x, 0.0) / line.free) @ line.e
+        return line.start.place + np.minimum(x, 0.0) * state.hub.tangent + reach
+
+    def root(self, state: LinkState) -> complex:
+        """The place of a link's proximal end (2)."""
+        if state.lines and not self.sleeved(state.index):
+            return state.lines[0].start.place
+        return state.hub.place + self._along(state.index, 0.0, state.q)[0] * state.hub.tangent
+
     def masses(self, state: LinkState) -> list[Part]:
         """A link's masses: its material, its hub, and the payload of the last one (3)."""
         joint = self.robot.links[state.index].joint
@@ -161,15 +178,24 @@ class Structure:
 
 def structure(robot: Robot, linear: bool | None = None) -> Structure:
     """The structure of a robot, with shapes computed here."""
-    links, load = robot.links, robot.payload
-    beyond = [*links[1:], None]
+    links, flat = robot.links, not robot.stiffening if linear is None else linear
     made = tuple(
-        pieces(link, after, *((load.mass_kg, load.inertia_kg_m2) if after is None else (0.0, 0.0)))
-        if link.flexible
-        else ()
-        for link, after in zip(links, beyond, strict=True)
+        _pieces(robot, link, after, flat) if link.flexible else ()
+        for link, after in zip(links, [*links[1:], None], strict=True)
     )
-    return Structure(robot, made, not robot.stiffening if linear is None else linear)
+    return Structure(robot, made, flat)
+
+
+def _pieces(robot: Robot, link: Link, after: Link | None, linear: bool) -> tuple[Piece, ...]:
+    """The pieces of a link: with nodal sliding a mesh; what the core does not have is one piece."""
+    slides = link.joint.type == "Pb" or (after is not None and after.joint.type == "Pa")
+    if robot.nodal and slides:
+        made = mesh(material(link), link.elements)
+    elif after is not None:
+        made = pieces(link, after)
+    else:
+        made = pieces(link, None, robot.payload.mass_kg, robot.payload.inertia_kg_m2)
+    return (joined(made),) if linear or robot.nodal else made
 
 
 def rigid_body(robot: Robot, i: int) -> tuple[float, float, float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -15,6 +15,7 @@ from ..robot import Robot, load
 from ..run import STATIONS
 from .assembly import Assembly
 from .constants import equations
+from .nodes import Nodes, nodes_at
 from .structure import Structure, structure
 
 _UNITS = {"rotation": "rad", "bubble": "rad", "shape": "rad", "mode": "kg^(1/2) m"}
@@ -30,12 +31,22 @@ class System:
     """
 
     robot: Robot
+    nodes: tuple[int, ...] | None = None  # that sliders and sleeves keep, where they go from node to node: `nodes.Nodes`
+
+    def fixed(self, q: Any) -> System:
+        """The robot of fixed structure at q (n,): itself; where it slides from node to node, with the nodes that it has there."""
+        if not self.robot.nodal:
+            return self
+        at = self._array(q, "q")
+        return replace(self, nodes=nodes_at(self.robot, at[self.joint_rows]))
 
     @cached_property
     def assembly(self) -> Assembly:
         """The same equations as dense sums, to be read; with the shapes that the core uses."""
         made = structure(self.robot)
-        if made.linear or self.robot.nodal:
+        if self.nodes is not None:
+            return Assembly(Nodes(made.robot, made.links, made.linear, self.nodes))
+        if not self.exact:
             return Assembly(made)
         links = tuple(self._shapes(i, pieces) for i, pieces in enumerate(made.links))
         return Assembly(Structure(self.robot, links))
@@ -63,8 +74,8 @@ class System:
 
     @cached_property
     def elastic_rows(self) -> np.ndarray:
-        """Rows of the elastic unknowns in q."""
-        return np.setdiff1d(np.arange(self.n), self.joint_rows)
+        """Rows of the elastic unknowns in q, without those of nodes at rest in a sleeve."""
+        return np.setdiff1d(np.arange(self.n), np.append(self.joint_rows, self._resting))
 
     @cached_property
     def locked(self) -> np.ndarray:
@@ -73,8 +84,12 @@ class System:
 
     @cached_property
     def free_rows(self) -> np.ndarray:
-        """Rows of q that can move: all but locked joints."""
-        return np.setdiff1d(np.arange(self.n), self.joint_rows[self.locked])
+        """Rows of q that can move: all but locked joints and nodes at rest in a sleeve."""
+        return np.setdiff1d(np.arange(self.n), np.append(self.joint_rows[self.locked], self._resting))
+
+    @property
+    def _resting(self) -> np.ndarray:
+        return np.zeros(0, dtype=int) if self.nodes is None else self.assembly.structure.resting  # type: ignore[attr-defined]
 
     def own_rows(self, link: int) -> np.ndarray:
         """Rows of the elastic unknowns of a link (from 0)."""
@@ -131,7 +146,13 @@ class System:
 
     def accelerations(self, q: Any, qd: Any, force: Any) -> np.ndarray:
         """qdd (n,) under generalised forces (n,), locked joints at rest; Coulomb friction left out (20) to (23)."""
-        return np.asarray(self.equations.accelerations(self.check(q), self.check(qd, "qd"), self.check(force, "force")))
+        at, rates, acting = self.check(q), self.check(qd, "qd"), self.check(force, "force")
+        if self.exact:
+            return np.asarray(self.equations.accelerations(at, rates, acting))
+        terms, out, free = self.assembly.terms(at, rates), np.zeros(self.n), self.free_rows
+        left = acting - terms.forces - terms.elastic - terms.damping @ rates
+        out[free] = np.linalg.solve(terms.mass[np.ix_(free, free)], left[free])
+        return out
 
     def line(self, q: Any, link: int, s: Any = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """x, y [m] and the tangent's angle theta [rad] in the base's axes of a link (from 1) at q.
@@ -189,9 +210,12 @@ class System:
 
     def check(self, q: Any, key: str = "q") -> np.ndarray:
         """An array (n,) of floats. Raises InputError for another shape, and for robots that slide from node to node."""
-        if self.robot.nodal:
+        if self.robot.nodal and self.nodes is None:
             text = 'expected "continuous": sliding from node to node has other matrices between every two nodes'
             raise InputError(text, key="sliding", value="nodal")
+        return self._array(q, key)
+
+    def _array(self, q: Any, key: str) -> np.ndarray:
         array = np.ascontiguousarray(q, dtype=float)
         if array.shape != (self.n,):
             raise InputError(
