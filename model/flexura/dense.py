@@ -231,6 +231,9 @@ class Course:
 
     @property
     def _free(self) -> np.ndarray:
+        """Rows whose accelerations are unknown."""
+        if not len(self.given):
+            return self.system.free_rows
         return np.setdiff1d(self.system.free_rows, self.rows[self.given])
 
     def _solver(self, start: float, z: np.ndarray, end: float, length: float | None) -> Any:
@@ -251,7 +254,7 @@ class Course:
             for piece, own in zip(assembly.structure.links[i], assembly.structure.own[i]):
                 unit[own] = 1 / np.maximum(np.abs(piece.B).max(axis=0), 1e-9)
         energy = 1e-2 * float(np.max(np.diag(M)[self.rows] * unit[self.rows] ** 2))
-        self._atol = STRICT * self.rtol * np.concatenate([1e-3 * unit, 1e-2 * unit, np.full(3, max(energy, 1e-12))])
+        self._atol = STRICT * self.rtol * np.concatenate([1e-2 * unit, 1e-1 * unit, np.full(3, max(energy, 1e-12))])
         free, elastic = self.system.free_rows, len(self.system.elastic_rows)
         if method in ("explicit", "implicit") or not elastic or not len(free):
             return "implicit" if method == "implicit" else "explicit"
