@@ -70,7 +70,7 @@ class Course:
         self.now, self.until, self.z = float(t[0]), float(t[-1]), np.concatenate([q, qd, np.zeros(3)])
         self.length: float | None = None  # of the last step
         self.steps, self.evaluations, self.jumped = 0, 0, 0.0
-        self.found: list[tuple[np.ndarray, ...]] = []
+        self.found: list[tuple[Any, ...]] = []
         self.events: list[dict[str, Any]] = []
         self.method = self._method(method)
 
@@ -155,7 +155,7 @@ class Course:
             self._show(self.t[(self.t > before) & (self.t <= self.now)], line)
             if self.progress is not None:
                 self.progress((self.now - self.t[0]) / (self.t[-1] - self.t[0]))
-        return (which[0], which[1]) if far > 0 else None
+        return (which[0], bool(which[1])) if far > 0 else None
 
     def _when(self, line: Callable[[float], np.ndarray], before: float, after: float) -> float:
         """When a joint leaves its bounds between two times."""
