@@ -5,7 +5,7 @@
 
 namespace flexura {
 
-constexpr int MOST_SLEEVE = 20;  // unknowns of a sleeved piece (whole_link.cpp)
+constexpr int MOST_WHOLE = 16;  // unknowns of a link that is one piece
 
 // Mass per length and bending stiffness at a point of the material, and their derivatives by its abscissa.
 template <class Real>
@@ -123,7 +123,7 @@ inline void free_stiffness(const Piece<Real> &c, const Real &d, Real *K) {
 template <class Real, class R>
 inline void add_bending(R &rows, const Piece<Real> &c, const Stage<Real> &stage, const Real *q, const Real &d) {
   const int m = c.m, rest = m + 2;
-  Real K[MOST_SLEEVE * MOST_SLEEVE], bent[Free::most];
+  Real K[MOST_WHOLE * MOST_WHOLE], bent[Free::most];
   free_stiffness(c, d, K);
   const Real share = stage.gq + stage.gv * c.beta, inverse = 1.0 / d;
   const Real *y = stage.y + c.own(), *v = stage.v + c.own();

@@ -4,18 +4,19 @@
 #include <array>
 #include <mutex>
 
+#include "sleeve.hpp"
+
 namespace flexura {
 namespace {
 
-constexpr int MOST_SHAPES = 20;  // of a whole link: more polynomials gain nothing that double precision shows
-constexpr int SPARE = 3;         // polynomials beyond the modes that are kept: the last modes of a space are none of the link
+constexpr int MOST_SHAPES = 20;  // of a link in modes: more polynomials gain nothing that double precision shows
 
-// How many unknowns a whole link has that keeps no number of modes: as many as its mesh, at most MOST_SHAPES.
-int mesh_count(const Link &link) { return std::min(2 * link.elements, MOST_SHAPES); }
+// How many Legendre shapes a whole link has that keeps no number of modes: as many as its mesh has unknowns, up to MOST_WHOLE.
+int mesh_count(const Link &link) { return std::min(2 * link.elements, MOST_WHOLE); }
 
-// How many Legendre shapes describe a whole link in modes: enough for the last to be right to 1e-5 in a uniform one.
+// How many describe it in modes: enough for the last mode to be right to 1e-5 in a uniform link.
 int shape_count(const Link &link) {
-  if (link.modes < 0) return mesh_count(link) + SPARE;
+  if (link.modes < 0) return mesh_count(link);
   const int few = std::min(link.modes, MOST_SHAPES - 5) + 5;
   return uniform(link.material) ? few : std::max(few, mesh_count(link));
 }
@@ -48,8 +49,8 @@ Shapes computed_shapes(int count, int P) {
 
 // The shapes at P = count or count + 1 points; computed once, when they are asked for first.
 const Shapes &shapes(int count, int P) {
-  static std::array<Shapes, 2 * (MOST_SHAPES + SPARE + 1)> table;
-  static std::array<std::once_flag, 2 * (MOST_SHAPES + SPARE + 1)> made;
+  static std::array<Shapes, 2 * (MOST_SHAPES + 1)> table;
+  static std::array<std::once_flag, 2 * (MOST_SHAPES + 1)> made;
   const std::size_t k = std::size_t(2 * count + (P > count));
   std::call_once(made.at(k), [&] { table[k] = computed_shapes(count, P); });
   return table[k];
@@ -130,9 +131,7 @@ WholeLink begin_whole(const Link &link, const Carried &carried) {
   WholeLink out;
   Draft &piece = out.piece;
   const int count = shape_count(link);
-  const bool all = link.modes < 0;
-  out.slider = carried.slider, out.follower = carried.follower && !all, out.own = true;
-  out.modes = all ? mesh_count(link) : link.modes;
+  out.slider = carried.slider, out.follower = carried.follower, out.modes = link.modes, out.own = true;
   piece.P = count + (link.modes < 0 || carried.follower ? 1 : 0), piece.beta = link.beta;
   inertia(piece, link.material, 0.0, link.length);
   add_payload(piece, carried);
@@ -145,7 +144,7 @@ WholeLink begin_whole(const Link &link, const Carried &carried) {
 WholeLink begin_sleeved(const Link &link, const Carried &carried) {
   WholeLink out;
   Draft &piece = out.piece;
-  const int count = link.modes < 0 ? mesh_count(link) : shape_count(link), P = count + 1;
+  const int count = shape_count(link), P = count + 1;
   const LineRule &rule = line_rule(P);
   out.sleeve = true, out.follower = carried.follower, out.modes = link.modes, out.own = link.modes >= 0;
   piece.P = P, piece.joint = At::sleeve, piece.beta = link.beta, piece.length = link.length;

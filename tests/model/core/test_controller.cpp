@@ -166,7 +166,7 @@ TEST("a cart follows the recursion written out") {
 }
 
 TEST("a stepper's pulses are the integral of its rate, and a joint without a spring is held to them") {
-  const Shared robot = made({rigid(JointKind::revolute, 0.1, 0.5), strip(JointKind::revolute, 0.3, 4, 2)});
+  const Shared robot = made({rigid(JointKind::slider, 0.1, 0.6), strip(JointKind::revolute, 0.3, 4, 2)});
   Driven held = effort(900.0, 50.0, constant(0.0)), step = effort(20.0, 0.0, step_to(0.4));
   step.output = JointLaw::Output::stepper;
   double *g = step.gain;
