@@ -62,7 +62,7 @@ def cart_with_sleeve(elements: int, start: float, slider: float = 0.7, **keys) -
 
 def cut_in_two(node: int, elements: int, stiffening: bool) -> fx.System:
     """`in_a_sleeve` as a robot of fixed structure: a rigid link in the sleeve and, on a locked joint, the elements beyond."""
-    behind, (mass, stiffness) = 0.8 * node / elements, TAPER
+    behind, mass = 0.8 * node / elements, TAPER[0]
     at = lambda table, s: np.interp(s, [0.0, 0.8], [v["value"] for v in table])
     xi, w = np.polynomial.legendre.leggauss(4)
     s, dm = behind / 2 * (1 + xi), behind / 2 * w * at(mass, behind / 2 * (1 + xi))
