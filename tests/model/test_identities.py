@@ -287,7 +287,7 @@ def small_state(sys: fx.System, seed: int) -> dict[str, np.ndarray]:
 
 
 @fast
-@given(robots(max_links=4), seeds)
+@given(robots(max_links=4, stiffening=True), seeds)
 def test_energy_changes_by_the_work_of_the_drives_less_the_losses(bot, seed):
     """To 1e-8 of the largest energy (B12) at rtol 1e-11, since work and losses do not choose the steps."""
     sys = fx.assemble(bot)
@@ -352,7 +352,7 @@ def test_a_very_stiff_robot_moves_like_a_rigid_one(bot, seed):
 
 
 @few
-@given(robots(max_links=4, gravity=False, stiffening=None, first="R"), seeds)
+@given(robots(max_links=4, gravity=False, stiffening=True, first="R"), seeds)
 def test_without_gravity_the_base_may_be_turned(bot, seed):
     sys, angle = fx.assemble(bot), 0.8
     t, small = np.linspace(0, 0.1, 6), small_state(sys, seed)
@@ -365,7 +365,7 @@ def test_without_gravity_the_base_may_be_turned(bot, seed):
 
 
 @few
-@given(robots(max_links=4, coulomb=True), seeds)
+@given(robots(max_links=4, coulomb=True, stiffening=True), seeds)
 def test_a_mirrored_robot_moves_mirrored(bot, seed):
     """y -> -y: angles, torques, deflections and gravity's y change sign; sliders and their forces do not."""
     data = bot.to_dict()
