@@ -26,7 +26,7 @@ def leaving(elements: int, rtol: float = 1e-6) -> tuple[fx.System, fx.Run]:
 B9 = np.array([-0.04202, 0.03550, -0.04937, 0.04401, 0.05059, -0.01515, -0.06376, -0.05752, 0.02937])
 
 
-@pytest.mark.parametrize(("elements", "accept"), [(4, 1e-2), (8, 1.5e-3)])
+@pytest.mark.parametrize(("elements", "accept"), [(2, 3e-3), (4, 6e-4)])
 def test_a_link_leaves_its_sleeve(elements, accept):
     """B9, large-rotation column; 1 % of the largest deflection is what the benchmark accepts."""
     _, run = leaving(elements)
@@ -135,7 +135,7 @@ def motions(sys: fx.System, size: float = 1.0) -> list[fx.Signal]:
 def test_energy_is_kept_with_moving_sliders_and_sleeves(name):
     """1e-8 of the largest energy, over crossings of nodes, with gravity and damping; drives that make the motion."""
     sys = structure(name, gravity=(0.0, -9.81))
-    run = fx.inverse(sys, np.linspace(0, 0.5, 6), motions(sys), q0=fx.static(sys), rtol=1e-11)
+    run = fx.inverse(sys, np.linspace(0, 0.5, 6), motions(sys), q0=fx.static(sys), rtol=1e-9)
     assert run.complete and run.meta["energy_error"] < 1e-8
     moved = [np.ptp(run[f"joint/{i}/position"]) for i in (1, 2)]
     assert min(moved) > 0.1
