@@ -230,6 +230,8 @@ template <class Real> class Adams {
       }
       keep(ahead[0][j], p), keep(ahead[1][j], q), keep(ahead[2][j], end);
     }
+    for (int j = order; j < ORDER; ++j)  // (older weights must not come back when a neighbour makes the chunk a mixed one)
+      for (auto &weights : ahead) keep(weights[j], Lanes(0.0));
     for (int r = 0; r < 2; ++r) {
       Lanes p = 0.0, q = 0.0;
       for (int m = 0; m <= order; ++m) {

@@ -102,7 +102,7 @@ void finish_together(std::size_t index, const std::vector<Blank *> &blanks, cons
     links.M = side_by_side([&](int k) -> const Numbers & { return whole(k).clamped.M; });
     links.deflection = side_by_side([&](int k) -> const Numbers & { return whole(k).clamped.deflection; });
     links.angle = side_by_side([&](int k) -> const Numbers & { return whole(k).clamped.angle; });
-    four = own_modes(links, whole(0).modes, whole(0).follower);
+    four = whole(0).modes < 0 ? orthogonal_shapes(links) : own_modes(links, whole(0).modes, whole(0).follower);
   }
   for (int k = 0; k < count; ++k) {
     LinkDraft &draft = blanks[std::size_t(k)]->links[index];
@@ -112,7 +112,8 @@ void finish_together(std::size_t index, const std::vector<Blank *> &blanks, cons
       for (const Pack<4> &x : four.X) one.X.push_back(x[k]);
       for (const Pack<4> &x : four.squares) one.squares.push_back(x[k]);
     } else if (draft.has_whole && draft.whole.own) {
-      one = own_modes(draft.whole.clamped, draft.whole.modes, draft.whole.follower);
+      const WholeLink &own = draft.whole;
+      one = own.modes < 0 ? orthogonal_shapes(own.clamped) : own_modes(own.clamped, own.modes, own.follower);
     }
     finish_link(draft, robots[std::size_t(k)]->links[index], one);
   }

@@ -4,8 +4,10 @@
 // trial, goes on from where its trial ended; what the others did is forgotten. The race is held again where progress a pass has fallen
 // to a quarter, at most once in AGAIN passes. Passes are counted, not time: a run's digits do not depend on the machine's load.
 //
-// There is no race either where exponential steps end soon (pace.hpp), or where it would not be allowed or is decided beforehand: a sampled controller must see each tick once, and a caller's
-// function no time before one it has seen; rigid robots without gains or friction and tolerances below 1e-9 are for explicit steps.
+// There is no race either where exponential steps end soon (pace.hpp), or where it would not be allowed or is decided beforehand: a
+// sampled controller must see each tick once, and a caller's function no time before one it has seen; rigid robots without gains or
+// friction and tolerances below 1e-9 are for explicit steps. Exponential steps do not take part where a slider moves along a link that
+// bends: the modes change with every step.
 #pragma once
 #include <array>
 #include <memory>
@@ -29,12 +31,12 @@ class Auto {
   bool advance(long steps) {
     if (!chosen) choose();
     while (steps > 0 && loop.any()) {
-      const long some = std::min(steps, CHECK), before = loop.course.passes;
-      const double t = loop.clock[0].t;
+      if (in_window == 0) window_passes = loop.course.passes, window_t = loop.clock[0].t;
+      const long some = std::min(steps, WINDOW - in_window);  // windows do not depend on how many steps are asked for
       loop.advance(*chosen, some);
-      steps -= some;
-      if (gives_way()) continue;
-      const double progress = (loop.clock[0].t - t) / static_cast<double>(std::max(loop.course.passes - before, 1L));
+      steps -= some, in_window = (in_window + some) % WINDOW;
+      if (gives_way() || in_window > 0) continue;
+      const double progress = (loop.clock[0].t - window_t) / static_cast<double>(std::max(loop.course.passes - window_passes, 1L));
       if (raced && loop.any() && progress * SLOWER < speed && since_race() > AGAIN) race();
     }
     return loop.any();
@@ -45,7 +47,7 @@ class Auto {
   const Exponential<double> &exponential_steps() const { return exponential; }
 
  private:
-  static constexpr long CHECK = 50;  // steps between two looks at the progress
+  static constexpr long WINDOW = 50;  // steps between two looks at the progress
   Loop<double> &loop;
   const double rtol;
   Exponential<double> exponential;
@@ -54,19 +56,21 @@ class Auto {
   Method<double> *chosen = nullptr;
   bool raced = false, unrivalled = false;
   int held = 0;
-  long last_race = 0;
+  long last_race = 0, in_window = 0, window_passes = 0;
+  double window_t = 0.0;
   double speed = 0.0;  // seconds a pass, when chosen
 
   // A state of the loop to come back to, with the rows recorded since another one.
   struct Mark {
     std::vector<double> z, t, state, drive;
     Clock clock;
+    Weights<double>::Sizes sizes;
     int rows = 0;
   };
   Mark mark(int since) const {
     const Record &r = loop.record[0];
     Mark m;
-    m.z = loop.course.z, m.clock = loop.clock[0], m.rows = r.rows;
+    m.z = loop.course.z, m.clock = loop.clock[0], m.rows = r.rows, m.sizes = loop.course.weights.sizes();
     m.t.assign(r.t.begin() + since, r.t.begin() + r.rows);
     m.state.assign(r.state.begin() + static_cast<std::ptrdiff_t>(since) * r.size, r.state.begin() + static_cast<std::ptrdiff_t>(r.rows) * r.size);
     m.drive.assign(r.drive.begin() + static_cast<std::ptrdiff_t>(since) * r.joints, r.drive.begin() + static_cast<std::ptrdiff_t>(r.rows) * r.joints);
@@ -75,6 +79,7 @@ class Auto {
   void go_back(const Mark &m, int since) {
     Record &r = loop.record[0];
     loop.course.z = m.z, loop.clock[0] = m.clock, r.rows = m.rows;
+    loop.course.weights.resume(m.sizes);  // what another trial has seen must not loosen the tolerance
     std::copy(m.t.begin(), m.t.end(), r.t.begin() + since);
     std::copy(m.state.begin(), m.state.end(), r.state.begin() + static_cast<std::ptrdiff_t>(since) * r.size);
     std::copy(m.drive.begin(), m.drive.end(), r.drive.begin() + static_cast<std::ptrdiff_t>(since) * r.joints);
@@ -87,7 +92,7 @@ class Auto {
     const auto resistance = [&](int i) { return larger(c.plant.viscous[i], c.plant.coulomb[i]); };
     if (for_explicit(rtol, bends, c.plant.joints, acting, resistance)) chosen = &explicit_;
     else if (acting.sampler) chosen = stiffer_than(acting.rate_Hz) ? static_cast<Method<double> *>(&implicit) : &explicit_;
-    else if (acting.function) chosen = bends ? static_cast<Method<double> *>(&exponential) : &explicit_;
+    else if (acting.function) chosen = !bends ? static_cast<Method<double> *>(&explicit_) : c.plant.rides ? static_cast<Method<double> *>(&implicit) : &exponential;
     else race();
   }
 
@@ -125,9 +130,11 @@ class Auto {
     double furthest = -1.0, step = start.clock.wish;
     const bool begun = chosen == nullptr;  // exponential steps have made the first part of their trial already
     const long before = loop.course.passes;
-    if (begun && without_rival()) return;
+    const bool rides = loop.course.plant.rides;
+    if (begun && !rides && without_rival()) return;
     unrivalled = false;
     for (Method<double> *method : std::array<Method<double> *, 3>{&exponential, &implicit, &explicit_}) {
+      if (method == &exponential && rides) continue;
       if (method == &explicit_ && hopeless(furthest)) break;
       const bool goes_on = begun && method == &exponential;
       if (!goes_on) {
@@ -165,7 +172,7 @@ class Auto {
   bool gives_way() {
     Clock &c = loop.clock[0];
     if (chosen != &exponential || (c.status != Status::stuck && c.status != Status::diverged)) return false;
-    chosen = &implicit, raced = false;
+    chosen = &implicit, raced = false, in_window = 0;
     c.status = Status::running, c.fresh = true, c.failed = 0;
     c.wish = 1e-6 * (c.end - c.t);
     return true;

@@ -51,7 +51,7 @@ void Controller::start(Acting &acting, const double *q) {
   }
 }
 
-void Controller::step(long k, double t, const double *positions, const Bend<double> &bend, SampledOutput &held) {
+void Controller::step(long k, double t, const double *positions, const Bend &bend, SampledOutput &held) {
   std::iota(law_.first.begin(), law_.first.end(), 0);
   law_.strip = [bend](const double *) { return bend; };
   law_.tick(k, t, positions, nullptr, held);

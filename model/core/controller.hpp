@@ -33,7 +33,7 @@ class Controller : public Sampler {
 
   void tick(long k, double t, const double *q, const double *v, SampledOutput &held) override { law_.tick(k, t, q, v, held); }
   // The same from what is measured, without a robot: positions of the joints (N), bend of the last flexible link.
-  void step(long k, double t, const double *positions, const Bend<double> &bend, SampledOutput &held);
+  void step(long k, double t, const double *positions, const Bend &bend, SampledOutput &held);
 
   const Law &law() const { return law_; }
   const Model<double> &robot() const { return *robot_; }

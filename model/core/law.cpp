@@ -24,7 +24,7 @@ void Law::reset() {
   for (std::size_t i = 0; i < joints.size(); ++i) memory_[i].ring.assign(std::size_t(joints[i].delay) + 1, 0.0);
   predicted_.assign(std::size_t(linear.states), 0.0), estimated_ = predicted_;
   measured_.assign(std::size_t(linear.measurements), 0.0);
-  before_ = filtered_ = rate_ = Bend<double>();
+  before_ = filtered_ = rate_ = Bend();
   log.clear();
 }
 
@@ -48,7 +48,7 @@ void Law::tick(long k, double t, const double *q, const double *, SampledOutput 
 // The strip: readings of two ticks make a value, its filter and its rate.
 void Law::sense(long k, const double *q) {
   if (!strip) return;
-  Bend<double> now = strip(q);
+  Bend now = strip(q);
   now.deflection = rounded(now.deflection, quantum);
   if (measured_.size() > joints.size()) measured_[joints.size()] = now.deflection - linear.offset[joints.size()];
   if (k == 0) before_ = filtered_ = now;

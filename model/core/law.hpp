@@ -55,7 +55,7 @@ class Law : public Sampler {
   double deflection = 1.0;  // a of the filter of deflection and slope
   double quantum = 0.0;     // of the measured deflection [m]; 0: exact
   std::vector<int> first;   // (joints) their rows
-  std::function<Bend<double>(const double *q)> strip;  // empty: no deflection is measured
+  std::function<Bend(const double *q)> strip;  // empty: no deflection is measured
   std::vector<Tick> log;    // (ticks, joints) if `logging`
   bool logging = true;
 
@@ -72,7 +72,7 @@ class Law : public Sampler {
   };
   std::vector<Memory> memory_;
   std::vector<double> predicted_, estimated_, measured_;
-  Bend<double> before_, filtered_, rate_;
+  Bend before_, filtered_, rate_;
 
   void sense(long k, const double *q);
   void measure(long k, double t, std::size_t i, const double *q);

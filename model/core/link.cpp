@@ -1,6 +1,7 @@
 #include "link.hpp"
 
 #include "fault.hpp"
+#include "sleeve.hpp"
 
 namespace flexura {
 namespace {
@@ -45,6 +46,7 @@ LinkDraft begin_link(const Link &link, int index, const Carried &carried) {
   const bool sleeve = joint.kind == JointKind::sleeve, flexible = link.elements > 0;
   if (flexible && (link.material.empty() || !(link.length > 0.0)))
     throw Fault(index, "length_m", "expected a length above 0 and a material for a link that bends");
+  if (flexible && link.modes > MOST_WHOLE - 2) throw Fault(index, "modes", "expected at most 14");
   LinkDraft out;
   if (sleeve) out.pieces.push_back(rigid(0.0, 0.0, 0.0, 0.0));  // the sleeve itself, fixed to the link before
   out.has_whole = flexible && (sleeve || link.modes >= 0 || carried.slider);

@@ -218,6 +218,14 @@ template <class Real> class ModelPlant : public Plant<Real> {
       Real &own = this->lever[std::size_t(this->first[std::size_t(i)])];
       if (model.kind[std::size_t(i)] == JointKind::revolute) own = larger(own, LEAST * this->reach);
     }
+    this->travel.assign(std::size_t(this->joints), Real(0.0));  // sleeves and sliders on links that bend
+    for (std::size_t i = 0; i < model.pieces.size(); ++i) {
+      const Piece<Real> &c = model.pieces[i];
+      if (c.joint == At::sleeve) this->travel[std::size_t(c.link)] = 0.003 * c.length;
+      if (c.joint != At::slider || i == 0 || model.pieces[i - 1].m == 0) continue;
+      this->rides = this->rides || !model.locked[std::size_t(c.link)];
+      this->travel[std::size_t(c.link)] = 0.003 * model.pieces[i - 1].length;
+    }
   }
 };
 

@@ -29,7 +29,7 @@ template <class Real> class Modes {
  public:
   static constexpr int LANES = LanesOf<Real>::value;
   static constexpr double POOR = 0.25;   // the change of Phi M Phi^T, and of Phi K Phi^T against w_i w_j, that is put up with
-  static constexpr double TURN = 0.25;   // the configuration is looked at after so many radians (metres of the tips over the reach)
+  static constexpr double TURN = 0.05;   // the configuration is looked at after so many radians (metres of the tips over the reach)
   static constexpr double FREE = 1e-4;   // w2 below this is none [rad^2/s^2]
 
   const int n, chunks, stride;
@@ -57,6 +57,10 @@ template <class Real> class Modes {
       double bent = 0.0;
       for (int j = e; j < end; ++j) {
         const double x = lane(plant.lever[j] * (q[j] - seen[j]), k);
+        if (j == e && !plant.travel.empty()) {
+          const double most = lane(plant.travel[i], k);
+          if (most > 0.0 && abs(lane(q[j] - seen[j], k)) > most) return true;
+        }
         if (j == e) way += i > 0 ? abs(x) : 0.0;  // turning the whole robot changes no mode
         else bent += x * x;
       }

@@ -27,7 +27,7 @@ int last_flexible(const Model<double> &model) {
 }
 
 template <class Real>
-Bend<Real> bend(const Model<Real> &model, Workspace<Real> &work, const Real *y, int link) {
+BendOf<Real> bend(const Model<Real> &model, Workspace<Real> &work, const Real *y, int link) {
   Real phi = 0.0, up = 0.0;  // in the hub's own axes
   for (int i = first_moving(model, link); i < model.begin[std::size_t(link) + 1]; ++i) {
     const Piece<Real> &c = model.pieces[std::size_t(i)];
@@ -106,7 +106,7 @@ void Observer<Real>::observe(const Real *y, const Real *v, Real *row, int parts)
     if (!bends(model_, link)) continue;
     if (parts & STATIONS) place_stations(y, link, out + 2);
     if (parts & BENDS) {
-      const Bend<Real> tip = bend(model_, work_, y, link);
+      const BendOf<Real> tip = bend(model_, work_, y, link);
       out[0] = tip.deflection, out[1] = tip.slope;
     }
     out += 2 + stations.size();
@@ -116,7 +116,7 @@ void Observer<Real>::observe(const Real *y, const Real *v, Real *row, int parts)
   if (parts & ENERGIES) out[2] = energy.kinetic, out[3] = energy.strain, out[4] = energy.potential;
 }
 
-template Bend<double> bend(const Model<double> &, Workspace<double> &, const double *, int);
+template Bend bend(const Model<double> &, Workspace<double> &, const double *, int);
 template class Observer<double>;
 template class Observer<Pack<4>>;
 

@@ -9,11 +9,12 @@ namespace flexura {
 
 // How a link's tip stands to the tangent at its hub (of a sleeved link: at the exit): distance across it, angle to it.
 template <class Real>
-struct Bend {
+struct BendOf {
   Real deflection = 0.0, slope = 0.0;  // [m], [rad]
 };
+using Bend = BendOf<double>;
 template <class Real>
-Bend<Real> bend(const Model<Real> &model, Workspace<Real> &work, const Real *y, int link);
+BendOf<Real> bend(const Model<Real> &model, Workspace<Real> &work, const Real *y, int link);
 
 // The last link that bends, or -1.
 int last_flexible(const Model<double> &model);

@@ -62,15 +62,40 @@ std::vector<Real> static_shape(const Clamped<Real> &link, const Real *L, const s
   return shape;
 }
 
-// The lowest `wanted` modes (-1: all). If another link follows, the static shapes of a force and a moment at the tip come to them.
+// Shapes whose stiffness is diagonal: each is one of the space less what those before it would bend with it, X^T K X = diag(squares). Of a
+// uniform link the space's own. What K has of round-off between orthogonal shapes is taken away first.
+template <class Real>
+OwnModes<Real> orthogonal_shapes(const Clamped<Real> &link) {
+  const int m = link.m;
+  std::vector<Real> L = link.K;
+  for (int i = 0; i < m; ++i)
+    for (int k = 0; k < i; ++k) {
+      Real &own = L[std::size_t(i * m + k)];
+      own = choose_less(abs(own), 1e-14 * root(link.K[std::size_t(i * m + i)] * link.K[std::size_t(k * m + k)]), Real(0.0), own);
+    }
+  cholesky(m, L.data());
+  OwnModes<Real> out;
+  out.count = m, out.X.assign(std::size_t(m * m), Real(0.0)), out.squares.resize(std::size_t(m));
+  std::vector<Real> x(std::size_t(m), Real(0.0));
+  for (int k = 0; k < m; ++k) {
+    const Real own = L[std::size_t(k * m + k)];
+    for (Real &value : x) value = Real(0.0);
+    x[std::size_t(k)] = own, out.squares[std::size_t(k)] = own * own;
+    solve_upper(m, L.data(), x.data());
+    for (int i = 0; i < m; ++i) out.X[std::size_t(i * m + k)] = x[std::size_t(i)];
+  }
+  return out;
+}
+
+// The lowest `wanted` modes. If another link follows, the static shapes of a force and a moment at the tip come to them.
 template <class Real>
 OwnModes<Real> own_modes(const Clamped<Real> &link, int wanted, bool follower) {
-  const int m = link.m, lowest = wanted < 0 || wanted > m ? m : wanted;
+  const int m = link.m, lowest = wanted > m ? m : wanted;
   OwnModes<Real> out;
   std::vector<Real> squares(std::size_t(m), Real(0.0)), all(std::size_t(m * m), Real(0.0));
   eigen_definite(m, link.K.data(), link.M.data(), squares.data(), all.data());
   out.count = lowest, out.X = first_columns(all, m, m, lowest), out.squares = squares;
-  if (wanted >= 0 && follower && lowest < m) {
+  if (follower && lowest < m) {
     const int wide = lowest + 2 < m ? lowest + 2 : m;
     std::vector<Real> Y(std::size_t(m * wide)), L = link.K, Z(std::size_t(wide * wide));
     cholesky(m, L.data());

@@ -5,6 +5,8 @@
 
 namespace flexura {
 
+constexpr int MOST_WHOLE = 16;  // unknowns of a link that is one piece
+
 // Mass per length and bending stiffness at a point of the material, and their derivatives by its abscissa.
 template <class Real>
 struct Matter {
@@ -99,23 +101,43 @@ inline void add_point(R &rows, const Piece<Real> &c, const Kept<Real> &k, const 
   rows.row[m + 1].set(rest, rows.row[m + 1][rest] + at.slope * swept + side * at.rate);
 }
 
-// Stiffness and damping of the free length, EI kappa^2 d summed over the points, and the force that bending puts on d.
+// K(d) of the free length, EI kappa^2 d summed over the points: (m, m), the upper triangle. What the sum leaves by round-off where shapes are
+// orthogonal is taken away: it would weigh on the rows of the highest shapes.
+template <class Real>
+inline void free_stiffness(const Piece<Real> &c, const Real &d, Real *K) {
+  const int m = c.m, P = c.P;
+  for (int i = 0; i < m * m; ++i) K[i] = 0.0;
+  for (int p = 0; p < P; ++p) {
+    const Real weight = matter_at(c, Real(c.length + d * (c.xi[p] - 1.0))).stiffness * c.weight[p] / d;
+    for (int i = 0; i < m; ++i)
+      for (int l = i; l < m; ++l) K[i * m + l] += weight * c.bend[i * padded(P) + p] * c.bend[l * padded(P) + p];
+  }
+  for (int i = 0; i < m; ++i)
+    for (int l = i + 1; l < m; ++l) {
+      const Real both = 1e-14 * root(K[i * m + i] * K[l * m + l]);
+      K[i * m + l] = choose_less(abs(K[i * m + l]), both, Real(0.0), K[i * m + l]);
+    }
+}
+
+// Stiffness and damping of the free length, and the force that bending puts on d.
 template <class Real, class R>
 inline void add_bending(R &rows, const Piece<Real> &c, const Stage<Real> &stage, const Real *q, const Real &d) {
-  const int m = c.m, P = c.P, rest = m + 2;
-  Real bent[Free::most], straightening[Free::most], moving[Free::most];
-  bending(c, q, bent), bending(c, stage.y + c.own(), straightening), bending(c, stage.v + c.own(), moving);
-  const Real inverse = 1.0 / d, share = stage.gq + stage.gv * c.beta;
-  Real outward = 0.0;
-  for (int p = 0; p < P; ++p) {
+  const int m = c.m, rest = m + 2;
+  Real K[MOST_WHOLE * MOST_WHOLE], bent[Free::most];
+  free_stiffness(c, d, K);
+  const Real share = stage.gq + stage.gv * c.beta, inverse = 1.0 / d;
+  const Real *y = stage.y + c.own(), *v = stage.v + c.own();
+  for (int i = 0; i < m; ++i) {
+    Real force = 0.0;
+    for (int l = 0; l < m; ++l) force += K[i < l ? i * m + l : l * m + i] * (y[l] + c.beta * v[l]);
+    rows.row[1 + i].set(rest, rows.row[1 + i][rest] + force);
+    for (int l = i; l < m; ++l) rows.row[1 + i].set(1 + l, rows.row[1 + i][1 + l] + share * K[i * m + l]);
+  }
+  bending(c, q, bent);
+  Real outward = 0.0;  // dU/dd at fixed q
+  for (int p = 0; p < c.P; ++p) {
     const Matter<Real> here = matter_at(c, Real(c.length + d * (c.xi[p] - 1.0)));
-    const Real weight = here.stiffness * c.weight[p] * inverse, moment = weight * (straightening[p] + c.beta * moving[p]);
     outward += 0.5 * c.weight[p] * bent[p] * bent[p] * inverse * (here.stiffness_slope * (c.xi[p] - 1.0) - here.stiffness * inverse);
-    for (int i = 0; i < m; ++i) {
-      const Real b = c.bend[i * padded(P) + p], stiff = share * weight * b;
-      rows.row[1 + i].set(rest, rows.row[1 + i][rest] + moment * b);
-      for (int l = i; l < m; ++l) rows.row[1 + i].set(1 + l, rows.row[1 + i][1 + l] + stiff * c.bend[l * padded(P) + p]);
-    }
   }
   rows.row[m + 1].set(rest, rows.row[m + 1][rest] + outward);
 }

@@ -4,17 +4,21 @@
 #include <array>
 #include <mutex>
 
+#include "sleeve.hpp"
+
 namespace flexura {
 namespace {
 
-constexpr int MOST_SHAPES = 20;  // of a whole link: more polynomials gain nothing that double precision shows
+constexpr int MOST_SHAPES = 20;  // of a link in modes: more polynomials gain nothing that double precision shows
 
-// How many Legendre shapes describe a whole link: enough for the last of its modes to be right to 1e-5 in a uniform one.
+// How many Legendre shapes a whole link has that keeps no number of modes: as many as its mesh has unknowns, up to MOST_WHOLE.
+int mesh_count(const Link &link) { return std::min(2 * link.elements, MOST_WHOLE); }
+
+// How many describe it in modes: enough for the last mode to be right to 1e-5 in a uniform link.
 int shape_count(const Link &link) {
-  const int mesh = std::min(2 * link.elements, MOST_SHAPES);
-  if (link.modes < 0) return mesh;
+  if (link.modes < 0) return mesh_count(link);
   const int few = std::min(link.modes, MOST_SHAPES - 5) + 5;
-  return uniform(link.material) ? few : std::max(few, mesh);
+  return uniform(link.material) ? few : std::max(few, mesh_count(link));
 }
 
 // Shapes (7): phi_0 = P_1 + 1, phi_k = (P_(k+1) - P_(k-1)) / (2 k + 1), at points and as sums of Legendre's polynomials.

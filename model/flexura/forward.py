@@ -83,6 +83,9 @@ def simulate(
         acting = as_function(acting, joints)
     q, qd = initial(system, t[0], acting, q0, qd0)
     if not system.exact:
+        if isinstance(acting, Controller):
+            expected = 'expected a robot with stiffening = true and sliding = "continuous" under a Controller'
+            raise InputError(expected, key="drive", value="Controller")
         slow = nodal if system.robot.nodal else dense
         return slow.simulate(system, t, acting, q, qd, rtol, method, progress)
     return _Course(system, t, acting, q, qd, rtol, method).run(progress)

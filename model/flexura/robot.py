@@ -18,6 +18,7 @@ from .files import read_toml, write_toml
 
 MAX_ELEMENTS = 200
 MAX_LINKS = 256
+MOST_MODES = 14  # of one link: more would need more polynomials than double precision carries
 LEAST_FREE = 0.02  # of its length that a flexible link keeps out of its sleeve: its mesh is that long
 
 _strict = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
@@ -189,6 +190,8 @@ class Link(_Table):
                 raise WrongValue(key, None, f"missing: {type(self).model_fields[key].description}")
         if self.modes is not None and self.modes > 2 * self.elements:
             raise WrongValue("modes", self.modes, f"at most {2 * self.elements}, twice the number of elements")
+        if self.modes is not None and self.modes > MOST_MODES:
+            raise WrongValue("modes", self.modes, f"at most {MOST_MODES}; a link without modes keeps all unknowns of its mesh")
 
     def _check_rigid(self) -> None:
         for key in ("modes", "young_modulus_Pa", "bending_stiffness_N_m2"):

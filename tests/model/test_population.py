@@ -50,7 +50,7 @@ def test_each_robot_has_its_own_drive_gains_or_prescribed_motion():
     for k, drive in enumerate(drives):
         run = fx.simulate(fx.assemble(ARM), T, drive)
         assert all(np.array_equal(done[name][k], run[name]) for name in done.units)
-    assert np.array_equal(done["joint/1/position"][2], [motion(t)[0] for t in T])
+    assert np.allclose(done["joint/1/position"][2], [motion(t)[0] for t in T], rtol=0, atol=1e-15)
 
 
 def test_a_varied_robot_has_the_rows_of_the_robot_made_anew():

@@ -107,7 +107,7 @@ nb::tuple tick(Controller &self, long k, double t, const Vector &q) {
 nb::tuple step(Controller &self, long k, double t, const Vector &positions, double deflection, double slope) {
   expect(positions.shape(0) == std::size_t(self.count()), "positions need an entry a joint");
   Acting acting(self.count());
-  self.step(k, t, positions.data(), Bend<double>{deflection, slope}, acting.held);
+  self.step(k, t, positions.data(), Bend{deflection, slope}, acting.held);
   return left(acting.held);
 }
 

@@ -72,7 +72,8 @@ double loss_of(const Mechanics &self, const Vector &q, const Vector &v) {
   return loss(*self.model, q.data(), v.data());
 }
 
-// Constants of the piece that a whole link is: B (m, P), K (m), shapes at the tip (m).
+// Constants of the piece that a whole link is: B (m, P), K (m), shapes at the tip (m); the shapes as sums of Legendre's polynomials (rows, m),
+// no rows where nothing slides along it.
 nb::tuple whole_link(const Mechanics &self, int link) {
   const Model<double> &model = *self.model;
   expect(0 <= link && link < model.links(), "there is no such link");
@@ -82,7 +83,10 @@ nb::tuple whole_link(const Mechanics &self, int link) {
     for (int j = 0; j < c.P; ++j) B.data()[i * c.P + j] = c.B[i * padded(c.P) + j];
     K.data()[i] = c.K[i], tip.data()[i] = c.tip_angle[i];
   }
-  return nb::make_tuple(B, K, tip);
+  Array sums = new_array({std::size_t(c.rail), std::size_t(c.m)});
+  for (int n = 0; n < c.rail; ++n)
+    for (int i = 0; i < c.m; ++i) sums.data()[n * c.m + i] = c.rails[n * (c.P + c.m) + c.P + i];
+  return nb::make_tuple(B, K, tip, sums);
 }
 
 }  // namespace

@@ -115,7 +115,7 @@ Array bends_of(const Mechanics &self, const Matrix &q, int link) {
   Workspace<double> work(*self.model);
   Array out = new_array({q.shape(0), 2});
   for (std::size_t k = 0; k < q.shape(0); ++k) {
-    const Bend<double> b = bend(*self.model, work, q.data() + k * q.shape(1), link);
+    const Bend b = bend(*self.model, work, q.data() + k * q.shape(1), link);
     out.data()[2 * k] = b.deflection, out.data()[2 * k + 1] = b.slope;
   }
   return out;

@@ -10,13 +10,14 @@ from typing import NamedTuple
 import numpy as np
 
 from ..robot import Link
-from .modes import clamped_matrices, clamped_modes
+from .modes import clamped_matrices, clamped_modes, orthogonal_shapes
 from .quadrature import collocation, gauss, lagrange, lagrange_integrals
 from .section import Material, material
 from .shapes import ElementShapes, MeshShapes, WholeShapes
 
 ELEMENT_POINTS = 3
-MOST_SHAPES = 20  # polynomials of a whole link
+MOST_SHAPES = 20  # polynomials of a link in modes
+MOST_WHOLE = 16  # unknowns of a link that is one piece
 
 
 class Place(NamedTuple):
@@ -123,7 +124,7 @@ class Piece:
 
 def orders(link: Link, followed: bool) -> tuple[int, int]:
     """How many polynomials (7) and how many points a whole-link piece has."""
-    mesh, sleeve = min(2 * link.elements, MOST_SHAPES), link.joint.type == "Pb"
+    mesh, sleeve = min(2 * link.elements, MOST_WHOLE), link.joint.type == "Pb"
     if link.modes is None:
         return mesh, mesh + 1
     few = min(link.modes, MOST_SHAPES - 5) + 5
@@ -152,15 +153,11 @@ def pieces(
     if sleeve and link.modes is None:
         return (whole_piece(law, points, np.eye(count), np.zeros(0)),)
     free = link.joint.start if sleeve else link.length_m
-    kept = count if link.modes is None else min(link.modes, count)
-    matrices = clamped_matrices(law, free, count, points, mass, inertia)
-    return (
-        whole_piece(
-            law,
-            points,
-            *clamped_modes(*matrices, kept, link.modes is not None and beyond is not None),
-        ),
-    )
+    M, K, tip = clamped_matrices(law, free, count, points, mass, inertia)
+    if link.modes is None:
+        return (whole_piece(law, points, *orthogonal_shapes(K)),)
+    kept = min(link.modes, count)
+    return (whole_piece(law, points, *clamped_modes(M, K, tip, kept, beyond is not None)),)
 
 
 def whole_piece(law: Material, points: int, coefficients: np.ndarray, K: np.ndarray) -> Piece:

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .line import Piece
+from .line import Piece, Place
 from .shapes import MeshShapes, element_of
 
 
@@ -26,6 +26,16 @@ class Mesh(Piece):
     def weights(self) -> np.ndarray:
         """Their weights on [0, 1], (P,)."""
         return np.concatenate([e.weights for e in self.elements]) / len(self.elements)
+
+    def at(self, xi: float) -> Place:
+        """Weights and shapes at a place xi: mostly a node, so that they are kept."""
+        if xi not in self._places:
+            self._places[xi] = super().at(xi)
+        return self._places[xi]
+
+    @cached_property
+    def _places(self) -> dict[float, Place]:
+        return {}
 
     def lagrange(self, xi: np.ndarray, derivative: int = 0) -> np.ndarray:
         """Those of the element that xi (S,) is on, by xi: (S, P)."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, eigh
+from scipy.linalg import cho_factor, cho_solve, eigh, solve_triangular
 
 from .quadrature import gauss, lagrange_integrals
 from .section import Material
@@ -47,6 +47,17 @@ def clamped_modes(
             lam, X = _modes(V.T @ M @ V, V.T @ K @ V)
             V = V @ X
     return V * np.where(tip[0] @ V < 0, -1.0, 1.0), lam
+
+
+def orthogonal_shapes(K: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Shapes (count, count) whose stiffness is diagonal, and that diagonal (count,) [N m].
+
+    Each is one of the space (7) less what those before it would bend with it; of a uniform link the
+    space's own. Round-off between orthogonal shapes is taken away first.
+    """
+    size = np.sqrt(np.diag(K))
+    L = np.linalg.cholesky(np.where(np.abs(K) < 1e-14 * np.outer(size, size), 0.0, K))
+    return solve_triangular(L.T, np.diag(np.diag(L))), np.diag(L) ** 2
 
 
 def _modes(M: np.ndarray, K: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -73,3 +73,13 @@ def legendre_shapes(count: int, xi: np.ndarray, derivative: int = 0) -> np.ndarr
     if derivative == 0:
         return legendre_integrals(count, xi)
     return 2.0**derivative * legendre(count, xi, derivative - 1)
+
+
+def of_legendre(sums: np.ndarray) -> np.ndarray:
+    """Coefficients (N, m) in the space (7) of shapes given as sums of P_0 ... P_N, (N + 1, m)."""
+    rest, out = sums.copy(), np.zeros((len(sums) - 1, sums.shape[1]))
+    for k in range(len(out) - 1, 0, -1):
+        out[k] = rest[k + 1] * (2 * k + 1)
+        rest[k - 1] += rest[k + 1]
+    out[0] = rest[1]
+    return out

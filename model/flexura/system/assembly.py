@@ -68,20 +68,28 @@ class Assembly:
 
     def elastic(self, q: np.ndarray) -> np.ndarray:
         """The derivative of the strain energy (n,): K q, and of a sleeved link also dU/dd (17)."""
-        out = self.stiffness_blocks(q) @ q
-        for state, law in self._sleeves(self.structure.states(q, np.zeros(self.n))):
+        sleeves = self._sleeves(self.structure.states(q, np.zeros(self.n)))
+        return self._stiffness(sleeves) @ q + self._push(sleeves, q)
+
+    def _push(self, sleeves: list[tuple[LinkState, Material]], q: np.ndarray) -> np.ndarray:
+        """dU/dd in the rows of the sleeves (n,) (17)."""
+        out = np.zeros(self.n)
+        for state, law in sleeves:
             y = q[state.lines[0].own]
             out[self.rows[state.index]] += 0.5 * y @ sleeve.stiffness(state.lines[0], law, 1) @ y
         return out
 
     def stiffness_blocks(self, q: np.ndarray) -> np.ndarray:
         """K (n, n), with K(d) of sleeved links: twice the strain energy is q^T K q (5), (17)."""
+        return self._stiffness(self._sleeves(self.structure.states(q, np.zeros(self.n))))
+
+    def _stiffness(self, sleeves: list[tuple[LinkState, Material]]) -> np.ndarray:
         K = np.zeros((self.n, self.n))
         for link, owns in zip(self.structure.links, self.structure.own, strict=True):
             for piece, own in zip(link, owns, strict=True):
                 if piece.K.size:
                     K[own, own] = np.diag(piece.K)
-        for state, law in self._sleeves(self.structure.states(q, np.zeros(self.n))):
+        for state, law in sleeves:
             own = state.lines[0].own
             K[own, own] = sleeve.stiffness(state.lines[0], law)
         return K
@@ -99,7 +107,10 @@ class Assembly:
 
     def damping(self, q: np.ndarray) -> np.ndarray:
         """D (n, n): viscous friction of joints, alpha M + beta K of elastic unknowns (18)."""
-        D, K = np.zeros((self.n, self.n)), self.stiffness_blocks(q)
+        return self._damping(self.stiffness_blocks(q), q)
+
+    def _damping(self, K: np.ndarray, q: np.ndarray) -> np.ndarray:
+        D = np.zeros((self.n, self.n))
         for i, (link, row) in enumerate(zip(self.robot.links, self.rows, strict=True)):
             D[row, row] = link.joint.viscous_friction
             if self.structure.own[i]:
@@ -140,7 +151,9 @@ class Assembly:
             return Terms(M, forces, K @ q, D)
         for state, law in sleeves:
             forces += sleeve.flow_forces(state.lines[0], law)
-        return Terms(M, forces, self.elastic(q), self.damping(q))
+        K = self._stiffness(sleeves)
+        elastic = K @ q + self._push(sleeves, q)
+        return Terms(M, forces, elastic, self._damping(K, q))
 
     @cached_property
     def _constant(self) -> tuple[np.ndarray, np.ndarray]:

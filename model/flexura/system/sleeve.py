@@ -76,4 +76,6 @@ def stiffness(line: Line, law: Material, derivative: int = 0) -> np.ndarray:
         2 * EI / d**3 + 2 * left * slope / d**2 + left**2 * bend / d,
     )[derivative]
     curvature = line.piece.shapes(xi, 1)
-    return curvature.T @ ((factor * w)[:, None] * curvature)
+    K = curvature.T @ ((factor * w)[:, None] * curvature)
+    size = np.sqrt(np.abs(np.diag(K)))
+    return np.where(np.abs(K) < 1e-14 * np.outer(size, size), 0.0, K)  # round-off of orthogonal shapes

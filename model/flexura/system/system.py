@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..link.line import Piece, whole_piece
-from ..link.shapes import legendre_shapes
+from ..link.shapes import legendre_shapes, of_legendre
 from ..robot import Robot, load
 from ..run import STATIONS
 from .assembly import Assembly
@@ -246,9 +246,12 @@ class System:
         """The pieces of a link; one in modes gets the core's modes in place of its own (all else is equal to the last digits)."""
         if len(pieces) != 1 or not hasattr(pieces[0].shapes, "coefficients") or not pieces[0].K.size:
             return pieces
-        B, K, _ = self.equations.whole_link(link)
-        own = legendre_shapes(len(pieces[0].shapes.coefficients), pieces[0].xi)
-        coefficients = np.linalg.lstsq(own, B.T, rcond=None)[0]
+        B, K, _, sums = self.equations.whole_link(link)
+        count = len(pieces[0].shapes.coefficients)
+        if len(sums):
+            coefficients = of_legendre(np.asarray(sums)[: count + 1])
+        else:
+            coefficients = np.linalg.lstsq(legendre_shapes(count, pieces[0].xi), B.T, rcond=None)[0]
         law = structure(self.robot).laws[link]
         assert law is not None
         return (whole_piece(law, pieces[0].points, coefficients, K),)
