@@ -175,6 +175,7 @@ def test_the_loss_of_a_damped_strip_in_its_sleeve(method):
     assert run["energy/loss"][-1] == pytest.approx(fine["energy/loss"][-1], rel=2e-3)
 
 
+@pytest.mark.slow
 def test_the_loss_of_the_dissertations_strip_in_its_sleeve():
     """The same with the dissertation's linear line: 1.86e-4 J."""
     strip = {"section": {"width_m": 0.02, "height_m": 0.001}, "young_modulus_Pa": 2e11, "density_kg_m3": 7850.0}

@@ -62,6 +62,7 @@ def test_bench_arm_needs_the_torque_of_benchmark_b7(method: str) -> None:
     assert run.meta["energy_error"] < 1e-7
 
 
+@pytest.mark.slow
 def test_linear_kinematics_need_the_torque_of_the_dissertations_form() -> None:
     """B7, last row: no stiffening, quadratic terms kept. The row has two to three digits of agreement between codes."""
     t = np.linspace(0.0, 1.0, 1001)
