@@ -17,7 +17,7 @@ import numpy as np
 from .dense import Course
 from .run import Run
 from .system import System
-from .system.nodes import cut, place, put_to_rest
+from .system.nodes import Nodes, cut, place, put_to_rest
 
 
 def simulate(
@@ -86,8 +86,10 @@ class _Course(Course):
             nodes[i] -= step
             said = f"node {nodes[i] + 1 if step > 0 else nodes[i]} of link {i + 1} {'left' if step > 0 else 'entered'} its sleeve"
             if step < 0:
+                structure = self.system.assembly.structure
+                assert isinstance(structure, Nodes)
                 for y in (self.z[:n], self.z[n : 2 * n]):
-                    put_to_rest(self.system.assembly.structure, i, nodes[i], y)
+                    put_to_rest(structure, i, nodes[i], y)
             if i + 1 < len(links) and self.system.robot.rides(i + 1):
                 nodes[i + 1] = max(nodes[i + 1], nodes[i] + 1)
         else:
