@@ -80,14 +80,13 @@ class _Course(Course):
     def _change(self, i: int, step: int) -> str:
         """Take the next node of joint i (from 0), upwards or downwards; says what happened."""
         links, n = self.system.robot.links, self.n
-        assert self.system.nodes is not None
+        structure = self.system.assembly.structure
+        assert isinstance(structure, Nodes) and self.system.nodes is not None
         nodes = list(self.system.nodes)
         if cut(links[i]):
             nodes[i] -= step
             said = f"node {nodes[i] + 1 if step > 0 else nodes[i]} of link {i + 1} {'left' if step > 0 else 'entered'} its sleeve"
             if step < 0:
-                structure = self.system.assembly.structure
-                assert isinstance(structure, Nodes)
                 for y in (self.z[:n], self.z[n : 2 * n]):
                     put_to_rest(structure, i, nodes[i], y)
             if i + 1 < len(links) and self.system.robot.rides(i + 1):
