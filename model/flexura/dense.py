@@ -12,9 +12,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from scipy.integrate import DOP853, Radau
-from scipy.linalg import eigh
-from scipy.optimize import brentq
 
 from .drive import Drive
 from .errors import InputError
@@ -170,6 +167,8 @@ class Course:
 
     def _when(self, line: Callable[[float], np.ndarray], before: float, after: float) -> float:
         """When a joint leaves its bounds between two times."""
+        from scipy.optimize import brentq
+
         far = lambda s: self._beyond(s, line(s))[0]
         return before if far(before) >= 0 else float(brentq(far, before, after, xtol=1e-15 * max(abs(after), 1e-3)))
 
@@ -249,6 +248,8 @@ class Course:
         return np.setdiff1d(self.system.free_rows, self.rows[self.given])
 
     def _solver(self, start: float, z: np.ndarray, end: float, length: float | None) -> Any:
+        from scipy.integrate import DOP853, Radau
+
         first = None if length is None else min(length, end - start) or None
         keys = {"rtol": max(STRICT * self.rtol, 3e-14), "atol": self._atol, "first_step": first}
         rates = lambda t, y: self._acted(t, y)[0]
@@ -258,6 +259,9 @@ class Course:
 
     def _method(self, method: str) -> str:
         """The method by its name in `METHODS`; sets what a step may err by where a number is small."""
+        from scipy.linalg import eigh
+
+
         assembly, joints = self.system.assembly, self.system.robot.links
         unit = np.ones(self.n)
         M, reach = assembly.mass(self.z[: self.n]), max(sum(link.length_m for link in joints), 1e-3)
