@@ -74,7 +74,7 @@ class Course:
         self.now, self.until, self.z = float(t[0]), float(t[-1]), np.concatenate([q, qd, np.zeros(3)])
         self.length: float | None = None  # of the last step
         self.steps, self.evaluations, self.jumped = 0, 0, 0.0
-        self.found: list[tuple[Any, ...]] = []
+        self.found: list[tuple[Any, ...]] = []  # rows: time, state, accounts, forces, what is seen, jumps so far
         self.events: list[dict[str, Any]] = []
         self.method = self._method(method)
 
@@ -153,14 +153,20 @@ class Course:
             if far > 0:
                 self.now = self._when(line, before, self.now)
                 far, *which = 1.0, *self._beyond(self.now, line(self.now))[1:]
-                again = self._solver(before, start, self.now, self.now - before)
-                while again.status == "running":
-                    again.step()
-                self.z = again.y
+                self.z = self._again(before, start, line(self.now), self.rows[which[0]])
             self._show(self.t[(self.t > before) & (self.t <= self.now)], line)
             if self.progress is not None:
                 self.progress((self.now - self.t[0]) / (self.t[-1] - self.t[0]))
         return (which[0], bool(which[1])) if far > 0 else None
+
+    def _again(self, before: float, start: np.ndarray, near: np.ndarray, row: int) -> np.ndarray:
+        """The state now by steps from `before`: `near` is interpolated. The row that ended the step is as it was found."""
+        solver = self._solver(before, start, self.now, self.now - before)
+        while solver.status == "running":
+            solver.step()
+        z = solver.y.copy()
+        z[row] = near[row]
+        return z
 
     def _when(self, line: Callable[[float], np.ndarray], before: float, after: float) -> float:
         """When a joint leaves its bounds between two times."""
