@@ -117,7 +117,7 @@ def test_kinds_of_both_modules_have_names_of_their_own():
 
 
 def cart() -> fx.System:
-    """The bench link in its three lowest modes, clamped across a rail, its transverse axis along the cart's motion; linear theory."""
+    """The bench link in three modes, clamped across a rail, its transverse axis along the cart's motion; linear theory."""
     link = beam(0.6, 0.2355, 0.5, 8, "Pa", angle_rad=-np.pi / 2, modes=3)
     return system(link, payload=0.05, stiffening=False)
 
