@@ -36,6 +36,7 @@ template <class Real> class Adams {
   Real *gap;                         // (stride) new less extrapolated N
   Real *late[4];                     // (stride) what a gap adds to eta, eta'; its share that is uncertain
   Real poly[2][ORDER + 1][COLUMNS];  // [slow, fast modes][power][value by age, GAP, OLDEST] (interpolation.hpp)
+  Real ends[2][ORDER];               // the values' polynomials at the end of the step
   Real *fast;                        // (stride) 1 for modes that turn fast, else 0
   Real time[ROWS];
   int count[LANES], steady[LANES];   // values held; steps since the length of the step changed
@@ -60,6 +61,7 @@ template <class Real> class Adams {
     for (auto &x : time) x = 0.0;
     for (int k = 0; k < LANES; ++k) count[k] = 0, steady[k] = 0, span[k] = -1.0;
     for (auto &set : poly) for (auto &power : set) for (Real &x : power) x = 0.0;
+    for (auto &set : ends) for (Real &x : set) x = 0.0;
   }
 
   Real *extra(int row_) { return N[row_] + stride; }
@@ -86,11 +88,8 @@ template <class Real> class Adams {
     }
     if (!any) return;
     Real node[ORDER];
-    for (int j = 0; j < ORDER; ++j)
-      for (int k = 0; k < LANES; ++k) {
-        const double own = lane(h, k);
-        set_lane(node[j], k, own > 0.0 ? (lane(time[row(j)], k) - lane(time[head], k)) / own : -j);
-      }
+    const Real moving = choose_less(Real(0.0), h, h, Real(1.0));
+    for (int j = 0; j < ORDER; ++j) node[j] = choose_less(Real(0.0), h, (time[row(j)] - time[head]) / moving, Real(-double(j)));
     polynomials(changed, node);
     for (int c = 0; c < chunks; ++c) weigh_values(wide(changed), c);
   }
@@ -151,11 +150,7 @@ template <class Real> class Adams {
   }
 
   // Coefficient m of the polynomial of a column, for the modes of a chunk.
-  Lanes coefficient(int column, int m, int c) const {
-    const char kind = kinds[static_cast<std::size_t>(c)];
-    if (kind != MIXED) return wide(poly[kind == FAST_ONES][m][column]);
-    return choose_less(Lanes(0.5), get(fast, c), wide(poly[1][m][column]), wide(poly[0][m][column]));
-  }
+  Lanes coefficient(int column, int m, int c) const { return choose(poly[0][m][column], poly[1][m][column], c); }
   // How many values, and which power of time at most, the modes of a chunk use.
   int order_of(int c) const { return kinds[static_cast<std::size_t>(c)] == FAST_ONES ? FAST_ORDER : ORDER; }
 
@@ -170,6 +165,13 @@ template <class Real> class Adams {
   std::vector<char> kinds;                        // (chunks) of the modes in a chunk
 
   static int smaller_of(int a, int b) { return a < b ? a : b; }
+
+  // One of two numbers by whether the modes of a chunk turn slowly or fast.
+  Lanes choose(const Real &slow_one, const Real &fast_one, int c) const {
+    const char kind = kinds[static_cast<std::size_t>(c)];
+    if (kind != MIXED) return wide(kind == FAST_ONES ? fast_one : slow_one);
+    return choose_less(Lanes(0.5), get(fast, c), wide(fast_one), wide(slow_one));
+  }
 
   // Free motion and moments of robot k's modes over a step of h.
   void tabulate_modes(int k, double h) {
@@ -194,26 +196,30 @@ template <class Real> class Adams {
 
   // Polynomials through the values that each robot holds, for the robots that changed.
   void polynomials(const Real &changed, const Real *node) {
-    Real fresh[ORDER + 1][COLUMNS];
-    auto set = [&](int turning, int k, const auto &from, auto pick) {
-      for (int m = 0; m <= ORDER; ++m)
-        for (int j = 0; j < COLUMNS; ++j)
-          if (lane(changed, k) > 0.5) set_lane(poly[turning][m][j], k, pick(from[m][j]));
-    };
-    bool alike = true;
+    bool alike = true, turn = false;  // turn: do any modes turn fast?
     for (int k = 1; k < LANES; ++k) alike = alike && count[k] == count[0];
-    for (int turning = 0; turning < 2; ++turning) {
+    for (char kind : kinds) turn = turn || kind != SLOW_ONES;
+    for (int turning = 0; turning <= turn; ++turning) {
       auto used = [&](int k) { return turning && count[k] > FAST_ORDER ? FAST_ORDER : count[k]; };
+      auto &set = poly[turning];
       if (alike) {
-        interpolate(used(0), node, fresh);
-        for (int k = 0; k < LANES; ++k) set(turning, k, fresh, [k](const Real &x) { return lane(x, k); });
-        continue;
+        Real C[ORDER + 1][COLUMNS];
+        interpolate(used(0), node, C);
+        for (int m = 0; m <= ORDER; ++m)
+          for (int j = 0; j <= OLDEST; ++j) set[m][j] = choose_less(Real(0.5), changed, C[m][j], set[m][j]);
+      } else {
+        for (int k = 0; k < LANES; ++k) {
+          if (lane(changed, k) < 0.5) continue;
+          double own[ORDER], C[ORDER + 1][COLUMNS];
+          for (int j = 0; j < ORDER; ++j) own[j] = lane(node[j], k);
+          interpolate(used(k), own, C);
+          for (int m = 0; m <= ORDER; ++m)
+            for (int j = 0; j <= OLDEST; ++j) set_lane(set[m][j], k, C[m][j]);
+        }
       }
-      for (int k = 0; k < LANES; ++k) {
-        double own[ORDER], C[ORDER + 1][COLUMNS];
-        for (int j = 0; j < ORDER; ++j) own[j] = lane(node[j], k);
-        interpolate(used(k), own, C);
-        set(turning, k, C, [](double x) { return x; });
+      for (int j = 0; j < ORDER; ++j) {
+        ends[turning][j] = 0.0;
+        for (int m = 0; m < ORDER; ++m) ends[turning][j] += set[m][j];
       }
     }
   }
@@ -223,12 +229,12 @@ template <class Real> class Adams {
     auto keep = [&](Real *at, Lanes x) { put(at, c, choose_less(Lanes(0.5), changed, x, get(at, c))); };
     const int order = order_of(c);
     for (int j = 0; j < order; ++j) {
-      Lanes p = 0.0, q = 0.0, end = 0.0;
+      Lanes p = 0.0, q = 0.0;
       for (int m = 0; m < order; ++m) {
         const Lanes C = coefficient(j, m, c);
-        p += C * get(A + m * stride, c), q += C * get(B + m * stride, c), end += C;
+        p += C * get(A + m * stride, c), q += C * get(B + m * stride, c);
       }
-      keep(ahead[0][j], p), keep(ahead[1][j], q), keep(ahead[2][j], end);
+      keep(ahead[0][j], p), keep(ahead[1][j], q), keep(ahead[2][j], choose(ends[0][j], ends[1][j], c));
     }
     for (int j = order; j < ORDER; ++j)  // (older weights must not come back when a neighbour makes the chunk a mixed one)
       for (auto &weights : ahead) keep(weights[j], Lanes(0.0));

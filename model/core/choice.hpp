@@ -1,7 +1,7 @@
 // The method "auto": which method takes fewest passes is measured, not guessed.
 //
-// From the state where a run begins each candidate goes on for TRIAL passes. The one that gets furthest a pass, in the second half of its
-// trial, goes on from where its trial ended; what the others did is forgotten. The race is held again where progress a pass has fallen
+// A run begins with exponential steps (pace.hpp); then the others go on from the same state for SHORT passes. The one that gets furthest a
+// pass, in the second half of its trial, goes on from where its trial ended; what the others did is forgotten. The race is held again where progress a pass has fallen
 // to a quarter, at most once in AGAIN passes. Passes are counted, not time: a run's digits do not depend on the machine's load.
 //
 // There is no race either where exponential steps end soon (pace.hpp), or where it would not be allowed or is decided beforehand: a
@@ -21,7 +21,7 @@ namespace flexura {
 
 class Auto {
  public:
-  static constexpr long TRIAL = 100, SHORT = 60, AGAIN = 1500;  // SHORT: of those that begin where the first one has got to
+  static constexpr long TRIAL = 100, SHORT = 60, AGAIN = 1500;  // TRIAL: of exponential steps in later races
   static constexpr double SLOWER = 4.0;
 
   Auto(Loop<double> &run, double tolerance, const ExponentialOptions &options = ExponentialOptions())
@@ -42,6 +42,14 @@ class Auto {
     return loop.any();
   }
 
+  // For a robot whose exponential steps were made in a pack: does another method get further a pass than these did? The run, which has just
+  // been started, is of no use after that.
+  bool outdone(double exponential_speed, double step) {
+    Best best{Mark(), &exponential, exponential_speed};
+    race_of_others(mark(loop.record[0].rows), step, best);
+    return best.method != &exponential;
+  }
+
   const char *name() const { return chosen ? chosen->name() : "auto"; }
   int races() const { return held; }
   const Exponential<double> &exponential_steps() const { return exponential; }
@@ -54,7 +62,7 @@ class Auto {
   Implicit<double> implicit;
   Explicit<double> explicit_;
   Method<double> *chosen = nullptr;
-  bool raced = false, unrivalled = false;
+  bool raced = false, goes_on = false;  // goes_on: with the exponential steps that the run began with
   int held = 0;
   long last_race = 0, in_window = 0, window_passes = 0;
   double window_t = 0.0;
@@ -122,52 +130,63 @@ class Auto {
   // Are explicit steps, of 12 passes and as long as they may be, slower than that?
   bool hopeless(double speed_) { return Explicit<double>::STABLE < 12.0 * speed_ * fastest(); }
 
-  // A run without a rival is looked at again after so many attempts of its own; else passes are counted.
-  long since_race() const { return unrivalled ? Pace::attempts(loop.clock[0]) : loop.course.passes - last_race; }
+  // Where exponential steps go on that a run has begun with, their own attempts are counted, which are the same in a pack.
+  long since_race() const { return goes_on ? Pace::attempts(loop.clock[0]) : loop.course.passes - last_race; }
 
-  // Do exponential steps, from the start of the run, have no rival?
-  bool without_rival() {
+  // How far methods got so far in a race.
+  struct Best {
+    Mark state;
+    Method<double> *method;
+    double speed;  // seconds a pass
+  };
+  bool over() const {
+    const Status status = loop.clock[0].status;
+    return status == Status::limit || status == Status::interrupted || status == Status::done;
+  }
+
+  // The exponential steps that a run begins with: their speed, as far as `pace` tells it; have they no rival?
+  bool begin_exponential(double &reached) {
     Pace pace;
     while (loop.advance(exponential, 1) && pace.look(loop.clock[0])) {
     }
-    if (!pace.settled(loop.clock[0])) return false;
-    const Clock &c = loop.clock[0];
-    chosen = &exponential, raced = unrivalled = true, speed = (c.t - pace.half) / (Pace::ATTEMPTS / 2);
-    return true;
+    reached = pace.speed(loop.clock[0]);
+    return pace.settled(loop.clock[0]);
   }
 
   void race() {
     const int since = loop.record[0].rows;
     const Mark start = mark(since);
-    Mark best;
-    Method<double> *winner = nullptr;
-    double furthest = -1.0, step = start.clock.wish;
-    const bool begun = chosen == nullptr;  // exponential steps have made the first part of their trial already
-    const long before = loop.course.passes;
-    const bool rides = loop.course.plant.rides;
-    if (begun && !rides && without_rival()) return;
-    unrivalled = false;
-    for (Method<double> *method : std::array<Method<double> *, 3>{&exponential, &implicit, &explicit_}) {
-      if (method == &exponential && rides) continue;
-      if (method == &explicit_ && hopeless(furthest)) break;
-      const bool goes_on = begun && method == &exponential;
-      if (!goes_on) {
-        go_back(start, since);
-        loop.clock[0].fresh = true;
-        loop.clock[0].wish = std::max(step, start.clock.wish);
+    const bool begun = chosen == nullptr;
+    Best best{Mark(), nullptr, -1.0};
+    double step = start.clock.wish;
+    goes_on = false;
+    if (!loop.course.plant.rides) {
+      double reached = 0.0;
+      if (begun && begin_exponential(reached)) {
+        chosen = &exponential, raced = goes_on = true, speed = reached;
+        return;
       }
-      const long most = goes_on ? std::max(TRIAL - (loop.course.passes - before), TRIAL / 4) : method == &exponential ? TRIAL : SHORT;
-      const double got = trial(*method, most);
-      if (loop.clock[0].status == Status::limit || loop.clock[0].status == Status::interrupted || loop.clock[0].status == Status::done) {
-        best = mark(since), winner = method, furthest = got;
-        break;  // the run is over
-      }
-      if (method == &exponential) step = loop.clock[0].wish;
-      if (got > furthest) best = mark(since), winner = method, furthest = got;
+      if (!begun) loop.clock[0].fresh = true, reached = trial(exponential, TRIAL);
+      best = {mark(since), &exponential, reached}, step = loop.clock[0].wish;
     }
-    go_back(best, since);
-    loop.resume(*winner);
-    chosen = winner, speed = furthest, raced = true, last_race = loop.course.passes, ++held;
+    if (!over()) race_of_others(start, step, best);
+    go_back(best.state, since);
+    loop.resume(*best.method);
+    chosen = best.method, speed = best.speed, raced = true, last_race = loop.course.passes, ++held;
+    goes_on = begun && chosen == &exponential;
+  }
+
+  // The other methods from `start` on, `step` being the first one that they try, against the best one so far.
+  void race_of_others(const Mark &start, double step, Best &best) {
+    const int since = start.rows;
+    for (Method<double> *method : std::array<Method<double> *, 2>{&implicit, &explicit_}) {
+      if (method == &explicit_ && hopeless(best.speed)) break;
+      go_back(start, since);
+      loop.clock[0].fresh = true, loop.clock[0].wish = std::max(step, start.clock.wish);
+      const double got = trial(*method, SHORT);
+      if (over() || got > best.speed || best.method == nullptr) best = {mark(since), method, got};
+      if (over()) break;
+    }
   }
 
   // Seconds a pass in the second half of `most` passes; -1: the method got stuck.

@@ -66,7 +66,7 @@ template <class Real> class Exponential : public Method<Real> {
     steps.correct();
     place(steps.corrected[0], steps.corrected[1], c.znew.data());
     c.acts.prescribe(c.znew.data(), c.znew.data() + n);
-    within.build(h);
+    within.build(h), accounts.prepare(h);
     Real uncertain[2];
     account(h, Real(1.0), true, c.znew.data(), uncertain);
     strain_after = strain;
@@ -102,7 +102,7 @@ template <class Real> class Exponential : public Method<Real> {
     place(y, v_, state);
     std::copy(state, state + 2 * n, out);
     Real uncertain[2];
-    account(h, x, false, out, uncertain);
+    if (c.balanced) account(h, x, false, out, uncertain);
   }
 
   double restart(int k, double wish, bool first) override { return first ? wish : larger(0.1 * wish, 1e-3 * wishes[k]); }

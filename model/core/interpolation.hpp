@@ -11,28 +11,36 @@ constexpr int OLDEST = ORDER + 1;  // GAP's less the one that does without the o
 constexpr int COLUMNS = 8;
 
 // Coefficients by powers of x, [power][column]: Lagrange's polynomials of the values by age, GAP, and OLDEST's.
-// Each is multiplied up from its roots. (Dividing the product of all by one would lose four digits where the nodes lie far apart.)
+// Each is multiplied up from its roots: those of younger values are shared, and so are those of older ones. (Dividing the product of all
+// by one would lose four digits where the nodes lie far apart.)
 template <class Real> inline void interpolate(int used, const Real *node, Real C[ORDER + 1][COLUMNS]) {
-  Real below[COLUMNS], at[COLUMNS];  // the product at the column's own node
-  for (int j = 0; j < COLUMNS; ++j) {
-    for (int m = 1; m <= ORDER; ++m) C[m][j] = 0.0;
-    C[0][j] = below[j] = at[j] = 1.0;
-  }
-  for (int j = 0; j < used && j < ORDER; ++j) at[j] = node[j];
-  for (int i = 0; i < used; ++i) {
-    const Real end = i == used - 1 ? Real(1.0) : node[i];  // OLDEST's polynomial has a root at x = 1 in place of the oldest node
-    for (int j = 0; j < COLUMNS; ++j) {
-      const double skip = j == i, take = 1.0 - skip;
-      const Real root = j == OLDEST ? end : node[i];
-      below[j] *= skip + take * (at[j] - node[i]);
-      for (int m = i + 1; m > 0; --m) C[m][j] = skip * C[m][j] + take * (C[m - 1][j] - root * C[m][j]);
-      C[0][j] = skip * C[0][j] - take * (root * C[0][j]);
+  Real young[ORDER + 1][ORDER + 1], old[ORDER + 1][ORDER + 1];  // [i]: roots node_0 ... node_(i-1); node_i ... node_(used-1)
+  auto times_root = [](int degree, const Real *p, const Real &root, Real *out) {
+    out[degree + 1] = p[degree];
+    for (int m = degree; m > 0; --m) out[m] = p[m - 1] - root * p[m];
+    out[0] = -(root * p[0]);
+  };
+  young[0][0] = old[used][0] = 1.0;
+  for (int i = 0; i < used; ++i) times_root(i, young[i], node[i], young[i + 1]);
+  for (int i = used - 1; i > 0; --i) times_root(used - 1 - i, old[i + 1], node[i], old[i]);
+  for (int m = 0; m <= ORDER; ++m)
+    for (int j = 0; j < COLUMNS; ++j) C[m][j] = 0.0;
+  Real end = 1.0;  // the product of all at x = 1
+  for (int j = 0; j < used; ++j) {
+    Real below = 1.0;
+    for (int i = 0; i < used; ++i)
+      if (i != j) below *= node[j] - node[i];
+    const Real scale = 1.0 / below;
+    for (int a = 0; a <= j; ++a) {
+      const Real factor = scale * young[j][a];
+      for (int b = 0; b < used - j; ++b) C[a + b][j] += factor * old[j + 1][b];
     }
+    end *= 1.0 - node[j];
   }
-  for (int j = 0; j < COLUMNS; ++j) {
-    const Real scale = j < used || j >= GAP ? 1.0 / below[j] : Real(0.0);
-    for (int m = 0; m <= ORDER; ++m) C[m][j] = scale * C[m][j];
-  }
+  const Real scale = 1.0 / end;
+  Real last[ORDER + 1];  // OLDEST's has a root at x = 1 in place of the oldest node
+  if (used > 0) times_root(used - 1, young[used - 1], Real(1.0), last);
+  for (int m = 0; m <= used; ++m) C[m][GAP] = scale * young[used][m], C[m][OLDEST] = used > 0 ? scale * last[m] : Real(0.0);
 }
 
 }  // namespace flexura

@@ -28,6 +28,8 @@ template <class Real> class Loop {
   std::array<Record, LANES> record;
   long most_steps = std::numeric_limits<long>::max();  // budget: accepted and rejected steps of a robot
   double longest = Clock::NEVER;                       // no step is longer [s]
+  static constexpr double PART = 0.15;                 // nor than this part of the shortest period of a signal
+  static constexpr double LEAST_STEPS = 100.0;         // of a run under a function of the caller's, whose waves are not known
   const std::atomic<bool> *interrupt = nullptr;        // stops the run where it is
   std::atomic<double> *progress = nullptr;             // the time reached by the slowest robot
 
@@ -35,7 +37,10 @@ template <class Real> class Loop {
   Loop(Plant<Real> &plant, Acting *const *acting, std::vector<double> times, double rtol)
       : course(plant, acting, rtol), outputs(std::move(times)), row_state(padded(course.size), Real(0.0)),
         plain(course.size, 0.0) {
-    for (int k = 0; k < LANES; ++k) breaks[k] = acting[k]->breaks();
+    for (int k = 0; k < LANES; ++k) {
+      breaks[k] = acting[k]->breaks(), most[k] = PART * acting[k]->shortest_period();
+      if (acting[k]->function) most[k] = std::fmin(most[k], (outputs.back() - outputs.front()) / LEAST_STEPS);
+    }
   }
 
   void start(const Real *q0, const Real *v0, double first_step) {
@@ -64,6 +69,8 @@ template <class Real> class Loop {
       arrive(method);
       if (!any()) break;
       attempt(method);
+      for (int k = 0; k < LANES; ++k) beyond[k] = clock[k].running() && lane(error, k) < 1.0 ? first_beyond(method, k) : -Clock::NEVER;
+      keep_within(method);
       for (int k = 0; k < LANES; ++k)
         if (clock[k].running()) judge(method, k);
       settle(method);
@@ -103,8 +110,10 @@ template <class Real> class Loop {
   std::vector<Real> row_state;
   std::vector<double> plain;   // one robot's state
   std::vector<double> before;  // what a sampled controller held
+  std::array<double, LANES> most;  // length of a step by what acts [s]
   Method<Real> *current = nullptr;
   Real at, length, last, error, good;
+  double beyond[LANES] = {};  // when the step just attempted leaves a limit; minus infinity: it is not good
   bool prepared = false;
 
   bool tick_due() const {
@@ -167,7 +176,7 @@ template <class Real> class Loop {
       set_lane(at, k, c.t), set_lane(length, k, 0.0), set_lane(last, k, c.t);
       if (!c.running()) continue;
       const double left = c.stop - c.t, ahead = outputs[c.row] - c.t;
-      c.step = method.fit(k, std::fmin(c.wish, longest), left, ahead);
+      c.step = method.fit(k, std::fmin(c.wish, std::fmin(longest, most[std::size_t(k)])), left, ahead);
       c.next = c.step >= left ? c.stop : c.step == ahead ? outputs[c.row] : c.t + c.step;
       set_lane(length, k, c.step), set_lane(last, k, std::fmax(c.t, c.last()));
     }
@@ -175,17 +184,12 @@ template <class Real> class Loop {
     prepared = false, good = Real(0.0);
   }
 
-  // Robot k: was the step good? If so, the outputs on its way, and limits.
+  // Robot k: was the step good, and did it end before a limit?
   void judge(Method<Real> &method, int k) {
     Clock &c = clock[k];
     const double e = lane(error, k);
     if (!(e < 1.0)) return reject(method, k, e);
-    const double passed_at = first_beyond(method, k);
-    while (c.row < count() && outputs[c.row] < std::fmin(c.next, passed_at)) {
-      between(method, k, outputs[c.row]);
-      keep(k, outputs[c.row], row_state.data());
-    }
-    if (passed_at <= c.next) return stop_at_limit(method, k, passed_at);
+    if (beyond[k] <= c.next) return stop_at_limit(method, k, beyond[k]);
     ++c.steps, c.failed = 0;
     const double wish = method.next(k, c.step, e, c.before, true);
     c.wish = c.step < c.wish ? std::fmax(c.wish, wish) : wish;
@@ -247,15 +251,49 @@ template <class Real> class Loop {
 
   // A row of robot k's record: the state z at time t, and the forces of the drives there.
   void keep(int k, double t, const Real *z) {
-    Clock &c = clock[k];
-    Record &r = record[k];
     Real now = at;
     set_lane(now, k, t);
     if (z != row_state.data()) std::copy(z, z + course.size, row_state.data());
-    Real *q = row_state.data(), *v = q + course.n;
     course.acts.at(now);
+    load_drives();
+    write(k, t);
+  }
+
+  // The outputs on the way of the good steps just attempted: of every robot one at a time, up to where it leaves a limit.
+  void keep_within(Method<Real> &method) {
+    for (;;) {
+      Real x = 0.0, now = at;
+      double due[LANES];
+      bool any_due = false;
+      for (int k = 0; k < LANES; ++k) {
+        const Clock &c = clock[k];
+        due[k] = c.row < count() ? outputs[std::size_t(c.row)] : Clock::NEVER;
+        if (!(due[k] < std::fmin(c.next, beyond[k]))) due[k] = Clock::NEVER;
+        else set_lane(x, k, (due[k] - c.t) / c.step), set_lane(now, k, due[k]), any_due = true;
+      }
+      if (!any_due) return;
+      if (!prepared) method.prepare(at, length, last), prepared = true;
+      method.between(length, x, row_state.data());
+      course.acts.at(now);
+      course.acts.prescribe(row_state.data(), row_state.data() + course.n);
+      load_drives();
+      for (int k = 0; k < LANES; ++k)
+        if (due[k] < Clock::NEVER) write(k, due[k]);
+    }
+  }
+
+  // What the drives give at row_state, `acts` being at its time.
+  void load_drives() {
+    const Real *q = row_state.data(), *v = q + course.n;
     course.acts.load(q, v);
     if (course.acts.any_prescribed()) course.react(q, v);
+  }
+
+  // The next row of robot k's record, from row_state.
+  void write(int k, double t) {
+    Clock &c = clock[k];
+    Record &r = record[k];
+    const Real *q = row_state.data(), *v = q + course.n;
     const std::size_t row = static_cast<std::size_t>(r.rows++);
     r.t[row] = t;
     for (int j = 0; j < course.size; ++j) r.state[row * r.size + j] = lane(row_state[j], k);

@@ -13,6 +13,8 @@
 // `rest` is the power lost less the first two terms at the same instant (Coulomb friction, material whose damping couples modes). What
 // is left out are products of two different free motions, which average out.
 #pragma once
+#include <algorithm>
+
 #include "within.hpp"
 
 namespace flexura {
@@ -35,12 +37,16 @@ template <class Real> class ModalAccounts {
   };
 
   ModalAccounts(const Adams<Real> &steps, const Within<Real> &motion, std::vector<Joint> free)
-      : s(steps), w(motion), joints(std::move(free)) {
+      : s(steps), w(motion), joints(std::move(free)), count(static_cast<int>(joints.size())), chunks(chunks_of<Real>(count + 2)),
+        room(room_of<Real>(count + 2)) {
     memory.lay([this](auto take) {
       for (Real *&row : L) take(row, s.stride);
       for (Real **vector : {&Qz, &square, &added}) take(*vector, s.stride);
-      take(phi, 2 * static_cast<int>(joints.size()) * s.stride);
+      for (Real **vector : {&total, &error, &squares}) take(*vector, room);
+      take(U, POWERS * room), take(uncertain, POWERS * room), take(P, ORDER * room), take(Z, POWERS * room);
+      take(phi, s.n * room), take(phi2, s.n * room);
     });
+    for (const Joint &joint : joints) damped = damped || worst(abs(joint.kd) + abs(joint.viscous)) > 0.0;
   }
 
   const std::vector<Joint> &free_joints() const { return joints; }
@@ -48,7 +54,6 @@ template <class Real> class ModalAccounts {
   // The numbers of a row at a state with the rates v (n) and eta' (stride): forces (joints) of the drives there with their gains' part,
   // the joints' places and rates in q, v; the power lost, and the power of prescribed joints.
   void record(Real *extra, const Real *force, const Real *q, const Real *v, const Real *etad, const Real &lost, const Real &prescribed) const {
-    const int count = static_cast<int>(joints.size());
     Real rest = lost;
     for (int j = 0; j < count; ++j) {
       const Joint &x = joints[static_cast<std::size_t>(j)];
@@ -62,61 +67,71 @@ template <class Real> class ModalAccounts {
     extra[count] = rest, extra[count + 1] = prescribed;
   }
 
+  // To be called when `Within` was built for a step of length h: what its integrals have in common.
+  void prepare(const Real &h) {
+    for (int c = 0; c < chunks; ++c) {  // the polynomials through the numbers' last values and their newest, and the uncertain part
+      Lanes values[ORDER], gap = get(s.extra(s.new_row()), c);
+      for (int j = 0; j < ORDER; ++j) values[j] = get(s.extra(s.row(j)), c), gap -= wide(s.ends[0][j]) * values[j];
+      for (int m = 0; m < POWERS; ++m) {
+        Lanes sum = wide(s.poly[0][m][GAP]) * gap;
+        for (int j = 0; j < ORDER; ++j) sum += wide(s.poly[0][m][j]) * values[j];
+        put(U + m * room, c, sum), put(uncertain + m * room, c, wide(s.poly[0][m][OLDEST]) * gap);
+      }
+    }
+    for (int q = 0; q < ORDER; ++q) {
+      Real *row = P + q * room;
+      std::fill(row, row + room, Real(0.0));
+      add_rows(s.n, chunks, w.p[q + 1], phi, room, row);
+      for (int c = 0; c < chunks; ++c) put(row, c, double(q + 1) * get(row, c));
+    }
+    P[count] = P[count + 1] = h;  // powers are integrated over time itself
+    turns = !w.damped.empty();
+    for (int c = 0; c < s.chunks; ++c) turns = turns || w.oscillates(c);
+  }
+
   // Integrals from the start of the step of length h to its fraction x, where the joints' places are q1; q0 at the start.
   // whole: x = 1.
   Sums over(const Real &h, const Real &x, bool whole, const Real *q0, const Real *q1) {
     Sums sum{0.0, 0.0, 0.0, 0.0, 0.0};
-    free_motion(h, x, whole);
+    const bool of_all_modes = s.b.lossy || s.b.damped;
+    if (turns || of_all_modes) free_motion(h, x, whole);
+    if (turns)
+      for (int m = 0; m < POWERS; ++m) {
+        std::fill(Z + m * room, Z + (m + 1) * room, Real(0.0));
+        add_rows(s.n, chunks, L[m], phi, room, Z + m * room);
+      }
     Real area[2 * POWERS], power = x;  // int_0^x x^k dx
     for (int k = 0; k < 2 * POWERS; ++k) area[k] = power * (1.0 / (k + 1)), power *= x;
-    const Real per = 1.0 / choose_less(Real(0.0), h, h, Real(1.0));
-    const int count = static_cast<int>(joints.size());
+    for (int c = 0; c < chunks; ++c) {
+      Lanes all = 0.0, wrong = 0.0;
+      for (int m = 0; m < POWERS; ++m) {
+        Lanes moment = turns ? get(Z + m * room, c) : Lanes(0.0);
+        for (int q = 0; q < ORDER; ++q) moment += get(P + q * room, c) * wide(area[m + q]);
+        all += get(U + m * room, c) * moment;
+        if (whole) wrong += get(uncertain + m * room, c) * moment;
+      }
+      put(total, c, all), put(error, c, wrong);
+    }
+    if (damped) square_rates(h, area);
     for (int j = 0; j < count; ++j) {
-      const Joint &joint = joints[static_cast<std::size_t>(j)];
-      const Real *phi_j = phi + 2 * j * s.stride;
-      Real P[ORDER], Z[POWERS], U[POWERS], uncertain[POWERS];
-      for (int q = 0; q < ORDER; ++q) P[q] = double(q + 1) * dot(s.n, phi_j, w.p[q + 1]);
-      for (int m = 0; m < POWERS; ++m) Z[m] = dot(s.n, phi_j, L[m]);
-      polynomial(j, U, uncertain);
-      for (int m = 0; m < POWERS; ++m) {
-        Real moment = Z[m];
-        for (int q = 0; q < ORDER; ++q) moment += P[q] * area[m + q];
-        sum.work += U[m] * moment, sum.work_error += uncertain[m] * moment;
-      }
-      Real squares = 0.0;
-      if (!(worst(abs(joint.kd) + abs(joint.viscous)) > 0.0)) {
-        sum.work -= 0.5 * joint.kp * (q1[joint.row] - q0[joint.row]) * (q1[joint.row] + q0[joint.row]);
-        continue;
-      }
-      squares = dot(s.n, phi_j + s.stride, Qz);
-      for (int q = 0; q < ORDER; ++q) {
-        Real row = 2.0 * Z[q];
-        for (int r = 0; r < ORDER; ++r) row += P[r] * area[q + r];
-        squares += per * P[q] * row;
-      }
+      const Joint &joint = joints[std::size_t(j)];
       const Real a = q0[joint.row], b = q1[joint.row];
-      sum.work -= 0.5 * joint.kp * (b - a) * (b + a) + joint.kd * squares;
-      sum.loss += joint.viscous * squares;
+      sum.work += total[j] - (0.5 * joint.kp * (b - a) * (b + a) + joint.kd * squares[j]);
+      sum.loss += joint.viscous * squares[j];
+      sum.work_error += error[j];
     }
-    for (int e = 0; e < 2; ++e) {  // powers that are taken as polynomials themselves
-      Real U[POWERS], uncertain[POWERS], all = 0.0, error = 0.0;
-      polynomial(count + e, U, uncertain);
-      for (int m = 0; m < POWERS; ++m) {
-        const Real moment = h * area[m];
-        all += U[m] * moment, error += uncertain[m] * moment;
-      }
-      (e == 0 ? sum.loss : sum.work) += all, (e == 0 ? sum.loss_error : sum.work_error) += error;
-    }
-    if (s.b.lossy || s.b.damped) of_modes(h, area, sum);
+    sum.loss += total[count], sum.loss_error += error[count];
+    sum.work += total[count + 1], sum.work_error += error[count + 1];
+    if (of_all_modes) of_modes(h, area, sum);
     return sum;
   }
 
   // To be called when modes were taken: the joints' rows of the modes, and their squares.
   void take_rows() {
-    for (int j = 0; j < static_cast<int>(joints.size()); ++j)
+    for (int j = 0; j < count; ++j)
       for (int k = 0; k < s.n; ++k) {
-        const Real x = s.b.phi[k * s.stride + joints[static_cast<std::size_t>(j)].row];
-        phi[2 * j * s.stride + k] = x, phi[(2 * j + 1) * s.stride + k] = x * x;
+        const Real x = s.b.phi[k * s.stride + joints[std::size_t(j)].row];
+        phi[k * room + j] = x, phi2[k * room + j] = x * x;
       }
   }
 
@@ -124,23 +139,28 @@ template <class Real> class ModalAccounts {
   const Adams<Real> &s;
   const Within<Real> &w;
   std::vector<Joint> joints;
+  const int count, chunks, room;     // of the extra numbers
   Block<Real> memory;
   Real *L[POWERS], *Qz;              // (stride): int x^m z' dt, int z'^2 dt
-  Real *phi;                         // (2 joints, stride): of each joint phi_kj, and squared
+  Real *phi, *phi2;                  // (n, room): of each joint phi_kj, and squared
+  Real *U, *uncertain, *P, *Z;       // (powers, room) of the step, see above; P_q of the joints' rates, Z: Z_j's share of int x^m v_j dt
+  Real *total, *error, *squares;     // (room) int u_j v_j dt, its uncertain part; int v_j^2 dt
   Real *square, *added;              // (stride) scratch; `square` is written by record() too
-  // The polynomial through an extra number's last values and its newest, and the part of it that is uncertain.
-  void polynomial(int number, Real *U, Real *uncertain) const {
-    Real values[ORDER], gap = s.extra(s.new_row())[number];
-    for (int j = 0; j < ORDER; ++j) {
-      values[j] = s.extra(s.row(j))[number];
-      Real end = 0.0;
-      for (int m = 0; m < ORDER; ++m) end += s.poly[0][m][j];
-      gap -= end * values[j];
-    }
-    for (int m = 0; m < POWERS; ++m) {
-      Real sum = s.poly[0][m][GAP] * gap;
-      for (int j = 0; j < ORDER; ++j) sum += s.poly[0][m][j] * values[j];
-      U[m] = sum, uncertain[m] = s.poly[0][m][OLDEST] * gap;
+  bool damped = false, turns = false;  // has any joint damping; does any mode have free motion in this step?
+
+  // int v_j^2 dt of the joints.
+  void square_rates(const Real &h, const Real *area) {
+    const Lanes per = wide(1.0 / choose_less(Real(0.0), h, h, Real(1.0)));
+    std::fill(squares, squares + room, Real(0.0));
+    if (turns) add_rows(s.n, chunks, Qz, phi2, room, squares);
+    for (int c = 0; c < chunks; ++c) {
+      Lanes sum = get(squares, c);
+      for (int q = 0; q < ORDER; ++q) {
+        Lanes row = turns ? 2.0 * get(Z + q * room, c) : Lanes(0.0);
+        for (int r = 0; r < ORDER; ++r) row += get(P + r * room, c) * wide(area[q + r]);
+        sum += per * get(P + q * room, c) * row;
+      }
+      put(squares, c, sum);
     }
   }
 

@@ -94,7 +94,7 @@ template <class Real> class ModelPlant : public Plant<Real> {
     std::vector<Real> unit(zero), column(zero), lost(zero);
     for (int i = 0; i < n; ++i) {
       unit[std::size_t(i)] = Real(1.0);
-      forces(model, work, q, zero.data(), unit.data(), Terms{false, false, false}, column.data());
+      forces(model, work, q, zero.data(), unit.data(), Terms{false, false, false}, column.data(), i > 0);
       for (int j = 0; j < n; ++j) M[j * n + i] = lane(column[std::size_t(j)], lane_), K[j * n + i] = D[j * n + i] = 0.0;
       if (model.mass_damped) {
         std::fill(lost.begin(), lost.end(), Real(0.0));

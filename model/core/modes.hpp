@@ -5,6 +5,7 @@
 // mode but their own, the unit vector. The modes need not be exact and need not follow the robot: what they leave out is integrated
 // as a force. They are taken again where they have become poor.
 #pragma once
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -29,7 +30,8 @@ template <class Real> class Modes {
  public:
   static constexpr int LANES = LanesOf<Real>::value;
   static constexpr double POOR = 0.25;   // the change of Phi M Phi^T, and of Phi K Phi^T against w_i w_j, that is put up with
-  static constexpr double TURN = 0.05;   // the configuration is looked at after so many radians (metres of the tips over the reach)
+  static constexpr double TURN = 0.05;   // the configuration is looked at after so many radians (metres of the tips over the reach),
+  static constexpr double FAR = 8.0;     // or as many times more, at most, where the modes were found to change slowly
   static constexpr double FREE = 1e-4;   // w2 below this is none [rad^2/s^2]
 
   const int n, chunks, stride;
@@ -45,7 +47,7 @@ template <class Real> class Modes {
       for (Real **matrix : {&phi, &rows}) take_(*matrix, n * stride);
       for (Real **vector : {&w2, &own, &material, &d2, &lag, &seen}) take_(*vector, stride);
     });
-    for (int k = 0; k < LANES; ++k) cutoff[k] = std::numeric_limits<double>::infinity(), taken[k] = 0;
+    for (int k = 0; k < LANES; ++k) cutoff[k] = std::numeric_limits<double>::infinity(), taken[k] = 0, patience[k] = TURN, gone[k] = 0.0;
   }
 
   // Has robot k gone far since its configuration was last looked at?
@@ -66,7 +68,7 @@ template <class Real> class Modes {
       }
       way += root(bent);
     }
-    return !(way <= TURN * lane(plant.reach, k));
+    return !(way <= patience[k] * lane(plant.reach, k));
   }
 
   // Takes modes of robot k from its matrices at q, if there are none or they are poor there; true if so. `slow` [rad/s]: frequencies
@@ -81,7 +83,13 @@ template <class Real> class Modes {
         for (std::size_t entry : {at(e, j), at(j, e)}) M[entry] = K[entry] = D[entry] = 0.0;
       M[at(e, e)] = 1.0;
     }
-    if (taken[k] > 0 && !poor(k, M, K, slow)) return false;
+    gone[k] += patience[k];
+    if (taken[k] > 0) {
+      const double changed = change(k, M, K, slow) / POOR;
+      patience[k] = smaller(larger(0.5 * gone[k] * (1.0 / larger(changed, 1e-3) - 1.0), TURN), FAR * TURN);  // half of what is left, were it to grow alike
+      if (changed < 1.0) return false;
+    }
+    gone[k] = 0.0, patience[k] = TURN;
     const std::size_t size = std::size_t(n);
     std::vector<double> squares(size), shapes(size * size);
     eigen_pencil(n, K.data(), M.data(), squares.data(), shapes.data());
@@ -118,37 +126,35 @@ template <class Real> class Modes {
  private:
   Block<Real> memory;
   Real *seen;  // (stride) the configuration looked at last
+  double patience[LANES], gone[LANES];  // way to the next look; from where the modes were taken to the last one
 
   std::size_t at(int i, int j) const { return std::size_t(i) * std::size_t(n) + std::size_t(j); }
 
-  // Frobenius' norm of Phi A Phi^T less what it was, relative to scale_i scale_j.
-  bool poor(int k, const std::vector<double> &M, const std::vector<double> &K, double slow) const {
+  // Frobenius' norm of Phi A Phi^T less what it was, relative to scale_i scale_j: the larger one of A = M and A = K.
+  double change(int k, const std::vector<double> &M, const std::vector<double> &K, double slow) const {
     double inertia = 0.0, stiffness = 0.0;
     const std::size_t size = std::size_t(n);
-    std::vector<double> Mx(size), Kx(size);
+    std::vector<double> shapes(size * size), Mx(size), Kx(size), s(size), r(size);  // shapes: a row an unknown
+    for (int a = 0; a < n; ++a)
+      for (int i = 0; i < n; ++i) shapes[at(i, a)] = lane(phi[a * stride + i], k);
     for (int a = 0; a < n; ++a) {
-      for (int i = 0; i < n; ++i) {
-        double s = 0.0, r = 0.0;
-        for (int j = 0; j < n; ++j) {
-          const double x = lane(phi[a * stride + j], k);
-          s += M[at(i, j)] * x, r += K[at(i, j)] * x;
-        }
-        Mx[std::size_t(i)] = s, Kx[std::size_t(i)] = r;
+      std::fill(Mx.begin(), Mx.end(), 0.0), std::fill(Kx.begin(), Kx.end(), 0.0);
+      for (int j = 0; j < n; ++j) {
+        const double x = shapes[at(j, a)];
+        for (int i = 0; i < n; ++i) Mx[std::size_t(i)] += M[at(j, i)] * x, Kx[std::size_t(i)] += K[at(j, i)] * x;
       }
+      std::fill(s.begin(), s.end(), 0.0), std::fill(r.begin(), r.end(), 0.0);
+      for (int i = 0; i < n; ++i)
+        for (int b = 0; b <= a; ++b)
+          s[std::size_t(b)] += shapes[at(i, b)] * Mx[std::size_t(i)], r[std::size_t(b)] += shapes[at(i, b)] * Kx[std::size_t(i)];
       for (int b = 0; b <= a; ++b) {
-        double s = 0.0, r = 0.0;
-        for (int i = 0; i < n; ++i) {
-          const double x = lane(phi[b * stride + i], k);
-          s += x * Mx[std::size_t(i)], r += x * Kx[std::size_t(i)];
-        }
-        const double same = a == b, twice = a == b ? 1.0 : 2.0;
-        const double wa = lane(w2[a], k), wb = lane(w2[b], k);
-        const double change = r - same * wa;
-        inertia += twice * (s - same) * (s - same);
-        stiffness += twice * change * change / (larger(wa, slow * slow) * larger(wb, slow * slow));
+        const double same = a == b, twice = a == b ? 1.0 : 2.0, wa = lane(w2[a], k), wb = lane(w2[b], k);
+        const double heavier = s[std::size_t(b)] - same, stiffer = r[std::size_t(b)] - same * wa;
+        inertia += twice * heavier * heavier;
+        stiffness += twice * stiffer * stiffer / (larger(wa, slow * slow) * larger(wb, slow * slow));
       }
     }
-    return !(larger(inertia, stiffness) < POOR * POOR);
+    return root(larger(inertia, stiffness));
   }
 };
 

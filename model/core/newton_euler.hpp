@@ -25,7 +25,7 @@ inline void weigh_points(const Piece<Real> &c, const Real *zx, const Real *zy, R
 template <class Real>
 inline Vec3<Real> inertial(const Piece<Real> &c, const Kept<Real> &k, const Vec3<Real> &u, const Real *a, bool last, Real *out) {
   const int m = c.m, P = c.P;
-  Real zx[Free::most] = {}, zy[Free::most] = {}, Yx[Free::most], Yy[Free::most];
+  Real zx[Free::most], zy[Free::most], Yx[Free::most], Yy[Free::most];
   Vec3<Real> wrench{c.mass * u.x, c.mass * u.y, c.hub * u.t};
   for (int j = 0; j < P; ++j) {
     Real turning = u.t;
@@ -81,11 +81,12 @@ Vec3<Real> inertial_sleeve(const Piece<Real> &c, const Kept<Real> &k, const Real
 }
 
 // Forces (n) of a motion: M a + h(q, v), plus what `terms` names of stiffness, damping and (taken off) gravity. With v = 0 and no
-// terms: M times a vector.
+// terms: M times a vector. `moved`: outward_kinematics was called at (y, v) already.
 template <class Real>
-void forces(const Model<Real> &model, Workspace<Real> &work, const Real *y, const Real *v, const Real *a, const Terms &terms, Real *out) {
+void forces(const Model<Real> &model, Workspace<Real> &work, const Real *y, const Real *v, const Real *a, const Terms &terms, Real *out,
+            bool moved = false) {
   const std::size_t count = model.pieces.size();
-  outward_kinematics(model, work, y, v);
+  if (!moved) outward_kinematics(model, work, y, v);
   const Real weight = terms.gravity ? 1.0 : 0.0;
   Vec3<Real> u{-weight * model.gravity[0], -weight * model.gravity[1], 0.0};
   std::vector<Vec3<Real>> &wrench = work.wrenches;

@@ -32,6 +32,10 @@ struct Pace {
     if (attempts(c) <= ATTEMPTS / 2) half = c.t;
     return c.running() && attempts(c) < ATTEMPTS;
   }
+  // Seconds an attempt, in the second half of them; -1: the run got stuck.
+  double speed(const Clock &c) const {
+    return c.status == Status::stuck || c.status == Status::diverged ? -1.0 : (c.t - half) / (ATTEMPTS / 2);
+  }
   bool settled(const Clock &c) const {
     if (!c.running()) return c.status == Status::done || c.status == Status::limit || c.status == Status::interrupted;
     return (c.end - c.t) * (ATTEMPTS / 2) <= REST * (c.t - half);

@@ -64,7 +64,9 @@ Model<Four> side_by_side(const std::vector<const Model<double> *> &models) {
 class Worker {
 public:
   Worker(const Population &population, double *values, const std::atomic<bool> &stop, std::vector<Ending> &endings)
-      : all_(population), values_(values), stop_(stop), endings_(endings) {}
+      : all_(population), values_(values), stop_(stop), endings_(endings) {
+    for (const Channel &channel : all_.channels) balanced_ = balanced_ || channel.of == Channel::account;
+  }
 
   // Robots `first` to `end`, at most four.
   void run(int first, int end) {
@@ -98,6 +100,7 @@ private:
   double *values_;
   const std::atomic<bool> &stop_;
   std::vector<Ending> &endings_;
+  bool balanced_ = false;  // are accounts asked for?
 
   Starter ready(int k, Model<double> model) const {
     Starter out;
@@ -156,19 +159,21 @@ private:
     Loop<Four> loop(plant, acting, all_.times, all_.rtol);
     const auto method = make_method<Four>(starter(0).method, loop.course, all_.rtol);
     if (!method) throw std::invalid_argument("there is no method " + all_.method);
-    loop.interrupt = &stop_;
+    loop.interrupt = &stop_, loop.course.balanced = balanced_;
     if (all_.most_steps > 0) loop.most_steps = all_.most_steps;
     loop.start(q.data(), v.data(), FIRST_STEP * (all_.times.back() - all_.times.front()));
     std::array<Pace, LANES> pace;
-    for (bool more = starter(0).open; more && loop.advance(*method, 1);) {
+    for (bool more = starter(0).open && !plant.rides; more && loop.advance(*method, 1);) {
       more = false;
       for (std::size_t k = 0; k < LANES; ++k) more |= pace[k].look(loop.clock[k]);
     }
     std::array<bool, LANES> alone{};
-    for (std::size_t k = 0; k < LANES; ++k) {
-      alone[k] = starter(0).open && !pace[k].settled(loop.clock[k]);
-      if (alone[k]) loop.clock[k].status = Status::interrupted;
+    for (std::size_t k = 0; k < std::size_t(count) && starter(0).open; ++k) {
+      const Clock &clock = loop.clock[k];
+      alone[k] = plant.rides || !(pace[k].settled(clock) || (clock.running() && !outdone(starters[k], pace[k].speed(clock), clock.wish)));
     }
+    for (std::size_t k = 0; k < LANES; ++k)
+      if (alone[k < std::size_t(count) ? k : 0]) loop.clock[k].status = Status::interrupted;
     while (loop.advance(*method, STEPS)) {
     }
     std::vector<Ran> ran;
@@ -189,11 +194,20 @@ private:
     else if (!ran.empty()) finish(side_by_side(of), robots, ran);
   }
 
-  void run_alone(const Starter &starter) {
+  Request request_of(const Starter &starter) const {
     Request request;
     request.times = all_.times, request.q = starter.q, request.v = starter.v, request.rtol = all_.rtol, request.method = all_.method;
     request.most_steps = all_.most_steps;
-    Simulation run(starter.shared, starter.acting, request);
+    return request;
+  }
+
+  // Does another method get further than the exponential steps that a pack has begun with?
+  bool outdone(const Starter &starter, double speed, double step) const {
+    return Simulation(starter.shared, starter.acting, request_of(starter)).outdone(speed, step);
+  }
+
+  void run_alone(const Starter &starter) {
+    Simulation run(starter.shared, starter.acting, request_of(starter));
     while (run.advance(STEPS) && !stop_.load(std::memory_order_relaxed)) {
     }
     finish(side_by_side({starter.shared.get()}), {starter.robot}, {{&run.clock(), &run.record(), run.state(), run.method()}});

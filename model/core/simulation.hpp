@@ -27,6 +27,9 @@ public:
   // At most so many steps further; may it go on?
   bool advance(long steps);
 
+  // Of "auto", a run that has just been made: see Auto::outdone.
+  bool outdone(double exponential_speed, double step) { return auto_->outdone(exponential_speed, step); }
+
   const Clock &clock() const { return loop_.clock[0]; }
   const Record &record() const { return loop_.record[0]; }
   const Model<double> &model() const { return *model_; }

@@ -401,6 +401,19 @@ def test_no_unstable_equilibrium_is_taken_for_the_answer(load):
     assert fx.tip_pose(sys, q)[1] > 0.1
 
 
+def test_a_simulation_loads_no_integrators_of_scipy_and_no_twin():
+    """What a run of the compiled core does not need costs no time at the start."""
+    code = (
+        "import sys, flexura as fx\n"
+        "from robots import rigid, system\n"
+        "fx.simulate(system(rigid(0.1, 1.0, 0.05, 0.0)), [0.0, 0.1])\n"
+        "print(*(name for name in ('numba', 'exudyn', 'scipy.integrate', 'matplotlib') if name in sys.modules))"
+    )
+    surroundings = os.environ | {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
+    done = subprocess.run([sys.executable, "-c", code], env=surroundings, capture_output=True, text=True, check=True, timeout=120)
+    assert done.stdout.split() == []
+
+
 # Memory -------------------------------------------------------------------------------------------------------------------------
 
 
