@@ -84,7 +84,7 @@ def quiet(r: Rigged) -> None:
 def slow_tick(r: Rigged) -> None:
     """The control interrupt takes three milliseconds: its controller becomes an endless loop (in simavr's flash) for so long."""
     simulator = r.board.simulator
-    at = simulator.symbol("_ZN7flexura3Pid6updateERKNS_8PidGainsERKNS_10PidSignalsE")
+    at = simulator.symbol("_ZN7flexura5PidOfINS_12BoardNumbersEE6updateERKNS_7GainsOfIS1_EERKNS_9SignalsOfIS1_EE")
     before = simulator.flash[at] | simulator.flash[at + 1] << 8
     simulator.patch(at, [0xCFFF])  # rjmp to itself
     r.board.wait(0.003)

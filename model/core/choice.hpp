@@ -21,6 +21,10 @@ namespace flexura {
 
 class Auto {
  public:
+  // LONG: if gains or friction couple the modes, which shows only when exponential steps have grown. DEAR: passes a second of explicit steps
+  // beyond which a sharp tolerance is left to a race without exponential ones.
+  static constexpr long LONG = 500;
+  static constexpr double DEAR = 2e6;
   static constexpr long TRIAL = 100, SHORT = 60, AGAIN = 1500;  // TRIAL: of exponential steps in later races
   static constexpr double SLOWER = 4.0;
 
@@ -62,6 +66,7 @@ class Auto {
   Implicit<double> implicit;
   Explicit<double> explicit_;
   Method<double> *chosen = nullptr;
+  bool coupled = false, sharp = false;  // gains or friction couple the modes; a tolerance that exponential steps are not for
   bool raced = false, goes_on = false;  // goes_on: with the exponential steps that the run began with
   int held = 0;
   long last_race = 0, in_window = 0, window_passes = 0;
@@ -98,7 +103,9 @@ class Auto {
     const Acting &acting = c.acts_of(0);
     const bool bends = c.n > c.plant.joints;
     const auto resistance = [&](int i) { return larger(c.plant.viscous[i], c.plant.coulomb[i]); };
-    if (for_explicit(rtol, bends, c.plant.joints, acting, resistance)) chosen = &explicit_;
+    coupled = resisted(acting);
+    sharp = rtol < SHARPEST;
+    if (for_explicit(rtol, bends, c.plant.joints, acting, resistance) && !(bends && hopeless(1.0 / DEAR))) chosen = &explicit_;
     else if (acting.sampler) chosen = for_ticks(acting.rate_Hz, bends && !resisted(acting));
     else if (acting.function) chosen = !bends ? static_cast<Method<double> *>(&explicit_) : c.plant.rides ? static_cast<Method<double> *>(&implicit) : &exponential;
     else race();
@@ -160,13 +167,13 @@ class Auto {
     Best best{Mark(), nullptr, -1.0};
     double step = start.clock.wish;
     goes_on = false;
-    if (!loop.course.plant.rides) {
+    if (!loop.course.plant.rides && !sharp) {
       double reached = 0.0;
-      if (begun && begin_exponential(reached)) {
+      if (begun && !coupled && begin_exponential(reached)) {
         chosen = &exponential, raced = goes_on = true, speed = reached;
         return;
       }
-      if (!begun) loop.clock[0].fresh = true, reached = trial(exponential, TRIAL);
+      if (!begun || coupled) loop.clock[0].fresh = true, reached = trial(exponential, coupled ? LONG : TRIAL);
       best = {mark(since), &exponential, reached}, step = loop.clock[0].wish;
     }
     if (!over()) race_of_others(start, step, best);
@@ -183,7 +190,7 @@ class Auto {
       if (method == &explicit_ && hopeless(best.speed)) break;
       go_back(start, since);
       loop.clock[0].fresh = true, loop.clock[0].wish = std::max(step, start.clock.wish);
-      const double got = trial(*method, SHORT);
+      const double got = trial(*method, coupled ? LONG : SHORT);
       if (over() || got > best.speed || best.method == nullptr) best = {mark(since), method, got};
       if (over()) break;
     }

@@ -40,6 +40,9 @@ class System:
         at = self._array(q, "q")
         return replace(self, nodes=nodes_at(self.robot, at[self.joint_rows]))
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {"robot": self.robot, "nodes": self.nodes}  # the rest is computed again
+
     @cached_property
     def assembly(self) -> Assembly:
         """The same equations as dense sums, to be read; with the shapes that the core uses."""
