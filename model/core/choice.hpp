@@ -21,10 +21,9 @@ namespace flexura {
 
 class Auto {
  public:
-  // LONG: if gains or friction couple the modes, which shows only when exponential steps have grown. DEAR: passes a second of explicit steps
-  // beyond which a sharp tolerance is left to a race without exponential ones.
-  static constexpr long LONG = 500;
-  static constexpr double DEAR = 2e6;
+  // DEAR: passes a second of explicit steps beyond which a sharp tolerance is left to a race without exponential ones. STRONG: the rate at
+  // which a damper stops its joint [1/s] beyond which it couples the modes so much that only implicit steps are long.
+  static constexpr double DEAR = 2e6, STRONG = 1000.0;
   static constexpr long TRIAL = 100, SHORT = 60, AGAIN = 1500;  // TRIAL: of exponential steps in later races
   static constexpr double SLOWER = 4.0;
 
@@ -66,7 +65,7 @@ class Auto {
   Implicit<double> implicit;
   Explicit<double> explicit_;
   Method<double> *chosen = nullptr;
-  bool coupled = false, sharp = false;  // gains or friction couple the modes; a tolerance that exponential steps are not for
+  bool sharp = false;  // a tolerance that exponential steps are not for
   bool raced = false, goes_on = false;  // goes_on: with the exponential steps that the run began with
   int held = 0;
   long last_race = 0, in_window = 0, window_passes = 0;
@@ -103,9 +102,9 @@ class Auto {
     const Acting &acting = c.acts_of(0);
     const bool bends = c.n > c.plant.joints;
     const auto resistance = [&](int i) { return larger(c.plant.viscous[i], c.plant.coulomb[i]); };
-    coupled = resisted(acting);
     sharp = rtol < SHARPEST;
     if (for_explicit(rtol, bends, c.plant.joints, acting, resistance) && !(bends && hopeless(1.0 / DEAR))) chosen = &explicit_;
+    else if (bends && !sharp && strongest_damper() > STRONG) chosen = &implicit;
     else if (acting.sampler) chosen = for_ticks(acting.rate_Hz, bends && !resisted(acting));
     else if (acting.function) chosen = !bends ? static_cast<Method<double> *>(&explicit_) : c.plant.rides ? static_cast<Method<double> *>(&implicit) : &exponential;
     else race();
@@ -123,6 +122,28 @@ class Auto {
       any = any || worst(larger(loop.course.plant.viscous[std::size_t(i)], loop.course.plant.coulomb[std::size_t(i)])) > 0.0 || d.kp > 0.0 || d.kd > 0.0;
     }
     return any;
+  }
+
+  // The largest rate at which gains and friction of a joint would stop it, its link's bending free [1/s].
+  double strongest_damper() {
+    Course<double> &c = loop.course;
+    const double *q = c.z.data(), *v = q + c.n;
+    c.acts.at(loop.clock[0].t), c.acts.load(q, v);
+    const std::vector<double> still(std::size_t(c.n), 0.0);
+    std::vector<double> force(still), rest(still), moved(still), reaction(std::size_t(c.plant.joints), 0.0);
+    Pass<double> pass = c.acts.pass(q, still.data(), q, still.data(), 0.0, 0.0);
+    pass.force = force.data();
+    c.plant.accelerate(pass, rest.data(), reaction.data());
+    double most = 0.0;
+    for (int i = 0; i < c.plant.joints; ++i) {
+      const std::size_t joint = std::size_t(i), row = std::size_t(c.plant.first[joint]);
+      const double resistance = pass.damping[joint] + c.plant.viscous[joint] + c.plant.coulomb[joint] / c.plant.slow;
+      if (pass.held[joint] || !(resistance > 0.0)) continue;
+      force[row] = 1.0;
+      c.plant.accelerate(pass, moved.data(), reaction.data());
+      force[row] = 0.0, most = std::max(most, resistance * (moved[row] - rest[row]));
+    }
+    return most;
   }
 
   // The highest frequency or rate of decay where the run is [rad/s].
@@ -169,11 +190,11 @@ class Auto {
     goes_on = false;
     if (!loop.course.plant.rides && !sharp) {
       double reached = 0.0;
-      if (begun && !coupled && begin_exponential(reached)) {
+      if (begun && begin_exponential(reached)) {
         chosen = &exponential, raced = goes_on = true, speed = reached;
         return;
       }
-      if (!begun || coupled) loop.clock[0].fresh = true, reached = trial(exponential, coupled ? LONG : TRIAL);
+      if (!begun) loop.clock[0].fresh = true, reached = trial(exponential, TRIAL);
       best = {mark(since), &exponential, reached}, step = loop.clock[0].wish;
     }
     if (!over()) race_of_others(start, step, best);
@@ -190,7 +211,7 @@ class Auto {
       if (method == &explicit_ && hopeless(best.speed)) break;
       go_back(start, since);
       loop.clock[0].fresh = true, loop.clock[0].wish = std::max(step, start.clock.wish);
-      const double got = trial(*method, coupled ? LONG : SHORT);
+      const double got = trial(*method, SHORT);
       if (over() || got > best.speed || best.method == nullptr) best = {mark(since), method, got};
       if (over()) break;
     }
