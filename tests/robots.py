@@ -1,7 +1,7 @@
 """Robots for the tests: short builders, the benchmarks' arms, and random robots with random states (hypothesis).
 
-A state from `state` is physically small: each flexible link is bent in shapes like its three lowest modes, its slopes below `SLOPE`.
-Random numbers on all unknowns would bend a link in shapes that no motion takes.
+A state from `state` is physically small: each flexible link is bent in shapes like its three lowest modes, its slopes below
+`SLOPE`. Random numbers on all unknowns would bend a link in shapes that no motion takes.
 """
 
 from __future__ import annotations

@@ -99,9 +99,23 @@ class Auto {
     const bool bends = c.n > c.plant.joints;
     const auto resistance = [&](int i) { return larger(c.plant.viscous[i], c.plant.coulomb[i]); };
     if (for_explicit(rtol, bends, c.plant.joints, acting, resistance)) chosen = &explicit_;
-    else if (acting.sampler) chosen = stiffer_than(acting.rate_Hz) ? static_cast<Method<double> *>(&implicit) : &explicit_;
+    else if (acting.sampler) chosen = for_ticks(acting.rate_Hz, bends && !resisted(acting));
     else if (acting.function) chosen = !bends ? static_cast<Method<double> *>(&explicit_) : c.plant.rides ? static_cast<Method<double> *>(&implicit) : &exponential;
     else race();
+  }
+
+  // Under a sampled controller: explicit steps if a tick takes few of them; else exponential ones, unless gains or friction couple the modes.
+  Method<double> *for_ticks(double rate_Hz, bool free) {
+    if (!stiffer_than(rate_Hz)) return &explicit_;
+    return free && !loop.course.plant.rides ? static_cast<Method<double> *>(&exponential) : &implicit;
+  }
+  bool resisted(const Acting &acting) const {
+    bool any = false;
+    for (int i = 0; i < loop.course.plant.joints; ++i) {
+      const JointDrive &d = acting.joints[std::size_t(i)];
+      any = any || worst(larger(loop.course.plant.viscous[std::size_t(i)], loop.course.plant.coulomb[std::size_t(i)])) > 0.0 || d.kp > 0.0 || d.kd > 0.0;
+    }
+    return any;
   }
 
   // The highest frequency or rate of decay where the run is [rad/s].

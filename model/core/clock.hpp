@@ -48,6 +48,9 @@ struct Clock {
     if (next_break < breaks.size()) stop = std::fmin(stop, breaks[next_break]);
   }
 
+  // Is there a break at t that `look_ahead` has not passed?
+  bool broken(const std::vector<double> &breaks) const { return next_break < breaks.size() && breaks[next_break] <= t; }
+
   // The instant before the next break: signals are read no later.
   double last() const { return std::nextafter(stop, -NEVER); }
 

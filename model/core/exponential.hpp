@@ -46,8 +46,7 @@ template <class Real> class Exponential : public Method<Real> {
       put_origin(k, q, v);
     }
     std::copy(c.z.begin(), c.z.begin() + 2 * n, state);
-    Real unused;
-    c.plant.powers(q, q, strain, unused);
+    strain = c.plant.strain(q);
     strain_before = choose_less(Real(0.5), which, strain, strain_before);
     look(t, steps.eta, steps.etad);
     const int from = steps.new_row(), to = steps.newest();
@@ -196,11 +195,11 @@ template <class Real> class Exponential : public Method<Real> {
   void account(const Real &h, const Real &x, bool whole, Real *z, Real *uncertain) {
     const auto sums = accounts.over(h, x, whole, c.z.data(), z);
     const Real *before = c.z.data() + 2 * n;
-    Real *now = z + 2 * n, unused;
-    c.plant.powers(z, z, strain, unused);
+    Real *now = z + 2 * n;
+    strain = c.plant.strain(z);
     now[WORK] = before[WORK] + sums.work, now[LOSS] = before[LOSS] + sums.loss;
     now[NUMERICAL] = before[NUMERICAL] + sums.numerical;
-    now[STRAIN] = before[STRAIN] + 0.5 * (strain - strain_before);  // (K q) . q is twice the energy
+    now[STRAIN] = before[STRAIN] + (strain - strain_before);
     uncertain[0] = sums.work_error, uncertain[1] = sums.loss_error;
   }
 

@@ -103,7 +103,8 @@ template <class Real> class Loop {
   std::vector<double> outputs;
   std::array<std::vector<double>, LANES> breaks;
   std::vector<Real> row_state;
-  std::vector<double> plain;  // one robot's state
+  std::vector<double> plain;   // one robot's state
+  std::vector<double> before;  // what a sampled controller held
   Method<Real> *current = nullptr;
   Real at, length, last, error, good;
   double beyond[LANES] = {};  // when the step just attempted leaves a limit; minus infinity: it is not good
@@ -138,8 +139,10 @@ template <class Real> class Loop {
       Acting &a = course.acts.acting(k);
       if (c.due(a) <= c.t && c.t < c.end) {
         const double *z = state_of(k, course.z.data());
+        before.assign(a.held.force.begin(), a.held.force.end());
         a.sampler->tick(c.tick++, c.t, z, z + course.n, a.held);
-        c.fresh = true;
+        const bool moves = std::any_of(a.joints.begin(), a.joints.end(), [](const JointDrive &d) { return d.sampled; });
+        c.fresh = c.fresh || moves || before != a.held.force;  // what holds as before makes no jump
       }
       c.look_ahead(breaks[k], a);
       if (c.fresh) set_lane(which, k, 1.0), jumped = true;
@@ -210,8 +213,9 @@ template <class Real> class Loop {
         if (lane(good, k) == 0.0) continue;
         Clock &c = clock[k];
         c.t = c.next;
-        if (c.steps % 8 == 0 || c.t == c.stop) set_lane(look, k, 1.0);
-        if (c.t == c.stop && c.t < c.end) c.fresh = true;
+        const bool breaks_here = c.t == c.stop && c.t < c.due(course.acts.acting(k));
+        if (c.steps % 8 == 0 || breaks_here) set_lane(look, k, 1.0);
+        if (c.t < c.end && (breaks_here || c.broken(breaks[k]))) c.fresh = true;
         if (c.t >= c.end) finish(k);
       }
       course.weights.grow(course.z.data(), look);

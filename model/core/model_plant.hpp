@@ -44,6 +44,15 @@ template <class Real> class ModelPlant : public Plant<Real> {
     for (int k = 0; k < this->n; ++k) loss += rest[std::size_t(k)] * v[k];
   }
 
+  Real strain(const Real *q) override {
+    Real twice = 0.0, sleeves = 0.0;
+    for (const Piece<Real> &c : model.pieces)
+      if (c.joint == At::sleeve) sleeves += sleeve_strain(c, q);
+      else
+        for (int l = 0; l < c.m; ++l) twice += c.K[l] * q[c.own() + l] * q[c.own() + l];
+    return 0.5 * twice + sleeves;
+  }
+
   Real energy(const Real *q, const Real *v) override {
     const Energies<Real> e = energies(model, work, q, v);
     return e.kinetic + e.strain;

@@ -44,6 +44,12 @@ template <class Real> struct Plant {
   virtual void accelerate(const Pass<Real> &pass, Real *a, Real *reaction) = 0;
   // The rate of the strain energy (K q) . q', and the power lost to the material's damping [W].
   virtual void powers(const Real *q, const Real *v, Real &strain, Real &loss) = 0;
+  // Strain energy [J]; (K q) . q is twice that if K is constant.
+  virtual Real strain(const Real *q) {
+    Real twice, unused;
+    powers(q, q, twice, unused);
+    return 0.5 * twice;
+  }
   // Kinetic and strain energy [J].
   virtual Real energy(const Real *q, const Real *v) = 0;
   // The largest angular frequency or rate of decay at q with the gains of `pass` [1/s], from above: what limits explicit steps.

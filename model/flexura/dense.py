@@ -12,9 +12,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from scipy.integrate import DOP853, Radau
-from scipy.linalg import eigh
-from scipy.optimize import brentq
 
 from .drive import Drive
 from .errors import InputError
@@ -74,7 +71,7 @@ class Course:
         self.now, self.until, self.z = float(t[0]), float(t[-1]), np.concatenate([q, qd, np.zeros(3)])
         self.length: float | None = None  # of the last step
         self.steps, self.evaluations, self.jumped = 0, 0, 0.0
-        self.found: list[tuple[Any, ...]] = []
+        self.found: list[tuple[Any, ...]] = []  # rows: time, state, accounts, forces, what is seen, jumps so far
         self.events: list[dict[str, Any]] = []
         self.method = self._method(method)
 
@@ -153,17 +150,25 @@ class Course:
             if far > 0:
                 self.now = self._when(line, before, self.now)
                 far, *which = 1.0, *self._beyond(self.now, line(self.now))[1:]
-                again = self._solver(before, start, self.now, self.now - before)
-                while again.status == "running":
-                    again.step()
-                self.z = again.y
+                self.z = self._again(before, start, line(self.now), self.rows[which[0]])
             self._show(self.t[(self.t > before) & (self.t <= self.now)], line)
             if self.progress is not None:
                 self.progress((self.now - self.t[0]) / (self.t[-1] - self.t[0]))
         return (which[0], bool(which[1])) if far > 0 else None
 
+    def _again(self, before: float, start: np.ndarray, near: np.ndarray, row: int) -> np.ndarray:
+        """The state now by steps from `before`: `near` is interpolated. The row that ended the step is as it was found."""
+        solver = self._solver(before, start, self.now, self.now - before)
+        while solver.status == "running":
+            solver.step()
+        z = solver.y.copy()
+        z[row] = near[row]
+        return z
+
     def _when(self, line: Callable[[float], np.ndarray], before: float, after: float) -> float:
         """When a joint leaves its bounds between two times."""
+        from scipy.optimize import brentq
+
         far = lambda s: self._beyond(s, line(s))[0]
         return before if far(before) >= 0 else float(brentq(far, before, after, xtol=1e-15 * max(abs(after), 1e-3)))
 
@@ -243,6 +248,8 @@ class Course:
         return np.setdiff1d(self.system.free_rows, self.rows[self.given])
 
     def _solver(self, start: float, z: np.ndarray, end: float, length: float | None) -> Any:
+        from scipy.integrate import DOP853, Radau
+
         first = None if length is None else min(length, end - start) or None
         keys = {"rtol": max(STRICT * self.rtol, 3e-14), "atol": self._atol, "first_step": first}
         rates = lambda t, y: self._acted(t, y)[0]
@@ -252,6 +259,9 @@ class Course:
 
     def _method(self, method: str) -> str:
         """The method by its name in `METHODS`; sets what a step may err by where a number is small."""
+        from scipy.linalg import eigh
+
+
         assembly, joints = self.system.assembly, self.system.robot.links
         unit = np.ones(self.n)
         M, reach = assembly.mass(self.z[: self.n]), max(sum(link.length_m for link in joints), 1e-3)

@@ -150,6 +150,8 @@ class _Course:
                     progress((self.core.progress()["t"] - t[0]) / (t[-1] - t[0]))
             if len(t) == 1:
                 self.core.advance(1)
+            if progress is not None and self.core.progress()["status"] == "done":
+                progress(1.0)
         except KeyboardInterrupt:
             interrupted = True
         about = self.core.progress()
@@ -213,7 +215,7 @@ def initial(system: System, t: float, drive: Any, q0: Any, qd0: Any) -> tuple[np
 
 
 def _times(t_eval: Any) -> np.ndarray:
-    t = np.ascontiguousarray(t_eval, dtype=float)
+    t = np.array(t_eval, dtype=float)
     if t.ndim != 1 or len(t) < 1 or not np.all(np.isfinite(t)) or not np.all(np.diff(t) > 0):
         raise InputError("expected ascending finite times in seconds, one or more", key="t_eval", value=t_eval)
     return t

@@ -133,14 +133,14 @@ def test_without_stiffening_rotation_softens_a_cantilever():
 @pytest.mark.parametrize(
     ("load", "deflection", "shortening", "slope"), [(0.5, 0.162144, 0.015919, 0.244534), (1.0, 0.301721, 0.056433, 0.461352)]
 )
-@pytest.mark.parametrize("elements", [2, 4, 8])
-def test_a_dead_tip_load_bends_a_link_like_an_inextensible_line(elements, load, deflection, shortening, slope):
-    """B4, to 1e-3."""
+@pytest.mark.parametrize(("elements", "near"), [(2, 1e-4), (4, 1e-5), (8, 6e-6)])
+def test_a_dead_tip_load_bends_a_link_like_an_inextensible_line(elements, near, load, deflection, shortening, slope):
+    """B4, to six digits with 8 elements."""
     sys = unit_link(elements)
     x, y, angle = fx.tip_pose(sys, fx.static(sys, tip_force=(0.0, load)))
-    assert y == pytest.approx(deflection, rel=1e-3)
-    assert 1 - x == pytest.approx(shortening, rel=1e-3)
-    assert angle == pytest.approx(slope, rel=1e-3)
+    assert y == pytest.approx(deflection, rel=near)
+    assert 1 - x == pytest.approx(shortening, rel=near)
+    assert angle == pytest.approx(slope, rel=near)
 
 
 @pytest.mark.parametrize("stiffening", [True, False])
@@ -204,20 +204,20 @@ def test_spin_up_is_stiffened_by_rotation(elements):
     assert np.abs(run["joint/1/position"] - psi).max() < 1e-4
     along, w = by_hub(run)
     assert w == pytest.approx(run["link/1/tip_deflection"], abs=1e-9)
-    assert w.min() == pytest.approx(-0.574, abs=1e-3) and t[w.argmin()] == pytest.approx(6.76, abs=0.015)
-    assert run["link/1/tip_slope"].min() == pytest.approx(-0.0773, abs=3e-4)
-    assert w[[500, 1000]] == pytest.approx([-0.46844, -0.36268], abs=1e-3)
+    assert w.min() == pytest.approx(-0.57376, abs=3e-5) and t[w.argmin()] == pytest.approx(6.76, abs=0.015)
+    assert run["link/1/tip_slope"].min() == pytest.approx(-0.0773, abs=3e-5)
+    assert w[[500, 1000]] == pytest.approx([-0.46844, -0.36268], abs=1.5e-4 if elements == 4 else 2e-5)
     assert np.abs(w[t >= 15]).max() < 5e-3
-    assert (along - 10).min() == pytest.approx(-0.0189, abs=2e-4)
+    assert (along - 10).min() == pytest.approx(-0.0189, abs=2e-5)
 
 
 def test_spin_up_diverges_without_stiffening():
     """B5: 6 rad/s is beyond the first frequency, 3.80 rad/s."""
-    try:
-        run = spin_up(False, 4)
-    except fx.FlexuraError:
-        return
-    assert np.abs(run["link/1/tip_deflection"]).max() > 1e2
+    arm = system(beam(10.0, 1.2, 1.4e4, 1, modes=1), stiffening=False)
+    drive = fx.Drive.prescribed(signal.Signal(np.array([[0, 0, 6.0, 0, 0, 0, 0, 0, 0, 0]])))
+    run = fx.simulate(arm, [0.0, 2.0], drive, q0=[0.0, 1e-4], rtol=1e-4)
+    growth = run["link/1/tip_deflection"][-1] / run["link/1/tip_deflection"][0]
+    assert growth == pytest.approx(np.cosh(2.0 * np.sqrt(36 - 3.799**2)), rel=0.01)
 
 
 # B6: a torque-driven arm --------------------------------------------------------------------------------------------------

@@ -14,8 +14,8 @@ TORQUE_AT = {0.10: 0.043175, 0.25: 0.33398, 0.40: 0.61167, 0.50: 0.44220, 0.60: 
 DEFLECTION_AT = {0.25: -0.068424, 0.50: -0.094305, 0.75: 0.190961, 1.00: 0.022690}
 
 
-def bench_arm(elements: int = 8, **keys: object) -> fx.System:
-    link = {
+def bench_arm(elements: int = 8, modes: int | None = None, **keys: object) -> fx.System:
+    link = ({} if modes is None else {"modes": modes}) | {
         "length_m": 0.6, "elements": elements, "mass_per_length_kg_m": 0.2355, "bending_stiffness_N_m2": 0.5,
         "joint": {"type": "R", "hub_inertia_kg_m2": 2e-3},
     }  # fmt: skip
@@ -51,7 +51,7 @@ def test_bench_arm_needs_the_torque_of_benchmark_b7(method: str) -> None:
     run = fx.inverse(bench_arm(), t, cycloid(np.pi / 2, 1.0), rtol=1e-8, method=method)
     torque, tip = run["joint/1/drive"], run["link/1/tip_deflection"]
     for at, value in TORQUE_AT.items():
-        assert np.interp(at, t, torque) == pytest.approx(value, abs=1e-4), at
+        assert np.interp(at, t, torque) == pytest.approx(value, abs=2e-5), at
     for at, value in DEFLECTION_AT.items():
         assert np.interp(at, t, tip) == pytest.approx(value, abs=1e-5), at
     assert torque.max() == pytest.approx(0.84354, abs=1e-4)
@@ -62,10 +62,11 @@ def test_bench_arm_needs_the_torque_of_benchmark_b7(method: str) -> None:
     assert run.meta["energy_error"] < 1e-7
 
 
+@pytest.mark.slow
 def test_linear_kinematics_need_the_torque_of_the_dissertations_form() -> None:
     """B7, last row: no stiffening, quadratic terms kept. The row has two to three digits of agreement between codes."""
     t = np.linspace(0.0, 1.0, 1001)
-    torque = fx.inverse(bench_arm(stiffening=False), t, cycloid(np.pi / 2, 1.0), rtol=1e-8)["joint/1/drive"]
+    torque = fx.inverse(bench_arm(modes=4, stiffening=False), t, cycloid(np.pi / 2, 1.0), rtol=1e-6)["joint/1/drive"]
     for at, value in {0.50: 0.4078, 0.60: 0.0216, 0.75: -0.8425, 0.90: -0.9733}.items():
         assert np.interp(at, t, torque) == pytest.approx(value, abs=0.01), at
 

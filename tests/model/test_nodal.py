@@ -341,6 +341,14 @@ def test_a_python_drive_sees_the_whole_robot():
         fx.simulate(cart, t, lambda time_s: [0.0, 0.0, 0.0])
 
 
+def test_a_node_is_passed_once_by_a_free_joint_and_the_implicit_method():
+    cart = cart_with_sleeve(2, 0.395)
+    qd = np.zeros(cart.n)
+    qd[0] = 0.5
+    run = fx.simulate(cart, [0.0, 0.02], qd0=qd, rtol=1e-4, method="implicit")
+    assert run.complete and [j["text"] for j in run.meta["energy_jumps"]] == ["node 1 of link 1 left its sleeve"]
+
+
 @pytest.mark.parametrize(
     ("d", "s", "keys", "force", "text"),
     [

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, eigh, solve_triangular
 
 from .quadrature import gauss, lagrange_integrals
 from .section import Material
@@ -55,6 +54,8 @@ def orthogonal_shapes(K: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     Each is one of the space (7) less what those before it would bend with it; of a uniform link the
     space's own. Round-off between orthogonal shapes is taken away first.
     """
+    from scipy.linalg import solve_triangular
+
     size = np.sqrt(np.diag(K))
     L = np.linalg.cholesky(np.where(np.abs(K) < 1e-14 * np.outer(size, size), 0.0, K))
     return solve_triangular(L.T, np.diag(np.diag(L))), np.diag(L) ** 2
@@ -62,6 +63,8 @@ def orthogonal_shapes(K: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _modes(M: np.ndarray, K: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """omega^2 (m,) ascending, mass-normalised modes (m, m); M x = mu K x keeps low ones exact."""
+    from scipy.linalg import eigh
+
     mu, X = eigh(M, K)
     mu, X = np.maximum(mu[::-1], 1e-300), X[:, ::-1]
     return 1 / mu, X / np.sqrt(mu)
@@ -71,6 +74,8 @@ def _rest_of_static_shapes(
     K: np.ndarray, tip: np.ndarray, lam: np.ndarray, V: np.ndarray
 ) -> np.ndarray:
     """The static shapes of a tip force and moment without what the modes V have of them (10)."""
+    from scipy.linalg import cho_factor, cho_solve
+
     room = len(K) - len(lam)
     rest = cho_solve(cho_factor(K), tip.T[:, :room])
     rest -= V @ ((V.T @ tip.T[:, :room]) / lam[:, None])

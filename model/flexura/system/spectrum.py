@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.linalg import eigh
 
 from ..errors import InputError
 from .statics import static
@@ -73,6 +72,8 @@ def _hertz(squares: np.ndarray) -> np.ndarray:
 
 def _dense(system: System, at: np.ndarray, joints: str, count: int | None) -> Modes:
     """The modes of the dissertation's linear model, from the dense equations."""
+    from scipy.linalg import eigh
+
     rows = system.elastic_rows if joints == "locked" else system.free_rows
     pick, shapes = np.ix_(rows, rows), np.zeros((system.n, len(rows)))
     if len(rows) == 0:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.linalg import cholesky, eig, eigvals, null_space, solve_triangular
 
 from ..errors import FlexuraError, InputError
 from .statics import static
@@ -61,6 +60,8 @@ class StateSpace:
     @property
     def poles(self) -> np.ndarray:
         """Eigenvalues of A (2m,) [1/s], by magnitude."""
+        from scipy.linalg import cholesky
+
         R = cholesky(self.M)
         return _roots(np.eye(len(self.M)), _scaled(R, self.G), _scaled(R, self.K))
 
@@ -73,6 +74,8 @@ class StateSpace:
         part (non-minimum phase) bound what feedback of that output can do. Raises InputError for unknown names, and for an
         output that the drive does not move.
         """
+        from scipy.linalg import cholesky, null_space, solve_triangular
+
         b = self.E[:, _find(drive, self.inputs, "drive")]
         c = self.outlook[_find(output, self.outputs, "output")]
         R = cholesky(self.M)  # coordinates in which M = 1
@@ -202,11 +205,15 @@ def _steep(system: System) -> np.ndarray:
 
 def _scaled(R: np.ndarray, X: np.ndarray) -> np.ndarray:
     """R^-T X R^-1."""
+    from scipy.linalg import solve_triangular
+
     return solve_triangular(R, solve_triangular(R, X, trans="T").T, trans="T").T
 
 
 def _roots(M: np.ndarray, G: np.ndarray, K: np.ndarray) -> np.ndarray:
     """Finite s with det(s^2 M + s G + K) = 0, by magnitude; without G as the roots of s^2."""
+    from scipy.linalg import eig, eigvals
+
     n = len(M)
     if n == 0:
         return np.zeros(0, dtype=complex)

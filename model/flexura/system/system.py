@@ -216,7 +216,7 @@ class System:
         return self._array(q, key)
 
     def _array(self, q: Any, key: str) -> np.ndarray:
-        array = np.ascontiguousarray(q, dtype=float)
+        array = np.array(q, dtype=float)
         if array.shape != (self.n,):
             raise InputError(
                 f"expected an array of shape ({self.n},), in the order of system.labels", key=key, value=array.shape

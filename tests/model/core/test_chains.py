@@ -45,7 +45,8 @@ def random_robot(rng: np.random.Generator) -> fx.Robot:
         if rng.random() < 0.3:
             keys["modes"] = int(rng.integers(1, min(2 * elements, 6) + 1))
         EI, taper = float(10 ** rng.uniform(-3, 6)), float(rng.uniform(0.3, 1.0))
-        law = (lambda v, f=taper: [{"at_m": 0.0, "value": v}, {"at_m": L, "value": v * f}]) if rng.random() < 0.3 else float
+        tapered = rng.random() < 0.3
+        law = lambda v, f=taper, end=L, on=tapered: [{"at_m": 0.0, "value": v}, {"at_m": end, "value": v * f}] if on else v
         keys["damping"] = {"beta_s": float(rng.choice([0.0, 1e-3])), "alpha_1_s": float(rng.choice([0.0, 0.1]))}
         tables.append(beam(L, law(rho), law(EI), elements, kind, **keys, **joint))
     last = tables[-1]["length_m"]

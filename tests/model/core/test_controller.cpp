@@ -76,14 +76,14 @@ std::vector<double> ticks(int count, int every = 1) {
 }
 
 // A run of a robot from rest under a controller.
-struct Run {
+struct RunOf {
   Workspace<double> work;
   ModelPlant<double> plant;
   Acting acting;
   Acting *list = &acting;
   std::unique_ptr<Loop<double>> loop;
 
-  Run(const Model<double> &model, Controller &controller, const std::vector<double> &t, double rtol, const char *name)
+  RunOf(const Model<double> &model, Controller &controller, const std::vector<double> &t, double rtol, const char *name)
       : work(model), plant(model, work), acting(model.links()) {
     const std::vector<double> q = rest(model), v(q.size(), 0.0);
     controller.start(acting, q.data());
@@ -144,7 +144,7 @@ TEST("a cart follows the recursion written out") {
     if (trial % 2) g[LIMIT] = 20.0, g[SLEW] = 3000.0;
     const Shared robot = made({rigid(JointKind::slider, 0.0, mass)}, 0.0);
     Controller controller = controlled(robot, {joint});
-    const Run run(*robot, controller, ticks(300), 1e-12, "explicit");
+    const RunOf run(*robot, controller, ticks(300), 1e-12, "explicit");
     double x = 0.0, v = 0.0, r = 0.0, last = 0.0, speed = 0.0, sum = 0.0, u = 0.0;
     std::vector<double> outputs(std::size_t(g[DELAY]), 0.0);
     for (int k = 0; k <= 300; ++k) {
@@ -172,7 +172,7 @@ TEST("a stepper's pulses are the integral of its rate, and a joint without a spr
   double *g = step.gain;
   g[LIMIT] = 2.0, g[SLEW] = 60.0, g[DELAY] = 1.0, g[RIGID] = 1.0;
   Controller controller = controlled(robot, {held, step});
-  const Run run(*robot, controller, ticks(600), 1e-6, "explicit-5");
+  const RunOf run(*robot, controller, ticks(600), 1e-6, "explicit-5");
   const int row = robot->first[1];
   double place = 0.0, before = 0.0;
   for (int k = 0; k < 600; ++k) {
@@ -188,7 +188,7 @@ TEST("a robot that starts elsewhere is not moved by a stepper that stands still"
   Driven step = effort(5.0, 0.0, constant(robot->start[0]));
   step.output = JointLaw::Output::stepper, step.gain[RIGID] = 1.0;
   Controller controller = controlled(robot, {step});
-  const Run run(*robot, controller, ticks(20), 1e-6, "explicit");
+  const RunOf run(*robot, controller, ticks(20), 1e-6, "explicit");
   for (int k = 0; k <= 20; ++k) CHECK(run.at(k, 0) == robot->start[0]);
 }
 
@@ -211,7 +211,7 @@ TEST("what the law measures of a tip is what a run shows of it") {
       for (int link = 0; link < robot->links(); ++link) {
         at += 3;
         if (robot->elastic[std::size_t(link)] == 0) continue;
-        const Bend<double> tip = bend(*robot, work, q.data(), link);
+        const Bend tip = bend(*robot, work, q.data(), link);
         CHECK(tip.deflection == row[at] && tip.slope == row[at + 1]);
         CHECK_NEAR(tip.deflection, row[at + 3], 1e-15);  // the last of two stations, by another way
         at += 4;
@@ -226,7 +226,7 @@ TEST("a strip bent to a circle has a circle's tip") {
   Workspace<double> work(*robot);
   for (double angle : {0.01, 1.0, 3.0}) {
     for (int e = 0; e < 8; ++e) q[std::size_t(1 + 2 * e)] = angle / 8.0;
-    const Bend<double> tip = bend(*robot, work, q.data(), 0);
+    const Bend tip = bend(*robot, work, q.data(), 0);
     CHECK_NEAR(tip.slope, angle, 1e-14);
     CHECK_NEAR(tip.deflection, 0.3 / angle * (1.0 - std::cos(angle)), 1e-9 * angle);
   }
@@ -243,7 +243,7 @@ TEST("the strip's terms: the mean of two ticks, every second tick, each joint in
   check::Random random{11};
   double w = 0.0, s = 0.0, dw = 0.0, ds = 0.0, w1 = 0.0, s1 = 0.0, u[2] = {0.0, 0.0};
   for (long k = 0; k < 40; ++k) {
-    const Bend<double> seen{random(-0.01, 0.01), random(-0.1, 0.1)};
+    const Bend seen{random(-0.01, 0.01), random(-0.1, 0.1)};
     const double still[2] = {0.0, 0.0}, reading = 1e-3 * std::floor(seen.deflection / 1e-3 + 0.5);
     if (k == 0) w = w1 = reading, s = s1 = seen.slope;
     if (k % 2 == 0) {
@@ -266,9 +266,9 @@ TEST("every method gives the same motion under a controller, also between its ti
   std::vector<double> t;
   for (int k = 0; k <= 100; ++k) t.push_back(0.004 * k + 0.0001 * (k % 3));  // not on ticks
   Controller controller = controlled(robot, {motor, turn});
-  const Run exact(*robot, controller, t, 1e-11, "explicit");
+  const RunOf exact(*robot, controller, t, 1e-11, "explicit");
   for (const auto &[name, rtol, most] : {std::tuple{"explicit-3", 1e-5, 1e-4}, std::tuple{"explicit-5", 1e-7, 1e-6}, std::tuple{"implicit", 1e-7, 1e-6}}) {
-    const Run run(*robot, controller, t, rtol, name);
+    const RunOf run(*robot, controller, t, rtol, name);
     for (int k = 0; k <= 100; ++k)
       for (int i = 0; i < 2; ++i) CHECK_NEAR(run.at(k, robot->first[std::size_t(i)]), exact.at(k, robot->first[std::size_t(i)]), most);
   }
@@ -321,7 +321,7 @@ TEST("a row of gains is its run; rows, order and threads do not matter; a row is
 
     Controller controller = plan.controller;
     controller.set_gains(gains.data() + b * GAINS);
-    Run run(*robot, controller, plan.t, plan.rtol, trials.plan().method.c_str());
+    RunOf run(*robot, controller, plan.t, plan.rtol, trials.plan().method.c_str());
     std::vector<double> q, w;
     for (int k = 0; k < int(plan.t.size()); ++k) {
       const double *z = run.loop->record[0].state.data() + std::size_t(k * run.loop->record[0].size);

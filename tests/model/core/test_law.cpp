@@ -82,7 +82,7 @@ TEST("the strip: two ticks make a reading, one joint takes it at once and the ot
     j.gains.kf = 1.0, j.gains.kg = 0.1, j.ks = 2.0;
   }
   double w = 0.0;
-  law.strip = [&](const double *) { return Bend<double>{w, 0.5 * w}; };
+  law.strip = [&](const double *) { return Bend{w, 0.5 * w}; };
   SampledOutput held = outputs(2);
   const double q[2] = {0.0, 0.0};
   std::vector<double> first, second;

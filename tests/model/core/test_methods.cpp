@@ -23,14 +23,14 @@ std::vector<double> grid(double end, int count) {
   return t;
 }
 
-struct Run {
+struct RunOf {
   Model<double> model;
   Workspace<double> work;
   ModelPlant<double> plant;
   Loop<double> loop;
   std::unique_ptr<Method<double>> method;
   std::vector<Pose<double>> pose;
-  Run(const Robot &robot, Acting *acting, std::vector<double> t, double rtol, const std::string &name)
+  RunOf(const Robot &robot, Acting *acting, std::vector<double> t, double rtol, const std::string &name)
       : model(assemble(robot)), work(model), plant(model, work), loop(plant, &acting, std::move(t), rtol),
         method(make_method(name, loop.course)), pose(std::size_t(model.links()) + 1) {}
   Status operator()(std::vector<double> q = {}) {
@@ -75,7 +75,7 @@ TEST("a flexible pendulum without a hub, released straight and horizontal") {
   robot.links = {bar(1.0, 0.5, 0.5, 8)};
   for (const char *name : NAMES) {
     Acting acting(1);
-    Run run(robot, &acting, grid(1.0, 5), 1e-4, name);
+    RunOf run(robot, &acting, grid(1.0, 5), 1e-4, name);
     CHECK(run() == Status::done);
     CHECK_NEAR(run.tip(1).x, 0.90890, 2e-4), CHECK_NEAR(run.tip(1).y, -0.40750, 2e-4);
     CHECK_NEAR(run.tip(2).x, -0.06008, 2e-4), CHECK_NEAR(run.tip(2).y, -0.99609, 2e-4);
@@ -90,7 +90,7 @@ TEST("the torque-driven bench arm") {
   robot.payload_mass = 0.05;
   Acting acting(1);
   acting.joints[0].force = {segment(0.0, 0.05), segment(0.5, -0.05), segment(1.0, 0.0)};
-  Run run(robot, &acting, grid(2.0, 9), 1e-4, "implicit");
+  RunOf run(robot, &acting, grid(2.0, 9), 1e-4, "implicit");
   CHECK(run() == Status::done);
   const double angle[] = {0.0, 0.06110, 0.19744, 0.26326, 0.28841}, deflection[] = {0.0, -0.012954, -0.019457, 0.022566, 0.034247};
   for (int k = 1; k < 5; ++k) {
@@ -120,7 +120,7 @@ TEST("the balance of sliders, sleeves, dampers and friction; a broken account sh
     acting.joints[std::size_t(i)].motion = {segment(0.0, at[i], 0.2)};
     acting.joints[std::size_t(i)].kp = 30.0, acting.joints[std::size_t(i)].kd = 3.0;
   }
-  Run run(robot, &acting, grid(0.5, 11), 1e-5, "implicit");
+  RunOf run(robot, &acting, grid(0.5, 11), 1e-5, "implicit");
   std::vector<double> q(std::size_t(run.model.n), 0.0);
   for (int i = 0; i < 3; ++i) q[std::size_t(run.plant.first[std::size_t(i)])] = at[i];
   CHECK(run(q) == Status::done);
@@ -155,7 +155,7 @@ TEST("four robots side by side have the digits of each alone") {
     loop.start(zero.data(), zero.data(), 1e-3);
     while (loop.advance(*method, 1000)) {}
     for (int k = 0; k < 4; ++k) {
-      Run run(robots[k], acts[k], grid(0.2, 11), 1e-4, name);
+      RunOf run(robots[k], acts[k], grid(0.2, 11), 1e-4, name);
       const std::vector<double> still(std::size_t(model.n), 0.0);
       run.loop.start(still.data(), still.data(), 1e-3);
       while (run.loop.advance(*run.method, 1000)) {}
@@ -174,7 +174,7 @@ TEST("a robot that stands still, with a locked joint, takes long steps") {
   robot.links[1].joint.locked = true;
   for (const char *name : NAMES) {
     Acting acting(2);
-    Run run(robot, &acting, grid(1.0, 3), 1e-6, name);
+    RunOf run(robot, &acting, grid(1.0, 3), 1e-6, name);
     CHECK(run() == Status::done);
     CHECK(run.state(2)[0] == 0.0 && run.state(2)[run.model.n - 1] == 0.0);
   }
