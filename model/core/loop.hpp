@@ -318,4 +318,7 @@ template <class Real> class Loop {
   }
 };
 
+extern template class Loop<double>;
+extern template class Loop<Pack<4>>;
+
 }  // namespace flexura
