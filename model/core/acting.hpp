@@ -67,6 +67,16 @@ struct Acting {
   // The force of joint i that does not depend on the state: signal and what is held.
   double force(int joint, double t) const { return evaluate(joints[joint].force, t).y + held.force[joint]; }
 
+  // The shortest period of the signals [s]: a step that is longer would see a wave at like phases and take it for still.
+  double shortest_period() const {
+    double w = 0.0;
+    for (const JointDrive &d : joints)
+      for (const Signal *signal : {&d.force, &d.motion})
+        for (const Segment &g : *signal)
+          if (g.A != 0.0) w = std::max(w, std::fabs(g.w));
+    return w > 0.0 ? 6.283185307179586 / w : std::numeric_limits<double>::infinity();
+  }
+
   // Times at which a signal jumps or kinks, ascending, each once.
   std::vector<double> breaks() const {
     std::vector<double> out;

@@ -28,6 +28,8 @@ template <class Real> class Loop {
   std::array<Record, LANES> record;
   long most_steps = std::numeric_limits<long>::max();  // budget: accepted and rejected steps of a robot
   double longest = Clock::NEVER;                       // no step is longer [s]
+  static constexpr double PART = 0.15;                 // nor than this part of the shortest period of a signal
+  static constexpr double LEAST_STEPS = 100.0;         // of a run under a function of the caller's, whose waves are not known
   const std::atomic<bool> *interrupt = nullptr;        // stops the run where it is
   std::atomic<double> *progress = nullptr;             // the time reached by the slowest robot
 
@@ -35,7 +37,10 @@ template <class Real> class Loop {
   Loop(Plant<Real> &plant, Acting *const *acting, std::vector<double> times, double rtol)
       : course(plant, acting, rtol), outputs(std::move(times)), row_state(padded(course.size), Real(0.0)),
         plain(course.size, 0.0) {
-    for (int k = 0; k < LANES; ++k) breaks[k] = acting[k]->breaks();
+    for (int k = 0; k < LANES; ++k) {
+      breaks[k] = acting[k]->breaks(), most[k] = PART * acting[k]->shortest_period();
+      if (acting[k]->function) most[k] = std::fmin(most[k], (outputs.back() - outputs.front()) / LEAST_STEPS);
+    }
   }
 
   void start(const Real *q0, const Real *v0, double first_step) {
@@ -105,6 +110,7 @@ template <class Real> class Loop {
   std::vector<Real> row_state;
   std::vector<double> plain;   // one robot's state
   std::vector<double> before;  // what a sampled controller held
+  std::array<double, LANES> most;  // length of a step by what acts [s]
   Method<Real> *current = nullptr;
   Real at, length, last, error, good;
   double beyond[LANES] = {};  // when the step just attempted leaves a limit; minus infinity: it is not good
@@ -170,7 +176,7 @@ template <class Real> class Loop {
       set_lane(at, k, c.t), set_lane(length, k, 0.0), set_lane(last, k, c.t);
       if (!c.running()) continue;
       const double left = c.stop - c.t, ahead = outputs[c.row] - c.t;
-      c.step = method.fit(k, std::fmin(c.wish, longest), left, ahead);
+      c.step = method.fit(k, std::fmin(c.wish, std::fmin(longest, most[std::size_t(k)])), left, ahead);
       c.next = c.step >= left ? c.stop : c.step == ahead ? outputs[c.row] : c.t + c.step;
       set_lane(length, k, c.step), set_lane(last, k, std::fmax(c.t, c.last()));
     }
