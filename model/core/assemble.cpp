@@ -4,7 +4,7 @@
 #include "eigen.hpp"
 #include "fault.hpp"
 #include "link.hpp"
-#include "pass.hpp"
+#include "newton_euler.hpp"
 
 namespace flexura {
 namespace {

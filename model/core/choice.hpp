@@ -1,8 +1,9 @@
 // The method "auto": which method takes fewest passes is measured, not guessed.
 //
 // A run begins with exponential steps (pace.hpp); then the others go on from the same state for SHORT passes. The one that gets furthest a
-// pass, in the second half of its trial, goes on from where its trial ended; what the others did is forgotten. The race is held again where progress a pass has fallen
-// to a quarter, at most once in AGAIN passes. Passes are counted, not time: a run's digits do not depend on the machine's load.
+// pass, in the second half of its trial, goes on from where its trial ended; what the others did is forgotten. The race is held again where
+// progress a pass has fallen to a quarter, at most once in AGAIN passes. Passes are counted, not time: a run's digits do not depend on the
+// machine's load.
 //
 // There is no race either where exponential steps end soon (pace.hpp), or where it would not be allowed or is decided beforehand: a
 // sampled controller must see each tick once, and a caller's function no time before one it has seen; rigid robots without gains or

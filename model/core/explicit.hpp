@@ -130,4 +130,7 @@ template <class Real> class Explicit : public Method<Real> {
   }
 };
 
+extern template class Explicit<double>;
+extern template class Explicit<Pack<4>>;
+
 }  // namespace flexura

@@ -137,4 +137,7 @@ template <class Real> class Implicit : public Method<Real> {
   }
 };
 
+extern template class Implicit<double>;
+extern template class Implicit<Pack<4>>;
+
 }  // namespace flexura

@@ -19,12 +19,25 @@ struct Free {
   static constexpr int most = 48;  // more is refused by `assemble`
 };
 
+// Whether code is made for all common sizes. What computes with derivatives does without those of links in their own modes, and so does
+// a build for which FLEXURA_FEW_SIZES is defined: it is compiled sooner and runs slower, with the same digits.
+#ifdef FLEXURA_FEW_SIZES
+template <class Real> constexpr bool many_sizes = false;
+#else
+template <class Real> constexpr bool many_sizes = true;
+template <int N> constexpr bool many_sizes<Dual<N>> = false;
+#endif
+
 // Calls f with m and P as sizes that the compiler knows, where they are common ones.
-template <class F>
+template <class Real, class F>
 inline void sized(int m, int P, F f) {
   switch (100 * m + P) {
     case 1: return f(Fixed<0>(), Fixed<1>());    // a rigid link
     case 203: return f(Fixed<2>(), Fixed<3>());  // an element of a mesh
+    default: break;
+  }
+  if constexpr (!many_sizes<Real>) return f(Free{m}, Free{P});
+  else switch (100 * m + P) {
     case 207: return f(Fixed<2>(), Fixed<7>());  // a link in its own modes, the last of its chain
     case 308: return f(Fixed<3>(), Fixed<8>());
     case 409: return f(Fixed<4>(), Fixed<9>());
@@ -170,7 +183,7 @@ void outward_kinematics(const Model<Real> &model, Workspace<Real> &work, const R
     if (c.joint == At::slider) k.along = slide;
     k.phi = phi, k.omega = omega;
     const Piece<Real> *next = i + 1 < count ? &model.pieces[i + 1] : nullptr;
-    sized(c.m, c.P, [&](auto m, auto P) { slide = outward(c, k, y, v, next, m, P, phi, omega); });
+    sized<Real>(c.m, c.P, [&](auto m, auto P) { slide = outward(c, k, y, v, next, m, P, phi, omega); });
     k.slide = slide;
   }
 }

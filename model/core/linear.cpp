@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "newton_euler.hpp"
+
 namespace flexura {
 
 Linear linearise(const Model<double> &model, const double *q, const double *v, const double *force,

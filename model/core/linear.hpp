@@ -3,7 +3,7 @@
 #pragma once
 #include <vector>
 
-#include "pass.hpp"
+#include "model.hpp"
 
 namespace flexura {
 

@@ -112,7 +112,7 @@ template <class Real> class Loop {
   std::vector<double> before;  // what a sampled controller held
   std::array<double, LANES> most;  // length of a step by what acts [s]
   Method<Real> *current = nullptr;
-  Real at, length, last, error, good;
+  Real at = 0.0, length = 0.0, last = 0.0, error = 0.0, good = 0.0;
   double beyond[LANES] = {};  // when the step just attempted leaves a limit; minus infinity: it is not good
   bool prepared = false;
 
@@ -323,5 +323,8 @@ template <class Real> class Loop {
     c.t = t, c.status = Status::limit;
   }
 };
+
+extern template class Loop<double>;
+extern template class Loop<Pack<4>>;
 
 }  // namespace flexura

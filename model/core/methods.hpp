@@ -24,15 +24,4 @@ const char *explicit_for_ticks(double tick_s, double fastest, double rtol);
 // Why a run ended where it did, in a sentence, and what to try: for every status but `running` and `done`. `joint` counts from 1.
 std::string explain(const Clock &clock, const std::string &method, double rtol);
 
-extern template class Loop<double>;
-extern template class Loop<Pack<4>>;
-extern template class Explicit<double>;
-extern template class Explicit<Pack<4>>;
-extern template class Implicit<double>;
-extern template class Implicit<Pack<4>>;
-extern template class PairSteps<double>;
-extern template class PairSteps<Pack<4>>;
-extern template class ModelPlant<double>;
-extern template class ModelPlant<Pack<4>>;
-
 }  // namespace flexura

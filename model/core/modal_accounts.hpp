@@ -78,12 +78,9 @@ template <class Real> class ModalAccounts {
         put(U + m * room, c, sum), put(uncertain + m * room, c, wide(s.poly[0][m][OLDEST]) * gap);
       }
     }
-    for (int q = 0; q < ORDER; ++q) {
-      Real *row = P + q * room;
-      std::fill(row, row + room, Real(0.0));
-      add_rows(s.n, chunks, w.p[q + 1], phi, room, row);
-      for (int c = 0; c < chunks; ++c) put(row, c, double(q + 1) * get(row, c));
-    }
+    of_joints<ORDER>(w.p + 1, P);
+    for (int q = 0; q < ORDER; ++q)
+      for (int c = 0; c < chunks; ++c) put(P + q * room, c, double(q + 1) * get(P + q * room, c));
     P[count] = P[count + 1] = h;  // powers are integrated over time itself
     turns = !w.damped.empty();
     for (int c = 0; c < s.chunks; ++c) turns = turns || w.oscillates(c);
@@ -95,11 +92,7 @@ template <class Real> class ModalAccounts {
     Sums sum{0.0, 0.0, 0.0, 0.0, 0.0};
     const bool of_all_modes = s.b.lossy || s.b.damped;
     if (turns || of_all_modes) free_motion(h, x, whole);
-    if (turns)
-      for (int m = 0; m < POWERS; ++m) {
-        std::fill(Z + m * room, Z + (m + 1) * room, Real(0.0));
-        add_rows(s.n, chunks, L[m], phi, room, Z + m * room);
-      }
+    if (turns) of_joints<POWERS>(L, Z);
     Real area[2 * POWERS], power = x;  // int_0^x x^k dx
     for (int k = 0; k < 2 * POWERS; ++k) area[k] = power * (1.0 / (k + 1)), power *= x;
     for (int c = 0; c < chunks; ++c) {
@@ -147,6 +140,19 @@ template <class Real> class ModalAccounts {
   Real *total, *error, *squares;     // (room) int u_j v_j dt, its uncertain part; int v_j^2 dt
   Real *square, *added;              // (stride) scratch; `square` is written by record() too
   bool damped = false, turns = false;  // has any joint damping; does any mode have free motion in this step?
+
+  // The joints' part of several quantities of the modes: out (COUNT, room), sum_k phi_kj x_k.
+  template <int COUNT> void of_joints(Real *const *x, Real *out) const {
+    for (int c = 0; c < chunks; ++c) {
+      Lanes sum[COUNT];
+      for (Lanes &one : sum) one = 0.0;
+      for (int k = 0; k < s.n; ++k) {
+        const Lanes row = get(phi + k * room, c);
+        for (int m = 0; m < COUNT; ++m) sum[m] += wide(x[m][k]) * row;
+      }
+      for (int m = 0; m < COUNT; ++m) put(out + m * room, c, sum[m]);
+    }
+  }
 
   // int v_j^2 dt of the joints.
   void square_rates(const Real &h, const Real *area) {

@@ -238,4 +238,7 @@ template <class Real> class ModelPlant : public Plant<Real> {
   }
 };
 
+extern template class ModelPlant<double>;
+extern template class ModelPlant<Pack<4>>;
+
 }  // namespace flexura

@@ -86,7 +86,7 @@ template <class Real> class Modes {
     gone[k] += patience[k];
     if (taken[k] > 0) {
       const double changed = change(k, M, K, slow) / POOR;
-      patience[k] = smaller(larger(0.5 * gone[k] * (1.0 / larger(changed, 1e-3) - 1.0), TURN), FAR * TURN);  // half of what is left, were it to grow alike
+      patience[k] = smaller(larger(0.7 * gone[k] * (1.0 / root(larger(changed, 1e-3)) - 1.0), TURN), FAR * TURN);  // were it to grow as a square
       if (changed < 1.0) return false;
     }
     gone[k] = 0.0, patience[k] = TURN;

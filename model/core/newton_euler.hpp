@@ -129,4 +129,15 @@ void forces(const Model<Real> &model, Workspace<Real> &work, const Real *y, cons
   if (terms.damping && model.mass_damped) add_mass_damping(model, y, v, out);
 }
 
+// The sweeps are compiled once a kind of number: sweeps_one.cpp, sweeps_four.cpp, sweeps_dual.cpp.
+#define FLEXURA_SWEEPS(EXTERN, Real)                                                                                                    \
+  EXTERN template void outward_kinematics(const Model<Real> &, Workspace<Real> &, const Real *, const Real *);                          \
+  EXTERN template void accelerate(const Model<Real> &, Workspace<Real> &, const Real *, const Real *, const Stage<Real> &, const Real *, \
+                                  const Held<Real> &, Real *);                                                                          \
+  EXTERN template void add_mass_damping(const Model<Real> &, const Real *, const Real *, Real *);                                       \
+  EXTERN template void forces(const Model<Real> &, Workspace<Real> &, const Real *, const Real *, const Real *, const Terms &, Real *, bool);
+FLEXURA_SWEEPS(extern, double)
+FLEXURA_SWEEPS(extern, Pack<4>)
+FLEXURA_SWEEPS(extern, Dual<4>)
+
 }  // namespace flexura

@@ -35,7 +35,7 @@ BendOf<Real> bend(const Model<Real> &model, Workspace<Real> &work, const Real *y
     const Real *q = y + c.own();
     const Real scale = c.joint == At::sleeve ? y[c.first] : Real(1.0);
     k.phi = phi, k.omega = 0.0;
-    sized(c.m, c.P, [&](auto m, auto P) { turn(c, k, q, q, m, P); });
+    sized<Real>(c.m, c.P, [&](auto m, auto P) { turn(c, k, q, q, m, P); });
     for (int j = 0; j < c.P; ++j) up += scale * c.w[j] * k.sine[j];
     for (int l = 0; l < c.m; ++l) phi += c.tip_angle[l] * q[l];
   }

@@ -93,4 +93,7 @@ template <class Real> class PairSteps : public Method<Real> {
   std::array<bool, LanesOf<Real>::value> known{};
 };
 
+extern template class PairSteps<double>;
+extern template class PairSteps<Pack<4>>;
+
 }  // namespace flexura

@@ -91,7 +91,7 @@ void accelerate(const Model<Real> &model, Workspace<Real> &work, const Real *y, 
     if (c.joint == At::sleeve)
       condense_sleeve(c, k, y, v, stage, force + c.own(), last, beyond, flow);
     else
-      sized(c.m, c.P, [&](auto m, auto P) { condense_elastic(c, k, stage, force + c.own(), last, m, P, beyond); });
+      sized<Real>(c.m, c.P, [&](auto m, auto P) { condense_elastic(c, k, stage, force + c.own(), last, m, P, beyond); });
     if (c.joint != At::none)
       eliminate_joint(c, k, stage, model.viscous[std::size_t(c.link)], force[c.first], hold, flow, beyond);
   }

@@ -1,0 +1,7 @@
+#include "newton_euler.hpp"
+
+namespace flexura {
+
+FLEXURA_SWEEPS(, double)
+
+}  // namespace flexura
