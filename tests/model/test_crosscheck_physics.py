@@ -78,6 +78,7 @@ def test_a_mixed_chain_with_a_slider_agrees():
     assert found["link/1/tip_deflection"] < 2e-3 and found["link/3/tip_deflection"] < 2e-3
 
 
+@pytest.mark.slow
 def test_without_stiffening_a_fast_strip_is_off():
     """A strip without damping that turns at 5 rad/s, bent by 3 %, two seconds: the linear kinematics are about 10 % off in the
     deflection, mostly in phase; with stiffening at least ten times less."""

@@ -150,7 +150,7 @@ def test_the_state_space_form_has_the_poles_and_the_transfer_function():
         "tip/y",
     )
     assert lin.inputs == ("joint/1/drive", "joint/2/drive") and len(lin.states) == size
-    assert lin.states[0] == "joint 1 position [rad]" and lin.states[size // 2] == "rate of joint 1 position [rad/s]"
+    assert lin.states[0] == "joint/1 [rad]" and lin.states[size // 2] == "rate of joint/1 [rad/s]"
     assert lin.units["joint/1/drive"] == "N m" and lin.units["tip/x"] == "m"
 
 
