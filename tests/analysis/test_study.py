@@ -30,6 +30,8 @@ def bang() -> Manoeuvre:
 # The dissertation's findings ----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
 def test_a_payload_near_20_g_bends_type_1_least():
     """Finding 1, and the table of an independent linear model with two elements a link: to 1.5 %."""
     linear = robot("type-1-rr", **{"stiffening": False, "link.1.elements": 2, "link.2.elements": 2})

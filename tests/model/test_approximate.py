@@ -104,6 +104,7 @@ def test_a_locked_joint_stays_and_needs_no_drive():
     )
 
 
+@pytest.mark.slow
 def test_steps_too_long_for_the_modes_are_refused():
     """The first mode of the light-hubbed link has a period of 8 ms."""
     sys = system(beam(0.3, 0.157, 0.3333, 4, hub_inertia_kg_m2=1e-6), payload=0.02)

@@ -56,7 +56,7 @@ B10 = {
 }
 
 
-@pytest.mark.parametrize("column", B10)
+@pytest.mark.parametrize("column", ["exact", pytest.param("linear", marks=pytest.mark.slow), "stiff"])
 def test_a_slider_on_a_flexible_link_under_gravity(column):
     """B10: a point mass driven along a clamped link, from its static equilibrium."""
     tip, stiffness, stiffening, accept = B10[column]
