@@ -173,9 +173,9 @@ def _check_steady(system: System, q: np.ndarray, rates: np.ndarray) -> None:
         raise InputError("expected rates of joints only", key="qd")
     later = q + rates / np.abs(rates).max()  # a radian or a metre on
     inertia = float(np.abs(system.mass(q)).max())
-    for function, size in ((lambda z: _balance(system, z, rates), inertia * float(rates @ rates)), (system.mass, inertia)):
+    for function, scale in ((lambda z: _balance(system, z, rates), inertia * float(rates @ rates)), (system.mass, inertia)):
         now, then = function(q), function(later)
-        if np.abs(then - now).max() > 1e-9 * size:
+        if np.abs(then - now).max() > 1e-9 * scale:
             raise InputError(
                 "expected a steady motion: rates of a first joint that turns or moves the whole robot, no gravity", key="qd"
             )
