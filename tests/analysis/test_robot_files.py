@@ -57,7 +57,7 @@ def replayed(path):
     return pytest.param(path, id=path.stem, marks=marks)
 
 
-@pytest.mark.parametrize("path", map(replayed, FILES))
+@pytest.mark.parametrize("path", list(map(replayed, FILES)))
 def test_replayed_inverse_drives_return_the_motion(path):
     """Every joint most of its way in half a second, exactly; its drives, as splines through 4 kHz values, forward again: 1e-6."""
     system = fx.assemble(fx.load(path))
