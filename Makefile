@@ -81,5 +81,5 @@ firmware: $(READY)
 	@$(VENV)/bin/python firmware/build.py
 
 clean:
-	rm -rf build dist *.egg-info .hypothesis .mypy_cache .pytest_cache .ruff_cache solution $(CORE) $(CORE) model/flexura/*.so
+	rm -rf build dist *.egg-info .hypothesis .mypy_cache .pytest_cache .ruff_cache solution $(CORE) model/flexura/*.so
 	find model analysis tests tools -name __pycache__ -prune -exec rm -rf {} +

@@ -44,9 +44,14 @@ class System:
         return {"robot": self.robot, "nodes": self.nodes}  # the rest is computed again
 
     @cached_property
+    def _structure(self) -> Structure:
+        """The numbering and the pieces with shapes of their own: found once, for the modes of links cost time."""
+        return structure(self.robot)
+
+    @cached_property
     def assembly(self) -> Assembly:
         """The same equations as dense sums, to be read; with the shapes that the core uses."""
-        made = structure(self.robot)
+        made = self._structure
         if self.nodes is not None:
             return Assembly(Nodes(made.robot, made.links, made.linear, self.nodes))
         if not self.exact:
@@ -67,8 +72,7 @@ class System:
     @cached_property
     def labels(self) -> tuple[str, ...]:
         """Names and units of the unknowns, for example "link/1/element/2/rotation [rad]"."""
-        names = structure(self.robot).labels
-        return tuple(f"{name} [{self._unit(name)}]" for name in names)
+        return tuple(f"{name} [{self._unit(name)}]" for name in self._structure.labels)
 
     @cached_property
     def joint_rows(self) -> np.ndarray:
@@ -255,7 +259,7 @@ class System:
             coefficients = of_legendre(np.asarray(sums)[: count + 1])
         else:
             coefficients = np.linalg.lstsq(legendre_shapes(count, pieces[0].xi), B.T, rcond=None)[0]
-        law = structure(self.robot).laws[link]
+        law = self._structure.laws[link]
         assert law is not None
         return (whole_piece(law, pieces[0].points, coefficients, K),)
 
