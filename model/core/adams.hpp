@@ -23,10 +23,6 @@ namespace flexura {
 template <class Real> class Adams {
  public:
   static constexpr int LANES = LanesOf<Real>::value, ROWS = ORDER + 1;
-  // Modes that turn by more than FAST rad a step look back on two values only: five would blow up, by 31, what the modes leave of their
-  // own force; two do by 3. Their forces being smooth, that costs no accuracy.
-  static constexpr int FAST_ORDER = 2;
-  static constexpr double FAST = 3.0;
 
   const Modes<Real> &b;
   const int n, chunks, stride;
@@ -35,9 +31,8 @@ template <class Real> class Adams {
   Real *predicted[2], *corrected[2]; // (stride) eta, eta' at its end
   Real *gap;                         // (stride) new less extrapolated N
   Real *late[4];                     // (stride) what a gap adds to eta, eta'; its share that is uncertain
-  Real poly[2][ORDER + 1][COLUMNS];  // [slow, fast modes][power][value by age, GAP, OLDEST] (interpolation.hpp)
-  Real ends[2][ORDER];               // the values' polynomials at the end of the step
-  Real *fast;                        // (stride) 1 for modes that turn fast, else 0
+  Real poly[ORDER + 1][COLUMNS];     // [power][value by age, GAP, OLDEST] (interpolation.hpp)
+  Real ends[ORDER];                  // the values' polynomials at the end of the step
   Real time[ROWS];
   int count[LANES], steady[LANES];   // values held; steps since the length of the step changed
 
@@ -47,7 +42,7 @@ template <class Real> class Adams {
       : b(modes), n(modes.n), chunks(modes.chunks), stride(modes.stride), extras(extra_numbers) {
     memory.lay([this](auto take) {
       auto vectors = [&](auto &...all) { (take(all, stride), ...); };
-      vectors(eta, etad, predicted[0], predicted[1], corrected[0], corrected[1], gap, fast);
+      vectors(eta, etad, predicted[0], predicted[1], corrected[0], corrected[1], gap);
       for (auto *group : {late, step}) for (int r = 0; r < 4; ++r) take(group[r], stride);
       for (Real *&row_ : N) take(row_, stride + room_of<Real>(extras));
       for (auto &table : ahead) for (Real *&row_ : table) take(row_, stride);
@@ -57,11 +52,10 @@ template <class Real> class Adams {
       for (double **vector : {&w2, &d2, &lag}) take(*vector, padded(n));
       take(one_step, 4 * padded(n)), take(one_A, POWERS * padded(n)), take(one_B, POWERS * padded(n));
     });
-    kinds.assign(static_cast<std::size_t>(chunks), SLOW_ONES);
     for (auto &x : time) x = 0.0;
     for (int k = 0; k < LANES; ++k) count[k] = 0, steady[k] = 0, span[k] = -1.0;
-    for (auto &set : poly) for (auto &power : set) for (Real &x : power) x = 0.0;
-    for (auto &set : ends) for (Real &x : set) x = 0.0;
+    for (auto &power : poly) for (Real &x : power) x = 0.0;
+    for (Real &x : ends) x = 0.0;
   }
 
   Real *extra(int row_) { return N[row_] + stride; }
@@ -76,22 +70,23 @@ template <class Real> class Adams {
   void restart(int k, double t) { count[k] = 1, set_lane(time[head], k, t), span[k] = -1.0; }
   void forget_tables(int k) { span[k] = -1.0; }
 
-  // The tables of a step of length h; 0: nothing moves.
-  void tabulate(const Real &h) {
+  // The tables of a step of length h; 0: nothing moves. True: of any robot the length or the modes are new.
+  bool tabulate(const Real &h) {
     Real changed = 0.0;
-    bool any = false;
+    bool any = false, fresh = false;
     for (int k = 0; k < LANES; ++k) {
       const double own = lane(h, k);
-      if (own != span[k]) tabulate_modes(k, own), span[k] = own, steady[k] = 0;
+      if (own != span[k]) tabulate_modes(k, own), span[k] = own, steady[k] = 0, fresh = true;
       else if (steady[k] > ORDER) continue;
       set_lane(changed, k, 1.0), any = true;
     }
-    if (!any) return;
+    if (!any) return false;
     Real node[ORDER];
     const Real moving = choose_less(Real(0.0), h, h, Real(1.0));
     for (int j = 0; j < ORDER; ++j) node[j] = choose_less(Real(0.0), h, (time[row(j)] - time[head]) / moving, Real(-double(j)));
     polynomials(changed, node);
     for (int c = 0; c < chunks; ++c) weigh_values(wide(changed), c);
+    return fresh;
   }
 
   // Where a step leads without a look at the equations there; minus the extrapolated N in `gap`.
@@ -101,9 +96,9 @@ template <class Real> class Adams {
     for (int c = 0; c < chunks; ++c) {
       const Lanes y = get(eta, c), v = get(etad, c);
       Lanes p = get(step[0], c) * y + get(step[1], c) * v, q = get(step[2], c) * y + get(step[3], c) * v, g = 0.0;
-      for (int j = 0, end = smaller_of(most, order_of(c)); j < end; ++j) {
+      for (int j = 0; j < most; ++j) {
         const Lanes value = get(N[row(j)], c);
-        p += get(ahead[0][j], c) * value, q += get(ahead[1][j], c) * value, g -= get(ahead[2][j], c) * value;
+        p += get(ahead[0][j], c) * value, q += get(ahead[1][j], c) * value, g -= wide(ends[j]) * value;
       }
       put(predicted[0], c, p), put(predicted[1], c, q), put(gap, c, g);
     }
@@ -149,29 +144,25 @@ template <class Real> class Adams {
     }
   }
 
-  // Coefficient m of the polynomial of a column, for the modes of a chunk.
-  Lanes coefficient(int column, int m, int c) const { return choose(poly[0][m][column], poly[1][m][column], c); }
-  // How many values, and which power of time at most, the modes of a chunk use.
-  int order_of(int c) const { return kinds[static_cast<std::size_t>(c)] == FAST_ONES ? FAST_ORDER : ORDER; }
+  // The polynomial of N over the step, of the modes of a chunk: F (ORDER + 1).
+  void force_polynomial(int c, Lanes *F) const {
+    Lanes value[ORDER];
+    const Lanes g = get(gap, c);
+    for (int j = 0; j < ORDER; ++j) value[j] = get(N[row(j)], c);
+    for (int q = 0; q <= ORDER; ++q) {
+      Lanes sum = wide(poly[q][GAP]) * g;
+      for (int j = 0; j < ORDER; ++j) sum += wide(poly[q][j]) * value[j];
+      F[q] = sum;
+    }
+  }
 
  private:
   Block<Real> memory;
   Block<double> one;                              // one robot's, for tabulate_modes
-  Real *step[4], *A, *B, *ahead[3][ORDER];        // free motion; moments; weights of old values in eta, eta' and in N extrapolated
+  Real *step[4], *A, *B, *ahead[2][ORDER];        // free motion; moments; weights of old values in eta, eta'
   double *w2, *d2, *lag, *one_step, *one_A, *one_B;
   double span[LANES];                             // length of the step that the tables are for
   int head = 0;
-  enum : char { SLOW_ONES, FAST_ONES, MIXED };
-  std::vector<char> kinds;                        // (chunks) of the modes in a chunk
-
-  static int smaller_of(int a, int b) { return a < b ? a : b; }
-
-  // One of two numbers by whether the modes of a chunk turn slowly or fast.
-  Lanes choose(const Real &slow_one, const Real &fast_one, int c) const {
-    const char kind = kinds[static_cast<std::size_t>(c)];
-    if (kind != MIXED) return wide(kind == FAST_ONES ? fast_one : slow_one);
-    return choose_less(Lanes(0.5), get(fast, c), wide(fast_one), wide(slow_one));
-  }
 
   // Free motion and moments of robot k's modes over a step of h.
   void tabulate_modes(int k, double h) {
@@ -184,68 +175,46 @@ template <class Real> class Adams {
         set_lane(A[m * stride + i], k, h > 0.0 ? one_A[m * room + i] : 0.0);
         set_lane(B[m * stride + i], k, h > 0.0 ? one_B[m * room + i] : 0.0);
       }
-      set_lane(fast[i], k, w2[i] * h * h > FAST * FAST ? 1.0 : 0.0);
-    }
-    if (LANES == 1)
-      for (int i = n; i < room; ++i) fast[i] = fast[n - 1];  // what fills up the last chunk is of its kind
-    for (int c = 0; c < chunks; ++c) {
-      const Lanes turning = get(fast, c);
-      kinds[static_cast<std::size_t>(c)] = worst(turning) < 0.5 ? SLOW_ONES : least(turning) > 0.5 ? FAST_ONES : MIXED;
     }
   }
 
   // Polynomials through the values that each robot holds, for the robots that changed.
   void polynomials(const Real &changed, const Real *node) {
-    bool alike = true, turn = false;  // turn: do any modes turn fast?
+    bool alike = true;
     for (int k = 1; k < LANES; ++k) alike = alike && count[k] == count[0];
-    for (char kind : kinds) turn = turn || kind != SLOW_ONES;
-    for (int turning = 0; turning <= turn; ++turning) {
-      auto used = [&](int k) { return turning && count[k] > FAST_ORDER ? FAST_ORDER : count[k]; };
-      auto &set = poly[turning];
-      if (alike) {
-        Real C[ORDER + 1][COLUMNS];
-        interpolate(used(0), node, C);
+    if (alike) {
+      Real C[ORDER + 1][COLUMNS];
+      interpolate(count[0], node, C);
+      for (int m = 0; m <= ORDER; ++m)
+        for (int j = 0; j <= OLDEST; ++j) poly[m][j] = choose_less(Real(0.5), changed, C[m][j], poly[m][j]);
+    } else {
+      for (int k = 0; k < LANES; ++k) {
+        if (lane(changed, k) < 0.5) continue;
+        double own[ORDER], C[ORDER + 1][COLUMNS];
+        for (int j = 0; j < ORDER; ++j) own[j] = lane(node[j], k);
+        interpolate(count[k], own, C);
         for (int m = 0; m <= ORDER; ++m)
-          for (int j = 0; j <= OLDEST; ++j) set[m][j] = choose_less(Real(0.5), changed, C[m][j], set[m][j]);
-      } else {
-        for (int k = 0; k < LANES; ++k) {
-          if (lane(changed, k) < 0.5) continue;
-          double own[ORDER], C[ORDER + 1][COLUMNS];
-          for (int j = 0; j < ORDER; ++j) own[j] = lane(node[j], k);
-          interpolate(used(k), own, C);
-          for (int m = 0; m <= ORDER; ++m)
-            for (int j = 0; j <= OLDEST; ++j) set_lane(set[m][j], k, C[m][j]);
-        }
+          for (int j = 0; j <= OLDEST; ++j) set_lane(poly[m][j], k, C[m][j]);
       }
-      for (int j = 0; j < ORDER; ++j) {
-        ends[turning][j] = 0.0;
-        for (int m = 0; m < ORDER; ++m) ends[turning][j] += set[m][j];
-      }
+    }
+    for (int j = 0; j < ORDER; ++j) {
+      ends[j] = 0.0;
+      for (int m = 0; m < ORDER; ++m) ends[j] += poly[m][j];
     }
   }
 
   // The weights of the values in a step, from the polynomials and the moments.
   void weigh_values(Lanes changed, int c) {
     auto keep = [&](Real *at, Lanes x) { put(at, c, choose_less(Lanes(0.5), changed, x, get(at, c))); };
-    const int order = order_of(c);
-    for (int j = 0; j < order; ++j) {
+    Lanes a[POWERS], b[POWERS];
+    for (int m = 0; m < POWERS; ++m) a[m] = get(A + m * stride, c), b[m] = get(B + m * stride, c);
+    auto weigh = [&](int column, Real *place, Real *rate) {
       Lanes p = 0.0, q = 0.0;
-      for (int m = 0; m < order; ++m) {
-        const Lanes C = coefficient(j, m, c);
-        p += C * get(A + m * stride, c), q += C * get(B + m * stride, c);
-      }
-      keep(ahead[0][j], p), keep(ahead[1][j], q), keep(ahead[2][j], choose(ends[0][j], ends[1][j], c));
-    }
-    for (int j = order; j < ORDER; ++j)  // (older weights must not come back when a neighbour makes the chunk a mixed one)
-      for (auto &weights : ahead) keep(weights[j], Lanes(0.0));
-    for (int r = 0; r < 2; ++r) {
-      Lanes p = 0.0, q = 0.0;
-      for (int m = 0; m <= order; ++m) {
-        const Lanes C = coefficient(GAP + r, m, c);
-        p += C * get(A + m * stride, c), q += C * get(B + m * stride, c);
-      }
-      keep(late[2 * r], p), keep(late[2 * r + 1], q);
-    }
+      for (int m = 0; m <= ORDER; ++m) p += wide(poly[m][column]) * a[m], q += wide(poly[m][column]) * b[m];
+      keep(place, p), keep(rate, q);
+    };
+    for (int j = 0; j < ORDER; ++j) weigh(j, ahead[0][j], ahead[1][j]);
+    weigh(GAP, late[0], late[1]), weigh(OLDEST, late[2], late[3]);
   }
 };
 

@@ -5,18 +5,14 @@
 // progress a pass has fallen to a quarter, at most once in AGAIN passes. Passes are counted, not time: a run's digits do not depend on the
 // machine's load.
 //
-// There is no race either where exponential steps end soon (pace.hpp), or where it would not be allowed or is decided beforehand: a
-// sampled controller must see each tick once, and a caller's function no time before one it has seen; rigid robots without gains or
-// friction and tolerances below 1e-9 are for explicit steps. Exponential steps do not take part where a slider moves along a link that
-// bends: the modes change with every step.
+// There is no race either where exponential steps end soon (pace.hpp), or where it is decided beforehand: rigid robots without gains or
+// friction and tolerances below 1e-9 are for explicit steps. Under a caller's function and under a sampled controller the run
+// does not go back: exponential and implicit steps are tried one after the other.
 #pragma once
 #include <array>
 #include <memory>
 
-#include "exponential.hpp"
-#include "implicit.hpp"
-#include "loop.hpp"
-#include "pace.hpp"
+#include "methods.hpp"
 
 namespace flexura {
 
@@ -27,6 +23,9 @@ class Auto {
   static constexpr double DEAR = 2e6, STRONG = 1000.0;
   static constexpr long TRIAL = 100, SHORT = 60, AGAIN = 1500;  // TRIAL: of exponential steps in later races
   static constexpr double SLOWER = 4.0;
+  static constexpr double FASTER = 1.5, FEW = 300.0, COSTLY = 2.5;  // under a caller's function: see race_forward
+  static constexpr double SEVERAL = 1.8;    // steps of order 2 a tick: more are for order 4,
+  static constexpr long ENOUGH = 1000;      // of so many at least
 
   Auto(Loop<double> &run, double tolerance, const ExponentialOptions &options = ExponentialOptions())
       : loop(run), rtol(tolerance), exponential(run.course, tolerance, options), implicit(run.course), explicit_(run.course) {}
@@ -40,6 +39,7 @@ class Auto {
       loop.advance(*chosen, some);
       steps -= some, in_window = (in_window + some) % WINDOW;
       if (gives_way() || in_window > 0) continue;
+      if (second_order && chosen == second_order && several_a_tick()) chosen = &implicit;
       const double progress = (loop.clock[0].t - window_t) / static_cast<double>(std::max(loop.course.passes - window_passes, 1L));
       if (raced && loop.any() && progress * SLOWER < speed && since_race() > AGAIN) race();
     }
@@ -65,13 +65,19 @@ class Auto {
   Exponential<double> exponential;
   Implicit<double> implicit;
   Explicit<double> explicit_;
-  Method<double> *chosen = nullptr;
+  std::unique_ptr<Method<double>> for_ticks;  // under a sampled controller
+  Method<double> *chosen = nullptr, *second_order = nullptr;
   bool sharp = false;  // a tolerance that exponential steps are not for
   bool raced = false, goes_on = false;  // goes_on: with the exponential steps that the run began with
   int held = 0;
   long last_race = 0, in_window = 0, window_passes = 0;
   double window_t = 0.0;
   double speed = 0.0;  // seconds a pass, when chosen
+
+  bool several_a_tick() const {
+    const Clock &c = loop.clock[0];
+    return Pace::attempts(c) >= ENOUGH && static_cast<double>(Pace::attempts(c)) > SEVERAL * static_cast<double>(c.tick);
+  }
 
   // A state of the loop to come back to, with the rows recorded since another one.
   struct Mark {
@@ -105,24 +111,10 @@ class Auto {
     const auto resistance = [&](int i) { return larger(c.plant.viscous[i], c.plant.coulomb[i]); };
     sharp = rtol < SHARPEST;
     if (for_explicit(rtol, bends, c.plant.joints, acting, resistance) && !(bends && hopeless(1.0 / DEAR))) chosen = &explicit_;
+    else if (acting.sampler) chosen = method_under_ticks(acting.rate_Hz, bends);
     else if (bends && !sharp && strongest_damper() > STRONG) chosen = &implicit;
-    else if (acting.sampler) chosen = for_ticks(acting.rate_Hz, bends && !resisted(acting));
-    else if (acting.function) chosen = !bends ? static_cast<Method<double> *>(&explicit_) : c.plant.rides ? static_cast<Method<double> *>(&implicit) : &exponential;
+    else if (acting.function) chosen = bends ? race_forward(implicit) : &explicit_;
     else race();
-  }
-
-  // Under a sampled controller: explicit steps if a tick takes few of them; else exponential ones, unless gains or friction couple the modes.
-  Method<double> *for_ticks(double rate_Hz, bool free) {
-    if (!stiffer_than(rate_Hz)) return &explicit_;
-    return free && !loop.course.plant.rides ? static_cast<Method<double> *>(&exponential) : &implicit;
-  }
-  bool resisted(const Acting &acting) const {
-    bool any = false;
-    for (int i = 0; i < loop.course.plant.joints; ++i) {
-      const JointDrive &d = acting.joints[std::size_t(i)];
-      any = any || worst(larger(loop.course.plant.viscous[std::size_t(i)], loop.course.plant.coulomb[std::size_t(i)])) > 0.0 || d.kp > 0.0 || d.kd > 0.0;
-    }
-    return any;
   }
 
   // The largest rate at which gains and friction of a joint would stop it, its link's bending free [1/s].
@@ -154,8 +146,6 @@ class Auto {
     c.acts.at(loop.clock[0].t), c.acts.load(q, v);
     return c.plant.fastest(q, c.acts.pass(q, v, q, v, 0.0, 0.0));
   }
-  // Would explicit steps between two ticks be many more than one? A step of either method costs a dozen passes.
-  bool stiffer_than(double rate_Hz) { return fastest() > 2.0 * Explicit<double>::STABLE * rate_Hz; }
   // Are explicit steps, of 12 passes and as long as they may be, slower than that?
   bool hopeless(double speed_) { return Explicit<double>::STABLE < 12.0 * speed_ * fastest(); }
 
@@ -189,7 +179,7 @@ class Auto {
     Best best{Mark(), nullptr, -1.0};
     double step = start.clock.wish;
     goes_on = false;
-    if (!loop.course.plant.rides && !sharp) {
+    if (!sharp) {
       double reached = 0.0;
       if (begun && begin_exponential(reached)) {
         chosen = &exponential, raced = goes_on = true, speed = reached;
@@ -203,6 +193,30 @@ class Auto {
     loop.resume(*best.method);
     chosen = best.method, speed = best.speed, raced = true, last_race = loop.course.passes, ++held;
     goes_on = begun && chosen == &exponential;
+  }
+
+  // Under a sampled controller: explicit steps if they are few a tick, else exponential or implicit ones.
+  Method<double> *method_under_ticks(double rate_Hz, bool bends) {
+    for_ticks = make_method(method_for_ticks(rate_Hz, fastest(), rtol), loop.course);
+    if (for_ticks->name() == std::string(TR_BDF2.name)) second_order = for_ticks.get();
+    const bool stiff = second_order || for_ticks->name() == std::string(ESDIRK_4.name);
+    return stiff && bends && !sharp ? race_forward(*for_ticks) : for_ticks.get();
+  }
+
+  // The better one of exponential and implicit steps, which are tried one after the other on the way: neither a controller nor a caller's
+  // function sees a time twice.
+  // Exponential steps go on as long as they get faster, or if the rest of the run takes few of them.
+  Method<double> *race_forward(Method<double> &other) {
+    const Clock &c = loop.clock[0];
+    double reached = -1.0;
+    for (double before = reached; !over(); before = reached) {
+      reached = trial(exponential, TRIAL);
+      if (reached > 0.0 && (c.end - c.t) < FEW * reached) return &exponential;
+      if (!(reached > FASTER * before)) break;
+    }
+    if (over()) return &exponential;
+    loop.clock[0].fresh = true;
+    return COSTLY * trial(other, 2 * TRIAL) > reached ? &other : &exponential;
   }
 
   // The other methods from `start` on, `step` being the first one that they try, against the best one so far.

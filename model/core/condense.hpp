@@ -89,12 +89,10 @@ inline void eliminate(Rows<Real, M, G> &rows, Kept<Real> &k, int m, Beyond<Real>
   beyond.A = I, beyond.b = p;
 }
 
-// A piece of constant length. q, v: its own unknowns where stiffness and damping act; force: on them.
+// Rows of the inertia of a piece of constant length by columns, what is beyond its tip left out.
 template <class Real, class M, class N>
-inline void condense_elastic(const Piece<Real> &c, Kept<Real> &k, const Stage<Real> &stage, const Real *force, bool last, M m, N P,
-                             Beyond<Real> &beyond) {
-  using R = Rows<Real, M::most, 0>;
-  using Columns = typename R::Columns;
+inline void elastic_rows(const Piece<Real> &c, const Kept<Real> &k, bool last, M m, N P, Rows<Real, M::most, 0> &rows) {
+  using Columns = typename Rows<Real, M::most, 0>::Columns;
   const int columns = m + 2, rest = m + 1, stride = padded(m + 2);
   Columns ex[N::most], ey[N::most];  // e_j Theta''_j by columns; in the rest i e_j Omega_j^2, which a quarter turn makes -e_j Omega_j^2
   for (int j = 0; j < P; ++j) {
@@ -102,7 +100,6 @@ inline void condense_elastic(const Piece<Real> &c, Kept<Real> &k, const Stage<Re
     const Real square = k.rate[j] * k.rate[j];
     ex[j].set(rest, -k.sine[j] * square), ey[j].set(rest, k.cosine[j] * square);
   }
-  R rows;
   for (int a = 0; a <= m; ++a) fill(rows.row[a], Real(0.0), columns);
   Columns x, y;
   for (int p = 0; p < P; ++p) {  // (4): H = sum_p |sum_j R_pj i e_j Theta''_j|^2
@@ -115,21 +112,28 @@ inline void condense_elastic(const Piece<Real> &c, Kept<Real> &k, const Stage<Re
   times(rows.x, Real(-1.0), y, columns), rows.y = x;
   rows.xx = c.mass, rows.xy = 0.0, rows.yy = c.mass;
   rows.row[0].set(0, rows.row[0][0] + c.hub);
+  if (!last) return;
+  rows.row[0].set(0, rows.row[0][0] + c.tip);  // the payload turns with the tip
+  for (int i = 0; i < m; ++i) {
+    const Real turning = c.tip * c.tip_angle[i];
+    rows.row[0].set(1 + i, rows.row[0][1 + i] + turning);
+    for (int l = i; l < m; ++l) rows.row[1 + i].set(1 + l, rows.row[1 + i][1 + l] + turning * c.tip_angle[l]);
+  }
+}
+
+// Condensation of a piece of constant length. force: on its own unknowns.
+template <class Real, class M, class N>
+inline void condense_elastic(const Piece<Real> &c, Kept<Real> &k, const Stage<Real> &stage, const Real *force, bool last, M m, N P,
+                             Beyond<Real> &beyond) {
+  const int rest = m + 1;
+  Rows<Real, M::most, 0> rows;
+  elastic_rows(c, k, last, m, P, rows);
   const Real *q = stage.y + c.own(), *v = stage.v + c.own();
   for (int i = 0; i < m; ++i) {
     rows.row[1 + i].set(rest, rows.row[1 + i][rest] + (c.K[i] * q[i] + c.D[i] * v[i] - force[i]));
     rows.row[1 + i].set(1 + i, rows.row[1 + i][1 + i] + (stage.gq * c.K[i] + stage.gv * c.D[i]));
   }
-  if (!last) {
-    add_beyond(rows, k, m, 0, stride, beyond);
-  } else {  // the payload turns with the tip
-    rows.row[0].set(0, rows.row[0][0] + c.tip);
-    for (int i = 0; i < m; ++i) {
-      const Real turning = c.tip * c.tip_angle[i];
-      rows.row[0].set(1 + i, rows.row[0][1 + i] + turning);
-      for (int l = i; l < m; ++l) rows.row[1 + i].set(1 + l, rows.row[1 + i][1 + l] + turning * c.tip_angle[l]);
-    }
-  }
+  if (!last) add_beyond(rows, k, m, 0, padded(m + 2), beyond);
   eliminate(rows, k, m, beyond, static_cast<Real *>(nullptr));
 }
 

@@ -19,8 +19,9 @@ struct ExponentialOptions {
 template <class Real> class Exponential : public Method<Real> {
  public:
   static constexpr int LANES = LanesOf<Real>::value;
-  static constexpr double GROWTH = 1.4;  // the least that a step may grow by: each new length costs new tables
-  static constexpr double TIGHT = 20.0;  // the local error is kept so far below the tolerance: few long steps add up what many short ones average out
+  static constexpr double GROWTH = 1.6;  // the least that a step may grow by: each new length costs new tables
+  static constexpr double SAFETY = 0.85;
+  static constexpr double TIGHT = 10.0;  // the local error is kept so far below the tolerance: few long steps add up what many short ones average out
   using Options = ExponentialOptions;
 
   Exponential(Course<Real> &shared, double tolerance, const Options &wanted = Options())
@@ -53,12 +54,12 @@ template <class Real> class Exponential : public Method<Real> {
     for (int k = 0; k < LANES; ++k) {
       if (lane(which, k) < 0.5) continue;
       for (int i = 0; i < modes.stride + steps.extras; ++i) set_lane(steps.N[to][i], k, lane(steps.N[from][i], k));
-      steps.restart(k, lane(t, k)), weigh(k), since[k] = 0;
+      steps.restart(k, lane(t, k)), weigh(k, c.end - lane(t, k)), since[k] = 0;
     }
   }
 
   Real attempt(const Real &t, const Real &h, const Real &last) override {
-    steps.tabulate(h);
+    if (steps.tabulate(h)) within.tabulate(h);
     steps.predict();
     place(steps.predicted[0], steps.predicted[1], state);
     end = smaller(t + h, last);
@@ -87,11 +88,11 @@ template <class Real> class Exponential : public Method<Real> {
     for (int k = 0; k < LANES; ++k) {
       if (lane(which, k) < 0.5) continue;
       const Real *q = c.znew.data(), *v = q + n;
-      if (++since[k] % 8 == 0 || steps.count[k] < ORDER) weigh(k);
+      if (++since[k] % 8 == 0 || steps.count[k] < ORDER) weigh(k, c.end - lane(end, k));
       if (!modes.moved(k, c.plant, q) || !take_modes(k, q, v, lane(end, k))) continue;
       put_origin(k, q, v);
       carry_over(k);
-      weigh(k);
+      weigh(k, c.end - lane(end, k));
     }
   }
 
@@ -117,10 +118,13 @@ template <class Real> class Exponential : public Method<Real> {
 
   double next(int k, double h, double error, double, bool accepted) override {
     const int order = steps.count[k] + 1;
-    const double factor = error > 0.0 ? 0.85 * flexura::power(larger(error, 1e-30), -1.0 / order) : 2.0;
-    if (!accepted) return error < 1e300 ? h * smaller(larger(0.25, factor), 0.9) : 0.1 * h;
     const bool settled = steps.count[k] < ORDER || steps.steady[k] >= 2;
-    return factor * h > GROWTH * wishes[k] && settled ? smaller(factor * h, 2.0 * wishes[k]) : wishes[k];
+    double most = 1.0;  // with a larger error a step does not grow
+    for (int i = 0; i < order; ++i) most *= SAFETY / GROWTH;
+    if (accepted && (!settled || error > most)) return wishes[k];
+    const double factor = error > 0.0 ? SAFETY * flexura::power(larger(error, 1e-30), -1.0 / order) : 2.0;
+    if (!accepted) return error < 1e300 ? h * smaller(larger(0.25, factor), 0.9) : 0.1 * h;
+    return factor * h > GROWTH * wishes[k] ? smaller(factor * h, 2.0 * wishes[k]) : wishes[k];
   }
 
  protected:
@@ -214,18 +218,22 @@ template <class Real> class Exponential : public Method<Real> {
     }
   }
 
-  // Error weights of robot k's modes from those of its unknowns.
-  void weigh(int k) {
+  // Error weights of robot k's modes from those of its unknowns. An error of a rate moves the tips until the end of the run at `left`, or
+  // for a part of a period.
+  void weigh(int k, double left) {
     const auto &w = c.weights.weight;
-    for (int mode = 0; mode < n; ++mode)
+    for (int mode = 0; mode < n; ++mode) {
+      double sum[2] = {0.0, 0.0};
       for (int e = 0; e < 2; ++e) {
-        double sum = 0.0;
         for (int i = 0; i < n; ++i) {
           const double x = lane(modes.phi[mode * modes.stride + i], k) * lane(w[e * n + i], k);
-          sum += x * x;
+          sum[e] += x * x;
         }
-        set_lane(size[e][mode], k, root(sum));
+        sum[e] = root(sum[e]);
       }
+      const double rate = root(lane(modes.w2[mode], k)), lasting = rate * left > 1.0 ? 1.0 / rate : left;
+      set_lane(size[0][mode], k, sum[0]), set_lane(size[1][mode], k, larger(sum[1], lasting * sum[0]));
+    }
   }
 
   // Robot k's state becomes the origin.

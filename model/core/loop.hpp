@@ -46,6 +46,7 @@ template <class Real> class Loop {
   void start(const Real *q0, const Real *v0, double first_step) {
     for (int k = 0; k < course.n; ++k) course.z[k] = q0[k], course.z[course.n + k] = v0[k];
     for (int k = 0; k < ACCOUNTS; ++k) course.z[2 * course.n + k] = Real(0.0);
+    course.end = outputs.back();
     course.acts.at(Real(outputs.front()));
     course.acts.prescribe(course.z.data(), course.z.data() + course.n);
     course.weights.start(course.z.data());

@@ -21,6 +21,7 @@ template <class Real> struct Course {
   std::vector<Real> error;    // (size) the error estimate of the last attempt, to say where it was worst
   std::vector<Real> scratch;  // (n)
   long passes = 0;
+  double end = 0.0;           // of the run [s]
   bool balanced = true;       // are the accounts of states within a step asked for?
 
   Course(Plant<Real> &robot, Acting *const *acting, double rtol)

@@ -7,15 +7,18 @@ namespace flexura {
 
 template <class Real> std::unique_ptr<Method<Real>> make_method(const std::string &name, Course<Real> &course, double rtol) {
   if (name == "explicit") return std::make_unique<Explicit<Real>>(course);
-  if (name == "implicit") return std::make_unique<Implicit<Real>>(course);
+  if (name == ESDIRK_4.name) return std::make_unique<Implicit<Real>>(course);
+  if (name == TR_BDF2.name) return std::make_unique<Implicit<Real>>(course, TR_BDF2);
   if (name == "exponential") return std::make_unique<Exponential<Real>>(course, rtol);
   if (name == PAIR_3.name) return std::make_unique<PairSteps<Real>>(course, PAIR_3);
   if (name == PAIR_5.name) return std::make_unique<PairSteps<Real>>(course, PAIR_5);
   return nullptr;
 }
 
-const char *explicit_for_ticks(double tick_s, double fastest, double rtol) {
-  const double three = 3.0 * std::ceil(tick_s * fastest / PAIR_3.stable), eight = 13.0 * std::ceil(tick_s * fastest / Explicit<double>::STABLE);
+const char *method_for_ticks(double rate_Hz, double fastest, double rtol) {
+  if (rtol < SHARPEST) return "explicit";
+  if (fastest > 2.0 * Explicit<double>::STABLE * rate_Hz) return rtol >= LOOSE ? TR_BDF2.name : ESDIRK_4.name;  // explicit steps would be many a tick
+  const double turns = fastest / rate_Hz, three = 3.0 * std::ceil(turns / PAIR_3.stable), eight = 13.0 * std::ceil(turns / Explicit<double>::STABLE);
   if (eight < three) return "explicit";
   return rtol >= 1e-6 ? PAIR_3.name : PAIR_5.name;
 }

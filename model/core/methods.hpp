@@ -8,6 +8,7 @@
 #include "implicit.hpp"
 #include "loop.hpp"
 #include "model_plant.hpp"
+#include "pace.hpp"
 #include "pairs.hpp"
 
 namespace flexura {
@@ -15,11 +16,13 @@ namespace flexura {
 // The first step to try, as a share of the whole run's time.
 constexpr double FIRST_STEP = 1e-4;
 
-// "explicit", "implicit" or "exponential"; under a sampled controller also "explicit-3" and "explicit-5". Null for any other name.
+// "explicit", "implicit" or "exponential"; under a sampled controller also "explicit-3", "explicit-5", "implicit-2". Null for any other name.
 template <class Real> std::unique_ptr<Method<Real>> make_method(const std::string &name, Course<Real> &course, double rtol = 1e-6);
 
-// Which of the explicit methods suits a run under a controller of short ticks, by passes a tick: `fastest` of the robot [1/s].
-const char *explicit_for_ticks(double tick_s, double fastest, double rtol);
+// Which method suits a run under a controller of short ticks, by passes a tick; `fastest`: the robot's highest frequency or rate of
+// decay [rad/s].
+constexpr double LOOSE = 1e-4;  // tolerances above are for implicit steps of order 2
+const char *method_for_ticks(double rate_Hz, double fastest, double rtol);
 
 // Why a run ended where it did, in a sentence, and what to try: for every status but `running` and `done`. `joint` counts from 1.
 std::string explain(const Clock &clock, const std::string &method, double rtol);

@@ -71,11 +71,11 @@ template <class Real> class ModalAccounts {
   void prepare(const Real &h) {
     for (int c = 0; c < chunks; ++c) {  // the polynomials through the numbers' last values and their newest, and the uncertain part
       Lanes values[ORDER], gap = get(s.extra(s.new_row()), c);
-      for (int j = 0; j < ORDER; ++j) values[j] = get(s.extra(s.row(j)), c), gap -= wide(s.ends[0][j]) * values[j];
+      for (int j = 0; j < ORDER; ++j) values[j] = get(s.extra(s.row(j)), c), gap -= wide(s.ends[j]) * values[j];
       for (int m = 0; m < POWERS; ++m) {
-        Lanes sum = wide(s.poly[0][m][GAP]) * gap;
-        for (int j = 0; j < ORDER; ++j) sum += wide(s.poly[0][m][j]) * values[j];
-        put(U + m * room, c, sum), put(uncertain + m * room, c, wide(s.poly[0][m][OLDEST]) * gap);
+        Lanes sum = wide(s.poly[m][GAP]) * gap;
+        for (int j = 0; j < ORDER; ++j) sum += wide(s.poly[m][j]) * values[j];
+        put(U + m * room, c, sum), put(uncertain + m * room, c, wide(s.poly[m][OLDEST]) * gap);
       }
     }
     of_joints<ORDER>(w.p + 1, P);
@@ -172,8 +172,9 @@ template <class Real> class ModalAccounts {
 
   // L and Qz of z from 0 to x, from z at both ends: by parts, L_m = x^m z - m J_(m-1), and z'' + d2 z' + w2 z = 0 gives J_m = int x^m z dx.
   template <class Number>
-  static void moments_of(Number w2, Number d2, Number h, Number x, Number z0, Number zd0, Number z1, Number zd1, Number *moment, Number &squares) {
-    const Number per = 1.0 / h, inverse = per / w2;
+  static void moments_of(Number w2, Number softness, Number d2, Number lifetime, Number per, Number x, Number z0, Number zd0, Number z1,
+                         Number zd1, Number *moment, Number &squares) {
+    const Number inverse = per * softness;
     Number before = 0.0, J = 0.0, power = 1.0;
     for (int m = 0; m < POWERS; ++m) {
       const Number here = m ? power * z1 - double(m) * J : z1 - z0;
@@ -181,34 +182,34 @@ template <class Real> class ModalAccounts {
       moment[m] = before = here;
       power = power * x;
     }
-    const Number energy = 0.5 * ((zd0 - zd1) * (zd0 + zd1) + w2 * (z0 - z1) * (z0 + z1));
-    squares = choose_less(Number(0.0), d2, energy / choose_less(Number(0.0), d2, d2, Number(1.0)), Number(0.0));
+    squares = 0.5 * lifetime * ((zd0 - zd1) * (zd0 + zd1) + w2 * (z0 - z1) * (z0 + z1));
   }
 
   void free_motion(const Real &h, const Real &x, bool whole) {
+    const Lanes per = wide(1.0 / choose_less(Real(0.0), h, h, Real(1.0)));
     for (int c = 0; c < s.chunks; ++c) {
       if (!w.oscillates(c)) {
         for (Real *row : L) put(row, c, Lanes(0.0));
         put(Qz, c, Lanes(0.0));
         continue;
       }
-      const Lanes H = wide(choose_less(Real(0.0), h, h, Real(1.0)));
       Lanes z, zd, moment[POWERS], squares;
-      whole ? w.free_at_end(h, c, z, zd) : w.free_at(h, x, c, z, zd);
-      moments_of(w.w2_of(c), w.d2_of(c), H, wide(x), get(w.z0, c), get(w.zd0, c), z, zd, moment, squares);
+      whole ? w.free_at_end(per, c, z, zd) : w.free_at(h, x, c, z, zd);
+      moments_of(w.w2_of(c), w.softness_of(c), w.d2_of(c), w.lifetime_of(c), per, wide(x), get(w.z0, c), get(w.zd0, c), z, zd, moment, squares);
       for (int m = 0; m < POWERS; ++m) put(L[m], c, moment[m]);
       put(Qz, c, squares);
     }
     for (const auto &one : w.damped) {
-      const double own_h = lane(h, one.robot), own_x = lane(x, one.robot);
+      const double own_h = lane(h, one.robot), own_x = lane(x, one.robot), own_per = own_h > 0.0 ? 1.0 / own_h : 1.0;
       double moment[POWERS], squares, z, zd;
-      one.at(own_x * own_h, z, zd);
+      if (whole) one.at_end(z, zd);
+      else one.at(own_x * own_h, z, zd);
       if (one.both) {
-        moments_of(one.w2, one.d2, own_h, own_x, one.z, one.zd, z, zd, moment, squares);
+        moments_of(one.w2, one.soft, one.d2, 1.0 / one.d2, own_per, own_x, one.z, one.zd, z, zd, moment, squares);
       } else {  // z = z0 e^(-d2 t): int x^m z' dt = z x^m + ... by parts, upwards, d2 h being large
         double power = 1.0;
         for (int m = 0; m < POWERS; ++m) {
-          moment[m] = m ? power * z + m * moment[m - 1] / (one.d2 * own_h) : z - one.z;
+          moment[m] = m ? power * z + m * moment[m - 1] * one.soft * own_per : z - one.z;
           power *= own_x;
         }
         squares = 0.5 * one.d2 * (one.z - z) * (one.z + z);
@@ -222,12 +223,11 @@ template <class Real> class ModalAccounts {
   void of_modes(const Real &h, const Real *area, Sums &sum) {
     const Lanes per = wide(1.0 / choose_less(Real(0.0), h, h, Real(1.0)));
     for (int c = 0; c < s.chunks; ++c) {
-      const int degree = w.degree(c);
       Lanes P[ORDER], squares = get(Qz, c), pumped = 0.0;
-      for (int q = 0; q < degree; ++q) P[q] = double(q + 1) * get(w.p[q + 1], c);
-      for (int q = 0; q < degree; ++q) {
+      for (int q = 0; q < ORDER; ++q) P[q] = double(q + 1) * get(w.p[q + 1], c);
+      for (int q = 0; q < ORDER; ++q) {
         Lanes moment = get(L[q], c), row = moment + moment;  // moment: int x^q eta' dt
-        for (int r = 0; r < degree; ++r) {
+        for (int r = 0; r < ORDER; ++r) {
           const Lanes part = P[r] * wide(area[q + r]);
           row += part, moment += part;
         }

@@ -1,6 +1,7 @@
 // A Model as the time loop sees it.
 #pragma once
 #include "lane.hpp"
+#include "mass_matrix.hpp"
 #include "places.hpp"
 #include "plant.hpp"
 
@@ -91,20 +92,20 @@ template <class Real> class ModelPlant : public Plant<Real> {
 
   bool matrices(int lane_, const Real *q, double *M, double *K, double *D) override {
     const int n = this->n;
-    std::vector<Real> unit(zero), column(zero), lost(zero);
-    for (int i = 0; i < n; ++i) {
-      unit[std::size_t(i)] = Real(1.0);
-      forces(model, work, q, zero.data(), unit.data(), Terms{false, false, false}, column.data(), i > 0);
-      for (int j = 0; j < n; ++j) M[j * n + i] = lane(column[std::size_t(j)], lane_), K[j * n + i] = D[j * n + i] = 0.0;
-      if (model.mass_damped) {
-        std::fill(lost.begin(), lost.end(), Real(0.0));
+    const std::size_t size = std::size_t(n);
+    std::vector<Real> all(size * size);
+    std::vector<Vec3<Real>> wrench(size);
+    mass_matrix(model, work, q, zero.data(), wrench.data(), all.data());
+    for (std::size_t i = 0; i < size * size; ++i) M[i] = lane(all[i], lane_), K[i] = D[i] = 0.0;
+    if (model.mass_damped) {
+      std::vector<Real> unit(zero), lost(zero);
+      for (int i = 0; i < n; ++i) {
+        unit[std::size_t(i)] = Real(1.0), std::fill(lost.begin(), lost.end(), Real(0.0));
         add_mass_damping(model, q, unit.data(), lost.data());
+        unit[std::size_t(i)] = Real(0.0);
         for (int j = 0; j < n; ++j) D[j * n + i] = lane(lost[std::size_t(j)], lane_);
       }
-      unit[std::size_t(i)] = Real(0.0);
     }
-    for (int i = 0; i < n; ++i)
-      for (int j = 0; j < i; ++j) M[i * n + j] = M[j * n + i] = 0.5 * (M[i * n + j] + M[j * n + i]);
     for (const Piece<Real> &c : model.pieces)
       for (int l = 0; l < c.m; ++l) {
         const int row = c.own() + l;

@@ -29,7 +29,7 @@ struct Matrices {
 template <class Real> class Modes {
  public:
   static constexpr int LANES = LanesOf<Real>::value;
-  static constexpr double POOR = 0.25;   // the change of Phi M Phi^T, and of Phi K Phi^T against w_i w_j, that is put up with
+  static constexpr double POOR = 0.1;    // the change of Phi M Phi^T, and of Phi K Phi^T against w_i w_j, that is put up with
   static constexpr double TURN = 0.05;   // the configuration is looked at after so many radians (metres of the tips over the reach),
   static constexpr double FAR = 8.0;     // or as many times more, at most, where the modes were found to change slowly
   static constexpr double FREE = 1e-4;   // w2 below this is none [rad^2/s^2]
@@ -84,26 +84,31 @@ template <class Real> class Modes {
       M[at(e, e)] = 1.0;
     }
     gone[k] += patience[k];
+    std::vector<double> shapes(M.size()), old, squares(std::size_t(n), 0.0);  // shapes: a row an unknown, a column a mode
     if (taken[k] > 0) {
-      const double changed = change(k, M, K, slow) / POOR;
+      old.resize(M.size());
+      for (int mode = 0; mode < n; ++mode)
+        for (int i = 0; i < n; ++i) old[at(i, mode)] = lane(phi[mode * stride + i], k);
+      const std::vector<double> turned_M = congruent(old, M), turned_K = congruent(old, K);
+      const double changed = change(k, turned_M, turned_K, slow) / POOR;
       patience[k] = smaller(larger(0.7 * gone[k] * (1.0 / root(larger(changed, 1e-3)) - 1.0), TURN), FAR * TURN);  // were it to grow as a square
       if (changed < 1.0) return false;
+      eigen_pencil(n, turned_K.data(), turned_M.data(), squares.data(), shapes.data());  // nearly diagonal: soon done
+      shapes = product(old, shapes);
+    } else {
+      eigen_pencil(n, K.data(), M.data(), squares.data(), shapes.data());
     }
     gone[k] = 0.0, patience[k] = TURN;
-    const std::size_t size = std::size_t(n);
-    std::vector<double> squares(size), shapes(size * size);
-    eigen_pencil(n, K.data(), M.data(), squares.data(), shapes.data());
+    const std::vector<double> momenta = product(M, shapes), lost = product(D, shapes);
+    const double least = larger(FREE, 1e-14 * squares[std::size_t(n - 1)]);
     for (int mode = 0; mode < n; ++mode) {
       const double square = squares[std::size_t(mode)];
-      const double least = larger(FREE, 1e-14 * squares[std::size_t(n - 1)]);
       set_lane(w2[mode], k, square > least ? square : 0.0);
       double decay = 0.0, joints = 0.0;
       for (int i = 0; i < n; ++i) {
         const double x = shapes[at(i, mode)];
-        double Mx = 0.0, Dx = 0.0;
-        for (int j = 0; j < n; ++j) Mx += M[at(i, j)] * shapes[at(j, mode)], Dx += D[at(i, j)] * shapes[at(j, mode)];
-        set_lane(phi[mode * stride + i], k, x), set_lane(rows[i * stride + mode], k, Mx);
-        decay += x * Dx;
+        set_lane(phi[mode * stride + i], k, x), set_lane(rows[i * stride + mode], k, momenta[at(i, mode)]);
+        decay += x * lost[at(i, mode)];
         if (!held_row[i]) joints += x * x * m.joint_damping[std::size_t(i)];
       }
       lossy = lossy || decay > 0.0;
@@ -130,30 +135,41 @@ template <class Real> class Modes {
 
   std::size_t at(int i, int j) const { return std::size_t(i) * std::size_t(n) + std::size_t(j); }
 
-  // Frobenius' norm of Phi A Phi^T less what it was, relative to scale_i scale_j: the larger one of A = M and A = K.
-  double change(int k, const std::vector<double> &M, const std::vector<double> &K, double slow) const {
-    double inertia = 0.0, stiffness = 0.0;
-    const std::size_t size = std::size_t(n);
-    std::vector<double> shapes(size * size), Mx(size), Kx(size), s(size), r(size);  // shapes: a row an unknown
-    for (int a = 0; a < n; ++a)
-      for (int i = 0; i < n; ++i) shapes[at(i, a)] = lane(phi[a * stride + i], k);
-    for (int a = 0; a < n; ++a) {
-      std::fill(Mx.begin(), Mx.end(), 0.0), std::fill(Kx.begin(), Kx.end(), 0.0);
+  // A B of matrices (n, n).
+  std::vector<double> product(const std::vector<double> &A, const std::vector<double> &B) const {
+    std::vector<double> out(A.size(), 0.0);
+    for (int i = 0; i < n; ++i)
       for (int j = 0; j < n; ++j) {
-        const double x = shapes[at(j, a)];
-        for (int i = 0; i < n; ++i) Mx[std::size_t(i)] += M[at(j, i)] * x, Kx[std::size_t(i)] += K[at(j, i)] * x;
+        const double a = A[at(i, j)];
+        if (a == 0.0) continue;
+        for (int l = 0; l < n; ++l) out[at(i, l)] += a * B[at(j, l)];
       }
-      std::fill(s.begin(), s.end(), 0.0), std::fill(r.begin(), r.end(), 0.0);
-      for (int i = 0; i < n; ++i)
-        for (int b = 0; b <= a; ++b)
-          s[std::size_t(b)] += shapes[at(i, b)] * Mx[std::size_t(i)], r[std::size_t(b)] += shapes[at(i, b)] * Kx[std::size_t(i)];
+    return out;
+  }
+  // S^T A S.
+  std::vector<double> congruent(const std::vector<double> &S, const std::vector<double> &A) const {
+    const std::vector<double> AS = product(A, S);
+    std::vector<double> out(A.size(), 0.0);
+    for (int i = 0; i < n; ++i)
+      for (int a = 0; a < n; ++a) {
+        const double x = S[at(i, a)];
+        for (int b = 0; b < n; ++b) out[at(a, b)] += x * AS[at(i, b)];
+      }
+    for (int a = 0; a < n; ++a)
+      for (int b = 0; b < a; ++b) out[at(a, b)] = out[at(b, a)];
+    return out;
+  }
+
+  // Frobenius' norm of Phi A Phi^T less what it was, relative to scale_i scale_j: the larger one of A = M and A = K.
+  double change(int k, const std::vector<double> &turned_M, const std::vector<double> &turned_K, double slow) const {
+    double inertia = 0.0, stiffness = 0.0;
+    for (int a = 0; a < n; ++a)
       for (int b = 0; b <= a; ++b) {
         const double same = a == b, twice = a == b ? 1.0 : 2.0, wa = lane(w2[a], k), wb = lane(w2[b], k);
-        const double heavier = s[std::size_t(b)] - same, stiffer = r[std::size_t(b)] - same * wa;
+        const double heavier = turned_M[at(a, b)] - same, stiffer = turned_K[at(a, b)] - same * wa;
         inertia += twice * heavier * heavier;
         stiffness += twice * stiffer * stiffer / (larger(wa, slow * slow) * larger(wb, slow * slow));
       }
-    }
     return root(larger(inertia, stiffness));
   }
 };

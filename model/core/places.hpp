@@ -94,22 +94,64 @@ Real sleeve_strain(const Piece<Real> &c, const Real *y) {
   return out;
 }
 
-// Energies at (y, v) (n). Kinetic: 1/2 v.M v, M v by `forces`; strain (5); potential of gravity, 0 with all mass at the origin.
+// Twice the kinetic energy of a sleeved piece, without its rotor: a quadratic form in the rates of its hub, its own unknowns and d.
+template <class Real>
+Real sleeve_inertia(const Piece<Real> &c, const Kept<Real> &k, const Real &vx, const Real &vy, bool last, const Real *y, const Real *v) {
+  const int m = c.m;
+  SleeveRows<Real> rows;
+  sleeve_rows(c, k, y, v, last, rows);
+  Real rate[Free::most + 2], out = rows.xx * vx * vx + 2.0 * rows.xy * vx * vy + rows.yy * vy * vy;
+  rate[0] = k.omega, rate[m + 1] = v[c.first];
+  for (int i = 0; i < m; ++i) rate[1 + i] = v[c.own() + i];
+  for (int a = 0; a <= m + 1; ++a) {
+    Real across = 2.0 * (rows.x[a] * vx + rows.y[a] * vy) + rows.row[a][a] * rate[a];  // only the upper triangle is formed
+    for (int b = a + 1; b <= m + 1; ++b) across += 2.0 * rows.row[a][b] * rate[b];
+    out += rate[a] * across;
+  }
+  return out;
+}
+
+// Kinetic energy of a piece whose hub moves at (vx, vy): the hub's, (4), the payload's turning and the rotor.
+template <class Real>
+Real kinetic_energy(const Piece<Real> &c, const Kept<Real> &k, const Real &vx, const Real &vy, bool last, const Real *y, const Real *v) {
+  Real out = 0.0;
+  if (c.joint != At::none) out += c.rotor * v[c.first] * v[c.first];
+  if (c.joint == At::sleeve) return 0.5 * (out + sleeve_inertia(c, k, vx, vy, last, y, v));
+  Real zx[Free::most], zy[Free::most], momentum_x = 0.0, momentum_y = 0.0;  // i e_j Omega_j
+  for (int j = 0; j < c.P; ++j) {
+    zx[j] = -k.sine[j] * k.rate[j], zy[j] = k.cosine[j] * k.rate[j];
+    momentum_x += c.moment[j] * zx[j], momentum_y += c.moment[j] * zy[j];
+  }
+  for (int p = 0; p < c.P; ++p) {
+    Real x = 0.0, y_ = 0.0;
+    for (int j = p; j < c.P; ++j) x += c.R[p * c.P + j] * zx[j], y_ += c.R[p * c.P + j] * zy[j];
+    out += x * x + y_ * y_;
+  }
+  out += c.mass * (vx * vx + vy * vy) + c.hub * k.omega * k.omega + 2.0 * (vx * momentum_x + vy * momentum_y);
+  if (last) {
+    Real turning = k.omega;
+    for (int i = 0; i < c.m; ++i) turning += c.tip_angle[i] * v[c.own() + i];
+    out += c.tip * turning * turning;
+  }
+  return 0.5 * out;
+}
+
+// Energies at (y, v) (n): kinetic; strain (5); potential of gravity, 0 with all mass at the origin.
 template <class Real>
 Energies<Real> energies(const Model<Real> &model, Workspace<Real> &work, const Real *y, const Real *v) {
   Energies<Real> out;
-  std::vector<Real> zero(std::size_t(model.n), Real(0.0)), momentum(zero);
-  forces(model, work, y, zero.data(), v, Terms{false, false, false}, momentum.data());
-  for (int i = 0; i < model.n; ++i) out.kinetic += 0.5 * momentum[std::size_t(i)] * v[i];
+  outward_kinematics(model, work, y, v);
   Hub<Real> hub;
-  for (std::size_t i = 0; i < model.pieces.size(); ++i) {
+  const std::size_t count = model.pieces.size();
+  for (std::size_t i = 0; i < count; ++i) {
     const Piece<Real> &c = model.pieces[i];
     const Kept<Real> &k = work.kept[i];
-    if (i == 0 && c.joint == At::slider) hub.x += y[c.first] + c.offset;
+    if (i == 0 && c.joint == At::slider) hub.x += y[c.first] + c.offset, hub.vx += v[c.first];
     Real x, up;
     first_moment(c, k, y, x, up);
     out.potential -= model.gravity[0] * (c.mass * hub.x + x) + model.gravity[1] * (c.mass * hub.y + up);
-    go_on(c, k, y, v, i + 1 < model.pieces.size() ? &model.pieces[i + 1] : nullptr, hub);
+    out.kinetic += kinetic_energy(c, k, hub.vx, hub.vy, i + 1 == count, y, v);
+    go_on(c, k, y, v, i + 1 < count ? &model.pieces[i + 1] : nullptr, hub);
     if (c.joint == At::sleeve) out.strain += sleeve_strain(c, y);
     else
       for (int l = 0; l < c.m; ++l) out.strain += 0.5 * c.K[l] * y[c.own() + l] * y[c.own() + l];

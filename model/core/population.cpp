@@ -163,14 +163,14 @@ private:
     if (all_.most_steps > 0) loop.most_steps = all_.most_steps;
     loop.start(q.data(), v.data(), FIRST_STEP * (all_.times.back() - all_.times.front()));
     std::array<Pace, LANES> pace;
-    for (bool more = starter(0).open && !plant.rides; more && loop.advance(*method, 1);) {
+    for (bool more = starter(0).open; more && loop.advance(*method, 1);) {
       more = false;
       for (std::size_t k = 0; k < LANES; ++k) more |= pace[k].look(loop.clock[k]);
     }
     std::array<bool, LANES> alone{};
     for (std::size_t k = 0; k < std::size_t(count) && starter(0).open; ++k) {
       const Clock &clock = loop.clock[k];
-      alone[k] = plant.rides || !(pace[k].settled(clock) || (clock.running() && !outdone(starters[k], pace[k].speed(clock), clock.wish)));
+      alone[k] = !(pace[k].settled(clock) || (clock.running() && !outdone(starters[k], pace[k].speed(clock), clock.wish)));
     }
     for (std::size_t k = 0; k < LANES; ++k)
       if (alone[k < std::size_t(count) ? k : 0]) loop.clock[k].status = Status::interrupted;

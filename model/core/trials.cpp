@@ -29,9 +29,7 @@ std::string method_for_ticks(const Model<double> &robot, Acting &acting, const d
   const Acts<double> acts(plant, &list);
   const std::vector<double> still(std::size_t(robot.n), 0.0);
   const double fastest = plant.fastest(q, acts.pass(q, still.data(), q, still.data(), 0.0, 0.0));
-  if (rtol < SHARPEST) return "explicit";
-  if (fastest > 2.0 * Explicit<double>::STABLE * acting.rate_Hz) return "implicit";  // explicit steps would be many a tick
-  return explicit_for_ticks(1.0 / acting.rate_Hz, fastest, rtol);
+  return method_for_ticks(acting.rate_Hz, fastest, rtol);
 }
 
 // The memory of one run at a time.

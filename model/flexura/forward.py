@@ -129,7 +129,6 @@ class _Course:
         elif isinstance(drive, Controller):
             segments, ranges, gains, follows, sampled = drive.core_drives()
             sampler, rate = drive.sampler(system), float(drive.rate_Hz)
-            method = sampler.method(q, rtol) if method == "auto" else method
         elif isinstance(drive, Sampled):
             sampler, rate = core.PythonSampler(system.equations, as_function(drive.function, joints)), float(drive.rate_Hz)
         else:

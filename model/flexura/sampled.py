@@ -12,8 +12,6 @@ import numpy as np
 
 from .errors import InputError
 
-Function = Callable[[float, np.ndarray, np.ndarray, float], np.ndarray]
-
 
 @dataclass(frozen=True)
 class Sampled:
@@ -38,29 +36,39 @@ class Sampled:
         return {"function": getattr(self.function, "__name__", type(self.function).__name__), "rate_Hz": self.rate_Hz}
 
 
-def as_function(drive: Callable[..., Any], joints: int) -> Function:
-    """A drive function of (t) or (t, position, velocity, tip_deflection) as one of four arguments that gives (joints,) floats.
+class DriveFunction:
+    """A drive function of (t), or of (t, position, velocity, tip_deflection), for the forces of so many joints.
 
-    Raises: InputError: it takes other arguments; or, when it is called, it gives something else.
+    Raises: InputError: it takes other arguments.
     """
-    try:
-        needed = [
-            p for p in inspect.signature(drive).parameters.values()
-            if p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD) and p.default is p.empty
-        ]  # fmt: skip
-        count = len(needed)
-    except (TypeError, ValueError):
-        count = 0
-    if count not in (1, 4):
-        raise InputError("expected a function of (t) or of (t, position, velocity, tip_deflection)", key="drive", value=drive)
 
-    def call(t: float, position: np.ndarray, velocity: np.ndarray, tip_deflection: float) -> np.ndarray:
-        given = drive(t) if count == 1 else drive(t, position, velocity, tip_deflection)
+    def __init__(self, function: Callable[..., Any], joints: int) -> None:
+        self.function, self.joints = function, joints
+        try:
+            parameters = inspect.signature(function).parameters.values()
+        except (TypeError, ValueError):
+            parameters = ()  # type: ignore[assignment]
+        needed = [
+            p for p in parameters if p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD) and p.default is p.empty
+        ]
+        if len(needed) not in (1, 4):
+            expected = "expected a function of (t) or of (t, position, velocity, tip_deflection)"
+            raise InputError(expected, key="drive", value=function)
+        self.of_time = len(needed) == 1
+
+    def read(self, given: Any, t: float) -> np.ndarray:
+        """The forces (joints,) that the function has given at t. Raises: InputError: it gave something else."""
         force = np.ascontiguousarray(given, dtype=float)
-        if force.shape != (joints,) or not np.all(np.isfinite(force)):
-            raise InputError(
-                f"expected {joints} finite forces from the drive function at t = {t:g} s", key="drive", value=given
-            )
+        if force.shape != (self.joints,) or not np.all(np.isfinite(force)):
+            expected = f"expected {self.joints} finite forces from the drive function at t = {t:g} s"
+            raise InputError(expected, key="drive", value=given)
         return force
 
-    return call
+    def __call__(self, t: float, position: np.ndarray, velocity: np.ndarray, tip_deflection: float) -> np.ndarray:
+        """The forces (joints,) at time t [s]."""
+        return self.read(self.function(t) if self.of_time else self.function(t, position, velocity, tip_deflection), t)
+
+
+def as_function(drive: Callable[..., Any], joints: int) -> DriveFunction:
+    """A caller's function as a drive. Raises: InputError: it takes other arguments than a drive function does."""
+    return DriveFunction(drive, joints)

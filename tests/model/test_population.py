@@ -119,7 +119,7 @@ def test_robots_are_drawn_with_a_generator_of_their_own():
 def test_a_robot_that_fails_ends_alone():
     stopped = ARM.replace({"link.1.joint.limits": [-0.002, 0.002]})
     outside = ARM.replace({"link.1.joint.limits": [0.0, 0.01]})
-    stuck = fx.Drive.force(constant(1e9), constant(1e9))
+    stuck = fx.Drive.force(constant(1e200), constant(1e200))
     prescribed = fx.Drive.prescribed(cycloid(0.5, 0.2, start=-0.1), None)
     items = [ARM, stopped, (outside, prescribed), (ARM, stuck), ARM]
     done = fx.simulate(fx.Batch.of(items), T, DRIVE, chunk=4)

@@ -11,46 +11,66 @@
 namespace flexura {
 namespace {
 
-// Arrays of a state as a Python function of a drive sees it.
-class Seen {
+// A DriveFunction of Python's as the core calls it.
+class PythonDrive {
 public:
-  explicit Seen(std::shared_ptr<const Model<double>> model) : model_(std::move(model)), work_(*model_), link_(last_flexible(*model_)) {}
+  PythonDrive(std::shared_ptr<const Model<double>> model, const nb::object &drive)
+      : model_(std::move(model)), work_(*model_), link_(last_flexible(*model_)), function_(drive.attr("function")), read_(drive.attr("read")),
+        of_time_(nb::cast<bool>(drive.attr("of_time"))) {}
 
-  // f(t, position, velocity, tip_deflection) -> forces (joints).
-  void call(const nb::callable &f, double t, const double *q, const double *v, double *force) {
+  // Forces (joints) at a state. The GIL is held.
+  void call(double t, const double *q, const double *v, double *force) {
+    if (of_time_) return take(function_(t), t, force);
     const std::size_t joints = model_->first.size();
     Array position = new_array({joints}), velocity = new_array({joints});
     for (std::size_t i = 0; i < joints; ++i) position.data()[i] = q[model_->first[i]], velocity.data()[i] = v[model_->first[i]];
     const double deflection = link_ < 0 ? 0.0 : bend(*model_, work_, q, link_).deflection;
-    const Vector out = nb::cast<Vector>(f(t, position, velocity, deflection));
-    if (out.shape(0) != joints) throw std::invalid_argument("the drive function gives another number of forces");
-    for (std::size_t i = 0; i < joints; ++i) force[i] = out.data()[i];
+    take(function_(t, position, velocity, deflection), t, force);
   }
 
 private:
   std::shared_ptr<const Model<double>> model_;
   Workspace<double> work_;
   int link_;
+  nb::object function_, read_;
+  bool of_time_;
+
+  // Arrays of finite doubles are read in place; all else by Python, which refuses what cannot be forces.
+  void take(const nb::object &given, double t, double *force) const {
+    if (take_array(given, force)) return;
+    const nb::object checked = read_(given, t);
+    if (!take_array(checked, force)) throw std::invalid_argument("the drive function gives another number of forces");
+  }
+  bool take_array(const nb::object &given, double *force) const {
+    Py_buffer view;
+    if (!PyObject_CheckBuffer(given.ptr())) return false;
+    if (PyObject_GetBuffer(given.ptr(), &view, PyBUF_ND | PyBUF_FORMAT | PyBUF_C_CONTIGUOUS) != 0) return PyErr_Clear(), false;
+    const std::size_t joints = model_->first.size();
+    const bool doubles = view.format && view.format[0] == 'd' && view.format[1] == '\0' && view.ndim == 1 && std::size_t(view.shape[0]) == joints;
+    bool finite = doubles;
+    for (std::size_t i = 0; doubles && i < joints; ++i) force[i] = static_cast<const double *>(view.buf)[i], finite = finite && std::isfinite(force[i]);
+    PyBuffer_Release(&view);
+    return finite;
+  }
 };
 
 // A Python function that is called once a tick.
 class PythonSampler : public Sampler {
 public:
-  PythonSampler(const Mechanics &robot, nb::callable f) : seen_(robot.model), f_(std::move(f)) {}
+  PythonSampler(const Mechanics &robot, const nb::object &drive) : drive_(robot.model, drive) {}
   void tick(long, double t, const double *q, const double *v, SampledOutput &held) override {
     nb::gil_scoped_acquire lock;
-    seen_.call(f_, t, q, v, held.force.data());
+    drive_.call(t, q, v, held.force.data());
   }
 
 private:
-  Seen seen_;
-  nb::callable f_;
+  PythonDrive drive_;
 };
 
 // A run and what Python objects it needs.
 struct Running {
-  nb::object function, sampler;  // kept alive
-  std::unique_ptr<Seen> seen;
+  nb::object function, sampler;  // a DriveFunction or None; a Sampler or None: kept alive
+  std::unique_ptr<PythonDrive> drive;
   std::unique_ptr<Simulation> run;
 
   Running(const Mechanics &robot, const Vector &t, const Vector &q, const Vector &v, double rtol, const std::string &method,
@@ -62,10 +82,10 @@ struct Running {
       throw std::invalid_argument("a run of another robot was expected");
     Acting acting = acting_of(segments, ranges, gains, prescribed, sampled, limits);
     if (!function.is_none()) {
-      seen = std::make_unique<Seen>(robot.model);
+      drive = std::make_unique<PythonDrive>(robot.model, function);
       acting.function = [this](double at, const double *place, const double *rate, double *force) {
         nb::gil_scoped_acquire lock;
-        seen->call(nb::borrow<nb::callable>(function), at, place, rate, force);
+        drive->call(at, place, rate, force);
       };
     }
     if (!sampler.is_none()) acting.sampler = nb::cast<Sampler *>(sampler), acting.rate_Hz = rate_Hz;
@@ -126,8 +146,8 @@ Array bends_of(const Mechanics &self, const Matrix &q, int link) {
 void bind_simulation(nb::module_ &module) {
   using namespace nb::literals;
   nb::class_<Sampler>(module, "Sampler", "A sampled controller.");
-  nb::class_<PythonSampler, Sampler>(module, "PythonSampler", "A function (t, position, velocity, tip_deflection) -> forces, once a tick.")
-      .def(nb::init<const Mechanics &, nb::callable>(), "robot"_a, "function"_a);
+  nb::class_<PythonSampler, Sampler>(module, "PythonSampler", "A DriveFunction that is called once a tick.")
+      .def(nb::init<const Mechanics &, const nb::object &>(), "robot"_a, "drive"_a);
   nb::class_<Running>(module, "Simulation", "A run in progress.")
       .def(nb::init<const Mechanics &, const Vector &, const Vector &, const Vector &, double, const std::string &, const Matrix &,
                     const Ranges &, const Matrix &, const Flags &, const Flags &, const Matrix &, nb::object, nb::object, double, double, long>(),
