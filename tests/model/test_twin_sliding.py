@@ -68,8 +68,9 @@ def test_rigid_links_in_sleeves(kinds):
     ("kinds", "flexible"),
     [
         ("R Pa", [True, False]), ("R Pa", True), ("Pa Pa", True), ("Pb R", [True, False]), ("R Pb", [False, True]),
-        ("R Pb", [True, False]), ("Pa Pb", True), 
-        pytest.param("Pb Pa", [True, False], marks=pytest.mark.slow), pytest.param("Pb Pb", [True, False], marks=pytest.mark.slow),
+        ("R Pb", [True, False]), ("Pa Pb", True),
+        pytest.param("Pb Pa", [True, False], marks=pytest.mark.slow),
+        pytest.param("Pb Pb", [True, False], marks=pytest.mark.slow),
     ],
 )  # fmt: skip
 def test_stiff_links_on_which_joints_slide_move_as_rigid_ones(kinds, flexible):
