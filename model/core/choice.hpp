@@ -6,7 +6,8 @@
 // machine's load.
 //
 // There is no race either where exponential steps end soon (pace.hpp), or where it is decided beforehand: rigid robots without gains or
-// friction and tolerances below 1e-9 are for explicit steps. Under a caller's function and under a sampled controller the run
+// friction and tolerances below 1e-9 are for explicit steps; a slider on a link that moves through a sleeve is for implicit ones, as its modes
+// change with every step. Under a caller's function and under a sampled controller the run
 // does not go back: exponential and implicit steps are tried one after the other.
 #pragma once
 #include <array>
@@ -113,7 +114,7 @@ class Auto {
     if (for_explicit(rtol, bends, c.plant.joints, acting, resistance) && !(bends && hopeless(1.0 / DEAR))) chosen = &explicit_;
     else if (acting.sampler) chosen = method_under_ticks(acting.rate_Hz, bends);
     else if (bends && !sharp && strongest_damper() > STRONG) chosen = &implicit;
-    else if (acting.function) chosen = bends ? race_forward(implicit) : &explicit_;
+    else if (acting.function) chosen = !bends ? static_cast<Method<double> *>(&explicit_) : c.plant.rides ? &implicit : race_forward(implicit);
     else race();
   }
 
@@ -179,7 +180,7 @@ class Auto {
     Best best{Mark(), nullptr, -1.0};
     double step = start.clock.wish;
     goes_on = false;
-    if (!sharp) {
+    if (!sharp && !loop.course.plant.rides) {
       double reached = 0.0;
       if (begun && begin_exponential(reached)) {
         chosen = &exponential, raced = goes_on = true, speed = reached;
@@ -200,7 +201,7 @@ class Auto {
     for_ticks = make_method(method_for_ticks(rate_Hz, fastest(), rtol), loop.course);
     if (for_ticks->name() == std::string(TR_BDF2.name)) second_order = for_ticks.get();
     const bool stiff = second_order || for_ticks->name() == std::string(ESDIRK_4.name);
-    return stiff && bends && !sharp ? race_forward(*for_ticks) : for_ticks.get();
+    return stiff && bends && !sharp && !loop.course.plant.rides ? race_forward(*for_ticks) : for_ticks.get();
   }
 
   // The better one of exponential and implicit steps, which are tried one after the other on the way: neither a controller nor a caller's

@@ -5,13 +5,15 @@
 
 namespace flexura {
 
-template <class Real> std::unique_ptr<Method<Real>> make_method(const std::string &name, Course<Real> &course, double rtol) {
+template <class Real> std::unique_ptr<Method<Real>> make_method(const std::string &name, Course<Real> &course, double rtol, const ExponentialOptions &options) {
   if (name == "explicit") return std::make_unique<Explicit<Real>>(course);
   if (name == ESDIRK_4.name) return std::make_unique<Implicit<Real>>(course);
   if (name == TR_BDF2.name) return std::make_unique<Implicit<Real>>(course, TR_BDF2);
-  if (name == "exponential") return std::make_unique<Exponential<Real>>(course, rtol);
-  if (name == PAIR_3.name) return std::make_unique<PairSteps<Real>>(course, PAIR_3);
-  if (name == PAIR_5.name) return std::make_unique<PairSteps<Real>>(course, PAIR_5);
+  if (name == "exponential") return std::make_unique<Exponential<Real>>(course, rtol, options);
+  if constexpr (LanesOf<Real>::value == 1) {  // sampled controllers run alone
+    if (name == PAIR_3.name) return std::make_unique<PairSteps<Real>>(course, PAIR_3);
+    if (name == PAIR_5.name) return std::make_unique<PairSteps<Real>>(course, PAIR_5);
+  }
   return nullptr;
 }
 
@@ -23,8 +25,8 @@ const char *method_for_ticks(double rate_Hz, double fastest, double rtol) {
   return rtol >= 1e-6 ? PAIR_3.name : PAIR_5.name;
 }
 
-template std::unique_ptr<Method<double>> make_method(const std::string &, Course<double> &, double);
-template std::unique_ptr<Method<Pack<4>>> make_method(const std::string &, Course<Pack<4>> &, double);
+template std::unique_ptr<Method<double>> make_method(const std::string &, Course<double> &, double, const ExponentialOptions &);
+template std::unique_ptr<Method<Pack<4>>> make_method(const std::string &, Course<Pack<4>> &, double, const ExponentialOptions &);
 
 namespace {
 
@@ -71,7 +73,6 @@ template class Explicit<Pack<4>>;
 template class Implicit<double>;
 template class Implicit<Pack<4>>;
 template class PairSteps<double>;
-template class PairSteps<Pack<4>>;
 template class ModelPlant<double>;
 template class ModelPlant<Pack<4>>;
 

@@ -17,7 +17,7 @@ namespace flexura {
 constexpr double FIRST_STEP = 1e-4;
 
 // "explicit", "implicit" or "exponential"; under a sampled controller also "explicit-3", "explicit-5", "implicit-2". Null for any other name.
-template <class Real> std::unique_ptr<Method<Real>> make_method(const std::string &name, Course<Real> &course, double rtol = 1e-6);
+template <class Real> std::unique_ptr<Method<Real>> make_method(const std::string &name, Course<Real> &course, double rtol = 1e-6, const ExponentialOptions &options = ExponentialOptions());
 
 // Which method suits a run under a controller of short ticks, by passes a tick; `fastest`: the robot's highest frequency or rate of
 // decay [rad/s].

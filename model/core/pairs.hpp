@@ -94,6 +94,5 @@ template <class Real> class PairSteps : public Method<Real> {
 };
 
 extern template class PairSteps<double>;
-extern template class PairSteps<Pack<4>>;
 
 }  // namespace flexura

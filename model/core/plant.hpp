@@ -35,7 +35,7 @@ template <class Real> struct Plant {
   std::vector<Real> lever;             // (n) metres that a tip moves a unit of an unknown, at most: what an error weighs
   std::vector<Real> deflect;           // (n) metres that the tip of its own link deflects; 0 for joints
   std::vector<Real> travel;            // (joints) a way of joint i after which modes may be others; 0: as far as its lever says; or empty
-  bool rides = false;                  // does a slider move along a link that bends? Its modes then change from step to step
+  bool rides = false;                  // does a slider move along a link that moves through a sleeve? Its modes then change from step to step
   Real reach = Real(1.0);              // length of the whole robot [m]
 
   virtual ~Plant() = default;

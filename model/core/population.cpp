@@ -157,20 +157,20 @@ private:
     Workspace<Four> work(model);
     ModelPlant<Four> plant(model, work);
     Loop<Four> loop(plant, acting, all_.times, all_.rtol);
-    const auto method = make_method<Four>(starter(0).method, loop.course, all_.rtol);
+    const auto method = make_method<Four>(starter(0).method, loop.course, all_.rtol, {all_.numerical_damping});
     if (!method) throw std::invalid_argument("there is no method " + all_.method);
     loop.interrupt = &stop_, loop.course.balanced = balanced_;
     if (all_.most_steps > 0) loop.most_steps = all_.most_steps;
     loop.start(q.data(), v.data(), FIRST_STEP * (all_.times.back() - all_.times.front()));
     std::array<Pace, LANES> pace;
-    for (bool more = starter(0).open; more && loop.advance(*method, 1);) {
+    for (bool more = starter(0).open && !plant.rides; more && loop.advance(*method, 1);) {
       more = false;
       for (std::size_t k = 0; k < LANES; ++k) more |= pace[k].look(loop.clock[k]);
     }
     std::array<bool, LANES> alone{};
     for (std::size_t k = 0; k < std::size_t(count) && starter(0).open; ++k) {
       const Clock &clock = loop.clock[k];
-      alone[k] = !(pace[k].settled(clock) || (clock.running() && !outdone(starters[k], pace[k].speed(clock), clock.wish)));
+      alone[k] = plant.rides || !(pace[k].settled(clock) || (clock.running() && !outdone(starters[k], pace[k].speed(clock), clock.wish)));
     }
     for (std::size_t k = 0; k < LANES; ++k)
       if (alone[k < std::size_t(count) ? k : 0]) loop.clock[k].status = Status::interrupted;
@@ -197,7 +197,7 @@ private:
   Request request_of(const Starter &starter) const {
     Request request;
     request.times = all_.times, request.q = starter.q, request.v = starter.v, request.rtol = all_.rtol, request.method = all_.method;
-    request.most_steps = all_.most_steps;
+    request.most_steps = all_.most_steps, request.numerical_damping = all_.numerical_damping;
     return request;
   }
 

@@ -27,6 +27,7 @@ struct Population {
   std::vector<double> q, v;            // (n) at the start, the same for all; empty: each robot's own start, at rest
   double rtol = 1e-6;
   std::string method = "auto";
+  bool numerical_damping = true;
   long most_steps = 0;                 // of a robot; 0: no budget
   std::vector<Channel> channels;
   int stations = 21;                   // of an Observer

@@ -6,8 +6,8 @@ namespace flexura {
 
 Simulation::Simulation(std::shared_ptr<const Model<double>> model, Acting acting, const Request &request)
     : model_(std::move(model)), work_(*model_), plant_(*model_, work_), acting_(std::move(acting)), acting_pointer_(&acting_),
-      loop_(plant_, &acting_pointer_, request.times, request.rtol), method_(make_method<double>(request.method, loop_.course, request.rtol)) {
-  if (!method_) auto_ = std::make_unique<Auto>(loop_, request.rtol);
+      loop_(plant_, &acting_pointer_, request.times, request.rtol), method_(make_method<double>(request.method, loop_.course, request.rtol, {request.numerical_damping})) {
+  if (!method_) auto_ = std::make_unique<Auto>(loop_, request.rtol, ExponentialOptions{request.numerical_damping});
   loop_.interrupt = &interrupt;
   if (request.most_steps > 0) loop_.most_steps = request.most_steps;
   const double span = request.times.back() - request.times.front();

@@ -17,6 +17,7 @@ struct Request {
   std::string method = "auto";    // or "explicit", "implicit", "exponential"
   double first_step = 0.0;         // 0: chosen
   long most_steps = 0;             // 0: no budget
+  bool numerical_damping = true;   // of fast modes, by exponential steps
 };
 
 class Simulation {

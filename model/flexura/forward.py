@@ -31,18 +31,18 @@ MOST_STEPS = 50_000_000  # of a run
 @overload
 def simulate(
     robot: Batch, t_eval: Any, drive: Drive | None = None, q0: Any = None, qd0: Any = None, rtol: float = 1e-6, *,
-    method: str = "auto", progress: Callable[[float], None] | None = None, **population: Any,
+    method: str = "auto", numerical_damping: bool = True, progress: Callable[[float], None] | None = None, **population: Any,
 ) -> Population: ...  # fmt: skip
 @overload
 def simulate(
-    robot: Any, t_eval: Any, drive: Drive | Controller | Sampled | Callable[..., Any] | None = None, q0: Any = None, qd0: Any =
-    None,
-    rtol: float = 1e-6, *, method: str = "auto", progress: Callable[[float], None] | None = None,
+    robot: Any, t_eval: Any, drive: Drive | Controller | Sampled | Callable[..., Any] | None = None, q0: Any = None,
+    qd0: Any = None, rtol: float = 1e-6, *, method: str = "auto", numerical_damping: bool = True,
+    progress: Callable[[float], None] | None = None,
 ) -> Run: ...  # fmt: skip
 def simulate(
-    robot: Any, t_eval: Any, drive: Drive | Controller | Sampled | Callable[..., Any] | None = None, q0: Any = None, qd0: Any =
-    None,
-    rtol: float = 1e-6, *, method: str = "auto", progress: Callable[[float], None] | None = None, **population: Any,
+    robot: Any, t_eval: Any, drive: Drive | Controller | Sampled | Callable[..., Any] | None = None, q0: Any = None,
+    qd0: Any = None, rtol: float = 1e-6, *, method: str = "auto", numerical_damping: bool = True,
+    progress: Callable[[float], None] | None = None, **population: Any,
 ) -> Run | Population:  # fmt: skip
     """Integrate the equations of motion from t_eval[0] on; the Run has its channels at t_eval (T,).
 
@@ -61,8 +61,9 @@ def simulate(
         may be
         called again for times within a step, never before its start, and must have no memory; q0, qd0 (n,): the state at the
         start, by default `system.start()` at rest; rtol: the error that is asked for, of deflections and of a thousandth of
-        the tip's path; method: "auto", "explicit" (order 8), "implicit", or "exponential"; progress: called with the finished
-        fraction.
+        the tip's path; method: "auto", "explicit" (order 8), "implicit", or "exponential"; numerical_damping:
+        exponential steps damp fast modes that change no output by more than the tolerance (integration.md (43)); False: they
+        do not; progress: called with the finished fraction.
 
     Raises: InputError: an argument is not what is expected.
     """
@@ -73,7 +74,10 @@ def simulate(
 
         if not (drive is None or isinstance(drive, Drive)):
             raise InputError("expected a Drive: a population runs in the core alone", key="drive", value=drive)
-        return many.simulate(robot, t_eval, drive, q0, qd0, rtol, method=method, progress=progress, **population)
+        return many.simulate(
+            robot, t_eval, drive, q0, qd0, rtol, method=method, numerical_damping=numerical_damping, progress=progress,
+            **population,
+        )  # fmt: skip
     if population:
         raise InputError("expected this of a Batch only, not of one robot", key=next(iter(population)))
     system, t = system_of(robot), check(t_eval, rtol, method)
@@ -88,7 +92,7 @@ def simulate(
             raise InputError(expected, key="drive", value="Controller")
         slow = nodal if system.robot.nodal else dense
         return slow.simulate(system, t, acting, q, qd, rtol, method, progress)
-    return _Course(system, t, acting, q, qd, rtol, method).run(progress)
+    return _Course(system, t, acting, q, qd, rtol, method, numerical_damping).run(progress)
 
 
 def inverse(
@@ -116,8 +120,9 @@ class _Course:
     """A run of the core in progress."""
 
     def __init__(
-        self, system: System, t: np.ndarray, drive: Any, q: np.ndarray, qd: np.ndarray, rtol: float, method: str
-    ) -> None:
+        self, system: System, t: np.ndarray, drive: Any, q: np.ndarray, qd: np.ndarray, rtol: float, method: str,
+        numerical_damping: bool = True,
+    ) -> None:  # fmt: skip
         self.system, self.t, self.drive, self.rtol = system, t, drive, rtol
         joints = len(system.robot.links)
         follows, function, sampler, rate = np.zeros(joints, dtype=np.uint8), None, None, 0.0
@@ -137,7 +142,7 @@ class _Course:
         self.core = core.Simulation(
             system.equations, t, q, qd, rtol, method, np.ascontiguousarray(segments), ranges, np.ascontiguousarray(gains),
             follows,
-            sampled, np.ascontiguousarray(system.limits), function, sampler, rate, 0.0, MOST_STEPS,
+            sampled, np.ascontiguousarray(system.limits), function, sampler, rate, numerical_damping, MOST_STEPS,
         )  # fmt: skip
 
     def run(self, progress: Callable[[float], None] | None) -> Run:

@@ -67,7 +67,8 @@ class Population:
 
 def simulate(
     batch: Batch, t_eval: Any, drive: Drive | None = None, q0: Any = None, qd0: Any = None, rtol: float = 1e-6, *,
-    method: str = "auto", progress: Callable[[float], None] | None = None, channels: Sequence[str] | None = None,
+    method: str = "auto", numerical_damping: bool = True, progress: Callable[[float], None] | None = None,
+    channels: Sequence[str] | None = None,
     reduce: Callable[[np.ndarray, dict[str, np.ndarray]], Any] | None = None, folder: str | Path | None = None,
     chunk: int = 256, threads: int | None = None, scheduler: str | None = None,
 ) -> Population:  # fmt: skip
@@ -79,7 +80,7 @@ def simulate(
     by force, and one that asks for something else is refused by name. `threads`: by default one a core. `scheduler`: the address
     of a Dask scheduler, whose workers then do the chunks. Raises InputError for wrong arguments; a robot that fails ends alone.
     """
-    request = Request.checked(t_eval, drive, q0, qd0, rtol, method, channels, reduce)
+    request = Request.checked(t_eval, drive, q0, qd0, rtol, method, numerical_damping, channels, reduce)
     for key, value in (("chunk", chunk), ("threads", 1 if threads is None else threads)):
         if isinstance(value, bool) or not isinstance(value, int) or value < 1:
             raise InputError("expected a whole number, 1 or more", key=key, value=value)
@@ -233,8 +234,8 @@ def _together(
     start = [np.zeros(0) if q is None else q for q in (request.q0, request.qd0)]
     values, words, reached, steps, joints, positions, texts = core.population(
         rows.counts, rows.numbers, rows.material, rows.gravity, rows.payload, rows.limits, packed,
-        np.array([number[id(drive)] for drive in drives]), request.t, *start, request.rtol, request.method, forward.MOST_STEPS,
-        columns, STATIONS, threads, watch,
+        np.array([number[id(drive)] for drive in drives]), request.t, *start, request.rtol, request.method,
+        request.numerical_damping, forward.MOST_STEPS, columns, STATIONS, threads, watch,
     )  # fmt: skip
     for name, found in zip(request.channels, values, strict=True):
         part.channels[name][members] = found
@@ -270,8 +271,9 @@ def _one_by_one(request: Request, share: Share, watch: Any, part: Part) -> None:
         drive = share.drives[k] or request.drive
         try:
             run = forward.simulate(
-                share.robots[k], request.t, drive, request.q0, request.qd0, request.rtol, method=request.method
-            )
+                share.robots[k], request.t, drive, request.q0, request.qd0, request.rtol, method=request.method,
+                numerical_damping=request.numerical_damping,
+            )  # fmt: skip
         except InputError as error:
             part.status[k], part.events[k] = "refused", str(error)
             continue

@@ -31,13 +31,15 @@ class Request:
     qd0: np.ndarray | None
     rtol: float
     method: str
+    numerical_damping: bool
     channels: tuple[str, ...]
     reduce: Callable[[np.ndarray, dict[str, np.ndarray]], Any] | None
 
     @staticmethod
     def checked(
-        t_eval: Any, drive: Drive | None, q0: Any, qd0: Any, rtol: float, method: str, channels: Sequence[str] | None, reduce: Any
-    ) -> Request:
+        t_eval: Any, drive: Drive | None, q0: Any, qd0: Any, rtol: float, method: str, numerical_damping: bool,
+        channels: Sequence[str] | None, reduce: Any,
+    ) -> Request:  # fmt: skip
         """A request whose arguments are good as far as that can be told without a robot. Raises InputError."""
         t = forward.check(t_eval, rtol, method)
         if not (reduce is None or callable(reduce)):
@@ -45,7 +47,7 @@ class Request:
         if isinstance(channels, str):
             raise InputError("expected a list of channels", key="channels", value=channels)
         start = [None if q is None else np.array(q, dtype=float) for q in (q0, qd0)]
-        return Request(t, drive, start[0], start[1], float(rtol), method, tuple(channels or ()), reduce)
+        return Request(t, drive, start[0], start[1], float(rtol), method, bool(numerical_damping), tuple(channels or ()), reduce)
 
     def fitted(self, robot: Robot) -> Request:
         """The request for robots like this one: with the default channels, and its names and shapes checked."""
@@ -85,6 +87,7 @@ class Request:
             "qd0": start[1],
             "rtol": self.rtol,
             "method": self.method,
+            "numerical_damping": self.numerical_damping,
             "channels": list(self.channels),
             "reduce": None if self.reduce is None else identity(self.reduce),
         }

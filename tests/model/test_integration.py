@@ -439,3 +439,14 @@ def test_two_systems_do_not_share_anything():
     alone = fx.simulate(a, [0.0, 0.2], SMOOTH)
     fx.simulate(b, [0.0, 0.2], SMOOTH)
     assert np.array_equal(fx.simulate(a, [0.0, 0.2], SMOOTH).states, alone.states)
+
+
+def test_numerical_damping_can_be_switched_off():
+    """Then its account is zero and the energy stays; with it the account says what it took."""
+    strip = robot(beam(0.5, 0.2, 5.0, 6))
+    start = fx.static(strip, joints=[0.0], tip_force=(0.0, 0.5))
+    asked = {"q0": start, "rtol": 1e-4, "method": "exponential"}
+    damped = fx.simulate(strip, np.linspace(0, 0.5, 11), fx.Drive.none(1), **asked)
+    free = fx.simulate(strip, np.linspace(0, 0.5, 11), fx.Drive.none(1), numerical_damping=False, **asked)
+    assert damped["energy/numerical_loss"][-1] > 0.0 and np.all(free["energy/numerical_loss"] == 0.0)
+    assert max(damped.meta["energy_error"], free.meta["energy_error"]) < 1e-3

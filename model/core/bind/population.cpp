@@ -37,7 +37,7 @@ Channel::Of kind_of(const std::string &name) {
 
 nb::tuple run_population(const Counts &counts, const Cube &numbers, const Cube &material, const Matrix &gravity, const Matrix &payload,
                          const Cube &limits, const std::vector<PackedDrive *> &drives, const Indices &drive_of, const Vector &t, const Vector &q,
-                         const Vector &v, double rtol, const std::string &method, long most_steps,
+                         const Vector &v, double rtol, const std::string &method, bool numerical_damping, long most_steps,
                          const std::vector<std::pair<std::string, int>> &channels, int stations, int threads, Watch &watch) {
   const std::size_t robots = numbers.shape(0), links = counts.shape(0);
   if (counts.shape(1) != COUNTS || numbers.shape(1) != links || numbers.shape(2) != NUMBERS || material.shape(0) != robots ||
@@ -60,7 +60,7 @@ nb::tuple run_population(const Counts &counts, const Cube &numbers, const Cube &
   }
   population.times.assign(t.data(), t.data() + t.shape(0));
   population.q.assign(q.data(), q.data() + q.shape(0)), population.v.assign(v.data(), v.data() + v.shape(0));
-  population.rtol = rtol, population.method = method, population.most_steps = most_steps, population.stations = stations;
+  population.rtol = rtol, population.method = method, population.numerical_damping = numerical_damping, population.most_steps = most_steps, population.stations = stations;
   for (const auto &[name, index] : channels) population.channels.push_back({kind_of(name), index});
   Array values = new_array({channels.size(), robots, t.shape(0)});
   std::vector<Ending> endings;
@@ -96,7 +96,7 @@ void bind_population(nb::module_ &module) {
       .def(nb::init<const Matrix &, const Ranges &, const Matrix &, const Flags &, const Flags &, const Matrix &>(), "segments"_a, "ranges"_a,
            "gains"_a, "prescribed"_a, "sampled"_a, "limits"_a);
   module.def("population", &run_population, "counts"_a, "numbers"_a, "material"_a, "gravity"_a, "payload"_a, "limits"_a, "drives"_a, "drive_of"_a,
-             "t"_a, "q"_a, "v"_a, "rtol"_a, "method"_a, "most_steps"_a, "channels"_a, "stations"_a, "threads"_a, "watch"_a,
+             "t"_a, "q"_a, "v"_a, "rtol"_a, "method"_a, "numerical_damping"_a, "most_steps"_a, "channels"_a, "stations"_a, "threads"_a, "watch"_a,
              "Values (channels, robots, times); of each robot how it ended, the time reached, steps, joint, positions of the joints; texts by robot.");
 }
 
