@@ -135,7 +135,8 @@ class _Trial:
         self.rows[:, 0], self.rows[:, 1] = a, drives
         run = core.Simulation(
             self.system.equations, np.array([a, b]), state[:n].copy(), state[n : 2 * n].copy(), self.rtol, "implicit", self.rows,
-            self.ranges, self.gains, self.none, self.none, self.free, None, None, 0.0, b - a, 0,
+            self.ranges, self.gains, self.none, self.none, self.free, None, None, 0.0, b - a, True,
+            0,
         )  # fmt: skip
         while run.advance(10_000):
             pass

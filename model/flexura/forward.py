@@ -142,7 +142,8 @@ class _Course:
         self.core = core.Simulation(
             system.equations, t, q, qd, rtol, method, np.ascontiguousarray(segments), ranges, np.ascontiguousarray(gains),
             follows,
-            sampled, np.ascontiguousarray(system.limits), function, sampler, rate, numerical_damping, MOST_STEPS,
+            sampled, np.ascontiguousarray(system.limits), function, sampler, rate, 0.0, numerical_damping,
+            MOST_STEPS,
         )  # fmt: skip
 
     def run(self, progress: Callable[[float], None] | None) -> Run:

@@ -75,7 +75,7 @@ struct Running {
 
   Running(const Mechanics &robot, const Vector &t, const Vector &q, const Vector &v, double rtol, const std::string &method,
           const Matrix &segments, const Ranges &ranges, const Matrix &gains, const Flags &prescribed, const Flags &sampled,
-          const Matrix &limits, nb::object function_, nb::object sampler_, double rate_Hz, bool numerical_damping, long most_steps)
+          const Matrix &limits, nb::object function_, nb::object sampler_, double rate_Hz, double first_step, bool numerical_damping, long most_steps)
       : function(std::move(function_)), sampler(std::move(sampler_)) {
     const std::size_t n = std::size_t(robot.model->n);
     if (q.shape(0) != n || v.shape(0) != n || t.shape(0) < 1 || ranges.shape(0) != robot.model->first.size())
@@ -92,7 +92,7 @@ struct Running {
     if (auto *controller = dynamic_cast<Controller *>(acting.sampler)) controller->start(acting, q.data());
     Request request;
     request.times = {t.data(), t.data() + t.shape(0)}, request.q = {q.data(), q.data() + n}, request.v = {v.data(), v.data() + n};
-    request.rtol = rtol, request.method = method, request.numerical_damping = numerical_damping, request.most_steps = most_steps;
+    request.rtol = rtol, request.method = method, request.first_step = first_step, request.numerical_damping = numerical_damping, request.most_steps = most_steps;
     run = std::make_unique<Simulation>(robot.model, std::move(acting), request);
   }
 
@@ -150,9 +150,9 @@ void bind_simulation(nb::module_ &module) {
       .def(nb::init<const Mechanics &, const nb::object &>(), "robot"_a, "drive"_a);
   nb::class_<Running>(module, "Simulation", "A run in progress.")
       .def(nb::init<const Mechanics &, const Vector &, const Vector &, const Vector &, double, const std::string &, const Matrix &,
-                    const Ranges &, const Matrix &, const Flags &, const Flags &, const Matrix &, nb::object, nb::object, double, bool, long>(),
+                    const Ranges &, const Matrix &, const Flags &, const Flags &, const Matrix &, nb::object, nb::object, double, double, bool, long>(),
            "robot"_a, "t"_a, "q"_a, "v"_a, "rtol"_a, "method"_a, "segments"_a, "ranges"_a, "gains"_a, "prescribed"_a, "sampled"_a,
-           "limits"_a, "function"_a.none(), "sampler"_a.none(), "rate_Hz"_a, "numerical_damping"_a, "most_steps"_a)
+           "limits"_a, "function"_a.none(), "sampler"_a.none(), "rate_Hz"_a, "first_step"_a, "numerical_damping"_a, "most_steps"_a)
       .def("advance", &Running::advance, "steps"_a, "At most so many steps further; may it go on?")
       .def("progress", &Running::progress, "How far the run is, and how it ended.")
       .def("rows", &Running::rows, "Times, states, accounts and drive forces so far.")
