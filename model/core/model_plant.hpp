@@ -233,7 +233,9 @@ template <class Real> class ModelPlant : public Plant<Real> {
       const Piece<Real> &c = model.pieces[i];
       if (c.joint == At::sleeve) this->travel[std::size_t(c.link)] = 0.003 * c.length;
       if (c.joint != At::slider || i == 0 || model.pieces[i - 1].m == 0) continue;
-      this->rides = this->rides || (model.pieces[i - 1].joint == At::sleeve && !model.locked[std::size_t(c.link)]);
+      const Piece<Real> &rail = model.pieces[i - 1];
+      const bool both = rail.joint == At::sleeve && !model.locked[std::size_t(rail.link)] && !model.locked[std::size_t(c.link)];
+      this->rides = this->rides || both;
       this->travel[std::size_t(c.link)] = 0.003 * model.pieces[i - 1].length;
     }
   }
