@@ -88,7 +88,7 @@ def tables(found: dict[str, Any]) -> list[Any]:
         "growth": lambda rows: [report.growths(rows)],
         "board": lambda rows: [report.boards(rows)],
         "accuracy": lambda rows: [report.accuracies(rows), "\n".join(accuracy.beyond(rows)) or "all within what is asked"],
-        "passes": lambda rows: [report.passes(rows)],
+        "passes": lambda rows: [report.passes(rows), "\n".join(accuracy.slower(rows)) or "auto: all within what is asked"],
     }
     return [part for name, rows in found.items() for part in shown[name](rows) if part]
 

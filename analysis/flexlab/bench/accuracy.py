@@ -1,13 +1,13 @@
 """How accurate the solver is, and in how many evaluations: python -m flexlab.bench accuracy, and ... passes.
 
 Errors are those of `problem.error`, from the converged motion on the problem's own mesh: what the tolerance is to keep. Passes
-are evaluations of the equations of motion for an error, by each method: the median over nine first steps where `fx.simulate`
-takes a first step.
+are evaluations of the equations of motion for an error, by each method: medians over nine tolerances within a tenth of one,
+which scatter as runs with other first steps do.
 """
 
 from __future__ import annotations
 
-import inspect
+import time
 from typing import Any
 
 import numpy as np
@@ -22,18 +22,18 @@ TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
 ERRORS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
 TIGHTER = (3e-9, 1e-9, 3e-10, 1e-10)  # tolerances that a small error takes
 MOST_TIMES_RTOL, MOST_BY_DEFAULT = 20.0, 1e-4  # asked
-FIRST_STEPS = np.geomspace(0.25, 4.0, 9)  # times FIRST_S
-FIRST_S = 1e-5
-LIMIT_S = 30.0
+SCATTER = np.geomspace(1 / 1.1, 1.1, 9)  # times a tolerance
+LIMIT_S, PATIENCE = 30.0, 4.0
+MOST_PASSES, MORE_PASSES = 2.0, 100  # asked of "auto": so many times those of the cheapest method, and so many more
 Row = dict[str, Any]
 
 
 def measured(
-    problem: Problem, system: fx.System, exact: Channels, rtol: float, method: str = "auto", **keys: Any
+    problem: Problem, system: fx.System, exact: Channels, rtol: float, method: str = "auto", limit_s: float = LIMIT_S
 ) -> tuple[float, int] | None:
     """Error and evaluations of a run, or None if it fails or takes too long."""
     try:
-        answer = native.run(problem, system, rtol, method, limit_s=LIMIT_S, **keys)
+        answer = native.run(problem, system, rtol, method, limit_s=limit_s)
     except (native.TooSlow, fx.FlexuraError, RuntimeError):
         return None
     return error(answer.channels, exact), answer.evaluations
@@ -52,28 +52,31 @@ def errors(problem: Problem) -> Row:
     return {"name": problem.name, "scale": size, "undamped": problem.undamped, "errors": rows, "default": default}
 
 
-def first_steps() -> list[dict[str, float]]:
-    """What to hand to `fx.simulate` for nine first steps; nothing, once, where it takes none."""
-    takes = "first_step_s" in inspect.signature(fx.simulate).parameters
-    return [{"first_step_s": float(FIRST_S * k)} for k in FIRST_STEPS] if takes else [{}]
-
-
 def passes(problem: Problem) -> Row:
-    """The fewest evaluations by which each method holds each error, its tolerance chosen by hand; medians over first steps."""
+    """The fewest evaluations by which each method holds each error, its tolerance chosen by hand.
+
+    Medians over nine tolerances near each other. A method whose run takes PATIENCE times the longest one of "auto" is given up.
+    """
     system, exact = native.system(problem.robot), native.converged(problem)
     methods = native.methods(problem)
     curves: dict[str, list[list[tuple[float, int]]]] = {method: [] for method in methods}
+    limit = LIMIT_S
     for method in methods:
-        for keys in first_steps():
+        longest = 0.0
+        for share in SCATTER:
             runs = []
             for rtol in RTOLS + TIGHTER:
-                found = measured(problem, system, exact, rtol, method, **keys)
+                begun = time.process_time()
+                found = measured(problem, system, exact, float(share * rtol), method, limit)
+                longest = max(longest, time.process_time() - begun)
                 if found is None:
                     break
                 runs.append(found)
                 if found[0] <= min(ERRORS):
                     break
             curves[method].append(runs)
+        if method == "auto":
+            limit = min(LIMIT_S, max(0.2, PATIENCE * longest))
     fewest = lambda runs, target: min((count for off, count in runs if off <= target), default=None)
     rows: list[Row] = []
     for target in ERRORS:
@@ -102,4 +105,16 @@ def beyond(rows: list[Row]) -> list[str]:
         usual = row["default"]["error"]
         if usual is not None and usual > MOST_BY_DEFAULT:
             out.append(f"{row['name']}: {usual:.1e} by default, asked {MOST_BY_DEFAULT:g}")
+    return out
+
+
+def slower(rows: list[Row]) -> list[str]:
+    """Where "auto" takes more evaluations than is asked, in words."""
+    out = []
+    for row in rows:
+        for each in row["passes"]:
+            counts = {method: count for method, count in each["passes"].items() if count is not None}
+            auto, best = counts.pop("auto", None), min(counts.values(), default=None)
+            if auto is not None and best is not None and auto > MOST_PASSES * best + MORE_PASSES:
+                out.append(f"{row['name']}: {auto} evaluations for an error of {each['error']:g}, the cheapest method {best}")
     return out
