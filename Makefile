@@ -45,7 +45,7 @@ demo: $(CORE)
 test check: lint types core tests
 
 lint: $(READY)
-	@$(VENV)/bin/ruff check model analysis firmware tests tools
+	@$(VENV)/bin/ruff check model analysis firmware tests tools examples
 
 types: $(READY)
 	@$(VENV)/bin/mypy
