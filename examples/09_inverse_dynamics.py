@@ -13,7 +13,7 @@ import numpy as np
 
 import flexura as fx
 from comparison import Comparison
-from flexura.signal import cycloid
+from flexura.signals import cycloid
 
 LENGTH_M, ARM_KG, SLIDER_KG, GRAVITY_M_S2 = 0.8, 1.5, 0.6, 9.81
 

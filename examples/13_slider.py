@@ -20,7 +20,7 @@ from scipy.special import ellipk, ellipkinc
 
 import flexura as fx
 from comparison import Comparison
-from flexura.signal import cycloid
+from flexura.signals import cycloid
 
 LENGTH_M, STIFFNESS_N_M2, SLIDER_KG, GRAVITY_M_S2 = 0.6, 0.5, 0.2, 9.81
 WEIGHT_N = SLIDER_KG * GRAVITY_M_S2

@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 
 import flexura as fx
 from comparison import Comparison
-from flexura.signal import constant
+from flexura.signals import constant
 
 LENGTH_M, MASS_KG_M, STIFFNESS_N_M2 = 0.6, 0.2355, 0.5
 

@@ -10,7 +10,7 @@ import numpy as np
 
 import flexura as fx
 from comparison import Comparison
-from flexura.signal import constant
+from flexura.signals import constant
 
 INERTIA_KG_M2, GAIN_N_M = 0.02, 8.0
 

@@ -14,7 +14,7 @@ import numpy as np
 
 import flexura as fx
 from comparison import Comparison
-from flexura.signal import piecewise
+from flexura.signals import piecewise
 
 LENGTH_M, MASS_KG_M, STIFFNESS_N_M2 = 1.0, 0.5, 0.3
 FORCE_N, TORQUE_N_M, PUSH_S, END_S = 3.0, -0.8, 0.4, 0.8

@@ -18,7 +18,7 @@ from flexlab.board.player import Knots, Player, drives, setpoints
 from flexlab.board.simulator import CLOCK_HZ
 from flexlab.flash import RIG, build
 from flexlab.rig.drives import Drives
-from flexura.signal import harmonic
+from flexura.signals import harmonic
 
 COMPILERS = ["debian", "7.3"]
 TICK = CLOCK_HZ // 1000  # cycles

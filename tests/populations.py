@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 import flexura as fx
-from flexura.signal import bang_bang
+from flexura.signals import bang_bang
 from robots import beam, rigid, robot
 
 ARM = robot(

@@ -9,7 +9,7 @@ from flexlab.tuning.free import free
 from flexlab.tuning.task import Task
 from flexura.drive import Drive, JointDrive, Manoeuvre
 from flexura.gains import Gains
-from flexura.signal import step
+from flexura.signals import step
 
 LINK = {
     "length_m": 0.3, "elements": 2, "section": {"width_m": 0.02, "height_m": 0.001}, "young_modulus_Pa": 2e11,

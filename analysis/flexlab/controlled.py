@@ -8,7 +8,7 @@ from pathlib import Path
 import flexura as fx
 from flexura import gains
 from flexura.gains import Gains
-from flexura.signal import constant
+from flexura.signals import constant
 
 
 def controlled(system: fx.System, asked: fx.Manoeuvre, file: Path) -> fx.Controller:

@@ -7,7 +7,7 @@ import numpy as np
 
 import flexura as fx
 from flexura.drive import JointDrive, Manoeuvre
-from flexura.signal import bang_bang
+from flexura.signals import bang_bang
 
 DURATION_S = 1.0  # of the motion; as long again at rest
 DEFLECTION = 0.01  # of a link's length

@@ -26,18 +26,19 @@ _HOME = {
     "Batch": "batch", "Population": "population",
     "Drive": "drive", "JointDrive": "drive", "Manoeuvre": "drive", "load_manoeuvre": "drive",
     "Controller": "control", "PID": "control", "Force": "control", "Motor": "control", "Stepper": "control",
-    "Signal": "signal", "Sampled": "sampled",
+    "Signal": "signals", "signals": "signals", "Sampled": "sampled",
     "FlexuraError": "errors", "InputError": "errors",
 }  # fmt: skip
 
 __all__ = [
     "PID", "Batch", "Controller", "Drive", "FlexuraError", "Force", "InputError", "JointDrive", "Manoeuvre", "Modes", "Motor",
     "NoEquilibrium", "Population", "Robot", "Run", "Sampled", "Signal", "StateSpace", "Stepper", "System",
-    "assemble", "frequencies", "inverse", "linearize", "load", "load_manoeuvre", "modes", "save", "simulate", "static",
+    "assemble", "frequencies", "inverse", "linearize", "load", "load_manoeuvre", "modes", "save", "signals", "simulate", "static",
     "tip_pose",
 ]  # fmt: skip
 
 if TYPE_CHECKING:
+    from . import signals
     from .batch import Batch
     from .control import PID, Controller, Force, Motor, Stepper
     from .drive import Drive, JointDrive, Manoeuvre, load_manoeuvre
@@ -47,7 +48,7 @@ if TYPE_CHECKING:
     from .robot import Robot, load, save
     from .run import Run
     from .sampled import Sampled
-    from .signal import Signal
+    from .signals import Signal
     from .system import (
         Modes,
         NoEquilibrium,
@@ -65,7 +66,8 @@ if TYPE_CHECKING:
 def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module 'flexura' has no attribute {name!r}")
-    value = getattr(importlib.import_module(f".{_HOME[name]}", __name__), name)
+    home = importlib.import_module(f".{_HOME[name]}", __name__)
+    value = home if name == _HOME[name] else getattr(home, name)
     globals()[name] = value
     return value
 

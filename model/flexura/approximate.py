@@ -20,7 +20,7 @@ from .forward import _put_on_motions, _state, _times, simulate
 from .record import limit_event, record
 from .robot import Robot
 from .run import Run
-from .signal import COLUMNS, Signal
+from .signals import COLUMNS, Signal
 from .system import System, assemble
 
 ACCOUNTS = 4  # numbers of a state beyond q and qd

@@ -27,11 +27,11 @@ from typing import Any
 
 import numpy as np
 
-from . import core, signal
+from . import core, signals
 from .drive import Drive, JointDrive
 from .errors import InputError
 from .run import Run
-from .signal import Signal
+from .signals import Signal
 from .system import System
 
 NONE, EFFORT, STEPPER = 0, 1, 2  # what a joint's output is: not the controller's, a force or voltage, a rate
@@ -206,7 +206,7 @@ class Controller:
 
     def sampler(self, system: System) -> Any:
         """All that the core needs of this controller on a robot: a `core.Controller`, with the memory and the log of one run."""
-        index, parts = np.zeros((len(self.joints), 5), dtype=np.int64), [np.zeros((0, signal.COLUMNS))]
+        index, parts = np.zeros((len(self.joints), 5), dtype=np.int64), [np.zeros((0, signals.COLUMNS))]
         springs, count = np.zeros((len(self.joints), 2)), 0
         for i, joint in enumerate(self.joints):
             if not isinstance(joint, PID):
@@ -284,7 +284,7 @@ def gravity(system: System, motions: Sequence[Signal], t_s: Any) -> list[Signal]
         q = np.zeros(system.n)
         q[rows] = [motion(t)[0] for motion in motions]
         held[k] = system.gravity(q)[rows]
-    return [signal.table(times, column) for column in held.T]
+    return [signals.table(times, column) for column in held.T]
 
 
 def inverse_dynamics(system: System, motions: Sequence[Signal], t_s: Any, rtol: float = 1e-7) -> list[Signal]:
@@ -292,4 +292,4 @@ def inverse_dynamics(system: System, motions: Sequence[Signal], t_s: Any, rtol: 
     from .forward import inverse
 
     run = inverse(system, t_s, motions, rtol=rtol)
-    return [signal.table(run.t, run[f"joint/{i}/drive"]) for i in range(1, len(motions) + 1)]
+    return [signals.table(run.t, run[f"joint/{i}/drive"]) for i in range(1, len(motions) + 1)]

@@ -16,12 +16,12 @@ from typing import Any
 
 import numpy as np
 
-from . import signal
+from . import signals
 from .errors import InputError
 from .files import read_toml
-from .signal import Signal
+from .signals import Signal
 
-_NONE = np.zeros((0, signal.COLUMNS))
+_NONE = np.zeros((0, signals.COLUMNS))
 
 
 @dataclass(frozen=True)
@@ -178,8 +178,8 @@ def _manoeuvre(data: dict[str, Any], joints: int) -> Manoeuvre:
         if not isinstance(entry, dict):
             raise InputError("expected a table", key=key, value=entry)
         _known(entry, _JOINT_KEYS, key + ".")
-        force = signal.from_spec(entry["force"], key=f"{key}.force") if "force" in entry else None
-        motion = signal.from_spec(entry["motion"], key=f"{key}.motion") if "motion" in entry else None
+        force = signals.from_spec(entry["force"], key=f"{key}.force") if "force" in entry else None
+        motion = signals.from_spec(entry["motion"], key=f"{key}.motion") if "motion" in entry else None
         gains = [
             _number(entry, k, "a gain of 0 or more", key=f"{key}.", low=-0.0, default=0.0, closed=True) for k in ("kp", "kd")
         ]
@@ -228,6 +228,6 @@ def _number(
     value = data.get(name, default)
     if value is None:
         raise InputError(f"missing: expected {expected}", key=key + name)
-    if not signal.finite(value) or not (value >= low if closed else value > low):
+    if not signals.finite(value) or not (value >= low if closed else value > low):
         raise InputError(f"expected {expected}", key=key + name, value=value)
     return float(value)

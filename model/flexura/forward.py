@@ -15,7 +15,7 @@ from .errors import InputError
 from .record import limit_event, record
 from .run import Run
 from .sampled import Sampled, as_function
-from .signal import COLUMNS, Signal
+from .signals import COLUMNS, Signal
 from .system import System, system_of
 
 if TYPE_CHECKING:

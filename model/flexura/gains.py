@@ -27,7 +27,7 @@ from typing import Any
 from .control import PID, Controller, Force, Motor, Output, Stepper
 from .errors import InputError
 from .files import read_toml, write_toml
-from .signal import Signal, constant, finite
+from .signals import Signal, constant, finite
 
 MAX_JOINTS = 9
 # names of PID's fields, {} the joint's number, by output

@@ -16,7 +16,7 @@ from flexlab.experiment.align import delay
 from flexlab.experiment.lead import led, quintic
 from flexlab.experiment.measure import Sensor, channels, commanded, rows, start_tick, velocity
 from flexlab.rig.description import Calibration
-from flexura.signal import bang_bang, evaluate, harmonic, polynomial, table
+from flexura.signals import bang_bang, evaluate, harmonic, polynomial, table
 
 CUBIC = Calibration(zero=0.61, c1_m=-1.85, c2_m=3.0, c3_m=-4.9)
 

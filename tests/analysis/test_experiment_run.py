@@ -21,7 +21,7 @@ from flexlab.experiment.measure import UNITS, Sensor, commanded
 from flexlab.experiment.rebuild import UNTOLD, knots_from, rebuild
 from flexlab.experiment.show import live_table, result_table, selftest_table
 from flexura.files import write_toml
-from flexura.signal import harmonic
+from flexura.signals import harmonic
 
 FRAME_BYTES = messages.HEAD_BYTES + messages.TELEMETRY.itemsize + 4  # with CRC, COBS and the zero byte
 

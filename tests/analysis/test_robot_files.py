@@ -10,7 +10,7 @@ import pytest
 import flexura as fx
 from flexlab.manoeuvres import REACH, _reach, modest
 from flexura.drive import load_manoeuvre
-from flexura.signal import polynomial, table
+from flexura.signals import polynomial, table
 
 ROOT = Path(__file__).resolve().parents[2]
 FILES = sorted((ROOT / "model" / "robots").glob("*.toml"))

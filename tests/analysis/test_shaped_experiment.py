@@ -11,8 +11,8 @@ from boards import elf
 from experiments import BENCH, SETTINGS, experiment
 from flexlab.experiment import plan as plans
 from flexlab.experiment.conduct import open_board
-from flexura import shaping
-from flexura.signal import constant, trapezoidal
+from flexura import signals
+from flexura.signals import constant, trapezoidal
 
 pytestmark = pytest.mark.slow
 MOVE_S, END_RAD, SEED = 0.25, 0.5, 3
@@ -66,8 +66,8 @@ def test_shaping_from_the_identified_frequency_brings_the_strip_to_rest(tmp_path
     assert amplitude > 5e-3
     parts = {}
     for name, shaper, factor in (
-        ("zv", shaping.zv, 1.0), ("zvd", shaping.zvd, 1.0), ("zv +10 %", shaping.zv, 1.1), ("zvd +10 %", shaping.zvd, 1.1),
-        ("zvd -10 %", shaping.zvd, 0.9),
+        ("zv", signals.zv, 1.0), ("zvd", signals.zvd, 1.0), ("zv +10 %", signals.zv, 1.1), ("zvd +10 %", signals.zvd, 1.1),
+        ("zvd -10 %", signals.zvd, 0.9),
     ):  # fmt: skip
         run = emulated(turn(shaper(plain, factor * frequency, ratio)), tmp_path / name.replace(" ", ""))
         assert run["joint/2/position"][-1] == pytest.approx(END_RAD, abs=0.005)

@@ -12,7 +12,7 @@ import flexura as fx
 from flexlab import study
 from flexlab.study import length_ratio, payload, sweep
 from flexura.drive import Drive, Manoeuvre, load_manoeuvre
-from flexura.signal import bang_bang, cycloid
+from flexura.signals import bang_bang, cycloid
 
 MODEL = Path(__file__).resolve().parents[2] / "model"
 SET_I = {0: 13.0, 10: 13.5, 20: 10.5, 30: 12.8, 50: 15.2, 80: 15.0, 120: 13.7, 200: 11.9}  # g: mm, linear model, n = 2 + 2

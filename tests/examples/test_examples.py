@@ -17,7 +17,7 @@ EXAMPLES = ROOT / "examples"
 SCRIPTS = sorted(EXAMPLES.glob("[0-9]*.py"))
 NOTEBOOKS = sorted((EXAMPLES / "notebooks").glob("*.ipynb"))
 LIBRARIES = {"argparse", "collections", "comparison", "flexura", "numpy", "scipy"}
-MODULES = {"flexura.shaping", "flexura.signal"}  # public, though not names of `flexura` itself
+MODULES = {"flexura.signals.shaping", "flexura.signals"}  # public, though not names of `flexura` itself
 ROW = re.compile(r"^.+  +(\S+)  +(\S+)  +(\d\.\de[+-]\d\d)$")
 PNG = b"\x89PNG\r\n"
 

@@ -13,7 +13,7 @@ from flexlab.board.emulated import EmulatedBoard
 from flexlab.board.link import Link
 from flexlab.board.player import Player, setpoints
 from flexlab.rig.plant import RigPlant, rig_plant
-from flexura.signal import harmonic
+from flexura.signals import harmonic
 
 AMPLITUDE_M, AMPLITUDE_RAD = 0.012, math.pi / 6
 

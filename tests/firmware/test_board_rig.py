@@ -14,7 +14,7 @@ from flexlab.board.declaration import CONFIG
 from flexlab.board.emulated import Outputs
 from flexlab.rig.description import DERIVED, tip_per_bend
 from flexlab.rig.drives import Drives
-from flexura.signal import harmonic
+from flexura.signals import harmonic
 
 ROOT = Path(__file__).resolve().parents[2]
 FILE = ROOT / "firmware" / "rig.toml"

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 import flexura as fx
 from flexlab.board import frames
 from flexlab.board.declaration import ADC_SAMPLES, CONFIG, CONTROL_HZ, DUTY_FULL
-from flexura import gains, signal
+from flexura import gains, signals
 
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "firmware"
@@ -81,7 +81,7 @@ def settings_of(**changes):
     return values, (ctypes.c_float * len(values))(*values.values())
 
 
-def signals(rows):
+def seen(rows):
     names = ("deflection", "deflection_rate")
     kind = np.dtype([("error", "<i4"), ("rate", "<i2"), ("setpoint_rate", "<i2"), ("tip", "<i4"), *((n, "<i2") for n in names)])
     return np.array([(*row[:3], 0, *row[3:]) for row in rows], kind)
@@ -108,7 +108,7 @@ def test_pid_in_si_units_is_its_formula(lib, joint, g, rows):
         chosen = dict(kp_2_1_s=100 * kp, ki_2_1_s2=500 * ki, kd_2=kd, kf_2_rad_s_m=50 * kf, kg_2_rad_m=5 * kg, kv_2=kv)
         chosen |= dict(rate_max_2_rad_s=7.8, acceleration_max_2_rad_s2=2000)
     values, array = settings_of(**chosen)
-    given_ = signals(rows)
+    given_ = seen(rows)
     out = (ctypes.c_int16 * len(rows))()
     assert lib.c_pid(array, joint, given_.ctypes, len(rows), out) == 255
     names = list(chosen)
@@ -148,7 +148,7 @@ def model(values, rows):
     system = fx.assemble(fx.load(ROOT / "model/robots/rig.toml"))
     count, step = 1 / values["motor_counts_per_m"], 1 / values["stepper_steps_per_rad"]
     played = np.arange(len(rows)) * TICK_S
-    reference = [signal.piecewise(played, rows[:, j] / 256 * (count, step)[j]) for j in range(2)]
+    reference = [signals.piecewise(played, rows[:, j] / 256 * (count, step)[j]) for j in range(2)]
     drive = gains.from_board(values).controller(reference, [fx.Motor(1.0, 0.0), fx.Stepper()])
     sampled = replace(drive, joints=tuple(replace(joint, delay_s=0.0) for joint in drive.joints)).sampler(system)
     sampled.start(system.start())

@@ -8,7 +8,7 @@ from hypothesis import given
 
 import flexura as fx
 from flexura.approximate import by_bisection, by_rigid_robot, rigid_robot
-from flexura.signal import constant, cycloid, piecewise, step, trapezoidal
+from flexura.signals import constant, cycloid, piecewise, step, trapezoidal
 from robots import beam, few, rigid, robots, system
 
 B7 = {0.10: 0.043175, 0.25: 0.33398, 0.40: 0.61167, 0.50: 0.44220, 0.60: -0.09519}  # N m

@@ -11,7 +11,7 @@ import pytest
 from scipy.special import ellipk
 
 import flexura as fx
-from flexura import signal
+from flexura import signals
 from robots import beam, bench_arm, by_hub, rigid, system
 
 CLAMPED = np.array([1.875104069, 4.694091133, 7.854757438, 10.99554073, 14.13716839])
@@ -190,7 +190,7 @@ W = 2 * np.pi / 15
 
 
 def spin_up(stiffening: bool, elements: int, end: float = 25.0) -> fx.Run:
-    torque = signal.Signal(np.array([[0, 0.4 * HUB, 0, 0, 0, 0, 0, -0.4 * HUB, W, np.pi / 2], [15, 0, 0, 0, 0, 0, 0, 0, 0, 0]]))
+    torque = signals.Signal(np.array([[0, 0.4 * HUB, 0, 0, 0, 0, 0, -0.4 * HUB, W, np.pi / 2], [15, 0, 0, 0, 0, 0, 0, 0, 0, 0]]))
     sys = system(beam(10.0, 1.2, 1.4e4, elements, hub_inertia_kg_m2=HUB), stiffening=stiffening)
     return fx.simulate(sys, np.linspace(0, end, round(100 * end) + 1), fx.Drive.force(torque), rtol=1e-9)
 
@@ -214,7 +214,7 @@ def test_spin_up_is_stiffened_by_rotation(elements):
 def test_spin_up_diverges_without_stiffening():
     """B5: 6 rad/s is beyond the first frequency, 3.80 rad/s."""
     arm = system(beam(10.0, 1.2, 1.4e4, 1, modes=1), stiffening=False)
-    drive = fx.Drive.prescribed(signal.Signal(np.array([[0, 0, 6.0, 0, 0, 0, 0, 0, 0, 0]])))
+    drive = fx.Drive.prescribed(signals.Signal(np.array([[0, 0, 6.0, 0, 0, 0, 0, 0, 0, 0]])))
     run = fx.simulate(arm, [0.0, 2.0], drive, q0=[0.0, 1e-4], rtol=1e-4)
     growth = run["link/1/tip_deflection"][-1] / run["link/1/tip_deflection"][0]
     assert growth == pytest.approx(np.cosh(2.0 * np.sqrt(36 - 3.799**2)), rel=0.01)
@@ -229,7 +229,7 @@ def test_a_torque_driven_arm_follows_the_inextensible_solution(method):
     angle = [0.06110, 0.19744, 0.26326, 0.28841, 0.37001, 0.33200]
     tip = [-0.012954, -0.019457, 0.022566, 0.034247, -0.021678, 0.004119]
     t = np.linspace(0, 2, 2001)
-    run = fx.simulate(bench_arm(), t, fx.Drive.force(signal.bang_bang(0.05, 1.0)), rtol=1e-8, method=method)
+    run = fx.simulate(bench_arm(), t, fx.Drive.force(signals.bang_bang(0.05, 1.0)), rtol=1e-8, method=method)
     at = [250, 500, 750, 1000, 1500, 2000]
     w = run["link/1/tip_deflection"]
     assert run["joint/1/position"][at] == pytest.approx(angle, abs=4e-3 * 0.37001)
@@ -290,12 +290,12 @@ def test_coulomb_friction_stops_a_cart_within_its_braking_distance(method):
 def test_a_rotor_adds_its_inertia_to_its_own_joint_only():
     """One joint: tau/(J + Jr). Two: M = [[J1 + J2, J2], [J2, J2 + Jr]]. A cart: F/(m + hub + rotor)."""
     shaft = system(rigid(0.0, 0.0, 0.0, 0.02, rotor_inertia=0.03))
-    run = fx.simulate(shaft, [0.0, 2.0], fx.Drive.force(signal.constant(0.1)), rtol=1e-10)
+    run = fx.simulate(shaft, [0.0, 2.0], fx.Drive.force(signals.constant(0.1)), rtol=1e-10)
     assert run["joint/1/position"][-1] == pytest.approx(0.1 / 0.05 * 2.0, rel=1e-9)
     two = system(rigid(0.0, 0.0, 0.0, 0.02), rigid(0.0, 0.0, 0.0, 0.04, rotor_inertia=0.03))
     assert two.mass(np.zeros(2)) == pytest.approx(np.array([[0.06, 0.04], [0.04, 0.07]]), rel=1e-12)
     cart = system(rigid(0.1, 0.6, 0.05, 0.0, "Pa", rotor_inertia=0.4, hub_mass_kg=0.5))
-    run = fx.simulate(cart, [0.0, 1.0], fx.Drive.force(signal.constant(0.3)), rtol=1e-10)
+    run = fx.simulate(cart, [0.0, 1.0], fx.Drive.force(signals.constant(0.3)), rtol=1e-10)
     assert run["joint/1/position"][-1] == pytest.approx(0.3 / 1.5 / 2, rel=1e-9)
 
 

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
 import flexura as fx
-from flexura import signal
+from flexura import signals
 from robots import beam, bench_arm, by_hub, rigid, system, two_link_arm
 
 METHODS = ("auto", "implicit", "exponential")
@@ -151,7 +151,7 @@ def test_a_slow_manoeuvre_of_a_space_arm_takes_few_passes():
     """6.37 m and 7.06 m without a payload, 60 s along cycloids; undamped, it rings by 0.8 % of the largest torque."""
     links = (beam(6.37, 21.8, 3.5e6, 8, hub_inertia_kg_m2=1.0, start=0.5),
              beam(7.06, 12.5, 2.8e6, 8, hub_mass_kg=50.0, hub_inertia_kg_m2=1.0, start=-1.2))  # fmt: skip
-    arm, motion = system(*links), [signal.cycloid(1.0, 60.0, start=0.5), signal.cycloid(-0.6, 60.0, start=-1.2)]
+    arm, motion = system(*links), [signals.cycloid(1.0, 60.0, start=0.5), signals.cycloid(-0.6, 60.0, start=-1.2)]
     run = few(lambda method: fx.inverse(arm, np.linspace(0, 60, 61), motion, method=method))
     rigid_arm = system(rigid(6.37, 21.8 * 6.37, 6.37 / 2, 21.8 * 6.37**3 / 12, hub_inertia_kg_m2=1.0, start=0.5),
                        rigid(7.06, 12.5 * 7.06, 7.06 / 2, 12.5 * 7.06**3 / 12, hub_mass_kg=50.0, hub_inertia_kg_m2=1.0,
@@ -219,7 +219,7 @@ def test_a_sampled_function_drives_like_its_steps(method):
     """Torques of a Python function, held from tick to tick: as the same staircase given as a signal."""
     arm, t = fx.assemble(two_link_arm(2, damping={"beta_s": 1e-3})), np.linspace(0, 0.3, 31)
     ticks = np.arange(30) / 100
-    stairs = [signal.piecewise(ticks, [torques(s + 1e-12)[i] for s in ticks]) for i in (0, 1)]
+    stairs = [signals.piecewise(ticks, [torques(s + 1e-12)[i] for s in ticks]) for i in (0, 1)]
     wanted = fx.simulate(arm, t, fx.Drive.force(*stairs), rtol=1e-7, method=method)
     called: list[float] = []
 
@@ -251,7 +251,7 @@ def test_a_plain_function_is_never_asked_about_the_past(method):
     back = np.maximum.accumulate(seen) - seen
     longest = 0.3 / run.meta["steps"] * 20 + 0.05
     assert back.max() < longest
-    waves = [signal.harmonic(a, 8 / (2 * np.pi), -np.pi / 2) for a in (0.02, 0.01)]
+    waves = [signals.harmonic(a, 8 / (2 * np.pi), -np.pi / 2) for a in (0.02, 0.01)]
     same = fx.simulate(arm, t, fx.Drive.force(*waves), rtol=1e-7)
     for i in (1, 2):
         size = np.abs(same[f"joint/{i}/position"]).max()
@@ -310,21 +310,21 @@ def test_an_error_in_a_sampled_function_reaches_the_caller():
 def test_the_torque_driven_arm(elements, angle_near, tip_near):
     """0.05 N m to 0.5 s, -0.05 N m to 1 s: hub angle and tip at 2 s, 0.33200 and 4.119 mm."""
     arm = bench_arm(elements)
-    run = fx.simulate(arm, [0.0, 2.0], fx.Drive.force(signal.bang_bang(0.05, 1.0)), rtol=1e-8)
+    run = fx.simulate(arm, [0.0, 2.0], fx.Drive.force(signals.bang_bang(0.05, 1.0)), rtol=1e-8)
     assert run["joint/1/position"][-1] == pytest.approx(0.33200, abs=angle_near)
     assert run["link/1/tip_deflection"][-1] == pytest.approx(4.119e-3, abs=tip_near)
 
 
 @pytest.mark.parametrize(("elements", "near"), [(4, 5e-5), (8, 1.5e-5)])
 def test_the_inverse_of_the_bench_arm(elements, near):
-    run = fx.inverse(bench_arm(elements), [0.0, 0.75, 1.25], signal.cycloid(np.pi / 2, 1.0), rtol=1e-8)
+    run = fx.inverse(bench_arm(elements), [0.0, 0.75, 1.25], signals.cycloid(np.pi / 2, 1.0), rtol=1e-8)
     assert run["joint/1/drive"][1:] == pytest.approx([-0.91220, 0.70646], abs=near)
 
 
 @pytest.mark.parametrize(("elements", "near"), [(4, 4e-5), (8, 1.5e-5)])
 def test_spin_up(elements, near):
     w = 2 * np.pi / 15
-    motion = signal.Signal(np.array([[0, 0.4 * -(1 / w**2), 0, 0.2, 0, 0, 0, 0.4 / w**2, w, np.pi / 2]]))
+    motion = signals.Signal(np.array([[0, 0.4 * -(1 / w**2), 0, 0.2, 0, 0, 0, 0.4 / w**2, w, np.pi / 2]]))
     if abs(motion(3.0)[0] - 0.4 * (4.5 + (np.cos(3 * w) - 1) / w**2)) > 1e-12:
         pytest.fail("a segment is another sum than this test takes it for")
     t = np.linspace(0, 7, 701)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 import flexura as fx
-from flexura import control, gains, lqr, shaping, signal, trials
+from flexura import control, gains, lqr, signals, trials
 from robots import beam, rigid, robot, system
 
 TICK, ROOT = 1e-3, Path(__file__).resolve().parents[2]
@@ -65,7 +65,7 @@ def test_a_cart_follows_the_recursion_written_out(data):
     """Filters, sum and its stop, limit, slew, delay and resolutions, to the solver's round-off."""
     pick = lambda *values: data.draw(st.sampled_from(values))
     c = fx.PID(
-        signal.cycloid(0.3, 0.2) if pick(True, False) else signal.step(0.3, 0.02), kp=pick(100.0, 400.0), ki=pick(0.0, 900.0),
+        signals.cycloid(0.3, 0.2) if pick(True, False) else signals.step(0.3, 0.02), kp=pick(100.0, 400.0), ki=pick(0.0, 900.0),
         kd=pick(0.0, 25.0), kv=pick(0.0, 3.0), kc=pick(0.0, 0.5), limit=pick(5.0, 40.0, np.inf), slew=pick(300.0, np.inf),
         setpoint_Hz=pick(0.0, 3.0), derivative_Hz=pick(0.0, 50.0), delay_s=pick(0.0, 0.003), count=pick(0.0, 1e-4),
         duty=pick(0.0, 0.1),
@@ -121,7 +121,7 @@ def test_every_term_is_that_of_the_law_written_out(seed):
     sys = system(rigid(0.1, 0.6, 0.05, 5e-4, "Pa"), rigid(0.1, 0.2, 0.05, 5e-4), beam(0.3, 0.157, 0.3333, 4, modes=2))
     pids = tuple(
         fx.PID(
-            signal.harmonic(*r.uniform(0.1, 2.0, 2)), output, feedforward=signal.harmonic(*r.uniform(0.1, 2.0, 2)),
+            signals.harmonic(*r.uniform(0.1, 2.0, 2)), output, feedforward=signals.harmonic(*r.uniform(0.1, 2.0, 2)),
             setpoint_Hz=r.choice([0.0, 5.0]), derivative_Hz=r.choice([0.0, 50.0]),
             limit=r.choice([3.0, np.inf]), slew=r.choice([500.0, np.inf]), **dict(zip(control.GAINS, r.uniform(-0.5, 0.9, 9))),
         )
@@ -143,7 +143,7 @@ def test_the_law_measures_what_a_run_shows():
     sys = system(beam(0.3, 0.157, 0.3333, 4), payload=0.02)
     bent = fx.static(sys, tip_force=(0.0, 2.0))
     for gain, channel in (("kf", "tip_deflection"), ("ks", "tip_slope")):
-        c = fx.PID(signal.constant(0.0), **{gain: 3.0})
+        c = fx.PID(signals.constant(0.0), **{gain: 3.0})
         run = fx.simulate(sys, [0.0, TICK], fx.Controller((c,), deflection_Hz=0.0), q0=bent)
         assert run["joint/1/drive"][0] == pytest.approx(3.0 * run[f"link/1/{channel}"][0], rel=1e-15)
         assert abs(run[f"link/1/{channel}"][0]) > 0.03
@@ -152,15 +152,15 @@ def test_the_law_measures_what_a_run_shows():
 def test_a_run_begins_where_the_robot_stands():
     """A stepper that holds a joint which does not start at 0."""
     sys = system(beam(0.3, 0.157, 0.3333, 4, "Pb", start=0.2), payload=0.02)
-    run = fx.simulate(sys, [0.0, 0.01], fx.Controller((fx.PID(signal.constant(0.2), fx.Stepper(), kp=5.0),)))
+    run = fx.simulate(sys, [0.0, 0.01], fx.Controller((fx.PID(signals.constant(0.2), fx.Stepper(), kp=5.0),)))
     np.testing.assert_array_equal(run["joint/1/position"], [0.2, 0.2])
 
 
 def test_rows_of_gains_are_runs_whatever_their_order_and_threads():
     sys = rig()
     drive = fx.Controller((
-        fx.PID(signal.step(0.05), fx.Motor(13.0, 120.0), kp=300, limit=6, setpoint_Hz=2.0),
-        fx.PID(signal.step(0.4), fx.Stepper(20.0, 0.01), kp=20, limit=6, slew=60, setpoint_Hz=2.0, delay_s=TICK),
+        fx.PID(signals.step(0.05), fx.Motor(13.0, 120.0), kp=300, limit=6, setpoint_Hz=2.0),
+        fx.PID(signals.step(0.4), fx.Stepper(20.0, 0.01), kp=20, limit=6, slew=60, setpoint_Hz=2.0, delay_s=TICK),
     ))  # fmt: skip
     rows = np.repeat(drive.gains()[None], 6, axis=0)
     rows[:, 0, control.KP] = np.linspace(100, 600, 6)
@@ -173,7 +173,7 @@ def test_rows_of_gains_are_runs_whatever_their_order_and_threads():
 
 def test_the_sum_does_not_wind_up():
     """A cart that does not move, pushed for 1 s against its limit: once the reference turns, so does the output."""
-    c = fx.PID(signal.piecewise([0.0, 1.0], [1.0, -1.0]), kp=10.0, ki=50.0, limit=20.0, slew=1000.0)
+    c = fx.PID(signals.piecewise([0.0, 1.0], [1.0, -1.0]), kp=10.0, ki=50.0, limit=20.0, slew=1000.0)
     run = fx.simulate(cart(1e12), np.arange(0, 1.2, TICK), fx.Controller((c,)))
     u = run["joint/1/drive"]
     assert u[999] == pytest.approx(20.0, abs=1e-6) and np.abs(u).max() <= 20.0
@@ -185,7 +185,7 @@ def test_the_sum_does_not_wind_up():
 
 def test_faster_sampling_tends_to_the_continuous_law_with_order_one():
     sys = rig()
-    motions = [signal.cycloid(0.05, 0.3), signal.cycloid(0.4, 0.3)]
+    motions = [signals.cycloid(0.05, 0.3), signals.cycloid(0.4, 0.3)]
     t = np.linspace(0, 0.5, 26)
     exact = fx.simulate(sys, t, fx.Drive.pd(motions, kp=[300, 3], kd=[30, 0.2]), rtol=1e-10)
     errors = []
@@ -202,8 +202,8 @@ def test_faster_sampling_tends_to_the_continuous_law_with_order_one():
 def test_every_method_balances_energy_and_agrees(method, rtol, most):
     sys = rig()
     pids = (
-        fx.PID(signal.step(0.05), fx.Motor(13.0, 120.0), kp=300, ki=100, kv=9, limit=6, setpoint_Hz=2.0),
-        fx.PID(signal.step(0.4), fx.Stepper(20.0, 0.01), kp=20, limit=6, slew=60, setpoint_Hz=2.0, delay_s=TICK),
+        fx.PID(signals.step(0.05), fx.Motor(13.0, 120.0), kp=300, ki=100, kv=9, limit=6, setpoint_Hz=2.0),
+        fx.PID(signals.step(0.4), fx.Stepper(20.0, 0.01), kp=20, limit=6, slew=60, setpoint_Hz=2.0, delay_s=TICK),
     )
     t = np.linspace(0, 0.6, 101)  # not on ticks
     run = fx.simulate(sys, t, fx.Controller(pids), rtol=rtol, method=method)
@@ -216,7 +216,7 @@ def test_every_method_balances_energy_and_agrees(method, rtol, most):
 def test_a_motor_is_its_voltage_less_its_back_emf():
     run = fx.simulate(
         rig(), np.arange(0, 0.3, TICK),
-        fx.Controller((fx.PID(signal.step(0.05), fx.Motor(13.0, 120.0), kp=200, limit=12), fx.PID(signal.constant(0.0), kp=3))),
+        fx.Controller((fx.PID(signals.step(0.05), fx.Motor(13.0, 120.0), kp=200, limit=12), fx.PID(signals.constant(0.0), kp=3))),
     )  # fmt: skip
     np.testing.assert_allclose(
         run["joint/1/drive"], 13.0 * run["joint/1/voltage"] - 120.0 * run["joint/1/velocity"], rtol=1e-9, atol=1e-9
@@ -226,8 +226,8 @@ def test_a_motor_is_its_voltage_less_its_back_emf():
 
 @pytest.mark.parametrize("stiffness", [None, 200.0])
 def test_a_steppers_joint_follows_its_pulses(stiffness):
-    step = fx.PID(signal.step(0.4), fx.Stepper(stiffness, 0.05), kp=20, limit=2.0, slew=60, delay_s=TICK)
-    held = fx.PID(signal.constant(0.0), kp=900, kd=50)
+    step = fx.PID(signals.step(0.4), fx.Stepper(stiffness, 0.05), kp=20, limit=2.0, slew=60, delay_s=TICK)
+    held = fx.PID(signals.constant(0.0), kp=900, kd=50)
     run = fx.simulate(rig(), np.arange(0, 1, TICK), fx.Controller((held, step)), rtol=1e-6)
     pulses, q = run["joint/2/pulses"], run["joint/2/position"]
     rate = np.diff(pulses) / TICK
@@ -242,7 +242,7 @@ def test_a_steppers_joint_follows_its_pulses(stiffness):
 def test_the_sum_takes_the_last_error_away():
     """A cart pushed by 2 N: without ki it stands off by 2 / kp."""
     for ki, off in ((0.0, 2 / 100), (200.0, 0.0)):
-        c = fx.PID(signal.step(0.1), kp=100, ki=ki, kd=20)
+        c = fx.PID(signals.step(0.1), kp=100, ki=ki, kd=20)
         run = fx.simulate(cart(gravity=(-1.0, 0.0)), np.linspace(0, 8, 81), fx.Controller((c,)))
         assert 0.1 - run["joint/1/position"][-1] == pytest.approx(off, abs=1e-6)
 
@@ -263,7 +263,7 @@ def test_small_motions_are_those_of_the_sampled_linear_model():
         u_before = kp @ (r - C @ x) - kd @ rate + (kd @ r / TICK if k == 0 else 0)
         last = C @ x
         x = F @ x + G @ u_before
-    pids = tuple(fx.PID(signal.step(r[i]), kp=kp[i, i], kd=kd[i, i], derivative_Hz=0.0) for i in range(2))
+    pids = tuple(fx.PID(signals.step(r[i]), kp=kp[i, i], kd=kd[i, i], derivative_Hz=0.0) for i in range(2))
     run = fx.simulate(sys, np.arange(300) * TICK, fx.Controller(pids), rtol=1e-10, method="explicit")
     got = np.column_stack([run["joint/1/position"], run["joint/2/position"]])
     assert np.abs(got - rows).max(axis=0) == pytest.approx([0, 0], abs=1e-8)  # 1e-4 of the motion, its square
@@ -277,7 +277,7 @@ def quiet(sys: fx.System, references, **keys):
 def test_the_lqrs_cost_is_its_riccati_matrix():
     """At rest beside small references, which the observer knows exactly: the weighted squares add up to x^T P x, x = -x_r."""
     sys, r = rig(), np.array([1e-5, 1e-4])
-    drive, d = quiet(sys, [signal.constant(r[0]), signal.constant(r[1])])
+    drive, d = quiet(sys, [signals.constant(r[0]), signals.constant(r[1])])
     run = fx.simulate(sys, np.arange(4001) * TICK, drive, rtol=1e-9, method="explicit")
     weighed = [
         (run["joint/1/position"] - r[0]) / 0.01, (run["joint/2/position"] - r[1]) / 0.05, run["link/2/tip_deflection"] / 0.005,
@@ -292,7 +292,7 @@ def test_the_lqrs_cost_is_its_riccati_matrix():
 def test_the_observers_error_falls_with_its_poles():
     """The law on the linear plant, from a small state that it does not know: z - x = (F (1 - L C))^k (z0 - x0)."""
     sys = rig()
-    drive, d = quiet(sys, [signal.constant(0.0)] * 2)
+    drive, d = quiet(sys, [signals.constant(0.0)] * 2)
     sampled = drive.sampler(sys)
     sampled.start(sys.start())
     x, wrong = np.linspace(1, 2, len(d.F)) * 1e-6, None
@@ -308,7 +308,7 @@ def test_the_observers_error_falls_with_its_poles():
 
 def test_an_lqr_brings_the_rig_to_rest_where_pd_leaves_it_swinging():
     sys, t = rig(), np.arange(0, 2, TICK)
-    references = [signal.cycloid(0.05, 0.4), signal.cycloid(0.4, 0.4)]
+    references = [signals.cycloid(0.05, 0.4), signals.cycloid(0.4, 0.4)]
     drive, _ = quiet(sys, references, limit=20.0)
     pd = fx.Controller(tuple(fx.PID(m, kp=p, kd=d) for m, p, d in zip(references, (900, 6), (50, 0.1))))
     good, plain = (fx.simulate(sys, t, c, rtol=1e-6) for c in (drive, pd))
@@ -321,14 +321,14 @@ def test_an_lqr_is_found_for_a_light_rotor_too():
     """On the rig's own file, whose rotor of 5 g cm^2 makes the states' scales differ by six orders."""
     tables = fx.load(ROOT / "model" / "robots" / "rig.toml").to_dict()
     tables["link"][1]["modes"] = 2
-    _, d = quiet(fx.assemble(fx.Robot.from_dict(tables)), [signal.constant(0.0)] * 2)
+    _, d = quiet(fx.assemble(fx.Robot.from_dict(tables)), [signals.constant(0.0)] * 2)
     assert np.abs(d.poles).max() < 1 and np.abs(d.observer_poles).max() < 1
 
 
 def test_feedforwards_carry_the_motion():
     """Inverse dynamics in place of feedback; gravity in place of a sum."""
     sys, t = rig(), np.arange(0, 0.6, TICK)
-    motions = [signal.cycloid(0.05, 0.5), signal.cycloid(0.4, 0.5)]
+    motions = [signals.cycloid(0.05, 0.5), signals.cycloid(0.4, 0.5)]
     ahead = control.inverse_dynamics(sys, motions, t)
     pids = tuple(fx.PID(m, kp=p, kd=d, feedforward=f) for m, f, p, d in zip(motions, ahead, (100, 1), (10, 0.05)))
     with_, without = (
@@ -337,8 +337,8 @@ def test_feedforwards_carry_the_motion():
     )
     assert np.abs(with_).max() < 0.05 * np.abs(without).max()
     hanging = system(rigid(0.5, 1.0, 0.25, 0.02, "R"), gravity=(0.0, -9.81))
-    (ahead,) = control.gravity(hanging, [signal.constant(0.3)], [0.0, 5.0])
-    arm = fx.PID(signal.constant(0.3), kp=20.0, kd=2.0, feedforward=ahead)
+    (ahead,) = control.gravity(hanging, [signals.constant(0.3)], [0.0, 5.0])
+    arm = fx.PID(signals.constant(0.3), kp=20.0, kd=2.0, feedforward=ahead)
     assert fx.simulate(hanging, [0.0, 5.0], fx.Controller((arm,)))["joint/1/position"][-1] == pytest.approx(0.3, abs=1e-6)
 
 
@@ -346,27 +346,27 @@ def test_shaped_references_leave_the_strip_at_rest():
     """ZV, ZVD and a matched cycloid at the clamped frequency, given to a stepper that counts its pulses."""
     sys, t = rig(), np.arange(0, 1.5, TICK)
     f = fx.frequencies(sys)[0]
-    move = signal.polynomial(0.4, 0.25)
-    held = fx.PID(signal.constant(0.0), kp=9000, kd=500)
+    move = signals.polynomial(0.4, 0.25)
+    held = fx.PID(signals.constant(0.0), kp=9000, kd=500)
 
     def left(reference) -> float:
         step = fx.PID(reference, fx.Stepper(), kp=20, kv=1, delay_s=TICK)
         return float(np.abs(fx.simulate(sys, t, fx.Controller((held, step)))["link/2/tip_deflection"][t > 0.8]).max())
 
     plain = left(move)
-    for reference in (shaping.zv(move, f), shaping.zvd(move, f), shaping.matched_cycloid(0.4, f)):
+    for reference in (signals.shaping.zv(move, f), signals.shaping.zvd(move, f), signals.shaping.matched_cycloid(0.4, f)):
         assert left(reference) < 0.1 * plain
 
 
 def test_slope_terms_are_deflection_terms_on_a_strip_loaded_at_its_tip():
-    c = fx.PID(signal.constant(0.0), kf=1.0, kg=0.5, ks=2.0, kt=0.1)
+    c = fx.PID(signals.constant(0.0), kf=1.0, kg=0.5, ks=2.0, kt=0.1)
     one = c.one_sensor(0.3)
     assert (one.kf, one.kg, one.ks, one.kt) == pytest.approx((1.0 + 2.0 * 5.0, 0.5 + 0.1 * 5.0, 0.0, 0.0))
     bent = fx.static(rig(), tip_force=(0.0, 0.1))
-    pulled = fx.simulate(rig(), [0.0, TICK], fx.Controller((fx.PID(signal.constant(0.0)), c), deflection_Hz=0.0), q0=bent)[
+    pulled = fx.simulate(rig(), [0.0, TICK], fx.Controller((fx.PID(signals.constant(0.0)), c), deflection_Hz=0.0), q0=bent)[
         "joint/2/drive"
     ][0]
-    same = fx.simulate(rig(), [0.0, TICK], fx.Controller((fx.PID(signal.constant(0.0)), one), deflection_Hz=0.0), q0=bent)
+    same = fx.simulate(rig(), [0.0, TICK], fx.Controller((fx.PID(signals.constant(0.0)), one), deflection_Hz=0.0), q0=bent)
     assert pulled == 0.0 and same["joint/2/drive"][0] == 0.0  # joint 2 takes the strip in odd ticks
 
 
@@ -375,20 +375,20 @@ def test_slope_terms_are_deflection_terms_on_a_strip_loaded_at_its_tip():
 ])  # fmt: skip
 def test_a_law_that_makes_no_sense_is_refused(change, key):
     with pytest.raises(fx.InputError) as caught:
-        fx.PID(signal.constant(0.0), **change)
+        fx.PID(signals.constant(0.0), **change)
     assert caught.value.key == key
 
 
 def test_the_twin_refuses_a_sampled_controller():
     from flexura import twin
 
-    c = fx.PID(signal.constant(0.0))
+    c = fx.PID(signals.constant(0.0))
     with pytest.raises(fx.InputError, match="drive"):
         twin.simulate(rig().robot, [0.0, 0.1], fx.Controller((c, c)))
 
 
 def test_delays_between_ticks_nodal_robots_and_wrong_counts_are_refused():
-    c = fx.PID(signal.constant(0.0))
+    c = fx.PID(signals.constant(0.0))
     with pytest.raises(fx.InputError, match="whole number of ticks"):
         fx.Controller((replace(c, delay_s=0.0015),))
     with pytest.raises(fx.InputError, match="joint drives, one a joint"):
@@ -425,7 +425,7 @@ def test_a_gains_file_is_the_controller_that_it_names(tmp_path):
     path = tmp_path / "gains.toml"
     path.write_text(FILE)
     read = gains.load(path)
-    one, two = read.controller([signal.step(0.1), signal.step(0.7)]).joints
+    one, two = read.controller([signals.step(0.1), signals.step(0.7)]).joints
     assert (one.kp, one.ki, one.limit, one.derivative_Hz) == (2000, 4000, 12, 40) and one.output == fx.Motor(13.1, 1180.0)
     assert (two.kp, two.kg, two.kd, two.limit, two.setpoint_Hz) == (20, -1.5, 0.1, 6, 2) and two.output == fx.Stepper()
     assert two.delay_s == 1e-3 and one.delay_s == 0.0

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import flexura as fx
-from flexura import signal
+from flexura import signals
 from robots import beam, rigid, robot, two_link_arm
 
 pytest.importorskip("exudyn")
@@ -27,7 +27,7 @@ def rig(elements: int = 6, **keys) -> fx.Robot:
 
 
 def jerks(*amplitudes: float, duration: float = 0.8) -> fx.Drive:
-    return fx.Drive.force(*(signal.bang_bang(a, duration, rise_s=0.1) for a in amplitudes))
+    return fx.Drive.force(*(signals.bang_bang(a, duration, rise_s=0.1) for a in amplitudes))
 
 
 def differences(bot: fx.Robot, drive: fx.Drive, t: np.ndarray, **keys) -> tuple[dict[str, float], float]:
@@ -83,7 +83,7 @@ def test_without_stiffening_a_fast_strip_is_off():
     """A strip without damping that turns at 5 rad/s, bent by 3 %, two seconds: the linear kinematics are about 10 % off in the
     deflection, mostly in phase; with stiffening at least ten times less."""
     strip = beam(0.3, 0.157, 2.0e11 * 0.02 * 0.001**3 / 12, 6, rotor_inertia=1e-3)
-    t, drive = np.linspace(0, 2, 201), fx.Drive.force(signal.bang_bang(2.0, 1.0), signal.bang_bang(0.06, 1.0))
+    t, drive = np.linspace(0, 2, 201), fx.Drive.force(signals.bang_bang(2.0, 1.0), signals.bang_bang(0.06, 1.0))
     bots = {on: robot(rigid(0.1, 1.0, 0.05, 0.0, "Pa"), strip, payload=0.05, stiffening=on) for on in (True, False)}
     w = twin.simulate(bots[True], t, drive, step_s=1.5e-4)["link/2/tip_deflection"]
     error = {}

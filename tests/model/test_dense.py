@@ -9,7 +9,7 @@ import pytest
 
 import chains
 import flexura as fx
-from flexura import dense, forward, signal
+from flexura import dense, forward, signals
 from flexura.sampled import Sampled
 from flexura.system.assembly import Assembly
 from robots import beam, bench_arm, largest_difference, rigid, system
@@ -57,7 +57,7 @@ def test_a_mesh_as_one_piece_is_the_chain_of_its_elements():
 def test_on_an_exact_robot_it_is_the_core(name):
     """The same equations, another program: motion, drives, work, losses."""
     exact = fx.assemble(chains.SMALL[name])
-    t, drive = np.linspace(0, 0.02, 5), fx.Drive.force(*[signal.harmonic(0.3, 2.0)] * len(exact.robot.links))
+    t, drive = np.linspace(0, 0.02, 5), fx.Drive.force(*[signals.harmonic(0.3, 2.0)] * len(exact.robot.links))
     q, qd = forward.initial(exact, 0.0, drive, None, None)
     a = dense.simulate(exact, t, drive, q, qd, 1e-6, "explicit", None)
     b = fx.simulate(exact, t, drive, rtol=1e-8, method="explicit")
@@ -100,7 +100,7 @@ def test_at_small_bending_the_linear_line_is_the_exact_one():
     """The difference falls with the square of the motion."""
     t, worst = np.linspace(0, 0.1, 6), []
     for torque in (0.01, 0.02):
-        drive = fx.Drive.force(signal.harmonic(torque, 5.0))
+        drive = fx.Drive.force(signals.harmonic(torque, 5.0))
         a, b = (fx.simulate(short_arm(kind), t, drive, rtol=1e-7) for kind in (False, True))
         worst.append(largest_difference(a, b, ["joint/1/position", "tip/y", "link/1/tip_deflection"]))
     assert worst[0] < 1e-3 and worst[1] == pytest.approx(4 * worst[0], rel=0.2)
@@ -115,7 +115,7 @@ def test_rotation_softens_the_linear_line(speed):
     omega = 2 * np.pi * fx.frequencies(arm, q=np.zeros(5), qd=rates)[0]
     assert omega == pytest.approx(np.sqrt(rest**2 - speed**2), rel=1e-6)
     q0 = 1e-4 * fx.modes(arm).shapes[:, 0]
-    spin = fx.Drive.prescribed(signal.Signal(np.array([[0, 0, speed, 0, 0, 0, 0, 0, 0, 0]])))
+    spin = fx.Drive.prescribed(signals.Signal(np.array([[0, 0, speed, 0, 0, 0, 0, 0, 0, 0]])))
     run = fx.simulate(arm, [0.0, 2 * np.pi / omega], spin, q0, rtol=1e-6)
     assert run["link/1/tip_deflection"][-1] == pytest.approx(run["link/1/tip_deflection"][0], rel=1e-4)
 
@@ -124,7 +124,7 @@ def test_rotation_softens_the_linear_line(speed):
 def test_the_linear_line_needs_the_torque_of_the_dissertations_form():
     """B7, last row, two to three digits of agreement between codes: cycloid to a right angle in 1 s."""
     t = np.linspace(0.0, 1.0, 101)
-    torque = fx.inverse(bench_arm(4, stiffening=False), t, signal.cycloid(np.pi / 2, 1.0), rtol=1e-5)["joint/1/drive"]
+    torque = fx.inverse(bench_arm(4, stiffening=False), t, signals.cycloid(np.pi / 2, 1.0), rtol=1e-5)["joint/1/drive"]
     for at, value in {0.50: 0.4078, 0.60: 0.0216, 0.75: -0.8425, 0.90: -0.9733}.items():
         assert np.interp(at, t, torque) == pytest.approx(value, abs=0.01), at
 
@@ -133,10 +133,10 @@ def test_the_linear_line_needs_the_torque_of_the_dissertations_form():
 
 
 def test_replayed_drives_return_the_motion():
-    arm, motion, t = short_arm(viscous_friction=0.1, coulomb_friction=0.01), signal.cycloid(0.3, 0.1), np.linspace(0, 0.1, 51)
+    arm, motion, t = short_arm(viscous_friction=0.1, coulomb_friction=0.01), signals.cycloid(0.3, 0.1), np.linspace(0, 0.1, 51)
     run = fx.inverse(arm, t, motion, rtol=1e-6)
     assert run["joint/1/position"] == pytest.approx([motion(s)[0] for s in t], abs=1e-14)
-    again = fx.simulate(arm, t, fx.Drive.force(signal.table(t, run["joint/1/drive"])), rtol=1e-6)
+    again = fx.simulate(arm, t, fx.Drive.force(signals.table(t, run["joint/1/drive"])), rtol=1e-6)
     assert largest_difference(again, run, PLACES) < 1e-3
     assert run.meta["energy_error"] < 1e-5 and run["energy/loss"][-1] > 0
 
@@ -152,25 +152,25 @@ def test_a_sampled_function_is_called_once_a_tick():
     a = fx.simulate(short_arm(), t, Sampled(law, 200.0), rtol=1e-6)
     assert ticks == pytest.approx([0.0, 0.005, 0.01, 0.015, 0.02], abs=1e-12)
     assert a.complete and a.meta["drive"] == {"function": "law", "rate_Hz": 200.0}
-    b = fx.simulate(short_arm(), t, fx.Drive.pd([signal.constant(0.1)], [0.5], [0.01]), rtol=1e-6)
+    b = fx.simulate(short_arm(), t, fx.Drive.pd([signals.constant(0.1)], [0.5], [0.01]), rtol=1e-6)
     assert largest_difference(a, b, ["joint/1/position"]) < 0.2
 
 
 def test_a_function_and_a_drive_agree():
     arm, t = short_arm(), np.linspace(0, 0.02, 5)
     a = fx.simulate(arm, t, lambda s, x, v, y: [0.5 * (0.1 - x[0]) - 0.01 * v[0]], rtol=1e-6)
-    b = fx.simulate(arm, t, fx.Drive.pd([signal.constant(0.1)], [0.5], [0.01]), rtol=1e-6)
+    b = fx.simulate(arm, t, fx.Drive.pd([signals.constant(0.1)], [0.5], [0.01]), rtol=1e-6)
     assert largest_difference(a, b) < 1e-12 and a.meta["drive"] == "Python function"
 
 
 def test_a_controller_is_refused():
     with pytest.raises(fx.InputError, match=r"stiffening = true"):
-        fx.simulate(short_arm(), [0.0, 0.1], fx.Controller((fx.PID(signal.constant(0.1), kp=1.0),)))
+        fx.simulate(short_arm(), [0.0, 0.1], fx.Controller((fx.PID(signals.constant(0.1), kp=1.0),)))
 
 
 def test_a_limit_ends_a_run_at_its_instant():
     arm = system(rigid(0.3, 0.2, 0.15, 1e-3, "Pa", limits=[-0.1, 0.1]), stiffening=False)
-    run = fx.simulate(arm, np.linspace(0, 2, 21), fx.Drive.force(signal.constant(0.1)))
+    run = fx.simulate(arm, np.linspace(0, 2, 21), fx.Drive.force(signals.constant(0.1)))
     assert not run.complete and run.t[-1] == pytest.approx(np.sqrt(0.4), rel=1e-6)
     assert run.meta["events"][-1]["text"].startswith("joint 1 left its limits, -0.1 to 0.1 m") and len(run.t) == 8
 
@@ -178,14 +178,14 @@ def test_a_limit_ends_a_run_at_its_instant():
 def test_a_step_in_the_drive_is_a_step():
     """Constant acceleration from 0.5 s on: the jump is met, not stepped over."""
     cart = system(rigid(0.3, 0.2, 0.15, 1e-3, "Pa"), stiffening=False)
-    run = fx.simulate(cart, [0.0, 0.5, 1.0], fx.Drive.force(signal.step(0.2, 0.5)), rtol=1e-9)
+    run = fx.simulate(cart, [0.0, 0.5, 1.0], fx.Drive.force(signals.step(0.2, 0.5)), rtol=1e-9)
     assert run["joint/1/position"] == pytest.approx([0.0, 0.0, 0.125], abs=1e-10) and run.meta["steps"] < 100
 
 
 def test_ctrl_c_keeps_what_was_finished():
     t = np.linspace(0, 5, 5001)
     stop = lambda done: _thread.interrupt_main() if done > 0.002 else None
-    run = fx.simulate(short_arm(), t, fx.Drive.force(signal.harmonic(0.1, 2.0)), method="explicit", progress=stop)
+    run = fx.simulate(short_arm(), t, fx.Drive.force(signals.harmonic(0.1, 2.0)), method="explicit", progress=stop)
     assert not run.complete and run.meta["events"][-1]["text"] == "interrupted"
     assert 1 <= len(run.t) < len(t) and np.array_equal(run.t, t[: len(run.t)])
 

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 
 import flexura as fx
-from flexura import signal
+from flexura import signals
 from flexura.system.assembly import COULOMB_RATE
 from robots import (
     beam,
@@ -278,7 +278,7 @@ def test_a_payloads_inertia_turns_with_the_tip_only(stiffening):
 def drives(sys: fx.System, seed: int) -> fx.Drive:
     """A smooth force or torque in every joint, 1 at most."""
     random = np.random.default_rng(seed + 2)
-    return fx.Drive.force(*(signal.harmonic(random.uniform(-1, 1) * 0.3, random.uniform(0.5, 3), 1.0) for _ in sys.robot.links))
+    return fx.Drive.force(*(signals.harmonic(random.uniform(-1, 1) * 0.3, random.uniform(0.5, 3), 1.0) for _ in sys.robot.links))
 
 
 def small_state(sys: fx.System, seed: int) -> dict[str, np.ndarray]:
@@ -382,11 +382,11 @@ def test_a_mirrored_robot_moves_mirrored(bot, seed):
     small, tau = small_state(sys, seed), 0.2 * forces(sys, seed)
     flip = [-1.0 if link.joint.type == "R" else 1.0 for link in bot.links]
     t = np.linspace(0, 0.1, 6)
-    a = fx.simulate(sys, t, fx.Drive.force(*(signal.constant(f) for f in tau)), **small, rtol=1e-9, method="explicit")
+    a = fx.simulate(sys, t, fx.Drive.force(*(signals.constant(f) for f in tau)), **small, rtol=1e-9, method="explicit")
     b = fx.simulate(
         other,
         t,
-        fx.Drive.force(*(signal.constant(f) for f in tau * flip)),
+        fx.Drive.force(*(signals.constant(f) for f in tau * flip)),
         small["q0"] * sign,
         small["qd0"] * sign,
         rtol=1e-9,
@@ -419,7 +419,7 @@ def test_a_locked_joint_between_two_halves_of_a_link_changes_nothing():
     one, two = whole_and_halves(8)
     a, b = (fx.tip_pose(s, fx.static(s, tip_force=(0.0, 2.0))) for s in (one, two))
     assert b == pytest.approx(a, rel=1e-10) and a[2] > 0.5
-    t, drive = np.linspace(0, 1, 51), signal.bang_bang(0.2, 1.0, rise_s=0.05)
+    t, drive = np.linspace(0, 1, 51), signals.bang_bang(0.2, 1.0, rise_s=0.05)
     a, b = (fx.simulate(s, t, fx.Drive.force(drive, *[None] * (len(s.robot.links) - 1)), rtol=1e-10) for s in (one, two))
     assert largest_difference(a, b, ["joint/1/position", "tip/x", "tip/y"]) < 1e-7
 
@@ -429,7 +429,7 @@ def test_a_locked_joint_between_two_halves_of_a_link_changes_nothing():
 
 def moved_at_joint_two(modes: int | None) -> fx.Run:
     sys = fx.assemble(two_link_arm(12) if modes is None else two_link_arm(4, modes=modes))
-    drive = fx.Drive.force(None, signal.bang_bang(0.1, 1.0, rise_s=0.1))
+    drive = fx.Drive.force(None, signals.bang_bang(0.1, 1.0, rise_s=0.1))
     return fx.simulate(sys, np.linspace(0, 1.5, 76), drive, rtol=1e-10, method="explicit")
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
-import signal as signals
+import signal as os_signal
 import subprocess
 import sys
 import time
@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 import flexura as fx
-from flexura import forward, signal
+from flexura import forward, signals
 from robots import beam, bench_arm, largest_difference, rigid, robot, system, two_link_arm
 
 METHODS = ("explicit", "implicit", "exponential")
-SMOOTH = fx.Drive.force(signal.polynomial(0.02, 0.3))
+SMOOTH = fx.Drive.force(signals.polynomial(0.02, 0.3))
 
 
 def cart(mass: float = 2.0, **joint) -> fx.System:
@@ -44,7 +44,7 @@ TOLERANCES = {"explicit": [1e-4, 1e-6, 1e-8, 1e-10], "implicit": [1e-3, 1e-5, 1e
 def test_the_error_falls_with_the_tolerance(method, tolerances, make):
     """Against rtol = 1e-12, after some periods: below a hundred times rtol, and smaller with every smaller rtol."""
     sys = make()
-    drive = fx.Drive.force(signal.polynomial(0.02, 0.3), *[None] * (len(sys.robot.links) - 1))
+    drive = fx.Drive.force(signals.polynomial(0.02, 0.3), *[None] * (len(sys.robot.links) - 1))
     t = np.linspace(0, 1, 21)
     exact = fx.simulate(sys, t, drive, rtol=1e-12, method="explicit")
     errors = [largest_difference(exact, fx.simulate(sys, t, drive, rtol=rtol, method=method)) for rtol in tolerances]
@@ -55,7 +55,7 @@ def test_the_error_falls_with_the_tolerance(method, tolerances, make):
 def test_all_methods_agree():
     """Smooth drives; a jump would start the 222 Hz mode ringing, in which a small phase error counts 222 periods long."""
     sys = fx.assemble(two_link_arm(2))
-    drive = fx.Drive.force(signal.polynomial(0.1, 0.3), signal.polynomial(0.05, 0.3))
+    drive = fx.Drive.force(signals.polynomial(0.1, 0.3), signals.polynomial(0.05, 0.3))
     t = np.linspace(0, 1, 51)
     a, *others = (fx.simulate(sys, t, drive, rtol=1e-9, method=m) for m in METHODS)
     for b in others:
@@ -79,7 +79,7 @@ def test_work_grows_with_accuracy_like_the_order_of_the_method(method, order):
 def test_results_do_not_depend_on_where_they_are_asked_for(method):
     """The implicit method makes the same steps whatever lies between the first and the last output; the explicit one may end a
     step on an output, which changes positions by no more than the tolerance allows."""
-    sys, drive = arm_with_friction(), fx.Drive.force(signal.constant(0.02), None)
+    sys, drive = arm_with_friction(), fx.Drive.force(signals.constant(0.02), None)
     few, many = np.array([0.0, 0.25, 0.5]), np.linspace(0, 0.5, 1001)
     odd = np.sort(np.append(np.random.default_rng(0).uniform(0, 0.5, 50), few))
     a, b, c = (fx.simulate(sys, t, drive, rtol=1e-7, method=method).states for t in (few, many, odd))
@@ -94,7 +94,7 @@ def test_results_do_not_depend_on_where_they_are_asked_for(method):
 @pytest.mark.parametrize("method", METHODS)
 def test_results_between_steps_are_as_good_as_those_at_steps(method):
     """A run that ends at t, so steps on it, against one that interpolates there."""
-    sys, drive = arm_with_friction(), fx.Drive.force(signal.constant(0.02), None)
+    sys, drive = arm_with_friction(), fx.Drive.force(signals.constant(0.02), None)
     through = fx.simulate(sys, np.linspace(0, 0.5, 101), drive, rtol=1e-7, method=method)
     names = [name for name in through if "energy" not in name or "work" in name or "loss" in name]
     for k in (13, 37, 80):
@@ -106,7 +106,7 @@ def test_results_between_steps_are_as_good_as_those_at_steps(method):
 @pytest.mark.parametrize("method", METHODS)
 def test_results_do_not_depend_on_how_often_the_loop_is_left(method, monkeypatch):
     sys, t = arm_with_friction(), np.linspace(0, 0.3, 31)
-    drive = fx.Drive.force(signal.bang_bang(0.05, 0.2), signal.harmonic(0.01, 3.0))
+    drive = fx.Drive.force(signals.bang_bang(0.05, 0.2), signals.harmonic(0.01, 3.0))
     runs = []
     for steps in (1, 7, 10**6):
         monkeypatch.setattr(forward, "STEPS_A_CALL", steps)
@@ -120,8 +120,8 @@ def test_time_may_start_anywhere(method):
     """Without gravity and with the drive moved along, a run from t = 7 is a run from 0."""
     sys = bench_arm(4)
     t = np.linspace(0, 0.5, 26)
-    a = fx.simulate(sys, t, fx.Drive.force(signal.bang_bang(0.02, 0.4)), rtol=1e-9, method=method)
-    b = fx.simulate(sys, t + 7, fx.Drive.force(signal.bang_bang(0.02, 0.4, at_s=7.0)), rtol=1e-9, method=method)
+    a = fx.simulate(sys, t, fx.Drive.force(signals.bang_bang(0.02, 0.4)), rtol=1e-9, method=method)
+    b = fx.simulate(sys, t + 7, fx.Drive.force(signals.bang_bang(0.02, 0.4, at_s=7.0)), rtol=1e-9, method=method)
     assert largest_difference(a, b) < 1e-6
 
 
@@ -139,7 +139,7 @@ def test_jumps_of_a_force_are_met_exactly(method):
     """A cart under a piecewise constant force: x and v to round-off at any tolerance, from the sums of the parabolas."""
     at, force, mass = [0.0, 0.123, 0.124, 0.5, 0.77], [1.0, -3.0, 7.0, -2.0, 0.0], 2.0
     t = np.unique([*np.linspace(0, 1, 11), *at])
-    run = fx.simulate(cart(mass), t, fx.Drive.force(signal.piecewise(at, force)), rtol=1e-2, method=method)
+    run = fx.simulate(cart(mass), t, fx.Drive.force(signals.piecewise(at, force)), rtol=1e-2, method=method)
     ends = np.append(at[1:], np.inf)
     v = sum(f / mass * (np.clip(t, a, b) - a) for f, a, b in zip(force, at, ends))
     x = sum(
@@ -154,7 +154,7 @@ def test_jumps_of_a_force_are_met_exactly(method):
 def test_a_jump_shorter_than_any_step_is_not_missed(method):
     """An impulse of 1e-5 s: m v = F dt."""
     run = fx.simulate(
-        cart(2.0), [0.0, 1.0], fx.Drive.force(signal.piecewise([0.0, 0.4, 0.40001], [0.0, 1e4, 0.0])), rtol=1e-3, method=method
+        cart(2.0), [0.0, 1.0], fx.Drive.force(signals.piecewise([0.0, 0.4, 0.40001], [0.0, 1e4, 0.0])), rtol=1e-3, method=method
     )
     assert run["joint/1/velocity"][-1] == pytest.approx(0.05, rel=1e-9)
 
@@ -163,7 +163,7 @@ def test_a_jump_shorter_than_any_step_is_not_missed(method):
 def test_a_python_function_drives_like_the_same_drive(method):
     links = (rigid(0.1, 0.5, 0.05, 1e-3, viscous_friction=0.01), beam(0.3, 0.2, 0.4, 2, damping={"beta_s": 1e-3}))
     sys, t = system(*links, payload=0.05), np.linspace(0, 0.12, 13)
-    drive = fx.Drive.force(signal.polynomial(0.05, 0.1), signal.cycloid(0.01, 0.05))
+    drive = fx.Drive.force(signals.polynomial(0.05, 0.1), signals.cycloid(0.01, 0.05))
     compiled = fx.simulate(sys, t, drive, rtol=1e-8, method=method)
     called = fx.simulate(sys, t, lambda s: drive(s, None, None), rtol=1e-8, method=method)
     assert largest_difference(compiled, called) < 1e-6
@@ -174,7 +174,7 @@ def test_a_python_function_drives_like_the_same_drive(method):
 def test_a_python_function_sees_positions_velocities_and_the_tip():
     """PD control written in Python against the compiled one, and the last link's deflection as the run has it."""
     sys, t = arm_with_friction(), np.linspace(0, 0.3, 16)
-    motions, kp, kd = [signal.cycloid(0.3, 0.2), signal.cycloid(0.1, 0.2, start=0.5)], [20.0, 5.0], [0.5, 0.1]
+    motions, kp, kd = [signals.cycloid(0.3, 0.2), signals.cycloid(0.1, 0.2, start=0.5)], [20.0, 5.0], [0.5, 0.1]
     drive = fx.Drive.pd(motions, kp, kd)
     seen = []
 
@@ -193,7 +193,7 @@ def test_a_python_function_sees_positions_velocities_and_the_tip():
 def test_stiff_gains_hold_a_cart_on_its_motion(method):
     """m x'' = kp (r - x) + kd (r' - x') with r a cycloid: the error of a well damped drive is m r''/kp to first order."""
     mass, kp, kd = 2.0, 1e6, 2e3
-    r = signal.cycloid(0.3, 1.0)
+    r = signals.cycloid(0.3, 1.0)
     run = fx.simulate(cart(mass), np.linspace(0, 1, 101), fx.Drive.pd([r], [kp], [kd]), rtol=1e-8, method=method)
     error = np.array([r(s)[0] for s in run.t]) - run["joint/1/position"]
     lag = np.array([mass * r(s)[2] / kp for s in run.t])
@@ -204,7 +204,7 @@ def test_the_implicit_method_steps_over_stiff_gains_and_damping():
     """The same robot with gains a hundred times stiffer takes hardly more implicit steps."""
     steps = []
     for kp in (1e4, 1e6):
-        drive = fx.Drive.pd([signal.polynomial(0.3, 1.0)], [kp], [kp / 100])
+        drive = fx.Drive.pd([signals.polynomial(0.3, 1.0)], [kp], [kp / 100])
         steps.append(fx.simulate(bench_arm(4), [0.0, 1.0], drive, rtol=1e-4, method="implicit").meta["steps"])
     assert steps[1] < 2 * steps[0]
 
@@ -212,7 +212,7 @@ def test_the_implicit_method_steps_over_stiff_gains_and_damping():
 def test_a_locked_joint_does_not_move_whatever_its_drive():
     sys = system(beam(0.4, 0.3, 1.0, 2, hub_inertia_kg_m2=1e-3), beam(0.3, 0.2, 0.4, 2, start=0.5, locked=True), payload=0.05)
     run = fx.simulate(
-        sys, np.linspace(0, 0.2, 5), fx.Drive.force(signal.constant(0.02), signal.constant(1.0)), qd0=np.ones(sys.n) * 1e-3
+        sys, np.linspace(0, 0.2, 5), fx.Drive.force(signals.constant(0.02), signals.constant(1.0)), qd0=np.ones(sys.n) * 1e-3
     )
     assert np.all(run["joint/2/position"] == 0.5) and np.all(run["joint/2/velocity"] == 0.0)
     assert run.meta["energy_error"] < 1e-5
@@ -225,7 +225,7 @@ def test_a_locked_joint_does_not_move_whatever_its_drive():
 @pytest.mark.parametrize("kind", ["drive", "function"])
 def test_a_joint_at_its_limit_ends_the_run(method, kind):
     """x = t^2/4 meets 0.1 m at 0.6325 s."""
-    drive = fx.Drive.force(signal.constant(1.0)) if kind == "drive" else lambda t: [1.0]
+    drive = fx.Drive.force(signals.constant(1.0)) if kind == "drive" else lambda t: [1.0]
     run = fx.simulate(cart(2.0, limits=[-0.05, 0.1]), np.linspace(0, 2, 201), drive, method=method)
     assert not run.complete
     assert run.t[-2] == pytest.approx(0.63, abs=1e-9) and len(run["tip/x"]) == len(run.t) == 65
@@ -254,7 +254,7 @@ def test_the_end_of_a_link_ends_the_run_with_a_word(method, kind, case):
         "into the sleeve": ([short], -1.0, 1, 0.008, "joint 1 (Pb) reached the end of link 1, at 0.008 m"),
     }[case]  # fmt: skip
     forces = [0.0] * (joint - 1) + [pull]
-    drive = fx.Drive.force(*(signal.constant(f) for f in forces)) if kind == "drive" else lambda t: forces
+    drive = fx.Drive.force(*(signals.constant(f) for f in forces)) if kind == "drive" else lambda t: forces
     run = fx.simulate(system(*robot), [0.0, 0.1, 5.0], drive, method=method, rtol=1e-7)
     assert not run.complete and [words in event["text"] for event in run.meta["events"]] == [True]
     assert run[f"joint/{joint}/position"][-1] == pytest.approx(end, abs=1e-7) and run.t[-1] == run.meta["events"][0]["t"]
@@ -265,14 +265,14 @@ def test_the_end_of_a_link_ends_the_run_with_a_word(method, kind, case):
 def test_a_joint_that_is_beyond_its_limit_only_within_a_step_is_caught_at_an_output(method):
     """x = 0.1 sin 2 pi t is beyond 0.0999 m from 0.2429 to 0.2571 s, and steps of a rigid cart are longer than that."""
     sys = cart(2.0, limits=[-0.2, 0.0999])
-    run = fx.inverse(sys, [0.0, 0.25, 1.0], signal.harmonic(0.1, 1.0, -np.pi / 2), method=method, rtol=1e-3)
+    run = fx.inverse(sys, [0.0, 0.25, 1.0], signals.harmonic(0.1, 1.0, -np.pi / 2), method=method, rtol=1e-3)
     assert not run.complete and "joint 1 left its limits" in run.meta["events"][0]["text"]
     assert run.t[-1] == pytest.approx(np.arcsin(0.999) / (2 * np.pi), rel=1e-6)
     assert run["joint/1/position"][-1] == pytest.approx(0.0999, rel=1e-6)
 
 
 def test_a_joint_that_stays_inside_its_limits_does_not_end_the_run():
-    run = fx.simulate(cart(2.0, limits=[-0.05, 0.1]), np.linspace(0, 0.63, 64), fx.Drive.force(signal.constant(1.0)))
+    run = fx.simulate(cart(2.0, limits=[-0.05, 0.1]), np.linspace(0, 0.63, 64), fx.Drive.force(signals.constant(1.0)))
     assert run.complete and run.meta["events"] == [] and len(run) == 64
 
 
@@ -310,7 +310,7 @@ from flexura import signal
 from robots import bench_arm
 def progress(done):
     print("going", flush=True)
-drive = fx.Drive.force(signal.polynomial(0.02, 0.3))
+drive = fx.Drive.force(signals.polynomial(0.02, 0.3))
 run = fx.simulate(bench_arm(), np.linspace(0, 3000, 3001), drive, rtol=1e-8, method="explicit", progress=progress)
 print("end", run.complete, len(run.t), all(np.all(np.isfinite(run[c])) for c in run), run.meta["events"][-1]["text"])
 """
@@ -323,7 +323,7 @@ def test_ctrl_c_ends_a_run_with_its_results():
     try:
         assert program.stdout.readline() == "going\n"
         time.sleep(0.2)
-        program.send_signal(signals.SIGINT)
+        program.send_signal(os_signal.SIGINT)
         last = [line for line in program.communicate(timeout=60)[0].splitlines() if line != "going"]
     finally:
         program.kill()
@@ -340,7 +340,7 @@ def test_progress_ascends_to_one():
 @pytest.mark.parametrize("method", METHODS)
 def test_a_run_that_cannot_go_on_says_when_and_keeps_what_it_has(method):
     """A force of 1e300 N from 0.5 s on: no number is large enough for its work."""
-    drive = fx.Drive.force(signal.piecewise([0.0, 0.5], [1.0, 1e300]))
+    drive = fx.Drive.force(signals.piecewise([0.0, 0.5], [1.0, 1e300]))
     run = fx.simulate(cart(), np.linspace(0, 1, 11), drive, method=method)
     assert not run.complete and 5 <= len(run) <= 7 and run["joint/1/position"][4] == pytest.approx(0.04, rel=1e-9)
     (event, *_) = run.meta["events"]
@@ -350,7 +350,7 @@ def test_a_run_that_cannot_go_on_says_when_and_keeps_what_it_has(method):
 @pytest.mark.parametrize("method", METHODS)
 def test_a_torque_that_bends_a_link_beyond_a_right_angle_is_a_motion_like_others(method):
     """50 N m on the bench arm, a hundred times EI / L: the two methods agree, and the energies balance."""
-    drive, t = fx.Drive.force(signal.constant(50.0)), [0.0, 0.01, 0.02]
+    drive, t = fx.Drive.force(signals.constant(50.0)), [0.0, 0.01, 0.02]
     run = fx.simulate(bench_arm(), t, drive, method=method, rtol=1e-7)
     assert run.complete and run.meta["energy_error"] < 1e-4 and abs(run["link/1/tip_slope"][-1]) > np.pi / 2
     exact = fx.simulate(bench_arm(), t, drive, method="explicit", rtol=1e-10)
@@ -424,7 +424,7 @@ def test_repeated_runs_do_not_grow():
             return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 2**20
 
     sys, t = arm_with_friction(), np.linspace(0, 0.05, 2001)
-    drive = fx.Drive.force(signal.constant(0.02), None)
+    drive = fx.Drive.force(signals.constant(0.02), None)
     for _ in range(10):
         fx.simulate(sys, t, drive)
     before = size()

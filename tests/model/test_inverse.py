@@ -7,7 +7,7 @@ import pytest
 
 import flexura as fx
 from flexura.drive import JointDrive
-from flexura.signal import cycloid, harmonic, polynomial, step, table
+from flexura.signals import cycloid, harmonic, polynomial, step, table
 
 TORQUE_AT = {0.10: 0.043175, 0.25: 0.33398, 0.40: 0.61167, 0.50: 0.44220, 0.60: -0.09519, 0.75: -0.91220, 0.90: -0.77400,
              1.25: 0.70646, 1.50: -0.81519}  # fmt: skip

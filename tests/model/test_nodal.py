@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import flexura as fx
-from flexura import signal
+from flexura import signals
 from flexura.system.nodes import nodes_at, put_to_rest
 from robots import beam, largest_difference, rigid, robot, system
 
@@ -25,9 +25,9 @@ def total(run: fx.Run) -> np.ndarray:
     return sum(run[name] for name in TOTAL)
 
 
-def steady(start: float, rate: float) -> signal.Signal:
+def steady(start: float, rate: float) -> signals.Signal:
     """Motion at a constant rate."""
-    return signal.Signal(np.array([[0.0, start, rate, 0, 0, 0, 0, 0, 0, 0]]))
+    return signals.Signal(np.array([[0.0, start, rate, 0, 0, 0, 0, 0, 0, 0]]))
 
 
 def under_a_slider(elements: int, sliding: str, start: float, stiffening: bool = False, **keys) -> fx.System:
@@ -123,7 +123,7 @@ def test_a_slider_on_the_last_node_is_a_body_at_the_tip(stiffening):
 def test_a_slider_held_on_a_node_rides_as_on_the_line():
     """At x_k the line has the node's displacement and slope; the spaces of the mesh and of the polynomials differ by little."""
     t = np.linspace(0, 0.05, 6)
-    push = fx.Drive.force(signal.harmonic(0.1, 5.0), None)
+    push = fx.Drive.force(signals.harmonic(0.1, 5.0), None)
     a, b = (fx.simulate(under_a_slider(4, kind, 0.45, locked=True), t, push, rtol=1e-6) for kind in ("nodal", "continuous"))
     assert largest_difference(a, b, ["joint/1/position", "tip/x", "tip/y", "link/1/tip_deflection"]) < 1e-3
     assert a.meta["energy_jumps"] == [] and list(a) == list(b) and a.units == b.units
@@ -160,7 +160,7 @@ def test_from_static_equilibrium_nothing_moves(build):
 
 def test_a_robot_that_slides_on_nothing_flexible_is_the_same_in_both_ways():
     links = beam(0.5, 0.2, 1.0, 2, modes=2), rigid(0.2, 0.3, 0.1, 1e-3, "Pb", start=0.1)
-    t, push = np.linspace(0, 0.3, 11), fx.Drive.force(signal.step(0.1), signal.step(0.5))
+    t, push = np.linspace(0, 0.3, 11), fx.Drive.force(signals.step(0.1), signals.step(0.5))
     a, b = (fx.simulate(system(*links, sliding=kind), t, push) for kind in ("nodal", "continuous"))
     assert largest_difference(a, b) == 0.0 and "energy_jumps" not in a.meta
 
@@ -197,10 +197,10 @@ def test_a_sleeve_converges_with_the_spacing_of_the_nodes():
 @pytest.mark.parametrize(
     ("elements", "start", "motion", "window", "tip_mm"),
     [
-        (4, 0.20, signal.harmonic(-0.05, 1.0, offset=0.25), (1.0, 2.0), 10.0),
-        (8, 0.20, signal.harmonic(-0.05, 1.0, offset=0.25), (0.3, 1.0), 13.3),
-        (8, 0.25, signal.constant(0.25), (1.0, 2.0), 5.0),
-        (4, 0.40, signal.constant(0.40), (1.0, 2.0), 34.0),
+        (4, 0.20, signals.harmonic(-0.05, 1.0, offset=0.25), (1.0, 2.0), 10.0),
+        (8, 0.20, signals.harmonic(-0.05, 1.0, offset=0.25), (0.3, 1.0), 13.3),
+        (8, 0.25, signals.constant(0.25), (1.0, 2.0), 5.0),
+        (4, 0.40, signals.constant(0.40), (1.0, 2.0), 34.0),
     ],
 )
 def test_the_dissertations_type_iii_as_an_independent_program_has_it(elements, start, motion, window, tip_mm):
@@ -211,7 +211,7 @@ def test_the_dissertations_type_iii_as_an_independent_program_has_it(elements, s
     }  # fmt: skip
     arm = system(rigid(0.2, 0.2, 0.1, 0.2 * 0.2**2 / 12), strip, payload=0.02, stiffening=False, sliding="nodal")
     t = np.linspace(0, window[1], round(500 * window[1]) + 1)
-    run = fx.inverse(arm, t, [signal.harmonic(np.pi / 6, 1.0, -np.pi / 2), motion], rtol=1e-5, method="implicit")
+    run = fx.inverse(arm, t, [signals.harmonic(np.pi / 6, 1.0, -np.pi / 2), motion], rtol=1e-5, method="implicit")
     peak = 1e3 * np.abs(run["link/2/tip_deflection"][t >= window[0]]).max()
     assert peak == pytest.approx(tip_mm, abs=0.05 if tip_mm < 20 else 0.5)  # the digits given
 
@@ -224,7 +224,7 @@ def test_the_dissertations_type_iii_as_an_independent_program_has_it(elements, s
 def test_energy_balances_between_the_jumps(start, rate, says, stiffening):
     """A free robot under drives, its link sliding into its sleeve or out: work, friction, damping and jumps are all."""
     arm = in_a_sleeve(5, "nodal", start, stiffening, viscous_friction=0.2)
-    push = fx.Drive.force(signal.harmonic(0.3, 1.0), signal.constant(rate), signal.harmonic(0.02, 2.0))
+    push = fx.Drive.force(signals.harmonic(0.3, 1.0), signals.constant(rate), signals.harmonic(0.02, 2.0))
     qd, q = np.zeros(arm.n), arm.start()
     qd[0], qd[1], q[6:8] = 1.0, rate, 0.02
     if says == "left":
@@ -247,7 +247,7 @@ def test_a_jump_is_the_difference_of_the_energies_on_its_two_sides():
     arm = in_a_sleeve(5, "nodal", 0.483, True)
     q = arm.start()
     q[6:8] = 0.05
-    motion = fx.Drive.prescribed(signal.harmonic(0.3, 1.0, -np.pi / 2), steady(0.483, -0.6), None)
+    motion = fx.Drive.prescribed(signals.harmonic(0.3, 1.0, -np.pi / 2), steady(0.483, -0.6), None)
     jump = fx.simulate(arm, [0.0, 0.008], motion, q, rtol=1e-8).meta["energy_jumps"][0]
     assert jump["t"] == pytest.approx(0.005, abs=1e-7) and abs(jump["J"]) > 1e-4
     run = fx.simulate(arm, [0.0, jump["t"] - 1e-7, jump["t"] + 1e-7, 0.008], motion, q, rtol=1e-8)
@@ -286,9 +286,9 @@ def test_a_node_that_enters_is_put_to_rest_and_no_other_is_moved():
 
 def test_a_node_that_leaves_starts_from_rest():
     arm = in_a_sleeve(5, "nodal", 0.485)
-    back_and_forth = signal.harmonic(0.01, 20.0, 0.0, offset=0.475)
+    back_and_forth = signals.harmonic(0.01, 20.0, 0.0, offset=0.475)
     t = np.linspace(0, 0.05, 51)
-    run = fx.inverse(arm, t, [signal.harmonic(0.3, 1.0, -np.pi / 2), back_and_forth, signal.constant(0.0)])
+    run = fx.inverse(arm, t, [signals.harmonic(0.3, 1.0, -np.pi / 2), back_and_forth, signals.constant(0.0)])
     behind = 0.8 - run["joint/2/position"]
     for k in range(1, 6):
         row = arm.joint_rows[1] + 2 * k - 1
@@ -320,14 +320,14 @@ def test_a_slider_on_a_link_in_a_sleeve_counts_along_the_whole_link():
 def test_the_node_under_a_slider_stays_ahead_of_the_sleeve():
     cart = cart_with_sleeve(4, 0.41, 0.395)
     assert nodes_at(cart.robot, cart.robot.start) == (1, 2)
-    run = fx.inverse(cart, [0.0, 0.03], [steady(0.41, -0.5), signal.constant(0.595)], q0=np.r_[0.41, np.zeros(8), 0.595])
+    run = fx.inverse(cart, [0.0, 0.03], [steady(0.41, -0.5), signals.constant(0.595)], q0=np.r_[0.41, np.zeros(8), 0.595])
     assert run.complete and len(run.meta["energy_jumps"]) == 1
 
 
 def test_a_python_drive_sees_the_whole_robot():
     t = np.linspace(0, 0.02, 5)
     cart = cart_with_sleeve(4, 0.599)
-    gains, targets = ([50.0, 30.0], [4.0, 2.0]), [signal.constant(0.7), signal.constant(0.5)]
+    gains, targets = ([50.0, 30.0], [4.0, 2.0]), [signals.constant(0.7), signals.constant(0.5)]
 
     def law(time_s, position, velocity, tip_deflection):
         assert position.shape == velocity.shape == (2,)
@@ -360,7 +360,7 @@ def test_a_node_is_passed_once_by_a_free_joint_and_the_implicit_method():
 )
 def test_the_end_of_a_link_and_a_limit_stop_a_run(d, s, keys, force, text):
     cart = cart_with_sleeve(4, d, s, **keys)
-    run = fx.simulate(cart, np.linspace(0, 2, 201), fx.Drive.force(*(signal.constant(f) for f in force)), rtol=1e-4)
+    run = fx.simulate(cart, np.linspace(0, 2, 201), fx.Drive.force(*(signals.constant(f) for f in force)), rtol=1e-4)
     last = run.meta["events"][-1]
     assert not run.complete and last["level"] == "ERROR" and last["text"].startswith(text) and last["t"] == run.t[-1] < 2.0
     d, s = run["joint/1/position"], run["joint/2/position"]
@@ -376,7 +376,7 @@ def test_ctrl_c_keeps_what_was_finished():
             _thread.interrupt_main()
 
     t = np.linspace(0, 5, 5001)
-    motions = [signal.harmonic(0.1, 1.0, -np.pi / 2, offset=0.45), signal.constant(0.7)]
+    motions = [signals.harmonic(0.1, 1.0, -np.pi / 2, offset=0.45), signals.constant(0.7)]
     run = fx.inverse(cart, t, motions, rtol=1e-4, method="explicit", progress=stop)
     assert not run.complete and run.meta["events"][-1]["text"] == "interrupted"
     assert 1 <= len(run.t) < len(t) and np.array_equal(run.t, t[: len(run.t)])
@@ -385,7 +385,7 @@ def test_ctrl_c_keeps_what_was_finished():
 def test_progress_goes_from_node_to_node():
     seen = []
     cart = cart_with_sleeve(4, 0.395)
-    run = fx.inverse(cart, [0.0, 0.02], [steady(0.395, 1.0), signal.constant(0.7)], rtol=1e-4, progress=seen.append)
+    run = fx.inverse(cart, [0.0, 0.02], [steady(0.395, 1.0), signals.constant(0.7)], rtol=1e-4, progress=seen.append)
     assert len(run.meta["energy_jumps"]) == 1 and seen == sorted(seen) and seen[-1] == 1.0 and seen[0] < 0.5
 
 

@@ -15,7 +15,7 @@ from hypothesis import given
 
 import flexura as fx
 from flexura.batch import digest
-from flexura.signal import constant, cycloid
+from flexura.signals import constant, cycloid
 from populations import ARM, DRIVE, same, varied
 from robots import beam, few, forces, robot, robots, seeds
 

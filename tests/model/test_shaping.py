@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import flexura as fx
-from flexura import shaping, signal
-from flexura.shaping import matched_cycloid, zv, zvd
-from flexura.signal import Signal, bang_bang, cycloid, harmonic, polynomial, step, table, trapezoidal
+from flexura import signals
+from flexura.signals import Signal, bang_bang, cycloid, harmonic, polynomial, step, table, trapezoidal
+from flexura.signals.shaping import matched_cycloid, zv, zvd
 from robots import beam, system
 
 COPIES = {zv: lambda k: [1, k], zvd: lambda k: [1, 2 * k, k * k]}
@@ -104,13 +104,13 @@ def test_what_cannot_be_shaped_is_named():
     for k in range(40):  # 2^40 segments
         nested = {"kind": "zv", "signal": nested, "frequency_Hz": 2.0**k / 3}
     with pytest.raises(fx.InputError, match="at most 50000 segments"):
-        signal.from_spec(nested)
+        signals.from_spec(nested)
     with pytest.raises(fx.InputError, match=r"signal.signal.kind = 'sine'"):
-        signal.from_spec({"kind": "zv", "signal": {"kind": "sine"}, "frequency_Hz": 1.0})
+        signals.from_spec({"kind": "zv", "signal": {"kind": "sine"}, "frequency_Hz": 1.0})
 
 
 def test_kinds_of_both_modules_have_names_of_their_own():
-    assert not set(signal.KINDS) & set(shaping.KINDS)
+    assert not set(signals.signal.KINDS) & set(signals.shaping.KINDS)
 
 
 # B8: a clamp on a cart ----------------------------------------------------------------------------------------------------

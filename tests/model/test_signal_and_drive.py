@@ -1,7 +1,9 @@
 """Signals against their formulas and against finite differences; drives against theirs; manoeuvre files."""
 
+import importlib
 import json
 import math
+import sys
 from itertools import pairwise
 
 import numpy as np
@@ -11,10 +13,10 @@ from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
 import flexura as fx
-from flexura import shaping, signal
+from flexura import signals
 from flexura.drive import Drive, JointDrive, load_manoeuvre
-from flexura.shaping import matched_cycloid, zv, zvd
-from flexura.signal import bang_bang, constant, cycloid, from_spec, harmonic, piecewise, polynomial, step, table, trapezoidal
+from flexura.signals import bang_bang, constant, cycloid, from_spec, harmonic, piecewise, polynomial, step, table, trapezoidal
+from flexura.signals.shaping import matched_cycloid, zv, zvd
 
 level = st.floats(-10, 10)
 instant = st.floats(0, 2)
@@ -178,10 +180,10 @@ def test_a_signal_survives_its_table_and_json(s):
 
 
 def test_a_signal_without_segments_is_zero():
-    assert signal.Signal(np.zeros((0, signal.COLUMNS)))(1.0) == (0.0, 0.0, 0.0)
+    assert signals.Signal(np.zeros((0, signals.COLUMNS)))(1.0) == (0.0, 0.0, 0.0)
 
 
-KINDS = ", ".join(signal.KINDS | shaping.KINDS)
+KINDS = ", ".join(signals.signal.KINDS | signals.shaping.KINDS)
 nan, inf = math.nan, math.inf
 WRONG_SIGNALS = {
     "a number": (3, "signal", 3, "a table with kind"),
@@ -251,7 +253,7 @@ scalars = st.one_of(st.floats(), st.integers(), st.booleans(), st.text(max_size=
         st.sampled_from(KEYS),
         scalars | st.lists(scalars, max_size=3) | st.sampled_from([1.0, 0.1, {"kind": "constant", "value": 1.0}]),
     ),
-    st.sampled_from(sorted(signal.KINDS | shaping.KINDS)),
+    st.sampled_from(sorted(signals.signal.KINDS | signals.shaping.KINDS)),
 )  # fmt: skip
 def test_any_table_is_a_signal_or_refused(spec, kind):
     for tried in (spec, spec | {"kind": kind}):
@@ -459,3 +461,11 @@ def test_bytes_changed_anywhere_never_raise_anything_else(tmp_path_factory, edit
         load_manoeuvre(path, 2)
     except fx.InputError as error:
         assert str(error).isprintable() and str(path) in str(error)
+
+
+@pytest.mark.parametrize(("old", "new"), [("signal", "signals"), ("shaping", "signals.shaping")])
+def test_an_old_name_is_answered_with_the_new_one(old, new):
+    sys.modules.pop(f"flexura.{old}", None)
+    with pytest.warns(DeprecationWarning, match=f"flexura.{old} is now flexura.{new}"):
+        module = importlib.import_module(f"flexura.{old}")
+    assert module.zv is signals.zv if old == "shaping" else module.cycloid is signals.cycloid

@@ -9,8 +9,8 @@ import pytest
 from scipy.optimize import brentq
 
 import flexura as fx
-from flexura import signal
-from flexura.signal import cycloid
+from flexura import signals
+from flexura.signals import cycloid
 from robots import beam, largest_difference, rigid, robot, system
 
 # B9: a link leaves its sleeve ---------------------------------------------------------------------------------------------------
@@ -152,7 +152,7 @@ def test_drives_of_the_inverse_return_the_motion(name):
     t = np.linspace(0, 0.3, 601)
     asked = motions(sys, 0.3)
     run = fx.inverse(sys, t, asked, rtol=1e-10)
-    drive = fx.Drive.force(*(signal.table(t, run[f"joint/{i}/drive"]) for i in (1, 2)))
+    drive = fx.Drive.force(*(signals.table(t, run[f"joint/{i}/drive"]) for i in (1, 2)))
     again = fx.simulate(sys, t, drive, rtol=1e-9)
     for i in (1, 2):
         assert np.abs(again[f"joint/{i}/position"] - run[f"joint/{i}/position"]).max() < 1e-6
@@ -178,7 +178,7 @@ def test_a_link_cut_in_two_by_a_locked_joint_gives_the_same(case):
         forces, joints = [0.05], [1]
     a, b = (system(*links, payload=0.05, gravity=(0.0, -0.2)) for links in (one, two))
     t = np.linspace(0, 0.4, 41)
-    drive = [signal.harmonic(f, 2.0, -np.pi / 2) for f in forces]
+    drive = [signals.harmonic(f, 2.0, -np.pi / 2) for f in forces]
     driven = dict(zip(joints, drive))
     first = fx.simulate(a, t, fx.Drive.force(*drive), q0=fx.static(a), rtol=1e-8)
     second = fx.simulate(b, t, fx.Drive.force(*(driven.get(i) for i in range(1, len(two) + 1))), q0=fx.static(b), rtol=1e-8)
@@ -208,7 +208,7 @@ def test_replacing_a_rigid_link_by_a_stiff_one_changes_nothing():
     keys = {"type": "Pb", "start": 0.3, "angle_rad": 0.3}
     solid = system(rigid(0.5, 0.15, 0.25, 0.15 * 0.5**2 / 12, **keys), rigid(0.2, 0.1, 0.1, 1e-3, type="Pa", start=0.35))
     hard = system(beam(0.5, 0.3, 1e5, 2, damping={"beta_s": 1e-4}, **keys), rigid(0.2, 0.1, 0.1, 1e-3, type="Pa", start=0.35))
-    drive = fx.Drive.force(signal.harmonic(0.2, 1.0, -np.pi / 2), signal.harmonic(-0.1, 1.5, -np.pi / 2))
+    drive = fx.Drive.force(signals.harmonic(0.2, 1.0, -np.pi / 2), signals.harmonic(-0.1, 1.5, -np.pi / 2))
     t = np.linspace(0, 0.5, 11)
     a = fx.simulate(solid, t, drive, rtol=1e-9)
     b = fx.simulate(hard, t, drive, rtol=1e-7, method="implicit")

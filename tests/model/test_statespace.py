@@ -9,7 +9,7 @@ from scipy.linalg import eigh, expm
 from scipy.optimize import brentq
 
 import flexura as fx
-from flexura.signal import constant
+from flexura.signals import constant
 from robots import beam, bench_arm, fast, few, rigid, robots, seeds, state, system, turning, two_link_arm
 
 SAGGING = {"gravity": (0.0, -9.81), "payload": 0.1}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from flexura import signal, twin
+from flexura import signals, twin
 from flexura.drive import Drive
 from twin_robots import G, beam, bench_arm, integrate, rig, rigid, robot, total_energy
 
@@ -16,7 +16,7 @@ def test_a_torque_driven_arm_follows_the_inextensible_solution(kind, elements):
     t = np.array([0.25, 0.50, 0.75, 1.00, 1.50, 2.00])
     angle = [0.06110, 0.19744, 0.26326, 0.28841, 0.37001, 0.33200]
     tip = [-0.012954, -0.019457, 0.022566, 0.034247, -0.021678, 0.004119]
-    run = twin.simulate(bench_arm(), t, Drive.force(signal.bang_bang(0.05, 1.0)), beam=kind, elements=elements)
+    run = twin.simulate(bench_arm(), t, Drive.force(signals.bang_bang(0.05, 1.0)), beam=kind, elements=elements)
     assert np.allclose(run["joint/1/position"], angle, atol=0.0025 * 0.37)
     assert np.allclose(run["link/1/tip_deflection"], tip, atol=0.01 * 0.0399)
     assert run.meta["program"].startswith("Exudyn") and run.meta["complete"] and run.meta["source"] == "twin"
@@ -27,7 +27,7 @@ def test_spin_up_is_stiffened_by_rotation():
     rows = np.array([
         [0.0, -0.4 * (15 / (2 * np.pi)) ** 2, 0, 0.2, 0, 0, 0, 0.4 * (15 / (2 * np.pi)) ** 2, 2 * np.pi / 15, np.pi / 2],
     ])  # fmt: skip
-    hub = signal.Signal(rows)
+    hub = signals.Signal(rows)
     arm = robot(beam(10.0, 1.2, 1.4e4, elements=8))
     drive = Drive.pd([hub], [1e7], [1e5])
     run = twin.simulate(arm, np.linspace(0, 10, 501), drive, elements=10, step_s=1e-3)
@@ -60,7 +60,7 @@ def test_free_vibration_has_the_frequency_of_a_cantilever_with_tip_mass():
 
 def test_both_beams_agree_on_the_rig():
     t = np.linspace(0, 1, 101)
-    drive = Drive.force(signal.bang_bang(0.5, 0.8, rise_s=0.05), signal.bang_bang(2e-3, 0.8, rise_s=0.05))
+    drive = Drive.force(signals.bang_bang(0.5, 0.8, rise_s=0.05), signals.bang_bang(2e-3, 0.8, rise_s=0.05))
     runs = [twin.simulate(rig(), t, drive, beam=kind) for kind in ("ancf", "ge")]
     for name in runs[0]:
         a, b = (run[name] for run in runs)
@@ -83,7 +83,7 @@ def test_a_locked_joint_makes_two_links_one():
     t = np.linspace(0, 0.5, 51)
     whole = robot(beam(0.6, 0.2355, 0.5, hub_inertia_kg_m2=2e-3), payload=0.05)
     halves = robot(beam(0.3, 0.2355, 0.5, hub_inertia_kg_m2=2e-3), beam(0.3, 0.2355, 0.5, locked=True), payload=0.05)
-    one = twin.simulate(whole, t, Drive.force(signal.constant(0.05)), elements=8)
+    one = twin.simulate(whole, t, Drive.force(signals.constant(0.05)), elements=8)
     two = twin.simulate(halves, t, lambda t: [0.05, 0.0], elements=4, step_s=one.meta["step_s"])
     assert abs(two["joint/2/position"]).max() < 1e-9
     for name in ("tip/x", "tip/y", "joint/1/position"):
@@ -217,7 +217,7 @@ def test_a_stiff_flexible_link_on_a_carriage_moves_as_a_rigid_one(kind):
     """Pa on the base with a flexible link at a fixed angle across the rail: constant force, all masses move along x."""
     arm = robot(beam(0.3, 0.2, 500.0, "Pa", angle_rad=1.2, hub_mass_kg=0.5, start=0.1), payload=0.1)
     t = np.linspace(0, 0.5, 51)
-    run = twin.simulate(arm, t, Drive.force(signal.constant(0.6)), beam=kind)
+    run = twin.simulate(arm, t, Drive.force(signals.constant(0.6)), beam=kind)
     total = 0.5 + 0.06 + 0.1
     assert np.allclose(run["joint/1/position"], 0.1 + 0.6 / total * t**2 / 2, atol=5e-6)
     assert np.allclose(run["link/1/angle"], 1.2) and np.allclose(run["link/1/y"], 0.0, atol=1e-9)

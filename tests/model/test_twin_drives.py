@@ -1,7 +1,7 @@
 """The twin's drives, times, interruption and errors."""
 
 import os
-import signal as signals
+import signal as os_signal
 import subprocess
 import sys
 import threading
@@ -9,7 +9,7 @@ import threading
 import numpy as np
 import pytest
 
-from flexura import signal, twin
+from flexura import signals, twin
 from flexura.drive import Drive
 from flexura.errors import FlexuraError, InputError
 from twin_robots import beam, bench_arm, rig, rigid, robot
@@ -21,7 +21,7 @@ def test_pd_control_is_continuous_and_equals_the_same_law_as_a_function():
     """A carriage under PD is a damped oscillator; the error at the default step is that of the time integration."""
     cart = robot(rigid(0.1, 2.0, 0.0, 1.0, "Pa"))
     t = np.linspace(0, 1, 101)
-    drive = Drive.pd([signal.step(0.1)], [200.0], [12.0])
+    drive = Drive.pd([signals.step(0.1)], [200.0], [12.0])
     run = twin.simulate(cart, t, drive)
     function = twin.simulate(cart, t, lambda t, position, velocity, tip: drive(t, position, velocity))
     omega, zeta = 10.0, 0.3
@@ -34,7 +34,7 @@ def test_pd_control_is_continuous_and_equals_the_same_law_as_a_function():
 
 
 def test_stiff_gains_on_a_light_rotor_as_data_and_as_a_function_and_with_dry_friction():
-    motion = [signal.harmonic(0.012, 1.0, -np.pi / 2), signal.harmonic(0.5, 1.0, -np.pi / 2)]
+    motion = [signals.harmonic(0.012, 1.0, -np.pi / 2), signals.harmonic(0.5, 1.0, -np.pi / 2)]
     drive = Drive.pd(motion, [900.0, 6.0], [50.0, 0.25])
     t = np.linspace(0, 0.4, 41)
     one = twin.simulate(rig(), t, drive)
@@ -66,7 +66,7 @@ def test_a_function_of_the_state_sees_the_tip_deflection_at_once():
 def test_a_jump_of_the_force_keeps_second_order():
     """A force that ends within a step: its impulse is exact, as a Drive (instants known); on a step also as a function."""
     cart = robot(rigid(0.1, 1.0, 0.0, 1.0, "Pa"))
-    for end, drive in ((0.30317, Drive.force(signal.piecewise([0.0, 0.30317], [1.0, 0.0]))), (0.3, lambda t: [1.0 * (t < 0.3)])):
+    for end, drive in ((0.30317, Drive.force(signals.piecewise([0.0, 0.30317], [1.0, 0.0]))), (0.3, lambda t: [1.0 * (t < 0.3)])):
         run = twin.simulate(cart, [0.0, 1.0], drive, step_s=1e-3)
         assert run["joint/1/velocity"][-1] == pytest.approx(end, abs=1e-9)
         assert run["joint/1/position"][-1] == pytest.approx(end**2 / 2 + end * (1 - end), abs=1e-6)
@@ -78,7 +78,7 @@ def test_a_jump_of_the_force_keeps_second_order():
 def test_times_between_steps_are_interpolated():
     cart = robot(rigid(0.1, 1.0, 0.0, 1.0, "Pa"))
     t = np.array([0.0, 0.1234567, 0.5, 0.777777, 0.9])
-    run = twin.simulate(cart, t, Drive.pd([signal.constant(0.0)], [100.0], [0.0]), qd0=[1.0], step_s=2e-4)
+    run = twin.simulate(cart, t, Drive.pd([signals.constant(0.0)], [100.0], [0.0]), qd0=[1.0], step_s=2e-4)
     assert np.array_equal(run.t, t)
     assert np.allclose(run["joint/1/position"], np.sin(10 * t) / 10, atol=1e-6)
     assert np.allclose(run["joint/1/velocity"], np.cos(10 * t), atol=1e-5)
@@ -88,13 +88,13 @@ def test_times_between_steps_are_interpolated():
 
 
 def test_ctrl_c_ends_a_run_with_what_there_is():
-    threading.Timer(0.5, lambda: os.kill(os.getpid(), signals.SIGINT)).start()
-    before = signals.getsignal(signals.SIGINT)
+    threading.Timer(0.5, lambda: os.kill(os.getpid(), os_signal.SIGINT)).start()
+    before = os_signal.getsignal(os_signal.SIGINT)
     fractions = []
     run = twin.simulate(rig(), np.linspace(0, 20, 2001), lambda t: [0.1, 0.0], step_s=1e-4, progress=fractions.append)
     assert not run.complete and 0 < run.t[-1] < 20 and len(run.t) > 2
     assert len(run["tip/x"]) == len(run.t) and np.isfinite(run["tip/x"]).all()
-    assert signals.getsignal(signals.SIGINT) is before and fractions == sorted(fractions)
+    assert os_signal.getsignal(os_signal.SIGINT) is before and fractions == sorted(fractions)
 
 
 def test_an_error_in_a_drive_or_in_progress_comes_out_as_itself():
@@ -114,7 +114,7 @@ def test_an_error_in_a_drive_or_in_progress_comes_out_as_itself():
 
 
 def test_a_failing_solver_is_an_error_with_its_time(capfd):
-    drive = Drive.force(signal.piecewise([0.0, 0.05], [0.0, 1e7]))
+    drive = Drive.force(signals.piecewise([0.0, 0.05], [0.0, 1e7]))
     with pytest.raises(FlexuraError, match=r"stopped at t = 0\.0.* s of 0.2 s: .* smaller step_s"):
         twin.simulate(bench_arm(), [0.0, 0.2], drive, step_s=1e-3)
     assert capfd.readouterr() == ("", "")
@@ -139,7 +139,7 @@ def test_what_it_does_not_contain_is_refused_by_name(change, key):
         ({"t_eval": [0.1, 0.0]}, "t_eval"), ({"qd0": [1.0, 2.0]}, "qd0"), ({"beam": "shell"}, "beam"),
         ({"elements": 0}, "elements"), ({"step_s": 0.0}, "step_s"), ({"step_s": 1e-9}, "step_s"),
         ({"drive": Drive.none(2)}, "drive"), ({"drive": 3.0}, "drive"),
-        ({"drive": lambda t: [1.0, 2.0]}, "drive"), ({"drive": Drive.prescribed(signal.cycloid(0.1, 0.5))}, "prescribed"),
+        ({"drive": lambda t: [1.0, 2.0]}, "drive"), ({"drive": Drive.prescribed(signals.cycloid(0.1, 0.5))}, "prescribed"),
     ],
 )  # fmt: skip
 def test_wrong_arguments_are_refused_by_name(arguments, key):

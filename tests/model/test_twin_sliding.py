@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import rigid_chain
-from flexura import signal, twin
+from flexura import signals, twin
 from flexura.drive import Drive
 from flexura.errors import FlexuraError, InputError
 from flexura.run import Run
@@ -90,7 +90,7 @@ def test_stiff_chains_of_all_joints_move_as_rigid_ones(kinds):
 
 
 SLEEVE_EI, SLEEVE_MASS, SLEEVE_LENGTH = 756.65, 4.015, 3.6
-SLEEVE_LAW = signal.cycloid(3.6, 2.0, start=1.8)
+SLEEVE_LAW = signals.cycloid(3.6, 2.0, start=1.8)
 
 
 def linear_link_leaving_its_sleeve(t, first, gravity):
@@ -157,7 +157,7 @@ def test_a_link_leaving_its_sleeve():
 )
 def test_a_slider_on_a_bent_link(stiffness, published):
     """Benchmark B10: a point of 0.05 kg from 0.1 m to 0.5 m in 1 s under gravity, from static equilibrium."""
-    law = signal.cycloid(0.5, 1.0, start=0.1)
+    law = signals.cycloid(0.5, 1.0, start=0.1)
     arm = robot(beam(0.6, 0.2355, stiffness, 4, locked=True), rigid(0.0, 0.05, 0.0, 0.0, "Pa", start=0.1), gravity=(0.0, -9.81))
     t = 0.25 * np.arange(len(published))
 
@@ -170,7 +170,7 @@ def test_a_slider_on_a_bent_link(stiffness, published):
                 robot, "ancf", mesh(robot, None, None, times), np.zeros(2), actuation(drive, robot.start, np.zeros(2)).gains
             )
 
-        damped, held = arm.replace({"link.1.damping.beta_s": 0.2}), stand(signal.constant(0.1))
+        damped, held = arm.replace({"link.1.damping.beta_s": 0.2}), stand(signals.constant(0.1))
         settle = solve.plan(np.array([0.0, 4.0]), 2e-3, forced=True)
         (_, q, v, _), _, _ = solve._solve(new(damped, held), actuation(held, arm.start, np.zeros(2)), settle, None)
         assert abs(v[-1]).max() < 1e-6
@@ -199,7 +199,7 @@ def test_a_bent_link_is_pushed_out_of_its_sleeve():
     for part in range(4):
         start = 0.5 + part / 4 * 1.0 / 32
         arm = robot(beam(1.0, 1e-5, 0.5, 4, "Pb", start=start, damping={"beta_s": 0.1}), payload=0.1, gravity=(0.0, -10.0))
-        run = twin.simulate(arm, [0.0, 4.0], Drive.pd([signal.constant(start)], [1e5], [1e3]), step_s=4e-3)
+        run = twin.simulate(arm, [0.0, 4.0], Drive.pd([signals.constant(start)], [1e5], [1e3]), step_s=4e-3)
         held.append(-run["joint/1/drive"][-1] * (0.5 / start) ** 2)
     assert np.mean(held) == pytest.approx(0.242104, rel=5e-3)
 
@@ -238,7 +238,7 @@ def test_a_locked_slider_at_the_tip_is_a_locked_revolute():
     carries = {"hub_mass_kg": 0.1, "hub_inertia_kg_m2": 1e-3, "locked": True}
     slid = robot(first, beam(0.3, 0.2, 0.5, 4, "Pa", start=0.5, angle_rad=0.9, **carries), payload=0.05)
     fixed = robot(first, beam(0.3, 0.2, 0.5, 4, start=0.9, **carries), payload=0.05)
-    drive = Drive.force(signal.bang_bang(0.3, 0.4, rise_s=0.05), None)
+    drive = Drive.force(signals.bang_bang(0.3, 0.4, rise_s=0.05), None)
     a, b = twin.simulate(slid, t, drive), twin.simulate(fixed, t, drive, elements=32, step_s=2.5e-4)
     for name, within in (
         ("joint/1/position", 1e-3),
@@ -257,7 +257,7 @@ def test_a_locked_sleeve_is_a_clamp():
     sleeve = robot(arm, beam(0.4, 0.2, 0.5, 4, "Pb", start=0.25, angle_rad=0.6, locked=True), payload=0.02)
     tail = rigid(0.0, 0.03, -0.075, 0.03 * 0.15**2 / 12, locked=True, start=0.6)
     clamped = robot(arm, tail, beam(0.25, 0.2, 0.5, 4, locked=True), payload=0.02)
-    drive = [Drive.force(signal.bang_bang(0.1, 0.4, rise_s=0.05), *[None] * k) for k in (1, 2)]
+    drive = [Drive.force(signals.bang_bang(0.1, 0.4, rise_s=0.05), *[None] * k) for k in (1, 2)]
     a, b = twin.simulate(sleeve, t, drive[0]), twin.simulate(clamped, t, drive[1], elements=12, step_s=2.5e-4)
     assert error(a, b, "joint/1/position") < 2e-4 and error(a, b, "tip/y") < 2e-4
     w, expected = a["link/2/tip_deflection"], b["link/3/tip_deflection"]
@@ -300,8 +300,8 @@ def test_the_error_of_a_hub_is_of_first_order_in_its_length_and_that_of_a_sleeve
     sleeve = robot(
         beam(0.9, 0.7, 5.0, 4, "Pb", start=0.4, damping={"beta_s": 5e-4}), payload=0.2, gravity=(0.0, -1.0)
     )  # fmt: skip
-    push = Drive.force(*2 * [signal.bang_bang(0.5, 0.4, rise_s=0.1)])
-    pull = Drive.pd([signal.cycloid(0.6, 0.4, start=0.4)], [1e6], [1e4])
+    push = Drive.force(*2 * [signals.bang_bang(0.5, 0.4, rise_s=0.1)])
+    pull = Drive.pd([signals.cycloid(0.6, 0.4, start=0.4)], [1e6], [1e4])
     for arm, drive, delta, name, low, high in (
         (slider, push, 0.0125, "joint/2/position", 1.8, 2.5), (sleeve, pull, 1.5 * 0.9 / 24, "link/1/tip_deflection", 3.0, 4.5),
     ):  # fmt: skip
@@ -339,7 +339,7 @@ def test_meta_tells_of_hub_lengths_and_extrapolation(tmp_path):
 
 def test_pd_control_as_data_and_as_a_function_and_the_sensed_deflection():
     seen = []
-    drive = Drive.pd([None, signal.cycloid(0.6, 0.3, start=0.5)], [0.0, 300.0], [0.0, 20.0])
+    drive = Drive.pd([None, signals.cycloid(0.6, 0.3, start=0.5)], [0.0, 300.0], [0.0, 20.0])
 
     def function(t, position, velocity, tip):
         seen.append(tip)

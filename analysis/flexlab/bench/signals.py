@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import importlib
-from importlib.util import find_spec
-from typing import Any
-
 import numpy as np
 
 import flexura as fx
+from flexura.signals import bang_bang, cycloid, harmonic, piecewise
 
-_home: Any = importlib.import_module("flexura.signals" if find_spec("flexura.signals") else "flexura.signal")
-bang_bang, cycloid, harmonic, piecewise = _home.bang_bang, _home.cycloid, _home.harmonic, _home.piecewise
+__all__ = ["bang_bang", "cycloid", "harmonic", "piecewise", "spin_up"]
 
 
 def spin_up(speed: float, duration: float) -> fx.Signal:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-from flexura.signal import harmonic
+from flexura.signals import harmonic
 
 from ..rig import Bench, configuration
 from ..rig.drives import Drives

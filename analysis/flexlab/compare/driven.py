@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 import flexura as fx
-from flexura import signal
+from flexura import signals
 from flexura.drive import JointDrive
 from flexura.errors import InputError
 
@@ -97,7 +97,7 @@ def simulate(
     return run
 
 
-def given(experiment: fx.Run) -> tuple[signal.Signal, bool]:
+def given(experiment: fx.Run) -> tuple[signals.Signal, bool]:
     """Joint 2's angle by its pulses [rad], from before the start on; whether it jumps: each pulse when the firmware gave it,
     where that follows from what the run holds, else a spline through the reports."""
     exact = from_run(experiment)
@@ -105,10 +105,10 @@ def given(experiment: fx.Run) -> tuple[signal.Signal, bool]:
         return _motion(experiment, "joint/2/pulses", "commanded"), False
     at, angle = exact
     at[0] = rest(experiment.t)[0]
-    return signal.piecewise(at, angle), True
+    return signals.piecewise(at, angle), True
 
 
-def _motion(experiment: fx.Run, name: str, by: str) -> signal.Signal:
+def _motion(experiment: fx.Run, name: str, by: str) -> signals.Signal:
     """The joint's motion from before the start on, where the robot was at rest: it must not start at speed and unbent."""
     t, y = from_rest(*known(experiment.t, experiment[name], name))
     return smoothed(t, y) if by == "measured" else onward(t, y)
@@ -122,11 +122,11 @@ def _started(robot: fx.Robot, joints: Sequence[float]) -> Start:
     return system, q0
 
 
-def held(t: np.ndarray, y: np.ndarray) -> signal.Signal:
+def held(t: np.ndarray, y: np.ndarray) -> signals.Signal:
     """Each sample held from half way after the one before to half way before the next: no lag, whatever happens between."""
     at = np.concatenate([t[:1], (t[1:] + t[:-1]) / 2])
     changes = np.concatenate([[True], np.diff(y) != 0.0])
-    return signal.piecewise(at[changes], y[changes])
+    return signals.piecewise(at[changes], y[changes])
 
 
 def _robot(experiment: fx.Run) -> fx.Robot:

@@ -20,7 +20,7 @@ import numpy as np
 import flexura as fx
 from flexura.drive import JointDrive
 from flexura.errors import FlexuraError
-from flexura.signal import Signal, table
+from flexura.signals import Signal, table
 
 from ..rig.stepper import MagneticSpring
 

@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from flexura.signal import Signal
+from flexura.signals import Signal
 
 from ..rig.emulation import EmulatedCarriage
 from ..rig.motor import JointLine

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexura import signal
+from flexura import signals
 from flexura.errors import InputError
-from flexura.signal import Signal
+from flexura.signals import Signal
 
 LEAST = 8  # samples of a motion
 REST_S = 0.25  # how long before its start a motion is continued at rest
@@ -48,7 +48,7 @@ def resolution(y: np.ndarray) -> float:
 
 def onward(t: np.ndarray, y: np.ndarray) -> Signal:
     """The natural cubic spline through (t, y), which goes on after its end instead of stopping dead there."""
-    through = signal.table(t, y)
+    through = signals.table(t, y)
     return Signal(through.segments[:-1], through.spec)
 
 
@@ -62,7 +62,7 @@ def smoothed(t: np.ndarray, y: np.ndarray, step: float | None = None) -> Signal:
     step = resolution(y) if step is None else step
     noise = step / np.sqrt(12)
     if noise == 0.0 or np.ptp(y) <= 2 * step:
-        return onward(t, y) if noise == 0.0 else signal.constant(float(np.mean(y)))
+        return onward(t, y) if noise == 0.0 else signals.constant(float(np.mean(y)))
     scale = (t[-1] - t[0]) / (len(t) - 1)  # lambda in units of the sample time: the same range for every rate
     changes = np.diff(y) != 0.0
     moving = np.append(changes, False) | np.insert(changes, 0, False)  # at rest the error is a constant, not a noise

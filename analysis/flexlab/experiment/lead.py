@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from flexura.signal import COLUMNS, Signal
+from flexura.signals import COLUMNS, Signal
 
 LEAD_S = 1.0
 AT_REST = 1e-9  # m, rad and their rates: no lead is needed

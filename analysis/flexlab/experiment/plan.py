@@ -15,7 +15,7 @@ import numpy as np
 
 import flexura as fx
 from flexura import gains as model_gains
-from flexura import signal
+from flexura import signals
 from flexura.errors import InputError
 from flexura.files import read_toml
 
@@ -64,7 +64,7 @@ def gains(path: Path) -> dict[str, float]:
         if name not in known:
             raise InputError(f"expected a setting of the controllers: {', '.join(GAINS)}", key=name, value=value, file=str(path))
         item = CONFIG[name]
-        if not signal.finite(value) or not item.least <= value <= item.greatest:
+        if not signals.finite(value) or not item.least <= value <= item.greatest:
             expected = f"expected a number between {item.least:g} and {item.greatest:g} ({item.text})"
             raise InputError(expected, key=name, value=value, file=str(path))
     return {name: float(value) for name, value in data.items()}
@@ -103,7 +103,7 @@ def step(
     if not 0 <= apart_s < duration_s - 0.4:
         raise InputError("expected 0 or more, and 0.4 s less than the duration", key="--apart-s", value=apart_s)
     first, second = 0.2, 0.2 + apart_s
-    motions = signal.step(step_1_m, first), signal.step(step_2_rad, second)
+    motions = signals.step(step_1_m, first), signals.step(step_2_rad, second)
     settings = settings | {  # a step is an error of its whole height, and no fault
         "following_max_1_m": max(settings["following_max_1_m"], 1.5 * abs(step_1_m)),
         "following_max_2_rad": max(settings["following_max_2_rad"], 1.5 * abs(step_2_rad)),
@@ -121,7 +121,7 @@ def free_vibration(bench: Bench, settings: dict[str, float], turn_rad: float = 0
     move_s, rise_s, rest_s = 0.18, 0.08, 0.1
     if not duration_s > 1.0:
         raise InputError("expected more than 1 s", key="--duration_s", value=duration_s)
-    motions = signal.constant(0.0), signal.trapezoidal(turn_rad, move_s, rise_s, at_s=rest_s)
+    motions = signals.constant(0.0), signals.trapezoidal(turn_rad, move_s, rise_s, at_s=rest_s)
     plan = _tracked("free-vibration", bench, settings, _following("move, stop, let ring", motions, duration_s))
     return dataclasses.replace(plan, asked=plan.asked | {"rings_from_s": rest_s + move_s})
 
@@ -155,13 +155,13 @@ def _profile(spec: dict[str, Any]) -> tuple[str, float, list[fx.Signal]]:
         if key not in DEFAULT_PROFILE:
             raise InputError(f"an unknown key; known here: {', '.join(DEFAULT_PROFILE)}", key=key, value=value)
     duration = spec.get("duration_s")
-    if duration is None or not signal.finite(duration) or not 0 < duration <= 600:
+    if duration is None or not signals.finite(duration) or not 0 < duration <= 600:
         raise InputError("expected a duration above 0 and at most 600 s", key="duration_s", value=duration)
     name = spec.get("name", "")
     if not isinstance(name, str):
         raise InputError("expected a text", key="name", value=name)
     zero = {"kind": "constant", "value": 0.0}
-    return name, float(duration), [signal.from_spec(spec.get(key, zero), key=key) for key in ("voltage_V", "rate_rad_s")]
+    return name, float(duration), [signals.from_spec(spec.get(key, zero), key=key) for key in ("voltage_V", "rate_rad_s")]
 
 
 def _following(name: str, motions: tuple[fx.Signal, fx.Signal], duration_s: float) -> fx.Manoeuvre:

@@ -14,7 +14,7 @@ import numpy as np
 
 import flexura as fx
 from flexura.errors import InputError
-from flexura.signal import COLUMNS, Signal
+from flexura.signals import COLUMNS, Signal
 
 from ..compare.driven import held
 from ..compare.screw import behind

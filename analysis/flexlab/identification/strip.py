@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 import flexura as fx
-from flexura import signal
+from flexura import signals
 from flexura.drive import JointDrive
 
 from ..compare import screw
@@ -67,7 +67,7 @@ class Strip:
         times = self._times
         nut = self.more.carriage.model_copy(update={"backlash_m": values["backlash_m"]})
         x = screw.behind(self._nut_m, screw.play(nut, self._friction * values.get("give", 1.0)))
-        moved = JointDrive(motion=signal.Signal(signal.table(times, x).segments[:-1]), prescribed=True)
+        moved = JointDrive(motion=signals.Signal(signals.table(times, x).segments[:-1]), prescribed=True)
         stepper = self.rig.stepper.model_copy(
             update={"holding_torque_N_m": self.rig.stepper.holding_torque_N_m * values["holding"]}
         )

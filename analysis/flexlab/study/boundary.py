@@ -8,7 +8,7 @@ import numpy as np
 
 import flexura as fx
 from flexura.drive import Drive, JointDrive, Manoeuvre
-from flexura.signal import harmonic
+from flexura.signals import harmonic
 
 from .sweep import Case, Finding, Row
 

@@ -17,7 +17,7 @@ import flexura as fx
 from flexura.control import Motor, Output
 from flexura.drive import Drive, JointDrive, Manoeuvre
 from flexura.gains import Gains
-from flexura.signal import step
+from flexura.signals import step
 
 from .free import Free, free
 from .objective import Weights

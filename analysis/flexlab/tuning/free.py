@@ -19,7 +19,7 @@ from flexura.control import DEFLECTION, DERIVATIVE, GAINS, LIMIT, SETPOINT, SLEW
 from flexura.errors import InputError
 from flexura.files import read_toml
 from flexura.gains import NAMES, Gains
-from flexura.signal import finite
+from flexura.signals import finite
 
 COLUMNS = {name: k for k, name in enumerate(GAINS)} | {
     "limit": LIMIT, "slew": SLEW, "setpoint_Hz": SETPOINT,

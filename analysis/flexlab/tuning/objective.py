@@ -17,7 +17,7 @@ import numpy as np
 
 from flexura.errors import InputError
 from flexura.response import EFFORT, ERROR, ITAE, JOINT, OVERSHOOT, RMS, SETTLING, STRIP, VIBRATION
-from flexura.signal import finite
+from flexura.signals import finite
 
 FAILED = 1e3
 HELP = """J = sum over joints of [ int t |r - q| dt / |step| + OVERSHOOT max(0, overshoot - 5 %)
