@@ -67,10 +67,11 @@ void reduce(int n, double *A, double *diagonal, double *off) {
   }
 }
 
-// QL steps with implicit shifts on a tridiagonal matrix until it is diagonal; the rows of `Q` (n, n) turn
-// with it. (Bowdler, Martin, Reinsch, Wilkinson, Numer. Math. 11 (1968) 293.) Off-diagonals end when they are
-// small beside their neighbours.
-void turn_diagonal(int n, double *d, double *e, double *Q) {
+}  // namespace
+
+// QL steps with implicit shifts until the matrix is diagonal. (Bowdler, Martin, Reinsch, Wilkinson, Numer.
+// Math. 11 (1968) 293.) Off-diagonals end when they are small beside their neighbours.
+void eigen_tridiagonal(int n, double *d, double *e, int width, double *Q) {
   e[n - 1] = 0.0;
   for (int l = 0; l < n; ++l)
     for (int tries = 0; tries < 60; ++tries) {
@@ -97,8 +98,8 @@ void turn_diagonal(int n, double *d, double *e, double *Q) {
         p = s * w;
         d[i + 1] = g + p;
         g = c * w - b;
-        double *x = Q + i * n, *y = Q + (i + 1) * n;
-        for (int k = 0; k < n; ++k) {
+        double *x = Q + i * width, *y = x + width;
+        for (int k = 0; k < width; ++k) {
           const double a = y[k];
           y[k] = s * x[k] + c * a, x[k] = c * x[k] - s * a;
         }
@@ -107,8 +108,6 @@ void turn_diagonal(int n, double *d, double *e, double *Q) {
       d[l] -= p, e[l] = g, e[m] = 0.0;
     }
 }
-
-}  // namespace
 
 void arrange(int n, double *values, double *shapes) {
   std::vector<int> order(sized(n));
@@ -141,7 +140,7 @@ void eigen_symmetric(int n, const double *A, double *values, double *vectors) {
   for (int i = 0; i < n; ++i)
     for (int j = 0; j < n; ++j) work[i * n + j] = A[order[i] * n + order[j]] / unit;
   reduce(n, work.data(), values, off.data());
-  turn_diagonal(n, values, off.data(), work.data());
+  eigen_tridiagonal(n, values, off.data(), n, work.data());
   for (int k = 0; k < n; ++k) {
     values[k] *= unit;
     for (int i = 0; i < n; ++i) vectors[order[i] * n + k] = work[k * n + i];

@@ -83,6 +83,11 @@ void eigen_definite(int n, const Pack<N> *K, const Pack<N> *M, Pack<N> *squares,
 // values of graded matrices keep their digits.
 void eigen_symmetric(int n, const double *A, double *values, double *vectors);
 
+// T x = l x, T tridiagonal: `values` (n) its diagonal on entry, `off` (n) beside it, k between k and k + 1,
+// lost. Values come out in no order; the rows of Q (n, width) turn with them: from 1 they become the vectors,
+// from one column of 1 that component of every vector. Rows in ascending order of their diagonal keep digits.
+void eigen_tridiagonal(int n, double *values, double *off, int width, double *Q);
+
 // K x = w^2 M x with K symmetric, whether definite or not, and M positive semidefinite: `squares` (n) of w,
 // ascending, negative in unstable directions, 0 up to round-off where nothing holds the motion, infinite
 // without mass; `shapes` (n, n), x . M x = 1. Returns how many squares are finite.

@@ -2,10 +2,12 @@
 // Nat. Bur. Stand. 45 (1950) 255).
 //
 // T = (K + s M)^-1 M is symmetric in the inner product x . M y; its largest eigenvalues mu = 1/(w^2 + s) are
-// the lowest frequencies. A basis Q, Q^T M Q = 1, grows by T times each of its vectors, made orthogonal to
-// all that are there; H = Q^T M T Q is small.
+// the lowest frequencies. A basis Q, Q^T M Q = 1, grows by T times its last vector, made orthogonal to all
+// that are there: Q^T M T Q has three diagonals. Modes that are known stand in front of it.
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <utility>
 
 #include "eigen.hpp"
 #include "spectrum.hpp"
@@ -14,172 +16,249 @@ namespace flexura {
 namespace {
 
 using Numbers = std::vector<double>;
-constexpr int FIRST = 4;  // vectors to begin with: equal frequencies of equal links come several at a time
-constexpr double ENOUGH = 1e-9;  // residual of a mode beside its mu; the error of mu is its square
-constexpr double NOTHING = 1e-10;
+constexpr double ENOUGH = 1e-9;        // residual of a mode beside its mu; the error of mu is its square
+constexpr double NOTHING = 1e-10;      // of a vector, beside what it was
+constexpr double ROUND_OFF = 0x1p-48;  // of T, beside its largest mu
 
 double inner(const Numbers &a, const Numbers &b) {
   double sum[4] = {0.0, 0.0, 0.0, 0.0};  // four, so that none waits for the one before
-  for (std::size_t k = 0; k < a.size(); ++k) sum[k % 4] += a[k] * b[k];
+  for (std::size_t i = 0; i < a.size(); i += 4)
+    for (int l = 0; l < 4; ++l) sum[l] += a[i + l] * b[i + l];
   return together(sum);
 }
 
-class Krylov {
+// Vectors x and M x by rows, x . M y = 0 or 1. Rows are padded to fours and come in fours; what is not used
+// is zero.
+class Basis {
  public:
-  std::vector<Numbers> Q, MQ, H;  // H[j]: Q^T M T q_j, as far as the basis went when T q_j joined it
+  explicit Basis(int n) : wide(padded(n)) {}
 
-  Krylov(const Model<double> &model, const double *q, const std::vector<int> &rows)
-      : model_(model), work_(model), q_(q, q + model.n), zero_(model.n, 0.0), rows_(rows) {}
+  const int wide;
+  int count = 0;
+  const double *row(int k) const { return &rows_[k * wide]; }
+  const double *mass_row(int k) const { return &mass_rows_[k * wide]; }
 
-  Numbers mass_times(const Numbers &x) {
-    Numbers all(model_.n), out(model_.n, 0.0);
-    forces(model_, work_, q_.data(), zero_.data(), x.data(), Terms{false, false, false}, all.data());
-    for (int k : rows_) out[k] = all[k];
-    return out;
-  }
-
-  // Joins what x has beside the basis; returns the products of x with the basis before and the vector that
-  // joined, if any.
-  Numbers join(Numbers x) {
-    Numbers products(Q.size(), 0.0);
-    double before = 0.0;  // x . M x, as far as it lies in the basis
-    for (int twice = 0; twice < 2; ++twice)
-      for (std::size_t j = 0; j < Q.size(); ++j) {
-        const double part = inner(MQ[j], x);
-        products[j] += part, before += part * part;
-        for (std::size_t k = 0; k < x.size(); ++k) x[k] -= part * Q[j][k];
+  // Takes off x what lies in the basis; returns how much of the last vector.
+  double take_off(Numbers &x) const {
+    using Chunk = Row<double, 4>;
+    double last = 0.0;
+    for (int k = 0; k < count; k += 4) {
+      const double *a = mass_row(k), *b = a + wide, *c = b + wide, *d = c + wide;
+      Pack<4> sums[4] = {0.0, 0.0, 0.0, 0.0};
+      for (int i = 0; i < wide; i += 4) {
+        const Pack<4> here = Chunk::load(&x[i], 0);
+        sums[0] += Chunk::load(a + i, 0) * here, sums[1] += Chunk::load(b + i, 0) * here;
+        sums[2] += Chunk::load(c + i, 0) * here, sums[3] += Chunk::load(d + i, 0) * here;
       }
-    Numbers Mx = mass_times(x);
-    const double square = inner(x, Mx), length = std::sqrt(std::max(square, 0.0));
-    if (!(square > NOTHING * NOTHING * before)) return products;
-    for (double &value : x) value /= length;
-    for (double &value : Mx) value /= length;
-    Q.push_back(std::move(x)), MQ.push_back(std::move(Mx));
-    products.push_back(length);
-    return products;
+      double part[4];
+      for (int l = 0; l < 4; ++l) part[l] = (sums[l][0] + sums[l][1]) + (sums[l][2] + sums[l][3]);
+      a = row(k), b = a + wide, c = b + wide, d = c + wide;
+      for (int i = 0; i < wide; ++i)
+        x[i] -= (part[0] * a[i] + part[1] * b[i]) + (part[2] * c[i] + part[3] * d[i]);
+      if (count - k <= 4) last = part[count - 1 - k];
+    }
+    return last;
   }
 
-  // A vector of numbers that look random and are the same everywhere, smoothed by T.
-  Numbers start(const Still &still) {
-    Numbers x(model_.n, 0.0), out(model_.n);
-    for (int k : rows_) {
-      seed_ = seed_ * 6364136223846793005u + 1442695040888963407u;
-      x[k] = double(seed_ >> 11) * 0x1p-53 - 0.5;
-    }
-    still.solve(mass_times(x).data(), out.data());
-    return out;
+  void join(const Numbers &x, const Numbers &Mx, double length) {
+    if (count % 4 == 0)
+      for (Numbers *rows : {&rows_, &mass_rows_}) rows->resize((count + 4) * wide, 0.0);
+    for (int i = 0; i < wide; ++i)
+      rows_[count * wide + i] = x[i] / length, mass_rows_[count * wide + i] = Mx[i] / length;
+    ++count;
+  }
+
+  // Forgets all but the first vectors.
+  void keep(int first) {
+    for (Numbers *rows : {&rows_, &mass_rows_})
+      std::fill(rows->begin() + first * wide, rows->end(), 0.0), rows->resize(padded(first) * wide);
+    count = first;
   }
 
  private:
-  const Model<double> &model_;
-  Workspace<double> work_;
-  Numbers q_, zero_;
-  std::vector<int> rows_;
+  Numbers rows_, mass_rows_;
+};
+
+class Lanczos {
+ public:
+  Numbers known;                                // w^2 of the vectors in front of the basis
+  std::vector<std::pair<double, double>> ritz;  // of the last run: mu, descending, and residual
+  int good = 0;                                 // how many of these have converged
+
+  Lanczos(Still &still, int n, const std::vector<int> &rows, double shift)
+      : still_(still), rows_(rows), shift_(shift), basis_(n), x_(basis_.wide), Mx_(basis_.wide) {}
+
+  // w^2 of the known modes, and of the first `count` of the last run.
+  Numbers squares(int count) const {
+    Numbers out = known;
+    for (int k = 0; k < count; ++k) out.push_back(1.0 / ritz[k].first - shift_);
+    return out;
+  }
+
+  const double *shape(int k) const { return basis_.row(k); }  // of a known mode
+
+  // Adds the motion of a free joint that nothing holds to the known modes: w = 0.
+  void add_joint(int row) {
+    std::fill(x_.begin(), x_.end(), 0.0);
+    x_[row] = 1.0;
+    if (join_rest()) known.push_back(0.0);
+  }
+
+  // Lanczos' method from a new vector, until `want` modes have converged or the basis is complete; false:
+  // none has.
+  bool run(int want) {
+    begin_ = basis_.count, good = 0;
+    ritz.clear(), diagonal_.clear(), beside_.clear();
+    std::fill(x_.begin(), x_.end(), 0.0);
+    for (int k : rows_) {  // numbers that look random and are the same everywhere
+      seed_ = seed_ * 6364136223846793005u + 1442695040888963407u;
+      x_[k] = double(seed_ >> 11) * 0x1p-53 - 0.5;
+    }
+    still_.mass_times(x_.data(), Mx_.data());
+    still_.solve(Mx_.data(), x_.data());
+    if (!join_rest()) return false;
+    double largest = 0.0, left;
+    for (int check = want + want / 2 + 4;; basis_.join(x_, Mx_, left)) {
+      still_.solve(basis_.mass_row(basis_.count - 1), x_.data());
+      diagonal_.push_back(basis_.take_off(x_));
+      diagonal_.back() += basis_.take_off(x_);  // once is not enough: M is badly conditioned
+      largest = std::max(largest, diagonal_.back());
+      left = length(), beside_.push_back(left);
+      const bool closed = !(left > ROUND_OFF * largest) || basis_.count >= int(rows_.size());
+      if (!closed && int(diagonal_.size()) < check) continue;
+      check += 2;
+      project();
+      if (closed || good >= want) return good > 0;
+    }
+  }
+
+  // Adds the modes that have converged to the known ones.
+  void add_converged() {
+    const int size = int(diagonal_.size()), wide = basis_.wide;
+    Numbers values, Q(size * size, 0.0), vectors(good * wide, 0.0);
+    for (int k = 0; k < size; ++k) Q[k * size + size - 1 - k] = 1.0;  // columns in the order of the basis
+    const std::vector<int> order = diagonalise(values, size, Q);
+    for (int k = 0; k < good; ++k) {
+      double *x = &vectors[k * wide];
+      for (int j = 0; j < size; ++j) {
+        const double part = Q[order[k] * size + j], *q = basis_.row(begin_ + j);
+        for (int i = 0; i < wide; ++i) x[i] += part * q[i];
+      }
+      known.push_back(1.0 / values[order[k]] - shift_);
+    }
+    basis_.keep(begin_);
+    for (int k = 0; k < good; ++k) {
+      std::copy_n(&vectors[k * wide], wide, x_.begin());
+      basis_.join(x_, Mx_, length());
+    }
+    good = 0, ritz.clear();
+  }
+
+ private:
+  // The square root of x . M x; M x goes into Mx_.
+  double length() {
+    still_.mass_times(x_.data(), Mx_.data());
+    return std::sqrt(std::max(inner(x_, Mx_), 0.0));
+  }
+
+  // Adds what x has beside the basis to the basis, if that is more than round-off.
+  bool join_rest() {
+    const double before = length();
+    basis_.take_off(x_), basis_.take_off(x_);
+    const double left = length();
+    if (left > NOTHING * before) basis_.join(x_, Mx_, left);
+    return left > NOTHING * before;
+  }
+
+  // Eigenvalues of Q^T M T Q, its rows from the last to the first, for they ascend that way; gives their
+  // indices by descending value. The rows of Q (size, width) turn as in eigen_tridiagonal.
+  std::vector<int> diagonalise(Numbers &values, int width, Numbers &Q) const {
+    const int size = int(diagonal_.size());
+    values.assign(diagonal_.rbegin(), diagonal_.rend());
+    Numbers off(beside_.rbegin() + 1, beside_.rend());
+    off.push_back(0.0);
+    eigen_tridiagonal(size, values.data(), off.data(), width, Q.data());
+    std::vector<int> order(size);
+    std::iota(order.begin(), order.end(), 0);
+    for (double &value : values)
+      if (!(value == value)) value = -HUGE_VAL;  // what is not a number comes last
+    std::sort(order.begin(), order.end(), [&](int a, int b) { return values[a] > values[b]; });
+    return order;
+  }
+
+  // Finds `ritz` and `good`.
+  void project() {
+    Numbers values, last(diagonal_.size(), 0.0);  // of each vector the part along the last of the basis
+    last[0] = 1.0;
+    ritz.clear(), good = 0;
+    for (int k : diagonalise(values, 1, last))
+      if (values[k] > 0.0) ritz.emplace_back(values[k], std::fabs(last[k]) * beside_.back());
+    if (ritz.empty()) return;
+    const double least = ROUND_OFF * ritz[0].first;
+    while (good < int(ritz.size()) && ritz[good].first > least &&
+           ritz[good].second <= ENOUGH * ritz[good].first + least)
+      ++good;
+  }
+
+  Still &still_;
+  const std::vector<int> &rows_;
+  const double shift_;
+  Basis basis_;
+  Numbers x_, Mx_, diagonal_, beside_;  // the last two: of Q^T M T Q
+  int begin_ = 0;                       // first vector of this run
   std::uint64_t seed_ = 1;
 };
 
-// w^2 of a shape near the lowest one: every piece bends as under a moment at its end.
-double estimate(const Model<double> &model, Still &still, Krylov &krylov, const double *q) {
-  Numbers z(model.n, 0.0), bent(q, q + model.n), slope(model.n);
-  for (const Piece<double> &c : model.pieces)
-    for (int k = 0; k < c.m; ++k)
-      if (c.joint != At::sleeve)
-        z[c.own() + k] = c.tip_angle[k] / c.K[k];
-      else if (k == 0)
-        z[c.own()] = q[c.first] / matter_at(c, c.length).stiffness;
-  for (int k = 0; k < model.n; ++k) bent[k] = z[k];
-  still.gradient(bent.data(), TipLoad{}, 0.0, slope.data());
-  const double inertia = inner(z, krylov.mass_times(z));
-  return inertia > 0.0 ? inner(z, slope) / inertia : 1.0;
-}
-
-struct Ritz {
-  Numbers mu, vectors;  // mu ascending; vectors (size, size) by columns
-  int good = 0;         // how many of the largest have converged
-};
-
-Ritz project(const Krylov &krylov, int most) {
-  const int size = int(krylov.H.size());
-  Ritz out;
-  out.mu.resize(size), out.vectors.resize(size * size);
-  Numbers H(size * size, 0.0);
-  for (int j = 0; j < size; ++j)
-    for (int i = 0; i < size && i < int(krylov.H[j].size()); ++i)
-      H[i * size + j] = H[j * size + i] = krylov.H[j][i];
-  eigen_symmetric(size, H.data(), out.mu.data(), out.vectors.data());
-  for (int k = size - 1; k >= 0 && out.good < most; --k, ++out.good) {
-    double outside = 0.0;  // T x has this beside the basis that H is of
-    for (int i = size; i < int(krylov.Q.size()); ++i) {
-      double part = 0.0;
-      for (int j = 0; j < size; ++j)
-        if (i < int(krylov.H[j].size())) part += krylov.H[j][i] * out.vectors[j * size + k];
-      outside += part * part;
-    }
-    if (std::sqrt(outside) > ENOUGH * std::fabs(out.mu[k]) + 0x1p-48 * std::fabs(out.mu[size - 1])) break;
-  }
-  return out;
+// How many modes below the last of `most` are not among those found: by the pivots of K - x M, x halfway to
+// the next square, or just above the last if there is none.
+int missing(const Lanczos &search, Still &still, const TipLoad &load, int most, double near) {
+  Numbers squares = search.squares(int(search.ritz.size()));
+  std::sort(squares.begin(), squares.end());
+  const int found = std::min(most, int(search.known.size()) + search.good);
+  const double last = squares[found - 1], above = found < int(squares.size()) ? squares[found] : HUGE_VAL;
+  const double gap = 1e-6 * (std::fabs(last) + near);
+  const double x = last + std::min(std::max(0.5 * (above - last), gap), 1e-2 * (std::fabs(last) + near));
+  const auto below = std::lower_bound(squares.begin(), squares.end(), x) - squares.begin();
+  return still.tangent(load, 1.0, -x, false) - int(below);
 }
 
 }  // namespace
 
 Modes lowest_modes(const Model<double> &model, const double *q, const char *free, int most,
-                   const TipLoad &load) {
+                   const TipLoad &load, bool shapes) {
   const std::vector<int> rows = moving_rows(model, free);
-  const int n = model.n, moving = int(rows.size());
+  const int n = model.n;
   Still still(model, q, free);
-  Krylov krylov(model, q, rows);
-  const double near = estimate(model, still, krylov, q);
-  double size,
-      shift = moving > n - model.links() ? near : 0.0;  // free joints may have nothing that holds them
+  double size;
   still.energy(q, load, 1.0, size);
-  for (int tries = 0; still.tangent(load, 1.0, shift, false) > 0 && tries < 60; ++tries)
-    shift = std::max(near, 16.0 * shift);
-  for (int k = 0; k < FIRST; ++k) krylov.join(krylov.start(still));
-
-  Ritz ritz;
-  Numbers next(n);
-  int check = most + most / 2 + 8;
-  for (bool complete = false; !complete;) {
-    const std::size_t j = krylov.H.size();
-    if (j < krylov.Q.size()) {
-      still.solve(krylov.MQ[j].data(), next.data());
-      krylov.H.push_back(krylov.join(next));
-      if (int(j) + 1 < check && j + 1 < krylov.Q.size()) continue;
-      check += 4 + check / 8;
-    }
-    ritz = project(krylov, most);
-    if (krylov.Q.empty()) return Modes{};  // nothing has mass
-    const int size_now = int(krylov.H.size()), found = std::min(most, size_now);
-    const bool closed = krylov.H.size() == krylov.Q.size();
-    if (ritz.good < found && !closed) continue;
-    // is any below the last? Counted halfway to the next square, or just above if there is none
-    const double last = 1.0 / ritz.mu[size_now - found] - shift;
-    const double above = found < size_now ? 1.0 / ritz.mu[size_now - found - 1] - shift : HUGE_VAL;
-    const double gap = 1e-6 * (std::fabs(last) + shift),
-                 x = last + std::min(std::max(0.5 * (above - last), gap), 1e-2 * (std::fabs(last) + near));
-    int below = 0;
-    for (double mu : ritz.mu) below += 1.0 / mu - shift < x && mu > 0.0;
-    const int really = still.tangent(load, 1.0, -x, false);
-    complete = really <= below || size_now >= moving;
-    still.tangent(load, 1.0, shift, false);
-    if (!complete) {
-      const std::size_t before = krylov.Q.size();
-      krylov.join(krylov.start(still));
-      complete = krylov.Q.size() == before && closed;  // nothing more has mass
-    }
+  const bool turns = int(rows.size()) > n - model.links();  // free joints may have nothing that holds them
+  const double near = still.near_lowest();
+  double shift = turns ? 0x1p-8 * near : 0.0;
+  for (int tries = 0; still.tangent(load, 1.0, shift, false) > 0; shift = std::max(near, 16.0 * shift))
+    if (++tries > 60) return Modes{};
+  Lanczos search(still, n, rows, shift);
+  if (still.idle(load))
+    for (int i = 0; free && i < model.links(); ++i)
+      if (free[i]) search.add_joint(model.first[i]);
+  for (int want = most - int(search.known.size()); want > 0 && search.run(want);) {
+    want = missing(search, still, load, most, near);
+    if (want > 0) still.tangent(load, 1.0, shift, false);
+    if (want > 0 || shapes) search.add_converged();
   }
+  const Numbers found = search.squares(search.good);
+  std::vector<int> order(found.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(), [&](int a, int b) { return found[a] < found[b]; });
   Modes out;
-  const int size_now = int(krylov.H.size());
-  for (int k = size_now - 1; k >= 0 && out.count < most && ritz.mu[k] > 0.0; --k, ++out.count)
-    out.squares.push_back(1.0 / ritz.mu[k] - shift);
+  out.count = std::min(most, int(found.size()));
+  for (int k = 0; k < out.count; ++k) out.squares.push_back(found[order[k]]);
+  if (!shapes) return out;
   out.shapes.assign(n * out.count, 0.0);
   for (int k = 0; k < out.count; ++k) {
-    Numbers x(n, 0.0);
-    for (int j = 0; j < size_now; ++j)
-      for (int i : rows) x[i] += krylov.Q[j][i] * ritz.vectors[j * size_now + size_now - 1 - k];
+    const double *x = search.shape(order[k]);
     double largest = 0.0;
-    for (double value : x)
-      if (std::fabs(value) > std::fabs(largest)) largest = value;
+    for (int i = 0; i < n; ++i)
+      if (std::fabs(x[i]) > std::fabs(largest)) largest = x[i];
     for (int i = 0; i < n; ++i) out.shapes[i * out.count + k] = largest < 0.0 ? -x[i] : x[i];
   }
   return out;

@@ -95,12 +95,12 @@ std::vector<double> Modes::frequencies() const {
 }
 
 Modes natural_modes(const Model<double> &model, const double *q, const char *free, int most,
-                    const TipLoad &load) {
+                    const TipLoad &load, bool shapes) {
   const int n = model.n;
   const std::vector<int> rows = moving_rows(model, free);
   const int moving = int(rows.size());
   if (most > 0 && moving >= MANY && 4 * most < moving && only_revolute(model, free))
-    return lowest_modes(model, q, free, most, load);
+    return lowest_modes(model, q, free, most, load, shapes);
   Numbers M(n * n), K(n * n);
   mass_matrix(model, q, M.data());
   stiffness_matrix(model, q, nullptr, load, K.data());
@@ -108,14 +108,15 @@ Modes natural_modes(const Model<double> &model, const double *q, const char *fre
   for (int i = 0; i < moving; ++i)
     for (int j = 0; j < i; ++j)
       K[i * moving + j] = K[j * moving + i] = 0.5 * (K[i * moving + j] + K[j * moving + i]);
-  Numbers squares(moving), shapes(moving * moving);
-  const int finite = eigen_pencil(moving, K.data(), M.data(), squares.data(), shapes.data());
+  Numbers squares(moving), vectors(moving * moving);
+  const int finite = eigen_pencil(moving, K.data(), M.data(), squares.data(), vectors.data());
   Modes out;
   out.count = most > 0 ? std::min(most, finite) : finite;
   out.squares.assign(squares.begin(), squares.begin() + out.count);
+  if (!shapes) return out;
   out.shapes.assign(n * out.count, 0.0);
   for (int i = 0; i < moving; ++i)
-    for (int k = 0; k < out.count; ++k) out.shapes[rows[i] * out.count + k] = shapes[i * moving + k];
+    for (int k = 0; k < out.count; ++k) out.shapes[rows[i] * out.count + k] = vectors[i * moving + k];
   return out;
 }
 

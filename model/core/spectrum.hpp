@@ -59,14 +59,14 @@ struct Modes {
 
 // The lowest `most` modes at q (n) (all of them: most <= 0) under gravity and a load held at the tip. Few of
 // many unknowns, joints held or revolute, are found in time proportional to the number of pieces
-// (`lowest_modes`), others from the matrices.
+// (`lowest_modes`), others from the matrices. Without `shapes` only the squares are.
 Modes natural_modes(const Model<double> &model, const double *q, const char *free, int most,
-                    const TipLoad &load = {});
+                    const TipLoad &load = {}, bool shapes = true);
 
-// Lanczos' method with the operator (K + s M)^-1 M, by two sweeps of `Still`: of joints only revolute ones
-// may be free. That no mode is missing is known from the pivots of K - x M: as many are negative as squares
-// are below x (Sylvester's law).
+// Lanczos' method with the operator (K + s M)^-1 M, by sweeps of `Still`: of joints only revolute ones may be
+// free. That no mode is missing is known from the pivots of K - x M: as many are negative as squares are below
+// x (Sylvester's law).
 Modes lowest_modes(const Model<double> &model, const double *q, const char *free, int most,
-                   const TipLoad &load);
+                   const TipLoad &load = {}, bool shapes = true);
 
 }  // namespace flexura

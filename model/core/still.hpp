@@ -26,32 +26,36 @@ namespace flexura {
 // A dead load at the last tip: it keeps its direction in the base's axes [N], [N m].
 struct TipLoad {
   double force[2] = {0.0, 0.0}, moment = 0.0;
+  bool none() const { return force[0] == 0.0 && force[1] == 0.0 && moment == 0.0; }
 };
 
 // A piece with everything but its hub's angle and its own unknowns put in, and what the tangent leaves of it.
+// Arrays are the model's, or lie in the memory of `Still`.
 struct StillPiece {
-  int m = 0, P = 0, own = 0;
-  int joint = -1;                  // row of a joint that is free to turn, or -1
-  double angle = 0.0;              // that its hub adds to the angle of the piece before, held joint included
-  double mass = 0.0, rod = 0.0;    // [kg]; s_0 [kg m]
-  double hub = 0.0, tip = 0.0;     // inertia of hub (with the rod behind) and payload [kg m^2]
-  double rotor = 0.0;              // of a free joint
-  const double *B = nullptr;       // (m, P), padded
-  std::vector<double> w, s, a, K;  // (P), (P), (m), (m, m)
-  std::vector<double> R;           // (rows, P): W = R^T R (4)
-  std::vector<double> sine, cosine;  // of Theta at the points
+  int m = 0, P = 0, own = 0, squares = 0;  // squares: rows of R
+  int joint = -1, held = -1;               // row of a joint that is free to turn, or that is held; -1: none
+  double angle = 0.0;            // that its hub adds to the angle of the piece before, held joint included
+  double mass = 0.0, rod = 0.0;  // [kg]; s_0 [kg m]
+  double hub = 0.0, tip = 0.0;   // inertia of hub (with the rod behind) and payload [kg m^2]
+  double rotor = 0.0;            // of a free joint
+  const double *B, *w, *s, *a;   // (m, P) padded, (P), (P), (m)
+  const double *R;               // (squares, P): W = R^T R (4)
+  double *K;                     // (m, m)
+  double *sine, *cosine;         // of Theta at the points
   double hub_sine = 0.0, hub_cosine = 1.0;
-  std::vector<double> J;  // (3, m + 1): motion of the next hub by turning and own unknowns
-  std::vector<double> L, D,
-      tail;           // (m, m), (m) inverse pivots, (m, 3): coupling of the own rows with x, y, angle
-  Vec3<double> pull;  // the same of a free joint, and its inverse pivot
+  double *J;                         // (3, m + 1): motion of the next hub by turning and own unknowns
+  double *inertia, *first;           // M: turning and own unknowns (m + 1, m + 1); with the hub's place (m + 1, 2)
+  double *L, *D, *tail;              // (m, m), (m) inverse pivots, (m, 3): own rows with x, y, angle
+  Vec3<double> pull{0.0, 0.0, 0.0};  // the same of a free joint, and its inverse pivot
   double inverse = 0.0;
 };
 
 class Still {
  public:
   // Joints at their positions in q (n). `free` (links) or null: which revolute joints find their own place.
+  // The model must outlive it.
   Still(const Model<double> &model, const double *q, const char *free);
+  Still(const Still &) = delete;
 
   // V at q under `share` of gravity and load; size: the sum of the sizes of its parts, for round-off. What
   // follows is at this q.
@@ -67,12 +71,27 @@ class Still {
   // x = (tangent)^-1 r, r and x (n; entries of held joints are 0).
   void solve(const double *r, double *x) const;
 
+  // M x (n; entries of held joints are 0).
+  void mass_times(const double *x, double *out);
+
   double turn(const double *step) const;     // the largest change of angle of a point that a step makes [rad]
   Vec3<double> tip() const { return tip_; }  // place and angle of the last tip
+  bool idle(const TipLoad &load) const {     // nothing but elastic forces acts
+    return gravity_[0] == 0.0 && gravity_[1] == 0.0 && load.none();
+  }
+
+  // x . K x / x . M x of a shape near the lowest mode's: every piece bends as under a moment at its end; 1 if
+  // nothing bends.
+  double near_lowest();
 
  private:
+  void weigh();  // `inertia` and `first` of all pieces
+
   std::vector<StillPiece> pieces_;
+  std::vector<double> memory_;
+  std::vector<Vec3<double>> wrenches_;
   int n_;
+  bool weighed_ = false;
   double gravity_[2], base_ = 0.0;  // base_: place of a slider on the base's rail
   Vec3<double> tip_{0.0, 0.0, 0.0};
 };

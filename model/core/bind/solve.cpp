@@ -42,19 +42,19 @@ nb::tuple equilibrium_of(const Mechanics &self, const Vector &q, const Vector &l
   return nb::make_tuple(out, int(found.balance), found.share, found.sweeps);
 }
 
-nb::tuple modes_of(const Mechanics &self, const Vector &q, const Flags &free, int most, const Vector &load) {
+nb::tuple modes_of(const Mechanics &self, const Vector &q, const Flags &free, int most, const Vector &load, bool shapes) {
   check_state(self, q);
   const std::vector<char> moving = free_joints(self, free);
   const TipLoad held = load_of(load);
   Modes found;
   {
     nb::gil_scoped_release release;
-    found = natural_modes(*self.model, q.data(), moving.data(), most, held);
+    found = natural_modes(*self.model, q.data(), moving.data(), most, held, shapes);
   }
-  Array squares = new_array({std::size_t(found.count)}), shapes = new_array({q.shape(0), std::size_t(found.count)});
+  Array squares = new_array({std::size_t(found.count)}), out = new_array({shapes ? q.shape(0) : 0, std::size_t(found.count)});
   std::copy(found.squares.begin(), found.squares.end(), squares.data());
-  std::copy(found.shapes.begin(), found.shapes.end(), shapes.data());
-  return nb::make_tuple(squares, shapes);
+  std::copy(found.shapes.begin(), found.shapes.end(), out.data());
+  return nb::make_tuple(squares, out);
 }
 
 Array mass_of(const Mechanics &self, const Vector &q) {
@@ -83,7 +83,8 @@ Array rates_of(const Mechanics &self, const Vector &q, const Vector &v) {
 void add_solve(nb::class_<Mechanics> &type) {
   using namespace nb::literals;
   type.def("equilibrium", &equilibrium_of, "q"_a, "load"_a, "free"_a, "q, balance (0 stable, 1 unstable, 2 missing), share borne, sweeps.")
-      .def("modes", &modes_of, "q"_a, "free"_a, "count"_a, "load"_a, "Squares [rad^2/s^2] and shapes of the lowest `count`; 0: all.")
+      .def("modes", &modes_of, "q"_a, "free"_a, "count"_a, "load"_a, "shapes"_a = true,
+           "Squares [rad^2/s^2] and shapes, if asked for, of the lowest `count`; 0: all.")
       .def("mass", &mass_of, "q"_a, "M(q) (n, n).")
       .def("stiffness", &stiffness_of, "q"_a, "v"_a, "Derivative of the forces at q (and rates v, if any) by q, (n, n).")
       .def("rates", &rates_of, "q"_a, "v"_a, "Derivative of the forces by v, (n, n).");

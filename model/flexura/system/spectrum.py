@@ -41,22 +41,25 @@ def frequencies(robot: Any, q: Any = None, joints: str = "locked", *, count: int
         system = system.fixed(q)
     if qd is not None:
         return _steady(system, static(system) if q is None else system.check(q), system.check(qd, "qd"), joints)[:count]
-    return modes(system, q, joints, count=count).frequencies_Hz
+    return _found(system, static(system) if q is None else system.check(q), joints, count, False).frequencies_Hz
 
 
 def modes(robot: Any, q: Any = None, joints: str = "locked", *, count: int | None = None) -> Modes:
     """Natural modes of the undamped robot linearised about q (n,). Arguments and errors as in `frequencies`."""
     system = system_of(robot)
     _check(joints, count)
-    at = static(system) if q is None else system.check(q)
+    return _found(system, static(system) if q is None else system.check(q), joints, count, True)
+
+
+def _found(system: System, at: np.ndarray, joints: str, count: int | None, shapes: bool) -> Modes:
+    """The modes at q (n,); where frequencies are all that is asked for, shapes may be empty."""
     if not system.exact:
         return _dense(system, at, joints, count)
     free = np.full(len(system.joint_rows), joints == "free", dtype=np.uint8)
-    squares, shapes = system.equations.modes(at, free, count or 0, np.zeros(3))
+    squares, columns = system.equations.modes(at, free, count or 0, np.zeros(3), shapes)
     if joints == "free" and not any(system.robot.gravity_m_s2):
-        rigid = len(system.free_rows) - len(system.elastic_rows)
-        squares[:rigid] = 0.0  # without gravity nothing holds a free joint
-    return Modes(_hertz(squares)[:count], shapes[:, :count], at, system.labels)
+        squares[: len(system.free_rows) - len(system.elastic_rows)] = 0.0  # without gravity nothing holds a free joint
+    return Modes(_hertz(squares), columns, at, system.labels)
 
 
 def _check(joints: str, count: int | None) -> None:
