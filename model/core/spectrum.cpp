@@ -1,10 +1,11 @@
-// Matrices by unit accelerations and dual numbers, and the modes from them (spectrum.hpp).
+// Matrices by composite bodies and dual numbers, and the modes from them (spectrum.hpp).
 #include "spectrum.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include "eigen.hpp"
+#include "mass_matrix.hpp"
 
 namespace flexura {
 namespace {
@@ -50,22 +51,10 @@ bool only_revolute(const Model<double> &model, const char *free) {
 }  // namespace
 
 void mass_matrix(const Model<double> &model, const double *q, double *M) {
-  const int n = model.n;
-  const Model<double> *same[4] = {&model, &model, &model, &model};
-  const Model<Pack<4>> four = pack(same);
-  Workspace<Pack<4>> work(four);
-  std::vector<Pack<4>> y(n), zero(n, Pack<4>(0.0)), a(n, Pack<4>(0.0)), column(n);
-  for (int k = 0; k < n; ++k) y[k] = q[k];
-  for (int first = 0; first < n; first += 4) {
-    for (int k = first; k < std::min(first + 4, n); ++k) a[k].set(k - first, 1.0);
-    forces(four, work, y.data(), zero.data(), a.data(), Terms{false, false, false}, column.data());
-    for (int k = first; k < std::min(first + 4, n); ++k) {
-      for (int i = 0; i < n; ++i) M[i * n + k] = column[i][k - first];
-      a[k] = 0.0;
-    }
-  }
-  for (int i = 0; i < n; ++i)  // symmetric to round-off; now to the last digit
-    for (int j = 0; j < i; ++j) M[i * n + j] = M[j * n + i] = 0.5 * (M[i * n + j] + M[j * n + i]);
+  Workspace<double> work(model);
+  const Numbers zero(std::size_t(model.n), 0.0);
+  std::vector<Vec3<double>> wrench(zero.size());
+  mass_matrix(model, work, q, zero.data(), wrench.data(), M);
 }
 
 void stiffness_matrix(const Model<double> &model, const double *q, const double *v, const TipLoad &load,

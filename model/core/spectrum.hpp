@@ -12,7 +12,7 @@
 
 namespace flexura {
 
-// M(q) (n, n), held joints and all: columns are the forces (3) of unit accelerations. Positive definite at
+// M(q) (n, n) of (14), held joints and all: composite bodies (21). Positive definite at
 // any bending.
 void mass_matrix(const Model<double> &model, const double *q, double *M);
 

@@ -82,6 +82,14 @@ TEST("M is positive definite at any bending, with a bare hub; v.M v / 2 is the k
     Numbers M(n * n);
     mass_matrix(model, q.data(), M.data());
     CHECK(definiteness(n, M) > 0.0);
+    Workspace<double> sweep(model);
+    Numbers unit(n, 0.0), still(n, 0.0), column(n);
+    for (int k = 0; k < n; ++k) {  // by inverse dynamics, column by column
+      unit[k] = 1.0;
+      forces(model, sweep, q.data(), still.data(), unit.data(), Terms{false, false, false}, column.data());
+      unit[k] = 0.0;
+      for (int i = 0; i < n; ++i) CHECK_NEAR(M[i * n + k], column[i], 1e-13 * std::sqrt(M[i * n + i] * M[k * n + k]));
+    }
     double sum = 0.0;
     for (int i = 0; i < n; ++i)
       for (int j = 0; j < n; ++j) sum += 0.5 * v[i] * M[i * n + j] * v[j];
