@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,8 +19,7 @@ from .kinematics import Frame, Line, ahead, base, line, station, turned
 from .masses import Part, line_masses, lump, turning
 
 
-@dataclass(frozen=True)
-class LinkState:
+class LinkState(NamedTuple):
     """A link in a state q, qd: frame of its hub (Pb: exit), its lines (none: rigid), its tip."""
 
     index: int
@@ -155,8 +155,12 @@ class Structure:
 
     def masses(self, state: LinkState) -> list[Part]:
         """A link's masses: its material, its hub, and the payload of the last one (3)."""
-        joint = self.robot.links[state.index].joint
-        return [*self.own_masses(state), lump(joint.hub_mass_kg, state.hub), turning(joint.hub_inertia_kg_m2, state.hub)]
+        joint, parts = self.robot.links[state.index].joint, self.own_masses(state)
+        if joint.hub_mass_kg:
+            parts.append(lump(joint.hub_mass_kg, state.hub))
+        if joint.hub_inertia_kg_m2:
+            parts.append(turning(joint.hub_inertia_kg_m2, state.hub))
+        return parts
 
     def own_masses(self, state: LinkState) -> list[Part]:
         """A link's masses without its hub."""
