@@ -23,7 +23,7 @@ LONGER = {
     "flexura.loop": "both methods and their step control run in one compiled piece",
     "flexlab.board.declaration": "generated: tables, not to be read through",
 }
-TWIN_MAY_USE = {"errors", "robot", "run", "drive", "signal", "twin"}
+TWIN_MAY_USE = {"errors", "robot", "run", "drive", "signals", "twin"}
 HEAVY = {"distributed", "exudyn", "rerun", "pyarrow", "matplotlib", "PIL", "platformio", "pymoo"}
 ADAPTERS = {"rerun": "flexlab.review"}  # the one package that adapts it, and is itself imported only when used
 

@@ -101,6 +101,13 @@ class Drive:
         all_breaks = [s.breaks for j in self.joints for s in (j.force, j.motion) if s is not None]
         return np.unique(np.concatenate(all_breaks)) if all_breaks else np.zeros(0)
 
+    @property
+    def shortest_period(self) -> float:
+        """The shortest period of the waves in the signals [s]; infinity without waves."""
+        rows = np.concatenate([_NONE, *(s.segments for j in self.joints for s in (j.force, j.motion) if s is not None)])
+        w = np.abs(rows[rows[:, 7] != 0, 8]).max(initial=0.0)
+        return 2 * np.pi / w if w > 0 else np.inf
+
     @cached_property
     def gains(self) -> np.ndarray:
         """Of position and rate, (n, 2); 0 where a joint follows no motion, or follows it exactly."""

@@ -79,7 +79,7 @@ class _Course(Course):
 
     def _change(self, i: int, step: int) -> str:
         """Take the next node of joint i (from 0), upwards or downwards; says what happened."""
-        links, n = self.system.robot.links, self.n
+        links, n = self.system.robot.links, self.system.n
         structure = self.system.assembly.structure
         assert isinstance(structure, Nodes) and self.system.nodes is not None
         nodes = list(self.system.nodes)
@@ -94,5 +94,5 @@ class _Course(Course):
         else:
             nodes[i] += step
             said = f"joint {i + 1} (Pa) went on to node {nodes[i]} of link {i}"
-        self.system = replace(self.system, nodes=tuple(nodes))
+        self.use(replace(self.system, nodes=tuple(nodes)))
         return said

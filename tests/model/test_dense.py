@@ -158,9 +158,9 @@ def test_a_sampled_function_is_called_once_a_tick():
 
 def test_a_function_and_a_drive_agree():
     arm, t = short_arm(), np.linspace(0, 0.02, 5)
-    a = fx.simulate(arm, t, lambda s, x, v, y: [0.5 * (0.1 - x[0]) - 0.01 * v[0]], rtol=1e-6)
-    b = fx.simulate(arm, t, fx.Drive.pd([signals.constant(0.1)], [0.5], [0.01]), rtol=1e-6)
-    assert largest_difference(a, b) < 1e-12 and a.meta["drive"] == "Python function"
+    a = fx.simulate(arm, t, lambda s, x, v, y: [0.5 * (0.1 - x[0]) - 0.01 * v[0]], rtol=1e-10)
+    b = fx.simulate(arm, t, fx.Drive.pd([signals.constant(0.1)], [0.5], [0.01]), rtol=1e-10)
+    assert largest_difference(a, b) < 1e-9 and a.meta["drive"] == "Python function"
 
 
 def test_a_controller_is_refused():

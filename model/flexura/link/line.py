@@ -11,7 +11,7 @@ import numpy as np
 
 from ..robot import Link
 from .modes import clamped_matrices, clamped_modes, orthogonal_shapes
-from .quadrature import collocation, gauss, lagrange, lagrange_integrals
+from .quadrature import collocation, gauss, lagrange, lagrange_integrals, legendre, legendre_at
 from .section import Material, material
 from .shapes import ElementShapes, MeshShapes, WholeShapes
 
@@ -90,21 +90,49 @@ class Piece:
     def _integrals(self) -> dict[tuple[float, ...], np.ndarray]:
         return {}
 
-    def at(self, xi: float) -> Place:
-        """Weights and shapes at a place xi."""
+    def exactly_at(self, xi: float) -> Place:
+        """Weights and shapes at a place xi, to round-off."""
         s = np.array([xi])
         lines = [self.integrals(s), *(self.lagrange(s, k) for k in (0, 1))]
         return Place(*(f[0] for f in lines), *(self.shapes(s, k)[0] for k in (0, 1, 2)))
 
+    def at(self, xi: float) -> Place:
+        """Weights and shapes at a place xi, quickly: a few times round-off."""
+        sums, P, m = self._sums, self.points, self.count
+        row = legendre_at(len(sums), xi) @ sums
+        b = row[3 * P :]
+        return Place(row[:P], row[P : 2 * P], row[2 * P : 3 * P], b[:m], b[m : 2 * m], b[2 * m :])
+
+    @cached_property
+    def _sums(self) -> np.ndarray:
+        """What a Place has, one behind the other, as sums of Legendre's polynomials: (degree + 1, 3 P + 3 m)."""
+        count = self.points + 1
+        xi, w = gauss(count)
+        lines = [self.integrals(xi), *(self.lagrange(xi, k) for k in (0, 1))]
+        values = np.hstack([*lines, *(self.shapes(xi, k) for k in (0, 1, 2))])
+        return (2 * np.arange(count)[:, None] + 1) * legendre(count, xi).T * w @ values
+
     @cached_property
     def tip(self) -> Place:
         """Weights and shapes at the tip."""
-        return self.at(1.0)
+        return self.exactly_at(1.0)
 
     @cached_property
     def B_tip(self) -> np.ndarray:
         """The shapes at the tip: (m,)."""
         return self.tip.b
+
+    @cached_property
+    def slopes(self) -> np.ndarray:
+        """The shapes' derivatives by xi at the points: (P, m)."""
+        return self.shapes(self.xi, 1)
+
+    @cached_property
+    def unit_stiffness(self) -> np.ndarray:
+        """K of (17) for d = EI = 1, without the round-off between orthogonal shapes: (m, m)."""
+        K = self.slopes.T @ (self.weights[:, None] * self.slopes)
+        size = np.sqrt(np.diag(K))
+        return np.where(np.abs(K) < 1e-14 * np.outer(size, size), 0.0, K)
 
     @cached_property
     def w(self) -> np.ndarray:

@@ -30,7 +30,7 @@ class Mesh(Piece):
     def at(self, xi: float) -> Place:
         """Weights and shapes at a place xi: mostly a node, so that they are kept."""
         if xi not in self._places:
-            self._places[xi] = super().at(xi)
+            self._places[xi] = self.exactly_at(xi)
         return self._places[xi]
 
     @cached_property

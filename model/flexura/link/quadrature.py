@@ -29,6 +29,14 @@ def legendre(count: int, xi: np.ndarray, derivative: int = 0) -> np.ndarray:
     return legvander(u, len(lower) - 1) @ lower
 
 
+def legendre_at(count: int, xi: float) -> np.ndarray:
+    """P_0 ... P_(count-1) at u = 2 xi - 1 of one place: (count,), quicker than `legendre`."""
+    u, out = 2 * xi - 1.0, [1.0, 2 * xi - 1.0]
+    for k in range(1, count - 1):
+        out.append(((2 * k + 1) * u * out[k] - k * out[k - 1]) / (k + 1))
+    return np.array(out[:count])
+
+
 @cache
 def _derivatives(count: int, order: int) -> np.ndarray:
     """Derivatives of P_0 ... P_(count-1) as sums of Legendre's polynomials, in columns."""

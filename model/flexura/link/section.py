@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.polynomial.polynomial import polyder, polyval
+from numpy.polynomial.polynomial import polyder
 from numpy.typing import ArrayLike
 
 from ..robot import Link
@@ -27,11 +28,11 @@ class Material:
     mass: np.ndarray
     stiffness: np.ndarray
 
-    @property
+    @cached_property
     def length(self) -> float:
         return float(self.breaks[-1])
 
-    @property
+    @cached_property
     def uniform(self) -> bool:
         """Whether nothing changes along the link."""
         return (
@@ -40,22 +41,32 @@ class Material:
 
     def mass_per_length(self, s: ArrayLike, derivative: int = 0) -> np.ndarray:
         """rho A at s (S,), or its derivative by s."""
-        return self._values(self.mass, s, derivative)
+        return self._values(self._slopes[0][derivative], s)
 
     def bending_stiffness(self, s: ArrayLike, derivative: int = 0) -> np.ndarray:
         """EI at s (S,), or its derivative by s."""
-        return self._values(self.stiffness, s, derivative)
+        return self._values(self._slopes[1][derivative], s)
 
     def quadrature(self, start: float, end: float, count: int) -> tuple[np.ndarray, np.ndarray]:
         """`count` Gauss points and weights [m] on each smooth part of start <= s <= end."""
-        inner = self.breaks[(self.breaks > start) & (self.breaks < end)]
+        inner = self.breaks[1:-1]
+        inner = inner[(inner > start) & (inner < end)]
         return cells(np.concatenate([[start], inner, [end]]), count)
 
-    def _values(self, rows: np.ndarray, s: ArrayLike, derivative: int) -> np.ndarray:
+    @cached_property
+    def _slopes(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        """Powers of the mass and of the stiffness and of their first two derivatives, lowest first: (powers, I)."""
+        return tuple([polyder(rows.T, k) for k in range(3)] for rows in (self.mass, self.stiffness))  # type: ignore[return-value]
+
+    def _values(self, powers: np.ndarray, s: ArrayLike) -> np.ndarray:
         s = np.atleast_1d(np.asarray(s, dtype=float))
-        k = np.clip(np.searchsorted(self.breaks, s, side="right") - 1, 0, len(rows) - 1)
-        powers = polyder(rows.T, derivative) if derivative else rows.T
-        return polyval(s - self.breaks[k], powers[:, k], tensor=False)
+        if self.uniform:
+            return np.full(s.shape, powers[0, 0])
+        k = np.clip(np.searchsorted(self.breaks, s, side="right") - 1, 0, powers.shape[1] - 1)
+        x, value = s - self.breaks[k], powers[-1, k]
+        for row in powers[-2::-1]:
+            value = value * x + row[k]
+        return value
 
 
 def material(link: Link) -> Material:

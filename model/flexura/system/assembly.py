@@ -28,11 +28,12 @@ class Energies(NamedTuple):
 
 
 class Terms(NamedTuple):
-    """The parts of (19) in a state: `forces` (n,) of inertia and gravity, `elastic` (n,), `damping` (n, n)."""
+    """The parts of (19) in a state: `forces` (n,) of inertia and gravity, `elastic` (n,); K and D (n, n)."""
 
     mass: np.ndarray
     forces: np.ndarray
     elastic: np.ndarray
+    stiffness: np.ndarray
     damping: np.ndarray
 
 
@@ -47,62 +48,82 @@ class Assembly:
         self.robot, self.rows = self.structure.robot, self.structure.rows
         self.labels, self.n = self.structure.labels, self.structure.n
         self._rotors = np.array([link.joint.rotor_inertia for link in self.robot.links])
+        self._coulomb = np.array([link.joint.coulomb_friction for link in self.robot.links])
         self._g = complex(*self.robot.gravity_m_s2)
+        laws = [(i, law) for i, law in enumerate(self.structure.laws) if law is not None and self.structure.sleeved(i)]
+        self._sleeved: dict[int, Material] = dict(laws)  # flexible links in a sleeve, with their materials
 
     def mass(self, q: np.ndarray) -> np.ndarray:
         """M(q) (n, n) (14)."""
-        M = masses.mass_matrix(self.n, self._parts(q, np.zeros(self.n)))
+        return self._mass(self._inertia(self._at_rest(q))[0])
+
+    def _mass(self, sums: masses.Sum) -> np.ndarray:
+        M = sums.mass
         M[self.rows, self.rows] += self._rotors
         return M
 
     def bias(self, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
         """Coriolis, centrifugal and convective forces (n,), on the left-hand side (15)."""
-        h = masses.inertia_forces(self.n, self._parts(q, qd))
-        for state, law in self._sleeves(self.structure.states(q, qd)):
-            h += sleeve.flow_forces(state.lines[0], law)
-        return h
+        sums, flow = self._inertia(self.structure.states(q, qd))
+        return sums.forces + flow
 
     def gravity(self, q: np.ndarray) -> np.ndarray:
         """Generalised gravity forces (n,), on the left-hand side (16)."""
-        return masses.weight(self.n, self._parts(q, np.zeros(self.n)), self._g)
+        return self._inertia(self._at_rest(q), self._g)[0].forces
+
+    def _inertia(self, states: list[LinkState], gravity: complex = 0j) -> tuple[masses.Sum, np.ndarray]:
+        """What (14) to (16) sum over, and the flow terms of (9) in (15) (n,)."""
+        parts, flow = [], np.zeros(self.n)
+        for state in states:
+            own = self.structure.masses(state)
+            parts += own
+            free = own[0]
+            if state.number in self._sleeved and isinstance(free, masses.Masses):
+                flow += sleeve.flow_forces(state.lines[0], self._sleeved[state.number], free)
+        return masses.summed(parts, gravity), flow
 
     def elastic(self, q: np.ndarray) -> np.ndarray:
         """The derivative of the strain energy (n,): K q, and of a sleeved link also dU/dd (17)."""
-        sleeves = self._sleeves(self.structure.states(q, np.zeros(self.n)))
-        return self._stiffness(sleeves) @ q + self._push(sleeves, q)
+        return self._elastic(self.stiffness_blocks(q), q)
 
-    def _push(self, sleeves: list[tuple[LinkState, Material]], q: np.ndarray) -> np.ndarray:
-        """dU/dd in the rows of the sleeves (n,) (17)."""
-        out = np.zeros(self.n)
-        for state, law in sleeves:
-            y = q[state.lines[0].own]
-            out[self.rows[state.index]] += 0.5 * y @ sleeve.stiffness(state.lines[0], law, 1) @ y
+    def _elastic(self, K: np.ndarray, q: np.ndarray) -> np.ndarray:
+        out = K @ q
+        for i in self._sleeved:
+            y = q[self.structure.own[i][0]]
+            out[self.rows[i]] += 0.5 * y @ self._sleeve(i, q, 1) @ y
         return out
 
     def stiffness_blocks(self, q: np.ndarray) -> np.ndarray:
         """K (n, n), with K(d) of sleeved links: twice the strain energy is q^T K q (5), (17)."""
-        return self._stiffness(self._sleeves(self.structure.states(q, np.zeros(self.n))))
+        K = self._diagonal.copy()
+        for i in self._sleeved:
+            own = self.structure.own[i][0]
+            K[own, own] = self._sleeve(i, q)
+        return K
 
-    def _stiffness(self, sleeves: list[tuple[LinkState, Material]]) -> np.ndarray:
+    @cached_property
+    def _diagonal(self) -> np.ndarray:
+        """K (n, n) of the pieces of constant length."""
         K = np.zeros((self.n, self.n))
         for link, owns in zip(self.structure.links, self.structure.own, strict=True):
             for piece, own in zip(link, owns, strict=True):
                 if piece.K.size:
                     K[own, own] = np.diag(piece.K)
-        for state, law in sleeves:
-            own = state.lines[0].own
-            K[own, own] = sleeve.stiffness(state.lines[0], law)
         return K
+
+    def _sleeve(self, i: int, q: np.ndarray, derivative: int = 0) -> np.ndarray:
+        """K(d) of the link i in a sleeve, or its derivatives by d (17)."""
+        return sleeve.stiffness(self.structure.links[i][0], float(q[self.rows[i]]), self._sleeved[i], derivative)
 
     def stiffness(self, q: np.ndarray) -> np.ndarray:
         """The second derivative of the strain energy (n, n), without loads (17)."""
         K = self.stiffness_blocks(q)
-        for state, law in self._sleeves(self.structure.states(q, np.zeros(self.n))):
-            own, row = state.lines[0].own, self.rows[state.index]
-            slope = sleeve.stiffness(state.lines[0], law, 1) @ q[own]
+        for i in self._sleeved:
+            own, row = self.structure.own[i][0], self.rows[i]
+            slope = self._sleeve(i, q, 1) @ q[own]
             K[own, row] += slope
             K[row, own] += slope
-            K[row, row] += 0.5 * q[own] @ sleeve.stiffness(state.lines[0], law, 2) @ q[own]
+            K[row, row] += 0.5 * q[own] @ self._sleeve(i, q, 2) @ q[own]
         return K
 
     def damping(self, q: np.ndarray) -> np.ndarray:
@@ -123,9 +144,7 @@ class Assembly:
     def coulomb(self, qd: np.ndarray) -> np.ndarray:
         """Coulomb friction of the joints (n,), on the left-hand side (18)."""
         out = np.zeros(self.n)
-        out[self.rows] = [link.joint.coulomb_friction for link in self.robot.links] * np.tanh(
-            qd[self.rows] / COULOMB_RATE
-        )
+        out[self.rows] = self._coulomb * np.tanh(qd[self.rows] / COULOMB_RATE)
         return out
 
     def forces(self, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
@@ -141,24 +160,14 @@ class Assembly:
     def terms(self, q: np.ndarray, qd: np.ndarray) -> Terms:
         """All of (19) but drives and Coulomb friction, in one sweep for a time loop."""
         states = self.structure.states(q, qd)
-        parts = [part for state in states for part in self.structure.masses(state)]
-        M = masses.mass_matrix(self.n, parts)
-        M[self.rows, self.rows] += self._rotors
-        forces = masses.inertia_forces(self.n, parts) + masses.weight(self.n, parts, self._g)
-        sleeves = self._sleeves(states)
-        if not sleeves:
-            K, D = self._constant
-            return Terms(M, forces, K @ q, D)
-        for state, law in sleeves:
-            forces += sleeve.flow_forces(state.lines[0], law)
-        K = self._stiffness(sleeves)
-        elastic = K @ q + self._push(sleeves, q)
-        return Terms(M, forces, elastic, self._damping(K, q))
+        sums, flow = self._inertia(states, self._g)
+        K, D = self._constant if not self._sleeved else (K := self.stiffness_blocks(q), self._damping(K, q))
+        return Terms(self._mass(sums), sums.forces + flow, self._elastic(K, q), K, D)
 
     @cached_property
     def _constant(self) -> tuple[np.ndarray, np.ndarray]:
         """K and D (n, n) of a robot without flexible links in sleeves, whose matrices depend on no q."""
-        return self.stiffness_blocks(np.zeros(self.n)), self.damping(np.zeros(self.n))
+        return self._diagonal, self.damping(np.zeros(self.n))
 
     def observe(self, q: np.ndarray, qd: np.ndarray, stations: int) -> np.ndarray:
         """What a Run shows of a state, in the order of `record.channel_units` (2), (29).
@@ -185,7 +194,7 @@ class Assembly:
     def _energies(self, states: list[LinkState], q: np.ndarray, qd: np.ndarray) -> Energies:
         parts = [part for state in states for part in self.structure.masses(state)]
         return Energies(
-            masses.kinetic(parts, qd) + 0.5 * float(self._rotors @ qd[self.rows] ** 2),
+            float(0.5 * qd @ self._mass(masses.summed(parts)) @ qd),
             float(0.5 * q @ self.stiffness_blocks(q) @ q),
             masses.potential(parts, self._g),
         )
@@ -196,39 +205,28 @@ class Assembly:
 
     def tip(self, q: np.ndarray, qd: np.ndarray | None = None) -> Frame:
         """The frame of the robot's tip, with the columns of its place and angle (13)."""
-        return self.structure.states(q, np.zeros(self.n) if qd is None else qd)[-1].tip
+        return (self._at_rest(q) if qd is None else self.structure.states(q, qd))[-1].tip
 
     def line(
         self, q: np.ndarray, link: int, s: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """x, y [m] and the tangent's angle [rad] of a link (from 1) at s (S,) [m] along it (2)."""
-        state = self.structure.states(q, np.zeros(self.n))[link - 1]
+        state = self._at_rest(q)[link - 1]
         frames = [self.structure.at(state, float(x)) for x in np.atleast_1d(s)]
         place = np.array([f.place for f in frames])
         return place.real, place.imag, np.array([f.angle for f in frames])
 
     def tip_deflections(self, q: np.ndarray) -> np.ndarray:
         """The tips of the flexible links across the tangents at their hubs (k,) [m]: r_y (2)."""
-        states = [state for state in self.structure.states(q, np.zeros(self.n)) if state.lines]
+        states = [state for state in self._at_rest(q) if state.lines]
         return np.array([((s.tip.place - s.hub.place) * s.hub.tangent.conjugate()).imag for s in states])
 
-    def _parts(self, q: np.ndarray, qd: np.ndarray) -> list[masses.Part]:
-        return [
-            part for state in self.structure.states(q, qd) for part in self.structure.masses(state)
-        ]
-
-    def _sleeves(self, states: list[LinkState]) -> list[tuple[LinkState, Material]]:
-        """The flexible links in a sleeve, with their materials."""
-        out = []
-        for state in states:
-            law = self.structure.laws[state.index]
-            if law is not None and self.structure.sleeved(state.index):
-                out.append((state, law))
-        return out
+    def _at_rest(self, q: np.ndarray) -> list[LinkState]:
+        return self.structure.states(q, np.zeros(self.n))
 
     def _clamped_mass(self, i: int, q: np.ndarray) -> np.ndarray:
         """M (n, n) of link i alone, straight and clamped, with the payload of the last one (18)."""
         straight, still = np.zeros(self.n), np.zeros(self.n)
         straight[self.rows[i]] = q[self.rows[i]]
         state = self.structure.link(i, base(self.n), straight, still)
-        return masses.mass_matrix(self.n, self.structure.own_masses(state))
+        return masses.summed(self.structure.own_masses(state)).mass

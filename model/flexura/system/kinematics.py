@@ -6,15 +6,15 @@ n unknowns; P points of a line. Equations: docs/theory/mechanics.md.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import cmath
+from typing import NamedTuple
 
 import numpy as np
 
 from ..link.line import Piece
 
 
-@dataclass(frozen=True)
-class Frame:
+class Frame(NamedTuple):
     """A place and an angle that move with the robot (13).
 
     place [m], angle [rad]; velocity (n,) complex and turning (n,): columns of their rates; rest and
@@ -31,7 +31,7 @@ class Frame:
     @property
     def tangent(self) -> complex:
         """The unit vector along the frame's x axis."""
-        return complex(np.exp(1j * self.angle))
+        return cmath.exp(1j * self.angle)
 
 
 def base(n: int) -> Frame:
@@ -41,24 +41,26 @@ def base(n: int) -> Frame:
 
 def turned(frame: Frame, angle: float, row: int | None = None) -> Frame:
     """The frame turned by an angle, which is the unknown `row` (None: a constant)."""
-    turning = frame.turning.copy()
+    turning = frame.turning
     if row is not None:
+        turning = turning.copy()
         turning[row] += 1.0
-    return replace(frame, angle=frame.angle + angle, turning=turning)
+    return frame._replace(angle=frame.angle + float(angle), turning=turning)
 
 
 def ahead(frame: Frame, x: float, rows: list[int], qd: np.ndarray) -> Frame:
     """The frame moved by x [m] along its x axis; the unknowns `rows` are summands of x."""
-    t, spin = frame.tangent, frame.turning @ qd
-    velocity = frame.velocity + 1j * x * t * frame.turning
-    velocity[rows] += t
-    rest = frame.rest + x * t * (1j * frame.rest_turning - spin**2) + 2j * t * spin * sum(qd[rows])
-    return replace(frame, place=frame.place + x * t, velocity=velocity, rest=complex(rest))
+    t, spin = frame.tangent, float(frame.turning @ qd)
+    velocity = frame.velocity + (1j * x * t) * frame.turning
+    for row in rows:
+        velocity[row] += t
+    rate = float(sum(qd[row] for row in rows))
+    rest = frame.rest + x * t * (1j * frame.rest_turning - spin**2) + 2j * t * spin * rate
+    return frame._replace(place=frame.place + x * t, velocity=velocity, rest=complex(rest))
 
 
-@dataclass(frozen=True)
-class Line:
-    """A piece's line in a state: tangents e (P,), their columns E (P, n), and N (P,) (1), (2).
+class Line(NamedTuple):
+    """A piece's line in a state: tangents e (P,), their columns E (P, n), their rates e' = E q' (P,), and N (P,) (1), (2).
 
     N: second derivatives of e at zero accelerations of the unknowns.
 
@@ -73,6 +75,7 @@ class Line:
     row: int | None
     e: np.ndarray
     E: np.ndarray
+    rates: np.ndarray
     N: np.ndarray
     q: np.ndarray
     qd: np.ndarray
@@ -95,22 +98,25 @@ def line(
     linear: bool = False,
 ) -> Line:
     """The line of a piece that begins at `start` (1); with `linear` (12) on the hub's frame `axis`."""
-    angle = start.angle + piece.B @ q[own]
-    columns = np.tile(start.turning, (piece.points, 1))
-    columns[:, own] += piece.B
+    bent, bending = piece.B @ q[own], piece.B @ qd[own]
+    spin = float(start.turning @ qd)
     if not linear:
-        e = np.exp(1j * angle)
-        N = e * (1j * start.rest_turning - (columns @ qd) ** 2)
-        return Line(piece, start, own, free, row, e, 1j * e[:, None] * columns, N, q, qd)
-    t, spin, bent = axis.tangent, axis.turning @ qd, columns - axis.turning
-    e = t * (1 + 1j * (angle - axis.angle))
-    E = 1j * e[:, None] * axis.turning + 1j * t * bent
-    N = (
-        e * (1j * axis.rest_turning - spin**2)
-        - 2 * spin * t * (bent @ qd)
-        + 1j * t * (start.rest_turning - axis.rest_turning)
-    )
-    return Line(piece, start, own, free, row, e, E, N, q, qd)
+        e = np.exp(1j * (start.angle + bent))
+        turn, left = spin + bending, 1j * e
+        E = left[:, None] * start.turning
+        E[:, own] += left[:, None] * piece.B
+        N = e * (1j * start.rest_turning - turn**2)
+        return Line(piece, start, own, free, row, e, E, left * turn, N, q, qd)
+    t, hub = axis.tangent, float(axis.turning @ qd)
+    e = t + 1j * t * (start.angle - axis.angle + bent)
+    E = (1j * e)[:, None] * axis.turning
+    E[:, own] += 1j * t * piece.B
+    bending += spin - hub
+    N = e * (1j * axis.rest_turning - hub**2) - (2 * hub * t) * bending
+    if start is not axis:
+        E += 1j * t * (start.turning - axis.turning)
+        N += 1j * t * (start.rest_turning - axis.rest_turning)
+    return Line(piece, start, own, free, row, e, E, 1j * hub * e + 1j * t * bending, N, q, qd)
 
 
 def station(line: Line, xi: float, slider: int | None = None) -> Frame:
@@ -118,35 +124,23 @@ def station(line: Line, xi: float, slider: int | None = None) -> Frame:
 
     d xi' = eta' + (1 - xi) d', so that a material point of a sleeved link runs through the mesh.
     """
-    d, start = line.free, line.start
+    d, start, y = line.free, line.start, line.q[line.own]
     w, l, dl, b, db, ddb = line.piece.tip if xi == 1.0 else line.piece.at(xi)
-    flow = np.zeros(len(line.qd))
-    if slider is not None:
-        flow[slider] += 1.0
-    if line.row is not None:
-        flow[line.row] += 1.0 - xi
-    run, spin = float(flow @ line.qd) / d, line.E @ line.qd
-    y, yd = line.q[line.own], line.qd[line.own]
-
-    velocity = start.velocity + d * w @ line.E + (l @ line.e) * flow
-    turning = start.turning + (db @ y) / d * flow
+    reach = complex(w @ line.e)
+    velocity, turning = start.velocity + d * (w @ line.E), start.turning.copy()
     turning[line.own] += b
+    rest, rest_turning = start.rest + d * complex(w @ line.N), start.rest_turning
+    moved = [] if slider is None else [(slider, 1.0)]
     if line.row is not None:
-        velocity[line.row] += w @ line.e
-    rest = (
-        start.rest
-        + d * w @ line.N
-        + 2 * line.rate * (w @ spin)
-        + d * run * (2 * l @ spin + run * (dl @ line.e))
-    )
-    rest_turning = start.rest_turning + run * (
-        2 * db @ yd + run * ddb @ y - 2 * line.rate / d * (db @ y)
-    )
-    return Frame(
-        complex(start.place + d * w @ line.e),
-        float(start.angle + b @ y),
-        velocity,
-        turning,
-        complex(rest),
-        float(rest_turning),
-    )
+        velocity[line.row] += reach
+        rest += 2 * line.rate * complex(w @ line.rates)
+        moved += [(line.row, 1.0 - xi)] if xi < 1.0 else []
+    if moved:
+        tangent, curvature = complex(l @ line.e), float(db @ y) / d
+        for row, share in moved:
+            velocity[row] += share * tangent
+            turning[row] += share * curvature
+        run = sum(share * float(line.qd[row]) for row, share in moved) / d
+        rest += d * run * (2 * complex(l @ line.rates) + run * complex(dl @ line.e))
+        rest_turning += run * (2 * float(db @ line.qd[line.own]) + run * float(ddb @ y) - 2 * line.rate * curvature)
+    return Frame(start.place + d * reach, start.angle + float(b @ y), velocity, turning, rest, rest_turning)

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from .kinematics import Frame, Line
 
 
-@dataclass(frozen=True)
-class Masses:
+class Masses(NamedTuple):
     """Point masses and their motion (13).
 
     mass (G,) [kg], place (G,) [m]; columns (G, n) of their velocities; rest (G,): accelerations at
@@ -23,8 +22,7 @@ class Masses:
     rest: np.ndarray
 
 
-@dataclass(frozen=True)
-class Turning:
+class Turning(NamedTuple):
     """A moment of inertia [kg m^2] that turns with a frame, with columns (n,) (13)."""
 
     inertia: float
@@ -35,11 +33,40 @@ class Turning:
 Part = Masses | Turning
 
 
+class Sum(NamedTuple):
+    """What (14) to (16) sum over, a row for x, y of each mass and each angle: weights, columns (R, n), accelerations (R,)."""
+
+    weight: np.ndarray
+    columns: np.ndarray
+    rest: np.ndarray
+
+    @property
+    def mass(self) -> np.ndarray:
+        """M (n, n), the sum of J^T m J (14)."""
+        return self.columns.T @ (self.weight[:, None] * self.columns)
+
+    @property
+    def forces(self) -> np.ndarray:
+        """The sum of J^T m a, a the accelerations at zero ones of the unknowns (15), (16): (n,)."""
+        return (self.weight * self.rest) @ self.columns
+
+
+def summed(parts: list[Part], gravity: complex = 0j) -> Sum:
+    """The rows of all parts; gravity is an acceleration of the base (16)."""
+    points = [p for p in parts if isinstance(p, Masses)]
+    angles = [p for p in parts if isinstance(p, Turning)]
+    mass, J = np.concatenate([p.mass for p in points]), np.concatenate([p.columns for p in points])
+    a = np.concatenate([p.rest for p in points]) - gravity
+    return Sum(
+        np.concatenate([mass, mass, [p.inertia for p in angles]]),
+        np.concatenate([J.real, J.imag, *(p.columns[None] for p in angles)]),
+        np.concatenate([a.real, a.imag, [p.rest for p in angles]]),
+    )
+
+
 def lump(mass: float, frame: Frame) -> Masses:
     """A point mass in a frame's origin."""
-    return Masses(
-        np.array([mass]), np.array([frame.place]), frame.velocity[None], np.array([frame.rest])
-    )
+    return Masses(np.array([mass]), np.array([frame.place]), frame.velocity[None], np.array([frame.rest]))
 
 
 def turning(inertia: float, frame: Frame) -> Turning:
@@ -61,45 +88,6 @@ def line_masses(line: Line) -> Masses:
 def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Scalar products of columns a (G, n) with b (G,) or (G, k), summed over the points."""
     return np.real(a.conj().T @ b)
-
-
-def mass_matrix(n: int, parts: list[Part]) -> np.ndarray:
-    """M (n, n), the sum of J^T m J (14)."""
-    M = np.zeros((n, n))
-    for p in parts:
-        if isinstance(p, Masses):
-            M += dot(p.columns, p.mass[:, None] * p.columns)
-        else:
-            M += p.inertia * np.outer(p.columns, p.columns)
-    return M
-
-
-def kinetic(parts: list[Part], qd: np.ndarray) -> float:
-    """The kinetic energy of the masses [J] (14)."""
-    total = 0.0
-    for p in parts:
-        square = np.abs(p.columns @ qd) ** 2
-        total += 0.5 * float(p.mass @ square if isinstance(p, Masses) else p.inertia * square)
-    return total
-
-
-def inertia_forces(n: int, parts: list[Part]) -> np.ndarray:
-    """The sum of J^T m a, a the accelerations at zero ones of the unknowns (15): (n,)."""
-    h = np.zeros(n)
-    for p in parts:
-        h += (
-            dot(p.columns, p.mass * p.rest)
-            if isinstance(p, Masses)
-            else p.inertia * p.rest * p.columns
-        )
-    return h
-
-
-def weight(n: int, parts: list[Part], gravity: complex) -> np.ndarray:
-    """Generalised gravity forces on the left-hand side, (n,) (16)."""
-    return -sum(
-        (dot(p.columns, p.mass * gravity) for p in parts if isinstance(p, Masses)), np.zeros(n)
-    )
 
 
 def potential(parts: list[Part], gravity: complex) -> float:

@@ -7,7 +7,7 @@ rest on its axis, so that the link is clamped at the last of them: up to l_e beh
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -39,7 +39,7 @@ class Nodes(Structure):
         if not cut(self.robot.links[i]):
             return super().link(i, hub, q, qd)
         root = ahead(hub, q[self.rows[i]] - self.robot.links[i].length_m, [self.rows[i]], qd)
-        return replace(super().link(i, root, q, qd), hub=hub)
+        return super().link(i, root, q, qd)._replace(hub=hub)
 
     def _hub(self, i: int, before: LinkState | None, q: np.ndarray, qd: np.ndarray) -> Frame:
         if before is None or not self.robot.rides(i):
@@ -48,8 +48,7 @@ class Nodes(Structure):
         at = k / self.robot.links[i - 1].elements
         node, root = station(line, at), line.start
         moved = ahead(root, q[self.rows[i]] - at * line.free, [self.rows[i]], qd)
-        frame = replace(
-            node,
+        frame = node._replace(
             place=node.place + moved.place - root.place,
             velocity=node.velocity + moved.velocity - root.velocity,
             rest=node.rest + moved.rest - root.rest,

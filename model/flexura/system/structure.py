@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,11 +19,10 @@ from .kinematics import Frame, Line, ahead, base, line, station, turned
 from .masses import Part, line_masses, lump, turning
 
 
-@dataclass(frozen=True)
-class LinkState:
+class LinkState(NamedTuple):
     """A link in a state q, qd: frame of its hub (Pb: exit), its lines (none: rigid), its tip."""
 
-    index: int
+    number: int
     q: np.ndarray
     qd: np.ndarray
     hub: Frame
@@ -123,14 +123,14 @@ class Structure:
             return turned(tip, joint.angle_rad)
         if before is None:
             return turned(ahead(tip, q[row], [row], qd), joint.angle_rad)
-        x, rows = self._along(before.index, q[row], q)
+        x, rows = self._along(before.number, q[row], q)
         if before.lines:
             return turned(station(before.lines[0], x / before.lines[0].free, row), joint.angle_rad)
         return turned(ahead(before.hub, x, [row, *rows], qd), joint.angle_rad)
 
     def at(self, state: LinkState, s: float) -> Frame:
         """The frame of a link at arc length s [m] from its proximal end (2), (11)."""
-        x, rows = self._along(state.index, s, state.q)
+        x, rows = self._along(state.number, s, state.q)
         if not state.lines or x < 0:
             return ahead(state.hub, x, rows, state.qd)
         h = state.lines[0].free
@@ -141,7 +141,7 @@ class Structure:
         """Places of a flexible link at arc lengths s (S,) [m] from its proximal end (2)."""
         if len(state.lines) > 1:
             return np.array([self.at(state, float(x)).place for x in s])
-        line, x = state.lines[0], s + self._along(state.index, 0.0, state.q)[0]
+        line, x = state.lines[0], s + self._along(state.number, 0.0, state.q)[0]
         if line.row is None:
             return line.start.place + line.free * line.piece.kept_integrals(tuple(x / line.free)) @ line.e
         reach = line.free * line.piece.integrals(np.maximum(x, 0.0) / line.free) @ line.e
@@ -149,18 +149,22 @@ class Structure:
 
     def root(self, state: LinkState) -> complex:
         """The place of a link's proximal end (2)."""
-        if state.lines and not self.sleeved(state.index):
+        if state.lines and not self.sleeved(state.number):
             return state.lines[0].start.place
-        return state.hub.place + self._along(state.index, 0.0, state.q)[0] * state.hub.tangent
+        return state.hub.place + self._along(state.number, 0.0, state.q)[0] * state.hub.tangent
 
     def masses(self, state: LinkState) -> list[Part]:
         """A link's masses: its material, its hub, and the payload of the last one (3)."""
-        joint = self.robot.links[state.index].joint
-        return [*self.own_masses(state), lump(joint.hub_mass_kg, state.hub), turning(joint.hub_inertia_kg_m2, state.hub)]
+        joint, parts = self.robot.links[state.number].joint, self.own_masses(state)
+        if joint.hub_mass_kg:
+            parts.append(lump(joint.hub_mass_kg, state.hub))
+        if joint.hub_inertia_kg_m2:
+            parts.append(turning(joint.hub_inertia_kg_m2, state.hub))
+        return parts
 
     def own_masses(self, state: LinkState) -> list[Part]:
         """A link's masses without its hub."""
-        i, law = state.index, self.laws[state.index]
+        i, law = state.number, self.laws[state.number]
         parts: list[Part] = []
         if law is None:
             mass, centre, inertia = rigid_body(self.robot, i)

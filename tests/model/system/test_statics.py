@@ -26,7 +26,7 @@ def geometric(assembly, q, force):
             turning = np.real(-1j * line.E / line.e[:, None])
             S += turning.T @ (gamma[:, None] * turning)
             load += line.piece.mass.sum() * g
-        load += assembly.robot.links[state.index].joint.hub_mass_kg * g
+        load += assembly.robot.links[state.number].joint.hub_mass_kg * g
     return S
 
 
