@@ -44,7 +44,7 @@ struct StillPiece {
   double *sine, *cosine;         // of Theta at the points
   double hub_sine = 0.0, hub_cosine = 1.0;
   double *J;                         // (3, m + 1): motion of the next hub by turning and own unknowns
-  double *inertia, *first;           // M: turning and own unknowns (m + 1, m + 1); with the hub's place (m + 1, 2)
+  double *inertia, *first;           // M of turning and own unknowns (m + 1, m + 1), with the hub (m + 1, 2)
   double *L, *D, *tail;              // (m, m), (m) inverse pivots, (m, 3): own rows with x, y, angle
   Vec3<double> pull{0.0, 0.0, 0.0};  // the same of a free joint, and its inverse pivot
   double inverse = 0.0;
