@@ -64,6 +64,8 @@ if TYPE_CHECKING:
 
 
 def __getattr__(name: str) -> Any:
+    if name in ("signal", "shaping"):  # of 0.1: they say what they are now
+        return importlib.import_module(f".{name}", __name__)
     if name not in _HOME:
         raise AttributeError(f"module 'flexura' has no attribute {name!r}")
     home = importlib.import_module(f".{_HOME[name]}", __name__)

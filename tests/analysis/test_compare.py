@@ -116,7 +116,7 @@ def test_the_relaxed_field_is_the_sine(pulse, prescribed):
     system = fx.assemble(robot)
     t = np.linspace(0, 0.5, 101)
     pulses = onward(t, pulse * np.minimum(t / 0.02, 1.0))
-    zero = fx.signal.constant(0.0)
+    zero = fx.signals.constant(0.0)
     stands = JointDrive(force=zero, motion=zero, prescribed=True) if prescribed else zero
     found = field.held_by_field((system, system.start()), t, stands, pulses, spring, 1e-6)
     exact = fx.simulate(system, t, lambda at, q, qd, tip: [0.0, spring.torque(pulses(at)[0], float(q[1]), on=True)])
@@ -154,14 +154,14 @@ def pushed(force, play_m=0.0, seconds=0.6, line=LINE):
 
 def test_static_friction_holds_the_nut_until_its_force():
     for newtons, moves in ((55.9, False), (-55.9, False), (56.1, True), (-56.1, True)):
-        _, nut, speed, carriage = pushed(fx.signal.constant(newtons))
+        _, nut, speed, carriage = pushed(fx.signals.constant(newtons))
         assert (nut[-1] != 0.0) == (speed[-1] != 0.0) == moves
         np.testing.assert_array_equal(nut, carriage)  # without play
 
 
 def test_the_nut_runs_and_coasts_as_the_line_says():
     """v = v_1 (1 - exp(-c t / m)), v_1 = (F - f) / c; from v_0 it coasts  m v_0 / c - (f m / c^2) ln(1 + c v_0 / f)."""
-    t, nut, speed, _ = pushed(fx.signal.piecewise([0.0, 0.3], [236.0, 0.0]))
+    t, nut, speed, _ = pushed(fx.signals.piecewise([0.0, 0.3], [236.0, 0.0]))
     c, m, f = LINE.viscous_N_s_m, 121.0, LINE.coulomb_N
     until = np.searchsorted(t, 0.3 - 1e-9)
     np.testing.assert_allclose(speed[:until], 0.05 * (1 - np.exp(-c / m * t[:until])), rtol=1e-9, atol=1e-15)
@@ -172,7 +172,7 @@ def test_the_nut_runs_and_coasts_as_the_line_says():
 
 def test_the_nut_crosses_its_play_without_the_rail_and_then_takes_the_carriage_along():
     b = 3e-4
-    t, nut, speed, carriage = pushed(fx.signal.constant(236.0), b)
+    t, nut, speed, carriage = pushed(fx.signals.constant(236.0), b)
     free = np.abs(nut) < b / 2
     c, m = LINE.viscous_N_s_m, 121.0
     np.testing.assert_allclose(speed[free], (236.0 - 32.0) / c * (1 - np.exp(-c / m * t[free])), rtol=1e-9, atol=1e-15)
@@ -180,7 +180,7 @@ def test_the_nut_crosses_its_play_without_the_rail_and_then_takes_the_carriage_a
     np.testing.assert_allclose(carriage[~free], nut[~free] - b / 2, atol=1e-15)
     assert speed[-1] == pytest.approx((236.0 - 36.0) / c, rel=1e-6)
     held_by_rail = dataclasses.replace(LINE, static_N=50.0, coulomb_N=50.0, rail_N=40.0)
-    _, nut, _, carriage = pushed(fx.signal.constant(45.0), b, seconds=2.0, line=held_by_rail)
+    _, nut, _, carriage = pushed(fx.signals.constant(45.0), b, seconds=2.0, line=held_by_rail)
     assert nut[-1] == nut[-2] and 0.0 < carriage[-1] < b / 2  # the flank soon stops it
     assert carriage[-1] == pytest.approx(nut[-1] - b / 2)
 

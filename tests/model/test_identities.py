@@ -153,13 +153,15 @@ def test_gravity_and_stiffness_are_gradients_of_the_energies(bot, seed):
 @fast
 @given(robots(coulomb=True, locked=True), seeds)
 def test_the_recursion_solves_the_assembled_equations(bot, seed):
-    """accelerate, of cost O(N), against M^-1 (F - bias - D qd - K q - gravity)."""
+    """accelerate, of cost O(N), against M^-1 (F - bias - D qd - K q - gravity), to the digits that solving with M leaves."""
     sys = fx.assemble(bot)
     q, qd = state(sys, seed)
     qd = at_rest_if_locked(sys, qd)
     tau = forces(sys, seed)
     size = turning(sys)
-    close(recursion(sys, q, qd, tau) * size, acceleration(sys, q, qd, tau) * size, 1e-8)
+    M, scale = sys.mass(q), 1 / np.sqrt(np.diag(sys.mass(q)))
+    lost = np.finfo(float).eps * np.linalg.cond(scale[:, None] * M * scale)
+    close(recursion(sys, q, qd, tau) * size, acceleration(sys, q, qd, tau) * size, max(1e-8, lost))
 
 
 @fast

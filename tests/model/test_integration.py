@@ -306,7 +306,7 @@ def test_an_interrupted_python_drive_keeps_what_it_has():
 
 _LONG = """
 import numpy as np, flexura as fx
-from flexura import signal
+from flexura import signals
 from robots import bench_arm
 def progress(done):
     print("going", flush=True)
