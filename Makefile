@@ -70,7 +70,7 @@ test-long: $(CORE)
 
 # make bench BENCH="type4 pendulum --rounds 3" times a few problems; BENCH=--help says what there is.
 bench: $(CORE)
-	@$(VENV)/bin/python -m flexlab.bench $(BENCH)
+	@$(VENV)/bin/python -m flexlab.benchmarks $(BENCH)
 
 # make flash PORT=/dev/ttyACM0, or without PORT the one Mega 2560 that is plugged in; CONFIGURE=1 writes the rig's constants too.
 flash: $(CORE)

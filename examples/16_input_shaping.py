@@ -14,8 +14,7 @@ import numpy as np
 
 import flexura as fx
 from comparison import Comparison
-from flexura.signals import cycloid
-from flexura.signals.shaping import zv, zvd
+from flexura.signals import cycloid, zv, zvd
 
 LENGTH_M, MASS_KG_M, STIFFNESS_N_M2, WAY_M, TIME_S = 0.6, 0.2355, 0.5, 1e-3, 0.6
 

@@ -75,7 +75,8 @@ class Comparison:
         worst = np.max([row[3] for row in self._rows])  # not a number if one of them is not
         met = bool(worst <= self.bound)
         print(
-            f"largest relative difference {worst:.1e}, bound {self.bound:.1e}: {'met' if met else 'MISSED'}"
+            f"largest relative difference {worst:.1e}, bound {self.bound:.1e}: "
+            f"{'met' if met else 'MISSED'}"
         )
         sys.exit(0 if met else 1)
 

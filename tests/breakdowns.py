@@ -1,4 +1,5 @@
-"""What no control tick detects: a host silent or drowned out, hangs, resets, a damaged memory; and what is measured then."""
+"""What no control tick detects: a host silent or drowned out, hangs, resets, a damaged memory; and
+what is measured then."""
 
 from __future__ import annotations
 
@@ -11,12 +12,12 @@ import pytest
 
 from boards import TICK, Rigged
 from faults import Case, Row, begins, nothing, only_by_hand
-from flexlab.board import messages
 from flexlab.board.base import BoardError
-from flexlab.board.declaration import CONFIG, Fault, Result, State
-from flexlab.board.frames import encode
-from flexlab.board.link import Refused
-from flexlab.flash import crc
+from flexlab.board.protocol import messages
+from flexlab.board.protocol.declaration import CONFIG, Fault, Result, State
+from flexlab.board.protocol.frames import encode
+from flexlab.board.protocol.session import Refused
+from flexlab.experiment.flash import crc
 
 
 def restarted(r: Rigged, seconds: float = 0.3) -> None:
@@ -30,7 +31,8 @@ def restarted(r: Rigged, seconds: float = 0.3) -> None:
 
 
 def off_until_armed(r: Rigged, state: State, fault: Fault) -> int:
-    """After a reset: the reason, outputs off, nothing moves before reference and arm. Returns the last driven cycle."""
+    """After a reset: the reason, outputs off, nothing moves before reference and arm. Returns the
+    last driven cycle."""
     who = r.link.connect()
     assert (who.state, who.fault) == (state, fault)
     off_since = r.last_driven
@@ -38,7 +40,9 @@ def off_until_armed(r: Rigged, state: State, fault: Fault) -> int:
     assert not r.driven and r.last_driven == off_since
     with pytest.raises(Refused) as refused:
         r.link.command("arm", mode=1)
-    assert refused.value.result is (Result.wrong_state if state is State.fault else Result.not_referenced)
+    assert refused.value.result is (
+        Result.wrong_state if state is State.fault else Result.not_referenced
+    )
     if fault is not Fault.none:
         r.link.command("clear", fault=fault)
     r.link.command("reference", position_1=0, position_2=0, steps=0)
@@ -64,7 +68,8 @@ def resets(cause: str, fault: Fault) -> Callable[[str], Row]:
 
 
 def hangs(symbol: str) -> Callable[[str], Row]:
-    """The code at a symbol becomes an endless loop (in simavr's flash) and is put right again at the reset, which cures it."""
+    """The code at a symbol becomes an endless loop (in simavr's flash) and is put right again at
+    the reset, which cures it."""
 
     def measured(compiler: str) -> Row:
         with Rigged(compiler) as r:
@@ -88,11 +93,14 @@ def hangs(symbol: str) -> Callable[[str], Row]:
 
 
 def silent(noise: Callable[[Rigged], bytes]) -> Callable[[str], Row]:
-    """The host says nothing that the board could take; `noise` is what is on the line instead, anew every millisecond."""
+    """The host says nothing that the board could take; `noise` is what is on the line instead, anew
+    every millisecond."""
 
     def measured(compiler: str) -> Row:
         with Rigged(compiler, trace=("busy",)) as r:
-            r.go(r.back_and_forth(duration_s=1.0))  # all of it fits the look-ahead twice over: no underrun comes first
+            r.go(
+                r.back_and_forth(duration_s=1.0)
+            )  # all of it fits the look-ahead twice over: no underrun comes first
             board = r.board
             while board.simulator.unsent:
                 board.wait(0.00025)
@@ -107,7 +115,11 @@ def silent(noise: Callable[[Rigged], bytes]) -> Callable[[str], Row]:
             r.until(lambda: r.fault is not Fault.none, 0.5, feed=False)
             assert r.fault is Fault.host_silent and r.state is State.fault
             ticks = begins(board.simulator.edges())
-            row = Row(Fault.host_silent, r.last_driven - caused, r.last_driven - ticks[r.link.newest["fault_tick"] - 1])
+            row = Row(
+                Fault.host_silent,
+                r.last_driven - caused,
+                r.last_driven - ticks[r.link.newest["fault_tick"] - 1],
+            )
             r.player = None
             only_by_hand(r, Case(Fault.host_silent, "", nothing, 0.0))
             return row
@@ -116,7 +128,8 @@ def silent(noise: Callable[[Rigged], bytes]) -> Callable[[str], Row]:
 
 
 def flipped(compiler: str, bits: slice) -> int:
-    """Boots a board for each flipped bit of the stored configuration: all in Fault, with safe defaults. Returns how many."""
+    """Boots a board for each flipped bit of the stored configuration: all in Fault, with safe
+    defaults. Returns how many."""
     with Rigged(compiler) as r:
         good = r.board.simulator.read_eeprom(0, 4096)
         used = [at for at in range(4096) if good[at] != 0xFF]
@@ -127,7 +140,11 @@ def flipped(compiler: str, bits: slice) -> int:
         spoilt[bit // 8] ^= 1 << bit % 8
         with Rigged(compiler, blank=True, eeprom=bytes(spoilt)) as r:
             who = r.link.identity
-            assert (who.state, who.fault, who.configuration_crc) == (State.fault, Fault.bad_configuration, defaults), bit
+            assert (who.state, who.fault, who.configuration_crc) == (
+                State.fault,
+                Fault.bad_configuration,
+                defaults,
+            ), bit
             with pytest.raises(BoardError):
                 r.link.command("arm", mode=1)
             assert not r.driven and r.last_driven == 0
@@ -161,10 +178,34 @@ OTHERS = {
     for name, fault, what, how, within_s in (
         ("silent host", Fault.host_silent, "host silent", silent(lambda r: b""), 0.2),
         ("flood", Fault.host_silent, "line flooded with garbage", silent(garbage), 0.2),
-        ("strangers", Fault.host_silent, "line flooded with good frames out of sequence", silent(strangers), 0.2),
+        (
+            "strangers",
+            Fault.host_silent,
+            "line flooded with good frames out of sequence",
+            silent(strangers),
+            0.2,
+        ),
         ("hung loop", Fault.watchdog, "main loop hangs", hangs("loop"), BITE_S + 0.01),
-        ("hung interrupt", Fault.watchdog, "control interrupt hangs, no other runs", hangs("__vector_47"), 2 * BITE_S + 0.02),
-        ("reset", Fault.none, "reset in mid-motion: button, or a program opens the port", resets("external", Fault.none), 0.0),
-        ("brown-out", Fault.brown_out, "dip of the board's supply (its flag set)", resets("brown-out", Fault.brown_out), 0.0),
+        (
+            "hung interrupt",
+            Fault.watchdog,
+            "control interrupt hangs, no other runs",
+            hangs("__vector_47"),
+            2 * BITE_S + 0.02,
+        ),
+        (
+            "reset",
+            Fault.none,
+            "reset in mid-motion: button, or a program opens the port",
+            resets("external", Fault.none),
+            0.0,
+        ),
+        (
+            "brown-out",
+            Fault.brown_out,
+            "dip of the board's supply (its flag set)",
+            resets("brown-out", Fault.brown_out),
+            0.0,
+        ),
     )
 }

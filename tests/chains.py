@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from flexura.robot import Robot
+from flexura.robot.robot import Robot
 from flexura.system.assembly import Assembly
 from robots import beam, rigid, robot
 
@@ -27,7 +27,9 @@ SMALL = {
     "R, Pa on modes": robot(beam(1.0, 1.0, 1.0, 2, modes=3), RIDER, **LOAD),
     "R, Pa on all shapes": robot(beam(1.0, TAPER, 1.0, 2, **DAMPED), RIDER, **LOAD),
     "Pb": robot(beam(1.0, 1.0, 1.0, 2, "Pb", start=0.6, angle_rad=0.2, **HUB), **LOAD),
-    "R, Pb, taper": robot(ARM, beam(1.0, TAPER, TAPER, 2, "Pb", start=0.6, **HUB, **DAMPED), **LOAD),
+    "R, Pb, taper": robot(
+        ARM, beam(1.0, TAPER, TAPER, 2, "Pb", start=0.6, **HUB, **DAMPED), **LOAD
+    ),
     "R, Pb, modes": robot(ARM, beam(1.0, TAPER, TAPER, 2, "Pb", start=0.6, modes=2, **HUB), **LOAD),
     "R, Pb, Pa": robot(
         ARM,
@@ -35,8 +37,10 @@ SMALL = {
         rigid(0.5, 1.0, 0.2, 0.1, "Pa", start=0.8, angle_rad=1.0, **HUB),
         **LOAD,
     ),
-    "R, Pb, Pa, rigid": robot(ARM, rigid(0.5, 1.0, 0.2, 0.1, "Pb", start=0.3, **HUB), RIDER, **LOAD),
-}  # fmt: skip
+    "R, Pb, Pa, rigid": robot(
+        ARM, rigid(0.5, 1.0, 0.2, 0.1, "Pb", start=0.3, **HUB), RIDER, **LOAD
+    ),
+}
 
 
 def random_chain(rng: np.random.Generator, links: int = 3) -> Robot:

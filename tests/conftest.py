@@ -1,4 +1,5 @@
-"""A test run that was started in the background ignores Ctrl-C, and so would every program that a test starts to interrupt it."""
+"""A test run that was started in the background ignores Ctrl-C, and so would every program that a
+test starts to interrupt it."""
 
 from __future__ import annotations
 

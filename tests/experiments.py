@@ -1,4 +1,5 @@
-"""Experiments for the tests: on the emulated board in this process, and by the command in another, over a pseudo-terminal."""
+"""Experiments for the tests: on the emulated board in this process, and by the command in another,
+over a pseudo-terminal."""
 
 from __future__ import annotations
 
@@ -13,15 +14,18 @@ from pathlib import Path
 
 from boards import BENCH, configured, elf
 from flexlab import rig
-from flexlab.board.emulated import EmulatedBoard
+from flexlab.board.emulator.emulated import EmulatedBoard
 from flexlab.board.pty import Pty
-from flexlab.experiment import conduct as steps
-from flexlab.experiment.conduct import Done, Opened, Watch, conduct
+from flexlab.experiment import run_experiment as steps
 from flexlab.experiment.plan import Plan
-from flexlab.rig.drives import Drives
+from flexlab.experiment.run_experiment import Done, Opened, Watch, conduct
+from flexlab.rig.plant.rigid_plant import Drives
 
 ROOT = Path(__file__).resolve().parents[1]
-ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join(map(str, (ROOT / "model", ROOT / "analysis"))), "COLUMNS": "160"}
+ENVIRONMENT = os.environ | {
+    "PYTHONPATH": os.pathsep.join(map(str, (ROOT / "model", ROOT / "analysis"))),
+    "COLUMNS": "160",
+}
 SETTINGS = rig.configuration(BENCH)
 
 
@@ -32,7 +36,9 @@ def board() -> EmulatedBoard:
     return made
 
 
-def experiment(plan: Plan, folder: Path, watch: Watch | None = None, opened: Opened | None = None) -> Done:
+def experiment(
+    plan: Plan, folder: Path, watch: Watch | None = None, opened: Opened | None = None
+) -> Done:
     """One experiment in this process."""
     opened = opened or Opened(board(), 0, {}, None)
     try:
@@ -42,7 +48,8 @@ def experiment(plan: Plan, folder: Path, watch: Watch | None = None, opened: Ope
 
 
 class Line:
-    """An emulated board behind a pseudo-terminal, at the wall clock's pace, in a thread of its own."""
+    """An emulated board behind a pseudo-terminal, at the wall clock's pace, in a thread of its
+    own."""
 
     def __init__(self) -> None:
         self.board = board()
@@ -100,15 +107,19 @@ class Line:
 
 def command(*arguments: object, cwd: Path, **more: object) -> subprocess.Popen[str]:
     """`flexura bench ...` as a process."""
-    line = [sys.executable, "-m", "flexlab.cli", "bench", *map(str, arguments)]
+    line = [sys.executable, "-m", "flexlab.cli.app", "bench", *map(str, arguments)]
     pipe, surroundings = subprocess.PIPE, {"stdin": subprocess.DEVNULL} | more
-    return subprocess.Popen(line, cwd=cwd, env=ENVIRONMENT, stdout=pipe, stderr=pipe, text=True, **surroundings)
+    return subprocess.Popen(
+        line, cwd=cwd, env=ENVIRONMENT, stdout=pipe, stderr=pipe, text=True, **surroundings
+    )
 
 
 @contextmanager
 def running(line: Line, *arguments: object, cwd: Path, **more: object):
     """The command on a line, once the motors are on; killed at the end if it is still there."""
-    process = command(*arguments, "--port", line.device, "--yes", "--countdown-s", 0, cwd=cwd, **more)
+    process = command(
+        *arguments, "--port", line.device, "--yes", "--countdown-s", 0, cwd=cwd, **more
+    )
     try:
         line.wait(lambda: line.driven or process.poll() is not None)
         yield process

@@ -1,8 +1,10 @@
-"""The table of analysis/README.md: python tests/identification_table.py [SEEDS] [FILE], some 40 s a rig on one core.
+"""The table of analysis/README.md: python tests/identification_table.py [SEEDS] [FILE], some 40 s a
+rig on one core.
 
-For each seed a rig drawn at random is excited for ten seconds on the emulated board and identified; a row says by how much the
-estimates are off, in percent, and whether the 95 % interval holds the true value (* where it does not). With a FILE each rig is
-kept there when it is done, and rigs that it holds are not computed again: delete it when the program has changed.
+For each seed a rig drawn at random is excited for ten seconds on the emulated board and identified;
+a row says by how much the estimates are off, in percent, and whether the 95 % interval holds the
+true value (* where it does not). With a FILE each rig is kept there when it is done, and rigs that
+it holds are not computed again: delete it when the program has changed.
 """
 
 from __future__ import annotations
@@ -42,7 +44,11 @@ def rig(seed: int) -> dict:
 
 
 def main(seeds: int, file: Path | None) -> None:
-    kept = [json.loads(line) for line in file.read_text().splitlines()] if file and file.exists() else []
+    kept = (
+        [json.loads(line) for line in file.read_text().splitlines()]
+        if file and file.exists()
+        else []
+    )
     known = {row["seed"]: row for row in kept}
     for seed in range(seeds):
         if seed not in known:
@@ -57,9 +63,18 @@ def main(seeds: int, file: Path | None) -> None:
         cells = (f"{100 * e:+.2f}{'' if held else ' *'}" for e, held in row["errors"].values())
         print(f"| {seed} |", " | ".join(cells), f"| {row['spent_s']:.0f} s |", flush=True)
     columns = list(zip(*(known[seed]["errors"].values() for seed in range(seeds)), strict=True))
-    print("| largest |", " | ".join(f"{100 * max(abs(e) for e, _ in each):.2f}" for each in columns), "| |")
-    print("| held |", " | ".join(f"{sum(h for _, h in each)} of {seeds}" for each in columns), "| |")
+    print(
+        "| largest |",
+        " | ".join(f"{100 * max(abs(e) for e, _ in each):.2f}" for each in columns),
+        "| |",
+    )
+    print(
+        "| held |", " | ".join(f"{sum(h for _, h in each)} of {seeds}" for each in columns), "| |"
+    )
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 20, Path(sys.argv[2]) if len(sys.argv) > 2 else None)
+    main(
+        int(sys.argv[1]) if len(sys.argv) > 1 else 20,
+        Path(sys.argv[2]) if len(sys.argv) > 2 else None,
+    )

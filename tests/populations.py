@@ -19,12 +19,20 @@ DRIVE = fx.Drive.force(bang_bang(2.0, 0.1, 0.01), bang_bang(0.05, 0.1, 0.01))
 
 
 def varied(count: int = 20) -> fx.Batch:
-    return fx.Batch.vary(ARM, {"payload.mass_kg": np.linspace(0, 0.1, count), "link.2.length_m": np.linspace(0.25, 0.35, count)})
+    return fx.Batch.vary(
+        ARM,
+        {
+            "payload.mass_kg": np.linspace(0, 0.1, count),
+            "link.2.length_m": np.linspace(0.25, 0.35, count),
+        },
+    )
 
 
 def same(a: fx.Population, b: fx.Population) -> bool:
     """Equal to the last bit, NaN where NaN is."""
-    return set(a.units) == set(b.units) and all(np.array_equal(a[name], b[name], equal_nan=True) for name in a.units)
+    return set(a.units) == set(b.units) and all(
+        np.array_equal(a[name], b[name], equal_nan=True) for name in a.units
+    )
 
 
 def no_number(t: Any, channels: Any) -> str:

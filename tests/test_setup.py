@@ -1,4 +1,6 @@
-"""What tools/setup.py decides, given a machine; what it then runs is tried by every `make` on a fresh one."""
+"""What tools/setup.py decides, given a machine; what it then runs is tried by every `make` on a
+fresh one."""
+
 import importlib.util
 import re
 from pathlib import Path
@@ -42,18 +44,40 @@ def test_a_complete_machine_needs_nothing():
 def test_a_bare_debian_needs_all():
     needs = setup.missing(BARE, nothing, [], "linux")
     board = ["gcc-avr", "avr-libc", "arduino-core-avr", "avrdude", "g++", "libsimavr-dev", "simavr"]
-    assert packages(needs) == ["python3.11-venv", "g++", "libgl1", "libx11-6", "libvulkan1", *board, "mesa-vulkan-drivers"]
-    assert [need.package for need in needs if need.vital] == ["python3.11-venv", "g++", "libgl1", "libx11-6"]
+    assert packages(needs) == [
+        "python3.11-venv",
+        "g++",
+        "libgl1",
+        "libx11-6",
+        "libvulkan1",
+        *board,
+        "mesa-vulkan-drivers",
+    ]
+    assert [need.package for need in needs if need.vital] == [
+        "python3.11-venv",
+        "g++",
+        "libgl1",
+        "libx11-6",
+    ]
 
 
 @pytest.mark.parametrize("library", [*setup.LIBRARIES, *setup.BOARD])
 def test_each_library_is_asked_for_by_itself(library):
-    assert packages(setup.missing(DEBIAN, lambda name: name != library.what, LAVAPIPE, "linux")) == [library.package]
+    assert packages(
+        setup.missing(DEBIAN, lambda name: name != library.what, LAVAPIPE, "linux")
+    ) == [library.package]
 
 
 def test_the_venv_package_follows_the_version_and_only_for_the_system_python():
-    assert packages(setup.missing(BARE._replace(version=(3, 13)), everything, LAVAPIPE, "linux")) == ["python3.13-venv"]
-    own = setup.missing(BARE._replace(path="/opt/python/bin/python3", of_system=False), everything, LAVAPIPE, "linux")
+    assert packages(
+        setup.missing(BARE._replace(version=(3, 13)), everything, LAVAPIPE, "linux")
+    ) == ["python3.13-venv"]
+    own = setup.missing(
+        BARE._replace(path="/opt/python/bin/python3", of_system=False),
+        everything,
+        LAVAPIPE,
+        "linux",
+    )
     assert packages(own) == [""]
     stop, message = setup.verdict(own, apt=True)
     assert stop and "/opt/python/bin/python3" in message and "apt-get" not in message
@@ -72,7 +96,9 @@ def test_one_compiler_of_any_name_is_enough_for_the_core(name, monkeypatch):
     assert setup.without_compiler(lambda what: what == "g++-13") == []
 
 
-@pytest.mark.parametrize(("apt", "command"), [(True, "apt-get install -y"), (False, "xcode-select --install")])
+@pytest.mark.parametrize(
+    ("apt", "command"), [(True, "apt-get install -y"), (False, "xcode-select --install")]
+)
 def test_without_a_compiler_nothing_goes_on_and_a_command_brings_one(apt, command):
     stop, message = setup.verdict(setup.without_compiler(nothing), apt, "sudo ")
     assert stop and "the core of the solver cannot be compiled" in message and command in message
@@ -82,6 +108,7 @@ def test_without_a_compiler_nothing_goes_on_and_a_command_brings_one(apt, comman
 def test_a_second_compiler_is_for_those_who_ask(monkeypatch):
     def no_clang(name):
         return name != "clang++"
+
     assert setup.missing(DEBIAN, no_clang, LAVAPIPE, "linux") == []
     monkeypatch.setenv("REQUIRE_CLANG", "1")
     assert setup.missing(DEBIAN, no_clang, LAVAPIPE, "linux") == [setup.CLANG]
@@ -90,7 +117,10 @@ def test_a_second_compiler_is_for_those_who_ask(monkeypatch):
 def test_on_debian_without_rights_the_command_to_type_is_exact():
     needs = setup.missing(BARE, nothing, [], "linux")
     stop, message = setup.verdict(needs, apt=True, sudo="sudo ")
-    packages = "python3.11-venv g++ libgl1 libx11-6 libvulkan1 gcc-avr avr-libc arduino-core-avr avrdude libsimavr-dev simavr"
+    packages = (
+        "python3.11-venv g++ libgl1 libx11-6 libvulkan1 gcc-avr avr-libc arduino-core-avr "
+        "avrdude libsimavr-dev simavr"
+    )
     typed = f"sudo apt-get install -y --no-install-recommends {packages} mesa-vulkan-drivers"
     assert stop and message.splitlines().count(f"  sudo apt-get update && {typed}") == 1
     assert "sudo" not in setup.verdict(needs, apt=True)[1]
@@ -104,7 +134,9 @@ def test_pictures_alone_never_stop():
 
 
 def test_elsewhere_the_missing_are_named_with_their_cost_and_the_set_up_goes_on():
-    stop, message = setup.verdict(setup.missing(DEBIAN, lambda name: name == "c++", [], "linux"), apt=False)
+    stop, message = setup.verdict(
+        setup.missing(DEBIAN, lambda name: name == "c++", [], "linux"), apt=False
+    )
     assert not stop and "apt-get" not in message
     for library in ("libGL.so.1", "libX11.so.6"):
         assert re.search(rf"{library} .*exudyn cannot be imported", message)
@@ -120,13 +152,20 @@ def python(path, version, has_venv=True):
 
 def test_choice_of_python():
     machine = {
-        "old": python("old", (3, 9)), "broken shim": None, "bare": python("bare", (3, 11), has_venv=False),
-        "good": python("good", (3, 12)), "too new": python("too new", (3, 99)),
+        "old": python("old", (3, 9)),
+        "broken shim": None,
+        "bare": python("bare", (3, 11), has_venv=False),
+        "good": python("good", (3, 12)),
+        "too new": python("too new", (3, 99)),
     }
     assert setup.choose(["old", "broken shim", "good"], machine.get).path == "good"
-    assert setup.choose(["bare", "good"], machine.get).path == "good"          # no need to install anything
-    assert setup.choose(["bare", "too new"], machine.get).path == "bare"       # its venv can be installed
-    with pytest.raises(setup.Stop, match=r"3\.11 to 3\.\d+ is missing.*old \(3\.9\), too new \(3\.99\)"):
+    assert setup.choose(["bare", "good"], machine.get).path == "good"  # no need to install anything
+    assert (
+        setup.choose(["bare", "too new"], machine.get).path == "bare"
+    )  # its venv can be installed
+    with pytest.raises(
+        setup.Stop, match=r"3\.11 to 3\.\d+ is missing.*old \(3\.9\), too new \(3\.99\)"
+    ):
         setup.choose(["old", "too new", "broken shim"], machine.get)
     with pytest.raises(setup.Stop, match="Found: none"):
         setup.choose([], machine.get)
@@ -155,12 +194,16 @@ def test_drivers_are_found_where_the_loader_looks(tmp_path, monkeypatch):
 
 
 def test_what_compiles_the_core_has_a_tested_version():
-    exact = dict(line.split("==") for line in (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()[1:])
+    exact = dict(
+        line.split("==")
+        for line in (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()[1:]
+    )
     assert set(setup.BUILDERS) <= set(exact)
 
 
 def test_the_core_is_compiled_again_when_a_file_of_it_changes():
-    """What the Makefile says is needed for the stamp of the core: the files, and their folders for those that come and go."""
+    """What the Makefile says is needed for the stamp of the core: the files, and their folders for
+    those that come and go."""
     text = (ROOT / "Makefile").read_text(encoding="utf-8")
     assert "$(CORE): $(READY) CMakeLists.txt $(shell find model/core)" in text
     assert "tests: $(CORE)" in text
@@ -171,6 +214,7 @@ def test_every_dependency_has_an_exact_tested_version():
 
     from packaging.requirements import Requirement
     from packaging.utils import canonicalize_name
+
     tables = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     project, wanted = tables["project"], tables["build-system"]
     lines = (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()

@@ -5,21 +5,30 @@ from __future__ import annotations
 import numpy as np
 
 import flexura as fx
-from flexlab.tuning.free import free
+from flexlab.tuning.search_space import free
 from flexlab.tuning.task import Task
-from flexura.drive import Drive, JointDrive, Manoeuvre
-from flexura.gains import Gains
+from flexura.control.gains import Gains
 from flexura.signals import step
+from flexura.signals.drive import Drive, JointDrive, Manoeuvre
 
 LINK = {
-    "length_m": 0.3, "elements": 2, "section": {"width_m": 0.02, "height_m": 0.001}, "young_modulus_Pa": 2e11,
-    "density_kg_m3": 7850.0, "damping": {"beta_s": 2e-4}, "joint": {"type": "R", "hub_inertia_kg_m2": 1e-3},
-}  # fmt: skip
+    "length_m": 0.3,
+    "elements": 2,
+    "section": {"width_m": 0.02, "height_m": 0.001},
+    "young_modulus_Pa": 2e11,
+    "density_kg_m3": 7850.0,
+    "damping": {"beta_s": 2e-4},
+    "joint": {"type": "R", "hub_inertia_kg_m2": 1e-3},
+}
 ROBOT = fx.Robot.from_dict({"name": "one link", "link": [LINK], "payload": {"mass_kg": 0.02}})
 SWING = Manoeuvre("a quarter", 1.0, 0.005, Drive((JointDrive(motion=step(np.pi / 4)),)))
-GAINS = Gains({"kp_1_N_m_rad": 2.0, "kd_1_N_m_s_rad": 0.1, "torque_max_1_N_m": 0.5, "setpoint_1_Hz": 3.0})
+GAINS = Gains(
+    {"kp_1_N_m_rad": 2.0, "kd_1_N_m_s_rad": 0.1, "torque_max_1_N_m": 0.5, "setpoint_1_Hz": 3.0}
+)
 FREE = (free("kp_1_N_m_rad", 0.1, 20), free("kd_1_N_m_s_rad", 0.01, 2), free("kf_1_N_m_m", -20, 20))
 
 
 def task(**changes) -> Task:
-    return Task(**({"robots": (ROBOT,), "manoeuvre": SWING, "gains": GAINS, "free": FREE} | changes))
+    return Task(
+        **({"robots": (ROBOT,), "manoeuvre": SWING, "gains": GAINS, "free": FREE} | changes)
+    )

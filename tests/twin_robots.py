@@ -2,15 +2,24 @@
 
 from scipy.integrate import solve_ivp
 
-from flexura.robot import Robot
+from flexura.robot.robot import Robot
 
-STEEL = {"section": {"width_m": 0.03, "height_m": 0.001}, "young_modulus_Pa": 2.0e11, "density_kg_m3": 7850.0}
+STEEL = {
+    "section": {"width_m": 0.03, "height_m": 0.001},
+    "young_modulus_Pa": 2.0e11,
+    "density_kg_m3": 7850.0,
+}
 G = 9.81
 
 
 def robot(*links, gravity=(0.0, 0.0), payload=0.0, payload_inertia=0.0, **keys):
     return Robot.from_dict(
-        {"link": list(links), "gravity_m_s2": gravity, "payload": {"mass_kg": payload, "inertia_kg_m2": payload_inertia}} | keys
+        {
+            "link": list(links),
+            "gravity_m_s2": gravity,
+            "payload": {"mass_kg": payload, "inertia_kg_m2": payload_inertia},
+        }
+        | keys
     )
 
 
@@ -21,9 +30,13 @@ def rigid(length, mass, centre, inertia, type="R", **joint):
 
 def beam(length, mass, stiffness, type="R", elements=4, beta=0.0, **joint):
     return {
-        "length_m": length, "elements": elements, "mass_per_length_kg_m": mass, "bending_stiffness_N_m2": stiffness,
-        "damping": {"beta_s": beta}, "joint": {"type": type} | joint,
-    }  # fmt: skip
+        "length_m": length,
+        "elements": elements,
+        "mass_per_length_kg_m": mass,
+        "bending_stiffness_N_m2": stiffness,
+        "damping": {"beta_s": beta},
+        "joint": {"type": type} | joint,
+    }
 
 
 def bench_arm(**joint):
@@ -33,10 +46,16 @@ def bench_arm(**joint):
 def rig():
     return robot(
         rigid(0.10, 0.60, 0.05, 5e-4, "Pa"),
-        {"length_m": 0.3, "elements": 4, **STEEL, "section": {"width_m": 0.02, "height_m": 0.001}, "damping": {"beta_s": 2e-4},
-         "joint": {"type": "R", "rotor_inertia": 5.4e-6}},
+        {
+            "length_m": 0.3,
+            "elements": 4,
+            **STEEL,
+            "section": {"width_m": 0.02, "height_m": 0.001},
+            "damping": {"beta_s": 2e-4},
+            "joint": {"type": "R", "rotor_inertia": 5.4e-6},
+        },
         payload=0.02,
-    )  # fmt: skip
+    )
 
 
 def total_energy(run):

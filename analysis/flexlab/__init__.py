@@ -1,1 +1,2 @@
-"""flexlab: the laboratory around the model: cross-checks, the review in Rerun, and the command `flexura`."""
+"""flexlab: the laboratory around the model: cross-checks, the review in Rerun, and the command
+`flexura`."""

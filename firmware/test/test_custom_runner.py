@@ -1,4 +1,5 @@
-"""PlatformIO's runner of the unit tests: reads the lines that check.h prints, which are Unity's, and downloads nothing."""
+"""PlatformIO's runner of the unit tests: reads the lines that check.h prints, which are Unity's,
+and downloads nothing."""
 
 from platformio.public import UnityTestRunner
 

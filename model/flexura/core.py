@@ -1,8 +1,9 @@
 """The one door to the compiled core: flat arrays of float64 in, flat arrays out.
 
-The core (`model/core`, C++) is compiled when flexura is installed, never later. On x86-64 there are two builds of it: one for
-processors of the level x86-64-v3 (most since 2013) and a plain one for all others. Both give the same digits. The environment
-variable FLEXURA_CORE, "plain" or "x86-64-v3", overrides the choice.
+The core (`model/core`, C++) is compiled when flexura is installed, never later. On x86-64 there are
+two builds of it: one for processors of the level x86-64-v3 (most since 2013) and a plain one for
+all others. Both give the same digits. The environment variable FLEXURA_CORE, "plain" or
+"x86-64-v3", overrides the choice.
 """
 
 from __future__ import annotations
@@ -24,13 +25,16 @@ def load(level: str) -> ModuleType:
 
     Args: level: a key of BUILDS, or "" for the best that this processor can run.
 
-    Raises: ImportError: there is no such level, this processor lacks it, or the core was not compiled for this Python.
+    Raises: ImportError: there is no such level, this processor lacks it, or the core was not
+    compiled for this Python.
     """
     if level and level not in BUILDS:
         raise ImportError(f"FLEXURA_CORE is {level!r}: expected {' or '.join(BUILDS)}")
     able = levels()
     if level and level not in able:
-        raise ImportError(f"FLEXURA_CORE asks for {level}, whose instructions this processor does not have")
+        raise ImportError(
+            f"FLEXURA_CORE asks for {level}, whose instructions this processor does not have"
+        )
     return _module(BUILDS[level or able[-1]])
 
 
@@ -39,7 +43,8 @@ def _module(name: str) -> ModuleType:
         return importlib.import_module(f".{name}", __package__)
     except ModuleNotFoundError as error:
         raise ImportError(
-            f"The compiled core of flexura is missing ({error}). `make setup` in the checkout compiles it, or `pip install .`"
+            f"The compiled core of flexura is missing ({error}). `make setup` in the checkout "
+            f"compiles it, or `pip install .`"
         ) from error
 
 
@@ -49,7 +54,9 @@ level: str = _core.level  # the build in use, a key of BUILDS
 compiler: str = _core.compiler  # what compiled it
 
 Mechanics = _core.Mechanics  # the equations of one robot, from the rows of system/constants.py
-Fault = _core.Fault  # what the core refuses: args are the link (from 0; -1: none), the key and what was expected
+Fault = (
+    _core.Fault
+)  # what the core refuses: args are the link (from 0; -1: none), the key and what was expected
 Simulation = _core.Simulation  # a run in progress
 Sampler = _core.Sampler  # what is called once a tick: a PythonSampler, or a controller of the core
 PythonSampler = _core.PythonSampler

@@ -1,10 +1,12 @@
-"""The one error that bad input raises: it names the file, the key, the value and what was expected."""
+"""The one error that bad input raises: it names the file, the key, the value and what was
+expected."""
 
 from __future__ import annotations
 
 
 class FlexuraError(Exception):
-    """Something the user can put right; the command prints it as one line and exits with status 2."""
+    """Something the user can put right; the command prints it as one line and exits with status
+    2."""
 
 
 class InputError(FlexuraError):
@@ -13,12 +15,16 @@ class InputError(FlexuraError):
     Attributes: `file` (may be ""), `key`, `value` (as read), `expected` (in words, with the unit).
     """
 
-    def __init__(self, expected: str, *, key: str = "", value: object = None, file: str = "", more: int = 0) -> None:
+    def __init__(
+        self, expected: str, *, key: str = "", value: object = None, file: str = "", more: int = 0
+    ) -> None:
         self.file, self.key, self.value, self.expected = file, key, value, expected
         where = f"{file}: " if file else ""
         shown = "" if value is None else f" = {_short(value)}"
         tail = f" (and {more} more wrong {'value' if more == 1 else 'values'})" if more else ""
-        super().__init__(_one_line(f"{where}{_cut(key, 200)}{shown}{': ' if key else ''}{expected}{tail}"))
+        super().__init__(
+            _one_line(f"{where}{_cut(key, 200)}{shown}{': ' if key else ''}{expected}{tail}")
+        )
 
     def in_file(self, file: str) -> InputError:
         """The same error, with the file's name."""
@@ -26,7 +32,8 @@ class InputError(FlexuraError):
 
 
 class WrongValue(ValueError):
-    """A wrong value found by a check across several keys of one table; `key` is relative to that table."""
+    """A wrong value found by a check across several keys of one table; `key` is relative to that
+    table."""
 
     def __init__(self, key: str, value: object, expected: str) -> None:
         self.key, self.value, self.expected = key, value, expected
@@ -36,7 +43,10 @@ class WrongValue(ValueError):
 def _short(value: object) -> str:
     try:
         return _cut(repr(value).replace("\n", " "), 60)
-    except (ValueError, RecursionError):  # a number of thousands of digits, tables in tables without end
+    except (
+        ValueError,
+        RecursionError,
+    ):  # a number of thousands of digits, tables in tables without end
         return f"(a very long {type(value).__name__})"
 
 

@@ -1,4 +1,5 @@
-"""The benchmark: its two programs agree where they are converged, its error measure, its choices, and its tables."""
+"""The benchmark: its two programs agree where they are converged, its error measure, its choices,
+and its tables."""
 
 import io
 
@@ -7,11 +8,21 @@ import pytest
 from rich.console import Console
 
 import flexura as fx
-from flexlab.bench import accuracy, choose, exudyn_run, measure, native, report, search, still, timing
-from flexlab.bench.exudyn_actions import sampled
-from flexlab.bench.motions import all_motions
-from flexlab.bench.problem import error, scale
-from flexlab.bench.signals import piecewise
+from flexlab.benchmarks import (
+    accuracy,
+    choose,
+    exudyn_run,
+    measure,
+    native,
+    report,
+    search,
+    still,
+    timing,
+)
+from flexlab.benchmarks.exudyn_actions import sampled
+from flexlab.benchmarks.motions import all_motions
+from flexlab.benchmarks.problem import error, scale
+from flexlab.benchmarks.signals import piecewise
 
 MOTIONS, STILL = all_motions(), still.all_still()
 QUICK = ("rig-pd", "rig-sampled", "payload", "arm-pd", "arm-inverse", "python-law", "friction")
@@ -32,7 +43,9 @@ def test_the_two_programs_agree(name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name in MOTIONS if name not in QUICK and MOTIONS[name].available])
+@pytest.mark.parametrize(
+    "name", [name for name in MOTIONS if name not in QUICK and MOTIONS[name].available]
+)
 def test_the_two_programs_agree_on_all_problems(name):
     assert converged_apart(MOTIONS[name]) <= 1.2 * search.stored()[name]["apart"] + SLACK
 
@@ -40,9 +53,14 @@ def test_the_two_programs_agree_on_all_problems(name):
 @pytest.mark.parametrize("name", ["rig-pd", "payload"])
 def test_a_stored_choice_holds_the_error_that_it_states(name):
     problem, choice = MOTIONS[name], search.choice(name)
-    exact = exudyn_run.run(problem, exudyn_run.Choice(problem.finer_elements or choice.elements, 8 * choice.substeps).tight())[1]
+    exact = exudyn_run.run(
+        problem,
+        exudyn_run.Choice(problem.finer_elements or choice.elements, 8 * choice.substeps).tight(),
+    )[1]
     found = error(exudyn_run.run(problem, choice)[1], exact)
-    assert found <= 1.1 * search.TARGET and found == pytest.approx(search.stored()[name]["error"], rel=0.2)
+    assert found <= 1.1 * search.TARGET and found == pytest.approx(
+        search.stored()[name]["error"], rel=0.2
+    )
 
 
 def test_every_motion_has_a_stored_choice_within_the_target():
@@ -59,13 +77,17 @@ def test_the_cheapest_setting_holds_the_error():
     system, exact = native.system(problem.robot), native.converged(problem)
     best, auto = choose.cheapest(problem, system, exact, 1e-3)
     for setting in (best, auto):
-        assert error(native.run(problem, system, setting.rtol, setting.method).channels, exact) <= 1e-3
+        assert (
+            error(native.run(problem, system, setting.rtol, setting.method).channels, exact) <= 1e-3
+        )
     assert auto.method == "auto" and best.seconds <= auto.seconds
 
 
 def test_a_lucky_hit_does_not_count(monkeypatch):
     errors = dict(zip(choose.RTOLS, [1.0, 5e-4, 2e-3, 8e-4, 7e-4] + [1e-9] * 9, strict=True))
-    answer = lambda problem, system, rtol, method, **keys: native.Answer(1.0, 10, method, {"off": np.array(errors[rtol])})
+    answer = lambda problem, system, rtol, method, **keys: native.Answer(
+        1.0, 10, method, {"off": np.array(errors[rtol])}
+    )
     monkeypatch.setattr(choose.native, "run", answer)
     monkeypatch.setattr(choose, "error", lambda channels, exact: float(channels["off"]))
     found = choose.loosest(None, None, {}, 1e-3, "implicit", 1.0)
@@ -74,7 +96,11 @@ def test_a_lucky_hit_does_not_count(monkeypatch):
 
 def test_the_error_is_that_of_places_and_deflections_over_the_largest_deflection():
     t = np.linspace(0, 1, 101)
-    exact = {"tip/x": np.cos(t), "tip/y": np.sin(t), "link/1/tip_deflection": 0.1 * np.sin(t * np.pi)}
+    exact = {
+        "tip/x": np.cos(t),
+        "tip/y": np.sin(t),
+        "link/1/tip_deflection": 0.1 * np.sin(t * np.pi),
+    }
     assert scale(exact) == pytest.approx(0.1)
     moved = exact | {"tip/x": exact["tip/x"] + 3e-4, "tip/y": exact["tip/y"] + 4e-4}
     assert error(moved, exact) == pytest.approx(5e-3)
@@ -88,7 +114,9 @@ def test_the_error_is_that_of_places_and_deflections_over_the_largest_deflection
 def test_exudyns_table_of_a_signal_that_jumps_has_its_impulse():
     signal, step, steps = piecewise([0.0, 0.0333, 0.07], [1.0, -2.0, 0.0]), 0.01, 10
     table = sampled([signal], steps, step)[:, 0]
-    impulse = step * (table.sum() - table[[0, -1]].sum() / 2)  # trapezoidal rule, as the solver takes a load
+    impulse = step * (
+        table.sum() - table[[0, -1]].sum() / 2
+    )  # trapezoidal rule, as the solver takes a load
     assert impulse == pytest.approx(1.0 * 0.0333 - 2.0 * (0.07 - 0.0333), rel=1e-12)
 
 
@@ -101,32 +129,73 @@ def test_frequencies_and_statics_agree():
 
 
 def test_a_row_fits_and_tells_what_failed(monkeypatch):
-    monkeypatch.setattr(measure, "walls", lambda programs, rounds: np.array([[4.0] + [0.02] * (len(programs) - 1)] * rounds))
+    monkeypatch.setattr(
+        measure,
+        "walls",
+        lambda programs, rounds: np.array([[4.0] + [0.02] * (len(programs) - 1)] * rounds),
+    )
     row = measure.motion(MOTIONS["arm-pd"], 2)
     assert row["auto"]["ratio"] == {"low": 200.0, "median": 200.0, "high": 200.0}
     assert row["default"]["error"] < 1e-3 and row["exudyn"]["error"] <= search.TARGET
     if not MOTIONS["python-tick"].available:
         assert "fx.Sampled" in measure.motion(MOTIONS["python-tick"], 2)["failed"]
     row["asked"] = 300
-    text = printed(report.motions([row, {"name": "other", "asked": None, "failed": "why"}]), report.summary([row]))
+    text = printed(
+        report.motions([row, {"name": "other", "asked": None, "failed": "why"}]),
+        report.summary([row]),
+    )
     assert "200" in text and "asked 300" in text and "geometric mean 200 of 1" in text
 
 
 @pytest.mark.parametrize("longest", [12345.6])
 def test_tables_fit_80_columns_without_cutting(longest):
     ratio = {"low": longest, "median": longest, "high": longest}
-    setting = {"method": "exponential", "took": "exponential", "rtol": 3e-5, "error": 9e-4, "ms": longest, "ratio": ratio}
-    row = {"name": "pendulum-long", "what": "w" * 60, "asked": 100.0, "best": setting, "auto": setting, "exudyn": {"ms": longest}}
+    setting = {
+        "method": "exponential",
+        "took": "exponential",
+        "rtol": 3e-5,
+        "error": 9e-4,
+        "ms": longest,
+        "ratio": ratio,
+    }
+    row = {
+        "name": "pendulum-long",
+        "what": "w" * 60,
+        "asked": 100.0,
+        "best": setting,
+        "auto": setting,
+        "exudyn": {"ms": longest},
+    }
     row["default"] = {"ms": longest, "error": 3e-5}
     tables = [
-        report.motions([row]), report.stills([row | {"name": "frequencies-sparse"}]), report.summary([row]),
+        report.motions([row]),
+        report.stills([row | {"name": "frequencies-sparse"}]),
+        report.summary([row]),
         report.populations([{"what": "p" * 40, "us": longest, "ratio": ratio, "asked": 1000.0}]),
         report.growths([{"what": "elements of a link", "count": 64, "us": longest, "times": 2.0}]),
-        report.accuracies([{"name": "pendulum-long", "undamped": True, "scale": 0.0123, "default": {"error": 1e-4},
-                            "errors": [{"rtol": r, "error": 123.4 * r} for r in accuracy.TOLERANCES]}]),
-        report.passes([{"name": "pendulum-long", "methods": ["exponential"],
-                        "passes": [{"error": e, "passes": {"exponential": 123456}} for e in accuracy.ERRORS]}]),
-    ]  # fmt: skip
+        report.accuracies(
+            [
+                {
+                    "name": "pendulum-long",
+                    "undamped": True,
+                    "scale": 0.0123,
+                    "default": {"error": 1e-4},
+                    "errors": [{"rtol": r, "error": 123.4 * r} for r in accuracy.TOLERANCES],
+                }
+            ]
+        ),
+        report.passes(
+            [
+                {
+                    "name": "pendulum-long",
+                    "methods": ["exponential"],
+                    "passes": [
+                        {"error": e, "passes": {"exponential": 123456}} for e in accuracy.ERRORS
+                    ],
+                }
+            ]
+        ),
+    ]
     for table in tables:
         text = printed(table)
         assert "…" not in text
@@ -145,14 +214,20 @@ def test_ratios_are_formed_round_by_round():
     slow, fast = np.array([8.0, 4.0, 6.0]), np.array([2.0, 2.0, 1.0])
     assert timing.ratio(slow, fast) == timing.Ratio(3.0, 4.0, 5.0)
     assert timing.geometric_mean([10.0, 1000.0]) == pytest.approx(100.0)
-    calls = iter([1.0, 0.03, 3.0, 0.05, 0.02, 0.04, 0.06, 0.01])  # first runs say how often a round repeats
+    calls = iter(
+        [1.0, 0.03, 3.0, 0.05, 0.02, 0.04, 0.06, 0.01]
+    )  # first runs say how often a round repeats
     run = lambda: next(calls)
     assert timing.walls([run, run], 1).tolist() == [[3.0, 0.05]]
 
 
 def test_accuracy_says_what_is_beyond_what_is_asked():
     entry = {"name": "a", "undamped": False, "default": {"error": 2e-4}}
-    entry["errors"] = [{"rtol": 1e-3, "error": 1e-3}, {"rtol": 1e-4, "error": 4e-3}, {"rtol": 1e-5, "error": None}]
+    entry["errors"] = [
+        {"rtol": 1e-3, "error": 1e-3},
+        {"rtol": 1e-4, "error": 4e-3},
+        {"rtol": 1e-5, "error": None},
+    ]
     said = accuracy.beyond([entry, entry | {"name": "b", "undamped": True}])
     assert len(said) == 3 and all(line.startswith("a:") for line in said)
 
@@ -171,4 +246,6 @@ def test_tighter_tolerances_come_closer(name):
 
 
 def test_the_public_interface_is_all_that_is_used():
-    assert {"simulate", "inverse", "static", "frequencies", "Drive", "Controller", "PID"} <= set(dir(fx))
+    assert {"simulate", "inverse", "static", "frequencies", "Drive", "Controller", "PID"} <= set(
+        dir(fx)
+    )

@@ -1,4 +1,5 @@
-"""Simulation against experiment. The experiments are the Exudyn twin's (twin_experiments.py), another program."""
+"""Simulation against experiment. The experiments are the Exudyn twin's (twin_experiments.py),
+another program."""
 
 import dataclasses
 import io
@@ -10,18 +11,19 @@ import numpy as np
 import pytest
 
 import flexura as fx
-from flexlab.compare import field, output, report, screw
-from flexlab.compare.driven import WAYS, simulate
-from flexlab.compare.measures import COVERED, PUBLISHED, compare, delay, ordered, response_time
-from flexlab.compare.smoothing import known, onward, resolution, smoothed
-from flexlab.deviation import deviations
-from flexlab.naming import EMULATED, called
+from flexlab.comparison import report, table
+from flexlab.comparison.measures import COVERED, PUBLISHED, compare, delay, ordered, response_time
+from flexlab.comparison.replay import lead_screw, stepper_relaxation
+from flexlab.comparison.replay.simulate_experiment import WAYS, simulate
+from flexlab.comparison.replay.smoothing import known, onward, resolution, smoothed
 from flexlab.rig import load
-from flexlab.rig.motor import JointLine, joint_line
-from flexlab.rig.stepper import MagneticSpring
-from flexura.drive import JointDrive
+from flexlab.rig.plant.motor import JointLine, joint_line
+from flexlab.rig.plant.stepper import MagneticSpring
+from flexlab.runs.deviation import deviations
+from flexlab.runs.labels import EMULATED, called
 from flexura.errors import InputError
-from flexura.run import Run
+from flexura.io.run import Run
+from flexura.signals.drive import JointDrive
 from twin_experiments import RIG, experiment
 
 
@@ -51,9 +53,15 @@ def document(compared):
 
 
 def run(t, **channels):
-    names = {name.replace("__", "/"): np.asarray(values, dtype=float) for name, values in channels.items()}
+    names = {
+        name.replace("__", "/"): np.asarray(values, dtype=float)
+        for name, values in channels.items()
+    }
     return Run(
-        np.asarray(t, dtype=float), names, {n: "rad" if n.startswith("joint/2") else "m" for n in names}, {"source": "experiment"}
+        np.asarray(t, dtype=float),
+        names,
+        {n: "rad" if n.startswith("joint/2") else "m" for n in names},
+        {"source": "experiment"},
     )
 
 
@@ -62,7 +70,8 @@ def run(t, **channels):
 
 @pytest.mark.parametrize("which", ["forward", "inverse"])
 def test_what_was_commanded_gives_what_another_program_found(which, request):
-    """The parts' own equations in Exudyn; in the simulation a line, a relaxed sine and 5 ms of the drive's samples."""
+    """The parts' own equations in Exudyn; in the simulation a line, a relaxed sine and 5 ms of the
+    drive's samples."""
     measured, moved = request.getfixturevalue(which)
     found = {row.channel: row.max_relative for row in deviations(simulate(measured), moved)}
     assert found["joint/1/position"] < 0.005 and found["joint/2/position"] < 0.0015
@@ -71,14 +80,20 @@ def test_what_was_commanded_gives_what_another_program_found(which, request):
 
 @pytest.mark.parametrize("which", ["forward", "inverse"])
 def test_joints_on_their_encoders_bend_the_strip_as_it_was_bent(which, request):
-    """The smoothed motion is as far from the samples as these from the truth (RMS), so at most twice that from the truth; an
-    encoder step of 2.6 mrad is 0.8 mm at the tip, which bends by 16 and 32 mm."""
+    """The smoothed motion is as far from the samples as these from the truth (RMS), so at most
+    twice that from the truth; an encoder step of 2.6 mrad is 0.8 mm at the tip, which bends by 16
+    and 32 mm."""
     measured, moved = request.getfixturevalue(which)
     simulated = simulate(measured, "measured")
     found = {row.channel: (row.max, row.rms) for row in deviations(simulated, moved)}
     step = 2 * np.pi / 2400
-    assert found["joint/2/position"][0] < step and found["joint/2/position"][1] < 2 * step / np.sqrt(12)
-    assert found["link/2/tip_deflection"][0] < 2 * 0.3 * step and found["link/2/tip_deflection"][1] < 0.3 * step
+    assert found["joint/2/position"][0] < step and found["joint/2/position"][
+        1
+    ] < 2 * step / np.sqrt(12)
+    assert (
+        found["link/2/tip_deflection"][0] < 2 * 0.3 * step
+        and found["link/2/tip_deflection"][1] < 0.3 * step
+    )
 
 
 def test_a_simulation_stands_on_the_experiments_times_and_names_its_drive(forward):
@@ -87,20 +102,26 @@ def test_a_simulation_stands_on_the_experiments_times_and_names_its_drive(forwar
         simulated = simulate(measured, by)
         np.testing.assert_allclose(simulated.t, measured.t, atol=1e-12)
         assert simulated.meta["driven_by"] == by and "(emulated)" in simulated.meta["simulates"]
-        assert np.isfinite(simulated["link/2/tip_deflection"]).all()  # dropouts of the experiment are none of the simulation
+        assert np.isfinite(
+            simulated["link/2/tip_deflection"]
+        ).all()  # dropouts of the experiment are none of the simulation
 
 
 def test_set_points_are_followed_exactly(inverse):
     measured, _ = inverse
     simulated = simulate(measured, "reference")
     there = np.isfinite(measured["joint/2/reference"])
-    np.testing.assert_allclose(simulated["joint/2/position"][there], measured["joint/2/reference"][there], atol=1e-7)
+    np.testing.assert_allclose(
+        simulated["joint/2/position"][there], measured["joint/2/reference"][there], atol=1e-7
+    )
 
 
 def test_the_robot_may_be_another(forward):
     measured, _ = forward
     soft = fx.Robot.from_dict(measured.meta["robot"]).replace({"link.2.young_modulus_Pa": 1e11})
-    rows = {row.channel: row for row in compare(simulate(measured, robot=soft), measured).differences}
+    rows = {
+        row.channel: row for row in compare(simulate(measured, robot=soft), measured).differences
+    }
     own = {row.channel: row for row in compare(simulate(measured), measured).differences}
     assert rows["link/2/tip_deflection"].max > 5 * own["link/2/tip_deflection"].max
 
@@ -108,24 +129,33 @@ def test_the_robot_may_be_another(forward):
 @pytest.mark.parametrize("pulse", [0.02, 0.2])
 @pytest.mark.parametrize("prescribed", [False, True])
 def test_the_relaxed_field_is_the_sine(pulse, prescribed):
-    """Against the same torque as a Python function in the native solver; 0.2 rad at once lose steps. A carriage that nothing
-    drives hardly moves; one that is told to stand goes by its force where steps are lost."""
+    """Against the same torque as a Python function in the native solver; 0.2 rad at once lose
+    steps. A carriage that nothing drives hardly moves; one that is told to stand goes by its force
+    where steps are lost."""
     bench = load(RIG)
     spring = MagneticSpring(bench.rig.stepper, bench.emulated.stepper)
-    robot = bench.robot.replace({"link.1.joint.viscous_friction": 1e3, "link.2.joint.viscous_friction": 2e-3})
+    robot = bench.robot.replace(
+        {"link.1.joint.viscous_friction": 1e3, "link.2.joint.viscous_friction": 2e-3}
+    )
     system = fx.assemble(robot)
     t = np.linspace(0, 0.5, 101)
     pulses = onward(t, pulse * np.minimum(t / 0.02, 1.0))
     zero = fx.signals.constant(0.0)
     stands = JointDrive(force=zero, motion=zero, prescribed=True) if prescribed else zero
-    found = field.held_by_field((system, system.start()), t, stands, pulses, spring, 1e-6)
-    exact = fx.simulate(system, t, lambda at, q, qd, tip: [0.0, spring.torque(pulses(at)[0], float(q[1]), on=True)])
+    found = stepper_relaxation.held_by_field(
+        (system, system.start()), t, stands, pulses, spring, 1e-6
+    )
+    exact = fx.simulate(
+        system, t, lambda at, q, qd, tip: [0.0, spring.torque(pulses(at)[0], float(q[1]), on=True)]
+    )
     lost = abs(exact["joint/2/position"][-1] - pulse) > 0.03
     assert lost == (pulse > 0.1)
     assert (found.meta["relaxation_rounds"] is None) == lost
     tolerance = 1e-6 if lost else 1e-2 if prescribed else 2e-3
     for name in ("joint/2/position", "link/2/tip_deflection"):
-        np.testing.assert_allclose(found[name], exact[name], atol=tolerance * np.abs(exact[name]).max())
+        np.testing.assert_allclose(
+            found[name], exact[name], atol=tolerance * np.abs(exact[name]).max()
+        )
 
 
 def test_a_constant_voltage_ends_at_the_lines_speed():
@@ -135,8 +165,15 @@ def test_a_constant_voltage_ends_at_the_lines_speed():
     t = np.arange(201) / 200.0
     still = np.zeros(len(t))
     measured = run(t, joint__1__position=still, joint__2__position=still, joint__2__pulses=still)
-    channels, units = measured.channels | {"joint/1/voltage": still + 6.0}, measured.units | {"joint/1/voltage": "V"}
-    meta = {"robot": bench.robot.to_dict(), "rig": bench.rig.model_dump(mode="json"), "source": "experiment"}
+    channels, units = (
+        measured.channels | {"joint/1/voltage": still + 6.0},
+        measured.units | {"joint/1/voltage": "V"},
+    )
+    meta = {
+        "robot": bench.robot.to_dict(),
+        "rig": bench.rig.model_dump(mode="json"),
+        "source": "experiment",
+    }
     simulated = simulate(Run(t, channels, units, meta))
     speed = (line.force_N_V * (6.0 - dead) - line.coulomb_N) / line.viscous_N_s_m
     assert simulated["joint/1/velocity"][-1] == pytest.approx(speed, rel=1e-4)
@@ -144,12 +181,19 @@ def test_a_constant_voltage_ends_at_the_lines_speed():
 
 # --- joint 1 by its voltage
 
-LINE = JointLine(force_N_V=50.0, viscous_N_s_m=4e3, coulomb_N=36.0, reflected_mass_kg=120.0, static_N=56.0, rail_N=4.0)
+LINE = JointLine(
+    force_N_V=50.0,
+    viscous_N_s_m=4e3,
+    coulomb_N=36.0,
+    reflected_mass_kg=120.0,
+    static_N=56.0,
+    rail_N=4.0,
+)
 
 
 def pushed(force, play_m=0.0, seconds=0.6, line=LINE):
-    t = np.arange(round(seconds / screw.STEP_S)) * screw.STEP_S
-    return t, *screw.driven(t, force, line, 121.0, play_m, 0.0)
+    t = np.arange(round(seconds / lead_screw.STEP_S)) * lead_screw.STEP_S
+    return t, *lead_screw.driven(t, force, line, 121.0, play_m, 0.0)
 
 
 def test_static_friction_holds_the_nut_until_its_force():
@@ -160,13 +204,18 @@ def test_static_friction_holds_the_nut_until_its_force():
 
 
 def test_the_nut_runs_and_coasts_as_the_line_says():
-    """v = v_1 (1 - exp(-c t / m)), v_1 = (F - f) / c; from v_0 it coasts  m v_0 / c - (f m / c^2) ln(1 + c v_0 / f)."""
+    """v = v_1 (1 - exp(-c t / m)), v_1 = (F - f) / c; from v_0 it coasts  m v_0 / c - (f m / c^2)
+    ln(1 + c v_0 / f)."""
     t, nut, speed, _ = pushed(fx.signals.piecewise([0.0, 0.3], [236.0, 0.0]))
     c, m, f = LINE.viscous_N_s_m, 121.0, LINE.coulomb_N
     until = np.searchsorted(t, 0.3 - 1e-9)
-    np.testing.assert_allclose(speed[:until], 0.05 * (1 - np.exp(-c / m * t[:until])), rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(
+        speed[:until], 0.05 * (1 - np.exp(-c / m * t[:until])), rtol=1e-9, atol=1e-15
+    )
     v = speed[until]
-    assert nut[-1] - nut[until] == pytest.approx(m * v / c - f * m / c**2 * np.log(1 + c * v / f), rel=1e-9)
+    assert nut[-1] - nut[until] == pytest.approx(
+        m * v / c - f * m / c**2 * np.log(1 + c * v / f), rel=1e-9
+    )
     assert speed[-1] == 0.0
 
 
@@ -175,7 +224,9 @@ def test_the_nut_crosses_its_play_without_the_rail_and_then_takes_the_carriage_a
     t, nut, speed, carriage = pushed(fx.signals.constant(236.0), b)
     free = np.abs(nut) < b / 2
     c, m = LINE.viscous_N_s_m, 121.0
-    np.testing.assert_allclose(speed[free], (236.0 - 32.0) / c * (1 - np.exp(-c / m * t[free])), rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(
+        speed[free], (236.0 - 32.0) / c * (1 - np.exp(-c / m * t[free])), rtol=1e-9, atol=1e-15
+    )
     assert not carriage[free].any() and free.sum() > 20
     np.testing.assert_allclose(carriage[~free], nut[~free] - b / 2, atol=1e-15)
     assert speed[-1] == pytest.approx((236.0 - 36.0) / c, rel=1e-6)
@@ -233,7 +284,9 @@ def test_a_motion_of_dropouts_is_refused():
 
 def test_response_times_of_known_motions():
     t = np.arange(2001) / 1000
-    assert response_time(t, 3 + 0.2 * np.sin(2 * np.pi * t)) == pytest.approx(np.arcsin(COVERED) / (2 * np.pi), abs=1e-5)
+    assert response_time(t, 3 + 0.2 * np.sin(2 * np.pi * t)) == pytest.approx(
+        np.arcsin(COVERED) / (2 * np.pi), abs=1e-5
+    )
     first_order = 1 - np.exp(-t / 0.1)
     level = COVERED * first_order[-1]
     assert response_time(t, -first_order) == pytest.approx(-0.1 * np.log(1 - level), abs=1e-5)
@@ -255,21 +308,33 @@ def test_a_delay_is_found_to_a_part_of_a_sample(late):
     t = np.arange(401) / 200
     noise = np.random.default_rng(3).normal(0, 0.002, len(t))
     law = lambda s: np.sin(2 * np.pi * s) + 0.3 * np.sin(7 * s)
-    first, second = run(t, joint__1__position=law(t)), run(t, joint__1__position=law(t - late) + noise)
+    first, second = (
+        run(t, joint__1__position=law(t)),
+        run(t, joint__1__position=law(t - late) + noise),
+    )
     second["joint/1/position"][40:45] = np.nan
     assert delay(first, second, "joint/1/position") == pytest.approx(late, abs=2e-4)
 
 
 def test_the_table_is_of_what_deviates():
-    """A sine with 3 % more amplitude deviates by 3 % of the peak, at the peak; half a degree of phase by its chord."""
+    """A sine with 3 % more amplitude deviates by 3 % of the peak, at the peak; half a degree of
+    phase by its chord."""
     t = np.arange(1001) / 1000
-    first = run(t, joint__1__position=0.01 * np.sin(2 * np.pi * t), link__2__tip_deflection=np.cos(t))
-    second = run(t, joint__1__position=0.0103 * np.sin(2 * np.pi * t), link__2__tip_deflection=1.1 * np.cos(t))
+    first = run(
+        t, joint__1__position=0.01 * np.sin(2 * np.pi * t), link__2__tip_deflection=np.cos(t)
+    )
+    second = run(
+        t,
+        joint__1__position=0.0103 * np.sin(2 * np.pi * t),
+        link__2__tip_deflection=1.1 * np.cos(t),
+    )
     second.meta["experiment"] = "forward"
     found = compare(first, second)
     joint, tip = found.differences
     assert joint.max_relative == pytest.approx(0.03, rel=1e-9) and joint.at_s == pytest.approx(0.25)
-    assert joint.peak == pytest.approx(0.01) and joint.rms_relative == pytest.approx(0.03 / np.sqrt(2), rel=1e-3)
+    assert joint.peak == pytest.approx(0.01) and joint.rms_relative == pytest.approx(
+        0.03 / np.sqrt(2), rel=1e-3
+    )
     assert tip.max_relative == pytest.approx(0.1) and tip.at_s == 0.0
     assert joint.published_percent == 4.35 and tip.published_percent == 7.5
     assert found.worst_response == pytest.approx(0.0, abs=1e-9) and found.lost == 0
@@ -284,10 +349,20 @@ def test_dropouts_are_counted_and_left_out():
 
 
 def test_the_dissertations_figures():
-    assert PUBLISHED["forward"] == {"joint/1/position": 4.35, "joint/2/position": 7.5, "link/2/tip_deflection": 7.5}
-    assert [PUBLISHED["inverse"][k] for k in ("joint/1/position", "joint/2/position", "response", "link/2/tip_deflection")] == [
-        8.3, 1.15, 17.8, 11.5,
-    ]  # fmt: skip
+    assert PUBLISHED["forward"] == {
+        "joint/1/position": 4.35,
+        "joint/2/position": 7.5,
+        "link/2/tip_deflection": 7.5,
+    }
+    assert [
+        PUBLISHED["inverse"][k]
+        for k in ("joint/1/position", "joint/2/position", "response", "link/2/tip_deflection")
+    ] == [
+        8.3,
+        1.15,
+        17.8,
+        11.5,
+    ]
 
 
 def test_the_experiment_comes_last(forward):
@@ -345,37 +420,49 @@ def terminal(c):
     from rich.console import Console
 
     console = Console(width=120, file=io.StringIO())
-    console.print(output.table(c))
+    console.print(table.table(c))
     return console.file.getvalue()
 
 
 def test_what_is_emulated_says_so_everywhere(compared, page, document):
     words = EMULATED.removeprefix("emulated: ")
     assert "experiment (emulated)" in terminal(compared) and words[:40] in terminal(compared)
-    assert output.numbers(compared)["emulated"] is True and "(emulated)" in output.numbers(compared)["title"]
+    assert (
+        table.numbers(compared)["emulated"] is True
+        and "(emulated)" in table.numbers(compared)["title"]
+    )
     head = page[: page.index("<table")]
     assert '<p class="emulated">' in head and words in head and "(emulated)" in head
     figures = re.findall(r"<svg.*?</svg>", page, re.DOTALL)
     assert len(figures) == 3 and all("(emulated)" in figure for figure in figures)
     assert page.count("<figcaption>Fig. ") == 3
-    assert all("(emulated)" in caption for caption in re.findall(r"<figcaption>(.*?)</figcaption>", page))
+    assert all(
+        "(emulated)" in caption for caption in re.findall(r"<figcaption>(.*?)</figcaption>", page)
+    )
     said = text_chunks(report.png(compared))
     assert "(emulated)" in said["Title"] and said["Description"] == EMULATED
-    assert rb"\(emulated\)" in document and words.encode() in document  # its properties; its text is compressed
+    assert (
+        rb"\(emulated\)" in document and words.encode() in document
+    )  # its properties; its text is compressed
 
 
 def test_a_measurement_does_not_say_emulated(compared):
     meta = compared.experiment.meta | {"emulated": False, "label": "experiment"}
-    simulated = replace(compared.simulation, meta=compared.simulation.meta | {"simulates": "forward experiment"})
+    simulated = replace(
+        compared.simulation, meta=compared.simulation.meta | {"simulates": "forward experiment"}
+    )
     real = compare(simulated, replace(compared.experiment, meta=meta))
-    assert "emulated" not in terminal(real) and not output.numbers(real)["emulated"]
+    assert "emulated" not in terminal(real) and not table.numbers(real)["emulated"]
     own = report.html(real)
     assert "(emulated)" not in own and 'class="emulated"' not in own
     assert "emulated" not in str(text_chunks(report.png(real)))
 
 
 def test_the_page_stands_alone(page):
-    assert not re.findall(r'(?:src|href)="(?!#)', page.replace('xlink:href="#', "")) and "<script" not in page
+    assert (
+        not re.findall(r'(?:src|href)="(?!#)', page.replace('xlink:href="#', ""))
+        and "<script" not in page
+    )
     ids = re.findall(r'\bid="([^"]+)"', page)
     assert len(ids) == len(set(ids))
     used = set(re.findall(r'(?:href="#|url\(#)([^")]+)', page))
@@ -387,15 +474,19 @@ def test_the_same_runs_give_the_same_report(compared, page, document):
 
 
 def test_all_tables_have_the_same_cells(compared, page):
-    rows = output.rows(compared)
-    assert [row[0] for row in rows[:3]] == ["joint variable 1", "joint variable 2", "tip displacement of link 2"]
+    rows = table.rows(compared)
+    assert [row[0] for row in rows[:3]] == [
+        "joint variable 1",
+        "joint variable 2",
+        "tip displacement of link 2",
+    ]
     assert [row[-1] for row in rows[:3]] == ["4.35 %", "7.5 %", "7.5 %"]
     for row in rows:
         assert "".join(f"<td>{cell}</td>" for cell in row) in page
 
 
 def test_the_folder_has_it_all(compared, tmp_path):
-    paths = output.save(compared, tmp_path, simulated=True)
+    paths = table.save(compared, tmp_path, simulated=True)
     assert {p.name for p in paths} == {
         "run.parquet",
         "comparison.json",
@@ -405,7 +496,7 @@ def test_the_folder_has_it_all(compared, tmp_path):
         "review.rrd",
     }
     stored = json.loads((tmp_path / "comparison.json").read_text())
-    assert stored == json.loads(json.dumps(output.numbers(compared)))
+    assert stored == json.loads(json.dumps(table.numbers(compared)))
     assert [row["published_percent"] for row in stored["deviations"]] == [4.35, 7.5, 7.5]
     again = Run.read(tmp_path / "simulation")
     assert compare(again, compared.experiment).differences == compared.differences
@@ -414,12 +505,16 @@ def test_the_folder_has_it_all(compared, tmp_path):
 
 def test_the_review_shows_the_dissertations_figures(compared, tmp_path):
     from flexlab.review.layout import _figures
-    from flexlab.review.record import _part
+    from flexlab.review.writer import _part
 
     shown, scene = _part("", [compared.simulation, compared.experiment])
     assert scene.measured
-    names = [column.contents[0].name if not hasattr(column.contents[0], "active_tab") else column.contents[0].contents[0].name
-             for column in _figures(scene)]  # fmt: skip
+    names = [
+        column.contents[0].name
+        if not hasattr(column.contents[0], "active_tab")
+        else column.contents[0].contents[0].name
+        for column in _figures(scene)
+    ]
     assert names == ["joint variable 1", "joint variable 2", "tip flexural displacement, link 2"]
     below = [column.contents[1].name for column in _figures(scene)]
     assert below == [f"deviation of {name}" for name in names]
@@ -441,7 +536,11 @@ def test_the_review_file_says_emulated(compared, tmp_path):
             pages += batch.column("TextDocument:text").to_pylist()
     assert {"simulation", "experiment", "deviation"} <= roots
     (page,) = [p[0] for p in pages]
-    assert "experiment (emulated): emulated." in page and "| joint variable 1 |" in page and "7.5 %" in page
+    assert (
+        "experiment (emulated): emulated." in page
+        and "| joint variable 1 |" in page
+        and "7.5 %" in page
+    )
 
 
 # --- the command
@@ -450,7 +549,7 @@ def test_the_review_file_says_emulated(compared, tmp_path):
 def invoke(*arguments):
     from typer.testing import CliRunner
 
-    from flexlab.cli import app
+    from flexlab.cli.app import app
 
     return CliRunner().invoke(app, [str(a) for a in arguments])
 
@@ -462,9 +561,11 @@ def test_the_command_compares_two_runs_and_leaves_them_as_they_are(compared, tmp
     done = invoke("compare", tmp_path / "experiment", tmp_path / "simulation", "--json")
     assert done.exit_code == 0, done.output
     found = json.loads(done.stdout)
-    assert found["emulated"] is True and found["runs"]["second"]["called"] == "experiment (emulated)"
+    assert (
+        found["emulated"] is True and found["runs"]["second"]["called"] == "experiment (emulated)"
+    )
     assert {k: found[k] for k in ("deviations", "responses")} == {
-        k: json.loads(json.dumps(output.numbers(compared)[k])) for k in ("deviations", "responses")
+        k: json.loads(json.dumps(table.numbers(compared)[k])) for k in ("deviations", "responses")
     }
     folder = tmp_path / "experiment" / "comparison"
     assert not (folder / "simulation").exists() and (folder / "report.html").is_file()
@@ -484,7 +585,10 @@ def test_the_command_exports_with_the_label(compared, tmp_path):
         (["compare", "RUN", "RUN", "--by", "measured"], "--by = 'measured': expected one run"),
         (["compare", "RUN", "--by", "guess"], "by = 'guess': expected one of"),
         (["compare", "absent"], "absent: no run here"),
-        (["export", "RUN", "--to", "xlsx"], "--to = 'xlsx': expected one of csv, parquet, tdms, mcap"),
+        (
+            ["export", "RUN", "--to", "xlsx"],
+            "--to = 'xlsx': expected one of csv, parquet, tdms, mcap",
+        ),
     ],
 )
 def test_the_command_names_what_is_wrong_and_leaves_nothing(arguments, words, compared, tmp_path):

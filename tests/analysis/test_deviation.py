@@ -1,13 +1,16 @@
 import numpy as np
 import pytest
 
-from flexlab.deviation import Deviation, compared, deviation, deviations
+from flexlab.runs.deviation import Deviation, compared, deviation, deviations
 from flexura.errors import InputError
-from flexura.run import Run
+from flexura.io.run import Run
 
 
 def run(t, **channels):
-    names = {name.replace("__", "/"): np.asarray(values, dtype=float) for name, values in channels.items()}
+    names = {
+        name.replace("__", "/"): np.asarray(values, dtype=float)
+        for name, values in channels.items()
+    }
     units = {name: "rad" if name.startswith("joint") else "m" for name in names}
     return Run(np.asarray(t, dtype=float), names, units, {"source": "simulation"})
 
@@ -30,7 +33,8 @@ def test_second_minus_first_on_the_times_of_the_first():
 
 
 def test_a_shifted_sine_deviates_by_its_chord():
-    """sin(wt - phi) - sin(wt) has the amplitude 2 sin(phi/2), and over whole periods the RMS amplitude / sqrt 2."""
+    """sin(wt - phi) - sin(wt) has the amplitude 2 sin(phi/2), and over whole periods the RMS
+    amplitude / sqrt 2."""
     t, phi = np.arange(1000) / 1000, 0.3
     first, second = (run(t, joint__1__position=4 * np.sin(2 * np.pi * t - p)) for p in (0.0, phi))
     (row,) = deviations(first, second)
@@ -38,7 +42,9 @@ def test_a_shifted_sine_deviates_by_its_chord():
     assert row.peak == pytest.approx(4)
     assert row.max == pytest.approx(8 * np.sin(phi / 2), rel=1e-5)
     assert row.rms == pytest.approx(8 * np.sin(phi / 2) / np.sqrt(2), rel=1e-9)
-    assert row.max_relative == pytest.approx(row.max / 4) and row.rms_relative == pytest.approx(row.rms / 4)
+    assert row.max_relative == pytest.approx(row.max / 4) and row.rms_relative == pytest.approx(
+        row.rms / 4
+    )
 
 
 def test_interpolation_error_falls_with_the_square_of_the_step():
@@ -72,10 +78,30 @@ def test_a_gap_stays_a_gap_and_grows_no_further_than_its_neighbours():
     t = np.arange(6.0)
     whole = run(t, tip__x=np.zeros(6))
     gap = run(t, tip__x=[1, 1, nan, 1, 1, 1])
-    assert np.isnan(deviation(whole, gap, "tip/x")[1]).tolist() == [False, False, True, False, False, False]
-    assert np.isnan(deviation(gap, whole, "tip/x")[1]).tolist() == [False, False, True, False, False, False]
+    assert np.isnan(deviation(whole, gap, "tip/x")[1]).tolist() == [
+        False,
+        False,
+        True,
+        False,
+        False,
+        False,
+    ]
+    assert np.isnan(deviation(gap, whole, "tip/x")[1]).tolist() == [
+        False,
+        False,
+        True,
+        False,
+        False,
+        False,
+    ]
     between = run(t + 0.5, tip__x=[1, 1, nan, 1, 1, 1])
-    assert np.isnan(deviation(whole, between, "tip/x")[1]).tolist() == [False, True, True, False, False]
+    assert np.isnan(deviation(whole, between, "tip/x")[1]).tolist() == [
+        False,
+        True,
+        True,
+        False,
+        False,
+    ]
     (row,) = deviations(whole, gap)
     assert row.max == 1 and row.rms == 1
 
@@ -106,14 +132,26 @@ def test_what_is_compared():
         "tip__x": [0, 0],
         "tip__y": [0, 0],
     }
-    a, b = run([0, 1], **channels), run([0, 1], **{k: v for k, v in channels.items() if k != "tip__y"})
-    assert compared(a, a) == ["joint/1/position", "link/2/tip_deflection", "tip/x", "tip/y", "tip_distance"]
+    a, b = (
+        run([0, 1], **channels),
+        run([0, 1], **{k: v for k, v in channels.items() if k != "tip__y"}),
+    )
+    assert compared(a, a) == [
+        "joint/1/position",
+        "link/2/tip_deflection",
+        "tip/x",
+        "tip/y",
+        "tip_distance",
+    ]
     assert compared(a, b) == ["joint/1/position", "link/2/tip_deflection", "tip/x"]
     assert isinstance(deviations(a, b, ["link/2/x"])[0], Deviation)
 
 
 def test_wrong_channels_are_named():
-    a, b = run([0, 1], tip__x=[0, 0]), Run(np.array([0.0, 1.0]), {"tip/x": np.zeros(2)}, {"tip/x": "rad"})
+    a, b = (
+        run([0, 1], tip__x=[0, 0]),
+        Run(np.array([0.0, 1.0]), {"tip/x": np.zeros(2)}, {"tip/x": "rad"}),
+    )
     with pytest.raises(InputError, match="no/such"):
         deviation(a, b, "no/such")
     with pytest.raises(InputError, match="not m and rad"):

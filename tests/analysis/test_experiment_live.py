@@ -14,8 +14,8 @@ import flexura as fx
 from experiments import BENCH, SETTINGS, experiment
 from flexlab import rig
 from flexlab.experiment import plan as plans
-from flexlab.experiment.conduct import Watch
-from flexlab.experiment.measure import Sensor
+from flexlab.experiment.run_experiment import Watch
+from flexlab.recordings.unit_conversion import Sensor
 from flexlab.review.headless import free_port, settled, viewer
 from flexlab.review.live import COLOURS, serve
 from flexura.errors import FlexuraError
@@ -64,7 +64,13 @@ def test_a_viewer_that_joins_late_sees_the_past_and_follows(tmp_path):
             first = settled(client)
             for reports in seen[half:]:
                 observe(reports, 0.5)
-            until(lambda: count(client.take_screenshot(), COLOURS[0]) > 1.15 * count(first, COLOURS[0]) > 300)
+            until(
+                lambda: (
+                    count(client.take_screenshot(), COLOURS[0])
+                    > 1.15 * count(first, COLOURS[0])
+                    > 300
+                )
+            )
             (tmp_path / "live.png").write_bytes(settled(client))
 
 

@@ -1,4 +1,5 @@
-"""Experiments on the emulated board: the four kinds, what a Run says of itself, and a recording that is cut anywhere."""
+"""Experiments on the emulated board: the four kinds, what a Run says of itself, and a recording
+that is cut anywhere."""
 
 import io
 import json
@@ -11,19 +12,21 @@ from rich.console import Console
 import flexura as fx
 from experiments import BENCH, SETTINGS, board, experiment
 from flexlab import rig
-from flexlab.board import messages
 from flexlab.board.base import BoardError
-from flexlab.board.declaration import DECLARATION, Fault
+from flexlab.board.protocol import messages
+from flexlab.board.protocol.declaration import DECLARATION, Fault
+from flexlab.cli.bench_tables import live_table, result_table, selftest_table
 from flexlab.experiment import plan as plans
-from flexlab.experiment import recording
-from flexlab.experiment.conduct import Opened, Watch, check, conduct
-from flexlab.experiment.measure import UNITS, Sensor, commanded
-from flexlab.experiment.rebuild import UNTOLD, knots_from, rebuild
-from flexlab.experiment.show import live_table, result_table, selftest_table
-from flexura.files import write_toml
+from flexlab.experiment.run_experiment import Opened, Watch, check, conduct
+from flexlab.recordings import recording
+from flexlab.recordings.run_from_recording import UNTOLD, knots_from, rebuild
+from flexlab.recordings.unit_conversion import UNITS, Sensor, commanded
+from flexura.io.toml_files import write_toml
 from flexura.signals import harmonic
 
-FRAME_BYTES = messages.HEAD_BYTES + messages.TELEMETRY.itemsize + 4  # with CRC, COBS and the zero byte
+FRAME_BYTES = (
+    messages.HEAD_BYTES + messages.TELEMETRY.itemsize + 4
+)  # with CRC, COBS and the zero byte
 
 
 @pytest.fixture(scope="module")
@@ -35,15 +38,29 @@ def tracked(tmp_path_factory):
 def test_a_run_says_what_it_is_and_where_it_comes_from(tracked):
     run = fx.Run.read(tracked.folder)
     about = run.meta
-    assert (about["kind"], about["source"], about["experiment"]) == ("experiment", "experiment", "inverse")
+    assert (about["kind"], about["source"], about["experiment"]) == (
+        "experiment",
+        "experiment",
+        "inverse",
+    )
     assert about["complete"] is True
-    assert about["emulated"] is True and about["label"].startswith("emulated") and about["seed"] == 0
+    assert (
+        about["emulated"] is True and about["label"].startswith("emulated") and about["seed"] == 0
+    )
     assert about["firmware"]["declaration"] == f"{DECLARATION:08x}" and about["host_version"]
-    assert fx.Robot.from_dict(about["robot"]) == BENCH.robot and about["rig"]["screw"]["lead_m"] == 0.008
+    assert (
+        fx.Robot.from_dict(about["robot"]) == BENCH.robot
+        and about["rig"]["screw"]["lead_m"] == 0.008
+    )
     assert about["settings"] == SETTINGS and "T" in about["started"]
     assert about["asked"] == BENCH.manoeuvre.spec() | {"lead_s": 1.0, "out_s": 1.0}
     assert set(UNITS) | {"tip/x", "tip/y"} == set(run) and run.units["joint/2/pulses"] == "rad"
-    assert about["line"] == {"reports": len(run), "missing": 0, "bad_frames": 0, "bytes": about["line"]["bytes"]}
+    assert about["line"] == {
+        "reports": len(run),
+        "missing": 0,
+        "bad_frames": 0,
+        "bytes": about["line"]["bytes"],
+    }
     assert json.loads(json.dumps(about)) == about
 
 
@@ -54,24 +71,36 @@ def test_the_clock_begins_with_the_execution_and_the_reports_follow_each_other(t
 
 
 def test_the_boards_set_points_are_those_that_were_asked(tracked):
-    """The manoeuvre's own motion at the run's times: the clock is right to a fraction of a tick, the cubics to a microstep/50."""
+    """The manoeuvre's own motion at the run's times: the clock is right to a fraction of a tick,
+    the cubics to a microstep/50."""
     run = tracked.run
     begin = next(phase["t"] for phase in run.meta["phases"] if phase["name"] == "manoeuvre")
     inside = (run.t > begin) & (run.t < begin + BENCH.manoeuvre.duration_s - 0.01)
-    for number, (joint, least) in enumerate(zip(BENCH.manoeuvre.drive.joints, (2e-7, 4e-5), strict=True), 1):
+    for number, (joint, least) in enumerate(
+        zip(BENCH.manoeuvre.drive.joints, (2e-7, 4e-5), strict=True), 1
+    ):
         wanted = np.array([joint.motion(t - begin)[0] for t in run.t[inside]])
         np.testing.assert_allclose(run[f"joint/{number}/reference"][inside], wanted, atol=least)
     kept = recording.read(tracked.folder)
     course = commanded(knots_from(kept.session["knots"]), SETTINGS)
     k = np.round(run.t[inside] * 1000).astype(int) - 1
-    np.testing.assert_allclose(run["joint/1/reference"][inside] * 256 * 80e3, course[k, 0], atol=3.0)  # three products are cut
+    np.testing.assert_allclose(
+        run["joint/1/reference"][inside] * 256 * 80e3, course[k, 0], atol=3.0
+    )  # three products are cut
 
 
 def test_the_joints_follow(tracked):
     run = tracked.run
-    for number, most in ((1, 0.0015), (2, 0.02)):  # 1 ms and a pulse behind at 3.3 rad/s, and the motor's dead zone
-        assert np.abs(run[f"joint/{number}/reference"] - run[f"joint/{number}/position"]).max() < most
-    x = 0.1 + run["joint/1/position"] + 0.3 * np.cos(run["joint/2/position"])  # the strip of `Drives` is straight
+    for number, most in (
+        (1, 0.0015),
+        (2, 0.02),
+    ):  # 1 ms and a pulse behind at 3.3 rad/s, and the motor's dead zone
+        assert (
+            np.abs(run[f"joint/{number}/reference"] - run[f"joint/{number}/position"]).max() < most
+        )
+    x = (
+        0.1 + run["joint/1/position"] + 0.3 * np.cos(run["joint/2/position"])
+    )  # the strip of `Drives` is straight
     np.testing.assert_allclose(run["tip/x"], x, atol=1e-9)
     lag = run.meta["delays"]["joint/2/position"]
     assert lag["behind"] == "joint/2/reference" and 0 <= lag["seconds"] < 0.01 and lag["std"] > 0
@@ -95,19 +124,27 @@ def test_forward_gives_the_drives_what_the_profile_says(tmp_path):
     np.testing.assert_allclose(run["joint/1/voltage"][held], 4.0, rtol=0.005)
     np.testing.assert_allclose(run["joint/1/voltage"][run.t > 0.65], 0.0)
     assert run["joint/2/pulses"][-1] == pytest.approx(0.1, abs=0.004)
-    assert run["joint/1/velocity"][held][-20] == pytest.approx(0.008 * 1000 / 60 * 3 / 11, rel=0.01)  # 1 V of 12 starts it
+    assert run["joint/1/velocity"][held][-20] == pytest.approx(
+        0.008 * 1000 / 60 * 3 / 11, rel=0.01
+    )  # 1 V of 12 starts it
     assert np.isnan(run["joint/1/reference"]).all() and run.meta["asked"]["name"] == "one stroke"
 
 
 def test_step_uses_the_gains_that_it_was_given(tmp_path):
     """A proportional controller alone: at the step the voltage is kp times its height."""
     for kp in (1500.0, 3000.0):
-        (tmp_path / "gains.toml").write_text(f"kp_1_V_m = {kp}\nki_1_V_m_s = 0.0\nkv_1_V_s_m = 0.0\nkc_1_V = 0.0\n")
+        (tmp_path / "gains.toml").write_text(
+            f"kp_1_V_m = {kp}\nki_1_V_m_s = 0.0\nkv_1_V_s_m = 0.0\nkc_1_V = 0.0\n"
+        )
         settings = SETTINGS | plans.gains(tmp_path / "gains.toml")
         run = experiment(plans.step(BENCH, settings, 0.003, 0.05, 2.0), tmp_path / f"{kp}").run
         first = np.flatnonzero(run["joint/1/reference"] > 0.0015)[0]
-        assert run.t[first] == pytest.approx(0.2, abs=0.011) and run["joint/1/reference"].max() == pytest.approx(0.003, rel=1e-4)
-        assert run["joint/2/reference"][-1] == pytest.approx(0.05, rel=1e-4) and run.meta["complete"]
+        assert run.t[first] == pytest.approx(0.2, abs=0.011) and run[
+            "joint/1/reference"
+        ].max() == pytest.approx(0.003, rel=1e-4)
+        assert (
+            run["joint/2/reference"][-1] == pytest.approx(0.05, rel=1e-4) and run.meta["complete"]
+        )
         assert run.meta["settings"]["kp_1_V_m"] == kp
         assert run["joint/1/voltage"].max() == pytest.approx(0.003 * kp, rel=0.03)
 
@@ -144,7 +181,9 @@ def test_a_recording_cut_at_any_byte_is_the_beginning_of_the_whole(tracked, tmp_
         for channel in set(run) - {"joint/1/velocity", "joint/2/velocity"}:
             np.testing.assert_array_equal(run[channel], whole[channel][:n], err_msg=channel)
         inner = slice(0, n - 10)  # the window of the velocity ends elsewhere
-        np.testing.assert_allclose(run["joint/1/velocity"][inner], whole["joint/1/velocity"][: n - 10], rtol=0, atol=1e-12)
+        np.testing.assert_allclose(
+            run["joint/1/velocity"][inner], whole["joint/1/velocity"][: n - 10], rtol=0, atol=1e-12
+        )
 
 
 def test_garbage_in_the_middle_costs_the_frames_that_it_hits(tracked, tmp_path):
@@ -155,14 +194,19 @@ def test_garbage_in_the_middle_costs_the_frames_that_it_hits(tracked, tmp_path):
     (folder / recording.RECEIVED).write_bytes(data)
     run = rebuild(folder)
     missing = np.isnan(run["joint/1/position"])
-    assert len(run) == len(tracked.run) and 3 <= missing.sum() <= 8 and run.meta["line"]["missing"] == missing.sum()
+    assert (
+        len(run) == len(tracked.run)
+        and 3 <= missing.sum() <= 8
+        and run.meta["line"]["missing"] == missing.sum()
+    )
     for channel in ("joint/1/position", "link/2/flex_voltage"):
         np.testing.assert_array_equal(run[channel][~missing], tracked.run[channel][~missing])
     assert any("did not arrive" in event["text"] for event in run.meta["events"])
 
 
 def test_what_another_program_had_left_on_the_line_is_not_of_this_run(tracked, tmp_path):
-    """Reports of an earlier session come first, with other numbers and earlier ticks, then the board's introduction."""
+    """Reports of an earlier session come first, with other numbers and earlier ticks, then the
+    board's introduction."""
     folder = cut_at(tracked, tmp_path, tracked.run.meta["line"]["bytes"])
     data = (folder / recording.RECEIVED).read_bytes()
     (folder / recording.RECEIVED).write_bytes(data[len(data) // 2 :] + data)
@@ -207,7 +251,12 @@ def faulty(tmp_path, expected, change=lambda plant: None, plan=None, **more):
     made = board()
     change(made.plant)
     with pytest.raises(BoardError, match=expected):
-        experiment(plan or plans.inverse(BENCH, SETTINGS), tmp_path / "run", opened=Opened(made, 0, {}, made.plant), **more)
+        experiment(
+            plan or plans.inverse(BENCH, SETTINGS),
+            tmp_path / "run",
+            opened=Opened(made, 0, {}, made.plant),
+            **more,
+        )
     assert not (tmp_path / "run").exists()
 
 
@@ -215,7 +264,10 @@ def faulty(tmp_path, expected, change=lambda plant: None, plan=None, **more):
     "expected, change",
     [
         ("supply", lambda plant: setattr(plant, "supply_V", 8.0)),
-        ("emergency stop: open; expected closed; Release it", lambda plant: setattr(plant, "emergency_stop", True)),
+        (
+            "emergency stop: open; expected closed; Release it",
+            lambda plant: setattr(plant, "emergency_stop", True),
+        ),
         ("limit high", lambda plant: setattr(plant, "carriage_m", 0.2)),
         ("flex sensor", lambda plant: setattr(plant, "flex_V", 0.0)),
         ("strip at rest", lambda plant: setattr(plant, "flex_V", plant.flex_V - 0.2)),
@@ -227,7 +279,7 @@ def test_the_self_test_finds_what_is_wrong_and_leaves_nothing_behind(tmp_path, e
 
 
 def test_a_board_of_another_declaration_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("flexlab.board.link.DECLARATION", 1)
+    monkeypatch.setattr("flexlab.board.protocol.session.DECLARATION", 1)
     faulty(tmp_path, "speaks declaration")
 
 
@@ -235,10 +287,26 @@ def test_settings_of_another_rig_are_not_written_without_permission(tmp_path):
     made = board()
     made.emulated, made.label = False, "a board like a real one"
     opened = Opened(made, None, {}, None)
-    bench = type(BENCH)(BENCH.file, BENCH.rig.model_copy(update={"board": BENCH.rig.board | {"kp_1_V_m": 900.0}}), *_rest())
+    bench = type(BENCH)(
+        BENCH.file,
+        BENCH.rig.model_copy(update={"board": BENCH.rig.board | {"kp_1_V_m": 900.0}}),
+        *_rest(),
+    )
     settings = rig.configuration(bench)
-    with pytest.raises(BoardError, match="configuration: 1 differ: kp_1_V_m; expected the rig file's; flexura flash --configure"):
-        conduct(bench, plans.inverse(bench, settings), opened, tmp_path / "run", rig.calibration(bench), Watch())
+    with pytest.raises(
+        BoardError,
+        match=(
+            "configuration: 1 differ: kp_1_V_m; expected the rig file's; flexura flash --configure"
+        ),
+    ):
+        conduct(
+            bench,
+            plans.inverse(bench, settings),
+            opened,
+            tmp_path / "run",
+            rig.calibration(bench),
+            Watch(),
+        )
     made.close()
 
 
@@ -299,7 +367,9 @@ def test_wrong_gains_are_refused_by_file_key_and_value(tmp_path, text, key, valu
 def test_a_joint_without_a_motion_is_refused():
     alone = fx.Drive.pd([harmonic(0.01, 1.0)], [1], [1])
     with pytest.raises(fx.InputError, match="missing: expected a motion of every joint") as raised:
-        plans.inverse(BENCH, SETTINGS, fx.Manoeuvre("", 1.0, 0.1, fx.Drive((*alone.joints, fx.JointDrive()))))
+        plans.inverse(
+            BENCH, SETTINGS, fx.Manoeuvre("", 1.0, 0.1, fx.Drive((*alone.joints, fx.JointDrive())))
+        )
     assert raised.value.key == "joint[2].motion"
 
 
@@ -336,9 +406,17 @@ def test_a_fault_ends_the_experiment_and_is_told(tmp_path):
     made = board()
     begun = lambda reports, part: setattr(made.plant, "blocked", made.plant.blocked or part > 0.2)
     done = experiment(
-        plans.inverse(BENCH, SETTINGS), tmp_path / "run", Watch(observe=begun), Opened(made, 0, {}, made.plant)
+        plans.inverse(BENCH, SETTINGS),
+        tmp_path / "run",
+        Watch(observe=begun),
+        Opened(made, 0, {}, made.plant),
     )
     assert not done.ended.complete and done.ended.stopped and "fault" in done.ended.text
-    fault = next(e for e in fx.Run.read(done.folder).meta["events"] if e["text"].startswith("board: fault"))
-    assert any(f"fault {f.name}" in fault["text"] for f in (Fault.stall_1, Fault.following_1)) and 0.4 < fault["t"] < 1.5
+    fault = next(
+        e for e in fx.Run.read(done.folder).meta["events"] if e["text"].startswith("board: fault")
+    )
+    assert (
+        any(f"fault {f.name}" in fault["text"] for f in (Fault.stall_1, Fault.following_1))
+        and 0.4 < fault["t"] < 1.5
+    )
     assert fault["level"] == "ERROR" and len(done.run) > 200

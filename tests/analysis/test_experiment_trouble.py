@@ -1,6 +1,8 @@
-"""The host under trouble, with the command in a process of its own and the emulated board at the other end of a pseudo-terminal.
+"""The host under trouble, with the command in a process of its own and the emulated board at the
+other end of a pseudo-terminal.
 
-Always: what had been received is on disk and readable, the motors are off, the next run starts cleanly.
+Always: what had been received is on disk and readable, the motors are off, the next run starts
+cleanly.
 """
 
 import json
@@ -16,14 +18,15 @@ import pytest
 import flexura as fx
 from experiments import BENCH, SETTINGS, Line, board, command, experiment, running
 from flexlab.experiment import plan as plans
-from flexlab.experiment import recording
-from flexlab.experiment.conduct import Opened, Watch
-from flexlab.experiment.rebuild import UNTOLD, rebuild
+from flexlab.experiment.run_experiment import Opened, Watch
+from flexlab.recordings import recording
+from flexlab.recordings.run_from_recording import UNTOLD, rebuild
 
 LONG = ("free-vibration", "--duration-s", 20)
 SHORT = ("free-vibration", "--duration-s", 1.1)
 SLOW = pytest.mark.slow
-OFF_S = 1.0  # the board's host_timeout_s is 0.2; its time may lag on a busy machine, ours does not wait for it
+# the board's host_timeout_s is 0.2; its time may lag on a busy machine, ours does not wait for it
+OFF_S = 1.0
 
 
 @pytest.fixture
@@ -45,7 +48,9 @@ def off(line):
 
 def ok(line, cwd, out):
     """The next run starts cleanly and comes to its end."""
-    process = command(*SHORT, "--port", line.device, "--yes", "--countdown-s", 0, "--out", out, "--json", cwd=cwd)
+    process = command(
+        *SHORT, "--port", line.device, "--yes", "--countdown-s", 0, "--out", out, "--json", cwd=cwd
+    )
     said, errors = process.communicate(timeout=60)
     assert process.returncode == 0, errors
     assert json.loads(said)["complete"] is True and not line.driven
@@ -55,27 +60,37 @@ def ok(line, cwd, out):
 def whole(run):
     """Row after row, nothing missing; a busy board stamps a report a tick late."""
     apart = np.diff(run.t)
-    assert apart.min() > 0.0009 and apart.max() < 0.0071 and np.median(apart) == pytest.approx(0.002)
+    assert (
+        apart.min() > 0.0009 and apart.max() < 0.0071 and np.median(apart) == pytest.approx(0.002)
+    )
     assert run.meta["line"]["missing"] == 0
     assert np.isfinite(run["joint/1/position"]).all()
 
 
 def test_over_a_serial_line_all_is_as_in_one_process(line, tmp_path):
-    """Real pyserial at a pseudo-terminal, and the board in another process's memory: the motion is the same."""
+    """Real pyserial at a pseudo-terminal, and the board in another process's memory: the motion is
+    the same."""
     ok(line, tmp_path, "run")
     far = fx.Run.read(tmp_path / "run")
-    assert far.meta["emulated"] is True and far.meta["label"] == f"emulated board at {line.device}"  # a pty is no hardware
+    assert (
+        far.meta["emulated"] is True and far.meta["label"] == f"emulated board at {line.device}"
+    )  # a pty is no hardware
     near = experiment(plans.free_vibration(BENCH, SETTINGS, 0.1, 1.1), tmp_path / "near").run
     n = min(len(far), len(near))
     assert n > 540 and far.meta["line"]["missing"] == 0
     at = np.interp(near.t, far.t, far["joint/2/position"])
-    np.testing.assert_allclose(at, near["joint/2/position"], atol=0.0066)  # 2.5 counts: reports a tick apart
+    np.testing.assert_allclose(
+        at, near["joint/2/position"], atol=0.0066
+    )  # 2.5 counts: reports a tick apart
 
 
 def killed(line, cwd, name, after_s):
-    """Kill -9 at that time after the recording began; the recording as the killed process left it."""
+    """Kill -9 at that time after the recording began; the recording as the killed process left
+    it."""
     folder = cwd / name
-    process = command(*LONG, "--port", line.device, "--yes", "--countdown-s", 0, "--out", name, cwd=cwd)
+    process = command(
+        *LONG, "--port", line.device, "--yes", "--countdown-s", 0, "--out", name, cwd=cwd
+    )
     line.wait(lambda: (folder / recording.RECEIVED).exists())
     time.sleep(after_s)
     process.kill()
@@ -107,10 +122,15 @@ def test_kill_9_at_a_random_moment(line, tmp_path, count, seed):
         saved.append(folder / "run.parquet")
     assert ran >= 1
     said = ok(line, tmp_path, "last")
-    assert "recovered" in said and all(path.exists() for path in saved)  # each by the start after it
+    assert "recovered" in said and all(
+        path.exists() for path in saved
+    )  # each by the start after it
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, *(pytest.param(n, marks=SLOW) for n in (signal.SIGTERM, signal.SIGHUP))])
+@pytest.mark.parametrize(
+    "number",
+    [signal.SIGINT, *(pytest.param(n, marks=SLOW) for n in (signal.SIGTERM, signal.SIGHUP))],
+)
 def test_ctrl_c_and_its_kin_stop_the_motors_in_order(line, tmp_path, number):
     with running(line, *LONG, "--out", "run", cwd=tmp_path) as process:
         time.sleep(0.5)
@@ -166,8 +186,14 @@ class Noisy:
         return bytes(data)
 
     def write(self, data):
-        self.commands += self.bad  # never two in a row: at the third the board would stop by itself, as it should
-        self.inner.write(data if self.commands % 10 != 5 or not self.bad else data[:-3] + self.random.randbytes(3))
+        self.commands += (
+            self.bad
+        )  # never two in a row: at the third the board would stop by itself, as it should
+        self.inner.write(
+            data
+            if self.commands % 10 != 5 or not self.bad
+            else data[:-3] + self.random.randbytes(3)
+        )
 
     def wait(self, seconds):
         self.inner.wait(seconds)
@@ -183,7 +209,8 @@ class Noisy:
 
 
 def test_garbage_on_the_line_costs_reports_and_nothing_else(tmp_path):
-    """One command in ten is damaged, one report in eight: the motion is that of a clean line, the gaps are NaN."""
+    """One command in ten is damaged, one report in eight: the motion is that of a clean line, the
+    gaps are NaN."""
     noisy = Noisy(board())
     plan = plans.free_vibration(BENCH, SETTINGS, 0.3, 1.5)
 
@@ -192,39 +219,58 @@ def test_garbage_on_the_line_costs_reports_and_nothing_else(tmp_path):
 
     run = experiment(plan, tmp_path / "noisy", Watch(observe=dirty), Opened(noisy, 0, {}, None)).run
     clean = experiment(plan, tmp_path / "clean").run
-    assert run.complete and run.meta["line"]["bad_frames"] > 20 and 20 < run.meta["line"]["missing"] < len(run) // 3
+    assert (
+        run.complete
+        and run.meta["line"]["bad_frames"] > 20
+        and 20 < run.meta["line"]["missing"] < len(run) // 3
+    )
     there = np.isfinite(run["joint/2/position"])
     n = min(len(run), len(clean))
-    np.testing.assert_allclose(run["joint/2/position"][:n][there[:n]], clean["joint/2/position"][:n][there[:n]], atol=0.01)
+    np.testing.assert_allclose(
+        run["joint/2/position"][:n][there[:n]], clean["joint/2/position"][:n][there[:n]], atol=0.01
+    )
     assert (~there).sum() == run.meta["line"]["missing"]
 
 
 def limited(size):
-    """Files of this process may not grow beyond `size` bytes; the write that would fails, as on a full disk."""
+    """Files of this process may not grow beyond `size` bytes; the write that would fails, as on a
+    full disk."""
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 
 
 def test_the_disk_is_full_in_the_middle(line, tmp_path):
-    """The system refuses to let the file grow; what had been received is there, to the byte that still went in."""
+    """The system refuses to let the file grow; what had been received is there, to the byte that
+    still went in."""
     size = 250_000
-    with running(line, *LONG, "--out", "run", cwd=tmp_path, preexec_fn=lambda: limited(size)) as process:
+    with running(
+        line, *LONG, "--out", "run", cwd=tmp_path, preexec_fn=lambda: limited(size)
+    ) as process:
         said = finished(process, 1)
     assert "what had been received before is kept" in said and not line.driven
     assert (tmp_path / "run" / recording.RECEIVED).stat().st_size == size
-    run = rebuild(tmp_path / "run") if not (tmp_path / "run" / "run.parquet").exists() else fx.Run.read(tmp_path / "run")
+    run = (
+        rebuild(tmp_path / "run")
+        if not (tmp_path / "run" / "run.parquet").exists()
+        else fx.Run.read(tmp_path / "run")
+    )
     whole(run)
     assert not run.complete and run.t[-1] > 0.3
     ok(line, tmp_path, "next")
 
 
 def test_no_space_left_on_device(tmp_path):
-    """/dev/full answers every write with ENOSPC: the first byte from the board ends it before anything moves."""
+    """/dev/full answers every write with ENOSPC: the first byte from the board ends it before
+    anything moves."""
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / recording.RECEIVED).symlink_to("/dev/full")
     made = board()
     with pytest.raises(recording.RecordingError, match="No space left on device"):
-        experiment(plans.free_vibration(BENCH, SETTINGS, 0.3, 1.5), tmp_path / "run", opened=Opened(made, 0, {}, None))
+        experiment(
+            plans.free_vibration(BENCH, SETTINGS, 0.3, 1.5),
+            tmp_path / "run",
+            opened=Opened(made, 0, {}, None),
+        )
 
 
 def test_a_port_that_another_program_has(line, tmp_path):
@@ -247,5 +293,3 @@ def test_without_a_person_to_ask_nothing_moves_on_a_real_port(line, tmp_path):
     process = command(*SHORT, "--port", line.device, "--out", "run", cwd=tmp_path)
     assert "--yes: missing" in finished(process, 2)
     assert not (tmp_path / "run").exists()
-
-

@@ -1,4 +1,5 @@
-"""A run in other formats, read back by programs that did not write it: numpy, DuckDB, a reader by NI's text, Rerun."""
+"""A run in other formats, read back by programs that did not write it: numpy, DuckDB, a reader by
+NI's text, Rerun."""
 
 import json
 import struct
@@ -8,30 +9,46 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexlab.export.command import forms
-from flexlab.naming import EMULATED
+from flexlab.cli.export import forms
 from flexlab.review.headless import executable
+from flexlab.runs.labels import EMULATED
 from flexura.errors import InputError
-from flexura.run import Run
+from flexura.io.run import Run
 
 UNITS = {
-    "joint/1/position": "m", "joint/2/velocity": "rad/s", "joint/1/drive": "N", "joint/2/drive": "N m", "joint/1/voltage": "V",
-    "energy/strain": "J", "link/2/tip_deflection": "m",
-}  # fmt: skip
+    "joint/1/position": "m",
+    "joint/2/velocity": "rad/s",
+    "joint/1/drive": "N",
+    "joint/2/drive": "N m",
+    "joint/1/voltage": "V",
+    "energy/strain": "J",
+    "link/2/tip_deflection": "m",
+}
 
 
 @pytest.fixture(scope="module")
 def run():
-    """Numbers that a careless writer changes: no short decimals, very large and very small, negative zero, gaps."""
+    """Numbers that a careless writer changes: no short decimals, very large and very small,
+    negative zero, gaps."""
     rng, t = np.random.default_rng(7), np.arange(257) / 200
-    channels = {name: rng.normal(size=len(t)) * 10.0 ** rng.integers(-12, 9, len(t)) for name in UNITS}
+    channels = {
+        name: rng.normal(size=len(t)) * 10.0 ** rng.integers(-12, 9, len(t)) for name in UNITS
+    }
     for k, values in enumerate(channels.values()):
         values[k:40:11] = np.nan
         values[100] = -0.0
     meta = {
-        "source": "experiment", "kind": "experiment", "emulated": True, "label": "emulated experiment", "experiment": "inverse",
-        "robot": {"name": 'rig "β", 2\n'}, "seed": 3, "started": "2026-11-24T11:00:00.25+00:00", "complete": True, "events": [],
-    }  # fmt: skip
+        "source": "experiment",
+        "kind": "experiment",
+        "emulated": True,
+        "label": "emulated experiment",
+        "experiment": "inverse",
+        "robot": {"name": 'rig "β", 2\n'},
+        "seed": 3,
+        "started": "2026-11-24T11:00:00.25+00:00",
+        "complete": True,
+        "events": [],
+    }
     return Run(t, channels, UNITS, meta)
 
 
@@ -72,14 +89,19 @@ def test_parquet_read_by_duckdb(run, tmp_path):
         values = found["time_s" if name == "time" else run.column(name)]
         assert not np.ma.is_masked(values)  # NaN is a number that is none, not a missing one
         same(run, name, np.asarray(values))
-    ((stored,),) = duckdb.sql(f"select value from parquet_kv_metadata('{path}') where key = 'flexura'").fetchall()
+    ((stored,),) = duckdb.sql(
+        f"select value from parquet_kv_metadata('{path}') where key = 'flexura'"
+    ).fetchall()
     assert json.loads(stored) == run.meta and json.loads(stored)["emulated"] is True
 
 
 def test_tdms_read_by_its_description(run, tmp_path):
     objects = tdms(written(run, "tdms", tmp_path).read_bytes())
     about = objects["/"][0]
-    assert about["label"] == "experiment (emulated)" == about["name"] and about["description"] == EMULATED
+    assert (
+        about["label"] == "experiment (emulated)" == about["name"]
+        and about["description"] == EMULATED
+    )
     assert about["emulated"] is True and json.loads(about["flexura"]) == run.meta
     assert objects["/'run'"][0]["label"] == "experiment (emulated)"
     for name in ("time", *run):
@@ -87,7 +109,10 @@ def test_tdms_read_by_its_description(run, tmp_path):
         assert properties["unit_string"] == ("s" if name == "time" else UNITS[name])
         same(run, name, values)
         if name != "time":
-            assert properties["wf_increment"] == pytest.approx(1 / 200) and properties["wf_start_offset"] == 0.0
+            assert (
+                properties["wf_increment"] == pytest.approx(1 / 200)
+                and properties["wf_start_offset"] == 0.0
+            )
 
 
 def test_tdms_without_even_times_has_no_time_base(run, tmp_path):
@@ -100,10 +125,16 @@ def test_tdms_without_even_times_has_no_time_base(run, tmp_path):
 
 
 def tdms(data):
-    """Properties and values by object path, as in NI's "TDMS File Format Internal Structure": one segment, not interleaved."""
+    """Properties and values by object path, as in NI's "TDMS File Format Internal Structure": one
+    segment, not interleaved."""
     assert data[:4] == b"TDSm"
     mask, version, _, raw_at = struct.unpack_from("<IIQQ", data, 4)
-    assert version in (4712, 4713) and mask & 0b1110 == 0b1110 and not mask & (1 << 5) and not mask & (1 << 6)
+    assert (
+        version in (4712, 4713)
+        and mask & 0b1110 == 0b1110
+        and not mask & (1 << 5)
+        and not mask & (1 << 6)
+    )
     at = 28
 
     def number(form):
@@ -127,9 +158,26 @@ def tdms(data):
         properties = {}
         for _ in range(number("I")):
             name, kind = text(), number("I")
-            properties[name] = text() if kind == 0x20 else bool(number("B")) if kind == 0x21 else number(
-                {1: "b", 2: "h", 3: "i", 4: "q", 5: "B", 6: "H", 7: "I", 8: "Q", 9: "f", 10: "d"}[kind]
-            )  # fmt: skip
+            properties[name] = (
+                text()
+                if kind == 0x20
+                else bool(number("B"))
+                if kind == 0x21
+                else number(
+                    {
+                        1: "b",
+                        2: "h",
+                        3: "i",
+                        4: "q",
+                        5: "B",
+                        6: "H",
+                        7: "I",
+                        8: "Q",
+                        9: "f",
+                        10: "d",
+                    }[kind]
+                )
+            )
         found[path] = properties, np.frombuffer(data, "<f8", count, raw)
         raw += 8 * count
     assert at == 28 + raw_at and raw == len(data)
@@ -144,7 +192,10 @@ def test_mcap_read_by_rerun(run, started, tmp_path):
     run = replace(run, meta=run.meta | {"started": started})
     path, converted = written(run, "mcap", tmp_path), tmp_path / "run.rrd"
     subprocess.run(
-        [str(executable()), "mcap", "convert", str(path), "-o", str(converted)], check=True, capture_output=True, timeout=60
+        [str(executable()), "mcap", "convert", str(path), "-o", str(converted)],
+        check=True,
+        capture_output=True,
+        timeout=60,
     )
     values, stamps, units, about = {}, {}, {}, {}
     for chunk in RrdReader(converted).stream():
@@ -152,11 +203,15 @@ def test_mcap_read_by_rerun(run, started, tmp_path):
         for name in batch.schema.names:
             cells = batch.column(name)
             if name == "std_msgs.msg.Float64:message":
-                values.setdefault(chunk.entity_path[1:], []).extend(cell[0]["data"] for cell in cells.to_pylist())
+                values.setdefault(chunk.entity_path[1:], []).extend(
+                    cell[0]["data"] for cell in cells.to_pylist()
+                )
                 at = batch.column("message_log_time").cast(pa.int64()).to_pylist()
                 stamps.setdefault(chunk.entity_path[1:], []).extend(at)
             elif name == "McapChannel:metadata":
-                units[chunk.entity_path[1:]] = {pair["first"]: pair["second"] for pair in cells[0].as_py()[0]}
+                units[chunk.entity_path[1:]] = {
+                    pair["first"]: pair["second"] for pair in cells[0].as_py()[0]
+                }
             elif chunk.entity_path == "/__mcap_metadata" and name == "flexura":
                 about = {pair["first"]: pair["second"] for pair in cells[0].as_py()[0]}
     assert set(values) == {"time", *run}
@@ -164,8 +219,13 @@ def test_mcap_read_by_rerun(run, started, tmp_path):
     for name in values:
         order = np.argsort(stamps[name], kind="stable")
         same(run, name, np.array(values[name])[order])
-        np.testing.assert_array_equal(np.array(stamps[name])[order], start + np.rint(run.t * 1e9).astype(np.int64))
-        assert units[name] == {"unit": "s" if name == "time" else UNITS[name], "label": "experiment (emulated)"}
+        np.testing.assert_array_equal(
+            np.array(stamps[name])[order], start + np.rint(run.t * 1e9).astype(np.int64)
+        )
+        assert units[name] == {
+            "unit": "s" if name == "time" else UNITS[name],
+            "label": "experiment (emulated)",
+        }
     assert about["label"] == "experiment (emulated)" and about["description"] == EMULATED
     assert json.loads(about["meta"]) == run.meta and about["start_ns"] == str(start)
 

@@ -1,4 +1,5 @@
-"""Identification: its statistics, its parts, and one emulated rig drawn at random that it has to find."""
+"""Identification: its statistics, its parts, and one emulated rig drawn at random that it has to
+find."""
 
 from __future__ import annotations
 
@@ -13,11 +14,12 @@ import pytest
 import flexura as fx
 from boards import BENCH
 from flexlab import rig as rigs
-from flexlab.compare import screw
-from flexlab.identification import carriage, excitation, files, output
+from flexlab.comparison.replay import lead_screw
+from flexlab.experiment import excitation
+from flexlab.identification import carriage, files, output
 from flexlab.identification.estimate import Unknown, covariance, estimate
 from flexlab.identification.identify import described, identify
-from flexlab.rig.motor import line
+from flexlab.rig.plant.motor import line
 from rigs import excited, ran
 
 FOLDER = Path(excitation.__file__).parent
@@ -35,7 +37,11 @@ def test_white_residuals_give_back_the_textbook_covariance():
     random = np.random.default_rng(1)
     J = random.standard_normal((2, 1, 4000))
     wanted = 0.25 * np.linalg.inv(J[:, 0] @ J[:, 0].T)
-    np.testing.assert_allclose(np.diag(covariance(J, 0.5 * random.standard_normal((1, 4000)), 0)), np.diag(wanted), rtol=0.08)
+    np.testing.assert_allclose(
+        np.diag(covariance(J, 0.5 * random.standard_normal((1, 4000)), 0)),
+        np.diag(wanted),
+        rtol=0.08,
+    )
 
 
 @pytest.mark.parametrize("kept", [0.0, 0.9])
@@ -43,14 +49,20 @@ def test_intervals_cover_what_they_say_with_residuals_that_hang_together(kept):
     t = np.linspace(0.0, 1.0, 2000)
     course = lambda v: v["size"] * np.exp(-t / v["decay_s"])
     truth = {"size": 2.0, "decay_s": 0.4}
-    unknowns = [Unknown("size", 1.5, 1e-4, (0.1, 10.0)), Unknown("decay_s", 0.3, 1e-4, (0.01, 10.0))]
+    unknowns = [
+        Unknown("size", 1.5, 1e-4, (0.1, 10.0)),
+        Unknown("decay_s", 0.3, 1e-4, (0.01, 10.0)),
+    ]
     inside, rounds = 0, 150
     for seed in range(rounds):
         measured = course(truth) + ringing(np.random.default_rng(seed), kept)
         found = estimate(lambda v, y=measured: (course(v) - y)[None, :], unknowns, 60)
-        inside += sum(low <= truth[name] <= high for name in truth for low, high in [found.interval(name)])
+        inside += sum(
+            low <= truth[name] <= high for name in truth for low, high in [found.interval(name)]
+        )
     share = inside / (2 * rounds)
-    # 95 % with three standard deviations of the count; Newey and West's window of 60 samples underrates a memory of 20 by some
+    # 95 % with three standard deviations of the count; Newey and West's window of 60 samples
+    # underrates a memory of 20 by some
     assert 0.95 - 3 * np.sqrt(0.95 * 0.05 / rounds) - (0.03 if kept else 0.0) <= share <= 1.0
 
 
@@ -60,7 +72,9 @@ def test_unknowns_that_do_nearly_the_same_are_told_apart():
     start = [Unknown("a", 1.0001 / 1.02, 1e-5, (0.5, 2.0)), Unknown("b", 1.02, 1e-2, (0.5, 2.0))]
     measured = model({"a": 1.0, "b": 1.0})
     found = estimate(lambda v: 1e3 * (model(v) - measured), start, 0, {"b": {"a": -1.0}})
-    assert found.values["a"] == pytest.approx(1.0, rel=1e-4) and found.values["b"] == pytest.approx(1.0, rel=1e-4)
+    assert found.values["a"] == pytest.approx(1.0, rel=1e-4) and found.values["b"] == pytest.approx(
+        1.0, rel=1e-4
+    )
 
 
 def test_a_doubt_about_the_model_widens_by_the_shift_it_would_cause():
@@ -74,17 +88,21 @@ def test_a_doubt_about_the_model_widens_by_the_shift_it_would_cause():
 def test_the_carriage_follows_the_nut_behind_its_play():
     t = np.linspace(0.0, 2.0, 4001)
     nut = 1e-3 * np.sin(2 * np.pi * t)
-    x = screw.behind(nut, 3e-4)
+    x = lead_screw.behind(nut, 3e-4)
     assert np.ptp(x[1000:]) == pytest.approx(2e-3 - 3e-4, rel=1e-5)
     assert np.abs(x - nut).max() == pytest.approx(1.5e-4, rel=1e-6)
-    still = np.diff(x[1000:]) == 0  # from each turn until the play is crossed: acos(1 - b / a) of the half turn
+    still = (
+        np.diff(x[1000:]) == 0
+    )  # from each turn until the play is crossed: acos(1 - b / a) of the half turn
     assert still.mean() == pytest.approx(np.arccos(1 - 0.3) / np.pi, abs=2e-3)
 
 
 def test_the_excitation_is_what_the_rig_can_do():
     plan = excitation.plan(BENCH, rigs.configuration(BENCH))
     assert not plan.failed and plan.duration_s <= 10.0
-    stiffer = dataclasses.replace(BENCH, robot=BENCH.robot.replace({"link.2.young_modulus_Pa": 3e11}))
+    stiffer = dataclasses.replace(
+        BENCH, robot=BENCH.robot.replace({"link.2.young_modulus_Pa": 3e11})
+    )
     rates = [excitation.profile(bench.robot)["rate_rad_s"]["value"] for bench in (BENCH, stiffer)]
     assert rates[0] != rates[1]  # its chirp follows the robot's second mode
 
@@ -92,7 +110,11 @@ def test_the_excitation_is_what_the_rig_can_do():
 def test_more_friction_leaves_constant_and_gear_of_the_motor_alone():
     rig = BENCH.rig
     more = rigs.Rig.model_validate(files.rubbed(rig, 1.4))
-    old, new, wanted = line(rig, rig.emulated), line(more, more.emulated), line(rig, rig.emulated, 1.4)
+    old, new, wanted = (
+        line(rig, rig.emulated),
+        line(more, more.emulated),
+        line(rig, rig.emulated, 1.4),
+    )
     assert new.force_N_V == pytest.approx(old.force_N_V, rel=1e-12)
     assert new.coulomb_N == pytest.approx(1.4 * old.coulomb_N, rel=1e-12)
     assert new.viscous_N_s_m == pytest.approx(wanted.viscous_N_s_m, rel=1e-12)
@@ -105,7 +127,11 @@ def test_nothing_here_looks_at_what_an_emulated_plant_says_of_itself():
             n.id for n in ast.walk(tree) if isinstance(n, ast.Name)
         }
         assert not names & {"truth", "ranges", "random_truth", "Truth"}, path.name
-        read = [n for n in ast.walk(tree) if isinstance(n, ast.Subscript) and isinstance(n.slice, ast.Constant)]
+        read = [
+            n
+            for n in ast.walk(tree)
+            if isinstance(n, ast.Subscript) and isinstance(n.slice, ast.Constant)
+        ]
         assert not [n for n in read if n.slice.value in ("truth", "ranges")], path.name
 
 
@@ -129,10 +155,15 @@ def test_what_cannot_be_identified_is_refused(excitement):
     run = excitement.run
     for change, key in (
         ({"channels": run.channels | {"joint/2/pulses": np.zeros(len(run))}}, "joint/2/pulses"),
-        ({"channels": {n: v for n, v in run.channels.items() if n != "link/2/flex_voltage"},
-          "units": {n: v for n, v in run.units.items() if n != "link/2/flex_voltage"}}, "RUN"),
+        (
+            {
+                "channels": {n: v for n, v in run.channels.items() if n != "link/2/flex_voltage"},
+                "units": {n: v for n, v in run.units.items() if n != "link/2/flex_voltage"},
+            },
+            "RUN",
+        ),
         ({"meta": {k: v for k, v in run.meta.items() if k != "rig"}}, "rig"),
-    ):  # fmt: skip
+    ):
         with pytest.raises(fx.InputError) as error:
             identify(dataclasses.replace(run, **change))
         assert error.value.key == key
@@ -141,7 +172,11 @@ def test_what_cannot_be_identified_is_refused(excitement):
 @pytest.fixture(scope="module")
 def found(excitement):
     run = excitement.run
-    return identify(dataclasses.replace(run, meta={k: v for k, v in run.meta.items() if k not in ("truth", "seed")}))
+    return identify(
+        dataclasses.replace(
+            run, meta={k: v for k, v in run.meta.items() if k not in ("truth", "seed")}
+        )
+    )
 
 
 @pytest.mark.slow
@@ -149,7 +184,12 @@ def found(excitement):
 def test_a_random_rig_is_found_from_one_run(excitement, found, tmp_path):
     """The issue's figures: stiffness 2 %, damping 10 %, payload 3 %, friction 15 %."""
     truth = excitement.run.meta["truth"]
-    for name, least in (("stiffness", 0.02), ("damping", 0.10), ("payload", 0.03), ("flex_gain", 0.05)):
+    for name, least in (
+        ("stiffness", 0.02),
+        ("damping", 0.10),
+        ("payload", 0.03),
+        ("flex_gain", 0.05),
+    ):
         assert found.strip.values[name] == pytest.approx(truth["factors"][name], rel=least), name
     assert found.carriage.values["coulomb_N"] == pytest.approx(truth["joint_1_coulomb_N"], rel=0.15)
     assert found.strip.values["backlash_m"] == pytest.approx(truth["backlash_m"], abs=5e-5)
@@ -162,10 +202,12 @@ def test_a_random_rig_is_found_from_one_run(excitement, found, tmp_path):
 @pytest.mark.timeout(1200)
 @pytest.mark.parametrize("experiment", ["forward", "inverse"])
 def test_what_was_found_predicts_other_experiments(found, experiment, tmp_path):
-    """The issue's figures: joint variables 1.5 %, tip displacement 4 %, response time 5 %, the largest deviation of the peak.
+    """The issue's figures: joint variables 1.5 %, tip displacement 4 %, response time 5 %, the
+    largest deviation of the peak.
 
-    Joint 2 and the tip are judged by what the plant truly did: a count of its encoder is 1 % of the forward run's stroke, and the
-    flex sensor's noise alone is 15 % of the inverse run's largest deflection.
+    Joint 2 and the tip are judged by what the plant truly did: a count of its encoder is 1 % of the
+    forward run's stroke, and the flex sensor's noise alone is 15 % of the inverse run's largest
+    deflection.
     """
     other, seen = ran(experiment, 3, tmp_path)
     before, after = output.check(found, other)
@@ -173,10 +215,20 @@ def test_what_was_found_predicts_other_experiments(found, experiment, tmp_path):
     tip, angle = seen.along(other)
     off = lambda y, name: np.nanmax(np.abs(y - simulated[name])) / np.nanmax(np.abs(y))
     figures = {
-        "joint 1": carriage_.max_relative, "joint 2": off(angle, "joint/2/position"),
-        "tip": off(tip, "link/2/tip_deflection"), "response": after.worst_response,
-    }  # fmt: skip
-    print(experiment, {k: round(100 * v, 2) for k, v in figures.items()}, "by the files", before.differences[0].max_relative)
+        "joint 1": carriage_.max_relative,
+        "joint 2": off(angle, "joint/2/position"),
+        "tip": off(tip, "link/2/tip_deflection"),
+        "response": after.worst_response,
+    }
+    print(
+        experiment,
+        {k: round(100 * v, 2) for k, v in figures.items()},
+        "by the files",
+        before.differences[0].max_relative,
+    )
     for name, most in (("joint 1", 0.015), ("joint 2", 0.015), ("tip", 0.04), ("response", 0.05)):
         assert figures[name] < most, figures
-    assert carriage_.channel == "joint/1/position" and carriage_.max_relative < before.differences[0].max_relative
+    assert (
+        carriage_.channel == "joint/1/position"
+        and carriage_.max_relative < before.differences[0].max_relative
+    )

@@ -9,12 +9,15 @@ import pytest
 
 from boards import BENCH
 from experiments import SETTINGS, experiment
-from flexlab.experiment import plan, pulses
+from flexlab.comparison.replay import pulses
+from flexlab.experiment import plan
 
 
 @pytest.fixture(scope="module", params=["inverse", "forward"])
 def run(request, tmp_path_factory):
-    done = experiment(getattr(plan, request.param)(BENCH, SETTINGS), tmp_path_factory.mktemp(request.param))
+    done = experiment(
+        getattr(plan, request.param)(BENCH, SETTINGS), tmp_path_factory.mktemp(request.param)
+    )
     assert done.ended.complete
     return done.run
 
@@ -26,13 +29,20 @@ def test_every_report_counts_the_pulses_that_the_knots_give(run):
     given = angle[np.searchsorted(at, run.t, side="right") - 1]
     step = 1 / SETTINGS["stepper_steps_per_rad"]
     assert np.abs(given - reported).max() < 1.01 * step
-    assert (np.abs(given - reported) > 0.01 * step).mean() < 0.01  # where a pulse comes with the tick itself
+    assert (
+        np.abs(given - reported) > 0.01 * step
+    ).mean() < 0.01  # where a pulse comes with the tick itself
 
 
 def test_a_report_that_says_otherwise_is_believed(run):
     changed = run["joint/2/pulses"].copy()
     changed[len(changed) // 2] += 2 / SETTINGS["stepper_steps_per_rad"]
-    assert pulses.from_run(dataclasses.replace(run, channels=run.channels | {"joint/2/pulses": changed})) is None
+    assert (
+        pulses.from_run(
+            dataclasses.replace(run, channels=run.channels | {"joint/2/pulses": changed})
+        )
+        is None
+    )
 
 
 @pytest.mark.parametrize("name", ["feedback_2", "kg_2_rad_m"])

@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexlab.deviation import deviation
-from flexlab.review import open_viewer, picture, poses, sampling, shapes, write_gallery, write_review
+from flexlab.review import open_viewer, picture, sampling, shapes, write_gallery, write_review
 from flexlab.review.sources import COLOURS, SECOND, sources
+from flexlab.runs import poses
+from flexlab.runs.deviation import deviation
 from flexura.errors import FlexuraError, InputError
-from flexura.robot import Robot, load
-from flexura.run import Run
+from flexura.io.run import Run
+from flexura.robot.robot import Robot, load
 
 RIG = load(Path(__file__).parents[2] / "model" / "robots" / "rig.toml")
 STRIP = RIG.to_dict()["link"][1]
@@ -23,8 +24,11 @@ DURATION, RAISED = 2.5, 1.0  # s; the rig's arm is horizontal at 0 and highest a
 # Runs whose answers are known: every link bends like a cantilever loaded at its tip.
 
 
-def synthetic(robot: Robot, source: str = "simulation", *, rate: float = 200.0, late: float = 0.0, **meta) -> Run:
-    """A motion that is consistent in all channels; `late` [s] shifts it, `rate` is in samples a second."""
+def synthetic(
+    robot: Robot, source: str = "simulation", *, rate: float = 200.0, late: float = 0.0, **meta
+) -> Run:
+    """A motion that is consistent in all channels; `late` [s] shifts it, `rate` is in samples a
+    second."""
     t = np.arange(round(DURATION * rate) + 1) / rate
     channels, units = {}, {}
 
@@ -36,32 +40,57 @@ def synthetic(robot: Robot, source: str = "simulation", *, rate: float = 200.0, 
     for i, link in enumerate(robot.links, 1):
         turns, swing = link.joint.type == "R", 0.5 * (1 - np.cos(np.pi * (t - late) / RAISED))
         q = (0.9 / i) * swing if turns else 0.04 + 0.06 * swing
-        for part, values, unit in (("position", q, ""), ("velocity", np.gradient(q, t), "/s"), ("drive", -q, "")):
-            put(f"joint/{i}/{part}", values, {"drive": "N m" if turns else "N"}.get(part, ("rad" if turns else "m") + unit))
+        for part, values, unit in (
+            ("position", q, ""),
+            ("velocity", np.gradient(q, t), "/s"),
+            ("drive", -q, ""),
+        ):
+            put(
+                f"joint/{i}/{part}",
+                values,
+                {"drive": "N m" if turns else "N"}.get(part, ("rad" if turns else "m") + unit),
+            )
         along = q if link.joint.type == "Pa" else np.full(len(t), length)
         px, pw, slope = cantilever(along, length, bend)
-        x, y = x + px * np.cos(angle) - pw * np.sin(angle), y + px * np.sin(angle) + pw * np.cos(angle)
+        x, y = (
+            x + px * np.cos(angle) - pw * np.sin(angle),
+            y + px * np.sin(angle) + pw * np.cos(angle),
+        )
         angle = angle + slope + (q if turns else link.joint.angle_rad)
-        length, bend = link.length_m, 0.02 * link.length_m * np.sin(4 * np.pi * (t - late)) * (link.elements > 0)
+        length, bend = (
+            link.length_m,
+            0.02 * link.length_m * np.sin(4 * np.pi * (t - late)) * (link.elements > 0),
+        )
         for part, values in (("x", x), ("y", y), ("angle", angle)):
             put(f"link/{i}/{part}", values, "rad" if part == "angle" else "m")
         if link.flexible:
             put(f"link/{i}/tip_deflection", bend, "m")
             put(f"link/{i}/tip_slope", 1.5 * bend / length, "rad")
             for k in range(9):
-                put(f"link/{i}/deflection/{k}", cantilever(np.full(len(t), k * length / 8), length, bend)[1], "m")
+                put(
+                    f"link/{i}/deflection/{k}",
+                    cantilever(np.full(len(t), k * length / 8), length, bend)[1],
+                    "m",
+                )
     px, pw, _ = cantilever(np.full(len(t), length), length, bend)
     put("tip/x", x + px * np.cos(angle) - pw * np.sin(angle), "m")
     put("tip/y", y + px * np.sin(angle) + pw * np.cos(angle), "m")
     put("energy/kinetic", np.sin(t) ** 2, "J")
     put("energy/potential", 0.0, "J")
     events = [{"t": RAISED, "text": "raised", "level": "WARN"}, {"t": 0.0, "text": "start"}]
-    about = {"source": source, "program": "test", "robot": robot.to_dict(), "complete": True, "events": events}
+    about = {
+        "source": source,
+        "program": "test",
+        "robot": robot.to_dict(),
+        "complete": True,
+        "events": events,
+    }
     return Run(t, channels, units, about | meta)
 
 
 def cantilever(x, length, tip):
-    """Place with its shortening -1/2 int w'^2, deflection and slope at x of a cantilever loaded at its tip."""
+    """Place with its shortening -1/2 int w'^2, deflection and slope at x of a cantilever loaded at
+    its tip."""
     if not length:
         return x, 0 * x, 0 * x
     xi = x / length
@@ -70,7 +99,8 @@ def cantilever(x, length, tip):
 
 
 def chain(joints: str, **changes) -> Robot:
-    """A robot of strips with these joints, such as "R R Pa"; a Pb starts a third of its strip out."""
+    """A robot of strips with these joints, such as "R R Pa"; a Pb starts a third of its strip
+    out."""
     start = {"R": 0.0, "Pa": 0.0, "Pb": STRIP["length_m"] / 3}
     links = [STRIP | {"joint": {"type": j, "start": start[j]}} for j in joints.split()]
     return Robot.from_dict({"name": f"chain {joints}", "link": links} | changes)
@@ -110,7 +140,9 @@ def scalars(rrd, entity):
 
 def text(rrd, entity="/about", component="TextDocument:text"):
     (cells,) = [
-        b.column(component).to_pylist() for c in chunks(rrd, entity) if component in (b := c.to_record_batch()).schema.names
+        b.column(component).to_pylist()
+        for c in chunks(rrd, entity)
+        if component in (b := c.to_record_batch()).schema.names
     ]
     return cells[0][0]
 
@@ -127,7 +159,14 @@ def rrd(pair, tmp_path_factory):
 
 def test_every_signal_reads_back_exactly(rrd, pair):
     for run in pair:
-        for name in ("joint/1/position", "joint/2/velocity", "joint/2/drive", "link/2/tip_deflection", "tip/x", "energy/kinetic"):
+        for name in (
+            "joint/1/position",
+            "joint/2/velocity",
+            "joint/2/drive",
+            "link/2/tip_deflection",
+            "tip/x",
+            "energy/kinetic",
+        ):
             index, values = scalars(rrd, f"/{run.meta['source']}/{name}")
             assert np.array_equal(index, np.rint(run.t * 1e9).astype(np.int64)), name
             assert np.array_equal(values, run[name]), name
@@ -136,23 +175,44 @@ def test_every_signal_reads_back_exactly(rrd, pair):
 
 
 def test_deviations_read_back_exactly(rrd, pair):
-    for name in ("joint/1/position", "joint/2/position", "link/2/tip_deflection", "tip/x", "tip/y", "tip_distance"):
+    for name in (
+        "joint/1/position",
+        "joint/2/position",
+        "link/2/tip_deflection",
+        "tip/x",
+        "tip/y",
+        "tip_distance",
+    ):
         index, values = scalars(rrd, f"/deviation/{name}")
         t, expected = deviation(*pair, name)
-        assert np.array_equal(values, expected) and np.array_equal(index, np.rint(t * 1e9).astype(np.int64))
+        assert np.array_equal(values, expected) and np.array_equal(
+            index, np.rint(t * 1e9).astype(np.int64)
+        )
 
 
 def test_entities_are_few_and_poses_are_not_among_the_signals(rrd):
     found = entities(rrd)
     assert len(found) < 100
     assert not [e for e in found if "/link/2/x" in e or "/link/2/deflection" in e]
-    assert {"/simulation/arm/deformed", "/twin/arm/deformed", "/about", "/ground/scale", "/events/twin"} <= found
+    assert {
+        "/simulation/arm/deformed",
+        "/twin/arm/deformed",
+        "/about",
+        "/ground/scale",
+        "/events/twin",
+    } <= found
 
 
 def test_units_and_sources_are_in_the_legends(rrd):
     assert text(rrd, "/twin/joint/1/position", "SeriesLines:names") == "joint 1, twin [m]"
-    assert text(rrd, "/simulation/joint/2/position", "SeriesLines:names") == "joint 2, simulation [rad]"
-    assert text(rrd, "/deviation/link/2/tip_deflection", "SeriesLines:names") == "link 2, twin − simulation [m]"
+    assert (
+        text(rrd, "/simulation/joint/2/position", "SeriesLines:names")
+        == "joint 2, simulation [rad]"
+    )
+    assert (
+        text(rrd, "/deviation/link/2/tip_deflection", "SeriesLines:names")
+        == "link 2, twin − simulation [m]"
+    )
 
 
 def test_shapes_are_in_the_file_at_frame_rate(rrd, pair):
@@ -160,14 +220,19 @@ def test_shapes_are_in_the_file_at_frame_rate(rrd, pair):
     assert len(index) <= DURATION * sampling.FRAME_RATE + 2
     rows = np.searchsorted(np.rint(pair[0].t * 1e9), index)
     ends = np.array([cell[0][-1] for cell in cells])
-    np.testing.assert_allclose(ends, np.stack([pair[0]["tip/x"], pair[0]["tip/y"]], axis=1)[rows], atol=1e-6)
+    np.testing.assert_allclose(
+        ends, np.stack([pair[0]["tip/x"], pair[0]["tip/y"]], axis=1)[rows], atol=1e-6
+    )
 
 
 def test_rerun_verifies_the_file(rrd):
     from flexlab.review.headless import executable
 
     done = subprocess.run(
-        [executable(), "rrd", "verify", str(rrd)], capture_output=True, text=True, env=os.environ | {"NO_COLOR": "1"}
+        [executable(), "rrd", "verify", str(rrd)],
+        capture_output=True,
+        text=True,
+        env=os.environ | {"NO_COLOR": "1"},
     )
     assert "1 file verified" in done.stdout + done.stderr and done.returncode == 0
 
@@ -201,14 +266,23 @@ def test_the_ghost_is_straight_and_as_long_as_the_link():
     c = shapes.curves(run, np.arange(len(run)), 0.01)
     ghost = c.undeformed[:, 2]
     np.testing.assert_allclose(np.linalg.norm(ghost[:, 1] - ghost[:, 0], axis=1), STRIP["length_m"])
-    np.testing.assert_allclose(np.arctan2(*(ghost[:, 1] - ghost[:, 0]).T[::-1]), run["link/3/angle"])
+    np.testing.assert_allclose(
+        np.arctan2(*(ghost[:, 1] - ghost[:, 0]).T[::-1]), run["link/3/angle"]
+    )
 
 
 def test_joints_are_marked_where_they_are():
     run = synthetic(RIG)
     c = shapes.curves(run, np.array([0, 50]), 0.01)
-    assert c.rail is not None and c.rail[:, 1].tolist() == [0, 0] and c.rail[0, 0] < -0.05 and c.rail[1, 0] > 0.15
-    np.testing.assert_allclose(c.sliders[:, 0, :4].mean(axis=1)[:, 0], run["joint/1/position"][[0, 50]])
+    assert (
+        c.rail is not None
+        and c.rail[:, 1].tolist() == [0, 0]
+        and c.rail[0, 0] < -0.05
+        and c.rail[1, 0] > 0.15
+    )
+    np.testing.assert_allclose(
+        c.sliders[:, 0, :4].mean(axis=1)[:, 0], run["joint/1/position"][[0, 50]]
+    )
     np.testing.assert_allclose(c.pins[:, 0, 0], run["link/2/x"][[0, 50]])
 
 
@@ -220,35 +294,55 @@ def test_a_sleeve_is_where_the_link_passes_it():
         {"joint/1/position": t + d, "link/1/tip_deflection": t + 0.002},
         dict.fromkeys(("joint/1/position", "link/1/tip_deflection"), "m"),
     )
-    run, computed = poses.with_poses(replace(run, meta={"source": "experiment", "robot": robot.to_dict()}))
+    run, computed = poses.with_poses(
+        replace(run, meta={"source": "experiment", "robot": robot.to_dict()})
+    )
     assert (
-        computed and run["link/1/x"] == pytest.approx(d - length) and run["tip/x"] == pytest.approx(d) and run["tip/y"] == 0.002
+        computed
+        and run["link/1/x"] == pytest.approx(d - length)
+        and run["tip/x"] == pytest.approx(d)
+        and run["tip/y"] == 0.002
     )
     c = shapes.curves(run, np.array([0]), 0.01)
     np.testing.assert_allclose(c.sliders[0, 0, :4].mean(axis=0), 0, atol=1e-15)
 
 
 def test_poses_that_a_measurement_lacks_are_computed():
-    """From joints and tip deflections alone, the arm is where the synthetic run, which bends that way, has it."""
+    """From joints and tip deflections alone, the arm is where the synthetic run, which bends that
+    way, has it."""
     for joints in ("Pa R", "R Pa R", "R R R R"):
         full = synthetic(chain(joints), "experiment")
-        kept = [name for name in full if name.startswith("joint") or name.endswith("tip_deflection")]
+        kept = [
+            name for name in full if name.startswith("joint") or name.endswith("tip_deflection")
+        ]
         bare = Run(full.t, {k: full[k] for k in kept}, {k: full.units[k] for k in kept}, full.meta)
         rebuilt, computed = poses.with_poses(bare)
         assert computed and not poses.with_poses(full)[1]
         # The only difference is the shortening, 0.6 w^2 / L a link.
         for name in ("tip/x", "tip/y", "link/2/angle"):
-            np.testing.assert_allclose(rebuilt[name], full[name], atol=0.6 * 0.02**2 * STRIP["length_m"] * len(joints.split()))
+            np.testing.assert_allclose(
+                rebuilt[name],
+                full[name],
+                atol=0.6 * 0.02**2 * STRIP["length_m"] * len(joints.split()),
+            )
 
 
 def test_a_gap_stays_a_gap(tmp_path, pair):
     first, second = pair
-    gap = {name: np.where((second.t > 1) & (second.t < 1.5), np.nan, values) for name, values in second.channels.items()}
+    gap = {
+        name: np.where((second.t > 1) & (second.t < 1.5), np.nan, values)
+        for name, values in second.channels.items()
+    }
     rrd = write_review(tmp_path / "gap.rrd", [first, replace(second, channels=gap)])
     _, values = scalars(rrd, "/twin/joint/1/position")
-    assert np.array_equal(values, gap["joint/1/position"], equal_nan=True) and np.isnan(values).any()
+    assert (
+        np.array_equal(values, gap["joint/1/position"], equal_nan=True) and np.isnan(values).any()
+    )
     _, apart = scalars(rrd, "/deviation/joint/1/position")
-    assert np.isnan(apart[(first.t > 1) & (first.t < 1.5)]).all() and np.isfinite(apart[first.t < 0.99]).all()
+    assert (
+        np.isnan(apart[(first.t > 1) & (first.t < 1.5)]).all()
+        and np.isfinite(apart[first.t < 0.99]).all()
+    )
     index, strips = column(rrd, "/twin/arm/deformed", "LineStrips2D:strips")
     hidden = (index > 1.0e9) & (index < 1.5e9)
     assert hidden.any() and [bool(s) for s in strips] == (~hidden).tolist()
@@ -260,7 +354,12 @@ def test_a_gap_stays_a_gap(tmp_path, pair):
 def test_frames_are_at_most_sixty_a_second_with_both_ends():
     t = np.arange(10_001) / 1000
     index = sampling.frames(t)
-    assert index[0] == 0 and index[-1] == 10_000 and np.diff(t[index])[:-1].min() >= 1 / 60 - 1e-3 and len(index) <= 602
+    assert (
+        index[0] == 0
+        and index[-1] == 10_000
+        and np.diff(t[index])[:-1].min() >= 1 / 60 - 1e-3
+        and len(index) <= 602
+    )
     assert sampling.frames(np.arange(11) / 10).tolist() == list(range(11))
     assert len(sampling.frames(np.linspace(0, 3600, 100_000))) <= sampling.MAX_FRAMES
     assert sampling.frames(np.zeros(1)).tolist() == [0] and len(sampling.frames(np.zeros(0))) == 0
@@ -270,13 +369,17 @@ def test_thinning_keeps_peaks_and_gaps():
     y = np.sin(np.linspace(0, 20, 100_000))
     y[777], y[50_001], y[90_000:90_010] = 9, -9, np.nan
     keep = sampling.thinned(y, 3000)
-    assert len(keep) <= 3002 and (np.diff(keep) > 0).all() and {0, 777, 50_001, 99_999} <= set(keep.tolist())
+    assert (
+        len(keep) <= 3002
+        and (np.diff(keep) > 0).all()
+        and {0, 777, 50_001, 99_999} <= set(keep.tolist())
+    )
     assert np.isnan(y[keep]).any()
     assert np.array_equal(sampling.thinned(y[:100], 3000), np.arange(100))
 
 
 def test_a_long_run_is_thinned_and_says_so(tmp_path, monkeypatch, pair):
-    monkeypatch.setattr("flexlab.review.record.MAX_SAMPLES", 3000)
+    monkeypatch.setattr("flexlab.review.writer.MAX_SAMPLES", 3000)
     rrd = write_review(tmp_path / "long.rrd", pair)
     _, values = scalars(rrd, "/simulation/tip/y")
     assert len(values) < len(pair[0]) and values.max() == pair[0]["tip/y"].max()
@@ -311,10 +414,15 @@ def test_an_emulated_experiment_is_never_unlabelled(tmp_path, pair):
 
 def test_an_incomplete_run_says_so(tmp_path, pair):
     cut = Run(
-        pair[0].t[:100], {k: v[:100] for k, v in pair[0].channels.items()}, pair[0].units, pair[0].meta | {"complete": False}
+        pair[0].t[:100],
+        {k: v[:100] for k, v in pair[0].channels.items()},
+        pair[0].units,
+        pair[0].meta | {"complete": False},
     )
     rrd = write_review(tmp_path / "cut.rrd", [cut])
-    assert "incomplete" in text(rrd) and "incomplete" in text(rrd, "/simulation/joint/1/position", "SeriesLines:names")
+    assert "incomplete" in text(rrd) and "incomplete" in text(
+        rrd, "/simulation/joint/1/position", "SeriesLines:names"
+    )
 
 
 def test_the_about_page_has_the_robot_and_the_deviations(rrd):
@@ -333,7 +441,7 @@ def test_the_about_page_has_the_robot_and_the_deviations(rrd):
 def test_a_failing_write_leaves_nothing(tmp_path, monkeypatch, pair):
     target = tmp_path / "r.rrd"
     target.write_bytes(b"the old one")
-    monkeypatch.setattr("flexlab.review.record.about", lambda *a, **k: 1 / 0)
+    monkeypatch.setattr("flexlab.review.writer.about", lambda *a, **k: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         write_review(target, pair)
     assert target.read_bytes() == b"the old one" and list(tmp_path.iterdir()) == [target]
@@ -352,7 +460,9 @@ def test_bad_arguments_are_named(tmp_path, pair):
         picture(tmp_path / "no.rrd", tmp_path / "p.png")
 
 
-@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="other systems always have a display")
+@pytest.mark.skipif(
+    not sys.platform.startswith("linux"), reason="other systems always have a display"
+)
 def test_without_a_display_there_is_no_window(rrd, monkeypatch):
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
@@ -364,7 +474,10 @@ def test_without_vulkan_the_packages_are_named(rrd, tmp_path, monkeypatch):
     from flexlab.review import headless
 
     fake = tmp_path / "rerun"
-    fake.write_text('#!/bin/sh\n[ "$1" = analytics ] || { echo "Failed to get render context" >&2; exit 102; }\n')
+    fake.write_text(
+        '#!/bin/sh\n[ "$1" = analytics ] || { echo "Failed to get render context" >&2; exit 102; '
+        "}\n"
+    )
     fake.chmod(0o755)
     monkeypatch.setattr(headless, "executable", lambda: fake)
     with pytest.raises(FlexuraError, match="mesa-vulkan-drivers libvulkan1"):
@@ -374,23 +487,33 @@ def test_without_vulkan_the_packages_are_named(rrd, tmp_path, monkeypatch):
 
 def test_rerun_is_imported_only_when_used():
     heavy = "{'rerun', 'rerun_cli', 'rerun_bindings', 'pyarrow'}"
-    code = f"import sys, flexlab.review, flexlab.deviation; sys.exit(bool({heavy} & set(sys.modules)))"
+    code = (
+        f"import sys, flexlab.review, flexlab.deviation; sys.exit(bool({heavy} & set(sys.modules)))"
+    )
     assert (
-        subprocess.run([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}).returncode == 0
+        subprocess.run(
+            [sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+        ).returncode
+        == 0
     )
 
 
 def test_no_rerun_name_in_use_is_deprecated(tmp_path):
     code = (
-        "import sys; from flexura.run import Run; from flexlab.review import write_gallery, write_review; import numpy as np\n"
+        "import sys; from flexura.run import Run; from flexlab.review import write_gallery, "
+        "write_review; import numpy as np\n"
         "import rerun.experimental, rerun.chunk, flexlab.review.headless\n"
-        "meta = {'source': 'simulation', 'phases': [{'t': 0.0, 'name': 'move'}], 'events': [{'t': 0.0, 'text': 'start'}]}\n"
-        "write_review(sys.argv[1], [Run(np.arange(3.0), {'joint/1/position': np.zeros(3)}, {'joint/1/position': 'rad'}, meta)])\n"
+        "meta = {'source': 'simulation', 'phases': [{'t': 0.0, 'name': 'move'}], 'events': [{'t': "
+        "0.0, 'text': 'start'}]}\n"
+        "write_review(sys.argv[1], [Run(np.arange(3.0), {'joint/1/position': np.zeros(3)}, "
+        "{'joint/1/position': 'rad'}, meta)])\n"
     )
     done = subprocess.run(
         [sys.executable, "-W", "error::DeprecationWarning", "-c", code, str(tmp_path / "d.rrd")],
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}, capture_output=True, text=True,
-    )  # fmt: skip
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+        capture_output=True,
+        text=True,
+    )
     assert done.returncode == 0, done.stderr
 
 
@@ -421,7 +544,9 @@ def look(viewer, rrd):
         query = table.get("ViewContents", {}).get("query", [])
         for part in [query] if isinstance(query, str) else query:
             base = part.lstrip("+- ").strip().removesuffix("/**")
-            assert any(e == base or e.startswith(base + "/") for e in logged), f"nothing is logged for {part}"
+            assert any(e == base or e.startswith(base + "/") for e in logged), (
+                f"nothing is logged for {part}"
+            )
             queries += 1
     assert queries
     views = {view.name: view for view in state.views}
@@ -436,7 +561,9 @@ def shot(viewer, view, time_s):
     from flexlab.review import headless
 
     viewer.set_time("time", duration=time_s, play_state="paused")
-    return np.asarray(Image.open(io.BytesIO(headless.settled(viewer, view.view_id))).convert("RGB")).astype(int)
+    return np.asarray(
+        Image.open(io.BytesIO(headless.settled(viewer, view.view_id))).convert("RGB")
+    ).astype(int)
 
 
 def painted(pixels, colour):
@@ -449,21 +576,34 @@ def test_both_arms_are_seen_and_up_is_up(viewer, rrd):
     up, flat = shot(viewer, both, RAISED), shot(viewer, both, 0.0)
     for source in ("simulation", "twin"):
         assert len(painted(up, COLOURS[source])) > 200, source
-    assert painted(up, COLOURS["simulation"])[:, 0].min() < painted(flat, COLOURS["simulation"])[:, 0].min() - 50
+    assert (
+        painted(up, COLOURS["simulation"])[:, 0].min()
+        < painted(flat, COLOURS["simulation"])[:, 0].min() - 50
+    )
     alone = shot(viewer, views["simulation"], RAISED)
-    assert len(painted(alone, COLOURS["simulation"])) > 100 and not len(painted(alone, COLOURS["twin"]))
+    assert len(painted(alone, COLOURS["simulation"])) > 100 and not len(
+        painted(alone, COLOURS["twin"])
+    )
 
 
 def test_the_review_of_one_run_has_no_empty_view(viewer, pair, tmp_path):
     views = look(viewer, write_review(tmp_path / "one.rrd", pair[:1]))
-    assert "simulation" in views and not [name for name in views if "deviation" in name or "overlaid" in name or "twin" in name]
-    views = look(viewer, write_review(tmp_path / "bare.rrd", [replace(pair[0], meta={"source": "simulation"})]))
+    assert "simulation" in views and not [
+        name for name in views if "deviation" in name or "overlaid" in name or "twin" in name
+    ]
+    views = look(
+        viewer,
+        write_review(tmp_path / "bare.rrd", [replace(pair[0], meta={"source": "simulation"})]),
+    )
     assert "simulation" not in views and "events" not in views
 
 
 def test_a_robot_with_five_links(viewer, tmp_path):
     robot = chain("R Pa R R R")
-    rrd = write_review(tmp_path / "five.rrd", [synthetic(robot), synthetic(robot, "experiment", late=0.05, emulated=True)])
+    rrd = write_review(
+        tmp_path / "five.rrd",
+        [synthetic(robot), synthetic(robot, "experiment", late=0.05, emulated=True)],
+    )
     views = look(viewer, rrd)
     assert "overlaid: blue simulation, green experiment (emulated)" in views
     tabs = [
@@ -475,15 +615,26 @@ def test_a_robot_with_five_links(viewer, tmp_path):
 
 
 def test_a_gallery_shows_every_robot_at_a_glance_and_on_a_page_of_its_own(viewer, pair, tmp_path):
-    groups = {"I RR": [synthetic(chain("R R")), synthetic(chain("R R"), "experiment")], "IV PaR": pair}
+    groups = {
+        "I RR": [synthetic(chain("R R")), synthetic(chain("R R"), "experiment")],
+        "IV PaR": pair,
+    }
     rrd = write_gallery(tmp_path / "all.rrd", groups)
     found = entities(rrd)
     for root in ("/i_rr", "/iv_par"):
-        assert {f"{root}/about", f"{root}/ground/grid", f"{root}/deviation/joint/1/position"} <= found
+        assert {
+            f"{root}/about",
+            f"{root}/ground/grid",
+            f"{root}/deviation/joint/1/position",
+        } <= found
     assert {"/i_rr/experiment/joint/2/position", "/iv_par/simulation/arm/deformed"} <= found
     assert all(path.startswith(("/i_rr", "/iv_par")) for path in found)
     views = look(viewer, rrd)
-    assert [name for name in ("I RR", "IV PaR") if not any(view.startswith(f"{name}: blue simulation") for view in views)] == []
+    assert [
+        name
+        for name in ("I RR", "IV PaR")
+        if not any(view.startswith(f"{name}: blue simulation") for view in views)
+    ] == []
     with pytest.raises(InputError, match="one robot or more"):
         write_gallery(tmp_path / "none.rrd", {})
 

@@ -1,4 +1,5 @@
-"""The emulated rig's plant: each part against what its data or the theory say, all of them together as a rig."""
+"""The emulated rig's plant: each part against what its data or the theory say, all of them together
+as a rig."""
 
 import dataclasses
 import math
@@ -12,11 +13,11 @@ from scipy.optimize import least_squares
 
 import flexura as fx
 from flexlab import rig
-from flexlab.board.emulated import Outputs
+from flexlab.board.emulator.emulated import Outputs
 from flexlab.rig.emulation import FACTORS, Ranges, Truth, random_truth
-from flexlab.rig.mechanics import STEP_S, Mechanics
-from flexlab.rig.motor import Motor, backwards, joint_line, motor_data
-from flexlab.rig.plant import rig_plant, true_robot
+from flexlab.rig.plant.mechanics import STEP_S, Mechanics
+from flexlab.rig.plant.motor import Motor, backwards, joint_line, motor_data
+from flexlab.rig.plant.plant import rig_plant, true_robot
 from flexura.errors import InputError
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -28,18 +29,26 @@ QUIET = {"flex__noise_V": 0.0, "flex__drift_V": 0.0}
 
 
 def run(plant, seconds, outputs, window=STEP_S):
-    """Advance a plant; `outputs(t)` gives duty and steps. Returns t, carriage, nut, joint, tip deflection."""
+    """Advance a plant; `outputs(t)` gives duty and steps. Returns t, carriage, nut, joint, tip
+    deflection."""
     rows = np.empty((round(seconds / window), 5))
     out = Outputs(motor_on=True, stepper_on=True)
     for k in range(len(rows)):
         out.duty, out.steps = outputs(k * window)
         plant.advance(window, out)
-        rows[k] = (k + 1) * window, plant.carriage_m, plant.nut_m, plant.joint_rad, plant.tip_deflection_m
+        rows[k] = (
+            (k + 1) * window,
+            plant.carriage_m,
+            plant.nut_m,
+            plant.joint_rad,
+            plant.tip_deflection_m,
+        )
     return rows.T
 
 
 def vibration(t, y, guess):
-    """Frequency [Hz] and decay rate [1/s] of a decaying oscillation about a constant, by least squares."""
+    """Frequency [Hz] and decay rate [1/s] of a decaying oscillation about a constant, by least
+    squares."""
 
     def residual(p):
         return p[0] * np.exp(-p[3] * t) * np.sin(2 * math.pi * p[2] * t + p[1]) + p[4] - y
@@ -54,7 +63,8 @@ def vibration(t, y, guess):
 
 
 def test_the_held_strip_vibrates_and_decays_as_the_model_says():
-    """Clamped: the first frequency of the native model's mesh of 12 elements; decay beta omega^2 / 2."""
+    """Clamped: the first frequency of the native model's mesh of 12 elements; decay beta omega^2 /
+    2."""
     mechanics = Mechanics(BENCH.robot)
     mechanics.hold_carriage(*STIFF)
     mechanics.hold_joint(2e4, 0.0)
@@ -66,13 +76,16 @@ def test_the_held_strip_vibrates_and_decays_as_the_model_says():
         deflection[k] = mechanics.tip_deflection_m
     t = np.arange(len(deflection)) * mechanics.step_s
     frequency, decay = vibration(t[600:], deflection[600:], 5.0)
-    exact = fx.frequencies(fx.assemble(BENCH.robot.replace({"link.2.elements": 12})), joints="locked")[0]
+    exact = fx.frequencies(
+        fx.assemble(BENCH.robot.replace({"link.2.elements": 12})), joints="locked"
+    )[0]
     assert frequency == pytest.approx(exact, rel=2e-3)
     assert decay == pytest.approx(0.5 * 2e-4 * (2 * math.pi * exact) ** 2, rel=0.02)
 
 
 def test_energy_of_what_nothing_drives_or_damps_stays():
-    """Thrown: carriage and strip turn and vibrate freely. The scheme damps what it does not resolve, and adds nothing."""
+    """Thrown: carriage and strip turn and vibrate freely. The scheme damps what it does not
+    resolve, and adds nothing."""
     mechanics = Mechanics(BENCH.robot.replace({"link.2.damping.beta_s": 0.0}))
     mechanics.hold_carriage(1e3, 0.0)
     mechanics.hold_joint(2.0, 0.0)
@@ -91,7 +104,8 @@ def test_energy_of_what_nothing_drives_or_damps_stays():
 
 @pytest.mark.parametrize("angle", [0.0, 0.7])
 def test_the_sensor_integrates_the_slope_of_a_loaded_cantilever(angle):
-    """w'(s) = P (L s - s^2/2) / EI + q (3 L^2 s - 3 L s^2 + s^3) / (6 EI), weight of payload and strip across the strip."""
+    """w'(s) = P (L s - s^2/2) / EI + q (3 L^2 s - 3 L s^2 + s^3) / (6 EI), weight of payload and
+    strip across the strip."""
     weight, (first, last) = 3.0, (0.002, 0.09725)
     gravity = [weight * math.sin(angle), -weight * math.cos(angle)]
     robot = BENCH.robot.replace({"gravity_m_s2": gravity, "link.2.damping.beta_s": 0.05})
@@ -105,22 +119,37 @@ def test_the_sensor_integrates_the_slope_of_a_loaded_cantilever(angle):
     p, q = weight * robot.payload.mass_kg, weight * float(strip.mass_per_length(np.zeros(1))[0])
 
     def slope(s):
-        return -(p * (length * s - s**2 / 2) + q * (3 * length**2 * s - 3 * length * s**2 + s**3) / 6) / ei
+        return (
+            -(p * (length * s - s**2 / 2) + q * (3 * length**2 * s - 3 * length * s**2 + s**3) / 6)
+            / ei
+        )
 
     assert mechanics.bend_rad == pytest.approx(slope(last) - slope(first), rel=3e-3)
-    assert mechanics.tip_deflection_m == pytest.approx(-(p / 3 + q * length / 8) * length**3 / ei, rel=3e-3)
+    assert mechanics.tip_deflection_m == pytest.approx(
+        -(p / 3 + q * length / 8) * length**3 / ei, rel=3e-3
+    )
 
 
 def test_a_plant_knows_nothing_of_the_native_solver():
     code = (
         f"import sys; sys.path[:0] = {[str(ROOT / 'model'), str(ROOT / 'analysis')]}\n"
-        "from flexlab import rig\nfrom flexlab.board.emulated import Outputs\nfrom flexlab.rig.plant import rig_plant\n"
-        f"plant = rig_plant(rig.load({str(BENCH.file)!r})); plant.advance(0.001, Outputs(duty=0.5, motor_on=True))\n"
+        "from flexlab import rig\nfrom flexlab.board.emulated import Outputs\nfrom "
+        "flexlab.rig.plant import rig_plant\n"
+        f"plant = rig_plant(rig.load({str(BENCH.file)!r})); plant.advance(0.001, Outputs(duty=0.5, "
+        f"motor_on=True))\n"
         "print(*sys.modules)"
     )
-    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120).stdout.split()
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120
+    ).stdout.split()
     assert "exudyn" in loaded
-    assert not {"flexura.kernel", "flexura.beam", "flexura.system", "flexura.loop", "flexura.forward"} & set(loaded)
+    assert not {
+        "flexura.kernel",
+        "flexura.beam",
+        "flexura.system",
+        "flexura.loop",
+        "flexura.simulation.simulate",
+    } & set(loaded)
 
 
 # ---- motor and screw
@@ -133,7 +162,9 @@ def test_the_motor_is_on_the_line_of_its_data_sheet(part):
     load = part * sheet.stall_torque_N_m
     for _ in range(2000):
         motor.advance(5e-4, sheet.rated_voltage_V, load)
-    assert motor.speed_rad_s * 30 / math.pi == pytest.approx(sheet.no_load_speed_rpm * (1 - part), rel=1e-3)
+    assert motor.speed_rad_s * 30 / math.pi == pytest.approx(
+        sheet.no_load_speed_rpm * (1 - part), rel=1e-3
+    )
     expected = sheet.no_load_current_A + part * (sheet.stall_current_A - sheet.no_load_current_A)
     assert motor.current_A == pytest.approx(expected, rel=1e-3)
 
@@ -141,7 +172,9 @@ def test_the_motor_is_on_the_line_of_its_data_sheet(part):
 def test_the_blocked_motor_takes_its_stall_current_with_the_coil_s_time_constant():
     motor = Motor(dataclasses.replace(DATA, inertia_kg_m2=1e6))
     motor.advance(1e-3, 12.0)
-    assert motor.current_A == pytest.approx(7.0 * (1 - math.exp(-1e-3 * DATA.resistance_ohm / DATA.inductance_H)), rel=1e-6)
+    assert motor.current_A == pytest.approx(
+        7.0 * (1 - math.exp(-1e-3 * DATA.resistance_ohm / DATA.inductance_H)), rel=1e-6
+    )
     for _ in range(20):
         motor.advance(1e-3, 12.0)
     assert motor.current_A == pytest.approx(7.0, rel=1e-6)
@@ -166,13 +199,16 @@ def test_a_motor_without_voltage_coasts_and_a_shorted_one_brakes():
             motor.advance(1e-3, volts)
         assert motor.speed_rad_s == 0.0
         turned.append(motor.angle_rad)
-    assert turned[0] == pytest.approx(0.5 * 50.0**2 * DATA.inertia_kg_m2 / DATA.friction_N_m, rel=0.01)  # J w^2 / 2 = T phi
+    assert turned[0] == pytest.approx(
+        0.5 * 50.0**2 * DATA.inertia_kg_m2 / DATA.friction_N_m, rel=0.01
+    )  # J w^2 / 2 = T phi
     assert turned[1] < 0.5 * turned[0]
 
 
 @pytest.mark.parametrize("efficiency", [0.6, 0.9])
 def test_a_load_costs_the_motor_more_than_it_gives_back(efficiency):
-    """Lifting takes the current (T_f + M / eta) / K, lowering (-T_f + M eta') / K; a self-locking screw turns for no load."""
+    """Lifting takes the current (T_f + M / eta) / K, lowering (-T_f + M eta') / K; a self-locking
+    screw turns for no load."""
     load = 0.02
     currents = []
     for volts in (6.0, -6.0):
@@ -181,7 +217,11 @@ def test_a_load_costs_the_motor_more_than_it_gives_back(efficiency):
             motor.advance(5e-4, volts, load)
         currents.append(motor.current_A)
     gear = DATA.gear_efficiency
-    both = load * (1 / (gear * efficiency) + backwards(gear) * backwards(efficiency)) / DATA.constant_N_m_A
+    both = (
+        load
+        * (1 / (gear * efficiency) + backwards(gear) * backwards(efficiency))
+        / DATA.constant_N_m_A
+    )
     assert currents[0] + currents[1] == pytest.approx(both, rel=2e-3)
     assert backwards(0.5) == 0.0 and backwards(1.0) == 1.0
     locked = Motor(DATA, screw_efficiency=0.5)
@@ -191,7 +231,8 @@ def test_a_load_costs_the_motor_more_than_it_gives_back(efficiency):
 
 @pytest.mark.parametrize("factor", [0.5, 2.0])
 def test_the_carriage_lags_by_the_play(factor):
-    """Slowly up and down: the carriage minus the nut differs, between the ways, by the play and twice the nut's give F / k."""
+    """Slowly up and down: the carriage minus the nut differs, between the ways, by the play and
+    twice the nut's give F / k."""
     emulated = BENCH.emulated.carriage
     plant = rig_plant(BENCH, truth=Truth(backlash=factor), **QUIET)
     _, carriage, nut, _, _ = run(plant, 4.0, lambda t: (0.25 if t < 2.0 else -0.25, 0))
@@ -203,13 +244,16 @@ def test_the_carriage_lags_by_the_play(factor):
 
 
 def test_the_line_of_joint_1_is_what_the_plant_does():
-    """Steady speed at a voltage, by force = viscous v + coulomb, with the bridge's dead zone beside."""
+    """Steady speed at a voltage, by force = viscous v + coulomb, with the bridge's dead zone
+    beside."""
     line = joint_line(BENCH)
     plant = rig_plant(BENCH, truth=SAME, **QUIET)
     _, _, nut, _, _ = run(plant, 1.0, lambda t: (0.5, 0))
     speed = (nut[-1] - nut[-401]) / (400 * STEP_S)
     volts = 6.0 - BENCH.emulated.driver.dead_zone_V
-    assert speed == pytest.approx((line.force_N_V * volts - line.coulomb_N) / line.viscous_N_s_m, rel=2e-3)
+    assert speed == pytest.approx(
+        (line.force_N_V * volts - line.coulomb_N) / line.viscous_N_s_m, rel=2e-3
+    )
 
 
 # ---- stepper
@@ -236,7 +280,9 @@ def test_the_stepper_swings_about_its_step_with_its_magnetic_spring():
     mass = float(strip.mass_per_length(np.zeros(1))[0]) * strip.length_m
     inertia = 0.02 + strip.joint.rotor_inertia + mass * strip.length_m**2 / 3
     n = stepper.full_steps_per_turn / 4
-    expected = math.sqrt(n * (stepper.holding_torque_N_m + 4 * bench.emulated.stepper.detent_torque_N_m) / inertia)
+    expected = math.sqrt(
+        n * (stepper.holding_torque_N_m + 4 * bench.emulated.stepper.detent_torque_N_m) / inertia
+    )
     swing = joint[t > 0.25]
     assert np.ptp(swing) < 0.01
     frequency, _ = vibration(t[t > 0.25], swing, expected / (2 * math.pi))
@@ -251,7 +297,10 @@ def test_an_overloaded_stepper_loses_steps_by_fours_and_a_spared_one_none():
     def smooth(s):
         return round(steps * min(1.0, s) ** 2 * (3 - 2 * min(1.0, s)))
 
-    for ramp in (2.0, 0.1):  # 2.4 rad/s^2 at most is 0.05 N m; 20 times as fast is beyond the holding torque
+    for ramp in (
+        2.0,
+        0.1,
+    ):  # 2.4 rad/s^2 at most is 0.05 N m; 20 times as fast is beyond the holding torque
         plant = rig_plant(bench, truth=SAME, stepper__damping_N_m_s=0.05, **QUIET)
         _, _, _, joint, _ = run(plant, ramp + 3.0, lambda t, ramp=ramp: (0, smooth(t / ramp)))
         after[ramp] = (steps * plant.spring.rad_per_step - joint[-1]) / (4 * math.radians(1.8))
@@ -278,17 +327,24 @@ def test_the_flex_sensor_divides_the_supply_by_its_bend():
     for bend in (-0.03, 0.0, 0.02):
         volts = plant.flex.voltage(bend)
         ohms = flex.divider_ohm * (5.0 / volts - 1.0)
-        assert ohms == pytest.approx(flex.straight_ohm + 0.9 * flex.ohm_per_rad * bend * (1 + more.nonlinearity_1_rad * bend))
+        assert ohms == pytest.approx(
+            flex.straight_ohm + 0.9 * flex.ohm_per_rad * bend * (1 + more.nonlinearity_1_rad * bend)
+        )
 
 
 def test_noise_and_drift_are_as_large_and_as_slow_as_the_file_says():
     flex = rig_plant(BENCH, seed=5, flex__noise_V=0.0, flex__drift_V=0.01, flex__drift_s=0.05).flex
     drift = np.array([flex.sample(0.0) for _ in range(400_000)]) - flex.voltage(0.0)
     assert drift.std() == pytest.approx(0.01, rel=0.1)
-    assert np.mean(drift[100:] * drift[:-100]) / drift.var() == pytest.approx(math.exp(-100 * STEP_S / 0.05), abs=0.06)
+    assert np.mean(drift[100:] * drift[:-100]) / drift.var() == pytest.approx(
+        math.exp(-100 * STEP_S / 0.05), abs=0.06
+    )
     flex = rig_plant(BENCH, seed=5, flex__noise_V=0.004, flex__drift_V=0.0).flex
     noise = np.array([flex.sample(0.0) for _ in range(20_000)]) - flex.voltage(0.0)
-    assert noise.std() == pytest.approx(0.004, rel=0.03) and abs(np.mean(noise[1:] * noise[:-1])) < 0.03 * noise.var()
+    assert (
+        noise.std() == pytest.approx(0.004, rel=0.03)
+        and abs(np.mean(noise[1:] * noise[:-1])) < 0.03 * noise.var()
+    )
 
 
 # ---- the whole
@@ -300,34 +356,46 @@ def profile(t):
 
 
 def test_coarse_steps_do_what_fine_ones_do():
-    """The same drives, held for a step, on steps a fifth as long with 8 elements: 0.5 % of the peak, rms; joints 0.1 %."""
+    """The same drives, held for a step, on steps a fifth as long with 8 elements: 0.5 % of the
+    peak, rms; joints 0.1 %."""
     plant = rig_plant(BENCH, **QUIET)
     rough = run(plant, 1.0, profile)
     fine = rig_plant(BENCH, step_s=STEP_S / 5, elements=8, **QUIET)
-    exact = run(fine, 1.0, lambda t: profile(STEP_S * math.floor(t / STEP_S + 1e-6)), window=STEP_S / 5)[:, 4::5]
+    exact = run(
+        fine, 1.0, lambda t: profile(STEP_S * math.floor(t / STEP_S + 1e-6)), window=STEP_S / 5
+    )[:, 4::5]
     for k, most in ((1, 1e-3), (2, 1e-3), (3, 1e-3), (4, 5e-3)):
         error = math.sqrt(np.mean((rough[k] - exact[k]) ** 2))
         assert error < most * np.ptp(exact[k]) / 2
 
 
 def test_each_pulse_acts_when_it_comes():
-    """A law's 520 microsteps as means over steps of 0.5 ms, against 0.05 ms and 8 elements: the tip (5 mm, ripple and all) is the
-    same to 1.2 % rms. Counted at the steps' ends instead it would be 1.6 %, and 2.5 % if they came a step late."""
+    """A law's 520 microsteps as means over steps of 0.5 ms, against 0.05 ms and 8 elements: the tip
+    (5 mm, ripple and all) is the same to 1.2 % rms. Counted at the steps' ends instead it would be
+    1.6 %, and 2.5 % if they came a step late."""
     at = np.arange(100_000) * 1e-5
     given = np.round(130 * (1 - np.cos(2 * math.pi * at)))
     seen = []
     for step, elements in ((STEP_S, 3), (STEP_S / 10, 8)):
         plant = rig_plant(BENCH, truth=SAME, step_s=step, elements=elements, **QUIET)
         means = given.reshape(-1, round(step / 1e-5)).mean(axis=1)
-        seen.append(run(plant, 1.0, lambda t, means=means, step=step: (0.0, means[round(t / step)]), window=step))
+        seen.append(
+            run(
+                plant,
+                1.0,
+                lambda t, means=means, step=step: (0.0, means[round(t / step)]),
+                window=step,
+            )
+        )
     rough, fine = seen[0], seen[1][:, 9::10]
     for k, most in ((3, 6e-4), (4, 1.2e-2)):
         assert np.std(rough[k] - fine[k]) < most * np.abs(fine[k]).max()
 
 
 def test_encoders_are_drawn_on_by_a_step():
-    """After each step they say where the shafts are a step later: the motor's to a hundredth of a count, the joint's to what the
-    microsteps' ripple makes of it; half a second later they stand there."""
+    """After each step they say where the shafts are a step later: the motor's to a hundredth of a
+    count, the joint's to what the microsteps' ripple makes of it; half a second later they stand
+    there."""
     plant, out = rig_plant(BENCH, **QUIET), Outputs(motor_on=True, stepper_on=True)
     told, true = [], []
     for k in range(3000):
@@ -348,7 +416,9 @@ def test_windows_shorter_than_a_step_change_nothing_but_the_time_between():
         a = dataclasses.replace(one.advance(STEP_S, out))
         half = dataclasses.replace(two.advance(STEP_S / 2, out))
         b = two.advance(STEP_S / 2, out)
-        assert (a.encoder_1, a.encoder_2, a.flex_V) == pytest.approx((b.encoder_1, b.encoder_2, b.flex_V), rel=1e-12, abs=1e-12)
+        assert (a.encoder_1, a.encoder_2, a.flex_V) == pytest.approx(
+            (b.encoder_1, b.encoder_2, b.flex_V), rel=1e-12, abs=1e-12
+        )
         assert half.encoder_1 <= b.encoder_1
     assert one.carriage_m == two.carriage_m > 0
 
@@ -362,23 +432,38 @@ def test_the_same_seed_is_the_same_rig_and_another_one_is_not():
 
 
 def test_the_truth_is_told_and_is_in_the_robot():
-    truth = Truth(stiffness=0.9, damping=1.5, payload=1.2, friction=1.1, backlash=0.8, flex_gain=0.95)
+    truth = Truth(
+        stiffness=0.9, damping=1.5, payload=1.2, friction=1.1, backlash=0.8, flex_gain=0.95
+    )
     plant = rig_plant(BENCH, seed=3, truth=truth)
     told = plant.truth
-    assert told["factors"] == truth.model_dump() and list(told["factors"]) == list(FACTORS) and told["seed"] == 3
+    assert (
+        told["factors"] == truth.model_dump()
+        and list(told["factors"]) == list(FACTORS)
+        and told["seed"] == 3
+    )
     robot = fx.Robot.from_dict(told["robot"])
     nominal = BENCH.robot
-    ratio = robot.links[1].bending_stiffness(np.zeros(1)) / nominal.links[1].bending_stiffness(np.zeros(1))
+    ratio = robot.links[1].bending_stiffness(np.zeros(1)) / nominal.links[1].bending_stiffness(
+        np.zeros(1)
+    )
     assert ratio == pytest.approx(0.9)
     assert robot.links[1].damping.beta_s == pytest.approx(1.5 * nominal.links[1].damping.beta_s)
-    assert told["payload_kg"] == pytest.approx(1.2 * nominal.payload.mass_kg) == robot.payload.mass_kg
+    assert (
+        told["payload_kg"] == pytest.approx(1.2 * nominal.payload.mass_kg) == robot.payload.mass_kg
+    )
     assert told["joint_1_coulomb_N"] == pytest.approx(1.1 * joint_line(BENCH).coulomb_N)
-    given = {"mass_per_length_kg_m": 0.157, "bending_stiffness_N_m2": [{"at_m": 0.0, "value": 0.3}, {"at_m": 0.3, "value": 0.2}]}
+    given = {
+        "mass_per_length_kg_m": 0.157,
+        "bending_stiffness_N_m2": [{"at_m": 0.0, "value": 0.3}, {"at_m": 0.3, "value": 0.2}],
+    }
     data = nominal.to_dict()
     for key in ("section", "young_modulus_Pa", "density_kg_m3"):
         del data["link"][1][key]
     data["link"][1] |= given
-    bent = true_robot(fx.Robot.from_dict(data), truth).links[1].bending_stiffness(np.array([0.0, 0.3]))
+    bent = (
+        true_robot(fx.Robot.from_dict(data), truth).links[1].bending_stiffness(np.array([0.0, 0.3]))
+    )
     assert bent == pytest.approx([0.27, 0.18])
 
 
@@ -392,7 +477,10 @@ def test_random_truths_lie_in_their_ranges_and_follow_their_seed():
     assert random_truth(4, ranges) == drawn[4] != drawn[5]
 
 
-@pytest.mark.parametrize("change, key", [({"flex__nois_V": 0.0}, "emulated.flex.nois_V"), ({"noise_V": 0.0}, "emulated.noise_V")])
+@pytest.mark.parametrize(
+    "change, key",
+    [({"flex__nois_V": 0.0}, "emulated.flex.nois_V"), ({"noise_V": 0.0}, "emulated.noise_V")],
+)
 def test_what_is_not_in_the_table_cannot_differ(change, key):
     with pytest.raises(InputError) as caught:
         rig_plant(BENCH, **change)

@@ -1,4 +1,5 @@
-"""Every robot file of the project: it loads, assembles, and does its default manoeuvre inside its limits."""
+"""Every robot file of the project: it loads, assembles, and does its default manoeuvre inside its
+limits."""
 
 from __future__ import annotations
 
@@ -8,9 +9,9 @@ import numpy as np
 import pytest
 
 import flexura as fx
-from flexlab.manoeuvres import REACH, _reach, modest
-from flexura.drive import load_manoeuvre
+from flexlab.crosscheck.default_manoeuvre import REACH, _reach, modest
 from flexura.signals import polynomial, table
+from flexura.signals.drive import load_manoeuvre
 
 ROOT = Path(__file__).resolve().parents[2]
 FILES = sorted((ROOT / "model" / "robots").glob("*.toml"))
@@ -27,12 +28,15 @@ def test_a_robot_file_is_read_and_written_and_says_what_it_is(path, tmp_path):
     robot = fx.load(path)
     fx.save(robot, tmp_path / "again.toml")
     assert fx.load(tmp_path / "again.toml") == robot
-    assert path.read_text().startswith("#") and robot.name and all(link.name for link in robot.links)
+    assert (
+        path.read_text().startswith("#") and robot.name and all(link.name for link in robot.links)
+    )
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_a_robot_does_its_default_manoeuvre(path):
-    """Every joint moves, none leaves its limits or the link it slides on, links bend by 1 % or so, energy is kept."""
+    """Every joint moves, none leaves its limits or the link it slides on, links bend by 1 % or so,
+    energy is kept."""
     robot = fx.load(path)
     system = fx.assemble(robot)
     asked = modest(system)
@@ -49,7 +53,10 @@ def test_a_robot_does_its_default_manoeuvre(path):
             assert 1e-5 < sag < (0.05 if np.any(robot.gravity_m_s2) else 0.012)
 
 
-STIFF_RIDES = {"type-2-rpa", "type-8-pbpa"}  # sliders on damped links of 16 shapes: minutes at this tolerance
+STIFF_RIDES = {
+    "type-2-rpa",
+    "type-8-pbpa",
+}  # sliders on damped links of 16 shapes: minutes at this tolerance
 
 
 def replayed(path):
@@ -59,10 +66,13 @@ def replayed(path):
 
 @pytest.mark.parametrize("path", list(map(replayed, FILES)))
 def test_replayed_inverse_drives_return_the_motion(path):
-    """Every joint most of its way in half a second, exactly; its drives, as splines through 4 kHz values, forward again: 1e-6."""
+    """Every joint most of its way in half a second, exactly; its drives, as splines through 4 kHz
+    values, forward again: 1e-6."""
     system = fx.assemble(fx.load(path))
     t, start = np.linspace(0.0, 0.6, 2401), system.robot.start
-    motions = [polynomial(s + 0.8 * reach, 0.5, s) for s, reach in zip(start, _reach(system), strict=True)]
+    motions = [
+        polynomial(s + 0.8 * reach, 0.5, s) for s, reach in zip(start, _reach(system), strict=True)
+    ]
     run = fx.inverse(system, t, motions, rtol=1e-10)
     drives = fx.Drive.force(*(table(t, run[f"joint/{i}/drive"]) for i in range(1, len(start) + 1)))
     again = fx.simulate(system, t, drives, rtol=1e-10)
@@ -83,8 +93,11 @@ def test_a_robot_has_natural_frequencies_and_a_linear_model(path):
 
 
 def test_the_cart_of_the_single_link_comes_to_rest():
-    """The manoeuvre file beside it: a cycloid over two periods; the exact geometry and mode 2 leave 0.2 % of the deflection."""
+    """The manoeuvre file beside it: a cycloid over two periods; the exact geometry and mode 2 leave
+    0.2 % of the deflection."""
     system = fx.assemble(fx.load(ROOT / "model" / "robots" / "single-pa.toml"))
     asked = load_manoeuvre(ROOT / "model" / "manoeuvres" / "single-pa-at-rest.toml", 1)
     tip = np.abs(fx.simulate(system, asked.t, asked.drive, rtol=1e-8)["link/1/tip_deflection"])
-    assert tip[asked.t > 2 / 1.44972].max() < 2e-3 * tip.max() and tip.max() == pytest.approx(0.0255, abs=2e-4)
+    assert tip[asked.t > 2 / 1.44972].max() < 2e-3 * tip.max() and tip.max() == pytest.approx(
+        0.0255, abs=2e-4
+    )

@@ -1,4 +1,5 @@
-"""Input shaping from an identified frequency, on the emulated rig: the whole way from one free vibration to a strip at rest."""
+"""Input shaping from an identified frequency, on the emulated rig: the whole way from one free
+vibration to a strip at rest."""
 
 from __future__ import annotations
 
@@ -10,7 +11,7 @@ import flexura as fx
 from boards import elf
 from experiments import BENCH, SETTINGS, experiment
 from flexlab.experiment import plan as plans
-from flexlab.experiment.conduct import open_board
+from flexlab.experiment.run_experiment import open_board
 from flexura import signals
 from flexura.signals import constant, trapezoidal
 
@@ -19,14 +20,16 @@ MOVE_S, END_RAD, SEED = 0.25, 0.5, 3
 
 
 def emulated(plan, folder) -> fx.Run:
-    """On the rig's plant, which is not the native model and has other numbers than the robot file."""
+    """On the rig's plant, which is not the native model and has other numbers than the robot
+    file."""
     run = experiment(plan, folder, opened=open_board(BENCH, None, SEED, elf())).run
     assert run.meta["emulated"] and run.meta["complete"]
     return run
 
 
 def free_vibration(run: fx.Run, from_s: float) -> tuple[float, float]:
-    """Frequency [Hz] and damping ratio of what the sensor says from an instant on: a damped sine and a constant."""
+    """Frequency [Hz] and damping ratio of what the sensor says from an instant on: a damped sine
+    and a constant."""
     there = (run.t >= from_s) & np.isfinite(run["link/2/tip_deflection"])
     t, w = run.t[there] - from_s, run["link/2/tip_deflection"][there]
     spectrum = np.abs(np.fft.rfft((w - w.mean()) * np.hanning(len(w)), 1 << 16))
@@ -35,7 +38,13 @@ def free_vibration(run: fx.Run, from_s: float) -> tuple[float, float]:
 
     def left(x):
         wave = np.exp(-x[1] * t)
-        basis = np.column_stack([wave * np.cos(2 * np.pi * x[0] * t), wave * np.sin(2 * np.pi * x[0] * t), np.ones_like(t)])
+        basis = np.column_stack(
+            [
+                wave * np.cos(2 * np.pi * x[0] * t),
+                wave * np.sin(2 * np.pi * x[0] * t),
+                np.ones_like(t),
+            ]
+        )
         return w - basis @ np.linalg.lstsq(basis, w, rcond=None)[0]
 
     found = least_squares(left, [guess, 0.2], x_scale=[0.01, 0.1]).x
@@ -43,12 +52,22 @@ def free_vibration(run: fx.Run, from_s: float) -> tuple[float, float]:
 
 
 def left(run: fx.Run, frequency_Hz: float) -> float:
-    """Amplitude [m] of the vibration in the second after the motion, at that frequency: the sensor's noise averages out."""
+    """Amplitude [m] of the vibration in the second after the motion, at that frequency: the
+    sensor's noise averages out."""
     begin = run.meta["phases"][0]["t"] + 0.9
     there = (run.t >= begin) & (run.t < begin + 1.0) & np.isfinite(run["link/2/tip_deflection"])
     t = run.t[there]
-    basis = np.column_stack([np.cos(2 * np.pi * frequency_Hz * t), np.sin(2 * np.pi * frequency_Hz * t), np.ones_like(t), t])
-    return float(np.hypot(*np.linalg.lstsq(basis, run["link/2/tip_deflection"][there], rcond=None)[0][:2]))
+    basis = np.column_stack(
+        [
+            np.cos(2 * np.pi * frequency_Hz * t),
+            np.sin(2 * np.pi * frequency_Hz * t),
+            np.ones_like(t),
+            t,
+        ]
+    )
+    return float(
+        np.hypot(*np.linalg.lstsq(basis, run["link/2/tip_deflection"][there], rcond=None)[0][:2])
+    )
 
 
 def turn(motion) -> plans.Plan:
@@ -57,7 +76,8 @@ def turn(motion) -> plans.Plan:
 
 
 def test_shaping_from_the_identified_frequency_brings_the_strip_to_rest(tmp_path):
-    """ZV and ZVD at the identified frequency: a twentieth of the unshaped vibration. 10 % off: ZVD still a tenth, ZV not."""
+    """ZV and ZVD at the identified frequency: a twentieth of the unshaped vibration. 10 % off: ZVD
+    still a tenth, ZV not."""
     ringing = emulated(plans.free_vibration(BENCH, SETTINGS, 0.2, 5.0), tmp_path / "free")
     frequency, ratio = free_vibration(ringing, ringing.meta["asked"]["rings_from_s"] + 0.1)
     assert 4.0 < frequency < 6.5 and 0 < ratio < 0.05
@@ -66,12 +86,20 @@ def test_shaping_from_the_identified_frequency_brings_the_strip_to_rest(tmp_path
     assert amplitude > 5e-3
     parts = {}
     for name, shaper, factor in (
-        ("zv", signals.zv, 1.0), ("zvd", signals.zvd, 1.0), ("zv +10 %", signals.zv, 1.1), ("zvd +10 %", signals.zvd, 1.1),
+        ("zv", signals.zv, 1.0),
+        ("zvd", signals.zvd, 1.0),
+        ("zv +10 %", signals.zv, 1.1),
+        ("zvd +10 %", signals.zvd, 1.1),
         ("zvd -10 %", signals.zvd, 0.9),
-    ):  # fmt: skip
-        run = emulated(turn(shaper(plain, factor * frequency, ratio)), tmp_path / name.replace(" ", ""))
+    ):
+        run = emulated(
+            turn(shaper(plain, factor * frequency, ratio)), tmp_path / name.replace(" ", "")
+        )
         assert run["joint/2/position"][-1] == pytest.approx(END_RAD, abs=0.005)
         parts[name] = amplitude / left(run, frequency)
-    print(f"identified {frequency:.3f} Hz, damping {ratio:.4f}; unshaped {1e3 * amplitude:.2f} mm; fewer times: {parts}")
+    print(
+        f"identified {frequency:.3f} Hz, damping {ratio:.4f}; unshaped {1e3 * amplitude:.2f} mm; "
+        f"fewer times: {parts}"
+    )
     assert parts["zv"] > 20 and parts["zvd"] > 20
     assert parts["zvd +10 %"] > 10 and parts["zvd -10 %"] > 10 > parts["zv +10 %"]

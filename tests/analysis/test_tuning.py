@@ -1,4 +1,5 @@
-"""Tuning: figures against formulas, rows of a population against single runs, searches that repeat, resume and agree."""
+"""Tuning: figures against formulas, rows of a population against single runs, searches that repeat,
+resume and agree."""
 
 from __future__ import annotations
 
@@ -18,18 +19,17 @@ from pymoo.core.population import Population
 from scipy.optimize import differential_evolution, minimize_scalar
 
 import flexura as fx
-from flexlab.controlled import under
-from flexlab.tuning import free as freedom
-from flexlab.tuning.engine import Threads
-from flexlab.tuning.free import free
+from flexlab.tuning import search_space as freedom
+from flexlab.tuning.closed_loop import under
+from flexlab.tuning.executor import Threads
 from flexlab.tuning.history import FILE, History
 from flexlab.tuning.objective import FAILED, Weights
 from flexlab.tuning.result import figures, result
 from flexlab.tuning.search import Search, _winners, search
+from flexlab.tuning.search_space import free
 from flexlab.tuning.task import varied
-from flexura import gains
-from flexura.errors import InputError
-from flexura.response import (
+from flexura.control import gains
+from flexura.control.step_response import (
     ERROR,
     ITAE,
     OVERSHOOT,
@@ -43,25 +43,31 @@ from flexura.response import (
     least_vibration,
     strip_figures,
 )
+from flexura.errors import InputError
 from tunings import FREE, GAINS, ROBOT, SWING, task
 
 ROOT = Path(__file__).resolve().parents[2]
 MODEL = ROOT / "model"
-ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join(map(str, (MODEL, ROOT / "analysis"))), "COLUMNS": "140"}
+ENVIRONMENT = os.environ | {
+    "PYTHONPATH": os.pathsep.join(map(str, (MODEL, ROOT / "analysis"))),
+    "COLUMNS": "140",
+}
 
 
 def joint(t, y, r=None):
     return joint_figures(t, np.ones_like(t) if r is None else r, y)
 
 
-# -- figures -----------------------------------------------------------------------------------------------------------
+# -- figures
 
 
 def test_a_first_order_rise_has_its_formulas():
     """1 - exp(-t/T): rise T ln 9, settling T ln 50, ITAE T^2."""
     t, T = np.linspace(0, 5, 20_001), 0.2
     f = joint(t, 1 - np.exp(-t / T))
-    assert f[[RISE, SETTLING, ITAE]] == pytest.approx([T * np.log(9), T * np.log(50), T**2], rel=1e-5)
+    assert f[[RISE, SETTLING, ITAE]] == pytest.approx(
+        [T * np.log(9), T * np.log(50), T**2], rel=1e-5
+    )
     assert f[OVERSHOOT] == 0 and f[ERROR] < 1e-9
 
 
@@ -78,42 +84,59 @@ def test_an_oscillating_rise_has_its_overshoot_and_settles_when_it_last_enters_t
 def test_what_never_happens_is_not_a_number():
     t = np.linspace(0, 1, 101)
     f = joint(t, 0.5 * t)
-    assert np.isnan(f[RISE]) and np.isnan(f[SETTLING]) and f[ERROR] == pytest.approx(0.525, abs=1e-3)
+    assert (
+        np.isnan(f[RISE]) and np.isnan(f[SETTLING]) and f[ERROR] == pytest.approx(0.525, abs=1e-3)
+    )
 
 
 def test_the_strips_figures_of_a_decaying_vibration_about_a_bend():
     t, d, w = np.linspace(0, 5, 50_001), 2.0, 2 * np.pi * 5
     y = 1e-3 + 4e-3 * np.exp(-d * t) * np.sin(w * t)
     out = strip_figures(t, y, 1.0)
-    assert out[PEAK] == pytest.approx(np.abs(y - y[0]).max()) and out[RESIDUAL] == pytest.approx(np.ptp(y[t >= 1]) / 2)
-    assert out[RMS] == pytest.approx(4e-3 * np.sqrt((1 / (4 * d) - 0.25 * d / (d**2 + w**2)) / 5), rel=1e-3)
-    assert out[VIBRATION] == pytest.approx(4e-3 * (2 / np.pi) / d**2, rel=1e-2)  # the mean of |sin| is 2 / pi
+    assert out[PEAK] == pytest.approx(np.abs(y - y[0]).max()) and out[RESIDUAL] == pytest.approx(
+        np.ptp(y[t >= 1]) / 2
+    )
+    assert out[RMS] == pytest.approx(
+        4e-3 * np.sqrt((1 / (4 * d) - 0.25 * d / (d**2 + w**2)) / 5), rel=1e-3
+    )
+    assert out[VIBRATION] == pytest.approx(
+        4e-3 * (2 / np.pi) / d**2, rel=1e-2
+    )  # the mean of |sin| is 2 / pi
 
 
-# -- rows of a population ----------------------------------------------------------------------------------------------
+# -- rows of a population
 
 
 def test_a_row_is_the_run_of_simulate_and_rows_do_not_know_of_each_other():
-    """Figures as from fx.simulate at the same tolerance to the bit; J from a Run by its definition; any order, any thread."""
+    """Figures as from fx.simulate at the same tolerance to the bit; J from a Run by its definition;
+    any order, any thread."""
     one = task(rtol=1e-6, modes=0)
     points = np.random.default_rng(3).random((9, 3))
     found, reached = one.run(one.trials(), points)
     again, _ = one.run(one.trials(), points[::-1])
     with Threads(one, 2) as engine:
         shared, _ = engine(points, np.full(9, np.inf))
-    assert np.array_equal(found, again[::-1], equal_nan=True) and np.array_equal(found, shared, equal_nan=True)
+    assert np.array_equal(found, again[::-1], equal_nan=True) and np.array_equal(
+        found, shared, equal_nan=True
+    )
     for k in (0, 4):
         tuned = one.tuned(one.values(points[k : k + 1])[0])
         system = fx.assemble(ROBOT)
         controller = under(system, SWING, tuned)
         run = fx.simulate(system, np.arange(0, 1001, 5) / 1000, controller, rtol=1e-6)
         direct = figures(run, controller)
-        assert np.array_equal(np.delete(direct.joints[0], 5), np.delete(found[k, 0, :6], 5), equal_nan=True)
+        assert np.array_equal(
+            np.delete(direct.joints[0], 5), np.delete(found[k, 0, :6], 5), equal_nan=True
+        )
         assert np.array_equal(direct.strip, found[k, 0, 6:])
         e, w = np.pi / 4 - run["joint/1/position"], run["link/1/tip_deflection"]
         itae = np.trapezoid(run.t * np.abs(e), run.t) / (np.pi / 4)
         rest = w[run.t >= 0.9 - 1e-12].mean()
-        J = itae + 100 * np.trapezoid(run.t * np.abs(w - rest), run.t) / 0.3 + max(0, (-e).max() / (np.pi / 4) - 0.05)
+        J = (
+            itae
+            + 100 * np.trapezoid(run.t * np.abs(w - rest), run.t) / 0.3
+            + max(0, (-e).max() / (np.pi / 4) - 0.05)
+        )
         J += 0.01 * found[k, 0, 5]
         assert one.score(found, reached)[k, 0] == pytest.approx(J, rel=1e-9)
 
@@ -137,7 +160,14 @@ def test_gains_that_break_the_robot_cost_more_than_any_that_do_not():
 
 def test_of_several_robots_the_worst_counts():
     robots = varied(ROBOT, (0.0, 1.0, 2.0), (0.9, 1.0))
-    assert len(robots) == 6 and [r.payload.mass_kg for r in robots] == [0.02, 0.0, 0.0, 0.02, 0.04, 0.04]
+    assert len(robots) == 6 and [r.payload.mass_kg for r in robots] == [
+        0.02,
+        0.0,
+        0.0,
+        0.02,
+        0.04,
+        0.04,
+    ]
     many = task(robots=robots)
     each = [task(robots=(r,)) for r in robots]
     point = many.start()[None]
@@ -145,18 +175,21 @@ def test_of_several_robots_the_worst_counts():
     assert worst == max(one.score(*one.run(one.trials(), point))[0, 0] for one in each)
 
 
-# -- runs that a search has no use for ------------------------------------------------------------------------------------
+# -- runs that a search has no use for
 
 
 def test_the_least_vibration_is_below_that_of_any_rest_and_close():
-    """Against SciPy's search for the best rest, at every length of the record; it stops early only where that is enough."""
+    """Against SciPy's search for the best rest, at every length of the record; it stops early only
+    where that is enough."""
     rng, t = np.random.default_rng(7), np.linspace(0, 3, 601)
     for _ in range(5):
         a, b, d, f = rng.uniform([-1e-2, -5e-3, 0.1, 1], [1e-2, 5e-3, 3, 9])
         w = b + a * np.exp(-d * t) * np.sin(2 * np.pi * f * t) + 1e-4 * rng.standard_normal(len(t))
         for count in (3, 20, 200, 601):
             of = lambda c, n=count, w=w: np.trapezoid(t[:n] * np.abs(w[:n] - c), t[:n])
-            least = minimize_scalar(of, bounds=(w.min(), w.max()), method="bounded", options={"xatol": 1e-9}).fun
+            least = minimize_scalar(
+                of, bounds=(w.min(), w.max()), method="bounded", options={"xatol": 1e-9}
+            ).fun
             assert 0.999 * least < least_vibration(t, w, count, 0.999 * least) <= least * (1 + 1e-9)
             assert least_vibration(t, w, count, 2 * least) <= least * (1 + 1e-9)
         assert least_vibration(t, w, 2, 0.0) == 0.0  # the first sample, at t = 0, has no weight
@@ -164,7 +197,8 @@ def test_the_least_vibration_is_below_that_of_any_rest_and_close():
 
 
 def test_a_run_is_abandoned_exactly_where_its_j_exceeds_the_limit():
-    """For limits about every run's own J, and what an abandoned run has of J is between the limit and it."""
+    """For limits about every run's own J, and what an abandoned run has of J is between the limit
+    and it."""
     one = task()
     points = np.random.default_rng(8).random((40, 3))
     whole, reached = one.run(one.trials(), points)
@@ -189,12 +223,17 @@ def test_on_several_robots_none_is_tried_after_one_that_was_too_bad():
     found, reached = many.run(many.trials(), points, limits)
     goals = many.score(found, reached)[:, 0]
     kept = limits >= J
-    assert np.array_equal(goals[kept], J[kept]) and (goals[~kept] > limits[~kept]).all() and (reached[~kept, -1] == 0).any()
+    assert (
+        np.array_equal(goals[kept], J[kept])
+        and (goals[~kept] > limits[~kept]).all()
+        and (reached[~kept, -1] == 0).any()
+    )
 
 
 @pytest.mark.parametrize("algorithm", ["ga", "pso", "cma-es"])
 def test_a_search_that_abandons_goes_the_same_way_to_the_bit(algorithm):
-    """Points of every generation, survivors and best J, with limits and without; limits too low by a tenth are noticed."""
+    """Points of every generation, survivors and best J, with limits and without; limits too low by
+    a tenth are noticed."""
     one, how = task(), Search(algorithm, population=10, generations=25, seed=6)
     trials = one.trials()
     with_limits, _ = tuned(one, how, engine=lambda points, limits: one.run(trials, points, limits))
@@ -213,33 +252,55 @@ def test_a_search_that_abandons_goes_the_same_way_to_the_bit(algorithm):
     assert not np.array_equal(wrong.all("points"), without.all("points"))
 
 
-# -- what is free ------------------------------------------------------------------------------------------------------
+# -- what is free
 
 
 def test_places_and_values_of_free_settings():
     gain, through = free("kp_1_V_m", 10, 1000), free("kg_2_rad_m", -2, 2)
     assert (gain.scale, through.scale) == ("log", "linear")
-    assert gain.value(np.array([0, 0.5, 1])) == pytest.approx([10, 100, 1000]) and through.value(np.array([0.25])) == [-1.0]
-    assert gain.place(100) == pytest.approx(0.5) and gain.place(1e9) == 1.0 and through.place(1) == 0.75
+    assert gain.value(np.array([0, 0.5, 1])) == pytest.approx([10, 100, 1000]) and through.value(
+        np.array([0.25])
+    ) == [-1.0]
+    assert (
+        gain.place(100) == pytest.approx(0.5)
+        and gain.place(1e9) == 1.0
+        and through.place(1) == 0.75
+    )
     assert free("kg_2_rad_m", -100, -1).value(np.array([0.5])) == pytest.approx([-10])
 
 
 def test_rows_of_the_law_are_those_of_a_controller_with_the_same_settings():
-    settings = {"kp_1_N_m_rad": 3.0, "kt_1_N_m_s_rad": 0.2, "setpoint_1_Hz": 2.0, "torque_max_1_N_m": 0.7, "derivative_Hz": 33.0,
-                "deflection_Hz": 21.0, "torque_slew_1_N_m_s": 9.0}  # fmt: skip
+    settings = {
+        "kp_1_N_m_rad": 3.0,
+        "kt_1_N_m_s_rad": 0.2,
+        "setpoint_1_Hz": 2.0,
+        "torque_max_1_N_m": 0.7,
+        "derivative_Hz": 33.0,
+        "deflection_Hz": 21.0,
+        "torque_slew_1_N_m_s": 9.0,
+    }
     frees = [free(name, value / 2, value * 2) for name, value in settings.items()]
     system = fx.assemble(ROBOT)
-    made, plain = (under(system, SWING, gains.Gains(GAINS.settings | more)) for more in (settings, {}))
+    made, plain = (
+        under(system, SWING, gains.Gains(GAINS.settings | more)) for more in (settings, {})
+    )
     base = plain.gains()
     row = freedom.rows(frees, np.array([list(settings.values())]), plain, base)
     assert np.array_equal(row[0], made.gains())
 
 
-@pytest.mark.parametrize("text, said", [
-    ("[free]\nkp_1_V_mm = [1, 2]", "setting of a gains file"), ("[free]\nkp_1_V_m = [2, 1]", "LOW below HIGH"),
-    ("[free]\nkp_1_V_m = 3", "[low, high]"), ("free = 1", "table [free]"), ("[frei]\nkp_1_V_m = [1, 2]", "unknown key"),
-    ("[free]\nkp_1_V_m = { low = -1, high = 2, scale = \"log\" }", "one sign"), ("[free]\ndelay_1_s = [0, 1]", "expected a gain"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "text, said",
+    [
+        ("[free]\nkp_1_V_mm = [1, 2]", "setting of a gains file"),
+        ("[free]\nkp_1_V_m = [2, 1]", "LOW below HIGH"),
+        ("[free]\nkp_1_V_m = 3", "[low, high]"),
+        ("free = 1", "table [free]"),
+        ("[frei]\nkp_1_V_m = [1, 2]", "unknown key"),
+        ('[free]\nkp_1_V_m = { low = -1, high = 2, scale = "log" }', "one sign"),
+        ("[free]\ndelay_1_s = [0, 1]", "expected a gain"),
+    ],
+)
 def test_a_wrong_file_of_bounds_is_refused_by_key(tmp_path, text, said):
     (tmp_path / "free.toml").write_text(text)
     with pytest.raises(InputError) as caught:
@@ -256,13 +317,19 @@ def test_free_settings_are_those_of_the_controllers_outputs_and_once():
         _ = task(manoeuvre=replace(SWING, drive=fx.Drive((fx.JointDrive(),)))).controllers
 
 
-# -- searches ----------------------------------------------------------------------------------------------------------
+# -- searches
 
 
 def tuned(one, how, folder=None, engine=None, generations=None):
     history = History.open(folder, one.digest(how.identity())) if folder else History("")
     with Threads(one, 1) as runs:
-        done = search(one, replace(how, generations=generations or how.generations), engine or runs, history, lambda h: None)
+        done = search(
+            one,
+            replace(how, generations=generations or how.generations),
+            engine or runs,
+            history,
+            lambda h: None,
+        )
     return history, done
 
 
@@ -302,7 +369,9 @@ def test_an_interrupted_search_goes_on_to_the_same_end(tmp_path, algorithm):
     for name in ("points", "goals", "figures", "reached"):
         assert np.array_equal(parts.all(name), whole.all(name), equal_nan=True)
     longer, _ = tuned(one, how, tmp_path, generations=9)
-    assert len(longer) == 9 and np.array_equal(longer.all("points")[: parts.evaluations], parts.all("points"))
+    assert len(longer) == 9 and np.array_equal(
+        longer.all("points")[: parts.evaluations], parts.all("points")
+    )
     with pytest.raises(InputError, match="empty folder"):
         tuned(one, replace(how, seed=6), tmp_path)
 
@@ -317,7 +386,10 @@ def test_a_tournament_is_won_by_the_best_of_all_three():
     population = Population.new(X=np.zeros((9, 1)), F=np.random.default_rng(1).random((9, 1)))
     drawn = np.array(list(permutations(range(9), 3)))
     won = _winners(population, drawn)[:, 0]
-    assert all(J == min(three) for J, three in zip(population.get("F")[won, 0], population.get("F")[drawn, 0], strict=True))
+    assert all(
+        J == min(three)
+        for J, three in zip(population.get("F")[won, 0], population.get("F")[drawn, 0], strict=True)
+    )
 
 
 @pytest.mark.parametrize("algorithm", ["ga", "pso", "cma-es"])
@@ -327,7 +399,15 @@ def test_the_search_finds_what_scipys_differential_evolution_finds(algorithm):
     trials = one.trials()
     J = lambda X: one.score(*one.run(trials, np.ascontiguousarray(np.atleast_2d(X.T))))[:, 0]
     known = differential_evolution(
-        J, [(0, 1)] * 2, rng=1, popsize=10, maxiter=40, tol=1e-6, vectorized=True, updating="deferred", polish=False
+        J,
+        [(0, 1)] * 2,
+        rng=1,
+        popsize=10,
+        maxiter=40,
+        tol=1e-6,
+        vectorized=True,
+        updating="deferred",
+        polish=False,
     )
     history, _ = tuned(one, Search(algorithm, population=20, generations=40, seed=2))
     assert history.all("goals").min() == pytest.approx(known.fun, rel=0.01)
@@ -361,18 +441,35 @@ def test_weights_must_be_numbers():
     assert Weights(vibration=0, overshoot=0, effort=0).text() == "J = sum_i [ itae_i / s^2 ]"
 
 
-# -- the command -------------------------------------------------------------------------------------------------------
+# -- the command
 
 STEP, RIG = MODEL / "manoeuvres" / "rig-step.toml", MODEL / "controllers" / "rig.toml"
 SMALL = (
-    "tune", MODEL / "robots" / "rig.toml", STEP, "--controller", RIG, "--rig", ROOT / "firmware" / "rig.toml", "--free",
-    "kf_2_rad_s_m=1:100", "--free", "kp_2_1_s=2:50", "--population", "6", "--out", "out", "--jobs", "1",
-)  # fmt: skip
+    "tune",
+    MODEL / "robots" / "rig.toml",
+    STEP,
+    "--controller",
+    RIG,
+    "--rig",
+    ROOT / "firmware" / "rig.toml",
+    "--free",
+    "kf_2_rad_s_m=1:100",
+    "--free",
+    "kp_2_1_s=2:50",
+    "--population",
+    "6",
+    "--out",
+    "out",
+    "--jobs",
+    "1",
+)
 
 
 def start(*arguments, cwd):
-    line = [sys.executable, "-m", "flexlab.cli", *map(str, arguments)]
-    return subprocess.Popen(line, cwd=cwd, env=ENVIRONMENT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    line = [sys.executable, "-m", "flexlab.cli.app", *map(str, arguments)]
+    return subprocess.Popen(
+        line, cwd=cwd, env=ENVIRONMENT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
 
 
 def flexura(*arguments, cwd):
@@ -387,13 +484,17 @@ def state(folder):
 
 
 def test_killed_and_interrupted_the_same_command_comes_to_the_same_end(tmp_path):
-    """kill -9, then a real Ctrl-C (SIGINT), then to the end; beside a run that nothing disturbed."""
+    """kill -9, then a real Ctrl-C (SIGINT), then to the end; beside a run that nothing
+    disturbed."""
     (tmp_path / "a").mkdir(), (tmp_path / "b").mkdir()
     arguments = (*SMALL, "--generations", "30", "--json")
     for number, (sent, status) in enumerate(((signal.SIGKILL, -9), (signal.SIGINT, 130)), 1):
         process = start(*arguments, cwd=tmp_path / "a")
         until = time.monotonic() + 200
-        while not (tmp_path / "a" / "out" / FILE).exists() or len(state(tmp_path / "a")["ends"]) < 3 * number:
+        while (
+            not (tmp_path / "a" / "out" / FILE).exists()
+            or len(state(tmp_path / "a")["ends"]) < 3 * number
+        ):
             assert process.poll() is None and time.monotonic() < until, process.communicate()
             time.sleep(0.01)
         process.send_signal(sent)
@@ -405,21 +506,41 @@ def test_killed_and_interrupted_the_same_command_comes_to_the_same_end(tmp_path)
     other = flexura(*arguments, cwd=tmp_path / "b")
     for name, array in state(tmp_path / "a").items():
         assert np.array_equal(array, state(tmp_path / "b")[name])
-    assert (tmp_path / "a/out/gains.toml").read_bytes() == (tmp_path / "b/out/gains.toml").read_bytes()
+    assert (tmp_path / "a/out/gains.toml").read_bytes() == (
+        tmp_path / "b/out/gains.toml"
+    ).read_bytes()
     first, second = json.loads(out), json.loads(other[1])
     assert first["settings"] == second["settings"] and first["goals"] == second["goals"]
     assert not list((tmp_path / "a/out").glob(f".{FILE}*"))
     kept = fx.Run.read(tmp_path / "a/out/history")
     assert len(kept) == first["generations"] and kept["goal/J/best"][-1] == first["goals"]["J"]
-    assert "J = sum_i" in first["objective"] and kept.meta["task"]["free"]["kp_2_1_s"]["scale"] == "log"
-    assert gains.load(tmp_path / "a/out/gains.toml").board()["kf_2_rad_s_m"] == first["settings"]["kf_2_rad_s_m"]
+    assert (
+        "J = sum_i" in first["objective"]
+        and kept.meta["task"]["free"]["kp_2_1_s"]["scale"] == "log"
+    )
+    assert (
+        gains.load(tmp_path / "a/out/gains.toml").board()["kf_2_rad_s_m"]
+        == first["settings"]["kf_2_rad_s_m"]
+    )
 
 
-@pytest.mark.parametrize("change, said", [
-    (("--algorithm", "annealing"), "--algorithm"), (("--free", "kp_9_V_m=1:2"), "kp_9_V_m"), (("--free", "kp_1_V_m"), "LOW:HIGH"),
-    (("--payload-factors", "-1"), "--payload-factors"), (("--population", "1"), "--population"),
-    (("--vibration", "-1"), "--vibration"), (("--dissertation",), "brings its own"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "change, said",
+    [
+        (("--algorithm", "annealing"), "--algorithm"),
+        (("--free", "kp_9_V_m=1:2"), "kp_9_V_m"),
+        (("--free", "kp_1_V_m"), "LOW:HIGH"),
+        (("--payload-factors", "-1"), "--payload-factors"),
+        (("--population", "1"), "--population"),
+        (("--vibration", "-1"), "--vibration"),
+        (("--dissertation",), "brings its own"),
+    ],
+)
 def test_a_wrong_argument_is_one_line_and_status_2(tmp_path, change, said):
     code, _, err = flexura(*SMALL, *change, cwd=tmp_path)
-    assert code == 2 and said in err and len(err.strip().splitlines()) == 1 and not list(tmp_path.iterdir())
+    assert (
+        code == 2
+        and said in err
+        and len(err.strip().splitlines()) == 1
+        and not list(tmp_path.iterdir())
+    )

@@ -8,8 +8,8 @@ import time
 import numpy as np
 import pytest
 
-from flexlab.tuning import engine as engines
-from flexlab.tuning.engine import Cluster, Threads
+from flexlab.tuning import executor as engines
+from flexlab.tuning.executor import Cluster, Threads
 from flexlab.tuning.history import History
 from flexlab.tuning.search import Search, search
 from flexura.errors import InputError

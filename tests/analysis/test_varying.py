@@ -1,4 +1,5 @@
-"""`flexura simulate --vary`: the numbers of single runs, a folder that goes on, and wrong arguments by name."""
+"""`flexura simulate --vary`: the numbers of single runs, a folder that goes on, and wrong arguments
+by name."""
 
 from __future__ import annotations
 
@@ -10,8 +11,8 @@ import pytest
 from typer.testing import CliRunner
 
 import flexura as fx
-from flexlab import varying
-from flexlab.cli import app
+from flexlab.cli.app import app
+from flexlab.studies import parameter_sweep
 
 RIG = Path(__file__).resolve().parents[2] / "model" / "robots" / "rig.toml"
 LAW = RIG.parents[1] / "manoeuvres" / "rig-inverse-law.toml"
@@ -30,18 +31,26 @@ def test_the_largest_peak_is_that_of_its_robot(tmp_path):
     assert peak["peak"] == np.abs(run["link/2/tip_deflection"]).max() > peak["least_peak"]
     stamps = {path: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
     again = CliRunner().invoke(app, arguments)
-    assert json.loads(again.stdout) == found and stamps == {path: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
-    assert "6 robots: 6 done" in CliRunner().invoke(app, [a for a in arguments if a != "--json"]).stdout
+    assert json.loads(again.stdout) == found and stamps == {
+        path: path.stat().st_mtime_ns for path in tmp_path.iterdir()
+    }
+    assert (
+        "6 robots: 6 done"
+        in CliRunner().invoke(app, [a for a in arguments if a != "--json"]).stdout
+    )
 
 
-@pytest.mark.parametrize("text", ["payload.mass_kg", "payload.mass_kg=0:1", "payload.mass_kg=0:inf:3", "payload.mass_kg=0:1:0"])
+@pytest.mark.parametrize(
+    "text",
+    ["payload.mass_kg", "payload.mass_kg=0:1", "payload.mass_kg=0:inf:3", "payload.mass_kg=0:1:0"],
+)
 def test_a_wrong_variation_is_named(text):
     with pytest.raises(fx.InputError) as raised:
-        varying.grid(fx.load(RIG), [text])
+        parameter_sweep.grid(fx.load(RIG), [text])
     assert raised.value.key == "--vary" and raised.value.value == text
 
 
 def test_a_key_that_is_no_number_of_the_robot_is_named(tmp_path):
-    batch, _ = varying.grid(fx.load(RIG), ["payload.weight=0:1:2"])
+    batch, _ = parameter_sweep.grid(fx.load(RIG), ["payload.weight=0:1:2"])
     with pytest.raises(fx.InputError, match="unknown key"):
         next(iter(batch))

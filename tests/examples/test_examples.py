@@ -1,4 +1,5 @@
-"""The examples: scripts meet their analytic answers and can miss them; notebooks run from their first cell to their last."""
+"""The examples: scripts meet their analytic answers and can miss them; notebooks run from their
+first cell to their last."""
 
 import ast
 import json
@@ -17,7 +18,10 @@ EXAMPLES = ROOT / "examples"
 SCRIPTS = sorted(EXAMPLES.glob("[0-9]*.py"))
 NOTEBOOKS = sorted((EXAMPLES / "notebooks").glob("*.ipynb"))
 LIBRARIES = {"argparse", "collections", "comparison", "flexura", "numpy", "scipy"}
-MODULES = {"flexura.signals.shaping", "flexura.signals"}  # public, though not names of `flexura` itself
+MODULES = {
+    "flexura.signals.shaping",
+    "flexura.signals",
+}  # public, though not names of `flexura` itself
 ROW = re.compile(r"^.+  +(\S+)  +(\S+)  +(\d\.\de[+-]\d\d)$")
 PNG = b"\x89PNG\r\n"
 
@@ -49,7 +53,8 @@ def docstring(script: Path) -> str:
 
 
 def cited(text: str) -> list[str]:
-    """The numbers of the equations that a docstring cites, in its order: "Equations (5) and (6)"."""
+    """The numbers of the equations that a docstring cites, in its order: "Equations (5) and
+    (6)"."""
     lists = re.findall(r"Equations? ((?:\(L?\d+\)(?:, | and )?)+)", text)
     return re.findall(r"L?\d+", " ".join(lists))
 
@@ -102,7 +107,11 @@ def test_a_script_ends_with_status_1_if_it_misses_its_bound(tmp_path):
 )
 def test_one_row_decides(found, status, tmp_path):
     """A value that is not a number misses every bound, in any row."""
-    rows = f"show.add('first', 1.0, 1.0); show.add('second', {found}, 1.0); show.add('third', 2.0, 2.0)"
+    rows = (
+        f"show.add('first', 1.0, 1.0); show.add('second', {found}, 1.0); show.add('third', "
+        f"2.0, "
+        f"2.0)"
+    )
     code = (
         f"from comparison import Comparison; show = Comparison('Rows.', 1e-6); {rows}; show.end()"
     )
@@ -120,7 +129,8 @@ def test_without_matplotlib_a_script_says_so_and_compares_all_the_same(tmp_path)
 
 
 def test_each_script_is_on_an_equation_of_its_own():
-    """The first equation that a docstring cites is in the theory, and no other script begins with it."""
+    """The first equation that a docstring cites is in the theory, and no other script begins with
+    it."""
     theory = "".join(
         path.read_text(encoding="utf-8")
         for path in sorted((ROOT / "docs" / "theory").rglob("*.md"))
@@ -186,7 +196,8 @@ for cell in json.loads(pathlib.Path(sys.argv[1]).read_text(encoding="utf-8"))["c
 
 @pytest.mark.parametrize("notebook", NOTEBOOKS, ids=name)
 def test_a_notebook_runs(notebook, tmp_path):
-    """Its code cells in order, in one namespace, as a kernel would; a notebook's last cell checks what it found."""
+    """Its code cells in order, in one namespace, as a kernel would; a notebook's last cell checks
+    what it found."""
     done = python("-c", RUN, notebook, cwd=tmp_path)
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
     assert "Traceback" not in done.stderr and done.stdout

@@ -1,4 +1,5 @@
-"""firmware/build.py and the stand-ins of tools/pio_offline: two compilers, the same image anywhere, clear words on failure."""
+"""firmware/build.py and the stand-ins of tools/pio_offline: two compilers, the same image anywhere,
+clear words on failure."""
 
 import hashlib
 import importlib.util
@@ -33,7 +34,9 @@ def test_the_board_says_which_compiler_built_it(compiler, version):
 def checkout(tmp_path):
     """The firmware and its tools at another place."""
     for part in ("firmware", "tools", "analysis/flexlab/board"):
-        shutil.copytree(ROOT / part, tmp_path / part, ignore=shutil.ignore_patterns(".pio", "__pycache__"))
+        shutil.copytree(
+            ROOT / part, tmp_path / part, ignore=shutil.ignore_patterns(".pio", "__pycache__")
+        )
     return tmp_path
 
 
@@ -52,7 +55,9 @@ def test_the_same_sources_give_the_same_image_anywhere(checkout, compiler):
 
 def test_a_mistake_in_the_sources_ends_in_the_compilers_words(checkout):
     main = checkout / "firmware" / "src" / "main.cpp"
-    main.write_text(main.read_text(encoding="utf-8") + "\nint mistake = missing;\n", encoding="utf-8")
+    main.write_text(
+        main.read_text(encoding="utf-8") + "\nint mistake = missing;\n", encoding="utf-8"
+    )
     done = build(checkout, "--compiler", "debian")
     assert done.returncode == 1 and done.stdout == ""
     assert "missing" in done.stderr and "this failed: pio run -e megaatmega2560" in done.stderr
@@ -62,13 +67,17 @@ def test_stand_ins_say_what_they_are(tmp_path):
     fill.fill(tmp_path)
     for package in (tmp_path / "packages").iterdir():
         record = json.loads((package / ".piopm").read_text())
-        assert record["spec"]["owner"] == ("platformio" if package.name == "tool-scons" else "local")
+        assert record["spec"]["owner"] == (
+            "platformio" if package.name == "tool-scons" else "local"
+        )
         assert json.loads((package / "package.json").read_text())["version"] == record["version"]
     assert {p.name for p in (tmp_path / "platforms").iterdir()} == {"atmelavr", "native"}
 
 
 def test_without_a_compiler_it_says_what_to_type_and_leaves_nothing(tmp_path):
-    with pytest.raises(fill.Missing, match=r"no avr-g\+\+ in .*/nowhere; on Debian type: apt-get install gcc-avr"):
+    with pytest.raises(
+        fill.Missing, match=r"no avr-g\+\+ in .*/nowhere; on Debian type: apt-get install gcc-avr"
+    ):
         fill.fill(tmp_path / "core", tmp_path / "nowhere")
     assert not any((tmp_path / "core").glob("*"))
 

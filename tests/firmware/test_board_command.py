@@ -9,17 +9,26 @@ from pathlib import Path
 import pytest
 
 from boards import elf
-from flexlab.board.declaration import CONFIG
+from flexlab.board.protocol.declaration import CONFIG
 
 ROOT = Path(__file__).resolve().parents[2]
 RIG = ROOT / "firmware" / "rig.toml"
-ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join(map(str, (ROOT / "model", ROOT / "analysis"))), "COLUMNS": "120"}
+ENVIRONMENT = os.environ | {
+    "PYTHONPATH": os.pathsep.join(map(str, (ROOT / "model", ROOT / "analysis"))),
+    "COLUMNS": "120",
+}
 
 
 def flexura(*arguments, cwd):
-    command = [sys.executable, "-m", "flexlab.cli", *map(str, arguments)]
+    command = [sys.executable, "-m", "flexlab.cli.app", *map(str, arguments)]
     return subprocess.run(
-        command, cwd=cwd, env=ENVIRONMENT, capture_output=True, text=True, timeout=250, stdin=subprocess.DEVNULL
+        command,
+        cwd=cwd,
+        env=ENVIRONMENT,
+        capture_output=True,
+        text=True,
+        timeout=250,
+        stdin=subprocess.DEVNULL,
     )
 
 
@@ -31,7 +40,9 @@ def changed(tmp_path):
         text = RIG.read_text(encoding="utf-8")
         assert old in text
         target = tmp_path / "rig.toml"
-        target.write_text(text.replace(old, new).replace('"../model', f'"{ROOT}/model'), encoding="utf-8")
+        target.write_text(
+            text.replace(old, new).replace('"../model', f'"{ROOT}/model'), encoding="utf-8"
+        )
         return target
 
     return write
@@ -60,20 +71,34 @@ def test_flash_without_configuring_tells_what_differs(tmp_path):
     "arguments, said",
     [
         (["--port", "/dev/not-there"], "flexura: --port = '/dev/not-there': "),
-        (["--port", "x", "--emulated"], "flexura: --port = 'x': expected either a port or --emulated"),
+        (
+            ["--port", "x", "--emulated"],
+            "flexura: --port = 'x': expected either a port or --emulated",
+        ),
         (["not-there.toml", "--emulated"], "flexura: not-there.toml: no such file"),
     ],
 )
 def test_wrong_arguments_end_in_one_line_and_status_2(tmp_path, arguments, said):
     done = flexura("flash", *arguments, cwd=tmp_path)
-    assert done.returncode == 2 and done.stderr.startswith(said) and len(done.stderr.splitlines()) == 1
+    assert (
+        done.returncode == 2 and done.stderr.startswith(said) and len(done.stderr.splitlines()) == 1
+    )
 
 
 def test_doctor_says_before_anything_moves_that_the_motor_is_too_slow(tmp_path, changed):
-    done = flexura("doctor", changed("no_load_speed_rpm = 1000.0", "no_load_speed_rpm = 251.0"), "--json", cwd=tmp_path)
+    done = flexura(
+        "doctor",
+        changed("no_load_speed_rpm = 1000.0", "no_load_speed_rpm = 251.0"),
+        "--json",
+        cwd=tmp_path,
+    )
     wrong = [f for f in json.loads(done.stdout) if f["state"] == "wrong"]
     assert done.returncode == 1 and [f["what"] for f in wrong] == ["rig: carriage speed"]
-    assert "75.4 mm/s" in wrong[0]["found"] and "33.5 mm/s" in wrong[0]["found"] and "cannot follow" in wrong[0]["cost"]
+    assert (
+        "75.4 mm/s" in wrong[0]["found"]
+        and "33.5 mm/s" in wrong[0]["found"]
+        and "cannot follow" in wrong[0]["cost"]
+    )
 
 
 def test_doctor_finds_the_emulator_and_a_sound_rig(tmp_path):
@@ -83,4 +108,6 @@ def test_doctor_finds_the_emulator_and_a_sound_rig(tmp_path):
 
 def test_doctor_refuses_a_wrong_rig_file(tmp_path, changed):
     done = flexura("doctor", changed("lead_m = 0.008", "lead_m = 8"), cwd=tmp_path)
-    assert done.returncode == 2 and "screw.lead_m = 8: expected the carriage's travel" in done.stderr
+    assert (
+        done.returncode == 2 and "screw.lead_m = 8: expected the carriage's travel" in done.stderr
+    )

@@ -1,4 +1,5 @@
-"""The emulator itself, under a small program whose behaviour the data sheet tells: what the firmware's tests stand on."""
+"""The emulator itself, under a small program whose behaviour the data sheet tells: what the
+firmware's tests stand on."""
 
 import shutil
 import subprocess
@@ -8,9 +9,9 @@ import numpy as np
 import pytest
 
 from flexlab.board.base import Board
-from flexlab.board.declaration import PINS
-from flexlab.board.emulated import LABEL, EmulatedBoard, Outputs, Sensors
-from flexlab.board.simulator import CLOCK_HZ, Simulator
+from flexlab.board.emulator.emulated import LABEL, EmulatedBoard, Outputs, Sensors
+from flexlab.board.emulator.simulator import CLOCK_HZ, Simulator
+from flexlab.board.protocol.declaration import PINS
 from flexura.errors import FlexuraError
 
 SOURCE = Path(__file__).with_name("emulator_probe.c")
@@ -34,7 +35,14 @@ class Bench:
 def program(tmp_path_factory):
     assert shutil.which("avr-gcc"), "avr-gcc is missing: make setup installs it"
     out = tmp_path_factory.mktemp("probe") / "probe.elf"
-    options = ["-mmcu=atmega2560", "-Os", "-Wall", "-Werror", "-std=gnu11", "-fno-ipa-icf"]  # both edge interrupts take as long
+    options = [
+        "-mmcu=atmega2560",
+        "-Os",
+        "-Wall",
+        "-Werror",
+        "-std=gnu11",
+        "-fno-ipa-icf",
+    ]  # both edge interrupts take as long
     subprocess.run(["avr-gcc", *options, "-o", out, SOURCE], check=True)
     return out
 
@@ -87,11 +95,23 @@ def test_without_the_enable_there_is_no_voltage(board):
     ask(board, "e")
     assert duty(board) == 1.0 and board.outputs.motor_on
     ask(board, "d")
-    assert duty(board) == 0.0 and board.simulator.window.driven_cycle < board.simulator.cycle - 0.01 * CLOCK_HZ
+    assert (
+        duty(board) == 0.0
+        and board.simulator.window.driven_cycle < board.simulator.cycle - 0.01 * CLOCK_HZ
+    )
 
 
 def test_steps_count_with_their_direction_while_the_driver_is_on(board):
-    for command, steps in (("s", 0), ("u", 0), ("s", 1), ("s", 2), ("v", 2), ("s", 1), ("s", 0), ("s", -1)):
+    for command, steps in (
+        ("s", 0),
+        ("u", 0),
+        ("s", 1),
+        ("s", 2),
+        ("v", 2),
+        ("s", 1),
+        ("s", 0),
+        ("s", -1),
+    ):
         ask(board, command)
         assert board.outputs.steps == steps
     assert board.outputs.stepper_on
@@ -109,7 +129,9 @@ def test_steps_of_a_window_count_for_the_time_that_they_were_there(board):
         board.step()
         end = board.simulator.cycle
         ups = [cycle for cycle, _, level in board.simulator.edges() if level]
-        assert board.outputs.steps == pytest.approx(before + sum(end - cycle for cycle in ups) / (end - begin), abs=1e-9)
+        assert board.outputs.steps == pytest.approx(
+            before + sum(end - cycle for cycle in ups) / (end - begin), abs=1e-9
+        )
         stepped += bool(ups)
         before += len(ups)
     assert stepped >= 3  # the bytes come 22 us apart, a window has 250 us
@@ -118,7 +140,8 @@ def test_steps_of_a_window_count_for_the_time_that_they_were_there(board):
 
 
 def test_a_compare_pin_stays_set_until_it_is_to_be_cleared(board):
-    """Data sheet: without PWM only the match changes the pin; neither the timer's overflow nor a write to OCR5A does."""
+    """Data sheet: without PWM only the match changes the pin; neither the timer's overflow nor a
+    write to OCR5A does."""
     ask(board, "v")
     board.simulator.trace(board.lines["step"], True)
     board.simulator.edges()
@@ -140,14 +163,17 @@ def test_every_encoder_edge_arrives(board, speed):
 
 
 def test_edges_arrive_at_their_own_cycle(board):
-    """The time between two single edges, by the processor's own timer, is that of the plant: windows leave no trace."""
+    """The time between two single edges, by the processor's own timer, is that of the plant:
+    windows leave no trace."""
     stamps, speed = [], 37.0  # a count in 27 ms
     board.plant.speed = speed
     for _ in range(8):
         board.wait(1 / speed - 0.003)
         stamps.append(ask(board, "t", 2))
     apart = np.diff(stamps[1:]) & 0xFFFF
-    assert np.abs(apart - CLOCK_HZ / speed % 65536).max() <= 6  # the instruction under way is finished first
+    assert (
+        np.abs(apart - CLOCK_HZ / speed % 65536).max() <= 6
+    )  # the instruction under way is finished first
 
 
 def test_a_cut_wire_is_high_and_a_mended_one_follows_again(board):
@@ -168,7 +194,8 @@ def test_a_cut_wire_is_high_and_a_mended_one_follows_again(board):
 
 
 def test_a_timer_interrupt_that_falls_due_behind_its_mask_comes_when_it_is_let_through(board):
-    """As on the chip, where the flag stays; simavr by itself forgets it, and the timer's next match is 33 ms away."""
+    """As on the chip, where the flag stays; simavr by itself forgets it, and the timer's next match
+    is 33 ms away."""
     ask(board, "m")
     board.wait(0.005)
     before = ask(board, "n", 4) >> 16
@@ -177,7 +204,9 @@ def test_a_timer_interrupt_that_falls_due_behind_its_mask_comes_when_it_is_let_t
     assert after > before
 
 
-@pytest.mark.parametrize("volts, reading", [(0.0, 0), (2.5, 511), (4.0, 818), (5.0, 1023), (7.0, 1023)])
+@pytest.mark.parametrize(
+    "volts, reading", [(0.0, 0), (2.5, 511), (4.0, 818), (5.0, 1023), (7.0, 1023)]
+)
 def test_adc(board, volts, reading):
     board.plant.sensors.flex_V = volts
     board.wait(0.001)
@@ -202,11 +231,19 @@ def test_after_a_reset_outputs_rest_and_inputs_keep_their_levels(board):
     assert board.outputs.motor_on and board.outputs.stepper_on
     board.simulator.reset("brown-out")
     board.wait(0.0003)
-    assert not board.outputs.motor_on and not board.outputs.stepper_on and board.simulator.window.resets == 1
+    assert (
+        not board.outputs.motor_on
+        and not board.outputs.stepper_on
+        and board.simulator.window.resets == 1
+    )
     assert not board.simulator.level("H", 3)
     board.wait(0.002)
     assert ask(board, "c", 1) == 4
-    assert hit(board, "limit_high") and not hit(board, "limit_low") and not hit(board, "emergency_stop")
+    assert (
+        hit(board, "limit_high")
+        and not hit(board, "limit_low")
+        and not hit(board, "emergency_stop")
+    )
 
 
 def test_eeprom_outlives_a_reset(board):
@@ -240,9 +277,12 @@ def test_a_hang_and_its_cure(board):
     assert board.read() == b"\1\1"
 
 
-@pytest.mark.parametrize("number", [0, 100, 0x7FFF, 0x8000, 0xFF00, 0xFFF1, 0xFFFE, 12, 0x0C0C, 0x0118])
+@pytest.mark.parametrize(
+    "number", [0, 100, 0x7FFF, 0x8000, 0xFF00, 0xFFF1, 0xFFFE, 12, 0x0C0C, 0x0118]
+)
 def test_skips_pass_over_one_instruction(board, number):
-    """By the instruction set manual: a skip passes over the next instruction, and ADIW and SBIW are one word long."""
+    """By the instruction set manual: a skip passes over the next instruction, and ADIW and SBIW are
+    one word long."""
     expected = number
     if expected & 0x8000:
         expected = expected + 15 & 0xFFFF
@@ -266,5 +306,8 @@ def test_what_is_no_firmware_is_refused(tmp_path):
     for content in (None, b"", b"not an ELF file"):
         if content is not None:
             bad.write_bytes(content)
-        with pytest.raises(FlexuraError, match=r"firmware\.elf: expected an ELF file of a firmware for the ATmega2560"):
+        with pytest.raises(
+            FlexuraError,
+            match=r"firmware\.elf: expected an ELF file of a firmware for the ATmega2560",
+        ):
             Simulator(bad, 500_000)

@@ -1,7 +1,9 @@
-"""The fault matrix: everything that can break is broken on the emulated board while it moves. For each, the outputs are off in
-time (in cycles), the reason is right, the host is told, and only a person's `clear` gets out of it.
+"""The fault matrix: everything that can break is broken on the emulated board while it moves. For
+each, the outputs are off in time (in cycles), the reason is right, the host is told, and only a
+person's `clear` gets out of it.
 
-The table in firmware/README.md is made of these measurements; `python tests/fault_table.py` writes it.
+The table in firmware/README.md is made of these measurements; `python tests/fault_table.py` writes
+it.
 """
 
 import pytest
@@ -10,8 +12,8 @@ from boards import COMPILERS, TICK
 from breakdowns import OTHERS, flipped
 from fault_table import agrees, line, table_in_readme
 from faults import CASES, measure
-from flexlab.board.declaration import Fault
-from flexlab.board.simulator import CLOCK_HZ
+from flexlab.board.emulator.simulator import CLOCK_HZ
+from flexlab.board.protocol.declaration import Fault
 
 both = pytest.mark.parametrize("compiler", COMPILERS)
 
@@ -37,7 +39,9 @@ def test_what_no_control_tick_detects(name, compiler):
 
 def is_in_the_readme(what, row, compiler):
     if compiler == "debian":
-        assert agrees(what, row, table_in_readme()), f"python tests/fault_table.py; measured: {line(what, row)}"
+        assert agrees(what, row, table_in_readme()), (
+            f"python tests/fault_table.py; measured: {line(what, row)}"
+        )
 
 
 def test_the_table_in_the_readme_has_no_other_rows():

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flexlab.board import frames, messages
-from flexlab.board.declaration import CONFIG, MESSAGES
+from flexlab.board.protocol import frames, messages
+from flexlab.board.protocol.declaration import CONFIG, MESSAGES
 from robots import fast
 
 RUN = bytes(range(1, 255))
@@ -46,7 +46,8 @@ def test_a_payload_comes_back(payload):
 @fast
 @given(st.binary(min_size=1, max_size=60), st.data())
 def test_a_flipped_bit_is_never_taken_for_the_payload(payload, data):
-    """A CRC of 16 bits finds every single flipped bit; where it turns a length byte into another the structure breaks as well."""
+    """A CRC of 16 bits finds every single flipped bit; where it turns a length byte into another
+    the structure breaks as well."""
     frame = bytearray(frames.encode(payload)[:-1])
     at, bit = data.draw(st.integers(0, len(frame) - 1)), data.draw(st.integers(0, 7))
     frame[at] ^= 1 << bit
@@ -54,7 +55,10 @@ def test_a_flipped_bit_is_never_taken_for_the_payload(payload, data):
 
 
 @fast
-@given(st.lists(st.binary(min_size=1, max_size=40), max_size=8), st.lists(st.integers(0, 60), max_size=8))
+@given(
+    st.lists(st.binary(min_size=1, max_size=40), max_size=8),
+    st.lists(st.integers(0, 60), max_size=8),
+)
 def test_however_the_stream_is_cut(payloads, cuts):
     stream = b"\0" + b"".join(map(frames.encode, payloads))
     deframer, out, rest = frames.Deframer(), [], stream
@@ -91,7 +95,9 @@ def test_a_message_comes_back(name):
 
 
 def test_a_field_that_does_not_fit_is_refused():
-    with pytest.raises(ValueError, match=r"reference: expected the fields position_1, position_2, steps"):
+    with pytest.raises(
+        ValueError, match=r"reference: expected the fields position_1, position_2, steps"
+    ):
         messages.pack("reference", 0, position_1=1)
     with pytest.raises(ValueError, match="reference"):
         messages.pack("reference", 0, position_1=2**31, position_2=0, steps=0)
@@ -101,7 +107,10 @@ def test_a_field_that_does_not_fit_is_refused():
 
 def test_reports_become_arrays():
     names = [f.name for f in MESSAGES["telemetry"].fields]
-    bodies = [messages.body(messages.pack("telemetry", k, **{n: k + i for i, n in enumerate(names)})) for k in range(3)]
+    bodies = [
+        messages.body(messages.pack("telemetry", k, **{n: k + i for i, n in enumerate(names)}))
+        for k in range(3)
+    ]
     table = messages.reports(bodies)
     assert table.dtype.names == tuple(names)
     for i, name in enumerate(names):

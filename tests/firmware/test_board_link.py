@@ -1,4 +1,5 @@
-"""The session between host and firmware, on the emulated board: greeting, refusals, a bad line, real pyserial."""
+"""The session between host and firmware, on the emulated board: greeting, refusals, a bad line,
+real pyserial."""
 
 from __future__ import annotations
 
@@ -13,17 +14,25 @@ from serial.tools.list_ports_common import ListPortInfo
 
 from boards import BENCH, Rigged, elf, finish
 from flexlab import rig
-from flexlab.board import link as link_module
-from flexlab.board import messages
 from flexlab.board.base import BoardError
-from flexlab.board.declaration import BAUD_BIT_S, CONFIG, DECLARATION, TELEMETRY_EVERY_TICKS, Fault, Result, State
-from flexlab.board.emulated import LABEL, EmulatedBoard
-from flexlab.board.frames import Deframer, decode, encode
-from flexlab.board.link import Link, Refused
+from flexlab.board.emulator.emulated import LABEL, EmulatedBoard
+from flexlab.board.protocol import messages
+from flexlab.board.protocol import session as link_module
+from flexlab.board.protocol.declaration import (
+    BAUD_BIT_S,
+    CONFIG,
+    DECLARATION,
+    TELEMETRY_EVERY_TICKS,
+    Fault,
+    Result,
+    State,
+)
+from flexlab.board.protocol.frames import Deframer, decode, encode
+from flexlab.board.protocol.session import Link, Refused
 from flexlab.board.pty import Pty
-from flexlab.board.serialport import SerialBoard, find, ports
-from flexlab.flash import crc, single
-from flexlab.rig.drives import Drives
+from flexlab.board.serial_port import SerialBoard, find, ports
+from flexlab.experiment.flash import crc, single
+from flexlab.rig.plant.rigid_plant import Drives
 from flexura.errors import InputError
 
 
@@ -39,7 +48,10 @@ def test_greeting():
 def test_a_board_of_another_declaration_is_refused_by_name(monkeypatch):
     monkeypatch.setattr(link_module, "DECLARATION", DECLARATION ^ 1)
     board = EmulatedBoard(elf(), Drives(BENCH))
-    with pytest.raises(BoardError, match=rf"{LABEL}: firmware .* speaks declaration {DECLARATION:08x}, this host speaks "):
+    with pytest.raises(
+        BoardError,
+        match=rf"{LABEL}: firmware .* speaks declaration {DECLARATION:08x}, this host speaks ",
+    ):
         Link(board).connect()
     finish(board)
 
@@ -72,7 +84,9 @@ def test_a_silent_line_is_no_board():
             self.resets += 1
 
     silent = Silent()
-    with pytest.raises(BoardError, match=r"emulated silence: no good frame within 2 s .*flexura flash"):
+    with pytest.raises(
+        BoardError, match=r"emulated silence: no good frame within 2 s .*flexura flash"
+    ):
         Link(silent).connect(2.0)
     assert silent.resets == 1 and silent.time < 2.1
 
@@ -89,11 +103,19 @@ def test_configuration_goes_there_and_back_and_outlives_a_reset():
     with Rigged(blank=True) as r:
         wanted = rig.configuration(BENCH)
         r.link.write_configuration(wanted)
-        assert r.link.read_configuration() == {name: single(value) for name, value in wanted.items()}
+        assert r.link.read_configuration() == {
+            name: single(value) for name, value in wanted.items()
+        }
         r.board.reset()
         who = r.link.connect()
-        assert who.configuration_crc == crc(wanted) and who.state is State.idle and who.resets == ("external",)
-        assert r.link.read_configuration() == {name: single(value) for name, value in wanted.items()}
+        assert (
+            who.configuration_crc == crc(wanted)
+            and who.state is State.idle
+            and who.resets == ("external",)
+        )
+        assert r.link.read_configuration() == {
+            name: single(value) for name, value in wanted.items()
+        }
 
 
 @pytest.mark.parametrize("name", CONFIG)
@@ -118,7 +140,9 @@ def test_telemetry_comes_every_second_tick_without_a_gap():
         table = r.link.telemetry()
         assert len(table) == pytest.approx(500, abs=3)
         assert set(np.diff(table["tick"][3:])) == {TELEMETRY_EVERY_TICKS}
-        assert r.link.counts.telemetry_lost == r.link.counts.bad_frames == r.link.counts.repeated == 0
+        assert (
+            r.link.counts.telemetry_lost == r.link.counts.bad_frames == r.link.counts.repeated == 0
+        )
         assert table["supply"].mean() == pytest.approx(12000, rel=0.01)
 
 
@@ -145,8 +169,8 @@ class Noisy(EmulatedBoard):
 
 
 def test_through_a_line_that_spoils_bytes_every_command_is_done_once():
-    """Of 100 bytes one is lost or spoilt: frames of 15 to 60 bytes then fail by the dozen. Set-points sent twice would be refused
-    (wrong_index) or show in `buffered`."""
+    """Of 100 bytes one is lost or spoilt: frames of 15 to 60 bytes then fail by the dozen.
+    Set-points sent twice would be refused (wrong_index) or show in `buffered`."""
     board = Noisy(elf(), Drives(BENCH))
     board.noise = random.Random(3)
     link = Link(board, sequence=1, repeat_s=0.01, attempts=50)
@@ -176,7 +200,10 @@ def acks(data: bytes) -> list[tuple[int, Result]]:
     """(sequence number, result) of the acks in a stream of bytes."""
     payloads = Deframer().feed(data)
     return [
-        (messages.head(p)[1], Result(messages.unpack(messages.MESSAGES["ack"], messages.body(p))["result"]))
+        (
+            messages.head(p)[1],
+            Result(messages.unpack(messages.MESSAGES["ack"], messages.body(p))["result"]),
+        )
         for p in payloads
         if messages.head(p)[0] == messages.MESSAGES["ack"].code
     ]
@@ -206,12 +233,17 @@ def test_a_repeated_command_is_answered_and_not_obeyed_again():
 
 @pytest.mark.parametrize("damage", ["flipped", "truncated", "lengthened"])
 def test_a_damaged_command_does_nothing(damage):
-    """Each bit of an `arm` flipped, the frame cut at each byte, a byte put in at each place: none is obeyed."""
+    """Each bit of an `arm` flipped, the frame cut at each byte, a byte put in at each place: none
+    is obeyed."""
     with Rigged() as r:
         r.link.command("reference", position_1=0, position_2=0, steps=0)
         frame = encode(messages.pack("arm", r.link._next, mode=2))
         spoilt = {
-            "flipped": [frame[:k] + bytes([frame[k] ^ 1 << i]) + frame[k + 1 :] for k in range(len(frame) - 1) for i in range(8)],
+            "flipped": [
+                frame[:k] + bytes([frame[k] ^ 1 << i]) + frame[k + 1 :]
+                for k in range(len(frame) - 1)
+                for i in range(8)
+            ],
             "truncated": [frame[:k] + b"\0" for k in range(1, len(frame) - 1)],
             "lengthened": [frame[:k] + b"\x55" + frame[k:] for k in range(len(frame))],
         }[damage]
@@ -226,7 +258,8 @@ def test_a_damaged_command_does_nothing(damage):
 
 
 def test_frames_of_a_session_played_again_are_refused():
-    """All that was said to make the joints move, once more and word for word: out of sequence, nothing moves."""
+    """All that was said to make the joints move, once more and word for word: out of sequence,
+    nothing moves."""
     with Rigged() as r:
         said: list[bytes] = []
         write = r.board.write
@@ -273,7 +306,8 @@ def test_a_reset_ends_the_session_and_the_host_sees_it():
 
 
 def test_real_pyserial_at_a_pseudo_terminal():
-    """Smoke test at the wall clock's pace, with wide limits: the emulated board behind a pty, pyserial at the other end."""
+    """Smoke test at the wall clock's pace, with wide limits: the emulated board behind a pty,
+    pyserial at the other end."""
     board = EmulatedBoard(elf(), Drives(BENCH))
     done = threading.Event()
     with Pty(board) as served:
@@ -283,7 +317,9 @@ def test_real_pyserial_at_a_pseudo_terminal():
             port = SerialBoard(served.device, BAUD_BIT_S)
             link = Link(port, repeat_s=0.5)
             assert link.connect(20.0).declaration == DECLARATION
-            assert link.read_configuration() == {name: single(item.default) for name, item in CONFIG.items()}
+            assert link.read_configuration() == {
+                name: single(item.default) for name, item in CONFIG.items()
+            }
             begin = time.monotonic()
             link.run(1.0)
             assert time.monotonic() - begin < 20
@@ -311,7 +347,9 @@ def plugged(*identities):
 
 
 def test_the_one_mega_that_is_plugged_in_is_found(monkeypatch):
-    monkeypatch.setattr(list_ports, "comports", plugged((0x0403, 0x6015), (0x2341, 0x0042), (None, None)))
+    monkeypatch.setattr(
+        list_ports, "comports", plugged((0x0403, 0x6015), (0x2341, 0x0042), (None, None))
+    )
     assert find() == "/dev/ttyACM1" and [p.what for p in ports()] == ["Arduino Mega 2560 R3"]
 
 
@@ -320,5 +358,8 @@ def test_no_board_or_two_of_them_are_named(monkeypatch):
     with pytest.raises(InputError, match=r"--port: no board is plugged in .* or use --emulated"):
         find()
     monkeypatch.setattr(list_ports, "comports", plugged((0x1A86, 0x7523), (0x2341, 0x0042)))
-    with pytest.raises(InputError, match=r"more than one board is plugged in: /dev/ttyACM0 \(CH340.*, /dev/ttyACM1 \(Arduino"):
+    with pytest.raises(
+        InputError,
+        match=r"more than one board is plugged in: /dev/ttyACM0 \(CH340.*, /dev/ttyACM1 \(Arduino",
+    ):
         find()

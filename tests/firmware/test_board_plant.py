@@ -1,4 +1,5 @@
-"""The firmware on the emulated rig: the dissertation's inverse law followed, the same bytes every time."""
+"""The firmware on the emulated rig: the dissertation's inverse law followed, the same bytes every
+time."""
 
 import math
 
@@ -7,12 +8,12 @@ import pytest
 
 from boards import BENCH, configured, elf, finish
 from flexlab import rig
-from flexlab.board import load
-from flexlab.board.declaration import Fault, State
-from flexlab.board.emulated import EmulatedBoard
-from flexlab.board.link import Link
-from flexlab.board.player import Player, setpoints
-from flexlab.rig.plant import RigPlant, rig_plant
+from flexlab.benchmarks import firmware_load
+from flexlab.board.emulator.emulated import EmulatedBoard
+from flexlab.board.protocol.declaration import Fault, State
+from flexlab.board.protocol.player import Player, setpoints
+from flexlab.board.protocol.session import Link
+from flexlab.rig.plant.plant import RigPlant, rig_plant
 from flexura.signals import harmonic
 
 AMPLITUDE_M, AMPLITUDE_RAD = 0.012, math.pi / 6
@@ -32,14 +33,17 @@ class Recorded(EmulatedBoard):
 
 
 def session(seed, seconds, watch=None):
-    """Follow the inverse law's motions from rest; returns the board, the link and the plant at the end."""
+    """Follow the inverse law's motions from rest; returns the board, the link and the plant at the
+    end."""
     plant, settings = rig_plant(BENCH, seed), rig.configuration(BENCH)
     board = Recorded(plant)
     board.simulator.write_eeprom(0, configured("debian", ()))
     link = Link(board, sequence=1)
     link.connect()
     link.command("reference", position_1=0, position_2=0, steps=0)
-    carriage, joint = (harmonic(amplitude, 1.0, math.pi, amplitude) for amplitude in (AMPLITUDE_M, AMPLITUDE_RAD))
+    carriage, joint = (
+        harmonic(amplitude, 1.0, math.pi, amplitude) for amplitude in (AMPLITUDE_M, AMPLITUDE_RAD)
+    )
     player = Player(link, setpoints(carriage, joint, seconds + 1.0, settings))
     player.start()
     for _ in range(round(seconds / 0.01)):
@@ -52,8 +56,14 @@ def session(seed, seconds, watch=None):
 def test_the_emulated_rig_follows_the_inverse_law():
     """No fault, and a strip that bends as much as the dissertation's does: 5 to 15 mm from rest."""
     seen = []
-    board, link, _ = session(0, 1.5, lambda board, p: seen.append((board.now(), p.carriage_m, p.joint_rad, p.tip_deflection_m)))
-    assert State(link.newest["state"]) is State.running and Fault(link.newest["fault"]) is Fault.none
+    board, link, _ = session(
+        0,
+        1.5,
+        lambda board, p: seen.append((board.now(), p.carriage_m, p.joint_rad, p.tip_deflection_m)),
+    )
+    assert (
+        State(link.newest["state"]) is State.running and Fault(link.newest["fault"]) is Fault.none
+    )
     _, carriage, joint, deflection = np.array(seen).T
     assert carriage.max() == pytest.approx(2 * AMPLITUDE_M, rel=0.02)
     assert joint.max() == pytest.approx(2 * AMPLITUDE_RAD, rel=0.02)
@@ -61,7 +71,9 @@ def test_the_emulated_rig_follows_the_inverse_law():
     table = link.telemetry()
     measured = table["position_1"] / rig.configuration(BENCH)["motor_counts_per_m"]
     play = BENCH.emulated.carriage.backlash_m
-    assert abs(measured.max() - carriage.max()) < play  # the motor's encoder does not see the nut's play
+    assert (
+        abs(measured.max() - carriage.max()) < play
+    )  # the motor's encoder does not see the nut's play
     flex = table["flex"] / np.median(table["flex"])
     assert np.ptp(flex) > 0.02  # the sensor sees the bend
     finish(board)
@@ -79,5 +91,5 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_others():
 
 def test_the_bench_measures_an_emulated_experiment():
     """The row of `make bench`; how fast is for it to say, not for a test."""
-    fast, alone = load.experiment(elf(), BENCH, 0.2)
+    fast, alone = firmware_load.experiment(elf(), BENCH, 0.2)
     assert 0 < fast < alone

@@ -10,10 +10,10 @@ import tomli_w
 
 import flexura as fx
 from flexlab import rig
-from flexlab.board.declaration import CONFIG
-from flexlab.board.emulated import Outputs
+from flexlab.board.emulator.emulated import Outputs
+from flexlab.board.protocol.declaration import CONFIG
 from flexlab.rig.description import DERIVED, tip_per_bend
-from flexlab.rig.drives import Drives
+from flexlab.rig.plant.rigid_plant import Drives
 from flexura.signals import harmonic
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -27,7 +27,8 @@ def bench():
 
 @pytest.fixture
 def written(tmp_path):
-    """Writes the rig file with some values changed; the other files it names stay where they are."""
+    """Writes the rig file with some values changed; the other files it names stay where they
+    are."""
 
     def write(**changes):
         data = tomllib.loads(FILE.read_text(encoding="utf-8"))
@@ -48,7 +49,9 @@ def written(tmp_path):
 def test_every_setting_of_the_board_has_a_value_in_range(bench):
     settings = rig.configuration(bench)
     assert list(settings) == list(CONFIG)
-    assert all(CONFIG[name].least <= value <= CONFIG[name].greatest for name, value in settings.items())
+    assert all(
+        CONFIG[name].least <= value <= CONFIG[name].greatest for name, value in settings.items()
+    )
     assert set(DERIVED) <= set(CONFIG) and not set(DERIVED) & set(bench.rig.board)
 
 
@@ -58,18 +61,23 @@ def test_settings_that_follow_from_the_rig(bench):
     assert settings["motor_counts_per_m"] == pytest.approx(80e3)
     assert 1 / settings["stepper_steps_per_rad"] == pytest.approx(math.radians(1.8) / 16)
     assert settings["stepper_counts_per_rad"] == pytest.approx(2400 / (2 * math.pi))
-    assert (settings["position_min_1_m"], settings["position_max_1_m"]) == bench.robot.links[0].joint.limits
+    assert (settings["position_min_1_m"], settings["position_max_1_m"]) == bench.robot.links[
+        0
+    ].joint.limits
 
 
 def test_flex_chain(bench):
-    """By hand: L = 0.3, s = 0.09525 give 0.374 m of tip for a radian, and 1.8 mm of tip for a count of 10 bits."""
+    """By hand: L = 0.3, s = 0.09525 give 0.374 m of tip for a radian, and 1.8 mm of tip for a count
+    of 10 bits."""
     assert tip_per_bend(bench) == pytest.approx(0.374, abs=5e-4)
     flex, fitted = bench.rig.flex, rig.calibration(bench)
     assert 1e3 * abs(fitted.c1_m) / 1024 == pytest.approx(1.8, abs=0.05)
     for tip in (-0.01, -0.002, 0.003, 0.012):
         ohms = flex.straight_ohm + flex.ohm_per_rad * tip / tip_per_bend(bench)
         x = flex.divider_ohm / (ohms + flex.divider_ohm) - fitted.zero
-        assert fitted.c1_m * x + fitted.c2_m * x**2 + fitted.c3_m * x**3 == pytest.approx(tip, rel=1e-5)
+        assert fitted.c1_m * x + fitted.c2_m * x**2 + fitted.c3_m * x**3 == pytest.approx(
+            tip, rel=1e-5
+        )
 
 
 def test_the_bench_can_follow_what_it_is_built_for(bench):
@@ -78,8 +86,13 @@ def test_the_bench_can_follow_what_it_is_built_for(bench):
 
 
 def test_a_251_rpm_motor_is_too_slow_for_the_inverse_law(written):
-    """75.4 mm/s = 565 rpm are needed, the 251 rpm motor makes 33 mm/s; its encoder at that speed would be too fast as well."""
-    slow = rig.load(written(motor__no_load_speed_rpm=251.0, motor__gear_ratio=43.8, motor__stall_torque_N_m=1.765))
+    """75.4 mm/s = 565 rpm are needed, the 251 rpm motor makes 33 mm/s; its encoder at that speed
+    would be too fast as well."""
+    slow = rig.load(
+        written(
+            motor__no_load_speed_rpm=251.0, motor__gear_ratio=43.8, motor__stall_torque_N_m=1.765
+        )
+    )
     failed = {c.what: c for c in rig.examine(slow) if not c.passed}
     assert set(failed) == {"carriage speed", "encoder edges"}
     assert "75.4 mm/s = 565 rpm" in failed["carriage speed"].needed
@@ -108,7 +121,9 @@ def test_what_the_rig_cannot_do_is_found(written, change, failing):
 
 
 def test_a_motion_beyond_the_carriage(bench):
-    far = fx.Manoeuvre("far", 4.0, 0.01, fx.Drive.pd([harmonic(0.06, 0.25), harmonic(0.1, 0.25)], [1, 1], [1, 1]))
+    far = fx.Manoeuvre(
+        "far", 4.0, 0.01, fx.Drive.pd([harmonic(0.06, 0.25), harmonic(0.1, 0.25)], [1, 1], [1, 1])
+    )
     assert {c.what for c in rig.examine(bench, far) if not c.passed} == {"carriage range"}
 
 
@@ -118,16 +133,41 @@ def test_a_motion_beyond_the_carriage(bench):
         ({"screw__lead_m": 8.0}, "screw.lead_m", 8.0, "at most 0.1 (0.008, not 8)"),
         ({"screw__pitch_m": 0.002}, "screw.pitch_m", 0.002, "an unknown key"),
         ({"stepper__microsteps": 12}, "stepper.microsteps", 12, "a power of two"),
-        ({"stepper__limits_rad": [1.0, -1.0]}, "stepper.limits_rad", [1.0, -1.0], "the lower limit first"),
+        (
+            {"stepper__limits_rad": [1.0, -1.0]},
+            "stepper.limits_rad",
+            [1.0, -1.0],
+            "the lower limit first",
+        ),
         ({"motor__encoder_pulses": 16.5}, "motor.encoder_pulses", 16.5, "a whole number"),
         ({"board__kp_1_V_mm": 1.0}, "board.kp_1_V_mm", 1.0, "did you mean kp_1_V_m?"),
         ({"board__kp_1_V_m": 1e9}, "board.kp_1_V_m", 1e9, "between -100000 and 100000"),
         ({"board__supply_V": 12.0}, "board.supply_V", 12.0, "follows from the other tables"),
         ({"emulated__flex__nois_V": 0.1}, "emulated.flex.nois_V", 0.1, "did you mean noise_V?"),
-        ({"emulated__carriage__backlash_m": 0.15}, "emulated.carriage.backlash_m", 0.15, "in metres, from 0 to 0.01"),
-        ({"emulated__truth__stiffness": 0.0}, "emulated.truth.stiffness", 0.0, "above 0 and at most 10"),
-        ({"emulated__ranges__payload": [2.0, 1.0]}, "emulated.ranges.payload", [2.0, 1.0], "the lower one first"),
-        ({"robot": str(ROOT / "model/robots/two-link-arm.toml")}, "robot", None, "a robot of type IV"),
+        (
+            {"emulated__carriage__backlash_m": 0.15},
+            "emulated.carriage.backlash_m",
+            0.15,
+            "in metres, from 0 to 0.01",
+        ),
+        (
+            {"emulated__truth__stiffness": 0.0},
+            "emulated.truth.stiffness",
+            0.0,
+            "above 0 and at most 10",
+        ),
+        (
+            {"emulated__ranges__payload": [2.0, 1.0]},
+            "emulated.ranges.payload",
+            [2.0, 1.0],
+            "the lower one first",
+        ),
+        (
+            {"robot": str(ROOT / "model/robots/two-link-arm.toml")},
+            "robot",
+            None,
+            "a robot of type IV",
+        ),
     ],
 )
 def test_a_wrong_rig_file_is_refused_by_key_and_value(written, change, key, value, expected):
@@ -145,7 +185,8 @@ def test_a_rig_whose_settings_leave_the_boards_range(written):
 
 
 def test_the_drives_of_the_plant_keep_to_the_motors_data(bench):
-    """At 12 V the motor's free speed, 1000 rpm of an 8 mm screw; nothing moves below the starting voltage."""
+    """At 12 V the motor's free speed, 1000 rpm of an 8 mm screw; nothing moves below the starting
+    voltage."""
     plant = Drives(bench)
     for _ in range(4000):
         plant.advance(250e-6, Outputs(duty=1.0, motor_on=True))
@@ -153,4 +194,6 @@ def test_the_drives_of_the_plant_keep_to_the_motors_data(bench):
     still = Drives(bench)
     for duty, on in ((0.07, True), (1.0, False)):
         assert still.advance(0.1, Outputs(duty=duty, motor_on=on)).encoder_1 == 0.0
-    np.testing.assert_allclose(still.advance(0.1, Outputs(steps=3200.0, stepper_on=True)).encoder_2, 2400)
+    np.testing.assert_allclose(
+        still.advance(0.1, Outputs(steps=3200.0, stepper_on=True)).encoder_2, 2400
+    )

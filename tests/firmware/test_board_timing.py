@@ -1,4 +1,5 @@
-"""Time on the emulated board, in cycles: control ticks, interrupts, step and encoder edges; memory; that it repeats itself."""
+"""Time on the emulated board, in cycles: control ticks, interrupts, step and encoder edges; memory;
+that it repeats itself."""
 
 import functools
 
@@ -6,17 +7,17 @@ import numpy as np
 import pytest
 
 from boards import BENCH, COMPILERS, TICK, Rigged, elf
-from flexlab.board import load
-from flexlab.board.declaration import Fault, State
-from flexlab.board.simulator import CLOCK_HZ
+from flexlab.benchmarks import firmware_load
+from flexlab.board.emulator.simulator import CLOCK_HZ
+from flexlab.board.protocol.declaration import Fault, State
 
 both = pytest.mark.parametrize("compiler", COMPILERS)
 TEN_MICROSECONDS = CLOCK_HZ // 100_000
 
 
 @functools.cache
-def loaded(compiler: str, every_term: bool = False) -> load.Load:
-    return load.measure(elf(compiler), BENCH, 2.0, every_term)
+def loaded(compiler: str, every_term: bool = False) -> firmware_load.Load:
+    return firmware_load.measure(elf(compiler), BENCH, 2.0, every_term)
 
 
 @both
@@ -37,7 +38,9 @@ def test_with_every_term_of_the_controllers_on_it_takes_a_little_more(compiler):
     """All gains, both set-point filters, joint 2 by its encoder: still under 40 %."""
     found = loaded(compiler, every_term=True)
     assert 0.01 < found.control_share < 0.40
-    assert found.missed == 0 and 0.95 * TICK <= found.period_least <= found.period_most <= 1.05 * TICK
+    assert (
+        found.missed == 0 and 0.95 * TICK <= found.period_least <= found.period_most <= 1.05 * TICK
+    )
 
 
 @both
@@ -49,23 +52,27 @@ def test_no_control_tick_is_lost_or_late(compiler):
 
 @both
 def test_no_encoder_edge_is_missed_at_20_000_a_second(compiler):
-    """Both encoders, every edge: the firmware's counts are the plant's when all stands still again."""
-    with Rigged(compiler, **load.HARD) as r:
+    """Both encoders, every edge: the firmware's counts are the plant's when all stands still
+    again."""
+    with Rigged(compiler, **firmware_load.HARD) as r:
         r.go(r.back_and_forth(0.0398, 2.498, duration_s=1.0), 0.0)
         r.until(lambda: r.player.done, 1.5)
         r.run(0.3)
         assert r.state is State.running and r.fault is Fault.none
         newest, sensors = r.link.newest, r.board.sensors
         assert newest["missed"] == 0
-        assert newest["position_1"] == np.floor(sensors.encoder_1) and newest["position_2"] == np.floor(sensors.encoder_2)
+        assert newest["position_1"] == np.floor(sensors.encoder_1) and newest[
+            "position_2"
+        ] == np.floor(sensors.encoder_2)
         assert newest["steps"] == r.board.simulator.window.steps
         assert abs(sensors.encoder_1) < 800 and loaded(compiler).missed == 0
 
 
 @both
 def test_step_edges_at_4000_a_second(compiler):
-    """At a constant rate the edges lie within 10 us of an even grid; between start and stop none is lost, none is extra."""
-    with Rigged(compiler, trace=("step",), **load.HARD) as r:
+    """At a constant rate the edges lie within 10 us of an even grid; between start and stop none is
+    lost, none is extra."""
+    with Rigged(compiler, trace=("step",), **firmware_load.HARD) as r:
         rate = 4000 / r.settings["stepper_steps_per_rad"]
         r.board.simulator.edges()
         r.go(r.open_loop(6.0, rate, duration_s=0.35), 0.3)
@@ -95,13 +102,21 @@ def test_a_trajectory_ends_at_its_last_set_point_to_the_microstep(compiler):
 @both
 def test_memory(compiler):
     found = loaded(compiler)
-    assert found.flash < load.FLASH_BYTES / 2
+    assert found.flash < firmware_load.FLASH_BYTES / 2
     assert 0 < found.ram_static and 50 < found.stack_most and found.ram_share < 0.60
 
 
 def history(slice_cycles: int) -> tuple[bytes, list[tuple[int, int, int]]]:
     """All bytes from the board and all edges of its outputs during a motion and a fault."""
-    outputs = ("motor_forward", "motor_reverse", "motor_enable", "step", "step_direction", "step_disable", "busy")
+    outputs = (
+        "motor_forward",
+        "motor_reverse",
+        "motor_enable",
+        "step",
+        "step_direction",
+        "step_disable",
+        "busy",
+    )
     received = bytearray()
     with Rigged(trace=outputs, slice_cycles=slice_cycles) as r:
         read = r.board.read
@@ -126,5 +141,6 @@ def test_the_same_input_gives_the_same_bytes_and_edges():
 
 
 def test_the_simulators_slice_changes_nothing_but_the_speed():
-    """simavr's default is to look up after every instruction; long slices give the same bytes and edges to the cycle."""
+    """simavr's default is to look up after every instruction; long slices give the same bytes and
+    edges to the cycle."""
     assert history(1) == history(1000)

@@ -1,4 +1,5 @@
-"""The firmware's portable library on this computer: sanitizers, independent computations, and its own unit tests."""
+"""The firmware's portable library on this computer: sanitizers, independent computations, and its
+own unit tests."""
 
 import binascii
 import ctypes
@@ -17,9 +18,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import flexura as fx
-from flexlab.board import frames
-from flexlab.board.declaration import ADC_SAMPLES, CONFIG, CONTROL_HZ, DUTY_FULL
-from flexura import gains, signals
+from flexlab.board.protocol import frames
+from flexlab.board.protocol.declaration import ADC_SAMPLES, CONFIG, CONTROL_HZ, DUTY_FULL
+from flexura import signals
+from flexura.control import gains
 
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "firmware"
@@ -38,16 +40,26 @@ def compiled(out: Path, *arguments: str) -> Path:
 
 @pytest.fixture(scope="module")
 def lib(tmp_path_factory):
-    """Trapping undefined behaviour; the address sanitizer watches the programs below, whose main is their own."""
+    """Trapping undefined behaviour; the address sanitizer watches the programs below, whose main is
+    their own."""
     path = tmp_path_factory.mktemp("lib") / "library.so"
-    arguments = ["-std=gnu++14", "-O1", "-shared", "-fPIC", "-fsanitize=undefined", str(HERE / "library.cpp")]
+    arguments = [
+        "-std=gnu++14",
+        "-O1",
+        "-shared",
+        "-fPIC",
+        "-fsanitize=undefined",
+        str(HERE / "library.cpp"),
+    ]
     library = ctypes.CDLL(str(compiled(path, *arguments)))
     library.c_crc.restype = ctypes.c_uint16
     return library
 
 
 def test_both_sides_of_the_protocol_are_fresh():
-    done = subprocess.run([sys.executable, FIRMWARE / "protocol.py", "--check"], capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, FIRMWARE / "protocol.py", "--check"], capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stderr
 
 
@@ -58,7 +70,10 @@ def test_board_and_host_read_each_others_frames(lib, code, sequence, fields):
     size = lib.c_encode(code, sequence, fields, len(fields), frame)
     assert bytes(frame[:size]) == frames.encode(payload)
     got = (ctypes.c_uint8 * 80)()
-    assert lib.c_receive(frames.encode(payload), size, got) == len(payload) and bytes(got[: len(payload)]) == payload
+    assert (
+        lib.c_receive(frames.encode(payload), size, got) == len(payload)
+        and bytes(got[: len(payload)]) == payload
+    )
 
 
 @given(st.binary(max_size=300))
@@ -73,7 +88,10 @@ def test_counts_follow_the_shaft(lib, moves):
     lines = bytes(gray[p & 3] for p in places[1:])
     which = bytes(int((gray[a & 3] ^ gray[b & 3]) == 1) for a, b in itertools.pairwise(places))
     missed = ctypes.c_int()
-    assert lib.c_count(lines, which, len(lines), ctypes.byref(missed)) == sum(moves) and missed.value == 0
+    assert (
+        lib.c_count(lines, which, len(lines), ctypes.byref(missed)) == sum(moves)
+        and missed.value == 0
+    )
 
 
 def settings_of(**changes):
@@ -83,7 +101,15 @@ def settings_of(**changes):
 
 def seen(rows):
     names = ("deflection", "deflection_rate")
-    kind = np.dtype([("error", "<i4"), ("rate", "<i2"), ("setpoint_rate", "<i2"), ("tip", "<i4"), *((n, "<i2") for n in names)])
+    kind = np.dtype(
+        [
+            ("error", "<i4"),
+            ("rate", "<i2"),
+            ("setpoint_rate", "<i2"),
+            ("tip", "<i4"),
+            *((n, "<i2") for n in names),
+        ]
+    )
     return np.array([(*row[:3], 0, *row[3:]) for row in rows], kind)
 
 
@@ -93,19 +119,35 @@ NAMES = (
     ("kp_2_1_s", "ki_2_1_s2", "kd_2", "kf_2_rad_s_m", "kg_2_rad_m", "kv_2"),
 )
 ROWS = st.lists(
-    st.tuples(st.integers(-(2**19), 2**19), *[st.integers(-3000, 3000)] * 4), min_size=1, max_size=60
+    st.tuples(st.integers(-(2**19), 2**19), *[st.integers(-3000, 3000)] * 4),
+    min_size=1,
+    max_size=60,
 )
 
 
 @given(joint=st.integers(0, 1), g=st.tuples(*[GAINS] * 6), rows=ROWS)
 def test_pid_in_si_units_is_its_formula(lib, joint, g, rows):
-    """u = kp e + ki sum(e) T + kd (r' - q') + kf w + kg w' + kv r', as firmware/README.md defines it, in V and rad/s."""
+    """u = kp e + ki sum(e) T + kd (r' - q') + kf w + kg w' + kv r', as firmware/README.md defines
+    it, in V and rad/s."""
     kp, ki, kd, kf, kg, kv = g
     if joint == 0:
-        chosen = dict(kp_1_V_m=2000 * kp, ki_1_V_m_s=9000 * ki, kd_1_V_s_m=100 * kd, kf_1_V_m=300 * kf, kg_1_V_s_m=20 * kg)
+        chosen = dict(
+            kp_1_V_m=2000 * kp,
+            ki_1_V_m_s=9000 * ki,
+            kd_1_V_s_m=100 * kd,
+            kf_1_V_m=300 * kf,
+            kg_1_V_s_m=20 * kg,
+        )
         chosen |= dict(kv_1_V_s_m=100 * kv, voltage_max_V=12, voltage_slew_V_s=3000)
     else:
-        chosen = dict(kp_2_1_s=100 * kp, ki_2_1_s2=500 * ki, kd_2=kd, kf_2_rad_s_m=50 * kf, kg_2_rad_m=5 * kg, kv_2=kv)
+        chosen = dict(
+            kp_2_1_s=100 * kp,
+            ki_2_1_s2=500 * ki,
+            kd_2=kd,
+            kf_2_rad_s_m=50 * kf,
+            kg_2_rad_m=5 * kg,
+            kv_2=kv,
+        )
         chosen |= dict(rate_max_2_rad_s=7.8, acceleration_max_2_rad_s2=2000)
     values, array = settings_of(**chosen)
     given_ = seen(rows)
@@ -134,7 +176,8 @@ def test_pid_in_si_units_is_its_formula(lib, joint, g, rows):
 
 
 def board(lib, values, rows):
-    """Voltages [V] and rates [rad/s] of a whole board, tick by tick: rows (T, 4) of set-points, counts moved, reading."""
+    """Voltages [V] and rates [rad/s] of a whole board, tick by tick: rows (T, 4) of set-points,
+    counts moved, reading."""
     kind = np.dtype([("setpoint", "<i4", 2), ("moved", "<i2"), ("flex", "<i2")])
     told = np.array([((a, b), m, f) for a, b, m, f in rows], kind)
     done = np.zeros(len(rows), np.dtype([("voltage", "<i2"), ("rate", "<i2")]))
@@ -144,13 +187,16 @@ def board(lib, values, rows):
 
 
 def model(values, rows):
-    """The same by the model's law, which knows no integers: all T ticks, without a robot's mechanics, before their delays."""
+    """The same by the model's law, which knows no integers: all T ticks, without a robot's
+    mechanics, before their delays."""
     system = fx.assemble(fx.load(ROOT / "model/robots/rig.toml"))
     count, step = 1 / values["motor_counts_per_m"], 1 / values["stepper_steps_per_rad"]
     played = np.arange(len(rows)) * TICK_S
     reference = [signals.piecewise(played, rows[:, j] / 256 * (count, step)[j]) for j in range(2)]
     drive = gains.from_board(values).controller(reference, [fx.Motor(1.0, 0.0), fx.Stepper()])
-    sampled = replace(drive, joints=tuple(replace(joint, delay_s=0.0) for joint in drive.joints)).sampler(system)
+    sampled = replace(
+        drive, joints=tuple(replace(joint, delay_s=0.0) for joint in drive.joints)
+    ).sampler(system)
     sampled.start(system.start())
     place, out = rows[0, 0] // 256, np.zeros((len(rows), 2))
     for k in range(1, len(rows)):
@@ -162,45 +208,85 @@ def model(values, rows):
 
 
 WIDE = dict(
-    position_min_1_m=-9, position_max_1_m=9, position_min_2_rad=-900, position_max_2_rad=900, speed_max_1_m_s=10,
-    speed_max_2_rad_s=1000, following_max_1_m=10, following_max_2_rad=1000, host_timeout_s=5, stall_voltage_V=30,
-    lost_step_rad=10, flex_min=0, flex_max=1, supply_min_V=5, supply_max_V=20, flex_zero=0.5, flex_c1_m=-0.4,
-)  # fmt: skip
+    position_min_1_m=-9,
+    position_max_1_m=9,
+    position_min_2_rad=-900,
+    position_max_2_rad=900,
+    speed_max_1_m_s=10,
+    speed_max_2_rad_s=1000,
+    following_max_1_m=10,
+    following_max_2_rad=1000,
+    host_timeout_s=5,
+    stall_voltage_V=30,
+    lost_step_rad=10,
+    flex_min=0,
+    flex_max=1,
+    supply_min_V=5,
+    supply_max_V=20,
+    flex_zero=0.5,
+    flex_c1_m=-0.4,
+)
 
 
 @settings(max_examples=60, deadline=None)
 @given(
-    seed=st.integers(0, 10**6), g=st.tuples(*[GAINS] * 10), tight=st.booleans(),
+    seed=st.integers(0, 10**6),
+    g=st.tuples(*[GAINS] * 10),
+    tight=st.booleans(),
     filters=st.tuples(*[st.sampled_from([0.0, 2.0, 20.0])] * 2),
-)  # fmt: skip
+)
 def test_the_models_law_is_the_boards(lib, seed, g, tight, filters):
-    """Random gains, set-points, encoder counts and readings through the whole board: filters, strip, sum, pulses; and tight
-    limits and slew, then without the sum, whose stop at a limit is a matter of round-off.
+    """Random gains, set-points, encoder counts and readings through the whole board: filters,
+    strip, sum, pulses; and tight limits and slew, then without the sum, whose stop at a limit is a
+    matter of round-off.
 
-    The board's errors are whole counts of joint 1 and 1/16 microsteps of joint 2, rounded down; its rates 1/256 of them a tick,
-    its deflection 10 um; its filters, rounded down too, end 1/256 of a count / a short; gains and slews are rounded to a
-    thousandth. `bound` is these through the gains. (59.9218 rad/s^2 is a whole number of its units.)
+    The board's errors are whole counts of joint 1 and 1/16 microsteps of joint 2, rounded down; its
+    rates 1/256 of them a tick, its deflection 10 um; its filters, rounded down too, end 1/256 of a
+    count / a short; gains and slews are rounded to a thousandth. `bound` is these through the
+    gains. (59.9218 rad/s^2 is a whole number of its units.)
     """
     r, T = np.random.default_rng(seed), 400
     kp, ki, kd, kf, kg, kv, p2, i2, f2, g2 = (float(x) for x in g)
     own = dict(
-        kp_1_V_m=2000 * kp, ki_1_V_m_s=4000 * ki, kd_1_V_s_m=20 * kd, kf_1_V_m=50 * kf, kg_1_V_s_m=kg, kv_1_V_s_m=20 * kv,
-        voltage_max_V=12, voltage_slew_V_s=20000, kp_2_1_s=60 * p2, ki_2_1_s2=100 * i2, kd_2=0.2 * kd, kf_2_rad_s_m=20 * f2,
-        kg_2_rad_m=0.2 * g2, kv_2=kv, rate_max_2_rad_s=7.8, acceleration_max_2_rad_s2=8000,
-        setpoint_1_Hz=filters[0], setpoint_2_Hz=filters[1],
-    )  # fmt: skip
+        kp_1_V_m=2000 * kp,
+        ki_1_V_m_s=4000 * ki,
+        kd_1_V_s_m=20 * kd,
+        kf_1_V_m=50 * kf,
+        kg_1_V_s_m=kg,
+        kv_1_V_s_m=20 * kv,
+        voltage_max_V=12,
+        voltage_slew_V_s=20000,
+        kp_2_1_s=60 * p2,
+        ki_2_1_s2=100 * i2,
+        kd_2=0.2 * kd,
+        kf_2_rad_s_m=20 * f2,
+        kg_2_rad_m=0.2 * g2,
+        kv_2=kv,
+        rate_max_2_rad_s=7.8,
+        acceleration_max_2_rad_s2=8000,
+        setpoint_1_Hz=filters[0],
+        setpoint_2_Hz=filters[1],
+    )
     if tight:
-        own |= dict(ki_1_V_m_s=0, ki_2_1_s2=0, kp_2_1_s=5 * p2, voltage_max_V=3, voltage_slew_V_s=300)
+        own |= dict(
+            ki_1_V_m_s=0, ki_2_1_s2=0, kp_2_1_s=5 * p2, voltage_max_V=3, voltage_slew_V_s=300
+        )
         own |= dict(rate_max_2_rad_s=2, acceleration_max_2_rad_s2=59.9218)
     values, _ = settings_of(**WIDE, **own)
     t, size = np.arange(T) * TICK_S, 1 if tight else 0.1
-    waves = [size * sum(a * np.sin(2 * np.pi * f * t + p) for a, f, p in r.uniform(size=(3, 3)) * [1, 8, 6]) for _ in range(3)]
+    waves = [
+        size
+        * sum(a * np.sin(2 * np.pi * f * t + p) for a, f, p in r.uniform(size=(3, 3)) * [1, 8, 6])
+        for _ in range(3)
+    ]
     rows = np.zeros((T, 4), np.int64)
     rows[:, 0] = 256 * (800 * (waves[0] - waves[0][0])).astype(int) + r.integers(0, 256, T)
     rows[:, 1] = 256 * (100 * (waves[1] - waves[1][0])).astype(int) + r.integers(0, 256, T)
     rows[0, :2] = rows[0, :2] // 256 * 256
     rows[2:, 2] = np.diff(np.round(700 * (waves[2] - waves[2][0])))[1:]
-    rows[:, 3] = 2048 + 60 * waves[2] + r.integers(-3, 4, T)  # faster than 0.64 m/s the board cannot count
+    rows[:, 3] = (
+        2048 + 60 * waves[2] + r.integers(-3, 4, T)
+    )  # faster than 0.64 m/s the board cannot count
     rows[:2, 3] = rows[1, 3]
     got, wanted = board(lib, values, rows), model(values, rows)
     for j, name in enumerate(("motor_counts_per_m", "stepper_steps_per_rad")):
@@ -217,11 +303,19 @@ def test_the_models_law_is_the_boards(lib, seed, g, tight, filters):
 
 
 def test_both_stop_their_sums_at_a_limit(lib):
-    """0.3 s against both limits, then back: the sums end alike but for a tick's share where the limit begins and ends to hold."""
+    """0.3 s against both limits, then back: the sums end alike but for a tick's share where the
+    limit begins and ends to hold."""
     own = dict(
-        kp_1_V_m=1000, ki_1_V_m_s=8000, voltage_max_V=3, voltage_slew_V_s=300, kp_2_1_s=5, ki_2_1_s2=20, rate_max_2_rad_s=0.5,
-        acceleration_max_2_rad_s2=59.9218, kv_2=0,
-    )  # fmt: skip
+        kp_1_V_m=1000,
+        ki_1_V_m_s=8000,
+        voltage_max_V=3,
+        voltage_slew_V_s=300,
+        kp_2_1_s=5,
+        ki_2_1_s2=20,
+        rate_max_2_rad_s=0.5,
+        acceleration_max_2_rad_s2=59.9218,
+        kv_2=0,
+    )
     values, _ = settings_of(**WIDE, **own)
     rows = np.zeros((900, 4), np.int64)
     rows[2:300, :2], rows[300:, :2] = (220 * 256, 150 * 256), (-60 * 256, -40 * 256)
@@ -242,28 +336,63 @@ def test_no_step_is_lost_or_added_and_none_is_too_soon(lib, rates):
     wanted = np.concatenate([[0], np.cumsum(rates.astype(int)) / 4096])
     given_ = np.concatenate([[0], np.cumsum(direction)])
     when = np.searchsorted(at, np.arange(1, len(rates) + 1) * 2000, side="right")
-    assert np.all(np.abs(given_[when] - wanted[1:]) <= 1.0)               # 3/4, and one that falls on the tick's very end
-    assert np.all(np.diff(at) >= 240) and np.all(np.diff(at)[direction[1:] == direction[:-1]] >= 490)
+    assert np.all(
+        np.abs(given_[when] - wanted[1:]) <= 1.0
+    )  # 3/4, and one that falls on the tick's very end
+    assert np.all(np.diff(at) >= 240) and np.all(
+        np.diff(at)[direction[1:] == direction[:-1]] >= 490
+    )
 
 
 def test_ten_million_random_and_mutated_bytes(tmp_path):
-    """Under both sanitizers; the judge of good frames is independent, the rig must stay in a state that is allowed."""
-    fuzz = compiled(tmp_path / "fuzz", "-std=gnu++14", "-O1", "-fsanitize=address,undefined", str(HERE / "fuzz_frames.cpp"))
+    """Under both sanitizers; the judge of good frames is independent, the rig must stay in a state
+    that is allowed."""
+    fuzz = compiled(
+        tmp_path / "fuzz",
+        "-std=gnu++14",
+        "-O1",
+        "-fsanitize=address,undefined",
+        str(HERE / "fuzz_frames.cpp"),
+    )
     done = subprocess.run([fuzz, "10000000", "7"], capture_output=True, text=True, timeout=250)
     assert done.returncode == 0, done.stderr
     found = re.fullmatch(r"(\d+) bytes, (\d+) good frames, (\d+) commands obeyed\s*", done.stdout)
-    assert found and int(found[1]) >= 10_000_000 and int(found[2]) > 50_000 and int(found[3]) > 5_000
+    assert (
+        found and int(found[1]) >= 10_000_000 and int(found[2]) > 50_000 and int(found[3]) > 5_000
+    )
 
 
 @pytest.mark.parametrize("environment", ["native", "simavr"])
 def test_the_unit_tests_run_here_and_on_the_avr(environment, tmp_path):
-    """The same file on this computer, with sanitizers, and on an emulated AVR; each must have run every test that it has."""
+    """The same file on this computer, with sanitizers, and on an emulated AVR; each must have run
+    every test that it has."""
     report = tmp_path / "report.json"
-    command = [sys.executable, FIRMWARE / "build.py", "--compiler", "debian", "pio", "test", "-e", environment]
-    done = subprocess.run([*command, "--without-uploading", "--json-output-path", report], capture_output=True, text=True)
+    command = [
+        sys.executable,
+        FIRMWARE / "build.py",
+        "--compiler",
+        "debian",
+        "pio",
+        "test",
+        "-e",
+        environment,
+    ]
+    done = subprocess.run(
+        [*command, "--without-uploading", "--json-output-path", report],
+        capture_output=True,
+        text=True,
+    )
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr
     result = json.loads(report.read_text())
-    written = len(re.findall(r"^  RUN\(", (FIRMWARE / "test/test_lib/test_main.cpp").read_text(), re.M))
-    suites = [suite for suite in result["test_suites"] if suite["env_name"] == environment and suite["status"] != "SKIPPED"]
+    written = len(
+        re.findall(r"^  RUN\(", (FIRMWARE / "test/test_lib/test_main.cpp").read_text(), re.M)
+    )
+    suites = [
+        suite
+        for suite in result["test_suites"]
+        if suite["env_name"] == environment and suite["status"] != "SKIPPED"
+    ]
     cases = [case for suite in suites for case in suite["test_cases"]]
-    assert written > 20 and len(cases) == written and all(case["status"] == "PASSED" for case in cases)
+    assert (
+        written > 20 and len(cases) == written and all(case["status"] == "PASSED" for case in cases)
+    )

@@ -1,4 +1,5 @@
-"""Populations on a real Dask scheduler with worker processes of its own, one of which is killed half-way."""
+"""Populations on a real Dask scheduler with worker processes of its own, one of which is killed
+half-way."""
 
 from __future__ import annotations
 
@@ -41,14 +42,31 @@ def test_a_killed_worker_loses_nothing_and_counts_nothing_twice(cluster, tmp_pat
         if len(seen) == 8:
             workers[0].send_signal(signal.SIGKILL)
 
-    done = fx.simulate(BATCH, T, DRIVE, rtol=1e-9, folder=tmp_path / "there", chunk=10, progress=progress, scheduler=address)
+    done = fx.simulate(
+        BATCH,
+        T,
+        DRIVE,
+        rtol=1e-9,
+        folder=tmp_path / "there",
+        chunk=10,
+        progress=progress,
+        scheduler=address,
+    )
     assert workers[0].wait(10) == -signal.SIGKILL and workers[1].poll() is None
-    assert done.complete and list(done.robots) == list(range(400)) and len(seen) == 40 and seen[-1] == 1.0
+    assert (
+        done.complete
+        and list(done.robots) == list(range(400))
+        and len(seen) == 40
+        and seen[-1] == 1.0
+    )
     here = fx.simulate(BATCH, T, DRIVE, rtol=1e-9, folder=tmp_path / "here", chunk=10)
     assert same(done, here) and list(done.status) == ["done"] * 400
     names = [path.name for path in sorted((tmp_path / "here").iterdir())]
     assert names == [path.name for path in sorted((tmp_path / "there").iterdir())]
-    assert all((tmp_path / "here" / name).read_bytes() == (tmp_path / "there" / name).read_bytes() for name in names)
+    assert all(
+        (tmp_path / "here" / name).read_bytes() == (tmp_path / "there" / name).read_bytes()
+        for name in names
+    )
 
 
 def test_a_cluster_goes_on_with_a_folder_that_was_begun_here(cluster, tmp_path):
@@ -83,14 +101,18 @@ def test_an_interrupted_cluster_keeps_what_is_done(cluster):
 def test_what_is_wrong_on_a_worker_is_said_here(cluster):
     address, _ = cluster
     ready(address, 1)
-    with pytest.raises(fx.InputError, match="number or a dictionary of numbers of robot 1") as raised:
+    with pytest.raises(
+        fx.InputError, match="number or a dictionary of numbers of robot 1"
+    ) as raised:
         fx.simulate(fx.Batch.of([ARM]), T, DRIVE, reduce=no_number, scheduler=address)
     assert raised.value.key == "reduce"
 
 
 def test_an_address_without_a_scheduler_is_refused(monkeypatch):
-    monkeypatch.setattr("flexura.cluster.CONNECT_S", 0.5)
+    monkeypatch.setattr("flexura.population.dask_cluster.CONNECT_S", 0.5)
     for address in ("tcp://127.0.0.1:1", "nonsense://x"):
-        with pytest.raises(fx.InputError, match="expected the address of a Dask scheduler") as raised:
+        with pytest.raises(
+            fx.InputError, match="expected the address of a Dask scheduler"
+        ) as raised:
             fx.simulate(BATCH, T, DRIVE, scheduler=address)
         assert raised.value.key == "scheduler"

@@ -1,4 +1,5 @@
-"""The dissertation's linear line in NumPy: closed forms, the exact line at small bending, and how a run goes on and ends."""
+"""The dissertation's linear line in NumPy: closed forms, the exact line at small bending, and how a
+run goes on and ends."""
 
 from __future__ import annotations
 
@@ -9,8 +10,9 @@ import pytest
 
 import chains
 import flexura as fx
-from flexura import dense, forward, signals
-from flexura.sampled import Sampled
+from flexura import signals
+from flexura.control.sampled import Sampled
+from flexura.simulation import dense, simulate
 from flexura.system.assembly import Assembly
 from robots import beam, bench_arm, largest_difference, rigid, system
 
@@ -28,7 +30,9 @@ def test_the_assembly_shows_what_the_core_shows(name):
     exact = fx.assemble(chains.SMALL[name])
     q, qd = chains.random_state(exact.assembly, np.random.default_rng(5), 0.5)
     mine = exact.assembly.observe(q, qd, 9)
-    assert mine == pytest.approx(exact.equations.observe(q[None], qd[None], 9)[0], abs=1e-12 * np.abs(mine).max())
+    assert mine == pytest.approx(
+        exact.equations.observe(q[None], qd[None], 9)[0], abs=1e-12 * np.abs(mine).max()
+    )
 
 
 @pytest.mark.parametrize("name", ["R, kink", "R, Pa on all shapes", "R, Pb, Pa"])
@@ -38,14 +42,23 @@ def test_one_sweep_gives_all_terms(name):
     terms = assembly.terms(q, qd)
     near = lambda x: pytest.approx(x, abs=1e-12 * np.abs(x).max())
     assert terms.mass == near(assembly.mass(q)) and terms.elastic == near(assembly.elastic(q))
-    assert terms.forces == near(assembly.bias(q, qd) + assembly.gravity(q)) and terms.damping == near(assembly.damping(q))
+    assert terms.forces == near(
+        assembly.bias(q, qd) + assembly.gravity(q)
+    ) and terms.damping == near(assembly.damping(q))
 
 
 def test_a_mesh_as_one_piece_is_the_chain_of_its_elements():
     table = beam(1.0, chains.BROKEN, chains.BROKEN, 3, **chains.HUB)
-    one, many = Assembly(system(table, **chains.LOAD).robot, True), Assembly(system(table, **chains.LOAD).robot, False)
+    one, many = (
+        Assembly(system(table, **chains.LOAD).robot, True),
+        Assembly(system(table, **chains.LOAD).robot, False),
+    )
     linear = type(many.structure)(many.robot, many.structure.links, True)
-    assert len(one.structure.links[0]) == 1 and len(many.structure.links[0]) == 3 and one.labels == many.labels
+    assert (
+        len(one.structure.links[0]) == 1
+        and len(many.structure.links[0]) == 3
+        and one.labels == many.labels
+    )
     q, qd = chains.random_state(many, np.random.default_rng(7))
     a, b = one, Assembly(linear)
     assert a.mass(q) == pytest.approx(b.mass(q), rel=1e-11, abs=1e-13)
@@ -57,8 +70,11 @@ def test_a_mesh_as_one_piece_is_the_chain_of_its_elements():
 def test_on_an_exact_robot_it_is_the_core(name):
     """The same equations, another program: motion, drives, work, losses."""
     exact = fx.assemble(chains.SMALL[name])
-    t, drive = np.linspace(0, 0.02, 5), fx.Drive.force(*[signals.harmonic(0.3, 2.0)] * len(exact.robot.links))
-    q, qd = forward.initial(exact, 0.0, drive, None, None)
+    t, drive = (
+        np.linspace(0, 0.02, 5),
+        fx.Drive.force(*[signals.harmonic(0.3, 2.0)] * len(exact.robot.links)),
+    )
+    q, qd = simulate.initial(exact, 0.0, drive, None, None)
     a = dense.simulate(exact, t, drive, q, qd, 1e-6, "explicit", None)
     b = fx.simulate(exact, t, drive, rtol=1e-8, method="explicit")
     assert list(a) == list(b)
@@ -68,7 +84,8 @@ def test_on_an_exact_robot_it_is_the_core(name):
 
 @pytest.mark.parametrize("method", ["explicit", "implicit"])
 def test_a_mode_of_a_clamped_link_is_a_cosine(method):
-    """Without stiffening and with the joint locked the equations are linear: q = q0 cos(omega t)."""
+    """Without stiffening and with the joint locked the equations are linear: q = q0 cos(omega
+    t)."""
     arm = short_arm(locked=True)
     found = fx.modes(arm)
     shape, omega = 1e-2 * found.shapes[:, 0], 2 * np.pi * found.frequencies_Hz[0]
@@ -82,7 +99,9 @@ def test_a_mode_of_a_clamped_link_is_a_cosine(method):
 def test_damping_takes_what_it_should_from_a_mode():
     """D = beta K: the mode's ratio is beta omega / 2."""
     arm = system(
-        beam(0.6, 0.2355, 0.5, 2, damping={"beta_s": 5e-3}, locked=True), payload=0.05, stiffening=False
+        beam(0.6, 0.2355, 0.5, 2, damping={"beta_s": 5e-3}, locked=True),
+        payload=0.05,
+        stiffening=False,
     )
     found = fx.modes(arm)
     omega = 2 * np.pi * found.frequencies_Hz[0]
@@ -90,7 +109,9 @@ def test_damping_takes_what_it_should_from_a_mode():
     t = np.linspace(0, 0.3, 7)
     run = fx.simulate(arm, t, q0=1e-2 * found.shapes[:, 0], rtol=1e-6)
     damped = omega * np.sqrt(1 - zeta**2)
-    y = np.exp(-zeta * omega * t) * (np.cos(damped * t) + zeta / np.sqrt(1 - zeta**2) * np.sin(damped * t))
+    y = np.exp(-zeta * omega * t) * (
+        np.cos(damped * t) + zeta / np.sqrt(1 - zeta**2) * np.sin(damped * t)
+    )
     tip = run["link/1/tip_deflection"]
     assert tip == pytest.approx(tip[0] * y, abs=2e-5 * tip[0])
     assert run["energy/loss"][-1] > 0 and run.meta["energy_error"] < 1e-5
@@ -102,7 +123,9 @@ def test_at_small_bending_the_linear_line_is_the_exact_one():
     for torque in (0.01, 0.02):
         drive = fx.Drive.force(signals.harmonic(torque, 5.0))
         a, b = (fx.simulate(short_arm(kind), t, drive, rtol=1e-7) for kind in (False, True))
-        worst.append(largest_difference(a, b, ["joint/1/position", "tip/y", "link/1/tip_deflection"]))
+        worst.append(
+            largest_difference(a, b, ["joint/1/position", "tip/y", "link/1/tip_deflection"])
+        )
     assert worst[0] < 1e-3 and worst[1] == pytest.approx(4 * worst[0], rel=0.2)
 
 
@@ -117,23 +140,32 @@ def test_rotation_softens_the_linear_line(speed):
     q0 = 1e-4 * fx.modes(arm).shapes[:, 0]
     spin = fx.Drive.prescribed(signals.Signal(np.array([[0, 0, speed, 0, 0, 0, 0, 0, 0, 0]])))
     run = fx.simulate(arm, [0.0, 2 * np.pi / omega], spin, q0, rtol=1e-6)
-    assert run["link/1/tip_deflection"][-1] == pytest.approx(run["link/1/tip_deflection"][0], rel=1e-4)
+    assert run["link/1/tip_deflection"][-1] == pytest.approx(
+        run["link/1/tip_deflection"][0], rel=1e-4
+    )
 
 
 @pytest.mark.slow
 def test_the_linear_line_needs_the_torque_of_the_dissertations_form():
-    """B7, last row, two to three digits of agreement between codes: cycloid to a right angle in 1 s."""
+    """B7, last row, two to three digits of agreement between codes: cycloid to a right angle in 1
+    s."""
     t = np.linspace(0.0, 1.0, 101)
-    torque = fx.inverse(bench_arm(4, stiffening=False), t, signals.cycloid(np.pi / 2, 1.0), rtol=1e-5)["joint/1/drive"]
+    torque = fx.inverse(
+        bench_arm(4, stiffening=False), t, signals.cycloid(np.pi / 2, 1.0), rtol=1e-5
+    )["joint/1/drive"]
     for at, value in {0.50: 0.4078, 0.60: 0.0216, 0.75: -0.8425, 0.90: -0.9733}.items():
         assert np.interp(at, t, torque) == pytest.approx(value, abs=0.01), at
 
 
-# Drives and ends ----------------------------------------------------------------------------------------------------------
+# Drives and ends
 
 
 def test_replayed_drives_return_the_motion():
-    arm, motion, t = short_arm(viscous_friction=0.1, coulomb_friction=0.01), signals.cycloid(0.3, 0.1), np.linspace(0, 0.1, 51)
+    arm, motion, t = (
+        short_arm(viscous_friction=0.1, coulomb_friction=0.01),
+        signals.cycloid(0.3, 0.1),
+        np.linspace(0, 0.1, 51),
+    )
     run = fx.inverse(arm, t, motion, rtol=1e-6)
     assert run["joint/1/position"] == pytest.approx([motion(s)[0] for s in t], abs=1e-14)
     again = fx.simulate(arm, t, fx.Drive.force(signals.table(t, run["joint/1/drive"])), rtol=1e-6)
@@ -165,27 +197,37 @@ def test_a_function_and_a_drive_agree():
 
 def test_a_controller_is_refused():
     with pytest.raises(fx.InputError, match=r"stiffening = true"):
-        fx.simulate(short_arm(), [0.0, 0.1], fx.Controller((fx.PID(signals.constant(0.1), kp=1.0),)))
+        fx.simulate(
+            short_arm(), [0.0, 0.1], fx.Controller((fx.PID(signals.constant(0.1), kp=1.0),))
+        )
 
 
 def test_a_limit_ends_a_run_at_its_instant():
     arm = system(rigid(0.3, 0.2, 0.15, 1e-3, "Pa", limits=[-0.1, 0.1]), stiffening=False)
     run = fx.simulate(arm, np.linspace(0, 2, 21), fx.Drive.force(signals.constant(0.1)))
     assert not run.complete and run.t[-1] == pytest.approx(np.sqrt(0.4), rel=1e-6)
-    assert run.meta["events"][-1]["text"].startswith("joint 1 left its limits, -0.1 to 0.1 m") and len(run.t) == 8
+    assert (
+        run.meta["events"][-1]["text"].startswith("joint 1 left its limits, -0.1 to 0.1 m")
+        and len(run.t) == 8
+    )
 
 
 def test_a_step_in_the_drive_is_a_step():
     """Constant acceleration from 0.5 s on: the jump is met, not stepped over."""
     cart = system(rigid(0.3, 0.2, 0.15, 1e-3, "Pa"), stiffening=False)
     run = fx.simulate(cart, [0.0, 0.5, 1.0], fx.Drive.force(signals.step(0.2, 0.5)), rtol=1e-9)
-    assert run["joint/1/position"] == pytest.approx([0.0, 0.0, 0.125], abs=1e-10) and run.meta["steps"] < 100
+    assert (
+        run["joint/1/position"] == pytest.approx([0.0, 0.0, 0.125], abs=1e-10)
+        and run.meta["steps"] < 100
+    )
 
 
 def test_ctrl_c_keeps_what_was_finished():
     t = np.linspace(0, 5, 5001)
     stop = lambda done: _thread.interrupt_main() if done > 0.002 else None
-    run = fx.simulate(short_arm(), t, fx.Drive.force(signals.harmonic(0.1, 2.0)), method="explicit", progress=stop)
+    run = fx.simulate(
+        short_arm(), t, fx.Drive.force(signals.harmonic(0.1, 2.0)), method="explicit", progress=stop
+    )
     assert not run.complete and run.meta["events"][-1]["text"] == "interrupted"
     assert 1 <= len(run.t) < len(t) and np.array_equal(run.t, t[: len(run.t)])
 

@@ -1,6 +1,8 @@
-"""B13: the flying spaghetti of Simo and Vu-Quoc (1986), a free beam of large strains, in the twin's geometrically exact links.
+"""B13: the flying spaghetti of Simo and Vu-Quoc (1986), a free beam of large strains, in the twin's
+geometrically exact links.
 
-Outside the reach of the native model, whose links are inextensible; it holds the twin's own parts to a published problem.
+Outside the reach of the native model, whose links are inextensible; it holds the twin's own parts
+to a published problem.
 """
 
 from __future__ import annotations
@@ -8,30 +10,44 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flexura.twin.exact import ExactLink
-from flexura.twin.part import Frame, Lump
-from flexura.twin.properties import BeamValues
+from flexura.twin.links.geometrically_exact import ExactLink
+from flexura.twin.links.part import Frame, Lump
+from flexura.twin.links.properties import BeamValues
 from flexura.twin.solve import _settings
 
 LENGTH, ELEMENTS, END_S, STEP_S = 10.0, 20, 5.0, 0.005
-TABLE = {2.5: ((-1.569, -0.786), (5.946, 0.971)), 5.0: ((-0.377, 4.767), (15.41, -3.741))}  # loaded end, free end
+TABLE = {
+    2.5: ((-1.569, -0.786), (5.946, 0.971)),
+    5.0: ((-0.377, 4.767), (15.41, -3.741)),
+}  # loaded end, free end
 
 
 @pytest.fixture(scope="module")
 def flight():
-    """The free beam from (6, 0), the loaded end, to (0, 8): force 8 in x and torque -80 for 2.5 s; link, times, coordinates."""
+    """The free beam from (6, 0), the loaded end, to (0, 8): force 8 in x and torque -80 for 2.5 s;
+    link, times, coordinates."""
     import exudyn as exu
     from exudyn import itemInterface as eii
 
     container = exu.SystemContainer()
     mbs = container.AddSystem()
     same = lambda value: np.full(ELEMENTS, value)
-    values = BeamValues(LENGTH / ELEMENTS, same(1.0), same(500.0), same(1e4), same(1e4), same(10.0), 0.0)
-    link = ExactLink(mbs, values, Lump(), Lump(), Frame(6.0, 0.0, float(np.arctan2(8.0, -6.0))), (0.0, 0.0))
+    values = BeamValues(
+        LENGTH / ELEMENTS, same(1.0), same(500.0), same(1e4), same(1e4), same(10.0), 0.0
+    )
+    link = ExactLink(
+        mbs, values, Lump(), Lump(), Frame(6.0, 0.0, float(np.arctan2(8.0, -6.0))), (0.0, 0.0)
+    )
     marker = mbs.AddMarker(eii.MarkerNodeRigid(nodeNumber=link.nodes[0]))
     on = lambda mbs, t, load: load if t <= 2.5 else [0.0, 0.0, 0.0]
-    mbs.AddLoad(eii.LoadForceVector(markerNumber=marker, loadVector=[8.0, 0, 0], loadVectorUserFunction=on))
-    mbs.AddLoad(eii.LoadTorqueVector(markerNumber=marker, loadVector=[0, 0, -80.0], loadVectorUserFunction=on))
+    mbs.AddLoad(
+        eii.LoadForceVector(markerNumber=marker, loadVector=[8.0, 0, 0], loadVectorUserFunction=on)
+    )
+    mbs.AddLoad(
+        eii.LoadTorqueVector(
+            markerNumber=marker, loadVector=[0, 0, -80.0], loadVectorUserFunction=on
+        )
+    )
     mbs.Assemble()
     kept = {}
 

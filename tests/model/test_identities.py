@@ -1,7 +1,8 @@
-"""What must hold for every robot: identities, symmetries and limits, on random robots in random states (B12).
+"""What must hold for every robot: identities, symmetries and limits, on random robots in random
+states (B12).
 
-Where a number is compared, the other number comes from another form of the same equations, from finite differences, or from an
-assembly written here.
+Where a number is compared, the other number comes from another form of the same equations, from
+finite differences, or from an assembly written here.
 """
 
 from __future__ import annotations
@@ -35,7 +36,9 @@ from robots import (
 
 def close(a, b, tolerance: float, least: float = 1e-9) -> None:
     """Agreement of two arrays relative to the largest entry, or to `least`."""
-    assert np.abs(np.asarray(a) - b).max() <= tolerance * max(np.abs(b).max(), np.abs(a).max(), least)
+    assert np.abs(np.asarray(a) - b).max() <= tolerance * max(
+        np.abs(b).max(), np.abs(a).max(), least
+    )
 
 
 def energy(sys: fx.System, name: str, q: np.ndarray, qd: np.ndarray | None = None) -> float:
@@ -88,7 +91,7 @@ def at_rest_if_locked(sys: fx.System, qd: np.ndarray) -> np.ndarray:
     return out
 
 
-# Mass matrix and energies ----------------------------------------------------------------------------------------------------
+# Mass matrix and energies
 
 
 @fast
@@ -117,17 +120,26 @@ def test_the_mass_matrix_is_the_hessian_of_the_kinetic_energy(bot, seed):
 @few
 @given(robots(max_links=3), seeds)
 def test_bias_forces_follow_from_the_mass_matrix(bot, seed):
-    """Lagrange: bias(q, qd) - bias(q, 0) = dM/dt qd - 1/2 d(qd^T M qd)/dq; bias(q, 0) is the strain energy's part beyond K."""
+    """Lagrange: bias(q, qd) - bias(q, 0) = dM/dt qd - 1/2 d(qd^T M qd)/dq; bias(q, 0) is the strain
+    energy's part beyond K."""
     sys = fx.assemble(bot)
     q, qd = state(sys, seed)
     h = 1e-3
     rate = (
-        (8 * (sys.mass(q + h * qd) - sys.mass(q - h * qd)) - (sys.mass(q + 2 * h * qd) - sys.mass(q - 2 * h * qd)))
+        (
+            8 * (sys.mass(q + h * qd) - sys.mass(q - h * qd))
+            - (sys.mass(q + 2 * h * qd) - sys.mass(q - 2 * h * qd))
+        )
         @ qd
         / (12 * h)
     )
     slope = gradient(lambda z: qd @ sys.mass(z) @ qd / 2, q, steps(sys, 2e-3))
-    close((sys.bias(q, qd) - sys.bias(q, 0 * q)) / turning(sys), (rate - slope) / turning(sys), 1e-7, least=1e-3)
+    close(
+        (sys.bias(q, qd) - sys.bias(q, 0 * q)) / turning(sys),
+        (rate - slope) / turning(sys),
+        1e-7,
+        least=1e-3,
+    )
 
 
 @few
@@ -147,13 +159,14 @@ def test_gravity_and_stiffness_are_gradients_of_the_energies(bot, seed):
     assert energy(sys, "strain", z) == pytest.approx(bent @ sys.stiffness() @ bent / 2, rel=1e-6)
 
 
-# Forward and inverse dynamics -------------------------------------------------------------------------------------------------
+# Forward and inverse dynamics
 
 
 @fast
 @given(robots(coulomb=True, locked=True), seeds)
 def test_the_recursion_solves_the_assembled_equations(bot, seed):
-    """accelerate, of cost O(N), against M^-1 (F - bias - D qd - K q - gravity), to the digits that solving with M leaves."""
+    """accelerate, of cost O(N), against M^-1 (F - bias - D qd - K q - gravity), to the digits that
+    solving with M leaves."""
     sys = fx.assemble(bot)
     q, qd = state(sys, seed)
     qd = at_rest_if_locked(sys, qd)
@@ -175,15 +188,21 @@ def test_inverse_dynamics_returns_the_forces_that_were_applied(bot, seed):
     got = sys.forces(q, qd, qdd)
     expected = np.zeros(sys.n)
     expected[sys.joint_rows] = tau
-    scale = np.abs(sys.mass(q)) @ np.abs(qdd) + np.abs(sys.elastic(q)) + np.abs(sys.bias(q, qd)) + np.abs(sys.gravity(q))
+    scale = (
+        np.abs(sys.mass(q)) @ np.abs(qdd)
+        + np.abs(sys.elastic(q))
+        + np.abs(sys.bias(q, qd))
+        + np.abs(sys.gravity(q))
+    )
     assert (np.abs(got - expected) < 1e-11 * (1 + scale)).all()
 
 
 @fast
 @given(robots(stiffening=False, modes=False, gravity=False, sliding=False), seeds)
 def test_the_extended_assembly_is_the_dissertations(bot, seed):
-    """M_ij = int m J^T J dx of each element by four Gauss points, J = dr/dq through the chain of homogeneous transforms,
-    scattered over all unknowns; hubs, rotors and the payload added (dissertation, 2.3 and 2.4)."""
+    """M_ij = int m J^T J dx of each element by four Gauss points, J = dr/dq through the chain of
+    homogeneous transforms, scattered over all unknowns; hubs, rotors and the payload added
+    (dissertation, 2.3 and 2.4)."""
     sys = fx.assemble(bot)
     q, _ = state(sys, seed)
     T = nodal(sys)
@@ -191,19 +210,23 @@ def test_the_extended_assembly_is_the_dissertations(bot, seed):
 
 
 def nodal(sys: fx.System) -> np.ndarray:
-    """Joints, and deflection and slope at each node, from the unknowns of each element: (n, n), for the linear line."""
+    """Joints, and deflection and slope at each node, from the unknowns of each element: (n, n), for
+    the linear line."""
     T = np.eye(sys.n)
     for i, link in enumerate(sys.robot.links):
         own, n = sys.own_rows(i), link.elements
         if len(own):
             angle = sys.angles(i + 1, np.linspace(0, link.length_m, 2 * n + 1))
             T[own[1::2]] = angle[2::2]
-            T[own[0::2]] = np.cumsum((angle[0:-1:2] + 4 * angle[1::2] + angle[2::2]) * link.length_m / n / 6, axis=0)
+            T[own[0::2]] = np.cumsum(
+                (angle[0:-1:2] + 4 * angle[1::2] + angle[2::2]) * link.length_m / n / 6, axis=0
+            )
     return T
 
 
 def by_elements(bot: fx.Robot, q: np.ndarray) -> np.ndarray:
-    """M(q) of the linear model: positions of mass points, directions of rotary inertias, differentiated with complex steps."""
+    """M(q) of the linear model: positions of mass points, directions of rotary inertias,
+    differentiated with complex steps."""
     n = len(q)
     first = np.cumsum([0] + [1 + 2 * link.elements for link in bot.links])
     weights, M = [], np.zeros((n, n))
@@ -211,22 +234,35 @@ def by_elements(bot: fx.Robot, q: np.ndarray) -> np.ndarray:
     for i, link in enumerate(bot.links):
         if link.flexible:
             h = link.length_m / link.elements
-            # properties are linear between given places: split elements there, so that Gauss points stay exact
-            ends = np.unique(np.round([*np.linspace(0, link.length_m, link.elements + 1), *link.breaks()], 12))
+            # properties are linear between given places: split elements there, so that Gauss points
+            # stay exact
+            ends = np.unique(
+                np.round([*np.linspace(0, link.length_m, link.elements + 1), *link.breaks()], 12)
+            )
             for a, b in itertools.pairwise(ends):
                 for p, w in zip(s, gauss):
                     x = (a + b) / 2 + p * (b - a) / 2
                     element = min(int((a + b) / 2 / h), link.elements - 1)
-                    weights.append((w * (b - a) / 2 * float(link.mass_per_length(x)), i, x, element))
+                    weights.append(
+                        (w * (b - a) / 2 * float(link.mass_per_length(x)), i, x, element)
+                    )
         else:
             weights.append((link.mass_kg, i, link.centre_of_mass_m, -1))
         weights.append((link.joint.hub_mass_kg, i, 0.0, 0))
     last = len(bot.links) - 1
-    weights.append((bot.payload.mass_kg, last, bot.links[last].length_m, bot.links[last].elements - 1))
+    weights.append(
+        (bot.payload.mass_kg, last, bot.links[last].length_m, bot.links[last].elements - 1)
+    )
 
     def places(z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """All mass points (k, 2), and the angles of hubs, links and payload."""
-        H, frames, angles, angle, end = np.eye(3, dtype=complex), [], [], 0, np.zeros(2, dtype=complex)
+        H, frames, angles, angle, end = (
+            np.eye(3, dtype=complex),
+            [],
+            [],
+            0,
+            np.zeros(2, dtype=complex),
+        )
         for i, link in enumerate(bot.links):
             before = bot.links[i - 1] if i else None
             eta = z[first[i]]
@@ -245,9 +281,18 @@ def by_elements(bot: fx.Robot, q: np.ndarray) -> np.ndarray:
             w = 0.0
             if bot.links[i].flexible:
                 l = bot.links[i].length_m / bot.links[i].elements
-                u = np.concatenate([np.zeros(2), z[first[i] + 1 : first[i + 1]]])[2 * element : 2 * element + 4]
+                u = np.concatenate([np.zeros(2), z[first[i] + 1 : first[i + 1]]])[
+                    2 * element : 2 * element + 4
+                ]
                 r = x / l - element
-                w = u @ np.array([1 - 3 * r**2 + 2 * r**3, l * (r - 2 * r**2 + r**3), 3 * r**2 - 2 * r**3, l * (r**3 - r**2)])
+                w = u @ np.array(
+                    [
+                        1 - 3 * r**2 + 2 * r**3,
+                        l * (r - 2 * r**2 + r**3),
+                        3 * r**2 - 2 * r**3,
+                        l * (r**3 - r**2),
+                    ]
+                )
             points.append((frames[i] @ np.array([x, w, 1.0]))[:2])
         return np.array(points), np.array(angles)
 
@@ -265,22 +310,30 @@ def by_elements(bot: fx.Robot, q: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("stiffening", [True, False])
 def test_a_payloads_inertia_turns_with_the_tip_only(stiffening):
-    """A payload without mass turns at the rate of the tip's angle: T = J (qd + d theta(L)/dt)^2/2 beyond the bare link's."""
+    """A payload without mass turns at the rate of the tip's angle: T = J (qd + d theta(L)/dt)^2/2
+    beyond the bare link's."""
     J = 0.02
-    bare, loaded = (system(beam(0.5, 0.2, 1.0, 2), payload_inertia=j, stiffening=stiffening) for j in (0.0, J))
+    bare, loaded = (
+        system(beam(0.5, 0.2, 1.0, 2), payload_inertia=j, stiffening=stiffening) for j in (0.0, J)
+    )
     q, qd = state(bare, 5, slope=0.3)
     rate = qd[0] + bare.angles(1, 0.5)[0] @ qd
     extra = energy(loaded, "kinetic", q, qd) - energy(bare, "kinetic", q, qd)
     assert extra == pytest.approx(J * rate**2 / 2, rel=1e-9)
 
 
-# Energy along a motion --------------------------------------------------------------------------------------------------------
+# Energy along a motion
 
 
 def drives(sys: fx.System, seed: int) -> fx.Drive:
     """A smooth force or torque in every joint, 1 at most."""
     random = np.random.default_rng(seed + 2)
-    return fx.Drive.force(*(signals.harmonic(random.uniform(-1, 1) * 0.3, random.uniform(0.5, 3), 1.0) for _ in sys.robot.links))
+    return fx.Drive.force(
+        *(
+            signals.harmonic(random.uniform(-1, 1) * 0.3, random.uniform(0.5, 3), 1.0)
+            for _ in sys.robot.links
+        )
+    )
 
 
 def small_state(sys: fx.System, seed: int) -> dict[str, np.ndarray]:
@@ -291,9 +344,17 @@ def small_state(sys: fx.System, seed: int) -> dict[str, np.ndarray]:
 @fast
 @given(robots(max_links=4, stiffening=True), seeds)
 def test_energy_changes_by_the_work_of_the_drives_less_the_losses(bot, seed):
-    """To 1e-8 of the largest energy (B12) at rtol 1e-11, since work and losses do not choose the steps."""
+    """To 1e-8 of the largest energy (B12) at rtol 1e-11, since work and losses do not choose the
+    steps."""
     sys = fx.assemble(bot)
-    run = fx.simulate(sys, [0.0, 0.05, 0.1], drives(sys, seed), **small_state(sys, seed), rtol=1e-11, method="explicit")
+    run = fx.simulate(
+        sys,
+        [0.0, 0.05, 0.1],
+        drives(sys, seed),
+        **small_state(sys, seed),
+        rtol=1e-11,
+        method="explicit",
+    )
     assert run.meta["energy_error"] < 1e-8
 
 
@@ -301,20 +362,32 @@ def test_energy_changes_by_the_work_of_the_drives_less_the_losses(bot, seed):
 @given(robots(max_links=3, modes=False, stiffening=True), seeds)
 def test_energy_is_balanced_by_the_implicit_method_too(bot, seed):
     sys = fx.assemble(bot)
-    run = fx.simulate(sys, [0.0, 0.025, 0.05], drives(sys, seed), **small_state(sys, seed), rtol=1e-11, method="implicit")
+    run = fx.simulate(
+        sys,
+        [0.0, 0.025, 0.05],
+        drives(sys, seed),
+        **small_state(sys, seed),
+        rtol=1e-11,
+        method="implicit",
+    )
     assert run.meta["energy_error"] < 1e-8
 
 
 @pytest.mark.parametrize("second", [{}, {"locked": True}], ids=["free", "locked"])
 def test_round_off_does_not_feed_energy_into_a_fine_link_that_carries_bodies(second):
-    """A flexible link with two rigid ones on it, the first free or fixed: at rtol 1e-11 the balance is kept to 1e-9."""
+    """A flexible link with two rigid ones on it, the first free or fixed: at rtol 1e-11 the balance
+    is kept to 1e-9."""
     body = {"hub_inertia_kg_m2": 1e-3, "start": -1.0}
-    arm = system(beam(0.2, 0.1, 0.5, 6, **body), rigid(0.2, 0.1, 0.0, 1e-3, **body, **second), rigid(0.2, 0.1, 0.0, 1e-3, **body))
+    arm = system(
+        beam(0.2, 0.1, 0.5, 6, **body),
+        rigid(0.2, 0.1, 0.0, 1e-3, **body, **second),
+        rigid(0.2, 0.1, 0.0, 1e-3, **body),
+    )
     run = fx.simulate(arm, [0.0, 0.05], **small_state(arm, 0), rtol=1e-11, method="explicit")
     assert run.meta["energy_error"] < 1e-9
 
 
-# Limits and symmetries --------------------------------------------------------------------------------------------------------
+# Limits and symmetries
 
 
 def stiffer(bot: fx.Robot, factor: float) -> fx.Robot:
@@ -323,8 +396,12 @@ def stiffer(bot: fx.Robot, factor: float) -> fx.Robot:
         if link.get("elements"):
             value = link["bending_stiffness_N_m2"]
             many = isinstance(value, list)
-            link["bending_stiffness_N_m2"] = [v | {"value": v["value"] * factor} for v in value] if many else value * factor
-            link["damping"] = {"beta_s": 1e-4}  # else the steps follow the ringing that a sudden load starts
+            link["bending_stiffness_N_m2"] = (
+                [v | {"value": v["value"] * factor} for v in value] if many else value * factor
+            )
+            link["damping"] = {
+                "beta_s": 1e-4
+            }  # else the steps follow the ringing that a sudden load starts
     return fx.Robot.from_dict(data)
 
 
@@ -359,7 +436,10 @@ def test_without_gravity_the_base_may_be_turned(bot, seed):
     sys, angle = fx.assemble(bot), 0.8
     t, small = np.linspace(0, 0.1, 6), small_state(sys, seed)
     turned = {"q0": small["q0"] + angle * np.eye(sys.n)[0], "qd0": small["qd0"]}
-    a, b = (fx.simulate(sys, t, drives(sys, seed), **s, rtol=1e-9, method="explicit") for s in (small, turned))
+    a, b = (
+        fx.simulate(sys, t, drives(sys, seed), **s, rtol=1e-9, method="explicit")
+        for s in (small, turned)
+    )
     c, s = np.cos(angle), np.sin(angle)
     close(b["tip/x"], c * a["tip/x"] - s * a["tip/y"], 1e-8)
     close(b["tip/y"], s * a["tip/x"] + c * a["tip/y"], 1e-8)
@@ -369,7 +449,8 @@ def test_without_gravity_the_base_may_be_turned(bot, seed):
 @few
 @given(robots(max_links=4, coulomb=True, stiffening=True), seeds)
 def test_a_mirrored_robot_moves_mirrored(bot, seed):
-    """y -> -y: angles, torques, deflections and gravity's y change sign; sliders and their forces do not."""
+    """y -> -y: angles, torques, deflections and gravity's y change sign; sliders and their forces
+    do not."""
     data = bot.to_dict()
     data["gravity_m_s2"] = [bot.gravity_m_s2[0], -bot.gravity_m_s2[1]]
     for link in data["link"]:
@@ -384,7 +465,14 @@ def test_a_mirrored_robot_moves_mirrored(bot, seed):
     small, tau = small_state(sys, seed), 0.2 * forces(sys, seed)
     flip = [-1.0 if link.joint.type == "R" else 1.0 for link in bot.links]
     t = np.linspace(0, 0.1, 6)
-    a = fx.simulate(sys, t, fx.Drive.force(*(signals.constant(f) for f in tau)), **small, rtol=1e-9, method="explicit")
+    a = fx.simulate(
+        sys,
+        t,
+        fx.Drive.force(*(signals.constant(f) for f in tau)),
+        **small,
+        rtol=1e-9,
+        method="explicit",
+    )
     b = fx.simulate(
         other,
         t,
@@ -417,16 +505,20 @@ def test_a_locked_joint_between_two_halves_of_a_link_changes_no_frequency():
 
 
 def test_a_locked_joint_between_two_halves_of_a_link_changes_nothing():
-    """The same line in one frame or in two, at any bending: statics to round-off, a motion to its tolerance."""
+    """The same line in one frame or in two, at any bending: statics to round-off, a motion to its
+    tolerance."""
     one, two = whole_and_halves(8)
     a, b = (fx.tip_pose(s, fx.static(s, tip_force=(0.0, 2.0))) for s in (one, two))
     assert b == pytest.approx(a, rel=1e-10) and a[2] > 0.5
     t, drive = np.linspace(0, 1, 51), signals.bang_bang(0.2, 1.0, rise_s=0.05)
-    a, b = (fx.simulate(s, t, fx.Drive.force(drive, *[None] * (len(s.robot.links) - 1)), rtol=1e-10) for s in (one, two))
+    a, b = (
+        fx.simulate(s, t, fx.Drive.force(drive, *[None] * (len(s.robot.links) - 1)), rtol=1e-10)
+        for s in (one, two)
+    )
     assert largest_difference(a, b, ["joint/1/position", "tip/x", "tip/y"]) < 1e-7
 
 
-# A link's own modes -----------------------------------------------------------------------------------------------------------
+# A link's own modes
 
 
 def moved_at_joint_two(modes: int | None) -> fx.Run:
@@ -436,7 +528,8 @@ def moved_at_joint_two(modes: int | None) -> fx.Run:
 
 
 def test_modes_converge_to_the_link():
-    """Three modes and the two static shapes of the tip are within 2e-3 of a fine mesh; all of them are the link."""
+    """Three modes and the two static shapes of the tip are within 2e-3 of a fine mesh; all of them
+    are the link."""
     names = [f"joint/{i}/position" for i in (1, 2)] + [f"link/{i}/tip_deflection" for i in (1, 2)]
     mesh = moved_at_joint_two(None)
     error = {}
@@ -448,7 +541,7 @@ def test_modes_converge_to_the_link():
     assert error[8] < error[3] < error[2] < error[1]
 
 
-# Linearisation ----------------------------------------------------------------------------------------------------------------
+# Linearisation
 
 
 @few
@@ -474,7 +567,8 @@ def test_frequencies_are_those_of_the_linearised_accelerations(bot, seed):
 
 
 def test_small_free_vibration_has_the_linearised_frequency():
-    """Ten periods after release in one mode the link is back: the phase error is the frequency's."""
+    """Ten periods after release in one mode the link is back: the phase error is the
+    frequency's."""
     arm = system(beam(0.6, 0.2355, 0.5, 4, locked=True, modes=4), payload=0.05)
     period = 1 / fx.frequencies(arm)[:3]
     for k, T in enumerate(period):
@@ -486,7 +580,7 @@ def test_small_free_vibration_has_the_linearised_frequency():
         assert abs(phase) / (20 * np.pi) < 1e-7
 
 
-# For long, and at rest -------------------------------------------------------------------------------------------------------
+# For long, and at rest
 
 
 def test_a_bench_arm_keeps_its_energy_for_long():
@@ -494,7 +588,12 @@ def test_a_bench_arm_keeps_its_energy_for_long():
     arm = bench_arm()
     q = fx.static(arm, tip_force=(0.0, 0.2))
     for method, rtol in (("explicit", 1e-10), ("implicit", 1e-8)):
-        assert fx.simulate(arm, np.linspace(0, 5, 6), q0=q, rtol=rtol, method=method).meta["energy_error"] < 100 * rtol
+        assert (
+            fx.simulate(arm, np.linspace(0, 5, 6), q0=q, rtol=rtol, method=method).meta[
+                "energy_error"
+            ]
+            < 100 * rtol
+        )
 
 
 def test_a_robot_that_hangs_still_stays_still():

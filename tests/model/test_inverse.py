@@ -1,4 +1,5 @@
-"""Inverse dynamics: benchmark B7 (the bench arm along a cycloid), exact identities, and replaying the drives."""
+"""Inverse dynamics: benchmark B7 (the bench arm along a cycloid), exact identities, and replaying
+the drives."""
 
 from __future__ import annotations
 
@@ -6,19 +7,31 @@ import numpy as np
 import pytest
 
 import flexura as fx
-from flexura.drive import JointDrive
 from flexura.signals import cycloid, harmonic, polynomial, step, table
+from flexura.signals.drive import JointDrive
 
-TORQUE_AT = {0.10: 0.043175, 0.25: 0.33398, 0.40: 0.61167, 0.50: 0.44220, 0.60: -0.09519, 0.75: -0.91220, 0.90: -0.77400,
-             1.25: 0.70646, 1.50: -0.81519}  # fmt: skip
+TORQUE_AT = {
+    0.10: 0.043175,
+    0.25: 0.33398,
+    0.40: 0.61167,
+    0.50: 0.44220,
+    0.60: -0.09519,
+    0.75: -0.91220,
+    0.90: -0.77400,
+    1.25: 0.70646,
+    1.50: -0.81519,
+}
 DEFLECTION_AT = {0.25: -0.068424, 0.50: -0.094305, 0.75: 0.190961, 1.00: 0.022690}
 
 
 def bench_arm(elements: int = 8, modes: int | None = None, **keys: object) -> fx.System:
     link = ({} if modes is None else {"modes": modes}) | {
-        "length_m": 0.6, "elements": elements, "mass_per_length_kg_m": 0.2355, "bending_stiffness_N_m2": 0.5,
+        "length_m": 0.6,
+        "elements": elements,
+        "mass_per_length_kg_m": 0.2355,
+        "bending_stiffness_N_m2": 0.5,
         "joint": {"type": "R", "hub_inertia_kg_m2": 2e-3},
-    }  # fmt: skip
+    }
     return fx.assemble(fx.Robot.from_dict({"link": [link], "payload": {"mass_kg": 0.05}, **keys}))
 
 
@@ -31,14 +44,31 @@ def cart_arm() -> fx.System:
         "joint": {"type": "Pa", "viscous_friction": 0.8, "rotor_inertia": 0.1},
     }
     first = {
-        "length_m": 0.4, "elements": 3, "mass_per_length_kg_m": 0.3, "bending_stiffness_N_m2": 4.0, "damping": {"beta_s": 1e-4},
+        "length_m": 0.4,
+        "elements": 3,
+        "mass_per_length_kg_m": 0.3,
+        "bending_stiffness_N_m2": 4.0,
+        "damping": {"beta_s": 1e-4},
         "joint": {"type": "R", "hub_inertia_kg_m2": 1e-3, "coulomb_friction": 0.02},
-    }  # fmt: skip
+    }
     second = {
-        "length_m": 0.3, "elements": 3, "mass_per_length_kg_m": 0.2, "bending_stiffness_N_m2": 1.0, "damping": {"beta_s": 1e-4},
-        "joint": {"type": "R", "hub_mass_kg": 0.1, "hub_inertia_kg_m2": 1e-4, "viscous_friction": 0.01},
-    }  # fmt: skip
-    data = {"gravity_m_s2": [0.0, -9.81], "link": [cart, first, second], "payload": {"mass_kg": 0.05, "inertia_kg_m2": 1e-5}}
+        "length_m": 0.3,
+        "elements": 3,
+        "mass_per_length_kg_m": 0.2,
+        "bending_stiffness_N_m2": 1.0,
+        "damping": {"beta_s": 1e-4},
+        "joint": {
+            "type": "R",
+            "hub_mass_kg": 0.1,
+            "hub_inertia_kg_m2": 1e-4,
+            "viscous_friction": 0.01,
+        },
+    }
+    data = {
+        "gravity_m_s2": [0.0, -9.81],
+        "link": [cart, first, second],
+        "payload": {"mass_kg": 0.05, "inertia_kg_m2": 1e-5},
+    }
     return fx.assemble(fx.Robot.from_dict(data))
 
 
@@ -57,16 +87,21 @@ def test_bench_arm_needs_the_torque_of_benchmark_b7(method: str) -> None:
     assert torque.max() == pytest.approx(0.84354, abs=1e-4)
     assert torque.min() == pytest.approx(-0.99543, abs=1e-4)
     stored = run["energy/kinetic"][-1] + run["energy/strain"][-1]
-    assert run["energy/work"][-1] == pytest.approx(stored, rel=1e-7)  # the hub is at rest: the work is in the link
+    assert run["energy/work"][-1] == pytest.approx(
+        stored, rel=1e-7
+    )  # the hub is at rest: the work is in the link
     assert stored == pytest.approx(0.127168, abs=1e-5)
     assert run.meta["energy_error"] < 1e-7
 
 
 @pytest.mark.slow
 def test_linear_kinematics_need_the_torque_of_the_dissertations_form() -> None:
-    """B7, last row: no stiffening, quadratic terms kept. The row has two to three digits of agreement between codes."""
+    """B7, last row: no stiffening, quadratic terms kept. The row has two to three digits of
+    agreement between codes."""
     t = np.linspace(0.0, 1.0, 1001)
-    torque = fx.inverse(bench_arm(modes=4, stiffening=False), t, cycloid(np.pi / 2, 1.0), rtol=1e-6)["joint/1/drive"]
+    torque = fx.inverse(
+        bench_arm(modes=4, stiffening=False), t, cycloid(np.pi / 2, 1.0), rtol=1e-6
+    )["joint/1/drive"]
     for at, value in {0.50: 0.4078, 0.60: 0.0216, 0.75: -0.8425, 0.90: -0.9733}.items():
         assert np.interp(at, t, torque) == pytest.approx(value, abs=0.01), at
 
@@ -89,15 +124,20 @@ def test_replayed_drives_return_the_motion() -> None:
     start = fx.simulate(system, [0.0], fx.Drive.prescribed(*MOTIONS)).states
     assert start is not None
     n = system.n
-    replay = fx.simulate(system, t, drives, q0=start[0, :n], qd0=start[0, n:], rtol=1e-10, method="explicit")
+    replay = fx.simulate(
+        system, t, drives, q0=start[0, :n], qd0=start[0, n:], rtol=1e-10, method="explicit"
+    )
     for i in (1, 2, 3):
         assert np.abs(replay[f"joint/{i}/position"] - run[f"joint/{i}/position"]).max() < 1e-6
 
 
 def test_drives_equal_the_joint_rows_of_the_equations_of_motion() -> None:
-    """tau = M qdd + bias + D qd + K q + gravity by Newton-Euler, accelerations by differences of the run's own velocities."""
+    """tau = M qdd + bias + D qd + K q + gravity by Newton-Euler, accelerations by differences of
+    the run's own velocities."""
     system, at, h = cart_arm(), 0.43, 1e-4
-    run = fx.inverse(system, np.array([0.0, at - h, at, at + h]), MOTIONS, rtol=1e-11, method="explicit")
+    run = fx.inverse(
+        system, np.array([0.0, at - h, at, at + h]), MOTIONS, rtol=1e-11, method="explicit"
+    )
     assert run.states is not None
     n = system.n
     qdd = (run.states[3, n:] - run.states[1, n:]) / (2 * h)
@@ -109,7 +149,13 @@ def test_drives_equal_the_joint_rows_of_the_equations_of_motion() -> None:
 
 def test_rigid_robot_needs_the_textbook_torque() -> None:
     """One rigid link under gravity: tau = J theta'' + m g c cos(theta)."""
-    link = {"length_m": 0.5, "mass_kg": 2.0, "centre_of_mass_m": 0.3, "inertia_kg_m2": 0.04, "joint": {"type": "R"}}
+    link = {
+        "length_m": 0.5,
+        "mass_kg": 2.0,
+        "centre_of_mass_m": 0.3,
+        "inertia_kg_m2": 0.04,
+        "joint": {"type": "R"},
+    }
     system = fx.assemble(fx.Robot.from_dict({"gravity_m_s2": [0.0, -9.81], "link": [link]}))
     t, motion = np.linspace(0.0, 1.0, 51), cycloid(1.2, 0.9)
     torque = fx.inverse(system, t, motion)["joint/1/drive"]
@@ -120,7 +166,11 @@ def test_rigid_robot_needs_the_textbook_torque() -> None:
 def test_one_joint_may_be_prescribed_and_another_driven() -> None:
     system = cart_arm()
     drive = fx.Drive(
-        (JointDrive(motion=MOTIONS[0], prescribed=True), JointDrive(motion=MOTIONS[1], kp=20.0, kd=0.5), JointDrive())
+        (
+            JointDrive(motion=MOTIONS[0], prescribed=True),
+            JointDrive(motion=MOTIONS[1], kp=20.0, kd=0.5),
+            JointDrive(),
+        )
     )
     run = fx.simulate(system, np.linspace(0, 0.5, 101), drive, rtol=1e-9, method="explicit")
     assert np.allclose(run["joint/1/position"], [MOTIONS[0](s)[0] for s in run.t], atol=1e-13)

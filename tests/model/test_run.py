@@ -13,9 +13,20 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import flexura as fx
-from flexura.run import Run
+from flexura.io.run import Run
 
-UNITS = {"s": "s", "m": "m", "rad": "rad", "m/s": "m_s", "rad/s": "rad_s", "N": "N", "N m": "N_m", "J": "J", "V": "V", "A": "A"}
+UNITS = {
+    "s": "s",
+    "m": "m",
+    "rad": "rad",
+    "m/s": "m_s",
+    "rad/s": "rad_s",
+    "N": "N",
+    "N m": "N_m",
+    "J": "J",
+    "V": "V",
+    "A": "A",
+}
 META = {
     "source": "simulation",
     "complete": True,
@@ -26,7 +37,12 @@ META = {
 
 def example():
     t = np.linspace(0, 1, 11)
-    channels = {"joint/1/position": np.sin(t), "joint/1/velocity": np.cos(t), "joint/1/drive": t**3, "energy/kinetic": t / 3}
+    channels = {
+        "joint/1/position": np.sin(t),
+        "joint/1/velocity": np.cos(t),
+        "joint/1/drive": t**3,
+        "energy/kinetic": t / 3,
+    }
     return Run(t, channels, dict(zip(channels, ("rad", "rad/s", "N m", "J"))), META)
 
 
@@ -37,7 +53,11 @@ def same_bits(a, b):
 def test_a_run_is_read_back_bit_for_bit(tmp_path):
     run = example()
     assert run.save(tmp_path / "new" / "folder") == tmp_path / "new" / "folder" / "run.parquet"
-    for place in (tmp_path / "new" / "folder", tmp_path / "new" / "folder" / "run.parquet", str(tmp_path / "new" / "folder")):
+    for place in (
+        tmp_path / "new" / "folder",
+        tmp_path / "new" / "folder" / "run.parquet",
+        str(tmp_path / "new" / "folder"),
+    ):
         again = Run.read(place)
         assert same_bits(again.t, run.t) and list(again) == list(run)
         assert all(same_bits(again[name], run[name]) for name in run)
@@ -48,7 +68,11 @@ bits = st.lists(st.integers(0, 2**64 - 1), min_size=0, max_size=40)
 
 
 @settings(max_examples=50, deadline=None, suppress_health_check=list(HealthCheck))
-@given(bits, st.text(alphabet=string.ascii_letters + "/_1", min_size=1, max_size=20), st.sampled_from(sorted(UNITS)))
+@given(
+    bits,
+    st.text(alphabet=string.ascii_letters + "/_1", min_size=1, max_size=20),
+    st.sampled_from(sorted(UNITS)),
+)
 def test_any_double_is_read_back_bit_for_bit_under_any_name(tmp_path_factory, patterns, name, unit):
     """Not-a-numbers with their payload, infinities, negative zeros, subnormal numbers."""
     values = np.array(patterns, dtype=np.uint64).view(np.float64)
@@ -64,12 +88,24 @@ def test_any_double_is_read_back_bit_for_bit_under_any_name(tmp_path_factory, pa
 def test_the_columns_are_named_by_channel_and_unit(tmp_path):
     table = pq.read_table(example().save(tmp_path))
     assert table.column_names == [
-        "time_s", "joint/1/position_rad", "joint/1/velocity_rad_s", "joint/1/drive_N_m", "energy/kinetic_J",
-    ]  # fmt: skip
+        "time_s",
+        "joint/1/position_rad",
+        "joint/1/velocity_rad_s",
+        "joint/1/drive_N_m",
+        "energy/kinetic_J",
+    ]
     assert all(field.type == pa.float64() for field in table.schema)
-    assert [field.metadata[b"unit"].decode() for field in table.schema] == ["s", "rad", "rad/s", "N m", "J"]
+    assert [field.metadata[b"unit"].decode() for field in table.schema] == [
+        "s",
+        "rad",
+        "rad/s",
+        "N m",
+        "J",
+    ]
     assert json.loads(table.schema.metadata[b"flexura"]) == META
-    np.testing.assert_array_equal(table["joint/1/position_rad"].to_numpy(), example()["joint/1/position"])
+    np.testing.assert_array_equal(
+        table["joint/1/position_rad"].to_numpy(), example()["joint/1/position"]
+    )
 
 
 @pytest.mark.parametrize("unit", UNITS)
@@ -111,7 +147,9 @@ def test_a_unit_for_every_channel_and_no_other(units):
 
 
 def test_a_channel_that_is_not_there_is_named_with_those_that_are():
-    with pytest.raises(KeyError, match="no channel 'joint/2/position'; there are: joint/1/position"):
+    with pytest.raises(
+        KeyError, match="no channel 'joint/2/position'; there are: joint/1/position"
+    ):
         example()["joint/2/position"]
     run = example()
     assert "joint/1/position" in run and "joint/2/position" not in run and len(run) == 11
@@ -139,7 +177,11 @@ def test_the_name_of_the_folder_is_no_data(tmp_path):
 def refused(place, words):
     with pytest.raises(fx.InputError) as caught:
         Run.read(place)
-    assert words in str(caught.value) and str(place) in str(caught.value) and str(caught.value).isprintable()
+    assert (
+        words in str(caught.value)
+        and str(place) in str(caught.value)
+        and str(caught.value).isprintable()
+    )
 
 
 def test_a_folder_without_a_run_is_named(tmp_path):
@@ -155,27 +197,55 @@ def column(*values, type=None):
 
 T, STORED = ("time_s", column(0, 1)), {"flexura": "{}"}
 OTHER_PARQUET = {
-    "another's Parquet": ([T, ("x_m", column(1, 2))], None, "m", "a Parquet file, but not a run of flexura"),
+    "another's Parquet": (
+        [T, ("x_m", column(1, 2))],
+        None,
+        "m",
+        "a Parquet file, but not a run of flexura",
+    ),
     "no times": ([("x_m", column(1, 2))], STORED, "m", "a Parquet file, but not a run of flexura"),
     "metadata that are no JSON": ([T], {"flexura": "{"}, "m", "a damaged run"),
     "metadata that are no text": ([T], {"flexura": b"\xff\xfe"}, "m", "a damaged run"),
     "metadata that are no table": ([T], {"flexura": "[1]"}, "m", "a damaged run"),
-    "a foreign unit": ([T, ("x_m", column(1, 2))], STORED, "furlong", "a damaged run (channel x_m has the unit 'furlong'"),
+    "a foreign unit": (
+        [T, ("x_m", column(1, 2))],
+        STORED,
+        "furlong",
+        "a damaged run (channel x_m has the unit 'furlong'",
+    ),
     "a unit that is no text": ([T, ("x_m", column(1, 2))], STORED, b"\xff", "a damaged run"),
     "texts": ([T, ("x_m", column("a", "b", type=pa.string()))], STORED, "m", "a damaged run"),
-    "lists": ([T, ("x_m", column([1.0], [2.0], type=pa.list_(pa.float64())))], STORED, "m", "a damaged run"),
-    "a column given twice": ([T, ("x_m", column(1, 2)), ("x_m", column(1, 2))], STORED, "m", "run.parquet: "),
+    "lists": (
+        [T, ("x_m", column([1.0], [2.0], type=pa.list_(pa.float64())))],
+        STORED,
+        "m",
+        "a damaged run",
+    ),
+    "a column given twice": (
+        [T, ("x_m", column(1, 2)), ("x_m", column(1, 2))],
+        STORED,
+        "m",
+        "run.parquet: ",
+    ),
 }
 
 
-@pytest.mark.parametrize("columns, metadata, unit, words", OTHER_PARQUET.values(), ids=OTHER_PARQUET)
+@pytest.mark.parametrize(
+    "columns, metadata, unit, words", OTHER_PARQUET.values(), ids=OTHER_PARQUET
+)
 def test_other_parquet_is_no_run(columns, metadata, unit, words, tmp_path):
-    schema = pa.schema([pa.field(name, v.type, metadata={"unit": unit}) for name, v in columns], metadata=metadata)
-    pq.write_table(pa.Table.from_arrays([v for _, v in columns], schema=schema), tmp_path / "run.parquet")
+    schema = pa.schema(
+        [pa.field(name, v.type, metadata={"unit": unit}) for name, v in columns], metadata=metadata
+    )
+    pq.write_table(
+        pa.Table.from_arrays([v for _, v in columns], schema=schema), tmp_path / "run.parquet"
+    )
     refused(tmp_path, words)
 
 
-@pytest.mark.parametrize("content", [b"", b"PAR1", b"PAR1PAR1", b"rubbish" * 100, b"\0" * 1000, b'name = "rig"\n'])
+@pytest.mark.parametrize(
+    "content", [b"", b"PAR1", b"PAR1PAR1", b"rubbish" * 100, b"\0" * 1000, b'name = "rig"\n']
+)
 def test_rubbish_is_no_run(content, tmp_path):
     (tmp_path / "run.parquet").write_bytes(content)
     refused(tmp_path, "not a Parquet file")
@@ -187,7 +257,9 @@ def test_a_damaged_file_never_raises_anything_else(tmp_path):
         raw = bytearray(good)
         for _ in range(rng.randint(1, 4)):
             raw[rng.randrange(len(raw))] = rng.randrange(256)
-        (tmp_path / "run.parquet").write_bytes(raw[: rng.randrange(len(raw))] if trial % 3 == 0 else raw)
+        (tmp_path / "run.parquet").write_bytes(
+            raw[: rng.randrange(len(raw))] if trial % 3 == 0 else raw
+        )
         try:
             Run.read(tmp_path)
         except fx.InputError as error:

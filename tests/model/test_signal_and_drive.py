@@ -1,4 +1,5 @@
-"""Signals against their formulas and against finite differences; drives against theirs; manoeuvre files."""
+"""Signals against their formulas and against finite differences; drives against theirs; manoeuvre
+files."""
 
 import importlib
 import json
@@ -14,8 +15,19 @@ from scipy.interpolate import CubicSpline
 
 import flexura as fx
 from flexura import signals
-from flexura.drive import Drive, JointDrive, load_manoeuvre
-from flexura.signals import bang_bang, constant, cycloid, from_spec, harmonic, piecewise, polynomial, step, table, trapezoidal
+from flexura.signals import (
+    bang_bang,
+    constant,
+    cycloid,
+    from_spec,
+    harmonic,
+    piecewise,
+    polynomial,
+    step,
+    table,
+    trapezoidal,
+)
+from flexura.signals.drive import Drive, JointDrive, load_manoeuvre
 from flexura.signals.shaping import matched_cycloid, zv, zvd
 
 level = st.floats(-10, 10)
@@ -26,7 +38,11 @@ duration = st.floats(0.2, 3)
 def points(least):
     """Ascending instants and as many values."""
     pairs = st.lists(st.tuples(st.floats(0.2, 1), level), min_size=least, max_size=6)
-    return st.builds(lambda start, rows: (start + np.cumsum([gap for gap, _ in rows]), [y for _, y in rows]), instant, pairs)
+    return st.builds(
+        lambda start, rows: (start + np.cumsum([gap for gap, _ in rows]), [y for _, y in rows]),
+        instant,
+        pairs,
+    )
 
 
 PLAIN = st.one_of(
@@ -34,7 +50,13 @@ PLAIN = st.one_of(
     st.builds(harmonic, level, st.floats(0, 2), st.floats(-4, 4), level),
     st.builds(cycloid, level, duration, level, instant),
     st.builds(polynomial, level, duration, level, instant),
-    st.builds(lambda a, T, part, at: bang_bang(a, T, part * T, at), level, duration, st.floats(0.1, 0.25), instant),
+    st.builds(
+        lambda a, T, part, at: bang_bang(a, T, part * T, at),
+        level,
+        duration,
+        st.floats(0.1, 0.25),
+        instant,
+    ),
     st.builds(
         lambda end, T, part, start, at: trapezoidal(end, T, part * T, start, at),
         level,
@@ -47,7 +69,11 @@ PLAIN = st.one_of(
     st.builds(lambda points: table(*points), points(2)),
 )
 SMOOTH = PLAIN | st.builds(
-    lambda shape, s, f, zeta: shape(s, f, zeta), st.sampled_from([zv, zvd]), PLAIN, st.floats(0.5, 5), st.floats(0, 0.5)
+    lambda shape, s, f, zeta: shape(s, f, zeta),
+    st.sampled_from([zv, zvd]),
+    PLAIN,
+    st.floats(0.5, 5),
+    st.floats(0, 0.5),
 )
 STEPPED = st.one_of(
     st.builds(step, level, instant),
@@ -67,7 +93,11 @@ def test_the_derivatives_are_those_of_the_values(s, t):
         return
     y, yd, ydd = s(t)
     before, after = s(t - h), s(t + h)
-    size = max(1.0, np.abs(s.segments[:, 1:8]).max(), np.abs(s.segments[:, 7] * s.segments[:, 8] ** 4).max())
+    size = max(
+        1.0,
+        np.abs(s.segments[:, 1:8]).max(),
+        np.abs(s.segments[:, 7] * s.segments[:, 8] ** 4).max(),
+    )
     assert yd == pytest.approx((after[0] - before[0]) / (2 * h), abs=1e-6 * size)
     assert ydd == pytest.approx((after[1] - before[1]) / (2 * h), abs=1e-5 * size)
     assert y == pytest.approx((after[0] + before[0]) / 2, abs=1e-6 * size)
@@ -103,7 +133,9 @@ def test_a_cycloid_equals_its_formula():
 def test_a_polynomial_equals_its_formula():
     u = np.linspace(0, 1, 50, endpoint=False)
     s = polynomial(3.0, 0.8, 1.0)
-    np.testing.assert_allclose([s(0.8 * x)[0] for x in u], 1 + 2 * (10 * u**3 - 15 * u**4 + 6 * u**5), rtol=1e-14)
+    np.testing.assert_allclose(
+        [s(0.8 * x)[0] for x in u], 1 + 2 * (10 * u**3 - 15 * u**4 + 6 * u**5), rtol=1e-14
+    )
 
 
 @settings(max_examples=100, deadline=None)
@@ -118,7 +150,8 @@ def test_a_harmonic_is_a_cosine(amplitude, f, phase, offset, t):
 
 
 def integral(s, end, order):
-    """The first or second integral of a signal from 0 to the end, exact for its polynomials: Gauss-Legendre on each piece."""
+    """The first or second integral of a signal from 0 to the end, exact for its polynomials:
+    Gauss-Legendre on each piece."""
     places = np.unique(np.clip([0.0, *s.breaks, end], 0.0, end))
     x, w = np.polynomial.legendre.leggauss(6)
     total = 0.0
@@ -132,7 +165,8 @@ def integral(s, end, order):
 @settings(max_examples=100, deadline=None)
 @given(st.floats(0.1, 10), duration, st.just(0.0) | st.floats(1e-3, 0.25), instant)
 def test_bang_bang_ends_at_rest(a, T, part, at):
-    """Its area is zero; a unit mass that it pushes has gone A (T - r)^2/4: rises, r, smooth a profile that much shorter."""
+    """Its area is zero; a unit mass that it pushes has gone A (T - r)^2/4: rises, r, smooth a
+    profile that much shorter."""
     s = bang_bang(a, T, part * T, at)
     assert integral(s, at + T + 1, 1) == pytest.approx(0, abs=1e-12 * a * T)
     assert integral(s, at + T + 1, 2) == pytest.approx(a * T**2 * (1 - part) ** 2 / 4, rel=1e-9)
@@ -192,58 +226,172 @@ WRONG_SIGNALS = {
     "an unknown kind": ({"kind": "sine"}, "signal.kind", "sine", f"one of {KINDS}"),
     "a kind that is a list": ({"kind": ["step"]}, "signal.kind", ["step"], "one of"),
     "a kind that is a table": ({"kind": {"a": 1}}, "signal.kind", {"a": 1}, "one of"),
-    "an unknown key": ({"kind": "constant", "value": 1, "at_s": 1}, "signal.at_s", 1, "unknown key; known for constant: value"),
-    "a missing key": ({"kind": "cycloid", "end": 1}, "signal.duration_s", None, "missing: expected a finite number"),
+    "an unknown key": (
+        {"kind": "constant", "value": 1, "at_s": 1},
+        "signal.at_s",
+        1,
+        "unknown key; known for constant: value",
+    ),
+    "a missing key": (
+        {"kind": "cycloid", "end": 1},
+        "signal.duration_s",
+        None,
+        "missing: expected a finite number",
+    ),
     "a text": ({"kind": "constant", "value": "1"}, "signal.value", "1", "a finite number"),
     "a truth value": ({"kind": "constant", "value": True}, "signal.value", True, "a finite number"),
     "not a number": ({"kind": "constant", "value": nan}, "signal.value", nan, "a finite number"),
     "infinity": ({"kind": "step", "value": inf}, "signal.value", inf, "a finite number"),
-    "a whole number beyond all": ({"kind": "step", "value": 10**400}, "signal.value", 10**400, "a finite number"),
-    "a list for a number": ({"kind": "constant", "value": [1, 2]}, "signal.value", [1, 2], "a finite number"),
-    "a table for a number": ({"kind": "constant", "value": {"a": 1}}, "signal.value", {"a": 1}, "a finite number"),
-    "a number for a list": ({"kind": "table", "t_s": 1, "y": [1]}, "signal.t_s", 1, "a list of finite numbers"),
-    "a list with a text": ({"kind": "table", "t_s": [0, 1], "y": [1, "2"]}, "signal.y", [1, "2"], "a list of finite numbers"),
-    "a table of one point": ({"kind": "table", "t_s": [0], "y": [1]}, "signal.t_s", [0.0], "at least two ascending times"),
-    "times that go back": ({"kind": "table", "t_s": [0, 2, 1], "y": [1, 2, 3]}, "signal.t_s", [0.0, 2.0, 1.0], "ascending"),
-    "times given twice": ({"kind": "table", "t_s": [0, 1, 1], "y": [1, 2, 3]}, "signal.t_s", [0.0, 1.0, 1.0], "ascending"),
-    "too few values": ({"kind": "table", "t_s": [0, 1], "y": [1]}, "signal.t_s", [0.0, 1.0], "as many values"),
-    "no instants": ({"kind": "piecewise", "at_s": [], "value": []}, "signal.at_s", [], "at least one"),
-    "instants that go back": ({"kind": "piecewise", "at_s": [1, 0], "value": [1, 2]}, "signal.at_s", [1.0, 0.0], "ascending"),
-    "no duration": ({"kind": "cycloid", "end": 1, "duration_s": 0}, "signal.duration_s", 0, "above 0 in seconds"),
-    "a negative duration": ({"kind": "polynomial", "end": 1, "duration_s": -1}, "signal.duration_s", -1, "above 0 in seconds"),
+    "a whole number beyond all": (
+        {"kind": "step", "value": 10**400},
+        "signal.value",
+        10**400,
+        "a finite number",
+    ),
+    "a list for a number": (
+        {"kind": "constant", "value": [1, 2]},
+        "signal.value",
+        [1, 2],
+        "a finite number",
+    ),
+    "a table for a number": (
+        {"kind": "constant", "value": {"a": 1}},
+        "signal.value",
+        {"a": 1},
+        "a finite number",
+    ),
+    "a number for a list": (
+        {"kind": "table", "t_s": 1, "y": [1]},
+        "signal.t_s",
+        1,
+        "a list of finite numbers",
+    ),
+    "a list with a text": (
+        {"kind": "table", "t_s": [0, 1], "y": [1, "2"]},
+        "signal.y",
+        [1, "2"],
+        "a list of finite numbers",
+    ),
+    "a table of one point": (
+        {"kind": "table", "t_s": [0], "y": [1]},
+        "signal.t_s",
+        [0.0],
+        "at least two ascending times",
+    ),
+    "times that go back": (
+        {"kind": "table", "t_s": [0, 2, 1], "y": [1, 2, 3]},
+        "signal.t_s",
+        [0.0, 2.0, 1.0],
+        "ascending",
+    ),
+    "times given twice": (
+        {"kind": "table", "t_s": [0, 1, 1], "y": [1, 2, 3]},
+        "signal.t_s",
+        [0.0, 1.0, 1.0],
+        "ascending",
+    ),
+    "too few values": (
+        {"kind": "table", "t_s": [0, 1], "y": [1]},
+        "signal.t_s",
+        [0.0, 1.0],
+        "as many values",
+    ),
+    "no instants": (
+        {"kind": "piecewise", "at_s": [], "value": []},
+        "signal.at_s",
+        [],
+        "at least one",
+    ),
+    "instants that go back": (
+        {"kind": "piecewise", "at_s": [1, 0], "value": [1, 2]},
+        "signal.at_s",
+        [1.0, 0.0],
+        "ascending",
+    ),
+    "no duration": (
+        {"kind": "cycloid", "end": 1, "duration_s": 0},
+        "signal.duration_s",
+        0,
+        "above 0 in seconds",
+    ),
+    "a negative duration": (
+        {"kind": "polynomial", "end": 1, "duration_s": -1},
+        "signal.duration_s",
+        -1,
+        "above 0 in seconds",
+    ),
     "a rise beyond a quarter": (
-        {"kind": "bang_bang", "amplitude": 1, "duration_s": 1, "rise_s": 0.3}, "signal.rise_s", 0.3, "between 0 and a quarter",
+        {"kind": "bang_bang", "amplitude": 1, "duration_s": 1, "rise_s": 0.3},
+        "signal.rise_s",
+        0.3,
+        "between 0 and a quarter",
     ),
     "a negative rise": (
-        {"kind": "bang_bang", "amplitude": 1, "duration_s": 1, "rise_s": -0.1}, "signal.rise_s", -0.1, "between 0 and a quarter",
+        {"kind": "bang_bang", "amplitude": 1, "duration_s": 1, "rise_s": -0.1},
+        "signal.rise_s",
+        -0.1,
+        "between 0 and a quarter",
     ),
     "a duration too short to differentiate": (
-        {"kind": "polynomial", "end": 1, "duration_s": 1e-200}, "signal.duration_s", 1e-200, "leaves the derivatives finite",
+        {"kind": "polynomial", "end": 1, "duration_s": 1e-200},
+        "signal.duration_s",
+        1e-200,
+        "leaves the derivatives finite",
     ),
     "a duration too long to cube": (
-        {"kind": "polynomial", "end": 1, "duration_s": 1e200}, "signal.duration_s", 1e200, "leaves the derivatives finite",
+        {"kind": "polynomial", "end": 1, "duration_s": 1e200},
+        "signal.duration_s",
+        1e200,
+        "leaves the derivatives finite",
     ),
-    "a rise beyond half": ({"kind": "trapezoidal", "end": 1, "duration_s": 1, "rise_s": 1}, "signal.rise_s", 1, "at most half"),
-    "a number for a signal": ({"kind": "zv", "signal": 1, "frequency_Hz": 1}, "signal.signal", 1, "a table of a signal"),
+    "a rise beyond half": (
+        {"kind": "trapezoidal", "end": 1, "duration_s": 1, "rise_s": 1},
+        "signal.rise_s",
+        1,
+        "at most half",
+    ),
+    "a number for a signal": (
+        {"kind": "zv", "signal": 1, "frequency_Hz": 1},
+        "signal.signal",
+        1,
+        "a table of a signal",
+    ),
     "half a period": (
-        {"kind": "matched_cycloid", "end": 1, "frequency_Hz": 1, "periods": 2.5}, "signal.periods", 2.5, "a whole number",
+        {"kind": "matched_cycloid", "end": 1, "frequency_Hz": 1, "periods": 2.5},
+        "signal.periods",
+        2.5,
+        "a whole number",
     ),
-    "a rise too steep": ({"kind": "cycloid", "end": 1e300, "duration_s": 1e-300}, "signal.kind", "cycloid", "are finite"),
+    "a rise too steep": (
+        {"kind": "cycloid", "end": 1e300, "duration_s": 1e-300},
+        "signal.kind",
+        "cycloid",
+        "are finite",
+    ),
     "points too far apart": (
-        {"kind": "table", "t_s": [0, 1e-200, 1], "y": [0, 1e300, -1e300]}, "signal.kind", "table", "derivatives are finite",
+        {"kind": "table", "t_s": [0, 1e-200, 1], "y": [0, 1e300, -1e300]},
+        "signal.kind",
+        "table",
+        "derivatives are finite",
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("spec, key, value, words", WRONG_SIGNALS.values(), ids=WRONG_SIGNALS)
 def test_a_wrong_signal_is_named(spec, key, value, words):
     with pytest.raises(fx.InputError) as caught:
         from_spec(spec)
-    assert (caught.value.key, repr(caught.value.value)) == (key, repr(value)) and words in caught.value.expected
+    assert (caught.value.key, repr(caught.value.value)) == (
+        key,
+        repr(value),
+    ) and words in caught.value.expected
     assert str(caught.value).isprintable()
 
 
-KEYS = "kind value at_s end duration_s start rise_s amplitude t_s y signal frequency_Hz periods damping_ratio".split()
+KEYS = (
+    "kind value at_s end duration_s start rise_s amplitude t_s y signal frequency_Hz periods "
+    "damping_ratio"
+).split()
 scalars = st.one_of(st.floats(), st.integers(), st.booleans(), st.text(max_size=3), st.none())
 
 
@@ -251,10 +399,12 @@ scalars = st.one_of(st.floats(), st.integers(), st.booleans(), st.text(max_size=
 @given(
     st.dictionaries(
         st.sampled_from(KEYS),
-        scalars | st.lists(scalars, max_size=3) | st.sampled_from([1.0, 0.1, {"kind": "constant", "value": 1.0}]),
+        scalars
+        | st.lists(scalars, max_size=3)
+        | st.sampled_from([1.0, 0.1, {"kind": "constant", "value": 1.0}]),
     ),
     st.sampled_from(sorted(signals.signal.KINDS | signals.shaping.KINDS)),
-)  # fmt: skip
+)
 def test_any_table_is_a_signal_or_refused(spec, kind):
     for tried in (spec, spec | {"kind": kind}):
         try:
@@ -271,7 +421,14 @@ def test_any_table_is_a_signal_or_refused(spec, kind):
 def test_a_drive_is_its_formula():
     """tau = f(t) + kp (r - eta) + kd (dr/dt - d eta/dt)."""
     f, r = harmonic(2.0, 1.5, 0.3), polynomial(1.0, 0.7, 0.2)
-    drive = Drive((JointDrive(f, r, 30.0, 4.0), JointDrive(force=f), JointDrive(motion=r, kp=7.0), JointDrive()))
+    drive = Drive(
+        (
+            JointDrive(f, r, 30.0, 4.0),
+            JointDrive(force=f),
+            JointDrive(motion=r, kp=7.0),
+            JointDrive(),
+        )
+    )
     eta, speed, t = np.array([0.1, 0.2, 0.3, 0.4]), np.array([1.0, 2.0, 3.0, 4.0]), 0.4
     expected = [
         f(t)[0] + 30 * (r(t)[0] - 0.1) + 4 * (r(t)[1] - 1.0),
@@ -282,11 +439,19 @@ def test_a_drive_is_its_formula():
     np.testing.assert_allclose(drive(t, eta, speed), expected, rtol=1e-15)
     assert not Drive.none(3)(t, eta, speed).any()
     np.testing.assert_array_equal(Drive.force(f, None)(t, eta, speed), [f(t)[0], 0.0])
-    np.testing.assert_allclose(Drive.pd([r], [7.0], [0.5])(t, eta, speed), [7 * (r(t)[0] - 0.1) + 0.5 * (r(t)[1] - 1.0)])
+    np.testing.assert_allclose(
+        Drive.pd([r], [7.0], [0.5])(t, eta, speed), [7 * (r(t)[0] - 0.1) + 0.5 * (r(t)[1] - 1.0)]
+    )
 
 
 def test_the_breaks_of_a_drive_are_sorted_and_each_there_once():
-    drive = Drive((JointDrive(bang_bang(1.0, 1.0)), JointDrive(step(1.0, 0.3), cycloid(1.0, 0.7)), JointDrive()))
+    drive = Drive(
+        (
+            JointDrive(bang_bang(1.0, 1.0)),
+            JointDrive(step(1.0, 0.3), cycloid(1.0, 0.7)),
+            JointDrive(),
+        )
+    )
     assert drive.breaks.tolist() == [-1e300, 0.0, 0.3, 0.5, 0.7, 1.0]
     assert Drive.none(2).breaks.shape == (0,)
 
@@ -296,13 +461,21 @@ def test_gains_and_motions_come_in_equal_numbers():
         Drive.pd([constant(1.0)], [1.0, 2.0], [1.0])
 
 
-joint_drives = st.builds(JointDrive, st.none() | SIGNALS, st.none() | SIGNALS, st.floats(0, 100), st.floats(0, 100))
+joint_drives = st.builds(
+    JointDrive, st.none() | SIGNALS, st.none() | SIGNALS, st.floats(0, 100), st.floats(0, 100)
+)
 
 
 @pytest.fixture(scope="module")
 def system():
     """Three joints with elastic unknowns between them: the joints' rows aren't 0, 1, 2."""
-    link = {"length_m": 0.3, "elements": 1, "mass_per_length_kg_m": 0.1, "bending_stiffness_N_m2": 1.0, "joint": {"type": "R"}}
+    link = {
+        "length_m": 0.3,
+        "elements": 1,
+        "mass_per_length_kg_m": 0.1,
+        "bending_stiffness_N_m2": 1.0,
+        "joint": {"type": "R"},
+    }
     return fx.assemble(fx.Robot.from_dict({"link": [link] * 3}))
 
 
@@ -327,7 +500,11 @@ def test_the_core_evaluates_a_packed_drive_alike(system):
 @given(st.lists(joint_drives, min_size=1, max_size=4))
 def test_a_packed_drive_holds_every_segment_once_and_says_where(joints):
     segments, ranges, gains = Drive(tuple(joints)).packed()
-    assert segments.flags.c_contiguous and ranges.shape == (len(joints), 4) and gains.shape == (len(joints), 2)
+    assert (
+        segments.flags.c_contiguous
+        and ranges.shape == (len(joints), 4)
+        and gains.shape == (len(joints), 2)
+    )
     count = 0
     for joint, (f0, f1, r0, r1), (kp, kd) in zip(joints, ranges, gains):
         for s, first, last in ((joint.force, f0, f1), (joint.motion, r0, r1)):
@@ -359,12 +536,22 @@ def test_a_manoeuvre_is_read(tmp_path):
     path = tmp_path / "manoeuvre.toml"
     path.write_text(GOOD)
     manoeuvre = load_manoeuvre(path, 2)
-    assert (manoeuvre.name, manoeuvre.duration_s, manoeuvre.output_step_s) == ("back and forth", 2.0, 0.01)
+    assert (manoeuvre.name, manoeuvre.duration_s, manoeuvre.output_step_s) == (
+        "back and forth",
+        2.0,
+        0.01,
+    )
     assert len(manoeuvre.t) == 201 and manoeuvre.t[0] == 0.0 and manoeuvre.t[-1] == 2.0
     assert manoeuvre.drive.joints[1].kp == 6.0 and manoeuvre.drive.joints[0].motion is None
     assert manoeuvre.drive.breaks.tolist() == [0.0, 0.5, 1.0]
     again = json.loads(json.dumps(manoeuvre.spec()))
-    assert again["joint"][1]["motion"] == {"kind": "cycloid", "end": 1.0, "duration_s": 0.5, "start": 0.0, "at_s": 0.0}
+    assert again["joint"][1]["motion"] == {
+        "kind": "cycloid",
+        "end": 1.0,
+        "duration_s": 0.5,
+        "start": 0.0,
+        "at_s": 0.0,
+    }
     assert again["joint"][0] == {"force": manoeuvre.drive.joints[0].force.spec}
 
 
@@ -387,48 +574,178 @@ def test_the_output_step_is_a_200th_of_the_duration_unless_given(tmp_path):
 F = 'force = { kind = "bang_bang", amplitude = 1.0, duration_s = 1.0 }'
 M = 'motion = { kind = "cycloid", end = 1.0, duration_s = 0.5 }'
 WRONG_MANOEUVRES = {
-    "no duration": ("duration_s = 2.0\n", "", "duration_s: missing: expected a duration above 0 in seconds"),
-    "a duration of 0": ("duration_s = 2.0", "duration_s = 0.0", "duration_s = 0.0: expected a duration above 0"),
-    "a negative duration": ("duration_s = 2.0", "duration_s = -2", "duration_s = -2: expected a duration above 0"),
-    "an endless duration": ("duration_s = 2.0", "duration_s = inf", "duration_s = inf: expected a duration above 0"),
-    "a duration that is no number": ("duration_s = 2.0", "duration_s = nan", "duration_s = nan: expected a duration above 0"),
-    "a duration as text": ("duration_s = 2.0", 'duration_s = "2"', "duration_s = '2': expected a duration above 0"),
-    "a duration as a truth value": ("duration_s = 2.0", "duration_s = true", "duration_s = True: expected a duration above 0"),
-    "a duration as a list": ("duration_s = 2.0", "duration_s = [2]", "duration_s = [2]: expected a duration above 0"),
-    "a duration beyond all numbers": ("duration_s = 2.0", f"duration_s = {10**400}", "duration_s = 1000"),
-    "a step longer than the duration": ("output_step_s = 0.01", "output_step_s = 3.0", "= 3.0: expected at most the duration"),
-    "a step of 0": ("output_step_s = 0.01", "output_step_s = 0", "output_step_s = 0: expected a time above 0"),
-    "a step too short": ("output_step_s = 0.01", "output_step_s = 1e-9", "_s = 1e-09: expected at most 10 million"),
-    "an unknown key": ("name =", "title =", "title = 'back and forth': an unknown key; known here: name, duration_s"),
+    "no duration": (
+        "duration_s = 2.0\n",
+        "",
+        "duration_s: missing: expected a duration above 0 in seconds",
+    ),
+    "a duration of 0": (
+        "duration_s = 2.0",
+        "duration_s = 0.0",
+        "duration_s = 0.0: expected a duration above 0",
+    ),
+    "a negative duration": (
+        "duration_s = 2.0",
+        "duration_s = -2",
+        "duration_s = -2: expected a duration above 0",
+    ),
+    "an endless duration": (
+        "duration_s = 2.0",
+        "duration_s = inf",
+        "duration_s = inf: expected a duration above 0",
+    ),
+    "a duration that is no number": (
+        "duration_s = 2.0",
+        "duration_s = nan",
+        "duration_s = nan: expected a duration above 0",
+    ),
+    "a duration as text": (
+        "duration_s = 2.0",
+        'duration_s = "2"',
+        "duration_s = '2': expected a duration above 0",
+    ),
+    "a duration as a truth value": (
+        "duration_s = 2.0",
+        "duration_s = true",
+        "duration_s = True: expected a duration above 0",
+    ),
+    "a duration as a list": (
+        "duration_s = 2.0",
+        "duration_s = [2]",
+        "duration_s = [2]: expected a duration above 0",
+    ),
+    "a duration beyond all numbers": (
+        "duration_s = 2.0",
+        f"duration_s = {10**400}",
+        "duration_s = 1000",
+    ),
+    "a step longer than the duration": (
+        "output_step_s = 0.01",
+        "output_step_s = 3.0",
+        "= 3.0: expected at most the duration",
+    ),
+    "a step of 0": (
+        "output_step_s = 0.01",
+        "output_step_s = 0",
+        "output_step_s = 0: expected a time above 0",
+    ),
+    "a step too short": (
+        "output_step_s = 0.01",
+        "output_step_s = 1e-9",
+        "_s = 1e-09: expected at most 10 million",
+    ),
+    "an unknown key": (
+        "name =",
+        "title =",
+        "title = 'back and forth': an unknown key; known here: name, duration_s",
+    ),
     "a number as name": ('name = "back and forth"', "name = 5", "name = 5: expected a text"),
     "a joint too few": ("[[joint]]\n" + F, "", "joint = 1: expected 2 tables [[joint]]"),
-    "a joint too many": ("[[joint]]\n" + F, "[[joint]]\n[[joint]]\n", "joint = 3: expected 2 tables [[joint]]"),
-    "no joints": (GOOD[GOOD.index("[[joint]]") :], "", "joint = 0: expected 2 tables [[joint]]"),
-    "joints as a number": (GOOD[GOOD.index("[[joint]]") :], "joint = 2", "joint = 2: expected 2 tables [[joint]]"),
-    "joints as numbers": (GOOD[GOOD.index("[[joint]]") :], "joint = [1, 2]", "joint[1] = 1: expected a table"),
-    "joints as one table": (GOOD[GOOD.index("[[joint]]") :], "[joint]\nkp = 1.0", "expected 2 tables [[joint]]"),
-    "an unknown key of a joint": ("kd = 0.25", "ki = 0.25", "joint[2].ki = 0.25: an unknown key; known here: force, motion"),
-    "a gain where the motion is prescribed": ("kd = 0.25", "prescribed = true", "joint[2].kp = 6.0: expected none: a prescribed"),
-    "prescribed by a number": ("kp = 6.0\nkd = 0.25", "prescribed = 1", "joint[2].prescribed = 1: expected true or false"),
-    "prescribed without a motion": (M + "\nkp = 6.0\nkd = 0.25", "prescribed = true", "joint[2].motion: missing: a prescribed"),
-    "prescribed with a jump": (
-        M + "\nkp = 6.0\nkd = 0.25", 'prescribed = true\nmotion = { kind = "step", value = 1.0, at_s = 0.5 }', "jump",
+    "a joint too many": (
+        "[[joint]]\n" + F,
+        "[[joint]]\n[[joint]]\n",
+        "joint = 3: expected 2 tables [[joint]]",
     ),
-    "a negative gain": ("kp = 6.0", "kp = -6.0", "joint[2].kp = -6.0: expected a gain of 0 or more"),
-    "a gain as text": ("kd = 0.25", 'kd = "0.25"', "joint[2].kd = '0.25': expected a gain of 0 or more"),
+    "no joints": (GOOD[GOOD.index("[[joint]]") :], "", "joint = 0: expected 2 tables [[joint]]"),
+    "joints as a number": (
+        GOOD[GOOD.index("[[joint]]") :],
+        "joint = 2",
+        "joint = 2: expected 2 tables [[joint]]",
+    ),
+    "joints as numbers": (
+        GOOD[GOOD.index("[[joint]]") :],
+        "joint = [1, 2]",
+        "joint[1] = 1: expected a table",
+    ),
+    "joints as one table": (
+        GOOD[GOOD.index("[[joint]]") :],
+        "[joint]\nkp = 1.0",
+        "expected 2 tables [[joint]]",
+    ),
+    "an unknown key of a joint": (
+        "kd = 0.25",
+        "ki = 0.25",
+        "joint[2].ki = 0.25: an unknown key; known here: force, motion",
+    ),
+    "a gain where the motion is prescribed": (
+        "kd = 0.25",
+        "prescribed = true",
+        "joint[2].kp = 6.0: expected none: a prescribed",
+    ),
+    "prescribed by a number": (
+        "kp = 6.0\nkd = 0.25",
+        "prescribed = 1",
+        "joint[2].prescribed = 1: expected true or false",
+    ),
+    "prescribed without a motion": (
+        M + "\nkp = 6.0\nkd = 0.25",
+        "prescribed = true",
+        "joint[2].motion: missing: a prescribed",
+    ),
+    "prescribed with a jump": (
+        M + "\nkp = 6.0\nkd = 0.25",
+        'prescribed = true\nmotion = { kind = "step", value = 1.0, at_s = 0.5 }',
+        "jump",
+    ),
+    "a negative gain": (
+        "kp = 6.0",
+        "kp = -6.0",
+        "joint[2].kp = -6.0: expected a gain of 0 or more",
+    ),
+    "a gain as text": (
+        "kd = 0.25",
+        'kd = "0.25"',
+        "joint[2].kd = '0.25': expected a gain of 0 or more",
+    ),
     "an endless gain": ("kd = 0.25", "kd = inf", "joint[2].kd = inf: expected a gain of 0 or more"),
-    "gains without a motion": (M, "", "joint[2].motion: missing: gains kp and kd need a motion to follow"),
+    "gains without a motion": (
+        M,
+        "",
+        "joint[2].motion: missing: gains kp and kd need a motion to follow",
+    ),
     "a force as a number": (F, "force = 1.0", "joint[1].force = 1.0: expected a table with kind"),
-    "a force without a kind": (F, "force = { value = 1.0 }", "joint[1].force.kind: missing: expected one of constant"),
-    "an unknown kind": ('"cycloid"', '"cyclode"', "joint[2].motion.kind = 'cyclode': expected one of constant"),
-    "an unknown key of a signal": ("end = 1.0", "to = 1.0", "joint[2].motion.to = 1.0: an unknown key; known for cycloid: end"),
-    "a key of a signal missing": ("end = 1.0, ", "", "joint[2].motion.end: missing: expected a finite number"),
-    "a signal's duration of 0": ("duration_s = 0.5", "duration_s = 0", "joint[2].motion.duration_s = 0: expected a duration"),
-    "a signal's number as text": ("amplitude = 1.0", 'amplitude = "1"', "joint[1].force.amplitude = '1': expected a finite"),
-    "a signal's list for a number": ("amplitude = 1.0", "amplitude = [1]", "joint[1].force.amplitude = [1]: expected a finite"),
+    "a force without a kind": (
+        F,
+        "force = { value = 1.0 }",
+        "joint[1].force.kind: missing: expected one of constant",
+    ),
+    "an unknown kind": (
+        '"cycloid"',
+        '"cyclode"',
+        "joint[2].motion.kind = 'cyclode': expected one of constant",
+    ),
+    "an unknown key of a signal": (
+        "end = 1.0",
+        "to = 1.0",
+        "joint[2].motion.to = 1.0: an unknown key; known for cycloid: end",
+    ),
+    "a key of a signal missing": (
+        "end = 1.0, ",
+        "",
+        "joint[2].motion.end: missing: expected a finite number",
+    ),
+    "a signal's duration of 0": (
+        "duration_s = 0.5",
+        "duration_s = 0",
+        "joint[2].motion.duration_s = 0: expected a duration",
+    ),
+    "a signal's number as text": (
+        "amplitude = 1.0",
+        'amplitude = "1"',
+        "joint[1].force.amplitude = '1': expected a finite",
+    ),
+    "a signal's list for a number": (
+        "amplitude = 1.0",
+        "amplitude = [1]",
+        "joint[1].force.amplitude = [1]: expected a finite",
+    ),
     "no TOML": ("[[joint]]\n" + F, "[[joint", "not valid TOML"),
-    "a date for a number": ("end = 1.0", "end = 1979-05-27", "joint[2].motion.end = datetime.date(1979, 5, 27): "),
-}  # fmt: skip
+    "a date for a number": (
+        "end = 1.0",
+        "end = 1979-05-27",
+        "joint[2].motion.end = datetime.date(1979, 5, 27): ",
+    ),
+}
 
 
 @pytest.mark.parametrize("old, new, words", WRONG_MANOEUVRES.values(), ids=WRONG_MANOEUVRES)
@@ -450,7 +767,13 @@ def test_a_manoeuvre_that_is_no_file_is_named(tmp_path):
 
 
 @settings(max_examples=150, deadline=None)
-@given(st.lists(st.tuples(st.integers(0, len(GOOD)), st.integers(0, 12), st.binary(max_size=4)), min_size=1, max_size=3))
+@given(
+    st.lists(
+        st.tuples(st.integers(0, len(GOOD)), st.integers(0, 12), st.binary(max_size=4)),
+        min_size=1,
+        max_size=3,
+    )
+)
 def test_bytes_changed_anywhere_never_raise_anything_else(tmp_path_factory, edits):
     raw = GOOD.encode()
     for place, length, new in edits:

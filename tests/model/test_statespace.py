@@ -1,4 +1,5 @@
-"""The linearised robot: against the nonlinear one, against natural frequencies, and its zeros against those of a beam."""
+"""The linearised robot: against the nonlinear one, against natural frequencies, and its zeros
+against those of a beam."""
 
 from __future__ import annotations
 
@@ -10,7 +11,19 @@ from scipy.optimize import brentq
 
 import flexura as fx
 from flexura.signals import constant
-from robots import beam, bench_arm, fast, few, rigid, robots, seeds, state, system, turning, two_link_arm
+from robots import (
+    beam,
+    bench_arm,
+    fast,
+    few,
+    rigid,
+    robots,
+    seeds,
+    state,
+    system,
+    turning,
+    two_link_arm,
+)
 
 SAGGING = {"gravity": (0.0, -9.81), "payload": 0.1}
 
@@ -24,13 +37,14 @@ def elbow(**keys) -> fx.System:
     return fx.assemble(two_link_arm(2).replace({"link.2.joint.start": 1.0} | keys))
 
 
-# Against the nonlinear robot ----------------------------------------------------------------------------------------------
+# Against the nonlinear robot
 
 
 @fast
 @given(robots(max_links=3), seeds)
 def test_the_matrices_are_the_tangents_of_the_forces(robot, seed):
-    """forces(q + e dq, e dqd, e dqdd) = hold + e (M dqdd + G dqd + K dq) + O(e^2): half of e leaves a quarter of the rest."""
+    """forces(q + e dq, e dqd, e dqdd) = hold + e (M dqdd + G dqd + K dq) + O(e^2): half of e leaves
+    a quarter of the rest."""
     sys = fx.assemble(robot)
     try:
         lin = fx.linearize(sys)
@@ -44,7 +58,10 @@ def test_the_matrices_are_the_tangents_of_the_forces(robot, seed):
     change = lin.M @ dqdd[rows] + lin.G @ dqd[rows] + lin.K @ dq[rows]
     rest = []
     for e in (1e-2, 5e-3, 0.0):
-        found = sys.forces(lin.q + e * dq, e * dqd, e * dqdd)[rows] - sys.forces(lin.q, 0 * dq, 0 * dq)[rows]
+        found = (
+            sys.forces(lin.q + e * dq, e * dqd, e * dqdd)[rows]
+            - sys.forces(lin.q, 0 * dq, 0 * dq)[rows]
+        )
         rest.append(np.linalg.norm((found - e * change) / size_of))
     size = np.linalg.norm(change / size_of)
     assert rest[0] < 0.05 * size and rest[1] < 0.3 * rest[0] + 1e-7 * size and rest[2] == 0
@@ -52,7 +69,8 @@ def test_the_matrices_are_the_tangents_of_the_forces(robot, seed):
 
 @pytest.mark.parametrize("gravity", [False, True])
 def test_a_step_of_the_linear_model_is_a_small_motion_of_the_robot(gravity):
-    """Drives a little off those that hold it, two links, damped: what differs falls with the square of the step."""
+    """Drives a little off those that hold it, two links, damped: what differs falls with the square
+    of the step."""
     keys = {"gravity_m_s2": [0.0, -1.0], "link.1.joint.start": 0.3} if gravity else {}
     sys = elbow(**keys, **{"link.1.damping": {"beta_s": 1e-3}, "link.2.damping": {"beta_s": 1e-3}})
     lin = fx.linearize(sys)
@@ -71,7 +89,8 @@ def test_a_step_of_the_linear_model_is_a_small_motion_of_the_robot(gravity):
 
 
 def test_a_disturbed_rotation_is_that_of_the_linear_model():
-    """An elbow that turns at 1 rad/s, its second joint held by a constant torque, let go a little off its steady shape."""
+    """An elbow that turns at 1 rad/s, its second joint held by a constant torque, let go a little
+    off its steady shape."""
     sys = elbow()
     qd = np.zeros(sys.n)
     qd[0] = 1.0
@@ -81,16 +100,20 @@ def test_a_disturbed_rotation_is_that_of_the_linear_model():
     x0[0], x0[sys.joint_rows[1]] = 1e-3, -2e-3
     t = np.linspace(0.0, 0.5, 11)
     names = ("joint/2/position", "link/1/tip_deflection", "link/2/tip_deflection")
-    wanted = np.array([lin.C[[lin.outputs.index(n) for n in names]] @ expm(lin.A * s) @ x0 for s in t])
+    wanted = np.array(
+        [lin.C[[lin.outputs.index(n) for n in names]] @ expm(lin.A * s) @ x0 for s in t]
+    )
     drive = fx.Drive.force(*(constant(h) for h in lin.hold))
     still = fx.simulate(sys, t, drive, q0=lin.q, qd0=qd, rtol=1e-11)
     moved = fx.simulate(sys, t, drive, q0=lin.q + x0[: sys.n], qd0=qd, rtol=1e-11)
     assert max(np.abs(still[n] - still[n][0]).max() for n in names) < 1e-8
     for k, name in enumerate(names):
-        assert moved[name] - still[name] == pytest.approx(wanted[:, k], abs=5e-3 * np.abs(wanted[:, k]).max()), name
+        assert moved[name] - still[name] == pytest.approx(
+            wanted[:, k], abs=5e-3 * np.abs(wanted[:, k]).max()
+        ), name
 
 
-# Poles --------------------------------------------------------------------------------------------------------------------
+# Poles
 
 
 @few
@@ -105,7 +128,9 @@ def test_eigenvalues_are_the_natural_frequencies(robot):
         lin = fx.linearize(sys, joints=joints)
         squares = eigh(lin.K, lin.M, eigvals_only=True) if len(lin.M) else np.zeros(0)
         found = np.sqrt(np.maximum(squares, 0)) / (2 * np.pi)
-        assert found == pytest.approx(frequencies, rel=1e-6, abs=1e-6 * max(frequencies, default=1.0))
+        assert found == pytest.approx(
+            frequencies, rel=1e-6, abs=1e-6 * max(frequencies, default=1.0)
+        )
         assert len(lin.inputs) == (joints == "free") * (len(sys.free_rows) - len(sys.elastic_rows))
 
 
@@ -115,14 +140,19 @@ def test_poles_of_a_damped_link_have_its_damping():
     lin, w = fx.linearize(sys), 2 * np.pi * fx.frequencies(sys)
     assert lin.inputs == () and lin.B.shape == (2 * sys.n - 2, 0)
     delta = (0.3 + 1e-3 * w**2) / 2
-    wanted = np.concatenate([-delta + np.sqrt(delta**2 - w**2 + 0j), -delta - np.sqrt(delta**2 - w**2 + 0j)])
-    by_imaginary = lambda s: s[np.lexsort((s.real, s.imag))]  # real parts of conjugates may differ by round-off
+    wanted = np.concatenate(
+        [-delta + np.sqrt(delta**2 - w**2 + 0j), -delta - np.sqrt(delta**2 - w**2 + 0j)]
+    )
+    by_imaginary = lambda s: s[
+        np.lexsort((s.real, s.imag))
+    ]  # real parts of conjugates may differ by round-off
     assert by_imaginary(lin.poles) == pytest.approx(by_imaginary(wanted), rel=1e-6)
 
 
 @pytest.mark.parametrize("speed", [2.0, 6.0])
 def test_a_rotation_stiffens_the_link(speed):
-    """Benchmark B3 through `linearize`, joints locked to the rotation; and a steady rotation needs no torque."""
+    """Benchmark B3 through `linearize`, joints locked to the rotation; and a steady rotation needs
+    no torque."""
     sys = unit_link(8)
     qd = np.zeros(sys.n)
     qd[0] = speed
@@ -136,11 +166,20 @@ def test_a_rotation_stiffens_the_link(speed):
 def test_the_state_space_form_has_the_poles_and_the_transfer_function():
     lin = fx.linearize(elbow(**{"link.1.damping": {"beta_s": 1e-3}}))
     size = len(lin.A)
-    assert (lin.A.shape, lin.B.shape, lin.C.shape, lin.D.shape) == ((size, size), (size, 2), (6, size), (6, 2))
+    assert (lin.A.shape, lin.B.shape, lin.C.shape, lin.D.shape) == (
+        (size, size),
+        (size, 2),
+        (6, size),
+        (6, 2),
+    )
     slow = lin.poles[np.abs(lin.poles) > 1e-3][:8]
-    assert np.abs(np.linalg.eigvals(lin.A)[:, None] - slow).min(axis=0) == pytest.approx(0, abs=1e-5)
+    assert np.abs(np.linalg.eigvals(lin.A)[:, None] - slow).min(axis=0) == pytest.approx(
+        0, abs=1e-5
+    )
     s = 3.0 + 20.0j
-    assert lin.transfer(s) == pytest.approx(lin.C @ np.linalg.solve(s * np.eye(size) - lin.A, lin.B) + lin.D, rel=1e-8)
+    assert lin.transfer(s) == pytest.approx(
+        lin.C @ np.linalg.solve(s * np.eye(size) - lin.A, lin.B) + lin.D, rel=1e-8
+    )
     assert lin.outputs == (
         "joint/1/position",
         "joint/2/position",
@@ -154,17 +193,25 @@ def test_the_state_space_form_has_the_poles_and_the_transfer_function():
     assert lin.units["joint/1/drive"] == "N m" and lin.units["tip/x"] == "m"
 
 
-# Zeros --------------------------------------------------------------------------------------------------------------------
+# Zeros
 
 
 def test_zeros_of_hub_torque_to_tip_are_real_and_of_both_signs():
-    """A pinned-free beam: sin x + sinh x = 0 at x = y (1 + i), tan y = -tanh y, so s = +-2 y^2 sqrt(EI/rhoA)/L^2."""
-    y = [brentq(lambda y: np.sin(y) * np.cosh(y) + np.cos(y) * np.sinh(y), k * np.pi - 1.0, k * np.pi) for k in (1, 2, 3)]
+    """A pinned-free beam: sin x + sinh x = 0 at x = y (1 + i), tan y = -tanh y, so s = +-2 y^2
+    sqrt(EI/rhoA)/L^2."""
+    y = [
+        brentq(
+            lambda y: np.sin(y) * np.cosh(y) + np.cos(y) * np.sinh(y), k * np.pi - 1.0, k * np.pi
+        )
+        for k in (1, 2, 3)
+    ]
     exact = np.repeat(2 * np.square(y), 2)
     errors = []
     for elements in (8, 16):
         found = fx.linearize(unit_link(elements)).zeros("joint/1/drive", "tip/y")[:6]
-        assert np.abs(found.imag).max() == 0 and np.array_equal(np.sort(np.sign(found.real)), [-1, -1, -1, 1, 1, 1])
+        assert np.abs(found.imag).max() == 0 and np.array_equal(
+            np.sort(np.sign(found.real)), [-1, -1, -1, 1, 1, 1]
+        )
         errors.append(np.abs(np.abs(found) / exact - 1))
     assert errors[1].max() < 5e-4 and errors[1][:2].max() < 2e-6
     assert np.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.5)
@@ -175,7 +222,9 @@ def test_collocated_zeros_are_the_clamped_frequencies(make):
     sys = make()
     zeros = fx.linearize(sys).zeros("joint/1/drive", "joint/1/position")
     assert zeros.real == pytest.approx(0, abs=1e-6 * np.abs(zeros).max())
-    assert np.sort(zeros.imag[zeros.imag > 0]) == pytest.approx(2 * np.pi * fx.frequencies(sys), rel=1e-7)
+    assert np.sort(zeros.imag[zeros.imag > 0]) == pytest.approx(
+        2 * np.pi * fx.frequencies(sys), rel=1e-7
+    )
 
 
 @few
@@ -218,7 +267,10 @@ def test_wrong_arguments_are_named():
         (lambda: fx.linearize(sys, qd=elastic), "qd: expected rates of joints only"),
         (lambda: fx.linearize(heavy, qd=turning), "qd: expected a steady motion"),
         (lambda: fx.linearize(sys, q=[0.0]), "expected an array of shape"),
-        (lambda: lin.zeros("joint/3/drive", "tip/x"), "drive = 'joint/3/drive': expected one of joint/1/drive"),
+        (
+            lambda: lin.zeros("joint/3/drive", "tip/x"),
+            "drive = 'joint/3/drive': expected one of joint/1/drive",
+        ),
         (lambda: lin.zeros("joint/1/drive", "tip/z"), "output = 'tip/z': expected one of"),
     ):
         with pytest.raises(fx.InputError, match=words.replace("/", "/")):
@@ -226,7 +278,8 @@ def test_wrong_arguments_are_named():
 
 
 def test_a_sagging_robot_is_held_by_its_static_drives():
-    """hold of one flexible pendulum arm, horizontal: the moment of its weight about the joint at the bent shape."""
+    """hold of one flexible pendulum arm, horizontal: the moment of its weight about the joint at
+    the bent shape."""
     sys = system(beam(0.6, 0.2355, 8.0, 8), **SAGGING)
     lin = fx.linearize(sys)
     run = fx.simulate(sys, [0.0, 0.2], fx.Drive.force(constant(lin.hold[0])), q0=lin.q, rtol=1e-10)

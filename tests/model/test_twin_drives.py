@@ -10,27 +10,37 @@ import numpy as np
 import pytest
 
 from flexura import signals, twin
-from flexura.drive import Drive
 from flexura.errors import FlexuraError, InputError
+from flexura.signals.drive import Drive
 from twin_robots import beam, bench_arm, rig, rigid, robot
 
-# Drives --------------------------------------------------------------------------------------------------------------
+# Drives
 
 
 def test_pd_control_is_continuous_and_equals_the_same_law_as_a_function():
-    """A carriage under PD is a damped oscillator; the error at the default step is that of the time integration."""
+    """A carriage under PD is a damped oscillator; the error at the default step is that of the time
+    integration."""
     cart = robot(rigid(0.1, 2.0, 0.0, 1.0, "Pa"))
     t = np.linspace(0, 1, 101)
     drive = Drive.pd([signals.step(0.1)], [200.0], [12.0])
     run = twin.simulate(cart, t, drive)
-    function = twin.simulate(cart, t, lambda t, position, velocity, tip: drive(t, position, velocity))
+    function = twin.simulate(
+        cart, t, lambda t, position, velocity, tip: drive(t, position, velocity)
+    )
     omega, zeta = 10.0, 0.3
     damped = omega * np.sqrt(1 - zeta**2)
-    exact = 0.1 - 0.1 * np.exp(-zeta * omega * t) * (np.cos(damped * t) + zeta * omega / damped * np.sin(damped * t))
+    exact = 0.1 - 0.1 * np.exp(-zeta * omega * t) * (
+        np.cos(damped * t) + zeta * omega / damped * np.sin(damped * t)
+    )
     assert abs(run["joint/1/position"] - exact).max() < 1e-6
     assert abs(run["joint/1/position"] - function["joint/1/position"]).max() < 1e-9
-    assert np.allclose(run["joint/1/drive"], [drive(s, [p], [v])[0] for s, p, v in
-                       zip(t, run["joint/1/position"], run["joint/1/velocity"], strict=True)])  # fmt: skip
+    assert np.allclose(
+        run["joint/1/drive"],
+        [
+            drive(s, [p], [v])[0]
+            for s, p, v in zip(t, run["joint/1/position"], run["joint/1/velocity"], strict=True)
+        ],
+    )
 
 
 def test_stiff_gains_on_a_light_rotor_as_data_and_as_a_function_and_with_dry_friction():
@@ -41,7 +51,9 @@ def test_stiff_gains_on_a_light_rotor_as_data_and_as_a_function_and_with_dry_fri
     two = twin.simulate(rig(), t, lambda t, *state: drive(t, *state), step_s=one.meta["step_s"])
     for name in ("joint/2/position", "link/2/tip_deflection", "joint/2/drive"):
         assert abs(one[name] - two[name]).max() < 1e-5 * abs(one[name]).max(), name
-    rough = rig().replace({"link.1.joint.coulomb_friction": 0.5, "link.2.joint.coulomb_friction": 5e-3})
+    rough = rig().replace(
+        {"link.1.joint.coulomb_friction": 0.5, "link.2.joint.coulomb_friction": 5e-3}
+    )
     run = twin.simulate(rough, t, drive)
     assert run.complete and run.meta["step_s"] < one.meta["step_s"]
     fine = twin.simulate(rough, t, drive, step_s=run.meta["step_s"] / 2)
@@ -58,27 +70,35 @@ def test_a_function_of_the_state_sees_the_tip_deflection_at_once():
 
     run = twin.simulate(bench_arm(start=0.3), np.linspace(0, 0.2, 21), drive)
     last = seen[-1]
-    assert last[0] == pytest.approx(0.2) and last[3] == pytest.approx(run["link/1/tip_deflection"][-1], rel=1e-6)
+    assert last[0] == pytest.approx(0.2) and last[3] == pytest.approx(
+        run["link/1/tip_deflection"][-1], rel=1e-6
+    )
     assert last[1] == pytest.approx(run["joint/1/position"][-1], rel=1e-9)
     assert run["joint/1/position"][0] == pytest.approx(0.3)
 
 
 def test_a_jump_of_the_force_keeps_second_order():
-    """A force that ends within a step: its impulse is exact, as a Drive (instants known); on a step also as a function."""
+    """A force that ends within a step: its impulse is exact, as a Drive (instants known); on a step
+    also as a function."""
     cart = robot(rigid(0.1, 1.0, 0.0, 1.0, "Pa"))
-    for end, drive in ((0.30317, Drive.force(signals.piecewise([0.0, 0.30317], [1.0, 0.0]))), (0.3, lambda t: [1.0 * (t < 0.3)])):
+    for end, drive in (
+        (0.30317, Drive.force(signals.piecewise([0.0, 0.30317], [1.0, 0.0]))),
+        (0.3, lambda t: [1.0 * (t < 0.3)]),
+    ):
         run = twin.simulate(cart, [0.0, 1.0], drive, step_s=1e-3)
         assert run["joint/1/velocity"][-1] == pytest.approx(end, abs=1e-9)
         assert run["joint/1/position"][-1] == pytest.approx(end**2 / 2 + end * (1 - end), abs=1e-6)
 
 
-# Times, interruption, errors ----------------------------------------------------------------------------------------
+# Times, interruption, errors
 
 
 def test_times_between_steps_are_interpolated():
     cart = robot(rigid(0.1, 1.0, 0.0, 1.0, "Pa"))
     t = np.array([0.0, 0.1234567, 0.5, 0.777777, 0.9])
-    run = twin.simulate(cart, t, Drive.pd([signals.constant(0.0)], [100.0], [0.0]), qd0=[1.0], step_s=2e-4)
+    run = twin.simulate(
+        cart, t, Drive.pd([signals.constant(0.0)], [100.0], [0.0]), qd0=[1.0], step_s=2e-4
+    )
     assert np.array_equal(run.t, t)
     assert np.allclose(run["joint/1/position"], np.sin(10 * t) / 10, atol=1e-6)
     assert np.allclose(run["joint/1/velocity"], np.cos(10 * t), atol=1e-5)
@@ -91,7 +111,13 @@ def test_ctrl_c_ends_a_run_with_what_there_is():
     threading.Timer(0.5, lambda: os.kill(os.getpid(), os_signal.SIGINT)).start()
     before = os_signal.getsignal(os_signal.SIGINT)
     fractions = []
-    run = twin.simulate(rig(), np.linspace(0, 20, 2001), lambda t: [0.1, 0.0], step_s=1e-4, progress=fractions.append)
+    run = twin.simulate(
+        rig(),
+        np.linspace(0, 20, 2001),
+        lambda t: [0.1, 0.0],
+        step_s=1e-4,
+        progress=fractions.append,
+    )
     assert not run.complete and 0 < run.t[-1] < 20 and len(run.t) > 2
     assert len(run["tip/x"]) == len(run.t) and np.isfinite(run["tip/x"]).all()
     assert os_signal.getsignal(os_signal.SIGINT) is before and fractions == sorted(fractions)
@@ -136,12 +162,18 @@ def test_what_it_does_not_contain_is_refused_by_name(change, key):
 @pytest.mark.parametrize(
     ("arguments", "key"),
     [
-        ({"t_eval": [0.1, 0.0]}, "t_eval"), ({"qd0": [1.0, 2.0]}, "qd0"), ({"beam": "shell"}, "beam"),
-        ({"elements": 0}, "elements"), ({"step_s": 0.0}, "step_s"), ({"step_s": 1e-9}, "step_s"),
-        ({"drive": Drive.none(2)}, "drive"), ({"drive": 3.0}, "drive"),
-        ({"drive": lambda t: [1.0, 2.0]}, "drive"), ({"drive": Drive.prescribed(signals.cycloid(0.1, 0.5))}, "prescribed"),
+        ({"t_eval": [0.1, 0.0]}, "t_eval"),
+        ({"qd0": [1.0, 2.0]}, "qd0"),
+        ({"beam": "shell"}, "beam"),
+        ({"elements": 0}, "elements"),
+        ({"step_s": 0.0}, "step_s"),
+        ({"step_s": 1e-9}, "step_s"),
+        ({"drive": Drive.none(2)}, "drive"),
+        ({"drive": 3.0}, "drive"),
+        ({"drive": lambda t: [1.0, 2.0]}, "drive"),
+        ({"drive": Drive.prescribed(signals.cycloid(0.1, 0.5))}, "prescribed"),
     ],
-)  # fmt: skip
+)
 def test_wrong_arguments_are_refused_by_name(arguments, key):
     with pytest.raises(InputError, match=key):
         twin.simulate(bench_arm(), **({"t_eval": [0.0, 0.1]} | arguments))
@@ -150,11 +182,19 @@ def test_wrong_arguments_are_refused_by_name(arguments, key):
 def test_it_is_quiet_and_writes_no_files(tmp_path):
     code = (
         "import sys, flexura\nassert 'exudyn' not in sys.modules\n"
-        "from flexura import twin\nfrom flexura.robot import Robot\nassert 'exudyn' not in sys.modules\n"
-        "r = Robot.from_dict({'link': [{'length_m': 0.1, 'mass_kg': 1.0, 'inertia_kg_m2': 1.0, 'joint': {'type': 'Pa'}}]})\n"
+        "from flexura import twin\nfrom flexura.robot import Robot\nassert 'exudyn' not in "
+        "sys.modules\n"
+        "r = Robot.from_dict({'link': [{'length_m': 0.1, 'mass_kg': 1.0, 'inertia_kg_m2': 1.0, "
+        "'joint': {'type': 'Pa'}}]})\n"
         "assert twin.simulate(r, [0.0, 0.01]).complete\n"
     )
-    done = subprocess.run([sys.executable, "-W", "error", "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=120,
-                          env=os.environ | {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p)})  # fmt: skip
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
+    )
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
     assert list(tmp_path.iterdir()) == []

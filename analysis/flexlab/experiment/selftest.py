@@ -1,7 +1,8 @@
-"""The self-test before an experiment: may this board, wired as it is, be armed? Nothing moves in it.
+"""The self-test before an experiment: may this board, wired as it is, be armed? Nothing moves in
+it.
 
-The declaration's hash is compared when the session opens (`Link.connect`); here follow configuration, faults, supply, switches,
-encoders and the flex sensor at rest.
+The declaration's hash is compared when the session opens (`Link.connect`); here follow
+configuration, faults, supply, switches, encoders and the flex sensor at rest.
 """
 
 from __future__ import annotations
@@ -12,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from ..board.base import BoardError
-from ..board.declaration import FAULTS, Fault, Flag, State
-from ..board.link import Identity, Link, Refused
-from ..flash import single
-from .measure import reading
+from ..board.protocol.declaration import FAULTS, Fault, Flag, State
+from ..board.protocol.session import Identity, Link, Refused
+from ..recordings.unit_conversion import reading
+from .flash import single
 
 REST_S = 0.4  # how long the rig is watched at rest
 BENT_M = 0.03  # a tip deflection at rest that is no drift of the sensor any more
@@ -23,7 +24,8 @@ BENT_M = 0.03  # a tip deflection at rest that is no drift of the sensor any mor
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing looked at: what was found against what was expected, and what to do where they differ."""
+    """One thing looked at: what was found against what was expected, and what to do where they
+    differ."""
 
     what: str
     passed: bool
@@ -34,7 +36,8 @@ class Finding:
 
 @dataclass(frozen=True)
 class Rest:
-    """The flex sensor's reading with the strip at rest: mean, standard deviation of one report, number of reports."""
+    """The flex sensor's reading with the strip at rest: mean, standard deviation of one report,
+    number of reports."""
 
     zero: float
     noise: float
@@ -44,11 +47,14 @@ class Rest:
         return vars(self)
 
 
-def prepare(link: Link, identity: Identity, stored: dict[str, float], wanted: dict[str, float], write: bool) -> list[Finding]:
+def prepare(
+    link: Link, identity: Identity, stored: dict[str, float], wanted: dict[str, float], write: bool
+) -> list[Finding]:
     """Bring the board to Idle with the settings of the experiment; what was found and done.
 
-    `stored` are the rig file's settings: a board that has others is refused, unless `write` allows to write and store them.
-    `wanted` are the experiment's; where they differ they are in use until the next reset and not stored.
+    `stored` are the rig file's settings: a board that has others is refused, unless `write` allows
+    to write and store them. `wanted` are the experiment's; where they differ they are in use until
+    the next reset and not stored.
     """
     link.command("stop")
     link.run(0.01)
@@ -56,31 +62,57 @@ def prepare(link: Link, identity: Identity, stored: dict[str, float], wanted: di
     found = link.read_configuration()
     differing = [name for name, value in stored.items() if found[name] != single(value)]
     out = [
-        Finding("declaration", True, f"{identity.declaration:08x}, firmware {identity.firmware}", "this program's"),
         Finding(
-            "configuration", not differing or write, _some(differing) if differing else "the rig file's",
-            "the rig file's", "flexura flash --configure",
+            "declaration",
+            True,
+            f"{identity.declaration:08x}, firmware {identity.firmware}",
+            "this program's",
         ),
-    ]  # fmt: skip
+        Finding(
+            "configuration",
+            not differing or write,
+            _some(differing) if differing else "the rig file's",
+            "the rig file's",
+            "flexura flash --configure",
+        ),
+    ]
     if differing and not write:
         return out
     if differing:
-        link.write_configuration({name: stored[name] for name in differing} if fault is Fault.none else stored)
+        link.write_configuration(
+            {name: stored[name] for name in differing} if fault is Fault.none else stored
+        )
     if fault is not Fault.none:
         try:
             link.command("clear", fault=fault)
-            out.append(Finding("fault", True, f"{fault.name} of before, cleared", "none that lasts"))
+            out.append(
+                Finding("fault", True, f"{fault.name} of before, cleared", "none that lasts")
+            )
         except Refused:
-            out.append(Finding("fault", False, f"{fault.name}: {FAULTS[fault][0]}", "none that lasts", FAULTS[fault][1]))
+            out.append(
+                Finding(
+                    "fault",
+                    False,
+                    f"{fault.name}: {FAULTS[fault][0]}",
+                    "none that lasts",
+                    FAULTS[fault][1],
+                )
+            )
             return out
-    special = {name: value for name, value in wanted.items() if single(value) != single(stored[name])}
+    special = {
+        name: value for name, value in wanted.items() if single(value) != single(stored[name])
+    }
     link.write_configuration(special, save=False)
     back = link.read_configuration()
     wrong = [name for name, value in wanted.items() if back[name] != single(value)]
     if wrong:
-        raise BoardError(f"{link.board.label}: read back other values than written: {', '.join(wrong)}")
+        raise BoardError(
+            f"{link.board.label}: read back other values than written: {', '.join(wrong)}"
+        )
     if special:
-        out.append(Finding("settings of this experiment", True, _some(list(special)), "in use, not stored"))
+        out.append(
+            Finding("settings of this experiment", True, _some(list(special)), "in use, not stored")
+        )
     return out
 
 
@@ -90,7 +122,10 @@ def examine(link: Link, settings: dict[str, float], tip_m: Any) -> tuple[list[Fi
     link.run(REST_S)
     seen = link.telemetry()
     if len(seen) < 10:
-        raise BoardError(f"{link.board.label}: {len(seen)} reports in {REST_S:g} s; expected some {round(500 * REST_S)}")
+        raise BoardError(
+            f"{link.board.label}: {len(seen)} reports in {REST_S:g} s; expected some "
+            f"{round(500 * REST_S)}"
+        )
     last, x = seen[-1], reading(seen["flex"])
     rest = Rest(float(x.mean()), float(x.std(ddof=1)), len(x))
     supply = seen["supply"] / 1000
@@ -98,21 +133,39 @@ def examine(link: Link, settings: dict[str, float], tip_m: Any) -> tuple[list[Fi
     out = [
         Finding("state", State(last["state"]) is State.idle, State(last["state"]).name, "idle"),
         Finding(
-            "supply", bool(settings["supply_min_V"] < supply.min() and supply.max() < settings["supply_max_V"]),
-            f"{supply.min():.2f} to {supply.max():.2f} V", f"{settings['supply_min_V']:g} to {settings['supply_max_V']:g} V",
+            "supply",
+            bool(
+                settings["supply_min_V"] < supply.min() and supply.max() < settings["supply_max_V"]
+            ),
+            f"{supply.min():.2f} to {supply.max():.2f} V",
+            f"{settings['supply_min_V']:g} to {settings['supply_max_V']:g} V",
             "switch the motor supply on; check its fuse",
         ),
-    ]  # fmt: skip
+    ]
     for flag in (Flag.emergency_stop, Flag.limit_low, Flag.limit_high):
         fault = FAULTS[Fault[flag.name]]
         open_ = bool(flags >> flag & 1)
-        out.append(Finding(flag.name.replace("_", " "), not open_, "open" if open_ else "closed", "closed", fault[1]))
+        out.append(
+            Finding(
+                flag.name.replace("_", " "),
+                not open_,
+                "open" if open_ else "closed",
+                "closed",
+                fault[1],
+            )
+        )
     for number in (1, 2):
         counts = seen[f"position_{number}"]
         spread = int(counts.max() - counts.min())
         found = "still" if spread <= 1 else f"moved by {spread} counts"
         out.append(
-            Finding(f"encoder {number}", spread <= 1, found, "still", "nothing may move before the start; check its wires")
+            Finding(
+                f"encoder {number}",
+                spread <= 1,
+                found,
+                "still",
+                "nothing may move before the start; check its wires",
+            )
         )
     missed = int(seen["missed"][-1] - seen["missed"][0])
     out.append(Finding("missed edges", missed == 0, str(missed), "0", "check the encoders' wires"))
@@ -120,14 +173,20 @@ def examine(link: Link, settings: dict[str, float], tip_m: Any) -> tuple[list[Fi
     tip = tip_m(rest.zero)
     out += [
         Finding(
-            "flex sensor", bool(low < x.min() and x.max() < high), f"{rest.zero:.4f} +- {rest.noise:.4f}", f"{low:g} to {high:g}",
+            "flex sensor",
+            bool(low < x.min() and x.max() < high),
+            f"{rest.zero:.4f} +- {rest.noise:.4f}",
+            f"{low:g} to {high:g}",
             "check the sensor and its wires",
         ),
         Finding(
-            "strip at rest", abs(tip) < BENT_M, f"{1e3 * tip:.1f} mm by the calibration", f"within {1e3 * BENT_M:g} mm",
+            "strip at rest",
+            abs(tip) < BENT_M,
+            f"{1e3 * tip:.1f} mm by the calibration",
+            f"within {1e3 * BENT_M:g} mm",
             "free the strip, or calibrate: flexura bench calibrate",
         ),
-    ]  # fmt: skip
+    ]
     return out, rest
 
 

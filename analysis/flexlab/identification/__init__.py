@@ -1,1 +1,2 @@
-"""Identification: the figures of robot and rig from an experiment, with their intervals, judged on another experiment."""
+"""Identification: the figures of robot and rig from an experiment, with their intervals, judged on
+another experiment."""

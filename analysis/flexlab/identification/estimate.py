@@ -1,9 +1,11 @@
 """Nonlinear least squares with confidence intervals that hold where residuals hang together.
 
-    minimise sum r_t(p)^2,   cov p = H^-1 S H^-1,   H = J^T J,   S = sum_l w_l sum_t (g_t g_{t-l}^T + transposed),  g_t = J_t r_t
+    minimise sum r_t(p)^2,   cov p = H^-1 S H^-1,   H = J^T J,   S = sum_l w_l sum_t (g_t g_{t-l}^T
+    + transposed),  g_t = J_t r_t
 
-with w_l = 1 - l/(m + 1): Newey & West, Econometrica 55 (1987) 703. Residuals of a mechanical model are no white noise: what the
-model lacks rings as the strip does, so that m must span some periods. White residuals give back s^2 (J^T J)^-1.
+with w_l = 1 - l/(m + 1): Newey & West, Econometrica 55 (1987) 703. Residuals of a mechanical model
+are no white noise: what the model lacks rings as the strip does, so that m must span some periods.
+White residuals give back s^2 (J^T J)^-1.
 """
 
 from __future__ import annotations
@@ -18,7 +20,8 @@ NORMAL_95 = 1.959964
 
 @dataclass(frozen=True)
 class Unknown:
-    """One number to be found: where to begin, the step of its differences, its bounds. A `factor` is found by its logarithm."""
+    """One number to be found: where to begin, the step of its differences, its bounds. A `factor`
+    is found by its logarithm."""
 
     name: str
     start: float
@@ -35,8 +38,8 @@ class Unknown:
 
 @dataclass(frozen=True)
 class Found:
-    """The values (k,) by name, the covariance (k, k) of the inner ones (logarithms of factors), residuals by series (s, T) and
-    their derivatives (k, s, T)."""
+    """The values (k,) by name, the covariance (k, k) of the inner ones (logarithms of factors),
+    residuals by series (s, T) and their derivatives (k, s, T)."""
 
     unknowns: tuple[Unknown, ...]
     values: dict[str, float]
@@ -46,9 +49,11 @@ class Found:
     evaluations: int
 
     def doubted(self, change: np.ndarray) -> Found:
-        """With the covariance that is due to a doubt about the model: `change` (s, T) of its residuals is one standard deviation.
+        """With the covariance that is due to a doubt about the model: `change` (s, T) of its
+        residuals is one standard deviation.
 
-        The shift of the inner values that such a change would cause, -(J^T J)^-1 J^T change, is added as an error of its own.
+        The shift of the inner values that such a change would cause, -(J^T J)^-1 J^T change, is
+        added as an error of its own.
         """
         J = self.derivatives.reshape(len(self.unknowns), -1)
         scale = np.linalg.norm(J, axis=1)
@@ -75,11 +80,13 @@ def estimate(
     together: dict[str, dict[str, float]] | None = None,
     most: int = 12,
 ) -> Found:
-    """Fit `model(values) -> residuals (s, T)` in units of their noise. `memory`: samples over which they may hang together.
+    """Fit `model(values) -> residuals (s, T)` in units of their noise. `memory`: samples over which
+    they may hang together.
 
-    `together`: for a name, by how much others are moved with it when the derivatives are taken, per unit of its inner value:
-    where two unknowns do nearly the same, the difference between them needs a step of its own, far longer than either alone may
-    be. Ends where a step gains less than 1e-4 of the sum of squares, or after `most` steps.
+    `together`: for a name, by how much others are moved with it when the derivatives are taken, per
+    unit of its inner value: where two unknowns do nearly the same, the difference between them
+    needs a step of its own, far longer than either alone may be. Ends where a step gains less than
+    1e-4 of the sum of squares, or after `most` steps.
     """
     from scipy.optimize import least_squares
 
@@ -97,7 +104,9 @@ def estimate(
     along = np.diag([u.step for u in unknowns])  # (k, k), a row for each step
     for name, others in (together or {}).items():
         for other, share in others.items():
-            along[names.index(name), names.index(other)] = share * along[names.index(name), names.index(name)]
+            along[names.index(name), names.index(other)] = (
+                share * along[names.index(name), names.index(name)]
+            )
 
     def differences(inner: np.ndarray) -> np.ndarray:
         base = residuals(inner)
@@ -108,9 +117,16 @@ def estimate(
     bounds = np.array([[u.inner(edge) for edge in u.bounds] for u in unknowns]).T
     scale = np.array([u.step for u in unknowns])
     found = least_squares(
-        lambda x: residuals(x).ravel(), start, lambda x: differences(x).reshape(len(x), -1).T, tuple(bounds), x_scale=scale,
-        ftol=1e-4, xtol=1e-7, gtol=1e-9, max_nfev=most,
-    )  # fmt: skip
+        lambda x: residuals(x).ravel(),
+        start,
+        lambda x: differences(x).reshape(len(x), -1).T,
+        tuple(bounds),
+        x_scale=scale,
+        ftol=1e-4,
+        xtol=1e-7,
+        gtol=1e-9,
+        max_nfev=most,
+    )
     last = residuals(found.x)
     J = differences(found.x)  # (k, s, T)
     return Found(tuple(unknowns), outer(found.x), covariance(J, last, memory), last, J, count)

@@ -1,4 +1,5 @@
-"""The files that an identification leaves: the robot, and the rig with the flex sensor's calibration."""
+"""The files that an identification leaves: the robot, and the rig with the flex sensor's
+calibration."""
 
 from __future__ import annotations
 
@@ -11,12 +12,12 @@ import numpy as np
 
 import flexura as fx
 from flexura.errors import InputError
-from flexura.files import write_toml
+from flexura.io import write_toml
 
-from ..experiment import calibrate
-from ..experiment.measure import ADC_V, Sensor
+from ..recordings import flex_calibration
+from ..recordings.unit_conversion import ADC_V, Sensor
 from ..rig.description import Calibration, Rig
-from ..rig.motor import resistance
+from ..rig.plant.motor import resistance
 from .identify import Identified
 from .strip import changed
 
@@ -29,10 +30,12 @@ def robot(found: Identified) -> fx.Robot:
 
 
 def rubbed(old: Rig, factor: float) -> dict[str, Any]:
-    """The rig file's tables with all friction of motor, screw and rail by one factor: voltage and speed cannot tell them apart.
+    """The rig file's tables with all friction of motor, screw and rail by one factor: voltage and
+    speed cannot tell them apart.
 
-    A motor with more friction takes more current without load and turns slower; its constant and its gear stay what they are,
-    I_0' = f I_0, n_0' = n_0 (U_0 - R I_0') / (U_0 - R I_0), M_s' = M_s (I_s - I_0') / (I_s - I_0).
+    A motor with more friction takes more current without load and turns slower; its constant and
+    its gear stay what they are, I_0' = f I_0, n_0' = n_0 (U_0 - R I_0') / (U_0 - R I_0), M_s' = M_s
+    (I_s - I_0') / (I_s - I_0).
     """
     tables, motor = old.model_dump(mode="json", exclude_none=True), old.motor
     before, after = motor.no_load_current_A, factor * motor.no_load_current_A
@@ -45,9 +48,12 @@ def rubbed(old: Rig, factor: float) -> dict[str, Any]:
     }
     emulated = tables["emulated"]
     for table, name in (
-        ("motor", "starts_at_V"), ("screw", "coulomb_friction_N_m"), ("carriage", "coulomb_friction_N"),
-        ("screw", "viscous_friction_N_m_s"), ("carriage", "viscous_friction_N_s_m"),
-    ):  # fmt: skip
+        ("motor", "starts_at_V"),
+        ("screw", "coulomb_friction_N_m"),
+        ("carriage", "coulomb_friction_N"),
+        ("screw", "viscous_friction_N_m_s"),
+        ("carriage", "viscous_friction_N_s_m"),
+    ):
         emulated[table][name] *= factor
     return tables
 
@@ -65,41 +71,50 @@ def rig(found: Identified) -> Rig:
 
 
 def calibration(found: Identified) -> Calibration:
-    """The firmware's cubic through the simulated course of reading and tip deflection: a calibration without a ruler.
+    """The firmware's cubic through the simulated course of reading and tip deflection: a
+    calibration without a ruler.
 
     Its covariance is that of the gain: a strip that bends more under the same reading.
     """
     data, values = found.data, found.strip.values
     run = data.simulate(values)
-    readings, tips = data.voltage(run, values | {"delay_s": 0.0}) / ADC_V, run["link/2/tip_deflection"]
+    readings, tips = (
+        data.voltage(run, values | {"delay_s": 0.0}) / ADC_V,
+        run["link/2/tip_deflection"],
+    )
     some = np.linspace(0, len(tips) - 1, POINTS).astype(int)
-    fitted = calibrate.fit(readings[some], tips[some]).calibration
+    fitted = flex_calibration.fit(readings[some], tips[some]).calibration
     c = np.array([0.0, fitted.c1_m, fitted.c2_m, fitted.c3_m])
     spread = np.array(fitted.covariance) + np.outer(c, c) * found.strip.deviation("flex_gain") ** 2
     return fitted.model_copy(update={"covariance": spread.tolist()})
 
 
 def described_anew(experiment: fx.Run, found: Identified) -> fx.Run:
-    """An experiment of this rig with the files that were found: its tip deflection is that of the new calibration."""
+    """An experiment of this rig with the files that were found: its tip deflection is that of the
+    new calibration."""
     made = rig(found)
     assert made.flex.calibration is not None
     rest = experiment.meta.get("rest") or {"zero": made.flex.calibration.zero}
     sensor = Sensor(made.flex.calibration, **rest)
     reading = experiment["link/2/flex_voltage"] / ADC_V
     channels = experiment.channels | {
-        "link/2/tip_deflection": sensor.tip(reading), "link/2/tip_deflection_std": sensor.tip_std(reading)
-    }  # fmt: skip
+        "link/2/tip_deflection": sensor.tip(reading),
+        "link/2/tip_deflection_std": sensor.tip_std(reading),
+    }
     units = experiment.units | {"link/2/tip_deflection_std": "m"}
     meta = experiment.meta | {"robot": robot(found).to_dict(), "rig": made.model_dump(mode="json")}
     return dataclasses.replace(experiment, channels=channels, units=units, meta=meta)
 
 
 def save(found: Identified, experiment: fx.Run, path: Path) -> list[Path]:
-    """Write the robot file, and the rig file beside it (name-rig.toml). Raises InputError before anything is written."""
+    """Write the robot file, and the rig file beside it (name-rig.toml). Raises InputError before
+    anything is written."""
     beside = path.with_name(f"{path.stem}-rig.toml")
     manoeuvre = Path(str(experiment.meta.get("rig_file", ""))).parent / found.nominal.rig.manoeuvre
     if not manoeuvre.is_file():
-        expected = "no such file: expected the rig's manoeuvre, which its new file must name as well"
+        expected = (
+            "no such file: expected the rig's manoeuvre, which its new file must name as well"
+        )
         raise InputError(expected, key="rig.manoeuvre", value=str(manoeuvre))
     tables = rig(found).model_dump(mode="json", exclude_none=True)
     tables["robot"], tables["manoeuvre"] = path.name, os.path.relpath(manoeuvre, path.parent)

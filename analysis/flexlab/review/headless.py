@@ -1,7 +1,8 @@
 """Looking at a review: in the native viewer's window, or as a picture drawn without a screen.
 
-The viewer only listens on this machine's loopback address. Pictures are drawn with a home folder of their own, so that
-neither the user's settings of the viewer nor its usage statistics come into play.
+The viewer only listens on this machine's loopback address. Pictures are drawn with a home folder of
+their own, so that neither the user's settings of the viewer nor its usage statistics come into
+play.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from flexura.errors import FlexuraError, InputError
-from flexura.files import write_bytes
+from flexura.io import write_bytes
 
 MENU_PX = 36  # the height of the viewer's menu, which stays as an empty strip when it is hidden
 LOOPBACK = "127.0.0.1"
@@ -31,21 +32,32 @@ NO_VULKAN = (
 )
 
 
-def draw(rrd: str | Path, png: str | Path, *, time_s: float | None = None, size: tuple[int, int] = (1600, 900)) -> Path:
+def draw(
+    rrd: str | Path,
+    png: str | Path,
+    *,
+    time_s: float | None = None,
+    size: tuple[int, int] = (1600, 900),
+) -> Path:
     """Draw a review; see `flexlab.review.picture`."""
     if min(size) < 100 or max(size) > 8000:
         raise InputError("a width and a height between 100 and 8000 pixels", key="size", value=size)
     at = default_time(rrd)
     with viewer((size[0], size[1] + MENU_PX)) as client:
         show(client, rrd)
-        client.run_command("ui.toggle_top_panel")  # the picture is of the review, not of the viewer's menu
-        client.set_time("time", duration=float(at if time_s is None else time_s), play_state="paused")
+        client.run_command(
+            "ui.toggle_top_panel"
+        )  # the picture is of the review, not of the viewer's menu
+        client.set_time(
+            "time", duration=float(at if time_s is None else time_s), play_state="paused"
+        )
         write_bytes(png, _without_menu(settled(client), size))
     return Path(png)
 
 
 def default_time(rrd: str | Path) -> float:
-    """The time [s] that a review proposes for its picture. Raises InputError for a file that is no review."""
+    """The time [s] that a review proposes for its picture. Raises InputError for a file that is no
+    review."""
     from rerun.chunk import RrdReader
 
     path = Path(rrd)
@@ -57,12 +69,15 @@ def default_time(rrd: str | Path) -> float:
             if "picture_time_s" in batch.schema.names:
                 return float(np.ravel(batch.column("picture_time_s")[0].as_py())[0])
     except (RuntimeError, ValueError, OSError) as error:
-        raise InputError(f"not a Rerun recording ({str(error).splitlines()[0]})", file=str(rrd)) from None
+        raise InputError(
+            f"not a Rerun recording ({str(error).splitlines()[0]})", file=str(rrd)
+        ) from None
     raise InputError("a Rerun recording, but not a review of flexura", file=str(rrd))
 
 
 def executable() -> Path:
-    """The viewer itself: the `rerun` on the path is a script, which would leave the viewer running when ended."""
+    """The viewer itself: the `rerun` on the path is a script, which would leave the viewer running
+    when ended."""
     try:
         import rerun_cli
     except ImportError:
@@ -75,9 +90,11 @@ def executable() -> Path:
 
 @contextlib.contextmanager
 def viewer(size: tuple[int, int] = (1600, 900), timeout: float = 60.0) -> Iterator[Any]:
-    """A viewer without a screen, `size` in pixels, as a client to steer it by; ended with the block.
+    """A viewer without a screen, `size` in pixels, as a client to steer it by; ended with the
+    block.
 
-    Raises FlexuraError when there is no Vulkan driver, or when the viewer doesn't answer within `timeout` seconds.
+    Raises FlexuraError when there is no Vulkan driver, or when the viewer doesn't answer within
+    `timeout` seconds.
     """
     from rerun.experimental import ViewerClient
 
@@ -93,7 +110,13 @@ def viewer(size: tuple[int, int] = (1600, 900), timeout: float = 60.0) -> Iterat
             "XDG_RUNTIME_DIR": home,
         }
         env = os.environ | own | {"RUST_LOG": "error", "NO_COLOR": "1"}
-        subprocess.run([program, "analytics", "disable"], env=env, check=False, capture_output=True, timeout=timeout)
+        subprocess.run(
+            [program, "analytics", "disable"],
+            env=env,
+            check=False,
+            capture_output=True,
+            timeout=timeout,
+        )
         options = [
             "--headless",
             "--bind",
@@ -105,7 +128,11 @@ def viewer(size: tuple[int, int] = (1600, 900), timeout: float = 60.0) -> Iterat
             "--hide-welcome-screen",
         ]
         process = subprocess.Popen(
-            [program, *options], env=env, stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT
+            [program, *options],
+            env=env,
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=subprocess.STDOUT,
         )
         try:
             yield _connected(ViewerClient, process, port, output, timeout)
@@ -118,7 +145,9 @@ def viewer(size: tuple[int, int] = (1600, 900), timeout: float = 60.0) -> Iterat
                 process.wait()
 
 
-def _connected(client_type: Any, process: subprocess.Popen[bytes], port: int, output: Any, timeout: float) -> Any:
+def _connected(
+    client_type: Any, process: subprocess.Popen[bytes], port: int, output: Any, timeout: float
+) -> Any:
     end = time.monotonic() + timeout
     while True:
         try:
@@ -131,7 +160,9 @@ def _connected(client_type: Any, process: subprocess.Popen[bytes], port: int, ou
                 said = output.read().decode(errors="replace")
                 if "render context" in said or "graphics adapter" in said or "wgpu" in said.lower():
                     raise FlexuraError(NO_VULKAN) from None
-                raise FlexuraError(f"the viewer did not start: {said.strip()[-500:] or 'no answer'}") from None
+                raise FlexuraError(
+                    f"the viewer did not start: {said.strip()[-500:] or 'no answer'}"
+                ) from None
             time.sleep(0.05)
 
 
@@ -147,7 +178,8 @@ def show(client: Any, rrd: str | Path, timeout: float = 60.0) -> Any:
 
 
 def settled(client: Any, view_id: Any = None, tries: int = 60) -> bytes:
-    """The PNG of a view, or of the whole window, once two in a row agree: axes and data arrive over several frames."""
+    """The PNG of a view, or of the whole window, once two in a row agree: axes and data arrive over
+    several frames."""
     last = b""
     for _ in range(tries):
         png = client.take_screenshot(view_id)
@@ -178,11 +210,24 @@ def open_window(rrd: str | Path) -> subprocess.Popen[bytes]:
     path = Path(rrd)
     if not path.is_file():
         raise InputError("no such file: expected a review (.rrd)", file=str(rrd))
-    if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        raise FlexuraError(f"no display to open the viewer on; copy {path} to a machine that has one, or draw a picture of it")
+    if sys.platform.startswith("linux") and not (
+        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    ):
+        raise FlexuraError(
+            f"no display to open the viewer on; copy {path} to a machine that has one, or draw a "
+            f"picture of it"
+        )
     program = executable()
     process = subprocess.Popen(
-        [str(program), "--bind", LOOPBACK, "--port", "auto", "--hide-welcome-screen", str(path.resolve())],
+        [
+            str(program),
+            "--bind",
+            LOOPBACK,
+            "--port",
+            "auto",
+            "--hide-welcome-screen",
+            str(path.resolve()),
+        ],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
@@ -193,7 +238,10 @@ def open_window(rrd: str | Path) -> subprocess.Popen[bytes]:
     except subprocess.TimeoutExpired:
         return process
     if code:
-        raise FlexuraError(f"the viewer ended at once with status {code}: is the display {os.environ.get('DISPLAY', '')} usable?")
+        raise FlexuraError(
+            f"the viewer ended at once with status {code}: is the display "
+            f"{os.environ.get('DISPLAY', '')} usable?"
+        )
     return process
 
 

@@ -1,4 +1,5 @@
-"""The layout of a review: which views there are, and where; built from what was recorded, so that no view is empty."""
+"""The layout of a review: which views there are, and where; built from what was recorded, so that
+no view is empty."""
 
 from __future__ import annotations
 
@@ -6,12 +7,21 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import rerun.blueprint as rrb
+from flexura.optional import Optional
+
+if TYPE_CHECKING:
+    import rerun.blueprint as rrb
+else:
+    rrb = Optional("rerun.blueprint", "view")
 
 CURVES = 6  # in one plot; further joints or links go to further tabs
-PLOT_PX, LINE_PX, LINE_CHARS = 265, 23, 36  # a plot's height and a legend's line in a window of 900 pixels
+PLOT_PX, LINE_PX, LINE_CHARS = (
+    265,
+    23,
+    36,
+)  # a plot's height and a legend's line in a window of 900 pixels
 WIDE = 1.2  # from this ratio on, two pictures below each other are larger than two side by side
 WHITE = (255, 255, 255)
 
@@ -31,8 +41,9 @@ Signals = dict[str, Signal]  # by entity path
 
 @dataclass(frozen=True)
 class Scene:
-    """What is recorded of one robot: `sources` (root, label, colour's name, has shapes), curves by path, the arms' bounds [m], y
-    up. In a gallery of several robots `name` is this one's and all its paths begin with `prefix`."""
+    """What is recorded of one robot: `sources` (root, label, colour's name, has shapes), curves by
+    path, the arms' bounds [m], y up. In a gallery of several robots `name` is this one's and all
+    its paths begin with `prefix`."""
 
     sources: tuple[tuple[str, str, str, bool], ...]
     signals: Signals
@@ -43,7 +54,8 @@ class Scene:
     high: tuple[float, float]
     prefix: str = ""
     name: str = ""
-    measured: bool = False  # an experiment beside its simulation: the dissertation's figures, each above its own deviation
+    # an experiment beside its simulation: the dissertation's figures, each above its own deviation
+    measured: bool = False
 
     @property
     def width(self) -> float:
@@ -78,40 +90,67 @@ def blueprint(scenes: Sequence[Scene]) -> rrb.Blueprint:
 
 def _page(scene: Scene) -> Any:
     """Arms and the about page above, plots over time below."""
-    notes: list[Any] = [rrb.TextDocumentView(origin="/", contents=[f"{scene.prefix}/about"], name="about this review")]
+    notes: list[Any] = [
+        rrb.TextDocumentView(
+            origin="/", contents=[f"{scene.prefix}/about"], name="about this review"
+        )
+    ]
     shares = [2.6]
     if scene.phases:
-        notes.append(rrb.StateTimelineView(origin="/", contents=[f"/{root}/phase" for root in scene.phases], name="phases"))
+        notes.append(
+            rrb.StateTimelineView(
+                origin="/", contents=[f"/{root}/phase" for root in scene.phases], name="phases"
+            )
+        )
         shares.append(0.6 + 0.4 * len(scene.phases))
     if scene.events:
-        notes.append(rrb.TextLogView(origin="/", contents=[f"{scene.prefix}/events/**"], name="events", columns=_log_columns()))
+        notes.append(
+            rrb.TextLogView(
+                origin="/",
+                contents=[f"{scene.prefix}/events/**"],
+                name="events",
+                columns=_log_columns(),
+            )
+        )
         shares.append(1.2)
     side = rrb.Vertical(*notes, row_shares=shares)
     if scene.measured and (figures := _figures(scene)):
         drawn = _arms(scene, apart=False)
         page = _tabs(notes)
         above = rrb.Horizontal(_tabs(drawn), page, column_shares=[3, 4]) if drawn else page
-        return rrb.Vertical(above, rrb.Horizontal(*figures), row_shares=[5, 7], name=scene.name or None)
+        return rrb.Vertical(
+            above, rrb.Horizontal(*figures), row_shares=[5, 7], name=scene.name or None
+        )
     upper = rrb.Horizontal(*(drawn := _arms(scene)), side, column_shares=_shares(scene, len(drawn)))
     columns = _plots(scene)
     if not columns:
         return upper
     above, height = (upper, 3) if drawn else (side, 2)
-    return rrb.Vertical(above, rrb.Horizontal(*columns), row_shares=[height, 5 - height], name=scene.name or None)
+    return rrb.Vertical(
+        above, rrb.Horizontal(*columns), row_shares=[height, 5 - height], name=scene.name or None
+    )
 
 
 def _arms(scene: Scene, apart: bool = True) -> list[Any]:
-    """The overlaid view, and each run alone: below each other when the picture is wide, else side by side; not `apart`: views
-    that may be tabs."""
+    """The overlaid view, and each run alone: below each other when the picture is wide, else side
+    by side; not `apart`: views that may be tabs."""
     # Bounds are given in the view's own coordinates, in which y points down.
-    bounds = rrb.VisualBounds2D(x_range=[scene.low[0], scene.high[0]], y_range=[-scene.high[1], -scene.low[1]])
+    bounds = rrb.VisualBounds2D(
+        x_range=[scene.low[0], scene.high[0]], y_range=[-scene.high[1], -scene.low[1]]
+    )
 
     def arm(name: str, contents: list[str]) -> Any:
         return rrb.Spatial2DView(
-            origin="/", contents=[f"{scene.prefix}/ground/**", *contents], name=name, visual_bounds=bounds, background=WHITE
+            origin="/",
+            contents=[f"{scene.prefix}/ground/**", *contents],
+            name=name,
+            visual_bounds=bounds,
+            background=WHITE,
         )
 
-    shaped = [(root, label, f"{colour} {label}") for root, label, colour, there in scene.sources if there]
+    shaped = [
+        (root, label, f"{colour} {label}") for root, label, colour, there in scene.sources if there
+    ]
     alone = [arm(label, [f"/{root}/arm/**"]) for root, label, _ in shaped]
     if len(shaped) < 2:
         return alone
@@ -121,41 +160,66 @@ def _arms(scene: Scene, apart: bool = True) -> list[Any]:
     both = arm(title, [f"/{a}/arm/**", f"/{b}/arm/**", f"- /{b}/arm/undeformed"])
     if not apart:
         return [both, *alone]
-    return [both, rrb.Vertical(*alone) if scene.width > WIDE * scene.height else rrb.Horizontal(*alone)]
+    return [
+        both,
+        rrb.Vertical(*alone) if scene.width > WIDE * scene.height else rrb.Horizontal(*alone),
+    ]
 
 
 def _figures(scene: Scene) -> list[Any]:
-    """The dissertation's Figs 4.19 to 4.21: each joint variable and each tip displacement, below it its deviation.
+    """The dissertation's Figs 4.19 to 4.21: each joint variable and each tip displacement, below it
+    its deviation.
 
-    The channels of one kind that share a unit share a figure; what else there is stands in tabs behind.
+    The channels of one kind that share a unit share a figure; what else there is stands in tabs
+    behind.
     """
     columns = []
     for kind, part, unit, words in (
-        ("joint", "position", "m", "joint variable"), ("joint", "position", "rad", "joint variable"),
+        ("joint", "position", "m", "joint variable"),
+        ("joint", "position", "rad", "joint variable"),
         ("link", "tip_deflection", "m", "tip flexural displacement, link"),
-    ):  # fmt: skip
+    ):
         pattern = rf"/{kind}/(\d+)/{part}"
-        shown = {p: s for p, s in scene.signals.items() if s.unit == unit and re.search(pattern + "$", p)}
+        shown = {
+            p: s for p, s in scene.signals.items() if s.unit == unit and re.search(pattern + "$", p)
+        }
         if not shown:
             continue
         numbers = _numbers(shown, pattern)
         name = f"{words} {', '.join(map(str, numbers))}"
-        below = {p: s for p, s in scene.deviations.items() if s.unit == unit and re.search(pattern + "$", p)}
+        below = {
+            p: s
+            for p, s in scene.deviations.items()
+            if s.unit == unit and re.search(pattern + "$", p)
+        }
         ends = [f"/{kind}/{i}/" for i in numbers]
-        behind = {p: s for p, s in scene.signals.items() if p not in shown and any(end in p for end in ends)}
+        behind = {
+            p: s
+            for p, s in scene.signals.items()
+            if p not in shown and any(end in p for end in ends)
+        }
         views = [_plot(name, shown), *_by_part(behind)]
         if kind == "link":
             views += _one("tip position", scene.signals, r"/.+/tip/[xy]")
-            views += _one("deviation of the tip", scene.deviations, r".*/deviation/(tip/[xy]|tip_distance)")
+            views += _one(
+                "deviation of the tip", scene.deviations, r".*/deviation/(tip/[xy]|tip_distance)"
+            )
         upper = _tabs(views)
-        columns.append(rrb.Vertical(upper, _plot(f"deviation of {name}", below), row_shares=[5, 3]) if below else upper)
+        columns.append(
+            rrb.Vertical(upper, _plot(f"deviation of {name}", below), row_shares=[5, 3])
+            if below
+            else upper
+        )
     return columns
 
 
 def _by_part(signals: Signals) -> list[Any]:
     """A plot for each quantity, by the last part of its path."""
     parts = dict.fromkeys(path.rsplit("/", 1)[1] for path in signals)
-    return [_plot(part.replace("_", " "), {p: s for p, s in signals.items() if p.endswith(f"/{part}")}) for part in parts]
+    return [
+        _plot(part.replace("_", " "), {p: s for p, s in signals.items() if p.endswith(f"/{part}")})
+        for part in parts
+    ]
 
 
 def _shares(scene: Scene, arms: int) -> list[float]:
@@ -165,11 +229,14 @@ def _shares(scene: Scene, arms: int) -> list[float]:
 
 
 def _plots(scene: Scene) -> list[Any]:
-    """Up to four columns of plots: joints that slide, joints that turn, links, deviations; what belongs together in tabs."""
+    """Up to four columns of plots: joints that slide, joints that turn, links, deviations; what
+    belongs together in tabs."""
     signals, columns = scene.signals, []
     group = CURVES // len(scene.sources)
     for unit in ("m", "rad"):
-        numbers = _numbers((path for path, s in signals.items() if s.unit == unit), r"/joint/(\d+)/position")
+        numbers = _numbers(
+            (path for path, s in signals.items() if s.unit == unit), r"/joint/(\d+)/position"
+        )
         views = [
             v
             for k, part in enumerate(("position", "velocity", "drive"))
@@ -180,7 +247,9 @@ def _plots(scene: Scene) -> list[Any]:
     links = _numbers(signals, r"/link/(\d+)/tip_(?:deflection|slope)")
     tip = _one("tip position", signals, r"/.+/tip/[xy]")
     bend = [
-        v for k, part in enumerate(("tip_deflection", "tip_slope")) for v in _grouped(signals, "link", part, links, group, k == 0)
+        v
+        for k, part in enumerate(("tip_deflection", "tip_slope"))
+        for v in _grouped(signals, "link", part, links, group, k == 0)
     ]
     if bend or tip:
         columns.append(bend + tip)
@@ -190,7 +259,9 @@ def _plots(scene: Scene) -> list[Any]:
         columns[-1].extend(energy)
     elif energy:
         columns.append(energy)
-    shown = re.compile(r"/.+/(joint/\d+/(position|velocity|drive)|link/\d+/tip_(deflection|slope)|energy/\w+|tip/[xy])")
+    shown = re.compile(
+        r"/.+/(joint/\d+/(position|velocity|drive)|link/\d+/tip_(deflection|slope)|energy/\w+|tip/[xy])"
+    )
     rest = {path: s for path, s in signals.items() if not shown.fullmatch(path)}
     further = [
         _plot(f"other [{unit}]", {p: s for p, s in rest.items() if s.unit == unit})
@@ -210,7 +281,11 @@ def _deviations(scene: Scene) -> list[Any]:
     apart = scene.deviations
     links = _numbers(apart, r"/link/(\d+)/tip_deflection")
     views = _grouped(apart, "link", "tip_deflection", links, CURVES // 2, True, "deviation of ")
-    views += _one("of the tip" if views else "deviation of the tip", apart, r".*/deviation/(tip/[xy]|tip_distance)")
+    views += _one(
+        "of the tip" if views else "deviation of the tip",
+        apart,
+        r".*/deviation/(tip/[xy]|tip_distance)",
+    )
     for unit in ("m", "rad"):
         same = {path: s for path, s in apart.items() if s.unit == unit}
         views += _grouped(
@@ -225,13 +300,31 @@ def _deviations(scene: Scene) -> list[Any]:
     return views
 
 
-def _grouped(signals: Signals, kind: str, part: str, numbers: list[int], group: int, full: bool, before: str = "") -> list[Any]:
-    """Plots of one quantity, `group` joints or links at a time; `full`: the name says which even where they are all."""
+def _grouped(
+    signals: Signals,
+    kind: str,
+    part: str,
+    numbers: list[int],
+    group: int,
+    full: bool,
+    before: str = "",
+) -> list[Any]:
+    """Plots of one quantity, `group` joints or links at a time; `full`: the name says which even
+    where they are all."""
     views = []
     for k in range(0, len(numbers), group):
         some = numbers[k : k + group]
-        found = {path: s for path, s in signals.items() for i in some if path.endswith(f"/{kind}/{i}/{part}")}
-        which = f", {kind}{'s' if len(some) > 1 else ''} {', '.join(map(str, some))}" if full or len(numbers) > group else ""
+        found = {
+            path: s
+            for path, s in signals.items()
+            for i in some
+            if path.endswith(f"/{kind}/{i}/{part}")
+        }
+        which = (
+            f", {kind}{'s' if len(some) > 1 else ''} {', '.join(map(str, some))}"
+            if full or len(numbers) > group
+            else ""
+        )
         if found:
             views.append(_plot(before + part.replace("_", " ") + which, found))
     return views
@@ -254,7 +347,8 @@ def _plot(name: str, signals: Signals) -> Any:
 
 
 def value_range(signals: Signals) -> tuple[float, float]:
-    """The range of a plot's vertical axis: all values, room for the legend above them, and two numbers to read off."""
+    """The range of a plot's vertical axis: all values, room for the legend above them, and two
+    numbers to read off."""
     low, high = min(s.low for s in signals.values()), max(s.high for s in signals.values())
     if high - low <= 1e-9 * max(abs(low), abs(high)):
         spare = 0.1 * max(abs(low), abs(high)) or 1.0
@@ -262,7 +356,8 @@ def value_range(signals: Signals) -> tuple[float, float]:
     lines = sum(-(-len(s.label) // LINE_CHARS) for s in signals.values())
     share = min((LINE_PX * lines + 14) / PLOT_PX, 0.6)
     low, high = low - 0.05 * (high - low), high + (high - low) * share / (1 - share)
-    # The viewer numbers powers of ten, and tenths of them while there are few: see that two numbers fit.
+    # The viewer numbers powers of ten, and tenths of them while there are few: see that two numbers
+    # fit.
     power = 10.0 ** math.floor(math.log10(high - low))
     if (high - low) / power > 1.2 and math.floor(high / power) - math.ceil(low / power) < 1:
         up, down = (math.floor(high / power) + 1) * power, (math.ceil(low / power) - 1) * power
@@ -271,7 +366,8 @@ def value_range(signals: Signals) -> tuple[float, float]:
 
 
 def _moving(signals: Signals) -> Signals:
-    """Without those that are 0 all the time, such as the potential energy of a robot in the horizontal plane."""
+    """Without those that are 0 all the time, such as the potential energy of a robot in the
+    horizontal plane."""
     return {path: s for path, s in signals.items() if s.low or s.high}
 
 
@@ -284,9 +380,14 @@ def _numbers(paths: Iterable[str], pattern: str) -> list[int]:
 
 
 def _log_columns() -> Any:
-    """Level and text: the text itself has the time, which the viewer would cut short, and names the source."""
+    """Level and text: the text itself has the time, which the viewer would cut short, and names the
+    source."""
     kinds = rrb.encodings.TextLogColumnKind
-    shown = [rrb.encodings.TextLogColumn(kind=kind, visible=True) for kind in (kinds.LogLevel, kinds.Body)]
+    shown = [
+        rrb.encodings.TextLogColumn(kind=kind, visible=True)
+        for kind in (kinds.LogLevel, kinds.Body)
+    ]
     return rrb.TextLogColumns(
-        timeline_columns=[rrb.encodings.TimelineColumn(timeline="time", visible=False)], text_log_columns=shown
+        timeline_columns=[rrb.encodings.TimelineColumn(timeline="time", visible=False)],
+        text_log_columns=shown,
     )

@@ -1,28 +1,42 @@
-"""A live view of an experiment: a Rerun server on this machine that a viewer may join late, or never, or leave.
+"""A live view of an experiment: a Rerun server on this machine that a viewer may join late, or
+never, or leave.
 
-Rerun's calls take milliseconds: they are made in a thread of their own, from a queue, so that the board's line does not wait.
+Rerun's calls take milliseconds: they are made in a thread of their own, from a queue, so that the
+board's line does not wait.
 """
 
 from __future__ import annotations
 
 import queue
+import socket
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import rerun as rr
-import rerun.blueprint as rrb
+
+from flexura.optional import Optional
+
+if TYPE_CHECKING:
+    import rerun as rr
+else:
+    rr = Optional("rerun", "view")
+from flexura.optional import Optional
+
+if TYPE_CHECKING:
+    import rerun.blueprint as rrb
+else:
+    rrb = Optional("rerun.blueprint", "view")
 
 import flexura as fx
 from flexura.errors import InputError
 
-from ..board.declaration import CONTROL_HZ, State
-from ..experiment.measure import UNITS, Sensor, channels
+from ..board.protocol.declaration import CONTROL_HZ, State
 from ..experiment.plan import Plan
-from .poses import with_poses
-from .record import times
+from ..recordings.unit_conversion import UNITS, Sensor, channels
+from ..runs.poses import with_poses
+from .writer import times
 
 HOST = "127.0.0.1"
 MEMORY = "500MB"  # what the server keeps for viewers that join late
@@ -36,16 +50,24 @@ COLOURS = ((32, 164, 84), (150, 150, 150), (160, 84, 204))  # measured, asked, c
 
 
 @contextmanager
-def serve(plan: Plan, sensor: Sensor, robot: fx.Robot, title: str, port: int) -> Iterator[Callable[[np.ndarray, float], None]]:
-    """Serve the view while the context lasts; it gives what takes new reports. Raises InputError for a port in use."""
+def serve(
+    plan: Plan, sensor: Sensor, robot: fx.Robot, title: str, port: int
+) -> Iterator[Callable[[np.ndarray, float], None]]:
+    """Serve the view while the context lasts; it gives what takes new reports. Raises InputError
+    for a port in use."""
     _free(port)
     waiting: queue.Queue[np.ndarray | None] = queue.Queue()
     with rr.RecordingStream("flexura-live") as rec:
-        rec.set_sinks(rr.GrpcServerSink(HOST, port, server_memory_limit=MEMORY), default_blueprint=_blueprint(title, robot))
+        rec.set_sinks(
+            rr.GrpcServerSink(HOST, port, server_memory_limit=MEMORY),
+            default_blueprint=_blueprint(title, robot),
+        )
         rec.set_log_time_enabled(False)
         rec.send_recording_name(title)
         _style(rec, title)
-        writer = threading.Thread(target=_write, args=(rec, waiting, plan, sensor, robot), name="live view", daemon=True)
+        writer = threading.Thread(
+            target=_write, args=(rec, waiting, plan, sensor, robot), name="live view", daemon=True
+        )
         writer.start()
         try:
             yield lambda reports, part: waiting.put(reports) if len(reports) else None
@@ -58,14 +80,15 @@ def serve(plan: Plan, sensor: Sensor, robot: fx.Robot, title: str, port: int) ->
 
 def _free(port: int) -> None:
     """Rerun itself says nothing when it cannot have the port."""
-    import socket
-
     with socket.socket() as trial:
         trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             trial.bind((HOST, port))
         except (OSError, OverflowError) as error:
-            expected = f"cannot be had ({getattr(error, 'strerror', None) or error}): expected a free TCP port"
+            expected = (
+                f"cannot be had ({getattr(error, 'strerror', None) or error}): expected a "
+                f"free TCP port"
+            )
             raise InputError(expected, key="--live-port", value=port) from None
 
 
@@ -73,11 +96,16 @@ def _blueprint(title: str, robot: fx.Robot) -> rrb.Blueprint:
     reach = sum(link.length_m for link in robot.links)
     low, high = robot.links[0].joint.limits or (0.0, 0.0)
     half = 0.6 * reach
-    bounds = rrb.VisualBounds2D(x_range=[low - 0.1 * reach, high + 1.1 * reach], y_range=[-half, half])
+    bounds = rrb.VisualBounds2D(
+        x_range=[low - 0.1 * reach, high + 1.1 * reach], y_range=[-half, half]
+    )
     plots = [
-        rrb.TimeSeriesView(origin="/", contents=[f"/experiment/{c}" for c in names], name=name) for name, names in PLOTS.items()
+        rrb.TimeSeriesView(origin="/", contents=[f"/experiment/{c}" for c in names], name=name)
+        for name, names in PLOTS.items()
     ]
-    arm = rrb.Spatial2DView(origin="/", contents=["/experiment/arm"], name=title, visual_bounds=bounds)
+    arm = rrb.Spatial2DView(
+        origin="/", contents=["/experiment/arm"], name=title, visual_bounds=bounds
+    )
     about = rrb.TextDocumentView(origin="/about", name="about")
     return rrb.Blueprint(
         rrb.Vertical(rrb.Horizontal(arm, about, column_shares=[3, 1]), rrb.Grid(*plots)),
@@ -90,19 +118,30 @@ def _blueprint(title: str, robot: fx.Robot) -> rrb.Blueprint:
 
 
 def _style(rec: rr.RecordingStream, title: str) -> None:
-    text = f"# {title}\n\nLive. The recording itself is in the run's folder.\n\nGreen: measured. Grey: set-point. Violet: pulses."
+    text = (
+        f"# {title}\n\nLive. The recording itself is in the run's folder.\n\nGreen: measured. "
+        f"Grey: set-point. Violet: pulses."
+    )
     rec.log("about", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
     thick: Any = rr.Radius.ui_points(3.0)
     style = rr.LineStrips2D.from_fields(colors=[COLOURS[0]], radii=[thick])
     rec.log("experiment/arm", style, static=True)
-    rec.log("experiment/arm", rr.Transform3D(scale=[1.0, -1.0, 1.0]), static=True)  # a 2D view's y points down
+    rec.log(
+        "experiment/arm", rr.Transform3D(scale=[1.0, -1.0, 1.0]), static=True
+    )  # a 2D view's y points down
     for names in PLOTS.values():
         for name, colour in zip(names, COLOURS, strict=False):
             kind = name.rpartition("/")[2].replace("_", " ")
-            rec.log(f"experiment/{name}", rr.SeriesLines(colors=[colour], widths=[1.8], names=[kind]), static=True)
+            rec.log(
+                f"experiment/{name}",
+                rr.SeriesLines(colors=[colour], widths=[1.8], names=[kind]),
+                static=True,
+            )
 
 
-def _write(rec: rr.RecordingStream, waiting: queue.Queue[Any], plan: Plan, sensor: Sensor, robot: fx.Robot) -> None:
+def _write(
+    rec: rr.RecordingStream, waiting: queue.Queue[Any], plan: Plan, sensor: Sensor, robot: fx.Robot
+) -> None:
     start: int | None = None
     while (reports := waiting.get()) is not None:
         if start is None:
@@ -115,20 +154,32 @@ def _write(rec: rr.RecordingStream, waiting: queue.Queue[Any], plan: Plan, senso
         for names in PLOTS.values():
             for name in names:
                 if np.isfinite(values[name]).any():
-                    rec.send_columns(f"experiment/{name}", index, rr.Scalars.columns(scalars=values[name]))
+                    rec.send_columns(
+                        f"experiment/{name}", index, rr.Scalars.columns(scalars=values[name])
+                    )
         line = _arm({name: v[-1:] for name, v in values.items()}, robot)
         if np.isfinite(line).all():
             strip = rr.LineStrips2D.columns(strips=[line.astype(np.float32)])
-            rec.send_columns("experiment/arm", times((ticks[-1:] - start) / CONTROL_HZ, ticks[-1:] - start), strip)
+            rec.send_columns(
+                "experiment/arm",
+                times((ticks[-1:] - start) / CONTROL_HZ, ticks[-1:] - start),
+                strip,
+            )
 
 
 def _arm(values: dict[str, np.ndarray], robot: fx.Robot) -> np.ndarray:
     """The arm's line at one instant, (points, 2) in the base frame."""
-    run, _ = with_poses(fx.Run(np.zeros(1), values, {name: UNITS[name] for name in values}, {"robot": robot.to_dict()}))
+    run, _ = with_poses(
+        fx.Run(
+            np.zeros(1), values, {name: UNITS[name] for name in values}, {"robot": robot.to_dict()}
+        )
+    )
     x1, y1, a1 = (float(run[f"link/1/{part}"][0]) for part in ("x", "y", "angle"))
     x2, y2, a2 = (float(run[f"link/2/{part}"][0]) for part in ("x", "y", "angle"))
     w = np.array([run[f"link/2/deflection/{k}"][0] for k in range(9)])
     along = np.linspace(0.0, robot.links[1].length_m, 9)
-    strip = np.stack([x2 + along * np.cos(a2) - w * np.sin(a2), y2 + along * np.sin(a2) + w * np.cos(a2)], axis=1)
+    strip = np.stack(
+        [x2 + along * np.cos(a2) - w * np.sin(a2), y2 + along * np.sin(a2) + w * np.cos(a2)], axis=1
+    )
     length = robot.links[0].length_m
     return np.concatenate([[[x1, y1], [x1 + length * np.cos(a1), y1 + length * np.sin(a1)]], strip])

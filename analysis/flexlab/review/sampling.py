@@ -1,4 +1,5 @@
-"""Which samples of a run are drawn: shapes at frame rate, long signals thinned without losing their extremes."""
+"""Which samples of a run are drawn: shapes at frame rate, long signals thinned without losing their
+extremes."""
 
 from __future__ import annotations
 
@@ -10,7 +11,8 @@ MAX_SAMPLES = 1_000_000  # scalars of one review: beyond, the viewer needs secon
 
 
 def frames(t: np.ndarray) -> np.ndarray:
-    """Indices (F,) of the samples whose shape is drawn: at most FRAME_RATE a second and MAX_FRAMES in all, both ends included."""
+    """Indices (F,) of the samples whose shape is drawn: at most FRAME_RATE a second and MAX_FRAMES
+    in all, both ends included."""
     t = np.asarray(t, dtype=float)
     if len(t) == 0:
         return np.zeros(0, dtype=np.int64)
@@ -21,14 +23,21 @@ def frames(t: np.ndarray) -> np.ndarray:
 
 
 def thinned(y: np.ndarray, budget: int) -> np.ndarray:
-    """Ascending indices (K,), K <= budget + 2, that keep the smallest and largest value and one gap (NaN) of each equal block."""
+    """Ascending indices (K,), K <= budget + 2, that keep the smallest and largest value and one gap
+    (NaN) of each equal block."""
     y = np.asarray(y, dtype=float)
     if len(y) <= budget:
         return np.arange(len(y), dtype=np.int64)
     blocks = max(budget // 3, 1)
     per = -(-len(y) // blocks)
-    padded = np.append(y, np.full(blocks * per - len(y), y[-1])).reshape(blocks, per)  # repeating the end adds no new value
+    padded = np.append(y, np.full(blocks * per - len(y), y[-1])).reshape(
+        blocks, per
+    )  # repeating the end adds no new value
     gap = np.isnan(padded)
-    places = [np.where(gap, np.inf, padded).argmin(axis=1), np.where(gap, -np.inf, padded).argmax(axis=1), gap.argmax(axis=1)]
+    places = [
+        np.where(gap, np.inf, padded).argmin(axis=1),
+        np.where(gap, -np.inf, padded).argmax(axis=1),
+        gap.argmax(axis=1),
+    ]
     keep = np.concatenate([np.arange(blocks) * per + place for place in places] + [[0, len(y) - 1]])
     return np.unique(np.minimum(keep, len(y) - 1)).astype(np.int64)

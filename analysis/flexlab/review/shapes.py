@@ -1,8 +1,9 @@
 """The curves that a review draws, computed from a run's channels and its robot; plain numpy.
 
-A flexible link: the deflection at its nine stations is interpolated by a cubic spline, clamped at the hub and with the
-slope of the channel `tip_slope` at its tip, and placed in the link's hub frame. With geometric stiffening a point at x
-moves to x - 1/2 int_0^x w'^2, as in the model, so that the curve ends at the tip.
+A flexible link: the deflection at its nine stations is interpolated by a cubic spline, clamped at
+the hub and with the slope of the channel `tip_slope` at its tip, and placed in the link's hub
+frame. With geometric stiffening a point at x moves to x - 1/2 int_0^x w'^2, as in the model, so
+that the curve ends at the tip.
 """
 
 from __future__ import annotations
@@ -12,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from flexura.io import STATIONS, Run
 from flexura.robot import Link, Robot
-from flexura.run import STATIONS, Run
 
 PER_STATION = 3  # curve points in each interval between stations
 POINTS = (STATIONS - 1) * PER_STATION + 1
@@ -24,9 +25,10 @@ _GAUSS = np.polynomial.legendre.leggauss(3)  # exact for the square of a quadrat
 class Curves:
     """Shapes of one run at its frames, in the base frame [m]; y up. A frame without a value is NaN.
 
-    `index` (F,) samples of the run; `undeformed` (F, flexible links, 2, 2), `deformed` (F, flexible links, POINTS, 2);
-    `rigid` (F, rigid links, 2, 2); `pins` (F, R joints, 2); `sliders` (F, P joints, 5, 2), closed rectangles;
-    `tip` (F, 2); `trace` (K, 2), the tip's path; `rail` (2, 2) or None.
+    `index` (F,) samples of the run; `undeformed` (F, flexible links, 2, 2), `deformed` (F, flexible
+    links, POINTS, 2); `rigid` (F, rigid links, 2, 2); `pins` (F, R joints, 2); `sliders` (F, P
+    joints, 5, 2), closed rectangles; `tip` (F, 2); `trace` (K, 2), the tip's path; `rail` (2, 2) or
+    None.
     """
 
     index: np.ndarray
@@ -44,7 +46,11 @@ def has_shapes(run: Run) -> bool:
     """Whether the run's channels say where its links are."""
     links = len(run.meta.get("robot", {}).get("link", []))
     poses = (f"link/{i}/{part}" for i in range(1, links + 1) for part in ("x", "y", "angle"))
-    return links > 0 and all(name in run for name in poses) and bool(np.isfinite(run["link/1/x"]).any())
+    return (
+        links > 0
+        and all(name in run for name in poses)
+        and bool(np.isfinite(run["link/1/x"]).any())
+    )
 
 
 def curves(run: Run, index: np.ndarray, size: float) -> Curves:
@@ -65,7 +71,11 @@ def curves(run: Run, index: np.ndarray, size: float) -> Curves:
             pins.append(pose[:, :2])
         else:
             sliders.append(place(*slider(run, i, link, pose, index, size)))
-    tip = np.stack([run["tip/x"][index], run["tip/y"][index]], axis=1) if "tip/x" in run and "tip/y" in run else end
+    tip = (
+        np.stack([run["tip/x"][index], run["tip/y"][index]], axis=1)
+        if "tip/x" in run and "tip/y" in run
+        else end
+    )
     trace = tip[np.isfinite(tip).all(axis=1)]
     f = len(index)
     return Curves(
@@ -82,11 +92,14 @@ def curves(run: Run, index: np.ndarray, size: float) -> Curves:
 
 
 def bent(run: Run, i: int, link: Link, index: np.ndarray, shortening: bool) -> np.ndarray:
-    """Link i's curve in its hub frame, (F, POINTS, 2) [m]; straight where the run has no stations."""
+    """Link i's curve in its hub frame, (F, POINTS, 2) [m]; straight where the run has no
+    stations."""
     x = np.linspace(0.0, link.length_m, POINTS)
     names = [f"link/{i}/deflection/{k}" for k in range(STATIONS)]
     if not all(name in run for name in names):
-        return np.broadcast_to(np.stack([x, np.zeros(POINTS)], axis=1), (len(index), POINTS, 2)).copy()
+        return np.broadcast_to(
+            np.stack([x, np.zeros(POINTS)], axis=1), (len(index), POINTS, 2)
+        ).copy()
     at = np.linspace(0.0, link.length_m, STATIONS)
     known = np.stack([run[name][index] for name in names], axis=1)
     slope_name = f"link/{i}/tip_slope"
@@ -94,7 +107,10 @@ def bent(run: Run, i: int, link: Link, index: np.ndarray, shortening: bool) -> n
         known = np.concatenate([known, run[slope_name][index][:, None]], axis=1)
     # The spline is linear in what is known: build it once, for unit values.
     unit = np.eye(known.shape[1])
-    ends = ((1, np.zeros(len(unit))), (1, unit[:, STATIONS]) if slope_name in run else (2, np.zeros(len(unit))))
+    ends = (
+        (1, np.zeros(len(unit))),
+        (1, unit[:, STATIONS]) if slope_name in run else (2, np.zeros(len(unit))),
+    )
     spline = CubicSpline(at, unit[:, :STATIONS].T, bc_type=ends)
     w = known @ spline(x).T
     if not shortening:
@@ -107,10 +123,15 @@ def bent(run: Run, i: int, link: Link, index: np.ndarray, shortening: bool) -> n
     return np.stack([x - np.concatenate([np.zeros((len(index), 1)), lost], axis=1), w], axis=2)
 
 
-def slider(run: Run, i: int, link: Link, pose: np.ndarray, index: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
-    """The pose (F, 3) of the rectangle that marks a Pa's hub or a Pb's sleeve, and its corners (1, 5, 2)."""
+def slider(
+    run: Run, i: int, link: Link, pose: np.ndarray, index: np.ndarray, size: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """The pose (F, 3) of the rectangle that marks a Pa's hub or a Pb's sleeve, and its corners (1,
+    5, 2)."""
     at = pose.copy()
-    if link.joint.type == "Pa":  # the hub lies along the previous link, link i leaves it at the fixed angle
+    if (
+        link.joint.type == "Pa"
+    ):  # the hub lies along the previous link, link i leaves it at the fixed angle
         at[:, 2] -= link.joint.angle_rad
     else:  # the sleeve is where link i passes, d before the end of the link
         name = f"joint/{i}/position"
@@ -122,28 +143,43 @@ def slider(run: Run, i: int, link: Link, pose: np.ndarray, index: np.ndarray, si
 
 
 def place(pose: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Points (F or 1, n, 2) of a moving frame with pose (F, 3) [m, m, rad] in the base frame, (F, n, 2)."""
+    """Points (F or 1, n, 2) of a moving frame with pose (F, 3) [m, m, rad] in the base frame, (F,
+    n, 2)."""
     c, s = np.cos(pose[:, 2])[:, None], np.sin(pose[:, 2])[:, None]
     x, y = points[..., 0], points[..., 1]
     return np.stack([pose[:, :1] + c * x - s * y, pose[:, 1:2] + s * x + c * y], axis=2)
 
 
 def rail(run: Run, robot: Robot, size: float) -> np.ndarray | None:
-    """Both ends (2, 2) of the line on which a first joint Pa slides: its limits and its travel, and a little more."""
+    """Both ends (2, 2) of the line on which a first joint Pa slides: its limits and its travel, and
+    a little more."""
     joint = robot.links[0].joint
     if joint.type != "Pa":
         return None
     travel = run["link/1/x"][np.isfinite(run["link/1/x"])]
-    reach = [*travel[[travel.argmin(), travel.argmax()]], *(joint.limits or ())] if len(travel) else [0.0]
+    reach = (
+        [*travel[[travel.argmin(), travel.argmax()]], *(joint.limits or ())]
+        if len(travel)
+        else [0.0]
+    )
     return np.array([[min(reach) - 1.5 * size, 0.0], [max(reach) + 1.5 * size, 0.0]])
 
 
 def extent(runs: list[Run]) -> tuple[np.ndarray, np.ndarray]:
-    """The lower left and the upper right corner [m] of everything that moves in the runs, with a margin."""
+    """The lower left and the upper right corner [m] of everything that moves in the runs, with a
+    margin."""
     seen = []
     for run in runs:
         c = curves(run, np.unique(np.linspace(0, len(run) - 1, 400).astype(int)), 0.0)
-        parts = [c.undeformed, c.deformed, c.rigid, c.pins, c.sliders, c.tip, *([c.rail] if c.rail is not None else [])]
+        parts = [
+            c.undeformed,
+            c.deformed,
+            c.rigid,
+            c.pins,
+            c.sliders,
+            c.tip,
+            *([c.rail] if c.rail is not None else []),
+        ]
         seen += [part.reshape(-1, 2) for part in parts]
     points = np.concatenate(seen)
     points = points[np.isfinite(points).all(axis=1)]
@@ -159,7 +195,8 @@ def extent(runs: list[Run]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def grid(low: np.ndarray, high: np.ndarray) -> tuple[float, np.ndarray]:
-    """A round spacing [m] and the lines (n, 2, 2) of a square grid that covers the picture and as much again on every side."""
+    """A round spacing [m] and the lines (n, 2, 2) of a square grid that covers the picture and as
+    much again on every side."""
     rough = float(max(high - low)) / 4.5
     power = 10.0 ** np.floor(np.log10(rough))
     step = float(power * max(m for m in (1.0, 2.0, 5.0) if m * power <= rough * 1.0001))

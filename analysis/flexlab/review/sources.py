@@ -7,14 +7,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from flexura.errors import InputError
-from flexura.run import Run
+from flexura.io import Run
 
-from .. import naming
-from .poses import with_poses
+from ..runs import labels
+from ..runs.poses import with_poses
 from .shapes import has_shapes
 
 Colour = tuple[int, int, int]
-COLOURS: dict[str, Colour] = {"simulation": (36, 123, 214), "twin": (240, 120, 24), "experiment": (32, 164, 84)}
+COLOURS: dict[str, Colour] = {
+    "simulation": (36, 123, 214),
+    "twin": (240, 120, 24),
+    "experiment": (32, 164, 84),
+}
 SECOND: Colour = (160, 84, 204)  # the second of two runs from the same kind of source
 OTHER: Colour = (110, 110, 110)
 DEVIATION: Colour = (214, 64, 140)
@@ -26,12 +30,15 @@ NAMES = {
     OTHER: "grey",
 }
 
-_HIDDEN = re.compile(r"link/\d+/(x|y|angle|deflection/\d+)")  # drawn as shapes, not as curves over time
+_HIDDEN = re.compile(
+    r"link/\d+/(x|y|angle|deflection/\d+)"
+)  # drawn as shapes, not as curves over time
 
 
 @dataclass(frozen=True)
 class Source:
-    """One run of a review: its root in the entity tree, what it is called, its colour; `computed`: its poses are no channels."""
+    """One run of a review: its root in the entity tree, what it is called, its colour; `computed`:
+    its poses are no channels."""
 
     root: str
     label: str
@@ -50,12 +57,13 @@ class Source:
 
 
 def sources(runs: Sequence[Run]) -> list[Source]:
-    """One or two runs with their names. Raises InputError for another number of runs, or one without samples."""
+    """One or two runs with their names. Raises InputError for another number of runs, or one
+    without samples."""
     if not 1 <= len(runs) <= 2:
         raise InputError("one run, or two to compare", key="runs", value=len(runs))
     found: list[Source] = []
     for run in runs:
-        kind = naming.kind(run)
+        kind = labels.kind(run)
         if len(run) == 0:
             raise InputError("a run with samples; this one is empty", key="run", value=kind)
         root = re.sub(r"[^a-z0-9_]", "_", kind.lower())
@@ -63,18 +71,24 @@ def sources(runs: Sequence[Run]) -> list[Source]:
         if found and found[0].root == root:
             root, colour, again = f"{root}_2", SECOND, " 2"
         placed, computed = with_poses(run)
-        found.append(Source(root, naming.called(run, again), colour, placed, computed))
+        found.append(Source(root, labels.called(run, again), colour, placed, computed))
     return found
 
 
 def against_experiment(shown: Sequence[Source]) -> bool:
     """Whether these are a calculation and an experiment, in this order."""
-    return len(shown) == 2 and [naming.kind(s.run) == "experiment" for s in shown] == [False, True]
+    return len(shown) == 2 and [labels.kind(s.run) == "experiment" for s in shown] == [False, True]
 
 
 def order(names: list[str], units: dict[str, str]) -> dict[str, int]:
     """Which tone each channel gets: its place, from 0, among those that share a plot with it."""
-    fixed = {"energy/strain": 1, "energy/potential": 2, "energy/loss": 1, "tip/y": 1, "tip_distance": 2}
+    fixed = {
+        "energy/strain": 1,
+        "energy/potential": 2,
+        "energy/loss": 1,
+        "tip/y": 1,
+        "tip_distance": 2,
+    }
     places: dict[str, int] = {}
     seen: dict[tuple[str, str], int] = {}
     for name in names:

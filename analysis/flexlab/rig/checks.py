@@ -31,7 +31,8 @@ class Check:
 
 @dataclass(frozen=True)
 class Peaks:
-    """The largest position (both ways), speed and acceleration that a motion asks of a joint, in m or rad and s."""
+    """The largest position (both ways), speed and acceleration that a motion asks of a joint, in m
+    or rad and s."""
 
     lowest: float
     highest: float
@@ -41,16 +42,21 @@ class Peaks:
 
 def peaks(motion: fx.Signal, duration_s: float) -> Peaks:
     """Sampled 2000 times, and at the signal's own breaks."""
-    t = np.union1d(np.linspace(0.0, duration_s, 2001), motion.breaks[(motion.breaks >= 0) & (motion.breaks <= duration_s)])
+    t = np.union1d(
+        np.linspace(0.0, duration_s, 2001),
+        motion.breaks[(motion.breaks >= 0) & (motion.breaks <= duration_s)],
+    )
     r, v, a = np.array([motion(float(at)) for at in t]).T
     return Peaks(float(r.min()), float(r.max()), float(np.abs(v).max()), float(np.abs(a).max()))
 
 
 def examine(bench: Bench, manoeuvre: fx.Manoeuvre | None = None) -> list[Check]:
-    """All checks of a bench against what it is to follow (the rig file's own manoeuvre, if no other is given)."""
+    """All checks of a bench against what it is to follow (the rig file's own manoeuvre, if no other
+    is given)."""
     asked = manoeuvre or bench.manoeuvre
     found: list[Peaks | None] = [
-        peaks(joint.motion, asked.duration_s) if joint.motion is not None else None for joint in asked.drive.joints
+        peaks(joint.motion, asked.duration_s) if joint.motion is not None else None
+        for joint in asked.drive.joints
     ]
     out = [*_always(bench)]
     if found[0] is not None:
@@ -63,7 +69,8 @@ def examine(bench: Bench, manoeuvre: fx.Manoeuvre | None = None) -> list[Check]:
 
 
 def _carriage(bench: Bench, peak: Peaks) -> list[Check]:
-    """Speed by the motor's line n = n0 U / U0 (1 - M / (M0 U / U0)), force by M = F lead / (2 pi efficiency)."""
+    """Speed by the motor's line n = n0 U / U0 (1 - M / (M0 U / U0)), force by M = F lead / (2 pi
+    efficiency)."""
     rig, settings = bench.rig, configuration(bench)
     motor, screw = rig.motor, rig.screw
     part = min(settings["voltage_max_V"], rig.driver.supply_V) / motor.rated_voltage_V
@@ -78,7 +85,8 @@ def _carriage(bench: Bench, peak: Peaks) -> list[Check]:
             "carriage speed",
             peak.speed <= loaded,
             f"{1e3 * peak.speed:.1f} mm/s = {rpm * peak.speed:.0f} rpm of the screw",
-            f"{1e3 * loaded:.1f} mm/s = {rpm * loaded:.0f} rpm under load, {1e3 * free:.1f} mm/s without",
+            f"{1e3 * loaded:.1f} mm/s = {rpm * loaded:.0f} rpm under load, {1e3 * free:.1f} mm/s "
+            f"without",
             "a motor of a lower gear ratio, a screw of a larger lead, or a slower motion",
         ),
         Check(
@@ -89,7 +97,14 @@ def _carriage(bench: Bench, peak: Peaks) -> list[Check]:
             "a stronger motor or a slower motion",
         ),
         _inside("carriage range", peak, bench.limits[0], 1e3, "mm"),
-        _below("carriage speed limit", peak.speed, settings["speed_max_1_m_s"], "speed_max_1_m_s", 1e3, "mm/s"),
+        _below(
+            "carriage speed limit",
+            peak.speed,
+            settings["speed_max_1_m_s"],
+            "speed_max_1_m_s",
+            1e3,
+            "mm/s",
+        ),
     ]
 
 
@@ -98,7 +113,10 @@ def _rotary(bench: Bench, peak: Peaks) -> list[Check]:
     rate = peak.speed * settings["stepper_steps_per_rad"]
     strip, payload = bench.robot.links[1], bench.robot.payload
     x = np.linspace(0.0, strip.length_m, 201)
-    inertia = float(np.trapezoid(strip.mass_per_length(x) * x**2, x)) + payload.mass_kg * strip.length_m**2
+    inertia = (
+        float(np.trapezoid(strip.mass_per_length(x) * x**2, x))
+        + payload.mass_kg * strip.length_m**2
+    )
     inertia += payload.inertia_kg_m2 + strip.joint.hub_inertia_kg_m2 + strip.joint.rotor_inertia
     torque, holding = inertia * peak.acceleration, bench.rig.stepper.holding_torque_N_m
     return [
@@ -117,20 +135,46 @@ def _rotary(bench: Bench, peak: Peaks) -> list[Check]:
             "a stronger stepper or a slower motion",
         ),
         _inside("joint 2 range", peak, bench.limits[1], 1.0, "rad"),
-        _below("joint 2 speed limit", peak.speed, settings["speed_max_2_rad_s"], "speed_max_2_rad_s", 1.0, "rad/s"),
-        _below("joint 2 rate limit", peak.speed, settings["rate_max_2_rad_s"], "rate_max_2_rad_s", 1.0, "rad/s"),
         _below(
-            "joint 2 acceleration", peak.acceleration, settings["acceleration_max_2_rad_s2"], "acceleration_max_2_rad_s2", 1.0,
+            "joint 2 speed limit",
+            peak.speed,
+            settings["speed_max_2_rad_s"],
+            "speed_max_2_rad_s",
+            1.0,
+            "rad/s",
+        ),
+        _below(
+            "joint 2 rate limit",
+            peak.speed,
+            settings["rate_max_2_rad_s"],
+            "rate_max_2_rad_s",
+            1.0,
+            "rad/s",
+        ),
+        _below(
+            "joint 2 acceleration",
+            peak.acceleration,
+            settings["acceleration_max_2_rad_s2"],
+            "acceleration_max_2_rad_s2",
+            1.0,
             "rad/s^2",
         ),
-    ]  # fmt: skip
+    ]
 
 
 def _edges(bench: Bench, one: Peaks, two: Peaks) -> Check:
     settings = configuration(bench)
-    rate = one.speed * settings["motor_counts_per_m"] + two.speed * settings["stepper_counts_per_rad"]
+    rate = (
+        one.speed * settings["motor_counts_per_m"] + two.speed * settings["stepper_counts_per_rad"]
+    )
     advice = "encoders of fewer pulses, or a slower motion"
-    return Check("encoder edges", rate <= EDGE_RATE_MAX_1_S, f"{rate:.0f} 1/s", f"{EDGE_RATE_MAX_1_S:.0f} 1/s", advice)
+    return Check(
+        "encoder edges",
+        rate <= EDGE_RATE_MAX_1_S,
+        f"{rate:.0f} 1/s",
+        f"{EDGE_RATE_MAX_1_S:.0f} 1/s",
+        advice,
+    )
 
 
 def _always(bench: Bench) -> list[Check]:
@@ -164,7 +208,8 @@ def _always(bench: Bench) -> list[Check]:
         Check(
             "flex sensor's resolution",
             count_mm <= 4.0,
-            f"{count_mm:.2f} mm of tip deflection for a count of 10 bits ({tip_per_bend(bench):.3f} m for a radian of bend)",
+            f"{count_mm:.2f} mm of tip deflection for a count of 10 bits "
+            f"({tip_per_bend(bench):.3f} m for a radian of bend)",
             "4 mm",
             "a divider_ohm near the sensor's resistance",
         ),
@@ -180,7 +225,9 @@ def moved_mass(bench: Bench) -> float:
         along = np.linspace(0.0, carriage.length_m, 201)
         own = float(np.trapezoid(carriage.mass_per_length(along), along))
     hubs = sum(link.joint.hub_mass_kg for link in (carriage, strip))
-    return own + hubs + float(np.trapezoid(strip.mass_per_length(x), x)) + bench.robot.payload.mass_kg
+    return (
+        own + hubs + float(np.trapezoid(strip.mass_per_length(x), x)) + bench.robot.payload.mass_kg
+    )
 
 
 def _inside(what: str, peak: Peaks, limits: tuple[float, float], factor: float, unit: str) -> Check:
@@ -195,4 +242,10 @@ def _inside(what: str, peak: Peaks, limits: tuple[float, float], factor: float, 
 
 
 def _below(what: str, needed: float, limit: float, setting: str, factor: float, unit: str) -> Check:
-    return Check(what, needed < limit, f"{factor * needed:.4g} {unit}", f"{factor * limit:.4g} {unit}", f"a higher {setting}")
+    return Check(
+        what,
+        needed < limit,
+        f"{factor * needed:.4g} {unit}",
+        f"{factor * limit:.4g} {unit}",
+        f"a higher {setting}",
+    )

@@ -1,7 +1,9 @@
-"""The rig: a frozen, validated description of what stands between the board and the robot, read from a TOML file.
+"""The rig: a frozen, validated description of what stands between the board and the robot, read
+from a TOML file.
 
-What the robot file says (length of the strip, limits of the carriage) is taken from there; what the protocol declares (names,
-ranges and defaults of the board's settings) from the protocol. No constant stands in two places.
+What the robot file says (length of the strip, limits of the carriage) is taken from there; what the
+protocol declares (names, ranges and defaults of the board's settings) from the protocol. No
+constant stands in two places.
 """
 
 from __future__ import annotations
@@ -17,31 +19,53 @@ from pydantic import Field, ValidationError, model_validator
 
 import flexura as fx
 from flexura.errors import InputError, WrongValue
-from flexura.explain import explain
-from flexura.files import read_toml
+from flexura.io import explain, read_toml
 
-from ..board.declaration import CONFIG
+from ..board.protocol.declaration import CONFIG
 from .emulation import Emulated
-from .table import Table, above
+from .toml_table import Table, above
 
 DERIVED = (  # settings of the board that follow from the other tables
-    "motor_counts_per_m", "stepper_steps_per_rad", "stepper_counts_per_rad", "supply_V", "supply_divider",
-    "flex_zero", "flex_c1_m", "flex_c2_m", "flex_c3_m",
-    "position_min_1_m", "position_max_1_m", "position_min_2_rad", "position_max_2_rad",
-)  # fmt: skip
+    "motor_counts_per_m",
+    "stepper_steps_per_rad",
+    "stepper_counts_per_rad",
+    "supply_V",
+    "supply_divider",
+    "flex_zero",
+    "flex_c1_m",
+    "flex_c2_m",
+    "flex_c3_m",
+    "position_min_1_m",
+    "position_max_1_m",
+    "position_min_2_rad",
+    "position_max_2_rad",
+)
 
 
 class Motor(Table):
-    """The geared DC motor of joint 1 with the encoder on its own shaft; torque and speed are the output shaft's."""
+    """The geared DC motor of joint 1 with the encoder on its own shaft; torque and speed are the
+    output shaft's."""
 
     rated_voltage_V: float = above("volts", "the voltage of the motor's data", 60)
-    no_load_speed_rpm: float = above("turns a minute", "the output shaft's speed without load at the rated voltage", 2e4)
+    no_load_speed_rpm: float = above(
+        "turns a minute", "the output shaft's speed without load at the rated voltage", 2e4
+    )
     no_load_current_A: float = above("amperes", "the current without load", 50)
-    stall_torque_N_m: float = above("newton metres", "the output shaft's torque at rest at the rated voltage", 100)
+    stall_torque_N_m: float = above(
+        "newton metres", "the output shaft's torque at rest at the rated voltage", 100
+    )
     stall_current_A: float = above("amperes", "the current at rest at the rated voltage", 200)
-    gear_ratio: float = Field(ge=1, le=1e4, description="turns of the motor for one of the output shaft, between 1 and 10000")
+    gear_ratio: float = Field(
+        ge=1,
+        le=1e4,
+        description="turns of the motor for one of the output shaft, between 1 and 10000",
+    )
     encoder_pulses: int = Field(
-        ge=1, le=10000, description="pulses of each encoder line in a turn of the motor, a whole number from 1 to 10000"
+        ge=1,
+        le=10000,
+        description=(
+            "pulses of each encoder line in a turn of the motor, a whole number from 1 to 10000"
+        ),
     )
 
 
@@ -49,30 +73,51 @@ class Screw(Table):
     """The lead screw of joint 1."""
 
     lead_m: float = Field(
-        gt=0, le=0.1, description="the carriage's travel in a turn of the screw in metres, above 0 and at most 0.1 (0.008, not 8)"
+        gt=0,
+        le=0.1,
+        description=(
+            "the carriage's travel in a turn of the screw in metres, above 0 and at most "
+            "0.1 (0.008, not 8)"
+        ),
     )
-    efficiency: float = Field(gt=0, le=1, description="force x travel / work at the screw, above 0 and at most 1")
+    efficiency: float = Field(
+        gt=0, le=1, description="force x travel / work at the screw, above 0 and at most 1"
+    )
 
 
 class Driver(Table):
     """The motor's bridge and supply."""
 
     supply_V: float = above("volts", "the motor's supply", 30)
-    supply_divider: float = Field(ge=1, le=10, description="motor supply / voltage at A1, between 1 and 10")
-    current_max_A: float = above("amperes", "the current that bridge, supply and fuse give for seconds", 200)
+    supply_divider: float = Field(
+        ge=1, le=10, description="motor supply / voltage at A1, between 1 and 10"
+    )
+    current_max_A: float = above(
+        "amperes", "the current that bridge, supply and fuse give for seconds", 200
+    )
 
 
 class Stepper(Table):
     """The stepper of joint 2, on the joint's axis, and the joint's encoder."""
 
-    full_steps_per_turn: int = Field(ge=4, le=10000, description="full steps in a turn, a whole number from 4 to 10000")
+    full_steps_per_turn: int = Field(
+        ge=4, le=10000, description="full steps in a turn, a whole number from 4 to 10000"
+    )
     microsteps: int = Field(ge=1, le=256, description="microsteps in a full step: 1, 2, 4, ... 256")
     holding_torque_N_m: float = above("newton metres", "the holding torque", 100)
     encoder_pulses: int = Field(
-        ge=1, le=100000, description="pulses of each encoder line in a turn of the joint, a whole number from 1 to 100000"
+        ge=1,
+        le=100000,
+        description=(
+            "pulses of each encoder line in a turn of the joint, a whole number from 1 to 100000"
+        ),
     )
     limits_rad: tuple[float, float] | None = Field(
-        None, strict=False, description="two numbers in rad, the lower limit and a higher one, unless the robot file has them"
+        None,
+        strict=False,
+        description=(
+            "two numbers in rad, the lower limit and a higher one, unless the robot file has them"
+        ),
     )
 
     @model_validator(mode="after")
@@ -80,14 +125,23 @@ class Stepper(Table):
         if self.microsteps & (self.microsteps - 1):
             raise WrongValue("microsteps", self.microsteps, "a power of two: 1, 2, 4, ... 256")
         if self.limits_rad is not None and not self.limits_rad[0] < self.limits_rad[1]:
-            raise WrongValue("limits_rad", list(self.limits_rad), "the lower limit first, then a higher upper limit")
+            raise WrongValue(
+                "limits_rad",
+                list(self.limits_rad),
+                "the lower limit first, then a higher upper limit",
+            )
         return self
 
 
 class Calibration(Table):
-    """A measured calibration: tip deflection = c1 x + c2 x^2 + c3 x^3 with x = reading - zero, readings as a fraction of 5 V."""
+    """A measured calibration: tip deflection = c1 x + c2 x^2 + c3 x^3 with x = reading - zero,
+    readings as a fraction of 5 V."""
 
-    zero: float = Field(gt=0, lt=1, description="the straight strip's reading, a fraction of full scale between 0 and 1")
+    zero: float = Field(
+        gt=0,
+        lt=1,
+        description="the straight strip's reading, a fraction of full scale between 0 and 1",
+    )
     c1_m: float = Field(description="metres for x, a finite number")
     c2_m: float = Field(0.0, description="metres for x^2, a finite number")
     c3_m: float = Field(0.0, description="metres for x^3, a finite number")
@@ -98,26 +152,41 @@ class Calibration(Table):
     @model_validator(mode="after")
     def _square(self) -> Calibration:
         if self.covariance is not None and [len(row) for row in self.covariance] != [4] * 4:
-            raise WrongValue("covariance", self.covariance, "four rows of four numbers, of zero, c1_m, c2_m, c3_m")
+            raise WrongValue(
+                "covariance",
+                self.covariance,
+                "four rows of four numbers, of zero, c1_m, c2_m, c3_m",
+            )
         return self
 
 
 class Flex(Table):
-    """The flex sensor in its divider: resistance straight_ohm + ohm_per_rad times the bend over its length."""
+    """The flex sensor in its divider: resistance straight_ohm + ohm_per_rad times the bend over its
+    length."""
 
     length_m: float = above("metres", "the sensor's active length from the strip's root on", 1)
     straight_ohm: float = above("ohms", "the resistance on the straight strip", 1e7)
-    ohm_per_rad: float = Field(gt=0, le=1e7, description="ohms for a radian of bend over its length, above 0 and at most 1e7")
+    ohm_per_rad: float = Field(
+        gt=0,
+        le=1e7,
+        description="ohms for a radian of bend over its length, above 0 and at most 1e7",
+    )
     divider_ohm: float = above("ohms", "the resistor from A0 to ground", 1e7)
-    calibration: Calibration | None = Field(None, description="a table { zero, c1_m, c2_m, c3_m }, measured")
+    calibration: Calibration | None = Field(
+        None, description="a table { zero, c1_m, c2_m, c3_m }, measured"
+    )
 
 
 class Rig(Table):
     """The bench of one robot. Frozen; SI units."""
 
-    name: str = Field("", max_length=200, description="the rig's name, a text of at most 200 characters")
+    name: str = Field(
+        "", max_length=200, description="the rig's name, a text of at most 200 characters"
+    )
     robot: str = Field(description="the path of the robot file, from the rig file's folder")
-    manoeuvre: str = Field(description="the path of the manoeuvre file that this rig must be able to follow")
+    manoeuvre: str = Field(
+        description="the path of the manoeuvre file that this rig must be able to follow"
+    )
     motor: Motor = Field(description="a table [motor]")
     screw: Screw = Field(description="a table [screw]")
     driver: Driver = Field(description="a table [driver]")
@@ -125,7 +194,8 @@ class Rig(Table):
     flex: Flex = Field(description="a table [flex]")
     emulated: Emulated | None = Field(None, description="a table [emulated], for the emulated rig")
     board: dict[str, float] = Field(
-        default_factory=dict, description="a table of the board's settings, numbers by their names in the protocol"
+        default_factory=dict,
+        description="a table of the board's settings, numbers by their names in the protocol",
     )
 
     @model_validator(mode="after")
@@ -139,13 +209,18 @@ class Rig(Table):
                 raise WrongValue(f"board.{name}", value, f"a setting of the board; {hint}")
             item = CONFIG[name]
             if not item.least <= value <= item.greatest:
-                raise WrongValue(f"board.{name}", value, f"between {item.least:g} and {item.greatest:g} ({item.text})")
+                raise WrongValue(
+                    f"board.{name}",
+                    value,
+                    f"between {item.least:g} and {item.greatest:g} ({item.text})",
+                )
         return self
 
 
 @dataclass(frozen=True)
 class Bench:
-    """A rig file with the files that it names, and the joints' limits [m, rad] from whichever has them."""
+    """A rig file with the files that it names, and the joints' limits [m, rad] from whichever has
+    them."""
 
     file: str
     rig: Rig
@@ -157,7 +232,11 @@ class Bench:
     def emulated(self) -> Emulated:
         """The rig file's table [emulated]; InputError where it has none."""
         if self.rig.emulated is None:
-            raise InputError("missing: the emulated rig is described in a table [emulated]", key="emulated", file=self.file)
+            raise InputError(
+                "missing: the emulated rig is described in a table [emulated]",
+                key="emulated",
+                file=self.file,
+            )
         return self.rig.emulated
 
 
@@ -168,11 +247,16 @@ def recorded(tables: Any) -> Rig:
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))
-        raise InputError(f"expected the rig file's tables ({first['msg']})", key=f"rig.{where}", value=first["input"]) from None
+        raise InputError(
+            f"expected the rig file's tables ({first['msg']})",
+            key=f"rig.{where}",
+            value=first["input"],
+        ) from None
 
 
 def load(path: str | os.PathLike[str]) -> Bench:
-    """Read a rig file and the files it names. Raises InputError, naming file, key, value and what was expected."""
+    """Read a rig file and the files it names. Raises InputError, naming file, key, value and what
+    was expected."""
     name = os.fspath(path)
     data = read_toml(path)
     try:
@@ -183,36 +267,56 @@ def load(path: str | os.PathLike[str]) -> Bench:
     robot = fx.load(folder / rig.robot)
     carriage, strip = (robot.links * 2)[:2]
     if robot.structure != "PaR" or carriage.flexible or not strip.flexible:
-        expected = "expected a robot of type IV: a rigid link with joint Pa, a flexible one with joint R"
+        expected = (
+            "expected a robot of type IV: a rigid link with joint Pa, a flexible one with joint R"
+        )
         raise InputError(expected, key="robot", value=rig.robot, file=name)
     if carriage.joint.limits is None:
-        raise InputError("expected a robot whose carriage has limits", key="robot", value=rig.robot, file=name)
+        raise InputError(
+            "expected a robot whose carriage has limits", key="robot", value=rig.robot, file=name
+        )
     here, there = rig.stepper.limits_rad, strip.joint.limits
     turn = here or there
     if turn is None:
-        raise InputError("missing: the limits of joint 2 in rad, here or in the robot file", key="stepper.limits_rad", file=name)
+        raise InputError(
+            "missing: the limits of joint 2 in rad, here or in the robot file",
+            key="stepper.limits_rad",
+            file=name,
+        )
     if here and there:
         expected = "expected limits in one place: the robot file has them too"
         raise InputError(expected, key="stepper.limits_rad", value=list(here), file=name)
-    return Bench(name, rig, robot, fx.load_manoeuvre(folder / rig.manoeuvre, 2), (carriage.joint.limits, turn))
+    return Bench(
+        name,
+        rig,
+        robot,
+        fx.load_manoeuvre(folder / rig.manoeuvre, 2),
+        (carriage.joint.limits, turn),
+    )
 
 
 def configuration(bench: Bench) -> dict[str, float]:
     """All settings of the board, by their names in the protocol, in its order.
 
-    d = lead counts / (4 pulses ratio), theta = 2 pi steps / (full steps x microsteps). Raises InputError where a number that
-    follows from the rig is outside the board's range.
+    d = lead counts / (4 pulses ratio), theta = 2 pi steps / (full steps x microsteps). Raises
+    InputError where a number that follows from the rig is outside the board's range.
     """
     rig = bench.rig
     (low_1, high_1), (low_2, high_2) = bench.limits
     turn = 2 * math.pi
     derived = {
-        "motor_counts_per_m": 4 * rig.motor.encoder_pulses * rig.motor.gear_ratio / rig.screw.lead_m,
+        "motor_counts_per_m": 4
+        * rig.motor.encoder_pulses
+        * rig.motor.gear_ratio
+        / rig.screw.lead_m,
         "stepper_steps_per_rad": rig.stepper.full_steps_per_turn * rig.stepper.microsteps / turn,
         "stepper_counts_per_rad": 4 * rig.stepper.encoder_pulses / turn,
         "supply_V": rig.driver.supply_V,
         "supply_divider": rig.driver.supply_divider,
-        **{f"flex_{key}": value for key, value in calibration(bench).model_dump(exclude={"covariance"}).items()},
+        **{
+            f"flex_{key}": value
+            for key, value in calibration(bench).model_dump(exclude={"covariance"}).items()
+        },
         "position_min_1_m": low_1,
         "position_max_1_m": high_1,
         "position_min_2_rad": low_2,
@@ -222,7 +326,10 @@ def configuration(bench: Bench) -> dict[str, float]:
     for name, value in derived.items():
         item = CONFIG[name]
         if not item.least <= value <= item.greatest:
-            expected = f"a rig whose {name} lies between {item.least:g} and {item.greatest:g} ({item.text})"
+            expected = (
+                f"a rig whose {name} lies between {item.least:g} and {item.greatest:g} "
+                f"({item.text})"
+            )
             raise InputError(expected, key=name, value=value, file=bench.file)
     return {name: (derived | rig.board).get(name, item.default) for name, item in CONFIG.items()}
 
@@ -230,7 +337,8 @@ def configuration(bench: Bench) -> dict[str, float]:
 def tip_per_bend(bench: Bench) -> float:
     """Tip deflection for a radian of bend under the sensor [m/rad], of a strip that its tip loads.
 
-    alpha = (P / EI)(L s - s^2 / 2), w = P L^3 / (3 EI), so w / alpha = L^3 / (3 (L s - s^2 / 2)) (Euler-Bernoulli).
+    alpha = (P / EI)(L s - s^2 / 2), w = P L^3 / (3 EI), so w / alpha = L^3 / (3 (L s - s^2 / 2))
+    (Euler-Bernoulli).
     """
     length, sensor = bench.robot.links[1].length_m, bench.rig.flex.length_m
     return length**3 / (3 * (length * sensor - sensor**2 / 2))
@@ -239,8 +347,9 @@ def tip_per_bend(bench: Bench) -> float:
 def calibration(bench: Bench) -> Calibration:
     """The measured calibration, or the one that the sensor's data give.
 
-    With the reading r = R_f / (R_s + R_f) and z that of the straight strip, the bend is (R_f / k)(1 / r - 1 / z); its expansion
-    to the third order in x = r - z, times the tip deflection for a radian.
+    With the reading r = R_f / (R_s + R_f) and z that of the straight strip, the bend is (R_f / k)(1
+    / r - 1 / z); its expansion to the third order in x = r - z, times the tip deflection for a
+    radian.
     """
     flex = bench.rig.flex
     if flex.calibration is not None:

@@ -1,7 +1,8 @@
-"""The table `emulated` of a rig file: what the emulated rig has beyond the data of the parts, and how far it is from them.
+"""The table `emulated` of a rig file: what the emulated rig has beyond the data of the parts, and
+how far it is from them.
 
-Nothing of it reaches a board. A simulation of the nominal rig may use all but the truth, which is for the plant behind the
-emulated board only.
+Nothing of it reaches a board. A simulation of the nominal rig may use all but the truth, which is
+for the plant behind the emulated board only.
 """
 
 from __future__ import annotations
@@ -13,15 +14,19 @@ from pydantic import Field, model_validator
 
 from flexura.errors import WrongValue
 
-from .table import Table, above, from_zero
+from .toml_table import Table, above, from_zero
 
 
 class EmulatedMotor(Table):
     """The motor itself, before its gear."""
 
-    rotor_inertia_kg_m2: float = above("kg m^2", "the inertia of the motor's rotor, before the gear", 1e-2)
+    rotor_inertia_kg_m2: float = above(
+        "kg m^2", "the inertia of the motor's rotor, before the gear", 1e-2
+    )
     inductance_H: float = above("henries", "the inductance of the motor", 1)
-    starts_at_V: float = above("volts", "the voltage at which the motor starts to turn without load", 60)
+    starts_at_V: float = above(
+        "volts", "the voltage at which the motor starts to turn without load", 60
+    )
 
 
 class EmulatedDriver(Table):
@@ -43,15 +48,23 @@ class EmulatedCarriage(Table):
     coulomb_friction_N: float = from_zero("newtons", "the rail's Coulomb friction", 1e3)
     viscous_friction_N_s_m: float = from_zero("N s/m", "the rail's viscous friction", 1e4)
     presliding_m: float = above("metres", "how far the carriage gives way before it slides", 1e-3)
-    backlash_m: float = from_zero("metres", "the play between the nut and the screw, from flank to flank", 0.01)
-    contact_stiffness_N_m: float = above("N/m", "the stiffness of the nut on a flank of the screw", 1e7)
-    contact_damping_N_s_m: float = from_zero("N s/m", "the damping of the nut on a flank of the screw", 1e5)
+    backlash_m: float = from_zero(
+        "metres", "the play between the nut and the screw, from flank to flank", 0.01
+    )
+    contact_stiffness_N_m: float = above(
+        "N/m", "the stiffness of the nut on a flank of the screw", 1e7
+    )
+    contact_damping_N_s_m: float = from_zero(
+        "N s/m", "the damping of the nut on a flank of the screw", 1e5
+    )
 
 
 class EmulatedStepper(Table):
     """What a stepper has beside its holding torque."""
 
-    detent_torque_N_m: float = from_zero("newton metres", "the detent torque, without current too", 10)
+    detent_torque_N_m: float = from_zero(
+        "newton metres", "the detent torque, without current too", 10
+    )
     damping_N_m_s: float = from_zero("N m s/rad", "the rotor's damping: eddy currents, bearings", 1)
 
 
@@ -60,9 +73,15 @@ class EmulatedFlex(Table):
 
     from_m: float = from_zero("metres", "where on the strip the active length begins", 1)
     nonlinearity_1_rad: float = Field(
-        ge=-10, le=10, description="by what part a radian of bend changes the ohms for a radian, between -10 and 10"
+        ge=-10,
+        le=10,
+        description=(
+            "by what part a radian of bend changes the ohms for a radian, between -10 and 10"
+        ),
     )
-    noise_V: float = from_zero("volts", "the standard deviation of the noise at A0, new in every step", 1)
+    noise_V: float = from_zero(
+        "volts", "the standard deviation of the noise at A0, new in every step", 1
+    )
     drift_V: float = from_zero("volts", "the standard deviation of the drift at A0", 1)
     drift_s: float = above("seconds", "the time in which the drift forgets", 1e5)
 
@@ -71,11 +90,17 @@ FACTORS = ("stiffness", "damping", "payload", "friction", "backlash", "flex_gain
 
 
 def _factor(what: str) -> Any:
-    return Field(1.0, gt=0, le=10, description=f"the emulated rig's {what} / what the files say, above 0 and at most 10")
+    return Field(
+        1.0,
+        gt=0,
+        le=10,
+        description=f"the emulated rig's {what} / what the files say, above 0 and at most 10",
+    )
 
 
 class Truth(Table):
-    """Factors by which the emulated rig differs from its files: what an identification is to find."""
+    """Factors by which the emulated rig differs from its files: what an identification is to
+    find."""
 
     stiffness: float = _factor("bending stiffness of the strip")
     damping: float = _factor("damping of the strip")
@@ -88,19 +113,33 @@ class Truth(Table):
 class Ranges(Table):
     """Between which factors `random_truth` draws: pairs, the lower one first."""
 
-    stiffness: tuple[float, float] = Field((0.85, 1.15), strict=False, description="two factors above 0, the lower one first")
-    damping: tuple[float, float] = Field((0.6, 2.0), strict=False, description="two factors above 0, the lower one first")
-    payload: tuple[float, float] = Field((0.8, 1.25), strict=False, description="two factors above 0, the lower one first")
-    friction: tuple[float, float] = Field((0.7, 1.5), strict=False, description="two factors above 0, the lower one first")
-    backlash: tuple[float, float] = Field((0.5, 2.0), strict=False, description="two factors above 0, the lower one first")
-    flex_gain: tuple[float, float] = Field((0.85, 1.15), strict=False, description="two factors above 0, the lower one first")
+    stiffness: tuple[float, float] = Field(
+        (0.85, 1.15), strict=False, description="two factors above 0, the lower one first"
+    )
+    damping: tuple[float, float] = Field(
+        (0.6, 2.0), strict=False, description="two factors above 0, the lower one first"
+    )
+    payload: tuple[float, float] = Field(
+        (0.8, 1.25), strict=False, description="two factors above 0, the lower one first"
+    )
+    friction: tuple[float, float] = Field(
+        (0.7, 1.5), strict=False, description="two factors above 0, the lower one first"
+    )
+    backlash: tuple[float, float] = Field(
+        (0.5, 2.0), strict=False, description="two factors above 0, the lower one first"
+    )
+    flex_gain: tuple[float, float] = Field(
+        (0.85, 1.15), strict=False, description="two factors above 0, the lower one first"
+    )
 
     @model_validator(mode="after")
     def _ordered(self) -> Ranges:
         for name in FACTORS:
             low, high = getattr(self, name)
             if not 0 < low <= high <= 10:
-                raise WrongValue(name, [low, high], "two factors above 0 and at most 10, the lower one first")
+                raise WrongValue(
+                    name, [low, high], "two factors above 0 and at most 10, the lower one first"
+                )
         return self
 
 
@@ -114,10 +153,15 @@ class Emulated(Table):
     stepper: EmulatedStepper = Field(description="a table [emulated.stepper]")
     flex: EmulatedFlex = Field(description="a table [emulated.flex]")
     truth: Truth = Field(default_factory=Truth, description="a table [emulated.truth] of factors")
-    ranges: Ranges = Field(default_factory=Ranges, description="a table [emulated.ranges] of pairs of factors")
+    ranges: Ranges = Field(
+        default_factory=Ranges, description="a table [emulated.ranges] of pairs of factors"
+    )
 
 
 def random_truth(seed: int, ranges: Ranges | None = None) -> Truth:
-    """The truth of a rig drawn at random, each factor log-uniform in its range; the same seed, the same rig."""
+    """The truth of a rig drawn at random, each factor log-uniform in its range; the same seed, the
+    same rig."""
     random, within = np.random.default_rng([seed, 1]), ranges or Ranges()
-    return Truth(**{name: float(np.exp(random.uniform(*np.log(getattr(within, name))))) for name in FACTORS})
+    return Truth(
+        **{name: float(np.exp(random.uniform(*np.log(getattr(within, name))))) for name in FACTORS}
+    )

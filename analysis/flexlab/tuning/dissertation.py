@@ -1,7 +1,9 @@
-"""`flexura tune --dissertation`: both cases of types III and IV tuned, in the layout of tables 3.10 and 3.12, with their figures.
+"""`flexura tune --dissertation`: both cases of types III and IV tuned, in the layout of tables 3.10
+and 3.12, with their figures.
 
-What is demanded of case 2 is compared with what was reached, with an LQR tuned for the same objective (`reference.py`), and with
-what the drives allow at all: the shortest time in which each joint can go its way within its limits.
+What is demanded of case 2 is compared with what was reached, with an LQR tuned for the same
+objective (`reference.py`), and with what the drives allow at all: the shortest time in which each
+joint can go its way within its limits.
 """
 
 from __future__ import annotations
@@ -16,14 +18,14 @@ from rich.console import Group
 from rich.table import Table
 
 import flexura as fx
-from flexura.response import ERROR, OVERSHOOT, RESIDUAL, SETTLING, Response, strip_figures
+from flexura.control import ERROR, OVERSHOOT, RESIDUAL, SETTLING, Response, strip_figures
 
-from ..controlled import under
-from ..zeros import transmission
+from ..studies.transmission_zeros import transmission
 from .cases import PUBLISHED, STRUCTURES, TABLE
-from .engine import engine
+from .closed_loop import under
+from .executor import engine
 from .history import History
-from .reference import Reference, reference
+from .lqr_reference import Reference, reference
 from .result import Result, number, numbers, result, save
 from .search import Search, search
 from .task import Task
@@ -33,7 +35,8 @@ OVERSHOOT_MOST, SETTLING_PART, ERROR_MOST, RESIDUAL_PART = 0.05, 0.5, 1e-3, 0.1
 
 @dataclass(frozen=True)
 class Both:
-    """Both cases of a structure, and an LQR; `residual_m` of each, from when the later of both cases has settled."""
+    """Both cases of a structure, and an LQR; `residual_m` of each, from when the later of both
+    cases has settled."""
 
     name: str
     results: tuple[Result, Result]
@@ -54,19 +57,32 @@ class Both:
         return [
             ("overshoot at most 5 %", bool(most <= OVERSHOOT_MOST), f"{100 * most:.2g} %"),
             (
-                "settling at most half the dissertation's", bool((parts <= SETTLING_PART).all()),
-                ", ".join(f"{s:.3g} s of {p:g} s" for s, p in zip(joints[:, SETTLING], published[:, 1], strict=True)),
+                "settling at most half the dissertation's",
+                bool((parts <= SETTLING_PART).all()),
+                ", ".join(
+                    f"{s:.3g} s of {p:g} s"
+                    for s, p in zip(joints[:, SETTLING], published[:, 1], strict=True)
+                ),
             ),
             ("no state error (0.1 %)", bool(error <= ERROR_MOST), f"{100 * error:.1g} %"),
-            ("residual vibration at most a tenth of case 1", bool(ratio <= RESIDUAL_PART), f"{ratio:.2g} of it"),
-        ]  # fmt: skip
+            (
+                "residual vibration at most a tenth of case 1",
+                bool(ratio <= RESIDUAL_PART),
+                f"{ratio:.2g} of it",
+            ),
+        ]
 
 
 def study(
-    names: list[str], how: Search, folder: Path, scheduler: str | None = None, jobs: int | None = None,
+    names: list[str],
+    how: Search,
+    folder: Path,
+    scheduler: str | None = None,
+    jobs: int | None = None,
     report: Callable[[History], None] = lambda history: None,
-) -> tuple[list[Both], bool]:  # fmt: skip
-    """Tune both cases of the named structures and an LQR, each stored in a folder of its own; False: interrupted."""
+) -> tuple[list[Both], bool]:
+    """Tune both cases of the named structures and an LQR, each stored in a folder of its own;
+    False: interrupted."""
     out: list[Both] = []
     for name in names:
         structure, found = STRUCTURES[name](), []
@@ -87,11 +103,18 @@ def study(
 
 def both(name: str, first: Result, second: Result, possible: Reference) -> Both:
     """The two cases side by side, with what limits both."""
-    settled, left = float(np.nanmax([r.responses[0].joints[:, SETTLING] for r in (first, second)])), []
+    settled, left = (
+        float(np.nanmax([r.responses[0].joints[:, SETTLING] for r in (first, second)])),
+        [],
+    )
     for run in (first.runs[0], second.runs[0], possible.run):
         left.append(float(strip_figures(run.t, run["link/2/tip_deflection"], settled)[RESIDUAL]))
-    zeros = {row.drive: float(row.unstable.real.min()) for row in _zeros(first.task) if len(row.unstable)}
-    return Both(name, (first, second), possible, (left[0], left[1], left[2]), _shortest(first.task), zeros)
+    zeros = {
+        row.drive: float(row.unstable.real.min()) for row in _zeros(first.task) if len(row.unstable)
+    }
+    return Both(
+        name, (first, second), possible, (left[0], left[1], left[2]), _shortest(first.task), zeros
+    )
 
 
 def _zeros(task: Task) -> list[Any]:
@@ -101,7 +124,8 @@ def _zeros(task: Task) -> list[Any]:
 
 
 def _shortest(task: Task) -> tuple[float, ...]:
-    """The time that each joint takes to 98 % of its way with its output at its limit, the others locked [s]."""
+    """The time that each joint takes to 98 % of its way with its output at its limit, the others
+    locked [s]."""
     times = []
     for i in range(len(task.robots[0].links)):
         data = task.robots[0].to_dict()
@@ -111,7 +135,9 @@ def _shortest(task: Task) -> tuple[float, ...]:
         controller = under(system, task.manoeuvre, task.gains)
         joints = list(controller.joints)
         joints[i] = replace(joints[i], kp=1e9, ki=0.0, kd=0.0)  # type: ignore[arg-type]  # at its limit until it is there
-        run = fx.simulate(system, task.manoeuvre.t, replace(controller, joints=tuple(joints)), rtol=1e-5)
+        run = fx.simulate(
+            system, task.manoeuvre.t, replace(controller, joints=tuple(joints)), rtol=1e-5
+        )
         y = run[f"joint/{i + 1}/position"]
         there = (y - y[0]) / (run[f"joint/{i + 1}/reference"][-1] - y[0]) >= 0.98
         times.append(float(run.t[there.argmax()]) if there.any() else float("nan"))
@@ -132,28 +158,68 @@ def _tables(each: Both) -> list[Any]:
     for i, kind in enumerate(kinds, 1):
         for head in (f"link {i}\n{kind}\ncase 1", "\n\ncase 2", "\n\ndeviation", "\n\nLQR"):
             out.add_column(head, justify="right", no_wrap=True)
-    rows = (("rise time [s]", 1.0), ("settling time [s]", 1.0), ("overshoot [%]", 100.0), ("state error [%]", 100.0))
+    rows = (
+        ("rise time [s]", 1.0),
+        ("settling time [s]", 1.0),
+        ("overshoot [%]", 100.0),
+        ("state error [%]", 100.0),
+    )
     for k, (text, factor) in enumerate(rows):
         cells = []
         for i in range(len(kinds)):
             ours = [factor * each.response(case).joints[i, k] for case in (1, 2)]
             theirs = [PUBLISHED[each.name, case][i][k] for case in (1, 2)]
-            pairs = [*zip(ours, theirs, strict=True), (abs(ours[0] - ours[1]), abs(theirs[0] - theirs[1]))]
-            cells += [f"{_figure(a)} ({b:.3g})" for a, b in pairs] + [_figure(factor * each.lqr.response.joints[i, k])]
+            pairs = [
+                *zip(ours, theirs, strict=True),
+                (abs(ours[0] - ours[1]), abs(theirs[0] - theirs[1])),
+            ]
+            cells += [f"{_figure(a)} ({b:.3g})" for a, b in pairs] + [
+                _figure(factor * each.lqr.response.joints[i, k])
+            ]
         out.add_row(text.replace("[", "\\["), *cells)
     peaks = [1e3 * r.strip[0] for r in (each.response(1), each.response(2), each.lqr.response)]
-    for text, values in (("largest w [mm]", peaks), ("residual w [mm]", [1e3 * x for x in each.residual_m])):
+    for text, values in (
+        ("largest w [mm]", peaks),
+        ("residual w [mm]", [1e3 * x for x in each.residual_m]),
+    ):
         one, two, possible = values
-        out.add_row(text.replace("[", "\\["), "", "", "", "", number(one), number(two), number(abs(one - two)), number(possible))
-    lines = [f"{'reached' if ok else 'NOT reached'}: {demand} ({words})" for demand, ok, words in each.verdicts()]
+        out.add_row(
+            text.replace("[", "\\["),
+            "",
+            "",
+            "",
+            "",
+            number(one),
+            number(two),
+            number(abs(one - two)),
+            number(possible),
+        )
+    lines = [
+        f"{'reached' if ok else 'NOT reached'}: {demand} ({words})"
+        for demand, ok, words in each.verdicts()
+    ]
     drives = ", ".join(f"joint {i} {s:.3g} s" for i, s in enumerate(each.shortest_s, 1))
     lines += [f"a drive at its limit, the other joint locked: {drives} to 98 %"]
-    lines += [f"zeros in the right half plane, drive to tip: {', '.join(f'{n} {z:.3g} 1/s' for n, z in each.zeros_1_s.items())}"]
+    lines += [
+        f"zeros in the right half plane, drive to tip: "
+        f"{', '.join(f'{n} {z:.3g} 1/s' for n, z in each.zeros_1_s.items())}"
+    ]
     for case, r in enumerate(each.results, 1):
-        lines.append(f"case {case}: J = {r.best[0]:.4g}, {r.history.evaluations} evaluations; {r.task.weights.text()}")
-    lines.append(f"LQR, what is possible: J = {each.lqr.J:.4g}, {each.lqr.evaluations} designs{_other(each)}")
-    lines.append("rise: 10 to 90 %; settling: to within 2 %; state error: mean of the last tenth of the time; residual: half of")
-    lines.append("w's range from the instant at which the later of both cases has settled. The dissertation defines none.")
+        lines.append(
+            f"case {case}: J = {r.best[0]:.4g}, {r.history.evaluations} evaluations; "
+            f"{r.task.weights.text()}"
+        )
+    lines.append(
+        f"LQR, what is possible: J = {each.lqr.J:.4g}, {each.lqr.evaluations} designs{_other(each)}"
+    )
+    lines.append(
+        "rise: 10 to 90 %; settling: to within 2 %; state error: mean of the last tenth of the "
+        "time; residual: half of"
+    )
+    lines.append(
+        "w's range from the instant at which the later of both cases has settled. The dissertation "
+        "defines none."
+    )
     out.caption, out.caption_justify = "\n".join(lines), "left"
     return [out]
 
@@ -165,7 +231,11 @@ def _figure(value: float) -> str:
 def _other(each: Both) -> str:
     """Where the LQR's drives are not those of the cases."""
     theirs, ours = STRUCTURES[each.name]().reference.settings, each.results[0].task.gains.settings
-    limits = [f"{name} = {value:g}" for name, value in theirs.items() if "_max_" in name and name not in ours]
+    limits = [
+        f"{name} = {value:g}"
+        for name, value in theirs.items()
+        if "_max_" in name and name not in ours
+    ]
     return f"; in place of the stepper's rate {', '.join(limits)}" if limits else ""
 
 
@@ -173,11 +243,13 @@ def data(found: list[Both]) -> dict[str, Any]:
     """For JSON."""
     return {
         f"type {each.name}": {
-            "cases": [numbers(r) for r in each.results], "residual_m": list(each.residual_m), "shortest_s": list(each.shortest_s),
+            "cases": [numbers(r) for r in each.results],
+            "residual_m": list(each.residual_m),
+            "shortest_s": list(each.shortest_s),
             "right_half_plane_zeros_1_s": each.zeros_1_s,
             "published": [PUBLISHED[each.name, case] for case in (1, 2)],
             "lqr": {"J": each.lqr.J, "weights": each.lqr.weights} | each.lqr.response.numbers(),
             "verdicts": [{"demand": d, "reached": ok, "words": w} for d, ok, w in each.verdicts()],
         }
         for each in found
-    }  # fmt: skip
+    }

@@ -10,14 +10,15 @@ import numpy as np
 
 import flexura as fx
 from flexura.errors import InputError
-from flexura.files import write_bytes
+from flexura.io import write_bytes
 
 FILE = "state.npz"
 _ARRAYS = ("points", "goals", "figures", "reached")
 
 
 class History:
-    """All points of the unit cube that were tried, their goals and figures; `wall_s` of each generation."""
+    """All points of the unit cube that were tried, their goals and figures; `wall_s` of each
+    generation."""
 
     def __init__(self, digest: str, path: Path | None = None) -> None:
         self.digest, self.path = digest, path
@@ -28,7 +29,8 @@ class History:
 
     @staticmethod
     def open(folder: Path, digest: str) -> History:
-        """The history stored in `folder`, empty where there is none. Raises InputError for one of another search."""
+        """The history stored in `folder`, empty where there is none. Raises InputError for one of
+        another search."""
         history = History(digest, folder / FILE)
         assert history.path is not None
         for rest in folder.glob(f".{FILE}.*"):  # of a process that was killed while it wrote
@@ -39,9 +41,14 @@ class History:
             with np.load(history.path) as data:
                 found = {name: data[name] for name in data.files}
         except (OSError, ValueError, EOFError) as error:
-            raise InputError(f"expected the state of a search ({error})", key="--out", file=str(history.path)) from None
+            raise InputError(
+                f"expected the state of a search ({error})", key="--out", file=str(history.path)
+            ) from None
         if str(found.get("digest")) != digest:
-            expected = "expected an empty folder, or one of this search, of which --generations and --patience alone may change"
+            expected = (
+                "expected an empty folder, or one of this search, of which --generations "
+                "and --patience alone may change"
+            )
             raise InputError(expected, key="--out", value=str(folder))
         history.ends, history.wall_s = found["ends"].tolist(), found["wall_s"].tolist()
         history.stored, begin = len(history.ends), 0
@@ -54,7 +61,14 @@ class History:
     def __len__(self) -> int:
         return len(self.ends)
 
-    def add(self, points: np.ndarray, goals: np.ndarray, figures: np.ndarray, reached: np.ndarray, wall_s: float) -> None:
+    def add(
+        self,
+        points: np.ndarray,
+        goals: np.ndarray,
+        figures: np.ndarray,
+        reached: np.ndarray,
+        wall_s: float,
+    ) -> None:
         """One generation more, stored."""
         for name, array in zip(_ARRAYS, (points, goals, figures, reached), strict=True):
             self._parts[name].append(np.array(array))
@@ -67,15 +81,21 @@ class History:
             write_bytes(self.path, sink.getvalue())
 
     def told(self, generation: int, points: np.ndarray) -> np.ndarray:
-        """The goals of a stored generation. Raises InputError where the search asks for other points than were stored."""
+        """The goals of a stored generation. Raises InputError where the search asks for other
+        points than were stored."""
         stored = self._parts["points"][generation]
         if stored.shape != points.shape or not np.array_equal(stored, points):
-            expected = "expected a search stored by the same version of pymoo: this one takes another way"
-            raise InputError(expected, key="--out", value=f"generation {generation + 1}", file=str(self.path))
+            expected = (
+                "expected a search stored by the same version of pymoo: this one takes another way"
+            )
+            raise InputError(
+                expected, key="--out", value=f"generation {generation + 1}", file=str(self.path)
+            )
         return self._parts["goals"][generation]
 
     def all(self, name: str) -> np.ndarray:
-        """points (E, d), goals (E, 1 or 2), figures (E, R, k) or reached (E, R) of all evaluations."""
+        """points (E, d), goals (E, 1 or 2), figures (E, R, k) or reached (E, R) of all
+        evaluations."""
         return np.concatenate(self._parts[name])
 
     @property
@@ -84,13 +104,20 @@ class History:
 
     @property
     def best(self) -> int:
-        """Which evaluation is best; of two goals the one nearest to both of the front's ends, each goal over its range."""
+        """Which evaluation is best; of two goals the one nearest to both of the front's ends, each
+        goal over its range."""
         goals = self.all("goals")
         if goals.shape[1] == 1:
             return int(goals[:, 0].argmin())
         front = self.front()
         low, high = goals[front].min(axis=0), goals[front].max(axis=0)
-        return int(front[np.linalg.norm((goals[front] - low) / np.maximum(high - low, 1e-300), axis=1).argmin()])
+        return int(
+            front[
+                np.linalg.norm(
+                    (goals[front] - low) / np.maximum(high - low, 1e-300), axis=1
+                ).argmin()
+            ]
+        )
 
     def front(self) -> np.ndarray:
         """The evaluations that none other beats in all goals, by their first goal."""
@@ -103,7 +130,8 @@ class History:
         return np.array(kept)
 
     def merit(self, generation: int) -> float:
-        """The best J after so many generations; of two goals minus the area between the front and the first median."""
+        """The best J after so many generations; of two goals minus the area between the front and
+        the first median."""
         goals = self.all("goals")
         seen = goals[: self.ends[generation - 1]]
         if goals.shape[1] == 1:
@@ -117,14 +145,19 @@ class History:
                 top = y
         return -area
 
-    def run(self, names: list[str], values: np.ndarray, goals: tuple[str, ...], meta: dict[str, Any]) -> fx.Run:
-        """As a Run whose "time" is the number of the generation: the best so far, the generation's median, its settings."""
+    def run(
+        self, names: list[str], values: np.ndarray, goals: tuple[str, ...], meta: dict[str, Any]
+    ) -> fx.Run:
+        """As a Run whose "time" is the number of the generation: the best so far, the generation's
+        median, its settings."""
         every, count = self.all("goals"), len(self)
         starts = [0, *self.ends[:-1]]
         channels, best = {}, np.array([int(every[:end, 0].argmin()) for end in self.ends])
         for k, goal in enumerate(goals):
             channels[f"goal/{goal}/best"] = np.array([every[:end, k].min() for end in self.ends])
-            channels[f"goal/{goal}/median"] = np.array([np.median(every[a:b, k]) for a, b in zip(starts, self.ends, strict=True)])
+            channels[f"goal/{goal}/median"] = np.array(
+                [np.median(every[a:b, k]) for a, b in zip(starts, self.ends, strict=True)]
+            )
         channels["evaluations"] = np.array(self.ends, dtype=float)
         channels |= {f"setting/{name}": values[best, k] for k, name in enumerate(names)}
         about = {"source": "tuning", "complete": True, "events": [], "t": "generation"} | meta

@@ -1,4 +1,5 @@
-"""What a search comes to: the best gains, simulated again to a tighter tolerance, their figures, files, table and drawing."""
+"""What a search comes to: the best gains, simulated again to a tighter tolerance, their figures,
+files, table and drawing."""
 
 from __future__ import annotations
 
@@ -11,12 +12,11 @@ import numpy as np
 from rich.table import Table
 
 import flexura as fx
-from flexura.files import write_bytes
-from flexura.gains import Gains
-from flexura.response import Response, of_run
+from flexura.control import Gains, Response, of_run
+from flexura.io import write_bytes
 
-from ..controlled import under
-from . import free as freedom
+from . import search_space as freedom
+from .closed_loop import under
 from .history import History
 from .objective import HELP
 from .search import Search
@@ -27,7 +27,8 @@ RTOL = 1e-6
 
 @dataclass(frozen=True)
 class Result:
-    """The best gains (of a front: the balanced ones), their runs on every robot of the task, and the history."""
+    """The best gains (of a front: the balanced ones), their runs on every robot of the task, and
+    the history."""
 
     task: Task
     how: Search
@@ -44,7 +45,11 @@ class Result:
 
     def meta(self) -> dict[str, Any]:
         """Everything that the outcome depends on, in the result too."""
-        own = {"objective": self.task.weights.text(), "objective_terms": HELP} if not self.task.pareto else {}
+        own = (
+            {"objective": self.task.weights.text(), "objective_terms": HELP}
+            if not self.task.pareto
+            else {}
+        )
         return own | {"search": vars(self.how), "task": self.task.spec(), "complete": self.complete}
 
 
@@ -53,12 +58,14 @@ def result(task: Task, how: Search, history: History, complete: bool) -> Result:
     values = task.values(history.all("points")[history.best][None])[0]
     tuned = task.tuned(values)
     both = [simulated(fx.assemble(robot), task.manoeuvre, tuned) for robot in task.robots]
-    return Result(task, how, history, complete, tuned, tuple(b[0] for b in both), tuple(b[1] for b in both))
+    return Result(
+        task, how, history, complete, tuned, tuple(b[0] for b in both), tuple(b[1] for b in both)
+    )
 
 
 def simulated(
     system: fx.System, asked: fx.Manoeuvre, gains: Gains, settled: float | None = None
-) -> tuple[fx.Run, Response]:  # fmt: skip
+) -> tuple[fx.Run, Response]:
     """A run under gains, and its figures."""
     controller = under(system, asked, gains)
     run = fx.simulate(system, asked.t, controller, rtol=RTOL)
@@ -68,12 +75,22 @@ def simulated(
 
 def figures(run: fx.Run, controller: fx.Controller, settled: float | None = None) -> Response:
     """The figures of a run, simulated or not, under the controller that it had."""
-    references = [np.array([pid.reference(t)[0] for t in run.t]) for pid in controller.joints if isinstance(pid, fx.PID)]
-    return of_run(run, references, [pid.limit for pid in controller.joints if isinstance(pid, fx.PID)], settled)
+    references = [
+        np.array([pid.reference(t)[0] for t in run.t])
+        for pid in controller.joints
+        if isinstance(pid, fx.PID)
+    ]
+    return of_run(
+        run,
+        references,
+        [pid.limit for pid in controller.joints if isinstance(pid, fx.PID)],
+        settled,
+    )
 
 
 def save(found: Result, folder: Path) -> list[Path]:
-    """gains.toml, best/ (the nominal run), history/ (a Run), tuning.png and .svg; of a front also front/gains-NN.toml."""
+    """gains.toml, best/ (the nominal run), history/ (a Run), tuning.png and .svg; of a front also
+    front/gains-NN.toml."""
     paths = [folder / "gains.toml", folder / "best", folder / "history"]
     found.gains.write(paths[0])
     found.runs[0].save(paths[1])
@@ -96,19 +113,50 @@ def save(found: Result, folder: Path) -> list[Path]:
 def table(found: Result) -> Table:
     """The tuned settings, and the figures on every robot."""
     history, task = found.history, found.task
-    out = Table(title=f"{task.robots[0].name or 'robot'}: {task.manoeuvre.name}, {found.how.algorithm}", title_justify="left")
-    for name in ("robot", "", "rise [s]", "settling [s]", "overshoot [%]", "error [%]", "peak [mm]", "residual [mm]"):
-        out.add_column(name.replace("[", "\\["), justify="left" if name == "robot" else "right", no_wrap=True)
+    out = Table(
+        title=f"{task.robots[0].name or 'robot'}: {task.manoeuvre.name}, {found.how.algorithm}",
+        title_justify="left",
+    )
+    for name in (
+        "robot",
+        "",
+        "rise [s]",
+        "settling [s]",
+        "overshoot [%]",
+        "error [%]",
+        "peak [mm]",
+        "residual [mm]",
+    ):
+        out.add_column(
+            name.replace("[", "\\["), justify="left" if name == "robot" else "right", no_wrap=True
+        )
     for k, response in enumerate(found.responses):
         for i, row in enumerate(response.joints):
             strip = [number(1e3 * x) for x in response.strip[:2]] if i == 0 else ["", ""]
             name = _robot(found, k) if i == 0 else ""
-            out.add_row(name, str(i + 1), number(row[0]), number(row[1]), number(100 * row[2]), number(100 * row[3]), *strip)
+            out.add_row(
+                name,
+                str(i + 1),
+                number(row[0]),
+                number(row[1]),
+                number(100 * row[2]),
+                number(100 * row[3]),
+                *strip,
+            )
     goals = ", ".join(f"{n} = {v:.5g}" for n, v in zip(task.goals, found.best, strict=True))
-    done = f"{history.evaluations} evaluations in {len(history)} generations, {sum(history.wall_s):.3g} s; seed {found.how.seed}"
-    lines = [f"{goals}; {done}" + ("" if found.complete else "; interrupted: the same command goes on")]
+    done = (
+        f"{history.evaluations} evaluations in {len(history)} generations, "
+        f"{sum(history.wall_s):.3g} s; seed {found.how.seed}"
+    )
+    lines = [
+        f"{goals}; {done}" + ("" if found.complete else "; interrupted: the same command goes on")
+    ]
     lines += [f"worst of {len(task.robots)} robots"] if len(task.robots) > 1 else []
-    lines += [f"{len(history.front())} gains on the front, these are the balanced ones"] if task.pareto else [task.weights.text()]
+    lines += (
+        [f"{len(history.front())} gains on the front, these are the balanced ones"]
+        if task.pareto
+        else [task.weights.text()]
+    )
     tuned = freedom.named(task.free, task.values(history.all("points")[history.best][None])[0])
     lines += [", ".join(f"{name} = {value:.4g}" for name, value in tuned.items())]
     out.caption, out.caption_justify = "\n".join(lines), "left"
@@ -143,13 +191,22 @@ def _stiffness(link: Any) -> float:
 
 def numbers(found: Result) -> dict[str, Any]:
     """For JSON."""
-    tuned = freedom.named(found.task.free, found.task.values(found.history.all("points")[found.history.best][None])[0])
+    tuned = freedom.named(
+        found.task.free, found.task.values(found.history.all("points")[found.history.best][None])[0]
+    )
     return {
-        "goals": dict(zip(found.task.goals, map(float, found.best), strict=True)), "settings": tuned,
-        "evaluations": found.history.evaluations, "generations": len(found.history), "wall_s": sum(found.history.wall_s),
-        "robots": [{"robot": _robot(found, k)} | r.numbers() for k, r in enumerate(found.responses)],
-        "front": [list(map(float, found.history.all("goals")[k])) for k in found.history.front()] if found.task.pareto else None,
-    } | found.meta()  # fmt: skip
+        "goals": dict(zip(found.task.goals, map(float, found.best), strict=True)),
+        "settings": tuned,
+        "evaluations": found.history.evaluations,
+        "generations": len(found.history),
+        "wall_s": sum(found.history.wall_s),
+        "robots": [
+            {"robot": _robot(found, k)} | r.numbers() for k, r in enumerate(found.responses)
+        ],
+        "front": [list(map(float, found.history.all("goals")[k])) for k in found.history.front()]
+        if found.task.pareto
+        else None,
+    } | found.meta()
 
 
 def figure(found: Result) -> Any:
@@ -173,7 +230,12 @@ def figure(found: Result) -> Any:
         starts = [0, *history.ends[:-1]]
         left.plot(history.ends, best, color="C0", label="best so far")
         middle = [np.median(goals[a:b, 0]) for a, b in zip(starts, history.ends, strict=True)]
-        left.plot(history.ends, middle, color="0.7", label="median of the generation, abandoned ones as far as they came")
+        left.plot(
+            history.ends,
+            middle,
+            color="0.7",
+            label="median of the generation, abandoned ones as far as they came",
+        )
         left.set(xlabel="evaluations", ylabel="J", yscale="log")
     left.legend(frameon=False)
     left.grid(alpha=0.3)
@@ -185,7 +247,9 @@ def figure(found: Result) -> Any:
     right.set(xlabel="time [s]")
     bent = [name for name in run if name.endswith("tip_deflection")]
     if bent:
-        right.plot(run.t, 10 * run[bent[-1]], color="C3", linewidth=0.9, label="tip deflection [dm]")
+        right.plot(
+            run.t, 10 * run[bent[-1]], color="C3", linewidth=0.9, label="tip deflection [dm]"
+        )
     right.legend(frameon=False)
     right.grid(alpha=0.3)
     return drawing

@@ -1,10 +1,13 @@
-"""The search: pymoo's algorithms by ask and tell, one call of the engine a generation, every generation stored.
+"""The search: pymoo's algorithms by ask and tell, one call of the engine a generation, every
+generation stored.
 
-The algorithms are deterministic for a seed, so that what is stored is not their state but what they were told: a search that goes
-on asks again for the stored generations and tells their goals instead of running them. That holds for all four alike.
+The algorithms are deterministic for a seed, so that what is stored is not their state but what they
+were told: a search that goes on asks again for the stored generations and tells their goals instead
+of running them. That holds for all four alike.
 
-A run is abandoned where it is certain that the search has no use for it: one worse than every parent does not survive in the
-genetic algorithm, one worse than its particle's own best changes nothing in the swarm. The search goes the same way as without.
+A run is abandoned where it is certain that the search has no use for it: one worse than every
+parent does not survive in the genetic algorithm, one worse than its particle's own best changes
+nothing in the swarm. The search goes the same way as without.
 """
 
 from __future__ import annotations
@@ -17,24 +20,29 @@ from typing import Any, Protocol
 import numpy as np
 
 from flexura.errors import FlexuraError, InputError
-from flexura.request import program
+from flexura.population import program
 
-from .engine import Runs
+from .executor import Runs
 from .history import History
 from .objective import FAILED
 
 ALGORITHMS = {
-    "ga": "genetic algorithm, real-coded: tournaments of 3, crossover (SBX) 0.8, mutation 0.1; best of parents and young stay",
-    "pso": "particle swarm with adaptive inertia", "cma-es": "covariance matrix adaptation", "nsga2": "Pareto front: two goals",
-}  # fmt: skip
+    "ga": (
+        "genetic algorithm, real-coded: tournaments of 3, crossover (SBX) 0.8, mutation 0.1; "
+        "best of parents and young stay"
+    ),
+    "pso": "particle swarm with adaptive inertia",
+    "cma-es": "covariance matrix adaptation",
+    "nsga2": "Pareto front: two goals",
+}
 POLISHERS, NEAR = 16, 0.2  # individuals of a polish, and how far they begin from the best
 SAME = 1e-3  # an improvement by less than this fraction is none
 
 
 @dataclass(frozen=True)
 class Search:
-    """How to search; `patience`: generations without an improvement after which it ends; `polish`: generations of a local
-    CMA-ES from the best point after that."""
+    """How to search; `patience`: generations without an improvement after which it ends; `polish`:
+    generations of a local CMA-ES from the best point after that."""
 
     algorithm: str = "ga"
     population: int = 50
@@ -45,19 +53,37 @@ class Search:
 
     def __post_init__(self) -> None:
         if self.algorithm not in ALGORITHMS:
-            raise InputError(f"expected one of {', '.join(ALGORITHMS)}", key="--algorithm", value=self.algorithm)
-        for name, least in (("population", 4), ("generations", 1), ("seed", 0), ("patience", 1), ("polish", 0)):
+            raise InputError(
+                f"expected one of {', '.join(ALGORITHMS)}", key="--algorithm", value=self.algorithm
+            )
+        for name, least in (
+            ("population", 4),
+            ("generations", 1),
+            ("seed", 0),
+            ("patience", 1),
+            ("polish", 0),
+        ):
             if getattr(self, name) < least:
-                raise InputError(f"expected {least} or more", key=f"--{name}", value=getattr(self, name))
+                raise InputError(
+                    f"expected {least} or more", key=f"--{name}", value=getattr(self, name)
+                )
 
     def identity(self) -> dict[str, Any]:
         """What makes its generations what they are, the solver too; its ends do not."""
-        own = {"algorithm": self.algorithm, "population": self.population, "seed": self.seed, "program": program()}
-        return own | ({"generations": self.generations, "patience": self.patience} if self.polish else {})
+        own = {
+            "algorithm": self.algorithm,
+            "population": self.population,
+            "seed": self.seed,
+            "program": program(),
+        }
+        return own | (
+            {"generations": self.generations, "patience": self.patience} if self.polish else {}
+        )
 
 
 class Sought(Protocol):
-    """What a search asks of a task: how many settings are free, where to start, and the goals of an engine's figures."""
+    """What a search asks of a task: how many settings are free, where to start, and the goals of an
+    engine's figures."""
 
     @property
     def free(self) -> Sized: ...
@@ -69,21 +95,43 @@ class Sought(Protocol):
     def score(self, figures: np.ndarray, reached: np.ndarray) -> np.ndarray: ...
 
 
-def search(task: Sought, how: Search, engine: Runs, history: History, progress: Callable[[History], None]) -> bool:
-    """Go on from what `history` holds to the end of the search; every generation is stored as it is done. True: to its end, not
-    interrupted. Raises InputError where the stored generations are not this search's."""
+def search(
+    task: Sought, how: Search, engine: Runs, history: History, progress: Callable[[History], None]
+) -> bool:
+    """Go on from what `history` holds to the end of the search; every generation is stored as it is
+    done. True: to its end, not interrupted. Raises InputError where the stored generations are not
+    this search's."""
     from pymoo.algorithms.soo.nonconvex.cmaes import CMAES
 
     if task.pareto != (how.algorithm == "nsga2"):
-        raise InputError("expected nsga2 for two goals, and only for them", key="--algorithm", value=how.algorithm)
+        raise InputError(
+            "expected nsga2 for two goals, and only for them",
+            key="--algorithm",
+            value=how.algorithm,
+        )
     if task.pareto and how.polish:
-        raise InputError("expected none where there are two goals", key="--polish", value=how.polish)
+        raise InputError(
+            "expected none where there are two goals", key="--polish", value=how.polish
+        )
     try:
-        done = _stage(_algorithm(how, task.start()), how.generations, how, task, engine, history, progress, 0)
+        done = _stage(
+            _algorithm(how, task.start()), how.generations, how, task, engine, history, progress, 0
+        )
         if how.polish:
-            best = history.all("points")[int(history.all("goals")[: history.ends[done - 1], 0].argmin())]
+            best = history.all("points")[
+                int(history.all("goals")[: history.ends[done - 1], 0].argmin())
+            ]
             local = CMAES(x0=best, sigma=NEAR, popsize=POLISHERS, tolfun=1e-6, tolx=1e-5)
-            _stage(local, how.polish, replace(how, patience=how.polish), task, engine, history, progress, done)
+            _stage(
+                local,
+                how.polish,
+                replace(how, patience=how.polish),
+                task,
+                engine,
+                history,
+                progress,
+                done,
+            )
     except KeyboardInterrupt:
         return False
     if not len(history):
@@ -92,10 +140,17 @@ def search(task: Sought, how: Search, engine: Runs, history: History, progress: 
 
 
 def _stage(
-    algorithm: Any, generations: int, how: Search, task: Sought, engine: Runs, history: History,
-    progress: Callable[[History], None], first: int,
-) -> int:  # fmt: skip
-    """One algorithm to its end, its generations being the history's from `first` on; how many there are after it."""
+    algorithm: Any,
+    generations: int,
+    how: Search,
+    task: Sought,
+    engine: Runs,
+    history: History,
+    progress: Callable[[History], None],
+    first: int,
+) -> int:
+    """One algorithm to its end, its generations being the history's from `first` on; how many there
+    are after it."""
     from pymoo.core.evaluator import Evaluator
     from pymoo.core.problem import Problem
     from pymoo.problems.static import StaticProblem
@@ -103,7 +158,9 @@ def _stage(
     d, generation = len(task.free), first
     problem = Problem(n_var=d, n_obj=len(task.goals), xl=np.zeros(d), xu=np.ones(d))
     algorithm.setup(problem, termination=("n_gen", generations), seed=how.seed, verbose=False)
-    while algorithm.has_next() and not (generation - first > how.patience and _stagnant(history, generation, how.patience)):
+    while algorithm.has_next() and not (
+        generation - first > how.patience and _stagnant(history, generation, how.patience)
+    ):
         asked = algorithm.ask()
         if asked is None or len(asked) == 0:
             break
@@ -123,7 +180,8 @@ def _stage(
 
 
 def _algorithm(how: Search, start: np.ndarray) -> Any:
-    """pymoo's algorithm; its first generation is a Latin hypercube with `start` in it, CMA-ES begins there."""
+    """pymoo's algorithm; its first generation is a Latin hypercube with `start` in it, CMA-ES
+    begins there."""
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.algorithms.soo.nonconvex.cmaes import CMAES
     from pymoo.algorithms.soo.nonconvex.ga import GA
@@ -140,20 +198,28 @@ def _algorithm(how: Search, start: np.ndarray) -> Any:
     cross, change = SBX(prob=0.8, eta=10), PM(prob=1.0, prob_var=max(0.1, 1 / len(start)), eta=5)
     if how.algorithm == "ga":
         select = TournamentSelection(pressure=3, func_comp=_winners)
-        return GA(pop_size=how.population, sampling=first, selection=select, crossover=cross, mutation=change)
+        return GA(
+            pop_size=how.population,
+            sampling=first,
+            selection=select,
+            crossover=cross,
+            mutation=change,
+        )
     if how.algorithm == "pso":
         return PSO(pop_size=how.population, sampling=first)
     return NSGA2(pop_size=how.population, sampling=first, crossover=cross, mutation=change)
 
 
 def _winners(population: Any, drawn: np.ndarray, **_: Any) -> np.ndarray:
-    """The best (k, 1) of each tournament (k, 3); pymoo's own comparison looks at the first two only."""
+    """The best (k, 1) of each tournament (k, 3); pymoo's own comparison looks at the first two
+    only."""
     J = population.get("F")[:, 0]
     return drawn[np.arange(len(drawn)), J[drawn].argmin(axis=1)][:, None]
 
 
 def limits(algorithm: Any, count: int) -> np.ndarray:
-    """The J (count,) above which each of the points just asked for is of no use, inf where every J is: CMA-ES ranks all."""
+    """The J (count,) above which each of the points just asked for is of no use, inf where every J
+    is: CMA-ES ranks all."""
     from pymoo.algorithms.soo.nonconvex.ga import GA
     from pymoo.algorithms.soo.nonconvex.pso import PSO
 
@@ -169,6 +235,7 @@ def limits(algorithm: Any, count: int) -> np.ndarray:
 
 
 def _stagnant(history: History, generation: int, patience: int) -> bool:
-    """Was there no improvement in the last `patience` generations before this one? Of two goals: of the front's area."""
+    """Was there no improvement in the last `patience` generations before this one? Of two goals: of
+    the front's area."""
     now, before = history.merit(generation), history.merit(generation - patience)
     return bool(before - now <= SAME * abs(before))

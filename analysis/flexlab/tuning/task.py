@@ -1,4 +1,5 @@
-"""What is tuned on what: robots, a manoeuvre, a controller with free settings, and an objective. Plain data, that travels."""
+"""What is tuned on what: robots, a manoeuvre, a controller with free settings, and an objective.
+Plain data, that travels."""
 
 from __future__ import annotations
 
@@ -12,24 +13,25 @@ from typing import Any
 import numpy as np
 
 import flexura as fx
-from flexura.control import PID
+from flexura.control import PID, Gains
 from flexura.errors import InputError
-from flexura.gains import Gains
-from flexura.trials import Trials, trials
+from flexura.simulation import Trials, trials
 
-from ..controlled import under
-from . import free as freedom
 from . import objective
-from .free import Free
+from . import search_space as freedom
+from .closed_loop import under
 from .objective import Weights
+from .search_space import Free
 
-# of a search's runs, whose steps the ticks bound; what comes out is simulated again to 1e-6, with the mesh of the robot file
+# of a search's runs, whose steps the ticks bound; what comes out is simulated again to 1e-6, with
+# the mesh of the robot file
 RTOL, MODES = 1e-3, 2
 
 
 @dataclass(frozen=True)
 class Task:
-    """Robots (the nominal one first), what they are to do, `gains` with its free settings, weights; `pareto`: two objectives.
+    """Robots (the nominal one first), what they are to do, `gains` with its free settings, weights;
+    `pareto`: two objectives.
 
     The runs of a search keep `modes` of each flexible link (0: what the robot file says).
     """
@@ -53,18 +55,24 @@ class Task:
 
     @cached_property
     def controllers(self) -> list[fx.Controller]:
-        """The controller of each robot with the file's own gains. Raises InputError for a joint that has nowhere to go."""
+        """The controller of each robot with the file's own gains. Raises InputError for a joint
+        that has nowhere to go."""
         out = [under(system, self.manoeuvre, self.gains) for system in self.systems]
         for joint, link in zip(out[0].joints, self.robots[0].links, strict=True):
             assert isinstance(joint, PID)
             if joint.reference(self.manoeuvre.duration_s)[0] == link.joint.start:
-                raise InputError("expected a manoeuvre at whose end every joint is elsewhere than at its start", key="MANOEUVRE")
+                raise InputError(
+                    "expected a manoeuvre at whose end every joint is elsewhere than at its start",
+                    key="MANOEUVRE",
+                )
         return out
 
     @property
     def length_m(self) -> float:
         """Of the last flexible link, 1 where there is none."""
-        return next((link.length_m for link in reversed(self.robots[0].links) if link.flexible), 1.0)
+        return next(
+            (link.length_m for link in reversed(self.robots[0].links) if link.flexible), 1.0
+        )
 
     @property
     def goals(self) -> tuple[str, ...]:
@@ -80,7 +88,11 @@ class Task:
 
     def tuned(self, values: np.ndarray) -> Gains:
         """The gains file with the free settings at `values` (d,)."""
-        return Gains(self.gains.settings | freedom.named(self.free, values), self.gains.outputs, self.gains.file)
+        return Gains(
+            self.gains.settings | freedom.named(self.free, values),
+            self.gains.outputs,
+            self.gains.file,
+        )
 
     @cached_property
     def prices(self) -> np.ndarray:
@@ -102,35 +114,54 @@ class Task:
         """What runs are made with, one for each robot; for any number of threads."""
         m = self.manoeuvre
         both = zip(self.systems, self.controllers, strict=True)
-        return [trials(system, controller, m.duration_s, m.output_step_s, self.rtol) for system, controller in both]
+        return [
+            trials(system, controller, m.duration_s, m.output_step_s, self.rtol)
+            for system, controller in both
+        ]
 
     def run(
         self, robots: Sequence[Trials], points: np.ndarray, limits: np.ndarray | None = None
-    ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-        """Figures (B, R, k) and fractions reached (B, R) at points (B, d) of the unit cube, each abandoned where J exceeds its
-        limit (B,), inf for none: its figures are then lower bounds, 0 on the robots that it was not tried on any more."""
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Figures (B, R, k) and fractions reached (B, R) at points (B, d) of the unit cube, each
+        abandoned where J exceeds its limit (B,), inf for none: its figures are then lower bounds, 0
+        on the robots that it was not tried on any more."""
         limits = np.full(len(points), np.inf) if limits is None else limits
         values, left = self.values(points), np.arange(len(points))
         width = self.prices.shape[1]
-        figures, reached = np.zeros((len(points), len(robots), width)), np.zeros((len(points), len(robots)))
-        for k, (one, controller, base) in enumerate(zip(robots, self.controllers, self._rows, strict=True)):
-            found, far = one.run(freedom.rows(self.free, values[left], controller, base), self.prices, limits[left])
+        figures, reached = (
+            np.zeros((len(points), len(robots), width)),
+            np.zeros((len(points), len(robots))),
+        )
+        for k, (one, controller, base) in enumerate(
+            zip(robots, self.controllers, self._rows, strict=True)
+        ):
+            found, far = one.run(
+                freedom.rows(self.free, values[left], controller, base), self.prices, limits[left]
+            )
             figures[left, k], reached[left, k] = found, far
             left = left[(far == 1.0) | np.isinf(limits[left])]
         return figures, reached
 
     def spec(self) -> dict[str, Any]:
-        """All that the outcome depends on but the search, for metadata and to know a stored run again."""
+        """All that the outcome depends on but the search, for metadata and to know a stored run
+        again."""
         return {
-            "robots": [robot.to_dict() for robot in self.robots], "manoeuvre": self.manoeuvre.spec(),
-            "controller": self.gains.settings, "outputs": [{"kind": type(o).__name__, **vars(o)} for o in self.gains.outputs],
-            "free": freedom.spec(self.free), "weights": vars(self.weights), "goals": list(self.goals), "rtol": self.rtol,
+            "robots": [robot.to_dict() for robot in self.robots],
+            "manoeuvre": self.manoeuvre.spec(),
+            "controller": self.gains.settings,
+            "outputs": [{"kind": type(o).__name__, **vars(o)} for o in self.gains.outputs],
+            "free": freedom.spec(self.free),
+            "weights": vars(self.weights),
+            "goals": list(self.goals),
+            "rtol": self.rtol,
             "modes": self.modes,
-        }  # fmt: skip
+        }
 
     def digest(self, more: dict[str, Any] | None = None) -> str:
         """Of this task and `more`: to know it again."""
-        return hashlib.sha256(json.dumps([self.spec(), more], sort_keys=True, default=str).encode()).hexdigest()
+        return hashlib.sha256(
+            json.dumps([self.spec(), more], sort_keys=True, default=str).encode()
+        ).hexdigest()
 
 
 def reduced(robot: fx.Robot, modes: int) -> fx.Robot:
@@ -142,8 +173,11 @@ def reduced(robot: fx.Robot, modes: int) -> fx.Robot:
     return fx.Robot.from_dict(data)
 
 
-def varied(robot: fx.Robot, payloads: Sequence[float] = (1.0,), stiffnesses: Sequence[float] = (1.0,)) -> tuple[fx.Robot, ...]:
-    """The robot itself, then all combinations of factors on the payload (mass and inertia) and on the links' stiffness."""
+def varied(
+    robot: fx.Robot, payloads: Sequence[float] = (1.0,), stiffnesses: Sequence[float] = (1.0,)
+) -> tuple[fx.Robot, ...]:
+    """The robot itself, then all combinations of factors on the payload (mass and inertia) and on
+    the links' stiffness."""
     out = [robot]
     for p in payloads:
         for s in stiffnesses:
@@ -157,7 +191,9 @@ def varied(robot: fx.Robot, payloads: Sequence[float] = (1.0,), stiffnesses: Seq
                 elif "bending_stiffness_N_m2" in link:
                     EI = link["bending_stiffness_N_m2"]
                     link["bending_stiffness_N_m2"] = (
-                        [entry | {"value": entry["value"] * s} for entry in EI] if isinstance(EI, list) else EI * s
+                        [entry | {"value": entry["value"] * s} for entry in EI]
+                        if isinstance(EI, list)
+                        else EI * s
                     )
             if (p, s) != (1.0, 1.0):
                 out.append(fx.Robot.from_dict(data))

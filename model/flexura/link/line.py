@@ -105,7 +105,8 @@ class Piece:
 
     @cached_property
     def _sums(self) -> np.ndarray:
-        """What a Place has, one behind the other, as sums of Legendre's polynomials: (degree + 1, 3 P + 3 m)."""
+        """What a Place has, one behind the other, as sums of Legendre's polynomials: (degree + 1, 3
+        P + 3 m)."""
         count = self.points + 1
         xi, w = gauss(count)
         lines = [self.integrals(xi), *(self.lagrange(xi, k) for k in (0, 1))]

@@ -55,7 +55,8 @@ class Material:
 
     @cached_property
     def _slopes(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
-        """Powers of the mass and of the stiffness and of their first two derivatives, lowest first: (powers, I)."""
+        """Powers of the mass and of the stiffness and of their first two derivatives, lowest first:
+        (powers, I)."""
         return tuple([polyder(rows.T, k) for k in range(3)] for rows in (self.mass, self.stiffness))  # type: ignore[return-value]
 
     def _values(self, powers: np.ndarray, s: ArrayLike) -> np.ndarray:

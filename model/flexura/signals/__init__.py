@@ -1,6 +1,9 @@
-"""Functions of time: motions to follow, forces and torques to apply, and their reading from tables."""
+"""Functions of time: motions to follow, forces and torques to apply, and their reading from
+tables."""
 
 from . import shaping, signal
+from .drive import Drive, JointDrive
+from .manoeuvre import Manoeuvre, load_manoeuvre
 from .parsing import finite, from_spec
 from .shaping import matched_cycloid, zv, zvd
 from .signal import (
@@ -19,6 +22,27 @@ from .signal import (
 )
 
 __all__ = [
-    "COLUMNS", "Signal", "bang_bang", "constant", "cycloid", "evaluate", "finite", "from_spec", "harmonic", "matched_cycloid",
-    "piecewise", "polynomial", "shaping", "signal", "step", "table", "trapezoidal", "zv", "zvd",
-]  # fmt: skip
+    "COLUMNS",
+    "Drive",
+    "JointDrive",
+    "Manoeuvre",
+    "Signal",
+    "bang_bang",
+    "constant",
+    "cycloid",
+    "evaluate",
+    "finite",
+    "from_spec",
+    "harmonic",
+    "load_manoeuvre",
+    "matched_cycloid",
+    "piecewise",
+    "polynomial",
+    "shaping",
+    "signal",
+    "step",
+    "table",
+    "trapezoidal",
+    "zv",
+    "zvd",
+]

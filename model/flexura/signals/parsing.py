@@ -17,15 +17,23 @@ def from_spec(spec: Any, *, key: str = "signal") -> Signal:
     """A signal from its table, for example `{ kind = "cycloid", end = 1.0, duration_s = 0.5 }`."""
     kinds = signal.KINDS | shaping.KINDS
     if not isinstance(spec, dict):
-        raise InputError(f"expected a table with kind, one of {', '.join(kinds)}", key=key, value=spec)
+        raise InputError(
+            f"expected a table with kind, one of {', '.join(kinds)}", key=key, value=spec
+        )
     kind = spec.get("kind")
     if not isinstance(kind, str) or kind not in kinds:
         missing = "missing: " if kind is None else ""
-        raise InputError(f"{missing}expected one of {', '.join(kinds)}", key=f"{key}.kind", value=kind)
+        raise InputError(
+            f"{missing}expected one of {', '.join(kinds)}", key=f"{key}.kind", value=kind
+        )
     known = inspect.signature(kinds[kind]).parameters
     for name, value in spec.items():
         if name != "kind" and name not in known:
-            raise InputError(f"an unknown key; known for {kind}: {', '.join(known)}", key=f"{key}.{name}", value=value)
+            raise InputError(
+                f"an unknown key; known for {kind}: {', '.join(known)}",
+                key=f"{key}.{name}",
+                value=value,
+            )
     given: dict[str, Any] = {}
     for name, parameter in known.items():
         expected, good = _FORMS[str(parameter.annotation)]
@@ -33,7 +41,9 @@ def from_spec(spec: Any, *, key: str = "signal") -> Signal:
             value = spec[name]
             if not good(value):
                 raise InputError(f"expected {expected}", key=f"{key}.{name}", value=value)
-            given[name] = from_spec(value, key=f"{key}.{name}") if isinstance(value, dict) else value
+            given[name] = (
+                from_spec(value, key=f"{key}.{name}") if isinstance(value, dict) else value
+            )
         elif parameter.default is parameter.empty:
             raise InputError(f"missing: expected {expected}", key=f"{key}.{name}")
     try:
@@ -41,8 +51,13 @@ def from_spec(spec: Any, *, key: str = "signal") -> Signal:
             return kinds[kind](**given)
     except InputError as error:
         raise InputError(error.expected, key=f"{key}.{error.key}", value=error.value) from None
-    except (ArithmeticError, ValueError):  # numbers near the ends of the range, in scipy's spline too
-        raise InputError("expected numbers whose derivatives are finite", key=f"{key}.kind", value=kind) from None
+    except (
+        ArithmeticError,
+        ValueError,
+    ):  # numbers near the ends of the range, in scipy's spline too
+        raise InputError(
+            "expected numbers whose derivatives are finite", key=f"{key}.kind", value=kind
+        ) from None
 
 
 def finite(value: Any) -> bool:

@@ -1,4 +1,5 @@
-"""Motions that leave a mode of the robot at rest: input shaping, and a cycloid matched to the mode."""
+"""Motions that leave a mode of the robot at rest: input shaping, and a cycloid matched to the
+mode."""
 
 from __future__ import annotations
 
@@ -13,34 +14,52 @@ MAX_SEGMENTS = 100_000  # shaping a shaped signal doubles its segments
 
 
 def zv(signal: Signal, frequency_Hz: float, damping_ratio: float = 0.0) -> Signal:
-    """Zero vibration: the signal as two copies, y = [y(t) + k y(t - T/2)] / (1 + k), which leave the mode at rest afterwards.
+    """Zero vibration: the signal as two copies, y = [y(t) + k y(t - T/2)] / (1 + k), which leave
+    the mode at rest afterwards.
 
-    k = exp(-pi zeta / sqrt(1 - zeta^2)); T = 1 / (f sqrt(1 - zeta^2)), the damped period of a mode of natural frequency f and
-    damping ratio zeta (Singer and Seering 1990, J. Dyn. Syst. Meas. Control 112, 76-82). Longer by T/2; what the signal starts
-    and ends with is kept. Exact in y, dy/dt and d2y/dt2. A frequency off by e leaves a vibration proportional to e.
+    k = exp(-pi zeta / sqrt(1 - zeta^2)); T = 1 / (f sqrt(1 - zeta^2)), the damped period of a mode
+    of natural frequency f and damping ratio zeta (Singer and Seering 1990, J. Dyn. Syst. Meas.
+    Control 112, 76-82). Longer by T/2; what the signal starts and ends with is kept. Exact in y,
+    dy/dt and d2y/dt2. A frequency off by e leaves a vibration proportional to e.
     """
     return _shape("zv", signal, frequency_Hz, damping_ratio, lambda k: [1, k])
 
 
 def zvd(signal: Signal, frequency_Hz: float, damping_ratio: float = 0.0) -> Signal:
-    """Zero vibration and derivative: three copies, weights 1, 2k, k^2 over (1 + k)^2, at 0, T/2, T; see `zv`.
+    """Zero vibration and derivative: three copies, weights 1, 2k, k^2 over (1 + k)^2, at 0, T/2, T;
+    see `zv`.
 
     A frequency off by e leaves a vibration proportional to e^2 only; longer by T.
     """
     return _shape("zvd", signal, frequency_Hz, damping_ratio, lambda k: [1, 2 * k, k * k])
 
 
-def matched_cycloid(end: float, frequency_Hz: float, periods: int = 2, start: float = 0.0, at_s: float = 0.0) -> Signal:
-    """A cycloid that takes `periods` (2 or more) whole periods of an undamped mode and so leaves it at rest: T = periods / f.
+def matched_cycloid(
+    end: float, frequency_Hz: float, periods: int = 2, start: float = 0.0, at_s: float = 0.0
+) -> Signal:
+    """A cycloid that takes `periods` (2 or more) whole periods of an undamped mode and so leaves it
+    at rest: T = periods / f.
 
-    Its acceleration is one sine of period T; the mode's response to a whole number n of its periods is zero at the end, but for
-    n = 1, its resonance. For a robot: `matched_cycloid(0.3, fx.frequencies(system)[0])`.
+    Its acceleration is one sine of period T; the mode's response to a whole number n of its periods
+    is zero at the end, but for n = 1, its resonance. For a robot: `matched_cycloid(0.3,
+    fx.frequencies(system)[0])`.
     """
     if periods < 2:
-        raise InputError("expected 2 or more periods of the mode; 1 is its resonance", key="periods", value=periods)
+        raise InputError(
+            "expected 2 or more periods of the mode; 1 is its resonance",
+            key="periods",
+            value=periods,
+        )
     _frequency(frequency_Hz)
     made = cycloid(end, periods / frequency_Hz, start, at_s)
-    spec = {"kind": "matched_cycloid", "end": end, "frequency_Hz": frequency_Hz, "periods": periods, "start": start, "at_s": at_s}
+    spec = {
+        "kind": "matched_cycloid",
+        "end": end,
+        "frequency_Hz": frequency_Hz,
+        "periods": periods,
+        "start": start,
+        "at_s": at_s,
+    }
     return Signal(made.segments, spec)
 
 
@@ -48,23 +67,36 @@ KINDS: dict[str, Callable[..., Signal]] = {f.__name__: f for f in (matched_cyclo
 _Weights = Callable[[float], list[float]]  # of the copies, from k
 
 
-def _shape(kind: str, signal: Signal, frequency_Hz: float, damping_ratio: float, weights: _Weights) -> Signal:
+def _shape(
+    kind: str, signal: Signal, frequency_Hz: float, damping_ratio: float, weights: _Weights
+) -> Signal:
     _frequency(frequency_Hz)
     if not 0 <= damping_ratio < 1:
-        raise InputError("expected a damping ratio from 0 to below 1", key="damping_ratio", value=damping_ratio)
+        raise InputError(
+            "expected a damping ratio from 0 to below 1", key="damping_ratio", value=damping_ratio
+        )
     root = np.sqrt(1 - damping_ratio**2)
     copies = np.array(weights(np.exp(-np.pi * damping_ratio / root)), dtype=float)
-    rows = _sum(signal.segments, copies / copies.sum(), np.arange(len(copies)) / (2 * frequency_Hz * root))
-    return signal_of(rows, kind=kind, signal=signal.spec, frequency_Hz=frequency_Hz, damping_ratio=damping_ratio)
+    rows = _sum(
+        signal.segments, copies / copies.sum(), np.arange(len(copies)) / (2 * frequency_Hz * root)
+    )
+    return signal_of(
+        rows, kind=kind, signal=signal.spec, frequency_Hz=frequency_Hz, damping_ratio=damping_ratio
+    )
 
 
 def _sum(segments: np.ndarray, weights: np.ndarray, delays: np.ndarray) -> list[list[float]]:
-    """The segments of sum_k weights_k y(t - delays_k): on each stretch between two starts of any copy, one segment."""
+    """The segments of sum_k weights_k y(t - delays_k): on each stretch between two starts of any
+    copy, one segment."""
     most = MAX_SEGMENTS // len(weights)
     if len(segments) > most:
-        raise InputError(f"expected a signal of at most {most} segments", key="signal", value=len(segments))
+        raise InputError(
+            f"expected a signal of at most {most} segments", key="signal", value=len(segments)
+        )
     if len(np.unique(segments[segments[:, 7] != 0, 8])) > 1:
-        raise InputError("expected a signal with a single frequency in all its segments", key="signal")
+        raise InputError(
+            "expected a signal with a single frequency in all its segments", key="signal"
+        )
     starts = segments[:, 0] + delays[:, None]  # (copies, k)
     rows = []
     for t0 in np.unique(starts):

@@ -1,12 +1,14 @@
-"""Functions of time with their first two derivatives: motions to follow, forces and torques to apply.
+"""Functions of time with their first two derivatives: motions to follow, forces and torques to
+apply.
 
 A Signal is a list of segments; on each, with s = t - t0,
 
     y(s) = c0 + c1 s + ... + c5 s^5 + A sin(w s + phi),
 
-which holds cycloids, harmonics, polynomials, bang-bang profiles and cubic splines in one form that the core
-evaluates without calling back into Python. Before the first segment y keeps its first value. `shaping.py` adds the signals
-that leave a mode at rest; `parsing.py` reads signals from tables.
+which holds cycloids, harmonics, polynomials, bang-bang profiles and cubic splines in one form that
+the core evaluates without calling back into Python. Before the first segment y keeps its first
+value. `shaping.py` adds the signals that leave a mode at rest; `parsing.py` reads signals from
+tables.
 """
 
 from __future__ import annotations
@@ -26,7 +28,9 @@ def evaluate(segments: np.ndarray, t: float) -> tuple[float, float, float]:
     """y, dy/dt and d2y/dt2 at t of segments (k, 10); 0 where k = 0."""
     if len(segments) == 0:
         return 0.0, 0.0, 0.0
-    low = max(int(np.searchsorted(segments[:, 0], t, side="right")) - 1, 0)  # the last segment that starts at or before t
+    low = max(
+        int(np.searchsorted(segments[:, 0], t, side="right")) - 1, 0
+    )  # the last segment that starts at or before t
     t0, c0, c1, c2, c3, c4, c5, A, w, phi = segments[low].tolist()
     s = t - t0
     if s < 0.0:  # before the first segment: hold
@@ -42,7 +46,8 @@ def evaluate(segments: np.ndarray, t: float) -> tuple[float, float, float]:
 
 @dataclass(frozen=True)
 class Signal:
-    """A function of time: `signal(t)` gives (y, dy/dt, d2y/dt2); `segments` (k, 10); `breaks` where it isn't smooth."""
+    """A function of time: `signal(t)` gives (y, dy/dt, d2y/dt2); `segments` (k, 10); `breaks` where
+    it isn't smooth."""
 
     segments: np.ndarray
     spec: dict[str, Any] = field(default_factory=dict)
@@ -62,7 +67,9 @@ def _row(t0: float, *c: float, A: float = 0.0, w: float = 0.0, phi: float = 0.0)
 def signal_of(rows: list[list[float]], **spec: Any) -> Signal:
     segments = np.array(rows, dtype=float).reshape(-1, COLUMNS)
     if not np.isfinite(segments).all():
-        raise InputError("expected numbers whose derivatives are finite", key="kind", value=spec["kind"])
+        raise InputError(
+            "expected numbers whose derivatives are finite", key="kind", value=spec["kind"]
+        )
     segments.setflags(write=False)
     return Signal(segments, spec)
 
@@ -77,14 +84,24 @@ def step(value: float, at_s: float = 0.0) -> Signal:
     return signal_of([_row(-1e300, 0.0), _row(at_s, value)], kind="step", value=value, at_s=at_s)
 
 
-def harmonic(amplitude: float, frequency_Hz: float, phase_rad: float = 0.0, offset: float = 0.0) -> Signal:
+def harmonic(
+    amplitude: float, frequency_Hz: float, phase_rad: float = 0.0, offset: float = 0.0
+) -> Signal:
     """y = offset + amplitude cos(2 pi f t + phase), the form of the dissertation's inverse law."""
     row = _row(0.0, offset, A=amplitude, w=2 * np.pi * frequency_Hz, phi=phase_rad + np.pi / 2)
-    return signal_of([row], kind="harmonic", amplitude=amplitude, frequency_Hz=frequency_Hz, phase_rad=phase_rad, offset=offset)
+    return signal_of(
+        [row],
+        kind="harmonic",
+        amplitude=amplitude,
+        frequency_Hz=frequency_Hz,
+        phase_rad=phase_rad,
+        offset=offset,
+    )
 
 
 def cycloid(end: float, duration_s: float, start: float = 0.0, at_s: float = 0.0) -> Signal:
-    """y = start + A [s/T - sin(2 pi s/T)/(2 pi)], A = end - start, then rest (benchmarks: "Cycloid")."""
+    """y = start + A [s/T - sin(2 pi s/T)/(2 pi)], A = end - start, then rest (benchmarks:
+    "Cycloid")."""
     _positive("duration_s", duration_s)
     A, T = end - start, duration_s
     rows = [_row(at_s, start, A / T, A=-A / (2 * np.pi), w=2 * np.pi / T), _row(at_s + T, end)]
@@ -92,80 +109,160 @@ def cycloid(end: float, duration_s: float, start: float = 0.0, at_s: float = 0.0
 
 
 def polynomial(end: float, duration_s: float, start: float = 0.0, at_s: float = 0.0) -> Signal:
-    """y = start + A (10 u^3 - 15 u^4 + 6 u^5), u = s/T: velocity and acceleration zero at both ends."""
+    """y = start + A (10 u^3 - 15 u^4 + 6 u^5), u = s/T: velocity and acceleration zero at both
+    ends."""
     _positive("duration_s", duration_s)
     rows = [_rise(at_s, start, end - start, duration_s), _row(at_s + duration_s, end)]
-    return signal_of(rows, kind="polynomial", end=end, duration_s=duration_s, start=start, at_s=at_s)
+    return signal_of(
+        rows, kind="polynomial", end=end, duration_s=duration_s, start=start, at_s=at_s
+    )
 
 
-def trapezoidal(end: float, duration_s: float, rise_s: float, start: float = 0.0, at_s: float = 0.0) -> Signal:
-    """From start to end with a trapezoid of velocity: constant acceleration for `rise_s`, none, the opposite for `rise_s`."""
+def trapezoidal(
+    end: float, duration_s: float, rise_s: float, start: float = 0.0, at_s: float = 0.0
+) -> Signal:
+    """From start to end with a trapezoid of velocity: constant acceleration for `rise_s`, none, the
+    opposite for `rise_s`."""
     _positive("duration_s", duration_s)
     T, r = duration_s, rise_s
     if not 0 < r <= T / 2:
-        raise InputError(f"expected a rise above 0 and at most half the duration, {T / 2:g} s", key="rise_s", value=r)
+        raise InputError(
+            f"expected a rise above 0 and at most half the duration, {T / 2:g} s",
+            key="rise_s",
+            value=r,
+        )
     v = (end - start) / (T - r)
     a = v / r
     brake = at_s + max(T - r, r)
     rows = [
-        _row(at_s, start, 0.0, a / 2), _row(at_s + r, start + v * r / 2, v),
-        _row(brake, end - v * r / 2, v, -a / 2), _row(at_s + T, end),
-    ]  # fmt: skip
-    return signal_of(rows, kind="trapezoidal", end=end, duration_s=duration_s, rise_s=rise_s, start=start, at_s=at_s)
+        _row(at_s, start, 0.0, a / 2),
+        _row(at_s + r, start + v * r / 2, v),
+        _row(brake, end - v * r / 2, v, -a / 2),
+        _row(at_s + T, end),
+    ]
+    return signal_of(
+        rows,
+        kind="trapezoidal",
+        end=end,
+        duration_s=duration_s,
+        rise_s=rise_s,
+        start=start,
+        at_s=at_s,
+    )
 
 
-def bang_bang(amplitude: float, duration_s: float, rise_s: float = 0.0, at_s: float = 0.0) -> Signal:
+def bang_bang(
+    amplitude: float, duration_s: float, rise_s: float = 0.0, at_s: float = 0.0
+) -> Signal:
     """+amplitude for the first half of the duration, -amplitude for the second, then 0.
 
-    With `rise_s` every change takes that long along 10 u^3 - 15 u^4 + 6 u^5 and is centred on the instant of the change,
-    the first and last ones lie inside the duration.
+    With `rise_s` every change takes that long along 10 u^3 - 15 u^4 + 6 u^5 and is centred on the
+    instant of the change, the first and last ones lie inside the duration.
     """
     _positive("duration_s", duration_s)
     a, T, r = amplitude, duration_s, rise_s
     if not 0 <= r <= T / 4:
-        raise InputError(f"expected a rise between 0 and a quarter of the duration, {T / 4:g} s", key="rise_s", value=r)
+        raise InputError(
+            f"expected a rise between 0 and a quarter of the duration, {T / 4:g} s",
+            key="rise_s",
+            value=r,
+        )
     if r == 0:
         rows = [_row(at_s, a), _row(at_s + T / 2, -a), _row(at_s + T, 0.0)]
     else:
         rows = [
-            _rise(at_s, 0.0, a, r), _row(at_s + r, a),
-            _rise(at_s + T / 2 - r / 2, a, -2 * a, r), _row(at_s + T / 2 + r / 2, -a),
-            _rise(at_s + T - r, -a, a, r), _row(at_s + T, 0.0),
-        ]  # fmt: skip
+            _rise(at_s, 0.0, a, r),
+            _row(at_s + r, a),
+            _rise(at_s + T / 2 - r / 2, a, -2 * a, r),
+            _row(at_s + T / 2 + r / 2, -a),
+            _rise(at_s + T - r, -a, a, r),
+            _row(at_s + T, 0.0),
+        ]
     if at_s > 0:
         rows.insert(0, _row(0.0))
-    return signal_of(rows, kind="bang_bang", amplitude=amplitude, duration_s=duration_s, rise_s=rise_s, at_s=at_s)
+    return signal_of(
+        rows, kind="bang_bang", amplitude=amplitude, duration_s=duration_s, rise_s=rise_s, at_s=at_s
+    )
 
 
 def table(t_s: Any, y: Any) -> Signal:
-    """A cubic spline through (t_s, y), both (k,), k >= 2, with zero second derivative at its ends; then the last value."""
+    """A cubic spline through (t_s, y), both (k,), k >= 2, with zero second derivative at its ends;
+    then the last value."""
     from scipy.interpolate import CubicSpline
 
     times, values = np.asarray(t_s, dtype=float), np.asarray(y, dtype=float)
-    if times.ndim != 1 or times.shape != values.shape or len(times) < 2 or not np.all(np.diff(times) > 0):
-        raise InputError("expected at least two ascending times and as many values y", key="t_s", value=times.tolist())
-    coefficients = CubicSpline(times, values, bc_type="natural").c  # (4, k - 1), highest power first
-    rows = [_row(times[k], *coefficients[::-1, k]) for k in range(len(times) - 1)] + [_row(times[-1], values[-1])]
+    if (
+        times.ndim != 1
+        or times.shape != values.shape
+        or len(times) < 2
+        or not np.all(np.diff(times) > 0)
+    ):
+        raise InputError(
+            "expected at least two ascending times and as many values y",
+            key="t_s",
+            value=times.tolist(),
+        )
+    coefficients = CubicSpline(
+        times, values, bc_type="natural"
+    ).c  # (4, k - 1), highest power first
+    rows = [_row(times[k], *coefficients[::-1, k]) for k in range(len(times) - 1)] + [
+        _row(times[-1], values[-1])
+    ]
     return signal_of(rows, kind="table", t_s=times.tolist(), y=values.tolist())
 
 
 def piecewise(at_s: Any, value: Any) -> Signal:
-    """Constant from each instant of `at_s` (k,) to the next, with the values (k,): the dissertation's bang-bang torques."""
+    """Constant from each instant of `at_s` (k,) to the next, with the values (k,): the
+    dissertation's bang-bang torques."""
     times, values = np.asarray(at_s, dtype=float), np.asarray(value, dtype=float)
-    if times.ndim != 1 or times.shape != values.shape or len(times) < 1 or not np.all(np.diff(times) > 0):
-        raise InputError("expected ascending times, at least one, and as many values", key="at_s", value=times.tolist())
+    if (
+        times.ndim != 1
+        or times.shape != values.shape
+        or len(times) < 1
+        or not np.all(np.diff(times) > 0)
+    ):
+        raise InputError(
+            "expected ascending times, at least one, and as many values",
+            key="at_s",
+            value=times.tolist(),
+        )
     rows = [_row(t, v) for t, v in zip(times, values, strict=True)]
     return signal_of(rows, kind="piecewise", at_s=times.tolist(), value=values.tolist())
 
 
-KINDS = {f.__name__: f for f in (constant, step, harmonic, cycloid, polynomial, trapezoidal, bang_bang, table, piecewise)}
+KINDS = {
+    f.__name__: f
+    for f in (
+        constant,
+        step,
+        harmonic,
+        cycloid,
+        polynomial,
+        trapezoidal,
+        bang_bang,
+        table,
+        piecewise,
+    )
+}
 
 
 def _rise(t0: float, start: float, change: float, duration: float) -> list[float]:
     try:
-        return _row(t0, start, 0.0, 0.0, 10 * change / duration**3, -15 * change / duration**4, 6 * change / duration**5)
+        return _row(
+            t0,
+            start,
+            0.0,
+            0.0,
+            10 * change / duration**3,
+            -15 * change / duration**4,
+            6 * change / duration**5,
+        )
     except ArithmeticError:  # 1e-200 or 1e200 seconds
-        raise InputError("expected a duration that leaves the derivatives finite", key="duration_s", value=duration) from None
+        raise InputError(
+            "expected a duration that leaves the derivatives finite",
+            key="duration_s",
+            value=duration,
+        ) from None
 
 
 def _positive(key: str, value: float) -> None:

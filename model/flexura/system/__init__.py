@@ -1,6 +1,7 @@
 """Robot -> System: a robot's equations, its equilibria, its small motions.
 
-`assembly` is the theory, dense and readable; `system` serves it to everybody, with the compiled core where that is faster.
+`assembly` is the theory, dense and readable; `system` serves it to everybody, with the compiled
+core where that is faster.
 """
 
 from .assembly import Assembly
@@ -10,6 +11,16 @@ from .statics import NoEquilibrium, static, tip_pose
 from .system import System, assemble, system_of
 
 __all__ = [
-    "Assembly", "Modes", "NoEquilibrium", "StateSpace", "System",
-    "assemble", "frequencies", "linearize", "modes", "static", "system_of", "tip_pose",
-]  # fmt: skip
+    "Assembly",
+    "Modes",
+    "NoEquilibrium",
+    "StateSpace",
+    "System",
+    "assemble",
+    "frequencies",
+    "linearize",
+    "modes",
+    "static",
+    "system_of",
+    "tip_pose",
+]

@@ -28,7 +28,8 @@ class Energies(NamedTuple):
 
 
 class Terms(NamedTuple):
-    """The parts of (19) in a state: `forces` (n,) of inertia and gravity, `elastic` (n,); K and D (n, n)."""
+    """The parts of (19) in a state: `forces` (n,) of inertia and gravity, `elastic` (n,); K and D
+    (n, n)."""
 
     mass: np.ndarray
     forces: np.ndarray
@@ -50,8 +51,14 @@ class Assembly:
         self._rotors = np.array([link.joint.rotor_inertia for link in self.robot.links])
         self._coulomb = np.array([link.joint.coulomb_friction for link in self.robot.links])
         self._g = complex(*self.robot.gravity_m_s2)
-        laws = [(i, law) for i, law in enumerate(self.structure.laws) if law is not None and self.structure.sleeved(i)]
-        self._sleeved: dict[int, Material] = dict(laws)  # flexible links in a sleeve, with their materials
+        laws = [
+            (i, law)
+            for i, law in enumerate(self.structure.laws)
+            if law is not None and self.structure.sleeved(i)
+        ]
+        self._sleeved: dict[int, Material] = dict(
+            laws
+        )  # flexible links in a sleeve, with their materials
 
     def mass(self, q: np.ndarray) -> np.ndarray:
         """M(q) (n, n) (14)."""
@@ -71,7 +78,9 @@ class Assembly:
         """Generalised gravity forces (n,), on the left-hand side (16)."""
         return self._inertia(self._at_rest(q), self._g)[0].forces
 
-    def _inertia(self, states: list[LinkState], gravity: complex = 0j) -> tuple[masses.Sum, np.ndarray]:
+    def _inertia(
+        self, states: list[LinkState], gravity: complex = 0j
+    ) -> tuple[masses.Sum, np.ndarray]:
         """What (14) to (16) sum over, and the flow terms of (9) in (15) (n,)."""
         parts, flow = [], np.zeros(self.n)
         for state in states:
@@ -113,7 +122,9 @@ class Assembly:
 
     def _sleeve(self, i: int, q: np.ndarray, derivative: int = 0) -> np.ndarray:
         """K(d) of the link i in a sleeve, or its derivatives by d (17)."""
-        return sleeve.stiffness(self.structure.links[i][0], float(q[self.rows[i]]), self._sleeved[i], derivative)
+        return sleeve.stiffness(
+            self.structure.links[i][0], float(q[self.rows[i]]), self._sleeved[i], derivative
+        )
 
     def stiffness(self, q: np.ndarray) -> np.ndarray:
         """The second derivative of the strain energy (n, n), without loads (17)."""
@@ -161,20 +172,26 @@ class Assembly:
         """All of (19) but drives and Coulomb friction, in one sweep for a time loop."""
         states = self.structure.states(q, qd)
         sums, flow = self._inertia(states, self._g)
-        K, D = self._constant if not self._sleeved else (K := self.stiffness_blocks(q), self._damping(K, q))
+        K, D = (
+            self._constant
+            if not self._sleeved
+            else (K := self.stiffness_blocks(q), self._damping(K, q))
+        )
         return Terms(self._mass(sums), sums.forces + flow, self._elastic(K, q), K, D)
 
     @cached_property
     def _constant(self) -> tuple[np.ndarray, np.ndarray]:
-        """K and D (n, n) of a robot without flexible links in sleeves, whose matrices depend on no q."""
+        """K and D (n, n) of a robot without flexible links in sleeves, whose matrices depend on no
+        q."""
         return self._diagonal, self.damping(np.zeros(self.n))
 
     def observe(self, q: np.ndarray, qd: np.ndarray, stations: int) -> np.ndarray:
         """What a Run shows of a state, in the order of `record.channel_units` (2), (29).
 
-        Link by link x, y [m], angle [rad] of its proximal end; if it bends its tip's distance across the tangent at its hub
-        (sleeve) [m], the tip's angle to it [rad], and that distance at `stations` equally spaced abscissas [m]; then x, y of the
-        tip; kinetic, strain and potential energy [J].
+        Link by link x, y [m], angle [rad] of its proximal end; if it bends its tip's distance
+        across the tangent at its hub (sleeve) [m], the tip's angle to it [rad], and that distance
+        at `stations` equally spaced abscissas [m]; then x, y of the tip; kinetic, strain and
+        potential energy [J].
         """
         states, out = self.structure.states(q, qd), []
         for state, link in zip(states, self.robot.links, strict=True):
@@ -182,7 +199,9 @@ class Assembly:
             out += [root.real, root.imag, hub.angle]
             if state.lines:
                 places = self.structure.places(state, np.linspace(0.0, link.length_m, stations))
-                across = ((np.append(state.tip.place, places) - hub.place) * hub.tangent.conjugate()).imag
+                across = (
+                    (np.append(state.tip.place, places) - hub.place) * hub.tangent.conjugate()
+                ).imag
                 out += [across[0], state.tip.angle - hub.angle, *across[1:]]
         tip = states[-1].tip.place
         return np.array([*out, tip.real, tip.imag, *self._energies(states, q, qd)])
@@ -219,7 +238,9 @@ class Assembly:
     def tip_deflections(self, q: np.ndarray) -> np.ndarray:
         """The tips of the flexible links across the tangents at their hubs (k,) [m]: r_y (2)."""
         states = [state for state in self._at_rest(q) if state.lines]
-        return np.array([((s.tip.place - s.hub.place) * s.hub.tangent.conjugate()).imag for s in states])
+        return np.array(
+            [((s.tip.place - s.hub.place) * s.hub.tangent.conjugate()).imag for s in states]
+        )
 
     def _at_rest(self, q: np.ndarray) -> list[LinkState]:
         return self.structure.states(q, np.zeros(self.n))

@@ -60,7 +60,8 @@ def ahead(frame: Frame, x: float, rows: list[int], qd: np.ndarray) -> Frame:
 
 
 class Line(NamedTuple):
-    """A piece's line in a state: tangents e (P,), their columns E (P, n), their rates e' = E q' (P,), and N (P,) (1), (2).
+    """A piece's line in a state: tangents e (P,), their columns E (P, n), their rates e' = E q'
+    (P,), and N (P,) (1), (2).
 
     N: second derivatives of e at zero accelerations of the unknowns.
 
@@ -97,7 +98,8 @@ def line(
     qd: np.ndarray,
     linear: bool = False,
 ) -> Line:
-    """The line of a piece that begins at `start` (1); with `linear` (12) on the hub's frame `axis`."""
+    """The line of a piece that begins at `start` (1); with `linear` (12) on the hub's frame
+    `axis`."""
     bent, bending = piece.B @ q[own], piece.B @ qd[own]
     spin = float(start.turning @ qd)
     if not linear:
@@ -142,5 +144,9 @@ def station(line: Line, xi: float, slider: int | None = None) -> Frame:
             turning[row] += share * curvature
         run = sum(share * float(line.qd[row]) for row, share in moved) / d
         rest += d * run * (2 * complex(l @ line.rates) + run * complex(dl @ line.e))
-        rest_turning += run * (2 * float(db @ line.qd[line.own]) + run * float(ddb @ y) - 2 * line.rate * curvature)
-    return Frame(start.place + d * reach, start.angle + float(b @ y), velocity, turning, rest, rest_turning)
+        rest_turning += run * (
+            2 * float(db @ line.qd[line.own]) + run * float(ddb @ y) - 2 * line.rate * curvature
+        )
+    return Frame(
+        start.place + d * reach, start.angle + float(b @ y), velocity, turning, rest, rest_turning
+    )

@@ -34,7 +34,8 @@ Part = Masses | Turning
 
 
 class Sum(NamedTuple):
-    """What (14) to (16) sum over, a row for x, y of each mass and each angle: weights, columns (R, n), accelerations (R,)."""
+    """What (14) to (16) sum over, a row for x, y of each mass and each angle: weights, columns (R,
+    n), accelerations (R,)."""
 
     weight: np.ndarray
     columns: np.ndarray
@@ -66,7 +67,9 @@ def summed(parts: list[Part], gravity: complex = 0j) -> Sum:
 
 def lump(mass: float, frame: Frame) -> Masses:
     """A point mass in a frame's origin."""
-    return Masses(np.array([mass]), np.array([frame.place]), frame.velocity[None], np.array([frame.rest]))
+    return Masses(
+        np.array([mass]), np.array([frame.place]), frame.velocity[None], np.array([frame.rest])
+    )
 
 
 def turning(inertia: float, frame: Frame) -> Turning:

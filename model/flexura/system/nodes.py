@@ -1,8 +1,10 @@
-"""Sliding from node to node: the structure of a robot while its sliders and sleeves keep their nodes.
+"""Sliding from node to node: the structure of a robot while its sliders and sleeves keep their
+nodes.
 
-Dissertation, table 2.1. Pa: the hub sits at d along the axis of the link that it rides on, and turns and moves across the axis
-with node k = ceil(d / l_e). Pb: the mesh is fixed to the link, node k at X_k = k L / n. Nodes in the sleeve, X_k <= L - d, are at
-rest on its axis, so that the link is clamped at the last of them: up to l_e behind the sleeve's exit.
+Dissertation, table 2.1. Pa: the hub sits at d along the axis of the link that it rides on, and
+turns and moves across the axis with node k = ceil(d / l_e). Pb: the mesh is fixed to the link, node
+k at X_k = k L / n. Nodes in the sleeve, X_k <= L - d, are at rest on its axis, so that the link is
+clamped at the last of them: up to l_e behind the sleeve's exit.
 """
 
 from __future__ import annotations
@@ -20,22 +22,29 @@ SAME = 1e-9  # of an element: on the node
 
 @dataclass(frozen=True)
 class Nodes(Structure):
-    """The structure with the node of each link: of a sleeved one the last at rest, of a slider the one that it takes, else 0."""
+    """The structure with the node of each link: of a sleeved one the last at rest, of a slider the
+    one that it takes, else 0."""
 
     nodes: tuple[int, ...] = ()
 
     @property
     def resting(self) -> np.ndarray:
         """The unknowns of the elements that end at nodes at rest."""
-        each = [row + 1 + np.arange(2 * k) for row, k, link in zip(self.rows, self.nodes, self.robot.links) if cut(link)]
+        each = [
+            row + 1 + np.arange(2 * k)
+            for row, k, link in zip(self.rows, self.nodes, self.robot.links)
+            if cut(link)
+        ]
         return np.concatenate([np.zeros(0, dtype=int), *each])
 
     def sleeved(self, i: int) -> bool:
-        """Whether link i is a rigid one in a sleeve: a flexible one moves with its mesh, which begins at its proximal end."""
+        """Whether link i is a rigid one in a sleeve: a flexible one moves with its mesh, which
+        begins at its proximal end."""
         return super().sleeved(i) and not self.links[i]
 
     def link(self, i: int, hub: Frame, q: np.ndarray, qd: np.ndarray) -> LinkState:
-        """Link i in a state; of a sleeved one `hub` is the exit, and the mesh begins L - d behind it."""
+        """Link i in a state; of a sleeved one `hub` is the exit, and the mesh begins L - d behind
+        it."""
         if not cut(self.robot.links[i]):
             return super().link(i, hub, q, qd)
         root = ahead(hub, q[self.rows[i]] - self.robot.links[i].length_m, [self.rows[i]], qd)
@@ -62,16 +71,23 @@ def cut(link: Link) -> bool:
 
 
 def nodes_at(robot: Robot, position: np.ndarray) -> tuple[int, ...]:
-    """The nodes (N,) of `Nodes` with the joints at `position` (N,); one element at least is ahead of a sleeve."""
+    """The nodes (N,) of `Nodes` with the joints at `position` (N,); one element at least is ahead
+    of a sleeve."""
     out: list[int] = []
     for i, (link, x) in enumerate(zip(robot.links, position)):
         node = 0
         if cut(link):
-            node = int(np.clip(np.floor(link.elements * (1 - x / link.length_m) + SAME), 0, link.elements - 1))
+            node = int(
+                np.clip(
+                    np.floor(link.elements * (1 - x / link.length_m) + SAME), 0, link.elements - 1
+                )
+            )
         elif robot.rides(i):
             under = robot.links[i - 1]
             first = out[i - 1] + 1 if cut(under) else 1
-            node = int(np.clip(np.ceil(under.elements * x / under.length_m - SAME), first, under.elements))
+            node = int(
+                np.clip(np.ceil(under.elements * x / under.length_m - SAME), first, under.elements)
+            )
         out.append(node)
     return tuple(out)
 
@@ -82,14 +98,24 @@ def place(link: Link, node: int) -> float:
 
 
 def put_to_rest(structure: Nodes, i: int, node: int, y: np.ndarray) -> None:
-    """Set deflection and angle of a node of link i to 0 in y (n,), unknowns or their rates; what other nodes have stays.
+    """Set deflection and angle of a node of link i to 0 in y (n,), unknowns or their rates; what
+    other nodes have stays.
 
-    The deflection is the integral of the angle, for the exact line too. All nodes before this one are at 0.
+    The deflection is the integral of the angle, for the exact line too. All nodes before this one
+    are at 0.
     """
-    link, h = structure.robot.links[i], structure.robot.links[i].length_m / structure.robot.links[i].elements
+    link, h = (
+        structure.robot.links[i],
+        structure.robot.links[i].length_m / structure.robot.links[i].elements,
+    )
     own = structure.own[i][0].start + 2 * (node - 1)
-    means = structure.links[i][0].integrals(np.arange(1, link.elements + 1) / link.elements) @ structure.links[i][0].B
-    mean = link.elements * np.diff(means, axis=0, prepend=0.0)  # of the angle over each element, by all unknowns
+    means = (
+        structure.links[i][0].integrals(np.arange(1, link.elements + 1) / link.elements)
+        @ structure.links[i][0].B
+    )
+    mean = link.elements * np.diff(
+        means, axis=0, prepend=0.0
+    )  # of the angle over each element, by all unknowns
     k = own - structure.own[i][0].start
     angle, deflection = y[own], h * mean[node - 1, k : k + 2] @ y[own : own + 2]
     y[own : own + 2] = 0.0

@@ -24,18 +24,25 @@ def free_masses(line: Line, law: Material) -> Masses:
     C = d * piece.C
     columns = start.velocity + C @ line.E
     columns[:, line.row] += piece.C @ line.e + (1 - piece.xi) * line.e
-    rest = start.rest + C @ line.N + line.rate * (2 * piece.C @ line.rates + (1 - piece.xi) * line.rates)
+    rest = (
+        start.rest
+        + C @ line.N
+        + line.rate * (2 * piece.C @ line.rates + (1 - piece.xi) * line.rates)
+    )
     mass = d * piece.weights * law.mass_per_length(law.length - d + d * piece.xi)
     return Masses(mass, start.place + C @ line.e, columns, rest)
 
 
 def flow_forces(line: Line, law: Material, free: Masses) -> np.ndarray:
-    """The terms of (9) beside columns times mass times accelerations, without dU: (n,). free: `free_masses`."""
+    """The terms of (9) beside columns times mass times accelerations, without dU: (n,). free:
+    `free_masses`."""
     d, d_rate, start, row, mu = line.free, line.rate, line.start, line.row, free.mass
     V, behind = (free.columns - start.velocity) @ line.qd, 1 - line.piece.xi
     left, mu_d = mu * behind, mu / d  # mu_d: d mu / dd at fixed xi (8)
     if not law.uniform:
-        mu_d = mu_d - d * behind * line.piece.weights * law.mass_per_length(law.length - d * behind, 1)
+        mu_d = mu_d - d * behind * line.piece.weights * law.mass_per_length(
+            law.length - d * behind, 1
+        )
     exit_density = float(law.mass_per_length(law.length - d)[0])
     out = d_rate * (dot(free.columns, mu_d * V) - dot(line.E, left * V))
     out -= exit_density * d_rate**2 * np.real(start.velocity.conj() * start.tangent)
@@ -50,7 +57,9 @@ def rod_behind(start: Frame, free: float, row: int, law: Material, qd: np.ndarra
     t, spin, x = start.tangent, float(start.turning @ qd), s - law.length + free
     columns = start.velocity + (1j * t * x)[:, None] * start.turning
     columns[:, row] += t
-    rest = start.rest + 2j * t * spin * float(qd[row]) + x * (t * (1j * start.rest_turning - spin**2))
+    rest = (
+        start.rest + 2j * t * spin * float(qd[row]) + x * (t * (1j * start.rest_turning - spin**2))
+    )
     return Masses(law.mass_per_length(s) * ds, start.place + t * x, columns, rest)
 
 

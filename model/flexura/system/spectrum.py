@@ -14,7 +14,8 @@ from .system import System, system_of
 
 @dataclass(frozen=True)
 class Modes:
-    """Natural modes at q (n,): frequencies_Hz (k,) ascending, shapes (n, k) with x . M x = 1, in the order of `labels`."""
+    """Natural modes at q (n,): frequencies_Hz (k,) ascending, shapes (n, k) with x . M x = 1, in
+    the order of `labels`."""
 
     frequencies_Hz: np.ndarray
     shapes: np.ndarray
@@ -22,17 +23,22 @@ class Modes:
     labels: tuple[str, ...]
 
 
-def frequencies(robot: Any, q: Any = None, joints: str = "locked", *, count: int | None = None, qd: Any = None) -> np.ndarray:
-    """Natural frequencies [Hz], ascending, of the undamped robot linearised about q (n,) (27), (28).
+def frequencies(
+    robot: Any, q: Any = None, joints: str = "locked", *, count: int | None = None, qd: Any = None
+) -> np.ndarray:
+    """Natural frequencies [Hz], ascending, of the undamped robot linearised about q (n,) (27),
+    (28).
 
-    Args: robot: a System, a Robot, or a robot file; q (n,): by default the static equilibrium at the start; joints: "locked"
-    (only
-        the elastic unknowns move) or "free" (rigid motions come out as 0); count: the lowest so many, by default all; qd (n,):
-        joint rates of a steady motion, for example a rotation at constant speed, joints locked to it.
+    Args: robot: a System, a Robot, or a robot file; q (n,): by default the static equilibrium at
+    the start; joints: "locked" (only
+        the elastic unknowns move) or "free" (rigid motions come out as 0); count: the lowest so
+        many, by default all; qd (n,): joint rates of a steady motion, for example a rotation at
+        constant speed, joints locked to it.
 
     Returns: (k,). Frequencies of unstable directions are 0.
 
-    Raises: InputError: an argument is not what is expected. NoEquilibrium: q is not given and there is no static equilibrium.
+    Raises: InputError: an argument is not what is expected. NoEquilibrium: q is not given and there
+    is no static equilibrium.
     """
     system = system_of(robot)
     _check(joints, count)
@@ -40,12 +46,17 @@ def frequencies(robot: Any, q: Any = None, joints: str = "locked", *, count: int
         q = static(system) if q is None else q
         system = system.fixed(q)
     if qd is not None:
-        return _steady(system, static(system) if q is None else system.check(q), system.check(qd, "qd"), joints)[:count]
-    return _found(system, static(system) if q is None else system.check(q), joints, count, False).frequencies_Hz
+        return _steady(
+            system, static(system) if q is None else system.check(q), system.check(qd, "qd"), joints
+        )[:count]
+    return _found(
+        system, static(system) if q is None else system.check(q), joints, count, False
+    ).frequencies_Hz
 
 
 def modes(robot: Any, q: Any = None, joints: str = "locked", *, count: int | None = None) -> Modes:
-    """Natural modes of the undamped robot linearised about q (n,). Arguments and errors as in `frequencies`."""
+    """Natural modes of the undamped robot linearised about q (n,). Arguments and errors as in
+    `frequencies`."""
     system = system_of(robot)
     _check(joints, count)
     return _found(system, static(system) if q is None else system.check(q), joints, count, True)
@@ -58,7 +69,9 @@ def _found(system: System, at: np.ndarray, joints: str, count: int | None, shape
     free = np.full(len(system.joint_rows), joints == "free", dtype=np.uint8)
     squares, columns = system.equations.modes(at, free, count or 0, np.zeros(3), shapes)
     if joints == "free" and not any(system.robot.gravity_m_s2):
-        squares[: len(system.free_rows) - len(system.elastic_rows)] = 0.0  # without gravity nothing holds a free joint
+        squares[: len(system.free_rows) - len(system.elastic_rows)] = (
+            0.0  # without gravity nothing holds a free joint
+        )
     return Modes(_hertz(squares), columns, at, system.labels)
 
 
@@ -89,7 +102,8 @@ def _dense(system: System, at: np.ndarray, joints: str, count: int | None) -> Mo
 
 
 def _steady(system: System, at: np.ndarray, rates: np.ndarray, joints: str) -> np.ndarray:
-    """Frequencies about a steady motion: imaginary parts of the eigenvalues of its linear equations."""
+    """Frequencies about a steady motion: imaginary parts of the eigenvalues of its linear
+    equations."""
     rows = system.elastic_rows if joints == "locked" else system.free_rows
     pick, n = np.ix_(rows, rows), len(rows)
     M, K = system.mass(at)[pick], system.tangent(at, rates)[pick]

@@ -1,4 +1,5 @@
-"""The robot linearised: state-space matrices, poles and zeros about an equilibrium or a steady rotation."""
+"""The robot linearised: state-space matrices, poles and zeros about an equilibrium or a steady
+rotation."""
 
 from __future__ import annotations
 
@@ -14,13 +15,13 @@ from .system import System, jacobian, system_of
 
 @dataclass(frozen=True)
 class StateSpace:
-    """Small motions x = (dq, d dq/dt) about q, qd (n,): x' = A x + B u, y = C x + D u, with u, y as deviations too.
+    """Small motions x = (dq, d dq/dt) about q, qd (n,): x' = A x + B u, y = C x + D u, with u, y as
+    deviations too.
 
-    From M dq'' + G dq' + K dq = E u, of which the fields are the matrices (m, m), (m, inputs): bias and gravity are in G and K.
-    `states`, `inputs`, `outputs` are names, `units` their units: inputs `joint/i/drive`, outputs `joint/i/position`,
-    `link/i/tip_deflection`, `tip/x`, `tip/y`, as in a Run. `hold` (N,): the drives [N or N m] that keep the robot there.
-    Coulomb
-    friction is left out.
+    From M dq'' + G dq' + K dq = E u, of which the fields are the matrices (m, m), (m, inputs): bias
+    and gravity are in G and K. `states`, `inputs`, `outputs` are names, `units` their units: inputs
+    `joint/i/drive`, outputs `joint/i/position`, `link/i/tip_deflection`, `tip/x`, `tip/y`, as in a
+    Run. `hold` (N,): the drives [N or N m] that keep the robot there. Coulomb friction is left out.
     """
 
     M: np.ndarray
@@ -40,7 +41,9 @@ class StateSpace:
     def A(self) -> np.ndarray:
         """(2m, 2m)."""
         m = len(self.M)
-        return np.block([[np.zeros((m, m)), np.eye(m)], [-np.linalg.solve(self.M, np.hstack([self.K, self.G]))]])
+        return np.block(
+            [[np.zeros((m, m)), np.eye(m)], [-np.linalg.solve(self.M, np.hstack([self.K, self.G]))]]
+        )
 
     @property
     def B(self) -> np.ndarray:
@@ -66,13 +69,14 @@ class StateSpace:
         return _roots(np.eye(len(self.M)), _scaled(R, self.G), _scaled(R, self.K))
 
     def zeros(self, drive: str, output: str) -> np.ndarray:
-        """Transmission zeros from an input to an output [1/s], by magnitude: where the output stays 0 while the drive acts.
+        """Transmission zeros from an input to an output [1/s], by magnitude: where the output stays
+        0 while the drive acts.
 
-        Motions with c dq = 0 in the directions that the drive does not push, L^T (s^2 M + s G + K) N z = 0, N = ker c, L = ker
-        b:
-        the finite invariant zeros of the pencil [[A - s, B], [C, 0]], without its infinite ones. Those with a positive real
-        part (non-minimum phase) bound what feedback of that output can do. Raises InputError for unknown names, and for an
-        output that the drive does not move.
+        Motions with c dq = 0 in the directions that the drive does not push, L^T (s^2 M + s G + K)
+        N z = 0, N = ker c, L = ker b: the finite invariant zeros of the pencil [[A - s, B], [C,
+        0]], without its infinite ones. Those with a positive real part (non-minimum phase) bound
+        what feedback of that output can do. Raises InputError for unknown names, and for an output
+        that the drive does not move.
         """
         from scipy.linalg import cholesky, null_space, solve_triangular
 
@@ -81,10 +85,19 @@ class StateSpace:
         R = cholesky(self.M)  # coordinates in which M = 1
         b, c = solve_triangular(R, b, trans="T"), solve_triangular(R, c, trans="T")
         G, K, one = _scaled(R, self.G), _scaled(R, self.K), np.eye(len(self.M))
-        for s in (1 + 1j, 37 + 5j):  # anywhere: only a transfer function that is zero is zero at both
+        for s in (
+            1 + 1j,
+            37 + 5j,
+        ):  # anywhere: only a transfer function that is zero is zero at both
             moved = np.linalg.solve(s * s * one + s * G + K, b)
-            if abs(c @ moved) <= 1e-10 * float(np.linalg.norm(moved)) * max(float(np.linalg.norm(c)), 1e-9):
-                raise InputError(f"expected an output that {drive} moves about this position", key="output", value=output)
+            if abs(c @ moved) <= 1e-10 * float(np.linalg.norm(moved)) * max(
+                float(np.linalg.norm(c)), 1e-9
+            ):
+                raise InputError(
+                    f"expected an output that {drive} moves about this position",
+                    key="output",
+                    value=output,
+                )
         N, L = null_space(c[None]), null_space(b[None])
         return _roots(L.T @ N, L.T @ G @ N, L.T @ K @ N)
 
@@ -94,13 +107,14 @@ class StateSpace:
 
 
 def linearize(robot: Any, q: Any = None, qd: Any = None, joints: str = "free") -> StateSpace:
-    """The robot linearised about an equilibrium q (n,), by default the static one at the start, or about a steady motion (27).
+    """The robot linearised about an equilibrium q (n,), by default the static one at the start, or
+    about a steady motion (27).
 
-    Args: robot: a System, a Robot, or a robot file; q (n,); qd (n,): joint rates of a steady motion, a rotation or translation
-    of the
-        whole robot, whose elastic equilibrium is found where q is not given; `tip/x`, `tip/y` are then along axes that turn
-        with
-        it; joints: "free", or "locked": only the elastic unknowns move, and there are no inputs.
+    Args: robot: a System, a Robot, or a robot file; q (n,); qd (n,): joint rates of a steady
+    motion, a rotation or translation of the
+        whole robot, whose elastic equilibrium is found where q is not given; `tip/x`, `tip/y` are
+        then along axes that turn with it; joints: "free", or "locked": only the elastic unknowns
+        move, and there are no inputs.
 
     Raises: InputError: q, qd are no equilibrium. FlexuraError: none is found.
     """
@@ -116,19 +130,29 @@ def linearize(robot: Any, q: Any = None, qd: Any = None, joints: str = "free") -
     K = system.tangent(at, rates if rates.any() else None)
     K = K if rates.any() else (K + K.T) / 2
     look, outputs, units = _outputs(system, at)
-    kept = [k for k, name in enumerate(outputs) if not name.startswith("joint") or int(name.split("/")[1]) - 1 in moved]
+    kept = [
+        k
+        for k, name in enumerate(outputs)
+        if not name.startswith("joint") or int(name.split("/")[1]) - 1 in moved
+    ]
     labels = [system.labels[row] for row in rows]
     drives = [f"joint/{i + 1}/drive" for i in moved]
     turns = [link.joint.type == "R" for link in system.robot.links]
     units |= {name: "N m" if turns[i] else "N" for name, i in zip(drives, moved, strict=True)}
     return StateSpace(
-        M=system.mass(at)[pick], G=system.rate(at, rates)[pick], K=K[pick],
+        M=system.mass(at)[pick],
+        G=system.rate(at, rates)[pick],
+        K=K[pick],
         E=(np.arange(system.n)[rows, None] == system.joint_rows[moved]).astype(float),
         outlook=look[np.ix_(np.array(kept), rows)],
         states=(*labels, *(f"rate of {label.replace(']', '/s]')}" for label in labels)),
-        inputs=tuple(drives), outputs=tuple(outputs[k] for k in kept), units=units, q=at, qd=rates,
+        inputs=tuple(drives),
+        outputs=tuple(outputs[k] for k in kept),
+        units=units,
+        q=at,
+        qd=rates,
         hold=system.forces(at, rates, np.zeros(system.n))[system.joint_rows],
-    )  # fmt: skip
+    )
 
 
 def _steady(system: System, rates: np.ndarray) -> np.ndarray:
@@ -145,11 +169,14 @@ def _steady(system: System, rates: np.ndarray) -> np.ndarray:
             break
         if np.linalg.norm(step * size) <= 1e-11 * (np.linalg.norm(q[rows] * size) + 1e-9):
             return q
-    raise FlexuraError("no equilibrium found at these rates: the rotation bends a link ever further")
+    raise FlexuraError(
+        "no equilibrium found at these rates: the rotation bends a link ever further"
+    )
 
 
 def _balance(system: System, q: np.ndarray, rates: np.ndarray) -> np.ndarray:
-    """What does not balance at rates (n,) that do not change: bias, elastic and gravity forces (n,)."""
+    """What does not balance at rates (n,) that do not change: bias, elastic and gravity forces
+    (n,)."""
     return system.elastic(q) + system.gravity(q) + (system.bias(q, rates) if rates.any() else 0.0)
 
 
@@ -159,13 +186,16 @@ def _sizes(system: System) -> np.ndarray:
 
 
 def _check_steady(system: System, q: np.ndarray, rates: np.ndarray) -> None:
-    """Refuse what is no equilibrium: elastic rows out of balance, or a motion along which the robot's equations change."""
+    """Refuse what is no equilibrium: elastic rows out of balance, or a motion along which the
+    robot's equations change."""
     rows = system.elastic_rows
     if len(rows):
         force, size = _balance(system, q, rates)[rows], _sizes(system)
         if np.linalg.norm(force / size) > 1e-5 * np.linalg.norm(q[rows] * size) + 1e-8:
             raise InputError(
-                "expected an equilibrium, as from fx.static(system, joints=...): elastic forces do not balance", key="q"
+                "expected an equilibrium, as from fx.static(system, joints=...): elastic forces do "
+                "not balance",
+                key="q",
             )
     if not rates.any():
         return
@@ -173,20 +203,31 @@ def _check_steady(system: System, q: np.ndarray, rates: np.ndarray) -> None:
         raise InputError("expected rates of joints only", key="qd")
     later = q + rates / np.abs(rates).max()  # a radian or a metre on
     inertia = float(np.abs(system.mass(q)).max())
-    for function, scale in ((lambda z: _balance(system, z, rates), inertia * float(rates @ rates)), (system.mass, inertia)):
+    for function, scale in (
+        (lambda z: _balance(system, z, rates), inertia * float(rates @ rates)),
+        (system.mass, inertia),
+    ):
         now, then = function(q), function(later)
         if np.abs(then - now).max() > 1e-9 * scale:
             raise InputError(
-                "expected a steady motion: rates of a first joint that turns or moves the whole robot, no gravity", key="qd"
+                "expected a steady motion: rates of a first joint that turns or moves the whole "
+                "robot, no gravity",
+                key="qd",
             )
 
 
 def _outputs(system: System, q: np.ndarray) -> tuple[np.ndarray, list[str], dict[str, str]]:
-    """d (joint positions, tip deflections, tip x, tip y) / dq (outputs, n), their names and units."""
+    """d (joint positions, tip deflections, tip x, tip y) / dq (outputs, n), their names and
+    units."""
     links = system.robot.links
     flexible = [i for i, link in enumerate(links) if link.flexible]
-    names = [f"joint/{i + 1}/position" for i in range(len(links))] + [f"link/{i + 1}/tip_deflection" for i in flexible]
-    units = {name: "rad" if "joint" in name and links[i].joint.type == "R" else "m" for i, name in enumerate(names)}
+    names = [f"joint/{i + 1}/position" for i in range(len(links))] + [
+        f"link/{i + 1}/tip_deflection" for i in flexible
+    ]
+    units = {
+        name: "rad" if "joint" in name and links[i].joint.type == "R" else "m"
+        for i, name in enumerate(names)
+    }
 
     def look(z: np.ndarray) -> np.ndarray:
         return np.concatenate([z[system.joint_rows], *system.places(z)])
@@ -198,7 +239,9 @@ def _outputs(system: System, q: np.ndarray) -> tuple[np.ndarray, list[str], dict
 def _steep(system: System) -> np.ndarray:
     """How far a unit of each unknown turns a link [rad], (n,); 1 for joints."""
     out = np.ones(system.n)
-    for owns, pieces in zip(system.assembly.structure.own, system.assembly.structure.links, strict=True):
+    for owns, pieces in zip(
+        system.assembly.structure.own, system.assembly.structure.links, strict=True
+    ):
         for own, piece in zip(owns, pieces, strict=True):
             out[own] = np.abs(piece.B).max(axis=0, initial=0.0)
     return out
@@ -223,7 +266,9 @@ def _roots(M: np.ndarray, G: np.ndarray, K: np.ndarray) -> np.ndarray:
         found = np.concatenate([np.sqrt(squares), -np.sqrt(squares)])
     else:
         zero, one = np.zeros((n, n)), np.eye(n)
-        found = eig(np.block([[zero, one], [-K, -G]]), np.block([[one, zero], [zero, M]]), right=False)
+        found = eig(
+            np.block([[zero, one], [-K, -G]]), np.block([[one, zero], [zero, M]]), right=False
+        )
     found = found[np.isfinite(found)]
     return found[np.argsort(np.abs(found), kind="stable")]
 

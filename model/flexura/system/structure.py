@@ -143,7 +143,10 @@ class Structure:
             return np.array([self.at(state, float(x)).place for x in s])
         line, x = state.lines[0], s + self._along(state.number, 0.0, state.q)[0]
         if line.row is None:
-            return line.start.place + line.free * line.piece.kept_integrals(tuple(x / line.free)) @ line.e
+            return (
+                line.start.place
+                + line.free * line.piece.kept_integrals(tuple(x / line.free)) @ line.e
+            )
         reach = line.free * line.piece.integrals(np.maximum(x, 0.0) / line.free) @ line.e
         return line.start.place + np.minimum(x, 0.0) * state.hub.tangent + reach
 

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..io import STATIONS
 from ..link.line import Piece, whole_piece
 from ..link.shapes import legendre_shapes, of_legendre
 from ..robot import Robot, load
-from ..run import STATIONS
 from .assembly import Assembly
 from .constants import equations
 from .nodes import Nodes, nodes_at
@@ -25,16 +25,20 @@ _UNITS = {"rotation": "rad", "bubble": "rad", "shape": "rad", "mode": "kg^(1/2) 
 class System:
     """A robot's equations M(q) qdd + bias(q, qd) + damping qd + elastic(q) + gravity(q) = F (19).
 
-    q (n,) is numbered [joint 1, elastic unknowns of link 1, joint 2, ...], named by `labels`: of a mesh the rotation across each
-    element and its bubble [rad] (6), of a link in its own modes mass-normalised coordinates [kg^(1/2) m], of a sleeved link its
-    shapes [rad] (7). F has entries in the joints' rows. Constant; solvers keep their memory apart from it.
+    q (n,) is numbered [joint 1, elastic unknowns of link 1, joint 2, ...], named by `labels`: of a
+    mesh the rotation across each element and its bubble [rad] (6), of a link in its own modes
+    mass-normalised coordinates [kg^(1/2) m], of a sleeved link its shapes [rad] (7). F has entries
+    in the joints' rows. Constant; solvers keep their memory apart from it.
     """
 
     robot: Robot
-    nodes: tuple[int, ...] | None = None  # that sliders and sleeves keep, where they go from node to node: `nodes.Nodes`
+    nodes: tuple[int, ...] | None = (
+        None  # that sliders and sleeves keep, where they go from node to node: `nodes.Nodes`
+    )
 
     def fixed(self, q: Any) -> System:
-        """The robot of fixed structure at q (n,): itself; where it slides from node to node, with the nodes that it has there."""
+        """The robot of fixed structure at q (n,): itself; where it slides from node to node, with
+        the nodes that it has there."""
         if not self.robot.nodal:
             return self
         at = self._array(q, "q")
@@ -45,7 +49,8 @@ class System:
 
     @cached_property
     def _structure(self) -> Structure:
-        """The numbering and the pieces with shapes of their own: found once, for the modes of links cost time."""
+        """The numbering and the pieces with shapes of their own: found once, for the modes of links
+        cost time."""
         return structure(self.robot)
 
     @cached_property
@@ -61,7 +66,8 @@ class System:
 
     @cached_property
     def equations(self) -> Any:
-        """The compiled equations, `core.Mechanics`. Raises InputError where the core refuses the robot."""
+        """The compiled equations, `core.Mechanics`. Raises InputError where the core refuses the
+        robot."""
         return equations(self.robot)
 
     @property
@@ -92,7 +98,9 @@ class System:
     @cached_property
     def free_rows(self) -> np.ndarray:
         """Rows of q that can move: all but locked joints and nodes at rest in a sleeve."""
-        return np.setdiff1d(np.arange(self.n), np.append(self.joint_rows[self.locked], self._resting))
+        return np.setdiff1d(
+            np.arange(self.n), np.append(self.joint_rows[self.locked], self._resting)
+        )
 
     @property
     def _resting(self) -> np.ndarray:
@@ -105,10 +113,13 @@ class System:
 
     @cached_property
     def limits(self) -> np.ndarray:
-        """Lower and upper limits of the joints (links, 2) [m or rad]: those of the file, and the ends of the links that slide."""
+        """Lower and upper limits of the joints (links, 2) [m or rad]: those of the file, and the
+        ends of the links that slide."""
         own = np.array([link.joint.limits or (-np.inf, np.inf) for link in self.robot.links])
         ends = np.array([self.robot.travel(i) for i in range(len(self.robot.links))])
-        return np.column_stack([np.maximum(own[:, 0], ends[:, 0]), np.minimum(own[:, 1], ends[:, 1])])
+        return np.column_stack(
+            [np.maximum(own[:, 0], ends[:, 0]), np.minimum(own[:, 1], ends[:, 1])]
+        )
 
     def start(self) -> np.ndarray:
         """The configuration at the start (n,): joints at their `start`, links straight."""
@@ -121,14 +132,16 @@ class System:
         return self.assembly.mass(self.check(q))
 
     def stiffness(self, q: Any = None) -> np.ndarray:
-        """K (n, n) at the start; with q the tangent stiffness there, the slope of elastic and gravity forces (17), (26)."""
+        """K (n, n) at the start; with q the tangent stiffness there, the slope of elastic and
+        gravity forces (17), (26)."""
         if q is None:
             return self.assembly.stiffness_blocks(self.check(self.start()))
         return self.tangent(q)
 
     @cached_property
     def damping(self) -> np.ndarray:
-        """D (n, n) at the start: Rayleigh damping of the elastic unknowns and viscous friction of the joints (18)."""
+        """D (n, n) at the start: Rayleigh damping of the elastic unknowns and viscous friction of
+        the joints (18)."""
         return self.damping_at(self.start())
 
     def damping_at(self, q: Any) -> np.ndarray:
@@ -148,11 +161,13 @@ class System:
         return self.assembly.bias(self.check(q), self.check(qd, "qd"))
 
     def forces(self, q: Any, qd: Any, qdd: Any) -> np.ndarray:
-        """Generalised forces (n,) that the motion needs: the whole left-hand side, Coulomb friction left out (19)."""
+        """Generalised forces (n,) that the motion needs: the whole left-hand side, Coulomb friction
+        left out (19)."""
         return self.assembly.forces(self.check(q), self.check(qd, "qd"), self.check(qdd, "qdd"))
 
     def accelerations(self, q: Any, qd: Any, force: Any) -> np.ndarray:
-        """qdd (n,) under generalised forces (n,), locked joints at rest; Coulomb friction left out (20) to (23)."""
+        """qdd (n,) under generalised forces (n,), locked joints at rest; Coulomb friction left out
+        (20) to (23)."""
         at, rates, acting = self.check(q), self.check(qd, "qd"), self.check(force, "force")
         if self.exact:
             return np.asarray(self.equations.accelerations(at, rates, acting))
@@ -164,61 +179,82 @@ class System:
     def line(self, q: Any, link: int, s: Any = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """x, y [m] and the tangent's angle theta [rad] in the base's axes of a link (from 1) at q.
 
-        Args: q (n,); link: its number; s (S,) [m] along it from its proximal end, by default 101 places from end to end.
+        Args: q (n,); link: its number; s (S,) [m] along it from its proximal end, by default 101
+        places from end to end.
 
-        Returns: three arrays (S,). Of a sleeved link what is inside or behind the sleeve lies on its axis.
+        Returns: three arrays (S,). Of a sleeved link what is inside or behind the sleeve lies on
+        its axis.
 
         Raises: InputError: there is no such link, or a place is not on it.
         """
         if not 1 <= link <= len(self.robot.links):
-            raise InputError(f"expected a link from 1 to {len(self.robot.links)}", key="link", value=link)
+            raise InputError(
+                f"expected a link from 1 to {len(self.robot.links)}", key="link", value=link
+            )
         length = self.robot.links[link - 1].length_m
-        places = np.linspace(0.0, length, 101) if s is None else np.atleast_1d(np.asarray(s, dtype=float))
+        places = (
+            np.linspace(0.0, length, 101)
+            if s is None
+            else np.atleast_1d(np.asarray(s, dtype=float))
+        )
         if places.ndim != 1 or not np.all((places >= 0) & (places <= length * (1 + 1e-12))):
-            raise InputError(f"expected places from 0 to the link's length, {length:g} m", key="s", value=s)
+            raise InputError(
+                f"expected places from 0 to the link's length, {length:g} m", key="s", value=s
+            )
         if self.exact:
-            return tuple(np.ascontiguousarray(self.equations.line(self.check(q), link - 1, places).T))  # type: ignore[return-value]
+            return tuple(
+                np.ascontiguousarray(self.equations.line(self.check(q), link - 1, places).T)
+            )  # type: ignore[return-value]
         return self.assembly.line(self.check(q), link, places)
 
     def angles(self, link: int, s: Any) -> np.ndarray:
-        """What each unknown turns the tangent by (S, n), against the hub, at s (S,) [m] along a link (from 1) of constant
-        length: B of (1)."""
+        """What each unknown turns the tangent by (S, n), against the hub, at s (S,) [m] along a
+        link (from 1) of constant length: B of (1)."""
         places = np.atleast_1d(np.asarray(s, dtype=float))
         out, start = np.zeros((len(places), self.n)), 0.0
         for piece, own in zip(
-            *(x[link - 1] for x in (self.assembly.structure.links, self.assembly.structure.own)), strict=True
+            *(x[link - 1] for x in (self.assembly.structure.links, self.assembly.structure.own)),
+            strict=True,
         ):
             out[:, own] = piece.shapes(np.clip((places - start) / piece.length, 0.0, 1.0))
             start += piece.length
         return out
 
     def observe(self, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
-        """What a Run shows of states q, qd (T, n): rows of poses, deflections, tip and energies, as `record.channel_units` names
-        them from `link/1/x` to `energy/potential` (2), (29)."""
+        """What a Run shows of states q, qd (T, n): rows of poses, deflections, tip and energies, as
+        `record.channel_units` names them from `link/1/x` to `energy/potential` (2), (29)."""
         if self.exact:
             return np.asarray(self.equations.observe(q, qd, STATIONS))
         return np.array([self.assembly.observe(a, b, STATIONS) for a, b in zip(q, qd, strict=True)])
 
     def places(self, q: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Tip deflections of the flexible links (k,) [m] and the last tip's x, y [m] at q: what a Run shows of them."""
+        """Tip deflections of the flexible links (k,) [m] and the last tip's x, y [m] at q: what a
+        Run shows of them."""
         at = self.check(q)
         if self.exact:
             row = self.equations.observe(at[None], np.zeros((1, self.n)), 2)[0]
             first = np.cumsum([0] + [3 + 4 * link.flexible for link in self.robot.links])
-            return row[[first[i] + 3 for i, link in enumerate(self.robot.links) if link.flexible]], row[
-                first[-1] : first[-1] + 2
-            ]
-        return self.assembly.tip_deflections(at), np.array([(tip := self.assembly.tip(at)).place.real, tip.place.imag])
+            return row[
+                [first[i] + 3 for i, link in enumerate(self.robot.links) if link.flexible]
+            ], row[first[-1] : first[-1] + 2]
+        return self.assembly.tip_deflections(at), np.array(
+            [(tip := self.assembly.tip(at)).place.real, tip.place.imag]
+        )
 
     @property
     def exact(self) -> bool:
-        """Whether the robot is on the exact line, which the compiled core has; else the dissertation's model is asked for."""
+        """Whether the robot is on the exact line, which the compiled core has; else the
+        dissertation's model is asked for."""
         return self.robot.stiffening and not self.robot.nodal
 
     def check(self, q: Any, key: str = "q") -> np.ndarray:
-        """An array (n,) of floats. Raises InputError for another shape, and for robots that slide from node to node."""
+        """An array (n,) of floats. Raises InputError for another shape, and for robots that slide
+        from node to node."""
         if self.robot.nodal and self.nodes is None:
-            text = 'expected "continuous": sliding from node to node has other matrices between every two nodes'
+            text = (
+                'expected "continuous": sliding from node to node has other matrices between '
+                "every two nodes"
+            )
             raise InputError(text, key="sliding", value="nodal")
         return self._array(q, key)
 
@@ -226,12 +262,15 @@ class System:
         array = np.array(q, dtype=float)
         if array.shape != (self.n,):
             raise InputError(
-                f"expected an array of shape ({self.n},), in the order of system.labels", key=key, value=array.shape
+                f"expected an array of shape ({self.n},), in the order of system.labels",
+                key=key,
+                value=array.shape,
             )
         return array
 
     def tangent(self, q: Any, qd: Any = None) -> np.ndarray:
-        """The derivative of bias, elastic and gravity forces by q (n, n), at rest or at rates qd (n,) (27)."""
+        """The derivative of bias, elastic and gravity forces by q (n, n), at rest or at rates qd
+        (n,) (27)."""
         at, rates = self.check(q), None if qd is None else self.check(qd, "qd")
         if self.exact:
             return np.asarray(self.equations.stiffness(at, np.zeros(0) if rates is None else rates))
@@ -242,16 +281,26 @@ class System:
         return jacobian(forces, at, np.full(self.n, 1e-6))
 
     def rate(self, q: Any, qd: Any) -> np.ndarray:
-        """The derivative of all forces by qd (n, n) at (q, qd): damping, friction, and the gyroscopic terms of a motion (27)."""
+        """The derivative of all forces by qd (n, n) at (q, qd): damping, friction, and the
+        gyroscopic terms of a motion (27)."""
         at, rates = self.check(q), self.check(qd, "qd")
         if self.exact:
             return np.asarray(self.equations.rates(at, rates))
-        gyroscopic = jacobian(lambda v: self.assembly.bias(at, v), rates, np.full(self.n, 1e-3)) if rates.any() else 0.0
+        gyroscopic = (
+            jacobian(lambda v: self.assembly.bias(at, v), rates, np.full(self.n, 1e-3))
+            if rates.any()
+            else 0.0
+        )
         return self.assembly.damping(at) + gyroscopic
 
     def _shapes(self, link: int, pieces: tuple[Piece, ...]) -> tuple[Piece, ...]:
-        """The pieces of a link; one in modes gets the core's modes in place of its own (all else is equal to the last digits)."""
-        if len(pieces) != 1 or not hasattr(pieces[0].shapes, "coefficients") or not pieces[0].K.size:
+        """The pieces of a link; one in modes gets the core's modes in place of its own (all else is
+        equal to the last digits)."""
+        if (
+            len(pieces) != 1
+            or not hasattr(pieces[0].shapes, "coefficients")
+            or not pieces[0].K.size
+        ):
             return pieces
         B, K, _, sums = self.equations.whole_link(link)
         count = len(pieces[0].shapes.coefficients)
@@ -284,13 +333,17 @@ def assemble(robot: Robot) -> System:
 
 
 def jacobian(function: Any, x: np.ndarray, steps: np.ndarray) -> np.ndarray:
-    """The derivative of a function of x (n,) by x, (m, n), by central differences with the given steps (n,)."""
+    """The derivative of a function of x (n,) by x, (m, n), by central differences with the given
+    steps (n,)."""
     shifts = np.diag(steps)
-    return np.column_stack([(function(x + e) - function(x - e)) / (2 * h) for e, h in zip(shifts, steps, strict=True)])
+    return np.column_stack(
+        [(function(x + e) - function(x - e)) / (2 * h) for e, h in zip(shifts, steps, strict=True)]
+    )
 
 
 def system_of(robot: Any) -> System:
-    """The System of what a function was given: a System, a Robot, or the path or name of a robot file."""
+    """The System of what a function was given: a System, a Robot, or the path or name of a robot
+    file."""
     if isinstance(robot, System):
         return robot
     return assemble(robot if isinstance(robot, Robot) else load(robot))

@@ -4,23 +4,26 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..run import STATIONS
-from .actuation import Actuation
-from .chain import Chain
-from .part import Ground, Motion
+from ..io import STATIONS
+from .build import Chain
+from .links.part import Ground, Motion
+from .loads import Actuation
 
 
 def channels(
     chain: Chain, act: Actuation, t: np.ndarray, q: np.ndarray, v: np.ndarray
 ) -> tuple[dict[str, np.ndarray], dict[str, str]]:
-    """Channels and their units from total coordinates q and velocities v of the system, both (T, coordinates)."""
+    """Channels and their units from total coordinates q and velocities v of the system, both (T,
+    coordinates)."""
     out: dict[str, tuple[np.ndarray, str]] = {}
     gravity = np.array(chain.robot.gravity_m_s2)
     kinetic, strain, potential = np.zeros(len(t)), np.zeros(len(t)), np.zeros(len(t))
     position, speed = np.zeros((len(t), len(chain.parts))), np.zeros((len(t), len(chain.parts)))
     origin = tip = Ground.motion(len(t))
     deflection = np.zeros(len(t))
-    for i, (link, part, index) in enumerate(zip(chain.robot.links, chain.parts, chain.index, strict=True)):
+    for i, (link, part, index) in enumerate(
+        zip(chain.robot.links, chain.parts, chain.index, strict=True)
+    ):
         mine, rate = q[:, index], v[:, index]
         hub, end = part.motion_at_origin(mine, rate), part.motion_at_tip(mine, rate)
         joint = link.joint
@@ -28,7 +31,9 @@ def channels(
             turned = _unwrap(t, hub.angle - tip.angle, hub.omega - tip.omega, joint.start)
             position[:, i], speed[:, i] = turned, hub.omega - tip.omega
             hub = hub._replace(angle=tip.angle + turned)
-        elif joint.type == "Pa":  # the tangent of a link turns by less than half a turn from its start
+        elif (
+            joint.type == "Pa"
+        ):  # the tangent of a link turns by less than half a turn from its start
             turned = _wrap(hub.angle - joint.angle_rad - origin.angle)
             position[:, i], speed[:, i] = _slide(origin, hub)
             hub = hub._replace(angle=origin.angle + turned + joint.angle_rad)
@@ -40,14 +45,19 @@ def channels(
         if slides is not None:
             position[:, i], speed[:, i] = q[:, slides], v[:, slides]
             if joint.type == "Pb":  # what is behind the sleeve's exit is on its axis
-                hub = hub._replace(r=sleeve.r + (position[:, i] - link.length_m)[:, None] * _axis(sleeve.angle))
+                hub = hub._replace(
+                    r=sleeve.r + (position[:, i] - link.length_m)[:, None] * _axis(sleeve.angle)
+                )
         slope = _wrap(end.angle - hub.angle)
         end = end._replace(angle=hub.angle + slope)
         out |= {f"link/{i + 1}/x": (hub.r[:, 0], "m"), f"link/{i + 1}/y": (hub.r[:, 1], "m")}
         out[f"link/{i + 1}/angle"] = hub.angle, "rad"
         deflection = _transverse(hub, end.r)
         if link.flexible:
-            out |= {f"link/{i + 1}/tip_deflection": (deflection, "m"), f"link/{i + 1}/tip_slope": (slope, "rad")}
+            out |= {
+                f"link/{i + 1}/tip_deflection": (deflection, "m"),
+                f"link/{i + 1}/tip_slope": (slope, "rad"),
+            }
             for k in range(STATIONS):
                 place = part.point(mine, k * link.length_m / (STATIONS - 1))
                 out[f"link/{i + 1}/deflection/{k}"] = _transverse(hub, place), "m"
@@ -59,14 +69,27 @@ def channels(
         origin, tip = hub, end
     out = _joints(chain, act, t, position, speed, deflection * bool(chain.mesh.elements[-1])) | out
     out |= {"tip/x": (tip.r[:, 0], "m"), "tip/y": (tip.r[:, 1], "m")}
-    out |= {"energy/kinetic": (kinetic, "J"), "energy/strain": (strain, "J"), "energy/potential": (potential, "J")}
-    return {name: values for name, (values, _) in out.items()}, {name: unit for name, (_, unit) in out.items()}
+    out |= {
+        "energy/kinetic": (kinetic, "J"),
+        "energy/strain": (strain, "J"),
+        "energy/potential": (potential, "J"),
+    }
+    return {name: values for name, (values, _) in out.items()}, {
+        name: unit for name, (_, unit) in out.items()
+    }
 
 
 def _joints(
-    chain: Chain, act: Actuation, t: np.ndarray, position: np.ndarray, speed: np.ndarray, deflection: np.ndarray
+    chain: Chain,
+    act: Actuation,
+    t: np.ndarray,
+    position: np.ndarray,
+    speed: np.ndarray,
+    deflection: np.ndarray,
 ) -> dict[str, tuple[np.ndarray, str]]:
-    drive = np.array([act.call(*sample) for sample in zip(t, position, speed, deflection, strict=True)]).reshape(position.shape)
+    drive = np.array(
+        [act.call(*sample) for sample in zip(t, position, speed, deflection, strict=True)]
+    ).reshape(position.shape)
     out = {}
     for i, link in enumerate(chain.robot.links):
         length, force = ("rad", "N m") if link.joint.type == "R" else ("m", "N")
@@ -86,7 +109,9 @@ def _slide(rail: Motion, hub: Motion) -> tuple[np.ndarray, np.ndarray]:
     axis = _axis(rail.angle)
     normal = np.stack([-axis[:, 1], axis[:, 0]], axis=-1)
     delta, rate = hub.r - rail.r, hub.v - rail.v
-    return (axis * delta).sum(axis=-1), (axis * rate + rail.omega[:, None] * normal * delta).sum(axis=-1)
+    return (axis * delta).sum(axis=-1), (axis * rate + rail.omega[:, None] * normal * delta).sum(
+        axis=-1
+    )
 
 
 def _axis(angle: np.ndarray) -> np.ndarray:
@@ -99,7 +124,8 @@ def _wrap(angle: np.ndarray) -> np.ndarray:
 
 
 def _unwrap(t: np.ndarray, angle: np.ndarray, rate: np.ndarray, start: float) -> np.ndarray:
-    """An angle known up to whole turns as a continuous one that begins at `start`; the rate bridges long output steps."""
+    """An angle known up to whole turns as a continuous one that begins at `start`; the rate bridges
+    long output steps."""
     out = np.empty_like(angle)
     guess = start
     for k in range(len(t)):

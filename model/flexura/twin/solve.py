@@ -1,4 +1,5 @@
-"""Simulating a robot in Exudyn: settings, the run itself, and what happens when it doesn't get to its end."""
+"""Simulating a robot in Exudyn: settings, the run itself, and what happens when it doesn't get to
+its end."""
 
 from __future__ import annotations
 
@@ -12,24 +13,28 @@ from typing import Any
 import numpy as np
 
 from ..errors import FlexuraError, InputError
+from ..io import Run
 from ..robot import MAX_ELEMENTS, Robot
-from ..run import Run
-from . import ancf, exact
-from .actuation import Actuation, Loads, actuation
-from .chain import Chain, build
+from .build import Chain, build
 from .channels import channels
 from .extrapolation import LONGER, extrapolate
-from .mesh import mesh, reach_of, refuse, sliding_kinds
-from .stepping import Steps, plan, suggest
+from .joints.mesh import mesh, reach_of, refuse, sliding_kinds
+from .links import ancf, geometrically_exact
+from .loads import Actuation, Loads, actuation
+from .steps import Steps, plan, suggest
 
-PROGRAMS = {"ancf": ancf.PROGRAM, "ge": exact.PROGRAM}
+PROGRAMS = {"ancf": ancf.PROGRAM, "ge": geometrically_exact.PROGRAM}
 ATTEMPTS = 4  # steps tried, each half the one before, where the user doesn't give one
-SPARSE = 60  # coordinates beyond which sparse matrices are faster (0.25 ms a step against 0.8 at 420)
+SPARSE = (
+    60  # coordinates beyond which sparse matrices are faster (0.25 ms a step against 0.8 at 420)
+)
 COARSE = 4  # elements a link for the frequencies that suggest a step
 SLACK = 1e-4  # how far a hub or sleeve may go beyond the end of its link, relative to the link
 PROGRESS = 0.01  # the fraction of a run between two calls of progress
 
-Record = tuple[list[float], list[np.ndarray], list[np.ndarray], list[np.ndarray]]  # times, coordinates, velocities, accelerations
+Record = tuple[
+    list[float], list[np.ndarray], list[np.ndarray], list[np.ndarray]
+]  # times, coordinates, velocities, accelerations
 
 
 class DidNotConverge(FlexuraError):
@@ -48,35 +53,46 @@ def simulate(
     hub_length_m: float | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Run:
-    """Simulate a robot in Exudyn, as a check on the native solver that shares nothing with it but the robot file.
+    """Simulate a robot in Exudyn, as a check on the native solver that shares nothing with it but
+    the robot file.
 
-    The robot starts straight at `robot.start`, at time 0, with the joint velocities `qd0` (n,) [m/s or rad/s] (None: at
-    rest). `t_eval` (T,): ascending times of the result [s]. `drive`: a Drive, or a function `(t)` or
-    `(t, position, velocity, tip_deflection)`, with the last link's tip deflection, that gives n forces [N] or torques
-    [N m]; a function of the state is called in every iteration, so it must depend on its arguments only.
+    The robot starts straight at `robot.start`, at time 0, with the joint velocities `qd0` (n,) [m/s
+    or rad/s] (None: at rest). `t_eval` (T,): ascending times of the result [s]. `drive`: a Drive,
+    or a function `(t)` or `(t, position, velocity, tip_deflection)`, with the last link's tip
+    deflection, that gives n forces [N] or torques [N m]; a function of the state is called in every
+    iteration, so it must depend on its arguments only.
 
-    `beam`: "ancf" (ObjectANCFCable2D, Euler-Bernoulli) or "ge" (ObjectBeamGeometricallyExact2D of three nodes, with shear).
-    `elements`: beam elements a flexible link; None: twice the robot file's and at least 8, or 32 where a joint slides on it.
-    `step_s`: Exudyn's longest step; None: from the robot's frequencies, for an error in time below 1e-3 of the tip deflection
-    or so, and shorter if need be. Steps divide a uniform output step; elsewhere results are interpolated by cubics.
-    `hub_length_m`: of the hub of a Pa on a flexible link and of the spans of a flexible Pb's sleeve, see `mesh`. None: short
-    ones, and once more for each of the two types with that type's twice as long, extrapolated to none (`extrapolation`);
-    `meta["extrapolation"]` says how far that went. A function of time or state is called in all these runs.
-    `progress`: called with the fraction done.
+    `beam`: "ancf" (ObjectANCFCable2D, Euler-Bernoulli) or "ge" (ObjectBeamGeometricallyExact2D of
+    three nodes, with shear). `elements`: beam elements a flexible link; None: twice the robot
+    file's and at least 8, or 32 where a joint slides on it. `step_s`: Exudyn's longest step; None:
+    from the robot's frequencies, for an error in time below 1e-3 of the tip deflection or so, and
+    shorter if need be. Steps divide a uniform output step; elsewhere results are interpolated by
+    cubics. `hub_length_m`: of the hub of a Pa on a flexible link and of the spans of a flexible
+    Pb's sleeve, see `mesh`. None: short ones, and once more for each of the two types with that
+    type's twice as long, extrapolated to none (`extrapolation`); `meta["extrapolation"]` says how
+    far that went. A function of time or state is called in all these runs. `progress`: called with
+    the fraction done.
 
-    The result has the channels of a native run (`flexura.run`) but no energy/work and energy/loss. Ctrl-C ends it early,
-    with `meta["complete"]` false. Links take all unknowns of their mesh (`modes` is not looked at); joint limits don't act.
+    The result has the channels of a native run (`flexura.run`) but no energy/work and energy/loss.
+    Ctrl-C ends it early, with `meta["complete"]` false. Links take all unknowns of their mesh
+    (`modes` is not looked at); joint limits don't act.
 
-    Raises InputError for what the twin doesn't contain (stiffening = false, damping alpha, sliding on a "ge" beam) or can't be,
-    FlexuraError where Exudyn's solver fails or a joint slides off the end of a flexible link, with the time it got to.
+    Raises InputError for what the twin doesn't contain (stiffening = false, damping alpha, sliding
+    on a "ge" beam) or can't be, FlexuraError where Exudyn's solver fails or a joint slides off the
+    end of a flexible link, with the time it got to.
     """
     refuse(robot, beam)
     t, speeds = _times(t_eval), _speeds(robot, qd0)
     if beam not in PROGRAMS:
         raise InputError('expected "ancf" or "ge"', key="beam", value=beam)
     if elements is not None and not 1 <= elements <= 2 * MAX_ELEMENTS:
-        raise InputError(f"expected a whole number from 1 to {2 * MAX_ELEMENTS}", key="elements", value=elements)
-    for key, given, unit in (("step_s", step_s, "time in seconds"), ("hub_length_m", hub_length_m, "length in metres")):
+        raise InputError(
+            f"expected a whole number from 1 to {2 * MAX_ELEMENTS}", key="elements", value=elements
+        )
+    for key, given, unit in (
+        ("step_s", step_s, "time in seconds"),
+        ("hub_length_m", hub_length_m, "length in metres"),
+    ):
         if given is not None and not given > 0:
             raise InputError(f"expected a {unit}, above 0", key=key, value=given)
     act = actuation(drive, robot.start, speeds)
@@ -88,14 +104,30 @@ def simulate(
             return build(robot, beam, mesh(robot, elements, hub_length_m, times), speeds, act.gains)
 
         tries = 1 if step_s else ATTEMPTS
-        return _run(new, act, t, longest, tries, lambda fraction: report((number + fraction) * share), PROGRAMS[beam])
+        return _run(
+            new,
+            act,
+            t,
+            longest,
+            tries,
+            lambda fraction: report((number + fraction) * share),
+            PROGRAMS[beam],
+        )
 
     with _quiet():
         coarse = mesh(robot, COARSE, hub_length_m)
-        first = run(0, {}, step_s or suggest(build(robot, beam, coarse, speeds, act.gains), _settings(1.0, 1), t[-1]))
+        first = run(
+            0,
+            {},
+            step_s
+            or suggest(build(robot, beam, coarse, speeds, act.gains), _settings(1.0, 1), t[-1]),
+        )
         if not kinds or not first.complete:
             return first
-        return extrapolate(first, {kind: run(k, {kind: LONGER}, first.meta["step_s"]) for k, kind in enumerate(kinds, 1)})
+        return extrapolate(
+            first,
+            {kind: run(k, {kind: LONGER}, first.meta["step_s"]) for k, kind in enumerate(kinds, 1)},
+        )
 
 
 def _run(
@@ -107,7 +139,8 @@ def _run(
     progress: Callable[[float], None],
     program: str,
 ) -> Run:
-    """Simulate with steps of at most `longest` [s], given by the user if there is one try, else halved where Exudyn fails."""
+    """Simulate with steps of at most `longest` [s], given by the user if there is one try, else
+    halved where Exudyn fails."""
     import exudyn
 
     for attempt in range(tries):
@@ -122,17 +155,30 @@ def _run(
     q += chain.reference
     values, units = channels(chain, act, t, q, v)
     meta = {
-        "source": "twin", "program": f"Exudyn {exudyn.__version__} ({program})", "robot": chain.robot.to_dict(),
-        "complete": done == steps.count, "events": [], "wall_s": wall, "steps": done, "step_s": steps.length,
-        "elements": chain.mesh.elements, "labels": [f"joint/{i}" for i in range(1, len(chain.parts) + 1)],
+        "source": "twin",
+        "program": f"Exudyn {exudyn.__version__} ({program})",
+        "robot": chain.robot.to_dict(),
+        "complete": done == steps.count,
+        "events": [],
+        "wall_s": wall,
+        "steps": done,
+        "step_s": steps.length,
+        "elements": chain.mesh.elements,
+        "labels": [f"joint/{i}" for i in range(1, len(chain.parts) + 1)],
         "hub_length_m": chain.mesh.hubs,
-    }  # fmt: skip
+    }
     return Run(t, values, units, meta)
 
 
 def _times(t_eval: Any) -> np.ndarray:
     t = np.array(t_eval, dtype=float)
-    if t.ndim != 1 or len(t) == 0 or not np.all(np.isfinite(t)) or t[0] < 0 or np.any(np.diff(t) <= 0):
+    if (
+        t.ndim != 1
+        or len(t) == 0
+        or not np.all(np.isfinite(t))
+        or t[0] < 0
+        or np.any(np.diff(t) <= 0)
+    ):
         raise InputError("expected ascending times in seconds, from 0 on", key="t_eval", value=t)
     return t
 
@@ -144,17 +190,23 @@ def _speeds(robot: Robot, qd0: Any) -> np.ndarray:
         raise InputError(f"expected {n} joint velocities in m/s or rad/s", key="qd0", value=speeds)
     for i, (link, speed) in enumerate(zip(robot.links, speeds, strict=True), 1):
         if link.joint.locked and speed:
-            raise InputError("expected 0: this joint is locked", key=f"qd0[{i}]", value=float(speed))
+            raise InputError(
+                "expected 0: this joint is locked", key=f"qd0[{i}]", value=float(speed)
+            )
     return speeds
 
 
-def _settings(end: float, steps: int, reach: float = 1.0, flexible: bool = True, coordinates: int = 0) -> Any:
-    """Settings that are sound for thin metal strips, and write no files; `reach` is the sum of the links' lengths [m].
+def _settings(
+    end: float, steps: int, reach: float = 1.0, flexible: bool = True, coordinates: int = 0
+) -> Any:
+    """Settings that are sound for thin metal strips, and write no files; `reach` is the sum of the
+    links' lengths [m].
 
-    Exudyn's default tolerances on residuals are below round-off for strips (EA/EI ~ 1e7 1/m^2); it would then halve its
-    step a thousand times without a word. With flexible links convergence is judged by increments (residualMode 1)
-    instead, and a step that fails, fails. These are increments of position, so that an error of 1e-12 is one of
-    1e-12/h^2 in acceleration: a fixed tolerance makes errors grow again as the step falls, one with h^2 doesn't.
+    Exudyn's default tolerances on residuals are below round-off for strips (EA/EI ~ 1e7 1/m^2); it
+    would then halve its step a thousand times without a word. With flexible links convergence is
+    judged by increments (residualMode 1) instead, and a step that fails, fails. These are
+    increments of position, so that an error of 1e-12 is one of 1e-12/h^2 in acceleration: a fixed
+    tolerance makes errors grow again as the step falls, one with h^2 doesn't.
     """
     import exudyn as exu
 
@@ -170,14 +222,18 @@ def _settings(end: float, steps: int, reach: float = 1.0, flexible: bool = True,
     integration.generalizedAlpha.spectralRadius = 0.9
     integration.adaptiveStep = False
     kinds = exu.LinearSolverType
-    settings.linearSolver.solverType = kinds.EigenSparse if coordinates > SPARSE else kinds.EigenDense
+    settings.linearSolver.solverType = (
+        kinds.EigenSparse if coordinates > SPARSE else kinds.EigenDense
+    )
     settings.solution.file.write = False
     settings.solution.solverInformationFileName = ""
     settings.solution.sensors.active = False
     return settings
 
 
-def _solve(chain: Chain, act: Actuation, steps: Steps, progress: Callable[[float], None] | None) -> tuple[Record, int, float]:
+def _solve(
+    chain: Chain, act: Actuation, steps: Steps, progress: Callable[[float], None] | None
+) -> tuple[Record, int, float]:
     """Run Exudyn; returns the record, the steps done, and seconds taken."""
     record: Record = ([], [], [], [])
     errors: list[BaseException] = []
@@ -194,7 +250,9 @@ def _solve(chain: Chain, act: Actuation, steps: Steps, progress: Callable[[float
     def before(mbs: Any, t: float) -> bool:
         try:
             loads.before_step(t)
-        except BaseException as error:  # an exception would come out of Exudyn as another one: stop first, raise after
+        except (
+            BaseException
+        ) as error:  # an exception would come out of Exudyn as another one: stop first, raise after
             errors.append(error)
         return not errors
 
@@ -229,13 +287,16 @@ def _solve(chain: Chain, act: Actuation, steps: Steps, progress: Callable[[float
 
 
 def _still_on(chain: Chain, q: Any, t: float) -> None:
-    """Raise FlexuraError where a hub or sleeve has come to the end of its link: Exudyn would let it stick there."""
+    """Raise FlexuraError where a hub or sleeve has come to the end of its link: Exudyn would let it
+    stick there."""
     for i, place in enumerate(chain.slides):
         if place is not None:
             low, high = reach_of(chain.robot, i)
             if not low - SLACK * high <= q[place] <= high + SLACK * high:
                 where = f"at {q[place]:.6g} m, it can be from {low:g} to {high:g} m"
-                raise FlexuraError(f"joint {i + 1} slid off the end of its link at t = {t:.6g} s: {where}")
+                raise FlexuraError(
+                    f"joint {i + 1} slid off the end of its link at t = {t:.6g} s: {where}"
+                )
 
 
 def _complaint(mbs: Any, settings: Any) -> str:
@@ -247,12 +308,20 @@ def _complaint(mbs: Any, settings: Any) -> str:
 
 
 def _failure(mbs: Any, done: int, steps: Steps, failed: str) -> FlexuraError:
-    where = f"Exudyn's solver stopped at t = {done * steps.length:.6g} s of {steps.count * steps.length:.6g} s"
+    where = (
+        f"Exudyn's solver stopped at t = {done * steps.length:.6g} s of "
+        f"{steps.count * steps.length:.6g} s"
+    )
     solver = mbs.sys.get("dynamicSolver")
     if solver is not None and solver.conv.linearSolverFailed:
-        return FlexuraError(f"{where}: its equations are singular; a link without mass that nothing holds?")
+        return FlexuraError(
+            f"{where}: its equations are singular; a link without mass that nothing holds?"
+        )
     if solver is not None and not solver.conv.newtonConverged:
-        cause = f"a step of {steps.length:.3g} s did not converge; the motion or the drive is too fast for it"
+        cause = (
+            f"a step of {steps.length:.3g} s did not converge; the motion or the drive is too "
+            f"fast for it"
+        )
         return DidNotConverge(f"{where}: {cause}, give a smaller step_s")
     return FlexuraError(f"{where}: {failed.splitlines()[0]}")
 
@@ -272,7 +341,8 @@ def _quiet() -> Iterator[None]:
 
 @contextmanager
 def _interruptible() -> Iterator[threading.Event]:
-    """An event that Ctrl-C sets, instead of an exception in the midst of Exudyn; only the main thread can be asked."""
+    """An event that Ctrl-C sets, instead of an exception in the midst of Exudyn; only the main
+    thread can be asked."""
     interrupted = threading.Event()
     if threading.current_thread() is not threading.main_thread():
         yield interrupted

@@ -1,4 +1,5 @@
-"""Builds of the core: without Python, with another compiler, and for two levels of processor with the same digits."""
+"""Builds of the core: without Python, with another compiler, and for two levels of processor with
+the same digits."""
 
 import os
 import shutil
@@ -16,17 +17,36 @@ from flexura import core
 ROOT = Path(__file__).resolve().parents[3]
 FUNCTIONS = ["sin", "cos", "exp", "log", "tanh"]
 CMAKE, NINJA = Path(cmake.CMAKE_BIN_DIR) / "cmake", Path(ninja.BIN_DIR) / "ninja"
-CLANG = next(filter(None, map(shutil.which, ["clang++", *(f"clang++-{version}" for version in range(14, 25))])), None)
-needs_clang = pytest.mark.skipif(not CLANG and not os.environ.get("REQUIRE_CLANG"), reason="no clang++ on this machine")
+CLANG = next(
+    filter(
+        None, map(shutil.which, ["clang++", *(f"clang++-{version}" for version in range(14, 25))])
+    ),
+    None,
+)
+needs_clang = pytest.mark.skipif(
+    not CLANG and not os.environ.get("REQUIRE_CLANG"), reason="no clang++ on this machine"
+)
 
 
 class Build:
-    """The library and its C++ tests in a folder, made with nothing on the PATH but compiler and linker."""
+    """The library and its C++ tests in a folder, made with nothing on the PATH but compiler and
+    linker."""
 
     def __init__(self, folder: Path, *settings: str):
         self.programs = programs = folder / "programs"
         programs.mkdir()
-        for name in ("c++", "g++", "clang++", "as", "ld", "ar", "ranlib", "nm", "dsymutil", "xcrun"):
+        for name in (
+            "c++",
+            "g++",
+            "clang++",
+            "as",
+            "ld",
+            "ar",
+            "ranlib",
+            "nm",
+            "dsymutil",
+            "xcrun",
+        ):
             if path := shutil.which(name):
                 (programs / name).symlink_to(path)
         self.folder, self.environment = folder / "build", {"PATH": str(programs)}
@@ -35,15 +55,26 @@ class Build:
 
     def run(self, *command: object) -> str:
         arguments = {"stdin": subprocess.DEVNULL, "capture_output": True, "text": True}
-        done = subprocess.run([*map(str, command)], env=self.environment, cwd=self.programs, **arguments)
+        done = subprocess.run(
+            [*map(str, command)], env=self.environment, cwd=self.programs, **arguments
+        )
         assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-4000:]
         return done.stdout
 
     def make(self, *targets: str) -> None:
-        self.run(CMAKE, "--build", self.folder, "--parallel", "2", *(f"--target={name}" for name in targets))
+        self.run(
+            CMAKE,
+            "--build",
+            self.folder,
+            "--parallel",
+            "2",
+            *(f"--target={name}" for name in targets),
+        )
 
     def test(self, *arguments: str) -> str:
-        return self.run(CMAKE.with_name("ctest"), "--test-dir", self.folder, "--output-on-failure", *arguments)
+        return self.run(
+            CMAKE.with_name("ctest"), "--test-dir", self.folder, "--output-on-failure", *arguments
+        )
 
 
 def test_the_library_is_made_without_python(tmp_path):
@@ -78,14 +109,23 @@ def test_all_of_the_core_in_other_builds(tmp_path, settings):
 
 def numbers() -> np.ndarray:
     random = np.random.default_rng(1)
-    return np.concatenate([[0.0, -0.0, np.inf, -np.inf, np.nan, 5e-324, 709.0, -745.0],
-                           random.uniform(-100.0, 100.0, 1001), 10.0 ** random.uniform(-300.0, 5.0, 1000)])  # fmt: skip
+    return np.concatenate(
+        [
+            [0.0, -0.0, np.inf, -np.inf, np.nan, 5e-324, 709.0, -745.0],
+            random.uniform(-100.0, 100.0, 1001),
+            10.0 ** random.uniform(-300.0, 5.0, 1000),
+        ]
+    )
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_two_builds_give_the_same_digits_one_by_one_and_in_packs(name):
     x = numbers()
-    results = [getattr(core.load(level), name)(x, packed=packed) for level in core.levels() for packed in (False, True)]
+    results = [
+        getattr(core.load(level), name)(x, packed=packed)
+        for level in core.levels()
+        for packed in (False, True)
+    ]
     for result in results[1:]:
         np.testing.assert_array_equal(result.view(np.int64), results[0].view(np.int64))
     with np.errstate(all="ignore"):
@@ -100,14 +140,18 @@ def test_what_is_no_vector_is_refused(wrong):
         core.load("plain").sin(wrong)
 
 
-@pytest.mark.parametrize("other", [np.arange(4), np.arange(8.0)[::2], np.zeros(3, np.float32), np.zeros(0)])
+@pytest.mark.parametrize(
+    "other", [np.arange(4), np.arange(8.0)[::2], np.zeros(3, np.float32), np.zeros(0)]
+)
 def test_a_vector_of_another_type_or_order_is_converted(other):
     np.testing.assert_allclose(core.load("plain").sin(other), np.sin(other), rtol=1e-7)
 
 
 def in_a_new_process(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
     surroundings = os.environ | {"PYTHONPATH": str(ROOT / "model")} | environment
-    return subprocess.run([sys.executable, "-c", code], env=surroundings, capture_output=True, text=True)
+    return subprocess.run(
+        [sys.executable, "-c", code], env=surroundings, capture_output=True, text=True
+    )
 
 
 def test_the_environment_chooses_the_build():
@@ -115,7 +159,10 @@ def test_the_environment_chooses_the_build():
     assert in_a_new_process(code, FLEXURA_CORE="plain").stdout == "plain\n"
     assert in_a_new_process(code, FLEXURA_CORE="").stdout == f"{core.levels()[-1]}\n"
     wrong = in_a_new_process(code, FLEXURA_CORE="fast")
-    assert wrong.returncode == 1 and "FLEXURA_CORE is 'fast': expected plain or x86-64-v3" in wrong.stderr
+    assert (
+        wrong.returncode == 1
+        and "FLEXURA_CORE is 'fast': expected plain or x86-64-v3" in wrong.stderr
+    )
 
 
 def test_without_compiled_modules_the_message_says_what_to_type(tmp_path):
@@ -123,4 +170,8 @@ def test_without_compiled_modules_the_message_says_what_to_type(tmp_path):
     for name in ("__init__.py", "core.py"):
         shutil.copy(ROOT / "model" / "flexura" / name, tmp_path / "flexura")
     done = in_a_new_process("import flexura.core", PYTHONPATH=str(tmp_path))
-    assert done.returncode == 1 and "The compiled core of flexura is missing" in done.stderr and "make setup" in done.stderr
+    assert (
+        done.returncode == 1
+        and "The compiled core of flexura is missing" in done.stderr
+        and "make setup" in done.stderr
+    )

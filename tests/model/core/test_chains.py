@@ -1,4 +1,5 @@
-"""Random chains of every kind: the recursion solves the assembled equations, and the mass matrix is positive definite."""
+"""Random chains of every kind: the recursion solves the assembled equations, and the mass matrix is
+positive definite."""
 
 from __future__ import annotations
 
@@ -16,9 +17,9 @@ PER_SEED = 20
 
 
 def random_robot(rng: np.random.Generator) -> fx.Robot:
-    """1 to 5 links: lengths 1e-2 to 10 m, EI 1e-3 to 1e6 N m2, R, Pa, Pb in equal shares, 30 % bare hubs, a payload of 0 to 1e3
-    masses of the last link; one sleeve in five begins near an end of its link; meshes of 1 to 32 elements, or modes; one link in
-    five is rigid."""
+    """1 to 5 links: lengths 1e-2 to 10 m, EI 1e-3 to 1e6 N m2, R, Pa, Pb in equal shares, 30 % bare
+    hubs, a payload of 0 to 1e3 masses of the last link; one sleeve in five begins near an end of
+    its link; meshes of 1 to 32 elements, or modes; one link in five is rigid."""
     tables: list[dict[str, Any]] = []
     for _ in range(rng.integers(1, 6)):
         kind, L = str(rng.choice(["R", "Pa", "Pb"])), float(10 ** rng.uniform(-2, 1))
@@ -31,31 +32,56 @@ def random_robot(rng: np.random.Generator) -> fx.Robot:
             joint["start"] = float(share) * L
         if kind == "Pa" and tables:
             before = tables[-1]
-            low = before["length_m"] - before["joint"]["start"] if before["joint"]["type"] == "Pb" else 0.0
+            low = (
+                before["length_m"] - before["joint"]["start"]
+                if before["joint"]["type"] == "Pb"
+                else 0.0
+            )
             joint["start"] = float(low + (before["length_m"] - low) * rng.uniform(0.02, 0.98))
         if rng.random() > 0.3:
             size = float(10 ** rng.uniform(-3, 1)) * rho * L
-            joint |= {"hub_mass_kg": size, "hub_inertia_kg_m2": size * L**2 * float(rng.uniform(0, 0.1))}
-            joint |= {"rotor_inertia": float(rng.choice([0.0, 0.01])) * size * (L**2 if kind == "R" else 1.0)}
+            joint |= {
+                "hub_mass_kg": size,
+                "hub_inertia_kg_m2": size * L**2 * float(rng.uniform(0, 0.1)),
+            }
+            joint |= {
+                "rotor_inertia": float(rng.choice([0.0, 0.01]))
+                * size
+                * (L**2 if kind == "R" else 1.0)
+            }
         joint |= {"viscous_friction": float(rng.choice([0.0, 0.1]))}
         if rng.random() < 0.2:
-            tables.append(rigid(L, rho * L, float(rng.uniform(0, 1)) * L, rho * L**3 / 12, kind, **joint))
+            tables.append(
+                rigid(L, rho * L, float(rng.uniform(0, 1)) * L, rho * L**3 / 12, kind, **joint)
+            )
             continue
         elements, keys = int(rng.choice([1, 2, 3, 4, 8, 16, 32])), {}
         if rng.random() < 0.3:
             keys["modes"] = int(rng.integers(1, min(2 * elements, 6) + 1))
         EI, taper = float(10 ** rng.uniform(-3, 6)), float(rng.uniform(0.3, 1.0))
         tapered = rng.random() < 0.3
-        law = lambda v, f=taper, end=L, on=tapered: [{"at_m": 0.0, "value": v}, {"at_m": end, "value": v * f}] if on else v
-        keys["damping"] = {"beta_s": float(rng.choice([0.0, 1e-3])), "alpha_1_s": float(rng.choice([0.0, 0.1]))}
+        law = lambda v, f=taper, end=L, on=tapered: (
+            [{"at_m": 0.0, "value": v}, {"at_m": end, "value": v * f}] if on else v
+        )
+        keys["damping"] = {
+            "beta_s": float(rng.choice([0.0, 1e-3])),
+            "alpha_1_s": float(rng.choice([0.0, 0.1])),
+        }
         tables.append(beam(L, law(rho), law(EI), elements, kind, **keys, **joint))
     last = tables[-1]["length_m"]
     payload = 0.0 if rng.random() < 0.25 else float(10 ** rng.uniform(-3, 3)) * rho * last
     gravity = (float(rng.uniform(-10, 10)), float(rng.uniform(-10, 10)))
-    return robot(*tables, gravity=gravity, payload=payload, payload_inertia=payload * last**2 * float(rng.choice([0.0, 0.01])))
+    return robot(
+        *tables,
+        gravity=gravity,
+        payload=payload,
+        payload_inertia=payload * last**2 * float(rng.choice([0.0, 0.01])),
+    )
 
 
-def random_state(sys: fx.System, rng: np.random.Generator, slope: float = 2.0) -> tuple[np.ndarray, np.ndarray]:
+def random_state(
+    sys: fx.System, rng: np.random.Generator, slope: float = 2.0
+) -> tuple[np.ndarray, np.ndarray]:
     """q and qd (n,): tip slopes up to `slope` rad, and a ripple on every unknown."""
     q, qd = sys.start(), rng.normal(size=sys.n)
     for i, (row, link) in enumerate(zip(sys.joint_rows, sys.robot.links, strict=True)):
@@ -64,7 +90,9 @@ def random_state(sys: fx.System, rng: np.random.Generator, slope: float = 2.0) -
         own = sys.own_rows(i)
         for z, size in ((q, slope), (qd, 3.0)):
             if len(own):
-                z[own] = bending(sys, i, size * rng.uniform(-1, 1, 3) / [1, 3, 9]) * (1 + 0.1 * rng.normal(size=len(own)))
+                z[own] = bending(sys, i, size * rng.uniform(-1, 1, 3) / [1, 3, 9]) * (
+                    1 + 0.1 * rng.normal(size=len(own))
+                )
     return q, qd
 
 
@@ -89,7 +117,9 @@ def faults(sys: fx.System, rng: np.random.Generator) -> list[str]:
         try:
             np.linalg.cholesky(unit)
         except np.linalg.LinAlgError:
-            out.append(f"M is not positive definite, smallest eigenvalue {np.linalg.eigvalsh(unit)[0]:.1e}")
+            out.append(
+                f"M is not positive definite, smallest eigenvalue {np.linalg.eigvalsh(unit)[0]:.1e}"
+            )
     force = np.zeros(sys.n)
     force[sys.joint_rows] = rng.normal(size=len(sys.joint_rows)) * (M @ np.abs(qd))[sys.joint_rows]
     a = sys.accelerations(q, qd, force)
@@ -98,13 +128,17 @@ def faults(sys: fx.System, rng: np.random.Generator) -> list[str]:
     size = np.abs(M) @ np.abs(a) + sum(np.abs(x) for x in terms)
     worst = np.abs(residual / np.where(size > 0, size, 1.0)).max()
     if not worst <= 1e-12:
-        out.append(f"residual {worst:.1e} in {sys.labels[np.argmax(np.abs(residual / np.where(size > 0, size, 1.0)))]}")
+        out.append(
+            f"residual {worst:.1e} in "
+            f"{sys.labels[np.argmax(np.abs(residual / np.where(size > 0, size, 1.0)))]}"
+        )
     return out
 
 
 @pytest.mark.parametrize("seed", range(15))
 def test_300_random_chains(seed):
-    """Residual of the assembly at the core's accelerations, row by row, and Cholesky's factor of the unit-diagonal M."""
+    """Residual of the assembly at the core's accelerations, row by row, and Cholesky's factor of
+    the unit-diagonal M."""
     assert judge(seed) == []
 
 

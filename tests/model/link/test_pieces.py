@@ -7,7 +7,7 @@ from flexura.link.line import pieces
 from flexura.link.quadrature import cells
 from flexura.link.section import material
 from flexura.link.shapes import ElementShapes, WholeShapes
-from flexura.robot import Link
+from flexura.robot.robot import Link
 from robots import beam
 
 SHAPES = [
@@ -16,8 +16,11 @@ SHAPES = [
     WholeShapes(np.eye(6)),
     WholeShapes(np.arange(8.0).reshape(4, 2)),
 ]
-SECTIONS = [{"at_m": 0.0, "width_m": 0.03, "height_m": 0.004}, {"at_m": 0.2, "width_m": 0.02, "height_m": 0.004},
-            {"at_m": 0.5, "width_m": 0.02, "height_m": 0.001}]  # fmt: skip
+SECTIONS = [
+    {"at_m": 0.0, "width_m": 0.03, "height_m": 0.004},
+    {"at_m": 0.2, "width_m": 0.02, "height_m": 0.004},
+    {"at_m": 0.5, "width_m": 0.02, "height_m": 0.001},
+]
 STEEL = {
     "length_m": 0.5,
     "young_modulus_Pa": 2e11,

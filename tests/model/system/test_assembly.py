@@ -79,9 +79,15 @@ def test_random_chains_have_positive_definite_mass_matrices(seed):
 def test_labels_name_the_unknowns():
     labels = Assembly(chains.SMALL["R, modes, R"]).labels
     assert labels == (
-        "joint/1", "link/1/mode/1", "link/1/mode/2", "link/1/mode/3", "link/1/mode/4",
-        "joint/2", "link/2/element/1/rotation", "link/2/element/1/bubble",
-    )  # fmt: skip
+        "joint/1",
+        "link/1/mode/1",
+        "link/1/mode/2",
+        "link/1/mode/3",
+        "link/1/mode/4",
+        "joint/2",
+        "link/2/element/1/rotation",
+        "link/2/element/1/bubble",
+    )
     assert Assembly(chains.SMALL["Pb"]).labels[:2] == ("joint/1", "link/1/shape/1")
 
 

@@ -5,13 +5,14 @@ import pytest
 
 import chains
 import flexura as fx
-from flexura.robot import Robot
+from flexura.robot.robot import Robot
 
 NOTHING = {"gravity": False, "stiffness": False, "damping": False}
 
 
 def check_residual(robot: Robot, rng: np.random.Generator, slope: float, most: float = 1e-12):
-    """The core's accelerations in the assembly's equations, row by row; its forces beside theirs."""
+    """The core's accelerations in the assembly's equations, row by row; its forces beside
+    theirs."""
     system = fx.assemble(robot)
     assembly, core = system.assembly, system.equations
     q, qd = chains.random_state(assembly, rng, slope)

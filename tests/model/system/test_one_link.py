@@ -52,7 +52,8 @@ def test_a_double_pendulum_is_the_textbooks():
 
 
 def fine_forces(assembly, q, qd, qdd):
-    """Newton's law for every point of a bent link, r = int e^(i Theta) by 60 cells; virtual work."""
+    """Newton's law for every point of a bent link, r = int e^(i Theta) by 60 cells; virtual
+    work."""
     (piece,) = assembly.structure.links[0]
     L, breaks = piece.length, np.linspace(0, 1, 61)
     x, dx = cells(breaks, 4)

@@ -12,13 +12,31 @@ core = str(package / "cores" / board.get("build.core"))
 machine = ["-mmcu=$BOARD_MCU"]
 env.Append(
     # DECIMAL_DIG: the core's WString.cpp wants it in C++, where avr-gcc 5 does not define it.
-    CPPDEFINES=[("F_CPU", "$BOARD_F_CPU"), ("ARDUINO", 10808), "ARDUINO_ARCH_AVR", ("DECIMAL_DIG", "__DECIMAL_DIG__")],
+    CPPDEFINES=[
+        ("F_CPU", "$BOARD_F_CPU"),
+        ("ARDUINO", 10808),
+        "ARDUINO_ARCH_AVR",
+        ("DECIMAL_DIG", "__DECIMAL_DIG__"),
+    ],
     CPPPATH=[core, str(package / "variants" / board.get("build.variant"))],
     ASFLAGS=machine,
     ASPPFLAGS=["-x", "assembler-with-cpp"],
-    CCFLAGS=[*machine, "-Os", "-ffunction-sections", "-fdata-sections", "-flto", "-fno-fat-lto-objects"],
+    CCFLAGS=[
+        *machine,
+        "-Os",
+        "-ffunction-sections",
+        "-fdata-sections",
+        "-flto",
+        "-fno-fat-lto-objects",
+    ],
     CFLAGS=["-std=gnu11"],
-    CXXFLAGS=["-std=gnu++11", "-fpermissive", "-fno-exceptions", "-fno-threadsafe-statics", "-Wno-error=narrowing"],
+    CXXFLAGS=[
+        "-std=gnu++11",
+        "-fpermissive",
+        "-fno-exceptions",
+        "-fno-threadsafe-statics",
+        "-Wno-error=narrowing",
+    ],
     LINKFLAGS=[*machine, "-Os", "-flto", "-fuse-linker-plugin", "-Wl,--gc-sections"],
     LIBS=["m"],
     LIBSOURCE_DIRS=[str(package / "libraries")],

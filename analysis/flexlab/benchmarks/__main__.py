@@ -1,0 +1,152 @@
+"""The command: python -m flexlab.benchmarks
+[motions|still|population|growth|board|accuracy|passes|search] [PROBLEM ...]."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import warnings
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from . import accuracy, board_load, growth, measure, population, report, search
+from .motions import all_motions
+from .problem import Problem
+from .still import Still, all_still
+
+PARTS = (
+    "motions",
+    "still",
+    "population",
+    "growth",
+    "board",
+)  # what is measured if nothing is named
+OTHERS = ("accuracy", "passes", "search")
+ROUNDS = 7
+
+
+def arguments() -> argparse.Namespace:
+    """The command line: parts and problems in any order, rounds, JSON."""
+    parser = argparse.ArgumentParser(
+        prog="python -m flexlab.benchmarks",
+        description=(
+            "Times flexura beside Exudyn at equal error, each at its cheapest settings, "
+            "in "
+            "processor time."
+        ),
+        epilog=f"parts: {', '.join(PARTS + OTHERS)}; "
+        f"problems: {', '.join([*all_motions(), *all_still()])}. "
+        "example: python -m flexlab.benchmarks type4 pendulum static --rounds 3",
+    )
+    parser.add_argument("names", nargs="*", help="parts or problems; all parts by default")
+    parser.add_argument(
+        "--rounds",
+        type=int,
+        default=ROUNDS,
+        help=f"rounds in which the programs take turns, default {ROUNDS}",
+    )
+    parser.add_argument(
+        "--json", action="store_true", help="print the numbers as JSON in place of tables"
+    )
+    given = parser.parse_args()
+    known = {*PARTS, *OTHERS, *all_motions(), *all_still()}
+    for name in given.names:
+        if name not in known:
+            parser.error(f"{name}: expected a part or a problem: {', '.join(sorted(known))}")
+    if given.rounds < 1:
+        parser.error("--rounds: expected a whole number, 1 or more")
+    return given
+
+
+def each(what: str, items: Iterable[Any], work: Callable[[Any], Any]) -> list[Any]:
+    """What `work` gives for each item, with a progress bar on stderr; an item names itself."""
+    items = list(items)
+    columns = (
+        TextColumn("{task.description:>32}"),
+        BarColumn(),
+        TextColumn("{task.completed}/{task.total}"),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
+        task = bars.add_task(what, total=len(items))
+        out = []
+        for item in items:
+            bars.update(task, description=f"{what}: {getattr(item, 'name', item)}")
+            out.append(work(item))
+            bars.advance(task)
+    return out
+
+
+def measured(
+    parts: list[str], motions: list[Problem], stills: list[Still], rounds: int
+) -> dict[str, Any]:
+    """The numbers of the parts."""
+    out: dict[str, Any] = {}
+    works: dict[str, Callable[[], Any]] = {
+        "motions": lambda: each("motions", motions, lambda p: measure.motion(p, rounds)),
+        "still": lambda: each("still", stills, lambda p: measure.still(p, rounds)),
+        "population": lambda: each("population", [rounds], population.measure)[0],
+        "growth": lambda: each("growth", [5 * rounds], growth.measure)[0],
+        "board": lambda: each("board", ["emulated"], lambda _: board_load.measure())[0],
+        "accuracy": lambda: each("accuracy", [p for p in motions if p.available], accuracy.errors),
+        "passes": lambda: each("passes", [p for p in motions if p.available], accuracy.passes),
+    }
+    for part in parts:
+        out[part] = works[part]()
+    return out
+
+
+def tables(found: dict[str, Any]) -> list[Any]:
+    """What is printed for the parts."""
+    shown: dict[str, Callable[[Any], list[Any]]] = {
+        "motions": lambda rows: [report.motions(rows), report.summary(rows)],
+        "still": lambda rows: [
+            report.stills(rows),
+            "\n".join(f"{r['name']}: {r['failed']}" for r in rows if "failed" in r),
+        ],
+        "population": lambda rows: [report.populations(rows)],
+        "growth": lambda rows: [report.growths(rows)],
+        "board": lambda rows: [report.boards(rows)],
+        "accuracy": lambda rows: [
+            report.accuracies(rows),
+            "\n".join(accuracy.beyond(rows)) or "all within what is asked",
+        ],
+        "passes": lambda rows: [
+            report.passes(rows),
+            "\n".join(accuracy.slower(rows)) or "auto: all within what is asked",
+        ],
+    }
+    return [part for name, rows in found.items() for part in shown[name](rows) if part]
+
+
+def main() -> None:
+    warnings.filterwarnings("ignore")
+    given = arguments()
+    motions, stills = all_motions(), all_still()
+    chosen = [motions[name] for name in given.names if name in motions]
+    quiet = [stills[name] for name in given.names if name in stills]
+    parts = [name for name in given.names if name in PARTS + OTHERS]
+    if not parts:
+        parts = [part for part, some in (("motions", chosen), ("still", quiet)) if some] or list(
+            PARTS
+        )
+    if "search" in parts:
+        search.main(
+            chosen or list(motions.values()), lambda line: print(line, file=sys.stderr, flush=True)
+        )
+        return
+    found = measured(
+        parts, chosen or list(motions.values()), quiet or list(stills.values()), given.rounds
+    )
+    if given.json:
+        print(json.dumps(found, indent=1, default=float))
+        return
+    report.show(*tables(found))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,128 @@
+"""Runs of flexura, by its public functions alone."""
+
+from __future__ import annotations
+
+import inspect
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+import flexura as fx
+
+from .problem import Channels, Problem, Tables, Work
+
+METHODS = ("auto", "explicit", "implicit", "exponential")
+
+
+class TooSlow(Exception):
+    """A run took longer than it was given."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Processor seconds of the time loop, evaluations of the equations of motion, the method that
+    ran, and the channels."""
+
+    seconds: float
+    evaluations: int
+    method: str
+    channels: Channels
+
+
+def default_rtol() -> float:
+    """The tolerance of a user who sets none."""
+    return float(inspect.signature(fx.simulate).parameters["rtol"].default)
+
+
+def system(tables: Tables) -> fx.System:
+    """The assembled robot of these tables."""
+    return fx.assemble(fx.Robot.from_dict(tables))
+
+
+def drive(work: Work) -> Any:
+    """What `fx.simulate` takes for this work."""
+    if work.of_time is not None or work.of_state is not None:
+        return work.of_time or work.of_state
+    if work.tick is not None:
+        return fx.Sampled(work.tick(), work.rate_Hz)  # type: ignore[attr-defined]
+    if work.rate_Hz:
+        laws = [
+            fx.PID(m, kp=p, kd=d, derivative_Hz=0.0)
+            for m, p, d in zip(work.motion, work.kp, work.kd, strict=True)
+        ]
+        return fx.Controller(tuple(laws), rate_Hz=work.rate_Hz)
+    if work.motion:
+        return fx.Drive.pd(work.motion, work.kp, work.kd)
+    if work.prescribed:
+        return fx.Drive.prescribed(*work.prescribed)
+    return fx.Drive.force(*work.force) if work.force else None
+
+
+def methods(problem: Problem) -> tuple[str, ...]:
+    """The methods that can run this problem."""
+    return METHODS[:3] if problem.work.python else METHODS
+
+
+def run(
+    problem: Problem,
+    made: fx.System,
+    rtol: float,
+    method: str = "auto",
+    *,
+    work: Work | None = None,
+    limit_s: float = 0.0,
+    **keys: Any,
+) -> Answer:
+    """One run from the straight robot at its start. Raises TooSlow after `limit_s` processor
+    seconds, RuntimeError if it does not reach the end, and what flexura raises. `work` replaces the
+    problem's; `keys` are handed on."""
+    begun = time.process_time()
+
+    def watch(fraction: float) -> None:
+        if time.process_time() - begun > limit_s:
+            raise TooSlow(f"{fraction:.0%} after {limit_s:g} s")
+
+    if "start" in inspect.signature(fx.simulate).parameters:
+        keys["start"] = "straight"
+    progress: Callable[[float], None] | None = watch if limit_s else None
+    work = work or problem.work
+    if problem.inverse:
+        keys.pop("start", None)
+        done = fx.inverse(
+            made, problem.t, work.prescribed, rtol=rtol, method=method, progress=progress, **keys
+        )
+    else:
+        done = fx.simulate(
+            made, problem.t, drive(work), rtol=rtol, method=method, progress=progress, **keys
+        )
+    whole = time.process_time() - begun
+    if not done.meta["complete"]:
+        raise RuntimeError(
+            "; ".join(event["text"] for event in done.meta["events"]) or "incomplete"
+        )
+    seconds = min(done.meta["wall_s"], whole)  # both are at least the processor time of the loop
+    return Answer(
+        seconds, int(done.meta["evaluations"]), done.meta["method"], channels(problem, done)
+    )
+
+
+def channels(problem: Problem, done: fx.Run) -> Channels:
+    """What is compared."""
+    names = problem.names
+    if problem.inverse:
+        names = names + [f"joint/{k}/drive" for k in range(1, len(problem.robot["link"]) + 1)]
+    return {name: np.asarray(done[name]) for name in names}
+
+
+def converged(problem: Problem, tables: Tables | None = None) -> Channels:
+    """The motion at a tolerance far below what is compared, on the problem's own mesh or on that of
+    `tables`; without Python functions where the same can be said by signals."""
+    method, rtol = problem.exact
+    if problem.work.rate_Hz and method == "implicit":
+        method = "auto"
+    return run(
+        problem, system(tables or problem.robot), rtol, method, work=problem.same or problem.work
+    ).channels

@@ -1,0 +1,22 @@
+"""Signals of the benchmark: those of flexura, and Kane's spin-up."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import flexura as fx
+from flexura.signals import bang_bang, cycloid, harmonic, piecewise
+
+__all__ = ["bang_bang", "cycloid", "harmonic", "piecewise", "spin_up"]
+
+
+def spin_up(speed: float, duration: float) -> fx.Signal:
+    """Kane's rotation: its rate rises to `speed` [rad/s] within `duration` [s], as t - sin(w t)/w
+    does, w = 2 pi/duration."""
+    w = 2 * np.pi / duration
+    a, b = speed / duration, speed / duration / w**2
+    rows = [
+        [0.0, -b, 0, a / 2, 0, 0, 0, b, w, np.pi / 2],
+        [duration, speed * duration / 2, speed, 0, 0, 0, 0, 0, 0, 0],
+    ]
+    return fx.Signal(np.array(rows), {"kind": "spin_up"})

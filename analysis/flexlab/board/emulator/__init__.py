@@ -1,0 +1,1 @@
+"""flexlab.board.emulator."""

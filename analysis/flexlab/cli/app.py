@@ -1,0 +1,98 @@
+"""The command `flexura`: its subcommands, and how errors end. Each is imported when it is called,
+or a call would wait."""
+
+from __future__ import annotations
+
+import gc
+import importlib
+import sys
+from typing import Any
+
+import typer
+from typer.core import TyperGroup
+
+from flexura.errors import FlexuraError, InputError
+
+COMMANDS = {
+    "simulate": "Simulate a robot; with --vary, a population of robots.",
+    "inverse": "Inverse dynamics: the drives that a manoeuvre's motions take.",
+    "frequencies": "Natural frequencies at the start, joints locked and free.",
+    "crosscheck": "Simulate a robot natively and in Exudyn, and compare.",
+    "study": "Studies of payload, link lengths and boundary conditions.",
+    "tune": "Find a controller's gains on the simulator.",
+    "bench": "Experiments on the rig, real or emulated.",
+    "identify": "Physical parameters from an experiment.",
+    "compare": "Compare an experiment with its simulation.",
+    "review": "Look at one run, or at two side by side, in Rerun.",
+    "export": "Write a run in another program's format.",
+    "flash": "Build the firmware and load it into the board.",
+    "doctor": "What is installed, what is missing, what that costs.",
+    "demo": "The rig, simulated, cross-checked and as an experiment.",
+}
+
+
+class Commands(TyperGroup):
+    """A group whose commands stand in modules of the same name beside this one."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """The names, in the order of a project's life."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Import a command; None for a name that is none."""
+        if cmd_name not in COMMANDS:
+            return None
+        module = importlib.import_module(f"flexlab.cli.{cmd_name}")
+        own = getattr(module, "app", None)
+        if own is None:
+            own = typer.Typer(**PLAIN)
+            own.command(cmd_name)(getattr(module, cmd_name))
+        command = typer.main.get_command(own)
+        command.name = cmd_name
+        return command
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """The table of commands, without importing any."""
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+
+PLAIN: dict[str, Any] = {
+    "add_completion": False,
+    "rich_markup_mode": None,
+    "pretty_exceptions_enable": False,
+}
+app = typer.Typer(name="flexura", cls=Commands, no_args_is_help=True, **PLAIN)
+
+
+@app.callback()
+def flexura() -> None:
+    """Robots with flexible links: simulate, cross-check, tune, measure, compare.
+
+    One robot file describes the robot.
+    """
+
+
+def main() -> None:
+    """Run the command; bad input ends in one line on stderr and status 2, whatever else goes wrong
+    in status 1."""
+    gc.set_threshold(
+        100_000
+    )  # looking for garbage among a million objects just imported is a tenth of the start
+    try:
+        app()
+    except KeyboardInterrupt:
+        typer.echo("flexura: interrupted", err=True)
+        sys.exit(130)
+    except OSError as error:
+        typer.echo(f"flexura: {error.filename or 'a file'}: {error.strerror or error}", err=True)
+        sys.exit(1)
+    except Exception as error:
+        if not isinstance(error, FlexuraError):
+            raise
+        typer.echo(f"flexura: {error}", err=True)
+        sys.exit(2 if isinstance(error, InputError) else 1)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,500 @@
+"""`flexura bench ...`: experiments on the rig at a serial port or, unless a port is named, on the
+emulated board."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import inspect
+import math
+import sys
+import time
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Annotated, Any, get_type_hints
+
+import typer
+
+import flexura as fx
+from flexura.errors import InputError
+
+from .. import rig as rigs
+from ..board.protocol.session import Link
+from ..experiment import excitation, plan
+from ..experiment import run_experiment as steps
+from ..experiment.flash import RIG
+from ..experiment.run_experiment import open_board
+from ..experiment.stop_requests import TOLD, stopping
+from ..recordings import flex_calibration as fitting
+from ..recordings.flex_calibration import read as read_calibration
+from ..recordings.recording import unfinished
+from ..recordings.run_from_recording import rebuild
+from ..recordings.unit_conversion import Sensor
+from ..review.live import serve
+from .bench_tables import (
+    calibration_numbers,
+    calibration_table,
+    heading,
+    numbers,
+    result_table,
+    selftest_table,
+)
+from .bench_tables import live as live_view
+from .output import events, say, show
+
+app = typer.Typer(
+    name="bench",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    help=(
+        "Experiments on the rig: self-test, execute, handle the signals. Emulated unless a port "
+        "is named."
+    ),
+)
+
+RigFile = Annotated[
+    Path | None, typer.Argument(metavar="RIG", help="rig file (TOML); default firmware/rig.toml")
+]
+Port = Annotated[
+    str | None,
+    typer.Option("--port", metavar="DEVICE", help="the board's serial port; without it: emulated"),
+]
+Emulated = Annotated[
+    bool,
+    typer.Option("--emulated", help="on the emulated board (the default): no hardware is touched"),
+]
+Seed = Annotated[int, typer.Option(help="of the emulated rig's noise and dirt")]
+Out = Annotated[
+    Path | None,
+    typer.Option(
+        "--out", metavar="FOLDER", help="where to keep it; default logs/<experiment>-<time>"
+    ),
+]
+Yes = Annotated[
+    bool,
+    typer.Option(
+        "--yes", help="ask nothing: both joints stand at their zero marks, nobody is in reach"
+    ),
+]
+Countdown = Annotated[
+    float | None, typer.Option(min=0, help="before the start; default 3, emulated 0")
+]
+Gains = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="controller settings (TOML) by the firmware's names"),
+]
+Calibrated = Annotated[
+    Path | None,
+    typer.Option(
+        "--calibration", metavar="FILE", help="of the flex sensor (TOML), as calibrate leaves it"
+    ),
+]
+Configure = Annotated[
+    bool,
+    typer.Option("--configure", help="write the rig file's settings to a board that has others"),
+]
+Live = Annotated[
+    bool,
+    typer.Option(
+        "--live", help="a live view for Rerun, which a viewer may join late; its address is printed"
+    ),
+]
+LivePort = Annotated[int, typer.Option(help="the live view's TCP port, on this machine only")]
+Firmware = Annotated[
+    Path | None,
+    typer.Option(metavar="ELF", help="built firmware for the emulated board; default: build it"),
+]
+Json = Annotated[bool, typer.Option("--json", help="print JSON instead of tables, for scripts")]
+
+
+@dataclass(frozen=True)
+class BenchOptions:
+    """What all experiments are asked."""
+
+    port: Port = None
+    emulated: Emulated = False
+    seed: Seed = 0
+    out: Out = None
+    yes: Yes = False
+    countdown_s: Countdown = None
+    calibration: Calibrated = None
+    configure: Configure = False
+    live: Live = False
+    live_port: LivePort = 9876
+    firmware: Firmware = None
+    json: Json = False
+
+
+def experiment(function: Any) -> Any:
+    """A command's function with the options that all experiments share, which it gets as `options:
+    BenchOptions`."""
+    own = [
+        p
+        for p in inspect.signature(function, eval_str=True).parameters.values()
+        if p.name != "options"
+    ]
+    kinds = get_type_hints(BenchOptions, include_extras=True)
+    shared = [
+        inspect.Parameter(
+            f.name, inspect.Parameter.KEYWORD_ONLY, default=f.default, annotation=kinds[f.name]
+        )
+        for f in fields(BenchOptions)
+    ]
+
+    @functools.wraps(function)
+    def command(**given: Any) -> None:
+        options = BenchOptions(**{f.name: given.pop(f.name) for f in fields(BenchOptions)})
+        function(**given, options=options)
+
+    parameters = [*own, *shared]
+    command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    command.__annotations__ = {p.name: p.annotation for p in parameters}
+    del command.__wrapped__  # type: ignore[attr-defined]
+    return command
+
+
+@app.command()
+@experiment
+def forward(
+    rig: RigFile = None,
+    profile: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help=(
+                "name, duration_s, and the signals voltage_V and rate_rad_s (TOML, as in a "
+                "manoeuvre)"
+            ),
+        ),
+    ] = None,
+    *,
+    options: BenchOptions,
+) -> None:
+    """Voltage to the motor and pulses to the stepper, open loop.
+
+    \b
+    Example: flexura bench forward --emulated --seed 1
+    """
+    ask = lambda bench, settings: plan.forward(bench, settings, profile)
+    _run(rig, ask, options)
+
+
+@app.command()
+@experiment
+def inverse(
+    rig: RigFile = None,
+    manoeuvre: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="manoeuvre file with a motion of both joints; default: the rig file's",
+        ),
+    ] = None,
+    gains: Gains = None,
+    *,
+    options: BenchOptions,
+) -> None:
+    """The joint motions of a manoeuvre, tracked by the firmware's controllers.
+
+    \b
+    Example: flexura bench inverse --manoeuvre model/manoeuvres/rig-inverse-law.toml
+    """
+    asked = None if manoeuvre is None else fx.load_manoeuvre(manoeuvre, 2)
+
+    def ask(bench: Any, settings: Any) -> Any:
+        try:
+            return plan.inverse(bench, settings, asked)
+        except fx.InputError as error:
+            raise error.in_file(str(manoeuvre) if manoeuvre else bench.rig.manoeuvre) from None
+
+    _run(rig, ask, options, gains)
+
+
+@app.command()
+@experiment
+def step(
+    rig: RigFile = None,
+    step_1_m: Annotated[float, typer.Option(help="height of joint 1's step")] = 0.005,
+    step_2_rad: Annotated[float, typer.Option(help="height of joint 2's step")] = 0.1,
+    duration_s: Annotated[float, typer.Option(help="of both steps together")] = 4.0,
+    apart_s: Annotated[
+        float | None,
+        typer.Option(help="joint 2's step after joint 1's; default: half the duration"),
+    ] = None,
+    gains: Gains = None,
+    *,
+    options: BenchOptions,
+) -> None:
+    """A step of each joint's set-point.
+
+    \b
+    Example: flexura bench step --gains gains.toml --step-1-m 0.004
+    """
+    ask = lambda bench, settings: plan.step(
+        bench, settings, step_1_m, step_2_rad, duration_s, apart_s
+    )
+    _run(rig, ask, options, gains)
+
+
+@app.command("free-vibration")
+@experiment
+def free_vibration(
+    rig: RigFile = None,
+    turn_rad: Annotated[float, typer.Option(help="how far joint 2 turns before it stops")] = 0.1,
+    duration_s: Annotated[float, typer.Option(help="of the whole")] = 6.0,
+    *,
+    options: BenchOptions,
+) -> None:
+    """Joint 2 moves, stops and holds; the strip rings.
+
+    \b
+    Example: flexura bench free-vibration --duration-s 10
+    """
+    ask = lambda bench, settings: plan.free_vibration(bench, settings, turn_rad, duration_s)
+    _run(rig, ask, options)
+
+
+@app.command()
+@experiment
+def excite(
+    rig: RigFile = None,
+    *,
+    options: BenchOptions,
+) -> None:
+    """Ten seconds, open loop, that show stiffness, damping, payload, friction and play: for flexura
+    identify.
+
+    \b
+    Example: flexura bench excite --emulated --seed 1
+    """
+    _run(rig, excitation.plan, options)
+
+
+@app.command()
+def recover(
+    folder: Annotated[
+        Path,
+        typer.Argument(metavar="FOLDER", help="of a recording whose host did not come to its end"),
+    ],
+    json: Json = False,
+) -> None:
+    """Make the run of a recording that was cut off; every start does it by itself for the
+    recordings beside its own.
+
+    \b
+    Example: flexura bench recover logs/forward-20260101-120000
+    """
+    run = rebuild(folder)
+    path = run.save(folder)
+    if json:
+        show(
+            True,
+            lambda: None,
+            lambda: {"run": str(path), "rows": len(run), "emulated": run.meta["emulated"]},
+        )
+    events(run)
+    say(json, f"{run.meta['label']}: {len(run)} rows, {run.t[-1]:.3f} s", f"stored {path}")
+
+
+@app.command()
+def calibrate(
+    rig: RigFile = None,
+    tips_mm: Annotated[
+        str | None, typer.Option(metavar="LIST", help="deflections to hold; default -20 to 20")
+    ] = None,
+    port: Port = None,
+    emulated: Emulated = False,
+    seed: Seed = 0,
+    out: Out = None,
+    firmware: Firmware = None,
+    json: Json = False,
+) -> None:
+    """The flex sensor's calibration: the strip held at known tip deflections, the firmware's cubic
+    through the readings.
+
+    
+    Example: flexura bench calibrate --emulated --tips-mm=-15,-10,-5,0,5,10,15
+    """
+    if emulated and port:
+        raise fx.InputError("expected either a port or --emulated", key="--port", value=port)
+    tips = fitting.TIPS_M if tips_mm is None else _millimetres(tips_mm)
+    bench = rigs.load(rig or RIG)
+    opened: Any = open_board(bench, port, seed, firmware)
+    hold = _held_by_hand
+    if opened.plant is not None:
+        held = fitting.Held(opened.plant, bench)
+        opened.board.plant, hold = held, held.hold
+    with contextlib.closing(opened.board):
+        found = fitting.fit(*fitting.measure(Link(opened.board), tips, hold))
+    path = (
+        out
+        or Path("logs")
+        / f"{'' if port else 'emulated-'}calibration-{time.strftime('%Y%m%d-%H%M%S')}"
+    ) / "calibration.toml"
+    fitting.write(found, path)
+    label = {"label": opened.board.label, "emulated": opened.board.emulated}
+    show(
+        json,
+        lambda: calibration_table(found, opened.board.label),
+        lambda: label | calibration_numbers(found) | {"file": str(path)},
+    )
+    say(json, f"stored {path}", f"use it: flexura bench inverse --calibration {path}")
+
+
+def _millimetres(text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(part) / 1000 for part in text.split(","))
+    except ValueError:
+        raise fx.InputError(
+            "expected deflections in mm with commas between, as -10,-5,0,5,10,15",
+            key="--tips-mm",
+            value=text,
+        ) from None
+
+
+def _held_by_hand(tip_m: float) -> float:
+    """Ask for the strip to be held at a deflection; what the person types is where it is."""
+    return 1e-3 * typer.prompt(
+        f"hold the tip at {1e3 * tip_m:g} mm; deflection in mm",
+        default=1e3 * tip_m,
+        type=float,
+        err=True,
+    )
+
+
+def _run(rig: Path | None, ask: Any, options: BenchOptions, gains: Path | None = None) -> None:
+    """What all experiments have in common, from the files to the table."""
+    if options.emulated and options.port:
+        raise fx.InputError(
+            "expected either a port or --emulated", key="--port", value=options.port
+        )
+    bench = rigs.load(rig or RIG)
+    settings = rigs.configuration(bench) | ({} if gains is None else plan.gains(gains))
+    asked = ask(bench, settings)
+    steps.check(asked)
+    if gains is not None:
+        asked = replace(asked, asked=asked.asked | {"gains": str(gains)})
+    fitted = (
+        rigs.calibration(bench)
+        if options.calibration is None
+        else read_calibration(options.calibration)
+    )
+    emulated = "" if options.port else "emulated-"
+    folder = (
+        options.out
+        or Path("logs") / f"{emulated}{asked.experiment}-{time.strftime('%Y%m%d-%H%M%S')}"
+    )
+    _recover_beside(folder, options.json)
+    if options.port is not None and not options.yes:
+        _confirm()
+    opened = steps.open_board(bench, options.port, options.seed, options.firmware)
+    title = heading(opened.board.label, opened.board.emulated, asked.experiment)
+    pause = (
+        options.countdown_s
+        if options.countdown_s is not None
+        else 0.0
+        if opened.board.emulated
+        else 3.0
+    )
+    with contextlib.ExitStack() as stack:
+        stack.callback(opened.board.close)
+        stop = stack.enter_context(stopping())
+        seers = [stack.enter_context(live_view(asked, Sensor(fitted, fitted.zero), title))]
+        if options.live:
+            seers.append(
+                stack.enter_context(
+                    serve(asked, Sensor(fitted, fitted.zero), bench.robot, title, options.live_port)
+                )
+            )
+            typer.echo(
+                f"live view: rerun --connect rerun+http://127.0.0.1:{options.live_port}/proxy",
+                err=True,
+            )
+
+        def observe(reports: Any, part: float) -> None:
+            for see in seers:
+                see(reports, part)
+
+        watch = steps.Watch(
+            tested=lambda findings: (
+                None if options.json else show(False, lambda: selftest_table(findings, title), dict)
+            ),
+            may_start=lambda link: _countdown(link, pause, stop),
+            stop_asked=stop.asked,
+            observe=observe,
+        )
+        try:
+            done = steps.conduct(bench, asked, opened, folder, fitted, watch, options.configure)
+        except steps.NotStarted as error:
+            typer.echo(f"flexura: {error}", err=True)
+            raise typer.Exit(130) from None
+    kept = {
+        key: done.run.meta[key]
+        for key in (
+            "kind",
+            "emulated",
+            "label",
+            "experiment",
+            "complete",
+            "line",
+            "delays",
+            "firmware",
+        )
+    }
+    show(
+        options.json,
+        lambda: result_table(done),
+        lambda: kept | {"run": str(folder), "channels": numbers(done.run)},
+    )
+    events(done.run)
+    say(options.json, f"stored {folder}", f"look at it: flexura review {folder}")
+    if not done.ended.complete:
+        typer.echo(f"flexura: not complete: {done.ended.text}", err=True)
+        raise typer.Exit(130 if done.ended.interrupted else 1)
+
+
+def _recover_beside(folder: Path, json: bool) -> None:
+    """Runs of recordings that a killed host left beside this one."""
+    for left in unfinished(folder.parent):
+        try:
+            run = rebuild(left)
+        except (
+            InputError
+        ) as error:  # nothing was received, or it is damaged: that is no reason not to start
+            typer.echo(f"not recovered: {error}", err=True)
+            continue
+        run.save(left)
+        typer.echo(
+            f"recovered {left}: {len(run)} rows that a host which ended without a word had "
+            f"received",
+            err=True,
+        )
+
+
+def _confirm() -> None:
+    if not sys.stdin.isatty():
+        raise fx.InputError(
+            "missing: nobody can be asked here whether the joints stand at zero and nobody is in "
+            "reach",
+            key="--yes",
+        )
+    typer.confirm(
+        "Do both joints stand at their zero marks, and is nobody in reach of the arm?",
+        abort=True,
+        err=True,
+    )
+
+
+def _countdown(link: Any, seconds: float, stop: Any) -> str:
+    """Count the seconds down with the session alive; says why the experiment is not to start, or
+    ""."""
+    end = link.board.now() + seconds
+    said = -1
+    while (left := end - link.board.now()) > 0:
+        if (whole := math.ceil(left)) != said:
+            said = whole
+            typer.echo(f"starts in {whole} s; {TOLD}", err=True)
+        link.run(min(0.05, left))
+        if why := stop.asked():
+            return why
+    return stop.asked()

@@ -1,0 +1,199 @@
+"""What the person at the bench sees: the self-test, a live table while the experiment runs, and the
+result.
+
+Always with the board's label, which says whether it is emulated.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from ..board.protocol.declaration import Flag, Mode, State
+from ..board.protocol.player import FRACTION
+from ..experiment.plan import Plan
+from ..experiment.run_experiment import Done
+from ..experiment.selftest import Finding
+from ..experiment.stop_requests import TOLD
+from ..recordings.flex_calibration import Fit
+from ..recordings.unit_conversion import Sensor, reading
+
+
+def heading(label: str, emulated: bool, experiment: str) -> str:
+    """The title of everything that is shown of an experiment."""
+    return f"{experiment} on the {label}{': no hardware is touched' if emulated else ''}"
+
+
+def selftest_table(findings: list[Finding], title: str) -> Any:
+    from rich.table import Table
+
+    out = Table(title=f"self-test: {title}", title_justify="left", show_edge=False)
+    for name in ("", "found", "expected"):
+        out.add_column(name, overflow="fold")
+    for f in findings:
+        out.add_row(
+            f"{'[green]ok    [/]' if f.passed else '[red]failed[/]'} {f.what}", f.found, f.expected
+        )
+    return out
+
+
+@contextmanager
+def live(plan: Plan, sensor: Sensor, title: str) -> Iterator[Callable[[np.ndarray, float], None]]:
+    """A table and a progress bar on a terminal's stderr that follow the newest report; nothing
+    elsewhere."""
+    if not sys.stderr.isatty():
+        yield lambda reports, part: None
+        return
+    from rich.console import Console
+    from rich.live import Live
+
+    with Live(console=Console(stderr=True), refresh_per_second=8, transient=True) as shown:
+
+        def observe(reports: np.ndarray, part: float) -> None:
+            if len(reports):
+                shown.update(live_table(reports[-1], part, plan, sensor, title))
+
+        yield observe
+
+
+def live_table(report: Any, part: float, plan: Plan, sensor: Sensor, title: str) -> Any:
+    """One report as it stands, with what is over of the experiment."""
+    from rich.console import Group
+    from rich.progress_bar import ProgressBar
+    from rich.table import Table
+
+    settings = plan.settings
+    per_m, per_rad, per_step = (
+        settings[name]
+        for name in ("motor_counts_per_m", "stepper_counts_per_rad", "stepper_steps_per_rad")
+    )
+    out = Table(title=title, title_justify="left", caption=TOLD, caption_justify="left")
+    for name in ("", "position", "set-point", "drive"):
+        out.add_column(name, justify="left" if not name else "right", min_width=14)
+    tracked = plan.knots.mode is Mode.position and report["state"] == State.running
+    wanted = [
+        f"{1e3 * report['setpoint_1'] / FRACTION / per_m:.2f} mm",
+        f"{report['setpoint_2'] / FRACTION / per_step:.4f} rad",
+    ]
+    one, two = wanted if tracked else ("", "")
+    out.add_row(
+        "joint 1",
+        f"{1e3 * report['position_1'] / per_m:.2f} mm",
+        one,
+        f"{report['voltage'] / 1000:.2f} V",
+    )
+    out.add_row(
+        "joint 2",
+        f"{report['position_2'] / per_rad:.4f} rad",
+        two,
+        f"{report['rate'] / per_step:.3f} rad/s",
+    )
+    out.add_row("tip deflection", f"{1e3 * float(sensor.tip(reading(report['flex']))):.2f} mm")
+    limited = ", voltage at its limit" if report["flags"] >> Flag.saturated & 1 else ""
+    out.add_row(
+        "board",
+        State(report["state"]).name + limited,
+        f"{report['buffered']} waiting",
+        f"{report['supply'] / 1000:.2f} V",
+    )
+    return Group(out, ProgressBar(total=1.0, completed=part, width=64))
+
+
+def result_table(done: Done) -> Any:
+    """The range of every channel, how well set-points were followed, and what the line lost."""
+    from rich.box import SIMPLE
+    from rich.table import Table
+
+    run = done.run
+    about = run.meta
+    title = heading(about["label"], about["emulated"], about["experiment"])
+    out = Table(title=title, title_justify="left", box=SIMPLE, padding=(0, 1, 0, 0))
+    out.add_column(
+        "channel", overflow="fold"
+    )  # this one gives way on a narrow terminal, no number does
+    for name in ("lowest", "highest", "max error", "RMS error", "lag"):
+        out.add_column(name, justify="right", no_wrap=True)
+    for name, row in numbers(run).items():
+        cells = [_short(row[key]) for key in ("lowest", "highest", "error_max", "error_rms")]
+        late = run.meta["delays"].get(name)
+        lag = f"{1e3 * late['seconds']:.1f} ± {1e3 * late['std']:.1f} ms" if late else ""
+        out.add_row(f"{name} \\[{run.units[name]}]", *cells, lag)
+    line = about["line"]
+    out.caption = (
+        f"{run.t[-1]:.3f} s, {line['reports']} reports, {line['missing']} missing, "
+        f"{line['bad_frames']} bad frames; "
+        f"firmware {about['firmware']['version']} ({about['firmware']['declaration']}); "
+        f"{done.ended.text}"
+    )
+    out.caption_justify = "left"
+    return out
+
+
+def calibration_table(found: Fit, label: str) -> Any:
+    """The deflections that were held, the readings, what the cubic makes of them, and its
+    coefficients."""
+    from rich.table import Table
+
+    sensor = Sensor(found.calibration, found.calibration.zero)
+    out = Table(title=f"calibration of the flex sensor on the {label}", title_justify="left")
+    for name in ("held / mm", "reading", "by the cubic / mm"):
+        out.add_column(name, justify="right")
+    for w, r in zip(found.tips_m, found.readings, strict=True):
+        out.add_row(f"{1e3 * w:.2f}", f"{r:.5f}", f"{1e3 * float(sensor.tip(r)):.2f}")
+    spread = np.sqrt(np.diag(np.array(found.calibration.covariance)))
+    names = ("zero", "c1_m", "c2_m", "c3_m")
+    text = ", ".join(
+        f"{n} = {getattr(found.calibration, n):.4g} +- {s:.2g}"
+        for n, s in zip(names, spread, strict=True)
+    )
+    out.caption = text + f"\nresidual {1e3 * found.residual_m:.2f} mm"
+    out.caption_justify = "left"
+    return out
+
+
+def calibration_numbers(found: Fit) -> dict[str, Any]:
+    """The same for scripts."""
+    points = {"held_m": found.tips_m.tolist(), "readings": found.readings.tolist()}
+    return {
+        "calibration": found.calibration.model_dump(mode="json"),
+        "residual_m": found.residual_m,
+    } | points
+
+
+def numbers(run: Any) -> dict[str, dict[str, float | None]]:
+    """The same by channel, for scripts; None where there is no number."""
+    out = {}
+    for name in run:
+        values = run[name][np.isfinite(run[name])]
+        if not len(values):
+            continue
+        lag = run.meta["delays"].get(name, {})
+        row: dict[str, float | None] = {
+            "lowest": float(values.min()),
+            "highest": float(values.max()),
+            "end": float(values[-1]),
+        }
+        row |= {
+            "error_max": None,
+            "error_rms": None,
+            "lag_s": lag.get("seconds"),
+            "lag_std_s": lag.get("std"),
+        }
+        reference = name.replace("position", "reference")
+        if reference != name and reference in run:
+            error = (run[reference] - run[name])[np.isfinite(run[reference] - run[name])]
+            if len(error):
+                row |= {
+                    "error_max": float(np.abs(error).max()),
+                    "error_rms": float(np.sqrt(np.mean(error**2))),
+                }
+        out[name] = row
+    return out
+
+
+def _short(value: float | None) -> str:
+    return "" if value is None else f"{value:.4g}"

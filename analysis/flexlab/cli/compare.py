@@ -1,0 +1,115 @@
+"""The command `flexura compare`."""
+
+from __future__ import annotations
+
+import json as json_
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+import flexura as fx
+from flexura.io import write_bytes
+
+from ..comparison import table
+from ..comparison.measures import Comparison, ordered
+from ..comparison.measures import compare as compared
+from ..comparison.replay.simulate_experiment import simulate
+from ..comparison.report import html, pdf, png
+from ..review import picture as draw
+from ..review import write_review
+from .output import events, interrupted, progress_bars, say, show
+
+
+def compare(
+    run: Annotated[
+        Path,
+        typer.Argument(
+            metavar="RUN", help="folder of an experiment, or of any run with a second one"
+        ),
+    ],
+    other: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="[RUN2]", help="folder of a run to compare with; without one, RUN is simulated"
+        ),
+    ] = None,
+    by: Annotated[
+        str | None,
+        typer.Option(
+            help="the simulation is driven by what was commanded (default), reference or measured"
+        ),
+    ] = None,
+    robot: Annotated[
+        Path | None,
+        typer.Option(metavar="ROBOT", help="robot file to simulate instead of the run's own"),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="FOLDER", help="default: comparison, in RUN's folder"),
+    ] = None,
+    picture: Annotated[
+        Path | None, typer.Option(metavar="FILE.png", help="draw the review into this file")
+    ] = None,
+    rtol: Annotated[float, typer.Option(help="relative tolerance of the native solver")] = 1e-6,
+    json: Annotated[
+        bool, typer.Option("--json", help="print JSON instead of tables, for scripts")
+    ] = False,
+) -> None:
+    """Compare an experiment with its simulation: table, report (HTML, PDF), figures and a review to
+    look at.
+
+    \b
+    Example: flexura compare logs/bench-inverse --by commanded
+    """
+    first = fx.Run.read(run)
+    if other is not None:
+        for key, value in (("by", by), ("robot", robot)):
+            if value is not None:
+                raise fx.InputError(
+                    "expected one run: two are compared as they are",
+                    key=f"--{key}",
+                    value=str(value),
+                )
+        first, second = ordered(first, fx.Run.read(other))
+    else:
+        described = None if robot is None else fx.load(robot)
+        with progress_bars("native") as report:
+            try:
+                second, by = first, by or "commanded"
+                first = simulate(
+                    second, by, described, rtol=rtol, progress=lambda f: report("native", f)
+                )
+            except fx.InputError as error:
+                raise error if error.file else error.in_file(str(run)) from None
+    found = compared(first, second)
+    folder = out or (run if run.is_dir() else run.parent) / "comparison"
+    paths = save(found, folder, simulated=other is None)
+    if picture is not None:
+        paths.append(draw(paths[-1], picture))
+    data: dict[str, Any] = table.numbers(found) | {"stored": [str(path) for path in paths]}
+    show(json, lambda: table.table(found), lambda: data)
+    for each in (first, second):
+        events(each)
+    say(
+        json,
+        f"stored {folder}: {', '.join(path.name for path in paths)}",
+        f"look at it: flexura review {folder / 'review.rrd'}",
+    )
+    if not first.complete:
+        raise typer.Exit(130 if interrupted(first) else 1)
+
+
+def save(c: Comparison, folder: Path, *, simulated: bool) -> list[Path]:
+    """Write comparison.json, report.html, report.pdf, comparison.png, review.rrd, and the
+    simulation where it is new."""
+    paths = [c.simulation.save(folder / "simulation")] if simulated else []
+    for name, data in (
+        ("comparison.json", json_.dumps(table.numbers(c), indent=1).encode()),
+        ("report.html", html(c).encode()),
+        ("report.pdf", pdf(c)),
+        ("comparison.png", png(c)),
+    ):
+        write_bytes(folder / name, data)
+        paths.append(folder / name)
+    return [*paths, write_review(folder / "review.rrd", [c.simulation, c.experiment])]

@@ -1,0 +1,198 @@
+"""What is installed here, what is missing, and what that costs."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+import platform
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import typer
+from rich.table import Table
+
+from flexura import core
+from flexura.errors import FlexuraError
+
+from ..board.emulator.simulator import CLOCK_HZ, compile_shim
+from ..board.serial_port import ports
+from ..experiment.flash import RIG
+from ..rig import examine as check
+from ..rig import load
+from .options import Json, RigFile
+from .output import show
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing looked at: `state` is "ok", "missing", "wrong" or "note"; `cost` says what doesn't
+    work without it."""
+
+    what: str
+    state: str
+    found: str
+    cost: str = ""
+
+
+_PACKAGES = {
+    "numpy": "nothing works",
+    "scipy": "nothing works",
+    "pydantic": "robot files cannot be read",
+    "pyarrow": "runs cannot be stored or read",
+    "exudyn": "no cross-check (flexura crosscheck, flexura demo)",
+    "rerun-sdk": "no review and no pictures (flexura review)",
+    "matplotlib": "no figures",
+    "platformio": "the firmware cannot be built or flashed",
+    "pyserial": "no board at a serial port (flexura flash)",
+}
+
+
+def examine(rig: Path | None = None) -> list[Finding]:
+    """Everything that flexura needs on this machine, the boards that are plugged in, and what the
+    rig can do; one finding each.
+
+    `rig` is a rig file, the project's own if None. Raises InputError for a wrong one.
+    """
+    return [*_python(), *_packages(), *_native_libraries(), *_core(), *_board(), *_rig(rig)]
+
+
+def _python() -> Iterator[Finding]:
+    version = platform.python_version()
+    good = sys.version_info >= (3, 11)
+    yield Finding(
+        "Python",
+        "ok" if good else "missing",
+        version,
+        "" if good else "flexura needs Python 3.11 or newer",
+    )
+    yield Finding("processor", "note", f"{platform.machine()}, {os.cpu_count()} cores")
+
+
+def _packages() -> Iterator[Finding]:
+    for name, cost in _PACKAGES.items():
+        try:
+            yield Finding(name, "ok", importlib.metadata.version(name))
+        except importlib.metadata.PackageNotFoundError:
+            yield Finding(name, "missing", "not installed", f"{cost}; type: pip install {name}")
+
+
+def _native_libraries() -> Iterator[Finding]:
+    try:
+        import exudyn  # noqa: F401
+
+        yield Finding("exudyn's libraries", "ok", "libGL, libX11 load")
+    except ImportError as error:
+        yield Finding(
+            "exudyn's libraries",
+            "missing",
+            str(error).splitlines()[0],
+            "no cross-check; on Debian type: apt-get install libgl1 libx11-6",
+        )
+    drivers = [
+        icd
+        for place in ("/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d")
+        for icd in Path(place).glob("*.json")
+    ]
+    if drivers:
+        yield Finding("Vulkan driver", "ok", f"{len(drivers)} found")
+    elif sys.platform == "linux":
+        cost = (
+            "no pictures (flexura review --picture); on Debian type: apt-get install "
+            "mesa-vulkan-drivers libvulkan1"
+        )
+        yield Finding("Vulkan driver", "missing", "none found", cost)
+    if sys.platform == "linux" and not (
+        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    ):
+        yield Finding(
+            "display",
+            "note",
+            "none",
+            "the review can be saved (--save) and drawn (--picture), not opened in a window",
+        )
+
+
+def _core() -> Iterator[Finding]:
+    slow = "x86-64-v3" in core.BUILDS and core.level == "plain"
+    cost = "3 to 8 times slower than on a processor with AVX2" if slow else ""
+    yield Finding("compiled core", "note" if slow else "ok", f"{core.level}, {core.compiler}", cost)
+
+
+def _board() -> Iterator[Finding]:
+    try:
+        yield Finding(
+            "emulated board",
+            "ok",
+            f"simavr, ATmega2560 at {CLOCK_HZ / 1e6:g} MHz: {compile_shim()}",
+        )
+    except FlexuraError as error:
+        yield Finding(
+            "emulated board",
+            "missing",
+            str(error).splitlines()[0],
+            "no emulated board (flexura flash --emulated)",
+        )
+    try:
+        found = list(ports())
+    except ImportError:  # told above
+        return
+    for port in found:
+        usable = os.access(port.device, os.R_OK | os.W_OK)
+        cost = (
+            ""
+            if usable
+            else "not yours to open; on Debian type: sudo adduser $USER dialout, and log in again"
+        )
+        yield Finding("board", "ok" if usable else "missing", f"{port.device}: {port.what}", cost)
+    if not found:
+        yield Finding(
+            "board", "note", "none plugged in", "experiments run on the emulated board only"
+        )
+
+
+def _rig(rig: Path | None) -> Iterator[Finding]:
+    if rig is None and not RIG.is_file():  # not a checkout
+        return
+    bench = load(rig or RIG)
+    checks = check(bench)
+    for c in checks:
+        if not c.passed:
+            cost = f"cannot follow {bench.manoeuvre.name!r}: {c.advice}"
+            yield Finding(
+                f"rig: {c.what}", "wrong", f"needed: {c.needed}; available: {c.available}", cost
+            )
+    if all(c.passed for c in checks):
+        yield Finding(
+            "rig", "ok", f"{bench.file}: can follow {bench.manoeuvre.name!r} ({len(checks)} checks)"
+        )
+
+
+def doctor(rig: RigFile = None, json: Json = False) -> None:
+    """What is installed, what is missing, what that costs; and whether the rig can do what it is
+    built for.
+
+    \b
+    Example: flexura doctor
+    """
+    findings = examine(rig)
+
+    def table() -> Table:
+
+        out = Table(show_edge=False)
+        for name in ("", "found", "what it costs"):
+            out.add_column(name, overflow="fold")
+        mark = {
+            "ok": "[green]ok     [/]",
+            "missing": "[red]missing[/]",
+            "note": "note   ",
+            "wrong": "[red]wrong  [/]",
+        }
+        for f in findings:
+            out.add_row(f"{mark[f.state]} {f.what}", f.found, f.cost)
+        return out
+
+    show(json, table, lambda: [vars(f) for f in findings])
+    if any(f.state in ("missing", "wrong") for f in findings):
+        raise typer.Exit(1)

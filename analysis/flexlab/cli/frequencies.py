@@ -1,0 +1,42 @@
+"""The command `flexura frequencies`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+import flexura as fx
+
+from ..studies.transmission_zeros import transmission
+from . import tables
+from .options import Json, RobotFile
+from .output import show
+
+
+def frequencies(
+    robot: RobotFile,
+    zeros: Annotated[
+        bool,
+        typer.Option(
+            "--zeros", help="also the transmission zeros from each drive to its joint and the tip"
+        ),
+    ] = False,
+    json: Json = False,
+) -> None:
+    """Natural frequencies at the start, joints locked and free.
+
+    \b
+    Example: flexura frequencies model/robots/two-link-arm.toml --zeros
+    """
+    described = fx.load(robot)
+    system = fx.assemble(described)
+    locked, free = (fx.frequencies(system, joints=joints) for joints in ("locked", "free"))
+    rows = transmission(fx.linearize(system)) if zeros else []
+    title = described.name or robot.stem
+    found = {"locked_Hz": locked.tolist(), "free_Hz": free.tolist()}
+    show(
+        json,
+        lambda: tables.frequency_tables(locked, free, title, rows),
+        lambda: found | ({"zeros": [row.numbers() for row in rows]} if zeros else {}),
+    )

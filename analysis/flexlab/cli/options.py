@@ -1,0 +1,31 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+RobotFile = Annotated[
+    Path,
+    typer.Argument(metavar="ROBOT", help="robot file (TOML), for example model/robots/rig.toml"),
+]
+ManoeuvreFile = Annotated[
+    Path | None,
+    typer.Argument(
+        metavar="MANOEUVRE",
+        help="manoeuvre file (TOML); without one, a modest back and forth of every joint",
+    ),
+]
+RigFile = Annotated[
+    Path | None, typer.Argument(metavar="RIG", help="rig file (TOML); default firmware/rig.toml")
+]
+Out = Annotated[
+    Path | None,
+    typer.Option(
+        "--out", metavar="FOLDER", help="where to leave the results; default logs/<command>-<robot>"
+    ),
+]
+Json = Annotated[bool, typer.Option("--json", help="print JSON instead of tables, for scripts")]
+Rtol = Annotated[float, typer.Option(help="relative tolerance of the native solver")]

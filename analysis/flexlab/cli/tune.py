@@ -1,0 +1,252 @@
+"""The command `flexura tune`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+import flexura as fx
+from flexura.control import Gains, load_gains
+
+from .. import rig as rigs
+from ..rig.nominal_robot import driven
+from ..tuning import dissertation as cases
+from ..tuning import result as results
+from ..tuning import search_space as freedom
+from ..tuning.executor import engine
+from ..tuning.history import History
+from ..tuning.objective import Weights
+from ..tuning.search import Search, search
+from ..tuning.task import Task, varied
+from .output import default_folder, say, show
+
+
+def tune(
+    robot: Annotated[Path | None, typer.Argument(metavar="ROBOT", help="robot file (TOML)")] = None,
+    manoeuvre: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="MANOEUVRE", help="manoeuvre file (TOML): the motions are the set-points"
+        ),
+    ] = None,
+    controller: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="GAINS", help="gains file (TOML): the structure, and what is not free"
+        ),
+    ] = None,
+    free: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=LOW:HIGH", help="a free setting; log scale unless 0 is between"),
+    ] = None,
+    free_file: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="TOML with a table [free]: name = [low, high]"),
+    ] = None,
+    algorithm: Annotated[
+        str, typer.Option(help="ga, pso, cma-es, or nsga2: settling time against vibration")
+    ] = "ga",
+    population: Annotated[int, typer.Option(help="individuals of a generation")] = 50,
+    generations: Annotated[int, typer.Option(help="at most so many")] = 100,
+    patience: Annotated[
+        int, typer.Option(help="generations without 0.1 % of improvement that end the search")
+    ] = 30,
+    polish: Annotated[
+        int, typer.Option(help="generations of a local CMA-ES from the best, at the end")
+    ] = 0,
+    seed: Annotated[int, typer.Option(help="the same seed, the same result")] = 1,
+    vibration: Annotated[
+        float, typer.Option(help="weight VIBRATION in J; 0: the elastic displacement is ignored")
+    ] = 100.0,
+    effort: Annotated[float, typer.Option(help="weight EFFORT in J")] = 0.01,
+    overshoot: Annotated[float, typer.Option(help="weight OVERSHOOT in J")] = 1.0,
+    payload_factors: Annotated[
+        str, typer.Option(metavar="LIST", help="robust: the worst over payloads, as 0,1,2")
+    ] = "1",
+    stiffness_factors: Annotated[
+        str, typer.Option(metavar="LIST", help="robust: and over stiffnesses, as 0.9,1.1")
+    ] = "1",
+    rig: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="RIG",
+            help="rig file: its motor's rotor and friction, its stepper, in the joints",
+        ),
+    ] = None,
+    rtol: Annotated[
+        float,
+        typer.Option(
+            help="relative tolerance of the runs of the search; the result is run to 1e-6"
+        ),
+    ] = 1e-3,
+    modes: Annotated[
+        int,
+        typer.Option(
+            min=0, help="of each link in the search; 0: the robot file's mesh, as in the result"
+        ),
+    ] = 2,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="a Dask scheduler, tcp://...")
+    ] = None,
+    jobs: Annotated[int | None, typer.Option(min=1, help="threads; default: one a core")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            metavar="FOLDER",
+            help="default logs/tune-<robot>; a search that stopped goes on",
+        ),
+    ] = None,
+    dissertation: Annotated[
+        bool,
+        typer.Option(
+            "--dissertation",
+            help="instead of a ROBOT: its control cases, types III and IV, in its tables",
+        ),
+    ] = False,
+    json: Annotated[
+        bool, typer.Option("--json", help="print JSON instead of tables, for scripts")
+    ] = False,
+) -> None:
+    """Find a controller's gains on the simulator, drive limits and sampling included.
+
+    The objective, the least of which is sought (the worst of the robots where there are several):
+
+    \b
+      J = sum over joints of [ int t |r - q| dt / |step|
+                               + OVERSHOOT max(0, overshoot - 5 %)
+                               + EFFORT int (u / limit)^2 dt / T ]
+          + VIBRATION int t |w - w(end)| dt / L
+    Times in s, w the tip deflection, L the length of the last flexible
+    link, u the drive's output. A run that ends before its time (a limit,
+    a bent link, chatter) counts 1000 (2 - the fraction done).
+
+    Every generation is stored in FOLDER: the same command goes on after an interruption, with the
+    same result.
+
+    \b Example: flexura tune model/robots/rig.toml model/manoeuvres/rig-step.toml --controller
+    model/controllers/rig.toml
+      --rig firmware/rig.toml --free kp_1_V_m=100:10000 --free kp_2_1_s=1:60 --free
+      kf_2_rad_s_m=0.5:100 --algorithm cma-es
+    """
+    if free and free_file:
+        raise fx.InputError(
+            "expected either --free or --free-file", key="--free-file", value=str(free_file)
+        )
+    how = Search(algorithm, population, generations, seed, patience, polish)
+    if dissertation:
+        if robot is not None or controller is not None:
+            raise fx.InputError(
+                "expected --dissertation without a robot: it brings its own",
+                key="ROBOT",
+                value=str(robot),
+            )
+        _cases(how, out or Path("logs") / "tune-dissertation", scheduler, jobs, json)
+        return
+    if robot is None or manoeuvre is None or controller is None:
+        raise fx.InputError(
+            "expected ROBOT, MANOEUVRE and --controller GAINS, or --dissertation",
+            key="ROBOT",
+            value=str(robot),
+        )
+    described, given = fx.load(robot), load_gains(controller)
+    if rig is not None:
+        described, outputs = driven(described, rigs.load(rig))
+        given = Gains(given.settings, outputs, given.file)
+    asked = fx.load_manoeuvre(manoeuvre, len(described.links))
+    frees = (
+        freedom.read(free_file)
+        if free_file
+        else [freedom.from_flag(f) for f in free or []] or freedom.usual(given)
+    )
+    weights = Weights(vibration, effort, overshoot)
+    robots = varied(
+        described,
+        _factors(payload_factors, "--payload-factors"),
+        _factors(stiffness_factors, "--stiffness-factors"),
+    )
+    task = Task(robots, asked, given, tuple(frees), weights, algorithm == "nsga2", rtol, modes)
+    task.controllers  # noqa: B018 - refuses what can't be before anything is written
+    folder = out or default_folder("tune", robot)
+    history = History.open(folder, task.digest(how.identity()))
+    if history.stored:
+        say(json, f"going on after generation {history.stored} in {folder}")
+    with (
+        engine(task, scheduler, jobs) as runs,
+        _bar(how.generations + how.polish, task.goals) as report,
+    ):
+        complete = search(task, how, runs, history, report)
+    if not len(history):
+        raise typer.Exit(130)
+    found = results.result(task, how, history, complete)
+    paths = results.save(found, folder)
+    show(
+        json,
+        lambda: results.table(found),
+        lambda: results.numbers(found) | {"stored": [str(path) for path in paths]},
+    )
+    say(
+        json,
+        f"stored {folder}: {', '.join(path.name for path in paths)}",
+        f"use it: flexura bench step --gains {paths[0]}",
+    )
+    if not complete:
+        raise typer.Exit(130)
+
+
+def _cases(how: Any, folder: Path, scheduler: str | None, jobs: int | None, json: bool) -> None:
+    with _bar(how.generations + how.polish, ("J",)) as report:
+        found, complete = cases.study(["IV", "III"], how, folder, scheduler, jobs, report)
+    if found:
+        show(json, lambda: cases.table(found), lambda: cases.data(found))
+    say(json, f"stored {folder}" + ("" if complete else "; interrupted: the same command goes on"))
+    if not complete:
+        raise typer.Exit(130)
+
+
+def _factors(text: str, key: str) -> list[float]:
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        values = []
+    if (
+        not values
+        or not all(0 <= v < 100 for v in values)
+        or (key.startswith("--stiff") and min(values) <= 0)
+    ):
+        expected = (
+            "expected factors of 0 or more (stiffness: above 0) with commas between, as 0.5,1,2"
+        )
+        raise fx.InputError(expected, key=key, value=text)
+    return values
+
+
+@contextmanager
+def _bar(generations: int, goals: tuple[str, ...]) -> Iterator[Callable[[Any], None]]:
+    """A bar on a terminal's stderr with the best so far, nothing elsewhere."""
+    if not sys.stderr.isatty():
+        yield lambda history: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
+        task = bars.add_task("generation", total=generations)
+
+        def report(history: Any) -> None:
+            best = history.all("goals")[history.best]
+            text = ", ".join(f"{name} {value:.4g}" for name, value in zip(goals, best, strict=True))
+            bars.update(task, completed=len(history), description=f"best {text}")
+
+        yield report

@@ -1,0 +1,2 @@
+"""Simulation against experiment: the simulation of what was commanded or measured, deviations,
+report and review."""

@@ -1,0 +1,137 @@
+"""Figures in the manner of the dissertation's Figs 4.16 to 4.21: simulation and experiment as two
+lines, and their difference."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import numpy as np
+
+from ..runs.deviation import deviation
+from ..runs.labels import called, emulated
+from .measures import Comparison, Difference
+
+BLUE, GREEN, PINK, INK = (
+    "#1f6fc4",
+    "#1d9a50",
+    "#c43a80",
+    "#30343b",
+)  # simulation, experiment, deviation, as in the review
+RATIO = [2.3, 1]
+STYLE: dict[Any, Any] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9,
+    "axes.edgecolor": "#9aa0a8",
+    "axes.labelcolor": INK,
+    "text.color": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.8,
+    "grid.color": "#e3e6ea",
+    "grid.linewidth": 0.7,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "svg.fonttype": "none",
+    "pdf.fonttype": 42,
+    "svg.hashsalt": "flexura",
+}
+
+
+def figure(c: Comparison, entry: Difference) -> Any:
+    """One quantity's figure, a matplotlib Figure: both runs above, their difference below."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    with matplotlib.rc_context(STYLE):
+        drawing = Figure(figsize=(7.4, 3.9), layout="constrained")
+        draw(c, entry, *drawing.subplots(2, 1, height_ratios=RATIO))
+        drawing.align_ylabels()
+    return drawing
+
+
+def draw(c: Comparison, entry: Difference, upper: Any, lower: Any) -> None:
+    """The two runs and their difference into two axes."""
+    scale, unit = (1e3, "mm") if entry.unit == "m" else (1.0, entry.unit)
+    name = symbol(entry)
+    first, second = c.simulation, c.experiment
+    upper.plot(
+        second.t,
+        scale * second[entry.channel],
+        color=GREEN,
+        linewidth=2.6,
+        alpha=0.75,
+        label=called(second),
+    )
+    upper.plot(
+        first.t, scale * first[entry.channel], color=BLUE, linewidth=1.1, label=called(first)
+    )
+    t, values = deviation(first, second, entry.channel)
+    lower.plot(t, scale * values, color=PINK, linewidth=0.9)
+    lower.axhline(0.0, color="#9aa0a8", linewidth=0.7)
+    if np.isfinite(entry.at_s):
+        size = scale * values[np.nanargmax(np.abs(values))]
+        lower.plot([entry.at_s], [size], "o", color=PINK, markersize=4)
+        text = f"largest {abs(size):.3g} {unit}" + (
+            f" = {100 * entry.max_relative:.3g} % of the peak" if entry.peak else ""
+        )
+        lower.set_title(text, fontsize=8, loc="right", pad=2, color=PINK)
+    upper.set_ylabel(f"{name} [{unit}]")
+    lower.set_ylabel(f"difference\n[{unit}]")
+    lower.set_xlabel("time [s]")
+    ends = min(first.t[0], second.t[0]), max(first.t[-1], second.t[-1])
+    for axes in (upper, lower):
+        axes.set_xlim(*ends)
+    upper.tick_params(labelbottom=False)
+    upper.set_title(heading(c, entry), loc="left", fontsize=9.5, fontweight="bold")
+    upper.legend(
+        frameon=False,
+        loc="lower right",
+        bbox_to_anchor=(1.0, 0.98),
+        ncols=2,
+        borderaxespad=0.2,
+        handlelength=1.6,
+    )
+
+
+def symbol(entry: Difference) -> str:
+    kind, number, _ = entry.channel.split("/")
+    if kind == "link":
+        return f"$w_{{{number}}}$"
+    return f"${'q' if entry.unit == 'rad' else 'd'}_{{{number}}}$"
+
+
+def heading(c: Comparison, entry: Difference) -> str:
+    text = entry.quantity[0].upper() + entry.quantity[1:]
+    return text + (f", {c.law}" if c.law else "") + (" (emulated)" if is_emulated(c) else "")
+
+
+def is_emulated(c: Comparison) -> bool:
+    return emulated(c.simulation) or emulated(c.experiment)
+
+
+def together(c: Comparison, size: tuple[float, float] = (8.3, 10.2)) -> Any:
+    """All quantities in one figure, one below the other."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    with matplotlib.rc_context(STYLE):
+        drawing = Figure(figsize=size, layout="constrained")
+        axes = drawing.subplots(2 * len(c.differences), 1, height_ratios=RATIO * len(c.differences))
+        for k, entry in enumerate(c.differences):
+            draw(c, entry, *axes[2 * k : 2 * k + 2])
+        drawing.align_ylabels()
+    return drawing
+
+
+def saved(drawing: Any, form: str, **metadata: str) -> bytes:
+    """The bytes of a figure as "svg", "png" or "pdf", the same for the same runs."""
+    import matplotlib
+
+    fixed = {"Date": None} if form == "svg" else {}
+    buffer = io.BytesIO()
+    with matplotlib.rc_context(STYLE):
+        drawing.savefig(buffer, format=form, dpi=150, metadata=metadata | fixed)
+    return buffer.getvalue()

@@ -1,0 +1,199 @@
+"""Simulation against experiment in the dissertation's terms: largest deviations relative to the
+peak, and the response time.
+
+**Response time**: from the start of execution (t = 0) until a joint variable has first covered 90 %
+of its largest distance from where it started, each run by its own largest distance. The
+dissertation gives a deviation of "response time" without defining it; this definition holds for
+steps and for periodic motions. It is not known where a dropout hides the instant.
+**Delay**: the shift in time by which the experiment fits the simulation best (least squares), which
+uses all samples.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+import flexura as fx
+from flexura.errors import InputError
+
+from ..runs.deviation import deviation, deviations, interpolate
+from ..runs.labels import kind
+
+COVERED = 0.9  # of the largest distance, for the response time
+LONGEST_DELAY_S = 0.25
+# The dissertation's largest deviations of its rig, type IV [%] (Duong Xuan Bien, 2019, chapter 4).
+PUBLISHED = {
+    "forward": {"joint/1/position": 4.35, "joint/2/position": 7.5, "link/2/tip_deflection": 7.5},
+    "inverse": {
+        "joint/1/position": 8.3,
+        "joint/2/position": 1.15,
+        "link/2/tip_deflection": 11.5,
+        "response": 17.8,
+    },
+}
+_COMPARED = re.compile(r"joint/(\d+)/position|link/(\d+)/tip_deflection")
+
+
+@dataclass(frozen=True)
+class Difference:
+    """One quantity's deviation, experiment minus simulation, in `unit`; `peak` and fractions are of
+    the simulation's peak."""
+
+    quantity: str
+    channel: str
+    unit: str
+    peak: float
+    max: float
+    at_s: float
+    rms: float
+    max_relative: float
+    rms_relative: float
+    published_percent: float | None
+
+
+@dataclass(frozen=True)
+class Response:
+    """One joint's response times [s] in both runs, their relative deviation, and the delay of the
+    experiment [s]."""
+
+    quantity: str
+    channel: str
+    simulation_s: float
+    experiment_s: float
+    relative: float
+    delay_s: float
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two runs and what separates them. `experiment` may be any second run; labels come from their
+    metadata."""
+
+    simulation: fx.Run
+    experiment: fx.Run
+    differences: tuple[Difference, ...]
+    responses: tuple[Response, ...]
+    lost: int  # samples of the experiment without a value in at least one compared channel
+
+    @property
+    def law(self) -> str:
+        """Which of the dissertation's experiments this is: "forward", "inverse", or another."""
+        return str(self.experiment.meta.get("experiment", ""))
+
+    @property
+    def worst_response(self) -> float:
+        """The largest relative deviation of a response time; NaN when none is known."""
+        found = [abs(r.relative) for r in self.responses if np.isfinite(r.relative)]
+        return max(found, default=float("nan"))
+
+    @property
+    def published_response_percent(self) -> float | None:
+        return PUBLISHED.get(self.law, {}).get("response")
+
+
+def ordered(first: fx.Run, second: fx.Run) -> tuple[fx.Run, fx.Run]:
+    """The two runs with the experiment last, where exactly one of them is one."""
+    return (second, first) if kind(first) == "experiment" != kind(second) else (first, second)
+
+
+def compare(simulation: fx.Run, experiment: fx.Run) -> Comparison:
+    """Compare the joint variables and tip displacements that both have. Raises InputError when
+    there is none."""
+    names = [n for n in simulation if _COMPARED.fullmatch(n) and n in experiment]
+    if not names:
+        raise InputError(
+            "expected two runs with joint positions in common", key="RUN", value=list(experiment)
+        )
+    published = PUBLISHED.get(str(experiment.meta.get("experiment", "")), {})
+    rows = []
+    for row in deviations(simulation, experiment, names):
+        t, values = deviation(simulation, experiment, row.channel)
+        size = np.where(np.isfinite(values), np.abs(values), -1.0)
+        at = float(t[size.argmax()]) if len(t) and size.max() >= 0 else float("nan")
+        rows.append(
+            Difference(
+                quantity(row.channel),
+                row.channel,
+                row.unit,
+                row.peak,
+                row.max,
+                at,
+                row.rms,
+                row.max_relative,
+                row.rms_relative,
+                published.get(row.channel),
+            )
+        )
+    joints = [n for n in names if n.startswith("joint")]
+    gone = ~np.isfinite(np.array([experiment[n] for n in names])).all(axis=0)
+    return Comparison(
+        simulation,
+        experiment,
+        tuple(rows),
+        tuple(_response(simulation, experiment, n) for n in joints),
+        int(gone.sum()),
+    )
+
+
+def quantity(channel: str) -> str:
+    """`joint/1/position` -> "joint variable 1", `link/2/tip_deflection` -> "tip displacement of
+    link 2"."""
+    found = _COMPARED.fullmatch(channel)
+    assert found
+    return f"joint variable {found[1]}" if found[1] else f"tip displacement of link {found[2]}"
+
+
+def _response(simulation: fx.Run, experiment: fx.Run, channel: str) -> Response:
+    first, second = (
+        response_time(simulation.t, simulation[channel]),
+        response_time(experiment.t, experiment[channel]),
+    )
+    relative = second / first - 1 if first > 0 else float("nan")
+    return Response(
+        quantity(channel), channel, first, second, relative, delay(simulation, experiment, channel)
+    )
+
+
+def response_time(t: np.ndarray, y: np.ndarray) -> float:
+    """When |y - y(0)| first reaches COVERED of its largest value [s]; NaN where it never moves or a
+    gap hides the instant."""
+    there = np.isfinite(y)
+    if not there.any():
+        return float("nan")
+    size = np.abs(y - y[there.argmax()])
+    level = COVERED * size[there].max()
+    beyond = size >= level  # a NaN is not
+    k = int(beyond.argmax())
+    if level == 0.0 or k == 0 or not there[k - 1]:
+        return float("nan")
+    return float(t[k - 1] + (t[k] - t[k - 1]) * (level - size[k - 1]) / (size[k] - size[k - 1]))
+
+
+def delay(simulation: fx.Run, experiment: fx.Run, channel: str) -> float:
+    """The tau [s] that makes sum (y_exp(t) - y_sim(t - tau))^2 smallest, at most LONGEST_DELAY_S;
+    NaN where nothing moves."""
+    from scipy.optimize import minimize_scalar
+
+    y, t, known = experiment[channel], experiment.t, simulation[channel]
+    inside = (
+        np.isfinite(y)
+        & (t >= simulation.t[0] + LONGEST_DELAY_S)
+        & (t <= simulation.t[-1] - LONGEST_DELAY_S)
+    )
+    if inside.sum() < 8 or np.ptp(y[inside]) == 0 or np.ptp(known) == 0:
+        return float("nan")
+
+    def left(tau: float) -> float:
+        difference = y[inside] - interpolate(t[inside] - tau, simulation.t, known)
+        return float(np.nanmean(difference**2))
+
+    grid = np.linspace(-LONGEST_DELAY_S, LONGEST_DELAY_S, 101)
+    near = grid[np.argmin([left(tau) for tau in grid])]
+    step = grid[1] - grid[0]
+    found = minimize_scalar(
+        left, bounds=(near - step, near + step), method="bounded", options={"xatol": 1e-6}
+    )
+    return float(found.x)

@@ -1,0 +1,166 @@
+"""What a comparison leaves: a table, JSON, and a folder with the simulation, report and review."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+
+from ..runs.labels import EMULATED, called, emulated
+from .measures import COVERED, Comparison
+
+HEADS = ("quantity", "peak", "largest deviation", "at [s]", "of the peak", "RMS", "dissertation")
+
+
+DRIVEN = {
+    "commanded": "driven by the voltage and the pulses that were commanded",
+    "reference": "follows the set-points exactly, as the dissertation's own",
+    "measured": "follows the encoders",
+}
+
+
+def title(c: Comparison) -> str:
+    name = c.simulation.meta.get("robot", {}).get("name") or "robot"
+    return f"{name}: {called(c.simulation)} against {called(c.experiment)}" + (
+        f", {c.law}" if c.law else ""
+    )
+
+
+def rows(c: Comparison) -> list[tuple[str, ...]]:
+    """The table's cells, HEADS above them: the same in the terminal, the page and the PDF."""
+    out: list[tuple[str, ...]] = [
+        (
+            d.quantity,
+            _length(d.peak, d.unit),
+            _length(d.max, d.unit),
+            _seconds(d.at_s),
+            _percent(d.max_relative),
+            _percent(d.rms_relative),
+            _published(d.published_percent),
+        )
+        for d in c.differences
+    ]
+    for r in c.responses:
+        took = f"{_seconds(r.experiment_s)} s against {_seconds(r.simulation_s)} s"
+        delayed = "-" if np.isnan(r.delay_s) else f"delay {1e3 * r.delay_s:.1f} ms"
+        out.append(
+            (f"response time, {r.quantity}", "", took, "", _percent(abs(r.relative)), delayed, "")
+        )
+    if c.responses:
+        worst = _percent(c.worst_response)
+        out.append(
+            (
+                "response time, the worse",
+                "",
+                "",
+                "",
+                worst,
+                "",
+                _published(c.published_response_percent),
+            )
+        )
+    return out
+
+
+def notes(c: Comparison) -> list[str]:
+    """What a reader must know beside the numbers."""
+    lines = [
+        f"{called(run)}: {EMULATED.removeprefix('emulated: ')}"
+        for run in (c.simulation, c.experiment)
+        if emulated(run)
+    ]
+    if way := c.simulation.meta.get("driven_by"):
+        lines.append(f"simulation {DRIVEN[way]} (--by {way})")
+    lines.append(
+        "deviation: second minus first, of the first run's peak; the dissertation's figures are of "
+        "its own rig"
+    )
+    if c.responses:
+        lines.append(
+            f"response time: from t = 0 until {100 * COVERED:g} % of the largest distance from the "
+            f"start is first covered; "
+            "delay: the shift in time that fits best"
+        )
+    if c.lost:
+        lines.append(
+            f"{c.lost} of {len(c.experiment)} samples are dropouts in at least one channel, and "
+            f"are left out"
+        )
+    for run in (c.simulation, c.experiment):
+        if not run.complete:
+            lines.append(
+                f"{called(run)}: ends at {run.t[-1]:.4g} s; what comes after is not compared"
+            )
+    return lines
+
+
+def table(c: Comparison) -> Table:
+    """The table for the terminal."""
+    out = Table(title=title(c), title_justify="left")
+    for head in HEADS:
+        out.add_column(
+            head.replace("[", "\\["),
+            justify="left" if head == "quantity" else "right",
+            overflow="fold",
+        )
+    for k, row in enumerate(cells := rows(c)):
+        out.add_row(*row, end_section=k in (len(c.differences) - 1, len(cells) - 1))
+    out.caption, out.caption_justify = "\n".join(notes(c)), "left"
+    return out
+
+
+def numbers(c: Comparison) -> dict[str, Any]:
+    """For JSON."""
+    clean = lambda entry: {
+        k: None
+        if isinstance(v, float) and not np.isfinite(v)
+        else float(v)
+        if isinstance(v, np.floating)
+        else v
+        for k, v in vars(entry).items()
+    }
+    about = {
+        name: {"called": called(run), "emulated": emulated(run), "complete": run.complete}
+        | {
+            k: run.meta[k]
+            for k in ("label", "driven_by", "started", "seed", "firmware", "host_version")
+            if k in run.meta
+        }
+        for name, run in (("first", c.simulation), ("second", c.experiment))
+    }
+    worst = c.worst_response
+    return {
+        "title": title(c),
+        "emulated": emulated(c.experiment) or emulated(c.simulation),
+        "experiment": c.law,
+        "runs": about,
+        "deviations": [clean(d) for d in c.differences],
+        "responses": [clean(r) for r in c.responses],
+        "response_relative": worst if np.isfinite(worst) else None,
+        "response_published_percent": c.published_response_percent,
+        "dropouts": c.lost,
+        "notes": notes(c),
+    }
+
+
+def _length(value: float, unit: str) -> str:
+    return "-" if not np.isfinite(value) else f"{1e3 * value:.3g} m{unit}"
+
+
+def _seconds(value: float) -> str:
+    return "-" if not np.isfinite(value) else f"{value:.3f}"
+
+
+def _percent(value: float) -> str:
+    return (
+        "-"
+        if not np.isfinite(value)
+        else f"{100 * value:.3g} %"
+        if value < 9.995
+        else f"{100 * value:.0f} %"
+    )
+
+
+def _published(value: float | None) -> str:
+    return "" if value is None else f"{value:g} %"

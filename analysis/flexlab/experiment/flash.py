@@ -1,0 +1,192 @@
+"""The firmware to a board, and the rig's constants into it: build, load, wait for the first good
+frame, read back, compare."""
+
+from __future__ import annotations
+
+import struct
+import subprocess
+import sys
+from binascii import crc_hqx
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from flexura.errors import FlexuraError, InputError
+
+from ..board.base import Board, BoardError
+from ..board.emulator.emulated import EmulatedBoard
+from ..board.protocol.declaration import BAUD_BIT_S, CONFIG, Fault
+from ..board.protocol.session import Identity, Link
+from ..board.serial_port import SerialBoard, find
+from ..rig import Bench, configuration
+from ..rig.plant.rigid_plant import Drives
+
+FIRMWARE = Path(__file__).parents[2] / "firmware"
+RIG = FIRMWARE / "rig.toml"
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A setting of the board beside what the rig file says."""
+
+    name: str
+    board: float
+    rig: float
+
+    @property
+    def agrees(self) -> bool:
+        return self.board == single(self.rig)
+
+
+@dataclass(frozen=True)
+class Flashed:
+    """What became of it. `board` is the port or "emulated ATmega2560"."""
+
+    board: str
+    emulated: bool
+    elf: Path
+    identity: Identity
+    settings: list[Setting]
+    configured: bool
+
+    @property
+    def differing(self) -> list[str]:
+        """Settings of the board that are not the rig file's."""
+        return [setting.name for setting in self.settings if not setting.agrees]
+
+
+def single(value: float) -> float:
+    """As the board keeps it: in single precision."""
+    return float(struct.unpack("<f", struct.pack("<f", value))[0])
+
+
+def crc(settings: dict[str, float]) -> int:
+    """The board's checksum of its settings: CRC-16 over all of them in their order, single
+    precision."""
+    return crc_hqx(struct.pack(f"<{len(CONFIG)}f", *(settings[name] for name in CONFIG)), 0xFFFF)
+
+
+def build(*options: str, firmware: Path = FIRMWARE) -> Path:
+    """Build the firmware with PlatformIO and return its ELF file. Raises FlexuraError with the end
+    of the compiler's output."""
+    script = firmware / "build.py"
+    if not script.is_file():
+        raise InputError(
+            "no such file: building the firmware needs a checkout of the project", file=str(script)
+        )
+    done = subprocess.run(
+        [sys.executable, str(script), *options],
+        capture_output=True,
+        text=True,
+        stdin=subprocess.DEVNULL,
+    )
+    if done.returncode:
+        said = "\n".join((done.stdout + done.stderr).strip().splitlines()[-15:])
+        raise FlexuraError(f"the firmware was not built or not loaded:\n{said}")
+    return Path(done.stdout.strip().splitlines()[-1])
+
+
+def flash(
+    bench: Bench,
+    port: str | None = None,
+    emulated: bool = False,
+    configure: bool = False,
+    say: Say = print,
+) -> Flashed:
+    """Build, load, meet the board, and read its settings; with `configure` write the rig's, store
+    them, and see them again after a reset.
+
+    Raises BoardError when the board does not come up as it must; nothing moves in any case.
+    """
+    if emulated and port:
+        raise InputError("expected either a port or --emulated", key="--port", value=port)
+    wanted = configuration(bench)
+    device = None if emulated else port or find()
+    if device and not Path(device).exists():
+        raise InputError(
+            "no such device: expected the board's serial port", key="--port", value=device
+        )
+    say("building the firmware")
+    elf = build(*(["--upload-port", device] if device else []))
+    say(
+        f"loaded into {device}"
+        if device
+        else "loaded into an emulated ATmega2560: no hardware is touched"
+    )
+    board: Board = SerialBoard(device, BAUD_BIT_S) if device else EmulatedBoard(elf, Drives(bench))
+    try:
+        link = Link(board)
+        identity = link.connect()
+        versions = (
+            f"firmware {identity.firmware}, avr-gcc {identity.compiler}, declaration "
+            f"{identity.declaration:08x}"
+        )
+        say(f"first good frame: {versions}")
+        if configure:
+            identity = _configure(link, wanted, say)
+        found = link.read_configuration()
+    finally:
+        board.close()
+    settings = [Setting(name, found[name], value) for name, value in wanted.items()]
+    done = Flashed(board.label, board.emulated, elf, identity, settings, configure)
+    if configure and done.differing:
+        raise BoardError(
+            f"{board.label}: read back other values than written: {', '.join(done.differing)}"
+        )
+    return done
+
+
+def _configure(link: Link, wanted: dict[str, float], say: Say) -> Identity:
+    """Write and store all settings, reset the board, and see that it comes up with them."""
+    link.command("config_defaults")
+    link.write_configuration(wanted)
+    say(f"wrote and stored {len(wanted)} settings")
+    link.board.reset()
+    identity = link.connect()
+    if identity.fault is Fault.bad_configuration or identity.configuration_crc != crc(wanted):
+        raise BoardError(
+            f"{link.board.label}: after a reset the board does not have the settings that were "
+            f"stored (checksum "
+            f"{identity.configuration_crc:04x}, expected {crc(wanted):04x}, fault "
+            f"{identity.fault.name})"
+        )
+    say("reset: the board came up with them")
+    return identity
+
+
+def table(done: Flashed) -> Any:
+    """The settings, those of the board and those of the rig file."""
+    from rich.table import Table
+
+    who = done.identity
+    out = Table(
+        title=f"{done.board}: firmware {who.firmware}, {who.state.name}, fault {who.fault.name}",
+        title_justify="left",
+    )
+    for name in ("setting", "board", "rig file", ""):
+        out.add_column(name, justify="left" if name == "setting" else "right", no_wrap=True)
+    for s in done.settings:
+        out.add_row(s.name, f"{s.board:.7g}", f"{s.rig:.7g}", "" if s.agrees else "[yellow]differs")
+    return out
+
+
+def data(done: Flashed) -> dict[str, Any]:
+    """The same for scripts."""
+    who = done.identity
+    return {
+        "board": done.board,
+        "emulated": done.emulated,
+        "elf": str(done.elf),
+        "firmware": who.firmware,
+        "compiler": who.compiler,
+        "declaration": f"{who.declaration:08x}",
+        "resets": list(who.resets),
+        "state": who.state.name,
+        "fault": who.fault.name,
+        "configured": done.configured,
+        "differing": done.differing,
+        "settings": {s.name: {"board": s.board, "rig": s.rig} for s in done.settings},
+    }

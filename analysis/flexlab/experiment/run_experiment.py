@@ -1,0 +1,208 @@
+"""One experiment from its plan to its Run: the dissertation's steps in order, with everything
+received kept on the way."""
+
+from __future__ import annotations
+
+import datetime
+import importlib
+import importlib.metadata
+import importlib.util
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import flexura as fx
+from flexura.errors import FlexuraError, InputError
+
+from ..board.base import Board, BoardError
+from ..board.emulator.emulated import EmulatedBoard
+from ..board.protocol.declaration import BAUD_BIT_S
+from ..board.protocol.session import Link
+from ..board.serial_port import SerialBoard
+from ..recordings.recording import Recorded, Recording
+from ..recordings.run_from_recording import knots_spec, rebuild
+from ..recordings.unit_conversion import Sensor
+from ..rig import Bench, configuration
+from ..rig.description import Calibration
+from ..rig.plant.rigid_plant import Drives
+from .flash import build
+from .plan import Plan
+from .selftest import Finding, prepare
+from .selftest import examine as test
+from .stream import Ended, execute, quiet
+
+SETTLE_S = {"forward": 1.0, "inverse": 0.5, "step": 0.5, "free-vibration": 0.0}
+
+
+class NotStarted(FlexuraError):
+    """A person did not want the experiment to start."""
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A board with what is known of it; `truth` are an emulated plant's own parameters, for whoever
+    judges an identification."""
+
+    board: Board
+    seed: int | None = None
+    truth: dict[str, Any] = field(default_factory=dict)
+    plant: Any = None
+
+
+@dataclass(frozen=True)
+class Watch:
+    """What the person at the bench sees and says. Each may be left as it is."""
+
+    tested: Callable[[list[Finding]], None] = lambda findings: None
+    may_start: Callable[[Link], str] = lambda link: ""  # the countdown; says why not
+    stop_asked: Callable[[], str] = lambda: ""
+    observe: Callable[[np.ndarray, float], None] = lambda reports, part: None
+
+
+@dataclass(frozen=True)
+class Done:
+    """A finished experiment."""
+
+    run: fx.Run
+    folder: Path
+    findings: list[Finding]
+    ended: Ended
+
+
+def check(plan: Plan) -> None:
+    """Raises InputError for the first thing that is asked and that the rig cannot do."""
+    if plan.failed:
+        first = plan.failed[0]
+        expected = f"the rig cannot do this: expected {first.available}; {first.advice}"
+        raise InputError(expected, key=first.what, value=first.needed, more=len(plan.failed) - 1)
+
+
+def open_board(bench: Bench, port: str | None, seed: int = 0, elf: Path | None = None) -> Opened:
+    """The board at a serial port, or, without one, an emulated board with the bench's plant behind
+    its wires."""
+    if port is not None:
+        if not Path(port).exists():
+            raise InputError(
+                "no such device: expected the board's serial port", key="--port", value=port
+            )
+        return Opened(SerialBoard(port, BAUD_BIT_S))
+    plant = plant_of(bench, seed)
+    return Opened(
+        EmulatedBoard(elf or build(), plant), seed, dict(getattr(plant, "truth", {})), plant
+    )
+
+
+def plant_of(bench: Bench, seed: int) -> Any:
+    """The emulated rig: its elastic plant where this version has one, else its drives with a
+    straight strip."""
+    if importlib.util.find_spec("flexlab.rig.plant.plant") is None:
+        return Drives(bench)
+    return importlib.import_module("flexlab.rig.plant.plant").rig_plant(bench, seed)
+
+
+def session(bench: Bench, plan: Plan, opened: Opened, calibration: Calibration) -> dict[str, Any]:
+    """What is known before the board is greeted; the run's metadata are made of it."""
+    board = opened.board
+    assert board.label.startswith("emulated") == board.emulated
+    return {
+        "kind": "experiment",
+        "source": "experiment",
+        "emulated": board.emulated,
+        "label": board.label,
+        "experiment": plan.experiment,
+        "name": bench.robot.name,
+        "structure": bench.robot.structure,
+        "program": f"flexura {importlib.metadata.version('flexura')}",
+        "robot": bench.robot.to_dict(),
+        "rig": bench.rig.model_dump(mode="json"),
+        "rig_file": bench.file,
+        "host_version": importlib.metadata.version("flexura"),
+        "seed": opened.seed,
+        "started": datetime.datetime.now().astimezone().isoformat(timespec="seconds"),
+        "asked": plan.asked,
+        "phases": plan.phases,
+        "settings": plan.settings,
+        "knots": knots_spec(plan.knots),
+        "calibration": calibration.model_dump(mode="json"),
+    } | ({"plant": type(opened.plant).__name__, "truth": opened.truth} if board.emulated else {})
+
+
+def conduct(
+    bench: Bench,
+    plan: Plan,
+    opened: Opened,
+    folder: Path,
+    calibration: Calibration,
+    watch: Watch,
+    configure: bool = False,
+) -> Done:
+    """Self-test, start, execute, and the Run; `configure` allows to write the rig's settings into a
+    board that has others.
+
+    Raises InputError before anything moves for what is wrong with the plan, BoardError for what is
+    wrong with the board; what happens later is in the result's `ended`. A recording in which
+    nothing moved is taken away again.
+    """
+    check(plan)
+    recording = Recording(folder, session(bench, plan, opened, calibration))
+    # The same experiment on the emulated board is the same byte for byte; a real line needs a
+    # number that nobody played before.
+    link = Link(Recorded(opened.board, recording), sequence=1 if opened.board.emulated else None)
+    try:
+        findings = _ready(
+            link, recording, bench, plan, calibration, opened.board.emulated or configure
+        )
+        watch.tested(findings)
+        if failed := [finding for finding in findings if not finding.passed]:
+            first = failed[0]
+            raise BoardError(
+                f"{link.board.label}: self-test: {first.what}: {first.found}; expected "
+                f"{first.expected}; {first.advice}"
+            )
+        if why := watch.may_start(link):
+            raise NotStarted(f"not started: {why}")
+    except BaseException:
+        quiet(link)
+        recording.discard()
+        raise
+    try:
+        ended = execute(
+            link, plan.knots, recording, SETTLE_S[plan.experiment], watch.stop_asked, watch.observe
+        )
+    finally:
+        recording.close()
+    run = rebuild(folder)
+    run.save(folder)
+    return Done(run, folder, findings, ended)
+
+
+def _ready(
+    link: Link,
+    recording: Recording,
+    bench: Bench,
+    plan: Plan,
+    calibration: Calibration,
+    write: bool,
+) -> list[Finding]:
+    """Greet the board, configure and test it, and tell it that both joints stand at 0."""
+    identity = link.connect()
+    recording.know(
+        firmware={
+            "version": identity.firmware,
+            "declaration": f"{identity.declaration:08x}",
+            "compiler": identity.compiler,
+            "protocol": identity.protocol,
+        }
+    )
+    findings = prepare(link, identity, configuration(bench), plan.settings, write)
+    if all(finding.passed for finding in findings):
+        more, rest = test(
+            link, plan.settings, lambda r: float(Sensor(calibration, calibration.zero).tip(r))
+        )
+        findings += more
+        recording.know(rest=rest.spec())
+        link.command("reference", position_1=0, position_2=0, steps=0)
+    return findings

@@ -1,0 +1,78 @@
+"""The ways a person stops an experiment: the stop key, Ctrl-C, and the signals of a closing
+terminal. All set one flag.
+
+A flag, not an exception: neither a frame nor a record is cut in the middle, and the motors are
+stopped in order.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import sys
+import termios
+import tty
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import Any
+
+KEYS = {b" ": "space", b"q": "q", b"\x1b": "Esc"}
+TOLD = "space, q or Esc stops the motors"
+
+
+class Stop:
+    """`asked()` says how somebody asked to stop, or "" so far."""
+
+    def __init__(self, stdin: int | None) -> None:
+        self._stdin = stdin
+        self._how = ""
+
+    def signalled(self, number: int, _: Any) -> None:
+        self._how = (
+            "interrupted"
+            if number == signal.SIGINT
+            else f"interrupted ({signal.Signals(number).name})"
+        )
+
+    def asked(self) -> str:
+        while (
+            not self._how and self._stdin is not None and select.select([self._stdin], [], [], 0)[0]
+        ):
+            pressed = os.read(self._stdin, 1)
+            if not pressed:
+                self._stdin = None
+            elif pressed in KEYS:
+                self._how = f"stopped with the key {KEYS[pressed]}"
+        return self._how
+
+
+@contextmanager
+def stopping() -> Iterator[Stop]:
+    """While it lasts, keys are read as they are pressed, and SIGINT, SIGTERM and SIGHUP end nothing
+    by themselves."""
+    stop = Stop(sys.stdin.fileno() if sys.stdin is not None and sys.stdin.isatty() else None)
+    before = {
+        s: signal.signal(s, stop.signalled) for s in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    }
+    try:
+        with _cbreak(stop._stdin):
+            yield stop
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def _cbreak(stdin: int | None) -> Iterator[None]:
+    if stdin is None:
+        yield
+        return
+
+    was = termios.tcgetattr(stdin)
+    try:
+        tty.setcbreak(stdin)
+        yield
+    finally:
+        with suppress(termios.error):  # the terminal may be gone
+            termios.tcsetattr(stdin, termios.TCSADRAIN, was)

@@ -1,0 +1,27 @@
+"""What a run is called wherever it is shown, so that nothing emulated can pass as measured."""
+
+from __future__ import annotations
+
+from flexura.io import Run
+
+EMULATED = "emulated: board and rig ran as programs, nothing here was measured on a physical rig"
+
+
+def kind(run: Run) -> str:
+    """ "simulation", "twin" or "experiment"."""
+    return str(run.meta.get("source") or run.meta.get("kind") or "simulation")
+
+
+def emulated(run: Run) -> bool:
+    return bool(run.meta.get("emulated"))
+
+
+def called(run: Run, which: str = "") -> str:
+    """The kind of run, `which` of two, and in brackets what a reader must know of it: emulated,
+    incomplete."""
+    notes = [
+        word
+        for word, true in (("emulated", emulated(run)), ("incomplete", not run.complete))
+        if true
+    ]
+    return kind(run) + which + (f" ({', '.join(notes)})" if notes else "")

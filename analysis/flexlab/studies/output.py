@@ -1,0 +1,218 @@
+"""What a study leaves: a table, JSON, a Parquet file of all its rows, and a figure."""
+
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+
+from flexura.io import write_bytes
+
+from .boundary import FIXED, SLIDING, WITHOUT
+from .sweep import Row, Study
+
+_HEADS = {
+    "payload_kg": "payload [g]",
+    "ratio": "L2/L1",
+    "L1_m": "L1 [mm]",
+    "L2_m": "L2 [mm]",
+    "case": "case",
+    "free_length_m": "free [mm]",
+}
+
+
+def table(study: Study) -> Table:
+    """One row a case, and the finding."""
+    out = Table(
+        title=f"{study.robot.name or 'robot'}: {study.name}; {study.about}", title_justify="left"
+    )
+    own = [key for key in study.rows[0] if key in _HEADS] if study.rows else []
+    peaks = [key for key in (study.rows[0] if study.rows else {}) if key.startswith("joint_")]
+    heads = [_HEADS[key] for key in own] + [
+        "f1 [Hz]",
+        f"largest w{study.link} [mm]",
+        f"later w{study.link} [mm]",
+    ]
+    heads += [
+        f"drive {key.split('_')[1]} [{key.split('_peak_')[1].replace('_', ' ')}]" for key in peaks
+    ]
+    for head in heads:
+        out.add_column(
+            head.replace("[", "\\["), justify="left" if head == "case" else "right", no_wrap=True
+        )
+    failures: list[str] = []
+    for row in study.rows:
+        cells = [
+            str(row[key]) if key == "case" else _number(row[key], 1.0 if key == "ratio" else 1e3)
+            for key in own
+        ]
+        if not row["complete"]:
+            cells += [_number(row.get("first_frequency_Hz", np.nan)), "[red]failed"]
+            failures.append(f"failed at {' '.join(cells[: len(own)])}: {row['error']}")
+            out.add_row(*cells, *[""] * (len(heads) - len(cells)))
+            continue
+        cells += [
+            _number(row["first_frequency_Hz"]),
+            _number(row["max_m"], 1e3),
+            _number(row["later_m"], 1e3),
+        ]
+        out.add_row(*cells, *(_number(row[key]) for key in peaks))
+    out.caption = "\n".join([*failures, verdict(study)])
+    out.caption_justify = "left"
+    return out
+
+
+def verdict(study: Study) -> str:
+    """The finding in words."""
+    said = {True: "REPRODUCED", False: "NOT reproduced", None: "cannot say"}[
+        study.finding.reproduced
+    ]
+    return f"finding: {study.finding.claim}\n{said}: {study.finding.words}"
+
+
+def numbers(study: Study) -> dict[str, Any]:
+    """For JSON: finding and rows."""
+    clean = lambda v: None if isinstance(v, float) and not np.isfinite(v) else v
+    found = study.finding
+    return {
+        "study": study.name,
+        "robot": study.robot.name,
+        "about": study.about,
+        "link": study.link,
+        "complete": study.complete,
+        "finding": {
+            "claim": found.claim,
+            "reproduced": found.reproduced,
+            "words": found.words,
+            **found.numbers,
+        },
+        "rows": [{key: clean(v) for key, v in row.items()} for row in study.rows],
+    }
+
+
+def save(study: Study, folder: Path) -> list[Path]:
+    """Write study.parquet, study.png and study.svg into `folder`, each as a whole; returns their
+    paths."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    about = {key: v for key, v in numbers(study).items() if key != "rows"} | {
+        "robot_file": study.robot.to_dict()
+    }
+    names = list(dict.fromkeys(key for row in study.rows for key in row))
+    columns = {name: [row.get(name) for row in study.rows] for name in names}
+    sink = pa.BufferOutputStream()
+    pq.write_table(
+        pa.table(columns).replace_schema_metadata({"flexura_study": json.dumps(about)}),
+        sink,
+        compression="zstd",
+    )
+    paths = [folder / f"study.{kind}" for kind in ("parquet", "png", "svg")]
+    write_bytes(paths[0], sink.getvalue().to_pybytes())
+    drawing = figure(study)
+    for path in paths[1:]:
+        buffer = io.BytesIO()
+        drawing.savefig(buffer, format=path.suffix[1:], dpi=150)
+        write_bytes(path, buffer.getvalue())
+    return paths
+
+
+def figure(study: Study) -> Any:
+    """The study's figure, a matplotlib Figure: the deflection over what was varied."""
+    from matplotlib.figure import Figure
+
+    drawing = Figure(figsize=(7.5, 5), layout="constrained")
+    axes = drawing.subplots()
+    rows = [row for row in study.rows if row["complete"]]
+    {"payload": _payload, "length-ratio": _length_ratio, "boundary": _boundary}[study.name](
+        axes, rows, study
+    )
+    axes.set_ylabel(f"tip deflection of link {study.link} [mm]")
+    axes.set_ylim(bottom=0)
+    axes.grid(alpha=0.3)
+    axes.legend(frameon=False, loc="upper center" if study.name == "length-ratio" else "best")
+    axes.set_title(
+        "\n".join([study.robot.name, *study.about.split("; ")]), fontsize="medium", loc="left"
+    )
+    return drawing
+
+
+def _payload(axes: Any, rows: list[Row], study: Study) -> None:
+    x = _column(rows, "payload_kg")
+    axes.plot(x, _column(rows, "max_m"), "o-", color="C0", markersize=4, label="largest")
+    later = _column(rows, "later_m")
+    if np.isfinite(later).any():
+        axes.plot(x, later, "s-", color="C1", markersize=4, label="largest after the drives")
+    found = study.finding.numbers
+    if found:
+        axes.axvspan(
+            1e3 * found["from_kg"],
+            1e3 * found["to_kg"],
+            color="C0",
+            alpha=0.12,
+            label="within 10 % of the least",
+        )
+    axes.set_xlabel("payload [g]")
+
+
+def _length_ratio(axes: Any, rows: list[Row], study: Study) -> None:
+    x = [row["ratio"] for row in rows]
+    axes.plot(x, _column(rows, "max_m"), "o-", color="C0", markersize=4, label="largest")
+    axes.plot(
+        x,
+        _column(rows, "later_m"),
+        "s-",
+        color="C1",
+        markersize=4,
+        label="largest in the second half",
+    )
+    axes.axvline(1.0, color="0.5", linewidth=1)
+    axes.set_xscale("log")
+    ticks = [t for t in (0.1, 0.25, 0.5, 1, 2, 4, 10) if x and x[0] <= t <= x[-1]]
+    axes.set_xticks(ticks, [f"{t:g}" for t in ticks])
+    axes.minorticks_off()
+    axes.set_xlabel("L2 / L1")
+    other = axes.twinx()
+    other.plot(x, [row["first_frequency_Hz"] for row in rows], ":", color="0.4")
+    other.set_ylim(bottom=0)
+    other.set_ylabel("first frequency, joints locked [Hz] (dotted)", color="0.4")
+
+
+def _boundary(axes: Any, rows: list[Row], study: Study) -> None:
+    fixed = [row for row in rows if row["case"] in (FIXED, WITHOUT)]
+    axes.plot(
+        _column(fixed, "free_length_m"),
+        _column(fixed, "later_m"),
+        "o-",
+        color="C0",
+        markersize=4,
+        label="fixed free length",
+    )
+    for name, mark, colour in ((SLIDING, "D", "C1"), (WITHOUT, "s", "C3")):
+        one = [row for row in rows if row["case"] == name]
+        axes.plot(
+            _column(one, "free_length_m"),
+            _column(one, "later_m"),
+            mark,
+            color=colour,
+            markersize=8,
+            label=f"{name}",
+        )
+        for row in one:
+            at = (1e3 * row["free_length_m"], 1e3 * row["later_m"])
+            axes.annotate(
+                f"{at[1]:.3g} mm", at, xytext=(-8, 4), textcoords="offset points", ha="right"
+            )
+    axes.set_xlabel("free length [mm] (sliding: its mean)")
+
+
+def _column(rows: list[Row], key: str) -> np.ndarray:
+    return 1e3 * np.array([row[key] for row in rows], dtype=float)
+
+
+def _number(value: float, factor: float = 1.0) -> str:
+    return f"{factor * value:.4g}" if np.isfinite(value) else "-"

@@ -1,0 +1,190 @@
+"""Which settings of a controller are free, between what bounds, and how a point of the unit cube
+becomes gains.
+
+[free] kp_1_V_m = [100, 20000]                                    # both of one sign: on a
+logarithmic scale kg_2_rad_m = { low = -2, high = 2, scale = "linear" }      # through 0: linear
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import flexura as fx
+from flexura.control import (
+    DEFLECTION,
+    DERIVATIVE,
+    GAINS,
+    LIMIT,
+    NAMES,
+    SETPOINT,
+    SLEW,
+    Gains,
+    smoothing,
+)
+from flexura.errors import InputError
+from flexura.io import read_toml
+from flexura.signals import finite
+
+COLUMNS = {name: k for k, name in enumerate(GAINS)} | {
+    "limit": LIMIT,
+    "slew": SLEW,
+    "setpoint_Hz": SETPOINT,
+}
+_FILTERS = {"derivative_Hz": DERIVATIVE, "deflection_Hz": DEFLECTION}  # of all joints
+SCALES = ("log", "linear")
+
+
+@dataclass(frozen=True)
+class Free:
+    """One free setting, by its name in a gains file, with its bounds in the file's unit."""
+
+    name: str
+    low: float
+    high: float
+    scale: str
+
+    def value(self, u: np.ndarray) -> np.ndarray:
+        """The setting at places u between 0 and 1: low + (high - low) u, or low (high / low)^u."""
+        u = np.clip(u, 0.0, 1.0)
+        if self.scale == "linear":
+            return self.low + (self.high - self.low) * u
+        return self.low * (self.high / self.low) ** u
+
+    def place(self, value: float) -> float:
+        """Where a setting's value is between its bounds, 0 to 1; the nearer bound where it is
+        outside."""
+        if self.scale == "linear":
+            return float(np.clip((value - self.low) / (self.high - self.low), 0.0, 1.0))
+        ratio = value / self.low
+        return (
+            0.0
+            if ratio <= 0
+            else float(np.clip(np.log(ratio) / np.log(self.high / self.low), 0.0, 1.0))
+        )
+
+
+def free(name: str, low: Any, high: Any, scale: str | None = None) -> Free:
+    """A free setting; by default on a logarithmic scale unless its bounds have 0 between them.
+    Raises InputError."""
+    if name not in NAMES and name not in _FILTERS:
+        expected = "expected a setting of a gains file, see firmware/README.md, the controller"
+        raise InputError(expected, key=f"free.{name}", value=name)
+    if not (finite(low) and finite(high) and low < high):
+        raise InputError(
+            "expected two finite numbers, LOW below HIGH", key=f"free.{name}", value=[low, high]
+        )
+    if scale not in (None, *SCALES):
+        raise InputError("expected log or linear", key=f"free.{name}.scale", value=scale)
+    if scale == "log" and low * high <= 0:
+        expected = "expected bounds of one sign and without 0 for a logarithmic scale"
+        raise InputError(expected, key=f"free.{name}", value=[low, high])
+    if any(field in ("delay_s", "encoder") for _, _, field in NAMES.get(name, ())):
+        raise InputError("expected a gain, a limit or a filter", key=f"free.{name}", value=name)
+    return Free(name, float(low), float(high), scale or ("log" if low * high > 0 else "linear"))
+
+
+def read(path: Path) -> list[Free]:
+    """The table [free] of a TOML file."""
+    data = read_toml(path)
+    try:
+        for key in data:
+            if key != "free":
+                raise InputError("an unknown key; known here: free", key=key, value=data[key])
+        table = data.get("free")
+        if not isinstance(table, dict) or not table:
+            raise InputError("missing: expected a table [free] of bounds", key="free", value=table)
+        return [_entry(name, entry) for name, entry in table.items()]
+    except InputError as error:
+        raise error.in_file(str(path)) from None
+
+
+def _entry(name: str, entry: Any) -> Free:
+    if isinstance(entry, list) and len(entry) == 2:
+        return free(name, entry[0], entry[1])
+    if isinstance(entry, dict) and {"low", "high"} <= set(entry) <= {"low", "high", "scale"}:
+        return free(name, entry["low"], entry["high"], entry.get("scale"))
+    expected = "expected [low, high] or { low, high, scale }"
+    raise InputError(expected, key=f"free.{name}", value=entry)
+
+
+def from_flag(text: str) -> Free:
+    """NAME=LOW:HIGH of the command line."""
+    name, _, bounds = text.partition("=")
+    try:
+        low, high = map(float, bounds.split(":"))
+    except ValueError:
+        raise InputError(
+            "expected NAME=LOW:HIGH, for example kp_1_V_m=100:20000", key="--free", value=text
+        ) from None
+    return free(name.strip(), low, high)
+
+
+def usual(gains: Gains) -> list[Free]:
+    """Without a word: every gain of the file that isn't 0, from a tenth to ten times its value."""
+    out = []
+    for name, value in gains.settings.items():
+        if value != 0.0 and name in NAMES and NAMES[name][0][2] in GAINS:
+            out.append(free(name, min(value / 10, value * 10), max(value / 10, value * 10)))
+    return out
+
+
+def settings(frees: Sequence[Free], points: np.ndarray) -> np.ndarray:
+    """Values (B, d) of the free settings at points (B, d) of the unit cube."""
+    return np.column_stack([f.value(points[:, k]) for k, f in enumerate(frees)])
+
+
+def named(frees: Sequence[Free], values: np.ndarray) -> dict[str, float]:
+    return {f.name: float(v) for f, v in zip(frees, values, strict=True)}
+
+
+def rows(
+    frees: Sequence[Free], values: np.ndarray, controller: fx.Controller, base: np.ndarray
+) -> np.ndarray:
+    """`Controller.gains` (B, N, 20) of values (B, d): those of `controller`, `base` (N, 20), but
+    for the free settings."""
+    out, period = np.repeat(base[None], len(values), axis=0), 1 / controller.rate_Hz
+    for k, f in enumerate(frees):
+        column = values[:, k]
+        if f.name in _FILTERS:
+            smooth = [
+                smoothing(v, period * (2 if f.name == "deflection_Hz" else 1)) for v in column
+            ]
+            out[:, :, _FILTERS[f.name]] = np.array(smooth)[:, None]
+            continue
+        i, _, field = NAMES[f.name][0]
+        out[:, i, COLUMNS[field]] = (
+            [smoothing(v, period) for v in column] if field == "setpoint_Hz" else column
+        )
+    return out
+
+
+def check(frees: Sequence[Free], gains: Gains) -> None:
+    """Raises InputError for a free setting that isn't one of this controller's joints and outputs,
+    or is there twice."""
+    kinds = gains.kinds
+    if not frees:
+        raise InputError("expected at least one free setting", key="free")
+    for k, f in enumerate(frees):
+        known = f.name in _FILTERS or any(
+            i < len(kinds) and kind in ("", kinds[i]) for i, kind, _ in NAMES[f.name]
+        )
+        if not known:
+            expected = f"expected a setting of joints whose outputs are {', '.join(kinds)}"
+            raise InputError(expected, key=f"free.{f.name}", value=f.name)
+        if f.name in [other.name for other in frees[:k]]:
+            raise InputError("expected each setting once", key=f"free.{f.name}", value=f.name)
+        if f.low <= 0 and (
+            f.name in _FILTERS
+            or any(field in ("limit", "slew", "setpoint_Hz") for _, _, field in NAMES[f.name])
+        ):
+            raise InputError("expected bounds above 0", key=f"free.{f.name}", value=[f.low, f.high])
+
+
+def spec(frees: Sequence[Free]) -> Mapping[str, Any]:
+    """As the table [free] of a file."""
+    return {f.name: {"low": f.low, "high": f.high, "scale": f.scale} for f in frees}

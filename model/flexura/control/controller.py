@@ -1,0 +1,357 @@
+"""Sampled controllers as drives: one law for the model, the emulated board and the board
+(firmware/README.md).
+
+The law of one joint, with T the tick, e = r - q, w the tip deflection and s the tip slope (12):
+
+    u = kp e + ki sum(e) T + kd (r' - q') + kf w + kg w' + ks s + kt s' + kv r' + kc sign r' + f(t)
+
+r: the reference through a first-order filter; r': its change / T; q': the filtered change of q / T,
+and of a stepper that counts its own pulses u of the tick before; w, s: the mean of two ticks, every
+second tick, through a filter of their own, w' its change / 2T; joint i takes them in ticks k with k
+mod 2 = i mod 2 (i from 0). |u| <= limit, and changes by at most slew T a tick. The sum's part of u
+stays within the limit, and stands still while limit or slew holds u back and e pushes it further.
+Filters: y += a (x - y), a = 1 - exp(-2 pi f T). u becomes a force, or a stepper's rate, after a
+whole number of ticks. The board's library (firmware/lib/control) computes it, in integers there and
+in floating point in the core.
+
+    carriage = fx.PID(step(0.1), fx.Motor(force_per_V=13.1, damping=1180.0), kp=2000, ki=4000,
+    limit=12) drive = fx.Controller((carriage, fx.PID(step(0.7), kp=6, kd=0.2))) run =
+    fx.simulate(system, t_eval, drive)
+
+The Run has `joint/i/reference` besides, and `joint/i/voltage` of a motor, `joint/i/pulses` of a
+stepper.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from .. import core, signals
+from ..errors import InputError
+from ..io import Run
+from ..signals import Drive, JointDrive, Signal
+from ..system import System
+
+NONE, EFFORT, STEPPER = (
+    0,
+    1,
+    2,
+)  # what a joint's output is: not the controller's, a force or voltage, a rate
+(
+    KP,
+    KI,
+    KD,
+    KF,
+    KG,
+    KS,
+    KT,
+    KV,
+    KC,
+    LIMIT,
+    SLEW,
+    FORCE,
+    SETPOINT,
+    DERIVATIVE,
+    DEFLECTION,
+    COUNT,
+    DUTY,
+    ENCODER,
+    RIGID,
+    DELAY,
+) = range(20)  # columns of `Controller.gains`, as Gain of model/core/controller.hpp counts them
+
+
+@dataclass(frozen=True)
+class Force:
+    """The law's output is the joint's force or torque itself [N or N m]."""
+
+
+@dataclass(frozen=True)
+class Motor:
+    """The output is a DC motor's voltage u: force = force_per_V u - damping eta'.
+
+    With torque constant k, resistance R, back-EMF constant ke and a transmission of i rad per m or
+    rad: force_per_V = k i / R, damping = k ke i^2 / R + friction; the inductance is left out. The
+    rotor's inertia is the robot file's `rotor_inertia`.
+    """
+
+    force_per_V: float
+    damping: float
+
+
+@dataclass(frozen=True)
+class Stepper:
+    """The output is a stepper's rate: the pulses' place is its integral, and the joint follows that
+    place.
+
+    `stiffness` [N m/rad or N/m] and `damping` of the magnetic spring between them; without a
+    stiffness the joint is held to the pulses, whose rate then changes evenly over a tick. The law
+    counts the pulses (the firmware's `feedback_2` = 0), or with `encoder` measures the joint. Lost
+    steps are not in it.
+    """
+
+    stiffness: float | None = None
+    damping: float = 0.0
+    encoder: bool = False
+
+
+Output = Force | Motor | Stepper
+
+
+@dataclass(frozen=True)
+class PID:
+    """One joint's law; gains in units of its output (N, N m, V, rad/s or m/s) per m or rad, s, as
+    the formula above says.
+
+    `reference` [m or rad] through a filter of `setpoint_Hz` (0: none), `feedforward` [units of the
+    output], `derivative_Hz` (0: none) for the measured velocity. `limit`, `slew` (per second) of
+    the output. `delay_s`, a whole number of ticks, from measurement to output. `count`: the
+    encoder's resolution [m or rad], `duty`: that of the output; 0: exact.
+    """
+
+    reference: Signal
+    output: Output = Force()
+    kp: float = 0.0
+    ki: float = 0.0
+    kd: float = 0.0
+    kf: float = 0.0
+    kg: float = 0.0
+    ks: float = 0.0
+    kt: float = 0.0
+    kv: float = 0.0
+    kc: float = 0.0
+    limit: float = math.inf
+    slew: float = math.inf
+    setpoint_Hz: float = 0.0
+    derivative_Hz: float = 50.0
+    feedforward: Signal | None = None
+    delay_s: float = 0.0
+    count: float = 0.0
+    duty: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in GAINS:
+            if not math.isfinite(getattr(self, name)):
+                raise InputError("expected a finite gain", key=name, value=getattr(self, name))
+        for name in ("setpoint_Hz", "derivative_Hz", "delay_s", "count", "duty"):
+            if not 0 <= getattr(self, name) < math.inf:
+                raise InputError(
+                    "expected a finite number of 0 or more", key=name, value=getattr(self, name)
+                )
+        for name in ("limit", "slew"):
+            if not getattr(self, name) > 0:
+                raise InputError("expected a number above 0", key=name, value=getattr(self, name))
+
+    @property
+    def prescribed(self) -> bool:
+        """Is the joint held to the pulses of its stepper?"""
+        return isinstance(self.output, Stepper) and self.output.stiffness is None
+
+    def one_sensor(self, length: float) -> PID:
+        """The same law for a strip of that free length [m] whose deflection alone is measured, as
+        on the rig: w'(L) is taken as 3 w(L) / (2 L), a cantilever's that its tip loads."""
+        per_m = 1.5 / length
+        return replace(
+            self, kf=self.kf + self.ks * per_m, kg=self.kg + self.kt * per_m, ks=0.0, kt=0.0
+        )
+
+    def spec(self) -> dict[str, Any]:
+        """What it is, for a Run's metadata; without what is infinite."""
+        plain = {f.name: getattr(self, f.name) for f in fields(self) if f.type == "float"}
+        out = {name: value for name, value in plain.items() if math.isfinite(value)}
+        out |= {
+            "reference": self.reference.spec,
+            "output": {"kind": type(self.output).__name__.lower(), **asdict(self.output)},
+        }
+        return out | ({"feedforward": self.feedforward.spec} if self.feedforward else {})
+
+
+GAINS = ("kp", "ki", "kd", "kf", "kg", "ks", "kt", "kv", "kc")
+
+
+@dataclass(frozen=True)
+class Linear:
+    """A linear law in place of the PID's terms, as `lqr.lqr` makes it.
+
+    z^ = z + L (y - C z), u = hold - K z^ + Kr r + Kv r' + f(t), limited as a PID's; z of the next
+    tick = F z^ + G (u - hold) with the u that the limits left. y: positions and deflection, less
+    `offset`.
+    """
+
+    F: np.ndarray
+    G: np.ndarray
+    L: np.ndarray
+    C: np.ndarray
+    K: np.ndarray
+    Kr: np.ndarray
+    Kv: np.ndarray
+    offset: np.ndarray
+    hold: np.ndarray
+
+
+@dataclass(frozen=True)
+class Controller:
+    """A sampled controller of all joints, one `PID` (or, left to itself, one `JointDrive`) a joint.
+
+    It measures and computes at t_eval[0] + k / rate_Hz and holds its outputs between. The tip
+    deflection is that of the last flexible link, filtered by `deflection_Hz` (0: none), in steps of
+    `deflection_quantum_m` (0: exact).
+    """
+
+    joints: tuple[PID | JointDrive, ...]
+    rate_Hz: float = 1000.0
+    deflection_Hz: float = 50.0
+    deflection_quantum_m: float = 0.0
+    linear: Linear | None = None
+
+    def __post_init__(self) -> None:
+        if not 0 < self.rate_Hz < math.inf:
+            raise InputError("expected a rate above 0 in hertz", key="rate_Hz", value=self.rate_Hz)
+        for name in ("deflection_Hz", "deflection_quantum_m"):
+            if not 0 <= getattr(self, name) < math.inf:
+                raise InputError(
+                    "expected a finite number of 0 or more", key=name, value=getattr(self, name)
+                )
+        for i, joint in enumerate(self.joints, 1):
+            late = joint.delay_s * self.rate_Hz if isinstance(joint, PID) else 0.0
+            if abs(late - round(late)) > 1e-6 or late > 10_000:
+                expected = (
+                    f"expected a whole number of ticks of {1 / self.rate_Hz:g} s, at most 10000"
+                )
+                raise InputError(expected, key=f"joint {i}: delay_s", value=late / self.rate_Hz)
+
+    @property
+    def follows(self) -> np.ndarray:
+        """Which joints are held to a motion, (N,) bool."""
+        return np.array([joint.prescribed for joint in self.joints]) & (
+            self._open().follows | self._own
+        )
+
+    @property
+    def breaks(self) -> np.ndarray:
+        """Instants at which what is not sampled isn't smooth [s]."""
+        return self._open().breaks
+
+    @property
+    def _own(self) -> np.ndarray:
+        return np.array([isinstance(joint, PID) for joint in self.joints])
+
+    def _open(self) -> Drive:
+        return Drive(
+            tuple(JointDrive() if isinstance(joint, PID) else joint for joint in self.joints)
+        )
+
+    def core_drives(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """What acts on the joints that are not this controller's: segments, ranges (N, 4) and gains
+        (N, 2) as `Drive.packed`, which joints follow their motion, and, for the core to fill in,
+        which this controller moves, (N,) each."""
+        drive = self._open()
+        return (
+            *drive.packed(),
+            drive.follows.astype(np.uint8),
+            np.zeros(len(self.joints), dtype=np.uint8),
+        )
+
+    def sampler(self, system: System) -> Any:
+        """All that the core needs of this controller on a robot: a `core.Controller`, with the
+        memory and the log of one run."""
+        index, parts = (
+            np.zeros((len(self.joints), 5), dtype=np.int64),
+            [np.zeros((0, signals.COLUMNS))],
+        )
+        springs, count = np.zeros((len(self.joints), 2)), 0
+        for i, joint in enumerate(self.joints):
+            if not isinstance(joint, PID):
+                continue
+            index[i, 0] = STEPPER if isinstance(joint.output, Stepper) else EFFORT
+            for k, wave in enumerate((joint.reference, joint.feedforward)):
+                segments = parts[0] if wave is None else wave.segments
+                index[i, 1 + 2 * k : 3 + 2 * k] = count, count + len(segments)
+                count += len(segments)
+                parts.append(segments)
+            if isinstance(joint.output, Stepper):
+                springs[i] = joint.output.stiffness or 0.0, joint.output.damping
+            elif isinstance(joint.output, Motor):
+                springs[i, 1] = joint.output.damping
+        linear = (
+            []
+            if self.linear is None
+            else [np.array(getattr(self.linear, f.name), dtype=float) for f in fields(Linear)]
+        )
+        return core.Controller(
+            system.equations,
+            float(self.rate_Hz),
+            float(self.deflection_quantum_m),
+            np.concatenate(parts),
+            index,
+            self.gains(),
+            springs,
+            linear[:7],
+            linear[7:],
+        )
+
+    def gains(self) -> np.ndarray:
+        """The numbers of the law that a search may change, (N, 20): columns KP to DELAY."""
+        g = np.zeros((len(self.joints), 20))
+        for row, joint in zip(g, self.joints, strict=True):
+            row[DEFLECTION] = smoothing(self.deflection_Hz, 2 / self.rate_Hz)
+            if not isinstance(joint, PID):
+                continue
+            row[:LIMIT] = [getattr(joint, name) for name in GAINS]
+            row[LIMIT], row[SLEW] = joint.limit, joint.slew
+            row[FORCE] = joint.output.force_per_V if isinstance(joint.output, Motor) else 1.0
+            row[SETPOINT] = smoothing(joint.setpoint_Hz, 1 / self.rate_Hz)
+            row[DERIVATIVE] = smoothing(joint.derivative_Hz, 1 / self.rate_Hz)
+            row[COUNT], row[DUTY], row[DELAY] = (
+                joint.count,
+                joint.duty,
+                round(joint.delay_s * self.rate_Hz),
+            )
+            row[RIGID] = joint.prescribed
+            row[ENCODER] = isinstance(joint.output, Stepper) and joint.output.encoder
+        return g
+
+    def recorded(self, run: Run, sampler: Any) -> Run:
+        """A Run with the law's own channels besides, joint/i/reference, joint/i/voltage and
+        joint/i/pulses, from the log of the `sampler` that ran in it."""
+        log, start = np.asarray(sampler.log), float(run.t[0]) if len(run.t) else 0.0
+        if len(log) == 0:  # no tick in it: a run of one instant
+            log = np.zeros((1, len(self.joints), 6))
+        k = np.clip(np.floor((run.t - start) * self.rate_Hz + 1e-6).astype(int), 0, len(log) - 1)
+        s = np.maximum(run.t - (start + k / self.rate_Hz), 0.0)
+        channels, units = dict(run.channels), dict(run.units)
+        for i, joint in enumerate(self.joints):
+            if not isinstance(joint, PID):
+                continue
+            row, unit = log[k, i], run.units[f"joint/{i + 1}/position"]
+            channels[f"joint/{i + 1}/reference"], units[f"joint/{i + 1}/reference"] = (
+                row[:, 0],
+                unit,
+            )
+            if isinstance(joint.output, Motor):
+                channels[f"joint/{i + 1}/voltage"], units[f"joint/{i + 1}/voltage"] = row[:, 1], "V"
+            elif isinstance(joint.output, Stepper):
+                place = row[:, 2] + s * (row[:, 3] + s * row[:, 4])
+                channels[f"joint/{i + 1}/pulses"], units[f"joint/{i + 1}/pulses"] = place, unit
+        return replace(run, channels=channels, units=units)
+
+    def spec(self) -> dict[str, Any]:
+        """What it is, for a Run's metadata."""
+        own = {
+            "rate_Hz": self.rate_Hz,
+            "deflection_Hz": self.deflection_Hz,
+            "deflection_quantum_m": self.deflection_quantum_m,
+        }
+        return own | {
+            "law": "PID" if self.linear is None else "linear",
+            "joint": [joint.spec() for joint in self.joints],
+        }
+
+
+def smoothing(frequency_Hz: float, period_s: float) -> float:
+    """a of y += a (x - y): 1 - exp(-2 pi f T); 1, no filter, for f = 0."""
+    return 1.0 if frequency_Hz == 0 else -math.expm1(-2 * math.pi * frequency_Hz * period_s)

@@ -1,0 +1,331 @@
+"""The gains file: a table `[controller]` of settings by their firmware names, with units, shared by
+model, board and tuning.
+
+    [controller]
+    kp_1_V_m = 2000.0          # joint 1 on a motor: u in V
+    ki_1_V_m_s = 4000.0
+    voltage_max_V = 12.0
+    kp_2_1_s = 20.0            # joint 2 on a stepper: u in rad/s
+    rate_max_2_rad_s = 6.0
+
+    [[output]]                 # of joint 1, for the model only; the board has it. One table a
+    joint, or none at all kind = "motor" force_per_V = 13.1         # N damping = 1180.0           #
+    N s/m
+
+A name says its joint and, by its units, what the output is: V, rad/s, and in the model only N or N
+m (`kp_1_N_m_rad`). The terms are those of `control.py`.
+"""
+
+from __future__ import annotations
+
+import difflib
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+from ..errors import InputError
+from ..io import read_toml, write_toml
+from ..signals import Signal, constant, finite
+from .controller import PID, Controller, Force, Motor, Output, Stepper
+
+MAX_JOINTS = 9
+# names of PID's fields, {} the joint's number, by output
+_ENDS = {
+    "motor": {
+        "kp": "kp_{}_V_m",
+        "ki": "ki_{}_V_m_s",
+        "kd": "kd_{}_V_s_m",
+        "kf": "kf_{}_V_m",
+        "kg": "kg_{}_V_s_m",
+        "ks": "ks_{}_V_rad",
+        "kt": "kt_{}_V_s_rad",
+        "kv": "kv_{}_V_s_m",
+        "kc": "kc_{}_V",
+        "limit": "voltage_max_{}_V",
+        "slew": "voltage_slew_{}_V_s",
+    },
+    "stepper": {
+        "kp": "kp_{}_1_s",
+        "ki": "ki_{}_1_s2",
+        "kd": "kd_{}",
+        "kf": "kf_{}_rad_s_m",
+        "kg": "kg_{}_rad_m",
+        "ks": "ks_{}_1_s",
+        "kt": "kt_{}",
+        "kv": "kv_{}",
+        "limit": "rate_max_{}_rad_s",
+        "slew": "acceleration_max_{}_rad_s2",
+    },
+    "force": {
+        "kp": "kp_{}_N_m",
+        "ki": "ki_{}_N_m_s",
+        "kd": "kd_{}_N_s_m",
+        "kf": "kf_{}_N_m",
+        "kg": "kg_{}_N_s_m",
+        "ks": "ks_{}_N_rad",
+        "kt": "kt_{}_N_s_rad",
+        "kv": "kv_{}_N_s_m",
+        "kc": "kc_{}_N",
+        "limit": "force_max_{}_N",
+        "slew": "force_slew_{}_N_s",
+    },
+    "torque": {
+        "kp": "kp_{}_N_m_rad",
+        "ki": "ki_{}_N_m_rad_s",
+        "kd": "kd_{}_N_m_s_rad",
+        "kf": "kf_{}_N_m_m",
+        "kg": "kg_{}_N_m_s_m",
+        "ks": "ks_{}_N_m_rad",
+        "kt": "kt_{}_N_m_s_rad",
+        "kv": "kv_{}_N_m_s_rad",
+        "kc": "kc_{}_N_m",
+        "limit": "torque_max_{}_N_m",
+        "slew": "torque_slew_{}_N_m_s",
+    },
+}
+_ANY = {"setpoint_Hz": "setpoint_{}_Hz", "delay_s": "delay_{}_s"}
+_BOARDS = {
+    "voltage_max_V": "voltage_max_1_V",
+    "voltage_slew_V_s": "voltage_slew_1_V_s",
+}  # the board has one motor
+_SHARED = ("rate_Hz", "derivative_Hz", "deflection_Hz")
+BOARD = (  # the settings of the board that are a controller's, in its order
+    "voltage_max_V",
+    "voltage_slew_V_s",
+    "rate_max_2_rad_s",
+    "acceleration_max_2_rad_s2",
+    "kp_1_V_m",
+    "ki_1_V_m_s",
+    "kd_1_V_s_m",
+    "kf_1_V_m",
+    "kg_1_V_s_m",
+    "kv_1_V_s_m",
+    "kc_1_V",
+    "kp_2_1_s",
+    "ki_2_1_s2",
+    "kd_2",
+    "kf_2_rad_s_m",
+    "kg_2_rad_m",
+    "kv_2",
+    "derivative_Hz",
+    "deflection_Hz",
+    "setpoint_1_Hz",
+    "setpoint_2_Hz",
+    "feedback_2",
+)
+_OUTPUTS = {"motor": Motor, "stepper": Stepper, "force": Force, "torque": Force}
+
+
+def _names() -> dict[str, list[tuple[int, str, str]]]:
+    """Known names: joint (from 0), output ("" any) and PID's field of each; `ks_1_N_m_rad` is a
+    torque's alone."""
+    out: dict[str, list[tuple[int, str, str]]] = {}
+    for i in range(MAX_JOINTS):
+        for kind, ends in _ENDS.items():
+            for field, name in ends.items():
+                out.setdefault(name.format(i + 1), []).append((i, kind, field))
+        for field, name in _ANY.items():
+            out[name.format(i + 1)] = [(i, "", field)]
+        out[f"feedback_{i + 1}"] = [(i, "stepper", "encoder")]
+    return out | {board: out[name] for board, name in _BOARDS.items()}
+
+
+NAMES = _names()
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Settings of a controller by name, and what stands behind its joints, () where the file does
+    not say."""
+
+    settings: dict[str, float]
+    outputs: tuple[Output, ...] = ()
+    file: str = ""
+
+    @property
+    def kinds(self) -> list[str]:
+        """Each joint's output: "motor", "stepper", "force" or "torque"."""
+        found: dict[int, set[str]] = {}
+        for name in self.settings:
+            if name not in _SHARED:
+                kinds = {kind for _, kind, _ in NAMES[name]} - {""}
+                i = NAMES[name][0][0]
+                found[i] = found.get(i, set(_ENDS)) & (kinds or set(_ENDS))
+        for i in range(max(found, default=0) + 1):
+            if len(found.get(i, ())) != 1:
+                expected = (
+                    f"expected names of joint {i + 1} with the units of one output: V, "
+                    f"rad/s, N or N m"
+                )
+                raise InputError(expected, key="controller", file=self.file)
+        return [found[i].copy().pop() for i in range(len(found))]
+
+    def controller(
+        self, references: Sequence[Signal], outputs: Sequence[Output] | None = None
+    ) -> Controller:
+        """The controller along `references` [m or rad], one a joint. `outputs` of the joints: by
+        default the file's; a force needs none, and a stepper's joint follows its pulses, one tick
+        late as on the board, unless `delay_2_s` says otherwise."""
+        kinds, rate = self.kinds, self.settings.get("rate_Hz", 1000.0)
+        if len(references) != len(kinds):
+            expected = f"expected gains of {len(references)} joints, one for each reference"
+            raise InputError(expected, key="controller", value=len(kinds), file=self.file)
+        joints = []
+        for i, (kind, reference) in enumerate(zip(kinds, references, strict=True)):
+            given: dict[str, Any] = {"delay_s": 1 / rate} if kind == "stepper" and rate > 0 else {}
+            given |= (
+                {"derivative_Hz": self.settings["derivative_Hz"]}
+                if "derivative_Hz" in self.settings
+                else {}
+            )
+            for name, value in self.settings.items():
+                if name not in _SHARED:
+                    given |= {
+                        field: value
+                        for j, own, field in NAMES[name]
+                        if j == i and own in ("", kind)
+                    }
+            encoder = given.pop("encoder", 0.0) >= 0.5
+            output = self._output(i, kind, outputs)
+            joints.append(
+                PID(reference, Stepper(output.stiffness, output.damping, encoder), **given)
+                if isinstance(output, Stepper)
+                else PID(reference, output, **given)
+            )
+        return Controller(tuple(joints), rate, self.settings.get("deflection_Hz", 50.0))
+
+    def _output(self, i: int, kind: str, outputs: Sequence[Output] | None) -> Output:
+        have = self.outputs if outputs is None else outputs
+        if kind in ("force", "torque"):
+            return Force()
+        if i < len(have) and isinstance(have[i], _OUTPUTS[kind]):
+            return have[i]
+        if kind == "stepper" and i >= len(have):
+            return Stepper()
+        raise InputError(
+            f'missing: expected a table with kind = "{kind}"',
+            key=f"output[{i + 1}]",
+            file=self.file,
+        )
+
+    def board(self) -> dict[str, float]:
+        """The board's settings in it. Raises InputError for what the board has not: terms in the
+        slope, forces, another rate."""
+        for name, value in self.settings.items():
+            if name == "rate_Hz" and value == 1000.0:
+                continue
+            if name not in BOARD and value != 0.0:
+                expected = "expected settings that the board has too"
+                raise InputError(expected, key=f"controller.{name}", value=value, file=self.file)
+        return {name: self.settings[name] for name in BOARD if name in self.settings}
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """A gains file."""
+        tables = []
+        for kind, output in zip(self.kinds, self.outputs, strict=False):
+            given = {
+                name: value
+                for name, value in vars(output).items()
+                if name != "encoder" and value is not None
+            }
+            tables.append({"kind": kind, **given})
+        write_toml(path, {"controller": self.settings} | ({"output": tables} if tables else {}))
+
+
+def from_board(values: Mapping[str, float]) -> Gains:
+    """The gains among all settings of a board."""
+    return Gains({name: float(values[name]) for name in BOARD})
+
+
+def load(path: str | os.PathLike[str]) -> Gains:
+    """Read a gains file. Raises InputError, naming file, key, value and what was expected."""
+    name = os.fspath(path)
+    data = read_toml(path)
+    try:
+        return _gains(data, name)
+    except InputError as error:
+        raise error if error.file else error.in_file(name) from None
+
+
+def _gains(data: dict[str, Any], file: str) -> Gains:
+    for key, value in data.items():
+        if key not in ("controller", "output"):
+            raise InputError("an unknown key; known here: controller, output", key=key, value=value)
+    table = data.get("controller")
+    if not isinstance(table, dict) or not table:
+        raise InputError(
+            "missing: expected a table [controller] of settings", key="controller", value=table
+        )
+    settings = {}
+    for key, value in table.items():
+        if key not in NAMES and key not in _SHARED:
+            near = difflib.get_close_matches(key, [*NAMES, *_SHARED], 1, 0.6)
+            hint = (
+                f"; did you mean {near[0]}?" if near else "; see firmware/README.md, the controller"
+            )
+            raise InputError(f"an unknown setting{hint}", key=f"controller.{key}", value=value)
+        if not finite(value):
+            raise InputError("expected a finite number", key=f"controller.{key}", value=value)
+        settings[key] = float(value)
+    tables = data.get("output", [])
+    if not isinstance(tables, list) or not all(isinstance(entry, dict) for entry in tables):
+        raise InputError("expected tables [[output]], one a joint", key="output", value=tables)
+    gains = Gains(
+        settings,
+        tuple(_read_output(entry, f"output[{i}]") for i, entry in enumerate(tables, 1)),
+        file,
+    )
+    try:
+        gains.controller([_REST] * len(gains.kinds), [o or _ANYTHING[k] for k, o in _padded(gains)])
+    except InputError as error:
+        if error.key.startswith(("output", "controller")):
+            raise
+        shown = next(
+            (
+                name
+                for name in settings
+                if any(field == error.key for _, _, field in NAMES.get(name, []))
+            ),
+            error.key,
+        )
+        raise InputError(error.expected, key=f"controller.{shown}", value=error.value) from None
+    return gains
+
+
+def _padded(gains: Gains) -> list[tuple[str, Output | None]]:
+    """Kind and output of each joint, None where the file does not say."""
+    kinds = gains.kinds
+    return list(zip(kinds, [*gains.outputs, *[None] * len(kinds)], strict=False))
+
+
+def _read_output(entry: dict[str, Any], key: str) -> Output:
+    kind = entry.get("kind")
+    if not isinstance(kind, str) or kind not in _OUTPUTS:
+        raise InputError(f"expected one of {', '.join(_OUTPUTS)}", key=f"{key}.kind", value=kind)
+    known = [f.name for f in fields(_OUTPUTS[kind]) if f.name != "encoder"]
+    for name, value in entry.items():
+        if name != "kind" and name not in known:
+            raise InputError(
+                f"an unknown key; known here: {', '.join(['kind', *known])}",
+                key=f"{key}.{name}",
+                value=value,
+            )
+        if name != "kind" and not (finite(value) and value >= 0):
+            raise InputError(
+                "expected a finite number of 0 or more", key=f"{key}.{name}", value=value
+            )
+    if kind == "motor" and not {"force_per_V", "damping"} <= set(entry):
+        raise InputError(
+            "missing: a motor has force_per_V [N or N m] and damping [N s/m or N m s/rad]", key=key
+        )
+    return _OUTPUTS[kind](**{name: float(value) for name, value in entry.items() if name != "kind"})
+
+
+_REST = constant(0.0)
+_ANYTHING: dict[str, Output] = {
+    "motor": Motor(1.0, 0.0),
+    "stepper": Stepper(),
+    "force": Force(),
+    "torque": Force(),
+}

@@ -1,0 +1,189 @@
+"""LQR on the linear model with a Kalman observer, discrete in time: the reference of what feedback
+can do.
+
+The robot about an equilibrium, its joints driven through `Force` or `Motor` outputs u held over a
+tick T:
+
+    x_k+1 = F x_k + G u_k,   y_k = C x_k,   [F G; 0 1] = exp([A B; 0 0] T)
+
+y: what the rig measures, joint positions and the deflection of the last flexible link. K and L
+minimise and come from
+
+    sum x^T Q x + u^T R u:   P = Q + F^T P (F - G K),  K = (R + G^T P G)^-1 G^T P F w ~ W, v ~ V:
+    S = F (S - S C^T (C S C^T + V)^-1 C S) F^T + W,  L = S C^T (C S C^T + V)^-1
+
+(Anderson and Moore, Optimal Control: Linear Quadratic Methods, 1990). The law is z^ = z + L (y - C
+z), u = -K (z^ - x_r), where x_r has the references at the joints and their rates; z of the next
+tick = F z^ + G u with u as the limits left it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.linalg import expm, solve_discrete_are
+
+from ..errors import InputError
+from ..system import System, linearize
+from .controller import PID, Controller, Linear, Motor, Stepper
+
+
+@dataclass(frozen=True)
+class Design:
+    """A discrete LQR with its observer: this module's matrices; x0^T P x0 is the cost, S the
+    observer's covariance.
+
+    `states`, `outputs` are names; `inputs` (m,) the joints that it drives, from 0.
+    """
+
+    F: np.ndarray
+    G: np.ndarray
+    C: np.ndarray
+    K: np.ndarray
+    L: np.ndarray
+    P: np.ndarray
+    S: np.ndarray
+    states: tuple[str, ...]
+    outputs: tuple[str, ...]
+    inputs: tuple[int, ...]
+
+    @property
+    def poles(self) -> np.ndarray:
+        """Of the closed loop F - G K, in the z plane."""
+        return np.linalg.eigvals(self.F - self.G @ self.K)
+
+    @property
+    def observer_poles(self) -> np.ndarray:
+        """Of the observer's error F (1 - L C), in the z plane."""
+        return np.linalg.eigvals(self.F @ (np.eye(len(self.F)) - self.L @ self.C))
+
+
+def lqr(
+    system: System,
+    controller: Controller,
+    effort: Any,
+    *,
+    position: Any = 1.0,
+    deflection: float = 1.0,
+    damping: float = 0.0,
+    disturbance: Any = 1.0,
+    noise: Any = 1e-4,
+    q: Any = None,
+) -> tuple[Controller, Design]:
+    """`controller` with its PIDs' terms replaced by an LQR and observer about q (default: the
+    static equilibrium at the start).
+
+    Its references, outputs, limits, slews, rate and quantisation stay. Weights by Bryson's rule:
+    `effort` (m,) of each output, `position` (N,) [m or rad], `deflection` [m] of the tips and
+    `damping` [s], what counts as much: cost (e / position)^2 + (w / deflection)^2 + (damping w' /
+    deflection)^2 + (u / effort)^2. Observer: `disturbance` (m,), the standard deviation of what
+    acts at the outputs in a tick, `noise` (N + 1,) of the measurements. Raises InputError for
+    steppers, which have no force, and where no stabilising solution exists.
+    """
+    linear, T = linearize(system, q), 1 / controller.rate_Hz
+    joints, driven = controller.joints, []
+    damp, scale = np.zeros(len(linear.M)), []
+    for i, joint in enumerate(joints):
+        if not isinstance(joint, PID) or isinstance(joint.output, Stepper):
+            raise InputError(
+                "expected a Force or a Motor: a stepper takes a rate, no force",
+                key=f"joint {i + 1}: output",
+            )
+        if f"joint/{i + 1}/drive" in linear.inputs:
+            driven.append(i)
+            motor = isinstance(joint.output, Motor)
+            scale.append(joint.output.force_per_V if isinstance(joint.output, Motor) else 1.0)
+            if motor:
+                damp += linear.E[:, len(driven) - 1] * joint.output.damping  # type: ignore[union-attr]
+    A, B = replace(linear, G=linear.G + np.diag(damp)).A, linear.B @ np.diag(scale)
+    n, m = B.shape
+    exponential = expm(np.block([[A, B], [np.zeros((m, n + m))]]) * T)
+    F, G = exponential[:n, :n], exponential[:n, n:]
+    bent = [k for k, name in enumerate(linear.outputs) if name.endswith("tip_deflection")]
+    places = [linear.outputs.index(f"joint/{i + 1}/position") for i in driven]
+    C, W = linear.C[places + bent[-1:]], linear.C[places + bent]
+    weights = np.concatenate(
+        [1 / _many(position, len(driven), "position"), np.full(len(bent), 1 / deflection)]
+    )
+    Q = (weights[:, None] * W).T @ (weights[:, None] * W)
+    rates = np.roll(W[len(driven) :], n // 2, axis=1) * damping / deflection
+    Q += rates.T @ rates
+    R = np.diag(1 / _many(effort, m, "effort") ** 2)
+    process = G @ np.diag(_many(disturbance, m, "disturbance") ** 2) @ G.T
+    V = np.diag(_many(noise, len(C), "noise") ** 2)
+    P, S = _riccati(F, G, Q, R, "effort"), _riccati(F.T, C.T, process, V, "noise")
+    K = np.linalg.solve(R + G.T @ P @ G, G.T @ P @ F)
+    L = np.linalg.solve(C @ S @ C.T + V, C @ S).T
+    design = Design(
+        F,
+        G,
+        C,
+        K,
+        L,
+        P,
+        S,
+        linear.states,
+        tuple(linear.outputs[k] for k in places + bent[-1:]),
+        tuple(driven),
+    )
+    return replace(
+        controller, linear=_linear(system, design, linear.q, linear.hold, scale, len(joints))
+    ), design
+
+
+def _riccati(F: np.ndarray, G: np.ndarray, Q: np.ndarray, R: np.ndarray, key: str) -> np.ndarray:
+    """The stabilising solution of P = Q + F^T P (F - G K). SciPy's balancing sometimes spoils its
+    reordering: then without."""
+    for balanced in (True, False):
+        try:
+            P = solve_discrete_are(F, G, Q, R, balanced=balanced)
+        except (np.linalg.LinAlgError, ValueError):
+            continue
+        if (
+            np.abs(np.linalg.eigvals(F - G @ np.linalg.solve(R + G.T @ P @ G, G.T @ P @ F))).max()
+            < 1
+        ):
+            return P
+    raise InputError(
+        "expected weights and measurements that a stabilising controller exists for", key=key
+    )
+
+
+def _linear(
+    system: System, d: Design, q: np.ndarray, hold: np.ndarray, scale: Sequence[float], joints: int
+) -> Linear:
+    """The law's matrices: all joints', zero for those that it does not drive."""
+    n, measured = len(d.F), np.zeros((joints + len(d.C) - len(d.inputs), len(d.F)))
+    G, K, Kr, Kv = (
+        np.zeros((n, joints)),
+        np.zeros((joints, n)),
+        np.zeros((joints, joints)),
+        np.zeros((joints, joints)),
+    )
+    L, offset, held = np.zeros((n, len(measured))), np.zeros(len(measured)), np.zeros(joints)
+    rows = [int(np.argmax(np.abs(row))) for row in d.C[: len(d.inputs)]]
+    for a, i in enumerate(d.inputs):
+        G[:, i], K[i], L[:, i], measured[i] = d.G[:, a], d.K[a], d.L[:, a], d.C[a]
+        held[i] = hold[i] / scale[a]
+        for b, j in enumerate(d.inputs):
+            Kr[i, j], Kv[i, j] = d.K[a, rows[b]], d.K[a, n // 2 + rows[b]]
+    offset[:joints] = q[system.joint_rows]
+    if len(measured) > joints:
+        L[:, joints], measured[joints] = d.L[:, -1], d.C[-1]
+        offset[joints] = system.places(q)[0][-1]
+    return Linear(d.F, G, L, measured, K, Kr, Kv, offset, held)
+
+
+def _many(value: Any, count: int, key: str) -> np.ndarray:
+    array = np.asarray(value, dtype=float)
+    if (
+        array.ndim > 1
+        or not np.all(np.isfinite(array))
+        or not np.all(array > 0)
+        or (array.ndim == 1 and len(array) != count)
+    ):
+        raise InputError(f"expected a number above 0, or {count} of them", key=key, value=value)
+    return np.broadcast_to(array, (count,))

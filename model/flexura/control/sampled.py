@@ -1,0 +1,86 @@
+"""Functions of the caller's own as drives: called at any time, or once a tick."""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """A Python object that is called once a tick and may have a memory.
+
+    f(t, position, velocity, tip_deflection), or f(t), is called at t = k / rate_Hz, k = 0, 1, 2,
+    ..., counted from the start of the run, each exactly once and in order of time, with the state
+    at that instant; steps that are rejected, events and an interruption change nothing of this. The
+    forces that it gives are held to the next tick. position and velocity have one entry a joint [m
+    or rad]; tip_deflection is the last flexible link's [m]. An error in f ends the run and reaches
+    the caller.
+    """
+
+    function: Callable[..., Any]
+    rate_Hz: float
+
+    def __post_init__(self) -> None:
+        if not 0 < self.rate_Hz < math.inf:
+            raise InputError("expected a rate above 0 in hertz", key="rate_Hz", value=self.rate_Hz)
+
+    def spec(self) -> dict[str, Any]:
+        """What it is, for a Run's metadata."""
+        return {
+            "function": getattr(self.function, "__name__", type(self.function).__name__),
+            "rate_Hz": self.rate_Hz,
+        }
+
+
+class DriveFunction:
+    """A drive function of (t), or of (t, position, velocity, tip_deflection), for the forces of so
+    many joints.
+
+    Raises: InputError: it takes other arguments.
+    """
+
+    def __init__(self, function: Callable[..., Any], joints: int) -> None:
+        self.function, self.joints = function, joints
+        try:
+            parameters = inspect.signature(function).parameters.values()
+        except (TypeError, ValueError):
+            parameters = ()  # type: ignore[assignment]
+        needed = [
+            p
+            for p in parameters
+            if p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD) and p.default is p.empty
+        ]
+        if len(needed) not in (1, 4):
+            expected = "expected a function of (t) or of (t, position, velocity, tip_deflection)"
+            raise InputError(expected, key="drive", value=function)
+        self.of_time = len(needed) == 1
+
+    def read(self, given: Any, t: float) -> np.ndarray:
+        """The forces (joints,) that the function has given at t. Raises: InputError: it gave
+        something else."""
+        force = np.ascontiguousarray(given, dtype=float)
+        if force.shape != (self.joints,) or not np.all(np.isfinite(force)):
+            expected = (
+                f"expected {self.joints} finite forces from the drive function at t = {t:g} s"
+            )
+            raise InputError(expected, key="drive", value=given)
+        return force
+
+    def __call__(
+        self, t: float, position: np.ndarray, velocity: np.ndarray, tip_deflection: float
+    ) -> np.ndarray:
+        """The forces (joints,) at time t [s]."""
+        return self.read(
+            self.function(t)
+            if self.of_time
+            else self.function(t, position, velocity, tip_deflection),
+            t,
+        )

@@ -1,0 +1,113 @@
+"""Figures of a controlled motion, each with one definition, from samples: computed by the core, for
+gain sweeps and Runs alike.
+
+Of joint i, with r(t) its reference before any filter, D = r(end) - q(0) the distance that it is to
+go, y = (q - q(0)) / D:
+
+    rise        time from y = 10 % to y = 90 %, both crossed for the first time [s] settling    time
+    after which |y - 1| stays within 2 % [s] overshoot   largest y - 1, not below 0 [1] error
+    |y - 1|, its mean over the last tenth of the time [1] itae        int t |r - q| dt / |D| [s^2]
+    effort      int (u / limit)^2 dt / T, u the output of the law as given; 0 where it has no limit
+    [1]
+
+and of the last flexible link, with w its tip deflection and b the instant at which the slowest
+joint has settled, at the latest a fifth of the time before the end:
+
+    peak        largest |w - w(0)| [m] residual    half of w's range from b on [m] vibration   int t
+    |w - w(end)| dt [m s^2], w(end) the mean over the last tenth: what bends the link for good
+    doesn't count rms         sqrt(int (w - w(end))^2 dt / T) [m]
+
+What never happens is NaN: the rise of a joint that doesn't arrive, settling of one that doesn't
+settle.
+
+Overshoot, ITAE and effort only grow with the samples, so that a run under way has a lower bound of
+each. So has the vibration, whatever w(end) will be: int t |w - w(end)| dt >= min_c int_0^now t |w -
+c| dt.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import core
+from ..io import Run
+
+RISE, SETTLING, OVERSHOOT, ERROR, ITAE, EFFORT = range(6)  # columns of a joint's figures
+PEAK, RESIDUAL, VIBRATION, RMS = range(4)  # of the strip's
+JOINT = ("rise_s", "settling_s", "overshoot", "error", "itae_s2", "effort")
+STRIP = ("peak_m", "residual_m", "vibration_m_s2", "rms_m")
+
+
+def joint_figures(t: np.ndarray, r: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """A joint's figures (6,), the effort 0, from samples t, r, q (T,)."""
+    return np.asarray(core.joint_figures(*_flat(t, r, q)))
+
+
+def strip_figures(t: np.ndarray, w: np.ndarray, settled: float) -> np.ndarray:
+    """The strip's figures (4,) from samples t, w (T,); `settled` [s], the slowest joint's, may be
+    NaN."""
+    return np.asarray(core.strip_figures(*_flat(t, w), settled))
+
+
+def least_vibration(t: np.ndarray, w: np.ndarray, seen: int, enough: float) -> float:
+    """What the strip's vibration comes to at least, from the first `seen` of the samples t, w (T,).
+
+    It is sought until it is above `enough`, or certain not to be.
+    """
+    return float(core.least_vibration(*_flat(t, w), seen, enough))
+
+
+def _flat(*samples: np.ndarray) -> list[np.ndarray]:
+    return [np.ascontiguousarray(x, dtype=float) for x in samples]
+
+
+@dataclass(frozen=True)
+class Response:
+    """The figures of one run: `joints` (N, 6), `strip` (4,), NaN for a robot without a flexible
+    link."""
+
+    joints: np.ndarray
+    strip: np.ndarray
+
+    def numbers(self) -> dict[str, float | None]:
+        """By name and unit, None for what never happened."""
+        clean = lambda x: float(x) if np.isfinite(x) else None
+        out = {
+            f"joint_{i}_{n}": clean(x)
+            for i, row in enumerate(self.joints, 1)
+            for n, x in zip(JOINT, row, strict=True)
+        }
+        return out | {name: clean(x) for name, x in zip(STRIP, self.strip, strict=True)}
+
+
+def of_run(
+    run: Run, references: list[np.ndarray], limits: list[float], settled: float | None = None
+) -> Response:
+    """The figures of a Run without gaps: `references` the unfiltered set-points (T,) a joint,
+    `limits` of the outputs.
+
+    `settled` [s] replaces the instant from which the residual counts, to compare two runs from the
+    same instant on.
+    """
+    joints, strip = np.full((len(references), len(JOINT)), np.nan), np.full(len(STRIP), np.nan)
+    for i, (r, limit) in enumerate(zip(references, limits, strict=True), 1):
+        joints[i - 1] = joint_figures(run.t, r, run[f"joint/{i}/position"])
+        joints[i - 1, EFFORT] = _effort(run, i, limit)
+    bent = [name for name in run if name.endswith("tip_deflection")]
+    if bent:
+        slowest = float(joints[:, SETTLING].max()) if settled is None else settled
+        strip = strip_figures(run.t, run[bent[-1]], slowest)
+    return Response(joints, strip)
+
+
+def _effort(run: Run, joint: int, limit: float) -> float:
+    """From the voltage, the rate of the pulses, or the force, whichever the run has first."""
+    if not np.isfinite(limit):
+        return 0.0
+    if f"joint/{joint}/pulses" in run:
+        u = np.gradient(run[f"joint/{joint}/pulses"], run.t)
+    else:
+        u = run[f"joint/{joint}/{'voltage' if f'joint/{joint}/voltage' in run else 'drive'}"]
+    return float(np.trapezoid((u / limit) ** 2, run.t) / (run.t[-1] - run.t[0]))

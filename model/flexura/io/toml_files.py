@@ -1,0 +1,77 @@
+"""Reading and writing TOML files: one clear error for whatever is wrong with them, and never half a
+file."""
+
+from __future__ import annotations
+
+import os
+import re
+import tempfile
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+
+MAX_BYTES = 10_000_000
+_TOO_DEEP = re.compile(
+    r"""(?:\.[ \t]*[\w"'-]+[ \t]*){300}"""
+)  # a.a.a.a...: tomllib's time and memory grow with the square
+
+
+def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """The tables of a TOML file. Raises InputError for anything that is not a readable TOML
+    file."""
+    name = os.fspath(path)
+    try:
+        with open(path, "rb") as stream:
+            raw = stream.read(MAX_BYTES + 1)
+    except FileNotFoundError:
+        raise InputError("no such file: expected the path of a TOML file", file=name) from None
+    except IsADirectoryError:
+        raise InputError("a directory: expected the path of a TOML file", file=name) from None
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"cannot be read ({getattr(error, 'strerror', None) or error}): expected a TOML file",
+            file=name,
+        ) from None
+    if len(raw) > MAX_BYTES:
+        raise InputError(f"more than {MAX_BYTES // 10**6} MB: expected a TOML file", file=name)
+    try:
+        text = raw.decode("utf-8-sig")  # some editors begin a file with a byte order mark
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"not a text (byte {error.start} is not UTF-8): expected a TOML file", file=name
+        ) from None
+    if _TOO_DEEP.search(text):
+        raise InputError("not valid TOML (nested too deeply)", file=name)
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise InputError("not valid TOML (nested too deeply)", file=name) from None
+    except ValueError as error:  # TOMLDecodeError, or a number of thousands of digits
+        raise InputError(f"not valid TOML ({error})", file=name) from None
+
+
+def write_text(path: str | os.PathLike[str], text: str) -> None:
+    """Write a file as a whole: a reader sees the old one or the new one."""
+    write_bytes(path, text.encode())
+
+
+def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
+    target = Path(path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(data)
+        os.chmod(name, 0o644)
+        os.replace(name, target)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+
+
+def write_toml(path: str | os.PathLike[str], data: dict[str, Any]) -> None:
+    import tomli_w
+
+    write_text(path, tomli_w.dumps(data))

@@ -1,0 +1,119 @@
+"""Pydantic's complaint about a file, said in the project's words: key, value, what was expected."""
+
+from __future__ import annotations
+
+import difflib
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+
+from ..errors import InputError, WrongValue
+
+
+def explain(
+    error: ValidationError, model: type[BaseModel], data: Any, file: str = ""
+) -> InputError:
+    """The first problem of `error` as an InputError; keys are counted from 1, as in
+    `link[2].length_m`."""
+    problems = [
+        problem for problem in error.errors() if _fits(problem["loc"], data)
+    ] or error.errors()
+    first = _misspelt(problems) or problems[0]
+    table: type[BaseModel] | None = model
+    keys: list[str] = []
+    expected, value, found = "", data, True
+    for part in first["loc"]:
+        if isinstance(part, int):
+            keys[-1] += f"[{part + 1}]"
+        elif table is not None and part in table.model_fields:
+            field = table.model_fields[part]
+            keys.append(part)
+            expected = field.description or expected
+            table = _table_inside(field.annotation, value, part)
+        elif first["type"] == "extra_forbidden" and part == first["loc"][-1]:
+            keys.append(str(part) or '""')
+        else:
+            continue  # a branch of a union, not a key
+        try:
+            value = value[part]
+        except (KeyError, IndexError, TypeError):
+            value, found = None, False
+    more = len(problems) - 1
+    wrong = (first.get("ctx") or {}).get("error")
+    if isinstance(wrong, WrongValue):
+        tail = wrong.key.split(".")
+        path = keys[:-1] if keys and keys[-1] == tail[0] else keys
+        return InputError(
+            _worded(wrong.expected),
+            key=".".join(path + tail),
+            value=wrong.value,
+            file=file,
+            more=more,
+        )
+    key = ".".join(keys) or "the file"
+    if first["type"] == "extra_forbidden":
+        names = list(table.model_fields) if table is not None else []
+        near = difflib.get_close_matches(keys[-1], names, 1, 0.6)
+        hint = f"did you mean {near[0]}?" if near else f"known here: {', '.join(names)}"
+        return InputError(f"an unknown key; {hint}", key=key, value=value, file=file, more=more)
+    if first["type"] == "missing":
+        return InputError(f"missing: expected {expected}", key=key, file=file, more=more)
+    if first["type"] == "too_long" and isinstance(value, list) and isinstance(value[0], dict):
+        value = len(value)
+    return InputError(
+        _worded(expected or first["msg"]),
+        key=key,
+        value=value if found else None,
+        file=file,
+        more=more,
+    )
+
+
+def _worded(expected: str) -> str:
+    return expected if expected.startswith("missing") else f"expected {expected}"
+
+
+def _misspelt(problems: list[Any]) -> Any:
+    """A missing key may be there under a wrong name, which is then the better thing to say."""
+    if problems[0]["type"] != "missing":
+        return None
+    return next(
+        (
+            p
+            for p in problems
+            if p["type"] == "extra_forbidden" and p["loc"][:-1] == problems[0]["loc"][:-1]
+        ),
+        None,
+    )
+
+
+def _fits(loc: tuple[int | str, ...], value: Any) -> bool:
+    """Where a key takes a list or something else, Pydantic says what is wrong for both: is this
+    about the one that was given?"""
+    for part in loc:
+        if isinstance(part, str) and part.startswith("list["):
+            if not isinstance(value, list):
+                return False
+            continue
+        if isinstance(part, str) and isinstance(value, list):
+            return False
+        try:
+            value = value[part]
+        except (KeyError, IndexError, TypeError):
+            continue  # a missing key, or the name of a form
+    return True
+
+
+def _table_inside(annotation: Any, value: Any, part: Any) -> type[BaseModel] | None:
+    """The model that describes a key's table, or the entries of its list."""
+    tables = _tables(annotation)
+    if len(tables) > 1:  # a table or a list of tables: look at what was given
+        given = value.get(part) if isinstance(value, dict) else None
+        return tables[-1] if isinstance(given, list) else tables[0]
+    return tables[0] if tables else None
+
+
+def _tables(annotation: Any) -> list[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [table for arg in get_args(annotation) for table in _tables(arg)]

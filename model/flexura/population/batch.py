@@ -1,0 +1,215 @@
+"""A batch: many robots of one topology with different numbers, made one at a time when they are
+needed."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Sized
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import islice
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..robot import Robot
+from ..signals import Drive
+from .rows import Rows, good, joined, one, varied
+
+Item = tuple[Robot, Drive | None]  # None: the drive that all share
+
+
+@dataclass(frozen=True)
+class Share:
+    """Some robots of a batch in their order; `first` is the number of the first, from 0.
+
+    `groups`: the numbers, from 0 within the share, of robots that have the same counts, and their
+    rows.
+    """
+
+    first: int
+    robots: Sequence[Robot]
+    drives: Sequence[Drive | None]
+    groups: list[tuple[np.ndarray, Rows]]
+
+    def __len__(self) -> int:
+        return len(self.drives)
+
+    @property
+    def digests(self) -> list[bytes]:
+        """16 bytes a robot that tell it and its drive from any other."""
+        out = [b""] * len(self)
+        exact = self.robots[0].stiffening
+        for members, rows in self.groups:
+            for j, k in enumerate(members):
+                out[k] = _digest(rows, j, exact, self.drives[k])
+        return out
+
+
+@dataclass(frozen=True)
+class Batch:
+    """`count` robots, each with its own drive or with the one that `simulate` is given; robots are
+    counted from 1 in messages.
+
+    `source` is what they come from: an iterable of Robot or (Robot, Drive), or a function (k,
+    random) of the number k from 0 and a numpy Generator of its own, which gives one: the same one
+    whatever is simulated before, elsewhere, or not at all.
+    """
+
+    source: Iterable[Any] | Callable[[int, np.random.Generator], Any]
+    count: int
+    seed: int = 0
+
+    @staticmethod
+    def of(robots: Any, count: int | None = None, seed: int = 0) -> Batch:
+        """A Batch of an iterable of Robot or (Robot, Drive), or of a function (k, random) that
+        makes the k-th.
+
+        `count` is needed where `robots` has no length. A generator is good for one simulation, a
+        list or a function for any.
+        """
+        if count is None:
+            if not isinstance(robots, Sized):
+                raise InputError("missing: expected how many robots there are", key="count")
+            count = len(robots)
+        if isinstance(count, bool) or not isinstance(count, int) or count < 1:
+            raise InputError(
+                "expected a whole number of robots, 1 or more", key="count", value=count
+            )
+        if not callable(robots) and not isinstance(robots, Iterable):
+            raise InputError(
+                "expected robots, or a function (k, random) that makes one",
+                key="robots",
+                value=robots,
+            )
+        return Batch(robots, count, seed)
+
+    @staticmethod
+    def vary(robot: Robot, changes: Mapping[str, Any]) -> Batch:
+        """The robots of `robot.replace({key: value})` along arrays of values, all of one length B:
+        {"payload.mass_kg": (B,)}."""
+        columns = {
+            key: np.atleast_1d(np.asarray(values, dtype=float)) for key, values in changes.items()
+        }
+        counts = {len(values) for values in columns.values()}
+        if len(counts) != 1:
+            raise InputError(
+                "expected one or more keys with equally many values",
+                key="changes",
+                value=sorted(counts),
+            )
+        return Batch(_Varied(robot, columns), counts.pop())
+
+    def __iter__(self) -> Iterator[Item]:
+        """The robots in their order, each checked against the first one's topology."""
+        first: tuple[Any, ...] | None = None
+        k = -1
+        for k, given in enumerate(self._given()):
+            if k >= self.count:
+                raise InputError(f"expected {self.count} robots, but there are more", key="robots")
+            robot, drive = given if isinstance(given, tuple) and len(given) == 2 else (given, None)
+            if not isinstance(robot, Robot) or not (drive is None or isinstance(drive, Drive)):
+                raise InputError(
+                    "expected a Robot or (Robot, Drive)", key=f"robots[{k + 1}]", value=given
+                )
+            shape = topology(robot)
+            first = first or shape
+            if shape != first:
+                raise InputError(
+                    "expected robots of one topology, that of the first",
+                    key=f"robots[{k + 1}]",
+                    value=shape,
+                )
+            if robot.nodal:
+                raise InputError(
+                    'expected "continuous" in a batch',
+                    key=f"robots[{k + 1}].sliding",
+                    value="nodal",
+                )
+            yield robot, drive
+        if k + 1 < self.count:
+            raise InputError(
+                f"expected {self.count} robots, but there are only {k + 1}", key="robots"
+            )
+
+    def shares(self, size: int) -> Iterator[Share]:
+        """The robots in shares of `size`; those of `vary` as rows of numbers, without making
+        them."""
+        source = self.source
+        if isinstance(source, _Varied) and source.quick:
+            for k in range(0, self.count, size):
+                part = _Varied(
+                    source.robot,
+                    {key: values[k : k + size] for key, values in source.columns.items()},
+                )
+                rows = varied(part.robot, part.columns)
+                assert rows is not None
+                yield Share(k, part, [None] * len(part), [(np.arange(len(part)), rows)])
+            return
+        items, first = iter(self), 0
+        while some := list(islice(items, size)):
+            robots = [robot for robot, _ in some]
+            yield Share(first, robots, [drive for _, drive in some], _grouped(robots))
+            first += len(some)
+
+    def _given(self) -> Iterator[Any]:
+        if callable(self.source):
+            return (
+                self.source(k, np.random.default_rng([self.seed, k])) for k in range(self.count)
+            )
+        return iter(self.source)
+
+
+def _grouped(robots: Sequence[Robot]) -> list[tuple[np.ndarray, Rows]]:
+    """The rows of robots, those of the same counts together."""
+    members: dict[bytes, list[int]] = {}
+    parts = [one(robot) for robot in robots]
+    for k, part in enumerate(parts):
+        members.setdefault(part.counts.tobytes(), []).append(k)
+    return [(np.array(group), joined([parts[k] for k in group])) for group in members.values()]
+
+
+@dataclass(frozen=True)
+class _Varied(Sequence[Robot]):
+    """A robot with values from columns of numbers, again and again; made when it is asked for."""
+
+    robot: Robot
+    columns: Mapping[str, np.ndarray]
+
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values())))
+
+    def __getitem__(self, k: Any) -> Any:
+        if not -len(self) <= k < len(self):
+            raise IndexError(k)
+        return self.robot.replace({key: float(values[k]) for key, values in self.columns.items()})
+
+    @cached_property
+    def quick(self) -> bool:
+        """Whether rows of numbers can be made without the robots."""
+        some = {key: values[:1] for key, values in self.columns.items()}
+        plain = not self.robot.nodal and good(self.robot, self.columns)
+        return plain and varied(self.robot, some) is not None
+
+
+def topology(robot: Robot) -> tuple[Any, ...]:
+    """What robots of one batch share: a tuple (joint type, elements, modes, locked) a link, and
+    whether links stiffen."""
+    return robot.stiffening, *(
+        (k.joint.type, k.elements, k.modes, k.joint.locked) for k in robot.links
+    )
+
+
+def digest(robot: Robot, drive: Drive | None) -> bytes:
+    """16 bytes that tell this robot and drive from any other: of all numbers, to the last bit."""
+    return _digest(one(robot), 0, robot.stiffening, drive)
+
+
+def _digest(rows: Rows, k: int, stiffening: bool, drive: Drive | None) -> bytes:
+    found = hashlib.blake2b(rows.contents(k) + bytes([stiffening]), digest_size=16)
+    if drive is not None:
+        segments, ranges, gains = drive.packed()
+        for array in (segments, ranges, gains, drive.follows):
+            found.update(np.ascontiguousarray(array).tobytes())
+    return found.digest()

@@ -1,0 +1,182 @@
+"""Populations: a batch of robots simulated chunk by chunk, in bounded memory, on all cores or a
+cluster, and restartable."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import closing
+from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import core
+from ..errors import InputError
+from ..signals import Drive
+from ..simulation.recorder import channel_units
+from . import dask_cluster, worker
+from .batch import Batch, Share
+from .request import Request
+from .store import Chunk, Store, in_memory
+
+
+@dataclass(frozen=True)
+class Population:
+    """A simulated batch: `t` (T,) [s], units of the channels, whether all `count` robots are
+    `complete`, and their chunks.
+
+    `population["tip/x"]` is (count, T), a reduced number (count,), `population.status` (count,) of
+    "done", "limit", "stuck" or "refused" (a robot that cannot be assembled or starts outside its
+    limits); a robot's values are NaN from where it stopped. Of an interrupted population only the
+    robots that are done have rows: `population.robots`, counted from 0.
+    """
+
+    t: np.ndarray
+    units: Mapping[str, str]
+    count: int
+    complete: bool
+    store: Store
+
+    def __iter__(self) -> Iterator[Chunk]:
+        """The chunks that are done, in order, one in memory at a time."""
+        return self.store.chunks()
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        parts = [(chunk.values.get(name), len(chunk)) for chunk in self]
+        known = next((values for values, _ in parts if values is not None), None)
+        if known is None:
+            raise KeyError(f"no {name!r} was kept")
+        nothing = lambda rows: np.full(
+            (rows, *known.shape[1:]), np.nan
+        )  # a chunk of refused robots has no reduced numbers
+        return np.concatenate(
+            [nothing(rows) if values is None else values for values, rows in parts]
+        )
+
+    @property
+    def robots(self) -> np.ndarray:
+        return np.concatenate(
+            [np.arange(c.first, c.first + len(c)) for c in self] or [np.zeros(0, dtype=int)]
+        )
+
+    @property
+    def status(self) -> np.ndarray:
+        return np.concatenate([c.status for c in self] or [np.zeros(0, dtype=str)])
+
+
+def simulate(
+    batch: Batch,
+    t_eval: Any,
+    drive: Drive | None = None,
+    q0: Any = None,
+    qd0: Any = None,
+    rtol: float = 1e-6,
+    *,
+    method: str = "auto",
+    numerical_damping: bool = True,
+    progress: Callable[[float], None] | None = None,
+    channels: Sequence[str] | None = None,
+    reduce: Callable[[np.ndarray, dict[str, np.ndarray]], Any] | None = None,
+    folder: str | Path | None = None,
+    chunk: int = 256,
+    threads: int | None = None,
+    scheduler: str | None = None,
+) -> Population:
+    """Simulate every robot of the batch as `simulate` does one, to the last bit.
+
+    `drive`, `q0`, `qd0` (n,) hold for robots without a drive of their own, and for all. `channels`
+    are kept, by default joint positions and tip deflections; with `reduce(t, channels) -> number or
+    {name: number}` only these numbers are. `folder`: a Parquet file each `chunk` robots, written as
+    a whole or not at all; the same call goes on where it was stopped, by Ctrl-C or by force, and
+    one that asks for something else is refused by name. `threads`: by default one a core.
+    `scheduler`: the address of a Dask scheduler, whose workers then do the chunks. Raises
+    InputError for wrong arguments; a robot that fails ends alone.
+    """
+    request = Request.checked(
+        t_eval, drive, q0, qd0, rtol, method, numerical_damping, channels, reduce
+    )
+    for key, value in (("chunk", chunk), ("threads", 1 if threads is None else threads)):
+        if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+            raise InputError("expected a whole number, 1 or more", key=key, value=value)
+    store, units, complete, done = in_memory(), {}, False, 0
+    shares = batch.shares(chunk)
+    try:
+        first = next(shares)
+        example = first.robots[0]
+        request = request.fitted(example)
+        units = (
+            {}
+            if request.reduce
+            else {k: v for k, v in channel_units(example).items() if k in request.channels}
+        )
+        store = (
+            in_memory()
+            if folder is None
+            else Store.opened(folder, request.spec() | {"count": batch.count, "chunk": chunk})
+        )
+        todo = _todo(chain([first], shares), store)
+        source = (
+            _local(request, todo, threads or worker.cores())
+            if scheduler is None
+            else dask_cluster.run(request, todo, scheduler)
+        )
+        with closing(source) as chunks:
+            for made in chunks:
+                if isinstance(made, Chunk):
+                    store.put(made)
+                done += len(made)
+                if progress is not None:
+                    progress(done / batch.count)
+        complete = True
+    except KeyboardInterrupt:
+        pass
+    return Population(request.t, units, batch.count, complete, store)
+
+
+def _todo(shares: Iterator[Share], store: Store) -> Iterator[worker.Work | range]:
+    """Chunks to be done: robots and their digests, which only a folder needs; a range stands for
+    one that the store has."""
+    for share in shares:
+        digests = [b""] * len(share) if store.folder is None else share.digests
+        if store.has(share.first, digests):
+            yield range(len(share))
+        else:
+            yield share, digests
+
+
+def _local(
+    request: Request, todo: Iterator[worker.Work | range], threads: int
+) -> Generator[Chunk | range, None, None]:
+    """The chunks, each worked on by all threads of the core; the rows of the next one are made here
+    meanwhile."""
+    watch = core.Watch()
+    waiting: deque[tuple[worker.Work | range, Future[worker.Part] | None]] = deque()
+
+    def finished() -> Chunk | range:
+        work, part = waiting.popleft()
+        if isinstance(work, range):
+            return work
+        assert part is not None
+        return worker.chunk_of(request, *work, part.result())
+
+    with ThreadPoolExecutor(1) as pool:
+        try:
+            for work in todo:
+                part = (
+                    None
+                    if isinstance(work, range)
+                    else pool.submit(worker.simulated, request, work[0], threads, watch)
+                )
+                waiting.append((work, part))
+                if len(waiting) > 2:
+                    yield finished()
+            while waiting:
+                yield finished()
+        except BaseException:
+            watch.stop()
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise

@@ -1,0 +1,170 @@
+"""What a population is asked for, the same for all its robots; and how one request is told from
+another."""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from types import CodeType
+from typing import Any
+
+import numpy as np
+
+from .. import core
+from ..errors import InputError
+from ..robot import Robot
+from ..signals import Drive
+from ..simulation.problem import check_request
+from ..simulation.recorder import channel_units
+from ..system.structure import structure
+
+
+@dataclass(frozen=True)
+class Request:
+    """Times (T,) [s], the shared drive and start, tolerance and method, and what is kept: channels,
+    or a function of them."""
+
+    t: np.ndarray
+    drive: Drive | None
+    q0: np.ndarray | None
+    qd0: np.ndarray | None
+    rtol: float
+    method: str
+    numerical_damping: bool
+    channels: tuple[str, ...]
+    reduce: Callable[[np.ndarray, dict[str, np.ndarray]], Any] | None
+
+    @staticmethod
+    def checked(
+        t_eval: Any,
+        drive: Drive | None,
+        q0: Any,
+        qd0: Any,
+        rtol: float,
+        method: str,
+        numerical_damping: bool,
+        channels: Sequence[str] | None,
+        reduce: Any,
+    ) -> Request:
+        """A request whose arguments are good as far as that can be told without a robot. Raises
+        InputError."""
+        t = check_request(t_eval, rtol, method)
+        if not (reduce is None or callable(reduce)):
+            raise InputError(
+                "expected a function (t, channels) -> number or {name: number}",
+                key="reduce",
+                value=reduce,
+            )
+        if isinstance(channels, str):
+            raise InputError("expected a list of channels", key="channels", value=channels)
+        start = [None if q is None else np.array(q, dtype=float) for q in (q0, qd0)]
+        return Request(
+            t,
+            drive,
+            start[0],
+            start[1],
+            float(rtol),
+            method,
+            bool(numerical_damping),
+            tuple(channels or ()),
+            reduce,
+        )
+
+    def fitted(self, robot: Robot) -> Request:
+        """The request for robots like this one: with the default channels, and its names and shapes
+        checked."""
+        known, links = channel_units(robot), robot.links
+        default = [f"joint/{i}/position" for i in range(1, len(links) + 1)]
+        default += [f"link/{i}/tip_deflection" for i, link in enumerate(links, 1) if link.flexible]
+        for name in self.channels:
+            if name not in known:
+                raise InputError(f"expected one of {', '.join(known)}", key="channels", value=name)
+        if self.drive is not None and len(self.drive.joints) != len(links):
+            raise InputError(
+                f"expected {len(links)} joint drives, one a joint",
+                key="drive",
+                value=len(self.drive.joints),
+            )
+        for key, value in (("q0", self.q0), ("qd0", self.qd0)):
+            n = 0 if value is None else structure(robot).n
+            if value is not None and (value.shape != (n,) or not np.isfinite(value).all()):
+                raise InputError(
+                    f"expected {n} finite numbers, in the order of system.labels",
+                    key=key,
+                    value=value,
+                )
+        return replace(self, channels=self.channels or tuple(default))
+
+    def reduced(self, channels: dict[str, np.ndarray], robot: int) -> dict[str, Any]:
+        """The numbers that `reduce` makes of a robot's channels. Raises InputError for anything
+        else than numbers."""
+        assert self.reduce is not None
+        found = self.reduce(self.t, channels)
+        numbers = found if isinstance(found, dict) else {"value": found}
+        try:
+            return {str(name): float(value) for name, value in numbers.items()}
+        except (TypeError, ValueError):
+            text = f"expected a number or a dictionary of numbers of robot {robot + 1}"
+            raise InputError(text, key="reduce", value=found) from None
+
+    def spec(self) -> dict[str, Any]:
+        """The request as JSON can hold it: two requests that are equal here give the same numbers
+        of the same robots."""
+        start = [None if q is None else q.tolist() for q in (self.q0, self.qd0)]
+        return {
+            "program": program(),
+            "t_s": self.t.tolist(),
+            "drive": None if self.drive is None else [joint.spec() for joint in self.drive.joints],
+            "q0": start[0],
+            "qd0": start[1],
+            "rtol": self.rtol,
+            "method": self.method,
+            "numerical_damping": self.numerical_damping,
+            "channels": list(self.channels),
+            "reduce": None if self.reduce is None else identity(self.reduce),
+        }
+
+
+@cache
+def program() -> str:
+    """The version and a digest of the solver: two equal ones compute the same numbers."""
+    found, folder = hashlib.sha256(), Path(core.__file__).parent
+    for source in [
+        *sorted(folder.rglob("*.py")),
+        *sorted(folder.glob("_core_*")),
+    ]:  # the core in all builds that are installed
+        found.update(source.read_bytes())
+    return f"flexura {version('flexura')} {found.hexdigest()[:16]}"
+
+
+def identity(function: Callable[..., Any]) -> str:
+    """A function's name and a digest of its code, defaults and the values that it closes over, so
+    that a changed one is noticed.
+
+    Raises InputError for values that do not pickle. What it calls in other modules is taken as it
+    is.
+    """
+    plain = getattr(function, "py_func", function)
+    code = getattr(plain, "__code__", None)
+    if code is None:
+        content: Any = plain
+    else:
+        closed = [cell.cell_contents for cell in plain.__closure__ or ()]
+        content = (_code(code), plain.__defaults__, plain.__kwdefaults__, closed)
+    try:
+        found = hashlib.sha256(pickle.dumps(content)).hexdigest()[:16]
+    except (pickle.PicklingError, AttributeError, TypeError):
+        raise InputError(
+            "expected a function that closes over plain values", key="reduce", value=function
+        ) from None
+    return f"{getattr(plain, '__qualname__', type(plain).__name__)} {found}"
+
+
+def _code(code: CodeType) -> tuple[Any, ...]:
+    constants = tuple(_code(c) if isinstance(c, CodeType) else repr(c) for c in code.co_consts)
+    return code.co_code, constants, code.co_names, code.co_varnames

@@ -1,0 +1,222 @@
+"""Many robots of one topology as rows of numbers, as the compiled core reads them; and how values
+vary along them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..robot import LEAST_FREE, Link, Robot
+from ..system.constants import rows
+
+# Columns of `numbers`, as system/constants.py gives them.
+LENGTH, MASS, CENTRE, INERTIA, START, LOW, HIGH = 0, 1, 2, 3, 7, 13, 14
+OF_JOINT = {
+    "angle_rad": 6,
+    "hub_mass_kg": 8,
+    "hub_inertia_kg_m2": 9,
+    "rotor_inertia": 10,
+    "viscous_friction": 11,
+    "coulomb_friction": 12,
+}
+OF_DAMPING = {"alpha_1_s": 4, "beta_s": 5}
+OF_RIGID = {
+    "mass_kg": MASS,
+    "centre_of_mass_m": CENTRE,
+    "inertia_kg_m2": INERTIA,
+    "length_m": LENGTH,
+}
+OF_MATERIAL = (
+    "length_m",
+    "young_modulus_Pa",
+    "density_kg_m3",
+    "mass_per_length_kg_m",
+    "bending_stiffness_N_m2",
+)
+OF_SECTION = ("width_m", "height_m")
+PA, PB = 1, 2  # kinds of joints in `counts`
+
+
+@dataclass(frozen=True)
+class Rows:
+    """B robots: counts (N, 5) of them all, numbers (B, N, 15), material (B, K, 10), gravity (B, 2)
+    and payload (B, 2)."""
+
+    counts: np.ndarray
+    numbers: np.ndarray
+    material: np.ndarray
+    gravity: np.ndarray
+    payload: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+    def of(self, some: Sequence[int] | slice) -> Rows:
+        """The rows of some robots."""
+        return Rows(
+            self.counts,
+            *(
+                np.ascontiguousarray(a[some])
+                for a in (self.numbers, self.material, self.gravity, self.payload)
+            ),
+        )
+
+    def contents(self, k: int) -> bytes:
+        """All numbers of robot k, to the last bit."""
+        arrays = (self.counts, self.numbers[k], self.material[k], self.gravity[k], self.payload[k])
+        return b"".join(np.ascontiguousarray(a).tobytes() for a in arrays)
+
+    @property
+    def limits(self) -> np.ndarray:
+        """Limits of the joints (B, N, 2) [m or rad], the ends of the links that slide included, as
+        in `System.limits`."""
+        out = np.array(self.numbers[:, :, [LOW, HIGH]])
+        length = self.numbers[:, :, LENGTH]
+        for i, count in enumerate(self.counts):
+            if count[0] == PB:
+                low, high = (LEAST_FREE * length[:, i] if count[2] else 0.0), length[:, i]
+            elif count[0] == PA and i > 0:
+                low, high = 0.0, length[:, i - 1]
+            else:
+                continue
+            out[:, i, 0], out[:, i, 1] = (
+                np.maximum(out[:, i, 0], low),
+                np.minimum(out[:, i, 1], high),
+            )
+        return out
+
+
+def one(robot: Robot) -> Rows:
+    """The rows of one robot."""
+    counts, numbers, material = rows(robot)
+    payload = np.array([[robot.payload.mass_kg, robot.payload.inertia_kg_m2]])
+    return Rows(
+        counts, numbers[None], material[None], np.array([robot.gravity_m_s2], dtype=float), payload
+    )
+
+
+def joined(parts: Sequence[Rows]) -> Rows:
+    """Robots of the same counts in one."""
+    first = parts[0]
+    return Rows(
+        first.counts,
+        *(
+            np.concatenate([getattr(p, name) for p in parts])
+            for name in ("numbers", "material", "gravity", "payload")
+        ),
+    )
+
+
+def varied(robot: Robot, columns: Mapping[str, np.ndarray]) -> Rows | None:
+    """The rows of `robot.replace({key: value})` along columns (B,), to the last bit, without making
+    the robots.
+
+    None: a key is not one that maps to numbers by itself. The values are taken as good (`good`).
+    """
+    base = one(robot)
+    B = len(next(iter(columns.values())))
+    again = lambda a: np.repeat(a, B, axis=0)
+    out = Rows(
+        base.counts,
+        again(base.numbers),
+        again(base.material),
+        again(base.gravity),
+        again(base.payload),
+    )
+    links: dict[int, dict[str, np.ndarray]] = {}
+    for key, values in columns.items():
+        parts = key.split(".")
+        if parts[0] == "payload" and parts[1:] in (["mass_kg"], ["inertia_kg_m2"]):
+            out.payload[:, int(parts[1] == "inertia_kg_m2")] = values
+        elif parts[0] == "gravity_m_s2" and parts[1:] in (["1"], ["2"]):
+            out.gravity[:, int(parts[1]) - 1] = values
+        elif (
+            parts[0] == "link"
+            and len(parts) > 2
+            and parts[1].isdigit()
+            and 1 <= int(parts[1]) <= len(robot.links)
+        ):
+            links.setdefault(int(parts[1]) - 1, {})[".".join(parts[2:])] = values
+        else:
+            return None
+    if not all(_vary_link(robot.links[i], i, out, changes) for i, changes in links.items()):
+        return None
+    return out
+
+
+def _vary_link(link: Link, i: int, out: Rows, changes: Mapping[str, np.ndarray]) -> bool:
+    """Puts varied values of link i into its rows; False: a key is not known here."""
+    rest = dict(changes)
+    for table, known in (("joint", OF_JOINT), ("damping", OF_DAMPING)):
+        for name, column in known.items():
+            if f"{table}.{name}" in rest:
+                out.numbers[:, i, column] = rest.pop(f"{table}.{name}")
+    if not rest:
+        return True
+    if not link.flexible:
+        return _vary_rigid(link, i, out, rest)
+    simple = not any(
+        isinstance(v, list)
+        for v in (link.section, link.mass_per_length_kg_m, link.bending_stiffness_N_m2)
+    )
+    given = [name for name in OF_MATERIAL if getattr(link, name) is not None]
+    given += [f"section.{name}" for name in OF_SECTION if link.section is not None]
+    if not simple or not set(rest) <= set(given):
+        return False
+    row = int(out.counts[:i, 4].sum())
+    value: Callable[[str], Any] = lambda name: rest[name] if name in rest else getattr(link, name)
+    if "length_m" in rest:
+        out.numbers[:, i, LENGTH] = out.material[:, row, 1] = rest["length_m"]
+    if link.section is None:
+        mass, stiffness = value("mass_per_length_kg_m"), value("bending_stiffness_N_m2")
+    else:  # in the order of Link.mass_per_length and Link.bending_stiffness
+        width, height = (
+            rest.get(f"section.{name}", getattr(link.section, name)) for name in OF_SECTION
+        )
+        cube = np.array([h**3 for h in np.atleast_1d(height).tolist()])
+        mass, stiffness = (
+            value("density_kg_m3") * width * height,
+            value("young_modulus_Pa") * width * cube / 12,
+        )
+    out.material[:, row, 2], out.material[:, row, 5] = mass, stiffness
+    return True
+
+
+def _vary_rigid(link: Link, i: int, out: Rows, changes: Mapping[str, np.ndarray]) -> bool:
+    if link.mass_kg is None or not set(changes) <= set(OF_RIGID):
+        return False
+    for name, values in changes.items():
+        out.numbers[:, i, OF_RIGID[name]] = values
+    if (
+        link.centre_of_mass_m is None
+        and "centre_of_mass_m" not in changes
+        and "length_m" in changes
+    ):
+        out.numbers[:, i, CENTRE] = changes["length_m"] / 2
+    return True
+
+
+def good(robot: Robot, columns: Mapping[str, np.ndarray]) -> bool:
+    """Whether all values make robots, as the least and the largest of each key tell: the rules of a
+    robot file bound every key by itself, but for a section's height, which is below the link's
+    length."""
+    try:
+        for key, values in columns.items():
+            if not np.isfinite(values).all():
+                return False
+            for end in (float(values.min()), float(values.max())):
+                robot.replace({key: end})
+        for i in range(1, len(robot.links) + 1):
+            length, height = (
+                columns.get(f"link.{i}.length_m"),
+                columns.get(f"link.{i}.section.height_m"),
+            )
+            if length is not None and height is not None and not (height < length).all():
+                return False
+    except InputError:
+        return False
+    return True

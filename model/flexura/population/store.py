@@ -1,0 +1,200 @@
+"""Chunks of a population, in memory or in a folder that a stopped call goes on with.
+
+A folder has `population.json`, the request, and `chunk-0000000.parquet`, ... named after their
+first robot: a row a robot, columns robot (from 1), status, reached_s, steps, event, digest, then
+each channel as a list of T numbers, or each reduced number. Every file appears as a whole or not at
+all, so that a folder never holds half a chunk, nor a robot twice.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..io import write_bytes, write_text
+
+MANIFEST = "population.json"
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """Robots `first`, `first` + 1, ... from 0: how each ended and when, and its channels (b, T) or
+    reduced numbers (b,). Only in a folder have they digests."""
+
+    first: int
+    status: np.ndarray
+    reached_s: np.ndarray
+    steps: np.ndarray
+    event: list[str]
+    digest: list[bytes]
+    values: dict[str, np.ndarray]
+
+    def __len__(self) -> int:
+        return len(self.digest)
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        try:
+            return self.values[name]
+        except KeyError:
+            raise KeyError(f"no {name!r} was kept; there are: {', '.join(self.values)}") from None
+
+    def to_parquet(self) -> bytes:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        columns: dict[str, Any] = {
+            "robot": np.arange(self.first + 1, self.first + 1 + len(self)),
+            "status": pa.array(self.status.tolist(), pa.string()),
+            "reached_s": self.reached_s,
+            "steps": self.steps,
+            "event": pa.array(self.event, pa.string()),
+            "digest": pa.array(self.digest, pa.binary(16)),
+        }
+        for name, values in self.values.items():
+            flat = pa.array(np.ascontiguousarray(values).ravel())
+            columns[f"values/{name}"] = (
+                pa.FixedSizeListArray.from_arrays(flat, values.shape[1])
+                if values.ndim == 2
+                else flat
+            )
+        sink = pa.BufferOutputStream()
+        pq.write_table(
+            pa.table(columns), sink, compression="zstd", use_dictionary=["status", "event"]
+        )
+        return sink.getvalue().to_pybytes()
+
+    @staticmethod
+    def from_parquet(path: Path) -> Chunk:
+        """Raises ValueError for a file that is none."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        try:
+            table = pq.ParquetFile(path).read().combine_chunks()
+            values = {}
+            for name in table.column_names:
+                if name.startswith("values/"):
+                    column = table.column(name).combine_chunks()
+                    flat = column.flatten() if pa.types.is_fixed_size_list(column.type) else column
+                    values[name.removeprefix("values/")] = flat.to_numpy(
+                        zero_copy_only=False
+                    ).reshape((len(table), -1) if flat is not column else len(table))
+            plain = {
+                name: table.column(name)
+                for name in ("robot", "status", "reached_s", "steps", "event", "digest")
+            }
+        except (pa.ArrowException, OSError, KeyError) as error:
+            raise ValueError(str(error)) from None
+        return Chunk(
+            int(plain["robot"][0].as_py()) - 1,
+            np.array(plain["status"].to_pylist()),
+            plain["reached_s"].to_numpy(),
+            plain["steps"].to_numpy(),
+            plain["event"].to_pylist(),
+            plain["digest"].to_pylist(),
+            values,
+        )
+
+
+@dataclass
+class Store:
+    """Where the chunks are: in `kept`, by their first robot, or in `folder`."""
+
+    folder: Path | None = None
+    kept: dict[int, Chunk] = field(default_factory=dict)
+
+    @staticmethod
+    def opened(folder: str | Path, request: dict[str, Any]) -> Store:
+        """The store of this request: a new folder, or one that the same request began. Raises
+        InputError for another's."""
+        path = Path(folder) / MANIFEST
+        asked = json.loads(json.dumps(request))
+        if not path.exists():
+            if any(Path(folder).glob("chunk-*.parquet")):
+                raise InputError(
+                    f"chunks without their {MANIFEST}: expected an empty folder, or all of one",
+                    file=str(folder),
+                )
+            write_text(path, json.dumps(asked))
+            return Store(Path(folder))
+        try:
+            begun = json.loads(path.read_text())
+            differing = [key for key in asked if begun[key] != asked[key]]
+        except (ValueError, KeyError, TypeError, OSError) as error:
+            raise InputError(f"not the request of a population ({error})", file=str(path)) from None
+        if differing:
+            key = differing[0]
+            raise InputError(
+                f"expected {_short(begun[key])}, with which this folder was begun, or another "
+                f"folder",
+                key=key,
+                value=_short(asked[key]),
+                file=str(path),
+                more=len(differing) - 1,
+            )
+        return Store(Path(folder))
+
+    def _path(self, first: int) -> Path:
+        assert self.folder is not None
+        return self.folder / f"chunk-{first:07d}.parquet"
+
+    def put(self, chunk: Chunk) -> None:
+        if self.folder is None:
+            self.kept[chunk.first] = chunk
+        else:
+            write_bytes(self._path(chunk.first), chunk.to_parquet())
+
+    def has(self, first: int, digests: list[bytes]) -> bool:
+        """Whether the chunk of these robots is done. Raises InputError where it has been done with
+        other robots."""
+        if self.folder is None or not self._path(first).exists():
+            return False
+        found = _digests(self._path(first))
+        for k, (one, other) in enumerate(zip(found, digests, strict=False)):
+            if one != other:
+                text = (
+                    "another robot or drive than this folder was begun with: expected the "
+                    "same, "
+                    "or another folder"
+                )
+                raise InputError(text, key=f"robots[{first + k + 1}]", file=str(self._path(first)))
+        return len(found) == len(digests)
+
+    def chunks(self) -> Iterator[Chunk]:
+        """The chunks that are done, in their order."""
+        if self.folder is None:
+            yield from (self.kept[first] for first in sorted(self.kept))
+            return
+        for path in sorted(self.folder.glob("chunk-*.parquet")):
+            try:
+                yield Chunk.from_parquet(path)
+            except ValueError as error:
+                raise InputError(
+                    f"a damaged chunk ({error}); simulating again mends it", file=str(path)
+                ) from None
+
+
+def _digests(path: Path) -> list[bytes]:
+    """The digests of a chunk's robots; none of a damaged file, which is then done again."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        return list(pq.ParquetFile(path).read(columns=["digest"]).column("digest").to_pylist())
+    except (pa.ArrowException, OSError, KeyError):
+        return []
+
+
+def in_memory() -> Store:
+    return Store()
+
+
+def _short(value: Any) -> str:
+    text = json.dumps(value)
+    return text if len(text) < 60 else text[:40] + " ... " + text[-15:]

@@ -1,0 +1,239 @@
+"""The robots of one chunk: simulated together in the core, observed, and reduced."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .. import core
+from ..errors import InputError
+from ..io import STATIONS
+from ..robot import Robot
+from ..signals import Drive
+from ..simulation.problem import MOST_STEPS, outside
+from ..simulation.recorder import LOSS, NUMERICAL, WORK, limit_event, observed
+from ..simulation.simulate import simulate
+from ..system import System
+from .batch import Share
+from .request import Request
+from .rows import Rows
+from .store import Chunk
+
+WORDS = ("done", "limit", "stuck", "refused")
+
+
+Work = tuple[Share, list[bytes]]
+
+
+def cores() -> int:
+    """The cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def compute(request: Request, share: Share, digests: list[bytes]) -> Chunk:
+    """Simulate the robots of one chunk in this thread."""
+    return chunk_of(request, share, digests, simulated(request, share, 1, core.Watch()))
+
+
+class Part(NamedTuple):
+    """The robots of a chunk, simulated: as in a Chunk, with the channels (b, T) of them all."""
+
+    status: list[str]
+    reached: np.ndarray
+    steps: np.ndarray
+    events: list[str]
+    channels: dict[str, np.ndarray]
+
+
+def simulated(request: Request, share: Share, threads: int, watch: Any) -> Part:
+    """Run and observe robots, or begin to, if `watch` is stopped meanwhile.
+
+    Raises: InputError: a drive has another number of joints.
+    """
+    b, T, N = len(share), len(request.t), len(share.robots[0].links)
+    for k, drive in enumerate(share.drives, 1):
+        if drive is not None and len(drive.joints) != N:
+            raise InputError(
+                f"expected {N} joint drives, one a joint",
+                key=f"robots[{share.first + k}].drive",
+                value=len(drive.joints),
+            )
+    part = Part(
+        [""] * b,
+        np.full(b, np.nan),
+        np.zeros(b, dtype=np.int64),
+        [""] * b,
+        {name: np.full((b, T), np.nan) for name in request.channels},
+    )
+    columns = _columns(share.robots[0], request.channels)
+    if columns is None or not share.robots[0].stiffening:
+        _one_by_one(request, share, watch, part)
+        return part
+    for members, rows in share.groups:
+        _together(request, share, members, rows, columns, threads, watch, part)
+    return part
+
+
+def _columns(robot: Robot, names: Sequence[str]) -> list[tuple[str, int]] | None:
+    """The channels as the core names them; None if it does not have one of them."""
+    known: dict[str, tuple[str, int]] = {}
+    for i in range(len(robot.links)):
+        known |= {f"joint/{i + 1}/{what}": (what, i) for what in ("position", "velocity", "drive")}
+    accounts = {"energy/work": WORK, "energy/loss": LOSS, "energy/numerical_loss": NUMERICAL}
+    seen = [name for name in observed(robot)]
+    known |= {name: ("account", k) for name, k in accounts.items()} | {
+        name: ("seen", k) for k, name in enumerate(seen)
+    }
+    return [known[name] for name in names] if all(name in known for name in names) else None
+
+
+def _packed(drive: Drive) -> Any:
+    """A drive as the core takes it. Limits are each robot's own."""
+    segments, ranges, gains = drive.packed()
+    N = len(drive.joints)
+    flags = drive.follows.astype(np.uint8)
+    return core.Drive(
+        segments,
+        ranges,
+        np.ascontiguousarray(gains),
+        flags,
+        np.zeros(N, dtype=np.uint8),
+        np.tile([-np.inf, np.inf], (N, 1)),
+    )
+
+
+def _together(
+    request: Request,
+    share: Share,
+    members: np.ndarray,
+    rows: Rows,
+    columns: list[tuple[str, int]],
+    threads: int,
+    watch: Any,
+    part: Part,
+) -> None:
+    """Robots of the same counts through the core, into their places of `part`."""
+    common = request.drive or Drive.none(rows.numbers.shape[1])
+    drives = [share.drives[k] or common for k in members]
+    number = {
+        id(drive): j for j, drive in enumerate({id(drive): drive for drive in drives}.values())
+    }
+    packed = [_packed(drive) for drive in {id(drive): drive for drive in drives}.values()]
+    start = [np.zeros(0) if q is None else q for q in (request.q0, request.qd0)]
+    values, words, reached, steps, joints, positions, texts = core.population(
+        rows.counts,
+        rows.numbers,
+        rows.material,
+        rows.gravity,
+        rows.payload,
+        rows.limits,
+        packed,
+        np.array([number[id(drive)] for drive in drives]),
+        request.t,
+        *start,
+        request.rtol,
+        request.method,
+        request.numerical_damping,
+        MOST_STEPS,
+        columns,
+        STATIONS,
+        threads,
+        watch,
+    )
+    for name, found in zip(request.channels, values, strict=True):
+        part.channels[name][members] = found
+    part.steps[members] = steps
+    for j, k in enumerate(members):
+        word = words[j]
+        part.status[k] = word if word in WORDS else "stuck"
+        if word != "refused":
+            part.reached[k] = reached[j]
+        if word != "done":
+            part.events[k] = _event(
+                share.robots[k], word, int(joints[j]), float(reached[j]), positions[j], texts.get(j)
+            )
+
+
+def _event(
+    robot: Robot,
+    word: str,
+    joint: int,
+    t: float,
+    position: np.ndarray,
+    text: tuple[int, str, str] | None,
+) -> str:
+    """Why a robot has not run to the end."""
+    if word == "limit":
+        return str(limit_event(System(robot), joint, t, position)["text"])
+    if word == "refused" and text is None:
+        limits = robot.links[joint].joint.limits
+        assert limits is not None
+        return str(outside(joint, limits, float(position[joint])))
+    link, key, said = text or (-1, "", "")
+    if word != "refused":
+        return said
+    return str(InputError(said, key=key if link < 0 else f"link[{link + 1}].{key}"))
+
+
+def _one_by_one(request: Request, share: Share, watch: Any, part: Part) -> None:
+    """Robots by `simulate`: of the dissertation's model, and for channels that the core does not
+    have."""
+    for k in range(len(share)):
+        if watch.stopped:
+            return
+        drive = share.drives[k] or request.drive
+        try:
+            run = simulate(
+                share.robots[k],
+                request.t,
+                drive,
+                request.q0,
+                request.qd0,
+                request.rtol,
+                method=request.method,
+                numerical_damping=request.numerical_damping,
+            )
+        except InputError as error:
+            part.status[k], part.events[k] = "refused", str(error)
+            continue
+        texts = [event["text"] for event in run.meta["events"] if event["level"] == "ERROR"]
+        part.status[k] = (
+            "done"
+            if run.complete
+            else "limit"
+            if any("stopped" in text for text in texts)
+            else "stuck"
+        )
+        part.reached[k], part.steps[k], part.events[k] = (
+            run.t[-1],
+            run.meta["steps"],
+            "" if run.complete else "; ".join(texts),
+        )
+        rows = int(np.count_nonzero(np.isin(run.t, request.t)))
+        for name in request.channels:
+            part.channels[name][k, :rows] = run[name][:rows]
+
+
+def chunk_of(request: Request, share: Share, digests: list[bytes], part: Part) -> Chunk:
+    """The chunk, reduced if so asked."""
+    values = {name: part.channels[name] for name in request.channels}
+    if request.reduce:
+        channels, values = values, {}
+        for k in range(len(share)):
+            if part.status[k] == "refused":
+                continue
+            kept = request.reduced(
+                {name: rows[k] for name, rows in channels.items()}, share.first + k
+            )
+            values = values or {name: np.full(len(share), np.nan) for name in kept}
+            if set(values) != set(kept):
+                text = f"expected the same numbers of every robot, {sorted(values)}"
+                raise InputError(text, key="reduce", value=sorted(kept))
+            for name, value in kept.items():
+                values[name][k] = value
+    return Chunk(
+        share.first, np.array(part.status), part.reached, part.steps, part.events, digests, values
+    )

@@ -1,0 +1,395 @@
+"""A link of the robot file, with its joint, section and damping."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+
+from ..errors import WrongValue
+
+MAX_ELEMENTS = 200
+
+
+MOST_MODES = 14  # of one link: more would need more polynomials than double precision carries
+
+
+LEAST_FREE = (
+    0.02  # of its length that a flexible link keeps out of its sleeve: its mesh is that long
+)
+
+
+_strict = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+
+Positive = Annotated[float, Field(gt=0)]
+
+
+class Table(BaseModel):
+    """A table of the robot file: frozen, and no key that it does not know."""
+
+    model_config = _strict
+
+
+class Section(Table):
+    """A rectangular cross-section; `height_m` lies in the plane of bending."""
+
+    width_m: float = Field(
+        gt=0, le=10, description="the section's width in metres, above 0 and at most 10"
+    )
+    height_m: float = Field(
+        gt=0,
+        le=10,
+        description=(
+            "the section's height in the plane of bending in metres, above 0 and at most 10"
+        ),
+    )
+
+
+class SectionAt(Section):
+    """A cross-section at a place along a tapered link."""
+
+    at_m: float = Field(
+        ge=0, description="the place of this section along the link in metres, 0 or more"
+    )
+
+
+class ValueAt(Table):
+    """A value at a place along a link."""
+
+    at_m: float = Field(
+        ge=0, description="the place of this value along the link in metres, 0 or more"
+    )
+    value: float = Field(gt=0, description="a number above 0, in the unit of the key")
+
+
+class Damping(Table):
+    """Rayleigh damping of the elastic unknowns, D = alpha M + beta K."""
+
+    alpha_1_s: float = Field(
+        0.0, ge=0, description="the mass-proportional factor in 1/s, 0 or more"
+    )
+    beta_s: float = Field(
+        0.0,
+        ge=0,
+        le=10,
+        description="the stiffness-proportional factor in seconds, between 0 and 10",
+    )
+
+
+class Joint(Table):
+    """The joint at the proximal side of a link: R, Pa or Pb (dissertation, table 2.1)."""
+
+    type: Literal["R", "Pa", "Pb"] = Field(description='the joint type, "R", "Pa" or "Pb"')
+    angle_rad: float = Field(
+        0.0,
+        ge=-7,
+        le=7,
+        description="the fixed angle gamma of a Pa or Pb in radians, between -7 and 7",
+    )
+    hub_mass_kg: float = Field(0.0, ge=0, description="the hub's mass in kilograms, 0 or more")
+    hub_inertia_kg_m2: float = Field(
+        0.0, ge=0, description="the hub's inertia in kg m^2, 0 or more"
+    )
+    rotor_inertia: float = Field(
+        0.0,
+        ge=0,
+        description=(
+            "the rotor's inertia reflected to the joint, kg (Pa, Pb) or kg m^2 (R), 0 or more"
+        ),
+    )
+    viscous_friction: float = Field(
+        0.0, ge=0, description="viscous friction in N s/m or N m s/rad, 0 or more"
+    )
+    coulomb_friction: float = Field(
+        0.0, ge=0, description="Coulomb friction in N or N m, 0 or more"
+    )
+    limits: tuple[float, float] | None = Field(
+        None,
+        strict=False,
+        description="two numbers, the lower limit and a higher upper limit, in m or rad",
+    )
+    start: float = Field(
+        0.0,
+        description=(
+            "the joint's position at the start, in m or rad (Pb: the free length), a finite number"
+        ),
+    )
+    locked: bool = Field(False, description="true (the joint is clamped at its start) or false")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Joint:
+        if self.type == "R" and self.angle_rad != 0:
+            raise WrongValue(
+                "angle_rad",
+                self.angle_rad,
+                "no fixed angle: a joint R turns; use start for its first position",
+            )
+        if self.limits is not None:
+            if not self.limits[0] < self.limits[1]:
+                raise WrongValue(
+                    "limits", list(self.limits), "the lower limit first, then a higher upper limit"
+                )
+            if not self.limits[0] <= self.start <= self.limits[1]:
+                raise WrongValue(
+                    "limits",
+                    list(self.limits),
+                    f"limits that contain the start position, {self.start:g}",
+                )
+        return self
+
+
+_LINK_TEXT = {
+    "section": (
+        "a table { width_m, height_m } or a list of { at_m, width_m, height_m } in order of at_m"
+    ),
+    "mass_per_length_kg_m": (
+        "mass per length in kg/m, a number above 0 or a list of { at_m, value } in order of at_m"
+    ),
+    "bending_stiffness_N_m2": (
+        "bending stiffness EI in N m^2, a number above 0 or a list of { "
+        "at_m, value } in order of at_m"
+    ),
+}
+
+
+class Link(Table):
+    """One link with the joint at its proximal side; rigid when `elements` is 0."""
+
+    name: str = Field(
+        "", max_length=200, description="the link's name, a text of at most 200 characters"
+    )
+    length_m: float = Field(
+        ge=0,
+        le=1000,
+        description=(
+            "the link's length in metres, above 0 and at most 1000 (0 is allowed for a rigid link)"
+        ),
+    )
+    elements: int = Field(
+        0,
+        ge=0,
+        le=MAX_ELEMENTS,
+        description=f"the number of beam elements, a whole number from 0 (rigid) to {MAX_ELEMENTS}",
+    )
+    modes: int | None = Field(
+        None,
+        ge=1,
+        description="how many of the link's own modes to keep, a whole number of 1 or more",
+    )
+    section: Section | list[SectionAt] | None = Field(None, description=_LINK_TEXT["section"])
+    young_modulus_Pa: float | None = Field(
+        None,
+        ge=1e5,
+        le=2e12,
+        description="Young's modulus in pascals, between 1e5 and 2e12 (steel: 2.0e11, not 200)",
+    )
+    density_kg_m3: float | None = Field(
+        None,
+        ge=10,
+        le=25000,
+        description="the density in kg/m^3, between 10 and 25000 (steel: 7850)",
+    )
+    mass_per_length_kg_m: Positive | list[ValueAt] | None = Field(
+        None, description=_LINK_TEXT["mass_per_length_kg_m"]
+    )
+    bending_stiffness_N_m2: Positive | list[ValueAt] | None = Field(
+        None, description=_LINK_TEXT["bending_stiffness_N_m2"]
+    )
+    mass_kg: float | None = Field(
+        None, ge=0, description="a rigid link's mass in kilograms, 0 or more"
+    )
+    centre_of_mass_m: float | None = Field(
+        None, description="a rigid link's centre of mass from its origin in metres"
+    )
+    inertia_kg_m2: float | None = Field(
+        None,
+        ge=0,
+        description="a rigid link's inertia about its centre of mass in kg m^2, 0 or more",
+    )
+    damping: Damping = Field(default_factory=Damping, description="a table { alpha_1_s, beta_s }")
+    joint: Joint = Field(description='a table [link.joint] with at least type = "R", "Pa" or "Pb"')
+
+    @property
+    def flexible(self) -> bool:
+        return self.elements > 0
+
+    @field_validator("section", "mass_per_length_kg_m", "bending_stiffness_N_m2")
+    @classmethod
+    def _ordered(cls, value: Any, info: Any) -> Any:
+        if isinstance(value, list):
+            at = [entry.at_m for entry in value]
+            if len(at) < 2:
+                raise WrongValue(info.field_name, at, "a list of at least two entries with at_m")
+            if any(b <= a for a, b in pairwise(at)):
+                raise WrongValue(info.field_name, at, "entries in ascending order of at_m")
+        return value
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Link:
+        if self.flexible:
+            self._check_flexible()
+        else:
+            self._check_rigid()
+        for key in ("section", "mass_per_length_kg_m", "bending_stiffness_N_m2"):
+            value = getattr(self, key)
+            if isinstance(value, list) and (
+                value[0].at_m != 0 or abs(value[-1].at_m - self.length_m) > 1e-9 * self.length_m
+            ):
+                raise WrongValue(
+                    key,
+                    [e.at_m for e in value],
+                    f"entries from at_m = 0 to the link's length, {self.length_m:g}",
+                )
+        if self.section is not None and self.length_m > 0:
+            listed = isinstance(self.section, list)
+            for k, s in enumerate(
+                self.section if isinstance(self.section, list) else [self.section], 1
+            ):
+                if s.height_m >= self.length_m:
+                    raise WrongValue(
+                        f"section[{k}].height_m" if listed else "section.height_m",
+                        s.height_m,
+                        f"a height below the link's length, {self.length_m:g} (metres, not "
+                        f"millimetres?)",
+                    )
+        return self
+
+    def _check_flexible(self) -> None:
+        if self.length_m <= 0:
+            raise WrongValue(
+                "length_m", self.length_m, "a length above 0 for a flexible link (elements > 0)"
+            )
+        for key in ("mass_kg", "centre_of_mass_m", "inertia_kg_m2"):
+            if getattr(self, key) is not None:
+                raise WrongValue(
+                    key,
+                    getattr(self, key),
+                    "absent for a flexible link: its mass comes from the section or "
+                    "mass_per_length_kg_m",
+                )
+        by_section = (self.section, self.young_modulus_Pa, self.density_kg_m3)
+        by_number = (self.mass_per_length_kg_m, self.bending_stiffness_N_m2)
+        if all(v is None for v in by_section + by_number):
+            raise WrongValue(
+                "section",
+                None,
+                "missing: a flexible link needs section, young_modulus_Pa, density_kg_m3, "
+                "or mass_per_length_kg_m, bending_stiffness_N_m2",
+            )
+        if any(v is not None for v in by_section) and any(v is not None for v in by_number):
+            key = (
+                "mass_per_length_kg_m"
+                if self.mass_per_length_kg_m is not None
+                else "bending_stiffness_N_m2"
+            )
+            raise WrongValue(
+                key,
+                getattr(self, key),
+                "either section, young_modulus_Pa, density_kg_m3, or mass_per_length_kg_m, "
+                "bending_stiffness_N_m2, "
+                "not some of each",
+            )
+        names = (
+            ("section", "young_modulus_Pa", "density_kg_m3")
+            if self.section_given
+            else ("mass_per_length_kg_m", "bending_stiffness_N_m2")
+        )
+        for key in names:
+            if getattr(self, key) is None:
+                raise WrongValue(key, None, f"missing: {type(self).model_fields[key].description}")
+        if self.modes is not None and self.modes > 2 * self.elements:
+            raise WrongValue(
+                "modes", self.modes, f"at most {2 * self.elements}, twice the number of elements"
+            )
+        if self.modes is not None and self.modes > MOST_MODES:
+            raise WrongValue(
+                "modes",
+                self.modes,
+                f"at most {MOST_MODES}; a link without modes keeps all unknowns of its mesh",
+            )
+
+    def _check_rigid(self) -> None:
+        for key in ("modes", "young_modulus_Pa", "bending_stiffness_N_m2"):
+            if getattr(self, key) is not None:
+                raise WrongValue(key, getattr(self, key), "absent for a rigid link (elements = 0)")
+        spread = (
+            self.section is not None
+            or self.mass_per_length_kg_m is not None
+            or self.density_kg_m3 is not None
+        )
+        if self.mass_kg is None and not spread:
+            raise WrongValue(
+                "mass_kg", None, "missing: a rigid link's mass in kilograms, 0 or more"
+            )
+        if spread:
+            if self.mass_kg is not None:
+                raise WrongValue(
+                    "mass_kg",
+                    self.mass_kg,
+                    "either mass_kg, or section and density_kg_m3, or mass_per_length_kg_m",
+                )
+            if self.mass_per_length_kg_m is None and (
+                self.section is None or self.density_kg_m3 is None
+            ):
+                missing = "density_kg_m3" if self.density_kg_m3 is None else "section"
+                raise WrongValue(
+                    missing, None, f"missing: {type(self).model_fields[missing].description}"
+                )
+
+    @property
+    def section_given(self) -> bool:
+        return (
+            self.section is not None
+            or self.young_modulus_Pa is not None
+            or self.density_kg_m3 is not None
+        )
+
+    def mass_per_length(self, x: Any) -> np.ndarray:
+        """Mass per length [kg/m] at x [m] from the link's origin, linear between the given
+        places."""
+        if self.mass_per_length_kg_m is not None:
+            return _spread(self.mass_per_length_kg_m, x)
+        width, height = self._section_at(x)
+        return _spread(self.density_kg_m3 * width * height, x)
+
+    def bending_stiffness(self, x: Any) -> np.ndarray:
+        """Bending stiffness EI [N m^2] at x [m] from the link's origin."""
+        if self.bending_stiffness_N_m2 is not None:
+            return _spread(self.bending_stiffness_N_m2, x)
+        width, height = self._section_at(x)
+        return _spread(self.young_modulus_Pa * width * height**3 / 12, x)
+
+    def axial_stiffness(self, x: Any) -> np.ndarray | None:
+        """Axial stiffness EA [N] at x [m], or None where the file gives EI only (the native model
+        has no axial unknowns)."""
+        if self.section is None or self.young_modulus_Pa is None:
+            return None
+        width, height = self._section_at(x)
+        return _spread(self.young_modulus_Pa * width * height, x)
+
+    def _section_at(self, x: Any) -> tuple[Any, Any]:
+        if isinstance(self.section, list):
+            at = [s.at_m for s in self.section]
+            return np.interp(x, at, [s.width_m for s in self.section]), np.interp(
+                x, at, [s.height_m for s in self.section]
+            )
+        assert self.section is not None
+        return self.section.width_m, self.section.height_m
+
+    def breaks(self) -> list[float]:
+        """Places along the link [m] where a given property has a kink, the ends included."""
+        places = {0.0, self.length_m}
+        for value in (self.section, self.mass_per_length_kg_m, self.bending_stiffness_N_m2):
+            if isinstance(value, list):
+                places.update(entry.at_m for entry in value)
+        return sorted(places)
+
+
+def _spread(value: Any, x: Any) -> np.ndarray:
+    """A list of values as an array at x, or one value for all of it."""
+    if isinstance(value, list):
+        return np.interp(x, [v.at_m for v in value], [v.value for v in value])
+    return value if isinstance(value, np.ndarray) else np.full(np.shape(x), value)

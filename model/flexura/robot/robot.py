@@ -1,0 +1,197 @@
+"""The robot: a frozen, validated description in SI units, read from and written to a TOML file.
+
+Every key carries its unit. Whatever is absurd (a modulus in GPa, a negative mass, an unknown key)
+is refused with the file, the key, the value and what was expected. Equations that use these
+numbers: `model/README.md`.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, Field, ValidationError, model_validator
+
+from ..errors import InputError, WrongValue
+from ..io import explain, read_toml, write_toml
+from .link import LEAST_FREE, Link, Table
+
+MAX_LINKS = 256
+
+
+class Payload(Table):
+    """A point mass with inertia at the tip of the last link."""
+
+    mass_kg: float = Field(0.0, ge=0, description="the payload's mass in kilograms, 0 or more")
+    inertia_kg_m2: float = Field(
+        0.0, ge=0, description="the payload's inertia in kg m^2, 0 or more"
+    )
+
+
+class Robot(Table):
+    """A serial planar chain of rigid and flexible links with joints R, Pa and Pb. Frozen; SI
+    units."""
+
+    name: str = Field(
+        "", max_length=200, description="the robot's name, a text of at most 200 characters"
+    )
+    gravity_m_s2: tuple[float, float] = Field(
+        (0.0, 0.0),
+        strict=False,
+        description="gravity in the base frame, two numbers [x, y] in m/s^2, y up",
+    )
+    stiffening: bool = Field(True, description="true, or false for the dissertation's linear model")
+    sliding: Literal["continuous", "nodal"] = Field(
+        "continuous",
+        description='"continuous" or "nodal", the dissertation\'s node-by-node Pa and Pb',
+    )
+    link: list[Link] = Field(
+        min_length=1, max_length=MAX_LINKS, description=f"1 to {MAX_LINKS} tables [[link]]"
+    )
+    payload: Payload = Field(
+        default_factory=Payload, description="a table { mass_kg, inertia_kg_m2 }"
+    )
+
+    @model_validator(mode="after")
+    def _starts_on_its_links(self) -> Robot:
+        for i, link in enumerate(self.link):
+            low, high = self.travel(i)
+            joint, key = link.joint, f"link[{i + 1}].joint"
+            where = (
+                f"between {low:g} and {high:g} m, the ends of link "
+                f"{i if joint.type == 'Pa' else i + 1}"
+            )
+            if joint.type == "Pa" and low == high:
+                raise WrongValue(
+                    f"link[{i}].length_m",
+                    0.0,
+                    f"a length above 0: link {i + 1} slides on this link",
+                )
+            if not low <= joint.start <= high:
+                free = "the free length at the start, " if joint.type == "Pb" else "a start "
+                raise WrongValue(f"{key}.start", joint.start, free + where)
+            if joint.limits is not None and not (
+                low <= joint.limits[0] and joint.limits[1] <= high
+            ):
+                raise WrongValue(f"{key}.limits", list(joint.limits), f"limits {where}")
+            if joint.type == "Pa" and i > 0 and self.link[i - 1].joint.type == "Pb":
+                exit_m = self.link[i - 1].length_m - self.link[i - 1].joint.start
+                if joint.start < exit_m:
+                    ahead = f"a start ahead of the sleeve of link {i}, at {exit_m:g} m or more"
+                    raise WrongValue(f"{key}.start", joint.start, ahead)
+        return self
+
+    @model_validator(mode="after")
+    def _whole_meshes(self) -> Robot:
+        if self.sliding == "nodal":
+            for i, link in enumerate(self.link):
+                slides = link.joint.type == "Pb" or (i + 1 < len(self.link) and self.rides(i + 1))
+                if link.modes is not None and slides:
+                    raise WrongValue(
+                        f"link[{i + 1}].modes",
+                        link.modes,
+                        'absent with sliding = "nodal", which goes by its nodes',
+                    )
+        return self
+
+    def rides(self, i: int) -> bool:
+        """Whether joint i (from 0) slides along a flexible link."""
+        return i > 0 and self.link[i].joint.type == "Pa" and self.link[i - 1].flexible
+
+    @property
+    def nodal(self) -> bool:
+        """Whether something slides node by node: `sliding`, and a flexible link in a sleeve or
+        under a slider."""
+        sleeved = any(link.joint.type == "Pb" and link.flexible for link in self.link)
+        return self.sliding == "nodal" and (
+            sleeved or any(self.rides(i) for i in range(len(self.link)))
+        )
+
+    def travel(self, i: int) -> tuple[float, float]:
+        """How far joint i (from 0) can go on its links: infinite for R and for a Pa on the base."""
+        link = self.link[i]
+        if link.joint.type == "Pb":
+            return (LEAST_FREE * link.length_m if link.flexible else 0.0), link.length_m
+        if link.joint.type == "Pa" and i > 0:
+            return 0.0, self.link[i - 1].length_m
+        return -np.inf, np.inf
+
+    @property
+    def links(self) -> list[Link]:
+        return self.link
+
+    @property
+    def structure(self) -> str:
+        """The joint types from the base outwards, for example "PaR"."""
+        return "".join(link.joint.type for link in self.link)
+
+    @property
+    def start(self) -> np.ndarray:
+        """Joint positions at the start, (links,) in m or rad."""
+        return np.array([link.joint.start for link in self.link])
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any], *, file: str = "") -> Robot:
+        """A robot from the tables of a robot file. Raises InputError, naming `file`, key, value and
+        what was expected."""
+        try:
+            return cls.model_validate(data)
+        except ValidationError as error:
+            raise explain(error, cls, data, file) from None
+
+    def to_dict(self) -> dict[str, Any]:
+        """The tables of a robot file, without the keys that have their default value."""
+        return self.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
+
+    def replace(self, changes: dict[str, Any]) -> Robot:
+        """A robot with some values changed: `robot.replace({"payload.mass_kg": 0.1,
+        "link.2.length_m": 0.4})`, links counted from 1."""
+        try:
+            return Robot.model_validate(_changed(self, changes))
+        except ValidationError:
+            return Robot.from_dict(
+                _changed(self.to_dict(), changes)
+            )  # says what is wrong in a file's words
+
+
+def _changed(tables: Any, changes: dict[str, Any]) -> dict[str, Any]:
+    """A robot, or the tables of its file, with some values changed: tables along the way, and as
+    they are the parts that do not change, which are not validated again."""
+    copied = lambda table: dict(table.__dict__) if isinstance(table, BaseModel) else table.copy()
+    out: dict[str, Any] = copied(tables)
+    for path, value in changes.items():
+        *parents, last = path.split(".")
+        table: Any = out
+        for part in parents:
+            key: Any = _number(table, part, path, value) if isinstance(table, list) else part
+            inner = table[key] if isinstance(table, list) else table.get(key)
+            inner = {} if inner is None else list(inner) if isinstance(inner, tuple) else inner
+            if not isinstance(inner, dict | list | BaseModel):
+                raise InputError(
+                    f"expected a place in a robot file; {part} isn't a table", key=path, value=value
+                )
+            table[key] = copied(inner)
+            table = table[key]
+        table[_number(table, last, path, value) if isinstance(table, list) else last] = value
+    return out
+
+
+def _number(table: list[Any], part: str, path: str, value: Any) -> int:
+    """The index of an entry of a list, from its number as people count."""
+    if not (part.isascii() and part.isdigit() and 1 <= int(part[:9]) <= len(table)):
+        raise InputError(
+            f"expected a number from 1 to {len(table)}, not {part!r}", key=path, value=value
+        )
+    return int(part) - 1
+
+
+def load(path: str | os.PathLike[str]) -> Robot:
+    """Read a robot file (TOML). Raises InputError, naming file, key, value and what was
+    expected."""
+    return Robot.from_dict(read_toml(path), file=os.fspath(path))
+
+
+def save(robot: Robot, path: str | os.PathLike[str]) -> None:
+    """Write a robot file (TOML) that `load` reads back to an equal robot."""
+    write_toml(path, robot.to_dict())

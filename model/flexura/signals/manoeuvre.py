@@ -1,0 +1,157 @@
+"""Manoeuvre files: what a robot is asked to do, and for how long."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..io import read_toml
+from .drive import Drive, JointDrive, check_smooth
+from .parsing import finite, from_spec
+from .signal import Signal
+
+
+@dataclass(frozen=True)
+class Manoeuvre:
+    """What a robot is asked to do: a drive, for how long, and how often the result is stored. Read
+    from a TOML file."""
+
+    name: str
+    duration_s: float
+    output_step_s: float
+    drive: Drive
+
+    @property
+    def t(self) -> np.ndarray:
+        """Times of the result [s], from 0 to the duration."""
+        return np.linspace(0.0, self.duration_s, round(self.duration_s / self.output_step_s) + 1)
+
+    def spec(self) -> dict[str, Any]:
+        """The tables of a manoeuvre file, every key given."""
+        own = {
+            "name": self.name,
+            "duration_s": self.duration_s,
+            "output_step_s": self.output_step_s,
+        }
+        return own | {"joint": self.drive.spec()}
+
+
+_KEYS = ("name", "duration_s", "output_step_s", "joint")
+
+
+_JOINT_KEYS = ("force", "motion", "kp", "kd", "prescribed")
+
+
+def load_manoeuvre(path: str | os.PathLike[str], joints: int) -> Manoeuvre:
+    """Read a manoeuvre file for a robot with that many joints. Raises InputError, naming file, key
+    and value."""
+    try:
+        return _manoeuvre(read_toml(path), joints)
+    except InputError as error:
+        raise error if error.file else error.in_file(os.fspath(path)) from None
+
+
+def _manoeuvre(data: dict[str, Any], joints: int) -> Manoeuvre:
+    _known(data, _KEYS, "")
+    duration = _number(data, "duration_s", "a duration above 0 in seconds", low=0.0)
+    step = _number(
+        data,
+        "output_step_s",
+        "a time above 0 in seconds, at most the duration",
+        low=0.0,
+        default=duration / 200,
+    )
+    if step > duration:
+        raise InputError(
+            f"expected at most the duration, {duration:g} s", key="output_step_s", value=step
+        )
+    if duration / step > 1e7:
+        raise InputError(
+            "expected at most 10 million output steps", key="output_step_s", value=step
+        )
+    tables = data.get("joint", [])
+    if not isinstance(tables, list) or len(tables) != joints:
+        count = len(tables) if isinstance(tables, list) else tables
+        raise InputError(
+            f"expected {joints} tables [[joint]], one for each joint of the robot",
+            key="joint",
+            value=count,
+        )
+    drives = []
+    for i, entry in enumerate(tables, 1):
+        key = f"joint[{i}]"
+        if not isinstance(entry, dict):
+            raise InputError("expected a table", key=key, value=entry)
+        _known(entry, _JOINT_KEYS, key + ".")
+        force = from_spec(entry["force"], key=f"{key}.force") if "force" in entry else None
+        motion = from_spec(entry["motion"], key=f"{key}.motion") if "motion" in entry else None
+        gains = [
+            _number(
+                entry, k, "a gain of 0 or more", key=f"{key}.", low=-0.0, default=0.0, closed=True
+            )
+            for k in ("kp", "kd")
+        ]
+        if motion is None and any(gains):
+            raise InputError(
+                "missing: gains kp and kd need a motion to follow", key=f"{key}.motion"
+            )
+        drives.append(
+            JointDrive(
+                force, motion, kp=gains[0], kd=gains[1], prescribed=_prescribed(entry, motion, key)
+            )
+        )
+    name = data.get("name", "")
+    if not isinstance(name, str):
+        raise InputError("expected a text", key="name", value=name)
+    return Manoeuvre(name, duration, step, Drive(tuple(drives)))
+
+
+def _prescribed(entry: dict[str, Any], motion: Signal | None, key: str) -> bool:
+    """Does this joint follow its motion exactly? Such a motion must not jump, and leaves no room
+    for a force of one's own."""
+    value = entry.get("prescribed", False)
+    if not isinstance(value, bool):
+        raise InputError("expected true or false", key=f"{key}.prescribed", value=value)
+    if not value:
+        return False
+    if motion is None:
+        raise InputError(
+            "missing: a prescribed joint needs a motion to follow", key=f"{key}.motion"
+        )
+    for name in ("force", "kp", "kd"):
+        if name in entry:
+            expected = "expected none: a prescribed joint takes the force that its motion needs"
+            raise InputError(expected, key=f"{key}.{name}", value=entry[name])
+    check_smooth(motion, f"{key}.motion")
+    return True
+
+
+def _known(data: dict[str, Any], keys: Sequence[str], prefix: str) -> None:
+    for key, value in data.items():
+        if key not in keys:
+            raise InputError(
+                f"an unknown key; known here: {', '.join(keys)}", key=prefix + key, value=value
+            )
+
+
+def _number(
+    data: dict[str, Any],
+    name: str,
+    expected: str,
+    *,
+    key: str = "",
+    low: float,
+    default: float | None = None,
+    closed: bool = False,
+) -> float:
+    value = data.get(name, default)
+    if value is None:
+        raise InputError(f"missing: expected {expected}", key=key + name)
+    if not finite(value) or not (value >= low if closed else value > low):
+        raise InputError(f"expected {expected}", key=key + name, value=value)
+    return float(value)

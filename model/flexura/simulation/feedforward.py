@@ -1,0 +1,33 @@
+"""Feedforwards for a controller, from the robot's own equations."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..signals import Signal, table
+from ..system import System
+from .simulate import inverse
+
+
+def gravity(system: System, motions: Sequence[Signal], t_s: Any) -> list[Signal]:
+    """Feedforwards that hold each joint against gravity along its motion, links straight: tables
+    over t_s (T,) [N or N m]."""
+    times = np.asarray(t_s, dtype=float)
+    rows, held = system.joint_rows, np.zeros((len(times), len(motions)))
+    for k, t in enumerate(times):
+        q = np.zeros(system.n)
+        q[rows] = [motion(t)[0] for motion in motions]
+        held[k] = system.gravity(q)[rows]
+    return [table(times, column) for column in held.T]
+
+
+def inverse_dynamics(
+    system: System, motions: Sequence[Signal], t_s: Any, rtol: float = 1e-7
+) -> list[Signal]:
+    """Feedforwards that the motions take, the links' bending included: tables over t_s (T,) of
+    `fx.inverse` [N or N m]."""
+    run = inverse(system, t_s, motions, rtol=rtol)
+    return [table(run.t, run[f"joint/{i}/drive"]) for i in range(1, len(motions) + 1)]

@@ -1,0 +1,137 @@
+"""The compiled integrator: a problem through time, with progress, interruption, and what ended
+it."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+
+from .. import core
+from ..control import Controller, DriveFunction, Sampled
+from ..signals import COLUMNS, Drive
+from .problem import MOST_STEPS, Problem, Progress, Solution
+from .recorder import limit_event
+
+STEPS_A_CALL = 400  # between two looks at the progress bar and the keyboard
+
+
+def solve(problem: Problem, progress: Progress = None) -> Solution:
+    """Integrate in the core (docs/theory/integration.md)."""
+    return _Integration(problem).run(progress)
+
+
+class _Integration:
+    """A run of the core in progress."""
+
+    def __init__(self, problem: Problem) -> None:
+        system, drive, t = problem.system, problem.drive, problem.t
+        self.problem, self.system, self.t, self.drive, self.rtol = (
+            problem,
+            system,
+            t,
+            drive,
+            problem.rtol,
+        )
+        joints = len(system.robot.links)
+        follows, function, sampler, rate = np.zeros(joints, dtype=np.uint8), None, None, 0.0
+        segments, ranges, gains = (
+            np.zeros((0, COLUMNS)),
+            np.zeros((joints, 4), dtype=np.int64),
+            np.zeros((joints, 2)),
+        )
+        sampled = np.zeros(joints, dtype=np.uint8)
+        if isinstance(drive, Drive):
+            segments, ranges, gains = drive.packed()
+            follows = drive.follows.astype(np.uint8)
+        elif isinstance(drive, Controller):
+            segments, ranges, gains, follows, sampled = drive.core_drives()
+            sampler, rate = drive.sampler(system), float(drive.rate_Hz)
+        elif isinstance(drive, Sampled):
+            sampler, rate = (
+                core.PythonSampler(system.equations, DriveFunction(drive.function, joints)),
+                float(drive.rate_Hz),
+            )
+        else:
+            function = drive
+        self.sampler = sampler
+        self.core = core.Simulation(
+            system.equations,
+            t,
+            problem.q,
+            problem.qd,
+            problem.rtol,
+            problem.method,
+            np.ascontiguousarray(segments),
+            ranges,
+            np.ascontiguousarray(gains),
+            follows,
+            sampled,
+            np.ascontiguousarray(system.limits),
+            function,
+            sampler,
+            rate,
+            0.0,
+            problem.numerical_damping,
+            MOST_STEPS,
+        )
+
+    def run(self, progress: Progress) -> Solution:
+        begun, t = time.perf_counter(), self.t
+        interrupted = False
+        try:
+            while len(t) > 1 and self.core.advance(STEPS_A_CALL):
+                if progress is not None:
+                    progress((self.core.progress()["t"] - t[0]) / (t[-1] - t[0]))
+            if len(t) == 1:
+                self.core.advance(1)
+            if progress is not None and self.core.progress()["status"] == "done":
+                progress(1.0)
+        except KeyboardInterrupt:
+            interrupted = True
+        about = self.core.progress()
+        times, states, accounts, forces = (np.asarray(a) for a in self.core.rows())
+        events = [] if interrupted else self._events(about)
+        if interrupted or about["status"] == "interrupted":
+            events = [{"t": about["t"], "level": "WARN", "text": "interrupted"}]
+        meta: dict[str, Any] = {
+            "steps": about["steps"],
+            "rejected": about["rejected"],
+            "evaluations": about["passes"],
+            "wall_s": time.perf_counter() - begun,
+            "complete": about["status"] == "done" and not interrupted,
+            "events": events,
+            "drive": self.drive.spec() if hasattr(self.drive, "spec") else "Python function",
+            "rtol": self.rtol,
+            "method": about["method"],
+        }
+        return Solution(times, states, accounts, forces, meta, sampler=self.sampler)
+
+    def _events(self, about: dict[str, Any]) -> list[dict[str, Any]]:
+        """What ended the run, if it is not its time."""
+        status, at = about["status"], float(about["t"])
+        if status == "done":
+            return []
+        z = np.asarray(self.core.state())
+        if status == "limit":
+            return [limit_event(self.system, int(about["joint"]), at, z[self.system.joint_rows])]
+        i = int(about["joint"]) + 1
+        where = (
+            "" if i == 0 else f" in {'the bending of link' if about['elastic'] else 'joint'} {i}"
+        )
+        what = {
+            "stuck": f"no step is short enough for rtol = {self.rtol:g}{where}; "
+            "try another tolerance or method, look at gains and forces",
+            "diverged": f"the state is not a number any more{where}; "
+            "a gain, a force or a start value is too large",
+            "exhausted": f"{MOST_STEPS} steps are used up{where}; "
+            'try method = "implicit", a larger rtol or a shorter time',
+        }[status]
+        return [
+            {
+                "t": at,
+                "level": "ERROR",
+                "text": f"the simulation got no further than t = {at:.6g} s: {what}",
+            }
+        ]

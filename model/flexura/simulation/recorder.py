@@ -1,0 +1,141 @@
+"""A finished simulation as a Run: its channels, their units, and the energy balance."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..io import STATIONS, Run
+from ..robot import Robot
+from ..system import System
+from .problem import Solution
+
+
+def channel_units(robot: Robot) -> dict[str, str]:
+    """The channels that a simulation of this robot has, in their order, with their units."""
+    units: dict[str, str] = {}
+    for i, link in enumerate(robot.links, 1):
+        turns = link.joint.type == "R"
+        kinds = ("rad", "rad/s", "N m") if turns else ("m", "m/s", "N")
+        units |= {
+            f"joint/{i}/{what}": unit
+            for what, unit in zip(("position", "velocity", "drive"), kinds, strict=True)
+        }
+    for i, link in enumerate(robot.links, 1):
+        units |= {f"link/{i}/x": "m", f"link/{i}/y": "m", f"link/{i}/angle": "rad"}
+        if link.flexible:
+            units |= {f"link/{i}/tip_deflection": "m", f"link/{i}/tip_slope": "rad"}
+            units |= {f"link/{i}/deflection/{k}": "m" for k in range(STATIONS)}
+    energies = ("kinetic", "strain", "potential", "work", "loss", "numerical_loss")
+    return units | {"tip/x": "m", "tip/y": "m"} | {f"energy/{name}": "J" for name in energies}
+
+
+def observed(robot: Robot) -> list[str]:
+    """The channels that the core reads from a state, in the order of `System.observe`."""
+    accounts = ("energy/work", "energy/loss", "energy/numerical_loss")
+    return [
+        name
+        for name in channel_units(robot)
+        if not name.startswith("joint/") and name not in accounts
+    ]
+
+
+WORK, LOSS, NUMERICAL, STRAIN = range(
+    4
+)  # columns of the accounts, as Account of model/core/plant.hpp counts them
+NOTED, DOUBTED, REFUSED = (
+    1e-3,
+    1e-2,
+    0.1,
+)  # of the energies: a balance beyond is a note, an event, the end of trust in a run
+
+
+def record(system: System, solution: Solution) -> Run:
+    """The Run of a solution: its channels, the balance of its energies, and the solver's
+    metadata."""
+    n, t, states, accounts = system.n, solution.t, solution.states, solution.accounts
+    q, v = np.ascontiguousarray(states[:, :n]), np.ascontiguousarray(states[:, n:])
+    seen = system.observe(q, v) if solution.seen is None else solution.seen
+    found: list[np.ndarray] = []
+    for i, row in enumerate(system.joint_rows):
+        found += [q[:, row], v[:, row], solution.forces[:, i]]
+    found += [*seen.T, *accounts[:, :STRAIN].T]
+    units = channel_units(system.robot)
+    channels = {
+        name: np.ascontiguousarray(values) for name, values in zip(units, found, strict=True)
+    }
+    about = describe(system, energy_error(seen[:, -3:], accounts, solution.jumps)) | solution.meta
+    if len(t):
+        about["numerical_loss_J"] = float(accounts[-1, NUMERICAL])
+    return judged(Run(t, channels, units, about, states))
+
+
+def judged(run: Run) -> Run:
+    """The Run with what its energy balance says of it: nothing, a note, a warning, or that it is
+    not to be trusted."""
+    error, end = run.meta["energy_error"], float(run.t[-1]) if len(run.t) else 0.0
+    if not error > NOTED:
+        return run
+    text = f"the energies do not balance: {error:.1%} of the largest of them is missing"
+    level = "INFO" if error <= DOUBTED else "WARN" if error <= REFUSED else "ERROR"
+    run.meta["events"] = [*run.meta.get("events", []), {"t": end, "level": level, "text": text}]
+    if not error <= REFUSED:
+        run.meta["complete"] = False
+    return run
+
+
+def describe(system: System, error: float) -> dict[str, Any]:
+    """What the metadata of every simulation says: of what, by what, and how well the energy
+    balances."""
+    robot = system.robot
+    return {
+        "source": "simulation",
+        "program": "flexura",
+        "name": robot.name,
+        "structure": robot.structure,
+        "unknowns": system.n,
+        "energy_error": error,
+        "robot": robot.to_dict(),
+    }
+
+
+def energy_error(energies: np.ndarray, accounts: np.ndarray, jumps: Any = 0.0) -> float:
+    """How far the energies (T, 3) and accounts (T, 4) of a run are from balancing, relative to the
+    largest of them.
+
+    The larger of |E - E(0) - work + loss + numerical loss - jumps| and |strain - strain(0) - its
+    own integral|; `jumps` (T,): what E has jumped by so far.
+    """
+    if not len(energies):
+        return 0.0
+    since = accounts - accounts[0]
+    change = energies - energies[0]
+    balance = change.sum(axis=1) - since[:, WORK] + since[:, LOSS] + since[:, NUMERICAL] - jumps
+    strain = change[:, 1] - since[:, STRAIN] if not np.any(jumps) else np.zeros(1)
+    scale = max(
+        np.abs(energies).max(), np.abs(change).max(), np.abs(accounts[:, :STRAIN]).max(), 1e-300
+    )
+    return float(max(np.abs(balance).max(), np.abs(strain).max()) / scale)
+
+
+def limit_event(system: System, joint: int, t: float, position: np.ndarray) -> dict[str, Any]:
+    """What stopped joint (from 0) at t, with the joints at `position` (N,)."""
+    robot, (low, high) = system.robot, system.limits[joint]
+    kind, own, travel = (
+        robot.links[joint].joint.type,
+        robot.links[joint].joint.limits,
+        robot.travel(joint),
+    )
+    bound = low if abs(position[joint] - low) < abs(position[joint] - high) else high
+    if abs(position[joint] - bound) > 1e-6 * max(1.0, abs(bound)):
+        text = f"joint {joint + 1} (Pa) ran into the sleeve of link {joint}: stopped"
+    elif bound in travel and (own is None or bound not in own):
+        link = joint if kind == "Pa" else joint + 1
+        text = f"joint {joint + 1} ({kind}) reached the end of link {link}, at {bound:g} m: stopped"
+    else:
+        text = (
+            f"joint {joint + 1} left its limits, {low:g} to {high:g} "
+            f"{'rad' if kind == 'R' else 'm'}: stopped"
+        )
+    return {"t": t, "level": "ERROR", "text": text}

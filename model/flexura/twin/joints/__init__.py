@@ -1,0 +1,1 @@
+"""Joints in Exudyn: revolute, prismatic, sliding along a beam; drives and friction in them."""

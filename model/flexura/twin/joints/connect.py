@@ -1,0 +1,203 @@
+"""A joint of the twin: constraints that leave one relative coordinate, and what acts on that
+coordinate.
+
+The coordinate is a marker of Exudyn whose value is the joint's position [m or rad] and whose
+Jacobian is the direction of virtual work: a force on it acts on the hub and back on the previous
+link, at the point and along the line where they touch. Drive, friction, lock and rotor all attach
+to it. The rotor is a mass of its own with one coordinate that the joint's coordinate is tied to,
+which gives exactly 1/2 I (d eta/dt)^2 between two moving links.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...robot import Joint, Link
+from ..links.part import Attachment, Frame
+from . import sliding
+
+FRICTION_SPEED = 1e-3  # m/s or rad/s: Coulomb friction is f tanh(velocity / this)
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """A joint's coordinate in Exudyn: `marker` measures it, `load` acts on it, `servo` is its PD
+    controller or None.
+
+    `kept` is what Exudyn only refers to.
+    """
+
+    marker: Any
+    load: Any
+    servo: Any = None
+    kept: Any = None
+
+
+def start_frame(link: Link, previous: Frame, length: float, speed: float) -> Frame:
+    """The straight start of a link; `previous` is the link before it, of that length, or the base
+    (0)."""
+    joint = link.joint
+    if joint.type == "R":
+        return previous.along(length, turn=joint.start, spin=speed)
+    if joint.type == "Pa":
+        return previous.along(joint.start, slide=speed, turn=joint.angle_rad)
+    return previous.along(length, turn=joint.angle_rad).along(
+        joint.start - link.length_m, slide=speed
+    )
+
+
+@dataclass(frozen=True)
+class Site:
+    """Where a joint is built: the start of the previous link's tip and of the link's origin, the
+    joint's speed [m/s or rad/s].
+
+    `tiny`: mass and inertia of bodies that only hold others.
+    """
+
+    mbs: Any
+    tip: Frame
+    origin: Frame
+    speed: float
+    tiny: tuple[float, float]
+
+
+def connect(
+    on: Site, link: Link, previous: Any, part: Any, places: np.ndarray | None
+) -> tuple[Any, Any]:
+    """Constrain `part` to `previous` by the joint of `link`; returns the marker of its coordinate,
+    and the node if it has one.
+
+    `places`: the points of the hub or sleeve of a joint that slides on a flexible link; None: it
+    doesn't.
+    """
+    joint, mbs = link.joint, on.mbs
+    if joint.type == "R":
+        return _revolute(mbs, joint, previous.tip, part.origin), None
+    if joint.type == "Pa":
+        if places is None:
+            return _prismatic(
+                mbs, previous.origin, part.origin, part.origin, 0.0, joint.angle_rad
+            ), None
+        hub = sliding.rigid(mbs, part.origin, on.origin, on.tiny)
+        line = sliding.Line(hub, on.origin, -joint.angle_rad)
+        node = sliding.hold(mbs, line, previous, places, joint.start, on.speed, on.tiny)
+        return sliding.marker_of(mbs, node), node
+    sleeve = sliding.rigid(mbs, previous.tip, on.tip, on.tiny)
+    if places is None:  # d is where the tip of link i is
+        return _prismatic(mbs, sleeve, part.origin, part.tip, joint.angle_rad, 0.0), None
+    line = sliding.Line(sleeve, on.tip, joint.angle_rad)
+    behind = sliding.hold(mbs, line, part, places, link.length_m - joint.start, -on.speed, on.tiny)
+    node = sliding.rest(mbs, behind, link.length_m, joint.start, on.speed)
+    return sliding.marker_of(mbs, node), node
+
+
+def _revolute(mbs: Any, joint: Joint, tip: Attachment, hub: Attachment) -> Any:
+    from exudyn import itemInterface as eii
+
+    mbs.AddObject(eii.ObjectJointRevolute2D(markerNumbers=[tip.marker, hub.marker]))
+    turns = mbs.AddNode(
+        eii.NodeGenericData(initialCoordinates=[joint.start], numberOfDataCoordinates=1)
+    )  # counts whole turns
+    return mbs.AddMarker(
+        eii.MarkerBodiesRelativeRotationCoordinate(
+            bodyNumbers=[tip.body, hub.body],
+            localPosition0=tip.place,
+            localPosition1=hub.place,
+            axis0=[0, 0, 1],
+            nodeNumber=turns,
+        )
+    )
+
+
+def _prismatic(
+    mbs: Any, rail: Attachment, hub: Attachment, end: Attachment, axis: float, turned: float
+) -> Any:
+    """`hub` slides on a line at the angle `axis` in the frame of `rail`, `turned` to it; the
+    coordinate is where `end` is."""
+    from exudyn import itemInterface as eii
+
+    along = [math.cos(axis), math.sin(axis), 0.0]
+    normal = [math.sin(turned), math.cos(turned), 0.0]  # of the line, in the hub's frame
+    markers = [rail.marker, hub.marker]
+    mbs.AddObject(
+        eii.ObjectJointPrismatic2D(markerNumbers=markers, axisMarker0=along, normalMarker1=normal)
+    )
+    return mbs.AddMarker(
+        eii.MarkerBodiesRelativeTranslationCoordinate(
+            bodyNumbers=[rail.body, end.body],
+            localPosition0=rail.place,
+            localPosition1=end.place,
+            axis0=along,
+        )
+    )
+
+
+def equip(
+    mbs: Any, joint: Joint, marker: Any, fixed: Any, speed: float, gains: tuple[float, float]
+) -> Coordinate:
+    """Put drive, PD gains (stiffness, damping), friction, rotor or lock on a joint's coordinate.
+
+    `fixed` is a marker whose coordinate is always 0, `speed` the joint's velocity at the start.
+    """
+    from exudyn import itemInterface as eii
+
+    load = mbs.AddLoad(eii.LoadCoordinate(markerNumber=marker, load=0.0))
+    if joint.locked:
+        mbs.AddObject(
+            eii.ObjectConnectorCoordinate(markerNumbers=[fixed, marker], offset=joint.start)
+        )
+        return Coordinate(marker, load)
+    servo = kept = None
+    if any(gains):
+        # its offsets follow the motion; kp r as a load instead, against a spring without offset, is
+        # as good in theory, but where both are large the turning of their lines of action, which
+        # Newton doesn't see, spoils its convergence
+        servo = mbs.AddObject(
+            eii.ObjectConnectorCoordinateSpringDamperExt(
+                markerNumbers=[fixed, marker],
+                stiffness=gains[0],
+                damping=gains[1],
+                frictionProportionalZone=1.0,
+            )
+        )
+    if joint.viscous_friction or joint.coulomb_friction:
+        spring = mbs.AddObject(
+            eii.ObjectConnectorCoordinateSpringDamper(
+                markerNumbers=[fixed, marker], damping=joint.viscous_friction
+            )
+        )
+        if joint.coulomb_friction:
+            kept = _friction(mbs, spring, joint.coulomb_friction)
+            mbs.SetObjectParameter(spring, "springForceUserFunction", kept)
+    if joint.rotor_inertia:
+        rotor = mbs.AddNode(
+            eii.NodeGenericODE2(
+                numberOfODE2Coordinates=1,
+                referenceCoordinates=[0.0],
+                initialCoordinates=[joint.start],
+                initialCoordinates_t=[speed],
+            )
+        )
+        mbs.AddObject(
+            eii.ObjectGenericODE2(nodeNumbers=[rotor], massMatrix=[[joint.rotor_inertia]])
+        )
+        own = mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=rotor, coordinate=0))
+        mbs.AddObject(eii.ObjectConnectorCoordinate(markerNumbers=[own, marker]))
+    return Coordinate(marker, load, servo, kept)
+
+
+def _friction(mbs: Any, spring: Any, coulomb: float) -> Any:
+    """c v + f tanh(v / v0) as an expression that Exudyn evaluates without calling Python."""
+    from exudyn import symbolic
+    from exudyn.advancedUtilities import CreateSymbolicUserFunction
+
+    tanh: Any = symbolic.tanh
+
+    def force(mbs, t, itemNumber, displacement, velocity, stiffness, damping, offset):  # type: ignore[no-untyped-def]
+        return damping * velocity + coulomb * tanh(velocity / FRICTION_SPEED)
+
+    return CreateSymbolicUserFunction(mbs, force, "springForceUserFunction", spring)

@@ -1,0 +1,248 @@
+"""A flexible link as ObjectANCFCable2D: an Euler-Bernoulli beam in absolute nodal coordinates.
+
+Coordinates of a node: place x, y and slope vector r' = (x', y'); Hermite cubics between. Hub and
+payload are ObjectGenericODE2 on the end nodes with diag(m, m, J, J): exact for rotation where |r'|
+= 1, and no joint is needed.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from .part import Attachment, Frame, Lump, Motion, hang
+from .properties import BeamValues
+
+PROGRAM = "ObjectANCFCable2D"
+NEAR = (
+    5  # elements of a stub as long as the link's, so that a sleeve's first spans are as stiff there
+)
+LIGHT = 1e-4  # mass per length of a stub, relative to the link's end
+
+# Exudyn's own integration points: more of them would see the axial strain between its points
+_AXIAL = np.polynomial.legendre.leggauss(5)
+_BENDING = np.polynomial.legendre.leggauss(3)
+
+
+class CableLink:
+    """A flexible link of equal ANCF cable elements between `hub` and `payload`."""
+
+    width = 4
+
+    def __init__(
+        self,
+        mbs: Any,
+        values: BeamValues,
+        hub: Lump,
+        payload: Lump,
+        frame: Frame,
+        gravity: tuple[float, float],
+        stubs: tuple[float, float] = (0.0, 0.0),
+    ) -> None:
+        """`stubs`: lengths [m] by which the beam goes on straight and almost without mass before
+        its origin and after its tip.
+
+        A hub or sleeve may then stand at the link's very end. The link's own nodes and energies
+        leave them out.
+        """
+        self.values, self.hub, self.payload = values, hub, payload
+        count, length = len(values), values.length
+        ends = np.concatenate(
+            [
+                _stub(-stubs[0], length),
+                np.arange(count + 1) * length,
+                _stub(stubs[1], length) + count * length,
+            ]
+        )
+        nodes = [_add_node(mbs, frame.along(x)) for x in ends]
+        first = int(np.searchsorted(ends, -length / 2))
+        self.nodes = nodes[first : first + count + 1]
+        self.starts, self.lengths = ends[:-1], np.diff(ends)
+        self.pairs = list(pairwise(nodes))
+        elements = [
+            _add_element(mbs, values, k - first, pair, size)
+            for k, (pair, size) in enumerate(zip(self.pairs, self.lengths, strict=True))
+        ]
+        mine = elements[first : first + count]
+        for element in mine:
+            hang(mbs, element, gravity)
+        for node, lump in ((self.nodes[0], hub), (self.nodes[-1], payload)):
+            _add_lump(mbs, node, lump, gravity)
+        self.origin = _end(mbs, mine[0], 0.0, self.nodes[0])
+        self.tip = _end(mbs, mine[-1], length, self.nodes[-1])
+
+    def layer(self, mbs: Any, sliding: Any) -> list[Any]:
+        """Markers of new elements without mass and stiffness, along the beam on its nodes, that
+        carry a sliding coordinate."""
+        from exudyn import itemInterface as eii
+
+        elements = [
+            mbs.AddObject(
+                eii.ObjectALEANCFCable2D(
+                    length=size,
+                    massPerLength=0.0,
+                    movingMassFactor=0.0,
+                    bendingStiffness=0.0,
+                    axialStiffness=0.0,
+                    nodeNumbers=[*pair, sliding],
+                    addALEvariation=False,
+                )
+            )
+            for pair, size in zip(self.pairs, self.lengths, strict=True)
+        ]
+        return [
+            mbs.AddMarker(eii.MarkerBodyCable2DCoordinates(bodyNumber=element))
+            for element in elements
+        ]
+
+    def motion_at_origin(self, q: np.ndarray, v: np.ndarray) -> Motion:
+        return _node_motion(q[:, :4], v[:, :4])
+
+    def motion_at_tip(self, q: np.ndarray, v: np.ndarray) -> Motion:
+        return _node_motion(q[:, -4:], v[:, -4:])
+
+    def point(self, q: np.ndarray, x: float) -> np.ndarray:
+        length = self.values.length
+        k = min(int(x / length), len(self.values) - 1)
+        return np.einsum("k,tkd->td", _shapes(x / length - k, length)[0], _elements(q)[:, k])
+
+    def kinetic(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        length = self.values.length
+        ends = _elements(v)
+        products = np.einsum("tekd,kl,teld->te", ends, _mass_matrix(length), ends)
+        lumps = self.hub.kinetic(self.motion_at_origin(q, v)) + self.payload.kinetic(
+            self.motion_at_tip(q, v)
+        )
+        return 0.5 * products @ self.values.mass + lumps
+
+    def strain(self, q: np.ndarray) -> np.ndarray:
+        length, ends = self.values.length, _elements(q)
+        out = np.zeros(len(q))
+        for u, w in zip(*_AXIAL, strict=True):
+            slope = np.einsum("k,tekd->ted", _shapes((u + 1) / 2, length)[1], ends)
+            stretch = np.hypot(slope[..., 0], slope[..., 1]) - 1
+            out += 0.25 * length * w * (stretch**2 @ self.values.axial)
+        for u, w in zip(*_BENDING, strict=True):
+            _, first, second = _shapes((u + 1) / 2, length)
+            slope, bend = (
+                np.einsum("k,tekd->ted", first, ends),
+                np.einsum("k,tekd->ted", second, ends),
+            )
+            curvature = (slope[..., 0] * bend[..., 1] - slope[..., 1] * bend[..., 0]) / (
+                slope**2
+            ).sum(axis=-1)
+            out += 0.25 * length * w * (curvature**2 @ self.values.bending)
+        return out
+
+    def moment(self, q: np.ndarray) -> np.ndarray:
+        length = self.values.length
+        mean = np.array([1 / 2, length / 12, 1 / 2, -length / 12])  # means of the Hermite cubics
+        beam = np.einsum("e,k,tekd->td", self.values.mass * length, mean, _elements(q))
+        return beam + self.hub.mass * q[:, :2] + self.payload.mass * q[:, -4:-2]
+
+
+def _stub(length: float, size: float) -> np.ndarray:
+    """Ends of a stub's elements away from the link, ascending: NEAR of the link's `size`, then
+    twice as long ones, so that they reach over `length` [m]; before the link if it is negative,
+    else after it."""
+    count = math.ceil(abs(length) / size - 1e-9)
+    ends = size * np.concatenate(
+        [np.arange(1, min(count, NEAR) + 1), np.arange(NEAR + 2, count + 2, 2)]
+    )
+    return -ends[::-1] if length < 0 else ends
+
+
+def _add_node(mbs: Any, here: Frame) -> Any:
+    from exudyn import itemInterface as eii
+
+    (c, s), w = here.axis, here.omega
+    place, speed = [here.x, here.y, c, s], [here.vx, here.vy, -w * s, w * c]
+    return mbs.AddNode(eii.NodePoint2DSlope1(referenceCoordinates=place, initialVelocities=speed))
+
+
+def _add_element(mbs: Any, values: BeamValues, k: int, nodes: tuple[Any, Any], size: float) -> Any:
+    """Element k of the link; the stubs, which have k < 0 or k >= len(values), are like the link's
+    end, of LIGHT mass."""
+    from exudyn import itemInterface as eii
+
+    near = min(max(k, 0), len(values) - 1)
+    return mbs.AddObject(
+        eii.ObjectANCFCable2D(
+            length=size,
+            massPerLength=values.mass[near] * (1.0 if near == k else LIGHT),
+            bendingStiffness=values.bending[near],
+            axialStiffness=values.axial[near],
+            bendingDamping=values.beta * values.bending[near],
+            nodeNumbers=list(nodes),
+        )
+    )
+
+
+def _add_lump(mbs: Any, node: Any, lump: Lump, gravity: tuple[float, float]) -> None:
+    from exudyn import itemInterface as eii
+
+    if lump.mass == 0 and lump.inertia == 0:
+        return
+    m, j = lump.mass, lump.inertia
+    mbs.AddObject(eii.ObjectGenericODE2(nodeNumbers=[node], massMatrix=np.diag([m, m, j, j])))
+    if any(gravity):
+        marker = mbs.AddMarker(eii.MarkerNodePosition(nodeNumber=node))
+        mbs.AddLoad(
+            eii.LoadForceVector(
+                markerNumber=marker, loadVector=[m * gravity[0], m * gravity[1], 0.0]
+            )
+        )
+
+
+def _end(mbs: Any, element: Any, x: float, node: Any) -> Attachment:
+    from exudyn import itemInterface as eii
+
+    return Attachment(
+        element, [x, 0.0, 0.0], mbs.AddMarker(eii.MarkerNodeRigid(nodeNumber=node)), rigid=False
+    )
+
+
+def _node_motion(q: np.ndarray, v: np.ndarray) -> Motion:
+    slope, rate = q[:, 2:], v[:, 2:]
+    omega = (slope[:, 0] * rate[:, 1] - slope[:, 1] * rate[:, 0]) / (slope**2).sum(axis=-1)
+    return Motion(q[:, :2], np.arctan2(slope[:, 1], slope[:, 0]), v[:, :2], omega)
+
+
+def _elements(q: np.ndarray) -> np.ndarray:
+    """Nodal coordinates (T, 4 nodes) as (T, elements, 4, 2): r, r' of the element's start, r, r' of
+    its end."""
+    nodes = q.reshape(len(q), -1, 2, 2)
+    return np.concatenate([nodes[:, :-1], nodes[:, 1:]], axis=2)
+
+
+def _shapes(s: float, length: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Hermite cubics of r, r', r, r' at s = x/length, and their first and second derivatives by
+    x."""
+    value = np.array(
+        [
+            1 - 3 * s**2 + 2 * s**3,
+            length * (s - 2 * s**2 + s**3),
+            3 * s**2 - 2 * s**3,
+            length * (s**3 - s**2),
+        ]
+    )
+    first = np.array(
+        [6 * (s**2 - s) / length, 1 - 4 * s + 3 * s**2, 6 * (s - s**2) / length, 3 * s**2 - 2 * s]
+    )
+    second = np.array([(12 * s - 6) / length, 6 * s - 4, (6 - 12 * s) / length, 6 * s - 2]) / length
+    return value, first, second
+
+
+def _mass_matrix(h: float) -> np.ndarray:
+    """Integrals of products of the cubics over an element of length h."""
+    return (h / 420) * np.array(
+        [
+            [156, 22 * h, 54, -13 * h],
+            [22 * h, 4 * h**2, 13 * h, -3 * h**2],
+            [54, 13 * h, 156, -22 * h],
+            [-13 * h, -3 * h**2, -22 * h, 4 * h**2],
+        ]
+    )

@@ -1,0 +1,140 @@
+"""A flexible link as ObjectBeamGeometricallyExact2D: a Reissner beam, quadratic elements of three
+nodes.
+
+Coordinates of a node: place x, y and the section's angle; quadratic Lagrange polynomials between.
+Hub and payload are ObjectRigidBody2D on the end nodes.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .part import Attachment, Frame, Lump, Motion, hang
+from .properties import BeamValues
+
+PROGRAM = "ObjectBeamGeometricallyExact2D"
+
+_STRAIN = np.polynomial.legendre.leggauss(2)  # Exudyn's own points: reduced, against locking
+_MASS = np.polynomial.legendre.leggauss(3)
+
+
+class ExactLink:
+    """A flexible link of equal geometrically exact elements between `hub` and `payload`."""
+
+    width = 3
+
+    def __init__(
+        self,
+        mbs: Any,
+        values: BeamValues,
+        hub: Lump,
+        payload: Lump,
+        frame: Frame,
+        gravity: tuple[float, float],
+    ) -> None:
+        from exudyn import itemInterface as eii
+
+        self.values, self.hub, self.payload = values, hub, payload
+        self.nodes = []
+        for k in range(2 * len(values) + 1):
+            here = frame.along(k * values.length / 2)
+            self.nodes.append(
+                mbs.AddNode(
+                    eii.NodeRigidBody2D(
+                        referenceCoordinates=list(here[:3]), initialVelocities=list(here[3:])
+                    )
+                )
+            )
+        for k in range(len(values)):
+            element = mbs.AddObject(
+                eii.ObjectBeamGeometricallyExact2D(
+                    length=values.length,
+                    massPerLength=values.mass[k],
+                    crossSectionInertia=values.rotary[k],
+                    bendingStiffness=values.bending[k],
+                    axialStiffness=values.axial[k],
+                    shearStiffness=values.shear[k],
+                    bendingDamping=values.beta * values.bending[k],
+                    nodeNumbers=self.nodes[2 * k : 2 * k + 3],
+                )
+            )
+            hang(mbs, element, gravity)
+        self.origin = _end(mbs, self.nodes[0], hub, gravity)
+        self.tip = _end(mbs, self.nodes[-1], payload, gravity)
+
+    def motion_at_origin(self, q: np.ndarray, v: np.ndarray) -> Motion:
+        return Motion(q[:, :2], q[:, 2], v[:, :2], v[:, 2])
+
+    def motion_at_tip(self, q: np.ndarray, v: np.ndarray) -> Motion:
+        return Motion(q[:, -3:-1], q[:, -1], v[:, -3:-1], v[:, -1])
+
+    def point(self, q: np.ndarray, x: float) -> np.ndarray:
+        k = min(int(x / self.values.length), len(self.values) - 1)
+        value, _ = _shapes(2 * (x / self.values.length - k) - 1, self.values.length)
+        return np.einsum("k,tkd->td", value, _elements(q)[:, k, :, :2])
+
+    def kinetic(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        ends, out = _elements(v), np.zeros(len(v))
+        for u, w in zip(*_MASS, strict=True):
+            rate = np.einsum("k,tekd->ted", _shapes(u, self.values.length)[0], ends)
+            density = (rate[..., :2] ** 2).sum(axis=-1) @ self.values.mass + rate[
+                ..., 2
+            ] ** 2 @ self.values.rotary
+            out += 0.25 * self.values.length * w * density
+        return (
+            out
+            + self.hub.kinetic(self.motion_at_origin(q, v))
+            + self.payload.kinetic(self.motion_at_tip(q, v))
+        )
+
+    def strain(self, q: np.ndarray) -> np.ndarray:
+        ends, out = _elements(q), np.zeros(len(q))
+        for u, w in zip(*_STRAIN, strict=True):
+            value, first = _shapes(u, self.values.length)
+            angle = np.einsum("k,tek->te", value, ends[..., 2])
+            slope = np.einsum("k,tekd->ted", first, ends)
+            c, s = np.cos(angle), np.sin(angle)
+            axial = c * slope[..., 0] + s * slope[..., 1] - 1
+            shear = -s * slope[..., 0] + c * slope[..., 1]
+            density = (
+                axial**2 @ self.values.axial
+                + shear**2 @ self.values.shear
+                + slope[..., 2] ** 2 @ self.values.bending
+            )
+            out += 0.25 * self.values.length * w * density
+        return out
+
+    def moment(self, q: np.ndarray) -> np.ndarray:
+        simpson = np.array([1 / 6, 4 / 6, 1 / 6])
+        beam = np.einsum(
+            "e,k,tekd->td", self.values.mass * self.values.length, simpson, _elements(q)[..., :2]
+        )
+        return beam + self.hub.mass * q[:, :2] + self.payload.mass * q[:, -3:-1]
+
+
+def _end(mbs: Any, node: Any, lump: Lump, gravity: tuple[float, float]) -> Attachment:
+    from exudyn import itemInterface as eii
+
+    # also without mass: a joint's coordinate needs a body, and the beam's elements don't offer one
+    body = mbs.AddObject(
+        eii.ObjectRigidBody2D(mass=lump.mass, inertia=lump.inertia, nodeNumber=node)
+    )
+    if lump.mass > 0:
+        hang(mbs, body, gravity)
+    return Attachment(body, [0.0, 0.0, 0.0], mbs.AddMarker(eii.MarkerBodyRigid(bodyNumber=body)))
+
+
+def _elements(q: np.ndarray) -> np.ndarray:
+    """Nodal coordinates (T, 3 nodes) as (T, elements, 3, 3): x, y, angle of the element's start,
+    middle and end."""
+    nodes = q.reshape(len(q), -1, 3)
+    return np.stack([nodes[:, :-2:2], nodes[:, 1:-1:2], nodes[:, 2::2]], axis=2)
+
+
+def _shapes(u: float, length: float) -> tuple[np.ndarray, np.ndarray]:
+    """Quadratic Lagrange polynomials of start, middle and end at u in [-1, 1], and their
+    derivatives by x."""
+    value = np.array([u * (u - 1) / 2, 1 - u**2, u * (u + 1) / 2])
+    return value, np.array([u - 0.5, -2 * u, u + 0.5]) * 2 / length

@@ -1,0 +1,148 @@
+"""What Exudyn needs to know of a link: values of its beam elements, or the sum of its rigid
+parts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...robot import Link, Payload
+
+# EA L^2/EI where the robot file gives no section: axial strains of 1e-5, far below what bending
+# does
+AXIAL_RATIO = 1e5
+SHEAR_CORRECTION = 5 / 6  # rectangular section
+POISSON = 0.3
+# mass and inertia of a rigid link without any, relative to the robot's total and to total * reach^2
+VANISHING = 1e-9
+
+_GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(5)
+
+
+@dataclass(frozen=True)
+class BeamValues:
+    """A flexible link cut into equal elements of `length` [m]; the other values are (elements,) in
+    SI units.
+
+    `mass` [kg/m] and the stiffnesses `bending` [N m^2], `axial` [N], `shear` [N] are means over the
+    element: its integrals are right, and the error of a tapering link is of second order in the
+    elements' length. `rotary` [kg m] is the section's moment of inertia, rhoA EI/EA. The bending
+    damping is beta EI, so that D = beta K.
+    """
+
+    length: float
+    mass: np.ndarray
+    bending: np.ndarray
+    axial: np.ndarray
+    shear: np.ndarray
+    rotary: np.ndarray
+    beta: float
+
+    def __len__(self) -> int:
+        return len(self.mass)
+
+
+def beam_values(link: Link, elements: int) -> BeamValues:
+    """The values of a flexible link's elements."""
+    ends = np.linspace(0.0, link.length_m, elements + 1)
+    kinks = np.array(link.breaks())
+    mass = _means(link.mass_per_length, ends, kinks)
+    bending = _means(link.bending_stiffness, ends, kinks)
+    if link.axial_stiffness(0.0) is None:
+        axial = np.full(elements, AXIAL_RATIO * bending.mean() / link.length_m**2)
+        shear = axial
+    else:
+        axial = _means(link.axial_stiffness, ends, kinks)
+        shear = axial * SHEAR_CORRECTION / (2 * (1 + POISSON))
+    return BeamValues(
+        link.length_m / elements,
+        mass,
+        bending,
+        axial,
+        shear,
+        mass * bending / axial,
+        link.damping.beta_s,
+    )
+
+
+def uniform(link: Link) -> bool:
+    """Whether a link has one section, or one mass per length and stiffness, from end to end."""
+    return not any(
+        isinstance(v, list)
+        for v in (link.section, link.mass_per_length_kg_m, link.bending_stiffness_N_m2)
+    )
+
+
+def _means(function: Any, ends: np.ndarray, kinks: np.ndarray) -> np.ndarray:
+    """Means of function(x) between consecutive ends; pieces between kinks are integrated apart."""
+    out = np.empty(len(ends) - 1)
+    for k, (a, b) in enumerate(pairwise(ends)):
+        edges = np.concatenate([[a], kinks[(kinks > a) & (kinks < b)], [b]])
+        middle, half = (edges[1:] + edges[:-1]) / 2, (edges[1:] - edges[:-1]) / 2
+        values = function(middle[:, None] + half[:, None] * _GAUSS_X)
+        out[k] = np.sum(half[:, None] * _GAUSS_W * values) / (b - a)
+    return out
+
+
+class Inertia(NamedTuple):
+    """Mass [kg], its centre's distance from the link's origin along the link [m], inertia about
+    that centre [kg m^2]."""
+
+    mass: float
+    centre: float
+    inertia: float
+
+    def plus(self, mass: float, at: float, inertia: float) -> Inertia:
+        """Both together, by the parallel-axis theorem."""
+        total = self.mass + mass
+        if total == 0:
+            return Inertia(0.0, self.centre, self.inertia + inertia)
+        centre = (self.mass * self.centre + mass * at) / total
+        about = (
+            self.inertia
+            + inertia
+            + self.mass * (self.centre - centre) ** 2
+            + mass * (at - centre) ** 2
+        )
+        return Inertia(total, centre, about)
+
+
+def link_inertia(link: Link) -> Inertia:
+    """A rigid link itself, without hub and payload."""
+    if link.mass_kg is not None:
+        return Inertia(link.mass_kg, _centre(link), link.inertia_kg_m2 or 0.0)
+    return _spread_inertia(link)
+
+
+def _centre(link: Link) -> float:
+    return link.length_m / 2 if link.centre_of_mass_m is None else link.centre_of_mass_m
+
+
+def _spread_inertia(link: Link) -> Inertia:
+    """A rigid link given by its mass per length: moments of the distribution, slender, without the
+    section's own inertia."""
+    edges = np.array(link.breaks())
+    middle, half = (edges[1:] + edges[:-1]) / 2, (edges[1:] - edges[:-1]) / 2
+    x = middle[:, None] + half[:, None] * _GAUSS_X
+    mass = link.mass_per_length(x) * half[:, None] * _GAUSS_W
+    total = float(mass.sum())
+    if total == 0:
+        return Inertia(0.0, 0.0, 0.0)
+    centre = float((mass * x).sum()) / total
+    return Inertia(total, centre, float((mass * (x - centre) ** 2).sum()))
+
+
+def total_mass(links: list[Link], payload: Payload) -> float:
+    """All mass of a robot [kg]; the scale for what has none."""
+    total = payload.mass_kg
+    for link in links:
+        total += link.joint.hub_mass_kg
+        if link.flexible:
+            ends, kinks = np.array([0.0, link.length_m]), np.array(link.breaks())
+            total += float(_means(link.mass_per_length, ends, kinks)[0]) * link.length_m
+        else:
+            total += link_inertia(link).mass
+    return total

@@ -1,0 +1,72 @@
+"""A rigid link: one ObjectRigidBody2D with its node at the link's origin; hub, and payload if it is
+the last, included."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .part import Attachment, Frame, Motion, hang
+from .properties import Inertia
+
+
+class RigidLink:
+    """A rigid link of a length [m]. Coordinates of its one node: x, y, angle of the link's
+    origin."""
+
+    width = 3
+
+    def __init__(
+        self, mbs: Any, length: float, inertia: Inertia, frame: Frame, gravity: tuple[float, float]
+    ) -> None:
+        from exudyn import itemInterface as eii
+
+        self.length, self.inertia = length, inertia
+        m, c, about = inertia
+        node = mbs.AddNode(
+            eii.NodeRigidBody2D(
+                referenceCoordinates=list(frame[:3]), initialVelocities=list(frame[3:])
+            )
+        )
+        body = mbs.AddObject(
+            eii.ObjectRigidBody2D(
+                mass=m, inertia=about + m * c**2, centerOfMass=[c, 0.0], nodeNumber=node
+            )
+        )  # Exudyn wants the inertia about the reference point, here the link's origin
+        hang(mbs, body, gravity)
+        self.nodes = [node]
+        self.origin, self.tip = (
+            Attachment(
+                body,
+                [x, 0.0, 0.0],
+                mbs.AddMarker(eii.MarkerBodyRigid(bodyNumber=body, localPosition=[x, 0.0, 0.0])),
+            )
+            for x in (0.0, length)
+        )
+
+    def motion_at_origin(self, q: np.ndarray, v: np.ndarray) -> Motion:
+        return self._motion(q, v, 0.0)
+
+    def motion_at_tip(self, q: np.ndarray, v: np.ndarray) -> Motion:
+        return self._motion(q, v, self.length)
+
+    def point(self, q: np.ndarray, x: float) -> np.ndarray:
+        return q[:, :2] + x * np.stack([np.cos(q[:, 2]), np.sin(q[:, 2])], axis=-1)
+
+    def kinetic(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        centre = self._motion(q, v, self.inertia.centre)
+        return (
+            0.5 * self.inertia.mass * (centre.v**2).sum(axis=-1)
+            + 0.5 * self.inertia.inertia * centre.omega**2
+        )
+
+    def strain(self, q: np.ndarray) -> np.ndarray:
+        return np.zeros(len(q))
+
+    def moment(self, q: np.ndarray) -> np.ndarray:
+        return self.inertia.mass * self.point(q, self.inertia.centre)
+
+    def _motion(self, q: np.ndarray, v: np.ndarray, x: float) -> Motion:
+        normal = np.stack([-np.sin(q[:, 2]), np.cos(q[:, 2])], axis=-1)
+        return Motion(self.point(q, x), q[:, 2], v[:, :2] + x * v[:, 2:3] * normal, v[:, 2])

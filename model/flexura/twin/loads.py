@@ -1,0 +1,233 @@
+"""What drives the twin's joints: open-loop forces once a step, feedback inside Exudyn's equations.
+
+A `Drive` is, in each joint, a force f(t) and a PD controller of gains kp, kd along a motion r(t).
+The force is a load that is set once a step. The controller is a spring-damper of Exudyn's own on
+the joint's coordinate, whose offsets r, dr/dt are set once a step: it acts without delay, since
+Exudyn solves for it. A Python function of time is such a force; one of the joints' state is called
+in every iteration, without delay as well; Newton's method knows no derivatives of it, so that its
+gains at the start, by differences, are made a controller that the load then takes off again.
+
+A force that jumps would be late or early by half a step, an error of first order. What a step uses
+is therefore the mean over the half steps before and after its instant wherever there is a jump, so
+that the impulse is exact.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..signals import Drive
+from .build import Chain
+from .links.part import Ground, Motion
+
+DIFFERENCE = 1e-6  # m, rad, m/s, rad/s
+
+
+@dataclass(frozen=True)
+class Actuation:
+    """A drive as the twin applies it; `call(t, position, velocity, tip_deflection)` gives the n
+    drive forces.
+
+    `gains` (n, 2): kp and kd of the joints' controllers. `plan(t)` gives (n, 3): force, r, dr/dt of
+    each joint; it is None where only `call` knows, and the controllers are there for Newton's sake.
+    `breaks`: instants at which the plan may jump; None: unknown, so that every step may have one.
+    """
+
+    gains: np.ndarray
+    call: Callable[..., np.ndarray]
+    plan: Callable[[float], np.ndarray] | None
+    breaks: np.ndarray | None
+
+
+def actuation(drive: Any, start: np.ndarray, speeds: np.ndarray) -> Actuation:
+    """The actuation for a Drive, a function of (t) or (t, position, velocity, tip_deflection), or
+    None.
+
+    `start`, `speeds` (n,): the joints' positions and velocities at time 0.
+    """
+    n = len(start)
+    drive = Drive.none(n) if drive is None else drive
+    if isinstance(drive, Drive):
+        if len(drive.joints) != n:
+            raise InputError(
+                f"expected one drive for each of the robot's {n} joints",
+                key="drive",
+                value=len(drive.joints),
+            )
+        if drive.follows.any():
+            expected = "expected a force, or gains on the motion: the twin has no prescribed joints"
+            raise InputError(expected, key="prescribed", value=True)
+        gains = np.array(
+            [(j.kp, j.kd) if j.motion is not None else (0.0, 0.0) for j in drive.joints]
+        ).reshape(n, 2)
+        return Actuation(gains, drive, lambda t: _plan(drive, t), drive.breaks)
+    if not callable(drive):
+        expected = "expected a Drive or a function (t) or (t, position, velocity, tip_deflection)"
+        raise InputError(expected, key="drive", value=drive)
+
+    def checked(*arguments: Any) -> np.ndarray:
+        forces = np.asarray(drive(*arguments), dtype=float)
+        if forces.shape != (n,) or not np.all(np.isfinite(forces)):
+            expected = (
+                f"expected {n} finite forces or torques from the drive at t = {arguments[0]:g} s"
+            )
+            raise InputError(expected, key="drive", value=forces)
+        return forces
+
+    if _takes_state(drive):
+        return Actuation(_gains(checked, start, speeds), checked, None, None)
+    still = np.zeros((n, 2))
+    return Actuation(
+        still, lambda t, *_: checked(t), lambda t: np.column_stack([checked(t), still]), None
+    )
+
+
+def _gains(call: Callable[..., np.ndarray], start: np.ndarray, speeds: np.ndarray) -> np.ndarray:
+    """Stiffness and damping that a function of the state puts on each joint's own coordinate at the
+    start, (n, 2), or 0."""
+    gains = np.zeros((len(start), 2))
+    for i in range(len(start)):
+        for column in range(2):
+            low, high = [start.copy(), speeds.copy()], [start.copy(), speeds.copy()]
+            low[column][i] -= DIFFERENCE
+            high[column][i] += DIFFERENCE
+            gains[i, column] = max(
+                0.0, (call(0.0, *low, 0.0) - call(0.0, *high, 0.0))[i] / (2 * DIFFERENCE)
+            )
+    return gains
+
+
+def _plan(drive: Drive, t: float) -> np.ndarray:
+    out = np.zeros((len(drive.joints), 3))
+    for i, joint in enumerate(drive.joints):
+        if joint.force is not None:
+            out[i, 0] = joint.force(t)[0]
+        if joint.motion is not None:
+            out[i, 1:] = joint.motion(t)[:2]
+    return out
+
+
+def _takes_state(function: Callable[..., Any]) -> bool:
+    """Whether a function can be called with four arguments."""
+    try:
+        inspect.signature(function).bind(0.0, None, None, 0.0)
+    except TypeError:
+        return False
+    except ValueError:  # a builtin without a signature
+        return True
+    return True
+
+
+class Loads:
+    """Keeps Exudyn's loads and controllers up to date in a run with steps of `step_s`; `stop` gets
+    an error of the drive's."""
+
+    def __init__(
+        self,
+        chain: Chain,
+        act: Actuation,
+        step_s: float,
+        steps: int,
+        stop: Callable[[BaseException], None],
+    ) -> None:
+        self.chain, self.act, self.step_s, self.stop = chain, act, step_s, stop
+        self.applied = np.zeros((len(chain.coordinates), 3))
+        self.edges: dict[int, list[float]] = {}
+        for t in (
+            []
+            if act.breaks is None
+            else act.breaks[(act.breaks > 0) & (act.breaks <= (steps + 0.5) * step_s)]
+        ):
+            self.edges.setdefault(round(t / step_s), []).append(t)
+        if act.plan is not None:
+            self._apply(act.plan(0.0))
+        else:
+            self._install_feedback()
+
+    def before_step(self, t: float) -> None:
+        """Set what acts in the step that ends at t [s]."""
+        if self.act.plan is None:
+            return
+        inside = [t] if self.act.breaks is None else self.edges.get(round(t / self.step_s))
+        if not inside:
+            self._apply(self.act.plan(t))
+            return
+        edges = np.array([t - self.step_s / 2, *inside, t + self.step_s / 2])
+        weights, middles = np.diff(edges) / self.step_s, (edges[1:] + edges[:-1]) / 2
+        self._apply(sum(w * self.act.plan(m) for w, m in zip(weights, middles, strict=True)))
+
+    def _apply(self, values: Any) -> None:
+        mbs = self.chain.mbs
+        for joint, now, before in zip(self.chain.coordinates, values, self.applied, strict=True):
+            if now[0] != before[0]:
+                mbs.SetLoadParameter(joint.load, "load", float(now[0]))
+            if joint.servo is not None:
+                mbs.SetObjectParameter(joint.servo, "offset", float(now[1]))
+                mbs.SetObjectParameter(joint.servo, "velocityOffset", float(now[2]))
+        self.applied = values
+
+    def _install_feedback(self) -> None:
+        """Let Exudyn ask for the forces whenever it evaluates them; the first joint's load computes
+        those of all."""
+        numbers = [c.load for c in self.chain.coordinates]
+        forces = np.zeros(len(numbers))
+        sense, (kp, kd) = Senses(self.chain), self.act.gains.T
+        for joint, start in zip(self.chain.coordinates, self.chain.robot.start, strict=True):
+            if joint.servo is not None:
+                self.chain.mbs.SetObjectParameter(joint.servo, "offset", float(start))
+
+        def first(mbs: Any, t: float, _load: float) -> float:
+            try:
+                position, velocity, deflection = sense()
+                forces[:] = self.act.call(t, position, velocity, deflection)
+                forces[:] += kp * (position - self.chain.robot.start) + kd * velocity
+            except BaseException as error:  # through Exudyn it would come out as another error
+                self.stop(error)
+            return forces[0]
+
+        for i, number in enumerate(numbers):
+            # Exudyn 1.13.6 evaluates loads in order of their numbers
+            self.chain.mbs.SetLoadParameter(
+                number, "loadUserFunction", first if i == 0 else lambda mbs, t, load, i=i: forces[i]
+            )
+
+
+class Senses:
+    """The joints' positions (n,), velocities (n,) and the last link's tip deflection [m] at the
+    iterate Exudyn is at."""
+
+    def __init__(self, chain: Chain) -> None:
+        import exudyn as exu
+
+        self.mbs, self.markers = chain.mbs, [c.marker for c in chain.coordinates]
+        self.kinds = exu.OutputVariableType.Coordinates, exu.OutputVariableType.Coordinates_t
+        self.chain = chain
+
+    def __call__(self) -> tuple[np.ndarray, np.ndarray, float]:
+        position, velocity = (
+            np.array([self.mbs.GetMarkerOutput(m, kind)[0] for m in self.markers])
+            for kind in self.kinds
+        )
+        return position, velocity, self._deflection()
+
+    def _deflection(self) -> float:
+        chain, last = self.chain, len(self.chain.parts) - 1
+        if not chain.mesh.elements[last]:
+            return 0.0
+        q = (self.mbs.systemData.GetODE2Coordinates() + chain.reference)[None, :]
+        (hub, tip), turn = self._ends(q, last), 0.0
+        if chain.robot.links[last].joint.type == "Pb":  # in the frame of the sleeve
+            hub = self._ends(q, last - 1)[1] if last else Ground.motion(1)
+            turn = chain.robot.links[last].joint.angle_rad
+        dx, dy = tip.r[0] - hub.r[0]
+        return float(np.cos(hub.angle[0] + turn) * dy - np.sin(hub.angle[0] + turn) * dx)
+
+    def _ends(self, q: np.ndarray, i: int) -> tuple[Motion, Motion]:
+        part, mine = self.chain.parts[i], q[:, self.chain.index[i]]
+        return part.motion_at_origin(mine, mine), part.motion_at_tip(mine, mine)

@@ -1,0 +1,133 @@
+"""Exudyn's steps: how long, and which of them to keep for the times asked for."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from .build import Chain
+
+MAX_STEPS = 5_000_000  # refused beyond
+DEFAULT_STEPS = 500_000  # a default step is never so short that it needs more
+LONGEST = 5e-4  # s
+PER_FIRST, PER_HIGHEST = (
+    240,
+    60,
+)  # steps in a period of the lowest and of the highest participating frequency
+RIGID_HZ, ROUND_OFF = (
+    0.02,
+    3e-8,
+)  # frequencies below, and below this part of the highest, are rigid motions and round-off
+# s, the run for which these hold; phase errors grow with time, so that h goes with 1/sqrt(time)
+SPAN = 2.0
+GRID = 1e-9  # how far a time may lie from a step, relative to the step, to count as on it
+
+
+@dataclass(frozen=True)
+class Steps:
+    """`count` steps of `length` [s]; `keep` (count + 1,) marks those to record; `exact`: every time
+    asked for is one of them."""
+
+    length: float
+    count: int
+    keep: np.ndarray
+    exact: bool
+
+    def at_times(
+        self, t: np.ndarray, at: np.ndarray, q: np.ndarray, v: np.ndarray, a: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Times, coordinates and velocities at those of the times t that the record reached; the
+        record begins at time 0."""
+        t = t[t <= at[-1] + 1e-3 * self.length]  # round-off of many steps
+        if self.exact:
+            mine = np.searchsorted(at, t - self.length / 2)
+            return t, q[mine], v[mine]
+        return t, *_interpolate(t, at, q, v, a)
+
+
+def plan(t: np.ndarray, longest: float, forced: bool) -> Steps:
+    """Steps up to t[-1], at most `longest` [s] each; they divide the output step where t is uniform
+    (and begins on it).
+
+    `forced`: the user gave the length, so that too many steps are an error and not a reason for
+    longer ones.
+    """
+    end = float(t[-1])
+    if end == 0:
+        return Steps(longest, 0, np.ones(1, dtype=bool), True)
+    if not forced:
+        longest = max(longest, end / DEFAULT_STEPS)
+    if end / longest > MAX_STEPS:
+        expected = f"expected at most {MAX_STEPS} steps, that is at least {end / MAX_STEPS:.3g} s"
+        raise InputError(expected, key="step_s", value=longest)
+    spacing = float(t[1] - t[0]) if len(t) > 1 else end
+    if spacing > 0 and np.all(np.abs(t / spacing - np.round(t / spacing)) < 1e-6):
+        length = spacing / math.ceil(spacing / longest - 1e-9)
+    else:
+        length = end / math.ceil(end / longest - 1e-9)
+    count = round(end / length)
+    places = t / length
+    exact = bool(np.all(np.abs(places - np.round(places)) < max(GRID, 1e-12 * count)))
+    keep = np.zeros(count + 1, dtype=bool)
+    keep[0] = True
+    wanted = [np.round(places)] if exact else [np.floor(places), np.ceil(places)]
+    for places_k in wanted:
+        keep[np.clip(places_k.astype(int), 0, count)] = True
+    return Steps(length, count, keep, exact)
+
+
+def suggest(chain: Chain, settings: Any, end: float) -> float:
+    """A step [s] for a time error below about 1e-3 of the tip deflection, from the robot's own
+    frequencies at its start.
+
+    240 steps in a period of the lowest frequency and 60 in one of the highest that takes part,
+    taken as the lowest and one more a flexible link (measured on a carriage with a flexible arm,
+    bang-bang driven, over 2 s: 3e-4 to 8e-4).
+    """
+    try:
+        hertz = np.sort(
+            chain.mbs.ComputeODE2Eigenvalues(simulationSettings=settings, convert2Frequencies=True)[
+                0
+            ]
+        )
+    except (
+        Exception
+    ):  # a linear solver's complaint about a singular matrix: the step is a proposal only
+        return LONGEST
+    hertz = hertz[np.isfinite(hertz)]
+    hertz = hertz[hertz > max(RIGID_HZ, ROUND_OFF * hertz.max(initial=0.0))]
+    if len(hertz) == 0:
+        return LONGEST
+    highest = hertz[min(sum(count > 0 for count in chain.mesh.elements), len(hertz) - 1)]
+    return min(
+        LONGEST,
+        min(1 / (PER_FIRST * hertz[0]), 1 / (PER_HIGHEST * highest))
+        * math.sqrt(SPAN / max(end, SPAN)),
+    )
+
+
+def _interpolate(
+    t: np.ndarray, at: np.ndarray, q: np.ndarray, v: np.ndarray, a: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Coordinates and velocities at t (T,) from those at the recorded times `at` (K,), with
+    accelerations, by cubics."""
+    if len(at) == 1:
+        return q[: len(t)], v[: len(t)]
+    k = np.clip(np.searchsorted(at, t, side="right") - 1, 0, len(at) - 2)
+    h = (at[k + 1] - at[k])[:, None]
+    s = (t - at[k])[:, None] / h
+    one, two, three, four = (
+        1 - 3 * s**2 + 2 * s**3,
+        h * (s - 2 * s**2 + s**3),
+        3 * s**2 - 2 * s**3,
+        h * (s**3 - s**2),
+    )
+
+    def cubic(y: np.ndarray, rate: np.ndarray) -> np.ndarray:
+        return one * y[k] + two * rate[k] + three * y[k + 1] + four * rate[k + 1]
+
+    return cubic(q, v), cubic(v, a)
