@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from flexura.robot.robot import Robot
+from flexura.robot import Robot
 from flexura.system.assembly import Assembly
 from robots import beam, rigid, robot
 

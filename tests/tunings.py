@@ -8,8 +8,7 @@ import flexura as fx
 from flexlab.tuning.search_space import free
 from flexlab.tuning.task import Task
 from flexura.control.gains import Gains
-from flexura.signals import step
-from flexura.signals.drive import Drive, JointDrive, Manoeuvre
+from flexura.signals import Drive, JointDrive, Manoeuvre, step
 
 LINK = {
     "length_m": 0.3,

@@ -15,7 +15,7 @@ import flexura as fx
 from flexlab.rig import load
 from flexlab.rig.plant.motor import motor_data
 from flexura import twin
-from flexura.io.run import Run
+from flexura.io import Run
 
 RIG = Path(__file__).parents[1] / "firmware" / "rig.toml"
 RATE_HZ, FLEX_V_M = 200.0, -2.7

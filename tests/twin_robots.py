@@ -2,7 +2,7 @@
 
 from scipy.integrate import solve_ivp
 
-from flexura.robot.robot import Robot
+from flexura.robot import Robot
 
 STEEL = {
     "section": {"width_m": 0.03, "height_m": 0.001},

@@ -9,9 +9,9 @@ from .io import Run
 from .population import Batch, Population
 from .population import simulate as simulate_population
 from .signals import Drive
+from .simulation.dynamics import DriveLike
+from .simulation.dynamics import simulate as simulate_robot
 from .simulation.problem import Progress
-from .simulation.simulate import DriveLike
-from .simulation.simulate import simulate as simulate_robot
 
 
 @overload

@@ -8,21 +8,13 @@ import pytest
 from rich.console import Console
 
 import flexura as fx
-from flexlab.benchmarks import (
-    accuracy,
-    choose,
-    exudyn_run,
-    measure,
-    native,
-    report,
-    search,
-    still,
-    timing,
-)
-from flexlab.benchmarks.exudyn_actions import sampled
-from flexlab.benchmarks.motions import all_motions
-from flexlab.benchmarks.problem import error, scale
-from flexlab.benchmarks.signals import piecewise
+from flexlab.benchmarks import accuracy, choose, measure, native, report, search, timing
+from flexlab.benchmarks.exudyn_programs import run as exudyn_run
+from flexlab.benchmarks.problems import still
+from flexlab.benchmarks.exudyn_programs.actions import sampled
+from flexlab.benchmarks.problems.motions import all_motions
+from flexlab.benchmarks.problems.problem import error, scale
+from flexlab.benchmarks.problems.signals import piecewise
 
 MOTIONS, STILL = all_motions(), still.all_still()
 QUICK = ("rig-pd", "rig-sampled", "payload", "arm-pd", "arm-inverse", "python-law", "friction")

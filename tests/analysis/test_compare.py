@@ -22,8 +22,8 @@ from flexlab.rig.plant.stepper import MagneticSpring
 from flexlab.runs.deviation import deviations
 from flexlab.runs.labels import EMULATED, called
 from flexura.errors import InputError
-from flexura.io.run import Run
-from flexura.signals.drive import JointDrive
+from flexura.io import Run
+from flexura.signals import JointDrive
 from twin_experiments import RIG, experiment
 
 

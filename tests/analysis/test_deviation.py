@@ -3,7 +3,7 @@ import pytest
 
 from flexlab.runs.deviation import Deviation, compared, deviation, deviations
 from flexura.errors import InputError
-from flexura.io.run import Run
+from flexura.io import Run
 
 
 def run(t, **channels):

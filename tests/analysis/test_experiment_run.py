@@ -21,7 +21,7 @@ from flexlab.experiment.run_experiment import Opened, Watch, check, conduct
 from flexlab.recordings import recording
 from flexlab.recordings.run_from_recording import UNTOLD, knots_from, rebuild
 from flexlab.recordings.unit_conversion import UNITS, Sensor, commanded
-from flexura.io.toml_files import write_toml
+from flexura.io import write_toml
 from flexura.signals import harmonic
 
 FRAME_BYTES = (

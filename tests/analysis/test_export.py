@@ -13,7 +13,7 @@ from flexlab.cli.export import forms
 from flexlab.review.headless import executable
 from flexlab.runs.labels import EMULATED
 from flexura.errors import InputError
-from flexura.io.run import Run
+from flexura.io import Run
 
 UNITS = {
     "joint/1/position": "m",

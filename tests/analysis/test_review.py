@@ -13,8 +13,8 @@ from flexlab.review.sources import COLOURS, SECOND, sources
 from flexlab.runs import poses
 from flexlab.runs.deviation import deviation
 from flexura.errors import FlexuraError, InputError
-from flexura.io.run import Run
-from flexura.robot.robot import Robot, load
+from flexura.io import Run
+from flexura.robot import Robot, load
 
 RIG = load(Path(__file__).parents[2] / "model" / "robots" / "rig.toml")
 STRIP = RIG.to_dict()["link"][1]

@@ -148,7 +148,7 @@ def test_a_plant_knows_nothing_of_the_native_solver():
         "flexura.beam",
         "flexura.system",
         "flexura.loop",
-        "flexura.simulation.simulate",
+        "flexura.simulation.dynamics",
     } & set(loaded)
 
 

@@ -10,8 +10,7 @@ import pytest
 
 import flexura as fx
 from flexlab.crosscheck.default_manoeuvre import REACH, _reach, modest
-from flexura.signals import polynomial, table
-from flexura.signals.drive import load_manoeuvre
+from flexura.signals import load_manoeuvre, polynomial, table
 
 ROOT = Path(__file__).resolve().parents[2]
 FILES = sorted((ROOT / "model" / "robots").glob("*.toml"))

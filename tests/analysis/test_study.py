@@ -12,8 +12,7 @@ import pytest
 import flexura as fx
 from flexlab import studies
 from flexlab.studies import length_ratio, payload, sweep
-from flexura.signals import bang_bang, cycloid
-from flexura.signals.drive import Drive, Manoeuvre, load_manoeuvre
+from flexura.signals import Drive, Manoeuvre, bang_bang, cycloid, load_manoeuvre
 
 MODEL = Path(__file__).resolve().parents[2] / "model"
 SET_I = {

@@ -16,7 +16,7 @@ from scipy.linalg import expm
 import flexura as fx
 from flexura import signals
 from flexura.control import controller, gains, lqr
-from flexura.simulation import gain_sweep
+from flexura.simulation import feedforward, gain_sweep
 from robots import beam, rigid, robot, system
 
 TICK, ROOT = 1e-3, Path(__file__).resolve().parents[2]
@@ -411,7 +411,7 @@ def test_small_motions_are_those_of_the_sampled_linear_model():
 
 def quiet(sys: fx.System, references, **keys):
     pids = tuple(fx.PID(reference, **keys) for reference in references)
-    return lqr.lqr(sys, fx.Controller(pids), [5.0, 0.5], position=[0.01, 0.05], deflection=0.005)
+    return lqr(sys, fx.Controller(pids), [5.0, 0.5], position=[0.01, 0.05], deflection=0.005)
 
 
 def test_the_lqrs_cost_is_its_riccati_matrix():
@@ -480,7 +480,7 @@ def test_feedforwards_carry_the_motion():
     """Inverse dynamics in place of feedback; gravity in place of a sum."""
     sys, t = rig(), np.arange(0, 0.6, TICK)
     motions = [signals.cycloid(0.05, 0.5), signals.cycloid(0.4, 0.5)]
-    ahead = controller.inverse_dynamics(sys, motions, t)
+    ahead = feedforward.inverse_dynamics(sys, motions, t)
     pids = tuple(
         fx.PID(m, kp=p, kd=d, feedforward=f)
         for m, f, p, d in zip(motions, ahead, (100, 1), (10, 0.05))
@@ -491,7 +491,7 @@ def test_feedforwards_carry_the_motion():
     )
     assert np.abs(with_).max() < 0.05 * np.abs(without).max()
     hanging = system(rigid(0.5, 1.0, 0.25, 0.02, "R"), gravity=(0.0, -9.81))
-    (ahead,) = controller.gravity(hanging, [signals.constant(0.3)], [0.0, 5.0])
+    (ahead,) = feedforward.gravity(hanging, [signals.constant(0.3)], [0.0, 5.0])
     arm = fx.PID(signals.constant(0.3), kp=20.0, kd=2.0, feedforward=ahead)
     assert fx.simulate(hanging, [0.0, 5.0], fx.Controller((arm,)))["joint/1/position"][
         -1
@@ -584,7 +584,7 @@ def test_delays_between_ticks_nodal_robots_and_wrong_counts_are_refused():
     with pytest.raises(fx.InputError, match="continuous"):
         fx.simulate(nodal, [0.0, 0.1], fx.Controller((c, c)))
     with pytest.raises(fx.InputError, match="stepper"):
-        lqr.lqr(rig(), fx.Controller((c, replace(c, output=fx.Stepper()))), 1.0)
+        lqr(rig(), fx.Controller((c, replace(c, output=fx.Stepper()))), 1.0)
 
 
 # The gains file

@@ -12,7 +12,9 @@ import chains
 import flexura as fx
 from flexura import signals
 from flexura.control.sampled import Sampled
-from flexura.simulation import dense, simulate
+from flexura.simulation import dense
+from flexura.simulation.problem import initial_value_problem
+from flexura.simulation.recorder import record
 from flexura.system.assembly import Assembly
 from robots import beam, bench_arm, largest_difference, rigid, system
 
@@ -74,8 +76,8 @@ def test_on_an_exact_robot_it_is_the_core(name):
         np.linspace(0, 0.02, 5),
         fx.Drive.force(*[signals.harmonic(0.3, 2.0)] * len(exact.robot.links)),
     )
-    q, qd = simulate.initial(exact, 0.0, drive, None, None)
-    a = dense.simulate(exact, t, drive, q, qd, 1e-6, "explicit", None)
+    problem = initial_value_problem(exact, t, drive, None, None, 1e-6, "explicit")
+    a = record(exact, dense.solve(problem))
     b = fx.simulate(exact, t, drive, rtol=1e-8, method="explicit")
     assert list(a) == list(b)
     for name in a:

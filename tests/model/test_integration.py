@@ -15,7 +15,7 @@ import pytest
 
 import flexura as fx
 from flexura import signals
-from flexura.simulation import simulate
+from flexura.simulation import integrator
 from robots import beam, bench_arm, largest_difference, rigid, robot, system, two_link_arm
 
 METHODS = ("explicit", "implicit", "exponential")
@@ -145,7 +145,7 @@ def test_results_do_not_depend_on_how_often_the_loop_is_left(method, monkeypatch
     drive = fx.Drive.force(signals.bang_bang(0.05, 0.2), signals.harmonic(0.01, 3.0))
     runs = []
     for steps in (1, 7, 10**6):
-        monkeypatch.setattr(simulate, "STEPS_A_CALL", steps)
+        monkeypatch.setattr(integrator, "STEPS_A_CALL", steps)
         runs.append(fx.simulate(sys, t, drive, method=method))
     for run in runs[1:]:
         assert (

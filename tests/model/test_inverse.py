@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 import flexura as fx
-from flexura.signals import cycloid, harmonic, polynomial, step, table
-from flexura.signals.drive import JointDrive
+from flexura.signals import JointDrive, cycloid, harmonic, polynomial, step, table
 
 TORQUE_AT = {
     0.10: 0.043175,

@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import flexura as fx
-from flexura.io.run import Run
+from flexura.io import Run
 
 UNITS = {
     "s": "s",

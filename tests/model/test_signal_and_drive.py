@@ -16,18 +16,20 @@ from scipy.interpolate import CubicSpline
 import flexura as fx
 from flexura import signals
 from flexura.signals import (
+    Drive,
+    JointDrive,
     bang_bang,
     constant,
     cycloid,
     from_spec,
     harmonic,
+    load_manoeuvre,
     piecewise,
     polynomial,
     step,
     table,
     trapezoidal,
 )
-from flexura.signals.drive import Drive, JointDrive, load_manoeuvre
 from flexura.signals.shaping import matched_cycloid, zv, zvd
 
 level = st.floats(-10, 10)

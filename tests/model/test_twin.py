@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from flexura import signals, twin
-from flexura.signals.drive import Drive
+from flexura.signals import Drive
 from twin_robots import G, beam, bench_arm, integrate, rig, rigid, robot, total_energy
 
 # Beams

@@ -11,7 +11,7 @@ import pytest
 
 from flexura import signals, twin
 from flexura.errors import FlexuraError, InputError
-from flexura.signals.drive import Drive
+from flexura.signals import Drive
 from twin_robots import beam, bench_arm, rig, rigid, robot
 
 # Drives

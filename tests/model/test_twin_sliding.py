@@ -9,8 +9,8 @@ import pytest
 import rigid_chain
 from flexura import signals, twin
 from flexura.errors import FlexuraError, InputError
-from flexura.io.run import Run
-from flexura.signals.drive import Drive
+from flexura.io import Run
+from flexura.signals import Drive
 from flexura.twin import solve
 from flexura.twin.build import build
 from flexura.twin.extrapolation import extrapolate

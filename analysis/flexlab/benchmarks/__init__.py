@@ -1,8 +1,7 @@
 """How fast and how accurate the solver is: `make bench`, or python -m flexlab.benchmarks.
 
-What stands where: `problem` (what a problem is, and the error measure), `robots`, `signals` and
-`motions` (the problems), `still` (statics and frequencies), `exudyn_chain`, `exudyn_actions`,
-`exudyn_run` (the same in Exudyn), `native` (runs of flexura), `search` (Exudyn's cheapest settings,
+What stands where: `problems` (motions, statics, frequencies, and the error measure),
+`exudyn_programs` (the same in Exudyn), `native` (runs of flexura), `search` (Exudyn's cheapest settings,
 kept in settings.json), `choose` (flexura's), `timing`, `measure` (rows), `report` (tables),
 `accuracy` (errors over tolerances), `population`, `growth`, `board_load`.
 """

@@ -14,9 +14,9 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from . import accuracy, board_load, growth, measure, population, report, search
-from .motions import all_motions
-from .problem import Problem
-from .still import Still, all_still
+from .problems.motions import all_motions
+from .problems.problem import Problem
+from .problems.still import Still, all_still
 
 PARTS = (
     "motions",

@@ -1,5 +1,4 @@
-"""How accurate the solver is, and in how many evaluations: python -m flexlab.benchmarks accuracy, and
-... passes.
+"""Accuracy and evaluations of the solver: python -m flexlab.benchmarks accuracy, and ... passes.
 
 Errors are those of `problem.error`, from the converged motion on the problem's own mesh: what the
 tolerance is to keep. Passes are evaluations of the equations of motion for an error, by each
@@ -18,7 +17,7 @@ import flexura as fx
 
 from . import native
 from .choose import RTOLS
-from .problem import Channels, Problem, error, scale
+from .problems.problem import Channels, Problem, error, scale
 
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
 ERRORS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)

@@ -10,7 +10,7 @@ import flexura as fx
 
 from . import native
 from .native import Answer, TooSlow
-from .problem import Channels, Problem, error
+from .problems.problem import Channels, Problem, error
 
 RTOLS = (3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 3e-7, 1e-7, 3e-8, 1e-8)
 LIMIT_S = 30.0  # processor time of a run while nothing better is known

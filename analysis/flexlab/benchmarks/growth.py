@@ -10,7 +10,7 @@ import numpy as np
 import flexura as fx
 
 from . import native
-from .robots import beam, robot, turning
+from .problems.robots import beam, robot, turning
 
 LINKS = (1, 2, 4, 8, 16, 32, 64)
 ELEMENTS = (1, 2, 4, 8, 16, 32)

@@ -9,11 +9,12 @@ import numpy as np
 
 import flexura as fx
 
-from . import exudyn_run, native, search
+from . import native, search
 from .choose import cheapest
-from .problem import Problem, error
+from .exudyn_programs import run as exudyn_run
+from .problems.problem import Problem, error
+from .problems.still import Still
 from .search import TARGET
-from .still import Still
 from .timing import ratio, walls
 
 DEFAULT_LIMIT_S = 60.0

@@ -12,7 +12,7 @@ import numpy as np
 
 import flexura as fx
 
-from .problem import Channels, Problem, Tables, Work
+from .problems.problem import Channels, Problem, Tables, Work
 
 METHODS = ("auto", "explicit", "implicit", "exponential")
 

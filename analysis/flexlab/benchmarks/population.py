@@ -13,8 +13,9 @@ import numpy as np
 
 import flexura as fx
 
-from . import exudyn_run, native, search
-from .motions import all_motions
+from . import native, search
+from .exudyn_programs import run as exudyn_run
+from .problems.motions import all_motions
 from .timing import ratio
 
 ROBOTS, REPEATS = 1000, 3

@@ -1,5 +1,4 @@
-"""Exudyn's cheapest settings for a given error, found by search: python -m flexlab.benchmarks search
-[PROBLEM ...].
+"""Exudyn's cheapest settings for an error: python -m flexlab.benchmarks search [PROBLEM ...].
 
 The converged model: steps are halved, with Newton's method converged, until a third of what the
 last halving changed is less than a tenth of the target; Richardson's extrapolation of the last two
@@ -20,8 +19,8 @@ from typing import Any
 import flexura as fx
 
 from . import native
-from .exudyn_run import Choice, run
-from .problem import Channels, Problem, error
+from .exudyn_programs.run import Choice, run
+from .problems.problem import Channels, Problem, error
 
 FILE = Path(__file__).with_name("settings.json")
 TARGET = 1e-3  # of `problem.scale`

@@ -1,1 +1,1 @@
-"""flexlab.cli."""
+"""The command `flexura`: a file for each of its commands."""

@@ -16,12 +16,12 @@ from ..comparison.replay.simulate_experiment import simulate
 from ..crosscheck.crosscheck import Check, Progress, crosscheck, save
 from ..experiment import plan, run_experiment
 from ..experiment.flash import RIG
+from ..paths import MANOEUVRES, ROBOTS
 from ..review import picture
 from .compare import save as save_comparison
 
-ROOT = Path(__file__).parents[2]
-ROBOT = ROOT / "model" / "robots" / "rig.toml"
-MANOEUVRE = ROOT / "model" / "manoeuvres" / "rig-inverse-law.toml"
+ROBOT = ROBOTS / "rig.toml"
+MANOEUVRE = MANOEUVRES / "rig-inverse-law.toml"
 
 
 @dataclass(frozen=True)

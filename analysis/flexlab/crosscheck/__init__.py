@@ -1,1 +1,1 @@
-"""flexlab.crosscheck."""
+"""The native solver against the Exudyn twin."""

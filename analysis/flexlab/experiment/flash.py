@@ -19,10 +19,10 @@ from ..board.emulator.emulated import EmulatedBoard
 from ..board.protocol.declaration import BAUD_BIT_S, CONFIG, Fault
 from ..board.protocol.session import Identity, Link
 from ..board.serial_port import SerialBoard, find
+from ..paths import FIRMWARE
 from ..rig import Bench, configuration
 from ..rig.plant.rigid_plant import Drives
 
-FIRMWARE = Path(__file__).parents[2] / "firmware"
 RIG = FIRMWARE / "rig.toml"
 
 Say = Callable[[str], None]

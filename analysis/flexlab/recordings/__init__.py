@@ -1,1 +1,1 @@
-"""flexlab.recordings."""
+"""What was received: kept as it arrives, converted to SI units, made a Run."""

@@ -1,1 +1,1 @@
-"""flexlab.runs."""
+"""What is done with any Run: deviation, poses, labels, export."""

@@ -13,19 +13,18 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 
 import flexura as fx
 from flexura.control import Gains, Motor, Output
 from flexura.signals import Drive, JointDrive, Manoeuvre, step
 
 from .. import rig as rigs
+from ..paths import FIRMWARE, ROBOTS
 from ..rig.nominal_robot import driven
 from .objective import Weights
 from .search_space import Free, free
 from .task import Task
 
-ROOT = Path(__file__).resolve().parents[3]
 DURATION_S, OUTPUT_STEP_S = 5.0, 0.005
 FIGURES = ("rise", "settling", "overshoot", "error")
 # Rise time [s], settling time [s], overshoot [%], state error, of joint 1 and joint 2; the
@@ -81,8 +80,8 @@ class Structure:
 def type_4() -> Structure:
     """PaR: the rig, its stepper with 6 rad/s and 60 rad/s^2, its motor with the voltage that takes
     the carriage to 90 % of the speed at which the board switches off."""
-    bench = rigs.load(ROOT / "firmware" / "rig.toml")
-    robot, outputs = driven(fx.load(ROOT / "model" / "robots" / "rig.toml"), bench)
+    bench = rigs.load(FIRMWARE / "rig.toml")
+    robot, outputs = driven(fx.load(ROBOTS / "rig.toml"), bench)
     board = rigs.configuration(bench)
     settings = {
         name: board[name]
@@ -126,7 +125,7 @@ def type_4() -> Structure:
 
 def type_3() -> Structure:
     """RPb: a torque of 2 N m, a force of 2 N."""
-    data = fx.load(ROOT / "model" / "robots" / "type-3-rpb.toml").to_dict()
+    data = fx.load(ROBOTS / "type-3-rpb.toml").to_dict()
     data["link"][1]["joint"]["start"] = 0.20
     settings = {
         "torque_max_1_N_m": 2.0,

@@ -13,9 +13,9 @@ from ..errors import InputError
 from ..io import STATIONS
 from ..robot import Robot
 from ..signals import Drive
+from ..simulation.dynamics import simulate
 from ..simulation.problem import MOST_STEPS, outside
 from ..simulation.recorder import LOSS, NUMERICAL, WORK, limit_event, observed
-from ..simulation.simulate import simulate
 from ..system import System
 from .batch import Share
 from .request import Request

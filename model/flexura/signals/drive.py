@@ -59,6 +59,7 @@ class Drive:
 
     @staticmethod
     def none(joints: int) -> Drive:
+        """No drive at all: every joint is free."""
         return Drive((JointDrive(),) * joints)
 
     @staticmethod

@@ -1,11 +1,11 @@
 """One robot: a problem is checked, solved and recorded."""
 
 from .approximate_inverse import by_bisection, by_rigid_robot, rigid_robot
+from .dynamics import inverse, simulate
 from .feedforward import gravity, inverse_dynamics
 from .gain_sweep import Trials, trials
 from .problem import METHODS
 from .recorder import channel_units
-from .simulate import inverse, simulate
 
 __all__ = [
     "METHODS",

@@ -20,9 +20,9 @@ from ..io import Run
 from ..robot import Robot
 from ..signals import COLUMNS, Drive, Signal
 from ..system import System, assemble
+from .dynamics import simulate
 from .problem import Solution, check_state, check_times, put_on_motions
 from .recorder import limit_event, record
-from .simulate import simulate
 
 ACCOUNTS = 4  # numbers of a state beyond q and qd
 MAX_SWEEPS = 300  # joint after joint, in one step

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..signals import Signal, table
 from ..system import System
-from .simulate import inverse
+from .dynamics import inverse
 
 
 def gravity(system: System, motions: Sequence[Signal], t_s: Any) -> list[Signal]:

@@ -166,9 +166,8 @@ def test_the_environment_chooses_the_build():
 
 
 def test_without_compiled_modules_the_message_says_what_to_type(tmp_path):
-    (tmp_path / "flexura").mkdir()
-    for name in ("__init__.py", "core.py"):
-        shutil.copy(ROOT / "model" / "flexura" / name, tmp_path / "flexura")
+    compiled = shutil.ignore_patterns("_*.so", "_*.pyd", "__pycache__")
+    shutil.copytree(ROOT / "model" / "flexura", tmp_path / "flexura", ignore=compiled)
     done = in_a_new_process("import flexura.core", PYTHONPATH=str(tmp_path))
     assert (
         done.returncode == 1

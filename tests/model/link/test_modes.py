@@ -8,7 +8,7 @@ from scipy.special import iv, jv
 from flexura.link.line import pieces
 from flexura.link.modes import clamped_matrices, clamped_modes
 from flexura.link.section import Material
-from flexura.robot.robot import Link
+from flexura.robot import Link
 from robots import beam
 
 UNIT = Material(np.array([0.0, 1.0]), np.array([[1.0, 0, 0]]), np.array([[1.0, 0, 0, 0, 0]]))

@@ -7,7 +7,7 @@ from flexura.link.line import pieces
 from flexura.link.quadrature import cells
 from flexura.link.section import material
 from flexura.link.shapes import ElementShapes, WholeShapes
-from flexura.robot.robot import Link
+from flexura.robot import Link
 from robots import beam
 
 SHAPES = [

@@ -5,7 +5,7 @@ import pytest
 
 import chains
 import flexura as fx
-from flexura.robot.robot import Robot
+from flexura.robot import Robot
 
 NOTHING = {"gravity": False, "stiffness": False, "damping": False}
 

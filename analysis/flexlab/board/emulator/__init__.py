@@ -1,1 +1,1 @@
-"""flexlab.board.emulator."""
+"""An emulated ATmega2560: simavr in lockstep with a plant."""

@@ -1,1 +1,2 @@
-"""flexlab.board.protocol."""
+"""What goes over the line: frames, messages, the session of commands and answers, streamed
+trajectories."""

@@ -1,1 +1,1 @@
-"""flexlab.rig.plant."""
+"""The emulated rig: motor, stepper, flex sensor and mechanics behind the board's pins."""

@@ -11,9 +11,9 @@ import numpy as np
 import flexura as fx
 from flexura import twin
 
-from .exudyn_actions import Actions
-from .exudyn_chain import Chain
-from .problem import Channels, Problem
+from ..problems.problem import Channels, Problem
+from .actions import Actions
+from .chain import Chain
 
 
 @dataclass(frozen=True)

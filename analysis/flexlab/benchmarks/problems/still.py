@@ -12,9 +12,9 @@ import numpy as np
 
 import flexura as fx
 
-from . import native
-from .exudyn_chain import Chain, exudyn
-from .exudyn_run import Choice, settings
+from .. import native
+from ..exudyn_programs.chain import Chain, exudyn
+from ..exudyn_programs.run import Choice, settings
 from .problem import Tables
 from .robots import beam, chain, robot, turning, upright_arm
 

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .problem import Tables
+from ..problems.problem import Tables
 
 AXIAL = 1e5  # EA L^2 / EI of links that are given by their EI
 

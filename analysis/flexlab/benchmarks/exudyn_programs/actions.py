@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from .exudyn_chain import Chain
-from .problem import Work
+from ..problems.problem import Work
+from .chain import Chain
 
 FRICTION_SPEED = 1e-3  # m/s or rad/s: Coulomb friction is f tanh(v / this)
 Signals = Any  # a sequence of flexura's signals, or of None

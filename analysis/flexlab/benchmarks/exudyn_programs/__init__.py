@@ -1,0 +1,1 @@
+"""The same problems as programs of Exudyn, built without flexura's code."""
