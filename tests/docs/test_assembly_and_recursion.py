@@ -1,4 +1,5 @@
-"""Equations of docs/theory/05-extended-assembly.md and 06-recursion.md, written down with plain NumPy, against system and core."""
+"""Equations of docs/theory/05-extended-assembly.md and 06-recursion.md, written down with plain
+NumPy, against system and core."""
 
 import numpy as np
 import pytest
@@ -6,7 +7,7 @@ from numpy.polynomial.legendre import leggauss
 from numpy.polynomial.polynomial import polyfromroots, polyint, polyval
 
 import robots
-from flexura import core
+from core_steps import steps
 
 L1, L2, RHO, EI = 0.5, 0.4, 0.3, 0.8
 RNG = np.random.default_rng(5)
@@ -15,9 +16,13 @@ BETA, FRICTION = 2e-3, 0.2
 
 
 def chain(**keys):
-    """Two flexible links with R joints, of two elements and of one: q = [joint, 4 unknowns, joint, 2 unknowns]."""
-    first = robots.beam(L1, RHO, EI, 2, hub_inertia_kg_m2=0.01, damping={"beta_s": BETA}, viscous_friction=FRICTION)
-    second = robots.beam(L2, RHO, EI, 1, hub_mass_kg=0.2, hub_inertia_kg_m2=0.005, rotor_inertia=0.003)
+    """Two flexible links of two elements and of one: q = [joint, 4 of its own, joint, 2]."""
+    first = robots.beam(
+        L1, RHO, EI, 2, hub_inertia_kg_m2=0.01, damping={"beta_s": BETA}, viscous_friction=FRICTION
+    )
+    second = robots.beam(
+        L2, RHO, EI, 1, hub_mass_kg=0.2, hub_inertia_kg_m2=0.005, rotor_inertia=0.003
+    )
     return robots.system(first, second, payload=0.1, payload_inertia=1e-3, **keys)
 
 
@@ -31,7 +36,11 @@ def masses(system):
     points, lumps = [], [(0.01, 1, 0.0), (0.005, 2, 0.0), (1e-3, 2, L2)]
     for link, length, elements in ((1, L1, 2), (2, L2, 1)):
         h = length / elements
-        points += [(RHO * h * b / 2, link, h * (k + (1 + a) / 2)) for k in range(elements) for a, b in zip(x, w)]
+        points += [
+            (RHO * h * b / 2, link, h * (k + (1 + a) / 2))
+            for k in range(elements)
+            for a, b in zip(x, w)
+        ]
     return [*points, (0.2, 2, 0.0), (0.1, 2, L2)], lumps
 
 
@@ -48,7 +57,9 @@ def along(system, q, direction, h=1e-3):
     out = []
     for values in zip(*at):
         a, b, c, d, e = values
-        out.append(((8 * (d - b) - (e - a)) / (12 * h), (16 * (b + d) - a - e - 30 * c) / (12 * h * h)))
+        out.append(
+            ((8 * (d - b) - (e - a)) / (12 * h), (16 * (b + d) - a - e - 30 * c) / (12 * h * h))
+        )
     return out
 
 
@@ -64,12 +75,20 @@ def test_columns_mass_matrix_bias_and_gravity():
     tip = system.assembly.tip(q, qd)
     (rate, rest), (spin, more) = along(system, q, qd)
     assert tip.velocity == pytest.approx(J[-1], abs=1e-8)
-    assert tip.velocity @ qd == pytest.approx(rate[-1], abs=1e-7) and tip.turning @ qd == pytest.approx(spin[-1], abs=1e-8)
-    assert tip.rest == pytest.approx(rest[-1], abs=1e-4) and tip.rest_turning == pytest.approx(more[-1], abs=1e-4)
+    assert tip.velocity @ qd == pytest.approx(
+        rate[-1], abs=1e-7
+    ) and tip.turning @ qd == pytest.approx(spin[-1], abs=1e-8)
+    assert tip.rest == pytest.approx(rest[-1], abs=1e-4) and tip.rest_turning == pytest.approx(
+        more[-1], abs=1e-4
+    )
     mu, I = (np.array([row[0] for row in group]) for group in masses(system))
     rotors = np.zeros(system.n)
     rotors[5] = 0.003
-    M = np.real(J.conj().T @ (mu[:, None] * J)) + turning.T @ (I[:, None] * turning) + np.diag(rotors)
+    M = (
+        np.real(J.conj().T @ (mu[:, None] * J))
+        + turning.T @ (I[:, None] * turning)
+        + np.diag(rotors)
+    )
     assert system.mass(q) == pytest.approx(M, rel=1e-7, abs=1e-9)
     assert system.equations.mass(q) == pytest.approx(M, rel=1e-7, abs=1e-9)
     h = np.real(J.conj().T @ (mu * rest)) + turning.T @ (I * more)
@@ -99,25 +118,47 @@ def test_elastic_forces():
 class Piece:
     """An element: its points, constants, and the unknowns q in the robot's."""
 
-    def __init__(self, h, own, joint=None, hub=(0.0, 0.0), payload=(0.0, 0.0), rotor=0.0, beta=0.0, friction=0.0):
+    def __init__(
+        self,
+        h,
+        own,
+        joint=None,
+        hub=(0.0, 0.0),
+        payload=(0.0, 0.0),
+        rotor=0.0,
+        beta=0.0,
+        friction=0.0,
+    ):
         x = (1 + leggauss(3)[0]) / 2
-        powers = [polyint(polyfromroots(np.delete(x, j)) / np.prod(x[j] - np.delete(x, j))) for j in range(3)]
+        powers = [
+            polyint(polyfromroots(np.delete(x, j)) / np.prod(x[j] - np.delete(x, j)))
+            for j in range(3)
+        ]
         y, dy = leggauss(10)
         w = h * np.column_stack([polyval((1 + y) / 2, p) for p in powers])
         dm = RHO * h * dy / 2
         self.w = h * np.array([polyval(1.0, p) for p in powers])
         self.B = np.column_stack([x, 6 * x * (1 - x)])
-        self.K, self.beta, self.own, self.joint, self.rotor, self.friction = EI / h * np.array([1, 12]), beta, own, joint, rotor, friction
+        self.K, self.beta, self.own, self.joint, self.rotor, self.friction = (
+            EI / h * np.array([1, 12]),
+            beta,
+            own,
+            joint,
+            rotor,
+            friction,
+        )
         self.hub, self.payload = hub, payload
         self.m, self.s = RHO * h + payload[0], dm @ w + payload[0] * self.w
         self.W = w.T @ (dm[:, None] * w) + payload[0] * np.outer(self.w, self.w)
 
     def look(self, phi, omega, q, qd):
-        """Its matrices at the angle and rate of its hub: X, J, beta, H, k, and the next hub's angle and rate."""
+        """X, J, beta, H, k at its hub's angle and rate; gives those of the next hub."""
         q, qd = q[self.own], qd[self.own]
         turn = np.column_stack([np.ones(3), self.B])
         e, spin = np.exp(1j * (phi + self.B @ q)), omega + self.B @ qd
-        columns = self.w @ (1j * e[:, None] * turn)  # of the tip's place by the angle and the unknowns
+        columns = self.w @ (
+            1j * e[:, None] * turn
+        )  # of the tip's place by the angle and the unknowns
         rest = self.w @ (-e * spin**2)
         self.X = np.array([[1, 0, columns[0].real], [0, 1, columns[0].imag], [0, 0, 1]])
         self.J = np.array([columns[1:].real, columns[1:].imag, [1, 0]])
@@ -141,9 +182,10 @@ class Piece:
 
 def pieces():
     return [
-        Piece(L1 / 2, slice(1, 3), 0, hub=(0.0, 0.01), beta=BETA, friction=FRICTION), Piece(L1 / 2, slice(3, 5), beta=BETA),
+        Piece(L1 / 2, slice(1, 3), 0, hub=(0.0, 0.01), beta=BETA, friction=FRICTION),
+        Piece(L1 / 2, slice(3, 5), beta=BETA),
         Piece(L2, slice(6, 8), 5, hub=(0.2, 0.005), payload=(0.1, 1e-3), rotor=0.003),
-    ]  # fmt: skip
+    ]
 
 
 def swept(q, qd):
@@ -176,7 +218,10 @@ def test_the_recursion():
         if piece.joint is not None:
             piece.F = force[piece.joint] - piece.friction * qd[piece.joint]
             piece.pivot = sigma @ A @ sigma + piece.rotor
-            A, b = A - np.outer(A @ sigma, sigma @ A) / piece.pivot, b + A @ sigma * (piece.F - sigma @ b) / piece.pivot
+            A, b = (
+                A - np.outer(A @ sigma, sigma @ A) / piece.pivot,
+                b + A @ sigma * (piece.F - sigma @ b) / piece.pivot,
+            )
     u, a = np.array([-G.real, -G.imag, 0.0]), np.zeros(system.n)
     for piece in made:
         if piece.joint is not None:
@@ -196,7 +241,12 @@ def test_the_mass_matrix_by_composite_bodies():
     """
     system = chain()
     q, qd, _ = state(system.n)
-    M, sigma, A, wrenches = np.zeros((system.n, system.n)), np.array([0.0, 0.0, 1.0]), np.zeros((3, 3)), {}
+    M, sigma, A, wrenches = (
+        np.zeros((system.n, system.n)),
+        np.array([0.0, 0.0, 1.0]),
+        np.zeros((3, 3)),
+        {},
+    )
     for piece in reversed(swept(q, 0 * qd)):
         both = np.hstack([piece.X, piece.J])
         H = piece.H + both.T @ A @ both
@@ -217,14 +267,14 @@ def test_the_mass_matrix_by_composite_bodies():
 
 
 def test_an_implicit_stage():
-    """One step of TR-BDF2 on a clamped link that hardly bends: stiffness and damping are implicit in each stage.
+    """One step of TR-BDF2 on a clamped link that hardly bends; stiffness and damping are implicit.
 
     Equations: 49
     """
     beam = robots.beam(L1, RHO, EI, 1, locked=True, damping={"beta_s": 0.05})
     system = robots.system(beam, payload=0.1)
     q, qd = np.array([0.0, 1e-6, -2e-7]), np.array([0.0, 3e-5, 1e-5])
-    t, y, v = step_of(system, "implicit-2", q, qd, 2e-3)
+    t, y, v = steps(system, "implicit-2", q, qd, 1.0, 0.1, 1, first=2e-3)[1][:3]
     M, K = system.mass(0 * q)[1:, 1:], np.diag([EI / L1, 12 * EI / L1])
     D, gamma, w = 0.05 * K, 1 - 1 / np.sqrt(2), np.sqrt(2) / 4
     places, rates, seconds = [q[1:]], [qd[1:]], [-np.linalg.solve(M, K @ q[1:] + D @ qd[1:])]
@@ -237,17 +287,6 @@ def test_an_implicit_stage():
         places.append(q_star + gq * a)
         rates.append(v_star + gv * a)
     assert t == pytest.approx(2e-3)
-    assert y[1:] == pytest.approx(places[-1], rel=1e-8) and v[1:] == pytest.approx(rates[-1], rel=1e-8)
-
-
-def step_of(system, method, q, qd, h):
-    """Time, q and q' after one step of the core."""
-    n, joints = system.n, len(system.robot.links)
-    run = core.Simulation(
-        system.equations, np.array([0.0, 100 * h]), q.copy(), qd.copy(), 0.1, method, np.zeros((0, 10)),
-        np.zeros((joints, 4), dtype=np.int64), np.zeros((joints, 2)), np.zeros(joints, dtype=np.uint8),
-        np.zeros(joints, dtype=np.uint8), np.tile([-np.inf, np.inf], (joints, 1)), None, None, 0.0, h, True, 0,
-    )  # fmt: skip
-    run.advance(1)
-    state = np.asarray(run.state())
-    return run.progress()["t"], state[:n], state[n : 2 * n]
+    assert y[1:] == pytest.approx(places[-1], rel=1e-8) and v[1:] == pytest.approx(
+        rates[-1], rel=1e-8
+    )

@@ -1,18 +1,29 @@
-"""Equations of docs/theory/09-control.md, written down with plain NumPy, against the sampled controller of the core."""
+"""Equations of docs/theory/09-control.md, written down with plain NumPy,
+against the sampled controller of the core."""
 
 import numpy as np
 import pytest
 
 import flexura as fx
 import robots
-from flexura.control import lqr as design_of
-from flexura.control.response import joint_figures, strip_figures
+from flexura import control
+from flexura.control.step_response import joint_figures, strip_figures
 from flexura.signals import cycloid, harmonic, matched_cycloid, zv, zvd
 
 RATE = 100.0
 T = 1 / RATE
 RNG = np.random.default_rng(7)
-GAINS = {"kp": 3.0, "ki": 7.0, "kd": 0.4, "kf": 20.0, "kg": 0.7, "ks": 2.0, "kt": 0.1, "kv": 0.5, "kc": 0.2}
+GAINS = {
+    "kp": 3.0,
+    "ki": 7.0,
+    "kd": 0.4,
+    "kf": 20.0,
+    "kg": 0.7,
+    "ks": 2.0,
+    "kt": 0.1,
+    "kv": 0.5,
+    "kc": 0.2,
+}
 
 
 def clip(x, c):
@@ -21,7 +32,9 @@ def clip(x, c):
 
 def arm():
     return robots.system(
-        robots.rigid(0.1, 0.4, 0.05, 1e-3, "Pa"), robots.beam(0.5, 0.2, 0.8, 2, hub_inertia_kg_m2=1e-3), payload=0.05
+        robots.rigid(0.1, 0.4, 0.05, 1e-3, "Pa"),
+        robots.beam(0.5, 0.2, 0.8, 2, hub_inertia_kg_m2=1e-3),
+        payload=0.05,
     )
 
 
@@ -34,7 +47,12 @@ def law(ticks, measured, w, s, joint, limit, slew, reference, feedforward):
     a_r, a_q, a_w = smoothing(5.0, T), smoothing(20.0, T), smoothing(15.0, 2 * T)
     g = GAINS
     r_before, rate, z, u, tip = reference(-1e-12)[0], 0.0, 0.0, 0.0, 0.0
-    q_before, before, filtered, slopes = measured[0], (w[0], s[0]), np.array([w[0], s[0]]), np.zeros(2)
+    q_before, before, filtered, slopes = (
+        measured[0],
+        (w[0], s[0]),
+        np.array([w[0], s[0]]),
+        np.zeros(2),
+    )
     out = []
     for k in range(ticks):
         r = r_before + a_r * (reference(k * T)[0] - r_before)
@@ -45,13 +63,25 @@ def law(ticks, measured, w, s, joint, limit, slew, reference, feedforward):
             slopes, filtered = (new - filtered) / (2 * T), new
         before = (w[k], s[k])
         if k % 2 == joint % 2:
-            tip = g["kf"] * filtered[0] + g["kg"] * slopes[0] + g["ks"] * filtered[1] + g["kt"] * slopes[1]
+            tip = (
+                g["kf"] * filtered[0]
+                + g["kg"] * slopes[0]
+                + g["ks"] * filtered[1]
+                + g["kt"] * slopes[1]
+            )
         e = r - measured[k]
         more = z + g["ki"] * e * T
         counted = more if abs(more) <= limit else z
-        wish = g["kp"] * e + counted + g["kd"] * (r_rate - rate) + tip + g["kv"] * r_rate + g["kc"] * np.sign(r_rate)
+        wish = (
+            g["kp"] * e
+            + counted
+            + g["kd"] * (r_rate - rate)
+            + tip
+            + g["kv"] * r_rate
+            + g["kc"] * np.sign(r_rate)
+        )
         wish += feedforward(k * T)[0]
-        u += clip(clip(wish, limit) - u, slew * T)
+        u = min(max(clip(wish, limit), u - slew * T), u + slew * T)
         if (wish - u) * g["ki"] * e <= 0:
             z = counted
         r_before, q_before = r, measured[k]
@@ -59,15 +89,25 @@ def law(ticks, measured, w, s, joint, limit, slew, reference, feedforward):
     return np.array(out)
 
 
-@pytest.mark.parametrize(("limit", "slew"), [(np.inf, np.inf), (1.2, np.inf), (1.2, 15.0), (0.3, 400.0)])
+@pytest.mark.parametrize(
+    ("limit", "slew"), [(np.inf, np.inf), (1.2, np.inf), (1.2, 15.0), (0.3, 400.0)]
+)
 def test_the_law_of_a_joint(limit, slew):
-    """Measurement, PID, limits and anti-windup against the core's controller on random measurements.
+    """Measurement, PID, limits and anti-windup on random measurements.
 
     Equations: 67, 68, 69, 70, 71, 72
     """
     ticks, reference, feedforward = 120, harmonic(0.5, 0.7), harmonic(0.1, 2.0)
     pids = tuple(
-        fx.PID(reference, limit=limit, slew=slew, setpoint_Hz=5.0, derivative_Hz=20.0, feedforward=feedforward, **GAINS)
+        fx.PID(
+            reference,
+            limit=limit,
+            slew=slew,
+            setpoint_Hz=5.0,
+            derivative_Hz=20.0,
+            feedforward=feedforward,
+            **GAINS,
+        )
         for _ in range(2)
     )
     controller = fx.Controller(pids, rate_Hz=RATE, deflection_Hz=15.0)
@@ -92,15 +132,23 @@ def test_one_sensor_in_place_of_two():
     """
     one = fx.PID(fx.signals.constant(0.0), **GAINS).one_sensor(0.4)
     assert one.kf == pytest.approx(GAINS["kf"] + 3 / (2 * 0.4) * GAINS["ks"])
-    assert one.kg == pytest.approx(GAINS["kg"] + 3 / (2 * 0.4) * GAINS["kt"]) and one.ks == one.kt == 0
+    assert (
+        one.kg == pytest.approx(GAINS["kg"] + 3 / (2 * 0.4) * GAINS["kt"]) and one.ks == one.kt == 0
+    )
 
 
 def lqr_design():
     system = arm()
     pids = (fx.PID(fx.signals.step(0.1), fx.Motor(13.0, 40.0)), fx.PID(fx.signals.step(0.5)))
     controller = fx.Controller(pids, rate_Hz=RATE)
-    made, design = design_of.lqr(
-        system, controller, (12.0, 0.5), position=(0.01, 0.05), deflection=0.002, disturbance=(0.5, 0.01), noise=(1e-4, 1e-4, 1e-5)
+    made, design = control.lqr(
+        system,
+        controller,
+        (12.0, 0.5),
+        position=(0.01, 0.05),
+        deflection=0.002,
+        disturbance=(0.5, 0.01),
+        noise=(1e-4, 1e-4, 1e-5),
     )
     return system, made, design
 
@@ -125,8 +173,12 @@ def test_the_linear_model_over_a_tick():
         exponential = exponential + term
     for _ in range(16):
         exponential = exponential @ exponential
-    assert design.F == pytest.approx(exponential[: 2 * n, : 2 * n], abs=1e-6 * np.abs(design.F).max())
-    assert design.G == pytest.approx(exponential[: 2 * n, 2 * n :], abs=1e-6 * np.abs(design.G).max())
+    assert design.F == pytest.approx(
+        exponential[: 2 * n, : 2 * n], abs=1e-6 * np.abs(design.F).max()
+    )
+    assert design.G == pytest.approx(
+        exponential[: 2 * n, 2 * n :], abs=1e-6 * np.abs(design.G).max()
+    )
 
 
 def test_the_regulator():
@@ -136,7 +188,10 @@ def test_the_regulator():
     """
     system, _, d = lqr_design()
     linear = fx.linearize(system)
-    rows = [linear.outputs.index(name) for name in ("joint/1/position", "joint/2/position", "link/2/tip_deflection")]
+    rows = [
+        linear.outputs.index(name)
+        for name in ("joint/1/position", "joint/2/position", "link/2/tip_deflection")
+    ]
     W = linear.C[rows] / np.array([0.01, 0.05, 0.002])[:, None]
     Q, R = W.T @ W, np.diag(1 / np.array([12.0, 0.5]) ** 2)
     K = np.linalg.solve(R + d.G.T @ d.P @ d.G, d.G.T @ d.P @ d.F)
@@ -187,11 +242,13 @@ def test_the_law_with_the_estimator():
 
 
 def oscillator_at(signal, f, zeta, end):
-    """Amplitude of a mode's vibration about its set-point after the motion, by small steps of its exact solution."""
+    """Amplitude of a mode about its set-point after the motion, by small exact steps."""
     w, n = 2 * np.pi * f, 4000
     h, x = end / n, np.zeros(2)
     A = np.array([[0, 1], [-w * w, -2 * zeta * w]])
-    step = np.eye(2) + h * A @ (np.eye(2) + h / 2 * A @ (np.eye(2) + h / 3 * A @ (np.eye(2) + h / 4 * A)))
+    step = np.eye(2) + h * A @ (
+        np.eye(2) + h / 2 * A @ (np.eye(2) + h / 3 * A @ (np.eye(2) + h / 4 * A))
+    )
     push = np.linalg.solve(A, (step - np.eye(2)) @ [0, 1])
     for k in range(n):
         x = step @ x + push * w * w * signal((k + 0.5) * h)[0]
@@ -211,7 +268,9 @@ def test_input_shapers():
     for t in (0.0, 0.2, 0.1 + 0.6 * Td, 0.1 + 1.2 * Td, 2.0):
         late = [y(motion, t - x) for x in (0.0, Td / 2, Td)]
         assert y(two, t) == pytest.approx((late[0] + k * late[1]) / (1 + k))
-        assert y(three, t) == pytest.approx((late[0] + 2 * k * late[1] + k * k * late[2]) / (1 + k) ** 2)
+        assert y(three, t) == pytest.approx(
+            (late[0] + 2 * k * late[1] + k * k * late[2]) / (1 + k) ** 2
+        )
         assert y(shaped, t) == pytest.approx((y(smooth, t) + k * y(smooth, t - Td / 2)) / (1 + k))
     assert oscillator_at(smooth, f, zeta, 2.0) > 20 * oscillator_at(shaped, f, zeta, 2.0)
 

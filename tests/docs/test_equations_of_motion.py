@@ -1,4 +1,5 @@
-"""Equations of docs/theory/03-equations-of-motion.md, written down with plain NumPy, against the system and the core."""
+"""Equations of docs/theory/03-equations-of-motion.md, written down with plain NumPy,
+against the system and the core."""
 
 import numpy as np
 import pytest
@@ -18,7 +19,10 @@ class Element:
     def __init__(self, length=L, rho=RHO):
         x, _ = leggauss(3)
         self.x = (1 + x) / 2
-        powers = [polyint(polyfromroots(np.delete(self.x, j)) / np.prod(self.x[j] - np.delete(self.x, j))) for j in range(3)]
+        powers = [
+            polyint(polyfromroots(np.delete(self.x, j)) / np.prod(self.x[j] - np.delete(self.x, j)))
+            for j in range(3)
+        ]
         y, dy = leggauss(20)
         w = length * np.column_stack([polyval((1 + y) / 2, p) for p in powers])
         dm = rho * length * dy / 2
@@ -52,7 +56,9 @@ def test_the_kinetic_energy_of_a_piece():
     energy += 0.5 * spin @ (c.W * dot(e[:, None], e)) @ spin
     found = system.assembly.energies(q, qd).kinetic - 0.5 * CARRIAGE * qd[0] ** 2
     assert found == pytest.approx(energy, rel=1e-12)
-    assert system.observe(q[None], qd[None])[0, -3] == pytest.approx(energy + 0.5 * CARRIAGE * qd[0] ** 2, rel=1e-12)
+    assert system.observe(q[None], qd[None])[0, -3] == pytest.approx(
+        energy + 0.5 * CARRIAGE * qd[0] ** 2, rel=1e-12
+    )
 
 
 def test_the_kinetic_energy_of_a_hub_and_a_rotor():
@@ -60,7 +66,10 @@ def test_the_kinetic_energy_of_a_hub_and_a_rotor():
 
     Equations: 21
     """
-    (q, qd, _), keys = state(), {"hub_mass_kg": 0.2, "hub_inertia_kg_m2": 0.03, "rotor_inertia": 0.01}
+    (q, qd, _), keys = (
+        state(),
+        {"hub_mass_kg": 0.2, "hub_inertia_kg_m2": 0.03, "rotor_inertia": 0.01},
+    )
     plain, full = (cart(link=link).observe(q[None], qd[None])[0, -3] for link in ({}, keys))
     added = 0.5 * 0.2 * qd[0] ** 2 + 0.5 * 0.03 * qd[1] ** 2 + 0.5 * 0.01 * qd[1] ** 2
     assert full - plain == pytest.approx(added, rel=1e-11)
@@ -76,7 +85,10 @@ def test_the_kinetic_energy_of_a_payload_with_rotary_inertia():
     tip, turning = qd[0] + c.w_tip @ (1j * e * spin), qd[1] + qd[2]
     added = 0.5 * 0.3 * abs(tip) ** 2 + 0.5 * 0.02 * turning**2
     plain, full = cart(), cart(payload=0.3, payload_inertia=0.02)
-    for energy in (lambda s: s.observe(q[None], qd[None])[0, -3], lambda s: s.assembly.energies(q, qd).kinetic):
+    for energy in (
+        lambda s: s.observe(q[None], qd[None])[0, -3],
+        lambda s: s.assembly.energies(q, qd).kinetic,
+    ):
         assert energy(full) - energy(plain) == pytest.approx(added, rel=1e-11)
 
 
@@ -95,9 +107,13 @@ def test_the_potential_of_gravity():
 def arm(**link):
     """A slider, a bent link with two elements, a rigid link."""
     return robots.system(
-        robots.rigid(0.1, 0.4, 0.05, 1e-3, "Pa", angle_rad=0.2), robots.beam(L, RHO, EI, 2, hub_mass_kg=0.1, **link),
-        robots.rigid(0.3, 0.2, 0.1, 2e-3), gravity=(0.0, -9.81), payload=0.1, payload_inertia=1e-3,
-    )  # fmt: skip
+        robots.rigid(0.1, 0.4, 0.05, 1e-3, "Pa", angle_rad=0.2),
+        robots.beam(L, RHO, EI, 2, hub_mass_kg=0.1, **link),
+        robots.rigid(0.3, 0.2, 0.1, 2e-3),
+        gravity=(0.0, -9.81),
+        payload=0.1,
+        payload_inertia=1e-3,
+    )
 
 
 def test_lagranges_equations():
@@ -130,7 +146,9 @@ def test_the_equations_of_motion_of_a_two_link_arm():
     Equations: 25
     """
     (l1, c1, m1, J1), (c2, m2, J2), g = (0.4, 0.15, 1.2, 0.02), (0.2, 0.7, 0.01), 9.81
-    first = robots.rigid(l1, m1, c1, J1, viscous_friction=0.3, coulomb_friction=0.05, rotor_inertia=0.02)
+    first = robots.rigid(
+        l1, m1, c1, J1, viscous_friction=0.3, coulomb_friction=0.05, rotor_inertia=0.02
+    )
     system = robots.system(first, robots.rigid(0.5, m2, c2, J2), gravity=(0.0, -g))
     q, qd, qdd = state(2)
     a, b = m2 * l1 * c2 * np.cos(q[1]), m2 * l1 * c2 * np.sin(q[1])
@@ -169,7 +187,9 @@ def test_the_balance_of_energy_and_the_loss():
 
     Equations: 27, 28
     """
-    system = arm(damping={"alpha_1_s": 0.1, "beta_s": 1e-3}, viscous_friction=0.2, coulomb_friction=0.3)
+    system = arm(
+        damping={"alpha_1_s": 0.1, "beta_s": 1e-3}, viscous_friction=0.2, coulomb_friction=0.3
+    )
     q, qd, _ = state(system.n, 0.4)
     drives = np.array([3.0, -1.0, 0.5])
     force = np.zeros(system.n)
@@ -179,7 +199,9 @@ def test_the_balance_of_energy_and_the_loss():
     a = system.accelerations(q, qd, force - friction)
 
     def total(t):
-        return system.observe((q + t * qd + 0.5 * t * t * a)[None], (qd + t * a)[None])[0, -3:].sum()
+        return system.observe((q + t * qd + 0.5 * t * t * a)[None], (qd + t * a)[None])[
+            0, -3:
+        ].sum()
 
     h = 1e-5
     rise = (8 * (total(h) - total(-h)) - (total(2 * h) - total(-2 * h))) / (12 * h)

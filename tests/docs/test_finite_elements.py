@@ -1,4 +1,5 @@
-"""Equations of docs/theory/02-finite-elements.md, written down with plain NumPy, against flexura.link and the system."""
+"""Equations of docs/theory/02-finite-elements.md, written down with plain NumPy,
+against flexura.link and the system."""
 
 import numpy as np
 import pytest
@@ -15,8 +16,17 @@ from flexura.link.shapes import legendre_shapes
 from flexura.robot import Link
 
 L = 0.5
-TAPER = [{"at_m": 0.0, "width_m": 0.03, "height_m": 0.006}, {"at_m": L, "width_m": 0.02, "height_m": 0.002}]
-STEEL = {"length_m": L, "elements": 3, "young_modulus_Pa": 2e11, "density_kg_m3": 7850.0, "joint": {"type": "R"}}
+TAPER = [
+    {"at_m": 0.0, "width_m": 0.03, "height_m": 0.006},
+    {"at_m": L, "width_m": 0.02, "height_m": 0.002},
+]
+STEEL = {
+    "length_m": L,
+    "elements": 3,
+    "young_modulus_Pa": 2e11,
+    "density_kg_m3": 7850.0,
+    "joint": {"type": "R"},
+}
 
 
 def fine(count=40, a=0.0, b=1.0):
@@ -40,7 +50,10 @@ def phi(k, u, derivative=False):
 
 def lagrange_of(points):
     """Lagrange's polynomials through points, by their roots, as powers."""
-    return [polyfromroots(np.delete(points, j)) / np.prod(x - np.delete(points, j)) for j, x in enumerate(points)]
+    return [
+        polyfromroots(np.delete(points, j)) / np.prod(x - np.delete(points, j))
+        for j, x in enumerate(points)
+    ]
 
 
 @pytest.fixture
@@ -94,7 +107,9 @@ def test_an_element(steel):
         c = k12 / k22
         assert piece.K == pytest.approx([k11 - c * k12, k22], rel=1e-12)
         bubble = 6 * x * (1 - x)
-        assert piece.shapes(x) == pytest.approx(np.column_stack([x - c * bubble, bubble]), abs=1e-13)
+        assert piece.shapes(x) == pytest.approx(
+            np.column_stack([x - c * bubble, bubble]), abs=1e-13
+        )
     uniform = Link.model_validate(robots.beam(L, 0.2, 0.7, 4))
     assert pieces(uniform)[0].K == pytest.approx(0.7 / (L / 4) * np.array([1, 12]), rel=1e-13)
 
@@ -106,16 +121,23 @@ def test_the_shapes_of_a_whole_link():
     """
     xi = np.linspace(0, 1, 9)
     u = 2 * xi - 1
-    assert legendre_shapes(6, xi) == pytest.approx(np.column_stack([phi(k, u) for k in range(6)]), abs=1e-14)
+    assert legendre_shapes(6, xi) == pytest.approx(
+        np.column_stack([phi(k, u) for k in range(6)]), abs=1e-14
+    )
     slopes = 2 * np.column_stack([phi(k, u, True) for k in range(6)])
     assert legendre_shapes(6, xi, 1) == pytest.approx(slopes, abs=1e-13)
     after = Link.model_validate(robots.rigid(0.1, 1.0, 0.05, 0.0, "Pa", start=0.1))
     tip = Link.model_validate(robots.rigid(0.1, 1.0, 0.05, 0.0))
     for elements, modes, next_link, shapes, points in (
-        (3, None, after, 6, 7), (10, None, after, 16, 17), (10, 3, tip, 8, 9), (10, 3, None, 8, 8),
-    ):  # fmt: skip
+        (3, None, after, 6, 7),
+        (10, None, after, 16, 17),
+        (10, 3, tip, 8, 9),
+        (10, 3, None, 8, 8),
+    ):
         keys = {} if modes is None else {"modes": modes}
-        (piece,) = pieces(Link.model_validate(robots.beam(L, 0.2, 0.7, elements, **keys)), next_link)
+        (piece,) = pieces(
+            Link.model_validate(robots.beam(L, 0.2, 0.7, elements, **keys)), next_link
+        )
         assert (len(piece.shapes.coefficients), piece.points) == (shapes, points)
 
 
@@ -128,12 +150,17 @@ def test_lagranges_polynomials_as_sums_of_legendres(count):
     points, _ = fine(count)
     xi = np.linspace(0, 1, 11)
     rows = lagrange_of(points)
-    assert lagrange(count, xi) == pytest.approx(np.column_stack([polyval(xi, r) for r in rows]), abs=1e-9)
+    assert lagrange(count, xi) == pytest.approx(
+        np.column_stack([polyval(xi, r) for r in rows]), abs=1e-9
+    )
     integrals = np.column_stack([polyval(xi, polyint(r)) for r in rows])
     assert lagrange_integrals(count, xi) == pytest.approx(integrals, abs=1e-10)
     u, g = leggauss(count)
     x = np.linspace(-1, 1, 11)
-    sums = sum((2 * k + 1) * np.outer(Legendre.basis(k)(x), g / 2 * Legendre.basis(k)(u)) for k in range(count))
+    sums = sum(
+        (2 * k + 1) * np.outer(Legendre.basis(k)(x), g / 2 * Legendre.basis(k)(u))
+        for k in range(count)
+    )
     assert lagrange(count, xi) == pytest.approx(sums, abs=1e-12)
 
 
@@ -190,7 +217,7 @@ def test_turning_energy_as_a_sum_of_squares():
 
 
 def own_matrices(count, points, mass=0.0, inertia=0.0):
-    """M_c and K_c of the tapered link with a payload, by fine quadrature of the interpolated deflection."""
+    """M_c and K_c of the tapered link with a payload, and its tip's deflections and angles."""
     nodes, _ = fine(points)
     B = np.column_stack([phi(k, 2 * nodes - 1) for k in range(count)])
     x, dx = fine()
@@ -200,7 +227,11 @@ def own_matrices(count, points, mass=0.0, inertia=0.0):
     W = w.T @ ((rho * L * dx)[:, None] * w)
     tip_angle = np.array([phi(k, 1.0) for k in range(count)])
     slopes = 2 / L * np.column_stack([phi(k, 2 * x - 1, True) for k in range(count)])
-    M = B.T @ W @ B + mass * np.outer(B.T @ w_tip, B.T @ w_tip) + inertia * np.outer(tip_angle, tip_angle)
+    M = (
+        B.T @ W @ B
+        + mass * np.outer(B.T @ w_tip, B.T @ w_tip)
+        + inertia * np.outer(tip_angle, tip_angle)
+    )
     return M, slopes.T @ ((EI * L * dx)[:, None] * slopes), B.T @ w_tip, tip_angle
 
 
@@ -230,7 +261,9 @@ def test_the_clamped_modes(steel):
     assert K @ V == pytest.approx(M @ V * squares, abs=1e-8 * np.abs(K @ V).max())
     assert np.all(w_tip @ V > 0)
     uniform = robots.robot(robots.beam(L, 0.2, 0.7, 4, modes=2))
-    assert fx.frequencies(uniform)[0] == pytest.approx(1.8751040687**2 / (2 * np.pi * L**2) * np.sqrt(0.7 / 0.2), rel=1e-6)
+    assert fx.frequencies(uniform)[0] == pytest.approx(
+        1.8751040687**2 / (2 * np.pi * L**2) * np.sqrt(0.7 / 0.2), rel=1e-6
+    )
 
 
 def test_static_shapes_join_the_modes(steel):

@@ -1,4 +1,5 @@
-"""Equations of docs/theory/01-kinematics.md, written down with plain NumPy, against the system's lines and frames."""
+"""Equations of docs/theory/01-kinematics.md, written down with plain NumPy,
+against the system's lines and frames."""
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ def gauss(count):
 
 
 def weights(x, points):
-    """Integrals from 0 to x of Lagrange's polynomials through the points, by their products of roots: (P,)."""
+    """Integrals from 0 to x of Lagrange's polynomials through the points, by their roots: (P,)."""
     out = []
     for j, node in enumerate(points):
         others = np.delete(points, j)
@@ -33,7 +34,7 @@ def bent(scale=0.6, **keys):
 
 
 def element_angle(x, q):
-    """The angle against the element's start at x = s / h, of a uniform element with unknowns q = (rotation, bubble)."""
+    """The angle against the start of a uniform element at x = s / h; q = (rotation, bubble)."""
     return q[0] * x + q[1] * 6 * x * (1 - x)
 
 
@@ -57,7 +58,9 @@ def test_the_hub_of_the_next_link(kind):
     fixed = {} if kind == "R" else {"angle_rad": 0.3}
     beam = robots.beam(L, 0.2, 0.5, 4, hub_inertia_kg_m2=1e-3)
     system = robots.system(beam, robots.rigid(0.3, 0.2, 0.15, 1e-3, kind, **joint, **fixed))
-    q = system.start() + 0.1 * RNG.normal(size=system.n) * np.isin(np.arange(system.n), system.elastic_rows)
+    q = system.start() + 0.1 * RNG.normal(size=system.n) * np.isin(
+        np.arange(system.n), system.elastic_rows
+    )
     q[0] = 0.7
     eta = 0.5 if kind == "R" else joint["start"]
     q[-1] = eta
@@ -75,7 +78,9 @@ def test_the_first_hub_stands_on_the_base():
     Equations: 1
     """
     system = robots.system(robots.rigid(0.3, 0.2, 0.15, 1e-3, "Pa", start=0.2, angle_rad=0.4))
-    assert np.ravel(system.line([0.25], 1, [0.1])) == pytest.approx([0.25 + 0.1 * np.cos(0.4), 0.1 * np.sin(0.4), 0.4])
+    assert np.ravel(system.line([0.25], 1, [0.1])) == pytest.approx(
+        [0.25 + 0.1 * np.cos(0.4), 0.1 * np.sin(0.4), 0.4]
+    )
 
 
 def test_the_angle_of_the_tangent():
@@ -83,7 +88,7 @@ def test_the_angle_of_the_tangent():
 
     Equations: 2
     """
-    system, q, qd, _ = bent()
+    system, q, _, _ = bent()
     h = L / ELEMENTS
     for s in (0.0, 0.25 * h, 1.5 * h, 3.9 * h, L):
         k = min(int(s / h), ELEMENTS - 1)
@@ -94,7 +99,7 @@ def test_the_angle_of_the_tangent():
 
 
 def test_the_place_is_the_integral_of_the_tangent():
-    """A fine sum over the tangents leads to the tip and to a place on the way; the error falls with the elements.
+    """A fine sum over the tangents leads to the tip; the error falls with the elements.
 
     Equations: 3
     """
@@ -103,7 +108,9 @@ def test_the_place_is_the_integral_of_the_tangent():
         system = robots.system(robots.beam(L, 0.2, 0.5, elements, hub_inertia_kg_m2=1e-3))
         q, h = np.zeros(system.n), L / elements
         q[0] = 0.3
-        q[1::2] = 2.0 * np.diff(np.sin(2.0 * np.linspace(0, 1, elements + 1)))  # the angle 2 sin(2 s / L) at the nodes
+        q[1::2] = 2.0 * np.diff(
+            np.sin(2.0 * np.linspace(0, 1, elements + 1))
+        )  # the angle 2 sin(2 s / L) at the nodes
         x, w = gauss(20)
         place = 0j
         for k in range(elements):
@@ -128,7 +135,9 @@ def test_the_place_by_quadrature():
     h, inside = L / ELEMENTS, 0.37
     start = np.exp(1j * (q[0] + element_angle(points, q[1:3])))
     inner = h * weights(inside, points) @ start
-    assert np.ravel(system.line(q, 1, [inside * h]))[:2] == pytest.approx([inner.real, inner.imag], abs=1e-14)
+    assert np.ravel(system.line(q, 1, [inside * h]))[:2] == pytest.approx(
+        [inner.real, inner.imag], abs=1e-14
+    )
 
 
 def test_velocity_and_acceleration_of_a_point():
@@ -177,7 +186,9 @@ def test_the_linear_line():
     place = velocity = acceleration = 0j
     start = np.zeros(3)  # of the angle against the hub, its rate and its second derivative
     for k in range(ELEMENTS):
-        own = [element_angle(points, x[1 + 2 * k : 3 + 2 * k]) + s for x, s in zip((q, qd, qdd), start)]
+        own = [
+            element_angle(points, x[1 + 2 * k : 3 + 2 * k]) + s for x, s in zip((q, qd, qdd), start)
+        ]
         e = t * (1 + 1j * own[0])
         rates = 1j * spin * e + 1j * t * own[1]
         seconds = 1j * more * e + 1j * t * own[2] - spin**2 * e - 2 * spin * own[1] * t

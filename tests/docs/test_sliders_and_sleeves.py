@@ -1,4 +1,5 @@
-"""Equations of docs/theory/04-sliders-and-sleeves.md, written down with plain NumPy, against the system and the core."""
+"""Equations of docs/theory/04-sliders-and-sleeves.md, written down with plain NumPy,
+against the system and the core."""
 
 import numpy as np
 import pytest
@@ -12,7 +13,10 @@ from flexura.system.nodes import nodes_at
 L, ELEMENTS = 0.8, 3
 N, P = 2 * ELEMENTS, 2 * ELEMENTS + 1  # shapes and points of a link as one piece
 RNG = np.random.default_rng(4)
-TAPER = [{"at_m": 0.0, "width_m": 0.03, "height_m": 0.004}, {"at_m": L, "width_m": 0.02, "height_m": 0.002}]
+TAPER = [
+    {"at_m": 0.0, "width_m": 0.03, "height_m": 0.004},
+    {"at_m": L, "width_m": 0.02, "height_m": 0.002},
+]
 
 
 def fine(count, a=0.0, b=1.0):
@@ -21,7 +25,10 @@ def fine(count, a=0.0, b=1.0):
 
 
 POINTS, G = fine(P)
-POWERS = [polyfromroots(np.delete(POINTS, j)) / np.prod(x - np.delete(POINTS, j)) for j, x in enumerate(POINTS)]
+POWERS = [
+    polyfromroots(np.delete(POINTS, j)) / np.prod(x - np.delete(POINTS, j))
+    for j, x in enumerate(POINTS)
+]
 
 
 def lagrange(xi, derivative=0):
@@ -35,7 +42,9 @@ def shapes(xi, derivative=0):
     for k in range(N):
         P0, P1 = Legendre.basis(max(k - 1, 0)), Legendre.basis(k + 1)
         phi = Legendre([1, 1]) if k == 0 else (P1 - P0) / (2 * k + 1)
-        out.append((phi.deriv(derivative) if derivative else phi)(2 * np.asarray(xi) - 1) * 2.0**derivative)
+        out.append(
+            (phi.deriv(derivative) if derivative else phi)(2 * np.asarray(xi) - 1) * 2.0**derivative
+        )
     return np.array(out).T
 
 
@@ -49,7 +58,9 @@ def dot(a, b):
 def ridden():
     """A link in a sleeve at the base that a slider rides on: q = [d, shapes, eta]."""
     beam = robots.beam(L, 0.3, 0.8, ELEMENTS, "Pb", start=0.5, angle_rad=0.3)
-    system = robots.system(beam, robots.rigid(0.1, 0.2, 0.05, 1e-3, "Pa", start=0.6, angle_rad=-0.2))
+    system = robots.system(
+        beam, robots.rigid(0.1, 0.2, 0.05, 1e-3, "Pa", start=0.6, angle_rad=-0.2)
+    )
     q, qd, qdd = (0.4 * RNG.normal(size=system.n) for _ in range(3))
     q[0], q[-1] = 0.5, 0.6
     return system, q, qd, qdd
@@ -76,8 +87,12 @@ def test_a_slider_on_a_link_in_a_sleeve():
     velocity = d * w @ (1j * e * spin) + qd[0] * (w @ e) + tau * along
     assert hub.velocity @ qd == pytest.approx(velocity, abs=1e-12)
     assert hub.turning @ qd == pytest.approx(b @ qd[1:-1] + kappa * along, abs=1e-12)
-    second = d * w @ (1j * e * more - e * spin**2) + tau * qdd[-1] + (w @ e + (1 - xi) * tau) * qdd[0]
-    second += 2 * qd[0] * w @ (1j * e * spin) + d * xi_rate * np.sum(2 * l * 1j * e * spin + xi_rate * dl * e)
+    second = (
+        d * w @ (1j * e * more - e * spin**2) + tau * qdd[-1] + (w @ e + (1 - xi) * tau) * qdd[0]
+    )
+    second += 2 * qd[0] * w @ (1j * e * spin) + d * xi_rate * np.sum(
+        2 * l * 1j * e * spin + xi_rate * dl * e
+    )
     assert hub.velocity @ qdd + hub.rest == pytest.approx(second, abs=1e-11)
     turned = b @ qdd[1:-1] + kappa * (qdd[-1] + (1 - xi) * qdd[0])
     turned += xi_rate * (2 * db @ qd[1:-1] + xi_rate * ddb @ y) - 2 * kappa * xi_rate * qd[0]
@@ -86,11 +101,18 @@ def test_a_slider_on_a_link_in_a_sleeve():
 
 def sleeved():
     """A carriage, a turning sleeve and a tapered link in it: q = [x, angle, d, shapes]."""
-    link = {"length_m": L, "elements": ELEMENTS, "section": TAPER, "young_modulus_Pa": 2e9, "density_kg_m3": 3000.0}
+    link = {
+        "length_m": L,
+        "elements": ELEMENTS,
+        "section": TAPER,
+        "young_modulus_Pa": 2e9,
+        "density_kg_m3": 3000.0,
+    }
     system = robots.system(
-        robots.rigid(0.0, 0.4, 0.0, 0.0, "Pa"), robots.rigid(0.0, 0.0, 0.0, 2e-3),
+        robots.rigid(0.0, 0.4, 0.0, 0.0, "Pa"),
+        robots.rigid(0.0, 0.0, 0.0, 2e-3),
         link | {"joint": {"type": "Pb", "start": 0.5}},
-    )  # fmt: skip
+    )
     q, qd, qdd = (0.5 * RNG.normal(size=system.n) for _ in range(3))
     q[2] = 0.5
     return system, q, qd, qdd
@@ -143,8 +165,12 @@ def test_the_strain_energy_of_the_free_length():
     """
     system, q, qd, _ = sleeved()
     K = stiffness(q[2])
-    assert system.observe(q[None], qd[None])[0, -2] == pytest.approx(0.5 * q[3:] @ K @ q[3:], rel=1e-11)
-    assert system.assembly.stiffness_blocks(q)[3:, 3:] == pytest.approx(K, rel=1e-9, abs=1e-9 * np.abs(K).max())
+    assert system.observe(q[None], qd[None])[0, -2] == pytest.approx(
+        0.5 * q[3:] @ K @ q[3:], rel=1e-11
+    )
+    assert system.assembly.stiffness_blocks(q)[3:, 3:] == pytest.approx(
+        K, rel=1e-9, abs=1e-9 * np.abs(K).max()
+    )
 
 
 @pytest.mark.parametrize("load", [(0.0, 0.0, 0.4), (0.0, 1.0, 0.0), (-0.5, 0.8, 0.2)])
@@ -165,7 +191,7 @@ def test_the_force_that_pushes_a_bent_link_out_of_its_sleeve(load):
 
 
 def test_the_rows_of_a_link_in_a_sleeve():
-    """Forces on carriage, sleeve, flow and shapes that a motion needs, in the assembly and in the core.
+    """Forces on carriage, sleeve, flow and shapes that a motion needs.
 
     Equations: 37
     """
@@ -195,7 +221,9 @@ def test_the_rows_of_a_link_in_a_sleeve():
     forces[2] += q[3:] @ (stiffness(d + h) - stiffness(d - h)) @ q[3:] / (4 * h)
     forces[3:] += stiffness(d) @ q[3:]
     assert system.forces(q, qd, qdd) == pytest.approx(forces, rel=1e-7, abs=1e-9)
-    assert system.equations.forces(q, qd, qdd, True, True, True) == pytest.approx(forces, rel=1e-7, abs=1e-9)
+    assert system.equations.forces(q, qd, qdd, True, True, True) == pytest.approx(
+        forces, rel=1e-7, abs=1e-9
+    )
 
 
 def test_the_node_of_a_slider_and_the_nodes_in_a_sleeve():
