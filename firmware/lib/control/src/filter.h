@@ -1,3 +1,4 @@
+// Copyright (c) 2026 the flexura authors. SPDX-License-Identifier: MIT
 // First-order low-pass filters, y += a (x - y) once a tick, a = 1 - exp(-2 pi f T).
 #pragma once
 #include "fixed.h"
@@ -9,9 +10,9 @@ class Velocity {
  public:
   void start() { filtered_ = 0; }
   void update(int8_t moved, uint16_t filter) {
-    filtered_ += fraction(static_cast<int32_t>(moved) * 65536 - filtered_, filter);
+    filtered_ += multiply_q16(static_cast<int32_t>(moved) * 65536 - filtered_, filter);
   }
-  int16_t value() const { return narrow(filtered_ >> 8); }        // counts / 256 per tick
+  int16_t value() const { return saturate16(filtered_ >> 8); }  // counts / 256 per tick
 
  private:
   int32_t filtered_ = 0;
@@ -23,9 +24,9 @@ class Setpoint {
   void start(int32_t position) { position_ = position; }
   int32_t update(int32_t position, uint16_t filter) {
     const int32_t way = subtract(position, position_);
-    return position_ += filter ? fraction(way, filter) : way;
+    return position_ += filter ? multiply_q16(way, filter) : way;
   }
-  int32_t position() const { return position_; }                  // counts / 256
+  int32_t position() const { return position_; }  // counts / 256
 
  private:
   int32_t position_ = 0;

@@ -1,9 +1,10 @@
+// Copyright (c) 2026 the flexura authors. SPDX-License-Identifier: MIT
 #include "pid.h"
 
 namespace flexura {
 
 int32_t tip_term(const PidGains &gains, int16_t deflection, int16_t rate) {
-  Sum sum;
+  Accumulator48 sum;
   sum.add(gains.kf, deflection);
   sum.add(gains.kg, rate);
   return sum.value();

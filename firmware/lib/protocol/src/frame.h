@@ -1,11 +1,12 @@
+// Copyright (c) 2026 the flexura authors. SPDX-License-Identifier: MIT
 // Frames: COBS(payload, CRC-16/CCITT-FALSE little-endian) and a zero byte.
 #pragma once
 #include "declaration.h"
 
 namespace flexura {
 
-constexpr uint8_t kHeadBytes = 3;                                // code, sequence
-constexpr uint8_t kFrameMaxBytes = kPayloadMaxBytes + 2 + 1 + 1; // CRC, COBS, the zero
+constexpr uint8_t kHeadBytes = 3;                                 // code, sequence
+constexpr uint8_t kFrameMaxBytes = kPayloadMaxBytes + 2 + 1 + 1;  // CRC, COBS, the zero
 
 uint16_t crc16(const uint8_t *data, uint16_t size, uint16_t crc = 0xFFFF);
 
@@ -20,7 +21,8 @@ uint8_t encode(uint16_t sequence, const Message &message, uint8_t *frame) {
 // Takes bytes as they come; noise costs no more than the frame it falls into.
 class Receiver {
  public:
-  // True when this byte ends a good frame; then code(), sequence(), fields() and size() are its own until the next byte.
+  // True when this byte ends a good frame; then code(), sequence(), fields() and size() are its own
+  // until the next byte.
   bool take(uint8_t byte);
 
   uint8_t code() const { return payload_[0]; }
@@ -34,8 +36,8 @@ class Receiver {
 
   uint8_t payload_[kPayloadMaxBytes + 2];
   uint8_t used_ = 0, length_ = 0;
-  uint8_t left_ = 0;          // bytes of the COBS block still to come
-  bool zero_due_ = false;     // the block ends in a zero, if another one follows
+  uint8_t left_ = 0;       // bytes of the COBS block still to come
+  bool zero_due_ = false;  // the block ends in a zero, if another one follows
   bool bad_ = false;
 };
 

@@ -1,28 +1,32 @@
-// What happens in a control tick: sense, watch, play, control.
+// Copyright (c) 2026 the flexura authors. SPDX-License-Identifier: MIT
+// What happens in a control tick: sense, play the trajectory, look for faults, control.
 #include "rig.h"
 
 namespace flexura {
 
 namespace {
-constexpr int32_t kRateOfStep = 268435;    // Q16, units of u_2 (1/4096 microstep per tick) in 1 microstep/s
+// Q16, units of u_2 (1/4096 microstep per tick) in 1 microstep/s.
+constexpr int32_t kRateOfStep = 268435;
 
 bool is_set(uint8_t bits, Reset cause) { return bits >> static_cast<uint8_t>(cause) & 1; }
 }  // namespace
 
 void Rig::begin(const Config *stored, uint8_t reset) {
   config_ = stored ? *stored : default_config();
-  wrong_item_ = make_scales(config_, scales_);
-  stored_ = stored && wrong_item_ == kConsistent;
+  wrong_item_ = to_fixed_point(config_, fixed_);
+  stored_ = stored && wrong_item_ == kAllValid;
   if (!stored_) {
     config_ = default_config();
-    wrong_item_ = make_scales(config_, scales_);
+    wrong_item_ = to_fixed_point(config_, fixed_);
   }
   if (is_set(reset, Reset::watchdog)) trip(Fault::watchdog);
   if (is_set(reset, Reset::brown_out) && !is_set(reset, Reset::power_on)) trip(Fault::brown_out);
   if (!stored_) trip(Fault::bad_configuration);
 }
 
+// The watchdog's interrupt may come at any time: a reason is not replaced half-way.
 void Rig::trip(Fault fault) {
+  InterruptLock lock;
   if (state_ == State::fault) return;
   fault_ = fault;
   fault_tick_ = tick_;
@@ -31,107 +35,117 @@ void Rig::trip(Fault fault) {
 
 void Rig::sense() {
   for (uint8_t j = 0; j < 2; ++j) {
-    seen_.position[j] += in_.moved[j];
-    if (j == 0 || scales_.on_encoder) {                  // else nobody asks
-      velocity_[j].update(in_.moved[j], scales_.velocity_filter);
-      seen_.velocity[j] = velocity_[j].value();
+    measured_.position[j] += in_.moved[j];
+    if (j == 0 || fixed_.on_encoder) {  // else the control does not need it
+      velocity_[j].update(in_.moved[j], fixed_.velocity_filter);
+      measured_.velocity[j] = velocity_[j].value();
     }
     if (in_.missed[j]) missed_ = static_cast<uint16_t>(missed_ + in_.missed[j]);
   }
   steps_given_ += in_.stepped;
-  const int32_t rest = by_encoder_rest_ + scales_.ratio * in_.moved[1];
+  const int32_t rest = by_encoder_rest_ + fixed_.ratio * in_.moved[1];
   by_encoder_ += upper(rest);
   by_encoder_rest_ = lower(rest);
-  seen_.lag = q8(by_encoder_ - steps_given_) + (by_encoder_rest_ >> 8);
+  measured_.lag = to_q8(by_encoder_ - steps_given_) + (by_encoder_rest_ >> 8);
   // The strip's slowness allows two ticks a reading, and noise asks for them.
   if (tick_ & 1) {
     flex_before_ = in_.flex;
   } else {
-    tip_.update(scales_.tip, static_cast<uint16_t>(flex_before_ + in_.flex));
+    flex_sensor_.update(fixed_.tip, static_cast<uint16_t>(flex_before_ + in_.flex));
   }
 }
 
-// Set-points and positions lie within half of what 32 bits hold (scales.cpp, commands.cpp), so that their differences fit.
+// Set-points and positions lie within half of what 32 bits hold (fixed_point_config.cpp,
+// commands.cpp), so that their differences fit.
 int32_t Rig::error(uint8_t joint) const {
-  const int32_t position = joint == 0         ? q8(seen_.position[0])
-                           : scales_.on_encoder ? q8(by_encoder_) + (by_encoder_rest_ >> 8)
-                                              : steps_.position();
-  return static_cast<int32_t>(static_cast<uint32_t>(target_.of[joint]) - static_cast<uint32_t>(position));
+  const int32_t position = joint == 0          ? to_q8(measured_.position[0])
+                           : fixed_.on_encoder ? to_q8(by_encoder_) + (by_encoder_rest_ >> 8)
+                                               : step_generator_.position();
+  return static_cast<int32_t>(static_cast<uint32_t>(target_.of[joint]) -
+                              static_cast<uint32_t>(position));
 }
 
 void Rig::tick(Outputs &out) {
-  tick_ = tick_ + 1;
+  {
+    InterruptLock lock;  // the watchdog's interrupt may read it
+    tick_ = tick_ + 1;
+  }
   sense();
   out.steps.count = 0;
-  seen_.tracking = false;
+  measured_.tracking = false;
   if (state_ == State::running) {
     const Tick before = target_;
-    const Player::Event event = player_.advance(target_);
-    if (event == Player::Event::underrun) trip(Fault::underrun);
-    final_ = event == Player::Event::final;
+    const TrajectoryPlayer::Event event = player_.advance(target_);
+    if (event == TrajectoryPlayer::Event::underrun) trip(Fault::underrun);
+    final_ = event == TrajectoryPlayer::Event::final;
     if (mode_ == Mode::position) {
-      seen_.tracking = true;
+      measured_.tracking = true;
       for (uint8_t j = 0; j < 2; ++j) {
-        setpoint_rate_[j] = narrow(target_.of[j] - before.of[j]);
-        seen_.error[j] = error(j);
+        setpoint_rate_[j] = saturate16(target_.of[j] - before.of[j]);
+        measured_.error[j] = error(j);
       }
     }
   }
   if (active()) {
-    const Fault fault = watch_.check(scales_.limits, in_, seen_);
+    const Fault fault = monitor_.check(fixed_.limits, in_, measured_);
     if (fault != Fault::none) trip(fault);
   }
   if (active()) {
     control();
     out.on = true;
-    out.duty = seen_.duty;
-    steps_.plan(pid_[1].output(), out.steps);
+    out.duty = measured_.duty;
+    step_generator_.plan(pid_[1].output(), out.steps);
   } else {
     out.on = false;
-    out.duty = seen_.duty = 0;
+    out.duty = 0;
+    measured_.duty = 0;
   }
 }
 
 void Rig::control() {
-  const PidGains *gains = scales_.gains;
+  const PidGains *gains = fixed_.gains;
   if (state_ == State::armed) {
     pid_[0].start(0);
-    pid_[1].follow(gains[1], 0);
+    pid_[1].track(gains[1], 0);
   } else if (mode_ == Mode::open_loop) {
-    pid_[0].follow(gains[0], upper(multiply(scales_.duty, static_cast<int16_t>(target_.of[0]))));
-    pid_[1].follow(gains[1], part(kRateOfStep, static_cast<int16_t>(target_.of[1])));
+    pid_[0].track(gains[0], upper(multiply(fixed_.duty, static_cast<int16_t>(target_.of[0]))));
+    pid_[1].track(gains[1], multiply_high(kRateOfStep, static_cast<int16_t>(target_.of[1])));
   } else {
-    // The deflection is new in every second tick; one joint takes it at once, the other in the next.
+    // The deflection is new in every second tick. Joint 1 takes it at once, joint 2 in the next
+    // tick: the products are shared between the two.
     const uint8_t turn = tick_ & 1;
-    tip_term_[turn] = tip_term(gains[turn], tip_.deflection(), tip_.rate());
-    PidSignals signals = {seen_.error[0], seen_.velocity[0], setpoint_rate_[0], tip_term_[0]};
+    tip_term_[turn] = tip_term(gains[turn], flex_sensor_.deflection(), flex_sensor_.rate());
+    PidSignals signals = {measured_.error[0], measured_.velocity[0], setpoint_rate_[0],
+                          tip_term_[0]};
     pid_[0].update(gains[0], signals);
-    signals.error = seen_.error[1];
+    signals.error = measured_.error[1];
     signals.tip = tip_term_[1];
     signals.setpoint_rate = setpoint_rate_[1];
-    signals.rate = scales_.on_encoder ? upper(multiply(scales_.ratio, seen_.velocity[1])) : static_cast<int16_t>(pid_[1].output() >> 4);
+    signals.rate = fixed_.on_encoder ? upper(multiply(fixed_.ratio, measured_.velocity[1]))
+                                     : static_cast<int16_t>(pid_[1].output() >> 4);
     pid_[1].update(gains[1], signals);
   }
-  seen_.duty = static_cast<int16_t>((pid_[0].output() + 8) >> 4);
+  measured_.duty = static_cast<int16_t>((pid_[0].output() + 8) >> 4);
 }
 
 uint32_t Rig::now() const {
-  Section section;
+  CriticalSection section;
   return tick_;
 }
 
 void Rig::report(Telemetry &report) const {
-  int16_t duty, rate;
+  int16_t duty;
+  int16_t rate;
   bool on;
   {
-    Section section;                                 // copies only: the control interrupt waits
+    CriticalSection section;  // copies only: the control interrupt waits
     report.tick = tick_;
     report.state = static_cast<uint8_t>(state_);
     report.fault = static_cast<uint8_t>(fault_);
     report.fault_tick = fault_tick_;
     report.flags = in_.switches;
-    report.position_1 = seen_.position[0];
-    report.position_2 = seen_.position[1];
+    report.position_1 = measured_.position[0];
+    report.position_2 = measured_.position[1];
     report.steps = steps_given_;
     report.setpoint_1 = target_.of[0];
     report.setpoint_2 = target_.of[1];
@@ -142,19 +156,23 @@ void Rig::report(Telemetry &report) const {
     duty = pid_[0].output();
     rate = pid_[1].output();
   }
-  const bool saturated = on && (duty >= scales_.gains[0].limit || duty <= -scales_.gains[0].limit);
-  const bool bits[] = {on, on, referenced_, final_, saturated};   // from bridge_enabled on, in the order of Flag
+  const bool saturated = on && (duty >= fixed_.gains[0].limit || duty <= -fixed_.gains[0].limit);
+  const bool holds = final_ && report.state == static_cast<uint8_t>(State::running);
+  // From bridge_enabled on, in the order of Flag.
+  const bool bits[] = {on, on, referenced_, holds, saturated};
   for (uint8_t k = 0; k < sizeof bits; ++k)
-    if (bits[k]) report.flags = static_cast<uint8_t>(report.flags | 1 << (static_cast<uint8_t>(Flag::bridge_enabled) + k));
+    if (bits[k])
+      report.flags = static_cast<uint8_t>(report.flags |
+                                          1 << (static_cast<uint8_t>(Flag::bridge_enabled) + k));
   report.buffered = player_.waiting();
-  report.voltage = on ? upper(multiply(scales_.voltage, duty)) : 0;
+  report.voltage = on ? upper(multiply(fixed_.voltage, duty)) : 0;
   report.rate = on ? static_cast<int16_t>(rate * 1000L / 4096) : 0;
-  report.supply = static_cast<uint16_t>(static_cast<uint32_t>(report.supply) * scales_.supply >> 6);
+  report.supply = static_cast<uint16_t>(static_cast<uint32_t>(report.supply) * fixed_.supply >> 6);
 }
 
 void Rig::host_spoke() {
-  Section section;
-  watch_.host_spoke();
+  CriticalSection section;
+  monitor_.host_spoke();
 }
 
 }  // namespace flexura

@@ -1,23 +1,38 @@
-// The rig: states, commands, and what happens in a control tick. The same code runs on the board, in its emulator and in host tests.
+// Copyright (c) 2026 the flexura authors. SPDX-License-Identifier: MIT
+// The rig: states, commands, and what happens in a control tick. The same code runs on the board,
+// in its emulator and in host tests.
 #pragma once
 #include "declaration.h"
+#include "fault_monitor.h"
 #include "filter.h"
+#include "fixed_point_config.h"
+#include "flex_sensor.h"
 #include "pid.h"
-#include "player.h"
-#include "scales.h"
-#include "steps.h"
-#include "tip.h"
-#include "watch.h"
+#include "step_generator.h"
+#include "trajectory_player.h"
 
 namespace flexura {
 
-// While one exists the control interrupt waits. Defined by whoever has interrupts: src/ on the board, nothing on the host.
-class Section {
+// While one exists the control interrupt waits. src/ defines it on the board; on the host it does
+// nothing.
+class CriticalSection {
  public:
-  Section();
-  ~Section();
-  Section(const Section &) = delete;
-  Section &operator=(const Section &) = delete;
+  CriticalSection();
+  ~CriticalSection();
+  CriticalSection(const CriticalSection &) = delete;
+  CriticalSection &operator=(const CriticalSection &) = delete;
+
+ private:
+  uint8_t before_;
+};
+
+// While one exists all interrupts wait, the watchdog's too. For a few cycles only.
+class InterruptLock {
+ public:
+  InterruptLock();
+  ~InterruptLock();
+  InterruptLock(const InterruptLock &) = delete;
+  InterruptLock &operator=(const InterruptLock &) = delete;
 
  private:
   uint8_t before_;
@@ -25,9 +40,9 @@ class Section {
 
 // What the control interrupt does to the hardware.
 struct Outputs {
-  bool on = false;                       // motor bridge and stepper driver enabled
-  int16_t duty = 0;                      // PWM counts, + up
-  StepPlan steps;                        // for the tick that comes next
+  bool on = false;   // motor bridge and stepper driver enabled
+  int16_t duty = 0;  // PWM counts, + up
+  StepPlan steps;    // for the tick that comes next
 };
 
 class Rig {
@@ -38,39 +53,45 @@ class Rig {
   // Control interrupt: fill the inputs, then tick.
   Inputs &inputs() { return in_; }
   void tick(Outputs &out);
-  // Into Fault, unless there already: the first reason stays. From interrupts or inside a Section.
+  // Into Fault, unless there already: the first reason stays. From interrupts or inside a
+  // CriticalSection.
   void trip(Fault fault);
 
-  // Main loop. `detail` belongs to the result. config_read, config_save and hello are the link's business (link.h).
+  // Main loop. Obeys a command by its code; `detail` belongs to the result. Commands of the session
+  // (session.h) are unknown here.
   Result command(uint8_t code, const uint8_t *fields, uint16_t &detail);
   void report(Telemetry &report) const;
   void host_spoke();
   void prepare() { player_.prepare(); }  // often
   bool may_configure() const;
-  uint8_t wrong_item() const { return wrong_item_; }   // why the configuration in use cannot be stored, or kConsistent
-  void stored() { stored_ = true; }      // it is the stored one now
+  // Number of the setting that forbids storing the settings in use, or kAllValid.
+  uint8_t wrong_item() const { return wrong_item_; }
+  void stored() { stored_ = true; }  // the settings in use are the stored ones now
 
   State state() const { return state_; }
   bool active() const { return state_ == State::armed || state_ == State::running; }
   Fault fault() const { return fault_; }
   uint32_t now() const;
   const Config &config() const { return config_; }
-  const Scales &scales() const { return scales_; }
+  const FixedPointConfig &fixed() const { return fixed_; }
 
  private:
   void sense();
-  int32_t error(uint8_t joint) const;    // counts / 256 or microsteps / 256
+  int32_t error(uint8_t joint) const;  // counts / 256 or microsteps / 256
   void control();
-  Result reference(const Reference &command);
-  Result arm(uint8_t mode, uint16_t &detail);
-  Result start(uint8_t period_log2, uint16_t &detail);
-  Result clear(uint8_t fault, uint16_t &detail);
-  Result add_setpoints(const Setpoints &command, uint16_t &detail);
-  Result add_drives(const Drives &command, uint16_t &detail);
+
+  // One handler a command, called through the table in commands.cpp.
+  template <class Message>
+  static Result handle_fields(Rig &rig, const uint8_t *fields, uint16_t &detail);
+#define FLEXURA_HANDLER(Message) Result handle(const Message &command, uint16_t &detail);
+  FLEXURA_RIG_COMMANDS(FLEXURA_HANDLER)
+#undef FLEXURA_HANDLER
+  struct Handler;
+  static const Handler kHandlers[];
+
+  bool enter(State from, State to);  // false if the state is another one by now
   Result may_add(uint16_t first, uint8_t count, uint8_t most, uint16_t &detail) const;
-  bool inside(const Knot &knot) const;
-  Result configure(uint8_t item, float value, uint16_t &detail);
-  void rescale();
+  void update_fixed_point();
 
   // What every tick touches comes first, within reach of one address register.
   volatile State state_ = State::idle;
@@ -79,26 +100,27 @@ class Rig {
   bool final_ = false;
   volatile uint32_t tick_ = 0;
   Inputs in_ = {};
-  Watched seen_ = {};
-  int32_t steps_given_ = 0;              // pulses
-  int32_t by_encoder_ = 0;               // joint 2 by its encoder, whole microsteps, and the rest of it as Q16
+  Measured measured_ = {};
+  int32_t steps_given_ = 0;  // pulses
+  int32_t by_encoder_ = 0;   // joint 2 by its encoder, whole microsteps, and the rest of it as Q16
   uint16_t by_encoder_rest_ = 0;
   uint16_t missed_ = 0;
   Velocity velocity_[2];
-  Tick target_ = {{0, 0}};               // of this tick
-  int16_t setpoint_rate_[2] = {0, 0};    // counts / 256 per tick
-  uint16_t flex_before_ = 0;             // reading of the tick before
+  Tick target_ = {{0, 0}};             // of this tick
+  int16_t setpoint_rate_[2] = {0, 0};  // counts / 256 per tick
+  uint16_t flex_before_ = 0;           // reading of the tick before
   Pid pid_[2];
-  Steps steps_;
-  Tip tip_;
-  int32_t tip_term_[2] = {0, 0};         // pid.h
-  Watch watch_;
-  Scales scales_;
-  Player player_;
+  StepGenerator step_generator_;
+  FlexSensor flex_sensor_;
+  int32_t tip_term_[2] = {0, 0};  // pid.h
+  FaultMonitor monitor_;
+  FixedPointConfig fixed_;
+  TrajectoryPlayer player_;
 
   uint32_t fault_tick_ = 0;
-  bool referenced_ = false, stored_ = false;
-  uint8_t wrong_item_ = kConsistent;     // of the configuration in use
+  bool referenced_ = false;
+  bool stored_ = false;
+  uint8_t wrong_item_ = kAllValid;  // of the settings in use
   Config config_;
 };
 

@@ -1,9 +1,10 @@
-#include "watch.h"
+// Copyright (c) 2026 the flexura authors. SPDX-License-Identifier: MIT
+#include "fault_monitor.h"
 
 namespace flexura {
 
 namespace {
-constexpr uint8_t kReadings = 4;   // out of range this many ticks in a row: noise is not a fault
+constexpr uint8_t kReadings = 4;  // out of range this many ticks in a row: noise is not a fault
 
 bool is_set(uint8_t bits, Flag flag) { return bits >> static_cast<uint8_t>(flag) & 1; }
 
@@ -16,12 +17,16 @@ Fault switches(uint8_t bits) {
   return Fault::none;
 }
 
-Fault supply(const WatchLimits &limits, uint16_t reading) {
-  return reading < limits.supply_low ? Fault::supply_low : reading > limits.supply_high ? Fault::supply_high : Fault::none;
+Fault supply(const FaultLimits &limits, uint16_t reading) {
+  return reading < limits.supply_low    ? Fault::supply_low
+         : reading > limits.supply_high ? Fault::supply_high
+                                        : Fault::none;
 }
 
-Fault flex(const WatchLimits &limits, uint16_t reading) {
-  return reading < limits.flex_low ? Fault::flex_low : reading > limits.flex_high ? Fault::flex_high : Fault::none;
+Fault flex(const FaultLimits &limits, uint16_t reading) {
+  return reading < limits.flex_low    ? Fault::flex_low
+         : reading > limits.flex_high ? Fault::flex_high
+                                      : Fault::none;
 }
 
 // Counts moved against a drive of this sign, forgotten as far as the joint moves with it again.
@@ -32,23 +37,32 @@ int32_t against(int32_t before, int8_t drive, int8_t moved) {
 }
 }  // namespace
 
-Fault standing(const WatchLimits &limits, const Inputs &in) {
+Fault standing(const FaultLimits &limits, const Inputs &in) {
   Fault fault = switches(in.switches);
   if (fault == Fault::none) fault = supply(limits, in.supply);
   if (fault == Fault::none) fault = flex(limits, in.flex);
   return fault;
 }
 
-void Watch::start() {
-  silent_ = stalled_ = 0;
+void FaultMonitor::start() {
+  silent_ = 0;
+  stalled_ = 0;
   direction_ = 0;
-  flex_out_ = supply_out_ = turn_ = 0;
-  for (uint8_t j = 0; j < 2; ++j) missed_[j] = alone_[j] = 0, against_[j] = travelled_[j] = 0;
+  flex_out_ = 0;
+  supply_out_ = 0;
+  turn_ = 0;
+  for (uint8_t j = 0; j < 2; ++j) {
+    missed_[j] = 0;
+    alone_[j] = 0;
+    against_[j] = 0;
+    travelled_[j] = 0;
+  }
 }
 
 // While nothing drives it a shaft may rest on an edge and tremble.
-uint16_t Watch::alone(uint8_t j, const uint8_t *edges, bool driven) {
-  const uint8_t a = edges[0], b = edges[1];
+uint16_t FaultMonitor::alone(uint8_t j, const uint8_t *edges, bool driven) {
+  const uint8_t a = edges[0];
+  const uint8_t b = edges[1];
   if (!driven || (a && b)) return alone_[j] = 0;
   if (!a && !b) return alone_[j];
   const EncoderLine line = a ? EncoderLine::a : EncoderLine::b;
@@ -57,7 +71,7 @@ uint16_t Watch::alone(uint8_t j, const uint8_t *edges, bool driven) {
   return alone_[j] = static_cast<uint16_t>(alone_[j] + a + b);
 }
 
-Fault Watch::encoders(const WatchLimits &limits, const Inputs &in, const Watched &now) {
+Fault FaultMonitor::encoders(const FaultLimits &limits, const Inputs &in, const Measured &now) {
   const bool driven = now.duty > limits.stall_duty || now.duty < -limits.stall_duty;
   for (uint8_t j = 0; j < 2; ++j) {
     if (!in.missed[j] && !in.flooded[j]) continue;
@@ -79,14 +93,15 @@ Fault Watch::encoders(const WatchLimits &limits, const Inputs &in, const Watched
 
   against_[1] = against(against_[1], direction_, in.moved[1]);
   if (beyond(now.lag, limits.lost)) {
-    // Why: the encoder went the other way for a good part of it; or only one of its lines moves; or the motor did not follow.
+    // Why: the encoder went the other way for a good part of it; or only one of its lines moves; or
+    // the motor did not follow.
     if (against_[1] > limits.against) return Fault::runaway_2;
     return alone_2 >= 4 ? Fault::encoder_2 : Fault::stall_2;
   }
   return Fault::none;
 }
 
-Fault Watch::check(const WatchLimits &limits, const Inputs &in, const Watched &now) {
+Fault FaultMonitor::check(const FaultLimits &limits, const Inputs &in, const Measured &now) {
   Fault fault = switches(in.switches);
   if (fault != Fault::none) return fault;
 
@@ -102,8 +117,10 @@ Fault Watch::check(const WatchLimits &limits, const Inputs &in, const Watched &n
   travelled_[0] = static_cast<int16_t>(travelled_[0] + in.moved[0]);
   travelled_[1] = static_cast<int16_t>(travelled_[1] + in.moved[1]);
   const uint8_t j = turn_ & 1;
-  if (now.position[j] < limits.travel_low[j] || now.position[j] > limits.travel_high[j]) return j ? Fault::travel_2 : Fault::travel_1;
-  if (now.tracking && beyond(now.error[j], limits.following[j])) return j ? Fault::following_2 : Fault::following_1;
+  if (now.position[j] < limits.travel_low[j] || now.position[j] > limits.travel_high[j])
+    return j ? Fault::travel_2 : Fault::travel_1;
+  if (now.tracking && beyond(now.error[j], limits.following[j]))
+    return j ? Fault::following_2 : Fault::following_1;
   if (turn_ % kWindow == j) {
     const int16_t way = travelled_[j];
     travelled_[j] = 0;

@@ -1,27 +1,34 @@
-#include "steps.h"
+// Copyright (c) 2026 the flexura authors. SPDX-License-Identifier: MIT
+#include "step_generator.h"
 
 namespace flexura {
 
 namespace {
-constexpr int16_t kStep = 4096, kThreshold = 3 * kStep / 4;
+constexpr int16_t kStep = 4096;
+constexpr int16_t kThreshold = 3 * kStep / 4;
 
-// part / whole as Q12, rounded down, bit by bit: a third of what a division costs. 0 <= part <= whole < 2^15.
+// part / whole as Q12, rounded down, bit by bit: a third of what a division costs. 0 <= part <=
+// whole < 2^15.
 uint16_t ratio(uint16_t part, uint16_t whole) {
   uint16_t quotient = 0;
   for (uint8_t bit = 0; bit < 12; ++bit) {
     part = static_cast<uint16_t>(part << 1);
     quotient = static_cast<uint16_t>(quotient << 1);
-    if (part >= whole) part = static_cast<uint16_t>(part - whole), ++quotient;
+    if (part >= whole) {
+      part = static_cast<uint16_t>(part - whole);
+      ++quotient;
+    }
   }
   return quotient;
 }
 }  // namespace
 
-void Steps::plan(int16_t rate, StepPlan &plan) {
+void StepGenerator::plan(int16_t rate, StepPlan &plan) {
   plan.up = rate > 0;
   plan.count = 0;
   // Mirrored so that the position always rises.
-  const int16_t pace = plan.up ? rate : -rate, from = plan.up ? ahead_ : -ahead_;
+  const int16_t pace = plan.up ? rate : -rate;
+  const int16_t from = plan.up ? ahead_ : -ahead_;
   int16_t over = from + pace - kThreshold;
   ahead_ = static_cast<int16_t>(ahead_ + rate);
   if (over < 0) return;
@@ -36,14 +43,19 @@ void Steps::plan(int16_t rate, StepPlan &plan) {
     given_ -= count;
     ahead_ = static_cast<int16_t>(ahead_ + way);
   }
-  const uint16_t first = from < kThreshold ? kThreshold - from : 0;   // 0: a rate turned round without a step between
+  const uint16_t first =
+      from < kThreshold ? kThreshold - from : 0;  // 0: a rate turned round without a step between
   if (count == 1) {
     plan.at[0] = static_cast<uint16_t>(unsigned_product(ratio(first, pace), kTickCounts) >> 12);
     return;
   }
-  const uint16_t interval = static_cast<uint16_t>(unsigned_product(ratio(kStep, pace), kTickCounts) >> 8);   // 1/16 counts
+  const uint16_t interval =
+      static_cast<uint16_t>(unsigned_product(ratio(kStep, pace), kTickCounts) >> 8);  // 1/16 counts
   uint16_t at = static_cast<uint16_t>(unsigned_product(first, interval) >> 12);
-  for (uint8_t k = 0; k < count; ++k, at = static_cast<uint16_t>(at + interval)) plan.at[k] = at >> 4;
+  for (uint8_t k = 0; k < count; ++k) {
+    plan.at[k] = at >> 4;
+    at = static_cast<uint16_t>(at + interval);
+  }
 }
 
 }  // namespace flexura

@@ -1,4 +1,5 @@
-#include "store.h"
+// Copyright (c) 2026 the flexura authors. SPDX-License-Identifier: MIT
+#include "settings_eeprom.h"
 
 #include <avr/eeprom.h>
 #include <string.h>
@@ -22,11 +23,12 @@ const uint8_t *bytes() { return reinterpret_cast<const uint8_t *>(&image); }
 
 }  // namespace
 
-namespace store {
+namespace eeprom {
 
 bool load(flexura::Config &config) {
   eeprom_read_block(&image, kPlace, sizeof image);
-  if (image.declaration != flexura::kDeclaration || image.crc != flexura::crc16(bytes(), kChecked)) return false;
+  if (image.declaration != flexura::kDeclaration || image.crc != flexura::crc16(bytes(), kChecked))
+    return false;
   memcpy(&config, &image.config, sizeof config);
   return true;
 }
@@ -50,4 +52,4 @@ Progress save() {
   return Progress::done;
 }
 
-}  // namespace store
+}  // namespace eeprom

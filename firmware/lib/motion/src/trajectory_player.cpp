@@ -1,4 +1,5 @@
-#include "player.h"
+// Copyright (c) 2026 the flexura authors. SPDX-License-Identifier: MIT
+#include "trajectory_player.h"
 
 namespace flexura {
 
@@ -8,15 +9,18 @@ int32_t over_period(int16_t velocity, uint8_t period_log2) {
 }
 }  // namespace
 
-void Player::clear() {
+void TrajectoryPlayer::clear() {
   knots_.clear();
   ticks_.clear();
   added_ = 0;
   fresh_ = true;
-  closed_ = begun_ = playing_ = ended_ = false;
+  closed_ = false;
+  begun_ = false;
+  playing_ = false;
+  ended_ = false;
 }
 
-void Player::add(const Knot &knot, bool final) {
+void TrajectoryPlayer::add(const Knot &knot, bool final) {
   newest_ = knot;
   knots_.put(knot);
   ++added_;
@@ -24,36 +28,40 @@ void Player::add(const Knot &knot, bool final) {
   closed_ = closed_ || final;
 }
 
-void Player::start(uint8_t period_log2, bool cubic, const uint16_t *filter) {
+void TrajectoryPlayer::start(uint8_t period_log2, bool cubic, const uint16_t *filter) {
   period_log2_ = period_log2;
   period_ = static_cast<uint8_t>(1 << period_log2);
   cubic_ = cubic;
   tick_ = 0;
-  s_ = ds_ = static_cast<uint16_t>(65536UL >> period_log2);   // never used where a period is one tick
+  ds_ = static_cast<uint16_t>(65536UL >> period_log2);  // never used where a period is one tick
+  s_ = ds_;
   from_ = knots_.first();
   knots_.drop();
   for (uint8_t j = 0; j < 2; ++j) {
     filter_[j] = filter[j];
     setpoint_[j].start(from_.position[j]);
   }
-  if (cubic && !load()) tick_ = period_;                      // the first knot is the final one
-  playing_ = begun_ = true;
+  if (cubic && !load()) tick_ = period_;  // the first knot is the final one
+  playing_ = true;
+  begun_ = true;
   prepare();
 }
 
-void Player::prepare() {
+void TrajectoryPlayer::prepare() {
   Tick tick;
-  while (playing_ && ticks_.room() && (cubic_ ? cubic_tick(tick) : drive_tick(tick))) ticks_.put(tick);
+  while (playing_ && ticks_.room() && (cubic_ ? cubic_tick(tick) : drive_tick(tick)))
+    ticks_.put(tick);
   if (begun_ && !playing_) ended_ = true;
 }
 
 // Hermite's cubic from the last knot to the next, multiplied out; false when there is none.
-bool Player::load() {
+bool TrajectoryPlayer::load() {
   if (knots_.waiting() == 0) return false;
   const Knot &to = knots_.first();
   for (uint8_t j = 0; j < 2; ++j) {
     const int32_t way = to.position[j] - from_.position[j];
-    const int32_t v0 = over_period(from_.velocity[j], period_log2_), v1 = over_period(to.velocity[j], period_log2_);
+    const int32_t v0 = over_period(from_.velocity[j], period_log2_);
+    const int32_t v1 = over_period(to.velocity[j], period_log2_);
     b_[j][0] = v0;
     b_[j][1] = 3 * way - 2 * v0 - v1;
     b_[j][2] = v0 + v1 - 2 * way;
@@ -62,7 +70,7 @@ bool Player::load() {
 }
 
 // False when the next knot is missing.
-bool Player::drive_tick(Tick &tick) {
+bool TrajectoryPlayer::drive_tick(Tick &tick) {
   if (tick_ == period_) {
     if (knots_.waiting() == 0 && !closed_) return false;
     if (knots_.waiting() == 0) {
@@ -79,22 +87,26 @@ bool Player::drive_tick(Tick &tick) {
   return true;
 }
 
-bool Player::cubic_tick(Tick &tick) {
+bool TrajectoryPlayer::cubic_tick(Tick &tick) {
   const bool last = tick_ == period_ && !load();
   if (last && !closed_) return false;
   int32_t position[2] = {from_.position[0], from_.position[1]};
   if (!last) {
-    if (tick_ == period_) tick_ = 0, s_ = ds_;
+    if (tick_ == period_) {
+      tick_ = 0;
+      s_ = ds_;
+    }
     if (++tick_ < period_) {
       for (uint8_t j = 0; j < 2; ++j) {
         const int32_t *b = b_[j];
-        position[j] += fraction(fraction(fraction(b[2], s_) + b[1], s_) + b[0], s_);
+        position[j] += multiply_q16(multiply_q16(multiply_q16(b[2], s_) + b[1], s_) + b[0], s_);
       }
       s_ = static_cast<uint16_t>(s_ + ds_);
     } else {
       from_ = knots_.first();
       knots_.drop();
-      position[0] = from_.position[0], position[1] = from_.position[1];
+      position[0] = from_.position[0];
+      position[1] = from_.position[1];
     }
   }
   bool rest = last;
@@ -103,7 +115,7 @@ bool Player::cubic_tick(Tick &tick) {
     tick.of[j] = setpoint_[j].update(position[j], filter_[j]);
     rest = rest && tick.of[j] == before;
   }
-  if (rest) {                                                 // the filters too have arrived, but for their rounding
+  if (rest) {  // the filters too have arrived, but for their rounding
     tick = {{position[0], position[1]}};
     playing_ = false;
   }
