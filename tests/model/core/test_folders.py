@@ -30,5 +30,7 @@ def test_folders_use_each_other_in_one_direction():
 
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda path: path.name)
 def test_a_folder_has_at_most_nine_names(folder):
-    names = {path.stem for path in folder.iterdir() if path.is_dir() or path.suffix in (".hpp", ".cpp")}
+    names = {
+        path.stem for path in folder.iterdir() if path.is_dir() or path.suffix in (".hpp", ".cpp")
+    }
     assert 0 < len(names) <= MOST
