@@ -1,10 +1,11 @@
 // What all files of the Python module share.
 //
-// Arrays go in as Vector or Matrix: contiguous float64 in memory that C++ reads in place. nanobind copies
-// arrays of another type or order first, and refuses another number of dimensions, lists and None with a
-// TypeError; an array that C++ writes to must therefore be bound with .noconvert(). Arrays come out as
-// `new_array`, which Python then owns. A function that takes longer than microseconds releases Python's lock
-// (nb::gil_scoped_release) and touches no Python object meanwhile.
+// Arrays go in as Vector or Matrix: contiguous float64 in memory that C++ reads in place. nanobind
+// copies arrays of another type or order first, and refuses another number of dimensions, lists and
+// None with a TypeError; an array that C++ writes to must therefore be bound with .noconvert().
+// Arrays come out as `new_array`, which Python then owns. A function that takes longer than
+// microseconds releases Python's lock (nb::gil_scoped_release) and touches no Python object
+// meanwhile.
 #pragma once
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
@@ -29,7 +30,6 @@ inline Array new_array(std::initializer_list<std::size_t> shape) {
   return Array(data, shape.size(), shape.begin(), owner);
 }
 
-void bind_numbers(nb::module_ &module);    // numbers.cpp
 void bind_mechanics(nb::module_ &module);   // mechanics.cpp
 void bind_simulation(nb::module_ &module);  // simulation.cpp
 void bind_control(nb::module_ &module);     // control.cpp, after simulation.cpp

@@ -4,7 +4,7 @@
 #include <nanobind/stl/vector.h>
 
 #include "mechanics.hpp"
-#include "trials.hpp"
+#include "simulation/gain_sweep.hpp"
 
 namespace flexura {
 namespace {
@@ -15,39 +15,52 @@ void expect(bool good, const char *text) {
 
 using Cube = nb::ndarray<const double, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 
-template <class Any> std::vector<double> numbers(const Any &array) { return std::vector<double>(array.data(), array.data() + array.size()); }
+template <class Any>
+std::vector<double> numbers(const Any &array) {
+  return std::vector<double>(array.data(), array.data() + array.size());
+}
 
 Signal signal_of(const Matrix &segments, std::int64_t from, std::int64_t to) {
   expect(segments.shape(1) == 10, "segments have ten numbers");
-  expect(0 <= from && from <= to && std::size_t(to) <= segments.shape(0), "there are no such segments");
+  expect(0 <= from && from <= to && std::size_t(to) <= segments.shape(0),
+         "there are no such segments");
   const Segment *rows = reinterpret_cast<const Segment *>(segments.data());
   return Signal(rows + from, rows + to);
 }
 
 // (F, G, L, C, K, Kr, Kv), (offset, hold); none: there is no linear law.
-LinearLaw linear_of(const std::vector<Matrix> &matrices, const std::vector<Vector> &about, std::size_t joints) {
+LinearLaw linear_of(const std::vector<Matrix> &matrices, const std::vector<Vector> &about,
+                    std::size_t joints) {
   LinearLaw law;
   if (matrices.empty()) return law;
-  expect(matrices.size() == 7 && about.size() == 2, "a linear law is F, G, L, C, K, Kr, Kv, and offset, hold");
+  expect(matrices.size() == 7 && about.size() == 2,
+         "a linear law is F, G, L, C, K, Kr, Kv, and offset, hold");
   std::vector<double> *const to[] = {&law.F, &law.G, &law.L, &law.C, &law.K, &law.Kr, &law.Kv};
   for (std::size_t k = 0; k < matrices.size(); ++k) *to[k] = numbers(matrices[k]);
   law.offset = numbers(about[0]), law.hold = numbers(about[1]);
   const std::size_t p = matrices[0].shape(0), m = law.offset.size();
-  expect(law.F.size() == p * p && law.G.size() == p * joints && law.L.size() == p * m && law.C.size() == m * p && law.K.size() == joints * p,
+  expect(law.F.size() == p * p && law.G.size() == p * joints && law.L.size() == p * m &&
+             law.C.size() == m * p && law.K.size() == joints * p,
          "the matrices of a linear law do not fit each other");
-  expect(law.Kr.size() == joints * joints && law.Kv.size() == law.Kr.size() && law.hold.size() == joints && (m == joints || m == joints + 1),
+  expect(law.Kr.size() == joints * joints && law.Kv.size() == law.Kr.size() &&
+             law.hold.size() == joints && (m == joints || m == joints + 1),
          "the matrices of a linear law do not fit the joints");
   law.states = int(p), law.measurements = int(m);
   return law;
 }
 
-// index (N, 5): output, reference from, to, feedforward from, to; gains (N, GAINS); springs (N, 2): stiffness, damping.
-std::unique_ptr<Controller> controller_of(const Mechanics &mechanics, double rate_Hz, double quantum, const Matrix &segments, const Counts &index,
-                                          const Matrix &gains, const Matrix &springs, const std::vector<Matrix> &linear,
+// index (N, 5): output, reference from, to, feedforward from, to; gains (N, GAINS); springs (N, 2):
+// stiffness, damping.
+std::unique_ptr<Controller> controller_of(const Mechanics &mechanics, double rate_Hz,
+                                          double quantum, const Matrix &segments,
+                                          const Counts &index, const Matrix &gains,
+                                          const Matrix &springs, const std::vector<Matrix> &linear,
                                           const std::vector<Vector> &about) {
   const std::size_t joints = mechanics.model->first.size();
   expect(index.shape(0) == joints && index.shape(1) == 5, "index has five numbers a joint");
-  expect(gains.shape(0) == joints && gains.shape(1) == GAINS && springs.shape(0) == joints && springs.shape(1) == 2, "gains and springs need a row a joint");
+  expect(gains.shape(0) == joints && gains.shape(1) == GAINS && springs.shape(0) == joints &&
+             springs.shape(1) == 2,
+         "gains and springs need a row a joint");
   std::vector<JointLaw> all;
   std::vector<Coupling> couplings;
   for (std::size_t i = 0; i < joints; ++i) {
@@ -55,58 +68,70 @@ std::unique_ptr<Controller> controller_of(const Mechanics &mechanics, double rat
     expect(0 <= row[0] && row[0] <= 2, "there is no such output");
     JointLaw joint;
     joint.output = JointLaw::Output(row[0]);
-    joint.reference = signal_of(segments, row[1], row[2]), joint.feedforward = signal_of(segments, row[3], row[4]);
+    joint.reference = signal_of(segments, row[1], row[2]),
+    joint.feedforward = signal_of(segments, row[3], row[4]);
     all.push_back(std::move(joint));
     couplings.push_back({springs.data()[2 * i], springs.data()[2 * i + 1]});
   }
-  auto made = std::make_unique<Controller>(mechanics.model, std::move(all), std::move(couplings), rate_Hz, quantum, linear_of(linear, about, joints));
+  auto made = std::make_unique<Controller>(mechanics.model, std::move(all), std::move(couplings),
+                                           rate_Hz, quantum, linear_of(linear, about, joints));
   made->set_gains(gains.data());
   return made;
 }
 
-// The drives of joints that are not a controller's. index (N, 5): force from, to, motion from, to, prescribed; gains (N, 2): kp, kd.
-Acting acting_of(const Matrix &segments, const Counts &index, const Matrix &gains, const Matrix &limits) {
+// The drives of joints that are not a controller's. index (N, 5): force from, to, motion from, to,
+// prescribed; gains (N, 2): kp, kd.
+Inputs acting_of(const Matrix &segments, const Counts &index, const Matrix &gains,
+                 const Matrix &limits) {
   const std::size_t joints = index.shape(0);
-  expect(index.shape(1) == 5 && gains.shape(0) == joints && gains.shape(1) == 2 && limits.shape(0) == joints && limits.shape(1) == 2,
+  expect(index.shape(1) == 5 && gains.shape(0) == joints && gains.shape(1) == 2 &&
+             limits.shape(0) == joints && limits.shape(1) == 2,
          "index, gains and limits need a row a joint");
-  Acting acting{int(joints)};
+  Inputs acting{int(joints)};
   for (std::size_t i = 0; i < joints; ++i) {
     const std::int64_t *row = index.data() + 5 * i;
     JointDrive &drive = acting.joints[i];
-    drive.force = signal_of(segments, row[0], row[1]), drive.motion = signal_of(segments, row[2], row[3]);
-    drive.prescribed = row[4] != 0, drive.kp = gains.data()[2 * i], drive.kd = gains.data()[2 * i + 1];
+    drive.force = signal_of(segments, row[0], row[1]),
+    drive.motion = signal_of(segments, row[2], row[3]);
+    drive.prescribed = row[4] != 0, drive.kp = gains.data()[2 * i],
+    drive.kd = gains.data()[2 * i + 1];
     acting.limit(int(i), limits.data()[2 * i], limits.data()[2 * i + 1]);
   }
   return acting;
 }
 
-void check_state(const Controller &self, const Vector &q) { expect(q.shape(0) == std::size_t(self.robot().n), "q needs an entry an unknown"); }
+void check_state(const Controller &self, const Vector &q) {
+  expect(q.shape(0) == std::size_t(self.robot().n), "q needs an entry an unknown");
+}
 
 void start(Controller &self, const Vector &q) {
   check_state(self, q);
-  Acting acting(self.count());
+  Inputs acting(self.count());
   self.start(acting, q.data());
 }
 
-// What a tick leaves: force (N), and the motion to follow from then on: place, rate and half the acceleration (N, 3).
+// What a tick leaves: force (N), and the motion to follow from then on: place, rate and half the
+// acceleration (N, 3).
 nb::tuple left(const SampledOutput &held) {
   const std::size_t joints = held.force.size();
   Array force = new_array({joints}), motion = new_array({joints, 3});
   std::copy(held.force.begin(), held.force.end(), force.data());
-  for (std::size_t i = 0; i < joints; ++i) std::copy(held.motion[i].c, held.motion[i].c + 3, motion.data() + 3 * i);
+  for (std::size_t i = 0; i < joints; ++i)
+    std::copy(held.motion[i].c, held.motion[i].c + 3, motion.data() + 3 * i);
   return nb::make_tuple(force, motion);
 }
 
 nb::tuple tick(Controller &self, long k, double t, const Vector &q) {
   check_state(self, q);
-  Acting acting(self.count());
+  Inputs acting(self.count());
   self.tick(k, t, q.data(), nullptr, acting.held);
   return left(acting.held);
 }
 
-nb::tuple step(Controller &self, long k, double t, const Vector &positions, double deflection, double slope) {
+nb::tuple step(Controller &self, long k, double t, const Vector &positions, double deflection,
+               double slope) {
   expect(positions.shape(0) == std::size_t(self.count()), "positions need an entry a joint");
-  Acting acting(self.count());
+  Inputs acting(self.count());
   self.step(k, t, positions.data(), Bend{deflection, slope}, acting.held);
   return left(acting.held);
 }
@@ -133,36 +158,52 @@ Array prediction(const Controller &self) {
 
 std::string method_of(Controller &self, const Vector &q, double rtol) {
   check_state(self, q);
-  Acting acting(self.count());
+  Inputs acting(self.count());
   self.start(acting, q.data());
   return method_for_ticks(self.robot(), acting, q.data(), rtol);
 }
 
-std::unique_ptr<Trials> trials_of(const Mechanics &mechanics, const Controller &controller, const Matrix &segments, const Counts &index,
-                                  const Matrix &gains, const Matrix &limits, const Vector &t, const Vector &q, const Matrix &references,
-                                  double rtol, const std::string &method) {
+std::unique_ptr<GainSweep> trials_of(const Mechanics &mechanics, const Controller &controller,
+                                     const Matrix &segments, const Counts &index,
+                                     const Matrix &gains, const Matrix &limits, const Vector &t,
+                                     const Vector &q, const Matrix &references, double rtol,
+                                     const std::string &method) {
   check_state(controller, q);
-  expect(t.shape(0) > 1 && references.shape(0) == std::size_t(controller.count()) && references.shape(1) == t.shape(0), "references need a row a joint");
-  Plan plan{mechanics.model, acting_of(segments, index, gains, limits), controller, numbers(t), numbers(q), numbers(references), rtol, method};
+  expect(t.shape(0) > 1 && references.shape(0) == std::size_t(controller.count()) &&
+             references.shape(1) == t.shape(0),
+         "references need a row a joint");
+  Plan plan{mechanics.model,
+            acting_of(segments, index, gains, limits),
+            controller,
+            numbers(t),
+            numbers(q),
+            numbers(references),
+            rtol,
+            method};
   nb::gil_scoped_release release;
-  return std::make_unique<Trials>(std::move(plan));
+  return std::make_unique<GainSweep>(std::move(plan));
 }
 
-nb::tuple run(Trials &self, const Matrix &prices, const Cube &gains, const Vector &limits, int threads) {
+nb::tuple run(GainSweep &self, const Matrix &prices, const Cube &gains, const Vector &limits,
+              int threads) {
   const std::size_t rows = limits.shape(0), width = std::size_t(self.plan().figures());
-  expect(prices.shape(0) == 2 && prices.shape(1) == width, "prices and what is free need an entry a figure");
-  expect(gains.shape(0) == rows && gains.shape(1) == std::size_t(self.plan().joints()) && gains.shape(2) == GAINS,
+  expect(prices.shape(0) == 2 && prices.shape(1) == width,
+         "prices and what is free need an entry a figure");
+  expect(gains.shape(0) == rows && gains.shape(1) == std::size_t(self.plan().joints()) &&
+             gains.shape(2) == GAINS,
          "gains need a row a joint, and limits an entry a run");
   Array figures = new_array({rows, width}), reached = new_array({rows});
   {
     nb::gil_scoped_release release;
-    self.run(Prices{prices.data(), prices.data() + width}, gains.data(), limits.data(), int(rows), threads, figures.data(), reached.data());
+    self.run(Prices{prices.data(), prices.data() + width}, gains.data(), limits.data(), int(rows),
+             threads, figures.data(), reached.data());
   }
   return nb::make_tuple(figures, reached);
 }
 
 Samples samples_of(const Vector &t, const Vector &a, const Vector &b) {
-  expect(t.shape(0) > 0 && a.shape(0) == t.shape(0) && b.shape(0) == t.shape(0), "samples need an entry an instant");
+  expect(t.shape(0) > 0 && a.shape(0) == t.shape(0) && b.shape(0) == t.shape(0),
+         "samples need an entry an instant");
   return {t.data(), int(t.shape(0))};
 }
 
@@ -188,20 +229,28 @@ double least_vibration_of(const Vector &t, const Vector &w, int seen, double eno
 
 void bind_control(nb::module_ &module) {
   using namespace nb::literals;
-  nb::class_<Controller, Sampler>(module, "Controller", "A sampled controller of all joints of one robot, with its memory and log.")
-      .def(nb::new_(&controller_of), "mechanics"_a, "rate_Hz"_a, "quantum"_a, "segments"_a, "index"_a, "gains"_a, "springs"_a, "linear"_a,
-           "about"_a)
+  nb::class_<Controller, Sampler>(
+      module, "Controller",
+      "A sampled controller of all joints of one robot, with its memory and log.")
+      .def(nb::new_(&controller_of), "mechanics"_a, "rate_Hz"_a, "quantum"_a, "segments"_a,
+           "index"_a, "gains"_a, "springs"_a, "linear"_a, "about"_a)
       .def("start", &start, "q"_a, "As before tick 0, on a robot that starts at q.")
-      .def("tick", &tick, "k"_a, "t"_a, "q"_a, "Tick k at the state q: forces (N,), and motions (N, 3) that hold from then on.")
-      .def("step", &step, "k"_a, "t"_a, "positions"_a, "deflection"_a, "slope"_a, "The same from what is measured.")
-      .def("method", &method_of, "q"_a, "rtol"_a, "The method for a run from q, by the ticks; sets the controller back.")
-      .def_prop_ro("log", &log_of, nb::rv_policy::move, "Of all ticks since the start, (ticks, N, 6).")
-      .def_prop_ro("prediction", &prediction, nb::rv_policy::move, "z of a linear law for the next tick.");
-  nb::class_<Trials>(module, "Trials", "One robot under many controllers; may be called from several threads.")
-      .def(nb::new_(&trials_of), "mechanics"_a, "controller"_a, "segments"_a, "index"_a, "gains"_a, "limits"_a, "t"_a, "q"_a, "references"_a, "rtol"_a,
-           "method"_a)
+      .def("tick", &tick, "k"_a, "t"_a, "q"_a,
+           "Tick k at the state q: forces (N,), and motions (N, 3) that hold from then on.")
+      .def("step", &step, "k"_a, "t"_a, "positions"_a, "deflection"_a, "slope"_a,
+           "The same from what is measured.")
+      .def("method", &method_of, "q"_a, "rtol"_a,
+           "The method for a run from q, by the ticks; sets the controller back.")
+      .def_prop_ro("log", &log_of, nb::rv_policy::move,
+                   "Of all ticks since the start, (ticks, N, 6).")
+      .def_prop_ro("prediction", &prediction, nb::rv_policy::move,
+                   "z of a linear law for the next tick.");
+  nb::class_<GainSweep>(module, "Trials",
+                        "One robot under many controllers; may be called from several threads.")
+      .def(nb::new_(&trials_of), "mechanics"_a, "controller"_a, "segments"_a, "index"_a, "gains"_a,
+           "limits"_a, "t"_a, "q"_a, "references"_a, "rtol"_a, "method"_a)
       .def("run", &run, "prices"_a, "gains"_a, "limits"_a, "threads"_a)
-      .def_prop_ro("method", [](const Trials &self) { return self.plan().method; });
+      .def_prop_ro("method", [](const GainSweep &self) { return self.plan().method; });
   module.def("joint_figures", &joint_figures_of, "t"_a, "r"_a, "q"_a);
   module.def("strip_figures", &strip_figures_of, "t"_a, "w"_a, "settled"_a);
   module.def("least_vibration", &least_vibration_of, "t"_a, "w"_a, "seen"_a, "enough"_a);

@@ -1,12 +1,13 @@
-// A robot's equations: from flat arrays of its constants to forward and inverse dynamics, energies, places.
+// A robot's equations: from flat arrays of its constants to forward and inverse dynamics, energies,
+// places.
 #include "mechanics.hpp"
 
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
-#include "fault.hpp"
-#include "observe.hpp"
-#include "table.hpp"
+#include "dynamics/outputs.hpp"
+#include "robot/input_fault.hpp"
+#include "robot/robot_table.hpp"
 
 namespace flexura {
 namespace {
@@ -18,21 +19,25 @@ void expect(bool good, const char *text) {
 Array accelerations(const Mechanics &self, const Vector &q, const Vector &v, const Vector &force) {
   const Model<double> &model = *self.model;
   const std::size_t n = std::size_t(model.n), links = model.first.size();
-  expect(q.shape(0) == n && v.shape(0) == n && force.shape(0) == n, "q, v and force need an entry an unknown");
+  expect(q.shape(0) == n && v.shape(0) == n && force.shape(0) == n,
+         "q, v and force need an entry an unknown");
   Workspace<double> work(model);
   const std::vector<double> given(links, 0.0);
   std::vector<double> reaction(links, 0.0);
   Array a = new_array({n});
   const Stage<double> plain{q.data(), v.data(), 0.0, 0.0, nullptr, nullptr};
-  accelerate(model, work, q.data(), v.data(), plain, force.data(), Held<double>{model.locked.data(), given.data(), reaction.data()}, a.data());
+  accelerate(model, work, q.data(), v.data(), plain, force.data(),
+             Held<double>{model.locked.data(), given.data(), reaction.data()}, a.data());
 
   return a;
 }
 
-Array inverse_dynamics(const Mechanics &self, const Vector &q, const Vector &v, const Vector &a, bool gravity, bool stiffness, bool damping) {
+Array inverse_dynamics(const Mechanics &self, const Vector &q, const Vector &v, const Vector &a,
+                       bool gravity, bool stiffness, bool damping) {
   const Model<double> &model = *self.model;
   const std::size_t n = std::size_t(model.n);
-  expect(q.shape(0) == n && v.shape(0) == n && a.shape(0) == n, "q, v and a need an entry an unknown");
+  expect(q.shape(0) == n && v.shape(0) == n && a.shape(0) == n,
+         "q, v and a need an entry an unknown");
   Workspace<double> work(model);
   Array out = new_array({n});
   forces(model, work, q.data(), v.data(), a.data(), Terms{gravity, stiffness, damping}, out.data());
@@ -41,13 +46,15 @@ Array inverse_dynamics(const Mechanics &self, const Vector &q, const Vector &v, 
 
 Array observations(const Mechanics &self, const Matrix &q, const Matrix &v, int stations) {
   const Model<double> &model = *self.model;
-  expect(q.shape(1) == std::size_t(model.n) && v.shape(1) == q.shape(1) && v.shape(0) == q.shape(0), "q and v need a column an unknown");
+  expect(q.shape(1) == std::size_t(model.n) && v.shape(1) == q.shape(1) && v.shape(0) == q.shape(0),
+         "q and v need a column an unknown");
   Observer<double> observer(model, stations);
   Array out = new_array({q.shape(0), std::size_t(observer.columns())});
   {
     nb::gil_scoped_release free;
     for (std::size_t k = 0; k < q.shape(0); ++k)
-      observer.observe(q.data() + k * q.shape(1), v.data() + k * q.shape(1), out.data() + k * std::size_t(observer.columns()));
+      observer.observe(q.data() + k * q.shape(1), v.data() + k * q.shape(1),
+                       out.data() + k * std::size_t(observer.columns()));
   }
   return out;
 }
@@ -60,25 +67,28 @@ Array line_of(const Mechanics &self, const Vector &q, int link, const Vector &s)
   const std::vector<double> still(std::size_t(model.n), 0.0);
   outward_kinematics(model, work, q.data(), still.data());
   std::vector<Pose<double>> poses(s.shape(0));
-  line(model, work, q.data(), link, s.data(), int(s.shape(0)), poses.data());
+  line_points(model, work, q.data(), link, s.data(), int(s.shape(0)), poses.data());
   Array out = new_array({s.shape(0), 3});
   for (std::size_t k = 0; k < poses.size(); ++k)
-    out.data()[3 * k] = poses[k].x, out.data()[3 * k + 1] = poses[k].y, out.data()[3 * k + 2] = poses[k].angle;
+    out.data()[3 * k] = poses[k].x, out.data()[3 * k + 1] = poses[k].y,
+                   out.data()[3 * k + 2] = poses[k].angle;
   return out;
 }
 
 double loss_of(const Mechanics &self, const Vector &q, const Vector &v) {
-  expect(q.shape(0) == std::size_t(self.model->n) && v.shape(0) == q.shape(0), "q and v need an entry an unknown");
+  expect(q.shape(0) == std::size_t(self.model->n) && v.shape(0) == q.shape(0),
+         "q and v need an entry an unknown");
   return loss(*self.model, q.data(), v.data());
 }
 
-// Constants of the piece that a whole link is: B (m, P), K (m), shapes at the tip (m); the shapes as sums of Legendre's polynomials (rows, m),
-// no rows where nothing slides along it.
+// Constants of the piece that a whole link is: B (m, P), K (m), shapes at the tip (m); the shapes
+// as sums of Legendre's polynomials (rows, m), no rows where nothing slides along it.
 nb::tuple whole_link(const Mechanics &self, int link) {
   const Model<double> &model = *self.model;
   expect(0 <= link && link < model.links(), "there is no such link");
   const Piece<double> &c = model.pieces[std::size_t(model.begin[std::size_t(link) + 1]) - 1];
-  Array B = new_array({std::size_t(c.m), std::size_t(c.P)}), K = new_array({std::size_t(c.m)}), tip = new_array({std::size_t(c.m)});
+  Array B = new_array({std::size_t(c.m), std::size_t(c.P)}), K = new_array({std::size_t(c.m)}),
+        tip = new_array({std::size_t(c.m)});
   for (int i = 0; i < c.m; ++i) {
     for (int j = 0; j < c.P; ++j) B.data()[i * c.P + j] = c.B[i * padded(c.P) + j];
     K.data()[i] = c.K[i], tip.data()[i] = c.tip_angle[i];
@@ -91,9 +101,11 @@ nb::tuple whole_link(const Mechanics &self, int link) {
 
 }  // namespace
 
-Robot robot_of(const Vector &gravity, const Vector &payload, const Counts &counts, const Matrix &numbers, const Matrix &material) {
+Robot robot_of(const Vector &gravity, const Vector &payload, const Counts &counts,
+               const Matrix &numbers, const Matrix &material) {
   expect(gravity.size() == 2 && payload.size() == 2, "gravity and payload have two numbers each");
-  expect(counts.shape(1) == COUNTS && numbers.shape(1) == NUMBERS && material.shape(1) == MATERIAL, "rows of other lengths were expected");
+  expect(counts.shape(1) == COUNTS && numbers.shape(1) == NUMBERS && material.shape(1) == MATERIAL,
+         "rows of other lengths were expected");
   expect(counts.shape(0) == numbers.shape(0), "counts and numbers need a row a link");
   Table table;
   table.links = int(counts.shape(0)), table.intervals = int(material.shape(0));
@@ -113,14 +125,24 @@ void bind_mechanics(nb::module_ &module) {
     }
   });
   nb::class_<Mechanics> type(module, "Mechanics", "The equations of one robot.");
-  type.def(nb::init<const Vector &, const Vector &, const Counts &, const Matrix &, const Matrix &>(), "gravity"_a, "payload"_a, "counts"_a,
-           "numbers"_a, "material"_a)
-      .def_prop_ro("n", [](const Mechanics &self) { return self.model->n; }, "How many unknowns there are.")
-      .def_prop_ro("first", [](const Mechanics &self) { return self.model->first; }, "Rows of the joints.")
-      .def_prop_ro("elastic", [](const Mechanics &self) { return self.model->elastic; }, "Elastic unknowns of each link.")
-      .def("pieces", [](const Mechanics &self, int link) { return self.model->begin.at(std::size_t(link) + 1) - self.model->begin.at(std::size_t(link)); })
+  type.def(nb::init<const Vector &, const Vector &, const Counts &, const Matrix &,
+                    const Matrix &>(),
+           "gravity"_a, "payload"_a, "counts"_a, "numbers"_a, "material"_a)
+      .def_prop_ro(
+          "n", [](const Mechanics &self) { return self.model->n; }, "How many unknowns there are.")
+      .def_prop_ro(
+          "first", [](const Mechanics &self) { return self.model->first; }, "Rows of the joints.")
+      .def_prop_ro(
+          "elastic", [](const Mechanics &self) { return self.model->elastic; },
+          "Elastic unknowns of each link.")
+      .def("pieces",
+           [](const Mechanics &self, int link) {
+             return self.model->begin.at(std::size_t(link) + 1) -
+                    self.model->begin.at(std::size_t(link));
+           })
       .def("accelerations", &accelerations, "q"_a, "v"_a, "force"_a)
-      .def("forces", &inverse_dynamics, "q"_a, "v"_a, "a"_a, "gravity"_a, "stiffness"_a, "damping"_a)
+      .def("forces", &inverse_dynamics, "q"_a, "v"_a, "a"_a, "gravity"_a, "stiffness"_a,
+           "damping"_a)
       .def("observe", &observations, "q"_a, "v"_a, "stations"_a)
       .def("line", &line_of, "q"_a, "link"_a, "s"_a)
       .def("loss", &loss_of, "q"_a, "v"_a)

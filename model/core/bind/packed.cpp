@@ -18,12 +18,13 @@ Signal signal_of(const Matrix &segments, std::int64_t from, std::int64_t to) {
 
 }  // namespace
 
-Acting acting_of(const Matrix &segments, const Ranges &ranges, const Matrix &gains, const Flags &prescribed, const Flags &sampled,
-                 const Matrix &limits) {
+Inputs acting_of(const Matrix &segments, const Ranges &ranges, const Matrix &gains,
+                 const Flags &prescribed, const Flags &sampled, const Matrix &limits) {
   const std::size_t joints = ranges.shape(0);
-  if (segments.shape(1) != 10 || ranges.shape(1) != 4 || gains.shape(0) != joints || limits.shape(0) != joints)
+  if (segments.shape(1) != 10 || ranges.shape(1) != 4 || gains.shape(0) != joints ||
+      limits.shape(0) != joints)
     throw std::invalid_argument("drives of another shape were expected");
-  Acting acting((int(joints)));
+  Inputs acting((int(joints)));
   for (std::size_t i = 0; i < joints; ++i) {
     JointDrive &joint = acting.joints[i];
     const std::int64_t *r = ranges.data() + 4 * i;

@@ -1,16 +1,17 @@
 // What acts on a robot as Python packs it, and how a run ended, in a word.
 #pragma once
 #include "bind.hpp"
-#include "clock.hpp"
+#include "integration/run_state.hpp"
 
 namespace flexura {
 
 using Flags = nb::ndarray<const std::uint8_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using Ranges = nb::ndarray<const std::int64_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
-// Drives of the joints: rows of signals, their ranges (joints, 4) [force from, to; motion from, to], gains (joints, 2), flags.
-Acting acting_of(const Matrix &segments, const Ranges &ranges, const Matrix &gains, const Flags &prescribed, const Flags &sampled,
-                 const Matrix &limits);
+// Drives of the joints: rows of signals, their ranges (joints, 4) [force from, to; motion from,
+// to], gains (joints, 2), flags.
+Inputs acting_of(const Matrix &segments, const Ranges &ranges, const Matrix &gains,
+                 const Flags &prescribed, const Flags &sampled, const Matrix &limits);
 
 const char *word(Status status);
 

@@ -1,12 +1,12 @@
 // Populations: many robots of one topology from rows of numbers to rows of channels.
-#include "population.hpp"
+#include "simulation/population.hpp"
 
-#include <nanobind/stl/string.h>
 #include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
-#include "methods.hpp"
 #include "packed.hpp"
+#include "simulation/method_by_name.hpp"
 
 namespace flexura {
 namespace {
@@ -15,7 +15,8 @@ using Counts = nb::ndarray<const std::int64_t, nb::ndim<2>, nb::c_contig, nb::de
 using Cube = nb::ndarray<const double, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 using Indices = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
-// What another thread sees of a population that runs: it can stop it, and ask how many robots are done.
+// What another thread sees of a population that runs: it can stop it, and ask how many robots are
+// done.
 struct Watch {
   std::atomic<bool> stop{false};
   std::atomic<long> done{0};
@@ -23,8 +24,9 @@ struct Watch {
 
 // What acts: packed once for all robots that share it.
 struct PackedDrive {
-  Acting acting;
-  PackedDrive(const Matrix &segments, const Ranges &ranges, const Matrix &gains, const Flags &prescribed, const Flags &sampled, const Matrix &limits)
+  Inputs acting;
+  PackedDrive(const Matrix &segments, const Ranges &ranges, const Matrix &gains,
+              const Flags &prescribed, const Flags &sampled, const Matrix &limits)
       : acting(acting_of(segments, ranges, gains, prescribed, sampled, limits)) {}
 };
 
@@ -35,32 +37,43 @@ Channel::Of kind_of(const std::string &name) {
   throw std::invalid_argument("there is no channel " + name);
 }
 
-nb::tuple run_population(const Counts &counts, const Cube &numbers, const Cube &material, const Matrix &gravity, const Matrix &payload,
-                         const Cube &limits, const std::vector<PackedDrive *> &drives, const Indices &drive_of, const Vector &t, const Vector &q,
-                         const Vector &v, double rtol, const std::string &method, bool numerical_damping, long most_steps,
-                         const std::vector<std::pair<std::string, int>> &channels, int stations, int threads, Watch &watch) {
+nb::tuple run_population(const Counts &counts, const Cube &numbers, const Cube &material,
+                         const Matrix &gravity, const Matrix &payload, const Cube &limits,
+                         const std::vector<PackedDrive *> &drives, const Indices &drive_of,
+                         const Vector &t, const Vector &q, const Vector &v, double rtol,
+                         const std::string &method, bool numerical_damping, long most_steps,
+                         const std::vector<std::pair<std::string, int>> &channels, int stations,
+                         int threads, Watch &watch) {
   const std::size_t robots = numbers.shape(0), links = counts.shape(0);
-  if (counts.shape(1) != COUNTS || numbers.shape(1) != links || numbers.shape(2) != NUMBERS || material.shape(0) != robots ||
-      material.shape(2) != MATERIAL || gravity.shape(0) != robots || gravity.shape(1) != 2 || payload.shape(0) != robots ||
-      payload.shape(1) != 2 || limits.shape(0) != robots || limits.shape(1) != links || limits.shape(2) != 2 || drive_of.shape(0) != robots ||
-      t.shape(0) < 1)
+  if (counts.shape(1) != COUNTS || numbers.shape(1) != links || numbers.shape(2) != NUMBERS ||
+      material.shape(0) != robots || material.shape(2) != MATERIAL || gravity.shape(0) != robots ||
+      gravity.shape(1) != 2 || payload.shape(0) != robots || payload.shape(1) != 2 ||
+      limits.shape(0) != robots || limits.shape(1) != links || limits.shape(2) != 2 ||
+      drive_of.shape(0) != robots || t.shape(0) < 1)
     throw std::invalid_argument("rows of another shape were expected");
   Population population;
   Table &table = population.robots;
-  table.count = int(robots), table.links = int(links), table.intervals = int(material.shape(1)), table.counts = counts.data();
-  table.numbers = numbers.data(), table.material = material.data(), table.gravity = gravity.data(), table.payload = payload.data();
+  table.count = int(robots), table.links = int(links), table.intervals = int(material.shape(1)),
+  table.counts = counts.data();
+  table.numbers = numbers.data(), table.material = material.data(), table.gravity = gravity.data(),
+  table.payload = payload.data();
   population.limits = limits.data();
   for (const PackedDrive *drive : drives) {
-    if (drive->acting.joints.size() != links) throw std::invalid_argument("drives need an entry a joint");
+    if (drive->acting.joints.size() != links)
+      throw std::invalid_argument("drives need an entry a joint");
     population.drives.push_back(drive->acting);
   }
   for (std::size_t k = 0; k < robots; ++k) {
-    if (drive_of.data()[k] < 0 || std::size_t(drive_of.data()[k]) >= drives.size()) throw std::invalid_argument("there is no such drive");
+    if (drive_of.data()[k] < 0 || std::size_t(drive_of.data()[k]) >= drives.size())
+      throw std::invalid_argument("there is no such drive");
     population.drive_of.push_back(int(drive_of.data()[k]));
   }
   population.times.assign(t.data(), t.data() + t.shape(0));
-  population.q.assign(q.data(), q.data() + q.shape(0)), population.v.assign(v.data(), v.data() + v.shape(0));
-  population.rtol = rtol, population.method = method, population.numerical_damping = numerical_damping, population.most_steps = most_steps, population.stations = stations;
+  population.q.assign(q.data(), q.data() + q.shape(0)),
+      population.v.assign(v.data(), v.data() + v.shape(0));
+  population.rtol = rtol, population.method = method,
+  population.numerical_damping = numerical_damping, population.most_steps = most_steps,
+  population.stations = stations;
   for (const auto &[name, index] : channels) population.channels.push_back({kind_of(name), index});
   Array values = new_array({channels.size(), robots, t.shape(0)});
   std::vector<Ending> endings;
@@ -69,16 +82,20 @@ nb::tuple run_population(const Counts &counts, const Cube &numbers, const Cube &
     endings = run(population, threads, values.data(), watch.stop, watch.done);
   }
   const std::size_t count = endings.size();
-  Array reached = new_array({count}), steps = new_array({count}), joint = new_array({count}), position = new_array({count, links});
+  Array reached = new_array({count}), steps = new_array({count}), joint = new_array({count}),
+        position = new_array({count, links});
   nb::list words;
   nb::dict texts;
   for (std::size_t k = 0; k < count; ++k) {
     const Ending &end = endings[k];
     words.append(end.refusal == Ending::none ? word(end.status) : "refused");
-    reached.data()[k] = end.reached, steps.data()[k] = double(end.steps), joint.data()[k] = end.joint;
+    reached.data()[k] = end.reached, steps.data()[k] = double(end.steps),
+    joint.data()[k] = end.joint;
     std::copy(end.position.begin(), end.position.end(), position.data() + k * links);
-    if (end.refusal == Ending::fault) texts[nb::int_(k)] = nb::make_tuple(end.joint, end.key, end.text);
-    else if (end.status != Status::done && end.refusal == Ending::none) texts[nb::int_(k)] = nb::make_tuple(-1, "", end.text);
+    if (end.refusal == Ending::fault)
+      texts[nb::int_(k)] = nb::make_tuple(end.joint, end.key, end.text);
+    else if (end.status != Status::done && end.refusal == Ending::none)
+      texts[nb::int_(k)] = nb::make_tuple(-1, "", end.text);
   }
   return nb::make_tuple(values, words, reached, steps, joint, position, texts);
 }
@@ -89,15 +106,22 @@ void bind_population(nb::module_ &module) {
   using namespace nb::literals;
   nb::class_<Watch>(module, "Watch", "What another thread sees of a population that runs.")
       .def(nb::init<>())
-      .def("stop", [](Watch &self) { self.stop = true; }, "Ends every robot where it is.")
+      .def(
+          "stop", [](Watch &self) { self.stop = true; }, "Ends every robot where it is.")
       .def_prop_ro("stopped", [](const Watch &self) { return self.stop.load(); })
-      .def_prop_ro("done", [](const Watch &self) { return self.done.load(); }, "How many robots are done.");
+      .def_prop_ro(
+          "done", [](const Watch &self) { return self.done.load(); }, "How many robots are done.");
   nb::class_<PackedDrive>(module, "Drive", "What acts on robots that share it.")
-      .def(nb::init<const Matrix &, const Ranges &, const Matrix &, const Flags &, const Flags &, const Matrix &>(), "segments"_a, "ranges"_a,
-           "gains"_a, "prescribed"_a, "sampled"_a, "limits"_a);
-  module.def("population", &run_population, "counts"_a, "numbers"_a, "material"_a, "gravity"_a, "payload"_a, "limits"_a, "drives"_a, "drive_of"_a,
-             "t"_a, "q"_a, "v"_a, "rtol"_a, "method"_a, "numerical_damping"_a, "most_steps"_a, "channels"_a, "stations"_a, "threads"_a, "watch"_a,
-             "Values (channels, robots, times); of each robot how it ended, the time reached, steps, joint, positions of the joints; texts by robot.");
+      .def(nb::init<const Matrix &, const Ranges &, const Matrix &, const Flags &, const Flags &,
+                    const Matrix &>(),
+           "segments"_a, "ranges"_a, "gains"_a, "prescribed"_a, "sampled"_a, "limits"_a);
+  module.def("population", &run_population, "counts"_a, "numbers"_a, "material"_a, "gravity"_a,
+             "payload"_a, "limits"_a, "drives"_a, "drive_of"_a, "t"_a, "q"_a, "v"_a, "rtol"_a,
+             "method"_a, "numerical_damping"_a, "most_steps"_a, "channels"_a, "stations"_a,
+             "threads"_a, "watch"_a,
+             "Values (channels, robots, times); of each robot how it ended, the time reached, "
+             "steps, joint, "
+             "positions of the joints; texts by robot.");
 }
 
 }  // namespace flexura

@@ -2,20 +2,24 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
-#include "controller.hpp"
+#include "control/controller.hpp"
+#include "dynamics/outputs.hpp"
 #include "mechanics.hpp"
-#include "observe.hpp"
 #include "packed.hpp"
-#include "simulation.hpp"
+#include "simulation/simulation.hpp"
 
 namespace flexura {
 namespace {
 
 // A DriveFunction of Python's as the core calls it.
 class PythonDrive {
-public:
+ public:
   PythonDrive(std::shared_ptr<const Model<double>> model, const nb::object &drive)
-      : model_(std::move(model)), work_(*model_), link_(last_flexible(*model_)), function_(drive.attr("function")), read_(drive.attr("read")),
+      : model_(std::move(model)),
+        work_(*model_),
+        link_(last_flexible(*model_)),
+        function_(drive.attr("function")),
+        read_(drive.attr("read")),
         of_time_(nb::cast<bool>(drive.attr("of_time"))) {}
 
   // Forces (joints) at a state. The GIL is held.
@@ -23,32 +27,39 @@ public:
     if (of_time_) return take(function_(t), t, force);
     const std::size_t joints = model_->first.size();
     Array position = new_array({joints}), velocity = new_array({joints});
-    for (std::size_t i = 0; i < joints; ++i) position.data()[i] = q[model_->first[i]], velocity.data()[i] = v[model_->first[i]];
+    for (std::size_t i = 0; i < joints; ++i)
+      position.data()[i] = q[model_->first[i]], velocity.data()[i] = v[model_->first[i]];
     const double deflection = link_ < 0 ? 0.0 : bend(*model_, work_, q, link_).deflection;
     take(function_(t, position, velocity, deflection), t, force);
   }
 
-private:
+ private:
   std::shared_ptr<const Model<double>> model_;
   Workspace<double> work_;
   int link_;
   nb::object function_, read_;
   bool of_time_;
 
-  // Arrays of finite doubles are read in place; all else by Python, which refuses what cannot be forces.
+  // Arrays of finite doubles are read in place; all else by Python, which refuses what cannot be
+  // forces.
   void take(const nb::object &given, double t, double *force) const {
     if (take_array(given, force)) return;
     const nb::object checked = read_(given, t);
-    if (!take_array(checked, force)) throw std::invalid_argument("the drive function gives another number of forces");
+    if (!take_array(checked, force))
+      throw std::invalid_argument("the drive function gives another number of forces");
   }
   bool take_array(const nb::object &given, double *force) const {
     Py_buffer view;
     if (!PyObject_CheckBuffer(given.ptr())) return false;
-    if (PyObject_GetBuffer(given.ptr(), &view, PyBUF_ND | PyBUF_FORMAT | PyBUF_C_CONTIGUOUS) != 0) return PyErr_Clear(), false;
+    if (PyObject_GetBuffer(given.ptr(), &view, PyBUF_ND | PyBUF_FORMAT | PyBUF_C_CONTIGUOUS) != 0)
+      return PyErr_Clear(), false;
     const std::size_t joints = model_->first.size();
-    const bool doubles = view.format && view.format[0] == 'd' && view.format[1] == '\0' && view.ndim == 1 && std::size_t(view.shape[0]) == joints;
+    const bool doubles = view.format && view.format[0] == 'd' && view.format[1] == '\0' &&
+                         view.ndim == 1 && std::size_t(view.shape[0]) == joints;
     bool finite = doubles;
-    for (std::size_t i = 0; doubles && i < joints; ++i) force[i] = static_cast<const double *>(view.buf)[i], finite = finite && std::isfinite(force[i]);
+    for (std::size_t i = 0; doubles && i < joints; ++i)
+      force[i] = static_cast<const double *>(view.buf)[i],
+      finite = finite && std::isfinite(force[i]);
     PyBuffer_Release(&view);
     return finite;
   }
@@ -56,14 +67,14 @@ private:
 
 // A Python function that is called once a tick.
 class PythonSampler : public Sampler {
-public:
+ public:
   PythonSampler(const Mechanics &robot, const nb::object &drive) : drive_(robot.model, drive) {}
   void tick(long, double t, const double *q, const double *v, SampledOutput &held) override {
     nb::gil_scoped_acquire lock;
     drive_.call(t, q, v, held.force.data());
   }
 
-private:
+ private:
   PythonDrive drive_;
 };
 
@@ -73,14 +84,17 @@ struct Running {
   std::unique_ptr<PythonDrive> drive;
   std::unique_ptr<Simulation> run;
 
-  Running(const Mechanics &robot, const Vector &t, const Vector &q, const Vector &v, double rtol, const std::string &method,
-          const Matrix &segments, const Ranges &ranges, const Matrix &gains, const Flags &prescribed, const Flags &sampled,
-          const Matrix &limits, nb::object function_, nb::object sampler_, double rate_Hz, double first_step, bool numerical_damping, long most_steps)
+  Running(const Mechanics &robot, const Vector &t, const Vector &q, const Vector &v, double rtol,
+          const std::string &method, const Matrix &segments, const Ranges &ranges,
+          const Matrix &gains, const Flags &prescribed, const Flags &sampled, const Matrix &limits,
+          nb::object function_, nb::object sampler_, double rate_Hz, double first_step,
+          bool numerical_damping, long most_steps)
       : function(std::move(function_)), sampler(std::move(sampler_)) {
     const std::size_t n = std::size_t(robot.model->n);
-    if (q.shape(0) != n || v.shape(0) != n || t.shape(0) < 1 || ranges.shape(0) != robot.model->first.size())
+    if (q.shape(0) != n || v.shape(0) != n || t.shape(0) < 1 ||
+        ranges.shape(0) != robot.model->first.size())
       throw std::invalid_argument("a run of another robot was expected");
-    Acting acting = acting_of(segments, ranges, gains, prescribed, sampled, limits);
+    Inputs acting = acting_of(segments, ranges, gains, prescribed, sampled, limits);
     if (!function.is_none()) {
       drive = std::make_unique<PythonDrive>(robot.model, function);
       acting.function = [this](double at, const double *place, const double *rate, double *force) {
@@ -89,10 +103,13 @@ struct Running {
       };
     }
     if (!sampler.is_none()) acting.sampler = nb::cast<Sampler *>(sampler), acting.rate_Hz = rate_Hz;
-    if (auto *controller = dynamic_cast<Controller *>(acting.sampler)) controller->start(acting, q.data());
+    if (auto *controller = dynamic_cast<Controller *>(acting.sampler))
+      controller->start(acting, q.data());
     Request request;
-    request.times = {t.data(), t.data() + t.shape(0)}, request.q = {q.data(), q.data() + n}, request.v = {v.data(), v.data() + n};
-    request.rtol = rtol, request.method = method, request.first_step = first_step, request.numerical_damping = numerical_damping, request.most_steps = most_steps;
+    request.times = {t.data(), t.data() + t.shape(0)}, request.q = {q.data(), q.data() + n},
+    request.v = {v.data(), v.data() + n};
+    request.rtol = rtol, request.method = method, request.first_step = first_step,
+    request.numerical_damping = numerical_damping, request.most_steps = most_steps;
     run = std::make_unique<Simulation>(robot.model, std::move(acting), request);
   }
 
@@ -102,9 +119,10 @@ struct Running {
   }
 
   nb::dict progress() const {
-    const Clock &c = run->clock();
+    const RunState &c = run->run_state();
     nb::dict out;
-    out["status"] = word(c.status), out["t"] = c.t, out["steps"] = c.steps, out["rejected"] = c.rejected;
+    out["status"] = word(c.status), out["t"] = c.t, out["steps"] = c.steps,
+    out["rejected"] = c.rejected;
     out["passes"] = run->passes(), out["method"] = run->method();
     out["joint"] = c.joint, out["elastic"] = c.elastic, out["rate"] = c.rate;
     return out;
@@ -113,12 +131,15 @@ struct Running {
   // Times (R,), states (R, 2 n), accounts (R, 4), drive forces (R, joints) of the rows so far.
   nb::tuple rows() const {
     const Record &r = run->record();
-    const std::size_t R = std::size_t(r.rows), size = std::size_t(r.size), wide = 2 * std::size_t(run->model().n), joints = std::size_t(r.joints);
-    Array t = new_array({R}), states = new_array({R, wide}), accounts = new_array({R, size - wide}), drive = new_array({R, joints});
+    const std::size_t R = std::size_t(r.rows), size = std::size_t(r.size),
+                      wide = 2 * std::size_t(run->model().n), joints = std::size_t(r.joints);
+    Array t = new_array({R}), states = new_array({R, wide}), accounts = new_array({R, size - wide}),
+          drive = new_array({R, joints});
     std::copy_n(r.t.begin(), R, t.data()), std::copy_n(r.drive.begin(), R * joints, drive.data());
     for (std::size_t k = 0; k < R; ++k) {
       std::copy_n(r.state.begin() + std::ptrdiff_t(k * size), wide, states.data() + k * wide);
-      std::copy_n(r.state.begin() + std::ptrdiff_t(k * size + wide), size - wide, accounts.data() + k * (size - wide));
+      std::copy_n(r.state.begin() + std::ptrdiff_t(k * size + wide), size - wide,
+                  accounts.data() + k * (size - wide));
     }
     return nb::make_tuple(t, states, accounts, drive);
   }
@@ -146,18 +167,23 @@ Array bends_of(const Mechanics &self, const Matrix &q, int link) {
 void bind_simulation(nb::module_ &module) {
   using namespace nb::literals;
   nb::class_<Sampler>(module, "Sampler", "A sampled controller.");
-  nb::class_<PythonSampler, Sampler>(module, "PythonSampler", "A DriveFunction that is called once a tick.")
+  nb::class_<PythonSampler, Sampler>(module, "PythonSampler",
+                                     "A DriveFunction that is called once a tick.")
       .def(nb::init<const Mechanics &, const nb::object &>(), "robot"_a, "drive"_a);
   nb::class_<Running>(module, "Simulation", "A run in progress.")
-      .def(nb::init<const Mechanics &, const Vector &, const Vector &, const Vector &, double, const std::string &, const Matrix &,
-                    const Ranges &, const Matrix &, const Flags &, const Flags &, const Matrix &, nb::object, nb::object, double, double, bool, long>(),
-           "robot"_a, "t"_a, "q"_a, "v"_a, "rtol"_a, "method"_a, "segments"_a, "ranges"_a, "gains"_a, "prescribed"_a, "sampled"_a,
-           "limits"_a, "function"_a.none(), "sampler"_a.none(), "rate_Hz"_a, "first_step"_a, "numerical_damping"_a, "most_steps"_a)
+      .def(nb::init<const Mechanics &, const Vector &, const Vector &, const Vector &, double,
+                    const std::string &, const Matrix &, const Ranges &, const Matrix &,
+                    const Flags &, const Flags &, const Matrix &, nb::object, nb::object, double,
+                    double, bool, long>(),
+           "robot"_a, "t"_a, "q"_a, "v"_a, "rtol"_a, "method"_a, "segments"_a, "ranges"_a,
+           "gains"_a, "prescribed"_a, "sampled"_a, "limits"_a, "function"_a.none(),
+           "sampler"_a.none(), "rate_Hz"_a, "first_step"_a, "numerical_damping"_a, "most_steps"_a)
       .def("advance", &Running::advance, "steps"_a, "At most so many steps further; may it go on?")
       .def("progress", &Running::progress, "How far the run is, and how it ended.")
       .def("rows", &Running::rows, "Times, states, accounts and drive forces so far.")
       .def("state", &Running::state, "The state where the run is, accounts included.");
-  module.def("bends", &bends_of, "robot"_a, "q"_a, "link"_a, "Tip deflection and slope (T, 2) of a link at q (T, n).");
+  module.def("bends", &bends_of, "robot"_a, "q"_a, "link"_a,
+             "Tip deflection and slope (T, 2) of a link at q (T, n).");
 }
 
 }  // namespace flexura

@@ -2,8 +2,8 @@
 #include <nanobind/stl/vector.h>
 
 #include "mechanics.hpp"
-#include "spectrum.hpp"
-#include "statics.hpp"
+#include "statics_and_modes/equilibrium.hpp"
+#include "statics_and_modes/natural_modes.hpp"
 
 namespace flexura {
 namespace {
@@ -11,7 +11,8 @@ namespace {
 using Flags = nb::ndarray<const std::uint8_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
 void check_state(const Mechanics &self, const Vector &q) {
-  if (q.shape(0) != std::size_t(self.model->n)) throw std::invalid_argument("q needs an entry an unknown");
+  if (q.shape(0) != std::size_t(self.model->n))
+    throw std::invalid_argument("q needs an entry an unknown");
 }
 
 TipLoad load_of(const Vector &load) {
@@ -22,13 +23,15 @@ TipLoad load_of(const Vector &load) {
 }
 
 std::vector<char> free_joints(const Mechanics &self, const Flags &free) {
-  if (free.shape(0) != self.model->first.size()) throw std::invalid_argument("a flag a joint was expected");
+  if (free.shape(0) != self.model->first.size())
+    throw std::invalid_argument("a flag a joint was expected");
   std::vector<char> out(free.data(), free.data() + free.shape(0));
   for (std::size_t i = 0; i < out.size(); ++i) out[i] = out[i] && !self.model->locked[i];
   return out;
 }
 
-nb::tuple equilibrium_of(const Mechanics &self, const Vector &q, const Vector &load, const Flags &free) {
+nb::tuple equilibrium_of(const Mechanics &self, const Vector &q, const Vector &load,
+                         const Flags &free) {
   check_state(self, q);
   Array out = new_array({q.shape(0)});
   std::copy(q.data(), q.data() + q.shape(0), out.data());
@@ -42,16 +45,18 @@ nb::tuple equilibrium_of(const Mechanics &self, const Vector &q, const Vector &l
   return nb::make_tuple(out, int(found.balance), found.share, found.sweeps);
 }
 
-nb::tuple modes_of(const Mechanics &self, const Vector &q, const Flags &free, int most, const Vector &load, bool shapes) {
+nb::tuple modes_of(const Mechanics &self, const Vector &q, const Flags &free, int most,
+                   const Vector &load, bool shapes) {
   check_state(self, q);
   const std::vector<char> moving = free_joints(self, free);
   const TipLoad held = load_of(load);
-  Modes found;
+  NaturalModes found;
   {
     nb::gil_scoped_release release;
     found = natural_modes(*self.model, q.data(), moving.data(), most, held, shapes);
   }
-  Array squares = new_array({std::size_t(found.count)}), out = new_array({shapes ? q.shape(0) : 0, std::size_t(found.count)});
+  Array squares = new_array({std::size_t(found.count)}),
+        out = new_array({shapes ? q.shape(0) : 0, std::size_t(found.count)});
   std::copy(found.squares.begin(), found.squares.end(), squares.data());
   std::copy(found.shapes.begin(), found.shapes.end(), out.data());
   return nb::make_tuple(squares, out);
@@ -82,11 +87,13 @@ Array rates_of(const Mechanics &self, const Vector &q, const Vector &v) {
 
 void add_solve(nb::class_<Mechanics> &type) {
   using namespace nb::literals;
-  type.def("equilibrium", &equilibrium_of, "q"_a, "load"_a, "free"_a, "q, balance (0 stable, 1 unstable, 2 missing), share borne, sweeps.")
+  type.def("equilibrium", &equilibrium_of, "q"_a, "load"_a, "free"_a,
+           "q, balance (0 stable, 1 unstable, 2 missing), share borne, sweeps.")
       .def("modes", &modes_of, "q"_a, "free"_a, "count"_a, "load"_a, "shapes"_a = true,
            "Squares [rad^2/s^2] and shapes, if asked for, of the lowest `count`; 0: all.")
       .def("mass", &mass_of, "q"_a, "M(q) (n, n).")
-      .def("stiffness", &stiffness_of, "q"_a, "v"_a, "Derivative of the forces at q (and rates v, if any) by q, (n, n).")
+      .def("stiffness", &stiffness_of, "q"_a, "v"_a,
+           "Derivative of the forces at q (and rates v, if any) by q, (n, n).")
       .def("rates", &rates_of, "q"_a, "v"_a, "Derivative of the forces by v, (n, n).");
 }
 

@@ -62,7 +62,7 @@ NONE, EFFORT, STEPPER = (
     ENCODER,
     RIGID,
     DELAY,
-) = range(20)  # columns of `Controller.gains`, as Gain of model/core/controller.hpp counts them
+) = range(20)  # columns of `Controller.gains`, as Gain of control/controller.hpp in the core
 
 
 @dataclass(frozen=True)

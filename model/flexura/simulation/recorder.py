@@ -43,7 +43,7 @@ def observed(robot: Robot) -> list[str]:
 
 WORK, LOSS, NUMERICAL, STRAIN = range(
     4
-)  # columns of the accounts, as Account of model/core/plant.hpp counts them
+)  # columns of the accounts, as Account of model/core/control/plant.hpp counts them
 NOTED, DOUBTED, REFUSED = (
     1e-3,
     1e-2,

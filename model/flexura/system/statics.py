@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import FlexuraError, InputError
 from .system import System, system_of
 
-STABLE, UNSTABLE = 0, 1  # Balance of model/core/statics.hpp
+STABLE, UNSTABLE = 0, 1  # Balance of model/core/statics_and_modes/equilibrium.hpp
 
 
 class NoEquilibrium(FlexuraError):

@@ -3,9 +3,9 @@
 //     #include "check.hpp"
 //     TEST("what must hold") { CHECK(1 + 1 == 2); CHECK_NEAR(0.1 + 0.2, 0.3, 1e-15); }
 //
-// It runs every test, prints what failed with its place, and ends with status 1 if anything did. A word on
-// the command line chooses the tests whose names contain it. CHECK_NEAR: the difference is at most the third
-// number; not a number fails.
+// It runs every test, prints what failed with its place, and ends with status 1 if anything did. A
+// word on the command line chooses the tests whose names contain it. CHECK_NEAR: the difference is
+// at most the third number; not a number fails.
 #pragma once
 #include <cmath>
 #include <cstdint>
@@ -42,7 +42,8 @@ inline void near(double a, double b, double most, const char *file, int line, co
   if (std::fabs(a - b) <= most) return;
   failed(file, line, text);
   if (failures() <= 50)
-    std::printf("    %.17g and %.17g differ by %.3g, more than %.3g\n", a, b, std::fabs(a - b), most);
+    std::printf("    %.17g and %.17g differ by %.3g, more than %.3g\n", a, b, std::fabs(a - b),
+                most);
 }
 
 // Random numbers that are the same everywhere (the standard's distributions are not): x_k =
@@ -55,8 +56,8 @@ struct Random {
   }
 };
 
-// One number for the bits of many: whether a build, a compiler or a machine gives the same digits. All that
-// is not a number is one.
+// One number for the bits of many: whether a build, a compiler or a machine gives the same digits.
+// All that is not a number is one.
 struct Digest {
   std::uint64_t value = 0xcbf29ce484222325u;
   void add(double x) {
@@ -66,7 +67,9 @@ struct Digest {
   }
 };
 
-inline bool same_bits(double a, double b) { return std::memcmp(&a, &b, sizeof a) == 0 || (a != a && b != b); }
+inline bool same_bits(double a, double b) {
+  return std::memcmp(&a, &b, sizeof a) == 0 || (a != a && b != b);
+}
 
 inline int run(int argc, char **argv) {
   int count = 0;

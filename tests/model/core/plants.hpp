@@ -1,14 +1,18 @@
-// Plants for tests of the time loop whose motion is known: unit masses on springs and dampers, each joint also a pendulum.
+// Plants for tests of the time loop whose motion is known: unit masses on springs and dampers, each
+// joint also a pendulum.
 #pragma once
 #include <cmath>
 
-#include "lane.hpp"
-#include "plant.hpp"
+#include "control/plant.hpp"
+#include "numbers/pack_lane.hpp"
 
 namespace flexura {
 
-// Joints with `elastic` further unknowns each. Every unknown k is a unit mass: q'' + damping q' + stiffness q + gravity sin q = force.
-template <class Real> struct Masses : Plant<Real> {
+// Joints with `elastic` further unknowns each. Every unknown k is a unit mass: q'' + damping q' +
+// stiffness q
+// + gravity sin q = force.
+template <class Real>
+struct Masses : Plant<Real> {
   std::vector<Real> stiffness, damping, gravity;
   long asked = 0;
 
@@ -22,29 +26,35 @@ template <class Real> struct Masses : Plant<Real> {
     stiffness.assign(this->n, Real(0.0)), damping = gravity = stiffness;
   }
 
-  void accelerate(const Pass<Real> &p, Real *a, Real *reaction) override {
+  void accelerate(const PassInputs<Real> &p, Real *a, Real *reaction) override {
     ++asked;
     for (int i = 0; i < this->joints; ++i)
       for (int k = this->first[i]; k < this->first[i + 1]; ++k) {
         const bool joint = k == this->first[i];
-        const Real s = joint ? stiffness[k] + p.stiffness[i] : stiffness[k], d = joint ? damping[k] + p.damping[i] + this->viscous[i] : damping[k];
+        const Real s = joint ? stiffness[k] + p.stiffness[i] : stiffness[k],
+                   d = joint ? damping[k] + p.damping[i] + this->viscous[i] : damping[k];
         Real sine, cosine;
         sincos(p.q[k], sine, cosine);
         const Real rest = p.force[k] - s * p.ys[k] - d * p.vs[k] - gravity[k] * sine;
-        if (joint && p.held[i]) a[k] = p.given[i], reaction[i] = a[k] + stiffness[k] * p.q[k] + (damping[k] + this->viscous[i]) * p.v[k] + gravity[k] * sine;
-        else a[k] = rest / (1.0 + p.gq * s + p.gv * d);
+        if (joint && p.held[i])
+          a[k] = p.given[i], reaction[i] = a[k] + stiffness[k] * p.q[k] +
+                                           (damping[k] + this->viscous[i]) * p.v[k] +
+                                           gravity[k] * sine;
+        else
+          a[k] = rest / (1.0 + p.gq * s + p.gv * d);
       }
   }
   void powers(const Real *q, const Real *v, Real &strain, Real &loss) override {
     strain = loss = Real(0.0);
-    for (int k = 0; k < this->n; ++k) strain += stiffness[k] * q[k] * v[k], loss += damping[k] * v[k] * v[k];
+    for (int k = 0; k < this->n; ++k)
+      strain += stiffness[k] * q[k] * v[k], loss += damping[k] * v[k] * v[k];
   }
   Real energy(const Real *q, const Real *v) override {
     Real sum = 0.0;
     for (int k = 0; k < this->n; ++k) sum += 0.5 * (v[k] * v[k] + stiffness[k] * q[k] * q[k]);
     return sum;
   }
-  Real fastest(const Real *, const Pass<Real> &) override {
+  Real fastest(const Real *, const PassInputs<Real> &) override {
     Real most = 0.0;
     for (int k = 0; k < this->n; ++k) most = larger(most, larger(root(stiffness[k]), damping[k]));
     return most;

@@ -81,15 +81,15 @@ def test_the_library_is_made_without_python(tmp_path):
     build = Build(tmp_path)
     known = (build.folder / "CMakeCache.txt").read_text().splitlines()
     assert not [line for line in known if line.startswith(("Python", "nanobind"))]
-    build.make("test_real")
-    assert "100% tests passed" in build.test("-R", "test_real$")
+    build.make("test_scalars")
+    assert "100% tests passed" in build.test("-R", "test_scalars$")
 
 
 @needs_clang
 def test_clang_gives_the_same_digits_and_no_warning(tmp_path):
     build = Build(tmp_path, f"-DCMAKE_CXX_COMPILER={CLANG}")
-    build.make("test_real", "test_real_portable")
-    assert "100% tests passed" in build.test("-R", "test_real")
+    build.make("test_scalars", "test_scalars_portable")
+    assert "100% tests passed" in build.test("-R", "test_scalars")
 
 
 @pytest.mark.slow

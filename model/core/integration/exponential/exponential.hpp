@@ -1,0 +1,327 @@
+// The method "exponential" of the time loop: Adams steps in the robot's modes
+// (predictor_corrector.hpp), which are taken again as it moves (modal_basis.hpp), with fast modes
+// damped that the tolerance does not ask for (numerical_damping.hpp).
+//
+// A step costs one pass. It begins anew, with one value and a short step, where what acts may jump.
+#pragma once
+#include "integration/exponential/energy_integrals.hpp"
+#include "integration/exponential/matrices_by_passes.hpp"
+#include "integration/exponential/numerical_damping.hpp"
+#include "integration/method.hpp"
+
+namespace flexura {
+
+struct ExponentialOptions {
+  bool damping = true;  // of fast modes
+  double zeta = 0.05;   // its ratio
+  double cutoff = 0.0;  // [rad/s]; 0: from the tolerance
+};
+
+template <class Real>
+class Exponential : public Method<Real> {
+ public:
+  static constexpr int LANES = LanesOf<Real>::value;
+  static constexpr double GROWTH =
+      1.6;  // the least that a step may grow by: each new length costs new tables
+  static constexpr double SAFETY = 0.85;
+  static constexpr double TIGHT = 10.0;  // the local error is kept so far below the tolerance: few
+                                         // long steps add up what many short ones average out
+  using Options = ExponentialOptions;
+
+  Exponential(Integration<Real> &shared, double tolerance, const Options &wanted = Options())
+      : Method<Real>(shared),
+        c(shared),
+        rtol(tolerance),
+        options(wanted),
+        n(shared.n),
+        modes(n),
+        steps(modes, extras_of(shared)),
+        within(steps),
+        accounts(steps, within, free_joints(shared)) {
+    memory.lay([this](auto take) {
+      for (Real **v : {&origin, &size[0], &size[1], &y, &v_, &forces}) take(*v, modes.stride + 4);
+      take(state, 2 * modes.stride + 8), take(slope, 2 * modes.stride + 8);
+    });
+    held.reset(new bool[static_cast<std::size_t>(n)]());
+    for (int i = 0; i < c.plant.joints; ++i) held[c.plant.first[i]] = given_motion(c, i);
+  }
+
+  const char *name() const override { return "exponential"; }
+  double cutoff(int k) const { return modes.cutoff[k]; }  // [rad/s]; infinity: nothing is damped
+  int modes_taken(int k) const { return modes.taken[k]; }
+
+  void begin(const Real &which, const Real &t) override {
+    const Real *q = c.z.data(), *v = q + n;
+    for (int k = 0; k < LANES; ++k) {
+      if (lane(which, k) < 0.5) continue;
+      if (modes.has_moved(k, c.plant, q)) take_modes(k, q, v, lane(t, k));
+      put_origin(k, q, v);
+    }
+    std::copy(c.z.begin(), c.z.begin() + 2 * n, state);
+    strain = c.plant.strain(q);
+    strain_before = choose_less(Real(0.5), which, strain, strain_before);
+    look(t, steps.eta, steps.etad);
+    const int from = steps.new_row(), to = steps.newest();
+    for (int k = 0; k < LANES; ++k) {
+      if (lane(which, k) < 0.5) continue;
+      for (int i = 0; i < modes.stride + steps.extras; ++i)
+        set_lane(steps.N[to][i], k, lane(steps.N[from][i], k));
+      steps.restart(k, lane(t, k)), set_error_weights(k, c.end - lane(t, k)), since[k] = 0;
+    }
+  }
+
+  Real attempt(const Real &t, const Real &h, const Real &last) override {
+    if (steps.tabulate(h)) within.tabulate(h);
+    steps.predict();
+    place(steps.predicted[0], steps.predicted[1], state);
+    end = smaller(t + h, last);
+    look(end, steps.predicted[0], steps.predicted[1]);
+    steps.correct();
+    place(steps.corrected[0], steps.corrected[1], c.znew.data());
+    c.acts.prescribe(c.znew.data(), c.znew.data() + n);
+    within.build(h), accounts.prepare(h);
+    Real uncertain[2];
+    account(h, Real(1.0), true, c.znew.data(), uncertain);
+    strain_after = strain;
+    Real squares[2];
+    for (int e = 0; e < 2; ++e) {
+      Real *x = e ? v_ : y;
+      for (int i = 0; i < modes.chunks; ++i)
+        put(x, i,
+            get(steps.corrector_weights[2 + e], i) * get(steps.pece_difference, i) *
+                get(size[e], i));
+      squares[e] = dot(n, x, x);
+    }
+    const Real error = root((squares[0] + squares[1]) * (1.0 / (2 * n))) * TIGHT;
+    if (!(worst(error) < 1.0)) locate_error();
+    return larger(error,
+                  larger(abs(uncertain[0]), abs(uncertain[1])) * c.weights.joules(c.znew.data()));
+  }
+
+  void accept(const Real &which) override {
+    steps.accept(which, end);
+    strain_before = choose_less(Real(0.5), which, strain_after, strain_before);
+    for (int k = 0; k < LANES; ++k) {
+      if (lane(which, k) < 0.5) continue;
+      const Real *q = c.znew.data(), *v = q + n;
+      if (++since[k] % 8 == 0 || steps.count[k] < ORDER) set_error_weights(k, c.end - lane(end, k));
+      if (!modes.has_moved(k, c.plant, q) || !take_modes(k, q, v, lane(end, k))) continue;
+      put_origin(k, q, v);
+      transform_history(k);
+      set_error_weights(k, c.end - lane(end, k));
+    }
+  }
+
+  void prepare(const Real &, const Real &, const Real &) override {}
+
+  void between(const Real &h, const Real &x, Real *out) override {
+    within.at(h, x, y, v_);
+    place(y, v_, state);
+    std::copy(state, state + 2 * n, out);
+    Real uncertain[2];
+    if (c.balanced) account(h, x, false, out, uncertain);
+  }
+
+  double restart(int k, double wish, bool first) override {
+    return first ? wish : larger(0.1 * wish, 1e-3 * wished_step[k]);
+  }
+
+  double fit(int k, double wish, double left, double) override {
+    wished_step[k] = wish;
+    const double parts = std::ceil(left / wish - 1e-6);  // as many equal steps, if they are few
+    double h = parts > 5.0 ? wish : left / parts;
+    if (abs(h - steps.length(k)) < 1e-9 * h) h = steps.length(k);
+    return parts <= 1.0 ? left : h;
+  }
+
+  double next(int k, double h, double error, double, bool accepted) override {
+    const int order = steps.count[k] + 1;
+    const bool settled = steps.count[k] < ORDER || steps.equal_steps[k] >= 2;
+    double most = 1.0;  // with a larger error a step does not grow
+    for (int i = 0; i < order; ++i) most *= SAFETY / GROWTH;
+    if (accepted && (!settled || error > most)) return wished_step[k];
+    const double factor =
+        error > 0.0 ? SAFETY * flexura::power(larger(error, 1e-30), -1.0 / order) : 2.0;
+    if (!accepted) return error < 1e300 ? h * smaller(larger(0.25, factor), 0.9) : 0.1 * h;
+    return factor * h > GROWTH * wished_step[k] ? smaller(factor * h, 2.0 * wished_step[k])
+                                                : wished_step[k];
+  }
+
+ protected:
+  double power() const override { return ORDER + 1.0; }
+
+ private:
+  Integration<Real> &c;
+  const double rtol;
+  const Options options;
+  const int n;
+  ModalBasis<Real> modes;
+  ExponentialAdams<Real> steps;
+  DenseOutput<Real> within;
+  EnergyIntegrals<Real> accounts;
+  Block<Real> memory;
+  Real *origin, *size[2], *y, *v_, *forces, *state,
+      *slope;                    // y = origin + sum eta phi; error weights of the modes; scratch
+  std::unique_ptr<bool[]> held;  // (n) rows of joints whose motion is given
+  Real end = 0.0;                // of the step being tried
+  Real strain = 0.0, strain_before = 0.0, strain_after = 0.0;  // twice the strain energy
+  double wished_step[LANES] = {};
+  long since[LANES] = {};  // steps since the start or a break
+
+  // Behind N, a row of the history keeps the accounts' numbers, then a, y and v.
+  static int extras_of(const Integration<Real> &c) {
+    int count = 0;
+    for (int i = 0; i < c.plant.joints; ++i) count += !given_motion(c, i);
+    return EnergyIntegrals<Real>::extras(count) + 3 * c.n;
+  }
+  static std::vector<typename EnergyIntegrals<Real>::Joint> free_joints(
+      const Integration<Real> &c) {
+    std::vector<typename EnergyIntegrals<Real>::Joint> out;
+    for (int i = 0; i < c.plant.joints; ++i) {
+      if (given_motion(c, i)) continue;
+      typename EnergyIntegrals<Real>::Joint j{c.plant.first[i], 0.0, 0.0, c.plant.viscous[i]};
+      for (int k = 0; k < LANES; ++k) {
+        const JointDrive &d = c.acts.acting(k).joints[i];
+        if (d.follows()) set_lane(j.kp, k, d.kp), set_lane(j.kd, k, d.kd);
+      }
+      out.push_back(j);
+    }
+    return out;
+  }
+  const Real *kept(int row) const { return steps.extra(row) + steps.extras - 3 * n; }
+
+  // q, v of a state of the modes, into z (room for 2 n + 4).
+  void place(const Real *e, const Real *ed, Real *z) const {
+    std::copy(origin, origin + n, z);
+    add_rows(n, modes.chunks, e, modes.phi, modes.stride,
+             z);  // (what stands behind the n-th number gains nothing)
+    std::fill(z + n, z + n + modes.stride, Real(0.0));
+    add_rows(n, modes.chunks, ed, modes.phi, modes.stride, z + n);
+  }
+
+  // The equations at `state`, of which e, ed are the modes' part, into the new row of the history.
+  void look(const Real &t, const Real *e, const Real *ed) {
+    c.slope(t, state, slope);
+    const int row = steps.new_row();
+    const Real *q = state, *v = state + n;
+    steps.force(slope + n, e, ed, steps.N[row]);
+    Real given = 0.0;
+    int free = 0;
+    for (int i = 0; i < c.plant.joints; ++i) {
+      const int e_ = c.plant.first[i];
+      if (!held[e_])
+        forces[free++] = c.acts.drive(i, q, v);
+      else if (!c.plant.locked[i])
+        given += c.acts.drive(i, q, v) * v[e_];
+    }
+    accounts.record(steps.extra(row), forces, q, v, ed, slope[2 * n + LOSS], given);
+    Real *keep = steps.extra(row) + steps.extras - 3 * n;
+    std::copy(slope + n, slope + 2 * n, keep);
+    std::copy(state, state + 2 * n, keep + n);
+  }
+
+  // The accounts of the state at the fraction x of the step, q its place.
+  void account(const Real &h, const Real &x, bool whole, Real *z, Real *uncertain) {
+    const auto sums = accounts.over(h, x, whole, c.z.data(), z);
+    const Real *before = c.z.data() + 2 * n;
+    Real *now = z + 2 * n;
+    strain = c.plant.strain(z);
+    now[WORK] = before[WORK] + sums.work, now[LOSS] = before[LOSS] + sums.loss;
+    now[NUMERICAL] = before[NUMERICAL] + sums.numerical;
+    now[STRAIN] = before[STRAIN] + (strain - strain_before);
+    uncertain[0] = sums.work_error, uncertain[1] = sums.loss_error;
+  }
+
+  // The error of the last attempt by unknowns, to say where it was worst.
+  void locate_error() {
+    for (int e = 0; e < 2; ++e) {
+      Real *out = e ? v_ : y;
+      for (int i = 0; i < modes.chunks; ++i)
+        put(state, i, get(steps.corrector_weights[2 + e], i) * get(steps.pece_difference, i));
+      std::fill(out, out + modes.stride, Real(0.0));
+      add_rows(n, modes.chunks, state, modes.phi, modes.stride, out);
+      std::copy(out, out + n, c.error.begin() + e * n);
+    }
+  }
+
+  // Error weights of robot k's modes from those of its unknowns. An error of a rate moves the tips
+  // until the end of the run at `left`, or for a part of a period.
+  void set_error_weights(int k, double left) {
+    const auto &w = c.weights.weight;
+    for (int mode = 0; mode < n; ++mode) {
+      double sum[2] = {0.0, 0.0};
+      for (int e = 0; e < 2; ++e) {
+        for (int i = 0; i < n; ++i) {
+          const double x = lane(modes.phi[mode * modes.stride + i], k) * lane(w[e * n + i], k);
+          sum[e] += x * x;
+        }
+        sum[e] = root(sum[e]);
+      }
+      const double rate = root(lane(modes.w2[mode], k)),
+                   lasting = rate * left > 1.0 ? 1.0 / rate : left;
+      set_lane(size[0][mode], k, sum[0]),
+          set_lane(size[1][mode], k, larger(sum[1], lasting * sum[0]));
+    }
+  }
+
+  // Robot k's state becomes the origin.
+  void put_origin(int k, const Real *q, const Real *v) {
+    for (int i = 0; i < n; ++i) set_lane(origin[i], k, lane(q[i], k));
+    for (int mode = 0; mode < n; ++mode) {
+      double sum = 0.0;
+      for (int i = 0; i < n; ++i)
+        sum += lane(v[i], k) * lane(modes.rows[i * modes.stride + mode], k);
+      set_lane(steps.eta[mode], k, 0.0), set_lane(steps.etad[mode], k, sum);
+    }
+  }
+
+  // Robot k's last values of N, in its new modes.
+  void transform_history(int k) {
+    for (int age = 0; age < steps.count[k]; ++age) {
+      const int row = steps.row(age);
+      const Real *a = kept(row), *q = a + n, *v = q + n;
+      for (int mode = 0; mode < n; ++mode) {
+        double e = 0.0, ed = 0.0, force = 0.0;
+        for (int i = 0; i < n; ++i) {
+          const double x = lane(modes.rows[i * modes.stride + mode], k);
+          e += lane(q[i] - origin[i], k) * x, ed += lane(v[i], k) * x, force += lane(a[i], k) * x;
+        }
+        set_lane(steps.N[row][mode], k,
+                 force + lane(modes.w2[mode], k) * e + lane(modes.own[mode], k) * ed);
+      }
+    }
+    steps.forget_tables(k);
+  }
+
+  // Takes robot k's modes at q if they are poor there; true if so. The cutoff is found once, at the
+  // start.
+  bool take_modes(int k, const Real *q, const Real *v, double t) {
+    Matrices m(n);
+    if (!c.plant.matrices(k, q, m.M.data(), m.K.data(), m.D.data()))
+      matrices_by_passes(c.plant, k, q, m), c.passes += n + 1;
+    for (int i = 0; i < c.plant.joints; ++i) {
+      const JointDrive &d = c.acts.acting(k).joints[i];
+      const int e = c.plant.first[i];
+      if (held[e]) continue;
+      m.joint_damping[e] = lane(c.plant.viscous[i], k) + (d.follows() ? d.kd : 0.0);
+      m.joint_stiffness[e] = d.follows() ? d.kp : 0.0;
+    }
+    const bool first = modes.taken[k] == 0;
+    if (!modes.take(k, m, q, held.get(), wished_step[k] > 0.0 ? 1.0 / wished_step[k] : 1.0,
+                    options.zeta))
+      return false;
+    if (first && options.damping) {
+      modes.cutoff[k] = options.cutoff > 0.0
+                            ? options.cutoff
+                            : find_cutoff(c, modes, held.get(), rtol, k, m, q, v, t);
+      modes.damp(k, options.zeta);
+    }
+    accounts.take_rows();
+    return true;
+  }
+};
+
+extern template class Exponential<double>;
+extern template class Exponential<Pack<4>>;
+
+}  // namespace flexura

@@ -1,0 +1,90 @@
+#include "link/link_pieces.hpp"
+
+#include "robot/input_fault.hpp"
+
+namespace flexura {
+namespace {
+
+// A link that does not bend: one point, the line a straight rod.
+PieceDraft rigid(double length, double mass, double centre, double about_centre) {
+  PieceDraft out;
+  out.m = 0, out.P = 1, out.length = length;
+  out.mass = mass, out.moment = {mass * centre}, out.W = {about_centre + mass * centre * centre},
+  out.w = {length};
+  out.rail = 2, out.railing = 2.0,
+  out.rails = {0.5, 0.5};  // w(x) = x = (P_0 + P_1)/2 at u = 2 x - 1
+  return out;
+}
+
+// An element of a mesh (6): the first shape x less as much of the bubble 6 x (1 - x) as makes K
+// diagonal.
+PieceDraft element(const Link &link, double from, double to) {
+  PieceDraft out;
+  out.m = 2, out.P = 3, out.beta = link.beta;
+  const double h = to - from;
+  double K11 = link.material[0].stiffness[0] / h, K12 = 0.0, K22 = 12.0 * K11;
+  if (!uniform(link.material)) {
+    K11 = K22 = 0.0;
+    integrate(link.material, from, to, 5, [&](double s, double weight, double, double stiffness) {
+      const double x = (s - from) / h, bubble = 6.0 * (1.0 - 2.0 * x),
+                   part = weight * stiffness / (h * h);
+      K11 += part, K12 += part * bubble, K22 += part * bubble * bubble;
+    });
+  }
+  const double mix = K12 / K22;
+  out.B.resize(6);
+  for (std::size_t p = 0; p < 3; ++p) {
+    const double x = 0.5 * (1.0 + line_rule(3).u[p]), bubble = 6.0 * x * (1.0 - x);
+    out.B[p] = x - mix * bubble, out.B[3 + p] = bubble;
+  }
+  out.K = {K11 - mix * K12, K22}, out.tip_angle = {1.0, 0.0};
+  inertia(out, link.material, from, to);
+  return out;
+}
+
+}  // namespace
+
+LinkDraft begin_link(const Link &link, int index, const Attachments &attached) {
+  const Joint &joint = link.joint;
+  const bool sleeve = joint.kind == JointKind::sleeve, flexible = link.elements > 0;
+  if (flexible && (link.material.empty() || !(link.length > 0.0)))
+    throw Fault(index, "length_m",
+                "expected a length above 0 and a material for a link that bends");
+  if (flexible && link.modes > MOST_WHOLE - 2) throw Fault(index, "modes", "expected at most 14");
+  LinkDraft out;
+  if (sleeve)
+    out.pieces.push_back(rigid(0.0, 0.0, 0.0, 0.0));  // the sleeve itself, fixed to the link before
+  out.has_whole = flexible && (sleeve || link.modes >= 0 || attached.slider);
+  if (!flexible) {
+    out.pieces.push_back(rigid(link.length, link.mass, link.centre, link.inertia));
+    add_payload(out.pieces.back(), attached);
+    if (sleeve) out.pieces.back().offset = -link.length;
+  } else if (out.has_whole) {
+    out.whole = sleeve ? begin_sleeved(link, attached) : begin_single_piece(link, attached);
+    out.pieces.emplace_back();
+  } else {
+    for (int e = 0; e < link.elements; ++e)
+      out.pieces.push_back(
+          element(link, link.length * e / link.elements,
+                  e + 1 == link.elements ? link.length : link.length * (e + 1) / link.elements));
+    add_payload(out.pieces.back(), attached);
+  }
+  auto piece = [&](std::size_t k) -> PieceDraft & {
+    return out.has_whole && k + 1 == out.pieces.size() ? out.whole.piece : out.pieces[k];
+  };
+  PieceDraft &base = piece(0), &moving = piece(sleeve ? 1 : 0);
+  base.angle = joint.kind == JointKind::revolute ? 0.0 : joint.angle;
+  base.mass += joint.hub_mass, base.hub += joint.hub_inertia;
+  moving.joint = joint.kind == JointKind::revolute ? HubJoint::revolute
+                 : sleeve && flexible              ? HubJoint::sleeve
+                                                   : HubJoint::slider;
+  moving.rotor = joint.rotor;
+  for (std::size_t k = 0; k < out.pieces.size(); ++k) piece(k).link = index;
+  return out;
+}
+
+void finish_link(LinkDraft &draft, const Link &link, const ClampedModes<double> &modes) {
+  if (draft.has_whole) draft.pieces.back() = finish_single_piece(draft.whole, link, modes);
+}
+
+}  // namespace flexura

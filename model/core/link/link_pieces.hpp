@@ -1,0 +1,21 @@
+// One link as pieces: points, shapes, and the constants of (3), (4) and (5).
+#pragma once
+#include "link/single_piece_link.hpp"
+
+namespace flexura {
+
+// A link in the making: its pieces from its joint to its tip. If `has_whole`, the last of them is
+// still `whole`, whose modes are to be found: of one robot, or of four at once.
+struct LinkDraft {
+  std::vector<PieceDraft> pieces;
+  bool has_whole = false;
+  SinglePieceLink whole;
+};
+
+// The pieces of link `index` (from 0), all but the modes. Throws Fault.
+LinkDraft begin_link(const Link &link, int index, const Attachments &attached);
+
+// Changes the last piece's shapes for its modes, if it has any.
+void finish_link(LinkDraft &draft, const Link &link, const ClampedModes<double> &modes);
+
+}  // namespace flexura

@@ -1,0 +1,216 @@
+// Populations: a robot's digits are its own, whatever threads, packs, order and neighbours; robots
+// end alone.
+#include "simulation/population.hpp"
+
+#include "check.hpp"
+#include "dynamics/outputs.hpp"
+#include "link/assembly.hpp"
+#include "robot/input_fault.hpp"
+#include "simulation/simulation.hpp"
+
+using namespace flexura;
+
+namespace {
+
+constexpr double FREE = std::numeric_limits<double>::infinity();
+
+// Rows of robots: a carriage on a rail, and a flexible link that turns on it.
+struct Many {
+  std::vector<std::int64_t> counts;
+  std::vector<double> numbers, material, gravity, payload, limits;
+  int robots;
+
+  Many(int count, int modes, int elements = 4) : robots(count) {
+    check::Random random;
+    counts = {1, 0, 0, -1, 0, 0, 0, elements, modes, 1};
+    for (int k = 0; k < count; ++k) {
+      const double length = random(0.2, 0.4);
+      numbers.insert(numbers.end(), {0.1, 0.6, 0.05, 5e-4, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.1,
+                                     0.0, -FREE, FREE});
+      numbers.insert(numbers.end(), {length, 0.0, 0.0, 0.0, 0.0, 1e-4, 0.0, 0.0, 0.0, 1e-3, 0.0,
+                                     0.0, 0.0, -FREE, FREE});
+      material.insert(material.end(), {0.0, length, random(0.1, 0.3), 0.0, 0.0, random(0.2, 3.0),
+                                       0.0, 0.0, 0.0, 0.0});
+      gravity.insert(gravity.end(), {0.0, -9.81}),
+          payload.insert(payload.end(), {random(0.0, 0.05), 0.0});
+      limits.insert(limits.end(), {-FREE, FREE, -FREE, FREE});
+    }
+  }
+  double &number(int robot, int link, int column) {
+    return numbers[std::size_t((robot * 2 + link) * NUMBERS + column)];
+  }
+
+  // The robots of these numbers, in this order.
+  Many of(const std::vector<int> &which) const {
+    Many out = *this;
+    out.robots = int(which.size());
+    auto take = [&](std::vector<double> &to, const std::vector<double> &from, int width) {
+      to.clear();
+      for (int k : which)
+        to.insert(to.end(), from.begin() + k * width, from.begin() + (k + 1) * width);
+    };
+    take(out.numbers, numbers, 2 * NUMBERS), take(out.material, material, MATERIAL),
+        take(out.gravity, gravity, 2);
+    take(out.payload, payload, 2), take(out.limits, limits, 4);
+    return out;
+  }
+
+  Population population(const std::string &method, double rtol) const {
+    Population out;
+    out.robots = {
+        robots,        2, 1, counts.data(), numbers.data(), material.data(), gravity.data(),
+        payload.data()};
+    out.limits = limits.data(), out.method = method, out.rtol = rtol;
+    Inputs acting(2);
+    acting.joints[0].force = {Segment{0.0, {1.0, 0, 0, 0, 0, 0}, 0, 0, 0},
+                              Segment{0.1, {-1.0, 0, 0, 0, 0, 0}, 0, 0, 0}};
+    acting.joints[1].force = {Segment{0.0, {0, 0, 0, 0, 0, 0}, 0.05, 9.0, 0}};
+    out.drives = {acting}, out.drive_of.assign(std::size_t(robots), 0);
+    for (int k = 0; k <= 10; ++k) out.times.push_back(0.02 * k);
+    out.channels = {{Channel::position, 0},
+                    {Channel::velocity, 1},
+                    {Channel::drive, 0},
+                    {Channel::account, WORK}};
+    for (int column = 0; column < 3 + 3 + 2 + 3 + 5; ++column)
+      out.channels.push_back({Channel::seen, column});
+    out.stations = 3;
+    return out;
+  }
+};
+
+struct Results {
+  std::vector<double> values;
+  std::vector<Ending> endings;
+  std::size_t channels, robots, times;
+  double at(std::size_t channel, int robot, std::size_t row) const {
+    return values[(channel * robots + std::size_t(robot)) * times + row];
+  }
+};
+
+Results results(const Population &population, int threads) {
+  Results out{{},
+              {},
+              population.channels.size(),
+              std::size_t(population.robots.count),
+              population.times.size()};
+  out.values.resize(out.channels * out.robots * out.times);
+  const std::atomic<bool> stop{false};
+  std::atomic<long> done{0};
+  out.endings = run(population, threads, out.values.data(), stop, done);
+  CHECK(done == population.robots.count);
+  return out;
+}
+
+bool same(const Results &a, int i, const Results &b, int j) {
+  const Ending &x = a.endings[std::size_t(i)], &y = b.endings[std::size_t(j)];
+  bool out = x.status == y.status && x.refusal == y.refusal && x.steps == y.steps &&
+             x.reached == y.reached && x.joint == y.joint && x.text == y.text;
+  for (std::size_t c = 0; c < a.channels; ++c)
+    for (std::size_t row = 0; row < a.times; ++row) {
+      const double p = a.at(c, i, row), q = b.at(c, j, row);
+      out = out && ((std::isnan(p) && std::isnan(q)) || check::same_bits(p, q));
+    }
+  return out;
+}
+
+}  // namespace
+
+TEST("threads, order and neighbours change no bit") {
+  for (const char *method : {"explicit", "implicit", "exponential", "auto"})
+    for (int modes : {2, -1}) {
+      const Many many(10, modes, modes < 0 ? 2 : 4);
+      const Results whole = results(many.population(method, 1e-4), 1),
+                    threads = results(many.population(method, 1e-4), 3);
+      for (int k = 0; k < 10; ++k)
+        CHECK(whole.endings[std::size_t(k)].status == Status::done && same(whole, k, threads, k));
+      const std::vector<int> order{7, 2, 9, 0, 5};
+      const Results some = results(many.of(order).population(method, 1e-4), 2);
+      for (int k = 0; k < 5; ++k) CHECK(same(whole, order[std::size_t(k)], some, k));
+    }
+}
+
+TEST("a robot of a population is the robot of a single run") {
+  const Many many(3, 2);
+  for (const char *method : {"explicit", "implicit", "exponential", "auto"}) {
+    const Population population = many.population(method, 1e-5);
+    const Results all = results(population, 1);
+    for (int k = 0; k < 3; ++k) {
+      auto model = std::make_shared<const Model<double>>(assemble(robot_of(population.robots, k)));
+      Request request;
+      request.times = population.times, request.q.assign(std::size_t(model->n), 0.0),
+      request.v = request.q;
+      request.rtol = population.rtol, request.method = method;
+      Simulation single(model, population.drives[0], request);
+      while (single.advance(100)) {
+      }
+      const Record &record = single.record();
+      Observer<double> observer(*model, 3);
+      std::vector<double> row(std::size_t(observer.columns()));
+      CHECK(single.run_state().steps == all.endings[std::size_t(k)].steps);
+      for (int r = 0; r < record.rows; ++r) {
+        const double *z = record.state.data() + r * record.size;
+        CHECK(check::same_bits(z[0], all.at(0, k, std::size_t(r))));
+        CHECK(check::same_bits(z[model->n + 1], all.at(1, k, std::size_t(r))));
+        observer.observe(z, z + model->n, row.data());
+        for (std::size_t c = 0; c < row.size(); ++c)
+          CHECK(check::same_bits(row[c], all.at(4 + c, k, std::size_t(r))));
+      }
+    }
+  }
+}
+
+TEST(
+    "robots that are refused, limited or stuck end alone; another kind of equations gets a pack of "
+    "its own") {
+  const Many good(6, 2);
+  Many many = good;
+  many.limits[4 * 1] = -1e-4, many.limits[4 * 1 + 1] = 1e-4;  // robot 1 meets a limit
+  many.number(2, 0, 1) = many.number(2, 0, 3) = 0.0,
+                    many.material[2 * MATERIAL + 2] = many.payload[4] = 0.0;  // moves nothing
+  many.number(3, 0, 13) = 0.1, many.number(3, 0, 14) = 0.2;                   // starts outside
+  many.material[4 * MATERIAL + 6] = -0.1 * many.material[4 * MATERIAL + 5];  // tapered: more shapes
+  const Results whole = results(good.population("implicit", 1e-4), 1),
+                out = results(many.population("implicit", 1e-4), 2);
+  CHECK(same(whole, 0, out, 0) && same(whole, 5, out, 5));
+  CHECK(out.endings[1].status == Status::limit && out.endings[1].joint == 0 &&
+        out.endings[1].reached < 0.2);
+  CHECK_NEAR(std::fabs(out.endings[1].position[0]), 1e-4, 1e-8);
+  CHECK(std::isnan(out.at(0, 1, 10)) && check::same_bits(out.at(0, 1, 0), whole.at(0, 1, 0)));
+  CHECK(out.endings[2].refusal == Ending::fault && out.endings[2].key == "joint" &&
+        std::isnan(out.at(0, 2, 0)));
+  CHECK(out.endings[3].refusal == Ending::start && out.endings[3].joint == 0);
+  CHECK(out.endings[4].status == Status::done);
+  const Results tapered = results(many.of({4}).population("implicit", 1e-4), 1);
+  CHECK(same(tapered, 0, out, 4));
+}
+
+TEST("a population that is stopped leaves the rest") {
+  const Many many(8, 2);
+  const Population population = many.population("implicit", 1e-4);
+  std::vector<double> values(population.channels.size() * 8 * population.times.size());
+  const std::atomic<bool> stop{true};
+  std::atomic<long> done{0};
+  const auto endings = run(population, 2, values.data(), stop, done);
+  CHECK(done == 0 && endings[0].status == Status::running);
+}
+
+TEST("robots that are assembled together have the numbers of each alone") {
+  for (int modes : {1, 3, -1}) {
+    const Many many(4, modes);
+    const Population population = many.population("implicit", 1e-4);
+    std::vector<Robot> robots;
+    const Robot *pointers[4];
+    Model<double> models[4];
+    std::unique_ptr<Fault> faults[4];
+    for (int k = 0; k < 4; ++k) robots.push_back(robot_of(population.robots, k));
+    robots[2].links.push_back(
+        robots[2].links[1]);  // all have a follower, so that static shapes are among the modes
+    for (int k : {0, 1, 3}) robots[std::size_t(k)].links.push_back(robots[2].links[2]);
+    for (int k = 0; k < 4; ++k) pointers[k] = &robots[std::size_t(k)];
+    assemble(pointers, 4, models, faults);
+    for (int k = 0; k < 4; ++k) {
+      const Model<double> alone = assemble(robots[std::size_t(k)]);
+      CHECK(!faults[k] && alone.numbers == models[k].numbers && alone.n == models[k].n);
+    }
+  }
+}
