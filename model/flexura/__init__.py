@@ -20,7 +20,18 @@ from .population import Batch, Population
 from .robot import Robot, load, save
 from .signals import Drive, JointDrive, Manoeuvre, Signal, load_manoeuvre
 from .simulation import inverse
-from .system import Modes, NoEquilibrium, StateSpace, System, assemble, frequencies, linearize, modes, static, tip_pose
+from .system import (
+    Modes,
+    NoEquilibrium,
+    StateSpace,
+    System,
+    assemble,
+    frequencies,
+    linearize,
+    modes,
+    static,
+    tip_pose,
+)
 
 __version__ = "0.1.0"
 __all__ = [

@@ -73,4 +73,8 @@ def simulate(
                 "expected a Drive: a population runs in the core alone", key="drive", value=drive
             )
         return simulate_population(robot, t_eval, drive, q0, qd0, rtol, **options)
+    known = ("method", "numerical_damping", "progress")
+    for key in options:
+        if key not in known:
+            raise InputError("expected this of a Batch only, not of one robot", key=key)
     return simulate_robot(robot, t_eval, drive, q0, qd0, rtol, **options)

@@ -10,8 +10,8 @@ from rich.console import Console
 import flexura as fx
 from flexlab.benchmarks import accuracy, choose, measure, native, report, search, timing
 from flexlab.benchmarks.exudyn_programs import run as exudyn_run
-from flexlab.benchmarks.problems import still
 from flexlab.benchmarks.exudyn_programs.actions import sampled
+from flexlab.benchmarks.problems import still
 from flexlab.benchmarks.problems.motions import all_motions
 from flexlab.benchmarks.problems.problem import error, scale
 from flexlab.benchmarks.problems.signals import piecewise

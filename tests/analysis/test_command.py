@@ -12,9 +12,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import flexura as fx
-from flexlab.cli.app import app
+from flexlab.cli.app import COMMANDS, app
 
 ROOT = Path(__file__).resolve().parents[2]
 RIG = ROOT / "model" / "robots" / "rig.toml"
@@ -23,12 +24,8 @@ ENVIRONMENT = os.environ | {
     "PYTHONPATH": os.pathsep.join(map(str, (ROOT / "model", ROOT / "analysis"))),
     "COLUMNS": "120",
 }
-COMMANDS = {
-    info.name or info.callback.__name__: info.callback
-    for info in app.registered_commands
-    if info.callback
-}
-HEAVY = ("numba", "exudyn", "rerun", "pyarrow", "scipy", "pydantic", "matplotlib", "numpy")
+HELP = {name: CliRunner().invoke(app, [name, "--help"]) for name in COMMANDS}
+HEAVY = ("exudyn", "rerun", "pyarrow", "matplotlib", "pymoo", "distributed")
 
 
 def flexura(*arguments, cwd):
@@ -74,18 +71,15 @@ def test_help_imports_nothing_heavy(tmp_path):
         "import sys; sys.argv = ['flexura', *sys.argv[1:]]; import atexit\n"
         f"atexit.register(lambda: print('imported:', *[m for m in {HEAVY} if m in sys.modules], "
         f"file=sys.stderr))\n"
-        "from flexlab.cli import main; main()"
+        "from flexlab.cli.app import main; main()"
     )
-    for arguments, own in (
-        (["--help"], ""),
-        (["simulate", "--help"], "pydantic"),
-    ):  # typer checks a command's types with pydantic
+    for arguments in (["--help"], *([name, "--help"] for name in COMMANDS)):
         command = [sys.executable, "-c", code, *arguments]
         done = subprocess.run(
             command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, timeout=60
         )
         assert done.returncode == 0 and "Usage:" in done.stdout
-        assert done.stderr.strip() in ("imported:", f"imported: {own}")
+        assert done.stderr.strip() == "imported:", arguments
 
 
 def test_help_names_every_command(tmp_path):
@@ -97,13 +91,11 @@ def test_help_names_every_command(tmp_path):
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_the_help_of_a_command_shows_an_example_of_files_that_exist(name):
-    from typer.testing import CliRunner
-
-    shown = CliRunner().invoke(app, [name, "--help"])
-    (example,) = re.findall(r"^\s*Example: (flexura .*)$", COMMANDS[name].__doc__, re.MULTILINE)
-    assert shown.exit_code == 0 and "".join(f"Example: {example}".split()) in "".join(
-        shown.output.split()
-    )
+    shown = HELP[name]
+    assert shown.exit_code == 0
+    if name == "bench":  # its own commands have the examples
+        return
+    example = re.search(r"Example: (flexura (?:.+\n?)+)", shown.output)[1]
     words = example.split()
     assert words[1] == name
     assert all((ROOT / word).is_file() for word in words if word.endswith(".toml"))
@@ -177,7 +169,7 @@ def test_wrong_input_is_one_line_on_stderr_with_status_2_and_leaves_nothing(
 ):
     (tmp_path / "bad.toml").write_text(BAD_ROBOT)
     (tmp_path / "law.toml").write_text(BAD_LAW)
-    (tmp_path / "free.toml").write_text(CYCLOIDS[: CYCLOIDS.rindex("motion =")])
+    (tmp_path / "free.toml").write_text(CYCLOIDS[: CYCLOIDS.index("motion.kind")])
     (tmp_path / "jump.toml").write_text(
         CYCLOIDS.replace(
             '"cycloid", end = 0.05, duration_s = 0.8', '"step", value = 1.0, at_s = 0.5'

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import flexura as fx
+from flexlab.cli.compare import save
 from flexlab.comparison import report, table
 from flexlab.comparison.measures import COVERED, PUBLISHED, compare, delay, ordered, response_time
 from flexlab.comparison.replay import lead_screw, stepper_relaxation
@@ -486,7 +487,7 @@ def test_all_tables_have_the_same_cells(compared, page):
 
 
 def test_the_folder_has_it_all(compared, tmp_path):
-    paths = table.save(compared, tmp_path, simulated=True)
+    paths = save(compared, tmp_path, simulated=True)
     assert {p.name for p in paths} == {
         "run.parquet",
         "comparison.json",

@@ -22,7 +22,7 @@ from flexlab.identification.identify import described, identify
 from flexlab.rig.plant.motor import line
 from rigs import excited, ran
 
-FOLDER = Path(excitation.__file__).parent
+FOLDER = Path(files.__file__).parent
 
 
 def ringing(random: np.random.Generator, kept: float, count: int = 2000) -> np.ndarray:

@@ -487,9 +487,7 @@ def test_without_vulkan_the_packages_are_named(rrd, tmp_path, monkeypatch):
 
 def test_rerun_is_imported_only_when_used():
     heavy = "{'rerun', 'rerun_cli', 'rerun_bindings', 'pyarrow'}"
-    code = (
-        f"import sys, flexlab.review, flexlab.deviation; sys.exit(bool({heavy} & set(sys.modules)))"
-    )
+    code = f"import sys, flexlab.review, flexlab.runs.deviation; sys.exit(bool({heavy} & set(sys.modules)))"
     assert (
         subprocess.run(
             [sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
@@ -500,7 +498,7 @@ def test_rerun_is_imported_only_when_used():
 
 def test_no_rerun_name_in_use_is_deprecated(tmp_path):
     code = (
-        "import sys; from flexura.run import Run; from flexlab.review import write_gallery, "
+        "import sys; from flexura.io import Run; from flexlab.review import write_gallery, "
         "write_review; import numpy as np\n"
         "import rerun.experimental, rerun.chunk, flexlab.review.headless\n"
         "meta = {'source': 'simulation', 'phases': [{'t': 0.0, 'name': 'move'}], 'events': [{'t': "

@@ -106,7 +106,7 @@ def test_an_lqrs_figures_are_those_of_its_run_within_the_cases_drive_limits(monk
     def none(*_, **__):
         raise fx.InputError("expected others", key="effort")
 
-    monkeypatch.setattr("flexura.control.lqr_design.lqr", none)
+    monkeypatch.setattr("flexlab.tuning.lqr_reference.lqr", none)
     assert designs.score(*designs(points, np.full(2, np.inf)))[:, 0] == pytest.approx(
         [2 * FAILED] * 2
     )

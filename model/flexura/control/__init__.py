@@ -1,12 +1,41 @@
 """What acts in the joints beyond a plain drive: sampled controllers, their gains and figures,
 functions of the caller's."""
 
-from .controller import DEFLECTION, DERIVATIVE, GAINS, LIMIT, PID, SETPOINT, SLEW, Controller, Force, Linear, Motor, Output, Stepper, smoothing
+from .controller import (
+    DEFLECTION,
+    DERIVATIVE,
+    GAINS,
+    LIMIT,
+    PID,
+    SETPOINT,
+    SLEW,
+    Controller,
+    Force,
+    Linear,
+    Motor,
+    Output,
+    Stepper,
+    smoothing,
+)
 from .gains import BOARD, NAMES, Gains
 from .gains import load as load_gains
 from .lqr_design import Design, lqr
 from .sampled import DriveFunction, Sampled
-from .step_response import EFFORT, ERROR, ITAE, JOINT, OVERSHOOT, RESIDUAL, RMS, SETTLING, STRIP, VIBRATION, Response, of_run, strip_figures
+from .step_response import (
+    EFFORT,
+    ERROR,
+    ITAE,
+    JOINT,
+    OVERSHOOT,
+    RESIDUAL,
+    RMS,
+    SETTLING,
+    STRIP,
+    VIBRATION,
+    Response,
+    of_run,
+    strip_figures,
+)
 
 __all__ = [
     "BOARD",

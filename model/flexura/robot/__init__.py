@@ -1,6 +1,17 @@
 """The robot file: a frozen, validated description of a robot in SI units."""
 
-from .link import LEAST_FREE, MAX_ELEMENTS, MOST_MODES, Damping, Joint, Link, Section, SectionAt, Table, ValueAt
+from .link import (
+    LEAST_FREE,
+    MAX_ELEMENTS,
+    MOST_MODES,
+    Damping,
+    Joint,
+    Link,
+    Section,
+    SectionAt,
+    Table,
+    ValueAt,
+)
 from .robot import MAX_LINKS, Payload, Robot, load, save
 
 __all__ = [

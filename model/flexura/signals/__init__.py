@@ -6,7 +6,20 @@ from .drive import Drive, JointDrive
 from .manoeuvre import Manoeuvre, load_manoeuvre
 from .parsing import finite, from_spec
 from .shaping import matched_cycloid, zv, zvd
-from .signal import COLUMNS, Signal, bang_bang, constant, cycloid, evaluate, harmonic, piecewise, polynomial, step, table, trapezoidal
+from .signal import (
+    COLUMNS,
+    Signal,
+    bang_bang,
+    constant,
+    cycloid,
+    evaluate,
+    harmonic,
+    piecewise,
+    polynomial,
+    step,
+    table,
+    trapezoidal,
+)
 
 __all__ = [
     "COLUMNS",
