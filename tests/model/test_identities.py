@@ -133,7 +133,7 @@ def test_bias_forces_follow_from_the_mass_matrix(bot, seed):
         @ qd
         / (12 * h)
     )
-    slope = gradient(lambda z: qd @ sys.mass(z) @ qd / 2, q, steps(sys, 2e-3))
+    slope = gradient(lambda z: qd @ sys.mass(z) @ qd / 2, q, steps(sys, 5e-4))
     close(
         (sys.bias(q, qd) - sys.bias(q, 0 * q)) / turning(sys),
         (rate - slope) / turning(sys),
@@ -417,7 +417,7 @@ def stiff(bot: fx.Robot) -> fx.Robot:
 @few
 @given(robots(max_links=4, locked=True, stiffening=True), seeds)
 def test_a_very_stiff_robot_moves_like_a_rigid_one(bot, seed):
-    """EI x 1e6, implicit, against links without elements."""
+    """EI x 1e6, implicit, against links without elements, until one of them reaches a limit."""
     hard, solid = fx.assemble(stiffer(bot, 1e6)), fx.assemble(stiff(bot))
     t = np.linspace(0, 0.5, 11)
     q, qd = hard.start(), np.zeros(hard.n)
@@ -425,9 +425,11 @@ def test_a_very_stiff_robot_moves_like_a_rigid_one(bot, seed):
     qd[hard.joint_rows] = rates
     a = fx.simulate(hard, t, drives(hard, seed), q, qd, rtol=1e-6, method="implicit")
     b = fx.simulate(solid, t, drives(solid, seed), qd0=rates, rtol=1e-9)
+    rows = min(np.count_nonzero(np.isin(run.t, t)) for run in (a, b))
+    assert rows > 1
     for i in range(1, len(bot.links) + 1):
-        size = max(np.abs(b[f"joint/{i}/position"]).max(), 0.1)
-        assert np.abs(a[f"joint/{i}/position"] - b[f"joint/{i}/position"]).max() < 1e-4 * size
+        ours, theirs = (run[f"joint/{i}/position"][:rows] for run in (a, b))
+        assert np.abs(ours - theirs).max() < 1e-4 * max(np.abs(theirs).max(), 0.1)
 
 
 @few
