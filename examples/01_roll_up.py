@@ -1,6 +1,6 @@
 """An end moment rolls a link up into a circle.
 
-Equations (1) and (2): the tangent's angle is linear in the unknowns, the place is its integral. A
+Equations (2) and (3): the tangent's angle is linear in the unknowns, the place is its integral. A
 moment M at the tip gives the constant curvature M / EI, whatever its size. The tip lies at
 
     x = r sin(L / r),    y = r (1 - cos(L / r)),    r = EI / M.

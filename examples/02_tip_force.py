@@ -1,6 +1,6 @@
 """A cantilever under a dead tip force takes the shape of the elastica.
 
-Equation (25): static equilibrium under a force P that keeps its direction, across the straight
+Equation (50): static equilibrium under a force P that keeps its direction, across the straight
 link. The tip's slope a follows from elliptic integrals of the modulus k:
 
     p = L sqrt(P / EI) = K(k) - F(f, k),    k^2 = (1 + sin a) / 2,    sin f = 1 / (k sqrt 2),

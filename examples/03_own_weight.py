@@ -1,6 +1,6 @@
 """A level link sags under its own weight.
 
-Equation (16): gravity's generalised forces. With the mass per length m, a light link has the tip
+Equation (42): gravity's generalised forces. With the mass per length m, a light link has the tip
 
     y = -m g L^4 / (8 EI),    slope = -m g L^3 / (6 EI).
 

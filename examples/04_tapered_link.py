@@ -1,6 +1,6 @@
 """A tapered link bends under a tip force.
 
-Equations (5) and (6): the strain energy of an element whose stiffness changes along it. The
+Equations (9) and (11): the strain energy of an element whose stiffness changes along it. The
 height falls linearly from h0 to h1 and the width b is constant, so that EI = E b h^3 / 12. Under a
 small tip force P the tip has the deflection w and the slope a,
 

@@ -1,6 +1,6 @@
 """A column buckles under its payload, and under its own weight.
 
-Equation (26): the second variation of the potential; its geometric stiffness is the axial force.
+Equation (51): the second variation of the potential; its geometric stiffness is the axial force.
 An upright clamped column loses its stability at these weights:
 
     payload:      W = pi^2 EI / (4 L^2),

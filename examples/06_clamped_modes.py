@@ -1,11 +1,11 @@
 """Natural frequencies and modes of a cantilever with a mass at its tip.
 
-Equation (28) gives the frequencies. With the mass per length m and r = payload / (m L) they are
+Equation (54) gives the frequencies. With the mass per length m and r = payload / (m L) they are
 
     w = b^2 sqrt(EI / m) / L^2,
     1 + cos b cosh b + r b (cos b sinh b - sin b cosh b) = 0.
 
-Equation (10) scales the modes to unit mass. Without a payload the tip then moves by 2 / sqrt(m L)
+Equation (18) scales the modes to unit mass. Without a payload the tip then moves by 2 / sqrt(m L)
 in every mode.
 """
 

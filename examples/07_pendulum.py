@@ -1,6 +1,6 @@
 """A rigid pendulum swings through large angles.
 
-Equation (29), the balance of energy: potential energy becomes kinetic energy and back. With the
+Equation (27), the balance of energy: potential energy becomes kinetic energy and back. With the
 inertia J about the pivot, the distance l of the centre of mass and the amplitude a, period and
 largest rate are
 

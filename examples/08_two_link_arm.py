@@ -1,6 +1,6 @@
 """A rigid two-link arm falls freely under gravity.
 
-Equations (14), (15) and (16): mass matrix, bias and gravity in M(q) q'' + h(q, q') + G(q) = 0. For
+Equations (40), (41) and (42): mass matrix, bias and gravity in M(q) q'' + h(q, q') + G(q) = 0. For
 two uniform rods textbooks have
 
     a = m1 l1^2 / 3 + m2 l1^2,    b = m2 l2^2 / 3,    c = m2 l1 l2 / 2,

@@ -1,6 +1,6 @@
 """The drives of a polar arm along a given motion.
 
-Equation (23): the row of a joint. For a joint that is held to a motion it gives the drive. A
+Equation (59): the row of a joint. For a joint that is held to a motion it gives the drive. A
 slider of mass m moves at r along an arm that turns by a, with the inertia J about the pivot:
 
     torque = (J + m r^2) a'' + 2 m r r' a' + (m_arm L / 2 + m r) g cos a,

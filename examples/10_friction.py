@@ -1,6 +1,6 @@
 """Coulomb friction stops a cart.
 
-Equations (18) and (30): the friction force is f tanh(v / v0) with v0 = 1 mm/s, and its loss. A
+Equations (57) and (28): the friction force is f tanh(v / v0) with v0 = 1 mm/s, and its loss. A
 cart of mass m with the first speed u has
 
     v = v0 asinh(sinh(u / v0) exp(-f t / (m v0))),

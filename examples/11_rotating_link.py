@@ -1,6 +1,6 @@
 """Rotation raises the natural frequencies of a link.
 
-Equation (15): the bias, which has the centrifugal forces. In units of EI / (m L^4), with the
+Equation (41): the bias, which has the centrifugal forces. In units of EI / (m L^4), with the
 squares g of the speed and l of the frequency, small vibrations in the plane of rotation obey
 
     w'''' = (g / 2) ((1 - x^2) w')' + (l + g) w,    w = w' = 0 at x = 0,  w'' = w''' = 0 at x = 1.

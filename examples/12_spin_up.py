@@ -1,6 +1,6 @@
 """A link on a hub is spun up to 6 rad/s: with and without foreshortening.
 
-Equation (12) is the linear line, `stiffening = false`. It has no foreshortening, so that
+Equation (7) is the linear line, `stiffening = false`. It has no foreshortening, so that
 centrifugal forces do not stiffen it. With the rate w of the hub, small deflections v obey
 
     w = 0.4 (t - T sin(2 pi t / T) / (2 pi)),    T = 15 s,    N = m w^2 (L^2 - x^2) / 2,

@@ -1,6 +1,6 @@
 """A slider crosses a link that it bends by its weight.
 
-Equation (11): a slider (Pa) rides on the line of the link before it. That link is clamped, level
+Equation (30): a slider (Pa) rides on the line of the link before it. That link is clamped, level
 and light. A slider of weight P at the abscissa s pushes outwards along the link with the force
 
     F = P sin(a),

@@ -1,6 +1,6 @@
 """A bent link is pushed out of its sleeve.
 
-Equation (9): a link that slides through a sleeve (Pb). The force M^2 / (2 EI) pushes it out, with
+Equation (36): a link that slides through a sleeve (Pb). The force M^2 / (2 EI) pushes it out, with
 the bending moment M at the exit. Here a payload of weight P hangs at the tip of a light, level
 link. At the free length d the moment is M = P x with
 

@@ -1,6 +1,6 @@
 """Poles and zeros of a free link that is driven at its root.
 
-Equation (27), the linear model. In units of sqrt(EI / m) / L^2
+Equation (56), the transmission zeros. In units of sqrt(EI / m) / L^2
 
     poles are those of a pinned link:                         i b^2,      tan b = tanh b,
     zeros from torque to angle, those of a clamped link:      i b^2,      cos b cosh b = -1,

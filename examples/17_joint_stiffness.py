@@ -1,6 +1,6 @@
 """A proportional gain at the joint is a spring at the root of a link.
 
-Equation (24): gains act like stiffness and damping in an implicit step. A link on a hinge with
+Equation (49): gains act like stiffness and damping in an implicit step. A link on a hinge with
 the spring k has the frequencies b^2 sqrt(EI / m) / L^2, where with r = k L / EI
 
     b (cos b sinh b - sin b cosh b) + r (1 + cos b cosh b) = 0.

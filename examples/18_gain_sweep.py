@@ -1,6 +1,6 @@
 """Many gains on one joint: the overshoot of a step.
 
-Equation (19) with one unknown: J q'' = kp (1 - q) - kd q'. A batch has one arm with many gains.
+Equation (58) with one unknown: J q'' = kp (1 - q) - kd q'. A batch has one arm with many gains.
 With the damping ratio z = kd / (2 sqrt(kp J)) and w = sqrt(kp / J)
 
     overshoot = exp(-pi z / sqrt(1 - z^2)),    time of the peak = pi / (w sqrt(1 - z^2)).

@@ -1,6 +1,6 @@
 """A linear-quadratic regulator on a robot of type IV: its cost is known beforehand.
 
-Equation (L3), here in continuous time, on the linear model x' = A x + B u. The robot is a rigid
+Equation (75), here in continuous time, on the linear model x' = A x + B u. The robot is a rigid
 carriage with a rigid arm at the angle b, so that A = [0, 1; 0, 0], B = [0; inverse of M] and
 
     M = [m1 + m2, -m2 c sin b; -m2 c sin b, J + m2 c^2].

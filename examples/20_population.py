@@ -1,6 +1,6 @@
 """A thousand pendulums, as one population.
 
-Equation (31): what `rtol` is relative to; for a rigid robot, to a thousandth of the tip's path. A
+Equation (81): what `rtol` is relative to; for a rigid robot, to a thousandth of the tip's path. A
 pendulum that is let go at the amplitude a has the angle q at time t, with Jacobi's function sn:
 
     sin(q / 2) = k sn(K(k) - w t, k),    k = sin(a / 2),    w = sqrt(g / l).

@@ -1,6 +1,6 @@
 """A soft beam flies freely in the plane: its centre of mass obeys the force alone.
 
-Equation (13): places and velocities of all points. Two massless sliders at right angles and a
+Equation (39): places and velocities of all points. Two massless sliders at right angles and a
 hinge leave the beam free. A force P along x and a torque N act at its lower end until t = s.
 Whatever the bending, the centre of mass moves as
 

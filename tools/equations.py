@@ -1,4 +1,4 @@
-"""The table of equations: docs/theory/equations.md, from the chapters beside it and the tests.
+"""The table of equations: docs/theory/equations.md, from the chapters, the code and the tests.
 
     python tools/equations.py            writes the table
     python tools/equations.py --check    status 1 if the table is not up to date
@@ -11,7 +11,9 @@ A numbered equation stands in a chapter as
     ... \\tag{7}
     $$
 
-A test in tests/docs says in its docstring which equations it evaluates: "Equations: 7, 8".
+A docstring of flexura, and a comment of the core or of the firmware's library, cites it as (7), or
+several as (7) to (9). A test in tests/docs says in its docstring which equations it evaluates:
+"Equations: 7, 8".
 """
 
 from __future__ import annotations
@@ -19,23 +21,30 @@ from __future__ import annotations
 import ast
 import re
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent
 THEORY, TESTS = "docs/theory", "tests/docs"
+PYTHON, CPP = "model/flexura", ("model/core", "firmware/lib")
 HEAD = """# Table of equations
 
 `python tools/equations.py` writes this page. Do not edit it.
 
-| number | equation | evaluated by |
-| --- | --- | --- |
+`computed by` names what cites the equation: a function or class of `flexura`, a file of the core or
+of the firmware's library. `evaluated by` names the test in `tests/docs` that writes it down anew.
+
+| number | equation | computed by | evaluated by |
+| --- | --- | --- | --- |
 """
 _EQUATION = re.compile(
     r'<a id="(?P<anchor>[\w-]+)"></a>\*\*(?P<name>.+?)\.\*\*(?P<source>[^\n]*)\n'
     r"(?P<latex>(?:(?!<a id=).)*?\\tag\{(?P<number>\d+)\})",
     re.DOTALL,
 )
+_CITATION = re.compile(r"(?<![\w)\]])\((\d{1,3})\)(?:\s+to\s+\((\d{1,3})\))?(?![\w(\[])")
+_COMMENT = re.compile(r"(?:^[ \t]*//.*\n)+|//.*", re.MULTILINE)
 
 
 class Equation(NamedTuple):
@@ -74,6 +83,61 @@ def equations(root: Path = ROOT) -> list[Equation]:
     return found
 
 
+def written(text: str) -> list[int]:
+    """The numbers that stand in a docstring or comment, as they are written."""
+    return [int(n) for found in _CITATION.finditer(text) for n in found.groups() if n]
+
+
+def cited(text: str) -> set[int]:
+    """The equations that a docstring or comment cites: of "(7) to (9)" also (8)."""
+    return {
+        n
+        for found in _CITATION.finditer(text)
+        for n in range(int(found[1]), int(found[2] or found[1]) + 1)
+    }
+
+
+def docstrings(path: Path) -> Iterator[tuple[str, str]]:
+    """The docstrings of a Python file with their dotted names in it; the module itself is ""."""
+
+    def inside(node: ast.AST, name: str) -> Iterator[tuple[str, str]]:
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+            yield name, ast.get_docstring(node, clean=False) or ""
+            for child in node.body:
+                own = getattr(child, "name", None)
+                if own:
+                    yield from inside(child, f"{name}.{own}" if name else own)
+
+    return inside(ast.parse(path.read_text(encoding="utf-8")), "")
+
+
+def comments(path: Path) -> list[str]:
+    """The comments of a C++ file, lines that follow each other as one, without their slashes."""
+    text = path.read_text(encoding="utf-8")
+    return [re.sub(r"^\s*//+", " ", c[0], flags=re.MULTILINE) for c in _COMMENT.finditer(text)]
+
+
+def citations(root: Path = ROOT) -> dict[int, list[str]]:
+    """By number, what computes an equation: functions and classes by name, C++ files by path."""
+    found: dict[int, list[str]] = {}
+
+    def note(text: str, name: str) -> None:
+        for number in cited(text):
+            if name not in found.setdefault(number, []):
+                found[number].append(name)
+
+    for path in sorted((root / PYTHON).rglob("*.py")):
+        module = ".".join(path.relative_to(root / PYTHON).with_suffix("").parts)
+        for name, text in docstrings(path):
+            if name:
+                note(text, f"{module}.{name}")
+    for folder in CPP:
+        for path in sorted((root / folder).rglob("*.[hc]*")):
+            for text in comments(path):
+                note(text, path.relative_to(root / folder).as_posix())
+    return found
+
+
 def tested(root: Path = ROOT) -> dict[int, list[str]]:
     """By number, the tests that evaluate an equation: `file::function`."""
     found: dict[int, list[str]] = {}
@@ -91,14 +155,16 @@ def tested(root: Path = ROOT) -> dict[int, list[str]]:
 
 def table(root: Path = ROOT) -> str:
     """The page with the table."""
-    tests, out, chapter = tested(root), [HEAD], None
+    code, tests, out, chapter = citations(root), tested(root), [HEAD], None
     for e in equations(root):
         if e.chapter != chapter:
             chapter = e.chapter
             title = chapter.read_text(encoding="utf-8").splitlines()[0].removeprefix("# ")
-            out.append(f"| | **[{title}]({chapter.name})** | |\n")
-        names = ", ".join(f"`{name.partition('::')[2]}`" for name in tests.get(e.number, ()))
-        out.append(f"| [({e.number})]({chapter.name}#{e.anchor}) | {e.name} | {names} |\n")
+            out.append(f"| | **[{title}]({chapter.name})** | | |\n")
+        computed = ", ".join(f"`{name}`" for name in code.get(e.number, ()))
+        evaluated = ", ".join(f"`{name.partition('::')[2]}`" for name in tests.get(e.number, ()))
+        number = f"[({e.number})]({chapter.name}#{e.anchor})"
+        out.append(f"| {number} | {e.name} | {computed} | {evaluated} |\n")
     return "".join(out)
 
 

@@ -61,7 +61,7 @@ def simulate(
         that is asked for, of deflections and of a thousandth of the tip's path. method: "auto",
         "explicit" (order 8), "implicit", or "exponential". numerical_damping: exponential steps
         damp fast modes that change no output by more than the tolerance
-            (integration.md (43)); False: they do not.
+            (94); False: they do not.
         progress: called with the finished fraction.
 
     Raises:

@@ -55,8 +55,8 @@ def docstring(script: Path) -> str:
 def cited(text: str) -> list[str]:
     """The numbers of the equations that a docstring cites, in its order: "Equations (5) and
     (6)"."""
-    lists = re.findall(r"Equations? ((?:\(L?\d+\)(?:, | and )?)+)", text)
-    return re.findall(r"L?\d+", " ".join(lists))
+    lists = re.findall(r"Equations? ((?:\(\d+\)(?:, | and )?)+)", text)
+    return re.findall(r"\d+", " ".join(lists))
 
 
 def name(path: Path) -> str:
@@ -136,11 +136,6 @@ def test_each_script_is_on_an_equation_of_its_own():
         for path in sorted((ROOT / "docs" / "theory").rglob("*.md"))
     )
     numbers = set(re.findall(r"\\tag\{(\w+)\}", theory))
-    numbers |= set(
-        re.findall(
-            r"\((L\d+)\)$", (ROOT / "model" / "README.md").read_text(encoding="utf-8"), re.MULTILINE
-        )
-    )
     firsts = {}
     for script in SCRIPTS:
         found = cited(docstring(script))
@@ -179,7 +174,7 @@ def test_the_readme_has_every_example_with_its_equations():
         f"notebooks/{notebook.name}" for notebook in NOTEBOOKS
     }
     for script in SCRIPTS:
-        shown = re.findall(r"\((L?\d+)\)", rows[script.name].split("|")[0])
+        shown = re.findall(r"\((\d+)\)", rows[script.name].split("|")[0])
         assert shown == cited(docstring(script)), script.name
 
 

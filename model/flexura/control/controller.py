@@ -1,7 +1,7 @@
 """Sampled controllers as drives: one law for the model, the emulated board and the board
 (firmware/README.md).
 
-The law of one joint, with T the tick, e = r - q, w the tip deflection and s the tip slope (12):
+The law of one joint, with T the tick, e = r - q, w the tip deflection and s the tip slope (70):
 
     u = kp e + ki sum(e) T + kd (r' - q') + kf w + kg w' + ks s + kt s' + kv r' + kc sign r' + f(t)
 
@@ -72,7 +72,7 @@ class Force:
 
 @dataclass(frozen=True)
 class Motor:
-    """The output is a DC motor's voltage u: force = force_per_V u - damping eta'.
+    """The output is a DC motor's voltage u: force = force_per_V u - damping eta' (62).
 
     With torque constant k, resistance R, back-EMF constant ke and a transmission of i rad per m or
     rad: force_per_V = k i / R, damping = k ke i^2 / R + friction; the inductance is left out. The
@@ -86,7 +86,7 @@ class Motor:
 @dataclass(frozen=True)
 class Stepper:
     """The output is a stepper's rate: the pulses' place is its integral, and the joint follows that
-    place.
+    place (63).
 
     `stiffness` [N m/rad or N/m] and `damping` of the magnetic spring between them; without a
     stiffness the joint is held to the pulses, whose rate then changes evenly over a tick. The law
@@ -104,8 +104,9 @@ Output = Force | Motor | Stepper
 
 @dataclass(frozen=True)
 class PID:
-    """One joint's law; gains in units of its output (N, N m, V, rad/s or m/s) per m or rad, s, as
-    the formula above says.
+    """One joint's law, a PID with deflection feedback (70), limits (71) and anti-windup (72).
+
+    Gains are in units of its output (N, N m, V, rad/s or m/s) per m or rad, s.
 
     `reference` [m or rad] through a filter of `setpoint_Hz` (0: none), `feedforward` [units of the
     output], `derivative_Hz` (0: none) for the measured velocity. `limit`, `slew` (per second) of
@@ -153,7 +154,7 @@ class PID:
 
     def one_sensor(self, length: float) -> PID:
         """The same law for a strip of that free length [m] whose deflection alone is measured, as
-        on the rig: w'(L) is taken as 3 w(L) / (2 L), a cantilever's that its tip loads."""
+        on the rig: w'(L) is taken as 3 w(L) / (2 L), a cantilever's that its tip loads (73)."""
         per_m = 1.5 / length
         return replace(
             self, kf=self.kf + self.ks * per_m, kg=self.kg + self.kt * per_m, ks=0.0, kt=0.0
@@ -175,7 +176,7 @@ GAINS = ("kp", "ki", "kd", "kf", "kg", "ks", "kt", "kv", "kc")
 
 @dataclass(frozen=True)
 class Linear:
-    """A linear law in place of the PID's terms, as `lqr.lqr` makes it.
+    """A linear law in place of the PID's terms (77), as `lqr` makes it.
 
     z^ = z + L (y - C z), u = hold - K z^ + Kr r + Kv r' + f(t), limited as a PID's; z of the next
     tick = F z^ + G (u - hold) with the u that the limits left. y: positions and deflection, less
@@ -197,9 +198,9 @@ class Linear:
 class Controller:
     """A sampled controller of all joints, one `PID` (or, left to itself, one `JointDrive`) a joint.
 
-    It measures and computes at t_eval[0] + k / rate_Hz and holds its outputs between. The tip
-    deflection is that of the last flexible link, filtered by `deflection_Hz` (0: none), in steps of
-    `deflection_quantum_m` (0: exact).
+    It measures and computes at t_eval[0] + k / rate_Hz and holds its outputs between: references
+    and velocities by (68), the tip deflection of the last flexible link by (69). The deflection is
+    filtered by `deflection_Hz` (0: none), in steps of `deflection_quantum_m` (0: exact).
     """
 
     joints: tuple[PID | JointDrive, ...]
@@ -353,5 +354,5 @@ class Controller:
 
 
 def smoothing(frequency_Hz: float, period_s: float) -> float:
-    """a of y += a (x - y): 1 - exp(-2 pi f T); 1, no filter, for f = 0."""
+    """a of y += a (x - y): 1 - exp(-2 pi f T) (67); 1, no filter, for f = 0."""
     return 1.0 if frequency_Hz == 0 else -math.expm1(-2 * math.pi * frequency_Hz * period_s)

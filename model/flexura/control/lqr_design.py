@@ -33,8 +33,8 @@ from .controller import PID, Controller, Linear, Motor, Stepper
 
 @dataclass(frozen=True)
 class Design:
-    """A discrete LQR with its observer: this module's matrices; x0^T P x0 is the cost, S the
-    observer's covariance.
+    """A discrete LQR (75) with its observer (76): this module's matrices; x0^T P x0 is the cost, S
+    the observer's covariance.
 
     `states`, `outputs` are names; `inputs` (m,) the joints that it drives, from 0.
     """
@@ -74,7 +74,7 @@ def lqr(
     q: Any = None,
 ) -> tuple[Controller, Design]:
     """`controller` with its PIDs' terms replaced by an LQR and observer about q (default: the
-    static equilibrium at the start).
+    static equilibrium at the start): (74) to (76).
 
     Its references, outputs, limits, slews, rate and quantisation stay. Weights by Bryson's rule:
     `effort` (m,) of each output, `position` (N,) [m or rad], `deflection` [m] of the tips and

@@ -41,13 +41,13 @@ STRIP = ("peak_m", "residual_m", "vibration_m_s2", "rms_m")
 
 
 def joint_figures(t: np.ndarray, r: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """A joint's figures (6,), the effort 0, from samples t, r, q (T,)."""
+    """A joint's figures (6,), the effort 0, from samples t, r, q (T,) (80)."""
     return np.asarray(core.joint_figures(*_flat(t, r, q)))
 
 
 def strip_figures(t: np.ndarray, w: np.ndarray, settled: float) -> np.ndarray:
-    """The strip's figures (4,) from samples t, w (T,); `settled` [s], the slowest joint's, may be
-    NaN."""
+    """The strip's figures (4,) from samples t, w (T,) (80); `settled` [s], the slowest joint's, may
+    be NaN."""
     return np.asarray(core.strip_figures(*_flat(t, w), settled))
 
 

@@ -21,7 +21,7 @@ MOST_WHOLE = 16  # unknowns of a link that is one piece
 
 
 class Place(NamedTuple):
-    """Weights w_j / length (P,) and shapes b_k (m,) at xi, and derivatives by xi (2), (11)."""
+    """Weights w_j / length (P,) and shapes b_k (m,) at xi, and derivatives by xi (4), (30)."""
 
     w: np.ndarray
     l: np.ndarray
@@ -33,11 +33,11 @@ class Place(NamedTuple):
 
 @dataclass(frozen=True)
 class Piece:
-    """A stretch of line on 0 <= xi <= 1 whose tangent's angle is linear in m unknowns (1).
+    """A stretch of line on 0 <= xi <= 1 whose tangent's angle is linear in m unknowns (2).
 
-    length [m]: of a sleeved link all of it. points: P. shapes: b(xi), (S,) -> (S, m). K (m,) (5) in
+    length [m]: of a sleeved link all of it. points: P. shapes: b(xi), (S,) -> (S, m). K (m,) (9) in
     N m, for modes in 1/s^2; of a sleeved link in modes that at the start's free length, else empty.
-    mass_xi (G,), mass (G,) [kg]: points whose sums are the integrals (3).
+    mass_xi (G,), mass (G,) [kg]: points whose sums are the integrals (14).
     """
 
     length: float
@@ -64,20 +64,20 @@ class Piece:
 
     @cached_property
     def C(self) -> np.ndarray:
-        """Integrals of Lagrange's polynomials to the points by xi (8): (P, P)."""
+        """Integrals of Lagrange's polynomials to the points by xi (32): (P, P)."""
         return collocation(self.points)
 
     @cached_property
     def B(self) -> np.ndarray:
-        """The shapes at the points (1): (P, m)."""
+        """The shapes at the points (2): (P, m)."""
         return self.shapes(self.xi)
 
     def lagrange(self, xi: np.ndarray, derivative: int = 0) -> np.ndarray:
-        """Lagrange's polynomials at xi (S,), or their derivatives by xi (2): (S, P)."""
+        """Lagrange's polynomials at xi (S,), or their derivatives by xi (13): (S, P)."""
         return lagrange(self.points, xi, derivative)
 
     def integrals(self, xi: np.ndarray) -> np.ndarray:
-        """The weights w_j over the length at xi (S,) (2): (S, P)."""
+        """The weights w_j over the length at xi (S,) (13): (S, P)."""
         return lagrange_integrals(self.points, xi)
 
     def kept_integrals(self, xi: tuple[float, ...]) -> np.ndarray:
@@ -130,29 +130,29 @@ class Piece:
 
     @cached_property
     def unit_stiffness(self) -> np.ndarray:
-        """K of (17) for d = EI = 1, without the round-off between orthogonal shapes: (m, m)."""
+        """K of (35) for d = EI = 1, without the round-off between orthogonal shapes: (m, m)."""
         K = self.slopes.T @ (self.weights[:, None] * self.slopes)
         size = np.sqrt(np.diag(K))
         return np.where(np.abs(K) < 1e-14 * np.outer(size, size), 0.0, K)
 
     @cached_property
     def w(self) -> np.ndarray:
-        """The weights w_j of the mass points (2): (G, P) [m]."""
+        """The weights w_j of the mass points (14): (G, P) [m]."""
         return self.length * self.integrals(self.mass_xi)
 
     @cached_property
     def s(self) -> np.ndarray:
-        """First moments s_j, the integral of w_j dm (3): (P,) [kg m]."""
+        """First moments s_j, the integral of w_j dm (14): (P,) [kg m]."""
         return self.mass @ self.w
 
     @cached_property
     def W(self) -> np.ndarray:
-        """Second moments W_jl, the integral of w_j w_l dm (3): (P, P) [kg m^2]."""
+        """Second moments W_jl, the integral of w_j w_l dm (14): (P, P) [kg m^2]."""
         return self.w.T @ (self.mass[:, None] * self.w)
 
 
 def orders(link: Link, followed: bool) -> tuple[int, int]:
-    """How many polynomials (7) and how many points a whole-link piece has."""
+    """How many polynomials (12) and how many points a whole-link piece has."""
     mesh, sleeve = min(2 * link.elements, MOST_WHOLE), link.joint.type == "Pb"
     if link.modes is None:
         return mesh, mesh + 1
@@ -162,7 +162,7 @@ def orders(link: Link, followed: bool) -> tuple[int, int]:
 
 
 def whole(link: Link, beyond: Link | None) -> bool:
-    """Whether a flexible link is one piece: in modes, in a sleeve, or `beyond` slides on it (7)."""
+    """Whether a link is one piece (12): it has modes or a sleeve, or `beyond` slides on it."""
     return (
         link.modes is not None
         or link.joint.type == "Pb"
@@ -190,20 +190,20 @@ def pieces(
 
 
 def whole_piece(law: Material, points: int, coefficients: np.ndarray, K: np.ndarray) -> Piece:
-    """A link as one piece with shapes (N, m) in the space (7) and diagonal stiffness (m,)."""
+    """A link as one piece with shapes (N, m) in the space (12) and diagonal stiffness (m,)."""
     s, ds = law.quadrature(0.0, law.length, points + 2)
     dm = law.mass_per_length(s) * ds
     return Piece(law.length, points, WholeShapes(coefficients), K, s / law.length, dm)
 
 
 def mesh(law: Material, elements: int) -> tuple[Piece, ...]:
-    """The pieces of a link of equal elements (6)."""
+    """The pieces of a link of equal elements (10)."""
     ends = np.linspace(0, law.length, elements + 1)
     return tuple(_element(law, a, b) for a, b in pairwise(ends))
 
 
 def _element(law: Material, a: float, b: float) -> Piece:
-    """The piece of an element between a and b [m], with shapes that make K diagonal (6)."""
+    """The piece of an element between a and b [m], with shapes that make K diagonal (10), (11)."""
     h = b - a
     s, ds = law.quadrature(a, b, ELEMENT_POINTS + 2)
     curvature, EI = ElementShapes()((s - a) / h, 1) / h, law.bending_stiffness(s) * ds

@@ -1,4 +1,4 @@
-"""A mesh as one piece: the sums of (1) and (2) run over the points of all its elements."""
+"""A mesh as one piece: the sums of (2) and (4) run over the points of all its elements."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Mesh(Piece):
         return self._on(xi, lambda e, x: factor * e.lagrange(x, derivative), lambda e: 0.0)
 
     def integrals(self, xi: np.ndarray) -> np.ndarray:
-        """The weights w_j over the length at xi (S,) (2): (S, P)."""
+        """The weights w_j over the length at xi (S,) (13): (S, P)."""
         n = len(self.elements)
         return self._on(xi, lambda e, x: e.integrals(x) / n, lambda e: e.weights / n)
 

@@ -1,4 +1,4 @@
-"""A link's own clamped modes in the space of polynomials (7), equation (10)."""
+"""A link's own clamped modes in the space of polynomials (12): (17) to (19)."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from .shapes import legendre_shapes
 def clamped_matrices(
     law: Material, free: float, count: int, points: int, mass: float = 0.0, inertia: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """M [kg m^2] and K [N m] (count, count) of a straight link's clamped last `free` metres (10).
+    """M [kg m^2] and K [N m] (count, count) of a straight link's clamped last `free` metres (17).
 
-    The unknowns are the coefficients in the space (7); a payload of `mass` and `inertia` is at the
+    The unknowns are the coefficients in the space (12); a payload of `mass` and `inertia` is at the
     tip. The third array has the tip's deflection and angle of each shape, (2, count) [m, rad].
     """
     L, ends = law.length, np.ones(1)
@@ -33,7 +33,7 @@ def clamped_matrices(
 def clamped_modes(
     M: np.ndarray, K: np.ndarray, tip: np.ndarray, kept: int, statics: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The lowest `kept` modes, mass-normalised, as columns (count, m), and omega^2 (m,) (10).
+    """The lowest `kept` modes, mass-normalised, as columns (count, m), and omega^2 (m,) (18).
 
     With `statics` the static shapes of a tip force and a tip moment join them, and the modes of
     this smaller space are given. Each mode moves the tip to the left.
@@ -51,8 +51,8 @@ def clamped_modes(
 def orthogonal_shapes(K: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Shapes (count, count) whose stiffness is diagonal, and that diagonal (count,) [N m].
 
-    Each is one of the space (7) less what those before it would bend with it; of a uniform link the
-    space's own. Round-off between orthogonal shapes is taken away first.
+    Each is one of the space (12) less what those before it would bend with it; of a uniform link
+    the space's own. Round-off between orthogonal shapes is taken away first.
     """
     from scipy.linalg import solve_triangular
 
@@ -73,7 +73,7 @@ def _modes(M: np.ndarray, K: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _rest_of_static_shapes(
     K: np.ndarray, tip: np.ndarray, lam: np.ndarray, V: np.ndarray
 ) -> np.ndarray:
-    """The static shapes of a tip force and moment without what the modes V have of them (10)."""
+    """The static shapes of a tip force and moment without what the modes V have of them (19)."""
     from scipy.linalg import cho_factor, cho_solve
 
     room = len(K) - len(lam)

@@ -1,4 +1,4 @@
-"""Gauss points, Legendre's polynomials, and Lagrange's through the points (docs/theory)."""
+"""Gauss points, Legendre's polynomials, and Lagrange's through the points: (12), (13)."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def _derivatives(count: int, order: int) -> np.ndarray:
 
 
 def legendre_integrals(count: int, xi: np.ndarray) -> np.ndarray:
-    """Integrals of P_0 ... P_(count-1) by u from -1 to 2 xi - 1, the shapes (7): (S, count)."""
+    """Integrals of P_0 ... P_(count-1) by u from -1 to 2 xi - 1, the shapes (12): (S, count)."""
     P = legendre(count + 1, xi)
     out = np.empty((len(P), count))
     out[:, 0] = P[:, 1] + 1.0
@@ -55,21 +55,21 @@ def legendre_integrals(count: int, xi: np.ndarray) -> np.ndarray:
 
 @cache
 def _lagrange(points: int) -> np.ndarray:
-    """Lagrange's polynomials as sums of Legendre's (2): (points, points), column j is l_j."""
+    """Lagrange's polynomials as sums of Legendre's (13): (points, points), column j is l_j."""
     xi, w = gauss(points)
     return (2 * np.arange(points)[:, None] + 1) * legendre(points, xi).T * w
 
 
 def lagrange(points: int, xi: np.ndarray, derivative: int = 0) -> np.ndarray:
-    """Lagrange's l_j through the Gauss points, or their derivatives by xi (2): (S, points)."""
+    """Lagrange's l_j through the Gauss points, or their derivatives by xi (13): (S, points)."""
     return 2.0**derivative * legendre(points, xi, derivative) @ _lagrange(points)
 
 
 def lagrange_integrals(points: int, xi: np.ndarray) -> np.ndarray:
-    """w_j(xi), the integrals of l_j from 0 to xi (2): (S, points)."""
+    """w_j(xi), the integrals of l_j from 0 to xi (13): (S, points)."""
     return 0.5 * legendre_integrals(points, xi) @ _lagrange(points)
 
 
 def collocation(points: int) -> np.ndarray:
-    """C, the integrals of l_j from 0 to Gauss point p (8): (points p, points j)."""
+    """C, the integrals of l_j from 0 to Gauss point p (32): (points p, points j)."""
     return lagrange_integrals(points, gauss(points)[0])

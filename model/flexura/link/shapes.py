@@ -11,7 +11,7 @@ from .quadrature import legendre, legendre_integrals
 
 @dataclass(frozen=True)
 class ElementShapes:
-    """The two shapes of an element (6): a ramp less `ratio` bubbles, and a bubble."""
+    """The two shapes of an element (10): a ramp less `ratio` bubbles, and a bubble."""
 
     ratio: float = 0.0
 
@@ -29,7 +29,7 @@ class ElementShapes:
 
 @dataclass(frozen=True)
 class MeshShapes:
-    """The shapes of n equal elements on a whole link (6): those behind a place have turned it."""
+    """The shapes of n equal elements on a whole link (10): those behind a place have turned it."""
 
     elements: tuple[ElementShapes, ...]
 
@@ -55,7 +55,7 @@ def element_of(n: int, xi: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class WholeShapes:
-    """Shapes of a whole link: column k of `coefficients` (N, m) is one in the space (7)."""
+    """Shapes of a whole link: column k of `coefficients` (N, m) is one in the space (12)."""
 
     coefficients: np.ndarray
 
@@ -69,14 +69,14 @@ class WholeShapes:
 
 
 def legendre_shapes(count: int, xi: np.ndarray, derivative: int = 0) -> np.ndarray:
-    """The space (7) at xi (S,), or its derivatives by xi: (S, count)."""
+    """The space (12) at xi (S,), or its derivatives by xi: (S, count)."""
     if derivative == 0:
         return legendre_integrals(count, xi)
     return 2.0**derivative * legendre(count, xi, derivative - 1)
 
 
 def of_legendre(sums: np.ndarray) -> np.ndarray:
-    """Coefficients (N, m) in the space (7) of shapes given as sums of P_0 ... P_N, (N + 1, m)."""
+    """Coefficients (N, m) in the space (12) of shapes given as sums of P_0 ... P_N, (N + 1, m)."""
     rest, out = sums.copy(), np.zeros((len(sums) - 1, sums.shape[1]))
     for k in range(len(out) - 1, 0, -1):
         out[k] = rest[k + 1] * (2 * k + 1)

@@ -25,10 +25,10 @@ _NONE = np.zeros((0, COLUMNS))
 @dataclass(frozen=True)
 class JointDrive:
     """One joint's drive: feedforward `force` [N or N m], and PD gains `kp`, `kd` on a `motion` [m
-    or rad].
+    or rad] (58).
 
     With `prescribed` the joint follows its motion exactly, whatever force that takes (inverse
-    dynamics).
+    dynamics (59)).
     """
 
     force: Signal | None = None

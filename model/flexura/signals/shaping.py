@@ -15,7 +15,7 @@ MAX_SEGMENTS = 100_000  # shaping a shaped signal doubles its segments
 
 def zv(signal: Signal, frequency_Hz: float, damping_ratio: float = 0.0) -> Signal:
     """Zero vibration: the signal as two copies, y = [y(t) + k y(t - T/2)] / (1 + k), which leave
-    the mode at rest afterwards.
+    the mode at rest afterwards (78).
 
     k = exp(-pi zeta / sqrt(1 - zeta^2)); T = 1 / (f sqrt(1 - zeta^2)), the damped period of a mode
     of natural frequency f and damping ratio zeta (Singer and Seering 1990, J. Dyn. Syst. Meas.
@@ -26,8 +26,8 @@ def zv(signal: Signal, frequency_Hz: float, damping_ratio: float = 0.0) -> Signa
 
 
 def zvd(signal: Signal, frequency_Hz: float, damping_ratio: float = 0.0) -> Signal:
-    """Zero vibration and derivative: three copies, weights 1, 2k, k^2 over (1 + k)^2, at 0, T/2, T;
-    see `zv`.
+    """Zero vibration and derivative: three copies, weights 1, 2k, k^2 over (1 + k)^2, at 0, T/2, T
+    (78); see `zv`.
 
     A frequency off by e leaves a vibration proportional to e^2 only; longer by T.
     """
@@ -38,7 +38,7 @@ def matched_cycloid(
     end: float, frequency_Hz: float, periods: int = 2, start: float = 0.0, at_s: float = 0.0
 ) -> Signal:
     """A cycloid that takes `periods` (2 or more) whole periods of an undamped mode and so leaves it
-    at rest: T = periods / f.
+    at rest: T = periods / f (79).
 
     Its acceleration is one sine of period T; the mode's response to a whole number n of its periods
     is zero at the end, but for n = 1, its resonance. For a robot: `matched_cycloid(0.3,

@@ -25,7 +25,7 @@ COLUMNS = 10  # t0, c0 ... c5, A, w, phi
 
 
 def evaluate(segments: np.ndarray, t: float) -> tuple[float, float, float]:
-    """y, dy/dt and d2y/dt2 at t of segments (k, 10); 0 where k = 0."""
+    """y, dy/dt and d2y/dt2 at t of segments (k, 10) (60); 0 where k = 0."""
     if len(segments) == 0:
         return 0.0, 0.0, 0.0
     low = max(
@@ -46,8 +46,8 @@ def evaluate(segments: np.ndarray, t: float) -> tuple[float, float, float]:
 
 @dataclass(frozen=True)
 class Signal:
-    """A function of time: `signal(t)` gives (y, dy/dt, d2y/dt2); `segments` (k, 10); `breaks` where
-    it isn't smooth."""
+    """A function of time (60): `signal(t)` gives (y, dy/dt, d2y/dt2); `segments` (k, 10); `breaks`
+    where it isn't smooth."""
 
     segments: np.ndarray
     spec: dict[str, Any] = field(default_factory=dict)
@@ -100,8 +100,7 @@ def harmonic(
 
 
 def cycloid(end: float, duration_s: float, start: float = 0.0, at_s: float = 0.0) -> Signal:
-    """y = start + A [s/T - sin(2 pi s/T)/(2 pi)], A = end - start, then rest (benchmarks:
-    "Cycloid")."""
+    """y = start + A [s/T - sin(2 pi s/T)/(2 pi)], A = end - start (61), then rest."""
     _positive("duration_s", duration_s)
     A, T = end - start, duration_s
     rows = [_row(at_s, start, A / T, A=-A / (2 * np.pi), w=2 * np.pi / T), _row(at_s + T, end)]

@@ -51,7 +51,7 @@ def by_rigid_robot(
     """Drives of the rigid robot along `motion`, applied open loop to the flexible one (Bien, My and
     Khoi 2017).
 
-    tau = M_rigid(r) r'' + bias + gravity + friction, exact, as splines through values about
+    tau = M_rigid(r) r'' + bias + gravity + friction (65), exact, as splines through values about
     `step_s` apart. Neither the elastic displacements nor the joints' errors are compensated.
     Arguments and errors otherwise as in `inverse`.
     """
@@ -83,7 +83,7 @@ def by_bisection(
     model under constant drives, each joint's bisected in a bracket until |e| < `joint_error` [m or
     rad], joint after joint until all are; then the next step.
 
-        e = (eta - r) + h (eta' - r')       at the end of the step, h long
+        e = (eta - r) + h (eta' - r')       at the end of the step, h long     (66)
 
     The second term is needed: position errors alone make the drives alternate, u_k = -u_(k-1) +
     ..., for a mass under held forces has its sampled zero at -1. `joint/i/drive` at t_k is the

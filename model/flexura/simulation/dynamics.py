@@ -48,7 +48,7 @@ def simulate(
         that is asked for, of deflections and of a thousandth of the tip's path. method: "auto",
         "explicit" (order 8), "implicit", or "exponential". numerical_damping: exponential steps
         damp fast modes that change no output by more than the tolerance
-            (integration.md (43)); False: they do not.
+            (94); False: they do not.
         progress: called with the finished fraction.
 
     Raises:
@@ -74,8 +74,8 @@ def inverse(
     method: str = "auto",
     progress: Progress = None,
 ) -> Run:
-    """Inverse dynamics: joints follow `motion` exactly; the Run has `joint/i/drive`, the forces
-    that this takes.
+    """Inverse dynamics (59): joints follow `motion` exactly; the Run has `joint/i/drive`, the
+    forces that this takes.
 
     The elastic unknowns are integrated from q0, qd0 (n,), whose joint entries are replaced by the
     motion's. Nothing is approximated by a rigid robot and nothing is iterated. Replaying the drives

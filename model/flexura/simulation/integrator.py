@@ -18,7 +18,7 @@ STEPS_A_CALL = 400  # between two looks at the progress bar and the keyboard
 
 
 def solve(problem: Problem, progress: Progress = None) -> Solution:
-    """Integrate in the core (docs/theory/integration.md)."""
+    """Integrate in the core (docs/theory/10-time-integration.md)."""
     return _Integration(problem).run(progress)
 
 

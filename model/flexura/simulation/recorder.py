@@ -102,7 +102,7 @@ def describe(system: System, error: float) -> dict[str, Any]:
 
 def energy_error(energies: np.ndarray, accounts: np.ndarray, jumps: Any = 0.0) -> float:
     """How far the energies (T, 3) and accounts (T, 4) of a run are from balancing, relative to the
-    largest of them.
+    largest of them (101).
 
     The larger of |E - E(0) - work + loss + numerical loss - jumps| and |strain - strain(0) - its
     own integral|; `jumps` (T,): what E has jumped by so far.
@@ -120,7 +120,7 @@ def energy_error(energies: np.ndarray, accounts: np.ndarray, jumps: Any = 0.0) -
 
 
 def limit_event(system: System, joint: int, t: float, position: np.ndarray) -> dict[str, Any]:
-    """What stopped joint (from 0) at t, with the joints at `position` (N,)."""
+    """What stopped joint (from 0) at t (64), with the joints at `position` (N,)."""
     robot, (low, high) = system.robot, system.limits[joint]
     kind, own, travel = (
         robot.links[joint].joint.type,

@@ -1,6 +1,6 @@
-"""The extended assembly: the equations of any chain, dense (docs/theory/mechanics.md).
+"""The extended assembly: Lagrange's equations (24) of any chain, dense.
 
-M(q) qdd + bias(q, qd) + damping(q) qd + elastic(q) + gravity(q) = force                   (19)
+M(q) qdd + bias(q, qd) + damping(q) qd + elastic(q) + gravity(q) = force                   (25)
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Energies(NamedTuple):
 
 
 class Terms(NamedTuple):
-    """The parts of (19) in a state: `forces` (n,) of inertia and gravity, `elastic` (n,); K and D
+    """The parts of (25) in a state: `forces` (n,) of inertia and gravity, `elastic` (n,); K and D
     (n, n)."""
 
     mass: np.ndarray
@@ -39,7 +39,7 @@ class Terms(NamedTuple):
 
 
 class Assembly:
-    """A robot's equations as dense sums over its pieces; q and qd (n,) are named by `labels`.
+    """Lagrange's equations (24) as dense sums over the pieces; q and qd (n,) are named by `labels`.
 
     A `Structure` in place of a robot brings its own shapes, so that two programs can use one set.
     """
@@ -61,7 +61,7 @@ class Assembly:
         )  # flexible links in a sleeve, with their materials
 
     def mass(self, q: np.ndarray) -> np.ndarray:
-        """M(q) (n, n) (14)."""
+        """M(q) (n, n) (40)."""
         return self._mass(self._inertia(self._at_rest(q))[0])
 
     def _mass(self, sums: masses.Sum) -> np.ndarray:
@@ -70,18 +70,18 @@ class Assembly:
         return M
 
     def bias(self, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
-        """Coriolis, centrifugal and convective forces (n,), on the left-hand side (15)."""
+        """Coriolis, centrifugal and convective forces (n,), on the left-hand side (41)."""
         sums, flow = self._inertia(self.structure.states(q, qd))
         return sums.forces + flow
 
     def gravity(self, q: np.ndarray) -> np.ndarray:
-        """Generalised gravity forces (n,), on the left-hand side (16)."""
+        """Generalised gravity forces (n,), on the left-hand side (42)."""
         return self._inertia(self._at_rest(q), self._g)[0].forces
 
     def _inertia(
         self, states: list[LinkState], gravity: complex = 0j
     ) -> tuple[masses.Sum, np.ndarray]:
-        """What (14) to (16) sum over, and the flow terms of (9) in (15) (n,)."""
+        """What (40) to (42) sum over, and the flow terms of (37) (n,)."""
         parts, flow = [], np.zeros(self.n)
         for state in states:
             own = self.structure.masses(state)
@@ -92,7 +92,10 @@ class Assembly:
         return masses.summed(parts, gravity), flow
 
     def elastic(self, q: np.ndarray) -> np.ndarray:
-        """The derivative of the strain energy (n,): K q, and of a sleeved link also dU/dd (17)."""
+        """Elastic forces (n,), on the left-hand side (43): K q, and of a sleeved link also dU/dd.
+
+        -dU/dd is the force that pushes a bent link out of its sleeve (36).
+        """
         return self._elastic(self.stiffness_blocks(q), q)
 
     def _elastic(self, K: np.ndarray, q: np.ndarray) -> np.ndarray:
@@ -103,7 +106,7 @@ class Assembly:
         return out
 
     def stiffness_blocks(self, q: np.ndarray) -> np.ndarray:
-        """K (n, n), with K(d) of sleeved links: twice the strain energy is q^T K q (5), (17)."""
+        """K (n, n), with K(d) of sleeved links: twice the strain energy is q^T K q (9), (35)."""
         K = self._diagonal.copy()
         for i in self._sleeved:
             own = self.structure.own[i][0]
@@ -121,13 +124,13 @@ class Assembly:
         return K
 
     def _sleeve(self, i: int, q: np.ndarray, derivative: int = 0) -> np.ndarray:
-        """K(d) of the link i in a sleeve, or its derivatives by d (17)."""
+        """K(d) of the link i in a sleeve, or its derivatives by d (35)."""
         return sleeve.stiffness(
             self.structure.links[i][0], float(q[self.rows[i]]), self._sleeved[i], derivative
         )
 
     def stiffness(self, q: np.ndarray) -> np.ndarray:
-        """The second derivative of the strain energy (n, n), without loads (17)."""
+        """The second derivative of the strain energy (n, n), without loads (43)."""
         K = self.stiffness_blocks(q)
         for i in self._sleeved:
             own, row = self.structure.own[i][0], self.rows[i]
@@ -138,7 +141,7 @@ class Assembly:
         return K
 
     def damping(self, q: np.ndarray) -> np.ndarray:
-        """D (n, n): viscous friction of joints, alpha M + beta K of elastic unknowns (18)."""
+        """D (n, n): viscous friction of joints, alpha M + beta K of elastic unknowns (26)."""
         return self._damping(self.stiffness_blocks(q), q)
 
     def _damping(self, K: np.ndarray, q: np.ndarray) -> np.ndarray:
@@ -153,13 +156,13 @@ class Assembly:
         return D
 
     def coulomb(self, qd: np.ndarray) -> np.ndarray:
-        """Coulomb friction of the joints (n,), on the left-hand side (18)."""
+        """Coulomb friction of the joints (n,), on the left-hand side (57)."""
         out = np.zeros(self.n)
         out[self.rows] = self._coulomb * np.tanh(qd[self.rows] / COULOMB_RATE)
         return out
 
     def forces(self, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
-        """The forces (n,) that a motion needs (19), without Coulomb friction."""
+        """The forces (n,) that a motion needs (59), without Coulomb friction."""
         return (
             self.mass(q) @ qdd
             + self.bias(q, qd)
@@ -169,7 +172,7 @@ class Assembly:
         )
 
     def terms(self, q: np.ndarray, qd: np.ndarray) -> Terms:
-        """All of (19) but drives and Coulomb friction, in one sweep for a time loop."""
+        """All of (25) but drives and Coulomb friction, in one sweep for a time loop."""
         states = self.structure.states(q, qd)
         sums, flow = self._inertia(states, self._g)
         K, D = (
@@ -186,7 +189,7 @@ class Assembly:
         return self._diagonal, self.damping(np.zeros(self.n))
 
     def observe(self, q: np.ndarray, qd: np.ndarray, stations: int) -> np.ndarray:
-        """What a Run shows of a state, in the order of `record.channel_units` (2), (29).
+        """What a Run shows of a state, in the order of `record.channel_units` (4), (6).
 
         Link by link x, y [m], angle [rad] of its proximal end; if it bends its tip's distance
         across the tangent at its hub (sleeve) [m], the tip's angle to it [rad], and that distance
@@ -207,7 +210,7 @@ class Assembly:
         return np.array([*out, tip.real, tip.imag, *self._energies(states, q, qd)])
 
     def energies(self, q: np.ndarray, qd: np.ndarray) -> Energies:
-        """The energies in a state (29)."""
+        """The energies in a state: kinetic (20), strain (9), of gravity (23)."""
         return self._energies(self.structure.states(q, qd), q, qd)
 
     def _energies(self, states: list[LinkState], q: np.ndarray, qd: np.ndarray) -> Energies:
@@ -219,24 +222,24 @@ class Assembly:
         )
 
     def loss(self, q: np.ndarray, qd: np.ndarray) -> float:
-        """The power that damping and friction take [W] (30)."""
+        """The power that damping and friction take [W] (28)."""
         return float(qd @ (self.damping(q) @ qd + self.coulomb(qd)))
 
     def tip(self, q: np.ndarray, qd: np.ndarray | None = None) -> Frame:
-        """The frame of the robot's tip, with the columns of its place and angle (13)."""
+        """The frame of the robot's tip, with the columns of its place and angle (39)."""
         return (self._at_rest(q) if qd is None else self.structure.states(q, qd))[-1].tip
 
     def line(
         self, q: np.ndarray, link: int, s: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """x, y [m] and the tangent's angle [rad] of a link (from 1) at s (S,) [m] along it (2)."""
+        """x, y [m] and the tangent's angle [rad] of a link (from 1) at s (S,) [m] along it (3)."""
         state = self._at_rest(q)[link - 1]
         frames = [self.structure.at(state, float(x)) for x in np.atleast_1d(s)]
         place = np.array([f.place for f in frames])
         return place.real, place.imag, np.array([f.angle for f in frames])
 
     def tip_deflections(self, q: np.ndarray) -> np.ndarray:
-        """The tips of the flexible links across the tangents at their hubs (k,) [m]: r_y (2)."""
+        """The tips of the flexible links across the tangents at their hubs (k,) [m]: r_y (6)."""
         states = [state for state in self._at_rest(q) if state.lines]
         return np.array(
             [((s.tip.place - s.hub.place) * s.hub.tangent.conjugate()).imag for s in states]
@@ -246,7 +249,7 @@ class Assembly:
         return self.structure.states(q, np.zeros(self.n))
 
     def _clamped_mass(self, i: int, q: np.ndarray) -> np.ndarray:
-        """M (n, n) of link i alone, straight and clamped, with the payload of the last one (18)."""
+        """M (n, n) of link i alone, straight and clamped, with the payload of the last one (26)."""
         straight, still = np.zeros(self.n), np.zeros(self.n)
         straight[self.rows[i]] = q[self.rows[i]]
         state = self.structure.link(i, base(self.n), straight, still)

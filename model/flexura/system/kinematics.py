@@ -1,7 +1,7 @@
 """Frames and lines of a chain with their columns: rates of place and angle by all unknowns.
 
 Places are complex numbers x + iy in the base's axes, so that i turns a vector to the left.
-n unknowns; P points of a line. Equations: docs/theory/mechanics.md.
+n unknowns; P points of a line. Equations: docs/theory/01-kinematics.md.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from ..link.line import Piece
 
 
 class Frame(NamedTuple):
-    """A place and an angle that move with the robot (13).
+    """A place and an angle that move with the robot (39).
 
     place [m], angle [rad]; velocity (n,) complex and turning (n,): columns of their rates; rest and
     rest_turning: their second derivatives at zero accelerations of the unknowns.
@@ -61,7 +61,7 @@ def ahead(frame: Frame, x: float, rows: list[int], qd: np.ndarray) -> Frame:
 
 class Line(NamedTuple):
     """A piece's line in a state: tangents e (P,), their columns E (P, n), their rates e' = E q'
-    (P,), and N (P,) (1), (2).
+    (P,), and N (P,) (2), (5).
 
     N: second derivatives of e at zero accelerations of the unknowns.
 
@@ -98,7 +98,7 @@ def line(
     qd: np.ndarray,
     linear: bool = False,
 ) -> Line:
-    """The line of a piece that begins at `start` (1); with `linear` (12) on the hub's frame
+    """The line of a piece that begins at `start` (2), (5); with `linear` (7) on the hub's frame
     `axis`."""
     bent, bending = piece.B @ q[own], piece.B @ qd[own]
     spin = float(start.turning @ qd)
@@ -122,9 +122,10 @@ def line(
 
 
 def station(line: Line, xi: float, slider: int | None = None) -> Frame:
-    """The frame of a line at xi (11): of a material point, or of a slider at the unknown `slider`.
+    """The frame of a line at xi (30), (31): of a material point, or of a slider at the unknown
+    `slider`.
 
-    d xi' = eta' + (1 - xi) d', so that a material point of a sleeved link runs through the mesh.
+    d xi' = eta' + (1 - xi) d' (29): a material point of a sleeved link runs through the mesh.
     """
     d, start, y = line.free, line.start, line.q[line.own]
     w, l, dl, b, db, ddb = line.piece.tip if xi == 1.0 else line.piece.at(xi)

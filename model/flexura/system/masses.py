@@ -10,7 +10,7 @@ from .kinematics import Frame, Line
 
 
 class Masses(NamedTuple):
-    """Point masses and their motion (13).
+    """Point masses and their motion (39).
 
     mass (G,) [kg], place (G,) [m]; columns (G, n) of their velocities; rest (G,): accelerations at
     zero accelerations of the unknowns.
@@ -23,7 +23,7 @@ class Masses(NamedTuple):
 
 
 class Turning(NamedTuple):
-    """A moment of inertia [kg m^2] that turns with a frame, with columns (n,) (13)."""
+    """A moment of inertia [kg m^2] that turns with a frame, with columns (n,) (39)."""
 
     inertia: float
     columns: np.ndarray
@@ -34,7 +34,7 @@ Part = Masses | Turning
 
 
 class Sum(NamedTuple):
-    """What (14) to (16) sum over, a row for x, y of each mass and each angle: weights, columns (R,
+    """What (40) to (42) sum over, a row for x, y of each mass and each angle: weights, columns (R,
     n), accelerations (R,)."""
 
     weight: np.ndarray
@@ -43,17 +43,17 @@ class Sum(NamedTuple):
 
     @property
     def mass(self) -> np.ndarray:
-        """M (n, n), the sum of J^T m J (14)."""
+        """M (n, n), the sum of J^T m J (40)."""
         return self.columns.T @ (self.weight[:, None] * self.columns)
 
     @property
     def forces(self) -> np.ndarray:
-        """The sum of J^T m a, a the accelerations at zero ones of the unknowns (15), (16): (n,)."""
+        """The sum of J^T m a, a the accelerations at zero ones of the unknowns (41), (42): (n,)."""
         return (self.weight * self.rest) @ self.columns
 
 
 def summed(parts: list[Part], gravity: complex = 0j) -> Sum:
-    """The rows of all parts; gravity is an acceleration of the base (16)."""
+    """The rows of all parts; gravity is an acceleration of the base (42)."""
     points = [p for p in parts if isinstance(p, Masses)]
     angles = [p for p in parts if isinstance(p, Turning)]
     mass, J = np.concatenate([p.mass for p in points]), np.concatenate([p.columns for p in points])
@@ -78,7 +78,7 @@ def turning(inertia: float, frame: Frame) -> Turning:
 
 
 def line_masses(line: Line) -> Masses:
-    """The mass points of a piece of constant length (2)."""
+    """The mass points of a piece of constant length (4), (5)."""
     start, w = line.start, line.piece.w
     return Masses(
         line.piece.mass,
@@ -94,7 +94,7 @@ def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def potential(parts: list[Part], gravity: complex) -> float:
-    """The potential energy of gravity [J] (16)."""
+    """The potential energy of gravity [J] (23)."""
     return -sum(
         float(np.real(np.conj(gravity) * (p.mass @ p.place)))
         for p in parts

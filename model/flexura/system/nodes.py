@@ -22,8 +22,8 @@ SAME = 1e-9  # of an element: on the node
 
 @dataclass(frozen=True)
 class Nodes(Structure):
-    """The structure with the node of each link: of a sleeved one the last at rest, of a slider the
-    one that it takes, else 0."""
+    """The structure with the node of each link (38): of a sleeved one the last at rest, of a slider
+    the one that it takes, else 0."""
 
     nodes: tuple[int, ...] = ()
 
@@ -71,8 +71,8 @@ def cut(link: Link) -> bool:
 
 
 def nodes_at(robot: Robot, position: np.ndarray) -> tuple[int, ...]:
-    """The nodes (N,) of `Nodes` with the joints at `position` (N,); one element at least is ahead
-    of a sleeve."""
+    """The nodes (N,) of `Nodes` with the joints at `position` (N,) (38); one element at least is
+    ahead of a sleeve."""
     out: list[int] = []
     for i, (link, x) in enumerate(zip(robot.links, position)):
         node = 0

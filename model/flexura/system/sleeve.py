@@ -1,4 +1,4 @@
-"""A flexible link that slides through a sleeve (Pb): its mesh covers the free length (8), (9)."""
+"""A flexible link that slides through a sleeve (Pb), its mesh on the free length: (32) to (37)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .masses import Masses, Part, dot, lump
 
 
 def masses(line: Line, law: Material) -> list[Part]:
-    """The masses of a sleeved link: free length, rod, and at the exit what the sums miss (9)."""
+    """The masses of a sleeved link: free length (33), rod (34), and at the exit what sums miss."""
     assert line.row is not None
     free, rod = free_masses(line, law), rod_behind(line.start, line.free, line.row, law, line.qd)
     missed = float(line.piece.mass.sum() - free.mass.sum() - rod.mass.sum())
@@ -19,7 +19,7 @@ def masses(line: Line, law: Material) -> list[Part]:
 
 
 def free_masses(line: Line, law: Material) -> Masses:
-    """The Gauss points on the free length, with the velocity of the material there (8), (9)."""
+    """The Gauss points on the free length, with the velocity of the material there (32), (33)."""
     d, piece, start = line.free, line.piece, line.start
     C = d * piece.C
     columns = start.velocity + C @ line.E
@@ -34,11 +34,11 @@ def free_masses(line: Line, law: Material) -> Masses:
 
 
 def flow_forces(line: Line, law: Material, free: Masses) -> np.ndarray:
-    """The terms of (9) beside columns times mass times accelerations, without dU: (n,). free:
+    """The terms of (37) beside columns times mass times accelerations, without dU: (n,). free:
     `free_masses`."""
     d, d_rate, start, row, mu = line.free, line.rate, line.start, line.row, free.mass
     V, behind = (free.columns - start.velocity) @ line.qd, 1 - line.piece.xi
-    left, mu_d = mu * behind, mu / d  # mu_d: d mu / dd at fixed xi (8)
+    left, mu_d = mu * behind, mu / d  # mu_d: d mu / dd at fixed xi (33)
     if not law.uniform:
         mu_d = mu_d - d * behind * line.piece.weights * law.mass_per_length(
             law.length - d * behind, 1
@@ -52,7 +52,7 @@ def flow_forces(line: Line, law: Material, free: Masses) -> np.ndarray:
 
 
 def rod_behind(start: Frame, free: float, row: int, law: Material, qd: np.ndarray) -> Masses:
-    """The masses of the straight rod inside and behind the sleeve, on its axis (9)."""
+    """The masses of the straight rod inside and behind the sleeve, on its axis (34)."""
     s, ds = law.quadrature(0.0, law.length - free, 4)
     t, spin, x = start.tangent, float(start.turning @ qd), s - law.length + free
     columns = start.velocity + (1j * t * x)[:, None] * start.turning
@@ -64,7 +64,7 @@ def rod_behind(start: Frame, free: float, row: int, law: Material, qd: np.ndarra
 
 
 def stiffness(piece: Piece, d: float, law: Material, derivative: int = 0) -> np.ndarray:
-    """K(d) [N m] of the free length d, or its first or second derivative by d (17): (m, m)."""
+    """K(d) [N m] of the free length d, or its first or second derivative by d (35): (m, m)."""
     if law.uniform:
         return law.stiffness[0, 0] * (1 / d, -1 / d**2, 2 / d**3)[derivative] * piece.unit_stiffness
     X, left = law.length - d + d * piece.xi, 1 - piece.xi

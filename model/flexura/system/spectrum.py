@@ -26,8 +26,8 @@ class Modes:
 def frequencies(
     robot: Any, q: Any = None, joints: str = "locked", *, count: int | None = None, qd: Any = None
 ) -> np.ndarray:
-    """Natural frequencies [Hz], ascending, of the undamped robot linearised about q (n,) (27),
-    (28).
+    """Natural frequencies [Hz], ascending, of the undamped robot linearised about q (n,) (52),
+    (54).
 
     Args: robot: a System, a Robot, or a robot file; q (n,): by default the static equilibrium at
     the start; joints: "locked" (only

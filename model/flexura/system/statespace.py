@@ -39,7 +39,7 @@ class StateSpace:
 
     @property
     def A(self) -> np.ndarray:
-        """(2m, 2m)."""
+        """(2m, 2m) (53)."""
         m = len(self.M)
         return np.block(
             [[np.zeros((m, m)), np.eye(m)], [-np.linalg.solve(self.M, np.hstack([self.K, self.G]))]]
@@ -47,12 +47,12 @@ class StateSpace:
 
     @property
     def B(self) -> np.ndarray:
-        """(2m, inputs)."""
+        """(2m, inputs) (53)."""
         return np.vstack([np.zeros_like(self.E), np.linalg.solve(self.M, self.E)])
 
     @property
     def C(self) -> np.ndarray:
-        """(outputs, 2m)."""
+        """(outputs, 2m) (53)."""
         return np.hstack([self.outlook, np.zeros_like(self.outlook)])
 
     @property
@@ -73,10 +73,10 @@ class StateSpace:
         0 while the drive acts.
 
         Motions with c dq = 0 in the directions that the drive does not push, L^T (s^2 M + s G + K)
-        N z = 0, N = ker c, L = ker b: the finite invariant zeros of the pencil [[A - s, B], [C,
-        0]], without its infinite ones. Those with a positive real part (non-minimum phase) bound
-        what feedback of that output can do. Raises InputError for unknown names, and for an output
-        that the drive does not move.
+        N z = 0, N = ker c, L = ker b (56): the finite invariant zeros of the pencil
+        [[A - s, B], [C, 0]], without its infinite ones. Those with a positive real part
+        (non-minimum phase) bound what feedback of that output can do. Raises InputError for unknown
+        names, and for an output that the drive does not move.
         """
         from scipy.linalg import cholesky, null_space, solve_triangular
 
@@ -108,7 +108,7 @@ class StateSpace:
 
 def linearize(robot: Any, q: Any = None, qd: Any = None, joints: str = "free") -> StateSpace:
     """The robot linearised about an equilibrium q (n,), by default the static one at the start, or
-    about a steady motion (27).
+    about a steady motion (52).
 
     Args: robot: a System, a Robot, or a robot file; q (n,); qd (n,): joint rates of a steady
     motion, a rotation or translation of the

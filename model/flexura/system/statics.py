@@ -28,7 +28,7 @@ def static(
     tip_force: tuple[float, float] = (0.0, 0.0),
     tip_moment: float = 0.0,
 ) -> np.ndarray:
-    """The static equilibrium q (n,) with the joints held: elastic + gravity = J_tip^T load (25).
+    """The static equilibrium q (n,) with the joints held: elastic + gravity = J_tip^T load (50).
 
     The load grows in steps from the straight robot, so that any bending is found: a cantilever
     under a dead transverse force P takes the shape of the elastica for any P L^2 / EI.

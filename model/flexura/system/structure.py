@@ -34,7 +34,7 @@ class LinkState(NamedTuple):
 class Structure:
     """A robot's links as pieces, numbered q = [joint 1, elastic unknowns of link 1, joint 2, ...].
 
-    `linear`: the dissertation's line (12).
+    `linear`: the dissertation's line (7).
     """
 
     robot: Robot
@@ -85,14 +85,14 @@ class Structure:
         return self.robot.links[i].joint.type == "Pb"
 
     def states(self, q: np.ndarray, qd: np.ndarray) -> list[LinkState]:
-        """The links in a state, from the base outwards (13)."""
+        """The links in a state, from the base outwards (39)."""
         out: list[LinkState] = []
         for i in range(len(self.links)):
             out.append(self.link(i, self._hub(i, out[-1] if out else None, q, qd), q, qd))
         return out
 
     def link(self, i: int, hub: Frame, q: np.ndarray, qd: np.ndarray) -> LinkState:
-        """Link i in a state, from the frame of its hub to its tip (1), (2)."""
+        """Link i in a state, from the frame of its hub to its tip (2), (5)."""
         row = self.rows[i]
         if not self.links[i]:
             return LinkState(
@@ -114,7 +114,7 @@ class Structure:
         )
 
     def _hub(self, i: int, before: LinkState | None, q: np.ndarray, qd: np.ndarray) -> Frame:
-        """The frame of link i's hub (of Pb: of the sleeve's exit) on the link before it (11)."""
+        """The frame of link i's hub (Pb: of the sleeve's exit) on the link before it (1), (30)."""
         joint, row = self.robot.links[i].joint, self.rows[i]
         tip = before.tip if before else base(self.n)
         if joint.type == "R":
@@ -129,7 +129,7 @@ class Structure:
         return turned(ahead(before.hub, x, [row, *rows], qd), joint.angle_rad)
 
     def at(self, state: LinkState, s: float) -> Frame:
-        """The frame of a link at arc length s [m] from its proximal end (2), (11)."""
+        """The frame of a link at arc length s [m] from its proximal end (4), (30)."""
         x, rows = self._along(state.number, s, state.q)
         if not state.lines or x < 0:
             return ahead(state.hub, x, rows, state.qd)
@@ -138,7 +138,7 @@ class Structure:
         return station(state.lines[k], x / h - k)
 
     def places(self, state: LinkState, s: np.ndarray) -> np.ndarray:
-        """Places of a flexible link at arc lengths s (S,) [m] from its proximal end (2)."""
+        """Places of a flexible link at arc lengths s (S,) [m] from its proximal end (4)."""
         if len(state.lines) > 1:
             return np.array([self.at(state, float(x)).place for x in s])
         line, x = state.lines[0], s + self._along(state.number, 0.0, state.q)[0]
@@ -151,13 +151,13 @@ class Structure:
         return line.start.place + np.minimum(x, 0.0) * state.hub.tangent + reach
 
     def root(self, state: LinkState) -> complex:
-        """The place of a link's proximal end (2)."""
+        """The place of a link's proximal end (3)."""
         if state.lines and not self.sleeved(state.number):
             return state.lines[0].start.place
         return state.hub.place + self._along(state.number, 0.0, state.q)[0] * state.hub.tangent
 
     def masses(self, state: LinkState) -> list[Part]:
-        """A link's masses: its material, its hub, and the payload of the last one (3)."""
+        """A link's masses: its material, its hub, and the payload of the last one (21), (22)."""
         joint, parts = self.robot.links[state.number].joint, self.own_masses(state)
         if joint.hub_mass_kg:
             parts.append(lump(joint.hub_mass_kg, state.hub))
@@ -206,7 +206,7 @@ def _pieces(robot: Robot, link: Link, after: Link | None, linear: bool) -> tuple
 
 
 def rigid_body(robot: Robot, i: int) -> tuple[float, float, float]:
-    """Mass [kg], centre [m] from the proximal end, inertia [kg m^2] about it, of rigid link i."""
+    """Mass [kg], centre [m] from the proximal end, inertia [kg m^2] about it: rigid link i (15)."""
     link = robot.links[i]
     if link.mass_kg is not None:
         centre = link.length_m / 2 if link.centre_of_mass_m is None else link.centre_of_mass_m

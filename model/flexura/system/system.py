@@ -23,11 +23,11 @@ _UNITS = {"rotation": "rad", "bubble": "rad", "shape": "rad", "mode": "kg^(1/2) 
 
 @dataclass(frozen=True)
 class System:
-    """A robot's equations M(q) qdd + bias(q, qd) + damping qd + elastic(q) + gravity(q) = F (19).
+    """A robot's equations M(q) qdd + bias(q, qd) + damping qd + elastic(q) + gravity(q) = F (25).
 
     q (n,) is numbered [joint 1, elastic unknowns of link 1, joint 2, ...], named by `labels`: of a
-    mesh the rotation across each element and its bubble [rad] (6), of a link in its own modes
-    mass-normalised coordinates [kg^(1/2) m], of a sleeved link its shapes [rad] (7). F has entries
+    mesh the rotation across each element and its bubble [rad] (10), of a link in its own modes
+    mass-normalised coordinates [kg^(1/2) m], of a sleeved link its shapes [rad] (12). F has entries
     in the joints' rows. Constant; solvers keep their memory apart from it.
     """
 
@@ -128,12 +128,12 @@ class System:
         return q
 
     def mass(self, q: Any) -> np.ndarray:
-        """M(q) (n, n) (14)."""
+        """M(q) (n, n) (40)."""
         return self.assembly.mass(self.check(q))
 
     def stiffness(self, q: Any = None) -> np.ndarray:
         """K (n, n) at the start; with q the tangent stiffness there, the slope of elastic and
-        gravity forces (17), (26)."""
+        gravity forces (43), (51)."""
         if q is None:
             return self.assembly.stiffness_blocks(self.check(self.start()))
         return self.tangent(q)
@@ -141,33 +141,33 @@ class System:
     @cached_property
     def damping(self) -> np.ndarray:
         """D (n, n) at the start: Rayleigh damping of the elastic unknowns and viscous friction of
-        the joints (18)."""
+        the joints (26)."""
         return self.damping_at(self.start())
 
     def damping_at(self, q: Any) -> np.ndarray:
-        """D (n, n) at q: it depends on the free length of a sleeved link, on nothing else (18)."""
+        """D (n, n) at q: it depends on the free length of a sleeved link, on nothing else (26)."""
         return self.assembly.damping(self.check(q))
 
     def elastic(self, q: Any) -> np.ndarray:
-        """Elastic forces (n,), on the left-hand side (17)."""
+        """Elastic forces (n,), on the left-hand side (43)."""
         return self.assembly.elastic(self.check(q))
 
     def gravity(self, q: Any) -> np.ndarray:
-        """Generalised gravity forces (n,), on the left-hand side (16)."""
+        """Generalised gravity forces (n,), on the left-hand side (42)."""
         return self.assembly.gravity(self.check(q))
 
     def bias(self, q: Any, qd: Any) -> np.ndarray:
-        """Coriolis and centrifugal forces (n,), on the left-hand side (15)."""
+        """Coriolis and centrifugal forces (n,), on the left-hand side (41)."""
         return self.assembly.bias(self.check(q), self.check(qd, "qd"))
 
     def forces(self, q: Any, qd: Any, qdd: Any) -> np.ndarray:
         """Generalised forces (n,) that the motion needs: the whole left-hand side, Coulomb friction
-        left out (19)."""
+        left out (59)."""
         return self.assembly.forces(self.check(q), self.check(qd, "qd"), self.check(qdd, "qdd"))
 
     def accelerations(self, q: Any, qd: Any, force: Any) -> np.ndarray:
         """qdd (n,) under generalised forces (n,), locked joints at rest; Coulomb friction left out
-        (20) to (23)."""
+        (44) to (47)."""
         at, rates, acting = self.check(q), self.check(qd, "qd"), self.check(force, "force")
         if self.exact:
             return np.asarray(self.equations.accelerations(at, rates, acting))
@@ -209,7 +209,7 @@ class System:
 
     def angles(self, link: int, s: Any) -> np.ndarray:
         """What each unknown turns the tangent by (S, n), against the hub, at s (S,) [m] along a
-        link (from 1) of constant length: B of (1)."""
+        link (from 1) of constant length: B of (2)."""
         places = np.atleast_1d(np.asarray(s, dtype=float))
         out, start = np.zeros((len(places), self.n)), 0.0
         for piece, own in zip(
@@ -222,7 +222,7 @@ class System:
 
     def observe(self, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
         """What a Run shows of states q, qd (T, n): rows of poses, deflections, tip and energies, as
-        `record.channel_units` names them from `link/1/x` to `energy/potential` (2), (29)."""
+        `record.channel_units` names them from `link/1/x` to `energy/potential` (4), (6)."""
         if self.exact:
             return np.asarray(self.equations.observe(q, qd, STATIONS))
         return np.array([self.assembly.observe(a, b, STATIONS) for a, b in zip(q, qd, strict=True)])
@@ -270,7 +270,7 @@ class System:
 
     def tangent(self, q: Any, qd: Any = None) -> np.ndarray:
         """The derivative of bias, elastic and gravity forces by q (n, n), at rest or at rates qd
-        (n,) (27)."""
+        (n,) (52)."""
         at, rates = self.check(q), None if qd is None else self.check(qd, "qd")
         if self.exact:
             return np.asarray(self.equations.stiffness(at, np.zeros(0) if rates is None else rates))
@@ -282,7 +282,7 @@ class System:
 
     def rate(self, q: Any, qd: Any) -> np.ndarray:
         """The derivative of all forces by qd (n, n) at (q, qd): damping, friction, and the
-        gyroscopic terms of a motion (27)."""
+        gyroscopic terms of a motion (52)."""
         at, rates = self.check(q), self.check(qd, "qd")
         if self.exact:
             return np.asarray(self.equations.rates(at, rates))

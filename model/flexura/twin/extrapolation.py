@@ -14,7 +14,7 @@ SENSITIVE = ("position", "tip_deflection")  # the channels that `meta["extrapola
 
 
 def extrapolate(run: Run, longer: Mapping[str, Run]) -> Run:
-    """The run as hubs and sleeves get infinitely short, delta -> 0 (Richardson).
+    """The run as hubs and sleeves get infinitely short, delta -> 0 (105).
 
     `longer`: by joint type, the run in which delta of joints of that type is LONGER times as long.
     Errors c delta^p, of order p = ORDER[type], of both types add up: y + sum_types (y -

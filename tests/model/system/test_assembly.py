@@ -25,7 +25,7 @@ def test_the_mass_matrix_is_symmetric_and_positive_definite(name, linear):
 
 @pytest.mark.parametrize("name, linear", ALL)
 def test_the_bias_is_that_of_lagranges_equations(name, linear):
-    """d/dt dT/dqd - dT/dq by differences; in a sleeve this tests the cancellations of (9)."""
+    """d/dt dT/dqd - dT/dq by differences; in a sleeve this tests the cancellations of (37)."""
     assembly, q, qd = assembly_and_state(name, linear)
     want = chains.lagrange(assembly, q, qd)
     assert assembly.bias(q, qd) == pytest.approx(want, abs=1e-8 * np.abs(want).max())

@@ -1,4 +1,4 @@
-"""The compiled core against the extended assembly: one theory, two derivations (14) to (19)."""
+"""The compiled core against the extended assembly: one theory, two derivations, (40) to (47)."""
 
 import numpy as np
 import pytest

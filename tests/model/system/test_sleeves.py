@@ -76,7 +76,7 @@ def bent(assembly, d, force):
     residual = lambda x: assembly.elastic(x) - np.real(assembly.tip(x).velocity.conj() * force)
     for _ in range(30):
         (line,) = assembly.structure.states(q, 0 * q)[0].lines
-        gamma = d * line.piece.weights * np.real(np.conj(force) * line.e)  # (26)
+        gamma = d * line.piece.weights * np.real(np.conj(force) * line.e)  # (51)
         S = assembly.stiffness(q)[1:, 1:] + line.piece.B.T @ (gamma[:, None] * line.piece.B)
         step = np.linalg.solve(S, -residual(q)[1:])
         q[1:] += step * min(1.0, 1.0 / np.abs(step).max())

@@ -1,4 +1,4 @@
-"""Equilibria: the elastica under a dead tip load, roll-up, and the geometric stiffness (26)."""
+"""Equilibria: the elastica under a dead tip load, roll-up, and the geometric stiffness (51)."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ WHOLE = robot(beam(1.0, 1.0, 1.0, 10), rigid(0.0, 0.0, 0.0, 0.0, "Pa", start=1.0
 
 
 def geometric(assembly, q, force):
-    """The geometric stiffness (n, n) of joints R under a dead tip force (complex), by (26)."""
+    """The geometric stiffness (n, n) of joints R under a dead tip force (complex), by (51)."""
     S, g = np.zeros((assembly.n, assembly.n)), complex(*assembly.robot.gravity_m_s2)
     states = assembly.structure.states(q, 0 * q)
     load = assembly.robot.payload.mass_kg * g + force
@@ -31,7 +31,7 @@ def geometric(assembly, q, force):
 
 
 def equilibrium(assembly, force, moment=0.0, steps=1):
-    """q with joints held at their start under a dead tip force and moment (25)."""
+    """q with joints held at their start under a dead tip force and moment (50)."""
     q, free = np.zeros(assembly.n), np.setdiff1d(np.arange(assembly.n), assembly.rows)
     q[assembly.rows] = assembly.robot.start
     for share in np.arange(1, steps + 1) / steps:

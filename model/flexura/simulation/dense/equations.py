@@ -13,7 +13,7 @@ from ...system.assembly import COULOMB_RATE, Terms
 
 
 class Equations:
-    """The dense equations (19) under a drive.
+    """The dense equations (25) under a drive.
 
     Args: drive: a Drive, a function of four arguments, or None where `held` has the forces.
     """
@@ -43,7 +43,7 @@ class Equations:
         self._solve = dposv
         self._coulomb = np.array([link.joint.coulomb_friction for link in system.robot.links])
         self.evaluations = 0
-        self.seen: tuple[Terms, np.ndarray, np.ndarray]  # the last terms (19), and q, v (n,) there
+        self.seen: tuple[Terms, np.ndarray, np.ndarray]  # the last terms (25), and q, v (n,) there
 
     def state(self, t: float, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """q, v and the accelerations that are prescribed (n,), with the joints that follow a motion
@@ -60,8 +60,8 @@ class Equations:
         return self.acted(t, z)[0]
 
     def acted(self, t: float, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """dz/dt, and the forces of the drives (N,), those that a motion needs included (19), (29),
-        (30)."""
+        """dz/dt, and the forces of the drives (N,), those that a motion needs included (25), (27),
+        (28)."""
         q, v, a = self.state(t, z)
         self.evaluations += 1
         if self.held is not None:
@@ -111,7 +111,7 @@ class Equations:
 
     def linear(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """M, K and D (m, m) in the free rows at the last evaluation, with the drives' gains and the
-        slope of friction (36)."""
+        slope of friction (86)."""
         terms, _, v = self.seen
         K, D = terms.stiffness.copy(), terms.damping.copy()
         D[self.rows, self.rows] += (

@@ -41,7 +41,7 @@ def solve(problem: Problem, progress: Progress = None) -> Solution:
     node to node.
 
     Work, loss and strain energy are integrated beside the motion and under the same error control
-    (29), (30). Methods are "explicit" (DOP853), "implicit" (Radau with the slope of the linear
+    (27), (28). Methods are "explicit" (DOP853), "implicit" (Radau with the slope of the linear
     forces), "exponential" (`exponential`), or "auto", one of them. The solution goes up to the end,
     a limit, an interruption, or where no step is short enough.
     """
@@ -290,7 +290,7 @@ class Integration:
 
     def _atol(self) -> np.ndarray:
         """What the numbers of a state may be wrong by in a step, for the root of the mean square
-        (32)."""
+        (82)."""
         return CAUTION[self.method] * self.weights.tolerance / np.sqrt(len(self.z))
 
     def _method(self, asked: str) -> str:

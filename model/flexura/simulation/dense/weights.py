@@ -1,4 +1,4 @@
-"""What an error weighs: metres at the robot's tips over the tolerance (31), (32)."""
+"""What an error weighs: metres at the robot's tips over the tolerance (81), (82)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ LEAST = 0.01  # of the robot's length: the lever of a joint that turns nothing l
 
 
 class Weights:
-    """The sizes of a run so far, and by how much each number of a state may be wrong.
+    """The sizes of a run so far (81), and by how much each number of a state may be wrong (82).
 
     `tolerance` (2n + 3,) belongs to z = (q, v, work, loss, strain); an error e is good if e /
     tolerance has a norm below 1.

@@ -191,7 +191,7 @@ def equip(
 
 
 def _friction(mbs: Any, spring: Any, coulomb: float) -> Any:
-    """c v + f tanh(v / v0) as an expression that Exudyn evaluates without calling Python."""
+    """c v + f tanh(v / v0) (57) as an expression that Exudyn evaluates without calling Python."""
     from exudyn import symbolic
     from exudyn.advancedUtilities import CreateSymbolicUserFunction
 

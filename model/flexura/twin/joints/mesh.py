@@ -110,8 +110,8 @@ def hub_places(delta: float) -> np.ndarray:
 
 
 def sleeve_places(delta: float, length: float, element: float) -> np.ndarray:
-    """The points of a sleeve, ahead of its exit [m], for a link of a length on a mesh of elements
-    of another.
+    """The points of a sleeve, ahead of its exit [m] (104), for a link of a length on a mesh of
+    elements of another.
 
     There are enough to guide the whole link, so that what is behind the exit stays straight.
     """

@@ -46,7 +46,7 @@ class BeamValues:
 
 
 def beam_values(link: Link, elements: int) -> BeamValues:
-    """The values of a flexible link's elements."""
+    """The values of a flexible link's elements (103)."""
     ends = np.linspace(0.0, link.length_m, elements + 1)
     kinks = np.array(link.breaks())
     mass = _means(link.mass_per_length, ends, kinks)
