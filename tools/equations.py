@@ -43,7 +43,7 @@ _EQUATION = re.compile(
     r"(?P<latex>(?:(?!<a id=).)*?\\tag\{(?P<number>\d+)\})",
     re.DOTALL,
 )
-_CITATION = re.compile(r"(?<![\w)\]])\((\d{1,3})\)(?:\s+to\s+\((\d{1,3})\))?(?![\w(\[])")
+_CITATION = re.compile(r"(?<![\w)\]'])\(([1-9]\d{0,2})\)(?:\s+to\s+\((\d{1,3})\))?(?![\w(\[])")
 _COMMENT = re.compile(r"(?:^[ \t]*//.*\n)+|//.*", re.MULTILINE)
 
 

@@ -12,6 +12,8 @@ table = importlib.util.module_from_spec(_SPEC)
 _SPEC.loader.exec_module(table)
 EQUATIONS = table.equations(ROOT)
 TESTS = table.tested(ROOT)
+CITATIONS = table.citations(ROOT)
+MOST = 3  # numbers in the docstring of a function
 
 
 def test_the_numbers_run_from_one_in_the_order_of_the_chapters():
@@ -32,6 +34,53 @@ def test_an_equation_is_evaluated_by_a_test(equation):
     assert TESTS.get(equation.number), (
         f"no test in tests/docs names ({equation.number}), {equation.name}"
     )
+
+
+@pytest.mark.parametrize("equation", EQUATIONS, ids=lambda e: str(e.number))
+def test_an_equation_is_cited_by_what_computes_it(equation):
+    assert CITATIONS.get(equation.number), f"no code cites ({equation.number}), {equation.name}"
+
+
+def test_the_code_cites_equations_that_there_are():
+    assert set(CITATIONS) <= {e.number for e in EQUATIONS}
+
+
+def test_a_function_cites_three_equations_at_most():
+    for path in sorted((ROOT / table.PYTHON).rglob("*.py")):
+        for name, text in table.docstrings(path):
+            assert len(set(table.written(text))) <= MOST, (path.name, name)
+
+
+def test_citations_are_found_in_docstrings_and_comments(tmp_path):
+    text = "The energies (20), (21) to (23); g'' + d g' = 0, g(0) = 0, P_(3), order 4(3), f(x) (9)."
+    assert table.cited(text) == {9, 20, 21, 22, 23} and table.written(text) == [20, 21, 23, 9]
+    (tmp_path / "a.py").write_text(
+        'class A:\n    def f(self):\n        """As (7)."""\n        (8)\n'
+    )
+    assert dict(table.docstrings(tmp_path / "a.py")) == {"": "", "A": "", "A.f": "As (7)."}
+    (tmp_path / "a.hpp").write_text("// From (7)\n// to (9).\nf(5);  // (1)\n")
+    assert [table.cited(text) for text in table.comments(tmp_path / "a.hpp")] == [{7, 8, 9}, {1}]
+
+
+FIELD = {  # what somebody looks for by the field's word, and where it is computed
+    "point on a bent link": (3, "system.assembly.Assembly.line"),
+    "condensation": (46, "dynamics/piece/condensation.hpp"),
+    "out of its sleeve": (36, "system.assembly.Assembly.elastic"),
+    "coulomb friction": (57, "system.assembly.Assembly.coulomb"),
+    "exponential predictor": (90, "integration/exponential/predictor_corrector.hpp"),
+    "pid with anti-windup": (72, "control.controller.PID"),
+    "stop at a limit": (64, "integration/joint_limits.hpp"),
+    "payload with its rotary inertia": (22, "system.structure.Structure.masses"),
+}
+
+
+@pytest.mark.parametrize("word", FIELD)
+def test_an_equation_is_found_by_the_fields_word_in_two_look_ups(word):
+    """The word is in a name or two of the table; the row names what computes the equation."""
+    number, code = FIELD[word]
+    found = [e.number for e in EQUATIONS if word in e.name.lower()]
+    assert number in found and len(found) <= 2
+    assert code in CITATIONS[number]
 
 
 def test_tests_name_equations_that_there_are():

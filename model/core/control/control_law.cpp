@@ -49,7 +49,7 @@ void ControlLaw::tick(long k, double t, const double *q, const double *, Sampled
   if (linear.states > 0) predict();
 }
 
-// The strip: readings of two ticks make a value, its filter and its rate.
+// The strip: readings of two ticks make a value, its filter and its rate (69).
 void ControlLaw::sense(long k, const double *q) {
   if (!strip) return;
   Bend now = strip(q);
@@ -67,7 +67,7 @@ void ControlLaw::sense(long k, const double *q) {
   before_ = now;
 }
 
-// Reference, place and velocity of joint i.
+// Reference, place and velocity of joint i (68).
 void ControlLaw::measure(long k, double t, std::size_t i, const double *q) {
   const JointLaw &joint = joints[i];
   Memory &m = memory_[i];
@@ -104,7 +104,7 @@ double ControlLaw::pid_output(long k, double t, std::size_t i) {
   return m.pid.update(a_tick(joint), in);
 }
 
-// z^ = z + L (y - C z).
+// z^ = z + L (y - C z) (77).
 void ControlLaw::estimate() {
   const std::size_t p = std::size_t(linear.states), M = measured_.size();
   estimated_ = predicted_;

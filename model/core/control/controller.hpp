@@ -1,6 +1,6 @@
 // A sampled controller (control_law.hpp) at work on a robot: its gains as rows of numbers, what it
 // measures of a state, and the drives through which its outputs act: a force, a motor's force_per_u
-// u - damping eta', or a stepper's pulses with or without a magnetic spring.
+// u - damping eta' (62), or a stepper's pulses with or without a magnetic spring (63).
 #pragma once
 #include <memory>
 

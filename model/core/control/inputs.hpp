@@ -3,9 +3,9 @@
 //
 //     force_i = f_i(t) + held_i + g_i(t, q, q') + kp_i (r_i - eta_i) + kd_i (r'_i - eta'_i)
 //
-// f_i and r_i are signals, held_i what the sampled controller holds since its last tick, g_i the
-// caller's function. A joint may follow its motion r_i exactly instead (prescribed); then the force
-// is what that takes.
+// (58). f_i and r_i are signals, held_i what the sampled controller holds since its last tick, g_i
+// the caller's function. A joint may follow its motion r_i exactly instead (prescribed); then the
+// force is what that takes.
 #pragma once
 #include <algorithm>
 #include <cmath>

@@ -2,7 +2,7 @@
 //
 // A signal is a list of segments, ascending in t0; on each, with s = t - t0,
 //
-//     y(s) = c0 + c1 s + ... + c5 s^5 + A sin(w s + phi).
+//     y(s) = c0 + c1 s + ... + c5 s^5 + A sin(w s + phi).                            (60)
 //
 // It jumps or kinks only where a segment begins. Before the first segment it keeps its first value.
 #pragma once

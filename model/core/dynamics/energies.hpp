@@ -1,5 +1,5 @@
-// Kinetic energy (3), strain energy (5), (17), gravity's potential (16), and the power that damping
-// takes (30).
+// Kinetic energy (20), strain energy (9), gravity's potential (23), and the power that damping
+// takes (28).
 #pragma once
 #include "dynamics/friction.hpp"
 #include "dynamics/positions.hpp"
@@ -33,7 +33,7 @@ void first_moment(const Piece<Real> &c, const PieceState<Real> &k, const Real *y
   }
 }
 
-// Strain energy of a sleeved piece: 1/2 q K(d) q.
+// Strain energy of a sleeved piece: 1/2 q K(d) q (35).
 template <class Real>
 Real sleeve_strain(const Piece<Real> &c, const Real *y) {
   Real bent[Free::most], out = 0.0;
@@ -45,8 +45,8 @@ Real sleeve_strain(const Piece<Real> &c, const Real *y) {
   return out;
 }
 
-// Twice the kinetic energy of a sleeved piece, without its rotor: a quadratic form in the rates of
-// its hub, its own unknowns and d.
+// Twice the kinetic energy of a sleeved piece (33), (34), without its rotor: a quadratic form in
+// the rates of its hub, its own unknowns and d.
 template <class Real>
 Real sleeve_inertia(const Piece<Real> &c, const PieceState<Real> &k, const Real &vx, const Real &vy,
                     bool last, const Real *y, const Real *v) {
@@ -65,8 +65,8 @@ Real sleeve_inertia(const Piece<Real> &c, const PieceState<Real> &k, const Real 
   return out;
 }
 
-// Kinetic energy (3), (4) of a piece whose hub moves at (vx, vy), with its rotor; of the last piece
-// also the payload's rotary inertia.
+// Kinetic energy (20), (16) of a piece whose hub moves at (vx, vy), with its rotor; of the last
+// piece also the payload's rotary inertia (22).
 template <class Real>
 Real kinetic_energy(const Piece<Real> &c, const PieceState<Real> &k, const Real &vx, const Real &vy,
                     bool last, const Real *y, const Real *v) {
@@ -85,7 +85,7 @@ Real kinetic_energy(const Piece<Real> &c, const PieceState<Real> &k, const Real 
   }
   out += c.mass * (vx * vx + vy * vy) + c.hub * k.omega * k.omega +
          2.0 * (vx * momentum_x + vy * momentum_y);
-  if (last) {  // the payload's rotary inertia, 1/2 I_tip Omega_L^2 (3)
+  if (last) {  // the payload's rotary inertia, 1/2 I_tip Omega_L^2 (22)
     Real turning = k.omega;
     for (int i = 0; i < c.m; ++i) turning += c.tip_angle[i] * v[c.own() + i];
     out += c.tip * turning * turning;
@@ -93,7 +93,7 @@ Real kinetic_energy(const Piece<Real> &c, const PieceState<Real> &k, const Real 
   return 0.5 * out;
 }
 
-// Energies at (y, v) (n): kinetic; strain (5); potential of gravity, 0 with all mass at the origin.
+// Energies at (y, v) (n): kinetic; strain (9); potential of gravity, 0 with all mass at the origin.
 template <class Real>
 Energies<Real> energies(const Model<Real> &model, Workspace<Real> &work, const Real *y,
                         const Real *v) {

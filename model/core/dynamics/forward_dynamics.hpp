@@ -1,4 +1,4 @@
-// Forward dynamics of a chain (20) to (23) in time proportional to its length: three sweeps over
+// Forward dynamics of a chain (44) to (47) in time proportional to its length: three sweeps over
 // its pieces.
 //
 //   outward   angles, rates, places of the joints kinematics.hpp inward    the wrench that moves a

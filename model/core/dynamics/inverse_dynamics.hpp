@@ -1,4 +1,4 @@
-// Inverse dynamics (19): the forces of a motion, in one sweep out and one back.
+// Inverse dynamics (59): the forces of a motion, in one sweep out and one back.
 #pragma once
 #include "dynamics/forward_dynamics.hpp"
 
@@ -11,7 +11,7 @@ struct Terms {
            true;  // damping (with stiffness only): D v, viscous friction; never Coulomb friction
 };
 
-// W z of a piece's points, z (P, 2): R^T (R z) (4).
+// W z of a piece's points, z (P, 2): R^T (R z) (16).
 template <class Real>
 inline void weigh_points(const Piece<Real> &c, const Real *zx, const Real *zy, Real *Yx, Real *Yy) {
   const int P = c.P;

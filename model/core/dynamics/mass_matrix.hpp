@@ -1,10 +1,10 @@
-// The mass matrix M(q) of a chain in one sweep inward, by composite bodies.
+// The mass matrix M(q) of a chain in one sweep inward, by composite bodies (48).
 #pragma once
 #include "dynamics/inverse_dynamics.hpp"
 
 namespace flexura {
 
-// The inertia of a piece and of all beyond it, with no unknown eliminated: (21).
+// The inertia of a piece and of all beyond it, with no unknown eliminated: (48).
 template <class Real, class R, class Size>
 inline void composite(const Piece<Real> &c, R &rows, int row, Size m, int flow, Vec3<Real> *wrench,
                       Sym3<Real> &A, Real *M, int n) {
@@ -20,7 +20,7 @@ inline void composite(const Piece<Real> &c, R &rows, int row, Size m, int flow, 
   A = {rows.xx, rows.xy, rows.x[0], rows.yy, rows.y[0], rows.row[0][0]};
 }
 
-// M (n, n) of (14) at y (n). `wrench` (n) is scratch: what a unit acceleration of an unknown takes
+// M (n, n) of (40) at y (n). `wrench` (n) is scratch: what a unit acceleration of an unknown takes
 // at the hub that the sweep has reached.
 template <class Real>
 void mass_matrix(const Model<Real> &model, Workspace<Real> &work, const Real *y, const Real *rest,

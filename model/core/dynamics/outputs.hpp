@@ -8,7 +8,7 @@
 namespace flexura {
 
 // How a link's tip stands to the tangent at its hub (of a sleeved link: at the exit): distance
-// across it, angle to it.
+// across it, angle to it (6).
 template <class Real>
 struct BendOf {
   Real deflection = 0.0, slope = 0.0;  // [m], [rad]

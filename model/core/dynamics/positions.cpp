@@ -5,8 +5,8 @@
 namespace flexura {
 namespace {
 
-// The point at the abscissa `x` of a bent piece: its place from the hub and the angle there, (1)
-// and (2) with Lagrange's polynomials through its points.
+// The point at the abscissa `x` of a bent piece: its place from the hub and the angle there, (2)
+// and (4) with Lagrange's polynomials through its points.
 Pose<double> point_on_piece(const Piece<double> &c, const PieceState<double> &k, const double *q,
                             double x, double length) {
   const LineRule &rule = line_rule(c.P);

@@ -1,4 +1,4 @@
-// Positions: hubs, tips, and any point on a bent link (1), (2), (8).
+// Positions: hubs, tips, and any point on a bent link (1), (3), (4).
 #pragma once
 #include "dynamics/inverse_dynamics.hpp"
 

@@ -2,7 +2,7 @@
 // the run is asked for.
 //
 // That size is the largest deflection of a tip so far, or a thousandth of the tips' way, whichever
-// is larger; for rates the same of their speeds. An error of unknown k moves a tip by at most
+// is larger (81); for rates the same of their speeds. An error of unknown k moves a tip by at most
 // lever_k. Errors are summed (root of squares) over a joint's position, over a link's elastic
 // unknowns, over their rates, and the worst of these groups decides. Work and losses weigh by the
 // largest energy so far.
@@ -86,8 +86,8 @@ class ErrorNorm {
     return 1.0 / (larger(sizes, Real(1e-280)) * rtol);
   }
 
-  // The worst group of an error e (2 n + ACCOUNTS) of a step to znew, over its tolerance. What is
-  // not a number stays so.
+  // The worst group of an error e (2 n + ACCOUNTS) of a step to znew, over its tolerance (82).
+  // What is   // not a number stays so.
   Real norm(const Real *e, const Real *znew) const {
     const Real joule = joules(znew);
     Real most = 0.0;

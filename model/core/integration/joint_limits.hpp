@@ -1,4 +1,4 @@
-// The stop at a limit: the instant within a step at which a joint first leaves its limits, by
+// The stop at a limit (64): the instant within a step at which a joint first leaves its limits, by
 // bisection of the dense output.
 #pragma once
 #include <algorithm>

@@ -60,7 +60,7 @@ struct Integration {
 
   const Inputs &acts_of(int lane_) const { return acts.acting(lane_); }
 
-  // The rates of the accounts, after the pass that `acts` was loaded for.
+  // The rates of the accounts (99), after the pass that `acts` was loaded for.
   void rates(const Real *q, const Real *v, Real *account) {
     plant.powers(q, v, account[STRAIN], account[LOSS]);
     account[WORK] = acts.work(q, v);
@@ -109,8 +109,8 @@ class Method {
     return left <= 1.000001 * wish ? left : left < 1.5 * wish ? 0.5 * left : wish;
   }
 
-  // The wish after a step of length h with that error; `accepted`: it was taken. `before`: the
-  // error of the step before.
+  // The wish after a step of length h with that error (84); `accepted`: it was taken. `before`:
+  // the error of the step before.
   virtual double next(int lane, double h, double error, double before, bool accepted) {
     (void)lane;
     const double order = power();

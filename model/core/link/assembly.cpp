@@ -45,7 +45,7 @@ void fill_piece(Piece<double> &c, const PieceDraft &d, double *block) {
     return;
   }
   put(into(c.moment), d.moment);
-  std::vector<double> lower = d.W;  // W = L L^T = R^T R (4)
+  std::vector<double> lower = d.W;  // W = L L^T = R^T R (16)
   cholesky(P, lower.data(), 4.0 * P * 0x1p-52);
   for (int p = 0; p < P; ++p)
     for (int j = p; j < P; ++j) into(c.R)[p * P + j] = lower[std::size_t(j * P + p)];

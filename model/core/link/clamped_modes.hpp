@@ -15,8 +15,8 @@ struct ClampedLink {
   std::vector<Real> K, M, deflection, angle;
 };
 
-// Modes as sums of the shapes, X (m, count): x . M x = 1, the tip goes to the left; the squares of
-// their frequencies (count).
+// Modes as sums of the shapes (18), X (m, count): x . M x = 1, the tip goes to the left; the
+// squares of their frequencies (count).
 template <class Real>
 struct ClampedModes {
   int count = 0;

@@ -5,7 +5,7 @@
 namespace flexura {
 namespace {
 
-// A link that does not bend: one point, the line a straight rod.
+// A link that does not bend: one point, the line a straight rod (15).
 PieceDraft rigid(double length, double mass, double centre, double about_centre) {
   PieceDraft out;
   out.m = 0, out.P = 1, out.length = length;
@@ -16,8 +16,8 @@ PieceDraft rigid(double length, double mass, double centre, double about_centre)
   return out;
 }
 
-// An element of a mesh (6): the first shape x less as much of the bubble 6 x (1 - x) as makes K
-// diagonal.
+// An element of a mesh (10), (11): the first shape x less as much of the bubble 6 x (1 - x) as
+// makes K diagonal.
 PieceDraft element(const Link &link, double from, double to) {
   PieceDraft out;
   out.m = 2, out.P = 3, out.beta = link.beta;

@@ -1,4 +1,4 @@
-// One link as pieces: points, shapes, and the constants of (3), (4) and (5).
+// One link as pieces: points, shapes, and the constants of (9), (14) and (16).
 #pragma once
 #include "link/single_piece_link.hpp"
 

@@ -65,7 +65,7 @@ void integrate(const std::vector<Interval> &material, double from, double to, in
   }
 }
 
-// Mass, first moment and W of a piece on [from, to] (3), and the weights of its tip.
+// Mass, first moment and W of a piece on [from, to] (14), and the weights of its tip.
 inline void inertia(PieceDraft &out, const std::vector<Interval> &material, double from,
                     double to) {
   const LineRule &rule = line_rule(out.P);
@@ -94,7 +94,7 @@ inline void inertia(PieceDraft &out, const std::vector<Interval> &material, doub
 }
 
 // A payload m_p with the rotary inertia I_tip at the tip: m_p, m_p w, m_p w w^T and I_tip Omega_L^2
-// of the kinetic energy (3).
+// of the kinetic energy (22).
 inline void add_payload(PieceDraft &out, const Attachments &attached) {
   const double m = attached.payload_mass;
   out.mass += m, out.tip = attached.payload_inertia;

@@ -21,7 +21,7 @@ int shape_count(const Link &link) {
   return uniform(link.material) ? few : std::max(few, mesh_count(link));
 }
 
-// Shapes (7): phi_0 = P_1 + 1, phi_k = (P_(k+1) - P_(k-1)) / (2 k + 1), at points and as sums of
+// Shapes (12): phi_0 = P_1 + 1, phi_k = (P_(k+1) - P_(k-1)) / (2 k + 1), at points and as sums of
 // Legendre's polynomials.
 struct Shapes {
   Numbers sums;    // (count + 1, count)

@@ -1,5 +1,5 @@
-// A link as one piece: the whole link's Legendre shapes (7), its own modes in them, and a link in a
-// sleeve (8).
+// A link as one piece: the whole link's Legendre shapes (12), its own modes in them, and a link in
+// a sleeve (32).
 //
 // It is made in two steps, so that four robots' modes are found together: `begin_single_piece` or
 // `begin_sleeved` give the piece in all its shapes and the matrices whose modes are asked for;

@@ -29,7 +29,7 @@ struct GaussRule {
 };
 const GaussRule &gauss(int count);
 
-// The weights w_j of a line's place (2) as a function of the place, of a line with P Gauss points.
+// The weights w_j of a line's place (13) as a function of the place, of a line with P Gauss points.
 struct LineRule {
   std::vector<double> u, weight;  // (P) of the points, on [-1, 1]
   // (P + 1, P): the integral of Lagrange's polynomial l_j through the points, as a sum of
@@ -38,7 +38,7 @@ struct LineRule {
   std::vector<double> integrals;
   std::vector<double> tip;  // (P) w of the tip of a line of length 1
   std::vector<double> moment,
-      W;  // (P), (P, P): int w dm and int w w^T dm (3) of a uniform line of length 1 and mass 1
+      W;  // (P), (P, P): int w dm and int w w^T dm (14) of a uniform line of length 1 and mass 1
 };
 const LineRule &line_rule(int P);
 

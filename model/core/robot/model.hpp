@@ -2,7 +2,7 @@
 // evaluation.
 //
 // A piece is a stretch of inextensible, unshearable line that begins at a hub. With P points j, the
-// angle of its tangent is linear in its m unknowns q, Theta_j = phi + sum_k B_jk q_k (1). A rigid
+// angle of its tangent is linear in its m unknowns q, Theta_j = phi + sum_k B_jk q_k (2). A rigid
 // link is a piece with one point and no unknowns; a link of n elements is n pieces of two unknowns
 // with no joint between; a link in its own modes, one that carries a slider, and one in a sleeve
 // are one piece.
@@ -49,15 +49,15 @@ struct Piece : Shape {
   const Real *K, *D;      // (m) stiffness and damping [N m/unit^2]
   const Real *B;          // (m, P): Theta at the points, per unknown
   const Real *columns;    // (P, m + 2): 1, B, 0 by columns
-  const Real *R;          // (P, P) upper triangle, W = R^T R (4)
+  const Real *R;          // (P, P) upper triangle, W = R^T R (16)
   const Real *moment;     // (P): int w dm
-  const Real *w;          // (P): weights of the tip's place (2)
+  const Real *w;          // (P): weights of the tip's place (4)
   const Real
       *rails;  // (rail, P + m): weights and shapes at any place, as sums of Legendre's polynomials
   const Real *xi, *weight;  // sleeve: (P) points and weights on [0, 1]
-  const Real *C;            // sleeve: (P, P) integrals up to the points (8)
+  const Real *C;            // sleeve: (P, P) integrals up to the points (32)
   const Real *bend;         // sleeve: (m, P): d Theta / d xi, per unknown
-  const Real *material;     // sleeve: (intervals, 10): from, to, mass per length (3), stiffness (5)
+  const Real *material;     // sleeve: (intervals, 10): from, to, mass per length, stiffness (8)
   Real payload, beta;       // sleeve: mass at the tip; D = beta K
 };
 

@@ -9,8 +9,8 @@ namespace flexura {
 
 // Lengths of rows. counts: kind of the joint, locked, elements, modes (-1: all), intervals of the
 // material. numbers: length, mass, centre, inertia, alpha, beta; of the joint angle, start, hub
-// mass, hub inertia, rotor, viscous, coulomb, low, high. material: from, to, mass per length (3),
-// bending stiffness (5).
+// mass, hub inertia, rotor, viscous, coulomb, low, high. material: from, to, mass per length,
+// bending stiffness (8).
 enum { COUNTS = 5, NUMBERS = 15, MATERIAL = 10 };
 
 struct Table {

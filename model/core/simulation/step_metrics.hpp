@@ -1,4 +1,4 @@
-// Figures of a controlled motion, each with one definition, from samples t (T) of a joint's
+// Figures of a controlled motion (80), each with one definition, from samples t (T) of a joint's
 // position q with its reference r, and of the last flexible link's tip deflection w. Of a joint,
 // with r its reference before any filter, D = r(end) - q(0), y = (q - q(0)) / D:
 //

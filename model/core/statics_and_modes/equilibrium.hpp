@@ -1,7 +1,7 @@
 // Static equilibrium: the shape that a robot takes under gravity and a dead load at its tip, with
 // its joints held, or free to turn.
 //
-// The energy V of potential_energy.hpp is stationary: Newton's method, each step as long as V
+// The energy V of potential_energy.hpp is stationary (50): Newton's method, each step as long as V
 // falls. From the straight robot without load the load grows in steps, as large as they succeed,
 // and along the way V must stay at a minimum: every pivot of every tangent positive. Where a step
 // ends otherwise it is halved. If the tangent is singular wherever the load is increased, however

@@ -1,5 +1,5 @@
 // The lowest modes of a robot with many unknowns, without a matrix of that size: Lanczos' method
-// (J. Res. Nat. Bur. Stand. 45 (1950) 255).
+// (55) (J. Res. Nat. Bur. Stand. 45 (1950) 255).
 //
 // T = (K + s M)^-1 M is symmetric in the inner product x . M y; its largest eigenvalues mu = 1/(w^2
 // + s) are the lowest frequencies. A basis Q, Q^T M Q = 1, grows by T times its last vector, made

@@ -1,5 +1,5 @@
-// The equations of motion linearised about any state: exact derivatives of the accelerations, by
-// dual numbers.
+// The equations of motion linearised about any state (52): exact derivatives of the accelerations,
+// by dual numbers.
 #pragma once
 #include <vector>
 

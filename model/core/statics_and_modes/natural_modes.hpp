@@ -1,5 +1,5 @@
 // The robot linearised about a configuration at rest: M(q), the tangent stiffness, natural
-// frequencies and modes.
+// frequencies and modes (54).
 //
 // The tangent stiffness is the derivative by q of all static forces: elastic, gravity, and a load
 // that is held at the tip. In a bent equilibrium it has the geometric stiffness of what the links
@@ -12,7 +12,7 @@
 
 namespace flexura {
 
-// M(q) (n, n) of (14), held joints and all: composite bodies (21). Positive definite at
+// M(q) (n, n) of (40), held joints and all: composite bodies (48). Positive definite at
 // any bending.
 void mass_matrix(const Model<double> &model, const double *q, double *M);
 

@@ -37,7 +37,7 @@ void put_next_hub(const Piece<double> &c, const Piece<double> *next, const doubl
   std::copy(at + c.P, at + c.P + c.m, a);
 }
 
-// First moments s, masses R, inertia and stiffness of a sleeved piece at its free length d, (8).
+// First moments s, masses R, inertia and stiffness of a sleeved piece at its free length d, (33).
 void sleeve_constants(const Piece<double> &c, double d, bool last, PieceAtRest &out, double *s,
                       double *R) {
   const int m = c.m, P = c.P;

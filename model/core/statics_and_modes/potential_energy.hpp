@@ -1,11 +1,11 @@
 // A chain at rest whose joints are held, or free to turn: its potential energy, the gradient of it,
 // and its tangent, each in time proportional to the number of pieces. Places of sliders and sleeves
 // are put in once; then every piece is of one kind. With e_j = (cos, sin) Theta_j at its points and
-// Theta_j of (1),
+// Theta_j of (2),
 //
-//     next hub:  r + sum_j w_j e_j,  angle + sum_k a_k q_k                        (2)
+//     next hub:  r + sum_j w_j e_j,  angle + sum_k a_k q_k                        (4)
 //     first moment of its mass about the hub:  sum_j s_j e_j  (+ s_0 e(phi) of the rod behind a
-//     sleeve) strain energy:  1/2 q . K q                                                 (5)
+//     sleeve) strain energy:  1/2 q . K q                                                 (9)
 //
 // and the potential energy under gravity g and a dead load at the last tip (force F in the base's
 // axes, moment T) is
@@ -41,7 +41,7 @@ struct PieceAtRest {
   double hub = 0.0, tip = 0.0;   // inertia of hub (with the rod behind) and payload [kg m^2]
   double rotor = 0.0;            // of a free joint
   const double *B, *w, *s, *a;   // (m, P) padded, (P), (P), (m)
-  const double *R;               // (squares, P): W = R^T R (4)
+  const double *R;               // (squares, P): W = R^T R (16)
   double *K;                     // (m, m)
   double *sine, *cosine;         // of Theta at the points
   double hub_sine = 0.0, hub_cosine = 1.0;

@@ -1,5 +1,5 @@
-// The tangent of a chain at rest: second derivatives of its energy, plus a share of M, as factors
-// of sweeps over the pieces (potential_energy.hpp).
+// The tangent of a chain at rest (51): second derivatives of its energy, plus a share of M, as
+// factors of sweeps over the pieces (potential_energy.hpp).
 #include <algorithm>
 #include <cmath>
 
@@ -32,7 +32,7 @@ struct StillRows {
   double H[N * N], x[N], y[N], parts[N];  // parts: the sizes of what was added to the diagonal
 };
 
-// The piece's M in turning, own unknowns and the hub's place: the sum of squares (4), first
+// The piece's M in turning, own unknowns and the hub's place: the sum of squares (16), first
 // moments, inertias of hub and payload.
 template <class M, class N>
 void weigh(PieceAtRest &c, M m, N P) {

@@ -1,5 +1,5 @@
 // Copyright (c) 2026 the flexura authors. SPDX-License-Identifier: MIT
-// First-order low-pass filters, y += a (x - y) once a tick, a = 1 - exp(-2 pi f T).
+// First-order low-pass filters, y += a (x - y) once a tick, a = 1 - exp(-2 pi f T) (67).
 #pragma once
 #include "fixed.h"
 

@@ -1,4 +1,4 @@
-// Condensation of one piece to its hub, the inward sweep (21), (22), (24). With u the acceleration
+// Condensation of one piece to its hub, the inward sweep (45), (46), (49). With u the acceleration
 // of its hub (place and angle, gravity taken off) and the wrench A t + b at its tip, t the tip's
 // acceleration, the piece's rows are formed by columns, its own unknowns are eliminated, and what
 // is left is the wrench A u + b that moves its hub.
@@ -58,7 +58,7 @@ inline void add_beyond(R &rows, const PieceState<Real> &k, int m, int flow, int 
 
 // Eliminates the piece's own rows, H = L D L^T, and leaves the wrench on the hub in `beyond`;
 // `flow`: (x, y, angle, flow, rest) of a sleeve's row of d. Every pivot is positive: the rows are
-// sums of squares (5).
+// sums of squares (9).
 template <class Real, int M, int G>
 inline void eliminate(Rows<Real, M, G> &rows, PieceState<Real> &k, int m,
                       ArticulatedInertia<Real> &beyond, Real *flow) {
@@ -115,7 +115,7 @@ inline void elastic_rows(const Piece<Real> &c, const PieceState<Real> &k, bool l
   }
   for (int a = 0; a <= m; ++a) fill(rows.row[a], Real(0.0), columns);
   Columns x, y;
-  for (int p = 0; p < P; ++p) {  // (4): H = sum_p |sum_j R_pj i e_j Theta''_j|^2
+  for (int p = 0; p < P; ++p) {  // (16): H = sum_p |sum_j R_pj i e_j Theta''_j|^2
     times(x, c.R[p * P + p], ex[p], columns), times(y, c.R[p * P + p], ey[p], columns);
     for (int j = p + 1; j < P; ++j)
       add(x, c.R[p * P + j], ex[j], columns), add(y, c.R[p * P + j], ey[j], columns);

@@ -1,4 +1,4 @@
-// Kinematics of one piece, the outward sweep (1), (2), (11), (20): angles and rates of every
+// Kinematics of one piece, the outward sweep (2), (5), (31), (44): angles and rates of every
 // piece's points from those of its hub, and the acceleration of the place where the next piece
 // sits, column by column: 0 turning, 1 ... m the piece's own unknowns, (m + 1 the flow of a
 // sleeve,) last what is there without accelerations.
@@ -54,7 +54,7 @@ inline void sized(int m, int P, F f) {
     }
 }
 
-// Theta, its sine and cosine, and Omega at a piece's points (1).
+// Theta, its sine and cosine, and Omega at a piece's points (2).
 template <class Real, class M, class N>
 inline void tangent_angles(const Piece<Real> &c, PieceState<Real> &k, const Real *q, const Real *v,
                            M m, N P) {
@@ -68,7 +68,7 @@ inline void tangent_angles(const Piece<Real> &c, PieceState<Real> &k, const Real
   store(sine, k.sine, P), store(cosine, k.cosine, P), store(rate, k.rate, P);
 }
 
-// The point at the tip of a bent piece of constant length (2): columns of its acceleration, into
+// The point at the tip of a bent piece of constant length (5): columns of its acceleration, into
 // k.tip.
 template <class Real, class M, class N>
 inline void tip_columns(const Piece<Real> &c, PieceState<Real> &k, M m, N P) {
@@ -91,7 +91,7 @@ inline void tip_columns(const Piece<Real> &c, PieceState<Real> &k, M m, N P) {
   angle[rest] = 0.0;
 }
 
-// A point on a bent link (1), (2), (11), on a line whose length scales with d (a piece of constant
+// A point on a bent link (3), (4), (30), on a line whose length scales with d (a piece of constant
 // length: d = 1): r = d sum_j at_j e_j at the angle phi + sum_k at_(P+k) q_k, where `at` depends on
 // xi and `by`, `twice` are its derivatives. d xi' = s; xi to the line's end is `left`; flow: d' of
 // a sleeve.
@@ -101,7 +101,7 @@ struct LinePoint {
   Real d, flow, s, left;
 };
 
-// Columns of the acceleration (11) of such a point into k.tip; returns the direction in which it
+// Columns of the acceleration (31) of such a point into k.tip; returns the direction in which it
 // moves along the line (angle: curvature). phi and omega become the place's own.
 template <class Real>
 inline Vec3<Real> line_point_columns(const Piece<Real> &c, PieceState<Real> &k, const Real *q,

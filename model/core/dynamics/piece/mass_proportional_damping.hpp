@@ -1,4 +1,4 @@
-// Damping that is proportional to mass: alpha times the straight, clamped link's own M, on its
+// Damping that is proportional to mass (26): alpha times the straight, clamped link's own M, on its
 // elastic unknowns. M v is formed along the straight line, where the slope is Theta' and the
 // deflection its integral; nothing moves lengthwise to first order.
 #pragma once

@@ -1,5 +1,5 @@
-// A link that slides through a sleeve (Pb), its free length d an unknown: the line of (7) on xi =
-// s/d, 0 at the exit, (8) and (9). A column more: 0 turning, 1 ... m shapes, m + 1 the flow d',
+// A link that slides through a sleeve (Pb), its free length d an unknown: the line of (12) on xi =
+// s/d, 0 at the exit, (32) and (37). A column more: 0 turning, 1 ... m shapes, m + 1 the flow d',
 // last the rest.
 #pragma once
 #include "dynamics/piece/condensation.hpp"
@@ -98,7 +98,7 @@ inline void add_point(R &rows, const Piece<Real> &c, const PieceState<Real> &k,
   for (int a = 0; a <= m + 1; ++a)
     add(rows.row[a], at.mu * x[a], x, columns, a), add(rows.row[a], at.mu * y[a], y, columns, a);
   add(rows.x, at.mu, x, columns), add(rows.y, at.mu, y, columns);
-  // (9): the mass of the point changes with d, and its material moves through it
+  // (37): the mass of the point changes with d, and its material moves through it
   const Real side = at.mu * (sidex * Vx + sidey * Vy);
   rows.x.set(rest, rows.x[rest] + flow * at.slope * Vx),
       rows.y.set(rest, rows.y[rest] + flow * at.slope * Vy);
@@ -132,7 +132,7 @@ inline void free_length_stiffness(const Piece<Real> &c, const Real &d, Real *K) 
     }
 }
 
-// The force out of a sleeve, -dU/dd at fixed shapes (8), (9): M0^2 / (2 EI) for a uniform link at
+// The force out of a sleeve, -dU/dd at fixed shapes (36): M0^2 / (2 EI) for a uniform link at
 // rest with the bending moment M0 at the exit. Here its negative, the row of d; `bent`: the
 // curvature at the points, per d.
 template <class Real>
@@ -147,7 +147,7 @@ inline Real sleeve_force_row(const Piece<Real> &c, const Real *bent, const Real 
   return out;
 }
 
-// Stiffness and damping of the free length, and the force that bending puts on d (9), (17).
+// Stiffness and damping of the free length, and the force that bending puts on d (35), (36).
 template <class Real, class R>
 inline void add_bending(R &rows, const Piece<Real> &c, const Stage<Real> &stage, const Real *q,
                         const Real &d) {
@@ -229,8 +229,8 @@ void sleeve_rows(const Piece<Real> &c, const PieceState<Real> &k, const Real *y,
   }
 }
 
-// Condensation of a sleeved piece; `flow` (5): its row of d, coupled with the hub's x, y, angle,
-// its own pivot and rest.
+// Condensation (46) of a sleeved piece; `flow`, five numbers: its row of d, coupled with the hub's
+// x, y, angle, its own pivot and rest.
 template <class Real>
 void condense_sleeve(const Piece<Real> &c, PieceState<Real> &k, const Real *y, const Real *v,
                      const Stage<Real> &stage, const Real *force, bool last,

@@ -1,10 +1,10 @@
-// The modes of a robot at one configuration, which exponential steps solve exactly.
+// The modes of a robot at one configuration (86), which exponential steps solve exactly.
 //
 // With M, K, D the matrices of mass, stiffness and damping there (the drives' linear gains in K and
 // D), the modes are the rows of Phi: Phi M Phi^T = 1, Phi K Phi^T = diag(w2); of Phi D Phi^T the
 // diagonal is kept. Joints that are held (locked or prescribed) move in no mode but their own, the
 // unit vector. The modes need not be exact and need not follow the robot: what they leave out is
-// integrated as a force. They are taken again where they have become poor.
+// integrated as a force. They are taken again where they have become poor (93).
 #pragma once
 #include <algorithm>
 #include <cmath>

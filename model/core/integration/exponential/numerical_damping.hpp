@@ -1,5 +1,5 @@
-// Numerical damping (43): the cutoff frequency above which modes are damped, those that the
-// tolerance does not ask for (44), (45).
+// Numerical damping (94): the cutoff frequency above which modes are damped, those that the
+// tolerance does not ask for (95), (96).
 //
 // The share of a mode is the largest tip deflection, or change of the tips' place, that it has in
 // the answer to the loads, over the largest static tip deflection under them. Loads: each drive's

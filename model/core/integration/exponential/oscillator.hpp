@@ -1,5 +1,5 @@
-// One damped oscillator x'' + d2 x' + w2 x = f, solved exactly over a step h: the free motion, and
-// the response to powers of time.
+// One damped oscillator x'' + d2 x' + w2 x = f, solved exactly over a step h (88): the free motion,
+// and the response to powers of time.
 //
 // With g the response to an impulse (g'' + d2 g' + w2 g = 0, g(0) = 0, g'(0) = 1) and f = sum_m f_m
 // (t/h)^m,
@@ -7,7 +7,7 @@
 //     x(h)  = (g' + d2 g) x(0) + g x'(0) + sum_m A_m f_m      A_m = int_0^h g(h - t) (t/h)^m dt
 //     x'(h) = -w2 g x(0)      + g' x'(0) + sum_m B_m f_m      B_m = int_0^h g'(h - t) (t/h)^m dt
 //
-// By parts, B_m = m A_(m-1) / h (m > 0), B_0 = g, and a_m = A_m / h^2 obeys
+// By parts, B_m = m A_(m-1) / h (m > 0), B_0 = g, and a_m = A_m / h^2 obeys (89)
 //
 //     w2 h^2 a_m + d2 h m a_(m-1) + m (m - 1) a_(m-2) = 1,     m > 1.
 //

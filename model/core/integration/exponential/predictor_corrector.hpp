@@ -1,20 +1,20 @@
-// Exponential steps of Adams' kind: predictor (38) and corrector (40). The linear part of each mode
-// is solved exactly.
+// Exponential steps of Adams' kind: predictor (90) and corrector (91). The linear part of each mode
+// is solved exactly (88).
 //
 // With y = origin + sum_k eta_k phi_k the equations of motion are
 //
 //     eta'' + own eta' + w2 eta = N,      N = rows a + own eta' + w2 eta,
 //
-// a the accelerations of a pass: exact, whatever the modes. N varies with the motion and not with
-// the vibration. A polynomial in time through its last values goes into the variation-of-constants
-// formula of each mode (oscillator.hpp), the equations are looked at once where that leads, and the
-// polynomial through the new value too makes the step: predict, evaluate, correct (exponential
-// multistep methods: Hochbruck, Ostermann, Acta Numerica 19 (2010), 2.5). The error is estimated as
-// Shampine and Gordon do, by leaving out the oldest value. Steps need not resolve any frequency of
-// the robot.
+// a the accelerations of a pass (87): exact, whatever the modes. N varies with the motion and not
+// with the vibration. A polynomial in time through its last values goes into the
+// variation-of-constants formula of each mode (oscillator.hpp), the equations are looked at once
+// where that leads, and the polynomial through the new value too makes the step: predict, evaluate,
+// correct (exponential multistep methods: Hochbruck, Ostermann, Acta Numerica 19 (2010), 2.5). The
+// error is estimated as Shampine and Gordon do, by leaving out the oldest value (92). Steps need
+// not resolve any frequency of the robot.
 //
-// Damping that is added to modes above a cutoff acts on the motion about the quasi-static one, N /
-// w2:
+// Damping that is added to modes above a cutoff acts on the motion about the quasi-static one (94),
+// N / w2:
 //
 //     eta'' + own eta' + added (eta' - N' / w2) + w2 eta = N,   so   d2 = own + added,   f = N +
 //     lag N', lag = added / w2.
@@ -104,7 +104,7 @@ class ExponentialAdams {
     return fresh;
   }
 
-  // Where a step leads without a look at the equations there; minus the extrapolated N in
+  // The predictor (90): where a step leads without a look at the equations; minus that N in
   // `pece_difference`.
   void predict() {
     int most = 0;
@@ -129,7 +129,7 @@ class ExponentialAdams {
     add_rows(n, chunks, a, b.rows, stride, out);
   }
 
-  // The step, with N found where `predict` led, in the new row.
+  // The corrector (91): the step, with N found where `predict` led, in the new row.
   void correct() {
     const Real *found = N[new_row()];
     for (int c = 0; c < chunks; ++c) {

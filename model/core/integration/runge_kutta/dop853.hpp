@@ -1,6 +1,6 @@
 // The method "explicit": Runge and Kutta's steps of order 8 with an interpolant of order 7
-// (DOP853), no longer than the fastest mode of the robot lets them be. Under a sampled controller
-// with short ticks, a step of order 3 or 5 a tick (`embedded_pairs.hpp`).
+// (DOP853), no longer than the fastest mode of the robot lets them be (83). Under a sampled
+// controller with short ticks, a step of order 3 or 5 a tick (`embedded_pairs.hpp`).
 #pragma once
 #include "integration/method.hpp"
 #include "integration/runge_kutta/dop853_coefficients.hpp"

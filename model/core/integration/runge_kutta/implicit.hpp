@@ -1,5 +1,5 @@
 // Implicit steps, each stage solved by passes that hold stiffness, damping, gains and friction
-// implicitly (24). A pass costs what an explicit one costs, and one to three make a stage whatever
+// implicitly (49). A pass costs what an explicit one costs, and one to three make a stage whatever
 // the stiffness: steps follow the motion, not the fastest mode.
 //
 //   "implicit"     ESDIRK4(3)6L[2]SA of Kennedy and Carpenter (2003, Appl. Numer. Math. 44), order
@@ -129,8 +129,8 @@ class Implicit : public Method<Real> {
                      // as a stage was slow to converge
   Real contraction = 1.0;  // of what is left of a stage by a pass, as last measured
 
-  // What stage s knows of its state: with the accelerations a that it looks for, ys + g^2 h^2 a and
-  // vs + g h a.
+  // What stage s knows of its state (85): with the accelerations a that it looks for, ys + g^2 h^2
+  // a and vs + g h a.
   void known(const Real &h, int s) {
     const int n = c.n;
     K.sum(c.z.data(), h, s_.A[s], s, other.data());

@@ -1,7 +1,7 @@
 """The linear part of a robot's equations, solved in closed form over a step: modes, and functions
 of their matrix.
 
-In the modes at one configuration, eta'' + C eta' + w^2 eta = N with C = Phi^T D Phi (86), (87). C
+In the modes at one configuration, eta'' + C eta' + w^2 eta = N with C = Phi^T D Phi (87). C
 is kept whole: damping that couples modes is in the linear part. With y = (eta, eta'), y' = L y +
 (0, N), and N = sum_p f_p (t/h)^p, the variation of constants (88) gives
 
