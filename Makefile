@@ -14,7 +14,7 @@ ifneq ($(shell test -x $(VENV)/bin/python && cat $(READY) 2>/dev/null),$(CURDIR)
 .PHONY: $(READY)
 endif
 
-.PHONY: help setup demo test check lint types tests core core-sanitize test-slow test-long bench firmware flash clean
+.PHONY: help setup demo test check lint types tests core core-sanitize test-slow test-long docs bench firmware flash clean
 
 help:
 	@echo "make demo       simulate the rig, cross-check it, and leave a review to look at"
@@ -22,6 +22,7 @@ help:
 	@echo "make test-slow  the tests that take longer"
 	@echo "make test-long  those that take hours; make test-long TESTS=tests/model/core/test_chains.py runs one part"
 	@echo "make core       only the C++ tests of the core; make core-sanitize the same, with memory and arithmetic watched"
+	@echo "make docs       this project's documentation as a site, in build/docs"
 	@echo "make bench      how fast the solver is on this machine, and how busy the board"
 	@echo "make firmware   build the board's program; its ELF file is named at the end"
 	@echo "make flash      build it and load it into the board: make flash PORT=/dev/ttyACM0 CONFIGURE=1"
@@ -45,7 +46,7 @@ demo: $(CORE)
 test check: lint types core tests
 
 lint: $(READY)
-	@$(VENV)/bin/ruff check model analysis firmware tests tools examples
+	@$(VENV)/bin/ruff check model analysis firmware tests tools examples docs
 
 types: $(READY)
 	@$(VENV)/bin/mypy
@@ -67,6 +68,11 @@ test-slow: $(CORE)
 
 test-long: $(CORE)
 	@$(VENV)/bin/pytest -m long $(TESTS)
+
+# A name that leads nowhere ends it.
+docs: $(CORE)
+	@$(VENV)/bin/python -m sphinx -W --keep-going -q -b html docs build/docs
+	@echo "open $(CURDIR)/build/docs/index.html"
 
 # make bench BENCH="type4 pendulum --rounds 3" times a few problems; BENCH=--help says what there is.
 bench: $(CORE)
