@@ -1,5 +1,6 @@
-"""The table of analysis/README.md: python tests/identification_table.py [SEEDS] [FILE], some 40 s a
-rig on one core.
+"""The table of docs/guide/identification.md: python tests/identification_table.py [SEEDS] [FILE].
+
+A rig takes some 40 s on one core.
 
 For each seed a rig drawn at random is excited for ten seconds on the emulated board and identified;
 a row says by how much the estimates are off, in percent, and whether the 95 % interval holds the

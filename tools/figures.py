@@ -1,11 +1,13 @@
 """The figures of the documentation that are drawn: python tools/figures.py
 
 docs/reference/channels.svg: a bent arm with the channels of a Run, computed and drawn to scale.
+docs/tip-deflection.svg: what the example of README.md draws.
 """
 
 from __future__ import annotations
 
-import sys
+import os
+import re
 from pathlib import Path
 
 import matplotlib
@@ -124,5 +126,18 @@ def _deflection(axes, hub, tip, text) -> None:  # type: ignore[no-untyped-def]
     axes.text(middle[0] + 0.08, middle[1], text, color=MARK, va="center")
 
 
+def example() -> None:
+    """Run the example of README.md, and leave its figure in docs."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    code = re.search(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    assert code is not None
+    matplotlib.rcParams["svg.hashsalt"] = "flexura"
+    os.environ["SOURCE_DATE_EPOCH"] = "0"  # no date in the file
+    os.chdir(ROOT)
+    exec(compile(code[1], "README.md", "exec"), {"__name__": "__main__"})
+    (ROOT / "tip-deflection.svg").rename(ROOT / "docs/tip-deflection.svg")
+
+
 if __name__ == "__main__":
-    channels(Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "docs/reference/channels.svg")
+    channels(ROOT / "docs/reference/channels.svg")
+    example()

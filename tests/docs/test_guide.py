@@ -87,3 +87,29 @@ def test_pages_name_commands_that_there_are():
             for word in words[1:]:
                 if word.startswith(("model/", "firmware/")):
                     assert (ROOT / word).exists(), (page.name, word)
+
+
+def test_the_example_of_the_readme_runs_and_its_commands_are_there(tmp_path, monkeypatch):
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    listed = re.findall(r"^\| `flexura (\w+)", text, re.MULTILINE)
+    assert len(listed) > 12 and set(listed) <= set(COMMANDS) | COMING
+    (tmp_path / "model").symlink_to(ROOT / "model")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MPLBACKEND", "svg")
+    (code,) = [block for kind, block in blocks(ROOT / "README.md") if kind == "python"]
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "tip-deflection.svg").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    "page",
+    [path for path in ROOT.glob("*.md")]
+    + [ROOT / name / "README.md" for name in ("model", "model/core", "analysis", "examples")]
+    + [ROOT / name / "README.md" for name in ("firmware", "logs")],
+    ids=lambda path: path.relative_to(ROOT).as_posix(),
+)
+def test_links_of_a_page_lead_to_files(page):
+    for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", page.read_text(encoding="utf-8")):
+        if not target.startswith(("http:", "https:")):
+            assert (page.parent / target).exists(), target

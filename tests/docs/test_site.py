@@ -5,9 +5,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-import flexura as fx
 import pytest
 
+import flexura as fx
 from flexura.simulation import channel_units
 
 ROOT = Path(__file__).resolve().parents[2]

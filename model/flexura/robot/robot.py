@@ -1,8 +1,8 @@
 """The robot: a frozen, validated description in SI units, read from and written to a TOML file.
 
 Every key carries its unit. Whatever is absurd (a modulus in GPa, a negative mass, an unknown key)
-is refused with the file, the key, the value and what was expected. Equations that use these
-numbers: `model/README.md`.
+is refused with the file, the key, the value and what was expected. `docs/reference` has
+every key.
 """
 
 from __future__ import annotations

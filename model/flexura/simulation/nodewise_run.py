@@ -5,7 +5,7 @@ While every slider and every sleeve keeps its node, the robot is one of fixed st
 (`system.nodes`), and the dense equations take it. Where a node changes, the joints, the elastic
 unknowns and their rates stay as they are, as in the dissertation's state vector; of a node that
 enters its sleeve deflection and angle become 0, which the next element takes up. By how much the
-energy jumps is logged. What this costs in accuracy is measured in `model/README.md`.
+energy jumps is logged. What this costs in accuracy is measured in `docs/theory/nodal-sliding.md`.
 """
 
 from __future__ import annotations
