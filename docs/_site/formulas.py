@@ -17,10 +17,10 @@ SETTINGS = """window.MathJax = {
   options: {enableMenu: false, processHtmlClass: "math"}
 };"""
 _ANCHOR = re.compile(r'<a id="(eq-\d+)"></a>')
-# formulas, code, links and targets are passed over; what is left is (7)
+# formulas, code, links and targets are passed over, and what follows a number; left is (7)
 _NUMBER = re.compile(
     r"\$\$.*?\$\$|\$[^$\n]*\$|```.*?```|`[^`\n]*`|\[[^\]\n]*\]\([^)\n]*\)|\(eq-\d+\)="
-    r"|(?<![\w)\]])\(([1-9]\d{0,2})\)(?!\w)",
+    r"|(?<![\w)\]])(?<!\d )\(([1-9]\d{0,2})\)(?!\w)",
     re.DOTALL,
 )
 
