@@ -18,7 +18,7 @@ from flexlab.board.protocol.declaration import Fault, State
 from flexlab.board.protocol.player import Knots, Player, drives, setpoints
 from flexlab.board.protocol.session import Link
 from flexlab.experiment.flash import RIG, build
-from flexlab.rig.plant.rigid_plant import Drives
+from flexlab.rig.plant.rigid_plant import RigidPlant
 from flexura.signals import harmonic
 
 COMPILERS = ["debian", "7.3"]
@@ -42,7 +42,7 @@ def elf(compiler: str = "debian") -> Path:
 def configured(compiler: str, settings: tuple[tuple[str, float], ...]) -> bytes:
     """The EEPROM of a board that was configured through its own commands, the rig's settings with
     some changed."""
-    board = EmulatedBoard(elf(compiler), Drives(BENCH))
+    board = EmulatedBoard(elf(compiler), RigidPlant(BENCH))
     link = Link(board, sequence=7)
     link.connect()
     link.write_configuration(rig.configuration(BENCH) | dict(settings))
@@ -72,7 +72,7 @@ class Rigged:
         **settings: float,
     ) -> None:
         self.settings = rig.configuration(BENCH) | settings
-        self.plant = Drives(BENCH, settings=self.settings)
+        self.plant = RigidPlant(BENCH, settings=self.settings)
         self.board = EmulatedBoard(elf(compiler), self.plant, slice_cycles=slice_cycles)
         if not blank:
             eeprom = configured(compiler, tuple(sorted(settings.items())))

@@ -17,7 +17,7 @@ from flexlab.board.protocol import messages
 from flexlab.board.protocol.declaration import CONFIG, Fault, Result, State
 from flexlab.board.protocol.frames import encode
 from flexlab.board.protocol.session import Refused
-from flexlab.experiment.flash import crc
+from flexlab.experiment.flash import settings_crc
 
 
 def restarted(r: Rigged, seconds: float = 0.3) -> None:
@@ -133,7 +133,7 @@ def flipped(compiler: str, bits: slice) -> int:
     with Rigged(compiler) as r:
         good = r.board.simulator.read_eeprom(0, 4096)
         used = [at for at in range(4096) if good[at] != 0xFF]
-    defaults = crc({name: item.default for name, item in CONFIG.items()})
+    defaults = settings_crc({name: item.default for name, item in CONFIG.items()})
     tried = 0
     for bit in range(8 * used[0], 8 * (used[-1] + 1))[bits]:
         spoilt = bytearray(good)

@@ -19,7 +19,7 @@ from flexlab.board.pty import Pty
 from flexlab.experiment import run_experiment as steps
 from flexlab.experiment.plan import Plan
 from flexlab.experiment.run_experiment import Done, Opened, Watch, conduct
-from flexlab.rig.plant.rigid_plant import Drives
+from flexlab.rig.plant.rigid_plant import RigidPlant
 
 ROOT = Path(__file__).resolve().parents[1]
 ENVIRONMENT = os.environ | {
@@ -31,7 +31,7 @@ SETTINGS = rig.configuration(BENCH)
 
 def board() -> EmulatedBoard:
     """A board with the rig's settings stored, and the bench's drives behind its wires."""
-    made = EmulatedBoard(elf(), Drives(BENCH))
+    made = EmulatedBoard(elf(), RigidPlant(BENCH))
     made.simulator.write_eeprom(0, configured("debian", ()))
     return made
 

@@ -14,7 +14,7 @@ from experiments import SETTINGS, experiment
 from flexlab.board.emulator.emulated import EmulatedBoard, Outputs, Sensors
 from flexlab.experiment import excitation, plan
 from flexlab.experiment.run_experiment import Done, Opened
-from flexlab.rig.emulation import random_truth
+from flexlab.rig.emulation import random_true_parameters
 from flexlab.rig.plant.plant import rig_plant
 
 
@@ -61,7 +61,7 @@ def ran(name: str, seed: int, folder: Path) -> tuple[fx.Run, Seen]:
         if name == "excite"
         else getattr(plan, name)(BENCH, SETTINGS)
     )
-    seen = Seen(rig_plant(BENCH, seed, truth=random_truth(seed)))
+    seen = Seen(rig_plant(BENCH, seed, truth=random_true_parameters(seed)))
     done = experiment(
         asked, folder, opened=Opened(EmulatedBoard(elf(), seen), seed, dict(seen.truth), seen)
     )
@@ -71,6 +71,6 @@ def ran(name: str, seed: int, folder: Path) -> tuple[fx.Run, Seen]:
 
 def excited(seed: int, folder: Path) -> Done:
     """The excitation of that rig."""
-    seen = Seen(rig_plant(BENCH, seed, truth=random_truth(seed)))
+    seen = Seen(rig_plant(BENCH, seed, truth=random_true_parameters(seed)))
     opened = Opened(EmulatedBoard(elf(), seen), seed, dict(seen.truth), seen)
     return experiment(excitation.plan(BENCH, SETTINGS), folder, opened=opened)

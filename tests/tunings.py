@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import flexura as fx
-from flexlab.tuning.search_space import free
+from flexlab.tuning.search_space import free_gain
 from flexlab.tuning.task import Task
 from flexura.control.gains import Gains
 from flexura.signals import Drive, JointDrive, Manoeuvre, step
@@ -24,7 +24,11 @@ SWING = Manoeuvre("a quarter", 1.0, 0.005, Drive((JointDrive(motion=step(np.pi /
 GAINS = Gains(
     {"kp_1_N_m_rad": 2.0, "kd_1_N_m_s_rad": 0.1, "torque_max_1_N_m": 0.5, "setpoint_1_Hz": 3.0}
 )
-FREE = (free("kp_1_N_m_rad", 0.1, 20), free("kd_1_N_m_s_rad", 0.01, 2), free("kf_1_N_m_m", -20, 20))
+FREE = (
+    free_gain("kp_1_N_m_rad", 0.1, 20),
+    free_gain("kd_1_N_m_s_rad", 0.01, 2),
+    free_gain("kf_1_N_m_m", -20, 20),
+)
 
 
 def task(**changes) -> Task:

@@ -8,22 +8,30 @@ import pytest
 from rich.console import Console
 
 import flexura as fx
-from flexlab.benchmarks import accuracy, choose, measure, native, report, search, timing
+from flexlab.benchmarks import (
+    accuracy,
+    equal_error,
+    exudyn_search,
+    native,
+    native_search,
+    report,
+    timing,
+)
 from flexlab.benchmarks.exudyn_programs import run as exudyn_run
-from flexlab.benchmarks.exudyn_programs.actions import sampled
-from flexlab.benchmarks.problems import still
+from flexlab.benchmarks.exudyn_programs.loads import sampled
+from flexlab.benchmarks.problems import statics
 from flexlab.benchmarks.problems.motions import all_motions
 from flexlab.benchmarks.problems.problem import error, scale
 from flexlab.benchmarks.problems.signals import piecewise
 
-MOTIONS, STILL = all_motions(), still.all_still()
+MOTIONS, STILL = all_motions(), statics.all_statics()
 QUICK = ("rig-pd", "rig-sampled", "payload", "arm-pd", "arm-inverse", "python-law", "friction")
 SLACK = 2e-3  # what a step four times shorter than the cheapest leaves
 
 
 def converged_apart(problem):
     """How far flexura's converged motion is from Exudyn's with a quarter of its cheapest step."""
-    choice = search.choice(problem.name)
+    choice = exudyn_search.choice(problem.name)
     finest = exudyn_run.Choice(problem.finer_elements or choice.elements, 4 * choice.substeps)
     theirs = exudyn_run.run(problem, finest if problem.hub_length_m else finest.tight())[1]
     return error(native.converged(problem, problem.finer), theirs)
@@ -31,7 +39,7 @@ def converged_apart(problem):
 
 @pytest.mark.parametrize("name", QUICK)
 def test_the_two_programs_agree(name):
-    assert converged_apart(MOTIONS[name]) <= 1.2 * search.stored()[name]["apart"] + SLACK
+    assert converged_apart(MOTIONS[name]) <= 1.2 * exudyn_search.stored()[name]["apart"] + SLACK
 
 
 @pytest.mark.slow
@@ -39,35 +47,35 @@ def test_the_two_programs_agree(name):
     "name", [name for name in MOTIONS if name not in QUICK and MOTIONS[name].available]
 )
 def test_the_two_programs_agree_on_all_problems(name):
-    assert converged_apart(MOTIONS[name]) <= 1.2 * search.stored()[name]["apart"] + SLACK
+    assert converged_apart(MOTIONS[name]) <= 1.2 * exudyn_search.stored()[name]["apart"] + SLACK
 
 
 @pytest.mark.parametrize("name", ["rig-pd", "payload"])
 def test_a_stored_choice_holds_the_error_that_it_states(name):
-    problem, choice = MOTIONS[name], search.choice(name)
+    problem, choice = MOTIONS[name], exudyn_search.choice(name)
     exact = exudyn_run.run(
         problem,
         exudyn_run.Choice(problem.finer_elements or choice.elements, 8 * choice.substeps).tight(),
     )[1]
     found = error(exudyn_run.run(problem, choice)[1], exact)
-    assert found <= 1.1 * search.TARGET and found == pytest.approx(
-        search.stored()[name]["error"], rel=0.2
+    assert found <= 1.1 * exudyn_search.TARGET and found == pytest.approx(
+        exudyn_search.stored()[name]["error"], rel=0.2
     )
 
 
 def test_every_motion_has_a_stored_choice_within_the_target():
-    stored = search.stored()
+    stored = exudyn_search.stored()
     assert len(MOTIONS) >= 20
     for name, problem in MOTIONS.items():
         if problem.available:
-            assert stored[name]["error"] <= search.TARGET, name
+            assert stored[name]["error"] <= exudyn_search.TARGET, name
             assert exudyn_run.Choice(**stored[name]["choice"]).substeps % problem.ticks == 0, name
 
 
 def test_the_cheapest_setting_holds_the_error():
     problem = MOTIONS["arm-pd"]
     system, exact = native.system(problem.robot), native.converged(problem)
-    best, auto = choose.cheapest(problem, system, exact, 1e-3)
+    best, auto = native_search.cheapest(problem, system, exact, 1e-3)
     for setting in (best, auto):
         assert (
             error(native.run(problem, system, setting.rtol, setting.method).channels, exact) <= 1e-3
@@ -76,14 +84,14 @@ def test_the_cheapest_setting_holds_the_error():
 
 
 def test_a_lucky_hit_does_not_count(monkeypatch):
-    errors = dict(zip(choose.RTOLS, [1.0, 5e-4, 2e-3, 8e-4, 7e-4] + [1e-9] * 9, strict=True))
+    errors = dict(zip(native_search.RTOLS, [1.0, 5e-4, 2e-3, 8e-4, 7e-4] + [1e-9] * 9, strict=True))
     answer = lambda problem, system, rtol, method, **keys: native.Answer(
         1.0, 10, method, {"off": np.array(errors[rtol])}
     )
-    monkeypatch.setattr(choose.native, "run", answer)
-    monkeypatch.setattr(choose, "error", lambda channels, exact: float(channels["off"]))
-    found = choose.loosest(None, None, {}, 1e-3, "implicit", 1.0)
-    assert found.rtol == choose.RTOLS[3] and found.error == 8e-4
+    monkeypatch.setattr(native_search.native, "run", answer)
+    monkeypatch.setattr(native_search, "error", lambda channels, exact: float(channels["off"]))
+    found = native_search.loosest(None, None, {}, 1e-3, "implicit", 1.0)
+    assert found.rtol == native_search.RTOLS[3] and found.error == 8e-4
 
 
 def test_the_error_is_that_of_places_and_deflections_over_the_largest_deflection():
@@ -113,24 +121,24 @@ def test_exudyns_table_of_a_signal_that_jumps_has_its_impulse():
 
 
 def test_frequencies_and_statics_agree():
-    tables = still.chain(2, 6)
-    ours, theirs = still.spectrum(tables)()[1], still.spectrum_in_exudyn(tables, 6, False)()[1]
-    assert still.nearest(ours[:8], theirs) <= 1e-4
+    tables = statics.chain(2, 6)
+    ours, theirs = statics.spectrum(tables)()[1], statics.exudyn_spectrum(tables, 6, False)()[1]
+    assert statics.nearest(ours[:8], theirs) <= 1e-4
     hanging = STILL["static"]
-    assert hanging.apart(hanging.ours()[1], hanging.theirs()[1]) <= 1e-4
+    assert hanging.difference(hanging.ours()[1], hanging.theirs()[1]) <= 1e-4
 
 
 def test_a_row_fits_and_tells_what_failed(monkeypatch):
     monkeypatch.setattr(
-        measure,
+        equal_error,
         "walls",
         lambda programs, rounds: np.array([[4.0] + [0.02] * (len(programs) - 1)] * rounds),
     )
-    row = measure.motion(MOTIONS["arm-pd"], 2)
+    row = equal_error.motion_row(MOTIONS["arm-pd"], 2)
     assert row["auto"]["ratio"] == {"low": 200.0, "median": 200.0, "high": 200.0}
-    assert row["default"]["error"] < 1e-3 and row["exudyn"]["error"] <= search.TARGET
+    assert row["default"]["error"] < 1e-3 and row["exudyn"]["error"] <= exudyn_search.TARGET
     if not MOTIONS["python-tick"].available:
-        assert "fx.Sampled" in measure.motion(MOTIONS["python-tick"], 2)["failed"]
+        assert "fx.Sampled" in equal_error.motion_row(MOTIONS["python-tick"], 2)["failed"]
     row["asked"] = 300
     text = printed(
         report.motions([row, {"name": "other", "asked": None, "failed": "why"}]),
@@ -161,7 +169,7 @@ def test_tables_fit_80_columns_without_cutting(longest):
     row["default"] = {"ms": longest, "error": 3e-5}
     tables = [
         report.motions([row]),
-        report.stills([row | {"name": "frequencies-sparse"}]),
+        report.statics([row | {"name": "frequencies-sparse"}]),
         report.summary([row]),
         report.populations([{"what": "p" * 40, "us": longest, "ratio": ratio, "asked": 1000.0}]),
         report.growths([{"what": "elements of a link", "count": 64, "us": longest, "times": 2.0}]),
@@ -210,7 +218,7 @@ def test_ratios_are_formed_round_by_round():
         [1.0, 0.03, 3.0, 0.05, 0.02, 0.04, 0.06, 0.01]
     )  # first runs say how often a round repeats
     run = lambda: next(calls)
-    assert timing.walls([run, run], 1).tolist() == [[3.0, 0.05]]
+    assert timing.run_times([run, run], 1).tolist() == [[3.0, 0.05]]
 
 
 def test_accuracy_says_what_is_beyond_what_is_asked():

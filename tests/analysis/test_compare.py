@@ -13,10 +13,22 @@ import pytest
 import flexura as fx
 from flexlab.cli.compare import save
 from flexlab.comparison import report, table
-from flexlab.comparison.measures import COVERED, PUBLISHED, compare, delay, ordered, response_time
+from flexlab.comparison.measures import (
+    PUBLISHED,
+    RESPONSE_LEVEL,
+    best_fit_delay,
+    compare,
+    response_time,
+    simulation_first,
+)
 from flexlab.comparison.replay import lead_screw, stepper_relaxation
-from flexlab.comparison.replay.simulate_experiment import WAYS, simulate
-from flexlab.comparison.replay.smoothing import known, onward, resolution, smoothed
+from flexlab.comparison.replay.simulate_experiment import DRIVEN_BY, simulate_experiment
+from flexlab.comparison.replay.smoothing import (
+    continue_past_end,
+    recorded_samples,
+    resolution,
+    smoothing_spline,
+)
 from flexlab.rig import load
 from flexlab.rig.plant.motor import JointLine, joint_line
 from flexlab.rig.plant.stepper import MagneticSpring
@@ -40,7 +52,7 @@ def forward():
 
 @pytest.fixture(scope="module")
 def compared(forward):
-    return compare(simulate(forward[0]), forward[0])
+    return compare(simulate_experiment(forward[0]), forward[0])
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +86,9 @@ def test_what_was_commanded_gives_what_another_program_found(which, request):
     """The parts' own equations in Exudyn; in the simulation a line, a relaxed sine and 5 ms of the
     drive's samples."""
     measured, moved = request.getfixturevalue(which)
-    found = {row.channel: row.max_relative for row in deviations(simulate(measured), moved)}
+    found = {
+        row.channel: row.max_relative for row in deviations(simulate_experiment(measured), moved)
+    }
     assert found["joint/1/position"] < 0.005 and found["joint/2/position"] < 0.0015
     assert found["link/2/tip_deflection"] < 0.011
 
@@ -85,7 +99,7 @@ def test_joints_on_their_encoders_bend_the_strip_as_it_was_bent(which, request):
     twice that from the truth; an encoder step of 2.6 mrad is 0.8 mm at the tip, which bends by 16
     and 32 mm."""
     measured, moved = request.getfixturevalue(which)
-    simulated = simulate(measured, "measured")
+    simulated = simulate_experiment(measured, "measured")
     found = {row.channel: (row.max, row.rms) for row in deviations(simulated, moved)}
     step = 2 * np.pi / 2400
     assert found["joint/2/position"][0] < step and found["joint/2/position"][
@@ -100,7 +114,7 @@ def test_joints_on_their_encoders_bend_the_strip_as_it_was_bent(which, request):
 def test_a_simulation_stands_on_the_experiments_times_and_names_its_drive(forward):
     measured, _ = forward
     for by in ("commanded", "measured"):
-        simulated = simulate(measured, by)
+        simulated = simulate_experiment(measured, by)
         np.testing.assert_allclose(simulated.t, measured.t, atol=1e-12)
         assert simulated.meta["driven_by"] == by and "(emulated)" in simulated.meta["simulates"]
         assert np.isfinite(
@@ -110,7 +124,7 @@ def test_a_simulation_stands_on_the_experiments_times_and_names_its_drive(forwar
 
 def test_set_points_are_followed_exactly(inverse):
     measured, _ = inverse
-    simulated = simulate(measured, "reference")
+    simulated = simulate_experiment(measured, "reference")
     there = np.isfinite(measured["joint/2/reference"])
     np.testing.assert_allclose(
         simulated["joint/2/position"][there], measured["joint/2/reference"][there], atol=1e-7
@@ -121,9 +135,10 @@ def test_the_robot_may_be_another(forward):
     measured, _ = forward
     soft = fx.Robot.from_dict(measured.meta["robot"]).replace({"link.2.young_modulus_Pa": 1e11})
     rows = {
-        row.channel: row for row in compare(simulate(measured, robot=soft), measured).differences
+        row.channel: row
+        for row in compare(simulate_experiment(measured, robot=soft), measured).differences
     }
-    own = {row.channel: row for row in compare(simulate(measured), measured).differences}
+    own = {row.channel: row for row in compare(simulate_experiment(measured), measured).differences}
     assert rows["link/2/tip_deflection"].max > 5 * own["link/2/tip_deflection"].max
 
 
@@ -140,10 +155,10 @@ def test_the_relaxed_field_is_the_sine(pulse, prescribed):
     )
     system = fx.assemble(robot)
     t = np.linspace(0, 0.5, 101)
-    pulses = onward(t, pulse * np.minimum(t / 0.02, 1.0))
+    pulses = continue_past_end(t, pulse * np.minimum(t / 0.02, 1.0))
     zero = fx.signals.constant(0.0)
     stands = JointDrive(force=zero, motion=zero, prescribed=True) if prescribed else zero
-    found = stepper_relaxation.held_by_field(
+    found = stepper_relaxation.simulate_with_stepper(
         (system, system.start()), t, stands, pulses, spring, 1e-6
     )
     exact = fx.simulate(
@@ -175,7 +190,7 @@ def test_a_constant_voltage_ends_at_the_lines_speed():
         "rig": bench.rig.model_dump(mode="json"),
         "source": "experiment",
     }
-    simulated = simulate(Run(t, channels, units, meta))
+    simulated = simulate_experiment(Run(t, channels, units, meta))
     speed = (line.force_N_V * (6.0 - dead) - line.coulomb_N) / line.viscous_N_s_m
     assert simulated["joint/1/velocity"][-1] == pytest.approx(speed, rel=1e-4)
 
@@ -194,7 +209,7 @@ LINE = JointLine(
 
 def pushed(force, play_m=0.0, seconds=0.6, line=LINE):
     t = np.arange(round(seconds / lead_screw.STEP_S)) * lead_screw.STEP_S
-    return t, *lead_screw.driven(t, force, line, 121.0, play_m, 0.0)
+    return t, *lead_screw.nut_and_carriage(t, force, line, 121.0, play_m, 0.0)
 
 
 def test_static_friction_holds_the_nut_until_its_force():
@@ -243,7 +258,7 @@ def test_the_nut_crosses_its_play_without_the_rail_and_then_takes_the_carriage_a
 def test_a_smoothed_motion_is_twice_differentiable_and_has_no_lag():
     t = np.arange(601) / 200.0
     true, step = 0.5 * np.sin(2 * np.pi * t), 2 * np.pi / 2400
-    motion = smoothed(t, np.round(true / step) * step)
+    motion = smoothing_spline(t, np.round(true / step) * step)
     for at in motion.breaks[1:]:
         jump = np.subtract(motion(np.nextafter(at, -np.inf)), motion(at))
         assert (np.abs(jump) < [1e-9, 1e-8, 1e-5]).all()
@@ -257,7 +272,7 @@ def test_a_smoothed_motion_is_twice_differentiable_and_has_no_lag():
 def test_the_residual_is_what_quantisation_leaves():
     t = np.arange(401) / 200.0
     y = np.round(np.sin(5 * t) / 0.01) * 0.01
-    motion = smoothed(t, y)
+    motion = smoothing_spline(t, y)
     fit = np.array([motion(at)[0] for at in t])
     moving = np.append(np.diff(y) != 0, False) | np.insert(np.diff(y) != 0, 0, False)
     assert np.sqrt(np.mean((fit - y)[moving] ** 2)) == pytest.approx(0.01 / np.sqrt(12), rel=0.02)
@@ -271,13 +286,13 @@ def test_the_resolution_is_found():
 
 def test_what_was_not_quantised_is_passed_through():
     t = np.linspace(0, 1, 50)
-    motion = smoothed(t, np.exp(t))
+    motion = smoothing_spline(t, np.exp(t))
     np.testing.assert_allclose([motion(at)[0] for at in t], np.exp(t), atol=1e-14)
 
 
 def test_a_motion_of_dropouts_is_refused():
     with pytest.raises(InputError, match="joint/1/position = 3: expected at least 8 samples"):
-        known(np.arange(9.0), np.array([1, 2, 3] + 6 * [np.nan]), "joint/1/position")
+        recorded_samples(np.arange(9.0), np.array([1, 2, 3] + 6 * [np.nan]), "joint/1/position")
 
 
 # --- measures
@@ -286,10 +301,10 @@ def test_a_motion_of_dropouts_is_refused():
 def test_response_times_of_known_motions():
     t = np.arange(2001) / 1000
     assert response_time(t, 3 + 0.2 * np.sin(2 * np.pi * t)) == pytest.approx(
-        np.arcsin(COVERED) / (2 * np.pi), abs=1e-5
+        np.arcsin(RESPONSE_LEVEL) / (2 * np.pi), abs=1e-5
     )
     first_order = 1 - np.exp(-t / 0.1)
-    level = COVERED * first_order[-1]
+    level = RESPONSE_LEVEL * first_order[-1]
     assert response_time(t, -first_order) == pytest.approx(-0.1 * np.log(1 - level), abs=1e-5)
     assert np.isnan(response_time(t, np.zeros(len(t)))) and np.isnan(response_time(t, t * np.nan))
 
@@ -314,7 +329,7 @@ def test_a_delay_is_found_to_a_part_of_a_sample(late):
         run(t, joint__1__position=law(t - late) + noise),
     )
     second["joint/1/position"][40:45] = np.nan
-    assert delay(first, second, "joint/1/position") == pytest.approx(late, abs=2e-4)
+    assert best_fit_delay(first, second, "joint/1/position") == pytest.approx(late, abs=2e-4)
 
 
 def test_the_table_is_of_what_deviates():
@@ -369,8 +384,8 @@ def test_the_dissertations_figures():
 def test_the_experiment_comes_last(forward):
     measured, moved = forward
     for pair in ((measured, moved), (moved, measured)):
-        assert ordered(*pair) == (moved, measured)
-    assert ordered(moved, moved) == (moved, moved)
+        assert simulation_first(*pair) == (moved, measured)
+    assert simulation_first(moved, moved) == (moved, moved)
 
 
 def test_runs_with_nothing_in_common_are_refused():
@@ -393,19 +408,19 @@ def test_runs_with_nothing_in_common_are_refused():
 )
 def test_what_an_experiment_lacks_is_named(by, changes, words, forward):
     with pytest.raises(InputError, match=re.escape(words)):
-        simulate(replace(forward[0], meta=forward[0].meta | changes), by)
+        simulate_experiment(replace(forward[0], meta=forward[0].meta | changes), by)
 
 
-@pytest.mark.parametrize("by", WAYS)
+@pytest.mark.parametrize("by", DRIVEN_BY)
 def test_a_run_without_the_channels_is_named(by):
     with pytest.raises(InputError, match=f"by = '{by}': expected a run with joint/1/"):
-        simulate(run([0, 1], tip__x=[0, 1]), by)
+        simulate_experiment(run([0, 1], tip__x=[0, 1]), by)
 
 
 def test_a_rig_without_its_emulated_figures_is_told_what_is_missing(forward):
     rig = forward[0].meta["rig"] | {"emulated": None}
     with pytest.raises(InputError, match=r"rig.emulated: missing"):
-        simulate(replace(forward[0], meta=forward[0].meta | {"rig": rig}))
+        simulate_experiment(replace(forward[0], meta=forward[0].meta | {"rig": rig}))
 
 
 # --- what it leaves, and that nothing emulated passes as measured

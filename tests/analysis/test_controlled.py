@@ -14,7 +14,7 @@ import pytest
 
 import flexura as fx
 from flexlab.board.protocol.declaration import CONFIG
-from flexlab.tuning.closed_loop import controlled
+from flexlab.tuning.closed_loop import controller_from_file
 from flexura.control import gains
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -60,7 +60,7 @@ def test_the_strips_term_takes_the_vibration_away():
     ten times less vibration."""
     system = rig_with_rotor()
     asked = fx.load_manoeuvre(STEP, 2)
-    drive = controlled(system, asked, GAINS)
+    drive = controller_from_file(system, asked, GAINS)
     plain = replace(drive, joints=(drive.joints[0], replace(drive.joints[1], kf=0.0)))
     good, poor = (fx.simulate(system, asked.t, d, rtol=1e-5) for d in (drive, plain))
     late = asked.t > 2.5
@@ -118,4 +118,4 @@ def test_a_prescribed_joint_is_refused(tmp_path):
     text = STEP.read_text().replace("duration_s = 0.6 }", "duration_s = 0.6 }\nprescribed = true")
     (tmp_path / "m.toml").write_text(text)
     with pytest.raises(fx.InputError, match="no prescribed joint"):
-        controlled(rig_with_rotor(), fx.load_manoeuvre(tmp_path / "m.toml", 2), GAINS)
+        controller_from_file(rig_with_rotor(), fx.load_manoeuvre(tmp_path / "m.toml", 2), GAINS)

@@ -12,9 +12,9 @@ from flexlab.board.protocol import messages
 from flexlab.board.protocol.declaration import Mode, State
 from flexlab.board.protocol.player import drives, setpoints
 from flexlab.board.protocol.session import Link
-from flexlab.experiment.lead_in import led, quintic
+from flexlab.experiment.lead_in import quintic, with_lead_in
 from flexlab.recordings import flex_calibration
-from flexlab.recordings.delay_estimation import delay
+from flexlab.recordings.delay_estimation import estimate_delay
 from flexlab.recordings.unit_conversion import (
     Sensor,
     channels,
@@ -148,7 +148,7 @@ def test_the_tip_deflections_uncertainty_is_what_monte_carlo_says():
 def test_a_known_delay_is_found_below_a_sample(late):
     t = np.arange(0, 3, 0.002)
     course = lambda at: np.sin(2 * np.pi * 1.1 * at) + 0.4 * np.sin(2 * np.pi * 3.7 * at)
-    found = delay(t, course(t), 0.2 + 1.7 * course(t - late))
+    found = estimate_delay(t, course(t), 0.2 + 1.7 * course(t - late))
     assert found.seconds == pytest.approx(late, abs=2e-6) and found.correlation > 0.999999
 
 
@@ -166,7 +166,7 @@ def test_a_delays_standard_deviation_is_that_of_many_trials():
             )
             response = course(t - 0.0123) + 0.1 * noise
             response[200:230] = np.nan
-            found.append(delay(t, course(t), response))
+            found.append(estimate_delay(t, course(t), response))
         error = np.array([f.seconds for f in found]) - 0.0123
         told = np.sqrt(np.mean([f.std**2 for f in found]))
         assert least < told / error.std() < most
@@ -175,8 +175,8 @@ def test_a_delays_standard_deviation_is_that_of_many_trials():
 
 def test_no_delay_where_nothing_moves():
     t = np.arange(0, 1, 0.002)
-    assert delay(t, np.zeros(500), np.sin(t)) is None
-    assert delay(t, np.full(500, np.nan), np.sin(t)) is None
+    assert estimate_delay(t, np.zeros(500), np.sin(t)) is None
+    assert estimate_delay(t, np.full(500, np.nan), np.sin(t)) is None
 
 
 @pytest.mark.parametrize("lost", [0, 7])
@@ -253,7 +253,7 @@ def test_the_emulated_strip_is_held_and_its_sensor_is_read_through_the_board():
     """Firmware, ADC and fit against the divider's own derivative: c1 = dw/dr at the straight
     strip."""
     made = board()
-    made.plant = flex_calibration.Held(made.plant, BENCH)
+    made.plant = flex_calibration.DeflectedPlant(made.plant, BENCH)
     found = flex_calibration.fit(
         *flex_calibration.measure(Link(made, sequence=1), flex_calibration.TIPS_M, made.plant.hold)
     )
@@ -294,7 +294,7 @@ def test_a_motion_is_led_in_and_out_without_a_jump_and_is_itself_in_between():
         polynomial(0.1, 0.5, at_s=0.3),
         table([-1.0, 0.4, 2.0], [0.1, 0.3, -0.2]),
     ):
-        found = led(motion, 1.5, 1.0, 0.7)
+        found = with_lead_in(motion, 1.5, 1.0, 0.7)
         for t in np.linspace(0.0, 1.4999, 200):
             np.testing.assert_allclose(found(1.0 + t), motion(t), rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(found(0.0), 0.0, atol=1e-12)
@@ -304,5 +304,5 @@ def test_a_motion_is_led_in_and_out_without_a_jump_and_is_itself_in_between():
     row = quintic(2.0, 0.5, (1.0, 2.0, 3.0), (-4.0, 5.0, -6.0))[None]
     np.testing.assert_allclose(evaluate(row, 2.0), (1.0, 2.0, 3.0))
     np.testing.assert_allclose(evaluate(row, 2.5), (-4.0, 5.0, -6.0))
-    same = led(bang_bang(1.0, 1.0, 0.1), 1.0, 0.0, 0.0)
+    same = with_lead_in(bang_bang(1.0, 1.0, 0.1), 1.0, 0.0, 0.0)
     assert all(same(t) == bang_bang(1.0, 1.0, 0.1)(t) for t in (0.0, 0.3, 0.5, 0.999))

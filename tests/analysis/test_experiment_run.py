@@ -19,7 +19,7 @@ from flexlab.cli.bench_tables import live_table, result_table, selftest_table
 from flexlab.experiment import plan as plans
 from flexlab.experiment.run_experiment import Opened, Watch, check, conduct
 from flexlab.recordings import recording
-from flexlab.recordings.run_from_recording import UNTOLD, knots_from, rebuild
+from flexlab.recordings.run_from_recording import UNEXPLAINED, knots_from, run_from_recording
 from flexlab.recordings.unit_conversion import UNITS, Sensor, commanded
 from flexura.io import write_toml
 from flexura.signals import harmonic
@@ -174,10 +174,12 @@ def test_a_recording_cut_at_any_byte_is_the_beginning_of_the_whole(tracked, tmp_
     whole = tracked.run
     total = whole.meta["line"]["bytes"]
     for size in np.random.default_rng(5).integers(total // 2, total, 6):
-        run = rebuild(cut_at(tracked, tmp_path, int(size)))
+        run = run_from_recording(cut_at(tracked, tmp_path, int(size)))
         n = len(run)
         assert n >= len(whole) - (total - size) // FRAME_BYTES - 2 and not run.complete
-        assert run.meta["events"][-1]["text"] == UNTOLD and run.meta["label"].startswith("emulated")
+        assert run.meta["events"][-1]["text"] == UNEXPLAINED and run.meta["label"].startswith(
+            "emulated"
+        )
         for channel in set(run) - {"joint/1/velocity", "joint/2/velocity"}:
             np.testing.assert_array_equal(run[channel], whole[channel][:n], err_msg=channel)
         inner = slice(0, n - 10)  # the window of the velocity ends elsewhere
@@ -192,7 +194,7 @@ def test_garbage_in_the_middle_costs_the_frames_that_it_hits(tracked, tmp_path):
     at = 2 * len(data) // 3
     data[at : at + 300] = np.random.default_rng(6).integers(0, 256, 300, dtype=np.uint8).tobytes()
     (folder / recording.RECEIVED).write_bytes(data)
-    run = rebuild(folder)
+    run = run_from_recording(folder)
     missing = np.isnan(run["joint/1/position"])
     assert (
         len(run) == len(tracked.run)
@@ -210,7 +212,7 @@ def test_what_another_program_had_left_on_the_line_is_not_of_this_run(tracked, t
     folder = cut_at(tracked, tmp_path, tracked.run.meta["line"]["bytes"])
     data = (folder / recording.RECEIVED).read_bytes()
     (folder / recording.RECEIVED).write_bytes(data[len(data) // 2 :] + data)
-    run = rebuild(folder)
+    run = run_from_recording(folder)
     assert len(run) == len(tracked.run) and run.meta["line"]["missing"] == 0
     np.testing.assert_array_equal(run["joint/2/position"], tracked.run["joint/2/position"])
 
@@ -221,11 +223,11 @@ def test_recordings_left_behind_are_found_and_those_under_way_are_not(tracked, t
     assert recording.unfinished(tmp_path) == [left]
     busy.close()
     assert set(recording.unfinished(tmp_path)) == {left, tmp_path / "busy"}
-    rebuild(left).save(left)
+    run_from_recording(left).save(left)
     assert recording.unfinished(tmp_path) == [tmp_path / "busy"]
     with pytest.raises(fx.InputError, match="no report"):
         shutil.copy(left / recording.SESSION, tmp_path / "busy")
-        rebuild(tmp_path / "busy")
+        run_from_recording(tmp_path / "busy")
 
 
 def test_a_folder_with_a_recording_is_not_written_over(tracked):

@@ -20,7 +20,7 @@ from experiments import BENCH, SETTINGS, Line, board, command, experiment, runni
 from flexlab.experiment import plan as plans
 from flexlab.experiment.run_experiment import Opened, Watch
 from flexlab.recordings import recording
-from flexlab.recordings.run_from_recording import UNTOLD, rebuild
+from flexlab.recordings.run_from_recording import UNEXPLAINED, run_from_recording
 
 LONG = ("free-vibration", "--duration-s", 20)
 SHORT = ("free-vibration", "--duration-s", 1.1)
@@ -111,12 +111,12 @@ def test_kill_9_at_a_random_moment(line, tmp_path, count, seed):
         kept = recording.read(folder)
         assert kept.session["experiment"] == "free-vibration"
         try:
-            run = rebuild(folder)
+            run = run_from_recording(folder)
         except fx.InputError as error:
             assert "no report" in str(error)  # killed before the board had answered
             continue
         whole(run)
-        assert not run.complete and UNTOLD in run.meta["events"][-1]["text"]
+        assert not run.complete and UNEXPLAINED in run.meta["events"][-1]["text"]
         if run.meta["events"][0]["text"] != "nothing was moved":
             ran += 1
         saved.append(folder / "run.parquet")
@@ -250,7 +250,7 @@ def test_the_disk_is_full_in_the_middle(line, tmp_path):
     assert "what had been received before is kept" in said and not line.driven
     assert (tmp_path / "run" / recording.RECEIVED).stat().st_size == size
     run = (
-        rebuild(tmp_path / "run")
+        run_from_recording(tmp_path / "run")
         if not (tmp_path / "run" / "run.parquet").exists()
         else fx.Run.read(tmp_path / "run")
     )

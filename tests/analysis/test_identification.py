@@ -17,9 +17,9 @@ from flexlab import rig as rigs
 from flexlab.comparison.replay import lead_screw
 from flexlab.experiment import excitation
 from flexlab.identification import carriage, files, output
-from flexlab.identification.estimate import Unknown, covariance, estimate
-from flexlab.identification.identify import described, identify
-from flexlab.rig.plant.motor import line
+from flexlab.identification.estimate import Parameter, covariance, estimate
+from flexlab.identification.identify import identify, read_nominal
+from flexlab.rig.plant.motor import joint_line_of
 from rigs import excited, ran
 
 FOLDER = Path(files.__file__).parent
@@ -50,8 +50,8 @@ def test_intervals_cover_what_they_say_with_residuals_that_hang_together(kept):
     course = lambda v: v["size"] * np.exp(-t / v["decay_s"])
     truth = {"size": 2.0, "decay_s": 0.4}
     unknowns = [
-        Unknown("size", 1.5, 1e-4, (0.1, 10.0)),
-        Unknown("decay_s", 0.3, 1e-4, (0.01, 10.0)),
+        Parameter("size", 1.5, 1e-4, (0.1, 10.0)),
+        Parameter("decay_s", 0.3, 1e-4, (0.01, 10.0)),
     ]
     inside, rounds = 0, 150
     for seed in range(rounds):
@@ -69,7 +69,10 @@ def test_intervals_cover_what_they_say_with_residuals_that_hang_together(kept):
 def test_unknowns_that_do_nearly_the_same_are_told_apart():
     t = np.linspace(0.0, 1.0, 500)
     model = lambda v: np.stack([np.sin(300 * t * v["a"] * v["b"]) + 1e-3 * v["b"] * t])
-    start = [Unknown("a", 1.0001 / 1.02, 1e-5, (0.5, 2.0)), Unknown("b", 1.02, 1e-2, (0.5, 2.0))]
+    start = [
+        Parameter("a", 1.0001 / 1.02, 1e-5, (0.5, 2.0)),
+        Parameter("b", 1.02, 1e-2, (0.5, 2.0)),
+    ]
     measured = model({"a": 1.0, "b": 1.0})
     found = estimate(lambda v: 1e3 * (model(v) - measured), start, 0, {"b": {"a": -1.0}})
     assert found.values["a"] == pytest.approx(1.0, rel=1e-4) and found.values["b"] == pytest.approx(
@@ -80,15 +83,17 @@ def test_unknowns_that_do_nearly_the_same_are_told_apart():
 def test_a_doubt_about_the_model_widens_by_the_shift_it_would_cause():
     t = np.linspace(0.0, 1.0, 400)
     model = lambda v: (v["slope"] * t)[None, :]
-    unknown = [Unknown("slope", 1.0, 1e-3, (-10.0, 10.0), factor=False)]
+    unknown = [Parameter("slope", 1.0, 1e-3, (-10.0, 10.0), factor=False)]
     found = estimate(lambda v: model(v) - 2 * t[None, :], unknown, 0)
-    assert found.doubted(0.1 * t[None, :]).deviation("slope") == pytest.approx(0.1, rel=1e-6)
+    assert found.with_model_uncertainty(0.1 * t[None, :]).deviation("slope") == pytest.approx(
+        0.1, rel=1e-6
+    )
 
 
 def test_the_carriage_follows_the_nut_behind_its_play():
     t = np.linspace(0.0, 2.0, 4001)
     nut = 1e-3 * np.sin(2 * np.pi * t)
-    x = lead_screw.behind(nut, 3e-4)
+    x = lead_screw.backlash_output(nut, 3e-4)
     assert np.ptp(x[1000:]) == pytest.approx(2e-3 - 3e-4, rel=1e-5)
     assert np.abs(x - nut).max() == pytest.approx(1.5e-4, rel=1e-6)
     still = (
@@ -109,11 +114,11 @@ def test_the_excitation_is_what_the_rig_can_do():
 
 def test_more_friction_leaves_constant_and_gear_of_the_motor_alone():
     rig = BENCH.rig
-    more = rigs.Rig.model_validate(files.rubbed(rig, 1.4))
+    more = rigs.Rig.model_validate(files.with_identified_friction(rig, 1.4))
     old, new, wanted = (
-        line(rig, rig.emulated),
-        line(more, more.emulated),
-        line(rig, rig.emulated, 1.4),
+        joint_line_of(rig, rig.emulated),
+        joint_line_of(more, more.emulated),
+        joint_line_of(rig, rig.emulated, 1.4),
     )
     assert new.force_N_V == pytest.approx(old.force_N_V, rel=1e-12)
     assert new.coulomb_N == pytest.approx(1.4 * old.coulomb_N, rel=1e-12)
@@ -126,7 +131,9 @@ def test_nothing_here_looks_at_what_an_emulated_plant_says_of_itself():
         names = {n.attr for n in ast.walk(tree) if isinstance(n, ast.Attribute)} | {
             n.id for n in ast.walk(tree) if isinstance(n, ast.Name)
         }
-        assert not names & {"truth", "ranges", "random_truth", "Truth"}, path.name
+        assert not names & {"truth", "ranges", "random_true_parameters", "TrueParameters"}, (
+            path.name
+        )
         read = [
             n
             for n in ast.walk(tree)
@@ -142,8 +149,8 @@ def excitement(tmp_path_factory):
 
 def test_friction_is_found_from_one_run(excitement):
     run = excitement.run
-    nominal = described(run)
-    found = carriage.fit(run, nominal.robot, nominal.line, nominal.more.driver.dead_zone_V)
+    nominal = read_nominal(run)
+    found = carriage.fit(run, nominal.robot, nominal.line, nominal.emulated.driver.dead_zone_V)
     truth = run.meta["truth"]
     assert found.values["coulomb_N"] == pytest.approx(truth["joint_1_coulomb_N"], rel=0.15)
     assert found.values["viscous_N_s_m"] == pytest.approx(truth["joint_1_viscous_N_s_m"], rel=0.15)

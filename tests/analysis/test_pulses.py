@@ -23,7 +23,7 @@ def run(request, tmp_path_factory):
 
 
 def test_every_report_counts_the_pulses_that_the_knots_give(run):
-    at, angle = pulses.from_run(run)
+    at, angle = pulses.pulses_of_run(run)
     assert len(at) > 500 and np.all(np.diff(at) > 0)
     reported = run["joint/2/pulses"]
     given = angle[np.searchsorted(at, run.t, side="right") - 1]
@@ -38,7 +38,7 @@ def test_a_report_that_says_otherwise_is_believed(run):
     changed = run["joint/2/pulses"].copy()
     changed[len(changed) // 2] += 2 / SETTINGS["stepper_steps_per_rad"]
     assert (
-        pulses.from_run(
+        pulses.pulses_of_run(
             dataclasses.replace(run, channels=run.channels | {"joint/2/pulses": changed})
         )
         is None
@@ -48,5 +48,5 @@ def test_a_report_that_says_otherwise_is_believed(run):
 @pytest.mark.parametrize("name", ["feedback_2", "kg_2_rad_m"])
 def test_a_controller_that_saw_more_than_its_pulses_is_not_replayed(run, name):
     settings = run.meta["settings"] | {name: 1.0}
-    found = pulses.from_run(dataclasses.replace(run, meta=run.meta | {"settings": settings}))
+    found = pulses.pulses_of_run(dataclasses.replace(run, meta=run.meta | {"settings": settings}))
     assert (found is None) == (run.meta["experiment"] == "inverse")

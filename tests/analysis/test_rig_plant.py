@@ -13,16 +13,16 @@ from scipy.optimize import least_squares
 import flexura as fx
 from flexlab import rig
 from flexlab.board.emulator.emulated import Outputs
-from flexlab.rig.emulation import FACTORS, Ranges, Truth, random_truth
+from flexlab.rig.emulation import FACTORS, Ranges, TrueParameters, random_true_parameters
 from flexlab.rig.plant.mechanics import STEP_S, Mechanics
-from flexlab.rig.plant.motor import Motor, backwards, joint_line, motor_data
+from flexlab.rig.plant.motor import DCMotor, back_driven_efficiency, joint_line, motor_data
 from flexlab.rig.plant.plant import rig_plant, true_robot
 from flexura.errors import InputError
 
 ROOT = Path(__file__).resolve().parents[2]
 BENCH = rig.load(ROOT / "firmware" / "rig.toml")
 DATA = motor_data(BENCH.rig, BENCH.emulated.motor)
-SAME = Truth()
+SAME = TrueParameters()
 STIFF = 1e9, 0.0
 QUIET = {"flex__noise_V": 0.0, "flex__drift_V": 0.0}
 
@@ -146,7 +146,7 @@ def test_a_plant_knows_nothing_of_the_native_solver():
 @pytest.mark.parametrize("part", [0.0, 0.25, 0.5, 0.9])
 def test_the_motor_is_on_the_line_of_its_data_sheet(part):
     """n = n0 (1 - M / M_stall), I = I0 + (I_stall - I0) M / M_stall, the gear's losses in it."""
-    motor, sheet = Motor(DATA), BENCH.rig.motor
+    motor, sheet = DCMotor(DATA), BENCH.rig.motor
     load = part * sheet.stall_torque_N_m
     for _ in range(2000):
         motor.advance(5e-4, sheet.rated_voltage_V, load)
@@ -158,7 +158,7 @@ def test_the_motor_is_on_the_line_of_its_data_sheet(part):
 
 
 def test_the_blocked_motor_takes_its_stall_current_with_the_coil_s_time_constant():
-    motor = Motor(dataclasses.replace(DATA, inertia_kg_m2=1e6))
+    motor = DCMotor(dataclasses.replace(DATA, inertia_kg_m2=1e6))
     motor.advance(1e-3, 12.0)
     assert motor.current_A == pytest.approx(
         7.0 * (1 - math.exp(-1e-3 * DATA.resistance_ohm / DATA.inductance_H)), rel=1e-6
@@ -172,7 +172,7 @@ def test_the_motor_starts_at_its_voltage_and_the_friction_of_the_truth_moves_it(
     starts = BENCH.emulated.motor.starts_at_V
     for factor in (1.0, 1.3):
         for volts, turns in ((0.98 * factor * starts, False), (1.03 * factor * starts, True)):
-            motor = Motor(DATA, friction=factor)
+            motor = DCMotor(DATA, friction=factor)
             for _ in range(100):
                 motor.advance(1e-3, volts)
             assert (motor.angle_rad != 0) == turns
@@ -181,7 +181,7 @@ def test_the_motor_starts_at_its_voltage_and_the_friction_of_the_truth_moves_it(
 def test_a_motor_without_voltage_coasts_and_a_shorted_one_brakes():
     turned = []
     for volts in (None, 0.0):
-        motor = Motor(DATA)
+        motor = DCMotor(DATA)
         motor.speed_rad_s = 50.0
         for _ in range(2000):
             motor.advance(1e-3, volts)
@@ -200,19 +200,22 @@ def test_a_load_costs_the_motor_more_than_it_gives_back(efficiency):
     load = 0.02
     currents = []
     for volts in (6.0, -6.0):
-        motor = Motor(DATA, screw_efficiency=efficiency)
+        motor = DCMotor(DATA, screw_efficiency=efficiency)
         for _ in range(2000):
             motor.advance(5e-4, volts, load)
         currents.append(motor.current_A)
     gear = DATA.gear_efficiency
     both = (
         load
-        * (1 / (gear * efficiency) + backwards(gear) * backwards(efficiency))
+        * (
+            1 / (gear * efficiency)
+            + back_driven_efficiency(gear) * back_driven_efficiency(efficiency)
+        )
         / DATA.constant_N_m_A
     )
     assert currents[0] + currents[1] == pytest.approx(both, rel=2e-3)
-    assert backwards(0.5) == 0.0 and backwards(1.0) == 1.0
-    locked = Motor(DATA, screw_efficiency=0.5)
+    assert back_driven_efficiency(0.5) == 0.0 and back_driven_efficiency(1.0) == 1.0
+    locked = DCMotor(DATA, screw_efficiency=0.5)
     locked.advance(0.1, None, 100.0)
     assert locked.angle_rad == 0.0
 
@@ -222,7 +225,7 @@ def test_the_carriage_lags_by_the_play(factor):
     """Slowly up and down: the carriage minus the nut differs, between the ways, by the play and
     twice the nut's give F / k."""
     emulated = BENCH.emulated.carriage
-    plant = rig_plant(BENCH, truth=Truth(backlash=factor), **QUIET)
+    plant = rig_plant(BENCH, truth=TrueParameters(backlash=factor), **QUIET)
     _, carriage, nut, _, _ = run(plant, 4.0, lambda t: (0.25 if t < 2.0 else -0.25, 0))
     up, down = (carriage - nut)[round(1.75 / STEP_S)], (carriage - nut)[round(3.75 / STEP_S)]
     force = emulated.coulomb_friction_N + emulated.viscous_friction_N_s_m * 0.015
@@ -310,7 +313,7 @@ def test_a_stepper_without_current_lets_the_joint_go():
 
 
 def test_the_flex_sensor_divides_the_supply_by_its_bend():
-    plant = rig_plant(BENCH, truth=Truth(flex_gain=0.9), **QUIET)
+    plant = rig_plant(BENCH, truth=TrueParameters(flex_gain=0.9), **QUIET)
     flex, more = BENCH.rig.flex, BENCH.emulated.flex
     for bend in (-0.03, 0.0, 0.02):
         volts = plant.flex.voltage(bend)
@@ -420,7 +423,7 @@ def test_the_same_seed_is_the_same_rig_and_another_one_is_not():
 
 
 def test_the_truth_is_told_and_is_in_the_robot():
-    truth = Truth(
+    truth = TrueParameters(
         stiffness=0.9, damping=1.5, payload=1.2, friction=1.1, backlash=0.8, flex_gain=0.95
     )
     plant = rig_plant(BENCH, seed=3, truth=truth)
@@ -457,12 +460,12 @@ def test_the_truth_is_told_and_is_in_the_robot():
 
 def test_random_truths_lie_in_their_ranges_and_follow_their_seed():
     ranges = Ranges(stiffness=(0.5, 0.6))
-    drawn = [random_truth(seed, ranges) for seed in range(50)]
+    drawn = [random_true_parameters(seed, ranges) for seed in range(50)]
     for name in FACTORS:
         low, high = getattr(ranges, name)
         values = [getattr(truth, name) for truth in drawn]
         assert low <= min(values) < max(values) <= high and np.ptp(values) > 0.7 * (high - low)
-    assert random_truth(4, ranges) == drawn[4] != drawn[5]
+    assert random_true_parameters(4, ranges) == drawn[4] != drawn[5]
 
 
 @pytest.mark.parametrize(

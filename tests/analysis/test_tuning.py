@@ -20,14 +20,14 @@ from scipy.optimize import differential_evolution, minimize_scalar
 
 import flexura as fx
 from flexlab.tuning import search_space as freedom
-from flexlab.tuning.closed_loop import under
-from flexlab.tuning.executor import Threads
+from flexlab.tuning.closed_loop import closed_loop_controller
+from flexlab.tuning.executor import ThreadExecutor
 from flexlab.tuning.history import FILE, History
-from flexlab.tuning.objective import FAILED, Weights
+from flexlab.tuning.objective import FAILURE_COST, Weights
 from flexlab.tuning.result import figures, result
 from flexlab.tuning.search import Search, _winners, search
-from flexlab.tuning.search_space import free
-from flexlab.tuning.task import varied
+from flexlab.tuning.search_space import free_gain
+from flexlab.tuning.task import perturbed_robots
 from flexura.control import gains
 from flexura.control.step_response import (
     ERROR,
@@ -114,15 +114,15 @@ def test_a_row_is_the_run_of_simulate_and_rows_do_not_know_of_each_other():
     points = np.random.default_rng(3).random((9, 3))
     found, reached = one.run(one.trials(), points)
     again, _ = one.run(one.trials(), points[::-1])
-    with Threads(one, 2) as engine:
-        shared, _ = engine(points, np.full(9, np.inf))
+    with ThreadExecutor(one, 2) as make_executor:
+        shared, _ = make_executor(points, np.full(9, np.inf))
     assert np.array_equal(found, again[::-1], equal_nan=True) and np.array_equal(
         found, shared, equal_nan=True
     )
     for k in (0, 4):
         tuned = one.tuned(one.values(points[k : k + 1])[0])
         system = fx.assemble(ROBOT)
-        controller = under(system, SWING, tuned)
+        controller = closed_loop_controller(system, SWING, tuned)
         run = fx.simulate(system, np.arange(0, 1001, 5) / 1000, controller, rtol=1e-6)
         direct = figures(run, controller)
         assert np.array_equal(
@@ -145,7 +145,12 @@ def test_the_effort_is_the_outputs_mean_square_over_the_limit():
     one = task(modes=0, rtol=1e-6)
     found, _ = one.run(one.trials(), one.start()[None])
     system = fx.assemble(ROBOT)
-    run = fx.simulate(system, np.arange(0, 10_001) / 10_000, under(system, SWING, GAINS), rtol=1e-6)
+    run = fx.simulate(
+        system,
+        np.arange(0, 10_001) / 10_000,
+        closed_loop_controller(system, SWING, GAINS),
+        rtol=1e-6,
+    )
     assert found[0, 0, 5] == pytest.approx(np.mean((run["joint/1/drive"] / 0.5) ** 2), rel=2e-3)
 
 
@@ -155,11 +160,11 @@ def test_gains_that_break_the_robot_cost_more_than_any_that_do_not():
     broken = task(robots=(fx.Robot.from_dict(data),))
     found, reached = broken.run(broken.trials(), np.array([[0.9, 0.3, 0.5]]))
     assert 0 < reached[0, 0] < 1 and np.isnan(found).all()
-    assert broken.score(found, reached)[0, 0] == pytest.approx(FAILED * (2 - reached[0, 0]))
+    assert broken.score(found, reached)[0, 0] == pytest.approx(FAILURE_COST * (2 - reached[0, 0]))
 
 
 def test_of_several_robots_the_worst_counts():
-    robots = varied(ROBOT, (0.0, 1.0, 2.0), (0.9, 1.0))
+    robots = perturbed_robots(ROBOT, (0.0, 1.0, 2.0), (0.9, 1.0))
     assert len(robots) == 6 and [r.payload.mass_kg for r in robots] == [
         0.02,
         0.0,
@@ -203,7 +208,7 @@ def test_a_run_is_abandoned_exactly_where_its_j_exceeds_the_limit():
     points = np.random.default_rng(8).random((40, 3))
     whole, reached = one.run(one.trials(), points)
     J = one.score(whole, reached)[:, 0]
-    fine = J < FAILED
+    fine = J < FAILURE_COST
     assert fine.sum() > 30
     for part in (0.3, 0.9, 1 - 1e-6, 1.0, 1 + 1e-6):
         found, far = one.run(one.trials(), points, np.where(fine, part * J, np.inf))
@@ -216,7 +221,7 @@ def test_a_run_is_abandoned_exactly_where_its_j_exceeds_the_limit():
 
 
 def test_on_several_robots_none_is_tried_after_one_that_was_too_bad():
-    many = task(robots=varied(ROBOT, (1.0, 2.0), (0.9,)))
+    many = task(robots=perturbed_robots(ROBOT, (1.0, 2.0), (0.9,)))
     points = np.random.default_rng(9).random((12, 3))
     J = many.score(*many.run(many.trials(), points))[:, 0]
     limits = np.full(12, np.median(J))
@@ -236,10 +241,14 @@ def test_a_search_that_abandons_goes_the_same_way_to_the_bit(algorithm):
     a tenth are noticed."""
     one, how = task(), Search(algorithm, population=10, generations=25, seed=6)
     trials = one.trials()
-    with_limits, _ = tuned(one, how, engine=lambda points, limits: one.run(trials, points, limits))
-    without, _ = tuned(one, how, engine=lambda points, limits: one.run(trials, points))
+    with_limits, _ = tuned(
+        one, how, make_executor=lambda points, limits: one.run(trials, points, limits)
+    )
+    without, _ = tuned(one, how, make_executor=lambda points, limits: one.run(trials, points))
     assert np.array_equal(with_limits.all("points"), without.all("points"))
-    assert [with_limits.merit(k) for k in range(1, 26)] == [without.merit(k) for k in range(1, 26)]
+    assert [with_limits.convergence_measure(k) for k in range(1, 26)] == [
+        without.convergence_measure(k) for k in range(1, 26)
+    ]
     cut = with_limits.all("reached")[:, 0] < 1
     kept = ~cut
     assert np.array_equal(with_limits.all("goals")[kept], without.all("goals")[kept])
@@ -248,7 +257,9 @@ def test_a_search_that_abandons_goes_the_same_way_to_the_bit(algorithm):
         assert not cut.any()
         return
     assert cut.mean() > 0.1
-    wrong, _ = tuned(one, how, engine=lambda points, limits: one.run(trials, points, 0.9 * limits))
+    wrong, _ = tuned(
+        one, how, make_executor=lambda points, limits: one.run(trials, points, 0.9 * limits)
+    )
     assert not np.array_equal(wrong.all("points"), without.all("points"))
 
 
@@ -256,17 +267,19 @@ def test_a_search_that_abandons_goes_the_same_way_to_the_bit(algorithm):
 
 
 def test_places_and_values_of_free_settings():
-    gain, through = free("kp_1_V_m", 10, 1000), free("kg_2_rad_m", -2, 2)
+    gain, through = free_gain("kp_1_V_m", 10, 1000), free_gain("kg_2_rad_m", -2, 2)
     assert (gain.scale, through.scale) == ("log", "linear")
-    assert gain.value(np.array([0, 0.5, 1])) == pytest.approx([10, 100, 1000]) and through.value(
-        np.array([0.25])
-    ) == [-1.0]
+    assert gain.from_unit_interval(np.array([0, 0.5, 1])) == pytest.approx(
+        [10, 100, 1000]
+    ) and through.from_unit_interval(np.array([0.25])) == [-1.0]
     assert (
-        gain.place(100) == pytest.approx(0.5)
-        and gain.place(1e9) == 1.0
-        and through.place(1) == 0.75
+        gain.to_unit_interval(100) == pytest.approx(0.5)
+        and gain.to_unit_interval(1e9) == 1.0
+        and through.to_unit_interval(1) == 0.75
     )
-    assert free("kg_2_rad_m", -100, -1).value(np.array([0.5])) == pytest.approx([-10])
+    assert free_gain("kg_2_rad_m", -100, -1).from_unit_interval(np.array([0.5])) == pytest.approx(
+        [-10]
+    )
 
 
 def test_rows_of_the_law_are_those_of_a_controller_with_the_same_settings():
@@ -279,10 +292,11 @@ def test_rows_of_the_law_are_those_of_a_controller_with_the_same_settings():
         "deflection_Hz": 21.0,
         "torque_slew_1_N_m_s": 9.0,
     }
-    frees = [free(name, value / 2, value * 2) for name, value in settings.items()]
+    frees = [free_gain(name, value / 2, value * 2) for name, value in settings.items()]
     system = fx.assemble(ROBOT)
     made, plain = (
-        under(system, SWING, gains.Gains(GAINS.settings | more)) for more in (settings, {})
+        closed_loop_controller(system, SWING, gains.Gains(GAINS.settings | more))
+        for more in (settings, {})
     )
     base = plain.gains()
     row = freedom.rows(frees, np.array([list(settings.values())]), plain, base)
@@ -310,7 +324,7 @@ def test_a_wrong_file_of_bounds_is_refused_by_key(tmp_path, text, said):
 
 def test_free_settings_are_those_of_the_controllers_outputs_and_once():
     with pytest.raises(InputError, match="torque"):
-        task(free=(free("kp_1_V_m", 1, 2),))
+        task(free=(free_gain("kp_1_V_m", 1, 2),))
     with pytest.raises(InputError, match="once"):
         task(free=(FREE[0], FREE[0]))
     with pytest.raises(InputError, match="elsewhere"):
@@ -320,13 +334,13 @@ def test_free_settings_are_those_of_the_controllers_outputs_and_once():
 # -- searches
 
 
-def tuned(one, how, folder=None, engine=None, generations=None):
+def tuned(one, how, folder=None, make_executor=None, generations=None):
     history = History.open(folder, one.digest(how.identity())) if folder else History("")
-    with Threads(one, 1) as runs:
+    with ThreadExecutor(one, 1) as runs:
         done = search(
             one,
             replace(how, generations=generations or how.generations),
-            engine or runs,
+            make_executor or runs,
             history,
             lambda h: None,
         )
@@ -336,7 +350,7 @@ def tuned(one, how, folder=None, engine=None, generations=None):
 def stopped(one, how, folder, at):
     """A search that is interrupted in its generation `at`."""
     calls = []
-    with Threads(one, 1) as runs:
+    with ThreadExecutor(one, 1) as runs:
 
         def interrupted(points, limits):
             calls.append(len(points))
@@ -350,7 +364,7 @@ def stopped(one, how, folder, at):
 def test_a_polish_goes_on_from_the_best_and_is_stored_like_the_rest(tmp_path):
     one, how = task(), Search("ga", population=8, generations=4, seed=5, polish=6)
     whole, _ = tuned(one, how)
-    assert len(whole) == 10 and whole.merit(10) < whole.merit(4)
+    assert len(whole) == 10 and whole.convergence_measure(10) < whole.convergence_measure(4)
     best = whole.all("goals")[: whole.ends[3], 0].argmin()
     assert np.array_equal(whole.all("points")[whole.ends[3]], whole.all("points")[best])
     stopped(one, how, tmp_path, at=8)
@@ -378,7 +392,7 @@ def test_an_interrupted_search_goes_on_to_the_same_end(tmp_path, algorithm):
 
 def test_a_search_ends_when_nothing_gets_better():
     flat = lambda points, limits: (np.zeros((len(points), 1, 10)), np.ones((len(points), 1)))
-    history, done = tuned(task(), Search("ga", 6, generations=50, patience=4), engine=flat)
+    history, done = tuned(task(), Search("ga", 6, generations=50, patience=4), make_executor=flat)
     assert done and len(history) == 5
 
 
@@ -416,7 +430,7 @@ def test_the_search_finds_what_scipys_differential_evolution_finds(algorithm):
 def test_the_front_is_of_gains_that_none_other_beats():
     one = task(pareto=True)
     history, _ = tuned(one, Search("nsga2", population=16, generations=10))
-    goals, front = history.all("goals"), history.front()
+    goals, front = history.all("goals"), history.pareto_front()
     for k in front:
         assert not ((goals <= goals[k]).all(axis=1) & (goals < goals[k]).any(axis=1)).any()
     others = np.setdiff1d(np.arange(len(goals)), front)

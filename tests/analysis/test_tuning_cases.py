@@ -13,18 +13,18 @@ import pytest
 
 import flexura as fx
 from flexlab import rig
-from flexlab.rig.nominal_robot import driven
+from flexlab.rig.nominal_robot import with_nominal_drives
 from flexlab.tuning import cases, dissertation
 from flexlab.tuning import search_space as freedom
-from flexlab.tuning.closed_loop import under
-from flexlab.tuning.executor import Threads
+from flexlab.tuning.closed_loop import closed_loop_controller
+from flexlab.tuning.executor import ThreadExecutor
 from flexlab.tuning.history import History
-from flexlab.tuning.lqr_reference import Designs
-from flexlab.tuning.objective import FAILED, split
+from flexlab.tuning.lqr_reference import LqrDesigns
+from flexlab.tuning.objective import FAILURE_COST, split_metrics
 from flexlab.tuning.result import figures, simulated
 from flexlab.tuning.search import Search, search
 from flexlab.tuning.search_space import settings
-from flexlab.tuning.task import varied
+from flexlab.tuning.task import perturbed_robots
 from flexura.control import gains
 from flexura.control.step_response import ERROR, OVERSHOOT, RESIDUAL, SETTLING
 
@@ -65,7 +65,7 @@ def test_case_1_knows_nothing_of_the_strip_and_is_else_the_same():
 def test_robust_gains_overshoot_by_at_most_10_percent_over_payloads_of_0_to_2_times():
     """The gains that come along (found with --payload-factors 0,1,2 --stiffness-factors 0.9,1.1),
     also between these, within the bounds that leave the flex sensor's error aside."""
-    robot, outputs = driven(
+    robot, outputs = with_nominal_drives(
         fx.load(ROOT / "model" / "robots" / "rig.toml"), rig.load(ROOT / "firmware" / "rig.toml")
     )
     given = gains.load(CONTROLLERS / "rig-robust.toml")
@@ -73,7 +73,7 @@ def test_robust_gains_overshoot_by_at_most_10_percent_over_payloads_of_0_to_2_ti
         assert free.low <= given.settings[free.name] <= free.high, free.name
     tuned = gains.Gains(given.settings, outputs)
     asked = cases.type_4().manoeuvre
-    for one in varied(robot, (0.0, 0.5, 1.5, 2.0), (0.9, 1.0, 1.1)):
+    for one in perturbed_robots(robot, (0.0, 0.5, 1.5, 2.0), (0.9, 1.0, 1.1)):
         _, response = simulated(fx.assemble(one), asked, tuned)
         assert (
             response.joints[:, OVERSHOOT].max() <= 0.10 and response.joints[:, SETTLING].max() < 1.4
@@ -83,7 +83,7 @@ def test_robust_gains_overshoot_by_at_most_10_percent_over_payloads_of_0_to_2_ti
 
 def test_an_lqrs_figures_are_those_of_its_run_within_the_cases_drive_limits(monkeypatch):
     """A design of type IV; weights for which there is none count as a failure."""
-    designs = Designs(cases.type_4())
+    designs = LqrDesigns(cases.type_4())
     points = np.vstack([designs.start(), designs.start() - 0.1])
     found, reached = designs(points, np.full(2, np.inf))
     assert (reached == 1).all()
@@ -92,7 +92,7 @@ def test_an_lqrs_figures_are_those_of_its_run_within_the_cases_drive_limits(monk
         designs.plant, designs.structure.manoeuvre.t, controller, rtol=designs.task.rtol
     )
     direct = figures(run, controller)
-    joints, strip = split(found)
+    joints, strip = split_metrics(found)
     assert direct.joints[:, :5] == pytest.approx(
         joints[0, 0, :, :5], rel=1e-7, abs=1e-9, nan_ok=True
     )
@@ -101,14 +101,14 @@ def test_an_lqrs_figures_are_those_of_its_run_within_the_cases_drive_limits(monk
         ("joint/1/voltage", "voltage_max_V"),
         ("joint/2/drive", "torque_max_2_N_m"),
     ):
-        assert np.abs(run[name]).max() <= designs.structure.reference.settings[limit] * (1 + 1e-9)
+        assert np.abs(run[name]).max() <= designs.structure.lqr_limits.settings[limit] * (1 + 1e-9)
 
     def none(*_, **__):
         raise fx.InputError("expected others", key="effort")
 
     monkeypatch.setattr("flexlab.tuning.lqr_reference.lqr", none)
     assert designs.score(*designs(points, np.full(2, np.inf)))[:, 0] == pytest.approx(
-        [2 * FAILED] * 2
+        [2 * FAILURE_COST] * 2
     )
 
 
@@ -122,11 +122,11 @@ def test_ga_pso_and_cma_es_reach_the_same_objective_within_2_percent_from_five_s
     for seed in range(1, 6):
         for name, population, generations in (("ga", 50, 60), ("pso", 30, 50), ("cma-es", 16, 140)):
             history, begun = History(""), time.perf_counter()
-            with Threads(task, 2) as engine:
+            with ThreadExecutor(task, 2) as make_executor:
                 assert search(
                     task,
                     Search(name, population, generations, seed, polish=80),
-                    engine,
+                    make_executor,
                     history,
                     lambda h: None,
                 )
@@ -193,11 +193,11 @@ def test_the_emulated_rig_does_what_the_simulation_says(tmp_path):
         {n: run.units[n] for n in names},
         run.meta,
     )
-    robot, outputs = driven(BENCH.robot, BENCH)
+    robot, outputs = with_nominal_drives(BENCH.robot, BENCH)
     given, system = gains.load(file), fx.assemble(robot)
     tuned = gains.Gains(given.settings, outputs)
     asked = cases.type_4().manoeuvre
-    measured = figures(cut, under(system, asked, tuned))
+    measured = figures(cut, closed_loop_controller(system, asked, tuned))
     _, expected = simulated(system, asked, tuned)
     print(
         "emulated",

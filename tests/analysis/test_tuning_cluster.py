@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flexlab.tuning import executor as engines
-from flexlab.tuning.executor import Cluster, Threads
+from flexlab.tuning.executor import DaskExecutor, ThreadExecutor
 from flexlab.tuning.history import History
 from flexlab.tuning.search import Search, search
 from flexura.errors import InputError
@@ -18,13 +18,13 @@ from tunings import task
 pytest_plugins = ["dask_cluster"]
 
 
-def connected(one, address: str) -> Cluster:
+def connected(one, address: str) -> DaskExecutor:
     until = time.monotonic() + 60
     while True:
         try:
-            engine = Cluster(one, address)
-            engine.client.wait_for_workers(2, timeout=60)
-            return engine
+            make_executor = DaskExecutor(one, address)
+            make_executor.client.wait_for_workers(2, timeout=60)
+            return make_executor
         except InputError:
             if time.monotonic() > until:
                 raise
@@ -34,15 +34,15 @@ def test_a_cluster_gives_the_same_bits_and_survives_a_worker(cluster):
     one, how = task(), Search("ga", population=12, generations=6, seed=4)
     address, workers = cluster
     here, there = History(""), History("")
-    with Threads(one, 1) as engine:
-        assert search(one, how, engine, here, lambda h: None)
+    with ThreadExecutor(one, 1) as make_executor:
+        assert search(one, how, make_executor, here, lambda h: None)
 
     def kill(history: History) -> None:
         if len(history) == 2:
             workers[0].send_signal(signal.SIGKILL)
 
-    with connected(one, address) as engine:
-        assert search(one, how, engine, there, kill)
+    with connected(one, address) as make_executor:
+        assert search(one, how, make_executor, there, kill)
     for name in ("points", "goals", "figures", "reached"):
         assert np.array_equal(here.all(name), there.all(name), equal_nan=True)
 
@@ -50,4 +50,4 @@ def test_a_cluster_gives_the_same_bits_and_survives_a_worker(cluster):
 def test_no_scheduler_there(monkeypatch):
     monkeypatch.setattr(engines, "CONNECT_S", 1)
     with pytest.raises(InputError, match="Dask scheduler"):
-        Cluster(task(), "tcp://127.0.0.1:1")
+        DaskExecutor(task(), "tcp://127.0.0.1:1")

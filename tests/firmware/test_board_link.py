@@ -31,8 +31,8 @@ from flexlab.board.protocol.frames import Deframer, decode, encode
 from flexlab.board.protocol.session import Link, Refused
 from flexlab.board.pty import Pty
 from flexlab.board.serial_port import SerialBoard, find, ports
-from flexlab.experiment.flash import crc, single
-from flexlab.rig.plant.rigid_plant import Drives
+from flexlab.experiment.flash import as_float32, settings_crc
+from flexlab.rig.plant.rigid_plant import RigidPlant
 from flexura.errors import InputError
 
 
@@ -41,13 +41,15 @@ def test_greeting():
         who = r.link.identity
         assert who.declaration == DECLARATION and who.resets == ("power_on",)
         assert who.state is State.fault and who.fault is Fault.bad_configuration  # a blank EEPROM
-        assert who.configuration_crc == crc({name: item.default for name, item in CONFIG.items()})
+        assert who.configuration_crc == settings_crc(
+            {name: item.default for name, item in CONFIG.items()}
+        )
         assert r.board.label == LABEL and r.board.emulated and LABEL.startswith("emulated")
 
 
 def test_a_board_of_another_declaration_is_refused_by_name(monkeypatch):
     monkeypatch.setattr(link_module, "DECLARATION", DECLARATION ^ 1)
-    board = EmulatedBoard(elf(), Drives(BENCH))
+    board = EmulatedBoard(elf(), RigidPlant(BENCH))
     with pytest.raises(
         BoardError,
         match=rf"{LABEL}: firmware .* speaks declaration {DECLARATION:08x}, this host speaks ",
@@ -104,17 +106,17 @@ def test_configuration_goes_there_and_back_and_outlives_a_reset():
         wanted = rig.configuration(BENCH)
         r.link.write_configuration(wanted)
         assert r.link.read_configuration() == {
-            name: single(value) for name, value in wanted.items()
+            name: as_float32(value) for name, value in wanted.items()
         }
         r.board.reset()
         who = r.link.connect()
         assert (
-            who.configuration_crc == crc(wanted)
+            who.configuration_crc == settings_crc(wanted)
             and who.state is State.idle
             and who.resets == ("external",)
         )
         assert r.link.read_configuration() == {
-            name: single(value) for name, value in wanted.items()
+            name: as_float32(value) for name, value in wanted.items()
         }
 
 
@@ -171,7 +173,7 @@ class Noisy(EmulatedBoard):
 def test_through_a_line_that_spoils_bytes_every_command_is_done_once():
     """Of 100 bytes one is lost or spoilt: frames of 15 to 60 bytes then fail by the dozen.
     Set-points sent twice would be refused (wrong_index) or show in `buffered`."""
-    board = Noisy(elf(), Drives(BENCH))
+    board = Noisy(elf(), RigidPlant(BENCH))
     board.noise = random.Random(3)
     link = Link(board, sequence=1, repeat_s=0.01, attempts=50)
     link.connect()
@@ -179,7 +181,7 @@ def test_through_a_line_that_spoils_bytes_every_command_is_done_once():
     wanted = rig.configuration(BENCH)
     link.write_configuration(wanted)
     link.command("clear", fault=Fault.bad_configuration)
-    assert link.read_configuration() == {name: single(value) for name, value in wanted.items()}
+    assert link.read_configuration() == {name: as_float32(value) for name, value in wanted.items()}
     link.command("reference", position_1=11, position_2=24, steps=32)
     link.command("arm", mode=2)
     for k in range(15):
@@ -308,7 +310,7 @@ def test_a_reset_ends_the_session_and_the_host_sees_it():
 def test_real_pyserial_at_a_pseudo_terminal():
     """Smoke test at the wall clock's pace, with wide limits: the emulated board behind a pty,
     pyserial at the other end."""
-    board = EmulatedBoard(elf(), Drives(BENCH))
+    board = EmulatedBoard(elf(), RigidPlant(BENCH))
     done = threading.Event()
     with Pty(board) as served:
         server = threading.Thread(target=served.serve, args=(done.is_set,))
@@ -318,7 +320,7 @@ def test_real_pyserial_at_a_pseudo_terminal():
             link = Link(port, repeat_s=0.5)
             assert link.connect(20.0).declaration == DECLARATION
             assert link.read_configuration() == {
-                name: single(item.default) for name, item in CONFIG.items()
+                name: as_float32(item.default) for name, item in CONFIG.items()
             }
             begin = time.monotonic()
             link.run(1.0)

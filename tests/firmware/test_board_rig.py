@@ -12,8 +12,8 @@ import flexura as fx
 from flexlab import rig
 from flexlab.board.emulator.emulated import Outputs
 from flexlab.board.protocol.declaration import CONFIG
-from flexlab.rig.description import DERIVED, tip_per_bend
-from flexlab.rig.plant.rigid_plant import Drives
+from flexlab.rig.description import DERIVED_SETTINGS, tip_per_bend
+from flexlab.rig.plant.rigid_plant import RigidPlant
 from flexura.signals import harmonic
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -52,7 +52,7 @@ def test_every_setting_of_the_board_has_a_value_in_range(bench):
     assert all(
         CONFIG[name].least <= value <= CONFIG[name].greatest for name, value in settings.items()
     )
-    assert set(DERIVED) <= set(CONFIG) and not set(DERIVED) & set(bench.rig.board)
+    assert set(DERIVED_SETTINGS) <= set(CONFIG) and not set(DERIVED_SETTINGS) & set(bench.rig.board)
 
 
 def test_settings_that_follow_from_the_rig(bench):
@@ -81,7 +81,7 @@ def test_flex_chain(bench):
 
 
 def test_the_bench_can_follow_what_it_is_built_for(bench):
-    checks = rig.examine(bench)
+    checks = rig.check_capability(bench)
     assert len(checks) >= 12 and [c.what for c in checks if not c.passed] == []
 
 
@@ -93,10 +93,10 @@ def test_a_251_rpm_motor_is_too_slow_for_the_inverse_law(written):
             motor__no_load_speed_rpm=251.0, motor__gear_ratio=43.8, motor__stall_torque_N_m=1.765
         )
     )
-    failed = {c.what: c for c in rig.examine(slow) if not c.passed}
+    failed = {c.what: c for c in rig.check_capability(slow) if not c.passed}
     assert set(failed) == {"carriage speed", "encoder edges"}
-    assert "75.4 mm/s = 565 rpm" in failed["carriage speed"].needed
-    assert "33.5 mm/s without" in failed["carriage speed"].available
+    assert "75.4 mm/s = 565 rpm" in failed["carriage speed"].found
+    assert "33.5 mm/s without" in failed["carriage speed"].expected
 
 
 @pytest.mark.parametrize(
@@ -117,14 +117,16 @@ def test_a_251_rpm_motor_is_too_slow_for_the_inverse_law(written):
     ],
 )
 def test_what_the_rig_cannot_do_is_found(written, change, failing):
-    assert {c.what for c in rig.examine(rig.load(written(**change))) if not c.passed} == failing
+    assert {
+        c.what for c in rig.check_capability(rig.load(written(**change))) if not c.passed
+    } == failing
 
 
 def test_a_motion_beyond_the_carriage(bench):
     far = fx.Manoeuvre(
         "far", 4.0, 0.01, fx.Drive.pd([harmonic(0.06, 0.25), harmonic(0.1, 0.25)], [1, 1], [1, 1])
     )
-    assert {c.what for c in rig.examine(bench, far) if not c.passed} == {"carriage range"}
+    assert {c.what for c in rig.check_capability(bench, far) if not c.passed} == {"carriage range"}
 
 
 @pytest.mark.parametrize(
@@ -187,11 +189,11 @@ def test_a_rig_whose_settings_leave_the_boards_range(written):
 def test_the_drives_of_the_plant_keep_to_the_motors_data(bench):
     """At 12 V the motor's free speed, 1000 rpm of an 8 mm screw; nothing moves below the starting
     voltage."""
-    plant = Drives(bench)
+    plant = RigidPlant(bench)
     for _ in range(4000):
         plant.advance(250e-6, Outputs(duty=1.0, motor_on=True))
     assert plant.speed_m_s == pytest.approx(0.008 * 1000 / 60, rel=1e-6)
-    still = Drives(bench)
+    still = RigidPlant(bench)
     for duty, on in ((0.07, True), (1.0, False)):
         assert still.advance(0.1, Outputs(duty=duty, motor_on=on)).encoder_1 == 0.0
     np.testing.assert_allclose(

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flexura.twin.links.geometrically_exact import ExactLink
-from flexura.twin.links.part import Frame, Lump
+from flexura.twin.links.geometrically_exact import GeometricallyExactLink
+from flexura.twin.links.part import Frame, PointMass
 from flexura.twin.links.properties import BeamValues
 from flexura.twin.solve import _settings
 
@@ -35,8 +35,13 @@ def flight():
     values = BeamValues(
         LENGTH / ELEMENTS, same(1.0), same(500.0), same(1e4), same(1e4), same(10.0), 0.0
     )
-    link = ExactLink(
-        mbs, values, Lump(), Lump(), Frame(6.0, 0.0, float(np.arctan2(8.0, -6.0))), (0.0, 0.0)
+    link = GeometricallyExactLink(
+        mbs,
+        values,
+        PointMass(),
+        PointMass(),
+        Frame(6.0, 0.0, float(np.arctan2(8.0, -6.0))),
+        (0.0, 0.0),
     )
     marker = mbs.AddMarker(eii.MarkerNodeRigid(nodeNumber=link.nodes[0]))
     on = lambda mbs, t, load: load if t <= 2.5 else [0.0, 0.0, 0.0]

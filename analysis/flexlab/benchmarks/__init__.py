@@ -1,10 +1,10 @@
-"""How fast and how accurate the solver is: `make bench`, or python -m flexlab.benchmarks.
+"""Speed and accuracy of the solver: `make bench`, or python -m flexlab.benchmarks.
 
-What stands where: `problems` (motions, statics, frequencies, and the error measure),
-`exudyn_programs` (the same in Exudyn), `native` (runs of flexura), `search` (Exudyn's cheapest
-settings, kept in settings.json), `choose` (flexura's), `timing`, `measure` (rows), `report`
-(tables),
-`accuracy` (errors over tolerances), `population`, `growth`, `board_load`.
+`problems` has the motions, statics, frequencies and the error measure; `exudyn_programs` the same
+in Exudyn; `native` runs of flexura. `exudyn_search` finds Exudyn's cheapest settings and keeps them
+in settings.json; `native_search` finds flexura's. `equal_error` makes the rows, `timing` measures,
+`report` makes the tables. `accuracy` gives errors over tolerances; `population`, `scaling` and
+`board_load` stand alone.
 """
 
 import os

@@ -1,5 +1,7 @@
-"""The command: python -m flexlab.benchmarks
-[motions|still|population|growth|board|accuracy|passes|search] [PROBLEM ...]."""
+"""The command: python -m flexlab.benchmarks [PART ...] [PROBLEM ...].
+
+Parts: motions, statics, population, scaling, board, accuracy, passes, search.
+"""
 
 from __future__ import annotations
 
@@ -13,24 +15,23 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from . import accuracy, board_load, growth, measure, population, report, search
+from . import accuracy, board_load, equal_error, exudyn_search, population, report, scaling
 from .problems.motions import all_motions
 from .problems.problem import Problem
-from .problems.still import Still, all_still
+from .problems.statics import StaticProblem, all_statics
 
-PARTS = (
-    "motions",
-    "still",
-    "population",
-    "growth",
-    "board",
-)  # what is measured if nothing is named
+# measured by default
+PARTS = ("motions", "statics", "population", "scaling", "board")
 OTHERS = ("accuracy", "passes", "search")
 ROUNDS = 7
 
 
 def arguments() -> argparse.Namespace:
-    """The command line: parts and problems in any order, rounds, JSON."""
+    """Parse the command line: parts and problems in any order, rounds, JSON.
+
+    Returns:
+        The parsed arguments `names`, `rounds`, `json`.
+    """
     parser = argparse.ArgumentParser(
         prog="python -m flexlab.benchmarks",
         description=(
@@ -39,7 +40,7 @@ def arguments() -> argparse.Namespace:
             "processor time."
         ),
         epilog=f"parts: {', '.join(PARTS + OTHERS)}; "
-        f"problems: {', '.join([*all_motions(), *all_still()])}. "
+        f"problems: {', '.join([*all_motions(), *all_statics()])}. "
         "example: python -m flexlab.benchmarks type4 pendulum static --rounds 3",
     )
     parser.add_argument("names", nargs="*", help="parts or problems; all parts by default")
@@ -53,7 +54,7 @@ def arguments() -> argparse.Namespace:
         "--json", action="store_true", help="print the numbers as JSON in place of tables"
     )
     given = parser.parse_args()
-    known = {*PARTS, *OTHERS, *all_motions(), *all_still()}
+    known = {*PARTS, *OTHERS, *all_motions(), *all_statics()}
     for name in given.names:
         if name not in known:
             parser.error(f"{name}: expected a part or a problem: {', '.join(sorted(known))}")
@@ -63,7 +64,16 @@ def arguments() -> argparse.Namespace:
 
 
 def each(what: str, items: Iterable[Any], work: Callable[[Any], Any]) -> list[Any]:
-    """What `work` gives for each item, with a progress bar on stderr; an item names itself."""
+    """Call `work` on each item, with a progress bar on stderr.
+
+    Args:
+        what: title of the bar.
+        items: what is worked on; the bar shows an item's `name`, if it has one.
+        work: called once with each item.
+
+    Returns:
+        The results, in the order of the items.
+    """
     items = list(items)
     columns = (
         TextColumn("{task.description:>32}"),
@@ -82,15 +92,25 @@ def each(what: str, items: Iterable[Any], work: Callable[[Any], Any]) -> list[An
 
 
 def measured(
-    parts: list[str], motions: list[Problem], stills: list[Still], rounds: int
+    parts: list[str], motions: list[Problem], statics: list[StaticProblem], rounds: int
 ) -> dict[str, Any]:
-    """The numbers of the parts."""
+    """Measure the named parts.
+
+    Args:
+        parts: names of `PARTS` or `OTHERS`.
+        motions: problems for "motions", "accuracy" and "passes".
+        statics: problems for "statics".
+        rounds: rounds in which the programs take turns.
+
+    Returns:
+        The rows of each part, by its name.
+    """
     out: dict[str, Any] = {}
     works: dict[str, Callable[[], Any]] = {
-        "motions": lambda: each("motions", motions, lambda p: measure.motion(p, rounds)),
-        "still": lambda: each("still", stills, lambda p: measure.still(p, rounds)),
+        "motions": lambda: each("motions", motions, lambda p: equal_error.motion_row(p, rounds)),
+        "statics": lambda: each("statics", statics, lambda p: equal_error.statics_row(p, rounds)),
         "population": lambda: each("population", [rounds], population.measure)[0],
-        "growth": lambda: each("growth", [5 * rounds], growth.measure)[0],
+        "scaling": lambda: each("scaling", [5 * rounds], scaling.measure)[0],
         "board": lambda: each("board", ["emulated"], lambda _: board_load.measure())[0],
         "accuracy": lambda: each("accuracy", [p for p in motions if p.available], accuracy.errors),
         "passes": lambda: each("passes", [p for p in motions if p.available], accuracy.passes),
@@ -101,15 +121,15 @@ def measured(
 
 
 def tables(found: dict[str, Any]) -> list[Any]:
-    """What is printed for the parts."""
+    """Tables and lines to print for the rows of `measured`."""
     shown: dict[str, Callable[[Any], list[Any]]] = {
         "motions": lambda rows: [report.motions(rows), report.summary(rows)],
-        "still": lambda rows: [
-            report.stills(rows),
+        "statics": lambda rows: [
+            report.statics(rows),
             "\n".join(f"{r['name']}: {r['failed']}" for r in rows if "failed" in r),
         ],
         "population": lambda rows: [report.populations(rows)],
-        "growth": lambda rows: [report.growths(rows)],
+        "scaling": lambda rows: [report.growths(rows)],
         "board": lambda rows: [report.boards(rows)],
         "accuracy": lambda rows: [
             report.accuracies(rows),
@@ -124,23 +144,27 @@ def tables(found: dict[str, Any]) -> list[Any]:
 
 
 def main() -> None:
+    """Run the command."""
     warnings.filterwarnings("ignore")
     given = arguments()
-    motions, stills = all_motions(), all_still()
+    motions, statics = all_motions(), all_statics()
     chosen = [motions[name] for name in given.names if name in motions]
-    quiet = [stills[name] for name in given.names if name in stills]
+    static_problems = [statics[name] for name in given.names if name in statics]
     parts = [name for name in given.names if name in PARTS + OTHERS]
     if not parts:
-        parts = [part for part, some in (("motions", chosen), ("still", quiet)) if some] or list(
-            PARTS
-        )
+        parts = [
+            part for part, some in (("motions", chosen), ("statics", static_problems)) if some
+        ] or list(PARTS)
     if "search" in parts:
-        search.main(
+        exudyn_search.main(
             chosen or list(motions.values()), lambda line: print(line, file=sys.stderr, flush=True)
         )
         return
     found = measured(
-        parts, chosen or list(motions.values()), quiet or list(stills.values()), given.rounds
+        parts,
+        chosen or list(motions.values()),
+        static_problems or list(statics.values()),
+        given.rounds,
     )
     if given.json:
         print(json.dumps(found, indent=1, default=float))

@@ -1,9 +1,8 @@
-"""Accuracy and evaluations of the solver: python -m flexlab.benchmarks accuracy, and ... passes.
+"""Accuracy and number of evaluations: python -m flexlab.benchmarks accuracy, and ... passes.
 
-Errors are those of `problem.error`, from the converged motion on the problem's own mesh: what the
-tolerance is to keep. Passes are evaluations of the equations of motion for an error, by each
-method: medians over nine tolerances within a tenth of one, which scatter as runs with other first
-steps do.
+Errors are those of `problem.error`, relative to the converged motion on the problem's own mesh. A
+pass is one evaluation of the equations of motion. The passes for an error are medians over nine
+tolerances within 10 % of each other, because single runs scatter with their first steps.
 """
 
 from __future__ import annotations
@@ -16,19 +15,17 @@ import numpy as np
 import flexura as fx
 
 from . import native
-from .choose import RTOLS
+from .native_search import RTOLS
 from .problems.problem import Channels, Problem, error, scale
 
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
 ERRORS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
 TIGHTER = (3e-9, 1e-9, 3e-10, 1e-10)  # tolerances that a small error takes
-MOST_TIMES_RTOL, MOST_BY_DEFAULT = 20.0, 1e-4  # asked
+MAX_ERROR_OVER_RTOL, MAX_DEFAULT_ERROR = 20.0, 1e-4  # required
 SCATTER = np.geomspace(1 / 1.1, 1.1, 9)  # times a tolerance
 LIMIT_S, PATIENCE = 30.0, 4.0
-MOST_PASSES, MORE_PASSES = (
-    2.0,
-    100,
-)  # asked of "auto": so many times those of the cheapest method, and so many more
+# required of "auto": at most so many times those of the cheapest method, plus so many
+MAX_PASS_RATIO, EXTRA_PASSES = 2.0, 100
 Row = dict[str, Any]
 
 
@@ -40,7 +37,19 @@ def measured(
     method: str = "auto",
     limit_s: float = LIMIT_S,
 ) -> tuple[float, int] | None:
-    """Error and evaluations of a run, or None if it fails or takes too long."""
+    """Error and evaluations of one run.
+
+    Args:
+        problem: what is run.
+        system: its assembled robot.
+        exact: the converged channels.
+        rtol: the tolerance.
+        method: a method of `fx.simulate`.
+        limit_s: processor time after which the run is given up [s].
+
+    Returns:
+        (error, evaluations), or None if the run fails or takes too long.
+    """
     try:
         answer = native.run(problem, system, rtol, method, limit_s=limit_s)
     except (native.TooSlow, fx.FlexuraError, RuntimeError):
@@ -49,7 +58,11 @@ def measured(
 
 
 def errors(problem: Problem) -> Row:
-    """Errors at each tolerance and with default settings, by method "auto"."""
+    """Errors of method "auto" at each tolerance and with default settings.
+
+    Returns:
+        A row: name, scale [m], undamped, errors and passes by rtol, the default's error.
+    """
     system, exact = native.system(problem.robot), native.converged(problem)
     size = scale(exact)
     rows: list[Row] = []
@@ -76,8 +89,11 @@ def errors(problem: Problem) -> Row:
 def passes(problem: Problem) -> Row:
     """The fewest evaluations by which each method holds each error, its tolerance chosen by hand.
 
-    Medians over nine tolerances near each other. A method whose run takes PATIENCE times the
-    longest one of "auto" is given up.
+    Medians over nine tolerances near each other. A method is given up if a run takes PATIENCE times
+    the longest run of "auto".
+
+    Returns:
+        A row: name, methods, and the passes of each method at each of `ERRORS`; None if it fails.
     """
     system, exact = native.system(problem.robot), native.converged(problem)
     methods = native.methods(problem)
@@ -114,7 +130,11 @@ def passes(problem: Problem) -> Row:
 
 
 def beyond(rows: list[Row]) -> list[str]:
-    """The problems, but the undamped ringing ones, whose error is more than is asked, in words."""
+    """Sentences about problems whose error exceeds the limit; undamped ringing is exempt.
+
+    Args:
+        rows: rows of `errors`.
+    """
     out = []
     for row in rows:
         if row["undamped"]:
@@ -122,19 +142,23 @@ def beyond(rows: list[Row]) -> list[str]:
         for each in row["errors"]:
             if each["error"] is None:
                 out.append(f"{row['name']}: fails at rtol {each['rtol']:g}")
-            elif each["error"] > MOST_TIMES_RTOL * each["rtol"]:
+            elif each["error"] > MAX_ERROR_OVER_RTOL * each["rtol"]:
                 out.append(
                     f"{row['name']}: {each['error'] / each['rtol']:.3g} rtol at {each['rtol']:g}, "
-                    f"asked {MOST_TIMES_RTOL:g}"
+                    f"asked {MAX_ERROR_OVER_RTOL:g}"
                 )
         usual = row["default"]["error"]
-        if usual is not None and usual > MOST_BY_DEFAULT:
-            out.append(f"{row['name']}: {usual:.1e} by default, asked {MOST_BY_DEFAULT:g}")
+        if usual is not None and usual > MAX_DEFAULT_ERROR:
+            out.append(f"{row['name']}: {usual:.1e} by default, asked {MAX_DEFAULT_ERROR:g}")
     return out
 
 
 def slower(rows: list[Row]) -> list[str]:
-    """Where "auto" takes more evaluations than is asked, in words."""
+    """Sentences about errors for which "auto" takes more evaluations than the limit.
+
+    Args:
+        rows: rows of `passes`.
+    """
     out = []
     for row in rows:
         for each in row["passes"]:
@@ -142,7 +166,11 @@ def slower(rows: list[Row]) -> list[str]:
                 method: count for method, count in each["passes"].items() if count is not None
             }
             auto, best = counts.pop("auto", None), min(counts.values(), default=None)
-            if auto is not None and best is not None and auto > MOST_PASSES * best + MORE_PASSES:
+            if (
+                auto is not None
+                and best is not None
+                and auto > MAX_PASS_RATIO * best + EXTRA_PASSES
+            ):
                 out.append(
                     f"{row['name']}: {auto} evaluations for an error of {each['error']:g}, the "
                     f"cheapest method {best}"

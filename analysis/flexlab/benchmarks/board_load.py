@@ -1,4 +1,4 @@
-"""How busy the board's processor is under its hardest load, emulated."""
+"""Processor load of the emulated board under its hardest motion, as rows for a table."""
 
 from __future__ import annotations
 
@@ -9,8 +9,11 @@ from . import firmware_load
 
 
 def measure() -> list[tuple[str, str, float]]:
-    """What the board's processor does under its hardest load, emulated: a name, the value in words,
-    the number in SI units."""
+    """Measure the load of the board's processor under its hardest motion, emulated.
+
+    Returns:
+        Rows (what, value in words, number in SI units).
+    """
     elf, rig = build(), load_rig(RIG)
     found, most = firmware_load.measure(elf, rig), firmware_load.measure(elf, rig, every_term=True)
     fast, alone = sorted(

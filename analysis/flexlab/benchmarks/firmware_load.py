@@ -1,9 +1,8 @@
-"""How hard the firmware's processor works, measured on the emulated board: `make bench` prints it,
-tests hold it to its limits.
+"""Processor load of the firmware, measured on the emulated board.
 
-Both joints follow a fast trajectory: the encoders give 20 000 edges a second at its peak, the
-stepper takes 4000 steps a second, set-points stream in and telemetry goes out. Times are exact in
-cycles of the simulated processor; simavr takes each instruction's cycles from the data sheet.
+Both joints follow a fast trajectory: 20 000 encoder edges and 4000 steps a second at its peak,
+set-points stream in, telemetry goes out. Times are exact in cycles of the simulated processor;
+simavr takes each instruction's cycles from the data sheet. Tests hold the load to its limits.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from ..board.protocol.player import Player, setpoints
 from ..board.protocol.session import Link
 from ..rig import Bench, configuration
 from ..rig.plant.plant import rig_plant
-from ..rig.plant.rigid_plant import Drives
+from ..rig.plant.rigid_plant import RigidPlant
 
 FLASH_BYTES, RAM_BYTES, RAM_BEGIN, RAM_END = 256 * 1024, 8192, 0x200, 0x2200
 CONTROL_VECTOR = 47  # TIMER5_COMPA
@@ -55,7 +54,7 @@ EVERY_TERM = {
 
 @dataclass(frozen=True)
 class Load:
-    """What was measured; times in cycles of 1/16 us, memory in bytes."""
+    """The measured load; times in cycles of 1/16 us, memory in bytes."""
 
     seconds: float  # of emulated time, without the start
     period_least: int
@@ -82,14 +81,21 @@ class Load:
 
     @property
     def ram_share(self) -> float:
+        """Static memory and deepest stack as a fraction of the RAM."""
         return (self.ram_static + self.stack_most) / RAM_BYTES
 
 
 def measure(elf: Path, bench: Bench, seconds: float = 2.0, every_term: bool = False) -> Load:
-    """Run the fast trajectory on an emulated board that is configured for it: the rig's
-    controllers, or every term of them on."""
+    """Run the fast trajectory on an emulated board that is configured for it.
+
+    Args:
+        elf: the firmware.
+        bench: the rig.
+        seconds: emulated time [s].
+        every_term: whether every term of both controllers is on.
+    """
     settings = configuration(bench) | HARD | (EVERY_TERM if every_term else {})
-    board = EmulatedBoard(elf, Drives(bench, settings=settings))
+    board = EmulatedBoard(elf, RigidPlant(bench, settings=settings))
     simulator = board.simulator
     static = simulator.symbol("_end") - RAM_BEGIN
     for address in range(RAM_BEGIN + static, RAM_END):
@@ -146,11 +152,18 @@ def measure(elf: Path, bench: Bench, seconds: float = 2.0, every_term: bool = Fa
 
 
 def experiment(elf: Path, bench: Bench, seconds: float = 4.0) -> tuple[float, float]:
-    """How fast an emulated experiment runs, and the firmware alone beside it: emulated / processor
-    time, both.
+    """Speed of an emulated experiment, and of the firmware alone.
 
-    Both joints back and forth as fast as in the dissertation's inverse law, with the rig's plant,
-    set-points streamed, telemetry received; then the firmware alone, in Idle.
+    Both joints move back and forth as fast as in the dissertation's inverse experiment, with the
+    rig's plant, streamed set-points and telemetry.
+
+    Args:
+        elf: the firmware.
+        bench: the rig.
+        seconds: emulated time [s].
+
+    Returns:
+        Emulated over processor time: of the experiment, and of the firmware alone in Idle.
     """
     settings, plant = configuration(bench), rig_plant(bench)
     board = EmulatedBoard(elf, plant)
@@ -175,7 +188,7 @@ def experiment(elf: Path, bench: Bench, seconds: float = 4.0) -> tuple[float, fl
 
 
 def _alone(board: EmulatedBoard) -> float:
-    """Processor time of the simulator without plant and link, for IDLE_S of the firmware's."""
+    """Processor time of the simulator without plant and link, for IDLE_S of the firmware."""
     simulator, begun = board.simulator, time.process_time()
     simulator.run(simulator.cycle + round(IDLE_S * CLOCK_HZ))
     return time.process_time() - begun

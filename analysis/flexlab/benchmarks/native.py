@@ -1,4 +1,4 @@
-"""Runs of flexura, by its public functions alone."""
+"""Runs of flexura through its public functions."""
 
 from __future__ import annotations
 
@@ -18,13 +18,12 @@ METHODS = ("auto", "explicit", "implicit", "exponential")
 
 
 class TooSlow(Exception):
-    """A run took longer than it was given."""
+    """A run took longer than its limit."""
 
 
 @dataclass(frozen=True)
 class Answer:
-    """Processor seconds of the time loop, evaluations of the equations of motion, the method that
-    ran, and the channels."""
+    """Processor time of the time loop [s], evaluations, the method used, and the channels."""
 
     seconds: float
     evaluations: int
@@ -33,17 +32,17 @@ class Answer:
 
 
 def default_rtol() -> float:
-    """The tolerance of a user who sets none."""
+    """The default tolerance of `fx.simulate`."""
     return float(inspect.signature(fx.simulate).parameters["rtol"].default)
 
 
 def system(tables: Tables) -> fx.System:
-    """The assembled robot of these tables."""
+    """Assemble the robot of these tables."""
     return fx.assemble(fx.Robot.from_dict(tables))
 
 
 def drive(work: Work) -> Any:
-    """What `fx.simulate` takes for this work."""
+    """The drive that `fx.simulate` takes for this work."""
     if work.of_time is not None or work.of_state is not None:
         return work.of_time or work.of_state
     if work.tick is not None:
@@ -76,9 +75,22 @@ def run(
     limit_s: float = 0.0,
     **keys: Any,
 ) -> Answer:
-    """One run from the straight robot at its start. Raises TooSlow after `limit_s` processor
-    seconds, RuntimeError if it does not reach the end, and what flexura raises. `work` replaces the
-    problem's; `keys` are handed on."""
+    """Run a problem once, from the straight robot at its start.
+
+    Args:
+        problem: what is run.
+        made: its assembled robot.
+        rtol: the tolerance.
+        method: a method of `fx.simulate`.
+        work: replaces the problem's own work.
+        limit_s: processor time after which the run is given up [s]; 0: none.
+        keys: further arguments of `fx.simulate` or `fx.inverse`.
+
+    Raises:
+        TooSlow: the limit is exceeded.
+        RuntimeError: the run does not reach its end.
+        FlexuraError: as flexura raises it.
+    """
     begun = time.process_time()
 
     def watch(fraction: float) -> None:
@@ -110,7 +122,7 @@ def run(
 
 
 def channels(problem: Problem, done: fx.Run) -> Channels:
-    """What is compared."""
+    """The channels of a run that are compared."""
     names = problem.names
     if problem.inverse:
         names = names + [f"joint/{k}/drive" for k in range(1, len(problem.robot["link"]) + 1)]
@@ -118,8 +130,14 @@ def channels(problem: Problem, done: fx.Run) -> Channels:
 
 
 def converged(problem: Problem, tables: Tables | None = None) -> Channels:
-    """The motion at a tolerance far below what is compared, on the problem's own mesh or on that of
-    `tables`; without Python functions where the same can be said by signals."""
+    """The motion at a tolerance far below what is compared.
+
+    Python functions are replaced by signals, if the problem has an equivalent.
+
+    Args:
+        problem: what is run.
+        tables: a robot with another mesh; by default the problem's own.
+    """
     method, rtol = problem.exact
     if problem.work.rate_Hz and method == "implicit":
         method = "auto"

@@ -1,5 +1,4 @@
-"""How fast a population is on this machine: many different robots of the problem `type4`, on all
-cores, beside Exudyn."""
+"""Speed of a population: many different robots of `type4` on all cores, beside Exudyn."""
 
 from __future__ import annotations
 
@@ -13,20 +12,24 @@ import numpy as np
 
 import flexura as fx
 
-from . import native, search
+from . import exudyn_search, native
 from .exudyn_programs import run as exudyn_run
 from .problems.motions import all_motions
 from .timing import ratio
 
 ROBOTS, REPEATS = 1000, 3
 RTOL = 2e-3
-ASKED_LOOP, ASKED_WHOLE = 1300.0, 1000.0
+REQUIRED_LOOP_RATIO, REQUIRED_WHOLE_RATIO = 1300.0, 1000.0
 VARIED = ("link.2.length_m", "payload.mass_kg", "link.2.young_modulus_Pa")
 SPREAD = 0.2  # up or down
 
 
 def batch(robots: int = ROBOTS) -> fx.Batch:
-    """Type IV of 12 elements and 2 modes, length, payload and stiffness each 20 % up or down."""
+    """Robots of type IV, 12 elements and 2 modes; length, payload and stiffness vary by 20 %.
+
+    Args:
+        robots: their number.
+    """
     problem, random = all_motions()["type4"], np.random.default_rng(0)
     tables = problem.robot
     middle = (
@@ -42,14 +45,21 @@ def batch(robots: int = ROBOTS) -> fx.Batch:
 
 
 def measure(rounds: int, robots: int = ROBOTS) -> list[dict[str, Any]]:
-    """Rows: what is timed, its median wall time a robot [us], how often one Exudyn run takes that
-    with the quartiles over the rounds, and what is asked.
+    """Wall time a robot of a population, and its ratio to one run of Exudyn.
 
-    The time loop is what a run takes beyond one of the same robots that ends where it begins. Wall
-    time on all cores; Exudyn's is the processor time of one run.
+    The time loop is the time of the whole call less that of a call whose runs end where they begin.
+    flexura's time is wall time on all cores, Exudyn's the processor time of one run.
+
+    Args:
+        rounds: rounds in which the programs take turns.
+        robots: size of the population.
+
+    Returns:
+        Rows: what is timed, the required ratio, the median time a robot [us], the ratio's
+            quartiles.
     """
     problem, many = all_motions()["type4"], batch(robots)
-    drive, choice = native.drive(problem.work), search.choice("type4")
+    drive, choice = native.drive(problem.work), exudyn_search.choice("type4")
 
     def whole(t: np.ndarray) -> float:
         begun = time.perf_counter()
@@ -64,16 +74,19 @@ def measure(rounds: int, robots: int = ROBOTS) -> list[dict[str, Any]]:
         lambda: whole(problem.t) / robots,
         lambda: whole(problem.t[:1]) / robots,
     ]
-    took = np.array([[shortest(run) for run in programs] for _ in range(rounds + 1)])[
-        1:
-    ]  # the first round warms up
+    # the first round warms up
+    took = np.array([[shortest(run) for run in programs] for _ in range(rounds + 1)])[1:]
     parts = [
         (
             f"from robots made anew to their channels, {os.cpu_count()} cores",
             took[:, 1],
-            ASKED_WHOLE,
+            REQUIRED_WHOLE_RATIO,
         ),
-        ("time loop and channels, without making the robots", took[:, 1] - took[:, 2], ASKED_LOOP),
+        (
+            "time loop and channels, without making the robots",
+            took[:, 1] - took[:, 2],
+            REQUIRED_LOOP_RATIO,
+        ),
     ]
     numbers = lambda seconds: {
         "us": 1e6 * float(np.median(seconds)),

@@ -7,7 +7,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from .growth import GROWTH
+from .scaling import MAX_GROWTH
 from .timing import geometric_mean
 
 WIDTH = 80
@@ -15,7 +15,7 @@ Rows = list[dict[str, Any]]
 
 
 def figure(value: float) -> str:
-    """Three digits, without a power of ten."""
+    """A number of three digits, without a power of ten."""
     return f"{value:#.3g}".rstrip(".") if value < 1000 else f"{value:.0f}"
 
 
@@ -25,12 +25,12 @@ def small(value: float) -> str:
 
 
 def spread(of: dict[str, Any] | None) -> str:
+    """The median ratio of a row's entry, "-" if there is none."""
     return "-" if of is None else figure(of["ratio"]["median"])
 
 
 def motions(rows: Rows) -> Table:
-    """Ratio of auto with its quartiles, of the best by hand; its method, tolerance and error;
-    times; what the default gives."""
+    """Table of the motions: ratios, best method, tolerance, error, times, default."""
     table = _table(
         "name", "auto", "quartiles", "best", "method", "rtol", "error", "ms", "Exudyn", "default"
     )
@@ -62,8 +62,7 @@ def motions(rows: Rows) -> Table:
 
 
 def summary(rows: Rows) -> str:
-    """Geometric mean and worst of the motions, by `auto` and by the best; and the misses of what is
-    asked."""
+    """Geometric mean and worst ratio of the motions, failures, and missed requirements."""
     lines = []
     for name, title in (("auto", "auto"), ("best", "best by hand")):
         ratios = {
@@ -86,8 +85,8 @@ def summary(rows: Rows) -> str:
     return "\n".join(lines)
 
 
-def stills(rows: Rows) -> Table:
-    """Statics and frequencies."""
+def statics(rows: Rows) -> Table:
+    """Table of statics and frequencies."""
     table = _table("name", "ratio", "quartiles", "asked", "apart", "ms", "Exudyn")
     for row in rows:
         asked = "" if row["asked"] is None else figure(row["asked"])
@@ -102,7 +101,7 @@ def stills(rows: Rows) -> Table:
 
 
 def populations(rows: Rows) -> Table:
-    """A robot's share of a population against one Exudyn run."""
+    """Table of a robot's share of a population against one run of Exudyn."""
     table = _table("population", "us a robot", "ratio", "quartiles", "asked")
     for row in rows:
         r = row["ratio"]
@@ -117,17 +116,22 @@ def populations(rows: Rows) -> Table:
 
 
 def growths(rows: Rows) -> Table:
-    """An evaluation's time over links and elements."""
+    """Table of an evaluation's time over links and elements."""
     table = _table("one evaluation", "number", "us", "times that of half as many", "at most")
     for row in rows:
         times = "" if row["times"] is None else f"{row['times']:.2f}"
         table.add_row(
-            row["what"], str(row["count"]), figure(row["us"]), times, f"{GROWTH}" if times else ""
+            row["what"],
+            str(row["count"]),
+            figure(row["us"]),
+            times,
+            f"{MAX_GROWTH}" if times else "",
         )
     return table
 
 
 def boards(rows: list[tuple[str, str, float]]) -> Table:
+    """Table of the emulated board's load."""
     table = _table("emulated board under its hardest load", "")
     for name, text, _ in rows:
         table.add_row(name, text)
@@ -135,7 +139,7 @@ def boards(rows: list[tuple[str, str, float]]) -> Table:
 
 
 def accuracies(rows: Rows) -> Table:
-    """Errors over rtol: how many times the tolerance, by the problem."""
+    """Table of errors in multiples of the tolerance, by problem."""
     tolerances = [each["rtol"] for each in rows[0]["errors"]]
     table = _table(
         "error / rtol, auto", *(small(rtol) for rtol in tolerances), "default", "scale m"
@@ -151,7 +155,7 @@ def accuracies(rows: Rows) -> Table:
 
 
 def passes(rows: Rows) -> Table:
-    """Evaluations at each error, by the method."""
+    """Table of evaluations at each error, by method."""
     errors = [each["error"] for each in rows[0]["passes"]]
     table = _table("passes at error", "method", *(small(error) for error in errors))
     for row in rows:
@@ -168,8 +172,7 @@ def _times(each: dict[str, Any]) -> str:
 
 
 def _table(*columns: str) -> Table:
-    """A table without a frame whose first column is on the left, the others on the right; what is
-    too long is folded."""
+    """A table without a frame: first column left, others right; long cells are folded."""
     table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
     for k, name in enumerate(columns):
         table.add_column(name, justify="right" if k else "left", overflow="fold")

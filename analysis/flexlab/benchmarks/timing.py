@@ -1,7 +1,7 @@
 """Programs timed side by side, in processor time.
 
-Every round times each program in turn, so that whatever else the machine does hits all alike; a
-quick one runs several times in a round, of which the shortest counts. Ratios are formed round by
+Every round times each program in turn, so that other loads of the machine hit all alike. A quick
+program runs several times in a round, of which the shortest counts. Ratios are formed round by
 round.
 """
 
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-ROUND_S, MOST = 0.05, 15  # a quick program runs as often in a round as fits here
+ROUND_S, MAX_REPEATS = 0.05, 15  # a quick program runs as often in a round as fits here
 
 
 @dataclass(frozen=True)
@@ -24,10 +24,17 @@ class Ratio:
     high: float
 
 
-def walls(programs: list[Callable[[], float]], rounds: int) -> np.ndarray:
-    """Seconds (rounds, programs), the shortest of a round's runs; `programs` give the seconds of
-    one run."""
-    repeats = [int(np.clip(ROUND_S / max(run(), 1e-9), 1, MOST)) for run in programs]
+def run_times(programs: list[Callable[[], float]], rounds: int) -> np.ndarray:
+    """Time programs side by side.
+
+    Args:
+        programs: each returns the processor time of one run [s].
+        rounds: number of rounds.
+
+    Returns:
+        Seconds (rounds, programs), the shortest of each round.
+    """
+    repeats = [int(np.clip(ROUND_S / max(run(), 1e-9), 1, MAX_REPEATS)) for run in programs]
     once = lambda run, count: min(run() for _ in range(count))
     return np.array(
         [
@@ -38,10 +45,11 @@ def walls(programs: list[Callable[[], float]], rounds: int) -> np.ndarray:
 
 
 def ratio(slow: np.ndarray, fast: np.ndarray) -> Ratio:
-    """How many times as fast, from the seconds (rounds,) of two programs."""
+    """Ratio of two programs' times (rounds,), slow over fast."""
     low, median, high = (float(x) for x in np.percentile(slow / fast, (25, 50, 75)))
     return Ratio(low, median, high)
 
 
 def geometric_mean(values: list[float]) -> float:
+    """The geometric mean of positive values; NaN if there are none."""
     return float(np.exp(np.mean(np.log(values)))) if values else float("nan")

@@ -24,11 +24,11 @@ from ..experiment import excitation, plan
 from ..experiment import run_experiment as steps
 from ..experiment.flash import RIG
 from ..experiment.run_experiment import open_board
-from ..experiment.stop_requests import TOLD, stopping
+from ..experiment.stop_requests import KEYS_HELP, watch_for_stop
 from ..recordings import flex_calibration as fitting
 from ..recordings.flex_calibration import read as read_calibration
 from ..recordings.recording import unfinished
-from ..recordings.run_from_recording import rebuild
+from ..recordings.run_from_recording import run_from_recording
 from ..recordings.unit_conversion import Sensor
 from ..review.live import serve
 from .bench_tables import (
@@ -284,7 +284,7 @@ def recover(
     \b
     Example: flexura bench recover logs/forward-20260101-120000
     """
-    run = rebuild(folder)
+    run = run_from_recording(folder)
     path = run.save(folder)
     if json:
         show(
@@ -322,7 +322,7 @@ def calibrate(
     opened: Any = open_board(bench, port, seed, firmware)
     hold = _held_by_hand
     if opened.plant is not None:
-        held = fitting.Held(opened.plant, bench)
+        held = fitting.DeflectedPlant(opened.plant, bench)
         opened.board.plant, hold = held, held.hold
     with contextlib.closing(opened.board):
         found = fitting.fit(*fitting.measure(Link(opened.board), tips, hold))
@@ -398,7 +398,7 @@ def _run(rig: Path | None, ask: Any, options: BenchOptions, gains: Path | None =
     )
     with contextlib.ExitStack() as stack:
         stack.callback(opened.board.close)
-        stop = stack.enter_context(stopping())
+        stop = stack.enter_context(watch_for_stop())
         seers = [stack.enter_context(live_view(asked, Sensor(fitted, fitted.zero), title))]
         if options.live:
             seers.append(
@@ -457,7 +457,7 @@ def _recover_beside(folder: Path, json: bool) -> None:
     """Runs of recordings that a killed host left beside this one."""
     for left in unfinished(folder.parent):
         try:
-            run = rebuild(left)
+            run = run_from_recording(left)
         except (
             InputError
         ) as error:  # nothing was received, or it is damaged: that is no reason not to start
@@ -493,7 +493,7 @@ def _countdown(link: Any, seconds: float, stop: Any) -> str:
     while (left := end - link.board.now()) > 0:
         if (whole := math.ceil(left)) != said:
             said = whole
-            typer.echo(f"starts in {whole} s; {TOLD}", err=True)
+            typer.echo(f"starts in {whole} s; {KEYS_HELP}", err=True)
         link.run(min(0.05, left))
         if why := stop.asked():
             return why

@@ -18,9 +18,9 @@ from ..board.protocol.player import FRACTION
 from ..experiment.plan import Plan
 from ..experiment.run_experiment import Done
 from ..experiment.selftest import Finding
-from ..experiment.stop_requests import TOLD
+from ..experiment.stop_requests import KEYS_HELP
 from ..recordings.flex_calibration import Fit
-from ..recordings.unit_conversion import Sensor, reading
+from ..recordings.unit_conversion import Sensor, flex_reading
 
 
 def heading(label: str, emulated: bool, experiment: str) -> str:
@@ -71,7 +71,7 @@ def live_table(report: Any, part: float, plan: Plan, sensor: Sensor, title: str)
         settings[name]
         for name in ("motor_counts_per_m", "stepper_counts_per_rad", "stepper_steps_per_rad")
     )
-    out = Table(title=title, title_justify="left", caption=TOLD, caption_justify="left")
+    out = Table(title=title, title_justify="left", caption=KEYS_HELP, caption_justify="left")
     for name in ("", "position", "set-point", "drive"):
         out.add_column(name, justify="left" if not name else "right", min_width=14)
     tracked = plan.knots.mode is Mode.position and report["state"] == State.running
@@ -92,7 +92,7 @@ def live_table(report: Any, part: float, plan: Plan, sensor: Sensor, title: str)
         two,
         f"{report['rate'] / per_step:.3f} rad/s",
     )
-    out.add_row("tip deflection", f"{1e3 * float(sensor.tip(reading(report['flex']))):.2f} mm")
+    out.add_row("tip deflection", f"{1e3 * float(sensor.tip(flex_reading(report['flex']))):.2f} mm")
     limited = ", voltage at its limit" if report["flags"] >> Flag.saturated & 1 else ""
     out.add_row(
         "board",

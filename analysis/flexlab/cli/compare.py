@@ -12,9 +12,9 @@ import flexura as fx
 from flexura.io import write_bytes
 
 from ..comparison import table
-from ..comparison.measures import Comparison, ordered
+from ..comparison.measures import Comparison, simulation_first
 from ..comparison.measures import compare as compared
-from ..comparison.replay.simulate_experiment import simulate
+from ..comparison.replay.simulate_experiment import simulate_experiment
 from ..comparison.report import html, pdf, png
 from ..review import picture as draw
 from ..review import write_review
@@ -71,13 +71,13 @@ def compare(
                     key=f"--{key}",
                     value=str(value),
                 )
-        first, second = ordered(first, fx.Run.read(other))
+        first, second = simulation_first(first, fx.Run.read(other))
     else:
         described = None if robot is None else fx.load(robot)
         with progress_bars("native") as report:
             try:
                 second, by = first, by or "commanded"
-                first = simulate(
+                first = simulate_experiment(
                     second, by, described, rtol=rtol, progress=lambda f: report("native", f)
                 )
             except fx.InputError as error:

@@ -12,7 +12,7 @@ from flexura.signals import load_manoeuvre
 
 from .. import rig
 from ..comparison.measures import compare
-from ..comparison.replay.simulate_experiment import simulate
+from ..comparison.replay.simulate_experiment import simulate_experiment
 from ..crosscheck.crosscheck import Check, Progress, crosscheck, save
 from ..experiment import plan, run_experiment
 from ..experiment.flash import RIG
@@ -52,7 +52,7 @@ def demonstrate(folder: Path, progress: Progress | None = None) -> Demonstration
     check = crosscheck(robot, load_manoeuvre(MANOEUVRE, len(robot.links)), progress=progress)
     save(check, folder / "crosscheck")
     experiment = _experiment(folder / "experiment", progress)
-    found = compare(simulate(experiment), experiment)
+    found = compare(simulate_experiment(experiment), experiment)
     review = save_comparison(found, folder / "comparison", simulated=True)[-1]
     try:
         return Demonstration(check, found, review, picture(review, folder / "review.png"))

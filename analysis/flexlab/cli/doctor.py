@@ -19,7 +19,7 @@ from flexura.errors import FlexuraError
 from ..board.emulator.simulator import CLOCK_HZ, compile_shim
 from ..board.serial_port import ports
 from ..experiment.flash import RIG
-from ..rig import examine as check
+from ..rig import check_capability as check
 from ..rig import load
 from .options import Json, RigFile
 from .output import show
@@ -161,7 +161,7 @@ def _rig(rig: Path | None) -> Iterator[Finding]:
         if not c.passed:
             cost = f"cannot follow {bench.manoeuvre.name!r}: {c.advice}"
             yield Finding(
-                f"rig: {c.what}", "wrong", f"needed: {c.needed}; available: {c.available}", cost
+                f"rig: {c.what}", "wrong", f"needed: {c.found}; available: {c.expected}", cost
             )
     if all(c.passed for c in checks):
         yield Finding(

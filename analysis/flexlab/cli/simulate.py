@@ -10,7 +10,7 @@ import typer
 import flexura as fx
 
 from ..studies import parameter_sweep
-from ..tuning.closed_loop import controlled
+from ..tuning.closed_loop import controller_from_file
 from . import tables
 from .options import Json, ManoeuvreFile, Out, RobotFile, Rtol
 from .output import default_folder, prepare, progress_bars, say, show, stored
@@ -69,7 +69,7 @@ def simulate(
             value=scheduler,
         )
 
-    drive = controlled(system, asked, controller) if controller else asked.drive
+    drive = controller_from_file(system, asked, controller) if controller else asked.drive
     with progress_bars("native") as report:
         run = fx.simulate(
             system, asked.t, drive, rtol=rtol, method=method, progress=lambda f: report("native", f)

@@ -14,15 +14,15 @@ import flexura as fx
 from flexura.control import Gains, load_gains
 
 from .. import rig as rigs
-from ..rig.nominal_robot import driven
+from ..rig.nominal_robot import with_nominal_drives
 from ..tuning import dissertation as cases
 from ..tuning import result as results
 from ..tuning import search_space as freedom
-from ..tuning.executor import engine
+from ..tuning.executor import make_executor
 from ..tuning.history import History
 from ..tuning.objective import Weights
 from ..tuning.search import Search, search
-from ..tuning.task import Task, varied
+from ..tuning.task import Task, perturbed_robots
 from .output import default_folder, say, show
 
 
@@ -156,16 +156,16 @@ def tune(
         )
     described, given = fx.load(robot), load_gains(controller)
     if rig is not None:
-        described, outputs = driven(described, rigs.load(rig))
+        described, outputs = with_nominal_drives(described, rigs.load(rig))
         given = Gains(given.settings, outputs, given.file)
     asked = fx.load_manoeuvre(manoeuvre, len(described.links))
     frees = (
         freedom.read(free_file)
         if free_file
-        else [freedom.from_flag(f) for f in free or []] or freedom.usual(given)
+        else [freedom.from_option(f) for f in free or []] or freedom.default_bounds(given)
     )
     weights = Weights(vibration, effort, overshoot)
-    robots = varied(
+    robots = perturbed_robots(
         described,
         _factors(payload_factors, "--payload-factors"),
         _factors(stiffness_factors, "--stiffness-factors"),
@@ -177,7 +177,7 @@ def tune(
     if history.stored:
         say(json, f"going on after generation {history.stored} in {folder}")
     with (
-        engine(task, scheduler, jobs) as runs,
+        make_executor(task, scheduler, jobs) as runs,
         _bar(how.generations + how.polish, task.goals) as report,
     ):
         complete = search(task, how, runs, history, report)

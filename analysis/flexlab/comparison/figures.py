@@ -105,7 +105,11 @@ def symbol(entry: Difference) -> str:
 
 def heading(c: Comparison, entry: Difference) -> str:
     text = entry.quantity[0].upper() + entry.quantity[1:]
-    return text + (f", {c.law}" if c.law else "") + (" (emulated)" if is_emulated(c) else "")
+    return (
+        text
+        + (f", {c.experiment_kind}" if c.experiment_kind else "")
+        + (" (emulated)" if is_emulated(c) else "")
+    )
 
 
 def is_emulated(c: Comparison) -> bool:

@@ -1,12 +1,13 @@
-"""Simulation against experiment in the dissertation's terms: largest deviations relative to the
-peak, and the response time.
+"""Measures of the deviation between simulation and experiment, as in the dissertation.
 
-**Response time**: from the start of execution (t = 0) until a joint variable has first covered 90 %
-of its largest distance from where it started, each run by its own largest distance. The
-dissertation gives a deviation of "response time" without defining it; this definition holds for
-steps and for periodic motions. It is not known where a dropout hides the instant.
-**Delay**: the shift in time by which the experiment fits the simulation best (least squares), which
-uses all samples.
+Largest deviations are relative to the simulation's peak.
+
+**Response time**: from the start of execution (t = 0) until a joint variable has covered 90 % of
+its largest distance from its start, each run by its own largest distance. The dissertation gives
+deviations of the "response time" without a definition; this one holds for steps and for periodic
+motions. It is unknown if a dropout hides the instant.
+
+**Delay**: the shift in time by which the experiment fits the simulation best (least squares).
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from flexura.errors import InputError
 from ..runs.deviation import deviation, deviations, interpolate
 from ..runs.labels import kind
 
-COVERED = 0.9  # of the largest distance, for the response time
+RESPONSE_LEVEL = 0.9  # of the largest distance, for the response time
 LONGEST_DELAY_S = 0.25
 # The dissertation's largest deviations of its rig, type IV [%] (Duong Xuan Bien, 2019, chapter 4).
 PUBLISHED = {
@@ -39,8 +40,10 @@ _COMPARED = re.compile(r"joint/(\d+)/position|link/(\d+)/tip_deflection")
 
 @dataclass(frozen=True)
 class Difference:
-    """One quantity's deviation, experiment minus simulation, in `unit`; `peak` and fractions are of
-    the simulation's peak."""
+    """One quantity's deviation, experiment minus simulation, in `unit`.
+
+    `peak` and relative values refer to the simulation's peak.
+    """
 
     quantity: str
     channel: str
@@ -55,9 +58,8 @@ class Difference:
 
 
 @dataclass(frozen=True)
-class Response:
-    """One joint's response times [s] in both runs, their relative deviation, and the delay of the
-    experiment [s]."""
+class ResponseTimes:
+    """One joint's response times in both runs [s], their relative deviation, and the delay [s]."""
 
     quantity: str
     channel: str
@@ -69,39 +71,49 @@ class Response:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two runs and what separates them. `experiment` may be any second run; labels come from their
-    metadata."""
+    """Two runs and their deviations. `experiment` may be any second run.
+
+    `lost`: samples of the experiment without a value in a compared channel.
+    """
 
     simulation: fx.Run
     experiment: fx.Run
     differences: tuple[Difference, ...]
-    responses: tuple[Response, ...]
+    responses: tuple[ResponseTimes, ...]
     lost: int  # samples of the experiment without a value in at least one compared channel
 
     @property
-    def law(self) -> str:
-        """Which of the dissertation's experiments this is: "forward", "inverse", or another."""
+    def experiment_kind(self) -> str:
+        """The dissertation's experiment: "forward", "inverse", or another; may be empty."""
         return str(self.experiment.meta.get("experiment", ""))
 
     @property
     def worst_response(self) -> float:
-        """The largest relative deviation of a response time; NaN when none is known."""
+        """The largest relative deviation of a response time; NaN if none is known."""
         found = [abs(r.relative) for r in self.responses if np.isfinite(r.relative)]
         return max(found, default=float("nan"))
 
     @property
     def published_response_percent(self) -> float | None:
-        return PUBLISHED.get(self.law, {}).get("response")
+        """The dissertation's deviation of the response time [%], or None."""
+        return PUBLISHED.get(self.experiment_kind, {}).get("response")
 
 
-def ordered(first: fx.Run, second: fx.Run) -> tuple[fx.Run, fx.Run]:
-    """The two runs with the experiment last, where exactly one of them is one."""
+def simulation_first(first: fx.Run, second: fx.Run) -> tuple[fx.Run, fx.Run]:
+    """The two runs, the experiment last if exactly one of them is an experiment."""
     return (second, first) if kind(first) == "experiment" != kind(second) else (first, second)
 
 
 def compare(simulation: fx.Run, experiment: fx.Run) -> Comparison:
-    """Compare the joint variables and tip displacements that both have. Raises InputError when
-    there is none."""
+    """Compare joint variables and tip displacements that both runs have.
+
+    Args:
+        simulation: the first run.
+        experiment: the second run.
+
+    Raises:
+        InputError: the runs have no such channel in common.
+    """
     names = [n for n in simulation if _COMPARED.fullmatch(n) and n in experiment]
     if not names:
         raise InputError(
@@ -139,32 +151,43 @@ def compare(simulation: fx.Run, experiment: fx.Run) -> Comparison:
 
 
 def quantity(channel: str) -> str:
-    """`joint/1/position` -> "joint variable 1", `link/2/tip_deflection` -> "tip displacement of
-    link 2"."""
+    """The name of a channel: `joint/1/position` is "joint variable 1"."""
     found = _COMPARED.fullmatch(channel)
     assert found
     return f"joint variable {found[1]}" if found[1] else f"tip displacement of link {found[2]}"
 
 
-def _response(simulation: fx.Run, experiment: fx.Run, channel: str) -> Response:
+def _response(simulation: fx.Run, experiment: fx.Run, channel: str) -> ResponseTimes:
     first, second = (
         response_time(simulation.t, simulation[channel]),
         response_time(experiment.t, experiment[channel]),
     )
     relative = second / first - 1 if first > 0 else float("nan")
-    return Response(
-        quantity(channel), channel, first, second, relative, delay(simulation, experiment, channel)
+    return ResponseTimes(
+        quantity(channel),
+        channel,
+        first,
+        second,
+        relative,
+        best_fit_delay(simulation, experiment, channel),
     )
 
 
 def response_time(t: np.ndarray, y: np.ndarray) -> float:
-    """When |y - y(0)| first reaches COVERED of its largest value [s]; NaN where it never moves or a
-    gap hides the instant."""
+    """Time at which |y - y(0)| first reaches RESPONSE_LEVEL of its largest value [s].
+
+    Args:
+        t: times (T,) [s].
+        y: values (T,).
+
+    Returns:
+        NaN if y does not move, or if a dropout hides the instant.
+    """
     there = np.isfinite(y)
     if not there.any():
         return float("nan")
     size = np.abs(y - y[there.argmax()])
-    level = COVERED * size[there].max()
+    level = RESPONSE_LEVEL * size[there].max()
     beyond = size >= level  # a NaN is not
     k = int(beyond.argmax())
     if level == 0.0 or k == 0 or not there[k - 1]:
@@ -172,9 +195,12 @@ def response_time(t: np.ndarray, y: np.ndarray) -> float:
     return float(t[k - 1] + (t[k] - t[k - 1]) * (level - size[k - 1]) / (size[k] - size[k - 1]))
 
 
-def delay(simulation: fx.Run, experiment: fx.Run, channel: str) -> float:
-    """The tau [s] that makes sum (y_exp(t) - y_sim(t - tau))^2 smallest, at most LONGEST_DELAY_S;
-    NaN where nothing moves."""
+def best_fit_delay(simulation: fx.Run, experiment: fx.Run, channel: str) -> float:
+    """Delay of the experiment: the tau that minimises sum (y_exp(t) - y_sim(t - tau))^2 [s].
+
+    Returns:
+        At most LONGEST_DELAY_S either way; NaN if nothing moves.
+    """
     from scipy.optimize import minimize_scalar
 
     y, t, known = experiment[channel], experiment.t, simulation[channel]

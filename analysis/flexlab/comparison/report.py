@@ -99,7 +99,7 @@ def png(c: Comparison) -> bytes:
 
 
 def caption(c: Comparison, k: int) -> str:
-    like = {"forward": "Figs 4.16 to 4.18", "inverse": "Figs 4.19 to 4.21"}.get(c.law)
+    like = {"forward": "Figs 4.16 to 4.18", "inverse": "Figs 4.19 to 4.21"}.get(c.experiment_kind)
     both = f"{called(c.simulation)} and {called(c.experiment)}"
     return f"Fig. {k + 1}. {heading(c, c.differences[k])}: {both}; below, their difference." + (
         f" In the manner of the dissertation's {like}." if like else ""

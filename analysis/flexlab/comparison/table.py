@@ -8,7 +8,7 @@ import numpy as np
 from rich.table import Table
 
 from ..runs.labels import EMULATED, called, emulated
-from .measures import COVERED, Comparison
+from .measures import RESPONSE_LEVEL, Comparison
 
 HEADS = ("quantity", "peak", "largest deviation", "at [s]", "of the peak", "RMS", "dissertation")
 
@@ -23,7 +23,7 @@ DRIVEN = {
 def title(c: Comparison) -> str:
     name = c.simulation.meta.get("robot", {}).get("name") or "robot"
     return f"{name}: {called(c.simulation)} against {called(c.experiment)}" + (
-        f", {c.law}" if c.law else ""
+        f", {c.experiment_kind}" if c.experiment_kind else ""
     )
 
 
@@ -78,8 +78,8 @@ def notes(c: Comparison) -> list[str]:
     )
     if c.responses:
         lines.append(
-            f"response time: from t = 0 until {100 * COVERED:g} % of the largest distance from the "
-            f"start is first covered; "
+            f"response time: from t = 0 until {100 * RESPONSE_LEVEL:g} % of the largest distance "
+            f"from the start is first covered; "
             "delay: the shift in time that fits best"
         )
     if c.lost:
@@ -133,7 +133,7 @@ def numbers(c: Comparison) -> dict[str, Any]:
     return {
         "title": title(c),
         "emulated": emulated(c.experiment) or emulated(c.simulation),
-        "experiment": c.law,
+        "experiment": c.experiment_kind,
         "runs": about,
         "deviations": [clean(d) for d in c.differences],
         "responses": [clean(r) for r in c.responses],

@@ -1,8 +1,6 @@
-"""Experiments on the rig, real or emulated: the dissertation's steps in order, and everything
-received kept as it arrives.
+"""Experiments on the rig, real or emulated.
 
-`plan` says what is asked of the rig, `selftest` looks whether it may, `execute` does it, `conduct`
-has all of it in order. `recording` keeps what arrives, `rebuild` makes the Run of it, with
-`measure` for the conversions, `align` for the time between command and response and `calibrate` for
-the flex sensor. `command` is what the terminal sees.
+`plan` says what is asked of the rig, `selftest` checks the board, `stream` executes the plan, and
+`run_experiment` has all steps in order. `flash` loads and configures the firmware, `excitation` is
+the plan for an identification, `lead_in` starts and ends motions smoothly.
 """

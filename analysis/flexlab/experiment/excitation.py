@@ -1,13 +1,12 @@
-"""Ten seconds, open loop, that show everything the identification asks for.
+"""The 10 s open-loop excitation that an identification needs.
 
-    0.0 to 0.3 s   rest: the flex sensor's noise 0.3 to 4.2 s   joint 2 near 0, the strip across the
-    rail's forces: strokes ring the first mode, a chirp goes through the
-                   second; the carriage meanwhile goes forth and back at many speeds: friction
-    4.2 to 5.4 s   joint 2 turns so that the strip stands across the rail 5.4 to 9.0 s   the
-    carriage sweeps through the first mode in strokes of some tenths of a millimetre, of which the
-    play of the
-                   nut takes its part
-    9.0 to 10 s    ringing: damping
+    0.0 to 0.3 s   rest: noise of the flex sensor
+    0.3 to 4.2 s   joint 2 near 0, the strip across the rail's forces: strokes excite the first
+                   mode, a chirp passes the second; the carriage moves at many speeds: friction
+    4.2 to 5.4 s   joint 2 turns until the strip stands across the rail
+    5.4 to 9.0 s   the carriage sweeps through the first mode in strokes of some tenths of a
+                   millimetre: backlash
+    9.0 to 10 s    free vibration: damping
 
 Frequencies and rates follow from the nominal robot, so that a strip of another length is excited as
 well.
@@ -28,30 +27,34 @@ DURATION_S = 9.0  # and one second of rest at the end
 STEP_S = 0.008  # of the board's knots
 CHIRP = (0.4, 4.0)  # [s], with the strip along the rail
 STROKE_RAD_S, CHIRP_RAD_S = 0.5, 0.9
-ASIDE_RAD, ASIDE_S, ASIDE_AT_S = 1.2, 1.2, 4.2
+TURN_RAD, TURN_S, TURN_AT_S = 1.2, 1.2, 4.2
 SWEEP = (5.4, 8.9)
-BIG_V, SMALL_V = (3.0, 6.0), 2.8
-
-
-ACCELERATION_RAD_S2 = (
-    500.0  # the board's limit in this experiment: a microstep more or less is no jump to a stepper
-)
+STROKE_V, SWEEP_V = (3.0, 6.0), 2.8
+# the board's limit in this experiment: a jump of the rate by a microstep is harmless
+ACCELERATION_RAD_S2 = 500.0
 
 
 def plan(bench: Bench, settings: dict[str, float]) -> Plan:
-    """The experiment: the profile as it stands, whatever the rig's own limit of joint 2's
-    acceleration."""
+    """The plan of the excitation, whatever the rig's limit of joint 2's acceleration.
+
+    Args:
+        bench: the rig.
+        settings: the board's settings, by name.
+    """
     return forward(
         bench, settings | {"acceleration_max_2_rad_s2": ACCELERATION_RAD_S2}, profile(bench.robot)
     )
 
 
 def profile(robot: fx.Robot) -> dict[str, Any]:
-    """The tables of a profile for `flexura bench forward`: voltage of the motor, rate of joint
-    2."""
+    """Tables of a profile for `flexura bench forward`: motor voltage, rate of joint 2.
+
+    Args:
+        robot: the nominal robot.
+    """
     first, second = fx.frequencies(fx.assemble(robot), joints="locked")[:2]
     t = np.arange(round(DURATION_S / STEP_S)) * STEP_S
-    held = lambda values: {
+    hold = lambda values: {
         "kind": "piecewise",
         "at_s": t.round(6).tolist(),
         "value": values.round(6).tolist(),
@@ -59,26 +62,26 @@ def profile(robot: fx.Robot) -> dict[str, Any]:
     return {
         "name": "excitation for the identification",
         "duration_s": DURATION_S,
-        "voltage_V": held(_voltage(t, first)),
-        "rate_rad_s": held(_rate(t, first, second)),
+        "voltage_V": hold(_voltage(t, first)),
+        "rate_rad_s": hold(_rate(t, first, second)),
     }
 
 
 def _voltage(t: np.ndarray, first_Hz: float) -> np.ndarray:
     a, b = CHIRP
     part = np.clip((t - a) / (b - a), 0, 1)
-    big = (
-        (BIG_V[0] + (BIG_V[1] - BIG_V[0]) * part)
+    strokes = (
+        (STROKE_V[0] + (STROKE_V[1] - STROKE_V[0]) * part)
         * np.sin(2 * np.pi * (0.8 + 0.35 * part) * (t - a))
-        * _between(t, a, b)
+        * _window(t, a, b)
     )
     a, b = SWEEP
-    small = (
-        SMALL_V
+    sweep = (
+        SWEEP_V
         * np.sin(2 * np.pi * _chirp(t, a, b, 0.78 * first_Hz, 1.18 * first_Hz))
-        * _between(t, a, b)
+        * _window(t, a, b)
     )
-    return big + small
+    return strokes + sweep
 
 
 def _rate(t: np.ndarray, first_Hz: float, second_Hz: float) -> np.ndarray:
@@ -89,19 +92,18 @@ def _rate(t: np.ndarray, first_Hz: float, second_Hz: float) -> np.ndarray:
         _chirp(t, a, middle, 0.78 * second_Hz, 1.06 * second_Hz),
         _chirp(t, middle, b, 1.06 * second_Hz, 0.78 * second_Hz),
     )
-    rate = CHIRP_RAD_S * np.sin(2 * np.pi * chirp) * _between(t, a, b)
-    rate += STROKE_RAD_S * _between(
-        t, a, a + 1.5 / first_Hz
-    )  # its beginning and its end ring together
-    s = np.clip((t - ASIDE_AT_S) / ASIDE_S, 0, 1)
-    return rate + ASIDE_RAD / ASIDE_S * 30 * (s * (1 - s)) ** 2  # d/ds (10 s^3 - 15 s^4 + 6 s^5)
+    rate = CHIRP_RAD_S * np.sin(2 * np.pi * chirp) * _window(t, a, b)
+    # its beginning and its end ring together
+    rate += STROKE_RAD_S * _window(t, a, a + 1.5 / first_Hz)
+    s = np.clip((t - TURN_AT_S) / TURN_S, 0, 1)
+    return rate + TURN_RAD / TURN_S * 30 * (s * (1 - s)) ** 2  # d/ds (10 s^3 - 15 s^4 + 6 s^5)
 
 
 def _chirp(t: np.ndarray, a: float, b: float, low_Hz: float, high_Hz: float) -> np.ndarray:
-    """Turns of an oscillation whose frequency goes evenly from low to high between a and b."""
+    """Phase in turns of an oscillation whose frequency rises linearly between a and b [s]."""
     s = np.clip(t, a, b) - a
     return low_Hz * s + (high_Hz - low_Hz) * s**2 / (2 * (b - a))
 
 
-def _between(t: np.ndarray, a: float, b: float) -> np.ndarray:
+def _window(t: np.ndarray, a: float, b: float) -> np.ndarray:
     return np.where((t >= a) & (t < b), 1.0, 0.0)

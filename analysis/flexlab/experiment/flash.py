@@ -1,5 +1,4 @@
-"""The firmware to a board, and the rig's constants into it: build, load, wait for the first good
-frame, read back, compare."""
+"""Load the firmware and the rig's settings into a board, and read them back."""
 
 from __future__ import annotations
 
@@ -21,7 +20,7 @@ from ..board.protocol.session import Identity, Link
 from ..board.serial_port import SerialBoard, find
 from ..paths import FIRMWARE
 from ..rig import Bench, configuration
-from ..rig.plant.rigid_plant import Drives
+from ..rig.plant.rigid_plant import RigidPlant
 
 RIG = FIRMWARE / "rig.toml"
 
@@ -30,7 +29,7 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Setting:
-    """A setting of the board beside what the rig file says."""
+    """A setting of the board beside that of the rig file."""
 
     name: str
     board: float
@@ -38,12 +37,13 @@ class Setting:
 
     @property
     def agrees(self) -> bool:
-        return self.board == single(self.rig)
+        """Whether both are equal in single precision."""
+        return self.board == as_float32(self.rig)
 
 
 @dataclass(frozen=True)
-class Flashed:
-    """What became of it. `board` is the port or "emulated ATmega2560"."""
+class FlashResult:
+    """The outcome; `board` is the port or "emulated ATmega2560"."""
 
     board: str
     emulated: bool
@@ -54,18 +54,17 @@ class Flashed:
 
     @property
     def differing(self) -> list[str]:
-        """Settings of the board that are not the rig file's."""
+        """Settings of the board that differ from the rig file's."""
         return [setting.name for setting in self.settings if not setting.agrees]
 
 
-def single(value: float) -> float:
-    """As the board keeps it: in single precision."""
+def as_float32(value: float) -> float:
+    """A value in single precision, as the board keeps it."""
     return float(struct.unpack("<f", struct.pack("<f", value))[0])
 
 
-def crc(settings: dict[str, float]) -> int:
-    """The board's checksum of its settings: CRC-16 over all of them in their order, single
-    precision."""
+def settings_crc(settings: dict[str, float]) -> int:
+    """The board's checksum of its settings: CRC-16 over all, in order, single precision."""
     return crc_hqx(struct.pack(f"<{len(CONFIG)}f", *(settings[name] for name in CONFIG)), 0xFFFF)
 
 
@@ -95,7 +94,7 @@ def flash(
     emulated: bool = False,
     configure: bool = False,
     say: Say = print,
-) -> Flashed:
+) -> FlashResult:
     """Build, load, meet the board, and read its settings; with `configure` write the rig's, store
     them, and see them again after a reset.
 
@@ -116,7 +115,9 @@ def flash(
         if device
         else "loaded into an emulated ATmega2560: no hardware is touched"
     )
-    board: Board = SerialBoard(device, BAUD_BIT_S) if device else EmulatedBoard(elf, Drives(bench))
+    board: Board = (
+        SerialBoard(device, BAUD_BIT_S) if device else EmulatedBoard(elf, RigidPlant(bench))
+    )
     try:
         link = Link(board)
         identity = link.connect()
@@ -131,7 +132,7 @@ def flash(
     finally:
         board.close()
     settings = [Setting(name, found[name], value) for name, value in wanted.items()]
-    done = Flashed(board.label, board.emulated, elf, identity, settings, configure)
+    done = FlashResult(board.label, board.emulated, elf, identity, settings, configure)
     if configure and done.differing:
         raise BoardError(
             f"{board.label}: read back other values than written: {', '.join(done.differing)}"
@@ -146,18 +147,20 @@ def _configure(link: Link, wanted: dict[str, float], say: Say) -> Identity:
     say(f"wrote and stored {len(wanted)} settings")
     link.board.reset()
     identity = link.connect()
-    if identity.fault is Fault.bad_configuration or identity.configuration_crc != crc(wanted):
+    if identity.fault is Fault.bad_configuration or identity.configuration_crc != settings_crc(
+        wanted
+    ):
         raise BoardError(
             f"{link.board.label}: after a reset the board does not have the settings that were "
             f"stored (checksum "
-            f"{identity.configuration_crc:04x}, expected {crc(wanted):04x}, fault "
+            f"{identity.configuration_crc:04x}, expected {settings_crc(wanted):04x}, fault "
             f"{identity.fault.name})"
         )
     say("reset: the board came up with them")
     return identity
 
 
-def table(done: Flashed) -> Any:
+def table(done: FlashResult) -> Any:
     """The settings, those of the board and those of the rig file."""
     from rich.table import Table
 
@@ -173,7 +176,7 @@ def table(done: Flashed) -> Any:
     return out
 
 
-def data(done: Flashed) -> dict[str, Any]:
+def data(done: FlashResult) -> dict[str, Any]:
     """The same for scripts."""
     who = done.identity
     return {

@@ -1,11 +1,9 @@
-"""Into a motion from rest, and out of it: a manoeuvre that begins or ends at speed cannot be jumped
-into by a rig.
+"""Smooth start and end of a motion that begins or ends at speed.
 
-    p(s) = quintic with position, velocity and acceleration given at both ends, s = time from its
-    beginning
+    p(s) = quintic with position, velocity and acceleration given at both ends, s from its beginning
 
-A stepper that is to be at 3.3 rad/s at once loses steps; led in over a second it keeps them, and
-the manoeuvre is as asked.
+A stepper that must turn at 3.3 rad/s at once loses steps. With a lead-in of one second it does not,
+and the manoeuvre itself is unchanged.
 """
 
 from __future__ import annotations
@@ -16,15 +14,18 @@ import numpy as np
 
 from flexura.signals import COLUMNS, Signal
 
-LEAD_S = 1.0
+LEAD_IN_S = 1.0
 AT_REST = 1e-9  # m, rad and their rates: no lead is needed
 
 
-def led(motion: Signal, duration_s: float, lead_s: float, out_s: float) -> Signal:
-    """The motion from `lead_s` on, led into from rest at 0, and in `out_s` after its end led to
-    rest where it ended.
+def with_lead_in(motion: Signal, duration_s: float, lead_s: float, out_s: float) -> Signal:
+    """A motion with a lead-in from rest at 0 and a lead-out to rest where it ends.
 
-    Both leads may be 0 s, where the motion begins or ends at rest.
+    Args:
+        motion: the motion, from 0 to its duration.
+        duration_s: its duration [s].
+        lead_s: duration of the lead-in [s]; 0 if the motion begins at rest.
+        out_s: duration of the lead-out [s]; 0 if it ends at rest.
     """
     rows = []
     begin, end = motion(0.0), motion(duration_s)
@@ -44,7 +45,14 @@ def led(motion: Signal, duration_s: float, lead_s: float, out_s: float) -> Signa
 def quintic(
     t0: float, T: float, a: tuple[float, float, float], b: tuple[float, float, float]
 ) -> np.ndarray:
-    """A signal's row from (position, velocity, acceleration) `a` at t0 to `b` at t0 + T."""
+    """A signal's row from a state at t0 to one at t0 + T.
+
+    Args:
+        t0: start [s].
+        T: duration [s].
+        a: position, velocity and acceleration at t0.
+        b: the same at t0 + T.
+    """
     left = np.array([b[0] - a[0] - a[1] * T - a[2] * T**2 / 2, b[1] - a[1] - a[2] * T, b[2] - a[2]])
     high = np.linalg.solve(
         [[T**3, T**4, T**5], [3 * T**2, 4 * T**3, 5 * T**4], [6 * T, 12 * T**2, 20 * T**3]], left
@@ -59,8 +67,7 @@ def _hold(t0: float, value: float) -> np.ndarray:
 
 
 def _shifted(segments: np.ndarray, by: float, duration_s: float) -> list[np.ndarray]:
-    """The rows that are in force from 0 to the duration, later by `by`; the first of them begins
-    there."""
+    """The rows that act from 0 to the duration, later by `by`; the first begins there."""
     first = max(int(np.searchsorted(segments[:, 0], 0.0, side="right")) - 1, 0)
     rows = [row.copy() for row in segments[first:] if row[0] < duration_s]
     if rows and rows[0][0] > 0:  # held until then

@@ -1,5 +1,4 @@
-"""What an experiment asks of the rig: knots for the board, in words and numbers, and whether the
-rig can do it.
+"""Plans of experiments: knots for the board, a description, and checks of the rig.
 
 Every plan begins with both joints at 0, where they are referenced.
 """
@@ -22,16 +21,13 @@ from flexura.io import read_toml
 
 from ..board.protocol.declaration import CONFIG
 from ..board.protocol.player import Knots, drives, setpoints
-from ..rig import Bench, Check, examine
+from ..rig import Bench, Check, check_capability
 from ..rig.checks import STEP_RATE_MAX_1_S
-from .lead_in import AT_REST, LEAD_S, led
+from .lead_in import AT_REST, LEAD_IN_S, with_lead_in
 
 PERIOD_LOG2 = 3  # knots are 8 ms apart
-ALWAYS = (
-    "motor current",
-    "supply",
-    "flex sensor at rest",
-)  # checks of the bench, whatever it is to do
+# checks of the rig that do not depend on the motion
+STATIC_CHECKS = ("motor current", "supply", "flex sensor at rest")
 GAINS = tuple(name for name in CONFIG if name[:2] in ("kp", "ki", "kd", "kf", "kg", "kv", "kc")) + (
     "derivative_Hz",
     "deflection_Hz",
@@ -39,14 +35,17 @@ GAINS = tuple(name for name in CONFIG if name[:2] in ("kp", "ki", "kd", "kf", "k
     "setpoint_2_Hz",
     "feedback_2",
 )
-# The law of a gains file that says nothing, as `flexura.Controller` has it.
-LAW = dict.fromkeys(GAINS, 0.0) | {"derivative_Hz": 50.0, "deflection_Hz": 50.0}
+# The controller of an empty gains file, as in `flexura.Controller`.
+ALL_TERMS_OFF = dict.fromkeys(GAINS, 0.0) | {"derivative_Hz": 50.0, "deflection_Hz": 50.0}
 
 
 @dataclass(frozen=True)
 class Plan:
-    """One experiment: `asked` is its description for the metadata, `settings` what the board must
-    be configured to, `phases` what begins when."""
+    """One experiment.
+
+    `asked`: its description for the metadata. `settings`: the board's settings. `phases`: what
+    begins when.
+    """
 
     experiment: str
     knots: Knots
@@ -58,19 +57,25 @@ class Plan:
 
     @property
     def failed(self) -> list[Check]:
+        """The checks that failed."""
         return [check for check in self.checks if not check.passed]
 
 
 def gains(path: Path) -> dict[str, float]:
-    """Controller settings by the firmware's names, from a TOML file. Raises InputError, naming
-    file, key and value.
+    """Controller settings by the firmware's names, from a TOML file.
 
-    A gains file of the model and of `flexura tune`, with a table [controller], is the whole law:
-    what it doesn't name is off.
+    A gains file of the model or of `flexura tune` has a table [controller] and is complete: terms
+    that it does not name are off.
+
+    Args:
+        path: the file.
+
+    Raises:
+        InputError: names file, key and value.
     """
     data, known = read_toml(path), GAINS
     if "controller" in data:
-        data, known = LAW | load_gains(path).board(), BOARD
+        data, known = ALL_TERMS_OFF | load_gains(path).board(), BOARD
     for name, value in data.items():
         if name not in known:
             raise InputError(
@@ -91,10 +96,17 @@ def gains(path: Path) -> dict[str, float]:
 def inverse(
     bench: Bench, settings: dict[str, float], manoeuvre: fx.Manoeuvre | None = None
 ) -> Plan:
-    """The joint motions of a manoeuvre, tracked by the firmware's controllers, led into and out of
-    where they are not at rest.
+    """Plan of the inverse experiment: the firmware's controllers track a manoeuvre's motions.
 
-    Raises InputError unless both joints have a motion.
+    A lead-in and lead-out are added if the motions do not start or end at rest.
+
+    Args:
+        bench: the rig.
+        settings: the board's settings, by name.
+        manoeuvre: by default that of the rig file.
+
+    Raises:
+        InputError: a joint has no motion.
     """
     asked = manoeuvre or bench.manoeuvre
     motions = []
@@ -104,17 +116,21 @@ def inverse(
                 "missing: expected a motion of every joint", key=f"joint[{number}].motion"
             )
         motions.append(joint.motion)
-    lead_s = LEAD_S if max(abs(v) for motion in motions for v in motion(0.0)[:2]) > AT_REST else 0.0
-    out_s = LEAD_S if any(abs(motion(asked.duration_s)[1]) > AT_REST for motion in motions) else 0.0
-    one, two = (led(motion, asked.duration_s, lead_s, out_s) for motion in motions)
-    whole = _following(asked.name, (one, two), lead_s + asked.duration_s + out_s)
+    lead_s = (
+        LEAD_IN_S if max(abs(v) for motion in motions for v in motion(0.0)[:2]) > AT_REST else 0.0
+    )
+    out_s = (
+        LEAD_IN_S if any(abs(motion(asked.duration_s)[1]) > AT_REST for motion in motions) else 0.0
+    )
+    one, two = (with_lead_in(motion, asked.duration_s, lead_s, out_s) for motion in motions)
+    whole = _manoeuvre_of(asked.name, (one, two), lead_s + asked.duration_s + out_s)
     parts = (
         (0.0, "lead in", lead_s),
         (lead_s, "manoeuvre", True),
         (lead_s + asked.duration_s, "lead out", out_s),
     )
     phases = [{"t": t, "name": name} for t, name, there in parts if there]
-    plan = _tracked("inverse", bench, settings, whole)
+    plan = _tracking_plan("inverse", bench, settings, whole)
     return dataclasses.replace(
         plan, asked=asked.spec() | {"lead_s": lead_s, "out_s": out_s}, phases=phases
     )
@@ -128,8 +144,19 @@ def step(
     duration_s: float = 4.0,
     apart_s: float | None = None,
 ) -> Plan:
-    """A step of each joint's set-point, the carriage's first, joint 2's `apart_s` (half the
-    duration) later; each within one knot period."""
+    """Plan of a step of each joint's set-point, the carriage's first.
+
+    Args:
+        bench: the rig.
+        settings: the board's settings, by name.
+        step_1_m: step of joint 1 [m].
+        step_2_rad: step of joint 2 [rad].
+        duration_s: total duration [s].
+        apart_s: time between the steps [s], by default half the duration.
+
+    Raises:
+        InputError: a time is out of range.
+    """
     if not duration_s > 0.8:
         raise InputError("expected more than 0.8 s", key="--duration_s", value=duration_s)
     apart_s = duration_s / 2 if apart_s is None else apart_s
@@ -143,29 +170,45 @@ def step(
         "following_max_1_m": max(settings["following_max_1_m"], 1.5 * abs(step_1_m)),
         "following_max_2_rad": max(settings["following_max_2_rad"], 1.5 * abs(step_2_rad)),
     }
-    plan = _tracked(
-        "step", bench, settings, _following("step of each set-point", motions, duration_s)
+    plan = _tracking_plan(
+        "step", bench, settings, _manoeuvre_of("step of each set-point", motions, duration_s)
     )
     steps = [
         {"joint": 1, "at_s": first, "height": step_1_m},
         {"joint": 2, "at_s": second, "height": step_2_rad},
     ]
-    able = [
-        check for check in plan.checks if check.what in (*ALWAYS, "carriage range", "joint 2 range")
-    ]  # its speed is no number
-    return dataclasses.replace(plan, checks=able, asked=plan.asked | {"steps": steps})
+    # the speed of a step is not finite
+    checks = [
+        check
+        for check in plan.checks
+        if check.what in (*STATIC_CHECKS, "carriage range", "joint 2 range")
+    ]
+    return dataclasses.replace(plan, checks=checks, asked=plan.asked | {"steps": steps})
 
 
 def free_vibration(
     bench: Bench, settings: dict[str, float], turn_rad: float = 0.1, duration_s: float = 6.0
 ) -> Plan:
-    """Joint 2 turns fast, stops and holds: the strip rings."""
+    """Plan of a free vibration: joint 2 turns fast, stops and holds.
+
+    Args:
+        bench: the rig.
+        settings: the board's settings, by name.
+        turn_rad: angle of the turn [rad].
+        duration_s: total duration [s].
+
+    Raises:
+        InputError: the duration is too short.
+    """
     move_s, rise_s, rest_s = 0.18, 0.08, 0.1
     if not duration_s > 1.0:
         raise InputError("expected more than 1 s", key="--duration_s", value=duration_s)
     motions = signals.constant(0.0), signals.trapezoidal(turn_rad, move_s, rise_s, at_s=rest_s)
-    plan = _tracked(
-        "free-vibration", bench, settings, _following("move, stop, let ring", motions, duration_s)
+    plan = _tracking_plan(
+        "free-vibration",
+        bench,
+        settings,
+        _manoeuvre_of("move, stop, let ring", motions, duration_s),
     )
     return dataclasses.replace(plan, asked=plan.asked | {"rings_from_s": rest_s + move_s})
 
@@ -173,8 +216,16 @@ def free_vibration(
 def forward(
     bench: Bench, settings: dict[str, float], profile: Path | dict[str, Any] | None = None
 ) -> Plan:
-    """Voltage and pulse profiles, open loop: of a file or its tables, or ones that make the strip
-    ring."""
+    """Plan of the forward experiment: voltage and pulse rate, open loop.
+
+    Args:
+        bench: the rig.
+        settings: the board's settings, by name.
+        profile: a file or its tables; by default one that makes the strip vibrate.
+
+    Raises:
+        InputError: names file, key and value.
+    """
     spec = (
         DEFAULT_PROFILE
         if profile is None
@@ -240,72 +291,78 @@ def _profile(spec: dict[str, Any]) -> tuple[str, float, list[fx.Signal]]:
     )
 
 
-def _following(name: str, motions: tuple[fx.Signal, fx.Signal], duration_s: float) -> fx.Manoeuvre:
+def _manoeuvre_of(
+    name: str, motions: tuple[fx.Signal, fx.Signal], duration_s: float
+) -> fx.Manoeuvre:
     return fx.Manoeuvre(
         name, duration_s, duration_s / 1000, fx.Drive.pd(motions, [0.0, 0.0], [0.0, 0.0])
     )
 
 
-def _tracked(
+def _tracking_plan(
     experiment: str, bench: Bench, settings: dict[str, float], asked: fx.Manoeuvre
 ) -> Plan:
     carriage, joint = (drive.motion for drive in asked.drive.joints)
     assert carriage is not None and joint is not None
     knots = setpoints(carriage, joint, asked.duration_s, settings, PERIOD_LOG2)
-    return Plan(experiment, knots, asked.duration_s, settings, examine(bench, asked), asked.spec())
+    return Plan(
+        experiment, knots, asked.duration_s, settings, check_capability(bench, asked), asked.spec()
+    )
 
 
 def _open_loop(bench: Bench, knots: Knots, settings: dict[str, float]) -> list[Check]:
-    """The carriage goes nowhere farther than on the motor's line without load; joint 2 where its
-    pulses say."""
+    """Checks of an open-loop plan.
+
+    The carriage goes no farther than on the motor's line without load; joint 2 follows its pulses.
+    """
     volts, steps = knots.columns["voltage"] / 1000, knots.columns["rate"]
     motor = bench.rig.motor
     free = bench.rig.screw.lead_m * motor.no_load_speed_rpm / 60 / motor.rated_voltage_V
-    way = lambda speed: np.concatenate([[0.0], np.cumsum(speed) * knots.period_s])
-    carriage, joint = way(free * volts), way(steps / settings["stepper_steps_per_rad"])
-    most_V, most_steps = float(np.abs(volts).max()), float(np.abs(steps).max())
-    most_m_s, most_rad_s = free * most_V, most_steps / settings["stepper_steps_per_rad"]
-    about = [
-        _least("motor voltage", most_V, settings["voltage_max_V"], 1.0, "V", "a lower voltage"),
-        _least(
+    integrate = lambda speed: np.concatenate([[0.0], np.cumsum(speed) * knots.period_s])
+    carriage, joint = integrate(free * volts), integrate(steps / settings["stepper_steps_per_rad"])
+    peak_V, peak_steps = float(np.abs(volts).max()), float(np.abs(steps).max())
+    peak_m_s, peak_rad_s = free * peak_V, peak_steps / settings["stepper_steps_per_rad"]
+    checks = [
+        _at_most("motor voltage", peak_V, settings["voltage_max_V"], 1.0, "V", "a lower voltage"),
+        _at_most(
             "carriage speed",
-            most_m_s,
+            peak_m_s,
             settings["speed_max_1_m_s"],
             1e3,
             "mm/s without load",
             "a lower voltage",
         ),
-        _least(
-            "joint 2 rate", most_rad_s, settings["rate_max_2_rad_s"], 1.0, "rad/s", "a lower rate"
+        _at_most(
+            "joint 2 rate", peak_rad_s, settings["rate_max_2_rad_s"], 1.0, "rad/s", "a lower rate"
         ),
-        _least(
-            "joint 2 speed", most_rad_s, settings["speed_max_2_rad_s"], 1.0, "rad/s", "a lower rate"
+        _at_most(
+            "joint 2 speed", peak_rad_s, settings["speed_max_2_rad_s"], 1.0, "rad/s", "a lower rate"
         ),
-        _least("step rate", most_steps, STEP_RATE_MAX_1_S, 1.0, "microsteps/s", "a lower rate"),
+        _at_most("step rate", peak_steps, STEP_RATE_MAX_1_S, 1.0, "microsteps/s", "a lower rate"),
     ]
-    for what, gone, (low, high), factor, unit in (
+    for what, travel, (low, high), factor, unit in (
         ("carriage range", carriage, bench.limits[0], 1e3, "mm without load"),
         ("joint 2 range", joint, bench.limits[1], 1.0, "rad"),
     ):
-        inside = bool(low <= gone.min() and gone.max() <= high)
-        needed = f"{factor * gone.min():.4g} to {factor * gone.max():.4g} {unit}"
-        about.append(
+        inside = bool(low <= travel.min() and travel.max() <= high)
+        found = f"{factor * travel.min():.4g} to {factor * travel.max():.4g} {unit}"
+        checks.append(
             Check(
                 what,
                 inside,
-                needed,
+                found,
                 f"{factor * low:.4g} to {factor * high:.4g}",
                 "a smaller profile",
             )
         )
-    return about + [check for check in examine(bench) if check.what in ALWAYS]
+    return checks + [check for check in check_capability(bench) if check.what in STATIC_CHECKS]
 
 
-def _least(what: str, needed: float, limit: float, factor: float, unit: str, advice: str) -> Check:
+def _at_most(what: str, found: float, limit: float, factor: float, unit: str, advice: str) -> Check:
     return Check(
         what,
-        needed <= limit,
-        f"{factor * needed:.4g} {unit}",
+        found <= limit,
+        f"{factor * found:.4g} {unit}",
         f"at most {factor * limit:.4g}",
         advice,
     )

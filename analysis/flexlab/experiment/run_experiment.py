@@ -22,17 +22,17 @@ from ..board.emulator.emulated import EmulatedBoard
 from ..board.protocol.declaration import BAUD_BIT_S
 from ..board.protocol.session import Link
 from ..board.serial_port import SerialBoard
-from ..recordings.recording import Recorded, Recording
-from ..recordings.run_from_recording import knots_spec, rebuild
+from ..recordings.recording import Recording, RecordingBoard
+from ..recordings.run_from_recording import knots_spec, run_from_recording
 from ..recordings.unit_conversion import Sensor
 from ..rig import Bench, configuration
 from ..rig.description import Calibration
-from ..rig.plant.rigid_plant import Drives
+from ..rig.plant.rigid_plant import RigidPlant
 from .flash import build
 from .plan import Plan
 from .selftest import Finding, prepare
 from .selftest import examine as test
-from .stream import Ended, execute, quiet
+from .stream import StreamResult, execute, stop_motors
 
 SETTLE_S = {"forward": 1.0, "inverse": 0.5, "step": 0.5, "free-vibration": 0.0}
 
@@ -69,15 +69,15 @@ class Done:
     run: fx.Run
     folder: Path
     findings: list[Finding]
-    ended: Ended
+    ended: StreamResult
 
 
 def check(plan: Plan) -> None:
     """Raises InputError for the first thing that is asked and that the rig cannot do."""
     if plan.failed:
         first = plan.failed[0]
-        expected = f"the rig cannot do this: expected {first.available}; {first.advice}"
-        raise InputError(expected, key=first.what, value=first.needed, more=len(plan.failed) - 1)
+        expected = f"the rig cannot do this: expected {first.expected}; {first.advice}"
+        raise InputError(expected, key=first.what, value=first.found, more=len(plan.failed) - 1)
 
 
 def open_board(bench: Bench, port: str | None, seed: int = 0, elf: Path | None = None) -> Opened:
@@ -99,7 +99,7 @@ def plant_of(bench: Bench, seed: int) -> Any:
     """The emulated rig: its elastic plant where this version has one, else its drives with a
     straight strip."""
     if importlib.util.find_spec("flexlab.rig.plant.plant") is None:
-        return Drives(bench)
+        return RigidPlant(bench)
     return importlib.import_module("flexlab.rig.plant.plant").rig_plant(bench, seed)
 
 
@@ -150,7 +150,9 @@ def conduct(
     recording = Recording(folder, session(bench, plan, opened, calibration))
     # The same experiment on the emulated board is the same byte for byte; a real line needs a
     # number that nobody played before.
-    link = Link(Recorded(opened.board, recording), sequence=1 if opened.board.emulated else None)
+    link = Link(
+        RecordingBoard(opened.board, recording), sequence=1 if opened.board.emulated else None
+    )
     try:
         findings = _ready(
             link, recording, bench, plan, calibration, opened.board.emulated or configure
@@ -165,7 +167,7 @@ def conduct(
         if why := watch.may_start(link):
             raise NotStarted(f"not started: {why}")
     except BaseException:
-        quiet(link)
+        stop_motors(link)
         recording.discard()
         raise
     try:
@@ -174,7 +176,7 @@ def conduct(
         )
     finally:
         recording.close()
-    run = rebuild(folder)
+    run = run_from_recording(folder)
     run.save(folder)
     return Done(run, folder, findings, ended)
 
@@ -189,7 +191,7 @@ def _ready(
 ) -> list[Finding]:
     """Greet the board, configure and test it, and tell it that both joints stand at 0."""
     identity = link.connect()
-    recording.know(
+    recording.write_session(
         firmware={
             "version": identity.firmware,
             "declaration": f"{identity.declaration:08x}",
@@ -203,6 +205,6 @@ def _ready(
             link, plan.settings, lambda r: float(Sensor(calibration, calibration.zero).tip(r))
         )
         findings += more
-        recording.know(rest=rest.spec())
+        recording.write_session(rest=rest.spec())
         link.command("reference", position_1=0, position_2=0, steps=0)
     return findings

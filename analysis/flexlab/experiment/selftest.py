@@ -15,8 +15,8 @@ import numpy as np
 from ..board.base import BoardError
 from ..board.protocol.declaration import FAULTS, Fault, Flag, State
 from ..board.protocol.session import Identity, Link, Refused
-from ..recordings.unit_conversion import reading
-from .flash import single
+from ..recordings.unit_conversion import flex_reading
+from .flash import as_float32
 
 REST_S = 0.4  # how long the rig is watched at rest
 BENT_M = 0.03  # a tip deflection at rest that is no drift of the sensor any more
@@ -60,7 +60,7 @@ def prepare(
     link.run(0.01)
     fault = Fault(link.newest["fault"])
     found = link.read_configuration()
-    differing = [name for name, value in stored.items() if found[name] != single(value)]
+    differing = [name for name, value in stored.items() if found[name] != as_float32(value)]
     out = [
         Finding(
             "declaration",
@@ -100,11 +100,13 @@ def prepare(
             )
             return out
     special = {
-        name: value for name, value in wanted.items() if single(value) != single(stored[name])
+        name: value
+        for name, value in wanted.items()
+        if as_float32(value) != as_float32(stored[name])
     }
     link.write_configuration(special, save=False)
     back = link.read_configuration()
-    wrong = [name for name, value in wanted.items() if back[name] != single(value)]
+    wrong = [name for name, value in wanted.items() if back[name] != as_float32(value)]
     if wrong:
         raise BoardError(
             f"{link.board.label}: read back other values than written: {', '.join(wrong)}"
@@ -126,7 +128,7 @@ def examine(link: Link, settings: dict[str, float], tip_m: Any) -> tuple[list[Fi
             f"{link.board.label}: {len(seen)} reports in {REST_S:g} s; expected some "
             f"{round(500 * REST_S)}"
         )
-    last, x = seen[-1], reading(seen["flex"])
+    last, x = seen[-1], flex_reading(seen["flex"])
     rest = Rest(float(x.mean()), float(x.std(ddof=1)), len(x))
     supply = seen["supply"] / 1000
     flags = np.bitwise_or.reduce(seen["flags"])

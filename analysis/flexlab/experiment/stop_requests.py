@@ -1,8 +1,7 @@
-"""The ways a person stops an experiment: the stop key, Ctrl-C, and the signals of a closing
-terminal. All set one flag.
+"""Ways in which a person stops an experiment: stop key, Ctrl-C, a closing terminal.
 
-A flag, not an exception: neither a frame nor a record is cut in the middle, and the motors are
-stopped in order.
+All set one flag. It is no exception, so that no frame and no record is cut, and the motors stop in
+order.
 """
 
 from __future__ import annotations
@@ -18,17 +17,18 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 KEYS = {b" ": "space", b"q": "q", b"\x1b": "Esc"}
-TOLD = "space, q or Esc stops the motors"
+KEYS_HELP = "space, q or Esc stops the motors"
 
 
-class Stop:
-    """`asked()` says how somebody asked to stop, or "" so far."""
+class StopRequest:
+    """Whether and how somebody asked to stop."""
 
     def __init__(self, stdin: int | None) -> None:
         self._stdin = stdin
         self._how = ""
 
     def signalled(self, number: int, _: Any) -> None:
+        """Handle a signal."""
         self._how = (
             "interrupted"
             if number == signal.SIGINT
@@ -36,6 +36,7 @@ class Stop:
         )
 
     def asked(self) -> str:
+        """How somebody asked to stop; "" if nobody did."""
         while (
             not self._how and self._stdin is not None and select.select([self._stdin], [], [], 0)[0]
         ):
@@ -48,15 +49,14 @@ class Stop:
 
 
 @contextmanager
-def stopping() -> Iterator[Stop]:
-    """While it lasts, keys are read as they are pressed, and SIGINT, SIGTERM and SIGHUP end nothing
-    by themselves."""
-    stop = Stop(sys.stdin.fileno() if sys.stdin is not None and sys.stdin.isatty() else None)
+def watch_for_stop() -> Iterator[StopRequest]:
+    """Read keys as they are pressed, and turn SIGINT, SIGTERM and SIGHUP into a stop request."""
+    stop = StopRequest(sys.stdin.fileno() if sys.stdin is not None and sys.stdin.isatty() else None)
     before = {
         s: signal.signal(s, stop.signalled) for s in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
     }
     try:
-        with _cbreak(stop._stdin):
+        with _single_keys(stop._stdin):
             yield stop
     finally:
         for number, handler in before.items():
@@ -64,7 +64,7 @@ def stopping() -> Iterator[Stop]:
 
 
 @contextmanager
-def _cbreak(stdin: int | None) -> Iterator[None]:
+def _single_keys(stdin: int | None) -> Iterator[None]:
     if stdin is None:
         yield
         return

@@ -1,5 +1,4 @@
-"""The experiment itself: arm, stream, start, watch, and the motors off at its end, whatever that
-is."""
+"""Execution of an experiment: arm, stream, start, watch, and motors off at its end."""
 
 from __future__ import annotations
 
@@ -15,14 +14,17 @@ from ..board.protocol.player import Knots, Player
 from ..board.protocol.session import Link, Refused
 from ..recordings.recording import Recording, RecordingError
 
-LOOK_S = 0.02  # how often the host looks at what came
-QUIET_S = 0.3  # how long it waits for the motors' stop to be acknowledged
+POLL_S = 0.02  # how often the host looks at what came
+STOP_TIMEOUT_S = 0.3  # how long it waits for the motors' stop to be acknowledged
 
 
 @dataclass(frozen=True)
-class Ended:
-    """How an experiment ended: `complete` if everything planned was done; `stopped` if the board
-    said that its outputs are off; `interrupted` if a person wanted it."""
+class StreamResult:
+    """How an experiment ended.
+
+    `complete`: everything planned was done. `stopped`: the board reported its outputs off.
+    `interrupted`: a person ended it.
+    """
 
     complete: bool
     text: str
@@ -37,22 +39,27 @@ def execute(
     settle_s: float,
     stop_asked: Callable[[], str],
     observe: Callable[[np.ndarray, float], None],
-) -> Ended:
-    """Play the knots and hold the last one for `settle_s`; returns how that ended, with the motors
-    told to stop.
+) -> StreamResult:
+    """Play the knots, hold the last one, and stop the motors.
 
-    `stop_asked()` says why to end early, or ""; `observe(reports, part)` gets the new reports and
-    which part of the time is over. What is wrong with line, board or disk ends the experiment and
-    is in the result, not raised.
+    Errors of line, board or disk end the experiment and are reported in the result, not raised.
+
+    Args:
+        link: the session with the board.
+        knots: the knots.
+        recording: receives the event of the end.
+        settle_s: how long the last knot is held [s].
+        stop_asked: returns why to end early, or "".
+        observe: called with new reports and the finished fraction.
     """
-    text, interrupted, wrong = "", False, None
+    text, interrupted, failure = "", False, None
     try:
         text, interrupted = _play(link, knots, settle_s, stop_asked, observe)
     except (BoardError, RecordingError) as error:
-        wrong = error
-    stopped = quiet(link)
-    if wrong is not None:
-        text = _behind(link, wrong)
+        failure = error
+    stopped = stop_motors(link)
+    if failure is not None:
+        text = _cause_of(link, failure)
     complete, text = text == "", text or "all done"
     if not stopped:
         text += "; no answer to the stop: the board stops by itself when it hears nothing"
@@ -64,7 +71,7 @@ def execute(
         )
     except RecordingError as error:
         complete, text = False, str(error)
-    return Ended(complete, text, stopped, interrupted)
+    return StreamResult(complete, text, stopped, interrupted)
 
 
 def _play(
@@ -74,13 +81,17 @@ def _play(
     stop_asked: Callable[[], str],
     observe: Callable[[np.ndarray, float], None],
 ) -> tuple[str, bool]:
-    """Why it ended, "" when everything was done, and whether a person wanted that."""
+    """Play the knots.
+
+    Returns:
+        Why it ended, "" if all is done; and whether a person asked for it.
+    """
     player = Player(link, knots)
     total = len(knots) * knots.period_s + settle_s
     player.start()
     begin, done_at = link.board.now(), None
     while True:
-        player.run(LOOK_S)
+        player.run(POLL_S)
         now = link.board.now()
         observe(link.telemetry(), min((now - begin) / total, 1.0))
         if reason := _reason(link):
@@ -94,7 +105,7 @@ def _play(
 
 
 def _reason(link: Link) -> str:
-    """Why the board does not run any more, if it does not."""
+    """Why the board no longer runs; "" if it runs."""
     if not link.alive:
         identity = link.identity
         return (
@@ -112,20 +123,23 @@ def _reason(link: Link) -> str:
     return ""
 
 
-def _behind(link: Link, wrong: Exception) -> str:
-    """What is behind an error: a board that refuses was reset or has a fault, and will say so."""
-    if isinstance(wrong, Refused) and not _reason(link):
+def _cause_of(link: Link, failure: Exception) -> str:
+    """The cause of an error: a board that refuses was reset or has a fault, and will report it."""
+    if isinstance(failure, Refused) and not _reason(link):
         with contextlib.suppress(BoardError, RecordingError):
             link.run(1.5 * ANNOUNCE_EVERY_TICKS / CONTROL_HZ)
-    return _reason(link) or str(wrong)
+    return _reason(link) or str(failure)
 
 
-def quiet(link: Link) -> bool:
-    """Tell the motors to stop; true when the board has acknowledged that, or was reset and has its
-    outputs off anyway."""
+def stop_motors(link: Link) -> bool:
+    """Stop the motors.
+
+    Returns:
+        Whether the board acknowledged it, or was reset and has its outputs off anyway.
+    """
     try:
         link.stop()
-        end = link.board.now() + QUIET_S
+        end = link.board.now() + STOP_TIMEOUT_S
         while not link.idle and link.board.now() < end and link.alive:
             link.run(0.005)
         return link.idle or not link.alive

@@ -1,2 +1,4 @@
-"""Identification: the figures of robot and rig from an experiment, with their intervals, judged on
-another experiment."""
+"""Identification: parameters of robot and rig from one experiment, with their intervals.
+
+A second experiment validates them.
+"""

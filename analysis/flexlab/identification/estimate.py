@@ -1,11 +1,11 @@
-"""Nonlinear least squares with confidence intervals that hold where residuals hang together.
+"""Nonlinear least squares with confidence intervals for autocorrelated residuals.
 
-    minimise sum r_t(p)^2,   cov p = H^-1 S H^-1,   H = J^T J,   S = sum_l w_l sum_t (g_t g_{t-l}^T
-    + transposed),  g_t = J_t r_t
+    minimise sum r_t(p)^2,   cov p = H^-1 S H^-1,   H = J^T J,   g_t = J_t r_t,
+    S = sum_l w_l sum_t (g_t g_{t-l}^T + transposed),   w_l = 1 - l/(m + 1)
 
-with w_l = 1 - l/(m + 1): Newey & West, Econometrica 55 (1987) 703. Residuals of a mechanical model
-are no white noise: what the model lacks rings as the strip does, so that m must span some periods.
-White residuals give back s^2 (J^T J)^-1.
+(Newey and West, Econometrica 55 (1987) 703.) Residuals of a mechanical model are not white: what
+the model lacks vibrates with the strip. The lag m must therefore span some periods. For white
+residuals the result is s^2 (J^T J)^-1.
 """
 
 from __future__ import annotations
@@ -19,9 +19,11 @@ NORMAL_95 = 1.959964
 
 
 @dataclass(frozen=True)
-class Unknown:
-    """One number to be found: where to begin, the step of its differences, its bounds. A `factor`
-    is found by its logarithm."""
+class Parameter:
+    """A number to estimate: start, step of the finite differences, bounds.
+
+    A `factor` is estimated by its logarithm.
+    """
 
     name: str
     start: float
@@ -29,117 +31,144 @@ class Unknown:
     bounds: tuple[float, float]
     factor: bool = True
 
-    def inner(self, value: float) -> float:
+    def to_scaled(self, value: float) -> float:
+        """The value as the solver sees it: the logarithm of a factor."""
         return float(np.log(value)) if self.factor else value
 
-    def outer(self, inner: float) -> float:
-        return float(np.exp(inner)) if self.factor else inner
+    def to_physical(self, scaled: float) -> float:
+        """The value in its unit, from the solver's."""
+        return float(np.exp(scaled)) if self.factor else scaled
 
 
 @dataclass(frozen=True)
-class Found:
-    """The values (k,) by name, the covariance (k, k) of the inner ones (logarithms of factors),
-    residuals by series (s, T) and their derivatives (k, s, T)."""
+class Estimate:
+    """Result of a fit with k parameters.
 
-    unknowns: tuple[Unknown, ...]
+    `values`: by name. `covariance` (k, k): of the scaled values. `residuals` (s, T): by series.
+    `derivatives` (k, s, T): of the residuals by the scaled values.
+    """
+
+    parameters: tuple[Parameter, ...]
     values: dict[str, float]
     covariance: np.ndarray
     residuals: np.ndarray
     derivatives: np.ndarray
     evaluations: int
 
-    def doubted(self, change: np.ndarray) -> Found:
-        """With the covariance that is due to a doubt about the model: `change` (s, T) of its
-        residuals is one standard deviation.
+    def with_model_uncertainty(self, change: np.ndarray) -> Estimate:
+        """Add the covariance due to an uncertainty of the model.
 
-        The shift of the inner values that such a change would cause, -(J^T J)^-1 J^T change, is
-        added as an error of its own.
+        The change of the residuals by one standard deviation shifts the scaled values by -(J^T
+        J)^-1 J^T change. This shift is added as an independent error.
+
+        Args:
+            change: change of the residuals (s, T).
         """
-        J = self.derivatives.reshape(len(self.unknowns), -1)
+        J = self.derivatives.reshape(len(self.parameters), -1)
         scale = np.linalg.norm(J, axis=1)
         shift, *_ = np.linalg.lstsq((J / scale[:, None]).T, -change.ravel(), rcond=None)
         shift /= scale
         return replace(self, covariance=self.covariance + np.outer(shift, shift))
 
     def deviation(self, name: str) -> float:
-        """Standard deviation of the inner value: of a factor relative to it."""
-        k = [u.name for u in self.unknowns].index(name)
+        """Standard deviation of the scaled value; of a factor, relative to it."""
+        k = [u.name for u in self.parameters].index(name)
         return float(np.sqrt(self.covariance[k, k]))
 
     def interval(self, name: str) -> tuple[float, float]:
-        """The 95 % interval."""
-        unknown = next(u for u in self.unknowns if u.name == name)
-        middle, wide = unknown.inner(self.values[name]), NORMAL_95 * self.deviation(name)
-        return unknown.outer(middle - wide), unknown.outer(middle + wide)
+        """The 95 % interval of a parameter."""
+        parameter = next(u for u in self.parameters if u.name == name)
+        middle, wide = parameter.to_scaled(self.values[name]), NORMAL_95 * self.deviation(name)
+        return parameter.to_physical(middle - wide), parameter.to_physical(middle + wide)
 
 
 def estimate(
     model: Callable[[dict[str, float]], np.ndarray],
-    unknowns: Sequence[Unknown],
-    memory: int,
-    together: dict[str, dict[str, float]] | None = None,
-    most: int = 12,
-) -> Found:
-    """Fit `model(values) -> residuals (s, T)` in units of their noise. `memory`: samples over which
-    they may hang together.
+    parameters: Sequence[Parameter],
+    correlation_samples: int,
+    directions: dict[str, dict[str, float]] | None = None,
+    max_steps: int = 12,
+) -> Estimate:
+    """Fit parameters by nonlinear least squares.
 
-    `together`: for a name, by how much others are moved with it when the derivatives are taken, per
-    unit of its inner value: where two unknowns do nearly the same, the difference between them
-    needs a step of its own, far longer than either alone may be. Ends where a step gains less than
-    1e-4 of the sum of squares, or after `most` steps.
+    Ends if a step gains less than 1e-4 of the sum of squares, or after `max_steps` steps.
+
+    Args:
+        model: returns residuals (s, T) in units of their noise, for values by name.
+        parameters: what is estimated.
+        correlation_samples: samples over which the residuals may be correlated.
+        directions: for a name, how much other parameters change with it in the finite differences,
+            per unit of its scaled value. If two parameters have nearly the same effect, the
+            difference between their effects needs a longer step.
+        max_steps: the largest number of steps.
     """
     from scipy.optimize import least_squares
 
     count = 0
 
-    def outer(inner: np.ndarray) -> dict[str, float]:
-        return {u.name: u.outer(x) for u, x in zip(unknowns, inner, strict=True)}
+    def physical(scaled: np.ndarray) -> dict[str, float]:
+        return {u.name: u.to_physical(x) for u, x in zip(parameters, scaled, strict=True)}
 
-    def residuals(inner: np.ndarray) -> np.ndarray:
+    def residuals(scaled: np.ndarray) -> np.ndarray:
         nonlocal count
         count += 1
-        return model(outer(inner))
+        return model(physical(scaled))
 
-    names = [u.name for u in unknowns]
-    along = np.diag([u.step for u in unknowns])  # (k, k), a row for each step
-    for name, others in (together or {}).items():
+    names = [u.name for u in parameters]
+    step_directions = np.diag([u.step for u in parameters])  # (k, k), a row for each step
+    for name, others in (directions or {}).items():
         for other, share in others.items():
-            along[names.index(name), names.index(other)] = (
-                share * along[names.index(name), names.index(name)]
+            step_directions[names.index(name), names.index(other)] = (
+                share * step_directions[names.index(name), names.index(name)]
             )
 
-    def differences(inner: np.ndarray) -> np.ndarray:
-        base = residuals(inner)
-        changes = np.array([residuals(inner + step) - base for step in along])
-        return np.linalg.solve(along, changes.reshape(len(along), -1)).reshape(changes.shape)
+    def jacobian(scaled: np.ndarray) -> np.ndarray:
+        base = residuals(scaled)
+        changes = np.array([residuals(scaled + step) - base for step in step_directions])
+        return np.linalg.solve(step_directions, changes.reshape(len(step_directions), -1)).reshape(
+            changes.shape
+        )
 
-    start = np.array([u.inner(u.start) for u in unknowns])
-    bounds = np.array([[u.inner(edge) for edge in u.bounds] for u in unknowns]).T
-    scale = np.array([u.step for u in unknowns])
-    found = least_squares(
+    start = np.array([u.to_scaled(u.start) for u in parameters])
+    bounds = np.array([[u.to_scaled(edge) for edge in u.bounds] for u in parameters]).T
+    scale = np.array([u.step for u in parameters])
+    solution = least_squares(
         lambda x: residuals(x).ravel(),
         start,
-        lambda x: differences(x).reshape(len(x), -1).T,
+        lambda x: jacobian(x).reshape(len(x), -1).T,
         tuple(bounds),
         x_scale=scale,
         ftol=1e-4,
         xtol=1e-7,
         gtol=1e-9,
-        max_nfev=most,
+        max_nfev=max_steps,
     )
-    last = residuals(found.x)
-    J = differences(found.x)  # (k, s, T)
-    return Found(tuple(unknowns), outer(found.x), covariance(J, last, memory), last, J, count)
+    final_residuals = residuals(solution.x)
+    J = jacobian(solution.x)  # (k, s, T)
+    return Estimate(
+        tuple(parameters),
+        physical(solution.x),
+        covariance(J, final_residuals, correlation_samples),
+        final_residuals,
+        J,
+        count,
+    )
 
 
-def covariance(J: np.ndarray, residuals: np.ndarray, memory: int) -> np.ndarray:
-    """The covariance (k, k) of the values, J (k, s, T), residuals (s, T)."""
+def covariance(J: np.ndarray, residuals: np.ndarray, correlation_samples: int) -> np.ndarray:
+    """Covariance (k, k) of the scaled values.
+
+    Args:
+        J: derivatives (k, s, T).
+        residuals: (s, T).
+        correlation_samples: the largest lag m.
+    """
     scores = (J * residuals).sum(axis=1)  # (k, T)
-    inside = scores @ scores.T
-    for lag in range(1, min(memory, scores.shape[1] - 1) + 1):
+    score_covariance = scores @ scores.T
+    for lag in range(1, min(correlation_samples, scores.shape[1] - 1) + 1):
         both = scores[:, lag:] @ scores[:, :-lag].T
-        inside += (1 - lag / (memory + 1)) * (both + both.T)
+        score_covariance += (1 - lag / (correlation_samples + 1)) * (both + both.T)
     scale = np.sqrt(np.einsum("ist,ist->i", J, J))
     A = J.reshape(len(J), -1) / scale[:, None]
-    bread = np.linalg.inv(A @ A.T) / np.outer(scale, scale)
-    return bread @ inside @ bread
+    inverse_normal = np.linalg.inv(A @ A.T) / np.outer(scale, scale)
+    return inverse_normal @ score_covariance @ inverse_normal

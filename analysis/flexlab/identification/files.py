@@ -1,5 +1,4 @@
-"""The files that an identification leaves: the robot, and the rig with the flex sensor's
-calibration."""
+"""Files of an identification: the robot, and the rig with the flex sensor's calibration."""
 
 from __future__ import annotations
 
@@ -19,23 +18,26 @@ from ..recordings.unit_conversion import ADC_V, Sensor
 from ..rig.description import Calibration, Rig
 from ..rig.plant.motor import resistance
 from .identify import Identified
-from .strip import changed
+from .strip import with_parameters
 
-POINTS = 400  # of the simulated course that the calibration is fitted to
+CALIBRATION_POINTS = 400  # of the simulated course that the calibration is fitted to
 
 
 def robot(found: Identified) -> fx.Robot:
-    """The robot with the stiffness, damping and payload that were found."""
-    return changed(found.nominal.robot, found.strip.values)
+    """The robot with the identified stiffness, damping and payload."""
+    return with_parameters(found.nominal.robot, found.strip.values)
 
 
-def rubbed(old: Rig, factor: float) -> dict[str, Any]:
-    """The rig file's tables with all friction of motor, screw and rail by one factor: voltage and
-    speed cannot tell them apart.
+def with_identified_friction(old: Rig, factor: float) -> dict[str, Any]:
+    """The rig file's tables with all friction of motor, screw and rail times one factor.
 
-    A motor with more friction takes more current without load and turns slower; its constant and
-    its gear stay what they are, I_0' = f I_0, n_0' = n_0 (U_0 - R I_0') / (U_0 - R I_0), M_s' = M_s
-    (I_s - I_0') / (I_s - I_0).
+    Voltage and speed cannot tell these frictions apart. A motor with more friction takes more
+    current without load and turns slower; its constant and gear stay the same: I_0' = f I_0, n_0' =
+    n_0 (U_0 - R I_0') / (U_0 - R I_0), M_s' = M_s (I_s - I_0') / (I_s - I_0).
+
+    Args:
+        old: the rig.
+        factor: f.
     """
     tables, motor = old.model_dump(mode="json", exclude_none=True), old.motor
     before, after = motor.no_load_current_A, factor * motor.no_load_current_A
@@ -59,9 +61,11 @@ def rubbed(old: Rig, factor: float) -> dict[str, Any]:
 
 
 def rig(found: Identified) -> Rig:
-    """The rig with the friction, play, holding torque and calibration that were found."""
+    """The rig with the identified friction, backlash, holding torque and calibration."""
     nominal, values = found.nominal, found.strip.values
-    tables = rubbed(nominal.rig, found.carriage.values["coulomb_N"] / nominal.line.coulomb_N)
+    tables = with_identified_friction(
+        nominal.rig, found.carriage.values["coulomb_N"] / nominal.line.coulomb_N
+    )
     tables["stepper"]["holding_torque_N_m"] *= values["holding"]
     tables["flex"]["ohm_per_rad"] *= values["flex_gain"]
     tables["flex"]["calibration"] = calibration(found).model_dump(exclude_none=True)
@@ -71,10 +75,10 @@ def rig(found: Identified) -> Rig:
 
 
 def calibration(found: Identified) -> Calibration:
-    """The firmware's cubic through the simulated course of reading and tip deflection: a
-    calibration without a ruler.
+    """The firmware's cubic fitted to simulated readings and tip deflections.
 
-    Its covariance is that of the gain: a strip that bends more under the same reading.
+    No ruler is needed. The covariance contains that of the gain: a strip that bends more under the
+    same reading.
     """
     data, values = found.data, found.strip.values
     run = data.simulate(values)
@@ -82,16 +86,20 @@ def calibration(found: Identified) -> Calibration:
         data.voltage(run, values | {"delay_s": 0.0}) / ADC_V,
         run["link/2/tip_deflection"],
     )
-    some = np.linspace(0, len(tips) - 1, POINTS).astype(int)
+    some = np.linspace(0, len(tips) - 1, CALIBRATION_POINTS).astype(int)
     fitted = flex_calibration.fit(readings[some], tips[some]).calibration
     c = np.array([0.0, fitted.c1_m, fitted.c2_m, fitted.c3_m])
     spread = np.array(fitted.covariance) + np.outer(c, c) * found.strip.deviation("flex_gain") ** 2
     return fitted.model_copy(update={"covariance": spread.tolist()})
 
 
-def described_anew(experiment: fx.Run, found: Identified) -> fx.Run:
-    """An experiment of this rig with the files that were found: its tip deflection is that of the
-    new calibration."""
+def with_identified_files(experiment: fx.Run, found: Identified) -> fx.Run:
+    """An experiment of this rig with the identified files; its tip deflection is recalibrated.
+
+    Args:
+        experiment: the run.
+        found: the identification.
+    """
     made = rig(found)
     assert made.flex.calibration is not None
     rest = experiment.meta.get("rest") or {"zero": made.flex.calibration.zero}
@@ -107,8 +115,19 @@ def described_anew(experiment: fx.Run, found: Identified) -> fx.Run:
 
 
 def save(found: Identified, experiment: fx.Run, path: Path) -> list[Path]:
-    """Write the robot file, and the rig file beside it (name-rig.toml). Raises InputError before
-    anything is written."""
+    """Write the robot file, and the rig file beside it (name-rig.toml).
+
+    Args:
+        found: the identification.
+        experiment: the run; its metadata name the rig's manoeuvre.
+        path: the robot file.
+
+    Returns:
+        Both paths.
+
+    Raises:
+        InputError: before anything is written, if the manoeuvre is missing.
+    """
     beside = path.with_name(f"{path.stem}-rig.toml")
     manoeuvre = Path(str(experiment.meta.get("rig_file", ""))).parent / found.nominal.rig.manoeuvre
     if not manoeuvre.is_file():

@@ -1,5 +1,4 @@
-"""What an identification comes to, as a table and for scripts; another experiment of the same rig
-to judge it by."""
+"""Results of an identification as a table and as JSON, and their validation."""
 
 from __future__ import annotations
 
@@ -13,16 +12,16 @@ from rich.table import Table
 import flexura as fx
 
 from ..comparison.measures import Comparison, compare
-from ..comparison.replay.simulate_experiment import simulate
+from ..comparison.replay.simulate_experiment import simulate_experiment
 from ..runs.labels import EMULATED, called, emulated
-from .estimate import Found
-from .files import described_anew
+from .estimate import Estimate
+from .files import with_identified_files
 from .identify import Identified
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """One figure: what the files say, what was found, its 95 % interval."""
+    """One parameter: nominal value, estimate, and 95 % interval, in `unit`."""
 
     name: str
     unit: str
@@ -33,13 +32,13 @@ class Quantity:
 
     @property
     def spread(self) -> float:
-        """Half the interval's width relative to the estimate."""
+        """Half the interval's width, relative to the estimate."""
         return (self.high - self.low) / 2 / abs(self.estimate)
 
 
 def quantities(found: Identified) -> list[Quantity]:
-    """The table's rows."""
-    nominal, more = found.nominal, found.nominal.more
+    """The rows of the table."""
+    nominal, more = found.nominal, found.nominal.emulated
     strip = nominal.robot.links[1]
     flex, stepper = nominal.rig.flex.ohm_per_rad, nominal.rig.stepper.holding_torque_N_m
     rows = [
@@ -75,20 +74,35 @@ def quantities(found: Identified) -> list[Quantity]:
     return out
 
 
-def _row(name: str, unit: str, found: Found, key: str, nominal: float, scale: float) -> Quantity:
+def _row(name: str, unit: str, found: Estimate, key: str, nominal: float, scale: float) -> Quantity:
     low, high = found.interval(key)
     return Quantity(name, unit, nominal, scale * found.values[key], scale * low, scale * high)
 
 
 def check(found: Identified, other: fx.Run, by: str = "commanded") -> tuple[Comparison, Comparison]:
-    """Another experiment of the same rig beside its simulation: by the files as they were, and by
-    what was found."""
-    anew = described_anew(other, found)
-    return compare(simulate(other, by), other), compare(simulate(anew, by), anew)
+    """Compare another experiment of the same rig with its simulation.
+
+    Args:
+        found: the identification.
+        other: the other experiment.
+        by: as in `simulate_experiment`.
+
+    Returns:
+        The comparison by the nominal files, and by the identified ones.
+    """
+    identified = with_identified_files(other, found)
+    return compare(simulate_experiment(other, by), other), compare(
+        simulate_experiment(identified, by), identified
+    )
 
 
 def table(found: Identified, experiment: fx.Run) -> Table:
-    """The table for the terminal."""
+    """The table for the terminal.
+
+    Args:
+        found: the identification.
+        experiment: the run that it used.
+    """
     out = Table(
         title=f"identified from: {called(experiment)}, {experiment.meta.get('label', '')}",
         title_justify="left",
@@ -120,7 +134,12 @@ def table(found: Identified, experiment: fx.Run) -> Table:
 
 
 def numbers(found: Identified, experiment: fx.Run) -> dict[str, Any]:
-    """For JSON."""
+    """The results for JSON.
+
+    Args:
+        found: the identification.
+        experiment: the run that it used.
+    """
     clean = lambda value: float(value) if math.isfinite(value) else None
     rows = {
         q.name: {"unit": q.unit}

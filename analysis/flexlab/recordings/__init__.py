@@ -1,1 +1,1 @@
-"""What was received: kept as it arrives, converted to SI units, made a Run."""
+"""Recordings: bytes as they arrive, their conversion to SI units, and the Run made of them."""

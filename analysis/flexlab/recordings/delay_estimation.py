@@ -1,5 +1,4 @@
-"""The time between a command and its response, estimated from both below a sample, and how sure
-that is."""
+"""The delay between a command and its response, to a fraction of a sample, with its uncertainty."""
 
 from __future__ import annotations
 
@@ -10,45 +9,51 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Delay:
-    """By how much the response lags [s], the standard deviation of that [s], and the correlation
-    that is left there (1 = the same shape)."""
+    """Lag of the response [s], its standard deviation [s], and the correlation at that lag."""
 
     seconds: float
     std: float
     correlation: float
 
 
-def delay(
-    t: np.ndarray, command: np.ndarray, response: np.ndarray, most_s: float = 0.5
+def estimate_delay(
+    t: np.ndarray, command: np.ndarray, response: np.ndarray, max_lag_s: float = 0.5
 ) -> Delay | None:
-    """Lag of `response` (T,) behind `command` (T,), both at (nearly) even times; None where nothing
-    moves.
+    """Lag of a response behind its command.
 
-    The peak of the normalised cross-correlation gives the lag to a sample, a parabola through it
-    and its neighbours a start, Gauss-Newton on  response(t) = a + b command(t - lag)  the rest. The
-    residual's variance over the slope's energy is the lag's variance; residuals that hang together
-    over n samples count as one.
+    The peak of the normalised cross-correlation gives the lag to a sample. A parabola through the
+    peak and its neighbours is the start of Gauss-Newton on response(t) = a + b command(t - lag).
+    The variance of the lag is the residual's variance over the slope's energy; n correlated
+    residuals count as one.
+
+    Args:
+        t: nearly even times (T,) [s].
+        command: values (T,), NaN if missing.
+        response: values (T,), NaN if missing.
+        max_lag_s: the largest lag [s].
+
+    Returns:
+        The delay, or None if nothing moves.
     """
-    there = np.isfinite(command) & np.isfinite(response)
-    if there.sum() < 32:
+    recorded = np.isfinite(command) & np.isfinite(response)
+    if recorded.sum() < 32:
         return None
-    first, last = np.flatnonzero(there)[[0, -1]]
+    first, last = np.flatnonzero(recorded)[[0, -1]]
     part = slice(first, last + 1)
-    t, there = t[part], there[part]
-    x, y = (
-        np.interp(t, t[there], values[part][there]) for values in (command, response)
-    )  # only to correlate, never stored
+    t, recorded = t[part], recorded[part]
+    # only to correlate, never stored
+    x, y = (np.interp(t, t[recorded], values[part][recorded]) for values in (command, response))
     spacing = float(t[-1] - t[0]) / (len(t) - 1)
     if x.std() < 1e-12 or y.std() < 1e-12:
         return None
-    most = min(round(most_s / spacing), len(t) // 2)
-    lags = np.arange(-most, most + 1)
+    max_lag = min(round(max_lag_s / spacing), len(t) // 2)
+    lags = np.arange(-max_lag, max_lag + 1)
     c = np.array([_correlation(x, y, int(k)) for k in lags])
     k = int(np.argmax(c))
     start = float(lags[k])
     if 0 < k < len(c) - 1 and (bend := c[k - 1] - 2 * c[k] + c[k + 1]) < 0:
         start += 0.5 * (c[k - 1] - c[k + 1]) / bend
-    return _refined(t, x, y, there, start * spacing)
+    return _refine(t, x, y, recorded, start * spacing)
 
 
 def _correlation(x: np.ndarray, y: np.ndarray, k: int) -> float:
@@ -58,40 +63,42 @@ def _correlation(x: np.ndarray, y: np.ndarray, k: int) -> float:
     return float(a @ b) / size if size > 0 else 0.0
 
 
-def _refined(
-    t: np.ndarray, x: np.ndarray, y: np.ndarray, there: np.ndarray, lag: float
+def _refine(
+    t: np.ndarray, x: np.ndarray, y: np.ndarray, recorded: np.ndarray, lag: float
 ) -> Delay | None:
     from scipy.interpolate import CubicSpline
 
-    course = CubicSpline(t, x)
+    command_spline = CubicSpline(t, x)
     spacing = float(t[-1] - t[0]) / (len(t) - 1)
     for _ in range(20):
-        use = there & (t - lag >= t[0]) & (t - lag <= t[-1])
-        if use.sum() < 16:
+        overlap = recorded & (t - lag >= t[0]) & (t - lag <= t[-1])
+        if overlap.sum() < 16:
             return None
-        shifted, slope = course(t[use] - lag), course(t[use] - lag, 1)
-        ones = np.ones(int(use.sum()))
-        gain = np.polyfit(shifted, y[use], 1)[0]
+        shifted, slope = command_spline(t[overlap] - lag), command_spline(t[overlap] - lag, 1)
+        ones = np.ones(int(overlap.sum()))
+        gain = np.polyfit(shifted, y[overlap], 1)[0]
         A = np.stack([ones, shifted, -gain * slope], axis=1)
-        solved, *_ = np.linalg.lstsq(A, y[use], rcond=None)
+        solved, *_ = np.linalg.lstsq(A, y[overlap], rcond=None)
         lag += float(np.clip(solved[2], -spacing, spacing))
         if abs(solved[2]) < 1e-3 * spacing:
             break
-    residual = y[use] - A @ solved
+    residual = y[overlap] - A @ solved
     count = len(residual)
-    free = max(count / _memory(residual) - 3, 1.0)
+    degrees_of_freedom = max(count / _correlated_samples(residual) - 3, 1.0)
     try:
-        spread = np.linalg.inv(A.T @ A / count)
+        inverse_normal = np.linalg.inv(A.T @ A / count)
     except np.linalg.LinAlgError:
         return None
-    variance = float(residual @ residual) / count * spread[2, 2] / free
-    fit = float(np.corrcoef(course(t[use] - lag), y[use])[0, 1])
+    variance = float(residual @ residual) / count * inverse_normal[2, 2] / degrees_of_freedom
+    fit = float(np.corrcoef(command_spline(t[overlap] - lag), y[overlap])[0, 1])
     return Delay(lag, float(np.sqrt(max(variance, 0.0))), fit)
 
 
-def _memory(residual: np.ndarray) -> float:
-    """Over how many samples the residual hangs together: 1 + 2 x its autocorrelation, summed to the
-    first change of sign."""
+def _correlated_samples(residual: np.ndarray) -> float:
+    """Number of samples over which the residual is correlated.
+
+    1 + 2 x its autocorrelation, summed to the first change of sign.
+    """
     e = residual - residual.mean()
     power = float(e @ e)
     if power == 0.0:

@@ -1,10 +1,9 @@
-"""The flex sensor's calibration: known tip deflections and the readings beside them, fitted by the
-firmware's cubic.
+"""Calibration of the flex sensor: the firmware's cubic fitted to known tip deflections.
 
-    w = c1 x + c2 x^2 + c3 x^3,  x = reading - zero        least squares in w, zero the root of the
-    fitted cubic
+    w = c1 x + c2 x^2 + c3 x^3,  x = reading - zero
 
-The covariance of zero, c1, c2 and c3 follows from the residuals' variance by the delta method.
+A cubic in the reading is fitted by least squares in w; zero is its root. The covariance of zero,
+c1, c2 and c3 follows from the residuals' variance by the delta method.
 """
 
 from __future__ import annotations
@@ -25,19 +24,18 @@ from ..board.protocol.declaration import CONFIG
 from ..board.protocol.session import Link
 from ..rig import Bench
 from ..rig.description import Calibration, tip_per_bend
-from ..rig.plant.rigid_plant import Drives
-from .unit_conversion import ADC_V, reading
+from ..rig.plant.rigid_plant import RigidPlant
+from .unit_conversion import ADC_V, flex_reading
 
-SETTLE_S, LOOK_S = 0.1, 0.4
-_UP = [float(w) for w in np.linspace(-0.02, 0.02, 9)]
-TIPS_M = tuple(_UP + _UP[-2::-1])  # held one after the other, there and back: an even drift cancels
-LEAST = 6  # points: four unknowns, and something left to judge them by
+SETTLE_S, SAMPLE_S = 0.1, 0.4
+_RISING = [float(w) for w in np.linspace(-0.02, 0.02, 9)]
+TIPS_M = tuple(_RISING + _RISING[-2::-1])  # there and back: a linear drift cancels
+MIN_POINTS = 6  # four unknowns, and some residuals
 
 
 @dataclass(frozen=True)
 class Fit:
-    """The calibration, with its covariance; `residual_m` is the standard deviation of what the
-    cubic leaves."""
+    """A calibration with its covariance, the points, and the residuals' standard deviation [m]."""
 
     calibration: Calibration
     readings: np.ndarray
@@ -46,17 +44,22 @@ class Fit:
 
 
 def fit(readings: np.ndarray, tips_m: np.ndarray) -> Fit:
-    """Least squares; readings (n,) are fractions of full scale, n at least 6. Raises InputError
-    where they tell nothing.
+    """Fit a calibration by least squares.
 
-    A highest term within two standard deviations of 0, or beyond what the board takes, is left out:
-    what the readings don't tell is not made up. Raises InputError too where the board would not
-    even take the straight line.
+    The highest term is left out if it is within two standard deviations of 0, or if the board does
+    not accept it.
+
+    Args:
+        readings: fractions of full scale (n,), n at least MIN_POINTS.
+        tips_m: tip deflections (n,) [m].
+
+    Raises:
+        InputError: too few different readings, or the board does not accept the straight line.
     """
     r, w = np.asarray(readings, dtype=float), np.asarray(tips_m, dtype=float)
-    if len(r) < LEAST or len(np.unique(r)) < LEAST:
+    if len(r) < MIN_POINTS or len(np.unique(r)) < MIN_POINTS:
         raise InputError(
-            f"expected at least {LEAST} deflections with as many different readings",
+            f"expected at least {MIN_POINTS} deflections with as many different readings",
             key="deflections",
             value=len(r),
         )
@@ -67,7 +70,7 @@ def fit(readings: np.ndarray, tips_m: np.ndarray) -> Fit:
             values[f"c{degree}_m"],
             np.array(found.calibration.covariance)[degree, degree],
         )
-        beyond = [name for name, value in values.items() if not _taken(name, value)]
+        beyond = [name for name, value in values.items() if not _within_board_range(name, value)]
         if not beyond and abs(highest) > 2 * np.sqrt(variance):
             return found
     if beyond:
@@ -80,7 +83,7 @@ def fit(readings: np.ndarray, tips_m: np.ndarray) -> Fit:
     return found
 
 
-def _taken(name: str, value: float) -> bool:
+def _within_board_range(name: str, value: float) -> bool:
     item = CONFIG[f"flex_{name}"]
     return item.least <= value <= item.greatest
 
@@ -89,18 +92,18 @@ def _fit(r: np.ndarray, w: np.ndarray, degree: int) -> Fit:
     centre, scale = r.mean(), np.ptp(r) / 2
     A = np.vander((r - centre) / scale, degree + 1, increasing=True)
     b, *_ = np.linalg.lstsq(A, w, rcond=None)
-    left = w - A @ b
-    variance = float(left @ left) / (len(r) - degree - 1)
-    spread = variance * np.linalg.inv(A.T @ A)
+    residual = w - A @ b
+    variance = float(residual @ residual) / (len(r) - degree - 1)
+    parameter_covariance = variance * np.linalg.inv(A.T @ A)
     jacobian = np.empty((4, degree + 1))
     for k in range(degree + 1):
         h = np.zeros(degree + 1)
         h[k] = 1e-6 * np.abs(b).max()
-        jacobian[:, k] = (_expanded(b + h, centre, scale) - _expanded(b - h, centre, scale)) / (
-            2 * h[k]
-        )
-    covariance = jacobian @ spread @ jacobian.T
-    zero, c1, c2, c3 = (float(v) for v in _expanded(b, centre, scale))
+        jacobian[:, k] = (
+            _expand_at_root(b + h, centre, scale) - _expand_at_root(b - h, centre, scale)
+        ) / (2 * h[k])
+    covariance = jacobian @ parameter_covariance @ jacobian.T
+    zero, c1, c2, c3 = (float(v) for v in _expand_at_root(b, centre, scale))
     rows = ((covariance + covariance.T) / 2).tolist()
     return Fit(
         Calibration(zero=zero, c1_m=c1, c2_m=c2, c3_m=c3, covariance=rows),
@@ -110,9 +113,12 @@ def _fit(r: np.ndarray, w: np.ndarray, degree: int) -> Fit:
     )
 
 
-def _expanded(b: np.ndarray, centre: float, scale: float) -> np.ndarray:
-    """(zero, c1, c2, c3) of the polynomial b in (r - centre) / scale: its root nearest to the
-    middle, its expansion there."""
+def _expand_at_root(b: np.ndarray, centre: float, scale: float) -> np.ndarray:
+    """Expand a polynomial b in (r - centre) / scale at its root nearest to the centre.
+
+    Returns:
+        (zero, c1, c2, c3).
+    """
     roots = np.roots(b[::-1])
     real = roots[np.abs(roots.imag) < 1e-9].real
     if not len(real):
@@ -128,25 +134,32 @@ def _expanded(b: np.ndarray, centre: float, scale: float) -> np.ndarray:
 def measure(
     link: Link, tips_m: tuple[float, ...], hold: Callable[[float], float]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(readings, deflections) of the strip held at each of `tips_m`; `hold(w)` holds it there and
-    says where it really is [m]."""
+    """Measure readings of the strip held at given deflections.
+
+    Args:
+        link: the session with the board.
+        tips_m: deflections to hold [m].
+        hold: holds the strip at a deflection and returns the actual one [m].
+
+    Returns:
+        Readings and actual deflections [m], (n,) each.
+    """
     link.connect()
-    readings, held = [], []
-    for asked in tips_m:
-        held.append(hold(asked))
+    readings, actual = [], []
+    for target in tips_m:
+        actual.append(hold(target))
         link.run(SETTLE_S)
         link.telemetry()
-        link.run(LOOK_S)
-        readings.append(float(reading(link.telemetry()["flex"]).mean()))
-    return np.array(readings), np.array(held)
+        link.run(SAMPLE_S)
+        readings.append(float(flex_reading(link.telemetry()["flex"]).mean()))
+    return np.array(readings), np.array(actual)
 
 
-class Held:
-    """An emulated rig whose strip is held deflected by a force at its tip (see
-    `board.emulated.Plant`): `tip_m` says how far.
+class DeflectedPlant:
+    """An emulated rig whose strip is held deflected by a force at its tip (`board.emulated.Plant`).
 
-    The sensor is the plant's own, with its noise, drift and nonlinearity, bent as the cantilever
-    is; `Drives` has none, and reads what the sensor's data say.
+    The sensor is the plant's own, with noise, drift and nonlinearity. A `RigidPlant` has none; its
+    sensor follows the data sheet. `tip_m` is the deflection [m].
     """
 
     def __init__(self, plant: Any, bench: Bench) -> None:
@@ -154,29 +167,37 @@ class Held:
         self.tip_m = 0.0
 
     def hold(self, tip_m: float) -> float:
+        """Hold the tip at a deflection [m]; returns it."""
         self.tip_m = tip_m
         return tip_m
 
     def advance(self, seconds: float, outputs: Outputs) -> Sensors:
+        """Advance the plant, its flex voltage replaced by that of the held strip."""
         sensors: Sensors = self._plant.advance(seconds, outputs)
         sensors.flex_V = self._voltage(self.tip_m / self._tip_per_bend)
         return sensors
 
     def _voltage(self, bend_rad: float) -> float:
-        if not isinstance(self._plant, Drives):
+        if not isinstance(self._plant, RigidPlant):
             return float(self._plant.flex.sample(bend_rad))
         ohm = self._flex.straight_ohm + self._flex.ohm_per_rad * bend_rad
         return ADC_V * self._flex.divider_ohm / (ohm + self._flex.divider_ohm)
 
 
 def write(found: Fit, path: Path) -> None:
-    """As a TOML file that `--calibration` takes, and whose content may stand in a rig file as
-    flex.calibration."""
+    """Write a calibration as a TOML file.
+
+    `--calibration` takes it; its content may stand in a rig file as flex.calibration.
+    """
     write_toml(path, found.calibration.model_dump(mode="json"))
 
 
 def read(path: Path) -> Calibration:
-    """A calibration file. Raises InputError, naming file, key, value and what was expected."""
+    """Read a calibration file.
+
+    Raises:
+        InputError: names file, key, value and what was expected.
+    """
     data = read_toml(path)
     try:
         return Calibration.model_validate(data)

@@ -1,10 +1,9 @@
-"""What arrives from the board, on disk before anybody looks at it: an append-only file of the bytes
-as they were on the line.
+"""A recording: bytes from the board, on disk before anything else is done with them.
 
-A recording is a folder: `session.json` is there before anything moves; `received.bin` grows with
-every read, unbuffered, so that a killed program loses nothing; `events.jsonl` has what the host saw
-and did, stamped with the board's tick. Frames carry their own ends and checksums, so a torn end is
-seen as such. `rebuild` makes the Run from these three and nothing else.
+A recording is a folder. `session.json` is written before anything moves. `received.bin` grows with
+every read, unbuffered, so that a killed program loses nothing. `events.jsonl` has what the host saw
+and did, with the board's tick. Frames carry their own ends and checksums, so that a torn end is
+recognised. `run_from_recording` makes the Run from these three files only.
 """
 
 from __future__ import annotations
@@ -25,14 +24,25 @@ SESSION, RECEIVED, EVENTS = "session.json", "received.bin", "events.jsonl"
 
 
 class RecordingError(FlexuraError):
-    """What arrives can't be kept: the disk is full, or gone."""
+    """Received bytes cannot be stored: the disk is full, or gone."""
 
 
 class Recording:
-    """The files of a recording under way, locked for this program; `failed` once one of them could
-    not be written."""
+    """The files of a recording in progress, locked for this program.
+
+    `failed` is set once a file cannot be written.
+    """
 
     def __init__(self, folder: Path, session: dict[str, Any]) -> None:
+        """Open a new recording.
+
+        Args:
+            folder: made if missing.
+            session: content of session.json.
+
+        Raises:
+            InputError: the folder holds a recording already.
+        """
         if (folder / SESSION).exists() or (folder / "run.parquet").exists():
             raise InputError(
                 "holds a recording already: expected a new folder", key="--out", value=str(folder)
@@ -41,26 +51,37 @@ class Recording:
         self.failed: RecordingError | None = None
         self._session = session
         folder.mkdir(parents=True, exist_ok=True)
-        self.know()
+        self.write_session()
         flags = os.O_CREAT | os.O_WRONLY | os.O_APPEND
-        self._received = os.open(folder / RECEIVED, flags, 0o644)
-        self._events = os.open(folder / EVENTS, flags, 0o644)
-        fcntl.flock(self._received, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        self._received_file = os.open(folder / RECEIVED, flags, 0o644)
+        self._events_file = os.open(folder / EVENTS, flags, 0o644)
+        fcntl.flock(self._received_file, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
-    def know(self, **more: Any) -> None:
-        """Put more into session.json; it is replaced as a whole."""
+    def write_session(self, **more: Any) -> None:
+        """Add entries to session.json, which is replaced as a whole."""
         self._session = self._session | more
         write_text(self.folder / SESSION, json.dumps(self._session, indent=1))
 
     def received(self, data: bytes) -> None:
-        """Append bytes as they came. Raises RecordingError once; later bytes are let go: the motors
-        must still be stopped."""
-        self._append(self._received, RECEIVED, data)
+        """Append bytes as they came.
+
+        Raises:
+            RecordingError: at the first failure; later bytes are dropped, so that the motors can be
+                stopped.
+        """
+        self._append(self._received_file, RECEIVED, data)
 
     def event(self, text: str, level: str = "INFO", tick: int | None = None, **more: Any) -> None:
-        """Append what happened; `tick` is the board's, None: before or after its reports."""
+        """Append an event.
+
+        Args:
+            text: what happened.
+            level: "INFO", "WARN" or "ERROR".
+            tick: the board's tick; None: before or after its reports.
+            more: further entries of the line.
+        """
         line = json.dumps({"text": text, "level": level, "tick": tick} | more)
-        self._append(self._events, EVENTS, line.encode() + b"\n")
+        self._append(self._events_file, EVENTS, line.encode() + b"\n")
 
     def _append(self, handle: int, name: str, data: bytes) -> None:
         if self.failed is not None and name == RECEIVED:
@@ -76,20 +97,18 @@ class Recording:
                 raise self.failed from None
 
     def close(self) -> None:
-        """To the disk itself, and unlocked. May be called twice."""
-        for handle in (self._received, self._events):
+        """Write to the disk itself and unlock. May be called twice."""
+        for handle in (self._received_file, self._events_file):
             if handle >= 0:
                 try:
                     os.fsync(handle)
-                except (
-                    OSError
-                ):  # a full disk was told when it was written to; a pipe has nothing to sync
+                except OSError:  # a full disk was reported by the write; a pipe has nothing to sync
                     pass
                 os.close(handle)
-        self._received = self._events = -1
+        self._received_file = self._events_file = -1
 
     def discard(self) -> None:
-        """Take the files away again: nothing moved, there is nothing to keep."""
+        """Remove the files: nothing moved."""
         self.close()
         for name in (SESSION, RECEIVED, EVENTS):
             (self.folder / name).unlink(missing_ok=True)
@@ -98,9 +117,8 @@ class Recording:
 
 
 @dataclass
-class Recorded:
-    """A board (see `board.base.Board`) whose bytes are in the recording before they are anywhere
-    else."""
+class RecordingBoard:
+    """A board (`board.base.Board`) whose received bytes are recorded before they are returned."""
 
     board: Board
     recording: Recording
@@ -109,29 +127,35 @@ class Recorded:
         self.label, self.emulated = self.board.label, self.board.emulated
 
     def read(self) -> bytes:
+        """Read from the board, and record what came."""
         data = self.board.read()
         if data:
             self.recording.received(data)
         return data
 
     def write(self, data: bytes) -> None:
+        """Write to the board."""
         self.board.write(data)
 
     def wait(self, seconds: float) -> None:
+        """Wait by the board's clock [s]."""
         self.board.wait(seconds)
 
     def now(self) -> float:
+        """The board's clock [s]."""
         return self.board.now()
 
     def reset(self) -> None:
+        """Reset the board."""
         self.board.reset()
 
     def close(self) -> None:
+        """Close the board."""
         self.board.close()
 
 
 @dataclass(frozen=True)
-class Kept:
+class StoredRecording:
     """A recording as read from its folder."""
 
     folder: Path
@@ -140,9 +164,12 @@ class Kept:
     events: list[dict[str, Any]]
 
 
-def read(folder: str | Path) -> Kept:
-    """Read a recording's folder; a last line that was not finished is left out. Raises InputError
-    where there is none."""
+def read(folder: str | Path) -> StoredRecording:
+    """Read a recording's folder; an unfinished last line of events is left out.
+
+    Raises:
+        InputError: there is no recording, or it is damaged.
+    """
     path = Path(folder)
     try:
         session = json.loads((path / SESSION).read_text(encoding="utf-8"))
@@ -157,12 +184,11 @@ def read(folder: str | Path) -> Kept:
         raise InputError(f"a damaged recording ({error})", file=str(folder)) from None
     if not isinstance(session, dict):
         raise InputError(f"a damaged recording: {SESSION} is not a table", file=str(folder))
-    return Kept(path, session, received, events)
+    return StoredRecording(path, session, received, events)
 
 
 def unfinished(logs: Path) -> list[Path]:
-    """Folders in `logs` with a recording of which no Run was made, and that no program is
-    writing."""
+    """Folders in `logs` with a recording that has no Run and that no program is writing."""
     found = []
     for session in sorted(logs.glob(f"*/{SESSION}")):
         folder = session.parent

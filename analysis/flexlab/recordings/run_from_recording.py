@@ -1,5 +1,4 @@
-"""The Run of a recording: from the bytes that were received and from what the host noted, and from
-nothing else.
+"""The Run of a recording, from the received bytes and the host's notes only.
 
 The same function ends every experiment and recovers one whose host was killed.
 """
@@ -21,12 +20,12 @@ from ..board.protocol.player import Knots
 from ..rig.description import Calibration
 from ..runs.poses import with_poses
 from . import recording
-from .delay_estimation import delay
-from .unit_conversion import UNITS, Sensor, channels, start_tick
+from .delay_estimation import estimate_delay
+from .unit_conversion import UNITS, Sensor, channels_of_reports, start_tick
 
 TICK = slice(messages.HEAD_BYTES, messages.HEAD_BYTES + 4)  # the first field of a report
-UNTOLD = "the host ended without a word; rebuilt from what had been received"
-_FOLLOWED = {  # what a channel follows
+UNEXPLAINED = "the host ended without a word; rebuilt from what had been received"
+_COMMAND_OF = {  # what a channel follows
     Mode.position: {
         "joint/1/position": "joint/1/reference",
         "joint/2/position": "joint/2/reference",
@@ -35,31 +34,41 @@ _FOLLOWED = {  # what a channel follows
 }
 
 
-def rebuild(folder: str | Path) -> fx.Run:
-    """Read a recording and make its Run. Raises InputError where there is no recording or nothing
-    was received in it."""
-    kept = recording.read(folder)
-    session = kept.session
+def run_from_recording(folder: str | Path) -> fx.Run:
+    """Read a recording and make its Run.
+
+    Args:
+        folder: the recording.
+
+    Raises:
+        InputError: there is no recording, or no report in it.
+    """
+    stored = recording.read(folder)
+    session = stored.session
     knots = knots_from(session["knots"])
     settings, rest = session["settings"], session.get("rest")
     deframer = Deframer()
-    reports, numbers = _reports(deframer.feed(kept.received))
+    reports, numbers = _reports(deframer.feed(stored.received))
     if not len(reports):
         raise fx.InputError(
             "no report of the board was received in this recording", file=str(folder)
         )
     calibration = Calibration.model_validate(session["calibration"])
     sensor = Sensor(calibration, **rest) if rest else Sensor(calibration, calibration.zero)
-    begun = start_tick(reports, knots, settings)
-    start, unsure_s = begun if begun is not None else (float(reports["tick"][0]), 0.0)
-    during = _during(reports, start)
-    reports = reports[during]
-    ticks, values = channels(reports, knots.mode, settings, sensor, numbers[during])
+    start_found = start_tick(reports, knots, settings)
+    start, uncertainty_s = (
+        start_found if start_found is not None else (float(reports["tick"][0]), 0.0)
+    )
+    within = _within(reports, start)
+    reports = reports[within]
+    ticks, values = channels_of_reports(reports, knots.mode, settings, sensor, numbers[within])
     t = (ticks - start) / CONTROL_HZ
     missing = len(t) - len(reports)
-    ended = [event for event in kept.events if event.get("ended")]
-    events = _told(kept.events, start, float(t[-1])) + _seen(reports, start)
-    if begun is None:
+    end_events = [event for event in stored.events if event.get("ended")]
+    events = _events_from_host(stored.events, start, float(t[-1])) + _events_from_board(
+        reports, start
+    )
+    if start_found is None:
         events.append({"t": 0.0, "text": "nothing was moved", "level": "WARN"})
     if missing:
         events.append(
@@ -69,18 +78,18 @@ def rebuild(folder: str | Path) -> fx.Run:
                 "level": "WARN",
             }
         )
-    if not ended:
-        events.append({"t": float(t[-1]), "text": UNTOLD, "level": "ERROR"})
+    if not end_events:
+        events.append({"t": float(t[-1]), "text": UNEXPLAINED, "level": "ERROR"})
     meta = {key: value for key, value in session.items() if key != "settings"} | {
-        "complete": bool(ended and ended[-1]["complete"]),
+        "complete": bool(end_events and end_events[-1]["complete"]),
         "events": sorted(events, key=lambda event: event["t"]),
         "settings": settings,
-        "start_uncertainty_s": unsure_s,
+        "start_uncertainty_s": uncertainty_s,
         "line": {
             "reports": len(reports),
             "missing": missing,
             "bad_frames": deframer.bad,
-            "bytes": len(kept.received),
+            "bytes": len(stored.received),
         },
         "tip_deflection_std": "noise, resolution, zero"
         + (", calibration" if calibration.covariance else "; calibration unknown"),
@@ -91,6 +100,7 @@ def rebuild(folder: str | Path) -> fx.Run:
 
 
 def knots_from(spec: dict[str, Any]) -> Knots:
+    """Knots from their table in session.json."""
     return Knots(
         Mode(spec["mode"]),
         spec["period_log2"],
@@ -99,16 +109,16 @@ def knots_from(spec: dict[str, Any]) -> Knots:
 
 
 def knots_spec(knots: Knots) -> dict[str, Any]:
+    """Knots as a table for session.json."""
     columns = {name: np.asarray(values).tolist() for name, values in knots.columns.items()}
     return {"mode": int(knots.mode), "period_log2": knots.period_log2, "columns": columns}
 
 
 def _reports(payloads: list[bytes]) -> tuple[np.ndarray, np.ndarray]:
-    """The reports, and their numbers, of the session in which the board ran; of the last one, if it
-    ran in none.
+    """The reports, and their numbers, of the session in which the board ran, else of the last one.
 
-    The board introduces itself at the beginning of each session and after each reset, and counts
-    its reports anew; where that was lost, a tick that is no later than the last tells of a reset.
+    The board introduces itself at the start of each session and after each reset, and counts its
+    reports anew. If that message is lost, a tick that does not increase tells of a reset.
     """
     code, size = MESSAGES["telemetry"].code, messages.HEAD_BYTES + messages.TELEMETRY.itemsize
     sessions: list[list[bytes]] = [[]]
@@ -124,26 +134,30 @@ def _reports(payloads: list[bytes]) -> tuple[np.ndarray, np.ndarray]:
             sessions.append([])
             last = -1
     found = [
-        (messages.reports([messages.body(p) for p in kept]), kept) for kept in sessions if kept
+        (messages.reports([messages.body(p) for p in stored]), stored)
+        for stored in sessions
+        if stored
     ]
     if not found:
         return messages.reports([]), np.zeros(0, dtype=np.int64)
-    reports, kept = next(
+    reports, stored = next(
         (pair for pair in reversed(found) if (pair[0]["state"] == State.running).any()), found[-1]
     )
-    return reports, np.array([p[1] | p[2] << 8 for p in kept], dtype=np.int64)
+    return reports, np.array([p[1] | p[2] << 8 for p in stored], dtype=np.int64)
 
 
-def _during(reports: np.ndarray, start: float) -> slice:
-    """From the start on; to the end where the board had a fault, else as long as it ran."""
+def _within(reports: np.ndarray, start: float) -> slice:
+    """Reports from the start on: to the end if the board had a fault, else while it ran."""
     first = int(np.searchsorted(reports["tick"].astype(np.int64), start))
     running = np.flatnonzero(reports["state"] == State.running)
     faulted = (reports["state"][first:] == State.fault).any()
     return slice(first, len(reports) if faulted or not len(running) else int(running[-1]) + 1)
 
 
-def _told(events: list[dict[str, Any]], start: float, end: float) -> list[dict[str, Any]]:
-    """The host's events in the run's time; those without a tick at its ends."""
+def _events_from_host(
+    events: list[dict[str, Any]], start: float, end: float
+) -> list[dict[str, Any]]:
+    """The host's events in the run's time; those without a tick at its end."""
     return [
         {
             "t": end if e.get("tick") is None else max((e["tick"] - start) / CONTROL_HZ, 0.0),
@@ -154,8 +168,8 @@ def _told(events: list[dict[str, Any]], start: float, end: float) -> list[dict[s
     ]
 
 
-def _seen(reports: np.ndarray, start: float) -> list[dict[str, Any]]:
-    """A fault, as the board's own reports tell it."""
+def _events_from_board(reports: np.ndarray, start: float) -> list[dict[str, Any]]:
+    """A fault, from the board's own reports."""
     faulted = reports[reports["state"] == State.fault]
     if not len(faulted):
         return []
@@ -167,7 +181,7 @@ def _seen(reports: np.ndarray, start: float) -> list[dict[str, Any]]:
 
 
 def _with_tip(run: fx.Run) -> fx.Run:
-    """The tip in the base frame from the joints' encoders and the flex sensor."""
+    """Add the tip in the base frame, from the joints' encoders and the flex sensor."""
     placed, _ = with_poses(run)
     names = ("tip/x", "tip/y")
     return dataclasses.replace(
@@ -178,10 +192,10 @@ def _with_tip(run: fx.Run) -> fx.Run:
 
 
 def _delays(run: fx.Run, mode: Mode) -> dict[str, Any]:
-    """By how much each channel lags behind what it follows."""
+    """The delay of each channel behind what it follows."""
     out = {}
-    for channel, command in _FOLLOWED[mode].items():
-        if found := delay(run.t, run[command], run[channel]):
+    for channel, command in _COMMAND_OF[mode].items():
+        if found := estimate_delay(run.t, run[command], run[channel]):
             out[channel] = {
                 "behind": command,
                 **{key: float(value) for key, value in vars(found).items()},

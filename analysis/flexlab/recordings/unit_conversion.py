@@ -1,8 +1,8 @@
-"""From what the board reports to physical quantities, each with the conversion written beside it.
+"""Conversion of the board's reports to physical quantities.
 
-    d1 = counts / motor_counts_per_m         theta2 = counts / stepper_counts_per_rad     pulses =
-    steps / stepper_steps_per_rad r = sum of the conversions / (adc_samples 1024)       w = c1 x +
-    c2 x^2 + c3 x^3,  x = r - zero
+    d1 = counts / motor_counts_per_m           theta2 = counts / stepper_counts_per_rad
+    pulses = steps / stepper_steps_per_rad     r = sum of the conversions / (adc_samples 1024)
+    w = c1 x + c2 x^2 + c3 x^3,  x = r - zero
 
 A report that did not arrive is NaN in every channel, and so is what depends on it.
 """
@@ -18,9 +18,8 @@ from ..board.protocol.player import FRACTION, Knots
 from ..rig.description import Calibration
 
 ADC_COUNTS, ADC_V = 1024, 5.0
-SMOOTH = (
-    21  # reports in the window of the velocity's local cubic: -3 dB at some 36 Hz, no phase lag
-)
+# reports in the window of the velocity's local cubic: -3 dB at some 36 Hz, no phase lag
+VELOCITY_WINDOW = 21
 UNITS = {
     "joint/1/position": "m",
     "joint/2/position": "rad",
@@ -38,8 +37,11 @@ UNITS = {
 
 @dataclass(frozen=True)
 class Sensor:
-    """The flex sensor as calibrated: `zero` is the straight strip's reading today, the mean of so
-    many `reports`, `noise` the standard deviation of one."""
+    """The calibrated flex sensor.
+
+    `zero`: today's reading of the straight strip, the mean of `reports` reports. `noise`: standard
+    deviation of one report.
+    """
 
     calibration: Calibration
     zero: float
@@ -52,11 +54,11 @@ class Sensor:
         return ((c.c3_m * x + c.c2_m) * x + c.c1_m) * x
 
     def tip_std(self, r: np.ndarray) -> np.ndarray:
-        """Its standard deviation [m] by propagation: noise and resolution of the reading, of the
-        zero, and the calibration's own.
+        """Standard deviation of the tip deflection [m], by propagation of errors.
 
-        var w = (dw/dx)^2 (var r + var zero) + a C a^T with a = (x, x^2, x^3), C the covariance of
-        c1, c2, c3; a calibration without a covariance adds nothing, which the run's metadata say.
+        var w = (dw/dx)^2 (var r + var zero) + a C a^T with a = (x, x^2, x^3) and C the covariance
+        of c1, c2, c3. Noise and resolution make var r and var zero. Without a covariance of the
+        calibration, C is 0; the run's metadata say so.
         """
         c, x = self.calibration, np.asarray(r) - self.zero
         slope = (3 * c.c3_m * x + 2 * c.c2_m) * x + c.c1_m
@@ -70,43 +72,59 @@ class Sensor:
         return np.sqrt(variance)
 
 
-def reading(flex: np.ndarray) -> np.ndarray:
+def flex_reading(flex: np.ndarray) -> np.ndarray:
     """Fraction of full scale from the sum of a tick's conversions."""
     return np.asarray(flex, dtype=float) / (ADC_SAMPLES * ADC_COUNTS)
 
 
-def rows(reports: np.ndarray, numbers: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """(ticks of all reports that the board made (T,), which of them arrived (n,)), by the reports'
-    `numbers` (n,), modulo 2^16.
+def ticks_of_reports(
+    reports: np.ndarray, numbers: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Ticks of all reports that the board made, and which of them arrived.
 
-    A report that did not arrive is given a tick evenly between its neighbours'. Without numbers all
-    are taken to have arrived.
+    A missing report gets a tick evenly between its neighbours.
+
+    Args:
+        reports: the reports that arrived (n,).
+        numbers: their numbers (n,), modulo 2^16; None: all arrived.
+
+    Returns:
+        Ticks (T,) and indices (n,) of the reports that arrived.
     """
     ticks = reports["tick"].astype(float)
     if numbers is None or len(numbers) < 2:
         return ticks, np.arange(len(ticks))
     ahead = np.maximum(np.mod(np.diff(numbers), 1 << 16), 1)
-    ahead = np.minimum(ahead, np.maximum(np.diff(ticks), 1)).astype(
-        int
-    )  # no more reports than ticks: the count began anew
-    place = np.concatenate([[0], np.cumsum(ahead)])
-    return np.interp(np.arange(place[-1] + 1), place, ticks), place
+    # no more reports than ticks: the board counts anew
+    ahead = np.minimum(ahead, np.maximum(np.diff(ticks), 1)).astype(int)
+    arrived = np.concatenate([[0], np.cumsum(ahead)])
+    return np.interp(np.arange(arrived[-1] + 1), arrived, ticks), arrived
 
 
-def channels(
+def channels_of_reports(
     reports: np.ndarray,
     mode: Mode,
     settings: dict[str, float],
     sensor: Sensor,
     numbers: np.ndarray | None = None,
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Ticks (T,) and the channels of UNITS (T,) of one session's reports, which ascend in time;
-    `numbers` as in `rows`."""
-    ticks, place = rows(reports, numbers)
+    """The channels of one session's reports.
 
-    def spread(values: np.ndarray) -> np.ndarray:
+    Args:
+        reports: the reports (n,), ascending in time.
+        mode: the mode of the experiment.
+        settings: the board's settings, by name.
+        sensor: the calibrated flex sensor.
+        numbers: the reports' numbers, as in `ticks_of_reports`.
+
+    Returns:
+        Ticks (T,), and the channels of UNITS, (T,) each.
+    """
+    ticks, arrived = ticks_of_reports(reports, numbers)
+
+    def at_ticks(values: np.ndarray) -> np.ndarray:
         out = np.full(len(ticks), np.nan)
-        out[place] = values
+        out[arrived] = values
         return out
 
     per_m, per_rad, per_step = (
@@ -115,25 +133,25 @@ def channels(
     )
     half_V = settings["supply_divider"] * ADC_V / ADC_COUNTS / 2  # a conversion rounds down
     tracked = (reports["state"] == State.running) & (mode is Mode.position)
-    r = reading(reports["flex"])
+    r = flex_reading(reports["flex"])
     out = {
-        "joint/1/position": spread(reports["position_1"] / per_m),
-        "joint/2/position": spread(reports["position_2"] / per_rad),
-        "joint/1/reference": spread(
+        "joint/1/position": at_ticks(reports["position_1"] / per_m),
+        "joint/2/position": at_ticks(reports["position_2"] / per_rad),
+        "joint/1/reference": at_ticks(
             np.where(tracked, reports["setpoint_1"] / (FRACTION * per_m), np.nan)
         ),
-        "joint/2/reference": spread(
+        "joint/2/reference": at_ticks(
             np.where(tracked, reports["setpoint_2"] / (FRACTION * per_step), np.nan)
         ),
-        # the board's figure is its duty times the supply it was told of; the motor gets the duty of
-        # the supply there is
-        "joint/1/voltage": spread(
+        # the board reports duty times the supply in its settings; the motor gets duty times the
+        # actual supply
+        "joint/1/voltage": at_ticks(
             reports["voltage"] / 1000 * ((reports["supply"] / 1000 + half_V) / settings["supply_V"])
         ),
-        "joint/2/pulses": spread(reports["steps"] / per_step),
-        "link/2/tip_deflection": spread(sensor.tip(r)),
-        "link/2/tip_deflection_std": spread(sensor.tip_std(r)),
-        "link/2/flex_voltage": spread(ADC_V * r),
+        "joint/2/pulses": at_ticks(reports["steps"] / per_step),
+        "link/2/tip_deflection": at_ticks(sensor.tip(r)),
+        "link/2/tip_deflection_std": at_ticks(sensor.tip_std(r)),
+        "link/2/flex_voltage": at_ticks(ADC_V * r),
     }
     for number in (1, 2):
         out[f"joint/{number}/velocity"] = velocity(
@@ -142,17 +160,24 @@ def channels(
     return ticks, {name: out[name] for name in UNITS}
 
 
-def velocity(t: np.ndarray, position: np.ndarray, samples: int = SMOOTH) -> np.ndarray:
-    """Derivative at t (T,) of the cubic that fits `samples` (odd) values about each, least squares.
+def velocity(t: np.ndarray, position: np.ndarray, samples: int = VELOCITY_WINDOW) -> np.ndarray:
+    """Velocity by a local cubic: Savitzky-Golay filter, Anal. Chem. 36 (1964) 1627.
 
-    Where the times are even this is the filter of Savitzky and Golay, Anal. Chem. 36 (1964) 1627.
-    Ends and the sides of a gap use the nearest full window; pieces shorter than that have no
+    Ends and the sides of a gap use the nearest full window. Pieces shorter than a window have no
     velocity (NaN).
+
+    Args:
+        t: times (T,) [s].
+        position: positions (T,), NaN if missing.
+        samples: length of the window, an odd number.
+
+    Returns:
+        Velocities (T,).
     """
     out = np.full(len(position), np.nan)
-    there = np.flatnonzero(np.isfinite(position))
+    present = np.flatnonzero(np.isfinite(position))
     half = samples // 2
-    for piece in np.split(there, np.flatnonzero(np.diff(there) > 1) + 1):
+    for piece in np.split(present, np.flatnonzero(np.diff(present) > 1) + 1):
         if len(piece) < samples:
             continue
         at, y = t[piece], position[piece]
@@ -169,12 +194,18 @@ def velocity(t: np.ndarray, position: np.ndarray, samples: int = SMOOTH) -> np.n
     return out
 
 
-def commanded(knots: Knots, settings: dict[str, float]) -> np.ndarray:
-    """What the board makes of the knots in each tick after the start, (K, 2) in the units of the
-    reports' set-points.
+def planned_setpoints(knots: Knots, settings: dict[str, float]) -> np.ndarray:
+    """The set-points that the board makes of the knots in each tick after the start.
 
     Position: cubics through the knots, then the set-point filter y += a (x - y). Open loop: each
     knot holds for a period.
+
+    Args:
+        knots: the knots.
+        settings: the board's settings, by name.
+
+    Returns:
+        (K, 2) in the units of the reports' set-points.
     """
     period = 2**knots.period_log2
     if knots.mode is Mode.open_loop:
@@ -208,19 +239,22 @@ def commanded(knots: Knots, settings: dict[str, float]) -> np.ndarray:
 def start_tick(
     reports: np.ndarray, knots: Knots, settings: dict[str, float]
 ) -> tuple[float, float] | None:
-    """The tick of t = 0 and how far it may be wrong [s]; None when the board never ran.
+    """The tick of t = 0.
 
     Reports are some ticks apart, so that the first report of Running leaves a choice; the
-    set-points in the reports decide it. Drives that hold for a period of knots may leave two ticks
-    that fit alike: then it is half a tick from both.
+    set-points decide it. Drives that hold for a period may leave two ticks that fit alike; the
+    result is then half a tick from both.
+
+    Returns:
+        The tick and its uncertainty [s]; None if the board never ran.
     """
     running = np.flatnonzero(reports["state"] == State.running)
     if not len(running):
         return None
     first = running[0]
-    latest = int(reports["tick"][first])  # told before the first tick of it was over
+    latest = int(reports["tick"][first])  # reported before its first tick was over
     earliest = int(reports["tick"][first - 1]) if first else latest - 2
-    course = commanded(knots, settings)
+    course = planned_setpoints(knots, settings)
     seen = reports[running]
     said = np.stack([seen["setpoint_1"], seen["setpoint_2"]], axis=1).astype(float)
     scale = np.abs(course).max(axis=0) + 1.0

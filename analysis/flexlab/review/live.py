@@ -34,7 +34,7 @@ from flexura.errors import InputError
 
 from ..board.protocol.declaration import CONTROL_HZ, State
 from ..experiment.plan import Plan
-from ..recordings.unit_conversion import UNITS, Sensor, channels
+from ..recordings.unit_conversion import UNITS, Sensor, channels_of_reports
 from ..runs.poses import with_poses
 from .writer import times
 
@@ -149,7 +149,7 @@ def _write(
             start = int(running[0]) if len(running) else None
         if start is None:
             continue
-        ticks, values = channels(reports, plan.knots.mode, plan.settings, sensor)
+        ticks, values = channels_of_reports(reports, plan.knots.mode, plan.settings, sensor)
         index = times((ticks - start) / CONTROL_HZ, ticks - start)
         for names in PLOTS.values():
             for name in names:

@@ -102,7 +102,9 @@ def _deviations(shown: list[Source]) -> list[str]:
 def _experiment(found: Comparison) -> list[str]:
     """The table of `flexura compare`, and its notes."""
     lines = "\n".join(f"- {note}" for note in table.notes(found))
-    head = "### Simulation against experiment" + (f", {found.law}" if found.law else "")
+    head = "### Simulation against experiment" + (
+        f", {found.experiment_kind}" if found.experiment_kind else ""
+    )
     heads = ("", *table.HEADS[1:])
     return [head, _table(heads, table.rows(found)), lines]
 

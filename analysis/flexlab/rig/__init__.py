@@ -1,18 +1,17 @@
-"""The rig: its file, the board's settings that follow from it, and whether it can do what it is
-asked to do."""
+"""The rig: its file, the board's settings that follow from it, and checks of its capability."""
 
-from .checks import Check, examine
+from .checks import Check, check_capability
 from .description import Bench, Rig, calibration, configuration, load
-from .emulation import Truth, random_truth
+from .emulation import TrueParameters, random_true_parameters
 
 __all__ = [
     "Bench",
     "Check",
     "Rig",
-    "Truth",
+    "TrueParameters",
     "calibration",
+    "check_capability",
     "configuration",
-    "examine",
     "load",
-    "random_truth",
+    "random_true_parameters",
 ]

@@ -1,4 +1,4 @@
-"""Can this rig do what it is asked to do? The arithmetic that tells, before anything moves.
+"""Can this rig do what it is asked to do? The arithmetic, before anything moves.
 
 A 251 rpm motor on a screw of 8 mm lead makes 33 mm/s; d1 = 0.012 m at 1 Hz takes 75 mm/s.
 """
@@ -20,19 +20,18 @@ EDGE_RATE_MAX_1_S = 20000.0  # encoder edges of both encoders together that the 
 
 @dataclass(frozen=True)
 class Check:
-    """One comparison: `needed` against `available`, in words."""
+    """One check: what was found and what was expected, in words, and what to do if they differ."""
 
     what: str
     passed: bool
-    needed: str
-    available: str
+    found: str
+    expected: str
     advice: str = ""
 
 
 @dataclass(frozen=True)
 class Peaks:
-    """The largest position (both ways), speed and acceleration that a motion asks of a joint, in m
-    or rad and s."""
+    """The largest position (both ways), speed and acceleration of a joint's motion, in m or rad."""
 
     lowest: float
     highest: float
@@ -41,7 +40,12 @@ class Peaks:
 
 
 def peaks(motion: fx.Signal, duration_s: float) -> Peaks:
-    """Sampled 2000 times, and at the signal's own breaks."""
+    """Extremes of a motion, sampled 2000 times and at the signal's own breaks.
+
+    Args:
+        motion: the joint's position over time [m or rad].
+        duration_s: end of the motion [s].
+    """
     t = np.union1d(
         np.linspace(0.0, duration_s, 2001),
         motion.breaks[(motion.breaks >= 0) & (motion.breaks <= duration_s)],
@@ -50,27 +54,37 @@ def peaks(motion: fx.Signal, duration_s: float) -> Peaks:
     return Peaks(float(r.min()), float(r.max()), float(np.abs(v).max()), float(np.abs(a).max()))
 
 
-def examine(bench: Bench, manoeuvre: fx.Manoeuvre | None = None) -> list[Check]:
-    """All checks of a bench against what it is to follow (the rig file's own manoeuvre, if no other
-    is given)."""
+def check_capability(bench: Bench, manoeuvre: fx.Manoeuvre | None = None) -> list[Check]:
+    """Check whether a rig can follow a manoeuvre.
+
+    Args:
+        bench: the rig.
+        manoeuvre: by default that of the rig file.
+
+    Returns:
+        One check for each requirement.
+    """
     asked = manoeuvre or bench.manoeuvre
-    found: list[Peaks | None] = [
+    motions: list[Peaks | None] = [
         peaks(joint.motion, asked.duration_s) if joint.motion is not None else None
         for joint in asked.drive.joints
     ]
     out = [*_always(bench)]
-    if found[0] is not None:
-        out += _carriage(bench, found[0])
-    if found[1] is not None:
-        out += _rotary(bench, found[1])
-    if found[0] is not None and found[1] is not None:
-        out.append(_edges(bench, found[0], found[1]))
+    if motions[0] is not None:
+        out += _carriage(bench, motions[0])
+    if motions[1] is not None:
+        out += _rotary(bench, motions[1])
+    if motions[0] is not None and motions[1] is not None:
+        out.append(_edges(bench, motions[0], motions[1]))
     return out
 
 
 def _carriage(bench: Bench, peak: Peaks) -> list[Check]:
-    """Speed by the motor's line n = n0 U / U0 (1 - M / (M0 U / U0)), force by M = F lead / (2 pi
-    efficiency)."""
+    """Checks of joint 1.
+
+    Speed by the motor's line n = n0 U / U0 (1 - M / (M0 U / U0)), torque M = F lead / (2 pi
+    efficiency).
+    """
     rig, settings = bench.rig, configuration(bench)
     motor, screw = rig.motor, rig.screw
     part = min(settings["voltage_max_V"], rig.driver.supply_V) / motor.rated_voltage_V
@@ -217,7 +231,7 @@ def _always(bench: Bench) -> list[Check]:
 
 
 def moved_mass(bench: Bench) -> float:
-    """Everything that joint 1 moves [kg], the motor's own inertia left out."""
+    """The mass that joint 1 moves [kg], without the motor's own inertia."""
     carriage, strip = bench.robot.links
     x = np.linspace(0.0, strip.length_m, 201)
     own = carriage.mass_kg
@@ -241,11 +255,11 @@ def _inside(what: str, peak: Peaks, limits: tuple[float, float], factor: float, 
     )
 
 
-def _below(what: str, needed: float, limit: float, setting: str, factor: float, unit: str) -> Check:
+def _below(what: str, found: float, limit: float, setting: str, factor: float, unit: str) -> Check:
     return Check(
         what,
-        needed < limit,
-        f"{factor * needed:.4g} {unit}",
+        found < limit,
+        f"{factor * found:.4g} {unit}",
         f"{factor * limit:.4g} {unit}",
         f"a higher {setting}",
     )

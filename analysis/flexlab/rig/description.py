@@ -1,9 +1,7 @@
-"""The rig: a frozen, validated description of what stands between the board and the robot, read
-from a TOML file.
+"""The rig file: a frozen, validated description of motors, drives and sensors.
 
-What the robot file says (length of the strip, limits of the carriage) is taken from there; what the
-protocol declares (names, ranges and defaults of the board's settings) from the protocol. No
-constant stands in two places.
+The robot file has the strip's length and the carriage's limits. The protocol has names, ranges and
+defaults of the board's settings. No constant stands in two places.
 """
 
 from __future__ import annotations
@@ -25,7 +23,7 @@ from ..board.protocol.declaration import CONFIG
 from .emulation import Emulated
 from .toml_table import Table, above
 
-DERIVED = (  # settings of the board that follow from the other tables
+DERIVED_SETTINGS = (  # settings of the board that follow from the other tables
     "motor_counts_per_m",
     "stepper_steps_per_rad",
     "stepper_counts_per_rad",
@@ -42,9 +40,11 @@ DERIVED = (  # settings of the board that follow from the other tables
 )
 
 
-class Motor(Table):
-    """The geared DC motor of joint 1 with the encoder on its own shaft; torque and speed are the
-    output shaft's."""
+class MotorSheet(Table):
+    """Data sheet of joint 1's geared DC motor; torque and speed at the output shaft.
+
+    Its encoder is on the motor's own shaft.
+    """
 
     rated_voltage_V: float = above("volts", "the voltage of the motor's data", 60)
     no_load_speed_rpm: float = above(
@@ -97,8 +97,8 @@ class Driver(Table):
     )
 
 
-class Stepper(Table):
-    """The stepper of joint 2, on the joint's axis, and the joint's encoder."""
+class StepperSheet(Table):
+    """Data sheet of joint 2's stepper, on the joint's axis, and the joint's encoder."""
 
     full_steps_per_turn: int = Field(
         ge=4, le=10000, description="full steps in a turn, a whole number from 4 to 10000"
@@ -121,7 +121,7 @@ class Stepper(Table):
     )
 
     @model_validator(mode="after")
-    def _consistent(self) -> Stepper:
+    def _consistent(self) -> StepperSheet:
         if self.microsteps & (self.microsteps - 1):
             raise WrongValue("microsteps", self.microsteps, "a power of two: 1, 2, 4, ... 256")
         if self.limits_rad is not None and not self.limits_rad[0] < self.limits_rad[1]:
@@ -134,8 +134,10 @@ class Stepper(Table):
 
 
 class Calibration(Table):
-    """A measured calibration: tip deflection = c1 x + c2 x^2 + c3 x^3 with x = reading - zero,
-    readings as a fraction of 5 V."""
+    """A measured calibration: tip deflection = c1 x + c2 x^2 + c3 x^3, x = reading - zero.
+
+    Readings are fractions of 5 V.
+    """
 
     zero: float = Field(
         gt=0,
@@ -161,8 +163,7 @@ class Calibration(Table):
 
 
 class Flex(Table):
-    """The flex sensor in its divider: resistance straight_ohm + ohm_per_rad times the bend over its
-    length."""
+    """The flex sensor in its divider: straight_ohm + ohm_per_rad times the bend over its length."""
 
     length_m: float = above("metres", "the sensor's active length from the strip's root on", 1)
     straight_ohm: float = above("ohms", "the resistance on the straight strip", 1e7)
@@ -187,10 +188,10 @@ class Rig(Table):
     manoeuvre: str = Field(
         description="the path of the manoeuvre file that this rig must be able to follow"
     )
-    motor: Motor = Field(description="a table [motor]")
+    motor: MotorSheet = Field(description="a table [motor]")
     screw: Screw = Field(description="a table [screw]")
     driver: Driver = Field(description="a table [driver]")
-    stepper: Stepper = Field(description="a table [stepper]")
+    stepper: StepperSheet = Field(description="a table [stepper]")
     flex: Flex = Field(description="a table [flex]")
     emulated: Emulated | None = Field(None, description="a table [emulated], for the emulated rig")
     board: dict[str, float] = Field(
@@ -201,7 +202,7 @@ class Rig(Table):
     @model_validator(mode="after")
     def _settings(self) -> Rig:
         for name, value in self.board.items():
-            if name in DERIVED:
+            if name in DERIVED_SETTINGS:
                 raise WrongValue(f"board.{name}", value, "absent: it follows from the other tables")
             if name not in CONFIG:
                 near = difflib.get_close_matches(name, CONFIG, 1, 0.6)
@@ -219,8 +220,10 @@ class Rig(Table):
 
 @dataclass(frozen=True)
 class Bench:
-    """A rig file with the files that it names, and the joints' limits [m, rad] from whichever has
-    them."""
+    """A rig file with the files that it names.
+
+    `limits`: of both joints [m, rad], from the rig file or the robot file.
+    """
 
     file: str
     rig: Rig
@@ -230,7 +233,11 @@ class Bench:
 
     @property
     def emulated(self) -> Emulated:
-        """The rig file's table [emulated]; InputError where it has none."""
+        """The rig file's table [emulated].
+
+        Raises:
+            InputError: there is none.
+        """
         if self.rig.emulated is None:
             raise InputError(
                 "missing: the emulated rig is described in a table [emulated]",
@@ -240,8 +247,15 @@ class Bench:
         return self.rig.emulated
 
 
-def recorded(tables: Any) -> Rig:
-    """The rig of a run's metadata. Raises InputError."""
+def rig_of_recording(tables: Any) -> Rig:
+    """The rig in a run's metadata.
+
+    Args:
+        tables: the rig file's tables.
+
+    Raises:
+        InputError: they are not valid.
+    """
     try:
         return Rig.model_validate(tables)
     except ValidationError as error:
@@ -255,8 +269,14 @@ def recorded(tables: Any) -> Rig:
 
 
 def load(path: str | os.PathLike[str]) -> Bench:
-    """Read a rig file and the files it names. Raises InputError, naming file, key, value and what
-    was expected."""
+    """Read a rig file and the files it names.
+
+    Args:
+        path: the rig file.
+
+    Raises:
+        InputError: names file, key, value and what was expected.
+    """
     name = os.fspath(path)
     data = read_toml(path)
     try:
@@ -296,10 +316,15 @@ def load(path: str | os.PathLike[str]) -> Bench:
 
 
 def configuration(bench: Bench) -> dict[str, float]:
-    """All settings of the board, by their names in the protocol, in its order.
+    """All settings of the board, by name, in the protocol's order.
 
-    d = lead counts / (4 pulses ratio), theta = 2 pi steps / (full steps x microsteps). Raises
-    InputError where a number that follows from the rig is outside the board's range.
+    d = lead counts / (4 pulses ratio), theta = 2 pi steps / (full steps x microsteps).
+
+    Args:
+        bench: the rig.
+
+    Raises:
+        InputError: a derived setting is outside the board's range.
     """
     rig = bench.rig
     (low_1, high_1), (low_2, high_2) = bench.limits
@@ -322,7 +347,7 @@ def configuration(bench: Bench) -> dict[str, float]:
         "position_min_2_rad": low_2,
         "position_max_2_rad": high_2,
     }
-    assert set(derived) == set(DERIVED)
+    assert set(derived) == set(DERIVED_SETTINGS)
     for name, value in derived.items():
         item = CONFIG[name]
         if not item.least <= value <= item.greatest:
@@ -335,21 +360,27 @@ def configuration(bench: Bench) -> dict[str, float]:
 
 
 def tip_per_bend(bench: Bench) -> float:
-    """Tip deflection for a radian of bend under the sensor [m/rad], of a strip that its tip loads.
+    """Tip deflection for a radian of bend under the sensor [m/rad], of a strip loaded at its tip.
 
     alpha = (P / EI)(L s - s^2 / 2), w = P L^3 / (3 EI), so w / alpha = L^3 / (3 (L s - s^2 / 2))
     (Euler-Bernoulli).
+
+    Args:
+        bench: the rig.
     """
     length, sensor = bench.robot.links[1].length_m, bench.rig.flex.length_m
     return length**3 / (3 * (length * sensor - sensor**2 / 2))
 
 
 def calibration(bench: Bench) -> Calibration:
-    """The measured calibration, or the one that the sensor's data give.
+    """The measured calibration, or that of the sensor's data sheet.
 
-    With the reading r = R_f / (R_s + R_f) and z that of the straight strip, the bend is (R_f / k)(1
-    / r - 1 / z); its expansion to the third order in x = r - z, times the tip deflection for a
-    radian.
+    With the reading r = R_f / (R_s + R_f), and z that of the straight strip, the bend is (R_f /
+    k)(1 / r - 1 / z). Its expansion to third order in x = r - z, times the tip deflection for a
+    radian, is the calibration.
+
+    Args:
+        bench: the rig.
     """
     flex = bench.rig.flex
     if flex.calibration is not None:

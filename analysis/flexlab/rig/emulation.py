@@ -1,8 +1,7 @@
-"""The table `emulated` of a rig file: what the emulated rig has beyond the data of the parts, and
-how far it is from them.
+"""The table `emulated` of a rig file: properties of the emulated rig beyond the data sheets.
 
-Nothing of it reaches a board. A simulation of the nominal rig may use all but the truth, which is
-for the plant behind the emulated board only.
+Nothing of it reaches a board. A simulation of the nominal rig may use all but the true parameters,
+which belong to the plant of the emulated board.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ class EmulatedMotor(Table):
 
 
 class EmulatedDriver(Table):
-    """The bridge."""
+    """The motor's bridge."""
 
     dead_zone_V: float = from_zero("volts", "what the bridge's dead time takes off the voltage", 5)
 
@@ -43,7 +42,7 @@ class EmulatedScrew(Table):
 
 
 class EmulatedCarriage(Table):
-    """The carriage on its rail, and the nut's play on the screw."""
+    """The carriage on its rail, and the nut's backlash on the screw."""
 
     coulomb_friction_N: float = from_zero("newtons", "the rail's Coulomb friction", 1e3)
     viscous_friction_N_s_m: float = from_zero("N s/m", "the rail's viscous friction", 1e4)
@@ -60,7 +59,7 @@ class EmulatedCarriage(Table):
 
 
 class EmulatedStepper(Table):
-    """What a stepper has beside its holding torque."""
+    """Detent torque and damping of the stepper."""
 
     detent_torque_N_m: float = from_zero(
         "newton metres", "the detent torque, without current too", 10
@@ -69,7 +68,7 @@ class EmulatedStepper(Table):
 
 
 class EmulatedFlex(Table):
-    """What the flex sensor has beside its data."""
+    """Position, nonlinearity, noise and drift of the flex sensor."""
 
     from_m: float = from_zero("metres", "where on the strip the active length begins", 1)
     nonlinearity_1_rad: float = Field(
@@ -98,9 +97,8 @@ def _factor(what: str) -> Any:
     )
 
 
-class Truth(Table):
-    """Factors by which the emulated rig differs from its files: what an identification is to
-    find."""
+class TrueParameters(Table):
+    """Factors by which the emulated rig differs from its files, for an identification to find."""
 
     stiffness: float = _factor("bending stiffness of the strip")
     damping: float = _factor("damping of the strip")
@@ -111,7 +109,7 @@ class Truth(Table):
 
 
 class Ranges(Table):
-    """Between which factors `random_truth` draws: pairs, the lower one first."""
+    """Ranges from which `random_true_parameters` draws: pairs of factors, the lower first."""
 
     stiffness: tuple[float, float] = Field(
         (0.85, 1.15), strict=False, description="two factors above 0, the lower one first"
@@ -152,16 +150,22 @@ class Emulated(Table):
     carriage: EmulatedCarriage = Field(description="a table [emulated.carriage]")
     stepper: EmulatedStepper = Field(description="a table [emulated.stepper]")
     flex: EmulatedFlex = Field(description="a table [emulated.flex]")
-    truth: Truth = Field(default_factory=Truth, description="a table [emulated.truth] of factors")
+    truth: TrueParameters = Field(
+        default_factory=TrueParameters, description="a table [emulated.truth] of factors"
+    )
     ranges: Ranges = Field(
         default_factory=Ranges, description="a table [emulated.ranges] of pairs of factors"
     )
 
 
-def random_truth(seed: int, ranges: Ranges | None = None) -> Truth:
-    """The truth of a rig drawn at random, each factor log-uniform in its range; the same seed, the
-    same rig."""
+def random_true_parameters(seed: int, ranges: Ranges | None = None) -> TrueParameters:
+    """Draw the true parameters of a rig at random, each factor log-uniform in its range.
+
+    Args:
+        seed: the same seed gives the same rig.
+        ranges: by default those of `Ranges`.
+    """
     random, within = np.random.default_rng([seed, 1]), ranges or Ranges()
-    return Truth(
+    return TrueParameters(
         **{name: float(np.exp(random.uniform(*np.log(getattr(within, name))))) for name in FACTORS}
     )

@@ -1,5 +1,4 @@
-"""The rig's robot and drives as the native model has them under a controller: nominal figures of
-the rig file."""
+"""The rig's robot and drives in the native model, with the nominal data of the rig file."""
 
 from __future__ import annotations
 
@@ -8,22 +7,30 @@ from flexura.control import Motor, Output, Stepper
 from flexura.errors import InputError
 
 from .description import Bench
-from .plant.motor import line
+from .plant.motor import joint_line_of
 
 POLE_PAIRS_PER_STEP = 0.25  # four full steps are one period of the magnetic spring
 
 
-def driven(robot: fx.Robot, bench: Bench) -> tuple[fx.Robot, tuple[Output, ...]]:
-    """The robot with the rotors' inertia and the friction that the rig's drives put into its
-    joints, and the outputs of a controller: motor (back-EMF and viscous friction in its damping)
-    and stepper with its magnetic spring.
+def with_nominal_drives(robot: fx.Robot, bench: Bench) -> tuple[fx.Robot, tuple[Output, ...]]:
+    """Add the rig's drives to a robot.
 
-    The nut's play, stiction, and the motor's inductance are left out. Raises InputError for a rig
-    file without [emulated], where rotor and friction stand, and for a robot that is not the rig's
-    kind.
+    The joints get the rotors' inertia and the drives' friction. The outputs of a controller are the
+    motor, with back-EMF and viscous friction as its damping, and the stepper with its magnetic
+    spring. Backlash, stiction and the motor's inductance are left out.
+
+    Args:
+        robot: a robot with two links.
+        bench: the rig.
+
+    Returns:
+        The robot with these joints, and the outputs of a controller.
+
+    Raises:
+        InputError: the rig file has no [emulated], or the robot has not two links.
     """
-    rig, more = bench.rig, bench.rig.emulated
-    if more is None:
+    rig, emulated = bench.rig, bench.rig.emulated
+    if emulated is None:
         raise InputError(
             "missing: the rotor's inertia and the rig's friction are there", key="emulated"
         )
@@ -31,11 +38,13 @@ def driven(robot: fx.Robot, bench: Bench) -> tuple[fx.Robot, tuple[Output, ...]]
         raise InputError(
             "expected a robot of two links, as the rig's", key="robot", value=robot.name
         )
-    carriage, data = line(rig, more), robot.to_dict()
+    carriage, data = joint_line_of(rig, emulated), robot.to_dict()
     first, second = (link["joint"] for link in data["link"])
     first["rotor_inertia"] = first.get("rotor_inertia", 0.0) + carriage.reflected_mass_kg
     first["coulomb_friction"] = first.get("coulomb_friction", 0.0) + carriage.coulomb_N
-    second["viscous_friction"] = second.get("viscous_friction", 0.0) + more.stepper.damping_N_m_s
+    second["viscous_friction"] = (
+        second.get("viscous_friction", 0.0) + emulated.stepper.damping_N_m_s
+    )
     stiffness = (
         rig.stepper.holding_torque_N_m * rig.stepper.full_steps_per_turn * POLE_PAIRS_PER_STEP
     )

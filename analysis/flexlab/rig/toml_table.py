@@ -1,4 +1,4 @@
-"""What all tables of a rig file have in common."""
+"""The base of all tables of a rig file."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ class Table(BaseModel):
 
 
 def above(unit: str, what: str, most: float) -> Any:
-    """A number above 0."""
+    """A field for a number above 0, at most `most`."""
     return Field(gt=0, le=most, description=f"{what} in {unit}, above 0 and at most {most:g}")
 
 
 def from_zero(unit: str, what: str, most: float) -> Any:
-    """A number from 0 on."""
+    """A field for a number from 0 to `most`."""
     return Field(ge=0, le=most, description=f"{what} in {unit}, from 0 to {most:g}")

@@ -1,2 +1,1 @@
-"""Tuning of controllers: gains found by evolution on the compiled simulator, judged by one
-objective."""
+"""Tuning of controllers: gains found by evolution on the compiled simulator, for one objective."""

@@ -1,11 +1,10 @@
-"""The dissertation's control cases: types III and IV, the elastic displacement ignored (case 1) and
-considered (case 2).
+"""The dissertation's control cases of types III and IV: elasticity ignored (1) or considered (2).
 
-The dissertation (Duong Xuan Bien, 2019, section 3.4.3) gives the figures of tables 3.10 and 3.12,
-and neither gains, bounds, limits nor the size of its steps, which are therefore this project's: d1
-0 -> 0.10 m and q2 0 -> pi/4 (type IV), q1 0 -> pi/4 and d2 0.20 -> 0.30 m (type III), as steps, 5
-s. Both cases have the same drive limits, algorithm, budget, seed and bounds. In case 1 the
-controller has no term in the strip and J no vibration; in case 2 both have.
+The dissertation (Duong Xuan Bien, 2019, section 3.4.3) gives the results of tables 3.10 and 3.12,
+but no gains, bounds, limits or step sizes. Those are this project's: d1 0 -> 0.10 m and q2 0 ->
+pi/4 (type IV), q1 0 -> pi/4 and d2 0.20 -> 0.30 m (type III), as steps, 5 s. Both cases have the
+same drive limits, algorithm, budget, seed and bounds. In case 1 the controller has no term in the
+strip and J no vibration; in case 2 both have.
 """
 
 from __future__ import annotations
@@ -20,9 +19,9 @@ from flexura.signals import Drive, JointDrive, Manoeuvre, step
 
 from .. import rig as rigs
 from ..paths import FIRMWARE, ROBOTS
-from ..rig.nominal_robot import driven
+from ..rig.nominal_robot import with_nominal_drives
 from .objective import Weights
-from .search_space import Free, free
+from .search_space import FreeGain, free_gain
 from .task import Task
 
 DURATION_S, OUTPUT_STEP_S = 5.0, 0.005
@@ -40,25 +39,35 @@ TABLE = {"IV": "table 3.10", "III": "table 3.12"}
 
 @dataclass(frozen=True)
 class Structure:
-    """A robot of the dissertation with its steps, drive limits (in `settings`), and free settings
-    of both cases."""
+    """A robot of the dissertation, with its steps, drive limits, and free settings.
+
+    `settings`: gains and drive limits. `free`: free settings of both cases. `strip`: the terms in
+    the strip, of case 2. `lqr_limits`: limits and outputs of an LQR, which has a force in every
+    joint.
+    """
 
     name: str
     robot: fx.Robot
     ends: tuple[float, float]
     settings: dict[str, float]
     outputs: tuple[Output, ...]
-    free: tuple[Free, ...]  # both cases
-    strip: tuple[Free, ...]  # case 2: the terms in the strip
-    reference: Gains  # limits and outputs of an LQR, which has a force in every joint
+    free: tuple[FreeGain, ...]  # both cases
+    strip: tuple[FreeGain, ...]  # case 2: the terms in the strip
+    lqr_limits: Gains  # limits and outputs of an LQR, which has a force in every joint
 
     @cached_property
     def manoeuvre(self) -> Manoeuvre:
+        """The steps as a manoeuvre."""
         drive = Drive(tuple(JointDrive(motion=step(end)) for end in self.ends))
         return Manoeuvre(f"type {self.name}, steps", DURATION_S, OUTPUT_STEP_S, drive)
 
     def task(self, case: int, weights: Weights | None = None) -> Task:
-        """Case 1 or 2; `weights`: those of case 2."""
+        """The task of case 1 or 2.
+
+        Args:
+            case: 1 or 2.
+            weights: of case 2.
+        """
         own = weights or Weights()
         if case == 1:
             return Task(
@@ -78,10 +87,13 @@ class Structure:
 
 
 def type_4() -> Structure:
-    """PaR: the rig, its stepper with 6 rad/s and 60 rad/s^2, its motor with the voltage that takes
-    the carriage to 90 % of the speed at which the board switches off."""
+    """Type IV (PaR), the rig.
+
+    The stepper is limited to 6 rad/s and 60 rad/s^2. The motor's voltage takes the carriage to 90 %
+    of the speed at which the board switches off.
+    """
     bench = rigs.load(FIRMWARE / "rig.toml")
-    robot, outputs = driven(fx.load(ROBOTS / "rig.toml"), bench)
+    robot, outputs = with_nominal_drives(fx.load(ROBOTS / "rig.toml"), bench)
     board = rigs.configuration(bench)
     settings = {
         name: board[name]
@@ -102,19 +114,23 @@ def type_4() -> Structure:
         settings,
         outputs,
         (
-            free("kp_1_V_m", 30, 20_000),
-            free("ki_1_V_m_s", 1, 20_000),
-            free("kd_1_V_s_m", 0.1, 1000),
-            free("kp_2_1_s", 0.5, 100),
-            free("ki_2_1_s2", 2, 100),
-            free("kd_2", 1e-3, 1),
-            free("setpoint_1_Hz", 0.2, 50),
-            free("setpoint_2_Hz", 0.2, 50),
+            free_gain("kp_1_V_m", 30, 20_000),
+            free_gain("ki_1_V_m_s", 1, 20_000),
+            free_gain("kd_1_V_s_m", 0.1, 1000),
+            free_gain("kp_2_1_s", 0.5, 100),
+            free_gain("ki_2_1_s2", 2, 100),
+            free_gain("kd_2", 1e-3, 1),
+            free_gain("setpoint_1_Hz", 0.2, 50),
+            free_gain("setpoint_2_Hz", 0.2, 50),
         ),
         # the flex sensor is wrong by 1 to 2 mm for long and as much in noise: with more than these
         # the joints would be too, and ki_2 is at least what integrates the former away in a few
         # seconds
-        (free("kf_1_V_m", -50, 50), free("kf_2_rad_s_m", -30, 30), free("kg_2_rad_m", -0.3, 0.3)),
+        (
+            free_gain("kf_1_V_m", -50, 50),
+            free_gain("kf_2_rad_s_m", -30, 30),
+            free_gain("kg_2_rad_m", -0.3, 0.3),
+        ),
         Gains(
             {name: value for name, value in settings.items() if "_2_" not in name}
             | {"kp_2_N_m_rad": 1.0, "torque_max_2_N_m": bench.rig.stepper.holding_torque_N_m},
@@ -124,7 +140,7 @@ def type_4() -> Structure:
 
 
 def type_3() -> Structure:
-    """RPb: a torque of 2 N m, a force of 2 N."""
+    """Type III (RPb): a torque of 2 N m, a force of 2 N."""
     data = fx.load(ROBOTS / "type-3-rpb.toml").to_dict()
     data["link"][1]["joint"]["start"] = 0.20
     settings = {
@@ -140,20 +156,20 @@ def type_3() -> Structure:
         settings,
         (),
         (
-            free("kp_1_N_m_rad", 0.1, 100),
-            free("ki_1_N_m_rad_s", 0.01, 100),
-            free("kd_1_N_m_s_rad", 0.01, 10),
-            free("kp_2_N_m", 1, 1000),
-            free("ki_2_N_m_s", 0.1, 1000),
-            free("kd_2_N_s_m", 0.1, 100),
-            free("setpoint_1_Hz", 0.2, 50),
-            free("setpoint_2_Hz", 0.2, 50),
+            free_gain("kp_1_N_m_rad", 0.1, 100),
+            free_gain("ki_1_N_m_rad_s", 0.01, 100),
+            free_gain("kd_1_N_m_s_rad", 0.01, 10),
+            free_gain("kp_2_N_m", 1, 1000),
+            free_gain("ki_2_N_m_s", 0.1, 1000),
+            free_gain("kd_2_N_s_m", 0.1, 100),
+            free_gain("setpoint_1_Hz", 0.2, 50),
+            free_gain("setpoint_2_Hz", 0.2, 50),
         ),
         (
-            free("kf_1_N_m_m", -200, 200),
-            free("kg_1_N_m_s_m", -10, 10),
-            free("kf_2_N_m", -200, 200),
-            free("kg_2_N_s_m", -10, 10),
+            free_gain("kf_1_N_m_m", -200, 200),
+            free_gain("kg_1_N_m_s_m", -10, 10),
+            free_gain("kf_2_N_m", -200, 200),
+            free_gain("kg_2_N_s_m", -10, 10),
         ),
         Gains(settings),
     )

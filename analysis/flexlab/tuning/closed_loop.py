@@ -1,4 +1,4 @@
-"""A manoeuvre under a controller from a gains file: the motions become its references."""
+"""A manoeuvre under a controller from a gains file: its motions become the references."""
 
 from __future__ import annotations
 
@@ -10,18 +10,26 @@ from flexura.control import Gains, load_gains
 from flexura.signals import constant
 
 
-def controlled(system: fx.System, asked: fx.Manoeuvre, file: Path) -> fx.Controller:
-    """`under` the gains of a file."""
-    return under(system, asked, load_gains(file))
+def controller_from_file(system: fx.System, asked: fx.Manoeuvre, file: Path) -> fx.Controller:
+    """The controller with the gains of a file; as `closed_loop_controller`."""
+    return closed_loop_controller(system, asked, load_gains(file))
 
 
-def under(system: fx.System, asked: fx.Manoeuvre, settings: Gains) -> fx.Controller:
-    """The controller along the manoeuvre's motions, whose own gains are unused; a joint without a
-    motion is held at its start.
+def closed_loop_controller(
+    system: fx.System, asked: fx.Manoeuvre, settings: Gains
+) -> fx.Controller:
+    """The controller that tracks a manoeuvre's motions.
 
-    The manoeuvre's forces are fed forward where the controller's output is a force or torque.
-    Raises InputError for a joint that the manoeuvre prescribes, and for gains of another number of
-    joints.
+    The manoeuvre's own gains are unused. A joint without a motion is held at its start. The
+    manoeuvre's forces are fed forward if the output is a force or torque.
+
+    Args:
+        system: the robot.
+        asked: the manoeuvre.
+        settings: the gains.
+
+    Raises:
+        InputError: the manoeuvre prescribes a joint, or the numbers of joints differ.
     """
     motions = []
     for i, (joint, start) in enumerate(zip(asked.drive.joints, system.robot.start, strict=True), 1):

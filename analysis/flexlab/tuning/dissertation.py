@@ -1,9 +1,8 @@
-"""`flexura tune --dissertation`: both cases of types III and IV tuned, in the layout of tables 3.10
-and 3.12, with their figures.
+"""`flexura tune --dissertation`: both cases of types III and IV, as in tables 3.10 and 3.12.
 
-What is demanded of case 2 is compared with what was reached, with an LQR tuned for the same
-objective (`reference.py`), and with what the drives allow at all: the shortest time in which each
-joint can go its way within its limits.
+The requirements of case 2 are compared with what was reached, with an LQR tuned for the same
+objective (`lqr_reference.py`), and with the drives' limits: the shortest time in which each joint
+can cover its distance.
 """
 
 from __future__ import annotations
@@ -22,10 +21,10 @@ from flexura.control import ERROR, OVERSHOOT, RESIDUAL, SETTLING, Response, stri
 
 from ..studies.transmission_zeros import transmission
 from .cases import PUBLISHED, STRUCTURES, TABLE
-from .closed_loop import under
-from .executor import engine
+from .closed_loop import closed_loop_controller
+from .executor import make_executor
 from .history import History
-from .lqr_reference import Reference, reference
+from .lqr_reference import LqrBaseline, tune_lqr_baseline
 from .result import Result, number, numbers, result, save
 from .search import Search, search
 from .task import Task
@@ -34,22 +33,26 @@ OVERSHOOT_MOST, SETTLING_PART, ERROR_MOST, RESIDUAL_PART = 0.05, 0.5, 1e-3, 0.1
 
 
 @dataclass(frozen=True)
-class Both:
-    """Both cases of a structure, and an LQR; `residual_m` of each, from when the later of both
-    cases has settled."""
+class TwoCases:
+    """Both cases of a structure, and an LQR.
+
+    `residual_m`: residual vibration of each, from when the later of both cases has settled.
+    `shortest_s`: shortest times of the joints. `zeros_1_s`: right-half-plane zeros by drive.
+    """
 
     name: str
     results: tuple[Result, Result]
-    lqr: Reference
+    lqr: LqrBaseline
     residual_m: tuple[float, float, float]
     shortest_s: tuple[float, ...]
     zeros_1_s: dict[str, float]
 
     def response(self, case: int) -> Response:
+        """The step response of a case."""
         return self.results[case - 1].responses[0]
 
     def verdicts(self) -> list[tuple[str, bool, str]]:
-        """What is demanded of case 2, whether it is reached, and the numbers."""
+        """The requirements of case 2: text, whether it is reached, and the numbers."""
         joints, published = self.response(2).joints, np.array(PUBLISHED[self.name, 2])
         parts = joints[:, SETTLING] / published[:, 1]
         ratio = self.residual_m[1] / self.residual_m[0]
@@ -80,59 +83,69 @@ def study(
     scheduler: str | None = None,
     jobs: int | None = None,
     report: Callable[[History], None] = lambda history: None,
-) -> tuple[list[Both], bool]:
-    """Tune both cases of the named structures and an LQR, each stored in a folder of its own;
-    False: interrupted."""
-    out: list[Both] = []
+) -> tuple[list[TwoCases], bool]:
+    """Tune both cases of the named structures and an LQR, each stored in a folder of its own.
+
+    Args:
+        names: keys of `STRUCTURES`.
+        how: the search.
+        folder: where results are stored.
+        scheduler: address of a Dask scheduler, or None.
+        jobs: number of threads, by default all cores.
+        report: called after each generation.
+
+    Returns:
+        The results, and False if the search was interrupted.
+    """
+    out: list[TwoCases] = []
     for name in names:
         structure, found = STRUCTURES[name](), []
         for case in (1, 2):
             task, own = structure.task(case), folder / f"type-{name}-case-{case}"
             history = History.open(own, task.digest(how.identity()))
-            with engine(task, scheduler, jobs) as runs:
+            with make_executor(task, scheduler, jobs) as runs:
                 if not search(task, how, runs, history, report):
                     return out, False
             found.append(result(task, how, history, True))
             save(found[-1], own)
-        possible = reference(structure, folder / f"type-{name}-lqr", report)
-        if possible is None:
+        lqr = tune_lqr_baseline(structure, folder / f"type-{name}-lqr", report)
+        if lqr is None:
             return out, False
-        out.append(both(name, found[0], found[1], possible))
+        out.append(compare_cases(name, found[0], found[1], lqr))
     return out, True
 
 
-def both(name: str, first: Result, second: Result, possible: Reference) -> Both:
-    """The two cases side by side, with what limits both."""
+def compare_cases(name: str, first: Result, second: Result, lqr: LqrBaseline) -> TwoCases:
+    """Put two cases and the LQR side by side, with the limits of both."""
     settled, left = (
         float(np.nanmax([r.responses[0].joints[:, SETTLING] for r in (first, second)])),
         [],
     )
-    for run in (first.runs[0], second.runs[0], possible.run):
+    for run in (first.runs[0], second.runs[0], lqr.run):
         left.append(float(strip_figures(run.t, run["link/2/tip_deflection"], settled)[RESIDUAL]))
     zeros = {
         row.drive: float(row.unstable.real.min()) for row in _zeros(first.task) if len(row.unstable)
     }
-    return Both(
-        name, (first, second), possible, (left[0], left[1], left[2]), _shortest(first.task), zeros
+    return TwoCases(
+        name, (first, second), lqr, (left[0], left[1], left[2]), _shortest(first.task), zeros
     )
 
 
 def _zeros(task: Task) -> list[Any]:
-    """The tip's transmission zeros, across a link that lies in the way of joint 1."""
+    """Transmission zeros of the tip, across a link that lies in joint 1's direction."""
     system = fx.assemble(task.robots[0])
     return [row for row in transmission(fx.linearize(system)) if row.output == "tip/y"]
 
 
 def _shortest(task: Task) -> tuple[float, ...]:
-    """The time that each joint takes to 98 % of its way with its output at its limit, the others
-    locked [s]."""
+    """Time of each joint to 98 % of its step with its output at the limit, others locked [s]."""
     times = []
     for i in range(len(task.robots[0].links)):
         data = task.robots[0].to_dict()
         for k, link in enumerate(data["link"]):
             link["joint"]["locked"] = k != i
         system = fx.assemble(fx.Robot.from_dict(data))
-        controller = under(system, task.manoeuvre, task.gains)
+        controller = closed_loop_controller(system, task.manoeuvre, task.gains)
         joints = list(controller.joints)
         joints[i] = replace(joints[i], kp=1e9, ki=0.0, kd=0.0)  # type: ignore[arg-type]  # at its limit until it is there
         run = fx.simulate(
@@ -144,12 +157,12 @@ def _shortest(task: Task) -> tuple[float, ...]:
     return tuple(times)
 
 
-def table(found: list[Both]) -> Group:
-    """Tables 3.10 and 3.12, each figure with the dissertation's in brackets, and the verdicts."""
+def table(found: list[TwoCases]) -> Group:
+    """Tables 3.10 and 3.12 with the dissertation's values in brackets, and the verdicts."""
     return Group(*(part for each in found for part in _tables(each)))
 
 
-def _tables(each: Both) -> list[Any]:
+def _tables(each: TwoCases) -> list[Any]:
     task = each.results[0].task
     kinds = ["turns" if link.joint.type == "R" else "translates" for link in task.robots[0].links]
     title = f"type {each.name}: this project (the dissertation's {TABLE[each.name]})"
@@ -182,7 +195,7 @@ def _tables(each: Both) -> list[Any]:
         ("largest w [mm]", peaks),
         ("residual w [mm]", [1e3 * x for x in each.residual_m]),
     ):
-        one, two, possible = values
+        one, two, lqr = values
         out.add_row(
             text.replace("[", "\\["),
             "",
@@ -192,7 +205,7 @@ def _tables(each: Both) -> list[Any]:
             number(one),
             number(two),
             number(abs(one - two)),
-            number(possible),
+            number(lqr),
         )
     lines = [
         f"{'reached' if ok else 'NOT reached'}: {demand} ({words})"
@@ -228,9 +241,9 @@ def _figure(value: float) -> str:
     return "0.000" if value <= 5e-4 else number(value)
 
 
-def _other(each: Both) -> str:
+def _other(each: TwoCases) -> str:
     """Where the LQR's drives are not those of the cases."""
-    theirs, ours = STRUCTURES[each.name]().reference.settings, each.results[0].task.gains.settings
+    theirs, ours = STRUCTURES[each.name]().lqr_limits.settings, each.results[0].task.gains.settings
     limits = [
         f"{name} = {value:g}"
         for name, value in theirs.items()
@@ -239,8 +252,8 @@ def _other(each: Both) -> str:
     return f"; in place of the stepper's rate {', '.join(limits)}" if limits else ""
 
 
-def data(found: list[Both]) -> dict[str, Any]:
-    """For JSON."""
+def data(found: list[TwoCases]) -> dict[str, Any]:
+    """The results for JSON."""
     return {
         f"type {each.name}": {
             "cases": [numbers(r) for r in each.results],

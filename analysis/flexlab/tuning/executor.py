@@ -1,5 +1,4 @@
-"""Where a population's runs are made: on this machine's cores or a Dask scheduler's workers. The
-numbers are the same."""
+"""Executors of a population's runs: this machine's cores or a Dask cluster; same results."""
 
 from __future__ import annotations
 
@@ -18,21 +17,22 @@ from .task import Task
 
 # that a worker of a cluster gets at a time; a core here gets one, so that all are done at about the
 # same time
-ROWS = 4
+ROWS_PER_TASK = 4
 CONNECT_S = 20
 
 
-class Runs(Protocol):
-    """Figures (B, R, k) and fractions reached (B, R) of points (B, d) with limits (B,), in their
-    order: `Task.run`."""
+class Evaluator(Protocol):
+    """Evaluates points (B, d) with cost limits (B,), as `Task.run`."""
 
-    def __call__(self, points: np.ndarray, limits: np.ndarray) -> tuple[np.ndarray, np.ndarray]: ...
+    def __call__(self, points: np.ndarray, limits: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Metrics (B, R, k) and fractions reached (B, R), in the order of the points."""
+        ...
 
 
-class Engine(Runs, Protocol):
-    """Those of a task, while it is open."""
+class Executor(Evaluator, Protocol):
+    """An evaluator of a task, while it is open."""
 
-    def __enter__(self) -> Engine: ...
+    def __enter__(self) -> Executor: ...
     def __exit__(
         self,
         kind: type[BaseException] | None,
@@ -41,22 +41,25 @@ class Engine(Runs, Protocol):
     ) -> None: ...
 
 
-class Threads:
-    """On this machine: a thread a core; the runs leave Python's lock."""
+class ThreadExecutor:
+    """Runs on this machine, one thread a core; the runs release Python's lock."""
 
     def __init__(self, task: Task, threads: int) -> None:
         self.task, self.trials, self.stopped = task, task.trials(), threading.Event()
         self.pool = ThreadPoolExecutor(threads)
 
     def __call__(self, points: np.ndarray, limits: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return _joined(list(self.pool.map(self._chunk, _chunks(points, 1), _chunks(limits, 1))))
+        """See `Evaluator`."""
+        return _concatenated(
+            list(self.pool.map(self._chunk, _chunks(points, 1), _chunks(limits, 1)))
+        )
 
     def _chunk(self, points: np.ndarray, limits: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         if self.stopped.is_set():
             raise KeyboardInterrupt
         return self.task.run(self.trials, points, limits)
 
-    def __enter__(self) -> Threads:
+    def __enter__(self) -> ThreadExecutor:
         return self
 
     def __exit__(self, kind: Any, error: Any, trace: Any) -> None:
@@ -64,9 +67,8 @@ class Threads:
         self.pool.shutdown(cancel_futures=True)
 
 
-class Cluster:
-    """On a Dask scheduler's workers (the extra `cluster`); what a lost worker had is given to
-    another."""
+class DaskExecutor:
+    """Runs on a Dask scheduler's workers (extra `cluster`); work of a lost worker is repeated."""
 
     def __init__(self, task: Task, scheduler: str) -> None:
         try:
@@ -86,50 +88,62 @@ class Cluster:
         self.task = task
 
     def __call__(self, points: np.ndarray, limits: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """See `Evaluator`."""
         futures = [
             self.client.submit(_on_worker, program(), self.task, *chunk, pure=False, retries=3)
-            for chunk in zip(_chunks(points, ROWS), _chunks(limits, ROWS), strict=True)
+            for chunk in zip(
+                _chunks(points, ROWS_PER_TASK), _chunks(limits, ROWS_PER_TASK), strict=True
+            )
         ]
         try:
-            return _joined(self.client.gather(futures))
+            return _concatenated(self.client.gather(futures))
         finally:
             self.client.cancel(futures)
 
-    def __enter__(self) -> Cluster:
+    def __enter__(self) -> DaskExecutor:
         return self
 
     def __exit__(self, kind: Any, error: Any, trace: Any) -> None:
         self.client.close()
 
 
-def engine(task: Task, scheduler: str | None = None, threads: int | None = None) -> Engine:
-    """The cluster at `scheduler`, or `threads` (default: all cores) here."""
-    return Cluster(task, scheduler) if scheduler else Threads(task, threads or cores())
+def make_executor(task: Task, scheduler: str | None = None, threads: int | None = None) -> Executor:
+    """The executor of a task.
+
+    Args:
+        task: what is evaluated.
+        scheduler: address of a Dask scheduler; None: threads on this machine.
+        threads: their number, by default all cores.
+
+    Raises:
+        InputError: there is no scheduler, or the extra is missing.
+    """
+    return DaskExecutor(task, scheduler) if scheduler else ThreadExecutor(task, threads or cores())
 
 
 def _chunks(rows: np.ndarray, size: int) -> list[np.ndarray]:
     return [rows[k : k + size] for k in range(0, len(rows), size)]
 
 
-def _joined(parts: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+def _concatenated(parts: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts])
 
 
 def _on_worker(
     version: str, task: Task, points: np.ndarray, limits: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """A chunk, on a worker. Another solver would give other numbers."""
+    """Evaluate a chunk on a worker, whose solver must have the same version."""
     if program() != version:
         raise FlexuraError(
             f"a worker runs another version of the solver, {program()}; this is {version}"
         )
-    held = _held(task.digest(), threading.get_ident())
-    if not held:
-        held += [task, task.trials()]
-    return held[0].run(held[1], points, limits)
+    state = _worker_state(task.digest(), threading.get_ident())
+    if not state:
+        state += [task, task.trials()]
+    return state[0].run(state[1], points, limits)
 
 
 @lru_cache(maxsize=8)
-def _held(digest: str, thread: int) -> list[Any]:
-    """What a worker's thread keeps of a task between two chunks."""
+def _worker_state(digest: str, thread: int) -> list[Any]:
+    """The task and its trials, kept by a worker's thread between chunks."""
     return []

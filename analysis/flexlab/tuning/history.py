@@ -1,4 +1,4 @@
-"""What a search was told, generation by generation: stored after each as a whole, and as a Run."""
+"""History of a search, stored as a whole after each generation, and as a Run."""
 
 from __future__ import annotations
 
@@ -17,8 +17,11 @@ _ARRAYS = ("points", "goals", "figures", "reached")
 
 
 class History:
-    """All points of the unit cube that were tried, their goals and figures; `wall_s` of each
-    generation."""
+    """All points of the unit cube that were tried, with their goals and metrics.
+
+    `ends`: number of evaluations after each generation. `wall_s`: duration of each [s]. `stored`:
+    generations that were stored already.
+    """
 
     def __init__(self, digest: str, path: Path | None = None) -> None:
         self.digest, self.path = digest, path
@@ -29,12 +32,19 @@ class History:
 
     @staticmethod
     def open(folder: Path, digest: str) -> History:
-        """The history stored in `folder`, empty where there is none. Raises InputError for one of
-        another search."""
+        """The history stored in a folder, empty if there is none.
+
+        Args:
+            folder: of the search.
+            digest: of the search and its task.
+
+        Raises:
+            InputError: the folder holds another search.
+        """
         history = History(digest, folder / FILE)
         assert history.path is not None
-        for rest in folder.glob(f".{FILE}.*"):  # of a process that was killed while it wrote
-            rest.unlink(missing_ok=True)
+        for leftover in folder.glob(f".{FILE}.*"):  # of a process that was killed while it wrote
+            leftover.unlink(missing_ok=True)
         if not history.path.exists():
             return history
         try:
@@ -61,16 +71,24 @@ class History:
     def __len__(self) -> int:
         return len(self.ends)
 
-    def add(
+    def append(
         self,
         points: np.ndarray,
         goals: np.ndarray,
-        figures: np.ndarray,
+        metrics: np.ndarray,
         reached: np.ndarray,
         wall_s: float,
     ) -> None:
-        """One generation more, stored."""
-        for name, array in zip(_ARRAYS, (points, goals, figures, reached), strict=True):
+        """Append a generation of B points and store the history.
+
+        Args:
+            points: in the unit cube (B, d).
+            goals: (B, 1 or 2).
+            metrics: of R robots (B, R, k).
+            reached: fractions of the time reached (B, R).
+            wall_s: duration [s].
+        """
+        for name, array in zip(_ARRAYS, (points, goals, metrics, reached), strict=True):
             self._parts[name].append(np.array(array))
         self.ends.append(len(points) + (self.ends[-1] if self.ends else 0))
         self.wall_s.append(wall_s)
@@ -80,9 +98,16 @@ class History:
             np.savez(sink, digest=self.digest, ends=self.ends, wall_s=self.wall_s, **arrays)
             write_bytes(self.path, sink.getvalue())
 
-    def told(self, generation: int, points: np.ndarray) -> np.ndarray:
-        """The goals of a stored generation. Raises InputError where the search asks for other
-        points than were stored."""
+    def goals_for_algorithm(self, generation: int, points: np.ndarray) -> np.ndarray:
+        """The goals of a stored generation.
+
+        Args:
+            generation: its number, from 0.
+            points: what the algorithm asks for.
+
+        Raises:
+            InputError: the algorithm asks for other points than were stored.
+        """
         stored = self._parts["points"][generation]
         if stored.shape != points.shape or not np.array_equal(stored, points):
             expected = (
@@ -94,50 +119,58 @@ class History:
         return self._parts["goals"][generation]
 
     def all(self, name: str) -> np.ndarray:
-        """points (E, d), goals (E, 1 or 2), figures (E, R, k) or reached (E, R) of all
-        evaluations."""
+        """An array of all E evaluations.
+
+        Args:
+            name: "points" (E, d), "goals" (E, 1 or 2), "figures" (E, R, k) or "reached" (E, R).
+        """
         return np.concatenate(self._parts[name])
 
     @property
     def evaluations(self) -> int:
+        """The number of evaluations."""
         return self.ends[-1] if self.ends else 0
 
     @property
     def best(self) -> int:
-        """Which evaluation is best; of two goals the one nearest to both of the front's ends, each
-        goal over its range."""
+        """Index of the best evaluation.
+
+        For two goals it is the one nearest to both ends of the front, each goal over its range.
+        """
         goals = self.all("goals")
         if goals.shape[1] == 1:
             return int(goals[:, 0].argmin())
-        front = self.front()
-        low, high = goals[front].min(axis=0), goals[front].max(axis=0)
+        pareto_front = self.pareto_front()
+        low, high = goals[pareto_front].min(axis=0), goals[pareto_front].max(axis=0)
         return int(
-            front[
+            pareto_front[
                 np.linalg.norm(
-                    (goals[front] - low) / np.maximum(high - low, 1e-300), axis=1
+                    (goals[pareto_front] - low) / np.maximum(high - low, 1e-300), axis=1
                 ).argmin()
             ]
         )
 
-    def front(self) -> np.ndarray:
-        """The evaluations that none other beats in all goals, by their first goal."""
+    def pareto_front(self) -> np.ndarray:
+        """Indices of the evaluations that no other beats in all goals, by the first goal."""
         goals = self.all("goals")
-        order, kept, least = np.lexsort(goals.T[::-1]), [], np.inf
+        order, members, least = np.lexsort(goals.T[::-1]), [], np.inf
         for k in order:
             if goals[k, -1] < least:
-                kept.append(k)
+                members.append(k)
                 least = goals[k, -1]
-        return np.array(kept)
+        return np.array(members)
 
-    def merit(self, generation: int) -> float:
-        """The best J after so many generations; of two goals minus the area between the front and
-        the first median."""
+    def convergence_measure(self, generation: int) -> float:
+        """The best J after so many generations.
+
+        For two goals: minus the area between the front and the median of the first generation.
+        """
         goals = self.all("goals")
-        seen = goals[: self.ends[generation - 1]]
+        tried = goals[: self.ends[generation - 1]]
         if goals.shape[1] == 1:
-            return float(seen[:, 0].min())
+            return float(tried[:, 0].min())
         corner = np.median(self._parts["goals"][0], axis=0)
-        inside = seen[(seen < corner).all(axis=1)]
+        inside = tried[(tried < corner).all(axis=1)]
         order, area, top = inside[np.argsort(inside[:, 0])], 0.0, corner[1]
         for x, y in order:
             if y < top:
@@ -148,8 +181,17 @@ class History:
     def run(
         self, names: list[str], values: np.ndarray, goals: tuple[str, ...], meta: dict[str, Any]
     ) -> fx.Run:
-        """As a Run whose "time" is the number of the generation: the best so far, the generation's
-        median, its settings."""
+        """The history as a Run over the number of the generation.
+
+        Args:
+            names: of the free settings.
+            values: their values (E, d).
+            goals: names of the goals.
+            meta: further metadata.
+
+        Returns:
+            Channels: best and median of the goals, evaluations, and the best settings so far.
+        """
         every, count = self.all("goals"), len(self)
         starts = [0, *self.ends[:-1]]
         channels, best = {}, np.array([int(every[:end, 0].argmin()) for end in self.ends])

@@ -1,13 +1,14 @@
-"""What is possible on a structure of the cases: an LQR with observer (`flexura.lqr`), its weights
-tuned for case 2's J.
+"""The LQR with observer (`flexura.lqr`) that results are compared with, tuned for case 2's J.
 
-It knows two modes of the strip, linear about a place on the way, measures what the rig does (joints
-and tip deflection), and has the same step, sampling and drive limits; it is tried on three modes,
-as it may not stir up one that it doesn't know, and what comes out runs on the whole mesh. It needs
-a force in every joint: where the cases have a stepper's rate, it has the torque up to which the
-stepper's field holds, with no limit to rate and acceleration. Free are that place, the filters of
-the set-points, and the weights: of each output in parts of its limit, of the strip's deflection and
-rate, and of the measurements' noise. A joint's weight is its way.
+It is designed on two modes of the strip, linear about a place on the way, and measures what the rig
+measures (joints and tip deflection). It has the same step, sampling and drive limits. It is tried
+on three modes, because it must not excite a mode that it does not know; the result runs on the
+whole mesh.
+
+It needs a force in every joint. Instead of a stepper's rate it has the torque that the stepper can
+hold, without limits of rate and acceleration. Free are the place, the filters of the set-points,
+and the weights of each output, of the strip's deflection and rate, and of the measurements' noise.
+A joint's weight is its step.
 """
 
 from __future__ import annotations
@@ -27,19 +28,19 @@ from flexura.errors import InputError
 from flexura.simulation import trials
 
 from .cases import Structure
-from .closed_loop import under
+from .closed_loop import closed_loop_controller
 from .history import History
 from .result import RTOL, figures
 from .search import Search, search
-from .search_space import Free, settings
-from .task import reduced
+from .search_space import FreeGain, settings
+from .task import with_modes
 
-HOW = Search("ga", population=30, generations=30, seed=1, polish=40)
+SEARCH = Search("ga", population=30, generations=30, seed=1, polish=40)
 
 
 @dataclass(frozen=True)
-class Reference:
-    """The best design: its J, weights by name, Run and figures."""
+class LqrBaseline:
+    """The best design: its J, weights by name, Run and step response."""
 
     J: float
     weights: dict[str, float]
@@ -48,38 +49,44 @@ class Reference:
     evaluations: int
 
 
-class Designs:
-    """Designs of one structure as a search sees them: points of the unit cube in, the figures of
-    runs out."""
+class LqrDesigns:
+    """Designs of one structure as a search sees them: points of the unit cube in, metrics out."""
 
     def __init__(self, structure: Structure) -> None:
         self.structure, self.task = structure, structure.task(2)
         numbers = range(1, len(structure.ends) + 1)
         self.free = (
-            *[Free(f"effort_{i}", 0.01, 100.0, "log") for i in numbers],
-            *[Free(f"setpoint_{i}_Hz", 0.2, 50.0, "log") for i in numbers],
-            Free("place", 0.0, 1.0, "linear"),
-            Free("deflection_m", 1e-4, 1.0, "log"),
-            Free("damping_s", 1e-3, 1.0, "log"),
-            Free("noise", 1e-6, 1e-2, "log"),
+            *[FreeGain(f"effort_{i}", 0.01, 100.0, "log") for i in numbers],
+            *[FreeGain(f"setpoint_{i}_Hz", 0.2, 50.0, "log") for i in numbers],
+            FreeGain("place", 0.0, 1.0, "linear"),
+            FreeGain("deflection_m", 1e-4, 1.0, "log"),
+            FreeGain("damping_s", 1e-3, 1.0, "log"),
+            FreeGain("noise", 1e-6, 1e-2, "log"),
         )
         self.pareto, self.goals, self.score = False, self.task.goals, self.task.score
 
     def start(self) -> np.ndarray:
+        """The middle of the unit cube (d,)."""
         return np.full(len(self.free), 0.5)
 
     @cached_property
     def plant(self) -> fx.System:
-        """With a mode that the design doesn't know."""
-        return fx.assemble(reduced(self.structure.robot, self.task.modes + 1))
+        """The robot with one mode more than the design knows."""
+        return fx.assemble(with_modes(self.structure.robot, self.task.modes + 1))
 
     def controller(self, values: np.ndarray) -> fx.Controller:
-        """The design (d,), on two modes. Raises InputError where there is none."""
+        """The design for settings (d,), on two modes.
+
+        Raises:
+            InputError: there is none.
+        """
         system = self.task.systems[0]
         named = {f.name: float(v) for f, v in zip(self.free, values, strict=True)}
-        given, count = self.structure.reference, len(self.structure.ends)
+        given, count = self.structure.lqr_limits, len(self.structure.ends)
         own = {name: named[name] for name in named if name.startswith("setpoint")}
-        plain = under(system, self.structure.manoeuvre, Gains(given.settings | own, given.outputs))
+        plain = closed_loop_controller(
+            system, self.structure.manoeuvre, Gains(given.settings | own, given.outputs)
+        )
         limits = np.array([pid.limit for pid in plain.joints if isinstance(pid, fx.PID)])
         start, rows = system.start(), system.joint_rows
         way = np.zeros(system.n)
@@ -97,11 +104,14 @@ class Designs:
         )[0]
 
     def __call__(self, points: np.ndarray, limits: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """As `engine.Runs`: figures (B, 1, k) and fractions reached (B, 1); weights without a
-        design have reached nothing."""
-        m, prices = self.structure.manoeuvre, self.task.prices
+        """Evaluate points (B, d); as `executor.Evaluator`. Weights without a design reach nothing.
+
+        Returns:
+            Metrics (B, 1, k) and fractions reached (B, 1).
+        """
+        m, cost_weights = self.structure.manoeuvre, self.task.cost_weights
         out, reached = (
-            np.full((len(points), 1, prices.shape[1]), np.nan),
+            np.full((len(points), 1, cost_weights.shape[1]), np.nan),
             np.zeros((len(points), 1)),
         )
         for k, values in enumerate(settings(self.free, points)):
@@ -109,23 +119,33 @@ class Designs:
                 drive = self.controller(values)
             except InputError:
                 continue
-            one = trials(self.plant, drive, m.duration_s, m.output_step_s, self.task.rtol)
-            out[k], reached[k] = one.run(drive.gains()[None], prices, limits[k : k + 1])
+            case = trials(self.plant, drive, m.duration_s, m.output_step_s, self.task.rtol)
+            out[k], reached[k] = case.run(drive.gains()[None], cost_weights, limits[k : k + 1])
         return out, reached
 
     def digest(self) -> str:
+        """Digest of the structure and the search."""
         free = [(f.name, f.low, f.high) for f in self.free]
-        about = [self.task.spec(), self.structure.reference.settings, free, HOW.identity()]
+        about = [self.task.spec(), self.structure.lqr_limits.settings, free, SEARCH.identity()]
         return hashlib.sha256(json.dumps(about, sort_keys=True, default=str).encode()).hexdigest()
 
 
-def reference(
+def tune_lqr_baseline(
     structure: Structure, folder: Path, report: Any = lambda history: None
-) -> Reference | None:
-    """The best design, found and stored in `folder` generation by generation; None: interrupted."""
-    designs = Designs(structure)
+) -> LqrBaseline | None:
+    """Tune the LQR, stored in a folder generation by generation.
+
+    Args:
+        structure: of the cases.
+        folder: where it is stored.
+        report: called after each generation.
+
+    Returns:
+        The best design; None: interrupted.
+    """
+    designs = LqrDesigns(structure)
     history = History.open(folder, designs.digest())
-    if not search(designs, HOW, designs, history, report):
+    if not search(designs, SEARCH, designs, history, report):
         return None
     values = settings(designs.free, history.all("points")[history.best][None])[0]
     controller = designs.controller(values)
@@ -133,7 +153,7 @@ def reference(
     run.meta["manoeuvre"] = structure.manoeuvre.name
     run.save(folder / "best")
     weights = {f.name: float(v) for f, v in zip(designs.free, values, strict=True)}
-    return Reference(
+    return LqrBaseline(
         float(history.all("goals").min()),
         weights,
         run,

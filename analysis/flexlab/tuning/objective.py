@@ -1,14 +1,14 @@
-"""What a controller is judged by: one number from the figures of a run, or two for a Pareto front.
+"""The objective of a search: one number from the metrics of a run, or two for a Pareto front.
 
-    J = sum_i ( itae_i / 1 s^2 + overshoot_weight max(0, overshoot_i - overshoot_free) +
-    effort_weight effort_i )
+    J = sum_i ( itae_i / 1 s^2 + overshoot_weight max(0, overshoot_i - overshoot_free)
+                + effort_weight effort_i )
         + vibration_weight vibration / (L 1 s^2)
 
-Figures as in `response.py`; L the length of the last flexible link. A run that doesn't come to its
-end (a joint limit, a bent link, chatter) counts FAILED (2 - the fraction of the time it reached),
-far above any run that does. Of several robots the worst counts. A run that was abandoned as worse
-than what a search can use counts what J had come to by then. Pareto: settling time of the slowest
-joint [s] against rms of the tip deflection [mm]; a joint that doesn't settle counts twice the
+Metrics are those of `flexura.control`; L is the length of the last flexible link. A run that does
+not reach its end (a joint limit, a bent link, chatter) costs FAILURE_COST (2 - the fraction of the
+time it reached), far above any run that does. Of several robots the worst counts. A run that was
+stopped because a search cannot use it counts its J until then. Pareto: settling time of the slowest
+joint [s] against rms of the tip deflection [mm]; a joint that does not settle counts twice the
 duration and its error.
 """
 
@@ -22,7 +22,7 @@ from flexura.control import EFFORT, ERROR, ITAE, JOINT, OVERSHOOT, RMS, SETTLING
 from flexura.errors import InputError
 from flexura.signals import finite
 
-FAILED = 1e3
+FAILURE_COST = 1e3
 HELP = """J = sum over joints of [ int t |r - q| dt / |step| + OVERSHOOT max(0, overshoot - 5 %)
 + EFFORT int (u / limit)^2 dt / T ] + VIBRATION int t |w - w(end)| dt / L
 times in s, w the tip deflection, L the link's length; capitals are the weights"""
@@ -59,16 +59,25 @@ class Weights:
         return f"J = sum_i [ {' + '.join(terms)} ]{strip}"
 
 
-def split(figures: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Figures (..., 6 N + 4) as those of the joints (..., N, 6) and of the strip (..., 4)."""
-    shape = figures.shape[:-1]
-    return figures[..., : -len(STRIP)].reshape(*shape, -1, len(JOINT)), figures[..., -len(STRIP) :]
+def split_metrics(metrics: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Split metrics (..., 6 N + 4) into those of N joints (..., N, 6) and of the strip (..., 4)."""
+    shape = metrics.shape[:-1]
+    return metrics[..., : -len(STRIP)].reshape(*shape, -1, len(JOINT)), metrics[..., -len(STRIP) :]
 
 
-def prices(weights: Weights, joints: int, length_m: float) -> np.ndarray:
-    """J as sum_k price_k max(0, figure_k - free_k): the prices and what is free, (2, 6 N + 4)."""
+def cost_weights(weights: Weights, joints: int, length_m: float) -> np.ndarray:
+    """Weights of J = sum_k weight_k max(0, metric_k - free_k).
+
+    Args:
+        weights: of J's terms.
+        joints: their number N.
+        length_m: L [m].
+
+    Returns:
+        Weights and what is free, (2, 6 N + 4).
+    """
     out = np.zeros((2, len(JOINT) * joints + len(STRIP)))
-    each, strip = split(out)
+    each, strip = split_metrics(out)
     each[0, :, ITAE], each[0, :, OVERSHOOT], each[0, :, EFFORT] = (
         1.0,
         weights.overshoot,
@@ -79,18 +88,35 @@ def prices(weights: Weights, joints: int, length_m: float) -> np.ndarray:
     return out
 
 
-def single(figures: np.ndarray, reached: np.ndarray, prices: np.ndarray) -> np.ndarray:
-    """J (B, 1) of figures (B, R, 6 N + 4) of R robots, the worst of them, and the fractions reached
-    (B, R)."""
-    paid = prices[0] > 0
-    price, free = prices[:, paid]
-    total = (price * np.maximum(0.0, figures[..., paid] - free)).sum(axis=-1)
+def scalar_cost(metrics: np.ndarray, reached: np.ndarray, cost_weights: np.ndarray) -> np.ndarray:
+    """J of the worst of R robots.
+
+    Args:
+        metrics: (B, R, 6 N + 4).
+        reached: fractions of the time reached (B, R).
+        cost_weights: as the function of this name returns them.
+
+    Returns:
+        (B, 1).
+    """
+    paid = cost_weights[0] > 0
+    weight, free = cost_weights[:, paid]
+    total = (weight * np.maximum(0.0, metrics[..., paid] - free)).sum(axis=-1)
     return _worst(total[..., None], reached)
 
 
-def double(figures: np.ndarray, reached: np.ndarray, duration_s: float) -> np.ndarray:
-    """Settling time [s] and rms of the deflection [mm], (B, 2), the worst of R robots of each."""
-    joints, strip = split(figures)
+def two_objectives(metrics: np.ndarray, reached: np.ndarray, duration_s: float) -> np.ndarray:
+    """Settling time [s] and rms of the deflection [mm] of the worst of R robots.
+
+    Args:
+        metrics: (B, R, 6 N + 4).
+        reached: fractions of the time reached (B, R).
+        duration_s: of the manoeuvre [s].
+
+    Returns:
+        (B, 2).
+    """
+    joints, strip = split_metrics(metrics)
     late = duration_s * (2 + joints[..., ERROR])
     settling = np.where(np.isfinite(joints[..., SETTLING]), joints[..., SETTLING], late).max(
         axis=-1
@@ -99,7 +125,6 @@ def double(figures: np.ndarray, reached: np.ndarray, duration_s: float) -> np.nd
 
 
 def _worst(values: np.ndarray, reached: np.ndarray) -> np.ndarray:
-    whole = np.where(
-        np.isfinite(values), values, FAILED * (2.0 - reached)[..., None]
-    )  # figures that failed are NaN
+    # metrics of failed runs are NaN
+    whole = np.where(np.isfinite(values), values, FAILURE_COST * (2.0 - reached)[..., None])
     return whole.max(axis=1)

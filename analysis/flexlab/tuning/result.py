@@ -16,7 +16,7 @@ from flexura.control import Gains, Response, of_run
 from flexura.io import write_bytes
 
 from . import search_space as freedom
-from .closed_loop import under
+from .closed_loop import closed_loop_controller
 from .history import History
 from .objective import HELP
 from .search import Search
@@ -67,7 +67,7 @@ def simulated(
     system: fx.System, asked: fx.Manoeuvre, gains: Gains, settled: float | None = None
 ) -> tuple[fx.Run, Response]:
     """A run under gains, and its figures."""
-    controller = under(system, asked, gains)
+    controller = closed_loop_controller(system, asked, gains)
     run = fx.simulate(system, asked.t, controller, rtol=RTOL)
     run.meta["manoeuvre"] = asked.name
     return run, figures(run, controller, settled)
@@ -98,7 +98,7 @@ def save(found: Result, folder: Path) -> list[Path]:
     values = task.values(history.all("points"))
     history.run([f.name for f in task.free], values, task.goals, found.meta()).save(paths[2])
     if task.pareto:
-        for number, k in enumerate(history.front(), 1):
+        for number, k in enumerate(history.pareto_front(), 1):
             task.tuned(values[k]).write(folder / "front" / f"gains-{number:02d}.toml")
         paths.append(folder / "front")
     drawing = figure(found)
@@ -153,7 +153,7 @@ def table(found: Result) -> Table:
     ]
     lines += [f"worst of {len(task.robots)} robots"] if len(task.robots) > 1 else []
     lines += (
-        [f"{len(history.front())} gains on the front, these are the balanced ones"]
+        [f"{len(history.pareto_front())} gains on the front, these are the balanced ones"]
         if task.pareto
         else [task.weights.text()]
     )
@@ -203,7 +203,9 @@ def numbers(found: Result) -> dict[str, Any]:
         "robots": [
             {"robot": _robot(found, k)} | r.numbers() for k, r in enumerate(found.responses)
         ],
-        "front": [list(map(float, found.history.all("goals")[k])) for k in found.history.front()]
+        "front": [
+            list(map(float, found.history.all("goals")[k])) for k in found.history.pareto_front()
+        ]
         if found.task.pareto
         else None,
     } | found.meta()
@@ -218,7 +220,7 @@ def figure(found: Result) -> Any:
     left, right = drawing.subplots(1, 2)
     goals = history.all("goals")
     if found.task.pareto:
-        front = history.front()
+        front = history.pareto_front()
         left.plot(goals[:, 0], goals[:, 1], ".", color="0.8", markersize=3, label="all tried")
         left.plot(goals[front, 0], goals[front, 1], "o-", color="C0", markersize=3, label="front")
         left.plot(*found.best, "D", color="C3", label="balanced")

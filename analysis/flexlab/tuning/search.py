@@ -1,13 +1,12 @@
-"""The search: pymoo's algorithms by ask and tell, one call of the engine a generation, every
-generation stored.
+"""The search: pymoo's algorithms by ask and tell, one call of the executor a generation.
 
-The algorithms are deterministic for a seed, so that what is stored is not their state but what they
-were told: a search that goes on asks again for the stored generations and tells their goals instead
-of running them. That holds for all four alike.
+Every generation is stored. The algorithms are deterministic for a seed, so that their state need
+not be stored: a search that continues asks again for the stored generations and gets their goals
+instead of running them.
 
-A run is abandoned where it is certain that the search has no use for it: one worse than every
-parent does not survive in the genetic algorithm, one worse than its particle's own best changes
-nothing in the swarm. The search goes the same way as without.
+A run is stopped once it is certainly useless to the search. In the genetic algorithm, a candidate
+worse than every parent does not survive. In the swarm, one worse than its particle's own best
+changes nothing. The search is the same as without this.
 """
 
 from __future__ import annotations
@@ -22,9 +21,9 @@ import numpy as np
 from flexura.errors import FlexuraError, InputError
 from flexura.population import program
 
-from .executor import Runs
+from .executor import Evaluator
 from .history import History
-from .objective import FAILED
+from .objective import FAILURE_COST
 
 ALGORITHMS = {
     "ga": (
@@ -35,14 +34,18 @@ ALGORITHMS = {
     "cma-es": "covariance matrix adaptation",
     "nsga2": "Pareto front: two goals",
 }
-POLISHERS, NEAR = 16, 0.2  # individuals of a polish, and how far they begin from the best
-SAME = 1e-3  # an improvement by less than this fraction is none
+# individuals of a polish, and their initial distance from the best point
+POLISH_POPULATION, POLISH_SIGMA = 16, 0.2
+MIN_IMPROVEMENT = 1e-3  # an improvement by less than this fraction is none
 
 
 @dataclass(frozen=True)
 class Search:
-    """How to search; `patience`: generations without an improvement after which it ends; `polish`:
-    generations of a local CMA-ES from the best point after that."""
+    """How to search.
+
+    `patience`: generations without an improvement after which the search ends. `polish`:
+    generations of a local CMA-ES that starts from the best point after that.
+    """
 
     algorithm: str = "ga"
     population: int = 50
@@ -69,7 +72,7 @@ class Search:
                 )
 
     def identity(self) -> dict[str, Any]:
-        """What makes its generations what they are, the solver too; its ends do not."""
+        """What determines the generations, the solver included; the ends do not."""
         own = {
             "algorithm": self.algorithm,
             "population": self.population,
@@ -81,26 +84,55 @@ class Search:
         )
 
 
-class Sought(Protocol):
-    """What a search asks of a task: how many settings are free, where to start, and the goals of an
-    engine's figures."""
+class SearchProblem(Protocol):
+    """What a search needs of a task: free settings, start, and the goals from metrics."""
 
     @property
-    def free(self) -> Sized: ...
+    def free(self) -> Sized:
+        """The free settings, d of them."""
+        ...
+
     @property
-    def pareto(self) -> bool: ...
+    def pareto(self) -> bool:
+        """Whether there are two goals."""
+        ...
+
     @property
-    def goals(self) -> tuple[str, ...]: ...
-    def start(self) -> np.ndarray: ...
-    def score(self, figures: np.ndarray, reached: np.ndarray) -> np.ndarray: ...
+    def goals(self) -> tuple[str, ...]:
+        """Names of the goals."""
+        ...
+
+    def start(self) -> np.ndarray:
+        """The point (d,) to start from."""
+        ...
+
+    def score(self, metrics: np.ndarray, reached: np.ndarray) -> np.ndarray:
+        """The goals (B, 1 or 2) from metrics (B, R, k) and fractions reached (B, R)."""
+        ...
 
 
 def search(
-    task: Sought, how: Search, engine: Runs, history: History, progress: Callable[[History], None]
+    task: SearchProblem,
+    how: Search,
+    evaluate: Evaluator,
+    history: History,
+    progress: Callable[[History], None],
 ) -> bool:
-    """Go on from what `history` holds to the end of the search; every generation is stored as it is
-    done. True: to its end, not interrupted. Raises InputError where the stored generations are not
-    this search's."""
+    """Continue the search in `history` to its end; every generation is stored when done.
+
+    Args:
+        task: what is optimised.
+        how: the search.
+        evaluate: evaluates points.
+        history: stored generations.
+        progress: called after each generation.
+
+    Returns:
+        True: to its end; False: interrupted.
+
+    Raises:
+        InputError: options do not fit, or the stored generations are another search's.
+    """
     from pymoo.algorithms.soo.nonconvex.cmaes import CMAES
 
     if task.pareto != (how.algorithm == "nsga2"):
@@ -115,19 +147,28 @@ def search(
         )
     try:
         done = _stage(
-            _algorithm(how, task.start()), how.generations, how, task, engine, history, progress, 0
+            _algorithm(how, task.start()),
+            how.generations,
+            how,
+            task,
+            evaluate,
+            history,
+            progress,
+            0,
         )
         if how.polish:
             best = history.all("points")[
                 int(history.all("goals")[: history.ends[done - 1], 0].argmin())
             ]
-            local = CMAES(x0=best, sigma=NEAR, popsize=POLISHERS, tolfun=1e-6, tolx=1e-5)
+            local = CMAES(
+                x0=best, sigma=POLISH_SIGMA, popsize=POLISH_POPULATION, tolfun=1e-6, tolx=1e-5
+            )
             _stage(
                 local,
                 how.polish,
                 replace(how, patience=how.polish),
                 task,
-                engine,
+                evaluate,
                 history,
                 progress,
                 done,
@@ -143,14 +184,17 @@ def _stage(
     algorithm: Any,
     generations: int,
     how: Search,
-    task: Sought,
-    engine: Runs,
+    task: SearchProblem,
+    evaluate: Evaluator,
     history: History,
     progress: Callable[[History], None],
     first: int,
 ) -> int:
-    """One algorithm to its end, its generations being the history's from `first` on; how many there
-    are after it."""
+    """Run one algorithm to its end; its generations are the history's from `first` on.
+
+    Returns:
+        The number of generations after it.
+    """
     from pymoo.core.evaluator import Evaluator
     from pymoo.core.problem import Problem
     from pymoo.problems.static import StaticProblem
@@ -166,12 +210,12 @@ def _stage(
             break
         points = np.asarray(asked.get("X"), dtype=float)
         if generation < len(history):
-            goals = history.told(generation, points)
+            goals = history.goals_for_algorithm(generation, points)
         else:
             begun = time.perf_counter()
-            figures, reached = engine(points, limits(algorithm, len(points)))
-            goals = task.score(figures, reached)
-            history.add(points, goals, figures, reached, time.perf_counter() - begun)
+            metrics, reached = evaluate(points, limits(algorithm, len(points)))
+            goals = task.score(metrics, reached)
+            history.append(points, goals, metrics, reached, time.perf_counter() - begun)
             progress(history)
         Evaluator().eval(StaticProblem(problem, F=goals), asked)
         algorithm.tell(infills=asked)
@@ -180,8 +224,10 @@ def _stage(
 
 
 def _algorithm(how: Search, start: np.ndarray) -> Any:
-    """pymoo's algorithm; its first generation is a Latin hypercube with `start` in it, CMA-ES
-    begins there."""
+    """pymoo's algorithm. Its first generation is a Latin hypercube with `start` in it.
+
+    CMA-ES begins at `start`.
+    """
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.algorithms.soo.nonconvex.cmaes import CMAES
     from pymoo.algorithms.soo.nonconvex.ga import GA
@@ -211,15 +257,21 @@ def _algorithm(how: Search, start: np.ndarray) -> Any:
 
 
 def _winners(population: Any, drawn: np.ndarray, **_: Any) -> np.ndarray:
-    """The best (k, 1) of each tournament (k, 3); pymoo's own comparison looks at the first two
-    only."""
+    """The best (k, 1) of each tournament (k, 3); pymoo's comparison looks at two only."""
     J = population.get("F")[:, 0]
     return drawn[np.arange(len(drawn)), J[drawn].argmin(axis=1)][:, None]
 
 
 def limits(algorithm: Any, count: int) -> np.ndarray:
-    """The J (count,) above which each of the points just asked for is of no use, inf where every J
-    is: CMA-ES ranks all."""
+    """The J above which each of the points just asked for is useless.
+
+    Args:
+        algorithm: pymoo's algorithm.
+        count: number of points.
+
+    Returns:
+        (count,), inf if every J matters: CMA-ES ranks all.
+    """
     from pymoo.algorithms.soo.nonconvex.ga import GA
     from pymoo.algorithms.soo.nonconvex.pso import PSO
 
@@ -231,11 +283,13 @@ def limits(algorithm: Any, count: int) -> np.ndarray:
         out[:] = known  # a particle's own best
     elif len(known) == algorithm.pop_size:
         out[:] = known.max()  # of equals the parents survive
-    return np.where(out < FAILED, out, np.inf)  # what a failure costs is not known before
+    return np.where(out < FAILURE_COST, out, np.inf)  # what a failure costs is not known before
 
 
 def _stagnant(history: History, generation: int, patience: int) -> bool:
-    """Was there no improvement in the last `patience` generations before this one? Of two goals: of
-    the front's area."""
-    now, before = history.merit(generation), history.merit(generation - patience)
-    return bool(before - now <= SAME * abs(before))
+    """Whether the last `patience` generations brought no improvement."""
+    now, before = (
+        history.convergence_measure(generation),
+        history.convergence_measure(generation - patience),
+    )
+    return bool(before - now <= MIN_IMPROVEMENT * abs(before))

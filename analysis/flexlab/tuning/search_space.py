@@ -1,8 +1,8 @@
-"""Which settings of a controller are free, between what bounds, and how a point of the unit cube
-becomes gains.
+"""The free settings of a controller, their bounds, and gains at points of the unit cube.
 
-[free] kp_1_V_m = [100, 20000]                                    # both of one sign: on a
-logarithmic scale kg_2_rad_m = { low = -2, high = 2, scale = "linear" }      # through 0: linear
+[free]
+kp_1_V_m = [100, 20000]                                   # one sign: logarithmic scale
+kg_2_rad_m = { low = -2, high = 2, scale = "linear" }     # through 0: linear
 """
 
 from __future__ import annotations
@@ -40,24 +40,26 @@ SCALES = ("log", "linear")
 
 
 @dataclass(frozen=True)
-class Free:
-    """One free setting, by its name in a gains file, with its bounds in the file's unit."""
+class FreeGain:
+    """A free setting, by its name in a gains file, with its bounds in the file's unit."""
 
     name: str
     low: float
     high: float
     scale: str
 
-    def value(self, u: np.ndarray) -> np.ndarray:
-        """The setting at places u between 0 and 1: low + (high - low) u, or low (high / low)^u."""
+    def from_unit_interval(self, u: np.ndarray) -> np.ndarray:
+        """The setting at places u (B,) between 0 and 1.
+
+        low + (high - low) u, or low (high / low)^u on a logarithmic scale.
+        """
         u = np.clip(u, 0.0, 1.0)
         if self.scale == "linear":
             return self.low + (self.high - self.low) * u
         return self.low * (self.high / self.low) ** u
 
-    def place(self, value: float) -> float:
-        """Where a setting's value is between its bounds, 0 to 1; the nearer bound where it is
-        outside."""
+    def to_unit_interval(self, value: float) -> float:
+        """Place of a value between its bounds, 0 to 1; the nearer bound if it is outside."""
         if self.scale == "linear":
             return float(np.clip((value - self.low) / (self.high - self.low), 0.0, 1.0))
         ratio = value / self.low
@@ -68,9 +70,18 @@ class Free:
         )
 
 
-def free(name: str, low: Any, high: Any, scale: str | None = None) -> Free:
-    """A free setting; by default on a logarithmic scale unless its bounds have 0 between them.
-    Raises InputError."""
+def free_gain(name: str, low: Any, high: Any, scale: str | None = None) -> FreeGain:
+    """A free setting.
+
+    Args:
+        name: as in a gains file.
+        low: lower bound, in the file's unit.
+        high: upper bound.
+        scale: "log" or "linear"; by default logarithmic, unless 0 lies between the bounds.
+
+    Raises:
+        InputError: the name is unknown, or the bounds do not fit.
+    """
     if name not in NAMES and name not in _FILTERS:
         expected = "expected a setting of a gains file, see firmware/README.md, the controller"
         raise InputError(expected, key=f"free.{name}", value=name)
@@ -85,11 +96,15 @@ def free(name: str, low: Any, high: Any, scale: str | None = None) -> Free:
         raise InputError(expected, key=f"free.{name}", value=[low, high])
     if any(field in ("delay_s", "encoder") for _, _, field in NAMES.get(name, ())):
         raise InputError("expected a gain, a limit or a filter", key=f"free.{name}", value=name)
-    return Free(name, float(low), float(high), scale or ("log" if low * high > 0 else "linear"))
+    return FreeGain(name, float(low), float(high), scale or ("log" if low * high > 0 else "linear"))
 
 
-def read(path: Path) -> list[Free]:
-    """The table [free] of a TOML file."""
+def read(path: Path) -> list[FreeGain]:
+    """Read the table [free] of a TOML file.
+
+    Raises:
+        InputError: names file, key, value and what was expected.
+    """
     data = read_toml(path)
     try:
         for key in data:
@@ -103,17 +118,21 @@ def read(path: Path) -> list[Free]:
         raise error.in_file(str(path)) from None
 
 
-def _entry(name: str, entry: Any) -> Free:
+def _entry(name: str, entry: Any) -> FreeGain:
     if isinstance(entry, list) and len(entry) == 2:
-        return free(name, entry[0], entry[1])
+        return free_gain(name, entry[0], entry[1])
     if isinstance(entry, dict) and {"low", "high"} <= set(entry) <= {"low", "high", "scale"}:
-        return free(name, entry["low"], entry["high"], entry.get("scale"))
+        return free_gain(name, entry["low"], entry["high"], entry.get("scale"))
     expected = "expected [low, high] or { low, high, scale }"
     raise InputError(expected, key=f"free.{name}", value=entry)
 
 
-def from_flag(text: str) -> Free:
-    """NAME=LOW:HIGH of the command line."""
+def from_option(text: str) -> FreeGain:
+    """A free setting from NAME=LOW:HIGH of the command line.
+
+    Raises:
+        InputError: the text has another form.
+    """
     name, _, bounds = text.partition("=")
     try:
         low, high = map(float, bounds.split(":"))
@@ -121,32 +140,42 @@ def from_flag(text: str) -> Free:
         raise InputError(
             "expected NAME=LOW:HIGH, for example kp_1_V_m=100:20000", key="--free", value=text
         ) from None
-    return free(name.strip(), low, high)
+    return free_gain(name.strip(), low, high)
 
 
-def usual(gains: Gains) -> list[Free]:
-    """Without a word: every gain of the file that isn't 0, from a tenth to ten times its value."""
+def default_bounds(gains: Gains) -> list[FreeGain]:
+    """Every gain of a file that is not 0, from a tenth to ten times its value."""
     out = []
     for name, value in gains.settings.items():
         if value != 0.0 and name in NAMES and NAMES[name][0][2] in GAINS:
-            out.append(free(name, min(value / 10, value * 10), max(value / 10, value * 10)))
+            out.append(free_gain(name, min(value / 10, value * 10), max(value / 10, value * 10)))
     return out
 
 
-def settings(frees: Sequence[Free], points: np.ndarray) -> np.ndarray:
+def settings(frees: Sequence[FreeGain], points: np.ndarray) -> np.ndarray:
     """Values (B, d) of the free settings at points (B, d) of the unit cube."""
-    return np.column_stack([f.value(points[:, k]) for k, f in enumerate(frees)])
+    return np.column_stack([f.from_unit_interval(points[:, k]) for k, f in enumerate(frees)])
 
 
-def named(frees: Sequence[Free], values: np.ndarray) -> dict[str, float]:
+def named(frees: Sequence[FreeGain], values: np.ndarray) -> dict[str, float]:
+    """The values (d,) by the names of the free settings."""
     return {f.name: float(v) for f, v in zip(frees, values, strict=True)}
 
 
 def rows(
-    frees: Sequence[Free], values: np.ndarray, controller: fx.Controller, base: np.ndarray
+    frees: Sequence[FreeGain], values: np.ndarray, controller: fx.Controller, base: np.ndarray
 ) -> np.ndarray:
-    """`Controller.gains` (B, N, 20) of values (B, d): those of `controller`, `base` (N, 20), but
-    for the free settings."""
+    """Rows of `Controller.gains` with free settings.
+
+    Args:
+        frees: the free settings.
+        values: their values (B, d).
+        controller: the controller.
+        base: its own gains (N, 20).
+
+    Returns:
+        (B, N, 20).
+    """
     out, period = np.repeat(base[None], len(values), axis=0), 1 / controller.rate_Hz
     for k, f in enumerate(frees):
         column = values[:, k]
@@ -163,9 +192,12 @@ def rows(
     return out
 
 
-def check(frees: Sequence[Free], gains: Gains) -> None:
-    """Raises InputError for a free setting that isn't one of this controller's joints and outputs,
-    or is there twice."""
+def check(frees: Sequence[FreeGain], gains: Gains) -> None:
+    """Check free settings against a controller.
+
+    Raises:
+        InputError: a setting is not one of its joints and outputs, or occurs twice.
+    """
     kinds = gains.kinds
     if not frees:
         raise InputError("expected at least one free setting", key="free")
@@ -185,6 +217,6 @@ def check(frees: Sequence[Free], gains: Gains) -> None:
             raise InputError("expected bounds above 0", key=f"free.{f.name}", value=[f.low, f.high])
 
 
-def spec(frees: Sequence[Free]) -> Mapping[str, Any]:
-    """As the table [free] of a file."""
+def spec(frees: Sequence[FreeGain]) -> Mapping[str, Any]:
+    """The free settings as the table [free] of a file."""
     return {f.name: {"low": f.low, "high": f.high, "scale": f.scale} for f in frees}

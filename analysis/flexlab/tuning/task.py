@@ -1,5 +1,7 @@
-"""What is tuned on what: robots, a manoeuvre, a controller with free settings, and an objective.
-Plain data, that travels."""
+"""What is tuned: robots, a manoeuvre, a controller with free settings, and an objective.
+
+All is plain data, which can be sent to workers.
+"""
 
 from __future__ import annotations
 
@@ -17,11 +19,10 @@ from flexura.control import PID, Gains
 from flexura.errors import InputError
 from flexura.simulation import Trials, trials
 
-from . import objective
-from . import search_space as freedom
-from .closed_loop import under
+from . import objective, search_space
+from .closed_loop import closed_loop_controller
 from .objective import Weights
-from .search_space import Free
+from .search_space import FreeGain
 
 # of a search's runs, whose steps the ticks bound; what comes out is simulated again to 1e-6, with
 # the mesh of the robot file
@@ -30,34 +31,39 @@ RTOL, MODES = 1e-3, 2
 
 @dataclass(frozen=True)
 class Task:
-    """Robots (the nominal one first), what they are to do, `gains` with its free settings, weights;
-    `pareto`: two objectives.
+    """Robots (the nominal one first), a manoeuvre, gains with free settings, and weights.
 
-    The runs of a search keep `modes` of each flexible link (0: what the robot file says).
+    `pareto`: two objectives. The runs of a search keep `modes` modes of each flexible link; 0: as
+    in the robot file.
     """
 
     robots: tuple[fx.Robot, ...]
     manoeuvre: fx.Manoeuvre
     gains: Gains
-    free: tuple[Free, ...]
+    free: tuple[FreeGain, ...]
     weights: Weights = field(default_factory=Weights)
     pareto: bool = False
     rtol: float = RTOL
     modes: int = MODES
 
     def __post_init__(self) -> None:
-        freedom.check(self.free, self.gains)
+        search_space.check(self.free, self.gains)
 
     @cached_property
     def systems(self) -> list[fx.System]:
-        """As the search has them."""
-        return [fx.assemble(reduced(robot, self.modes)) for robot in self.robots]
+        """The robots as the search simulates them."""
+        return [fx.assemble(with_modes(robot, self.modes)) for robot in self.robots]
 
     @cached_property
     def controllers(self) -> list[fx.Controller]:
-        """The controller of each robot with the file's own gains. Raises InputError for a joint
-        that has nowhere to go."""
-        out = [under(system, self.manoeuvre, self.gains) for system in self.systems]
+        """The controller of each robot with the file's own gains.
+
+        Raises:
+            InputError: a joint has no step.
+        """
+        out = [
+            closed_loop_controller(system, self.manoeuvre, self.gains) for system in self.systems
+        ]
         for joint, link in zip(out[0].joints, self.robots[0].links, strict=True):
             assert isinstance(joint, PID)
             if joint.reference(self.manoeuvre.duration_s)[0] == link.joint.start:
@@ -69,49 +75,58 @@ class Task:
 
     @property
     def length_m(self) -> float:
-        """Of the last flexible link, 1 where there is none."""
+        """Length of the last flexible link [m]; 1 if there is none."""
         return next(
             (link.length_m for link in reversed(self.robots[0].links) if link.flexible), 1.0
         )
 
     @property
     def goals(self) -> tuple[str, ...]:
+        """Names of the goals."""
         return ("settling_s", "rms_mm") if self.pareto else ("J",)
 
     def values(self, points: np.ndarray) -> np.ndarray:
-        return freedom.settings(self.free, points)
+        """Values (B, d) of the free settings at points (B, d)."""
+        return search_space.settings(self.free, points)
 
     def start(self) -> np.ndarray:
-        """The point (d,) of the file's own gains, the middle where the file is silent."""
+        """The point (d,) of the file's own gains; the middle for settings that it lacks."""
         own = self.gains.settings
-        return np.array([f.place(own[f.name]) if f.name in own else 0.5 for f in self.free])
+        return np.array(
+            [f.to_unit_interval(own[f.name]) if f.name in own else 0.5 for f in self.free]
+        )
 
     def tuned(self, values: np.ndarray) -> Gains:
-        """The gains file with the free settings at `values` (d,)."""
+        """The gains with the free settings at `values` (d,)."""
         return Gains(
-            self.gains.settings | freedom.named(self.free, values),
+            self.gains.settings | search_space.named(self.free, values),
             self.gains.outputs,
             self.gains.file,
         )
 
     @cached_property
-    def prices(self) -> np.ndarray:
-        """Of J."""
-        return objective.prices(self.weights, len(self.robots[0].links), self.length_m)
+    def cost_weights(self) -> np.ndarray:
+        """The weights of J, (2, k)."""
+        return objective.cost_weights(self.weights, len(self.robots[0].links), self.length_m)
 
     @cached_property
     def _rows(self) -> list[np.ndarray]:
         """The gains (N, 20) of each robot's controller."""
         return [c.gains() for c in self.controllers]
 
-    def score(self, figures: np.ndarray, reached: np.ndarray) -> np.ndarray:
-        """The goals (B, 1 or 2) from figures (B, R, k) and fractions reached (B, R)."""
+    def score(self, metrics: np.ndarray, reached: np.ndarray) -> np.ndarray:
+        """The goals (B, 1 or 2).
+
+        Args:
+            metrics: (B, R, k).
+            reached: fractions of the time reached (B, R).
+        """
         if self.pareto:
-            return objective.double(figures, reached, self.manoeuvre.duration_s)
-        return objective.single(figures, reached, self.prices)
+            return objective.two_objectives(metrics, reached, self.manoeuvre.duration_s)
+        return objective.scalar_cost(metrics, reached, self.cost_weights)
 
     def trials(self) -> list[Trials]:
-        """What runs are made with, one for each robot; for any number of threads."""
+        """The prepared runs of each robot; any number of threads may use them."""
         m = self.manoeuvre
         both = zip(self.systems, self.controllers, strict=True)
         return [
@@ -122,35 +137,46 @@ class Task:
     def run(
         self, robots: Sequence[Trials], points: np.ndarray, limits: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Figures (B, R, k) and fractions reached (B, R) at points (B, d) of the unit cube, each
-        abandoned where J exceeds its limit (B,), inf for none: its figures are then lower bounds, 0
-        on the robots that it was not tried on any more."""
+        """Run points of the unit cube on all robots.
+
+        A run is stopped if its J exceeds its limit. Its metrics are then lower bounds; they are 0
+        on robots that follow.
+
+        Args:
+            robots: as `trials` returns them.
+            points: (B, d).
+            limits: largest useful J (B,); inf or None: no limit.
+
+        Returns:
+            Metrics (B, R, k) and fractions of the time reached (B, R).
+        """
         limits = np.full(len(points), np.inf) if limits is None else limits
-        values, left = self.values(points), np.arange(len(points))
-        width = self.prices.shape[1]
-        figures, reached = (
+        values, remaining = self.values(points), np.arange(len(points))
+        width = self.cost_weights.shape[1]
+        metrics, reached = (
             np.zeros((len(points), len(robots), width)),
             np.zeros((len(points), len(robots))),
         )
-        for k, (one, controller, base) in enumerate(
+        for k, (case, controller, base) in enumerate(
             zip(robots, self.controllers, self._rows, strict=True)
         ):
-            found, far = one.run(
-                freedom.rows(self.free, values[left], controller, base), self.prices, limits[left]
+            found, fraction = case.run(
+                search_space.rows(self.free, values[remaining], controller, base),
+                self.cost_weights,
+                limits[remaining],
             )
-            figures[left, k], reached[left, k] = found, far
-            left = left[(far == 1.0) | np.isinf(limits[left])]
-        return figures, reached
+            metrics[remaining, k], reached[remaining, k] = found, fraction
+            remaining = remaining[(fraction == 1.0) | np.isinf(limits[remaining])]
+        return metrics, reached
 
     def spec(self) -> dict[str, Any]:
-        """All that the outcome depends on but the search, for metadata and to know a stored run
-        again."""
+        """All that the result depends on, except the search."""
         return {
             "robots": [robot.to_dict() for robot in self.robots],
             "manoeuvre": self.manoeuvre.spec(),
             "controller": self.gains.settings,
             "outputs": [{"kind": type(o).__name__, **vars(o)} for o in self.gains.outputs],
-            "free": freedom.spec(self.free),
+            "free": search_space.spec(self.free),
             "weights": vars(self.weights),
             "goals": list(self.goals),
             "rtol": self.rtol,
@@ -158,14 +184,14 @@ class Task:
         }
 
     def digest(self, more: dict[str, Any] | None = None) -> str:
-        """Of this task and `more`: to know it again."""
+        """Digest of this task and `more`, to recognise it."""
         return hashlib.sha256(
             json.dumps([self.spec(), more], sort_keys=True, default=str).encode()
         ).hexdigest()
 
 
-def reduced(robot: fx.Robot, modes: int) -> fx.Robot:
-    """The robot with so many modes of each flexible link, 0: as it is."""
+def with_modes(robot: fx.Robot, modes: int) -> fx.Robot:
+    """The robot with so many modes of each flexible link; 0: unchanged."""
     data = robot.to_dict()
     for table, link in zip(data["link"], robot.links, strict=True):
         if modes and link.flexible:
@@ -173,11 +199,16 @@ def reduced(robot: fx.Robot, modes: int) -> fx.Robot:
     return fx.Robot.from_dict(data)
 
 
-def varied(
+def perturbed_robots(
     robot: fx.Robot, payloads: Sequence[float] = (1.0,), stiffnesses: Sequence[float] = (1.0,)
 ) -> tuple[fx.Robot, ...]:
-    """The robot itself, then all combinations of factors on the payload (mass and inertia) and on
-    the links' stiffness."""
+    """The robot, then all combinations of factors on payload and stiffness.
+
+    Args:
+        robot: the nominal robot.
+        payloads: factors on the payload's mass and inertia.
+        stiffnesses: factors on the links' stiffness.
+    """
     out = [robot]
     for p in payloads:
         for s in stiffnesses:

@@ -1,1 +1,1 @@
-"""One link: quadrature, shapes, section, modes, and the pieces of its line."""
+"""One link by finite elements: section, quadrature, shapes, modes, and the pieces of its line."""

@@ -13,22 +13,22 @@ from .shapes import MeshShapes, element_of
 
 @dataclass(frozen=True)
 class Mesh(Piece):
-    """Equal elements one behind another; equal to the chain of them, and quick in NumPy."""
+    """Equal elements one behind another; equal to the chain of them, and fast in NumPy."""
 
     elements: tuple[Piece, ...] = ()
 
     @cached_property
     def xi(self) -> np.ndarray:
-        """The points of the angle, (P,)."""
+        """The points of the angle (P,)."""
         return np.concatenate([k + e.xi for k, e in enumerate(self.elements)]) / len(self.elements)
 
     @cached_property
     def weights(self) -> np.ndarray:
-        """Their weights on [0, 1], (P,)."""
+        """Weights of the points on [0, 1] (P,)."""
         return np.concatenate([e.weights for e in self.elements]) / len(self.elements)
 
     def at(self, xi: float) -> Place:
-        """Weights and shapes at a place xi: mostly a node, so that they are kept."""
+        """Weights and shapes at a place xi; mostly a node, so that they are kept."""
         if xi not in self._places:
             self._places[xi] = self.exactly_at(xi)
         return self._places[xi]
@@ -38,17 +38,25 @@ class Mesh(Piece):
         return {}
 
     def lagrange(self, xi: np.ndarray, derivative: int = 0) -> np.ndarray:
-        """Those of the element that xi (S,) is on, by xi: (S, P)."""
+        """Lagrange's polynomials of the element at each place, or their derivatives by xi.
+
+        Args:
+            xi: places (S,).
+            derivative: its order.
+
+        Returns:
+            (S, P).
+        """
         factor = len(self.elements) ** derivative
         return self._on(xi, lambda e, x: factor * e.lagrange(x, derivative), lambda e: 0.0)
 
     def integrals(self, xi: np.ndarray) -> np.ndarray:
-        """The weights w_j over the length at xi (S,) (13): (S, P)."""
+        """The weights w_j over the length at xi (S,) (13), (S, P)."""
         n = len(self.elements)
         return self._on(xi, lambda e, x: e.integrals(x) / n, lambda e: e.weights / n)
 
     def _on(self, xi: np.ndarray, here, behind) -> np.ndarray:  # type: ignore[no-untyped-def]
-        """Values (S, P) with `here` in the element that xi is on, `behind` in those before it."""
+        """Values (S, P): `here` in the element of each place, `behind` in those before it."""
         n, on = len(self.elements), element_of(len(self.elements), xi)
         out = np.zeros((len(xi), n, self.points // n))
         for k, element in enumerate(self.elements):

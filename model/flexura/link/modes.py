@@ -10,49 +10,81 @@ from .shapes import legendre_shapes
 
 
 def clamped_matrices(
-    law: Material, free: float, count: int, points: int, mass: float = 0.0, inertia: float = 0.0
+    properties: Material,
+    free: float,
+    count: int,
+    points: int,
+    mass: float = 0.0,
+    inertia: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """M [kg m^2] and K [N m] (count, count) of a straight link's clamped last `free` metres (17).
+    """Matrices of a straight link whose last `free` metres are clamped at their start (17).
 
-    The unknowns are the coefficients in the space (12); a payload of `mass` and `inertia` is at the
-    tip. The third array has the tip's deflection and angle of each shape, (2, count) [m, rad].
+    The unknowns are the coefficients in the space (12).
+
+    Args:
+        properties: mass and stiffness of the link.
+        free: the free length [m].
+        count: number of polynomials.
+        points: number of points.
+        mass: of a payload at the tip [kg].
+        inertia: of that payload [kg m^2].
+
+    Returns:
+        M [kg m^2] and K [N m], (count, count), and the tip's deflection and angle of each shape,
+            (2, count) [m, rad].
     """
-    L, ends = law.length, np.ones(1)
-    s, ds = law.quadrature(L - free, L, max(count + 3, points + 2))
+    L, ends = properties.length, np.ones(1)
+    s, ds = properties.quadrature(L - free, L, max(count + 3, points + 2))
     xi, B = (s - L + free) / free, legendre_shapes(count, gauss(points)[0])
     deflection, slope = (
         free * lagrange_integrals(points, xi) @ B,
         legendre_shapes(count, xi, 1) / free,
     )
     tip = np.vstack([free * lagrange_integrals(points, ends) @ B, legendre_shapes(count, ends)])
-    M = deflection.T @ ((law.mass_per_length(s) * ds)[:, None] * deflection)
+    M = deflection.T @ ((properties.mass_per_length(s) * ds)[:, None] * deflection)
     M += tip.T @ (np.array([[mass], [inertia]]) * tip)
-    return M, slope.T @ ((law.bending_stiffness(s) * ds)[:, None] * slope), tip
+    return M, slope.T @ ((properties.bending_stiffness(s) * ds)[:, None] * slope), tip
 
 
 def clamped_modes(
     M: np.ndarray, K: np.ndarray, tip: np.ndarray, kept: int, statics: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The lowest `kept` modes, mass-normalised, as columns (count, m), and omega^2 (m,) (18).
+    """The lowest modes of a clamped link, mass-normalised (18).
 
-    With `statics` the static shapes of a tip force and a tip moment join them, and the modes of
-    this smaller space are given. Each mode moves the tip to the left.
+    With `statics`, the static shapes of a tip force and a tip moment join them, and the modes of
+    this space are returned (19). Each mode moves the tip to the left.
+
+    Args:
+        M: mass matrix (count, count) [kg m^2].
+        K: stiffness matrix (count, count) [N m].
+        tip: the tip's deflection and angle of each shape (2, count).
+        kept: number of modes.
+        statics: whether static shapes join them.
+
+    Returns:
+        The modes as columns (count, m), and omega^2 (m,) [1/s^2].
     """
     lam, V = _modes(M, K)
     if kept < len(K):
         lam, V = lam[:kept], V[:, :kept]
         if statics:
-            V = np.column_stack([V, _rest_of_static_shapes(K, tip, lam, V)])
+            V = np.column_stack([V, _static_shape_residuals(K, tip, lam, V)])
             lam, X = _modes(V.T @ M @ V, V.T @ K @ V)
             V = V @ X
     return V * np.where(tip[0] @ V < 0, -1.0, 1.0), lam
 
 
 def orthogonal_shapes(K: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Shapes (count, count) whose stiffness is diagonal, and that diagonal (count,) [N m].
+    """Shapes with a diagonal stiffness.
 
-    Each is one of the space (12) less what those before it would bend with it; of a uniform link
-    the space's own. Round-off between orthogonal shapes is taken away first.
+    Each is one of the space (12) less its elastic part in those before it; for a uniform link they
+    are the space's own. Round-off between orthogonal shapes is removed first.
+
+    Args:
+        K: stiffness matrix (count, count) [N m].
+
+    Returns:
+        The shapes (count, count), and the diagonal (count,) [N m].
     """
     from scipy.linalg import solve_triangular
 
@@ -62,7 +94,10 @@ def orthogonal_shapes(K: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _modes(M: np.ndarray, K: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """omega^2 (m,) ascending, mass-normalised modes (m, m); M x = mu K x keeps low ones exact."""
+    """omega^2 (m,) ascending, and mass-normalised modes (m, m).
+
+    M x = mu K x keeps the low ones exact.
+    """
     from scipy.linalg import eigh
 
     mu, X = eigh(M, K)
@@ -70,14 +105,14 @@ def _modes(M: np.ndarray, K: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return 1 / mu, X / np.sqrt(mu)
 
 
-def _rest_of_static_shapes(
+def _static_shape_residuals(
     K: np.ndarray, tip: np.ndarray, lam: np.ndarray, V: np.ndarray
 ) -> np.ndarray:
-    """The static shapes of a tip force and moment without what the modes V have of them (19)."""
+    """The static shapes of a tip force and moment, without their part in the modes V (19)."""
     from scipy.linalg import cho_factor, cho_solve
 
-    room = len(K) - len(lam)
-    rest = cho_solve(cho_factor(K), tip.T[:, :room])
-    rest -= V @ ((V.T @ tip.T[:, :room]) / lam[:, None])
-    energy = np.einsum("ik,ij,jk->k", rest, K, rest)
-    return rest * np.sqrt(lam[-1] / np.maximum(energy, 1e-300))
+    free_columns = len(K) - len(lam)
+    residual = cho_solve(cho_factor(K), tip.T[:, :free_columns])
+    residual -= V @ ((V.T @ tip.T[:, :free_columns]) / lam[:, None])
+    energy = np.einsum("ik,ij,jk->k", residual, K, residual)
+    return residual * np.sqrt(lam[-1] / np.maximum(energy, 1e-300))

@@ -16,21 +16,38 @@ def gauss(count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def cells(breaks: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Gauss points and weights (cells * count,) between `breaks` (cells + 1,), in their unit."""
+    """Gauss points and weights between breaks.
+
+    Args:
+        breaks: (cells + 1,), ascending.
+        count: points of each cell.
+
+    Returns:
+        Points and weights (cells * count,), in the unit of the breaks.
+    """
     xi, w = gauss(count)
     widths = np.diff(breaks)[:, None]
     return (breaks[:-1, None] + widths * xi).ravel(), (widths * w).ravel()
 
 
 def legendre(count: int, xi: np.ndarray, derivative: int = 0) -> np.ndarray:
-    """Legendre's P_0 ... P_(count-1) at u = 2 xi - 1, or their derivatives by u: (S, count)."""
+    """Legendre's P_0 ... P_(count-1) at u = 2 xi - 1, or their derivatives by u.
+
+    Args:
+        count: number of polynomials.
+        xi: places (S,).
+        derivative: its order.
+
+    Returns:
+        (S, count).
+    """
     u = 2 * np.atleast_1d(xi) - 1.0
     lower = _derivatives(count, derivative)
     return legvander(u, len(lower) - 1) @ lower
 
 
 def legendre_at(count: int, xi: float) -> np.ndarray:
-    """P_0 ... P_(count-1) at u = 2 xi - 1 of one place: (count,), quicker than `legendre`."""
+    """P_0 ... P_(count-1) at u = 2 xi - 1 of one place (count,), faster than `legendre`."""
     u, out = 2 * xi - 1.0, [1.0, 2 * xi - 1.0]
     for k in range(1, count - 1):
         out.append(((2 * k + 1) * u * out[k] - k * out[k - 1]) / (k + 1))
@@ -44,7 +61,15 @@ def _derivatives(count: int, order: int) -> np.ndarray:
 
 
 def legendre_integrals(count: int, xi: np.ndarray) -> np.ndarray:
-    """Integrals of P_0 ... P_(count-1) by u from -1 to 2 xi - 1, the shapes (12): (S, count)."""
+    """Integrals of P_0 ... P_(count-1) by u from -1 to 2 xi - 1, the shapes (12).
+
+    Args:
+        count: number of polynomials.
+        xi: places (S,).
+
+    Returns:
+        (S, count).
+    """
     P = legendre(count + 1, xi)
     out = np.empty((len(P), count))
     out[:, 0] = P[:, 1] + 1.0
@@ -61,15 +86,32 @@ def _lagrange(points: int) -> np.ndarray:
 
 
 def lagrange(points: int, xi: np.ndarray, derivative: int = 0) -> np.ndarray:
-    """Lagrange's l_j through the Gauss points, or their derivatives by xi (13): (S, points)."""
+    """Lagrange's l_j through the Gauss points, or their derivatives by xi (13).
+
+    Args:
+        points: number of points.
+        xi: places (S,).
+        derivative: its order.
+
+    Returns:
+        (S, points).
+    """
     return 2.0**derivative * legendre(points, xi, derivative) @ _lagrange(points)
 
 
 def lagrange_integrals(points: int, xi: np.ndarray) -> np.ndarray:
-    """w_j(xi), the integrals of l_j from 0 to xi (13): (S, points)."""
+    """w_j(xi), the integrals of l_j from 0 to xi (13).
+
+    Args:
+        points: number of points.
+        xi: places (S,).
+
+    Returns:
+        (S, points).
+    """
     return 0.5 * legendre_integrals(points, xi) @ _lagrange(points)
 
 
 def collocation(points: int) -> np.ndarray:
-    """C, the integrals of l_j from 0 to Gauss point p (32): (points p, points j)."""
+    """C, the integrals of l_j from 0 to Gauss point p (32), (points p, points j)."""
     return lagrange_integrals(points, gauss(points)[0])

@@ -1,4 +1,4 @@
-"""A link's mass per length and bending stiffness as polynomials between its breaks."""
+"""A link's mass per length and bending stiffness as polynomials between breaks."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MASS_DEGREE, STIFFNESS_DEGREE = 2, 4  # of rho A and EI, if a section's dimensio
 class Material:
     """rho A(s) [kg/m] and EI(s) [N m^2] as polynomials between breaks.
 
-    breaks (I + 1,) [m], from 0 to the link's length; mass (I, 3) and stiffness (I, 5): row k holds
+    `breaks` (I + 1,) [m], from 0 to the link's length. `mass` (I, 3), `stiffness` (I, 5): row k has
     the powers of s - breaks[k], lowest first.
     """
 
@@ -30,33 +30,52 @@ class Material:
 
     @cached_property
     def length(self) -> float:
+        """Length of the link [m]."""
         return float(self.breaks[-1])
 
     @cached_property
     def uniform(self) -> bool:
-        """Whether nothing changes along the link."""
+        """Whether mass per length and stiffness are constant along the link."""
         return (
             len(self.mass) == 1 and not self.mass[0, 1:].any() and not self.stiffness[0, 1:].any()
         )
 
     def mass_per_length(self, s: ArrayLike, derivative: int = 0) -> np.ndarray:
-        """rho A at s (S,), or its derivative by s."""
+        """rho A at s (S,) [kg/m], or its derivative by s.
+
+        Args:
+            s: places (S,) [m].
+            derivative: its order, 0 to 2.
+        """
         return self._values(self._slopes[0][derivative], s)
 
     def bending_stiffness(self, s: ArrayLike, derivative: int = 0) -> np.ndarray:
-        """EI at s (S,), or its derivative by s."""
+        """EI at s (S,) [N m^2], or its derivative by s.
+
+        Args:
+            s: places (S,) [m].
+            derivative: its order, 0 to 2.
+        """
         return self._values(self._slopes[1][derivative], s)
 
     def quadrature(self, start: float, end: float, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """`count` Gauss points and weights [m] on each smooth part of start <= s <= end."""
+        """Gauss points and weights [m] on each smooth part of start <= s <= end.
+
+        Args:
+            start: lower end [m].
+            end: upper end [m].
+            count: points of each part.
+        """
         inner = self.breaks[1:-1]
         inner = inner[(inner > start) & (inner < end)]
         return cells(np.concatenate([[start], inner, [end]]), count)
 
     @cached_property
     def _slopes(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
-        """Powers of the mass and of the stiffness and of their first two derivatives, lowest first:
-        (powers, I)."""
+        """Powers of mass and stiffness and of their first two derivatives, lowest first.
+
+        (powers, I) each.
+        """
         return tuple([polyder(rows.T, k) for k in range(3)] for rows in (self.mass, self.stiffness))  # type: ignore[return-value]
 
     def _values(self, powers: np.ndarray, s: ArrayLike) -> np.ndarray:
@@ -71,7 +90,10 @@ class Material:
 
 
 def material(link: Link) -> Material:
-    """The material of a link of the robot file: tapers are linear in the section's dimensions."""
+    """Mass and stiffness of a link of the robot file.
+
+    Tapers are linear in the section's dimensions.
+    """
     breaks = np.array(link.breaks())
     parts = list(pairwise(breaks))
     mass = [_powers(link.mass_per_length, a, b, MASS_DEGREE) for a, b in parts]
@@ -84,10 +106,10 @@ def material(link: Link) -> Material:
     )
 
 
-def _powers(law, a: float, b: float, degree: int) -> np.ndarray:  # type: ignore[no-untyped-def]
-    """A polynomial's powers of s - a (degree + 1,) from its values between a and b."""
+def _powers(function, a: float, b: float, degree: int) -> np.ndarray:  # type: ignore[no-untyped-def]
+    """Powers of s - a (degree + 1,) of a polynomial, from its values between a and b."""
     t = np.linspace(0, 1, degree + 1)
-    values = law(a + (b - a) * t)
+    values = function(a + (b - a) * t)
     if np.ptp(values) == 0:
         return np.append(values[0], np.zeros(degree))
     return np.linalg.solve(np.vander(t, increasing=True), values) / (b - a) ** np.arange(degree + 1)

@@ -1,4 +1,4 @@
-"""Shapes of the tangent's angle: two on an element, and polynomials on a whole link."""
+"""Shapes of the tangent angle: two on an element, and polynomials on a whole link."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ class ElementShapes:
 
     @property
     def count(self) -> int:
+        """The number of shapes, 2."""
         return 2
 
     def __call__(self, xi: np.ndarray, derivative: int = 0) -> np.ndarray:
-        """Their values at xi, or their derivatives by xi: (S, 2)."""
+        """Values (S, 2) at xi (S,), or their derivatives by xi."""
         x = np.atleast_1d(np.asarray(xi, dtype=float))
         ramp = (x, np.ones_like(x), np.zeros_like(x))[derivative]
         bubble = (6 * x * (1 - x), 6 - 12 * x, np.full_like(x, -12.0))[derivative]
@@ -29,16 +30,17 @@ class ElementShapes:
 
 @dataclass(frozen=True)
 class MeshShapes:
-    """The shapes of n equal elements on a whole link (10): those behind a place have turned it."""
+    """The shapes of n equal elements on a whole link (10); elements before a place turn it."""
 
     elements: tuple[ElementShapes, ...]
 
     @property
     def count(self) -> int:
+        """The number of shapes, 2 n."""
         return 2 * len(self.elements)
 
     def __call__(self, xi: np.ndarray, derivative: int = 0) -> np.ndarray:
-        """Their values at xi, or their derivatives by xi: (S, 2 n)."""
+        """Values (S, 2 n) at xi (S,), or their derivatives by xi."""
         n, xi = len(self.elements), np.atleast_1d(np.asarray(xi, dtype=float))
         out, on = np.zeros((len(xi), n, 2)), element_of(n, xi)
         for k, shapes in enumerate(self.elements):
@@ -49,7 +51,7 @@ class MeshShapes:
 
 
 def element_of(n: int, xi: np.ndarray) -> np.ndarray:
-    """Which of n equal elements a place xi (S,) on the link lies on, from 0."""
+    """Index of the one of n equal elements on which a place xi (S,) of the link lies, from 0."""
     return np.clip((n * xi).astype(int), 0, n - 1)
 
 
@@ -61,22 +63,39 @@ class WholeShapes:
 
     @property
     def count(self) -> int:
+        """The number m of shapes."""
         return self.coefficients.shape[1]
 
     def __call__(self, xi: np.ndarray, derivative: int = 0) -> np.ndarray:
-        """Their values at xi, or their derivatives by xi: (S, m)."""
+        """Values (S, m) at xi (S,), or their derivatives by xi."""
         return legendre_shapes(len(self.coefficients), xi, derivative) @ self.coefficients
 
 
 def legendre_shapes(count: int, xi: np.ndarray, derivative: int = 0) -> np.ndarray:
-    """The space (12) at xi (S,), or its derivatives by xi: (S, count)."""
+    """The space (12) at xi, or its derivatives by xi.
+
+    Args:
+        count: number of polynomials.
+        xi: places (S,).
+        derivative: its order.
+
+    Returns:
+        (S, count).
+    """
     if derivative == 0:
         return legendre_integrals(count, xi)
     return 2.0**derivative * legendre(count, xi, derivative - 1)
 
 
-def of_legendre(sums: np.ndarray) -> np.ndarray:
-    """Coefficients (N, m) in the space (12) of shapes given as sums of P_0 ... P_N, (N + 1, m)."""
+def coefficients_of_legendre_sums(sums: np.ndarray) -> np.ndarray:
+    """Coefficients in the space (12) of shapes given as sums of Legendre's polynomials.
+
+    Args:
+        sums: of P_0 ... P_N, (N + 1, m).
+
+    Returns:
+        (N, m).
+    """
     rest, out = sums.copy(), np.zeros((len(sums) - 1, sums.shape[1]))
     for k in range(len(out) - 1, 0, -1):
         out[k] = rest[k + 1] * (2 * k + 1)

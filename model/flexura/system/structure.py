@@ -145,7 +145,7 @@ class Structure:
         if line.row is None:
             return (
                 line.start.place
-                + line.free * line.piece.kept_integrals(tuple(x / line.free)) @ line.e
+                + line.free * line.piece.cached_integrals(tuple(x / line.free)) @ line.e
             )
         reach = line.free * line.piece.integrals(np.maximum(x, 0.0) / line.free) @ line.e
         return line.start.place + np.minimum(x, 0.0) * state.hub.tangent + reach

@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import InputError
 from ..io import STATIONS
 from ..link.line import Piece, whole_piece
-from ..link.shapes import legendre_shapes, of_legendre
+from ..link.shapes import coefficients_of_legendre_sums, legendre_shapes
 from ..robot import Robot, load
 from .assembly import Assembly
 from .constants import equations
@@ -305,7 +305,7 @@ class System:
         B, K, _, sums = self.equations.whole_link(link)
         count = len(pieces[0].shapes.coefficients)
         if len(sums):
-            coefficients = of_legendre(np.asarray(sums)[: count + 1])
+            coefficients = coefficients_of_legendre_sums(np.asarray(sums)[: count + 1])
         else:
             coefficients = np.linalg.lstsq(legendre_shapes(count, pieces[0].xi), B.T, rcond=None)[0]
         law = self._structure.laws[link]

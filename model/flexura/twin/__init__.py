@@ -1,8 +1,7 @@
-"""The twin: the same Robot built in Exudyn, an independent program, to check the native solver
-against.
+"""The twin: the same Robot built in Exudyn, an independent program, as a check of the solver.
 
-It shares the robot file, `Run` and the drives (pure input data) with the native solver, and no
-mechanics. Its links are beams with axial unknowns and exact rotations, so it always contains
+It shares the robot file, `Run` and the drives (pure input data) with the native solver, but no
+mechanics. Its links are beams with axial unknowns and exact rotations, so that it always contains
 geometric stiffening.
 
     from flexura import twin

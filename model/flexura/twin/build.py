@@ -1,4 +1,4 @@
-"""The robot built in Exudyn: parts for the links, coordinates for the joints."""
+"""A robot built in Exudyn: parts for the links, coordinates for the joints."""
 
 from __future__ import annotations
 
@@ -11,23 +11,25 @@ from ..robot import Link, Robot
 from .joints import connect
 from .joints.mesh import Mesh
 from .links.ancf import CableLink
-from .links.geometrically_exact import ExactLink
-from .links.part import Frame, Ground, Lump, Part
-from .links.properties import VANISHING, beam_values, link_inertia, total_mass
+from .links.geometrically_exact import GeometricallyExactLink
+from .links.part import Frame, Ground, Part, PointMass
+from .links.properties import NEGLIGIBLE, beam_values, link_inertia, total_mass
 from .links.rigid import RigidLink
 
-BEAMS = {"ancf": CableLink, "ge": ExactLink}
+BEAMS = {"ancf": CableLink, "ge": GeometricallyExactLink}
 
 
 @dataclass(frozen=True)
-class Chain:
-    """An assembled robot: `mbs` is Exudyn's system, `parts` and `coordinates` have one entry a link
-    and joint.
+class TwinModel:
+    """An assembled robot in Exudyn.
 
-    `index[i]` are the places of part i's coordinates among the system's, `slides[i]` that of the
-    position of a joint that slides on a flexible link (None for others), `reference` the system's
-    coordinates before any displacement (Exudyn's own sum of both, GetODE2CoordinatesTotal, corrupts
-    memory from about 100 coordinates on in 1.13.6). `container` owns `mbs` and must live as long.
+    `mbs`: Exudyn's system. `parts`, `coordinates`: one entry a link and a joint. `index[i]`:
+    indices of part i's coordinates in the system. `slides[i]`: index of the position of a joint
+    that slides on a flexible link, else None. `reference`: the system's coordinates before any
+    displacement. `container` owns `mbs` and must live as long.
+
+    Exudyn's own sum of reference and displacement, GetODE2CoordinatesTotal, corrupts memory from
+    about 100 coordinates on (1.13.6).
     """
 
     robot: Robot
@@ -42,17 +44,25 @@ class Chain:
 
     @property
     def reach(self) -> float:
+        """The sum of the links' lengths [m]."""
         return reach(self.robot)
 
 
 def reach(robot: Robot) -> float:
-    """The sum of the links' lengths [m], the robot's size; 1 where none has any."""
+    """The sum of the links' lengths [m], the robot's size; 1 if it is 0."""
     return sum(link.length_m for link in robot.links) or 1.0
 
 
-def build(robot: Robot, beam: str, mesh: Mesh, speeds: np.ndarray, gains: np.ndarray) -> Chain:
-    """The robot straight at its start, its joints at `speeds` (n,), with PD controllers of `gains`
-    (n, 2)."""
+def build(robot: Robot, beam: str, mesh: Mesh, speeds: np.ndarray, gains: np.ndarray) -> TwinModel:
+    """Build a robot, straight at its start.
+
+    Args:
+        robot: the robot.
+        beam: "ancf" or "ge".
+        mesh: elements, hubs and sleeves.
+        speeds: joint velocities at the start (n,) [m/s or rad/s].
+        gains: of the joints' PD controllers (n, 2).
+    """
     import exudyn as exu
     from exudyn import itemInterface as eii
 
@@ -62,41 +72,55 @@ def build(robot: Robot, beam: str, mesh: Mesh, speeds: np.ndarray, gains: np.nda
         eii.MarkerNodeCoordinate(nodeNumber=mbs.AddNode(eii.NodePointGround()), coordinate=0)
     )
     scale = total_mass(robot.links, robot.payload) or 1.0
-    tiny = VANISHING * scale, VANISHING * scale * reach(robot) ** 2
+    negligible = NEGLIGIBLE * scale, NEGLIGIBLE * scale * reach(robot) ** 2
     previous: Any = Ground.add(mbs)
     frame, length = Frame(0.0, 0.0, 0.0), 0.0
     parts: list[Part] = []
     coordinates, nodes = [], []
     for i, link in enumerate(robot.links):
         tip, frame = frame.along(length), connect.start_frame(link, frame, length, speeds[i])
-        part = _part(mbs, robot, i, BEAMS[beam], mesh, frame, tiny)
-        on = connect.Site(mbs, tip, frame, speeds[i], tiny)
+        part = _add_link(mbs, robot, i, BEAMS[beam], mesh, frame, negligible)
+        on = connect.JointSite(mbs, tip, frame, speeds[i], negligible)
         marker, node = connect.connect(on, link, previous, part, mesh.places[i])
         coordinates.append(
-            connect.equip(mbs, link.joint, marker, fixed, speeds[i], tuple(gains[i]))
+            connect.add_drive_and_friction(
+                mbs, link.joint, marker, fixed, speeds[i], tuple(gains[i])
+            )
         )
         parts.append(part)
         nodes.append(node)
         previous, length = part, link.length_m
     mbs.Assemble()
     index = [
-        np.concatenate([_places(mbs, node, part.width) for node in part.nodes]) for part in parts
+        np.concatenate([_coordinate_rows(mbs, node, part.width) for node in part.nodes])
+        for part in parts
     ]
     slides = [None if node is None else int(mbs.GetNodeODE2Index(node)) for node in nodes]
     reference = np.array(mbs.systemData.GetODE2Coordinates(exu.ConfigurationType.Reference))
-    return Chain(robot, mbs, parts, coordinates, index, slides, mesh, reference, container)
+    return TwinModel(robot, mbs, parts, coordinates, index, slides, mesh, reference, container)
 
 
-def _part(
-    mbs: Any, robot: Robot, i: int, beam: Any, mesh: Mesh, frame: Frame, tiny: tuple[float, float]
+def _add_link(
+    mbs: Any,
+    robot: Robot,
+    i: int,
+    beam: Any,
+    mesh: Mesh,
+    frame: Frame,
+    negligible: tuple[float, float],
 ) -> Part:
+    """Add link i with its hub, and with what is at its end.
+
+    A rigid link gets at least a `negligible` mass and inertia; its mass matrix would else be
+    singular.
+    """
     link, last = robot.links[i], i == len(robot.links) - 1
     ending = (
-        Lump(robot.payload.mass_kg, robot.payload.inertia_kg_m2)
+        PointMass(robot.payload.mass_kg, robot.payload.inertia_kg_m2)
         if last
-        else _hub(robot.links[i + 1], "Pb")
+        else _hub_on(robot.links[i + 1], "Pb")
     )
-    hub = _hub(link, "R", "Pa")
+    hub = _hub_on(link, "R", "Pa")
     if link.flexible:
         stubs = [mesh.stubs[i]] if any(mesh.stubs[i]) else []
         return beam(
@@ -108,20 +132,25 @@ def _part(
         .plus(ending.mass, link.length_m, ending.inertia)
     )
     inertia = inertia._replace(
-        mass=max(inertia.mass, tiny[0]), inertia=max(inertia.inertia, tiny[1])
+        mass=max(inertia.mass, negligible[0]), inertia=max(inertia.inertia, negligible[1])
     )
-    return RigidLink(
-        mbs, link.length_m, inertia, frame, robot.gravity_m_s2
-    )  # without any its mass matrix would be singular
+    return RigidLink(mbs, link.length_m, inertia, frame, robot.gravity_m_s2)
 
 
-def _hub(link: Link, *types: str) -> Lump:
-    """The hub of a link's joint if that is of these types, else nothing: a Pb's, its sleeve, is on
-    the link before."""
+def _hub_on(link: Link, *types: str) -> PointMass:
+    """The hub of a link's joint if that has one of these types, else nothing.
+
+    A Pb's hub, its sleeve, is on the link before.
+    """
     joint = link.joint
-    return Lump(joint.hub_mass_kg, joint.hub_inertia_kg_m2) if joint.type in types else Lump()
+    return (
+        PointMass(joint.hub_mass_kg, joint.hub_inertia_kg_m2)
+        if joint.type in types
+        else PointMass()
+    )
 
 
-def _places(mbs: Any, node: Any, width: int) -> np.ndarray:
+def _coordinate_rows(mbs: Any, node: Any, width: int) -> np.ndarray:
+    """Indices of a node's coordinates in the system."""
     first = mbs.GetNodeODE2Index(node)
     return np.arange(first, first + width)

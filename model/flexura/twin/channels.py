@@ -5,35 +5,44 @@ from __future__ import annotations
 import numpy as np
 
 from ..io import STATIONS
-from .build import Chain
+from .build import TwinModel
 from .links.part import Ground, Motion
 from .loads import Actuation
 
 
 def channels(
-    chain: Chain, act: Actuation, t: np.ndarray, q: np.ndarray, v: np.ndarray
+    model: TwinModel, act: Actuation, t: np.ndarray, q: np.ndarray, v: np.ndarray
 ) -> tuple[dict[str, np.ndarray], dict[str, str]]:
-    """Channels and their units from total coordinates q and velocities v of the system, both (T,
-    coordinates)."""
+    """Channels of a run from the system's coordinates.
+
+    Args:
+        model: the assembled robot.
+        act: its drives.
+        t: times (T,) [s].
+        q: total coordinates of the system (T, coordinates).
+        v: their velocities (T, coordinates).
+
+    Returns:
+        Channels (T,) and their units, by name.
+    """
     out: dict[str, tuple[np.ndarray, str]] = {}
-    gravity = np.array(chain.robot.gravity_m_s2)
+    gravity = np.array(model.robot.gravity_m_s2)
     kinetic, strain, potential = np.zeros(len(t)), np.zeros(len(t)), np.zeros(len(t))
-    position, speed = np.zeros((len(t), len(chain.parts))), np.zeros((len(t), len(chain.parts)))
+    position, speed = np.zeros((len(t), len(model.parts))), np.zeros((len(t), len(model.parts)))
     origin = tip = Ground.motion(len(t))
     deflection = np.zeros(len(t))
     for i, (link, part, index) in enumerate(
-        zip(chain.robot.links, chain.parts, chain.index, strict=True)
+        zip(model.robot.links, model.parts, model.index, strict=True)
     ):
-        mine, rate = q[:, index], v[:, index]
-        hub, end = part.motion_at_origin(mine, rate), part.motion_at_tip(mine, rate)
+        own, rate = q[:, index], v[:, index]
+        hub, end = part.motion_at_origin(own, rate), part.motion_at_tip(own, rate)
         joint = link.joint
         if joint.type == "R":
             turned = _unwrap(t, hub.angle - tip.angle, hub.omega - tip.omega, joint.start)
             position[:, i], speed[:, i] = turned, hub.omega - tip.omega
             hub = hub._replace(angle=tip.angle + turned)
-        elif (
-            joint.type == "Pa"
-        ):  # the tangent of a link turns by less than half a turn from its start
+        elif joint.type == "Pa":
+            # the tangent of a link turns by less than half a turn from its start
             turned = _wrap(hub.angle - joint.angle_rad - origin.angle)
             position[:, i], speed[:, i] = _slide(origin, hub)
             hub = hub._replace(angle=origin.angle + turned + joint.angle_rad)
@@ -41,7 +50,7 @@ def channels(
             sleeve = tip._replace(angle=tip.angle + joint.angle_rad)
             position[:, i], speed[:, i] = _slide(sleeve, end)
             hub = hub._replace(angle=sleeve.angle)
-        slides = chain.slides[i]
+        slides = model.slides[i]
         if slides is not None:
             position[:, i], speed[:, i] = q[:, slides], v[:, slides]
             if joint.type == "Pb":  # what is behind the sleeve's exit is on its axis
@@ -59,15 +68,15 @@ def channels(
                 f"link/{i + 1}/tip_slope": (slope, "rad"),
             }
             for k in range(STATIONS):
-                place = part.point(mine, k * link.length_m / (STATIONS - 1))
+                place = part.point(own, k * link.length_m / (STATIONS - 1))
                 out[f"link/{i + 1}/deflection/{k}"] = _transverse(hub, place), "m"
-        kinetic += part.kinetic(mine, rate)
+        kinetic += part.kinetic(own, rate)
         if not joint.locked:
             kinetic += 0.5 * joint.rotor_inertia * speed[:, i] ** 2
-        strain += part.strain(mine)
-        potential -= part.moment(mine) @ gravity
+        strain += part.strain(own)
+        potential -= part.moment(own) @ gravity
         origin, tip = hub, end
-    out = _joints(chain, act, t, position, speed, deflection * bool(chain.mesh.elements[-1])) | out
+    out = _joints(model, act, t, position, speed, deflection * bool(model.mesh.elements[-1])) | out
     out |= {"tip/x": (tip.r[:, 0], "m"), "tip/y": (tip.r[:, 1], "m")}
     out |= {
         "energy/kinetic": (kinetic, "J"),
@@ -80,18 +89,19 @@ def channels(
 
 
 def _joints(
-    chain: Chain,
+    model: TwinModel,
     act: Actuation,
     t: np.ndarray,
     position: np.ndarray,
     speed: np.ndarray,
     deflection: np.ndarray,
 ) -> dict[str, tuple[np.ndarray, str]]:
+    """Position, velocity and drive of the joints, with units."""
     drive = np.array(
         [act.call(*sample) for sample in zip(t, position, speed, deflection, strict=True)]
     ).reshape(position.shape)
     out = {}
-    for i, link in enumerate(chain.robot.links):
+    for i, link in enumerate(model.robot.links):
         length, force = ("rad", "N m") if link.joint.type == "R" else ("m", "N")
         out[f"joint/{i + 1}/position"] = position[:, i], length
         out[f"joint/{i + 1}/velocity"] = speed[:, i], f"{length}/s"
@@ -100,12 +110,13 @@ def _joints(
 
 
 def _transverse(hub: Motion, place: np.ndarray) -> np.ndarray:
+    """Distance of points (T, 2) across the hub's axis (T,) [m]."""
     delta = place - hub.r
     return np.cos(hub.angle) * delta[:, 1] - np.sin(hub.angle) * delta[:, 0]
 
 
 def _slide(rail: Motion, hub: Motion) -> tuple[np.ndarray, np.ndarray]:
-    """Distance of the hub along the rail's axis, and its rate."""
+    """Distance of the hub along the rail's axis, and its rate, (T,) each."""
     axis = _axis(rail.angle)
     normal = np.stack([-axis[:, 1], axis[:, 0]], axis=-1)
     delta, rate = hub.r - rail.r, hub.v - rail.v
@@ -119,13 +130,21 @@ def _axis(angle: np.ndarray) -> np.ndarray:
 
 
 def _wrap(angle: np.ndarray) -> np.ndarray:
-    """To (-pi, pi]."""
+    """An angle in (-pi, pi]."""
     return angle - 2 * np.pi * np.ceil(angle / (2 * np.pi) - 0.5)
 
 
 def _unwrap(t: np.ndarray, angle: np.ndarray, rate: np.ndarray, start: float) -> np.ndarray:
-    """An angle known up to whole turns as a continuous one that begins at `start`; the rate bridges
-    long output steps."""
+    """An angle known up to whole turns as a continuous one.
+
+    The rate predicts the angle over long output steps.
+
+    Args:
+        t: times (T,) [s].
+        angle: up to whole turns (T,) [rad].
+        rate: its rate (T,) [rad/s].
+        start: the angle at the start, at most half a turn off [rad].
+    """
     out = np.empty_like(angle)
     guess = start
     for k in range(len(t)):

@@ -1,4 +1,4 @@
-"""From runs with hubs of two lengths to a hub of none."""
+"""Extrapolation from runs with hubs of two lengths to hubs of none."""
 
 from __future__ import annotations
 
@@ -9,30 +9,34 @@ import numpy as np
 from ..io import Run
 from .joints.mesh import ORDER
 
-LONGER = 2.0  # the second length of hubs and sleeves' spans, relative to the first
-SENSITIVE = ("position", "tip_deflection")  # the channels that `meta["extrapolation"]` judges
+LENGTH_FACTOR = 2.0  # the second length of hubs and sleeves' spans, relative to the first
+JUDGED_CHANNELS = ("position", "tip_deflection")  # the channels that `meta["extrapolation"]` judges
 
 
 def extrapolate(run: Run, longer: Mapping[str, Run]) -> Run:
     """The run as hubs and sleeves get infinitely short, delta -> 0 (105).
 
-    `longer`: by joint type, the run in which delta of joints of that type is LONGER times as long.
-    Errors c delta^p, of order p = ORDER[type], of both types add up: y + sum_types (y -
-    y_longer)/(LONGER^p - 1). `meta["extrapolation"]` is by type how far the joint position or tip
-    deflection that moved most did so, relative to its largest magnitude.
+    Richardson's extrapolation: errors are c delta^p, with p = ORDER[type], and those of both types
+    add up. `meta["extrapolation"]` has by type the largest change of a joint position or tip
+    deflection, relative to its largest magnitude.
+
+    Args:
+        run: with the shorter hubs.
+        longer: by joint type, the run in which delta of joints of that type is LENGTH_FACTOR times
+            as long.
     """
     count = min(len(other) for other in (run, *longer.values()))
     values = {name: channel[:count].copy() for name, channel in run.channels.items()}
     sizes = {}
     for kind, other in longer.items():
-        weight = 1 / (LONGER ** ORDER[kind] - 1)
+        weight = 1 / (LENGTH_FACTOR ** ORDER[kind] - 1)
         steps = {name: weight * (run[name][:count] - other[name][:count]) for name in values}
         for name, step in steps.items():
             values[name] += step
         sizes[kind] = max(
             float(np.abs(step).max() / max(np.abs(run[name][:count]).max(), 1e-12))
             for name, step in steps.items()
-            if name.endswith(SENSITIVE)
+            if name.endswith(JUDGED_CHANNELS)
         )
     lengths = {
         kind: [run.meta["hub_length_m"], other.meta["hub_length_m"]]

@@ -1,15 +1,17 @@
-"""What drives the twin's joints: open-loop forces once a step, feedback inside Exudyn's equations.
+"""Drives of the twin's joints: open-loop forces once a step, feedback inside Exudyn's equations.
 
-A `Drive` is, in each joint, a force f(t) and a PD controller of gains kp, kd along a motion r(t).
-The force is a load that is set once a step. The controller is a spring-damper of Exudyn's own on
-the joint's coordinate, whose offsets r, dr/dt are set once a step: it acts without delay, since
-Exudyn solves for it. A Python function of time is such a force; one of the joints' state is called
-in every iteration, without delay as well; Newton's method knows no derivatives of it, so that its
-gains at the start, by differences, are made a controller that the load then takes off again.
+A `Drive` is, in each joint, a force f(t) and a PD controller with gains kp, kd along a motion r(t).
+The force is a load that is set once a step. The controller is a spring-damper of Exudyn on the
+joint's coordinate, whose offsets r, dr/dt are set once a step. It acts without delay, because
+Exudyn solves for it.
 
-A force that jumps would be late or early by half a step, an error of first order. What a step uses
-is therefore the mean over the half steps before and after its instant wherever there is a jump, so
-that the impulse is exact.
+A Python function of time is such a force. A function of the joints' state is called in every
+iteration, also without delay. Newton's method knows no derivatives of it. Its gains at the start,
+by finite differences, therefore become a controller, and the load subtracts that controller's force
+again.
+
+A force that jumps would be late or early by half a step, an error of first order. Where it jumps, a
+step uses the mean over the half steps before and after its instant, so that the impulse is exact.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..signals import Drive
-from .build import Chain
+from .build import TwinModel
 from .links.part import Ground, Motion
 
 DIFFERENCE = 1e-6  # m, rad, m/s, rad/s
@@ -31,12 +33,12 @@ DIFFERENCE = 1e-6  # m, rad, m/s, rad/s
 
 @dataclass(frozen=True)
 class Actuation:
-    """A drive as the twin applies it; `call(t, position, velocity, tip_deflection)` gives the n
-    drive forces.
+    """A drive as the twin applies it.
 
-    `gains` (n, 2): kp and kd of the joints' controllers. `plan(t)` gives (n, 3): force, r, dr/dt of
-    each joint; it is None where only `call` knows, and the controllers are there for Newton's sake.
-    `breaks`: instants at which the plan may jump; None: unknown, so that every step may have one.
+    `gains` (n, 2): kp and kd of the joints' controllers. `call(t, position, velocity,
+    tip_deflection)`: the n drive forces. `plan(t)`: force, r, dr/dt of each joint (n, 3); None if
+    the drive is a function of the state, whose controllers only help Newton's method. `breaks`:
+    instants at which the plan may jump; None: unknown, every step may have one.
     """
 
     gains: np.ndarray
@@ -46,10 +48,15 @@ class Actuation:
 
 
 def actuation(drive: Any, start: np.ndarray, speeds: np.ndarray) -> Actuation:
-    """The actuation for a Drive, a function of (t) or (t, position, velocity, tip_deflection), or
-    None.
+    """The actuation for a drive.
 
-    `start`, `speeds` (n,): the joints' positions and velocities at time 0.
+    Args:
+        drive: a Drive, a function of (t) or of (t, position, velocity, tip_deflection), or None.
+        start: joint positions at time 0 (n,).
+        speeds: joint velocities at time 0 (n,).
+
+    Raises:
+        InputError: the drive does not fit the robot.
     """
     n = len(start)
     drive = Drive.none(n) if drive is None else drive
@@ -89,8 +96,10 @@ def actuation(drive: Any, start: np.ndarray, speeds: np.ndarray) -> Actuation:
 
 
 def _gains(call: Callable[..., np.ndarray], start: np.ndarray, speeds: np.ndarray) -> np.ndarray:
-    """Stiffness and damping that a function of the state puts on each joint's own coordinate at the
-    start, (n, 2), or 0."""
+    """Stiffness and damping (n, 2) of a function of the state at the start, by differences.
+
+    Only those on each joint's own coordinate; 0 if negative.
+    """
     gains = np.zeros((len(start), 2))
     for i in range(len(start)):
         for column in range(2):
@@ -104,6 +113,7 @@ def _gains(call: Callable[..., np.ndarray], start: np.ndarray, speeds: np.ndarra
 
 
 def _plan(drive: Drive, t: float) -> np.ndarray:
+    """Force, r and dr/dt of each joint at t, (n, 3)."""
     out = np.zeros((len(drive.joints), 3))
     for i, joint in enumerate(drive.joints):
         if joint.force is not None:
@@ -125,19 +135,27 @@ def _takes_state(function: Callable[..., Any]) -> bool:
 
 
 class Loads:
-    """Keeps Exudyn's loads and controllers up to date in a run with steps of `step_s`; `stop` gets
-    an error of the drive's."""
+    """Keeps Exudyn's loads and controllers up to date during a run."""
 
     def __init__(
         self,
-        chain: Chain,
+        model: TwinModel,
         act: Actuation,
         step_s: float,
         steps: int,
         stop: Callable[[BaseException], None],
     ) -> None:
-        self.chain, self.act, self.step_s, self.stop = chain, act, step_s, stop
-        self.applied = np.zeros((len(chain.coordinates), 3))
+        """Apply the drive at time 0.
+
+        Args:
+            model: the assembled robot.
+            act: its drives.
+            step_s: length of a step [s].
+            steps: number of steps.
+            stop: called with an error of the drive.
+        """
+        self.model, self.act, self.step_s, self.stop = model, act, step_s, stop
+        self.applied = np.zeros((len(model.coordinates), 3))
         self.edges: dict[int, list[float]] = {}
         for t in (
             []
@@ -163,8 +181,8 @@ class Loads:
         self._apply(sum(w * self.act.plan(m) for w, m in zip(weights, middles, strict=True)))
 
     def _apply(self, values: Any) -> None:
-        mbs = self.chain.mbs
-        for joint, now, before in zip(self.chain.coordinates, values, self.applied, strict=True):
+        mbs = self.model.mbs
+        for joint, now, before in zip(self.model.coordinates, values, self.applied, strict=True):
             if now[0] != before[0]:
                 mbs.SetLoadParameter(joint.load, "load", float(now[0]))
             if joint.servo is not None:
@@ -173,43 +191,45 @@ class Loads:
         self.applied = values
 
     def _install_feedback(self) -> None:
-        """Let Exudyn ask for the forces whenever it evaluates them; the first joint's load computes
-        those of all."""
-        numbers = [c.load for c in self.chain.coordinates]
+        """Let Exudyn call the drive whenever it evaluates loads.
+
+        The first joint's load computes the forces of all.
+        """
+        numbers = [c.load for c in self.model.coordinates]
         forces = np.zeros(len(numbers))
-        sense, (kp, kd) = Senses(self.chain), self.act.gains.T
-        for joint, start in zip(self.chain.coordinates, self.chain.robot.start, strict=True):
+        sense, (kp, kd) = Sensors(self.model), self.act.gains.T
+        for joint, start in zip(self.model.coordinates, self.model.robot.start, strict=True):
             if joint.servo is not None:
-                self.chain.mbs.SetObjectParameter(joint.servo, "offset", float(start))
+                self.model.mbs.SetObjectParameter(joint.servo, "offset", float(start))
 
         def first(mbs: Any, t: float, _load: float) -> float:
             try:
                 position, velocity, deflection = sense()
                 forces[:] = self.act.call(t, position, velocity, deflection)
-                forces[:] += kp * (position - self.chain.robot.start) + kd * velocity
+                forces[:] += kp * (position - self.model.robot.start) + kd * velocity
             except BaseException as error:  # through Exudyn it would come out as another error
                 self.stop(error)
             return forces[0]
 
         for i, number in enumerate(numbers):
             # Exudyn 1.13.6 evaluates loads in order of their numbers
-            self.chain.mbs.SetLoadParameter(
+            self.model.mbs.SetLoadParameter(
                 number, "loadUserFunction", first if i == 0 else lambda mbs, t, load, i=i: forces[i]
             )
 
 
-class Senses:
-    """The joints' positions (n,), velocities (n,) and the last link's tip deflection [m] at the
-    iterate Exudyn is at."""
+class Sensors:
+    """Joint positions and velocities (n,) and tip deflection [m] at Exudyn's current iterate."""
 
-    def __init__(self, chain: Chain) -> None:
+    def __init__(self, model: TwinModel) -> None:
         import exudyn as exu
 
-        self.mbs, self.markers = chain.mbs, [c.marker for c in chain.coordinates]
+        self.mbs, self.markers = model.mbs, [c.marker for c in model.coordinates]
         self.kinds = exu.OutputVariableType.Coordinates, exu.OutputVariableType.Coordinates_t
-        self.chain = chain
+        self.model = model
 
     def __call__(self) -> tuple[np.ndarray, np.ndarray, float]:
+        """Positions (n,), velocities (n,) and tip deflection [m]."""
         position, velocity = (
             np.array([self.mbs.GetMarkerOutput(m, kind)[0] for m in self.markers])
             for kind in self.kinds
@@ -217,17 +237,18 @@ class Senses:
         return position, velocity, self._deflection()
 
     def _deflection(self) -> float:
-        chain, last = self.chain, len(self.chain.parts) - 1
-        if not chain.mesh.elements[last]:
+        """Tip deflection of the last link [m]; 0 if it is rigid."""
+        model, last = self.model, len(self.model.parts) - 1
+        if not model.mesh.elements[last]:
             return 0.0
-        q = (self.mbs.systemData.GetODE2Coordinates() + chain.reference)[None, :]
+        q = (self.mbs.systemData.GetODE2Coordinates() + model.reference)[None, :]
         (hub, tip), turn = self._ends(q, last), 0.0
-        if chain.robot.links[last].joint.type == "Pb":  # in the frame of the sleeve
+        if model.robot.links[last].joint.type == "Pb":  # in the frame of the sleeve
             hub = self._ends(q, last - 1)[1] if last else Ground.motion(1)
-            turn = chain.robot.links[last].joint.angle_rad
+            turn = model.robot.links[last].joint.angle_rad
         dx, dy = tip.r[0] - hub.r[0]
         return float(np.cos(hub.angle[0] + turn) * dy - np.sin(hub.angle[0] + turn) * dx)
 
     def _ends(self, q: np.ndarray, i: int) -> tuple[Motion, Motion]:
-        part, mine = self.chain.parts[i], q[:, self.chain.index[i]]
-        return part.motion_at_origin(mine, mine), part.motion_at_tip(mine, mine)
+        part, own = self.model.parts[i], q[:, self.model.index[i]]
+        return part.motion_at_origin(own, own), part.motion_at_tip(own, own)

@@ -1,5 +1,4 @@
-"""Simulating a robot in Exudyn: settings, the run itself, and what happens when it doesn't get to
-its end."""
+"""Simulation of a robot in Exudyn: settings, the run, and its failures."""
 
 from __future__ import annotations
 
@@ -15,26 +14,24 @@ import numpy as np
 from ..errors import FlexuraError, InputError
 from ..io import Run
 from ..robot import MAX_ELEMENTS, Robot
-from .build import Chain, build
+from .build import TwinModel, build
 from .channels import channels
-from .extrapolation import LONGER, extrapolate
-from .joints.mesh import mesh, reach_of, refuse, sliding_kinds
+from .extrapolation import LENGTH_FACTOR, extrapolate
+from .joints.mesh import check_supported, mesh, slide_range, sliding_kinds
 from .links import ancf, geometrically_exact
 from .loads import Actuation, Loads, actuation
-from .steps import Steps, plan, suggest
+from .steps import Steps, plan_steps, suggest_step
 
 PROGRAMS = {"ancf": ancf.PROGRAM, "ge": geometrically_exact.PROGRAM}
-ATTEMPTS = 4  # steps tried, each half the one before, where the user doesn't give one
-SPARSE = (
-    60  # coordinates beyond which sparse matrices are faster (0.25 ms a step against 0.8 at 420)
-)
-COARSE = 4  # elements a link for the frequencies that suggest a step
+ATTEMPTS = 4  # steps tried, each half the one before, unless the user gives one
+# coordinates beyond which sparse matrices are faster (0.25 ms a step against 0.8 at 420)
+SPARSE_FROM = 60
+COARSE_ELEMENTS = 4  # elements a link for the frequencies that suggest a step
 SLACK = 1e-4  # how far a hub or sleeve may go beyond the end of its link, relative to the link
 PROGRESS = 0.01  # the fraction of a run between two calls of progress
 
-Record = tuple[
-    list[float], list[np.ndarray], list[np.ndarray], list[np.ndarray]
-]  # times, coordinates, velocities, accelerations
+# times, coordinates, velocities, accelerations
+Record = tuple[list[float], list[np.ndarray], list[np.ndarray], list[np.ndarray]]
 
 
 class DidNotConverge(FlexuraError):
@@ -53,35 +50,43 @@ def simulate(
     hub_length_m: float | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Run:
-    """Simulate a robot in Exudyn, as a check on the native solver that shares nothing with it but
-    the robot file.
+    """Simulate a robot in Exudyn, as a check of the native solver.
 
-    The robot starts straight at `robot.start`, at time 0, with the joint velocities `qd0` (n,) [m/s
-    or rad/s] (None: at rest). `t_eval` (T,): ascending times of the result [s]. `drive`: a Drive,
-    or a function `(t)` or `(t, position, velocity, tip_deflection)`, with the last link's tip
-    deflection, that gives n forces [N] or torques [N m]; a function of the state is called in every
-    iteration, so it must depend on its arguments only.
+    Nothing is shared with the native solver but the robot file and the drives. The robot starts
+    straight at `robot.start`, at time 0. Links take all unknowns of their mesh (`modes` is
+    ignored); joint limits do not act.
 
-    `beam`: "ancf" (ObjectANCFCable2D, Euler-Bernoulli) or "ge" (ObjectBeamGeometricallyExact2D of
-    three nodes, with shear). `elements`: beam elements a flexible link; None: twice the robot
-    file's and at least 8, or 32 where a joint slides on it. `step_s`: Exudyn's longest step; None:
-    from the robot's frequencies, for an error in time below 1e-3 of the tip deflection or so, and
-    shorter if need be. Steps divide a uniform output step; elsewhere results are interpolated by
-    cubics. `hub_length_m`: of the hub of a Pa on a flexible link and of the spans of a flexible
-    Pb's sleeve, see `mesh`. None: short ones, and once more for each of the two types with that
-    type's twice as long, extrapolated to none (`extrapolation`); `meta["extrapolation"]` says how
-    far that went. A function of time or state is called in all these runs. `progress`: called with
-    the fraction done.
+    Args:
+        robot: the robot.
+        t_eval: ascending times of the result (T,) [s], from 0 on.
+        drive: a Drive, or a function of (t) or of (t, position, velocity, tip_deflection) that
+            returns n forces [N] or torques [N m]; tip_deflection is the last link's. A function of
+            the state is called in every iteration, so that it must depend on its arguments only.
+        qd0: joint velocities at the start (n,) [m/s or rad/s]; None: at rest.
+        beam: "ancf" (ObjectANCFCable2D, Euler-Bernoulli) or "ge" (ObjectBeamGeometricallyExact2D of
+            three nodes, with shear).
+        elements: beam elements a flexible link; None: twice the robot file's and at least 8, or 32
+            if a joint slides on it.
+        step_s: Exudyn's longest step [s]; None: from the robot's frequencies, for a time error
+            below 1e-3 of the tip deflection or so, and shorter if needed. Steps divide a uniform
+            output step; else cubics interpolate.
+        hub_length_m: length of the hub of a Pa on a flexible link, and of the spans of a flexible
+            Pb's sleeve [m], see `mesh`. None: short ones, extrapolated to none by one more run for
+            each of the two types (`extrapolation`).
+        progress: called with the finished fraction.
 
-    The result has the channels of a native run (`flexura.run`) but no energy/work and energy/loss.
-    Ctrl-C ends it early, with `meta["complete"]` false. Links take all unknowns of their mesh
-    (`modes` is not looked at); joint limits don't act.
+    Returns:
+        A Run with the channels of a native run except energy/work and energy/loss.
+            `meta["extrapolation"]` has the size of the extrapolation. Ctrl-C ends it early, with
+            `meta["complete"]` false.
 
-    Raises InputError for what the twin doesn't contain (stiffening = false, damping alpha, sliding
-    on a "ge" beam) or can't be, FlexuraError where Exudyn's solver fails or a joint slides off the
-    end of a flexible link, with the time it got to.
+    Raises:
+        InputError: an argument is wrong, or the twin does not contain something: stiffening =
+            false, damping alpha, sliding on a "ge" beam.
+        FlexuraError: Exudyn's solver fails, or a joint slides off the end of a flexible link; the
+            message has the time.
     """
-    refuse(robot, beam)
+    check_supported(robot, beam)
     t, speeds = _times(t_eval), _speeds(robot, qd0)
     if beam not in PROGRAMS:
         raise InputError('expected "ancf" or "ge"', key="beam", value=beam)
@@ -100,7 +105,7 @@ def simulate(
     share, report = 1 / (1 + len(kinds)), progress or (lambda fraction: None)
 
     def run(number: int, times: dict[str, float], longest: float) -> Run:
-        def new() -> Chain:
+        def new() -> TwinModel:
             return build(robot, beam, mesh(robot, elements, hub_length_m, times), speeds, act.gains)
 
         tries = 1 if step_s else ATTEMPTS
@@ -115,23 +120,28 @@ def simulate(
         )
 
     with _quiet():
-        coarse = mesh(robot, COARSE, hub_length_m)
+        coarse = mesh(robot, COARSE_ELEMENTS, hub_length_m)
         first = run(
             0,
             {},
             step_s
-            or suggest(build(robot, beam, coarse, speeds, act.gains), _settings(1.0, 1), t[-1]),
+            or suggest_step(
+                build(robot, beam, coarse, speeds, act.gains), _settings(1.0, 1), t[-1]
+            ),
         )
         if not kinds or not first.complete:
             return first
         return extrapolate(
             first,
-            {kind: run(k, {kind: LONGER}, first.meta["step_s"]) for k, kind in enumerate(kinds, 1)},
+            {
+                kind: run(k, {kind: LENGTH_FACTOR}, first.meta["step_s"])
+                for k, kind in enumerate(kinds, 1)
+            },
         )
 
 
 def _run(
-    new: Callable[[], Chain],
+    new: Callable[[], TwinModel],
     act: Actuation,
     t: np.ndarray,
     longest: float,
@@ -139,38 +149,41 @@ def _run(
     progress: Callable[[float], None],
     program: str,
 ) -> Run:
-    """Simulate with steps of at most `longest` [s], given by the user if there is one try, else
-    halved where Exudyn fails."""
+    """Simulate with steps of at most `longest` [s]; they are halved if Exudyn fails.
+
+    With one try, the step is the user's and stays.
+    """
     import exudyn
 
     for attempt in range(tries):
-        chain, steps = new(), plan(t, longest / 2**attempt, forced=tries == 1)
+        model, steps = new(), plan_steps(t, longest / 2**attempt, forced=tries == 1)
         try:
-            record, done, wall = _solve(chain, act, steps, progress)
+            record, done, wall = _solve(model, act, steps, progress)
             break
         except DidNotConverge:
             if attempt == tries - 1:
                 raise
     t, q, v = steps.at_times(t, *(np.array(column) for column in record))
-    q += chain.reference
-    values, units = channels(chain, act, t, q, v)
+    q += model.reference
+    values, units = channels(model, act, t, q, v)
     meta = {
         "source": "twin",
         "program": f"Exudyn {exudyn.__version__} ({program})",
-        "robot": chain.robot.to_dict(),
+        "robot": model.robot.to_dict(),
         "complete": done == steps.count,
         "events": [],
         "wall_s": wall,
         "steps": done,
         "step_s": steps.length,
-        "elements": chain.mesh.elements,
-        "labels": [f"joint/{i}" for i in range(1, len(chain.parts) + 1)],
-        "hub_length_m": chain.mesh.hubs,
+        "elements": model.mesh.elements,
+        "labels": [f"joint/{i}" for i in range(1, len(model.parts) + 1)],
+        "hub_length_m": model.mesh.hubs,
     }
     return Run(t, values, units, meta)
 
 
 def _times(t_eval: Any) -> np.ndarray:
+    """The output times (T,), checked."""
     t = np.array(t_eval, dtype=float)
     if (
         t.ndim != 1
@@ -184,6 +197,7 @@ def _times(t_eval: Any) -> np.ndarray:
 
 
 def _speeds(robot: Robot, qd0: Any) -> np.ndarray:
+    """The joint velocities at the start (n,), checked."""
     n = len(robot.links)
     speeds = np.zeros(n) if qd0 is None else np.array(qd0, dtype=float)
     if speeds.shape != (n,) or not np.all(np.isfinite(speeds)):
@@ -199,14 +213,20 @@ def _speeds(robot: Robot, qd0: Any) -> np.ndarray:
 def _settings(
     end: float, steps: int, reach: float = 1.0, flexible: bool = True, coordinates: int = 0
 ) -> Any:
-    """Settings that are sound for thin metal strips, and write no files; `reach` is the sum of the
-    links' lengths [m].
+    """Exudyn's settings, sound for thin metal strips, without files.
 
     Exudyn's default tolerances on residuals are below round-off for strips (EA/EI ~ 1e7 1/m^2); it
-    would then halve its step a thousand times without a word. With flexible links convergence is
-    judged by increments (residualMode 1) instead, and a step that fails, fails. These are
-    increments of position, so that an error of 1e-12 is one of 1e-12/h^2 in acceleration: a fixed
-    tolerance makes errors grow again as the step falls, one with h^2 doesn't.
+    would then halve its step a thousand times without a message. With flexible links, convergence
+    is judged by increments (residualMode 1) instead, and a step that fails, fails. An increment of
+    position of 1e-12 is 1e-12/h^2 in acceleration: with a fixed tolerance errors grow again as the
+    step falls, with one proportional to h^2 they do not.
+
+    Args:
+        end: duration [s].
+        steps: number of steps.
+        reach: sum of the links' lengths [m].
+        flexible: whether a link is flexible.
+        coordinates: of the system.
     """
     import exudyn as exu
 
@@ -223,7 +243,7 @@ def _settings(
     integration.adaptiveStep = False
     kinds = exu.LinearSolverType
     settings.linearSolver.solverType = (
-        kinds.EigenSparse if coordinates > SPARSE else kinds.EigenDense
+        kinds.EigenSparse if coordinates > SPARSE_FROM else kinds.EigenDense
     )
     settings.solution.file.write = False
     settings.solution.solverInformationFileName = ""
@@ -232,13 +252,17 @@ def _settings(
 
 
 def _solve(
-    chain: Chain, act: Actuation, steps: Steps, progress: Callable[[float], None] | None
+    model: TwinModel, act: Actuation, steps: Steps, progress: Callable[[float], None] | None
 ) -> tuple[Record, int, float]:
-    """Run Exudyn; returns the record, the steps done, and seconds taken."""
+    """Run Exudyn.
+
+    Returns:
+        The record, the number of steps done, and the time taken [s].
+    """
     record: Record = ([], [], [], [])
     errors: list[BaseException] = []
-    data, done = chain.mbs.systemData, 0
-    loads = Loads(chain, act, steps.length, steps.count, errors.append)
+    data, done = model.mbs.systemData, 0
+    loads = Loads(model, act, steps.length, steps.count, errors.append)
     announce = max(1, round(PROGRESS * steps.count))
 
     def keep() -> None:
@@ -250,9 +274,8 @@ def _solve(
     def before(mbs: Any, t: float) -> bool:
         try:
             loads.before_step(t)
-        except (
-            BaseException
-        ) as error:  # an exception would come out of Exudyn as another one: stop first, raise after
+        except BaseException as error:
+            # Exudyn would turn it into another exception: stop first, raise after
             errors.append(error)
         return not errors
 
@@ -260,7 +283,7 @@ def _solve(
         nonlocal done
         try:
             done = round(t / steps.length)
-            _still_on(chain, data.GetODE2Coordinates(), t)
+            _check_on_links(model, data.GetODE2Coordinates(), t)
             if steps.keep[done]:
                 keep()
             if progress is not None and done % announce == 0:
@@ -272,26 +295,28 @@ def _solve(
     began = time.perf_counter()
     with _interruptible() as interrupted:
         if steps.count == 0:
-            after(chain.mbs, 0.0)
+            after(model.mbs, 0.0)
         else:
-            chain.mbs.SetPreStepUserFunction(before)
-            chain.mbs.SetPostStepUserFunction(after)
-            end, size = steps.count * steps.length, len(chain.reference)
-            settings = _settings(end, steps.count, chain.reach, any(chain.mesh.elements), size)
-            failed = _complaint(chain.mbs, settings)
+            model.mbs.SetPreStepUserFunction(before)
+            model.mbs.SetPostStepUserFunction(after)
+            end, size = steps.count * steps.length, len(model.reference)
+            settings = _settings(end, steps.count, model.reach, any(model.mesh.elements), size)
+            failed = _run_solver(model.mbs, settings)
             if failed and not errors:
-                raise _failure(chain.mbs, done, steps, failed)
+                raise _failure(model.mbs, done, steps, failed)
     if errors:
         raise errors[0]
     return record, done, time.perf_counter() - began
 
 
-def _still_on(chain: Chain, q: Any, t: float) -> None:
-    """Raise FlexuraError where a hub or sleeve has come to the end of its link: Exudyn would let it
-    stick there."""
-    for i, place in enumerate(chain.slides):
+def _check_on_links(model: TwinModel, q: Any, t: float) -> None:
+    """Raise FlexuraError if a hub or sleeve has reached the end of its link.
+
+    Exudyn would let it stick there.
+    """
+    for i, place in enumerate(model.slides):
         if place is not None:
-            low, high = reach_of(chain.robot, i)
+            low, high = slide_range(model.robot, i)
             if not low - SLACK * high <= q[place] <= high + SLACK * high:
                 where = f"at {q[place]:.6g} m, it can be from {low:g} to {high:g} m"
                 raise FlexuraError(
@@ -299,8 +324,8 @@ def _still_on(chain: Chain, q: Any, t: float) -> None:
                 )
 
 
-def _complaint(mbs: Any, settings: Any) -> str:
-    """Exudyn's own complaint, or "" when it got to the end or was stopped."""
+def _run_solver(mbs: Any, settings: Any) -> str:
+    """Run Exudyn's solver; its error message, or "" if it ended or was stopped."""
     try:
         return "" if mbs.SolveDynamic(settings) else "SolveDynamic returned False"
     except Exception as error:
@@ -308,6 +333,7 @@ def _complaint(mbs: Any, settings: Any) -> str:
 
 
 def _failure(mbs: Any, done: int, steps: Steps, failed: str) -> FlexuraError:
+    """The error for a run that failed."""
     where = (
         f"Exudyn's solver stopped at t = {done * steps.length:.6g} s of "
         f"{steps.count * steps.length:.6g} s"
@@ -328,7 +354,7 @@ def _failure(mbs: Any, done: int, steps: Steps, failed: str) -> FlexuraError:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep Exudyn's own messages off the user's terminal."""
+    """Keep Exudyn's messages off the terminal."""
     import exudyn as exu
 
     before = exu.config.printToConsole, exu.config.suppressWarnings
@@ -341,8 +367,10 @@ def _quiet() -> Iterator[None]:
 
 @contextmanager
 def _interruptible() -> Iterator[threading.Event]:
-    """An event that Ctrl-C sets, instead of an exception in the midst of Exudyn; only the main
-    thread can be asked."""
+    """An event that Ctrl-C sets, instead of an exception inside Exudyn.
+
+    Only the main thread can receive it.
+    """
     interrupted = threading.Event()
     if threading.current_thread() is not threading.main_thread():
         yield interrupted

@@ -1,4 +1,4 @@
-"""Exudyn's steps: how long, and which of them to keep for the times asked for."""
+"""Exudyn's steps: their length, and which of them to record for the output times."""
 
 from __future__ import annotations
 
@@ -9,28 +9,28 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from .build import Chain
+from .build import TwinModel
 
 MAX_STEPS = 5_000_000  # refused beyond
 DEFAULT_STEPS = 500_000  # a default step is never so short that it needs more
-LONGEST = 5e-4  # s
-PER_FIRST, PER_HIGHEST = (
-    240,
-    60,
-)  # steps in a period of the lowest and of the highest participating frequency
-RIGID_HZ, ROUND_OFF = (
-    0.02,
-    3e-8,
-)  # frequencies below, and below this part of the highest, are rigid motions and round-off
+MAX_STEP_S = 5e-4  # s
+STEPS_PER_FIRST_PERIOD = 240  # of the lowest frequency
+STEPS_PER_HIGHEST_PERIOD = 60  # of the highest frequency that takes part
+RIGID_HZ = 0.02  # frequencies below are rigid motions
+ROUND_OFF = 3e-8  # frequencies below this part of the highest are round-off
 # s, the run for which these hold; phase errors grow with time, so that h goes with 1/sqrt(time)
-SPAN = 2.0
-GRID = 1e-9  # how far a time may lie from a step, relative to the step, to count as on it
+REFERENCE_DURATION_S = 2.0
+ON_STEP_TOLERANCE = (
+    1e-9  # how far a time may lie from a step, relative to the step, to count as on it
+)
 
 
 @dataclass(frozen=True)
 class Steps:
-    """`count` steps of `length` [s]; `keep` (count + 1,) marks those to record; `exact`: every time
-    asked for is one of them."""
+    """`count` steps of `length` [s].
+
+    `keep` (count + 1,) marks those to record. `exact`: every output time is one of them.
+    """
 
     length: float
     count: int
@@ -40,21 +40,36 @@ class Steps:
     def at_times(
         self, t: np.ndarray, at: np.ndarray, q: np.ndarray, v: np.ndarray, a: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Times, coordinates and velocities at those of the times t that the record reached; the
-        record begins at time 0."""
+        """Coordinates at the output times that the record reached.
+
+        Args:
+            t: output times (T,) [s].
+            at: recorded times (K,) [s], from 0 on.
+            q: coordinates (K, n).
+            v: velocities (K, n).
+            a: accelerations (K, n).
+
+        Returns:
+            Times (k,), coordinates and velocities (k, n).
+        """
         t = t[t <= at[-1] + 1e-3 * self.length]  # round-off of many steps
         if self.exact:
-            mine = np.searchsorted(at, t - self.length / 2)
-            return t, q[mine], v[mine]
+            own = np.searchsorted(at, t - self.length / 2)
+            return t, q[own], v[own]
         return t, *_interpolate(t, at, q, v, a)
 
 
-def plan(t: np.ndarray, longest: float, forced: bool) -> Steps:
-    """Steps up to t[-1], at most `longest` [s] each; they divide the output step where t is uniform
-    (and begins on it).
+def plan_steps(t: np.ndarray, longest: float, forced: bool) -> Steps:
+    """Steps up to t[-1]; they divide the output step if t is uniform and begins on it.
 
-    `forced`: the user gave the length, so that too many steps are an error and not a reason for
-    longer ones.
+    Args:
+        t: output times (T,) [s].
+        longest: the longest step [s].
+        forced: the user gave the length, so that too many steps are an error, not a reason for
+            longer ones.
+
+    Raises:
+        InputError: there would be too many steps.
     """
     end = float(t[-1])
     if end == 0:
@@ -71,7 +86,7 @@ def plan(t: np.ndarray, longest: float, forced: bool) -> Steps:
         length = end / math.ceil(end / longest - 1e-9)
     count = round(end / length)
     places = t / length
-    exact = bool(np.all(np.abs(places - np.round(places)) < max(GRID, 1e-12 * count)))
+    exact = bool(np.all(np.abs(places - np.round(places)) < max(ON_STEP_TOLERANCE, 1e-12 * count)))
     keep = np.zeros(count + 1, dtype=bool)
     keep[0] = True
     wanted = [np.round(places)] if exact else [np.floor(places), np.ceil(places)]
@@ -80,41 +95,50 @@ def plan(t: np.ndarray, longest: float, forced: bool) -> Steps:
     return Steps(length, count, keep, exact)
 
 
-def suggest(chain: Chain, settings: Any, end: float) -> float:
-    """A step [s] for a time error below about 1e-3 of the tip deflection, from the robot's own
-    frequencies at its start.
+def suggest_step(model: TwinModel, settings: Any, end: float) -> float:
+    """A step for a time error below about 1e-3 of the tip deflection [s].
 
-    240 steps in a period of the lowest frequency and 60 in one of the highest that takes part,
-    taken as the lowest and one more a flexible link (measured on a carriage with a flexible arm,
-    bang-bang driven, over 2 s: 3e-4 to 8e-4).
+    240 steps in a period of the lowest frequency, and 60 in one of the highest that takes part, at
+    the robot's start. The latter is taken as the lowest and one more a flexible link (measured on a
+    carriage with a flexible arm, bang-bang driven, over 2 s: 3e-4 to 8e-4).
+
+    Args:
+        model: the assembled robot.
+        settings: Exudyn's settings.
+        end: duration [s].
     """
     try:
         hertz = np.sort(
-            chain.mbs.ComputeODE2Eigenvalues(simulationSettings=settings, convert2Frequencies=True)[
+            model.mbs.ComputeODE2Eigenvalues(simulationSettings=settings, convert2Frequencies=True)[
                 0
             ]
         )
-    except (
-        Exception
-    ):  # a linear solver's complaint about a singular matrix: the step is a proposal only
-        return LONGEST
+    except Exception:  # of a linear solver about a singular matrix: the step is a proposal only
+        return MAX_STEP_S
     hertz = hertz[np.isfinite(hertz)]
     hertz = hertz[hertz > max(RIGID_HZ, ROUND_OFF * hertz.max(initial=0.0))]
     if len(hertz) == 0:
-        return LONGEST
-    highest = hertz[min(sum(count > 0 for count in chain.mesh.elements), len(hertz) - 1)]
+        return MAX_STEP_S
+    highest = hertz[min(sum(count > 0 for count in model.mesh.elements), len(hertz) - 1)]
     return min(
-        LONGEST,
-        min(1 / (PER_FIRST * hertz[0]), 1 / (PER_HIGHEST * highest))
-        * math.sqrt(SPAN / max(end, SPAN)),
+        MAX_STEP_S,
+        min(1 / (STEPS_PER_FIRST_PERIOD * hertz[0]), 1 / (STEPS_PER_HIGHEST_PERIOD * highest))
+        * math.sqrt(REFERENCE_DURATION_S / max(end, REFERENCE_DURATION_S)),
     )
 
 
 def _interpolate(
     t: np.ndarray, at: np.ndarray, q: np.ndarray, v: np.ndarray, a: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates and velocities at t (T,) from those at the recorded times `at` (K,), with
-    accelerations, by cubics."""
+    """Coordinates and velocities at t (T,) by cubics.
+
+    Args:
+        t: output times (T,) [s].
+        at: recorded times (K,) [s].
+        q: coordinates (K, n).
+        v: velocities (K, n).
+        a: accelerations (K, n).
+    """
     if len(at) == 1:
         return q[: len(t)], v[: len(t)]
     k = np.clip(np.searchsorted(at, t, side="right") - 1, 0, len(at) - 2)

@@ -1,1 +1,1 @@
-"""The same problems as programs of Exudyn, built without flexura's code."""
+"""The benchmark's problems as programs of Exudyn, built without flexura's code."""

@@ -1,9 +1,8 @@
-"""A chain of flexible links in Exudyn, as one builds it who wants it fast. It shares a robot file's
-tables with flexura, no more.
+"""A chain of flexible links in Exudyn, built for speed from a robot file's tables.
 
-ANCF cables; the inertias of hubs and of the payload sit on the beams' end nodes, so that there are
-no bodies and no joints but the hinges; sensors in memory. A chain is one carriage on a rail or
-none, then flexible links with joints R.
+ANCF cables; inertias of hubs and payload sit on the beams' end nodes, so that there are no bodies
+and no joints but the hinges; sensors stay in memory. A chain is one carriage on a rail or none,
+then flexible links with joints R.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ AXIAL = 1e5  # EA L^2 / EI of links that are given by their EI
 
 
 def exudyn() -> Any:
-    """Exudyn's module, quiet."""
+    """Exudyn's module, without messages."""
     import exudyn as exu
 
     exu.SetWriteToConsole(False)
@@ -28,7 +27,7 @@ def exudyn() -> Any:
 
 
 def line(link: Tables) -> tuple[float, float, float]:
-    """Mass per length [kg/m], EI [N m2] and EA [N] of a link's tables."""
+    """Mass per length [kg/m], EI [N m^2] and EA [N] of a link's tables."""
     if "section" not in link:
         stiffness = link["bending_stiffness_N_m2"]
         return link["mass_per_length_kg_m"], stiffness, AXIAL * stiffness / link["length_m"] ** 2
@@ -38,8 +37,7 @@ def line(link: Tables) -> tuple[float, float, float]:
 
 
 class Joint(NamedTuple):
-    """A joint: markers of the drive's loads (on the link, and back on what carries it), and how its
-    coordinate is measured."""
+    """Markers of a joint's loads and of its coordinate, and the nodes between which it turns."""
 
     loads: list[int]
     coordinate: int  # marker of the joint's coordinate [m or rad]
@@ -48,9 +46,16 @@ class Joint(NamedTuple):
 
 
 class Chain:
-    """The assembled system `mbs`, its joints, and the sensors of the links' ends."""
+    """The system `mbs`, its joints, and sensors at the links' ends."""
 
     def __init__(self, robot: Tables, elements: int, reduced: int = 0) -> None:
+        """Build the chain, straight at its start; it is not assembled yet.
+
+        Args:
+            robot: tables of a robot file.
+            elements: cables a flexible link.
+            reduced: order of the cables' reduced quadrature; 0: full.
+        """
         from exudyn import itemInterface as item
 
         self.robot, self.item, self.exu = robot, item, exudyn()
@@ -63,7 +68,7 @@ class Chain:
         )
         self.joints: list[Joint] = []
         self.ends: list[tuple[int, int]] = []  # nodes
-        self.rides = robot["link"][0]["elements"] == 0
+        self.has_carriage = robot["link"][0]["elements"] == 0
         self._links([link for link in robot["link"] if link["elements"]], elements, reduced)
         self.sensors = [
             (self._sensor(root, "CoordinatesTotal"), self._sensor(tip, "Position"))
@@ -71,7 +76,7 @@ class Chain:
         ]
 
     def _links(self, links: list[Tables], elements: int, reduced: int) -> None:
-        """All flexible links, straight at their start."""
+        """Add all flexible links, straight at their start."""
         from exudyn import beams
 
         x, y, angle, payload = 0.0, 0.0, 0.0, self.robot.get("payload", {})
@@ -93,11 +98,11 @@ class Chain:
             )
             root, tip = made["nodes"][0], made["nodes"][-1]
             joint, last = link["joint"], k == len(links) - 1
-            riding = self.robot["link"][0]["mass_kg"] if self.rides and k == 0 else 0.0
-            self._lump(
+            riding = self.robot["link"][0]["mass_kg"] if self.has_carriage and k == 0 else 0.0
+            self._point_mass(
                 root, joint.get("hub_mass_kg", 0.0) + riding, joint.get("hub_inertia_kg_m2", 0.0)
             )
-            self._lump(
+            self._point_mass(
                 tip,
                 *(
                     (payload.get(key, 0.0) for key in ("mass_kg", "inertia_kg_m2"))
@@ -115,13 +120,13 @@ class Chain:
     def _hinge(
         self, k: int, root: int, carrier: int, bodies: list[int], place: list[float], start: float
     ) -> None:
-        """The joint R of flexible link k, and the rail before it."""
+        """Add the joint R of flexible link k, and the rail before it."""
         hub, before = self._marker("NodeRigid", nodeNumber=root), self.ends[-1][1] if k else None
         held = [self._marker("NodeCoordinate", nodeNumber=root, coordinate=j) for j in (0, 1)]
-        if k == 0 and self.rides:
+        if k == 0 and self.has_carriage:
             self.joints.append(Joint([held[0]], held[0], root, None))
         if k == 0:
-            for coordinate in held[1:] if self.rides else held:
+            for coordinate in held[1:] if self.has_carriage else held:
                 self.mbs.AddObject(
                     self.item.ObjectConnectorCoordinate(markerNumbers=[self.origin, coordinate])
                 )
@@ -140,9 +145,8 @@ class Chain:
         )
         self.joints.append(Joint([hub, carrier] if k else [hub], angle, root, before))
 
-    def _lump(self, node: int, mass: float, inertia: float) -> None:
-        """A mass and an inertia on the end of a beam: the slope of an ANCF node turns with it, and
-        has length 1."""
+    def _point_mass(self, node: int, mass: float, inertia: float) -> None:
+        """Add a mass and an inertia to a beam's end node, whose slope vector has length 1."""
         if mass or inertia:
             self.mbs.AddObject(
                 self.item.ObjectGenericODE2(
@@ -165,7 +169,7 @@ class Chain:
         return self.mbs.AddSensor(sensor)
 
     def measured(self) -> tuple[np.ndarray, np.ndarray, float]:
-        """Positions and velocities of the joints now, and the last link's tip deflection."""
+        """Positions and velocities of the joints now, (joints,), and the tip deflection [m]."""
         kind, get = self.exu.OutputVariableType, self.mbs.GetNodeOutput
         angle = lambda q: math.atan2(q[3], q[2])
         rate = lambda q, v: (q[2] * v[3] - q[3] * v[2]) / (q[2] ** 2 + q[3] ** 2)

@@ -1,4 +1,4 @@
-"""Runs of Exudyn: how a problem is integrated, in how much processor time, and what comes out."""
+"""Runs of Exudyn: settings, processor time, and the channels."""
 
 from __future__ import annotations
 
@@ -12,14 +12,13 @@ import flexura as fx
 from flexura import twin
 
 from ..problems.problem import Channels, Problem
-from .actions import Actions
 from .chain import Chain
+from .loads import Loads
 
 
 @dataclass(frozen=True)
 class Choice:
-    """How Exudyn integrates: elements a link, steps in an output step, and what its solver is
-    told."""
+    """Settings of a run: elements a link, steps in an output step, and the solver's options."""
 
     elements: int
     substeps: int
@@ -33,7 +32,7 @@ class Choice:
     trapezoidal: bool = False  # index 2, in place of generalized alpha
 
     def to_dict(self) -> dict[str, Any]:
-        """What differs from the defaults, elements and substeps in any case."""
+        """The settings that differ from the defaults; elements and substeps always."""
         plain = asdict(Choice(0, 0))
         return {k: v for k, v in asdict(self).items() if v != plain[k]}
 
@@ -51,8 +50,15 @@ class Choice:
 
 
 def settings(exu: Any, choice: Choice, end: float, step: float, period: float) -> Any:
-    """Exudyn's settings: fixed steps, modified Newton, no files, sensors at the output's instants
-    alone."""
+    """Exudyn's settings: fixed steps, modified Newton, no files, sensors at output times.
+
+    Args:
+        exu: Exudyn's module.
+        choice: what is chosen.
+        end: duration [s].
+        step: length of a step [s].
+        period: time between outputs [s].
+    """
     made = exu.SimulationSettings()
     integration = made.timeIntegration
     integration.endTime, integration.numberOfSteps = end, round(end / step)
@@ -73,17 +79,23 @@ def settings(exu: Any, choice: Choice, end: float, step: float, period: float) -
 
 
 def run(problem: Problem, choice: Choice) -> tuple[float, Channels]:
-    """Processor seconds of the time loop, and the channels at the problem's times. Raises
-    RuntimeError if Exudyn gives up."""
+    """Run a problem in Exudyn.
+
+    Returns:
+        Processor time of the time loop [s], and the channels at the problem's times.
+
+    Raises:
+        RuntimeError: Exudyn fails.
+    """
     period = float(problem.t[1] - problem.t[0])
     step = period / choice.substeps
     if problem.hub_length_m:
         return _twin(problem, choice, step)
     chain = Chain(problem.robot, choice.elements, choice.reduced)
-    actions = Actions(chain, problem.work)
+    loads = Loads(chain, problem.work)
     chain.mbs.Assemble()
     end = float(problem.t[-1])
-    actions.begin(round(end / step), step)
+    loads.begin(round(end / step), step)
     kinds = chain.exu.DynamicSolverType
     kind = kinds.TrapezoidalIndex2 if choice.trapezoidal else kinds.GeneralizedAlpha
     chosen = settings(chain.exu, choice, end, step, period)
@@ -92,12 +104,15 @@ def run(problem: Problem, choice: Choice) -> tuple[float, Channels]:
     took = time.process_time() - begun
     if done is False:
         raise RuntimeError("Exudyn's solver failed")
-    return took, channels(problem, chain, actions)
+    return took, channels(problem, chain, loads)
 
 
-def channels(problem: Problem, chain: Chain, actions: Actions) -> Channels:
-    """Tip deflections, the tip's place, and the drives of prescribed joints if they are asked for.
-    Raises RuntimeError."""
+def channels(problem: Problem, chain: Chain, loads: Loads) -> Channels:
+    """Tip deflections, tip position, and drives of prescribed joints.
+
+    Raises:
+        RuntimeError: Exudyn stopped early, or a value is not finite.
+    """
     read = lambda sensor: np.asarray(chain.mbs.GetSensorStoredData(sensor))
     out: Channels = {}
     first = len(chain.joints) - len(chain.ends) + 1
@@ -110,7 +125,7 @@ def channels(problem: Problem, chain: Chain, actions: Actions) -> Channels:
     out["tip/x"], out["tip/y"] = b[:, 1], b[:, 2]
     if problem.inverse:
         out |= {
-            f"joint/{k}/drive": -read(sensor)[:, 1] for k, sensor in enumerate(actions.reactions, 1)
+            f"joint/{k}/drive": -read(sensor)[:, 1] for k, sensor in enumerate(loads.reactions, 1)
         }
     if any(
         len(value) != len(problem.t) or not np.all(np.isfinite(value)) for value in out.values()
@@ -120,7 +135,7 @@ def channels(problem: Problem, chain: Chain, actions: Actions) -> Channels:
 
 
 def _twin(problem: Problem, choice: Choice, step: float) -> tuple[float, Channels]:
-    """The same by flexura's twin, which knows sliders and sleeves."""
+    """The same by flexura's twin, which has sliders and sleeves."""
     drive = fx.Drive.force(*problem.work.force)
     begun = time.process_time()
     done = twin.simulate(

@@ -1,2 +1,1 @@
-"""The problems of the benchmarks: robots, signals, motions, statics and frequencies, and how
-errors count."""
+"""The benchmark's problems: robots, signals, motions, statics, frequencies, error measure."""

@@ -1,4 +1,4 @@
-"""The motions of the benchmark: what users of planar robots with flexible links run."""
+"""The benchmark's motions: typical motions of planar robots with flexible links."""
 
 from __future__ import annotations
 
@@ -33,17 +33,17 @@ from .signals import bang_bang, cycloid, harmonic, piecewise, spin_up
 
 
 def times(end: float, steps: int) -> np.ndarray:
-    """Instants of the output, from 0 to `end` [s]."""
+    """Output times from 0 to `end` [s], (steps + 1,)."""
     return np.linspace(0.0, end, steps + 1)
 
 
 def rig_swing() -> list[fx.Signal]:
-    """The rig's inverse law: both joints along sines."""
+    """The rig's inverse manoeuvre: both joints along sines."""
     return [harmonic(0.012, 1.0, -np.pi / 2), harmonic(np.pi / 6, 1.0, -np.pi / 2)]
 
 
 def one_link() -> list[Problem]:
-    """Robots with one flexible link."""
+    """Problems with one flexible link."""
     pulse = Work(force=[bang_bang(2.0, 1.0, 0.01), bang_bang(0.05, 1.0, 0.01)])
     swing = rig_swing()
     sampled = Work(motion=swing, kp=[900.0, 6.0], kd=[50.0, 0.15], rate_Hz=1000.0)
@@ -68,7 +68,7 @@ def one_link() -> list[Problem]:
             finer=type_4(12),
             finer_elements=16,
             exact=("explicit", 1e-9),
-            asked=550,
+            required_ratio=550,
         ),
         Problem(
             "type4-mesh",
@@ -80,7 +80,7 @@ def one_link() -> list[Problem]:
             finer=type_4(12),
             finer_elements=16,
             exact=("explicit", 1e-9),
-            asked=500,
+            required_ratio=500,
         ),
         Problem(
             "rig-pd",
@@ -173,7 +173,7 @@ def one_link() -> list[Problem]:
 
 
 def more_links() -> list[Problem]:
-    """Robots with two to twelve flexible links, joints R."""
+    """Problems with two to twelve flexible links, joints R."""
     steps = Work(
         force=[
             piecewise([0, 0.5, 1.0], [0.2, -0.2, 0.0]),
@@ -263,7 +263,7 @@ def more_links() -> list[Problem]:
 
 
 def sliding() -> list[Problem]:
-    """Robots on whose links something slides."""
+    """Problems in which a joint slides on a link."""
     pulses = lambda *size: Work(force=[bang_bang(a, 0.4, 0.02) for a in size])
     return [
         Problem(
@@ -274,7 +274,7 @@ def sliding() -> list[Problem]:
             pulses(0.3, -0.1),
             8,
             hub_length_m=0.03,
-            asked=150,
+            required_ratio=150,
         ),
         Problem(
             "rpb",
@@ -293,13 +293,13 @@ def sliding() -> list[Problem]:
             pulses(0.7, 0.016),
             4,
             hub_length_m=0.10,
-            asked=580,
+            required_ratio=580,
         ),
     ]
 
 
 def in_python() -> list[Problem]:
-    """Robots that a user's own Python function drives."""
+    """Problems driven by a Python function."""
     swing, kp, kd = rig_swing(), (900.0, 6.0), (50.0, 0.15)
 
     def open_loop(t: float) -> Any:

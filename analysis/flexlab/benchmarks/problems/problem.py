@@ -1,4 +1,4 @@
-"""What a problem of the benchmark is, and how far two answers to it are apart."""
+"""A problem of the benchmark, and the error between two answers to it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import flexura as fx
 
 Tables = dict[str, Any]  # a robot file's tables
 Channels = dict[str, np.ndarray]  # values (T,) by channel name
-PATH_SHARE = 1e-3  # of the tip's path: what counts as a deflection where the links hardly bend
+PATH_SHARE = 1e-3  # of the tip's path: the least scale of deflections
 
 
 @dataclass(frozen=True)
@@ -21,8 +21,9 @@ class Work:
 
     `force`: torques or forces over time. `motion`, `kp`, `kd`: PD control along a motion, held
     between ticks if `rate_Hz` > 0. `prescribed`: motions that the joints follow exactly.
-    `of_time(t)` and `of_state(t, position, velocity, tip_deflection)` are a user's own Python
-    functions, which give one force a joint; `tick` is one that is called once a tick of `rate_Hz`.
+    `of_time(t)` and `of_state(t, position, velocity, tip_deflection)`: Python functions that return
+    one force a joint. `tick()` makes such a function, with a memory, that is called once a tick of
+    `rate_Hz`.
     """
 
     force: Sequence[fx.Signal | None] = ()
@@ -47,12 +48,13 @@ class Work:
 class Problem:
     """A robot and what it does at the times t (T,) [s].
 
-    `robot` is what flexura runs; `finer`, if given, is the robot whose converged motion counts (a
-    mesh beside few modes). `elements` is what Exudyn takes for each flexible link, `finer_elements`
-    what its converged model takes. `exact`: method and tolerance of flexura's converged run; `same`
-    acts as `work` does, without Python. `hub_length_m`: of the hubs of the twin, which runs what
-    slides; 0: the chain of `exudyn_chain.py` runs it. `undamped`: it rings after jumps and nothing
-    damps it, so that the accuracy that is asked of the others does not hold.
+    `robot`: tables of the robot that flexura runs. `finer`: a robot with a finer mesh, whose
+    converged motion counts. `elements`, `finer_elements`: Exudyn's elements a flexible link, in a
+    run and in its converged model. `exact`: method and tolerance of flexura's converged run.
+    `same`: equivalent to `work`, without Python functions. `hub_length_m`: length of the twin's
+    hubs, for sliding joints; 0: `exudyn_programs.chain` runs the problem. `undamped`: it rings
+    after jumps, so that the required accuracy does not apply. `required_ratio`: how much faster
+    than Exudyn. `needs`: a public name of flexura that the problem needs.
     """
 
     name: str
@@ -68,16 +70,17 @@ class Problem:
     hub_length_m: float = 0.0
     inverse: bool = False
     undamped: bool = False
-    asked: float | None = None
+    required_ratio: float | None = None
     needs: str = ""  # a public name of flexura without which it can't be run
 
     @property
     def available(self) -> bool:
+        """Whether this version of flexura can run the problem."""
         return not self.needs or hasattr(fx, self.needs)
 
     @property
     def names(self) -> list[str]:
-        """The channels of its motion that are compared."""
+        """The channels that are compared."""
         bent = [
             f"link/{k}/tip_deflection"
             for k, link in enumerate(self.robot["link"], 1)
@@ -92,16 +95,20 @@ class Problem:
 
 
 def scale(exact: Channels) -> float:
-    """The length by which errors are divided [m]: the largest tip deflection, or 1e-3 of the tip's
-    path if that is more."""
+    """The length by which errors are divided [m].
+
+    It is the largest tip deflection, or 1e-3 of the tip's path if that is more.
+    """
     bent = max(np.abs(v).max() for name, v in exact.items() if name.endswith("tip_deflection"))
     path = np.hypot(np.diff(exact["tip/x"]), np.diff(exact["tip/y"])).sum()
     return float(max(bent, PATH_SHARE * path))
 
 
 def error(found: Channels, exact: Channels) -> float:
-    """The largest deviation of the tip's place and of the tip deflections, relative to `scale`; of
-    drives, to their largest."""
+    """The largest deviation of tip position and tip deflections, relative to `scale`.
+
+    Deviations of drives are relative to the largest drive. Infinite if a value is not finite.
+    """
     size = scale(exact)
     worst = [
         np.hypot(found["tip/x"] - exact["tip/x"], found["tip/y"] - exact["tip/y"]).max() / size

@@ -1,4 +1,4 @@
-"""Tables of the robots of the benchmark."""
+"""Robot tables of the benchmark."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from .problem import Tables
 
 
 def turning(**keys: Any) -> Tables:
-    """A joint R."""
+    """Table of a joint R."""
     return {"type": "R", **keys}
 
 
@@ -20,7 +20,16 @@ def strip(
     metal: str = "steel",
     **keys: Any,
 ) -> Tables:
-    """A flexible link of a rectangular section (width, height) [m]."""
+    """Table of a flexible link with a rectangular section.
+
+    Args:
+        length: its length [m].
+        section: width and height [m].
+        elements: finite elements.
+        joint: table of its joint.
+        metal: "steel", "aluminium" or "6061".
+        keys: further keys of the link.
+    """
     modulus, density = {
         "steel": (2.0e11, 7850.0),
         "aluminium": (7.0e10, 2700.0),
@@ -41,13 +50,13 @@ def strip(
 def beam(
     length: float, stiffness: float, mass: float, elements: int, joint: Tables, **keys: Any
 ) -> Tables:
-    """A flexible link by its EI [N m2] and its mass per length [kg/m]."""
+    """Table of a flexible link by its EI [N m^2] and mass per length [kg/m]."""
     line = {"mass_per_length_kg_m": mass, "bending_stiffness_N_m2": stiffness}
     return {"length_m": length, "elements": elements, **line, "joint": joint, **keys}
 
 
 def carriage(mass: float) -> Tables:
-    """A rigid link without length on a rail, first of its robot."""
+    """Table of a rigid link without length on a rail, the first of its robot."""
     return {
         "length_m": 0.0,
         "elements": 0,
@@ -58,15 +67,21 @@ def carriage(mass: float) -> Tables:
 
 
 def damped(beta: float) -> Tables:
-    """A link's damping beta [s] of its curvature."""
+    """A link's damping key; beta [s]."""
     return {"damping": {"beta_s": beta}}
 
 
 def robot(
     links: list[Tables], payload: float = 0.0, inertia: float = 0.0, gravity: bool = False
 ) -> Tables:
-    """A robot of these links, with a payload [kg, kg m2], in the vertical plane if there is
-    gravity."""
+    """Tables of a robot.
+
+    Args:
+        links: tables of its links.
+        payload: mass at the tip [kg].
+        inertia: the payload's moment of inertia [kg m^2].
+        gravity: whether the plane is vertical.
+    """
     made: Tables = {"name": "benchmark", "link": links}
     if payload or inertia:
         made["payload"] = {"mass_kg": payload, "inertia_kg_m2": inertia}
@@ -74,7 +89,7 @@ def robot(
 
 
 def meshed(tables: Tables, elements: int) -> Tables:
-    """The same robot with all unknowns of so many elements a flexible link."""
+    """The robot with all unknowns of `elements` elements a flexible link, without modes."""
     whole = lambda link: {k: v for k, v in link.items() if k != "modes"} | {"elements": elements}
     return tables | {"link": [whole(link) if link["elements"] else link for link in tables["link"]]}
 
@@ -96,7 +111,7 @@ def tokhi_arm(elements: int = 8, joint: Tables | None = None) -> Tables:
 
 
 def rig(hub: float) -> Tables:
-    """The rig (PaR) with a hub of this inertia [kg m2] in place of its rotor."""
+    """The rig (PaR) with a hub of inertia `hub` [kg m^2] instead of its rotor."""
     return robot(
         [
             carriage(0.6),
@@ -107,8 +122,7 @@ def rig(hub: float) -> Tables:
 
 
 def type_4(elements: int, modes: int = 0) -> Tables:
-    """Type IV (PaR) of the benchmark: a carriage on a rail, a rotor, a steel strip, a payload;
-    undamped."""
+    """Type IV (PaR): a carriage on a rail, a rotor, a steel strip, a payload; undamped."""
     keys: Tables = {"modes": modes} if modes else {}
     return robot(
         [
@@ -120,7 +134,7 @@ def type_4(elements: int, modes: int = 0) -> Tables:
 
 
 def two_strips(elements: int, modes: tuple[int, int] | None = None) -> Tables:
-    """Type I (RR) of the benchmark: two aluminium strips, undamped."""
+    """Type I (RR): two aluminium strips, undamped."""
     first = strip(0.9, (0.03, 0.006), elements, turning(hub_inertia_kg_m2=0.05), "aluminium")
     second = strip(
         0.8, (0.03, 0.004), elements, turning(hub_mass_kg=0.5, hub_inertia_kg_m2=0.005), "aluminium"
@@ -146,7 +160,7 @@ def upright_arm(elements: int) -> Tables:
 
 
 def chain(links: int, elements: int) -> Tables:
-    """Equal damped links between joints R."""
+    """Equal damped links with joints R."""
     hub = turning(hub_mass_kg=0.1, hub_inertia_kg_m2=1e-3)
     return robot([beam(0.3, 2.0, 0.2, elements, hub, **damped(1e-3)) for _ in range(links)], 0.1)
 
@@ -171,8 +185,7 @@ def boom() -> Tables:
 
 
 def slider(elements: int = 8) -> Tables:
-    """Type II (RPa): a slider rides along a turning flexible arm and carries a flexible strip
-    across it."""
+    """Type II (RPa): a flexible strip across a slider on a turning flexible arm."""
     ride = {
         "type": "Pa",
         "angle_rad": 1.5707963267948966,
@@ -185,15 +198,14 @@ def slider(elements: int = 8) -> Tables:
 
 
 def sleeve(elements: int = 4) -> Tables:
-    """Type III (RPb): a flexible strip slides through a sleeve on a turning rigid arm."""
+    """Type III (RPb): a flexible strip that slides through a sleeve on a turning rigid arm."""
     through = {"type": "Pb", "start": 0.25, "limits": [0.15, 0.35], "hub_mass_kg": 0.3}
     arm: Tables = {"length_m": 0.2, "elements": 0, "mass_per_length_kg_m": 1.0, "joint": turning()}
     return robot([arm, strip(0.4, (0.02, 0.001), elements, through, **damped(2e-4))], 0.02)
 
 
 def wrist(elements: int = 4) -> Tables:
-    """Type VII (PbR): a flexible arm slides through a sleeve in the base; a joint R at its end
-    turns a flexible strip."""
+    """Type VII (PbR): a flexible arm through a sleeve in the base, with a strip on a joint R."""
     through = {"type": "Pb", "start": 0.3, "limits": [0.2, 0.45]}
     turn = turning(hub_mass_kg=0.15, hub_inertia_kg_m2=1e-4)
     arm = strip(0.5, (0.03, 0.003), elements, through, **damped(2e-4))

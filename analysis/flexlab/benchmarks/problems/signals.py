@@ -11,8 +11,12 @@ __all__ = ["bang_bang", "cycloid", "harmonic", "piecewise", "spin_up"]
 
 
 def spin_up(speed: float, duration: float) -> fx.Signal:
-    """Kane's rotation: its rate rises to `speed` [rad/s] within `duration` [s], as t - sin(w t)/w
-    does, w = 2 pi/duration."""
+    """Kane's rotation, whose rate rises as t - sin(w t)/w with w = 2 pi / duration.
+
+    Args:
+        speed: final rate [rad/s].
+        duration: time until it is reached [s].
+    """
     w = 2 * np.pi / duration
     a, b = speed / duration, speed / duration / w**2
     rows = [

@@ -1,1 +1,1 @@
-"""The simulation of an experiment: what was commanded or measured, through the rig's drives."""
+"""Simulation of an experiment from its commands or measurements, through the rig's drives."""

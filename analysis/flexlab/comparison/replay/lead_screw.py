@@ -1,14 +1,15 @@
-"""Joint 1 by its motor's voltage: the nut by the motor's line with static friction, the carriage
-behind the nut's play.
+"""Joint 1 from its motor's voltage: the nut with static friction, the carriage behind backlash.
 
-    m s'' = F - c s' - f sign s'            f: Coulomb friction; at rest s stays as long as |F| <=
-    f_0, static friction x = min(max(x, s - b/2), s + b/2)       both frictions less the rail's part
-    while the nut crosses the play b
+    m s'' = F - c s' - f sign s'       moving; f: Coulomb friction
+    s'' = 0                            at rest, if |F| <= f_0, the static friction
+    x = min(max(x, s - b/2), s + b/2)  carriage behind the nut, backlash b
 
-with F the voltage's force, m of rotor and carriage. Solved exactly over steps of constant F and f
-(`STEP_S`). The encoder sees s. The strip's vibration does nothing to s: it pulls with a newton at a
-rotor of a hundred kilogrammes. That the rail brakes the carriage wherever the nut doesn't push it
-is true up to some 2 m/s^2.
+F is the voltage's force, m the mass of rotor and carriage. While the nut crosses the backlash, both
+frictions lose the rail's part. The equations are solved exactly over steps of constant F and f
+(`STEP_S`). The encoder sees s.
+
+Two assumptions: the strip's vibration does not move s (1 N against a rotor of 100 kg), and the rail
+brakes the carriage whenever the nut does not push it (true up to some 2 m/s^2).
 """
 
 from __future__ import annotations
@@ -23,42 +24,57 @@ from ...rig.emulation import EmulatedCarriage
 from ...rig.plant.motor import JointLine
 
 STEP_S = 2.5e-4
-AT_FLANK = 1e-9  # of the play
+FLANK_TOLERANCE = 1e-9  # of the play
 
 
-def play(carriage: EmulatedCarriage, friction: float = 1.0) -> float:
-    """The nut's play [m] and how far rail friction, by this factor, presses it into its flanks."""
+def backlash(carriage: EmulatedCarriage, friction: float = 1.0) -> float:
+    """The nut's backlash, and how far the rail's friction presses it into its flanks [m].
+
+    Args:
+        carriage: the rig file's table.
+        friction: factor on the rail's Coulomb friction.
+    """
     return (
         carriage.backlash_m
         + 2 * friction * carriage.coulomb_friction_N / carriage.contact_stiffness_N_m
     )
 
 
-def driven(
+def nut_and_carriage(
     t: np.ndarray, force: Signal, line: JointLine, mass_kg: float, play_m: float, start_m: float
 ) -> np.ndarray:
-    """Nut [m], its speed [m/s] and carriage [m], (3, T) at even t (T,) [s] from rest on, the nut in
-    the middle of its play.
+    """Integrate nut and carriage from rest, the nut in the middle of its backlash.
 
-    `mass_kg`: all that moves, the rotor's reflected mass with it.
+    Args:
+        t: evenly spaced times (T,) [s].
+        force: the force of the motor's voltage on the nut [N].
+        line: joint 1 as a linear motor.
+        mass_kg: all that moves, the rotor's reflected mass included.
+        play_m: backlash from flank to flank [m].
+        start_m: position at the start [m].
+
+    Returns:
+        Nut position [m], its speed [m/s], and carriage position [m], (3, T).
     """
     out = np.empty((3, len(t)))
     half, rate, step = play_m / 2, line.viscous_N_s_m / mass_kg, float(t[1] - t[0])
-    kept = math.exp(-rate * step)
-    way = (1 - kept) / rate
+    decay = math.exp(-rate * step)
+    travel = (1 - decay) / rate
     nut = carriage = start_m
     speed = 0.0
     for k, at in enumerate(t):
         out[:, k] = nut, speed, carriage
         F = force(at + step / 2)[0]
-        ahead = math.copysign(1.0, speed or F)
-        off = 0.0 if ahead * (nut - carriage) >= half - AT_FLANK * play_m else line.rail_N
-        if speed == 0.0 and abs(F) <= line.static_N - off:
+        direction = math.copysign(1.0, speed or F)
+        released_N = (
+            0.0 if direction * (nut - carriage) >= half - FLANK_TOLERANCE * play_m else line.rail_N
+        )
+        if speed == 0.0 and abs(F) <= line.static_N - released_N:
             continue
-        final = (F - ahead * (line.coulomb_N - off)) / line.viscous_N_s_m
-        after = final + (speed - final) * kept
-        if after * ahead >= 0.0:
-            nut += final * step + (speed - final) * way
+        final = (F - direction * (line.coulomb_N - released_N)) / line.viscous_N_s_m
+        after = final + (speed - final) * decay
+        if after * direction >= 0.0:
+            nut += final * step + (speed - final) * travel
             speed = after
         else:  # stops within the step, and may start again in the next
             nut += final * math.log(1 - speed / final) / rate + speed / rate
@@ -67,9 +83,13 @@ def driven(
     return out
 
 
-def behind(nut_m: np.ndarray, play_m: float) -> np.ndarray:
-    """The carriage's places (T,) [m] behind a nut at (T,) with that play from flank to flank, in
-    its middle at the start."""
+def backlash_output(nut_m: np.ndarray, play_m: float) -> np.ndarray:
+    """Carriage positions (T,) [m] behind a nut with backlash.
+
+    Args:
+        nut_m: positions of the nut (T,) [m]; it starts in the middle of the backlash.
+        play_m: backlash from flank to flank [m].
+    """
     x = np.empty(len(nut_m))
     at, half = nut_m[0], play_m / 2
     for k, nut in enumerate(nut_m):

@@ -1,13 +1,14 @@
-"""When the stepper got each of its pulses: the firmware's own arithmetic for joint 2, replayed on
-the knots that were sent.
+"""Times of the stepper's pulses: the firmware's arithmetic for joint 2, replayed on the knots.
 
-A report has the pulses' number, every 2 ms. Between two of them a pulse may have come 1 ms sooner
-or later than a line through the numbers says; each such error is a blow of one microstep (0.6 mm at
-the tip) x 1 ms, and hundreds of them make the strip ring by half a millimetre. Where the controller
-of joint 2 sees nothing but its own pulses and no strip (`feedback_2`, `kf_2_rad_s_m`, `kg_2_rad_m`
-0), or there is none, the pulses follow from knots and settings alone: cubics and set-point filter
-(player.cpp), the controller in integers (pid.cpp), and its rate's pulses (steps.cpp), bit for bit.
-The reports' numbers tell whether that holds.
+A report gives the number of pulses every 2 ms, so that a pulse's time is uncertain by 1 ms. Each
+such error is a blow of one microstep (0.6 mm at the tip) x 1 ms; hundreds of them make the strip
+vibrate by half a millimetre.
+
+If joint 2's controller uses its own pulses only (`feedback_2`, `kf_2_rad_s_m`, `kg_2_rad_m` are 0),
+or in open loop, knots and settings determine the pulses. The arithmetic is that of the firmware,
+bit for bit: cubics and set-point filter (trajectory_player.cpp), the controller in integers
+(pid.cpp), and the pulses of its rate (step_generator.cpp). The reports' numbers tell whether that
+holds.
 """
 
 from __future__ import annotations
@@ -22,19 +23,20 @@ from ...board.protocol.declaration import CONTROL_HZ, Mode
 from ...board.protocol.player import Knots
 
 TICK_COUNTS = 2000  # of the step timer
-STEP, THRESHOLD, STEPS_PER_TICK, MOST = 4096, 3072, 5, 16383
+STEP, THRESHOLD, STEPS_PER_TICK, MAX_RATE = 4096, 3072, 5, 16383
 RATE_OF_STEP = 268435  # Q16, 1/4096 microsteps a tick in 1 microstep/s
-CLOSE_S = 1e-4  # to a report: a pulse there may be in it or not
+REPORT_TOLERANCE_S = 1e-4  # to a report: a pulse there may be in it or not
 
-_OWN = ("feedback_2", "kf_2_rad_s_m", "kg_2_rad_m")
+_OTHER_FEEDBACK = ("feedback_2", "kf_2_rad_s_m", "kg_2_rad_m")
 
 
-def from_run(run: fx.Run) -> tuple[np.ndarray, np.ndarray] | None:
-    """Times [s] of the pulses (P,), and joint 2's angle by them from each on (P,) [rad]; the first
-    is the run's first sample.
+def pulses_of_run(run: fx.Run) -> tuple[np.ndarray, np.ndarray] | None:
+    """Times and angles of joint 2's pulses in a run.
 
-    None where its metadata lack the knots, where the controller needs more than them, or where a
-    report says otherwise.
+    Returns:
+        Times (P,) [s] and the angle from each time on (P,) [rad], the first at the run's start.
+            None if the metadata lack the knots, if the controller uses other measurements, or if a
+            report contradicts the pulses.
     """
     meta = run.meta
     settings, spec = meta.get("settings"), meta.get("knots")
@@ -45,27 +47,36 @@ def from_run(run: fx.Run) -> tuple[np.ndarray, np.ndarray] | None:
         spec["period_log2"],
         {name: np.array(v) for name, v in spec["columns"].items()},
     )
-    if knots.mode is Mode.position and any(settings[name] for name in _OWN):
+    if knots.mode is Mode.position and any(settings[name] for name in _OTHER_FEEDBACK):
         return None
     there = np.isfinite(run["joint/2/pulses"])
     t, per_rad = run.t[there], settings["stepper_steps_per_rad"]
     seen = np.round(run["joint/2/pulses"][there] * per_rad)
-    at, up = pulses(knots, settings, int(seen[0]), round(CONTROL_HZ * float(t[-1])) + 1)
+    at, up = planned_pulses(knots, settings, int(seen[0]), round(CONTROL_HZ * float(t[-1])) + 1)
     count = seen[0] + np.concatenate([[0], np.cumsum(up)])
     given = lambda late: count[np.searchsorted(at, t + late)]
     unsure = float(meta.get("start_uncertainty_s", 0.0))
-    for late in {0.0, -unsure, unsure}:  # the start may be half a tick from where it was put
-        earlier, later = given(late - CLOSE_S), given(late + CLOSE_S)
+    for late in {0.0, -unsure, unsure}:  # the start is known to half a tick
+        earlier, later = given(late - REPORT_TOLERANCE_S), given(late + REPORT_TOLERANCE_S)
         if ((seen >= np.minimum(earlier, later)) & (seen <= np.maximum(earlier, later))).all():
             return np.concatenate([[run.t[0]], at - late]), count / per_rad
     return None
 
 
-def pulses(
+def planned_pulses(
     knots: Knots, settings: dict[str, float], given: int, ticks: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Times after the start (P,) [s] and directions (P,) of the pulses planned in so many ticks,
-    `given` of them before."""
+    """The pulses that the firmware plans.
+
+    Args:
+        knots: the knots that were sent.
+        settings: the board's settings, by name.
+        given: pulses before the start.
+        ticks: number of control ticks.
+
+    Returns:
+        Times after the start (P,) [s] and directions (P,), 1 or -1.
+    """
     controller = _Controller(settings)
     if knots.mode is Mode.position:
         course = _course(knots, controller.filter, ticks)
@@ -74,7 +85,7 @@ def pulses(
         period = 2**knots.period_log2
         rates = np.repeat(knots.columns["rate"], period)[:ticks].tolist()
         course, before = iter(rates + [0] * (ticks - len(rates))), 0
-    ahead, times, ups = 0, [], []  # microsteps / 4096: the position asked for less the pulses given
+    ahead, times, ups = 0, [], []  # microsteps / 4096: commanded position less pulses
     for tick, target in enumerate(course, 1):
         if knots.mode is Mode.position:
             rate = controller.update(
@@ -93,8 +104,7 @@ def pulses(
 
 
 def _course(knots: Knots, filter_: int, ticks: int) -> Iterator[int]:
-    """Joint 2's filtered set-point in each tick after the start, microsteps / 256: the cubics of
-    `Player::cubic_tick`."""
+    """Joint 2's filtered set-point in each tick [microsteps / 256], as the firmware computes it."""
     log2, period = knots.period_log2, 2**knots.period_log2
     positions, speeds = knots.columns["position_2"].tolist(), knots.columns["velocity_2"].tolist()
     setpoint = positions[0]
@@ -112,8 +122,7 @@ def _course(knots: Knots, filter_: int, ticks: int) -> Iterator[int]:
 
 
 class _Controller:
-    """`Pid` of joint 2 on its own pulses; gains as `make_scales` makes them, in single
-    precision."""
+    """The firmware's PID of joint 2 on its own pulses; gains in fixed point, as on the board."""
 
     def __init__(self, settings: dict[str, float]) -> None:
         f = np.float32
@@ -124,11 +133,11 @@ class _Controller:
         self.kp = fixed(value["kp_2_1_s"] * (unit / f(16) * f(2**16)))
         self.ki = fixed(value["ki_2_1_s2"] * (unit / f(16) * tick * f(2**32)))
         self.kd, self.kv = (fixed(value[name] * (f(4096) * f(256))) for name in ("kd_2", "kv_2"))
-        self.limit = int(min(value["rate_max_2_rad_s"] * per_rad * unit + f(0.5), f(MOST)))
+        self.limit = int(min(value["rate_max_2_rad_s"] * per_rad * unit + f(0.5), f(MAX_RATE)))
         self.slew = int(
             min(
                 max(value["acceleration_max_2_rad_s2"] * per_rad * tick * unit + f(0.5), f(1)),
-                f(MOST),
+                f(MAX_RATE),
             )
         )
         cut = value["setpoint_2_Hz"]
@@ -140,14 +149,21 @@ class _Controller:
         self.sum = self.output = 0
 
     def follow(self, wish: int) -> int:
-        """The output [microsteps / 4096 a tick] that limit and slew leave of a wish."""
+        """Limit a wanted rate by rate and slew limits [microsteps / 4096 a tick]."""
         limited = min(max(_narrow(wish), -self.limit), self.limit)
         self.output = min(max(limited, self.output - self.slew), self.output + self.slew)
         return self.output
 
     def update(self, off: int, setpoint_rate: int) -> int:
-        """One tick, from the error [microsteps / 256] and the set-point's rate [the same a
-        tick]."""
+        """One tick of the controller.
+
+        Args:
+            off: the error [microsteps / 256].
+            setpoint_rate: rate of the set-point [microsteps / 256 a tick].
+
+        Returns:
+            The rate [microsteps / 4096 a tick].
+        """
         error = _narrow(off >> 4)
         total = self.sum + self.ki * error
         if not -self.limit <= total >> 32 < self.limit:
@@ -161,8 +177,7 @@ class _Controller:
 
 
 def _plan(pace: int, ahead: int) -> list[int]:
-    """The step timer's counts from the tick's begin to each step, as if the position rose:
-    `Steps::plan`."""
+    """Counts of the step timer from a tick's beginning to each step, for a rising position."""
     over = ahead + pace - THRESHOLD
     if over < 0:
         return []
@@ -176,7 +191,7 @@ def _plan(pace: int, ahead: int) -> list[int]:
 
 
 def _ratio(part: int, whole: int) -> int:
-    """part / whole as Q12, rounded down, of its 12 bits."""
+    """part / whole as Q12, rounded down, at most 4095."""
     return min((part << 12) // whole, 4095)
 
 

@@ -1,13 +1,15 @@
-"""The simulation of an experiment: the native model, driven by what the experiment commanded, was
-told to follow, or measured.
+"""Simulation of an experiment by the native model.
 
-`commanded`: the motor's voltage moves the nut and this the carriage behind its play (`screw`), the
-stepper's pulses act through its magnetic spring (`rig.motor`, `field`), with the figures of the rig
-file: everything is predicted, and every error of the drives' data adds up. Joint 1 is then what its
-encoder would say, the nut. `reference`: the joints follow their set-points exactly, as in the
-dissertation's own inverse comparison: what the controllers leave is in the deviation. `measured`:
-the joints follow their encoders (smoothed): what is left is the deviation of the elastic model
-alone.
+The joints are driven in one of three ways:
+
+- `commanded`: the motor's voltage moves the nut, and the nut the carriage behind its backlash
+  (`lead_screw`). The stepper's pulses act through its magnetic spring (`stepper_relaxation`).
+  All is predicted from the rig file, so that every error of the drives' data adds up. Joint 1's
+  position is that of the nut, as its encoder sees it.
+- `reference`: the joints follow their set-points exactly, as in the dissertation's inverse
+  comparison. The deviation contains the controllers' errors.
+- `measured`: the joints follow their smoothed encoders. The deviation is that of the elastic model
+  alone.
 """
 
 from __future__ import annotations
@@ -22,28 +24,34 @@ from flexura import signals
 from flexura.errors import InputError
 from flexura.signals import JointDrive
 
-from ...rig.description import Rig, recorded
+from ...rig.description import Rig, rig_of_recording
 from ...rig.emulation import Emulated
-from ...rig.plant.motor import JointLine, line, resistance
+from ...rig.plant.motor import JointLine, joint_line_of, resistance
 from ...rig.plant.stepper import MagneticSpring
 from ...runs.labels import called
 from . import lead_screw
-from .pulses import from_run
-from .smoothing import from_rest, known, onward, rest, smoothed
-from .stepper_relaxation import Start, held_by_field
+from .pulses import pulses_of_run
+from .smoothing import (
+    continue_past_end,
+    initial_rest,
+    recorded_samples,
+    smoothing_spline,
+    with_initial_rest,
+)
+from .stepper_relaxation import StartState, simulate_with_stepper
 
-# a voltage holds for the tick after its report, in mid-course; the one of the tick between is not
+# a voltage holds in the tick after its report, half a tick late on the mean; every second tick is
 # reported
-SET_S = 5e-4
-WAYS = ("commanded", "reference", "measured")
-NEEDS = {
+VOLTAGE_DELAY_S = 5e-4
+DRIVEN_BY = ("commanded", "reference", "measured")
+REQUIRED_CHANNELS = {
     "commanded": ("joint/1/voltage", "joint/2/pulses"),
     "reference": ("joint/1/reference", "joint/2/reference"),
     "measured": ("joint/1/position", "joint/2/position"),
 }
 
 
-def simulate(
+def simulate_experiment(
     experiment: fx.Run,
     by: str = "commanded",
     robot: fx.Robot | None = None,
@@ -51,16 +59,27 @@ def simulate(
     rtol: float = 1e-6,
     progress: Callable[[float], None] | None = None,
 ) -> fx.Run:
-    """Simulate an experiment natively, at its own times; `robot`: by default that of its metadata.
+    """Simulate an experiment natively, at its own times.
 
-    Raises InputError for a run that lacks the channels or the metadata that this takes.
+    Args:
+        experiment: the run; its metadata have the robot and, for "commanded", the rig.
+        by: one of `DRIVEN_BY`.
+        robot: by default that of the metadata.
+        rtol: tolerance of the simulation.
+        progress: called with the finished fraction.
+
+    Returns:
+        The simulated run; `meta["driven_by"]` is `by`.
+
+    Raises:
+        InputError: the run lacks a channel or metadata that this needs.
     """
-    if by not in WAYS:
-        raise InputError(f"expected one of {', '.join(WAYS)}", key="by", value=by)
-    lacking = [name for name in NEEDS[by] if name not in experiment]
-    if lacking:
+    if by not in DRIVEN_BY:
+        raise InputError(f"expected one of {', '.join(DRIVEN_BY)}", key="by", value=by)
+    missing = [name for name in REQUIRED_CHANNELS[by] if name not in experiment]
+    if missing:
         raise InputError(
-            f"expected a run with {lacking[0]}; it has: {', '.join(experiment)}", key="by", value=by
+            f"expected a run with {missing[0]}; it has: {', '.join(experiment)}", key="by", value=by
         )
     if by == "reference" and experiment.meta.get("experiment") == "step":
         raise InputError(
@@ -76,49 +95,57 @@ def simulate(
     t = experiment.t
     if by == "commanded":
         rig, more = _rig(experiment)
-        carriage = line(rig, more)
+        carriage = joint_line_of(rig, more)
         robot = _with_drives(robot, carriage, more.stepper.damping_N_m_s)
-        pulses, jumps = given(experiment)
-        times, volts = known(t, experiment["joint/1/voltage"], "joint/1/voltage")
+        pulses, jumps = joint_2_pulse_angle(experiment)
+        times, volts = recorded_samples(t, experiment["joint/1/voltage"], "joint/1/voltage")
         volts = np.sign(volts) * np.maximum(np.abs(volts) - more.driver.dead_zone_V, 0.0)
-        force = held(
-            times + SET_S + more.motor.inductance_H / resistance(rig), carriage.force_N_V * volts
+        force = hold_midpoints(
+            times + VOLTAGE_DELAY_S + more.motor.inductance_H / resistance(rig),
+            carriage.force_N_V * volts,
         )
         at_start = (
-            known(t, experiment["joint/1/position"], "joint/1/position")[1][0],
+            recorded_samples(t, experiment["joint/1/position"], "joint/1/position")[1][0],
             pulses(t[0])[0],
         )
         spring = MagneticSpring(rig.stepper, more.stepper)
         method = "implicit" if jumps else "auto"  # one every millisecond
-        start = _started(robot, at_start)
+        start = _start_at(robot, at_start)
         mass_kg = float(start[0].mass(start[1])[0, 0])
-        fine = np.arange(t[0], t[-1] + lead_screw.STEP_S, lead_screw.STEP_S)
-        nut, speed, x = lead_screw.driven(
-            fine, force, carriage, mass_kg, lead_screw.play(more.carriage), at_start[0]
+        fine_t = np.arange(t[0], t[-1] + lead_screw.STEP_S, lead_screw.STEP_S)
+        nut, speed, x = lead_screw.nut_and_carriage(
+            fine_t, force, carriage, mass_kg, lead_screw.backlash(more.carriage), at_start[0]
         )
-        moved = JointDrive(force=force, motion=onward(t, np.interp(t, fine, x)), prescribed=True)
-        run = held_by_field(start, t, moved, pulses, spring, rtol, progress, method=method)
+        carriage_drive = JointDrive(
+            force=force, motion=continue_past_end(t, np.interp(t, fine_t, x)), prescribed=True
+        )
+        run = simulate_with_stepper(
+            start, t, carriage_drive, pulses, spring, rtol, progress, method=method
+        )
         if run.meta["relaxation_rounds"] is not None:
-            seen = {
-                "joint/1/position": np.interp(run.t, fine, nut),
-                "joint/1/velocity": np.interp(run.t, fine, speed),
+            nut_channels = {
+                "joint/1/position": np.interp(run.t, fine_t, nut),
+                "joint/1/velocity": np.interp(run.t, fine_t, speed),
             }
-            run = dataclasses.replace(run, channels=run.channels | seen)
+            run = dataclasses.replace(run, channels=run.channels | nut_channels)
     else:
-        motions = [_motion(experiment, name, by) for name in NEEDS[by]]
-        earlier = rest(t)
-        system, q0 = _started(robot, [motion(earlier[0])[0] for motion in motions])
+        motions = [_motion(experiment, name, by) for name in REQUIRED_CHANNELS[by]]
+        rest_t = initial_rest(t)
+        system, q0 = _start_at(robot, [motion(rest_t[0])[0] for motion in motions])
         run = fx.simulate(
             system,
-            np.concatenate([earlier, t]),
+            np.concatenate([rest_t, t]),
             fx.Drive.prescribed(*motions),
             q0=q0,
             rtol=rtol,
             progress=progress,
         )
-        kept = slice(len(earlier), None)
+        recorded = slice(len(rest_t), None)
         run = dataclasses.replace(
-            run, t=run.t[kept], channels={n: v[kept] for n, v in run.channels.items()}, states=None
+            run,
+            t=run.t[recorded],
+            channels={n: v[recorded] for n, v in run.channels.items()},
+            states=None,
         )
     run.meta.pop("drive", None)  # the experiment's own samples once more
     run.meta["driven_by"] = by
@@ -128,26 +155,30 @@ def simulate(
     return run
 
 
-def given(experiment: fx.Run) -> tuple[signals.Signal, bool]:
-    """Joint 2's angle by its pulses [rad], from before the start on; whether it jumps: each pulse
-    when the firmware gave it, where that follows from what the run holds, else a spline through the
-    reports."""
-    exact = from_run(experiment)
+def joint_2_pulse_angle(experiment: fx.Run) -> tuple[signals.Signal, bool]:
+    """Joint 2's angle by its pulses, from before the start on.
+
+    Each pulse acts when the firmware gave it, if the run's data determine that. Otherwise a spline
+    through the reports is used.
+
+    Returns:
+        The angle [rad] as a signal, and whether it jumps.
+    """
+    exact = pulses_of_run(experiment)
     if exact is None:
         return _motion(experiment, "joint/2/pulses", "commanded"), False
     at, angle = exact
-    at[0] = rest(experiment.t)[0]
+    at[0] = initial_rest(experiment.t)[0]
     return signals.piecewise(at, angle), True
 
 
 def _motion(experiment: fx.Run, name: str, by: str) -> signals.Signal:
-    """The joint's motion from before the start on, where the robot was at rest: it must not start
-    at speed and unbent."""
-    t, y = from_rest(*known(experiment.t, experiment[name], name))
-    return smoothed(t, y) if by == "measured" else onward(t, y)
+    """A joint's motion with a rest before its start, so that the strip starts unbent at rest."""
+    t, y = with_initial_rest(*recorded_samples(experiment.t, experiment[name], name))
+    return smoothing_spline(t, y) if by == "measured" else continue_past_end(t, y)
 
 
-def _started(robot: fx.Robot, joints: Sequence[float]) -> Start:
+def _start_at(robot: fx.Robot, joints: Sequence[float]) -> StartState:
     """The system, and its state with the joints where the experiment had them."""
     system = fx.assemble(robot)
     q0 = system.start()
@@ -155,9 +186,13 @@ def _started(robot: fx.Robot, joints: Sequence[float]) -> Start:
     return system, q0
 
 
-def held(t: np.ndarray, y: np.ndarray) -> signals.Signal:
-    """Each sample held from half way after the one before to half way before the next: no lag,
-    whatever happens between."""
+def hold_midpoints(t: np.ndarray, y: np.ndarray) -> signals.Signal:
+    """Hold each sample from half way after the one before to half way before the next: no lag.
+
+    Args:
+        t: times (T,) [s].
+        y: values (T,).
+    """
     at = np.concatenate([t[:1], (t[1:] + t[:-1]) / 2])
     changes = np.concatenate([[True], np.diff(y) != 0.0])
     return signals.piecewise(at[changes], y[changes])
@@ -173,8 +208,7 @@ def _robot(experiment: fx.Run) -> fx.Robot:
 
 
 def _with_drives(robot: fx.Robot, carriage: JointLine, damping_N_m_s: float) -> fx.Robot:
-    """The robot with the motor's friction and inertia in joint 1 and the stepper's damping in joint
-    2."""
+    """The robot with motor friction and inertia in joint 1, stepper damping in joint 2."""
     data = robot.to_dict()
     first, second = (link["joint"] for link in data["link"])
     more = (
@@ -194,7 +228,7 @@ def _rig(experiment: fx.Run) -> tuple[Rig, Emulated]:
         raise InputError(
             "missing: the run has no rig file in its metadata, which `commanded` needs", key="rig"
         )
-    rig = recorded(tables)
+    rig = rig_of_recording(tables)
     if rig.emulated is None:
         raise InputError(
             "missing: `commanded` needs the rotor's inertia and the rig's friction from there",

@@ -1,10 +1,9 @@
-"""Measured positions as motions that a joint can be made to follow: twice differentiable, without
-lag, as smooth as they may be.
+"""Measured positions as motions that a joint can follow: smooth and without lag.
 
-A natural cubic smoothing spline s minimises sum (y - s(t))^2 + lambda int s''^2 dt (Reinsch 1967).
-It is C2 and symmetric in time (no phase), and one number decides: lambda is the largest for which
-the residual is what quantisation leaves, RMS = q / sqrt(12) with q the step between the values that
-were measured (Morozov's discrepancy principle).
+A natural cubic smoothing spline s minimises sum (y - s(t))^2 + lambda int s''^2 dt (Reinsch, Numer.
+Math. 10 (1967) 177). It is twice continuously differentiable and has no phase lag. Morozov's
+discrepancy principle gives lambda: the largest for which the RMS residual is that of quantisation,
+q / sqrt(12), with q the step between measured values.
 """
 
 from __future__ import annotations
@@ -15,38 +14,48 @@ from flexura import signals
 from flexura.errors import InputError
 from flexura.signals import Signal
 
-LEAST = 8  # samples of a motion
+MIN_SAMPLES = 8  # samples of a motion
 REST_S = 0.25  # how long before its start a motion is continued at rest
 
 
-def known(t: np.ndarray, y: np.ndarray, channel: str) -> tuple[np.ndarray, np.ndarray]:
-    """The samples that are there (not NaN). Raises InputError when they are too few to drive a
-    joint by."""
+def recorded_samples(t: np.ndarray, y: np.ndarray, channel: str) -> tuple[np.ndarray, np.ndarray]:
+    """The samples that are not dropouts (NaN).
+
+    Args:
+        t: times (T,) [s].
+        y: values (T,).
+        channel: named in the error.
+
+    Returns:
+        Times and values (k,).
+
+    Raises:
+        InputError: fewer than MIN_SAMPLES are left.
+    """
     there = np.isfinite(y)
-    if there.sum() < LEAST:
+    if there.sum() < MIN_SAMPLES:
         raise InputError(
-            f"expected at least {LEAST} samples that are not dropouts",
+            f"expected at least {MIN_SAMPLES} samples that are not dropouts",
             key=channel,
             value=int(there.sum()),
         )
     return t[there], y[there]
 
 
-def rest(t: np.ndarray) -> np.ndarray:
-    """Times of the rest before t (k,), at the same rate [s]."""
+def initial_rest(t: np.ndarray) -> np.ndarray:
+    """Times of a rest of REST_S before t (k,), at the same rate [s]."""
     step = float(np.median(np.diff(t)))
     return t[0] - step * np.arange(round(REST_S / step), 0, -1)
 
 
-def from_rest(t: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A motion with the rest before it."""
-    earlier = rest(t)
+def with_initial_rest(t: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Times and positions (k,) with a rest before them."""
+    earlier = initial_rest(t)
     return np.concatenate([earlier, t]), np.concatenate([np.full(len(earlier), y[0]), y])
 
 
 def resolution(y: np.ndarray) -> float:
-    """The step between the values that occur: their smallest difference, 0 where all are the same
-    or none occurs twice."""
+    """The smallest difference between measured values; 0 if all are equal or none repeats."""
     values = np.unique(y)
     if len(values) < 2 or len(values) > 0.9 * len(y):
         return 0.0
@@ -56,33 +65,34 @@ def resolution(y: np.ndarray) -> float:
     )
 
 
-def onward(t: np.ndarray, y: np.ndarray) -> Signal:
-    """The natural cubic spline through (t, y), which goes on after its end instead of stopping dead
-    there."""
+def continue_past_end(t: np.ndarray, y: np.ndarray) -> Signal:
+    """The natural cubic spline through (t, y), which continues past its end."""
     through = signals.table(t, y)
     return Signal(through.segments[:-1], through.spec)
 
 
-def smoothed(t: np.ndarray, y: np.ndarray, step: float | None = None) -> Signal:
-    """The smoothing spline of y (k,) at ascending t (k,) [s]; `step`: of the quantisation, by
-    default `resolution(y)`.
+def smoothing_spline(t: np.ndarray, y: np.ndarray, step: float | None = None) -> Signal:
+    """The smoothing spline of measured positions.
 
-    Without quantisation the spline goes through every sample. Dropouts must have been left out: the
+    Without quantisation the spline goes through every sample. Dropouts must have been removed; the
     spline spans them.
+
+    Args:
+        t: ascending times (k,) [s].
+        y: positions (k,).
+        step: step of the quantisation, by default `resolution(y)`.
     """
     from scipy.interpolate import make_smoothing_spline
 
     step = resolution(y) if step is None else step
     noise = step / np.sqrt(12)
     if noise == 0.0 or np.ptp(y) <= 2 * step:
-        return onward(t, y) if noise == 0.0 else signals.constant(float(np.mean(y)))
-    scale = (t[-1] - t[0]) / (
-        len(t) - 1
-    )  # lambda in units of the sample time: the same range for every rate
+        return continue_past_end(t, y) if noise == 0.0 else signals.constant(float(np.mean(y)))
+    # lambda in units of the sample time: the same range for every rate
+    scale = (t[-1] - t[0]) / (len(t) - 1)
     changes = np.diff(y) != 0.0
-    moving = np.append(changes, False) | np.insert(
-        changes, 0, False
-    )  # at rest the error is a constant, not a noise
+    # at rest the error is a constant, not a noise
+    moving = np.append(changes, False) | np.insert(changes, 0, False)
     low, high = -6.0, 12.0  # log10
     for _ in range(24):
         middle = (low + high) / 2
@@ -90,4 +100,4 @@ def smoothed(t: np.ndarray, y: np.ndarray, step: float | None = None) -> Signal:
         low, high = (
             (middle, high) if np.sqrt(np.mean((y - fit)[moving] ** 2)) < noise else (low, middle)
         )
-    return onward(t, make_smoothing_spline(t, y, lam=10**low * scale**3)(t))
+    return continue_past_end(t, make_smoothing_spline(t, y, lam=10**low * scale**3)(t))

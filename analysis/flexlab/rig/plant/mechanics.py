@@ -1,15 +1,13 @@
-"""The mechanics of the emulated rig in Exudyn: carriage, hub, strip and payload, stepped from
-outside.
+"""The mechanics of the emulated rig in Exudyn: carriage, hub, strip and payload, step by step.
 
-The twin's own cable elements, without joints: the carriage doesn't turn, so that its mass and the
-hub stand on the strip's first node, which is held on the rail by one constraint. What drives
-carriage and hub are two linear springs, implicit in Exudyn's step, whose zeros are set before every
-step; the nut's play, friction and the stepper's magnetic spring are made of them.
+The strip consists of the twin's cable elements, without joints. The carriage does not turn, so that
+its mass and the hub sit on the strip's first node; one constraint holds that node on the rail. Two
+linear springs, implicit in Exudyn's step, drive carriage and hub. Their zeros are set before every
+step. Backlash, friction and the stepper's magnetic spring are made of them.
 
 Exudyn runs step by step (`MainSolverImplicitSecondOrder`: generalised alpha, spectral radius 0.9,
-modified Newton) with its structures made once. The strip is softer along its axis than steel, EA
-L^2 / EI = 1e4 at most: axial strains of 1e-5, fewer iterations, and less of the locking that cable
-elements have when they are few.
+modified Newton) with its structures made once. The strip's axial stiffness is reduced to EA L^2 /
+EI = 1e4 at most. Axial strains are then 1e-5, iterations fewer, and a few cable elements lock less.
 """
 
 from __future__ import annotations
@@ -22,7 +20,7 @@ import numpy as np
 
 import flexura as fx
 from flexura.errors import FlexuraError
-from flexura.twin.links import CableLink, Frame, Ground, Lump, beam_values, link_inertia
+from flexura.twin.links import CableLink, Frame, Ground, PointMass, beam_values, link_inertia
 
 STEP_S = 5e-4
 ELEMENTS = 3
@@ -32,11 +30,10 @@ FOREVER_S = 1e7
 
 
 class Mechanics:
-    """Carriage (coordinate x along the rail, from its origin) and strip (angle to the carriage) of
-    a robot of type IV.
+    """Carriage and strip of a robot of type IV.
 
-    `position`: x [m] and angle [rad] at the start, the strip straight, all at rest. `sensor_m`:
-    from where to where on the strip `bend_rad` integrates its curvature.
+    `x_m`: carriage position along the rail, from its origin [m]. `angle_rad`: the strip's angle to
+    the carriage [rad].
     """
 
     def __init__(
@@ -47,6 +44,15 @@ class Mechanics:
         elements: int = ELEMENTS,
         sensor_m: tuple[float, float] = (0.0, 0.0),
     ) -> None:
+        """Build the robot at rest, the strip straight.
+
+        Args:
+            robot: a robot of type IV.
+            position: carriage [m] and strip [rad] at the start.
+            step_s: Exudyn's step [s].
+            elements: cables of the strip.
+            sensor_m: the part of the strip over which `bend_rad` integrates the curvature [m].
+        """
         import exudyn as exu
 
         self.step_s, self.x_m, self.angle_rad = step_s, *position
@@ -63,8 +69,10 @@ class Mechanics:
         self._data = self._mbs.systemData
         self._reference = np.array(self._data.GetODE2Coordinates(exu.ConfigurationType.Reference))
         self._root_m = float(self._reference[0])
-        self._ends = [_slope_at(s, robot.links[1].length_m / elements, elements) for s in sensor_m]
-        self._carriage = self._joint = 0.0, 0.0
+        self._sensor_ends = [
+            _slope_at(s, robot.links[1].length_m / elements, elements) for s in sensor_m
+        ]
+        self._carriage_values = self._joint_values = 0.0, 0.0
         self._read()
 
     def _build(self, robot: fx.Robot, position: tuple[float, float], elements: int) -> None:
@@ -78,8 +86,8 @@ class Mechanics:
         soft = AXIAL_RATIO * values.bending.mean() / strip.length_m**2
         values = dataclasses.replace(values, axial=np.minimum(values.axial, soft))
         joint = strip.joint
-        hub = Lump(_carried(robot), joint.hub_inertia_kg_m2 + joint.rotor_inertia)
-        tip = Lump(payload.mass_kg, payload.inertia_kg_m2)
+        hub = PointMass(_carriage_mass(robot), joint.hub_inertia_kg_m2 + joint.rotor_inertia)
+        tip = PointMass(payload.mass_kg, payload.inertia_kg_m2)
         self.strip = CableLink(mbs, values, hub, tip, frame, robot.gravity_m_s2)
         root = self.strip.nodes[0]
         fixed = mbs.AddMarker(
@@ -92,37 +100,44 @@ class Mechanics:
         turns = mbs.AddNode(
             eii.NodeGenericData(initialCoordinates=[frame.angle], numberOfDataCoordinates=1)
         )
-        self._rail = mbs.AddObject(
+        self._carriage_spring = mbs.AddObject(
             eii.ObjectConnectorCoordinateSpringDamper(markerNumbers=[fixed, along])
         )
         markers = [Ground.add(mbs).tip.marker, self.strip.origin.marker]
-        self._hub = mbs.AddObject(
+        self._joint_spring = mbs.AddObject(
             eii.ObjectConnectorTorsionalSpringDamper(markerNumbers=markers, nodeNumber=turns)
         )
         mbs.Assemble()
 
     def hold_carriage(self, stiffness: float, damping: float) -> None:
-        """Set the carriage's spring [N/m, N s/m]; Exudyn makes a new Jacobian if need be."""
-        if (stiffness, damping) != self._carriage:
-            self._carriage = stiffness, damping
-            self._set(self._rail, stiffness, damping)
+        """Set the carriage's spring [N/m, N s/m]; Exudyn renews its Jacobian if they change."""
+        if (stiffness, damping) != self._carriage_values:
+            self._carriage_values = stiffness, damping
+            self._set(self._carriage_spring, stiffness, damping)
 
     def hold_joint(self, stiffness: float, damping: float) -> None:
         """Set the joint's spring [N m/rad, N m s/rad]."""
-        if (stiffness, damping) != self._joint:
-            self._joint = stiffness, damping
-            self._set(self._hub, stiffness, damping)
+        if (stiffness, damping) != self._joint_values:
+            self._joint_values = stiffness, damping
+            self._set(self._joint_spring, stiffness, damping)
 
     def _set(self, spring: Any, stiffness: float, damping: float) -> None:
         self._mbs.SetObjectParameter(spring, "stiffness", stiffness)
         self._mbs.SetObjectParameter(spring, "damping", damping)
 
     def step(self, carriage_m: float, joint_rad: float) -> None:
-        """One step with the springs' zeros here. Raises FlexuraError where Exudyn's Newton
-        iteration fails."""
+        """Take one step.
+
+        Args:
+            carriage_m: zero of the carriage's spring [m].
+            joint_rad: zero of the joint's spring [rad].
+
+        Raises:
+            FlexuraError: Exudyn's Newton iteration fails.
+        """
         mbs, solver, settings = self._mbs, self._solver, self._settings
-        mbs.SetObjectParameter(self._rail, "offset", carriage_m - self._start)
-        mbs.SetObjectParameter(self._hub, "offset", joint_rad + self._turned)
+        mbs.SetObjectParameter(self._carriage_spring, "offset", carriage_m - self._start)
+        mbs.SetObjectParameter(self._joint_spring, "offset", joint_rad + self._turned)
         solver.UpdateCurrentTime(mbs, settings)
         solver.InitializeStep(mbs, settings)
         if not solver.DiscontinuousIteration(mbs, settings):
@@ -142,9 +157,8 @@ class Mechanics:
 
     @property
     def bend_rad(self) -> float:
-        """The integral of the strip's curvature under the sensor: how far the tangent turns from
-        one end of it to the other."""
-        q, ((i, a, b, c, d), (j, e, f, g, h)) = self._values, self._ends
+        """The strip's bend under the sensor: the angle between the tangents at its ends [rad]."""
+        q, ((i, a, b, c, d), (j, e, f, g, h)) = self._values, self._sensor_ends
         x, y = (
             a * q[i] + b * q[i + 2] + c * q[i + 4] + d * q[i + 6],
             a * q[i + 1] + b * q[i + 3] + c * q[i + 5] + d * q[i + 7],
@@ -157,40 +171,46 @@ class Mechanics:
 
     @property
     def tip_deflection_m(self) -> float:
-        """Of the strip's tip, across the hub's axis."""
+        """Deflection of the strip's tip, across the hub's axis [m]."""
         q = self._values
         angle = math.atan2(q[3], q[2])
         return math.cos(angle) * (q[-3] - q[1]) - math.sin(angle) * (q[-4] - q[0])
 
     @property
     def tip_m(self) -> tuple[float, float]:
-        """The strip's tip in the base frame."""
+        """Position of the strip's tip in the base frame [m]."""
         return self._values[-4], self._values[-3]
 
     @property
     def energy_J(self) -> float:
-        """Kinetic and strain energy, gravity and springs left out."""
+        """Kinetic and strain energy [J], without gravity and springs."""
         q, v = np.array(self._values)[None, :], np.array(self._data.GetODE2Coordinates_t())[None, :]
         return float((self.strip.kinetic(q, v) + self.strip.strain(q))[0])
 
 
 def _slope_at(x: float, size: float, elements: int) -> tuple[int, float, float, float, float]:
-    """The slope vector r' at x [m] from the root: the place of its element's coordinates, and the
-    weights of r, r', r, r'."""
+    """The slope vector r' at x [m] from the root, by Hermite's cubics.
+
+    Returns:
+        The index of its element's coordinates, and the weights of r, r', r, r'.
+    """
     k = min(int(x / size), elements - 1)
     s = x / size - k
+    # Hermite's cubics
     return (
         4 * k,
         6 * (s**2 - s) / size,
         1 - 4 * s + 3 * s**2,
         6 * (s - s**2) / size,
         3 * s**2 - 2 * s,
-    )  # Hermite's cubics
+    )
 
 
-def _carried(robot: fx.Robot) -> float:
-    """Mass of the carriage with the hubs on it [kg]; a rotor of joint 1 stands beyond the nut, with
-    the motor."""
+def _carriage_mass(robot: fx.Robot) -> float:
+    """Mass of the carriage with the hubs on it [kg].
+
+    A rotor of joint 1 belongs to the motor, beyond the nut.
+    """
     carriage, strip = robot.links
     return link_inertia(carriage).mass + carriage.joint.hub_mass_kg + strip.joint.hub_mass_kg
 

@@ -1,26 +1,25 @@
-"""The emulated rig: Exudyn's mechanics behind motor, screw with play, stepper, encoders and flex
-sensor, as real rigs have them.
+"""The emulated rig: Exudyn's mechanics behind motor, screw, stepper, encoders and flex sensor.
 
     board = EmulatedBoard(elf, rig_plant(load("firmware/rig.toml"), seed=3))
 
-Time runs in steps of h = 0.5 ms, one behind the board: a step takes the mean voltage and the mean
-of the pulses given in just its own time, so that volt-seconds are exact and each pulse acts from
-when it came. What an implicit step takes at its end acts as if spread evenly about this end, and a
-mean stands for the step's middle: the command is led by half of its last change. For the step that
-the board goes ahead its encoders are drawn on in a straight line, the motor's wrong by 0.01 counts,
-the joint's by 0.06 in the mean and 0.3 at most, in the ripple of the microsteps; in between they
-move evenly, so that edges come one by one. The same seed gives the same bytes. The figures stand in
-`firmware/rig.toml`, [emulated].
+The plant runs one step (h = 0.5 ms) behind the board. Each step uses the mean voltage and the mean
+pulse count of its own interval, so that volt-seconds are exact and each pulse acts from when it
+came. An implicit step's end value acts as if spread evenly about the end, a mean stands for the
+step's middle; the command therefore leads by half of its last change.
 
-The nut touches a flank of the screw (spring and damper), or none while it crosses the play b; the
-rail holds the carriage by a bristle that gives way by d and then slides (an elastic-plastic
-spring):
+Encoder positions for the interval that the board has already started are extrapolated linearly. The
+motor's error is 0.01 counts, the joint's 0.06 on the mean and 0.3 at most, in the ripple of the
+microsteps. Between steps encoders move evenly, so that edges come one by one. The same seed gives
+the same bytes. The data stand in `firmware/rig.toml`, [emulated].
 
-    F_nut  = -k (x - s -+ b/2) - c (x' - s')        where x - s is beyond +-b/2, s = lead angle / (2
-    pi) F_rail = -(F_c / d) (x - z) - c_r x'            z follows x at no more than d
+The nut touches a flank of the screw (spring and damper), or none while it crosses the backlash b.
+The rail holds the carriage by an elastic-plastic spring that gives way by d and then slides:
 
-Its error against steps of 0.05 ms and 8 elements under the same 520 pulses a second, relative to
-the peak: tip deflection (5 mm, the ripple of the microsteps with it) 0.9 % rms, joint 0.03 %.
+    F_nut  = -k (x - s -+ b/2) - c (x' - s')     if x - s is beyond +-b/2, s = lead angle / (2 pi)
+    F_rail = -(F_c / d) (x - z) - c_r x'         z follows x at no more than d
+
+Error against steps of 0.05 ms and 8 elements under the same 520 pulses a second, relative to the
+peak: tip deflection (5 mm, with the ripple of the microsteps) 0.9 % rms, joint 0.03 %.
 """
 
 from __future__ import annotations
@@ -37,10 +36,10 @@ from flexura.io import explain
 
 from ...board.emulator.emulated import Outputs, Sensors
 from ..description import Bench, configuration
-from ..emulation import FACTORS, Emulated, Truth
+from ..emulation import FACTORS, Emulated, TrueParameters
 from .flex_sensor import FlexSensor
 from .mechanics import ELEMENTS, STEP_S, Mechanics
-from .motor import Motor, joint_line, motor_data
+from .motor import DCMotor, joint_line, motor_data
 from .stepper import MagneticSpring
 
 
@@ -48,19 +47,26 @@ def rig_plant(
     bench: Bench,
     seed: int = 0,
     *,
-    truth: Truth | None = None,
+    truth: TrueParameters | None = None,
     start: tuple[float, float] = (0.0, 0.0),
     step_s: float = STEP_S,
     elements: int = ELEMENTS,
     **what_differs: Any,
 ) -> RigPlant:
-    """The emulated rig of a bench.
+    """The emulated rig of a rig file.
 
-    `truth`: the factors by which it differs from its files (None: the rig file's own;
-    `random_truth(seed)` draws some). `start`: carriage [m] and joint 2 [rad], at rest.
-    `what_differs`: values of [emulated] by their path, with two underscores for the dot,
-    `flex__noise_V=0.0`. Raises InputError for a rig file without [emulated] and for names that are
-    not there.
+    Args:
+        bench: the rig.
+        seed: of noise and drift.
+        truth: factors by which the rig differs from its files; None: the rig file's own.
+        start: carriage [m] and joint 2 [rad], at rest.
+        step_s: step of the plant [s].
+        elements: cables of the strip.
+        what_differs: values of [emulated] by their path, with two underscores for the dot, as
+            `flex__noise_V=0.0`.
+
+    Raises:
+        InputError: the rig file has no [emulated], or a name is unknown.
     """
     return RigPlant(
         bench,
@@ -92,7 +98,7 @@ def _changed(bench: Bench, changes: dict[str, Any]) -> Emulated:
         ) from None
 
 
-def true_robot(robot: fx.Robot, truth: Truth) -> fx.Robot:
+def true_robot(robot: fx.Robot, truth: TrueParameters) -> fx.Robot:
     """The robot as the emulated rig has it: stiffness, damping and payload by their factors."""
     strip, payload = robot.links[1], robot.payload
     given = "young_modulus_Pa" if strip.young_modulus_Pa is not None else "bending_stiffness_N_m2"
@@ -113,16 +119,18 @@ def true_robot(robot: fx.Robot, truth: Truth) -> fx.Robot:
 
 
 class RigPlant:
-    """The emulated rig as a plant (see `board.emulated.Plant`). `truth`: its true parameters, which
-    an identification must not read. `carriage_m`, `joint_rad`, `tip_deflection_m`: where it truly
-    is. `emergency_stop` may be pressed."""
+    """The emulated rig as a plant (`board.emulated.Plant`).
+
+    `truth`: its true parameters, which an identification must not read. `carriage_m`, `joint_rad`,
+    `tip_deflection_m`: its true position. `emergency_stop` may be set.
+    """
 
     def __init__(
         self,
         bench: Bench,
         emulated: Emulated,
         seed: int,
-        truth: Truth,
+        truth: TrueParameters,
         start: tuple[float, float],
         step_s: float,
         elements: int,
@@ -140,7 +148,7 @@ class RigPlant:
             robot, start, step_s, elements, sensor_m=(first, first + rig.flex.length_m)
         )
         screw, carriage = emulated.screw, emulated.carriage
-        self.motor = Motor(
+        self.motor = DCMotor(
             motor_data(rig, emulated.motor),
             rig.screw.efficiency,
             screw.coulomb_friction_N_m,
@@ -152,27 +160,26 @@ class RigPlant:
             rig.flex, emulated.flex, np.random.default_rng([seed, 0]), step_s, truth.flex_gain
         )
         self.supply_V, self.emergency_stop = rig.driver.supply_V, False
-        self.truth = _told(bench, truth, robot, seed)
-        self._dead_V = emulated.driver.dead_zone_V
+        self.truth = _truth_for_metadata(bench, truth, robot, seed)
+        self._dead_zone_V = emulated.driver.dead_zone_V
         self._lead, self._start = rig.screw.lead_m / (2 * math.pi), start
-        self._play = 0.5 * truth.backlash * carriage.backlash_m
-        self._nut = carriage.contact_stiffness_N_m, carriage.contact_damping_N_s_m
-        self._gives = carriage.presliding_m
-        self._bristle = truth.friction * carriage.coulomb_friction_N / carriage.presliding_m
-        self._rail = truth.friction * carriage.viscous_friction_N_s_m
-        self._rotor = emulated.stepper.damping_N_m_s
+        self._half_backlash = 0.5 * truth.backlash * carriage.backlash_m
+        self._contact = carriage.contact_stiffness_N_m, carriage.contact_damping_N_s_m
+        self._presliding = carriage.presliding_m
+        self._rail_stiffness = truth.friction * carriage.coulomb_friction_N / carriage.presliding_m
+        self._rail_damping = truth.friction * carriage.viscous_friction_N_s_m
+        self._rotor_damping = emulated.stepper.damping_N_m_s
         self._ends = bench.limits[0]
         self._counts = settings["motor_counts_per_m"], settings["stepper_counts_per_rad"]
         self._step_s = step_s
-        self._left = 0.0  # of the step that was made last [s]
+        self._unused_s = 0.0  # of the step that was made last [s]
         self._volt_s = self._microstep_s = self._since = 0.0
         self._anchor = self._x = start[0]
         self._theta = start[1]
         self._load_N_m = self._steps = self._bend = 0.0
-        self._turned = self._shafts()
-        self._before = self._shown = (
-            self._turned
-        )  # what the encoders say at the ends of the step that the board is in
+        self._counts_now = self._shafts()
+        # what the encoders say at the ends of the step that the board is in
+        self._previous = self._extrapolated = self._counts_now
         self._sensors = Sensors(
             flex_V=self.flex.sample(0.0), supply_V=self.supply_V / rig.driver.supply_divider
         )
@@ -181,55 +188,64 @@ class RigPlant:
 
     @property
     def window_s(self) -> float:
-        """The windows in which a board is best run with this plant."""
+        """The interval in which a board is best run with this plant [s]."""
         return self._step_s
 
     @property
     def carriage_m(self) -> float:
+        """Position of the carriage [m]."""
         return self.mechanics.x_m
 
     @property
     def nut_m(self) -> float:
-        """The carriage's place by the motor's encoder: without play."""
+        """The carriage's position by the motor's encoder, without backlash [m]."""
         return self._start[0] + self._lead * self.motor.angle_rad
 
     @property
     def joint_rad(self) -> float:
+        """Angle of joint 2 [rad]."""
         return self.mechanics.angle_rad
 
     @property
     def tip_deflection_m(self) -> float:
+        """Deflection of the strip's tip [m]."""
         return self.mechanics.tip_deflection_m
 
     # ---- in lockstep
 
     def advance(self, seconds: float, outputs: Outputs) -> Sensors:
+        """Advance the plant with the board's outputs; returns what its inputs then see.
+
+        Args:
+            seconds: time to advance [s].
+            outputs: of the board, constant in this time.
+        """
         self._volt_s += outputs.duty * self.supply_V * seconds
         self._microstep_s += outputs.steps * seconds
         self._since += seconds
-        if self._left < seconds - 1e-9:
+        if self._unused_s < seconds - 1e-9:
             voltage, steps = self._volt_s / self._since, self._microstep_s / self._since
             self._volt_s = self._microstep_s = self._since = 0.0
-            while self._left < seconds - 1e-9:
+            while self._unused_s < seconds - 1e-9:
                 self._step(outputs, voltage, steps)
-                self._left += self._step_s
-        self._left -= seconds
-        part = 1.0 - self._left / self._step_s
-        (one, two), (a, b) = self._before, self._shown
+                self._unused_s += self._step_s
+        self._unused_s -= seconds
+        part = 1.0 - self._unused_s / self._step_s
+        (one, two), (a, b) = self._previous, self._extrapolated
         sensors = self._sensors
         sensors.encoder_1, sensors.encoder_2 = one + part * (a - one), two + part * (b - two)
         sensors.emergency_stop = self.emergency_stop
         return sensors
 
     def _step(self, outputs: Outputs, voltage: float, steps: float) -> None:
-        voltage = math.copysign(max(0.0, abs(voltage) - self._dead_V), voltage)
+        voltage = math.copysign(max(0.0, abs(voltage) - self._dead_zone_V), voltage)
         self.motor.advance(self._step_s, voltage if outputs.motor_on else None, self._load_N_m)
         mechanics = self.mechanics
         here, turned = mechanics.x_m, mechanics.angle_rad
         on = outputs.stepper_on
         command = self._start[1] + (1.5 * steps - 0.5 * self._steps) * self.spring.rad_per_step
         self._steps = steps
-        mechanics.hold_joint(self.spring.stiffness(on), self._rotor)
+        mechanics.hold_joint(self.spring.stiffness(on), self._rotor_damping)
         centre = self.spring.centre(command, 2 * turned - self._theta, on)
         nut, flank = self._carriage(2 * here - self._x)
         mechanics.step(nut, centre)
@@ -237,49 +253,63 @@ class RigPlant:
         if flank is None:
             self._load_N_m = 0.0
         else:
-            stiffness, damping = self._nut
+            stiffness, damping = self._contact
             slip = (mechanics.x_m - here) / self._step_s - self._lead * self.motor.speed_rad_s
             self._load_N_m = -self._lead * (stiffness * (mechanics.x_m - flank) + damping * slip)
         sensors = self._sensors
         before, self._bend = self._bend, mechanics.bend_rad
-        sensors.flex_V = self.flex.sample(
-            1.5 * self._bend - 0.5 * before
-        )  # in the middle of the step that the board is in
+        # in the middle of the step that the board is in
+        sensors.flex_V = self.flex.sample(1.5 * self._bend - 0.5 * before)
         sensors.limit_low, sensors.limit_high = (
             mechanics.x_m <= self._ends[0],
             mechanics.x_m >= self._ends[1],
         )
-        now, (one, two) = self._shafts(), self._turned
-        self._before, self._shown, self._turned = (
-            self._shown,
+        now, (one, two) = self._shafts(), self._counts_now
+        self._previous, self._extrapolated, self._counts_now = (
+            self._extrapolated,
             (2 * now[0] - one, 2 * now[1] - two),
             now,
         )
 
     def _carriage(self, expected: float) -> tuple[float, float | None]:
-        """Set the carriage's spring for a step that is expected to end there: nut and bristle in
-        one, its zero so that it gives the sum of both, k x_0 + c s' = k_1 z + k_2 flank + c s'.
-        Returns the zero, and the flank or None."""
-        self._anchor = min(max(self._anchor, expected - self._gives), expected + self._gives)
-        stiffness, damping, pull = self._bristle, self._rail, self._bristle * self._anchor
+        """Set the carriage's spring for a step that is expected to end at `expected` [m].
+
+        One spring stands for nut and rail; its zero makes its force the sum of both: k x_0 + c s' =
+        k_1 z + k_2 flank + c s'.
+
+        Returns:
+            The zero [m], and the flank that the nut touches [m] or None.
+        """
+        self._anchor = min(
+            max(self._anchor, expected - self._presliding), expected + self._presliding
+        )
+        stiffness, damping, pull = (
+            self._rail_stiffness,
+            self._rail_damping,
+            self._rail_stiffness * self._anchor,
+        )
         nut, flank = self.nut_m, None
-        if expected - nut >= self._play:
-            flank = nut + self._play
-        elif nut - expected >= self._play:
-            flank = nut - self._play
+        if expected - nut >= self._half_backlash:
+            flank = nut + self._half_backlash
+        elif nut - expected >= self._half_backlash:
+            flank = nut - self._half_backlash
         if flank is not None:
-            stiffness, damping = stiffness + self._nut[0], damping + self._nut[1]
-            pull += self._nut[0] * flank + self._nut[1] * self._lead * self.motor.speed_rad_s
+            stiffness, damping = stiffness + self._contact[0], damping + self._contact[1]
+            pull += (
+                self._contact[0] * flank + self._contact[1] * self._lead * self.motor.speed_rad_s
+            )
         self.mechanics.hold_carriage(stiffness, damping)
         return pull / stiffness if stiffness else 0.0, flank
 
     def _shafts(self) -> tuple[float, float]:
-        """Both encoders in counts, from where they stand at the start."""
+        """Both encoders in counts, from their positions at the start."""
         turned = self.mechanics.angle_rad - self._start[1]
         return self._counts[0] * self._lead * self.motor.angle_rad, self._counts[1] * turned
 
 
-def _told(bench: Bench, truth: Truth, robot: fx.Robot, seed: int) -> dict[str, Any]:
+def _truth_for_metadata(
+    bench: Bench, truth: TrueParameters, robot: fx.Robot, seed: int
+) -> dict[str, Any]:
     line = joint_line(bench, truth.friction)
     strip = robot.links[1]
     return {

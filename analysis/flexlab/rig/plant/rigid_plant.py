@@ -1,12 +1,9 @@
-"""A plant without anything elastic: the bench's motor, screw, stepper, switches and sensors, the
-strip always straight.
+"""A plant without elasticity: motor, screw, stepper, switches and sensors, the strip straight.
 
-It is what `flexura flash --emulated` and the firmware's tests need: drives that move the encoders
-as the rig's would. The motor follows its line of speed over voltage with a time constant and a dead
-zone; the stepper takes every step.
+`flexura flash --emulated` and the firmware's tests use it. The motor follows its line of speed over
+voltage with a time constant and a dead zone; the stepper takes every step.
 
-    tau dv/dt = lead n0 (u - sign(u) u_f) / (60 (U0 - u_f)) - v        (v = 0 at rest while |u| <=
-    u_f)
+    tau dv/dt = lead n0 (u - sign(u) u_f) / (60 (U0 - u_f)) - v     (v = 0 at rest, if |u| <= u_f)
 """
 
 from __future__ import annotations
@@ -20,13 +17,19 @@ TIME_CONSTANT_S = 0.04  # mechanical, motor with screw and carriage; assumed
 STARTS_AT_V = 1.0  # the motor's data: starts to turn
 
 
-class Drives:
-    """The bench's drives as a plant (see `board.emulated.Plant`). Public fields are there to be set
-    by whoever breaks the rig."""
+class RigidPlant:
+    """The rig's drives as a plant (`board.emulated.Plant`). Public fields may be set."""
 
     def __init__(
         self, bench: Bench, start_m: float = 0.0, settings: dict[str, float] | None = None
     ) -> None:
+        """Set up the plant at rest.
+
+        Args:
+            bench: the rig.
+            start_m: position of the carriage [m].
+            settings: of the board, by default those of the rig.
+        """
         settings = settings or configuration(bench)
         motor = bench.rig.motor
         self.supply_V = bench.rig.driver.supply_V
@@ -53,6 +56,12 @@ class Drives:
         self._sensors = Sensors()
 
     def advance(self, seconds: float, outputs: Outputs) -> Sensors:
+        """Advance the plant with the board's outputs; returns what its inputs then see.
+
+        Args:
+            seconds: time to advance [s].
+            outputs: of the board, constant in this time.
+        """
         u = outputs.duty * self.supply_V if outputs.motor_on else 0.0
         drive = math.copysign(max(0.0, abs(u) - STARTS_AT_V), u)
         kept = math.exp(-seconds / TIME_CONSTANT_S)

@@ -1,11 +1,10 @@
-"""A joint of the twin: constraints that leave one relative coordinate, and what acts on that
-coordinate.
+"""A joint of the twin: constraints that leave one relative coordinate, and its drive.
 
 The coordinate is a marker of Exudyn whose value is the joint's position [m or rad] and whose
-Jacobian is the direction of virtual work: a force on it acts on the hub and back on the previous
-link, at the point and along the line where they touch. Drive, friction, lock and rotor all attach
-to it. The rotor is a mass of its own with one coordinate that the joint's coordinate is tied to,
-which gives exactly 1/2 I (d eta/dt)^2 between two moving links.
+Jacobian is the direction of virtual work. A force on it acts on the hub and back on the previous
+link, at the point and along the line where they touch. Drive, friction, lock and rotor attach to
+it. The rotor is a mass of its own with one coordinate tied to the joint's, which gives exactly 1/2
+I (d eta/dt)^2 between two moving links.
 """
 
 from __future__ import annotations
@@ -25,21 +24,27 @@ FRICTION_SPEED = 1e-3  # m/s or rad/s: Coulomb friction is f tanh(velocity / thi
 
 @dataclass(frozen=True)
 class Coordinate:
-    """A joint's coordinate in Exudyn: `marker` measures it, `load` acts on it, `servo` is its PD
-    controller or None.
+    """A joint's coordinate in Exudyn.
 
-    `kept` is what Exudyn only refers to.
+    `marker` measures it, `load` acts on it, `servo` is its PD controller or None. `references`
+    keeps objects that Exudyn only refers to.
     """
 
     marker: Any
     load: Any
     servo: Any = None
-    kept: Any = None
+    references: Any = None
 
 
 def start_frame(link: Link, previous: Frame, length: float, speed: float) -> Frame:
-    """The straight start of a link; `previous` is the link before it, of that length, or the base
-    (0)."""
+    """The straight start of a link.
+
+    Args:
+        link: the link.
+        previous: start of the link before it, or the base.
+        length: length of the link before it [m]; 0 for the base.
+        speed: joint velocity [m/s or rad/s].
+    """
     joint = link.joint
     if joint.type == "R":
         return previous.along(length, turn=joint.start, spin=speed)
@@ -51,28 +56,34 @@ def start_frame(link: Link, previous: Frame, length: float, speed: float) -> Fra
 
 
 @dataclass(frozen=True)
-class Site:
-    """Where a joint is built: the start of the previous link's tip and of the link's origin, the
-    joint's speed [m/s or rad/s].
+class JointSite:
+    """Where a joint is built.
 
-    `tiny`: mass and inertia of bodies that only hold others.
+    `tip`, `origin`: starts of the previous link's tip and of the link's origin. `speed`: of the
+    joint [m/s or rad/s]. `negligible`: mass and inertia of bodies that only hold others.
     """
 
     mbs: Any
     tip: Frame
     origin: Frame
     speed: float
-    tiny: tuple[float, float]
+    negligible: tuple[float, float]
 
 
 def connect(
-    on: Site, link: Link, previous: Any, part: Any, places: np.ndarray | None
+    on: JointSite, link: Link, previous: Any, part: Any, places: np.ndarray | None
 ) -> tuple[Any, Any]:
-    """Constrain `part` to `previous` by the joint of `link`; returns the marker of its coordinate,
-    and the node if it has one.
+    """Constrain a link to the one before it.
 
-    `places`: the points of the hub or sleeve of a joint that slides on a flexible link; None: it
-    doesn't.
+    Args:
+        on: where the joint is built.
+        link: the link.
+        previous: the part before it, or the base.
+        part: the link's part.
+        places: points of the hub or sleeve, if the joint slides on a flexible link [m]; else None.
+
+    Returns:
+        The marker of the joint's coordinate, and its node if it has one.
     """
     joint, mbs = link.joint, on.mbs
     if joint.type == "R":
@@ -82,16 +93,20 @@ def connect(
             return _prismatic(
                 mbs, previous.origin, part.origin, part.origin, 0.0, joint.angle_rad
             ), None
-        hub = sliding.rigid(mbs, part.origin, on.origin, on.tiny)
+        hub = sliding.rigid_carrier(mbs, part.origin, on.origin, on.negligible)
         line = sliding.Line(hub, on.origin, -joint.angle_rad)
-        node = sliding.hold(mbs, line, previous, places, joint.start, on.speed, on.tiny)
+        node = sliding.add_sliding_points(
+            mbs, line, previous, places, joint.start, on.speed, on.negligible
+        )
         return sliding.marker_of(mbs, node), node
-    sleeve = sliding.rigid(mbs, previous.tip, on.tip, on.tiny)
+    sleeve = sliding.rigid_carrier(mbs, previous.tip, on.tip, on.negligible)
     if places is None:  # d is where the tip of link i is
         return _prismatic(mbs, sleeve, part.origin, part.tip, joint.angle_rad, 0.0), None
     line = sliding.Line(sleeve, on.tip, joint.angle_rad)
-    behind = sliding.hold(mbs, line, part, places, link.length_m - joint.start, -on.speed, on.tiny)
-    node = sliding.rest(mbs, behind, link.length_m, joint.start, on.speed)
+    behind = sliding.add_sliding_points(
+        mbs, line, part, places, link.length_m - joint.start, -on.speed, on.negligible
+    )
+    node = sliding.complement(mbs, behind, link.length_m, joint.start, on.speed)
     return sliding.marker_of(mbs, node), node
 
 
@@ -99,9 +114,10 @@ def _revolute(mbs: Any, joint: Joint, tip: Attachment, hub: Attachment) -> Any:
     from exudyn import itemInterface as eii
 
     mbs.AddObject(eii.ObjectJointRevolute2D(markerNumbers=[tip.marker, hub.marker]))
+    # counts whole turns
     turns = mbs.AddNode(
         eii.NodeGenericData(initialCoordinates=[joint.start], numberOfDataCoordinates=1)
-    )  # counts whole turns
+    )
     return mbs.AddMarker(
         eii.MarkerBodiesRelativeRotationCoordinate(
             bodyNumbers=[tip.body, hub.body],
@@ -136,12 +152,18 @@ def _prismatic(
     )
 
 
-def equip(
+def add_drive_and_friction(
     mbs: Any, joint: Joint, marker: Any, fixed: Any, speed: float, gains: tuple[float, float]
 ) -> Coordinate:
-    """Put drive, PD gains (stiffness, damping), friction, rotor or lock on a joint's coordinate.
+    """Put drive, PD gains, friction, rotor or lock on a joint's coordinate.
 
-    `fixed` is a marker whose coordinate is always 0, `speed` the joint's velocity at the start.
+    Args:
+        mbs: Exudyn's system.
+        joint: the joint.
+        marker: of its coordinate.
+        fixed: a marker whose coordinate is always 0.
+        speed: velocity at the start [m/s or rad/s].
+        gains: stiffness and damping.
     """
     from exudyn import itemInterface as eii
 
@@ -151,11 +173,11 @@ def equip(
             eii.ObjectConnectorCoordinate(markerNumbers=[fixed, marker], offset=joint.start)
         )
         return Coordinate(marker, load)
-    servo = kept = None
+    servo = references = None
     if any(gains):
-        # its offsets follow the motion; kp r as a load instead, against a spring without offset, is
-        # as good in theory, but where both are large the turning of their lines of action, which
-        # Newton doesn't see, spoils its convergence
+        # Its offsets follow the motion. A load kp r against a spring without offset is equivalent,
+        # but if both are large, Newton's method does not see their lines of action turn, and
+        # converges badly.
         servo = mbs.AddObject(
             eii.ObjectConnectorCoordinateSpringDamperExt(
                 markerNumbers=[fixed, marker],
@@ -171,8 +193,8 @@ def equip(
             )
         )
         if joint.coulomb_friction:
-            kept = _friction(mbs, spring, joint.coulomb_friction)
-            mbs.SetObjectParameter(spring, "springForceUserFunction", kept)
+            references = _friction(mbs, spring, joint.coulomb_friction)
+            mbs.SetObjectParameter(spring, "springForceUserFunction", references)
     if joint.rotor_inertia:
         rotor = mbs.AddNode(
             eii.NodeGenericODE2(
@@ -187,11 +209,11 @@ def equip(
         )
         own = mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=rotor, coordinate=0))
         mbs.AddObject(eii.ObjectConnectorCoordinate(markerNumbers=[own, marker]))
-    return Coordinate(marker, load, servo, kept)
+    return Coordinate(marker, load, servo, references)
 
 
 def _friction(mbs: Any, spring: Any, coulomb: float) -> Any:
-    """c v + f tanh(v / v0) (57) as an expression that Exudyn evaluates without calling Python."""
+    """c v + f tanh(v / v0) (57) as an expression that Exudyn evaluates without Python."""
     from exudyn import symbolic
     from exudyn.advancedUtilities import CreateSymbolicUserFunction
 

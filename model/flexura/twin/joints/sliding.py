@@ -1,14 +1,13 @@
-"""Sliding on a flexible link: a rigid carrier that holds the elastic line at points, among which it
-slides.
+"""Sliding on a flexible link: a rigid carrier guides the elastic line at points.
 
-A beam runs through points of a carrier that lie on a straight line; the abscissa of point k on the
-beam is `place[k]` more than one sliding coordinate of all of them. The first point is fixed in the
-carrier, the others are free along the line, so that the beam may shorten as it bends. Two points
+A beam runs through points of a carrier that lie on a straight line. The abscissa of point k on the
+beam is `place[k]` more than one sliding coordinate of all points. The first point is fixed in the
+carrier; the others are free along the line, so that the beam may shorten as it bends. Two points
 make a hub on link i-1 (Pa), a row of them a sleeve for link i (Pb).
 
-Each point is an ObjectJointALEMoving2D, whose Jacobian has the sliding coordinate in it: the force
-that a bent beam puts on the coordinate, M^2/(2 EI), is there and energy is kept, unlike with
-ObjectJointSliding2D. An ALE cable carries one coordinate; to have several, each gets a layer of
+Each point is an ObjectJointALEMoving2D, whose Jacobian contains the sliding coordinate. The force
+of a bent beam on that coordinate, M^2/(2 EI), is therefore present and energy is conserved, unlike
+with ObjectJointSliding2D. An ALE cable carries one coordinate. For several, each gets a layer of
 cables of its own, without mass and stiffness, on the nodes of the beam.
 """
 
@@ -23,45 +22,62 @@ from ..links.part import Attachment, Frame
 
 
 class Line(NamedTuple):
-    """A line in a rigid carrier: it starts at the carrier's place, which is at `frame`, at `angle`
-    [rad] in the carrier."""
+    """A line in a rigid carrier.
+
+    It starts at the carrier's place, which is at `frame`, at `angle` [rad] in the carrier.
+    """
 
     carrier: Attachment
     frame: Frame
     angle: float
 
 
-def rigid(mbs: Any, held: Attachment, frame: Frame, tiny: tuple[float, float]) -> Attachment:
-    """`held`, at `frame`, as part of a rigid body: itself if it is one, else a body of `tiny` mass
-    and inertia fixed to it."""
+def rigid_carrier(
+    mbs: Any, held: Attachment, frame: Frame, negligible: tuple[float, float]
+) -> Attachment:
+    """An attachment as part of a rigid body.
+
+    Args:
+        mbs: Exudyn's system.
+        held: the attachment.
+        frame: its start.
+        negligible: mass and inertia of a new body, fixed to `held` if that is not rigid.
+    """
     from exudyn import itemInterface as eii
 
     if held.rigid:
         return held
-    mine = _body(mbs, frame, tiny)
+    own = _body(mbs, frame, negligible)
     mbs.AddObject(
         eii.ObjectJointGeneric(
-            markerNumbers=[held.marker, mine.marker], constrainedAxes=[1, 1, 0, 0, 0, 1]
+            markerNumbers=[held.marker, own.marker], constrainedAxes=[1, 1, 0, 0, 0, 1]
         )
     )
-    return mine
+    return own
 
 
-def hold(
+def add_sliding_points(
     mbs: Any,
     line: Line,
     beam: Any,
     places: np.ndarray,
     start: float,
     speed: float,
-    tiny: tuple[float, float],
+    negligible: tuple[float, float],
 ) -> Any:
-    """Hold `beam` (a CableLink) at points of a carrier, `places` [m] ahead on its line; returns the
-    sliding coordinate's node.
+    """Guide a beam at points of a carrier, along which it slides.
 
-    The coordinate is the beam's abscissa at the line's start; it is `start` at first [m], at the
-    rate `speed` [m/s]. `tiny`: mass and inertia of the bodies that stand for the points free along
-    the line.
+    Args:
+        mbs: Exudyn's system.
+        line: of the points.
+        beam: a CableLink.
+        places: of the points ahead on the line [m].
+        start: abscissa of the beam at the line's start [m].
+        speed: its rate [m/s].
+        negligible: mass and inertia of the bodies that stand for points free along the line.
+
+    Returns:
+        The node of the sliding coordinate, the beam's abscissa at the line's start.
     """
     from exudyn import itemInterface as eii
 
@@ -76,7 +92,7 @@ def hold(
                 eii.MarkerBodyRigid(bodyNumber=carrier.body, localPosition=there)
             )
         else:
-            marker = _body(mbs, straight.along(place), tiny).marker
+            marker = _body(mbs, straight.along(place), negligible).marker
             mbs.AddObject(
                 eii.ObjectJointPrismatic2D(
                     markerNumbers=[carrier.marker, marker],
@@ -103,7 +119,13 @@ def hold(
 
 
 def coordinate(mbs: Any, start: float, speed: float) -> Any:
-    """A node of one coordinate without mass."""
+    """Add a node of one coordinate without mass.
+
+    Args:
+        mbs: Exudyn's system.
+        start: value of the coordinate.
+        speed: its rate.
+    """
     from exudyn import itemInterface as eii
 
     return mbs.AddNode(
@@ -123,23 +145,33 @@ def marker_of(mbs: Any, node: Any) -> Any:
     return mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=node, coordinate=0))
 
 
-def rest(mbs: Any, node: Any, total: float, start: float, speed: float) -> Any:
-    """A node whose coordinate and another one's are `total` together."""
+def complement(mbs: Any, node: Any, total: float, start: float, speed: float) -> Any:
+    """Add a node whose coordinate is `total` less that of another.
+
+    Args:
+        mbs: Exudyn's system.
+        node: the other node.
+        total: their sum.
+        start: value of the new coordinate.
+        speed: its rate.
+    """
     from exudyn import itemInterface as eii
 
-    mine = coordinate(mbs, start, speed)
-    markers = [marker_of(mbs, mine), marker_of(mbs, node)]
+    own = coordinate(mbs, start, speed)
+    markers = [marker_of(mbs, own), marker_of(mbs, node)]
     mbs.AddObject(
         eii.ObjectConnectorCoordinate(markerNumbers=markers, factorValue1=-1.0, offset=-total)
     )
-    return mine
+    return own
 
 
-def _body(mbs: Any, frame: Frame, tiny: tuple[float, float]) -> Attachment:
+def _body(mbs: Any, frame: Frame, negligible: tuple[float, float]) -> Attachment:
     from exudyn import itemInterface as eii
 
     node = mbs.AddNode(
         eii.NodeRigidBody2D(referenceCoordinates=list(frame[:3]), initialVelocities=list(frame[3:]))
     )
-    body = mbs.AddObject(eii.ObjectRigidBody2D(mass=tiny[0], inertia=tiny[1], nodeNumber=node))
+    body = mbs.AddObject(
+        eii.ObjectRigidBody2D(mass=negligible[0], inertia=negligible[1], nodeNumber=node)
+    )
     return Attachment(body, [0.0, 0.0, 0.0], mbs.AddMarker(eii.MarkerBodyRigid(bodyNumber=body)))

@@ -1,8 +1,8 @@
 """A flexible link as ObjectANCFCable2D: an Euler-Bernoulli beam in absolute nodal coordinates.
 
-Coordinates of a node: place x, y and slope vector r' = (x', y'); Hermite cubics between. Hub and
-payload are ObjectGenericODE2 on the end nodes with diag(m, m, J, J): exact for rotation where |r'|
-= 1, and no joint is needed.
+Coordinates of a node: position x, y and slope vector r' = (x', y'), with Hermite cubics between.
+Hub and payload are ObjectGenericODE2 on the end nodes with diag(m, m, J, J): exact for rotation if
+|r'| = 1, and no joint is needed.
 """
 
 from __future__ import annotations
@@ -13,14 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from .part import Attachment, Frame, Lump, Motion, hang
+from .part import Attachment, Frame, Motion, PointMass, add_gravity
 from .properties import BeamValues
 
 PROGRAM = "ObjectANCFCable2D"
-NEAR = (
-    5  # elements of a stub as long as the link's, so that a sleeve's first spans are as stiff there
-)
-LIGHT = 1e-4  # mass per length of a stub, relative to the link's end
+# elements of a stub as long as the link's, so that a sleeve's first spans are as stiff there
+FINE_STUB_ELEMENTS = 5
+STUB_MASS_RATIO = 1e-4  # mass per length of a stub, relative to the link's end
 
 # Exudyn's own integration points: more of them would see the axial strain between its points
 _AXIAL = np.polynomial.legendre.leggauss(5)
@@ -36,17 +35,26 @@ class CableLink:
         self,
         mbs: Any,
         values: BeamValues,
-        hub: Lump,
-        payload: Lump,
+        hub: PointMass,
+        payload: PointMass,
         frame: Frame,
         gravity: tuple[float, float],
         stubs: tuple[float, float] = (0.0, 0.0),
     ) -> None:
-        """`stubs`: lengths [m] by which the beam goes on straight and almost without mass before
-        its origin and after its tip.
+        """Add the link to Exudyn's system.
 
-        A hub or sleeve may then stand at the link's very end. The link's own nodes and energies
-        leave them out.
+        With stubs, a hub or sleeve may stand at the link's very end. The link's own nodes and
+        energies leave them out.
+
+        Args:
+            mbs: Exudyn's system.
+            values: of the elements.
+            hub: at the origin.
+            payload: at the tip.
+            frame: the link's start.
+            gravity: [m/s^2].
+            stubs: lengths [m] by which the beam continues, straight and almost without mass, before
+                its origin and after its tip.
         """
         self.values, self.hub, self.payload = values, hub, payload
         count, length = len(values), values.length
@@ -66,17 +74,24 @@ class CableLink:
             _add_element(mbs, values, k - first, pair, size)
             for k, (pair, size) in enumerate(zip(self.pairs, self.lengths, strict=True))
         ]
-        mine = elements[first : first + count]
-        for element in mine:
-            hang(mbs, element, gravity)
+        own = elements[first : first + count]
+        for element in own:
+            add_gravity(mbs, element, gravity)
         for node, lump in ((self.nodes[0], hub), (self.nodes[-1], payload)):
             _add_lump(mbs, node, lump, gravity)
-        self.origin = _end(mbs, mine[0], 0.0, self.nodes[0])
-        self.tip = _end(mbs, mine[-1], length, self.nodes[-1])
+        self.origin = _end(mbs, own[0], 0.0, self.nodes[0])
+        self.tip = _end(mbs, own[-1], length, self.nodes[-1])
 
     def layer(self, mbs: Any, sliding: Any) -> list[Any]:
-        """Markers of new elements without mass and stiffness, along the beam on its nodes, that
-        carry a sliding coordinate."""
+        """Add cables without mass and stiffness on the beam's nodes, with a sliding coordinate.
+
+        Args:
+            mbs: Exudyn's system.
+            sliding: node of the sliding coordinate.
+
+        Returns:
+            Their markers, along the beam.
+        """
         from exudyn import itemInterface as eii
 
         elements = [
@@ -99,17 +114,21 @@ class CableLink:
         ]
 
     def motion_at_origin(self, q: np.ndarray, v: np.ndarray) -> Motion:
+        """See `Part`."""
         return _node_motion(q[:, :4], v[:, :4])
 
     def motion_at_tip(self, q: np.ndarray, v: np.ndarray) -> Motion:
+        """See `Part`."""
         return _node_motion(q[:, -4:], v[:, -4:])
 
     def point(self, q: np.ndarray, x: float) -> np.ndarray:
+        """See `Part`."""
         length = self.values.length
         k = min(int(x / length), len(self.values) - 1)
         return np.einsum("k,tkd->td", _shapes(x / length - k, length)[0], _elements(q)[:, k])
 
     def kinetic(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """See `Part`."""
         length = self.values.length
         ends = _elements(v)
         products = np.einsum("tekd,kl,teld->te", ends, _mass_matrix(length), ends)
@@ -119,6 +138,7 @@ class CableLink:
         return 0.5 * products @ self.values.mass + lumps
 
     def strain(self, q: np.ndarray) -> np.ndarray:
+        """See `Part`."""
         length, ends = self.values.length, _elements(q)
         out = np.zeros(len(q))
         for u, w in zip(*_AXIAL, strict=True):
@@ -138,6 +158,7 @@ class CableLink:
         return out
 
     def moment(self, q: np.ndarray) -> np.ndarray:
+        """See `Part`."""
         length = self.values.length
         mean = np.array([1 / 2, length / 12, 1 / 2, -length / 12])  # means of the Hermite cubics
         beam = np.einsum("e,k,tekd->td", self.values.mass * length, mean, _elements(q))
@@ -145,12 +166,20 @@ class CableLink:
 
 
 def _stub(length: float, size: float) -> np.ndarray:
-    """Ends of a stub's elements away from the link, ascending: NEAR of the link's `size`, then
-    twice as long ones, so that they reach over `length` [m]; before the link if it is negative,
-    else after it."""
+    """Ends of a stub's elements, away from the link, ascending [m].
+
+    The first FINE_STUB_ELEMENTS are as long as the link's; the others twice.
+
+    Args:
+        length: of the stub [m]; negative: before the link.
+        size: length of the link's elements [m].
+    """
     count = math.ceil(abs(length) / size - 1e-9)
     ends = size * np.concatenate(
-        [np.arange(1, min(count, NEAR) + 1), np.arange(NEAR + 2, count + 2, 2)]
+        [
+            np.arange(1, min(count, FINE_STUB_ELEMENTS) + 1),
+            np.arange(FINE_STUB_ELEMENTS + 2, count + 2, 2),
+        ]
     )
     return -ends[::-1] if length < 0 else ends
 
@@ -164,15 +193,14 @@ def _add_node(mbs: Any, here: Frame) -> Any:
 
 
 def _add_element(mbs: Any, values: BeamValues, k: int, nodes: tuple[Any, Any], size: float) -> Any:
-    """Element k of the link; the stubs, which have k < 0 or k >= len(values), are like the link's
-    end, of LIGHT mass."""
+    """Add element k of the link; others are stubs: as the link's end, but almost without mass."""
     from exudyn import itemInterface as eii
 
     near = min(max(k, 0), len(values) - 1)
     return mbs.AddObject(
         eii.ObjectANCFCable2D(
             length=size,
-            massPerLength=values.mass[near] * (1.0 if near == k else LIGHT),
+            massPerLength=values.mass[near] * (1.0 if near == k else STUB_MASS_RATIO),
             bendingStiffness=values.bending[near],
             axialStiffness=values.axial[near],
             bendingDamping=values.beta * values.bending[near],
@@ -181,7 +209,7 @@ def _add_element(mbs: Any, values: BeamValues, k: int, nodes: tuple[Any, Any], s
     )
 
 
-def _add_lump(mbs: Any, node: Any, lump: Lump, gravity: tuple[float, float]) -> None:
+def _add_lump(mbs: Any, node: Any, lump: PointMass, gravity: tuple[float, float]) -> None:
     from exudyn import itemInterface as eii
 
     if lump.mass == 0 and lump.inertia == 0:
@@ -212,15 +240,13 @@ def _node_motion(q: np.ndarray, v: np.ndarray) -> Motion:
 
 
 def _elements(q: np.ndarray) -> np.ndarray:
-    """Nodal coordinates (T, 4 nodes) as (T, elements, 4, 2): r, r' of the element's start, r, r' of
-    its end."""
+    """Nodal coordinates (T, 4 nodes) as (T, elements, 4, 2): r, r' of both ends."""
     nodes = q.reshape(len(q), -1, 2, 2)
     return np.concatenate([nodes[:, :-1], nodes[:, 1:]], axis=2)
 
 
 def _shapes(s: float, length: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Hermite cubics of r, r', r, r' at s = x/length, and their first and second derivatives by
-    x."""
+    """Hermite cubics of r, r', r, r' at s = x/length, with first and second derivatives by x."""
     value = np.array(
         [
             1 - 3 * s**2 + 2 * s**3,
@@ -237,7 +263,7 @@ def _shapes(s: float, length: float) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 
 def _mass_matrix(h: float) -> np.ndarray:
-    """Integrals of products of the cubics over an element of length h."""
+    """Integrals of products of the cubics over an element of length h [m]."""
     return (h / 420) * np.array(
         [
             [156, 22 * h, 54, -13 * h],

@@ -1,8 +1,7 @@
-"""A flexible link as ObjectBeamGeometricallyExact2D: a Reissner beam, quadratic elements of three
-nodes.
+"""A flexible link as ObjectBeamGeometricallyExact2D: a Reissner beam of three-node elements.
 
-Coordinates of a node: place x, y and the section's angle; quadratic Lagrange polynomials between.
-Hub and payload are ObjectRigidBody2D on the end nodes.
+Coordinates of a node: position x, y and the section's angle, with quadratic Lagrange polynomials
+between. Hub and payload are ObjectRigidBody2D on the end nodes.
 """
 
 from __future__ import annotations
@@ -11,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .part import Attachment, Frame, Lump, Motion, hang
+from .part import Attachment, Frame, Motion, PointMass, add_gravity
 from .properties import BeamValues
 
 PROGRAM = "ObjectBeamGeometricallyExact2D"
@@ -20,7 +19,7 @@ _STRAIN = np.polynomial.legendre.leggauss(2)  # Exudyn's own points: reduced, ag
 _MASS = np.polynomial.legendre.leggauss(3)
 
 
-class ExactLink:
+class GeometricallyExactLink:
     """A flexible link of equal geometrically exact elements between `hub` and `payload`."""
 
     width = 3
@@ -29,8 +28,8 @@ class ExactLink:
         self,
         mbs: Any,
         values: BeamValues,
-        hub: Lump,
-        payload: Lump,
+        hub: PointMass,
+        payload: PointMass,
         frame: Frame,
         gravity: tuple[float, float],
     ) -> None:
@@ -60,22 +59,26 @@ class ExactLink:
                     nodeNumbers=self.nodes[2 * k : 2 * k + 3],
                 )
             )
-            hang(mbs, element, gravity)
+            add_gravity(mbs, element, gravity)
         self.origin = _end(mbs, self.nodes[0], hub, gravity)
         self.tip = _end(mbs, self.nodes[-1], payload, gravity)
 
     def motion_at_origin(self, q: np.ndarray, v: np.ndarray) -> Motion:
+        """See `Part`."""
         return Motion(q[:, :2], q[:, 2], v[:, :2], v[:, 2])
 
     def motion_at_tip(self, q: np.ndarray, v: np.ndarray) -> Motion:
+        """See `Part`."""
         return Motion(q[:, -3:-1], q[:, -1], v[:, -3:-1], v[:, -1])
 
     def point(self, q: np.ndarray, x: float) -> np.ndarray:
+        """See `Part`."""
         k = min(int(x / self.values.length), len(self.values) - 1)
         value, _ = _shapes(2 * (x / self.values.length - k) - 1, self.values.length)
         return np.einsum("k,tkd->td", value, _elements(q)[:, k, :, :2])
 
     def kinetic(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """See `Part`."""
         ends, out = _elements(v), np.zeros(len(v))
         for u, w in zip(*_MASS, strict=True):
             rate = np.einsum("k,tekd->ted", _shapes(u, self.values.length)[0], ends)
@@ -90,6 +93,7 @@ class ExactLink:
         )
 
     def strain(self, q: np.ndarray) -> np.ndarray:
+        """See `Part`."""
         ends, out = _elements(q), np.zeros(len(q))
         for u, w in zip(*_STRAIN, strict=True):
             value, first = _shapes(u, self.values.length)
@@ -107,6 +111,7 @@ class ExactLink:
         return out
 
     def moment(self, q: np.ndarray) -> np.ndarray:
+        """See `Part`."""
         simpson = np.array([1 / 6, 4 / 6, 1 / 6])
         beam = np.einsum(
             "e,k,tekd->td", self.values.mass * self.values.length, simpson, _elements(q)[..., :2]
@@ -114,7 +119,7 @@ class ExactLink:
         return beam + self.hub.mass * q[:, :2] + self.payload.mass * q[:, -3:-1]
 
 
-def _end(mbs: Any, node: Any, lump: Lump, gravity: tuple[float, float]) -> Attachment:
+def _end(mbs: Any, node: Any, lump: PointMass, gravity: tuple[float, float]) -> Attachment:
     from exudyn import itemInterface as eii
 
     # also without mass: a joint's coordinate needs a body, and the beam's elements don't offer one
@@ -122,19 +127,17 @@ def _end(mbs: Any, node: Any, lump: Lump, gravity: tuple[float, float]) -> Attac
         eii.ObjectRigidBody2D(mass=lump.mass, inertia=lump.inertia, nodeNumber=node)
     )
     if lump.mass > 0:
-        hang(mbs, body, gravity)
+        add_gravity(mbs, body, gravity)
     return Attachment(body, [0.0, 0.0, 0.0], mbs.AddMarker(eii.MarkerBodyRigid(bodyNumber=body)))
 
 
 def _elements(q: np.ndarray) -> np.ndarray:
-    """Nodal coordinates (T, 3 nodes) as (T, elements, 3, 3): x, y, angle of the element's start,
-    middle and end."""
+    """Nodal coordinates (T, 3 nodes) as (T, elements, 3, 3): x, y, angle of the three nodes."""
     nodes = q.reshape(len(q), -1, 3)
     return np.stack([nodes[:, :-2:2], nodes[:, 1:-1:2], nodes[:, 2::2]], axis=2)
 
 
 def _shapes(u: float, length: float) -> tuple[np.ndarray, np.ndarray]:
-    """Quadratic Lagrange polynomials of start, middle and end at u in [-1, 1], and their
-    derivatives by x."""
+    """Quadratic Lagrange polynomials at u in [-1, 1], and their derivatives by x."""
     value = np.array([u * (u - 1) / 2, 1 - u**2, u * (u + 1) / 2])
     return value, np.array([u - 0.5, -2 * u, u + 0.5]) * 2 / length

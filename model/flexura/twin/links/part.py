@@ -1,4 +1,4 @@
-"""A part of the twin: one link in Exudyn, and how to read its motion from recorded coordinates."""
+"""A part of the twin: one link in Exudyn, and its motion from recorded coordinates."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 
 class Frame(NamedTuple):
-    """A link's straight start: place x, y [m], angle [rad], and their velocities."""
+    """A link's straight start: position x, y [m], angle [rad], and their velocities."""
 
     x: float
     y: float
@@ -20,11 +20,18 @@ class Frame(NamedTuple):
 
     @property
     def axis(self) -> tuple[float, float]:
+        """Direction of the x axis: cosine and sine of the angle."""
         return float(np.cos(self.angle)), float(np.sin(self.angle))
 
     def along(self, s: float, slide: float = 0.0, turn: float = 0.0, spin: float = 0.0) -> Frame:
-        """The frame a distance s along this one, sliding along it at `slide` [m/s], turned by
-        `turn`, turning at `spin` more."""
+        """The frame a distance s along this one.
+
+        Args:
+            s: distance [m].
+            slide: velocity along this frame [m/s].
+            turn: rotation [rad].
+            spin: additional angular velocity [rad/s].
+        """
         c, n = self.axis
         return Frame(
             self.x + s * c,
@@ -37,8 +44,7 @@ class Frame(NamedTuple):
 
 
 class Attachment(NamedTuple):
-    """Where a joint takes hold: a body, the place in it, a marker with position and orientation
-    there, whether it is rigid."""
+    """Where a joint attaches: a body, a position in it, a marker there, whether it is rigid."""
 
     body: Any
     place: list[float]
@@ -56,7 +62,7 @@ class Motion(NamedTuple):
 
 
 class Part(Protocol):
-    """One link: made when added to Exudyn's system, read afterwards.
+    """One link in Exudyn's system, and its motion.
 
     q, v: total coordinates and velocities of the part's own nodes over time, (T, coordinates).
     Angles are known up to whole turns until they are unwrapped.
@@ -67,12 +73,16 @@ class Part(Protocol):
     origin: Attachment
     tip: Attachment
 
-    def motion_at_origin(self, q: np.ndarray, v: np.ndarray) -> Motion: ...
+    def motion_at_origin(self, q: np.ndarray, v: np.ndarray) -> Motion:
+        """Motion of the link's origin."""
+        ...
 
-    def motion_at_tip(self, q: np.ndarray, v: np.ndarray) -> Motion: ...
+    def motion_at_tip(self, q: np.ndarray, v: np.ndarray) -> Motion:
+        """Motion of the link's tip."""
+        ...
 
     def point(self, q: np.ndarray, x: float) -> np.ndarray:
-        """The material point x [m] from the origin, (T, 2)."""
+        """The material point x [m] from the origin, (T, 2) [m]."""
         ...
 
     def kinetic(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -89,25 +99,27 @@ class Part(Protocol):
 
 
 @dataclass
-class Lump:
-    """A mass and inertia on a beam's node: hub or payload."""
+class PointMass:
+    """A mass [kg] and inertia [kg m^2] on a beam's node: hub or payload."""
 
     mass: float = 0.0
     inertia: float = 0.0
 
     def kinetic(self, motion: Motion) -> np.ndarray:
+        """Kinetic energy (T,) [J]."""
         return 0.5 * self.mass * (motion.v**2).sum(axis=-1) + 0.5 * self.inertia * motion.omega**2
 
 
 @dataclass
 class Ground:
-    """The base: what the first joint holds on to."""
+    """The base, to which the first joint attaches."""
 
     tip: Attachment
     origin: Attachment
 
     @staticmethod
     def add(mbs: Any) -> Ground:
+        """Add the base to Exudyn's system."""
         from exudyn import itemInterface as eii
 
         body = mbs.AddObject(eii.ObjectGround())
@@ -118,11 +130,12 @@ class Ground:
 
     @staticmethod
     def motion(times: int) -> Motion:
+        """The base's motion at a number of times: none."""
         return Motion(np.zeros((times, 2)), np.zeros(times), np.zeros((times, 2)), np.zeros(times))
 
 
-def hang(mbs: Any, body: Any, gravity: tuple[float, float]) -> None:
-    """Put a body with mass under gravity [m/s^2]."""
+def add_gravity(mbs: Any, body: Any, gravity: tuple[float, float]) -> None:
+    """Put a body under gravity [m/s^2]."""
     from exudyn import itemInterface as eii
 
     if any(gravity):

@@ -1,5 +1,4 @@
-"""What Exudyn needs to know of a link: values of its beam elements, or the sum of its rigid
-parts."""
+"""Properties of a link for Exudyn: values of its beam elements, or its rigid inertia."""
 
 from __future__ import annotations
 
@@ -17,15 +16,14 @@ AXIAL_RATIO = 1e5
 SHEAR_CORRECTION = 5 / 6  # rectangular section
 POISSON = 0.3
 # mass and inertia of a rigid link without any, relative to the robot's total and to total * reach^2
-VANISHING = 1e-9
+NEGLIGIBLE = 1e-9
 
 _GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(5)
 
 
 @dataclass(frozen=True)
 class BeamValues:
-    """A flexible link cut into equal elements of `length` [m]; the other values are (elements,) in
-    SI units.
+    """A flexible link as equal elements of `length` [m]; other values (elements,) in SI units.
 
     `mass` [kg/m] and the stiffnesses `bending` [N m^2], `axial` [N], `shear` [N] are means over the
     element: its integrals are right, and the error of a tapering link is of second order in the
@@ -46,7 +44,12 @@ class BeamValues:
 
 
 def beam_values(link: Link, elements: int) -> BeamValues:
-    """The values of a flexible link's elements (103)."""
+    """Values of a flexible link's elements (103).
+
+    Args:
+        link: the link.
+        elements: their number.
+    """
     ends = np.linspace(0.0, link.length_m, elements + 1)
     kinks = np.array(link.breaks())
     mass = _means(link.mass_per_length, ends, kinks)
@@ -69,7 +72,7 @@ def beam_values(link: Link, elements: int) -> BeamValues:
 
 
 def uniform(link: Link) -> bool:
-    """Whether a link has one section, or one mass per length and stiffness, from end to end."""
+    """Whether section, mass per length and stiffness are constant along the link."""
     return not any(
         isinstance(v, list)
         for v in (link.section, link.mass_per_length_kg_m, link.bending_stiffness_N_m2)
@@ -77,7 +80,16 @@ def uniform(link: Link) -> bool:
 
 
 def _means(function: Any, ends: np.ndarray, kinks: np.ndarray) -> np.ndarray:
-    """Means of function(x) between consecutive ends; pieces between kinks are integrated apart."""
+    """Means of a function of x between consecutive ends, integrated apart between kinks.
+
+    Args:
+        function: of x [m].
+        ends: (K + 1,) [m].
+        kinks: where the function is not smooth [m].
+
+    Returns:
+        (K,).
+    """
     out = np.empty(len(ends) - 1)
     for k, (a, b) in enumerate(pairwise(ends)):
         edges = np.concatenate([[a], kinks[(kinks > a) & (kinks < b)], [b]])
@@ -88,15 +100,20 @@ def _means(function: Any, ends: np.ndarray, kinks: np.ndarray) -> np.ndarray:
 
 
 class Inertia(NamedTuple):
-    """Mass [kg], its centre's distance from the link's origin along the link [m], inertia about
-    that centre [kg m^2]."""
+    """Mass [kg], distance of its centre along the link [m], inertia about the centre [kg m^2]."""
 
     mass: float
     centre: float
     inertia: float
 
     def plus(self, mass: float, at: float, inertia: float) -> Inertia:
-        """Both together, by the parallel-axis theorem."""
+        """Both together, by the parallel-axis theorem.
+
+        Args:
+            mass: to be added [kg].
+            at: its distance along the link [m].
+            inertia: about its own centre [kg m^2].
+        """
         total = self.mass + mass
         if total == 0:
             return Inertia(0.0, self.centre, self.inertia + inertia)
@@ -111,7 +128,7 @@ class Inertia(NamedTuple):
 
 
 def link_inertia(link: Link) -> Inertia:
-    """A rigid link itself, without hub and payload."""
+    """Inertia of a rigid link, without hub and payload."""
     if link.mass_kg is not None:
         return Inertia(link.mass_kg, _centre(link), link.inertia_kg_m2 or 0.0)
     return _spread_inertia(link)
@@ -122,8 +139,7 @@ def _centre(link: Link) -> float:
 
 
 def _spread_inertia(link: Link) -> Inertia:
-    """A rigid link given by its mass per length: moments of the distribution, slender, without the
-    section's own inertia."""
+    """Inertia of a rigid link with a mass per length; its section's own inertia is left out."""
     edges = np.array(link.breaks())
     middle, half = (edges[1:] + edges[:-1]) / 2, (edges[1:] - edges[:-1]) / 2
     x = middle[:, None] + half[:, None] * _GAUSS_X
@@ -136,7 +152,12 @@ def _spread_inertia(link: Link) -> Inertia:
 
 
 def total_mass(links: list[Link], payload: Payload) -> float:
-    """All mass of a robot [kg]; the scale for what has none."""
+    """Total mass of a robot [kg], the scale for negligible masses.
+
+    Args:
+        links: of the robot.
+        payload: of the robot.
+    """
     total = payload.mass_kg
     for link in links:
         total += link.joint.hub_mass_kg

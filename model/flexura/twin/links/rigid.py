@@ -1,5 +1,4 @@
-"""A rigid link: one ObjectRigidBody2D with its node at the link's origin; hub, and payload if it is
-the last, included."""
+"""A rigid link: one ObjectRigidBody2D with its node at the link's origin."""
 
 from __future__ import annotations
 
@@ -7,13 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from .part import Attachment, Frame, Motion, hang
+from .part import Attachment, Frame, Motion, add_gravity
 from .properties import Inertia
 
 
 class RigidLink:
-    """A rigid link of a length [m]. Coordinates of its one node: x, y, angle of the link's
-    origin."""
+    """A rigid link with hub, and with the payload if it is the last.
+
+    Coordinates of its one node: x, y, angle of the link's origin.
+    """
 
     width = 3
 
@@ -29,12 +30,13 @@ class RigidLink:
                 referenceCoordinates=list(frame[:3]), initialVelocities=list(frame[3:])
             )
         )
+        # Exudyn takes the inertia about the reference point, here the link's origin
         body = mbs.AddObject(
             eii.ObjectRigidBody2D(
                 mass=m, inertia=about + m * c**2, centerOfMass=[c, 0.0], nodeNumber=node
             )
-        )  # Exudyn wants the inertia about the reference point, here the link's origin
-        hang(mbs, body, gravity)
+        )
+        add_gravity(mbs, body, gravity)
         self.nodes = [node]
         self.origin, self.tip = (
             Attachment(
@@ -46,15 +48,19 @@ class RigidLink:
         )
 
     def motion_at_origin(self, q: np.ndarray, v: np.ndarray) -> Motion:
+        """See `Part`."""
         return self._motion(q, v, 0.0)
 
     def motion_at_tip(self, q: np.ndarray, v: np.ndarray) -> Motion:
+        """See `Part`."""
         return self._motion(q, v, self.length)
 
     def point(self, q: np.ndarray, x: float) -> np.ndarray:
+        """See `Part`."""
         return q[:, :2] + x * np.stack([np.cos(q[:, 2]), np.sin(q[:, 2])], axis=-1)
 
     def kinetic(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """See `Part`."""
         centre = self._motion(q, v, self.inertia.centre)
         return (
             0.5 * self.inertia.mass * (centre.v**2).sum(axis=-1)
@@ -62,9 +68,11 @@ class RigidLink:
         )
 
     def strain(self, q: np.ndarray) -> np.ndarray:
+        """See `Part`."""
         return np.zeros(len(q))
 
     def moment(self, q: np.ndarray) -> np.ndarray:
+        """See `Part`."""
         return self.inertia.mass * self.point(q, self.inertia.centre)
 
     def _motion(self, q: np.ndarray, v: np.ndarray, x: float) -> Motion:

@@ -1,5 +1,4 @@
-"""What acts on the chain in Exudyn: loads set once a step from tables, its own spring-dampers for
-PD control, constraints."""
+"""What acts on the chain in Exudyn: loads from tables, PD spring-dampers, constraints."""
 
 from __future__ import annotations
 
@@ -16,8 +15,20 @@ Signals = Any  # a sequence of flexura's signals, or of None
 
 
 def sampled(signals: Signals, steps: int, step: float, derivative: int = 0) -> np.ndarray:
-    """Signals at the ends of the steps, (steps + 1, joints). Where one jumps, it is the mean over
-    the half steps around, so that the impulse is exact."""
+    """Signals at the ends of the steps.
+
+    At a jump the value is the mean over the half steps before and after, so that the impulse is
+    exact.
+
+    Args:
+        signals: one Signal a joint.
+        steps: number of steps.
+        step: their length [s].
+        derivative: 0, 1 or 2.
+
+    Returns:
+        (steps + 1, joints).
+    """
     out = np.zeros((steps + 1, len(signals)))
     for j, signal in enumerate(signals):
         out[:, j] = [signal(k * step)[derivative] for k in range(steps + 1)]
@@ -32,11 +43,11 @@ def sampled(signals: Signals, steps: int, step: float, derivative: int = 0) -> n
     return out
 
 
-class Actions:
-    """Everything that `work` asks for, on an unassembled chain; `begin` sets it up for steps of one
-    length."""
+class Loads:
+    """All that a problem's work asks for, added to a chain before it is assembled."""
 
     def __init__(self, chain: Chain, work: Work) -> None:
+        """Add loads, servos, constraints and friction to the chain."""
         self.chain, self.work = chain, work
         item, mbs = chain.item, chain.mbs
         self.loads = [
@@ -70,25 +81,24 @@ class Actions:
                 )
                 self.reactions.append(mbs.AddSensor(sensor))
 
-    def _rails(self, k: int) -> bool:
+    def _is_carriage(self, k: int) -> bool:
         """Whether joint k is the carriage's."""
-        return self.chain.rides and k == 0
+        return self.chain.has_carriage and k == 0
 
     def _load(self, k: int, marker: int) -> int:
         item = self.chain.item
-        if self._rails(k):
+        if self._is_carriage(k):
             return self.chain.mbs.AddLoad(item.LoadCoordinate(markerNumber=marker, load=0.0))
         return self.chain.mbs.AddLoad(
             item.LoadTorqueVector(markerNumber=marker, loadVector=[0, 0, 0])
         )
 
     def _friction(self) -> None:
-        """Viscous and Coulomb friction of the joints; the latter is a function that Exudyn compiles
-        into its own code."""
+        """Add viscous and Coulomb friction; Exudyn compiles the latter from an expression."""
         from exudyn import symbolic
         from exudyn.advancedUtilities import CreateSymbolicUserFunction
 
-        self.kept = []
+        self.references = []
         for link, joint in zip(self.chain.robot["link"], self.chain.joints, strict=True):
             viscous, coulomb = (
                 link["joint"].get("viscous_friction", 0.0),
@@ -110,20 +120,24 @@ class Actions:
                 function = CreateSymbolicUserFunction(
                     self.chain.mbs, force, "springForceUserFunction", damper
                 )
-                self.kept.append(function)
+                self.references.append(function)
                 self.chain.mbs.SetObjectParameter(damper, "springForceUserFunction", function)
 
     def _apply(self, k: int, force: float) -> None:
         """Set joint k's drive: on the link, and back on what carries it."""
-        if self._rails(k):
+        if self._is_carriage(k):
             self.chain.mbs.SetLoadParameter(self.loads[k][0], "load", force)
             return
         for load, sign in zip(self.loads[k], (1.0, -1.0), strict=False):
             self.chain.mbs.SetLoadParameter(load, "loadVector", [0, 0, sign * force])
 
     def begin(self, steps: int, step: float) -> None:
-        """Make the tables for these steps, set what holds at the start, and have Exudyn call what
-        changes once a step."""
+        """Prepare a run: tables, values at the start, and the function that Exudyn calls each step.
+
+        Args:
+            steps: number of steps.
+            step: their length [s].
+        """
         work = self.work
         parts: list[Callable[[int], None]] = []
         if work.force:
@@ -189,7 +203,7 @@ class Actions:
         return part
 
     def _of_state(self, function: Callable[..., Any]) -> None:
-        """A law of the state, which Exudyn asks for in every iteration; one joint on the base."""
+        """A control law of the state, which Exudyn calls in every iteration; one joint only."""
 
         def torque(mbs: Any, t: float, load: Any) -> list[float]:
             return [0.0, 0.0, float(function(t, *self.chain.measured())[0])]
@@ -197,8 +211,11 @@ class Actions:
         self.chain.mbs.SetLoadParameter(self.loads[0][0], "loadVectorUserFunction", torque)
 
     def _ticks(self, steps: int, step: float) -> Callable[[int], None]:
-        """A sampled law. What a tick changes holds from its instant on: the load at the instant
-        itself should have been the mean of before and after, and the next one makes up for it."""
+        """A sampled control law.
+
+        A tick's output holds from its instant on. The load at the instant itself should be the mean
+        of old and new output; the step after it makes up for the difference.
+        """
         law = self.work.tick() if self.work.tick is not None else proportional(self.work)
         held, late = np.zeros(len(self.loads)), np.zeros(len(self.loads))
 
@@ -218,8 +235,7 @@ class Actions:
 
 
 def proportional(work: Work) -> Callable[..., Any]:
-    """PD control of the measured positions, rates by differences of two ticks: what `fx.PID`
-    without filters does."""
+    """PD control of measured positions, rates by differences of two ticks: `fx.PID` unfiltered."""
     last: list[np.ndarray] = []
 
     def law(

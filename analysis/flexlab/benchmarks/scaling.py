@@ -14,20 +14,27 @@ from .problems.robots import beam, robot, turning
 
 LINKS = (1, 2, 4, 8, 16, 32, 64)
 ELEMENTS = (1, 2, 4, 8, 16, 32)
-GROWTH = 2.2  # asked: at most, for twice the links or elements
+MAX_GROWTH = 2.2  # required: at most, for twice the links or elements
 T_S, RTOL = 1e-3, 1e-6  # a run of so many seconds, whose evaluations are counted
 
 
-def made(links: int, elements: int) -> fx.System:
-    """Joints R between equal flexible links."""
+def chain_of(links: int, elements: int) -> fx.System:
+    """A chain of equal flexible links with joints R.
+
+    Args:
+        links: number of links.
+        elements: elements of each link.
+    """
     return native.system(
         robot([beam(0.5, 2.0, 0.3, elements, turning(hub_inertia_kg_m2=1e-3))] * links)
     )
 
 
 def timed(system: fx.System) -> Callable[[], float]:
-    """A function that gives the microseconds of one evaluation, from a run's time loop and its
-    evaluations."""
+    """A function that measures one evaluation of the equations of motion [us].
+
+    It divides the time of a run's loop by the run's evaluations.
+    """
     start = 1e-3 * np.random.default_rng(0).uniform(-1, 1, system.n)
 
     def once() -> float:
@@ -40,10 +47,19 @@ def timed(system: fx.System) -> Callable[[], float]:
 def measure(
     rounds: int, links: tuple[int, ...] = LINKS, elements: tuple[int, ...] = ELEMENTS
 ) -> list[dict[str, Any]]:
-    """Rows: what grows, how many of it, microseconds of an evaluation, and how often the time of
-    half as many."""
-    cases = [("links of 2 elements", n, timed(made(n, 2))) for n in links]
-    cases += [("elements of a link", n, timed(made(1, n))) for n in elements]
+    """Time one evaluation for growing numbers of links and of elements.
+
+    Args:
+        rounds: repetitions, of which the shortest counts.
+        links: numbers of links of 2 elements each.
+        elements: numbers of elements of one link.
+
+    Returns:
+        Rows: what grows, its count, the time of an evaluation [us], and its ratio to the row
+            before.
+    """
+    cases = [("links of 2 elements", n, timed(chain_of(n, 2))) for n in links]
+    cases += [("elements of a link", n, timed(chain_of(1, n))) for n in elements]
     best = np.array([[run() for _, _, run in cases] for _ in range(rounds + 1)]).min(axis=0)
     rows: list[dict[str, Any]] = []
     for k, (what, count, _) in enumerate(cases):

@@ -1,11 +1,12 @@
 """Exudyn's cheapest settings for an error: python -m flexlab.benchmarks search [PROBLEM ...].
 
-The converged model: steps are halved, with Newton's method converged, until a third of what the
-last halving changed is less than a tenth of the target; Richardson's extrapolation of the last two
-counts. The search takes the longest step that holds the target on each mesh, then tries one setting
-after another on the best of them, with the longest step that holds the target there, and keeps what
-is cheaper. What it finds is in `settings.json`: the choice, its error, its processor time, the
-error of the converged model, and how far the converged models of the two programs are apart.
+Converged model: steps are halved, with Newton's method converged, until the estimated error is
+below a tenth of the target. The estimate is a third of the last change; Richardson's extrapolation
+of the last two runs is the result.
+
+Search: on each mesh the longest step that holds the target; then one setting after another on the
+best mesh. Cheaper settings are kept. `settings.json` gets the choice, its error and processor time,
+the error of the converged model, and the difference of the two programs' converged models.
 """
 
 from __future__ import annotations
@@ -40,40 +41,55 @@ VARIANTS: tuple[dict[str, Any], ...] = (
     {"sparse": True},
     {"trapezoidal": True},
 )
-NEWTON: tuple[dict[str, Any], ...] = (
-    {},
-    {"increments": True, "tolerance": 1e-8},
-)  # the second where the first never holds
+# the second is used if the first never holds
+NEWTON: tuple[dict[str, Any], ...] = ({}, {"increments": True, "tolerance": 1e-8})
 Log = Callable[[str], None]
 
 
 def attempt(problem: Problem, choice: Choice) -> tuple[float, Channels] | None:
-    """A run, or None if Exudyn gives up."""
+    """One run of Exudyn: processor time [s] and channels, or None if Exudyn fails."""
     try:
         return run(problem, choice)
     except (RuntimeError, ValueError, fx.FlexuraError):
         return None
 
 
-def doubled(problem: Problem, choice: Choice) -> Iterator[tuple[int, float, Channels]]:
-    """Runs with twice the steps each: steps in an output step, processor seconds, channels."""
+def runs_with_halved_steps(
+    problem: Problem, choice: Choice
+) -> Iterator[tuple[int, float, Channels]]:
+    """Runs with twice as many steps each, until a run would take too long.
+
+    Yields:
+        Steps in an output step, processor time [s], channels.
+    """
     substeps, seconds = problem.ticks, 0.0
     while substeps <= FINEST and 2.2 * seconds < LONGEST_S:
-        got = attempt(problem, replace(choice, substeps=substeps))
-        if got is not None:
-            seconds = got[0]
-            yield substeps, *got
+        result = attempt(problem, replace(choice, substeps=substeps))
+        if result is not None:
+            seconds = result[0]
+            yield substeps, *result
         substeps *= 2
 
 
 def converged(problem: Problem, log: Log) -> tuple[Channels, float, int]:
-    """Exudyn's converged channels on the problem's fine mesh, an estimate of their own error, and
-    the most steps in an output step that did not hold the target. Raises RuntimeError."""
+    """Exudyn's converged channels on the problem's fine mesh.
+
+    Args:
+        problem: what is run.
+        log: called with lines of progress.
+
+    Returns:
+        The channels, an estimate of their error, and the largest number of steps in an output step
+            that did not hold the target.
+
+    Raises:
+        RuntimeError: the converged model was not reached.
+    """
     start = Choice(problem.finer_elements or problem.elements, 1)
     before: Channels | None = None
     best: Channels | None = None
     estimate, runs = float("inf"), []
-    for substeps, seconds, found in doubled(
+    for substeps, seconds, found in runs_with_halved_steps(
         problem, start if problem.hub_length_m else start.tight()
     ):
         runs.append((substeps, found))
@@ -104,27 +120,49 @@ Found = tuple[Choice, float, float]  # a choice, its processor seconds and its e
 def longest_step(
     problem: Problem, choice: Choice, exact: Channels, substeps: list[int]
 ) -> Found | None:
-    """The longest of these steps that holds the target."""
+    """The longest step that holds the target.
+
+    Args:
+        problem: what is run.
+        choice: the other settings.
+        exact: the converged channels.
+        substeps: numbers of steps to try, in ticks of the problem.
+
+    Returns:
+        The choice, its processor time [s] and error; None if no step holds the target.
+    """
     for count in substeps:
         tried = replace(choice, substeps=count * problem.ticks)
-        got = attempt(problem, tried)
-        if got is None:
+        result = attempt(problem, tried)
+        if result is None:
             continue
-        if (off := error(got[1], exact)) <= TARGET:
-            return tried, got[0], off
-        if got[0] > LONGEST_S:
+        if (found_error := error(result[1], exact)) <= TARGET:
+            return tried, result[0], found_error
+        if result[0] > LONGEST_S:
             return None
     return None
 
 
 def meshes(problem: Problem) -> list[int]:
-    """Elements a link to be tried: the problem's, and a few more where a finer mesh counts."""
+    """Numbers of elements to try: the problem's, and some more if a finer mesh counts."""
     return [problem.elements + k for k in ((0, 1, 2, 4) if problem.finer_elements else (0,))]
 
 
 def cheapest(problem: Problem, exact: Channels, coarse: int, log: Log) -> Found:
-    """The cheapest choice that holds the target, with more steps than `coarse`. Raises RuntimeError
-    if there is none."""
+    """The cheapest choice that holds the target.
+
+    Args:
+        problem: what is run.
+        exact: the converged channels.
+        coarse: number of steps that is known to be too small.
+        log: called with lines of progress.
+
+    Returns:
+        The choice, its processor time [s] and error.
+
+    Raises:
+        RuntimeError: there is none.
+    """
     ladder = list(LADDER)
     finer = [count for count in ladder if count * problem.ticks > coarse]
     for newton in NEWTON:
@@ -162,19 +200,28 @@ def cheapest(problem: Problem, exact: Channels, coarse: int, log: Log) -> Found:
 
 
 def search(problem: Problem, log: Log) -> dict[str, Any]:
-    """The entry of `settings.json`."""
+    """Search one problem's settings.
+
+    Returns:
+        The entry of `settings.json`.
+    """
     exact, own, coarse = converged(problem, log)
-    choice, seconds, off = cheapest(problem, exact, coarse, log)
-    apart = error(native.converged(problem, problem.finer), exact)
-    log(f"  the converged models of the two programs are {apart:.1e} apart")
-    numbers = {"error": off, "seconds": seconds, "converged_within": own, "apart": apart}
+    choice, seconds, found_error = cheapest(problem, exact, coarse, log)
+    difference = error(native.converged(problem, problem.finer), exact)
+    log(f"  the converged models of the two programs are {difference:.1e} apart")
+    numbers = {
+        "error": found_error,
+        "seconds": seconds,
+        "converged_within": own,
+        "apart": difference,
+    }
     return {"choice": choice.to_dict()} | {
         key: float(f"{value:.3g}") for key, value in numbers.items()
     }
 
 
 def stored() -> dict[str, dict[str, Any]]:
-    """The choices found so far, by problem."""
+    """The entries of `settings.json`, by problem."""
     return json.loads(FILE.read_text()) if FILE.exists() else {}
 
 
@@ -184,12 +231,12 @@ def choice(name: str) -> Choice:
 
 
 def store(name: str, entry: dict[str, Any]) -> None:
-    """Write one problem's entry."""
+    """Write one problem's entry of `settings.json`."""
     FILE.write_text(json.dumps(dict(sorted((stored() | {name: entry}).items())), indent=1) + "\n")
 
 
 def main(problems: list[Problem], log: Log = print) -> None:
-    """Search for each problem in turn; what fails is said, and the others are still done."""
+    """Search the problems in turn; a failure is reported and the next problem follows."""
     for problem in problems:
         log(problem.name)
         try:

@@ -26,25 +26,25 @@ Program = Callable[[], tuple[float, np.ndarray]]  # processor seconds and the an
 
 
 @dataclass(frozen=True)
-class Still:
-    """A problem without motion: what both programs do, and how far their answers are apart."""
+class StaticProblem:
+    """A problem without motion: both programs, and the difference of their answers."""
 
     name: str
     what: str
     ours: Program
     theirs: Program
-    apart: Callable[[np.ndarray, np.ndarray], float]
-    asked: float | None = None
+    difference: Callable[[np.ndarray, np.ndarray], float]
+    required_ratio: float | None = None
 
 
 def timed(call: Callable[[], Any]) -> tuple[float, Any]:
-    """Processor seconds of a call, and what it gives."""
+    """Call a function; returns processor time [s] and its result."""
     begun = time.process_time()
     given = call()
     return time.process_time() - begun, given
 
 
-def lazily(make: Callable[[], Program]) -> Program:
+def on_first_run(make: Callable[[], Program]) -> Program:
     """A program that is set up when it is first run."""
     made: list[Program] = []
 
@@ -56,7 +56,7 @@ def lazily(make: Callable[[], Program]) -> Program:
 
 
 def tip(tables: Tables, force: tuple[float, float]) -> Program:
-    """flexura: where the tip comes to rest under a dead force and the weight, joints held."""
+    """flexura: equilibrium position of the tip under a force [N] and the weight, joints held."""
     system = native.system(tables)
 
     def run() -> tuple[float, np.ndarray]:
@@ -66,7 +66,7 @@ def tip(tables: Tables, force: tuple[float, float]) -> Program:
     return run
 
 
-def tip_in_exudyn(tables: Tables, elements: int, force: tuple[float, float]) -> Program:
+def exudyn_tip(tables: Tables, elements: int, force: tuple[float, float]) -> Program:
     """Exudyn: the same, with the fewest load steps that converge."""
 
     def once(steps: int) -> tuple[float, np.ndarray]:
@@ -105,14 +105,14 @@ def tip_in_exudyn(tables: Tables, elements: int, force: tuple[float, float]) -> 
 
 
 def spectrum(tables: Tables) -> Program:
-    """flexura: the lowest frequencies [Hz] with the joints free."""
+    """flexura: the lowest frequencies [Hz] with free joints."""
     system = native.system(tables)
     takes = inspect.signature(fx.frequencies).parameters
     keys = {"count": COUNT} if "count" in takes else {}
     return lambda: timed(lambda: np.asarray(fx.frequencies(system, joints="free", **keys))[:COUNT])
 
 
-class Sprung(Chain):
+class SprungChain(Chain):
     """A chain whose hinges are stiff springs."""
 
     def _hinge(
@@ -129,10 +129,16 @@ class Sprung(Chain):
         )
 
 
-def spectrum_in_exudyn(tables: Tables, elements: int, sprung: bool) -> Program:
-    """Exudyn: all frequencies by dense matrices with the hinges as constraints, or the lowest by
-    sparse ones with springs."""
-    made = (Sprung if sprung else Chain)(tables, elements)
+def exudyn_spectrum(tables: Tables, elements: int, sprung: bool) -> Program:
+    """Exudyn: frequencies [Hz] with free joints.
+
+    Args:
+        tables: the robot.
+        elements: cables a link.
+        sprung: False: all frequencies, dense matrices, hinges as constraints. True: the lowest,
+            sparse matrices, hinges as stiff springs.
+    """
+    made = (SprungChain if sprung else Chain)(tables, elements)
     made.mbs.Assemble()
     sparse = exudyn().SimulationSettings()
     sparse.linearSolver.solverType = exudyn().LinearSolverType.EigenSparse
@@ -149,47 +155,49 @@ def spectrum_in_exudyn(tables: Tables, elements: int, sprung: bool) -> Program:
 
 
 def nearest(ours: np.ndarray, theirs: np.ndarray) -> float:
-    """The largest relative distance of one of our frequencies from the nearest of theirs, which
-    have those of stretching too."""
+    """The largest relative distance of our frequencies from the nearest of theirs.
+
+    Theirs include the frequencies of stretching.
+    """
     return max(float(np.abs(theirs / f - 1).min()) for f in ours if f > 0.1)
 
 
-def all_still() -> dict[str, Still]:
+def all_statics() -> dict[str, StaticProblem]:
     """The problems by their names."""
     hanging, pull = upright_arm(4), (0.5, -0.6)
     soft, push = robot([beam(1.0, 1.0, 0.1, 8, turning())]), (0.0, 10.0)
     many = chain(4, 50)
     shift = lambda size: lambda a, b: float(np.abs(a - b).max() / size)
     found = [
-        Still(
+        StaticProblem(
             "static",
             "three links under their weight and a force at the tip",
-            lazily(lambda: tip(hanging, pull)),
-            lazily(lambda: tip_in_exudyn(hanging, 4, pull)),
+            on_first_run(lambda: tip(hanging, pull)),
+            on_first_run(lambda: exudyn_tip(hanging, 4, pull)),
             shift(1.2),
             10,
         ),
-        Still(
+        StaticProblem(
             "elastica",
             "a cantilever, P L^2/EI = 10, 8 elements",
-            lazily(lambda: tip(soft, push)),
-            lazily(lambda: tip_in_exudyn(soft, 8, push)),
+            on_first_run(lambda: tip(soft, push)),
+            on_first_run(lambda: exudyn_tip(soft, 8, push)),
             shift(1.0),
             10,
         ),
-        Still(
+        StaticProblem(
             "frequencies",
             f"lowest {COUNT} of 404 unknowns; Exudyn: constraints, dense",
-            lazily(lambda: spectrum(many)),
-            lazily(lambda: spectrum_in_exudyn(many, 50, False)),
+            on_first_run(lambda: spectrum(many)),
+            on_first_run(lambda: exudyn_spectrum(many, 50, False)),
             nearest,
             10,
         ),
-        Still(
+        StaticProblem(
             "frequencies-sparse",
             "the same; Exudyn: springs as hinges, sparse",
-            lazily(lambda: spectrum(many)),
-            lazily(lambda: spectrum_in_exudyn(many, 50, True)),
+            on_first_run(lambda: spectrum(many)),
+            on_first_run(lambda: exudyn_spectrum(many, 50, True)),
             nearest,
         ),
     ]
