@@ -178,7 +178,7 @@ def driven(robot: fx.Robot, more: Emulated, elements: int | None = None) -> fx.R
         {
             "link.2.modes": MODES,
             "link.2.elements": elements or strip.elements,
-            "link.2.joint.viscous_friction": strip.joint.viscous_friction
+            "link.2.joint.viscous_friction_N_m_s_rad": strip.joint.viscous_friction
             + more.stepper.damping_N_m_s,
         }
     )

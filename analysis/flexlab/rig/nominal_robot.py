@@ -33,9 +33,10 @@ def driven(robot: fx.Robot, bench: Bench) -> tuple[fx.Robot, tuple[Output, ...]]
         )
     carriage, data = line(rig, more), robot.to_dict()
     first, second = (link["joint"] for link in data["link"])
-    first["rotor_inertia"] = first.get("rotor_inertia", 0.0) + carriage.reflected_mass_kg
-    first["coulomb_friction"] = first.get("coulomb_friction", 0.0) + carriage.coulomb_N
-    second["viscous_friction"] = second.get("viscous_friction", 0.0) + more.stepper.damping_N_m_s
+    first["rotor_mass_kg"] = first.get("rotor_mass_kg", 0.0) + carriage.reflected_mass_kg
+    first["coulomb_friction_N"] = first.get("coulomb_friction_N", 0.0) + carriage.coulomb_N
+    friction = "viscous_friction_N_m_s_rad"
+    second[friction] = second.get(friction, 0.0) + more.stepper.damping_N_m_s
     stiffness = (
         rig.stepper.holding_torque_N_m * rig.stepper.full_steps_per_turn * POLE_PAIRS_PER_STEP
     )

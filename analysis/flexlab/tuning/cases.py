@@ -126,7 +126,7 @@ def type_4() -> Structure:
 def type_3() -> Structure:
     """RPb: a torque of 2 N m, a force of 2 N."""
     data = fx.load(ROBOTS / "type-3-rpb.toml").to_dict()
-    data["link"][1]["joint"]["start"] = 0.20
+    data["link"][1]["joint"]["start_m"] = 0.20
     settings = {
         "torque_max_1_N_m": 2.0,
         "force_max_2_N": 2.0,

@@ -91,8 +91,8 @@ class Actions:
         self.kept = []
         for link, joint in zip(self.chain.robot["link"], self.chain.joints, strict=True):
             viscous, coulomb = (
-                link["joint"].get("viscous_friction", 0.0),
-                link["joint"].get("coulomb_friction", 0.0),
+                link["joint"].get("viscous_friction_N_m_s_rad", 0.0),
+                link["joint"].get("coulomb_friction_N_m", 0.0),
             )
             if not viscous and not coulomb:
                 continue

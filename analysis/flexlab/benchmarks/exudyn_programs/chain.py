@@ -79,7 +79,7 @@ class Chain:
         body, place = self.ground, [0.0, 0.0, 0.0]
         for k, link in enumerate(links):
             mass, bending, axial = line(link)
-            angle += link["joint"].get("start", 0.0)
+            angle += link["joint"].get("start_rad", 0.0)
             to = [x + link["length_m"] * math.cos(angle), y + link["length_m"] * math.sin(angle), 0]
             cable = self.item.ObjectANCFCable2D(
                 massPerLength=mass,
@@ -106,7 +106,7 @@ class Chain:
                 ),
             )
             self._hinge(
-                k, root, carrier, [body, made["elements"][0]], place, joint.get("start", 0.0)
+                k, root, carrier, [body, made["elements"][0]], place, joint.get("start_rad", 0.0)
             )
             self.ends.append((root, tip))
             carrier, (x, y) = self._marker("NodeRigid", nodeNumber=tip), to[:2]

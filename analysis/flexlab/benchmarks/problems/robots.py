@@ -176,8 +176,8 @@ def slider(elements: int = 8) -> Tables:
     ride = {
         "type": "Pa",
         "angle_rad": 1.5707963267948966,
-        "start": 0.25,
-        "limits": [0.1, 0.4],
+        "start_m": 0.25,
+        "limits_m": [0.1, 0.4],
         "hub_mass_kg": 0.1,
     }
     arm = strip(0.5, (0.03, 0.003), elements, turning(hub_inertia_kg_m2=2e-3), **damped(2e-4))
@@ -186,7 +186,7 @@ def slider(elements: int = 8) -> Tables:
 
 def sleeve(elements: int = 4) -> Tables:
     """Type III (RPb): a flexible strip slides through a sleeve on a turning rigid arm."""
-    through = {"type": "Pb", "start": 0.25, "limits": [0.15, 0.35], "hub_mass_kg": 0.3}
+    through = {"type": "Pb", "start_m": 0.25, "limits_m": [0.15, 0.35], "hub_mass_kg": 0.3}
     arm: Tables = {"length_m": 0.2, "elements": 0, "mass_per_length_kg_m": 1.0, "joint": turning()}
     return robot([arm, strip(0.4, (0.02, 0.001), elements, through, **damped(2e-4))], 0.02)
 
@@ -194,7 +194,7 @@ def sleeve(elements: int = 4) -> Tables:
 def wrist(elements: int = 4) -> Tables:
     """Type VII (PbR): a flexible arm slides through a sleeve in the base; a joint R at its end
     turns a flexible strip."""
-    through = {"type": "Pb", "start": 0.3, "limits": [0.2, 0.45]}
+    through = {"type": "Pb", "start_m": 0.3, "limits_m": [0.2, 0.45]}
     turn = turning(hub_mass_kg=0.15, hub_inertia_kg_m2=1e-4)
     arm = strip(0.5, (0.03, 0.003), elements, through, **damped(2e-4))
     return robot([arm, strip(0.25, (0.02, 0.001), elements, turn, **damped(2e-4))], 0.02)

@@ -1,0 +1,54 @@
+"""Files that come with flexura, found by name: robots, manoeuvres, controllers, rigs.
+
+An installed package has them in folders of its own. A checkout has them beside the package, and the
+rigs in `firmware`.
+"""
+
+from __future__ import annotations
+
+import difflib
+import os
+import re
+from pathlib import Path
+
+from ..errors import InputError
+
+PACKAGE = Path(__file__).resolve().parents[1]
+KINDS = {"robots": "robot", "manoeuvres": "manoeuvre", "controllers": "gains", "rigs": "rig"}
+
+
+def shipped(kind: str) -> dict[str, Path]:
+    """The files of a kind by their names, which are the files' own without `.toml`.
+
+    Args:
+        kind: a key of `KINDS`.
+    """
+    beside = PACKAGE.parent / kind
+    if kind == "rigs":
+        beside = PACKAGE.parents[1] / "firmware"
+    folder = next((f for f in (PACKAGE / kind, beside) if f.is_dir()), beside)
+    pattern = "rig*.toml" if kind == "rigs" else "*.toml"
+    return {path.stem: path for path in sorted(folder.glob(pattern))}
+
+
+def find(path: str | os.PathLike[str], kind: str) -> Path:
+    """The file at this path or, where none is there, the shipped one of this name.
+
+    Args:
+        path: a path, or a name without folder and suffix, for example "rig".
+        kind: a key of `KINDS`.
+
+    Raises:
+        InputError: neither; names that are near are said.
+    """
+    given = Path(path)
+    name = os.fspath(path)
+    if not re.fullmatch(r"[\w-]+", name) or given.is_file():
+        return given
+    known = shipped(kind)
+    if name in known:
+        return known[name]
+    near = difflib.get_close_matches(name, known, 3, 0.4)
+    said = f"did you mean {' or '.join(near)}?" if near else f"known: {', '.join(known) or 'none'}"
+    expected = f"no such file, and no {KINDS[kind]} of this name comes with flexura; {said}"
+    raise InputError(expected, file=name)
