@@ -13,14 +13,11 @@ G = 9.81
 
 
 def robot(*links, gravity=(0.0, 0.0), payload=0.0, payload_inertia=0.0, **keys):
-    data = (
-        {
-            "link": list(links),
-            "gravity_m_s2": gravity,
-            "payload": {"mass_kg": payload, "inertia_kg_m2": payload_inertia},
-        }
-        | keys
-    )
+    data = {
+        "link": list(links),
+        "gravity_m_s2": gravity,
+        "payload": {"mass_kg": payload, "inertia_kg_m2": payload_inertia},
+    } | keys
     return Robot.from_dict(renamed(data)[0])  # joints may have keys without a unit
 
 

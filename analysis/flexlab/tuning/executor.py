@@ -12,6 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from flexura.errors import FlexuraError, InputError
+from flexura.optional import require
 from flexura.population import cores, program
 
 from .task import Task
@@ -69,16 +70,9 @@ class Cluster:
     another."""
 
     def __init__(self, task: Task, scheduler: str) -> None:
+        distributed = require("distributed")
         try:
-            from distributed import Client
-        except ImportError:
-            raise InputError(
-                'expected the extra "cluster": pip install flexura[cluster]',
-                key="--scheduler",
-                value=scheduler,
-            ) from None
-        try:
-            self.client = Client(scheduler, timeout=CONNECT_S, set_as_default=False)
+            self.client = distributed.Client(scheduler, timeout=CONNECT_S, set_as_default=False)
         except (OSError, ValueError) as error:
             text = f"expected the address of a Dask scheduler, tcp://host:port ({error})"
             raise InputError(text, key="--scheduler", value=scheduler) from None

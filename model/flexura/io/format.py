@@ -23,4 +23,6 @@ def check_format(tables: Mapping[str, Any], file: str = "") -> None:
         raise InputError(expected, key="format", value=value, file=file)
     if value > FORMAT:
         newer = "a newer flexura wrote this file; type: pip install --upgrade flexura"
-        raise InputError(f"{newer}; known here: up to {FORMAT}", key="format", value=value, file=file)
+        raise InputError(
+            f"{newer}; known here: up to {FORMAT}", key="format", value=value, file=file
+        )

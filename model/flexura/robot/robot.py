@@ -82,7 +82,9 @@ class Robot(Table):
             if joint.limits is not None and not (
                 low <= joint.limits[0] and joint.limits[1] <= high
             ):
-                raise WrongValue(f"{key}.{joint.key('limits')}", list(joint.limits), f"limits {where}")
+                raise WrongValue(
+                    f"{key}.{joint.key('limits')}", list(joint.limits), f"limits {where}"
+                )
             if joint.type == "Pa" and i > 0 and self.link[i - 1].joint.type == "Pb":
                 exit_m = self.link[i - 1].length_m - self.link[i - 1].joint.start
                 if joint.start < exit_m:
@@ -172,7 +174,6 @@ class Robot(Table):
             return Robot.from_dict(
                 _changed(self.to_dict(), changes)
             )  # says what is wrong in a file's words
-
 
     def _todays_path(self, path: str) -> str:
         """`link.2.joint.start_rad` of `link.2.joint.start`; any other path as it is."""

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..optional import Optional
 from ..robot import Link, Robot
 from .joints import connect
 from .joints.mesh import Mesh
@@ -15,6 +16,9 @@ from .links.geometrically_exact import ExactLink
 from .links.part import Frame, Ground, Lump, Part
 from .links.properties import VANISHING, beam_values, link_inertia, total_mass
 from .links.rigid import RigidLink
+
+exu = Optional("exudyn")
+eii = Optional("exudyn.itemInterface")
 
 BEAMS = {"ancf": CableLink, "ge": ExactLink}
 
@@ -53,8 +57,6 @@ def reach(robot: Robot) -> float:
 def build(robot: Robot, beam: str, mesh: Mesh, speeds: np.ndarray, gains: np.ndarray) -> Chain:
     """The robot straight at its start, its joints at `speeds` (n,), with PD controllers of `gains`
     (n, 2)."""
-    import exudyn as exu
-    from exudyn import itemInterface as eii
 
     container = exu.SystemContainer()
     mbs = container.AddSystem()

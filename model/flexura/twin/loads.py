@@ -22,9 +22,12 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..optional import Optional
 from ..signals import Drive
 from .build import Chain
 from .links.part import Ground, Motion
+
+exu = Optional("exudyn")
 
 DIFFERENCE = 1e-6  # m, rad, m/s, rad/s
 
@@ -203,7 +206,6 @@ class Senses:
     iterate Exudyn is at."""
 
     def __init__(self, chain: Chain) -> None:
-        import exudyn as exu
 
         self.mbs, self.markers = chain.mbs, [c.marker for c in chain.coordinates]
         self.kinds = exu.OutputVariableType.Coordinates, exu.OutputVariableType.Coordinates_t

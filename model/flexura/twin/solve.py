@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import FlexuraError, InputError
 from ..io import Run
+from ..optional import Optional
 from ..robot import MAX_ELEMENTS, Robot
 from .build import Chain, build
 from .channels import channels
@@ -22,6 +23,8 @@ from .joints.mesh import mesh, reach_of, refuse, sliding_kinds
 from .links import ancf, geometrically_exact
 from .loads import Actuation, Loads, actuation
 from .steps import Steps, plan, suggest
+
+exu = Optional("exudyn")
 
 PROGRAMS = {"ancf": ancf.PROGRAM, "ge": geometrically_exact.PROGRAM}
 ATTEMPTS = 4  # steps tried, each half the one before, where the user doesn't give one
@@ -141,7 +144,6 @@ def _run(
 ) -> Run:
     """Simulate with steps of at most `longest` [s], given by the user if there is one try, else
     halved where Exudyn fails."""
-    import exudyn
 
     for attempt in range(tries):
         chain, steps = new(), plan(t, longest / 2**attempt, forced=tries == 1)
@@ -156,7 +158,7 @@ def _run(
     values, units = channels(chain, act, t, q, v)
     meta = {
         "source": "twin",
-        "program": f"Exudyn {exudyn.__version__} ({program})",
+        "program": f"Exudyn {exu.__version__} ({program})",
         "robot": chain.robot.to_dict(),
         "complete": done == steps.count,
         "events": [],
@@ -208,7 +210,6 @@ def _settings(
     increments of position, so that an error of 1e-12 is one of 1e-12/h^2 in acceleration: a fixed
     tolerance makes errors grow again as the step falls, one with h^2 doesn't.
     """
-    import exudyn as exu
 
     settings = exu.SimulationSettings()
     integration = settings.timeIntegration
@@ -329,7 +330,6 @@ def _failure(mbs: Any, done: int, steps: Steps, failed: str) -> FlexuraError:
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Keep Exudyn's own messages off the user's terminal."""
-    import exudyn as exu
 
     before = exu.config.printToConsole, exu.config.suppressWarnings
     exu.config.printToConsole, exu.config.suppressWarnings = False, True

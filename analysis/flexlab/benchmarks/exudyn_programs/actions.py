@@ -8,8 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from flexura.optional import Optional, require
+
 from ..problems.problem import Work
 from .chain import Chain
+
+exu = Optional("exudyn")
 
 FRICTION_SPEED = 1e-3  # m/s or rad/s: Coulomb friction is f tanh(v / this)
 Signals = Any  # a sequence of flexura's signals, or of None
@@ -85,8 +89,8 @@ class Actions:
     def _friction(self) -> None:
         """Viscous and Coulomb friction of the joints; the latter is a function that Exudyn compiles
         into its own code."""
-        from exudyn import symbolic
-        from exudyn.advancedUtilities import CreateSymbolicUserFunction
+        symbolic = exu.symbolic
+        CreateSymbolicUserFunction = require("exudyn.advancedUtilities").CreateSymbolicUserFunction
 
         self.kept = []
         for link, joint in zip(self.chain.robot["link"], self.chain.joints, strict=True):

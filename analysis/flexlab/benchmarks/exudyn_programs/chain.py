@@ -13,14 +13,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from flexura.optional import Optional
+
 from ..problems.problem import Tables
+
+exu = Optional("exudyn")
+item = Optional("exudyn.itemInterface")
+beams = Optional("exudyn.beams")
 
 AXIAL = 1e5  # EA L^2 / EI of links that are given by their EI
 
 
 def exudyn() -> Any:
     """Exudyn's module, quiet."""
-    import exudyn as exu
 
     exu.SetWriteToConsole(False)
     exu.config.suppressWarnings = True
@@ -51,7 +56,6 @@ class Chain:
     """The assembled system `mbs`, its joints, and the sensors of the links' ends."""
 
     def __init__(self, robot: Tables, elements: int, reduced: int = 0) -> None:
-        from exudyn import itemInterface as item
 
         self.robot, self.item, self.exu = robot, item, exudyn()
         self.container = self.exu.SystemContainer()
@@ -72,7 +76,6 @@ class Chain:
 
     def _links(self, links: list[Tables], elements: int, reduced: int) -> None:
         """All flexible links, straight at their start."""
-        from exudyn import beams
 
         x, y, angle, payload = 0.0, 0.0, 0.0, self.robot.get("payload", {})
         carrier = self._marker("BodyRigid", bodyNumber=self.ground)

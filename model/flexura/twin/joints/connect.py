@@ -16,9 +16,13 @@ from typing import Any
 
 import numpy as np
 
+from ...optional import Optional, require
 from ...robot import Joint, Link
 from ..links.part import Attachment, Frame
 from . import sliding
+
+eii = Optional("exudyn.itemInterface")
+exu = Optional("exudyn")
 
 FRICTION_SPEED = 1e-3  # m/s or rad/s: Coulomb friction is f tanh(velocity / this)
 
@@ -96,7 +100,6 @@ def connect(
 
 
 def _revolute(mbs: Any, joint: Joint, tip: Attachment, hub: Attachment) -> Any:
-    from exudyn import itemInterface as eii
 
     mbs.AddObject(eii.ObjectJointRevolute2D(markerNumbers=[tip.marker, hub.marker]))
     turns = mbs.AddNode(
@@ -118,7 +121,6 @@ def _prismatic(
 ) -> Any:
     """`hub` slides on a line at the angle `axis` in the frame of `rail`, `turned` to it; the
     coordinate is where `end` is."""
-    from exudyn import itemInterface as eii
 
     along = [math.cos(axis), math.sin(axis), 0.0]
     normal = [math.sin(turned), math.cos(turned), 0.0]  # of the line, in the hub's frame
@@ -143,7 +145,6 @@ def equip(
 
     `fixed` is a marker whose coordinate is always 0, `speed` the joint's velocity at the start.
     """
-    from exudyn import itemInterface as eii
 
     load = mbs.AddLoad(eii.LoadCoordinate(markerNumber=marker, load=0.0))
     if joint.locked:
@@ -192,8 +193,8 @@ def equip(
 
 def _friction(mbs: Any, spring: Any, coulomb: float) -> Any:
     """c v + f tanh(v / v0) as an expression that Exudyn evaluates without calling Python."""
-    from exudyn import symbolic
-    from exudyn.advancedUtilities import CreateSymbolicUserFunction
+    symbolic = exu.symbolic
+    CreateSymbolicUserFunction = require("exudyn.advancedUtilities").CreateSymbolicUserFunction
 
     tanh: Any = symbolic.tanh
 

@@ -19,7 +19,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...optional import Optional
 from ..links.part import Attachment, Frame
+
+eii = Optional("exudyn.itemInterface")
 
 
 class Line(NamedTuple):
@@ -34,7 +37,6 @@ class Line(NamedTuple):
 def rigid(mbs: Any, held: Attachment, frame: Frame, tiny: tuple[float, float]) -> Attachment:
     """`held`, at `frame`, as part of a rigid body: itself if it is one, else a body of `tiny` mass
     and inertia fixed to it."""
-    from exudyn import itemInterface as eii
 
     if held.rigid:
         return held
@@ -63,7 +65,6 @@ def hold(
     rate `speed` [m/s]. `tiny`: mass and inertia of the bodies that stand for the points free along
     the line.
     """
-    from exudyn import itemInterface as eii
 
     node = coordinate(mbs, start, speed)
     cables = beam.layer(mbs, node)
@@ -104,7 +105,6 @@ def hold(
 
 def coordinate(mbs: Any, start: float, speed: float) -> Any:
     """A node of one coordinate without mass."""
-    from exudyn import itemInterface as eii
 
     return mbs.AddNode(
         eii.NodeGenericODE2(
@@ -118,14 +118,12 @@ def coordinate(mbs: Any, start: float, speed: float) -> Any:
 
 def marker_of(mbs: Any, node: Any) -> Any:
     """The marker of such a node's coordinate."""
-    from exudyn import itemInterface as eii
 
     return mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=node, coordinate=0))
 
 
 def rest(mbs: Any, node: Any, total: float, start: float, speed: float) -> Any:
     """A node whose coordinate and another one's are `total` together."""
-    from exudyn import itemInterface as eii
 
     mine = coordinate(mbs, start, speed)
     markers = [marker_of(mbs, mine), marker_of(mbs, node)]
@@ -136,7 +134,6 @@ def rest(mbs: Any, node: Any, total: float, start: float, speed: float) -> Any:
 
 
 def _body(mbs: Any, frame: Frame, tiny: tuple[float, float]) -> Attachment:
-    from exudyn import itemInterface as eii
 
     node = mbs.AddNode(
         eii.NodeRigidBody2D(referenceCoordinates=list(frame[:3]), initialVelocities=list(frame[3:]))

@@ -13,8 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from ...optional import Optional
 from .part import Attachment, Frame, Lump, Motion, hang
 from .properties import BeamValues
+
+eii = Optional("exudyn.itemInterface")
 
 PROGRAM = "ObjectANCFCable2D"
 NEAR = (
@@ -77,7 +80,6 @@ class CableLink:
     def layer(self, mbs: Any, sliding: Any) -> list[Any]:
         """Markers of new elements without mass and stiffness, along the beam on its nodes, that
         carry a sliding coordinate."""
-        from exudyn import itemInterface as eii
 
         elements = [
             mbs.AddObject(
@@ -156,7 +158,6 @@ def _stub(length: float, size: float) -> np.ndarray:
 
 
 def _add_node(mbs: Any, here: Frame) -> Any:
-    from exudyn import itemInterface as eii
 
     (c, s), w = here.axis, here.omega
     place, speed = [here.x, here.y, c, s], [here.vx, here.vy, -w * s, w * c]
@@ -166,7 +167,6 @@ def _add_node(mbs: Any, here: Frame) -> Any:
 def _add_element(mbs: Any, values: BeamValues, k: int, nodes: tuple[Any, Any], size: float) -> Any:
     """Element k of the link; the stubs, which have k < 0 or k >= len(values), are like the link's
     end, of LIGHT mass."""
-    from exudyn import itemInterface as eii
 
     near = min(max(k, 0), len(values) - 1)
     return mbs.AddObject(
@@ -182,7 +182,6 @@ def _add_element(mbs: Any, values: BeamValues, k: int, nodes: tuple[Any, Any], s
 
 
 def _add_lump(mbs: Any, node: Any, lump: Lump, gravity: tuple[float, float]) -> None:
-    from exudyn import itemInterface as eii
 
     if lump.mass == 0 and lump.inertia == 0:
         return
@@ -198,7 +197,6 @@ def _add_lump(mbs: Any, node: Any, lump: Lump, gravity: tuple[float, float]) -> 
 
 
 def _end(mbs: Any, element: Any, x: float, node: Any) -> Attachment:
-    from exudyn import itemInterface as eii
 
     return Attachment(
         element, [x, 0.0, 0.0], mbs.AddMarker(eii.MarkerNodeRigid(nodeNumber=node)), rigid=False

@@ -11,8 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from ...optional import Optional
 from .part import Attachment, Frame, Lump, Motion, hang
 from .properties import BeamValues
+
+eii = Optional("exudyn.itemInterface")
 
 PROGRAM = "ObjectBeamGeometricallyExact2D"
 
@@ -34,7 +37,6 @@ class ExactLink:
         frame: Frame,
         gravity: tuple[float, float],
     ) -> None:
-        from exudyn import itemInterface as eii
 
         self.values, self.hub, self.payload = values, hub, payload
         self.nodes = []
@@ -115,7 +117,6 @@ class ExactLink:
 
 
 def _end(mbs: Any, node: Any, lump: Lump, gravity: tuple[float, float]) -> Attachment:
-    from exudyn import itemInterface as eii
 
     # also without mass: a joint's coordinate needs a body, and the beam's elements don't offer one
     body = mbs.AddObject(

@@ -7,6 +7,10 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from ...optional import Optional
+
+eii = Optional("exudyn.itemInterface")
+
 
 class Frame(NamedTuple):
     """A link's straight start: place x, y [m], angle [rad], and their velocities."""
@@ -108,7 +112,6 @@ class Ground:
 
     @staticmethod
     def add(mbs: Any) -> Ground:
-        from exudyn import itemInterface as eii
 
         body = mbs.AddObject(eii.ObjectGround())
         here = Attachment(
@@ -123,7 +126,6 @@ class Ground:
 
 def hang(mbs: Any, body: Any, gravity: tuple[float, float]) -> None:
     """Put a body with mass under gravity [m/s^2]."""
-    from exudyn import itemInterface as eii
 
     if any(gravity):
         marker = mbs.AddMarker(eii.MarkerBodyMass(bodyNumber=body))

@@ -7,8 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from ...optional import Optional
 from .part import Attachment, Frame, Motion, hang
 from .properties import Inertia
+
+eii = Optional("exudyn.itemInterface")
 
 
 class RigidLink:
@@ -20,7 +23,6 @@ class RigidLink:
     def __init__(
         self, mbs: Any, length: float, inertia: Inertia, frame: Frame, gravity: tuple[float, float]
     ) -> None:
-        from exudyn import itemInterface as eii
 
         self.length, self.inertia = length, inertia
         m, c, about = inertia
