@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import importlib.metadata
 from typing import Any
 
 from .errors import InputError
@@ -38,44 +37,42 @@ class Optional:
         system = exu.SystemContainer()
 
     Args:
-        name: the module, for example "matplotlib.figure"; its package is in `EXTRAS`.
+        name: the module, for example "matplotlib.figure".
+        extra: the extra that brings its package, by default the one of `EXTRAS`.
     """
 
-    def __init__(self, name: str) -> None:
-        self._name = name
+    def __init__(self, name: str, extra: str = "") -> None:
+        self._name, self._extra = name, extra
 
     def __getattr__(self, attribute: str) -> Any:
         """The module's attribute. Raises Missing."""
         if attribute.startswith("__") and attribute not in ("__version__", "__file__"):
             raise AttributeError(attribute)
-        return getattr(require(self._name), attribute)
+        return getattr(load(self._name, self._extra), attribute)
 
 
-def require(name: str) -> Any:
+def load(name: str, extra: str = "") -> Any:
     """Import a module of an extra.
+
+    Args:
+        name: the module.
+        extra: the extra that brings its package, by default the one of `EXTRAS`.
 
     Raises:
         Missing: its package is not installed, or a library that it needs is not there.
     """
+    package = name.partition(".")[0]
     try:
         return importlib.import_module(name)
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] == package:
+            command = f'pip install "flexura[{extra or EXTRAS[package]}]"'
+            raise Missing(f"{package} is not installed; type: {command}") from None
+        raise _broken(package, error) from None
     except ImportError as error:
-        raise explained(error, name) from None
+        raise _broken(package, error) from None
 
 
-def explained(error: ImportError, name: str = "") -> ImportError:
-    """`Missing`, with the command that brings the package; another error as it is.
-
-    Args:
-        error: what an import raised.
-        name: the module that was asked for, by default the one that the error names.
-    """
-    package = (name or error.name or "").partition(".")[0]
-    if package not in EXTRAS:
-        return error
-    absent = isinstance(error, ModuleNotFoundError)
-    if absent and (error.name or "").partition(".")[0] == package:
-        command = f'pip install "flexura[{EXTRAS[package]}]"'
-        return Missing(f"{package} is not installed; type: {command}")
+def _broken(package: str, error: ImportError) -> Missing:
     reason = (str(error) or "no reason given").splitlines()[0]
     return Missing(f"{package} does not load ({reason}); flexura doctor says what is missing")

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from flexura.optional import Optional, require
+from flexura.optional import Optional, load
 
 from ..runs.deviation import deviation
 from ..runs.labels import called, emulated
@@ -46,7 +46,7 @@ STYLE: dict[Any, Any] = {
 
 def figure(c: Comparison, entry: Difference) -> Any:
     """One quantity's figure, a matplotlib Figure: both runs above, their difference below."""
-    Figure = require("matplotlib.figure").Figure
+    Figure = load("matplotlib.figure").Figure
 
     with matplotlib.rc_context(STYLE):
         drawing = Figure(figsize=(7.4, 3.9), layout="constrained")
@@ -117,7 +117,7 @@ def is_emulated(c: Comparison) -> bool:
 
 def together(c: Comparison, size: tuple[float, float] = (8.3, 10.2)) -> Any:
     """All quantities in one figure, one below the other."""
-    Figure = require("matplotlib.figure").Figure
+    Figure = load("matplotlib.figure").Figure
 
     with matplotlib.rc_context(STYLE):
         drawing = Figure(figsize=size, layout="constrained")

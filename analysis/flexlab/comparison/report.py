@@ -10,7 +10,7 @@ import re
 from textwrap import wrap
 from typing import Any
 
-from flexura.optional import Optional, require
+from flexura.optional import Optional, load
 
 from ..runs.labels import EMULATED, called
 from .figures import STYLE, figure, heading, is_emulated, saved, together
@@ -76,7 +76,7 @@ def html(c: Comparison) -> str:
 def pdf(c: Comparison) -> bytes:
     """Two pages of A4: the figures; the table with the notes and what the runs say about
     themselves."""
-    PdfPages = require("matplotlib.backends.backend_pdf").PdfPages
+    PdfPages = load("matplotlib.backends.backend_pdf").PdfPages
 
     buffer = io.BytesIO()
     subject = EMULATED if is_emulated(c) else called(c.experiment)
@@ -146,7 +146,7 @@ def _inline(svg: bytes, prefix: str) -> str:
 
 def _front(c: Comparison) -> Any:
     """The PDF's first page."""
-    Figure = require("matplotlib.figure").Figure
+    Figure = load("matplotlib.figure").Figure
 
     page = Figure(figsize=(8.27, 11.69))
     y = 0.955
@@ -218,6 +218,6 @@ def _lay(
 
 
 def _rule(y: float) -> Any:
-    Line2D = require("matplotlib.lines").Line2D
+    Line2D = load("matplotlib.lines").Line2D
 
     return Line2D([0.06, 0.985], [y, y])

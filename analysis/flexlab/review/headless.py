@@ -23,7 +23,7 @@ import numpy as np
 
 from flexura.errors import FlexuraError, InputError
 from flexura.io import write_bytes
-from flexura.optional import Optional, require
+from flexura.optional import Optional, load
 
 rerun_cli = Optional("rerun_cli")
 
@@ -61,7 +61,7 @@ def draw(
 def default_time(rrd: str | Path) -> float:
     """The time [s] that a review proposes for its picture. Raises InputError for a file that is no
     review."""
-    RrdReader = require("rerun.chunk").RrdReader
+    RrdReader = load("rerun.chunk").RrdReader
 
     path = Path(rrd)
     if not path.is_file():
@@ -95,7 +95,7 @@ def viewer(size: tuple[int, int] = (1600, 900), timeout: float = 60.0) -> Iterat
     Raises FlexuraError when there is no Vulkan driver, or when the viewer doesn't answer within
     `timeout` seconds.
     """
-    ViewerClient = require("rerun.experimental").ViewerClient
+    ViewerClient = load("rerun.experimental").ViewerClient
 
     program, port = str(executable()), free_port()
     with (
@@ -191,7 +191,7 @@ def settled(client: Any, view_id: Any = None, tries: int = 60) -> bytes:
 
 def _without_menu(png: bytes, size: tuple[int, int]) -> bytes:
     """The picture cut to `size`: without the strip of the menu where it is empty, else scaled."""
-    Image = require("PIL.Image")
+    Image = load("PIL.Image")
 
     image = Image.open(io.BytesIO(png)).convert("RGB")
     strip = image.crop((image.width // 4, 4, image.width // 2, MENU_PX - 4)).getcolors(1)

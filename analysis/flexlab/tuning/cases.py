@@ -19,7 +19,6 @@ from flexura.control import Gains, Motor, Output
 from flexura.signals import Drive, JointDrive, Manoeuvre, step
 
 from .. import rig as rigs
-from ..paths import FIRMWARE, ROBOTS
 from ..rig.nominal_robot import driven
 from .objective import Weights
 from .search_space import Free, free
@@ -80,8 +79,8 @@ class Structure:
 def type_4() -> Structure:
     """PaR: the rig, its stepper with 6 rad/s and 60 rad/s^2, its motor with the voltage that takes
     the carriage to 90 % of the speed at which the board switches off."""
-    bench = rigs.load(FIRMWARE / "rig.toml")
-    robot, outputs = driven(fx.load(ROBOTS / "rig.toml"), bench)
+    bench = rigs.load("rig")
+    robot, outputs = driven(fx.load("rig"), bench)
     board = rigs.configuration(bench)
     settings = {
         name: board[name]
@@ -125,7 +124,7 @@ def type_4() -> Structure:
 
 def type_3() -> Structure:
     """RPb: a torque of 2 N m, a force of 2 N."""
-    data = fx.load(ROBOTS / "type-3-rpb.toml").to_dict()
+    data = fx.load("type-3-rpb").to_dict()
     data["link"][1]["joint"]["start_m"] = 0.20
     settings = {
         "torque_max_1_N_m": 2.0,

@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from flexura.errors import FlexuraError, InputError
-from flexura.optional import require
+from flexura.optional import load
 from flexura.population import cores, program
 
 from .task import Task
@@ -70,7 +70,7 @@ class Cluster:
     another."""
 
     def __init__(self, task: Task, scheduler: str) -> None:
-        distributed = require("distributed")
+        distributed = load("distributed")
         try:
             self.client = distributed.Client(scheduler, timeout=CONNECT_S, set_as_default=False)
         except (OSError, ValueError) as error:

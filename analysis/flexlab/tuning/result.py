@@ -14,7 +14,7 @@ from rich.table import Table
 import flexura as fx
 from flexura.control import Gains, Response, of_run
 from flexura.io import write_bytes
-from flexura.optional import require
+from flexura.optional import load
 
 from . import search_space as freedom
 from .closed_loop import under
@@ -212,7 +212,7 @@ def numbers(found: Result) -> dict[str, Any]:
 
 def figure(found: Result) -> Any:
     """The search's progress (or the front), and what the best gains do."""
-    Figure = require("matplotlib.figure").Figure
+    Figure = load("matplotlib.figure").Figure
 
     history, run = found.history, found.runs[0]
     drawing = Figure(figsize=(10, 4.2), layout="constrained")

@@ -20,7 +20,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from flexura.errors import FlexuraError, InputError
-from flexura.optional import require
+from flexura.optional import load
 from flexura.population import program
 
 from .executor import Runs
@@ -102,7 +102,7 @@ def search(
     """Go on from what `history` holds to the end of the search; every generation is stored as it is
     done. True: to its end, not interrupted. Raises InputError where the stored generations are not
     this search's."""
-    CMAES = require("pymoo.algorithms.soo.nonconvex.cmaes").CMAES
+    CMAES = load("pymoo.algorithms.soo.nonconvex.cmaes").CMAES
 
     if task.pareto != (how.algorithm == "nsga2"):
         raise InputError(
@@ -152,9 +152,9 @@ def _stage(
 ) -> int:
     """One algorithm to its end, its generations being the history's from `first` on; how many there
     are after it."""
-    Evaluator = require("pymoo.core.evaluator").Evaluator
-    Problem = require("pymoo.core.problem").Problem
-    StaticProblem = require("pymoo.problems.static").StaticProblem
+    Evaluator = load("pymoo.core.evaluator").Evaluator
+    Problem = load("pymoo.core.problem").Problem
+    StaticProblem = load("pymoo.problems.static").StaticProblem
 
     d, generation = len(task.free), first
     problem = Problem(n_var=d, n_obj=len(task.goals), xl=np.zeros(d), xu=np.ones(d))
@@ -183,13 +183,13 @@ def _stage(
 def _algorithm(how: Search, start: np.ndarray) -> Any:
     """pymoo's algorithm; its first generation is a Latin hypercube with `start` in it, CMA-ES
     begins there."""
-    NSGA2 = require("pymoo.algorithms.moo.nsga2").NSGA2
-    CMAES = require("pymoo.algorithms.soo.nonconvex.cmaes").CMAES
-    GA = require("pymoo.algorithms.soo.nonconvex.ga").GA
-    PSO = require("pymoo.algorithms.soo.nonconvex.pso").PSO
-    SBX = require("pymoo.operators.crossover.sbx").SBX
-    PM = require("pymoo.operators.mutation.pm").PM
-    TournamentSelection = require("pymoo.operators.selection.tournament").TournamentSelection
+    NSGA2 = load("pymoo.algorithms.moo.nsga2").NSGA2
+    CMAES = load("pymoo.algorithms.soo.nonconvex.cmaes").CMAES
+    GA = load("pymoo.algorithms.soo.nonconvex.ga").GA
+    PSO = load("pymoo.algorithms.soo.nonconvex.pso").PSO
+    SBX = load("pymoo.operators.crossover.sbx").SBX
+    PM = load("pymoo.operators.mutation.pm").PM
+    TournamentSelection = load("pymoo.operators.selection.tournament").TournamentSelection
     from scipy.stats import qmc
 
     if how.algorithm == "cma-es":
@@ -221,8 +221,8 @@ def _winners(population: Any, drawn: np.ndarray, **_: Any) -> np.ndarray:
 def limits(algorithm: Any, count: int) -> np.ndarray:
     """The J (count,) above which each of the points just asked for is of no use, inf where every J
     is: CMA-ES ranks all."""
-    GA = require("pymoo.algorithms.soo.nonconvex.ga").GA
-    PSO = require("pymoo.algorithms.soo.nonconvex.pso").PSO
+    GA = load("pymoo.algorithms.soo.nonconvex.ga").GA
+    PSO = load("pymoo.algorithms.soo.nonconvex.pso").PSO
 
     out = np.full(count, np.inf)
     if not algorithm.is_initialized or not isinstance(algorithm, GA | PSO):

@@ -2,7 +2,7 @@
 
 from .format import FORMAT, check_format
 from .run import FILE, STATIONS, Run
-from .shipped import find, shipped
+from .shipped import find, shipped_files
 from .toml_files import read_toml, write_bytes, write_text, write_toml
 from .validation import explain
 
@@ -15,7 +15,7 @@ __all__ = [
     "explain",
     "find",
     "read_toml",
-    "shipped",
+    "shipped_files",
     "write_bytes",
     "write_text",
     "write_toml",

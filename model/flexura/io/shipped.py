@@ -7,6 +7,7 @@ rigs in `firmware`.
 from __future__ import annotations
 
 import difflib
+import logging
 import os
 import re
 from pathlib import Path
@@ -17,7 +18,7 @@ PACKAGE = Path(__file__).resolve().parents[1]
 KINDS = {"robots": "robot", "manoeuvres": "manoeuvre", "controllers": "gains", "rigs": "rig"}
 
 
-def shipped(kind: str) -> dict[str, Path]:
+def shipped_files(kind: str) -> dict[str, Path]:
     """The files of a kind by their names, which are the files' own without `.toml`.
 
     Args:
@@ -29,6 +30,9 @@ def shipped(kind: str) -> dict[str, Path]:
     folder = next((f for f in (PACKAGE / kind, beside) if f.is_dir()), beside)
     pattern = "rig*.toml" if kind == "rigs" else "*.toml"
     return {path.stem: path for path in sorted(folder.glob(pattern))}
+
+
+_log = logging.getLogger("flexura")
 
 
 def find(path: str | os.PathLike[str], kind: str) -> Path:
@@ -43,11 +47,11 @@ def find(path: str | os.PathLike[str], kind: str) -> Path:
     """
     given = Path(path)
     name = os.fspath(path)
-    if not re.fullmatch(r"[\w-]+", name) or given.is_file():
-        return given
-    known = shipped(kind)
-    if name in known:
-        return known[name]
+    known = shipped_files(kind) if re.fullmatch(r"[\w-]+", name) and not given.is_file() else None
+    if known is None or name in known:
+        found = given if known is None else known[name]
+        _log.debug("%s file %s", KINDS[kind], found)
+        return found
     near = difflib.get_close_matches(name, known, 3, 0.4)
     said = f"did you mean {' or '.join(near)}?" if near else f"known: {', '.join(known) or 'none'}"
     expected = f"no such file, and no {KINDS[kind]} of this name comes with flexura; {said}"

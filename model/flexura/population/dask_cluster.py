@@ -6,7 +6,7 @@ from collections.abc import Generator, Iterator
 from typing import TYPE_CHECKING, Any
 
 from ..errors import FlexuraError, InputError
-from ..optional import require
+from ..optional import load
 from .request import program
 from .worker import compute
 
@@ -29,7 +29,7 @@ def run(
     by one process. Whatever ends this early cancels what is left. Raises InputError for an address
     at which there is no scheduler.
     """
-    distributed = require("distributed")
+    distributed = load("distributed")
     try:
         client = distributed.Client(scheduler, timeout=CONNECT_S, set_as_default=False)
     except (OSError, ValueError) as error:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from flexura.optional import Optional, require
+from flexura.optional import Optional, load
 
 from ..problems.problem import Work
 from .chain import Chain
@@ -90,7 +90,7 @@ class Actions:
         """Viscous and Coulomb friction of the joints; the latter is a function that Exudyn compiles
         into its own code."""
         symbolic = exu.symbolic
-        CreateSymbolicUserFunction = require("exudyn.advancedUtilities").CreateSymbolicUserFunction
+        CreateSymbolicUserFunction = load("exudyn.advancedUtilities").CreateSymbolicUserFunction
 
         self.kept = []
         for link, joint in zip(self.chain.robot["link"], self.chain.joints, strict=True):
@@ -122,8 +122,8 @@ class Actions:
         if self._rails(k):
             self.chain.mbs.SetLoadParameter(self.loads[k][0], "load", force)
             return
-        for load, sign in zip(self.loads[k], (1.0, -1.0), strict=False):
-            self.chain.mbs.SetLoadParameter(load, "loadVector", [0, 0, sign * force])
+        for one, sign in zip(self.loads[k], (1.0, -1.0), strict=False):
+            self.chain.mbs.SetLoadParameter(one, "loadVector", [0, 0, sign * force])
 
     def begin(self, steps: int, step: float) -> None:
         """Make the tables for these steps, set what holds at the start, and have Exudyn call what

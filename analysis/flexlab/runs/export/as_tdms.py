@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from flexura.io import Run
-from flexura.optional import require
+from flexura.optional import load
 
 from ..labels import EMULATED, called, emulated
 
@@ -24,10 +24,10 @@ def write(run: Run) -> bytes:
     Evenly sampled channels have a time base (`wf_start_offset`, `wf_increment`) besides the channel
     `time`.
     """
-    ChannelObject = require("nptdms").ChannelObject
-    GroupObject = require("nptdms").GroupObject
-    RootObject = require("nptdms").RootObject
-    TdmsWriter = require("nptdms").TdmsWriter
+    ChannelObject = load("nptdms").ChannelObject
+    GroupObject = load("nptdms").GroupObject
+    RootObject = load("nptdms").RootObject
+    TdmsWriter = load("nptdms").TdmsWriter
 
     label = called(run)
     about: dict[str, Any] = {"name": label, "label": label, "flexura": json.dumps(run.meta)}

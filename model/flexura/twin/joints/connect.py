@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ...optional import Optional, require
+from ...optional import Optional, load
 from ...robot import Joint, Link
 from ..links.part import Attachment, Frame
 from . import sliding
@@ -194,7 +194,7 @@ def equip(
 def _friction(mbs: Any, spring: Any, coulomb: float) -> Any:
     """c v + f tanh(v / v0) as an expression that Exudyn evaluates without calling Python."""
     symbolic = exu.symbolic
-    CreateSymbolicUserFunction = require("exudyn.advancedUtilities").CreateSymbolicUserFunction
+    CreateSymbolicUserFunction = load("exudyn.advancedUtilities").CreateSymbolicUserFunction
 
     tanh: Any = symbolic.tanh
 
