@@ -16,7 +16,7 @@ from ..comparison.measures import Comparison, compare
 from ..comparison.replay.simulate_experiment import simulate
 from ..crosscheck import crosscheck as cross
 from ..experiment import plan, run_experiment
-from ..experiment.flash import RIG
+from ..experiment.flash import RIG, build
 from ..review import picture
 from .compare import save as save_comparison
 
@@ -115,7 +115,7 @@ def _experiment(folder: Path, progress: cross.Progress | None) -> fx.Run:
     its wires."""
     bench = rig.load(RIG)
     asked = plan.inverse(bench, rig.configuration(bench))
-    opened = run_experiment.open_board(bench, None)
+    opened = run_experiment.open_board(bench, None, elf=build())  # what misses it says so first
     watch = run_experiment.Watch(
         observe=lambda reports, part: progress("emulated", part) if progress else None
     )
