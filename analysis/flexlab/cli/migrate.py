@@ -51,7 +51,7 @@ def migrate(
     if json:
         show(True, lambda: None, lambda: found)
     for file, _, old in done:
-        lines = [f"{file}: {each.path} {'is' if check else 'was'} {each.new} now" for each in old]
+        lines = [f"{file}: {each.path} is now {each.new}" for each in old]
         say(json, *lines or [f"{file}: nothing to rename"])
     if check and any(old for _, _, old in done):
         raise typer.Exit(1)
