@@ -145,6 +145,5 @@ def test_help_needs_no_extra(flexura, name):
 
 
 def test_types_are_shipped(installed):
-    code = "import flexura, flexlab, pathlib as p; print(*(p.Path(m.__file__).with_name('py.typed').is_file() for m in (flexura, flexlab)))"
-    done = subprocess.run([installed / "python", "-c", code], capture_output=True, text=True)
-    assert done.stdout.split() == ["True", "True"], done.stderr
+    (packages,) = installed.parent.glob("lib/python*/site-packages")
+    assert all((packages / name / "py.typed").is_file() for name in ("flexura", "flexlab"))

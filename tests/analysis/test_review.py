@@ -487,7 +487,8 @@ def test_without_vulkan_the_packages_are_named(rrd, tmp_path, monkeypatch):
 
 def test_rerun_is_imported_only_when_used():
     heavy = "{'rerun', 'rerun_cli', 'rerun_bindings', 'pyarrow'}"
-    code = f"import sys, flexlab.review, flexlab.runs.deviation; sys.exit(bool({heavy} & set(sys.modules)))"
+    code = "import sys, flexlab.review, flexlab.runs.deviation; "
+    code += f"sys.exit(bool({heavy} & set(sys.modules)))"
     assert (
         subprocess.run(
             [sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
