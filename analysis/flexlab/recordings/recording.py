@@ -9,6 +9,7 @@ seen as such. `rebuild` makes the Run from these three and nothing else.
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import json
 import os
@@ -79,12 +80,9 @@ class Recording:
         """To the disk itself, and unlocked. May be called twice."""
         for handle in (self._received, self._events):
             if handle >= 0:
-                try:
+                # a full disk was told when it was written to; a pipe has nothing to sync
+                with contextlib.suppress(OSError):
                     os.fsync(handle)
-                except (
-                    OSError
-                ):  # a full disk was told when it was written to; a pipe has nothing to sync
-                    pass
                 os.close(handle)
         self._received = self._events = -1
 

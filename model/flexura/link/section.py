@@ -30,6 +30,7 @@ class Material:
 
     @cached_property
     def length(self) -> float:
+        """The link's length [m]."""
         return float(self.breaks[-1])
 
     @cached_property

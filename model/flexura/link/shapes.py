@@ -17,6 +17,7 @@ class ElementShapes:
 
     @property
     def count(self) -> int:
+        """How many there are."""
         return 2
 
     def __call__(self, xi: np.ndarray, derivative: int = 0) -> np.ndarray:
@@ -35,6 +36,7 @@ class MeshShapes:
 
     @property
     def count(self) -> int:
+        """How many there are."""
         return 2 * len(self.elements)
 
     def __call__(self, xi: np.ndarray, derivative: int = 0) -> np.ndarray:
@@ -61,6 +63,7 @@ class WholeShapes:
 
     @property
     def count(self) -> int:
+        """How many there are."""
         return self.coefficients.shape[1]
 
     def __call__(self, xi: np.ndarray, derivative: int = 0) -> np.ndarray:

@@ -145,6 +145,7 @@ class Link(Table):
 
     @property
     def flexible(self) -> bool:
+        """Whether the link has beam elements."""
         return self.elements > 0
 
     @field_validator("section", "mass_per_length_kg_m", "bending_stiffness_N_m2")
@@ -272,6 +273,7 @@ class Link(Table):
 
     @property
     def section_given(self) -> bool:
+        """Whether mass and stiffness come from the section and the material."""
         return (
             self.section is not None
             or self.young_modulus_Pa is not None

@@ -129,6 +129,7 @@ class Robot(Table):
 
     @property
     def links(self) -> list[Link]:
+        """The links, from the base outwards."""
         return self.link
 
     @property
