@@ -73,6 +73,16 @@ def load(name: str, extra: str = "") -> Any:
         raise _broken(package, error) from None
 
 
+def need(*packages: str) -> None:
+    """Ask for packages before the work whose result takes them.
+
+    Raises:
+        Missing: one of them is not there.
+    """
+    for package in packages:
+        load(package)
+
+
 def _broken(package: str, error: ImportError) -> Missing:
     reason = (str(error) or "no reason given").splitlines()[0]
     return Missing(f"{package} does not load ({reason}); flexura doctor says what is missing")
