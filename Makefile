@@ -6,6 +6,7 @@ PYTHON ?= python3
 JOBS   ?= 2
 
 VENV     := .venv
+PYTHON_FILES := model analysis firmware tests tools examples
 READY    := $(VENV)/.ready
 CORE     := $(VENV)/.core
 
@@ -14,16 +15,18 @@ ifneq ($(shell test -x $(VENV)/bin/python && cat $(READY) 2>/dev/null),$(CURDIR)
 .PHONY: $(READY)
 endif
 
-.PHONY: help setup demo test check lint types tests core core-sanitize test-slow test-long docs bench firmware flash clean
+.PHONY: help setup demo test check quick lint types tests core core-sanitize test-slow test-long docs bench wheel firmware flash clean
 
 help:
 	@echo "make demo       simulate the rig, cross-check it, and leave a review to look at"
 	@echo "make test       style, types and the quick tests ('make check' is the same)"
+	@echo "make quick      style, types and a choice of tests in less than a minute, before each commit"
 	@echo "make test-slow  the tests that take longer"
 	@echo "make test-long  those that take hours; make test-long TESTS=tests/model/core/test_chains.py runs one part"
 	@echo "make core       only the C++ tests of the core; make core-sanitize the same, with memory and arithmetic watched"
 	@echo "make docs       this project's documentation as a site, in build/docs"
 	@echo "make bench      how fast the solver is on this machine, and how busy the board"
+	@echo "make wheel      a wheel that needs no compiler, in dist"
 	@echo "make firmware   build the board's program; its ELF file is named at the end"
 	@echo "make flash      build it and load it into the board: make flash PORT=/dev/ttyACM0 CONFIGURE=1"
 	@echo "make setup      only the setting up, which every target does by itself"
@@ -46,7 +49,16 @@ demo: $(CORE)
 test check: lint types core tests
 
 lint: $(READY)
-	@$(VENV)/bin/ruff check model analysis firmware tests tools examples docs
+	@$(VENV)/bin/ruff check $(PYTHON_FILES)
+	@$(VENV)/bin/ruff format --check --quiet $(PYTHON_FILES)
+	@git ls-files '*.cpp' '*.hpp' '*.h' '*.c' 2>/dev/null | xargs -r $(VENV)/bin/clang-format --dry-run -Werror
+
+# The files that are quick and look at much; tests/test_setup.py holds that they are there.
+QUICK := tests/test_setup.py tests/model/test_formats.py tests/model/test_shipped.py tests/model/test_optional.py \
+  tests/model/test_run.py tests/model/test_statespace.py tests/model/test_shaping.py tests/model/system tests/model/link
+
+quick: lint types $(CORE)
+	@$(VENV)/bin/pytest -q -n $(JOBS) -m "not slow and not long" $(QUICK)
 
 types: $(READY)
 	@$(VENV)/bin/mypy
@@ -77,6 +89,11 @@ docs: $(CORE)
 # make bench BENCH="type4 pendulum --rounds 3" times a few problems; BENCH=--help says what there is.
 bench: $(CORE)
 	@$(VENV)/bin/python -m flexlab.benchmarks $(BENCH)
+
+# For this machine's Python and processor. On Linux it takes the manylinux tag that its libraries allow; `cibuildwheel` makes those of
+# all Pythons (pyproject.toml), in containers with old libraries.
+wheel: $(READY)
+	@$(VENV)/bin/python tools/wheel.py
 
 # make flash PORT=/dev/ttyACM0, or without PORT the one Mega 2560 that is plugged in; CONFIGURE=1 writes the rig's constants too.
 flash: $(CORE)

@@ -21,7 +21,7 @@ LENGTH_M, STIFFNESS_N_M2, GRAVITY_M_S2, LIGHT_N = 1.2, 3.0, 9.81, 1e-8
 
 def column(own_N: float, payload_N: float) -> fx.System:
     """The upright column with these weights."""
-    link = {"length_m": LENGTH_M, "elements": 16, "joint": {"type": "R", "start": np.pi / 2}}
+    link = {"length_m": LENGTH_M, "elements": 16, "joint": {"type": "R", "start_rad": np.pi / 2}}
     link["bending_stiffness_N_m2"] = STIFFNESS_N_M2
     link["mass_per_length_kg_m"] = own_N / LENGTH_M / GRAVITY_M_S2
     tables = {"link": [link], "gravity_m_s2": [0.0, -GRAVITY_M_S2]}

@@ -26,7 +26,7 @@ for degrees in (30, 120, 170):
     amplitude = np.radians(degrees)
     link = {"length_m": 2 * CENTRE_M, "mass_kg": MASS_KG, "centre_of_mass_m": CENTRE_M}
     link |= {"inertia_kg_m2": INERTIA_KG_M2}
-    link["joint"] = {"type": "R", "start": amplitude - np.pi / 2}  # from the vertical downwards
+    link["joint"] = {"type": "R", "start_rad": amplitude - np.pi / 2}  # from the vertical downwards
     robot = fx.Robot.from_dict({"link": [link], "gravity_m_s2": [0.0, -GRAVITY_M_S2]})
 
     period_s = 4 * np.sqrt(pivot_kg_m2 / moment_N_m) * ellipk(np.sin(amplitude / 2) ** 2)

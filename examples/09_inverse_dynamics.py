@@ -19,7 +19,7 @@ LENGTH_M, ARM_KG, SLIDER_KG, GRAVITY_M_S2 = 0.8, 1.5, 0.6, 9.81
 
 arm = {"length_m": LENGTH_M, "mass_kg": ARM_KG, "inertia_kg_m2": ARM_KG * LENGTH_M**2 / 12}
 arm["joint"] = {"type": "R"}
-slider = {"length_m": 0.0, "mass_kg": SLIDER_KG, "joint": {"type": "Pa", "start": 0.2}}
+slider = {"length_m": 0.0, "mass_kg": SLIDER_KG, "joint": {"type": "Pa", "start_m": 0.2}}
 robot = fx.Robot.from_dict({"link": [arm, slider], "gravity_m_s2": [0.0, -GRAVITY_M_S2]})
 
 turn, slide = cycloid(np.pi / 2, 1.0), cycloid(0.7, 0.8, start=0.2)

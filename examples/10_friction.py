@@ -23,7 +23,7 @@ def speed(t: np.ndarray) -> np.ndarray:
 
 
 cart = {"length_m": 0.0, "mass_kg": MASS_KG}
-cart["joint"] = {"type": "Pa", "coulomb_friction": FRICTION_N}
+cart["joint"] = {"type": "Pa", "coulomb_friction_N": FRICTION_N}
 robot = fx.Robot.from_dict({"name": "cart", "link": [cart]})
 t = np.linspace(0, 3, 301)
 run = fx.simulate(robot, t, qd0=[SPEED_M_S], rtol=1e-9)

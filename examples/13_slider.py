@@ -40,7 +40,7 @@ def force(s: float) -> float:
 rail = {"length_m": LENGTH_M, "elements": 10, "joint": {"type": "R", "locked": True}}
 rail |= {"mass_per_length_kg_m": 1e-5, "bending_stiffness_N_m2": STIFFNESS_N_M2}
 rail["damping"] = {"beta_s": 0.05}
-slider = {"length_m": 0.0, "mass_kg": SLIDER_KG, "joint": {"type": "Pa", "start": 0.1}}
+slider = {"length_m": 0.0, "mass_kg": SLIDER_KG, "joint": {"type": "Pa", "start_m": 0.1}}
 robot = fx.Robot.from_dict({"link": [rail, slider], "gravity_m_s2": [0.0, -GRAVITY_M_S2]})
 system = fx.assemble(robot)
 

@@ -34,7 +34,7 @@ def push(d: float) -> float:
     return moment**2 / (2 * STIFFNESS_N_M2)
 
 
-rod = {"length_m": LENGTH_M, "elements": 6, "joint": {"type": "Pb", "start": 0.5}}
+rod = {"length_m": LENGTH_M, "elements": 6, "joint": {"type": "Pb", "start_m": 0.5}}
 rod |= {"mass_per_length_kg_m": 1e-7, "bending_stiffness_N_m2": STIFFNESS_N_M2}
 tables = {"link": [rod], "payload": {"mass_kg": PAYLOAD_KG}}
 system = fx.assemble(fx.Robot.from_dict(tables | {"gravity_m_s2": [0.0, -GRAVITY_M_S2]}))

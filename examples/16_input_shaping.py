@@ -21,7 +21,7 @@ LENGTH_M, MASS_KG_M, STIFFNESS_N_M2, WAY_M, TIME_S = 0.6, 0.2355, 0.5, 1e-3, 0.6
 cart = {"length_m": 0.01, "mass_kg": 1.0, "joint": {"type": "Pa"}}
 strip = {"length_m": LENGTH_M, "elements": 16, "modes": 1}
 strip |= {"mass_per_length_kg_m": MASS_KG_M, "bending_stiffness_N_m2": STIFFNESS_N_M2}
-strip["joint"] = {"type": "R", "start": np.pi / 2, "locked": True}
+strip["joint"] = {"type": "R", "start_rad": np.pi / 2, "locked": True}
 system = fx.assemble(fx.Robot.from_dict({"name": "strip on a cart", "link": [cart, strip]}))
 
 b = 1.8751040687119611  # of a cantilever: cos b cosh b = -1

@@ -27,7 +27,7 @@ Q, R = np.diag([1.0, 1.0, 0.0, 0.0]), np.diag([1e-3, 1e-1])
 
 carriage = {"length_m": 0.1, "mass_kg": CARRIAGE_KG, "joint": {"type": "Pa"}}
 arm = {"length_m": 0.3, "mass_kg": ARM_KG, "inertia_kg_m2": INERTIA_KG_M2}
-arm |= {"centre_of_mass_m": CENTRE_M, "joint": {"type": "R", "start": ANGLE_RAD}}
+arm |= {"centre_of_mass_m": CENTRE_M, "joint": {"type": "R", "start_rad": ANGLE_RAD}}
 robot = fx.Robot.from_dict({"name": "rigid robot of type IV", "link": [carriage, arm]})
 rest, t = np.array([0.0, ANGLE_RAD]), np.linspace(0, 6, 6001)
 

@@ -21,7 +21,7 @@ FORCE_N, TORQUE_N_M, PUSH_S, END_S = 3.0, -0.8, 0.4, 0.8
 MASS_KG = MASS_KG_M * LENGTH_M
 
 rail = {"length_m": 3.0, "mass_kg": 0.0, "joint": {"type": "Pa", "angle_rad": np.pi / 2}}
-point = {"length_m": 0.0, "mass_kg": 0.0, "joint": {"type": "Pa", "start": 1.5}}
+point = {"length_m": 0.0, "mass_kg": 0.0, "joint": {"type": "Pa", "start_m": 1.5}}
 beam = {"length_m": LENGTH_M, "elements": 8, "joint": {"type": "R"}}
 beam |= {"mass_per_length_kg_m": MASS_KG_M, "bending_stiffness_N_m2": STIFFNESS_N_M2}
 system = fx.assemble(fx.Robot.from_dict({"name": "free beam", "link": [rail, point, beam]}))

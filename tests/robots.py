@@ -15,6 +15,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 
 import flexura as fx
+from flexura.robot import renamed
 
 SLOPE = 0.1  # rad: largest slope of a random state
 fast = settings(max_examples=25, deadline=None, derandomize=True, database=None)
@@ -58,10 +59,10 @@ def robot(
     payload_inertia: float = 0.0,
     **keys: Any,
 ) -> fx.Robot:
+    """A robot of these links; their joints may have keys without a unit, as `start`."""
     load = {"mass_kg": float(payload), "inertia_kg_m2": float(payload_inertia)}
-    return fx.Robot.from_dict(
-        {"link": list(links), "gravity_m_s2": gravity, "payload": load} | keys
-    )
+    data = {"link": list(links), "gravity_m_s2": gravity, "payload": load} | keys
+    return fx.Robot.from_dict(renamed(data)[0])
 
 
 def system(*links: dict[str, Any], **keys: Any) -> fx.System:

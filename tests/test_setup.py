@@ -225,3 +225,30 @@ def test_every_dependency_has_an_exact_tested_version():
         if requirement.name == project["name"]:  # an extra that takes in others
             continue
         assert requirement.specifier.contains(exact[canonicalize_name(requirement.name)]), text
+
+
+def test_the_quick_choice_is_there():
+    """`make quick` names its files; each is one, or a folder of tests."""
+    text = (ROOT / "Makefile").read_text(encoding="utf-8").replace("\\\n", " ")
+    (chosen,) = re.findall(r"^QUICK := (.*)$", text, re.MULTILINE)
+    for name in chosen.split():
+        path = ROOT / name
+        assert path.is_file() if path.suffix else list(path.glob("test_*.py")), name
+    assert "quick: lint types $(CORE)" in text
+
+
+def test_what_is_run_before_a_commit_is_what_the_lint_target_runs():
+    hooks = (ROOT / ".pre-commit-config.yaml").read_text(encoding="utf-8")
+    for program in ("ruff check", "ruff format", "clang-format", "mypy"):
+        assert f"entry: .venv/bin/{program}" in hooks
+
+
+def test_all_extras_are_in_all():
+    import tomllib
+
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = project["optional-dependencies"]
+    (everything,) = extras["all"]
+    named = set(re.fullmatch(r"flexura\[(.*)\]", everything)[1].split(","))
+    assert named == set(extras) - {"all", "build", "test"}
+    assert "flexura[all,build]" in extras["test"]

@@ -26,7 +26,7 @@ def robot(bench, rotor, stiffness=1.0, payload=1.0):
     carriage, strip = data["link"]
     strip["young_modulus_Pa"] *= stiffness
     data["payload"]["mass_kg"] *= payload
-    carriage["joint"]["rotor_inertia"] = rotor
+    carriage["joint"]["rotor_mass_kg"] = rotor
     return fx.Robot.from_dict(data)
 
 

@@ -2,7 +2,7 @@
 
 from scipy.integrate import solve_ivp
 
-from flexura.robot import Robot
+from flexura.robot import Robot, renamed
 
 STEEL = {
     "section": {"width_m": 0.03, "height_m": 0.001},
@@ -13,14 +13,12 @@ G = 9.81
 
 
 def robot(*links, gravity=(0.0, 0.0), payload=0.0, payload_inertia=0.0, **keys):
-    return Robot.from_dict(
-        {
-            "link": list(links),
-            "gravity_m_s2": gravity,
-            "payload": {"mass_kg": payload, "inertia_kg_m2": payload_inertia},
-        }
-        | keys
-    )
+    data = {
+        "link": list(links),
+        "gravity_m_s2": gravity,
+        "payload": {"mass_kg": payload, "inertia_kg_m2": payload_inertia},
+    } | keys
+    return Robot.from_dict(renamed(data)[0])  # joints may have keys without a unit
 
 
 def rigid(length, mass, centre, inertia, type="R", **joint):
@@ -52,7 +50,7 @@ def rig():
             **STEEL,
             "section": {"width_m": 0.02, "height_m": 0.001},
             "damping": {"beta_s": 2e-4},
-            "joint": {"type": "R", "rotor_inertia": 5.4e-6},
+            "joint": {"type": "R", "rotor_inertia_kg_m2": 5.4e-6},
         },
         payload=0.02,
     )

@@ -1,8 +1,5 @@
-"""Where the checkout is that the laboratory runs from."""
+"""Where the checkout is that the laboratory runs from; an installed package has no firmware."""
 
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
-FIRMWARE = ROOT / "firmware"
-ROBOTS = ROOT / "model" / "robots"
-MANOEUVRES = ROOT / "model" / "manoeuvres"
+FIRMWARE = Path(__file__).resolve().parents[2] / "firmware"

@@ -38,7 +38,7 @@ def rig_with_rotor(modes: int = 2) -> fx.System:
     them."""
     tables = fx.load(MODEL / "robots" / "rig.toml").to_dict()
     tables["link"][1]["modes"] = modes
-    tables["link"][0]["joint"] |= {"rotor_inertia": 123.4, "coulomb_friction": 37.5}
+    tables["link"][0]["joint"] |= {"rotor_mass_kg": 123.4, "coulomb_friction_N": 37.5}
     return fx.assemble(fx.Robot.from_dict(tables))
 
 

@@ -1,5 +1,5 @@
-/* A small program whose behaviour can be told from the data sheet: it tries the emulated board itself (test_board_emulator.py).
- * Each byte from the host is a command; answers are bytes. */
+/* A small program whose behaviour can be told from the data sheet: it tries the emulated board
+ * itself (test_board_emulator.py). Each byte from the host is a command; answers are bytes. */
 #define F_CPU 16000000UL
 #include <avr/eeprom.h>
 #include <avr/interrupt.h>
@@ -7,17 +7,28 @@
 
 static volatile uint16_t edges, ticks, stamp;
 
-ISR(INT2_vect) { stamp = TCNT1; ++edges; }
-ISR(INT3_vect) { stamp = TCNT1; ++edges; }
-ISR(TIMER5_COMPA_vect) { OCR5A += 2000; ++ticks; }
+ISR(INT2_vect) {
+  stamp = TCNT1;
+  ++edges;
+}
+ISR(INT3_vect) {
+  stamp = TCNT1;
+  ++edges;
+}
+ISR(TIMER5_COMPA_vect) {
+  OCR5A += 2000;
+  ++ticks;
+}
 
 __attribute__((noinline)) uint8_t take(void) {
-  while (!(UCSR0A & _BV(RXC0))) {}
+  while (!(UCSR0A & _BV(RXC0))) {
+  }
   return UDR0;
 }
 
 static void give(uint8_t byte) {
-  while (!(UCSR0A & _BV(UDRE0))) {}
+  while (!(UCSR0A & _BV(UDRE0))) {
+  }
   UDR0 = byte;
 }
 
@@ -52,14 +63,30 @@ int main(void) {
       case 's': PORTL |= _BV(4), PORTL &= (uint8_t)~_BV(4); break;
       case 'x': TCCR5A = _BV(COM5B1) | _BV(COM5B0), OCR5B = TCNT5 + take16(); break;
       case 'y': TCCR5A = _BV(COM5B1), OCR5B = TCNT5 + take16(); break;
-      case 'n': { cli(); const uint16_t n = edges, t = ticks; sei(); give16(n), give16(t); } break;
+      case 'n': {
+        cli();
+        const uint16_t n = edges, t = ticks;
+        sei();
+        give16(n), give16(t);
+      } break;
       case 't': give16(stamp); break;
       case 'm': TIMSK5 = 0; break;
       case 'M': TIMSK5 = _BV(OCIE5A); break;
-      case 'a': ADMUX = _BV(REFS0), ADCSRA = _BV(ADEN) | _BV(ADSC) | 7; while (ADCSRA & _BV(ADSC)) {} give16(ADC); break;
-      case 'k': { int16_t n = (int16_t)take16(); /* the pairs that simavr takes wrongly; avr-gcc divides by 16, 32, 64 so */
-        __asm__("sbrc %B0, 7 \n adiw %A0, 15 \n sbrs %B0, 7 \n sbiw %A0, 12 \n cpse %A0, %B0 \n adiw %A0, 31" : "+w"(n));
-        give16((uint16_t)n); } break;
+      case 'a':
+        ADMUX = _BV(REFS0), ADCSRA = _BV(ADEN) | _BV(ADSC) | 7;
+        while (ADCSRA & _BV(ADSC)) {
+        }
+        give16(ADC);
+        break;
+      case 'k': {
+        int16_t n = (int16_t)
+            take16(); /* the pairs that simavr takes wrongly; avr-gcc divides by 16, 32, 64 so */
+        __asm__(
+            "sbrc %B0, 7 \n adiw %A0, 15 \n sbrs %B0, 7 \n sbiw %A0, 12 \n cpse %A0, %B0 \n adiw "
+            "%A0, 31"
+            : "+w"(n));
+        give16((uint16_t)n);
+      } break;
       case 'w': eeprom_write_byte((uint8_t *)7, take()); break;
       case 'r': give(eeprom_read_byte((const uint8_t *)7)); break;
     }

@@ -260,9 +260,9 @@ def test_the_loss_of_the_dissertations_strip_in_its_sleeve():
     }
     joint = {
         "type": "Pb",
-        "start": 0.2,
-        "limits": [0.1, 0.35],
-        "viscous_friction": 1.0,
+        "start_m": 0.2,
+        "limits_m": [0.1, 0.35],
+        "viscous_friction_N_s_m": 1.0,
         "locked": True,
     }
     link = {"length_m": 0.4, "elements": 4, "damping": {"beta_s": 2e-3}, "joint": joint} | strip

@@ -27,7 +27,7 @@ def rig(elements: int = 6, **keys) -> fx.Robot:
         "young_modulus_Pa": 2.0e11,
         "density_kg_m3": 7850.0,
         "damping": {"beta_s": 2e-4},
-        "joint": {"type": "R", "rotor_inertia": 5.4e-6},
+        "joint": {"type": "R", "rotor_inertia_kg_m2": 5.4e-6},
     }
     return robot(rigid(0.10, 0.60, 0.05, 5e-4, "Pa"), strip, payload=0.02, **keys)
 

@@ -458,7 +458,7 @@ def test_a_mirrored_robot_moves_mirrored(bot, seed):
     for link in data["link"]:
         turns = link["joint"]["type"] == "R"
         if turns:
-            link["joint"]["start"] = -link["joint"].get("start", 0.0)
+            link["joint"]["start_rad"] = -link["joint"].get("start_rad", 0.0)
         else:
             link["joint"]["angle_rad"] = -link["joint"].get("angle_rad", 0.0)
     sys, other = fx.assemble(bot), fx.assemble(fx.Robot.from_dict(data))

@@ -40,7 +40,7 @@ def cart_arm() -> fx.System:
         "length_m": 0.1,
         "mass_kg": 0.5,
         "inertia_kg_m2": 1e-3,
-        "joint": {"type": "Pa", "viscous_friction": 0.8, "rotor_inertia": 0.1},
+        "joint": {"type": "Pa", "viscous_friction_N_s_m": 0.8, "rotor_mass_kg": 0.1},
     }
     first = {
         "length_m": 0.4,
@@ -48,7 +48,7 @@ def cart_arm() -> fx.System:
         "mass_per_length_kg_m": 0.3,
         "bending_stiffness_N_m2": 4.0,
         "damping": {"beta_s": 1e-4},
-        "joint": {"type": "R", "hub_inertia_kg_m2": 1e-3, "coulomb_friction": 0.02},
+        "joint": {"type": "R", "hub_inertia_kg_m2": 1e-3, "coulomb_friction_N_m": 0.02},
     }
     second = {
         "length_m": 0.3,
@@ -60,7 +60,7 @@ def cart_arm() -> fx.System:
             "type": "R",
             "hub_mass_kg": 0.1,
             "hub_inertia_kg_m2": 1e-4,
-            "viscous_friction": 0.01,
+            "viscous_friction_N_m_s_rad": 0.01,
         },
     }
     data = {

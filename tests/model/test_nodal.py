@@ -289,7 +289,7 @@ def test_the_dissertations_type_iii_as_an_independent_program_has_it(
         "young_modulus_Pa": 2e11,
         "density_kg_m3": 7850.0,
         "damping": {"alpha_1_s": 1.0},
-        "joint": {"type": "Pb", "hub_mass_kg": 0.3, "start": start},
+        "joint": {"type": "Pb", "hub_mass_kg": 0.3, "start_m": start},
     }
     arm = system(
         rigid(0.2, 0.2, 0.1, 0.2 * 0.2**2 / 12),

@@ -13,6 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import flexura as fx
+from flexura.robot import renamed
 
 ROOT = Path(__file__).resolve().parents[2]
 ROBOTS = sorted((ROOT / "model" / "robots").glob("*.toml"))
@@ -36,10 +37,10 @@ type = "Pa"
 angle_rad = 0.0
 hub_mass_kg = 0.0
 hub_inertia_kg_m2 = 0.0
-rotor_inertia = 0.0
-viscous_friction = 0.0
-coulomb_friction = 0.0
-limits = [-0.05, 0.15]
+rotor_mass_kg = 0.0
+viscous_friction_N_s_m = 0.0
+coulomb_friction_N = 0.0
+limits_m = [-0.05, 0.15]
 
 [[link]]
 name = "strip"
@@ -511,7 +512,7 @@ VALUES = {
         {STRIP + "joint.angle_rad": 0.5},
         "link[2].joint.angle_rad",
         0.5,
-        "a joint R turns; use start",
+        "a joint R turns; use start_rad",
     ),
     "an angle in degrees": (
         {CART + "joint.angle_rad": 90.0},
@@ -532,60 +533,60 @@ VALUES = {
         "kg m^2",
     ),
     "a negative rotor inertia": (
-        {STRIP + "joint.rotor_inertia": -1},
-        "link[2].joint.rotor_inertia",
+        {STRIP + "joint.rotor_inertia_kg_m2": -1},
+        "link[2].joint.rotor_inertia_kg_m2",
         -1,
-        "reflected to the joint",
+        "reflected to a joint R in kg m^2",
     ),
     "negative friction": (
-        {STRIP + "joint.viscous_friction": -1.0},
-        "link[2].joint.viscous_friction",
+        {STRIP + "joint.viscous_friction_N_m_s_rad": -1.0},
+        "link[2].joint.viscous_friction_N_m_s_rad",
         -1.0,
-        "N s/m or N m s/rad",
+        "viscous friction of a joint R in N m s/rad",
     ),
     "negative dry friction": (
-        {STRIP + "joint.coulomb_friction": -1.0},
-        "link[2].joint.coulomb_friction",
+        {STRIP + "joint.coulomb_friction_N_m": -1.0},
+        "link[2].joint.coulomb_friction_N_m",
         -1.0,
-        "N or N m",
+        "Coulomb friction of a joint R in N m",
     ),
     "limits in the wrong order": (
-        {CART + "joint.limits": [0.15, -0.05]},
-        "link[1].joint.limits",
+        {CART + "joint.limits_m": [0.15, -0.05]},
+        "link[1].joint.limits_m",
         [0.15, -0.05],
         "the lower limit first",
     ),
     "limits at one place": (
-        {CART + "joint.limits": [0.0, 0.0]},
-        "link[1].joint.limits",
+        {CART + "joint.limits_m": [0.0, 0.0]},
+        "link[1].joint.limits_m",
         [0.0, 0.0],
         "a higher upper limit",
     ),
     "a Pb without its free length": (
-        {CART + "joint.type": "Pb", CART + "joint.limits": ABSENT, CART + "joint.start": -0.01},
-        "link[1].joint.start",
+        {CART + "joint.type": "Pb", CART + "joint.limits_m": ABSENT, CART + "joint.start_m": -0.01},
+        "link[1].joint.start_m",
         -0.01,
         "the free length at the start, between 0 and 0.1 m, the ends of link 1",
     ),
     "a flexible Pb that is all inside": (
         {STRIP + "joint.type": "Pb"},
-        "link[2].joint.start",
+        "link[2].joint.start_m",
         0.0,
         "between 0.006 and 0.3 m, the ends of link 2",
     ),
     "a Pb with limits beyond its link": (
         {
             STRIP + "joint.type": "Pb",
-            STRIP + "joint.start": 0.2,
-            STRIP + "joint.limits": [0.1, 0.31],
+            STRIP + "joint.start_m": 0.2,
+            STRIP + "joint.limits_m": [0.1, 0.31],
         },
-        "link[2].joint.limits",
+        "link[2].joint.limits_m",
         [0.1, 0.31],
         "limits between 0.006 and 0.3 m, the ends of link 2",
     ),
     "a Pa that starts beyond its link": (
-        {STRIP + "joint.type": "Pa", STRIP + "joint.start": 0.11},
-        "link[2].joint.start",
+        {STRIP + "joint.type": "Pa", STRIP + "joint.start_m": 0.11},
+        "link[2].joint.start_m",
         0.11,
         "between 0 and 0.1 m, the ends of link 1",
     ),
@@ -598,54 +599,54 @@ VALUES = {
     "a Pa behind a sleeve": (
         {
             CART + "joint.type": "Pb",
-            CART + "joint.limits": ABSENT,
-            CART + "joint.start": 0.04,
+            CART + "joint.limits_m": ABSENT,
+            CART + "joint.start_m": 0.04,
             STRIP + "joint.type": "Pa",
-            STRIP + "joint.start": 0.05,
+            STRIP + "joint.start_m": 0.05,
         },
-        "link[2].joint.start",
+        "link[2].joint.start_m",
         0.05,
         "ahead of the sleeve of link 1, at 0.06 m or more",
     ),
     "limits beside the start": (
-        {CART + "joint.limits": [0.05, 0.15]},
-        "link[1].joint.limits",
+        {CART + "joint.limits_m": [0.05, 0.15]},
+        "link[1].joint.limits_m",
         [0.05, 0.15],
         "contain the start position, 0",
     ),
     "a start beside the limits": (
-        {CART + "joint.start": 0.3},
-        "link[1].joint.limits",
+        {CART + "joint.start_m": 0.3},
+        "link[1].joint.limits_m",
         [-0.05, 0.15],
         "contain the start position, 0.3",
     ),
     "one limit": (
-        {CART + "joint.limits": [0.05]},
-        "link[1].joint.limits[2]",
+        {CART + "joint.limits_m": [0.05]},
+        "link[1].joint.limits_m[2]",
         None,
         "missing: expected two numbers",
     ),
     "three limits": (
-        {CART + "joint.limits": [0.05, 0.1, 0.2]},
-        "link[1].joint.limits",
+        {CART + "joint.limits_m": [0.05, 0.1, 0.2]},
+        "link[1].joint.limits_m",
         [0.05, 0.1, 0.2],
         "two numbers",
     ),
     "limits as a number": (
-        {CART + "joint.limits": 0.1},
-        "link[1].joint.limits",
+        {CART + "joint.limits_m": 0.1},
+        "link[1].joint.limits_m",
         0.1,
         "two numbers",
     ),
     "an endless limit": (
-        {CART + "joint.limits": [-inf, 0.1]},
-        "link[1].joint.limits[1]",
+        {CART + "joint.limits_m": [-inf, 0.1]},
+        "link[1].joint.limits_m[1]",
         -inf,
         "two numbers",
     ),
     "a start that is no number": (
-        {CART + "joint.start": nan},
-        "link[1].joint.start",
+        {CART + "joint.start_m": nan},
+        "link[1].joint.start_m",
         nan,
         "a finite number",
     ),
@@ -935,15 +936,14 @@ EVERY_KEY = {
     "link.1.mass_kg": 0.0,
     "link.1.centre_of_mass_m": -0.01,
     "link.1.inertia_kg_m2": 0.0,
-    "link.1.joint.type": "R",
     "link.1.joint.angle_rad": 1.5,
     "link.1.joint.hub_mass_kg": 0.1,
     "link.1.joint.hub_inertia_kg_m2": 0.1,
-    "link.1.joint.rotor_inertia": 0.1,
-    "link.1.joint.viscous_friction": 0.1,
-    "link.1.joint.coulomb_friction": 0.1,
-    "link.1.joint.limits": [-1, 1],
-    "link.1.joint.start": 0.01,
+    "link.1.joint.rotor_mass_kg": 0.1,
+    "link.1.joint.viscous_friction_N_s_m": 0.1,
+    "link.1.joint.coulomb_friction_N": 0.1,
+    "link.1.joint.limits_m": [-1, 1],
+    "link.1.joint.start_m": 0.01,
     "link.1.joint.locked": True,
     "link.2.elements": 200,
     "link.2.modes": 8,
@@ -1138,7 +1138,7 @@ def chains(draw):
             joint["start"] = start
             if draw(st.booleans()) and low < high:
                 joint["limits"] = [(low + start) / 2, (start + high) / 2]
-    return chain
+    return renamed({"link": chain})[0]["link"]
 
 
 @st.composite

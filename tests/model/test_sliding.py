@@ -249,7 +249,7 @@ def test_a_link_cut_in_two_by_a_locked_joint_gives_the_same(case):
     if case == "sleeve at the tip":
         one, two, forces, joints = [whole, sleeved], [*halves, sleeved], [0.05, 0.05], [1, 3]
     elif case == "slider on the outer half":
-        inner = slider | {"joint": slider["joint"] | {"start": 0.05}}
+        inner = slider | {"joint": slider["joint"] | {"start_m": 0.05}}
         one, two, forces, joints = [whole, slider], [*halves, inner], [0.05, 0.1], [1, 3]
     else:
         one = [
@@ -301,7 +301,7 @@ def test_a_slider_does_not_feel_where_the_nodes_are():
 
 def test_replacing_a_rigid_link_by_a_stiff_one_changes_nothing():
     """PbPa on rigid links against EI x 1e5, implicit."""
-    keys = {"type": "Pb", "start": 0.3, "angle_rad": 0.3}
+    keys = {"type": "Pb", "start_m": 0.3, "angle_rad": 0.3}
     solid = system(
         rigid(0.5, 0.15, 0.25, 0.15 * 0.5**2 / 12, **keys),
         rigid(0.2, 0.1, 0.1, 1e-3, type="Pa", start=0.35),

@@ -7,6 +7,7 @@ does not reset the board; everything else is as on the line.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import time
 import tty
@@ -47,10 +48,8 @@ class Pty:
             self.lag_s = max(self.lag_s, -ahead)
 
     def _exchange(self) -> None:
-        try:
+        with contextlib.suppress(BlockingIOError):
             self.board.write(os.read(self._master, 4096))
-        except BlockingIOError:
-            pass
         self.board.wait(STEP_S)
         data = self.board.read()
         try:

@@ -7,8 +7,12 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from flexura.errors import InputError
+from flexura.optional import Optional
 
 from .base import BoardError
+
+list_ports = Optional("serial.tools.list_ports")
+serial = Optional("serial")
 
 # USB vendor and product of the Mega 2560 and of the serial chips on its copies
 KNOWN = {
@@ -32,7 +36,6 @@ class Port(NamedTuple):
 
 def ports() -> Iterator[Port]:
     """Serial ports whose USB identity is a Mega 2560's or that of a serial chip on its copies."""
-    from serial.tools import list_ports
 
     for port in sorted(list_ports.comports(), key=lambda p: p.device):
         if what := KNOWN.get((port.vid or 0, port.pid or 0)):
@@ -66,7 +69,6 @@ class SerialBoard:
     """
 
     def __init__(self, device: str, baud: int) -> None:
-        import serial
 
         self.label = device
         try:

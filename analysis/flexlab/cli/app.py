@@ -6,12 +6,15 @@ from __future__ import annotations
 import gc
 import importlib
 import sys
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
+from flexura import __version__
 from flexura.errors import FlexuraError, InputError
+
+from .verbosity import set_verbosity
 
 COMMANDS = {
     "simulate": "Simulate a robot; with --vary, a population of robots.",
@@ -25,6 +28,9 @@ COMMANDS = {
     "compare": "Compare an experiment with its simulation.",
     "review": "Look at one run, or at two side by side, in Rerun.",
     "export": "Write a run in another program's format.",
+    "migrate": "Files of an older flexura with the keys of today.",
+    "new": "A commented robot file to begin with.",
+    "robots": "The robots that come with flexura.",
     "flash": "Build the firmware and load it into the board.",
     "doctor": "What is installed, what is missing, what that costs.",
     "demo": "The rig, simulated, cross-checked and as an experiment.",
@@ -65,12 +71,31 @@ PLAIN: dict[str, Any] = {
 app = typer.Typer(name="flexura", cls=Commands, no_args_is_help=True, **PLAIN)
 
 
+def _version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"flexura {__version__}")
+        raise typer.Exit
+
+
 @app.callback()
-def flexura() -> None:
+def flexura(
+    version: Annotated[
+        bool, typer.Option("--version", help="print the version", is_eager=True, callback=_version)
+    ] = False,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", help="only results and errors: no progress, no notes")
+    ] = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", help="also which files are read, and the like")
+    ] = False,
+) -> None:
     """Robots with flexible links: simulate, cross-check, tune, measure, compare.
 
     One robot file describes the robot.
     """
+    if quiet and verbose:
+        raise InputError("expected --quiet or --verbose, not both", key="--quiet")
+    set_verbosity(quiet=quiet, verbose=verbose)
 
 
 def main() -> None:

@@ -10,6 +10,7 @@ import typer
 
 import flexura as fx
 from flexura.io import write_bytes
+from flexura.optional import need
 
 from ..comparison import table
 from ..comparison.measures import Comparison, simulation_first
@@ -62,6 +63,7 @@ def compare(
     \b
     Example: flexura compare logs/bench-inverse --by commanded
     """
+    need("matplotlib", "rerun")
     first = fx.Run.read(run)
     if other is not None:
         for key, value in (("by", by), ("robot", robot)):

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from flexura.errors import InputError
+from flexura.optional import need
 
 from ..crosscheck import crosscheck as cross
 from ..crosscheck import nine_structures
@@ -42,6 +43,7 @@ def crosscheck(
     \b Example: flexura crosscheck model/robots/rig.toml model/manoeuvres/rig-inverse-law.toml
     --tolerance 0.005
     """
+    need("exudyn", "rerun")
     if all_ or robot is None:
         if not all_ or robot is not None:
             raise InputError(

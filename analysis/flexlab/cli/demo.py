@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from rich.console import Group
 
 from ..comparison import table
 from . import tables
-from .demonstration import demonstrate
+from .demonstration import Demonstration, demonstrate, numbers
 from .output import interrupted, progress_bars, say, show
 
 
@@ -31,37 +32,33 @@ def demo(
     with progress_bars("native", "twin", "emulated") as report:
         done = demonstrate(out, report)
     drawn = done.picture if isinstance(done.picture, Path) else None
-    show(
-        json,
-        lambda: tables.check_table(done.check),
-        lambda: (
-            tables.check_json(done.check)
-            | {
-                "experiment": table.numbers(done.comparison),
-                "review": str(done.review),
-                "picture": drawn and str(drawn),
-            }
-        ),
-    )
-    if not json:
-        show(json, lambda: table.table(done.comparison), dict)
-    lines = [
-        f"stored {out}: the runs, a report, the review"
-        + (f" and its picture {drawn.name}" if drawn else "")
-    ]
-    if drawn is None:
+    show(json, lambda: _tables(done), lambda: _numbers(done))
+    say(json, *[f"left out: {text}" for text in done.left_out])
+    lines = [f"stored {out}"]
+    if done.review is not None and drawn is None:
         lines.append(f"no picture: {done.picture}")
-    lines += [
-        "next:",
-        f"  flexura review {done.review}      the review, in a window",
-        f"  open {done.review.parent / 'report.html'}             the report, in a browser",
-        "  flexura bench forward                                    another experiment, emulated",
-        "  flexura crosscheck model/robots/two-link-arm.toml        another robot, in two programs",
-        "  flexura --help                                           everything else",
-    ]
+    lines.append("next:")
+    if done.review is not None:
+        lines += [
+            f"  flexura review {done.review}",
+            f"  open {done.review.parent / 'report.html'}",
+            "  flexura bench forward",
+        ]
+    lines += ["  flexura crosscheck two-link-arm", "  flexura robots", "  flexura --help"]
     if shutil.which("flexura") is None:
-        lines.append("(the command is in .venv/bin; to have it at hand: source .venv/bin/activate)")
+        lines.append("(the command is in .venv/bin; to find it: source .venv/bin/activate)")
     say(json, *lines)
     if not done.passed:
-        runs = (done.check.simulation, done.check.twin, done.comparison.experiment)
-        raise typer.Exit(130 if any(map(interrupted, runs)) else 1)
+        raise typer.Exit(130 if any(map(interrupted, done.runs)) else 1)
+
+
+def _tables(done: Demonstration) -> Group:
+    """The cross-check, or the native run alone, and the experiment beside its simulation."""
+    first = tables.check_table(done.check) if done.check else tables.run_table(done.simulation)
+    return Group(first, *([table.table(done.comparison)] if done.comparison else []))
+
+
+def _numbers(done: Demonstration) -> dict[str, Any]:
+    first = tables.check_json(done.check) if done.check else tables.run_json(done.simulation)
+    second = {"experiment": table.numbers(done.comparison)} if done.comparison else {}
+    return first | second | numbers(done)

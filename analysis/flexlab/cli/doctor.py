@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
+import importlib.util
 import os
 import platform
 import sys
@@ -11,24 +12,31 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import typer
+from rich.markup import escape
 from rich.table import Table
 
 from flexura import core
 from flexura.errors import FlexuraError
+from flexura.optional import Missing, load
 
 from ..board.emulator.simulator import CLOCK_HZ, compile_shim
 from ..board.serial_port import ports
 from ..experiment.flash import RIG
 from ..rig import check_capability as check
-from ..rig import load
+from ..rig import load as load_rig
 from .options import Json, RigFile
 from .output import show
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing looked at: `state` is "ok", "missing", "wrong" or "note"; `cost` says what doesn't
-    work without it."""
+    """One thing looked at.
+
+    Attributes:
+        what, found: its name, and what was found.
+        state: "ok", "missing", "absent" (an extra), "wrong" or "note".
+        cost: what does not work without it.
+    """
 
     what: str
     state: str
@@ -36,16 +44,17 @@ class Finding:
     cost: str = ""
 
 
-_PACKAGES = {
-    "numpy": "nothing works",
-    "scipy": "nothing works",
-    "pydantic": "robot files cannot be read",
-    "pyarrow": "runs cannot be stored or read",
-    "exudyn": "no cross-check (flexura crosscheck, flexura demo)",
-    "rerun-sdk": "no review and no pictures (flexura review)",
-    "matplotlib": "no figures",
-    "platformio": "the firmware cannot be built or flashed",
-    "pyserial": "no board at a serial port (flexura flash)",
+# Installed with every flexura.
+_NEEDED = ("numpy", "scipy", "pydantic", "pyarrow", "rich", "tomli-w", "typer")
+# What an extra of flexura is for, and its packages.
+_EXTRAS = {
+    "twin": ("no cross-check and no emulated rig (flexura crosscheck)", ["exudyn"]),
+    "view": ("no review (flexura review)", ["rerun-sdk"]),
+    "lab": ("no figures, reports and pictures", ["matplotlib", "pillow"]),
+    "board": ("the firmware cannot be built or flashed", ["platformio", "pyserial", "scons"]),
+    "export": ("no export to these programs", ["mcap", "npTDMS", "pandas", "xarray"]),
+    "tune": ("no search of gains (flexura tune)", ["pymoo"]),
+    "cluster": ("no populations on several machines (--scheduler)", ["distributed"]),
 }
 
 
@@ -71,25 +80,28 @@ def _python() -> Iterator[Finding]:
 
 
 def _packages() -> Iterator[Finding]:
-    for name, cost in _PACKAGES.items():
-        try:
-            yield Finding(name, "ok", importlib.metadata.version(name))
-        except importlib.metadata.PackageNotFoundError:
-            yield Finding(name, "missing", "not installed", f"{cost}; type: pip install {name}")
+    for name in _NEEDED:
+        yield _package(name, "flexura is not installed whole; type: pip install flexura", "missing")
+    for extra, (cost, names) in _EXTRAS.items():
+        for name in names:
+            yield _package(name, f'{cost}; type: pip install "flexura[{extra}]"', "absent")
+
+
+def _package(name: str, cost: str, state: str) -> Finding:
+    try:
+        return Finding(name, "ok", importlib.metadata.version(name))
+    except importlib.metadata.PackageNotFoundError:
+        return Finding(name, state, "not installed", cost)
 
 
 def _native_libraries() -> Iterator[Finding]:
-    try:
-        import exudyn  # noqa: F401
-
-        yield Finding("exudyn's libraries", "ok", "libGL, libX11 load")
-    except ImportError as error:
-        yield Finding(
-            "exudyn's libraries",
-            "missing",
-            str(error).splitlines()[0],
-            "no cross-check; on Debian type: apt-get install libgl1 libx11-6",
-        )
+    if importlib.util.find_spec("exudyn") is not None:
+        try:
+            load("exudyn")
+            yield Finding("exudyn's libraries", "ok", "libGL, libX11 load")
+        except Missing as error:
+            cost = "no cross-check; on Debian type: apt-get install libgl1 libx11-6"
+            yield Finding("exudyn's libraries", "missing", str(error), cost)
     drivers = [
         icd
         for place in ("/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d")
@@ -136,7 +148,7 @@ def _board() -> Iterator[Finding]:
         )
     try:
         found = list(ports())
-    except ImportError:  # told above
+    except Missing:  # told above
         return
     for port in found:
         usable = os.access(port.device, os.R_OK | os.W_OK)
@@ -153,9 +165,7 @@ def _board() -> Iterator[Finding]:
 
 
 def _rig(rig: Path | None) -> Iterator[Finding]:
-    if rig is None and not RIG.is_file():  # not a checkout
-        return
-    bench = load(rig or RIG)
+    bench = load_rig(rig or RIG)
     checks = check(bench)
     for c in checks:
         if not c.passed:
@@ -186,11 +196,12 @@ def doctor(rig: RigFile = None, json: Json = False) -> None:
         mark = {
             "ok": "[green]ok     [/]",
             "missing": "[red]missing[/]",
+            "absent": "absent ",
             "note": "note   ",
             "wrong": "[red]wrong  [/]",
         }
         for f in findings:
-            out.add_row(f"{mark[f.state]} {f.what}", f.found, f.cost)
+            out.add_row(f"{mark[f.state]} {escape(f.what)}", escape(f.found), escape(f.cost))
         return out
 
     show(json, table, lambda: [vars(f) for f in findings])

@@ -14,6 +14,7 @@ import typer
 import flexura as fx
 
 from ..crosscheck.default_manoeuvre import modest
+from .verbosity import quiet
 
 
 def prepare(robot: Path, manoeuvre: Path | None) -> Any:
@@ -30,7 +31,7 @@ def prepare(robot: Path, manoeuvre: Path | None) -> Any:
 @contextmanager
 def progress_bars(*names: str) -> Iterator[Callable[[str, float], None]]:
     """Progress bars on a terminal's stderr, nothing elsewhere."""
-    if not sys.stderr.isatty():
+    if quiet() or not sys.stderr.isatty():
         yield lambda name, fraction: None
         return
     from rich.console import Console
@@ -58,7 +59,7 @@ def show(json: bool, table: Callable[[], Any], data: Callable[[], Any]) -> None:
 
 
 def say(json: bool, *lines: str) -> None:
-    if not json:
+    if not json and not quiet():
         for line in lines:
             typer.echo(line)
 

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 import flexura as fx
+from flexura.optional import need
 
 from .. import studies
 from .options import Json, ManoeuvreFile, Out, RobotFile, Rtol
@@ -39,6 +40,7 @@ def study(
     model/manoeuvres/type-1-bang-bang.toml --values 0:0.2:41
     """
     described = fx.load(robot)
+    need("matplotlib")
     asked = None if manoeuvre is None else fx.load_manoeuvre(manoeuvre, len(described.links))
     folder = out or default_folder(f"study-{kind}", robot)
     with progress_bars(kind) as report:

@@ -12,6 +12,7 @@ import typer
 
 import flexura as fx
 from flexura.control import Gains, load_gains
+from flexura.optional import need
 
 from .. import rig as rigs
 from ..rig.nominal_robot import with_nominal_drives
@@ -139,6 +140,7 @@ def tune(
             "expected either --free or --free-file", key="--free-file", value=str(free_file)
         )
     how = Search(algorithm, population, generations, seed, patience, polish)
+    need("pymoo", "matplotlib")
     if dissertation:
         if robot is not None or controller is not None:
             raise fx.InputError(

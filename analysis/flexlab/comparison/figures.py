@@ -8,9 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from flexura.optional import Optional, load
+
 from ..runs.deviation import deviation
 from ..runs.labels import called, emulated
 from .measures import Comparison, Difference
+
+matplotlib = Optional("matplotlib")
 
 BLUE, GREEN, PINK, INK = (
     "#1f6fc4",
@@ -42,8 +46,7 @@ STYLE: dict[Any, Any] = {
 
 def figure(c: Comparison, entry: Difference) -> Any:
     """One quantity's figure, a matplotlib Figure: both runs above, their difference below."""
-    import matplotlib
-    from matplotlib.figure import Figure
+    Figure = load("matplotlib.figure").Figure
 
     with matplotlib.rc_context(STYLE):
         drawing = Figure(figsize=(7.4, 3.9), layout="constrained")
@@ -118,8 +121,7 @@ def is_emulated(c: Comparison) -> bool:
 
 def together(c: Comparison, size: tuple[float, float] = (8.3, 10.2)) -> Any:
     """All quantities in one figure, one below the other."""
-    import matplotlib
-    from matplotlib.figure import Figure
+    Figure = load("matplotlib.figure").Figure
 
     with matplotlib.rc_context(STYLE):
         drawing = Figure(figsize=size, layout="constrained")
@@ -132,7 +134,6 @@ def together(c: Comparison, size: tuple[float, float] = (8.3, 10.2)) -> Any:
 
 def saved(drawing: Any, form: str, **metadata: str) -> bytes:
     """The bytes of a figure as "svg", "png" or "pdf", the same for the same runs."""
-    import matplotlib
 
     fixed = {"Date": None} if form == "svg" else {}
     buffer = io.BytesIO()

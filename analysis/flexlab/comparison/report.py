@@ -10,10 +10,14 @@ import re
 from textwrap import wrap
 from typing import Any
 
+from flexura.optional import Optional, load
+
 from ..runs.labels import EMULATED, called
 from .figures import STYLE, figure, heading, is_emulated, saved, together
 from .measures import Comparison
 from .table import HEADS, notes, rows, title
+
+matplotlib = Optional("matplotlib")
 
 CSS = """
 body { font: 15px/1.45 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; color: #30343b; }
@@ -72,8 +76,7 @@ def html(c: Comparison) -> str:
 def pdf(c: Comparison) -> bytes:
     """Two pages of A4: the figures; the table with the notes and what the runs say about
     themselves."""
-    import matplotlib
-    from matplotlib.backends.backend_pdf import PdfPages
+    PdfPages = load("matplotlib.backends.backend_pdf").PdfPages
 
     buffer = io.BytesIO()
     subject = EMULATED if is_emulated(c) else called(c.experiment)
@@ -143,7 +146,7 @@ def _inline(svg: bytes, prefix: str) -> str:
 
 def _front(c: Comparison) -> Any:
     """The PDF's first page."""
-    from matplotlib.figure import Figure
+    Figure = load("matplotlib.figure").Figure
 
     page = Figure(figsize=(8.27, 11.69))
     y = 0.955
@@ -215,6 +218,6 @@ def _lay(
 
 
 def _rule(y: float) -> Any:
-    from matplotlib.lines import Line2D
+    Line2D = load("matplotlib.lines").Line2D
 
     return Line2D([0.06, 0.985], [y, y])

@@ -19,7 +19,6 @@ from ..review import write_gallery
 from .crosscheck import Check, crosscheck
 from .default_manoeuvre import modest
 
-ROBOTS = Path("model/robots")
 FILES = {
     "RR": "type-1-rr",
     "RPa": "type-2-rpa",
@@ -72,11 +71,20 @@ class Row:
 
 
 def crosscheck_nine(
-    robots: Path = ROBOTS, progress: Callable[[float], None] = lambda f: None
+    robots: Path | None = None, progress: Callable[[float], None] = lambda f: None
 ) -> list[Row]:
-    """The rows of all nine, in the dissertation's order, on all cores; raises InputError where a
-    robot file is not there."""
-    described = {name: fx.load(robots / f"{file}.toml") for name, file in FILES.items()}
+    """The rows of all nine, in the dissertation's order, on all cores.
+
+    Args:
+        robots: the folder of their robot files, by default those that come with flexura.
+        progress: called with the finished fraction.
+
+    Raises:
+        InputError: a robot file is not there, or has another structure.
+    """
+    described = {
+        name: fx.load(robots / f"{file}.toml" if robots else file) for name, file in FILES.items()
+    }
     for name, robot in described.items():
         if robot.structure != name:
             raise fx.InputError(

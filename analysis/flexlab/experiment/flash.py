@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from flexura.errors import FlexuraError, InputError
+from flexura.optional import Missing, load
 
 from ..board.base import Board, BoardError
 from ..board.emulator.emulated import EmulatedBoard
@@ -22,7 +23,7 @@ from ..paths import FIRMWARE
 from ..rig import Bench, configuration
 from ..rig.plant.rigid_plant import RigidPlant
 
-RIG = FIRMWARE / "rig.toml"
+RIG = "rig"  # the rig that comes with flexura
 
 Say = Callable[[str], None]
 
@@ -73,9 +74,11 @@ def build(*options: str, firmware: Path = FIRMWARE) -> Path:
     of the compiler's output."""
     script = firmware / "build.py"
     if not script.is_file():
-        raise InputError(
-            "no such file: building the firmware needs a checkout of the project", file=str(script)
+        raise Missing(
+            "the firmware's sources are not in an installed package: build it in a checkout of the "
+            "project, or name a built one (--firmware ELF)"
         )
+    load("platformio")
     done = subprocess.run(
         [sys.executable, str(script), *options],
         capture_output=True,

@@ -93,9 +93,9 @@ def _rail(robot: fx.Robot, line: JointLine, values: dict[str, float]) -> fx.Syst
     moved = float(system.mass(system.start())[0, 0]) - robot.links[0].joint.rotor_inertia
     joint = {
         "type": "Pa",
-        "rotor_inertia": line.reflected_mass_kg,
-        "viscous_friction": values["viscous_N_s_m"],
-        "coulomb_friction": values["coulomb_N"],
+        "rotor_mass_kg": line.reflected_mass_kg,
+        "viscous_friction_N_s_m": values["viscous_N_s_m"],
+        "coulomb_friction_N": values["coulomb_N"],
     }
     body = {"length_m": 0.0, "elements": 0, "mass_kg": moved, "joint": joint}
     return fx.assemble(fx.Robot.from_dict({"name": "carriage alone", "link": [body]}))

@@ -11,11 +11,11 @@ import numpy as np
 
 import flexura as fx
 from flexura.errors import InputError
-from flexura.io import write_toml
+from flexura.io import find, write_toml
 
 from ..recordings import flex_calibration
 from ..recordings.unit_conversion import ADC_V, Sensor
-from ..rig.description import Calibration, Rig
+from ..rig.description import Calibration, Rig, named_file
 from ..rig.plant.motor import resistance
 from .identify import Identified
 from .strip import with_parameters
@@ -129,14 +129,17 @@ def save(found: Identified, experiment: fx.Run, path: Path) -> list[Path]:
         InputError: before anything is written, if the manoeuvre is missing.
     """
     beside = path.with_name(f"{path.stem}-rig.toml")
-    manoeuvre = Path(str(experiment.meta.get("rig_file", ""))).parent / found.nominal.rig.manoeuvre
-    if not manoeuvre.is_file():
+    rig_file = Path(str(experiment.meta.get("rig_file", "")))
+    manoeuvre = named_file(rig_file, found.nominal.rig.manoeuvre)
+    if not find(manoeuvre, "manoeuvres").is_file():
         expected = (
             "no such file: expected the rig's manoeuvre, which its new file must name as well"
         )
         raise InputError(expected, key="rig.manoeuvre", value=str(manoeuvre))
+    if isinstance(manoeuvre, Path):
+        manoeuvre = os.path.relpath(manoeuvre, path.parent)
     tables = rig(found).model_dump(mode="json", exclude_none=True)
-    tables["robot"], tables["manoeuvre"] = path.name, os.path.relpath(manoeuvre, path.parent)
+    tables["robot"], tables["manoeuvre"] = path.name, manoeuvre
     said = robot(found).to_dict()
     write_toml(path, said)
     write_toml(beside, tables)

@@ -8,6 +8,7 @@ recognised. `run_from_recording` makes the Run from these three files only.
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import json
 import os
@@ -100,10 +101,9 @@ class Recording:
         """Write to the disk itself and unlock. May be called twice."""
         for handle in (self._received_file, self._events_file):
             if handle >= 0:
-                try:
+                # a full disk was reported by the write; a pipe has nothing to sync
+                with contextlib.suppress(OSError):
                     os.fsync(handle)
-                except OSError:  # a full disk was reported by the write; a pipe has nothing to sync
-                    pass
                 os.close(handle)
         self._received_file = self._events_file = -1
 

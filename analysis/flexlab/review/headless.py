@@ -23,6 +23,9 @@ import numpy as np
 
 from flexura.errors import FlexuraError, InputError
 from flexura.io import write_bytes
+from flexura.optional import Optional, load
+
+rerun_cli = Optional("rerun_cli")
 
 MENU_PX = 36  # the height of the viewer's menu, which stays as an empty strip when it is hidden
 LOOPBACK = "127.0.0.1"
@@ -58,7 +61,7 @@ def draw(
 def default_time(rrd: str | Path) -> float:
     """The time [s] that a review proposes for its picture. Raises InputError for a file that is no
     review."""
-    from rerun.chunk import RrdReader
+    RrdReader = load("rerun.chunk").RrdReader
 
     path = Path(rrd)
     if not path.is_file():
@@ -78,10 +81,6 @@ def default_time(rrd: str | Path) -> float:
 def executable() -> Path:
     """The viewer itself: the `rerun` on the path is a script, which would leave the viewer running
     when ended."""
-    try:
-        import rerun_cli
-    except ImportError:
-        raise FlexuraError("the viewer is missing: install rerun-sdk") from None
     path = Path(rerun_cli.__file__).with_name("rerun.exe" if os.name == "nt" else "rerun")
     if not path.is_file():
         raise FlexuraError(f"the viewer is missing: expected {path}; install rerun-sdk again")
@@ -96,7 +95,7 @@ def viewer(size: tuple[int, int] = (1600, 900), timeout: float = 60.0) -> Iterat
     Raises FlexuraError when there is no Vulkan driver, or when the viewer doesn't answer within
     `timeout` seconds.
     """
-    from rerun.experimental import ViewerClient
+    ViewerClient = load("rerun.experimental").ViewerClient
 
     program, port = str(executable()), free_port()
     with (
@@ -192,7 +191,7 @@ def settled(client: Any, view_id: Any = None, tries: int = 60) -> bytes:
 
 def _without_menu(png: bytes, size: tuple[int, int]) -> bytes:
     """The picture cut to `size`: without the strip of the menu where it is empty, else scaled."""
-    from PIL import Image
+    Image = load("PIL.Image")
 
     image = Image.open(io.BytesIO(png)).convert("RGB")
     strip = image.crop((image.width // 4, 4, image.width // 2, MENU_PX - 4)).getcolors(1)

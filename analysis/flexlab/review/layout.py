@@ -14,7 +14,7 @@ from flexura.optional import Optional
 if TYPE_CHECKING:
     import rerun.blueprint as rrb
 else:
-    rrb = Optional("rerun.blueprint", "view")
+    rrb = Optional("rerun.blueprint")
 
 CURVES = 6  # in one plot; further joints or links go to further tabs
 PLOT_PX, LINE_PX, LINE_CHARS = (

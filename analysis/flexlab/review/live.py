@@ -21,13 +21,13 @@ from flexura.optional import Optional
 if TYPE_CHECKING:
     import rerun as rr
 else:
-    rr = Optional("rerun", "view")
+    rr = Optional("rerun")
 from flexura.optional import Optional
 
 if TYPE_CHECKING:
     import rerun.blueprint as rrb
 else:
-    rrb = Optional("rerun.blueprint", "view")
+    rrb = Optional("rerun.blueprint")
 
 import flexura as fx
 from flexura.errors import InputError

@@ -19,7 +19,7 @@ from flexura.optional import Optional
 if TYPE_CHECKING:
     import rerun as rr
 else:
-    rr = Optional("rerun", "view")
+    rr = Optional("rerun")
 
 from flexura.io import Run
 

@@ -17,7 +17,7 @@ from pydantic import Field, ValidationError, model_validator
 
 import flexura as fx
 from flexura.errors import InputError, WrongValue
-from flexura.io import explain, read_toml
+from flexura.io import FORMAT, check_format, explain, find, read_toml
 
 from ..board.protocol.declaration import CONFIG
 from .emulation import Emulated
@@ -181,12 +181,19 @@ class Flex(Table):
 class Rig(Table):
     """The bench of one robot. Frozen; SI units."""
 
+    format: int = Field(
+        FORMAT, ge=1, le=FORMAT, description=f"the file's format, a whole number up to {FORMAT}"
+    )
     name: str = Field(
         "", max_length=200, description="the rig's name, a text of at most 200 characters"
     )
-    robot: str = Field(description="the path of the robot file, from the rig file's folder")
+    robot: str = Field(
+        description="the path of the robot file from the rig file's folder, or a shipped name"
+    )
     manoeuvre: str = Field(
-        description="the path of the manoeuvre file that this rig must be able to follow"
+        description=(
+            "the path of the manoeuvre file that this rig must be able to follow, or a shipped name"
+        )
     )
     motor: MotorSheet = Field(description="a table [motor]")
     screw: Screw = Field(description="a table [screw]")
@@ -272,19 +279,20 @@ def load(path: str | os.PathLike[str]) -> Bench:
     """Read a rig file and the files it names.
 
     Args:
-        path: the rig file.
+        path: the file's path, or the name of a rig that comes with flexura, for example "rig".
 
     Raises:
-        InputError: names file, key, value and what was expected.
+        InputError: no such file, or a wrong value; it names file, key, value and what was expected.
     """
-    name = os.fspath(path)
-    data = read_toml(path)
+    found = find(path, "rigs")
+    name = os.fspath(found)
+    data = read_toml(found)
+    check_format(data, name)
     try:
         rig = Rig.model_validate(data)
     except ValidationError as error:
         raise explain(error, Rig, data, name) from None
-    folder = Path(path).parent
-    robot = fx.load(folder / rig.robot)
+    robot = fx.load(named_file(found, rig.robot))
     carriage, strip = (robot.links * 2)[:2]
     if robot.structure != "PaR" or carriage.flexible or not strip.flexible:
         expected = (
@@ -310,9 +318,16 @@ def load(path: str | os.PathLike[str]) -> Bench:
         name,
         rig,
         robot,
-        fx.load_manoeuvre(folder / rig.manoeuvre, 2),
+        fx.load_manoeuvre(named_file(found, rig.manoeuvre), 2),
         (carriage.joint.limits, turn),
     )
+
+
+def named_file(file: Path, named: str) -> str | Path:
+    """The file that a rig file names: a path from its folder or, where none is there, a shipped
+    name."""
+    path = file.parent / named
+    return path if path.is_file() or Path(named).suffix else named
 
 
 def configuration(bench: Bench) -> dict[str, float]:

@@ -54,8 +54,8 @@ def cases(robot: fx.Robot, manoeuvre: Manoeuvre | None, lengths_m: np.ndarray) -
     for d, name in [*((float(d), FIXED) for d in inner), (link.length_m, WITHOUT)]:
         data = robot.to_dict()
         joint = data["link"][i]["joint"]
-        joint.pop("limits", None)
-        joint |= {"start": d, "locked": True}
+        joint.pop("limits_m", None)
+        joint |= {"start_m": d, "locked": True}
         out.append(
             Case({"case": name, "free_length_m": d}, fx.Robot.from_dict(data), held, i + 1, half)
         )

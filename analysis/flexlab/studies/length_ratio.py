@@ -119,9 +119,9 @@ def _with_lengths(robot: fx.Robot, lengths: list[float], keep: str) -> fx.Robot:
             link["mass_kg"] *= factor
             link["inertia_kg_m2"] = link.get("inertia_kg_m2", 0.0) * factor**3
         for joint in _measured_along(data["link"], i):
-            joint["start"] = joint.get("start", 0.0) * factor
-            if "limits" in joint:
-                joint["limits"] = [limit * factor for limit in joint["limits"]]
+            joint["start_m"] = joint.get("start_m", 0.0) * factor
+            if "limits_m" in joint:
+                joint["limits_m"] = [limit * factor for limit in joint["limits_m"]]
     return fx.Robot.from_dict(data)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from rich.table import Table
 
 from flexura.io import write_bytes
+from flexura.optional import load
 
 from .boundary import FIXED, SLIDING, WITHOUT
 from .sweep import Row, Study
@@ -123,7 +124,7 @@ def save(study: Study, folder: Path) -> list[Path]:
 
 def figure(study: Study) -> Any:
     """The study's figure, a matplotlib Figure: the deflection over what was varied."""
-    from matplotlib.figure import Figure
+    Figure = load("matplotlib.figure").Figure
 
     drawing = Figure(figsize=(7.5, 5), layout="constrained")
     axes = drawing.subplots()

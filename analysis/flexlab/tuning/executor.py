@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from flexura.errors import FlexuraError, InputError
+from flexura.optional import load
 from flexura.population import cores, program
 
 from .task import Task
@@ -71,16 +72,9 @@ class DaskExecutor:
     """Runs on a Dask scheduler's workers (extra `cluster`); work of a lost worker is repeated."""
 
     def __init__(self, task: Task, scheduler: str) -> None:
+        distributed = load("distributed")
         try:
-            from distributed import Client
-        except ImportError:
-            raise InputError(
-                'expected the extra "cluster": pip install flexura[cluster]',
-                key="--scheduler",
-                value=scheduler,
-            ) from None
-        try:
-            self.client = Client(scheduler, timeout=CONNECT_S, set_as_default=False)
+            self.client = distributed.Client(scheduler, timeout=CONNECT_S, set_as_default=False)
         except (OSError, ValueError) as error:
             text = f"expected the address of a Dask scheduler, tcp://host:port ({error})"
             raise InputError(text, key="--scheduler", value=scheduler) from None

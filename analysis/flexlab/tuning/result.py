@@ -14,6 +14,7 @@ from rich.table import Table
 import flexura as fx
 from flexura.control import Gains, Response, of_run
 from flexura.io import write_bytes
+from flexura.optional import load
 
 from . import search_space as freedom
 from .closed_loop import closed_loop_controller
@@ -213,7 +214,7 @@ def numbers(found: Result) -> dict[str, Any]:
 
 def figure(found: Result) -> Any:
     """The search's progress (or the front), and what the best gains do."""
-    from matplotlib.figure import Figure
+    Figure = load("matplotlib.figure").Figure
 
     history, run = found.history, found.runs[0]
     drawing = Figure(figsize=(10, 4.2), layout="constrained")

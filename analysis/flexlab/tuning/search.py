@@ -19,6 +19,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from flexura.errors import FlexuraError, InputError
+from flexura.optional import load
 from flexura.population import program
 
 from .executor import Evaluator
@@ -133,7 +134,6 @@ def search(
     Raises:
         InputError: options do not fit, or the stored generations are another search's.
     """
-    from pymoo.algorithms.soo.nonconvex.cmaes import CMAES
 
     if task.pareto != (how.algorithm == "nsga2"):
         raise InputError(
@@ -160,7 +160,7 @@ def search(
             best = history.all("points")[
                 int(history.all("goals")[: history.ends[done - 1], 0].argmin())
             ]
-            local = CMAES(
+            local = load("pymoo.algorithms.soo.nonconvex.cmaes").CMAES(
                 x0=best, sigma=POLISH_SIGMA, popsize=POLISH_POPULATION, tolfun=1e-6, tolx=1e-5
             )
             _stage(
@@ -195,11 +195,9 @@ def _stage(
     Returns:
         The number of generations after it.
     """
-    from pymoo.core.evaluator import Evaluator
-    from pymoo.core.problem import Problem
-    from pymoo.problems.static import StaticProblem
-
     d, generation = len(task.free), first
+    core, static = load("pymoo.core.evaluator"), load("pymoo.problems.static")
+    Problem = load("pymoo.core.problem").Problem
     problem = Problem(n_var=d, n_obj=len(task.goals), xl=np.zeros(d), xu=np.ones(d))
     algorithm.setup(problem, termination=("n_gen", generations), seed=how.seed, verbose=False)
     while algorithm.has_next() and not (
@@ -217,7 +215,7 @@ def _stage(
             goals = task.score(metrics, reached)
             history.append(points, goals, metrics, reached, time.perf_counter() - begun)
             progress(history)
-        Evaluator().eval(StaticProblem(problem, F=goals), asked)
+        core.Evaluator().eval(static.StaticProblem(problem, F=goals), asked)
         algorithm.tell(infills=asked)
         generation += 1
     return generation
@@ -228,15 +226,15 @@ def _algorithm(how: Search, start: np.ndarray) -> Any:
 
     CMA-ES begins at `start`.
     """
-    from pymoo.algorithms.moo.nsga2 import NSGA2
-    from pymoo.algorithms.soo.nonconvex.cmaes import CMAES
-    from pymoo.algorithms.soo.nonconvex.ga import GA
-    from pymoo.algorithms.soo.nonconvex.pso import PSO
-    from pymoo.operators.crossover.sbx import SBX
-    from pymoo.operators.mutation.pm import PM
-    from pymoo.operators.selection.tournament import TournamentSelection
     from scipy.stats import qmc
 
+    CMAES = load("pymoo.algorithms.soo.nonconvex.cmaes").CMAES
+    GA = load("pymoo.algorithms.soo.nonconvex.ga").GA
+    NSGA2 = load("pymoo.algorithms.moo.nsga2").NSGA2
+    PM = load("pymoo.operators.mutation.pm").PM
+    PSO = load("pymoo.algorithms.soo.nonconvex.pso").PSO
+    SBX = load("pymoo.operators.crossover.sbx").SBX
+    TournamentSelection = load("pymoo.operators.selection.tournament").TournamentSelection
     if how.algorithm == "cma-es":
         return CMAES(x0=start, sigma=0.3, popsize=how.population, tolfun=1e-6, tolx=1e-5)
     first = qmc.LatinHypercube(len(start), seed=how.seed).random(how.population)
@@ -272,9 +270,8 @@ def limits(algorithm: Any, count: int) -> np.ndarray:
     Returns:
         (count,), inf if every J matters: CMA-ES ranks all.
     """
-    from pymoo.algorithms.soo.nonconvex.ga import GA
-    from pymoo.algorithms.soo.nonconvex.pso import PSO
-
+    GA = load("pymoo.algorithms.soo.nonconvex.ga").GA
+    PSO = load("pymoo.algorithms.soo.nonconvex.pso").PSO
     out = np.full(count, np.inf)
     if not algorithm.is_initialized or not isinstance(algorithm, GA | PSO):
         return out

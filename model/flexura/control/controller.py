@@ -76,7 +76,7 @@ class Motor:
 
     With torque constant k, resistance R, back-EMF constant ke and a transmission of i rad per m or
     rad: force_per_V = k i / R, damping = k ke i^2 / R + friction; the inductance is left out. The
-    rotor's inertia is the robot file's `rotor_inertia`.
+    rotor's inertia is the robot file's `rotor_inertia_kg_m2` or `rotor_mass_kg`.
     """
 
     force_per_V: float

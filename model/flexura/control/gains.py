@@ -25,7 +25,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from ..errors import InputError
-from ..io import read_toml, write_toml
+from ..io import find, read_toml, write_toml
 from ..signals import Signal, constant, finite
 from .controller import PID, Controller, Force, Motor, Output, Stepper
 
@@ -239,9 +239,17 @@ def from_board(values: Mapping[str, float]) -> Gains:
 
 
 def load(path: str | os.PathLike[str]) -> Gains:
-    """Read a gains file. Raises InputError, naming file, key, value and what was expected."""
-    name = os.fspath(path)
-    data = read_toml(path)
+    """Read a gains file.
+
+    Args:
+        path: the file's path, or the name of a controller that comes with flexura.
+
+    Raises:
+        InputError: no such file, or a wrong value; it names file, key, value and what was expected.
+    """
+    found = find(path, "controllers")
+    name = os.fspath(found)
+    data = read_toml(found)
     try:
         return _gains(data, name)
     except InputError as error:

@@ -28,6 +28,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from .format import FORMAT, check_format
 from .toml_files import write_bytes
 
 FILE = "run.parquet"
@@ -128,7 +129,8 @@ class Run:
         }
         units = {"time_s": "s"} | {self.column(name): unit for name, unit in self.units.items()}
         fields = [pa.field(name, pa.float64(), metadata={"unit": units[name]}) for name in columns]
-        schema = pa.schema(fields, metadata={"flexura": json.dumps(self.meta)})
+        about = {"flexura": json.dumps(self.meta), "format": str(FORMAT)}
+        schema = pa.schema(fields, metadata=about)
         sink = pa.BufferOutputStream()
         pq.write_table(
             pa.table(
@@ -174,6 +176,7 @@ class Run:
                 "a Parquet file, but not a run of flexura: expected a column time_s and metadata",
                 file=file,
             )
+        check_format({"format": int(table.schema.metadata.get(b"format", FORMAT))}, file)
         meta, channels, units = json.loads(stored), {}, {}
         if not isinstance(meta, dict):
             raise ValueError("its metadata is not a table")

@@ -58,6 +58,7 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
 
 
 def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
+    """Write a file as a whole: a reader sees the old one or the new one."""
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
@@ -72,6 +73,7 @@ def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
 
 
 def write_toml(path: str | os.PathLike[str], data: dict[str, Any]) -> None:
+    """Write tables as a TOML file, as a whole."""
     import tomli_w
 
     write_text(path, tomli_w.dumps(data))

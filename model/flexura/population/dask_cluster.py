@@ -6,6 +6,7 @@ from collections.abc import Generator, Iterator
 from typing import TYPE_CHECKING, Any
 
 from ..errors import FlexuraError, InputError
+from ..optional import load
 from .request import program
 from .worker import compute
 
@@ -28,22 +29,15 @@ def run(
     by one process. Whatever ends this early cancels what is left. Raises InputError for an address
     at which there is no scheduler.
     """
+    distributed = load("distributed")
     try:
-        from distributed import Client, as_completed
-    except ImportError:
-        raise InputError(
-            'expected the extra "cluster": pip install flexura[cluster]',
-            key="scheduler",
-            value=scheduler,
-        ) from None
-    try:
-        client = Client(scheduler, timeout=CONNECT_S, set_as_default=False)
+        client = distributed.Client(scheduler, timeout=CONNECT_S, set_as_default=False)
     except (OSError, ValueError) as error:
         text = f"expected the address of a Dask scheduler, tcp://host:port ({error})"
         raise InputError(text, key="scheduler", value=scheduler) from None
     with client:
         client.wait_for_workers(1, timeout=CONNECT_S)
-        coming, ended = as_completed(loop=client.loop), False
+        coming, ended = distributed.as_completed(loop=client.loop), False
         waiting: set[Any] = set()
         try:
             while True:

@@ -19,10 +19,8 @@ OF_JOINT = {
     "angle_rad": 6,
     "hub_mass_kg": 8,
     "hub_inertia_kg_m2": 9,
-    "rotor_inertia": 10,
-    "viscous_friction": 11,
-    "coulomb_friction": 12,
 }
+OF_EITHER = {"rotor_inertia": 10, "viscous_friction": 11, "coulomb_friction": 12}
 OF_DAMPING = {"alpha_1_s": 4, "beta_s": 5}
 OF_RIGID = {
     "mass_kg": MASS,
@@ -151,7 +149,8 @@ def varied(robot: Robot, columns: Mapping[str, np.ndarray]) -> Rows | None:
 def _vary_link(link: Link, i: int, out: Rows, changes: Mapping[str, np.ndarray]) -> bool:
     """Puts varied values of link i into its rows; False: a key is not known here."""
     rest = dict(changes)
-    for table, known in (("joint", OF_JOINT), ("damping", OF_DAMPING)):
+    own = {link.joint.key(name): column for name, column in OF_EITHER.items()}
+    for table, known in (("joint", OF_JOINT | OF_EITHER | own), ("damping", OF_DAMPING)):
         for name, column in known.items():
             if f"{table}.{name}" in rest:
                 out.numbers[:, i, column] = rest.pop(f"{table}.{name}")

@@ -1,18 +1,10 @@
 """The robot file: a frozen, validated description of a robot in SI units."""
 
-from .link import (
-    LEAST_FREE,
-    MAX_ELEMENTS,
-    MOST_MODES,
-    Damping,
-    Joint,
-    Link,
-    Section,
-    SectionAt,
-    Table,
-    ValueAt,
-)
+from .joint import Joint, key_of
+from .link import LEAST_FREE, MAX_ELEMENTS, MOST_MODES, Damping, Link, Section, SectionAt, ValueAt
+from .old_keys import OldKey, renamed
 from .robot import MAX_LINKS, Payload, Robot, load, save
+from .table import Table
 
 __all__ = [
     "LEAST_FREE",
@@ -22,12 +14,15 @@ __all__ = [
     "Damping",
     "Joint",
     "Link",
+    "OldKey",
     "Payload",
     "Robot",
     "Section",
     "SectionAt",
     "Table",
     "ValueAt",
+    "key_of",
     "load",
+    "renamed",
     "save",
 ]

@@ -1,14 +1,16 @@
-"""A link of the robot file, with its joint, section and damping."""
+"""A link of the robot file, with its section and damping."""
 
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from ..errors import WrongValue
+from .joint import Joint
+from .table import Table
 
 MAX_ELEMENTS = 200
 
@@ -21,16 +23,7 @@ LEAST_FREE = (
 )
 
 
-_strict = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
-
-
 Positive = Annotated[float, Field(gt=0)]
-
-
-class Table(BaseModel):
-    """A table of the robot file: frozen, and no key that it does not know."""
-
-    model_config = _strict
 
 
 class Section(Table):
@@ -77,68 +70,6 @@ class Damping(Table):
         le=10,
         description="the stiffness-proportional factor in seconds, between 0 and 10",
     )
-
-
-class Joint(Table):
-    """The joint at the proximal side of a link: R, Pa or Pb (dissertation, table 2.1)."""
-
-    type: Literal["R", "Pa", "Pb"] = Field(description='the joint type, "R", "Pa" or "Pb"')
-    angle_rad: float = Field(
-        0.0,
-        ge=-7,
-        le=7,
-        description="the fixed angle gamma of a Pa or Pb in radians, between -7 and 7",
-    )
-    hub_mass_kg: float = Field(0.0, ge=0, description="the hub's mass in kilograms, 0 or more")
-    hub_inertia_kg_m2: float = Field(
-        0.0, ge=0, description="the hub's inertia in kg m^2, 0 or more"
-    )
-    rotor_inertia: float = Field(
-        0.0,
-        ge=0,
-        description=(
-            "the rotor's inertia reflected to the joint, kg (Pa, Pb) or kg m^2 (R), 0 or more"
-        ),
-    )
-    viscous_friction: float = Field(
-        0.0, ge=0, description="viscous friction in N s/m or N m s/rad, 0 or more"
-    )
-    coulomb_friction: float = Field(
-        0.0, ge=0, description="Coulomb friction in N or N m, 0 or more"
-    )
-    limits: tuple[float, float] | None = Field(
-        None,
-        strict=False,
-        description="two numbers, the lower limit and a higher upper limit, in m or rad",
-    )
-    start: float = Field(
-        0.0,
-        description=(
-            "the joint's position at the start, in m or rad (Pb: the free length), a finite number"
-        ),
-    )
-    locked: bool = Field(False, description="true (the joint is clamped at its start) or false")
-
-    @model_validator(mode="after")
-    def _consistent(self) -> Joint:
-        if self.type == "R" and self.angle_rad != 0:
-            raise WrongValue(
-                "angle_rad",
-                self.angle_rad,
-                "no fixed angle: a joint R turns; use start for its first position",
-            )
-        if self.limits is not None:
-            if not self.limits[0] < self.limits[1]:
-                raise WrongValue(
-                    "limits", list(self.limits), "the lower limit first, then a higher upper limit"
-                )
-            if not self.limits[0] <= self.start <= self.limits[1]:
-                raise WrongValue(
-                    "limits",
-                    list(self.limits),
-                    f"limits that contain the start position, {self.start:g}",
-                )
-        return self
 
 
 _LINK_TEXT = {
@@ -214,6 +145,7 @@ class Link(Table):
 
     @property
     def flexible(self) -> bool:
+        """Whether the link has beam elements."""
         return self.elements > 0
 
     @field_validator("section", "mass_per_length_kg_m", "bending_stiffness_N_m2")
@@ -341,6 +273,7 @@ class Link(Table):
 
     @property
     def section_given(self) -> bool:
+        """Whether mass and stiffness come from the section and the material."""
         return (
             self.section is not None
             or self.young_modulus_Pa is not None

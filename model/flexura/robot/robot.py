@@ -7,6 +7,7 @@ every key.
 
 from __future__ import annotations
 
+import logging
 import os
 from typing import Any, Literal
 
@@ -14,10 +15,14 @@ import numpy as np
 from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from ..errors import InputError, WrongValue
-from ..io import explain, read_toml, write_toml
-from .link import LEAST_FREE, Link, Table
+from ..io import FORMAT, check_format, explain, find, read_toml, write_toml
+from .joint import KEYS
+from .link import LEAST_FREE, Link
+from .old_keys import renamed
+from .table import Table
 
 MAX_LINKS = 256
+_log = logging.getLogger("flexura")
 
 
 class Payload(Table):
@@ -52,6 +57,9 @@ class Robot(Table):
     payload: Payload = Field(
         default_factory=Payload, description="a table { mass_kg, inertia_kg_m2 }"
     )
+    format: int = Field(
+        FORMAT, ge=1, le=FORMAT, description=f"the file's format, a whole number up to {FORMAT}"
+    )
 
     @model_validator(mode="after")
     def _starts_on_its_links(self) -> Robot:
@@ -70,16 +78,18 @@ class Robot(Table):
                 )
             if not low <= joint.start <= high:
                 free = "the free length at the start, " if joint.type == "Pb" else "a start "
-                raise WrongValue(f"{key}.start", joint.start, free + where)
+                raise WrongValue(f"{key}.{joint.key('start')}", joint.start, free + where)
             if joint.limits is not None and not (
                 low <= joint.limits[0] and joint.limits[1] <= high
             ):
-                raise WrongValue(f"{key}.limits", list(joint.limits), f"limits {where}")
+                raise WrongValue(
+                    f"{key}.{joint.key('limits')}", list(joint.limits), f"limits {where}"
+                )
             if joint.type == "Pa" and i > 0 and self.link[i - 1].joint.type == "Pb":
                 exit_m = self.link[i - 1].length_m - self.link[i - 1].joint.start
                 if joint.start < exit_m:
                     ahead = f"a start ahead of the sleeve of link {i}, at {exit_m:g} m or more"
-                    raise WrongValue(f"{key}.start", joint.start, ahead)
+                    raise WrongValue(f"{key}.{joint.key('start')}", joint.start, ahead)
         return self
 
     @model_validator(mode="after")
@@ -119,6 +129,7 @@ class Robot(Table):
 
     @property
     def links(self) -> list[Link]:
+        """The links, from the base outwards."""
         return self.link
 
     @property
@@ -133,8 +144,18 @@ class Robot(Table):
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], *, file: str = "") -> Robot:
-        """A robot from the tables of a robot file. Raises InputError, naming `file`, key, value and
-        what was expected."""
+        """A robot from the tables of a robot file.
+
+        Keys of 0.1 without a unit, as `start`, are read as those of today, and the logger "flexura"
+        names the new ones. Raises InputError, naming `file`, key, value and what was expected.
+        """
+        if isinstance(data, dict):
+            check_format(data, file)
+        data, old = renamed(data)
+        if old:
+            keys = ", ".join(f"{each.path} is {each.new}" for each in old)
+            how = f"; to rename them: flexura migrate {file}" if file else ""
+            _log.warning("%skeys of 0.1: %s now%s", f"{file}: " if file else "", keys, how)
         try:
             return cls.model_validate(data)
         except ValidationError as error:
@@ -147,12 +168,21 @@ class Robot(Table):
     def replace(self, changes: dict[str, Any]) -> Robot:
         """A robot with some values changed: `robot.replace({"payload.mass_kg": 0.1,
         "link.2.length_m": 0.4})`, links counted from 1."""
+        changes = {self._todays_path(path): value for path, value in changes.items()}
         try:
             return Robot.model_validate(_changed(self, changes))
         except ValidationError:
             return Robot.from_dict(
                 _changed(self.to_dict(), changes)
             )  # says what is wrong in a file's words
+
+    def _todays_path(self, path: str) -> str:
+        """`link.2.joint.start_rad` of `link.2.joint.start`; any other path as it is."""
+        parts = path.split(".")
+        if len(parts) != 4 or parts[0] != "link" or parts[2] != "joint" or parts[3] not in KEYS:
+            return path
+        number = _number(self.link, parts[1], path, None)
+        return ".".join([*parts[:3], self.link[number].joint.key(parts[3])])
 
 
 def _changed(tables: Any, changes: dict[str, Any]) -> dict[str, Any]:
@@ -187,11 +217,19 @@ def _number(table: list[Any], part: str, path: str, value: Any) -> int:
 
 
 def load(path: str | os.PathLike[str]) -> Robot:
-    """Read a robot file (TOML). Raises InputError, naming file, key, value and what was
-    expected."""
-    return Robot.from_dict(read_toml(path), file=os.fspath(path))
+    """Read a robot file (TOML).
+
+    Args:
+        path: the file's path, or the name of a robot that comes with flexura, for example "rig".
+
+    Raises:
+        InputError: no such file or robot, or a wrong value; it names file, key, value and what was
+            expected.
+    """
+    found = find(path, "robots")
+    return Robot.from_dict(read_toml(found), file=os.fspath(found))
 
 
 def save(robot: Robot, path: str | os.PathLike[str]) -> None:
     """Write a robot file (TOML) that `load` reads back to an equal robot."""
-    write_toml(path, robot.to_dict())
+    write_toml(path, {"format": FORMAT} | robot.to_dict())

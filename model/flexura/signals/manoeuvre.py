@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..io import read_toml
+from ..io import check_format, find, read_toml
 from .drive import Drive, JointDrive, check_smooth
 from .parsing import finite, from_spec
 from .signal import Signal
@@ -41,22 +41,31 @@ class Manoeuvre:
         return own | {"joint": self.drive.spec()}
 
 
-_KEYS = ("name", "duration_s", "output_step_s", "joint")
+_KEYS = ("name", "duration_s", "output_step_s", "joint", "format")
 
 
 _JOINT_KEYS = ("force", "motion", "kp", "kd", "prescribed")
 
 
 def load_manoeuvre(path: str | os.PathLike[str], joints: int) -> Manoeuvre:
-    """Read a manoeuvre file for a robot with that many joints. Raises InputError, naming file, key
-    and value."""
+    """Read a manoeuvre file.
+
+    Args:
+        path: the file's path, or the name of a manoeuvre that comes with flexura.
+        joints: how many the robot has.
+
+    Raises:
+        InputError: no such file, or a wrong value; it names file, key and value.
+    """
+    found = find(path, "manoeuvres")
     try:
-        return _manoeuvre(read_toml(path), joints)
+        return _manoeuvre(read_toml(found), joints)
     except InputError as error:
-        raise error if error.file else error.in_file(os.fspath(path)) from None
+        raise error if error.file else error.in_file(os.fspath(found)) from None
 
 
 def _manoeuvre(data: dict[str, Any], joints: int) -> Manoeuvre:
+    check_format(data)
     _known(data, _KEYS, "")
     duration = _number(data, "duration_s", "a duration above 0 in seconds", low=0.0)
     step = _number(

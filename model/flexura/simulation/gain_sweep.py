@@ -34,6 +34,7 @@ class Trials:
 
     @property
     def method(self) -> str:
+        """The method of integration."""
         return str(self.runs.method)
 
     def run(

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..optional import Optional
 from ..robot import Link, Robot
 from .joints import connect
 from .joints.mesh import Mesh
@@ -16,6 +17,8 @@ from .links.part import Frame, Ground, Part, PointMass
 from .links.properties import NEGLIGIBLE, beam_values, link_inertia, total_mass
 from .links.rigid import RigidLink
 
+exu = Optional("exudyn")
+eii = Optional("exudyn.itemInterface")
 BEAMS = {"ancf": CableLink, "ge": GeometricallyExactLink}
 
 
@@ -63,8 +66,6 @@ def build(robot: Robot, beam: str, mesh: Mesh, speeds: np.ndarray, gains: np.nda
         speeds: joint velocities at the start (n,) [m/s or rad/s].
         gains: of the joints' PD controllers (n, 2).
     """
-    import exudyn as exu
-    from exudyn import itemInterface as eii
 
     container = exu.SystemContainer()
     mbs = container.AddSystem()

@@ -24,9 +24,12 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..optional import Optional
 from ..signals import Drive
 from .build import TwinModel
 from .links.part import Ground, Motion
+
+exu = Optional("exudyn")
 
 DIFFERENCE = 1e-6  # m, rad, m/s, rad/s
 
@@ -222,7 +225,6 @@ class Sensors:
     """Joint positions and velocities (n,) and tip deflection [m] at Exudyn's current iterate."""
 
     def __init__(self, model: TwinModel) -> None:
-        import exudyn as exu
 
         self.mbs, self.markers = model.mbs, [c.marker for c in model.coordinates]
         self.kinds = exu.OutputVariableType.Coordinates, exu.OutputVariableType.Coordinates_t

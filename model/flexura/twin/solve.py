@@ -13,6 +13,7 @@ import numpy as np
 
 from ..errors import FlexuraError, InputError
 from ..io import Run
+from ..optional import Optional
 from ..robot import MAX_ELEMENTS, Robot
 from .build import TwinModel, build
 from .channels import channels
@@ -21,6 +22,8 @@ from .joints.mesh import check_supported, mesh, slide_range, sliding_kinds
 from .links import ancf, geometrically_exact
 from .loads import Actuation, Loads, actuation
 from .steps import Steps, plan_steps, suggest_step
+
+exu = Optional("exudyn")
 
 PROGRAMS = {"ancf": ancf.PROGRAM, "ge": geometrically_exact.PROGRAM}
 ATTEMPTS = 4  # steps tried, each half the one before, unless the user gives one
@@ -153,7 +156,6 @@ def _run(
 
     With one try, the step is the user's and stays.
     """
-    import exudyn
 
     for attempt in range(tries):
         model, steps = new(), plan_steps(t, longest / 2**attempt, forced=tries == 1)
@@ -168,7 +170,7 @@ def _run(
     values, units = channels(model, act, t, q, v)
     meta = {
         "source": "twin",
-        "program": f"Exudyn {exudyn.__version__} ({program})",
+        "program": f"Exudyn {exu.__version__} ({program})",
         "robot": model.robot.to_dict(),
         "complete": done == steps.count,
         "events": [],
@@ -228,7 +230,6 @@ def _settings(
         flexible: whether a link is flexible.
         coordinates: of the system.
     """
-    import exudyn as exu
 
     settings = exu.SimulationSettings()
     integration = settings.timeIntegration
@@ -355,7 +356,6 @@ def _failure(mbs: Any, done: int, steps: Steps, failed: str) -> FlexuraError:
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Keep Exudyn's messages off the terminal."""
-    import exudyn as exu
 
     before = exu.config.printToConsole, exu.config.suppressWarnings
     exu.config.printToConsole, exu.config.suppressWarnings = False, True

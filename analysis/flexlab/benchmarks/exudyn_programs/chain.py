@@ -12,14 +12,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from flexura.optional import Optional
+
 from ..problems.problem import Tables
+
+exu = Optional("exudyn")
+item = Optional("exudyn.itemInterface")
+beams = Optional("exudyn.beams")
 
 AXIAL = 1e5  # EA L^2 / EI of links that are given by their EI
 
 
 def exudyn() -> Any:
     """Exudyn's module, without messages."""
-    import exudyn as exu
 
     exu.SetWriteToConsole(False)
     exu.config.suppressWarnings = True
@@ -56,7 +61,6 @@ class Chain:
             elements: cables a flexible link.
             reduced: order of the cables' reduced quadrature; 0: full.
         """
-        from exudyn import itemInterface as item
 
         self.robot, self.item, self.exu = robot, item, exudyn()
         self.container = self.exu.SystemContainer()
@@ -77,14 +81,13 @@ class Chain:
 
     def _links(self, links: list[Tables], elements: int, reduced: int) -> None:
         """Add all flexible links, straight at their start."""
-        from exudyn import beams
 
         x, y, angle, payload = 0.0, 0.0, 0.0, self.robot.get("payload", {})
         carrier = self._marker("BodyRigid", bodyNumber=self.ground)
         body, place = self.ground, [0.0, 0.0, 0.0]
         for k, link in enumerate(links):
             mass, bending, axial = line(link)
-            angle += link["joint"].get("start", 0.0)
+            angle += link["joint"].get("start_rad", 0.0)
             to = [x + link["length_m"] * math.cos(angle), y + link["length_m"] * math.sin(angle), 0]
             cable = self.item.ObjectANCFCable2D(
                 massPerLength=mass,
@@ -111,7 +114,7 @@ class Chain:
                 ),
             )
             self._hinge(
-                k, root, carrier, [body, made["elements"][0]], place, joint.get("start", 0.0)
+                k, root, carrier, [body, made["elements"][0]], place, joint.get("start_rad", 0.0)
             )
             self.ends.append((root, tip))
             carrier, (x, y) = self._marker("NodeRigid", nodeNumber=tip), to[:2]

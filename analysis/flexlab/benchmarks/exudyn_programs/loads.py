@@ -7,8 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from flexura.optional import Optional
+
 from ..problems.problem import Work
 from .chain import Chain
+
+exu, advanced = Optional("exudyn"), Optional("exudyn.advancedUtilities")
 
 FRICTION_SPEED = 1e-3  # m/s or rad/s: Coulomb friction is f tanh(v / this)
 Signals = Any  # a sequence of flexura's signals, or of None
@@ -95,14 +99,11 @@ class Loads:
 
     def _friction(self) -> None:
         """Add viscous and Coulomb friction; Exudyn compiles the latter from an expression."""
-        from exudyn import symbolic
-        from exudyn.advancedUtilities import CreateSymbolicUserFunction
-
         self.references = []
         for link, joint in zip(self.chain.robot["link"], self.chain.joints, strict=True):
             viscous, coulomb = (
-                link["joint"].get("viscous_friction", 0.0),
-                link["joint"].get("coulomb_friction", 0.0),
+                link["joint"].get("viscous_friction_N_m_s_rad", 0.0),
+                link["joint"].get("coulomb_friction_N_m", 0.0),
             )
             if not viscous and not coulomb:
                 continue
@@ -114,10 +115,10 @@ class Loads:
             )
 
             def force(mbs, t, itemNumber, displacement, velocity, stiffness, damping, offset):  # type: ignore[no-untyped-def]
-                return damping * velocity + coulomb * symbolic.tanh(velocity / FRICTION_SPEED)  # noqa: B023 (compiled at once)
+                return damping * velocity + coulomb * exu.symbolic.tanh(velocity / FRICTION_SPEED)  # noqa: B023 (compiled at once)
 
             if coulomb:
-                function = CreateSymbolicUserFunction(
+                function = advanced.CreateSymbolicUserFunction(
                     self.chain.mbs, force, "springForceUserFunction", damper
                 )
                 self.references.append(function)
@@ -128,8 +129,8 @@ class Loads:
         if self._is_carriage(k):
             self.chain.mbs.SetLoadParameter(self.loads[k][0], "load", force)
             return
-        for load, sign in zip(self.loads[k], (1.0, -1.0), strict=False):
-            self.chain.mbs.SetLoadParameter(load, "loadVector", [0, 0, sign * force])
+        for one, sign in zip(self.loads[k], (1.0, -1.0), strict=False):
+            self.chain.mbs.SetLoadParameter(one, "loadVector", [0, 0, sign * force])
 
     def begin(self, steps: int, step: float) -> None:
         """Prepare a run: tables, values at the start, and the function that Exudyn calls each step.

@@ -55,7 +55,7 @@ def one_link() -> list[Problem]:
     falling = lambda stiffness, **keys: robot(
         [beam(1.0, stiffness, 0.3, 8, turning(), **keys)], gravity=True
     )
-    friction = tokhi_arm(8, {"coulomb_friction": 0.05, "viscous_friction": 0.01})
+    friction = tokhi_arm(8, {"coulomb_friction_N_m": 0.05, "viscous_friction_N_m_s_rad": 0.01})
     cable = robot([beam(10.0, 1.4e4, 1.2, 8, turning())])
     return [
         Problem(

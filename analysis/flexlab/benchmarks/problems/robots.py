@@ -189,8 +189,8 @@ def slider(elements: int = 8) -> Tables:
     ride = {
         "type": "Pa",
         "angle_rad": 1.5707963267948966,
-        "start": 0.25,
-        "limits": [0.1, 0.4],
+        "start_m": 0.25,
+        "limits_m": [0.1, 0.4],
         "hub_mass_kg": 0.1,
     }
     arm = strip(0.5, (0.03, 0.003), elements, turning(hub_inertia_kg_m2=2e-3), **damped(2e-4))

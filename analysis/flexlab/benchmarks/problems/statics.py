@@ -76,7 +76,7 @@ def exudyn_tip(tables: Tables, elements: int, force: tuple[float, float]) -> Pro
             ends = [made.origin, joint.coordinate]
             mbs.AddObject(
                 item.ObjectConnectorCoordinate(
-                    markerNumbers=ends, offset=link["joint"].get("start", 0.0)
+                    markerNumbers=ends, offset=link["joint"].get("start_rad", 0.0)
                 )
             )
         end = mbs.AddMarker(item.MarkerNodePosition(nodeNumber=made.ends[-1][1]))

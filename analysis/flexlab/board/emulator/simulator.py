@@ -30,6 +30,7 @@ from pathlib import Path
 from typing import Any
 
 from flexura.errors import FlexuraError
+from flexura.optional import Missing
 
 from .simavr_patches import repair
 
@@ -103,10 +104,10 @@ _INTERFACE: dict[str, tuple[Any, tuple[Any, ...]]] = {
 
 def compile_shim() -> Path:
     """The shared library of shim/, from the cache or compiled now (under a second). Raises
-    FlexuraError that says what is missing."""
+    Missing, which says what to install."""
     config = _HEADERS / "sim_core_config.h"
     if not config.is_file():
-        raise FlexuraError(
+        raise Missing(
             f"the emulated board needs simavr, whose headers are not in {_HEADERS}; {_INSTALL}"
         )
     digest = hashlib.sha256(
@@ -140,7 +141,7 @@ def compile_shim() -> Path:
             )
         os.replace(name, target)
     except FileNotFoundError:
-        raise FlexuraError(
+        raise Missing(
             f"the emulated board needs a C compiler, and there is no cc; {_INSTALL}"
         ) from None
     finally:

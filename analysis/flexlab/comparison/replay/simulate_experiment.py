@@ -212,10 +212,10 @@ def _with_drives(robot: fx.Robot, carriage: JointLine, damping_N_m_s: float) -> 
     data = robot.to_dict()
     first, second = (link["joint"] for link in data["link"])
     more = (
-        (first, "viscous_friction", carriage.viscous_N_s_m),
-        (first, "coulomb_friction", carriage.coulomb_N),
-        (first, "rotor_inertia", carriage.reflected_mass_kg),
-        (second, "viscous_friction", damping_N_m_s),
+        (first, "viscous_friction_N_s_m", carriage.viscous_N_s_m),
+        (first, "coulomb_friction_N", carriage.coulomb_N),
+        (first, "rotor_mass_kg", carriage.reflected_mass_kg),
+        (second, "viscous_friction_N_m_s_rad", damping_N_m_s),
     )
     for joint, key, value in more:
         joint[key] = joint.get(key, 0.0) + value

@@ -20,7 +20,11 @@ import numpy as np
 
 import flexura as fx
 from flexura.errors import FlexuraError
+from flexura.optional import Optional
 from flexura.twin.links import CableLink, Frame, Ground, PointMass, beam_values, link_inertia
+
+exu = Optional("exudyn")
+eii = Optional("exudyn.itemInterface")
 
 STEP_S = 5e-4
 ELEMENTS = 3
@@ -53,7 +57,6 @@ class Mechanics:
             elements: cables of the strip.
             sensor_m: the part of the strip over which `bend_rad` integrates the curvature [m].
         """
-        import exudyn as exu
 
         self.step_s, self.x_m, self.angle_rad = step_s, *position
         self._start, self._turned = position[0], robot.links[0].joint.angle_rad
@@ -76,7 +79,6 @@ class Mechanics:
         self._read()
 
     def _build(self, robot: fx.Robot, position: tuple[float, float], elements: int) -> None:
-        from exudyn import itemInterface as eii
 
         mbs = self._mbs
         (carriage, strip), payload = robot.links, robot.payload
@@ -216,7 +218,6 @@ def _carriage_mass(robot: fx.Robot) -> float:
 
 
 def _settings(step_s: float) -> Any:
-    import exudyn as exu
 
     settings = exu.SimulationSettings()
     integration = settings.timeIntegration

@@ -12,6 +12,7 @@ import numpy as np
 
 from flexura.errors import InputError
 from flexura.io import Run
+from flexura.optional import load
 
 from ..labels import EMULATED, called, emulated
 
@@ -26,7 +27,7 @@ def write(run: Run) -> bytes:
     Units stand in the channels' metadata, the run's in the metadata record `flexura`. Raises
     InputError for a start that is no time, or a time before 1970.
     """
-    from mcap.writer import Writer
+    Writer = load("mcap.writer").Writer
 
     start = _start_ns(run)
     stamps = start + np.rint(run.t * 1e9).astype(np.int64)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from flexura.io import Run
+from flexura.optional import load
 
 from ..labels import EMULATED, called, emulated
 
@@ -23,7 +24,10 @@ def write(run: Run) -> bytes:
     Evenly sampled channels have a time base (`wf_start_offset`, `wf_increment`) besides the channel
     `time`.
     """
-    from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
+    ChannelObject = load("nptdms").ChannelObject
+    GroupObject = load("nptdms").GroupObject
+    RootObject = load("nptdms").RootObject
+    TdmsWriter = load("nptdms").TdmsWriter
 
     label = called(run)
     about: dict[str, Any] = {"name": label, "label": label, "flexura": json.dumps(run.meta)}

@@ -237,6 +237,7 @@ class Within:
         )
 
     def __call__(self, t: float) -> np.ndarray:
+        """The state at a time of the step [s]."""
         plan, modes, y, x, at = self.plan, self.modes, self.y, (t - self.t) / self.plan.h, 0.0
         f = np.einsum("pkj,kj->pj", plan.values, self.N) + plan.gap * self.gap
         for level in range(1, modes.halvings(plan.h) + 1):

@@ -15,9 +15,13 @@ from typing import Any
 
 import numpy as np
 
+from ...optional import Optional
 from ...robot import Joint, Link
 from ..links.part import Attachment, Frame
 from . import sliding
+
+eii = Optional("exudyn.itemInterface")
+exu, advanced = Optional("exudyn"), Optional("exudyn.advancedUtilities")
 
 FRICTION_SPEED = 1e-3  # m/s or rad/s: Coulomb friction is f tanh(velocity / this)
 
@@ -111,7 +115,6 @@ def connect(
 
 
 def _revolute(mbs: Any, joint: Joint, tip: Attachment, hub: Attachment) -> Any:
-    from exudyn import itemInterface as eii
 
     mbs.AddObject(eii.ObjectJointRevolute2D(markerNumbers=[tip.marker, hub.marker]))
     # counts whole turns
@@ -134,7 +137,6 @@ def _prismatic(
 ) -> Any:
     """`hub` slides on a line at the angle `axis` in the frame of `rail`, `turned` to it; the
     coordinate is where `end` is."""
-    from exudyn import itemInterface as eii
 
     along = [math.cos(axis), math.sin(axis), 0.0]
     normal = [math.sin(turned), math.cos(turned), 0.0]  # of the line, in the hub's frame
@@ -165,7 +167,6 @@ def add_drive_and_friction(
         speed: velocity at the start [m/s or rad/s].
         gains: stiffness and damping.
     """
-    from exudyn import itemInterface as eii
 
     load = mbs.AddLoad(eii.LoadCoordinate(markerNumber=marker, load=0.0))
     if joint.locked:
@@ -214,12 +215,9 @@ def add_drive_and_friction(
 
 def _friction(mbs: Any, spring: Any, coulomb: float) -> Any:
     """c v + f tanh(v / v0) (57) as an expression that Exudyn evaluates without Python."""
-    from exudyn import symbolic
-    from exudyn.advancedUtilities import CreateSymbolicUserFunction
-
-    tanh: Any = symbolic.tanh
+    tanh: Any = exu.symbolic.tanh
 
     def force(mbs, t, itemNumber, displacement, velocity, stiffness, damping, offset):  # type: ignore[no-untyped-def]
         return damping * velocity + coulomb * tanh(velocity / FRICTION_SPEED)
 
-    return CreateSymbolicUserFunction(mbs, force, "springForceUserFunction", spring)
+    return advanced.CreateSymbolicUserFunction(mbs, force, "springForceUserFunction", spring)

@@ -18,7 +18,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...optional import Optional
 from ..links.part import Attachment, Frame
+
+eii = Optional("exudyn.itemInterface")
 
 
 class Line(NamedTuple):
@@ -43,7 +46,6 @@ def rigid_carrier(
         frame: its start.
         negligible: mass and inertia of a new body, fixed to `held` if that is not rigid.
     """
-    from exudyn import itemInterface as eii
 
     if held.rigid:
         return held
@@ -79,7 +81,6 @@ def add_sliding_points(
     Returns:
         The node of the sliding coordinate, the beam's abscissa at the line's start.
     """
-    from exudyn import itemInterface as eii
 
     node = coordinate(mbs, start, speed)
     cables = beam.layer(mbs, node)
@@ -126,7 +127,6 @@ def coordinate(mbs: Any, start: float, speed: float) -> Any:
         start: value of the coordinate.
         speed: its rate.
     """
-    from exudyn import itemInterface as eii
 
     return mbs.AddNode(
         eii.NodeGenericODE2(
@@ -140,7 +140,6 @@ def coordinate(mbs: Any, start: float, speed: float) -> Any:
 
 def marker_of(mbs: Any, node: Any) -> Any:
     """The marker of such a node's coordinate."""
-    from exudyn import itemInterface as eii
 
     return mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=node, coordinate=0))
 
@@ -155,7 +154,6 @@ def complement(mbs: Any, node: Any, total: float, start: float, speed: float) ->
         start: value of the new coordinate.
         speed: its rate.
     """
-    from exudyn import itemInterface as eii
 
     own = coordinate(mbs, start, speed)
     markers = [marker_of(mbs, own), marker_of(mbs, node)]
@@ -166,7 +164,6 @@ def complement(mbs: Any, node: Any, total: float, start: float, speed: float) ->
 
 
 def _body(mbs: Any, frame: Frame, negligible: tuple[float, float]) -> Attachment:
-    from exudyn import itemInterface as eii
 
     node = mbs.AddNode(
         eii.NodeRigidBody2D(referenceCoordinates=list(frame[:3]), initialVelocities=list(frame[3:]))

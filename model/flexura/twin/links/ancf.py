@@ -13,8 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from ...optional import Optional
 from .part import Attachment, Frame, Motion, PointMass, add_gravity
 from .properties import BeamValues
+
+eii = Optional("exudyn.itemInterface")
 
 PROGRAM = "ObjectANCFCable2D"
 # elements of a stub as long as the link's, so that a sleeve's first spans are as stiff there
@@ -92,7 +95,6 @@ class CableLink:
         Returns:
             Their markers, along the beam.
         """
-        from exudyn import itemInterface as eii
 
         elements = [
             mbs.AddObject(
@@ -185,7 +187,6 @@ def _stub(length: float, size: float) -> np.ndarray:
 
 
 def _add_node(mbs: Any, here: Frame) -> Any:
-    from exudyn import itemInterface as eii
 
     (c, s), w = here.axis, here.omega
     place, speed = [here.x, here.y, c, s], [here.vx, here.vy, -w * s, w * c]
@@ -194,7 +195,6 @@ def _add_node(mbs: Any, here: Frame) -> Any:
 
 def _add_element(mbs: Any, values: BeamValues, k: int, nodes: tuple[Any, Any], size: float) -> Any:
     """Add element k of the link; others are stubs: as the link's end, but almost without mass."""
-    from exudyn import itemInterface as eii
 
     near = min(max(k, 0), len(values) - 1)
     return mbs.AddObject(
@@ -210,7 +210,6 @@ def _add_element(mbs: Any, values: BeamValues, k: int, nodes: tuple[Any, Any], s
 
 
 def _add_lump(mbs: Any, node: Any, lump: PointMass, gravity: tuple[float, float]) -> None:
-    from exudyn import itemInterface as eii
 
     if lump.mass == 0 and lump.inertia == 0:
         return
@@ -226,7 +225,6 @@ def _add_lump(mbs: Any, node: Any, lump: PointMass, gravity: tuple[float, float]
 
 
 def _end(mbs: Any, element: Any, x: float, node: Any) -> Attachment:
-    from exudyn import itemInterface as eii
 
     return Attachment(
         element, [x, 0.0, 0.0], mbs.AddMarker(eii.MarkerNodeRigid(nodeNumber=node)), rigid=False

@@ -10,8 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from ...optional import Optional
 from .part import Attachment, Frame, Motion, PointMass, add_gravity
 from .properties import BeamValues
+
+eii = Optional("exudyn.itemInterface")
 
 PROGRAM = "ObjectBeamGeometricallyExact2D"
 
@@ -33,7 +36,6 @@ class GeometricallyExactLink:
         frame: Frame,
         gravity: tuple[float, float],
     ) -> None:
-        from exudyn import itemInterface as eii
 
         self.values, self.hub, self.payload = values, hub, payload
         self.nodes = []
@@ -120,7 +122,6 @@ class GeometricallyExactLink:
 
 
 def _end(mbs: Any, node: Any, lump: PointMass, gravity: tuple[float, float]) -> Attachment:
-    from exudyn import itemInterface as eii
 
     # also without mass: a joint's coordinate needs a body, and the beam's elements don't offer one
     body = mbs.AddObject(

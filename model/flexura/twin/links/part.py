@@ -7,6 +7,10 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from ...optional import Optional
+
+eii = Optional("exudyn.itemInterface")
+
 
 class Frame(NamedTuple):
     """A link's straight start: position x, y [m], angle [rad], and their velocities."""
@@ -120,7 +124,6 @@ class Ground:
     @staticmethod
     def add(mbs: Any) -> Ground:
         """Add the base to Exudyn's system."""
-        from exudyn import itemInterface as eii
 
         body = mbs.AddObject(eii.ObjectGround())
         here = Attachment(
@@ -136,7 +139,6 @@ class Ground:
 
 def add_gravity(mbs: Any, body: Any, gravity: tuple[float, float]) -> None:
     """Put a body under gravity [m/s^2]."""
-    from exudyn import itemInterface as eii
 
     if any(gravity):
         marker = mbs.AddMarker(eii.MarkerBodyMass(bodyNumber=body))

@@ -6,8 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from ...optional import Optional
 from .part import Attachment, Frame, Motion, add_gravity
 from .properties import Inertia
+
+eii = Optional("exudyn.itemInterface")
 
 
 class RigidLink:
@@ -21,7 +24,6 @@ class RigidLink:
     def __init__(
         self, mbs: Any, length: float, inertia: Inertia, frame: Frame, gravity: tuple[float, float]
     ) -> None:
-        from exudyn import itemInterface as eii
 
         self.length, self.inertia = length, inertia
         m, c, about = inertia

@@ -1,0 +1,132 @@
+"""The joint of a link in the robot file: its keys carry the unit of what the joint does, turn or
+slide."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import Field, model_validator
+
+from ..errors import WrongValue
+from .table import Table
+
+# Quantities of a joint: the key of a joint that turns (R), and of one that slides (Pa, Pb).
+KEYS = {
+    "start": ("start_rad", "start_m"),
+    "limits": ("limits_rad", "limits_m"),
+    "rotor_inertia": ("rotor_inertia_kg_m2", "rotor_mass_kg"),
+    "viscous_friction": ("viscous_friction_N_m_s_rad", "viscous_friction_N_s_m"),
+    "coulomb_friction": ("coulomb_friction_N_m", "coulomb_friction_N"),
+}
+
+
+def key_of(quantity: str, type: object) -> str:
+    """The key of a quantity for a joint of this type: `start` of a joint R is `start_rad`.
+
+    Args:
+        quantity: a name of `KEYS`, or any other, which is its own key.
+        type: "R", "Pa" or "Pb".
+    """
+    turning, sliding = KEYS.get(quantity, (quantity, quantity))
+    return turning if type == "R" else sliding
+
+
+def _limits(unit: str) -> Any:
+    text = f"two numbers, the lower limit and a higher upper limit, in {unit}"
+    return Field(None, strict=False, description=text)
+
+
+def _number(what: str, unit: str) -> Any:
+    return Field(0.0, ge=0, description=f"{what} in {unit}, 0 or more")
+
+
+class Joint(Table):
+    """The joint at the proximal side of a link: R, Pa or Pb (dissertation, table 2.1).
+
+    `start`, `limits`, `rotor_inertia`, `viscous_friction` and `coulomb_friction` are the values in
+    the joint's own unit, whichever key holds them.
+    """
+
+    type: Literal["R", "Pa", "Pb"] = Field(description='the joint type, "R", "Pa" or "Pb"')
+    angle_rad: float = Field(
+        0.0,
+        ge=-7,
+        le=7,
+        description="the fixed angle gamma of a Pa or Pb in radians, between -7 and 7",
+    )
+    start_rad: float = Field(
+        0.0, description="the position of a joint R at the start in radians, a finite number"
+    )
+    start_m: float = Field(
+        0.0,
+        description=(
+            "the position of a joint Pa or Pb at the start in metres (Pb: the free length), a "
+            "finite number"
+        ),
+    )
+    limits_rad: tuple[float, float] | None = _limits("radians, of a joint R")
+    limits_m: tuple[float, float] | None = _limits("metres, of a joint Pa or Pb")
+    hub_mass_kg: float = Field(0.0, ge=0, description="the hub's mass in kilograms, 0 or more")
+    hub_inertia_kg_m2: float = Field(
+        0.0, ge=0, description="the hub's inertia in kg m^2, 0 or more"
+    )
+    rotor_inertia_kg_m2: float = _number("the rotor's inertia reflected to a joint R", "kg m^2")
+    rotor_mass_kg: float = _number("the rotor's inertia reflected to a joint Pa or Pb", "kg")
+    viscous_friction_N_m_s_rad: float = _number("viscous friction of a joint R", "N m s/rad")
+    viscous_friction_N_s_m: float = _number("viscous friction of a joint Pa or Pb", "N s/m")
+    coulomb_friction_N_m: float = _number("Coulomb friction of a joint R", "N m")
+    coulomb_friction_N: float = _number("Coulomb friction of a joint Pa or Pb", "N")
+    locked: bool = Field(False, description="true (the joint is clamped at its start) or false")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Joint:
+        for quantity, (turning, sliding) in KEYS.items():
+            wrong = sliding if self.type == "R" else turning
+            value = getattr(self, wrong)
+            if wrong in self.model_fields_set and value != type(self).model_fields[wrong].default:
+                right = key_of(quantity, self.type)
+                raise WrongValue(wrong, value, f"none: a joint {self.type} has {right}")
+        if self.type == "R" and self.angle_rad != 0:
+            raise WrongValue(
+                "angle_rad",
+                self.angle_rad,
+                "no fixed angle: a joint R turns; use start_rad for its first position",
+            )
+        if self.limits is not None:
+            key, given = self.key("limits"), list(self.limits)
+            if not self.limits[0] < self.limits[1]:
+                raise WrongValue(key, given, "the lower limit first, then a higher upper limit")
+            if not self.limits[0] <= self.start <= self.limits[1]:
+                raise WrongValue(
+                    key, given, f"limits that contain the start position, {self.start:g}"
+                )
+        return self
+
+    def key(self, quantity: str) -> str:
+        """The key that holds a quantity of this joint."""
+        return key_of(quantity, self.type)
+
+    @property
+    def start(self) -> float:
+        """The position at the start [rad, m]; Pb: the free length."""
+        return self.start_rad if self.type == "R" else self.start_m
+
+    @property
+    def limits(self) -> tuple[float, float] | None:
+        """The lower and the upper limit [rad, m], or None."""
+        return self.limits_rad if self.type == "R" else self.limits_m
+
+    @property
+    def rotor_inertia(self) -> float:
+        """The rotor's inertia reflected to the joint [kg m^2, kg]."""
+        return self.rotor_inertia_kg_m2 if self.type == "R" else self.rotor_mass_kg
+
+    @property
+    def viscous_friction(self) -> float:
+        """Viscous friction [N m s/rad, N s/m]."""
+        return self.viscous_friction_N_m_s_rad if self.type == "R" else self.viscous_friction_N_s_m
+
+    @property
+    def coulomb_friction(self) -> float:
+        """Coulomb friction [N m, N]."""
+        return self.coulomb_friction_N_m if self.type == "R" else self.coulomb_friction_N
