@@ -46,8 +46,8 @@ class Sensors:
 
     encoder_1: float = 0.0  # motor encoder, counts (x4), fractions too
     encoder_2: float = 0.0  # encoder of joint 2
-    flex_V: float = 2.5  # at A0
-    supply_V: float = 2.45  # at A1, behind the divider
+    flex_V: float = 2.5  # at pin flex
+    supply_V: float = 2.45  # at pin supply, behind the divider
     limit_low: bool = False  # hit
     limit_high: bool = False
     emergency_stop: bool = False  # pressed
@@ -119,10 +119,10 @@ class EmulatedBoard:
         simulator = self.simulator
         window = simulator.window
         window.encoder[0], window.encoder[1] = sensors.encoder_1, sensors.encoder_2
-        for channel, value in enumerate((sensors.flex_V, sensors.supply_V)):
-            if self._volts[channel] != value:
-                self._volts[channel] = value
-                simulator.adc(channel, round(1000 * min(max(value, 0.0), 5.0)))
+        for k, (name, value) in enumerate((("flex", sensors.flex_V), ("supply", sensors.supply_V))):
+            if self._volts[k] != value:
+                self._volts[k] = value
+                simulator.adc(PINS[name].bit, round(1000 * min(max(value, 0.0), 5.0)))
         if self._switches != (
             switches := (sensors.limit_low, sensors.limit_high, sensors.emergency_stop)
         ):
