@@ -104,9 +104,9 @@ struct Done {
 
 int c_board(const float *values, const Told *rows, uint32_t size, Done *done) {
   Rig rig;
-  Config config;
-  memcpy(config.values, values, sizeof config.values);
-  rig.begin(&config, 0);
+  Stored stored = {Config(), 1};
+  memcpy(stored.config.values, values, sizeof stored.config.values);
+  rig.begin(&stored, 0, 1);
   if (rig.state() != State::idle)
     return 100 + rig.wrong_item();
   Outputs out;

@@ -37,13 +37,15 @@ def execute(
     settle_s: float,
     stop_asked: Callable[[], str],
     observe: Callable[[np.ndarray, float], None],
+    broken: str = "",
 ) -> Ended:
     """Play the knots and hold the last one for `settle_s`; returns how that ended, with the motors
     told to stop.
 
     `stop_asked()` says why to end early, or ""; `observe(reports, part)` gets the new reports and
     which part of the time is over. What is wrong with line, board or disk ends the experiment and
-    is in the result, not raised.
+    is in the result, not raised. `broken` says what is known to be broken: then it is never
+    complete.
     """
     text, interrupted, wrong = "", False, None
     try:
@@ -53,6 +55,8 @@ def execute(
     stopped = quiet(link)
     if wrong is not None:
         text = _behind(link, wrong)
+    if broken:
+        text = f"{broken}: {text or 'the board noticed nothing'}"
     complete, text = text == "", text or "all done"
     if not stopped:
         text += "; no answer to the stop: the board stops by itself when it hears nothing"

@@ -29,8 +29,9 @@ from ctypes import (
 from pathlib import Path
 from typing import Any
 
-from flexura.errors import FlexuraError
+from flexura.errors import FlexuraError, InputError
 
+from .elf import check
 from .simavr_patches import repair
 
 CLOCK_HZ = 16_000_000
@@ -78,6 +79,7 @@ _INTERFACE: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "board_free": (None, (c_void_p,)),
     "board_window": (ctypes.POINTER(Window), (c_void_p,)),
     "board_line": (c_int, (c_void_p, c_char, c_int, c_int, c_int, c_int)),
+    "board_cut": (None, (c_void_p, c_uint32, c_int)),
     "board_trace": (None, (c_void_p, c_uint32, c_int)),
     "board_encoder": (None, (c_void_p, c_int, c_char, c_int, c_char, c_int)),
     "board_pin": (None, (c_void_p, c_uint64, c_char, c_int, c_int)),
@@ -165,10 +167,11 @@ class Simulator:
     """
 
     def __init__(self, elf: Path, baud: int, slice_cycles: int = 1000) -> None:
+        check(elf)
         self._lib = _library()
-        handle = self._lib.board_new(os.fsencode(elf), CLOCK_HZ, baud) if elf.is_file() else None
+        handle = self._lib.board_new(os.fsencode(elf), CLOCK_HZ, baud)
         if not handle:
-            raise FlexuraError(f"{elf}: expected an ELF file of a firmware for the ATmega2560")
+            raise InputError("expected an ELF file of a firmware for the ATmega2560", file=str(elf))
         self._board = c_void_p(handle)
         self._run, self._slice = self._lib.board_run, slice_cycles
         self.window: Window = self._lib.board_window(self._board).contents
@@ -211,6 +214,10 @@ class Simulator:
         if number < 0:
             raise FlexuraError("too many watched pins")
         return number
+
+    def cut(self, line: int, broken: bool) -> None:
+        """Break the wire of a watched output pin, or mend it: what it led to is at rest."""
+        self._lib.board_cut(self._board, line, broken)
 
     def trace(self, line: int, on: bool) -> None:
         self._lib.board_trace(self._board, line, on)

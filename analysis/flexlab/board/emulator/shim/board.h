@@ -44,6 +44,7 @@ typedef struct {
   avr_irq_t *irq;
   uint32_t index, traced;
   uint8_t role, rest, level; /* rest: the level without the firmware, given by the rig's resistors */
+  uint8_t cut;               /* the wire is broken: what it led to is at rest */
 } line_t;
 
 typedef struct {
@@ -75,6 +76,7 @@ struct board {
   uint8_t level_of[8]; /* by role */
   const avr_timer_t *timer[STEP + 1]; /* of the compare pins, by role, and their comparators */
   const avr_timer_comp_t *comparator[STEP + 1];
+  uint8_t cut[STEP_DISABLE + 1]; /* by role: its wire is broken */
   int unsettled;       /* a line is not at the level that simavr believes */
   int motor;           /* -1, 0, 1: how the pins drive the motor now */
   uint64_t motor_since;

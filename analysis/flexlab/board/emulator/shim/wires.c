@@ -60,7 +60,7 @@ void turn(board_t *b, encoder_t *encoder, double position, uint64_t begin, uint6
 
 static int always_on(const board_t *b, int role) {
   const avr_timer_comp_t *comparator = b->comparator[role];
-  if (!comparator || avr_regbit_get(b->avr, comparator->com) != avr_timer_com_clear) return 0;
+  if (!comparator || b->cut[role] || avr_regbit_get(b->avr, comparator->com) != avr_timer_com_clear) return 0;
   const uint8_t *data = b->avr->data;
   const avr_timer_t *timer = b->timer[role];
   return (data[comparator->r_ocr] | data[comparator->r_ocrh] << 8) >= (data[timer->r_icr] | data[timer->r_icrh] << 8);
@@ -84,7 +84,7 @@ static void on_edge(struct avr_irq_t *irq, uint32_t value, void *param) {
   (void)irq;
   line_t *line = param;
   board_t *b = line->board;
-  const uint8_t level = value & 1;
+  const uint8_t level = line->cut ? line->rest : value & 1;
   if (level == line->level) return;
   if (line->role == STEP && b->comparator[STEP]) {
     const uint8_t mode = avr_regbit_get(b->avr, b->comparator[STEP]->com);
@@ -123,7 +123,8 @@ static void follow_timer(board_t *b, char port, int bit, int role) {
 /* Has simavr believe what the lines are. */
 void settle(board_t *b) {
   b->unsettled = 0;
-  for (uint32_t i = 0; i < b->line_count; ++i) b->lines[i].irq->value = b->lines[i].level; /* simavr tells of changes only */
+  for (uint32_t i = 0; i < b->line_count; ++i) /* simavr tells of changes only */
+    if (!b->lines[i].cut) b->lines[i].irq->value = b->lines[i].level;
 }
 
 /* After a reset every pin is an input: outputs are pulled to rest by the rig's resistors, inputs keep their levels. */
@@ -149,6 +150,15 @@ int board_line(board_t *b, char port, int bit, int role, int rest, int traced) {
   if (role == FORWARD || role == REVERSE || role == STEP) follow_timer(b, port, bit, role);
   avr_irq_register_notify(irq, on_edge, line);
   return (int)line->index;
+}
+
+/* Breaks the wire of a line, or mends it: then it has the level that the pin's output has. */
+void board_cut(board_t *b, uint32_t n, int broken) {
+  line_t *line = &b->lines[n];
+  line->cut = (uint8_t)(broken != 0);
+  if (line->role) b->cut[line->role] = line->cut;
+  on_edge(NULL, line->irq->value & 1, line);
+  if (line->role) on_drive(b);
 }
 
 void board_trace(board_t *b, uint32_t line, int on) { b->lines[line].traced = (uint32_t)on; }
