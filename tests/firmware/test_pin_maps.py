@@ -12,6 +12,7 @@ import pytest
 from pin_maps import ROOT, build, checkout, declare, declared, illegal, legal, pins, place
 
 SLOW = pytest.mark.slow
+pytestmark = pytest.mark.timeout(1200)  # ten seconds of a processor, minutes of a busy one
 
 
 def switches_on_ports_that_no_instruction_reaches():

@@ -186,6 +186,8 @@ def conduct(
         )
         watch.tested(findings)
         if failed := [finding for finding in findings if not finding.passed]:
+            if why := watch.stop_asked():
+                raise NotStarted(f"not started: {why}")
             first = failed[0]
             raise BoardError(
                 f"{link.board.label}: self-test: {first.what}: {first.found}; expected "

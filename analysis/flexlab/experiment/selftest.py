@@ -16,7 +16,7 @@ import numpy as np
 
 from ..board.base import BoardError
 from ..board.commissioning import Program, program, where
-from ..board.protocol.declaration import FAULTS, PINS_HASH, Fault, Flag, State
+from ..board.protocol.declaration import FAULTS, PINS_HASH, Fault, Flag, Result, State
 from ..board.protocol.session import Identity, Link, Refused
 from ..recordings.unit_conversion import reading
 from .flash import single
@@ -105,7 +105,9 @@ def prepare(
             out.append(
                 Finding("fault", True, f"{fault.name} of before, cleared", "none that lasts")
             )
-        except Refused:
+        except Refused as refused:
+            if refused.result is Result.fault_persists:  # perhaps because of another one
+                fault = Fault(refused.detail)
             out.append(
                 Finding(
                     "fault",
