@@ -18,7 +18,6 @@ from ctypes import (
     c_char,
     c_char_p,
     c_int,
-    c_int64,
     c_size_t,
     c_uint8,
     c_uint16,
@@ -29,9 +28,9 @@ from ctypes import (
 from pathlib import Path
 from typing import Any
 
-from flexura.errors import FlexuraError, InputError
+from flexura.errors import FlexuraError
 
-from .elf import check
+from .elf import read
 from .simavr_patches import repair
 
 CLOCK_HZ = 16_000_000
@@ -75,7 +74,7 @@ class Edge(ctypes.Structure):
 
 
 _INTERFACE: dict[str, tuple[Any, tuple[Any, ...]]] = {
-    "board_new": (c_void_p, (c_char_p, c_uint32, c_uint32)),
+    "board_new": (c_void_p, (c_char_p, c_uint32, c_uint32, c_uint32)),
     "board_free": (None, (c_void_p,)),
     "board_window": (ctypes.POINTER(Window), (c_void_p,)),
     "board_line": (c_int, (c_void_p, c_char, c_int, c_int, c_int, c_int)),
@@ -97,7 +96,6 @@ _INTERFACE: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "board_flash": (ctypes.POINTER(c_uint8), (c_void_p,)),
     "board_reset": (None, (c_void_p, c_uint8)),
     "board_eeprom": (c_int, (c_void_p, c_int, c_void_p, c_uint16, c_uint32)),
-    "board_symbol": (c_int64, (c_void_p, c_char_p)),
     "board_vector": (None, (c_void_p, c_int, c_uint64 * 4)),
     "board_log": (c_char_p, (c_void_p,)),
 }
@@ -167,11 +165,12 @@ class Simulator:
     """
 
     def __init__(self, elf: Path, baud: int, slice_cycles: int = 1000) -> None:
-        check(elf)
+        program = read(elf)
+        self._symbols = program.symbols
         self._lib = _library()
-        handle = self._lib.board_new(os.fsencode(elf), CLOCK_HZ, baud)
+        handle = self._lib.board_new(program.flash, len(program.flash), CLOCK_HZ, baud)
         if not handle:
-            raise InputError("expected an ELF file of a firmware for the ATmega2560", file=str(elf))
+            raise FlexuraError("simavr knows no ATmega2560")
         self._board = c_void_p(handle)
         self._run, self._slice = self._lib.board_run, slice_cycles
         self.window: Window = self._lib.board_window(self._board).contents
@@ -283,10 +282,9 @@ class Simulator:
 
     def symbol(self, name: str) -> int:
         """The address of a symbol of the ELF file; data addresses count from 0."""
-        address = self._lib.board_symbol(self._board, name.encode())
-        if address < 0:
+        if name not in self._symbols:
             raise FlexuraError(f"the firmware has no symbol {name}")
-        return address & 0x7FFFFF
+        return self._symbols[name] & 0x7FFFFF
 
     def patch(self, address: int, words: Iterable[int]) -> None:
         """Overwrite flash with instruction words, to make the firmware misbehave where a test wants

@@ -8,7 +8,6 @@
 #include "avr_timer.h"
 #include "avr_watchdog.h"
 #include "sim_avr.h"
-#include "sim_elf.h"
 
 enum { ENCODERS = 2, LINES = 16, VECTORS = 64, PORTS = 12, MCUSR = 0x54, WATCHDOG_RESET = 8, TIMSK0 = 0x6E, TIMERS = 6 };
 enum { ON_PIN, ON_ADC };
@@ -88,8 +87,6 @@ struct board {
   uint64_t entered[VECTORS], longest[VECTORS], own[VECTORS], total[VECTORS], entries[VECTORS];
   uint32_t stack[VECTORS], depth;
   uint64_t nested[VECTORS]; /* by depth: cycles that others took meanwhile */
-  avr_symbol_t **symbols;
-  uint32_t symbol_count;
   char log[1 << 14];
   size_t log_used;
 };

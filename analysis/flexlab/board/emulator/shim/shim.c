@@ -110,23 +110,21 @@ void board_free(board_t *b) {
   free(b->inputs.at), free(b->to_uart.at), free(b->from_uart.at), free(b->edges.at), free(b);
 }
 
-board_t *board_new(const char *elf, uint32_t hz, uint32_t baud) {
-  static elf_firmware_t firmware; /* large; read at once and its parts kept by simavr */
-  memset(&firmware, 0, sizeof firmware);
+/* `flash`: what the flash holds from address 0 on; the rest is erased. */
+board_t *board_new(const uint8_t *flash, uint32_t size, uint32_t hz, uint32_t baud) {
   avr_global_logger_set(on_log);
-  if (elf_read_firmware(elf, &firmware)) return NULL;
   board_t *b = calloc(1, sizeof *b);
   if (!b) return NULL;
   b->inputs.size = sizeof(input_t), b->edges.size = sizeof(edge_t), b->to_uart.size = b->from_uart.size = 1;
   b->byte_cycles = 11ull * hz / baud;
-  b->symbols = firmware.symbol, b->symbol_count = firmware.symbolcount;
   avr_t *avr = b->avr = avr_make_mcu_by_name("atmega2560");
   if (!avr) return board_free(b), NULL;
   avr->custom.data = b;
   avr_init(avr);
   avr->log = LOG_WARNING;
   avr->vcc = avr->avcc = avr->aref = 5000;
-  avr_load_firmware(avr, &firmware);
+  avr_loadcode(avr, (uint8_t *)flash, size, 0);
+  avr->codeend = size;
   avr->frequency = hz;
   avr->sleep = no_sleep;
   b->core_reset = avr->reset;
@@ -241,13 +239,6 @@ void board_reset(board_t *b, uint8_t cause) {
 int board_eeprom(board_t *b, int write, uint8_t *bytes, uint16_t offset, uint32_t size) {
   avr_eeprom_desc_t d = {.ee = bytes, .offset = offset, .size = size};
   return avr_ioctl(b->avr, write ? AVR_IOCTL_EEPROM_SET : AVR_IOCTL_EEPROM_GET, &d);
-}
-
-/* The address of a symbol of the ELF file (data at 0x800000 and above), or -1. */
-int64_t board_symbol(const board_t *b, const char *name) {
-  for (uint32_t i = 0; i < b->symbol_count; ++i)
-    if (!strcmp(b->symbols[i]->symbol, name)) return b->symbols[i]->addr;
-  return -1;
 }
 
 /* into: entries, cycles in all, cycles of the longest, cycles of the longest without those that interrupted it. */
