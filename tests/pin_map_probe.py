@@ -61,10 +61,31 @@ def motion() -> dict[str, object]:
         }
 
 
+def duty(voltage: float) -> float:
+    """The motor's mean voltage / supply with a constant voltage asked for."""
+    with Rigged(speed_max_1_m_s=1.0, position_min_1_m=-1.0) as r:
+        r.go(r.open_loop(voltage, 0.0), 0.05)
+        windows = []
+        for _ in range(200):
+            r.board.step()
+            r.link.poll()
+            windows.append(r.board.outputs.duty)
+        return sum(windows) / len(windows)
+
+
 if __name__ == "__main__":
     rows = {name: measure(name, "debian") for name in CASES}
     found = {
         name: {"fault": row.fault.name, "ticks": row.after_cause / TICK}
         for name, row in rows.items()
     }
-    print(json.dumps({"clock_Hz": CLOCK_HZ, "motion": motion(), "broken": found}))
+    print(
+        json.dumps(
+            {
+                "clock_Hz": CLOCK_HZ,
+                "motion": motion(),
+                "duty": [duty(6.0), duty(-6.0)],
+                "broken": found,
+            }
+        )
+    )

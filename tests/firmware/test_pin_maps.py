@@ -16,9 +16,15 @@ pytestmark = pytest.mark.timeout(1200)  # ten seconds of a processor, minutes of
 
 
 def switches_on_ports_that_no_instruction_reaches():
-    """Stop and limits at ports H, K and G: read by other instructions than at port A."""
+    """Stop and limits at ports H, K and G: read by other instructions than at port A. An output
+    beside the PWM's: written a thousand times a second."""
     out = declared()
-    for name, port in (("emergency_stop", "PH6"), ("limit_low", "PK7"), ("limit_high", "PG5")):
+    for name, port in {
+        "emergency_stop": "PH6",
+        "limit_low": "PK7",
+        "limit_high": "PG5",
+        "busy": "PH0",
+    }.items():
         place(out[name], port)
     return out
 
@@ -43,6 +49,7 @@ def works(copy, wanted):
     assert probe.returncode == 0, probe.stderr
     found = json.loads(probe.stdout)
     motion, broken = found["motion"], found["broken"]
+    assert found["duty"] == pytest.approx([0.5, -0.5], abs=2e-3)
     assert motion["carriage_m"] == pytest.approx([0.02, 0.0], abs=2e-3)
     assert motion["joint_rad"] == pytest.approx([0.8, 0.0], abs=0.02)
     assert motion["encoders"] == pytest.approx([0.0, 0.0], abs=0.02)

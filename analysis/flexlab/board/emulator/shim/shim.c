@@ -12,6 +12,7 @@
  *   - fast PWM with OCRnx at TOP, which is always on, shows no level at the pin: read from the registers;
  *   - a timer's interrupt that falls due while it is masked is forgotten: raised when it is unmasked;
  *   - a watchdog whose interrupt nobody serves never resets: it does with its next time-out;
+ *   - a write to a port ends the PWM pulses of its pins: ignored;
  *   - without PWM, a compare pin that is to be set is cleared when the timer overflows or another OCRnx is written: ignored;
  *   - a byte of the UART takes 11 bit times, not 10 (left as it is: slower than the hardware).
  */

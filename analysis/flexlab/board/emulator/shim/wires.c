@@ -66,6 +66,13 @@ static int always_on(const board_t *b, int role) {
   return (data[comparator->r_ocr] | data[comparator->r_ocrh] << 8) >= (data[timer->r_icr] | data[timer->r_icrh] << 8);
 }
 
+/* A write to a port has simavr believe that the PWM outputs on it are low, in the middle of their pulse. */
+static int still_high(const board_t *b, int role) {
+  const avr_timer_comp_t *comparator = b->comparator[role];
+  if (!comparator || avr_regbit_get(b->avr, comparator->com) != avr_timer_com_clear) return 0;
+  return b->avr->cycle - b->timer[role]->tov_base < comparator->comp_cycles;
+}
+
 /* The drivers' inputs changed: what they did until now goes into the sums. */
 void on_drive(board_t *b) {
   const uint64_t now = b->avr->cycle;
@@ -86,6 +93,10 @@ static void on_edge(struct avr_irq_t *irq, uint32_t value, void *param) {
   board_t *b = line->board;
   const uint8_t level = line->cut ? line->rest : value & 1;
   if (level == line->level) return;
+  if ((line->role == FORWARD || line->role == REVERSE) && !level && !line->cut && still_high(b, line->role)) {
+    b->unsettled = 1;
+    return;
+  }
   if (line->role == STEP && b->comparator[STEP]) {
     const uint8_t mode = avr_regbit_get(b->avr, b->comparator[STEP]->com);
     if (mode == (level ? avr_timer_com_clear : avr_timer_com_set)) { /* not what that mode can do */
