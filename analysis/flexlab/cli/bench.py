@@ -52,6 +52,8 @@ app = typer.Typer(
     ),
 )
 
+TOLD_BY_JSON = "kind emulated label experiment complete line delays firmware".split()
+
 RigFile = Annotated[
     Path | None, typer.Argument(metavar="RIG", help="rig file (TOML); default firmware/rig.toml")
 ]
@@ -438,19 +440,7 @@ def _run(rig: Path | None, ask: Any, options: BenchOptions, gains: Path | None =
         except steps.NotStarted as error:
             typer.echo(f"flexura: {error}", err=True)
             raise typer.Exit(130) from None
-    kept = {
-        key: done.run.meta[key]
-        for key in (
-            "kind",
-            "emulated",
-            "label",
-            "experiment",
-            "complete",
-            "line",
-            "delays",
-            "firmware",
-        )
-    }
+    kept = {key: done.run.meta[key] for key in TOLD_BY_JSON}
     show(
         options.json,
         lambda: result_table(done),
