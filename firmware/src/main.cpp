@@ -12,8 +12,9 @@
 #include "stepper.h"
 #include "uart.h"
 
+// The emergency stop is proven for one firmware: it must have its hash.
 #ifndef FLEXURA_FIRMWARE_HASH
-#error "build with PlatformIO, as platformio.ini says: the emergency stop is proven for one firmware"
+#error "build with PlatformIO, as platformio.ini says"
 #endif
 
 using flexura::Fault;
@@ -182,8 +183,7 @@ void poll_commands() {
 
 void poll_eeprom_save() {
   if (!board.session.saving()) return;
-  if (board.session.begin_saving())
-    eeprom::begin_save({board.rig.config(), board.rig.proven()});
+  if (board.session.begin_saving()) eeprom::begin_save({board.rig.config(), board.rig.proven()});
   const eeprom::Progress progress = eeprom::save();
   if (progress == eeprom::Progress::busy) return;
   uint8_t frame[flexura::kFrameMaxBytes];

@@ -724,8 +724,8 @@ static void resets_are_told() {
   CHECK(rig.fault() == Fault::watchdog);
   begin(config, 1 << static_cast<uint8_t>(Reset::brown_out));
   CHECK(rig.fault() == Fault::brown_out);
-  begin(config, 1 << static_cast<uint8_t>(Reset::brown_out) |
-                    1 << static_cast<uint8_t>(Reset::power_on));
+  begin(config,
+        1 << static_cast<uint8_t>(Reset::brown_out) | 1 << static_cast<uint8_t>(Reset::power_on));
   CHECK(rig.fault() == Fault::none);
 }
 
