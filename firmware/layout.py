@@ -13,6 +13,7 @@ ENUMERATIONS = {
     "results": "Result",
     "flags": "Flag",
     "resets": "Reset",
+    "stop_trials": "StopTrial",
 }
 TYPES = {
     "u8": ("uint8_t", "B"),

@@ -5,6 +5,8 @@ A map is refused if a pin appears twice, does not exist, or cannot do what its f
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -191,6 +193,12 @@ def check(pins: dict[str, Any]) -> None:
         )
 
 
+def digest(pins: dict[str, Any]) -> int:
+    """Hash of which function is where."""
+    where = {name: port_of(entry) for name, entry in sorted(pins.items())}
+    return int.from_bytes(hashlib.sha256(json.dumps(where).encode()).digest()[:4], "little")
+
+
 def _special(name: str, unit: str) -> list[str]:
     """Registers and bits of the unit behind a pin."""
     if unit.startswith("INT"):
@@ -216,7 +224,8 @@ def _special(name: str, unit: str) -> list[str]:
 
 def header(pins: dict[str, Any], said: str) -> str:
     """The C++ header: a struct a pin. Registers are references: one instruction sets a bit."""
-    out = [f"// {said}", "#pragma once", "#include <avr/io.h>", "", "namespace pin {"]
+    out = [f"// {said}", "#pragma once", "#include <avr/io.h>", "", "namespace pin {", ""]
+    out.append(f"constexpr uint32_t kHash = 0x{digest(pins):08X};  // which function is where")
     for name, entry in pins.items():
         port, bit, unit = entry["port"], entry["bit"], unit_of(name, entry)
         out += [

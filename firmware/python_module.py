@@ -6,6 +6,7 @@ import json
 from typing import Any
 
 from layout import ENUMERATIONS, split, struct_format
+from pins import digest as hash_of_pins
 from pins import number_of
 
 _TYPES = '''
@@ -134,7 +135,8 @@ def module(declared: dict[str, Any], digest: int, said: str) -> str:
             json.dumps(item["text"]),
         ]
         out += _call("    ", f"{json.dumps(name)}: Item", values)
-    out += ["}", "", "PINS: dict[str, Pin] = {"]
+    out += ["}", "", f"PINS_HASH = 0x{hash_of_pins(declared['pins']):08X}"]
+    out += ["PINS: dict[str, Pin] = {"]
     for name, entry in declared["pins"].items():
         values = [json.dumps(number_of(entry)), json.dumps(entry["port"]), str(entry["bit"])]
         out += _call(

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from flexlab import rig
 from flexlab.board.base import BoardError
+from flexlab.board.commissioning import commission
 from flexlab.board.emulator.emulated import EmulatedBoard
 from flexlab.board.emulator.simulator import CLOCK_HZ
 from flexlab.board.protocol.declaration import Fault, State
@@ -46,6 +47,8 @@ def configured(compiler: str, settings: tuple[tuple[str, float], ...]) -> bytes:
     link = Link(board, sequence=7)
     link.connect()
     link.write_configuration(rig.configuration(BENCH) | dict(settings))
+    link.command("clear", fault=Fault.bad_configuration)
+    assert commission(link).may_move
     image = board.simulator.read_eeprom(0, 4096)
     finish(board)
     return image

@@ -53,8 +53,8 @@ FLOORS = {
     ],
 }
 MAX_LINES = 400
+GENERATED = {"flexlab.board.protocol.declaration"}  # tables, not to be read through
 LONGER = {
-    "flexlab.board.protocol.declaration": "generated: tables, not to be read through",
     "flexlab.review.writer": "one archetype after another",
     "flexlab.cli.bench": "seven commands",
 }
@@ -239,7 +239,7 @@ def test_a_bare_import_of_the_model_loads_nothing_heavy():
 @pytest.mark.parametrize("module", MODULES)
 def test_a_module_can_be_read_in_one_sitting(module):
     lines = len(MODULES[module].read_text().splitlines())
-    assert lines <= (500 if module in LONGER else MAX_LINES)
+    assert module in GENERATED or lines <= (500 if module in LONGER else MAX_LINES)
 
 
 @pytest.mark.parametrize("module", MODULES)

@@ -12,6 +12,11 @@
 #include "stepper.h"
 #include "uart.h"
 
+// The emergency stop is proven for one firmware: it must have its hash.
+#ifndef FLEXURA_FIRMWARE_HASH
+#error "build with PlatformIO, as platformio.ini says"
+#endif
+
 using flexura::Fault;
 using flexura::State;
 
@@ -20,7 +25,8 @@ namespace {
 // All that the main loop and the control interrupt keep.
 struct Board {
   flexura::Rig rig;
-  flexura::Build build = {{0, 1, 0}, {__GNUC__, __GNUC_MINOR__, __GNUC_PATCHLEVEL__}, 0};
+  flexura::Build build = {
+      {0, 1, 0}, {__GNUC__, __GNUC_MINOR__, __GNUC_PATCHLEVEL__}, 0, pin::kHash};
   flexura::Session session{rig, build};
 
   // Control interrupt.
@@ -145,9 +151,9 @@ void setup() {
   sensors::begin();
   uart::begin();
 
-  flexura::Config stored;
+  flexura::Stored stored;
   const bool found = eeprom::load(stored);
-  board.rig.begin(found ? &stored : nullptr, reset_cause);
+  board.rig.begin(found ? &stored : nullptr, reset_cause, FLEXURA_FIRMWARE_HASH);
 
   // Timer 5 runs free at 2 MHz: OC5A gives the control ticks, another output the step edges.
   TCCR5A = 0;
@@ -177,7 +183,7 @@ void poll_commands() {
 
 void poll_eeprom_save() {
   if (!board.session.saving()) return;
-  if (board.session.begin_saving()) eeprom::begin_save(board.rig.config());
+  if (board.session.begin_saving()) eeprom::begin_save({board.rig.config(), board.rig.proven()});
   const eeprom::Progress progress = eeprom::save();
   if (progress == eeprom::Progress::busy) return;
   uint8_t frame[flexura::kFrameMaxBytes];
@@ -229,8 +235,11 @@ void feed_watchdog(uint32_t now) {
   board.last_tick = now;
   wdt_reset();
   const State state = board.rig.state();
-  // After a fault the watchdog may have spent its interrupt.
-  if (board.last_state == State::fault && state == State::idle) start_watchdog();
+  // In a fault the watchdog may have spent its interrupt, and said so for the next reset.
+  if (board.last_state == State::fault && state != State::fault) {
+    marker.magic = 0;
+    start_watchdog();
+  }
   board.last_state = state;
 }
 

@@ -45,11 +45,8 @@ void drive(int16_t duty) {
   }
 }
 
-bool enabled() { return pin::motor_enable::port() & pin::motor_enable::mask; }
+void enable(bool on) { pin::set<pin::motor_enable>(on); }
 
-// Written only when it changes: simavr ends the PWM pulse of a port that is written.
-void enable(bool on) {
-  if (on != enabled()) pin::set<pin::motor_enable>(on);
-}
+bool enabled() { return pin::motor_enable::port() & pin::motor_enable::mask; }
 
 }  // namespace motor

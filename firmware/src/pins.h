@@ -4,6 +4,8 @@
 
 namespace pin {
 
+constexpr uint32_t kHash = 0x4BDEB14B;  // which function is where
+
 // 6, OC4A: PWM 20 kHz: bridge input that drives the carriage up
 struct motor_forward {
   static constexpr uint8_t bit = 3;

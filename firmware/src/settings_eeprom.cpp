@@ -10,7 +10,7 @@ namespace {
 
 struct __attribute__((packed)) Image {
   uint32_t declaration;
-  flexura::Config config;
+  flexura::Stored stored;
   uint16_t crc;
 };
 uint8_t *const kPlace = reinterpret_cast<uint8_t *>(16);
@@ -25,17 +25,17 @@ const uint8_t *bytes() { return reinterpret_cast<const uint8_t *>(&image); }
 
 namespace eeprom {
 
-bool load(flexura::Config &config) {
+bool load(flexura::Stored &stored) {
   eeprom_read_block(&image, kPlace, sizeof image);
   if (image.declaration != flexura::kDeclaration || image.crc != flexura::crc16(bytes(), kChecked))
     return false;
-  memcpy(&config, &image.config, sizeof config);
+  memcpy(&stored, &image.stored, sizeof stored);
   return true;
 }
 
-void begin_save(const flexura::Config &config) {
+void begin_save(const flexura::Stored &stored) {
   image.declaration = flexura::kDeclaration;
-  memcpy(&image.config, &config, sizeof config);
+  memcpy(&image.stored, &stored, sizeof stored);
   image.crc = flexura::crc16(bytes(), kChecked);
   written = 0;
 }

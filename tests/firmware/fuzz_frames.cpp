@@ -77,11 +77,11 @@ int main(int count, char **words) {
   const unsigned long total = count > 1 ? strtoul(words[1], nullptr, 10) : 100000;
   random_.seed(count > 2 ? strtoul(words[2], nullptr, 10) : 1);
   static Rig rig;
-  const Config config = default_config();
-  rig.begin(&config, 1);
+  const Stored stored = {default_config(), 1};
+  rig.begin(&stored, 1, 1);
   rig.inputs().flex = 3500;
   rig.inputs().supply = 500;
-  static const Build build = {{0, 1, 0}, {0, 0, 0}, 1};
+  static const Build build = {{0, 1, 0}, {0, 0, 0}, 1, 1};
   static Session session(rig, build);
   Receiver receiver;
   Outputs out;

@@ -15,6 +15,7 @@ from serial.tools.list_ports_common import ListPortInfo
 from boards import BENCH, Rigged, elf, finish
 from flexlab import rig
 from flexlab.board.base import BoardError
+from flexlab.board.commissioning import commission
 from flexlab.board.emulator.emulated import LABEL, EmulatedBoard
 from flexlab.board.protocol import messages
 from flexlab.board.protocol import session as link_module
@@ -175,12 +176,13 @@ def test_through_a_line_that_spoils_bytes_every_command_is_done_once():
     Set-points sent twice would be refused (wrong_index) or show in `buffered`."""
     board = Noisy(elf(), RigidPlant(BENCH))
     board.noise = random.Random(3)
-    link = Link(board, sequence=1, repeat_s=0.01, attempts=50)
+    link = Link(board, sequence=1, repeat_s=0.01, answer_s=0.5)
     link.connect()
     board.rate = 0.01
     wanted = rig.configuration(BENCH)
     link.write_configuration(wanted)
     link.command("clear", fault=Fault.bad_configuration)
+    assert commission(link).may_move
     assert link.read_configuration() == {name: as_float32(value) for name, value in wanted.items()}
     link.command("reference", position_1=11, position_2=24, steps=32)
     link.command("arm", mode=2)

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from flexura.signals import harmonic
 
+from ..board.commissioning import commission
 from ..board.emulator.emulated import EmulatedBoard
 from ..board.emulator.simulator import CLOCK_HZ
 from ..board.protocol.declaration import CONTROL_HZ
@@ -104,6 +105,7 @@ def measure(elf: Path, bench: Bench, seconds: float = 2.0, every_term: bool = Fa
     link.connect()
     link.write_configuration(settings)
     link.command("clear", fault=link.newest["fault"])
+    commission(link)
     link.command("reference", position_1=0, position_2=0, steps=0)
     carriage, joint = (harmonic(way / 2, 1.0, math.pi, way / 2) for way in (0.0398, 2.498))
     player = Player(link, setpoints(carriage, joint, seconds + 1.0, settings))
@@ -171,6 +173,7 @@ def experiment(elf: Path, bench: Bench, seconds: float = 4.0) -> tuple[float, fl
     link.connect()
     link.write_configuration(settings)
     link.command("clear", fault=link.newest["fault"])
+    commission(link)
     link.command("reference", position_1=0, position_2=0, steps=0)
     carriage, joint = (
         harmonic(amplitude, 1.0, math.pi, amplitude) for amplitude in (0.012, math.pi / 6)

@@ -52,6 +52,8 @@ app = typer.Typer(
     ),
 )
 
+TOLD_BY_JSON = ["kind", "emulated", "label", "experiment", "complete", "line", "delays", "firmware"]
+
 RigFile = Annotated[
     Path | None, typer.Argument(metavar="RIG", help="rig file (TOML); default firmware/rig.toml")
 ]
@@ -104,6 +106,14 @@ Firmware = Annotated[
     Path | None,
     typer.Option(metavar="ELF", help="built firmware for the emulated board; default: build it"),
 ]
+Cut = Annotated[
+    str | None,
+    typer.Option(
+        "--cut",
+        metavar="NAME",
+        help="break the emulated wire of this entry of [pins]: who notices?",
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="print JSON instead of tables, for scripts")]
 
 
@@ -122,6 +132,7 @@ class BenchOptions:
     live: Live = False
     live_port: LivePort = 9876
     firmware: Firmware = None
+    cut: Cut = None
     json: Json = False
 
 
@@ -387,7 +398,7 @@ def _run(rig: Path | None, ask: Any, options: BenchOptions, gains: Path | None =
     _recover_beside(folder, options.json)
     if options.port is not None and not options.yes:
         _confirm()
-    opened = steps.open_board(bench, options.port, options.seed, options.firmware)
+    opened = steps.open_board(bench, options.port, options.seed, options.firmware, options.cut)
     title = heading(opened.board.label, opened.board.emulated, asked.experiment)
     pause = (
         options.countdown_s
@@ -419,6 +430,7 @@ def _run(rig: Path | None, ask: Any, options: BenchOptions, gains: Path | None =
             tested=lambda findings: (
                 None if options.json else show(False, lambda: selftest_table(findings, title), dict)
             ),
+            say=lambda text: typer.echo(text, err=True),
             may_start=lambda link: _countdown(link, pause, stop),
             stop_asked=stop.asked,
             observe=observe,
@@ -428,19 +440,7 @@ def _run(rig: Path | None, ask: Any, options: BenchOptions, gains: Path | None =
         except steps.NotStarted as error:
             typer.echo(f"flexura: {error}", err=True)
             raise typer.Exit(130) from None
-    kept = {
-        key: done.run.meta[key]
-        for key in (
-            "kind",
-            "emulated",
-            "label",
-            "experiment",
-            "complete",
-            "line",
-            "delays",
-            "firmware",
-        )
-    }
+    kept = {key: done.run.meta[key] for key in TOLD_BY_JSON}
     show(
         options.json,
         lambda: result_table(done),

@@ -15,6 +15,7 @@ from flexura.errors import FlexuraError, InputError
 from flexura.optional import Missing, load
 
 from ..board.base import Board, BoardError
+from ..board.commissioning import program
 from ..board.emulator.emulated import EmulatedBoard
 from ..board.protocol.declaration import BAUD_BIT_S, CONFIG, Fault
 from ..board.protocol.session import Identity, Link
@@ -132,6 +133,11 @@ def flash(
         if configure:
             identity = _configure(link, wanted, say)
         found = link.read_configuration()
+        if not program(link).may_move:
+            say(
+                "the emergency stop is not proven with this firmware: the next experiment asks for "
+                "a press"
+            )
     finally:
         board.close()
     settings = [Setting(name, found[name], value) for name, value in wanted.items()]

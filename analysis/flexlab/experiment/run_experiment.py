@@ -18,8 +18,9 @@ import flexura as fx
 from flexura.errors import FlexuraError, InputError
 
 from ..board.base import Board, BoardError
+from ..board.commissioning import Program, commission, program, where
 from ..board.emulator.emulated import EmulatedBoard
-from ..board.protocol.declaration import BAUD_BIT_S
+from ..board.protocol.declaration import BAUD_BIT_S, PINS
 from ..board.protocol.session import Link
 from ..board.serial_port import SerialBoard
 from ..recordings.recording import Recording, RecordingBoard
@@ -44,12 +45,18 @@ class NotStarted(FlexuraError):
 @dataclass(frozen=True)
 class Opened:
     """A board with what is known of it; `truth` are an emulated plant's own parameters, for whoever
-    judges an identification."""
+    judges an identification; `cut` is the entry of [pins] whose wire was cut."""
 
     board: Board
     seed: int | None = None
     truth: dict[str, Any] = field(default_factory=dict)
     plant: Any = None
+    cut: str = ""
+
+    @property
+    def broken(self) -> str:
+        """What is broken, in words."""
+        return f"wire of {self.cut} ({where(self.cut)}) cut" if self.cut else ""
 
 
 @dataclass(frozen=True)
@@ -57,6 +64,7 @@ class Watch:
     """What the person at the bench sees and says. Each may be left as it is."""
 
     tested: Callable[[list[Finding]], None] = lambda findings: None
+    say: Callable[[str], None] = lambda text: None  # what the person is to do
     may_start: Callable[[Link], str] = lambda link: ""  # the countdown; says why not
     stop_asked: Callable[[], str] = lambda: ""
     observe: Callable[[np.ndarray, float], None] = lambda reports, part: None
@@ -80,19 +88,30 @@ def check(plan: Plan) -> None:
         raise InputError(expected, key=first.what, value=first.found, more=len(plan.failed) - 1)
 
 
-def open_board(bench: Bench, port: str | None, seed: int = 0, elf: Path | None = None) -> Opened:
+def open_board(
+    bench: Bench, port: str | None, seed: int = 0, elf: Path | None = None, cut: str | None = None
+) -> Opened:
     """The board at a serial port, or, without one, an emulated board with the bench's plant behind
-    its wires."""
+    its wires; `cut` breaks the wire of that entry of [pins]."""
+    if cut is not None and cut not in PINS:
+        raise InputError(f"expected one of [pins]: {', '.join(PINS)}", key="--cut", value=cut)
     if port is not None:
+        if cut is not None:
+            raise InputError(
+                "expected an emulated board: a real one's wires are cut by hand",
+                key="--cut",
+                value=cut,
+            )
         if not Path(port).exists():
             raise InputError(
                 "no such device: expected the board's serial port", key="--port", value=port
             )
         return Opened(SerialBoard(port, BAUD_BIT_S))
     plant = plant_of(bench, seed)
-    return Opened(
-        EmulatedBoard(elf or build(), plant), seed, dict(getattr(plant, "truth", {})), plant
-    )
+    board = EmulatedBoard(elf or build(), plant)
+    if cut is not None:
+        board.cut(cut)
+    return Opened(board, seed, dict(getattr(plant, "truth", {})), plant, cut or "")
 
 
 def plant_of(bench: Bench, seed: int) -> Any:
@@ -107,27 +126,31 @@ def session(bench: Bench, plan: Plan, opened: Opened, calibration: Calibration) 
     """What is known before the board is greeted; the run's metadata are made of it."""
     board = opened.board
     assert board.label.startswith("emulated") == board.emulated
-    return {
-        "kind": "experiment",
-        "source": "experiment",
-        "emulated": board.emulated,
-        "label": board.label,
-        "experiment": plan.experiment,
-        "name": bench.robot.name,
-        "structure": bench.robot.structure,
-        "program": f"flexura {importlib.metadata.version('flexura')}",
-        "robot": bench.robot.to_dict(),
-        "rig": bench.rig.model_dump(mode="json"),
-        "rig_file": bench.file,
-        "host_version": importlib.metadata.version("flexura"),
-        "seed": opened.seed,
-        "started": datetime.datetime.now().astimezone().isoformat(timespec="seconds"),
-        "asked": plan.asked,
-        "phases": plan.phases,
-        "settings": plan.settings,
-        "knots": knots_spec(plan.knots),
-        "calibration": calibration.model_dump(mode="json"),
-    } | ({"plant": type(opened.plant).__name__, "truth": opened.truth} if board.emulated else {})
+    return (
+        {
+            "kind": "experiment",
+            "source": "experiment",
+            "emulated": board.emulated,
+            "label": board.label,
+            "experiment": plan.experiment,
+            "name": bench.robot.name,
+            "structure": bench.robot.structure,
+            "program": f"flexura {importlib.metadata.version('flexura')}",
+            "robot": bench.robot.to_dict(),
+            "rig": bench.rig.model_dump(mode="json"),
+            "rig_file": bench.file,
+            "host_version": importlib.metadata.version("flexura"),
+            "seed": opened.seed,
+            "started": datetime.datetime.now().astimezone().isoformat(timespec="seconds"),
+            "asked": plan.asked,
+            "phases": plan.phases,
+            "settings": plan.settings,
+            "knots": knots_spec(plan.knots),
+            "calibration": calibration.model_dump(mode="json"),
+        }
+        | ({"plant": type(opened.plant).__name__, "truth": opened.truth} if board.emulated else {})
+        | ({"cut": opened.cut} if opened.cut else {})
+    )
 
 
 def conduct(
@@ -155,10 +178,18 @@ def conduct(
     )
     try:
         findings = _ready(
-            link, recording, bench, plan, calibration, opened.board.emulated or configure
+            link,
+            recording,
+            bench,
+            plan,
+            calibration,
+            opened.board.emulated or configure,
+            lambda link: commission(link, opened.board, watch.say, watch.stop_asked),
         )
         watch.tested(findings)
         if failed := [finding for finding in findings if not finding.passed]:
+            if why := watch.stop_asked():
+                raise NotStarted(f"not started: {why}")
             first = failed[0]
             raise BoardError(
                 f"{link.board.label}: self-test: {first.what}: {first.found}; expected "
@@ -166,13 +197,21 @@ def conduct(
             )
         if why := watch.may_start(link):
             raise NotStarted(f"not started: {why}")
-    except BaseException:
+    except BaseException as error:
         stop_motors(link)
         recording.discard()
+        if opened.cut and isinstance(error, BoardError):
+            raise BoardError(f"{opened.broken}: {error}") from None
         raise
     try:
         ended = execute(
-            link, plan.knots, recording, SETTLE_S[plan.experiment], watch.stop_asked, watch.observe
+            link,
+            plan.knots,
+            recording,
+            SETTLE_S[plan.experiment],
+            watch.stop_asked,
+            watch.observe,
+            opened.broken,
         )
     finally:
         recording.close()
@@ -188,18 +227,22 @@ def _ready(
     plan: Plan,
     calibration: Calibration,
     write: bool,
+    commission: Callable[[Link], Program],
 ) -> list[Finding]:
     """Greet the board, configure and test it, and tell it that both joints stand at 0."""
     identity = link.connect()
+    runs = program(link)
     recording.write_session(
         firmware={
             "version": identity.firmware,
             "declaration": f"{identity.declaration:08x}",
             "compiler": identity.compiler,
             "protocol": identity.protocol,
+            "hash": f"{runs.firmware:08x}",
+            "pins": f"{runs.pins:08x}",
         }
     )
-    findings = prepare(link, identity, configuration(bench), plan.settings, write)
+    findings = prepare(link, identity, configuration(bench), plan.settings, write, commission)
     if all(finding.passed for finding in findings):
         more, rest = test(
             link, plan.settings, lambda r: float(Sensor(calibration, calibration.zero).tip(r))

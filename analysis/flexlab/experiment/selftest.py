@@ -1,19 +1,22 @@
 """The self-test before an experiment: may this board, wired as it is, be armed? Nothing moves in
 it.
 
-The declaration's hash is compared when the session opens (`Link.connect`); here follow
-configuration, faults, supply, switches, encoders and the flex sensor at rest.
+The declaration's hash is compared when the session opens (`Link.connect`); here follow pins,
+configuration, faults, the proof of the emergency stop, supply, switches, encoders and the flex
+sensor at rest.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..board.base import BoardError
-from ..board.protocol.declaration import FAULTS, Fault, Flag, State
+from ..board.commissioning import Program, program, where
+from ..board.protocol.declaration import FAULTS, PINS_HASH, Fault, Flag, Result, State
 from ..board.protocol.session import Identity, Link, Refused
 from ..recordings.unit_conversion import flex_reading
 from .flash import as_float32
@@ -48,20 +51,34 @@ class Rest:
 
 
 def prepare(
-    link: Link, identity: Identity, stored: dict[str, float], wanted: dict[str, float], write: bool
+    link: Link,
+    identity: Identity,
+    stored: dict[str, float],
+    wanted: dict[str, float],
+    write: bool,
+    commission: Callable[[Link], Program],
 ) -> list[Finding]:
     """Bring the board to Idle with the settings of the experiment; what was found and done.
 
     `stored` are the rig file's settings: a board that has others is refused, unless `write` allows
     to write and store them. `wanted` are the experiment's; where they differ they are in use until
-    the next reset and not stored.
+    the next reset and not stored. `commission(link)` has the emergency stop pressed, if it is not
+    proven with the board's firmware.
     """
     link.command("stop")
     link.run(0.01)
     fault = Fault(link.newest["fault"])
     found = link.read_configuration()
     differing = [name for name, value in stored.items() if found[name] != as_float32(value)]
+    runs = program(link)
     out = [
+        Finding(
+            "pins",
+            runs.pins_are_declared,
+            f"{runs.pins:08x}",
+            f"{PINS_HASH:08x}, those of protocol.toml",
+            "load the firmware of this declaration: flexura flash",
+        ),
         Finding(
             "declaration",
             True,
@@ -76,7 +93,7 @@ def prepare(
             "flexura flash --configure",
         ),
     ]
-    if differing and not write:
+    if not all(finding.passed for finding in out):
         return out
     if differing:
         link.write_configuration(
@@ -88,7 +105,9 @@ def prepare(
             out.append(
                 Finding("fault", True, f"{fault.name} of before, cleared", "none that lasts")
             )
-        except Refused:
+        except Refused as refused:
+            if refused.result is Result.fault_persists:  # perhaps because of another one
+                fault = Fault(refused.detail)
             out.append(
                 Finding(
                     "fault",
@@ -99,6 +118,9 @@ def prepare(
                 )
             )
             return out
+    out.append(_stop_proof(commission(link)))
+    if not out[-1].passed:
+        return out
     special = {
         name: value
         for name, value in wanted.items()
@@ -116,6 +138,17 @@ def prepare(
             Finding("settings of this experiment", True, _some(list(special)), "in use, not stored")
         )
     return out
+
+
+def _stop_proof(runs: Program) -> Finding:
+    trial = {"untried": "never pressed", "pressed": "open", "released": "not stored"}
+    return Finding(
+        "emergency stop proven",
+        runs.may_move,
+        f"with firmware {runs.firmware:08x}" if runs.may_move else trial[runs.stop.name],
+        "pressed and released once with this firmware",
+        f"emergency_stop is at {where('emergency_stop')}: check its wire, press it and release it",
+    )
 
 
 def examine(link: Link, settings: dict[str, float], tip_m: Any) -> tuple[list[Finding], Rest]:

@@ -39,6 +39,7 @@ def execute(
     settle_s: float,
     stop_asked: Callable[[], str],
     observe: Callable[[np.ndarray, float], None],
+    broken: str = "",
 ) -> StreamResult:
     """Play the knots, hold the last one, and stop the motors.
 
@@ -50,6 +51,7 @@ def execute(
         recording: receives the event of the end.
         settle_s: how long the last knot is held [s].
         stop_asked: returns why to end early, or "".
+        broken: what is known to be broken, or ""; then the experiment is never complete.
         observe: called with new reports and the finished fraction.
     """
     text, interrupted, failure = "", False, None
@@ -60,6 +62,8 @@ def execute(
     stopped = stop_motors(link)
     if failure is not None:
         text = _cause_of(link, failure)
+    if broken:
+        text = f"{broken}: {text or 'the board noticed nothing'}"
     complete, text = text == "", text or "all done"
     if not stopped:
         text += "; no answer to the stop: the board stops by itself when it hears nothing"

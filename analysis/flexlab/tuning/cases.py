@@ -18,7 +18,7 @@ from flexura.control import Gains, Motor, Output
 from flexura.signals import Drive, JointDrive, Manoeuvre, step
 
 from .. import rig as rigs
-from ..paths import FIRMWARE, ROBOTS
+from ..paths import FIRMWARE
 from ..rig.nominal_robot import with_nominal_drives
 from .objective import Weights
 from .search_space import FreeGain, free_gain
@@ -93,7 +93,7 @@ def type_4() -> Structure:
     of the speed at which the board switches off.
     """
     bench = rigs.load(FIRMWARE / "rig.toml")
-    robot, outputs = with_nominal_drives(fx.load(ROBOTS / "rig.toml"), bench)
+    robot, outputs = with_nominal_drives(fx.load("rig"), bench)
     board = rigs.configuration(bench)
     settings = {
         name: board[name]
@@ -141,7 +141,7 @@ def type_4() -> Structure:
 
 def type_3() -> Structure:
     """Type III (RPb): a torque of 2 N m, a force of 2 N."""
-    data = fx.load(ROBOTS / "type-3-rpb.toml").to_dict()
+    data = fx.load("type-3-rpb").to_dict()
     data["link"][1]["joint"]["start"] = 0.20
     settings = {
         "torque_max_1_N_m": 2.0,

@@ -378,12 +378,21 @@ static void a_filtered_setpoint_arrives() {
 // ---- the rig
 
 static Rig rig;
-static const Build kBuild = {{0, 1, 0}, {5, 4, 0}, 1};
+static const uint32_t kFirmware = 0x12345678;
+static const Build kBuild = {{0, 1, 0}, {5, 4, 0}, 1, 77};
 static Outputs out;
 
 static Result ask(uint8_t code, const void *fields = nullptr) {
   uint16_t detail;
   return rig.command(code, static_cast<const uint8_t *>(fields), detail);
+}
+
+// A board that comes up with these settings, its emergency stop proven.
+static void begin(const Config &config, uint8_t reset = 1, uint32_t proven = kFirmware) {
+  rig = Rig();
+  out = Outputs();
+  const Stored stored = {config, proven};
+  rig.begin(&stored, reset, kFirmware);
 }
 
 static void tick(uint16_t times = 1) {
@@ -399,11 +408,9 @@ static void tick(uint16_t times = 1) {
 }
 
 static void healthy() {
-  rig = Rig();
-  out = Outputs();
   Config config = default_config();
   config.lost_step_rad() = 10;  // the encoder of joint 2 stands still in these tests
-  rig.begin(&config, 1);
+  begin(config);
   Inputs &in = rig.inputs();
   in.flex = 3500;
   in.supply = 500;
@@ -544,8 +551,7 @@ static void every_fault_has_its_reason() {
 static Fault fault_of_joint_2(void (*moves)(uint16_t)) {
   run_open_loop(0, 400);
   const Config config = default_config();  // 0.05 rad may be lost
-  rig = Rig();
-  rig.begin(&config, 1);
+  begin(config);
   Inputs &in = rig.inputs();
   in.flex = 3500;
   in.supply = 500;
@@ -589,6 +595,92 @@ static void joint_2_is_watched_by_its_encoder() {
   CHECK(fault_of_joint_2(trembles) == Fault::encoder_2);
 }
 
+// A shaft that rests on an edge of line A and crosses it again and again.
+static bool trembles_without_a_fault(uint16_t ticks, int8_t (*stepped)(uint16_t)) {
+  run_open_loop(0, 0);
+  for (uint16_t k = 0; k < ticks && rig.state() != State::fault; ++k) {
+    if (k % 50 == 0) rig.host_spoke();
+    if (k % 256 == 0) {  // the host goes on with its knots
+      Drives drives = {};
+      drives.first = static_cast<uint16_t>(8 + k / 64);
+      drives.count = 4;
+      CHECK(ask(Drives::kCode, &drives) == Result::ok);
+    }
+    Inputs &in = rig.inputs();
+    memset(in.edges, 0, sizeof in.edges);
+    in.moved[0] = 0;
+    trembles(k);
+    in.stepped = stepped(k);
+    rig.prepare();
+    rig.tick(out);
+  }
+  return rig.state() == State::running;
+}
+
+static int8_t once(uint16_t k) { return k == 0; }
+static int8_t to_and_fro(uint16_t k) { return k % 20 ? 0 : k % 40 ? -1 : 1; }
+static int8_t onwards(uint16_t k) { return k % 20 == 0; }
+
+static void a_shaft_that_trembles_is_no_broken_wire() {
+  CHECK(trembles_without_a_fault(20000, once));
+  CHECK(trembles_without_a_fault(20000, to_and_fro));
+  CHECK(!trembles_without_a_fault(20000, onwards) && rig.fault() == Fault::encoder_2);
+}
+
+static void without_a_proven_stop_nothing_is_armed() {
+  const Reference reference = {0, 0, 0};
+  const Arm arm = {static_cast<uint8_t>(Mode::position)};
+  const uint8_t open = 1 << static_cast<uint8_t>(Flag::emergency_stop);
+  const uint32_t others[] = {0, kFirmware - 1, kFirmware ^ 0x80000000UL};
+  for (uint32_t proven : others) {
+    begin(default_config(), 1, proven);
+    Inputs &in = rig.inputs();
+    in.flex = 3500;
+    in.supply = 500;
+    tick();
+    uint16_t detail = 99;
+    CHECK(ask(Reference::kCode, &reference) == Result::ok);
+    CHECK(rig.command(Arm::kCode, reinterpret_cast<const uint8_t *>(&arm), detail) ==
+              Result::stop_unproven &&
+          detail == static_cast<uint16_t>(StopTrial::untried));
+    CHECK(ask(Commission::kCode) == Result::stop_unproven);
+    for (uint8_t n = 0; n < 10; ++n) {  // a disturbance is no press
+      in.switches = open;
+      tick(30);
+      in.switches = 0;
+      tick();
+    }
+    CHECK(rig.stop_trial() == StopTrial::untried);
+    in.switches = open;
+    tick(60);
+    CHECK(ask(Commission::kCode) == Result::stop_unproven && rig.proven() == proven);
+    in.switches = 0;
+    tick();
+    CHECK(ask(Arm::kCode, &arm) == Result::stop_unproven);  // seen, but nobody said so
+    CHECK(ask(Commission::kCode) == Result::ok && rig.proven() == kFirmware);
+    CHECK(ask(Arm::kCode, &arm) == Result::ok);
+    CHECK(ask(Commission::kCode) == Result::wrong_state);
+  }
+}
+
+static void a_position_lost_with_the_outputs_off_is_unknown() {
+  const Reference reference = {0, 0, 0};
+  const Arm arm = {static_cast<uint8_t>(Mode::position)};
+  for (uint8_t k = 0; k < 4; ++k) {
+    healthy();
+    CHECK(ask(Reference::kCode, &reference) == Result::ok);
+    Inputs &in = rig.inputs();
+    if (k < 2) in.missed[k] = 1;
+    if (k >= 2) in.flooded[k - 2] = true;
+    tick();
+    in.missed[0] = in.missed[1] = 0;
+    in.flooded[0] = in.flooded[1] = false;
+    tick();
+    CHECK(ask(Arm::kCode, &arm) == Result::not_referenced);
+    CHECK(ask(Reference::kCode, &reference) == Result::ok && ask(Arm::kCode, &arm) == Result::ok);
+  }
+}
+
 static void a_silent_host_stops_all() {
   run_open_loop(1000, 0);
   tick(200);
@@ -615,7 +707,7 @@ static void a_configuration_must_make_sense() {
   config.voltage_max_V() = 13;
   CHECK(to_fixed_point(config, fixed) == ITEM(voltage_max_V));
   rig = Rig();
-  rig.begin(nullptr, 1);
+  rig.begin(nullptr, 1, kFirmware);
   CHECK(rig.fault() == Fault::bad_configuration);
   const Clear clear = {static_cast<uint8_t>(Fault::bad_configuration)};
   CHECK(ask(Clear::kCode, &clear) == Result::fault_persists);
@@ -628,15 +720,12 @@ static void a_configuration_must_make_sense() {
 
 static void resets_are_told() {
   const Config config = default_config();
-  rig = Rig();
-  rig.begin(&config, 1 << static_cast<uint8_t>(Reset::watchdog));
+  begin(config, 1 << static_cast<uint8_t>(Reset::watchdog));
   CHECK(rig.fault() == Fault::watchdog);
-  rig = Rig();
-  rig.begin(&config, 1 << static_cast<uint8_t>(Reset::brown_out));
+  begin(config, 1 << static_cast<uint8_t>(Reset::brown_out));
   CHECK(rig.fault() == Fault::brown_out);
-  rig = Rig();
-  rig.begin(&config, 1 << static_cast<uint8_t>(Reset::brown_out) |
-                         1 << static_cast<uint8_t>(Reset::power_on));
+  begin(config,
+        1 << static_cast<uint8_t>(Reset::brown_out) | 1 << static_cast<uint8_t>(Reset::power_on));
   CHECK(rig.fault() == Fault::none);
 }
 
@@ -671,8 +760,7 @@ static void host_and_board_compute_the_same() {
   config.setpoint_1_Hz() = config.setpoint_2_Hz() = 100;
   config.flex_c1_m() = 0.3f;
   config.flex_c2_m() = config.flex_c3_m() = 0.1f;
-  rig = Rig();
-  rig.begin(&config, 1);
+  begin(config);
   Inputs &in = rig.inputs();
   in.flex = 3500;
   in.supply = 500;
@@ -788,6 +876,9 @@ static void tests() {
   RUN(the_first_fault_is_kept_until_cleared_by_name);
   RUN(every_fault_has_its_reason);
   RUN(joint_2_is_watched_by_its_encoder);
+  RUN(a_shaft_that_trembles_is_no_broken_wire);
+  RUN(without_a_proven_stop_nothing_is_armed);
+  RUN(a_position_lost_with_the_outputs_off_is_unknown);
   RUN(a_silent_host_stops_all);
   RUN(a_configuration_must_make_sense);
   RUN(resets_are_told);

@@ -26,6 +26,7 @@ _OUTPUTS = {  # pin, role for the plant, level without the firmware
     "step_direction": ("step_up", False),
     "step_disable": ("step_disable", True),
 }
+_WEAK = ("flex", "supply")  # read by the converter
 _SWITCHES = ("limit_low", "limit_high", "emergency_stop")
 
 
@@ -46,8 +47,8 @@ class Sensors:
 
     encoder_1: float = 0.0  # motor encoder, counts (x4), fractions too
     encoder_2: float = 0.0  # encoder of joint 2
-    flex_V: float = 2.5  # at A0
-    supply_V: float = 2.45  # at A1, behind the divider
+    flex_V: float = 2.5  # at pin flex
+    supply_V: float = 2.45  # at pin supply, behind the divider
     limit_low: bool = False  # hit
     limit_high: bool = False
     emergency_stop: bool = False  # pressed
@@ -87,6 +88,8 @@ class EmulatedBoard:
         for number in self._swapped:
             self.wire_encoder(number)
         self._volts = [-1.0, -1.0]
+        self._broken: set[str] = set()
+        self._stop_pressed = False
         self._switches: tuple[bool, ...] | None = None
 
     # ---- a board
@@ -119,13 +122,14 @@ class EmulatedBoard:
         simulator = self.simulator
         window = simulator.window
         window.encoder[0], window.encoder[1] = sensors.encoder_1, sensors.encoder_2
-        for channel, value in enumerate((sensors.flex_V, sensors.supply_V)):
-            if self._volts[channel] != value:
-                self._volts[channel] = value
-                simulator.adc(channel, round(1000 * min(max(value, 0.0), 5.0)))
-        if self._switches != (
-            switches := (sensors.limit_low, sensors.limit_high, sensors.emergency_stop)
-        ):
+        for k, (name, value) in enumerate((("flex", sensors.flex_V), ("supply", sensors.supply_V))):
+            if name in self._broken:
+                value = 0.0
+            if self._volts[k] != value:
+                self._volts[k] = value
+                simulator.adc(PINS[name].bit, round(1000 * min(max(value, 0.0), 5.0)))
+        stop = sensors.emergency_stop or self._stop_pressed
+        if self._switches != (switches := (sensors.limit_low, sensors.limit_high, stop)):
             self._switches = switches
             for name, opened in zip(
                 _SWITCHES, switches, strict=True
@@ -149,12 +153,30 @@ class EmulatedBoard:
         )
         self.simulator.encoder(number - 1, *((b, a) if swapped else (a, b)))
 
+    def press_stop(self, pressed: bool) -> None:
+        """Press or release the emergency stop at the board, whatever the plant says."""
+        self._stop_pressed = pressed
+
     def cut(self, pin: str) -> None:
-        """Cut the wire at an input pin: its pull-up makes it high."""
-        self.simulator.stick(PINS[pin].port, PINS[pin].bit, True)
+        """Cut the wire at a pin.
+
+        An input's pull-up makes it high; what the converter reads falls to 0 V; a driver's input
+        rests where its resistor pulls it.
+        """
+        self._broken.add(pin)
+        if pin in self.lines:
+            self.simulator.cut(self.lines[pin], True)
+        elif pin not in _WEAK:
+            self.simulator.stick(PINS[pin].port, PINS[pin].bit, True)
 
     def mend(self, pin: str) -> None:
-        """Mend a cut wire: the pin follows the plant again."""
+        """Mend a cut wire: the pin follows the plant again, or the plant the pin."""
+        self._broken.discard(pin)
+        if pin in self.lines:
+            self.simulator.cut(self.lines[pin], False)
+            return
+        if pin in _WEAK:
+            return
         self.simulator.stick(PINS[pin].port, PINS[pin].bit, None)
         self._switches = None
         for number, swapped in self._swapped.items():

@@ -18,7 +18,6 @@ from ctypes import (
     c_char,
     c_char_p,
     c_int,
-    c_int64,
     c_size_t,
     c_uint8,
     c_uint16,
@@ -32,6 +31,7 @@ from typing import Any
 from flexura.errors import FlexuraError
 from flexura.optional import Missing
 
+from .elf import read
 from .simavr_patches import repair
 
 CLOCK_HZ = 16_000_000
@@ -75,10 +75,11 @@ class Edge(ctypes.Structure):
 
 
 _INTERFACE: dict[str, tuple[Any, tuple[Any, ...]]] = {
-    "board_new": (c_void_p, (c_char_p, c_uint32, c_uint32)),
+    "board_new": (c_void_p, (c_char_p, c_uint32, c_uint32, c_uint32)),
     "board_free": (None, (c_void_p,)),
     "board_window": (ctypes.POINTER(Window), (c_void_p,)),
     "board_line": (c_int, (c_void_p, c_char, c_int, c_int, c_int, c_int)),
+    "board_cut": (None, (c_void_p, c_uint32, c_int)),
     "board_trace": (None, (c_void_p, c_uint32, c_int)),
     "board_encoder": (None, (c_void_p, c_int, c_char, c_int, c_char, c_int)),
     "board_pin": (None, (c_void_p, c_uint64, c_char, c_int, c_int)),
@@ -96,7 +97,6 @@ _INTERFACE: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "board_flash": (ctypes.POINTER(c_uint8), (c_void_p,)),
     "board_reset": (None, (c_void_p, c_uint8)),
     "board_eeprom": (c_int, (c_void_p, c_int, c_void_p, c_uint16, c_uint32)),
-    "board_symbol": (c_int64, (c_void_p, c_char_p)),
     "board_vector": (None, (c_void_p, c_int, c_uint64 * 4)),
     "board_log": (c_char_p, (c_void_p,)),
 }
@@ -166,10 +166,12 @@ class Simulator:
     """
 
     def __init__(self, elf: Path, baud: int, slice_cycles: int = 1000) -> None:
+        program = read(elf)
+        self._symbols = program.symbols
         self._lib = _library()
-        handle = self._lib.board_new(os.fsencode(elf), CLOCK_HZ, baud) if elf.is_file() else None
+        handle = self._lib.board_new(program.flash, len(program.flash), CLOCK_HZ, baud)
         if not handle:
-            raise FlexuraError(f"{elf}: expected an ELF file of a firmware for the ATmega2560")
+            raise FlexuraError("simavr knows no ATmega2560")
         self._board = c_void_p(handle)
         self._run, self._slice = self._lib.board_run, slice_cycles
         self.window: Window = self._lib.board_window(self._board).contents
@@ -212,6 +214,10 @@ class Simulator:
         if number < 0:
             raise FlexuraError("too many watched pins")
         return number
+
+    def cut(self, line: int, broken: bool) -> None:
+        """Break the wire of a watched output pin, or mend it: what it led to is at rest."""
+        self._lib.board_cut(self._board, line, broken)
 
     def trace(self, line: int, on: bool) -> None:
         self._lib.board_trace(self._board, line, on)
@@ -277,10 +283,9 @@ class Simulator:
 
     def symbol(self, name: str) -> int:
         """The address of a symbol of the ELF file; data addresses count from 0."""
-        address = self._lib.board_symbol(self._board, name.encode())
-        if address < 0:
+        if name not in self._symbols:
             raise FlexuraError(f"the firmware has no symbol {name}")
-        return address & 0x7FFFFF
+        return self._symbols[name] & 0x7FFFFF
 
     def patch(self, address: int, words: Iterable[int]) -> None:
         """Overwrite flash with instruction words, to make the firmware misbehave where a test wants

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 NAME = "flexura-rig"
 VERSION = 1
-DECLARATION = 0x813C4D42
+DECLARATION = 0x41A4921D
 BAUD_BIT_S = 500000
 CONTROL_HZ = 1000
 TELEMETRY_EVERY_TICKS = 2
@@ -86,6 +86,7 @@ class Result(IntEnum):
     not_ready = 11
     inconsistent = 12
     not_stored = 13
+    stop_unproven = 14
 
 
 class Flag(IntEnum):
@@ -108,6 +109,14 @@ class Reset(IntEnum):
     external = 1
     brown_out = 2
     watchdog = 3
+
+
+class StopTrial(IntEnum):
+    """Codes of [stop_trials]."""
+
+    untried = 0
+    pressed = 1
+    released = 2
 
 
 # What each means, and what the person at the bench does about it.
@@ -224,6 +233,7 @@ RESULTS: dict[Result, str] = {
     Result.not_ready: "Too few set-points before the start; detail = how many there are.",
     Result.inconsistent: "The configuration contradicts itself or cannot be computed with; detail = item.",
     Result.not_stored: "The memory does not hold what was written: worn out?",
+    Result.stop_unproven: "The emergency stop was not yet pressed and released with this firmware; detail = [stop_trials].",
 }
 
 
@@ -316,6 +326,17 @@ MESSAGES: dict[str, Message] = {
         "<Bf",
         (Field("item", "", 1), Field("value", "", 1)),
     ),
+    "program": Message(
+        "program",
+        132,
+        "<IIIB",
+        (
+            Field("firmware", "", 1),
+            Field("pins", "", 1),
+            Field("proven", "", 1),
+            Field("stop", "", 1),
+        ),
+    ),
     "hello": Message("hello", 1, "<I", (Field("declaration", "", 1),)),
     "keepalive": Message("keepalive", 2, "<", ()),
     "stop": Message("stop", 3, "<", ()),
@@ -368,6 +389,8 @@ MESSAGES: dict[str, Message] = {
     ),
     "config_save": Message("config_save", 13, "<", ()),
     "config_defaults": Message("config_defaults", 14, "<", ()),
+    "program_read": Message("program_read", 15, "<", ()),
+    "commission": Message("commission", 16, "<", ()),
 }
 
 CONFIG: dict[str, Item] = {
@@ -460,6 +483,7 @@ CONFIG: dict[str, Item] = {
     ),
 }
 
+PINS_HASH = 0x4BDEB14B
 PINS: dict[str, Pin] = {
     "motor_forward": Pin("6", "H", 3, "PWM 20 kHz: bridge input that drives the carriage up"),
     "motor_reverse": Pin("7", "H", 4, "PWM 20 kHz: bridge input that drives the carriage down"),

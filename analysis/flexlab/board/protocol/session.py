@@ -2,9 +2,9 @@
 repeated, telemetry as it comes.
 
 One command is on its way at a time. It is repeated with the same sequence number until its
-acknowledgement arrives; the board answers a repeated number as before and does nothing, so that a
-lost answer never makes it act twice. When there is nothing to say, `keepalive` says that the host
-is there.
+acknowledgement arrives, each time when the measured round trip is over. The board answers a
+repeated number as before and does nothing: a lost answer never makes it act twice. When there is
+nothing to say, `keepalive` says that the host is there.
 """
 
 from __future__ import annotations
@@ -30,11 +30,14 @@ from .declaration import (
     State,
 )
 from .frames import Deframer, encode
+from .round_trip import RoundTrip
 
 STEP_S = 0.001  # how long the host lets the board's time pass before it looks again
 SLOW = {
     "config_save": 2.0
 }  # commands whose answer may take longer than the usual time to repeat, s
+# commands that are answered by a message and an acknowledgement, and that message
+READS = {"config_read": "config_value", "program_read": "program"}
 _REPORT_CODE = MESSAGES["telemetry"].code
 _REPORT_BYTES = messages.HEAD_BYTES + messages.TELEMETRY.itemsize
 
@@ -73,6 +76,7 @@ class Command:
     sequence: int = 0
     frame: bytes = b""
     due_s: float = -1.0  # when it is sent, again or for the first time
+    first_s: float = 0.0  # when it was sent
     attempts: int = 0
     result: Result | None = None
     detail: int = 0
@@ -99,12 +103,13 @@ class Counts:
 @dataclass
 class Link:
     """A session with a board. `sequence` starts the count; without one it is chosen at random, as
-    the protocol asks."""
+    the protocol asks. A command is repeated after the measured round trip, until one is measured
+    and at most after `repeat_s`; the host gives up `answer_s` after its first attempt."""
 
     board: Board
     sequence: int | None = None
     repeat_s: float = 0.05
-    attempts: int = 20
+    answer_s: float = 1.0
     keepalive_s: float = 0.05
     counts: Counts = field(default_factory=Counts)
     identity: Identity | None = None
@@ -121,6 +126,8 @@ class Link:
         self._last_report: int | None = None
         self._last_said = 0.0
         self._open = False
+        self.round_trip = RoundTrip(self.repeat_s)
+        self._answered = (-1, 0.0)  # the last command's number, and how long its answer took
 
     # ---- session
 
@@ -243,14 +250,17 @@ class Link:
     def _send(self, now: float) -> None:
         asked = self._now
         assert asked is not None
-        if asked.attempts == self.attempts:
+        slow_s = SLOW.get(asked.name, 0.0)
+        if asked.attempts == 0:
+            asked.first_s = now
+        elif now - asked.first_s >= max(self.answer_s, 20 * slow_s):
             self._now = None
             raise BoardError(
                 f"{self.board.label}: no answer to {asked.name} after {asked.attempts} attempts"
             )
         self.counts.repeated += asked.attempts > 0
         asked.attempts += 1
-        asked.due_s = now + SLOW.get(asked.name, self.repeat_s)
+        asked.due_s = now + max(slow_s, self.round_trip.repeat_s)
         self._last_said = now
         self.board.write(asked.frame)
 
@@ -272,17 +282,27 @@ class Link:
         if message.name == "identity":
             self._introduce(values)
         elif self._now is not None and found[1] == self._now.sequence:
-            if message.name == "config_value":
-                self._now.answer = values
-            elif message.name == "ack" and values["command"] == MESSAGES[self._now.name].code:
-                if (
-                    self._now.name == "config_read"
-                    and values["result"] == Result.ok
-                    and self._now.answer is None
-                ):
-                    return  # the value was lost on its way: asked again, it comes again
-                self._now.result, self._now.detail = Result(values["result"]), values["detail"]
-                self._now = None
+            self._answer(self._now, message.name, values)
+        elif message.name == "ack" and found[1] == self._answered[0]:
+            self.round_trip.measured(self._answered[1])  # it was repeated too early
+            self._answered = (-1, 0.0)
+
+    def _answer(self, asked: Command, name: str, values: dict[str, Any]) -> None:
+        """What the board said about the command that is on its way."""
+        if name == READS.get(asked.name):
+            asked.answer = values
+        elif name == "ack" and values["command"] == MESSAGES[asked.name].code:
+            if asked.name in READS and values["result"] == Result.ok and asked.answer is None:
+                return  # the value was lost on its way: asked again, it comes again
+            asked.result, asked.detail = Result(values["result"]), values["detail"]
+            self._now = None
+            took = self.board.now() - asked.first_s
+            if asked.name in SLOW:
+                return
+            if asked.attempts == 1:
+                self.round_trip.measured(took)
+            else:
+                self._answered = (asked.sequence, took)
 
     def _report(self, payload: bytes) -> None:
         self._newest = messages.body(payload)

@@ -4,7 +4,7 @@
 
 namespace flexura {
 
-constexpr uint32_t kDeclaration = 0x813C4D42;
+constexpr uint32_t kDeclaration = 0x41A4921D;
 constexpr uint8_t kProtocolVersion = 1;
 constexpr uint32_t kBaudBitS = 500000;
 constexpr uint16_t kControlHz = 1000;
@@ -118,6 +118,8 @@ enum class Result : uint8_t {
   inconsistent = 12,
   // The memory does not hold what was written: worn out?
   not_stored = 13,
+  // The emergency stop was not yet pressed and released with this firmware; detail = [stop_trials].
+  stop_unproven = 14,
 };
 
 enum class Flag : uint8_t {
@@ -148,6 +150,15 @@ enum class Reset : uint8_t {
   brown_out = 2,
   // The watchdog.
   watchdog = 3,
+};
+
+enum class StopTrial : uint8_t {
+  // It was never open.
+  untried = 0,
+  // It is open, for 50 ticks or more.
+  pressed = 1,
+  // It was open, and is closed again.
+  released = 2,
 };
 
 // Announced from reset until a `hello` is accepted, and after it once more.
@@ -239,6 +250,21 @@ struct __attribute__((packed)) ConfigValue {
 };
 static_assert(sizeof(ConfigValue) == ConfigValue::kSize, "layout");
 
+// Sent before the ack of `program_read`, with the same sequence number.
+struct __attribute__((packed)) Program {
+  static constexpr uint8_t kCode = 132;
+  static constexpr uint8_t kSize = 13;
+  // hash of the firmware's sources, its pins with them; never 0
+  uint32_t firmware;
+  // hash of [pins]
+  uint32_t pins;
+  // hash of the firmware with which the emergency stop was proven, or 0
+  uint32_t proven;
+  // [stop_trials]
+  uint8_t stop;
+};
+static_assert(sizeof(Program) == Program::kSize, "layout");
+
 // Opens a session: its sequence number (choose it at random) starts the count. Idle and Fault only.
 struct __attribute__((packed)) Hello {
   static constexpr uint8_t kCode = 1;
@@ -273,8 +299,8 @@ struct __attribute__((packed)) Reference {
 };
 static_assert(sizeof(Reference) == Reference::kSize, "layout");
 
-// Idle to Armed: enables the drivers, if nothing speaks against it. Empties the look-ahead; the
-// next index is 0.
+// Idle to Armed: enables the drivers, if the emergency stop is proven and nothing speaks against
+// it. Empties the look-ahead; the next index is 0.
 struct __attribute__((packed)) Arm {
   static constexpr uint8_t kCode = 5;
   static constexpr uint8_t kSize = 1;
@@ -377,6 +403,19 @@ struct __attribute__((packed)) ConfigDefaults {
   static constexpr uint8_t kSize = 0;
 };
 
+// Answered by `program` and an ack.
+struct __attribute__((packed)) ProgramRead {
+  static constexpr uint8_t kCode = 15;
+  static constexpr uint8_t kSize = 0;
+};
+
+// Keeps with the settings that this firmware has seen the emergency stop pressed and released:
+// without it `arm` is refused. Idle only; `config_save` stores it.
+struct __attribute__((packed)) Commission {
+  static constexpr uint8_t kCode = 16;
+  static constexpr uint8_t kSize = 0;
+};
+
 // X(message) of every command that Rig handles.
 #define FLEXURA_RIG_COMMANDS(X) \
   X(Keepalive)                  \
@@ -389,13 +428,15 @@ struct __attribute__((packed)) ConfigDefaults {
   X(Halt)                       \
   X(Clear)                      \
   X(ConfigWrite)                \
-  X(ConfigDefaults)
+  X(ConfigDefaults)             \
+  X(Commission)
 
 // X(message) of every command that Session handles.
 #define FLEXURA_SESSION_COMMANDS(X) \
   X(Hello)                          \
   X(ConfigRead)                     \
-  X(ConfigSave)
+  X(ConfigSave)                     \
+  X(ProgramRead)
 
 // Numbers of the settings.
 enum class Item : uint8_t {

@@ -79,12 +79,16 @@ Result Rig::handle(const Arm &command, uint16_t &detail) {
   if (command.mode != static_cast<uint8_t>(Mode::open_loop) &&
       command.mode != static_cast<uint8_t>(Mode::position))
     return Result::out_of_range;
-  if (!referenced_) return Result::not_referenced;
   if (wrong_item_ != kAllValid) {
     detail = wrong_item_;
     return Result::inconsistent;
   }
+  if (proven_ != firmware_ || firmware_ == 0) {
+    detail = static_cast<uint16_t>(stop_trial_);
+    return Result::stop_unproven;
+  }
   CriticalSection section;
+  if (!referenced_) return Result::not_referenced;
   const Fault fault = standing(fixed_.limits, in_);
   if (fault != Fault::none) {
     detail = static_cast<uint16_t>(fault);
@@ -104,6 +108,16 @@ Result Rig::handle(const Arm &command, uint16_t &detail) {
   final_ = false;
   mode_ = static_cast<Mode>(command.mode);
   return enter(State::idle, State::armed) ? Result::ok : Result::wrong_state;
+}
+
+Result Rig::handle(const Commission &, uint16_t &detail) {
+  if (state_ != State::idle) return Result::wrong_state;
+  if (stop_trial_ != StopTrial::released) {
+    detail = static_cast<uint16_t>(stop_trial_);
+    return Result::stop_unproven;
+  }
+  proven_ = firmware_;
+  return Result::ok;
 }
 
 Result Rig::may_add(uint16_t first, uint8_t count, uint8_t most, uint16_t &detail) const {

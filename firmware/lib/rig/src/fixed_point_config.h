@@ -20,6 +20,12 @@ struct FixedPointConfig {
   bool on_encoder;                    // joint 2 is controlled on its encoder
 };
 
+// What outlives a reset.
+struct Stored {
+  Config config;
+  uint32_t proven;  // hash of the firmware with which the emergency stop was proven, or 0
+};
+
 constexpr uint8_t kAllValid = 255;
 
 // Fills `fixed`; returns the number of an item that is outside its range, contradicts another or

@@ -7,12 +7,17 @@ namespace flexura {
 namespace {
 // Q16, units of u_2 (1/4096 microstep per tick) in 1 microstep/s.
 constexpr int32_t kRateOfStep = 268435;
+constexpr uint8_t kPressTicks = 50;  // a person presses for longer, a disturbance does not
+
+bool is_set(uint8_t bits, Flag flag) { return bits >> static_cast<uint8_t>(flag) & 1; }
 
 bool is_set(uint8_t bits, Reset cause) { return bits >> static_cast<uint8_t>(cause) & 1; }
 }  // namespace
 
-void Rig::begin(const Config *stored, uint8_t reset) {
-  config_ = stored ? *stored : default_config();
+void Rig::begin(const Stored *stored, uint8_t reset, uint32_t firmware) {
+  firmware_ = firmware;
+  proven_ = stored ? stored->proven : 0;
+  config_ = stored ? stored->config : default_config();
   wrong_item_ = to_fixed_point(config_, fixed_);
   stored_ = stored && wrong_item_ == kAllValid;
   if (!stored_) {
@@ -42,6 +47,9 @@ void Rig::sense() {
     }
     if (in_.missed[j]) missed_ = static_cast<uint16_t>(missed_ + in_.missed[j]);
   }
+  // Nobody judges encoders while the outputs are off; where the joints are is not known any more.
+  if (!active() && (in_.missed[0] || in_.missed[1] || in_.flooded[0] || in_.flooded[1]))
+    referenced_ = false;
   steps_given_ += in_.stepped;
   const int32_t rest = by_encoder_rest_ + fixed_.ratio * in_.moved[1];
   by_encoder_ += upper(rest);
@@ -52,6 +60,18 @@ void Rig::sense() {
     flex_before_ = in_.flex;
   } else {
     flex_sensor_.update(fixed_.tip, static_cast<uint16_t>(flex_before_ + in_.flex));
+  }
+}
+
+// Seen with the outputs off: the emergency stop open for long enough, then closed.
+void Rig::watch_stop() {
+  const bool open = is_set(in_.switches, Flag::emergency_stop);
+  if (!open) {
+    stop_open_ = 0;
+    if (stop_trial_ == StopTrial::pressed) stop_trial_ = StopTrial::released;
+  } else if (++stop_open_ >= kPressTicks) {
+    stop_open_ = kPressTicks;
+    stop_trial_ = StopTrial::pressed;
   }
 }
 
@@ -96,6 +116,7 @@ void Rig::tick(Outputs &out) {
     out.duty = measured_.duty;
     step_generator_.plan(pid_[1].output(), out.steps);
   } else {
+    watch_stop();
     out.on = false;
     out.duty = 0;
     measured_.duty = 0;
@@ -139,10 +160,14 @@ void Rig::report(Telemetry &report) const {
   bool on;
   {
     CriticalSection section;  // copies only: the control interrupt waits
-    report.tick = tick_;
-    report.state = static_cast<uint8_t>(state_);
-    report.fault = static_cast<uint8_t>(fault_);
-    report.fault_tick = fault_tick_;
+    {
+      InterruptLock lock;  // the watchdog's interrupt may trip
+      report.tick = tick_;
+      report.state = static_cast<uint8_t>(state_);
+      report.fault = static_cast<uint8_t>(fault_);
+      report.fault_tick = fault_tick_;
+      on = active();
+    }
     report.flags = in_.switches;
     report.position_1 = measured_.position[0];
     report.position_2 = measured_.position[1];
@@ -152,7 +177,6 @@ void Rig::report(Telemetry &report) const {
     report.flex = in_.flex;
     report.supply = in_.supply;
     report.missed = missed_;
-    on = active();
     duty = pid_[0].output();
     rate = pid_[1].output();
   }

@@ -48,7 +48,7 @@ struct Outputs {
 class Rig {
  public:
   // `stored` is what the memory holds, or nothing where its check failed. `reset`: bits of Reset.
-  void begin(const Config *stored, uint8_t reset);
+  void begin(const Stored *stored, uint8_t reset, uint32_t firmware);
 
   // Control interrupt: fill the inputs, then tick.
   Inputs &inputs() { return in_; }
@@ -73,10 +73,14 @@ class Rig {
   Fault fault() const { return fault_; }
   uint32_t now() const;
   const Config &config() const { return config_; }
+  uint32_t firmware() const { return firmware_; }  // its hash
+  uint32_t proven() const { return proven_; }      // Stored
+  StopTrial stop_trial() const { return stop_trial_; }
   const FixedPointConfig &fixed() const { return fixed_; }
 
  private:
   void sense();
+  void watch_stop();
   int32_t error(uint8_t joint) const;  // counts / 256 or microsteps / 256
   void control();
 
@@ -118,7 +122,11 @@ class Rig {
   TrajectoryPlayer player_;
 
   uint32_t fault_tick_ = 0;
-  bool referenced_ = false;
+  volatile bool referenced_ = false;
+  volatile StopTrial stop_trial_ = StopTrial::untried;
+  uint8_t stop_open_ = 0;  // ticks
+  uint32_t firmware_ = 0;
+  uint32_t proven_ = 0;
   bool stored_ = false;
   uint8_t wrong_item_ = kAllValid;  // of the settings in use
   Config config_;

@@ -5,6 +5,7 @@ namespace flexura {
 
 namespace {
 constexpr uint8_t kReadings = 4;  // out of range this many ticks in a row: noise is not a fault
+constexpr uint8_t kEcho = 50;     // ticks in which a shaft answers a pulse
 
 bool is_set(uint8_t bits, Flag flag) { return bits >> static_cast<uint8_t>(flag) & 1; }
 
@@ -48,6 +49,7 @@ void FaultMonitor::start() {
   silent_ = 0;
   stalled_ = 0;
   direction_ = 0;
+  since_step_ = kEcho + 1;
   flex_out_ = 0;
   supply_out_ = 0;
   turn_ = 0;
@@ -59,16 +61,28 @@ void FaultMonitor::start() {
   }
 }
 
-// While nothing drives it a shaft may rest on an edge and tremble.
-uint16_t FaultMonitor::alone(uint8_t j, const uint8_t *edges, bool driven) {
+void FaultMonitor::count_alone(uint8_t j, const uint8_t *edges) {
   const uint8_t a = edges[0];
   const uint8_t b = edges[1];
-  if (!driven || (a && b)) return alone_[j] = 0;
-  if (!a && !b) return alone_[j];
+  if (!a && !b) return;
   const EncoderLine line = a ? EncoderLine::a : EncoderLine::b;
-  if (line != alone_line_[j]) alone_[j] = 0;
+  if ((a && b) || line != alone_line_[j]) alone_[j] = 0;
   alone_line_[j] = line;
-  return alone_[j] = static_cast<uint16_t>(alone_[j] + a + b);
+  if (!(a && b)) alone_[j] = static_cast<uint16_t>(alone_[j] + a + b);
+}
+
+// Whether joint 2 is given pulses, or was a moment ago. One that turns back crosses the same edge
+// again, which is no sign of a broken wire.
+bool FaultMonitor::steps(int8_t stepped) {
+  if (stepped) {
+    const int8_t direction = stepped > 0 ? 1 : -1;
+    if (direction != direction_) alone_[1] = 0;
+    direction_ = direction;
+    since_step_ = 0;
+  } else if (since_step_ <= kEcho) {
+    ++since_step_;
+  }
+  return since_step_ <= kEcho;
 }
 
 Fault FaultMonitor::encoders(const FaultLimits &limits, const Inputs &in, const Measured &now) {
@@ -78,10 +92,15 @@ Fault FaultMonitor::encoders(const FaultLimits &limits, const Inputs &in, const 
     missed_[j] = static_cast<uint16_t>(missed_[j] + in.missed[j]);
     if (in.flooded[j] || missed_[j] > limits.missed) return j ? Fault::encoder_2 : Fault::encoder_1;
   }
-  if (alone(0, in.edges[0], driven) >= limits.alone) return Fault::encoder_1;
-  if (in.stepped) direction_ = in.stepped > 0 ? 1 : -1;
-  const uint16_t alone_2 = alone(1, in.edges[1], direction_ != 0);
-  if (alone_2 >= limits.alone) return Fault::encoder_2;
+  // A shaft that nothing drives may rest on an edge and tremble, for as long as it likes.
+  if (driven) {
+    count_alone(0, in.edges[0]);
+  } else {
+    alone_[0] = 0;
+  }
+  if (alone_[0] >= limits.alone) return Fault::encoder_1;
+  if (steps(in.stepped)) count_alone(1, in.edges[1]);
+  if (alone_[1] >= limits.alone) return Fault::encoder_2;
 
   against_[0] = driven ? against(against_[0], now.duty > 0 ? 1 : -1, in.moved[0]) : 0;
   if (against_[0] > limits.runaway) return Fault::runaway_1;
@@ -96,7 +115,7 @@ Fault FaultMonitor::encoders(const FaultLimits &limits, const Inputs &in, const 
     // Why: the encoder went the other way for a good part of it; or only one of its lines moves; or
     // the motor did not follow.
     if (against_[1] > limits.against) return Fault::runaway_2;
-    return alone_2 >= 4 ? Fault::encoder_2 : Fault::stall_2;
+    return alone_[1] >= 4 ? Fault::encoder_2 : Fault::stall_2;
   }
   return Fault::none;
 }

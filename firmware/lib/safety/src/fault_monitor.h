@@ -60,7 +60,8 @@ class FaultMonitor {
   void host_spoke() { silent_ = 0; }
 
  private:
-  uint16_t alone(uint8_t joint, const uint8_t *edges, bool driven);
+  void count_alone(uint8_t joint, const uint8_t *edges);
+  bool steps(int8_t stepped);
   Fault encoders(const FaultLimits &limits, const Inputs &in, const Measured &now);
 
   uint16_t silent_ = 0;
@@ -68,6 +69,7 @@ class FaultMonitor {
   uint16_t missed_[2] = {0, 0};
   int32_t against_[2] = {0, 0};  // counts moved against the drive
   int8_t direction_ = 0;         // of the last pulses
+  uint8_t since_step_ = 0;       // ticks since the last pulses
   // Edges of one line in a row: a shaft that turns alternates them, a broken wire does not.
   uint16_t alone_[2] = {0, 0};
   EncoderLine alone_line_[2];

@@ -53,6 +53,12 @@ uint8_t Session::value(uint8_t item, uint8_t *frame) const {
   return encode(receiver_.sequence(), value, frame);
 }
 
+uint8_t Session::program(uint8_t *frame) const {
+  const Program program = {rig_.firmware(), build_.pins, rig_.proven(),
+                           static_cast<uint8_t>(rig_.stop_trial())};
+  return encode(receiver_.sequence(), program, frame);
+}
+
 uint8_t Session::answer(Result result, uint16_t detail, uint8_t *frame) {
   ack_.command = receiver_.code();
   ack_.result = static_cast<uint8_t>(result);
@@ -108,6 +114,7 @@ uint8_t Session::handle_command(uint8_t *frame) {
   rig_.host_spoke();
   if (code == ConfigRead::kCode) return config_read(frame);
   if (code == ConfigSave::kCode) return config_save(frame);
+  if (code == ProgramRead::kCode) return program_read(frame);
   uint16_t detail = 0;
   const Result result = rig_.command(code, receiver_.fields(), detail);
   return answer(result, detail, frame);
@@ -132,6 +139,7 @@ uint8_t Session::repeat(uint8_t *frame) {
   const bool read = receiver_.code() == ConfigRead::kCode;
   if (read && ack_.result == static_cast<uint8_t>(Result::ok))
     size = value(receiver_.fields()[0], frame);
+  if (receiver_.code() == ProgramRead::kCode) size = program(frame);
   return static_cast<uint8_t>(size + encode(receiver_.sequence(), ack_, frame + size));
 }
 
@@ -159,6 +167,11 @@ uint8_t Session::config_read(uint8_t *frame) {
   const uint8_t item = receiver_.fields()[0];
   if (item >= kConfigItems) return answer(Result::out_of_range, 0, frame);
   const uint8_t size = value(item, frame);
+  return static_cast<uint8_t>(size + answer(Result::ok, 0, frame + size));
+}
+
+uint8_t Session::program_read(uint8_t *frame) {
+  const uint8_t size = program(frame);
   return static_cast<uint8_t>(size + answer(Result::ok, 0, frame + size));
 }
 

@@ -10,6 +10,7 @@ struct Build {
   uint8_t firmware[3];
   uint8_t compiler[3];
   uint8_t reset;
+  uint32_t pins;  // hash of [pins]
 };
 
 class Session {
@@ -38,9 +39,11 @@ class Session {
   uint8_t hello(uint8_t *frame);
   uint8_t config_read(uint8_t *frame);
   uint8_t config_save(uint8_t *frame);
+  uint8_t program_read(uint8_t *frame);
   uint8_t refuse(Result result, uint16_t detail, uint8_t *frame);
   uint8_t answer(Result result, uint16_t detail, uint8_t *frame);
   uint8_t value(uint8_t item, uint8_t *frame) const;
+  uint8_t program(uint8_t *frame) const;
   bool next_in_order() const;
 
   Rig &rig_;
