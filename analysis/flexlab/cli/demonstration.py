@@ -3,7 +3,7 @@ experiment on the emulated board beside its simulation."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +36,13 @@ class Demonstration:
 
     @property
     def passed(self) -> bool:
+        """Whether the check passed and the experiment came to its end."""
         return self.check.passed and self.comparison.experiment.complete
+
+    def moved(self, old: Path, new: Path) -> Demonstration:
+        """The same with its files in another folder."""
+        place = lambda path: new / path.relative_to(old) if isinstance(path, Path) else path
+        return replace(self, review=place(self.review), picture=place(self.picture))
 
 
 def demonstrate(folder: Path, progress: Progress | None = None) -> Demonstration:
