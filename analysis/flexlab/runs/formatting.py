@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import unicodedata
 from typing import Any
 
 
@@ -34,7 +35,8 @@ def finite(value: Any) -> Any:
 
 def printable(text: str) -> str:
     """A text from a file for a terminal: control characters and line ends as escapes."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+    shown = lambda c: c.isprintable() or unicodedata.category(c) == "Zs"
+    return "".join(c if shown(c) else c.encode("unicode_escape").decode() for c in text)
 
 
 def file_name(text: str) -> str:

@@ -11,10 +11,10 @@ import os
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, Field, ValidationError, model_validator
+from pydantic import BaseModel, Field, ValidationError, field_validator, model_validator
 
 from ..errors import InputError, WrongValue
-from ..io import explain, read_toml, write_toml
+from ..io import explain, is_name, read_toml, write_toml
 from .link import LEAST_FREE, Link, Table
 
 MAX_LINKS = 256
@@ -34,7 +34,9 @@ class Robot(Table):
     units."""
 
     name: str = Field(
-        "", max_length=200, description="the robot's name, a text of at most 200 characters"
+        "",
+        max_length=200,
+        description="the robot's name, one line of at most 200 characters without control codes",
     )
     gravity_m_s2: tuple[float, float] = Field(
         (0.0, 0.0),
@@ -52,6 +54,13 @@ class Robot(Table):
     payload: Payload = Field(
         default_factory=Payload, description="a table { mass_kg, inertia_kg_m2 }"
     )
+
+    @field_validator("name")
+    @classmethod
+    def _one_line(cls, name: str) -> str:
+        if not is_name(name):
+            raise ValueError("expected one line without control codes")
+        return name
 
     @model_validator(mode="after")
     def _starts_on_its_links(self) -> Robot:
