@@ -15,14 +15,23 @@ import numpy as np
 import pytest
 
 import flexura as fx
+from flexlab import rig as rigs
 from flexlab.cli import app
+from flexura.control import load_gains
 
 ROOT = Path(__file__).resolve().parents[2]
 ROBOT = (ROOT / "model" / "robots" / "rig.toml").read_text()
 LAW = (ROOT / "model" / "manoeuvres" / "rig-inverse-law.toml").read_text()
 GAINS = (ROOT / "model" / "controllers" / "rig.toml").read_text()
+RIG = (
+    (ROOT / "firmware" / "rig.toml")
+    .read_text()
+    .replace("../model/robots/rig.toml", "robot.toml")
+    .replace("../model/manoeuvres/rig-inverse-law.toml", "law.toml")
+)
+GOOD_FILES = {"robot.toml": ROBOT, "law.toml": LAW, "gains.toml": GAINS, "rig.toml": RIG}
 SEED = 20260101
-FILES, LINES, ARGUMENTS = 220, 180, 100
+FILES, DAMAGED_RUNS, LINES, ARGUMENTS = 220, 20, 180, 100
 
 # --- damage: each changes a good file so that it is wrong
 
@@ -113,9 +122,8 @@ def run(arguments):
 @pytest.fixture
 def place(tmp_path, monkeypatch):
     """A working folder with good files, and a run."""
-    (tmp_path / "robot.toml").write_text(ROBOT)
-    (tmp_path / "law.toml").write_text(LAW)
-    (tmp_path / "gains.toml").write_text(GAINS)
+    for name, text in GOOD_FILES.items():
+        (tmp_path / name).write_text(text)
     monkeypatch.chdir(tmp_path)
     t = np.linspace(0, 1, 5)
     fx.Run(t, {"tip/x": t}, {"tip/x": "m"}, {"source": "simulation"}).save("run")
@@ -146,40 +154,47 @@ def complaint(place, arguments, before):
 # --- wrong files
 
 
+READERS = {  # the commands that read a file, with the damaged one in its place
+    "robot.toml": [
+        ["simulate", "bad.toml", "law.toml"],
+        ["frequencies", "bad.toml"],
+        ["inverse", "bad.toml", "law.toml"],
+        ["crosscheck", "bad.toml", "law.toml"],
+        ["study", "payload", "bad.toml", "--values", "0:1:3"],
+        ["simulate", "bad.toml", "law.toml", "--vary", "payload.mass_kg=0:1:2"],
+        ["tune", "bad.toml", "law.toml", "--controller", "gains.toml"],
+    ],
+    "law.toml": [
+        ["simulate", "robot.toml", "bad.toml"],
+        ["inverse", "robot.toml", "bad.toml"],
+        ["crosscheck", "robot.toml", "bad.toml"],
+        ["study", "payload", "robot.toml", "bad.toml"],
+        ["tune", "robot.toml", "bad.toml", "--controller", "gains.toml"],
+    ],
+    "gains.toml": [
+        ["simulate", "robot.toml", "law.toml", "--controller", "bad.toml"],
+        ["tune", "robot.toml", "law.toml", "--controller", "bad.toml"],
+    ],
+    "rig.toml": [
+        ["bench", "step", "bad.toml"],
+        ["bench", "calibrate", "bad.toml"],
+        ["tune", "robot.toml", "law.toml", "--controller", "gains.toml", "--rig", "bad.toml"],
+        ["flash", "bad.toml", "--emulated"],
+    ],
+}
+
+
 def test_wrong_files(place):
     rng = random.Random(SEED)
     begun = time.monotonic()
     cases, found = 0, []
     while cases < FILES:
-        which = rng.choice(("robot.toml", "law.toml", "gains.toml"))
-        good = {"robot.toml": ROBOT, "law.toml": LAW, "gains.toml": GAINS}[which]
-        bad = damaged(good, rng)
+        which = rng.choice(list(GOOD_FILES))
+        bad = damaged(GOOD_FILES[which], rng)
         if still_good(which, bad, place):
             continue
         (place / "bad.toml").write_bytes(bad)
-        command = {
-            "robot.toml": [
-                ["simulate", "bad.toml", "law.toml"],
-                ["frequencies", "bad.toml"],
-                ["inverse", "bad.toml", "law.toml"],
-                ["crosscheck", "bad.toml", "law.toml"],
-                ["study", "payload", "bad.toml", "--values", "0:1:3"],
-                ["simulate", "bad.toml", "law.toml", "--vary", "payload.mass_kg=0:1:2"],
-                ["tune", "bad.toml", "law.toml", "--controller", "gains.toml"],
-            ],
-            "law.toml": [
-                ["simulate", "robot.toml", "bad.toml"],
-                ["inverse", "robot.toml", "bad.toml"],
-                ["crosscheck", "robot.toml", "bad.toml"],
-                ["study", "payload", "robot.toml", "bad.toml"],
-                ["tune", "robot.toml", "bad.toml", "--controller", "gains.toml"],
-            ],
-            "gains.toml": [
-                ["simulate", "robot.toml", "law.toml", "--controller", "bad.toml"],
-                ["tune", "robot.toml", "law.toml", "--controller", "bad.toml"],
-            ],
-        }[which]
-        found.append(complaint(place, rng.choice(command), listing(place)))
+        found.append(complaint(place, rng.choice(READERS[which]), listing(place)))
         cases += 1
     assert not any(found), "\n".join(filter(None, found))
     assert time.monotonic() - begun < 60
@@ -194,15 +209,32 @@ def still_good(which, data, place):
             fx.load(path)
         elif which == "law.toml":
             fx.load_manoeuvre(path, 2)
+        elif which == "rig.toml":
+            rigs.load(path)
         else:
-            from flexura.control import load_gains
-
             load_gains(path)
     except fx.FlexuraError:
         return False
     finally:
         path.unlink()
     return True
+
+
+# --- runs whose file is cut, or has other bytes
+
+
+def test_damaged_runs(place):
+    rng = random.Random(SEED)
+    good = (place / "run" / "run.parquet").read_bytes()
+    found = []
+    for _ in range(DAMAGED_RUNS):
+        (place / "run" / "run.parquet").write_bytes(good[: rng.randrange(len(good) - 1)])
+        command = rng.choice(
+            (["export", "run", "--to", "csv"], ["review", "run"], ["compare", "run", "run"])
+            + (["identify", "run"], ["compare", "run"])
+        )
+        found.append(complaint(place, command, listing(place)))
+    assert not any(found), "\n".join(filter(None, found))
 
 
 # --- wrong command lines
@@ -275,7 +307,7 @@ OPTIONS = {
         "--payload-factors": ("x", "-1", "", "nan", "1e9"),
         "--stiffness-factors": ("0", "x", "1,,2"),
         "--rtol": ("0", "nan"),
-        "--modes": ("-1", "99"),
+        "--modes": ("-1", "x"),
         "--rig": ("absent.toml", "robot.toml"),
         "--vibration": ("nan", "-1"),
         "--out": ("robot.toml", "run", "/dev/null/x"),

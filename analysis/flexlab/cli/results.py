@@ -104,7 +104,7 @@ def file_result(path: Path | None, key: str = "--out", *, force: bool = False) -
     if path is None:
         yield
         return
-    if path.is_dir():
+    if os.path.isdir(path):
         raise InputError("a folder: expected the name of a file", key=key, value=str(path))
     if os.path.lexists(path) and not force:
         raise InputError(
@@ -145,11 +145,12 @@ def taken(path: Path) -> bool:
 def _folder(target: Path, counts: bool) -> Iterator[Path]:
     """A new folder on the same file system as `target`: in it if it is there, else beside it."""
     made: list[Path] = []
-    inside = not counts and target.is_dir()
-    parent = target if inside else target.parent
-    folder = parent / f".flexura-{secrets.token_hex(4)}"
+    folder = Path()
     try:
         try:
+            inside = not counts and target.is_dir()
+            parent = target if inside else target.parent
+            folder = parent / f".flexura-{secrets.token_hex(4)}"
             made = _parents(parent)
             if not inside and not counts and os.path.lexists(target):
                 raise NotADirectoryError(0, "a file, not a folder")
@@ -161,7 +162,8 @@ def _folder(target: Path, counts: bool) -> Iterator[Path]:
             raise _unwritable("--out", target, error) from None
         yield folder
     finally:
-        shutil.rmtree(folder, ignore_errors=True)
+        if folder.name:
+            shutil.rmtree(folder, ignore_errors=True)
         _remove_empty(made)
 
 
