@@ -4,10 +4,7 @@ Each ends with status 2 and one sentence, or in an InputError or a TypeError tha
 argument. Nothing is left behind.
 """
 
-import contextlib
-import io
 import random
-import sys
 import time
 from pathlib import Path
 
@@ -15,8 +12,8 @@ import numpy as np
 import pytest
 
 import flexura as fx
+from commands import run
 from flexlab import rig as rigs
-from flexlab.cli import app
 from flexura.control import load_gains
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -100,23 +97,6 @@ def damaged(text, rng):
 
 
 # --- running the command
-
-
-def run(arguments):
-    """Status, stdout, stderr of `flexura ARGUMENTS`; an exception that is not caught comes out."""
-    out, err = io.StringIO(), io.StringIO()
-    before = sys.argv
-    sys.argv = ["flexura", *map(str, arguments)]
-    try:
-        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-            try:
-                app.main()
-                status = 0
-            except SystemExit as end:
-                status = end.code or 0
-    finally:
-        sys.argv = before
-    return status, out.getvalue(), err.getvalue()
 
 
 @pytest.fixture

@@ -38,7 +38,7 @@ def export(
     The file has all numbers, units and metadata.
 
     \b
-    Example: flexura export logs/demo/simulation --to tdms
+    Example: flexura export logs/first --to csv
     """
     writers = forms()
     if to not in writers:

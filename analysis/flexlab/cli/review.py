@@ -40,7 +40,7 @@ def review(
     """Look at one run, or at two side by side, in Rerun.
 
     \b
-    Example: flexura review logs/first logs/second --picture review.png
+    Example: flexura review logs/first logs/second --save review.rrd
     """
     if len(runs) > 2:
         raise fx.InputError("expected one or two runs", key="RUN", value=[str(r) for r in runs])

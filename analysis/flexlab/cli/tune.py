@@ -123,6 +123,7 @@ def tune(
                                + OVERSHOOT max(0, overshoot - 5 %)
                                + EFFORT int (u / limit)^2 dt / T ]
           + VIBRATION int t |w - w(end)| dt / L
+
     Times in s. w is the tip deflection, L the length of the last flexible link, u the drive's
     output. A run that ends early counts 1000 (2 - the fraction done).
 

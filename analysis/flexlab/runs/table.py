@@ -76,7 +76,7 @@ class Table:
         if whole.least <= width or len(heads) <= 2:
             return [whole.fitted(width)]
         full = [row for row in rows if row is not None]
-        if len(full) <= FEW:
+        if len(full) <= FEW and words[0]:
             turned = Block(
                 [heads[0], *(text(row[0]) for row in full)],
                 [True] + [False] * len(full),
@@ -142,7 +142,11 @@ class Block:
         return Block(
             [self.heads[k] for k in every],
             [self.words[k] for k in every],
-            [None if row is None else tuple(row[k] for k in every) for row in self.rows],
+            [
+                None if row is None else tuple(row[k] for k in every)
+                for row in self.rows
+                if row is None or any(text(row[k]) for k in columns)
+            ],
         )
 
 
