@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import run
 
 import flexura as fx
+from commands import run
 from flexlab.crosscheck import step_error
 from flexlab.crosscheck.crosscheck import Check, crosscheck
 from flexlab.runs.deviation import deviations
@@ -69,9 +69,7 @@ def test_the_weights_are_those_of_a_second_order_method():
     def at(step):
         return fx.Run(t, {"tip/x": t + 3 * step**2}, {"tip/x": "m"}, {"step_s": step})
 
-    (error,) = (
-        step_error.estimate(at(0.0), at(0.01), at(coarser))["tip/x"] for coarser in (0.02,)
-    )
+    (error,) = (step_error.estimate(at(0.0), at(0.01), at(coarser))["tip/x"] for coarser in (0.02,))
     assert error == pytest.approx(3 * 0.01**2)
 
 
