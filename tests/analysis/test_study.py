@@ -236,7 +236,7 @@ def test_a_case_that_cannot_be_simulated_is_a_row_that_says_so():
         and done.rows[-1]["complete"]
         and done.complete
     )
-    assert "failed at 0: joint 2 left its limits" in studies.table(done).caption
+    assert "failed at payload [g] 0: joint 2 left its limits" in studies.table(done).notes[0]
 
 
 def test_a_study_is_stored_with_its_finding(tmp_path):

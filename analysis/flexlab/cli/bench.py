@@ -44,6 +44,7 @@ from .output import events, say, show
 
 app = typer.Typer(
     name="bench",
+    add_completion=False,
     no_args_is_help=True,
     rich_markup_mode=None,
     help=(
@@ -181,7 +182,9 @@ def forward(
     *,
     options: BenchOptions,
 ) -> None:
-    """Voltage to the motor and pulses to the stepper, open loop.
+    """Drive motor and stepper open loop.
+
+    The motor gets a voltage, the stepper pulses.
 
     \b
     Example: flexura bench forward --emulated --seed 1
@@ -205,7 +208,9 @@ def inverse(
     *,
     options: BenchOptions,
 ) -> None:
-    """The joint motions of a manoeuvre, tracked by the firmware's controllers.
+    """Track the joint motions of a manoeuvre.
+
+    The firmware's controllers follow them.
 
     \b
     Example: flexura bench inverse --manoeuvre model/manoeuvres/rig-inverse-law.toml
@@ -236,7 +241,7 @@ def step(
     *,
     options: BenchOptions,
 ) -> None:
-    """A step of each joint's set-point.
+    """Step each joint's set-point.
 
     \b
     Example: flexura bench step --gains gains.toml --step-1-m 0.004
@@ -256,7 +261,7 @@ def free_vibration(
     *,
     options: BenchOptions,
 ) -> None:
-    """Joint 2 moves, stops and holds; the strip rings.
+    """Stop joint 2 after a fast move; the strip rings.
 
     \b
     Example: flexura bench free-vibration --duration-s 10
@@ -272,8 +277,9 @@ def excite(
     *,
     options: BenchOptions,
 ) -> None:
-    """Ten seconds, open loop, that show stiffness, damping, payload, friction and play: for flexura
-    identify.
+    """Run the 10 s that flexura identify needs.
+
+    The drives run open loop. The motion shows stiffness, damping, payload, friction and play.
 
     \b
     Example: flexura bench excite --emulated --seed 1
@@ -289,8 +295,9 @@ def recover(
     ],
     json: Json = False,
 ) -> None:
-    """Make the run of a recording that was cut off; every start does it by itself for the
-    recordings beside its own.
+    """Make the run of a recording that was cut off.
+
+    Every experiment does this by itself for the recordings beside its own.
 
     \b
     Example: flexura bench recover logs/forward-20260101-120000
@@ -320,10 +327,11 @@ def calibrate(
     firmware: Firmware = None,
     json: Json = False,
 ) -> None:
-    """The flex sensor's calibration: the strip held at known tip deflections, the firmware's cubic
-    through the readings.
+    """Calibrate the flex sensor.
 
-    
+    The strip is held at known tip deflections. The firmware's cubic is fitted to the readings.
+
+    \b
     Example: flexura bench calibrate --emulated --tips-mm=-15,-10,-5,0,5,10,15
     """
     if emulated and port:

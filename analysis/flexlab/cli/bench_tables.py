@@ -21,6 +21,8 @@ from ..experiment.selftest import Finding
 from ..experiment.stop_requests import KEYS_HELP
 from ..recordings.flex_calibration import Fit
 from ..recordings.unit_conversion import Sensor, flex_reading
+from ..runs.formatting import number
+from ..runs.table import Styled, Table
 
 
 def heading(label: str, emulated: bool, experiment: str) -> str:
@@ -28,16 +30,13 @@ def heading(label: str, emulated: bool, experiment: str) -> str:
     return f"{experiment} on the {label}{': no hardware is touched' if emulated else ''}"
 
 
-def selftest_table(findings: list[Finding], title: str) -> Any:
-    from rich.table import Table
-
-    out = Table(title=f"self-test: {title}", title_justify="left", show_edge=False)
-    for name in ("", "found", "expected"):
-        out.add_column(name, overflow="fold")
+def selftest_table(findings: list[Finding], title: str) -> Table:
+    """One row a test of the board: what was found and what was expected."""
+    heads = ("", "found", "expected")
+    out = Table(f"self-test: {title}", ("passed", *heads), heads)
     for f in findings:
-        out.add_row(
-            f"{'[green]ok    [/]' if f.passed else '[red]failed[/]'} {f.what}", f.found, f.expected
-        )
+        passed = Styled("ok", "green") if f.passed else Styled("failed", "red")
+        out.add(passed, f.what, f.found, f.expected)
     return out
 
 
@@ -64,14 +63,17 @@ def live_table(report: Any, part: float, plan: Plan, sensor: Sensor, title: str)
     """One report as it stands, with what is over of the experiment."""
     from rich.console import Group
     from rich.progress_bar import ProgressBar
-    from rich.table import Table
+    from rich.table import Table as Drawing
+    from rich.text import Text
 
     settings = plan.settings
     per_m, per_rad, per_step = (
         settings[name]
         for name in ("motor_counts_per_m", "stepper_counts_per_rad", "stepper_steps_per_rad")
     )
-    out = Table(title=title, title_justify="left", caption=KEYS_HELP, caption_justify="left")
+    out = Drawing(
+        title=Text(title), title_justify="left", caption=KEYS_HELP, caption_justify="left"
+    )
     for name in ("", "position", "set-point", "drive"):
         out.add_column(name, justify="left" if not name else "right", min_width=14)
     tracked = plan.knots.mode is Mode.position and report["state"] == State.running
@@ -103,55 +105,43 @@ def live_table(report: Any, part: float, plan: Plan, sensor: Sensor, title: str)
     return Group(out, ProgressBar(total=1.0, completed=part, width=64))
 
 
-def result_table(done: Done) -> Any:
+def result_table(done: Done) -> Table:
     """The range of every channel, how well set-points were followed, and what the line lost."""
-    from rich.box import SIMPLE
-    from rich.table import Table
-
     run = done.run
     about = run.meta
     title = heading(about["label"], about["emulated"], about["experiment"])
-    out = Table(title=title, title_justify="left", box=SIMPLE, padding=(0, 1, 0, 0))
-    out.add_column(
-        "channel", overflow="fold"
-    )  # this one gives way on a narrow terminal, no number does
-    for name in ("lowest", "highest", "max error", "RMS error", "lag"):
-        out.add_column(name, justify="right", no_wrap=True)
+    heads = ("lowest", "highest", "max error", "RMS error", "lag")
+    out = Table(title, ("channel", *heads), ("channel",))
     for name, row in numbers(run).items():
         cells = [_short(row[key]) for key in ("lowest", "highest", "error_max", "error_rms")]
         late = run.meta["delays"].get(name)
         lag = f"{1e3 * late['seconds']:.1f} ± {1e3 * late['std']:.1f} ms" if late else ""
-        out.add_row(f"{name} \\[{run.units[name]}]", *cells, lag)
+        out.add(f"{name} [{run.units[name]}]", *cells, lag)
     line = about["line"]
-    out.caption = (
+    out.notes.append(
         f"{run.t[-1]:.3f} s, {line['reports']} reports, {line['missing']} missing, "
         f"{line['bad_frames']} bad frames; "
         f"firmware {about['firmware']['version']} ({about['firmware']['declaration']}); "
         f"{done.ended.text}"
     )
-    out.caption_justify = "left"
     return out
 
 
-def calibration_table(found: Fit, label: str) -> Any:
+def calibration_table(found: Fit, label: str) -> Table:
     """The deflections that were held, the readings, what the cubic makes of them, and its
     coefficients."""
-    from rich.table import Table
-
     sensor = Sensor(found.calibration, found.calibration.zero)
-    out = Table(title=f"calibration of the flex sensor on the {label}", title_justify="left")
-    for name in ("held / mm", "reading", "by the cubic / mm"):
-        out.add_column(name, justify="right")
+    heads = ("held [mm]", "reading", "by the cubic [mm]")
+    out = Table(f"calibration of the flex sensor on the {label}", heads)
     for w, r in zip(found.tips_m, found.readings, strict=True):
-        out.add_row(f"{1e3 * w:.2f}", f"{r:.5f}", f"{1e3 * float(sensor.tip(r)):.2f}")
+        out.add(f"{1e3 * w:.2f}", f"{r:.5f}", f"{1e3 * float(sensor.tip(r)):.2f}")
     spread = np.sqrt(np.diag(np.array(found.calibration.covariance)))
     names = ("zero", "c1_m", "c2_m", "c3_m")
-    text = ", ".join(
-        f"{n} = {getattr(found.calibration, n):.4g} +- {s:.2g}"
+    values = (
+        f"{n} = {getattr(found.calibration, n):.4g} ± {s:.2g}"
         for n, s in zip(names, spread, strict=True)
     )
-    out.caption = text + f"\nresidual {1e3 * found.residual_m:.2f} mm"
-    out.caption_justify = "left"
+    out.notes += [", ".join(values), f"residual {1e3 * found.residual_m:.2f} mm"]
     return out
 
 
@@ -196,4 +186,4 @@ def numbers(run: Any) -> dict[str, dict[str, float | None]]:
 
 
 def _short(value: float | None) -> str:
-    return "" if value is None else f"{value:.4g}"
+    return "" if value is None else number(value)

@@ -19,7 +19,9 @@ from ..comparison.replay.simulate_experiment import simulate_experiment
 from ..comparison.report import html, pdf, png
 from ..review import picture as draw
 from ..review import write_review
+from .options import Force, Json, Rtol
 from .output import events, interrupted, progress_bars, say, show
+from .results import counted, file_result, results
 
 
 def compare(
@@ -47,55 +49,62 @@ def compare(
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="FOLDER", help="default: comparison, in RUN's folder"),
+        typer.Option(
+            "--out", metavar="FOLDER", help="new folder; default RUN/comparison-1, -2, ..."
+        ),
     ] = None,
     picture: Annotated[
         Path | None, typer.Option(metavar="FILE.png", help="draw the review into this file")
     ] = None,
-    rtol: Annotated[float, typer.Option(help="relative tolerance of the native solver")] = 1e-6,
-    json: Annotated[
-        bool, typer.Option("--json", help="print JSON instead of tables, for scripts")
-    ] = False,
+    rtol: Rtol = 1e-6,
+    force: Force = False,
+    json: Json = False,
 ) -> None:
-    """Compare an experiment with its simulation: table, report (HTML, PDF), figures and a review to
-    look at.
+    """Compare an experiment with its simulation, or two runs.
+
+    It writes a report (HTML, PDF), figures and a review.
 
     \b
-    Example: flexura compare logs/bench-inverse --by commanded
+    Example: flexura compare logs/experiment --by commanded
     """
     need("matplotlib", "rerun")
     first = fx.Run.read(run)
-    if other is not None:
-        for key, value in (("by", by), ("robot", robot)):
-            if value is not None:
-                raise fx.InputError(
-                    "expected one run: two are compared as they are",
-                    key=f"--{key}",
-                    value=str(value),
-                )
-        first, second = simulation_first(first, fx.Run.read(other))
-    else:
-        described = None if robot is None else fx.load(robot)
-        with progress_bars("native") as report:
-            try:
-                second, by = first, by or "commanded"
-                first = simulate_experiment(
-                    second, by, described, rtol=rtol, progress=lambda f: report("native", f)
-                )
-            except fx.InputError as error:
-                raise error if error.file else error.in_file(str(run)) from None
-    found = compared(first, second)
-    folder = out or (run if run.is_dir() else run.parent) / "comparison"
-    paths = save(found, folder, simulated=other is None)
-    if picture is not None:
-        paths.append(draw(paths[-1], picture))
+    home = run if run.is_dir() else run.parent
+    target = counted(home / "comparison", folder=True) if out is None else out
+    with results(target, force=force) as draft, file_result(picture, "--picture", force=force):
+        if other is not None:
+            for key, value in (("by", by), ("robot", robot)):
+                if value is not None:
+                    raise fx.InputError(
+                        "expected one run: two are compared as they are",
+                        key=f"--{key}",
+                        value=str(value),
+                    )
+            first, second = simulation_first(first, fx.Run.read(other))
+        else:
+            described = None if robot is None else fx.load(robot)
+            with progress_bars("native") as report:
+                try:
+                    second, by = first, by or "commanded"
+                    first = simulate_experiment(
+                        second, by, described, rtol=rtol, progress=lambda f: report("native", f)
+                    )
+                except fx.InputError as error:
+                    raise error if error.file else error.in_file(str(run)) from None
+        found = compared(first, second)
+        written = save(found, draft.folder, simulated=other is None)
+        if picture is not None:
+            draw(written[-1], picture)
+        names = [path.relative_to(draft.folder) for path in written]
+        folder = draft.keep(interrupted=interrupted(first))
+    paths = [folder / name for name in names] + ([] if picture is None else [picture])
     data: dict[str, Any] = table.numbers(found) | {"stored": [str(path) for path in paths]}
     show(json, lambda: table.table(found), lambda: data)
     for each in (first, second):
         events(each)
     say(
         json,
-        f"stored {folder}: {', '.join(path.name for path in paths)}",
+        f"stored {folder}: {', '.join(map(str, names))}",
         f"look at it: flexura review {folder / 'review.rrd'}",
     )
     if not first.complete:

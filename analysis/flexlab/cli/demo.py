@@ -12,29 +12,38 @@ from rich.console import Group
 from ..comparison import table
 from . import tables
 from .demonstration import Demonstration, demonstrate, numbers
+from .options import Force, Json
 from .output import interrupted, progress_bars, say, show
+from .results import results
 
 
 def demo(
     out: Annotated[
-        Path, typer.Option("--out", metavar="FOLDER", help="where to leave the results")
-    ] = Path("logs/demo"),
-    json: Annotated[
-        bool, typer.Option("--json", help="print JSON instead of tables, for scripts")
-    ] = False,
+        Path | None,
+        typer.Option(
+            "--out", metavar="FOLDER", help="new folder for the results; default logs/demo-1, ..."
+        ),
+    ] = None,
+    force: Force = False,
+    json: Json = False,
 ) -> None:
-    """The dissertation's rig along its inverse law: natively, in Exudyn, and as an experiment on
-    the emulated board.
+    """Show the dissertation's rig along its inverse law.
+
+    It is simulated here and in Exudyn, and runs as an experiment on the emulated board.
 
     \b
     Example: flexura demo
     """
-    with progress_bars("native", "twin", "emulated") as report:
-        done = demonstrate(out, report)
+    with results(out, "demo", force=force) as draft:
+        with progress_bars("native", "twin", "emulated") as report:
+            done = demonstrate(draft.folder, report)
+        stopped = any(map(interrupted, done.runs))
+        folder = draft.keep(interrupted=stopped)
+        done = done.moved(draft.folder, folder)
     drawn = done.picture if isinstance(done.picture, Path) else None
     show(json, lambda: _tables(done), lambda: _numbers(done))
     say(json, *[f"left out: {text}" for text in done.left_out])
-    lines = [f"stored {out}"]
+    lines = [f"stored {folder}"]
     if done.review is not None and drawn is None:
         lines.append(f"no picture: {done.picture}")
     lines.append("next:")
@@ -49,7 +58,7 @@ def demo(
         lines.append("(the command is in .venv/bin; to find it: source .venv/bin/activate)")
     say(json, *lines)
     if not done.passed:
-        raise typer.Exit(130 if any(map(interrupted, done.runs)) else 1)
+        raise typer.Exit(130 if stopped else 1)
 
 
 def _tables(done: Demonstration) -> Group:

@@ -180,8 +180,9 @@ def _rig(rig: Path | None) -> Iterator[Finding]:
 
 
 def doctor(rig: RigFile = None, json: Json = False) -> None:
-    """What is installed, what is missing, what that costs; and whether the rig can do what it is
-    built for.
+    """Check the installation: list missing parts and the features they disable.
+
+    It also checks whether the rig can follow its manoeuvre.
 
     \b
     Example: flexura doctor

@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from flexura.errors import InputError
-from flexura.io import Run, write_bytes
+from flexura.io import FILE, Run, write_bytes
 
 from ..runs.export import as_csv, as_mcap, as_tdms
 from ..runs.labels import called
+from .options import ForceFile, Json
 from .output import say, show
+from .results import file_result
 
 if TYPE_CHECKING:
     from flexura.io import Run
@@ -28,19 +30,26 @@ def export(
         Path | None,
         typer.Option("--out", metavar="FILE", help="default: run.FORMAT in the run's folder"),
     ] = None,
-    json: Annotated[bool, typer.Option("--json", help="print JSON, for scripts")] = False,
+    force: ForceFile = False,
+    json: Json = False,
 ) -> None:
-    """Write a run in another program's format: all numbers, units and metadata.
+    """Write a run in another program's format.
+
+    The file has all numbers, units and metadata.
 
     \b
-    Example: flexura export logs/demo/simulation --to tdms
+    Example: flexura export logs/first --to csv
     """
     writers = forms()
     if to not in writers:
         raise InputError(f"expected one of {', '.join(writers)}", key="--to", value=to)
     read = Run.read(run)
     target = out or (run if run.is_dir() else run.parent) / f"run.{to}"
-    write_bytes(target, writers[to](read))
+    source = run / FILE if run.is_dir() else run
+    if target.exists() and target.samefile(source):
+        raise InputError("the run itself: expected another file", key="--out", value=str(target))
+    with file_result(target, force=force):
+        write_bytes(target, writers[to](read))
     about = {
         "file": str(target),
         "called": called(read),

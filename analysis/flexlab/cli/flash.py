@@ -20,15 +20,19 @@ def flash(
     ] = None,
     emulated: Annotated[
         bool,
-        typer.Option("--emulated", help="into an emulated board instead: no hardware is touched"),
+        typer.Option("--emulated", help="use an emulated board instead; no hardware is touched"),
     ] = False,
     configure: Annotated[
-        bool, typer.Option("--configure", help="write the rig's constants, store them, compare")
+        bool,
+        typer.Option(
+            "--configure", help="write the rig file's settings, and store them in the board"
+        ),
     ] = False,
     json: Json = False,
 ) -> None:
-    """Build the firmware, load it into the board, wait for its first good frame, read back version
-    and settings.
+    """Build the firmware and load it into the board.
+
+    It waits for the board's first good frame, and reads back version and settings.
 
     \b
     Example: flexura flash --emulated --configure

@@ -24,7 +24,7 @@ def frequencies(
     ] = False,
     json: Json = False,
 ) -> None:
-    """Natural frequencies at the start, joints locked and free.
+    """Compute natural frequencies at the start, with joints locked and free.
 
     \b
     Example: flexura frequencies model/robots/two-link-arm.toml --zeros

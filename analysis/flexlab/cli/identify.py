@@ -12,66 +12,81 @@ import flexura as fx
 from ..comparison import table as compared
 from ..identification import files, output
 from ..identification.identify import identify as identified
-from .output import progress_bars, say, show
+from .options import ForceFile, Json
+from .output import progress_bars, say, show, warn
+from .results import counted, file_result
 
 
 def identify(
     run: Annotated[
         Path,
-        typer.Argument(metavar="RUN", help="folder of an experiment; best of flexura bench excite"),
+        typer.Argument(
+            metavar="RUN", help="folder of an experiment, best from flexura bench excite"
+        ),
     ],
     check: Annotated[
         Path | None,
         typer.Option(
             "--check",
             metavar="RUN2",
-            help="another experiment of the same rig, to judge the result by",
+            help="another experiment of the same rig, which judges the result",
         ),
     ] = None,
     by: Annotated[
-        str, typer.Option(help="how RUN2 is simulated: commanded, reference or measured")
-    ] = "commanded",
+        str | None,
+        typer.Option(help="how RUN2 is simulated: commanded (default), reference or measured"),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
             "--out",
             metavar="FILE.toml",
-            help="robot file to write; the rig's stands beside it, FILE-rig.toml",
+            help="robot file to write, with the rig's beside it as FILE-rig.toml; "
+            "default robot.toml in RUN/identified-1, -2, ...",
         ),
     ] = None,
-    json: Annotated[
-        bool, typer.Option("--json", help="print JSON instead of tables, for scripts")
-    ] = False,
+    force: ForceFile = False,
+    json: Json = False,
 ) -> None:
-    """Stiffness, damping, payload, friction, play and sensor from an experiment, with intervals;
-    new robot and rig files.
+    """Identify physical parameters from an experiment.
+
+    It finds stiffness, damping, payload, friction, play and the sensor's gain, each with its 95 %
+    interval. It writes a new robot file and a new rig file.
 
     \b
-    Example: flexura identify logs/excite --check logs/inverse
+    Example: flexura identify logs/excite
     """
     experiment = fx.Run.read(run)
+    if by is not None and check is None:
+        raise fx.InputError("expected together with --check", key="--by", value=by)
     other = None if check is None else fx.Run.read(check)
-    try:
-        with progress_bars("joint 1", "strip") as report:
-            found = identified(experiment, report)
-        paths = files.save(
-            found,
-            experiment,
-            out or (run if run.is_dir() else run.parent) / "identified" / "robot.toml",
-        )
-    except fx.InputError as error:
-        raise error if error.file else error.in_file(str(run)) from None
+    home = run if run.is_dir() else run.parent
+    path = out or counted(home / "identified", folder=True) / "robot.toml"
+    with (
+        file_result(path, force=force or out is None),
+        file_result(files.beside(path), force=force or out is None),
+    ):
+        try:
+            with progress_bars("joint 1", "strip") as report:
+                found = identified(experiment, report)
+        except fx.InputError as error:
+            raise error if error.file else error.in_file(str(run)) from None
+        judged = None if other is None else output.check(found, other, by or "commanded")
+        paths, missing = files.save(found, experiment, path)
     data: dict[str, Any] = output.numbers(found, experiment) | {
-        "stored": [str(path) for path in paths]
+        "stored": [str(path) for path in paths],
+        "not_stored": missing,
     }
-    judged = None if other is None else output.check(found, other, by)
     if judged is not None:
         data["check"] = {
             name: compared.numbers(c)
             for name, c in zip(("files", "identified"), judged, strict=True)
         }
-    show(json, lambda: output.table(found, experiment), lambda: data)
-    if judged is not None and not json:
-        for comparison in map(compared.table, judged):
-            show(False, lambda made=comparison: made, dict)  # type: ignore[misc]
+    show(
+        json,
+        lambda: [output.table(found, experiment), *map(compared.table, judged or ())],
+        lambda: data,
+    )
+    for sentence in missing:
+        warn(sentence)
     say(json, f"stored {', '.join(map(str, paths))}")

@@ -8,11 +8,13 @@ from typing import Annotated
 import typer
 
 import flexura as fx
+from flexura.io import FILE
 
 from ..studies.drive_requirements import efforts
 from . import tables
-from .options import Json, Out, RobotFile, Rtol
-from .output import default_folder, prepare, progress_bars, show, stored
+from .options import Force, Json, Out, RobotFile, Rtol
+from .output import interrupted, prepare, progress_bars, show, stored
+from .results import results
 
 
 def inverse(
@@ -26,10 +28,12 @@ def inverse(
     out: Out = None,
     rtol: Rtol = 1e-7,
     method: Annotated[str, typer.Option(help="auto, explicit or implicit")] = "auto",
+    force: Force = False,
     json: Json = False,
 ) -> None:
-    """Inverse dynamics: the forces and torques that the manoeuvre's motions take, exactly followed;
-    gains and forces are ignored.
+    """Compute the forces and torques that a manoeuvre's motions take.
+
+    Every joint follows its motion exactly. Gains and forces of the manoeuvre file are ignored.
 
     \b
     Example: flexura inverse model/robots/rig.toml model/manoeuvres/rig-inverse-law.toml
@@ -47,22 +51,25 @@ def inverse(
         drive = fx.Drive.prescribed(*motions)
     except fx.InputError as error:
         raise error.in_file(str(manoeuvre)) from None
-    with progress_bars("inverse") as report:
-        run = fx.simulate(
-            system,
-            asked.t,
-            drive,
-            rtol=rtol,
-            method=method,
-            progress=lambda f: report("inverse", f),
-        )
-    run.meta["manoeuvre"] = asked.name
-    folder = out or default_folder("inverse", robot)
-    path = run.save(folder)
-    rows = efforts(run)
+    with results(out, "inverse", robot.stem, manoeuvre.stem, force=force) as draft:
+        with progress_bars("inverse") as report:
+            run = fx.simulate(
+                system,
+                asked.t,
+                drive,
+                rtol=rtol,
+                method=method,
+                progress=lambda f: report("inverse", f),
+            )
+        run.meta["manoeuvre"] = asked.name
+        run.save(draft.folder)
+        folder = draft.keep(interrupted=interrupted(run))
+    rows = efforts(run) if len(run) > 1 else []
     show(
         json,
         lambda: tables.effort_table(rows, run),
-        lambda: tables.run_json(run) | {"drives": [vars(r) for r in rows], "run": str(path)},
+        lambda: (
+            tables.run_json(run) | {"drives": [vars(r) for r in rows], "run": str(folder / FILE)}
+        ),
     )
-    stored(run, path, json)
+    stored(run, folder, json)

@@ -24,8 +24,19 @@ RigFile = Annotated[
 Out = Annotated[
     Path | None,
     typer.Option(
-        "--out", metavar="FOLDER", help="where to leave the results; default logs/<command>-<robot>"
+        "--out",
+        metavar="FOLDER",
+        help="new folder for the results; default logs/COMMAND-ROBOT-MANOEUVRE-1, -2, ...",
     ),
 ]
+Force = Annotated[
+    bool, typer.Option("--force", help="write into a folder that has results, and replace them")
+]
+ForceFile = Annotated[bool, typer.Option("--force", help="replace a file that is there")]
 Json = Annotated[bool, typer.Option("--json", help="print JSON instead of tables, for scripts")]
 Rtol = Annotated[float, typer.Option(help="relative tolerance of the native solver")]
+
+
+def stem(path: Path | None) -> tuple[str, ...]:
+    """A file's name without folder and extension, as a part of a folder's name; () for None."""
+    return () if path is None else (path.stem,)

@@ -12,8 +12,11 @@ from typing import Any
 import typer
 
 import flexura as fx
+from flexura.io import FILE
 
 from ..crosscheck.default_manoeuvre import modest
+from ..runs.formatting import printable
+from ..runs.table import WIDTH
 from .verbosity import quiet
 
 
@@ -48,42 +51,48 @@ def progress_bars(*names: str) -> Iterator[Callable[[str, float], None]]:
         yield lambda name, fraction: bars.update(tasks[name], completed=fraction)
 
 
-def show(json: bool, table: Callable[[], Any], data: Callable[[], Any]) -> None:
+def show(json: bool, tables: Callable[[], Any], data: Callable[[], Any]) -> None:
+    """Print a table, or several, or JSON; 80 columns wide where there is no terminal."""
     if json:
         typer.echo(json_.dumps(data(), indent=1))
         return
     from rich.console import Console
 
-    console = Console() if sys.stdout.isatty() else Console(width=120)
-    console.print(table())
+    console = Console(width=None if sys.stdout.isatty() else WIDTH)
+    made = tables()
+    for k, table in enumerate(made if isinstance(made, list) else [made]):
+        if k:
+            console.print()
+        console.print(table)
 
 
 def say(json: bool, *lines: str) -> None:
+    """Print lines, without the control characters that names may have; nothing beside JSON."""
     if not json and not quiet():
         for line in lines:
-            typer.echo(line)
+            typer.echo(printable(line))
+
+
+def warn(line: str) -> None:
+    """Print a line on stderr."""
+    typer.echo(printable(line), err=True)
 
 
 def events(run: Any) -> None:
+    """Print a run's events on stderr."""
     for event in run.meta.get("events", []):
-        typer.echo(
-            f"{run.meta['source']}: {event['level'].lower()} at t = {event['t']:.4g} s: "
-            f"{event['text']}",
-            err=True,
-        )
+        source, level = run.meta.get("source", "run"), event["level"].lower()
+        warn(f"{source}: {level} at t = {event['t']:.4g} s: {event['text']}")
 
 
-def stored(run: Any, path: Path, json: bool) -> None:
-    """What happened to a run and where it is; the status of one that did not come to its end."""
+def stored(run: Any, folder: Path, json: bool) -> None:
+    """Say what happened to a run and where it is; end with the status of an incomplete one."""
     events(run)
-    say(json, f"stored {path}", f"look at it: flexura review {path.parent}")
+    say(json, f"stored {folder / FILE}", f"look at it: flexura review {folder}")
     if not run.complete:
         raise typer.Exit(130 if interrupted(run) else 1)
 
 
 def interrupted(run: Any) -> bool:
+    """Whether Ctrl-C ended a run."""
     return any(event["text"] == "interrupted" for event in run.meta.get("events", []))
-
-
-def default_folder(command: str, robot: Path) -> Path:
-    return Path("logs") / f"{command}-{robot.stem}"

@@ -10,6 +10,9 @@ import typer
 import flexura as fx
 
 from .. import review as rerun
+from .options import ForceFile, Json
+from .output import say, show
+from .results import counted, file_result
 
 
 def review(
@@ -29,26 +32,43 @@ def review(
     ] = None,
     time_s: Annotated[
         float | None,
-        typer.Option(help="the picture's instant; default: the largest tip deflection"),
+        typer.Option(help="the picture's instant [s]; default: the largest tip deflection"),
     ] = None,
+    force: ForceFile = False,
+    json: Json = False,
 ) -> None:
-    """Look at one run, or at two of them side by side, in Rerun.
+    """Look at one run, or at two side by side, in Rerun.
 
     \b
-    Example: flexura review logs/demo/simulation logs/demo/twin --picture review.png
+    Example: flexura review logs/first logs/second --save review.rrd
     """
     if len(runs) > 2:
         raise fx.InputError("expected one or two runs", key="RUN", value=[str(r) for r in runs])
+    if time_s is not None and picture is None:
+        raise fx.InputError("expected together with --picture", key="--time-s", value=time_s)
+    drawn = None if picture is None else str(picture)
     if runs[0].suffix == ".rrd" and len(runs) == 1 and save is None:
         target = runs[0]
+        with file_result(picture, "--picture", force=force):
+            if picture is not None:
+                rerun.picture(target, picture, time_s=time_s)
     else:
         read = [fx.Run.read(folder) for folder in runs]
         beside = (runs[0] if runs[0].is_dir() else runs[0].parent) / "review.rrd"
         target = save or (picture.with_suffix(".rrd") if picture else beside)
-        rerun.write_review(target, read)
-        typer.echo(f"stored {target}")
+        if target == beside and target.exists() and not force:
+            target = counted(target)
+        with (
+            file_result(target, "--save" if save else "--picture", force=force),
+            file_result(picture, "--picture", force=force),
+        ):
+            rerun.write_review(target, read)
+            if picture is not None:
+                rerun.picture(target, picture, time_s=time_s)
+        say(json, f"stored {target}")
     if picture is not None:
-        rerun.picture(target, picture, time_s=time_s)
-        typer.echo(f"stored {picture}")
+        say(json, f"stored {picture}")
+    if json:
+        show(True, lambda: None, lambda: {"review": str(target), "picture": drawn})
     if save is None and picture is None:
         rerun.open_viewer(target)

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 import flexura as fx
+from flexura.io import FILE
 
 from ..studies import parameter_sweep
 from ..tuning.closed_loop import controller_from_file
 from . import tables
-from .options import Json, ManoeuvreFile, Out, RobotFile, Rtol
-from .output import default_folder, prepare, progress_bars, say, show, stored
+from .options import Force, Json, ManoeuvreFile, Out, RobotFile, Rtol, stem
+from .output import interrupted, prepare, progress_bars, say, show, stored, warn
+from .results import continued, results
 
 
 def simulate(
@@ -33,83 +35,91 @@ def simulate(
         list[str] | None,
         typer.Option(
             metavar="KEY=LOW:HIGH:COUNT",
-            help="many robots: numbers of the file, in all combinations",
+            help="vary a number of the robot file; several are combined",
         ),
     ] = None,
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="with --vary: a Dask scheduler, tcp://...")
     ] = None,
+    force: Force = False,
     json: Json = False,
 ) -> None:
-    """Simulate a robot natively and store the run; with --vary, a population that goes on where it
-    was stopped.
+    """Simulate a robot, and store the run.
 
-    \b Example: flexura simulate model/robots/rig.toml model/manoeuvres/rig-step.toml --controller
-    model/controllers/rig.toml And: flexura simulate model/robots/rig.toml
-    model/manoeuvres/rig-inverse-law.toml And: flexura simulate model/robots/rig.toml --vary
-    payload.mass_kg=0:0.1:101 --vary link.2.length_m=0.2:0.3:11
+    With --vary it simulates a population of robots. The same command goes on where it was stopped,
+    in the same folder: logs/population-ROBOT-MANOEUVRE without --out.
+
+    \b
+    Example: flexura simulate model/robots/rig.toml model/manoeuvres/rig-inverse-law.toml
     """
-    system, asked = prepare(robot, manoeuvre)
-    if vary:
-        _simulate_many(
-            system.robot,
-            asked,
-            vary,
-            out or default_folder("simulate-many", robot),
-            rtol,
-            method,
-            scheduler,
-            json,
-        )
-        return
-    if scheduler is not None:
+    if scheduler is not None and not vary:
         raise fx.InputError(
             "expected together with --vary: one robot is simulated here",
             key="--scheduler",
             value=scheduler,
         )
-
+    if vary:
+        for key, given in (("--force", force), ("--controller", controller)):
+            if given:
+                raise fx.InputError("expected without --vary", key=key, value=str(given))
+        _simulate_many(robot, manoeuvre, vary, out, rtol, method, scheduler, json)
+        return
+    system, asked = prepare(robot, manoeuvre)
     drive = controller_from_file(system, asked, controller) if controller else asked.drive
-    with progress_bars("native") as report:
-        run = fx.simulate(
-            system, asked.t, drive, rtol=rtol, method=method, progress=lambda f: report("native", f)
-        )
-    run.meta["manoeuvre"] = asked.name
-    folder = out or default_folder("simulate", robot)
-    path = run.save(folder)
-    show(json, lambda: tables.run_table(run), lambda: tables.run_json(run) | {"run": str(path)})
-    stored(run, path, json)
+    with results(out, "simulate", robot.stem, *stem(manoeuvre), force=force) as draft:
+        with progress_bars("native") as report:
+            run = fx.simulate(
+                system,
+                asked.t,
+                drive,
+                rtol=rtol,
+                method=method,
+                progress=lambda f: report("native", f),
+            )
+        run.meta["manoeuvre"] = asked.name
+        run.save(draft.folder)
+        folder = draft.keep(interrupted=interrupted(run))
+    show(
+        json,
+        lambda: tables.run_table(run),
+        lambda: tables.run_json(run) | {"run": str(folder / FILE)},
+    )
+    stored(run, folder, json)
 
 
 def _simulate_many(
-    robot: Any,
-    asked: Any,
+    robot: Path,
+    manoeuvre: Path | None,
     vary: list[str],
-    folder: Path,
+    out: Path | None,
     rtol: float,
     method: str,
     scheduler: str | None,
     json: bool,
 ) -> None:
-
+    parameter_sweep.ranges(vary)  # the count is refused before anything is computed
+    system, asked = prepare(robot, manoeuvre)
+    batch, chosen = parameter_sweep.grid(system.robot, vary)
+    folder = continued(out, "population", robot.stem, *stem(manoeuvre), mark="population.json")
     with progress_bars("robots") as report:
-        done, chosen = parameter_sweep.simulate(
-            robot,
-            asked,
-            vary,
-            folder,
+        done = fx.simulate(
+            batch,
+            asked.t,
+            asked.drive,
             rtol=rtol,
             method=method,
+            folder=folder,
             scheduler=scheduler,
             progress=lambda f: report("robots", f),
         )
     if not done.complete:
-        typer.echo(
-            f"interrupted after {len(done.robots)} of {done.count} robots; the same command goes "
-            f"on",
-            err=True,
+        warn(
+            f"interrupted after {len(done.robots)} of {done.count} robots; "
+            f"the same command goes on in {folder}"
         )
         raise typer.Exit(130)
     found = parameter_sweep.numbers(done, chosen, folder)
-    show(json, lambda: parameter_sweep.table(found), lambda: found)
-    say(json, f"stored {folder}")
+    show(json, lambda: parameter_sweep.tables(found), lambda: found)
+    say(json, f"stored {folder}; the same command goes on in it")
+    if set(found["ended"]) != {"done"}:
+        raise typer.Exit(1)

@@ -10,8 +10,9 @@ import flexura as fx
 from flexura.optional import need
 
 from .. import studies
-from .options import Json, ManoeuvreFile, Out, RobotFile, Rtol
-from .output import default_folder, progress_bars, say, show
+from .options import Force, Json, ManoeuvreFile, Out, RobotFile, Rtol, stem
+from .output import progress_bars, say, show, warn
+from .results import results
 
 
 def study(
@@ -22,42 +23,57 @@ def study(
     rtol: Rtol = 1e-6,
     values: Annotated[
         str | None,
-        typer.Option(metavar="LOW:HIGH:COUNT", help="payloads [kg], ratios, lengths [m]"),
+        typer.Option(
+            metavar="LOW:HIGH:COUNT",
+            help="payloads [kg], length ratios L2/L1, or free lengths [m], as KIND asks",
+        ),
     ] = None,
     keep: Annotated[
-        str, typer.Option(help="lengths: total (L1 + L2), first (L1), density (total, m1 = mu1 L1)")
-    ] = "total",
+        str | None,
+        typer.Option(
+            help="of length-ratio: total (L1 + L2 is kept), first (L1), or density (L1 + L2 and "
+            "the mass per length of link 1); default total"
+        ),
+    ] = None,
     channels: Annotated[
         bool, typer.Option("--channels", help="store the channels of all runs too")
     ] = False,
     jobs: Annotated[int | None, typer.Option(min=1, help="processes; default: one a core")] = None,
+    force: Force = False,
     json: Json = False,
 ) -> None:
-    """The dissertation's studies on any robot: payload, ratio of link lengths, with and without a
-    sleeve; table, figure, Parquet.
+    """Study a robot's payload, ratio of link lengths, or sleeve.
 
-    \b Example: flexura study payload model/robots/type-1-rr.toml
-    model/manoeuvres/type-1-bang-bang.toml --values 0:0.2:41
+    It stores a table (Parquet) and a figure. KIND boundary: with and without a sleeve.
+
+    \b
+    Example: flexura study payload model/robots/type-1-rr.toml --values 0:0.2:11
     """
+    if keep is not None and kind != "length-ratio":
+        raise fx.InputError("expected with KIND length-ratio alone", key="--keep", value=keep)
     described = fx.load(robot)
     need("matplotlib")
     asked = None if manoeuvre is None else fx.load_manoeuvre(manoeuvre, len(described.links))
-    folder = out or default_folder(f"study-{kind}", robot)
-    with progress_bars(kind) as report:
-        done = studies.run(
-            kind,
-            described,
-            asked,
-            values,
-            keep=keep,
-            rtol=rtol,
-            jobs=jobs,
-            progress=lambda f: report(kind, f),
-            channels=folder / "runs" if channels else None,
-        )
-    stored = [str(path) for path in studies.save(done, folder)]
+    with results(out, f"study-{kind}", robot.stem, *stem(manoeuvre), force=force) as draft:
+        with progress_bars(kind) as report:
+            done = studies.run(
+                kind,
+                described,
+                asked,
+                values,
+                keep=keep or "total",
+                rtol=rtol,
+                jobs=jobs,
+                progress=lambda f: report(kind, f),
+                channels=draft.folder / "runs" if channels else None,
+            )
+        names = [path.name for path in studies.save(done, draft.folder)]
+        folder = draft.keep(interrupted=not done.complete)
+    stored = [str(folder / name) for name in names]
     show(json, lambda: studies.table(done), lambda: studies.numbers(done) | {"stored": stored})
-    say(json, f"stored {', '.join(stored)}")
+    say(json, f"stored {folder}: {', '.join(names)}")
     if not done.complete:
-        typer.echo(f"interrupted after {len(done.rows)} runs, which are stored", err=True)
+        warn(f"interrupted after {len(done.rows)} runs, which are stored in {folder}")
         raise typer.Exit(130)
+    if not any(row["complete"] for row in done.rows):
+        raise typer.Exit(1)

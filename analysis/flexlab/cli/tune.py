@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 
 import flexura as fx
-from flexura.control import Gains, load_gains
+from flexura.control import BOARD, Gains, load_gains
 from flexura.optional import need
 
 from .. import rig as rigs
@@ -20,11 +20,13 @@ from ..tuning import dissertation as cases
 from ..tuning import result as results
 from ..tuning import search_space as freedom
 from ..tuning.executor import make_executor
-from ..tuning.history import History
+from ..tuning.history import FILE, History
 from ..tuning.objective import Weights
 from ..tuning.search import Search, search
 from ..tuning.task import Task, perturbed_robots
-from .output import default_folder, say, show
+from .options import Json
+from .output import say, show
+from .results import continued
 
 
 def tune(
@@ -38,12 +40,14 @@ def tune(
     controller: Annotated[
         Path | None,
         typer.Option(
-            metavar="GAINS", help="gains file (TOML): the structure, and what is not free"
+            metavar="GAINS", help="gains file (TOML): the structure, and the settings not free"
         ),
     ] = None,
     free: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME=LOW:HIGH", help="a free setting; log scale unless 0 is between"),
+        typer.Option(
+            metavar="NAME=LOW:HIGH", help="a free setting and its bounds; several are given"
+        ),
     ] = None,
     free_file: Annotated[
         Path | None,
@@ -52,44 +56,42 @@ def tune(
     algorithm: Annotated[
         str, typer.Option(help="ga, pso, cma-es, or nsga2: settling time against vibration")
     ] = "ga",
-    population: Annotated[int, typer.Option(help="individuals of a generation")] = 50,
-    generations: Annotated[int, typer.Option(help="at most so many")] = 100,
+    population: Annotated[int, typer.Option(help="individuals in a generation")] = 50,
+    generations: Annotated[int, typer.Option(help="maximum number of generations")] = 100,
     patience: Annotated[
-        int, typer.Option(help="generations without 0.1 % of improvement that end the search")
+        int,
+        typer.Option(help="end the search after so many generations without 0.1 % of improvement"),
     ] = 30,
     polish: Annotated[
-        int, typer.Option(help="generations of a local CMA-ES from the best, at the end")
+        int, typer.Option(help="generations of a local search (CMA-ES) from the best, at the end")
     ] = 0,
-    seed: Annotated[int, typer.Option(help="the same seed, the same result")] = 1,
+    seed: Annotated[int, typer.Option(help="random seed; the same seed gives the same result")] = 1,
     vibration: Annotated[
-        float, typer.Option(help="weight VIBRATION in J; 0: the elastic displacement is ignored")
+        float, typer.Option(help="weight VIBRATION in J; 0 ignores the deflection")
     ] = 100.0,
     effort: Annotated[float, typer.Option(help="weight EFFORT in J")] = 0.01,
     overshoot: Annotated[float, typer.Option(help="weight OVERSHOOT in J")] = 1.0,
     payload_factors: Annotated[
-        str, typer.Option(metavar="LIST", help="robust: the worst over payloads, as 0,1,2")
+        str, typer.Option(metavar="LIST", help="judge by the worst of these payloads, as 0,1,2")
     ] = "1",
     stiffness_factors: Annotated[
-        str, typer.Option(metavar="LIST", help="robust: and over stiffnesses, as 0.9,1.1")
+        str,
+        typer.Option(metavar="LIST", help="judge by the worst of these stiffnesses, as 0.9,1.1"),
     ] = "1",
     rig: Annotated[
         Path | None,
         typer.Option(
             metavar="RIG",
-            help="rig file: its motor's rotor and friction, its stepper, in the joints",
+            help="rig file (TOML): adds its motor's rotor and friction, and its stepper",
         ),
     ] = None,
     rtol: Annotated[
         float,
-        typer.Option(
-            help="relative tolerance of the runs of the search; the result is run to 1e-6"
-        ),
+        typer.Option(help="relative tolerance during the search; the result is simulated to 1e-6"),
     ] = 1e-3,
     modes: Annotated[
         int,
-        typer.Option(
-            min=0, help="of each link in the search; 0: the robot file's mesh, as in the result"
-        ),
+        typer.Option(min=0, help="modes of each link during the search; 0: the robot file's mesh"),
     ] = 2,
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="a Dask scheduler, tcp://...")
@@ -100,40 +102,39 @@ def tune(
         typer.Option(
             "--out",
             metavar="FOLDER",
-            help="default logs/tune-<robot>; a search that stopped goes on",
+            help="default logs/tune-ROBOT-MANOEUVRE; the same search goes on in its folder",
         ),
     ] = None,
     dissertation: Annotated[
         bool,
         typer.Option(
             "--dissertation",
-            help="instead of a ROBOT: its control cases, types III and IV, in its tables",
+            help="tune the dissertation's control cases, types III and IV, instead of a ROBOT",
         ),
     ] = False,
-    json: Annotated[
-        bool, typer.Option("--json", help="print JSON instead of tables, for scripts")
-    ] = False,
+    json: Json = False,
 ) -> None:
-    """Find a controller's gains on the simulator, drive limits and sampling included.
+    """Find a controller's gains on the simulator.
 
-    The objective, the least of which is sought (the worst of the robots where there are several):
+    The runs include drive limits and sampling. The objective J is minimised. Of several robots the
+    worst counts.
 
     \b
       J = sum over joints of [ int t |r - q| dt / |step|
                                + OVERSHOOT max(0, overshoot - 5 %)
                                + EFFORT int (u / limit)^2 dt / T ]
           + VIBRATION int t |w - w(end)| dt / L
-    Times in s, w the tip deflection, L the length of the last flexible
-    link, u the drive's output. A run that ends before its time (a limit,
-    a bent link, chatter) counts 1000 (2 - the fraction done).
 
-    Every generation is stored in FOLDER: the same command goes on after an interruption, with the
-    same result.
+    Times in s. w is the tip deflection, L the length of the last flexible link, u the drive's
+    output. A run that ends early counts 1000 (2 - the fraction done).
 
-    \b Example: flexura tune model/robots/rig.toml model/manoeuvres/rig-step.toml --controller
-    model/controllers/rig.toml
-      --rig firmware/rig.toml --free kp_1_V_m=100:10000 --free kp_2_1_s=1:60 --free
-      kf_2_rad_s_m=0.5:100 --algorithm cma-es
+    Every generation is stored in FOLDER. The same command goes on after an interruption, with the
+    same result. A folder with other files is refused.
+
+    \b
+    Example: flexura tune model/robots/rig.toml model/manoeuvres/rig-step.toml
+      --controller model/controllers/rig.toml --rig firmware/rig.toml
+      --free kp_1_V_m=100:10000 --free kp_2_1_s=1:60 --algorithm cma-es
     """
     if free and free_file:
         raise fx.InputError(
@@ -142,13 +143,15 @@ def tune(
     how = Search(algorithm, population, generations, seed, patience, polish)
     need("pymoo", "matplotlib")
     if dissertation:
-        if robot is not None or controller is not None:
-            raise fx.InputError(
-                "expected --dissertation without a robot: it brings its own",
-                key="ROBOT",
-                value=str(robot),
-            )
-        _cases(how, out or Path("logs") / "tune-dissertation", scheduler, jobs, json)
+        own = (robot, manoeuvre, controller, free, free_file, rig)
+        for key, one in zip(_OWN, own, strict=True):
+            if one:
+                raise fx.InputError(
+                    "expected --dissertation without it: it brings its own",
+                    key=key,
+                    value=str(one),
+                )
+        _cases(how, out, scheduler, jobs, json)
         return
     if robot is None or manoeuvre is None or controller is None:
         raise fx.InputError(
@@ -174,7 +177,7 @@ def tune(
     )
     task = Task(robots, asked, given, tuple(frees), weights, algorithm == "nsga2", rtol, modes)
     task.controllers  # noqa: B018 - refuses what can't be before anything is written
-    folder = out or default_folder("tune", robot)
+    folder = continued(out, "tune", robot.stem, manoeuvre.stem, mark=FILE)
     history = History.open(folder, task.digest(how.identity()))
     if history.stored:
         say(json, f"going on after generation {history.stored} in {folder}")
@@ -195,13 +198,21 @@ def tune(
     say(
         json,
         f"stored {folder}: {', '.join(path.name for path in paths)}",
-        f"use it: flexura bench step --gains {paths[0]}",
+        f"use it: flexura bench step --gains {paths[0]}"
+        if set(given.settings) <= set(BOARD)
+        else f"use it: flexura simulate {robot} {manoeuvre} --controller {paths[0]}",
     )
     if not complete:
         raise typer.Exit(130)
 
 
-def _cases(how: Any, folder: Path, scheduler: str | None, jobs: int | None, json: bool) -> None:
+_OWN = ("ROBOT", "MANOEUVRE", "--controller", "--free", "--free-file", "--rig")
+
+
+def _cases(
+    how: Search, out: Path | None, scheduler: str | None, jobs: int | None, json: bool
+) -> None:
+    folder = continued(out, "tune-dissertation", mark=f"type-IV-case-1/{FILE}")
     with _bar(how.generations + how.polish, ("J",)) as report:
         found, complete = cases.study(["IV", "III"], how, folder, scheduler, jobs, report)
     if found:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from rich.table import Table
 
+from ..runs.formatting import percent
 from ..runs.labels import EMULATED, called, emulated
+from ..runs.table import Table
 from .measures import RESPONSE_LEVEL, Comparison
 
 HEADS = ("quantity", "peak", "largest deviation", "at [s]", "of the peak", "RMS", "dissertation")
@@ -35,8 +36,8 @@ def rows(c: Comparison) -> list[tuple[str, ...]]:
             _length(d.peak, d.unit),
             _length(d.max, d.unit),
             _seconds(d.at_s),
-            _percent(d.max_relative),
-            _percent(d.rms_relative),
+            percent(d.max_relative, 3),
+            percent(d.rms_relative, 3),
             _published(d.published_percent),
         )
         for d in c.differences
@@ -45,10 +46,10 @@ def rows(c: Comparison) -> list[tuple[str, ...]]:
         took = f"{_seconds(r.experiment_s)} s against {_seconds(r.simulation_s)} s"
         delayed = "-" if np.isnan(r.delay_s) else f"delay {1e3 * r.delay_s:.1f} ms"
         out.append(
-            (f"response time, {r.quantity}", "", took, "", _percent(abs(r.relative)), delayed, "")
+            (f"response time, {r.quantity}", "", took, "", percent(abs(r.relative), 3), delayed, "")
         )
     if c.responses:
-        worst = _percent(c.worst_response)
+        worst = percent(c.worst_response, 3)
         out.append(
             (
                 "response time, the worse",
@@ -97,16 +98,12 @@ def notes(c: Comparison) -> list[str]:
 
 def table(c: Comparison) -> Table:
     """The table for the terminal."""
-    out = Table(title=title(c), title_justify="left")
-    for head in HEADS:
-        out.add_column(
-            head.replace("[", "\\["),
-            justify="left" if head == "quantity" else "right",
-            overflow="fold",
-        )
+    out = Table(title(c), HEADS, ("quantity",))
     for k, row in enumerate(cells := rows(c)):
-        out.add_row(*row, end_section=k in (len(c.differences) - 1, len(cells) - 1))
-    out.caption, out.caption_justify = "\n".join(notes(c)), "left"
+        out.add(*row)
+        if k == len(c.differences) - 1 and k < len(cells) - 1:
+            out.rule()
+    out.notes += notes(c)
     return out
 
 
@@ -150,16 +147,6 @@ def _length(value: float, unit: str) -> str:
 
 def _seconds(value: float) -> str:
     return "-" if not np.isfinite(value) else f"{value:.3f}"
-
-
-def _percent(value: float) -> str:
-    return (
-        "-"
-        if not np.isfinite(value)
-        else f"{100 * value:.3g} %"
-        if value < 9.995
-        else f"{100 * value:.0f} %"
-    )
 
 
 def _published(value: float | None) -> str:

@@ -23,6 +23,8 @@ from ..board.serial_port import SerialBoard, find
 from ..paths import FIRMWARE
 from ..rig import Bench, configuration
 from ..rig.plant.rigid_plant import RigidPlant
+from ..runs.formatting import number
+from ..runs.table import Styled, Table
 
 RIG = "rig"  # the rig that comes with flexura
 
@@ -169,19 +171,14 @@ def _configure(link: Link, wanted: dict[str, float], say: Say) -> Identity:
     return identity
 
 
-def table(done: FlashResult) -> Any:
+def table(done: FlashResult) -> Table:
     """The settings, those of the board and those of the rig file."""
-    from rich.table import Table
-
     who = done.identity
-    out = Table(
-        title=f"{done.board}: firmware {who.firmware}, {who.state.name}, fault {who.fault.name}",
-        title_justify="left",
-    )
-    for name in ("setting", "board", "rig file", ""):
-        out.add_column(name, justify="left" if name == "setting" else "right", no_wrap=True)
+    title = f"{done.board}: firmware {who.firmware}, {who.state.name}, fault {who.fault.name}"
+    out = Table(title, ("setting", "board", "rig file", ""), ("setting",))
     for s in done.settings:
-        out.add_row(s.name, f"{s.board:.7g}", f"{s.rig:.7g}", "" if s.agrees else "[yellow]differs")
+        differs = "" if s.agrees else Styled("differs", "yellow")
+        out.add(s.name, number(s.board, 7), number(s.rig, 7), differs)
     return out
 
 

@@ -25,6 +25,7 @@ from ..rig import Bench, Check, check_capability
 from ..rig.checks import STEP_RATE_MAX_1_S
 from .lead_in import AT_REST, LEAD_IN_S, with_lead_in
 
+LONGEST_S = 600.0  # of an experiment
 PERIOD_LOG2 = 3  # knots are 8 ms apart
 # checks of the rig that do not depend on the motion
 STATIC_CHECKS = ("motor current", "supply", "flex sensor at rest")
@@ -157,8 +158,10 @@ def step(
     Raises:
         InputError: a time is out of range.
     """
-    if not duration_s > 0.8:
-        raise InputError("expected more than 0.8 s", key="--duration_s", value=duration_s)
+    _check_duration(duration_s, 0.8)
+    for key, value in (("--step-1-m", step_1_m), ("--step-2-rad", step_2_rad)):
+        if not math.isfinite(value):
+            raise InputError("expected a finite number", key=key, value=value)
     apart_s = duration_s / 2 if apart_s is None else apart_s
     if not 0 <= apart_s < duration_s - 0.4:
         raise InputError(
@@ -201,8 +204,9 @@ def free_vibration(
         InputError: the duration is too short.
     """
     move_s, rise_s, rest_s = 0.18, 0.08, 0.1
-    if not duration_s > 1.0:
-        raise InputError("expected more than 1 s", key="--duration_s", value=duration_s)
+    _check_duration(duration_s, 1.0)
+    if not math.isfinite(turn_rad):
+        raise InputError("expected a finite number", key="--turn-rad", value=turn_rad)
     motions = signals.constant(0.0), signals.trapezoidal(turn_rad, move_s, rise_s, at_s=rest_s)
     plan = _tracking_plan(
         "free-vibration",
@@ -276,9 +280,11 @@ def _profile(spec: dict[str, Any]) -> tuple[str, float, list[fx.Signal]]:
                 f"an unknown key; known here: {', '.join(DEFAULT_PROFILE)}", key=key, value=value
             )
     duration = spec.get("duration_s")
-    if duration is None or not signals.finite(duration) or not 0 < duration <= 600:
+    if duration is None or not signals.finite(duration) or not 0 < duration <= LONGEST_S:
         raise InputError(
-            "expected a duration above 0 and at most 600 s", key="duration_s", value=duration
+            f"expected a duration above 0 and at most {LONGEST_S:g} s",
+            key="duration_s",
+            value=duration,
         )
     name = spec.get("name", "")
     if not isinstance(name, str):
@@ -289,6 +295,16 @@ def _profile(spec: dict[str, Any]) -> tuple[str, float, list[fx.Signal]]:
         float(duration),
         [signals.from_spec(spec.get(key, zero), key=key) for key in ("voltage_V", "rate_rad_s")],
     )
+
+
+def _check_duration(duration_s: float, above_s: float) -> None:
+    """Refuse a duration before its knots are made."""
+    if not above_s < duration_s <= LONGEST_S:
+        raise InputError(
+            f"expected more than {above_s:g} s and at most {LONGEST_S:g} s",
+            key="--duration-s",
+            value=duration_s,
+        )
 
 
 def _manoeuvre_of(
@@ -304,6 +320,10 @@ def _tracking_plan(
 ) -> Plan:
     carriage, joint = (drive.motion for drive in asked.drive.joints)
     assert carriage is not None and joint is not None
+    if asked.duration_s > LONGEST_S:
+        raise InputError(
+            f"expected at most {LONGEST_S:g} s", key="duration_s", value=asked.duration_s
+        )
     knots = setpoints(carriage, joint, asked.duration_s, settings, PERIOD_LOG2)
     return Plan(
         experiment, knots, asked.duration_s, settings, check_capability(bench, asked), asked.spec()

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 NORMAL_95 = 1.959964
+AT_BOUND = 1e-3  # of the range between the bounds: nearer counts as at the bound
 
 
 @dataclass(frozen=True)
@@ -74,6 +75,17 @@ class Estimate:
         """Standard deviation of the scaled value; of a factor, relative to it."""
         k = [u.name for u in self.parameters].index(name)
         return float(np.sqrt(self.covariance[k, k]))
+
+    def at_bounds(self) -> list[tuple[Parameter, str]]:
+        """The parameters whose values are at their "lower" or "upper" bound."""
+        out = []
+        for parameter in self.parameters:
+            low, high = map(parameter.to_scaled, parameter.bounds)
+            value = parameter.to_scaled(self.values[parameter.name])
+            for word, room in (("lower", value - low), ("upper", high - value)):
+                if room <= AT_BOUND * (high - low):
+                    out.append((parameter, word))
+        return out
 
     def interval(self, name: str) -> tuple[float, float]:
         """The 95 % interval of a parameter."""

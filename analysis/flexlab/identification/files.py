@@ -114,33 +114,33 @@ def with_identified_files(experiment: fx.Run, found: Identified) -> fx.Run:
     return dataclasses.replace(experiment, channels=channels, units=units, meta=meta)
 
 
-def save(found: Identified, experiment: fx.Run, path: Path) -> list[Path]:
-    """Write the robot file, and the rig file beside it (name-rig.toml).
-
-    Args:
-        found: the identification.
-        experiment: the run; its metadata name the rig's manoeuvre.
-        path: the robot file.
+def save(found: Identified, experiment: fx.Run, path: Path) -> tuple[list[Path], list[str]]:
+    """Write the robot file, and the rig file beside it (NAME-rig.toml).
 
     Returns:
-        Both paths.
-
-    Raises:
-        InputError: before anything is written, if the manoeuvre is missing.
+        The files, and a sentence for what could not be written. The rig file names a manoeuvre
+        file. An experiment from another computer may have its manoeuvre there.
     """
-    beside = path.with_name(f"{path.stem}-rig.toml")
+    write_toml(path, robot(found).to_dict())
+    place = beside(path)
     rig_file = Path(str(experiment.meta.get("rig_file", "")))
     manoeuvre = named_file(rig_file, found.nominal.rig.manoeuvre)
-    if not find(manoeuvre, "manoeuvres").is_file():
-        expected = (
-            "no such file: expected the rig's manoeuvre, which its new file must name as well"
-        )
-        raise InputError(expected, key="rig.manoeuvre", value=str(manoeuvre))
+    try:
+        there = find(manoeuvre, "manoeuvres").is_file()
+    except InputError:
+        there = False
+    if not there:
+        return [path], [
+            f"{place} is not written: its manoeuvre {manoeuvre} is not on this computer"
+        ]
     if isinstance(manoeuvre, Path):
         manoeuvre = os.path.relpath(manoeuvre, path.parent)
     tables = rig(found).model_dump(mode="json", exclude_none=True)
     tables["robot"], tables["manoeuvre"] = path.name, manoeuvre
-    said = robot(found).to_dict()
-    write_toml(path, said)
-    write_toml(beside, tables)
-    return [path, beside]
+    write_toml(place, tables)
+    return [path, place], []
+
+
+def beside(path: Path) -> Path:
+    """The rig file's place beside the robot file `path`."""
+    return path.with_name(f"{path.stem}-rig.toml")

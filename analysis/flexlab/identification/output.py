@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from rich.table import Table
 
 import flexura as fx
 
 from ..comparison.measures import Comparison, compare
 from ..comparison.replay.simulate_experiment import simulate_experiment
+from ..runs.formatting import finite, number, percent
 from ..runs.labels import EMULATED, called, emulated
+from ..runs.table import Table
 from .estimate import Estimate
 from .files import with_identified_files
 from .identify import Identified
@@ -21,8 +21,10 @@ from .identify import Identified
 
 @dataclass(frozen=True)
 class Quantity:
-    """One parameter: nominal value, estimate, and 95 % interval, in `unit`."""
+    """One parameter: nominal value, estimate and 95 % interval, in `unit`; `key`: its name in the
+    search."""
 
+    key: str
     name: str
     unit: str
     nominal: float
@@ -76,7 +78,7 @@ def quantities(found: Identified) -> list[Quantity]:
 
 def _row(name: str, unit: str, found: Estimate, key: str, nominal: float, scale: float) -> Quantity:
     low, high = found.interval(key)
-    return Quantity(name, unit, nominal, scale * found.values[key], scale * low, scale * high)
+    return Quantity(key, name, unit, nominal, scale * found.values[key], scale * low, scale * high)
 
 
 def check(found: Identified, other: fx.Run, by: str = "commanded") -> tuple[Comparison, Comparison]:
@@ -103,51 +105,50 @@ def table(found: Identified, experiment: fx.Run) -> Table:
         found: the identification.
         experiment: the run that it used.
     """
+    label = experiment.meta.get("label")
     out = Table(
-        title=f"identified from: {called(experiment)}, {experiment.meta.get('label', '')}",
-        title_justify="left",
+        f"identified from: {called(experiment)}" + (f", {label}" if label else ""),
+        ("quantity", "unit", "file", "estimate", "low", "high", "+-"),
+        ("quantity", "unit"),
     )
-    for head in ("quantity", "unit", "file", "estimate", "95 % interval", "+-"):
-        out.add_column(
-            head, justify="left" if head in ("quantity", "unit") else "right", no_wrap=True
-        )
     for q in quantities(found):
-        out.add_row(
+        out.add(
             q.name,
             q.unit,
-            f"{q.nominal:.4g}",
-            f"{q.estimate:.4g}",
-            f"{q.low:.4g} to {q.high:.4g}",
-            f"{100 * q.spread:.2g} %",
+            *(number(x) for x in (q.nominal, q.estimate, q.low, q.high)),
+            percent(q.spread),
         )
     rms = np.sqrt(np.mean(found.strip.residuals**2, axis=1))
-    notes = [
+    out.notes += [EMULATED] if emulated(experiment) else []
+    out.notes += [
         f"residuals / noise: flex sensor {rms[0]:.2f}, joint 2 {rms[1]:.2f}",
-        "intervals: noise (Newey-West), mesh, strip's mass to 0.5 %, payload's radius of gyration "
-        "to 5.6 mm, nut's give to half",
+        "low, high: the 95 % interval, from noise (Newey-West), mesh, the strip's mass to 0.5 %, "
+        "the payload's radius of gyration to 5.6 mm, the nut's give to half",
     ]
-    out.caption, out.caption_justify = (
-        "\n".join(([EMULATED] if emulated(experiment) else []) + notes),
-        "left",
-    )
+    out.notes += at_bounds(found)
     return out
 
 
-def numbers(found: Identified, experiment: fx.Run) -> dict[str, Any]:
-    """The results for JSON.
+def at_bounds(found: Identified) -> list[str]:
+    """A sentence for each figure that is at the bound of its search: its interval says nothing."""
+    names = {q.key: q.name for q in quantities(found)}
+    return [
+        f"{names[unknown.name]}: at the {word} bound of the search; its value is not known"
+        for part in (found.strip, found.carriage)
+        for unknown, word in part.at_bounds()
+    ]
 
-    Args:
-        found: the identification.
-        experiment: the run that it used.
-    """
-    clean = lambda value: float(value) if math.isfinite(value) else None
-    rows = {
-        q.name: {"unit": q.unit}
-        | {key: clean(getattr(q, key)) for key in ("nominal", "estimate", "low", "high")}
-        for q in quantities(found)
-    }
-    about = {"emulated": emulated(experiment), "label": experiment.meta.get("label", "")}
-    return about | {
-        "quantities": rows,
+
+def numbers(found: Identified, experiment: fx.Run) -> dict[str, Any]:
+    """For JSON."""
+    return {
+        "emulated": emulated(experiment),
+        "label": experiment.meta.get("label", ""),
+        "parameters": [
+            {"name": q.name, "unit": q.unit, "file": finite(q.nominal), "value": finite(q.estimate)}
+            | {"low": finite(q.low), "high": finite(q.high)}
+            for q in quantities(found)
+        ],
+        "at_bounds": at_bounds(found),
         "evaluations": found.strip.evaluations + found.carriage.evaluations,
     }

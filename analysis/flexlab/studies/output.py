@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.table import Table
 
 from flexura.io import write_bytes
 from flexura.optional import load
 
+from ..runs.formatting import number
+from ..runs.table import Cell, Styled, Table, text
 from .boundary import FIXED, SLIDING, WITHOUT
 from .sweep import Row, Study
 
@@ -28,42 +29,34 @@ _HEADS = {
 
 def table(study: Study) -> Table:
     """One row a case, and the finding."""
-    out = Table(
-        title=f"{study.robot.name or 'robot'}: {study.name}; {study.about}", title_justify="left"
-    )
     own = [key for key in study.rows[0] if key in _HEADS] if study.rows else []
-    peaks = [key for key in (study.rows[0] if study.rows else {}) if key.startswith("joint_")]
-    heads = [_HEADS[key] for key in own] + [
-        "f1 [Hz]",
-        f"largest w{study.link} [mm]",
-        f"later w{study.link} [mm]",
-    ]
+    every = dict.fromkeys(key for row in study.rows for key in row)
+    peaks = [key for key in every if key.startswith("joint_")]
+    heads = [_HEADS[key] for key in own] + ["f1 [Hz]"]
+    heads += [f"largest w{study.link} [mm]", f"later w{study.link} [mm]"]
     heads += [
         f"drive {key.split('_')[1]} [{key.split('_peak_')[1].replace('_', ' ')}]" for key in peaks
     ]
-    for head in heads:
-        out.add_column(
-            head.replace("[", "\\["), justify="left" if head == "case" else "right", no_wrap=True
-        )
-    failures: list[str] = []
+    title = f"{study.robot.name or 'robot'}: {study.name}; {study.about}"
+    out = Table(title, heads, ("case",))
     for row in study.rows:
-        cells = [
-            str(row[key]) if key == "case" else _number(row[key], 1.0 if key == "ratio" else 1e3)
+        cells: list[Cell] = [
+            str(row[key]) if key == "case" else number((1.0 if key == "ratio" else 1e3) * row[key])
             for key in own
         ]
         if not row["complete"]:
-            cells += [_number(row.get("first_frequency_Hz", np.nan)), "[red]failed"]
-            failures.append(f"failed at {' '.join(cells[: len(own)])}: {row['error']}")
-            out.add_row(*cells, *[""] * (len(heads) - len(cells)))
+            place = ", ".join(f"{_HEADS[key]} {text(c)}" for key, c in zip(own, cells, strict=True))
+            out.notes.append(f"failed at {place}: {row['error']}")
+            cells += [number(row.get("first_frequency_Hz", np.nan)), Styled("failed", "red")]
+            out.add(*cells, *[""] * (len(heads) - len(cells)))
             continue
         cells += [
-            _number(row["first_frequency_Hz"]),
-            _number(row["max_m"], 1e3),
-            _number(row["later_m"], 1e3),
+            number(row["first_frequency_Hz"]),
+            number(1e3 * row["max_m"]),
+            number(1e3 * row["later_m"], missing=""),
         ]
-        out.add_row(*cells, *(_number(row[key]) for key in peaks))
-    out.caption = "\n".join([*failures, verdict(study)])
-    out.caption_justify = "left"
+        out.add(*cells, *(number(row[key]) for key in peaks))
+    out.notes += verdict(study).split("\n")
     return out
 
 
@@ -213,7 +206,3 @@ def _boundary(axes: Any, rows: list[Row], study: Study) -> None:
 
 def _column(rows: list[Row], key: str) -> np.ndarray:
     return 1e3 * np.array([row[key] for row in rows], dtype=float)
-
-
-def _number(value: float, factor: float = 1.0) -> str:
-    return f"{factor * value:.4g}" if np.isfinite(value) else "-"

@@ -13,19 +13,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Group
-from rich.table import Table
 
 import flexura as fx
 from flexura.control import ERROR, OVERSHOOT, RESIDUAL, SETTLING, Response, strip_figures
 
+from ..runs.formatting import number
+from ..runs.table import Table
 from ..studies.transmission_zeros import transmission
 from .cases import PUBLISHED, STRUCTURES, TABLE
 from .closed_loop import closed_loop_controller
 from .executor import make_executor
 from .history import History
 from .lqr_reference import LqrBaseline, tune_lqr_baseline
-from .result import Result, number, numbers, result, save
+from .result import Result, numbers, result, save
 from .search import Search, search
 from .task import Task
 
@@ -157,20 +157,20 @@ def _shortest(task: Task) -> tuple[float, ...]:
     return tuple(times)
 
 
-def table(found: list[TwoCases]) -> Group:
-    """Tables 3.10 and 3.12 with the dissertation's values in brackets, and the verdicts."""
-    return Group(*(part for each in found for part in _tables(each)))
+def table(found: list[TwoCases]) -> list[Table]:
+    """Tables 3.10 and 3.12, each figure with the dissertation's in brackets, and the verdicts."""
+    return [_table(each) for each in found]
 
 
-def _tables(each: TwoCases) -> list[Any]:
+def _table(each: TwoCases) -> Table:
     task = each.results[0].task
     kinds = ["turns" if link.joint.type == "R" else "translates" for link in task.robots[0].links]
-    title = f"type {each.name}: this project (the dissertation's {TABLE[each.name]})"
-    out = Table(title=title, title_justify="left", padding=(0, 1, 0, 0), pad_edge=False)
-    out.add_column("", no_wrap=True)
+    heads = [""]
     for i, kind in enumerate(kinds, 1):
-        for head in (f"link {i}\n{kind}\ncase 1", "\n\ncase 2", "\n\ndeviation", "\n\nLQR"):
-            out.add_column(head, justify="right", no_wrap=True)
+        link = f"link {i} {kind}:"
+        heads += [f"{link} case 1", f"{link} case 2", f"{link} deviation", f"{link} LQR"]
+    title = f"type {each.name}: this project (the dissertation's {TABLE[each.name]})"
+    out = Table(title, heads, ("",))
     rows = (
         ("rise time [s]", 1.0),
         ("settling time [s]", 1.0),
@@ -189,23 +189,20 @@ def _tables(each: TwoCases) -> list[Any]:
             cells += [f"{_figure(a)} ({b:.3g})" for a, b in pairs] + [
                 _figure(factor * each.lqr.response.joints[i, k])
             ]
-        out.add_row(text.replace("[", "\\["), *cells)
+        out.add(text, *cells)
     peaks = [1e3 * r.strip[0] for r in (each.response(1), each.response(2), each.lqr.response)]
     for text, values in (
         ("largest w [mm]", peaks),
         ("residual w [mm]", [1e3 * x for x in each.residual_m]),
     ):
         one, two, lqr = values
-        out.add_row(
-            text.replace("[", "\\["),
+        out.add(
+            text,
             "",
             "",
             "",
             "",
-            number(one),
-            number(two),
-            number(abs(one - two)),
-            number(lqr),
+            *(number(x, 3, missing="never") for x in (one, two, abs(one - two), lqr)),
         )
     lines = [
         f"{'reached' if ok else 'NOT reached'}: {demand} ({words})"
@@ -233,12 +230,12 @@ def _tables(each: TwoCases) -> list[Any]:
         "w's range from the instant at which the later of both cases has settled. The dissertation "
         "defines none."
     )
-    out.caption, out.caption_justify = "\n".join(lines), "left"
-    return [out]
+    out.notes += lines
+    return out
 
 
 def _figure(value: float) -> str:
-    return "0.000" if value <= 5e-4 else number(value)
+    return "0.000" if value <= 5e-4 else number(value, 3, missing="never")
 
 
 def _other(each: TwoCases) -> str:

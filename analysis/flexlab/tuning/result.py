@@ -9,13 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.table import Table
 
 import flexura as fx
 from flexura.control import Gains, Response, of_run
 from flexura.io import write_bytes
 from flexura.optional import load
 
+from ..runs.formatting import number
+from ..runs.table import Table
 from . import search_space as freedom
 from .closed_loop import closed_loop_controller
 from .history import History
@@ -43,6 +44,17 @@ class Result:
     def best(self) -> np.ndarray:
         """Its goals."""
         return np.asarray(self.history.all("goals")[self.history.best])
+
+    @property
+    def settings(self) -> dict[str, float]:
+        """The free settings that were found, by name."""
+        point = self.history.all("points")[self.history.best]
+        return freedom.named(self.task.free, self.task.values(point[None])[0])
+
+    @property
+    def at_bounds(self) -> list[str]:
+        """A sentence for each setting that ended at a bound of its range."""
+        return freedom.at_bounds(self.task.free, self.settings)
 
     def meta(self) -> dict[str, Any]:
         """Everything that the outcome depends on, in the result too."""
@@ -111,61 +123,53 @@ def save(found: Result, folder: Path) -> list[Path]:
     return paths
 
 
+HEADS = (
+    "robot",
+    "joint",
+    "rise [s]",
+    "settling [s]",
+    "overshoot [%]",
+    "error [%]",
+    "peak [mm]",
+    "residual [mm]",
+)
+
+
 def table(found: Result) -> Table:
-    """The tuned settings, and the figures on every robot."""
+    """The figures on every robot, the tuned settings, and what ended at its bound."""
     history, task = found.history, found.task
-    out = Table(
-        title=f"{task.robots[0].name or 'robot'}: {task.manoeuvre.name}, {found.how.algorithm}",
-        title_justify="left",
-    )
-    for name in (
-        "robot",
-        "",
-        "rise [s]",
-        "settling [s]",
-        "overshoot [%]",
-        "error [%]",
-        "peak [mm]",
-        "residual [mm]",
-    ):
-        out.add_column(
-            name.replace("[", "\\["), justify="left" if name == "robot" else "right", no_wrap=True
-        )
+    title = f"{task.robots[0].name or 'robot'}: {task.manoeuvre.name}, {found.how.algorithm}"
+    out = Table(title, HEADS, ("robot",))
     for k, response in enumerate(found.responses):
         for i, row in enumerate(response.joints):
-            strip = [number(1e3 * x) for x in response.strip[:2]] if i == 0 else ["", ""]
-            name = _robot(found, k) if i == 0 else ""
-            out.add_row(
-                name,
+            bent = [number(1e3 * x, 3, missing="") for x in response.strip[:2]]
+            out.add(
+                _robot(found, k) if i == 0 else "",
                 str(i + 1),
-                number(row[0]),
-                number(row[1]),
-                number(100 * row[2]),
-                number(100 * row[3]),
-                *strip,
+                *(number(factor * x, 3, missing="never") for factor, x in zip(_FACTORS, row)),
+                *(bent if i == 0 else ["", ""]),
             )
     goals = ", ".join(f"{n} = {v:.5g}" for n, v in zip(task.goals, found.best, strict=True))
-    done = (
-        f"{history.evaluations} evaluations in {len(history)} generations, "
+    out.notes.append(
+        f"{goals}; {history.evaluations} evaluations in {len(history)} generations, "
         f"{sum(history.wall_s):.3g} s; seed {found.how.seed}"
     )
-    lines = [
-        f"{goals}; {done}" + ("" if found.complete else "; interrupted: the same command goes on")
-    ]
-    lines += [f"worst of {len(task.robots)} robots"] if len(task.robots) > 1 else []
-    lines += (
-        [f"{len(history.pareto_front())} gains on the front, these are the balanced ones"]
+    if not found.complete:
+        out.notes.append("interrupted: the same command goes on")
+    if len(task.robots) > 1:
+        out.notes.append(f"worst of {len(task.robots)} robots")
+    out.notes.append(
+        f"{len(history.pareto_front())} gains on the front, these are the balanced ones"
         if task.pareto
-        else [task.weights.text()]
+        else task.weights.text()
     )
-    tuned = freedom.named(task.free, task.values(history.all("points")[history.best][None])[0])
-    lines += [", ".join(f"{name} = {value:.4g}" for name, value in tuned.items())]
-    out.caption, out.caption_justify = "\n".join(lines), "left"
+    tuned = found.settings
+    out.notes.append(", ".join(f"{name} = {value:.4g}" for name, value in tuned.items()))
+    out.notes += found.at_bounds
     return out
 
 
-def number(value: float) -> str:
-    return f"{value:.3g}" if np.isfinite(value) else "never"
+_FACTORS = (1.0, 1.0, 100.0, 100.0)  # of rise, settling, overshoot, error
 
 
 def _robot(found: Result, k: int) -> str:
@@ -192,12 +196,10 @@ def _stiffness(link: Any) -> float:
 
 def numbers(found: Result) -> dict[str, Any]:
     """For JSON."""
-    tuned = freedom.named(
-        found.task.free, found.task.values(found.history.all("points")[found.history.best][None])[0]
-    )
     return {
         "goals": dict(zip(found.task.goals, map(float, found.best), strict=True)),
-        "settings": tuned,
+        "settings": found.settings,
+        "at_bounds": found.at_bounds,
         "evaluations": found.history.evaluations,
         "generations": len(found.history),
         "wall_s": sum(found.history.wall_s),

@@ -162,6 +162,23 @@ def named(frees: Sequence[FreeGain], values: np.ndarray) -> dict[str, float]:
     return {f.name: float(v) for f, v in zip(frees, values, strict=True)}
 
 
+AT_BOUND = 0.005  # of the range, on its scale: nearer counts as at the bound
+
+
+def at_bounds(frees: Sequence[FreeGain], values: Mapping[str, float]) -> list[str]:
+    """A sentence for each setting whose value is at a bound of its range."""
+    out = []
+    for f in frees:
+        place = f.to_unit_interval(values[f.name])
+        for bound, word, near in ((f.low, "lower", place), (f.high, "upper", 1.0 - place)):
+            if near <= AT_BOUND:
+                out.append(
+                    f"{f.name} is at its {word} bound, {bound:g}: a wider range may give a better "
+                    "result"
+                )
+    return out
+
+
 def rows(
     frees: Sequence[FreeGain], values: np.ndarray, controller: fx.Controller, base: np.ndarray
 ) -> np.ndarray:

@@ -48,6 +48,10 @@ class Task:
 
     def __post_init__(self) -> None:
         search_space.check(self.free, self.gains)
+        if not 0 < self.rtol <= 0.1:
+            raise InputError(
+                "expected a relative tolerance above 0, at most 0.1", key="--rtol", value=self.rtol
+            )
 
     @cached_property
     def systems(self) -> list[fx.System]:

@@ -4,7 +4,7 @@ from .format import FORMAT, check_format
 from .run import FILE, STATIONS, Run
 from .shipped import find, shipped_files
 from .toml_files import read_toml, write_bytes, write_text, write_toml
-from .validation import explain
+from .validation import explain, is_name
 
 __all__ = [
     "FILE",
@@ -14,6 +14,7 @@ __all__ = [
     "check_format",
     "explain",
     "find",
+    "is_name",
     "read_toml",
     "shipped_files",
     "write_bytes",

@@ -148,8 +148,12 @@ class Run:
         import pyarrow.parquet as pq
 
         path = Path(folder)
-        path = path / FILE if path.is_dir() else path
-        if not path.is_file():
+        try:
+            path = path / FILE if path.is_dir() else path
+            there = path.is_file()
+        except OSError:  # a name that is too long, a folder that may not be looked into
+            there = False
+        if not there:
             raise InputError(f"no run here: expected a folder with {FILE}", file=str(folder))
         try:
             table = pq.read_table(path, partitioning=None)  # a folder named a=b is just a folder

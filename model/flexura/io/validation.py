@@ -3,11 +3,22 @@
 from __future__ import annotations
 
 import difflib
+import unicodedata
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
 from ..errors import InputError, WrongValue
+
+MOST_LETTERS = 200
+
+
+def is_name(value: Any) -> bool:
+    """Whether a value is a name: a text of one line, not too long, without control characters."""
+    if not isinstance(value, str) or len(value) > MOST_LETTERS:
+        return False
+    kinds = map(unicodedata.category, value)
+    return not any(kind.startswith("C") or kind in ("Zl", "Zp") for kind in kinds)
 
 
 def explain(

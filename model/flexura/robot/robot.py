@@ -12,10 +12,10 @@ import os
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, Field, ValidationError, model_validator
+from pydantic import BaseModel, Field, ValidationError, field_validator, model_validator
 
 from ..errors import InputError, WrongValue
-from ..io import FORMAT, check_format, explain, find, read_toml, write_toml
+from ..io import FORMAT, check_format, explain, find, is_name, read_toml, write_toml
 from .joint import KEYS
 from .link import LEAST_FREE, Link
 from .old_keys import renamed
@@ -39,7 +39,9 @@ class Robot(Table):
     units."""
 
     name: str = Field(
-        "", max_length=200, description="the robot's name, a text of at most 200 characters"
+        "",
+        max_length=200,
+        description="the robot's name, one line of at most 200 characters without control codes",
     )
     gravity_m_s2: tuple[float, float] = Field(
         (0.0, 0.0),
@@ -60,6 +62,13 @@ class Robot(Table):
     format: int = Field(
         FORMAT, ge=1, le=FORMAT, description=f"the file's format, a whole number up to {FORMAT}"
     )
+
+    @field_validator("name")
+    @classmethod
+    def _one_line(cls, name: str) -> str:
+        if not is_name(name):
+            raise ValueError("expected one line without control codes")
+        return name
 
     @model_validator(mode="after")
     def _starts_on_its_links(self) -> Robot:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..io import check_format, find, read_toml
+from ..io import check_format, find, is_name, read_toml
 from .drive import Drive, JointDrive, check_smooth
 from .parsing import finite, from_spec
 from .signal import Signal
@@ -115,8 +115,12 @@ def _manoeuvre(data: dict[str, Any], joints: int) -> Manoeuvre:
             )
         )
     name = data.get("name", "")
-    if not isinstance(name, str):
-        raise InputError("expected a text", key="name", value=name)
+    if not is_name(name):
+        raise InputError(
+            "expected one line of at most 200 characters without control codes",
+            key="name",
+            value=name,
+        )
     return Manoeuvre(name, duration, step, Drive(tuple(drives)))
 
 

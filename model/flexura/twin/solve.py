@@ -101,7 +101,7 @@ def simulate(
         ("step_s", step_s, "time in seconds"),
         ("hub_length_m", hub_length_m, "length in metres"),
     ):
-        if given is not None and not given > 0:
+        if given is not None and not 0 < given < np.inf:
             raise InputError(f"expected a {unit}, above 0", key=key, value=given)
     act = actuation(drive, robot.start, speeds)
     kinds = sliding_kinds(robot) if hub_length_m is None else []

@@ -1,0 +1,199 @@
+"""Where a command leaves its results: tried before the work, and nothing overwritten.
+
+The results are written into a folder beside their place, and moved there when they are whole. An
+interruption leaves finished results as they are.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+import secrets
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from flexura.errors import InputError
+
+from ..runs.formatting import file_name
+
+LOGS = Path("logs")
+REPLACE = "or --force, which replaces files of the same names"
+
+
+@dataclass(frozen=True)
+class Draft:
+    """A folder to write into, and the place of the results."""
+
+    folder: Path
+    target: Path
+    counts: bool  # the place is a default, which counts up
+
+    def keep(self, *, interrupted: bool = False) -> Path:
+        """Move the results to their place, and return it.
+
+        Interrupted work replaces no finished results: it stands in a folder beside.
+        """
+        target = self.target
+        if self.counts or (interrupted and taken(target)):
+            stem = target if self.counts else target.with_name(f"{target.name}-interrupted")
+            while True:
+                target = counted(stem, folder=True)
+                try:
+                    os.rename(self.folder, target)
+                    return target
+                except OSError:
+                    if not os.path.lexists(target):  # else another process took this number
+                        raise
+        if not target.exists():
+            os.rename(self.folder, target)
+            return target
+        for entry in sorted(self.folder.iterdir()):
+            _replace(entry, target / entry.name, self.folder)
+        return target
+
+
+@contextmanager
+def results(out: Path | None, *names: str, force: bool = False) -> Iterator[Draft]:
+    """A draft of the folder `out`, or by default of logs/NAME-NAME-1, -2, ...
+
+    What has not been kept at the end is removed.
+
+    Raises:
+        InputError: `out` has something in it and `force` is false, or it cannot be written.
+    """
+    target = LOGS / "-".join(map(file_name, names)) if out is None else out
+    if out is not None and not force and taken(out):
+        raise InputError(
+            f"results are there: expected a new or empty folder, {REPLACE}",
+            key="--out",
+            value=str(out),
+        )
+    with _folder(target, out is None) as folder:
+        yield Draft(folder, target, out is None)
+
+
+def continued(out: Path | None, *names: str, mark: str) -> Path:
+    """The folder of a command that goes on where it was stopped: `out`, or logs/NAME-NAME.
+
+    Raises:
+        InputError: the folder cannot be written, or has files but no `mark` of such a command.
+    """
+    target = LOGS / "-".join(map(file_name, names)) if out is None else out
+    if taken(target) and not (target / mark).exists():
+        raise InputError(
+            f"other files are there: expected a new or empty folder, or one with {mark} to go on",
+            key="--out",
+            value=str(target),
+        )
+    with _folder(target, False):
+        return target
+
+
+@contextmanager
+def file_result(path: Path | None, key: str = "--out", *, force: bool = False) -> Iterator[None]:
+    """Try a file before the work: it is not there, and can be written.
+
+    Folders that were made for it are removed if it is not there at the end.
+
+    Raises:
+        InputError: the file is there and `force` is false, or it cannot be written.
+    """
+    if path is None:
+        yield
+        return
+    if os.path.isdir(path):
+        raise InputError("a folder: expected the name of a file", key=key, value=str(path))
+    if os.path.lexists(path) and not force:
+        raise InputError(
+            "a file is there: expected another name, or --force to replace it",
+            key=key,
+            value=str(path),
+        )
+    made: list[Path] = []
+    try:
+        try:
+            made = _parents(path.parent)
+            trial = path.parent / f".flexura-{secrets.token_hex(4)}"
+            trial.touch(exist_ok=False)
+            trial.unlink()
+        except (OSError, ValueError) as error:
+            raise _unwritable(key, path, error) from None
+        yield
+    finally:
+        _remove_empty(made)
+
+
+def counted(path: Path, *, folder: bool = False) -> Path:
+    """The first of NAME-1.EXT, NAME-2.EXT, ... that is not there; a folder has no extension."""
+    stem, extension = (path.name, "") if folder else (path.stem, path.suffix)
+    places = (path.with_name(f"{stem}-{k}{extension}") for k in itertools.count(1))
+    return next(place for place in places if not os.path.lexists(place))
+
+
+def taken(path: Path) -> bool:
+    """Whether something is there that results would stand on: a file, or a folder with entries."""
+    try:
+        return os.path.lexists(path) and not (path.is_dir() and not any(path.iterdir()))
+    except (OSError, ValueError):  # what cannot be read is refused where it is tried
+        return False
+
+
+@contextmanager
+def _folder(target: Path, counts: bool) -> Iterator[Path]:
+    """A new folder on the same file system as `target`: in it if it is there, else beside it."""
+    made: list[Path] = []
+    folder = Path()
+    try:
+        try:
+            inside = not counts and target.is_dir()
+            parent = target if inside else target.parent
+            folder = parent / f".flexura-{secrets.token_hex(4)}"
+            made = _parents(parent)
+            if not inside and not counts and os.path.lexists(target):
+                raise NotADirectoryError(0, "a file, not a folder")
+            folder.mkdir()
+            if not inside:
+                (folder / target.name).mkdir()  # a name that the file system refuses
+                (folder / target.name).rmdir()
+        except (OSError, ValueError) as error:
+            raise _unwritable("--out", target, error) from None
+        yield folder
+    finally:
+        if folder.name:
+            shutil.rmtree(folder, ignore_errors=True)
+        _remove_empty(made)
+
+
+def _parents(folder: Path) -> list[Path]:
+    """Make a folder and those above it; returns the new ones, the outermost first."""
+    new = [p for p in (folder, *folder.parents) if not os.path.lexists(p)]
+    made: list[Path] = []
+    try:
+        for p in reversed(new):
+            p.mkdir()
+            made.append(p)
+    except OSError:
+        _remove_empty(made)
+        raise
+    return made
+
+
+def _remove_empty(folders: list[Path]) -> None:
+    for folder in reversed(folders):
+        with suppress(OSError):
+            folder.rmdir()
+
+
+def _unwritable(key: str, path: Path, error: Exception) -> InputError:
+    why = getattr(error, "strerror", None) or str(error)
+    return InputError(f"cannot be written ({why})", key=key, value=str(path))
+
+
+def _replace(entry: Path, place: Path, old: Path) -> None:
+    """Move a result to its place; a folder that stands there goes into `old`."""
+    if os.path.lexists(place) and (place.is_dir() or entry.is_dir()):
+        os.rename(place, old / f".replaced-{entry.name}")
+    os.replace(entry, place)
