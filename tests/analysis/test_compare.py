@@ -583,7 +583,7 @@ def test_the_command_compares_two_runs_and_leaves_them_as_they_are(compared, tmp
     assert {k: found[k] for k in ("deviations", "responses")} == {
         k: json.loads(json.dumps(table.numbers(compared)[k])) for k in ("deviations", "responses")
     }
-    folder = tmp_path / "experiment" / "comparison"
+    folder = tmp_path / "experiment" / "comparison-1"
     assert not (folder / "simulation").exists() and (folder / "report.html").is_file()
     assert (tmp_path / "experiment" / "run.parquet").read_bytes() == before
 

@@ -200,10 +200,24 @@ def test_a_random_rig_is_found_from_one_run(excitement, found, tmp_path):
         assert found.strip.values[name] == pytest.approx(truth["factors"][name], rel=least), name
     assert found.carriage.values["coulomb_N"] == pytest.approx(truth["joint_1_coulomb_N"], rel=0.15)
     assert found.strip.values["backlash_m"] == pytest.approx(truth["backlash_m"], abs=5e-5)
-    robot, rig = files.save(found, excitement.run, tmp_path / "robot.toml")
+    (robot, rig), missing = files.save(found, excitement.run, tmp_path / "robot.toml")
+    assert missing == []
     assert fx.load(robot).payload.mass_kg == files.robot(found).payload.mass_kg
     assert rigs.configuration(rigs.load(rig))
-    json.dumps(output.numbers(found, excitement.run))
+    told = json.loads(json.dumps(output.numbers(found, excitement.run)))
+    assert all(p["low"] <= p["value"] <= p["high"] for p in told["parameters"])
+    assert told["at_bounds"] == []
+    elsewhere = fx.Run(
+        excitement.run.t,
+        excitement.run.channels,
+        excitement.run.units,
+        excitement.run.meta | {"rig_file": "/home/lab/firmware/rig.toml"},
+    )
+    (alone,), (missing,) = files.save(found, elsewhere, tmp_path / "b" / "robot.toml")
+    assert fx.load(alone) == fx.load(robot) and [p.name for p in alone.parent.iterdir()] == [
+        "robot.toml"
+    ]
+    assert "robot-rig.toml is not written" in missing and "/home/lab" in missing
 
 
 @pytest.mark.timeout(1200)

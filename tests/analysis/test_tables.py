@@ -120,6 +120,7 @@ QUICK = {
     + ["--vary", "link.2.length_m=0.25:0.3:7"],
     "inverse": ["inverse", RIG, LAW],
     "inverse, nine joints": ["inverse", "nine.toml", "nine-motions.toml"],
+    "robots": ["robots"],
     "frequencies": ["frequencies", "model/robots/two-link-arm.toml", "--zeros"],
     "crosscheck": ["crosscheck", RIG, LAW],
     "payload": ["study", "payload", TYPE_1, "--values", "0:0.2:5"],

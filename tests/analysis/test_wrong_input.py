@@ -231,6 +231,8 @@ GOOD = {
     "compare": ["run"],
     "review": ["run"],
     "export": ["run", "--to", "csv"],
+    "migrate": ["robot.toml"],
+    "new": ["robot.toml"],
 }
 # options with a value that is wrong, whatever the rest of the line
 OPTIONS = {
@@ -306,6 +308,8 @@ OPTIONS = {
         "--picture": ("robot.toml", "/dev/null/x"),
         "--time-s": ("x", "1"),
     },
+    "migrate": {"--keys": ("x",)},
+    "new": {"--links": ("2",)},
     "export": {"--to": ("doc", "", "CSV"), "--out": ("robot.toml", ".", "run/run.parquet")},
 }
 

@@ -49,7 +49,7 @@ def crosscheck(
     deviation may be the twin's own error, so that it says nothing about the native solver.
 
     \b
-    Example: flexura crosscheck model/robots/rig.toml model/manoeuvres/rig-inverse-law.toml
+    Example: flexura crosscheck rig rig-inverse-law
     """
     need("exudyn", "rerun")
     if all_ or robot is None:

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Group
 
 from ..comparison import table
+from ..runs.table import Table
 from . import tables
 from .demonstration import Demonstration, demonstrate, numbers
 from .options import Force, Json
@@ -61,10 +61,10 @@ def demo(
         raise typer.Exit(130 if stopped else 1)
 
 
-def _tables(done: Demonstration) -> Group:
+def _tables(done: Demonstration) -> list[Table]:
     """The cross-check, or the native run alone, and the experiment beside its simulation."""
     first = tables.check_table(done.check) if done.check else tables.run_table(done.simulation)
-    return Group(first, *([table.table(done.comparison)] if done.comparison else []))
+    return [first, *([table.table(done.comparison)] if done.comparison else [])]
 
 
 def _numbers(done: Demonstration) -> dict[str, Any]:

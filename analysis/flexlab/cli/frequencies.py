@@ -27,7 +27,7 @@ def frequencies(
     """Compute natural frequencies at the start, with joints locked and free.
 
     \b
-    Example: flexura frequencies model/robots/two-link-arm.toml --zeros
+    Example: flexura frequencies two-link-arm --zeros
     """
     described = fx.load(robot)
     system = fx.assemble(described)

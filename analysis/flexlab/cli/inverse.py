@@ -36,7 +36,7 @@ def inverse(
     Every joint follows its motion exactly. Gains and forces of the manoeuvre file are ignored.
 
     \b
-    Example: flexura inverse model/robots/rig.toml model/manoeuvres/rig-inverse-law.toml
+    Example: flexura inverse rig rig-inverse-law
     """
     system, asked = prepare(robot, manoeuvre)
     motions = [joint.motion for joint in asked.drive.joints]

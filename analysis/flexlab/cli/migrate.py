@@ -36,7 +36,9 @@ def migrate(
     ] = False,
     json: Json = False,
 ) -> None:
-    """Rename old keys of files. Comments and layout stay. Either all files are written or none.
+    """Rename old keys of files.
+
+    Comments and layout stay. Either all files are written or none.
 
     \b
     Example: flexura migrate my-arm.toml

@@ -11,28 +11,30 @@ import typer
 import flexura as fx
 from flexura.io import write_text
 
-from .options import Json
+from .options import ForceFile, Json
 from .output import say, show
+from .results import file_result
 
 TEMPLATE = Path(__file__).with_name("new_robot.toml")
 
 
 def new(
     file: Annotated[Path, typer.Argument(metavar="FILE.toml", help="the robot file to write")],
-    force: Annotated[bool, typer.Option("--force", help="write over a file that is there")] = False,
+    force: ForceFile = False,
     json: Json = False,
 ) -> None:
-    """Write a robot file to begin with: two links, every common key with its meaning.
+    """Write a commented robot file to begin with.
+
+    It has two links, and every common key with its meaning.
 
     \b
     Example: flexura new my-arm.toml
     """
     if file.suffix != ".toml":
         raise fx.InputError("expected a name that ends with .toml", key="FILE", value=str(file))
-    if file.exists() and not force:
-        raise fx.InputError("is there already: name another, or --force", file=str(file))
     named = f"name = {json_.dumps(file.stem[:200], ensure_ascii=False)}"
-    write_text(file, TEMPLATE.read_text("utf-8").replace('name = "my robot"', named, 1))
+    with file_result(file, "FILE", force=force):
+        write_text(file, TEMPLATE.read_text("utf-8").replace('name = "my robot"', named, 1))
     if json:
         show(True, lambda: None, lambda: {"robot": str(file)})
     say(

@@ -9,13 +9,14 @@ import typer
 
 RobotFile = Annotated[
     Path,
-    typer.Argument(metavar="ROBOT", help="robot file (TOML), for example model/robots/rig.toml"),
+    typer.Argument(metavar="ROBOT", help="robot file (TOML), or the name of a shipped one, as rig"),
 ]
 ManoeuvreFile = Annotated[
     Path | None,
     typer.Argument(
         metavar="MANOEUVRE",
-        help="manoeuvre file (TOML); without one, a modest back and forth of every joint",
+        help="manoeuvre file (TOML), or the name of a shipped one; default: every joint moves a "
+        "little, back and forth",
     ),
 ]
 RigFile = Annotated[

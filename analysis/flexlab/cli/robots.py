@@ -5,18 +5,20 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from rich.markup import escape
-from rich.table import Table
 
 import flexura as fx
 from flexura.io import shipped_files
 
+from ..runs.formatting import number
+from ..runs.table import Table
 from .options import Json
 from .output import say, show
 
 
 def robots(json: Json = False) -> None:
-    """List the robots that come with flexura. A command takes their names in place of a file.
+    """List the robots that come with flexura.
+
+    A command takes their names in place of a file.
 
     \b
     Example: flexura robots
@@ -43,16 +45,16 @@ def _row(name: str) -> dict[str, Any]:
 
 
 def _table(rows: list[dict[str, Any]]) -> Table:
-    out = Table(show_edge=False, caption="first frequency: at the start, joints locked")
-    for title in ("name", "structure", "links", "unknowns", "first [Hz]"):
-        out.add_column(title, justify="left" if title in ("name", "structure") else "right")
+    heads = ("name", "structure", "links", "unknowns", "first [Hz]")
+    out = Table("robots that come with flexura", heads, ("name", "structure"))
     for row in rows:
         first = row["first_frequency_Hz"]
-        out.add_row(
-            escape(row["name"]),
+        out.add(
+            row["name"],
             row["structure"],
             str(row["links"]),
             str(row["unknowns"]),
-            "" if first is None else f"{first:.5g}",
+            "" if first is None else number(first, 5),
         )
+    out.notes.append("first: the lowest frequency at the start, joints locked")
     return out

@@ -50,7 +50,7 @@ def simulate(
     in the same folder: logs/population-ROBOT-MANOEUVRE without --out.
 
     \b
-    Example: flexura simulate model/robots/rig.toml model/manoeuvres/rig-inverse-law.toml
+    Example: flexura simulate rig rig-inverse-law
     """
     if scheduler is not None and not vary:
         raise fx.InputError(

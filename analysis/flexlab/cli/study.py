@@ -47,7 +47,7 @@ def study(
     It stores a table (Parquet) and a figure. KIND boundary: with and without a sleeve.
 
     \b
-    Example: flexura study payload model/robots/type-1-rr.toml --values 0:0.2:11
+    Example: flexura study payload type-1-rr --values 0:0.2:11
     """
     if keep is not None and kind != "length-ratio":
         raise fx.InputError("expected with KIND length-ratio alone", key="--keep", value=keep)

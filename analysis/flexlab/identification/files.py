@@ -117,6 +117,11 @@ def with_identified_files(experiment: fx.Run, found: Identified) -> fx.Run:
 def save(found: Identified, experiment: fx.Run, path: Path) -> tuple[list[Path], list[str]]:
     """Write the robot file, and the rig file beside it (NAME-rig.toml).
 
+    Args:
+        found: the identification.
+        experiment: the run; its metadata name the rig's manoeuvre.
+        path: the robot file.
+
     Returns:
         The files, and a sentence for what could not be written. The rig file names a manoeuvre
         file. An experiment from another computer may have its manoeuvre there.

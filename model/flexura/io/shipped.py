@@ -47,7 +47,9 @@ def find(path: str | os.PathLike[str], kind: str) -> Path:
     """
     given = Path(path)
     name = os.fspath(path)
-    known = shipped_files(kind) if re.fullmatch(r"[\w-]+", name) and not given.is_file() else None
+    known = (
+        shipped_files(kind) if re.fullmatch(r"[\w-]+", name) and not os.path.isfile(path) else None
+    )
     if known is None or name in known:
         found = given if known is None else known[name]
         _log.debug("%s file %s", KINDS[kind], found)
