@@ -20,7 +20,7 @@ from flexlab.experiment import plan as plans
 from flexlab.experiment.run_experiment import Opened, Watch, check, conduct
 from flexlab.recordings import recording
 from flexlab.recordings.run_from_recording import UNEXPLAINED, knots_from, run_from_recording
-from flexlab.recordings.unit_conversion import UNITS, Sensor, commanded
+from flexlab.recordings.unit_conversion import UNITS, Sensor, planned_setpoints
 from flexura.io import write_toml
 from flexura.signals import harmonic
 
@@ -82,7 +82,7 @@ def test_the_boards_set_points_are_those_that_were_asked(tracked):
         wanted = np.array([joint.motion(t - begin)[0] for t in run.t[inside]])
         np.testing.assert_allclose(run[f"joint/{number}/reference"][inside], wanted, atol=least)
     kept = recording.read(tracked.folder)
-    course = commanded(knots_from(kept.session["knots"]), SETTINGS)
+    course = planned_setpoints(knots_from(kept.session["knots"]), SETTINGS)
     k = np.round(run.t[inside] * 1000).astype(int) - 1
     np.testing.assert_allclose(
         run["joint/1/reference"][inside] * 256 * 80e3, course[k, 0], atol=3.0
