@@ -26,24 +26,23 @@ from ..board.serial_port import SerialBoard
 from ..recordings.recording import Recording, RecordingBoard
 from ..recordings.run_from_recording import knots_spec, run_from_recording
 from ..recordings.unit_conversion import Sensor
-from ..rig import Bench, configuration
+from ..rig import Check, RigSetup, configuration
 from ..rig.description import Calibration
 from ..rig.plant.rigid_plant import RigidPlant
 from .flash import build
 from .plan import Plan
-from .selftest import Finding, prepare
-from .selftest import examine as test
+from .selftest import prepare, run_selftest
 from .stream import StreamResult, execute, stop_motors
 
 SETTLE_S = {"forward": 1.0, "inverse": 0.5, "step": 0.5, "free-vibration": 0.0}
 
 
-class NotStarted(FlexuraError):
+class RefusedToStart(FlexuraError):
     """A person did not want the experiment to start."""
 
 
 @dataclass(frozen=True)
-class Opened:
+class OpenBoard:
     """A board with what is known of it; `truth` are an emulated plant's own parameters, for whoever
     judges an identification; `cut` is the entry of [pins] whose wire was cut."""
 
@@ -60,10 +59,10 @@ class Opened:
 
 
 @dataclass(frozen=True)
-class Watch:
+class Hooks:
     """What the person at the bench sees and says. Each may be left as it is."""
 
-    tested: Callable[[list[Finding]], None] = lambda findings: None
+    tested: Callable[[list[Check]], None] = lambda findings: None
     say: Callable[[str], None] = lambda text: None  # what the person is to do
     may_start: Callable[[Link], str] = lambda link: ""  # the countdown; says why not
     stop_asked: Callable[[], str] = lambda: ""
@@ -71,12 +70,12 @@ class Watch:
 
 
 @dataclass(frozen=True)
-class Done:
+class ExperimentResult:
     """A finished experiment."""
 
     run: fx.Run
     folder: Path
-    findings: list[Finding]
+    findings: list[Check]
     ended: StreamResult
 
 
@@ -89,8 +88,12 @@ def check(plan: Plan) -> None:
 
 
 def open_board(
-    bench: Bench, port: str | None, seed: int = 0, elf: Path | None = None, cut: str | None = None
-) -> Opened:
+    setup: RigSetup,
+    port: str | None,
+    seed: int = 0,
+    elf: Path | None = None,
+    cut: str | None = None,
+) -> OpenBoard:
     """The board at a serial port, or, without one, an emulated board with the bench's plant behind
     its wires; `cut` breaks the wire of that entry of [pins]."""
     if cut is not None and cut not in PINS:
@@ -106,23 +109,25 @@ def open_board(
             raise InputError(
                 "no such device: expected the board's serial port", key="--port", value=port
             )
-        return Opened(SerialBoard(port, BAUD_BIT_S))
-    plant = plant_of(bench, seed)
+        return OpenBoard(SerialBoard(port, BAUD_BIT_S))
+    plant = plant_of(setup, seed)
     board = EmulatedBoard(elf or build(), plant)
     if cut is not None:
         board.cut(cut)
-    return Opened(board, seed, dict(getattr(plant, "truth", {})), plant, cut or "")
+    return OpenBoard(board, seed, dict(getattr(plant, "truth", {})), plant, cut or "")
 
 
-def plant_of(bench: Bench, seed: int) -> Any:
+def plant_of(setup: RigSetup, seed: int) -> Any:
     """The emulated rig: its elastic plant where this version has one, else its drives with a
     straight strip."""
     if importlib.util.find_spec("flexlab.rig.plant.plant") is None:
-        return RigidPlant(bench)
-    return importlib.import_module("flexlab.rig.plant.plant").rig_plant(bench, seed)
+        return RigidPlant(setup)
+    return importlib.import_module("flexlab.rig.plant.plant").rig_plant(setup, seed)
 
 
-def session(bench: Bench, plan: Plan, opened: Opened, calibration: Calibration) -> dict[str, Any]:
+def session(
+    setup: RigSetup, plan: Plan, opened: OpenBoard, calibration: Calibration
+) -> dict[str, Any]:
     """What is known before the board is greeted; the run's metadata are made of it."""
     board = opened.board
     assert board.label.startswith("emulated") == board.emulated
@@ -133,12 +138,12 @@ def session(bench: Bench, plan: Plan, opened: Opened, calibration: Calibration) 
             "emulated": board.emulated,
             "label": board.label,
             "experiment": plan.experiment,
-            "name": bench.robot.name,
-            "structure": bench.robot.structure,
+            "name": setup.robot.name,
+            "structure": setup.robot.structure,
             "program": f"flexura {importlib.metadata.version('flexura')}",
-            "robot": bench.robot.to_dict(),
-            "rig": bench.rig.model_dump(mode="json"),
-            "rig_file": bench.file,
+            "robot": setup.robot.to_dict(),
+            "rig": setup.rig.model_dump(mode="json"),
+            "rig_file": setup.file,
             "host_version": importlib.metadata.version("flexura"),
             "seed": opened.seed,
             "started": datetime.datetime.now().astimezone().isoformat(timespec="seconds"),
@@ -154,14 +159,14 @@ def session(bench: Bench, plan: Plan, opened: Opened, calibration: Calibration) 
 
 
 def conduct(
-    bench: Bench,
+    setup: RigSetup,
     plan: Plan,
-    opened: Opened,
+    opened: OpenBoard,
     folder: Path,
     calibration: Calibration,
-    watch: Watch,
+    watch: Hooks,
     configure: bool = False,
-) -> Done:
+) -> ExperimentResult:
     """Self-test, start, execute, and the Run; `configure` allows to write the rig's settings into a
     board that has others.
 
@@ -170,7 +175,7 @@ def conduct(
     nothing moved is taken away again.
     """
     check(plan)
-    recording = Recording(folder, session(bench, plan, opened, calibration))
+    recording = Recording(folder, session(setup, plan, opened, calibration))
     # The same experiment on the emulated board is the same byte for byte; a real line needs a
     # number that nobody played before.
     link = Link(
@@ -180,7 +185,7 @@ def conduct(
         findings = _ready(
             link,
             recording,
-            bench,
+            setup,
             plan,
             calibration,
             opened.board.emulated or configure,
@@ -189,14 +194,14 @@ def conduct(
         watch.tested(findings)
         if failed := [finding for finding in findings if not finding.passed]:
             if why := watch.stop_asked():
-                raise NotStarted(f"not started: {why}")
+                raise RefusedToStart(f"not started: {why}")
             first = failed[0]
             raise BoardError(
                 f"{link.board.label}: self-test: {first.what}: {first.found}; expected "
                 f"{first.expected}; {first.advice}"
             )
         if why := watch.may_start(link):
-            raise NotStarted(f"not started: {why}")
+            raise RefusedToStart(f"not started: {why}")
     except BaseException as error:
         stop_motors(link)
         recording.discard()
@@ -217,18 +222,18 @@ def conduct(
         recording.close()
     run = run_from_recording(folder)
     run.save(folder)
-    return Done(run, folder, findings, ended)
+    return ExperimentResult(run, folder, findings, ended)
 
 
 def _ready(
     link: Link,
     recording: Recording,
-    bench: Bench,
+    setup: RigSetup,
     plan: Plan,
     calibration: Calibration,
     write: bool,
     commission: Callable[[Link], Program],
-) -> list[Finding]:
+) -> list[Check]:
     """Greet the board, configure and test it, and tell it that both joints stand at 0."""
     identity = link.connect()
     runs = program(link)
@@ -242,9 +247,9 @@ def _ready(
             "pins": f"{runs.pins:08x}",
         }
     )
-    findings = prepare(link, identity, configuration(bench), plan.settings, write, commission)
+    findings = prepare(link, identity, configuration(setup), plan.settings, write, commission)
     if all(finding.passed for finding in findings):
-        more, rest = test(
+        more, rest = run_selftest(
             link, plan.settings, lambda r: float(Sensor(calibration, calibration.zero).tip(r))
         )
         findings += more

@@ -19,22 +19,11 @@ from ..board.commissioning import Program, program, where
 from ..board.protocol.declaration import FAULTS, PINS_HASH, Fault, Flag, Result, State
 from ..board.protocol.session import Identity, Link, Refused
 from ..recordings.unit_conversion import flex_reading
+from ..rig import Check
 from .flash import as_float32
 
 REST_S = 0.4  # how long the rig is watched at rest
 BENT_M = 0.03  # a tip deflection at rest that is no drift of the sensor any more
-
-
-@dataclass(frozen=True)
-class Finding:
-    """One thing looked at: what was found against what was expected, and what to do where they
-    differ."""
-
-    what: str
-    passed: bool
-    found: str
-    expected: str
-    advice: str = ""
 
 
 @dataclass(frozen=True)
@@ -57,7 +46,7 @@ def prepare(
     wanted: dict[str, float],
     write: bool,
     commission: Callable[[Link], Program],
-) -> list[Finding]:
+) -> list[Check]:
     """Bring the board to Idle with the settings of the experiment; what was found and done.
 
     `stored` are the rig file's settings: a board that has others is refused, unless `write` allows
@@ -72,20 +61,20 @@ def prepare(
     differing = [name for name, value in stored.items() if found[name] != as_float32(value)]
     runs = program(link)
     out = [
-        Finding(
+        Check(
             "pins",
             runs.pins_are_declared,
             f"{runs.pins:08x}",
             f"{PINS_HASH:08x}, those of protocol.toml",
             "load the firmware of this declaration: flexura flash",
         ),
-        Finding(
+        Check(
             "declaration",
             True,
             f"{identity.declaration:08x}, firmware {identity.firmware}",
             "this program's",
         ),
-        Finding(
+        Check(
             "configuration",
             not differing or write,
             _some(differing) if differing else "the rig file's",
@@ -102,14 +91,12 @@ def prepare(
     if fault is not Fault.none:
         try:
             link.command("clear", fault=fault)
-            out.append(
-                Finding("fault", True, f"{fault.name} of before, cleared", "none that lasts")
-            )
+            out.append(Check("fault", True, f"{fault.name} of before, cleared", "none that lasts"))
         except Refused as refused:
             if refused.result is Result.fault_persists:  # perhaps because of another one
                 fault = Fault(refused.detail)
             out.append(
-                Finding(
+                Check(
                     "fault",
                     False,
                     f"{fault.name}: {FAULTS[fault][0]}",
@@ -135,14 +122,14 @@ def prepare(
         )
     if special:
         out.append(
-            Finding("settings of this experiment", True, _some(list(special)), "in use, not stored")
+            Check("settings of this experiment", True, _some(list(special)), "in use, not stored")
         )
     return out
 
 
-def _stop_proof(runs: Program) -> Finding:
+def _stop_proof(runs: Program) -> Check:
     trial = {"untried": "never pressed", "pressed": "open", "released": "not stored"}
-    return Finding(
+    return Check(
         "emergency stop proven",
         runs.may_move,
         f"with firmware {runs.firmware:08x}" if runs.may_move else trial[runs.stop.name],
@@ -151,7 +138,7 @@ def _stop_proof(runs: Program) -> Finding:
     )
 
 
-def examine(link: Link, settings: dict[str, float], tip_m: Any) -> tuple[list[Finding], Rest]:
+def run_selftest(link: Link, settings: dict[str, float], tip_m: Any) -> tuple[list[Check], Rest]:
     """Watch the rig at rest. `tip_m(reading)` is the tip deflection that the calibration gives."""
     link.telemetry()
     link.run(REST_S)
@@ -166,8 +153,8 @@ def examine(link: Link, settings: dict[str, float], tip_m: Any) -> tuple[list[Fi
     supply = seen["supply"] / 1000
     flags = np.bitwise_or.reduce(seen["flags"])
     out = [
-        Finding("state", State(last["state"]) is State.idle, State(last["state"]).name, "idle"),
-        Finding(
+        Check("state", State(last["state"]) is State.idle, State(last["state"]).name, "idle"),
+        Check(
             "supply",
             bool(
                 settings["supply_min_V"] < supply.min() and supply.max() < settings["supply_max_V"]
@@ -181,7 +168,7 @@ def examine(link: Link, settings: dict[str, float], tip_m: Any) -> tuple[list[Fi
         fault = FAULTS[Fault[flag.name]]
         open_ = bool(flags >> flag & 1)
         out.append(
-            Finding(
+            Check(
                 flag.name.replace("_", " "),
                 not open_,
                 "open" if open_ else "closed",
@@ -194,7 +181,7 @@ def examine(link: Link, settings: dict[str, float], tip_m: Any) -> tuple[list[Fi
         spread = int(counts.max() - counts.min())
         found = "still" if spread <= 1 else f"moved by {spread} counts"
         out.append(
-            Finding(
+            Check(
                 f"encoder {number}",
                 spread <= 1,
                 found,
@@ -203,18 +190,18 @@ def examine(link: Link, settings: dict[str, float], tip_m: Any) -> tuple[list[Fi
             )
         )
     missed = int(seen["missed"][-1] - seen["missed"][0])
-    out.append(Finding("missed edges", missed == 0, str(missed), "0", "check the encoders' wires"))
+    out.append(Check("missed edges", missed == 0, str(missed), "0", "check the encoders' wires"))
     low, high = settings["flex_min"], settings["flex_max"]
     tip = tip_m(rest.zero)
     out += [
-        Finding(
+        Check(
             "flex sensor",
             bool(low < x.min() and x.max() < high),
             f"{rest.zero:.4f} +- {rest.noise:.4f}",
             f"{low:g} to {high:g}",
             "check the sensor and its wires",
         ),
-        Finding(
+        Check(
             "strip at rest",
             abs(tip) < BENT_M,
             f"{1e3 * tip:.1f} mm by the calibration",
