@@ -1,12 +1,9 @@
-"""One experiment from its plan to its Run: the dissertation's steps in order, with everything
-received kept on the way."""
+"""One experiment from its plan to its Run; everything received is recorded on the way."""
 
 from __future__ import annotations
 
 import datetime
-import importlib
 import importlib.metadata
-import importlib.util
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -28,7 +25,7 @@ from ..recordings.run_from_recording import knots_spec, run_from_recording
 from ..recordings.unit_conversion import Sensor
 from ..rig import Check, RigSetup, configuration
 from ..rig.description import Calibration
-from ..rig.plant.rigid_plant import RigidPlant
+from ..rig.plant.plant import rig_plant
 from .flash import build
 from .plan import Plan
 from .selftest import prepare, run_selftest
@@ -43,8 +40,11 @@ class RefusedToStart(FlexuraError):
 
 @dataclass(frozen=True)
 class OpenBoard:
-    """A board with what is known of it; `truth` are an emulated plant's own parameters, for whoever
-    judges an identification; `cut` is the entry of [pins] whose wire was cut."""
+    """A board with what is known of it.
+
+    `truth`: an emulated plant's own parameters, to judge an identification. `cut`: the entry of
+    [pins] whose wire was cut.
+    """
 
     board: Board
     seed: int | None = None
@@ -60,7 +60,12 @@ class OpenBoard:
 
 @dataclass(frozen=True)
 class Hooks:
-    """What the person at the bench sees and says. Each may be left as it is."""
+    """What the person at the bench sees and says; each has a default.
+
+    `tested`: gets the checks. `say`: gets what the person is to do. `may_start`: the countdown,
+    returns why not, or "". `stop_asked`: why to stop, or "". `observe`: gets new reports and the
+    finished fraction.
+    """
 
     tested: Callable[[list[Check]], None] = lambda findings: None
     say: Callable[[str], None] = lambda text: None  # what the person is to do
@@ -80,7 +85,11 @@ class ExperimentResult:
 
 
 def check(plan: Plan) -> None:
-    """Raises InputError for the first thing that is asked and that the rig cannot do."""
+    """Check that the rig can follow a plan.
+
+    Raises:
+        InputError: names the first failed check.
+    """
     if plan.failed:
         first = plan.failed[0]
         expected = f"the rig cannot do this: expected {first.expected}; {first.advice}"
@@ -94,8 +103,18 @@ def open_board(
     elf: Path | None = None,
     cut: str | None = None,
 ) -> OpenBoard:
-    """The board at a serial port, or, without one, an emulated board with the bench's plant behind
-    its wires; `cut` breaks the wire of that entry of [pins]."""
+    """Open the board at a serial port, or an emulated board with the rig's plant.
+
+    Args:
+        setup: the rig.
+        port: serial port; None: an emulated board.
+        seed: of the emulated rig's noise.
+        elf: the firmware of an emulated board; by default it is built.
+        cut: entry of [pins] whose wire is cut, of an emulated board.
+
+    Raises:
+        InputError: there is no such port or pin, or a real board's wire is to be cut.
+    """
     if cut is not None and cut not in PINS:
         raise InputError(f"expected one of [pins]: {', '.join(PINS)}", key="--cut", value=cut)
     if port is not None:
@@ -110,25 +129,24 @@ def open_board(
                 "no such device: expected the board's serial port", key="--port", value=port
             )
         return OpenBoard(SerialBoard(port, BAUD_BIT_S))
-    plant = plant_of(setup, seed)
+    plant = rig_plant(setup, seed)
     board = EmulatedBoard(elf or build(), plant)
     if cut is not None:
         board.cut(cut)
-    return OpenBoard(board, seed, dict(getattr(plant, "truth", {})), plant, cut or "")
-
-
-def plant_of(setup: RigSetup, seed: int) -> Any:
-    """The emulated rig: its elastic plant where this version has one, else its drives with a
-    straight strip."""
-    if importlib.util.find_spec("flexlab.rig.plant.plant") is None:
-        return RigidPlant(setup)
-    return importlib.import_module("flexlab.rig.plant.plant").rig_plant(setup, seed)
+    return OpenBoard(board, seed, dict(plant.truth), plant, cut or "")
 
 
 def session(
     setup: RigSetup, plan: Plan, opened: OpenBoard, calibration: Calibration
 ) -> dict[str, Any]:
-    """What is known before the board is greeted; the run's metadata are made of it."""
+    """What is known before the board is greeted, for session.json and the run's metadata.
+
+    Args:
+        setup: the rig.
+        plan: the experiment.
+        opened: the board.
+        calibration: of the flex sensor.
+    """
     board = opened.board
     assert board.label.startswith("emulated") == board.emulated
     return (
@@ -167,12 +185,24 @@ def conduct(
     watch: Hooks,
     configure: bool = False,
 ) -> ExperimentResult:
-    """Self-test, start, execute, and the Run; `configure` allows to write the rig's settings into a
-    board that has others.
+    """Test the rig, start and execute a plan, and make the Run.
 
-    Raises InputError before anything moves for what is wrong with the plan, BoardError for what is
-    wrong with the board; what happens later is in the result's `ended`. A recording in which
-    nothing moved is taken away again.
+    What happens after the start is in the result's `ended`. A recording in which nothing moved is
+    removed.
+
+    Args:
+        setup: the rig.
+        plan: the experiment.
+        opened: the board.
+        folder: of the recording.
+        calibration: of the flex sensor.
+        watch: what the person sees and says.
+        configure: whether the rig's settings may be written into a board that has others.
+
+    Raises:
+        InputError: the rig cannot follow the plan.
+        BoardError: the board fails before anything moves.
+        RefusedToStart: a person did not want it.
     """
     check(plan)
     recording = Recording(folder, session(setup, plan, opened, calibration))

@@ -1,9 +1,8 @@
-"""The self-test before an experiment: may this board, wired as it is, be armed? Nothing moves in
-it.
+"""The self-test before an experiment: may this board, as it is wired, be armed?
 
-The declaration's hash is compared when the session opens (`Link.connect`); here follow pins,
-configuration, faults, the proof of the emergency stop, supply, switches, encoders and the flex
-sensor at rest.
+Nothing moves in it. `Link.connect` compares the declaration's hash when the session opens. The
+self-test checks pins, configuration, faults, the proof of the emergency stop, supply, switches,
+encoders and the flex sensor at rest.
 """
 
 from __future__ import annotations
@@ -28,14 +27,17 @@ BENT_M = 0.03  # a tip deflection at rest that is no drift of the sensor any mor
 
 @dataclass(frozen=True)
 class Rest:
-    """The flex sensor's reading with the strip at rest: mean, standard deviation of one report,
-    number of reports."""
+    """The flex sensor's reading with the strip at rest.
+
+    `zero`: mean. `noise`: standard deviation of one report. `reports`: their number.
+    """
 
     zero: float
     noise: float
     reports: int
 
     def spec(self) -> dict[str, Any]:
+        """As a table for session.json."""
         return vars(self)
 
 
@@ -47,12 +49,22 @@ def prepare(
     write: bool,
     commission: Callable[[Link], Program],
 ) -> list[Check]:
-    """Bring the board to Idle with the settings of the experiment; what was found and done.
+    """Bring the board to Idle with the settings of the experiment.
 
-    `stored` are the rig file's settings: a board that has others is refused, unless `write` allows
-    to write and store them. `wanted` are the experiment's; where they differ they are in use until
-    the next reset and not stored. `commission(link)` has the emergency stop pressed, if it is not
-    proven with the board's firmware.
+    Args:
+        link: the session with the board.
+        identity: what the board says of itself.
+        stored: the rig file's settings. A board that has others is refused, unless `write` is set.
+        wanted: the experiment's settings. Those that differ are in use until the next reset and not
+            stored.
+        write: whether the rig file's settings may be written and stored.
+        commission: has the emergency stop pressed, if it is not proven with the board's firmware.
+
+    Returns:
+        The checks, up to the first that failed.
+
+    Raises:
+        BoardError: the board does not keep what was written.
     """
     link.command("stop")
     link.run(0.01)
@@ -139,7 +151,19 @@ def _stop_proof(runs: Program) -> Check:
 
 
 def run_selftest(link: Link, settings: dict[str, float], tip_m: Any) -> tuple[list[Check], Rest]:
-    """Watch the rig at rest. `tip_m(reading)` is the tip deflection that the calibration gives."""
+    """Watch the rig at rest.
+
+    Args:
+        link: the session with the board.
+        settings: of the experiment, by name.
+        tip_m: tip deflection [m] of a reading, by the calibration.
+
+    Returns:
+        The checks, and the flex sensor's reading at rest.
+
+    Raises:
+        BoardError: reports are missing.
+    """
     link.telemetry()
     link.run(REST_S)
     seen = link.telemetry()

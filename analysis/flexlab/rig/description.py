@@ -179,7 +179,7 @@ class Flex(Table):
 
 
 class Rig(Table):
-    """The bench of one robot. Frozen; SI units."""
+    """The rig file of one robot. Frozen; SI units."""
 
     format: int = Field(
         FORMAT, ge=1, le=FORMAT, description=f"the file's format, a whole number up to {FORMAT}"
