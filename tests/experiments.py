@@ -18,7 +18,7 @@ from flexlab.board.emulator.emulated import EmulatedBoard
 from flexlab.board.pty import Pty
 from flexlab.experiment import run_experiment as steps
 from flexlab.experiment.plan import Plan
-from flexlab.experiment.run_experiment import Done, Opened, Watch, conduct
+from flexlab.experiment.run_experiment import ExperimentResult, Hooks, OpenBoard, conduct
 from flexlab.rig.plant.rigid_plant import RigidPlant
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -37,12 +37,12 @@ def board() -> EmulatedBoard:
 
 
 def experiment(
-    plan: Plan, folder: Path, watch: Watch | None = None, opened: Opened | None = None
-) -> Done:
+    plan: Plan, folder: Path, watch: Hooks | None = None, opened: OpenBoard | None = None
+) -> ExperimentResult:
     """One experiment in this process."""
-    opened = opened or Opened(board(), 0, {}, None)
+    opened = opened or OpenBoard(board(), 0, {}, None)
     try:
-        return conduct(BENCH, plan, opened, folder, rig.calibration(BENCH), watch or Watch())
+        return conduct(BENCH, plan, opened, folder, rig.calibration(BENCH), watch or Hooks())
     finally:
         opened.board.close()
 

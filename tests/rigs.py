@@ -13,7 +13,7 @@ from boards import BENCH, elf
 from experiments import SETTINGS, experiment
 from flexlab.board.emulator.emulated import EmulatedBoard, Outputs, Sensors
 from flexlab.experiment import excitation, plan
-from flexlab.experiment.run_experiment import Done, Opened
+from flexlab.experiment.run_experiment import ExperimentResult, OpenBoard
 from flexlab.rig.emulation import random_true_parameters
 from flexlab.rig.plant.plant import rig_plant
 
@@ -63,14 +63,14 @@ def ran(name: str, seed: int, folder: Path) -> tuple[fx.Run, Seen]:
     )
     seen = Seen(rig_plant(BENCH, seed, truth=random_true_parameters(seed)))
     done = experiment(
-        asked, folder, opened=Opened(EmulatedBoard(elf(), seen), seed, dict(seen.truth), seen)
+        asked, folder, opened=OpenBoard(EmulatedBoard(elf(), seen), seed, dict(seen.truth), seen)
     )
     assert done.ended.complete
     return done.run, seen
 
 
-def excited(seed: int, folder: Path) -> Done:
+def excited(seed: int, folder: Path) -> ExperimentResult:
     """The excitation of that rig."""
     seen = Seen(rig_plant(BENCH, seed, truth=random_true_parameters(seed)))
-    opened = Opened(EmulatedBoard(elf(), seen), seed, dict(seen.truth), seen)
+    opened = OpenBoard(EmulatedBoard(elf(), seen), seed, dict(seen.truth), seen)
     return experiment(excitation.plan(BENCH, SETTINGS), folder, opened=opened)

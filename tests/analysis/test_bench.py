@@ -90,7 +90,7 @@ def test_a_lucky_hit_does_not_count(monkeypatch):
     )
     monkeypatch.setattr(native_search.native, "run", answer)
     monkeypatch.setattr(native_search, "error", lambda channels, exact: float(channels["off"]))
-    found = native_search.loosest(None, None, {}, 1e-3, "implicit", 1.0)
+    found = native_search.loosest_tolerance(None, None, {}, 1e-3, "implicit", 1.0)
     assert found.rtol == native_search.RTOLS[3] and found.error == 8e-4
 
 

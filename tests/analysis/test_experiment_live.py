@@ -14,7 +14,7 @@ import flexura as fx
 from experiments import BENCH, SETTINGS, experiment
 from flexlab import rig
 from flexlab.experiment import plan as plans
-from flexlab.experiment.run_experiment import Watch
+from flexlab.experiment.run_experiment import Hooks
 from flexlab.recordings.unit_conversion import Sensor
 from flexlab.review.headless import free_port, settled, viewer
 from flexlab.review.live import COLOURS, serve
@@ -52,7 +52,7 @@ def count(png, colour):
 def test_a_viewer_that_joins_late_sees_the_past_and_follows(tmp_path):
     plan, port = plans.inverse(BENCH, SETTINGS), free_port()
     seen = []
-    experiment(plan, tmp_path / "run", Watch(observe=lambda reports, part: seen.append(reports)))
+    experiment(plan, tmp_path / "run", Hooks(observe=lambda reports, part: seen.append(reports)))
     half = len(seen) // 2
     title = "inverse on the emulated ATmega2560: no hardware is touched"
     with serve(plan, SENSOR, BENCH.robot, title, port) as observe:
@@ -88,6 +88,6 @@ def test_a_port_in_use_is_refused():
 def test_without_a_viewer_the_experiment_is_the_same(tmp_path):
     plan = plans.free_vibration(BENCH, SETTINGS, 0.3, 1.1)
     with serve(plan, SENSOR, BENCH.robot, "nobody looks", free_port()) as observe:
-        seen = experiment(plan, tmp_path / "a", Watch(observe=observe)).run
+        seen = experiment(plan, tmp_path / "a", Hooks(observe=observe)).run
     alone = experiment(plan, tmp_path / "b").run
     np.testing.assert_array_equal(seen["joint/2/position"], alone["joint/2/position"])

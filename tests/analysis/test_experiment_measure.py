@@ -17,10 +17,10 @@ from flexlab.recordings import flex_calibration
 from flexlab.recordings.delay_estimation import estimate_delay
 from flexlab.recordings.unit_conversion import (
     Sensor,
-    channels,
-    commanded,
-    rows,
+    channels_of_reports,
+    planned_setpoints,
     start_tick,
+    ticks_of_reports,
     velocity,
 )
 from flexlab.rig.description import Calibration
@@ -49,7 +49,7 @@ def test_conversions_by_hand():
         "setpoint_2": 256 * 1600,
     }
     seen = reports(**places, voltage=6000, supply=11400)
-    ticks, found = channels(seen, Mode.position, SETTINGS, Sensor(CUBIC, 0.61))
+    ticks, found = channels_of_reports(seen, Mode.position, SETTINGS, Sensor(CUBIC, 0.61))
     x = 2500 / 4096 - 0.61
     expected = {
         "joint/1/position": 0.01,
@@ -72,7 +72,7 @@ def test_what_did_not_arrive_is_nan_and_nothing_else_is():
         np.delete(a, lost)
         for a in (reports(position_1=np.arange(100)), (65500 + np.arange(100)) % 65536)
     )
-    ticks, found = channels(seen, Mode.position, SETTINGS, Sensor(CUBIC, 0.61), numbers)
+    ticks, found = channels_of_reports(seen, Mode.position, SETTINGS, Sensor(CUBIC, 0.61), numbers)
     np.testing.assert_array_equal(ticks, 1000 + 2 * np.arange(100))
     for name, values in found.items():
         if "velocity" not in name:
@@ -85,16 +85,20 @@ def test_what_did_not_arrive_is_nan_and_nothing_else_is():
 
 def test_reports_that_are_counted_anew_make_no_gap_of_60_000():
     numbers = np.concatenate([5000 + np.arange(50), np.arange(50)])
-    ticks, place = rows(reports(), numbers)
+    ticks, place = ticks_of_reports(reports(), numbers)
     assert len(ticks) <= 101 and (np.diff(ticks) > 0).all() and len(place) == 100
 
 
 def test_set_points_are_none_where_the_board_tracks_nothing():
     state = np.where(np.arange(100) < 60, State.running, State.fault)
-    _, found = channels(reports(state=state), Mode.position, SETTINGS, Sensor(CUBIC, 0.61))
+    _, found = channels_of_reports(
+        reports(state=state), Mode.position, SETTINGS, Sensor(CUBIC, 0.61)
+    )
     np.testing.assert_array_equal(np.isnan(found["joint/1/reference"]), state == State.fault)
     assert np.isnan(
-        channels(reports(), Mode.open_loop, SETTINGS, Sensor(CUBIC, 0.61))[1]["joint/2/reference"]
+        channels_of_reports(reports(), Mode.open_loop, SETTINGS, Sensor(CUBIC, 0.61))[1][
+            "joint/2/reference"
+        ]
     ).all()
 
 
@@ -183,7 +187,7 @@ def test_no_delay_where_nothing_moves():
 def test_the_start_is_found_from_the_set_points_also_when_the_first_reports_are_lost(lost):
     carriage, joint = (harmonic(way / 2, 1.0, np.pi, way / 2) for way in (0.02, 0.8))
     knots = setpoints(carriage, joint, 1.0, SETTINGS)
-    course = np.round(commanded(knots, SETTINGS))
+    course = np.round(planned_setpoints(knots, SETTINGS))
     for start in (1041, 1042):
         ticks = 1000 + 2 * np.arange(200)
         k = ticks - start - 1
@@ -199,7 +203,7 @@ def test_the_start_is_found_from_the_set_points_also_when_the_first_reports_are_
 
 def test_drives_that_hold_for_a_period_leave_half_a_tick():
     knots = drives(lambda t: 3.0 * (t > 0.1), lambda t: 0.0, 0.5, SETTINGS)
-    course = commanded(knots, SETTINGS)
+    course = planned_setpoints(knots, SETTINGS)
     k = 1000 + 2 * np.arange(100) - 1041 - 1
     seen = reports(100, 1000, state=np.where(k >= 0, State.running, State.armed))
     seen["setpoint_1"] = np.where(k >= 0, course[np.clip(k, 0, None), 0], 0)

@@ -17,10 +17,10 @@ from flexlab.board.protocol import messages
 from flexlab.board.protocol.declaration import DECLARATION, Fault
 from flexlab.cli.bench_tables import live_table, result_table, selftest_table
 from flexlab.experiment import plan as plans
-from flexlab.experiment.run_experiment import Opened, Watch, check, conduct
+from flexlab.experiment.run_experiment import Hooks, OpenBoard, check, conduct
 from flexlab.recordings import recording
 from flexlab.recordings.run_from_recording import UNEXPLAINED, knots_from, run_from_recording
-from flexlab.recordings.unit_conversion import UNITS, Sensor, commanded
+from flexlab.recordings.unit_conversion import UNITS, Sensor, planned_setpoints
 from flexura.io import write_toml
 from flexura.signals import harmonic
 
@@ -82,7 +82,7 @@ def test_the_boards_set_points_are_those_that_were_asked(tracked):
         wanted = np.array([joint.motion(t - begin)[0] for t in run.t[inside]])
         np.testing.assert_allclose(run[f"joint/{number}/reference"][inside], wanted, atol=least)
     kept = recording.read(tracked.folder)
-    course = commanded(knots_from(kept.session["knots"]), SETTINGS)
+    course = planned_setpoints(knots_from(kept.session["knots"]), SETTINGS)
     k = np.round(run.t[inside] * 1000).astype(int) - 1
     np.testing.assert_allclose(
         run["joint/1/reference"][inside] * 256 * 80e3, course[k, 0], atol=3.0
@@ -256,7 +256,7 @@ def faulty(tmp_path, expected, change=lambda plant: None, plan=None, **more):
         experiment(
             plan or plans.inverse(BENCH, SETTINGS),
             tmp_path / "run",
-            opened=Opened(made, 0, {}, made.plant),
+            opened=OpenBoard(made, 0, {}, made.plant),
             **more,
         )
     assert not (tmp_path / "run").exists()
@@ -288,7 +288,7 @@ def test_a_board_of_another_declaration_is_refused(tmp_path, monkeypatch):
 def test_settings_of_another_rig_are_not_written_without_permission(tmp_path):
     made = board()
     made.emulated, made.label = False, "a board like a real one"
-    opened = Opened(made, None, {}, None)
+    opened = OpenBoard(made, None, {}, None)
     bench = type(BENCH)(
         BENCH.file,
         BENCH.rig.model_copy(update={"board": BENCH.rig.board | {"kp_1_V_m": 900.0}}),
@@ -307,7 +307,7 @@ def test_settings_of_another_rig_are_not_written_without_permission(tmp_path):
             opened,
             tmp_path / "run",
             rig.calibration(bench),
-            Watch(),
+            Hooks(),
         )
     made.close()
 
@@ -410,8 +410,8 @@ def test_a_fault_ends_the_experiment_and_is_told(tmp_path):
     done = experiment(
         plans.inverse(BENCH, SETTINGS),
         tmp_path / "run",
-        Watch(observe=begun),
-        Opened(made, 0, {}, made.plant),
+        Hooks(observe=begun),
+        OpenBoard(made, 0, {}, made.plant),
     )
     assert not done.ended.complete and done.ended.stopped and "fault" in done.ended.text
     fault = next(

@@ -18,7 +18,7 @@ import pytest
 import flexura as fx
 from experiments import BENCH, SETTINGS, Line, board, command, experiment, running
 from flexlab.experiment import plan as plans
-from flexlab.experiment.run_experiment import Opened, Watch
+from flexlab.experiment.run_experiment import Hooks, OpenBoard
 from flexlab.recordings import recording
 from flexlab.recordings.run_from_recording import UNEXPLAINED, run_from_recording
 
@@ -217,7 +217,9 @@ def test_garbage_on_the_line_costs_reports_and_nothing_else(tmp_path):
     def dirty(reports, part):
         noisy.bad = True
 
-    run = experiment(plan, tmp_path / "noisy", Watch(observe=dirty), Opened(noisy, 0, {}, None)).run
+    run = experiment(
+        plan, tmp_path / "noisy", Hooks(observe=dirty), OpenBoard(noisy, 0, {}, None)
+    ).run
     clean = experiment(plan, tmp_path / "clean").run
     assert (
         run.complete
@@ -269,7 +271,7 @@ def test_no_space_left_on_device(tmp_path):
         experiment(
             plans.free_vibration(BENCH, SETTINGS, 0.3, 1.5),
             tmp_path / "run",
-            opened=Opened(made, 0, {}, None),
+            opened=OpenBoard(made, 0, {}, None),
         )
 
 

@@ -156,7 +156,7 @@ def test_the_effort_is_the_outputs_mean_square_over_the_limit():
 
 def test_gains_that_break_the_robot_cost_more_than_any_that_do_not():
     data = ROBOT.to_dict()
-    data["link"][0]["joint"]["limits_m"] = [-0.1, 0.5]
+    data["link"][0]["joint"]["limits_rad"] = [-0.1, 0.5]
     broken = task(robots=(fx.Robot.from_dict(data),))
     found, reached = broken.run(broken.trials(), np.array([[0.9, 0.3, 0.5]]))
     assert 0 < reached[0, 0] < 1 and np.isnan(found).all()

@@ -15,8 +15,8 @@ from flexlab.board.emulator.emulated import EmulatedBoard
 from flexlab.board.protocol.declaration import PINS_HASH, Fault, Result, StopTrial
 from flexlab.board.protocol.session import Link, Refused
 from flexlab.experiment import plan as plans
-from flexlab.experiment.run_experiment import NotStarted, Opened, Watch, conduct
-from flexlab.rig.plant.rigid_plant import Drives
+from flexlab.experiment.run_experiment import Hooks, OpenBoard, RefusedToStart, conduct
+from flexlab.rig.plant.rigid_plant import RigidPlant
 
 PROVEN_AT = 16 + 4 + 4 * len(SETTINGS)  # in the EEPROM: after the declaration and the settings
 
@@ -40,7 +40,7 @@ class Real:
 
 def unproven():
     """A board with the rig's settings whose stop was never pressed."""
-    board = EmulatedBoard(elf(), Drives(BENCH))
+    board = EmulatedBoard(elf(), RigidPlant(BENCH))
     image = bytearray(configured("debian", ()))
     assert any(image[PROVEN_AT : PROVEN_AT + 4])
     link = Link(board, sequence=3)
@@ -52,7 +52,7 @@ def unproven():
 
 def vibration(board, folder, watch=None):
     plan = plans.free_vibration(BENCH, SETTINGS, 0.1, 1.1)
-    return experiment(plan, folder, watch, Opened(board, 0, {}, None))
+    return experiment(plan, folder, watch, OpenBoard(board, 0, {}, None))
 
 
 def test_the_proof_is_the_firmwares_own_and_outlives_a_reset():
@@ -110,7 +110,7 @@ def test_a_person_presses_once_and_never_again(tmp_path):
     real = Real(inner, lambda now: inner.press_stop(2.5 < now - begin < 2.9))
     plan, calibration = plans.free_vibration(BENCH, SETTINGS, 0.1, 1.1), rig.calibration(BENCH)
     for name in ("first", "second"):
-        watch, opened = Watch(say=said.append), Opened(real, 0, {}, None)
+        watch, opened = Hooks(say=said.append), OpenBoard(real, 0, {}, None)
         done = conduct(BENCH, plan, opened, tmp_path / name, calibration, watch)
         assert done.run.complete and len(said) == 1
         assert "emergency stop proven" in [finding.what for finding in done.findings]
@@ -131,7 +131,7 @@ def test_nobody_presses_and_nothing_moves(tmp_path, monkeypatch):
 
 def test_who_gives_up_waiting_starts_nothing(tmp_path):
     inner = unproven()
-    watch = Watch(stop_asked=lambda: "interrupted" if inner.now() > 3.0 else "")
-    with pytest.raises(NotStarted, match="interrupted"):
+    watch = Hooks(stop_asked=lambda: "interrupted" if inner.now() > 3.0 else "")
+    with pytest.raises(RefusedToStart, match="interrupted"):
         vibration(Real(inner), tmp_path / "run", watch)
     assert inner.simulator.window.driven_cycle == 0 and not (tmp_path / "run").exists()

@@ -8,7 +8,7 @@ from boards import BENCH, Rigged
 from experiments import SETTINGS, board, experiment
 from flexlab.board.protocol.round_trip import LEAST_S, RoundTrip
 from flexlab.experiment import plan as plans
-from flexlab.experiment.run_experiment import Opened
+from flexlab.experiment.run_experiment import OpenBoard
 
 SLOW = pytest.mark.slow
 
@@ -93,7 +93,7 @@ def goes_on(rate, seed, folder, duration_s):
     """A whole experiment through such a line, the self-test with it."""
     wrong = Wrong(board(), rate, seed)
     plan = plans.free_vibration(BENCH, SETTINGS, 0.3, duration_s)
-    done = experiment(plan, folder, opened=Opened(wrong, 0, {}, None))
+    done = experiment(plan, folder, opened=OpenBoard(wrong, 0, {}, None))
     assert done.ended.complete, done.ended.text
     assert wrong.changed > 100 * duration_s * rate / 0.01
     assert done.run["joint/2/position"][-1] == pytest.approx(0.3, abs=0.01)

@@ -21,7 +21,7 @@ from ..board.emulator.simulator import CLOCK_HZ
 from ..board.protocol.declaration import CONTROL_HZ
 from ..board.protocol.player import Player, setpoints
 from ..board.protocol.session import Link
-from ..rig import Bench, configuration
+from ..rig import RigSetup, configuration
 from ..rig.plant.plant import rig_plant
 from ..rig.plant.rigid_plant import RigidPlant
 
@@ -86,17 +86,17 @@ class Load:
         return (self.ram_static + self.stack_most) / RAM_BYTES
 
 
-def measure(elf: Path, bench: Bench, seconds: float = 2.0, every_term: bool = False) -> Load:
+def measure(elf: Path, setup: RigSetup, seconds: float = 2.0, every_term: bool = False) -> Load:
     """Run the fast trajectory on an emulated board that is configured for it.
 
     Args:
         elf: the firmware.
-        bench: the rig.
+        setup: the rig.
         seconds: emulated time [s].
         every_term: whether every term of both controllers is on.
     """
-    settings = configuration(bench) | HARD | (EVERY_TERM if every_term else {})
-    board = EmulatedBoard(elf, RigidPlant(bench, settings=settings))
+    settings = configuration(setup) | HARD | (EVERY_TERM if every_term else {})
+    board = EmulatedBoard(elf, RigidPlant(setup, settings=settings))
     simulator = board.simulator
     static = simulator.symbol("_end") - RAM_BEGIN
     for address in range(RAM_BEGIN + static, RAM_END):
@@ -153,7 +153,7 @@ def measure(elf: Path, bench: Bench, seconds: float = 2.0, every_term: bool = Fa
     )
 
 
-def experiment(elf: Path, bench: Bench, seconds: float = 4.0) -> tuple[float, float]:
+def experiment(elf: Path, setup: RigSetup, seconds: float = 4.0) -> tuple[float, float]:
     """Speed of an emulated experiment, and of the firmware alone.
 
     Both joints move back and forth as fast as in the dissertation's inverse experiment, with the
@@ -161,13 +161,13 @@ def experiment(elf: Path, bench: Bench, seconds: float = 4.0) -> tuple[float, fl
 
     Args:
         elf: the firmware.
-        bench: the rig.
+        setup: the rig.
         seconds: emulated time [s].
 
     Returns:
         Emulated over processor time: of the experiment, and of the firmware alone in Idle.
     """
-    settings, plant = configuration(bench), rig_plant(bench)
+    settings, plant = configuration(setup), rig_plant(setup)
     board = EmulatedBoard(elf, plant)
     link = Link(board, sequence=1)
     link.connect()

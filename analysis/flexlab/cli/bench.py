@@ -434,7 +434,7 @@ def _run(rig: Path | None, ask: Any, options: BenchOptions, gains: Path | None =
             for see in seers:
                 see(reports, part)
 
-        watch = steps.Watch(
+        watch = steps.Hooks(
             tested=lambda findings: (
                 None if options.json else show(False, lambda: selftest_table(findings, title), dict)
             ),
@@ -445,7 +445,7 @@ def _run(rig: Path | None, ask: Any, options: BenchOptions, gains: Path | None =
         )
         try:
             done = steps.conduct(bench, asked, opened, folder, fitted, watch, options.configure)
-        except steps.NotStarted as error:
+        except steps.RefusedToStart as error:
             typer.echo(f"flexura: {error}", err=True)
             raise typer.Exit(130) from None
     kept = {key: done.run.meta[key] for key in TOLD_BY_JSON}

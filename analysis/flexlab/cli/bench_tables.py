@@ -16,11 +16,11 @@ import numpy as np
 from ..board.protocol.declaration import Flag, Mode, State
 from ..board.protocol.player import FRACTION
 from ..experiment.plan import Plan
-from ..experiment.run_experiment import Done
-from ..experiment.selftest import Finding
+from ..experiment.run_experiment import ExperimentResult
 from ..experiment.stop_requests import KEYS_HELP
 from ..recordings.flex_calibration import Fit
 from ..recordings.unit_conversion import Sensor, flex_reading
+from ..rig import Check
 from ..runs.formatting import number
 from ..runs.table import Styled, Table
 
@@ -30,7 +30,7 @@ def heading(label: str, emulated: bool, experiment: str) -> str:
     return f"{experiment} on the {label}{': no hardware is touched' if emulated else ''}"
 
 
-def selftest_table(findings: list[Finding], title: str) -> Table:
+def selftest_table(findings: list[Check], title: str) -> Table:
     """One row a test of the board: what was found and what was expected."""
     heads = ("", "found", "expected")
     out = Table(f"self-test: {title}", ("passed", *heads), heads)
@@ -105,7 +105,7 @@ def live_table(report: Any, part: float, plan: Plan, sensor: Sensor, title: str)
     return Group(out, ProgressBar(total=1.0, completed=part, width=64))
 
 
-def result_table(done: Done) -> Table:
+def result_table(done: ExperimentResult) -> Table:
     """The range of every channel, how well set-points were followed, and what the line lost."""
     run = done.run
     about = run.meta

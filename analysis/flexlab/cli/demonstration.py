@@ -116,7 +116,7 @@ def _experiment(folder: Path, progress: cross.Progress | None) -> fx.Run:
     bench = rig.load(RIG)
     asked = plan.inverse(bench, rig.configuration(bench))
     opened = run_experiment.open_board(bench, None, elf=build())  # what misses it says so first
-    watch = run_experiment.Watch(
+    watch = run_experiment.Hooks(
         observe=lambda reports, part: progress("emulated", part) if progress else None
     )
     try:

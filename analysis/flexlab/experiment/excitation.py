@@ -20,7 +20,7 @@ import numpy as np
 
 import flexura as fx
 
-from ..rig import Bench
+from ..rig import RigSetup
 from .plan import Plan, forward
 
 DURATION_S = 9.0  # and one second of rest at the end
@@ -34,15 +34,15 @@ STROKE_V, SWEEP_V = (3.0, 6.0), 2.8
 ACCELERATION_RAD_S2 = 500.0
 
 
-def plan(bench: Bench, settings: dict[str, float]) -> Plan:
+def plan(setup: RigSetup, settings: dict[str, float]) -> Plan:
     """The plan of the excitation, whatever the rig's limit of joint 2's acceleration.
 
     Args:
-        bench: the rig.
+        setup: the rig.
         settings: the board's settings, by name.
     """
     return forward(
-        bench, settings | {"acceleration_max_2_rad_s2": ACCELERATION_RAD_S2}, profile(bench.robot)
+        setup, settings | {"acceleration_max_2_rad_s2": ACCELERATION_RAD_S2}, profile(setup.robot)
     )
 
 

@@ -21,7 +21,7 @@ from ..board.protocol.declaration import BAUD_BIT_S, CONFIG, Fault
 from ..board.protocol.session import Identity, Link
 from ..board.serial_port import SerialBoard, find
 from ..paths import FIRMWARE
-from ..rig import Bench, configuration
+from ..rig import RigSetup, configuration
 from ..rig.plant.rigid_plant import RigidPlant
 from ..runs.formatting import number
 from ..runs.table import Styled, Table
@@ -95,7 +95,7 @@ def build(*options: str, firmware: Path = FIRMWARE) -> Path:
 
 
 def flash(
-    bench: Bench,
+    setup: RigSetup,
     port: str | None = None,
     emulated: bool = False,
     configure: bool = False,
@@ -108,7 +108,7 @@ def flash(
     """
     if emulated and port:
         raise InputError("expected either a port or --emulated", key="--port", value=port)
-    wanted = configuration(bench)
+    wanted = configuration(setup)
     device = None if emulated else port or find()
     if device and not Path(device).exists():
         raise InputError(
@@ -122,7 +122,7 @@ def flash(
         else "loaded into an emulated ATmega2560: no hardware is touched"
     )
     board: Board = (
-        SerialBoard(device, BAUD_BIT_S) if device else EmulatedBoard(elf, RigidPlant(bench))
+        SerialBoard(device, BAUD_BIT_S) if device else EmulatedBoard(elf, RigidPlant(setup))
     )
     try:
         link = Link(board)

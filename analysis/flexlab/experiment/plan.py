@@ -21,7 +21,7 @@ from flexura.io import read_toml
 
 from ..board.protocol.declaration import CONFIG
 from ..board.protocol.player import Knots, drives, setpoints
-from ..rig import Bench, Check, check_capability
+from ..rig import Check, RigSetup, check_capability
 from ..rig.checks import STEP_RATE_MAX_1_S
 from .lead_in import AT_REST, LEAD_IN_S, with_lead_in
 
@@ -95,21 +95,21 @@ def gains(path: Path) -> dict[str, float]:
 
 
 def inverse(
-    bench: Bench, settings: dict[str, float], manoeuvre: fx.Manoeuvre | None = None
+    setup: RigSetup, settings: dict[str, float], manoeuvre: fx.Manoeuvre | None = None
 ) -> Plan:
     """Plan of the inverse experiment: the firmware's controllers track a manoeuvre's motions.
 
     A lead-in and lead-out are added if the motions do not start or end at rest.
 
     Args:
-        bench: the rig.
+        setup: the rig.
         settings: the board's settings, by name.
         manoeuvre: by default that of the rig file.
 
     Raises:
         InputError: a joint has no motion.
     """
-    asked = manoeuvre or bench.manoeuvre
+    asked = manoeuvre or setup.manoeuvre
     motions = []
     for number, joint in enumerate(asked.drive.joints, 1):
         if joint.motion is None:
@@ -131,14 +131,14 @@ def inverse(
         (lead_s + asked.duration_s, "lead out", out_s),
     )
     phases = [{"t": t, "name": name} for t, name, there in parts if there]
-    plan = _tracking_plan("inverse", bench, settings, whole)
+    plan = _tracking_plan("inverse", setup, settings, whole)
     return dataclasses.replace(
         plan, asked=asked.spec() | {"lead_s": lead_s, "out_s": out_s}, phases=phases
     )
 
 
 def step(
-    bench: Bench,
+    setup: RigSetup,
     settings: dict[str, float],
     step_1_m: float = 0.005,
     step_2_rad: float = 0.1,
@@ -148,7 +148,7 @@ def step(
     """Plan of a step of each joint's set-point, the carriage's first.
 
     Args:
-        bench: the rig.
+        setup: the rig.
         settings: the board's settings, by name.
         step_1_m: step of joint 1 [m].
         step_2_rad: step of joint 2 [rad].
@@ -174,7 +174,7 @@ def step(
         "following_max_2_rad": max(settings["following_max_2_rad"], 1.5 * abs(step_2_rad)),
     }
     plan = _tracking_plan(
-        "step", bench, settings, _manoeuvre_of("step of each set-point", motions, duration_s)
+        "step", setup, settings, _manoeuvre_of("step of each set-point", motions, duration_s)
     )
     steps = [
         {"joint": 1, "at_s": first, "height": step_1_m},
@@ -190,12 +190,12 @@ def step(
 
 
 def free_vibration(
-    bench: Bench, settings: dict[str, float], turn_rad: float = 0.1, duration_s: float = 6.0
+    setup: RigSetup, settings: dict[str, float], turn_rad: float = 0.1, duration_s: float = 6.0
 ) -> Plan:
     """Plan of a free vibration: joint 2 turns fast, stops and holds.
 
     Args:
-        bench: the rig.
+        setup: the rig.
         settings: the board's settings, by name.
         turn_rad: angle of the turn [rad].
         duration_s: total duration [s].
@@ -210,7 +210,7 @@ def free_vibration(
     motions = signals.constant(0.0), signals.trapezoidal(turn_rad, move_s, rise_s, at_s=rest_s)
     plan = _tracking_plan(
         "free-vibration",
-        bench,
+        setup,
         settings,
         _manoeuvre_of("move, stop, let ring", motions, duration_s),
     )
@@ -218,12 +218,12 @@ def free_vibration(
 
 
 def forward(
-    bench: Bench, settings: dict[str, float], profile: Path | dict[str, Any] | None = None
+    setup: RigSetup, settings: dict[str, float], profile: Path | dict[str, Any] | None = None
 ) -> Plan:
     """Plan of the forward experiment: voltage and pulse rate, open loop.
 
     Args:
-        bench: the rig.
+        setup: the rig.
         settings: the board's settings, by name.
         profile: a file or its tables; by default one that makes the strip vibrate.
 
@@ -249,7 +249,7 @@ def forward(
         knots,
         duration,
         settings,
-        _open_loop(bench, knots, settings),
+        _open_loop(setup, knots, settings),
         spec | {"name": name},
     )
 
@@ -316,7 +316,7 @@ def _manoeuvre_of(
 
 
 def _tracking_plan(
-    experiment: str, bench: Bench, settings: dict[str, float], asked: fx.Manoeuvre
+    experiment: str, setup: RigSetup, settings: dict[str, float], asked: fx.Manoeuvre
 ) -> Plan:
     carriage, joint = (drive.motion for drive in asked.drive.joints)
     assert carriage is not None and joint is not None
@@ -326,18 +326,18 @@ def _tracking_plan(
         )
     knots = setpoints(carriage, joint, asked.duration_s, settings, PERIOD_LOG2)
     return Plan(
-        experiment, knots, asked.duration_s, settings, check_capability(bench, asked), asked.spec()
+        experiment, knots, asked.duration_s, settings, check_capability(setup, asked), asked.spec()
     )
 
 
-def _open_loop(bench: Bench, knots: Knots, settings: dict[str, float]) -> list[Check]:
+def _open_loop(setup: RigSetup, knots: Knots, settings: dict[str, float]) -> list[Check]:
     """Checks of an open-loop plan.
 
     The carriage goes no farther than on the motor's line without load; joint 2 follows its pulses.
     """
     volts, steps = knots.columns["voltage"] / 1000, knots.columns["rate"]
-    motor = bench.rig.motor
-    free = bench.rig.screw.lead_m * motor.no_load_speed_rpm / 60 / motor.rated_voltage_V
+    motor = setup.rig.motor
+    free = setup.rig.screw.lead_m * motor.no_load_speed_rpm / 60 / motor.rated_voltage_V
     integrate = lambda speed: np.concatenate([[0.0], np.cumsum(speed) * knots.period_s])
     carriage, joint = integrate(free * volts), integrate(steps / settings["stepper_steps_per_rad"])
     peak_V, peak_steps = float(np.abs(volts).max()), float(np.abs(steps).max())
@@ -361,8 +361,8 @@ def _open_loop(bench: Bench, knots: Knots, settings: dict[str, float]) -> list[C
         _at_most("step rate", peak_steps, STEP_RATE_MAX_1_S, 1.0, "microsteps/s", "a lower rate"),
     ]
     for what, travel, (low, high), factor, unit in (
-        ("carriage range", carriage, bench.limits[0], 1e3, "mm without load"),
-        ("joint 2 range", joint, bench.limits[1], 1.0, "rad"),
+        ("carriage range", carriage, setup.limits[0], 1e3, "mm without load"),
+        ("joint 2 range", joint, setup.limits[1], 1.0, "rad"),
     ):
         inside = bool(low <= travel.min() and travel.max() <= high)
         found = f"{factor * travel.min():.4g} to {factor * travel.max():.4g} {unit}"
@@ -375,7 +375,7 @@ def _open_loop(bench: Bench, knots: Knots, settings: dict[str, float]) -> list[C
                 "a smaller profile",
             )
         )
-    return checks + [check for check in check_capability(bench) if check.what in STATIC_CHECKS]
+    return checks + [check for check in check_capability(setup) if check.what in STATIC_CHECKS]
 
 
 def _at_most(what: str, found: float, limit: float, factor: float, unit: str, advice: str) -> Check:

@@ -1,12 +1,9 @@
-"""One experiment from its plan to its Run: the dissertation's steps in order, with everything
-received kept on the way."""
+"""One experiment from its plan to its Run; everything received is recorded on the way."""
 
 from __future__ import annotations
 
 import datetime
-import importlib
 import importlib.metadata
-import importlib.util
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -26,26 +23,28 @@ from ..board.serial_port import SerialBoard
 from ..recordings.recording import Recording, RecordingBoard
 from ..recordings.run_from_recording import knots_spec, run_from_recording
 from ..recordings.unit_conversion import Sensor
-from ..rig import Bench, configuration
+from ..rig import Check, RigSetup, configuration
 from ..rig.description import Calibration
-from ..rig.plant.rigid_plant import RigidPlant
+from ..rig.plant.plant import rig_plant
 from .flash import build
 from .plan import Plan
-from .selftest import Finding, prepare
-from .selftest import examine as test
+from .selftest import prepare, run_selftest
 from .stream import StreamResult, execute, stop_motors
 
 SETTLE_S = {"forward": 1.0, "inverse": 0.5, "step": 0.5, "free-vibration": 0.0}
 
 
-class NotStarted(FlexuraError):
+class RefusedToStart(FlexuraError):
     """A person did not want the experiment to start."""
 
 
 @dataclass(frozen=True)
-class Opened:
-    """A board with what is known of it; `truth` are an emulated plant's own parameters, for whoever
-    judges an identification; `cut` is the entry of [pins] whose wire was cut."""
+class OpenBoard:
+    """A board with what is known of it.
+
+    `truth`: an emulated plant's own parameters, to judge an identification. `cut`: the entry of
+    [pins] whose wire was cut.
+    """
 
     board: Board
     seed: int | None = None
@@ -60,10 +59,15 @@ class Opened:
 
 
 @dataclass(frozen=True)
-class Watch:
-    """What the person at the bench sees and says. Each may be left as it is."""
+class Hooks:
+    """What the person at the bench sees and says; each has a default.
 
-    tested: Callable[[list[Finding]], None] = lambda findings: None
+    `tested`: gets the checks. `say`: gets what the person is to do. `may_start`: the countdown,
+    returns why not, or "". `stop_asked`: why to stop, or "". `observe`: gets new reports and the
+    finished fraction.
+    """
+
+    tested: Callable[[list[Check]], None] = lambda findings: None
     say: Callable[[str], None] = lambda text: None  # what the person is to do
     may_start: Callable[[Link], str] = lambda link: ""  # the countdown; says why not
     stop_asked: Callable[[], str] = lambda: ""
@@ -71,17 +75,21 @@ class Watch:
 
 
 @dataclass(frozen=True)
-class Done:
+class ExperimentResult:
     """A finished experiment."""
 
     run: fx.Run
     folder: Path
-    findings: list[Finding]
+    findings: list[Check]
     ended: StreamResult
 
 
 def check(plan: Plan) -> None:
-    """Raises InputError for the first thing that is asked and that the rig cannot do."""
+    """Check that the rig can follow a plan.
+
+    Raises:
+        InputError: names the first failed check.
+    """
     if plan.failed:
         first = plan.failed[0]
         expected = f"the rig cannot do this: expected {first.expected}; {first.advice}"
@@ -89,10 +97,24 @@ def check(plan: Plan) -> None:
 
 
 def open_board(
-    bench: Bench, port: str | None, seed: int = 0, elf: Path | None = None, cut: str | None = None
-) -> Opened:
-    """The board at a serial port, or, without one, an emulated board with the bench's plant behind
-    its wires; `cut` breaks the wire of that entry of [pins]."""
+    setup: RigSetup,
+    port: str | None,
+    seed: int = 0,
+    elf: Path | None = None,
+    cut: str | None = None,
+) -> OpenBoard:
+    """Open the board at a serial port, or an emulated board with the rig's plant.
+
+    Args:
+        setup: the rig.
+        port: serial port; None: an emulated board.
+        seed: of the emulated rig's noise.
+        elf: the firmware of an emulated board; by default it is built.
+        cut: entry of [pins] whose wire is cut, of an emulated board.
+
+    Raises:
+        InputError: there is no such port or pin, or a real board's wire is to be cut.
+    """
     if cut is not None and cut not in PINS:
         raise InputError(f"expected one of [pins]: {', '.join(PINS)}", key="--cut", value=cut)
     if port is not None:
@@ -106,24 +128,25 @@ def open_board(
             raise InputError(
                 "no such device: expected the board's serial port", key="--port", value=port
             )
-        return Opened(SerialBoard(port, BAUD_BIT_S))
-    plant = plant_of(bench, seed)
+        return OpenBoard(SerialBoard(port, BAUD_BIT_S))
+    plant = rig_plant(setup, seed)
     board = EmulatedBoard(elf or build(), plant)
     if cut is not None:
         board.cut(cut)
-    return Opened(board, seed, dict(getattr(plant, "truth", {})), plant, cut or "")
+    return OpenBoard(board, seed, dict(plant.truth), plant, cut or "")
 
 
-def plant_of(bench: Bench, seed: int) -> Any:
-    """The emulated rig: its elastic plant where this version has one, else its drives with a
-    straight strip."""
-    if importlib.util.find_spec("flexlab.rig.plant.plant") is None:
-        return RigidPlant(bench)
-    return importlib.import_module("flexlab.rig.plant.plant").rig_plant(bench, seed)
+def session(
+    setup: RigSetup, plan: Plan, opened: OpenBoard, calibration: Calibration
+) -> dict[str, Any]:
+    """What is known before the board is greeted, for session.json and the run's metadata.
 
-
-def session(bench: Bench, plan: Plan, opened: Opened, calibration: Calibration) -> dict[str, Any]:
-    """What is known before the board is greeted; the run's metadata are made of it."""
+    Args:
+        setup: the rig.
+        plan: the experiment.
+        opened: the board.
+        calibration: of the flex sensor.
+    """
     board = opened.board
     assert board.label.startswith("emulated") == board.emulated
     return (
@@ -133,12 +156,12 @@ def session(bench: Bench, plan: Plan, opened: Opened, calibration: Calibration) 
             "emulated": board.emulated,
             "label": board.label,
             "experiment": plan.experiment,
-            "name": bench.robot.name,
-            "structure": bench.robot.structure,
+            "name": setup.robot.name,
+            "structure": setup.robot.structure,
             "program": f"flexura {importlib.metadata.version('flexura')}",
-            "robot": bench.robot.to_dict(),
-            "rig": bench.rig.model_dump(mode="json"),
-            "rig_file": bench.file,
+            "robot": setup.robot.to_dict(),
+            "rig": setup.rig.model_dump(mode="json"),
+            "rig_file": setup.file,
             "host_version": importlib.metadata.version("flexura"),
             "seed": opened.seed,
             "started": datetime.datetime.now().astimezone().isoformat(timespec="seconds"),
@@ -154,23 +177,35 @@ def session(bench: Bench, plan: Plan, opened: Opened, calibration: Calibration) 
 
 
 def conduct(
-    bench: Bench,
+    setup: RigSetup,
     plan: Plan,
-    opened: Opened,
+    opened: OpenBoard,
     folder: Path,
     calibration: Calibration,
-    watch: Watch,
+    watch: Hooks,
     configure: bool = False,
-) -> Done:
-    """Self-test, start, execute, and the Run; `configure` allows to write the rig's settings into a
-    board that has others.
+) -> ExperimentResult:
+    """Test the rig, start and execute a plan, and make the Run.
 
-    Raises InputError before anything moves for what is wrong with the plan, BoardError for what is
-    wrong with the board; what happens later is in the result's `ended`. A recording in which
-    nothing moved is taken away again.
+    What happens after the start is in the result's `ended`. A recording in which nothing moved is
+    removed.
+
+    Args:
+        setup: the rig.
+        plan: the experiment.
+        opened: the board.
+        folder: of the recording.
+        calibration: of the flex sensor.
+        watch: what the person sees and says.
+        configure: whether the rig's settings may be written into a board that has others.
+
+    Raises:
+        InputError: the rig cannot follow the plan.
+        BoardError: the board fails before anything moves.
+        RefusedToStart: a person did not want it.
     """
     check(plan)
-    recording = Recording(folder, session(bench, plan, opened, calibration))
+    recording = Recording(folder, session(setup, plan, opened, calibration))
     # The same experiment on the emulated board is the same byte for byte; a real line needs a
     # number that nobody played before.
     link = Link(
@@ -180,7 +215,7 @@ def conduct(
         findings = _ready(
             link,
             recording,
-            bench,
+            setup,
             plan,
             calibration,
             opened.board.emulated or configure,
@@ -189,14 +224,14 @@ def conduct(
         watch.tested(findings)
         if failed := [finding for finding in findings if not finding.passed]:
             if why := watch.stop_asked():
-                raise NotStarted(f"not started: {why}")
+                raise RefusedToStart(f"not started: {why}")
             first = failed[0]
             raise BoardError(
                 f"{link.board.label}: self-test: {first.what}: {first.found}; expected "
                 f"{first.expected}; {first.advice}"
             )
         if why := watch.may_start(link):
-            raise NotStarted(f"not started: {why}")
+            raise RefusedToStart(f"not started: {why}")
     except BaseException as error:
         stop_motors(link)
         recording.discard()
@@ -217,18 +252,18 @@ def conduct(
         recording.close()
     run = run_from_recording(folder)
     run.save(folder)
-    return Done(run, folder, findings, ended)
+    return ExperimentResult(run, folder, findings, ended)
 
 
 def _ready(
     link: Link,
     recording: Recording,
-    bench: Bench,
+    setup: RigSetup,
     plan: Plan,
     calibration: Calibration,
     write: bool,
     commission: Callable[[Link], Program],
-) -> list[Finding]:
+) -> list[Check]:
     """Greet the board, configure and test it, and tell it that both joints stand at 0."""
     identity = link.connect()
     runs = program(link)
@@ -242,9 +277,9 @@ def _ready(
             "pins": f"{runs.pins:08x}",
         }
     )
-    findings = prepare(link, identity, configuration(bench), plan.settings, write, commission)
+    findings = prepare(link, identity, configuration(setup), plan.settings, write, commission)
     if all(finding.passed for finding in findings):
-        more, rest = test(
+        more, rest = run_selftest(
             link, plan.settings, lambda r: float(Sensor(calibration, calibration.zero).tip(r))
         )
         findings += more

@@ -1,9 +1,8 @@
-"""The self-test before an experiment: may this board, wired as it is, be armed? Nothing moves in
-it.
+"""The self-test before an experiment: may this board, as it is wired, be armed?
 
-The declaration's hash is compared when the session opens (`Link.connect`); here follow pins,
-configuration, faults, the proof of the emergency stop, supply, switches, encoders and the flex
-sensor at rest.
+Nothing moves in it. `Link.connect` compares the declaration's hash when the session opens. The
+self-test checks pins, configuration, faults, the proof of the emergency stop, supply, switches,
+encoders and the flex sensor at rest.
 """
 
 from __future__ import annotations
@@ -19,6 +18,7 @@ from ..board.commissioning import Program, program, where
 from ..board.protocol.declaration import FAULTS, PINS_HASH, Fault, Flag, Result, State
 from ..board.protocol.session import Identity, Link, Refused
 from ..recordings.unit_conversion import flex_reading
+from ..rig import Check
 from .flash import as_float32
 
 REST_S = 0.4  # how long the rig is watched at rest
@@ -26,27 +26,18 @@ BENT_M = 0.03  # a tip deflection at rest that is no drift of the sensor any mor
 
 
 @dataclass(frozen=True)
-class Finding:
-    """One thing looked at: what was found against what was expected, and what to do where they
-    differ."""
-
-    what: str
-    passed: bool
-    found: str
-    expected: str
-    advice: str = ""
-
-
-@dataclass(frozen=True)
 class Rest:
-    """The flex sensor's reading with the strip at rest: mean, standard deviation of one report,
-    number of reports."""
+    """The flex sensor's reading with the strip at rest.
+
+    `zero`: mean. `noise`: standard deviation of one report. `reports`: their number.
+    """
 
     zero: float
     noise: float
     reports: int
 
     def spec(self) -> dict[str, Any]:
+        """As a table for session.json."""
         return vars(self)
 
 
@@ -57,13 +48,23 @@ def prepare(
     wanted: dict[str, float],
     write: bool,
     commission: Callable[[Link], Program],
-) -> list[Finding]:
-    """Bring the board to Idle with the settings of the experiment; what was found and done.
+) -> list[Check]:
+    """Bring the board to Idle with the settings of the experiment.
 
-    `stored` are the rig file's settings: a board that has others is refused, unless `write` allows
-    to write and store them. `wanted` are the experiment's; where they differ they are in use until
-    the next reset and not stored. `commission(link)` has the emergency stop pressed, if it is not
-    proven with the board's firmware.
+    Args:
+        link: the session with the board.
+        identity: what the board says of itself.
+        stored: the rig file's settings. A board that has others is refused, unless `write` is set.
+        wanted: the experiment's settings. Those that differ are in use until the next reset and not
+            stored.
+        write: whether the rig file's settings may be written and stored.
+        commission: has the emergency stop pressed, if it is not proven with the board's firmware.
+
+    Returns:
+        The checks, up to the first that failed.
+
+    Raises:
+        BoardError: the board does not keep what was written.
     """
     link.command("stop")
     link.run(0.01)
@@ -72,20 +73,20 @@ def prepare(
     differing = [name for name, value in stored.items() if found[name] != as_float32(value)]
     runs = program(link)
     out = [
-        Finding(
+        Check(
             "pins",
             runs.pins_are_declared,
             f"{runs.pins:08x}",
             f"{PINS_HASH:08x}, those of protocol.toml",
             "load the firmware of this declaration: flexura flash",
         ),
-        Finding(
+        Check(
             "declaration",
             True,
             f"{identity.declaration:08x}, firmware {identity.firmware}",
             "this program's",
         ),
-        Finding(
+        Check(
             "configuration",
             not differing or write,
             _some(differing) if differing else "the rig file's",
@@ -102,14 +103,12 @@ def prepare(
     if fault is not Fault.none:
         try:
             link.command("clear", fault=fault)
-            out.append(
-                Finding("fault", True, f"{fault.name} of before, cleared", "none that lasts")
-            )
+            out.append(Check("fault", True, f"{fault.name} of before, cleared", "none that lasts"))
         except Refused as refused:
             if refused.result is Result.fault_persists:  # perhaps because of another one
                 fault = Fault(refused.detail)
             out.append(
-                Finding(
+                Check(
                     "fault",
                     False,
                     f"{fault.name}: {FAULTS[fault][0]}",
@@ -135,14 +134,14 @@ def prepare(
         )
     if special:
         out.append(
-            Finding("settings of this experiment", True, _some(list(special)), "in use, not stored")
+            Check("settings of this experiment", True, _some(list(special)), "in use, not stored")
         )
     return out
 
 
-def _stop_proof(runs: Program) -> Finding:
+def _stop_proof(runs: Program) -> Check:
     trial = {"untried": "never pressed", "pressed": "open", "released": "not stored"}
-    return Finding(
+    return Check(
         "emergency stop proven",
         runs.may_move,
         f"with firmware {runs.firmware:08x}" if runs.may_move else trial[runs.stop.name],
@@ -151,8 +150,20 @@ def _stop_proof(runs: Program) -> Finding:
     )
 
 
-def examine(link: Link, settings: dict[str, float], tip_m: Any) -> tuple[list[Finding], Rest]:
-    """Watch the rig at rest. `tip_m(reading)` is the tip deflection that the calibration gives."""
+def run_selftest(link: Link, settings: dict[str, float], tip_m: Any) -> tuple[list[Check], Rest]:
+    """Watch the rig at rest.
+
+    Args:
+        link: the session with the board.
+        settings: of the experiment, by name.
+        tip_m: tip deflection [m] of a reading, by the calibration.
+
+    Returns:
+        The checks, and the flex sensor's reading at rest.
+
+    Raises:
+        BoardError: reports are missing.
+    """
     link.telemetry()
     link.run(REST_S)
     seen = link.telemetry()
@@ -166,8 +177,8 @@ def examine(link: Link, settings: dict[str, float], tip_m: Any) -> tuple[list[Fi
     supply = seen["supply"] / 1000
     flags = np.bitwise_or.reduce(seen["flags"])
     out = [
-        Finding("state", State(last["state"]) is State.idle, State(last["state"]).name, "idle"),
-        Finding(
+        Check("state", State(last["state"]) is State.idle, State(last["state"]).name, "idle"),
+        Check(
             "supply",
             bool(
                 settings["supply_min_V"] < supply.min() and supply.max() < settings["supply_max_V"]
@@ -181,7 +192,7 @@ def examine(link: Link, settings: dict[str, float], tip_m: Any) -> tuple[list[Fi
         fault = FAULTS[Fault[flag.name]]
         open_ = bool(flags >> flag & 1)
         out.append(
-            Finding(
+            Check(
                 flag.name.replace("_", " "),
                 not open_,
                 "open" if open_ else "closed",
@@ -194,7 +205,7 @@ def examine(link: Link, settings: dict[str, float], tip_m: Any) -> tuple[list[Fi
         spread = int(counts.max() - counts.min())
         found = "still" if spread <= 1 else f"moved by {spread} counts"
         out.append(
-            Finding(
+            Check(
                 f"encoder {number}",
                 spread <= 1,
                 found,
@@ -203,18 +214,18 @@ def examine(link: Link, settings: dict[str, float], tip_m: Any) -> tuple[list[Fi
             )
         )
     missed = int(seen["missed"][-1] - seen["missed"][0])
-    out.append(Finding("missed edges", missed == 0, str(missed), "0", "check the encoders' wires"))
+    out.append(Check("missed edges", missed == 0, str(missed), "0", "check the encoders' wires"))
     low, high = settings["flex_min"], settings["flex_max"]
     tip = tip_m(rest.zero)
     out += [
-        Finding(
+        Check(
             "flex sensor",
             bool(low < x.min() and x.max() < high),
             f"{rest.zero:.4f} +- {rest.noise:.4f}",
             f"{low:g} to {high:g}",
             "check the sensor and its wires",
         ),
-        Finding(
+        Check(
             "strip at rest",
             abs(tip) < BENT_M,
             f"{1e3 * tip:.1f} mm by the calibration",

@@ -22,7 +22,7 @@ from flexura.io import explain, read_toml, write_toml
 from ..board.emulator.emulated import Outputs, Sensors
 from ..board.protocol.declaration import CONFIG
 from ..board.protocol.session import Link
-from ..rig import Bench
+from ..rig import RigSetup
 from ..rig.description import Calibration, tip_per_bend
 from ..rig.plant.rigid_plant import RigidPlant
 from .unit_conversion import ADC_V, flex_reading
@@ -162,8 +162,8 @@ class DeflectedPlant:
     sensor follows the data sheet. `tip_m` is the deflection [m].
     """
 
-    def __init__(self, plant: Any, bench: Bench) -> None:
-        self._plant, self._flex, self._tip_per_bend = plant, bench.rig.flex, tip_per_bend(bench)
+    def __init__(self, plant: Any, setup: RigSetup) -> None:
+        self._plant, self._flex, self._tip_per_bend = plant, setup.rig.flex, tip_per_bend(setup)
         self.tip_m = 0.0
 
     def hold(self, tip_m: float) -> float:

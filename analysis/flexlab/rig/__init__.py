@@ -1,13 +1,13 @@
 """The rig: its file, the board's settings that follow from it, and checks of its capability."""
 
 from .checks import Check, check_capability
-from .description import Bench, Rig, calibration, configuration, load
+from .description import Rig, RigSetup, calibration, configuration, load
 from .emulation import TrueParameters, random_true_parameters
 
 __all__ = [
-    "Bench",
     "Check",
     "Rig",
+    "RigSetup",
     "TrueParameters",
     "calibration",
     "check_capability",

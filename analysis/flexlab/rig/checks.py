@@ -12,7 +12,7 @@ import numpy as np
 
 import flexura as fx
 
-from .description import Bench, calibration, configuration, tip_per_bend
+from .description import RigSetup, calibration, configuration, tip_per_bend
 
 STEP_RATE_MAX_1_S = 4000.0  # what the firmware's step generator is made for
 EDGE_RATE_MAX_1_S = 20000.0  # encoder edges of both encoders together that the firmware is made for
@@ -54,42 +54,42 @@ def peaks(motion: fx.Signal, duration_s: float) -> Peaks:
     return Peaks(float(r.min()), float(r.max()), float(np.abs(v).max()), float(np.abs(a).max()))
 
 
-def check_capability(bench: Bench, manoeuvre: fx.Manoeuvre | None = None) -> list[Check]:
+def check_capability(setup: RigSetup, manoeuvre: fx.Manoeuvre | None = None) -> list[Check]:
     """Check whether a rig can follow a manoeuvre.
 
     Args:
-        bench: the rig.
+        setup: the rig.
         manoeuvre: by default that of the rig file.
 
     Returns:
         One check for each requirement.
     """
-    asked = manoeuvre or bench.manoeuvre
+    asked = manoeuvre or setup.manoeuvre
     motions: list[Peaks | None] = [
         peaks(joint.motion, asked.duration_s) if joint.motion is not None else None
         for joint in asked.drive.joints
     ]
-    out = [*_always(bench)]
+    out = [*_always(setup)]
     if motions[0] is not None:
-        out += _carriage(bench, motions[0])
+        out += _carriage(setup, motions[0])
     if motions[1] is not None:
-        out += _rotary(bench, motions[1])
+        out += _rotary(setup, motions[1])
     if motions[0] is not None and motions[1] is not None:
-        out.append(_edges(bench, motions[0], motions[1]))
+        out.append(_edges(setup, motions[0], motions[1]))
     return out
 
 
-def _carriage(bench: Bench, peak: Peaks) -> list[Check]:
+def _carriage(setup: RigSetup, peak: Peaks) -> list[Check]:
     """Checks of joint 1.
 
     Speed by the motor's line n = n0 U / U0 (1 - M / (M0 U / U0)), torque M = F lead / (2 pi
     efficiency).
     """
-    rig, settings = bench.rig, configuration(bench)
+    rig, settings = setup.rig, configuration(setup)
     motor, screw = rig.motor, rig.screw
     part = min(settings["voltage_max_V"], rig.driver.supply_V) / motor.rated_voltage_V
     free = part * motor.no_load_speed_rpm / 60 * screw.lead_m
-    mass = moved_mass(bench)
+    mass = moved_mass(setup)
     torque = mass * peak.acceleration * screw.lead_m / (2 * math.pi * screw.efficiency)
     stall = part * motor.stall_torque_N_m
     loaded = free * max(0.0, 1 - torque / stall)
@@ -110,7 +110,7 @@ def _carriage(bench: Bench, peak: Peaks) -> list[Check]:
             f"half of {stall:.2f} N m at rest",
             "a stronger motor or a slower motion",
         ),
-        _inside("carriage range", peak, bench.limits[0], 1e3, "mm"),
+        _inside("carriage range", peak, setup.limits[0], 1e3, "mm"),
         _below(
             "carriage speed limit",
             peak.speed,
@@ -122,17 +122,17 @@ def _carriage(bench: Bench, peak: Peaks) -> list[Check]:
     ]
 
 
-def _rotary(bench: Bench, peak: Peaks) -> list[Check]:
-    settings = configuration(bench)
+def _rotary(setup: RigSetup, peak: Peaks) -> list[Check]:
+    settings = configuration(setup)
     rate = peak.speed * settings["stepper_steps_per_rad"]
-    strip, payload = bench.robot.links[1], bench.robot.payload
+    strip, payload = setup.robot.links[1], setup.robot.payload
     x = np.linspace(0.0, strip.length_m, 201)
     inertia = (
         float(np.trapezoid(strip.mass_per_length(x) * x**2, x))
         + payload.mass_kg * strip.length_m**2
     )
     inertia += payload.inertia_kg_m2 + strip.joint.hub_inertia_kg_m2 + strip.joint.rotor_inertia
-    torque, holding = inertia * peak.acceleration, bench.rig.stepper.holding_torque_N_m
+    torque, holding = inertia * peak.acceleration, setup.rig.stepper.holding_torque_N_m
     return [
         Check(
             "step rate",
@@ -148,7 +148,7 @@ def _rotary(bench: Bench, peak: Peaks) -> list[Check]:
             f"half of {holding:.2f} N m holding torque",
             "a stronger stepper or a slower motion",
         ),
-        _inside("joint 2 range", peak, bench.limits[1], 1.0, "rad"),
+        _inside("joint 2 range", peak, setup.limits[1], 1.0, "rad"),
         _below(
             "joint 2 speed limit",
             peak.speed,
@@ -176,8 +176,8 @@ def _rotary(bench: Bench, peak: Peaks) -> list[Check]:
     ]
 
 
-def _edges(bench: Bench, one: Peaks, two: Peaks) -> Check:
-    settings = configuration(bench)
+def _edges(setup: RigSetup, one: Peaks, two: Peaks) -> Check:
+    settings = configuration(setup)
     rate = (
         one.speed * settings["motor_counts_per_m"] + two.speed * settings["stepper_counts_per_rad"]
     )
@@ -191,11 +191,11 @@ def _edges(bench: Bench, one: Peaks, two: Peaks) -> Check:
     )
 
 
-def _always(bench: Bench) -> list[Check]:
-    rig, settings = bench.rig, configuration(bench)
+def _always(setup: RigSetup) -> list[Check]:
+    rig, settings = setup.rig, configuration(setup)
     part = min(settings["voltage_max_V"], rig.driver.supply_V) / rig.motor.rated_voltage_V
     stall = part * rig.motor.stall_current_A
-    fitted = calibration(bench)
+    fitted = calibration(setup)
     count_mm = 1e3 * abs(fitted.c1_m) / 1024
     return [
         Check(
@@ -223,16 +223,16 @@ def _always(bench: Bench) -> list[Check]:
             "flex sensor's resolution",
             count_mm <= 4.0,
             f"{count_mm:.2f} mm of tip deflection for a count of 10 bits "
-            f"({tip_per_bend(bench):.3f} m for a radian of bend)",
+            f"({tip_per_bend(setup):.3f} m for a radian of bend)",
             "4 mm",
             "a divider_ohm near the sensor's resistance",
         ),
     ]
 
 
-def moved_mass(bench: Bench) -> float:
+def moved_mass(setup: RigSetup) -> float:
     """The mass that joint 1 moves [kg], without the motor's own inertia."""
-    carriage, strip = bench.robot.links
+    carriage, strip = setup.robot.links
     x = np.linspace(0.0, strip.length_m, 201)
     own = carriage.mass_kg
     if own is None:
@@ -240,7 +240,7 @@ def moved_mass(bench: Bench) -> float:
         own = float(np.trapezoid(carriage.mass_per_length(along), along))
     hubs = sum(link.joint.hub_mass_kg for link in (carriage, strip))
     return (
-        own + hubs + float(np.trapezoid(strip.mass_per_length(x), x)) + bench.robot.payload.mass_kg
+        own + hubs + float(np.trapezoid(strip.mass_per_length(x), x)) + setup.robot.payload.mass_kg
     )
 
 

@@ -179,7 +179,7 @@ class Flex(Table):
 
 
 class Rig(Table):
-    """The bench of one robot. Frozen; SI units."""
+    """The rig file of one robot. Frozen; SI units."""
 
     format: int = Field(
         FORMAT, ge=1, le=FORMAT, description=f"the file's format, a whole number up to {FORMAT}"
@@ -226,7 +226,7 @@ class Rig(Table):
 
 
 @dataclass(frozen=True)
-class Bench:
+class RigSetup:
     """A rig file with the files that it names.
 
     `limits`: of both joints [m, rad], from the rig file or the robot file.
@@ -275,7 +275,7 @@ def rig_of_recording(tables: Any) -> Rig:
         ) from None
 
 
-def load(path: str | os.PathLike[str]) -> Bench:
+def load(path: str | os.PathLike[str]) -> RigSetup:
     """Read a rig file and the files it names.
 
     Args:
@@ -314,7 +314,7 @@ def load(path: str | os.PathLike[str]) -> Bench:
     if here and there:
         expected = "expected limits in one place: the robot file has them too"
         raise InputError(expected, key="stepper.limits_rad", value=list(here), file=name)
-    return Bench(
+    return RigSetup(
         name,
         rig,
         robot,
@@ -330,19 +330,19 @@ def named_file(file: Path, named: str) -> str | Path:
     return path if path.is_file() or Path(named).suffix else named
 
 
-def configuration(bench: Bench) -> dict[str, float]:
+def configuration(setup: RigSetup) -> dict[str, float]:
     """All settings of the board, by name, in the protocol's order.
 
     d = lead counts / (4 pulses ratio), theta = 2 pi steps / (full steps x microsteps).
 
     Args:
-        bench: the rig.
+        setup: the rig.
 
     Raises:
         InputError: a derived setting is outside the board's range.
     """
-    rig = bench.rig
-    (low_1, high_1), (low_2, high_2) = bench.limits
+    rig = setup.rig
+    (low_1, high_1), (low_2, high_2) = setup.limits
     turn = 2 * math.pi
     derived = {
         "motor_counts_per_m": 4
@@ -355,7 +355,7 @@ def configuration(bench: Bench) -> dict[str, float]:
         "supply_divider": rig.driver.supply_divider,
         **{
             f"flex_{key}": value
-            for key, value in calibration(bench).model_dump(exclude={"covariance"}).items()
+            for key, value in calibration(setup).model_dump(exclude={"covariance"}).items()
         },
         "position_min_1_m": low_1,
         "position_max_1_m": high_1,
@@ -370,24 +370,24 @@ def configuration(bench: Bench) -> dict[str, float]:
                 f"a rig whose {name} lies between {item.least:g} and {item.greatest:g} "
                 f"({item.text})"
             )
-            raise InputError(expected, key=name, value=value, file=bench.file)
+            raise InputError(expected, key=name, value=value, file=setup.file)
     return {name: (derived | rig.board).get(name, item.default) for name, item in CONFIG.items()}
 
 
-def tip_per_bend(bench: Bench) -> float:
+def tip_per_bend(setup: RigSetup) -> float:
     """Tip deflection for a radian of bend under the sensor [m/rad], of a strip loaded at its tip.
 
     alpha = (P / EI)(L s - s^2 / 2), w = P L^3 / (3 EI), so w / alpha = L^3 / (3 (L s - s^2 / 2))
     (Euler-Bernoulli).
 
     Args:
-        bench: the rig.
+        setup: the rig.
     """
-    length, sensor = bench.robot.links[1].length_m, bench.rig.flex.length_m
+    length, sensor = setup.robot.links[1].length_m, setup.rig.flex.length_m
     return length**3 / (3 * (length * sensor - sensor**2 / 2))
 
 
-def calibration(bench: Bench) -> Calibration:
+def calibration(setup: RigSetup) -> Calibration:
     """The measured calibration, or that of the sensor's data sheet.
 
     With the reading r = R_f / (R_s + R_f), and z that of the straight strip, the bend is (R_f /
@@ -395,11 +395,11 @@ def calibration(bench: Bench) -> Calibration:
     radian, is the calibration.
 
     Args:
-        bench: the rig.
+        setup: the rig.
     """
-    flex = bench.rig.flex
+    flex = setup.rig.flex
     if flex.calibration is not None:
         return flex.calibration
     z = flex.divider_ohm / (flex.straight_ohm + flex.divider_ohm)
-    scale = tip_per_bend(bench) * flex.divider_ohm / flex.ohm_per_rad
+    scale = tip_per_bend(setup) * flex.divider_ohm / flex.ohm_per_rad
     return Calibration(zero=z, c1_m=-scale / z**2, c2_m=scale / z**3, c3_m=-scale / z**4)

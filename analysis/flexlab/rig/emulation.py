@@ -108,27 +108,19 @@ class TrueParameters(Table):
     flex_gain: float = _factor("ohms of the flex sensor for a radian")
 
 
+def _range(low: float, high: float) -> Any:
+    return Field((low, high), strict=False, description="two factors above 0, the lower one first")
+
+
 class Ranges(Table):
     """Ranges from which `random_true_parameters` draws: pairs of factors, the lower first."""
 
-    stiffness: tuple[float, float] = Field(
-        (0.85, 1.15), strict=False, description="two factors above 0, the lower one first"
-    )
-    damping: tuple[float, float] = Field(
-        (0.6, 2.0), strict=False, description="two factors above 0, the lower one first"
-    )
-    payload: tuple[float, float] = Field(
-        (0.8, 1.25), strict=False, description="two factors above 0, the lower one first"
-    )
-    friction: tuple[float, float] = Field(
-        (0.7, 1.5), strict=False, description="two factors above 0, the lower one first"
-    )
-    backlash: tuple[float, float] = Field(
-        (0.5, 2.0), strict=False, description="two factors above 0, the lower one first"
-    )
-    flex_gain: tuple[float, float] = Field(
-        (0.85, 1.15), strict=False, description="two factors above 0, the lower one first"
-    )
+    stiffness: tuple[float, float] = _range(0.85, 1.15)
+    damping: tuple[float, float] = _range(0.6, 2.0)
+    payload: tuple[float, float] = _range(0.8, 1.25)
+    friction: tuple[float, float] = _range(0.7, 1.5)
+    backlash: tuple[float, float] = _range(0.5, 2.0)
+    flex_gain: tuple[float, float] = _range(0.85, 1.15)
 
     @model_validator(mode="after")
     def _ordered(self) -> Ranges:

@@ -6,13 +6,13 @@ import flexura as fx
 from flexura.control import Motor, Output, Stepper
 from flexura.errors import InputError
 
-from .description import Bench
+from .description import RigSetup
 from .plant.motor import joint_line_of
 
 POLE_PAIRS_PER_STEP = 0.25  # four full steps are one period of the magnetic spring
 
 
-def with_nominal_drives(robot: fx.Robot, bench: Bench) -> tuple[fx.Robot, tuple[Output, ...]]:
+def with_nominal_drives(robot: fx.Robot, setup: RigSetup) -> tuple[fx.Robot, tuple[Output, ...]]:
     """Add the rig's drives to a robot.
 
     The joints get the rotors' inertia and the drives' friction. The outputs of a controller are the
@@ -21,7 +21,7 @@ def with_nominal_drives(robot: fx.Robot, bench: Bench) -> tuple[fx.Robot, tuple[
 
     Args:
         robot: a robot with two links.
-        bench: the rig.
+        setup: the rig.
 
     Returns:
         The robot with these joints, and the outputs of a controller.
@@ -29,7 +29,7 @@ def with_nominal_drives(robot: fx.Robot, bench: Bench) -> tuple[fx.Robot, tuple[
     Raises:
         InputError: the rig file has no [emulated], or the robot has not two links.
     """
-    rig, emulated = bench.rig, bench.rig.emulated
+    rig, emulated = setup.rig, setup.rig.emulated
     if emulated is None:
         raise InputError(
             "missing: the rotor's inertia and the rig's friction are there", key="emulated"

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 from flexura.errors import InputError
 
-from ..description import Bench, Rig
+from ..description import Rig, RigSetup
 from ..emulation import Emulated, EmulatedMotor
 
 # the current is exact for a constant speed; far below the mechanical time constant of 30 ms
@@ -170,17 +170,17 @@ class JointLine:
     rail_N: float
 
 
-def joint_line(bench: Bench, friction: float = 1.0) -> JointLine:
+def joint_line(setup: RigSetup, friction: float = 1.0) -> JointLine:
     """Joint 1 as a linear motor, from the rig's nominal data.
 
     With r = lead / (2 pi): force K / (R r), back-EMF K^2 / (R r^2), mass J / r^2. The motor always
     drives the rail's friction, which counts 1 / (eta_gear eta_screw) times.
 
     Args:
-        bench: the rig.
+        setup: the rig.
         friction: factor on Coulomb and viscous friction, not on the back-EMF.
     """
-    return joint_line_of(bench.rig, bench.emulated, friction)
+    return joint_line_of(setup.rig, setup.emulated, friction)
 
 
 def joint_line_of(rig: Rig, emulated: Emulated, friction: float = 1.0) -> JointLine:

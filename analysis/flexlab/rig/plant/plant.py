@@ -35,7 +35,7 @@ from flexura.errors import InputError
 from flexura.io import explain
 
 from ...board.emulator.emulated import Outputs, Sensors
-from ..description import Bench, configuration
+from ..description import RigSetup, configuration
 from ..emulation import FACTORS, Emulated, TrueParameters
 from .flex_sensor import FlexSensor
 from .mechanics import ELEMENTS, STEP_S, Mechanics
@@ -44,7 +44,7 @@ from .stepper import MagneticSpring
 
 
 def rig_plant(
-    bench: Bench,
+    setup: RigSetup,
     seed: int = 0,
     *,
     truth: TrueParameters | None = None,
@@ -56,7 +56,7 @@ def rig_plant(
     """The emulated rig of a rig file.
 
     Args:
-        bench: the rig.
+        setup: the rig.
         seed: of noise and drift.
         truth: factors by which the rig differs from its files; None: the rig file's own.
         start: carriage [m] and joint 2 [rad], at rest.
@@ -69,32 +69,32 @@ def rig_plant(
         InputError: the rig file has no [emulated], or a name is unknown.
     """
     return RigPlant(
-        bench,
-        _changed(bench, what_differs),
+        setup,
+        _changed(setup, what_differs),
         seed,
-        truth or bench.emulated.truth,
+        truth or setup.emulated.truth,
         start,
         step_s,
         elements,
     )
 
 
-def _changed(bench: Bench, changes: dict[str, Any]) -> Emulated:
-    data = bench.emulated.model_dump()
+def _changed(setup: RigSetup, changes: dict[str, Any]) -> Emulated:
+    data = setup.emulated.model_dump()
     for path, value in changes.items():
         table, _, name = path.partition("__")
         if name not in data.get(table, {}):
             expected = "expected a value of [emulated], such as flex__noise_V"
             raise InputError(
-                expected, key=f"emulated.{path.replace('__', '.')}", value=value, file=bench.file
+                expected, key=f"emulated.{path.replace('__', '.')}", value=value, file=setup.file
             )
         data[table][name] = value
     try:
         return Emulated.model_validate(data)
     except ValidationError as error:
-        wrong = explain(error, Emulated, data, bench.file)
+        wrong = explain(error, Emulated, data, setup.file)
         raise InputError(
-            wrong.expected, key=f"emulated.{wrong.key}", value=wrong.value, file=bench.file
+            wrong.expected, key=f"emulated.{wrong.key}", value=wrong.value, file=setup.file
         ) from None
 
 
@@ -127,7 +127,7 @@ class RigPlant:
 
     def __init__(
         self,
-        bench: Bench,
+        setup: RigSetup,
         emulated: Emulated,
         seed: int,
         truth: TrueParameters,
@@ -135,15 +135,15 @@ class RigPlant:
         step_s: float,
         elements: int,
     ) -> None:
-        rig, settings = bench.rig, configuration(bench)
-        robot = true_robot(bench.robot, truth)
+        rig, settings = setup.rig, configuration(setup)
+        robot = true_robot(setup.robot, truth)
         first, strip = emulated.flex.from_m, robot.links[1]
         if first + rig.flex.length_m > strip.length_m:
             expected = (
                 f"expected a sensor of {rig.flex.length_m:g} m that ends on the strip of "
                 f"{strip.length_m:g} m"
             )
-            raise InputError(expected, key="emulated.flex.from_m", value=first, file=bench.file)
+            raise InputError(expected, key="emulated.flex.from_m", value=first, file=setup.file)
         self.mechanics = Mechanics(
             robot, start, step_s, elements, sensor_m=(first, first + rig.flex.length_m)
         )
@@ -160,7 +160,7 @@ class RigPlant:
             rig.flex, emulated.flex, np.random.default_rng([seed, 0]), step_s, truth.flex_gain
         )
         self.supply_V, self.emergency_stop = rig.driver.supply_V, False
-        self.truth = _truth_for_metadata(bench, truth, robot, seed)
+        self.truth = _truth_for_metadata(setup, truth, robot, seed)
         self._dead_zone_V = emulated.driver.dead_zone_V
         self._lead, self._start = rig.screw.lead_m / (2 * math.pi), start
         self._half_backlash = 0.5 * truth.backlash * carriage.backlash_m
@@ -169,7 +169,7 @@ class RigPlant:
         self._rail_stiffness = truth.friction * carriage.coulomb_friction_N / carriage.presliding_m
         self._rail_damping = truth.friction * carriage.viscous_friction_N_s_m
         self._rotor_damping = emulated.stepper.damping_N_m_s
-        self._ends = bench.limits[0]
+        self._ends = setup.limits[0]
         self._counts = settings["motor_counts_per_m"], settings["stepper_counts_per_rad"]
         self._step_s = step_s
         self._unused_s = 0.0  # of the step that was made last [s]
@@ -308,9 +308,9 @@ class RigPlant:
 
 
 def _truth_for_metadata(
-    bench: Bench, truth: TrueParameters, robot: fx.Robot, seed: int
+    setup: RigSetup, truth: TrueParameters, robot: fx.Robot, seed: int
 ) -> dict[str, Any]:
-    line = joint_line(bench, truth.friction)
+    line = joint_line(setup, truth.friction)
     strip = robot.links[1]
     return {
         "seed": seed,
@@ -321,6 +321,6 @@ def _truth_for_metadata(
         "payload_kg": robot.payload.mass_kg,
         "joint_1_coulomb_N": line.coulomb_N,
         "joint_1_viscous_N_s_m": line.viscous_N_s_m,
-        "backlash_m": truth.backlash * bench.emulated.carriage.backlash_m,
-        "flex_ohm_per_rad": truth.flex_gain * bench.rig.flex.ohm_per_rad,
+        "backlash_m": truth.backlash * setup.emulated.carriage.backlash_m,
+        "flex_ohm_per_rad": truth.flex_gain * setup.rig.flex.ohm_per_rad,
     }

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from ...board.emulator.emulated import Outputs, Sensors
-from ..description import Bench, configuration
+from ..description import RigSetup, configuration
 
 TIME_CONSTANT_S = 0.04  # mechanical, motor with screw and carriage; assumed
 STARTS_AT_V = 1.0  # the motor's data: starts to turn
@@ -21,28 +21,28 @@ class RigidPlant:
     """The rig's drives as a plant (`board.emulated.Plant`). Public fields may be set."""
 
     def __init__(
-        self, bench: Bench, start_m: float = 0.0, settings: dict[str, float] | None = None
+        self, setup: RigSetup, start_m: float = 0.0, settings: dict[str, float] | None = None
     ) -> None:
         """Set up the plant at rest.
 
         Args:
-            bench: the rig.
+            setup: the rig.
             start_m: position of the carriage [m].
             settings: of the board, by default those of the rig.
         """
-        settings = settings or configuration(bench)
-        motor = bench.rig.motor
-        self.supply_V = bench.rig.driver.supply_V
+        settings = settings or configuration(setup)
+        motor = setup.rig.motor
+        self.supply_V = setup.rig.driver.supply_V
         self.carriage_m, self.speed_m_s, self.joint_rad = start_m, 0.0, 0.0
         self.blocked = False  # the carriage is held
         self.joint_blocked = False  # joint 2 is held: steps are lost
         self.joint_reversed = False  # a coil of the stepper is swapped
-        self.ends_m = bench.limits[0]  # where the switches are; the carriage goes on beyond them
+        self.ends_m = setup.limits[0]  # where the switches are; the carriage goes on beyond them
         self.flex_V = 5.0 * settings["flex_zero"]
         self.emergency_stop = False
         self._divider = settings["supply_divider"]
         self._m_s_for_V = (
-            bench.rig.screw.lead_m
+            setup.rig.screw.lead_m
             * motor.no_load_speed_rpm
             / 60
             / (motor.rated_voltage_V - STARTS_AT_V)
