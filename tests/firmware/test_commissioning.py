@@ -16,7 +16,7 @@ from flexlab.board.protocol.declaration import PINS_HASH, Fault, Result, StopTri
 from flexlab.board.protocol.session import Link, Refused
 from flexlab.experiment import plan as plans
 from flexlab.experiment.run_experiment import NotStarted, Opened, Watch, conduct
-from flexlab.rig.plant.rigid_plant import Drives
+from flexlab.rig.plant.rigid_plant import RigidPlant
 
 PROVEN_AT = 16 + 4 + 4 * len(SETTINGS)  # in the EEPROM: after the declaration and the settings
 
@@ -40,7 +40,7 @@ class Real:
 
 def unproven():
     """A board with the rig's settings whose stop was never pressed."""
-    board = EmulatedBoard(elf(), Drives(BENCH))
+    board = EmulatedBoard(elf(), RigidPlant(BENCH))
     image = bytearray(configured("debian", ()))
     assert any(image[PROVEN_AT : PROVEN_AT + 4])
     link = Link(board, sequence=3)
