@@ -94,7 +94,7 @@ static void on_edge(struct avr_irq_t *irq, uint32_t value, void *param) {
   const uint8_t level = line->cut ? line->rest : value & 1;
   if (level == line->level) return;
   if ((line->role == FORWARD || line->role == REVERSE) && !level && !line->cut && still_high(b, line->role)) {
-    b->unsettled = 1;
+    line->irq->flags |= IRQ_FLAG_INIT; /* simavr tells of the next change, which is none for it */
     return;
   }
   if (line->role == STEP && b->comparator[STEP]) {
