@@ -122,7 +122,7 @@ double ControlLaw::linear_output(double t, std::size_t i) {
   for (std::size_t j = 0; j < N; ++j)
     wish += linear.Kr[i * N + j] * (memory_[j].reference - linear.offset[j]) +
             linear.Kv[i * N + j] * memory_[j].reference_rate;
-  return memory_[i].pid.follow(a_tick(joints[i]), wish + evaluate(joints[i].feedforward, t).y);
+  return memory_[i].pid.track(a_tick(joints[i]), wish + evaluate(joints[i].feedforward, t).y);
 }
 
 // z = F z^ + G u, with the outputs as given.
