@@ -17,21 +17,7 @@ class ModelPlant : public Plant<Real> {
   static constexpr double INSIDE =
       0.1;  // what a shape that leaves the tip where it is still weighs
 
-  ModelPlant(const Model<Real> &robot, Workspace<Real> &memory)
-      : model(robot),
-        work(memory),
-        x(std::size_t(robot.n)),
-        rest(x),
-        force(x),
-        zero(std::size_t(robot.n), Real(0.0)) {
-    this->n = model.n, this->joints = model.links();
-    this->first = model.first, this->first.push_back(model.n);
-    this->viscous = model.viscous, this->coulomb = model.coulomb, this->slow = COULOMB_SPEED;
-    for (int i = 0; i < this->joints; ++i)
-      this->locked.push_back(model.locked[std::size_t(i)] != 0);
-    reaction.assign(std::size_t(this->joints), Real(0.0));
-    weigh();
-  }
+  ModelPlant(const Model<Real> &robot, Workspace<Real> &memory);
 
   void accelerate(const PassInputs<Real> &p, Real *a, Real *reactions) override {
     flexura::accelerate(model, work, p.q, p.v,
@@ -278,6 +264,23 @@ class ModelPlant : public Plant<Real> {
     }
   }
 };
+
+template <class Real>
+ModelPlant<Real>::ModelPlant(const Model<Real> &robot, Workspace<Real> &memory)
+    : model(robot),
+      work(memory),
+      x(std::size_t(robot.n)),
+      rest(x),
+      force(x),
+      zero(std::size_t(robot.n), Real(0.0)) {
+  this->n = model.n, this->joints = model.links();
+  this->first = model.first, this->first.push_back(model.n);
+  this->viscous = model.viscous, this->coulomb = model.coulomb, this->slow = COULOMB_SPEED;
+  for (int i = 0; i < this->joints; ++i)
+    this->locked.push_back(model.locked[std::size_t(i)] != 0);
+  reaction.assign(std::size_t(this->joints), Real(0.0));
+  weigh();
+}
 
 extern template class ModelPlant<double>;
 extern template class ModelPlant<Pack<4>>;

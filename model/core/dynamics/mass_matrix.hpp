@@ -51,7 +51,7 @@ void mass_matrix(const Model<Real> &model, Workspace<Real> &work, const Real *y,
       if (!last) add_beyond(rows, k, m, 1, stride, beyond);
       composite(c, rows, row, Free{m}, 1, wrench, A, M, n);
     } else {
-      sized<Real>(c.m, c.P, [&](auto fixed, auto P) {
+      sized<Real, false>(c.m, c.P, [&](auto fixed, auto P) {
         Rows<Real, decltype(fixed)::most, 0> rows;
         elastic_rows(c, k, last, fixed, P, rows);
         if (!last) add_beyond(rows, k, m, 0, stride, beyond);
@@ -67,5 +67,10 @@ void mass_matrix(const Model<Real> &model, Workspace<Real> &work, const Real *y,
   for (int i = 0; i < n; ++i)
     for (int j = 0; j < i; ++j) M[i * n + j] = M[j * n + i];
 }
+
+extern template void mass_matrix(const Model<double> &, Workspace<double> &, const double *,
+                                 const double *, Vec3<double> *, double *);
+extern template void mass_matrix(const Model<Pack<4>> &, Workspace<Pack<4>> &, const Pack<4> *,
+                                 const Pack<4> *, Vec3<Pack<4>> *, Pack<4> *);
 
 }  // namespace flexura

@@ -51,45 +51,10 @@ class Loop {
     }
   }
 
-  void start(const Real *q0, const Real *v0, double first_step) {
-    for (int k = 0; k < integration.n; ++k)
-      integration.z[k] = q0[k], integration.z[integration.n + k] = v0[k];
-    for (int k = 0; k < ACCOUNTS; ++k) integration.z[2 * integration.n + k] = Real(0.0);
-    integration.end = outputs.back();
-    integration.acts.at(Real(outputs.front()));
-    integration.acts.prescribe(integration.z.data(), integration.z.data() + integration.n);
-    integration.weights.start(integration.z.data());
-    integration.znew = integration.z;
-    current = nullptr;
-    for (int k = 0; k < LANES; ++k) {
-      run_state[k] = RunState();
-      run_state[k].t = run_state[k].start = outputs.front(), run_state[k].end = outputs.back(),
-      run_state[k].wish = first_step;
-      record[k].open(outputs.size() + 1, integration.size, integration.plant.joints);
-    }
-  }
+  void start(const Real *q0, const Real *v0, double first_step);
 
   // At most so many steps further with that method; is any robot still running?
-  bool advance(Method<Real> &method, long steps) {
-    if (current != &method)
-      for (RunState &c : run_state) c.fresh = true;
-    current = &method;
-    for (long s = 0; s < steps && any(); ++s) {
-      if (interrupt && interrupt->load(std::memory_order_relaxed)) end_all(Status::interrupted);
-      if (rehearsal && tick_due()) break;
-      arrive(method);
-      if (!any()) break;
-      attempt(method);
-      for (int k = 0; k < LANES; ++k)
-        beyond[k] = run_state[k].running() && lane(error, k) < 1.0 ? first_beyond(method, k)
-                                                                   : -RunState::NEVER;
-      keep_within(method);
-      for (int k = 0; k < LANES; ++k)
-        if (run_state[k].running()) judge(method, k);
-      settle(method);
-    }
-    return any();
-  }
+  bool advance(Method<Real> &method, long steps);
 
   // Goes on with a method whose last step led to where the loop now is again
   // (method_selection.hpp).
@@ -352,6 +317,48 @@ class Loop {
     c.t = t, c.status = Status::limit;
   }
 };
+
+// (Not in the class: what uses a loop does not compile it.)
+template <class Real>
+void Loop<Real>::start(const Real *q0, const Real *v0, double first_step) {
+  for (int k = 0; k < integration.n; ++k)
+    integration.z[k] = q0[k], integration.z[integration.n + k] = v0[k];
+  for (int k = 0; k < ACCOUNTS; ++k) integration.z[2 * integration.n + k] = Real(0.0);
+  integration.end = outputs.back();
+  integration.acts.at(Real(outputs.front()));
+  integration.acts.prescribe(integration.z.data(), integration.z.data() + integration.n);
+  integration.weights.start(integration.z.data());
+  integration.znew = integration.z;
+  current = nullptr;
+  for (int k = 0; k < LANES; ++k) {
+    run_state[k] = RunState();
+    run_state[k].t = run_state[k].start = outputs.front(), run_state[k].end = outputs.back(),
+    run_state[k].wish = first_step;
+    record[k].open(outputs.size() + 1, integration.size, integration.plant.joints);
+  }
+}
+
+template <class Real>
+bool Loop<Real>::advance(Method<Real> &method, long steps) {
+  if (current != &method)
+    for (RunState &c : run_state) c.fresh = true;
+  current = &method;
+  for (long s = 0; s < steps && any(); ++s) {
+    if (interrupt && interrupt->load(std::memory_order_relaxed)) end_all(Status::interrupted);
+    if (rehearsal && tick_due()) break;
+    arrive(method);
+    if (!any()) break;
+    attempt(method);
+    for (int k = 0; k < LANES; ++k)
+      beyond[k] = run_state[k].running() && lane(error, k) < 1.0 ? first_beyond(method, k)
+                                                                 : -RunState::NEVER;
+    keep_within(method);
+    for (int k = 0; k < LANES; ++k)
+      if (run_state[k].running()) judge(method, k);
+    settle(method);
+  }
+  return any();
+}
 
 extern template class Loop<double>;
 extern template class Loop<Pack<4>>;

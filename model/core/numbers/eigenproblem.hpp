@@ -25,19 +25,20 @@ namespace flexura {
 template <class Real>
 Real cholesky(int n, Real *A, double floor = 0.0) {
   Real worst_ratio = 1.0;
+  std::vector<Real> first(static_cast<std::size_t>(n)), column(first);
+  for (int j = 0; j < n; ++j) first[std::size_t(j)] = A[j * n + j];
   for (int j = 0; j < n; ++j) {
-    Real *row = A + j * n, pivot = row[j];
-    for (int k = 0; k < j; ++k) pivot -= row[k] * row[k];
-    const Real limit = floor * abs(row[j]),
-               ratio = pivot / choose_less(Real(0.0), abs(row[j]), abs(row[j]), Real(1.0));
+    const Real pivot = A[j * n + j], size = abs(first[std::size_t(j)]), limit = floor * size,
+               ratio = pivot / choose_less(Real(0.0), size, size, Real(1.0));
     worst_ratio = smaller(worst_ratio, ratio);
     const Real length = root(choose_less(limit, pivot, pivot, Real(0.0)));
     const Real inverse = choose_less(Real(0.0), length, 1.0 / length, Real(0.0));
-    row[j] = length;
+    A[j * n + j] = length;
     for (int i = j + 1; i < n; ++i) {
-      Real *below = A + i * n, sum = below[j];
-      for (int k = 0; k < j; ++k) sum -= below[k] * row[k];
-      below[j] = sum * inverse;
+      Real *below = A + i * n;
+      const Real own = below[j] * inverse;
+      below[j] = column[std::size_t(i)] = own;
+      for (int k = j + 1; k <= i; ++k) below[k] -= own * column[std::size_t(k)];
     }
   }
   return worst_ratio;

@@ -158,7 +158,16 @@ void eigen_definite(int n, const double *K, const double *M, double *squares, do
       L[i * n + j] *= scale[i] * scale[j], C[i * n + j] *= scale[i] * scale[j];
   cholesky(n, L.data());
   pivoted(n, C.data(), length, X.data());
-  for (int k = 0; k < n; ++k) solve_lower(n, L.data(), X.data() + k * length);
+  Numbers across(L.size());  // L^T, whose rows are read in a row
+  for (int i = 0; i < n; ++i)
+    for (int k = 0; k <= i; ++k) across[k * n + i] = L[i * n + k];
+  for (int k = 0; k < n; ++k) {
+    double *x = X.data() + k * length;
+    for (int i = 0; i < n; ++i) {
+      const double *row = across.data() + i * n, own = x[i] /= row[i];
+      for (int j = i + 1; j < n; ++j) x[j] -= row[j] * own;
+    }
+  }
   n <= few ? orthogonalise(n, length, X.data()) : orthogonalise_many(n, length, X.data());
   double heaviest = 0.0;
   for (int k = 0; k < n; ++k) {

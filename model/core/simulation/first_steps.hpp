@@ -1,22 +1,25 @@
-// When "auto" holds no race: what can be told of one robot, whether it runs alone or in a pack.
+// When "auto" holds no race. One robot and a robot in a pack ask the same functions.
 #pragma once
-#include "simulation/method_by_name.hpp"
+#include "integration/method.hpp"
+#include "integration/run_state.hpp"
 
 namespace flexura {
 
-// Explicit steps for sure: a sharp tolerance, or a rigid robot without gains or friction.
-template <class Number>
-bool explicit_without_trial(double rtol, bool bends, int joints, const Inputs &acting,
-                            Number resistance) {
-  if (rtol < SHARPEST) return true;
-  if (bends) return false;
-  for (int i = 0; i < joints; ++i) {
-    const JointDrive &d = acting.joints[std::size_t(i)];
-    if (resistance(i) > 0.0 || (d.follows() && !d.prescribed && (d.kp > 0.0 || d.kd > 0.0)))
-      return false;
-  }
-  return true;
-}
+// DEAR: passes a second of explicit steps beyond which a sharp tolerance is left to a race without
+// exponential ones. STRONG: the rate at which a damper stops its joint [1/s] beyond which it
+// couples the modes so much that only implicit steps are long.
+constexpr double DEAR = 2e6, STRONG = 1000.0;
+
+// The method that "auto" takes without a trial, "explicit" or "implicit"; null: a trial decides. The
+// state is that of `run`, which starts at time t. Explicit steps are for sharp tolerances, and for
+// rigid robots without gains or friction. Implicit ones are for strong dampers.
+const char *method_without_trial(Integration<double> &run, double t, double rtol);
+
+// The highest frequency or rate of decay at a run's state [rad/s].
+double fastest(Integration<double> &run, double t);
+
+// Are explicit steps, of 12 passes and as long as they may be, slower than `speed` [s a pass]?
+bool explicit_is_slower(Integration<double> &run, double t, double speed);
 
 // The first exponential steps of a run. If the rest takes no more of them than the trials of the
 // other methods would take passes, they have no rival. What is counted are a robot's own attempts,

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <thread>
 
+#include "integration/time_loop.hpp"
 #include "simulation/method_by_name.hpp"
 
 namespace flexura {

@@ -3,6 +3,11 @@
 #include <cmath>
 #include <cstdio>
 
+#include "integration/exponential/exponential.hpp"
+#include "integration/runge_kutta/dop853.hpp"
+#include "integration/runge_kutta/embedded_pairs.hpp"
+#include "integration/runge_kutta/implicit.hpp"
+
 namespace flexura {
 
 template <class Real>
@@ -74,15 +79,5 @@ std::string explain(const RunState &c, const std::string &method, double rtol) {
   }
   return "";
 }
-
-template class Loop<double>;
-template class Loop<Pack<4>>;
-template class Explicit<double>;
-template class Explicit<Pack<4>>;
-template class Implicit<double>;
-template class Implicit<Pack<4>>;
-template class EmbeddedPairSteps<double>;
-template class ModelPlant<double>;
-template class ModelPlant<Pack<4>>;
 
 }  // namespace flexura

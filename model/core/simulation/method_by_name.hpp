@@ -1,15 +1,12 @@
-// The methods of the time loop by their names. Loops and methods are compiled once, in methods.cpp,
-// for one robot and for four.
+// The methods of the time loop by their names. What uses them sees the interface `Method` alone:
+// each method is compiled once, for one robot and for four.
 #pragma once
 #include <memory>
 #include <string>
 
-#include "control/model_plant.hpp"
-#include "integration/exponential/exponential.hpp"
-#include "integration/runge_kutta/dop853.hpp"
-#include "integration/runge_kutta/embedded_pairs.hpp"
-#include "integration/runge_kutta/implicit.hpp"
-#include "integration/time_loop.hpp"
+#include "integration/exponential/options.hpp"
+#include "integration/method.hpp"
+#include "integration/run_state.hpp"
 
 namespace flexura {
 

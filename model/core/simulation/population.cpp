@@ -7,10 +7,14 @@
 #include <mutex>
 #include <thread>
 
+#include "control/model_plant.hpp"
 #include "dynamics/outputs.hpp"
+#include "integration/time_loop.hpp"
 #include "link/assembly.hpp"
 #include "robot/input_fault.hpp"
+#include "simulation/first_steps.hpp"
 #include "simulation/method_by_name.hpp"
+#include "simulation/method_selection.hpp"
 #include "simulation/simulation.hpp"
 
 namespace flexura {
@@ -93,7 +97,11 @@ class Worker {
         continue;
       }
       Starter starter = ready(k, std::move(models[k - first]));
-      if (inside_limits(starter, ending)) starters.push_back(std::move(starter));
+      if (!inside_limits(starter, ending)) continue;
+      if (starter.method == "auto")
+        run_alone(starter);
+      else
+        starters.push_back(std::move(starter));
     }
     while (!starters.empty()) {  // those like the first share a pack
       std::vector<Starter> rest, together;
@@ -132,16 +140,23 @@ class Worker {
       const Motion motion = out.acting.motion(i, all_.times.front());
       out.q[row] = motion.y, out.v[row] = motion.yd;
     }
-    if (all_.method == "auto") {
-      const auto resistance = [&](int i) {
-        return larger(model.viscous[std::size_t(i)], model.coulomb[std::size_t(i)]);
-      };
-      out.open = !explicit_without_trial(all_.rtol, model.n > model.links(), model.links(),
-                                         out.acting, resistance);
-      out.method = out.open ? "exponential" : "explicit";
-    }
+    if (all_.method == "auto") choose_method(model, out);
     out.shared = std::make_shared<const Model<double>>(std::move(model));
     return out;
+  }
+
+  // The method that needs no trial, or the exponential steps that a trial begins with. A sharp
+  // tolerance has a trial without them: "auto" remains, and the robot runs alone.
+  void choose_method(const Model<double> &model, Starter &starter) const {
+    Workspace<double> work(model);
+    ModelPlant<double> plant(model, work);
+    Inputs *acting = &starter.acting;
+    Integration<double> run(plant, &acting, all_.rtol);
+    std::copy(starter.q.begin(), starter.q.end(), run.z.begin());
+    std::copy(starter.v.begin(), starter.v.end(), run.z.begin() + model.n);
+    const char *name = method_without_trial(run, all_.times.front(), all_.rtol);
+    starter.open = name == nullptr && all_.rtol >= SHARPEST;
+    starter.method = name ? name : starter.open ? "exponential" : all_.method;
   }
 
   static bool inside_limits(const Starter &starter, Ending &ending) {

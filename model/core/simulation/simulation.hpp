@@ -6,8 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "control/model_plant.hpp"
-#include "simulation/method_selection.hpp"
+#include "control/inputs.hpp"
+#include "integration/run_record.hpp"
+#include "integration/run_state.hpp"
+#include "robot/model.hpp"
 
 namespace flexura {
 
@@ -26,33 +28,26 @@ class Simulation {
   // `acting` and what it names must outlive the run.
   Simulation(std::shared_ptr<const Model<double>> model, Inputs acting, const Request &request);
 
+  ~Simulation();
+
   // At most so many steps further; may it go on?
   bool advance(long steps);
 
   // Of "auto", a run that has just been made: see MethodSelection::outdone.
-  bool outdone(double exponential_speed, double step) {
-    return auto_->outdone(exponential_speed, step);
-  }
+  bool outdone(double exponential_speed, double step);
 
-  const RunState &run_state() const { return loop_.run_state[0]; }
-  const Record &record() const { return loop_.record[0]; }
+  const RunState &run_state() const;
+  const Record &record() const;
   const Model<double> &model() const { return *model_; }
-  long passes() const { return loop_.integration.passes; }
-  std::string method() const { return method_ ? method_->name() : auto_->name(); }
-  std::vector<double> state() const {
-    return {loop_.integration.z.begin(), loop_.integration.z.begin() + loop_.integration.size};
-  }
+  long passes() const;
+  std::string method() const;
+  std::vector<double> state() const;
   std::atomic<bool> interrupt{false};
 
  private:
+  struct Parts;  // the robot's workspace, the time loop and its method
   std::shared_ptr<const Model<double>> model_;
-  Workspace<double> work_;
-  ModelPlant<double> plant_;
-  Inputs acting_;
-  Inputs *acting_pointer_;
-  Loop<double> loop_;
-  std::unique_ptr<Method<double>> method_;  // or
-  std::unique_ptr<MethodSelection> auto_;
+  std::unique_ptr<Parts> parts_;
 };
 
 }  // namespace flexura

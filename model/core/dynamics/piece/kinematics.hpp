@@ -34,15 +34,16 @@ template <int N>
 constexpr bool many_sizes<Dual<N> > = false;
 #endif
 
-// Calls f with m and P as sizes that the compiler knows, where they are common ones.
-template <class Real, class F>
+// Calls f with m and P as sizes that the compiler knows, where they are common ones; `many`: those
+// of links in their own modes too.
+template <class Real, bool many = many_sizes<Real>, class F>
 inline void sized(int m, int P, F f) {
   switch (100 * m + P) {
     case 1: return f(Fixed<0>(), Fixed<1>());    // a rigid link
     case 203: return f(Fixed<2>(), Fixed<3>());  // an element of a mesh
     default: break;
   }
-  if constexpr (!many_sizes<Real>)
+  if constexpr (!many)
     return f(Free{m}, Free{P});
   else
     switch (100 * m + P) {

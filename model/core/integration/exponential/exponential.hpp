@@ -7,25 +7,22 @@
 #include "integration/exponential/energy_integrals.hpp"
 #include "integration/exponential/matrices_by_passes.hpp"
 #include "integration/exponential/numerical_damping.hpp"
+#include "integration/exponential/options.hpp"
 #include "integration/method.hpp"
 
 namespace flexura {
-
-struct ExponentialOptions {
-  bool damping = true;  // of fast modes
-  double zeta = 0.05;   // its ratio
-  double cutoff = 0.0;  // [rad/s]; 0: from the tolerance
-};
 
 template <class Real>
 class Exponential : public Method<Real> {
  public:
   static constexpr int LANES = LanesOf<Real>::value;
-  static constexpr double GROWTH =
-      1.6;  // the least that a step may grow by: each new length costs new tables
+  static constexpr double GROWTH = 1.25,  // the least that a step may grow by: each new length
+                                          // costs new tables
+      FADING = 0.85;  // of an error from step to step: those of oscillations pass through zero
   static constexpr double SAFETY = 0.85;
   static constexpr double TIGHT = 10.0;  // the local error is kept so far below the tolerance: few
                                          // long steps add up what many short ones average out
+  static constexpr double TINY = 1e-4;   // an error after which a step grows by four, not by two
   using Options = ExponentialOptions;
 
   Exponential(Integration<Real> &shared, double tolerance, const Options &wanted = Options())
@@ -104,7 +101,8 @@ class Exponential : public Method<Real> {
     for (int k = 0; k < LANES; ++k) {
       if (lane(which, k) < 0.5) continue;
       const Real *q = c.znew.data(), *v = q + n;
-      if (++since[k] % 8 == 0 || steps.count[k] < ORDER) set_error_weights(k, c.end - lane(end, k));
+      if (++since[k] % 8 == 0 || steps.count[k] < ORDER || weights_changed(k))
+        set_error_weights(k, c.end - lane(end, k));
       if (!modes.has_moved(k, c.plant, q) || !take_modes(k, q, v, lane(end, k))) continue;
       put_origin(k, q, v);
       transform_history(k);
@@ -136,15 +134,19 @@ class Exponential : public Method<Real> {
 
   double next(int k, double h, double error, double, bool accepted) override {
     const int order = steps.count[k] + 1;
-    const bool settled = steps.count[k] < ORDER || steps.equal_steps[k] >= 2;
+    auto factor = [order](double e) {
+      return SAFETY * flexura::power(larger(e, 1e-30), -1.0 / order);
+    };
+    if (!accepted) return error < 1e300 ? h * smaller(larger(0.25, factor(error)), 0.9) : 0.1 * h;
+    const bool starts = steps.count[k] < ORDER;
+    lately[k] = starts ? error : larger(error, FADING * lately[k]);
     double most = 1.0;  // with a larger error a step does not grow
     for (int i = 0; i < order; ++i) most *= SAFETY / GROWTH;
-    if (accepted && (!settled || error > most)) return wished_step[k];
-    const double factor =
-        error > 0.0 ? SAFETY * flexura::power(larger(error, 1e-30), -1.0 / order) : 2.0;
-    if (!accepted) return error < 1e300 ? h * smaller(larger(0.25, factor), 0.9) : 0.1 * h;
-    return factor * h > GROWTH * wished_step[k] ? smaller(factor * h, 2.0 * wished_step[k])
-                                                : wished_step[k];
+    if (!(starts || steps.equal_steps[k] >= 2) || lately[k] > most) return wished_step[k];
+    const double wish = smaller(factor(lately[k]) * h, (lately[k] < TINY ? 4.0 : 2.0) * wished_step[k]);
+    if (!(wish > GROWTH * wished_step[k])) return wished_step[k];
+    lately[k] = 0.0;
+    return wish;
   }
 
  protected:
@@ -165,7 +167,8 @@ class Exponential : public Method<Real> {
   std::unique_ptr<bool[]> held;  // (n) rows of joints whose motion is given
   Real end = 0.0;                // of the step being tried
   Real strain = 0.0, strain_before = 0.0, strain_after = 0.0;  // twice the strain energy
-  double wished_step[LANES] = {};
+  double wished_step[LANES] = {}, lately[LANES] = {};  // lately: the largest error, fading
+  double weighed[2][LANES] = {};  // what the error weights of the modes were taken from
   long since[LANES] = {};  // steps since the start or a break
 
   // Behind N, a row of the history keeps the accounts' numbers, then a, y and v.
@@ -244,10 +247,18 @@ class Exponential : public Method<Real> {
     }
   }
 
+  // Has what robot k is asked for grown by a tenth?
+  bool weights_changed(int k) const {
+    for (int e = 0; e < 2; ++e)
+      if (lane(c.weights.weight[e * n], k) < 0.9 * weighed[e][k]) return true;
+    return false;
+  }
+
   // Error weights of robot k's modes from those of its unknowns. An error of a rate moves the tips
   // until the end of the run at `left`, or for a part of a period.
   void set_error_weights(int k, double left) {
     const auto &w = c.weights.weight;
+    for (int e = 0; e < 2; ++e) weighed[e][k] = lane(w[e * n], k);
     for (int mode = 0; mode < n; ++mode) {
       double sum[2] = {0.0, 0.0};
       for (int e = 0; e < 2; ++e) {

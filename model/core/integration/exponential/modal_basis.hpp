@@ -13,7 +13,7 @@
 #include "control/inputs.hpp"
 #include "control/plant.hpp"
 #include "numbers/eigenproblem.hpp"
-#include "numbers/modal_vectors.hpp"
+#include "numbers/matrix_products.hpp"
 
 namespace flexura {
 
@@ -110,19 +110,19 @@ class ModalBasis {
       old.resize(M.size());
       for (int mode = 0; mode < n; ++mode)
         for (int i = 0; i < n; ++i) old[at(i, mode)] = lane(phi[mode * stride + i], k);
-      const std::vector<double> turned_M = congruent(old, M), turned_K = congruent(old, K);
+      const std::vector<double> turned_M = symmetric_product(n, old, product(n, M, old)), turned_K = symmetric_product(n, old, product(n, K, old));
       const double changed = change(k, turned_M, turned_K, slow) / POOR;
       patience[k] = smaller(larger(0.7 * gone[k] * (1.0 / root(larger(changed, 1e-3)) - 1.0), TURN),
                             FAR * TURN);  // were it to grow as a square
       if (changed < 1.0) return false;
       eigen_pencil(n, turned_K.data(), turned_M.data(), squares.data(),
                    shapes.data());  // nearly diagonal: soon done
-      shapes = product(old, shapes);
+      shapes = product(n, old, shapes);
     } else {
       eigen_pencil(n, K.data(), M.data(), squares.data(), shapes.data());
     }
     gone[k] = 0.0, patience[k] = TURN;
-    const std::vector<double> momenta = product(M, shapes), lost = product(D, shapes);
+    const std::vector<double> momenta = product(n, M, shapes), lost = product(n, D, shapes);
     const double least = larger(FREE, 1e-14 * squares[std::size_t(n - 1)]);
     for (int mode = 0; mode < n; ++mode) {
       const double square = squares[std::size_t(mode)];
@@ -161,31 +161,6 @@ class ModalBasis {
       gone[LANES];  // way to the next look; from where the modes were taken to the last one
 
   std::size_t at(int i, int j) const { return std::size_t(i) * std::size_t(n) + std::size_t(j); }
-
-  // A B of matrices (n, n).
-  std::vector<double> product(const std::vector<double> &A, const std::vector<double> &B) const {
-    std::vector<double> out(A.size(), 0.0);
-    for (int i = 0; i < n; ++i)
-      for (int j = 0; j < n; ++j) {
-        const double a = A[at(i, j)];
-        if (a == 0.0) continue;
-        for (int l = 0; l < n; ++l) out[at(i, l)] += a * B[at(j, l)];
-      }
-    return out;
-  }
-  // S^T A S.
-  std::vector<double> congruent(const std::vector<double> &S, const std::vector<double> &A) const {
-    const std::vector<double> AS = product(A, S);
-    std::vector<double> out(A.size(), 0.0);
-    for (int i = 0; i < n; ++i)
-      for (int a = 0; a < n; ++a) {
-        const double x = S[at(i, a)];
-        for (int b = 0; b < n; ++b) out[at(a, b)] += x * AS[at(i, b)];
-      }
-    for (int a = 0; a < n; ++a)
-      for (int b = 0; b < a; ++b) out[at(a, b)] = out[at(b, a)];
-    return out;
-  }
 
   // Frobenius' norm of Phi A Phi^T less what it was, relative to scale_i scale_j: the larger one of
   // A = M and A = K.

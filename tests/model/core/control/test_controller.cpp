@@ -2,6 +2,8 @@
 // gains; figures.
 #include "check.hpp"
 #include "control/controller.hpp"
+#include "control/model_plant.hpp"
+#include "integration/time_loop.hpp"
 #include "link/assembly.hpp"
 #include "simulation/gain_sweep.hpp"
 #include "simulation/method_by_name.hpp"
@@ -151,7 +153,7 @@ TEST(
       CHECK(u == law.update(real, SignalsOf<ModelNumbers>{double(e), double(rate),
                                                           double(setpoint_rate), tip_real}));
     }
-    CHECK(pid.follow(board, 77) == law.follow(real, 77.0));
+    CHECK(pid.track(board, 77) == law.track(real, 77.0));
   }
 }
 

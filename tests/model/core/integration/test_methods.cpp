@@ -2,7 +2,9 @@
 #include <string>
 
 #include "check.hpp"
+#include "control/model_plant.hpp"
 #include "energy_balance.hpp"
+#include "integration/time_loop.hpp"
 #include "link/assembly.hpp"
 #include "simulation/method_by_name.hpp"
 

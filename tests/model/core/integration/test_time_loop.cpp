@@ -1,5 +1,6 @@
 // The time loop and its methods, on plants whose motion is known.
 #include "check.hpp"
+#include "integration/runge_kutta/dop853.hpp"
 #include "integration/runge_kutta/embedded_pairs.hpp"
 #include "integration/runge_kutta/implicit.hpp"
 #include "integration/time_loop.hpp"

@@ -2,6 +2,10 @@
 #include <cmath>
 
 #include "check.hpp"
+#include "integration/exponential/exponential.hpp"
+#include "integration/runge_kutta/dop853.hpp"
+#include "integration/runge_kutta/implicit.hpp"
+#include "integration/time_loop.hpp"
 #include "plants.hpp"
 #include "simulation/method_selection.hpp"
 

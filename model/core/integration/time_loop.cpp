@@ -1,0 +1,8 @@
+#include "integration/time_loop.hpp"
+
+namespace flexura {
+
+template class Loop<double>;
+template class Loop<Pack<4>>;
+
+}  // namespace flexura
