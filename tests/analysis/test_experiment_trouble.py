@@ -42,6 +42,12 @@ def finished(process, status):
     return said
 
 
+def moves_for(line, seconds):
+    """So long by the board's clock, which lags on a busy machine."""
+    begin = line.board.now()
+    line.wait(lambda: line.board.now() - begin > seconds)
+
+
 def off(line):
     line.wait(lambda: not line.driven, OFF_S * 10)
 
@@ -133,7 +139,7 @@ def test_kill_9_at_a_random_moment(line, tmp_path, count, seed):
 )
 def test_ctrl_c_and_its_kin_stop_the_motors_in_order(line, tmp_path, number):
     with running(line, *LONG, "--out", "run", cwd=tmp_path) as process:
-        time.sleep(0.5)
+        moves_for(line, 0.5)
         process.send_signal(number)
         said = finished(process, 130)
     assert "interrupted" in said and not line.driven
@@ -144,7 +150,7 @@ def test_ctrl_c_and_its_kin_stop_the_motors_in_order(line, tmp_path, number):
 
 def test_the_line_is_unplugged(line, tmp_path):
     with running(line, *LONG, "--out", "run", cwd=tmp_path) as process:
-        time.sleep(0.6)
+        moves_for(line, 0.6)
         line.unplug()
         said = finished(process, 1)
     assert "the line is gone" in said and "the board stops by itself" in said
@@ -158,7 +164,7 @@ def test_the_line_is_unplugged(line, tmp_path):
 
 def test_the_board_is_reset_in_the_middle(line, tmp_path):
     with running(line, *LONG, "--out", "run", cwd=tmp_path) as process:
-        time.sleep(0.6)
+        moves_for(line, 0.6)
         line.do(line.board.reset)
         said = finished(process, 1)
     assert "the board was reset (external)" in said and not line.driven
