@@ -250,5 +250,5 @@ def test_all_extras_are_in_all():
     extras = project["optional-dependencies"]
     (everything,) = extras["all"]
     named = set(re.fullmatch(r"flexura\[(.*)\]", everything)[1].split(","))
-    assert named == set(extras) - {"all", "build", "test"}
-    assert "flexura[all,build]" in extras["test"]
+    assert named == set(extras) - {"all", "build", "docs", "test"}
+    assert any(text.startswith("flexura[all,build") for text in extras["test"])

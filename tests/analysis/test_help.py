@@ -2,13 +2,11 @@
 
 import re
 import shlex
-from pathlib import Path
 
 import pytest
 
 from commands import commands, examples, run
 
-ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = {" ".join(words): command for words, command in commands()}
 FASTER = {"tune": ["--population", "8", "--generations", "1"]}  # beside what the example says
 SLOW = {"flash", "demo", "compare", "identify", "doctor"}
@@ -21,6 +19,7 @@ BEFORE = {
     "export": [[*FIRST, "--out", "logs/first"]],
     "migrate": [["new", "my-arm.toml"]],
     "compare": [[*EXPERIMENT, "--out", "logs/experiment"]],
+    "migrate": [["new", "my-arm.toml"]],
     "identify": [["bench", "excite", "--seed", "1", "--out", "logs/excite"]],
 }
 ELSEWHERE = {"bench recover", "bench step"}  # go on from an experiment that is no example's
@@ -29,9 +28,8 @@ MOST_WORDS = 25
 
 @pytest.fixture
 def place(tmp_path, monkeypatch):
+    """A folder that knows nothing of the checkout."""
     monkeypatch.chdir(tmp_path)
-    for name in ("model", "firmware"):
-        (tmp_path / name).symlink_to(ROOT / name)
     return tmp_path
 
 

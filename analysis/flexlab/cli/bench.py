@@ -56,7 +56,7 @@ app = typer.Typer(
 TOLD_BY_JSON = ["kind", "emulated", "label", "experiment", "complete", "line", "delays", "firmware"]
 
 RigFile = Annotated[
-    Path | None, typer.Argument(metavar="RIG", help="rig file (TOML); default firmware/rig.toml")
+    Path | None, typer.Argument(metavar="RIG", help="rig file (TOML), or a name; default rig")
 ]
 Port = Annotated[
     str | None,
@@ -213,7 +213,7 @@ def inverse(
     The firmware's controllers follow them.
 
     \b
-    Example: flexura bench inverse --manoeuvre model/manoeuvres/rig-inverse-law.toml
+    Example: flexura bench inverse --manoeuvre rig-inverse-law
     """
     asked = None if manoeuvre is None else fx.load_manoeuvre(manoeuvre, 2)
 

@@ -20,7 +20,7 @@ ManoeuvreFile = Annotated[
     ),
 ]
 RigFile = Annotated[
-    Path | None, typer.Argument(metavar="RIG", help="rig file (TOML); default firmware/rig.toml")
+    Path | None, typer.Argument(metavar="RIG", help="rig file (TOML), or a name; default rig")
 ]
 Out = Annotated[
     Path | None,

@@ -132,7 +132,7 @@ def tune(
     same result. A folder with other files is refused.
 
     \b
-    Example: flexura tune rig rig-step --controller rig --rig firmware/rig.toml
+    Example: flexura tune rig rig-step --controller rig --rig rig
       --free kp_1_V_m=100:10000 --free kp_2_1_s=1:60 --algorithm cma-es
     """
     if free and free_file:
