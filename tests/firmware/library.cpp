@@ -13,8 +13,8 @@ InterruptLock::~InterruptLock() { (void)before_; }
 extern "C" {
 uint16_t c_crc(const uint8_t *data, uint16_t size) { return crc16(data, size); }
 
-uint8_t c_encode(uint8_t code, uint16_t sequence, const uint8_t *fields,
-                 uint8_t size, uint8_t *frame) {
+uint8_t c_encode(uint8_t code, uint16_t sequence, const uint8_t *fields, uint8_t size,
+                 uint8_t *frame) {
   return encode(code, sequence, fields, size, frame);
 }
 
@@ -34,8 +34,7 @@ int c_receive(const uint8_t *bytes, uint32_t size, uint8_t *payload) {
   return length;
 }
 
-int c_count(const uint8_t *lines, const uint8_t *which, uint32_t size,
-            int *missed) {
+int c_count(const uint8_t *lines, const uint8_t *which, uint32_t size, int *missed) {
   Quadrature q;
   q.start(0);
   int count = 0;
@@ -55,19 +54,16 @@ struct Row {
   int16_t deflection, deflection_rate;
 };
 
-int c_pid(const float *values, uint8_t joint, const Row *rows, uint32_t size,
-          int16_t *outputs) {
+int c_pid(const float *values, uint8_t joint, const Row *rows, uint32_t size, int16_t *outputs) {
   Config config;
   memcpy(config.values, values, sizeof config.values);
   FixedPointConfig fixed;
   const uint8_t wrong = to_fixed_point(config, fixed);
-  if (wrong != kAllValid)
-    return wrong;
+  if (wrong != kAllValid) return wrong;
   Pid pid;
   for (uint32_t k = 0; k < size; ++k) {
     PidSignals signals = rows[k].signals;
-    signals.tip = tip_term(fixed.gains[joint], rows[k].deflection,
-                           rows[k].deflection_rate);
+    signals.tip = tip_term(fixed.gains[joint], rows[k].deflection, rows[k].deflection_rate);
     outputs[k] = pid.update(fixed.gains[joint], signals);
   }
   return kAllValid;
@@ -75,8 +71,7 @@ int c_pid(const float *values, uint8_t joint, const Row *rows, uint32_t size,
 
 // Rates [microstep / 4096 per tick] in; times of all steps [timer counts] and
 // their directions out.
-int c_steps(const int16_t *rates, uint32_t size, int64_t *at,
-            int8_t *direction) {
+int c_steps(const int16_t *rates, uint32_t size, int64_t *at, int8_t *direction) {
   StepGenerator steps;
   StepPlan plan;
   int n = 0;
@@ -107,27 +102,22 @@ int c_board(const float *values, const Told *rows, uint32_t size, Done *done) {
   Stored stored = {Config(), 1};
   memcpy(stored.config.values, values, sizeof stored.config.values);
   rig.begin(&stored, 0, 1);
-  if (rig.state() != State::idle)
-    return 100 + rig.wrong_item();
+  if (rig.state() != State::idle) return 100 + rig.wrong_item();
   Outputs out;
   Inputs &in = rig.inputs();
   uint16_t detail;
   const auto tell = [&](uint8_t code, const void *fields) {
-    return static_cast<int>(
-        rig.command(code, static_cast<const uint8_t *>(fields), detail));
+    return static_cast<int>(rig.command(code, static_cast<const uint8_t *>(fields), detail));
   };
-  const uint16_t supply = 502; // 12 V / 4.9 of 5 V
+  const uint16_t supply = 502;  // 12 V / 4.9 of 5 V
   in = Inputs();
   in.supply = supply;
   in.flex = static_cast<uint16_t>(rows[0].flex);
-  rig.tick(out); // the next one is even
-  const Reference here = {rows[0].setpoint[0] / 256, 0,
-                          rows[0].setpoint[1] / 256};
-  if (tell(Reference::kCode, &here))
-    return 1;
+  rig.tick(out);  // the next one is even
+  const Reference here = {rows[0].setpoint[0] / 256, 0, rows[0].setpoint[1] / 256};
+  if (tell(Reference::kCode, &here)) return 1;
   const Arm arm = {static_cast<uint8_t>(Mode::position)};
-  if (tell(Arm::kCode, &arm))
-    return 2;
+  if (tell(Arm::kCode, &arm)) return 2;
   uint32_t next = 0;
   const auto feed = [&] {
     for (uint8_t n = 0; n < 8 && next < size; ++n, ++next) {
@@ -137,14 +127,12 @@ int c_board(const float *values, const Told *rows, uint32_t size, Done *done) {
       one.final = next + 1 == size;
       one.position_1[0] = rows[next].setpoint[0];
       one.position_2[0] = rows[next].setpoint[1];
-      if (tell(Setpoints::kCode, &one))
-        break;
+      if (tell(Setpoints::kCode, &one)) break;
     }
   };
   feed();
   const Start start = {0};
-  if (tell(Start::kCode, &start))
-    return 3;
+  if (tell(Start::kCode, &start)) return 3;
   int8_t planned = 0;
   for (uint32_t k = 1; k < size; ++k) {
     feed();
@@ -156,10 +144,8 @@ int c_board(const float *values, const Told *rows, uint32_t size, Done *done) {
     in.moved[0] = static_cast<int8_t>(rows[k].moved);
     in.stepped = planned;
     rig.tick(out);
-    planned =
-        static_cast<int8_t>(out.steps.up ? out.steps.count : -out.steps.count);
-    if (rig.state() != State::running)
-      return 1000 + static_cast<int>(rig.fault());
+    planned = static_cast<int8_t>(out.steps.up ? out.steps.count : -out.steps.count);
+    if (rig.state() != State::running) return 1000 + static_cast<int>(rig.fault());
     Telemetry report;
     rig.report(report);
     done[k] = {report.voltage, report.rate};

@@ -143,7 +143,8 @@ class Exponential : public Method<Real> {
     double most = 1.0;  // with a larger error a step does not grow
     for (int i = 0; i < order; ++i) most *= SAFETY / GROWTH;
     if (!(starts || steps.equal_steps[k] >= 2) || lately[k] > most) return wished_step[k];
-    const double wish = smaller(factor(lately[k]) * h, (lately[k] < TINY ? 4.0 : 2.0) * wished_step[k]);
+    const double wish =
+        smaller(factor(lately[k]) * h, (lately[k] < TINY ? 4.0 : 2.0) * wished_step[k]);
     if (!(wish > GROWTH * wished_step[k])) return wished_step[k];
     lately[k] = 0.0;
     return wish;
@@ -167,9 +168,9 @@ class Exponential : public Method<Real> {
   std::unique_ptr<bool[]> held;  // (n) rows of joints whose motion is given
   Real end = 0.0;                // of the step being tried
   Real strain = 0.0, strain_before = 0.0, strain_after = 0.0;  // twice the strain energy
-  double wished_step[LANES] = {}, lately[LANES] = {};  // lately: the largest error, fading
+  double wished_step[LANES] = {}, lately[LANES] = {};          // lately: the largest error, fading
   double weighed[2][LANES] = {};  // what the error weights of the modes were taken from
-  long since[LANES] = {};  // steps since the start or a break
+  long since[LANES] = {};         // steps since the start or a break
 
   // Behind N, a row of the history keeps the accounts' numbers, then a, y and v.
   static int extras_of(const Integration<Real> &c) {

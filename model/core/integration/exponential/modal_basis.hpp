@@ -110,7 +110,8 @@ class ModalBasis {
       old.resize(M.size());
       for (int mode = 0; mode < n; ++mode)
         for (int i = 0; i < n; ++i) old[at(i, mode)] = lane(phi[mode * stride + i], k);
-      const std::vector<double> turned_M = symmetric_product(n, old, product(n, M, old)), turned_K = symmetric_product(n, old, product(n, K, old));
+      const std::vector<double> turned_M = symmetric_product(n, old, product(n, M, old)),
+                                turned_K = symmetric_product(n, old, product(n, K, old));
       const double changed = change(k, turned_M, turned_K, slow) / POOR;
       patience[k] = smaller(larger(0.7 * gone[k] * (1.0 / root(larger(changed, 1e-3)) - 1.0), TURN),
                             FAR * TURN);  // were it to grow as a square

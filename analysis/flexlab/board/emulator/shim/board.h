@@ -9,20 +9,38 @@
 #include "avr_watchdog.h"
 #include "sim_avr.h"
 
-enum { ENCODERS = 2, LINES = 16, VECTORS = 64, PORTS = 12, MCUSR = 0x54, WATCHDOG_RESET = 8, TIMSK0 = 0x6E, TIMERS = 6 };
+enum {
+  ENCODERS = 2,
+  LINES = 16,
+  VECTORS = 64,
+  PORTS = 12,
+  MCUSR = 0x54,
+  WATCHDOG_RESET = 8,
+  TIMSK0 = 0x6E,
+  TIMERS = 6
+};
 enum { ON_PIN, ON_ADC };
-enum { FORWARD = 1, REVERSE, ENABLE, STEP, STEP_UP, STEP_DISABLE }; /* what a line does for the plant; 0: only watched */
+enum {
+  FORWARD = 1,
+  REVERSE,
+  ENABLE,
+  STEP,
+  STEP_UP,
+  STEP_DISABLE
+}; /* what a line does for the plant; 0: only watched */
 
-typedef struct { /* shared with Python: all doubles, see simulator.py */
+typedef struct {            /* shared with Python: all doubles, see simulator.py */
   double encoder[ENCODERS]; /* in: position at the window's end [counts, x4] */
-  double duty;              /* out: mean of forward minus reverse while the bridge is enabled, over the window, -1..1 */
-  double steps;             /* out: steps taken since the start, with sign, counted while the driver was enabled */
-  double steps_mean;        /* out: mean of `steps` over the window's time */
-  double motor_on;          /* out: 1 while the motor's driver is enabled */
-  double stepper_on;        /* out: 1 while the stepper's driver is enabled */
-  double driven_cycle;      /* out: the last cycle at which the bridge was enabled */
-  double step_cycle;        /* out: the last cycle at which the stepper driver was enabled */
-  double resets;            /* out: resets since the start, power-on not counted */
+  double duty; /* out: mean of forward minus reverse while the bridge is enabled, over the window,
+                  -1..1 */
+  double
+      steps; /* out: steps taken since the start, with sign, counted while the driver was enabled */
+  double steps_mean;   /* out: mean of `steps` over the window's time */
+  double motor_on;     /* out: 1 while the motor's driver is enabled */
+  double stepper_on;   /* out: 1 while the stepper's driver is enabled */
+  double driven_cycle; /* out: the last cycle at which the bridge was enabled */
+  double step_cycle;   /* out: the last cycle at which the stepper driver was enabled */
+  double resets;       /* out: resets since the start, power-on not counted */
 } window_t;
 
 typedef struct {
@@ -42,8 +60,9 @@ typedef struct {
   board_t *board;
   avr_irq_t *irq;
   uint32_t index, traced;
-  uint8_t role, rest, level; /* rest: the level without the firmware, given by the rig's resistors */
-  uint8_t cut;               /* the wire is broken: what it led to is at rest */
+  uint8_t role, rest,
+      level;   /* rest: the level without the firmware, given by the rig's resistors */
+  uint8_t cut; /* the wire is broken: what it led to is at rest */
 } line_t;
 
 typedef struct {
@@ -64,24 +83,25 @@ struct board {
   int was_reset, bitten;
   avr_watchdog_t *watchdog;
   window_t window;
-  queue_t inputs;   /* input_t in order of cycle */
-  queue_t to_uart;  /* bytes that the line still holds */
+  queue_t inputs;  /* input_t in order of cycle */
+  queue_t to_uart; /* bytes that the line still holds */
   queue_t from_uart;
-  queue_t edges;    /* edge_t of traced lines */
+  queue_t edges;                   /* edge_t of traced lines */
   uint64_t byte_cycles, next_byte; /* a byte's time on the line; when the next one has arrived */
   encoder_t encoder[ENCODERS];
   line_t lines[LINES];
   uint32_t line_count;
-  uint8_t level_of[8]; /* by role */
+  uint8_t level_of[8];                /* by role */
   const avr_timer_t *timer[STEP + 1]; /* of the compare pins, by role, and their comparators */
   const avr_timer_comp_t *comparator[STEP + 1];
   uint8_t cut[STEP_DISABLE + 1]; /* by role: its wire is broken */
-  int unsettled;       /* a line is not at the level that simavr believes */
-  int motor;           /* -1, 0, 1: how the pins drive the motor now */
+  int unsettled;                 /* a line is not at the level that simavr believes */
+  int motor;                     /* -1, 0, 1: how the pins drive the motor now */
   uint64_t motor_since;
   double motor_sum;
-  uint64_t begin;           /* the window's first cycle */
-  double steps_late;        /* sum of the window's steps, each by how long after its begin it came [cycles] */
+  uint64_t begin; /* the window's first cycle */
+  double
+      steps_late; /* sum of the window's steps, each by how long after its begin it came [cycles] */
   uint8_t driven[PORTS], level[PORTS]; /* inputs by port letter - 'A' */
   uint64_t stuck[PORTS];               /* bits of pins that ignore what drives them */
   uint64_t entered[VECTORS], longest[VECTORS], own[VECTORS], total[VECTORS], entries[VECTORS];
@@ -116,9 +136,9 @@ static inline size_t take(queue_t *q, void *into, size_t room) {
 }
 
 /* wires.c */
-void schedule(board_t *b, input_t e);      /* among the inputs, in order of cycle */
+void schedule(board_t *b, input_t e); /* among the inputs, in order of cycle */
 void deliver(board_t *b, const input_t *e);
 void turn(board_t *b, encoder_t *encoder, double position, uint64_t begin, uint64_t end);
-void on_drive(board_t *b);                 /* brings the sums up to now */
-void settle(board_t *b);                   /* has simavr believe what the lines are */
-void rest(board_t *b);                     /* as after a reset, when every pin is an input */
+void on_drive(board_t *b); /* brings the sums up to now */
+void settle(board_t *b);   /* has simavr believe what the lines are */
+void rest(board_t *b);     /* as after a reset, when every pin is an input */

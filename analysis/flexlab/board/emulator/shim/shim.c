@@ -1,19 +1,26 @@
-/* An ATmega2560 with its wires, stepped in lockstep with a plant: a flat C interface to simavr for ctypes.
+/* An ATmega2560 with its wires, stepped in lockstep with a plant: a flat C interface to simavr for
+ * ctypes.
  *
- * The plant sees averages over a window of cycles (motor duty, steps); the firmware sees every edge at its own cycle. All that
- * crosses this border is the block `window_t`, plain C functions for what is rare, and two byte streams.
+ * The plant sees averages over a window of cycles (motor duty, steps); the firmware sees every edge
+ * at its own cycle. All that crosses this border is the block `window_t`, plain C functions for
+ * what is rare, and two byte streams.
  *
  * Written for simavr 1.6. Worked around here:
  *   - its UART sleeps on the host while firmware polls it, and prints: flags cleared;
  *   - its sleep() follows the wall clock: replaced;
- *   - a pull-up overwrites a driven input at the next write to that port: AVR_IOCTL_IOPORT_SET_EXTERNAL;
+ *   - a pull-up overwrites a driven input at the next write to that port:
+ * AVR_IOCTL_IOPORT_SET_EXTERNAL;
  *   - a reset forgets the levels of input pins: written again;
- *   - an INTn pin that is low before its edge is chosen is polled every cycle: strict level trigger off;
- *   - fast PWM with OCRnx at TOP, which is always on, shows no level at the pin: read from the registers;
- *   - a timer's interrupt that falls due while it is masked is forgotten: raised when it is unmasked;
+ *   - an INTn pin that is low before its edge is chosen is polled every cycle: strict level trigger
+ * off;
+ *   - fast PWM with OCRnx at TOP, which is always on, shows no level at the pin: read from the
+ * registers;
+ *   - a timer's interrupt that falls due while it is masked is forgotten: raised when it is
+ * unmasked;
  *   - a watchdog whose interrupt nobody serves never resets: it does with its next time-out;
  *   - a write to a port ends the PWM pulses of its pins: ignored;
- *   - without PWM, a compare pin that is to be set is cleared when the timer overflows or another OCRnx is written: ignored;
+ *   - without PWM, a compare pin that is to be set is cleared when the timer overflows or another
+ * OCRnx is written: ignored;
  *   - a byte of the UART takes 11 bit times, not 10 (left as it is: slower than the hardware).
  */
 #include <stdarg.h>
@@ -65,17 +72,21 @@ static void on_bite(struct avr_irq_t *irq, uint32_t value, void *param) {
   board_t *b = param;
   if (value && avr_regbit_get(b->avr, b->watchdog->wde))
     avr_cycle_timer_register(b->avr, b->watchdog->cycle_count, second_bite, b);
-  else avr_cycle_timer_cancel(b->avr, second_bite, b);
+  else
+    avr_cycle_timer_cancel(b->avr, second_bite, b);
 }
 
-/* A timer's mask was written: what fell due behind it and is let through now is due now, as the flag in TIFRn says. */
+/* A timer's mask was written: what fell due behind it and is let through now is due now, as the
+ * flag in TIFRn says. */
 static void on_mask(struct avr_irq_t *irq, uint32_t value, void *param) {
   (void)irq, (void)value;
   board_t *b = param;
   for (int i = 0; i < b->avr->interrupts.vector_count; ++i) {
     avr_int_vector_t *vector = b->avr->interrupts.vector[i];
-    if (vector->enable.reg < TIMSK0 || vector->enable.reg >= TIMSK0 + TIMERS || vector->pending) continue;
-    if (avr_regbit_get(b->avr, vector->enable) && avr_regbit_get(b->avr, vector->raised)) avr_raise_interrupt(b->avr, vector);
+    if (vector->enable.reg < TIMSK0 || vector->enable.reg >= TIMSK0 + TIMERS || vector->pending)
+      continue;
+    if (avr_regbit_get(b->avr, vector->enable) && avr_regbit_get(b->avr, vector->raised))
+      avr_raise_interrupt(b->avr, vector);
   }
 }
 
@@ -95,7 +106,9 @@ static void on_reset(avr_t *avr) {
 
 static void no_sleep(avr_t *avr, avr_cycle_count_t cycles) { (void)avr, (void)cycles; }
 
-static avr_cycle_count_t wake(avr_t *avr, avr_cycle_count_t when, void *param) { return (void)avr, (void)when, (void)param, 0; }
+static avr_cycle_count_t wake(avr_t *avr, avr_cycle_count_t when, void *param) {
+  return (void)avr, (void)when, (void)param, 0;
+}
 
 static void after_reset(board_t *b) {
   b->was_reset = b->bitten = 0;
@@ -116,7 +129,8 @@ board_t *board_new(const uint8_t *flash, uint32_t size, uint32_t hz, uint32_t ba
   avr_global_logger_set(on_log);
   board_t *b = calloc(1, sizeof *b);
   if (!b) return NULL;
-  b->inputs.size = sizeof(input_t), b->edges.size = sizeof(edge_t), b->to_uart.size = b->from_uart.size = 1;
+  b->inputs.size = sizeof(input_t), b->edges.size = sizeof(edge_t),
+  b->to_uart.size = b->from_uart.size = 1;
   b->byte_cycles = 11ull * hz / baud;
   avr_t *avr = b->avr = avr_make_mcu_by_name("atmega2560");
   if (!avr) return board_free(b), NULL;
@@ -135,13 +149,16 @@ board_t *board_new(const uint8_t *flash, uint32_t size, uint32_t hz, uint32_t ba
     uint32_t flags = 0;
     avr_ioctl(avr, AVR_IOCTL_UART_SET_FLAGS(uart), &flags);
   }
-  avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUTPUT), on_tx, b);
+  avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUTPUT), on_tx,
+                          b);
   for (int i = 0; i < TIMERS; ++i)
-    avr_irq_register_notify(avr_iomem_getirq(avr, (avr_io_addr_t)(TIMSK0 + i), NULL, AVR_IOMEM_IRQ_ALL), on_mask, b);
+    avr_irq_register_notify(
+        avr_iomem_getirq(avr, (avr_io_addr_t)(TIMSK0 + i), NULL, AVR_IOMEM_IRQ_ALL), on_mask, b);
   for (avr_io_t *io = avr->io_port; io; io = io->next)
     if (!strcmp(io->kind, "watchdog")) b->watchdog = (avr_watchdog_t *)io;
   avr_irq_register_notify(b->watchdog->watchdog.irq + AVR_INT_IRQ_PENDING, on_bite, b);
-  avr_irq_register_notify(avr_get_interrupt_irq(avr, AVR_INT_ANY) + AVR_INT_IRQ_RUNNING, on_interrupt, b);
+  avr_irq_register_notify(avr_get_interrupt_irq(avr, AVR_INT_ANY) + AVR_INT_IRQ_RUNNING,
+                          on_interrupt, b);
   return b;
 }
 
@@ -167,12 +184,15 @@ size_t board_unsent(const board_t *b) { return b->to_uart.used - b->to_uart.head
 
 size_t board_received(const board_t *b) { return b->from_uart.used - b->from_uart.head; }
 
-size_t board_receive(board_t *b, uint8_t *into, size_t room) { return take(&b->from_uart, into, room); }
+size_t board_receive(board_t *b, uint8_t *into, size_t room) {
+  return take(&b->from_uart, into, room);
+}
 
 size_t board_edges(board_t *b, edge_t *into, size_t room) { return take(&b->edges, into, room); }
 
-/* Runs to the cycle `until`. `slice` is how many cycles simavr may run without looking up; 1 is its default. A larger one gives
- * the same edges and bytes, faster: what is scheduled is among simavr's timers, and a slice is cut at the next of them. */
+/* Runs to the cycle `until`. `slice` is how many cycles simavr may run without looking up; 1 is its
+ * default. A larger one gives the same edges and bytes, faster: what is scheduled is among simavr's
+ * timers, and a slice is cut at the next of them. */
 int board_run(board_t *b, uint64_t until, uint32_t slice) {
   avr_t *avr = b->avr;
   uint64_t armed = 0;
@@ -198,8 +218,10 @@ int board_run(board_t *b, uint64_t until, uint32_t slice) {
       avr_raise_irq(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_INPUT), byte);
       b->next_byte += b->byte_cycles;
     }
-    if (b->to_uart.head < b->to_uart.used) next = b->next_byte < next ? b->next_byte : next;
-    else if (b->to_uart.used) b->to_uart.head = b->to_uart.used = 0, b->next_byte -= b->byte_cycles;
+    if (b->to_uart.head < b->to_uart.used)
+      next = b->next_byte < next ? b->next_byte : next;
+    else if (b->to_uart.used)
+      b->to_uart.head = b->to_uart.used = 0, b->next_byte -= b->byte_cycles;
     if (next != armed) {
       avr_cycle_timer_register(avr, next > avr->cycle ? next - avr->cycle : 1, wake, b);
       armed = next;
@@ -242,9 +264,11 @@ int board_eeprom(board_t *b, int write, uint8_t *bytes, uint16_t offset, uint32_
   return avr_ioctl(b->avr, write ? AVR_IOCTL_EEPROM_SET : AVR_IOCTL_EEPROM_GET, &d);
 }
 
-/* into: entries, cycles in all, cycles of the longest, cycles of the longest without those that interrupted it. */
+/* into: entries, cycles in all, cycles of the longest, cycles of the longest without those that
+ * interrupted it. */
 void board_vector(const board_t *b, int vector, uint64_t into[4]) {
-  into[0] = b->entries[vector], into[1] = b->total[vector], into[2] = b->longest[vector], into[3] = b->own[vector];
+  into[0] = b->entries[vector], into[1] = b->total[vector], into[2] = b->longest[vector],
+  into[3] = b->own[vector];
 }
 
 /* What simavr complained about since the last call. */

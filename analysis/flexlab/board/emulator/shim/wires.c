@@ -1,4 +1,5 @@
-/* The wires between firmware and plant: pins, encoders and ADC on the way in; drivers' inputs and steps on the way out. */
+/* The wires between firmware and plant: pins, encoders and ADC on the way in; drivers' inputs and
+ * steps on the way out. */
 #include <math.h>
 
 #include "avr_adc.h"
@@ -31,13 +32,16 @@ static avr_ioport_t *port_of(avr_t *avr, char name) {
 }
 
 void deliver(board_t *b, const input_t *e) {
-  if (e->kind == ON_PIN) drive_pin(b, (char)e->unit, e->n, e->value);
-  else avr_raise_irq(avr_io_getirq(b->avr, AVR_IOCTL_ADC_GETIRQ, e->n), e->value);
+  if (e->kind == ON_PIN)
+    drive_pin(b, (char)e->unit, e->n, e->value);
+  else
+    avr_raise_irq(avr_io_getirq(b->avr, AVR_IOCTL_ADC_GETIRQ, e->n), e->value);
 }
 
 static const uint8_t gray[4] = {0, 1, 3, 2}; /* of a count's last two bits; bit 0: A, bit 1: B */
 
-/* A shaft that moves evenly from its last position to `position` between two cycles; A leads B upwards. */
+/* A shaft that moves evenly from its last position to `position` between two cycles; A leads B
+ * upwards. */
 void turn(board_t *b, encoder_t *encoder, double position, uint64_t begin, uint64_t end) {
   const int64_t goal = (int64_t)floor(position);
   if (goal != encoder->count) {
@@ -49,8 +53,8 @@ void turn(board_t *b, encoder_t *encoder, double position, uint64_t begin, uint6
       encoder->count += up ? 1 : -1;
       const uint8_t now = gray[encoder->count & 3];
       const int which = (old ^ now) >> 1;
-      schedule(b, (input_t){begin + (uint64_t)((crossed - encoder->position) * scale), ON_PIN, encoder->port[which],
-                            encoder->bit[which], (now >> which) & 1});
+      schedule(b, (input_t){begin + (uint64_t)((crossed - encoder->position) * scale), ON_PIN,
+                            encoder->port[which], encoder->bit[which], (now >> which) & 1});
     }
   }
   encoder->position = position;
@@ -60,13 +64,16 @@ void turn(board_t *b, encoder_t *encoder, double position, uint64_t begin, uint6
 
 static int always_on(const board_t *b, int role) {
   const avr_timer_comp_t *comparator = b->comparator[role];
-  if (!comparator || b->cut[role] || avr_regbit_get(b->avr, comparator->com) != avr_timer_com_clear) return 0;
+  if (!comparator || b->cut[role] || avr_regbit_get(b->avr, comparator->com) != avr_timer_com_clear)
+    return 0;
   const uint8_t *data = b->avr->data;
   const avr_timer_t *timer = b->timer[role];
-  return (data[comparator->r_ocr] | data[comparator->r_ocrh] << 8) >= (data[timer->r_icr] | data[timer->r_icrh] << 8);
+  return (data[comparator->r_ocr] | data[comparator->r_ocrh] << 8) >=
+         (data[timer->r_icr] | data[timer->r_icrh] << 8);
 }
 
-/* A write to a port has simavr believe that the PWM outputs on it are low, in the middle of their pulse. */
+/* A write to a port has simavr believe that the PWM outputs on it are low, in the middle of their
+ * pulse. */
 static int still_high(const board_t *b, int role) {
   const avr_timer_comp_t *comparator = b->comparator[role];
   if (!comparator || avr_regbit_get(b->avr, comparator->com) != avr_timer_com_clear) return 0;
@@ -83,7 +90,8 @@ void on_drive(board_t *b) {
   if (w->stepper_on != 0) w->step_cycle = (double)now;
   w->motor_on = b->level_of[ENABLE];
   w->stepper_on = !b->level_of[STEP_DISABLE];
-  const int forward = b->level_of[FORWARD] || always_on(b, FORWARD), reverse = b->level_of[REVERSE] || always_on(b, REVERSE);
+  const int forward = b->level_of[FORWARD] || always_on(b, FORWARD),
+            reverse = b->level_of[REVERSE] || always_on(b, REVERSE);
   b->motor = b->level_of[ENABLE] ? forward - reverse : 0;
 }
 
@@ -93,7 +101,8 @@ static void on_edge(struct avr_irq_t *irq, uint32_t value, void *param) {
   board_t *b = line->board;
   const uint8_t level = line->cut ? line->rest : value & 1;
   if (level == line->level) return;
-  if ((line->role == FORWARD || line->role == REVERSE) && !level && !line->cut && still_high(b, line->role)) {
+  if ((line->role == FORWARD || line->role == REVERSE) && !level && !line->cut &&
+      still_high(b, line->role)) {
     line->irq->flags |= IRQ_FLAG_INIT; /* simavr tells of the next change, which is none for it */
     return;
   }
@@ -111,10 +120,13 @@ static void on_edge(struct avr_irq_t *irq, uint32_t value, void *param) {
     const double step = b->level_of[STEP_UP] ? 1 : -1;
     b->window.steps += step;
     b->steps_late += step * (double)(b->avr->cycle - b->begin);
-  } else if (line->role) on_drive(b);
+  } else if (line->role)
+    on_drive(b);
 }
 
-static void on_timer(struct avr_irq_t *irq, uint32_t value, void *param) { (void)irq, (void)value, on_drive(param); }
+static void on_timer(struct avr_irq_t *irq, uint32_t value, void *param) {
+  (void)irq, (void)value, on_drive(param);
+}
 
 /* Has the timer whose output is on the pin tell of every change of its comparator. */
 static void follow_timer(board_t *b, char port, int bit, int role) {
@@ -122,13 +134,15 @@ static void follow_timer(board_t *b, char port, int bit, int role) {
   for (avr_io_t *io = b->avr->io_port; io; io = io->next) {
     const avr_timer_t *timer = (const avr_timer_t *)io;
     for (int i = 0; i < AVR_TIMER_COMP_COUNT && !strcmp(io->kind, "timer"); ++i)
-      if (timer->comp[i].r_ocrh && timer->comp[i].com_pin.reg == p->r_port && timer->comp[i].com_pin.bit == bit)
+      if (timer->comp[i].r_ocrh && timer->comp[i].com_pin.reg == p->r_port &&
+          timer->comp[i].com_pin.bit == bit)
         b->timer[role] = timer, b->comparator[role] = &timer->comp[i];
   }
   if (!b->comparator[role]) return;
   const avr_io_addr_t registers[] = {b->comparator[role]->r_ocr, b->comparator[role]->com.reg};
   for (int i = 0; i < 2; ++i)
-    avr_irq_register_notify(avr_iomem_getirq(b->avr, registers[i], NULL, AVR_IOMEM_IRQ_ALL), on_timer, b);
+    avr_irq_register_notify(avr_iomem_getirq(b->avr, registers[i], NULL, AVR_IOMEM_IRQ_ALL),
+                            on_timer, b);
 }
 
 /* Has simavr believe what the lines are. */
@@ -138,25 +152,34 @@ void settle(board_t *b) {
     if (!b->lines[i].cut) b->lines[i].irq->value = b->lines[i].level;
 }
 
-/* After a reset every pin is an input: outputs are pulled to rest by the rig's resistors, inputs keep their levels. */
+/* After a reset every pin is an input: outputs are pulled to rest by the rig's resistors, inputs
+ * keep their levels. */
 void rest(board_t *b) {
   for (uint32_t i = 0; i < b->line_count; ++i) on_edge(NULL, b->lines[i].rest, &b->lines[i]);
   settle(b);
   for (int p = 0; p < PORTS; ++p) {
     avr_ioport_t *port = b->driven[p] ? port_of(b->avr, (char)('A' + p)) : NULL;
-    if (port) b->avr->data[port->r_pin] = (uint8_t)((b->avr->data[port->r_pin] & ~b->driven[p]) | (b->level[p] & b->driven[p]));
+    if (port)
+      b->avr->data[port->r_pin] =
+          (uint8_t)((b->avr->data[port->r_pin] & ~b->driven[p]) | (b->level[p] & b->driven[p]));
   }
 }
 
 /* ---- the interface */
 
-/* Watches an output pin; with a role it drives the plant. Returns the line's number in the trace, or -1. */
+/* Watches an output pin; with a role it drives the plant. Returns the line's number in the trace,
+ * or -1. */
 int board_line(board_t *b, char port, int bit, int role, int rest, int traced) {
   if (b->line_count == LINES) return -1;
   line_t *line = &b->lines[b->line_count];
   avr_irq_t *irq = avr_io_getirq(b->avr, AVR_IOCTL_IOPORT_GETIRQ(port), bit);
-  *line = (line_t){.board = b, .irq = irq, .index = b->line_count++, .traced = (uint32_t)traced, .role = (uint8_t)role,
-                   .rest = (uint8_t)rest, .level = (uint8_t)rest};
+  *line = (line_t){.board = b,
+                   .irq = irq,
+                   .index = b->line_count++,
+                   .traced = (uint32_t)traced,
+                   .role = (uint8_t)role,
+                   .rest = (uint8_t)rest,
+                   .level = (uint8_t)rest};
   b->level_of[role] = (uint8_t)rest;
   if (role == FORWARD || role == REVERSE || role == STEP) follow_timer(b, port, bit, role);
   avr_irq_register_notify(irq, on_edge, line);
@@ -176,12 +199,15 @@ void board_trace(board_t *b, uint32_t line, int on) { b->lines[line].traced = (u
 
 void board_encoder(board_t *b, int n, char port_a, int bit_a, char port_b, int bit_b) {
   encoder_t *e = &b->encoder[n];
-  e->port[0] = (uint8_t)port_a, e->bit[0] = (uint8_t)bit_a, e->port[1] = (uint8_t)port_b, e->bit[1] = (uint8_t)bit_b;
+  e->port[0] = (uint8_t)port_a, e->bit[0] = (uint8_t)bit_a, e->port[1] = (uint8_t)port_b,
+  e->bit[1] = (uint8_t)bit_b;
   e->wired = 1;
-  for (int i = 0; i < 2; ++i) drive_pin(b, (char)e->port[i], e->bit[i], gray[e->count & 3] >> i & 1);
+  for (int i = 0; i < 2; ++i)
+    drive_pin(b, (char)e->port[i], e->bit[i], gray[e->count & 3] >> i & 1);
 }
 
-/* A broken or shorted wire: the pin stays at `level` from now on, or is mended with -1 and takes what drives it next. */
+/* A broken or shorted wire: the pin stays at `level` from now on, or is mended with -1 and takes
+ * what drives it next. */
 void board_stick(board_t *b, char port, int bit, int level) {
   b->stuck[port - 'A'] &= ~(1ull << bit);
   if (level >= 0) {
