@@ -15,8 +15,9 @@ from flexura.io import find, write_toml
 
 from ..recordings import flex_calibration
 from ..recordings.unit_conversion import ADC_V, Sensor
-from ..rig.description import Calibration, Rig, named_file
+from ..rig.description import Calibration, Rig
 from ..rig.plant.motor import resistance
+from ..rig.toml_table import named_file
 from .identify import Identified
 from .strip import with_parameters
 

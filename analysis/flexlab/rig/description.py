@@ -10,7 +10,6 @@ import difflib
 import math
 import os
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from pydantic import Field, ValidationError, model_validator
@@ -21,7 +20,7 @@ from flexura.io import FORMAT, check_format, explain, find, read_toml
 
 from ..board.protocol.declaration import CONFIG
 from .emulation import Emulated
-from .toml_table import Table, above
+from .toml_table import Table, above, named_file
 
 DERIVED_SETTINGS = (  # settings of the board that follow from the other tables
     "motor_counts_per_m",
@@ -321,13 +320,6 @@ def load(path: str | os.PathLike[str]) -> RigSetup:
         fx.load_manoeuvre(named_file(found, rig.manoeuvre), 2),
         (carriage.joint.limits, turn),
     )
-
-
-def named_file(file: Path, named: str) -> str | Path:
-    """The file that a rig file names: a path from its folder or, where none is there, a shipped
-    name."""
-    path = file.parent / named
-    return path if path.is_file() or Path(named).suffix else named
 
 
 def configuration(setup: RigSetup) -> dict[str, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -21,3 +22,10 @@ def above(unit: str, what: str, most: float) -> Any:
 def from_zero(unit: str, what: str, most: float) -> Any:
     """A field for a number from 0 to `most`."""
     return Field(ge=0, le=most, description=f"{what} in {unit}, from 0 to {most:g}")
+
+
+def named_file(file: Path, named: str) -> str | Path:
+    """The file that a rig file names: a path from its folder or, where none is there, a shipped
+    name."""
+    path = file.parent / named
+    return path if path.is_file() or Path(named).suffix else named
