@@ -166,7 +166,7 @@ READERS = {  # the commands that read a file, with the damaged one in its place
 
 def test_wrong_files(place):
     rng = random.Random(SEED)
-    begun = time.monotonic()
+    begun = time.process_time()
     cases, found = 0, []
     while cases < FILES:
         which = rng.choice(list(GOOD_FILES))
@@ -177,7 +177,7 @@ def test_wrong_files(place):
         found.append(complaint(place, rng.choice(READERS[which]), listing(place)))
         cases += 1
     assert not any(found), "\n".join(filter(None, found))
-    assert time.monotonic() - begun < 60
+    assert time.process_time() - begun < 60
 
 
 def still_good(which, data, place):
@@ -362,43 +362,28 @@ WRONG = (
 )
 
 
-def calls(robot, system, t, drive, wrong):
-    """Public functions, each with one argument that is wrong, if this value is wrong for it."""
+def calls(robot, wrong):
+    """Functions that read, each with an argument that is wrong."""
     return {
-        "simulate robot": lambda: fx.simulate(wrong, t, drive),
-        "simulate t_eval": lambda: fx.simulate(system, wrong, drive),
-        "simulate rtol": lambda: fx.simulate(system, t, drive, rtol=wrong),
-        "simulate method": lambda: fx.simulate(system, t, drive, method=wrong),
-        "assemble": lambda: fx.assemble(wrong),
         "load": lambda: fx.load(wrong),
         "from_dict": lambda: fx.Robot.from_dict(wrong),
         "replace": lambda: robot.replace({"link.2.length_m": wrong}),
-        "frequencies": lambda: fx.frequencies(system, joints=wrong),
         "read": lambda: fx.Run.read(wrong),
         "load_manoeuvre": lambda: fx.load_manoeuvre(wrong, 2),
+        "load_gains": lambda: load_gains(wrong),
     }
 
 
-GOOD_FOR = {  # values that the function may take
-    "simulate t_eval": lambda w: isinstance(w, list) and w == [],
-    "simulate rtol": lambda w: False,
-    "replace": lambda w: False,
-}
-
-
 def test_wrong_python_arguments(place):
-    rng = random.Random(SEED)
+    """Of the functions that read; `tests/model` has those that compute."""
     robot = fx.load(place / "robot.toml")
-    system = fx.assemble(robot)
-    drive = fx.load_manoeuvre(place / "law.toml", 2).drive
-    t = np.linspace(0.0, 0.01, 3)
     before = listing(place)
-    names = list(calls(robot, system, t, drive, None))
-    every = [(name, wrong) for name in names for wrong in WRONG]
+    every = [(name, wrong) for name in calls(robot, None) for wrong in WRONG]
+    assert len(every) >= ARGUMENTS
     found = []
-    for name, wrong in rng.sample(every, ARGUMENTS):
+    for name, wrong in every:
         try:
-            calls(robot, system, t, drive, wrong)[name]()
+            calls(robot, wrong)[name]()
         except (fx.InputError, TypeError) as error:
             text = str(error)
             if not text or "\n" in text or "\0" in text:

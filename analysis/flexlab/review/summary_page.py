@@ -15,10 +15,12 @@ from flexura.robot import Link, Robot
 from ..comparison import table
 from ..comparison.measures import Comparison, compare
 from ..runs.deviation import deviations
+from ..runs.formatting import markdown, number, percent, printable
 from .sampling import MAX_SAMPLES
 from .sources import Source, against_experiment, tip_meaning
 
 MAX_ROWS = 40  # of one table: a robot of 200 links is not read link by link
+NONE = "–"  # in place of a number that there is none of
 HANDLED = {"robot", "name", "structure", "events", "phases", "source", "complete", "emulated"}
 FIRST = (
     "program",
@@ -37,7 +39,9 @@ def about(shown: list[Source], *, thinned_to: int | None = None) -> str:
     """The page; `thinned_to` is the number of samples that each curve was reduced to, if it was."""
     robot = Robot.from_dict(shown[0].run.meta["robot"]) if shown[0].run.meta.get("robot") else None
     parts = [
-        f"## {robot.name or 'robot without a name'}" if robot else "## run without a robot file",
+        f"## {markdown(robot.name) or 'robot without a name'}"
+        if robot
+        else "## run without a robot file",
         *_notes(shown),
     ]
     if len(shown) == 2:
@@ -87,8 +91,8 @@ def _deviations(shown: list[Source]) -> list[str]:
     rows = [
         (
             f"{d.channel} [{d.unit}]",
-            f"{_number(d.max, 2)} ({_percent(d.max_relative)})",
-            f"{_number(d.rms, 2)} ({_percent(d.rms_relative)})",
+            f"{number(d.max, 2, NONE)} ({percent(d.max_relative, missing=NONE)})",
+            f"{number(d.rms, 2, NONE)} ({percent(d.rms_relative, missing=NONE)})",
         )
         for d in deviations(first.run, second.run)
     ]
@@ -185,7 +189,7 @@ def _flat(meta: dict[str, Any], before: str = "") -> Iterable[tuple[str, str]]:
         elif isinstance(value, bool):
             yield before + key, "yes" if value else "no"
         elif isinstance(value, int | float):
-            yield before + key, _number(value)
+            yield before + key, str(value) if isinstance(value, int) else number(value, 3, NONE)
         elif value is not None:
             text = str(value)
             yield before + key, text if len(text) <= 160 else text[:157] + "..."
@@ -231,28 +235,10 @@ def _table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
     more = f"\n\n({len(rows) - MAX_ROWS} more rows are left out.)" if len(rows) > MAX_ROWS else ""
     return (
         "\n".join(
-            "| " + " | ".join(cell.replace("|", "/").replace("\n", " ") for cell in line) + " |"
+            "| "
+            + " | ".join(printable(cell.replace("|", "/").replace("\n", " ")) for cell in line)
+            + " |"
             for line in lines
         )
         + more
-    )
-
-
-def _number(value: float, digits: int = 3) -> str:
-    return (
-        str(value)
-        if isinstance(value, int)
-        else "–"
-        if math.isnan(value)
-        else f"{value:.{digits}g}"
-    )
-
-
-def _percent(value: float) -> str:
-    return (
-        "–"
-        if math.isnan(value)
-        else f"{100 * value:.2g} %"
-        if value < 0.995
-        else f"{100 * value:.0f} %"
     )

@@ -43,3 +43,9 @@ def file_name(text: str) -> str:
     """A text as a part of a file's name: letters, digits, dot, hyphen and underscore."""
     kept = "".join(c if c.isascii() and (c.isalnum() or c in "._-") else "-" for c in text)
     return kept.strip(".-") or "unnamed"
+
+
+def markdown(text: str) -> str:
+    """A text from a file for a page in Markdown: its marks are shown as they are, in one line."""
+    escaped = "".join(f"\\{c}" if c in "\\`*_[]<>#|~" else c for c in text.replace("\n", " "))
+    return printable(escaped)
