@@ -276,8 +276,7 @@ ModelPlant<Real>::ModelPlant(const Model<Real> &robot, Workspace<Real> &memory)
   this->n = model.n, this->joints = model.links();
   this->first = model.first, this->first.push_back(model.n);
   this->viscous = model.viscous, this->coulomb = model.coulomb, this->slow = COULOMB_SPEED;
-  for (int i = 0; i < this->joints; ++i)
-    this->locked.push_back(model.locked[std::size_t(i)] != 0);
+  for (int i = 0; i < this->joints; ++i) this->locked.push_back(model.locked[std::size_t(i)] != 0);
   reaction.assign(std::size_t(this->joints), Real(0.0));
   weigh();
 }

@@ -10,9 +10,9 @@ namespace flexura {
 // couples the modes so much that only implicit steps are long.
 constexpr double DEAR = 2e6, STRONG = 1000.0;
 
-// The method that "auto" takes without a trial, "explicit" or "implicit"; null: a trial decides. The
-// state is that of `run`, which starts at time t. Explicit steps are for sharp tolerances, and for
-// rigid robots without gains or friction. Implicit ones are for strong dampers.
+// The method that "auto" takes without a trial, "explicit" or "implicit"; null: a trial decides.
+// The state is that of `run`, which starts at time t. Explicit steps are for sharp tolerances, and
+// for rigid robots without gains or friction. Implicit ones are for strong dampers.
 const char *method_without_trial(Integration<double> &run, double t, double rtol);
 
 // The highest frequency or rate of decay at a run's state [rad/s].

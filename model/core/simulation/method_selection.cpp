@@ -73,9 +73,7 @@ void MethodSelection::choose() {
   else if (acting.sampler)
     chosen = method_under_ticks(acting.rate_Hz, bends);
   else if (acting.function)
-    chosen = !bends          ? by_explicit()
-             : c.plant.rides ? implicit()
-                             : race_forward(*implicit());
+    chosen = !bends ? by_explicit() : c.plant.rides ? implicit() : race_forward(*implicit());
   else
     race();
 }
@@ -132,7 +130,9 @@ void MethodSelection::race() {
 // Under a sampled controller: explicit steps if they are few a tick, else exponential or implicit
 // ones.
 Method<double> *MethodSelection::method_under_ticks(double rate_Hz, bool bends) {
-  for_ticks = make_method(method_for_ticks(rate_Hz, fastest(loop.integration, loop.run_state[0].t), rtol), loop.integration);
+  for_ticks =
+      make_method(method_for_ticks(rate_Hz, fastest(loop.integration, loop.run_state[0].t), rtol),
+                  loop.integration);
   if (for_ticks->name() == std::string(TR_BDF2.name)) second_order = for_ticks.get();
   const bool stiff = second_order || for_ticks->name() == std::string(ESDIRK_4.name);
   return stiff && bends && !sharp && !loop.integration.plant.rides ? race_forward(*for_ticks)
@@ -170,7 +170,7 @@ void MethodSelection::race_of_others(const Mark &start, double step, Best &best)
   }
 }
 
-// Seconds a pass in the second half of `most` passes; -1: the method got stuck.
+// (102): seconds a pass in the second half of `most` passes; -1: the method got stuck.
 double MethodSelection::trial(Method<double> &method, long most) {
   const long begin = loop.integration.passes;
   long half = begin;

@@ -7,7 +7,6 @@
 #include "integration/exponential/energy_integrals.hpp"
 #include "integration/exponential/matrices_by_passes.hpp"
 #include "integration/exponential/numerical_damping.hpp"
-#include "integration/exponential/options.hpp"
 #include "integration/method.hpp"
 
 namespace flexura {
@@ -143,7 +142,8 @@ class Exponential : public Method<Real> {
     double most = 1.0;  // with a larger error a step does not grow
     for (int i = 0; i < order; ++i) most *= SAFETY / GROWTH;
     if (!(starts || steps.equal_steps[k] >= 2) || lately[k] > most) return wished_step[k];
-    const double wish = smaller(factor(lately[k]) * h, (lately[k] < TINY ? 4.0 : 2.0) * wished_step[k]);
+    const double wish =
+        smaller(factor(lately[k]) * h, (lately[k] < TINY ? 4.0 : 2.0) * wished_step[k]);
     if (!(wish > GROWTH * wished_step[k])) return wished_step[k];
     lately[k] = 0.0;
     return wish;
@@ -167,9 +167,9 @@ class Exponential : public Method<Real> {
   std::unique_ptr<bool[]> held;  // (n) rows of joints whose motion is given
   Real end = 0.0;                // of the step being tried
   Real strain = 0.0, strain_before = 0.0, strain_after = 0.0;  // twice the strain energy
-  double wished_step[LANES] = {}, lately[LANES] = {};  // lately: the largest error, fading
+  double wished_step[LANES] = {}, lately[LANES] = {};          // lately: the largest error, fading
   double weighed[2][LANES] = {};  // what the error weights of the modes were taken from
-  long since[LANES] = {};  // steps since the start or a break
+  long since[LANES] = {};         // steps since the start or a break
 
   // Behind N, a row of the history keeps the accounts' numbers, then a, y and v.
   static int extras_of(const Integration<Real> &c) {
@@ -254,8 +254,8 @@ class Exponential : public Method<Real> {
     return false;
   }
 
-  // Error weights of robot k's modes from those of its unknowns. An error of a rate moves the tips
-  // until the end of the run at `left`, or for a part of a period.
+  // (92): error weights of robot k's modes from those of its unknowns. An error of a rate moves the
+  // tips until the end of the run at `left`, or for a part of a period.
   void set_error_weights(int k, double left) {
     const auto &w = c.weights.weight;
     for (int e = 0; e < 2; ++e) weighed[e][k] = lane(w[e * n], k);
