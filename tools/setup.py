@@ -325,8 +325,8 @@ def set_up(venv: Path) -> None:
 
 
 def level() -> str:
-    """The instructions that the core's C++ tests may use here; the Python module is built for each
-    level anyway."""
+    """The instructions that the core may use here: the module and the C++ tests are for them. Empty:
+    for any processor."""
     flags = Path("/proc/cpuinfo")
     return (
         "x86-64-v3"
@@ -363,6 +363,8 @@ def build_core(venv: Path) -> None:
         "compiling the core (half a minute the first time)",
         [cmake, "--build", str(folder), "--parallel", jobs],
     )
+    for old in (ROOT / "model/flexura").glob("_core_*"):  # of another level or Python
+        old.unlink()
     step(
         "installing the core",
         [cmake, "--install", str(folder), "--component", "module", "--prefix", f"{ROOT / 'model'}"],

@@ -1,14 +1,15 @@
 """The one door to the compiled core: flat arrays of float64 in, flat arrays out.
 
-The core (`model/core`, C++) is compiled when flexura is installed, never later. On x86-64 there are
-two builds of it: one for processors of the level x86-64-v3 (most since 2013) and a plain one for
-all others. Both give the same digits. The environment variable FLEXURA_CORE, "plain" or
-"x86-64-v3", overrides the choice.
+The core (`model/core`, C++) is compiled when flexura is installed, never later. On x86-64 a wheel
+has two builds of it: one for processors of the level x86-64-v3 (most since 2013) and a plain one
+for all others. Both give the same digits. A checkout has the one for its own processor. The
+environment variable FLEXURA_CORE, "plain" or "x86-64-v3", overrides the choice.
 """
 
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import os
 from types import ModuleType
 
@@ -16,26 +17,39 @@ BUILDS = {"plain": "_core_plain", "x86-64-v3": "_core_v3"}
 
 
 def levels() -> list[str]:
-    """The builds that this processor can run, keys of BUILDS, the best last."""
-    return list(BUILDS) if _module("_processor").has_v3() else ["plain"]
+    """The builds that are here and that this processor can run, keys of BUILDS, the best last."""
+    return [
+        level for level in _able() if importlib.util.find_spec(f".{BUILDS[level]}", __package__)
+    ]
 
 
 def load(level: str) -> ModuleType:
     """The build of the core for processors of a level.
 
-    Args: level: a key of BUILDS, or "" for the best that this processor can run.
+    Args: level: a key of BUILDS, or "" for the best that is here and that this processor can run.
 
     Raises: ImportError: there is no such level, this processor lacks it, or the core was not
-    compiled for this Python.
+    compiled for it or for this Python.
     """
     if level and level not in BUILDS:
         raise ImportError(f"FLEXURA_CORE is {level!r}: expected {' or '.join(BUILDS)}")
-    able = levels()
+    able = _able()
     if level and level not in able:
         raise ImportError(
             f"FLEXURA_CORE asks for {level}, whose instructions this processor does not have"
         )
-    return _module(BUILDS[level or able[-1]])
+    here = levels()
+    if level and here and level not in here:
+        raise ImportError(
+            f"FLEXURA_CORE asks for {level}, which was not compiled here: in the checkout type "
+            f"cmake -DFLEXURA_PLAIN=ON build/core && make setup"
+        )
+    return _module(BUILDS[level or (here or able)[-1]])
+
+
+def _able() -> list[str]:
+    """The levels that this processor can run."""
+    return list(BUILDS) if _module("_processor").has_v3() else ["plain"]
 
 
 def _module(name: str) -> ModuleType:

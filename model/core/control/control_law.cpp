@@ -90,6 +90,7 @@ GainsOf<ModelNumbers> ControlLaw::a_tick(const JointLaw &joint) const {
   return g;
 }
 
+// The extended PID (70) with its limits (71) and anti-windup (72).
 double ControlLaw::pid_output(long k, double t, std::size_t i) {
   const JointLaw &joint = joints[i];
   const GainsOf<ModelNumbers> &g = joint.gains;

@@ -1,6 +1,6 @@
-// The control law of a robot's joints: a PID with anti-windup, or a linear law with an observer. At
-// each tick it measures, computes, and holds its outputs until the next. The PID is the firmware's
-// own (firmware/lib/control/src/pid.h), computed in doubles.
+// The control law of a robot's joints: a PID with anti-windup (70), (72), or a linear law with an
+// estimator (76), (77). At each tick it measures, computes, and holds its outputs until the next.
+// The PID is the firmware's own (firmware/lib/control/src/pid.h), computed in doubles.
 //
 //     u = kp e + ki sum(e) T + kd (r' - q') + kf w + kg w' + ks s + kt s' + kv r' + kc sign r' +
 //     f(t)                                                                                   (70)

@@ -1,4 +1,4 @@
-// Functions of time with two derivatives: forces to apply, motions to follow.
+// Functions of time (60) with two derivatives: forces to apply, motions to follow.
 //
 // A signal is a list of segments, ascending in t0; on each, with s = t - t0,
 //

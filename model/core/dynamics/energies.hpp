@@ -119,7 +119,7 @@ Energies<Real> energies(const Model<Real> &model, Workspace<Real> &work, const R
   return out;
 }
 
-// Power [W] that damping and friction take at (y, v) (n).
+// Power [W] that damping and friction take at (y, v) (n): (28).
 template <class Real>
 Real loss(const Model<Real> &model, const Real *y, const Real *v) {
   Real out = 0.0;

@@ -1,5 +1,5 @@
 // What an error weighs: metres at the robot's tips over the tolerance, rtol times the size of what
-// the run is asked for.
+// the run is asked for: (81), (82).
 //
 // That size is the largest deflection of a tip so far, or a thousandth of the tips' way, whichever
 // is larger (81); for rates the same of their speeds. An error of unknown k moves a tip by at most

@@ -69,6 +69,13 @@ struct Integration {
   }
 };
 
+// What may be said about the method "exponential".
+struct ExponentialOptions {
+  bool damping = true;  // of fast modes
+  double zeta = 0.05;   // its ratio
+  double cutoff = 0.0;  // [rad/s]; 0: from the tolerance
+};
+
 template <class Real>
 class Method {
  public:

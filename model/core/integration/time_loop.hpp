@@ -306,6 +306,7 @@ class Loop {
     });
   }
 
+  // (64): the run ends where joint c.joint meets its limit.
   void stop_at_limit(Method<Real> &method, int k, double t) {
     RunState &c = run_state[k];
     if (t > c.t) {

@@ -1,5 +1,5 @@
-// The own modes of a clamped link in a space of shapes. For one robot, or for four at once with the
-// same digits.
+// The own modes of a clamped link in a space of shapes: (17) to (19). For one robot, or for four at
+// once with the same digits.
 #pragma once
 #include <vector>
 

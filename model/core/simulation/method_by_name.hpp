@@ -4,7 +4,6 @@
 #include <memory>
 #include <string>
 
-#include "integration/exponential/options.hpp"
 #include "integration/method.hpp"
 #include "integration/run_state.hpp"
 

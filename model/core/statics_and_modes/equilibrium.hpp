@@ -1,5 +1,5 @@
 // Static equilibrium: the shape that a robot takes under gravity and a dead load at its tip, with
-// its joints held, or free to turn.
+// its joints held, or free to turn: (50).
 //
 // The energy V of potential_energy.hpp is stationary (50): Newton's method, each step as long as V
 // falls. From the straight robot without load the load grows in steps, as large as they succeed,

@@ -119,7 +119,7 @@ def numbers() -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_two_builds_give_the_same_digits_one_by_one_and_in_packs(name):
+def test_builds_give_the_same_digits_one_by_one_and_in_packs(name):
     x = numbers()
     results = [
         getattr(core.load(level), name)(x, packed=packed)
@@ -134,17 +134,67 @@ def test_two_builds_give_the_same_digits_one_by_one_and_in_packs(name):
     np.testing.assert_allclose(results[0][usable], right[usable], rtol=1e-15, atol=1e-15)
 
 
+RUN = """
+import sys
+import numpy as np
+import flexura as fx
+from flexura import core
+from flexura.signals import constant, cycloid
+
+assert core.level == sys.argv[1], core.level
+for name in sys.argv[2:]:
+    system = fx.assemble(fx.Robot.load(name))
+    joints = len(system.robot.link)
+    drive = fx.Drive.force(*[constant(0.05)] * joints)
+    t = np.linspace(0.0, 0.2, 11)
+    for method in ("explicit", "implicit", "exponential"):
+        run = fx.simulate(system, t, drive, method=method, rtol=1e-5)
+        print(name, method, run["tip/x"].tobytes().hex(), run["energy/loss"].tobytes().hex())
+"""
+
+
+@pytest.mark.slow
+def test_the_build_for_any_processor_gives_the_digits_of_the_other(tmp_path):
+    """Compiled as a checkout asks for it, chosen by FLEXURA_CORE; whole runs, to the last bit."""
+    if core.level == "plain":
+        pytest.skip("this processor has the build for any processor alone")
+    shutil.copytree(ROOT / "model" / "flexura", tmp_path / "flexura")
+    settings = [
+        "-DFLEXURA_MODULE=ON",
+        "-DFLEXURA_PLAIN=ON",
+        "-DFLEXURA_LEVEL=x86-64-v3",
+        f"-DCMAKE_MAKE_PROGRAM={NINJA}",
+        f"-DPython_EXECUTABLE={sys.executable}",
+    ]
+    build = [*map(str, (CMAKE, "-S", ROOT, "-B", tmp_path / "build", "-G", "Ninja")), *settings]
+    make = [str(CMAKE), "--build", str(tmp_path / "build"), "--target", "_core_plain", "_processor"]
+    for command in (build, make):
+        done = subprocess.run(command, capture_output=True, text=True)
+        assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-4000:]
+    for compiled in (tmp_path / "build").rglob("_*.so"):
+        shutil.copy(compiled, tmp_path / "flexura")
+    robots = [str(ROOT / "model" / "robots" / f"{name}.toml") for name in ("single-r", "rig")]
+    printed = []
+    for level in ("plain", "x86-64-v3"):
+        surroundings = os.environ | {"PYTHONPATH": str(tmp_path), "FLEXURA_CORE": level}
+        command = [sys.executable, "-c", RUN, level, *robots]
+        done = subprocess.run(command, env=surroundings, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr[-4000:]
+        printed.append(done.stdout)
+    assert len(printed[0].splitlines()) == 6 and printed[0] == printed[1]
+
+
 @pytest.mark.parametrize("wrong", [np.zeros((2, 2)), np.zeros(3, complex), [1.0], None])
 def test_what_is_no_vector_is_refused(wrong):
     with pytest.raises(TypeError):
-        core.load("plain").sin(wrong)
+        core.load("").sin(wrong)
 
 
 @pytest.mark.parametrize(
     "other", [np.arange(4), np.arange(8.0)[::2], np.zeros(3, np.float32), np.zeros(0)]
 )
 def test_a_vector_of_another_type_or_order_is_converted(other):
-    np.testing.assert_allclose(core.load("plain").sin(other), np.sin(other), rtol=1e-7)
+    np.testing.assert_allclose(core.load("").sin(other), np.sin(other), rtol=1e-7)
 
 
 def in_a_new_process(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -156,13 +206,28 @@ def in_a_new_process(code: str, **environment: str) -> subprocess.CompletedProce
 
 def test_the_environment_chooses_the_build():
     code = "from flexura import core; print(core.level)"
-    assert in_a_new_process(code, FLEXURA_CORE="plain").stdout == "plain\n"
+    for level in core.levels():
+        assert in_a_new_process(code, FLEXURA_CORE=level).stdout == f"{level}\n"
     assert in_a_new_process(code, FLEXURA_CORE="").stdout == f"{core.levels()[-1]}\n"
     wrong = in_a_new_process(code, FLEXURA_CORE="fast")
     assert (
         wrong.returncode == 1
         and "FLEXURA_CORE is 'fast': expected plain or x86-64-v3" in wrong.stderr
     )
+
+
+def test_what_was_not_compiled_is_said(tmp_path):
+    """A checkout without the build for any processor, and one with it alone."""
+    if core.level == "plain":
+        pytest.skip("this processor has the build for any processor alone")
+    without = shutil.ignore_patterns("_core_plain*", "__pycache__")
+    shutil.copytree(ROOT / "model" / "flexura", tmp_path / "flexura", ignore=without)
+    code = "from flexura import core; print(core.level)"
+    chosen = in_a_new_process(code, PYTHONPATH=str(tmp_path))
+    assert chosen.stdout == "x86-64-v3\n"
+    asked = in_a_new_process(code, PYTHONPATH=str(tmp_path), FLEXURA_CORE="plain")
+    assert asked.returncode == 1 and "FLEXURA_CORE asks for plain, which was not" in asked.stderr
+    assert "cmake -DFLEXURA_PLAIN=ON build/core && make setup" in asked.stderr
 
 
 def test_without_compiled_modules_the_message_says_what_to_type(tmp_path):

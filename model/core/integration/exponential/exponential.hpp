@@ -7,7 +7,6 @@
 #include "integration/exponential/energy_integrals.hpp"
 #include "integration/exponential/matrices_by_passes.hpp"
 #include "integration/exponential/numerical_damping.hpp"
-#include "integration/exponential/options.hpp"
 #include "integration/method.hpp"
 
 namespace flexura {
@@ -255,8 +254,8 @@ class Exponential : public Method<Real> {
     return false;
   }
 
-  // Error weights of robot k's modes from those of its unknowns. An error of a rate moves the tips
-  // until the end of the run at `left`, or for a part of a period.
+  // (92): error weights of robot k's modes from those of its unknowns. An error of a rate moves the
+  // tips until the end of the run at `left`, or for a part of a period.
   void set_error_weights(int k, double left) {
     const auto &w = c.weights.weight;
     for (int e = 0; e < 2; ++e) weighed[e][k] = lane(w[e * n], k);

@@ -13,7 +13,7 @@
 #include "control/inputs.hpp"
 #include "control/plant.hpp"
 #include "numbers/eigenproblem.hpp"
-#include "numbers/matrix_products.hpp"
+#include "numbers/modal_vectors.hpp"
 
 namespace flexura {
 
@@ -66,7 +66,7 @@ class ModalBasis {
       gone[k] = 0.0;
   }
 
-  // Has robot k gone far since its configuration was last looked at?
+  // Has robot k gone far since its configuration was last looked at, so that (93) is to be asked?
   bool has_moved(int k, const Plant<Real> &plant, const Real *q) const {
     if (taken[k] == 0) return true;
     double way = 0.0;
@@ -144,7 +144,7 @@ class ModalBasis {
     return true;
   }
 
-  // Adds the damping rate 2 zeta w to robot k's modes above its cutoff.
+  // Adds the damping rate 2 zeta w (94) to robot k's modes above its cutoff.
   void damp(int k, double zeta) {
     for (int mode = 0; mode < n; ++mode) {
       const double square = lane(w2[mode], k), w = root(square),
@@ -163,8 +163,8 @@ class ModalBasis {
 
   std::size_t at(int i, int j) const { return std::size_t(i) * std::size_t(n) + std::size_t(j); }
 
-  // Frobenius' norm of Phi A Phi^T less what it was, relative to scale_i scale_j: the larger one of
-  // A = M and A = K.
+  // (93): Frobenius' norm of Phi A Phi^T less what it was, relative to scale_i scale_j: the larger
+  // one of A = M and A = K.
   double change(int k, const std::vector<double> &turned_M, const std::vector<double> &turned_K,
                 double slow) const {
     double inertia = 0.0, stiffness = 0.0;

@@ -61,7 +61,7 @@ inline Run run_of(double w2, double d2, double h) {
   return dd < 3.0 || dd * dd < 4.2 * x2 ? Run::down : Run::bounded;
 }
 
-// a_m, m < POWERS, upwards from a_0 and a_1. Number: double or Lanes.
+// (89): a_m, m < POWERS, upwards from a_0 and a_1. Number: double or Lanes.
 template <class Number>
 inline void moments_upwards(Number x2, Number dd, Number g_h, Number dg, Number *a) {
   const Number inverse = 1.0 / x2;
@@ -71,8 +71,8 @@ inline void moments_upwards(Number x2, Number dd, Number g_h, Number dg, Number 
     a[m] = (1.0 - dd * double(m) * a[m - 1] - double(m * (m - 1)) * a[m - 2]) * inverse;
 }
 
-// Downwards from far above, where a_m is nearly 1 / m^2; what is wrong with the guess is gone below
-// round-off at the end.
+// (89) downwards from far above, where a_m is nearly 1 / m^2; what is wrong with the guess is gone
+// below round-off at the end.
 template <class Number>
 inline void moments_downwards(Number x2, Number dd, int from, Number *a) {
   Number above = 1.0 / double(from * from), here = 1.0 / double((from - 1) * (from - 1));

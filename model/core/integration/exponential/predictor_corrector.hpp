@@ -122,7 +122,7 @@ class ExponentialAdams {
     }
   }
 
-  // N from accelerations a (n) at a state of the modes, into `out`.
+  // N of (87) from accelerations a (n) at a state of the modes, into `out`.
   void force(const Real *a, const Real *y, const Real *v, Real *out) const {
     for (int c = 0; c < chunks; ++c)
       put(out, c, get(b.w2, c) * get(y, c) + get(b.own, c) * get(v, c));
