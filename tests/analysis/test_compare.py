@@ -12,7 +12,7 @@ import pytest
 
 import flexura as fx
 from flexlab.cli.compare import save
-from flexlab.comparison import report, table
+from flexlab.comparison import pages, report, table
 from flexlab.comparison.measures import (
     PUBLISHED,
     RESPONSE_LEVEL,
@@ -33,9 +33,8 @@ from flexlab.rig import load
 from flexlab.rig.plant.motor import JointLine, joint_line
 from flexlab.rig.plant.stepper import MagneticSpring
 from flexlab.runs.deviation import deviations
-from flexlab.runs.labels import EMULATED, called
 from flexura.errors import InputError
-from flexura.io import Run
+from flexura.io import EMULATED, Run, called
 from flexura.signals import JointDrive
 from twin_experiments import RIG, experiment
 
@@ -62,7 +61,7 @@ def page(compared):
 
 @pytest.fixture(scope="module")
 def document(compared):
-    return report.pdf(compared)
+    return pages.pdf(compared)
 
 
 def run(t, **channels):
@@ -486,7 +485,7 @@ def test_the_page_stands_alone(page):
 
 
 def test_the_same_runs_give_the_same_report(compared, page, document):
-    assert report.html(compared) == page and report.pdf(compared) == document
+    assert report.html(compared) == page and pages.pdf(compared) == document
 
 
 def test_all_tables_have_the_same_cells(compared, page):
@@ -499,6 +498,29 @@ def test_all_tables_have_the_same_cells(compared, page):
     assert [row[-1] for row in rows[:3]] == ["4.35 %", "7.5 %", "7.5 %"]
     for row in rows:
         assert "".join(f"<td>{cell}</td>" for cell in row) in page
+
+
+def test_the_sheets_have_every_row_and_no_text_lies_on_another(compared):
+    sheets = pages.drawn(compared)
+    found = []
+    for sheet in sheets:
+        sheet.draw_without_rendering()
+        texts = [text for text in sheet.texts if text.get_text()]
+        found += [text.get_text() for text in texts]
+        boxes = [text.get_window_extent() for text in texts]
+        boxes += [axes.get_tightbbox() for axes in sheet.axes]
+        for k, box in enumerate(boxes):
+            assert sheet.bbox.x0 < box.x0 and box.x1 < sheet.bbox.x1
+            assert sheet.bbox.y0 < box.y0 and box.y1 < sheet.bbox.y1
+            for other in boxes[:k]:
+                across = min(box.x1, other.x1) - max(box.x0, other.x0)
+                up = min(box.y1, other.y1) - max(box.y0, other.y0)
+                assert across <= 1 or up <= 1
+    written = " ".join(found).replace(" ", "")
+    for row in [*table.rows(compared), *report.about(compared)]:
+        for cell in row:
+            assert cell.replace(" ", "") in written
+    assert sum(len(sheet.axes) for sheet in sheets) == 2 * len(compared.differences)
 
 
 def test_the_folder_has_it_all(compared, tmp_path):
@@ -603,7 +625,7 @@ def test_the_command_exports_with_the_label(compared, tmp_path):
         (["compare", "absent"], "absent: no run here"),
         (
             ["export", "RUN", "--to", "xlsx"],
-            "--to = 'xlsx': expected one of csv, parquet, tdms, mcap",
+            "--to = 'xlsx': expected one of csv, parquet, mat, tdms, mcap",
         ),
     ],
 )

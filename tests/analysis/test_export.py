@@ -1,19 +1,24 @@
 """A run in other formats, read back by programs that did not write it: numpy, DuckDB, a reader by
 NI's text, Rerun."""
 
+import io
 import json
+import re
 import struct
 import subprocess
 from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.io
+from hypothesis import given
+from hypothesis import strategies as st
 
 from flexlab.cli.export import forms
 from flexlab.review.headless import executable
-from flexlab.runs.labels import EMULATED
+from flexlab.runs.export.names import topics, variables
 from flexura.errors import InputError
-from flexura.io import Run
+from flexura.io import EMULATED, Run
 
 UNITS = {
     "joint/1/position": "m",
@@ -198,18 +203,19 @@ def test_mcap_read_by_rerun(run, started, tmp_path):
         timeout=60,
     )
     values, stamps, units, about = {}, {}, {}, {}
+    named = {topic[1:]: name for name, topic in topics(("time", *run)).items()}
     for chunk in RrdReader(converted).stream():
         batch = chunk.to_record_batch()
         for name in batch.schema.names:
             cells = batch.column(name)
             if name == "std_msgs.msg.Float64:message":
-                values.setdefault(chunk.entity_path[1:], []).extend(
+                values.setdefault(named[chunk.entity_path[1:]], []).extend(
                     cell[0]["data"] for cell in cells.to_pylist()
                 )
                 at = batch.column("message_log_time").cast(pa.int64()).to_pylist()
-                stamps.setdefault(chunk.entity_path[1:], []).extend(at)
+                stamps.setdefault(named[chunk.entity_path[1:]], []).extend(at)
             elif name == "McapChannel:metadata":
-                units[chunk.entity_path[1:]] = {
+                units[named[chunk.entity_path[1:]]] = {
                     pair["first"]: pair["second"] for pair in cells[0].as_py()[0]
                 }
             elif chunk.entity_path == "/__mcap_metadata" and name == "flexura":
@@ -225,9 +231,50 @@ def test_mcap_read_by_rerun(run, started, tmp_path):
         assert units[name] == {
             "unit": "s" if name == "time" else UNITS[name],
             "label": "experiment (emulated)",
+            "channel": name,
         }
     assert about["label"] == "experiment (emulated)" and about["description"] == EMULATED
     assert json.loads(about["meta"]) == run.meta and about["start_ns"] == str(start)
+
+
+TOPIC = re.compile(r"(/[A-Za-z](_?[A-Za-z0-9])*)+")  # ROS 2: no token begins with a digit, no __
+
+
+@pytest.mark.parametrize(
+    "name, topic",
+    [
+        ("joint/1/position", "/joint_1/position"),
+        ("link/2/deflection/8", "/link_2/deflection_8"),
+        ("sensor/strain gauge, 3", "/sensor/strain_gauge_3"),
+        ("sensor/__x__", "/sensor/x"),
+        ("sensor/β", "/sensor"),
+    ],
+)
+def test_topics_are_names_that_ros_2_allows(name, topic):
+    assert topics([name]) == {name: topic} and TOPIC.fullmatch(topic)
+
+
+@given(st.lists(st.text(alphabet="a1_/ β", min_size=1, max_size=12), unique=True))
+def test_any_names_give_topics_and_variables_that_differ(names):
+    for made, allowed in ((topics, TOPIC), (variables, re.compile(r"[A-Za-z]\w{0,62}", re.A))):
+        found = made(names)
+        assert len(set(found.values())) == len(names)
+        assert all(allowed.fullmatch(new) for new in found.values())
+
+
+def test_mat_read_by_scipy(run, tmp_path):
+    path = written(run, "mat", tmp_path)
+    found = scipy.io.loadmat(path, simplify_cells=True)
+    for name, new in variables(("t", *run)).items():
+        same(run, "time" if name == "t" else name, found[new])
+        assert found["units"][new] == ("s" if name == "t" else UNITS[name])
+        assert found["channels"][new] == name
+    assert found["joint_1_position"].shape == (len(run),)
+    about = found["meta"]
+    assert about["label"] == "experiment (emulated)" and about["description"] == EMULATED
+    assert json.loads(about["json"]) == run.meta and about["seed"] == 3
+    assert about["robot"]["name"] == run.meta["robot"]["name"]
+    assert path.read_bytes() == forms()["mat"](run)  # the same run, the same bytes
 
 
 def test_mcap_refuses_what_it_cannot_say(run):
@@ -241,6 +288,8 @@ def test_mcap_refuses_what_it_cannot_say(run):
 def test_a_measurement_or_simulation_is_not_called_emulated(form, run):
     for meta in ({"source": "experiment", "emulated": False}, {"source": "simulation"}):
         data = forms()[form](replace(run, meta=meta))
+        if form == "mat":
+            data = str(scipy.io.loadmat(io.BytesIO(data))).encode()
         assert b"(emulated)" not in data and EMULATED.encode() not in data
 
 

@@ -27,6 +27,8 @@ COMMANDS = {
     "identify": "Identify physical parameters from an experiment.",
     "compare": "Compare an experiment with its simulation, or two runs.",
     "review": "Look at one run, or at two side by side, in Rerun.",
+    "plot": "Draw a run over time, for a screen or for print.",
+    "animate": "Write a run as a film.",
     "export": "Write a run in another program's format.",
     "migrate": "Rename old keys of files.",
     "new": "Write a commented robot file to begin with.",

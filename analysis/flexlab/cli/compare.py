@@ -15,8 +15,9 @@ from flexura.optional import need
 from ..comparison import table
 from ..comparison.measures import Comparison, simulation_first
 from ..comparison.measures import compare as compared
+from ..comparison.pages import pdf
 from ..comparison.replay.simulate_experiment import simulate_experiment
-from ..comparison.report import html, pdf, png
+from ..comparison.report import html, png
 from ..review import picture as draw
 from ..review import write_review
 from .options import Force, Json, Rtol

@@ -4,32 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated, Any
 
 import typer
 
+import flexura as fx
 from flexura.errors import InputError
-from flexura.io import FILE, Run, write_bytes
+from flexura.io import FILE, Run, called, write_bytes
+from flexura.population import is_population
 
-from ..runs.export import as_csv, as_mcap, as_tdms
-from ..runs.labels import called
+from ..runs.export import as_csv, as_mat, as_mcap, as_tdms, population
 from .options import ForceFile, Json
 from .output import say, show
 from .results import file_result
-
-if TYPE_CHECKING:
-    from flexura.io import Run
+from .runs import RobotNumber, one_run
 
 
 def export(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="folder of a run, or its run.parquet")],
+    run: Annotated[
+        Path,
+        typer.Argument(metavar="RUN", help="folder of a run or population, or a run.parquet"),
+    ],
     to: Annotated[
-        str, typer.Option("--to", help="csv, parquet, tdms (LabVIEW) or mcap (ROS 2, Foxglove)")
+        str,
+        typer.Option("--to", help="csv, parquet, mat (MATLAB), tdms (LabVIEW) or mcap (ROS 2)"),
     ],
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="FILE", help="default: run.FORMAT in the run's folder"),
+        typer.Option("--out", metavar="FILE", help="a new file; default: run.FORMAT beside RUN"),
     ] = None,
+    robot: RobotNumber = None,
     force: ForceFile = False,
     json: Json = False,
 ) -> None:
@@ -37,37 +41,51 @@ def export(
 
     The file has all numbers, units and metadata.
 
+    Of a population a table, one row a robot: what was varied, how it ended, peaks and last values.
+
     \b
     Example: flexura export logs/first --to csv
     """
-    writers = forms()
+    table = is_population(run) and robot is None
+    writers: dict[str, Callable[[Any], bytes]] = dict(tables() if table else forms())
     if to not in writers:
         raise InputError(f"expected one of {', '.join(writers)}", key="--to", value=to)
-    read = Run.read(run)
-    target = out or (run if run.is_dir() else run.parent) / f"run.{to}"
+    name = "population" if table else "run" if robot is None else f"robot-{robot}"
+    target = out or (run if run.is_dir() else run.parent) / f"{name}.{to}"
+    read = fx.Population.read(run) if table else one_run(run, robot)
     source = run / FILE if run.is_dir() else run
-    if target.exists() and target.samefile(source):
+    if target.exists() and source.exists() and target.samefile(source):
         raise InputError("the run itself: expected another file", key="--out", value=str(target))
     with file_result(target, force=force):
         write_bytes(target, writers[to](read))
-    about = {
-        "file": str(target),
-        "called": called(read),
-        "emulated": bool(read.meta.get("emulated")),
-        "rows": len(read),
-    }
+    about: dict[str, Any] = {"file": str(target)}
+    if isinstance(read, Run):
+        emulated = bool(read.meta.get("emulated"))
+        about |= {"called": called(read), "emulated": emulated, "rows": len(read)}
+        line = f"{called(read)}: {len(read)} rows, {len(read.channels)} channels"
+    else:
+        about |= {"called": "population", "emulated": False, "rows": len(read.robots)}
+        line = f"population: {about['rows']} of {read.count} robots"
     if json:
         show(True, lambda: None, lambda: about)
-    say(
-        json, f"{called(read)}: {len(read)} rows, {len(read.channels)} channels", f"stored {target}"
-    )
+    say(json, line, f"stored {target}")
 
 
 def forms() -> dict[str, Callable[[Run], bytes]]:
-    """What writes each format."""
+    """What writes each format of a run."""
     return {
         "csv": as_csv.write,
         "parquet": lambda run: run.parquet(),
+        "mat": as_mat.write,
         "tdms": as_tdms.write,
         "mcap": as_mcap.write,
+    }
+
+
+def tables() -> dict[str, Callable[[fx.Population], bytes]]:
+    """What writes each format of a population."""
+    return {
+        "csv": population.as_csv,
+        "parquet": population.as_parquet,
+        "mat": population.as_mat,
     }

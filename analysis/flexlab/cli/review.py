@@ -8,17 +8,22 @@ from typing import Annotated
 import typer
 
 import flexura as fx
+from flexura.population import is_population
 
 from .. import review as rerun
 from .options import ForceFile, Json
 from .output import say, show
 from .results import counted, file_result
+from .runs import RobotNumber, one_run
 
 
 def review(
     runs: Annotated[
         list[Path],
-        typer.Argument(metavar="RUN [RUN]", help="one or two folders of runs; or a review, .rrd"),
+        typer.Argument(
+            metavar="RUN [RUN]",
+            help="one or two folders of runs, or of a population with --robot; or a review, .rrd",
+        ),
     ],
     save: Annotated[
         Path | None,
@@ -30,6 +35,7 @@ def review(
         Path | None,
         typer.Option(metavar="FILE.png", help="draw the review into this file, without a screen"),
     ] = None,
+    robot: RobotNumber = None,
     time_s: Annotated[
         float | None,
         typer.Option(help="the picture's instant [s]; default: the largest tip deflection"),
@@ -53,7 +59,7 @@ def review(
             if picture is not None:
                 rerun.picture(target, picture, time_s=time_s)
     else:
-        read = [fx.Run.read(folder) for folder in runs]
+        read = [one_run(folder, robot if is_population(folder) else None) for folder in runs]
         beside = (runs[0] if runs[0].is_dir() else runs[0].parent) / "review.rrd"
         target = save or (picture.with_suffix(".rrd") if picture else beside)
         if target == beside and target.exists() and not force:

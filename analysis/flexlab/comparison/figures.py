@@ -3,18 +3,16 @@ lines, and their difference."""
 
 from __future__ import annotations
 
-import io
 from typing import Any
 
 import numpy as np
 
-from flexura.optional import Optional, load
+from flexura.io import called, emulated
+from flexura.io.drawing import STYLE
+from flexura.optional import load
 
 from ..runs.deviation import deviation
-from ..runs.labels import called, emulated
 from .measures import Comparison, Difference
-
-matplotlib = Optional("matplotlib")
 
 BLUE, GREEN, PINK, INK = (
     "#1f6fc4",
@@ -23,33 +21,13 @@ BLUE, GREEN, PINK, INK = (
     "#30343b",
 )  # simulation, experiment, deviation, as in the review
 RATIO = [2.3, 1]
-STYLE: dict[Any, Any] = {
-    "font.family": "DejaVu Sans",
-    "font.size": 9,
-    "axes.edgecolor": "#9aa0a8",
-    "axes.labelcolor": INK,
-    "text.color": INK,
-    "xtick.color": INK,
-    "ytick.color": INK,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.linewidth": 0.8,
-    "grid.color": "#e3e6ea",
-    "grid.linewidth": 0.7,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "svg.fonttype": "none",
-    "pdf.fonttype": 42,
-    "svg.hashsalt": "flexura",
-}
 
 
 def figure(c: Comparison, entry: Difference) -> Any:
     """One quantity's figure, a matplotlib Figure: both runs above, their difference below."""
-    Figure = load("matplotlib.figure").Figure
-
+    matplotlib = load("matplotlib")
     with matplotlib.rc_context(STYLE):
-        drawing = Figure(figsize=(7.4, 3.9), layout="constrained")
+        drawing = load("matplotlib.figure").Figure(figsize=(7.4, 3.9), layout="constrained")
         draw(c, entry, *drawing.subplots(2, 1, height_ratios=RATIO))
         drawing.align_ylabels()
     return drawing
@@ -88,11 +66,11 @@ def draw(c: Comparison, entry: Difference, upper: Any, lower: Any) -> None:
     for axes in (upper, lower):
         axes.set_xlim(*ends)
     upper.tick_params(labelbottom=False)
-    upper.set_title(heading(c, entry), loc="left", fontsize=9.5, fontweight="bold")
+    upper.set_title(heading(c, entry), loc="left", fontsize=9.5, fontweight="bold", pad=17)
     upper.legend(
         frameon=False,
-        loc="lower right",
-        bbox_to_anchor=(1.0, 0.98),
+        loc="lower left",
+        bbox_to_anchor=(-0.008, 0.99),
         ncols=2,
         borderaxespad=0.2,
         handlelength=1.6,
@@ -121,22 +99,12 @@ def is_emulated(c: Comparison) -> bool:
 
 def together(c: Comparison, size: tuple[float, float] = (8.3, 10.2)) -> Any:
     """All quantities in one figure, one below the other."""
-    Figure = load("matplotlib.figure").Figure
-
+    matplotlib = load("matplotlib")
+    count = len(c.differences)
     with matplotlib.rc_context(STYLE):
-        drawing = Figure(figsize=size, layout="constrained")
-        axes = drawing.subplots(2 * len(c.differences), 1, height_ratios=RATIO * len(c.differences))
+        drawing = load("matplotlib.figure").Figure(figsize=size, layout="constrained")
+        axes = drawing.subplots(2 * count, 1, height_ratios=RATIO * count)
         for k, entry in enumerate(c.differences):
             draw(c, entry, *axes[2 * k : 2 * k + 2])
         drawing.align_ylabels()
     return drawing
-
-
-def saved(drawing: Any, form: str, **metadata: str) -> bytes:
-    """The bytes of a figure as "svg", "png" or "pdf", the same for the same runs."""
-
-    fixed = {"Date": None} if form == "svg" else {}
-    buffer = io.BytesIO()
-    with matplotlib.rc_context(STYLE):
-        drawing.savefig(buffer, format=form, dpi=150, metadata=metadata | fixed)
-    return buffer.getvalue()

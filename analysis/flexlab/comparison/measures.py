@@ -19,9 +19,9 @@ import numpy as np
 
 import flexura as fx
 from flexura.errors import InputError
+from flexura.io import kind
 
 from ..runs.deviation import deviation, deviations, interpolate
-from ..runs.labels import kind
 
 RESPONSE_LEVEL = 0.9  # of the largest distance, for the response time
 LONGEST_DELAY_S = 0.25

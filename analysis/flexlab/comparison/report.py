@@ -1,23 +1,19 @@
-"""The report of a comparison: one self-contained page (HTML with its figures inside), the same as
-PDF, and a picture."""
+"""The report of a comparison: one self-contained page (HTML with its figures inside), and a
+picture. The same as PDF is made by `pages`."""
 
 from __future__ import annotations
 
 import html as html_
-import io
 import json
 import re
-from textwrap import wrap
 from typing import Any
 
-from flexura.optional import Optional, load
+from flexura.io import EMULATED, called
+from flexura.io.drawing import saved
 
-from ..runs.labels import EMULATED, called
-from .figures import STYLE, figure, heading, is_emulated, saved, together
+from .figures import figure, heading, is_emulated, together
 from .measures import Comparison
 from .table import HEADS, notes, rows, title
-
-matplotlib = Optional("matplotlib")
 
 CSS = """
 body { font: 15px/1.45 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; color: #30343b; }
@@ -35,7 +31,6 @@ figcaption { font-size: .86rem; color: #5a6069; }
 ul { padding-left: 1.2rem; font-size: .9rem; }
 @media print { figure, table { break-inside: avoid; } }
 """.strip()
-ROWS = 36  # of the metadata on a page; the rest is in the files
 HIDDEN = {"robot", "rig", "events", "phases", "truth", "drive", "firmware"}
 
 
@@ -71,24 +66,6 @@ def html(c: Comparison) -> str:
         f"<th>{text(called(c.experiment))}</th></tr></thead>"
         f"<tbody>{runs}</tbody></table>\n</body></html>\n"
     )
-
-
-def pdf(c: Comparison) -> bytes:
-    """Two pages of A4: the figures; the table with the notes and what the runs say about
-    themselves."""
-    PdfPages = load("matplotlib.backends.backend_pdf").PdfPages
-
-    buffer = io.BytesIO()
-    subject = EMULATED if is_emulated(c) else called(c.experiment)
-    with (
-        matplotlib.rc_context(STYLE),
-        PdfPages(
-            buffer, metadata={"Title": title(c), "Subject": subject, "CreationDate": None}
-        ) as pages,
-    ):
-        pages.savefig(_front(c))
-        pages.savefig(together(c, (8.27, 11.69)))
-    return buffer.getvalue()
 
 
 def png(c: Comparison) -> bytes:
@@ -142,82 +119,3 @@ def _inline(svg: bytes, prefix: str) -> str:
     text = text[text.index("<svg") :]
     text = re.sub(r'\bid="', f'id="{prefix}', text)
     return re.sub(r'(href="#|url\(#)', lambda found: found[1] + prefix, text)
-
-
-def _front(c: Comparison) -> Any:
-    """The PDF's first page."""
-    Figure = load("matplotlib.figure").Figure
-
-    page = Figure(figsize=(8.27, 11.69))
-    y = 0.955
-    for line in wrap(title(c), 72):
-        page.text(0.06, y, line, fontsize=14, fontweight="bold", va="top")
-        y -= 0.024
-    if is_emulated(c):
-        page.text(
-            0.06,
-            y - 0.008,
-            f"{EMULATED[0].upper()}{EMULATED[1:]}.",
-            fontsize=9,
-            va="top",
-            bbox={"facecolor": "#fff1d6", "edgecolor": "#f0a020", "pad": 5},
-        )
-        y -= 0.045
-    y = _lay(page, y, [HEADS, *rows(c)], [0.06, 0.38, 0.58, 0.655, 0.755, 0.87, 0.985], 8)
-    for note in notes(c):
-        for k, line in enumerate(wrap(note, 118)):
-            page.text(0.06, y, ("• " if k == 0 else "   ") + line, fontsize=8, va="top")
-            y -= 0.0155
-    y -= 0.02
-    cells = [("", called(c.simulation), called(c.experiment)), *about(c)[:ROWS]]
-    _lay(
-        page,
-        y,
-        [tuple("\n".join(wrap(cell, 44)[:3]) for cell in row) for row in cells],
-        [0.06, 0.28, 0.64],
-        7.5,
-        left=True,
-    )
-    return page
-
-
-def _lay(
-    page: Any,
-    y: float,
-    cells: list[tuple[str, ...]],
-    at: list[float],
-    size: float,
-    left: bool = False,
-) -> float:
-    """A table's cells at the abscissas `at` (right ends but for the first; `left`: left ends);
-    returns where it ends."""
-    for n, row in enumerate(cells):
-        height = (
-            0.0185
-            * size
-            / 8
-            * max(1, *(cell.count("\n") + 1 for cell in row))
-            * (0.8 if "\n" in "".join(row) else 1)
-        )
-        for k, cell in enumerate(row):
-            side = "left" if left or k == 0 else "right"
-            weight = "bold" if n == 0 else "normal"
-            page.text(
-                at[k],
-                y - 0.011 * size / 8,
-                cell,
-                fontsize=size,
-                va="baseline",
-                ha=side,
-                fontweight=weight,
-            )
-        y -= height
-        line = page.add_artist(_rule(y + 0.004))
-        line.set(linewidth=1.0 if n == 0 else 0.5, color="#9aa0a8" if n == 0 else "#e3e6ea")
-    return y - 0.012
-
-
-def _rule(y: float) -> Any:
-    Line2D = load("matplotlib.lines").Line2D
-
-    return Line2D([0.06, 0.985], [y, y])

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from flexura.io import EMULATED, called, emulated
+
 from ..runs.formatting import percent
-from ..runs.labels import EMULATED, called, emulated
 from ..runs.table import Table
 from .measures import RESPONSE_LEVEL, Comparison
 

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 import flexura as fx
+from flexura.io import EMULATED, called, emulated
 
 from ..comparison.measures import Comparison, compare
 from ..comparison.replay.simulate_experiment import simulate_experiment
 from ..runs.formatting import finite, number, percent
-from ..runs.labels import EMULATED, called, emulated
 from ..runs.table import Table
 from .estimate import Estimate
 from .files import with_identified_files

@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 
 import flexura as fx
+from flexura.io.drawing import with_poses
 
 from ..board.protocol import messages
 from ..board.protocol.declaration import CONTROL_HZ, FAULTS, MESSAGES, Fault, Mode, State
 from ..board.protocol.frames import Deframer
 from ..board.protocol.player import Knots
 from ..rig.description import Calibration
-from ..runs.poses import with_poses
 from . import recording
 from .delay_estimation import estimate_delay
 from .unit_conversion import UNITS, Sensor, channels_of_reports, start_tick

@@ -3,7 +3,6 @@ no view is empty."""
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -11,32 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 from flexura.optional import Optional
 
+from .ticks import LOW_PX, PLOT_PX, Signals, value_range
+
 if TYPE_CHECKING:
     import rerun.blueprint as rrb
 else:
     rrb = Optional("rerun.blueprint")
 
 CURVES = 6  # in one plot; further joints or links go to further tabs
-PLOT_PX, LINE_PX, LINE_CHARS = (
-    265,
-    23,
-    36,
-)  # a plot's height and a legend's line in a window of 900 pixels
 WIDE = 1.2  # from this ratio on, two pictures below each other are larger than two side by side
 WHITE = (255, 255, 255)
-
-
-@dataclass(frozen=True)
-class Signal:
-    """One curve over time: its unit, its name in the legend, its smallest and largest value."""
-
-    unit: str
-    label: str
-    low: float
-    high: float
-
-
-Signals = dict[str, Signal]  # by entity path
 
 
 @dataclass(frozen=True)
@@ -206,7 +189,7 @@ def _figures(scene: Scene) -> list[Any]:
             )
         upper = _tabs(views)
         columns.append(
-            rrb.Vertical(upper, _plot(f"deviation of {name}", below), row_shares=[5, 3])
+            rrb.Vertical(upper, _plot(f"deviation of {name}", below, LOW_PX), row_shares=[5, 3])
             if below
             else upper
         )
@@ -335,34 +318,15 @@ def _one(name: str, signals: Signals, pattern: str) -> list[Any]:
     return [_plot(name, found)] if found else []
 
 
-def _plot(name: str, signals: Signals) -> Any:
+def _plot(name: str, signals: Signals, height: int = PLOT_PX) -> Any:
     return rrb.TimeSeriesView(
         origin="/",
         contents=list(signals),
         name=name,
         axis_x=rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal),
-        axis_y=rrb.ScalarAxis(range=value_range(signals)),
+        axis_y=rrb.ScalarAxis(range=value_range(signals, height)),
         plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop),
     )
-
-
-def value_range(signals: Signals) -> tuple[float, float]:
-    """The range of a plot's vertical axis: all values, room for the legend above them, and two
-    numbers to read off."""
-    low, high = min(s.low for s in signals.values()), max(s.high for s in signals.values())
-    if high - low <= 1e-9 * max(abs(low), abs(high)):
-        spare = 0.1 * max(abs(low), abs(high)) or 1.0
-        low, high = low - spare, high + spare
-    lines = sum(-(-len(s.label) // LINE_CHARS) for s in signals.values())
-    share = min((LINE_PX * lines + 14) / PLOT_PX, 0.6)
-    low, high = low - 0.05 * (high - low), high + (high - low) * share / (1 - share)
-    # The viewer numbers powers of ten, and tenths of them while there are few: see that two numbers
-    # fit.
-    power = 10.0 ** math.floor(math.log10(high - low))
-    if (high - low) / power > 1.2 and math.floor(high / power) - math.ceil(low / power) < 1:
-        up, down = (math.floor(high / power) + 1) * power, (math.ceil(low / power) - 1) * power
-        low, high = (low, up * 1.02) if up - high < low - down else (down - 0.02 * power, high)
-    return low, high
 
 
 def _moving(signals: Signals) -> Signals:

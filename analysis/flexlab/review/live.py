@@ -31,11 +31,11 @@ else:
 
 import flexura as fx
 from flexura.errors import InputError
+from flexura.io.drawing import with_poses
 
 from ..board.protocol.declaration import CONTROL_HZ, State
 from ..experiment.plan import Plan
 from ..recordings.unit_conversion import UNITS, Sensor, channels_of_reports
-from ..runs.poses import with_poses
 from .writer import times
 
 HOST = "127.0.0.1"

@@ -7,11 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from flexura.errors import InputError
-from flexura.io import Run
-
-from ..runs import labels
-from ..runs.poses import with_poses
-from .shapes import has_shapes
+from flexura.io import Run, called, kind
+from flexura.io.drawing import has_shapes, with_poses
 
 Colour = tuple[int, int, int]
 COLOURS: dict[str, Colour] = {
@@ -22,6 +19,16 @@ COLOURS: dict[str, Colour] = {
 SECOND: Colour = (160, 84, 204)  # the second of two runs from the same kind of source
 OTHER: Colour = (110, 110, 110)
 DEVIATION: Colour = (214, 64, 140)
+# The curves of one source in one plot: its own colour, then others near it. Each is seen on the
+# viewer's light and dark background alike, and differs from its neighbours in lightness too.
+FAMILIES: dict[Colour, tuple[Colour, ...]] = {
+    COLOURS["simulation"]: ((36, 123, 214), (0, 172, 200), (116, 92, 214), (120, 168, 232)),
+    COLOURS["twin"]: ((240, 120, 24), (204, 52, 44), (196, 146, 20), (236, 140, 128)),
+    COLOURS["experiment"]: ((32, 164, 84), (134, 150, 24), (16, 116, 104), (112, 184, 128)),
+    SECOND: ((160, 84, 204), (210, 92, 178), (112, 72, 168), (184, 148, 216)),
+    DEVIATION: ((214, 64, 140), (226, 112, 84), (150, 60, 150), (226, 140, 178)),
+    OTHER: ((110, 110, 110), (165, 165, 165), (70, 110, 160), (170, 120, 80)),
+}
 NAMES = {
     COLOURS["simulation"]: "blue",
     COLOURS["twin"]: "orange",
@@ -63,25 +70,26 @@ def sources(runs: Sequence[Run]) -> list[Source]:
         raise InputError("one run, or two to compare", key="runs", value=len(runs))
     found: list[Source] = []
     for run in runs:
-        kind = labels.kind(run)
+        source = kind(run)
         if len(run) == 0:
-            raise InputError("a run with samples; this one is empty", key="run", value=kind)
-        root = re.sub(r"[^a-z0-9_]", "_", kind.lower())
-        colour, again = COLOURS.get(kind, OTHER), ""
+            raise InputError("a run with samples; this one is empty", key="run", value=source)
+        root = re.sub(r"[^a-z0-9_]", "_", source.lower())
+        colour, again = COLOURS.get(source, OTHER), ""
         if found and found[0].root == root:
             root, colour, again = f"{root}_2", SECOND, " 2"
         placed, computed = with_poses(run)
-        found.append(Source(root, labels.called(run, again), colour, placed, computed))
+        found.append(Source(root, called(run, again), colour, placed, computed))
     return found
 
 
 def against_experiment(shown: Sequence[Source]) -> bool:
     """Whether these are a calculation and an experiment, in this order."""
-    return len(shown) == 2 and [labels.kind(s.run) == "experiment" for s in shown] == [False, True]
+    return len(shown) == 2 and [kind(s.run) == "experiment" for s in shown] == [False, True]
 
 
 def order(names: list[str], units: dict[str, str]) -> dict[str, int]:
-    """Which tone each channel gets: its place, from 0, among those that share a plot with it."""
+    """Which colour of a family each channel gets: its place, from 0, among those that share a plot
+    with it."""
     fixed = {
         "energy/strain": 1,
         "energy/potential": 2,
@@ -100,9 +108,14 @@ def order(names: list[str], units: dict[str, str]) -> dict[str, int]:
     return places
 
 
-def tone(colour: Colour, k: int) -> Colour:
-    """A lighter tone of a colour for the k-th curve (from 0) of one source in one plot."""
-    share = (0.0, 0.5, 0.75, 0.25)[k % 4]
+def curve_colour(colour: Colour, k: int) -> Colour:
+    """The colour of the k-th curve (from 0) of one source in one plot."""
+    family = FAMILIES[colour]
+    return family[k % len(family)]
+
+
+def pale(colour: Colour, share: float) -> Colour:
+    """A colour mixed with a share of white, for what is drawn on white."""
     r, g, b = (round(c + share * (255 - c)) for c in colour)
     return r, g, b
 

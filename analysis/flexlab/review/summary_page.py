@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from flexura.errors import InputError
+from flexura.io.drawing import MAX_SAMPLES
 from flexura.robot import Link, Robot
 
 from ..comparison import table
 from ..comparison.measures import Comparison, compare
 from ..runs.deviation import deviations
 from ..runs.formatting import markdown, number, percent, printable
-from .sampling import MAX_SAMPLES
 from .sources import Source, against_experiment, tip_meaning
 
 MAX_ROWS = 40  # of one table: a robot of 200 links is not read link by link

@@ -22,23 +22,24 @@ else:
     rr = Optional("rerun")
 
 from flexura.io import Run
+from flexura.io.drawing import MAX_SAMPLES, curves, extent, frames, grid, thinned
 
 from ..runs.deviation import TIP_DISTANCE, common, compared, deviation
-from .layout import Scene, Signal, blueprint
-from .sampling import MAX_SAMPLES, frames, thinned
-from .shapes import curves, extent, grid
+from .layout import Scene, blueprint
 from .sources import (
     DEVIATION,
     NAMES,
     Source,
     against_experiment,
+    curve_colour,
     entity,
     loaded,
     order,
+    pale,
     sources,
-    tone,
 )
 from .summary_page import about
+from .ticks import Signal
 
 CHUNK = 10_000  # rows a chunk: large enough to be quick, small enough to be loaded in parts
 GHOST = (150, 150, 150)
@@ -159,7 +160,9 @@ def _write(rec: rr.RecordingStream, shown: list[Source], scene: Scene) -> None:
         name = path.removeprefix(f"{scene.prefix}/deviation/")
         t, values = deviation(first.run, shown[1].run, name)
         step = np.flatnonzero(common(first.run, shown[1].run))
-        curve(rec, path, t, values, step, signal, tone(DEVIATION, places[name]), 1.8, budget)
+        curve(
+            rec, path, t, values, step, signal, curve_colour(DEVIATION, places[name]), 1.8, budget
+        )
     page = about(shown, thinned_to=budget if samples > MAX_SAMPLES else None)
     rec.log(
         f"{scene.prefix}/about",
@@ -169,7 +172,7 @@ def _write(rec: rr.RecordingStream, shown: list[Source], scene: Scene) -> None:
 
 
 def signals(rec: rr.RecordingStream, s: Source, scene: Scene, budget: int) -> None:
-    """One entity a channel, in the source's colour; curves that share a plot differ in tone."""
+    """One entity a channel, in a colour of the source's family; curves that share a plot differ."""
     places = order(s.signals, s.run.units)
     # The viewer draws curves in the order of their paths: those below are broader, to be seen where
     # both runs agree.
@@ -179,7 +182,7 @@ def signals(rec: rr.RecordingStream, s: Source, scene: Scene, budget: int) -> No
     for name in s.signals:
         path = f"/{s.root}/{entity(name)}"
         if path in scene.signals:
-            colour = tone(s.colour, places[name] + (3 if below and scene.measured else 0))
+            colour = curve_colour(s.colour, places[name] + (3 if below and scene.measured else 0))
             curve(
                 rec,
                 path,
@@ -205,7 +208,13 @@ def curve(
     budget: int,
 ) -> None:
     """One signal: its style and unit once, its samples in chunks."""
-    style = rr.SeriesLines(colors=[colour], widths=[width], names=[signal.label])
+    # The viewer draws the smallest and largest value of each pixel; by default it averages them.
+    style = rr.SeriesLines(
+        colors=[colour],
+        widths=[width],
+        names=[signal.label],
+        aggregation_policy=rr.components.AggregationPolicy.MinMax,
+    )
     rec.log(path, style, rr.AnyValues(unit=signal.unit), static=True)
     keep = thinned(y, budget)
     for a in range(0, len(keep), CHUNK):
@@ -236,7 +245,7 @@ def shape(rec: rr.RecordingStream, s: Source, scene: Scene, over: bool) -> None:
         f"{arm}/rigid",
         index,
         c.rigid,
-        tone(s.colour, 1),
+        pale(s.colour, 0.5),
         (0.25 if over else 0.45) * size,
         20 + over,
     )
@@ -252,7 +261,7 @@ def shape(rec: rr.RecordingStream, s: Source, scene: Scene, over: bool) -> None:
     if len(c.trace) > 1:
         path = rr.LineStrips2D(
             [c.trace.astype(np.float32)],
-            colors=[tone(s.colour, 2)],
+            colors=[pale(s.colour, 0.75)],
             radii=[line(0.5 if over else 1.2)],
             draw_order=5.0 + over,
         )

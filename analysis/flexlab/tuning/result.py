@@ -3,7 +3,6 @@ files, table and drawing."""
 
 from __future__ import annotations
 
-import io
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,12 +12,13 @@ import numpy as np
 import flexura as fx
 from flexura.control import Gains, Response, of_run
 from flexura.io import write_bytes
-from flexura.optional import load
+from flexura.io.drawing import saved
 
 from ..runs.formatting import number
 from ..runs.table import Table
 from . import search_space as freedom
 from .closed_loop import closed_loop_controller
+from .drawing import figure
 from .history import History
 from .objective import HELP
 from .search import Search
@@ -114,12 +114,10 @@ def save(found: Result, folder: Path) -> list[Path]:
         for number, k in enumerate(history.pareto_front(), 1):
             task.tuned(values[k]).write(folder / "front" / f"gains-{number:02d}.toml")
         paths.append(folder / "front")
-    drawing = figure(found)
+    drawing = figure(task, history, found.runs[0])
     for kind in ("png", "svg"):
-        buffer = io.BytesIO()
-        drawing.savefig(buffer, format=kind, dpi=150)
         paths.append(folder / f"tuning.{kind}")
-        write_bytes(paths[-1], buffer.getvalue())
+        write_bytes(paths[-1], saved(drawing, kind, Title=f"tuning: {task.manoeuvre.name}"))
     return paths
 
 
@@ -212,49 +210,3 @@ def numbers(found: Result) -> dict[str, Any]:
         if found.task.pareto
         else None,
     } | found.meta()
-
-
-def figure(found: Result) -> Any:
-    """The search's progress (or the front), and what the best gains do."""
-    Figure = load("matplotlib.figure").Figure
-
-    history, run = found.history, found.runs[0]
-    drawing = Figure(figsize=(10, 4.2), layout="constrained")
-    left, right = drawing.subplots(1, 2)
-    goals = history.all("goals")
-    if found.task.pareto:
-        front = history.pareto_front()
-        left.plot(goals[:, 0], goals[:, 1], ".", color="0.8", markersize=3, label="all tried")
-        left.plot(goals[front, 0], goals[front, 1], "o-", color="C0", markersize=3, label="front")
-        left.plot(*found.best, "D", color="C3", label="balanced")
-        far = goals[front].max(axis=0)
-        left.set(xlabel="settling time [s]", ylabel="rms of the tip deflection [mm]")
-        left.set(xlim=(0, 1.5 * far[0]), ylim=(0, 2 * far[1]))
-    else:
-        best = [goals[:end, 0].min() for end in history.ends]
-        starts = [0, *history.ends[:-1]]
-        left.plot(history.ends, best, color="C0", label="best so far")
-        middle = [np.median(goals[a:b, 0]) for a, b in zip(starts, history.ends, strict=True)]
-        left.plot(
-            history.ends,
-            middle,
-            color="0.7",
-            label="median of the generation, abandoned ones as far as they came",
-        )
-        left.set(xlabel="evaluations", ylabel="J", yscale="log")
-    left.legend(frameon=False)
-    left.grid(alpha=0.3)
-    for i in range(1, len(found.responses[0].joints) + 1):
-        y = run[f"joint/{i}/position"]
-        end = run[f"joint/{i}/reference"][-1]
-        right.plot(run.t, (y - y[0]) / (end - y[0]), label=f"joint {i}, of its way")
-    right.axhspan(0.98, 1.02, color="0.9")
-    right.set(xlabel="time [s]")
-    bent = [name for name in run if name.endswith("tip_deflection")]
-    if bent:
-        right.plot(
-            run.t, 10 * run[bent[-1]], color="C3", linewidth=0.9, label="tip deflection [dm]"
-        )
-    right.legend(frameon=False)
-    right.grid(alpha=0.3)
-    return drawing

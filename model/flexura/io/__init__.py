@@ -1,22 +1,34 @@
-"""Files: runs in Parquet, TOML tables, whole or not at all."""
+"""Files: runs in Parquet, TOML tables, whole or not at all; what a run's channels mean, and its
+pictures."""
 
+from . import summary
+from .channels import CHANNELS, STATIONS, Channel, channel
 from .format import FORMAT, check_format
-from .run import FILE, STATIONS, Run
+from .labels import EMULATED, called, emulated, kind
+from .run import FILE, Run
 from .shipped import find, shipped_files
 from .toml_files import read_toml, write_bytes, write_text, write_toml
 from .validation import explain, is_name
 
 __all__ = [
+    "CHANNELS",
+    "EMULATED",
     "FILE",
     "FORMAT",
     "STATIONS",
+    "Channel",
     "Run",
+    "called",
+    "channel",
     "check_format",
+    "emulated",
     "explain",
     "find",
     "is_name",
+    "kind",
     "read_toml",
     "shipped_files",
+    "summary",
     "write_bytes",
     "write_text",
     "write_toml",

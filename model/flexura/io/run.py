@@ -1,52 +1,36 @@
 """A run: a time series with named, unit-carrying channels. A simulation and an experiment are both
 a Run.
 
-Channel names (also the entity paths of the review), joints and links counted from 1:
-
-    joint/i/position  joint/i/velocity  joint/i/drive      m or rad; m/s or rad/s; N or N m link/i/x
-    link/i/y  link/i/angle                       pose of the link's hub frame in the base frame [m,
-    m, rad] link/i/tip_deflection  link/i/tip_slope                flexible links: of the tip, in
-    the hub's frame [m, rad] link/i/deflection/k                                    flexible links:
-    at x = k L / 8, k = 0 ... 8 [m] tip/x  tip/y                                           the last
-    link's tip in the base frame [m] energy/kinetic  energy/strain  energy/potential        [J]
-    energy/work  energy/loss                               work of the drives, dissipated energy
-    since the start [J]
-
-Archived as Parquet: one column a channel, named channel_unit (`joint/1/position_rad`), metadata in
-the schema.
+What each channel means stands in `channels`. Archived as Parquet: one column a channel, named
+channel_unit (`joint/1/position_rad`), metadata in the schema.
 """
 
 from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, ItemsView, Iterator, KeysView
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import InputError
+from . import summary
+from .channels import SUFFIX
+from .drawing.film import animation
+from .drawing.over_time import FORMS, figure, heading, saved
 from .format import FORMAT, check_format
+from .frames import pandas_frame, xarray_dataset
 from .toml_files import write_bytes
 
-FILE = "run.parquet"
-STATIONS = 9  # places along a flexible link at which a Run holds the deflection
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+    from matplotlib.figure import Figure
 
-_SUFFIX = {
-    "s": "s",
-    "m": "m",
-    "rad": "rad",
-    "m/s": "m_s",
-    "rad/s": "rad_s",
-    "N": "N",
-    "N m": "N_m",
-    "J": "J",
-    "V": "V",
-    "A": "A",
-    "1": "1",
-}
+FILE = "run.parquet"
 
 
 @dataclass(frozen=True)
@@ -77,9 +61,9 @@ class Run:
                     f"channel {name} has shape {np.shape(values)}, the times have "
                     f"{np.shape(self.t)}"
                 )
-            if self.units[name] not in _SUFFIX:
+            if self.units[name] not in SUFFIX:
                 raise ValueError(
-                    f"channel {name} has the unit {self.units[name]!r}; known: {', '.join(_SUFFIX)}"
+                    f"channel {name} has the unit {self.units[name]!r}; known: {', '.join(SUFFIX)}"
                 )
         columns = ["time_s", *map(self.column, self.channels)]
         twice = sorted(column for column, count in Counter(columns).items() if count > 1)
@@ -88,7 +72,7 @@ class Run:
 
     def column(self, channel: str) -> str:
         """The name of a channel's column in a file, its unit at the end."""
-        return f"{channel}_{_SUFFIX[self.units[channel]]}"
+        return f"{channel}_{SUFFIX[self.units[channel]]}"
 
     def __getitem__(self, channel: str) -> np.ndarray:
         try:
@@ -107,9 +91,122 @@ class Run:
     def __len__(self) -> int:
         return len(self.t)
 
+    def keys(self) -> KeysView[str]:
+        """The names of the channels."""
+        return self.channels.keys()
+
+    def items(self) -> ItemsView[str, np.ndarray]:
+        """Names and values (T,) of the channels."""
+        return self.channels.items()
+
     @property
     def complete(self) -> bool:
+        """Whether the run came to its end."""
         return bool(self.meta.get("complete", True))
+
+    def __repr__(self) -> str:
+        return summary.text(self._title(), self._rows())
+
+    def _repr_html_(self) -> str:
+        return summary.html(self._title(), self._rows())
+
+    def _title(self) -> str:
+        return f"Run: {heading([self])}"
+
+    def _rows(self) -> list[tuple[str, str]]:
+        """What a terminal and a notebook show: the time, and the channels by their first word."""
+        span = f"{self.t[0]:.6g} to {self.t[-1]:.6g} s, " if len(self) else ""
+        rows = [("t", f"{span}{len(self)} samples")]
+        kinds: dict[str, tuple[list[int], list[str]]] = {}
+        for name in self.channels:
+            kind, _, rest = name.partition("/")
+            number, _, part = rest.partition("/")
+            counted, parts = kinds.setdefault(kind, ([], []))
+            if number.isdigit() and part:
+                counted.append(int(number))
+                parts.append(part.partition("/")[0])
+            else:
+                parts.append(rest)
+        for kind, (counted, parts) in kinds.items():
+            number = f"/{summary.numbers(counted)}" if counted else ""
+            rows.append((f"{kind}{number}", summary.listed(dict.fromkeys(filter(None, parts)), 66)))
+        if events := self.meta.get("events"):
+            rows.append(("events", summary.listed(e.get("text", "") for e in events)))
+        return rows
+
+    def plot(self, *channels: str, out: str | Path | None = None, title: str = "") -> Figure:
+        """Draw channels over time, one panel a unit, the legend beside it.
+
+        Args:
+            channels: names, or patterns such as "joint/*/position"; none: joint positions, tip
+                deflections, drives and energies.
+            out: a file to write, .pdf, .svg or .png, as a whole or not at all.
+            title: by default the robot and what kind of run it is.
+
+        Returns:
+            The figure, of pyplot if no file is asked for.
+
+        Raises:
+            InputError: a pattern fits no channel, the run is empty, or `out` has another ending.
+            Missing: matplotlib is not installed.
+        """
+        form = "" if out is None else Path(out).suffix.lower().removeprefix(".")
+        if out is not None and form not in FORMS:
+            raise InputError(
+                f"expected a file that ends with .{', .'.join(FORMS)}", key="out", value=str(out)
+            )
+        drawing = figure([self], channels, title=title, interactive=out is None)
+        if out is not None:
+            write_bytes(out, saved(drawing, form, Title=title or heading([self])))
+        return drawing
+
+    def animate(
+        self,
+        out: str | Path,
+        *,
+        frame_rate: float = 25.0,
+        duration: float | None = None,
+        progress: Callable[[float], None] | None = None,
+    ) -> Path:
+        """Write the run as a film: the links as bent as they are, the tip's way, and a clock.
+
+        Args:
+            out: the file, .gif, or .mp4 where an encoder is installed.
+            frame_rate: pictures a second of the film [1/s].
+            duration: of the film [s]; by default the run's own, but 3 to 12 s.
+            progress: called with the fraction that is done.
+
+        Returns:
+            The path of the file.
+
+        Raises:
+            InputError: a wrong argument, or a run that does not say where its links are.
+            FlexuraError: there is no encoder for MP4.
+            Missing: matplotlib or pillow is not installed.
+        """
+        return animation(self, out, frame_rate=frame_rate, duration=duration, progress=progress)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """The channels as columns over the index `t` [s].
+
+        Returns:
+            A table whose `attrs` has "units" by name, and "meta".
+
+        Raises:
+            Missing: pandas is not installed.
+        """
+        return pandas_frame(self.t, self.channels, self.units, self.meta)
+
+    def to_xarray(self) -> xr.Dataset:
+        """The channels as variables over the dimension `t` [s].
+
+        Returns:
+            A data set; each variable's `attrs` has "units", the data set's the metadata.
+
+        Raises:
+            Missing: xarray is not installed.
+        """
+        return xarray_dataset(self.t, self.channels, self.units, self.meta)
 
     def save(self, folder: str | Path) -> Path:
         """Write `run.parquet` into `folder` (made if need be) as a whole or not at all; returns its
@@ -138,6 +235,7 @@ class Run:
             ),
             sink,
             compression="zstd",
+            write_page_checksum=True,
         )
         return bytes(sink.getvalue().to_pybytes())
 
@@ -156,7 +254,9 @@ class Run:
         if not there:
             raise InputError(f"no run here: expected a folder with {FILE}", file=str(folder))
         try:
-            table = pq.read_table(path, partitioning=None)  # a folder named a=b is just a folder
+            table = pq.read_table(
+                path, partitioning=None, page_checksum_verification=True
+            )  # a folder named a=b is just a folder
         except (pa.ArrowException, OSError, ValueError) as error:
             raise InputError(
                 f"not a Parquet file ({(str(error) or 'damaged').splitlines()[0]})", file=str(path)
@@ -190,6 +290,6 @@ class Run:
                 t = values
             else:
                 unit = (column.metadata or {}).get(b"unit", b"1").decode()
-                name = column.name.removesuffix(f"_{_SUFFIX.get(unit, '')}")
+                name = column.name.removesuffix(f"_{SUFFIX.get(unit, '')}")
                 channels[name], units[name] = values, unit
         return Run(t, channels, units, meta)

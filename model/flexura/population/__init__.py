@@ -3,6 +3,7 @@
 from .batch import Batch
 from .population import Population, simulate
 from .request import program
+from .store import is_population
 from .worker import cores
 
-__all__ = ["Batch", "Population", "cores", "program", "simulate"]
+__all__ = ["Batch", "Population", "cores", "is_population", "program", "simulate"]

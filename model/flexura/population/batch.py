@@ -101,6 +101,16 @@ class Batch:
             )
         return Batch(_Varied(robot, columns), counts.pop())
 
+    @property
+    def varied(self) -> dict[str, np.ndarray]:
+        """The values (B,) of what `vary` varied, by key; empty for other batches."""
+        return dict(self.source.columns) if isinstance(self.source, _Varied) else {}
+
+    @property
+    def base(self) -> Robot | None:
+        """The robot that `vary` began with; None for other batches."""
+        return self.source.robot if isinstance(self.source, _Varied) else None
+
     def __iter__(self) -> Iterator[Item]:
         """The robots in their order, each checked against the first one's topology."""
         first: tuple[Any, ...] | None = None

@@ -7,24 +7,33 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .. import core
 from ..errors import InputError
+from ..io import Run, summary
+from ..optional import Optional
+from ..robot import Robot
 from ..signals import Drive
 from ..simulation.recorder import channel_units
 from . import dask_cluster, worker
 from .batch import Batch, Share
 from .request import Request
-from .store import Chunk, Store, in_memory
+from .results import one_run, tabulated
+from .store import MANIFEST, Chunk, Store, in_memory, manifest
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+pandas = Optional("pandas")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Population:
     """A simulated batch: `t` (T,) [s], units of the channels, whether all `count` robots are
     `complete`, and their chunks.
@@ -32,7 +41,8 @@ class Population:
     `population["tip/x"]` is (count, T), a reduced number (count,), `population.status` (count,) of
     "done", "limit", "stuck" or "refused" (a robot that cannot be assembled or starts outside its
     limits); a robot's values are NaN from where it stopped. Of an interrupted population only the
-    robots that are done have rows: `population.robots`, counted from 0.
+    robots that are done have rows: `population.robots`, counted from 0. `base`: the robot that
+    `Batch.vary` began with; None for other batches.
     """
 
     t: np.ndarray
@@ -40,32 +50,115 @@ class Population:
     count: int
     complete: bool
     store: Store
+    base: Robot | None = None
+
+    @staticmethod
+    def read(folder: str | Path) -> Population:
+        """Open a population's folder, complete or not.
+
+        Args:
+            folder: what `simulate` was given, or `flexura simulate --vary` left.
+
+        Returns:
+            The population; its chunks are read when they are needed.
+
+        Raises:
+            InputError: there is no population.
+        """
+        begun = manifest(folder)
+        try:
+            base = None if begun.get("base") is None else Robot.from_dict(begun["base"])
+            t, count = np.array(begun["t_s"], dtype=float), int(begun["count"])
+            units = {str(name): str(unit) for name, unit in begun.get("units", {}).items()}
+        except (ValueError, TypeError, AttributeError) as error:
+            raise InputError(
+                f"not the request of a population ({error})", file=str(Path(folder) / MANIFEST)
+            ) from None
+        store = Store(Path(folder))
+        return Population(t, units, count, store.rows() == count, store, base)
 
     def __iter__(self) -> Iterator[Chunk]:
         """The chunks that are done, in order, one in memory at a time."""
         return self.store.chunks()
 
     def __getitem__(self, name: str) -> np.ndarray:
+        """A channel (robots, T), or a reduced number (robots,)."""
         parts = [(chunk.values.get(name), len(chunk)) for chunk in self]
         known = next((values for values, _ in parts if values is not None), None)
         if known is None:
             raise KeyError(f"no {name!r} was kept")
-        nothing = lambda rows: np.full(
-            (rows, *known.shape[1:]), np.nan
-        )  # a chunk of refused robots has no reduced numbers
+        # a chunk of refused robots has no reduced numbers
+        nothing = lambda rows: np.full((rows, *known.shape[1:]), np.nan)
         return np.concatenate(
             [nothing(rows) if values is None else values for values, rows in parts]
         )
 
     @property
     def robots(self) -> np.ndarray:
+        """The numbers of the robots that are done, from 0."""
         return np.concatenate(
             [np.arange(c.first, c.first + len(c)) for c in self] or [np.zeros(0, dtype=int)]
         )
 
     @property
     def status(self) -> np.ndarray:
+        """How each robot ended."""
         return np.concatenate([c.status for c in self] or [np.zeros(0, dtype=str)])
+
+    def table(self) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+        """One row a robot that is done: what was varied, how it ended, and its results.
+
+        Returns:
+            Columns: `robot` (from 1); one a varied key, named as in `--vary`; `status`,
+            `reached_s`, `event`; of a channel `CHANNEL/peak`, the largest magnitude, and
+            `CHANNEL/end`, the last value; reduced numbers by their names. Units of the channels'
+            columns.
+        """
+        return tabulated(self)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """The table over the index `robot`, counted from 1; `attrs` has "units" by column.
+
+        Raises:
+            Missing: pandas is not installed.
+        """
+        columns, units = self.table()
+        frame = pandas.DataFrame(columns).set_index("robot")
+        frame.attrs = {"units": units}
+        return frame
+
+    def run(self, robot: int) -> Run:
+        """What was kept of one robot, as a Run.
+
+        Args:
+            robot: its number, from 1.
+
+        Returns:
+            Its channels, with the robot in the metadata if it is known.
+
+        Raises:
+            InputError: there is no such robot, it is not done, or no channels were kept.
+        """
+        return one_run(self, robot)
+
+    def __repr__(self) -> str:
+        return summary.text(*self._summary())
+
+    def _repr_html_(self) -> str:
+        return summary.html(*self._summary())
+
+    def _summary(self) -> tuple[str, list[tuple[str, str]]]:
+        done = "complete" if self.complete else f"{self.store.rows()} of them done"
+        first = next(iter(self), None)
+        rows = [("t", f"{self.t[0]:.6g} to {self.t[-1]:.6g} s, {len(self.t)} samples")]
+        if first is not None:
+            rows += [("varied", summary.listed(first.vary))] if first.vary else []
+            rows.append(("kept", summary.listed(first.values)))
+        rows.append(
+            ("chunks in", "memory" if self.store.folder is None else str(self.store.folder))
+        )
+        name = f" of {self.base.name}" if self.base is not None and self.base.name else ""
+        return f"Population{name}: {self.count} robots, {done}", rows
 
 
 def simulate(
@@ -116,7 +209,7 @@ def simulate(
         store = (
             in_memory()
             if folder is None
-            else Store.opened(folder, request.spec() | {"count": batch.count, "chunk": chunk})
+            else Store.opened(folder, request.spec() | _contents(batch, chunk, units))
         )
         todo = _todo(chain([first], shares), store)
         source = (
@@ -127,14 +220,23 @@ def simulate(
         with closing(source) as chunks:
             for made in chunks:
                 if isinstance(made, Chunk):
-                    store.put(made)
+                    rows = slice(made.first, made.first + len(made))
+                    values = {key: column[rows] for key, column in batch.varied.items()}
+                    store.put(replace(made, vary=values))
                 done += len(made)
                 if progress is not None:
                     progress(done / batch.count)
         complete = True
     except KeyboardInterrupt:
         pass
-    return Population(request.t, units, batch.count, complete, store)
+    return Population(request.t, units, batch.count, complete, store, batch.base)
+
+
+def _contents(batch: Batch, chunk: int, units: Mapping[str, str]) -> dict[str, Any]:
+    """What a folder says of its robots, so that it can be read without the batch."""
+    base = None if batch.base is None else batch.base.to_dict()
+    about = {"count": batch.count, "chunk": chunk, "units": dict(units)}
+    return about | {"base": base, "vary": list(batch.varied)}
 
 
 def _todo(shares: Iterator[Share], store: Store) -> Iterator[worker.Work | range]:

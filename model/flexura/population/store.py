@@ -1,9 +1,10 @@
 """Chunks of a population, in memory or in a folder that a stopped call goes on with.
 
 A folder has `population.json`, the request, and `chunk-0000000.parquet`, ... named after their
-first robot: a row a robot, columns robot (from 1), status, reached_s, steps, event, digest, then
-each channel as a list of T numbers, or each reduced number. Every file appears as a whole or not at
-all, so that a folder never holds half a chunk, nor a robot twice.
+first robot: a row a robot, columns robot (from 1), status, reached_s, steps, event, digest, what
+was varied as `vary/KEY`, then each channel as a list of T numbers, or each reduced number. Every
+file appears as a whole or not at all, so that a folder never holds half a chunk, nor a robot
+twice. Every page of a file has a checksum, so that a damaged file is not read.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ MANIFEST = "population.json"
 @dataclass(frozen=True)
 class Chunk:
     """Robots `first`, `first` + 1, ... from 0: how each ended and when, and its channels (b, T) or
-    reduced numbers (b,). Only in a folder have they digests."""
+    reduced numbers (b,); `vary`: the values (b,) of what was varied, by key. Only in a folder
+    have they digests."""
 
     first: int
     status: np.ndarray
@@ -34,6 +36,7 @@ class Chunk:
     event: list[str]
     digest: list[bytes]
     values: dict[str, np.ndarray]
+    vary: dict[str, np.ndarray] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.digest)
@@ -56,6 +59,7 @@ class Chunk:
             "event": pa.array(self.event, pa.string()),
             "digest": pa.array(self.digest, pa.binary(16)),
         }
+        columns |= {f"vary/{key}": values for key, values in self.vary.items()}
         for name, values in self.values.items():
             flat = pa.array(np.ascontiguousarray(values).ravel())
             columns[f"values/{name}"] = (
@@ -65,7 +69,11 @@ class Chunk:
             )
         sink = pa.BufferOutputStream()
         pq.write_table(
-            pa.table(columns), sink, compression="zstd", use_dictionary=["status", "event"]
+            pa.table(columns),
+            sink,
+            compression="zstd",
+            use_dictionary=["status", "event"],
+            write_page_checksum=True,
         )
         return sink.getvalue().to_pybytes()
 
@@ -76,7 +84,7 @@ class Chunk:
         import pyarrow.parquet as pq
 
         try:
-            table = pq.ParquetFile(path).read().combine_chunks()
+            table = pq.ParquetFile(path, page_checksum_verification=True).read().combine_chunks()
             values = {}
             for name in table.column_names:
                 if name.startswith("values/"):
@@ -85,6 +93,11 @@ class Chunk:
                     values[name.removeprefix("values/")] = flat.to_numpy(
                         zero_copy_only=False
                     ).reshape((len(table), -1) if flat is not column else len(table))
+            varied = {
+                name.removeprefix("vary/"): table.column(name).to_numpy()
+                for name in table.column_names
+                if name.startswith("vary/")
+            }
             plain = {
                 name: table.column(name)
                 for name in ("robot", "status", "reached_s", "steps", "event", "digest")
@@ -99,6 +112,7 @@ class Chunk:
             plain["event"].to_pylist(),
             plain["digest"].to_pylist(),
             values,
+            varied,
         )
 
 
@@ -123,15 +137,12 @@ class Store:
                 )
             write_text(path, json.dumps(asked))
             return Store(Path(folder))
-        try:
-            begun = json.loads(path.read_text())
-            differing = [key for key in asked if begun[key] != asked[key]]
-        except (ValueError, KeyError, TypeError, OSError) as error:
-            raise InputError(f"not the request of a population ({error})", file=str(path)) from None
+        begun = manifest(folder)
+        differing = [key for key in asked if key not in begun or begun[key] != asked[key]]
         if differing:
             key = differing[0]
             raise InputError(
-                f"expected {_short(begun[key])}, with which this folder was begun, or another "
+                f"expected {_short(begun.get(key))}, with which this folder was begun, or another "
                 f"folder",
                 key=key,
                 value=_short(asked[key]),
@@ -166,6 +177,12 @@ class Store:
                 raise InputError(text, key=f"robots[{first + k + 1}]", file=str(self._path(first)))
         return len(found) == len(digests)
 
+    def rows(self) -> int:
+        """How many robots are done."""
+        if self.folder is None:
+            return sum(map(len, self.kept.values()))
+        return sum(len(_digests(path)) for path in self.folder.glob("chunk-*.parquet"))
+
     def chunks(self) -> Iterator[Chunk]:
         """The chunks that are done, in their order."""
         if self.folder is None:
@@ -180,13 +197,43 @@ class Store:
                 ) from None
 
 
+def is_population(folder: str | Path) -> bool:
+    """Whether a folder is one of a population."""
+    return (Path(folder) / MANIFEST).is_file()
+
+
+def manifest(folder: str | Path) -> dict[str, Any]:
+    """The request that a folder was begun with.
+
+    Args:
+        folder: of a population.
+
+    Returns:
+        The table in its population.json.
+
+    Raises:
+        InputError: there is none, or another file.
+    """
+    path = Path(folder) / MANIFEST
+    if not path.is_file():
+        raise InputError(f"no population here: expected a folder with {MANIFEST}", file=str(folder))
+    try:
+        found = json.loads(path.read_text())
+        if not isinstance(found, dict) or not {"t_s", "channels", "count"} <= set(found):
+            raise ValueError("expected t_s, channels and count")
+    except (ValueError, OSError, RecursionError) as error:
+        raise InputError(f"not the request of a population ({error})", file=str(path)) from None
+    return found
+
+
 def _digests(path: Path) -> list[bytes]:
     """The digests of a chunk's robots; none of a damaged file, which is then done again."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     try:
-        return list(pq.ParquetFile(path).read(columns=["digest"]).column("digest").to_pylist())
+        table = pq.ParquetFile(path, page_checksum_verification=True).read(columns=["digest"])
+        return list(table.column("digest").to_pylist())
     except (pa.ArrowException, OSError, KeyError):
         return []
 

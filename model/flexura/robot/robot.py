@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import BaseModel, Field, ValidationError, field_validator, model_validator
 
 from ..errors import InputError, WrongValue
-from ..io import FORMAT, check_format, explain, find, is_name, read_toml, write_toml
+from ..io import FORMAT, check_format, explain, find, is_name, read_toml, summary, write_toml
 from .joint import KEYS
 from .link import LEAST_FREE, Link
 from .old_keys import renamed
@@ -169,6 +169,29 @@ class Robot(Table):
             return cls.model_validate(data)
         except ValidationError as error:
             raise explain(error, cls, data, file) from None
+
+    def __repr__(self) -> str:
+        return summary.text(*self._summary())
+
+    def __str__(self) -> str:
+        return repr(self)
+
+    def _repr_html_(self) -> str:
+        return summary.html(*self._summary())
+
+    def _summary(self) -> tuple[str, list[tuple[str, str]]]:
+        x, y = self.gravity_m_s2
+        rows = [("payload", f"{self.payload.mass_kg:g} kg"), ("gravity", f"({x:g}, {y:g}) m/s^2")]
+        if not self.stiffening:
+            rows.append(("model", "linear, without stiffening"))
+        for i, link in enumerate(self.links, 1):
+            kind = f"flexible, {link.elements} elements" if link.flexible else "rigid"
+            modes = f", {link.modes} modes" if link.modes else ""
+            name = f" ({link.name})" if link.name else ""
+            rows.append(
+                (f"link {i}", f"{link.joint.type}, {link.length_m:g} m, {kind}{modes}{name}")
+            )
+        return f"Robot: {self.name or 'without a name'}, {self.structure}", rows
 
     def to_dict(self) -> dict[str, Any]:
         """The tables of a robot file, without the keys that have their default value."""

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from ..errors import FlexuraError, InputError
+from ..io import summary
 from .statics import static
 from .system import System, jacobian, system_of
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class StateSpace:
     """Small motions x = (dq, d dq/dt) about q, qd (n,): x' = A x + B u, y = C x + D u, with u, y as
     deviations too.
@@ -36,6 +37,26 @@ class StateSpace:
     q: np.ndarray
     qd: np.ndarray
     hold: np.ndarray
+
+    def __repr__(self) -> str:
+        return summary.text(*self._summary())
+
+    def _repr_html_(self) -> str:
+        return summary.html(*self._summary())
+
+    def _summary(self) -> tuple[str, list[tuple[str, str]]]:
+        m, moving = len(self.M), "in steady motion" if self.qd.any() else "at rest"
+        shapes = f"A ({2 * m}, {2 * m}), B ({2 * m}, {len(self.inputs)})"
+        shapes += f", C ({len(self.outputs)}, {2 * m}), D ({len(self.outputs)}, {len(self.inputs)})"
+        hold = [f"{value:.4g}" for value in self.hold]
+        rows = [
+            ("matrices", shapes),
+            ("states", summary.listed(self.states)),
+            ("inputs", summary.listed(f"{name} [{self.units[name]}]" for name in self.inputs)),
+            ("outputs", summary.listed(f"{name} [{self.units[name]}]" for name in self.outputs)),
+            ("hold", f"{summary.listed(hold, 30)}, drives that keep the robot there"),
+        ]
+        return f"StateSpace about a robot {moving}", rows
 
     @property
     def A(self) -> np.ndarray:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..io import STATIONS
+from ..io import STATIONS, summary
 from ..link.line import Piece, whole_piece
 from ..link.shapes import coefficients_of_legendre_sums, legendre_shapes
 from ..robot import Robot, load
@@ -35,6 +35,23 @@ class System:
     nodes: tuple[int, ...] | None = (
         None  # that sliders and sleeves keep, where they go from node to node: `nodes.Nodes`
     )
+
+    def __repr__(self) -> str:
+        return summary.text(*self._summary())
+
+    def _repr_html_(self) -> str:
+        return summary.html(*self._summary())
+
+    def _summary(self) -> tuple[str, list[tuple[str, str]]]:
+        joints = len(self.joint_rows)
+        model = "exact line" if self.exact else "the dissertation's linear line"
+        rows = [
+            ("unknowns", f"{self.n}: {joints} of joints, {self.n - joints} elastic"),
+            ("labels", summary.listed(self.labels)),
+            ("model", model),
+        ]
+        rows += [] if self.nodes is None else [("nodes", summary.listed(self.nodes))]
+        return f"System of {self.robot.name or 'a robot'}, {self.robot.structure}", rows
 
     def fixed(self, q: Any) -> System:
         """The robot of fixed structure at q (n,): itself; where it slides from node to node, with

@@ -22,13 +22,13 @@ import numpy as np
 import flexura as fx
 from flexura import signals
 from flexura.errors import InputError
+from flexura.io import called
 from flexura.signals import JointDrive
 
 from ...rig.description import Rig, rig_of_recording
 from ...rig.emulation import Emulated
 from ...rig.plant.motor import JointLine, joint_line_of, resistance
 from ...rig.plant.stepper import MagneticSpring
-from ...runs.labels import called
 from . import lead_screw
 from .pulses import pulses_of_run
 from .smoothing import (

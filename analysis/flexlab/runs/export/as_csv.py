@@ -9,9 +9,7 @@ import json
 
 import numpy as np
 
-from flexura.io import Run
-
-from ..labels import EMULATED, called, emulated
+from flexura.io import EMULATED, Run, called, emulated
 
 
 def write(run: Run) -> bytes:

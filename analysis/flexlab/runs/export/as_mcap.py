@@ -1,5 +1,6 @@
 """MCAP, the container of ROS 2 and Foxglove: one topic a channel, std_msgs/msg/Float64 in CDR, so
-that common viewers plot it."""
+that common viewers plot it; "joint/1/position" is the topic `/joint_1/position`, as ROS 2 allows
+it."""
 
 from __future__ import annotations
 
@@ -11,10 +12,10 @@ from datetime import datetime
 import numpy as np
 
 from flexura.errors import InputError
-from flexura.io import Run
+from flexura.io import EMULATED, Run, called, emulated
 from flexura.optional import load
 
-from ..labels import EMULATED, called, emulated
+from .names import topics
 
 CDR_LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 SCHEMA = "std_msgs/msg/Float64"
@@ -24,11 +25,9 @@ def write(run: Run) -> bytes:
     """Log times are the run's times after its start (`started`, or 1970), to a nanosecond; `/time`
     has them exactly.
 
-    Units stand in the channels' metadata, the run's in the metadata record `flexura`. Raises
-    InputError for a start that is no time, or a time before 1970.
+    Names and units of the channels stand in their metadata, the run's in the metadata record
+    `flexura`. Raises InputError for a start that is no time, or a time before 1970.
     """
-    Writer = load("mcap.writer").Writer
-
     start = _start_ns(run)
     stamps = start + np.rint(run.t * 1e9).astype(np.int64)
     if len(stamps) and stamps[0] < 0:
@@ -40,17 +39,18 @@ def write(run: Run) -> bytes:
         )
     label = called(run)
     out = io.BytesIO()
-    writer = Writer(out)
+    writer = load("mcap.writer").Writer(out)
     writer.start(profile="ros2", library="flexura")
     schema = writer.register_schema(name=SCHEMA, encoding="ros2msg", data=b"float64 data\n")
     about = {"label": label, "start_ns": str(start), "meta": json.dumps(run.meta)}
     writer.add_metadata("flexura", about | ({"description": EMULATED} if emulated(run) else {}))
+    named = topics(("time", *run))
     for name, values, unit in (("time", run.t, "s"), *((n, run[n], run.units[n]) for n in run)):
         channel = writer.register_channel(
-            topic=f"/{name}",
+            topic=named[name],
             message_encoding="cdr",
             schema_id=schema,
-            metadata={"unit": unit, "label": label},
+            metadata={"unit": unit, "label": label, "channel": name},
         )
         for k, (at, value) in enumerate(
             zip(stamps.tolist(), np.asarray(values, dtype=float).tolist(), strict=True)

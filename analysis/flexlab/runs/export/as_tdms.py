@@ -9,10 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from flexura.io import Run
+from flexura.io import EMULATED, Run, called, emulated
 from flexura.optional import load
-
-from ..labels import EMULATED, called, emulated
 
 GROUP = "run"
 
@@ -24,11 +22,7 @@ def write(run: Run) -> bytes:
     Evenly sampled channels have a time base (`wf_start_offset`, `wf_increment`) besides the channel
     `time`.
     """
-    ChannelObject = load("nptdms").ChannelObject
-    GroupObject = load("nptdms").GroupObject
-    RootObject = load("nptdms").RootObject
-    TdmsWriter = load("nptdms").TdmsWriter
-
+    nptdms = load("nptdms")
     label = called(run)
     about: dict[str, Any] = {"name": label, "label": label, "flexura": json.dumps(run.meta)}
     about |= {
@@ -40,18 +34,22 @@ def write(run: Run) -> bytes:
         about["description"] = EMULATED
     base = _time_base(run.t)
     channels = [
-        ChannelObject(
+        nptdms.ChannelObject(
             GROUP, "time", np.asarray(run.t, dtype=np.float64), properties={"unit_string": "s"}
         )
     ]
     for name, values in run.channels.items():
         properties = {"unit_string": run.units[name], "description": label} | base
         channels.append(
-            ChannelObject(GROUP, name, np.asarray(values, dtype=np.float64), properties=properties)
+            nptdms.ChannelObject(
+                GROUP, name, np.asarray(values, dtype=np.float64), properties=properties
+            )
         )
     out = io.BytesIO()
-    with TdmsWriter(out) as writer:
-        writer.write_segment([RootObject(about), GroupObject(GROUP, {"label": label}), *channels])
+    with nptdms.TdmsWriter(out) as writer:
+        writer.write_segment(
+            [nptdms.RootObject(about), nptdms.GroupObject(GROUP, {"label": label}), *channels]
+        )
     return out.getvalue()
 
 

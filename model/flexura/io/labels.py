@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from flexura.io import Run
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .run import Run
 
 EMULATED = "emulated: board and rig ran as programs, nothing here was measured on a physical rig"
 
 
 def kind(run: Run) -> str:
-    """ "simulation", "twin" or "experiment"."""
+    """What a run is of: "simulation", "twin" or "experiment"."""
     return str(run.meta.get("source") or run.meta.get("kind") or "simulation")
 
 
 def emulated(run: Run) -> bool:
+    """Whether the run is of a board and a rig that ran as programs."""
     return bool(run.meta.get("emulated"))
 
 

@@ -1,24 +1,22 @@
-"""The curves that a review draws, computed from a run's channels and its robot; plain numpy.
+"""The curves that a review, a figure and an animation draw, from a run's channels; plain numpy.
 
-A flexible link: the deflection at its nine stations is interpolated by a cubic spline, clamped at
-the hub and with the slope of the channel `tip_slope` at its tip, and placed in the link's hub
-frame. With geometric stiffening a point at x moves to x - 1/2 int_0^x w'^2, as in the model, so
-that the curve ends at the tip.
+A flexible link: the line through the deflections at its nine stations, as `bending` finds it,
+placed in the link's hub frame.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
-from flexura.io import STATIONS, Run
-from flexura.robot import Link, Robot
+from ..channels import STATIONS
+from .bending import POINTS, inextensible
+from .outline import Outline, outlines, shortens
 
-PER_STATION = 3  # curve points in each interval between stations
-POINTS = (STATIONS - 1) * PER_STATION + 1
-_GAUSS = np.polynomial.legendre.leggauss(3)  # exact for the square of a quadratic slope
+if TYPE_CHECKING:
+    from ..run import Run
 
 
 @dataclass(frozen=True)
@@ -44,7 +42,7 @@ class Curves:
 
 def has_shapes(run: Run) -> bool:
     """Whether the run's channels say where its links are."""
-    links = len(run.meta.get("robot", {}).get("link", []))
+    links = len(outlines(run.meta))
     poses = (f"link/{i}/{part}" for i in range(1, links + 1) for part in ("x", "y", "angle"))
     return (
         links > 0
@@ -55,19 +53,19 @@ def has_shapes(run: Run) -> bool:
 
 def curves(run: Run, index: np.ndarray, size: float) -> Curves:
     """The shapes at the samples `index` (F,); `size` is half the length of a slider's mark [m]."""
-    robot = Robot.from_dict(run.meta["robot"])
+    links = outlines(run.meta)
     undeformed, deformed, rigid, pins, sliders = [], [], [], [], []
     end = np.zeros((len(index), 2))
-    for i, link in enumerate(robot.links, start=1):
+    for i, link in enumerate(links, start=1):
         pose = np.stack([run[f"link/{i}/{part}"][index] for part in ("x", "y", "angle")], axis=1)
         straight = place(pose, np.array([[0.0, 0.0], [link.length_m, 0.0]])[None])
         if link.flexible:
             undeformed.append(straight)
-            deformed.append(place(pose, bent(run, i, link, index, robot.stiffening)))
+            deformed.append(place(pose, bent(run, i, link, index)))
         elif link.length_m > 0:
             rigid.append(straight)
         end = deformed[-1][:, -1] if link.flexible else straight[:, -1]
-        if link.joint.type == "R":
+        if link.joint == "R":
             pins.append(pose[:, :2])
         else:
             sliders.append(place(*slider(run, i, link, pose, index, size)))
@@ -87,52 +85,42 @@ def curves(run: Run, index: np.ndarray, size: float) -> Curves:
         stack(sliders, f, 5),
         tip,
         trace,
-        rail(run, robot, size),
+        rail(run, links[0], size),
     )
 
 
-def bent(run: Run, i: int, link: Link, index: np.ndarray, shortening: bool) -> np.ndarray:
+def bent(run: Run, i: int, link: Outline, index: np.ndarray) -> np.ndarray:
     """Link i's curve in its hub frame, (F, POINTS, 2) [m]; straight where the run has no
     stations."""
     x = np.linspace(0.0, link.length_m, POINTS)
     names = [f"link/{i}/deflection/{k}" for k in range(STATIONS)]
     if not all(name in run for name in names):
-        return np.broadcast_to(
-            np.stack([x, np.zeros(POINTS)], axis=1), (len(index), POINTS, 2)
-        ).copy()
-    at = np.linspace(0.0, link.length_m, STATIONS)
+        straight = np.stack([x, np.zeros(POINTS)], axis=1)
+        return np.broadcast_to(straight, (len(index), POINTS, 2)).copy()
     known = np.stack([run[name][index] for name in names], axis=1)
-    slope_name = f"link/{i}/tip_slope"
-    if slope_name in run:
-        known = np.concatenate([known, run[slope_name][index][:, None]], axis=1)
-    # The spline is linear in what is known: build it once, for unit values.
-    unit = np.eye(known.shape[1])
-    ends = (
-        (1, np.zeros(len(unit))),
-        (1, unit[:, STATIONS]) if slope_name in run else (2, np.zeros(len(unit))),
-    )
-    spline = CubicSpline(at, unit[:, :STATIONS].T, bc_type=ends)
-    w = known @ spline(x).T
-    if not shortening:
-        return np.stack([np.broadcast_to(x, w.shape), w], axis=2)
-    nodes, weights = _GAUSS
-    half = 0.5 * (x[1] - x[0])
-    places = (0.5 * (x[1:] + x[:-1]))[:, None] + half * nodes
-    slope = (known @ spline(places.ravel(), 1).T).reshape(len(index), POINTS - 1, len(nodes))
-    lost = np.cumsum(half * (slope**2 @ weights), axis=1) / 2
-    return np.stack([x - np.concatenate([np.zeros((len(index), 1)), lost], axis=1), w], axis=2)
+    slope = run[f"link/{i}/tip_slope"][index] if f"link/{i}/tip_slope" in run else None
+    if shortens(run.meta):
+        return inextensible(known, slope, link.length_m)
+    from scipy.interpolate import CubicSpline
+
+    at, there = np.linspace(0.0, link.length_m, STATIONS), np.isfinite(known).all(axis=1)
+    zero = np.zeros(len(known))
+    tip = (2, zero) if slope is None else (1, np.where(np.isfinite(slope), slope, 0.0))
+    spline = CubicSpline(at, np.where(there[:, None], known, 0.0).T, bc_type=((1, zero), tip))
+    w = np.where(there[:, None], spline(x).T, np.nan)
+    return np.stack([np.broadcast_to(x, w.shape), w], axis=2)
 
 
 def slider(
-    run: Run, i: int, link: Link, pose: np.ndarray, index: np.ndarray, size: float
+    run: Run, i: int, link: Outline, pose: np.ndarray, index: np.ndarray, size: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """The pose (F, 3) of the rectangle that marks a Pa's hub or a Pb's sleeve, and its corners (1,
     5, 2)."""
     at = pose.copy()
     if (
-        link.joint.type == "Pa"
+        link.joint == "Pa"
     ):  # the hub lies along the previous link, link i leaves it at the fixed angle
-        at[:, 2] -= link.joint.angle_rad
+        at[:, 2] -= link.angle_rad
     else:  # the sleeve is where link i passes, d before the end of the link
         name = f"joint/{i}/position"
         behind = link.length_m - (run[name][index] if name in run else link.length_m)
@@ -150,18 +138,13 @@ def place(pose: np.ndarray, points: np.ndarray) -> np.ndarray:
     return np.stack([pose[:, :1] + c * x - s * y, pose[:, 1:2] + s * x + c * y], axis=2)
 
 
-def rail(run: Run, robot: Robot, size: float) -> np.ndarray | None:
+def rail(run: Run, link: Outline, size: float) -> np.ndarray | None:
     """Both ends (2, 2) of the line on which a first joint Pa slides: its limits and its travel, and
     a little more."""
-    joint = robot.links[0].joint
-    if joint.type != "Pa":
+    if link.joint != "Pa":
         return None
     travel = run["link/1/x"][np.isfinite(run["link/1/x"])]
-    reach = (
-        [*travel[[travel.argmin(), travel.argmax()]], *(joint.limits or ())]
-        if len(travel)
-        else [0.0]
-    )
+    reach = [*travel[[travel.argmin(), travel.argmax()]], *link.limits] if len(travel) else [0.0]
     return np.array([[min(reach) - 1.5 * size, 0.0], [max(reach) + 1.5 * size, 0.0]])
 
 
@@ -209,4 +192,5 @@ def grid(low: np.ndarray, high: np.ndarray) -> tuple[float, np.ndarray]:
 
 
 def stack(parts: list[np.ndarray], frames: int, points: int) -> np.ndarray:
+    """Parts (F, points, 2) along a new second axis; without any, an axis of length 0."""
     return np.stack(parts, axis=1) if parts else np.zeros((frames, 0, points, 2))

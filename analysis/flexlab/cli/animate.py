@@ -1,0 +1,44 @@
+"""The command `flexura animate`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .options import ForceFile
+from .output import progress_bars, say
+from .results import file_result
+from .runs import RobotNumber, one_run
+
+
+def animate(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="folder of a run, or its run.parquet")],
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="FILE", help="a new .gif or .mp4; default: run.gif"),
+    ] = None,
+    frame_rate: Annotated[float, typer.Option(help="pictures a second of the film")] = 25.0,
+    duration_s: Annotated[
+        float | None,
+        typer.Option(help="duration of the film [s]; default: the run's own, but 3 to 12"),
+    ] = None,
+    robot: RobotNumber = None,
+    force: ForceFile = False,
+) -> None:
+    """Write a run as a film: the links as bent as they are, the tip's way, and a clock.
+
+    \b
+    Example: flexura animate logs/first --out first.gif
+    """
+    target = out or (run if run.is_dir() else run.parent) / "run.gif"
+    shown = one_run(run, robot)
+    with file_result(target, force=force), progress_bars("pictures") as report:
+        shown.animate(
+            target,
+            frame_rate=frame_rate,
+            duration=duration_s,
+            progress=lambda fraction: report("pictures", fraction),
+        )
+    say(False, f"stored {target}")

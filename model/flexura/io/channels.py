@@ -1,0 +1,203 @@
+"""The channels of a Run: their names, units, sign, frame and zero, in one table.
+
+Joints and links are counted from 1. The base frame is at the first joint's origin: x to the right,
+y up, angles counter-clockwise. The hub frame of a link has its x axis along the tangent at the
+link's hub (Pb: along the sleeve), its y axis 90 degrees counter-clockwise from there.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+STATIONS = 9  # places along a flexible link at which a Run holds the deflection
+
+SUFFIX = {
+    "s": "s",
+    "m": "m",
+    "rad": "rad",
+    "m/s": "m_s",
+    "rad/s": "rad_s",
+    "N": "N",
+    "N m": "N_m",
+    "J": "J",
+    "V": "V",
+    "A": "A",
+    "1": "1",
+}  # of a column's name in a file, by unit
+
+
+@dataclass(frozen=True)
+class Channel:
+    """What a channel means.
+
+    Attributes:
+        name: the channel, with `i` for a joint or link, `k` for a station, `NAME` for any name.
+        units: its unit; two where it depends on the joint: R, then Pa and Pb.
+        quantity: a short name for a figure's axis.
+        meaning: sign, frame and zero in words.
+    """
+
+    name: str
+    units: tuple[str, ...]
+    quantity: str
+    meaning: str
+
+    def fits(self, name: str) -> bool:
+        """Whether a channel's name is one of these."""
+        parts = {"i": r"[1-9]\d*", "k": r"\d+", "NAME": r".+"}
+        pattern = "/".join(parts.get(part, re.escape(part)) for part in self.name.split("/"))
+        return re.fullmatch(pattern, name) is not None
+
+
+TURN, LENGTH, RATE, FORCE = ("rad", "m"), ("m",), ("rad/s", "m/s"), ("N m", "N")
+
+CHANNELS = (
+    Channel(
+        "joint/i/position",
+        TURN,
+        "joint position",
+        "R: angle of link i's hub against the tangent at the end of link i-1 (i = 1: against x), "
+        "counter-clockwise; 0: aligned. Pa: distance of the hub from the origin of link i-1, along "
+        "that link (i = 1: along x). Pb: free length of link i ahead of its sleeve.",
+    ),
+    Channel(
+        "joint/i/velocity",
+        RATE,
+        "joint velocity",
+        "Time derivative of joint/i/position; the same sign.",
+    ),
+    Channel(
+        "joint/i/drive",
+        FORCE,
+        "drive",
+        "Moment or force of the drive between link i-1 and the hub of link i; positive: it pushes "
+        "joint/i/position up. The work of a drive is the integral of drive times velocity.",
+    ),
+    Channel(
+        "joint/i/motor_position",
+        TURN,
+        "motor position",
+        "Elastic joint: position of the rotor, reduced to the joint; equal to joint/i/position "
+        "where the transmission is not strained.",
+    ),
+    Channel(
+        "joint/i/reference",
+        TURN,
+        "reference",
+        "Set-point of joint/i/position that a controller follows; the same sign and zero.",
+    ),
+    Channel(
+        "joint/i/pulses",
+        TURN,
+        "counted pulses",
+        "Experiment: joint position that the counted pulses of a stepper motor stand for.",
+    ),
+    Channel(
+        "joint/i/voltage",
+        ("V",),
+        "motor voltage",
+        "Voltage at the motor of joint i; positive: it pushes joint/i/position up.",
+    ),
+    Channel(
+        "joint/i/current",
+        ("A",),
+        "motor current",
+        "Current of the motor of joint i, with the voltage's sign.",
+    ),
+    Channel("link/i/x", LENGTH, "hub x", "Origin of link i's hub frame in the base frame."),
+    Channel("link/i/y", LENGTH, "hub y", "Origin of link i's hub frame in the base frame."),
+    Channel(
+        "link/i/angle",
+        ("rad",),
+        "link angle",
+        "Angle of link i's hub frame against the base frame's x, counter-clockwise; counted "
+        "through full turns.",
+    ),
+    Channel(
+        "link/i/tip_deflection",
+        LENGTH,
+        "tip deflection",
+        "Flexible link: distance of its end from the x axis of its hub frame, positive towards y; "
+        "0: straight.",
+    ),
+    Channel(
+        "link/i/tip_slope",
+        ("rad",),
+        "tip slope",
+        "Flexible link: angle of the tangent at its end against the x axis of its hub frame, "
+        "counter-clockwise; 0: straight.",
+    ),
+    Channel(
+        "link/i/deflection/k",
+        LENGTH,
+        "deflection",
+        f"Flexible link: as tip_deflection, of the point at the arc length k L / {STATIONS - 1} "
+        f"from the link's origin, k = 0 ... {STATIONS - 1}.",
+    ),
+    Channel(
+        "link/i/tip_deflection_std",
+        LENGTH,
+        "standard deviation of the tip deflection",
+        "Experiment: standard deviation of a reading of link/i/tip_deflection, 0 or more.",
+    ),
+    Channel(
+        "link/i/flex_voltage",
+        ("V",),
+        "flex sensor voltage",
+        "Experiment: voltage of the flex sensor on link i, as read; not zeroed.",
+    ),
+    Channel(
+        "sensor/NAME",
+        ("m", "rad", "1", "m/s"),
+        "sensor",
+        "Sensor of the robot file: deflection [m] and slope [rad] in the hub frame of its link, "
+        "strain [1] positive where the fibre is stretched.",
+    ),
+    Channel("tip/x", LENGTH, "tip x", "Tip of the last link in the base frame."),
+    Channel("tip/y", LENGTH, "tip y", "Tip of the last link in the base frame."),
+    Channel(
+        "energy/kinetic",
+        ("J",),
+        "kinetic energy",
+        "Of links, hubs, rotors and payload in the base frame; 0: at rest.",
+    ),
+    Channel(
+        "energy/strain",
+        ("J",),
+        "strain energy",
+        "Of bent links and of springs; 0: unstrained.",
+    ),
+    Channel(
+        "energy/potential",
+        ("J",),
+        "potential energy",
+        "Of gravity; 0: all masses at the height of the base frame's origin.",
+    ),
+    Channel("energy/work", ("J",), "work of the drives", "Done by the drives since the start."),
+    Channel(
+        "energy/loss",
+        ("J",),
+        "dissipated energy",
+        "Dissipated by damping and friction since the start; never falls.",
+    ),
+    Channel(
+        "energy/numerical_loss",
+        ("J",),
+        "numerical loss",
+        "Taken out by the numerical damping of the solver since the start.",
+    ),
+)
+
+
+def channel(name: str) -> Channel:
+    """What a channel means; of a name that is in no table, only its last part is known.
+
+    Args:
+        name: for example "joint/1/position".
+
+    Returns:
+        Its row of CHANNELS, or one without units and meaning.
+    """
+    found = next((known for known in CHANNELS if known.fits(name)), None)
+    return found or Channel(name, (), name.rpartition("/")[2].replace("_", " "), "")
