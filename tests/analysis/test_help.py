@@ -19,6 +19,8 @@ EXPERIMENT = ["bench", "free-vibration", "--duration-s", "2"]
 BEFORE = {
     "review": [[*FIRST, "--out", "logs/first"], [*FIRST, "--out", "logs/second"]],
     "export": [[*FIRST, "--out", "logs/first"]],
+    "plot": [[*FIRST, "--out", "logs/first"]],
+    "animate": [[*FIRST, "--out", "logs/first"]],
     "migrate": [["new", "my-arm.toml"]],
     "compare": [[*EXPERIMENT, "--out", "logs/experiment"]],
     "identify": [["bench", "excite", "--seed", "1", "--out", "logs/excite"]],
