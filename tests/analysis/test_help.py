@@ -17,6 +17,9 @@ EXPERIMENT = ["bench", "free-vibration", "--duration-s", "2"]
 BEFORE = {
     "review": [[*FIRST, "--out", "logs/first"], [*FIRST, "--out", "logs/second"]],
     "export": [[*FIRST, "--out", "logs/first"]],
+    "plot": [[*FIRST, "--out", "logs/first"]],
+    "animate": [[*FIRST, "--out", "logs/first"]],
+    "migrate": [["new", "my-arm.toml"]],
     "compare": [[*EXPERIMENT, "--out", "logs/experiment"]],
     "migrate": [["new", "my-arm.toml"]],
     "identify": [["bench", "excite", "--seed", "1", "--out", "logs/excite"]],

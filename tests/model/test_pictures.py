@@ -294,8 +294,9 @@ def shown(run):
     system = fx.assemble(ARM)
     batch = fx.Batch.vary(ARM, {"payload.mass_kg": np.linspace(0, 0.1, 3)})
     population = fx.simulate(batch, np.linspace(0, 0.02, 3))
-    odd = ARM.replace({"name": "<b>arm</b> \x1b[31m [/] \n" + "x" * 100})
-    return [run, ARM, long, odd, system, fx.assemble(odd), fx.linearize(system), population]
+    odd = ARM.replace({"name": "<b>arm</b> [/] " + "x" * 100})
+    coded = fx.Run(run.t, run.channels, run.units, {"robot": {"name": "\x1b[31m\n" + "x" * 100}})
+    return [run, ARM, long, odd, coded, system, fx.assemble(odd), fx.linearize(system), population]
 
 
 def test_twelve_lines_of_eighty_columns_and_a_table(run):

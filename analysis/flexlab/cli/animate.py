@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from .options import ForceFile
-from .output import progress_bars, say
+from .options import ForceFile, Json
+from .output import progress_bars, say, show
 from .results import file_result
 from .runs import RobotNumber, one_run
 
@@ -26,8 +26,11 @@ def animate(
     ] = None,
     robot: RobotNumber = None,
     force: ForceFile = False,
+    json: Json = False,
 ) -> None:
-    """Write a run as a film: the links as bent as they are, the tip's way, and a clock.
+    """Write a run as a film.
+
+    It shows the links as bent as they are, the way of the tip, and a clock.
 
     \b
     Example: flexura animate logs/first --out first.gif
@@ -41,4 +44,6 @@ def animate(
             duration=duration_s,
             progress=lambda fraction: report("pictures", fraction),
         )
-    say(False, f"stored {target}")
+    if json:
+        show(True, lambda: None, lambda: {"file": str(target)})
+    say(json, f"stored {target}")

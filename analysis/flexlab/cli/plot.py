@@ -11,8 +11,8 @@ from flexura.errors import InputError
 from flexura.io import FILE, write_bytes
 from flexura.io.drawing import FORMS, figure, heading, saved
 
-from .options import ForceFile
-from .output import say
+from .options import ForceFile, Json
+from .output import say, show
 from .results import file_result
 from .runs import RobotNumber, named, one_run
 
@@ -33,6 +33,7 @@ def plot(
     title: Annotated[str, typer.Option(help="above the figure; default: the robot's name")] = "",
     robot: RobotNumber = None,
     force: ForceFile = False,
+    json: Json = False,
 ) -> None:
     """Draw a run over time: one panel a unit, the legend beside it.
 
@@ -53,7 +54,9 @@ def plot(
         runs = [one_run(path, robot) for path in paths]
         drawing = figure(runs, patterns, names=named(paths, runs), title=title)
         write_bytes(target, saved(drawing, form, Title=title or heading(runs)))
-    say(False, f"stored {target}")
+    if json:
+        show(True, lambda: None, lambda: {"file": str(target)})
+    say(json, f"stored {target}")
 
 
 def _is_run(text: str) -> bool:
