@@ -325,9 +325,8 @@ def set_up(venv: Path) -> None:
 
 
 def level() -> str:
-    """The instructions that the core may use here, in the module and in the C++ tests.
-
-    Empty: those of any processor."""
+    """The instructions that the core may use here, its module and its C++ tests. Empty: those of
+    any processor."""
     flags = Path("/proc/cpuinfo")
     return (
         "x86-64-v3"

@@ -19,7 +19,6 @@ BEFORE = {
     "export": [[*FIRST, "--out", "logs/first"]],
     "plot": [[*FIRST, "--out", "logs/first"]],
     "animate": [[*FIRST, "--out", "logs/first"]],
-    "migrate": [["new", "my-arm.toml"]],
     "compare": [[*EXPERIMENT, "--out", "logs/experiment"]],
     "migrate": [["new", "my-arm.toml"]],
     "identify": [["bench", "excite", "--seed", "1", "--out", "logs/excite"]],

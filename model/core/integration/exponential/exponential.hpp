@@ -21,7 +21,9 @@ class Exponential : public Method<Real> {
   static constexpr double SAFETY = 0.85;
   static constexpr double TIGHT = 10.0;  // the local error is kept so far below the tolerance: few
                                          // long steps add up what many short ones average out
-  static constexpr double TINY = 1e-4;   // an error after which a step grows by four, not by two
+  static constexpr double TINY = 1e-4;   // an error after which a step grows threefold, not twofold
+  static constexpr double SLIDING =
+      2.0;  // and further where a joint slides along a link that bends
   using Options = ExponentialOptions;
 
   Exponential(Integration<Real> &shared, double tolerance, const Options &wanted = Options())
@@ -29,6 +31,7 @@ class Exponential : public Method<Real> {
         c(shared),
         rtol(tolerance),
         options(wanted),
+        tight(slides(shared.plant) ? SLIDING * TIGHT : TIGHT),
         n(shared.n),
         modes(n),
         steps(modes, extras_of(shared)),
@@ -88,7 +91,7 @@ class Exponential : public Method<Real> {
                 get(size[e], i));
       squares[e] = dot(n, x, x);
     }
-    const Real error = root((squares[0] + squares[1]) * (1.0 / (2 * n))) * TIGHT;
+    const Real error = root((squares[0] + squares[1]) * (1.0 / (2 * n))) * tight;
     if (!(worst(error) < 1.0)) locate_error();
     return larger(error,
                   larger(abs(uncertain[0]), abs(uncertain[1])) * c.weights.joules(c.znew.data()));
@@ -143,7 +146,7 @@ class Exponential : public Method<Real> {
     for (int i = 0; i < order; ++i) most *= SAFETY / GROWTH;
     if (!(starts || steps.equal_steps[k] >= 2) || lately[k] > most) return wished_step[k];
     const double wish =
-        smaller(factor(lately[k]) * h, (lately[k] < TINY ? 4.0 : 2.0) * wished_step[k]);
+        smaller(factor(lately[k]) * h, (lately[k] < TINY ? 3.0 : 2.0) * wished_step[k]);
     if (!(wish > GROWTH * wished_step[k])) return wished_step[k];
     lately[k] = 0.0;
     return wish;
@@ -156,6 +159,7 @@ class Exponential : public Method<Real> {
   Integration<Real> &c;
   const double rtol;
   const Options options;
+  const double tight;  // TIGHT, or more
   const int n;
   ModalBasis<Real> modes;
   ExponentialAdams<Real> steps;
@@ -190,6 +194,10 @@ class Exponential : public Method<Real> {
       out.push_back(j);
     }
     return out;
+  }
+  static bool slides(const Plant<Real> &plant) {
+    return std::any_of(plant.travel.begin(), plant.travel.end(),
+                       [](const Real &most) { return worst(most) > 0.0; });
   }
   const Real *kept(int row) const { return steps.extra(row) + steps.extras - 3 * n; }
 
