@@ -38,7 +38,7 @@ def simulate(
     numerical_damping: bool = True,
     progress: Progress = None,
 ) -> Run:
-    """Integrate the equations of motion of one robot (19); arguments and errors as in
+    """Integrate the equations of motion of one robot (25); arguments and errors as in
     `flexura.simulate`."""
     problem = initial_value_problem(
         robot, t_eval, drive, q0, qd0, rtol, method, numerical_damping, start, continue_from

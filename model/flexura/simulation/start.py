@@ -23,7 +23,7 @@ def consistent_start(
     """q and qd (n,) at the start t [s], and which start it is: "given", "static" or "straight".
 
     Locked joints are at rest, prescribed ones on their motion. Without q0 the links are straight,
-    or under gravity in static equilibrium with the joints held where they start (25).
+    or under gravity in static equilibrium with the joints held where they start (50).
 
     Raises: InputError: wrong shapes, a drive of another number of joints, a joint outside its
     limits. NoEquilibrium: there is none.

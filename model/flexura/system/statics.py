@@ -57,7 +57,7 @@ def static(
 
 def equilibrium(equations: Any, q: np.ndarray, load: np.ndarray | None = None) -> np.ndarray:
     """The static equilibrium (n,) of compiled equations with the joints where they are in q (n,),
-    under a `load` (3,) at the tip: force x, y [N] and moment [N m] (25).
+    under a `load` (3,) at the tip: force x, y [N] and moment [N m] (50).
 
     Raises: NoEquilibrium: there is none, or it was not found.
     """
@@ -76,7 +76,7 @@ def equilibrium(equations: Any, q: np.ndarray, load: np.ndarray | None = None) -
 
 
 def holding(robot: Any, q: Any = None) -> np.ndarray:
-    """The drives (links,) [N or N m] that hold the joints at rest (19): elastic forces and gravity
+    """The drives (links,) [N or N m] that hold the joints at rest (25): elastic forces and gravity
     in their rows.
 
     Args:
