@@ -50,7 +50,7 @@ for load in (1e-3, 2.0, 20.0):
     )
     q = fx.static(system)
     x, y, slope = fx.tip_pose(system, q)
-    torque = fx.linearize(system).hold[0]
+    torque = fx.holding(system)[0]
     analytic = [LENGTH_M, -load / 8, -load / 6, load / 2]
     if load > 0.01:
         analytic = heavy(load) * [1, 1, 1, load]

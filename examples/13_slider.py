@@ -46,7 +46,7 @@ system = fx.assemble(robot)
 
 show = Comparison(__doc__, bound=5e-4)
 for s in (0.2, 0.4, 0.6):
-    held = fx.linearize(system, q=fx.static(system, joints=[0.0, s])).hold[1]
+    held = fx.holding(system, fx.static(system, joints=[0.0, s]))[1]
     show.add(f"holding force at {s} m [N]", held, -force(s))
 
 t = np.linspace(0, 5, 501)

@@ -41,7 +41,7 @@ system = fx.assemble(fx.Robot.from_dict(tables | {"gravity_m_s2": [0.0, -GRAVITY
 
 show = Comparison(__doc__, bound=1e-5)
 lengths = (0.2, 0.4, 0.6, 0.8)
-held = [fx.linearize(system, q=fx.static(system, joints=[d])).hold[0] for d in lengths]
+held = [fx.holding(system, fx.static(system, joints=[d]))[0] for d in lengths]
 for d, force in zip(lengths, held):
     show.add(f"drive at d = {d} m [N]", force, -push(d))
 

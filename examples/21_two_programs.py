@@ -55,8 +55,10 @@ robot = fx.Robot.from_dict(tables | {"gravity_m_s2": [0.0, -GRAVITY_M_S2]})
 
 t = np.linspace(0, 0.3, 301)
 analytic = series(t)
-straight = fx.assemble(robot).start()
-runs = {"flexura": fx.simulate(robot, t, q0=straight), "Exudyn": twin.simulate(robot, t)}
+runs = {
+    "flexura": fx.simulate(robot, t, start="straight"),
+    "Exudyn": twin.simulate(robot, t, start="straight"),
+}
 
 show = Comparison(__doc__, bound=2e-3)
 size = np.abs(analytic).max()

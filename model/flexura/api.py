@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable
 from typing import Any, overload
 
 from .errors import InputError
@@ -13,6 +15,11 @@ from .simulation.dynamics import DriveLike
 from .simulation.dynamics import simulate as simulate_robot
 from .simulation.problem import Progress
 
+OF_ONE, OF_MANY = (
+    {p.name for p in inspect.signature(f).parameters.values() if p.kind is p.KEYWORD_ONLY}
+    for f in (simulate_robot, simulate_population)
+)
+
 
 @overload
 def simulate(
@@ -22,12 +29,15 @@ def simulate(
 def simulate(
     robot: Any,
     t_eval: Any,
-    drive: DriveLike | None = None,
+    drive: DriveLike = None,
     q0: Any = None,
     qd0: Any = None,
     rtol: float = 1e-6,
     *,
     method: str = "auto",
+    start: str | None = None,
+    continue_from: Run | None = None,
+    until: Callable[..., Any] | None = None,
     numerical_damping: bool = True,
     progress: Progress = None,
 ) -> Run: ...
@@ -42,39 +52,55 @@ def simulate(
 ) -> Any:
     """Integrate the equations of motion from t_eval[0] on; the Run has its channels at t_eval (T,).
 
-    A joint that reaches a limit of the robot file or the end of its link ends the run. So does a
-    tolerance that cannot be kept, a state that is not a number, and Ctrl-C. The Run then has what
-    was computed until there, an event says what happened and where, and `meta["complete"]` is
-    false. `meta["energy_error"]` is how far the energies are from balancing, relative to the
-    largest; beyond 1e-3 an event says so, beyond 0.1 the run is not complete.
+    Under gravity a run starts in static equilibrium, with the joints held where they start and the
+    links bent by their weight; `meta["start"]` says which start was used. A joint that reaches a
+    limit of the robot file or the end of its link ends the run. So does a tolerance that cannot be
+    kept, a state that is not a number, and Ctrl-C. The Run then has what was computed until there,
+    an event says what happened and where, and `meta["complete"]` is false. `meta["energy_error"]`
+    is how far the energies are from balancing, relative to the largest; beyond 1e-3 an event says
+    so, beyond 0.1 the run is not complete. Each event has a name: "limit", "end_of_link", "sleeve",
+    "interrupted", "stuck", "diverged", "exhausted", "balance", "node", "until", "still".
 
     Args:
-        robot: a System, a Robot, a robot file, or a Batch of robots, which gives a Population;
-        `flexura.population.simulate`
-            says what else that takes.
-        t_eval (T,): ascending times [s]. drive: a Drive, a sampled Controller, `Sampled(f,
-        rate_Hz)`, or a function of (t) or of (t, position, velocity,
-            tip_deflection) that gives (links,) forces and torques [N or N m]. Such a function may
-            be called again for times within a step, never before its start, and must have no
-            memory.
-        q0, qd0 (n,): the state at the start, by default `system.start()` at rest. rtol: the error
-        that is asked for, of deflections and of a thousandth of the tip's path. method: "auto",
-        "explicit" (order 8), "implicit", or "exponential". numerical_damping: exponential steps
-        damp fast modes that change no output by more than the tolerance
-            (94); False: they do not.
+        robot: a System, a Robot, the path or name of a robot file, or a Batch of robots, which
+            gives a Population; `flexura.population.simulate` says what else that takes.
+        t_eval (T,): ascending times [s].
+        drive: a Drive, a sampled Controller, `Sampled(f, rate_Hz)`, or a function of (t) or of (t,
+            position, velocity, tip_deflection) that gives (links,) forces and torques [N or N m].
+            Such a function may be called again for times within a step, never before its start,
+            and must have no memory. Or forces, one entry a joint: a number, a Signal, a function
+            of t, an array of len(t_eval) values, or None; or an array (T, joints).
+        q0, qd0 (n,): the state at the start; without qd0 the robot is at rest.
+        rtol: the error that is asked for, of deflections and of a thousandth of the tip's path.
+        method: "auto", "explicit" (order 8), "implicit", or "exponential".
+        start: where q0 is not given, "static", which is the default under gravity, or "straight".
+        continue_from: a Run of `simulate`, at whose end this one starts, with its state and its
+            work and losses; t_eval begins there, so that signals go on. Controllers begin anew.
+        until: a function of (t, position, velocity, tip_deflection) that gives a bool, or a number
+            of which a change of sign counts. It is looked at at the times t_eval; the instant
+            between two of them is then found, by integrating again from the first of the two, and
+            the run ends there, complete, with the event "until". Under a Sampled or a Controller
+            the run ends at the time of t_eval itself.
+        numerical_damping: exponential steps damp fast modes that change no output by more than the
+            tolerance (94); False: they do not.
         progress: called with the finished fraction.
 
+    Returns: a Run, of a Batch a Population.
+
     Raises:
-        InputError: an argument is not what is expected.
+        InputError: an argument is not what is expected, or a motion has nothing that follows it.
+        NoEquilibrium: there is no static equilibrium to start in.
     """
     if isinstance(robot, Batch):
         if not (drive is None or isinstance(drive, Drive)):
             raise InputError(
                 "expected a Drive: a population runs in the core alone", key="drive", value=drive
             )
+        for key in options:
+            if key in OF_ONE and key not in OF_MANY:
+                raise InputError("expected this of one robot only, not of a Batch", key=key)
         return simulate_population(robot, t_eval, drive, q0, qd0, rtol, **options)
-    known = ("method", "numerical_damping", "progress")
     for key in options:
-        if key not in known:
+        if key in OF_MANY and key not in OF_ONE:
             raise InputError("expected this of a Batch only, not of one robot", key=key)
     return simulate_robot(robot, t_eval, drive, q0, qd0, rtol, **options)

@@ -74,7 +74,7 @@ def soft_pendulum(stiffer: float, elements: int) -> fx.System:
 @pytest.mark.parametrize("stiffer", SOFT)
 def test_a_soft_pendulum_is_let_go(stiffer):
     wanted, near = SOFT[stiffer]
-    run = fx.simulate(soft_pendulum(stiffer, 16), [0.0, 0.5, 1.0, 2.0, 3.0])
+    run = fx.simulate(soft_pendulum(stiffer, 16), [0.0, 0.5, 1.0, 2.0, 3.0], start="straight")
     closed(run)
     off = np.abs(np.column_stack([run["tip/x"], run["tip/y"]])[1:] - wanted).max(axis=1)
     assert (off < near).all(), off
@@ -82,7 +82,7 @@ def test_a_soft_pendulum_is_let_go(stiffer):
 
 @pytest.mark.parametrize("elements", [4, 8, 32])
 def test_any_mesh_of_a_soft_pendulum_runs(elements):
-    run = fx.simulate(soft_pendulum(1.0, elements), [0.0, 0.5])
+    run = fx.simulate(soft_pendulum(1.0, elements), [0.0, 0.5], start="straight")
     closed(run)
     assert (run["tip/x"][-1], run["tip/y"][-1]) == pytest.approx(
         (1.0650, -1.2308), abs=5e-3 if elements == 4 else 5e-4
@@ -97,6 +97,7 @@ def test_the_flexible_pendulum(elements, near):
         system(beam(1.0, 0.5, 0.5, elements), gravity=(0.0, -9.81)),
         [0.0, 0.25, 0.5, 0.75, 1.0],
         rtol=1e-8,
+        start="straight",
     )
     closed(run, 1e-6)
     assert np.abs(np.column_stack([run["tip/x"], run["tip/y"]])[1:] - wanted).max() < near
@@ -167,7 +168,7 @@ def test_a_falling_cable_on_a_tiny_hub_takes_few_passes():
     joint = {"type": "R", "hub_inertia_kg_m2": 1.667e-8}
     link = {"length_m": 2.0, "elements": 8, "damping": {"beta_s": 0.02}, "joint": joint} | steel
     cable, t = system(link, gravity=(0.0, -9.81)), np.linspace(0, 0.5, 51)
-    run = few(lambda method: fx.simulate(cable, t, method=method))
+    run = few(lambda method: fx.simulate(cable, t, method=method, start="straight"))
     assert run.meta["evaluations"] < 4000
     rod = fx.simulate(
         system(rigid(2.0, 1.56, 1.0, 1.56 * 4 / 12), gravity=(0.0, -9.81)), [0.0, 0.5], rtol=1e-10
@@ -244,9 +245,11 @@ def test_the_loss_of_a_damped_strip_in_its_sleeve(method):
     """The shipped strip in its sleeve under gravity, let go straight: 1.86e-4 J by every method,
     and the energies balance."""
     sleeved = fx.load("model/robots/single-pb.toml").replace({"link.1.joint.locked": True})
-    run = fx.simulate(sleeved, np.linspace(0, 0.5, 6), method=method)
+    run = fx.simulate(sleeved, np.linspace(0, 0.5, 6), method=method, start="straight")
     closed(run)
-    fine = fx.simulate(sleeved, np.linspace(0, 0.5, 6), method="implicit", rtol=1e-8)
+    fine = fx.simulate(
+        sleeved, np.linspace(0, 0.5, 6), method="implicit", rtol=1e-8, start="straight"
+    )
     assert run["energy/loss"][-1] == pytest.approx(fine["energy/loss"][-1], rel=2e-3)
 
 
@@ -270,6 +273,7 @@ def test_the_loss_of_the_dissertations_strip_in_its_sleeve():
         system(link, gravity=(0.0, -9.81), payload=0.01, stiffening=False),
         np.linspace(0, 0.5, 6),
         rtol=1e-5,
+        start="straight",
     )
     closed(run)
     assert run["energy/loss"][-1] == pytest.approx(1.86e-4, rel=3e-3)

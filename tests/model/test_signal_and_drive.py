@@ -294,9 +294,9 @@ WRONG_SIGNALS = {
     ),
     "too few values": (
         {"kind": "table", "t_s": [0, 1], "y": [1]},
-        "signal.t_s",
-        [0.0, 1.0],
-        "as many values",
+        "signal.y",
+        [1],
+        "2 finite values, one a time",
     ),
     "no instants": (
         {"kind": "piecewise", "at_s": [], "value": []},
@@ -459,7 +459,7 @@ def test_the_breaks_of_a_drive_are_sorted_and_each_there_once():
 
 
 def test_gains_and_motions_come_in_equal_numbers():
-    with pytest.raises(ValueError, match="longer"):
+    with pytest.raises(fx.InputError, match=r"^kp = \[1.0, 2.0\]"):
         Drive.pd([constant(1.0)], [1.0, 2.0], [1.0])
 
 

@@ -81,7 +81,7 @@ def test_free_vibration_has_the_frequency_of_a_cantilever_with_tip_mass():
     gravity = arm.replace(
         {"gravity_m_s2": [0.0, -0.05]}
     )  # a sudden uniform load: mostly the first mode, about its static value
-    w = twin.simulate(gravity, t)["link/2/tip_deflection"]
+    w = twin.simulate(gravity, t, start="straight")["link/2/tip_deflection"]
     shape = np.column_stack(
         [np.cos(k * t) for k in (omega, 4.111133386**2 * np.sqrt(stiffness / mass) / length**2)]
     )
@@ -115,7 +115,9 @@ def test_energy_is_conserved_in_free_motion(kind):
         payload_inertia=1e-4,
         gravity=(0.0, -2.0),
     )
-    run = twin.simulate(arm, np.linspace(0, 1, 101), qd0=[1.0, -0.5], beam=kind, step_s=2.5e-4)
+    run = twin.simulate(
+        arm, np.linspace(0, 1, 101), qd0=[1.0, -0.5], beam=kind, step_s=2.5e-4, start="straight"
+    )
     exchanged = np.ptp(run["energy/potential"])
     assert abs(total_energy(run) - total_energy(run)[0]).max() < 1e-3 * exchanged
     assert np.ptp(run["energy/strain"]) > 0.02 * exchanged
@@ -163,7 +165,7 @@ def test_bending_damping_is_proportional_to_stiffness():
     omega = 1.875104069**2 * np.sqrt(stiffness / mass) / length**2
     arm = robot(beam(length, mass, stiffness, beta=beta, locked=True), gravity=(0.0, -0.1))
     t = np.linspace(0, 8 * np.pi / omega, 401)
-    w = twin.simulate(arm, t)["link/1/tip_deflection"]
+    w = twin.simulate(arm, t, start="straight")["link/1/tip_deflection"]
     zeta = beta * omega / 2
     static = -mass * 0.1 * length**4 / 8 / stiffness
     phase = omega * np.sqrt(1 - zeta**2) * t
@@ -186,8 +188,10 @@ def test_a_tapered_link_has_the_exact_static_deflection(kind):
     taper = {"at_m": 0.0, "value": 2.0}, {"at_m": length, "value": 0.5}
     link = beam(length, 1e-3, 1.0, locked=True, beta=0.02) | {"bending_stiffness_N_m2": list(taper)}
     arm = robot(link, payload=0.1, gravity=(0.0, -load))
-    run = twin.simulate(arm, np.array([0.0, 2.0]), beam=kind, step_s=1e-3)
-    coarse = twin.simulate(arm, np.array([0.0, 2.0]), beam=kind, step_s=1e-3, elements=6)
+    run = twin.simulate(arm, np.array([0.0, 2.0]), beam=kind, step_s=1e-3, start="straight")
+    coarse = twin.simulate(
+        arm, np.array([0.0, 2.0]), beam=kind, step_s=1e-3, elements=6, start="straight"
+    )
     x = np.linspace(0, length, 20001)
     moment = 0.1 * load * (length - x) + 1e-3 * load * (length - x) ** 2 / 2
     exact = -np.trapezoid(moment * (length - x) / (2.0 - 3.0 * x), x)

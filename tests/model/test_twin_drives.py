@@ -9,6 +9,7 @@ import threading
 import numpy as np
 import pytest
 
+import flexura
 from flexura import signals, twin
 from flexura.errors import FlexuraError, InputError
 from flexura.signals import Drive
@@ -169,14 +170,36 @@ def test_what_it_does_not_contain_is_refused_by_name(change, key):
         ({"step_s": 0.0}, "step_s"),
         ({"step_s": 1e-9}, "step_s"),
         ({"drive": Drive.none(2)}, "drive"),
-        ({"drive": 3.0}, "drive"),
+        ({"drive": "3.0"}, "drive"),
+        ({"drive": Drive.pd([1.0], 0.0, 0.0)}, "drive"),
         ({"drive": lambda t: [1.0, 2.0]}, "drive"),
-        ({"drive": Drive.prescribed(signals.cycloid(0.1, 0.5))}, "prescribed"),
     ],
 )
 def test_wrong_arguments_are_refused_by_name(arguments, key):
     with pytest.raises(InputError, match=key):
         twin.simulate(bench_arm(), **({"t_eval": [0.0, 0.1]} | arguments))
+
+
+def test_prescribed_joints_take_the_drives_of_inverse_dynamics():
+    """An arm in a vertical plane, from its equilibrium along motions: drives by two programs."""
+    arm = robot(
+        beam(0.5, 0.5, 10.0, "R", 3, start=0.4, hub_inertia_kg_m2=0.01, viscous_friction=0.05),
+        beam(0.4, 0.3, 5.0, "R", 3, start=-0.9, hub_inertia_kg_m2=0.01, rotor_inertia=0.02),
+        gravity=(0.0, -9.81),
+        payload=0.3,
+    )
+    t = np.linspace(0, 0.6, 61)
+    motions = [signals.polynomial(0.8, 0.5, 0.4), signals.polynomial(-0.5, 0.5, -0.9)]
+    native = flexura.inverse(arm, t, motions)
+    other = twin.simulate(arm, t, Drive.prescribed(*motions))
+    assert native.meta["start"] == other.meta["start"] == "static"
+    for i in (1, 2):
+        assert other[f"joint/{i}/position"] == pytest.approx(
+            native[f"joint/{i}/position"], abs=1e-9
+        )
+        drive = native[f"joint/{i}/drive"]
+        assert np.abs(other[f"joint/{i}/drive"] - drive).max() < 0.01 * np.abs(drive).max()
+        assert other[f"joint/{i}/drive"][0] == pytest.approx(flexura.holding(arm)[i - 1], rel=1e-3)
 
 
 def test_it_is_quiet_and_writes_no_files(tmp_path):

@@ -97,12 +97,10 @@ def run(
         if time.process_time() - begun > limit_s:
             raise TooSlow(f"{fraction:.0%} after {limit_s:g} s")
 
-    if "start" in inspect.signature(fx.simulate).parameters:
-        keys["start"] = "straight"
+    keys["start"] = "straight"
     progress: Callable[[float], None] | None = watch if limit_s else None
     work = work or problem.work
     if problem.inverse:
-        keys.pop("start", None)
         done = fx.inverse(
             made, problem.t, work.prescribed, rtol=rtol, method=method, progress=progress, **keys
         )

@@ -13,8 +13,8 @@ from flexura.optional import need
 from ..crosscheck import crosscheck as cross
 from ..crosscheck import nine_structures
 from . import tables
-from .options import Force, Json, ManoeuvreFile, Out, Rtol, stem
-from .output import events, interrupted, prepare, progress_bars, say, show, warn
+from .options import Force, Json, ManoeuvreFile, Out, Prescribed, Rtol, Start, stem
+from .output import events, followed, interrupted, prepare, progress_bars, say, show, warn
 from .results import results
 
 
@@ -32,6 +32,8 @@ def crosscheck(
         float,
         typer.Option(min=0.0, help="largest deviation allowed, relative to each channel's peak"),
     ] = 0.01,
+    prescribed: Prescribed = False,
+    start: Start = None,
     all_: Annotated[
         bool,
         typer.Option("--all", help="check the dissertation's nine structures instead of a ROBOT"),
@@ -64,7 +66,8 @@ def crosscheck(
                 raise InputError("expected without --all", key=key, value=str(given))
         _crosscheck_all(out, force, json)
         return
-    system, asked = prepare(robot, manoeuvre)
+    system, asked = prepare(robot, manoeuvre, prescribed, start)
+    followed(asked, manoeuvre, "call with --prescribed")
     with results(out, "crosscheck", robot.stem, *stem(manoeuvre), force=force) as draft:
         with progress_bars("native", "twin") as report:
             check = cross.crosscheck(

@@ -12,7 +12,7 @@ from flexura.io import FILE
 
 from ..studies.drive_requirements import efforts
 from . import tables
-from .options import Force, Json, Out, RobotFile, Rtol
+from .options import Force, Json, Out, RobotFile, Rtol, Start
 from .output import interrupted, prepare, progress_bars, show, stored
 from .results import results
 
@@ -29,6 +29,7 @@ def inverse(
     rtol: Rtol = 1e-7,
     method: Annotated[str, typer.Option(help="auto, explicit or implicit")] = "auto",
     force: Force = False,
+    start: Start = None,
     json: Json = False,
 ) -> None:
     """Compute the forces and torques that a manoeuvre's motions take.
@@ -38,7 +39,7 @@ def inverse(
     \b
     Example: flexura inverse rig rig-inverse-law
     """
-    system, asked = prepare(robot, manoeuvre)
+    system, asked = prepare(robot, manoeuvre, start=start)
     motions = [joint.motion for joint in asked.drive.joints]
     for i, (motion, link) in enumerate(zip(motions, system.robot.links, strict=True), 1):
         if motion is None and not link.joint.locked:
@@ -48,7 +49,7 @@ def inverse(
                 file=str(manoeuvre),
             )
     try:
-        drive = fx.Drive.prescribed(*motions)
+        drive = asked.prescribed().drive
     except fx.InputError as error:
         raise error.in_file(str(manoeuvre)) from None
     with results(out, "inverse", robot.stem, manoeuvre.stem, force=force) as draft:
@@ -59,6 +60,7 @@ def inverse(
                 drive,
                 rtol=rtol,
                 method=method,
+                start=asked.start,
                 progress=lambda f: report("inverse", f),
             )
         run.meta["manoeuvre"] = asked.name

@@ -36,6 +36,16 @@ Force = Annotated[
 ForceFile = Annotated[bool, typer.Option("--force", help="replace a file that is there")]
 Json = Annotated[bool, typer.Option("--json", help="print JSON instead of tables, for scripts")]
 Rtol = Annotated[float, typer.Option(help="relative tolerance of the native solver")]
+Prescribed = Annotated[
+    bool, typer.Option("--prescribed", help="follow the manoeuvre's motions exactly")
+]
+Start = Annotated[
+    str | None,
+    typer.Option(
+        metavar="static|straight",
+        help="links at the start: in equilibrium under gravity, the default, or straight",
+    ),
+]
 
 
 def stem(path: Path | None) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ import json as json_
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,21 +15,43 @@ import typer
 import flexura as fx
 from flexura.io import FILE
 
+from ..crosscheck.default_manoeuvre import described as described_manoeuvre
 from ..crosscheck.default_manoeuvre import modest
 from ..runs.formatting import printable
 from ..runs.table import WIDTH
 from .verbosity import quiet
 
 
-def prepare(robot: Path, manoeuvre: Path | None) -> Any:
-    """The assembled robot and what it is asked to do."""
+def prepare(
+    robot: Path, manoeuvre: Path | None, prescribed: bool = False, start: str | None = None
+) -> Any:
+    """The assembled robot and what it is asked to do; a manoeuvre of its own is told on stderr."""
     described = fx.load(robot)
     try:
         system = fx.assemble(described)
     except fx.InputError as error:
         raise error if error.file else error.in_file(str(robot)) from None
     asked = None if manoeuvre is None else fx.load_manoeuvre(manoeuvre, len(described.links))
-    return system, asked or modest(system)
+    if asked is None:
+        asked = modest(system)
+        typer.echo(described_manoeuvre(asked, described), err=True)
+    try:
+        asked = asked.prescribed() if prescribed else asked
+    except fx.InputError as error:
+        raise error.in_file(str(manoeuvre)) from None
+    return system, replace(asked, start=start or asked.start)
+
+
+def followed(asked: fx.Manoeuvre, manoeuvre: Path | None, options: str) -> None:
+    """Refuse a motion that nothing follows; `options` of the command say what to do."""
+    for i, joint in enumerate(asked.drive.joints, 1):
+        if joint.unfollowed:
+            raise fx.InputError(
+                f"joint {i} has a motion, but neither gains nor prescribed: give it kp and kd, or "
+                f"{options}",
+                key=f"joint[{i}].motion",
+                file=str(manoeuvre or ""),
+            )
 
 
 @contextmanager

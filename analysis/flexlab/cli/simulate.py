@@ -13,8 +13,8 @@ from flexura.io import FILE
 from ..studies import parameter_sweep
 from ..tuning.closed_loop import controller_from_file
 from . import tables
-from .options import Force, Json, ManoeuvreFile, Out, RobotFile, Rtol, stem
-from .output import interrupted, prepare, progress_bars, say, show, stored, warn
+from .options import Force, Json, ManoeuvreFile, Out, Prescribed, RobotFile, Rtol, Start, stem
+from .output import followed, interrupted, prepare, progress_bars, say, show, stored, warn
 from .results import continued, results
 
 
@@ -31,6 +31,8 @@ def simulate(
             help="gains file (TOML): a sampled controller follows the manoeuvre's motions",
         ),
     ] = None,
+    prescribed: Prescribed = False,
+    start: Start = None,
     vary: Annotated[
         list[str] | None,
         typer.Option(
@@ -62,9 +64,17 @@ def simulate(
         for key, given in (("--force", force), ("--controller", controller)):
             if given:
                 raise fx.InputError("expected without --vary", key=key, value=str(given))
-        _simulate_many(robot, manoeuvre, vary, out, rtol, method, scheduler, json)
+        _simulate_many(
+            robot, manoeuvre, prescribed, start, vary, out, rtol, method, scheduler, json
+        )
         return
-    system, asked = prepare(robot, manoeuvre)
+    if controller and prescribed:
+        raise fx.InputError(
+            "expected without --prescribed", key="--controller", value=str(controller)
+        )
+    system, asked = prepare(robot, manoeuvre, prescribed, start)
+    if not controller:
+        followed(asked, manoeuvre, "call with --controller GAINS or --prescribed")
     drive = controller_from_file(system, asked, controller) if controller else asked.drive
     with results(out, "simulate", robot.stem, *stem(manoeuvre), force=force) as draft:
         with progress_bars("native") as report:
@@ -74,6 +84,7 @@ def simulate(
                 drive,
                 rtol=rtol,
                 method=method,
+                start=asked.start,
                 progress=lambda f: report("native", f),
             )
         run.meta["manoeuvre"] = asked.name
@@ -90,6 +101,8 @@ def simulate(
 def _simulate_many(
     robot: Path,
     manoeuvre: Path | None,
+    prescribed: bool,
+    start: str | None,
     vary: list[str],
     out: Path | None,
     rtol: float,
@@ -98,7 +111,8 @@ def _simulate_many(
     json: bool,
 ) -> None:
     parameter_sweep.ranges(vary)  # the count is refused before anything is computed
-    system, asked = prepare(robot, manoeuvre)
+    system, asked = prepare(robot, manoeuvre, prescribed, start)
+    followed(asked, manoeuvre, "call with --prescribed")
     batch, chosen = parameter_sweep.grid(system.robot, vary)
     folder = continued(out, "population", robot.stem, *stem(manoeuvre), mark="population.json")
     with progress_bars("robots") as report:
@@ -108,6 +122,7 @@ def _simulate_many(
             asked.drive,
             rtol=rtol,
             method=method,
+            start=asked.start,
             folder=folder,
             scheduler=scheduler,
             progress=lambda f: report("robots", f),

@@ -110,7 +110,7 @@ def run_table(run: fx.Run) -> Table:
 def _solved(about: dict[str, Any]) -> str:
     return (
         f"{about['method']}, {about['steps']} steps, rtol {about['rtol']:g}, "
-        f"energy error {about['energy_error']:.1e}"
+        f"energy error {about['energy_error']:.1e}; start: {about['start']}"
     )
 
 

@@ -83,7 +83,7 @@ def crosscheck(
 
     Args:
         robot: the robot of both.
-        manoeuvre: what it does; the twin has no prescribed joints.
+        manoeuvre: what it does.
         beam: "ancf" or "ge", see `flexura.twin`.
         rtol: relative tolerance of the native solver.
         tolerance: largest deviation allowed, relative to each channel's largest magnitude.
@@ -91,22 +91,14 @@ def crosscheck(
             leaves the verdict open.
         own_error: estimate the twin's own error, by one more run of the twin or a few.
         progress: called with "native" or "twin" and the finished fraction.
-
-    Raises:
-        InputError: a joint is prescribed.
     """
-    if manoeuvre.drive.follows.any():
-        raise fx.InputError(
-            "expected a force, or gains on the motion: the twin has no prescribed joints",
-            key="prescribed",
-            value=True,
-        )
     report = progress or (lambda name, fraction: None)
     native = fx.simulate(
         fx.assemble(robot),
         manoeuvre.t,
         manoeuvre.drive,
         rtol=rtol,
+        start=manoeuvre.start,
         progress=lambda f: report("native", f),
     )
     report("native", 1.0)
@@ -116,6 +108,7 @@ def crosscheck(
             robot,
             native.t,
             manoeuvre.drive,
+            start=manoeuvre.start,
             beam=beam,
             step_s=step,
             progress=lambda f: report("twin", begin + part * f),

@@ -141,7 +141,9 @@ def _row(work: _Work) -> Row:
     try:
         system = fx.assemble(robot)
         row["first_frequency_Hz"] = float(min(fx.frequencies(system), default=np.nan))
-        run = fx.simulate(system, case.manoeuvre.t, case.manoeuvre.drive, rtol=rtol)
+        run = fx.simulate(
+            system, case.manoeuvre.t, case.manoeuvre.drive, rtol=rtol, start=case.manoeuvre.start
+        )
     except fx.FlexuraError as error:
         return row | {"complete": False, "error": str(error)}
     if any(event["text"] == "interrupted" for event in run.meta["events"]):

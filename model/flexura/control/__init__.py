@@ -4,22 +4,17 @@ functions of the caller's."""
 from .controller import (
     DEFLECTION,
     DERIVATIVE,
-    GAINS,
     LIMIT,
-    PID,
     SETPOINT,
     SLEW,
     Controller,
-    Force,
     Linear,
-    Motor,
-    Output,
-    Stepper,
     smoothing,
 )
 from .gains import BOARD, NAMES, Gains
 from .gains import load as load_gains
 from .lqr_design import Design, lqr
+from .pid import GAINS, PID, Force, Motor, Output, Stepper
 from .sampled import DriveFunction, Sampled
 from .step_response import (
     EFFORT,

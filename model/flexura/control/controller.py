@@ -25,16 +25,18 @@ stepper.
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, fields, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 
 from .. import core, signals
 from ..errors import InputError
-from ..io import Run
-from ..signals import Drive, JointDrive, Signal
+from ..io import Run, number
+from ..signals import Drive, JointDrive
 from ..system import System
+from .pid import GAINS, PID, Motor, Stepper, not_negative
 
 NONE, EFFORT, STEPPER = (
     0,
@@ -63,115 +65,6 @@ NONE, EFFORT, STEPPER = (
     RIGID,
     DELAY,
 ) = range(20)  # columns of `Controller.gains`, as Gain of control/controller.hpp in the core
-
-
-@dataclass(frozen=True)
-class Force:
-    """The law's output is the joint's force or torque itself [N or N m]."""
-
-
-@dataclass(frozen=True)
-class Motor:
-    """The output is a DC motor's voltage u: force = force_per_V u - damping eta' (62).
-
-    With torque constant k, resistance R, back-EMF constant ke and a transmission of i rad per m or
-    rad: force_per_V = k i / R, damping = k ke i^2 / R + friction; the inductance is left out. The
-    rotor's inertia is the robot file's `rotor_inertia_kg_m2` or `rotor_mass_kg`.
-    """
-
-    force_per_V: float
-    damping: float
-
-
-@dataclass(frozen=True)
-class Stepper:
-    """The output is a stepper's rate: the pulses' place is its integral, and the joint follows that
-    place (63).
-
-    `stiffness` [N m/rad or N/m] and `damping` of the magnetic spring between them; without a
-    stiffness the joint is held to the pulses, whose rate then changes evenly over a tick. The law
-    counts the pulses (the firmware's `feedback_2` = 0), or with `encoder` measures the joint. Lost
-    steps are not in it.
-    """
-
-    stiffness: float | None = None
-    damping: float = 0.0
-    encoder: bool = False
-
-
-Output = Force | Motor | Stepper
-
-
-@dataclass(frozen=True)
-class PID:
-    """One joint's law, a PID with deflection feedback (70), limits (71) and anti-windup (72).
-
-    Gains are in units of its output (N, N m, V, rad/s or m/s) per m or rad, s.
-
-    `reference` [m or rad] through a filter of `setpoint_Hz` (0: none), `feedforward` [units of the
-    output], `derivative_Hz` (0: none) for the measured velocity. `limit`, `slew` (per second) of
-    the output. `delay_s`, a whole number of ticks, from measurement to output. `count`: the
-    encoder's resolution [m or rad], `duty`: that of the output; 0: exact.
-    """
-
-    reference: Signal
-    output: Output = Force()
-    kp: float = 0.0
-    ki: float = 0.0
-    kd: float = 0.0
-    kf: float = 0.0
-    kg: float = 0.0
-    ks: float = 0.0
-    kt: float = 0.0
-    kv: float = 0.0
-    kc: float = 0.0
-    limit: float = math.inf
-    slew: float = math.inf
-    setpoint_Hz: float = 0.0
-    derivative_Hz: float = 50.0
-    feedforward: Signal | None = None
-    delay_s: float = 0.0
-    count: float = 0.0
-    duty: float = 0.0
-
-    def __post_init__(self) -> None:
-        for name in GAINS:
-            if not math.isfinite(getattr(self, name)):
-                raise InputError("expected a finite gain", key=name, value=getattr(self, name))
-        for name in ("setpoint_Hz", "derivative_Hz", "delay_s", "count", "duty"):
-            if not 0 <= getattr(self, name) < math.inf:
-                raise InputError(
-                    "expected a finite number of 0 or more", key=name, value=getattr(self, name)
-                )
-        for name in ("limit", "slew"):
-            if not getattr(self, name) > 0:
-                raise InputError("expected a number above 0", key=name, value=getattr(self, name))
-
-    @property
-    def prescribed(self) -> bool:
-        """Is the joint held to the pulses of its stepper?"""
-        return isinstance(self.output, Stepper) and self.output.stiffness is None
-
-    def one_sensor(self, length: float) -> PID:
-        """The same law for a strip of that free length [m] whose deflection alone is measured, as
-        on the rig: w'(L) is taken as 3 w(L) / (2 L), a cantilever's that its tip loads (73)."""
-        per_m = 1.5 / length
-        return replace(
-            self, kf=self.kf + self.ks * per_m, kg=self.kg + self.kt * per_m, ks=0.0, kt=0.0
-        )
-
-    def spec(self) -> dict[str, Any]:
-        """What it is, for a Run's metadata; without what is infinite."""
-        plain = {f.name: getattr(self, f.name) for f in fields(self) if f.type == "float"}
-        out = {name: value for name, value in plain.items() if math.isfinite(value)}
-        out |= {
-            "reference": self.reference.spec,
-            "output": {"kind": type(self.output).__name__.lower(), **asdict(self.output)},
-        }
-        return out | ({"feedforward": self.feedforward.spec} if self.feedforward else {})
-
-
-GAINS = ("kp", "ki", "kd", "kf", "kg", "ks", "kt", "kv", "kc")
 
 
 @dataclass(frozen=True)
@@ -210,13 +103,18 @@ class Controller:
     linear: Linear | None = None
 
     def __post_init__(self) -> None:
-        if not 0 < self.rate_Hz < math.inf:
+        joints = self.joints
+        if not isinstance(joints, Sequence) or not all(
+            isinstance(joint, PID | JointDrive) for joint in joints
+        ):
+            raise InputError("expected a PID or a JointDrive a joint", key="joints", value=joints)
+        object.__setattr__(self, "joints", tuple(joints))
+        if not number(self.rate_Hz, "rate_Hz", "expected a rate above 0 in hertz") > 0:
             raise InputError("expected a rate above 0 in hertz", key="rate_Hz", value=self.rate_Hz)
         for name in ("deflection_Hz", "deflection_quantum_m"):
-            if not 0 <= getattr(self, name) < math.inf:
-                raise InputError(
-                    "expected a finite number of 0 or more", key=name, value=getattr(self, name)
-                )
+            not_negative(self, name)
+        if not (self.linear is None or isinstance(self.linear, Linear)):
+            raise InputError("expected a Linear or None", key="linear", value=self.linear)
         for i, joint in enumerate(self.joints, 1):
             late = joint.delay_s * self.rate_Hz if isinstance(joint, PID) else 0.0
             if abs(late - round(late)) > 1e-6 or late > 10_000:
@@ -245,6 +143,15 @@ class Controller:
         return Drive(
             tuple(JointDrive() if isinstance(joint, PID) else joint for joint in self.joints)
         )
+
+    def within(self, start: float, end: float) -> Controller:
+        """The same controller for a run from `start` to `end` [s], see `Drive.within`."""
+        opened = self._open().within(start, end)
+        joints = tuple(
+            joint.within(start, end) if isinstance(joint, PID) else own
+            for joint, own in zip(self.joints, opened.joints, strict=True)
+        )
+        return replace(self, joints=joints)
 
     def core_drives(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """What acts on the joints that are not this controller's: segments, ranges (N, 4) and gains

@@ -27,7 +27,8 @@ from typing import Any
 from ..errors import InputError
 from ..io import find, read_toml, write_toml
 from ..signals import Signal, constant, finite
-from .controller import PID, Controller, Force, Motor, Output, Stepper
+from .controller import Controller
+from .pid import PID, Force, Motor, Output, Stepper
 
 MAX_JOINTS = 9
 # names of PID's fields, {} the joint's number, by output

@@ -27,8 +27,10 @@ import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 
 from ..errors import InputError
-from ..system import System, linearize
-from .controller import PID, Controller, Linear, Motor, Stepper
+from ..io import array, number
+from ..system import System, assemble, linearize
+from .controller import Controller, Linear
+from .pid import PID, Motor, Stepper
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,7 @@ class Design:
 
 
 def lqr(
-    system: System,
+    robot: Any,
     controller: Controller,
     effort: Any,
     *,
@@ -83,6 +85,13 @@ def lqr(
     acts at the outputs in a tick, `noise` (N + 1,) of the measurements. Raises InputError for
     steppers, which have no force, and where no stabilising solution exists.
     """
+    system = assemble(robot)
+    if not isinstance(controller, Controller):
+        raise InputError("expected a Controller", key="controller", value=controller)
+    if len(controller.joints) != len(system.robot.links):
+        expected = f"expected a Controller of {len(system.robot.links)} joints"
+        raise InputError(expected, key="controller", value=len(controller.joints))
+    deflection, damping = _many(deflection, 1, "deflection")[0], number(damping, "damping")
     linear, T = linearize(system, q), 1 / controller.rate_Hz
     joints, driven = controller.joints, []
     damp, scale = np.zeros(len(linear.M)), []
@@ -178,12 +187,8 @@ def _linear(
 
 
 def _many(value: Any, count: int, key: str) -> np.ndarray:
-    array = np.asarray(value, dtype=float)
-    if (
-        array.ndim > 1
-        or not np.all(np.isfinite(array))
-        or not np.all(array > 0)
-        or (array.ndim == 1 and len(array) != count)
-    ):
-        raise InputError(f"expected a number above 0, or {count} of them", key=key, value=value)
-    return np.broadcast_to(array, (count,))
+    expected = f"expected a number above 0, or {count} of them"
+    found = array(value, key, expected)
+    if found.shape not in ((), (count,)) or not np.all(found > 0):
+        raise InputError(expected, key=key, value=value)
+    return np.broadcast_to(found, (count,))

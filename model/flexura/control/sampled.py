@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -11,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..io import array, function_of, number
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,9 @@ class Sampled:
     rate_Hz: float
 
     def __post_init__(self) -> None:
-        if not 0 < self.rate_Hz < math.inf:
+        expected = "expected a function of (t) or of (t, position, velocity, tip_deflection)"
+        function_of(self.function, "function", (1, 4), expected)
+        if not number(self.rate_Hz, "rate_Hz", "expected a rate above 0 in hertz") > 0:
             raise InputError("expected a rate above 0 in hertz", key="rate_Hz", value=self.rate_Hz)
 
     def spec(self) -> dict[str, Any]:
@@ -66,11 +68,9 @@ class DriveFunction:
     def read(self, given: Any, t: float) -> np.ndarray:
         """The forces (joints,) that the function has given at t. Raises: InputError: it gave
         something else."""
-        force = np.ascontiguousarray(given, dtype=float)
-        if force.shape != (self.joints,) or not np.all(np.isfinite(force)):
-            expected = (
-                f"expected {self.joints} finite forces from the drive function at t = {t:g} s"
-            )
+        expected = f"expected {self.joints} finite forces from the drive function at t = {t:g} s"
+        force = np.atleast_1d(array(given, "drive", expected))
+        if force.shape != (self.joints,):
             raise InputError(expected, key="drive", value=given)
         return force
 

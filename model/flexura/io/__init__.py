@@ -2,6 +2,16 @@
 pictures."""
 
 from . import summary
+from .arguments import (
+    array,
+    check_progress,
+    choice,
+    finite_arguments,
+    flag,
+    function_of,
+    number,
+    whole,
+)
 from .channels import CHANNELS, STATIONS, Channel, channel
 from .format import FORMAT, check_format
 from .labels import EMULATED, called, emulated, kind
@@ -18,17 +28,25 @@ __all__ = [
     "STATIONS",
     "Channel",
     "Run",
+    "array",
     "called",
     "channel",
     "check_format",
+    "check_progress",
+    "choice",
     "emulated",
     "explain",
     "find",
+    "finite_arguments",
+    "flag",
+    "function_of",
     "is_name",
     "kind",
+    "number",
     "read_toml",
     "shipped_files",
     "summary",
+    "whole",
     "write_bytes",
     "write_text",
     "write_toml",

@@ -45,6 +45,8 @@ def find(path: str | os.PathLike[str], kind: str) -> Path:
     Raises:
         InputError: neither; names that are near are said.
     """
+    if not isinstance(path, str | os.PathLike):
+        raise InputError("expected a path or a name", key="path", value=path)
     given = Path(path)
     name = os.fspath(path)
     known = (

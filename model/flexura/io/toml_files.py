@@ -21,6 +21,8 @@ _TOO_DEEP = re.compile(
 def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
     """The tables of a TOML file. Raises InputError for anything that is not a readable TOML
     file."""
+    if not isinstance(path, str | os.PathLike):
+        raise InputError("expected the path of a TOML file", key="path", value=path)
     name = os.fspath(path)
     try:
         with open(path, "rb") as stream:

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..robot import Robot
+from ..io import array, whole
+from ..robot import Robot, robot_of
 from ..signals import Drive
 from .rows import Rows, good, joined, one, varied
 
@@ -73,24 +74,27 @@ class Batch:
             if not isinstance(robots, Sized):
                 raise InputError("missing: expected how many robots there are", key="count")
             count = len(robots)
-        if isinstance(count, bool) or not isinstance(count, int) or count < 1:
-            raise InputError(
-                "expected a whole number of robots, 1 or more", key="count", value=count
-            )
+        count = whole(count, "count", 1, "expected a whole number of robots, 1 or more")
         if not callable(robots) and not isinstance(robots, Iterable):
             raise InputError(
                 "expected robots, or a function (k, random) that makes one",
                 key="robots",
                 value=robots,
             )
-        return Batch(robots, count, seed)
+        return Batch(robots, count, whole(seed, "seed", 0))
 
     @staticmethod
-    def vary(robot: Robot, changes: Mapping[str, Any]) -> Batch:
+    def vary(robot: Any, changes: Mapping[str, Any]) -> Batch:
         """The robots of `robot.replace({key: value})` along arrays of values, all of one length B:
         {"payload.mass_kg": (B,)}."""
+        robot = robot_of(robot)
+        if not isinstance(changes, Mapping):
+            raise InputError(
+                "expected a dictionary of keys and values", key="changes", value=changes
+            )
         columns = {
-            key: np.atleast_1d(np.asarray(values, dtype=float)) for key, values in changes.items()
+            key: np.atleast_1d(array(values, "changes", f"expected finite numbers of {key}"))
+            for key, values in changes.items()
         }
         counts = {len(values) for values in columns.values()}
         if len(counts) != 1:

@@ -16,7 +16,7 @@ import numpy as np
 
 from .. import core
 from ..errors import InputError
-from ..io import Run, summary
+from ..io import Run, check_progress, summary, whole
 from ..optional import Optional
 from ..robot import Robot
 from ..signals import Drive
@@ -170,6 +170,7 @@ def simulate(
     rtol: float = 1e-6,
     *,
     method: str = "auto",
+    start: str | None = None,
     numerical_damping: bool = True,
     progress: Callable[[float], None] | None = None,
     channels: Sequence[str] | None = None,
@@ -181,7 +182,8 @@ def simulate(
 ) -> Population:
     """Simulate every robot of the batch as `simulate` does one, to the last bit.
 
-    `drive`, `q0`, `qd0` (n,) hold for robots without a drive of their own, and for all. `channels`
+    `drive`, `q0`, `qd0` (n,) hold for robots without a drive of their own, and for all. Without
+    `q0` each robot has its own `start`, as in `flexura.simulate`. `channels`
     are kept, by default joint positions and tip deflections; with `reduce(t, channels) -> number or
     {name: number}` only these numbers are. `folder`: a Parquet file each `chunk` robots, written as
     a whole or not at all; the same call goes on where it was stopped, by Ctrl-C or by force, and
@@ -190,11 +192,14 @@ def simulate(
     InputError for wrong arguments; a robot that fails ends alone.
     """
     request = Request.checked(
-        t_eval, drive, q0, qd0, rtol, method, numerical_damping, channels, reduce
+        t_eval, drive, q0, qd0, rtol, method, start, numerical_damping, channels, reduce
     )
     for key, value in (("chunk", chunk), ("threads", 1 if threads is None else threads)):
-        if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-            raise InputError("expected a whole number, 1 or more", key=key, value=value)
+        whole(value, key, 1)
+    for key, text in (("folder", folder), ("scheduler", scheduler)):
+        if not (text is None or isinstance(text, str | Path)):
+            raise InputError("expected a text", key=key, value=text)
+    check_progress(progress)
     store, units, complete, done = in_memory(), {}, False, 0
     shares = batch.shares(chunk)
     try:

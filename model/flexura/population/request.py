@@ -17,8 +17,9 @@ import numpy as np
 
 from .. import core
 from ..errors import InputError
+from ..io import array, choice, flag, function_of
 from ..robot import Robot
-from ..signals import Drive
+from ..signals import STARTS, Drive
 from ..simulation.problem import check_request
 from ..simulation.recorder import channel_units
 from ..system.structure import structure
@@ -35,6 +36,7 @@ class Request:
     qd0: np.ndarray | None
     rtol: float
     method: str
+    start: str | None
     numerical_damping: bool
     channels: tuple[str, ...]
     reduce: Callable[[np.ndarray, dict[str, np.ndarray]], Any] | None
@@ -47,6 +49,7 @@ class Request:
         qd0: Any,
         rtol: float,
         method: str,
+        start: str | None,
         numerical_damping: bool,
         channels: Sequence[str] | None,
         reduce: Any,
@@ -54,23 +57,34 @@ class Request:
         """A request whose arguments are good as far as that can be told without a robot. Raises
         InputError."""
         t = check_request(t_eval, rtol, method)
-        if not (reduce is None or callable(reduce)):
-            raise InputError(
-                "expected a function (t, channels) -> number or {name: number}",
-                key="reduce",
-                value=reduce,
-            )
-        if isinstance(channels, str):
+        if reduce is not None:
+            expected = "expected a function (t, channels) -> number or {name: number}"
+            function_of(reduce, "reduce", (2,), expected)
+        if channels is not None and (
+            isinstance(channels, str)
+            or not isinstance(channels, Sequence)
+            or not all(isinstance(name, str) for name in channels)
+        ):
             raise InputError("expected a list of channels", key="channels", value=channels)
-        start = [None if q is None else np.array(q, dtype=float) for q in (q0, qd0)]
+        if start is not None:
+            choice(start, "start", STARTS)
+            if q0 is not None:
+                raise InputError("expected q0 or start, not both", key="start", value=start)
+        if drive is not None:
+            drive = drive.within(float(t[0]), float(t[-1]))
+        state = [
+            None if q is None else array(q, key, "expected finite numbers", (None,))
+            for key, q in (("q0", q0), ("qd0", qd0))
+        ]
         return Request(
             t,
             drive,
-            start[0],
-            start[1],
+            state[0],
+            state[1],
             float(rtol),
             method,
-            bool(numerical_damping),
+            start,
+            flag(numerical_damping, "numerical_damping"),
             tuple(channels or ()),
             reduce,
         )
@@ -84,12 +98,8 @@ class Request:
         for name in self.channels:
             if name not in known:
                 raise InputError(f"expected one of {', '.join(known)}", key="channels", value=name)
-        if self.drive is not None and len(self.drive.joints) != len(links):
-            raise InputError(
-                f"expected {len(links)} joint drives, one a joint",
-                key="drive",
-                value=len(self.drive.joints),
-            )
+        if self.drive is not None:
+            check_drive(self.drive, len(links), "drive")
         for key, value in (("q0", self.q0), ("qd0", self.qd0)):
             n = 0 if value is None else structure(robot).n
             if value is not None and (value.shape != (n,) or not np.isfinite(value).all()):
@@ -124,10 +134,21 @@ class Request:
             "qd0": start[1],
             "rtol": self.rtol,
             "method": self.method,
+            "start": self.start,
             "numerical_damping": self.numerical_damping,
             "channels": list(self.channels),
             "reduce": None if self.reduce is None else identity(self.reduce),
         }
+
+
+def check_drive(drive: Drive, joints: int, key: str) -> None:
+    """Raises InputError for a drive of another number of joints, or one with Python functions."""
+    if len(drive.joints) != joints:
+        raise InputError(
+            f"expected {joints} joint drives, one a joint", key=key, value=len(drive.joints)
+        )
+    if drive.calls:
+        raise InputError("expected Signals as forces: a population runs in the core alone", key=key)
 
 
 @cache

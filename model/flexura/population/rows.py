@@ -15,6 +15,7 @@ from ..system.constants import rows
 
 # Columns of `numbers`, as system/constants.py gives them.
 LENGTH, MASS, CENTRE, INERTIA, START, LOW, HIGH = 0, 1, 2, 3, 7, 13, 14
+ELEMENTS = 2  # column of `counts`
 OF_JOINT = {
     "angle_rad": 6,
     "hub_mass_kg": 8,

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,12 +16,13 @@ from ..io import STATIONS
 from ..robot import Robot
 from ..signals import Drive
 from ..simulation.dynamics import simulate
-from ..simulation.problem import MOST_STEPS, outside
-from ..simulation.recorder import LOSS, NUMERICAL, WORK, limit_event, observed
-from ..system import System
+from ..simulation.problem import MOST_STEPS
+from ..simulation.recorder import LIMITS, LOSS, NUMERICAL, WORK, limit_event, observed
+from ..simulation.start import NO_START, outside, put_on_motions
+from ..system import NoEquilibrium, System, equilibrium
 from .batch import Share
-from .request import Request
-from .rows import Rows
+from .request import Request, check_drive
+from .rows import ELEMENTS, START, Rows
 from .store import Chunk
 
 WORDS = ("done", "limit", "stuck", "refused")
@@ -55,12 +58,8 @@ def simulated(request: Request, share: Share, threads: int, watch: Any) -> Part:
     """
     b, T, N = len(share), len(request.t), len(share.robots[0].links)
     for k, drive in enumerate(share.drives, 1):
-        if drive is not None and len(drive.joints) != N:
-            raise InputError(
-                f"expected {N} joint drives, one a joint",
-                key=f"robots[{share.first + k}].drive",
-                value=len(drive.joints),
-            )
+        if drive is not None:
+            check_drive(drive, N, f"robots[{share.first + k}].drive")
     part = Part(
         [""] * b,
         np.full(b, np.nan),
@@ -73,8 +72,67 @@ def simulated(request: Request, share: Share, threads: int, watch: Any) -> Part:
         _one_by_one(request, share, watch, part)
         return part
     for members, rows in share.groups:
-        _together(request, share, members, rows, columns, threads, watch, part)
+        bent = _bent(request, rows)
+        if len(straight := np.flatnonzero(~bent)):
+            own = rows if len(straight) == len(rows) else rows.of(straight.tolist())
+            _together(request, share, members[straight], own, columns, threads, watch, part)
+        _each_from_equilibrium(
+            request, share, members, rows, np.flatnonzero(bent), columns, threads, watch, part
+        )
     return part
+
+
+def _bent(request: Request, rows: Rows) -> np.ndarray:
+    """Which robots (B,) start in a static equilibrium of their own."""
+    if request.q0 is not None or not (rows.counts[:, ELEMENTS] > 0).any():
+        return np.zeros(len(rows), dtype=bool)
+    if request.start is not None:
+        return np.full(len(rows), request.start == "static")
+    return np.asarray(rows.gravity.any(axis=1))
+
+
+def _each_from_equilibrium(
+    request: Request,
+    share: Share,
+    members: np.ndarray,
+    rows: Rows,
+    which: np.ndarray,
+    columns: list[tuple[str, int]],
+    threads: int,
+    watch: Any,
+    part: Part,
+) -> None:
+    """Robots of the same counts from their static equilibria: one after the other through the core,
+    in so many threads."""
+
+    def run(j: int) -> None:
+        k, own = members[j], rows.of([j])
+        try:
+            q0 = _equilibrium(own, share.drives[k] or request.drive, float(request.t[0]))
+        except NoEquilibrium as error:
+            part.status[k], part.events[k] = "refused", f"{error}; {NO_START}"
+            return
+        _together(replace(request, q0=q0), share, members[[j]], own, columns, 1, watch, part)
+
+    with ThreadPoolExecutor(threads) as pool:
+        for _ in pool.map(run, map(int, which)):
+            pass
+
+
+def _equilibrium(rows: Rows, drive: Drive | None, t: float) -> np.ndarray | None:
+    """The start (n,) of one robot: links in equilibrium, joints at their start or, if prescribed,
+    on their motion at t [s]; None: the core refuses the robot, and will say why."""
+    try:
+        robot = core.Mechanics(
+            rows.gravity[0], rows.payload[0], rows.counts, rows.numbers[0], rows.material[0]
+        )
+    except core.Fault:
+        return None
+    q = np.zeros(robot.n)
+    q[robot.first] = rows.numbers[0, :, START]
+    if drive is not None:
+        put_on_motions(robot.first, drive, t, q, np.zeros(robot.n))
+    return equilibrium(robot, q)
 
 
 def _columns(robot: Robot, names: Sequence[str]) -> list[tuple[str, int]] | None:
@@ -117,7 +175,10 @@ def _together(
 ) -> None:
     """Robots of the same counts through the core, into their places of `part`."""
     common = request.drive or Drive.none(rows.numbers.shape[1])
-    drives = [share.drives[k] or common for k in members]
+    begin, end = float(request.t[0]), float(request.t[-1])
+    given = [share.drives[k] or common for k in members]
+    within = {id(drive): drive.within(begin, end) for drive in given}
+    drives = [within[id(drive)] for drive in given]
     number = {
         id(drive): j for j, drive in enumerate({id(drive): drive for drive in drives}.values())
     }
@@ -194,23 +255,24 @@ def _one_by_one(request: Request, share: Share, watch: Any, part: Part) -> None:
                 request.qd0,
                 request.rtol,
                 method=request.method,
+                start=request.start,
                 numerical_damping=request.numerical_damping,
             )
-        except InputError as error:
+        except (InputError, NoEquilibrium) as error:
             part.status[k], part.events[k] = "refused", str(error)
             continue
-        texts = [event["text"] for event in run.meta["events"] if event["level"] == "ERROR"]
+        errors = [event for event in run.meta["events"] if event["level"] == "ERROR"]
         part.status[k] = (
             "done"
             if run.complete
             else "limit"
-            if any("stopped" in text for text in texts)
+            if any(event.get("name") in LIMITS for event in errors)
             else "stuck"
         )
         part.reached[k], part.steps[k], part.events[k] = (
             run.t[-1],
             run.meta["steps"],
-            "" if run.complete else "; ".join(texts),
+            "" if run.complete else "; ".join(event["text"] for event in errors),
         )
         rows = int(np.count_nonzero(np.isin(run.t, request.t)))
         for name in request.channels:

@@ -3,7 +3,7 @@
 from .joint import Joint, key_of
 from .link import LEAST_FREE, MAX_ELEMENTS, MOST_MODES, Damping, Link, Section, SectionAt, ValueAt
 from .old_keys import OldKey, renamed
-from .robot import MAX_LINKS, Payload, Robot, load, save
+from .robot import MAX_LINKS, Payload, Robot, load, robot_of, save
 from .table import Table
 
 __all__ = [
@@ -24,5 +24,6 @@ __all__ = [
     "key_of",
     "load",
     "renamed",
+    "robot_of",
     "save",
 ]

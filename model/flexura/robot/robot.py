@@ -262,6 +262,24 @@ def load(path: str | os.PathLike[str]) -> Robot:
     return Robot.from_dict(read_toml(found), file=os.fspath(found))
 
 
+def robot_of(robot: Any, key: str = "robot") -> Robot:
+    """The Robot of what a function was given.
+
+    Args: robot: a Robot, the path or name of a robot file, or a System; key: the argument's name.
+
+    Raises: InputError: it is something else, or the file is wrong.
+    """
+    if isinstance(robot, Robot):
+        return robot
+    if isinstance(robot, str | os.PathLike):
+        return load(robot)
+    described = None if isinstance(robot, type) else getattr(robot, "robot", None)
+    if isinstance(described, Robot):
+        return described
+    expected = "expected a Robot, a System, or the path or name of a robot file"
+    raise InputError(expected, key=key, value=robot)
+
+
 def save(robot: Robot, path: str | os.PathLike[str]) -> None:
     """Write a robot file (TOML) that `load` reads back to an equal robot."""
     write_toml(path, {"format": FORMAT} | robot.to_dict())

@@ -2,8 +2,9 @@
 tables."""
 
 from . import shaping, signal
-from .drive import Drive, JointDrive
-from .manoeuvre import Manoeuvre, load_manoeuvre
+from .conversion import FunctionSignal, as_signal, as_signals, spline
+from .drive import Drive, JointDrive, check_smooth
+from .manoeuvre import STARTS, Manoeuvre, load_manoeuvre
 from .parsing import finite, from_spec
 from .shaping import matched_cycloid, zv, zvd
 from .signal import (
@@ -16,6 +17,7 @@ from .signal import (
     harmonic,
     piecewise,
     polynomial,
+    ramp,
     step,
     table,
     trapezoidal,
@@ -23,11 +25,16 @@ from .signal import (
 
 __all__ = [
     "COLUMNS",
+    "STARTS",
     "Drive",
+    "FunctionSignal",
     "JointDrive",
     "Manoeuvre",
     "Signal",
+    "as_signal",
+    "as_signals",
     "bang_bang",
+    "check_smooth",
     "constant",
     "cycloid",
     "evaluate",
@@ -38,8 +45,10 @@ __all__ = [
     "matched_cycloid",
     "piecewise",
     "polynomial",
+    "ramp",
     "shaping",
     "signal",
+    "spline",
     "step",
     "table",
     "trapezoidal",

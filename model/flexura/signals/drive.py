@@ -10,13 +10,15 @@ tip_deflection) -> forces` works in their place, slower.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
+from ..io import array, flag, number, whole
+from .conversion import WHAT_TO_DO, FunctionSignal, as_signal, spline
 from .signal import COLUMNS, Signal
 
 _NONE = np.zeros((0, COLUMNS))
@@ -27,8 +29,9 @@ class JointDrive:
     """One joint's drive: feedforward `force` [N or N m], and PD gains `kp`, `kd` on a `motion` [m
     or rad] (58).
 
-    With `prescribed` the joint follows its motion exactly, whatever force that takes (inverse
-    dynamics (59)).
+    Force and motion are numbers, Signals or functions of time. With `prescribed` the joint follows
+    its motion exactly, whatever force that takes (inverse dynamics (59)). Raises InputError for
+    other arguments.
     """
 
     force: Signal | None = None
@@ -36,6 +39,26 @@ class JointDrive:
     kp: float = 0.0
     kd: float = 0.0
     prescribed: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("force", "motion"):
+            object.__setattr__(self, name, as_signal(getattr(self, name), name))
+        for name in ("kp", "kd"):
+            object.__setattr__(self, name, number(getattr(self, name), name))
+        object.__setattr__(self, "prescribed", flag(self.prescribed, "prescribed"))
+
+    @property
+    def unfollowed(self) -> bool:
+        """Whether it has a motion, but neither gains nor `prescribed`: nothing would follow it."""
+        return self.motion is not None and not (self.prescribed or self.kp or self.kd)
+
+    def force_at(self, t: float) -> float:
+        """The feedforward at t [s], 0 without one."""
+        if self.force is None:
+            return 0.0
+        if isinstance(self.force, FunctionSignal):
+            return self.force.value(t)
+        return self.force(t)[0]
 
     def spec(self) -> dict[str, Any]:
         """This joint's table of a manoeuvre file."""
@@ -57,34 +80,74 @@ class Drive:
     joints: tuple[JointDrive, ...]
     meta: dict[str, Any] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        joints = self.joints
+        if not isinstance(joints, Sequence) or not all(isinstance(j, JointDrive) for j in joints):
+            raise InputError("expected a JointDrive for each joint", key="joints", value=joints)
+        if not isinstance(self.meta, dict):
+            raise InputError("expected a dictionary", key="meta", value=self.meta)
+        object.__setattr__(self, "joints", tuple(joints))
+
     @staticmethod
     def none(joints: int) -> Drive:
         """No drive at all: every joint is free."""
-        return Drive((JointDrive(),) * joints)
+        return Drive((JointDrive(),) * whole(joints, "joints", 0))
 
     @staticmethod
-    def force(*signals: Signal | None) -> Drive:
-        """Open loop: a force or torque signal a joint (None: free)."""
-        return Drive(tuple(JointDrive(force=s) for s in signals))
+    def force(*signals: Any, t_s: Any = None) -> Drive:
+        """Open loop: a force or torque [N or N m] a joint.
+
+        Args:
+            signals: one entry a joint: a number, a Signal, a function of t [s], an array (T,) of
+                values at the times `t_s`, or None for a free joint.
+            t_s (T,): the times of arrays [s].
+
+        Raises:
+            InputError: an argument is not what is expected.
+        """
+        return Drive(tuple(JointDrive(force=s) for s in _waves("force", signals, t_s)))
 
     @staticmethod
-    def pd(motions: Sequence[Signal], kp: Sequence[float], kd: Sequence[float]) -> Drive:
-        """Joint PD control along `motions`."""
+    def pd(motions: Any, kp: Any, kd: Any, t_s: Any = None) -> Drive:
+        """Joint PD control along motions.
+
+        Args:
+            motions: one entry a joint, as in `force` [m or rad].
+            kp: gains of the position, (joints,) or one for all [N/m or N m/rad].
+            kd: gains of the rate, (joints,) or one for all [N s/m or N m s/rad].
+            t_s (T,): the times of arrays [s].
+
+        Raises:
+            InputError: an argument is not what is expected.
+        """
+        if isinstance(motions, Signal | str | bytes | dict) or not np.iterable(motions):
+            raise InputError("expected motions, one a joint", key="motions", value=motions)
+        waves = _waves("motions", list(motions), t_s)
+        gains = [_gains(value, len(waves), key) for key, value in (("kp", kp), ("kd", kd))]
         return Drive(
-            tuple(JointDrive(motion=m, kp=p, kd=d) for m, p, d in zip(motions, kp, kd, strict=True))
+            tuple(
+                JointDrive(motion=m, kp=float(p), kd=float(d))
+                for m, p, d in zip(waves, *gains, strict=True)
+            )
         )
 
     @staticmethod
-    def prescribed(*motions: Signal | None) -> Drive:
-        """Joints that follow their motions exactly (None: free). Raises InputError for a motion
-        that jumps or kinks."""
-        for i, motion in enumerate(motions, 1):
-            if motion is not None:
-                check_smooth(motion, f"motion {i}")
+    def prescribed(*motions: Any, t_s: Any = None) -> Drive:
+        """Joints that follow their motions exactly.
+
+        A motion whose position or velocity jumps inside a run is refused when the run begins.
+
+        Args:
+            motions: one entry a joint, as in `force` [m or rad]; None: the joint is free.
+            t_s (T,): the times of arrays [s].
+
+        Raises:
+            InputError: an argument is not what is expected.
+        """
         return Drive(
             tuple(
                 JointDrive() if m is None else JointDrive(motion=m, prescribed=True)
-                for m in motions
+                for m in _waves("motion", motions, t_s)
             )
         )
 
@@ -93,13 +156,52 @@ class Drive:
         """Which joints follow a prescribed motion, (n,) bool."""
         return np.array([joint.prescribed and joint.motion is not None for joint in self.joints])
 
+    @property
+    def calls(self) -> bool:
+        """Whether a force is a Python function."""
+        return any(isinstance(j.force, FunctionSignal) for j in self.joints)
+
+    def called(self, t: float) -> np.ndarray:
+        """The forces (n,) at t [s] of those joints whose force is a Python function."""
+        return np.array(
+            [j.force.value(t) if isinstance(j.force, FunctionSignal) else 0.0 for j in self.joints]
+        )
+
+    def within(self, start: float, end: float) -> Drive:
+        """The same drive for a run from `start` to `end` [s]: its motions are Signals.
+
+        Functions become splines. A prescribed motion that jumps at `end` keeps to the end what it
+        was before.
+
+        Raises:
+            InputError: a joint has a motion that nothing follows; a prescribed motion's position or
+                velocity jumps inside the run, or a function's that is followed.
+        """
+        joints = []
+        for i, joint in enumerate(self.joints, 1):
+            motion, key = joint.motion, f"motion of joint {i}"
+            if joint.unfollowed:
+                raise InputError(
+                    f"joint {i} has a motion, but neither gains nor prescribed: give kp and kd, "
+                    f"prescribe it (Drive.prescribed, manoeuvre.prescribed()), or take a "
+                    f"controller",
+                    key="drive",
+                )
+            if isinstance(motion, FunctionSignal):
+                motion = spline(replace(motion, key=key), start, end)
+            if motion is not None and joint.prescribed:
+                check_smooth(motion, key, start, end)
+                motion = _up_to(motion, end)
+            joints.append(joint if motion is joint.motion else replace(joint, motion=motion))
+        same = all(a is b for a, b in zip(joints, self.joints, strict=True))
+        return self if same else replace(self, joints=tuple(joints))
+
     def __call__(
         self, t: float, position: Any, velocity: Any, tip_deflection: float = 0.0
     ) -> np.ndarray:
         out = np.zeros(len(self.joints))
         for i, joint in enumerate(self.joints):
-            if joint.force is not None:
-                out[i] = joint.force(t)[0]
+            out[i] = joint.force_at(t)
             if joint.motion is not None and not joint.prescribed:
                 r, rd, _ = joint.motion(t)
                 out[i] += joint.kp * (r - position[i]) + joint.kd * (rd - velocity[i])
@@ -136,7 +238,7 @@ class Drive:
                 (j.kp, j.kd) if j.motion is not None and not j.prescribed else (0.0, 0.0)
                 for j in self.joints
             ]
-        )
+        ).reshape(-1, 2)
 
     def packed(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Segments (k, 10) of all signals, their index (n, 4) [force from, to; motion from, to],
@@ -152,14 +254,41 @@ class Drive:
         return np.ascontiguousarray(np.concatenate(parts)), index, self.gains.copy()
 
 
-def check_smooth(motion: Signal, key: str) -> None:
-    """Refuse a motion whose position or velocity jumps: no finite force follows it."""
+def check_smooth(motion: Signal, key: str, start: float = -np.inf, end: float = np.inf) -> None:
+    """Refuse a motion whose position or velocity jumps between `start` and `end` [s], both
+    excluded: no finite force follows it."""
     for at in motion.breaks[1:]:
-        before = np.array(motion(np.nextafter(at, -np.inf))[:2])
-        after = np.array(motion(at)[:2])
-        if not np.allclose(before, after, rtol=1e-7, atol=1e-9):
+        if start < at < end and not _smooth_at(motion, float(at)):
             raise InputError(
                 f"expected a motion without jumps in position and velocity; it has one at t = "
-                f"{at:g} s",
+                f"{at:g} s: {WHAT_TO_DO}",
                 key=key,
             )
+
+
+def _smooth_at(motion: Signal, at: float) -> bool:
+    before, after = np.array(motion(np.nextafter(at, -np.inf))[:2]), np.array(motion(at)[:2])
+    return np.allclose(before, after, rtol=1e-7, atol=1e-9)
+
+
+def _up_to(motion: Signal, end: float) -> Signal:
+    """The motion without what it jumps to at `end` [s]."""
+    kept = int(np.searchsorted(motion.breaks, end))
+    if 0 < kept < len(motion.breaks) and motion.breaks[kept] == end and not _smooth_at(motion, end):
+        return Signal(motion.segments[:kept], motion.spec)
+    return motion
+
+
+def _waves(key: str, given: Sequence[Any], t_s: Any) -> list[Signal | None]:
+    expected = "expected ascending finite times in seconds"
+    t = None if t_s is None else array(t_s, "t_s", expected, (None,))
+    if t is not None and not np.all(np.diff(t) > 0):
+        raise InputError(expected, key="t_s", value=t_s)
+    return [as_signal(value, f"{key} {i}", t) for i, value in enumerate(given, 1)]
+
+
+def _gains(value: Any, joints: int, key: str) -> np.ndarray:
+    found = array(value, key, f"expected a number, or {joints} of them, one a joint")
+    if found.shape not in ((), (1,), (joints,)):
+        raise InputError(f"expected {joints} numbers, one a joint", key=key, value=value)
+    return np.broadcast_to(found, (joints,))

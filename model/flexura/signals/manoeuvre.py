@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
-from ..io import check_format, find, is_name, read_toml
+from ..io import check_format, choice, find, is_name, read_toml, whole
 from .drive import Drive, JointDrive, check_smooth
 from .parsing import finite, from_spec
 from .signal import Signal
@@ -19,31 +19,54 @@ from .signal import Signal
 @dataclass(frozen=True)
 class Manoeuvre:
     """What a robot is asked to do: a drive, for how long, and how often the result is stored. Read
-    from a TOML file."""
+    from a TOML file.
+
+    `start`: "static" or "straight", as in `simulate`; None leaves it to gravity.
+    """
 
     name: str
     duration_s: float
     output_step_s: float
     drive: Drive
+    start: str | None = None
 
     @property
     def t(self) -> np.ndarray:
         """Times of the result [s], from 0 to the duration."""
         return np.linspace(0.0, self.duration_s, round(self.duration_s / self.output_step_s) + 1)
 
+    def prescribed(self) -> Manoeuvre:
+        """The same manoeuvre with its motions followed exactly, in place of gains and forces on
+        these joints.
+
+        Raises:
+            InputError: no joint has a motion; a motion jumps within the duration.
+        """
+        joints = self.drive.joints
+        if all(joint.motion is None for joint in joints):
+            raise InputError("missing: no joint has a motion to follow", key="motion")
+        for i, joint in enumerate(joints, 1):
+            if joint.motion is not None:
+                check_smooth(joint.motion, f"joint[{i}].motion", 0.0, self.duration_s)
+        exact = [
+            j if j.motion is None else JointDrive(None, j.motion, 0.0, 0.0, True) for j in joints
+        ]
+        return replace(self, drive=Drive(tuple(exact)))
+
     def spec(self) -> dict[str, Any]:
         """The tables of a manoeuvre file, every key given."""
-        own = {
+        own: dict[str, Any] = {
             "name": self.name,
             "duration_s": self.duration_s,
             "output_step_s": self.output_step_s,
         }
+        if self.start is not None:
+            own["start"] = self.start
         return own | {"joint": self.drive.spec()}
 
 
-_KEYS = ("name", "duration_s", "output_step_s", "joint", "format")
-
-
+STARTS = ("static", "straight")
+_KEYS = ("name", "duration_s", "output_step_s", "start", "joint", "format")
 _JOINT_KEYS = ("force", "motion", "kp", "kd", "prescribed")
 
 
@@ -57,6 +80,7 @@ def load_manoeuvre(path: str | os.PathLike[str], joints: int) -> Manoeuvre:
     Raises:
         InputError: no such file, or a wrong value; it names file, key and value.
     """
+    joints = whole(joints, "joints", 1, "expected how many joints the robot has")
     found = find(path, "manoeuvres")
     try:
         return _manoeuvre(read_toml(found), joints)
@@ -111,7 +135,11 @@ def _manoeuvre(data: dict[str, Any], joints: int) -> Manoeuvre:
             )
         drives.append(
             JointDrive(
-                force, motion, kp=gains[0], kd=gains[1], prescribed=_prescribed(entry, motion, key)
+                force,
+                motion,
+                kp=gains[0],
+                kd=gains[1],
+                prescribed=_prescribed(entry, motion, key, duration),
             )
         )
     name = data.get("name", "")
@@ -121,12 +149,15 @@ def _manoeuvre(data: dict[str, Any], joints: int) -> Manoeuvre:
             key="name",
             value=name,
         )
-    return Manoeuvre(name, duration, step, Drive(tuple(drives)))
+    start = data.get("start")
+    if start is not None:
+        choice(start, "start", STARTS)
+    return Manoeuvre(name, duration, step, Drive(tuple(drives)), start)
 
 
-def _prescribed(entry: dict[str, Any], motion: Signal | None, key: str) -> bool:
-    """Does this joint follow its motion exactly? Such a motion must not jump, and leaves no room
-    for a force of one's own."""
+def _prescribed(entry: dict[str, Any], motion: Signal | None, key: str, duration: float) -> bool:
+    """Does this joint follow its motion exactly? Such a motion must not jump in its `duration` [s],
+    and leaves no room for a force of one's own."""
     value = entry.get("prescribed", False)
     if not isinstance(value, bool):
         raise InputError("expected true or false", key=f"{key}.prescribed", value=value)
@@ -140,7 +171,7 @@ def _prescribed(entry: dict[str, Any], motion: Signal | None, key: str) -> bool:
         if name in entry:
             expected = "expected none: a prescribed joint takes the force that its motion needs"
             raise InputError(expected, key=f"{key}.{name}", value=entry[name])
-    check_smooth(motion, f"{key}.motion")
+    check_smooth(motion, f"{key}.motion", 0.0, duration)
     return True
 
 

@@ -8,11 +8,13 @@ from collections.abc import Callable
 import numpy as np
 
 from ..errors import InputError
+from ..io import finite_arguments
 from .signal import COLUMNS, Signal, cycloid, signal_of
 
 MAX_SEGMENTS = 100_000  # shaping a shaped signal doubles its segments
 
 
+@finite_arguments
 def zv(signal: Signal, frequency_Hz: float, damping_ratio: float = 0.0) -> Signal:
     """Zero vibration: the signal as two copies, y = [y(t) + k y(t - T/2)] / (1 + k), which leave
     the mode at rest afterwards (78).
@@ -25,6 +27,7 @@ def zv(signal: Signal, frequency_Hz: float, damping_ratio: float = 0.0) -> Signa
     return _shape("zv", signal, frequency_Hz, damping_ratio, lambda k: [1, k])
 
 
+@finite_arguments
 def zvd(signal: Signal, frequency_Hz: float, damping_ratio: float = 0.0) -> Signal:
     """Zero vibration and derivative: three copies, weights 1, 2k, k^2 over (1 + k)^2, at 0, T/2, T
     (78); see `zv`.
@@ -34,6 +37,7 @@ def zvd(signal: Signal, frequency_Hz: float, damping_ratio: float = 0.0) -> Sign
     return _shape("zvd", signal, frequency_Hz, damping_ratio, lambda k: [1, 2 * k, k * k])
 
 
+@finite_arguments
 def matched_cycloid(
     end: float, frequency_Hz: float, periods: int = 2, start: float = 0.0, at_s: float = 0.0
 ) -> Signal:
@@ -70,6 +74,8 @@ _Weights = Callable[[float], list[float]]  # of the copies, from k
 def _shape(
     kind: str, signal: Signal, frequency_Hz: float, damping_ratio: float, weights: _Weights
 ) -> Signal:
+    if not isinstance(signal, Signal) or not len(signal.segments):
+        raise InputError("expected a Signal of segments, no function", key="signal", value=signal)
     _frequency(frequency_Hz)
     if not 0 <= damping_ratio < 1:
         raise InputError(

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..io import array, finite_arguments
 
 COLUMNS = 10  # t0, c0 ... c5, A, w, phi
 
@@ -52,6 +53,17 @@ class Signal:
     segments: np.ndarray
     spec: dict[str, Any] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        expected = f"expected segments (k, {COLUMNS}): t0, c0 to c5, A, w, phi"
+        given = self.segments
+        if not (isinstance(given, np.ndarray) and given.dtype == float and given.ndim == 2):
+            given = array(given, "segments", expected)
+        if given.ndim != 2 or given.shape[1] != COLUMNS:
+            raise InputError(expected, key="segments", value=given.shape)
+        if not isinstance(self.spec, dict):
+            raise InputError("expected a table", key="spec", value=self.spec)
+        object.__setattr__(self, "segments", given)
+
     def __call__(self, t: float) -> tuple[float, float, float]:
         return evaluate(self.segments, float(t))
 
@@ -74,16 +86,19 @@ def signal_of(rows: list[list[float]], **spec: Any) -> Signal:
     return Signal(segments, spec)
 
 
+@finite_arguments
 def constant(value: float) -> Signal:
     """y = value."""
     return signal_of([_row(0.0, value)], kind="constant", value=value)
 
 
+@finite_arguments
 def step(value: float, at_s: float = 0.0) -> Signal:
     """0, then `value` from `at_s` on."""
     return signal_of([_row(-1e300, 0.0), _row(at_s, value)], kind="step", value=value, at_s=at_s)
 
 
+@finite_arguments
 def harmonic(
     amplitude: float, frequency_Hz: float, phase_rad: float = 0.0, offset: float = 0.0
 ) -> Signal:
@@ -99,6 +114,19 @@ def harmonic(
     )
 
 
+@finite_arguments
+def ramp(end: float, duration_s: float, start: float = 0.0, at_s: float = 0.0) -> Signal:
+    """y along a straight line from start to end in `duration_s`, then rest.
+
+    Its velocity jumps at both ends of the line. As a prescribed motion it is good for runs that lie
+    between them.
+    """
+    _positive("duration_s", duration_s)
+    rows = [_row(at_s, start, (end - start) / duration_s), _row(at_s + duration_s, end)]
+    return signal_of(rows, kind="ramp", end=end, duration_s=duration_s, start=start, at_s=at_s)
+
+
+@finite_arguments
 def cycloid(end: float, duration_s: float, start: float = 0.0, at_s: float = 0.0) -> Signal:
     """y = start + A [s/T - sin(2 pi s/T)/(2 pi)], A = end - start (61), then rest."""
     _positive("duration_s", duration_s)
@@ -107,6 +135,7 @@ def cycloid(end: float, duration_s: float, start: float = 0.0, at_s: float = 0.0
     return signal_of(rows, kind="cycloid", end=end, duration_s=duration_s, start=start, at_s=at_s)
 
 
+@finite_arguments
 def polynomial(end: float, duration_s: float, start: float = 0.0, at_s: float = 0.0) -> Signal:
     """y = start + A (10 u^3 - 15 u^4 + 6 u^5), u = s/T: velocity and acceleration zero at both
     ends."""
@@ -117,6 +146,7 @@ def polynomial(end: float, duration_s: float, start: float = 0.0, at_s: float = 
     )
 
 
+@finite_arguments
 def trapezoidal(
     end: float, duration_s: float, rise_s: float, start: float = 0.0, at_s: float = 0.0
 ) -> Signal:
@@ -150,6 +180,7 @@ def trapezoidal(
     )
 
 
+@finite_arguments
 def bang_bang(
     amplitude: float, duration_s: float, rise_s: float = 0.0, at_s: float = 0.0
 ) -> Signal:
@@ -189,18 +220,7 @@ def table(t_s: Any, y: Any) -> Signal:
     then the last value."""
     from scipy.interpolate import CubicSpline
 
-    times, values = np.asarray(t_s, dtype=float), np.asarray(y, dtype=float)
-    if (
-        times.ndim != 1
-        or times.shape != values.shape
-        or len(times) < 2
-        or not np.all(np.diff(times) > 0)
-    ):
-        raise InputError(
-            "expected at least two ascending times and as many values y",
-            key="t_s",
-            value=times.tolist(),
-        )
+    times, values = _columns("t_s", t_s, "y", y, 2)
     coefficients = CubicSpline(
         times, values, bc_type="natural"
     ).c  # (4, k - 1), highest power first
@@ -213,18 +233,7 @@ def table(t_s: Any, y: Any) -> Signal:
 def piecewise(at_s: Any, value: Any) -> Signal:
     """Constant from each instant of `at_s` (k,) to the next, with the values (k,): the
     dissertation's bang-bang torques."""
-    times, values = np.asarray(at_s, dtype=float), np.asarray(value, dtype=float)
-    if (
-        times.ndim != 1
-        or times.shape != values.shape
-        or len(times) < 1
-        or not np.all(np.diff(times) > 0)
-    ):
-        raise InputError(
-            "expected ascending times, at least one, and as many values",
-            key="at_s",
-            value=times.tolist(),
-        )
+    times, values = _columns("at_s", at_s, "value", value, 1)
     rows = [_row(t, v) for t, v in zip(times, values, strict=True)]
     return signal_of(rows, kind="piecewise", at_s=times.tolist(), value=values.tolist())
 
@@ -235,6 +244,7 @@ KINDS = {
         constant,
         step,
         harmonic,
+        ramp,
         cycloid,
         polynomial,
         trapezoidal,
@@ -262,6 +272,17 @@ def _rise(t0: float, start: float, change: float, duration: float) -> list[float
             key="duration_s",
             value=duration,
         ) from None
+
+
+def _columns(
+    key: str, times: Any, other: str, values: Any, least: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Ascending times (k,) and as many values, `least` or more. Raises InputError."""
+    expected = f"expected at least {'two' if least == 2 else 'one'} ascending times"
+    t = array(times, key, expected, (None,))
+    if len(t) < least or not np.all(np.diff(t) > 0):
+        raise InputError(expected, key=key, value=t.tolist())
+    return t, array(values, other, f"expected {len(t)} finite values, one a time", (len(t),))
 
 
 def _positive(key: str, value: float) -> None:

@@ -21,8 +21,9 @@ from ..robot import Robot
 from ..signals import COLUMNS, Drive, Signal
 from ..system import System, assemble
 from .dynamics import simulate
-from .problem import Solution, check_state, check_times, put_on_motions
+from .problem import Solution, check_times
 from .recorder import limit_event, record
+from .start import consistent_start
 
 ACCOUNTS = 4  # numbers of a state beyond q and qd
 MAX_SWEEPS = 300  # joint after joint, in one step
@@ -56,7 +57,7 @@ def by_rigid_robot(
     Arguments and errors otherwise as in `inverse`.
     """
     t = check_times(t_eval)
-    Drive.prescribed(*motion)  # refuses motions that jump
+    Drive.prescribed(*motion).within(t[0], t[-1])  # refuses motions that jump
     rigid = assemble(rigid_robot(system.robot))
     drive = Drive.force(*_splines(lambda s: _forces(rigid, motion, s), motion, t[0], t[-1], step_s))
     q0, qd0 = _start(system, t[0], motion, q0, qd0)
@@ -91,7 +92,7 @@ def by_bisection(
     makes the drives diverge, which raises FlexuraError. Otherwise as in `inverse`.
     """
     t, n, rows = check_times(t_eval), system.n, system.joint_rows
-    Drive.prescribed(*motion)
+    Drive.prescribed(*motion).within(t[0], t[-1])
     state = np.concatenate([*_start(system, t[0], motion, q0, qd0), np.zeros(ACCOUNTS)])
     trial = _Trial(system, rtol)
     rigid = assemble(rigid_robot(system.robot))
@@ -137,7 +138,14 @@ def by_bisection(
             if progress is not None:
                 progress((b - t[0]) / (t[-1] - t[0]))
     except KeyboardInterrupt:
-        events.append({"t": float(t[len(states) - 1]), "level": "WARN", "text": "interrupted"})
+        events.append(
+            {
+                "t": float(t[len(states) - 1]),
+                "level": "WARN",
+                "name": "interrupted",
+                "text": "interrupted",
+            }
+        )
     z, rows_done = np.array(states), len(states)
     forces.append(forces[-1] if forces else np.zeros(len(rows)))
     meta = {
@@ -283,9 +291,5 @@ def _start(
     system: System, t: float, motion: Sequence[Signal], q0: Any, qd0: Any
 ) -> tuple[np.ndarray, np.ndarray]:
     """The state at the start, its joints on their motions."""
-    q, qd = (
-        check_state(system, "q0", q0, system.start()),
-        check_state(system, "qd0", qd0, np.zeros(system.n)),
-    )
-    put_on_motions(system, Drive.prescribed(*motion), t, q, qd)
+    q, qd, _ = consistent_start(system, t, Drive.prescribed(*motion), q0, qd0)
     return system.check(q), qd

@@ -3,75 +3,75 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
+
+import numpy as np
 
 from ..control import Controller, Sampled
 from ..errors import InputError
-from ..io import Run
-from ..signals import Drive, Signal
-from ..system import System, system_of
+from ..io import Run, check_progress
+from ..signals import Drive, as_signals
+from ..system import System, assemble
 from . import dense, integrator, nodewise_run
-from .problem import Problem, Progress, Solution, initial_value_problem
-from .recorder import record
+from .problem import Problem, Progress, Solution, check_times, initial_value_problem
+from .recorder import record, still
+from .stop_condition import StopCondition
 
-DriveLike = Drive | Controller | Sampled | Callable[..., Any]
+DriveLike = (
+    Drive | Controller | Sampled | Callable[..., Any] | Sequence[Any] | np.ndarray | float | None
+)
 
 
 def simulate(
     robot: Any,
     t_eval: Any,
-    drive: DriveLike | None = None,
+    drive: DriveLike = None,
     q0: Any = None,
     qd0: Any = None,
     rtol: float = 1e-6,
     *,
     method: str = "auto",
+    start: str | None = None,
+    continue_from: Run | None = None,
+    until: Callable[..., Any] | None = None,
     numerical_damping: bool = True,
     progress: Progress = None,
 ) -> Run:
-    """Integrate the equations of motion from t_eval[0] on; the Run has its channels at t_eval (T,).
-
-    A joint that reaches a limit of the robot file or the end of its link ends the run. So does a
-    tolerance that cannot be kept, a state that is not a number, and Ctrl-C. The Run then has what
-    was computed until there, an event says what happened and where, and `meta["complete"]` is
-    false. `meta["energy_error"]` is how far the energies are from balancing, relative to the
-    largest; beyond 1e-3 an event says so, beyond 0.1 the run is not complete.
-
-    Args:
-        robot: a System, a Robot, or a robot file. t_eval (T,): ascending times [s]. drive: a Drive,
-        a sampled Controller, `Sampled(f, rate_Hz)`, or a function of (t) or of (t, position,
-        velocity,
-            tip_deflection) that gives (links,) forces and torques [N or N m]. Such a function may
-            be called again for times within a step, never before its start, and must have no
-            memory.
-        q0, qd0 (n,): the state at the start, by default `system.start()` at rest. rtol: the error
-        that is asked for, of deflections and of a thousandth of the tip's path. method: "auto",
-        "explicit" (order 8), "implicit", or "exponential". numerical_damping: exponential steps
-        damp fast modes that change no output by more than the tolerance
-            (94); False: they do not.
-        progress: called with the finished fraction.
-
-    Raises:
-        InputError: an argument is not what is expected.
-    """
-    problem = initial_value_problem(robot, t_eval, drive, q0, qd0, rtol, method, numerical_damping)
-    run = record(problem.system, solution := _solver(problem.system)(problem, progress))
-    return (
-        problem.drive.recorded(run, solution.sampler)
-        if isinstance(problem.drive, Controller)
-        else run
+    """Integrate the equations of motion of one robot (25); arguments and errors as in
+    `flexura.simulate`."""
+    problem = initial_value_problem(
+        robot, t_eval, drive, q0, qd0, rtol, method, numerical_damping, start, continue_from
     )
+    check_progress(progress)
+    solver = _solver(problem.system)
+    solution = (
+        solver(problem, progress)
+        if until is None
+        else StopCondition(until, problem).run(solver, progress)
+    )
+    solution = replace(
+        solution,
+        accounts=solution.accounts + problem.accounts,
+        meta=solution.meta | {"start": problem.start},
+    )
+    run = record(problem.system, solution)
+    run.meta["events"] = run.meta["events"] + still(run)
+    if isinstance(problem.drive, Controller):
+        return problem.drive.recorded(run, solution.sampler)
+    return run
 
 
 def inverse(
     robot: Any,
     t_eval: Any,
-    motion: Signal | Sequence[Signal],
+    motion: Any,
     q0: Any = None,
     qd0: Any = None,
     rtol: float = 1e-6,
     *,
     method: str = "auto",
+    start: str | None = None,
     progress: Progress = None,
 ) -> Run:
     """Inverse dynamics (59): joints follow `motion` exactly; the Run has `joint/i/drive`, the
@@ -82,22 +82,28 @@ def inverse(
     through `simulate` returns the motion.
 
     Args:
-        motion: one Signal a joint; the others as in `simulate`.
+        robot: a System, a Robot, or the path or name of a robot file.
+        t_eval (T,): ascending times [s].
+        motion: one entry a joint: a Signal, a function of t, an array of len(t_eval) values, or a
+            number; or an array (T, joints). Arrays become cubic splines, functions splines of
+            fifth order. None is good for a locked joint. A motion may begin and end with any
+            velocity, but not jump inside the run.
+        q0, qd0, rtol, method, start, progress: as in `flexura.simulate`. Under gravity the run
+            starts in static equilibrium with the joints on their motions.
 
     Raises:
         InputError: an argument is not what is expected; a motion whose position or velocity jumps.
+        NoEquilibrium: there is no static equilibrium to start in.
     """
-    system = system_of(robot)
-    motions = [motion] if isinstance(motion, Signal) else list(motion)
-    if len(motions) != len(system.robot.links) or not all(isinstance(m, Signal) for m in motions):
-        raise InputError(
-            f"expected {len(system.robot.links)} Signals, one a joint",
-            key="motion",
-            value=len(motions),
-        )
-    return simulate(
-        system, t_eval, Drive.prescribed(*motions), q0, qd0, rtol, method=method, progress=progress
-    )
+    system, t = assemble(robot), check_times(t_eval)
+    motions = as_signals(motion, len(system.robot.links), "motion", t)
+    for i, (signal, link) in enumerate(zip(motions, system.robot.links, strict=True), 1):
+        if signal is None and not link.joint.locked:
+            raise InputError(
+                "missing: expected a motion of every joint", key=f"motion[{i}]", value="None"
+            )
+    drive = Drive.prescribed(*motions)
+    return simulate(system, t, drive, q0, qd0, rtol, method=method, start=start, progress=progress)
 
 
 def _solver(system: System) -> Callable[[Problem, Progress], Solution]:

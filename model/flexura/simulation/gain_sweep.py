@@ -20,6 +20,7 @@ from .. import core
 from ..control import JOINT, PID, STRIP, Controller
 from ..errors import InputError
 from ..system import System
+from .start import consistent_start
 
 PER_JOINT, OF_STRIP = len(JOINT), len(STRIP)
 
@@ -78,8 +79,8 @@ def trials(
     rtol: float,
     method: str = "auto",
 ) -> Trials:
-    """What rows of gains are run with, from the robot's start at rest, straight. Samples lie on
-    ticks.
+    """What rows of gains are run with, from rest as `simulate` starts: under gravity in static
+    equilibrium. Samples lie on ticks.
 
     Raises: InputError: the robot is not on the exact line, or the controller is one of other
     joints.
@@ -94,6 +95,7 @@ def trials(
     rate = controller.rate_Hz
     every = max(1, round(output_step_s * rate))
     t = np.arange(0, round(duration_s * rate) + 1, every) / rate
+    controller = controller.within(float(t[0]), float(t[-1]))
     references = np.array(
         [[j.reference(at)[0] if isinstance(j, PID) else 0.0 for at in t] for j in controller.joints]
     )
@@ -107,7 +109,7 @@ def trials(
         gains,
         np.ascontiguousarray(system.limits),
         t,
-        system.start(),
+        consistent_start(system, float(t[0]), controller, None, None)[0],
         references,
         rtol,
         method,

@@ -15,6 +15,7 @@ from .problem import MOST_STEPS, Problem, Progress, Solution
 from .recorder import limit_event
 
 STEPS_A_CALL = 400  # between two looks at the progress bar and the keyboard
+STEPS_A_LOOK = 20  # between two looks at the condition that ends a run
 
 
 def solve(problem: Problem, progress: Progress = None) -> Solution:
@@ -43,6 +44,7 @@ class _Integration:
         )
         sampled = np.zeros(joints, dtype=np.uint8)
         if isinstance(drive, Drive):
+            function = DriveFunction(drive.called, joints) if drive.calls else None
             segments, ranges, gains = drive.packed()
             follows = drive.follows.astype(np.uint8)
         elif isinstance(drive, Controller):
@@ -78,10 +80,12 @@ class _Integration:
         )
 
     def run(self, progress: Progress) -> Solution:
-        begun, t = time.perf_counter(), self.t
+        begun, t, ends = time.perf_counter(), self.t, self.problem.ends
         interrupted = False
         try:
-            while len(t) > 1 and self.core.advance(STEPS_A_CALL):
+            while len(t) > 1 and self.core.advance(STEPS_A_CALL if ends is None else STEPS_A_LOOK):
+                if ends is not None and ends(*(np.asarray(a) for a in self.core.rows()[:2])):
+                    break
                 if progress is not None:
                     progress((self.core.progress()["t"] - t[0]) / (t[-1] - t[0]))
             if len(t) == 1:
@@ -94,7 +98,8 @@ class _Integration:
         times, states, accounts, forces = (np.asarray(a) for a in self.core.rows())
         events = [] if interrupted else self._events(about)
         if interrupted or about["status"] == "interrupted":
-            events = [{"t": about["t"], "level": "WARN", "text": "interrupted"}]
+            name = "interrupted"
+            events = [{"t": about["t"], "level": "WARN", "name": name, "text": name}]
         meta: dict[str, Any] = {
             "steps": about["steps"],
             "rejected": about["rejected"],
@@ -111,7 +116,7 @@ class _Integration:
     def _events(self, about: dict[str, Any]) -> list[dict[str, Any]]:
         """What ended the run, if it is not its time."""
         status, at = about["status"], float(about["t"])
-        if status == "done":
+        if status in ("done", "running"):  # running: a condition ends it
             return []
         z = np.asarray(self.core.state())
         if status == "limit":
@@ -132,6 +137,7 @@ class _Integration:
             {
                 "t": at,
                 "level": "ERROR",
+                "name": status,
                 "text": f"the simulation got no further than t = {at:.6g} s: {what}",
             }
         ]

@@ -69,7 +69,7 @@ class _Nodewise(Integration):
         self.jumped += jump
         self.jumps.append({"t": self.now, "text": text, "J": jump})
         text = f"{text}: the energy jumps by {jump:.3g} J"
-        self.events.append({"t": self.now, "level": "INFO", "text": text})
+        self.events.append({"t": self.now, "level": "INFO", "name": "node", "text": text})
         return True
 
     def solution(self, meta: dict[str, Any]) -> Solution:

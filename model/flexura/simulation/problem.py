@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from ..control import PID, Controller, DriveFunction, Sampled
+from ..control import Controller, DriveFunction, Sampled
 from ..errors import InputError
-from ..signals import Drive
-from ..system import System, system_of
+from ..io import Run, array, choice, flag, number
+from ..signals import Drive, Signal, as_signals
+from ..system import System, assemble
+from .start import consistent_start, end_of, inside_limits, put_on_motions
 
 METHODS = ("auto", "explicit", "implicit", "exponential")
 SHORT = ("explicit-3", "explicit-5")  # what "auto" takes under a Controller whose ticks are short
@@ -25,7 +27,9 @@ class Problem:
     """An initial value problem: robot, output times (T,) [s], drive, state q, qd (n,) at t[0],
     tolerance and method.
 
-    `drive` is a Drive, a Controller, a Sampled, or a DriveFunction.
+    `drive` is a Drive, a Controller, a Sampled, or a DriveFunction. `start`: "static", "straight",
+    "given" or "continued". `accounts` (4,): those of the run that this one continues [J]. `ends`,
+    called with the times and states so far, says whether the rest is of no use.
     """
 
     system: System
@@ -36,6 +40,9 @@ class Problem:
     rtol: float
     method: str
     numerical_damping: bool = True
+    start: str = "given"
+    accounts: np.ndarray = field(default_factory=lambda: np.zeros(4))
+    ends: Callable[[np.ndarray, np.ndarray], bool] | None = None
 
 
 @dataclass(frozen=True)
@@ -66,114 +73,86 @@ def initial_value_problem(
     drive: Any,
     q0: Any,
     qd0: Any,
-    rtol: float,
-    method: str,
-    numerical_damping: bool = True,
+    rtol: Any,
+    method: Any,
+    numerical_damping: Any = True,
+    start: Any = None,
+    before: Run | None = None,
 ) -> Problem:
     """The problem that a simulation solves.
 
-    Args: as those of `simulate`.
+    Args: as those of `simulate`; before: the run that it continues.
 
-    Raises: InputError: an argument is not what is expected.
+    Raises: InputError: an argument is not what is expected. NoEquilibrium: it should start in
+    static equilibrium, and there is none.
     """
-    system, t = system_of(robot), check_request(t_eval, rtol, method)
-    joints = len(system.robot.links)
-    acting = Drive.none(joints) if drive is None else drive
-    if not isinstance(acting, Drive | Controller | Sampled):
-        acting = DriveFunction(acting, joints)
-    q, qd = consistent_start(system, t[0], acting, q0, qd0)
+    system, t = assemble(robot), check_request(t_eval, rtol, method)
+    acting = acting_drive(drive, len(system.robot.links), t)
+    accounts = np.zeros(4)
+    if before is None:
+        q, qd, start = consistent_start(system, t[0], acting, q0, qd0, start)
+    else:
+        q, qd, accounts = end_of(before, system, t, {"q0": q0, "qd0": qd0, "start": start})
+        start = "continued"
+        put_on_motions(system.joint_rows, acting, t[0], q, qd)
+        inside_limits(system, q)
     if not system.exact and isinstance(acting, Controller):
         expected = (
             'expected a robot with stiffening = true and sliding = "continuous" under a Controller'
         )
         raise InputError(expected, key="drive", value="Controller")
-    return Problem(system, t, acting, q, qd, rtol, method, numerical_damping)
+    damping = flag(numerical_damping, "numerical_damping")
+    return Problem(system, t, acting, q, qd, float(rtol), method, damping, start, accounts)
 
 
-def check_request(t_eval: Any, rtol: float, method: str) -> np.ndarray:
+def acting_drive(drive: Any, joints: int, t: np.ndarray) -> Drive | Controller | Sampled | Any:
+    """What acts in a run at the times t (T,) [s], as the solvers take it.
+
+    Args: drive: as in `simulate`; joints: how many the robot has.
+
+    Returns: a Drive whose motions are Signals, a Controller, a Sampled or a DriveFunction.
+
+    Raises: InputError: it is nothing of this, is for another number of joints, or has a motion that
+    nothing follows.
+    """
+    if drive is None:
+        return Drive.none(joints)
+    if isinstance(drive, Sampled):
+        return drive
+    if not isinstance(drive, Drive | Controller):
+        if callable(drive) and not isinstance(drive, Signal | type):
+            return DriveFunction(drive, joints)
+        if isinstance(drive, str | bytes | dict | type):
+            raise InputError(EXPECTED_DRIVE, key="drive", value=drive)
+        drive = Drive.force(*as_signals(drive, joints, "drive", t))
+    if len(drive.joints) != joints:
+        raise InputError(
+            f"expected {joints} joint drives, one a joint", key="drive", value=len(drive.joints)
+        )
+    return drive.within(float(t[0]), float(t[-1]))
+
+
+EXPECTED_DRIVE = (
+    "expected a Drive, a Controller, a Sampled, a function of (t) or of (t, position, velocity, "
+    "tip_deflection), or one entry a joint: numbers, Signals, functions of t or arrays"
+)
+
+
+def check_request(t_eval: Any, rtol: Any, method: Any) -> np.ndarray:
     """The times (T,) of a request whose tolerance and method are good. Raises InputError."""
     t = check_times(t_eval)
-    if not 1e-13 <= rtol <= 0.1:
-        raise InputError(
-            "expected a relative tolerance between 1e-13 and 0.1", key="rtol", value=rtol
-        )
-    if method not in METHODS + SHORT:
-        raise InputError(f"expected one of {', '.join(METHODS)}", key="method", value=method)
+    expected = "expected a relative tolerance between 1e-13 and 0.1"
+    if not 1e-13 <= number(rtol, "rtol", expected) <= 0.1:
+        raise InputError(expected, key="rtol", value=rtol)
+    if not (isinstance(method, str) and method in SHORT):
+        choice(method, "method", METHODS)
     return t
-
-
-def consistent_start(
-    system: System, t: float, drive: Any, q0: Any, qd0: Any
-) -> tuple[np.ndarray, np.ndarray]:
-    """q and qd (n,) at the start t [s]: as given, locked joints at rest, prescribed ones on their
-    motion. Raises InputError for wrong shapes, a drive of another number of joints, and a joint
-    outside its limits."""
-    q, qd = (
-        check_state(system, "q0", q0, system.start()),
-        check_state(system, "qd0", qd0, np.zeros(system.n)),
-    )
-    qd[system.joint_rows[system.locked]] = 0.0
-    if isinstance(drive, Drive | Controller):
-        if len(drive.joints) != len(system.robot.links):
-            raise InputError(
-                f"expected {len(system.robot.links)} joint drives, one a joint",
-                key="drive",
-                value=len(drive.joints),
-            )
-        put_on_motions(system, drive, t, q, qd)
-    inside_limits(system, q)
-    return q, qd
 
 
 def check_times(t_eval: Any) -> np.ndarray:
     """Ascending finite times (T,) [s]. Raises InputError."""
-    t = np.array(t_eval, dtype=float)
-    if t.ndim != 1 or len(t) < 1 or not np.all(np.isfinite(t)) or not np.all(np.diff(t) > 0):
-        raise InputError(
-            "expected ascending finite times in seconds, one or more", key="t_eval", value=t_eval
-        )
+    expected = "expected ascending finite times in seconds, one or more"
+    t = array(t_eval, "t_eval", expected, (None,))
+    if len(t) < 1 or not np.all(np.diff(t) > 0):
+        raise InputError(expected, key="t_eval", value=t_eval)
     return t
-
-
-def check_state(system: System, key: str, value: Any, default: np.ndarray) -> np.ndarray:
-    """A state's q or qd (n,), or the default. Raises InputError."""
-    if value is None:
-        return default
-    array = np.array(value, dtype=float)
-    if array.shape != (system.n,) or not np.all(np.isfinite(array)):
-        raise InputError(
-            f"expected {system.n} finite numbers, in the order of system.labels",
-            key=key,
-            value=value,
-        )
-    return array
-
-
-def put_on_motions(
-    system: System, drive: Drive | Controller, t: float, q: np.ndarray, qd: np.ndarray
-) -> None:
-    """Prescribed joints take position and velocity of their motions at t [s], in place."""
-    for joint, row in zip(drive.joints, system.joint_rows, strict=True):
-        if isinstance(joint, PID):
-            qd[row] = 0.0 if joint.prescribed else qd[row]
-        elif joint.prescribed and joint.motion is not None:
-            q[row], qd[row], _ = joint.motion(t)
-
-
-def inside_limits(system: System, q: np.ndarray) -> None:
-    """Raises InputError for a joint that starts outside its limits."""
-    for i, (link, row) in enumerate(zip(system.robot.links, system.joint_rows, strict=True), 1):
-        if (
-            link.joint.limits is not None
-            and not link.joint.limits[0] <= q[row] <= link.joint.limits[1]
-        ):
-            raise outside(i - 1, link.joint.limits, float(q[row]))
-
-
-def outside(joint: int, limits: tuple[float, float], position: float) -> InputError:
-    """Why a joint (from 0) cannot start at a position."""
-    return InputError(
-        f"expected a start inside the limits of joint {joint + 1}, {list(limits)}",
-        key="q0",
-        value=position,
-    )

@@ -44,6 +44,8 @@ def observed(robot: Robot) -> list[str]:
 WORK, LOSS, NUMERICAL, STRAIN = range(
     4
 )  # columns of the accounts, as Account of model/core/control/plant.hpp counts them
+LIMITS = ("limit", "end_of_link", "sleeve")  # names of events that stop a joint
+STILL = 1e-9  # m or rad: a robot whose unknowns change by less does not move
 NOTED, DOUBTED, REFUSED = (
     1e-3,
     1e-2,
@@ -79,10 +81,22 @@ def judged(run: Run) -> Run:
         return run
     text = f"the energies do not balance: {error:.1%} of the largest of them is missing"
     level = "INFO" if error <= DOUBTED else "WARN" if error <= REFUSED else "ERROR"
-    run.meta["events"] = [*run.meta.get("events", []), {"t": end, "level": level, "text": text}]
+    event = {"t": end, "level": level, "name": "balance", "text": text}
+    run.meta["events"] = [*run.meta.get("events", []), event]
     if not error <= REFUSED:
         run.meta["complete"] = False
     return run
+
+
+def still(run: Run) -> list[dict[str, Any]]:
+    """The event of a run in which nothing moves and no drive acts; none of another."""
+    drives = [values for name, values in run.channels.items() if name.endswith("/drive")]
+    if run.states is None or len(run.t) < 2 or any(values.any() for values in drives):
+        return []
+    if np.abs(run.states - run.states[0]).max() > STILL:
+        return []
+    text = "nothing moves: no drive acts, and the robot starts at rest in equilibrium"
+    return [{"t": float(run.t[0]), "level": "INFO", "name": "still", "text": text}]
 
 
 def describe(system: System, error: float) -> dict[str, Any]:
@@ -129,13 +143,18 @@ def limit_event(system: System, joint: int, t: float, position: np.ndarray) -> d
     )
     bound = low if abs(position[joint] - low) < abs(position[joint] - high) else high
     if abs(position[joint] - bound) > 1e-6 * max(1.0, abs(bound)):
-        text = f"joint {joint + 1} (Pa) ran into the sleeve of link {joint}: stopped"
+        name, text = (
+            "sleeve",
+            f"joint {joint + 1} (Pa) ran into the sleeve of link {joint}: stopped",
+        )
     elif bound in travel and (own is None or bound not in own):
         link = joint if kind == "Pa" else joint + 1
+        name = "end_of_link"
         text = f"joint {joint + 1} ({kind}) reached the end of link {link}, at {bound:g} m: stopped"
     else:
+        name = "limit"
         text = (
             f"joint {joint + 1} left its limits, {low:g} to {high:g} "
             f"{'rad' if kind == 'R' else 'm'}: stopped"
         )
-    return {"t": t, "level": "ERROR", "text": text}
+    return {"t": t, "level": "ERROR", "name": name, "text": text}

@@ -7,8 +7,8 @@ core where that is faster.
 from .assembly import Assembly
 from .spectrum import Modes, frequencies, modes
 from .statespace import StateSpace, linearize
-from .statics import NoEquilibrium, static, tip_pose
-from .system import System, assemble, system_of
+from .statics import NoEquilibrium, equilibrium, holding, static, tip_pose
+from .system import System, assemble
 
 __all__ = [
     "Assembly",
@@ -17,10 +17,11 @@ __all__ = [
     "StateSpace",
     "System",
     "assemble",
+    "equilibrium",
     "frequencies",
+    "holding",
     "linearize",
     "modes",
     "static",
-    "system_of",
     "tip_pose",
 ]

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..io import choice, whole
 from .statics import static
-from .system import System, system_of
+from .system import System, assemble
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ def frequencies(
     Raises: InputError: an argument is not what is expected. NoEquilibrium: q is not given and there
     is no static equilibrium.
     """
-    system = system_of(robot)
+    system = assemble(robot)
     _check(joints, count)
     if system.robot.nodal:
         q = static(system) if q is None else q
@@ -57,7 +57,7 @@ def frequencies(
 def modes(robot: Any, q: Any = None, joints: str = "locked", *, count: int | None = None) -> Modes:
     """Natural modes of the undamped robot linearised about q (n,). Arguments and errors as in
     `frequencies`."""
-    system = system_of(robot)
+    system = assemble(robot)
     _check(joints, count)
     return _found(system, static(system) if q is None else system.check(q), joints, count, True)
 
@@ -75,11 +75,10 @@ def _found(system: System, at: np.ndarray, joints: str, count: int | None, shape
     return Modes(_hertz(squares), columns, at, system.labels)
 
 
-def _check(joints: str, count: int | None) -> None:
-    if joints not in ("locked", "free"):
-        raise InputError('expected "locked" or "free"', key="joints", value=joints)
-    if count is not None and (isinstance(count, bool) or not isinstance(count, int) or count < 1):
-        raise InputError("expected a whole number, 1 or more", key="count", value=count)
+def _check(joints: Any, count: Any) -> None:
+    choice(joints, "joints", ("locked", "free"))
+    if count is not None:
+        whole(count, "count", 1)
 
 
 def _hertz(squares: np.ndarray) -> np.ndarray:

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import FlexuraError, InputError
-from ..io import summary
+from ..io import choice, summary
 from .statics import static
-from .system import System, jacobian, system_of
+from .system import System, assemble, jacobian
 
 
 @dataclass(frozen=True, repr=False)
@@ -139,9 +139,8 @@ def linearize(robot: Any, q: Any = None, qd: Any = None, joints: str = "free") -
 
     Raises: InputError: q, qd are no equilibrium. FlexuraError: none is found.
     """
-    system = system_of(robot)
-    if joints not in ("free", "locked"):
-        raise InputError('expected "free" or "locked"', key="joints", value=joints)
+    system = assemble(robot)
+    choice(joints, "joints", ("free", "locked"))
     rates = np.zeros(system.n) if qd is None else system.check(qd, "qd")
     at = _steady(system, rates) if q is None else system.check(q)
     _check_steady(system, at, rates)

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import FlexuraError, InputError
-from .system import System, system_of
+from ..errors import FlexuraError
+from ..io import array, number
+from .system import System, assemble
 
 STABLE, UNSTABLE = 0, 1  # Balance of model/core/statics_and_modes/equilibrium.hpp
 
@@ -25,7 +26,7 @@ class NoEquilibrium(FlexuraError):
 def static(
     robot: Any,
     joints: Any = None,
-    tip_force: tuple[float, float] = (0.0, 0.0),
+    tip_force: Any = (0.0, 0.0),
     tip_moment: float = 0.0,
 ) -> np.ndarray:
     """The static equilibrium q (n,) with the joints held: elastic + gravity = J_tip^T load (50).
@@ -33,27 +34,35 @@ def static(
     The load grows in steps from the straight robot, so that any bending is found: a cantilever
     under a dead transverse force P takes the shape of the elastica for any P L^2 / EI.
 
-    Args: robot: a System, a Robot, or a robot file; joints (links,): positions [m or rad], by
-    default their start; tip_force:
-        x and y [N] at the last tip, in the base's axes; tip_moment [N m] there.
+    Args:
+        robot: a System, a Robot, or the path or name of a robot file.
+        joints (links,): positions [m or rad], by default their start.
+        tip_force: x and y [N] at the last tip, in the base's axes.
+        tip_moment: moment there [N m].
 
     Returns: q (n,) in the order of `system.labels`.
 
-    Raises: InputError: an argument is not what is expected. NoEquilibrium: a link buckles under the
-    load, or none was found.
+    Raises:
+        InputError: an argument is not what is expected.
+        NoEquilibrium: a link buckles under the load, or none was found.
     """
-    system = system_of(robot)
-    q, load = held(system, joints), np.array([*tip_force, tip_moment], dtype=float)
-    if load.shape != (3,) or not np.all(np.isfinite(load)):
-        raise InputError(
-            "expected a finite force (x, y) and moment",
-            key="tip_force",
-            value=(tip_force, tip_moment),
-        )
+    system = assemble(robot)
+    force = array(tip_force, "tip_force", "expected a finite force (x, y) in newtons", (2,))
+    load = np.array([*force, number(tip_moment, "tip_moment")])
+    q = held(system, joints)
     if not system.exact:
         return _dense(system.fixed(q), q, load)
-    free = np.zeros(len(system.joint_rows), dtype=np.uint8)
-    found, balance, share, _ = system.equations.equilibrium(q, load, free)
+    return equilibrium(system.equations, q, load)
+
+
+def equilibrium(equations: Any, q: np.ndarray, load: np.ndarray | None = None) -> np.ndarray:
+    """The static equilibrium (n,) of compiled equations with the joints where they are in q (n,),
+    under a `load` (3,) at the tip: force x, y [N] and moment [N m] (50).
+
+    Raises: NoEquilibrium: there is none, or it was not found.
+    """
+    free = np.zeros(len(equations.first), dtype=np.uint8)
+    found, balance, share, _ = equations.equilibrium(q, np.zeros(3) if load is None else load, free)
     if balance == STABLE:
         return np.asarray(found)
     if balance == UNSTABLE:
@@ -66,26 +75,47 @@ def static(
     raise NoEquilibrium(text, np.asarray(found), float(share))
 
 
+def holding(robot: Any, q: Any = None) -> np.ndarray:
+    """The drives (links,) [N or N m] that hold the joints at rest (25): elastic forces and gravity
+    in their rows.
+
+    Args:
+        robot: a System, a Robot, or the path or name of a robot file.
+        q (n,): by default the static equilibrium at the start.
+
+    Raises:
+        InputError: an argument is not what is expected.
+        NoEquilibrium: q is not given and there is no static equilibrium.
+    """
+    system = assemble(robot)
+    at = static(system) if q is None else q
+    system, rest = system.fixed(at), np.zeros(system.n)
+    return system.forces(at, rest, rest)[system.joint_rows]
+
+
 def held(system: System, joints: Any) -> np.ndarray:
     """q (n,) of the straight robot with the joints at `joints` (links,) [m or rad], by default
     their start. Raises InputError."""
     q = system.start()
     if joints is not None:
-        given = np.asarray(joints, dtype=float)
-        if given.shape != system.joint_rows.shape or not np.all(np.isfinite(given)):
-            raise InputError(
-                f"expected {len(system.joint_rows)} finite joint positions",
-                key="joints",
-                value=joints,
-            )
-        q[system.joint_rows] = given
+        rows = system.joint_rows
+        q[rows] = array(
+            joints, "joints", f"expected {len(rows)} finite joint positions", rows.shape
+        )
     return q
 
 
 def tip_pose(robot: Any, q: Any) -> np.ndarray:
-    """x, y [m] and angle [rad] of the last link's tip in the base's axes at q (n,)."""
-    system = system_of(robot)
-    system = system.fixed(q)
+    """x, y [m] and angle [rad] of the last link's tip in the base's axes.
+
+    Args:
+        robot: a System, a Robot, or the path or name of a robot file.
+        q (n,): the configuration, in the order of `system.labels`.
+
+    Raises:
+        InputError: an argument is not what is expected.
+    """
+    system = assemble(robot).fixed(q)
     x, y, angle = system.line(q, len(system.robot.links), [system.robot.links[-1].length_m])
     return np.array([x[0], y[0], angle[0]])
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -9,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..io import STATIONS, summary
+from ..io import STATIONS, array, number, summary
 from ..link.line import Piece, whole_piece
 from ..link.shapes import coefficients_of_legendre_sums, legendre_shapes
-from ..robot import Robot, load
+from ..robot import Robot, robot_of
 from .assembly import Assembly
 from .constants import equations
 from .nodes import Nodes, nodes_at
@@ -204,15 +205,14 @@ class System:
 
         Raises: InputError: there is no such link, or a place is not on it.
         """
-        if not 1 <= link <= len(self.robot.links):
-            raise InputError(
-                f"expected a link from 1 to {len(self.robot.links)}", key="link", value=link
-            )
+        expected = f"expected a link from 1 to {len(self.robot.links)}"
+        if number(link, "link", expected) not in range(1, len(self.robot.links) + 1):
+            raise InputError(expected, key="link", value=link)
         length = self.robot.links[link - 1].length_m
         places = (
             np.linspace(0.0, length, 101)
             if s is None
-            else np.atleast_1d(np.asarray(s, dtype=float))
+            else np.atleast_1d(array(s, "s", "expected places in metres"))
         )
         if places.ndim != 1 or not np.all((places >= 0) & (places <= length * (1 + 1e-12))):
             raise InputError(
@@ -276,14 +276,11 @@ class System:
         return self._array(q, key)
 
     def _array(self, q: Any, key: str) -> np.ndarray:
-        array = np.array(q, dtype=float)
-        if array.shape != (self.n,):
-            raise InputError(
-                f"expected an array of shape ({self.n},), in the order of system.labels",
-                key=key,
-                value=array.shape,
-            )
-        return array
+        expected = f"expected an array of shape ({self.n},), in the order of system.labels"
+        found = array(q, key, expected)
+        if found.shape != (self.n,):
+            raise InputError(expected, key=key, value=found.shape)
+        return found
 
     def tangent(self, q: Any, qd: Any = None) -> np.ndarray:
         """The derivative of bias, elastic and gravity forces by q (n, n), at rest or at rates qd
@@ -336,16 +333,24 @@ class System:
         return "rad" if self.robot.links[int(parts[1]) - 1].joint.type == "R" else "m"
 
 
-def assemble(robot: Robot) -> System:
+def assemble(robot: Any) -> System:
     """The System of a robot.
 
-    Args: robot: its description.
+    Args:
+        robot: a Robot, the path or name of a robot file, or a System, which is returned as it is.
 
-    Raises: InputError: a joint moves no mass.
+    Raises:
+        InputError: an argument is not what is expected; a joint moves no mass.
     """
-    system = System(robot)
+    if isinstance(robot, System):
+        return robot
+    system = System(robot_of(robot))
     if system.exact:
-        _ = system.equations
+        try:
+            _ = system.equations
+        except InputError as error:
+            named = isinstance(robot, str | os.PathLike) and not error.file
+            raise error.in_file(os.fspath(robot)) if named else error from None
     return system
 
 
@@ -356,11 +361,3 @@ def jacobian(function: Any, x: np.ndarray, steps: np.ndarray) -> np.ndarray:
     return np.column_stack(
         [(function(x + e) - function(x - e)) / (2 * h) for e, h in zip(shifts, steps, strict=True)]
     )
-
-
-def system_of(robot: Any) -> System:
-    """The System of what a function was given: a System, a Robot, or the path or name of a robot
-    file."""
-    if isinstance(robot, System):
-        return robot
-    return assemble(robot if isinstance(robot, Robot) else load(robot))

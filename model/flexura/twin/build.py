@@ -56,7 +56,15 @@ def reach(robot: Robot) -> float:
     return sum(link.length_m for link in robot.links) or 1.0
 
 
-def build(robot: Robot, beam: str, mesh: Mesh, speeds: np.ndarray, gains: np.ndarray) -> TwinModel:
+def build(
+    robot: Robot,
+    beam: str,
+    mesh: Mesh,
+    speeds: np.ndarray,
+    gains: np.ndarray,
+    guided: np.ndarray | None = None,
+    held: bool = False,
+) -> TwinModel:
     """Build a robot, straight at its start.
 
     Args:
@@ -65,6 +73,8 @@ def build(robot: Robot, beam: str, mesh: Mesh, speeds: np.ndarray, gains: np.nda
         mesh: elements, hubs and sleeves.
         speeds: joint velocities at the start (n,) [m/s or rad/s].
         gains: of the joints' PD controllers (n, 2).
+        guided: which joints follow a prescribed motion (n,); None: none does.
+        held: all joints stay at their start.
     """
 
     container = exu.SystemContainer()
@@ -85,7 +95,14 @@ def build(robot: Robot, beam: str, mesh: Mesh, speeds: np.ndarray, gains: np.nda
         marker, node = connect.connect(on, link, previous, part, mesh.places[i])
         coordinates.append(
             connect.add_drive_and_friction(
-                mbs, link.joint, marker, fixed, speeds[i], tuple(gains[i])
+                mbs,
+                link.joint,
+                marker,
+                fixed,
+                speeds[i],
+                tuple(gains[i]),
+                guided is not None and bool(guided[i]),
+                held,
             )
         )
         parts.append(part)

@@ -11,7 +11,12 @@ from .loads import Actuation
 
 
 def channels(
-    model: TwinModel, act: Actuation, t: np.ndarray, q: np.ndarray, v: np.ndarray
+    model: TwinModel,
+    act: Actuation,
+    t: np.ndarray,
+    q: np.ndarray,
+    v: np.ndarray,
+    reaction: np.ndarray,
 ) -> tuple[dict[str, np.ndarray], dict[str, str]]:
     """Channels of a run from the system's coordinates.
 
@@ -21,6 +26,7 @@ def channels(
         t: times (T,) [s].
         q: total coordinates of the system (T, coordinates).
         v: their velocities (T, coordinates).
+        reaction: forces of the constraints that hold joints to a motion (T, n).
 
     Returns:
         Channels (T,) and their units, by name.
@@ -76,7 +82,8 @@ def channels(
         strain += part.strain(own)
         potential -= part.moment(own) @ gravity
         origin, tip = hub, end
-    out = _joints(model, act, t, position, speed, deflection * bool(model.mesh.elements[-1])) | out
+    bent = deflection * bool(model.mesh.elements[-1])
+    out = _joints(model, act, t, position, speed, bent, reaction) | out
     out |= {"tip/x": (tip.r[:, 0], "m"), "tip/y": (tip.r[:, 1], "m")}
     out |= {
         "energy/kinetic": (kinetic, "J"),
@@ -95,11 +102,13 @@ def _joints(
     position: np.ndarray,
     speed: np.ndarray,
     deflection: np.ndarray,
+    reaction: np.ndarray,
 ) -> dict[str, tuple[np.ndarray, str]]:
     """Position, velocity and drive of the joints, with units."""
     drive = np.array(
         [act.call(*sample) for sample in zip(t, position, speed, deflection, strict=True)]
     ).reshape(position.shape)
+    drive = drive + reaction
     out = {}
     for i, link in enumerate(model.robot.links):
         length, force = ("rad", "N m") if link.joint.type == "R" else ("m", "N")

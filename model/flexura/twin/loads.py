@@ -24,8 +24,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..io import array, function_of
 from ..optional import Optional
-from ..signals import Drive
+from ..signals import Drive, Signal, as_signals
 from .build import TwinModel
 from .links.part import Ground, Motion
 
@@ -41,28 +42,34 @@ class Actuation:
     `gains` (n, 2): kp and kd of the joints' controllers. `call(t, position, velocity,
     tip_deflection)`: the n drive forces. `plan(t)`: force, r, dr/dt of each joint (n, 3); None if
     the drive is a function of the state, whose controllers only help Newton's method. `breaks`:
-    instants at which the plan may jump; None: unknown, every step may have one.
+    instants at which the plan may jump; None: unknown, every step may have one. `guided` (n,):
+    which joints are held to their motion r; None: none is.
     """
 
     gains: np.ndarray
     call: Callable[..., np.ndarray]
     plan: Callable[[float], np.ndarray] | None
     breaks: np.ndarray | None
+    guided: np.ndarray | None = None
 
 
-def actuation(drive: Any, start: np.ndarray, speeds: np.ndarray) -> Actuation:
+def actuation(drive: Any, start: np.ndarray, speeds: np.ndarray, t: np.ndarray) -> Actuation:
     """The actuation for a drive.
 
     Args:
-        drive: a Drive, a function of (t) or of (t, position, velocity, tip_deflection), or None.
+        drive: a Drive, a function of (t) or of (t, position, velocity, tip_deflection), forces one
+            entry a joint, or None.
         start: joint positions at time 0 (n,).
         speeds: joint velocities at time 0 (n,).
+        t: the run's times (T,) [s].
 
     Raises:
         InputError: the drive does not fit the robot.
     """
     n = len(start)
     drive = Drive.none(n) if drive is None else drive
+    if not isinstance(drive, Drive) and (not callable(drive) or isinstance(drive, Signal | type)):
+        drive = Drive.force(*as_signals(drive, n, "drive", t))
     if isinstance(drive, Drive):
         if len(drive.joints) != n:
             raise InputError(
@@ -70,27 +77,18 @@ def actuation(drive: Any, start: np.ndarray, speeds: np.ndarray) -> Actuation:
                 key="drive",
                 value=len(drive.joints),
             )
-        if drive.follows.any():
-            expected = "expected a force, or gains on the motion: the twin has no prescribed joints"
-            raise InputError(expected, key="prescribed", value=True)
-        gains = np.array(
-            [(j.kp, j.kd) if j.motion is not None else (0.0, 0.0) for j in drive.joints]
-        ).reshape(n, 2)
-        return Actuation(gains, drive, lambda t: _plan(drive, t), drive.breaks)
-    if not callable(drive):
-        expected = "expected a Drive or a function (t) or (t, position, velocity, tip_deflection)"
-        raise InputError(expected, key="drive", value=drive)
+        acting = drive.within(0.0, float(t[-1]))
+        breaks = None if acting.calls else acting.breaks
+        return Actuation(acting.gains, acting, lambda t: _plan(acting, t), breaks, acting.follows)
+
+    expected = "expected a Drive or a function (t) or (t, position, velocity, tip_deflection)"
+    function_of(drive, "drive", (1, 4), expected)
 
     def checked(*arguments: Any) -> np.ndarray:
-        forces = np.asarray(drive(*arguments), dtype=float)
-        if forces.shape != (n,) or not np.all(np.isfinite(forces)):
-            expected = (
-                f"expected {n} finite forces or torques from the drive at t = {arguments[0]:g} s"
-            )
-            raise InputError(expected, key="drive", value=forces)
-        return forces
+        expected = f"expected {n} finite forces or torques from the drive at t = {arguments[0]:g} s"
+        return array(drive(*arguments), "drive", expected, (n,))
 
-    if _takes_state(drive):
+    if _takes(drive, 4):
         return Actuation(_gains(checked, start, speeds), checked, None, None)
     still = np.zeros((n, 2))
     return Actuation(
@@ -119,17 +117,16 @@ def _plan(drive: Drive, t: float) -> np.ndarray:
     """Force, r and dr/dt of each joint at t, (n, 3)."""
     out = np.zeros((len(drive.joints), 3))
     for i, joint in enumerate(drive.joints):
-        if joint.force is not None:
-            out[i, 0] = joint.force(t)[0]
+        out[i, 0] = joint.force_at(t)
         if joint.motion is not None:
             out[i, 1:] = joint.motion(t)[:2]
     return out
 
 
-def _takes_state(function: Callable[..., Any]) -> bool:
-    """Whether a function can be called with four arguments."""
+def _takes(function: Callable[..., Any], count: int) -> bool:
+    """Whether a function can be called with so many arguments."""
     try:
-        inspect.signature(function).bind(0.0, None, None, 0.0)
+        inspect.signature(function).bind(*[0.0] * count)
     except TypeError:
         return False
     except ValueError:  # a builtin without a signature
@@ -181,13 +178,18 @@ class Loads:
             return
         edges = np.array([t - self.step_s / 2, *inside, t + self.step_s / 2])
         weights, middles = np.diff(edges) / self.step_s, (edges[1:] + edges[:-1]) / 2
-        self._apply(sum(w * self.act.plan(m) for w, m in zip(weights, middles, strict=True)))
+        mean = sum(w * self.act.plan(m) for w, m in zip(weights, middles, strict=True))
+        if self.act.guided is not None:
+            mean[self.act.guided] = self.act.plan(t)[self.act.guided]
+        self._apply(mean)
 
     def _apply(self, values: Any) -> None:
         mbs = self.model.mbs
         for joint, now, before in zip(self.model.coordinates, values, self.applied, strict=True):
             if now[0] != before[0]:
                 mbs.SetLoadParameter(joint.load, "load", float(now[0]))
+            if joint.guide is not None:
+                mbs.SetObjectParameter(joint.guide, "offset", float(now[1]))
             if joint.servo is not None:
                 mbs.SetObjectParameter(joint.servo, "offset", float(now[1]))
                 mbs.SetObjectParameter(joint.servo, "velocityOffset", float(now[2]))

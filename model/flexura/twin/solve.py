@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 
 from ..errors import FlexuraError, InputError
-from ..io import Run
+from ..io import Run, array, check_progress, choice, number, whole
 from ..optional import Optional
-from ..robot import MAX_ELEMENTS, Robot
+from ..robot import MAX_ELEMENTS, Robot, robot_of
 from .build import TwinModel, build
 from .channels import channels
+from .equilibrium import equilibrium, put, which_start
 from .extrapolation import LENGTH_FACTOR, extrapolate
 from .joints.mesh import check_supported, mesh, slide_range, sliding_kinds
 from .links import ancf, geometrically_exact
@@ -33,8 +34,8 @@ COARSE_ELEMENTS = 4  # elements a link for the frequencies that suggest a step
 SLACK = 1e-4  # how far a hub or sleeve may go beyond the end of its link, relative to the link
 PROGRESS = 0.01  # the fraction of a run between two calls of progress
 
-# times, coordinates, velocities, accelerations
-Record = tuple[list[float], list[np.ndarray], list[np.ndarray], list[np.ndarray]]
+# times, coordinates, velocities, accelerations, forces of the constraints on prescribed joints
+Record = tuple[list[float], list[np.ndarray], list[np.ndarray], list[np.ndarray], list[np.ndarray]]
 
 
 class DidNotConverge(FlexuraError):
@@ -42,11 +43,12 @@ class DidNotConverge(FlexuraError):
 
 
 def simulate(
-    robot: Robot,
+    robot: Any,
     t_eval: Any,
     drive: Any = None,
     qd0: Any = None,
     *,
+    start: str | None = None,
     beam: str = "ancf",
     elements: int | None = None,
     step_s: float | None = None,
@@ -55,17 +57,21 @@ def simulate(
 ) -> Run:
     """Simulate a robot in Exudyn, as a check of the native solver.
 
-    Nothing is shared with the native solver but the robot file and the drives. The robot starts
-    straight at `robot.start`, at time 0. Links take all unknowns of their mesh (`modes` is
-    ignored); joint limits do not act.
+    Nothing is shared with the native solver but the robot file and the drives. The robot is at
+    `robot.start` at time 0. Links take all unknowns of their mesh (`modes` is ignored); joint
+    limits do not act.
 
     Args:
-        robot: the robot.
+        robot: a Robot, a System, or the path or name of a robot file.
         t_eval: ascending times of the result (T,) [s], from 0 on.
-        drive: a Drive, or a function of (t) or of (t, position, velocity, tip_deflection) that
-            returns n forces [N] or torques [N m]; tip_deflection is the last link's. A function of
-            the state is called in every iteration, so that it must depend on its arguments only.
+        drive: a Drive, whose prescribed joints are held to their motions; a function of (t) or of
+            (t, position, velocity, tip_deflection) that returns n forces [N] or torques [N m];
+            tip_deflection is the last link's. A function of the state is called in every
+            iteration, so that it must depend on its arguments only. Or forces, one entry a joint,
+            as in `flexura.simulate`.
         qd0: joint velocities at the start (n,) [m/s or rad/s]; None: at rest.
+        start: "static", links in equilibrium with the joints held, which is the default under
+            gravity and needs a robot at rest, or "straight". `meta["start"]` says which was used.
         beam: "ancf" (ObjectANCFCable2D, Euler-Bernoulli) or "ge" (ObjectBeamGeometricallyExact2D of
             three nodes, with shear).
         elements: beam elements a flexible link; None: twice the robot file's and at least 8, or 32
@@ -86,30 +92,45 @@ def simulate(
     Raises:
         InputError: an argument is wrong, or the twin does not contain something: stiffening =
             false, damping alpha, sliding on a "ge" beam.
-        FlexuraError: Exudyn's solver fails, or a joint slides off the end of a flexible link; the
-            message has the time.
+        FlexuraError: Exudyn's solver fails, or finds no equilibrium to start in, or a joint slides
+            off the end of a flexible link; the message has the time.
     """
+    robot = robot_of(robot)
+    choice(beam, "beam", tuple(PROGRAMS))
     check_supported(robot, beam)
     t, speeds = _times(t_eval), _speeds(robot, qd0)
-    if beam not in PROGRAMS:
-        raise InputError('expected "ancf" or "ge"', key="beam", value=beam)
-    if elements is not None and not 1 <= elements <= 2 * MAX_ELEMENTS:
-        raise InputError(
-            f"expected a whole number from 1 to {2 * MAX_ELEMENTS}", key="elements", value=elements
-        )
+    if elements is not None:
+        most = 2 * MAX_ELEMENTS
+        expected = f"expected a whole number from 1 to {most}"
+        if whole(elements, "elements", 1, expected) > most:
+            raise InputError(expected, key="elements", value=elements)
     for key, given, unit in (
         ("step_s", step_s, "time in seconds"),
         ("hub_length_m", hub_length_m, "length in metres"),
     ):
-        if given is not None and not 0 < given < np.inf:
-            raise InputError(f"expected a {unit}, above 0", key=key, value=given)
-    act = actuation(drive, robot.start, speeds)
+        expected = f"expected a {unit}, above 0"
+        if given is not None and not number(given, key, expected) > 0:
+            raise InputError(expected, key=key, value=given)
+    check_progress(progress)
+    act = actuation(drive, robot.start, speeds, t)
+    if act.guided is not None and act.guided.any():
+        assert act.plan is not None
+        on = act.plan(0.0)
+        robot = _at(robot, np.where(act.guided, on[:, 1], robot.start))
+        speeds = np.where(act.guided, on[:, 2], speeds)
+    begins = which_start(robot, start, speeds)
     kinds = sliding_kinds(robot) if hub_length_m is None else []
     share, report = 1 / (1 + len(kinds)), progress or (lambda fraction: None)
 
     def run(number: int, times: dict[str, float], longest: float) -> Run:
+        shape = mesh(robot, elements, hub_length_m, times)
+        bent = equilibrium(robot, beam, shape) if begins == "static" else None
+
         def new() -> TwinModel:
-            return build(robot, beam, mesh(robot, elements, hub_length_m, times), speeds, act.gains)
+            model = build(robot, beam, shape, speeds, act.gains, act.guided)
+            if bent is not None:
+                put(model, bent)
+            return model
 
         tries = 1 if step_s else ATTEMPTS
         return _run(
@@ -129,9 +150,10 @@ def simulate(
             {},
             step_s
             or suggest_step(
-                build(robot, beam, coarse, speeds, act.gains), _settings(1.0, 1), t[-1]
+                build(robot, beam, coarse, speeds, act.gains, act.guided), _settings(1.0, 1), t[-1]
             ),
         )
+        first.meta["start"] = begins
         if not kinds or not first.complete:
             return first
         return extrapolate(
@@ -165,9 +187,11 @@ def _run(
         except DidNotConverge:
             if attempt == tries - 1:
                 raise
-    t, q, v = steps.at_times(t, *(np.array(column) for column in record))
+    at, *columns = (np.array(column) for column in record[:4])
+    t, q, v = steps.at_times(t, at, *columns)
     q += model.reference
-    values, units = channels(model, act, t, q, v)
+    reaction = np.column_stack([np.interp(t, at, column) for column in np.array(record[4]).T])
+    values, units = channels(model, act, t, q, v, reaction)
     meta = {
         "source": "twin",
         "program": f"Exudyn {exu.__version__} ({program})",
@@ -186,24 +210,28 @@ def _run(
 
 def _times(t_eval: Any) -> np.ndarray:
     """The output times (T,), checked."""
-    t = np.array(t_eval, dtype=float)
-    if (
-        t.ndim != 1
-        or len(t) == 0
-        or not np.all(np.isfinite(t))
-        or t[0] < 0
-        or np.any(np.diff(t) <= 0)
-    ):
-        raise InputError("expected ascending times in seconds, from 0 on", key="t_eval", value=t)
+    expected = "expected ascending times in seconds, from 0 on"
+    t = array(t_eval, "t_eval", expected, (None,))
+    if len(t) == 0 or t[0] < 0 or np.any(np.diff(t) <= 0):
+        raise InputError(expected, key="t_eval", value=t)
     return t
+
+
+def _at(robot: Robot, positions: np.ndarray) -> Robot:
+    """The same robot with its joints starting at positions (n,)."""
+    links = [
+        link.model_copy(update={"joint": link.joint.model_copy(update={"start": float(place)})})
+        for link, place in zip(robot.links, positions, strict=True)
+    ]
+    return robot.model_copy(update={"link": links})
 
 
 def _speeds(robot: Robot, qd0: Any) -> np.ndarray:
     """The joint velocities at the start (n,), checked."""
     n = len(robot.links)
-    speeds = np.zeros(n) if qd0 is None else np.array(qd0, dtype=float)
-    if speeds.shape != (n,) or not np.all(np.isfinite(speeds)):
-        raise InputError(f"expected {n} joint velocities in m/s or rad/s", key="qd0", value=speeds)
+    if qd0 is None:
+        return np.zeros(n)
+    speeds = array(qd0, "qd0", f"expected {n} joint velocities in m/s or rad/s", (n,))
     for i, (link, speed) in enumerate(zip(robot.links, speeds, strict=True), 1):
         if link.joint.locked and speed:
             raise InputError(
@@ -255,12 +283,9 @@ def _settings(
 def _solve(
     model: TwinModel, act: Actuation, steps: Steps, progress: Callable[[float], None] | None
 ) -> tuple[Record, int, float]:
-    """Run Exudyn.
-
-    Returns:
-        The record, the number of steps done, and the time taken [s].
-    """
-    record: Record = ([], [], [], [])
+    """Run Exudyn; returns the record, the steps done, and seconds taken."""
+    record: Record = ([], [], [], [], [])
+    force = exu.OutputVariableType.Force
     errors: list[BaseException] = []
     data, done = model.mbs.systemData, 0
     loads = Loads(model, act, steps.length, steps.count, errors.append)
@@ -271,6 +296,9 @@ def _solve(
         record[1].append(np.array(data.GetODE2Coordinates()))
         record[2].append(np.array(data.GetODE2Coordinates_t()))
         record[3].append(np.array(data.GetODE2Coordinates_tt()))
+        guides = [joint.guide for joint in model.coordinates]
+        forces = [0.0 if g is None else -model.mbs.GetObjectOutput(g, force) for g in guides]
+        record[4].append(np.array(forces, dtype=float))
 
     def before(mbs: Any, t: float) -> bool:
         try:

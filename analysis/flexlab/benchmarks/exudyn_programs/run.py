@@ -145,6 +145,7 @@ def _twin(problem: Problem, choice: Choice, step: float) -> tuple[float, Channel
         elements=choice.elements,
         hub_length_m=problem.hub_length_m,
         step_s=step,
+        start="straight",
     )
     took = min(time.process_time() - begun, done.meta["wall_s"])
     if not done.meta["complete"]:

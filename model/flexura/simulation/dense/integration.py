@@ -61,12 +61,15 @@ class Integration:
             problem.method,
         )
         self.t, self.drive, self.rtol, self.progress = t, drive, rtol, progress
+        self.ends, self.ended = problem.ends, False
         self.ticks, marks, self.span = np.zeros(0), np.zeros(0), float(t[-1] - t[0])
         self.longest = (
-            self.span / LEAST_STEPS if callable(drive) and not isinstance(drive, Drive) else np.inf
+            self.span / LEAST_STEPS
+            if isinstance(drive, DriveFunction) or (isinstance(drive, Drive) and drive.calls)
+            else np.inf
         )
         if isinstance(drive, Drive):
-            marks, self.longest = drive.breaks, PART * drive.shortest_period
+            marks, self.longest = drive.breaks, min(self.longest, PART * drive.shortest_period)
         elif isinstance(drive, Sampled):
             self.sampled = DriveFunction(drive.function, len(system.joint_rows))
             self.ticks = marks = (
@@ -105,7 +108,8 @@ class Integration:
             self._show(self.t[:1], lambda s: self.z)
             complete = len(self.t) == 1 or self._go()
         except KeyboardInterrupt:
-            self.events.append({"t": self.now, "level": "WARN", "text": "interrupted"})
+            name = "interrupted"
+            self.events.append({"t": self.now, "level": "WARN", "name": name, "text": name})
         meta = {
             "steps": self.steps,
             "evaluations": self.evaluations + self.equations.evaluations,
@@ -150,6 +154,8 @@ class Integration:
         """Go on to the end of the times; whether it is reached."""
         while self.marks:
             beyond = self._solve(float(self.marks[0]))
+            if self.ended:
+                return True
             if beyond is None:
                 del self.marks[0]
                 self._arrive()
@@ -194,7 +200,7 @@ class Integration:
                     f"the simulation got no further than t = {self.now:.6g} s: "
                     f"{STUCK.format(self.rtol)}"
                 )
-                self.events.append({"t": self.now, "level": "ERROR", "text": text})
+                self.events.append({"t": self.now, "level": "ERROR", "name": "stuck", "text": text})
                 return ()
             self.steps += 1
             line, self.now, self.z, self.length = (
@@ -207,6 +213,11 @@ class Integration:
             self._show(self.t[(self.t > before) & (self.t <= self.now)], line)
             self.weights.grow(self.z, self.equations.energy())
             solver.atol = self._atol()
+            if self.ends is not None and self.ends(
+                np.array([row[0] for row in self.found]), np.array([row[1] for row in self.found])
+            ):
+                self.ended = True
+                return None
             if self.progress is not None:
                 self.progress((self.now - self.t[0]) / self.span)
         return (which[0], bool(which[1])) if far > 0 else None

@@ -30,14 +30,16 @@ FRICTION_SPEED = 1e-3  # m/s or rad/s: Coulomb friction is f tanh(velocity / thi
 class Coordinate:
     """A joint's coordinate in Exudyn.
 
-    `marker` measures it, `load` acts on it, `servo` is its PD controller or None. `references`
-    keeps objects that Exudyn only refers to.
+    `marker` measures it, `load` acts on it, `servo` is its PD controller or None, `guide` the
+    constraint that puts it on a prescribed motion or None. `references` keeps objects that Exudyn
+    only refers to.
     """
 
     marker: Any
     load: Any
     servo: Any = None
     references: Any = None
+    guide: Any = None
 
 
 def start_frame(link: Link, previous: Frame, length: float, speed: float) -> Frame:
@@ -155,7 +157,14 @@ def _prismatic(
 
 
 def add_drive_and_friction(
-    mbs: Any, joint: Joint, marker: Any, fixed: Any, speed: float, gains: tuple[float, float]
+    mbs: Any,
+    joint: Joint,
+    marker: Any,
+    fixed: Any,
+    speed: float,
+    gains: tuple[float, float],
+    guided: bool = False,
+    held: bool = False,
 ) -> Coordinate:
     """Put drive, PD gains, friction, rotor or lock on a joint's coordinate.
 
@@ -166,13 +175,17 @@ def add_drive_and_friction(
         fixed: a marker whose coordinate is always 0.
         speed: velocity at the start [m/s or rad/s].
         gains: stiffness and damping.
+        guided: it follows a prescribed motion.
+        held: a joint that is not locked stays at its start all the same, with the same unknowns.
     """
 
     load = mbs.AddLoad(eii.LoadCoordinate(markerNumber=marker, load=0.0))
-    if joint.locked:
-        mbs.AddObject(
+    guide = None
+    if joint.locked or guided or held:
+        guide = mbs.AddObject(
             eii.ObjectConnectorCoordinate(markerNumbers=[fixed, marker], offset=joint.start)
         )
+    if joint.locked:
         return Coordinate(marker, load)
     servo = references = None
     if any(gains):
@@ -210,7 +223,7 @@ def add_drive_and_friction(
         )
         own = mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=rotor, coordinate=0))
         mbs.AddObject(eii.ObjectConnectorCoordinate(markerNumbers=[own, marker]))
-    return Coordinate(marker, load, servo, references)
+    return Coordinate(marker, load, servo, references, guide if guided else None)
 
 
 def _friction(mbs: Any, spring: Any, coulomb: float) -> Any:

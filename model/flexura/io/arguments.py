@@ -1,0 +1,170 @@
+"""Numbers that callers give as arguments: read as floats, or refused by the argument's name."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, ParamSpec, TypeVar
+
+import numpy as np
+
+from ..errors import InputError
+
+MOST = 10**9  # a whole number beyond is a slip
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+def number(value: Any, key: str, expected: str = "expected a finite number") -> float:
+    """A finite number as a float.
+
+    Args: value: what was given; key: the argument's name; expected: what is said of a wrong value.
+
+    Raises: InputError: it is a text, a bool, an array, or not finite.
+    """
+    if isinstance(value, bool | np.bool_ | str | bytes | list | tuple | dict | set):
+        raise InputError(expected, key=key, value=value)
+    if isinstance(value, np.ndarray) and value.ndim:
+        raise InputError(expected, key=key, value=value)
+    try:
+        found = float(value)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(expected, key=key, value=value) from None
+    if not math.isfinite(found):
+        raise InputError(expected, key=key, value=value)
+    return found
+
+
+def array(
+    value: Any, key: str, expected: str, shape: tuple[int | None, ...] | None = None
+) -> np.ndarray:
+    """A new array of finite floats.
+
+    Args: value: what was given; key: the argument's name; expected: what is said of a wrong value;
+        shape: the lengths that it must have, None for any length or, in place of the tuple, for any
+        shape.
+
+    Raises: InputError: it is no array of finite numbers of this shape.
+    """
+    try:
+        found = np.asarray(value)
+        good = found.dtype.kind in "iuf" or (found.dtype.kind == "O" and not _texts(found))
+        out = np.array(found, dtype=float) if good else None
+    except (TypeError, ValueError, OverflowError):
+        out = None
+    if out is None or not np.all(np.isfinite(out)) or not _fits(out.shape, shape):
+        raise InputError(expected, key=key, value=value)
+    return out
+
+
+def whole(value: Any, key: str, least: int, expected: str = "") -> int:
+    """A whole number of `least` or more.
+
+    Args: value: what was given; key: the argument's name; expected: what is said of a wrong value.
+
+    Raises: InputError: it is none.
+    """
+    expected = expected or f"expected a whole number, {least} or more"
+    if isinstance(value, bool) or not isinstance(value, int | np.integer):
+        raise InputError(expected, key=key, value=value)
+    if not least <= value <= MOST:
+        raise InputError(expected, key=key, value=value)
+    return int(value)
+
+
+def choice(value: Any, key: str, known: Sequence[str]) -> str:
+    """One of the known words.
+
+    Args: value: what was given; key: the argument's name; known: the words.
+
+    Raises: InputError: it is none of them.
+    """
+    if not isinstance(value, str) or value not in known:
+        words = [f'"{word}"' for word in known]
+        text = " or ".join(words) if len(words) < 3 else f"one of {', '.join(known)}"
+        raise InputError(f"expected {text}", key=key, value=value)
+    return value
+
+
+def flag(value: Any, key: str) -> bool:
+    """True or False.
+
+    Args: value: what was given; key: the argument's name.
+
+    Raises: InputError: it is neither.
+    """
+    if not isinstance(value, bool | np.bool_):
+        raise InputError("expected True or False", key=key, value=value)
+    return bool(value)
+
+
+def function_of(value: Any, key: str, counts: Sequence[int], expected: str) -> Any:
+    """A function that can be called with one of so many arguments.
+
+    Args: value: what was given; key: the argument's name; counts: of positional arguments;
+        expected: what is said of a wrong value.
+
+    Raises: InputError: it is none.
+    """
+    if not callable(value) or not any(_takes(value, count) for count in counts):
+        raise InputError(expected, key=key, value=value)
+    return value
+
+
+def _takes(function: Any, count: int) -> bool:
+    try:
+        inspect.signature(function).bind(*[0.0] * count)
+    except TypeError:
+        return False
+    except ValueError:  # a builtin without a signature
+        return True
+    return True
+
+
+def check_progress(progress: Any) -> None:
+    """Raises InputError for what is neither None nor a function of the finished fraction."""
+    if progress is not None:
+        function_of(progress, "progress", (1,), "expected a function of the finished fraction")
+
+
+def finite_arguments(function: Callable[P, T]) -> Callable[P, T]:
+    """The same function with its arguments that are annotated `float` or `int` read as numbers.
+
+    The function raises InputError, by the argument's name, for what is no finite number.
+    """
+    signature = inspect.signature(function)
+    kinds = {name: str(p.annotation) for name, p in signature.parameters.items()}
+    whole = [name for name, kind in kinds.items() if kind == "int"]
+    real = [name for name, kind in kinds.items() if kind == "float"]
+
+    @functools.wraps(function)
+    def checked(*args: P.args, **kwargs: P.kwargs) -> T:
+        given = signature.bind(*args, **kwargs)
+        for name in real:
+            if name in given.arguments:
+                value = given.arguments[name]
+                found = number(value, name)
+                given.arguments[name] = value if isinstance(value, int | float) else found
+        for name in whole:
+            if name in given.arguments:
+                value = number(given.arguments[name], name, "expected a whole number")
+                if value != round(value):
+                    raise InputError("expected a whole number", key=name, value=value)
+                given.arguments[name] = int(value)
+        return function(*given.args, **given.kwargs)
+
+    return checked
+
+
+def _texts(found: np.ndarray) -> bool:
+    return any(isinstance(x, str | bytes | bool | type(None)) for x in found.flat)
+
+
+def _fits(shape: tuple[int, ...], asked: tuple[int | None, ...] | None) -> bool:
+    if asked is None:
+        return True
+    return len(shape) == len(asked) and all(
+        want in (None, has) for has, want in zip(shape, asked, strict=True)
+    )

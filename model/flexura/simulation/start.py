@@ -1,0 +1,127 @@
+"""Where a run starts: in static equilibrium, straight, from a given state, or where another run
+ended."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..control import PID, Controller
+from ..errors import InputError
+from ..io import Run, array, choice
+from ..robot import Robot
+from ..signals import STARTS, Drive
+from ..system import NoEquilibrium, System, static
+
+NO_START = 'start = "straight" begins with straight links, q0 with a state of your own'
+
+
+def consistent_start(
+    system: System, t: float, drive: Any, q0: Any, qd0: Any, start: Any = None
+) -> tuple[np.ndarray, np.ndarray, str]:
+    """q and qd (n,) at the start t [s], and which start it is: "given", "static" or "straight".
+
+    Locked joints are at rest, prescribed ones on their motion. Without q0 the links are straight,
+    or under gravity in static equilibrium with the joints held where they start (50).
+
+    Raises: InputError: wrong shapes, a drive of another number of joints, a joint outside its
+    limits. NoEquilibrium: there is none.
+    """
+    q, qd = (
+        check_state(system, "q0", q0, system.start()),
+        check_state(system, "qd0", qd0, np.zeros(system.n)),
+    )
+    which = which_start(system.robot, q0, start)
+    qd[system.joint_rows[system.locked]] = 0.0
+    put_on_motions(system.joint_rows, drive, t, q, qd)
+    inside_limits(system, q)
+    if which == "static":
+        try:
+            q = static(system, q[system.joint_rows])
+        except NoEquilibrium as error:
+            raise NoEquilibrium(f"{error}; {NO_START}", error.q, error.share) from None
+    return q, qd, which
+
+
+def which_start(robot: Robot, q0: Any, start: Any) -> str:
+    """The start of a run: "given" by q0, or "static" or "straight", by default as gravity asks.
+
+    Raises: InputError: start is none of these, or given beside q0.
+    """
+    if start is not None:
+        choice(start, "start", STARTS)
+    if q0 is not None:
+        if start is not None:
+            raise InputError("expected q0 or start, not both", key="start", value=start)
+        return "given"
+    bends = any(link.flexible for link in robot.links)
+    return start or ("static" if bends and any(robot.gravity_m_s2) else "straight")
+
+
+def end_of(
+    run: Any, system: System, t: np.ndarray, others: dict[str, Any]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """q, qd (n,) and accounts (4,) [J] at the end of a run that is continued at the times t (T,).
+
+    Raises: InputError: it is no run of this robot with its states, t does not begin at its end, or
+    one of `others` is given besides.
+    """
+    key, n = "continue_from", system.n
+    if not isinstance(run, Run):
+        raise InputError("expected a Run", key=key, value=run)
+    for name, value in others.items():
+        if value is not None:
+            raise InputError(f"expected {name} or continue_from, not both", key=name, value=value)
+    if run.states is None or not len(run.t):
+        text = "expected a run of fx.simulate in this session: archived runs have no states"
+        raise InputError(text, key=key, value=f"a run of {run.meta.get('source')}")
+    if run.states.shape[1] != 2 * n:
+        text = f"expected a run of a robot with {n} unknowns"
+        raise InputError(text, key=key, value=run.states.shape[1] // 2)
+    end = float(run.t[-1])
+    if abs(t[0] - end) > 1e-9 * max(1.0, abs(end)):
+        text = f"expected times that begin at the end of the run that is continued, {end:g} s"
+        raise InputError(text, key="t_eval", value=float(t[0]))
+    accounts = [float(run[f"energy/{name}"][-1]) for name in ("work", "loss", "numerical_loss")]
+    z = run.states[-1]
+    return z[:n].copy(), z[n:].copy(), np.array([*accounts, 0.0])
+
+
+def check_state(system: System, key: str, value: Any, default: np.ndarray) -> np.ndarray:
+    """A state's q or qd (n,), or the default. Raises InputError."""
+    if value is None:
+        return default
+    expected = f"expected {system.n} finite numbers, in the order of system.labels"
+    return array(value, key, expected, (system.n,))
+
+
+def put_on_motions(joint_rows: Any, drive: Any, t: float, q: np.ndarray, qd: np.ndarray) -> None:
+    """Prescribed joints take position and velocity of their motions at t [s], in place; their
+    entries of q and qd (n,) are in `joint_rows` (links,)."""
+    if not isinstance(drive, Drive | Controller):
+        return
+    for joint, row in zip(drive.joints, joint_rows, strict=True):
+        if isinstance(joint, PID):
+            qd[row] = 0.0 if joint.prescribed else qd[row]
+        elif joint.prescribed and joint.motion is not None:
+            q[row], qd[row], _ = joint.motion(t)
+
+
+def inside_limits(system: System, q: np.ndarray) -> None:
+    """Raises InputError for a joint that starts outside its limits."""
+    for i, (link, row) in enumerate(zip(system.robot.links, system.joint_rows, strict=True), 1):
+        if (
+            link.joint.limits is not None
+            and not link.joint.limits[0] <= q[row] <= link.joint.limits[1]
+        ):
+            raise outside(i - 1, link.joint.limits, float(q[row]))
+
+
+def outside(joint: int, limits: tuple[float, float], position: float) -> InputError:
+    """Why a joint (from 0) cannot start at a position."""
+    return InputError(
+        f"expected a start inside the limits of joint {joint + 1}, {list(limits)}",
+        key="q0",
+        value=position,
+    )
