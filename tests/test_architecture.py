@@ -56,7 +56,8 @@ MAX_LINES = 400
 GENERATED = {"flexlab.board.protocol.declaration"}  # tables, not to be read through
 LONGER = {
     "flexlab.review.writer": "one archetype after another",
-    "flexlab.cli.bench": "seven commands",
+    "flexlab.cli.bench": "six commands",
+    "flexura.twin.solve": "one run of Exudyn, from its settings to its failure",
 }
 HEAVY = {"distributed", "exudyn", "rerun", "pyarrow", "matplotlib", "PIL", "platformio", "pymoo"}
 OUTSIDE_OF_THE_MODEL = ("rich", "typer", "rerun", "serial", "PIL")

@@ -81,11 +81,10 @@ def models(model: type[BaseModel]) -> Iterator[type[BaseModel]]:
     seen: list[type[BaseModel]] = []
 
     def visit(kind: Any) -> None:
-        if inspect.isclass(kind) and issubclass(kind, BaseModel):
-            if kind not in seen:
-                seen.append(kind)
-                for field in kind.model_fields.values():
-                    visit(field.annotation)
+        if inspect.isclass(kind) and issubclass(kind, BaseModel) and kind not in seen:
+            seen.append(kind)
+            for field in kind.model_fields.values():
+                visit(field.annotation)
         for part in get_args(kind):
             visit(part)
 

@@ -131,7 +131,7 @@ def test_frequencies_and_statics_agree():
 def test_a_row_fits_and_tells_what_failed(monkeypatch):
     monkeypatch.setattr(
         equal_error,
-        "walls",
+        "run_times",
         lambda programs, rounds: np.array([[4.0] + [0.02] * (len(programs) - 1)] * rounds),
     )
     row = equal_error.motion_row(MOTIONS["arm-pd"], 2)

@@ -126,7 +126,7 @@ def test_the_shapes_of_a_whole_link():
     )
     slopes = 2 * np.column_stack([phi(k, u, True) for k in range(6)])
     assert legendre_shapes(6, xi, 1) == pytest.approx(slopes, abs=1e-13)
-    after = Link.model_validate(robots.rigid(0.1, 1.0, 0.05, 0.0, "Pa", start=0.1))
+    after = Link.model_validate(robots.rigid(0.1, 1.0, 0.05, 0.0, "Pa", start_m=0.1))
     tip = Link.model_validate(robots.rigid(0.1, 1.0, 0.05, 0.0))
     for elements, modes, next_link, shapes, points in (
         (3, None, after, 6, 7),

@@ -54,7 +54,7 @@ def test_the_hub_of_the_next_link(kind):
 
     Equations: 1
     """
-    joint = {"start": 0.4 * L} if kind == "Pa" else {"start": 0.1} if kind == "Pb" else {}
+    joint = {"start_m": 0.4 * L} if kind == "Pa" else {"start_m": 0.1} if kind == "Pb" else {}
     fixed = {} if kind == "R" else {"angle_rad": 0.3}
     beam = robots.beam(L, 0.2, 0.5, 4, hub_inertia_kg_m2=1e-3)
     system = robots.system(beam, robots.rigid(0.3, 0.2, 0.15, 1e-3, kind, **joint, **fixed))
@@ -62,7 +62,7 @@ def test_the_hub_of_the_next_link(kind):
         np.arange(system.n), system.elastic_rows
     )
     q[0] = 0.7
-    eta = 0.5 if kind == "R" else joint["start"]
+    eta = 0.5 if kind == "R" else joint["start_m"]
     q[-1] = eta
     carrier = eta if kind == "Pa" else L
     x, y, angle = system.line(q, 1, [carrier])

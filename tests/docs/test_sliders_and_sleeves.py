@@ -111,7 +111,7 @@ def sleeved():
     system = robots.system(
         robots.rigid(0.0, 0.4, 0.0, 0.0, "Pa"),
         robots.rigid(0.0, 0.0, 0.0, 2e-3),
-        link | {"joint": {"type": "Pb", "start": 0.5}},
+        link | {"joint": {"type": "Pb", "start_m": 0.5}},
     )
     q, qd, qdd = (0.5 * RNG.normal(size=system.n) for _ in range(3))
     q[2] = 0.5

@@ -1,5 +1,5 @@
-"""A newcomer's first day: starts under gravity, motions from whatever there is, runs that go on, end
-where they are told to, or say why they do nothing."""
+"""A newcomer's first day: starts under gravity, motions from whatever there is, runs that go on,
+end where they are told to, or say why they do nothing."""
 
 from dataclasses import replace
 
@@ -128,7 +128,7 @@ def test_a_prescribed_joint_starts_in_equilibrium_where_its_motion_begins():
 
 
 def test_q0_and_start_are_not_given_both():
-    with pytest.raises(fx.InputError, match="^start = 'static': expected q0 or start, not both"):
+    with pytest.raises(fx.InputError, match=r"^start = 'static': expected q0 or start, not both"):
         fx.simulate(falling_beam(), [0.0, 1.0], q0=np.zeros(9), start="static")
 
 
@@ -174,7 +174,7 @@ def test_a_measured_motion_may_begin_and_end_with_any_velocity():
     line = signals.table([0.0, 1.0], [0.0, 1.0])
     assert fx.inverse(RIG, t, [0.0, line])["joint/2/velocity"][-1] == pytest.approx(1.0)
     for motion in (line, signals.ramp(1.0, 1.0), lambda s: min(s, 1.0)):
-        with pytest.raises(fx.InputError, match="near t = 0.9998 s|at t = 1 s: end the run there"):
+        with pytest.raises(fx.InputError, match=r"near t = 0.9998 s|at t = 1 s: end the run there"):
             fx.inverse(RIG, np.linspace(0, 2, 101), [0.0, motion])
 
 
@@ -335,9 +335,9 @@ def test_what_cannot_be_continued_says_why(tmp_path):
         with pytest.raises(fx.InputError) as caught:
             fx.simulate(RIG, t + 0.2, [0.5, 0.0], **options)
         assert caught.value.key == key
-    with pytest.raises(fx.InputError, match="^t_eval = 0.3: expected times that begin at the end"):
+    with pytest.raises(fx.InputError, match=r"^t_eval = 0.3: expected times that begin at the end"):
         fx.simulate(RIG, t + 0.3, continue_from=first)
-    with pytest.raises(fx.InputError, match="^continue_from = 10: expected a run of a robot with"):
+    with pytest.raises(fx.InputError, match=r"^continue_from = 10: expected a run of a robot with"):
         fx.simulate(ARM, t + 0.2, continue_from=first)
 
 
@@ -410,5 +410,5 @@ def test_an_error_in_a_condition_reaches_the_caller():
 
     with pytest.raises(RuntimeError, match="mine"):
         fx.simulate(RIG, [0.0, 0.1], [0.1, 0.0], until=until)
-    with pytest.raises(fx.InputError, match="^until = 'far': expected a bool or a finite number"):
+    with pytest.raises(fx.InputError, match=r"^until = 'far': expected a bool or a finite number"):
         fx.simulate(RIG, [0.0, 0.1], [0.1, 0.0], until=lambda t, x, v, w: "far")

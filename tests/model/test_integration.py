@@ -358,7 +358,7 @@ def test_the_end_of_a_link_ends_the_run_with_a_word(method, kind, case):
         "the sleeve's mouth": (
             [
                 sleeved | {"joint": sleeved["joint"] | {"locked": True}},
-                slider | {"joint": slider["joint"] | {"start_m": 0.3}},
+                slider | {"joint": slider["joint"] | {"start": 0.3}},
             ],
             -1.0,
             2,

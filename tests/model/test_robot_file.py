@@ -13,6 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import flexura as fx
+from flexura.io import is_name
 from flexura.robot import renamed
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -730,8 +731,13 @@ VALUES = {
     ),
     "stiffening as a number": ({"stiffening": 1}, "stiffening", 1, "true, or false"),
     "stiffening as text": ({"stiffening": "yes"}, "stiffening", "yes", "true, or false"),
-    "a number as name": ({"name": 5}, "name", 5, "a text"),
-    "an endless name": ({"name": "x" * 201}, "name", "x" * 201, "a text of at most 200 characters"),
+    "a number as name": ({"name": 5}, "name", 5, "one line of at most 200"),
+    "an endless name": (
+        {"name": "x" * 201},
+        "name",
+        "x" * 201,
+        "one line of at most 200 characters",
+    ),
     "no links": ({"link": ABSENT}, "link", None, "missing: expected 1 to 256 tables [[link]]"),
     "an empty list of links": ({"link": []}, "link", [], "1 to 256 tables [[link]]"),
     "one table of links": (
@@ -1195,7 +1201,7 @@ robots = (
     st.fixed_dictionaries(
         {"link": chains()},
         optional={
-            "name": st.text(max_size=50),
+            "name": st.text(max_size=50).filter(is_name),
             "gravity_m_s2": st.lists(number(-1e3, 1e3), min_size=2, max_size=2),
             "stiffening": st.booleans(),
             "sliding": st.sampled_from(["continuous", "nodal"]),

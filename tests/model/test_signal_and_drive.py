@@ -641,7 +641,11 @@ WRONG_MANOEUVRES = {
         "title =",
         "title = 'back and forth': an unknown key; known here: name, duration_s",
     ),
-    "a number as name": ('name = "back and forth"', "name = 5", "name = 5: expected a text"),
+    "a number as name": (
+        'name = "back and forth"',
+        "name = 5",
+        "name = 5: expected one line of at most 200",
+    ),
     "a joint too few": ("[[joint]]\n" + F, "", "joint = 1: expected 2 tables [[joint]]"),
     "a joint too many": (
         "[[joint]]\n" + F,

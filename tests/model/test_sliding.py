@@ -249,7 +249,7 @@ def test_a_link_cut_in_two_by_a_locked_joint_gives_the_same(case):
     if case == "sleeve at the tip":
         one, two, forces, joints = [whole, sleeved], [*halves, sleeved], [0.05, 0.05], [1, 3]
     elif case == "slider on the outer half":
-        inner = slider | {"joint": slider["joint"] | {"start_m": 0.05}}
+        inner = slider | {"joint": slider["joint"] | {"start": 0.05}}
         one, two, forces, joints = [whole, slider], [*halves, inner], [0.05, 0.1], [1, 3]
     else:
         one = [

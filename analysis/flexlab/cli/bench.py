@@ -19,21 +19,34 @@ import flexura as fx
 from flexura.errors import InputError
 
 from .. import rig as rigs
-from ..board.protocol.session import Link
 from ..experiment import excitation, plan
 from ..experiment import run_experiment as steps
 from ..experiment.flash import RIG
-from ..experiment.run_experiment import open_board
 from ..experiment.stop_requests import KEYS_HELP, watch_for_stop
-from ..recordings import flex_calibration as fitting
 from ..recordings.flex_calibration import read as read_calibration
 from ..recordings.recording import unfinished
 from ..recordings.run_from_recording import run_from_recording
 from ..recordings.unit_conversion import Sensor
 from ..review.live import serve
+from .bench_calibrate import calibrate
+from .bench_options import (
+    Calibrated,
+    Configure,
+    Countdown,
+    Cut,
+    Emulated,
+    Firmware,
+    Gains,
+    Json,
+    Live,
+    LivePort,
+    Out,
+    Port,
+    RigFile,
+    Seed,
+    Yes,
+)
 from .bench_tables import (
-    calibration_numbers,
-    calibration_table,
     heading,
     numbers,
     result_table,
@@ -55,67 +68,7 @@ app = typer.Typer(
 
 TOLD_BY_JSON = ["kind", "emulated", "label", "experiment", "complete", "line", "delays", "firmware"]
 
-RigFile = Annotated[
-    Path | None, typer.Argument(metavar="RIG", help="rig file (TOML), or a name; default rig")
-]
-Port = Annotated[
-    str | None,
-    typer.Option("--port", metavar="DEVICE", help="the board's serial port; without it: emulated"),
-]
-Emulated = Annotated[
-    bool,
-    typer.Option("--emulated", help="on the emulated board (the default): no hardware is touched"),
-]
-Seed = Annotated[int, typer.Option(help="of the emulated rig's noise and dirt")]
-Out = Annotated[
-    Path | None,
-    typer.Option(
-        "--out", metavar="FOLDER", help="where to keep it; default logs/<experiment>-<time>"
-    ),
-]
-Yes = Annotated[
-    bool,
-    typer.Option(
-        "--yes", help="ask nothing: both joints stand at their zero marks, nobody is in reach"
-    ),
-]
-Countdown = Annotated[
-    float | None, typer.Option(min=0, help="before the start; default 3, emulated 0")
-]
-Gains = Annotated[
-    Path | None,
-    typer.Option(metavar="FILE", help="controller settings (TOML) by the firmware's names"),
-]
-Calibrated = Annotated[
-    Path | None,
-    typer.Option(
-        "--calibration", metavar="FILE", help="of the flex sensor (TOML), as calibrate leaves it"
-    ),
-]
-Configure = Annotated[
-    bool,
-    typer.Option("--configure", help="write the rig file's settings to a board that has others"),
-]
-Live = Annotated[
-    bool,
-    typer.Option(
-        "--live", help="a live view for Rerun, which a viewer may join late; its address is printed"
-    ),
-]
-LivePort = Annotated[int, typer.Option(help="the live view's TCP port, on this machine only")]
-Firmware = Annotated[
-    Path | None,
-    typer.Option(metavar="ELF", help="built firmware for the emulated board; default: build it"),
-]
-Cut = Annotated[
-    str | None,
-    typer.Option(
-        "--cut",
-        metavar="NAME",
-        help="break the emulated wire of this entry of [pins]: who notices?",
-    ),
-]
-Json = Annotated[bool, typer.Option("--json", help="print JSON instead of tables, for scripts")]
+app.command()(calibrate)
 
 
 @dataclass(frozen=True)
@@ -312,73 +265,6 @@ def recover(
         )
     events(run)
     say(json, f"{run.meta['label']}: {len(run)} rows, {run.t[-1]:.3f} s", f"stored {path}")
-
-
-@app.command()
-def calibrate(
-    rig: RigFile = None,
-    tips_mm: Annotated[
-        str | None, typer.Option(metavar="LIST", help="deflections to hold; default -20 to 20")
-    ] = None,
-    port: Port = None,
-    emulated: Emulated = False,
-    seed: Seed = 0,
-    out: Out = None,
-    firmware: Firmware = None,
-    json: Json = False,
-) -> None:
-    """Calibrate the flex sensor.
-
-    The strip is held at known tip deflections. The firmware's cubic is fitted to the readings.
-
-    \b
-    Example: flexura bench calibrate --emulated --tips-mm=-15,-10,-5,0,5,10,15
-    """
-    if emulated and port:
-        raise fx.InputError("expected either a port or --emulated", key="--port", value=port)
-    tips = fitting.TIPS_M if tips_mm is None else _millimetres(tips_mm)
-    bench = rigs.load(rig or RIG)
-    opened: Any = open_board(bench, port, seed, firmware)
-    hold = _held_by_hand
-    if opened.plant is not None:
-        held = fitting.DeflectedPlant(opened.plant, bench)
-        opened.board.plant, hold = held, held.hold
-    with contextlib.closing(opened.board):
-        found = fitting.fit(*fitting.measure(Link(opened.board), tips, hold))
-    path = (
-        out
-        or Path("logs")
-        / f"{'' if port else 'emulated-'}calibration-{time.strftime('%Y%m%d-%H%M%S')}"
-    ) / "calibration.toml"
-    fitting.write(found, path)
-    label = {"label": opened.board.label, "emulated": opened.board.emulated}
-    show(
-        json,
-        lambda: calibration_table(found, opened.board.label),
-        lambda: label | calibration_numbers(found) | {"file": str(path)},
-    )
-    say(json, f"stored {path}", f"use it: flexura bench inverse --calibration {path}")
-
-
-def _millimetres(text: str) -> tuple[float, ...]:
-    try:
-        return tuple(float(part) / 1000 for part in text.split(","))
-    except ValueError:
-        raise fx.InputError(
-            "expected deflections in mm with commas between, as -10,-5,0,5,10,15",
-            key="--tips-mm",
-            value=text,
-        ) from None
-
-
-def _held_by_hand(tip_m: float) -> float:
-    """Ask for the strip to be held at a deflection; what the person types is where it is."""
-    return 1e-3 * typer.prompt(
-        f"hold the tip at {1e3 * tip_m:g} mm; deflection in mm",
-        default=1e3 * tip_m,
-        type=float,
-        err=True,
-    )
 
 
 def _run(rig: Path | None, ask: Any, options: BenchOptions, gains: Path | None = None) -> None:

@@ -40,11 +40,12 @@ def with_nominal_drives(robot: fx.Robot, setup: RigSetup) -> tuple[fx.Robot, tup
         )
     carriage, data = joint_line_of(rig, emulated), robot.to_dict()
     first, second = (link["joint"] for link in data["link"])
-    first["rotor_inertia"] = first.get("rotor_inertia", 0.0) + carriage.reflected_mass_kg
-    first["coulomb_friction"] = first.get("coulomb_friction", 0.0) + carriage.coulomb_N
-    second["viscous_friction"] = (
-        second.get("viscous_friction", 0.0) + emulated.stepper.damping_N_m_s
-    )
+    for joint, key, more in (
+        (first, "rotor_mass_kg", carriage.reflected_mass_kg),
+        (first, "coulomb_friction_N", carriage.coulomb_N),
+        (second, "viscous_friction_N_m_s_rad", emulated.stepper.damping_N_m_s),
+    ):
+        joint[key] = joint.get(key, 0.0) + more
     stiffness = (
         rig.stepper.holding_torque_N_m * rig.stepper.full_steps_per_turn * POLE_PAIRS_PER_STEP
     )

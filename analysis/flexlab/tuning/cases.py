@@ -142,7 +142,7 @@ def type_4() -> Structure:
 def type_3() -> Structure:
     """Type III (RPb): a torque of 2 N m, a force of 2 N."""
     data = fx.load("type-3-rpb").to_dict()
-    data["link"][1]["joint"]["start"] = 0.20
+    data["link"][1]["joint"]["start_m"] = 0.20
     settings = {
         "torque_max_1_N_m": 2.0,
         "force_max_2_N": 2.0,

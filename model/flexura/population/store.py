@@ -21,6 +21,7 @@ from ..errors import InputError
 from ..io import write_bytes, write_text
 
 MANIFEST = "population.json"
+NOTES = ("base", "vary", "units")  # of the manifest, for readers; robots are told apart by digests
 
 
 @dataclass(frozen=True)
@@ -138,7 +139,11 @@ class Store:
             write_text(path, json.dumps(asked))
             return Store(Path(folder))
         begun = manifest(folder)
-        differing = [key for key in asked if key not in begun or begun[key] != asked[key]]
+        differing = [
+            key
+            for key in asked
+            if key not in NOTES and (key not in begun or begun[key] != asked[key])
+        ]
         if differing:
             key = differing[0]
             raise InputError(

@@ -16,7 +16,7 @@ from pydantic import BaseModel, Field, ValidationError, field_validator, model_v
 
 from ..errors import InputError, WrongValue
 from ..io import FORMAT, check_format, explain, find, is_name, read_toml, summary, write_toml
-from .joint import KEYS
+from .joint import KEYS, key_of
 from .link import LEAST_FREE, Link
 from .old_keys import renamed
 from .table import Table
@@ -200,7 +200,7 @@ class Robot(Table):
     def replace(self, changes: dict[str, Any]) -> Robot:
         """A robot with some values changed: `robot.replace({"payload.mass_kg": 0.1,
         "link.2.length_m": 0.4})`, links counted from 1."""
-        changes = {self._todays_path(path): value for path, value in changes.items()}
+        changes = {self._todays_path(path, changes): value for path, value in changes.items()}
         try:
             return Robot.model_validate(_changed(self, changes))
         except ValidationError:
@@ -208,13 +208,14 @@ class Robot(Table):
                 _changed(self.to_dict(), changes)
             )  # says what is wrong in a file's words
 
-    def _todays_path(self, path: str) -> str:
+    def _todays_path(self, path: str, changes: dict[str, Any]) -> str:
         """`link.2.joint.start_rad` of `link.2.joint.start`; any other path as it is."""
         parts = path.split(".")
         if len(parts) != 4 or parts[0] != "link" or parts[2] != "joint" or parts[3] not in KEYS:
             return path
         number = _number(self.link, parts[1], path, None)
-        return ".".join([*parts[:3], self.link[number].joint.key(parts[3])])
+        kind = changes.get(f"link.{parts[1]}.joint.type", self.link[number].joint.type)
+        return ".".join([*parts[:3], key_of(parts[3], kind)])
 
 
 def _changed(tables: Any, changes: dict[str, Any]) -> dict[str, Any]:
