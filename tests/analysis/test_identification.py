@@ -213,7 +213,10 @@ def test_a_random_rig_is_found_from_one_run(excitement, found, tmp_path):
         excitement.run.units,
         excitement.run.meta | {"rig_file": "/home/lab/firmware/rig.toml"},
     )
-    (alone,), (missing,) = files.save(found, elsewhere, tmp_path / "b" / "robot.toml")
+    nominal = found.nominal
+    own = nominal.rig.model_copy(update={"manoeuvre": "../manoeuvres/own.toml"})
+    there = dataclasses.replace(found, nominal=dataclasses.replace(nominal, rig=own))
+    (alone,), (missing,) = files.save(there, elsewhere, tmp_path / "b" / "robot.toml")
     assert fx.load(alone) == fx.load(robot) and [p.name for p in alone.parent.iterdir()] == [
         "robot.toml"
     ]
