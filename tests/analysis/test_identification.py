@@ -6,7 +6,6 @@ from __future__ import annotations
 import ast
 import dataclasses
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -208,11 +207,16 @@ def test_a_random_rig_is_found_from_one_run(excitement, found, tmp_path):
     told = json.loads(json.dumps(output.numbers(found, excitement.run)))
     assert all(p["low"] <= p["value"] <= p["high"] for p in told["parameters"])
     assert told["at_bounds"] == []
-    named = found.nominal.rig.model_copy(update={"manoeuvre": "../law.toml"})
-    elsewhere = replace(found, nominal=replace(found.nominal, rig=named))
-    meta = excitement.run.meta | {"rig_file": "/lab/firmware/rig.toml"}
-    run = replace(excitement.run, meta=meta)
-    (alone,), (missing,) = files.save(elsewhere, run, tmp_path / "b" / "robot.toml")
+    elsewhere = fx.Run(
+        excitement.run.t,
+        excitement.run.channels,
+        excitement.run.units,
+        excitement.run.meta | {"rig_file": "/lab/firmware/rig.toml"},
+    )
+    nominal = found.nominal
+    own = nominal.rig.model_copy(update={"manoeuvre": "../manoeuvres/own.toml"})
+    there = dataclasses.replace(found, nominal=dataclasses.replace(nominal, rig=own))
+    (alone,), (missing,) = files.save(there, elsewhere, tmp_path / "b" / "robot.toml")
     assert fx.load(alone) == fx.load(robot) and [p.name for p in alone.parent.iterdir()] == [
         "robot.toml"
     ]

@@ -16,7 +16,6 @@ from flexura import __version__
 from flexura.errors import FlexuraError, InputError
 
 from ..runs.formatting import printable
-
 from .verbosity import set_verbosity
 
 COMMANDS = {
