@@ -16,7 +16,6 @@ ROOT = Path(__file__).resolve().parents[2]
 GUIDE = ROOT / "docs" / "guide"
 MOST_COMMANDS = 10
 SET_UP = ("make setup", ". .venv/bin/activate")  # the tests run in what these make
-COMING = {"new", "plot", "animate"} - set(COMMANDS)  # commands of the page that are not there yet
 
 
 def blocks(page: Path) -> list[tuple[str, str]]:
@@ -42,7 +41,7 @@ def test_the_path_of_a_stranger(tmp_path):
             files.add(name)
         for line in text.splitlines() if kind == "sh" else ():
             word, *rest = shlex.split(line)
-            if line in SET_UP or rest[0] in COMING:
+            if line in SET_UP:
                 continue
             assert word == "flexura"
             done = subprocess.run(
@@ -56,10 +55,9 @@ def test_the_path_of_a_stranger(tmp_path):
         if kind == "python":
             subprocess.run([sys.executable, "-c", text], cwd=tmp_path, check=True)
     assert files == {"my-arm.toml", "reach.toml"}
-    assert {"simulate", "frequencies", "inverse", "crosscheck"} <= set(run)
+    assert {"new", "simulate", "frequencies", "inverse", "crosscheck"} <= set(run)
+    assert {"plot", "animate"} <= set(run)
     assert (tmp_path / "runs" / "from-python" / "run.parquet").exists()
-    if COMING:
-        pytest.xfail(f"the page has commands that are not there yet: {', '.join(sorted(COMING))}")
     assert (tmp_path / "reach.pdf").stat().st_size and (tmp_path / "reach.gif").stat().st_size
 
 
@@ -83,7 +81,7 @@ def test_pages_name_commands_that_there_are():
         for line in commands(page):
             words = shlex.split(line, comments=True)
             if words[0] == "flexura":
-                assert words[1] in set(COMMANDS) | COMING, (page.name, line)
+                assert words[1] in set(COMMANDS), (page.name, line)
             for word in words[1:]:
                 if word.startswith(("model/", "firmware/")):
                     assert (ROOT / word).exists(), (page.name, word)
@@ -92,7 +90,7 @@ def test_pages_name_commands_that_there_are():
 def test_the_example_of_the_readme_runs_and_its_commands_are_there(tmp_path, monkeypatch):
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     listed = re.findall(r"^\| `flexura (\w+)", text, re.MULTILINE)
-    assert len(listed) > 12 and set(listed) <= set(COMMANDS) | COMING
+    assert len(listed) > 12 and set(listed) <= set(COMMANDS)
     (tmp_path / "model").symlink_to(ROOT / "model")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("MPLBACKEND", "svg")
