@@ -68,7 +68,7 @@ FIELD = {  # what somebody looks for by the field's word, and where it is comput
     "out of its sleeve": (36, "system.assembly.Assembly.elastic"),
     "coulomb friction": (57, "system.assembly.Assembly.coulomb"),
     "exponential predictor": (90, "integration/exponential/predictor_corrector.hpp"),
-    "pid with anti-windup": (72, "control.controller.PID"),
+    "pid with anti-windup": (72, "control.pid.PID"),
     "stop at a limit": (64, "integration/joint_limits.hpp"),
     "payload with its rotary inertia": (22, "system.structure.Structure.masses"),
 }

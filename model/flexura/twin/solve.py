@@ -14,14 +14,14 @@ import numpy as np
 from ..errors import FlexuraError, InputError
 from ..io import Run, array, check_progress, choice, number, whole
 from ..optional import Optional
-from ..robot import MAX_ELEMENTS, Robot, robot_of
+from ..robot import MAX_ELEMENTS, robot_of
 from .build import TwinModel, build
 from .channels import channels
-from .equilibrium import equilibrium, put, which_start
 from .extrapolation import LENGTH_FACTOR, extrapolate
 from .joints.mesh import check_supported, mesh, slide_range, sliding_kinds
 from .links import ancf, geometrically_exact
 from .loads import Actuation, Loads, actuation
+from .start import at_positions, equilibrium, put, start_speeds, which_start
 from .steps import Steps, plan_steps, suggest_step
 
 exu = Optional("exudyn")
@@ -98,7 +98,7 @@ def simulate(
     robot = robot_of(robot)
     choice(beam, "beam", tuple(PROGRAMS))
     check_supported(robot, beam)
-    t, speeds = _times(t_eval), _speeds(robot, qd0)
+    t, speeds = _times(t_eval), start_speeds(robot, qd0)
     if elements is not None:
         most = 2 * MAX_ELEMENTS
         expected = f"expected a whole number from 1 to {most}"
@@ -116,7 +116,7 @@ def simulate(
     if act.guided is not None and act.guided.any():
         assert act.plan is not None
         on = act.plan(0.0)
-        robot = _at(robot, np.where(act.guided, on[:, 1], robot.start))
+        robot = at_positions(robot, np.where(act.guided, on[:, 1], robot.start))
         speeds = np.where(act.guided, on[:, 2], speeds)
     begins = which_start(robot, start, speeds)
     kinds = sliding_kinds(robot) if hub_length_m is None else []
@@ -215,29 +215,6 @@ def _times(t_eval: Any) -> np.ndarray:
     if len(t) == 0 or t[0] < 0 or np.any(np.diff(t) <= 0):
         raise InputError(expected, key="t_eval", value=t)
     return t
-
-
-def _at(robot: Robot, positions: np.ndarray) -> Robot:
-    """The same robot with its joints starting at positions (n,)."""
-    links = [
-        link.model_copy(update={"joint": link.joint.model_copy(update={"start": float(place)})})
-        for link, place in zip(robot.links, positions, strict=True)
-    ]
-    return robot.model_copy(update={"link": links})
-
-
-def _speeds(robot: Robot, qd0: Any) -> np.ndarray:
-    """The joint velocities at the start (n,), checked."""
-    n = len(robot.links)
-    if qd0 is None:
-        return np.zeros(n)
-    speeds = array(qd0, "qd0", f"expected {n} joint velocities in m/s or rad/s", (n,))
-    for i, (link, speed) in enumerate(zip(robot.links, speeds, strict=True), 1):
-        if link.joint.locked and speed:
-            raise InputError(
-                "expected 0: this joint is locked", key=f"qd0[{i}]", value=float(speed)
-            )
-    return speeds
 
 
 def _settings(

@@ -1,4 +1,5 @@
-"""The static equilibrium of a robot in Exudyn: links under gravity, joints held at their start."""
+"""Where a run in Exudyn starts: positions, speeds, straight or in static equilibrium, links under
+gravity and joints held."""
 
 from __future__ import annotations
 
@@ -7,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import FlexuraError, InputError
-from ..io import choice
+from ..io import array, choice
 from ..optional import Optional
 from ..robot import Robot
 from ..signals import STARTS
@@ -18,6 +19,29 @@ exu = Optional("exudyn")
 
 LOAD_STEPS = (1, 10, 100)  # tried in turn: in how many steps gravity grows
 SPREAD = 1e-10  # of the robot's size: the last correction of a solution
+
+
+def at_positions(robot: Robot, positions: np.ndarray) -> Robot:
+    """The same robot with its joints starting at positions (n,)."""
+    links = [
+        link.model_copy(update={"joint": link.joint.model_copy(update={"start": float(place)})})
+        for link, place in zip(robot.links, positions, strict=True)
+    ]
+    return robot.model_copy(update={"link": links})
+
+
+def start_speeds(robot: Robot, qd0: Any) -> np.ndarray:
+    """The joint velocities at the start (n,), checked."""
+    n = len(robot.links)
+    if qd0 is None:
+        return np.zeros(n)
+    speeds = array(qd0, "qd0", f"expected {n} joint velocities in m/s or rad/s", (n,))
+    for i, (link, speed) in enumerate(zip(robot.links, speeds, strict=True), 1):
+        if link.joint.locked and speed:
+            raise InputError(
+                "expected 0: this joint is locked", key=f"qd0[{i}]", value=float(speed)
+            )
+    return speeds
 
 
 def which_start(robot: Robot, start: Any, speeds: np.ndarray) -> str:
