@@ -10,7 +10,8 @@ import pytest
 import flexura as fx
 from commands import run
 from flexlab.comparison.measures import compare
-from flexlab.comparison.report import html, pdf
+from flexlab.comparison.pages import pdf
+from flexlab.comparison.report import html
 from flexlab.review import write_review
 from flexlab.runs.formatting import markdown
 from flexura.io import is_name

@@ -3,6 +3,7 @@ or a call would wait."""
 
 from __future__ import annotations
 
+import errno
 import gc
 import importlib
 import sys
@@ -14,6 +15,7 @@ from typer.core import TyperGroup
 from flexura import __version__
 from flexura.errors import FlexuraError, InputError
 
+from ..runs.formatting import printable
 from .verbosity import set_verbosity
 
 COMMANDS = {
@@ -112,8 +114,9 @@ def main() -> None:
         typer.echo("flexura: interrupted", err=True)
         sys.exit(130)
     except OSError as error:
-        typer.echo(f"flexura: {error.filename or 'a file'}: {error.strerror or error}", err=True)
-        sys.exit(1)
+        said = f"flexura: {error.filename or 'a file'}: {error.strerror or error}"
+        typer.echo(printable(said), err=True)
+        sys.exit(2 if error.errno == errno.ENAMETOOLONG else 1)  # no such file can be there
     except Exception as error:
         if not isinstance(error, FlexuraError):
             raise
