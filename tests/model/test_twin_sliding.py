@@ -1,6 +1,7 @@
 """The twin's sliders (Pa on a flexible link) and sleeves (Pb) against rigid chains, published
 numbers and themselves."""
 
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -17,6 +18,8 @@ from flexura.twin.extrapolation import extrapolate
 from flexura.twin.joints.mesh import mesh, sleeve_places
 from flexura.twin.loads import actuation
 from robots import beam, rigid, robot
+
+let_go = partial(twin.simulate, start="straight")  # links straight at the start
 
 
 def total_energy(run):
@@ -59,7 +62,7 @@ def deviations_from_rigid(kinds, flexible, **keys):
     force = np.where(np.array(kinds) == "R", 0.4, 1.0) * ([1.0] + [-0.3] * (len(kinds) - 1))
     speeds = np.where(np.array(kinds) == "R", 1.0, 0.1) * ([1.0] + [-0.5] * (len(kinds) - 1))
     q, tip = rigid_chain.simulate(arm, t, force, speeds)
-    run = twin.simulate(arm, t, lambda t: force, qd0=speeds, **keys)
+    run = let_go(arm, t, lambda t: force, qd0=speeds, **keys)
     moved = [
         abs(run[f"joint/{i}/position"] - each).max() / np.ptp(each) for i, each in enumerate(q, 1)
     ]
@@ -179,7 +182,7 @@ def test_a_link_leaving_its_sleeve():
         beam(SLEEVE_LENGTH, SLEEVE_MASS, SLEEVE_EI, 4, "Pb", start=1.8), gravity=(0.0, -0.6)
     )
     t = np.linspace(0, 2, 81)
-    run = twin.simulate(arm, t, Drive.pd([SLEEVE_LAW], [1e7], [1e5]), step_s=1e-3)
+    run = let_go(arm, t, Drive.pd([SLEEVE_LAW], [1e7], [1e5]), step_s=1e-3)
     expected = linear_link_leaving_its_sleeve(t, [], 0.6)
     assert abs(run["joint/1/position"] - [SLEEVE_LAW(s)[0] for s in t]).max() < 1e-5
     assert abs(run["link/1/tip_deflection"] - expected).max() < 2e-3 * abs(expected).max()
@@ -220,13 +223,13 @@ def test_a_slider_on_a_bent_link(stiffness, published):
                 "ancf",
                 mesh(robot, None, None, times),
                 np.zeros(2),
-                actuation(drive, robot.start, np.zeros(2)).gains,
+                actuation(drive, robot.start, np.zeros(2), np.array([0.0, 1.0])).gains,
             )
 
         damped, held = arm.replace({"link.1.damping.beta_s": 0.2}), stand(signals.constant(0.1))
         settle = solve.plan_steps(np.array([0.0, 4.0]), 2e-3, forced=True)
         (_, q, v, _), _, _ = solve._solve(
-            new(damped, held), actuation(held, arm.start, np.zeros(2)), settle, None
+            new(damped, held), actuation(held, arm.start, np.zeros(2), np.array([0.0, 1.0])), settle, None
         )
         assert abs(v[-1]).max() < 1e-6
 
@@ -237,7 +240,7 @@ def test_a_slider_on_a_bent_link(stiffness, published):
             moving.mbs.systemData.SetODE2Coordinates(q[-1], exudyn.ConfigurationType.Initial)
             return moving
 
-        act = actuation(stand(law), arm.start, np.zeros(2))
+        act = actuation(stand(law), arm.start, np.zeros(2), np.array([0.0, 1.0]))
         return solve._run(from_equilibrium, act, t, 1e-3, 1, lambda fraction: None, "ANCF")
 
     slid = extrapolate(run({}), {"Pa": run({"Pa": 2.0})})
@@ -260,7 +263,7 @@ def test_a_bent_link_is_pushed_out_of_its_sleeve():
             payload=0.1,
             gravity=(0.0, -10.0),
         )
-        run = twin.simulate(
+        run = let_go(
             arm, [0.0, 4.0], Drive.pd([signals.constant(start)], [1e5], [1e3]), step_s=4e-3
         )
         held.append(-run["joint/1/drive"][-1] * (0.5 / start) ** 2)
@@ -312,7 +315,7 @@ def test_a_locked_slider_at_the_tip_is_a_locked_revolute():
     )
     fixed = robot(first, beam(0.3, 0.2, 0.5, 4, start=0.9, **carries), payload=0.05)
     drive = Drive.force(signals.bang_bang(0.3, 0.4, rise_s=0.05), None)
-    a, b = twin.simulate(slid, t, drive), twin.simulate(fixed, t, drive, elements=32, step_s=2.5e-4)
+    a, b = let_go(slid, t, drive), let_go(fixed, t, drive, elements=32, step_s=2.5e-4)
     for name, within in (
         ("joint/1/position", 1e-3),
         ("link/1/tip_deflection", 5e-3),
@@ -335,8 +338,8 @@ def test_a_locked_sleeve_is_a_clamp():
     clamped = robot(arm, tail, beam(0.25, 0.2, 0.5, 4, locked=True), payload=0.02)
     drive = [Drive.force(signals.bang_bang(0.1, 0.4, rise_s=0.05), *[None] * k) for k in (1, 2)]
     a, b = (
-        twin.simulate(sleeve, t, drive[0]),
-        twin.simulate(clamped, t, drive[1], elements=12, step_s=2.5e-4),
+        let_go(sleeve, t, drive[0]),
+        let_go(clamped, t, drive[1], elements=12, step_s=2.5e-4),
     )
     assert error(a, b, "joint/1/position") < 2e-4 and error(a, b, "tip/y") < 2e-4
     w, expected = a["link/2/tip_deflection"], b["link/3/tip_deflection"]
@@ -366,7 +369,7 @@ def soft(**keys):
 
 
 def test_energy_is_conserved_through_sleeve_and_hub():
-    run = twin.simulate(
+    run = let_go(
         soft(), np.linspace(0, 0.5, 51), qd0=[0.3, 0.2], hub_length_m=0.0675, step_s=2.5e-4
     )
     drift, strain = (
@@ -380,7 +383,7 @@ def test_energy_is_conserved_through_sleeve_and_hub():
 def test_the_error_is_of_second_order_in_the_step():
     arm, t = soft().replace({"link.1.damping.beta_s": 1e-3}), np.linspace(0, 0.2, 21)
     runs = [
-        twin.simulate(arm, t, qd0=[0.3, 0.2], hub_length_m=0.0675, step_s=h)
+        let_go(arm, t, qd0=[0.3, 0.2], hub_length_m=0.0675, step_s=h)
         for h in (2e-3, 1e-3, 5e-4)
     ]
     for name in ("joint/1/position", "joint/2/position", "link/1/tip_deflection"):
@@ -407,7 +410,7 @@ def test_the_error_of_a_hub_is_of_first_order_in_its_length_and_that_of_a_sleeve
         (sleeve, pull, 1.5 * 0.9 / 24, "link/1/tip_deflection", 3.0, 4.5),
     ):
         y = [
-            twin.simulate(arm, t, drive, elements=24, hub_length_m=k * delta, step_s=5e-4)[name]
+            let_go(arm, t, drive, elements=24, hub_length_m=k * delta, step_s=5e-4)[name]
             for k in (1, 2, 4)
         ]
         assert low < np.linalg.norm(y[2] - y[1]) / np.linalg.norm(y[1] - y[0]) < high, name
@@ -432,7 +435,7 @@ def test_extrapolation_takes_both_errors_away():
 
 def test_meta_tells_of_hub_lengths_and_extrapolation(tmp_path):
     fractions = []
-    run = twin.simulate(soft(), [0.0, 0.05], qd0=[0.3, 0.2], progress=fractions.append)
+    run = let_go(soft(), [0.0, 0.05], qd0=[0.3, 0.2], progress=fractions.append)
     sleeve, hub = 1.5 * 0.9 / 32, 0.5 * 0.9 / 32
     assert run.meta["hub_length_m"] == pytest.approx([sleeve, hub]) and set(
         run.meta["extrapolation"]
@@ -442,7 +445,7 @@ def test_meta_tells_of_hub_lengths_and_extrapolation(tmp_path):
     assert fractions == sorted(fractions) and fractions[-1] == pytest.approx(1.0)
     run.save(tmp_path)
     assert Run.read(tmp_path).meta == run.meta
-    assert "extrapolation" not in twin.simulate(soft(), [0.0, 0.05], hub_length_m=0.05).meta
+    assert "extrapolation" not in let_go(soft(), [0.0, 0.05], hub_length_m=0.05).meta
 
 
 # Drives and ends
@@ -475,7 +478,7 @@ def test_pd_control_as_data_and_as_a_function_and_the_sensed_deflection():
     )
     t = np.linspace(0, 0.3, 31)
     one, two = (
-        twin.simulate(arm, t, each, hub_length_m=0.0675, step_s=5e-4) for each in (drive, function)
+        let_go(arm, t, each, hub_length_m=0.0675, step_s=5e-4) for each in (drive, function)
     )
     for name in ("joint/2/position", "joint/2/drive", "link/2/tip_deflection"):
         assert abs(one[name] - two[name]).max() < 1e-6 * abs(one[name]).max(), name
@@ -485,7 +488,7 @@ def test_pd_control_as_data_and_as_a_function_and_the_sensed_deflection():
 def test_friction_stops_a_link_in_its_sleeve():
     arm = robot(beam(0.8, 1.0, 50.0, 4, "Pb", start=0.4, coulomb_friction=0.8, hub_mass_kg=5.0))
     t = np.linspace(0, 0.6, 61)
-    run = twin.simulate(arm, t, qd0=[0.4], hub_length_m=0.06)
+    run = let_go(arm, t, qd0=[0.4], hub_length_m=0.06)
     moving = t < 0.38
     assert run["joint/1/velocity"][moving] == pytest.approx(
         0.4 - t[moving], abs=1e-4
@@ -516,7 +519,7 @@ def test_sliding_off_the_end_is_an_error_with_its_time(arm, speeds, joint, capfd
     with pytest.raises(
         FlexuraError, match=rf"joint {joint} slid off the end of its link at t = 0\.(05|1)"
     ):
-        twin.simulate(arm, [0.0, 0.2], qd0=speeds)
+        let_go(arm, [0.0, 0.2], qd0=speeds)
     assert capfd.readouterr() == ("", "")
 
 
@@ -532,4 +535,4 @@ def test_sliding_off_the_end_is_an_error_with_its_time(arm, speeds, joint, capfd
 )
 def test_what_cannot_slide_is_refused_by_name(change, arguments, key):
     with pytest.raises(InputError, match=key):
-        twin.simulate(soft().replace(change), [0.0, 0.1], **arguments)
+        let_go(soft().replace(change), [0.0, 0.1], **arguments)
