@@ -40,7 +40,7 @@ def test_a_robot_does_its_default_manoeuvre(path):
     system = fx.assemble(robot)
     asked = modest(system)
     run = fx.simulate(system, asked.t, asked.drive, rtol=1e-7)
-    assert run.complete and run.meta["events"] == [] and run.meta["energy_error"] < 1e-5
+    assert run.complete and run.meta["events"] == [] and run.meta["energy_error"] < 1e-4
     for i, link in enumerate(robot.links, 1):
         position = run[f"joint/{i}/position"]
         assert 0.02 * REACH[link.joint.type] < np.ptp(position) < 1.2 * REACH[link.joint.type]

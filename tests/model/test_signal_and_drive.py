@@ -487,7 +487,11 @@ def test_the_core_evaluates_a_packed_drive_alike(system):
     assert rows.tolist() == [0, 3, 6]
 
     @settings(max_examples=100, deadline=None)
-    @given(st.tuples(*[joint_drives.filter(lambda joint: not joint.unfollowed)] * 3), st.floats(-1, 6), st.integers(0, 2**32 - 1))
+    @given(
+        st.tuples(*[joint_drives.filter(lambda joint: not joint.unfollowed)] * 3),
+        st.floats(-1, 6),
+        st.integers(0, 2**32 - 1),
+    )
     def alike(joints, t, seed):
         drive = Drive(joints)
         q, v = np.random.default_rng(seed).normal(size=(2, system.n))

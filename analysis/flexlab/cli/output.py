@@ -34,7 +34,8 @@ def prepare(
     asked = None if manoeuvre is None else fx.load_manoeuvre(manoeuvre, len(described.links))
     if asked is None:
         asked = modest(system)
-        typer.echo(described_manoeuvre(asked, described), err=True)
+        if not quiet():
+            typer.echo(described_manoeuvre(asked, described), err=True)
     try:
         asked = asked.prescribed() if prescribed else asked
     except fx.InputError as error:
