@@ -124,6 +124,30 @@ WRONG = {
         ["inverse", RIG, "jump.toml"],
         "jump.toml: joint[1].motion: expected a motion without jumps",
     ),
+    "a motion that nothing follows": (
+        ["simulate", RIG, "rig-step"],
+        "joint[1].motion: joint 1 has a motion, but neither gains nor prescribed",
+    ),
+    "a motion that nothing follows in the twin": (
+        ["crosscheck", RIG, "rig-step"],
+        "or call with --prescribed",
+    ),
+    "a controller of exact motions": (
+        ["simulate", RIG, "rig-step", "--prescribed", "--controller", "rig"],
+        "--controller = 'rig': expected without --prescribed",
+    ),
+    "a controller of many robots": (
+        ["simulate", RIG, "rig-step", "--vary", "payload.mass_kg=0:1:2", "--controller", "rig"],
+        "--controller = 'rig': expected without --vary",
+    ),
+    "nothing to prescribe": (
+        ["simulate", RIG, "type-1-bang-bang", "--prescribed"],
+        "missing: no joint has a motion to follow",
+    ),
+    "a start of another kind": (
+        ["simulate", RIG, LAW, "--start", "bent"],
+        'start = \'bent\': expected "static" or "straight"',
+    ),
     "an unknown study": (["study", "mass", RIG], "KIND = 'mass': expected one of payload"),
     "a study of nothing": (
         ["study", "boundary", RIG],
@@ -210,8 +234,8 @@ def test_simulate_without_a_manoeuvre_moves_every_joint_and_shows_a_table(warm, 
     """Results go to logs/COMMAND-ROBOT-1 under the working folder."""
     done = flexura("simulate", RIG, cwd=tmp_path)
     run = fx.Run.read(tmp_path / "logs" / "simulate-rig-1")
-    assert done.returncode == 0
-    assert re.fullmatch(r"no manoeuvre was given: [^\n]+\n", done.stderr)
+    told = "no manoeuvre was given: joint 1 goes 0.05 m, joint 2 goes 0.3 rad in 1 s"
+    assert done.returncode == 0 and done.stderr.startswith(told)
     assert all(np.ptp(run[f"joint/{i}/position"]) > 1e-3 for i in (1, 2))
     assert all(
         text in done.stdout
@@ -220,8 +244,23 @@ def test_simulate_without_a_manoeuvre_moves_every_joint_and_shows_a_table(warm, 
             "joint/1/position",
             "link/2/tip_deflection",
             "stored logs",
+            "start: straight",
         )
     )
+
+
+def test_motions_are_followed_exactly_by_both_programs(warm, tmp_path):
+    """The shipped steps, which no gains follow; and a controller without a manoeuvre."""
+    done = flexura("crosscheck", RIG, "rig-step", "--prescribed", "--out", "a", cwd=tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    runs = [fx.Run.read(tmp_path / "a" / name) for name in ("simulation", "twin")]
+    for run in runs:
+        assert run["joint/2/position"].max() == pytest.approx(np.pi / 4, abs=1e-9)
+    done = flexura("simulate", RIG, "--controller", "rig", "--out", "b", cwd=tmp_path)
+    assert done.returncode == 0
+    run = fx.Run.read(tmp_path / "b")
+    assert run["joint/2/reference"][-1] == pytest.approx(0.3, abs=1e-9)
+    assert run["joint/2/position"][-1] == pytest.approx(0.3, abs=5e-3)
 
 
 def test_ctrl_c_stores_what_there_is_and_marks_it_incomplete(warm, tmp_path):
