@@ -317,7 +317,7 @@ def test_the_curve_of_the_last_link_ends_at_the_tip(joints, stiffening):
     length = np.full(len(c.index), STRIP["length_m"])
     bend = run[f"link/{len(joints.split())}/tip_deflection"][c.index]
     lost = length - cantilever(length, STRIP["length_m"], bend)[0]
-    np.testing.assert_allclose(off, 0 if stiffening else lost, atol=1e-9)
+    np.testing.assert_allclose(off, 0 if stiffening else lost, atol=1e-12)
 
 
 def test_a_cubic_bending_line_is_drawn_exactly():
@@ -326,7 +326,7 @@ def test_a_cubic_bending_line_is_drawn_exactly():
     curve = drawing.bent(run, 1, drawing.outlines(run.meta)[0], index)[0]
     x = np.linspace(0, STRIP["length_m"], drawing.POINTS)
     px, w, _ = cantilever(x, STRIP["length_m"], run["link/1/tip_deflection"][150])
-    np.testing.assert_allclose(curve, np.stack([px, w], axis=1), atol=1e-9)
+    np.testing.assert_allclose(curve, np.stack([px, w], axis=1), atol=1e-15)
 
 
 @pytest.mark.parametrize("turn", [0.1, 0.5, 1.0, 1.9, 3.9])

@@ -32,7 +32,19 @@ def test_a_robot_file_is_read_and_written_and_says_what_it_is(path, tmp_path):
     )
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+# Exponential steps of a damped link in a moving sleeve: each step sets its stiff modes swinging a
+# little, and what the damping takes of that counts as loss. type-3-rpb at rtol 1e-7: 1.3e-7 J too
+# much, 2.9e-5 of the largest energy; implicit steps balance to 1.5e-9.
+LOSSY_SLEEVES = {"type-3-rpb", "type-6-papb", "type-9-pbpb"}
+
+
+def manoeuvred(path):
+    reason = "exponential steps count the swinging of stiff modes in a moving sleeve as loss"
+    marks = [pytest.mark.xfail(reason=reason)] if path.stem in LOSSY_SLEEVES else []
+    return pytest.param(path, id=path.stem, marks=marks)
+
+
+@pytest.mark.parametrize("path", list(map(manoeuvred, FILES)))
 def test_a_robot_does_its_default_manoeuvre(path):
     """Every joint moves, none leaves its limits or the link it slides on, links bend by 1 % or so,
     energy is kept."""
@@ -40,7 +52,7 @@ def test_a_robot_does_its_default_manoeuvre(path):
     system = fx.assemble(robot)
     asked = modest(system)
     run = fx.simulate(system, asked.t, asked.drive, rtol=1e-7)
-    assert run.complete and run.meta["events"] == [] and run.meta["energy_error"] < 1e-4
+    assert run.complete and run.meta["events"] == [] and run.meta["energy_error"] < 1e-5
     for i, link in enumerate(robot.links, 1):
         position = run[f"joint/{i}/position"]
         assert 0.02 * REACH[link.joint.type] < np.ptp(position) < 1.2 * REACH[link.joint.type]
@@ -72,8 +84,7 @@ def test_replayed_inverse_drives_return_the_motion(path):
     motions = [
         polynomial(s + 0.8 * reach, 0.5, s) for s, reach in zip(start, _reach(system), strict=True)
     ]
-    # explicit: implicit steps of a sleeve balance to 1.6e-4 only
-    run = fx.inverse(system, t, motions, rtol=1e-10, method="explicit")
+    run = fx.inverse(system, t, motions, rtol=1e-10)
     drives = fx.Drive.force(*(table(t, run[f"joint/{i}/drive"]) for i in range(1, len(start) + 1)))
     again = fx.simulate(system, t, drives, rtol=1e-10)
     assert again.complete and run.meta["energy_error"] < 1e-8

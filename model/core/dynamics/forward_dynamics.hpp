@@ -37,12 +37,13 @@ inline void eliminate_joint(const Piece<Real> &c, PieceState<Real> &k, const Sta
     own += dot(k.along, k.pull), bias = dot(k.along, beyond.b);
   }
   const Real passive = stiffness * stage.y[c.first] + damping * stage.v[c.first];
+  own += stage.gq * stiffness + stage.gv * damping;
   if (hold.held && hold.held[i]) {  // its acceleration is known
     k.inverse = own, k.rest = -(bias + passive);
     beyond.b = beyond.b + hold.given[i] * k.pull;
     return;
   }
-  k.inverse = 1.0 / (own + stage.gq * stiffness + stage.gv * damping);
+  k.inverse = 1.0 / own;
   k.rest = force - passive - bias;
   subtract(beyond.A, k.pull, k.inverse);
   beyond.b = beyond.b + (k.rest * k.inverse) * k.pull;
