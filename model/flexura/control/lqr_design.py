@@ -24,7 +24,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.linalg import expm, solve_discrete_are
 
 from ..errors import InputError
 from ..io import array, number
@@ -107,6 +106,8 @@ def lqr(
             scale.append(joint.output.force_per_V if isinstance(joint.output, Motor) else 1.0)
             if motor:
                 damp += linear.E[:, len(driven) - 1] * joint.output.damping  # type: ignore[union-attr]
+    from scipy.linalg import expm
+
     A, B = replace(linear, G=linear.G + np.diag(damp)).A, linear.B @ np.diag(scale)
     n, m = B.shape
     exponential = expm(np.block([[A, B], [np.zeros((m, n + m))]]) * T)
@@ -146,6 +147,8 @@ def lqr(
 def _riccati(F: np.ndarray, G: np.ndarray, Q: np.ndarray, R: np.ndarray, key: str) -> np.ndarray:
     """The stabilising solution of P = Q + F^T P (F - G K). SciPy's balancing sometimes spoils its
     reordering: then without."""
+    from scipy.linalg import solve_discrete_are
+
     for balanced in (True, False):
         try:
             P = solve_discrete_are(F, G, Q, R, balanced=balanced)

@@ -230,9 +230,7 @@ class Run:
         schema = pa.schema(fields, metadata=about)
         sink = pa.BufferOutputStream()
         pq.write_table(
-            pa.table(
-                [pa.array(np.asarray(v, dtype=float)) for v in columns.values()], schema=schema
-            ),
+            pa.table([_float_column(values) for values in columns.values()], schema=schema),
             sink,
             compression="zstd",
             write_page_checksum=True,
@@ -293,3 +291,11 @@ class Run:
                 name = column.name.removesuffix(f"_{SUFFIX.get(unit, '')}")
                 channels[name], units[name] = values, unit
         return Run(t, channels, units, meta)
+
+
+def _float_column(values: np.ndarray) -> Any:
+    """Numbers as a column of Arrow; its own conversion of an array first imports pandas."""
+    import pyarrow as pa
+
+    numbers = np.ascontiguousarray(values, dtype=float)
+    return pa.Array.from_buffers(pa.float64(), len(numbers), [None, pa.py_buffer(numbers)])
