@@ -68,9 +68,8 @@ level: str = _core.level  # the build in use, a key of BUILDS
 compiler: str = _core.compiler  # what compiled it
 
 Mechanics = _core.Mechanics  # the equations of one robot, from the rows of system/constants.py
-Fault = (
-    _core.Fault
-)  # what the core refuses: args are the link (from 0; -1: none), the key and what was expected
+# what the core refuses: args are the link (from 0; -1: none), the key and what was expected
+Fault = _core.Fault
 Simulation = _core.Simulation  # a run in progress
 Sampler = _core.Sampler  # what is called once a tick: a PythonSampler, or a controller of the core
 PythonSampler = _core.PythonSampler

@@ -101,12 +101,7 @@ def measure(elf: Path, setup: RigSetup, seconds: float = 2.0, every_term: bool =
     static = simulator.symbol("_end") - RAM_BEGIN
     for address in range(RAM_BEGIN + static, RAM_END):
         simulator.data[address] = PAINT
-    link = Link(board, sequence=1)
-    link.connect()
-    link.write_configuration(settings)
-    link.command("clear", fault=link.newest["fault"])
-    commission(link)
-    link.command("reference", position_1=0, position_2=0, steps=0)
+    link = _ready(board, settings)
     carriage, joint = (harmonic(way / 2, 1.0, math.pi, way / 2) for way in (0.0398, 2.498))
     player = Player(link, setpoints(carriage, joint, seconds + 1.0, settings))
     player.start()
@@ -169,12 +164,7 @@ def experiment(elf: Path, setup: RigSetup, seconds: float = 4.0) -> tuple[float,
     """
     settings, plant = configuration(setup), rig_plant(setup)
     board = EmulatedBoard(elf, plant)
-    link = Link(board, sequence=1)
-    link.connect()
-    link.write_configuration(settings)
-    link.command("clear", fault=link.newest["fault"])
-    commission(link)
-    link.command("reference", position_1=0, position_2=0, steps=0)
+    link = _ready(board, settings)
     carriage, joint = (
         harmonic(amplitude, 1.0, math.pi, amplitude) for amplitude in (0.012, math.pi / 6)
     )
@@ -188,6 +178,17 @@ def experiment(elf: Path, setup: RigSetup, seconds: float = 4.0) -> tuple[float,
     alone = _alone(board)
     board.close()
     return seconds / wall, IDLE_S / alone
+
+
+def _ready(board: EmulatedBoard, settings: dict[str, float]) -> Link:
+    """A session with a board that is configured, has proven its stop and stands at zero."""
+    link = Link(board, sequence=1)
+    link.connect()
+    link.write_configuration(settings)
+    link.command("clear", fault=link.newest["fault"])
+    commission(link)
+    link.command("reference", position_1=0, position_2=0, steps=0)
+    return link
 
 
 def _alone(board: EmulatedBoard) -> float:

@@ -105,9 +105,8 @@ def flexura(
 def main() -> None:
     """Run the command; bad input ends in one line on stderr and status 2, whatever else goes wrong
     in status 1."""
-    gc.set_threshold(
-        100_000
-    )  # looking for garbage among a million objects just imported is a tenth of the start
+    # looking for garbage among a million objects just imported is a tenth of the start
+    gc.set_threshold(100_000)
     try:
         app()
     except KeyboardInterrupt:

@@ -13,7 +13,7 @@ from flexura.io import FILE
 from ..studies.drive_requirements import efforts
 from . import tables
 from .options import Force, Json, Out, RobotFile, Rtol, Start
-from .output import interrupted, prepare, progress_bars, show, stored
+from .output import interrupted, prepare, show, simulate_asked, stored
 from .results import results
 
 
@@ -53,17 +53,7 @@ def inverse(
     except fx.InputError as error:
         raise error.in_file(str(manoeuvre)) from None
     with results(out, "inverse", robot.stem, manoeuvre.stem, force=force) as draft:
-        with progress_bars("inverse") as report:
-            run = fx.simulate(
-                system,
-                asked.t,
-                drive,
-                rtol=rtol,
-                method=method,
-                start=asked.start,
-                progress=lambda f: report("inverse", f),
-            )
-        run.meta["manoeuvre"] = asked.name
+        run = simulate_asked(system, asked, drive, "inverse", rtol=rtol, method=method)
         run.save(draft.folder)
         folder = draft.keep(interrupted=interrupted(run))
     rows = efforts(run) if len(run) > 1 else []

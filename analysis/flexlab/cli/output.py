@@ -75,6 +75,23 @@ def progress_bars(*names: str) -> Iterator[Callable[[str, float], None]]:
         yield lambda name, fraction: bars.update(tasks[name], completed=fraction)
 
 
+def simulate_asked(
+    system: fx.System, asked: fx.Manoeuvre, drive: Any, bar: str, **how: Any
+) -> fx.Run:
+    """Simulate what is asked, with a progress bar; `how`: rtol and method."""
+    with progress_bars(bar) as report:
+        run = fx.simulate(
+            system,
+            asked.t,
+            drive,
+            start=asked.start,
+            progress=lambda fraction: report(bar, fraction),
+            **how,
+        )
+    run.meta["manoeuvre"] = asked.name
+    return run
+
+
 def show(json: bool, tables: Callable[[], Any], data: Callable[[], Any]) -> None:
     """Print a table, or several, or JSON; 80 columns wide where there is no terminal."""
     if json:

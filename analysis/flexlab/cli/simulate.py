@@ -14,7 +14,17 @@ from ..studies import parameter_sweep
 from ..tuning.closed_loop import controller_from_file
 from . import tables
 from .options import Force, Json, ManoeuvreFile, Out, Prescribed, RobotFile, Rtol, Start, stem
-from .output import followed, interrupted, prepare, progress_bars, say, show, stored, warn
+from .output import (
+    followed,
+    interrupted,
+    prepare,
+    progress_bars,
+    say,
+    show,
+    simulate_asked,
+    stored,
+    warn,
+)
 from .results import continued, results
 
 
@@ -77,17 +87,7 @@ def simulate(
         followed(asked, manoeuvre, "call with --controller GAINS or --prescribed")
     drive = controller_from_file(system, asked, controller) if controller else asked.drive
     with results(out, "simulate", robot.stem, *stem(manoeuvre), force=force) as draft:
-        with progress_bars("native") as report:
-            run = fx.simulate(
-                system,
-                asked.t,
-                drive,
-                rtol=rtol,
-                method=method,
-                start=asked.start,
-                progress=lambda f: report("native", f),
-            )
-        run.meta["manoeuvre"] = asked.name
+        run = simulate_asked(system, asked, drive, "native", rtol=rtol, method=method)
         run.save(draft.folder)
         folder = draft.keep(interrupted=interrupted(run))
     show(

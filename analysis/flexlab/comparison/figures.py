@@ -14,12 +14,8 @@ from flexura.optional import load
 from ..runs.deviation import deviation
 from .measures import Comparison, Difference
 
-BLUE, GREEN, PINK, INK = (
-    "#1f6fc4",
-    "#1d9a50",
-    "#c43a80",
-    "#30343b",
-)  # simulation, experiment, deviation, as in the review
+# simulation, experiment, deviation, as in the review
+BLUE, GREEN, PINK, INK = "#1f6fc4", "#1d9a50", "#c43a80", "#30343b"
 RATIO = [2.3, 1]
 
 

@@ -48,9 +48,8 @@ def draw(
     at = default_time(rrd)
     with viewer((size[0], size[1] + MENU_PX)) as client:
         show(client, rrd)
-        client.run_command(
-            "ui.toggle_top_panel"
-        )  # the picture is of the review, not of the viewer's menu
+        # the picture is of the review, not of the viewer's menu
+        client.run_command("ui.toggle_top_panel")
         client.set_time(
             "time", duration=float(at if time_s is None else time_s), play_state="paused"
         )

@@ -126,9 +126,8 @@ def _style(rec: rr.RecordingStream, title: str) -> None:
     thick: Any = rr.Radius.ui_points(3.0)
     style = rr.LineStrips2D.from_fields(colors=[COLOURS[0]], radii=[thick])
     rec.log("experiment/arm", style, static=True)
-    rec.log(
-        "experiment/arm", rr.Transform3D(scale=[1.0, -1.0, 1.0]), static=True
-    )  # a 2D view's y points down
+    # a 2D view's y points down
+    rec.log("experiment/arm", rr.Transform3D(scale=[1.0, -1.0, 1.0]), static=True)
     for names in PLOTS.values():
         for name, colour in zip(names, COLOURS, strict=False):
             kind = name.rpartition("/")[2].replace("_", " ")

@@ -37,9 +37,8 @@ NAMES = {
     OTHER: "grey",
 }
 
-_HIDDEN = re.compile(
-    r"link/\d+/(x|y|angle|deflection/\d+)"
-)  # drawn as shapes, not as curves over time
+# drawn as shapes, not as curves over time
+_HIDDEN = re.compile(r"link/\d+/(x|y|angle|deflection/\d+)")
 
 
 @dataclass(frozen=True)

@@ -5,12 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-PLOT_PX, LOW_PX, LINE_PX, LINE_CHARS = (
-    265,
-    140,
-    23,
-    36,
-)  # the height of a plot, of one below another, and of a legend's line in a window of 900 pixels
+# the height of a plot, of one below another, and of a legend's line in a window of 900 pixels
+PLOT_PX, LOW_PX, LINE_PX, LINE_CHARS = 265, 140, 23, 36
 LABEL_PX = 26  # the viewer numbers the powers of ten that are at least so far apart
 
 

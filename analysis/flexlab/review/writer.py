@@ -51,9 +51,8 @@ LEVELS = {"INFO", "WARN", "ERROR", "DEBUG", "TRACE", "CRITICAL"}
 def write(path: str | Path, groups: dict[str, Sequence[Run]]) -> Path:
     """Write the review of one group of runs, or a gallery of several by name; see
     `flexlab.review`."""
-    rr.set_strict_mode(
-        True
-    )  # otherwise wrong lengths and shapes only warn, and the data is dropped
+    # otherwise wrong lengths and shapes only warn, and the data is dropped
+    rr.set_strict_mode(True)
     target = Path(path)
     parts = [_part(name if len(groups) > 1 else "", runs) for name, runs in groups.items()]
     scenes = [scene for _, scene in parts]

@@ -99,12 +99,11 @@ Energies<Real> energies(const Model<Real> &model, Workspace<Real> &work, const R
                         const Real *v) {
   Energies<Real> out;
   outward_kinematics(model, work, y, v);
-  Hub<Real> hub;
+  Hub<Real> hub = first_hub(model, y, v);
   const std::size_t count = model.pieces.size();
   for (std::size_t i = 0; i < count; ++i) {
     const Piece<Real> &c = model.pieces[i];
     const PieceState<Real> &k = work.kept[i];
-    if (i == 0 && c.joint == HubJoint::slider) hub.x += y[c.first] + c.offset, hub.vx += v[c.first];
     Real x, up;
     first_moment(c, k, y, x, up);
     out.potential -=

@@ -31,12 +31,11 @@ Pose<double> point_on_piece(const Piece<double> &c, const PieceState<double> &k,
 void line_points(const Model<double> &model, const Workspace<double> &work, const double *y,
                  int link, const double *s, int count, Pose<double> *out) {
   const int begin = model.begin[std::size_t(link)], end = model.begin[std::size_t(link) + 1];
-  Hub<double> hub;
-  std::vector<Hub<double>> hubs;
   const std::vector<double> still(std::size_t(model.n), 0.0);
+  Hub<double> hub = first_hub(model, y, still.data());
+  std::vector<Hub<double>> hubs;
   for (int i = 0; i < end; ++i) {
     const Piece<double> &c = model.pieces[std::size_t(i)];
-    if (i == 0 && c.joint == HubJoint::slider) hub.x += y[c.first] + c.offset;
     hubs.push_back(hub);
     const bool within = std::size_t(i) + 1 < model.pieces.size();
     advance_hub(c, work.kept[std::size_t(i)], y, still.data(),

@@ -15,6 +15,15 @@ struct Hub {
   Real x = 0.0, y = 0.0, vx = 0.0, vy = 0.0;
 };
 
+// The first hub at (y, v): at the origin, or as far along the axis as it slides there.
+template <class Real>
+inline Hub<Real> first_hub(const Model<Real> &model, const Real *y, const Real *v) {
+  Hub<Real> hub;
+  const Piece<Real> &c = model.pieces.front();
+  if (c.joint == HubJoint::slider) hub.x = y[c.first] + c.offset, hub.vx = v[c.first];
+  return hub;
+}
+
 // Where a piece's tip, or the slider on it, is from its hub; and its velocity, from the columns
 // that `outward_kinematics` has left.
 template <class Real>
@@ -38,12 +47,11 @@ inline void advance_hub(const Piece<Real> &c, const PieceState<Real> &k, const R
 template <class Real>
 void hub_poses(const Model<Real> &model, const Workspace<Real> &work, const Real *y, const Real *v,
                Pose<Real> *poses, Real *tip_velocity) {
-  Hub<Real> hub;
+  Hub<Real> hub = first_hub(model, y, v);
   const std::size_t count = model.pieces.size();
   for (std::size_t i = 0; i < count; ++i) {
     const Piece<Real> &c = model.pieces[i];
     const PieceState<Real> &k = work.kept[i];
-    if (i == 0 && c.joint == HubJoint::slider) hub.x += y[c.first] + c.offset, hub.vx += v[c.first];
     const bool begins = int(i) == model.begin[std::size_t(c.link)];
     const bool sleeved = model.kind[std::size_t(c.link)] == JointKind::sleeve;
     if (sleeved ? !begins : begins) {

@@ -38,11 +38,8 @@ from ..signals import Drive, JointDrive
 from ..system import System
 from .pid import GAINS, PID, Motor, Stepper, not_negative
 
-NONE, EFFORT, STEPPER = (
-    0,
-    1,
-    2,
-)  # what a joint's output is: not the controller's, a force or voltage, a rate
+# what a joint's output is: not the controller's, a force or voltage, a rate
+NONE, EFFORT, STEPPER = 0, 1, 2
 (
     KP,
     KI,

@@ -86,10 +86,11 @@ _ENDS = {
     },
 }
 _ANY = {"setpoint_Hz": "setpoint_{}_Hz", "delay_s": "delay_{}_s"}
+# the board has one motor
 _BOARDS = {
     "voltage_max_V": "voltage_max_1_V",
     "voltage_slew_V_s": "voltage_slew_1_V_s",
-}  # the board has one motor
+}
 _SHARED = ("rate_Hz", "derivative_Hz", "deflection_Hz")
 BOARD = (  # the settings of the board that are a controller's, in its order
     "voltage_max_V",

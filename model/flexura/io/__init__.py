@@ -10,6 +10,7 @@ from .arguments import (
     flag,
     function_of,
     number,
+    takes,
     whole,
 )
 from .channels import CHANNELS, STATIONS, Channel, channel
@@ -46,6 +47,7 @@ __all__ = [
     "read_toml",
     "shipped_files",
     "summary",
+    "takes",
     "whole",
     "write_bytes",
     "write_text",

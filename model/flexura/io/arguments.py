@@ -108,12 +108,13 @@ def function_of(value: Any, key: str, counts: Sequence[int], expected: str) -> A
 
     Raises: InputError: it is none.
     """
-    if not callable(value) or not any(_takes(value, count) for count in counts):
+    if not callable(value) or not any(takes(value, count) for count in counts):
         raise InputError(expected, key=key, value=value)
     return value
 
 
-def _takes(function: Any, count: int) -> bool:
+def takes(function: Any, count: int) -> bool:
+    """Whether a function can be called with so many arguments."""
     try:
         inspect.signature(function).bind(*[0.0] * count)
     except TypeError:

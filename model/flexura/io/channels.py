@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 STATIONS = 9  # places along a flexible link at which a Run holds the deflection
 
+# of a column's name in a file, by unit
 SUFFIX = {
     "s": "s",
     "m": "m",
@@ -24,7 +25,7 @@ SUFFIX = {
     "V": "V",
     "A": "A",
     "1": "1",
-}  # of a column's name in a file, by unit
+}
 
 
 @dataclass(frozen=True)

@@ -252,9 +252,8 @@ class Run:
         if not there:
             raise InputError(f"no run here: expected a folder with {FILE}", file=str(folder))
         try:
-            table = pq.read_table(
-                path, partitioning=None, page_checksum_verification=True
-            )  # a folder named a=b is just a folder
+            # a folder named a=b is just a folder
+            table = pq.read_table(path, partitioning=None, page_checksum_verification=True)
         except (pa.ArrowException, OSError, ValueError) as error:
             raise InputError(
                 f"not a Parquet file ({(str(error) or 'damaged').splitlines()[0]})", file=str(path)

@@ -13,9 +13,8 @@ from typing import Any
 from ..errors import InputError
 
 MAX_BYTES = 10_000_000
-_TOO_DEEP = re.compile(
-    r"""(?:\.[ \t]*[\w"'-]+[ \t]*){300}"""
-)  # a.a.a.a...: tomllib's time and memory grow with the square
+# a.a.a.a...: tomllib's time and memory grow with the square
+_TOO_DEEP = re.compile(r"""(?:\.[ \t]*[\w"'-]+[ \t]*){300}""")
 
 
 def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:

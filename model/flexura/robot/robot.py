@@ -201,12 +201,11 @@ class Robot(Table):
         """A robot with some values changed: `robot.replace({"payload.mass_kg": 0.1,
         "link.2.length_m": 0.4})`, links counted from 1."""
         changes = {self._todays_path(path, changes): value for path, value in changes.items()}
+        # says what is wrong in a file's words
         try:
             return Robot.model_validate(_changed(self, changes))
         except ValidationError:
-            return Robot.from_dict(
-                _changed(self.to_dict(), changes)
-            )  # says what is wrong in a file's words
+            return Robot.from_dict(_changed(self.to_dict(), changes))
 
     def _todays_path(self, path: str, changes: dict[str, Any]) -> str:
         """`link.2.joint.start_rad` of `link.2.joint.start`; any other path as it is."""

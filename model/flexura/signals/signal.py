@@ -29,9 +29,8 @@ def evaluate(segments: np.ndarray, t: float) -> tuple[float, float, float]:
     """y, dy/dt and d2y/dt2 at t of segments (k, 10) (60); 0 where k = 0."""
     if len(segments) == 0:
         return 0.0, 0.0, 0.0
-    low = max(
-        int(np.searchsorted(segments[:, 0], t, side="right")) - 1, 0
-    )  # the last segment that starts at or before t
+    # the last segment that starts at or before t
+    low = max(int(np.searchsorted(segments[:, 0], t, side="right")) - 1, 0)
     t0, c0, c1, c2, c3, c4, c5, A, w, phi = segments[low].tolist()
     s = t - t0
     if s < 0.0:  # before the first segment: hold

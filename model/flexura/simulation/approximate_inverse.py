@@ -272,9 +272,8 @@ def _splines(
     parts: list[list[np.ndarray]] = [[] for _ in motion]
     for a, b in pairwise(np.unique(np.clip(breaks, start, end))):
         count = max(4, int(np.ceil((b - a) / step)) + 1)
-        x = (
-            a + (b - a) * (1 - np.cos(np.linspace(0, np.pi, count))) / 2
-        )  # closer at the ends: friction turns where a joint stops
+        # closer at the ends: friction turns where a joint stops
+        x = a + (b - a) * (1 - np.cos(np.linspace(0, np.pi, count))) / 2
         x[-1] = b
         inside = np.append(x[:-1], np.nextafter(b, -np.inf))
         c = CubicSpline(

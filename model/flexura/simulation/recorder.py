@@ -41,16 +41,12 @@ def observed(robot: Robot) -> list[str]:
     ]
 
 
-WORK, LOSS, NUMERICAL, STRAIN = range(
-    4
-)  # columns of the accounts, as Account of model/core/control/plant.hpp counts them
+# columns of the accounts, as Account of model/core/control/plant.hpp counts them
+WORK, LOSS, NUMERICAL, STRAIN = range(4)
 LIMITS = ("limit", "end_of_link", "sleeve")  # names of events that stop a joint
 STILL = 1e-9  # m or rad: a robot whose unknowns change by less does not move
-NOTED, DOUBTED, REFUSED = (
-    1e-3,
-    1e-2,
-    0.1,
-)  # of the energies: a balance beyond is a note, an event, the end of trust in a run
+# of the energies: a balance beyond is a note, an event, the end of trust in a run
+NOTED, DOUBTED, REFUSED = 1e-3, 1e-2, 0.1
 
 
 def record(system: System, solution: Solution) -> Run:

@@ -56,9 +56,8 @@ class Assembly:
             for i, law in enumerate(self.structure.laws)
             if law is not None and self.structure.sleeved(i)
         ]
-        self._sleeved: dict[int, Material] = dict(
-            laws
-        )  # flexible links in a sleeve, with their materials
+        # flexible links in a sleeve, with their materials
+        self._sleeved: dict[int, Material] = dict(laws)
 
     def mass(self, q: np.ndarray) -> np.ndarray:
         """M(q) (n, n) (40)."""

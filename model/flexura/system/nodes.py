@@ -113,9 +113,8 @@ def put_to_rest(structure: Nodes, i: int, node: int, y: np.ndarray) -> None:
         structure.links[i][0].integrals(np.arange(1, link.elements + 1) / link.elements)
         @ structure.links[i][0].B
     )
-    mean = link.elements * np.diff(
-        means, axis=0, prepend=0.0
-    )  # of the angle over each element, by all unknowns
+    # of the angle over each element, by all unknowns
+    mean = link.elements * np.diff(means, axis=0, prepend=0.0)
     k = own - structure.own[i][0].start
     angle, deflection = y[own], h * mean[node - 1, k : k + 2] @ y[own : own + 2]
     y[own : own + 2] = 0.0

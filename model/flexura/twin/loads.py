@@ -16,7 +16,6 @@ step uses the mean over the half steps before and after its instant, so that the
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -24,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..io import array, function_of
+from ..io import array, function_of, takes
 from ..optional import Optional
 from ..signals import Drive, Signal, as_signals
 from .build import TwinModel
@@ -88,7 +87,7 @@ def actuation(drive: Any, start: np.ndarray, speeds: np.ndarray, t: np.ndarray) 
         expected = f"expected {n} finite forces or torques from the drive at t = {arguments[0]:g} s"
         return array(drive(*arguments), "drive", expected, (n,))
 
-    if _takes(drive, 4):
+    if takes(drive, 4):
         return Actuation(_gains(checked, start, speeds), checked, None, None)
     still = np.zeros((n, 2))
     return Actuation(
@@ -121,17 +120,6 @@ def _plan(drive: Drive, t: float) -> np.ndarray:
         if joint.motion is not None:
             out[i, 1:] = joint.motion(t)[:2]
     return out
-
-
-def _takes(function: Callable[..., Any], count: int) -> bool:
-    """Whether a function can be called with so many arguments."""
-    try:
-        inspect.signature(function).bind(*[0.0] * count)
-    except TypeError:
-        return False
-    except ValueError:  # a builtin without a signature
-        return True
-    return True
 
 
 class Loads:

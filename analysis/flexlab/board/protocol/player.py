@@ -20,9 +20,8 @@ from .session import Command, Link, Refused
 FRACTION = 256  # set-points count in 1/256 of a count or microstep
 _SHARE = {"setpoints": 4, "drives": 8}  # knots in one command
 
-Function = Callable[
-    [float], tuple[float, float, float]
-]  # t [s] -> position, velocity, acceleration, as a flexura Signal
+# t [s] -> position, velocity, acceleration, as a flexura Signal
+Function = Callable[[float], tuple[float, float, float]]
 
 
 @dataclass(frozen=True)

@@ -33,9 +33,8 @@ from .frames import Deframer, encode
 from .round_trip import RoundTrip
 
 STEP_S = 0.001  # how long the host lets the board's time pass before it looks again
-SLOW = {
-    "config_save": 2.0
-}  # commands whose answer may take longer than the usual time to repeat, s
+# commands whose answer may take longer than the usual time to repeat, s
+SLOW = {"config_save": 2.0}
 # commands that are answered by a message and an acknowledgement, and that message
 READS = {"config_read": "config_value", "program_read": "program"}
 _REPORT_CODE = MESSAGES["telemetry"].code

@@ -51,12 +51,13 @@ STYLE: dict[str, Any] = {
     "pdf.fonttype": 42,
     "svg.hashsalt": "flexura",
 }
+# what a figure shows that was asked for nothing in particular: a panel each, of each unit
 USUAL = (
     ("joint/*/position", "joint/*/reference"),
     ("link/*/tip_deflection",),
     ("joint/*/drive", "joint/*/voltage"),
     ("energy/kinetic", "energy/strain", "energy/potential", "energy/work", "energy/loss"),
-)  # what a figure shows that was asked for nothing in particular: a panel each, of each unit
+)
 
 
 def figure(

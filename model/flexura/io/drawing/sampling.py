@@ -30,9 +30,8 @@ def thinned(y: np.ndarray, budget: int) -> np.ndarray:
         return np.arange(len(y), dtype=np.int64)
     blocks = max(budget // 3, 1)
     per = -(-len(y) // blocks)
-    padded = np.append(y, np.full(blocks * per - len(y), y[-1])).reshape(
-        blocks, per
-    )  # repeating the end adds no new value
+    # repeating the end adds no new value
+    padded = np.append(y, np.full(blocks * per - len(y), y[-1])).reshape(blocks, per)
     gap = np.isnan(padded)
     places = [
         np.where(gap, np.inf, padded).argmin(axis=1),

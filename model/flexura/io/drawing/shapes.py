@@ -170,9 +170,8 @@ def extent(runs: list[Run]) -> tuple[np.ndarray, np.ndarray]:
         return np.array([-1.0, -1.0]), np.array([1.0, 1.0])
     low, high = points.min(axis=0), points.max(axis=0)
     reach = max(float((high - low).max()), 1e-3)
-    spare = np.maximum(
-        0.08 * reach, (0.4 * reach - (high - low)) / 2
-    )  # an arm that hardly turns still gets a picture, not a slit
+    # an arm that hardly turns still gets a picture, not a slit
+    spare = np.maximum(0.08 * reach, (0.4 * reach - (high - low)) / 2)
     foot = 0.12 * float((high - low + 2 * spare)[1])  # the scale bar and its label go below the arm
     return low - spare - [0.0, foot], high + spare
 

@@ -22,9 +22,8 @@ class Equations:
         from scipy.linalg.lapack import dposv
 
         self.system, self.drive = system, drive
-        self.until = (
-            np.inf
-        )  # the latest time [s] at which signals are read, just before the next break
+        # the latest time [s] at which signals are read, just before the next break
+        self.until = np.inf
         self.held: np.ndarray | None = None  # forces (N,) of a sampled drive since the last tick
         self.n, self.rows = system.n, system.joint_rows
         self.motions: list[Signal | None] = [None] * len(self.rows)
@@ -36,9 +35,8 @@ class Equations:
         self.given = np.array(
             [i for i, motion in enumerate(self.motions) if motion is not None], dtype=int
         )
-        self.free = np.setdiff1d(
-            system.free_rows, self.rows[self.given]
-        )  # rows whose accelerations are unknown
+        # rows whose accelerations are unknown
+        self.free = np.setdiff1d(system.free_rows, self.rows[self.given])
         self._pick, self._square = np.ix_(self.free, self.free), len(self.free) == self.n
         self._solve = dposv
         self._coulomb = np.array([link.joint.coulomb_friction for link in system.robot.links])

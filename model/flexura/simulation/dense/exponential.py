@@ -19,10 +19,8 @@ from .equations import Equations
 from .propagator import Modes
 
 ORDER = 5  # values that a step looks back on
-FAST, FAST_ORDER = (
-    1.0,
-    4,
-)  # modes that turn by more than FAST rad in a step look back on four: five would blow up sooner
+# modes that turn by more than FAST rad in a step look back on four: five would blow up sooner
+FAST, FAST_ORDER = 1.0, 4
 ACCOUNTS = 2  # that are integrated: work and loss
 FIRST = 1e-4  # of the run: the first step
 AGAIN = 6  # rungs that a step is shorter after a break

@@ -24,10 +24,8 @@ ROUND_OFF = (
     3e-14  # the relative tolerance of SciPy's methods, beside an absolute one for each number
 )
 LOOK = 8  # steps between two looks at the energy
-PART, LEAST_STEPS = (
-    0.15,
-    100,
-)  # no step is longer than this part of a signal's period, or of a run under a caller's function
+# no step is longer than this part of a signal's period, or of a run under a caller's function
+PART, LEAST_STEPS = 0.15, 100
 TURNS = 2e4  # rad or decays of a rigid robot in a run, beyond which "auto" is implicit
 TICKS = 10.6  # rad of the fastest mode in a tick, below which "auto" is explicit under a Sampled
 STUCK = (
@@ -171,9 +169,8 @@ class Integration:
         """At the start of a stretch without breaks: signals are read up to its end; a sampled drive
         is asked, if it is time."""
         if self.marks:
-            self.equations.until = np.nextafter(
-                self.marks[0], -np.inf
-            )  # a drive's value there belongs to what follows
+            # a drive's value there belongs to what follows
+            self.equations.until = np.nextafter(self.marks[0], -np.inf)
         if np.any(np.abs(self.ticks - self.now) <= 1e-12 * max(abs(self.now), 1e-3)):
             q, v, _ = self.equations.state(self.now, self.z)
             self.equations.held = self.sampled(
