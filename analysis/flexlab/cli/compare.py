@@ -21,7 +21,7 @@ from ..comparison.report import html, png
 from ..review import picture as draw
 from ..review import write_review
 from .options import Force, Json, Rtol
-from .output import events, interrupted, progress_bars, say, show
+from .output import events, progress_bars, say, show
 from .results import counted, file_result, results
 
 
@@ -97,7 +97,7 @@ def compare(
         if picture is not None:
             draw(written[-1], picture)
         names = [path.relative_to(draft.folder) for path in written]
-        folder = draft.keep(interrupted=interrupted(first))
+        folder = draft.keep(interrupted=first.interrupted)
     paths = [folder / name for name in names] + ([] if picture is None else [picture])
     data: dict[str, Any] = table.numbers(found) | {"stored": [str(path) for path in paths]}
     show(json, lambda: table.table(found), lambda: data)
@@ -109,7 +109,7 @@ def compare(
         f"look at it: flexura review {folder / 'review.rrd'}",
     )
     if not first.complete:
-        raise typer.Exit(130 if interrupted(first) else 1)
+        raise typer.Exit(130 if first.interrupted else 1)
 
 
 def save(c: Comparison, folder: Path, *, simulated: bool) -> list[Path]:

@@ -14,7 +14,7 @@ from ..crosscheck import crosscheck as cross
 from ..crosscheck import nine_structures
 from . import tables
 from .options import Force, Json, ManoeuvreFile, Out, Prescribed, Rtol, Start, stem
-from .output import events, followed, interrupted, prepare, progress_bars, say, show, warn
+from .output import events, followed, prepare, progress_bars, say, show, warn
 from .results import results
 
 
@@ -80,7 +80,7 @@ def crosscheck(
                 progress=report,
             )
         review = cross.save(check, draft.folder).name
-        stopped = interrupted(check.simulation) or interrupted(check.twin)
+        stopped = check.simulation.interrupted or check.twin.interrupted
         folder = draft.keep(interrupted=stopped)
     show(
         json,

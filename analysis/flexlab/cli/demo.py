@@ -13,7 +13,7 @@ from ..runs.table import Table
 from . import tables
 from .demonstration import Demonstration, demonstrate, numbers
 from .options import Force, Json
-from .output import interrupted, progress_bars, say, show
+from .output import progress_bars, say, show
 from .results import results
 
 
@@ -37,7 +37,7 @@ def demo(
     with results(out, "demo", force=force) as draft:
         with progress_bars("native", "twin", "emulated") as report:
             done = demonstrate(draft.folder, report)
-        stopped = any(map(interrupted, done.runs))
+        stopped = any(run.interrupted for run in done.runs)
         folder = draft.keep(interrupted=stopped)
         done = done.moved(draft.folder, folder)
     drawn = done.picture if isinstance(done.picture, Path) else None

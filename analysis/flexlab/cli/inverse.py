@@ -13,7 +13,7 @@ from flexura.io import FILE
 from ..studies.drive_requirements import efforts
 from . import tables
 from .options import Force, Json, Out, RobotFile, Rtol, Start
-from .output import interrupted, prepare, show, simulate_asked, stored
+from .output import prepare, show, simulate_asked, stored
 from .results import results
 
 
@@ -55,7 +55,7 @@ def inverse(
     with results(out, "inverse", robot.stem, manoeuvre.stem, force=force) as draft:
         run = simulate_asked(system, asked, drive, "inverse", rtol=rtol, method=method)
         run.save(draft.folder)
-        folder = draft.keep(interrupted=interrupted(run))
+        folder = draft.keep(interrupted=run.interrupted)
     rows = efforts(run) if len(run) > 1 else []
     show(
         json,

@@ -131,9 +131,4 @@ def stored(run: Any, folder: Path, json: bool) -> None:
     events(run)
     say(json, f"stored {folder / FILE}", f"look at it: flexura review {folder}")
     if not run.complete:
-        raise typer.Exit(130 if interrupted(run) else 1)
-
-
-def interrupted(run: Any) -> bool:
-    """Whether Ctrl-C ended a run."""
-    return any(event["text"] == "interrupted" for event in run.meta.get("events", []))
+        raise typer.Exit(130 if run.interrupted else 1)

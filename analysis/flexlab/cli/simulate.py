@@ -16,7 +16,6 @@ from . import tables
 from .options import Force, Json, ManoeuvreFile, Out, Prescribed, RobotFile, Rtol, Start, stem
 from .output import (
     followed,
-    interrupted,
     prepare,
     progress_bars,
     say,
@@ -89,7 +88,7 @@ def simulate(
     with results(out, "simulate", robot.stem, *stem(manoeuvre), force=force) as draft:
         run = simulate_asked(system, asked, drive, "native", rtol=rtol, method=method)
         run.save(draft.folder)
-        folder = draft.keep(interrupted=interrupted(run))
+        folder = draft.keep(interrupted=run.interrupted)
     show(
         json,
         lambda: tables.run_table(run),

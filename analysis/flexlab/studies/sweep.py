@@ -146,7 +146,7 @@ def _row(work: _Work) -> Row:
         )
     except fx.FlexuraError as error:
         return row | {"complete": False, "error": str(error)}
-    if any(event["text"] == "interrupted" for event in run.meta["events"]):
+    if run.interrupted:
         raise KeyboardInterrupt
     later = run.t >= case.from_s - 1e-9
     for i, link in enumerate(robot.links, 1):

@@ -104,6 +104,11 @@ class Run:
         """Whether the run came to its end."""
         return bool(self.meta.get("complete", True))
 
+    @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C ended the run."""
+        return any(event["text"] == "interrupted" for event in self.meta.get("events", []))
+
     def __repr__(self) -> str:
         return summary.text(self._title(), self._rows())
 
