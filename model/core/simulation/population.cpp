@@ -124,11 +124,13 @@ class Worker {
     out.robot = k, out.method = all_.method,
     out.acting = all_.drives[std::size_t(all_.drive_of[std::size_t(k)])];
     const std::size_t n = std::size_t(model.n);
-    const bool own = all_.q.empty();
-    out.q = own ? std::vector<double>(n, 0.0) : all_.q,
-    out.v = all_.v.empty() ? std::vector<double>(n, 0.0) : all_.v;
-    if (out.q.size() != n || out.v.size() != n)
+    const bool own = all_.q.empty(), each = all_.q.size() == std::size_t(all_.robots.count) * n;
+    if ((!own && !each && all_.q.size() != n) || (!all_.v.empty() && all_.v.size() != n))
       throw std::invalid_argument("the start needs an entry an unknown");
+    const auto first = all_.q.begin() + (each ? std::ptrdiff_t(std::size_t(k) * n) : 0);
+    out.q =
+        own ? std::vector<double>(n, 0.0) : std::vector<double>(first, first + std::ptrdiff_t(n)),
+    out.v = all_.v.empty() ? std::vector<double>(n, 0.0) : all_.v;
     for (int i = 0; i < model.links(); ++i) {
       const std::size_t link = std::size_t(i), row = std::size_t(model.first[link]);
       const double *limits = all_.limits + 2 * (std::size_t(k) * model.first.size() + link);

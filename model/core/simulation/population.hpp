@@ -27,8 +27,9 @@ struct Population {
   std::vector<Inputs> drives;      // limits apart; neither functions nor samplers
   std::vector<int> drive_of;       // (robots): index of the drive
   std::vector<double> times;       // of the outputs; the first is the start
-  std::vector<double> q,
-      v;  // (n) at the start, the same for all; empty: each robot's own start, at rest
+  std::vector<double> q;  // (n) at the start, the same for all, or (robots, n); empty: each
+                          // robot's own start, links straight
+  std::vector<double> v;  // (n), the same for all; empty: at rest
   double rtol = 1e-6;
   std::string method = "auto";
   bool numerical_damping = true;

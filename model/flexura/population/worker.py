@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -72,13 +71,10 @@ def simulated(request: Request, share: Share, threads: int, watch: Any) -> Part:
         _one_by_one(request, share, watch, part)
         return part
     for members, rows in share.groups:
-        bent = _bent(request, rows)
-        if len(straight := np.flatnonzero(~bent)):
-            own = rows if len(straight) == len(rows) else rows.of(straight.tolist())
-            _together(request, share, members[straight], own, columns, threads, watch, part)
-        _each_from_equilibrium(
-            request, share, members, rows, np.flatnonzero(bent), columns, threads, watch, part
-        )
+        for some, q0 in _starts(request, share, members, rows, threads, part):
+            if len(some) and not watch.stopped:
+                own = rows if len(some) == len(rows) else rows.of(some.tolist())
+                _together(request, share, members[some], own, q0, columns, threads, watch, part)
     return part
 
 
@@ -91,32 +87,31 @@ def _bent(request: Request, rows: Rows) -> np.ndarray:
     return np.asarray(rows.gravity.any(axis=1))
 
 
-def _each_from_equilibrium(
-    request: Request,
-    share: Share,
-    members: np.ndarray,
-    rows: Rows,
-    which: np.ndarray,
-    columns: list[tuple[str, int]],
-    threads: int,
-    watch: Any,
-    part: Part,
-) -> None:
-    """Robots of the same counts from their static equilibria: one after the other through the core,
-    in so many threads."""
+def _starts(
+    request: Request, share: Share, members: np.ndarray, rows: Rows, threads: int, part: Part
+) -> list[tuple[np.ndarray, np.ndarray | None]]:
+    """Robots of the same counts (B,) by their starts: which of them, and q0, (n,) for all of these,
+    (count, n) for each, or None for straight links. `part` refuses one without equilibrium."""
+    bent = _bent(request, rows)
+    which = np.flatnonzero(bent)
 
-    def run(j: int) -> None:
-        k, own = members[j], rows.of([j])
+    def start(j: int) -> np.ndarray | str | None:
+        drive = share.drives[members[j]] or request.drive
         try:
-            q0 = _equilibrium(own, share.drives[k] or request.drive, float(request.t[0]))
+            return _equilibrium(rows.of([j]), drive, float(request.t[0]))
         except NoEquilibrium as error:
-            part.status[k], part.events[k] = "refused", f"{error}; {NO_START}"
-            return
-        _together(replace(request, q0=q0), share, members[[j]], own, columns, 1, watch, part)
+            return f"{error}; {NO_START}"
 
     with ThreadPoolExecutor(threads) as pool:
-        for _ in pool.map(run, map(int, which)):
-            pass
+        found = dict(zip(which, pool.map(start, map(int, which)), strict=True))
+    for j, why in found.items():
+        if isinstance(why, str):
+            part.status[members[j]], part.events[members[j]] = "refused", why
+    there = {j: q for j, q in found.items() if isinstance(q, np.ndarray)}
+    # whom the core refuses has no equilibrium either, and is told why with those that are straight
+    plain = np.flatnonzero(~bent).tolist() + [j for j, q in found.items() if q is None]
+    each = (np.array(list(there), dtype=int), np.array(list(there.values())))
+    return [(np.array(sorted(plain), dtype=int), request.q0), each]
 
 
 def _equilibrium(rows: Rows, drive: Drive | None, t: float) -> np.ndarray | None:
@@ -168,12 +163,16 @@ def _together(
     share: Share,
     members: np.ndarray,
     rows: Rows,
+    q0: np.ndarray | None,
     columns: list[tuple[str, int]],
     threads: int,
     watch: Any,
     part: Part,
 ) -> None:
-    """Robots of the same counts through the core, into their places of `part`."""
+    """Robots of the same counts through the core, into their places of `part`.
+
+    q0: as `_starts` gives it.
+    """
     common = request.drive or Drive.none(rows.numbers.shape[1])
     begin, end = float(request.t[0]), float(request.t[-1])
     given = [share.drives[k] or common for k in members]
@@ -183,7 +182,7 @@ def _together(
         id(drive): j for j, drive in enumerate({id(drive): drive for drive in drives}.values())
     }
     packed = [_packed(drive) for drive in {id(drive): drive for drive in drives}.values()]
-    start = [np.zeros(0) if q is None else q for q in (request.q0, request.qd0)]
+    start = [np.zeros(0) if q is None else q.ravel() for q in (q0, request.qd0)]
     values, words, reached, steps, joints, positions, texts = core.population(
         rows.counts,
         rows.numbers,
