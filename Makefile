@@ -54,8 +54,8 @@ lint: $(READY)
 	@git ls-files '*.cpp' '*.hpp' '*.h' '*.c' 2>/dev/null | xargs -r $(VENV)/bin/clang-format --dry-run -Werror
 
 # The files that are quick and look at much; tests/test_setup.py holds that they are there.
-QUICK := tests/test_setup.py tests/model/test_formats.py tests/model/test_shipped.py tests/model/test_optional.py \
-  tests/model/test_run.py tests/model/test_statespace.py tests/model/test_shaping.py tests/model/system tests/model/link
+QUICK := tests/test_setup.py tests/model/io/test_formats.py tests/model/io/test_shipped.py tests/model/test_optional.py \
+  tests/model/io/test_run.py tests/model/signals/test_shaping.py tests/model/system tests/model/link
 
 quick: lint types $(CORE)
 	@$(VENV)/bin/pytest -q -n $(JOBS) -m "not slow and not long" $(QUICK)
