@@ -77,10 +77,10 @@ def simulate(
         continue_from: a Run of `simulate`, at whose end this one starts, with its state and its
             work and losses; t_eval begins there, so that signals go on. Controllers begin anew.
         until: a function of (t, position, velocity, tip_deflection) that gives a bool, or a number
-            of which a change of sign counts. It is looked at at the times t_eval; the instant
-            between two of them is then found, by integrating again from the first of the two, and
-            the run ends there, complete, with the event "until". Under a Sampled or a Controller
-            the run ends at the time of t_eval itself.
+            of which a change of sign counts. It is evaluated at the times t_eval. The instant
+            between two of them is found by integrating again from the first of the two. The run
+            ends there, complete, with the event "until". Under a Sampled or a Controller it ends at
+            the time of t_eval: both may have a memory, so that no tick is computed twice.
         numerical_damping: exponential steps damp fast modes that change no output by more than the
             tolerance (94); False: they do not.
         progress: called with the finished fraction.

@@ -238,7 +238,7 @@ def bending(sys: fx.System, link: int, sizes: Any) -> np.ndarray:
     pi s / L), k = 1, 2, ..., the angles of a clamped link's modes nearly, as closely as its own
     shapes come to them."""
     x = np.linspace(0, 1, 8 * (sys.robot.links[link].elements or 1) + 1)
-    shapes = sys.angles(link + 1, x * sys.robot.links[link].length_m)[:, sys.own_rows(link)]
+    shapes = sys.angles(link + 1, x * sys.robot.links[link].length_m)[:, sys.link_rows(link)]
     angle = sum(size * np.sin((k + 0.5) * np.pi * x) for k, size in enumerate(sizes))
     scale = np.abs(shapes).max(axis=0)
     return np.linalg.lstsq(shapes / scale, angle, rcond=None)[0] / scale
@@ -248,7 +248,7 @@ def turning(sys: fx.System) -> np.ndarray:
     """How far a unit of each unknown turns a tangent [rad], (n,); 1 for joints."""
     out = np.ones(sys.n)
     for i, link in enumerate(sys.robot.links):
-        own = sys.own_rows(i)
+        own = sys.link_rows(i)
         if len(own):
             out[own] = np.abs(
                 sys.angles(i + 1, np.linspace(0, link.length_m, 64 * link.elements + 1))[:, own]
@@ -262,7 +262,7 @@ def _motion(
     y = np.zeros(sys.n)
     for i, row in enumerate(sys.joint_rows):
         y[row] = joints[i] * random.uniform(-1, 1)
-        if len(own := sys.own_rows(i)):
+        if len(own := sys.link_rows(i)):
             kept = min(3, len(own))
             y[own] = bending(sys, i, slope / kept * random.uniform(-1, 1, kept))
     return y

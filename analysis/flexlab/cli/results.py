@@ -65,14 +65,27 @@ def results(out: Path | None, *names: str, force: bool = False) -> Iterator[Draf
         InputError: `out` has something in it and `force` is false, or it cannot be written.
     """
     target = LOGS / "-".join(map(file_name, names)) if out is None else out
+    refuse_taken(out, force)
+    with _folder(target, out is None) as folder:
+        yield Draft(folder, target, out is None)
+
+
+def refuse_taken(out: Path | None, force: bool) -> None:
+    """Refuse a folder that has something in it.
+
+    Args:
+        out: the folder; None: a default that is not there yet.
+        force: files of the same names may be replaced.
+
+    Raises:
+        InputError: `out` has something in it and `force` is false.
+    """
     if out is not None and not force and taken(out):
         raise InputError(
             f"results are there: expected a new or empty folder, {REPLACE}",
             key="--out",
             value=str(out),
         )
-    with _folder(target, out is None) as folder:
-        yield Draft(folder, target, out is None)
 
 
 def continued(out: Path | None, *names: str, mark: str) -> Path:

@@ -9,9 +9,9 @@ recognised. `run_from_recording` makes the Run from these three files only.
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import json
 import os
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,13 @@ from flexura.io import write_text
 
 from ..board.base import Board
 
+if sys.platform == "win32":  # not tried
+    import msvcrt
+else:
+    import fcntl
+
 SESSION, RECEIVED, EVENTS = "session.json", "received.bin", "events.jsonl"
+RUN = "run.parquet"
 
 
 class RecordingError(FlexuraError):
@@ -34,20 +40,23 @@ class Recording:
     `failed` is set once a file cannot be written.
     """
 
-    def __init__(self, folder: Path, session: dict[str, Any]) -> None:
+    def __init__(self, folder: Path, session: dict[str, Any], *, replace: bool = False) -> None:
         """Open a new recording.
 
         Args:
             folder: made if missing.
             session: content of session.json.
+            replace: whether a recording in the folder, with its Run, is removed.
 
         Raises:
-            InputError: the folder holds a recording already.
+            InputError: the folder holds a recording already, and `replace` is false.
         """
-        if (folder / SESSION).exists() or (folder / "run.parquet").exists():
+        if ((folder / SESSION).exists() or (folder / RUN).exists()) and not replace:
             raise InputError(
                 "holds a recording already: expected a new folder", key="--out", value=str(folder)
             )
+        for name in (SESSION, RECEIVED, EVENTS, RUN):
+            (folder / name).unlink(missing_ok=True)
         self.folder = folder
         self.failed: RecordingError | None = None
         self._session = session
@@ -56,7 +65,7 @@ class Recording:
         flags = os.O_CREAT | os.O_WRONLY | os.O_APPEND
         self._received_file = os.open(folder / RECEIVED, flags, 0o644)
         self._events_file = os.open(folder / EVENTS, flags, 0o644)
-        fcntl.flock(self._received_file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        _lock(self._received_file)
 
     def write_session(self, **more: Any) -> None:
         """Add entries to session.json, which is replaced as a whole."""
@@ -192,12 +201,22 @@ def unfinished(logs: Path) -> list[Path]:
     found = []
     for session in sorted(logs.glob(f"*/{SESSION}")):
         folder = session.parent
-        if (folder / "run.parquet").exists() or not (folder / RECEIVED).exists():
+        if (folder / RUN).exists() or not (folder / RECEIVED).exists():
             continue
         with open(folder / RECEIVED, "rb") as stream:
-            try:
-                fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
+            if not _lock(stream.fileno()):
                 continue
         found.append(folder)
     return found
+
+
+def _lock(file: int) -> bool:
+    """Lock an open file for this program; false if another program has it."""
+    try:
+        if sys.platform == "win32":
+            msvcrt.locking(file, msvcrt.LK_NBLCK, 1)
+        else:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True

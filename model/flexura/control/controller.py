@@ -36,7 +36,7 @@ from ..errors import InputError
 from ..io import Run, number
 from ..signals import Drive, JointDrive
 from ..system import System
-from .pid import GAINS, PID, Motor, Stepper, not_negative
+from .pid import GAINS, PID, Motor, Stepper, check_not_negative
 
 # what a joint's output is: not the controller's, a force or voltage, a rate
 NONE, EFFORT, STEPPER = 0, 1, 2
@@ -109,7 +109,7 @@ class Controller:
         if not number(self.rate_Hz, "rate_Hz", "expected a rate above 0 in hertz") > 0:
             raise InputError("expected a rate above 0 in hertz", key="rate_Hz", value=self.rate_Hz)
         for name in ("deflection_Hz", "deflection_quantum_m"):
-            not_negative(self, name)
+            check_not_negative(self, name)
         if not (self.linear is None or isinstance(self.linear, Linear)):
             raise InputError("expected a Linear or None", key="linear", value=self.linear)
         for i, joint in enumerate(self.joints, 1):
@@ -203,14 +203,14 @@ class Controller:
         """The numbers of the law that a search may change, (N, 20): columns KP to DELAY."""
         g = np.zeros((len(self.joints), 20))
         for row, joint in zip(g, self.joints, strict=True):
-            row[DEFLECTION] = smoothing(self.deflection_Hz, 2 / self.rate_Hz)
+            row[DEFLECTION] = filter_coefficient(self.deflection_Hz, 2 / self.rate_Hz)
             if not isinstance(joint, PID):
                 continue
             row[:LIMIT] = [getattr(joint, name) for name in GAINS]
             row[LIMIT], row[SLEW] = joint.limit, joint.slew
             row[FORCE] = joint.output.force_per_V if isinstance(joint.output, Motor) else 1.0
-            row[SETPOINT] = smoothing(joint.setpoint_Hz, 1 / self.rate_Hz)
-            row[DERIVATIVE] = smoothing(joint.derivative_Hz, 1 / self.rate_Hz)
+            row[SETPOINT] = filter_coefficient(joint.setpoint_Hz, 1 / self.rate_Hz)
+            row[DERIVATIVE] = filter_coefficient(joint.derivative_Hz, 1 / self.rate_Hz)
             row[COUNT], row[DUTY], row[DELAY] = (
                 joint.count,
                 joint.duty,
@@ -257,6 +257,6 @@ class Controller:
         }
 
 
-def smoothing(frequency_Hz: float, period_s: float) -> float:
+def filter_coefficient(frequency_Hz: float, period_s: float) -> float:
     """a of y += a (x - y): 1 - exp(-2 pi f T) (67); 1, no filter, for f = 0."""
     return 1.0 if frequency_Hz == 0 else -math.expm1(-2 * math.pi * frequency_Hz * period_s)

@@ -90,7 +90,7 @@ def lqr(
     if len(controller.joints) != len(system.robot.links):
         expected = f"expected a Controller of {len(system.robot.links)} joints"
         raise InputError(expected, key="controller", value=len(controller.joints))
-    deflection, damping = _many(deflection, 1, "deflection")[0], number(damping, "damping")
+    deflection, damping = _weight_matrix(deflection, 1, "deflection")[0], number(damping, "damping")
     linear, T = linearize(system, q), 1 / controller.rate_Hz
     joints, driven = controller.joints, []
     damp, scale = np.zeros(len(linear.M)), []
@@ -116,14 +116,14 @@ def lqr(
     places = [linear.outputs.index(f"joint/{i + 1}/position") for i in driven]
     C, W = linear.C[places + bent[-1:]], linear.C[places + bent]
     weights = np.concatenate(
-        [1 / _many(position, len(driven), "position"), np.full(len(bent), 1 / deflection)]
+        [1 / _weight_matrix(position, len(driven), "position"), np.full(len(bent), 1 / deflection)]
     )
     Q = (weights[:, None] * W).T @ (weights[:, None] * W)
     rates = np.roll(W[len(driven) :], n // 2, axis=1) * damping / deflection
     Q += rates.T @ rates
-    R = np.diag(1 / _many(effort, m, "effort") ** 2)
-    process = G @ np.diag(_many(disturbance, m, "disturbance") ** 2) @ G.T
-    V = np.diag(_many(noise, len(C), "noise") ** 2)
+    R = np.diag(1 / _weight_matrix(effort, m, "effort") ** 2)
+    process = G @ np.diag(_weight_matrix(disturbance, m, "disturbance") ** 2) @ G.T
+    V = np.diag(_weight_matrix(noise, len(C), "noise") ** 2)
     P, S = _riccati(F, G, Q, R, "effort"), _riccati(F.T, C.T, process, V, "noise")
     K = np.linalg.solve(R + G.T @ P @ G, G.T @ P @ F)
     L = np.linalg.solve(C @ S @ C.T + V, C @ S).T
@@ -189,7 +189,7 @@ def _linear(
     return Linear(d.F, G, L, measured, K, Kr, Kv, offset, held)
 
 
-def _many(value: Any, count: int, key: str) -> np.ndarray:
+def _weight_matrix(value: Any, count: int, key: str) -> np.ndarray:
     expected = f"expected a number above 0, or {count} of them"
     found = array(value, key, expected)
     if found.shape not in ((), (count,)) or not np.all(found > 0):

@@ -103,7 +103,7 @@ class PID:
         for name in GAINS:
             object.__setattr__(self, name, number(getattr(self, name), name))
         for name in ("setpoint_Hz", "derivative_Hz", "delay_s", "count", "duty"):
-            not_negative(self, name)
+            check_not_negative(self, name)
         for name in ("limit", "slew"):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int | float) or not value > 0:
@@ -146,7 +146,7 @@ class PID:
         return out | ({"feedforward": self.feedforward.spec} if self.feedforward else {})
 
 
-def not_negative(given: Any, name: str) -> None:
+def check_not_negative(given: Any, name: str) -> None:
     """Raises InputError where a field is no finite number of 0 or more."""
     expected, value = "expected a finite number of 0 or more", getattr(given, name)
     if not number(value, name, expected) >= 0:

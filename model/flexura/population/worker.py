@@ -16,8 +16,8 @@ from ..robot import Robot
 from ..signals import Drive
 from ..simulation.dynamics import simulate
 from ..simulation.problem import MOST_STEPS
-from ..simulation.recorder import LIMITS, LOSS, NUMERICAL, WORK, limit_event, observed
-from ..simulation.start import NO_START, outside, put_on_motions
+from ..simulation.recorder import LIMITS, LOSS, NUMERICAL, WORK, limit_event, recorded_channels
+from ..simulation.start import NO_START, apply_prescribed_motions, limit_error
 from ..system import NoEquilibrium, System, equilibrium
 from .batch import Share
 from .request import Request, check_drive
@@ -126,7 +126,7 @@ def _equilibrium(rows: Rows, drive: Drive | None, t: float) -> np.ndarray | None
     q = np.zeros(robot.n)
     q[robot.first] = rows.numbers[0, :, START]
     if drive is not None:
-        put_on_motions(robot.first, drive, t, q, np.zeros(robot.n))
+        apply_prescribed_motions(robot.first, drive, t, q, np.zeros(robot.n))
     return equilibrium(robot, q)
 
 
@@ -136,7 +136,7 @@ def _columns(robot: Robot, names: Sequence[str]) -> list[tuple[str, int]] | None
     for i in range(len(robot.links)):
         known |= {f"joint/{i + 1}/{what}": (what, i) for what in ("position", "velocity", "drive")}
     accounts = {"energy/work": WORK, "energy/loss": LOSS, "energy/numerical_loss": NUMERICAL}
-    seen = [name for name in observed(robot)]
+    seen = [name for name in recorded_channels(robot)]
     known |= {name: ("account", k) for name, k in accounts.items()} | {
         name: ("seen", k) for k, name in enumerate(seen)
     }
@@ -231,7 +231,7 @@ def _event(
     if word == "refused" and text is None:
         limits = robot.links[joint].joint.limits
         assert limits is not None
-        return str(outside(joint, limits, float(position[joint])))
+        return str(limit_error(joint, limits, float(position[joint])))
     link, key, said = text or (-1, "", "")
     if word != "refused":
         return said

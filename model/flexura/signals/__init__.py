@@ -5,7 +5,7 @@ from . import shaping, signal
 from .conversion import FunctionSignal, as_signal, as_signals, spline
 from .drive import Drive, JointDrive, check_smooth
 from .manoeuvre import STARTS, Manoeuvre, load_manoeuvre
-from .parsing import finite, from_spec
+from .parsing import from_spec, is_finite
 from .shaping import matched_cycloid, zv, zvd
 from .signal import (
     COLUMNS,
@@ -38,9 +38,9 @@ __all__ = [
     "constant",
     "cycloid",
     "evaluate",
-    "finite",
     "from_spec",
     "harmonic",
+    "is_finite",
     "load_manoeuvre",
     "matched_cycloid",
     "piecewise",

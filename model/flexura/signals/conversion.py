@@ -55,7 +55,10 @@ def as_signal(value: Any, key: str, t: np.ndarray | None = None) -> Signal | Non
         return constant(number(value, key, EXPECTED))
     if callable(value):
         return FunctionSignal(
-            np.zeros((0, COLUMNS)), _named(value), function_of(value, key, (1,), EXPECTED), key
+            np.zeros((0, COLUMNS)),
+            _function_spec(value),
+            function_of(value, key, (1,), EXPECTED),
+            key,
         )
     if isinstance(value, str | bytes | dict | set):
         raise InputError(EXPECTED, key=key, value=value)
@@ -89,18 +92,18 @@ def as_signals(
         entries = list(value.T) if t is not None and len(value) == len(t) else list(value)
     else:
         entries = list(value)
-    if joints == 1 and t is not None and len(entries) == len(t) > 1 and not _each(entries):
+    if joints == 1 and t is not None and len(entries) == len(t) > 1 and not _has_entries(entries):
         entries = [entries]
     if len(entries) != joints:
         raise InputError(expected, key=key, value=len(entries))
     return [as_signal(entry, f"{key}[{i}]", t) for i, entry in enumerate(entries, 1)]
 
 
-def _named(function: Callable[..., Any]) -> dict[str, Any]:
+def _function_spec(function: Callable[..., Any]) -> dict[str, Any]:
     return {"kind": "function", "name": getattr(function, "__name__", type(function).__name__)}
 
 
-def _each(value: Any) -> bool:
+def _has_entries(value: Any) -> bool:
     return any(isinstance(x, Signal) or callable(x) or np.iterable(x) for x in value)
 
 

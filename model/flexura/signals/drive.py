@@ -48,7 +48,7 @@ class JointDrive:
         object.__setattr__(self, "prescribed", flag(self.prescribed, "prescribed"))
 
     @property
-    def unfollowed(self) -> bool:
+    def has_unfollowed_motion(self) -> bool:
         """Whether it has a motion, but neither gains nor `prescribed`: nothing would follow it."""
         return self.motion is not None and not (self.prescribed or self.kp or self.kd)
 
@@ -157,11 +157,11 @@ class Drive:
         return np.array([joint.prescribed and joint.motion is not None for joint in self.joints])
 
     @property
-    def calls(self) -> bool:
+    def has_functions(self) -> bool:
         """Whether a force is a Python function."""
         return any(isinstance(j.force, FunctionSignal) for j in self.joints)
 
-    def called(self, t: float) -> np.ndarray:
+    def function_forces(self, t: float) -> np.ndarray:
         """The forces (n,) at t [s] of those joints whose force is a Python function."""
         return np.array(
             [j.force.value(t) if isinstance(j.force, FunctionSignal) else 0.0 for j in self.joints]
@@ -180,7 +180,7 @@ class Drive:
         joints = []
         for i, joint in enumerate(self.joints, 1):
             motion, key = joint.motion, f"motion of joint {i}"
-            if joint.unfollowed:
+            if joint.has_unfollowed_motion:
                 raise InputError(
                     f"joint {i} has a motion, but neither gains nor prescribed: give kp and kd, "
                     f"prescribe it (Drive.prescribed, manoeuvre.prescribed()), or take a "

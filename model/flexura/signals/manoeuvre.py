@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import InputError
 from ..io import check_format, choice, find, is_name, read_toml, whole
 from .drive import Drive, JointDrive, check_smooth
-from .parsing import finite, from_spec
+from .parsing import from_spec, is_finite
 from .signal import Signal
 
 
@@ -90,7 +90,7 @@ def load_manoeuvre(path: str | os.PathLike[str], joints: int) -> Manoeuvre:
 
 def _manoeuvre(data: dict[str, Any], joints: int) -> Manoeuvre:
     check_format(data)
-    _known(data, _KEYS, "")
+    _check_keys(data, _KEYS, "")
     duration = _number(data, "duration_s", "a duration above 0 in seconds", low=0.0)
     step = _number(
         data,
@@ -120,7 +120,7 @@ def _manoeuvre(data: dict[str, Any], joints: int) -> Manoeuvre:
         key = f"joint[{i}]"
         if not isinstance(entry, dict):
             raise InputError("expected a table", key=key, value=entry)
-        _known(entry, _JOINT_KEYS, key + ".")
+        _check_keys(entry, _JOINT_KEYS, key + ".")
         force = from_spec(entry["force"], key=f"{key}.force") if "force" in entry else None
         motion = from_spec(entry["motion"], key=f"{key}.motion") if "motion" in entry else None
         gains = [
@@ -175,7 +175,7 @@ def _prescribed(entry: dict[str, Any], motion: Signal | None, key: str, duration
     return True
 
 
-def _known(data: dict[str, Any], keys: Sequence[str], prefix: str) -> None:
+def _check_keys(data: dict[str, Any], keys: Sequence[str], prefix: str) -> None:
     for key, value in data.items():
         if key not in keys:
             raise InputError(
@@ -196,6 +196,6 @@ def _number(
     value = data.get(name, default)
     if value is None:
         raise InputError(f"missing: expected {expected}", key=key + name)
-    if not finite(value) or not (value >= low if closed else value > low):
+    if not is_finite(value) or not (value >= low if closed else value > low):
         raise InputError(f"expected {expected}", key=key + name, value=value)
     return float(value)

@@ -60,7 +60,7 @@ def from_spec(spec: Any, *, key: str = "signal") -> Signal:
         ) from None
 
 
-def finite(value: Any) -> bool:
+def is_finite(value: Any) -> bool:
     """Is it a finite number, as read from a file?"""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
@@ -71,11 +71,11 @@ def finite(value: Any) -> bool:
 
 
 def _numbers(value: Any) -> bool:
-    return isinstance(value, list) and all(map(finite, value))
+    return isinstance(value, list) and all(map(is_finite, value))
 
 
 _FORMS = {  # what a key takes, by the annotation of the parameter of its name
-    "float": ("a finite number", finite),
+    "float": ("a finite number", is_finite),
     "int": ("a whole number", lambda value: isinstance(value, int) and not isinstance(value, bool)),
     "Any": ("a list of finite numbers", _numbers),
     "Signal": ("a table of a signal, with its kind", lambda value: isinstance(value, dict)),

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..io import finite_arguments
-from .signal import COLUMNS, Signal, cycloid, signal_of
+from .signal import COLUMNS, Signal, cycloid, from_segments
 
 MAX_SEGMENTS = 100_000  # shaping a shaped signal doubles its segments
 
@@ -86,7 +86,7 @@ def _shape(
     rows = _sum(
         signal.segments, copies / copies.sum(), np.arange(len(copies)) / (2 * frequency_Hz * root)
     )
-    return signal_of(
+    return from_segments(
         rows, kind=kind, signal=signal.spec, frequency_Hz=frequency_Hz, damping_ratio=damping_ratio
     )
 

@@ -75,7 +75,7 @@ def _row(t0: float, *c: float, A: float = 0.0, w: float = 0.0, phi: float = 0.0)
     return [t0, *c, *([0.0] * (6 - len(c))), A, w, phi]
 
 
-def signal_of(rows: list[list[float]], **spec: Any) -> Signal:
+def from_segments(rows: list[list[float]], **spec: Any) -> Signal:
     segments = np.array(rows, dtype=float).reshape(-1, COLUMNS)
     if not np.isfinite(segments).all():
         raise InputError(
@@ -88,13 +88,15 @@ def signal_of(rows: list[list[float]], **spec: Any) -> Signal:
 @finite_arguments
 def constant(value: float) -> Signal:
     """y = value."""
-    return signal_of([_row(0.0, value)], kind="constant", value=value)
+    return from_segments([_row(0.0, value)], kind="constant", value=value)
 
 
 @finite_arguments
 def step(value: float, at_s: float = 0.0) -> Signal:
     """0, then `value` from `at_s` on."""
-    return signal_of([_row(-1e300, 0.0), _row(at_s, value)], kind="step", value=value, at_s=at_s)
+    return from_segments(
+        [_row(-1e300, 0.0), _row(at_s, value)], kind="step", value=value, at_s=at_s
+    )
 
 
 @finite_arguments
@@ -103,7 +105,7 @@ def harmonic(
 ) -> Signal:
     """y = offset + amplitude cos(2 pi f t + phase), the form of the dissertation's inverse law."""
     row = _row(0.0, offset, A=amplitude, w=2 * np.pi * frequency_Hz, phi=phase_rad + np.pi / 2)
-    return signal_of(
+    return from_segments(
         [row],
         kind="harmonic",
         amplitude=amplitude,
@@ -122,7 +124,7 @@ def ramp(end: float, duration_s: float, start: float = 0.0, at_s: float = 0.0) -
     """
     _positive("duration_s", duration_s)
     rows = [_row(at_s, start, (end - start) / duration_s), _row(at_s + duration_s, end)]
-    return signal_of(rows, kind="ramp", end=end, duration_s=duration_s, start=start, at_s=at_s)
+    return from_segments(rows, kind="ramp", end=end, duration_s=duration_s, start=start, at_s=at_s)
 
 
 @finite_arguments
@@ -131,7 +133,9 @@ def cycloid(end: float, duration_s: float, start: float = 0.0, at_s: float = 0.0
     _positive("duration_s", duration_s)
     A, T = end - start, duration_s
     rows = [_row(at_s, start, A / T, A=-A / (2 * np.pi), w=2 * np.pi / T), _row(at_s + T, end)]
-    return signal_of(rows, kind="cycloid", end=end, duration_s=duration_s, start=start, at_s=at_s)
+    return from_segments(
+        rows, kind="cycloid", end=end, duration_s=duration_s, start=start, at_s=at_s
+    )
 
 
 @finite_arguments
@@ -140,7 +144,7 @@ def polynomial(end: float, duration_s: float, start: float = 0.0, at_s: float = 
     ends."""
     _positive("duration_s", duration_s)
     rows = [_rise(at_s, start, end - start, duration_s), _row(at_s + duration_s, end)]
-    return signal_of(
+    return from_segments(
         rows, kind="polynomial", end=end, duration_s=duration_s, start=start, at_s=at_s
     )
 
@@ -168,7 +172,7 @@ def trapezoidal(
         _row(brake, end - v * r / 2, v, -a / 2),
         _row(at_s + T, end),
     ]
-    return signal_of(
+    return from_segments(
         rows,
         kind="trapezoidal",
         end=end,
@@ -209,7 +213,7 @@ def bang_bang(
         ]
     if at_s > 0:
         rows.insert(0, _row(0.0))
-    return signal_of(
+    return from_segments(
         rows, kind="bang_bang", amplitude=amplitude, duration_s=duration_s, rise_s=rise_s, at_s=at_s
     )
 
@@ -226,7 +230,7 @@ def table(t_s: Any, y: Any) -> Signal:
     rows = [_row(times[k], *coefficients[::-1, k]) for k in range(len(times) - 1)] + [
         _row(times[-1], values[-1])
     ]
-    return signal_of(rows, kind="table", t_s=times.tolist(), y=values.tolist())
+    return from_segments(rows, kind="table", t_s=times.tolist(), y=values.tolist())
 
 
 def piecewise(at_s: Any, value: Any) -> Signal:
@@ -234,7 +238,7 @@ def piecewise(at_s: Any, value: Any) -> Signal:
     dissertation's bang-bang torques."""
     times, values = _columns("at_s", at_s, "value", value, 1)
     rows = [_row(t, v) for t, v in zip(times, values, strict=True)]
-    return signal_of(rows, kind="piecewise", at_s=times.tolist(), value=values.tolist())
+    return from_segments(rows, kind="piecewise", at_s=times.tolist(), value=values.tolist())
 
 
 KINDS = {

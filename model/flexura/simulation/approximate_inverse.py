@@ -38,7 +38,7 @@ def rigid_robot(robot: Robot) -> Robot:
     return Robot.from_dict(data)
 
 
-def by_rigid_robot(
+def rigid_feedforward(
     system: System,
     t_eval: Any,
     motion: Sequence[Signal],
@@ -66,7 +66,7 @@ def by_rigid_robot(
     return run
 
 
-def by_bisection(
+def shoot_by_bisection(
     system: System,
     t_eval: Any,
     motion: Sequence[Signal],

@@ -3,7 +3,7 @@ figures are kept.
 
 Nothing of Python runs between two rows, and a call leaves Python's lock. What a row gives does not
 depend on the others, nor on the number of threads. Several threads of the caller's may use one
-`Trials` at the same time.
+`GainSweep` at the same time.
 
 A row may have a limit to its cost, sum_k price_k max(0, figure_k - free_k) with prices on
 overshoot, ITAE, effort and vibration: it is abandoned as soon as it is certain to cost more.
@@ -26,7 +26,7 @@ PER_JOINT, OF_STRIP = len(JOINT), len(STRIP)
 
 
 @dataclass(frozen=True)
-class Trials:
+class GainSweep:
     """Runs of one robot from rest under the same references; `joints` N, `method` how they are
     integrated."""
 
@@ -41,7 +41,7 @@ class Trials:
     def run(
         self,
         gains: np.ndarray,
-        prices: np.ndarray | None = None,
+        weights: np.ndarray | None = None,
         limits: np.ndarray | None = None,
         threads: int = 1,
     ) -> tuple[np.ndarray, np.ndarray]:
@@ -59,26 +59,26 @@ class Trials:
         rows = np.ascontiguousarray(gains, dtype=float)
         free = (
             np.zeros((2, PER_JOINT * self.joints + OF_STRIP))
-            if prices is None
-            else np.ascontiguousarray(prices, dtype=float)
+            if weights is None
+            else np.ascontiguousarray(weights, dtype=float)
         )
         most = (
             np.full(len(rows), np.inf)
             if limits is None
             else np.ascontiguousarray(limits, dtype=float)
         )
-        figures, reached = self.runs.run(free, rows, most, threads)
-        return np.asarray(figures), np.asarray(reached)
+        metrics, reached = self.runs.run(free, rows, most, threads)
+        return np.asarray(metrics), np.asarray(reached)
 
 
-def trials(
+def prepare_gain_sweep(
     system: System,
     controller: Controller,
     duration_s: float,
     output_step_s: float,
     rtol: float,
     method: str = "auto",
-) -> Trials:
+) -> GainSweep:
     """What rows of gains are run with, from rest as `simulate` starts: under gravity in static
     equilibrium. Samples lie on ticks.
 
@@ -101,7 +101,7 @@ def trials(
     )
     segments, ranges, gains, follows, _ = controller.core_drives()
     index = np.column_stack([ranges, follows]).astype(np.int64)
-    runs = core.Trials(
+    runs = core.GainSweep(
         system.equations,
         controller.sampler(system),
         segments,
@@ -114,4 +114,4 @@ def trials(
         rtol,
         method,
     )
-    return Trials(len(controller.joints), runs)
+    return GainSweep(len(controller.joints), runs)

@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..io import Run, array, choice, flag, number
 from ..signals import Drive, Signal, as_signals
 from ..system import System, assemble
-from .start import consistent_start, end_of, inside_limits, put_on_motions
+from .start import apply_prescribed_motions, check_limits, consistent_start, state_at_end
 
 METHODS = ("auto", "explicit", "implicit", "exponential")
 SHORT = ("explicit-3", "explicit-5")  # what "auto" takes under a Controller whose ticks are short
@@ -92,10 +92,10 @@ def initial_value_problem(
     if before is None:
         q, qd, start = consistent_start(system, t[0], acting, q0, qd0, start)
     else:
-        q, qd, accounts = end_of(before, system, t, {"q0": q0, "qd0": qd0, "start": start})
+        q, qd, accounts = state_at_end(before, system, t, {"q0": q0, "qd0": qd0, "start": start})
         start = "continued"
-        put_on_motions(system.joint_rows, acting, t[0], q, qd)
-        inside_limits(system, q)
+        apply_prescribed_motions(system.joint_rows, acting, t[0], q, qd)
+        check_limits(system, q)
     if not system.exact and isinstance(acting, Controller):
         expected = (
             'expected a robot with stiffening = true and sliding = "continuous" under a Controller'

@@ -31,7 +31,7 @@ def channel_units(robot: Robot) -> dict[str, str]:
     return units | {"tip/x": "m", "tip/y": "m"} | {f"energy/{name}": "J" for name in energies}
 
 
-def observed(robot: Robot) -> list[str]:
+def recorded_channels(robot: Robot) -> list[str]:
     """The channels that the core reads from a state, in the order of `System.observe`."""
     accounts = ("energy/work", "energy/loss", "energy/numerical_loss")
     return [
@@ -66,10 +66,10 @@ def record(system: System, solution: Solution) -> Run:
     about = describe(system, energy_error(seen[:, -3:], accounts, solution.jumps)) | solution.meta
     if len(t):
         about["numerical_loss_J"] = float(accounts[-1, NUMERICAL])
-    return judged(Run(t, channels, units, about, states))
+    return with_balance_event(Run(t, channels, units, about, states))
 
 
-def judged(run: Run) -> Run:
+def with_balance_event(run: Run) -> Run:
     """The Run with what its energy balance says of it: nothing, a note, a warning, or that it is
     not to be trusted."""
     error, end = run.meta["energy_error"], float(run.t[-1]) if len(run.t) else 0.0

@@ -32,10 +32,10 @@ def consistent_start(
         check_state(system, "q0", q0, system.start()),
         check_state(system, "qd0", qd0, np.zeros(system.n)),
     )
-    which = which_start(system.robot, q0, start)
+    which = resolve_start(system.robot, q0, start)
     qd[system.joint_rows[system.locked]] = 0.0
-    put_on_motions(system.joint_rows, drive, t, q, qd)
-    inside_limits(system, q)
+    apply_prescribed_motions(system.joint_rows, drive, t, q, qd)
+    check_limits(system, q)
     if which == "static":
         try:
             q = static(system, q[system.joint_rows])
@@ -44,7 +44,7 @@ def consistent_start(
     return q, qd, which
 
 
-def which_start(robot: Robot, q0: Any, start: Any) -> str:
+def resolve_start(robot: Robot, q0: Any, start: Any) -> str:
     """The start of a run: "given" by q0, or "static" or "straight", by default as gravity asks.
 
     Raises: InputError: start is none of these, or given beside q0.
@@ -59,7 +59,7 @@ def which_start(robot: Robot, q0: Any, start: Any) -> str:
     return start or ("static" if bends and any(robot.gravity_m_s2) else "straight")
 
 
-def end_of(
+def state_at_end(
     run: Any, system: System, t: np.ndarray, others: dict[str, Any]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """q, qd (n,) and accounts (4,) [J] at the end of a run that is continued at the times t (T,).
@@ -96,7 +96,9 @@ def check_state(system: System, key: str, value: Any, default: np.ndarray) -> np
     return array(value, key, expected, (system.n,))
 
 
-def put_on_motions(joint_rows: Any, drive: Any, t: float, q: np.ndarray, qd: np.ndarray) -> None:
+def apply_prescribed_motions(
+    joint_rows: Any, drive: Any, t: float, q: np.ndarray, qd: np.ndarray
+) -> None:
     """Prescribed joints take position and velocity of their motions at t [s], in place; their
     entries of q and qd (n,) are in `joint_rows` (links,)."""
     if not isinstance(drive, Drive | Controller):
@@ -108,17 +110,17 @@ def put_on_motions(joint_rows: Any, drive: Any, t: float, q: np.ndarray, qd: np.
             q[row], qd[row], _ = joint.motion(t)
 
 
-def inside_limits(system: System, q: np.ndarray) -> None:
+def check_limits(system: System, q: np.ndarray) -> None:
     """Raises InputError for a joint that starts outside its limits."""
     for i, (link, row) in enumerate(zip(system.robot.links, system.joint_rows, strict=True), 1):
         if (
             link.joint.limits is not None
             and not link.joint.limits[0] <= q[row] <= link.joint.limits[1]
         ):
-            raise outside(i - 1, link.joint.limits, float(q[row]))
+            raise limit_error(i - 1, link.joint.limits, float(q[row]))
 
 
-def outside(joint: int, limits: tuple[float, float], position: float) -> InputError:
+def limit_error(joint: int, limits: tuple[float, float], position: float) -> InputError:
     """Why a joint (from 0) cannot start at a position."""
     return InputError(
         f"expected a start inside the limits of joint {joint + 1}, {list(limits)}",

@@ -51,13 +51,13 @@ class Assembly:
         self._rotors = np.array([link.joint.rotor_inertia for link in self.robot.links])
         self._coulomb = np.array([link.joint.coulomb_friction for link in self.robot.links])
         self._g = complex(*self.robot.gravity_m_s2)
-        laws = [
-            (i, law)
-            for i, law in enumerate(self.structure.laws)
-            if law is not None and self.structure.sleeved(i)
+        materials = [
+            (i, material)
+            for i, material in enumerate(self.structure.materials)
+            if material is not None and self.structure.sleeved(i)
         ]
         # flexible links in a sleeve, with their materials
-        self._sleeved: dict[int, Material] = dict(laws)
+        self._sleeved: dict[int, Material] = dict(materials)
 
     def mass(self, q: np.ndarray) -> np.ndarray:
         """M(q) (n, n) (40)."""
@@ -88,7 +88,7 @@ class Assembly:
             free = own[0]
             if state.number in self._sleeved and isinstance(free, masses.Masses):
                 flow += sleeve.flow_forces(state.lines[0], self._sleeved[state.number], free)
-        return masses.summed(parts, gravity), flow
+        return masses.total(parts, gravity), flow
 
     def elastic(self, q: np.ndarray) -> np.ndarray:
         """Elastic forces (n,), on the left-hand side (43): K q, and of a sleeved link also dU/dd.
@@ -215,7 +215,7 @@ class Assembly:
     def _energies(self, states: list[LinkState], q: np.ndarray, qd: np.ndarray) -> Energies:
         parts = [part for state in states for part in self.structure.masses(state)]
         return Energies(
-            float(0.5 * qd @ self._mass(masses.summed(parts)) @ qd),
+            float(0.5 * qd @ self._mass(masses.total(parts)) @ qd),
             float(0.5 * q @ self.stiffness_blocks(q) @ q),
             masses.potential(parts, self._g),
         )
@@ -252,4 +252,4 @@ class Assembly:
         straight, still = np.zeros(self.n), np.zeros(self.n)
         straight[self.rows[i]] = q[self.rows[i]]
         state = self.structure.link(i, base(self.n), straight, still)
-        return masses.summed(self.structure.own_masses(state)).mass
+        return masses.total(self.structure.own_masses(state)).mass

@@ -80,5 +80,5 @@ def rows(robot: Robot) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def intervals(link: Link) -> np.ndarray:
     """The material of a link that bends, (K, 10): from, to [m], mass per length and bending
     stiffness by powers (8)."""
-    law = material(link)
-    return np.column_stack([law.breaks[:-1], law.breaks[1:], law.mass, law.stiffness])
+    own = material(link)
+    return np.column_stack([own.breaks[:-1], own.breaks[1:], own.mass, own.stiffness])

@@ -49,7 +49,7 @@ def frequencies(
         return _steady(
             system, static(system) if q is None else system.check(q), system.check(qd, "qd"), joints
         )[:count]
-    return _found(
+    return _eigenmodes(
         system, static(system) if q is None else system.check(q), joints, count, False
     ).frequencies_Hz
 
@@ -59,10 +59,14 @@ def modes(robot: Any, q: Any = None, joints: str = "locked", *, count: int | Non
     `frequencies`."""
     system = assemble(robot)
     _check(joints, count)
-    return _found(system, static(system) if q is None else system.check(q), joints, count, True)
+    return _eigenmodes(
+        system, static(system) if q is None else system.check(q), joints, count, True
+    )
 
 
-def _found(system: System, at: np.ndarray, joints: str, count: int | None, shapes: bool) -> Modes:
+def _eigenmodes(
+    system: System, at: np.ndarray, joints: str, count: int | None, shapes: bool
+) -> Modes:
     """The modes at q (n,); where frequencies are all that is asked for, shapes may be empty."""
     if not system.exact:
         return _dense(system, at, joints, count)

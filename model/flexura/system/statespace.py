@@ -149,7 +149,7 @@ def linearize(robot: Any, q: Any = None, qd: Any = None, joints: str = "free") -
     moved = [i for i, row in enumerate(system.joint_rows) if row in rows]
     K = system.tangent(at, rates if rates.any() else None)
     K = K if rates.any() else (K + K.T) / 2
-    look, outputs, units = _outputs(system, at)
+    outputs_at, outputs, units = _outputs(system, at)
     kept = [
         k
         for k, name in enumerate(outputs)
@@ -164,7 +164,7 @@ def linearize(robot: Any, q: Any = None, qd: Any = None, joints: str = "free") -
         G=system.rate(at, rates)[pick],
         K=K[pick],
         E=(np.arange(system.n)[rows, None] == system.joint_rows[moved]).astype(float),
-        outlook=look[np.ix_(np.array(kept), rows)],
+        outlook=outputs_at[np.ix_(np.array(kept), rows)],
         states=(*labels, *(f"rate of {label.replace(']', '/s]')}" for label in labels)),
         inputs=tuple(drives),
         outputs=tuple(outputs[k] for k in kept),
@@ -249,10 +249,10 @@ def _outputs(system: System, q: np.ndarray) -> tuple[np.ndarray, list[str], dict
         for i, name in enumerate(names)
     }
 
-    def look(z: np.ndarray) -> np.ndarray:
+    def outputs_at(z: np.ndarray) -> np.ndarray:
         return np.concatenate([z[system.joint_rows], *system.places(z)])
 
-    slopes = jacobian(look, q, np.full(system.n, 1e-5) / np.maximum(_steep(system), 1e-300))
+    slopes = jacobian(outputs_at, q, np.full(system.n, 1e-5) / np.maximum(_steep(system), 1e-300))
     return slopes, [*names, "tip/x", "tip/y"], units | {"tip/x": "m", "tip/y": "m"}
 
 

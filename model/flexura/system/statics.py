@@ -49,7 +49,7 @@ def static(
     system = assemble(robot)
     force = array(tip_force, "tip_force", "expected a finite force (x, y) in newtons", (2,))
     load = np.array([*force, number(tip_moment, "tip_moment")])
-    q = held(system, joints)
+    q = joint_positions(system, joints)
     if not system.exact:
         return _dense(system.fixed(q), q, load)
     return equilibrium(system.equations, q, load)
@@ -93,7 +93,7 @@ def holding(robot: Any, q: Any = None) -> np.ndarray:
     return system.forces(at, rest, rest)[system.joint_rows]
 
 
-def held(system: System, joints: Any) -> np.ndarray:
+def joint_positions(system: System, joints: Any) -> np.ndarray:
     """q (n,) of the straight robot with the joints at `joints` (links,) [m or rad], by default
     their start. Raises InputError."""
     q = system.start()

@@ -15,8 +15,8 @@ from ..link.section import Material, material
 from ..link.shapes import WholeShapes
 from ..robot import Link, Robot
 from . import sleeve
-from .kinematics import Frame, Line, ahead, base, line, station, turned
-from .masses import Part, line_masses, lump, turning
+from .kinematics import Frame, Line, base, line, rotate, station, translate
+from .masses import Part, line_masses, point_mass, turning
 
 
 class LinkState(NamedTuple):
@@ -76,7 +76,7 @@ class Structure:
         return len(self.labels)
 
     @cached_property
-    def laws(self) -> list[Material | None]:
+    def materials(self) -> list[Material | None]:
         """The material of each link; None for rigid ones."""
         return [material(link) if link.flexible else None for link in self.robot.links]
 
@@ -96,7 +96,12 @@ class Structure:
         row = self.rows[i]
         if not self.links[i]:
             return LinkState(
-                i, q, qd, hub, (), ahead(hub, *self._along(i, self.robot.links[i].length_m, q), qd)
+                i,
+                q,
+                qd,
+                hub,
+                (),
+                translate(hub, *self._along(i, self.robot.links[i].length_m, q), qd),
             )
         lines, frame = [], hub
         for piece, own in zip(self.links[i], self.own[i], strict=True):
@@ -118,21 +123,21 @@ class Structure:
         joint, row = self.robot.links[i].joint, self.rows[i]
         tip = before.tip if before else base(self.n)
         if joint.type == "R":
-            return turned(tip, q[row], row)
+            return rotate(tip, q[row], row)
         if joint.type == "Pb":
-            return turned(tip, joint.angle_rad)
+            return rotate(tip, joint.angle_rad)
         if before is None:
-            return turned(ahead(tip, q[row], [row], qd), joint.angle_rad)
+            return rotate(translate(tip, q[row], [row], qd), joint.angle_rad)
         x, rows = self._along(before.number, q[row], q)
         if before.lines:
-            return turned(station(before.lines[0], x / before.lines[0].free, row), joint.angle_rad)
-        return turned(ahead(before.hub, x, [row, *rows], qd), joint.angle_rad)
+            return rotate(station(before.lines[0], x / before.lines[0].free, row), joint.angle_rad)
+        return rotate(translate(before.hub, x, [row, *rows], qd), joint.angle_rad)
 
     def at(self, state: LinkState, s: float) -> Frame:
         """The frame of a link at arc length s [m] from its proximal end (4), (30)."""
         x, rows = self._along(state.number, s, state.q)
         if not state.lines or x < 0:
-            return ahead(state.hub, x, rows, state.qd)
+            return translate(state.hub, x, rows, state.qd)
         h = state.lines[0].free
         k = min(int(x / h), len(state.lines) - 1)
         return station(state.lines[k], x / h - k)
@@ -160,26 +165,26 @@ class Structure:
         """A link's masses: its material, its hub, and the payload of the last one (21), (22)."""
         joint, parts = self.robot.links[state.number].joint, self.own_masses(state)
         if joint.hub_mass_kg:
-            parts.append(lump(joint.hub_mass_kg, state.hub))
+            parts.append(point_mass(joint.hub_mass_kg, state.hub))
         if joint.hub_inertia_kg_m2:
             parts.append(turning(joint.hub_inertia_kg_m2, state.hub))
         return parts
 
     def own_masses(self, state: LinkState) -> list[Part]:
         """A link's masses without its hub."""
-        i, law = state.number, self.laws[state.number]
+        i, material = state.number, self.materials[state.number]
         parts: list[Part] = []
-        if law is None:
+        if material is None:
             mass, centre, inertia = rigid_body(self.robot, i)
-            frame = ahead(state.hub, *self._along(i, centre, state.q), state.qd)
-            parts += [lump(mass, frame), turning(inertia, frame)]
+            frame = translate(state.hub, *self._along(i, centre, state.q), state.qd)
+            parts += [point_mass(mass, frame), turning(inertia, frame)]
         elif self.sleeved(i):
-            parts += sleeve.masses(state.lines[0], law)
+            parts += sleeve.masses(state.lines[0], material)
         else:
             parts += [line_masses(x) for x in state.lines]
         if i == len(self.links) - 1:
             load = self.robot.payload
-            parts += [lump(load.mass_kg, state.tip), turning(load.inertia_kg_m2, state.tip)]
+            parts += [point_mass(load.mass_kg, state.tip), turning(load.inertia_kg_m2, state.tip)]
         return parts
 
 

@@ -124,7 +124,7 @@ class System:
     def _resting(self) -> np.ndarray:
         return np.zeros(0, dtype=int) if self.nodes is None else self.assembly.structure.resting  # type: ignore[attr-defined]
 
-    def own_rows(self, link: int) -> np.ndarray:
+    def link_rows(self, link: int) -> np.ndarray:
         """Rows of the elastic unknowns of a link (from 0)."""
         ends = np.append(self.joint_rows, self.n)
         return np.arange(ends[link] + 1, ends[link + 1])
@@ -322,9 +322,9 @@ class System:
             coefficients = coefficients_of_legendre_sums(np.asarray(sums)[: count + 1])
         else:
             coefficients = np.linalg.lstsq(legendre_shapes(count, pieces[0].xi), B.T, rcond=None)[0]
-        law = self._structure.laws[link]
-        assert law is not None
-        return (whole_piece(law, pieces[0].points, coefficients, K),)
+        material = self._structure.materials[link]
+        assert material is not None
+        return (whole_piece(material, pieces[0].points, coefficients, K),)
 
     def _unit(self, name: str) -> str:
         parts = name.split("/")

@@ -538,7 +538,7 @@ def test_the_about_page_has_the_robot_and_the_deviations(rrd):
 def test_a_failing_write_leaves_nothing(tmp_path, monkeypatch, pair):
     target = tmp_path / "r.rrd"
     target.write_bytes(b"the old one")
-    monkeypatch.setattr("flexlab.review.writer.about", lambda *a, **k: 1 / 0)
+    monkeypatch.setattr("flexlab.review.writer.summary", lambda *a, **k: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         write_review(target, pair)
     assert target.read_bytes() == b"the old one" and list(tmp_path.iterdir()) == [target]
@@ -658,7 +658,7 @@ def shot(viewer, view, time_s):
 
     viewer.set_time("time", duration=time_s, play_state="paused")
     return np.asarray(
-        Image.open(io.BytesIO(headless.settled(viewer, view.view_id))).convert("RGB")
+        Image.open(io.BytesIO(headless.settled_picture(viewer, view.view_id))).convert("RGB")
     ).astype(int)
 
 

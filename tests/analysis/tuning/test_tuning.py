@@ -29,7 +29,7 @@ from flexlab.tuning.search import Search, _winners, search
 from flexlab.tuning.search_space import free_gain
 from flexlab.tuning.task import perturbed_robots
 from flexura.control import gains
-from flexura.control.step_response import (
+from flexura.control.step_metrics import (
     ERROR,
     ITAE,
     OVERSHOOT,
@@ -39,9 +39,9 @@ from flexura.control.step_response import (
     RMS,
     SETTLING,
     VIBRATION,
-    joint_figures,
-    least_vibration,
-    strip_figures,
+    joint_metrics,
+    strip_metrics,
+    vibration_lower_bound,
 )
 from flexura.errors import InputError
 from tunings import FREE, GAINS, ROBOT, SWING, task
@@ -55,7 +55,7 @@ ENVIRONMENT = os.environ | {
 
 
 def joint(t, y, r=None):
-    return joint_figures(t, np.ones_like(t) if r is None else r, y)
+    return joint_metrics(t, np.ones_like(t) if r is None else r, y)
 
 
 # -- figures
@@ -92,7 +92,7 @@ def test_what_never_happens_is_not_a_number():
 def test_the_strips_figures_of_a_decaying_vibration_about_a_bend():
     t, d, w = np.linspace(0, 5, 50_001), 2.0, 2 * np.pi * 5
     y = 1e-3 + 4e-3 * np.exp(-d * t) * np.sin(w * t)
-    out = strip_figures(t, y, 1.0)
+    out = strip_metrics(t, y, 1.0)
     assert out[PEAK] == pytest.approx(np.abs(y - y[0]).max()) and out[RESIDUAL] == pytest.approx(
         np.ptp(y[t >= 1]) / 2
     )
@@ -112,8 +112,8 @@ def test_a_row_is_the_run_of_simulate_and_rows_do_not_know_of_each_other():
     any order, any thread."""
     one = task(rtol=1e-6, modes=0)
     points = np.random.default_rng(3).random((9, 3))
-    found, reached = one.run(one.trials(), points)
-    again, _ = one.run(one.trials(), points[::-1])
+    found, reached = one.run(one.gain_sweeps(), points)
+    again, _ = one.run(one.gain_sweeps(), points[::-1])
     with ThreadExecutor(one, 2) as make_executor:
         shared, _ = make_executor(points, np.full(9, np.inf))
     assert np.array_equal(found, again[::-1], equal_nan=True) and np.array_equal(
@@ -143,7 +143,7 @@ def test_a_row_is_the_run_of_simulate_and_rows_do_not_know_of_each_other():
 
 def test_the_effort_is_the_outputs_mean_square_over_the_limit():
     one = task(modes=0, rtol=1e-6)
-    found, _ = one.run(one.trials(), one.start()[None])
+    found, _ = one.run(one.gain_sweeps(), one.start()[None])
     system = fx.assemble(ROBOT)
     run = fx.simulate(
         system,
@@ -158,7 +158,7 @@ def test_gains_that_break_the_robot_cost_more_than_any_that_do_not():
     data = ROBOT.to_dict()
     data["link"][0]["joint"]["limits_rad"] = [-0.1, 0.5]
     broken = task(robots=(fx.Robot.from_dict(data),))
-    found, reached = broken.run(broken.trials(), np.array([[0.9, 0.3, 0.5]]))
+    found, reached = broken.run(broken.gain_sweeps(), np.array([[0.9, 0.3, 0.5]]))
     assert 0 < reached[0, 0] < 1 and np.isnan(found).all()
     assert broken.score(found, reached)[0, 0] == pytest.approx(FAILURE_COST * (2 - reached[0, 0]))
 
@@ -176,8 +176,8 @@ def test_of_several_robots_the_worst_counts():
     many = task(robots=robots)
     each = [task(robots=(r,)) for r in robots]
     point = many.start()[None]
-    worst = many.score(*many.run(many.trials(), point))[0, 0]
-    assert worst == max(one.score(*one.run(one.trials(), point))[0, 0] for one in each)
+    worst = many.score(*many.run(many.gain_sweeps(), point))[0, 0]
+    assert worst == max(one.score(*one.run(one.gain_sweeps(), point))[0, 0] for one in each)
 
 
 # -- runs that a search has no use for
@@ -195,10 +195,16 @@ def test_the_least_vibration_is_below_that_of_any_rest_and_close():
             least = minimize_scalar(
                 of, bounds=(w.min(), w.max()), method="bounded", options={"xatol": 1e-9}
             ).fun
-            assert 0.999 * least < least_vibration(t, w, count, 0.999 * least) <= least * (1 + 1e-9)
-            assert least_vibration(t, w, count, 2 * least) <= least * (1 + 1e-9)
-        assert least_vibration(t, w, 2, 0.0) == 0.0  # the first sample, at t = 0, has no weight
-    assert least_vibration(t, np.full(601, 3e-3), 601, 0.0) == 0.0
+            assert (
+                0.999 * least
+                < vibration_lower_bound(t, w, count, 0.999 * least)
+                <= least * (1 + 1e-9)
+            )
+            assert vibration_lower_bound(t, w, count, 2 * least) <= least * (1 + 1e-9)
+        assert (
+            vibration_lower_bound(t, w, 2, 0.0) == 0.0
+        )  # the first sample, at t = 0, has no weight
+    assert vibration_lower_bound(t, np.full(601, 3e-3), 601, 0.0) == 0.0
 
 
 def test_a_run_is_abandoned_exactly_where_its_j_exceeds_the_limit():
@@ -206,31 +212,33 @@ def test_a_run_is_abandoned_exactly_where_its_j_exceeds_the_limit():
     and it."""
     one = task()
     points = np.random.default_rng(8).random((40, 3))
-    whole, reached = one.run(one.trials(), points)
+    whole, reached = one.run(one.gain_sweeps(), points)
     J = one.score(whole, reached)[:, 0]
     fine = J < FAILURE_COST
     assert fine.sum() > 30
     for part in (0.3, 0.9, 1 - 1e-6, 1.0, 1 + 1e-6):
-        found, far = one.run(one.trials(), points, np.where(fine, part * J, np.inf))
-        goals = one.score(found, far)[:, 0]
+        found, far = one.run(one.gain_sweeps(), points, np.where(fine, part * J, np.inf))
+        objectives = one.score(found, far)[:, 0]
         if part >= 1:
             assert np.array_equal(found, whole, equal_nan=True)
             continue
-        assert (goals[fine] > part * J[fine]).all() and (goals[fine] <= J[fine] * (1 + 1e-9)).all()
+        assert (objectives[fine] > part * J[fine]).all() and (
+            objectives[fine] <= J[fine] * (1 + 1e-9)
+        ).all()
         assert part > 0.9 or (far[fine] < 1).mean() > 0.5
 
 
 def test_on_several_robots_none_is_tried_after_one_that_was_too_bad():
     many = task(robots=perturbed_robots(ROBOT, (1.0, 2.0), (0.9,)))
     points = np.random.default_rng(9).random((12, 3))
-    J = many.score(*many.run(many.trials(), points))[:, 0]
+    J = many.score(*many.run(many.gain_sweeps(), points))[:, 0]
     limits = np.full(12, np.median(J))
-    found, reached = many.run(many.trials(), points, limits)
-    goals = many.score(found, reached)[:, 0]
+    found, reached = many.run(many.gain_sweeps(), points, limits)
+    objectives = many.score(found, reached)[:, 0]
     kept = limits >= J
     assert (
-        np.array_equal(goals[kept], J[kept])
-        and (goals[~kept] > limits[~kept]).all()
+        np.array_equal(objectives[kept], J[kept])
+        and (objectives[~kept] > limits[~kept]).all()
         and (reached[~kept, -1] == 0).any()
     )
 
@@ -240,7 +248,7 @@ def test_a_search_that_abandons_goes_the_same_way_to_the_bit(algorithm):
     """Points of every generation, survivors and best J, with limits and without; limits too low by
     a tenth are noticed."""
     one, how = task(), Search(algorithm, population=10, generations=25, seed=6)
-    trials = one.trials()
+    trials = one.gain_sweeps()
     with_limits, _ = tuned(
         one, how, make_executor=lambda points, limits: one.run(trials, points, limits)
     )
@@ -292,14 +300,14 @@ def test_rows_of_the_law_are_those_of_a_controller_with_the_same_settings():
         "deflection_Hz": 21.0,
         "torque_slew_1_N_m_s": 9.0,
     }
-    frees = [free_gain(name, value / 2, value * 2) for name, value in settings.items()]
+    free_gains = [free_gain(name, value / 2, value * 2) for name, value in settings.items()]
     system = fx.assemble(ROBOT)
     made, plain = (
         closed_loop_controller(system, SWING, gains.Gains(GAINS.settings | more))
         for more in (settings, {})
     )
     base = plain.gains()
-    row = freedom.rows(frees, np.array([list(settings.values())]), plain, base)
+    row = freedom.rows(free_gains, np.array([list(settings.values())]), plain, base)
     assert np.array_equal(row[0], made.gains())
 
 
@@ -410,7 +418,7 @@ def test_a_tournament_is_won_by_the_best_of_all_three():
 def test_the_search_finds_what_scipys_differential_evolution_finds(algorithm):
     """Two gains, the same objective."""
     one = task(free=FREE[:2])
-    trials = one.trials()
+    trials = one.gain_sweeps()
     J = lambda X: one.score(*one.run(trials, np.ascontiguousarray(np.atleast_2d(X.T))))[:, 0]
     known = differential_evolution(
         J,
@@ -430,11 +438,13 @@ def test_the_search_finds_what_scipys_differential_evolution_finds(algorithm):
 def test_the_front_is_of_gains_that_none_other_beats():
     one = task(pareto=True)
     history, _ = tuned(one, Search("nsga2", population=16, generations=10))
-    goals, front = history.all("goals"), history.pareto_front()
+    objectives, front = history.all("goals"), history.pareto_front()
     for k in front:
-        assert not ((goals <= goals[k]).all(axis=1) & (goals < goals[k]).any(axis=1)).any()
-    others = np.setdiff1d(np.arange(len(goals)), front)
-    assert all((goals[front] <= goals[k]).all(axis=1).any() for k in others)
+        assert not (
+            (objectives <= objectives[k]).all(axis=1) & (objectives < objectives[k]).any(axis=1)
+        ).any()
+    others = np.setdiff1d(np.arange(len(objectives)), front)
+    assert all((objectives[front] <= objectives[k]).all(axis=1).any() for k in others)
     assert len(front) >= 3 and history.best in front
 
 

@@ -21,12 +21,12 @@ from flexlab.tuning.executor import ThreadExecutor
 from flexlab.tuning.history import History
 from flexlab.tuning.lqr_reference import LqrDesigns
 from flexlab.tuning.objective import FAILURE_COST, split_metrics
-from flexlab.tuning.result import figures, simulated
+from flexlab.tuning.result import figures, simulate_tuned
 from flexlab.tuning.search import Search, search
 from flexlab.tuning.search_space import settings
 from flexlab.tuning.task import perturbed_robots
 from flexura.control import gains
-from flexura.control.step_response import ERROR, OVERSHOOT, RESIDUAL, SETTLING
+from flexura.control.step_metrics import ERROR, OVERSHOOT, RESIDUAL, SETTLING
 
 ROOT = Path(__file__).resolve().parents[3]
 CONTROLLERS = ROOT / "model" / "controllers"
@@ -74,7 +74,7 @@ def test_robust_gains_overshoot_by_at_most_10_percent_over_payloads_of_0_to_2_ti
     tuned = gains.Gains(given.settings, outputs)
     asked = cases.type_4().manoeuvre
     for one in perturbed_robots(robot, (0.0, 0.5, 1.5, 2.0), (0.9, 1.0, 1.1)):
-        _, response = simulated(fx.assemble(one), asked, tuned)
+        _, response = simulate_tuned(fx.assemble(one), asked, tuned)
         assert (
             response.joints[:, OVERSHOOT].max() <= 0.10 and response.joints[:, SETTLING].max() < 1.4
         )
@@ -198,7 +198,7 @@ def test_the_emulated_rig_does_what_the_simulation_says(tmp_path):
     tuned = gains.Gains(given.settings, outputs)
     asked = cases.type_4().manoeuvre
     measured = figures(cut, closed_loop_controller(system, asked, tuned))
-    _, expected = simulated(system, asked, tuned)
+    _, expected = simulate_tuned(system, asked, tuned)
     print(
         "emulated",
         measured.joints,

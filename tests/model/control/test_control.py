@@ -242,7 +242,7 @@ def test_rows_of_gains_are_runs_whatever_their_order_and_threads():
     )
     rows = np.repeat(drive.gains()[None], 6, axis=0)
     rows[:, 0, controller.KP] = np.linspace(100, 600, 6)
-    many = gain_sweep.trials(sys, drive, 1.0, 0.005, 1e-5)
+    many = gain_sweep.prepare_gain_sweep(sys, drive, 1.0, 0.005, 1e-5)
     figures, reached = many.run(rows)
     assert (reached == 1.0).all()
     again, _ = many.run(rows[::-1], threads=3)

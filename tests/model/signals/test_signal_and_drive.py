@@ -488,7 +488,7 @@ def test_the_core_evaluates_a_packed_drive_alike(system):
 
     @settings(max_examples=100, deadline=None)
     @given(
-        st.tuples(*[joint_drives.filter(lambda joint: not joint.unfollowed)] * 3),
+        st.tuples(*[joint_drives.filter(lambda joint: not joint.has_unfollowed_motion)] * 3),
         st.floats(-1, 6),
         st.integers(0, 2**32 - 1),
     )

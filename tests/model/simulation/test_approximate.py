@@ -8,7 +8,11 @@ from hypothesis import given
 
 import flexura as fx
 from flexura.signals import constant, cycloid, piecewise, step, trapezoidal
-from flexura.simulation.approximate_inverse import by_bisection, by_rigid_robot, rigid_robot
+from flexura.simulation.approximate_inverse import (
+    rigid_feedforward,
+    rigid_robot,
+    shoot_by_bisection,
+)
 from robots import beam, few, rigid, robots, system
 
 B7 = {0.10: 0.043175, 0.25: 0.33398, 0.40: 0.61167, 0.50: 0.44220, 0.60: -0.09519}  # N m
@@ -49,7 +53,7 @@ def test_the_rigid_robot_needs_a_third_of_the_bench_arms_torque():
     """B7: at most 0.36474 N m; the flexible arm under it does not follow."""
     t = np.linspace(0.0, 1.0, 1001)
     motion = [cycloid(np.pi / 2, 1.0)]
-    run = by_rigid_robot(bench(), t, motion)
+    run = rigid_feedforward(bench(), t, motion)
     assert run["joint/1/drive"].max() == pytest.approx(0.36474, abs=2e-5)
     inertia = 2e-3 + 0.2355 * 0.6**3 / 3 + 0.05 * 0.6**2
     assert run["joint/1/drive"] == pytest.approx([inertia * motion[0](s)[2] for s in t], abs=1e-6)
@@ -69,7 +73,7 @@ def test_a_rigid_robot_follows_its_own_drives_and_a_flexible_one_the_better_the_
     wanted = np.array([[m(s)[0] for m in motion] for s in t])
 
     def errors(robot: fx.Robot) -> np.ndarray:
-        run = by_rigid_robot(fx.assemble(robot), t, motion, rtol=1e-9)
+        run = rigid_feedforward(fx.assemble(robot), t, motion, rtol=1e-9)
         return np.array(
             [np.abs(run[f"joint/{i}/position"] - wanted[:, i - 1]).max() for i in (1, 2)]
         )
@@ -90,7 +94,10 @@ def test_bisection_finds_the_torque_of_the_bench_arm():
     sys, motion, errors = bench(), [cycloid(np.pi / 2, 1.0)], []
     for h in (0.008, 0.004):
         t = np.arange(0.0, 0.64, h)
-        run, exact = by_bisection(sys, t, motion), fx.inverse(sys, t + h / 2, motion, rtol=1e-9)
+        run, exact = (
+            shoot_by_bisection(sys, t, motion),
+            fx.inverse(sys, t + h / 2, motion, rtol=1e-9),
+        )
         off = np.abs(run["joint/1/position"] - [motion[0](s)[0] for s in t]).max()
         errors.append((np.abs(run["joint/1/drive"] - exact["joint/1/drive"])[:-1].max(), off))
         assert (
@@ -111,7 +118,7 @@ def test_bisection_of_two_joints_and_its_replay():
     `simulate`."""
     sys, motion = cart(), [cycloid(0.05, 0.3), cycloid(2.2, 0.3, 1.5)]
     t = np.linspace(0.0, 0.36, 181)
-    run = by_bisection(sys, t, motion, rtol=1e-8)
+    run = shoot_by_bisection(sys, t, motion, rtol=1e-8)
     for i, way in ((1, 0.05), (2, 0.7)):
         assert (
             np.abs(run[f"joint/{i}/position"] - [motion[i - 1](s)[0] for s in t]).max() < 1e-4 * way
@@ -124,7 +131,7 @@ def test_bisection_of_two_joints_and_its_replay():
 
 def test_a_locked_joint_stays_and_needs_no_drive():
     sys = cart(locked=True)
-    run = by_bisection(sys, np.linspace(0.0, 0.1, 51), [cycloid(0.05, 0.3), constant(1.5)])
+    run = shoot_by_bisection(sys, np.linspace(0.0, 0.1, 51), [cycloid(0.05, 0.3), constant(1.5)])
     assert (
         np.ptp(run["joint/2/position"]) == 0
         and np.abs(run["joint/1/position"] - [cycloid(0.05, 0.3)(s)[0] for s in run.t]).max() < 1e-6
@@ -136,12 +143,12 @@ def test_steps_too_long_for_the_modes_are_refused():
     """The first mode of the light-hubbed link has a period of 8 ms."""
     sys = system(beam(0.3, 0.157, 0.3333, 4, hub_inertia_kg_m2=1e-6), payload=0.02)
     with pytest.raises(fx.FlexuraError, match="expected shorter steps"):
-        by_bisection(sys, np.linspace(0.0, 2.0, 101), [cycloid(0.5, 1.0)])
+        shoot_by_bisection(sys, np.linspace(0.0, 2.0, 101), [cycloid(0.5, 1.0)])
 
 
 def test_reaching_a_limit_ends_the_run():
     sys = system(rigid(0.1, 0.6, 0.05, 5e-4, "Pa", limits=[-0.01, 0.03]))
-    run = by_bisection(sys, np.linspace(0.0, 1.0, 51), [cycloid(0.05, 1.0)])
+    run = shoot_by_bisection(sys, np.linspace(0.0, 1.0, 51), [cycloid(0.05, 1.0)])
     assert (
         not run.complete
         and "left its limits" in run.meta["events"][0]["text"]
@@ -151,7 +158,7 @@ def test_reaching_a_limit_ends_the_run():
 
 
 def test_a_motion_that_jumps_is_refused():
-    for way in (by_bisection, by_rigid_robot):
+    for way in (shoot_by_bisection, rigid_feedforward):
         with pytest.raises(fx.InputError, match="jumps"):
             way(bench(), [0.0, 1.0], [step(1.0, 0.5)])
 
@@ -161,7 +168,7 @@ def test_sleeves_and_sliders_are_bisected_too():
     link = beam(0.4, 0.157, 0.3333, 4, "Pb", start=0.25, modes=2)
     sys = system(rigid(0.2, 0.2, 0.1, 1e-3), link, payload=0.02)
     t, motion = np.arange(0.0, 0.3, 0.002), [cycloid(0.4, 0.25), cycloid(0.3, 0.25, 0.25)]
-    run, exact = by_bisection(sys, t, motion), fx.inverse(sys, t + 0.001, motion, rtol=1e-9)
+    run, exact = shoot_by_bisection(sys, t, motion), fx.inverse(sys, t + 0.001, motion, rtol=1e-9)
     for i in (1, 2):
         needed = exact[f"joint/{i}/drive"][:-1]
         assert run[f"joint/{i}/drive"][:-1] == pytest.approx(
@@ -171,4 +178,6 @@ def test_sleeves_and_sliders_are_bisected_too():
 
 def test_a_robot_with_all_joints_locked_is_refused():
     with pytest.raises(fx.InputError, match="free to move"):
-        by_bisection(system(beam(0.6, 0.2355, 0.5, 2, locked=True)), [0.0, 0.1], [constant(0.0)])
+        shoot_by_bisection(
+            system(beam(0.6, 0.2355, 0.5, 2, locked=True)), [0.0, 0.1], [constant(0.0)]
+        )

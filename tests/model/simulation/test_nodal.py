@@ -13,7 +13,7 @@ import pytest
 
 import flexura as fx
 from flexura import signals
-from flexura.system.nodes import nodes_at, put_to_rest
+from flexura.system.nodes import nodes_at, rest_node
 from robots import beam, largest_difference, rigid, robot, system
 
 TAPER = (
@@ -382,7 +382,7 @@ def test_a_node_that_enters_is_put_to_rest_and_no_other_is_moved():
     assert link.nodes == (1,)
     y = np.r_[0.5, 0.0, 0.0, np.random.default_rng(3).normal(size=8)]
     z, s = y.copy(), 0.8 * np.arange(6) / 5
-    put_to_rest(link.assembly.structure, 0, 2, z)
+    rest_node(link.assembly.structure, 0, 2, z)
     before, after = (np.array(link.line(q, 1, s)[1:]) for q in (y, z))
     assert np.all(z[:5] == [0.5, 0, 0, 0, 0]) and after[:, 2] == pytest.approx(0.0, abs=1e-15)
     assert after[:, 3:] == pytest.approx(before[:, 3:], abs=1e-14)

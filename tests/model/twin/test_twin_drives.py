@@ -202,6 +202,40 @@ def test_prescribed_joints_take_the_drives_of_inverse_dynamics():
         assert other[f"joint/{i}/drive"][0] == pytest.approx(flexura.holding(arm)[i - 1], rel=1e-3)
 
 
+@pytest.mark.parametrize("kind", ["ancf", "ge"])
+def test_a_static_start_keeps_the_joint_velocities(kind):
+    """A bent arm on a moving cart: both programs start with the same shape and the same motion."""
+    arm = robot(
+        rigid(0.1, 1.0, 0.05, 1e-3, "Pa"),
+        beam(0.5, 0.5, 4.0, "R", 3, start=0.4, hub_inertia_kg_m2=0.01, rotor_inertia=0.02),
+        beam(0.4, 0.3, 2.0, "R", 3, start=-0.9, hub_inertia_kg_m2=0.01),
+        gravity=(0.0, -9.81),
+        payload=0.2,
+    )
+    t, speeds = np.linspace(0, 0.1, 21), [0.5, -1.0, 2.0]
+    system = flexura.assemble(arm)
+    qd0 = np.zeros(system.n)
+    qd0[system.joint_rows] = speeds
+    native = flexura.simulate(arm, t, qd0=qd0)
+    other = twin.simulate(arm, t, qd0=speeds, beam=kind, step_s=1e-4)
+    assert native.meta["start"] == other.meta["start"] == "static"
+    assert abs(native["link/2/tip_deflection"][0]) > 0.05
+    assert other["energy/kinetic"][0] == pytest.approx(native["energy/kinetic"][0], rel=1e-3)
+    for channel in ("tip/x", "tip/y"):
+        path = np.abs(native[channel] - native[channel][0]).max()
+        assert np.abs(other[channel] - native[channel]).max() < 0.005 * path
+
+
+def test_a_static_start_of_a_slider_on_a_flexible_link_is_at_rest():
+    arm = robot(
+        beam(0.5, 0.5, 4.0, "R", 3),
+        rigid(0.1, 0.1, 0.0, 1e-4, "Pa", start=0.25),
+        gravity=(0.0, -9.81),
+    )
+    with pytest.raises(InputError, match="slides on a flexible link"):
+        twin.simulate(arm, [0.0, 0.1], qd0=[0.0, 0.1])
+
+
 def test_it_is_quiet_and_writes_no_files(tmp_path):
     code = (
         "import sys, flexura\nassert 'exudyn' not in sys.modules\n"

@@ -13,7 +13,7 @@ from ...io import STATIONS
 from ...signals import Drive
 from ...system import System
 from ..problem import Problem, Progress, Solution
-from ..recorder import limit_event, observed
+from ..recorder import limit_event, recorded_channels
 from .equations import Equations
 from .exponential import Exponential
 from .weights import Weights
@@ -63,7 +63,8 @@ class Integration:
         self.ticks, marks, self.span = np.zeros(0), np.zeros(0), float(t[-1] - t[0])
         self.longest = (
             self.span / LEAST_STEPS
-            if isinstance(drive, DriveFunction) or (isinstance(drive, Drive) and drive.calls)
+            if isinstance(drive, DriveFunction)
+            or (isinstance(drive, Drive) and drive.has_functions)
             else np.inf
         )
         if isinstance(drive, Drive):
@@ -122,7 +123,7 @@ class Integration:
 
     def solution(self, meta: dict[str, Any]) -> Solution:
         """What was computed."""
-        widths = (2 * self.system.n, 4, len(self.rows), len(observed(self.system.robot)))
+        widths = (2 * self.system.n, 4, len(self.rows), len(recorded_channels(self.system.robot)))
         empty = [np.zeros(0), *(np.zeros((0, width)) for width in widths), np.zeros(0)]
         times, states, accounts, forces, seen, jumps = [
             np.array(part) for part in zip(*self.found, strict=True)

@@ -40,23 +40,23 @@ JOINT = ("rise_s", "settling_s", "overshoot", "error", "itae_s2", "effort")
 STRIP = ("peak_m", "residual_m", "vibration_m_s2", "rms_m")
 
 
-def joint_figures(t: np.ndarray, r: np.ndarray, q: np.ndarray) -> np.ndarray:
+def joint_metrics(t: np.ndarray, r: np.ndarray, q: np.ndarray) -> np.ndarray:
     """A joint's figures (6,), the effort 0, from samples t, r, q (T,) (80)."""
-    return np.asarray(core.joint_figures(*_flat(t, r, q)))
+    return np.asarray(core.joint_metrics(*_flat(t, r, q)))
 
 
-def strip_figures(t: np.ndarray, w: np.ndarray, settled: float) -> np.ndarray:
+def strip_metrics(t: np.ndarray, w: np.ndarray, settled: float) -> np.ndarray:
     """The strip's figures (4,) from samples t, w (T,) (80); `settled` [s], the slowest joint's, may
     be NaN."""
-    return np.asarray(core.strip_figures(*_flat(t, w), settled))
+    return np.asarray(core.strip_metrics(*_flat(t, w), settled))
 
 
-def least_vibration(t: np.ndarray, w: np.ndarray, seen: int, enough: float) -> float:
+def vibration_lower_bound(t: np.ndarray, w: np.ndarray, seen: int, enough: float) -> float:
     """What the strip's vibration comes to at least, from the first `seen` of the samples t, w (T,).
 
     It is sought until it is above `enough`, or certain not to be.
     """
-    return float(core.least_vibration(*_flat(t, w), seen, enough))
+    return float(core.vibration_lower_bound(*_flat(t, w), seen, enough))
 
 
 def _flat(*samples: np.ndarray) -> list[np.ndarray]:
@@ -64,7 +64,7 @@ def _flat(*samples: np.ndarray) -> list[np.ndarray]:
 
 
 @dataclass(frozen=True)
-class Response:
+class StepResponse:
     """The figures of one run: `joints` (N, 6), `strip` (4,), NaN for a robot without a flexible
     link."""
 
@@ -82,9 +82,9 @@ class Response:
         return out | {name: clean(x) for name, x in zip(STRIP, self.strip, strict=True)}
 
 
-def of_run(
+def step_response(
     run: Run, references: list[np.ndarray], limits: list[float], settled: float | None = None
-) -> Response:
+) -> StepResponse:
     """The figures of a Run without gaps: `references` the unfiltered set-points (T,) a joint,
     `limits` of the outputs.
 
@@ -93,13 +93,13 @@ def of_run(
     """
     joints, strip = np.full((len(references), len(JOINT)), np.nan), np.full(len(STRIP), np.nan)
     for i, (r, limit) in enumerate(zip(references, limits, strict=True), 1):
-        joints[i - 1] = joint_figures(run.t, r, run[f"joint/{i}/position"])
+        joints[i - 1] = joint_metrics(run.t, r, run[f"joint/{i}/position"])
         joints[i - 1, EFFORT] = _effort(run, i, limit)
     bent = [name for name in run if name.endswith("tip_deflection")]
     if bent:
         slowest = float(joints[:, SETTLING].max()) if settled is None else settled
-        strip = strip_figures(run.t, run[bent[-1]], slowest)
-    return Response(joints, strip)
+        strip = strip_metrics(run.t, run[bent[-1]], slowest)
+    return StepResponse(joints, strip)
 
 
 def _effort(run: Run, joint: int, limit: float) -> float:
