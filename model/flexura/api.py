@@ -64,14 +64,16 @@ def simulate(
     Args:
         robot: a System, a Robot, the path or name of a robot file, or a Batch of robots, which
             gives a Population; `flexura.population.simulate` says what else that takes.
-        t_eval (T,): ascending times [s].
+        t_eval: ascending times (T,) [s].
         drive: a Drive, a sampled Controller, `Sampled(f, rate_Hz)`, or a function of (t) or of (t,
             position, velocity, tip_deflection) that gives (links,) forces and torques [N or N m].
             Such a function may be called again for times within a step, never before its start,
             and must have no memory. Or forces, one entry a joint: a number, a Signal, a function
             of t, an array of len(t_eval) values, or None; or an array (T, joints).
-        q0, qd0 (n,): the state at the start; without qd0 the robot is at rest.
+        q0: configuration at the start (n,); None: see `start`.
+        qd0: its rates (n,); None: at rest.
         rtol: the error that is asked for, of deflections and of a thousandth of the tip's path.
+        **options: the arguments below, by name.
         method: "auto", "explicit" (order 8), "implicit", or "exponential".
         start: where q0 is not given, "static", which is the default under gravity, or "straight".
         continue_from: a Run of `simulate`, at whose end this one starts, with its state and its
@@ -85,7 +87,8 @@ def simulate(
             tolerance (94); False: they do not.
         progress: called with the finished fraction.
 
-    Returns: a Run, of a Batch a Population.
+    Returns:
+        A Run, of a Batch a Population.
 
     Raises:
         InputError: an argument is not what is expected, or a motion has nothing that follows it.

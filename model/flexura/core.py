@@ -26,10 +26,15 @@ def levels() -> list[str]:
 def load(level: str) -> ModuleType:
     """The build of the core for processors of a level.
 
-    Args: level: a key of BUILDS, or "" for the best that is here and that this processor can run.
+    Args:
+        level: a key of BUILDS, or "" for the best that is here and that this processor can run.
 
-    Raises: ImportError: there is no such level, this processor lacks it, or the core was not
-    compiled for it or for this Python.
+    Returns:
+        The compiled module.
+
+    Raises:
+        ImportError: there is no such level, this processor lacks it, or the core was not compiled
+            for it or for this Python.
     """
     if level and level not in BUILDS:
         raise ImportError(f"FLEXURA_CORE is {level!r}: expected {' or '.join(BUILDS)}")

@@ -12,7 +12,11 @@ class FlexuraError(Exception):
 class InputError(FlexuraError):
     """A wrong value in a file or an argument.
 
-    Attributes: `file` (may be ""), `key`, `value` (as read), `expected` (in words, with the unit).
+    Attributes:
+        file: name of the file; may be "".
+        key: of the value.
+        value: as read.
+        expected: in words, with the unit.
     """
 
     def __init__(
@@ -27,7 +31,14 @@ class InputError(FlexuraError):
         )
 
     def in_file(self, file: str) -> InputError:
-        """The same error, with the file's name."""
+        """The same error, with the file's name.
+
+        Args:
+            file: name of the file.
+
+        Returns:
+            The error to raise.
+        """
         return InputError(self.expected, key=self.key, value=self.value, file=file)
 
 

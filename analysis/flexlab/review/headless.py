@@ -244,6 +244,7 @@ def open_window(rrd: str | Path) -> subprocess.Popen[bytes]:
 
 
 def free_port() -> int:
+    """A TCP port of this machine that no program uses now."""
     with socket.socket() as s:
         s.bind((LOOPBACK, 0))
         return int(s.getsockname()[1])

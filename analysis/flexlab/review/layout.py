@@ -42,10 +42,12 @@ class Scene:
 
     @property
     def width(self) -> float:
+        """Width of the picture [m]."""
         return self.high[0] - self.low[0]
 
     @property
     def height(self) -> float:
+        """Height of the picture [m]."""
         return self.high[1] - self.low[1]
 
     @property

@@ -59,6 +59,7 @@ class Source:
 
     @property
     def has_shape(self) -> bool:
+        """Whether the run's channels say where its links are."""
         return has_shapes(self.run)
 
 
@@ -130,4 +131,12 @@ def has_payload(run: Run) -> bool:
 
 
 def tip_meaning(run: Run) -> str:
+    """What the size of the tip's mark means.
+
+    Args:
+        run: the run.
+
+    Returns:
+        The end of a sentence.
+    """
     return "large because it carries the payload" if has_payload(run) else "without a payload"

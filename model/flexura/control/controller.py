@@ -142,7 +142,15 @@ class Controller:
         )
 
     def within(self, start: float, end: float) -> Controller:
-        """The same controller for a run from `start` to `end` [s], see `Drive.within`."""
+        """The same controller for a run between two times, see `Drive.within`.
+
+        Args:
+            start: begin of the run [s].
+            end: end of the run [s].
+
+        Returns:
+            A controller whose functions of time are Signals.
+        """
         opened = self._open().within(start, end)
         joints = tuple(
             joint.within(start, end) if isinstance(joint, PID) else own
@@ -162,8 +170,14 @@ class Controller:
         )
 
     def sampler(self, system: System) -> Any:
-        """All that the core needs of this controller on a robot: a `core.Controller`, with the
-        memory and the log of one run."""
+        """What the core needs of this controller on a robot.
+
+        Args:
+            system: the robot.
+
+        Returns:
+            A `core.Controller`, with the state and the log of one run.
+        """
         index, parts = (
             np.zeros((len(self.joints), 5), dtype=np.int64),
             [np.zeros((0, signals.COLUMNS))],
@@ -221,8 +235,15 @@ class Controller:
         return g
 
     def recorded(self, run: Run, sampler: Any) -> Run:
-        """A Run with the law's own channels besides, joint/i/reference, joint/i/voltage and
-        joint/i/pulses, from the log of the `sampler` that ran in it."""
+        """A Run with the controller's own channels besides.
+
+        Args:
+            run: the Run.
+            sampler: that ran in it, with its log.
+
+        Returns:
+            The Run with joint/i/reference, joint/i/voltage and joint/i/pulses.
+        """
         log, start = np.asarray(sampler.log), float(run.t[0]) if len(run.t) else 0.0
         if len(log) == 0:  # no tick in it: a run of one instant
             log = np.zeros((1, len(self.joints), 6))
@@ -258,5 +279,13 @@ class Controller:
 
 
 def filter_coefficient(frequency_Hz: float, period_s: float) -> float:
-    """a of y += a (x - y): 1 - exp(-2 pi f T) (67); 1, no filter, for f = 0."""
+    """a of the first-order filter y += a (x - y): a = 1 - exp(-2 pi f T) (67).
+
+    Args:
+        frequency_Hz: f, the corner frequency [Hz]; 0: no filter, a = 1.
+        period_s: T, the time of a tick [s].
+
+    Returns:
+        a, from 0 to 1.
+    """
     return 1.0 if frequency_Hz == 0 else -math.expm1(-2 * math.pi * frequency_Hz * period_s)

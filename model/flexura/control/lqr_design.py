@@ -74,15 +74,28 @@ def lqr(
     noise: Any = 1e-4,
     q: Any = None,
 ) -> tuple[Controller, Design]:
-    """`controller` with its PIDs' terms replaced by an LQR and observer about q (default: the
-    static equilibrium at the start): (74) to (76).
+    """A controller with its PIDs' terms replaced by an LQR and an observer (74) to (76).
 
-    Its references, outputs, limits, slews, rate and quantisation stay. Weights by Bryson's rule:
-    `effort` (m,) of each output, `position` (N,) [m or rad], `deflection` [m] of the tips and
-    `damping` [s], what counts as much: cost (e / position)^2 + (w / deflection)^2 + (damping w' /
-    deflection)^2 + (u / effort)^2. Observer: `disturbance` (m,), the standard deviation of what
-    acts at the outputs in a tick, `noise` (N + 1,) of the measurements. Raises InputError for
-    steppers, which have no force, and where no stabilising solution exists.
+    References, outputs, limits, slews, rate and quantisation stay. The weights follow Bryson's
+    rule, with the cost (e / position)^2 + (w / deflection)^2 + (damping w' / deflection)^2 +
+    (u / effort)^2.
+
+    Args:
+        robot: a System, a Robot, or the path or name of a robot file.
+        controller: the controller.
+        effort: of each output (m,), that counts as much as the deviations below.
+        position: deviation of each joint (N,) or of all [m or rad].
+        deflection: of the tips [m].
+        damping: time by which the rate of a deflection is weighted [s].
+        disturbance: standard deviation of what acts at the outputs in a tick, (m,) or one.
+        noise: standard deviation of the measurements, (N + 1,) or one.
+        q: configuration (n,) of the design; None: the static equilibrium at the start.
+
+    Returns:
+        The controller, and the Design with its matrices and poles.
+
+    Raises:
+        InputError: a stepper, which has no force, or no stabilising solution exists.
     """
     system = assemble(robot)
     if not isinstance(controller, Controller):

@@ -1,21 +1,24 @@
-"""Figures of a controlled motion, each with one definition, from samples: computed by the core, for
-gain sweeps and Runs alike.
+"""Metrics of a controlled motion, each with one definition (80), computed from samples by the core
+for gain sweeps and Runs alike.
 
 Of joint i, with r(t) its reference before any filter, D = r(end) - q(0) the distance that it is to
 go, y = (q - q(0)) / D:
 
-    rise        time from y = 10 % to y = 90 %, both crossed for the first time [s] settling    time
-    after which |y - 1| stays within 2 % [s] overshoot   largest y - 1, not below 0 [1] error
-    |y - 1|, its mean over the last tenth of the time [1] itae        int t |r - q| dt / |D| [s^2]
-    effort      int (u / limit)^2 dt / T, u the output of the law as given; 0 where it has no limit
-    [1]
+- rise [s]: from y = 10 % to y = 90 %, both crossed for the first time;
+- settling [s]: time after which |y - 1| stays within 2 %;
+- overshoot [1]: largest y - 1, not below 0;
+- error [1]: |y - 1|, its mean over the last tenth of the time;
+- itae [s^2]: int t |r - q| dt / |D|;
+- effort [1]: int (u / limit)^2 dt / T, u the output as given; 0 where it has no limit.
 
-and of the last flexible link, with w its tip deflection and b the instant at which the slowest
-joint has settled, at the latest a fifth of the time before the end:
+Of the last flexible link, with w its tip deflection and b the instant at which the slowest joint
+has settled, at the latest a fifth of the time before the end:
 
-    peak        largest |w - w(0)| [m] residual    half of w's range from b on [m] vibration   int t
-    |w - w(end)| dt [m s^2], w(end) the mean over the last tenth: what bends the link for good
-    doesn't count rms         sqrt(int (w - w(end))^2 dt / T) [m]
+- peak [m]: largest |w - w(0)|;
+- residual [m]: half of w's range from b on;
+- vibration [m s^2]: int t |w - w(end)| dt, w(end) the mean over the last tenth: a lasting bend
+  does not count;
+- rms [m]: sqrt(int (w - w(end))^2 dt / T).
 
 What never happens is NaN: the rise of a joint that doesn't arrive, settling of one that doesn't
 settle.
@@ -41,20 +44,46 @@ STRIP = ("peak_m", "residual_m", "vibration_m_s2", "rms_m")
 
 
 def joint_metrics(t: np.ndarray, r: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """A joint's figures (6,), the effort 0, from samples t, r, q (T,) (80)."""
+    """The metrics of a joint (80).
+
+    Args:
+        t: times (T,) [s].
+        r: unfiltered set-points (T,) [m or rad].
+        q: positions (T,) [m or rad].
+
+    Returns:
+        Rise, settling, overshoot, error, ITAE, and an effort of 0 (6,).
+    """
     return np.asarray(core.joint_metrics(*_flat(t, r, q)))
 
 
 def strip_metrics(t: np.ndarray, w: np.ndarray, settled: float) -> np.ndarray:
-    """The strip's figures (4,) from samples t, w (T,) (80); `settled` [s], the slowest joint's, may
-    be NaN."""
+    """The metrics of the last flexible link (80).
+
+    Args:
+        t: times (T,) [s].
+        w: tip deflections (T,) [m].
+        settled: when the slowest joint has settled [s]; may be NaN.
+
+    Returns:
+        Peak, residual, vibration and RMS (4,).
+    """
     return np.asarray(core.strip_metrics(*_flat(t, w), settled))
 
 
 def vibration_lower_bound(t: np.ndarray, w: np.ndarray, seen: int, enough: float) -> float:
-    """What the strip's vibration comes to at least, from the first `seen` of the samples t, w (T,).
+    """A lower bound of a link's vibration from the first samples.
 
-    It is sought until it is above `enough`, or certain not to be.
+    It is raised until it is above `enough`, or certain not to come there.
+
+    Args:
+        t: times (T,) [s].
+        w: tip deflections (T,) [m].
+        seen: how many samples are known.
+        enough: bound that suffices [m s^2].
+
+    Returns:
+        The bound [m s^2].
     """
     return float(core.vibration_lower_bound(*_flat(t, w), seen, enough))
 
@@ -85,11 +114,17 @@ class StepResponse:
 def step_response(
     run: Run, references: list[np.ndarray], limits: list[float], settled: float | None = None
 ) -> StepResponse:
-    """The figures of a Run without gaps: `references` the unfiltered set-points (T,) a joint,
-    `limits` of the outputs.
+    """The metrics of a Run without gaps (80).
 
-    `settled` [s] replaces the instant from which the residual counts, to compare two runs from the
-    same instant on.
+    Args:
+        run: the Run.
+        references: the unfiltered set-points (T,), one a joint [m or rad].
+        limits: of the outputs, one a joint.
+        settled: instant from which the residual counts [s]; None: when the slowest joint has
+            settled. Two runs are compared from the same instant on.
+
+    Returns:
+        The StepResponse.
     """
     joints, strip = np.full((len(references), len(JOINT)), np.nan), np.full(len(STRIP), np.nan)
     for i, (r, limit) in enumerate(zip(references, limits, strict=True), 1):

@@ -45,7 +45,14 @@ class Channel:
     meaning: str
 
     def fits(self, name: str) -> bool:
-        """Whether a channel's name is one of these."""
+        """Whether a channel's name is one of these.
+
+        Args:
+            name: for example "joint/1/position".
+
+        Returns:
+            True if it is.
+        """
         parts = {"i": r"[1-9]\d*", "k": r"\d+", "NAME": r".+"}
         pattern = "/".join(parts.get(part, re.escape(part)) for part in self.name.split("/"))
         return re.fullmatch(pattern, name) is not None

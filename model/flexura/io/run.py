@@ -71,7 +71,14 @@ class Run:
             raise ValueError(f"two channels would share a column: {', '.join(twice)}")
 
     def column(self, channel: str) -> str:
-        """The name of a channel's column in a file, its unit at the end."""
+        """The name of a channel's column in a file.
+
+        Args:
+            channel: name of the channel.
+
+        Returns:
+            The name with its unit at the end.
+        """
         return f"{channel}_{SUFFIX[self.units[channel]]}"
 
     def __getitem__(self, channel: str) -> np.ndarray:
@@ -214,8 +221,14 @@ class Run:
         return xarray_dataset(self.t, self.channels, self.units, self.meta)
 
     def save(self, folder: str | Path) -> Path:
-        """Write `run.parquet` into `folder` (made if need be) as a whole or not at all; returns its
-        path."""
+        """Write `run.parquet` as a whole or not at all.
+
+        Args:
+            folder: where to; it is made if need be.
+
+        Returns:
+            The file's path.
+        """
         path = Path(folder) / FILE
         write_bytes(path, self.parquet())
         return path
@@ -244,7 +257,17 @@ class Run:
 
     @staticmethod
     def read(folder: str | Path) -> Run:
-        """Read a run's folder, or its Parquet file. Raises InputError for anything else."""
+        """Read a run.
+
+        Args:
+            folder: a run's folder, or its Parquet file.
+
+        Returns:
+            The Run.
+
+        Raises:
+            InputError: there is no run, or its file is damaged.
+        """
         import pyarrow as pa
         import pyarrow.parquet as pq
 

@@ -18,8 +18,17 @@ _TOO_DEEP = re.compile(r"""(?:\.[ \t]*[\w"'-]+[ \t]*){300}""")
 
 
 def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """The tables of a TOML file. Raises InputError for anything that is not a readable TOML
-    file."""
+    """The tables of a TOML file.
+
+    Args:
+        path: of the file.
+
+    Returns:
+        The tables.
+
+    Raises:
+        InputError: it is not a readable TOML file.
+    """
     if not isinstance(path, str | os.PathLike):
         raise InputError("expected the path of a TOML file", key="path", value=path)
     name = os.fspath(path)
@@ -54,12 +63,22 @@ def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:
-    """Write a file as a whole: a reader sees the old one or the new one."""
+    """Write a file as a whole: a reader sees the old one or the new one.
+
+    Args:
+        path: of the file.
+        text: its content.
+    """
     write_bytes(path, text.encode())
 
 
 def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
-    """Write a file as a whole: a reader sees the old one or the new one."""
+    """Write a file as a whole: a reader sees the old one or the new one.
+
+    Args:
+        path: of the file.
+        data: its content.
+    """
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
@@ -74,7 +93,12 @@ def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
 
 
 def write_toml(path: str | os.PathLike[str], data: dict[str, Any]) -> None:
-    """Write tables as a TOML file, as a whole."""
+    """Write tables as a TOML file, as a whole.
+
+    Args:
+        path: of the file.
+        data: the tables.
+    """
     import tomli_w
 
     write_text(path, tomli_w.dumps(data))

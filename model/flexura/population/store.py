@@ -49,6 +49,7 @@ class Chunk:
             raise KeyError(f"no {name!r} was kept; there are: {', '.join(self.values)}") from None
 
     def to_parquet(self) -> bytes:
+        """The chunk as the content of a Parquet file, with a row a robot."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -161,6 +162,11 @@ class Store:
         return self.folder / f"chunk-{first:07d}.parquet"
 
     def put(self, chunk: Chunk) -> None:
+        """Keep a chunk: in its file, or in memory where there is no folder.
+
+        Args:
+            chunk: the chunk.
+        """
         if self.folder is None:
             self.kept[chunk.first] = chunk
         else:
@@ -203,7 +209,14 @@ class Store:
 
 
 def is_population(folder: str | Path) -> bool:
-    """Whether a folder is one of a population."""
+    """Whether a folder is one of a population.
+
+    Args:
+        folder: the folder.
+
+    Returns:
+        True if a population was stored there.
+    """
     return (Path(folder) / MANIFEST).is_file()
 
 
@@ -244,6 +257,7 @@ def _digests(path: Path) -> list[bytes]:
 
 
 def in_memory() -> Store:
+    """A store without a folder."""
     return Store()
 
 

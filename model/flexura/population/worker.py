@@ -53,7 +53,17 @@ class Part(NamedTuple):
 def simulated(request: Request, share: Share, threads: int, watch: Any) -> Part:
     """Run and observe robots, or begin to, if `watch` is stopped meanwhile.
 
-    Raises: InputError: a drive has another number of joints.
+    Args:
+        request: what is asked.
+        share: the robots.
+        threads: how many work.
+        watch: by which another thread stops the work.
+
+    Returns:
+        What was computed of each robot.
+
+    Raises:
+        InputError: a drive has another number of joints.
     """
     b, T, N = len(share), len(request.t), len(share.robots[0].links)
     for k, drive in enumerate(share.drives, 1):

@@ -26,6 +26,9 @@ def key_of(quantity: str, type: object) -> str:
     Args:
         quantity: a name of `KEYS`, or any other, which is its own key.
         type: "R", "Pa" or "Pb".
+
+    Returns:
+        The key.
     """
     turning, sliding = KEYS.get(quantity, (quantity, quantity))
     return turning if type == "R" else sliding
@@ -103,7 +106,14 @@ class Joint(Table):
         return self
 
     def key(self, quantity: str) -> str:
-        """The key that holds a quantity of this joint."""
+        """The key that holds a quantity of this joint.
+
+        Args:
+            quantity: for example "start".
+
+        Returns:
+            The key, for example "start_rad".
+        """
         return key_of(quantity, self.type)
 
     @property

@@ -281,23 +281,43 @@ class Link(Table):
         )
 
     def mass_per_length(self, x: Any) -> np.ndarray:
-        """Mass per length [kg/m] at x [m] from the link's origin, linear between the given
-        places."""
+        """Mass per length, linear between the given places.
+
+        Args:
+            x: places from the link's origin [m].
+
+        Returns:
+            As many values [kg/m].
+        """
         if self.mass_per_length_kg_m is not None:
             return _spread(self.mass_per_length_kg_m, x)
         width, height = self._section_at(x)
         return _spread(self.density_kg_m3 * width * height, x)
 
     def bending_stiffness(self, x: Any) -> np.ndarray:
-        """Bending stiffness EI [N m^2] at x [m] from the link's origin."""
+        """Bending stiffness EI.
+
+        Args:
+            x: places from the link's origin [m].
+
+        Returns:
+            As many values [N m^2].
+        """
         if self.bending_stiffness_N_m2 is not None:
             return _spread(self.bending_stiffness_N_m2, x)
         width, height = self._section_at(x)
         return _spread(self.young_modulus_Pa * width * height**3 / 12, x)
 
     def axial_stiffness(self, x: Any) -> np.ndarray | None:
-        """Axial stiffness EA [N] at x [m], or None where the file gives EI only (the native model
-        has no axial unknowns)."""
+        """Axial stiffness EA.
+
+        Args:
+            x: places from the link's origin [m].
+
+        Returns:
+            As many values [N]; None where the file gives EI only. The native model has no axial
+            unknowns.
+        """
         if self.section is None or self.young_modulus_Pa is None:
             return None
         width, height = self._section_at(x)

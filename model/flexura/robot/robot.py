@@ -115,7 +115,14 @@ class Robot(Table):
         return self
 
     def rides(self, i: int) -> bool:
-        """Whether joint i (from 0) slides along a flexible link."""
+        """Whether a joint slides along a flexible link.
+
+        Args:
+            i: number of the joint, from 0.
+
+        Returns:
+            True for a Pa whose link before is flexible.
+        """
         return i > 0 and self.link[i].joint.type == "Pa" and self.link[i - 1].flexible
 
     @property
@@ -128,7 +135,14 @@ class Robot(Table):
         )
 
     def travel(self, i: int) -> tuple[float, float]:
-        """How far joint i (from 0) can go on its links: infinite for R and for a Pa on the base."""
+        """How far a joint can go on its links.
+
+        Args:
+            i: number of the joint, from 0.
+
+        Returns:
+            The lowest and the highest position [m]; infinite for R and for a Pa on the base.
+        """
         link = self.link[i]
         if link.joint.type == "Pb":
             return (LEAST_FREE * link.length_m if link.flexible else 0.0), link.length_m
@@ -156,7 +170,17 @@ class Robot(Table):
         """A robot from the tables of a robot file.
 
         Keys of 0.1 without a unit, as `start`, are read as those of today, and the logger "flexura"
-        names the new ones. Raises InputError, naming `file`, key, value and what was expected.
+        names the new ones.
+
+        Args:
+            data: the tables.
+            file: name of their file, for messages.
+
+        Returns:
+            The Robot.
+
+        Raises:
+            InputError: a wrong value; it names file, key, value and what was expected.
         """
         if isinstance(data, dict):
             check_format(data, file)
@@ -198,8 +222,18 @@ class Robot(Table):
         return self.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
 
     def replace(self, changes: dict[str, Any]) -> Robot:
-        """A robot with some values changed: `robot.replace({"payload.mass_kg": 0.1,
-        "link.2.length_m": 0.4})`, links counted from 1."""
+        """A robot with some values changed.
+
+        Args:
+            changes: values by key, links counted from 1: {"payload.mass_kg": 0.1,
+                "link.2.length_m": 0.4}.
+
+        Returns:
+            The new Robot; this one stays.
+
+        Raises:
+            InputError: an unknown key, or a wrong value.
+        """
         changes = {self._todays_path(path, changes): value for path, value in changes.items()}
         # says what is wrong in a file's words
         try:
@@ -254,6 +288,9 @@ def load(path: str | os.PathLike[str]) -> Robot:
     Args:
         path: the file's path, or the name of a robot that comes with flexura, for example "rig".
 
+    Returns:
+        The Robot.
+
     Raises:
         InputError: no such file or robot, or a wrong value; it names file, key, value and what was
             expected.
@@ -265,9 +302,15 @@ def load(path: str | os.PathLike[str]) -> Robot:
 def robot_of(robot: Any, key: str = "robot") -> Robot:
     """The Robot of what a function was given.
 
-    Args: robot: a Robot, the path or name of a robot file, or a System; key: the argument's name.
+    Args:
+        robot: a Robot, the path or name of a robot file, or a System.
+        key: name of the argument.
 
-    Raises: InputError: it is something else, or the file is wrong.
+    Returns:
+        The Robot.
+
+    Raises:
+        InputError: it is something else, or the file is wrong.
     """
     if isinstance(robot, Robot):
         return robot
@@ -281,5 +324,10 @@ def robot_of(robot: Any, key: str = "robot") -> Robot:
 
 
 def save(robot: Robot, path: str | os.PathLike[str]) -> None:
-    """Write a robot file (TOML) that `load` reads back to an equal robot."""
+    """Write a robot file (TOML) that `load` reads back to an equal robot.
+
+    Args:
+        robot: the robot.
+        path: where to; a file there is replaced as a whole.
+    """
     write_toml(path, {"format": FORMAT} | robot.to_dict())

@@ -25,7 +25,17 @@ class FunctionSignal(Signal):
     key: str = "signal"
 
     def value(self, t: float) -> float:
-        """y at t [s]. Raises InputError where the function gives anything but a finite number."""
+        """The function's value.
+
+        Args:
+            t: time [s].
+
+        Returns:
+            y.
+
+        Raises:
+            InputError: the function gives anything but a finite number.
+        """
         given = self.function(t)
         if isinstance(given, np.ndarray) and given.size == 1:
             given = given.item()
@@ -41,13 +51,17 @@ class FunctionSignal(Signal):
 def as_signal(value: Any, key: str, t: np.ndarray | None = None) -> Signal | None:
     """A Signal from what a caller gives.
 
-    Args: value: None, a number, a Signal, a function of t [s], or values (T,) at the times `t`
-        (T,); key: the argument's name, for the message.
+    Args:
+        value: None, a number, a Signal, a function of t [s], or values (T,) at the times `t`.
+        key: name of the argument, for the message.
+        t: times (T,) [s].
 
-    Returns: numbers as constant Signals, arrays as cubic splines (`table`), functions as a
+    Returns:
+        Numbers as constant Signals, arrays as cubic splines (`table`), functions as a
         FunctionSignal.
 
-    Raises: InputError: anything else; an array without times, or of another length.
+    Raises:
+        InputError: anything else; an array without times, or of another length.
     """
     if value is None or isinstance(value, Signal):
         return value
@@ -78,10 +92,18 @@ def as_signals(
 ) -> list[Signal | None]:
     """One Signal or function a joint.
 
-    Args: value: one entry a joint, each as `as_signal` reads it; or values (T, joints) at the times
-        `t` (T,); of a robot with one joint also its entry alone. key: the argument's name.
+    Args:
+        value: one entry a joint, each as `as_signal` reads it; or values (T, joints) at the times
+            `t`; of a robot with one joint also its entry alone.
+        joints: how many the robot has.
+        key: name of the argument, for the message.
+        t: times (T,) [s].
 
-    Raises: InputError: another number of entries, or an entry that is nothing of this.
+    Returns:
+        One entry a joint, None for a free one.
+
+    Raises:
+        InputError: another number of entries, or an entry that is nothing of this.
     """
     expected = f"expected {joints} entries, one a joint: numbers, Signals, functions of t or arrays"
     if isinstance(value, str | bytes | dict | set) or value is None:
@@ -108,12 +130,21 @@ def _has_entries(value: Any) -> bool:
 
 
 def spline(signal: FunctionSignal, start: float, end: float) -> Signal:
-    """A function of time as a spline of fifth order from `start` to `end` [s].
+    """A function of time as a spline of fifth order.
 
     As many equally spaced values are taken as the spline needs to meet the function between them.
     Where its acceleration jumps, the spline rounds the jump over a few thousandths of the time.
 
-    Raises: InputError: a value is no finite number; its position or velocity jumps.
+    Args:
+        signal: the function.
+        start: begin of the spline [s].
+        end: end of the spline [s].
+
+    Returns:
+        The Signal.
+
+    Raises:
+        InputError: a value is no finite number; its position or velocity jumps.
     """
     from scipy.interpolate import PPoly, make_interp_spline
 

@@ -77,6 +77,9 @@ def load_manoeuvre(path: str | os.PathLike[str], joints: int) -> Manoeuvre:
         path: the file's path, or the name of a manoeuvre that comes with flexura.
         joints: how many the robot has.
 
+    Returns:
+        The Manoeuvre.
+
     Raises:
         InputError: no such file, or a wrong value; it names file, key and value.
     """

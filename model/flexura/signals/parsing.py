@@ -14,7 +14,18 @@ from .signal import Signal
 
 
 def from_spec(spec: Any, *, key: str = "signal") -> Signal:
-    """A signal from its table, for example `{ kind = "cycloid", end = 1.0, duration_s = 0.5 }`."""
+    """A signal from its table, for example `{ kind = "cycloid", end = 1.0, duration_s = 0.5 }`.
+
+    Args:
+        spec: the table.
+        key: its name, for messages.
+
+    Returns:
+        The Signal.
+
+    Raises:
+        InputError: an unknown kind or key, or a wrong value.
+    """
     kinds = signal.KINDS | shaping.KINDS
     if not isinstance(spec, dict):
         raise InputError(
@@ -61,7 +72,14 @@ def from_spec(spec: Any, *, key: str = "signal") -> Signal:
 
 
 def is_finite(value: Any) -> bool:
-    """Is it a finite number, as read from a file?"""
+    """Whether a value is a finite number, as read from a file.
+
+    Args:
+        value: the value.
+
+    Returns:
+        True for an int or a finite float, not for a bool.
+    """
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
     try:

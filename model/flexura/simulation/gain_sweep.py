@@ -45,16 +45,20 @@ class GainSweep:
         limits: np.ndarray | None = None,
         threads: int = 1,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Figures (B, 6 N + 4), those of each joint, then the strip's, and what fraction of the
-        time each run reached (B,).
+        """Simulate rows of gains.
 
-        Args: gains (B, N, 20): rows of `Controller.gains`; prices (2, 6 N + 4): those of the
-        figures and what is free of each;
-            limits (B,), inf for none, which an abandoned row's cost would exceed by a billionth or
-            more; threads: how many work.
+        Args:
+            gains: rows of `Controller.gains` (B, N, 20).
+            weights: of the metrics, and what is free of each (2, 6 N + 4); None: no row is
+                abandoned.
+            limits: of the rows' costs (B,), inf for none. An abandoned row's cost would exceed its
+                limit by a billionth or more.
+            threads: how many work.
 
-        Returns: Of an abandoned row the figures are lower bounds, 0 where it has none, and of one
-        that failed NaN.
+        Returns:
+            Metrics (B, 6 N + 4), those of each joint, then the strip's; and what fraction of the
+            time each run reached (B,). Metrics of an abandoned row are lower bounds, 0 where there
+            is none. Those of one that failed are NaN.
         """
         rows = np.ascontiguousarray(gains, dtype=float)
         free = (
@@ -79,11 +83,24 @@ def prepare_gain_sweep(
     rtol: float,
     method: str = "auto",
 ) -> GainSweep:
-    """What rows of gains are run with, from rest as `simulate` starts: under gravity in static
-    equilibrium. Samples lie on ticks.
+    """Prepare the runs of many rows of gains on one robot.
 
-    Raises: InputError: the robot is not on the exact line, or the controller is one of other
-    joints.
+    They begin at rest as `simulate` does: under gravity in static equilibrium. Samples lie on
+    ticks.
+
+    Args:
+        system: the robot.
+        controller: its references, outputs and rate.
+        duration_s: of a run [s].
+        output_step_s: between two samples [s].
+        rtol: as in `flexura.simulate`.
+        method: as in `flexura.simulate`.
+
+    Returns:
+        The GainSweep.
+
+    Raises:
+        InputError: the robot is not on the exact line, or the controller is one of other joints.
     """
     if not system.exact:
         raise InputError(

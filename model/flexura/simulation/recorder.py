@@ -13,7 +13,14 @@ from .problem import Solution
 
 
 def channel_units(robot: Robot) -> dict[str, str]:
-    """The channels that a simulation of this robot has, in their order, with their units."""
+    """The channels that a simulation of this robot has.
+
+    Args:
+        robot: the robot.
+
+    Returns:
+        Units by channel, in the order of the channels.
+    """
     units: dict[str, str] = {}
     for i, link in enumerate(robot.links, 1):
         turns = link.joint.type == "R"

@@ -60,7 +60,14 @@ class Assembly:
         self._sleeved: dict[int, Material] = dict(materials)
 
     def mass(self, q: np.ndarray) -> np.ndarray:
-        """M(q) (n, n) (40)."""
+        """The mass matrix M(q) (40).
+
+        Args:
+            q: configuration (n,).
+
+        Returns:
+            (n, n).
+        """
         return self._mass(self._inertia(self._at_rest(q))[0])
 
     def _mass(self, sums: masses.Sum) -> np.ndarray:
@@ -69,12 +76,27 @@ class Assembly:
         return M
 
     def bias(self, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
-        """Coriolis, centrifugal and convective forces (n,), on the left-hand side (41)."""
+        """Coriolis, centrifugal and convective forces, on the left-hand side (41).
+
+        Args:
+            q: configuration (n,).
+            qd: its rates (n,).
+
+        Returns:
+            Generalised forces (n,).
+        """
         sums, flow = self._inertia(self.structure.states(q, qd))
         return sums.forces + flow
 
     def gravity(self, q: np.ndarray) -> np.ndarray:
-        """Generalised gravity forces (n,), on the left-hand side (42)."""
+        """Forces of gravity, on the left-hand side (42).
+
+        Args:
+            q: configuration (n,).
+
+        Returns:
+            Generalised forces (n,).
+        """
         return self._inertia(self._at_rest(q), self._g)[0].forces
 
     def _inertia(
@@ -91,9 +113,15 @@ class Assembly:
         return masses.total(parts, gravity), flow
 
     def elastic(self, q: np.ndarray) -> np.ndarray:
-        """Elastic forces (n,), on the left-hand side (43): K q, and of a sleeved link also dU/dd.
+        """Elastic forces, on the left-hand side (43): K q, and of a sleeved link also dU/dd.
 
         -dU/dd is the force that pushes a bent link out of its sleeve (36).
+
+        Args:
+            q: configuration (n,).
+
+        Returns:
+            Generalised forces (n,).
         """
         return self._elastic(self.stiffness_blocks(q), q)
 
@@ -105,7 +133,14 @@ class Assembly:
         return out
 
     def stiffness_blocks(self, q: np.ndarray) -> np.ndarray:
-        """K (n, n), with K(d) of sleeved links: twice the strain energy is q^T K q (9), (35)."""
+        """K, with K(d) of sleeved links: twice the strain energy is q^T K q (9), (35).
+
+        Args:
+            q: configuration (n,).
+
+        Returns:
+            (n, n).
+        """
         K = self._diagonal.copy()
         for i in self._sleeved:
             own = self.structure.own[i][0]
@@ -129,7 +164,14 @@ class Assembly:
         )
 
     def stiffness(self, q: np.ndarray) -> np.ndarray:
-        """The second derivative of the strain energy (n, n), without loads (43)."""
+        """The second derivative of the strain energy, without loads (43).
+
+        Args:
+            q: configuration (n,).
+
+        Returns:
+            (n, n).
+        """
         K = self.stiffness_blocks(q)
         for i in self._sleeved:
             own, row = self.structure.own[i][0], self.rows[i]
@@ -140,7 +182,14 @@ class Assembly:
         return K
 
     def damping(self, q: np.ndarray) -> np.ndarray:
-        """D (n, n): viscous friction of joints, alpha M + beta K of elastic unknowns (26)."""
+        """D: viscous friction of joints, alpha M + beta K of elastic unknowns (26).
+
+        Args:
+            q: configuration (n,).
+
+        Returns:
+            (n, n).
+        """
         return self._damping(self.stiffness_blocks(q), q)
 
     def _damping(self, K: np.ndarray, q: np.ndarray) -> np.ndarray:
@@ -155,13 +204,29 @@ class Assembly:
         return D
 
     def coulomb(self, qd: np.ndarray) -> np.ndarray:
-        """Coulomb friction of the joints (n,), on the left-hand side (57)."""
+        """Coulomb friction of the joints, on the left-hand side (57).
+
+        Args:
+            qd: rates (n,).
+
+        Returns:
+            Generalised forces (n,).
+        """
         out = np.zeros(self.n)
         out[self.rows] = self._coulomb * np.tanh(qd[self.rows] / COULOMB_RATE)
         return out
 
     def forces(self, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
-        """The forces (n,) that a motion needs (59), without Coulomb friction."""
+        """The forces that a motion needs (59), without Coulomb friction.
+
+        Args:
+            q: configuration (n,).
+            qd: its rates (n,).
+            qdd: its accelerations (n,).
+
+        Returns:
+            Generalised forces (n,).
+        """
         return (
             self.mass(q) @ qdd
             + self.bias(q, qd)
@@ -171,7 +236,15 @@ class Assembly:
         )
 
     def terms(self, q: np.ndarray, qd: np.ndarray) -> Terms:
-        """All of (25) but drives and Coulomb friction, in one sweep for a time loop."""
+        """All of (25) but drives and Coulomb friction, in one sweep for a time loop.
+
+        Args:
+            q: configuration (n,).
+            qd: its rates (n,).
+
+        Returns:
+            The terms.
+        """
         states = self.structure.states(q, qd)
         sums, flow = self._inertia(states, self._g)
         K, D = (
@@ -188,12 +261,20 @@ class Assembly:
         return self._diagonal, self.damping(np.zeros(self.n))
 
     def observe(self, q: np.ndarray, qd: np.ndarray, stations: int) -> np.ndarray:
-        """What a Run shows of a state, in the order of `record.channel_units` (4), (6).
+        """What a Run shows of a state, in the order of `recorder.channel_units` (4), (6).
 
-        Link by link x, y [m], angle [rad] of its proximal end; if it bends its tip's distance
-        across the tangent at its hub (sleeve) [m], the tip's angle to it [rad], and that distance
-        at `stations` equally spaced abscissas [m]; then x, y of the tip; kinetic, strain and
+        Link by link x, y [m] and angle [rad] of its proximal end. If it bends, also its tip's
+        distance across the tangent at its hub (sleeve) [m], the tip's angle to it [rad], and that
+        distance at equally spaced abscissas [m]. Then x, y of the tip; kinetic, strain and
         potential energy [J].
+
+        Args:
+            q: configuration (n,).
+            qd: its rates (n,).
+            stations: number of abscissas.
+
+        Returns:
+            The row.
         """
         states, out = self.structure.states(q, qd), []
         for state, link in zip(states, self.robot.links, strict=True):
@@ -209,7 +290,15 @@ class Assembly:
         return np.array([*out, tip.real, tip.imag, *self._energies(states, q, qd)])
 
     def energies(self, q: np.ndarray, qd: np.ndarray) -> Energies:
-        """The energies in a state: kinetic (20), strain (9), of gravity (23)."""
+        """The energies in a state: kinetic (20), strain (9), of gravity (23).
+
+        Args:
+            q: configuration (n,).
+            qd: its rates (n,).
+
+        Returns:
+            Energies [J].
+        """
         return self._energies(self.structure.states(q, qd), q, qd)
 
     def _energies(self, states: list[LinkState], q: np.ndarray, qd: np.ndarray) -> Energies:
@@ -221,24 +310,56 @@ class Assembly:
         )
 
     def loss(self, q: np.ndarray, qd: np.ndarray) -> float:
-        """The power that damping and friction take [W] (28)."""
+        """The power that damping and friction take (28).
+
+        Args:
+            q: configuration (n,).
+            qd: its rates (n,).
+
+        Returns:
+            Power [W].
+        """
         return float(qd @ (self.damping(q) @ qd + self.coulomb(qd)))
 
     def tip(self, q: np.ndarray, qd: np.ndarray | None = None) -> Frame:
-        """The frame of the robot's tip, with the columns of its place and angle (39)."""
+        """The frame of the robot's tip, with the columns of its place and angle (39).
+
+        Args:
+            q: configuration (n,).
+            qd: its rates (n,); None: at rest.
+
+        Returns:
+            The frame.
+        """
         return (self._at_rest(q) if qd is None else self.structure.states(q, qd))[-1].tip
 
     def line(
         self, q: np.ndarray, link: int, s: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """x, y [m] and the tangent's angle [rad] of a link (from 1) at s (S,) [m] along it (3)."""
+        """The shape of a link (3).
+
+        Args:
+            q: configuration (n,).
+            link: its number, from 1.
+            s: abscissas along it (S,) [m].
+
+        Returns:
+            x, y [m] and the tangent's angle [rad], each (S,).
+        """
         state = self._at_rest(q)[link - 1]
         frames = [self.structure.at(state, float(x)) for x in np.atleast_1d(s)]
         place = np.array([f.place for f in frames])
         return place.real, place.imag, np.array([f.angle for f in frames])
 
     def tip_deflections(self, q: np.ndarray) -> np.ndarray:
-        """The tips of the flexible links across the tangents at their hubs (k,) [m]: r_y (6)."""
+        """The tips of the flexible links across the tangents at their hubs: r_y (6).
+
+        Args:
+            q: configuration (n,).
+
+        Returns:
+            (k,) [m].
+        """
         states = [state for state in self._at_rest(q) if state.lines]
         return np.array(
             [((s.tip.place - s.hub.place) * s.hub.tangent.conjugate()).imag for s in states]

@@ -20,11 +20,14 @@ KINDS = ("R", "Pa", "Pb")
 def equations(robot: Robot) -> Any:
     """The compiled equations of a robot.
 
-    Args: robot: its description.
+    Args:
+        robot: its description.
 
-    Returns: a `core.Mechanics`.
+    Returns:
+        A `core.Mechanics`.
 
-    Raises: InputError: the core refuses the robot; the key is that of the robot file.
+    Raises:
+        InputError: the core refuses the robot; the key is that of the robot file.
     """
     counts, numbers, parts = rows(robot)
     payload = np.array([robot.payload.mass_kg, robot.payload.inertia_kg_m2])

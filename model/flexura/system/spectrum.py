@@ -26,19 +26,22 @@ class Modes:
 def frequencies(
     robot: Any, q: Any = None, joints: str = "locked", *, count: int | None = None, qd: Any = None
 ) -> np.ndarray:
-    """Natural frequencies [Hz], ascending, of the undamped robot linearised about q (n,) (52),
-    (54).
+    """Natural frequencies of the undamped, linearised robot, ascending (52), (54).
 
-    Args: robot: a System, a Robot, or a robot file; q (n,): by default the static equilibrium at
-    the start; joints: "locked" (only
-        the elastic unknowns move) or "free" (rigid motions come out as 0); count: the lowest so
-        many, by default all; qd (n,): joint rates of a steady motion, for example a rotation at
-        constant speed, joints locked to it.
+    Args:
+        robot: a System, a Robot, or the path or name of a robot file.
+        q: configuration (n,); None: the static equilibrium at the start.
+        joints: "locked" (only the elastic unknowns move) or "free" (rigid motions come out as 0).
+        count: how many of the lowest; None: all.
+        qd: joint rates of a steady motion (n,), for example a rotation at constant speed; joints
+            are locked to it.
 
-    Returns: (k,). Frequencies of unstable directions are 0.
+    Returns:
+        (k,) [Hz]. Frequencies of unstable directions are 0.
 
-    Raises: InputError: an argument is not what is expected. NoEquilibrium: q is not given and there
-    is no static equilibrium.
+    Raises:
+        InputError: an argument is not what is expected.
+        NoEquilibrium: q is not given and there is no static equilibrium.
     """
     system = assemble(robot)
     _check(joints, count)
@@ -55,8 +58,17 @@ def frequencies(
 
 
 def modes(robot: Any, q: Any = None, joints: str = "locked", *, count: int | None = None) -> Modes:
-    """Natural modes of the undamped robot linearised about q (n,). Arguments and errors as in
-    `frequencies`."""
+    """Natural modes of the undamped, linearised robot. Errors as in `frequencies`.
+
+    Args:
+        robot: a System, a Robot, or the path or name of a robot file.
+        q: configuration (n,); None: the static equilibrium at the start.
+        joints: "locked" or "free".
+        count: how many of the lowest; None: all.
+
+    Returns:
+        Frequencies [Hz], ascending, and shapes.
+    """
     system = assemble(robot)
     _check(joints, count)
     return _eigenmodes(

@@ -90,14 +90,23 @@ class StateSpace:
         return _roots(np.eye(len(self.M)), _scaled(R, self.G), _scaled(R, self.K))
 
     def zeros(self, drive: str, output: str) -> np.ndarray:
-        """Transmission zeros from an input to an output [1/s], by magnitude: where the output stays
-        0 while the drive acts.
+        """Transmission zeros from an input to an output, by magnitude: where the output stays 0
+        while the drive acts.
 
         Motions with c dq = 0 in the directions that the drive does not push, L^T (s^2 M + s G + K)
         N z = 0, N = ker c, L = ker b (56): the finite invariant zeros of the pencil
         [[A - s, B], [C, 0]], without its infinite ones. Those with a positive real part
-        (non-minimum phase) bound what feedback of that output can do. Raises InputError for unknown
-        names, and for an output that the drive does not move.
+        (non-minimum phase) bound what feedback of that output can do.
+
+        Args:
+            drive: name of the input, for example "joint/1/drive".
+            output: name of the output, for example "tip/x".
+
+        Returns:
+            Zeros (k,) [1/s], complex.
+
+        Raises:
+            InputError: unknown names, or an output that the drive does not move.
         """
         from scipy.linalg import cholesky, null_space, solve_triangular
 
@@ -123,21 +132,34 @@ class StateSpace:
         return _roots(L.T @ N, L.T @ G @ N, L.T @ K @ N)
 
     def transfer(self, s: complex) -> np.ndarray:
-        """C (s - A)^-1 B at a complex frequency s [1/s], (outputs, inputs)."""
+        """The transfer matrix C (s - A)^-1 B.
+
+        Args:
+            s: complex frequency [1/s].
+
+        Returns:
+            (outputs, inputs), complex.
+        """
         return self.outlook @ np.linalg.solve(s * s * self.M + s * self.G + self.K, self.E)
 
 
 def linearize(robot: Any, q: Any = None, qd: Any = None, joints: str = "free") -> StateSpace:
-    """The robot linearised about an equilibrium q (n,), by default the static one at the start, or
-    about a steady motion (52).
+    """The robot linearised about an equilibrium, or about a steady motion (52).
 
-    Args: robot: a System, a Robot, or a robot file; q (n,); qd (n,): joint rates of a steady
-    motion, a rotation or translation of the
-        whole robot, whose elastic equilibrium is found where q is not given; `tip/x`, `tip/y` are
-        then along axes that turn with it; joints: "free", or "locked": only the elastic unknowns
-        move, and there are no inputs.
+    Args:
+        robot: a System, a Robot, or the path or name of a robot file.
+        q: equilibrium (n,); None: the static one at the start.
+        qd: joint rates (n,) of a steady motion, a rotation or translation of the whole robot, whose
+            elastic equilibrium is found where q is not given. `tip/x`, `tip/y` are then along axes
+            that turn with it.
+        joints: "free", or "locked": only the elastic unknowns move, and there are no inputs.
 
-    Raises: InputError: q, qd are no equilibrium. FlexuraError: none is found.
+    Returns:
+        The StateSpace A, B, C, D with the names of states, inputs and outputs.
+
+    Raises:
+        InputError: q, qd are no equilibrium.
+        FlexuraError: none is found.
     """
     system = assemble(robot)
     choice(joints, "joints", ("free", "locked"))

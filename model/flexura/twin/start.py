@@ -75,9 +75,18 @@ def resolve_start(robot: Robot, start: Any, speeds: np.ndarray) -> str:
 
 
 def equilibrium(robot: Robot, beam: str, mesh: Mesh) -> np.ndarray:
-    """The coordinates of a robot with this mesh in static equilibrium, without the reference.
+    """The coordinates of a robot in static equilibrium, without the reference.
 
-    Raises: FlexuraError: Exudyn finds none.
+    Args:
+        robot: the robot, with its joints at their start.
+        beam: "ancf" or "ge".
+        mesh: elements, hubs and sleeves.
+
+    Returns:
+        Displacements of all coordinates.
+
+    Raises:
+        FlexuraError: Exudyn finds none.
     """
     n = len(robot.links)
     for steps in LOAD_STEPS:

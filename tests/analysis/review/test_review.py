@@ -19,7 +19,7 @@ from flexlab.runs.deviation import deviation
 from flexura.errors import FlexuraError, InputError
 from flexura.io import Run, drawing
 from flexura.robot import Robot, load
-from flexura.simulation.recorder import observed
+from flexura.simulation.recorder import recorded_channels
 
 RIG = load(Path(__file__).parents[3] / "model" / "robots" / "rig.toml")
 STRIP = RIG.to_dict()["link"][1]
@@ -352,7 +352,7 @@ def test_an_elastica_of_any_size_ends_at_the_tip_of_the_model(force):
     strip |= {"mass_per_length_kg_m": 0.2, "bending_stiffness_N_m2": 2.0}
     system = fx.assemble(Robot.from_dict({"link": [strip]}))
     q = fx.static(system, tip_force=force)
-    names, row = observed(system.robot), system.observe(q[None], 0 * q[None])
+    names, row = recorded_channels(system.robot), system.observe(q[None], 0 * q[None])
     run = Run(
         np.zeros(1),
         {name: row[:, k] for k, name in enumerate(names)},

@@ -24,7 +24,7 @@ from flexlab.tuning.closed_loop import closed_loop_controller
 from flexlab.tuning.executor import ThreadExecutor
 from flexlab.tuning.history import FILE, History
 from flexlab.tuning.objective import FAILURE_COST, Weights
-from flexlab.tuning.result import figures, result
+from flexlab.tuning.result import metrics, result
 from flexlab.tuning.search import Search, _winners, search
 from flexlab.tuning.search_space import free_gain
 from flexlab.tuning.task import perturbed_robots
@@ -124,7 +124,7 @@ def test_a_row_is_the_run_of_simulate_and_rows_do_not_know_of_each_other():
         system = fx.assemble(ROBOT)
         controller = closed_loop_controller(system, SWING, tuned)
         run = fx.simulate(system, np.arange(0, 1001, 5) / 1000, controller, rtol=1e-6)
-        direct = figures(run, controller)
+        direct = metrics(run, controller)
         assert np.array_equal(
             np.delete(direct.joints[0], 5), np.delete(found[k, 0, :6], 5), equal_nan=True
         )

@@ -21,7 +21,7 @@ from flexlab.tuning.executor import ThreadExecutor
 from flexlab.tuning.history import History
 from flexlab.tuning.lqr_reference import LqrDesigns
 from flexlab.tuning.objective import FAILURE_COST, split_metrics
-from flexlab.tuning.result import figures, simulate_tuned
+from flexlab.tuning.result import metrics, simulate_tuned
 from flexlab.tuning.search import Search, search
 from flexlab.tuning.search_space import settings
 from flexlab.tuning.task import perturbed_robots
@@ -91,7 +91,7 @@ def test_an_lqrs_figures_are_those_of_its_run_within_the_cases_drive_limits(monk
     run = fx.simulate(
         designs.plant, designs.structure.manoeuvre.t, controller, rtol=designs.task.rtol
     )
-    direct = figures(run, controller)
+    direct = metrics(run, controller)
     joints, strip = split_metrics(found)
     assert direct.joints[:, :5] == pytest.approx(
         joints[0, 0, :, :5], rel=1e-7, abs=1e-9, nan_ok=True
@@ -197,7 +197,7 @@ def test_the_emulated_rig_does_what_the_simulation_says(tmp_path):
     given, system = gains.load(file), fx.assemble(robot)
     tuned = gains.Gains(given.settings, outputs)
     asked = cases.type_4().manoeuvre
-    measured = figures(cut, closed_loop_controller(system, asked, tuned))
+    measured = metrics(cut, closed_loop_controller(system, asked, tuned))
     _, expected = simulate_tuned(system, asked, tuned)
     print(
         "emulated",

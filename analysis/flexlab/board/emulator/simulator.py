@@ -71,6 +71,8 @@ class Window(ctypes.Structure):
 
 
 class Edge(ctypes.Structure):
+    """A change of a traced line: at which cycle, which line, and its level from then on."""
+
     _fields_ = (("cycle", c_uint64), ("line", c_uint32), ("level", c_uint32))
 
 
@@ -183,6 +185,7 @@ class Simulator:
         self._bytes, self._edges = (c_uint8 * _ROOM)(), (Edge * _ROOM)()
 
     def close(self) -> None:
+        """Free the emulated processor."""
         if self._board:
             self._lib.board_free(self._board)
             self._board = c_void_p()
@@ -197,10 +200,12 @@ class Simulator:
 
     @property
     def cycle(self) -> int:
+        """Cycles of the processor since the start."""
         return self._lib.board_cycle(self._board)
 
     @property
     def pc(self) -> int:
+        """The program counter [bytes]."""
         return self._lib.board_pc(self._board)
 
     def line(
@@ -220,6 +225,12 @@ class Simulator:
         self._lib.board_cut(self._board, line, broken)
 
     def trace(self, line: int, on: bool) -> None:
+        """Record the edges of a line, or stop doing so.
+
+        Args:
+            line: its number.
+            on: whether edges are recorded.
+        """
         self._lib.board_trace(self._board, line, on)
 
     def encoder(self, number: int, a: tuple[str, int], b: tuple[str, int]) -> None:
@@ -242,6 +253,12 @@ class Simulator:
         self._lib.board_stick(self._board, port.encode(), bit, -1 if level is None else int(level))
 
     def adc(self, channel: int, millivolts: int) -> None:
+        """Set the voltage at an analogue input.
+
+        Args:
+            channel: of the converter.
+            millivolts: the voltage [mV].
+        """
         self._lib.board_adc(self._board, self.cycle, channel, millivolts)
 
     def send(self, data: bytes) -> None:
@@ -274,11 +291,26 @@ class Simulator:
         self._lib.board_reset(self._board, RESET_CAUSES[cause])
 
     def read_eeprom(self, offset: int, size: int) -> bytes:
+        """Bytes of the EEPROM.
+
+        Args:
+            offset: of the first byte.
+            size: number of bytes.
+
+        Returns:
+            The bytes.
+        """
         got = (c_uint8 * size)()
         self._lib.board_eeprom(self._board, 0, got, offset, size)
         return bytes(got)
 
     def write_eeprom(self, offset: int, data: bytes) -> None:
+        """Write bytes into the EEPROM.
+
+        Args:
+            offset: of the first byte.
+            data: the bytes.
+        """
         self._lib.board_eeprom(self._board, 1, (c_uint8 * len(data))(*data), offset, len(data))
 
     def symbol(self, name: str) -> int:

@@ -64,6 +64,14 @@ class Deframer:
         self._rest = b""
 
     def feed(self, data: bytes) -> list[bytes]:
+        """Take received bytes.
+
+        Args:
+            data: the bytes; a frame may be spread over several calls.
+
+        Returns:
+            The payloads of the good frames that they complete. `bad` counts the others.
+        """
         *frames, rest = (self._rest + data).split(b"\0")
         self._rest = rest[-MAX_PENDING:]
         payloads = [(frame, decode(frame)) for frame in frames if frame]

@@ -15,7 +15,9 @@ from ...system.assembly import COULOMB_RATE, Terms
 class Equations:
     """The dense equations (25) under a drive.
 
-    Args: drive: a Drive, a function of four arguments, or None where `held` has the forces.
+    Args:
+        system: the robot.
+        drive: a Drive, a function of four arguments, or None where `held` has the forces.
     """
 
     def __init__(self, system: System, drive: Drive | Callable[..., np.ndarray] | None) -> None:

@@ -35,6 +35,9 @@ class Frame(NamedTuple):
             slide: velocity along this frame [m/s].
             turn: rotation [rad].
             spin: additional angular velocity [rad/s].
+
+        Returns:
+            The frame.
         """
         c, n = self.axis
         return Frame(
@@ -78,27 +81,73 @@ class Part(Protocol):
     tip: Attachment
 
     def motion_at_origin(self, q: np.ndarray, v: np.ndarray) -> Motion:
-        """Motion of the link's origin."""
+        """Motion of the link's origin.
+
+        Args:
+            q: coordinates of the part's nodes (T, k).
+            v: their velocities (T, k).
+
+        Returns:
+            The motion.
+        """
         ...
 
     def motion_at_tip(self, q: np.ndarray, v: np.ndarray) -> Motion:
-        """Motion of the link's tip."""
+        """Motion of the link's tip.
+
+        Args:
+            q: coordinates of the part's nodes (T, k).
+            v: their velocities (T, k).
+
+        Returns:
+            The motion.
+        """
         ...
 
     def point(self, q: np.ndarray, x: float) -> np.ndarray:
-        """The material point x [m] from the origin, (T, 2) [m]."""
+        """A material point of the link.
+
+        Args:
+            q: coordinates of the part's nodes (T, k).
+            x: distance from the origin [m].
+
+        Returns:
+            Its place (T, 2) [m].
+        """
         ...
 
     def kinetic(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Kinetic energy [J], (T,)."""
+        """Kinetic energy.
+
+        Args:
+            q: coordinates of the part's nodes (T, k).
+            v: their velocities (T, k).
+
+        Returns:
+            (T,) [J].
+        """
         ...
 
     def strain(self, q: np.ndarray) -> np.ndarray:
-        """Strain energy of bending, axial and shear strains [J], (T,)."""
+        """Strain energy of bending, axial and shear strains.
+
+        Args:
+            q: coordinates of the part's nodes (T, k).
+
+        Returns:
+            (T,) [J].
+        """
         ...
 
     def moment(self, q: np.ndarray) -> np.ndarray:
-        """The integral of position over mass [kg m], (T, 2)."""
+        """The integral of position over mass.
+
+        Args:
+            q: coordinates of the part's nodes (T, k).
+
+        Returns:
+            (T, 2) [kg m].
+        """
         ...
 
 
@@ -110,7 +159,14 @@ class PointMass:
     inertia: float = 0.0
 
     def kinetic(self, motion: Motion) -> np.ndarray:
-        """Kinetic energy (T,) [J]."""
+        """Kinetic energy of the mass.
+
+        Args:
+            motion: of its node over time.
+
+        Returns:
+            (T,) [J].
+        """
         return 0.5 * self.mass * (motion.v**2).sum(axis=-1) + 0.5 * self.inertia * motion.omega**2
 
 
@@ -123,7 +179,14 @@ class Ground:
 
     @staticmethod
     def add(mbs: Any) -> Ground:
-        """Add the base to Exudyn's system."""
+        """Add the base to Exudyn's system.
+
+        Args:
+            mbs: Exudyn's system.
+
+        Returns:
+            The base.
+        """
 
         body = mbs.AddObject(eii.ObjectGround())
         here = Attachment(
@@ -133,7 +196,14 @@ class Ground:
 
     @staticmethod
     def motion(times: int) -> Motion:
-        """The base's motion at a number of times: none."""
+        """The base's motion: none.
+
+        Args:
+            times: number of times T.
+
+        Returns:
+            Zeros.
+        """
         return Motion(np.zeros((times, 2)), np.zeros(times), np.zeros((times, 2)), np.zeros(times))
 
 

@@ -49,6 +49,9 @@ def beam_values(link: Link, elements: int) -> BeamValues:
     Args:
         link: the link.
         elements: their number.
+
+    Returns:
+        The values.
     """
     ends = np.linspace(0.0, link.length_m, elements + 1)
     kinks = np.array(link.breaks())
@@ -128,7 +131,14 @@ class Inertia(NamedTuple):
 
 
 def link_inertia(link: Link) -> Inertia:
-    """Inertia of a rigid link, without hub and payload."""
+    """Inertia of a rigid link, without hub and payload.
+
+    Args:
+        link: the link.
+
+    Returns:
+        Mass [kg], centre [m] and inertia [kg m^2].
+    """
     if link.mass_kg is not None:
         return Inertia(link.mass_kg, _centre(link), link.inertia_kg_m2 or 0.0)
     return _spread_inertia(link)
