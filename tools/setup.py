@@ -78,7 +78,6 @@ BOARD = [
 CLANG = Need(
     "clang++", "clang", "the core is not tried with a second compiler", False
 )  # for continuous integration
-BUILDERS = ["cmake", "nanobind", "ninja", "scikit-build-core"]
 # The environment is linked to the Python files in this checkout; build_core puts the compiled
 # modules beside them.
 LINKED = ["--no-build-isolation", "-C", "editable.mode=inplace", "-C", "wheel.cmake=false"]
@@ -301,21 +300,12 @@ def set_up(venv: Path) -> None:
             ROOT / "build", ignore_errors=True
         )  # CMake's folders know the place and the Python too
         step("environment", [python.path, "-m", "venv", "--clear", str(venv)])
-    pip = [
-        inside,
-        "-m",
-        "pip",
-        "install",
-        "-q",
-        "--disable-pip-version-check",
-        "-c",
-        "constraints.txt",
-    ]
-    step("what compiles the core", [*pip, *BUILDERS])
+    pip = [inside, "-m", "pip", "install", "-q", "--disable-pip-version-check"]
     step(
         "Python packages (about 400 MB to download the first time)",
-        [*pip, *LINKED, "-e", ".[test]"],
+        [*pip, "--require-hashes", "--only-binary", ":all:", "-r", "constraints.txt"],
     )
+    step("the project itself", [*pip, "--no-deps", *LINKED, "-e", "."])
     for link in venv.glob("lib/python*/site-packages/_editable_*flexura.pth"):
         paths = [line for line in link.read_text().splitlines() if not line.startswith("import ")]
         link.write_text(
