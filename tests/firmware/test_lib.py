@@ -1,7 +1,6 @@
 """The firmware's portable library on this computer: sanitizers, independent computations, and its
 own unit tests."""
 
-import binascii
 import ctypes
 import itertools
 import json
@@ -9,6 +8,7 @@ import re
 import shutil
 import subprocess
 import sys
+import zlib
 from dataclasses import replace
 from pathlib import Path
 
@@ -52,7 +52,7 @@ def lib(tmp_path_factory):
         str(HERE / "library.cpp"),
     ]
     library = ctypes.CDLL(str(compiled(path, *arguments)))
-    library.c_crc.restype = ctypes.c_uint16
+    library.c_crc.restype = ctypes.c_uint32
     return library
 
 
@@ -78,7 +78,7 @@ def test_board_and_host_read_each_others_frames(lib, code, sequence, fields):
 
 @given(st.binary(max_size=300))
 def test_crc_is_the_standard_librarys(lib, data):
-    assert lib.c_crc(data, len(data)) == binascii.crc_hqx(data, 0xFFFF)
+    assert lib.c_crc(data, len(data)) == zlib.crc32(data)
 
 
 @given(st.lists(st.sampled_from([1, -1]), max_size=400))
@@ -360,6 +360,20 @@ def test_ten_million_random_and_mutated_bytes(tmp_path):
     assert (
         found and int(found[1]) >= 10_000_000 and int(found[2]) > 50_000 and int(found[3]) > 5_000
     )
+
+
+@pytest.mark.parametrize(
+    ("frames", "seed"), [(1_000_000, 1), pytest.param(10_000_000, 2, marks=pytest.mark.slow)]
+)
+def test_no_damaged_frame_is_obeyed(tmp_path, frames, seed):
+    """Commands that would be obeyed but for their damage. A CRC of 16 bits takes 8 of 10^7 for
+    whole and one is obeyed; of the CRC-32 2^16 times fewer are expected, 1e-4 of them."""
+    program = compiled(
+        tmp_path / "damaged", "-std=gnu++14", "-O2", str(HERE / "damaged_frames.cpp")
+    )
+    done = subprocess.run([program, str(frames), str(seed)], capture_output=True, text=True)
+    said = f"{frames} damaged frames, 0 taken for whole, 0 obeyed\n"
+    assert (done.returncode, done.stdout) == (0, said), done.stderr
 
 
 @pytest.mark.parametrize(
