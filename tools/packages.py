@@ -1,6 +1,6 @@
 """The packages that the project is tested with: exact versions, licences, bill of materials.
 
-    python tools/packages.py lock [options of uv]   constraints.txt anew, with the hashes of all files
+    python tools/packages.py lock [options of uv]   constraints.txt anew, with hashes of all files
     python tools/packages.py licences               a table: package, version, licence
     python tools/packages.py sbom FILE              CycloneDX 1.5 in JSON
 

@@ -3,9 +3,9 @@
     python tools/wheel.py [folder]        by default dist
 
 The same sources give the same bytes: files carry the time of the last commit, or SOURCE_DATE_EPOCH,
-and no path of the machine. On Linux the wheel gets the manylinux tag that this machine's libraries allow: on an older system it
-is installed on more machines. Of the platforms in pyproject.toml's [tool.cibuildwheel] only Linux
-on x86-64 has been tried.
+and no path of the machine. On Linux the wheel gets the manylinux tag that this machine's libraries
+allow: on an older system it is installed on more machines. Of the platforms in pyproject.toml's
+[tool.cibuildwheel] only Linux on x86-64 has been tried.
 """
 
 from __future__ import annotations

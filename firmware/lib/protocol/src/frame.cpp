@@ -27,7 +27,8 @@ const uint32_t kSteps[256] PROGMEM = {SIXTY_FOUR(0), SIXTY_FOUR(64), SIXTY_FOUR(
 #undef SIXTY_FOUR
 }  // namespace
 
-uint32_t crc32(const uint8_t *data, uint16_t size, uint32_t crc) {
+// Not inlined: its unrolled loop in every place that asks for it took 10 KB.
+__attribute__((noinline)) uint32_t crc32(const uint8_t *data, uint16_t size, uint32_t crc) {
   crc = ~crc;
   while (size--) crc = crc >> 8 ^ pgm_read_dword(&kSteps[static_cast<uint8_t>(crc) ^ *data++]);
   return ~crc;
