@@ -123,7 +123,8 @@ def test_a_second_compiler_is_for_those_who_ask(monkeypatch):
 
     assert setup.missing(DEBIAN, no_clang, LAVAPIPE, "linux") == []
     monkeypatch.setenv("REQUIRE_CLANG", "1")
-    assert setup.missing(DEBIAN, no_clang, LAVAPIPE, "linux") == [setup.CLANG]
+    assert setup.missing(DEBIAN, no_clang, LAVAPIPE, "linux") == [setup.CLANG[0]]
+    assert setup.missing(DEBIAN, lambda name: "clang" not in name, LAVAPIPE, "linux") == setup.CLANG
 
 
 def test_on_debian_without_rights_the_command_to_type_is_exact():
@@ -241,13 +242,13 @@ def test_only_files_with_a_known_hash_are_installed():
 
 
 @pytest.mark.parametrize(
-    ("name", "systems"),
-    [("numpy", 4), ("rerun-sdk", 4), ("exudyn", 3), ("cmake", 4)],
+    ("name", "files"),
+    [("numpy", 20), ("rerun-sdk", 4), ("exudyn", 4), ("cmake", 10), ("scipy", 20)],
 )
-def test_the_hashes_are_those_of_all_systems(name, systems):
+def test_the_hashes_are_those_of_all_systems(name, files):
     """A wheel of each system and Python is more than the one or two files of this machine."""
     (package,) = (one for one in packages_tool.locked() if one.name == name)
-    assert len(package.hashes) > systems
+    assert len(package.hashes) >= files
 
 
 def test_a_replaced_file_is_refused(tmp_path):

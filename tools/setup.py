@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import ctypes
 import fcntl
+import glob
 import os
 import shutil
 import signal
@@ -75,9 +76,16 @@ BOARD = [
     Need("/usr/include/simavr/sim_avr.h", "libsimavr-dev", NO_EMULATOR, False),
     Need("simavr", "simavr", "no unit tests on the AVR", False),
 ]
-CLANG = Need(
-    "clang++", "clang", "the core is not tried with a second compiler", False
-)  # for continuous integration
+# For continuous integration.
+CLANG = [
+    Need("clang++", "clang", "the core is not tried with a second compiler", False),
+    Need(
+        "/usr/lib/llvm-*/lib/clang/*/lib/linux/libclang_rt.fuzzer-*.a",
+        "libclang-rt-dev",
+        "the board's receiver is not tried by a fuzzer",
+        False,
+    ),
+]
 # The environment is linked to the Python files in this checkout; build_core puts the compiled
 # modules beside them.
 LINKED = ["--no-build-isolation", "-C", "editable.mode=inplace", "-C", "wheel.cmake=false"]
@@ -85,9 +93,10 @@ DRIVER = Need("a Vulkan driver", "mesa-vulkan-drivers", NO_PICTURE, False)
 
 
 def has(what: str) -> bool:
-    """Whether the dynamic loader finds a library, the PATH a program, the disk a file."""
+    """Whether the dynamic loader finds a library, the PATH a program, the disk a file (a pattern
+    of names will do)."""
     if what.startswith("/"):
-        return Path(what).exists()
+        return bool(glob.glob(what))
     if ".so" not in what:
         return shutil.which(what) is not None
     try:
@@ -141,7 +150,8 @@ def missing(
     if system == "linux":  # on macOS the wheels use the system's own frameworks
         needs += [need for need in [*LIBRARIES, *BOARD] if not has(need.what)]
         needs += [] if drivers else [DRIVER]
-        needs += [CLANG] if os.environ.get("REQUIRE_CLANG") and not has(CLANG.what) else []
+        clang = CLANG if os.environ.get("REQUIRE_CLANG") else []
+        needs += [need for need in clang if not has(need.what)]
     return needs
 
 
