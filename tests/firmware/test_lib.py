@@ -344,9 +344,7 @@ def test_three_million_random_and_mutated_bytes(tmp_path):
     done = subprocess.run([fuzz, "3000000", "7"], capture_output=True, text=True, timeout=250)
     assert done.returncode == 0, done.stderr
     found = re.fullmatch(r"(\d+) bytes, (\d+) good frames, (\d+) commands obeyed\s*", done.stdout)
-    assert (
-        found and int(found[1]) >= 3_000_000 and int(found[2]) > 15_000 and int(found[3]) > 1_500
-    )
+    assert found and int(found[1]) >= 3_000_000 and int(found[2]) > 15_000 and int(found[3]) > 1_500
 
 
 @pytest.mark.parametrize(
@@ -365,7 +363,10 @@ def test_no_damaged_frame_is_obeyed(tmp_path, frames, seed):
 
 @pytest.mark.parametrize(
     "environment, suites",
-    [("native", {"test_lib"}), ("simavr", {"test_lib", "test_interrupts"})],
+    [
+        ("native", {"test_lib", "test_refusals"}),
+        ("simavr", {"test_lib", "test_refusals", "test_interrupts"}),
+    ],
 )
 def test_the_unit_tests_run_here_and_on_the_avr(environment, suites, tmp_path):
     """The same file on this computer, with sanitizers, and on an emulated AVR, where the interrupt
