@@ -57,6 +57,7 @@ NAMES = [*BOARD, *HOST]
 MAINS = {
     "unit": [f"-I{FIRMWARE / 'test'}", str(FIRMWARE / "test/test_lib/test_main.cpp")],
     "refusals": [f"-I{FIRMWARE / 'test'}", str(FIRMWARE / "test/test_refusals/test_main.cpp")],
+    "faults": [f"-I{FIRMWARE / 'test'}", str(FIRMWARE / "test/test_faults/test_main.cpp")],
     "frames": [str(HERE / "fuzz_frames.cpp")],
     "replay": ["-DREPLAY", str(HERE / "fuzz_session.cpp")],
 }

@@ -364,8 +364,8 @@ def test_no_damaged_frame_is_obeyed(tmp_path, frames, seed):
 @pytest.mark.parametrize(
     "environment, suites",
     [
-        ("native", {"test_lib", "test_refusals"}),
-        ("simavr", {"test_lib", "test_refusals", "test_interrupts"}),
+        ("native", {"test_lib", "test_refusals", "test_faults"}),
+        ("simavr", {"test_lib", "test_refusals", "test_faults", "test_interrupts"}),
     ],
 )
 def test_the_unit_tests_run_here_and_on_the_avr(environment, suites, tmp_path):
