@@ -117,8 +117,9 @@ class Board:
         return made
 
     def notices(self, mutant: mutants.Mutant | None, source: Path) -> str | None:
-        """The name of the first program that fails; None: no program notices the mutant."""
-        mutated = self.objects[str(source)]
+        """The name of the first program that fails; None: no program notices the mutant. Of a
+        header the unit tests are compiled again too: they have objects of its classes."""
+        mutated, mains = self.objects[str(source)], dict(self.mains)
         if mutant:
             place = self.folder / "mutant"
             shutil.rmtree(place, ignore_errors=True)
@@ -130,10 +131,14 @@ class Board:
                 shutil.copy(source, own)
             try:
                 mutated = self.compiled(own, f"-I{place}", out="mutant.o")
+                for name in ("unit", "refusals") if mutant.file.endswith(".h") else ():
+                    mains[name] = place / f"{name}.o"
+                    before = [*CXX, f"-I{place}", *INCLUDES, *MAINS[name], "-c"]
+                    subprocess.run([*before, "-o", str(mains[name])], check=True)
             except subprocess.CalledProcessError:
                 return "the compiler"
         others = [str(o) for s, o in self.objects.items() if s != str(source)]
-        for name, main in self.mains.items():
+        for name, main in mains.items():
             program = str(self.folder / name)
             linked = ["g++", str(mutated), str(main), *others, "-o", program]
             subprocess.run(linked, check=True)

@@ -14,6 +14,7 @@ import os
 import shutil
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -45,9 +46,21 @@ def build(folder: Path, root: Path = ROOT) -> Path:
         (wheel,) = repaired.glob("*.whl")
     for old in folder.glob("flexura-*.whl"):
         old.unlink()
-    out = Path(shutil.move(wheel, folder))
+    out = folder / wheel.name
+    without_rights(wheel, out)
     shutil.rmtree(raw)
     return out
+
+
+def without_rights(wheel: Path, out: Path) -> None:
+    """The same wheel; the rights of its files are the usual ones, not those of this checkout."""
+    with zipfile.ZipFile(wheel) as old, zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as new:
+        for about in old.infolist():
+            made = zipfile.ZipInfo(about.filename, about.date_time)
+            made.create_system = 3  # Unix
+            made.external_attr = 0o100644 << 16
+            made.compress_type = zipfile.ZIP_DEFLATED
+            new.writestr(made, old.read(about))
 
 
 def run(command: list[str], env: dict[str, str] | None = None) -> None:

@@ -28,6 +28,35 @@ static void a_sum_of_errors_stops_at_both_limits() {
   }
 }
 
+static void the_least_gains_and_rates_count() {
+  const PidGains none;
+  CHECK(!none.fine && none.kp == 0 && none.ki == 0 && none.kd == 0 && none.kf == 0);
+  CHECK(none.kg == 0 && none.kv == 0 && none.kc == 0 && none.limit == 0 && none.slew == 0);
+  PidGains gains;
+  gains.limit = 1000;
+  gains.slew = 1000;
+  Pid fresh;
+  CHECK(fresh.output() == 0);
+  // Sums are in 2^-16 of u: what kd = 1 makes of a rate of 25600 is the rest to 1.
+  gains.kd = 1;
+  PidSignals in = {0, -25600, 0, 65536L - 25600};
+  CHECK(fresh.update(gains, in) == 1);
+  gains.kd = 0;
+  gains.kc = 70;
+  for (int16_t rate = -2; rate <= 2; ++rate) {
+    in = {0, 0, rate, 0};
+    CHECK(fresh.update(gains, in) == (rate > 0 ? 70 : rate < 0 ? -70 : 0));
+  }
+  // ki = 1 is 2^-32: the last of 2^32 makes a unit of u.
+  gains.kc = 0;
+  gains.ki = 1114129L;  // times 3855 it is 2^32 - 1
+  in = {3855L * 256, 0, 0, 0};
+  CHECK(fresh.update(gains, in) == 0);
+  gains.ki = 1;
+  in = {256, 0, 0, 0};
+  CHECK(fresh.update(gains, in) == 1);
+}
+
 // ---- settings
 
 struct Setting {
@@ -593,6 +622,7 @@ static void a_repeated_command_has_its_own_answer_again() {
 static void tests() {
   RUN(sums_at_the_ends_of_32_bits_stay_there);
   RUN(a_sum_of_errors_stops_at_both_limits);
+  RUN(the_least_gains_and_rates_count);
   RUN(settings_that_do_not_fit_the_boards_numbers_are_named);
   RUN(stored_settings_that_are_wrong_are_not_used);
   RUN(arming_asks_for_settings_firmware_mode_and_inputs);
