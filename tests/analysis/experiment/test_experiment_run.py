@@ -13,7 +13,7 @@ import flexura as fx
 from experiments import BENCH, SETTINGS, board, experiment
 from flexlab import rig
 from flexlab.board.base import BoardError
-from flexlab.board.protocol import messages
+from flexlab.board.protocol import frames, messages
 from flexlab.board.protocol.declaration import DECLARATION, Fault
 from flexlab.cli.bench_tables import live_table, result_table, selftest_table
 from flexlab.experiment import plan as plans
@@ -24,9 +24,8 @@ from flexlab.recordings.unit_conversion import UNITS, Sensor, planned_setpoints
 from flexura.io import write_toml
 from flexura.signals import harmonic
 
-FRAME_BYTES = (
-    messages.HEAD_BYTES + messages.TELEMETRY.itemsize + 4
-)  # with CRC, COBS and the zero byte
+# With CRC, COBS and the zero byte.
+FRAME_BYTES = messages.HEAD_BYTES + messages.TELEMETRY.itemsize + frames.CRC_BYTES + 2
 
 
 @pytest.fixture(scope="module")
