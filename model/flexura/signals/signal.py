@@ -23,6 +23,20 @@ from ..errors import InputError
 from ..io import array, finite_arguments
 
 COLUMNS = 10  # t0, c0 ... c5, A, w, phi
+FEW = 8  # segments that are looked through one by one
+
+
+def _segment(segments: np.ndarray, t: float) -> list[float]:
+    """The last one of segments (k, 10) that starts at or before t, else the first."""
+    if len(segments) > FEW:
+        low = max(int(np.searchsorted(segments[:, 0], t, side="right")) - 1, 0)
+        row: list[float] = segments[low].tolist()
+        return row
+    rows: list[list[float]] = segments.tolist()
+    for row in reversed(rows):
+        if row[0] <= t:
+            return row
+    return rows[0]
 
 
 def evaluate(segments: np.ndarray, t: float) -> tuple[float, float, float]:
@@ -37,9 +51,7 @@ def evaluate(segments: np.ndarray, t: float) -> tuple[float, float, float]:
     """
     if len(segments) == 0:
         return 0.0, 0.0, 0.0
-    # the last segment that starts at or before t
-    low = max(int(np.searchsorted(segments[:, 0], t, side="right")) - 1, 0)
-    t0, c0, c1, c2, c3, c4, c5, A, w, phi = segments[low].tolist()
+    t0, c0, c1, c2, c3, c4, c5, A, w, phi = _segment(segments, t)
     s = t - t0
     if s < 0.0:  # before the first segment: hold
         return c0 + A * math.sin(phi), 0.0, 0.0
