@@ -5,31 +5,17 @@
 #include "numbers/quadrature.hpp"
 
 namespace flexura {
-namespace {
-
-template <class Real>
-bool bends(const Model<Real> &model, int link) {
-  return model.elastic[std::size_t(link)] > 0;
-}
-
-// The first piece of a link that moves with it: behind its sleeve, if it has one.
-template <class Real>
-int first_moving(const Model<Real> &model, int link) {
-  return model.begin[std::size_t(link)] + (model.kind[std::size_t(link)] == JointKind::sleeve);
-}
-
-}  // namespace
 
 int last_flexible(const Model<double> &model) {
   int link = model.links() - 1;
-  while (link >= 0 && !bends(model, link)) --link;
+  while (link >= 0 && !model.bends(link)) --link;
   return link;
 }
 
 template <class Real>
 BendOf<Real> bend(const Model<Real> &model, Workspace<Real> &work, const Real *y, int link) {
   Real phi = 0.0, up = 0.0;  // in the hub's own axes
-  for (int i = first_moving(model, link); i < model.begin[std::size_t(link) + 1]; ++i) {
+  for (int i = model.line[std::size_t(link)]; i < model.begin[std::size_t(link) + 1]; ++i) {
     const Piece<Real> &c = model.pieces[std::size_t(i)];
     PieceState<Real> &k = work.kept[std::size_t(i)];
     const Real *q = y + c.own();
@@ -50,9 +36,9 @@ Observer<Real>::Observer(const Model<Real> &model, int stations)
       poses_(std::size_t(model.links()) + 1) {
   for (int link = 0; link < model.links(); ++link) {
     part_.insert(part_.end(), 3, POSES);
-    if (!bends(model, link)) continue;
+    if (!model.bends(link)) continue;
     part_.insert(part_.end(), 2, BENDS), part_.insert(part_.end(), std::size_t(stations), STATIONS);
-    const int first = first_moving(model, link),
+    const int first = model.line[std::size_t(link)],
               count = model.begin[std::size_t(link) + 1] - first;  // pieces of equal length
     const bool sleeved = model.kind[std::size_t(link)] == JointKind::sleeve;
     for (int k = 0; k < stations; ++k) {
@@ -71,7 +57,7 @@ Observer<Real>::Observer(const Model<Real> &model, int stations)
 // How far the stations of a link lie from the tangent at its hub; after `outward_kinematics`.
 template <class Real>
 void Observer<Real>::place_stations(const Real *y, int link, Real *out) {
-  const int first = first_moving(model_, link);
+  const int first = model_.line[std::size_t(link)];
   Real sine, cosine,
       x = 0.0, up = 0.0;  // of the hub's axes; from the hub to the piece's, in the base's axes
   sincos(work_.kept[std::size_t(first)].phi, sine, cosine);
@@ -117,7 +103,7 @@ void Observer<Real>::observe(const Real *y, const Real *v, Real *row, int parts)
     const Pose<Real> &pose = poses_[std::size_t(link)];
     if (parts & POSES) out[0] = pose.x, out[1] = pose.y, out[2] = pose.angle;
     out += 3;
-    if (!bends(model_, link)) continue;
+    if (!model_.bends(link)) continue;
     if (parts & STATIONS) place_stations(y, link, out + 2);
     if (parts & BENDS) {
       const BendOf<Real> tip = bend(model_, work_, y, link);

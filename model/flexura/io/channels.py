@@ -80,7 +80,14 @@ CHANNELS = (
         TURN,
         "motor position",
         "Elastic joint: position of the rotor, reduced to the joint; equal to joint/i/position "
-        "where the transmission is not strained.",
+        "where the transmission is not strained. A drive acts here, and a controller measures this.",
+    ),
+    Channel(
+        "joint/i/motor_velocity",
+        RATE,
+        "motor velocity",
+        "Elastic joint: time derivative of joint/i/motor_position; the work of the drive is the "
+        "integral of drive times this velocity.",
     ),
     Channel(
         "joint/i/reference",

@@ -1,7 +1,17 @@
 """The robot file: a frozen, validated description of a robot in SI units."""
 
-from .joint import Joint, key_of
-from .link import LEAST_FREE, MAX_ELEMENTS, MOST_MODES, Damping, Link, Section, SectionAt, ValueAt
+from .joint import Joint, Spring, Transmission, key_of
+from .link import (
+    LEAST_FREE,
+    MAX_ELEMENTS,
+    MOST_MODES,
+    Damping,
+    Link,
+    Lump,
+    Section,
+    SectionAt,
+    ValueAt,
+)
 from .old_keys import OldKey, renamed
 from .robot import MAX_LINKS, Payload, Robot, load, robot_of, save
 from .table import Table
@@ -14,12 +24,15 @@ __all__ = [
     "Damping",
     "Joint",
     "Link",
+    "Lump",
     "OldKey",
     "Payload",
     "Robot",
     "Section",
     "SectionAt",
+    "Spring",
     "Table",
+    "Transmission",
     "ValueAt",
     "key_of",
     "load",

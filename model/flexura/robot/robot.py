@@ -26,11 +26,19 @@ _log = logging.getLogger("flexura")
 
 
 class Payload(Table):
-    """A point mass with inertia at the tip of the last link."""
+    """A body at the tip of the last link."""
 
     mass_kg: float = Field(0.0, ge=0, description="the payload's mass in kilograms, 0 or more")
     inertia_kg_m2: float = Field(
-        0.0, ge=0, description="the payload's inertia in kg m^2, 0 or more"
+        0.0,
+        ge=0,
+        description="the payload's inertia about its own centre in kg m^2, 0 or more",
+    )
+    centre_of_mass_m: tuple[float, float] = Field(
+        (0.0, 0.0),
+        strict=False,
+        description="the payload's centre from the tip in metres, two numbers [along, across] the "
+        "tip's tangent",
     )
 
 
@@ -57,7 +65,8 @@ class Robot(Table):
         min_length=1, max_length=MAX_LINKS, description=f"1 to {MAX_LINKS} tables [[link]]"
     )
     payload: Payload = Field(
-        default_factory=Payload, description="a table { mass_kg, inertia_kg_m2 }"
+        default_factory=Payload,
+        description="a table { mass_kg, inertia_kg_m2, centre_of_mass_m }",
     )
     format: int = Field(
         FORMAT, ge=1, le=FORMAT, description=f"the file's format, a whole number up to {FORMAT}"

@@ -21,8 +21,8 @@ class StateSpace:
 
     From M dq'' + G dq' + K dq = E u, of which the fields are the matrices (m, m), (m, inputs): bias
     and gravity are in G and K. `states`, `inputs`, `outputs` are names, `units` their units: inputs
-    `joint/i/drive`, outputs `joint/i/position`, `link/i/tip_deflection`, `tip/x`, `tip/y`, as in a
-    Run. `hold` (N,): the drives [N or N m] that keep the robot there. Coulomb friction is left out.
+    `joint/i/drive`, outputs `joint/i/position` (behind a transmission also
+    `joint/i/motor_position`), `link/i/tip_deflection`, `tip/x`, `tip/y`, as in a Run. `hold` (N,): the drives [N or N m] that keep the robot there. Coulomb friction is left out.
     """
 
     M: np.ndarray
@@ -153,7 +153,7 @@ def linearize(robot: Any, q: Any = None, qd: Any = None, joints: str = "free") -
     kept = [
         k
         for k, name in enumerate(outputs)
-        if not name.startswith("joint") or int(name.split("/")[1]) - 1 in moved
+        if not name.startswith("joint") or _number(name) in moved
     ]
     labels = [system.labels[row] for row in rows]
     drives = [f"joint/{i + 1}/drive" for i in moved]
@@ -173,6 +173,11 @@ def linearize(robot: Any, q: Any = None, qd: Any = None, joints: str = "free") -
         qd=rates,
         hold=system.forces(at, rates, np.zeros(system.n))[system.joint_rows],
     )
+
+
+def _number(name: str) -> int:
+    """The joint or link of an output, from 0."""
+    return int(name.split("/")[1]) - 1
 
 
 def _steady(system: System, rates: np.ndarray) -> np.ndarray:
@@ -241,16 +246,17 @@ def _outputs(system: System, q: np.ndarray) -> tuple[np.ndarray, list[str], dict
     units."""
     links = system.robot.links
     flexible = [i for i, link in enumerate(links) if link.flexible]
-    names = [f"joint/{i + 1}/position" for i in range(len(links))] + [
-        f"link/{i + 1}/tip_deflection" for i in flexible
-    ]
+    motors, rows = list(system.windup_rows), system.joint_rows
+    names = [f"joint/{i + 1}/position" for i in range(len(links))]
+    names += [f"joint/{i + 1}/motor_position" for i in motors]
+    names += [f"link/{i + 1}/tip_deflection" for i in flexible]
     units = {
-        name: "rad" if "joint" in name and links[i].joint.type == "R" else "m"
-        for i, name in enumerate(names)
+        name: "rad" if name.startswith("joint") and links[_number(name)].joint.type == "R" else "m"
+        for name in names
     }
 
     def look(z: np.ndarray) -> np.ndarray:
-        return np.concatenate([z[system.joint_rows], *system.places(z)])
+        return np.concatenate([system.hub_positions(z), z[rows[motors]], *system.places(z)])
 
     slopes = jacobian(look, q, np.full(system.n, 1e-5) / np.maximum(_steep(system), 1e-300))
     return slopes, [*names, "tip/x", "tip/y"], units | {"tip/x": "m", "tip/y": "m"}

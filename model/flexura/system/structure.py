@@ -44,15 +44,27 @@ class Structure:
     @cached_property
     def rows(self) -> list[int]:
         """The unknown of each joint."""
-        sizes = [1 + sum(p.count for p in link) for link in self.links]
+        sizes = [
+            1 + elastic_joint(link) + sum(p.count for p in made)
+            for link, made in zip(self.robot.links, self.links, strict=True)
+        ]
         return [sum(sizes[:i]) for i in range(len(sizes))]
+
+    @cached_property
+    def windups(self) -> dict[int, int]:
+        """The unknown of each transmission, by the number of its link (from 0) (107)."""
+        links = zip(self.robot.links, self.rows, strict=True)
+        return {i: row + 1 for i, (link, row) in enumerate(links) if elastic_joint(link)}
 
     @cached_property
     def own(self) -> list[list[slice]]:
         """The unknowns of each piece of each link."""
         ends = [
-            [row + 1 + sum(p.count for p in link[:k]) for k in range(len(link) + 1)]
-            for row, link in zip(self.rows, self.links, strict=True)
+            [
+                row + 1 + (i in self.windups) + sum(p.count for p in link[:k])
+                for k in range(len(link) + 1)
+            ]
+            for i, (row, link) in enumerate(zip(self.rows, self.links, strict=True))
         ]
         return [[slice(a, b) for a, b in pairwise(e)] for e in ends]
 
@@ -61,7 +73,7 @@ class Structure:
         """The names of the unknowns."""
         out: list[str] = []
         for i, link in enumerate(self.links, 1):
-            out.append(f"joint/{i}")
+            out += [f"joint/{i}", f"link/{i}/windup"] if i - 1 in self.windups else [f"joint/{i}"]
             if link and isinstance(link[0].shapes, WholeShapes):
                 kind = "mode" if link[0].K.size else "shape"
                 out += [f"link/{i}/{kind}/{j}" for j in range(1, link[0].count + 1)]
@@ -105,7 +117,7 @@ class Structure:
             frame = station(lines[-1], 1.0)
         return LinkState(i, q, qd, hub, tuple(lines), frame)
 
-    def _along(self, i: int, s: float, q: np.ndarray) -> tuple[float, list[int]]:
+    def _along(self, i: int, s: complex, q: np.ndarray) -> tuple[complex, list[int]]:
         """How far s on link i is ahead of its hub or exit [m], and the unknowns in it."""
         return (
             (s - self.robot.links[i].length_m + q[self.rows[i]], [self.rows[i]])
@@ -118,7 +130,10 @@ class Structure:
         joint, row = self.robot.links[i].joint, self.rows[i]
         tip = before.tip if before else base(self.n)
         if joint.type == "R":
-            return turned(tip, q[row], row)
+            hub = turned(tip, q[row], row)
+            if i in self.windups:  # (107)
+                hub = turned(hub, q[self.windups[i]], self.windups[i])
+            return ahead(hub, joint.hub_radius_m, [], qd) if joint.hub_radius_m else hub  # (110)
         if joint.type == "Pb":
             return turned(tip, joint.angle_rad)
         if before is None:
@@ -160,7 +175,8 @@ class Structure:
         """A link's masses: its material, its hub, and the payload of the last one (21), (22)."""
         joint, parts = self.robot.links[state.number].joint, self.own_masses(state)
         if joint.hub_mass_kg:
-            parts.append(lump(joint.hub_mass_kg, state.hub))
+            axis = ahead(state.hub, -joint.hub_radius_m, [], state.qd)
+            parts.append(lump(joint.hub_mass_kg, axis if joint.hub_radius_m else state.hub))
         if joint.hub_inertia_kg_m2:
             parts.append(turning(joint.hub_inertia_kg_m2, state.hub))
         return parts
@@ -177,9 +193,14 @@ class Structure:
             parts += sleeve.masses(state.lines[0], law)
         else:
             parts += [line_masses(x) for x in state.lines]
+        for each in self.robot.links[i].mass:  # (108)
+            frame = self.at(state, each.at_m)
+            parts += [lump(each.mass_kg, frame), turning(each.inertia_kg_m2, frame)]
         if i == len(self.links) - 1:
-            load = self.robot.payload
-            parts += [lump(load.mass_kg, state.tip), turning(load.inertia_kg_m2, state.tip)]
+            load, frame = self.robot.payload, state.tip
+            if any(load.centre_of_mass_m):  # (109)
+                frame = ahead(frame, complex(*load.centre_of_mass_m), [], state.qd)
+            parts += [lump(load.mass_kg, frame), turning(load.inertia_kg_m2, frame)]
         return parts
 
 
@@ -205,14 +226,21 @@ def _pieces(robot: Robot, link: Link, after: Link | None, linear: bool) -> tuple
     return (joined(made),) if linear or robot.nodal else made
 
 
-def rigid_body(robot: Robot, i: int) -> tuple[float, float, float]:
-    """Mass [kg], centre [m] from the proximal end, inertia [kg m^2] about it: rigid link i (15)."""
+def elastic_joint(link: Link) -> bool:
+    """Whether a transmission is between the rotor and the hub of a link."""
+    return link.joint.transmission is not None
+
+
+def rigid_body(robot: Robot, i: int) -> tuple[float, complex, float]:
+    """Mass [kg], centre along + i across [m] from the proximal end, inertia [kg m^2] about it:
+    rigid link i (15), (109)."""
     link = robot.links[i]
     if link.mass_kg is not None:
-        centre = link.length_m / 2 if link.centre_of_mass_m is None else link.centre_of_mass_m
+        given = link.length_m / 2 if link.centre_of_mass_m is None else link.centre_of_mass_m
+        centre = complex(*given) if isinstance(given, tuple) else complex(given)
         return link.mass_kg, centre, link.inertia_kg_m2 or 0.0
     s, ds = material(link).quadrature(0.0, link.length_m, 3)
     dm = link.mass_per_length(s) * ds
     mass = float(dm.sum())
     centre = float(dm @ s) / mass
-    return mass, centre, float(dm @ (s - centre) ** 2)
+    return mass, complex(centre), float(dm @ (s - centre) ** 2)
