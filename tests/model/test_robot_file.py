@@ -169,7 +169,7 @@ VALUES = {
         {STRIP + "young_modulus_Pa": 2e14},
         "link[2].young_modulus_Pa",
         2e14,
-        "between 1e5 and 2e12",
+        "between 1e3 and 2e12",
     ),
     "no modulus": (
         {STRIP + "young_modulus_Pa": ABSENT},
@@ -466,10 +466,10 @@ VALUES = {
         -1.0,
         "0 or more",
     ),
-    "a centre of mass as a point": (
-        {CART + "centre_of_mass_m": [0.05, 0.0]},
+    "a centre of mass in space": (
+        {CART + "centre_of_mass_m": [0.05, 0.0, 0.0]},
         "link[1].centre_of_mass_m",
-        [0.05, 0.0],
+        [0.05, 0.0, 0.0],
         "centre of mass",
     ),
     "no joint": (
@@ -691,7 +691,7 @@ VALUES = {
         {"payload": 3.0},
         "payload",
         3.0,
-        "a table { mass_kg, inertia_kg_m2 }",
+        "a table { mass_kg, inertia_kg_m2, centre_of_mass_m }",
     ),
     "a payload as a list of tables": (
         {"payload": [{"mass_kg": 1.0}]},

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "numbers/pack_lane.hpp"
 #include "numbers/quadrature.hpp"
 
 namespace flexura {
@@ -39,13 +40,22 @@ Observer<Real>::Observer(const Model<Real> &model, int stations)
     if (!model.bends(link)) continue;
     part_.insert(part_.end(), 2, BENDS), part_.insert(part_.end(), std::size_t(stations), STATIONS);
     const int first = model.line[std::size_t(link)],
-              count = model.begin[std::size_t(link) + 1] - first;  // pieces of equal length
+              count = model.begin[std::size_t(link) + 1] - first;
+    std::vector<double> ends{0.0};  // of the pieces, by the length of the first
+    for (int i = 0; i < count; ++i) {
+      const Piece<Real> &c = model.pieces[std::size_t(first + i)];
+      const double unit = lane(model.pieces[std::size_t(first)].length, 0);
+      ends.push_back(c.turning ? ends.back() + lane(c.length, 0) / unit : i + 1);  // else equal
+    }
     const bool sleeved = model.kind[std::size_t(link)] == JointKind::sleeve;
     for (int k = 0; k < stations; ++k) {
-      const double along = double(k * count) / (stations - 1);
-      const int piece = std::min(int(along), count - 1),
-                P = model.pieces[std::size_t(first + piece)].P;
-      Station station{first + piece, along - piece, std::vector<double>(std::size_t(P))};
+      const double along = k * ends.back() / (stations - 1);
+      int piece = 0;
+      while (piece + 1 < count && along >= ends[std::size_t(piece) + 1]) ++piece;
+      const int P = model.pieces[std::size_t(first + piece)].P;
+      const double begin = ends[std::size_t(piece)];
+      Station station{first + piece, (along - begin) / (ends[std::size_t(piece) + 1] - begin),
+                      std::vector<double>(std::size_t(P))};
       if (!sleeved)
         line_weights(line_rule(P), 2.0 * station.share - 1.0, 0.5, station.weight.data());
       stations_[std::size_t(link)].push_back(std::move(station));

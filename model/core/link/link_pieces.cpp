@@ -1,5 +1,6 @@
 #include "link/link_pieces.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "robot/input_fault.hpp"
@@ -65,6 +66,35 @@ PieceDraft element(const Link &link, double from, double to, bool last) {
   return out;
 }
 
+// Where the elements of a mesh end (108): they are of equal length between the ends of the link and
+// its lumps, where the curvature or its slope jumps. Lumps within a quarter of an element of an end
+// or of one another get no node. As in flexura/link/line.py.
+Numbers mesh_nodes(const Link &link) {
+  const double length = link.length, least = 0.25 * length / link.elements;
+  Numbers at, ends{0.0};
+  for (const Lump &lump : link.lumps) at.push_back(lump.at);
+  std::sort(at.begin(), at.end());
+  for (double x : at)
+    if (x - ends.back() >= least && length - x >= least && int(ends.size()) < link.elements)
+      ends.push_back(x);
+  ends.push_back(length);
+  std::vector<int> count(ends.size() - 1, 1);
+  for (int spare = link.elements - int(count.size()); spare > 0; --spare) {
+    std::size_t longest = 0;
+    auto element = [&](std::size_t k) { return (ends[k + 1] - ends[k]) / count[k]; };
+    for (std::size_t k = 1; k < count.size(); ++k)
+      if (element(k) > element(longest)) longest = k;
+    ++count[longest];
+  }
+  Numbers out{0.0};
+  for (std::size_t k = 0; k < count.size(); ++k) {
+    for (int e = 1; e < count[k]; ++e)
+      out.push_back(ends[k] + (ends[k + 1] - ends[k]) * e / count[k]);
+    out.push_back(ends[k + 1]);
+  }
+  return out;
+}
+
 }  // namespace
 
 LinkDraft begin_link(const Link &link, int index, const Attachments &attached) {
@@ -94,12 +124,9 @@ LinkDraft begin_link(const Link &link, int index, const Attachments &attached) {
     out.whole = sleeve ? begin_sleeved(link, attached) : begin_single_piece(link, attached);
     out.pieces.emplace_back();
   } else {
-    for (int e = 0; e < link.elements; ++e) {
-      const bool last = e + 1 == link.elements;
-      out.pieces.push_back(element(link, link.length * e / link.elements,
-                                   last ? link.length : link.length * (e + 1) / link.elements,
-                                   last));
-    }
+    const Numbers nodes = mesh_nodes(link);
+    for (std::size_t e = 0; e + 1 < nodes.size(); ++e)
+      out.pieces.push_back(element(link, nodes[e], nodes[e + 1], e + 2 == nodes.size()));
     add_payload(out.pieces.back(), attached);
   }
   auto piece = [&](std::size_t k) -> PieceDraft & {

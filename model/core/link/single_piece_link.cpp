@@ -17,6 +17,7 @@ int mesh_count(const Link &link) { return std::min(2 * link.elements, MOST_WHOLE
 // How many describe it in modes: enough for the last mode to be right to 1e-5 in a uniform link.
 int shape_count(const Link &link) {
   if (link.modes < 0) return mesh_count(link);
+  if (!link.lumps.empty()) return MOST_SHAPES;  // their forces bend the modes sharply
   const int few = std::min(link.modes, MOST_SHAPES - 5) + 5;
   return uniform(link.material) ? few : std::max(few, mesh_count(link));
 }

@@ -15,7 +15,7 @@ from ..system.constants import payload, rows
 
 # Columns of `numbers`, as system/constants.py gives them.
 LENGTH, MASS, CENTRE, INERTIA, START, LOW, HIGH = 0, 1, 2, 3, 7, 13, 14
-ELEMENTS = 2  # column of `counts`
+ELEMENTS, LUMPS = 2, 5  # columns of `counts`
 OF_JOINT = {
     "angle_rad": 6,
     "hub_mass_kg": 8,
@@ -70,6 +70,14 @@ class Rows:
         varied = (self.numbers, self.material, self.lumps, self.gravity, self.payload)
         arrays = (self.counts, *(each[k] for each in varied))
         return b"".join(np.ascontiguousarray(a).tobytes() for a in arrays)
+
+    @property
+    def topology(self) -> bytes:
+        """What is the same in robots that the core takes together: the counts, and at which shares
+        of their links the lumped masses of the first are, by which its meshes are made."""
+        on = np.repeat(np.arange(len(self.counts)), self.counts[:, LUMPS])
+        shares = self.lumps[0, :, 0] / np.maximum(self.numbers[0, on, LENGTH], 1e-300)
+        return self.counts.tobytes() + np.round(shares, 12).tobytes()
 
     @property
     def limits(self) -> np.ndarray:

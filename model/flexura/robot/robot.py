@@ -111,6 +111,23 @@ class Robot(Table):
         return self
 
     @model_validator(mode="after")
+    def _sharp_bends(self) -> Robot:
+        for i, link in enumerate(self.link):
+            ridden = i + 1 < len(self.link) and self.rides(i + 1)
+            if not link.flexible or not (ridden or link.modes):
+                continue
+            for k, lump in enumerate(link.mass, 1):
+                if lump.inertia_kg_m2 and 0 < lump.at_m < link.length_m:
+                    what = "under a slider" if ridden else "in modes"
+                    raise WrongValue(
+                        f"link[{i + 1}].mass[{k}].inertia_kg_m2",
+                        lump.inertia_kg_m2,
+                        f"0 between the ends of a link {what}: its smooth shapes do not bend there "
+                        f"as sharply as an inertia makes it; a mesh without modes does",
+                    )
+        return self
+
+    @model_validator(mode="after")
     def _whole_meshes(self) -> Robot:
         if self.sliding == "nodal":
             for i, link in enumerate(self.link):

@@ -110,8 +110,8 @@ class Assembly:
         return out
 
     def stiffness_blocks(self, q: np.ndarray) -> np.ndarray:
-        """K (n, n), with K(d) of sleeved links (9), (35) and the springs of joints (106), (107):
-        twice the strain energy is z^T K z, z = q less where the springs rest."""
+        """K (n, n), with K(d) of sleeved links (9), (35), and with the springs of joints: twice the
+        strain energy is z^T K z, z = q less where the springs rest."""
         K = self._diagonal.copy()
         for i in self._sleeved:
             own = self.structure.own[i][0]

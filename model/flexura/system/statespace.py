@@ -14,6 +14,9 @@ from .statics import static
 from .system import System, assemble, jacobian
 
 
+INFINITE = 1e5  # times the fastest pole: a zero beyond is one at infinity, and round-off
+
+
 @dataclass(frozen=True, repr=False)
 class StateSpace:
     """Small motions x = (dq, d dq/dt) about q, qd (n,): x' = A x + B u, y = C x + D u, with u, y as
@@ -120,7 +123,8 @@ class StateSpace:
                     value=output,
                 )
         N, L = null_space(c[None]), null_space(b[None])
-        return _roots(L.T @ N, L.T @ G @ N, L.T @ K @ N)
+        found = _roots(L.T @ N, L.T @ G @ N, L.T @ K @ N)
+        return found[np.abs(found) < INFINITE * max(1.0, np.abs(self.poles).max())]
 
     def transfer(self, s: complex) -> np.ndarray:
         """C (s - A)^-1 B at a complex frequency s [1/s], (outputs, inputs)."""

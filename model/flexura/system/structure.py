@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..link.line import Piece, mesh, pieces
+from ..link.line import Piece, is_one_piece, mesh, pieces
 from ..link.mesh import joined
 from ..link.section import Material, material
 from ..link.shapes import WholeShapes
@@ -148,9 +148,10 @@ class Structure:
         x, rows = self._along(state.number, s, state.q)
         if not state.lines or x < 0:
             return ahead(state.hub, x, rows, state.qd)
-        h = state.lines[0].free
-        k = min(int(x / h), len(state.lines) - 1)
-        return station(state.lines[k], x / h - k)
+        k, last = 0, len(state.lines) - 1
+        while k < last and x >= state.lines[k].free:
+            x, k = x - state.lines[k].free, k + 1
+        return station(state.lines[k], x / state.lines[k].free)
 
     def places(self, state: LinkState, s: np.ndarray) -> np.ndarray:
         """Places of a flexible link at arc lengths s (S,) [m] from its proximal end (4)."""
@@ -217,12 +218,11 @@ def structure(robot: Robot, linear: bool | None = None) -> Structure:
 def _pieces(robot: Robot, link: Link, after: Link | None, linear: bool) -> tuple[Piece, ...]:
     """The pieces of a link: with nodal sliding a mesh; what the core does not have is one piece."""
     slides = link.joint.type == "Pb" or (after is not None and after.joint.type == "Pa")
-    if robot.nodal and slides:
-        made = mesh(material(link), link.elements)
-    elif after is not None:
-        made = pieces(link, after)
+    equal = slides if robot.nodal else not is_one_piece(link, after)
+    if (linear or robot.nodal) and equal:
+        made = mesh(material(link), np.linspace(0, link.length_m, link.elements + 1))
     else:
-        made = pieces(link, None, robot.payload.mass_kg, robot.payload.inertia_kg_m2)
+        made = pieces(link, after, robot.payload if after is None else None)
     return (joined(made),) if linear or robot.nodal else made
 
 
