@@ -88,8 +88,11 @@ def test_a_lumped_mass():
     Equations: 108
     """
     system, q, qd = arm(), *state(arm())
-    bare = fx.assemble(system.robot.replace({"link.1.mass.1.mass_kg": 0.0})), fx.assemble(
-        system.robot.replace({"link.1.mass.1.mass_kg": 0.0, "link.1.mass.1.inertia_kg_m2": 0.0})
+    bare = (
+        fx.assemble(system.robot.replace({"link.1.mass.1.mass_kg": 0.0})),
+        fx.assemble(
+            system.robot.replace({"link.1.mass.1.mass_kg": 0.0, "link.1.mass.1.inertia_kg_m2": 0.0})
+        ),
     )
     of = lambda z: np.array([x[0] for x in system.line(z, 1, [AT])])
     own = kinetic(system, q, qd) - kinetic(bare[1], q, qd)

@@ -1,15 +1,15 @@
 """Masses on links, centres off the line, hub radii and springs beside drives, against textbook
 answers to 1e-5, and their energies."""
 
-import beams
 import numpy as np
 import pytest
-from beams import Beam, Body
-from robots import beam, rigid, robot
 from scipy.special import ellipk
 
+import beams
 import flexura as fx
+from beams import Beam, Body
 from flexura import signals
+from robots import beam, rigid, robot
 
 L, RHO, EI = 0.8, 0.5, 2.0
 LINE = Beam(L, RHO, EI)
@@ -30,7 +30,11 @@ def link(elements=32, masses=(), **joint):
 
 def loaded(bot, mass, inertia, centre):
     return bot.replace(
-        {"payload.mass_kg": mass, "payload.inertia_kg_m2": inertia, "payload.centre_of_mass_m": centre}
+        {
+            "payload.mass_kg": mass,
+            "payload.inertia_kg_m2": inertia,
+            "payload.centre_of_mass_m": centre,
+        }
     )
 
 
@@ -69,10 +73,13 @@ def test_a_payload_with_its_centre_off_the_tip(form, centre):
 
 
 def test_a_spring_hinged_beam():
-    """Spring-hinged and free (Blevins, Formulas for Natural Frequency and Mode Shape, table 8-1)."""
+    """Spring-hinged and free (Blevins, Formulas for Natural Frequency, table 8-1)."""
     spring = {"stiffness_N_m_rad": 5.0, "rest_rad": 0.3}
     bot = robot(link(spring=spring, start=0.3))
-    near(fx.frequencies(bot, joints="free", count=3), beams.frequencies(LINE, lambda w: 5.0, [], 60.0))
+    near(
+        fx.frequencies(bot, joints="free", count=3),
+        beams.frequencies(LINE, lambda w: 5.0, [], 60.0),
+    )
     stiff = bot.replace({"link.1.joint.spring.stiffness_N_m_rad": 1e9})
     clamped = np.array([1.875104069, 4.694091133]) ** 2 * np.sqrt(EI / RHO) / L**2 / (2 * np.pi)
     near(fx.frequencies(stiff, joints="free", count=2), clamped)

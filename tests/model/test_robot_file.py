@@ -335,13 +335,13 @@ VALUES = {
         BY_NUMBER | {STRIP + "mass_per_length_kg_m": -1.0},
         "link[2].mass_per_length_kg_m",
         -1.0,
-        "a number above 0 or a list",
+        "a number of 0 or more, or a list",
     ),
     "a mass per length as text": (
         BY_NUMBER | {STRIP + "mass_per_length_kg_m": "1"},
         "link[2].mass_per_length_kg_m",
         "1",
-        "a number above 0 or a list",
+        "a number of 0 or more, or a list",
     ),
     "a mass per length as a truth value": (
         BY_NUMBER | {STRIP + "mass_per_length_kg_m": True},

@@ -94,7 +94,9 @@ def test_a_carriage_on_a_spring_carries_an_arm():
     arm = lumps(beam(0.5, 0.2, 1.0, 8, hub_inertia_kg_m2=1e-3), (0.33, 0.05, 0.0))
     arm["damping"] = {"beta_s": 1e-3}
     bot = robot(cart, arm)
-    compared(bot, fx.Drive.force(0.0, signals.bang_bang(0.1, 0.3, rise_s=0.05)), np.linspace(0, 0.6, 61))
+    compared(
+        bot, fx.Drive.force(0.0, signals.bang_bang(0.1, 0.3, rise_s=0.05)), np.linspace(0, 0.6, 61)
+    )
 
 
 def test_the_frequencies_of_case_m02():

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "dynamics/inverse_dynamics.hpp"
+#include "dynamics/mass_matrix.hpp"
 #include "link/link_pieces.hpp"
 #include "numbers/eigenproblem.hpp"
 #include "robot/input_fault.hpp"
@@ -65,7 +65,19 @@ void check_masses(const Model<double> &model, const Robot &robot) {
   const std::size_t n = std::size_t(model.n), links = robot.links.size();
   std::vector<double> q(n, 0.0), zero(n, 0.0), a(n), given(links, 0.0), reaction(links);
   std::vector<char> held(model.locked);
+  std::vector<double> M;  // where a link has no mass, what bends with it leaves round-off
+  if (std::any_of(robot.links.begin(), robot.links.end(), [](const Link &link) {
+        return link.elements > 0 && link.material[0].mass[0] == 0.0;
+      }))
+    M.resize(n * n);
+  auto least = [&](int row) {
+    return M.empty() ? 0.0 : 1e-14 * M[std::size_t(row) * (n + 1)];
+  };
   for (std::size_t i = 0; i < links; ++i) q[std::size_t(model.first[i])] = model.start[i];
+  if (!M.empty()) {
+    std::vector<Vec3<double>> wrench(n);
+    mass_matrix(model, work, q.data(), zero.data(), wrench.data(), M.data());
+  }
   const Stage<double> plain{q.data(), zero.data(), 0.0, 0.0, nullptr, nullptr};
   accelerate(model, work, q.data(), zero.data(), plain, zero.data(),
              Held<double>{held.data(), given.data(), reaction.data()}, a.data());
@@ -80,7 +92,7 @@ void check_masses(const Model<double> &model, const Robot &robot) {
     }
     if (c.joint == HubJoint::none || held[std::size_t(c.link)]) continue;
     const double pivot = 1.0 / work.kept[i].inverse;
-    if (!(pivot > 0.0) || !std::isfinite(pivot))
+    if (!(pivot > least(c.first)) || !std::isfinite(pivot))
       throw Fault(c.link, "joint",
                   "nothing to accelerate: expected a mass or inertia (link, hub, rotor or payload) "
                   "that this "

@@ -80,7 +80,8 @@ CHANNELS = (
         TURN,
         "motor position",
         "Elastic joint: position of the rotor, reduced to the joint; equal to joint/i/position "
-        "where the transmission is not strained. A drive acts here, and a controller measures this.",
+        "where the transmission is not strained. The drive acts on it, and a controller "
+        "measures it.",
     ),
     Channel(
         "joint/i/motor_velocity",

@@ -256,7 +256,9 @@ def nodes(link: Link) -> np.ndarray:
     spans, each = np.diff([*ends, length]), np.ones(len(ends), dtype=int)
     for _ in range(count - len(each)):
         each[np.argmax(spans / each)] += 1
-    inner = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(ends, [*ends[1:], length], each)]
+    inner = [
+        np.linspace(a, b, n, endpoint=False) for a, b, n in zip(ends, [*ends[1:], length], each)
+    ]
     return np.append(np.concatenate(inner), length)
 
 

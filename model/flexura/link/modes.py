@@ -13,8 +13,11 @@ from .shapes import legendre_shapes
 
 
 class ClampedBody(NamedTuple):
-    """A body on a link (108), (109): place [m], mass [kg], inertia about its centre [kg m^2], and the
-    centre along and across the tangent there [m]."""
+    """A body on a link (108), (109).
+
+    Place [m], mass [kg], inertia about its centre [kg m^2], and the centre along and across the
+    tangent there [m].
+    """
 
     at: float
     mass: float
@@ -56,9 +59,7 @@ def clamped_matrices(
     M = deflection.T @ ((properties.mass_per_length(s) * ds)[:, None] * deflection)
     for body in bodies:
         at = np.array([(body.at - L + free) / free])
-        place = np.vstack(
-            [free * lagrange_integrals(points, at) @ B, legendre_shapes(count, at)]
-        )
+        place = np.vstack([free * lagrange_integrals(points, at) @ B, legendre_shapes(count, at)])
         lever = place[0] + body.along * place[1]
         turning = body.inertia + body.mass * body.across**2
         M += body.mass * np.outer(lever, lever) + turning * np.outer(place[1], place[1])

@@ -13,7 +13,8 @@ from .link import (
     ValueAt,
 )
 from .old_keys import OldKey, renamed
-from .robot import MAX_LINKS, Payload, Robot, load, robot_of, save
+from .payload import Payload
+from .robot import MAX_LINKS, Robot, load, robot_of, save
 from .table import Table
 
 __all__ = [

@@ -171,6 +171,16 @@ class Joint(Table):
             return 0.0
         return self.spring.rest_rad if self.type == "R" else self.spring.rest_m
 
+    @property
+    def windup_stiffness(self) -> float:
+        """Stiffness of the transmission at the joint [N m/rad]; 0: none."""
+        return 0.0 if self.transmission is None else self.transmission.stiffness_N_m_rad
+
+    @property
+    def windup_damping(self) -> float:
+        """Damping of the transmission at the joint [N m s/rad]."""
+        return 0.0 if self.transmission is None else self.transmission.damping_N_m_s_rad
+
     def key(self, quantity: str) -> str:
         """The key that holds a quantity of this joint."""
         return key_of(quantity, self.type)

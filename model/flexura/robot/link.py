@@ -24,6 +24,7 @@ LEAST_FREE = (
 
 
 Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
 Pair = Annotated[tuple[float, float], Field(strict=False)]
 
 
@@ -88,7 +89,8 @@ _LINK_TEXT = {
         "a table { width_m, height_m } or a list of { at_m, width_m, height_m } in order of at_m"
     ),
     "mass_per_length_kg_m": (
-        "mass per length in kg/m, a number above 0 or a list of { at_m, value } in order of at_m"
+        "mass per length in kg/m, a number of 0 or more, or a list of { at_m, value } in order of "
+        "at_m"
     ),
     "bending_stiffness_N_m2": (
         "bending stiffness EI in N m^2, a number above 0 or a list of { "
@@ -134,7 +136,7 @@ class Link(Table):
         le=25000,
         description="the density in kg/m^3, between 10 and 25000 (steel: 7850)",
     )
-    mass_per_length_kg_m: Positive | list[ValueAt] | None = Field(
+    mass_per_length_kg_m: NotNegative | list[ValueAt] | None = Field(
         None, description=_LINK_TEXT["mass_per_length_kg_m"]
     )
     bending_stiffness_N_m2: Positive | list[ValueAt] | None = Field(
@@ -186,7 +188,9 @@ class Link(Table):
                 expected = f"a place on the link, at most its length, {self.length_m:g}"
                 raise WrongValue(f"mass[{k}].at_m", lump.at_m, expected)
         if self.mass and self.flexible and self.joint.type == "Pb":
-            expected = "none: masses on a flexible link that moves through a sleeve are not modelled"
+            expected = (
+                "none: masses on a flexible link that moves through a sleeve are not modelled"
+            )
             raise WrongValue("mass[1].at_m", self.mass[0].at_m, expected)
         for key in ("section", "mass_per_length_kg_m", "bending_stiffness_N_m2"):
             value = getattr(self, key)
@@ -275,6 +279,8 @@ class Link(Table):
             or self.mass_per_length_kg_m is not None
             or self.density_kg_m3 is not None
         )
+        if self.mass_per_length_kg_m == 0:
+            raise WrongValue("mass_per_length_kg_m", 0.0, "a number above 0, or mass_kg = 0.0")
         if self.mass_kg is None and not spread:
             raise WrongValue(
                 "mass_kg", None, "missing: a rigid link's mass in kilograms, 0 or more"

@@ -19,27 +19,12 @@ from ..io import FORMAT, check_format, explain, find, is_name, read_toml, summar
 from .joint import KEYS, key_of
 from .link import LEAST_FREE, Link
 from .old_keys import renamed
+from .payload import Payload
+from .suitability import check_masses, check_stretch
 from .table import Table
 
 MAX_LINKS = 256
 _log = logging.getLogger("flexura")
-
-
-class Payload(Table):
-    """A body at the tip of the last link."""
-
-    mass_kg: float = Field(0.0, ge=0, description="the payload's mass in kilograms, 0 or more")
-    inertia_kg_m2: float = Field(
-        0.0,
-        ge=0,
-        description="the payload's inertia about its own centre in kg m^2, 0 or more",
-    )
-    centre_of_mass_m: tuple[float, float] = Field(
-        (0.0, 0.0),
-        strict=False,
-        description="the payload's centre from the tip in metres, two numbers [along, across] the "
-        "tip's tangent",
-    )
 
 
 class Robot(Table):
@@ -111,20 +96,9 @@ class Robot(Table):
         return self
 
     @model_validator(mode="after")
-    def _sharp_bends(self) -> Robot:
-        for i, link in enumerate(self.link):
-            ridden = i + 1 < len(self.link) and self.rides(i + 1)
-            if not link.flexible or not (ridden or link.modes):
-                continue
-            for k, lump in enumerate(link.mass, 1):
-                if lump.inertia_kg_m2 and 0 < lump.at_m < link.length_m:
-                    what = "under a slider" if ridden else "in modes"
-                    raise WrongValue(
-                        f"link[{i + 1}].mass[{k}].inertia_kg_m2",
-                        lump.inertia_kg_m2,
-                        f"0 between the ends of a link {what}: its smooth shapes do not bend there "
-                        f"as sharply as an inertia makes it; a mesh without modes does",
-                    )
+    def _suits(self) -> Robot:
+        check_masses(self.link, self.payload)
+        check_stretch(self.link, self.payload, self.gravity_m_s2)
         return self
 
     @model_validator(mode="after")

@@ -124,7 +124,7 @@ class Assembly:
         K = np.zeros((self.n, self.n))
         K[self.rows, self.rows] = self._springs
         for i, row in self.structure.windups.items():
-            K[row, row] = self.robot.links[i].joint.transmission.stiffness_N_m_rad
+            K[row, row] = self.robot.links[i].joint.windup_stiffness
         for link, owns in zip(self.structure.links, self.structure.own, strict=True):
             for piece, own in zip(link, owns, strict=True):
                 if piece.K.size:
@@ -158,8 +158,8 @@ class Assembly:
         for i, (link, row) in enumerate(zip(self.robot.links, self.rows, strict=True)):
             D[row, row] = link.joint.viscous_friction
             if i in self.structure.windups:
-                windup, between = self.structure.windups[i], link.joint.transmission
-                D[windup, windup] = between.damping_N_m_s_rad
+                windup = self.structure.windups[i]
+                D[windup, windup] = link.joint.windup_damping
             if self.structure.own[i]:
                 own = slice(self.structure.own[i][0].start, self.structure.own[i][-1].stop)
                 D[own, own] = link.damping.beta_s * K[own, own]

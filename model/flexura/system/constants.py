@@ -73,7 +73,6 @@ def rows(robot: Robot) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
             )
         )
         mass, centre, inertia = (0.0, 0j, 0.0) if link.flexible else rigid_body(robot, i)
-        between = joint.transmission
         low, high = joint.limits or (-math.inf, math.inf)
         numbers.append(
             (
@@ -95,8 +94,8 @@ def rows(robot: Robot) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
                 joint.spring_stiffness,
                 joint.spring_rest,
                 joint.hub_radius_m,
-                between.stiffness_N_m_rad if between else 0.0,
-                between.damping_N_m_s_rad if between else 0.0,
+                joint.windup_stiffness,
+                joint.windup_damping,
                 centre.imag,
             )
         )

@@ -75,7 +75,9 @@ def _found(system: System, at: np.ndarray, joints: str, count: int | None, shape
 
 def _unheld(system: System) -> int:
     """How many free joints nothing holds where there is no gravity: those without a spring."""
-    return sum(not each.joint.locked and not each.joint.spring_stiffness for each in system.robot.links)
+    return sum(
+        not each.joint.locked and not each.joint.spring_stiffness for each in system.robot.links
+    )
 
 
 def _check(joints: Any, count: Any) -> None:

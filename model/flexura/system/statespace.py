@@ -13,7 +13,6 @@ from ..io import choice, summary
 from .statics import static
 from .system import System, assemble, jacobian
 
-
 INFINITE = 1e5  # times the fastest pole: a zero beyond is one at infinity, and round-off
 
 
@@ -25,7 +24,8 @@ class StateSpace:
     From M dq'' + G dq' + K dq = E u, of which the fields are the matrices (m, m), (m, inputs): bias
     and gravity are in G and K. `states`, `inputs`, `outputs` are names, `units` their units: inputs
     `joint/i/drive`, outputs `joint/i/position` (behind a transmission also
-    `joint/i/motor_position`), `link/i/tip_deflection`, `tip/x`, `tip/y`, as in a Run. `hold` (N,): the drives [N or N m] that keep the robot there. Coulomb friction is left out.
+    `joint/i/motor_position`), `link/i/tip_deflection`, `tip/x`, `tip/y`, as in a Run. `hold` (N,):
+    the drives [N or N m] that keep the robot there. Coulomb friction is left out.
     """
 
     M: np.ndarray
@@ -87,10 +87,21 @@ class StateSpace:
     @property
     def poles(self) -> np.ndarray:
         """Eigenvalues of A (2m,) [1/s], by magnitude."""
+        R = self._root
+        return _roots(np.eye(len(self.M)), _scaled(R, self.G), _scaled(R, self.K))
+
+    @property
+    def _root(self) -> np.ndarray:
+        """R (m, m), M = R^T R. Raises FlexuraError: M is singular to double precision."""
         from scipy.linalg import cholesky
 
-        R = cholesky(self.M)
-        return _roots(np.eye(len(self.M)), _scaled(R, self.G), _scaled(R, self.K))
+        try:
+            return np.asarray(cholesky(self.M))
+        except np.linalg.LinAlgError:
+            raise FlexuraError(
+                "M is singular to double precision: a link has almost no mass beside what it "
+                "carries; fewer of its modes, as modes = 2, leave the rest out"
+            ) from None
 
     def zeros(self, drive: str, output: str) -> np.ndarray:
         """Transmission zeros from an input to an output [1/s], by magnitude: where the output stays
@@ -102,11 +113,11 @@ class StateSpace:
         (non-minimum phase) bound what feedback of that output can do. Raises InputError for unknown
         names, and for an output that the drive does not move.
         """
-        from scipy.linalg import cholesky, null_space, solve_triangular
+        from scipy.linalg import null_space, solve_triangular
 
         b = self.E[:, _find(drive, self.inputs, "drive")]
         c = self.outlook[_find(output, self.outputs, "output")]
-        R = cholesky(self.M)  # coordinates in which M = 1
+        R = self._root  # coordinates in which M = 1
         b, c = solve_triangular(R, b, trans="T"), solve_triangular(R, c, trans="T")
         G, K, one = _scaled(R, self.G), _scaled(R, self.K), np.eye(len(self.M))
         for s in (

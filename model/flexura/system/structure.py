@@ -117,7 +117,7 @@ class Structure:
             frame = station(lines[-1], 1.0)
         return LinkState(i, q, qd, hub, tuple(lines), frame)
 
-    def _along(self, i: int, s: complex, q: np.ndarray) -> tuple[complex, list[int]]:
+    def _along(self, i: int, s: float, q: np.ndarray) -> tuple[float, list[int]]:
         """How far s on link i is ahead of its hub or exit [m], and the unknowns in it."""
         return (
             (s - self.robot.links[i].length_m + q[self.rows[i]], [self.rows[i]])
@@ -188,7 +188,8 @@ class Structure:
         parts: list[Part] = []
         if law is None:
             mass, centre, inertia = rigid_body(self.robot, i)
-            frame = ahead(state.hub, *self._along(i, centre, state.q), state.qd)
+            x, rows = self._along(i, centre.real, state.q)
+            frame = ahead(state.hub, complex(x, centre.imag), rows, state.qd)
             parts += [lump(mass, frame), turning(inertia, frame)]
         elif self.sleeved(i):
             parts += sleeve.masses(state.lines[0], law)

@@ -28,8 +28,9 @@ class TwinModel:
 
     `mbs`: Exudyn's system. `parts`, `coordinates`: one entry a link and a joint. `index[i]`:
     indices of part i's coordinates in the system. `slides[i]`: index of the position of a joint
-    that slides on a flexible link, `rotors[i]`: of the rotor behind a transmission, else None. `reference`: the system's coordinates before any
-    displacement. `container` owns `mbs` and must live as long.
+    that slides on a flexible link, `rotors[i]`: of the rotor behind a transmission, else None.
+    `reference`: the system's coordinates before any displacement. `container` owns `mbs` and must
+    live as long.
 
     Exudyn's own sum of reference and displacement, GetODE2CoordinatesTotal, corrupts memory from
     about 100 coordinates on (1.13.6).
@@ -120,7 +121,9 @@ def build(
         for joint in coordinates
     ]
     reference = np.array(mbs.systemData.GetODE2Coordinates(exu.ConfigurationType.Reference))
-    return TwinModel(robot, mbs, parts, coordinates, index, slides, rotors, mesh, reference, container)
+    return TwinModel(
+        robot, mbs, parts, coordinates, index, slides, rotors, mesh, reference, container
+    )
 
 
 def _add_link(

@@ -79,10 +79,10 @@ def channels(
                 out[f"link/{i + 1}/deflection/{k}"] = _transverse(hub, place), "m"
         kinetic += part.kinetic(own, rate)
         motor[0][:, i], motor[1][:, i] = position[:, i], speed[:, i]
-        rotor, between = model.rotors[i], joint.transmission
-        if rotor is not None and between is not None:
+        rotor = model.rotors[i]
+        if rotor is not None:
             motor[0][:, i], motor[1][:, i] = q[:, rotor], v[:, rotor]
-            strain += 0.5 * between.stiffness_N_m_rad * (position[:, i] - q[:, rotor]) ** 2
+            strain += 0.5 * joint.windup_stiffness * (position[:, i] - q[:, rotor]) ** 2
         strain += 0.5 * joint.spring_stiffness * (motor[0][:, i] - joint.spring_rest) ** 2
         if not joint.locked:
             kinetic += 0.5 * joint.rotor_inertia * motor[1][:, i] ** 2
