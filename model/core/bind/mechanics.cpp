@@ -128,8 +128,8 @@ void bind_mechanics(nb::module_ &module) {
     }
   });
   nb::class_<Mechanics> type(module, "Mechanics", "The equations of one robot.");
-  type.def(nb::init<const Vector &, const Vector &, const Counts &, const Matrix &,
-                    const Matrix &, const Matrix &>(),
+  type.def(nb::init<const Vector &, const Vector &, const Counts &, const Matrix &, const Matrix &,
+                    const Matrix &>(),
            "gravity"_a, "payload"_a, "counts"_a, "numbers"_a, "material"_a, "lumps"_a)
       .def_prop_ro(
           "n", [](const Mechanics &self) { return self.model->n; }, "How many unknowns there are.")

@@ -70,9 +70,7 @@ void check_masses(const Model<double> &model, const Robot &robot) {
         return link.elements > 0 && link.material[0].mass[0] == 0.0;
       }))
     M.resize(n * n);
-  auto least = [&](int row) {
-    return M.empty() ? 0.0 : 1e-14 * M[std::size_t(row) * (n + 1)];
-  };
+  auto least = [&](int row) { return M.empty() ? 0.0 : 1e-14 * M[std::size_t(row) * (n + 1)]; };
   for (std::size_t i = 0; i < links; ++i) q[std::size_t(model.first[i])] = model.start[i];
   if (!M.empty()) {
     std::vector<Vec3<double>> wrench(n);
@@ -86,9 +84,10 @@ void check_masses(const Model<double> &model, const Robot &robot) {
     if (c.m > 0 && int(i) < model.line[std::size_t(c.link)]) {
       const double pivot = 1.0 / work.kept[i].inverses[0];
       if (!(pivot > 0.0) || !std::isfinite(pivot))
-        throw Fault(c.link, "joint.transmission",
-                    "nothing to accelerate: expected a mass or inertia (link, hub or payload) beyond "
-                    "the transmission");
+        throw Fault(
+            c.link, "joint.transmission",
+            "nothing to accelerate: expected a mass or inertia (link, hub or payload) beyond "
+            "the transmission");
     }
     if (c.joint == HubJoint::none || held[std::size_t(c.link)]) continue;
     const double pivot = 1.0 / work.kept[i].inverse;
@@ -260,8 +259,7 @@ template <class Real, class Number>
 Model<Real> converted(const Model<double> &one, Number number) {
   Model<Real> out;
   out.n = one.n, out.first = one.first, out.elastic = one.elastic, out.begin = one.begin,
-  out.line = one.line,
-  out.kind = one.kind, out.locked = one.locked;
+  out.line = one.line, out.kind = one.kind, out.locked = one.locked;
   out.start = one.start, out.low = one.low, out.high = one.high, out.mass_damped = one.mass_damped;
   for (int k = 0; k < 2; ++k)
     out.gravity[k] = number([k](const Model<double> &m) { return m.gravity[k]; });

@@ -19,7 +19,8 @@ PieceDraft rigid(double length, double mass, double centre, double about_centre)
   return out;
 }
 
-// A mass whose centre is `along`, `across` from the hub: without length, turned to the centre (109).
+// A mass whose centre is `along`, `across` from the hub: without length, turned to the centre
+// (109).
 PieceDraft off_line(double mass, double along, double across, double about_centre) {
   PieceDraft out = rigid(0.0, mass, std::hypot(along, across), about_centre);
   out.angle = std::atan2(across, along);

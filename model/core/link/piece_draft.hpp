@@ -26,8 +26,8 @@ struct PieceDraft : Shape {
          railing = 0.0, payload = 0.0, beta = 0.0;
   Numbers tip_angle, K, B, W, moment, w, rails;  // B (m, P), W (P, P), rails (rail, P + m)
   Numbers xi, weight, C, bend, material;         // of a sleeve
-  Numbers D;                 // (m), if damping is not beta K
-  std::vector<Spin> spins;  // lumped inertias
+  Numbers D;                                     // (m), if damping is not beta K
+  std::vector<Spin> spins;                       // lumped inertias
 };
 
 // What stands on a link: a payload at its tip, another link there, a slider along it.

@@ -35,7 +35,7 @@ struct Shape {
   int first = 0;     // row of its joint's unknown, or of its first own one, among all unknowns
   int rail = 0;  // Legendre polynomials that describe the line, if the next piece slides along it;
                  // 0: that piece sits at the tip
-  int intervals = 0;  // of the material of a sleeved piece
+  int intervals = 0;     // of the material of a sleeved piece
   bool turning = false;  // has lumped inertias that turn with its line
   int own() const { return first + (joint != HubJoint::none); }  // row of the first own unknown
 };
@@ -118,8 +118,8 @@ struct Model {
   Model(const Model &) = delete;
 };
 
-// Position of a joint's hub from unknowns q (n), or its rate from their rates: behind a transmission
-// the rotor's and the windup (107).
+// Position of a joint's hub from unknowns q (n), or its rate from their rates: behind a
+// transmission the rotor's and the windup (107).
 template <class Real>
 inline double hub_position(const Model<Real> &model, int link, const double *q) {
   const std::size_t i = std::size_t(link);

@@ -18,9 +18,9 @@ struct Joint {
   double viscous = 0.0, coulomb = 0.0;  // [N m s/rad or N s/m], [N m or N]
   double low = 0.0, high = 0.0;         // limits [rad or m]
   double spring = 0.0, rest = 0.0;      // beside the drive [N m/rad or N/m], [rad or m]
-  bool has_hub = false;      // of a revolute joint: a radius or a transmission
-  bool elastic = false;      // a transmission between rotor and hub
-  double hub_radius = 0.0;   // from the axis to where the link's line begins [m]
+  bool has_hub = false;                 // of a revolute joint: a radius or a transmission
+  bool elastic = false;                 // a transmission between rotor and hub
+  double hub_radius = 0.0;              // from the axis to where the link's line begins [m]
   double transmission_stiffness = 0.0, transmission_damping = 0.0;  // [N m/rad], [N m s/rad]
 };
 
@@ -44,9 +44,9 @@ struct Link {
   std::vector<Interval>
       material;  // of a link that bends, or of a sleeved rigid one; ascending, without gaps
   double mass = 0.0, centre = 0.0,
-         inertia = 0.0;            // of a rigid link; inertia about its centre of mass
-  bool off_line = false;           // whether a rigid link's centre may lie off its line
-  double centre_across = 0.0;      // how far, to the left [m]
+         inertia = 0.0;        // of a rigid link; inertia about its centre of mass
+  bool off_line = false;       // whether a rigid link's centre may lie off its line
+  double centre_across = 0.0;  // how far, to the left [m]
   std::vector<Lump> lumps;
   double alpha = 0.0, beta = 0.0;  // Rayleigh damping [1/s], [s]
   Joint joint;

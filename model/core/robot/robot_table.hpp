@@ -19,11 +19,11 @@ enum OffLine { OFF_LINK = 1, OFF_PAYLOAD = 2 };  // the latter in the last link'
 
 struct Table {
   int count = 1, links = 0, intervals = 0, lumps = 0;  // the last two of all links together
-  const std::int64_t *counts = nullptr;     // (links, COUNTS), the same for all robots
-  const double *numbers = nullptr;          // (count, links, NUMBERS)
-  const double *material = nullptr;         // (count, intervals, MATERIAL)
-  const double *lump = nullptr;             // (count, lumps, LUMP)
-  const double *gravity = nullptr;          // (count, 2)
+  const std::int64_t *counts = nullptr;                // (links, COUNTS), the same for all robots
+  const double *numbers = nullptr;                     // (count, links, NUMBERS)
+  const double *material = nullptr;                    // (count, intervals, MATERIAL)
+  const double *lump = nullptr;                        // (count, lumps, LUMP)
+  const double *gravity = nullptr;                     // (count, 2)
   const double *payload = nullptr;  // (count, PAYLOAD): mass, inertia, centre along and across
 };
 

@@ -69,7 +69,8 @@ void add_mass_damping(const Model<Real> &model, const Real *y, const Real *v, Re
     if (only.joint == HubJoint::sleeve) {
       add_sleeve_damping(only, alpha, y[only.first], v + only.own(), last, out + only.own());
       if (last && model.tool())
-        add_tool_damping(only, *model.tool(), alpha, y[only.first], v + only.own(), out + only.own());
+        add_tool_damping(only, *model.tool(), alpha, y[only.first], v + only.own(),
+                         out + only.own());
       continue;
     }
     std::vector<Real> force(std::size_t(end - begin)), turning(force.size());  // on the piece's hub
