@@ -5,9 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-import os
 import re
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,7 +19,7 @@ if TYPE_CHECKING:
 else:
     rr = Optional("rerun")
 
-from flexura.io import Run
+from flexura.io import Run, replaced
 from flexura.io.drawing import MAX_SAMPLES, curves, extent, frames, grid, thinned
 
 from ..runs.deviation import TIP_DISTANCE, common, compared, deviation
@@ -56,15 +54,12 @@ def write(path: str | Path, groups: dict[str, Sequence[Run]]) -> Path:
     target = Path(path)
     parts = [_part(name if len(groups) > 1 else "", runs) for name, runs in groups.items()]
     scenes = [scene for _, scene in parts]
-    target.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".rrd")
-    os.close(handle)
-    try:
+    with replaced(target) as draft:
         # The viewer keeps a layout by application id: reviews with the same layout share one,
         # others must not.
         key = hashlib.sha1(repr(scenes).encode()).hexdigest()[:8]
         with rr.RecordingStream(f"flexura-review-{key}") as rec:
-            rec.save(name, default_blueprint=blueprint(scenes))
+            rec.save(draft, default_blueprint=blueprint(scenes))
             rec.set_log_time_enabled(False)
             rec.send_recording_name("; ".join(dict.fromkeys(_title(shown) for shown, _ in parts)))
             rec.send_property(
@@ -72,11 +67,6 @@ def write(path: str | Path, groups: dict[str, Sequence[Run]]) -> Path:
             )
             for shown, scene in parts:
                 _write(rec, shown, scene)
-        os.chmod(name, 0o644)
-        os.replace(name, target)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
     return target
 
 

@@ -21,9 +21,10 @@ from . import summary
 from .channels import SUFFIX
 from .drawing.film import animation
 from .drawing.over_time import FORMS, figure, heading, saved
+from .files import settle, write_bytes
 from .format import FORMAT, check_format
 from .frames import pandas_frame, xarray_dataset
-from .toml_files import write_bytes
+from .seal import Damaged, read_sealed, say_unsealed, sealed_parquet
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -240,16 +241,22 @@ class Run:
             compression="zstd",
             write_page_checksum=True,
         )
-        return bytes(sink.getvalue().to_pybytes())
+        return sealed_parquet(sink.getvalue().to_pybytes())
 
     @staticmethod
     def read(folder: str | Path) -> Run:
-        """Read a run's folder, or its Parquet file. Raises InputError for anything else."""
+        """Read a run's folder, or its Parquet file.
+
+        Raises:
+            InputError: anything else, or a file in which a byte is not as it was written.
+        """
         import pyarrow as pa
         import pyarrow.parquet as pq
 
         path = Path(folder)
         try:
+            for place in (path, path.parent):
+                settle(place)
             path = path / FILE if path.is_dir() else path
             there = path.is_file()
         except OSError:  # a name that is too long, a folder that may not be looked into
@@ -257,14 +264,16 @@ class Run:
         if not there:
             raise InputError(f"no run here: expected a folder with {FILE}", file=str(folder))
         try:
-            # a folder named a=b is just a folder
-            table = pq.read_table(path, partitioning=None, page_checksum_verification=True)
+            content, sealed = read_sealed(path, "restore a copy, or make it again", "a damaged run")
+            table = pq.ParquetFile(pa.BufferReader(content), page_checksum_verification=True).read()
+        except Damaged:
+            raise
         except (pa.ArrowException, OSError, ValueError) as error:
             raise InputError(
                 f"not a Parquet file ({(str(error) or 'damaged').splitlines()[0]})", file=str(path)
             ) from None
         try:
-            return Run._from_table(table, str(path))
+            run = Run._from_table(table, str(path))
         except (
             pa.ArrowException,
             KeyError,
@@ -273,6 +282,9 @@ class Run:
             raise InputError(
                 f"a damaged run ({(str(error) or 'unreadable').splitlines()[0]})", file=str(path)
             ) from None
+        if not sealed:
+            say_unsealed(path)
+        return run
 
     @staticmethod
     def _from_table(table: Any, file: str) -> Run:
