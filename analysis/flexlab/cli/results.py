@@ -85,7 +85,7 @@ def results(out: Path | None, *names: str, force: bool = False) -> Iterator[Draf
             key="--out",
             value=str(out),
         )
-    with _folder(target, out is None) as folder:
+    with _folder(target, out is None) as folder, _named(folder, target):
         yield Draft(folder, target, out is None)
 
 
@@ -157,6 +157,17 @@ def taken(path: Path) -> bool:
         return any(not name.startswith(DRAFT) or name == FINISHED for name in names)
     except (OSError, ValueError):  # what cannot be read is refused where it is tried
         return False
+
+
+@contextmanager
+def _named(draft: Path, target: Path) -> Iterator[None]:
+    """Errors name files where they would have been in the end."""
+    try:
+        yield
+    except InputError as error:
+        if error.file and Path(error.file).is_relative_to(draft):
+            raise error.in_file(str(target / Path(error.file).relative_to(draft))) from None
+        raise
 
 
 @contextmanager

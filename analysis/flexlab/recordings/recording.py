@@ -202,7 +202,7 @@ class StoredRecording:
 
 
 def read(folder: str | Path) -> StoredRecording:
-    """Read a recording's folder; an unfinished last line of events is left out.
+    """Read a recording's folder; damaged lines of events are left out and counted.
 
     Raises:
         InputError: there is no recording, or it is damaged.
@@ -213,7 +213,8 @@ def read(folder: str | Path) -> StoredRecording:
         session, sealed = read_sealed_json(path / SESSION, "restore a copy", "a damaged recording")
         received = (path / RECEIVED).read_bytes()
         place = path / EVENTS
-        lines = (path / EVENTS).read_bytes().split(b"\n")[:-1]
+        *lines, torn = (path / EVENTS).read_bytes().split(b"\n")
+        lines += [torn] if torn and sealed else []
         found = [_event(line, sealed) for line in lines]
         events = [event for event in found if event is not None]
     except Damaged:
