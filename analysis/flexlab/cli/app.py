@@ -13,7 +13,7 @@ import typer
 from typer.core import TyperGroup
 
 from flexura import __version__
-from flexura.errors import FlexuraError, InputError
+from flexura.errors import FlexuraError, InputError, out_of_memory
 
 from ..runs.formatting import printable
 from .verbosity import set_verbosity
@@ -112,8 +112,11 @@ def main() -> None:
     except KeyboardInterrupt:
         typer.echo("flexura: interrupted", err=True)
         sys.exit(130)
+    except MemoryError as error:
+        typer.echo(f"flexura: {out_of_memory(error)}", err=True)
+        sys.exit(1)
     except OSError as error:
-        said = f"flexura: {error.filename or 'a file'}: {error.strerror or error}"
+        said = f"flexura: {error.filename or 'standard output'}: {error.strerror or error}"
         typer.echo(printable(said), err=True)
         sys.exit(2 if error.errno == errno.ENAMETOOLONG else 1)  # no such file can be there
     except Exception as error:

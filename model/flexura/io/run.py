@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, within_memory
 from . import summary
 from .channels import SUFFIX
 from .drawing.film import animation
@@ -221,6 +221,7 @@ class Run:
         write_bytes(path, self.parquet())
         return path
 
+    @within_memory
     def parquet(self) -> bytes:
         """The run as a Parquet file: one column a channel, its unit in the field, the metadata in
         the schema."""
@@ -244,6 +245,7 @@ class Run:
         return sealed_parquet(sink.getvalue().to_pybytes())
 
     @staticmethod
+    @within_memory
     def read(folder: str | Path) -> Run:
         """Read a run's folder, or its Parquet file.
 
@@ -266,7 +268,7 @@ class Run:
         try:
             content, sealed = read_sealed(path, "restore a copy, or make it again", "a damaged run")
             table = pq.ParquetFile(pa.BufferReader(content), page_checksum_verification=True).read()
-        except Damaged:
+        except (Damaged, MemoryError):
             raise
         except (pa.ArrowException, OSError, ValueError) as error:
             raise InputError(
@@ -274,6 +276,8 @@ class Run:
             ) from None
         try:
             run = Run._from_table(table, str(path))
+        except MemoryError:
+            raise
         except (
             pa.ArrowException,
             KeyError,

@@ -112,7 +112,7 @@ class Chunk:
                 name: table.column(name)
                 for name in ("robot", "status", "reached_s", "steps", "event", "digest")
             }
-        except Damaged:
+        except (Damaged, MemoryError):
             raise
         except (pa.ArrowException, OSError, KeyError, ValueError) as error:
             raise Damaged(f"a damaged chunk ({error}); {MENDED}", file=str(path)) from None
@@ -256,6 +256,8 @@ def _digests(path: Path) -> list[bytes]:
 
     try:
         return list(_table(path).column("digest").to_pylist())
+    except MemoryError:
+        raise
     except (Damaged, pa.ArrowException, OSError, KeyError, ValueError):
         return []
 
