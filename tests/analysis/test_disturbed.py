@@ -14,7 +14,7 @@ import pytest
 import archives
 import flexura as fx
 from flexlab.tuning.history import History
-from flexura.io import DRAFT, FINISHED, REPLACED
+from flexura.io import DRAFT, read_toml, settle
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "disturbance"))
 import power
@@ -24,10 +24,9 @@ from commands import COMMANDS, Place, files
 
 KINDS = ("write", "sync", "rename", "create")
 QUICK = ("simulate", "new")
-SLOW = [name for name in COMMANDS if name not in QUICK]
-TIERS = [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)]
-DONE = 12  # of longer series the first operations are failed, and of the rest a sample
-STEP = 29
+SLOW = [pytest.param(n, marks=pytest.mark.slow) for n in COMMANDS if n not in QUICK]
+DONE, STEP = 6, 61  # of long series the first operations are failed, and of the rest a sample
+BINDING = 4  # objects of the core that a command makes: nanobind's own table of them may not fail
 CORE, NUMPY = "/flexura/_core", "_multiarray_umath"
 MEGABYTE = 1 << 20
 
@@ -82,7 +81,7 @@ def readable(work):
         list(fx.Population.read(path.parent))
     for path in work.rglob("*.toml"):
         if DRAFT not in path.name:
-            fx.io.read_toml(path)
+            read_toml(path)
     for path in work.rglob("*.rrd"):
         assert DRAFT in path.name or b"RRF2FOOT" in path.read_bytes()[-16:]
 
@@ -90,8 +89,19 @@ def readable(work):
 # The disk
 
 
-@pytest.mark.parametrize("name", TIERS)
+@pytest.mark.parametrize("name", [*QUICK, *SLOW])
+def test_operations_on_the_disk_fail_once(name, place):
+    failing_disk(name, place, STEP)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", COMMANDS)
 def test_every_operation_on_the_disk_fails_once(name, place):
+    failing_disk(name, place, 1)
+
+
+def failing_disk(name, place, step):
+    """The n-th operation fails, n = 1, 2, 3, ... until the command passes."""
     counts = Counter()
     for kind in KINDS:
         n = 1
@@ -107,7 +117,7 @@ def test_every_operation_on_the_disk_fails_once(name, place):
             if command.resumes and kind == "write":
                 again = place.run(command, work)
                 assert again.status == 0, again.err
-            n += 1 if n < DONE else STEP
+            n += 1 if n < DONE else step
     print(f"{name}: {sum(counts.values())} faults, {dict(counts)}")
     assert set(counts) == set(KINDS) or name == "migrate"
 
@@ -133,7 +143,7 @@ def test_a_failing_disk_keeps_the_finished_results(name, place):
                 (work / path).write_bytes(content)
             ended = place.run(command, work, "--force", *command.other, kind=kind, n=n)
             assert "Traceback" not in ended.err, ended.err
-            settled(work / command.out)
+            settle(work / command.out)
             now = files(work)
             kept = [now.get(path) == content for path, content in first.items()]
             assert set(now) >= set(first), (kind, n, set(first) - set(now))
@@ -147,12 +157,6 @@ def test_a_failing_disk_keeps_the_finished_results(name, place):
             n += 1 if n < DONE else STEP
     print(f"{name} over finished results: {faults} faults")
     assert faults >= 8
-
-
-def settled(out):
-    """The next reader ends a replacement that was cut off."""
-    if (out / FINISHED).exists() or (out / REPLACED).exists():
-        fx.io.settle(out)
 
 
 # Signals
@@ -210,17 +214,26 @@ def numbers(out):
 # Memory
 
 
-@pytest.mark.slow
+@pytest.mark.parametrize("name", [*QUICK, *SLOW])
+def test_two_limits_of_memory(name, place):
+    short_memory(name, place, [2, 40])
+
+
+@pytest.mark.long
 @pytest.mark.parametrize("name", COMMANDS)
 def test_twenty_limits_of_memory(name, place):
+    short_memory(name, place, np.geomspace(0.25, 400, 20))
+
+
+def short_memory(name, place, limits):
+    """A command with so many megabytes more than it has when it begins."""
     counts = Counter()
-    for megabytes in np.geomspace(0.25, 400, 20):
+    for megabytes in limits:
         command, work = ready(place, name)
         ended = place.run(command, work, memory=int(megabytes * MEGABYTE))
-        assert "Traceback" not in ended.err, ended.err
         counts[ended.status] += 1
-        if ended.status >= 0:
-            ended_well(ended, work)
+        # Arrow and others crash where a small piece of memory is refused: what is kept is whole
+        ended_well(ended, work, killed=ended.status < 0)
     print(f"{name}: statuses {dict(counts)}")
 
 
@@ -232,10 +245,14 @@ def test_twenty_limits_of_memory(name, place):
     ],
 )
 def test_every_allocation_of_the_core_fails_once(name, place):
-    n, faults = 1, 0
+    n, faults, binding = 1, 0, 0
     while True:
         command, work = ready(place, name)
         ended = place.run(command, work, kind="allocation", n=n, library=CORE, bytes=0)
+        if ended.status == -signal.SIGABRT:
+            binding, n = binding + 1, n + 1
+            assert "bad_alloc" in ended.err and binding <= BINDING
+            continue
         ended_well(ended, work)
         if not ended.disturbed:
             assert ended.status == 0
@@ -243,19 +260,19 @@ def test_every_allocation_of_the_core_fails_once(name, place):
         assert ended.status in (0, 1) and (ended.status == 0 or "not enough memory" in ended.err)
         faults += 1
         n += 1 if n < DONE else max(1, n // 4)
-    print(f"{name}: {faults} allocations of the core failed")
+    print(f"{name}: {faults} allocations of the core failed, {binding} of the binding's")
     assert faults > DONE
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["simulate", "simulate --vary", "export csv", "compare", "plot"])
-def test_every_array_above_a_megabyte_fails_once(name, place):
-    """Of NumPy, and of the core; here above a twentieth of a megabyte, since examples are small."""
+def test_every_large_array_fails_once(name, place):
+    """Of NumPy, above 16 kB, since the examples are small: what is above 1 MB in use is among
+    them."""
     n, faults = 1, 0
     while True:
         command, work = ready(place, name)
-        size = MEGABYTE // 20
-        ended = place.run(command, work, kind="array", n=n, library=NUMPY, bytes=size)
+        ended = place.run(command, work, kind="array", n=n, library=NUMPY, bytes=16_000)
         ended_well(ended, work)
         if not ended.disturbed:
             break
@@ -263,6 +280,7 @@ def test_every_array_above_a_megabyte_fails_once(name, place):
         faults += 1
         n += 1 if n < DONE else max(1, n // 4)
     print(f"{name}: {faults} arrays failed")
+    assert faults
 
 
 # The power

@@ -74,9 +74,9 @@ class Program:
         Args:
             arguments: after `flexura`.
             cwd: the working folder; operations on files below it are disturbed.
-            disturbance: `kind` ("write", "sync", "rename", "create") and `n`: the n-th fails; `log`:
-                a file for all operations; `kind` "allocation" or "array", `n`, `library`, `bytes`;
-                `memory`: bytes of address space above what there is; `signal`, `after_s`.
+            disturbance: `kind` ("write", "sync", "rename", "create") and `n`: the n-th fails;
+                `log`: a file for all operations; `kind` "allocation" or "array", `n`, `library`,
+                `bytes`; `memory`: bytes of address space above what there is; `signal`, `after_s`.
         """
         files = {name: str(self.folder / name) for name in ("out", "err", "counts")}
         Path(files["counts"]).unlink(missing_ok=True)
@@ -86,5 +86,5 @@ class Program:
         done = json.loads(self.process.stdout.readline())
         out, err = (Path(files[name]).read_text(errors="replace") for name in ("out", "err"))
         counts = Path(files["counts"])
-        many, fired = json.loads(counts.read_text()) if counts.exists() else (0, 0)
+        many, fired = json.loads(counts.read_text() or "[0, 0]") if counts.exists() else (0, 0)
         return Ended(done["status"], out, err, done["s"], many, bool(fired), done["sent"])

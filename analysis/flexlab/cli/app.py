@@ -7,7 +7,7 @@ import errno
 import gc
 import importlib
 import sys
-from typing import Annotated, Any
+from typing import Annotated, Any, NoReturn
 
 import typer
 from typer.core import TyperGroup
@@ -67,6 +67,8 @@ class Commands(TyperGroup):
             formatter.write_dl(list(COMMANDS.items()))
 
 
+# what else than MemoryError says so: the loader of libraries, and threads
+SHORT_OF_MEMORY = ("failed to map segment", "cannot allocate memory", "can't start new thread")
 PLAIN: dict[str, Any] = {
     "add_completion": False,
     "rich_markup_mode": None,
@@ -112,18 +114,25 @@ def main() -> None:
     except KeyboardInterrupt:
         typer.echo("flexura: interrupted", err=True)
         sys.exit(130)
-    except MemoryError as error:
-        typer.echo(f"flexura: {out_of_memory(error)}", err=True)
-        sys.exit(1)
     except OSError as error:
+        if error.errno == errno.ENOMEM:
+            _end_without_memory(error)
         said = f"flexura: {error.filename or 'standard output'}: {error.strerror or error}"
         typer.echo(printable(said), err=True)
         sys.exit(2 if error.errno == errno.ENAMETOOLONG else 1)  # no such file can be there
     except Exception as error:
+        if isinstance(error, MemoryError) or any(text in str(error) for text in SHORT_OF_MEMORY):
+            _end_without_memory(error)
         if not isinstance(error, FlexuraError):
             raise
         typer.echo(f"flexura: {error}", err=True)
         sys.exit(2 if isinstance(error, InputError) else 1)
+
+
+def _end_without_memory(error: Exception) -> NoReturn:
+    short = error if isinstance(error, MemoryError) else MemoryError(str(error).splitlines()[0])
+    typer.echo(f"flexura: {out_of_memory(short)}", err=True)
+    sys.exit(1)
 
 
 if __name__ == "__main__":

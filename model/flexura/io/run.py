@@ -265,15 +265,18 @@ class Run:
             there = False
         if not there:
             raise InputError(f"no run here: expected a folder with {FILE}", file=str(folder))
+        sealed = False
         try:
             content, sealed = read_sealed(path, "restore a copy, or make it again", "a damaged run")
             table = pq.ParquetFile(pa.BufferReader(content), page_checksum_verification=True).read()
         except (Damaged, MemoryError):
             raise
         except (pa.ArrowException, OSError, ValueError) as error:
-            raise InputError(
-                f"not a Parquet file ({(str(error) or 'damaged').splitlines()[0]})", file=str(path)
-            ) from None
+            why = (str(error) or "damaged").splitlines()[0]
+            what = (
+                "cannot be read now, though its checksum fits" if sealed else "not a Parquet file"
+            )
+            raise InputError(f"{what} ({why})", file=str(path)) from None
         try:
             run = Run._from_table(table, str(path))
         except MemoryError:
