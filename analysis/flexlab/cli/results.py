@@ -89,6 +89,21 @@ def results(out: Path | None, *names: str, force: bool = False) -> Iterator[Draf
         yield Draft(folder, target, out is None)
 
 
+@contextmanager
+def replacing(folder: Path) -> Iterator[Path]:
+    """A draft of results that in the end replace those of the same names in `folder`, together.
+
+    Raises:
+        InputError: the folder cannot be written; the old results are as they were.
+    """
+    with _folder(folder, False) as draft, _named(draft, folder):
+        yield draft
+        try:
+            replace_results(draft, folder)
+        except OSError as error:
+            raise unwritable(folder, error, "--out") from None
+
+
 def continued(out: Path | None, *names: str, mark: str) -> Path:
     """The folder of a command that goes on where it was stopped: `out`, or logs/NAME-NAME.
 
