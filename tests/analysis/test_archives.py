@@ -88,3 +88,39 @@ def test_a_name_that_looks_like_a_seal_does_no_harm(tmp_path):
     made = fx.Run(archives.T, {}, {}, {"source": text, "robot": {"name": text[:20]}})
     made.save(tmp_path)
     assert fx.Run.read(tmp_path).meta == made.meta
+
+
+@pytest.mark.parametrize(
+    "every",
+    [pytest.param(211, marks=pytest.mark.slow), pytest.param(1, marks=pytest.mark.long)],
+)
+def test_a_flipped_byte_of_what_a_board_sent_is_a_row_that_is_lost(every, tmp_path):
+    """Each frame has its own checksum: a number is what was sent, or NaN, and the run says so."""
+    from experiments import BENCH, SETTINGS, experiment
+    from flexlab.experiment import plan as plans
+    from flexlab.recordings import recording
+    from flexlab.recordings.run_from_recording import run_from_recording
+
+    whole = experiment(plans.free_vibration(BENCH, SETTINGS, 0.3, 1.05), tmp_path / "run").run
+    file = tmp_path / "run" / recording.RECEIVED
+    good, flips, unseen = file.read_bytes(), 0, 0
+    for at in range(0, len(good), every):
+        raw = bytearray(good)
+        raw[at] ^= 1 << at // every % 8
+        file.write_bytes(raw)
+        run = run_from_recording(tmp_path / "run")
+        same = equal_or_missing(run, whole)
+        line = run.meta["line"]
+        assert same or line["bad_frames"] or line["missing"] or len(run) < len(whole)
+        flips, unseen = flips + 1, unseen + same
+    print(f"received.bin: {len(good)} bytes, {flips} flips, {unseen} outside of the reports")
+
+
+def equal_or_missing(run, whole):
+    """Every number is that of the whole run, or missing; returns whether none is missing."""
+    at = np.searchsorted(whole.t, run.t)
+    assert np.array_equal(whole.t[at], run.t)
+    for name in ("joint/1/position", "joint/2/position", "link/2/flex_voltage"):
+        there = np.isfinite(run[name])
+        assert np.array_equal(run[name][there], whole[name][at][there]), name
+    return len(run) == len(whole) and bool(np.isfinite(run["joint/1/position"]).all())

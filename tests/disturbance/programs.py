@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -45,6 +46,10 @@ class Program:
     def __init__(self, folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         self.folder = folder
+        self._start()
+
+    def _start(self) -> None:
+        folder = self.folder
         surroundings = os.environ | {
             "LD_PRELOAD": str(shim(folder)),
             "PYTHONPATH": os.pathsep.join(map(str, PATHS)),
@@ -58,6 +63,7 @@ class Program:
             stdout=subprocess.PIPE,
             text=True,
             env=surroundings,
+            start_new_session=True,
         )
         assert self.process.stdout is not None
         assert self.process.stdout.readline() == "ready\n"
@@ -66,7 +72,17 @@ class Program:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.process.communicate(timeout=60)
+        self._stop()
+
+    def _stop(self) -> None:
+        """End it; a command that still runs is ended too."""
+        assert self.process.stdin is not None
+        self.process.stdin.close()
+        try:
+            self.process.wait(5)
+        except subprocess.TimeoutExpired:
+            os.killpg(self.process.pid, signal.SIGKILL)
+            self.process.wait()
 
     def run(self, arguments: list[Any], cwd: Path, **disturbance: Any) -> Ended:
         """Run the command in a folder.
@@ -82,8 +98,13 @@ class Program:
         Path(files["counts"]).unlink(missing_ok=True)
         asked = {"arguments": list(map(str, arguments)), "cwd": str(cwd.resolve())}
         assert self.process.stdin is not None and self.process.stdout is not None
-        print(json.dumps(asked | files | disturbance), file=self.process.stdin, flush=True)
-        done = json.loads(self.process.stdout.readline())
+        try:
+            print(json.dumps(asked | files | disturbance), file=self.process.stdin, flush=True)
+            done = json.loads(self.process.stdout.readline())
+        except BaseException:  # its answer would be taken for that of the next command
+            self._stop()
+            self._start()
+            raise
         out, err = (Path(files[name]).read_text(errors="replace") for name in ("out", "err"))
         counts = Path(files["counts"])
         many, fired = json.loads(counts.read_text() or "[0, 0]") if counts.exists() else (0, 0)

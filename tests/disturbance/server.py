@@ -31,7 +31,6 @@ def main() -> None:
         asked = json.loads(line)
         child = os.fork()
         if child == 0:
-            os.setpgid(0, 0)
             _run(cli, shim, asked)
         print(json.dumps(_watched(child, asked)), flush=True)
 
@@ -49,7 +48,7 @@ def _watched(child: int, asked: dict[str, Any]) -> dict[str, Any]:
             os.kill(child, asked["signal"])
             sent = True
         if now > asked.get("limit_s", 300):
-            os.killpg(child, signal.SIGKILL)
+            os.kill(child, signal.SIGKILL)
         time.sleep(0.002)
     return {
         "status": os.waitstatus_to_exitcode(status),

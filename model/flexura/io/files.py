@@ -6,7 +6,7 @@ the folder is synchronised. After a loss of power there is the old file or the n
 
 from __future__ import annotations
 
-import fcntl
+import errno
 import os
 import secrets
 import shutil
@@ -15,6 +15,11 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..errors import InputError
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
 
 DRAFT = ".flexura-"  # how names begin that no result has
 # inside a folder: new results that are on their way to their places, and the old ones
@@ -49,9 +54,11 @@ def replaced(path: str | os.PathLike[str]) -> Iterator[Path]:
     """
     target = Path(path)
     draft = target.with_name(
-        f"{DRAFT}{target.stem[:100]}-{secrets.token_hex(4)}{target.suffix[:20]}"
+        f"{DRAFT}{target.stem[:40]}-{secrets.token_hex(4)}{target.suffix[:20]}"
     )
     try:
+        if target.exists() and not target.is_file():
+            raise OSError(0, "not a file")  # a device or a folder
         make_folder(target.parent)
         os.close(os.open(draft, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o644))
         try:
@@ -69,7 +76,7 @@ def replaced(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 def leftovers(path: Path) -> Iterator[Path]:
     """Drafts of a file that a process left which was killed while it wrote."""
-    yield from path.parent.glob(f"{DRAFT}{path.stem[:100]}-*{path.suffix[:20]}")
+    yield from path.parent.glob(f"{DRAFT}{path.stem[:40]}-*{path.suffix[:20]}")
 
 
 def move(source: Path, target: Path) -> None:
@@ -116,14 +123,21 @@ def make_folder(folder: Path) -> list[Path]:
 def sync(path: Path) -> None:
     """Write a file, or the names in a folder, to the disk itself.
 
+    Some file systems cannot do that with folders; then it is theirs to keep the names.
+
     Raises:
         OSError: the disk fails.
     """
-    handle = os.open(path, os.O_RDONLY)
+    folder = path.is_dir()
     try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
+        handle = os.open(path, os.O_RDONLY if folder else os.O_RDWR)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+    except OSError as error:
+        if not folder or error.errno not in (errno.EACCES, errno.EINVAL, errno.ENOTSUP):
+            raise
 
 
 def unwritable(path: str | os.PathLike[str], error: Exception, key: str = "") -> InputError:
@@ -149,13 +163,9 @@ def replace_results(draft: Path, folder: Path) -> None:
         OSError: the file system refuses something.
     """
     settle(folder)
-    lock = os.open(draft, os.O_RDONLY)
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+    with _alone(draft):
         move(draft, folder / FINISHED)
         _settle(folder)
-    finally:
-        os.close(lock)
 
 
 def settle(folder: Path) -> None:
@@ -164,15 +174,24 @@ def settle(folder: Path) -> None:
     Raises:
         OSError: the file system refuses something.
     """
+    if (folder / FINISHED).is_dir():
+        with _alone(folder / FINISHED):
+            _settle(folder)
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """No other process works on this folder, whatever its name becomes."""
+    handle = -1
+    with suppress(FileNotFoundError):  # another process has done it
+        handle = -1 if fcntl is None else os.open(folder, os.O_RDONLY)
     try:
-        lock = os.open(folder / FINISHED, os.O_RDONLY)
-    except OSError:
-        return
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        _settle(folder)
+        if handle >= 0:
+            fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
     finally:
-        os.close(lock)
+        if handle >= 0:
+            os.close(handle)
 
 
 def _settle(folder: Path) -> None:
