@@ -24,7 +24,7 @@ from .drawing.over_time import FORMS, figure, heading, saved
 from .files import settle, write_bytes
 from .format import FORMAT, check_format
 from .frames import pandas_frame, xarray_dataset
-from .seal import Damaged, read_sealed, say_unsealed, sealed_parquet
+from .seal import Damaged, read_sealed, read_table, say_unsealed, sealed_parquet
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -253,7 +253,6 @@ class Run:
             InputError: anything else, or a file in which a byte is not as it was written.
         """
         import pyarrow as pa
-        import pyarrow.parquet as pq
 
         path = Path(folder)
         try:
@@ -268,7 +267,7 @@ class Run:
         sealed = False
         try:
             content, sealed = read_sealed(path, "restore a copy, or make it again", "a damaged run")
-            table = pq.ParquetFile(pa.BufferReader(content), page_checksum_verification=True).read()
+            table = read_table(content)
         except (Damaged, MemoryError):
             raise
         except (pa.ArrowException, OSError, ValueError) as error:

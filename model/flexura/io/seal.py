@@ -21,6 +21,7 @@ BEGIN, END = b"flexura-seal:", b":flexura-seal"
 DIGITS = 64
 SIZE = len(BEGIN) + DIGITS + len(END)
 KEY = "seal"
+LARGE = 10_000_000  # bytes
 FOOTER = 8  # of Parquet: the size of its metadata, and PAR1
 
 _log = logging.getLogger("flexura")
@@ -99,6 +100,24 @@ def read_sealed_json(
     if isinstance(found, dict):
         found.pop(KEY, None)
     return found, there
+
+
+def read_table(content: bytes) -> Any:
+    """The table of a Parquet file's content.
+
+    Small ones are read without threads: Arrow ends the process if there is no memory for one.
+
+    Raises:
+        pyarrow.ArrowException, OSError, ValueError: it is no Parquet file.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    large = len(content) > LARGE
+    file = pq.ParquetFile(
+        pa.BufferReader(content), pre_buffer=large, page_checksum_verification=True
+    )
+    return file.read(use_threads=large)
 
 
 def say_unsealed(path: str | os.PathLike[str]) -> None:

@@ -22,6 +22,7 @@ from ..io import (
     Damaged,
     read_sealed,
     read_sealed_json,
+    read_table,
     say_unsealed,
     sealed_json,
     sealed_parquet,
@@ -243,11 +244,8 @@ def manifest(folder: str | Path) -> dict[str, Any]:
 
 def _table(path: Path) -> Any:
     """The table of a chunk's file, all of it verified."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
     content, _ = read_sealed(path, MENDED, "a damaged chunk")
-    return pq.ParquetFile(pa.BufferReader(content), page_checksum_verification=True).read()
+    return read_table(content)
 
 
 def _digests(path: Path) -> list[bytes]:
