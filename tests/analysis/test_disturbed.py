@@ -266,7 +266,7 @@ def test_every_allocation_of_the_core_fails_once(name, place):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["simulate", "simulate --vary", "export csv", "plot"])
+@pytest.mark.parametrize("name", ["simulate", "export csv", "export mat"])
 def test_every_large_array_fails_once(name, place):
     """Of NumPy, above 16 kB, since the examples are small: what is above 1 MB in use is among
     them."""
@@ -411,15 +411,22 @@ def test_a_loss_of_power_while_an_experiment_is_recorded(place, tmp_path):
         assert "stored" not in said or found == "run"
         if run is not None:
             equal_or_missing(run, whole)
+            assert run.complete or any(event["level"] == "ERROR" for event in run.meta["events"])
     print(f"an experiment: {dict(counts)}")
     assert counts["run"] and counts["refused"]
 
 
 def equal_or_missing(run, whole):
-    """Every number of a run is the whole one's, or NaN; velocities depend on those around."""
-    there = np.isin(run.t, whole.t)
-    at = np.searchsorted(whole.t, run.t[there])
-    for name in ("joint/1/position", "joint/2/position", "link/2/flex_voltage"):
-        values = run[name][there]
-        missing = np.isnan(values)
-        assert np.array_equal(values[~missing], whole[name][at][~missing]), name
+    """Every number of a run is the whole one's, or NaN; time may begin some ticks apart, since the
+    start is estimated from what there is. Where nothing had moved, a run says so."""
+    if any(event["text"] == "nothing was moved" for event in run.meta["events"]):
+        return
+    names = ("joint/1/position", "joint/2/position", "link/2/flex_voltage")
+    step = np.median(np.diff(whole.t))
+    for shift in sorted(range(-5, 6), key=abs):
+        at = np.rint((run.t - whole.t[0]) / step).astype(int) + shift
+        there = (at >= 0) & (at < len(whole.t))
+        pairs = [(run[name][there], whole[name][at[there]]) for name in names]
+        if all(np.array_equal(a[np.isfinite(a)], b[np.isfinite(a)]) for a, b in pairs):
+            return
+    raise AssertionError("a number that the board had not sent")
