@@ -61,6 +61,14 @@ class Commands(TyperGroup):
         command.name = cmd_name
         return command
 
+    def invoke(self, ctx: Any) -> Any:
+        """Call a command; Ctrl-C ends it with a word, where it does not keep what it has."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            typer.echo("flexura: interrupted", err=True)
+            raise typer.Exit(130) from None
+
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """The table of commands, without importing any."""
         with formatter.section("Commands"):
