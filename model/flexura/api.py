@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Callable
 from typing import Any, overload
 
-from .errors import InputError
+from .errors import InputError, within_memory
 from .io import Run
 from .population import Batch, Population
 from .population import simulate as simulate_population
@@ -41,6 +41,7 @@ def simulate(
     numerical_damping: bool = True,
     progress: Progress = None,
 ) -> Run: ...
+@within_memory
 def simulate(
     robot: Any,
     t_eval: Any,

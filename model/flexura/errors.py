@@ -3,6 +3,13 @@ expected."""
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
+from typing import ParamSpec, TypeVar
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
 
 class FlexuraError(Exception):
     """Something the user can put right; the command prints it as one line and exits with status
@@ -40,6 +47,37 @@ class InputError(FlexuraError):
             The error to raise.
         """
         return InputError(self.expected, key=self.key, value=self.value, file=file)
+
+
+class OutOfMemory(FlexuraError, MemoryError):
+    """There is less memory than an array or the core asks for."""
+
+
+def within_memory(function: Callable[P, T]) -> Callable[P, T]:
+    """A function whose MemoryError, from whatever library, is OutOfMemory with its size."""
+
+    @functools.wraps(function)
+    def guarded(*arguments: P.args, **options: P.kwargs) -> T:
+        try:
+            return function(*arguments, **options)
+        except MemoryError as error:
+            raise out_of_memory(error) from None
+
+    return guarded
+
+
+def out_of_memory(error: MemoryError) -> OutOfMemory:
+    """The error that says what did not fit: NumPy and Arrow tell the size."""
+    if isinstance(error, OutOfMemory):
+        return error
+    size = str(error).replace("std::bad_alloc", "").replace("bad allocation", "")
+    what = f" ({size})" if size else " (a small piece more was refused)"
+    return OutOfMemory(
+        _one_line(
+            f"not enough memory{what}: ask for fewer samples, elements or robots at once, or give "
+            "the process more"
+        )
+    )
 
 
 class WrongValue(ValueError):

@@ -26,7 +26,7 @@ from ..tuning.search import Search, search
 from ..tuning.task import Task, perturbed_robots
 from .options import Json
 from .output import message, print_results
-from .results import continued
+from .results import continued, replacing
 
 
 def tune(
@@ -188,7 +188,8 @@ def tune(
     if not len(history):
         raise typer.Exit(130)
     found = results.result(task, how, history, complete)
-    paths = results.save(found, folder)
+    with replacing(folder) as draft:
+        paths = [folder / path.relative_to(draft) for path in results.save(found, draft)]
     print_results(
         json,
         lambda: results.table(found),

@@ -257,6 +257,8 @@ def conduct(
         recording.close()
     run = run_from_recording(folder)
     run.save(folder)
+    if recording.failed is not None and ended.complete:
+        raise recording.failed
     return ExperimentResult(run, folder, findings, ended)
 
 

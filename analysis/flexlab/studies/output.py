@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from flexura.io import write_bytes
+from flexura.io import sealed_parquet, write_bytes
 from flexura.optional import load
 
 from ..runs.formatting import number
@@ -125,9 +125,10 @@ def save(study: Study, folder: Path) -> list[Path]:
         pa.table(columns).replace_schema_metadata({"flexura_study": json.dumps(about)}),
         sink,
         compression="zstd",
+        write_page_checksum=True,
     )
     paths = [folder / f"study.{kind}" for kind in ("parquet", "png", "svg")]
-    write_bytes(paths[0], sink.getvalue().to_pybytes())
+    write_bytes(paths[0], sealed_parquet(sink.getvalue().to_pybytes()))
     drawing = figure(study)
     for path in paths[1:]:
         buffer = io.BytesIO()

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import zipfile
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +12,22 @@ import numpy as np
 
 import flexura as fx
 from flexura.errors import InputError
-from flexura.io import write_bytes
+from flexura.io import Damaged, leftovers, read_sealed, say_unsealed, sealed, write_bytes
 
 FILE = "state.npz"
+ADVICE = "restore a copy, or remove it to begin the search again"
+NO_ARRAYS = (  # what NumPy raises for a file that has none
+    OSError,
+    ValueError,
+    EOFError,
+    AttributeError,
+    KeyError,
+    NotImplementedError,
+    RuntimeError,
+    SyntaxError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
 _ARRAYS = ("points", "goals", "figures", "reached")
 
 
@@ -43,14 +58,20 @@ class History:
         """
         history = History(digest, folder / FILE)
         assert history.path is not None
-        for leftover in folder.glob(f".{FILE}.*"):  # of a process that was killed while it wrote
+        for leftover in leftovers(history.path):  # of a process that was killed while it wrote
             leftover.unlink(missing_ok=True)
         if not history.path.exists():
             return history
         try:
-            with np.load(history.path) as data:
+            content, there = read_sealed(history.path, ADVICE, "a damaged state of a search")
+            with np.load(io.BytesIO(content)) as data:
                 found = {name: data[name] for name in data.files}
-        except (OSError, ValueError, EOFError) as error:
+            missing = {"digest", "ends", "wall_s", *_ARRAYS} - set(found)
+            if missing:
+                raise ValueError(f"without {', '.join(sorted(missing))}")
+        except Damaged:
+            raise
+        except NO_ARRAYS as error:
             raise InputError(
                 f"expected the state of a search ({error})", key="--out", file=str(history.path)
             ) from None
@@ -60,6 +81,8 @@ class History:
                 "and --patience alone may change"
             )
             raise InputError(expected, key="--out", value=str(folder))
+        if not there:
+            say_unsealed(history.path)
         history.ends, history.wall_s = found["ends"].tolist(), found["wall_s"].tolist()
         history.stored, begin = len(history.ends), 0
         for end in history.ends:
@@ -96,7 +119,7 @@ class History:
             sink = io.BytesIO()
             arrays: dict[str, Any] = {name: self.all(name) for name in _ARRAYS}
             np.savez(sink, digest=self.digest, ends=self.ends, wall_s=self.wall_s, **arrays)
-            write_bytes(self.path, sink.getvalue())
+            write_bytes(self.path, sealed(sink.getvalue()))
 
     def objectives_for_algorithm(self, generation: int, points: np.ndarray) -> np.ndarray:
         """The goals of a stored generation.

@@ -5,12 +5,11 @@ from __future__ import annotations
 
 import os
 import re
-import tempfile
 import tomllib
-from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
+from .files import write_text
 
 MAX_BYTES = 10_000_000
 # a.a.a.a...: tomllib's time and memory grow with the square
@@ -60,36 +59,6 @@ def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
         raise InputError("not valid TOML (nested too deeply)", file=name) from None
     except ValueError as error:  # TOMLDecodeError, or a number of thousands of digits
         raise InputError(f"not valid TOML ({error})", file=name) from None
-
-
-def write_text(path: str | os.PathLike[str], text: str) -> None:
-    """Write a file as a whole: a reader sees the old one or the new one.
-
-    Args:
-        path: of the file.
-        text: its content.
-    """
-    write_bytes(path, text.encode())
-
-
-def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
-    """Write a file as a whole: a reader sees the old one or the new one.
-
-    Args:
-        path: of the file.
-        data: its content.
-    """
-    target = Path(path)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            stream.write(data)
-        os.chmod(name, 0o644)
-        os.replace(name, target)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
 
 
 def write_toml(path: str | os.PathLike[str], data: dict[str, Any]) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..control import Controller, Sampled
-from ..errors import InputError
+from ..errors import InputError, within_memory
 from ..io import Run, check_progress
 from ..signals import Drive, as_signals
 from ..system import System, assemble
@@ -79,6 +79,7 @@ def simulate(
     return run
 
 
+@within_memory
 def inverse(
     robot: Any,
     t_eval: Any,

@@ -276,7 +276,7 @@ def test_a_run_that_cannot_be_stored_leaves_what_was_there(tmp_path, monkeypatch
         raise OSError("disk full")
 
     monkeypatch.setattr(os, "replace", fail)
-    with pytest.raises(OSError, match="disk full"):
+    with pytest.raises(fx.InputError, match=r"run\.parquet: cannot be written \(disk full\)"):
         Run(np.zeros(2), {}, {}).save(tmp_path)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
@@ -285,7 +285,7 @@ def test_a_run_interrupted_while_it_is_written_leaves_nothing(tmp_path, monkeypa
     def interrupt(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(os, "fdopen", interrupt)
+    monkeypatch.setattr(os, "fsync", interrupt)
     with pytest.raises(KeyboardInterrupt):
         example().save(tmp_path)
     assert list(tmp_path.iterdir()) == []

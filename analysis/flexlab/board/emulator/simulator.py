@@ -12,7 +12,6 @@ import ctypes
 import hashlib
 import os
 import subprocess
-import tempfile
 from collections.abc import Iterable
 from ctypes import (
     c_char,
@@ -29,6 +28,7 @@ from pathlib import Path
 from typing import Any
 
 from flexura.errors import FlexuraError
+from flexura.io import replaced
 from flexura.optional import Missing
 
 from .elf import read
@@ -119,35 +119,20 @@ def compile_shim() -> Path:
     target = folder / f"board-{digest}.so"
     if target.exists():
         return target
-    folder.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=folder, suffix=".so")
-    os.close(handle)
-    try:
-        parts = [str(path) for path in _SOURCES if path.suffix == ".c"]
-        command = [
-            "cc",
-            "-O2",
-            "-shared",
-            "-fPIC",
-            f"-I{_HEADERS}",
-            "-o",
-            name,
-            *parts,
-            "-lsimavr",
-            "-lm",
-        ]
-        done = subprocess.run(command, capture_output=True, text=True)
+    parts = [str(path) for path in _SOURCES if path.suffix == ".c"]
+    options = ["-O2", "-shared", "-fPIC", f"-I{_HEADERS}"]
+    with replaced(target) as draft:
+        command = ["cc", *options, "-o", str(draft), *parts, "-lsimavr", "-lm"]
+        try:
+            done = subprocess.run(command, capture_output=True, text=True)
+        except FileNotFoundError:
+            raise Missing(
+                f"the emulated board needs a C compiler, and there is no cc; {_INSTALL}"
+            ) from None
         if done.returncode:
             raise FlexuraError(
                 f"the emulated board's shim does not compile; {_INSTALL}\n{done.stderr.strip()}"
             )
-        os.replace(name, target)
-    except FileNotFoundError:
-        raise Missing(
-            f"the emulated board needs a C compiler, and there is no cc; {_INSTALL}"
-        ) from None
-    finally:
-        Path(name).unlink(missing_ok=True)
     return target
 
 
