@@ -16,23 +16,30 @@ from .arguments import (
 from .channels import CHANNELS, STATIONS, Channel, channel
 from .format import FORMAT, check_format
 from .labels import EMULATED, called, emulated, kind
+from .memory import check_memory
 from .run import FILE, Run
 from .shipped import find, shipped_files
 from .toml_files import read_toml, write_bytes, write_text, write_toml
-from .validation import explain, is_name
+from .trust import DOUBTED, REFUSED, balance_events, judged
+from .validation import MOST_LETTERS, explain, is_name
 
 __all__ = [
     "CHANNELS",
+    "DOUBTED",
     "EMULATED",
     "FILE",
     "FORMAT",
+    "MOST_LETTERS",
+    "REFUSED",
     "STATIONS",
     "Channel",
     "Run",
     "array",
+    "balance_events",
     "called",
     "channel",
     "check_format",
+    "check_memory",
     "check_progress",
     "choice",
     "emulated",
@@ -42,6 +49,7 @@ __all__ = [
     "flag",
     "function_of",
     "is_name",
+    "judged",
     "kind",
     "number",
     "read_toml",

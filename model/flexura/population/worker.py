@@ -15,7 +15,6 @@ from ..io import STATIONS
 from ..robot import Robot
 from ..signals import Drive
 from ..simulation.dynamics import simulate
-from ..simulation.problem import MOST_STEPS
 from ..simulation.recorder import LIMITS, LOSS, NUMERICAL, WORK, limit_event, observed
 from ..simulation.start import NO_START, outside, put_on_motions
 from ..system import NoEquilibrium, System, equilibrium
@@ -197,7 +196,7 @@ def _together(
         request.rtol,
         request.method,
         request.numerical_damping,
-        MOST_STEPS,
+        request.max_steps,
         columns,
         STATIONS,
         threads,
@@ -256,6 +255,7 @@ def _one_by_one(request: Request, share: Share, watch: Any, part: Part) -> None:
                 method=request.method,
                 start=request.start,
                 numerical_damping=request.numerical_damping,
+                max_steps=request.max_steps,
             )
         except (InputError, NoEquilibrium) as error:
             part.status[k], part.events[k] = "refused", str(error)

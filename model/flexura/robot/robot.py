@@ -12,14 +12,14 @@ import os
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, Field, ValidationError, field_validator, model_validator
+from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from ..errors import InputError, WrongValue
-from ..io import FORMAT, check_format, explain, find, is_name, read_toml, summary, write_toml
+from ..io import FORMAT, check_format, explain, find, read_toml, summary, write_toml
 from .joint import KEYS, key_of
 from .link import LEAST_FREE, Link
 from .old_keys import renamed
-from .table import Table
+from .table import BOUNDS, Table, name, quantity
 
 MAX_LINKS = 256
 _log = logging.getLogger("flexura")
@@ -28,25 +28,20 @@ _log = logging.getLogger("flexura")
 class Payload(Table):
     """A point mass with inertia at the tip of the last link."""
 
-    mass_kg: float = Field(0.0, ge=0, description="the payload's mass in kilograms, 0 or more")
-    inertia_kg_m2: float = Field(
-        0.0, ge=0, description="the payload's inertia in kg m^2, 0 or more"
-    )
+    mass_kg: float = quantity("mass_kg", "the payload's mass in kilograms", 0.0)
+    inertia_kg_m2: float = quantity("inertia_kg_m2", "the payload's inertia in kg m^2", 0.0)
 
 
 class Robot(Table):
     """A serial planar chain of rigid and flexible links with joints R, Pa and Pb. Frozen; SI
     units."""
 
-    name: str = Field(
-        "",
-        max_length=200,
-        description="the robot's name, one line of at most 200 characters without control codes",
-    )
+    name: str = name("the robot's")
     gravity_m_s2: tuple[float, float] = Field(
         (0.0, 0.0),
         strict=False,
-        description="gravity in the base frame, two numbers [x, y] in m/s^2, y up",
+        description="gravity in the base frame, two numbers [x, y] in m/s^2, y up, "
+        f"{BOUNDS['gravity_m_s2']}",
     )
     stiffening: bool = Field(True, description="true, or false for the dissertation's linear model")
     sliding: Literal["continuous", "nodal"] = Field(
@@ -62,13 +57,6 @@ class Robot(Table):
     format: int = Field(
         FORMAT, ge=1, le=FORMAT, description=f"the file's format, a whole number up to {FORMAT}"
     )
-
-    @field_validator("name")
-    @classmethod
-    def _one_line(cls, name: str) -> str:
-        if not is_name(name):
-            raise ValueError("expected one line without control codes")
-        return name
 
     @model_validator(mode="after")
     def _starts_on_its_links(self) -> Robot:

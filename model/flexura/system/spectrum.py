@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import guarded
 from ..io import choice, whole
 from .statics import static
 from .system import System, assemble
@@ -23,6 +24,7 @@ class Modes:
     labels: tuple[str, ...]
 
 
+@guarded("the natural frequencies")
 def frequencies(
     robot: Any, q: Any = None, joints: str = "locked", *, count: int | None = None, qd: Any = None
 ) -> np.ndarray:
@@ -54,6 +56,7 @@ def frequencies(
     ).frequencies_Hz
 
 
+@guarded("the natural modes")
 def modes(robot: Any, q: Any = None, joints: str = "locked", *, count: int | None = None) -> Modes:
     """Natural modes of the undamped robot linearised about q (n,). Arguments and errors as in
     `frequencies`."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import FlexuraError, InputError
+from ..errors import FlexuraError, InputError, guarded
 from ..io import choice, summary
 from .statics import static
 from .system import System, assemble, jacobian
@@ -127,6 +127,7 @@ class StateSpace:
         return self.outlook @ np.linalg.solve(s * s * self.M + s * self.G + self.K, self.E)
 
 
+@guarded("the linear equations")
 def linearize(robot: Any, q: Any = None, qd: Any = None, joints: str = "free") -> StateSpace:
     """The robot linearised about an equilibrium q (n,), by default the static one at the start, or
     about a steady motion (52).

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import FlexuraError
+from ..errors import FlexuraError, guarded
 from ..io import array, number
 from .system import System, assemble
 
@@ -23,6 +23,7 @@ class NoEquilibrium(FlexuraError):
         self.q, self.share = q, share
 
 
+@guarded("the static equilibrium")
 def static(
     robot: Any,
     joints: Any = None,
@@ -75,6 +76,7 @@ def equilibrium(equations: Any, q: np.ndarray, load: np.ndarray | None = None) -
     raise NoEquilibrium(text, np.asarray(found), float(share))
 
 
+@guarded("the holding forces")
 def holding(robot: Any, q: Any = None) -> np.ndarray:
     """The drives (links,) [N or N m] that hold the joints at rest (25): elastic forces and gravity
     in their rows.
