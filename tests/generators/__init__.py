@@ -1,1 +1,1 @@
-"""Seeded generators of well-formed inputs, with what must hold of each: `robots`, `files`, `trial`."""
+"""Seeded generators of well-formed inputs, with what must hold of each."""

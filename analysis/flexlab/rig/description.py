@@ -20,7 +20,7 @@ from flexura.io import FORMAT, check_format, explain, find, is_name, read_toml
 
 from ..board.protocol.declaration import CONFIG
 from .emulation import Emulated
-from .toml_table import Table, above, named_file
+from .toml_table import Table, above, named_file, within
 
 DERIVED_SETTINGS = (  # settings of the board that follow from the other tables
     "motor_counts_per_m",
@@ -37,6 +37,9 @@ DERIVED_SETTINGS = (  # settings of the board that follow from the other tables
     "position_min_2_rad",
     "position_max_2_rad",
 )
+
+
+ONE_LINE = "the rig's name, one line of at most 200 characters without control codes"
 
 
 class MotorSheet(Table):
@@ -143,9 +146,9 @@ class Calibration(Table):
         lt=1,
         description="the straight strip's reading, a fraction of full scale between 0 and 1",
     )
-    c1_m: float = Field(ge=-1e6, le=1e6, description="metres for x, between -1e6 and 1e6")
-    c2_m: float = Field(0.0, ge=-1e6, le=1e6, description="metres for x^2, between -1e6 and 1e6")
-    c3_m: float = Field(0.0, ge=-1e6, le=1e6, description="metres for x^3, between -1e6 and 1e6")
+    c1_m: float = within("metres for x", 1e6)
+    c2_m: float = within("metres for x^2", 1e6, 0.0)
+    c3_m: float = within("metres for x^3", 1e6, 0.0)
     covariance: list[list[float]] | None = Field(
         None, description="four rows of four numbers: the covariance of zero, c1_m, c2_m, c3_m"
     )
@@ -183,11 +186,7 @@ class Rig(Table):
     format: int = Field(
         FORMAT, ge=1, le=FORMAT, description=f"the file's format, a whole number up to {FORMAT}"
     )
-    name: str = Field(
-        "",
-        max_length=200,
-        description="the rig's name, one line of at most 200 characters without control codes",
-    )
+    name: str = Field("", max_length=200, description=ONE_LINE)
     robot: str = Field(
         description="the path of the robot file from the rig file's folder, or a shipped name"
     )
@@ -210,8 +209,7 @@ class Rig(Table):
     @model_validator(mode="after")
     def _settings(self) -> Rig:
         if not is_name(self.name):
-            expected = type(self).model_fields["name"].description
-            raise WrongValue("name", self.name, expected or "")
+            raise WrongValue("name", self.name, ONE_LINE)
         for name, value in self.board.items():
             if name in DERIVED_SETTINGS:
                 raise WrongValue(f"board.{name}", value, "absent: it follows from the other tables")

@@ -210,6 +210,7 @@ def simulate(
             raise InputError("expected a text", key=key, value=text)
     check_progress(progress)
     store, units, complete, done = in_memory(), {}, False, 0
+    _check_memory(batch, request, chunk, folder)
     shares = batch.shares(chunk)
     try:
         first = next(shares)
@@ -267,16 +268,25 @@ def _todo(shares: Iterator[Share], store: Store) -> Iterator[worker.Work | range
             yield share, digests
 
 
+A_ROBOT = 4096  # bytes that the description of one takes
+
+
 def _check_memory(batch: Batch, request: Request, chunk: int, folder: Any) -> None:
     """Raises InputError for a population that does not fit into memory."""
-    wide = 8.0 * len(request.t) * len(request.channels)
+    wide = 8.0 * len(request.t) * max(len(request.channels), 1)
     rows = "a chunk of" if folder is not None or request.reduce else ""
     count = min(chunk, batch.count) if rows else batch.count
     what = (
-        f"{len(request.channels)} channels at {len(request.t)} times of {rows} {count} robots; "
+        f"{len(request.channels) or 'the'} channels at {len(request.t)} times of {rows} {count} "
+        f"robots; "
         f"expected {'smaller chunks' if rows else 'a folder'}, fewer channels, times or robots"
     )
-    check_memory(3.0 * wide * count, " ".join(what.split()), "chunk" if rows else "robots", count)
+    check_memory(
+        3.0 * wide * count + A_ROBOT * min(chunk, batch.count),
+        " ".join(what.split()),
+        "chunk" if rows else "robots",
+        count,
+    )
 
 
 def _local(

@@ -80,11 +80,11 @@ class Joint(Table):
 
     @model_validator(mode="after")
     def _consistent(self) -> Joint:
-        for quantity, (turning, sliding) in KEYS.items():
+        for name, (turning, sliding) in KEYS.items():
             wrong = sliding if self.type == "R" else turning
             value = getattr(self, wrong)
             if wrong in self.model_fields_set and value != type(self).model_fields[wrong].default:
-                right = key_of(quantity, self.type)
+                right = key_of(name, self.type)
                 raise WrongValue(wrong, value, f"none: a joint {self.type} has {right}")
         if self.type == "R" and self.angle_rad != 0:
             raise WrongValue(

@@ -104,8 +104,8 @@ def inverse(
             number; or an array (T, joints). Arrays become cubic splines, functions splines of
             fifth order. None is good for a locked joint. A motion may begin and end with any
             velocity, but not jump inside the run.
-        q0, qd0, rtol, method, start, max_steps, wall_time, progress: as in `flexura.simulate`. Under gravity the run
-            starts in static equilibrium with the joints on their motions.
+        q0, qd0, rtol, method, start, max_steps, wall_time, progress: as in `flexura.simulate`.
+            Under gravity the run starts in static equilibrium with the joints on their motions.
 
     Raises:
         InputError: an argument is not what is expected; a motion whose position or velocity jumps.
