@@ -43,8 +43,8 @@ class Population:
     `complete`, and their chunks.
 
     `population["tip/x"]` is (count, T), a reduced number (count,), `population.status` (count,) of
-    "done", "limit", "stuck" or "refused" (a robot that cannot be assembled or starts outside its
-    limits); a robot's values are NaN from where it stopped. Of an interrupted population only the
+    "done", "limit", "stuck", "unbalanced" (energies that miss more than a tenth) or "refused" (a
+    robot that cannot be assembled or starts outside its limits); a robot's values are NaN from where it stopped. Of an interrupted population only the
     robots that are done have rows: `population.robots`, counted from 0. `base`: the robot that
     `Batch.vary` began with; None for other batches.
     """
