@@ -164,6 +164,9 @@ def by_bisection(
     )
 
 
+STEPS_A_TRIAL = 200  # of the integrator between two instants of a bisection, at most
+
+
 class _Trial:
     """Forward steps from one state under drives that are tried, without limits."""
 
@@ -198,7 +201,7 @@ class _Trial:
             0.0,
             b - a,
             True,
-            0,
+            STEPS_A_TRIAL,
         )
         while run.advance(10_000):
             pass
