@@ -66,8 +66,16 @@ def runs_of_r16(path, gravity, locked):
     keys = {"start": "straight"}
     run = fx.simulate(system, t, drive, **keys)
     for method in ("explicit", "implicit"):
-        sharp = fx.simulate(system, t, drive, method=method, rtol=1e-10, max_steps=100_000, **keys)
-        if sharp.complete or sharp.meta["events"][-1]["name"] != "exhausted":
+        sharp = fx.simulate(
+            system,
+            t,
+            drive,
+            method=method,
+            rtol=1e-10,
+            max_steps=20_000 if method == "explicit" else None,
+            **keys,
+        )
+        if all(event["name"] != "exhausted" for event in sharp.meta["events"]):
             break
     return run, sharp
 
