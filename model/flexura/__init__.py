@@ -14,7 +14,7 @@ from types import ModuleType
 from . import moved, signals
 from .api import simulate
 from .control import PID, Controller, Force, Motor, Sampled, Stepper
-from .errors import FlexuraError, InputError
+from .errors import FlexuraError, InputError, NumericalError
 from .io import Run
 from .population import Batch, Population
 from .robot import Robot, load, save
@@ -48,6 +48,7 @@ __all__ = [
     "Modes",
     "Motor",
     "NoEquilibrium",
+    "NumericalError",
     "Population",
     "Robot",
     "Run",

@@ -39,6 +39,14 @@ Rtol = Annotated[float, typer.Option(help="relative tolerance of the native solv
 Prescribed = Annotated[
     bool, typer.Option("--prescribed", help="follow the manoeuvre's motions exactly")
 ]
+MaxSteps = Annotated[
+    int | None,
+    typer.Option(metavar="N", help="budget of steps; it ends the run; default 20 million"),
+]
+WallTime = Annotated[
+    float | None,
+    typer.Option(metavar="SECONDS", help="stop after so many seconds; keep what is computed"),
+]
 Start = Annotated[
     str | None,
     typer.Option(

@@ -16,11 +16,11 @@ from pydantic import Field, ValidationError, model_validator
 
 import flexura as fx
 from flexura.errors import InputError, WrongValue
-from flexura.io import FORMAT, check_format, explain, find, read_toml
+from flexura.io import FORMAT, check_format, explain, find, is_name, read_toml
 
 from ..board.protocol.declaration import CONFIG
 from .emulation import Emulated
-from .toml_table import Table, above, named_file
+from .toml_table import Table, above, named_file, within
 
 DERIVED_SETTINGS = (  # settings of the board that follow from the other tables
     "motor_counts_per_m",
@@ -37,6 +37,9 @@ DERIVED_SETTINGS = (  # settings of the board that follow from the other tables
     "position_min_2_rad",
     "position_max_2_rad",
 )
+
+
+ONE_LINE = "the rig's name, one line of at most 200 characters without control codes"
 
 
 class MotorSheet(Table):
@@ -143,9 +146,9 @@ class Calibration(Table):
         lt=1,
         description="the straight strip's reading, a fraction of full scale between 0 and 1",
     )
-    c1_m: float = Field(description="metres for x, a finite number")
-    c2_m: float = Field(0.0, description="metres for x^2, a finite number")
-    c3_m: float = Field(0.0, description="metres for x^3, a finite number")
+    c1_m: float = within("metres for x", 1e6)
+    c2_m: float = within("metres for x^2", 1e6, 0.0)
+    c3_m: float = within("metres for x^3", 1e6, 0.0)
     covariance: list[list[float]] | None = Field(
         None, description="four rows of four numbers: the covariance of zero, c1_m, c2_m, c3_m"
     )
@@ -183,9 +186,7 @@ class Rig(Table):
     format: int = Field(
         FORMAT, ge=1, le=FORMAT, description=f"the file's format, a whole number up to {FORMAT}"
     )
-    name: str = Field(
-        "", max_length=200, description="the rig's name, a text of at most 200 characters"
-    )
+    name: str = Field("", max_length=200, description=ONE_LINE)
     robot: str = Field(
         description="the path of the robot file from the rig file's folder, or a shipped name"
     )
@@ -207,6 +208,8 @@ class Rig(Table):
 
     @model_validator(mode="after")
     def _settings(self) -> Rig:
+        if not is_name(self.name):
+            raise WrongValue("name", self.name, ONE_LINE)
         for name, value in self.board.items():
             if name in DERIVED_SETTINGS:
                 raise WrongValue(f"board.{name}", value, "absent: it follows from the other tables")

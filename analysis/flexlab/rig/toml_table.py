@@ -24,6 +24,11 @@ def from_zero(unit: str, what: str, most: float) -> Any:
     return Field(ge=0, le=most, description=f"{what} in {unit}, from 0 to {most:g}")
 
 
+def within(what: str, most: float, default: Any = ...) -> Any:
+    """A field for a number of either sign, at most `most` in size; without a default required."""
+    return Field(default, ge=-most, le=most, description=f"{what}, at most {most:g} in size")
+
+
 def named_file(file: Path, named: str) -> str | Path:
     """The file that a rig file names: a path from its folder or, where none is there, a shipped
     name."""

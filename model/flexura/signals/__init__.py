@@ -5,7 +5,7 @@ from . import shaping, signal
 from .conversion import FunctionSignal, as_signal, as_signals, spline
 from .drive import Drive, JointDrive, check_smooth
 from .manoeuvre import STARTS, Manoeuvre, load_manoeuvre
-from .parsing import from_spec, is_finite
+from .parsing import PLAUSIBLE, from_spec, is_finite, plausible
 from .shaping import matched_cycloid, zv, zvd
 from .signal import (
     COLUMNS,
@@ -25,6 +25,7 @@ from .signal import (
 
 __all__ = [
     "COLUMNS",
+    "PLAUSIBLE",
     "STARTS",
     "Drive",
     "FunctionSignal",
@@ -44,6 +45,7 @@ __all__ = [
     "load_manoeuvre",
     "matched_cycloid",
     "piecewise",
+    "plausible",
     "polynomial",
     "ramp",
     "shaping",

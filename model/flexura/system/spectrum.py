@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import within_memory
+from ..errors import guarded
 from ..io import choice, whole
 from .statics import static
 from .system import System, assemble
@@ -24,7 +24,7 @@ class Modes:
     labels: tuple[str, ...]
 
 
-@within_memory
+@guarded("the natural frequencies")
 def frequencies(
     robot: Any, q: Any = None, joints: str = "locked", *, count: int | None = None, qd: Any = None
 ) -> np.ndarray:
@@ -59,7 +59,7 @@ def frequencies(
     ).frequencies_Hz
 
 
-@within_memory
+@guarded("the natural modes")
 def modes(robot: Any, q: Any = None, joints: str = "locked", *, count: int | None = None) -> Modes:
     """Natural modes of the undamped, linearised robot. Errors as in `frequencies`.
 

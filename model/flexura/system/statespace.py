@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import FlexuraError, InputError, within_memory
+from ..errors import FlexuraError, InputError, guarded
 from ..io import choice, summary
 from .statics import static
 from .system import System, assemble, jacobian
@@ -158,7 +158,7 @@ class StateSpace:
         return self.outlook @ np.linalg.solve(s * s * self.M + s * self.G + self.K, self.E)
 
 
-@within_memory
+@guarded("the linear equations")
 def linearize(robot: Any, q: Any = None, qd: Any = None, joints: str = "free") -> StateSpace:
     """The robot linearised about an equilibrium, or about a steady motion (52).
 

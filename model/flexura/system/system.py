@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, within_memory
+from ..errors import InputError, guarded
 from ..io import STATIONS, array, number, summary
 from ..link.line import Piece, whole_piece
 from ..link.shapes import coefficients_of_legendre_sums, legendre_shapes
@@ -474,7 +474,7 @@ class System:
         return "rad" if self.robot.links[int(parts[1]) - 1].joint.type == "R" else "m"
 
 
-@within_memory
+@guarded("the equations of motion")
 def assemble(robot: Any) -> System:
     """The System of a robot.
 
