@@ -19,7 +19,7 @@ from .io import Run
 from .population import Batch, Population
 from .robot import Robot, load, save
 from .signals import Drive, JointDrive, Manoeuvre, Signal, load_manoeuvre
-from .simulation import inverse
+from .simulation import feedforward, inverse, inverse_kinematics, invert
 from .system import (
     Modes,
     NoEquilibrium,
@@ -57,9 +57,12 @@ __all__ = [
     "Stepper",
     "System",
     "assemble",
+    "feedforward",
     "frequencies",
     "holding",
     "inverse",
+    "inverse_kinematics",
+    "invert",
     "linearize",
     "load",
     "load_manoeuvre",

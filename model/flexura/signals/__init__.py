@@ -1,7 +1,7 @@
 """Functions of time: motions to follow, forces and torques to apply, and their reading from
 tables."""
 
-from . import shaping, signal
+from . import paths, shaping, signal
 from .conversion import FunctionSignal, as_signal, as_signals, spline
 from .drive import Drive, JointDrive, check_smooth
 from .manoeuvre import STARTS, Manoeuvre, load_manoeuvre
@@ -43,6 +43,7 @@ __all__ = [
     "harmonic",
     "load_manoeuvre",
     "matched_cycloid",
+    "paths",
     "piecewise",
     "polynomial",
     "ramp",

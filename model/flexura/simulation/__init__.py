@@ -6,6 +6,7 @@ from .feedforward import gravity, inverse_dynamics
 from .gain_sweep import Trials, trials
 from .problem import METHODS
 from .recorder import channel_units
+from .trajectory import feedforward, inverse_kinematics, invert
 
 __all__ = [
     "METHODS",
@@ -13,9 +14,12 @@ __all__ = [
     "by_bisection",
     "by_rigid_robot",
     "channel_units",
+    "feedforward",
     "gravity",
     "inverse",
     "inverse_dynamics",
+    "inverse_kinematics",
+    "invert",
     "rigid_robot",
     "simulate",
     "trials",
