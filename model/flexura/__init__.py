@@ -21,12 +21,14 @@ from .robot import Robot, load, save
 from .signals import Drive, JointDrive, Manoeuvre, Signal, load_manoeuvre
 from .simulation import feedforward, inverse, inverse_kinematics, invert
 from .system import (
+    FrequencyResponse,
     Modes,
     NoEquilibrium,
     StateSpace,
     System,
     assemble,
     frequencies,
+    frequency_response,
     holding,
     linearize,
     modes,
@@ -42,6 +44,7 @@ __all__ = [
     "Drive",
     "FlexuraError",
     "Force",
+    "FrequencyResponse",
     "InputError",
     "JointDrive",
     "Manoeuvre",
@@ -59,6 +62,7 @@ __all__ = [
     "assemble",
     "feedforward",
     "frequencies",
+    "frequency_response",
     "holding",
     "inverse",
     "inverse_kinematics",

@@ -10,8 +10,11 @@ import numpy as np
 
 from ..errors import FlexuraError, InputError
 from ..io import choice, summary
+from ..optional import Optional
 from .statics import static
 from .system import System, assemble, jacobian
+
+control = Optional("control")
 
 
 @dataclass(frozen=True, repr=False)
@@ -121,6 +124,19 @@ class StateSpace:
                 )
         N, L = null_space(c[None]), null_space(b[None])
         return _roots(L.T @ N, L.T @ G @ N, L.T @ K @ N)
+
+    def to_control(self) -> Any:
+        """This system as a `control.StateSpace` of python-control, with the names of states, inputs
+        and outputs. Raises Missing where python-control is not installed."""
+        return control.ss(
+            self.A,
+            self.B,
+            self.C,
+            self.D,
+            states=[name.replace(".", "_") for name in self.states],
+            inputs=list(self.inputs),
+            outputs=list(self.outputs),
+        )
 
     def transfer(self, s: complex) -> np.ndarray:
         """C (s - A)^-1 B at a complex frequency s [1/s], (outputs, inputs)."""

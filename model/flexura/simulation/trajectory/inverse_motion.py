@@ -19,7 +19,7 @@ from .zero_dynamics import ZeroDynamics, zero_dynamics
 MOST = 30  # steps of Newton's method on one mesh
 CLOSE = 1e-9  # rad or m: a step that small is the last
 STALLED = 1e-6  # rad or m: steps below that no longer shrink are round-off
-PACES = (0.25, 0.5, 0.7, 0.85, 1.0)  # of the motion, where it is too quick for the first guess
+LEAST = 0.1  # share of a step; below it Newton's method is given up
 
 
 @dataclass(frozen=True)
@@ -77,27 +77,29 @@ class TipProblem:
         q = self.along(t, start)
         return mesh.through(q[1:-1], q[[0, -1]])
 
-    def solve(
-        self, mesh: Mesh, first: np.ndarray, start: Rest, end: Rest, quick: bool = True
-    ) -> TipMotion:
-        """Newton's method from coefficients `first` (count, n) on.
-
-        Raises: FlexuraError: it does not converge.
-        """
-        count, c = 0, first
-        if quick:
+    def solve(self, mesh: Mesh, first: np.ndarray, start: Rest, end: Rest) -> TipMotion | None:
+        """Newton's method from coefficients `first` (count, n) on; steps that overshoot are halved.
+        None where it does not converge."""
+        wanted = self.path.at(mesh.t)
+        c, before, share, kept = first, np.inf, 1.0, (first, np.zeros_like(first))
+        for count in range(1, MOST + 1):
             try:
-                return self._newton(mesh, c, start, end, 1.0, 0)
-            except _Diverged as error:
-                count = error.count
-        for pace in PACES:
-            try:
-                done = self._newton(mesh, c, start, end, pace, count)
-            except _Diverged as error:
-                text = f"at {pace:g} of its pace: the motion is too quick for this robot"
-                raise FlexuraError(f"no inverse motion was found {text}") from error
-            c, count = done.coefficients, done.iterations
-        return done
+                step = self._step(mesh, c, wanted, start, end)
+            except np.linalg.LinAlgError:
+                step = np.full_like(c, np.nan)
+            size = float(np.abs(step).max())
+            if size < CLOSE or (before < STALLED and size > before / 4):
+                return TipMotion(mesh, c - step, count)
+            if not size <= 2 * before:
+                share /= 2
+                if share < LEAST:
+                    break
+                c = kept[0] - share * kept[1]
+                continue
+            kept, before = (c, step), size
+            share = min(1.0, 2 * share)
+            c = c - share * step
+        return None
 
     def correction(self, motion: TipMotion, start: Rest, end: Rest, off: np.ndarray) -> np.ndarray:
         """The change of the coefficients (count, n) that takes deviations of the tip away, to first
@@ -108,7 +110,7 @@ class TipProblem:
         """
         mesh, n = motion.mesh, self.system.n
         wanted = self.path.at(mesh.t)
-        band, left = self._linear(mesh, motion.coefficients, wanted, start, end, 1.0)
+        band, left = self._linear(mesh, motion.coefficients, wanted, start, end)
         begun = (mesh.t - mesh.nodes[0]) / (0.3 * (self.path.start - mesh.nodes[0]))
         share = np.clip(begun, 0.0, 1.0)
         body = np.zeros((len(mesh.t), n))
@@ -120,50 +122,20 @@ class TipProblem:
         right[last : last + off.shape[1]] = off[-1]
         return band.solve(right).reshape(-1, n)
 
-    def _newton(
-        self, mesh: Mesh, c: np.ndarray, start: Rest, end: Rest, pace: float, count: int
-    ) -> TipMotion:
-        """Newton's method for the motion at a share of its pace; steps that overshoot are
-        halved."""
-        wanted = self.path.at(mesh.t)
-        before, share, kept = np.inf, 1.0, (c, np.zeros_like(c))
-        for _ in range(MOST):
-            count += 1
-            try:
-                step = self._step(mesh, c, wanted, start, end, pace)
-            except np.linalg.LinAlgError:
-                step = np.full_like(c, np.nan)
-            size = float(np.abs(step).max())
-            if size < CLOSE or (before < STALLED and size > before / 4):
-                return TipMotion(mesh, c - step, count)
-            if not size <= 2 * before:
-                share /= 2
-                if share < 0.05:
-                    break
-                c = kept[0] - share * kept[1]
-                continue
-            kept, before = (c, step), size
-            share = min(1.0, 2 * share)
-            c = c - share * step
-        raise _Diverged(count)
-
     def _step(
-        self, mesh: Mesh, c: np.ndarray, wanted: np.ndarray, start: Rest, end: Rest, pace: float
+        self, mesh: Mesh, c: np.ndarray, wanted: np.ndarray, start: Rest, end: Rest
     ) -> np.ndarray:
-        band, left = self._linear(mesh, c, wanted, start, end, pace)
+        band, left = self._linear(mesh, c, wanted, start, end)
         return band.solve(left).reshape(c.shape)
 
     def _linear(
-        self, mesh: Mesh, c: np.ndarray, wanted: np.ndarray, start: Rest, end: Rest, pace: float
+        self, mesh: Mesh, c: np.ndarray, wanted: np.ndarray, start: Rest, end: Rest
     ) -> tuple[Band, np.ndarray]:
         """The matrix of Newton's method, and what must become 0."""
         system, n = self.system, self.system.n
         q, v, a = mesh.here(c)
-        force, K, G, M, tip, slope = system.equations.force_derivatives(
-            q, pace * v, pace * pace * a
-        )
+        force, K, G, M, tip, slope = system.equations.force_derivatives(q, v, a)
         off, by_q = self.path.deviation(tip, slope, wanted)
-        G, M = pace * G, pace * pace * M
         K[:, self.free], force[:, self.free] = by_q, off
         for part in (G, M):
             part[:, system.joint_rows] = 0.0
@@ -172,20 +144,20 @@ class TipProblem:
             force[:, self.locked] = q[:, self.locked] - start.q[self.locked]
         sides, left = [], []
         for k, (rest, growing) in enumerate(((start, False), (end, True))):
-            rows, values = self._side(mesh, c, rest, k, growing, pace)
+            rows, values = self._side(mesh, c, rest, k, growing)
             sides.append(rows)
             left.append(values)
         band = mesh.band([K, G, M], *sides)
         return band, np.concatenate([left[0], force.ravel(), left[1]])
 
     def _side(
-        self, mesh: Mesh, c: np.ndarray, rest: Rest, k: int, growing: bool, pace: float
+        self, mesh: Mesh, c: np.ndarray, rest: Rest, k: int, growing: bool
     ) -> tuple[np.ndarray, np.ndarray]:
         """Rows and values of what must be 0 at the first (k = 0) or last (1) node."""
         n, count = self.system.n, len(self.elastic)
         values = mesh.ends[:, k]
         own = c[: POINTS + 2] if k == 0 else c[-(POINTS + 2) :]
-        q, v = values[0] @ own, pace * (values[1] @ own)
+        q, v = values[0] @ own, values[1] @ own
         bounded = rest.zeros.growing if growing else rest.zeros.decaying
         by_q, by_v = np.zeros((len(bounded), n)), np.zeros((len(bounded), n))
         by_q[:, self.elastic], by_v[:, self.elastic] = bounded[:, :count], bounded[:, count:]
@@ -195,16 +167,10 @@ class TipProblem:
         off, tip_by_q = self.path.deviation(tip, slope, self.path.at(mesh.nodes[[-1 * k]]))
         fixed = np.eye(n)[self.locked]
         rows = np.vstack([by_q, tip_by_q[0], fixed])
-        rates = np.vstack([pace * by_v, np.zeros((len(rows) - len(by_v), n))])
+        rates = np.vstack([by_v, np.zeros((len(rows) - len(by_v), n))])
         both = values[0][:, None] * rows[:, None, :] + values[1][:, None] * rates[:, None, :]
         gone = (q - rest.q)[self.locked]
         return both.reshape(len(rows), -1), np.concatenate([left, off[0], gone])
-
-
-class _Diverged(Exception):
-    def __init__(self, count: int) -> None:
-        super().__init__(count)
-        self.count = count
 
 
 def mesh_between(start: float, end: float, breaks: np.ndarray, step: float) -> Mesh:

@@ -17,17 +17,24 @@ from ..dynamics import inverse
 from ..problem import check_times
 from .collocation import Mesh
 from .inverse_motion import Rest, TipMotion, TipProblem, mesh_between
+from .nearest_motion import nearest_motion
 from .posture import exact_system
 from .tip_output import TipPath, tip_path
 
 FADED = 18.0  # e-folds: the joints' motion before and after the path is shorter than this leaves it
-LONGEST = 10.0  # durations of the path: of what comes before it, and after it
-INTERVALS = (30, 20, 15)  # of the mesh in the path's duration, one after another where one fails
+# durations of the path: of what comes before it, and after it
+LONGEST, SHORTEST, NEAREST = 5.0, 0.05, 1.0
+INTERVALS = (30, 20)  # of the mesh in the path's duration, one after another where one fails
 CORRECTIONS = 6  # with the finer robot, at most
 GOOD = 1e-9  # of the tip's reach: a deviation that small is good enough
 RTOL = 1e-9  # of the runs that judge
 SMOOTH = 2e-9  # m or rad: what a cubic spline through the rows of a Run may be off by
 MOST_ROWS = 20_001
+EXACT = 1e-6  # of the reach: a nearest motion that is off by less follows the path
+NO_EXACT = (
+    "no exact inverse was found: the path is too quick, or passes a posture in which the joints "
+    "cannot move the tip in every direction"
+)
 
 
 def invert(
@@ -72,16 +79,30 @@ def invert(
     problem = TipProblem(system, path)
     report = progress or (lambda fraction: None)
     ends = rests(problem)
-    if on_axis := _forbidden(ends):
-        raise FlexuraError(on_axis)
-    motion = _solved(problem, ends)
+    why = _forbidden(ends)
+    if why and not least_squares:
+        raise FlexuraError(f"{why}; least_squares=True gives the nearest motion")
+    motion = None if why else _solved(problem, ends)
     report(0.5)
-    motion, judge = _corrected(problem, motion, ends)
+    if motion is not None:
+        motion, judge = _corrected(problem, motion, ends)
+        mesh, signals, count = motion.mesh, joint_signals(system, motion), motion.iterations
+    else:
+        judge, mesh = assemble(finer(system.robot)), _mesh(path, ends, NEAREST, INTERVALS[0])
+        nearest = nearest_motion(judge, path, mesh, static(judge, ends[0].q[system.joint_rows]))
+        signals, count = nearest.signals, nearest.iterations
     report(0.9)
-    signals = joint_signals(system, motion)
-    rows = output_times(times, motion, system.joint_rows)
+    rows = output_times(times, mesh.nodes[[0, -1]], signals)
     run = recorded(system.robot, judge, signals, path, rows)
-    run.meta["iterations"] = motion.iterations
+    if motion is None and run.meta["tip_error_m"] > EXACT * sum(
+        link.length_m for link in system.robot.links
+    ):
+        why = why or NO_EXACT
+        text = f"{why}; this is the nearest motion, off by {run.meta['tip_error_m']:.3g} m"
+        event = {"t": path.start, "level": "WARN", "name": "nearest", "text": text}
+        run.meta["events"] = [*run.meta["events"], event]
+    run.meta["exact"] = not any(event["name"] == "nearest" for event in run.meta["events"])
+    run.meta["iterations"] = count
     zeros = ends[0].zeros.zeros[:6]
     run.meta["zeros_1_s"] = [[float(z.real), float(z.imag)] for z in zeros]
     report(1.0)
@@ -104,25 +125,31 @@ def _forbidden(ends: tuple[Rest, Rest]) -> str:
                 f"a transmission zero on the imaginary axis forbids exact tracking: "
                 f"{abs(zeros[0].imag):.4g} rad/s about the {where} of the path. With the tip at "
                 f"rest the robot oscillates at this frequency for ever. Damping (damping.beta_s) "
-                f"moves it from the axis; least_squares=True gives the nearest motion"
+                f"moves it from the axis"
             )
     return ""
 
 
-def _solved(problem: TipProblem, ends: tuple[Rest, Rest]) -> TipMotion:
-    path, (start, end) = problem.path, ends
+def _mesh(path: TipPath, ends: tuple[Rest, Rest], longest: float, count: int) -> Mesh:
+    """A mesh of `count` intervals in the path's duration, that begins and ends as much before and
+    after it as the joints' motions need, at most `longest` durations."""
     span = path.end - path.start
     before, after = (
-        min(FADED / rest.zeros.rate(sign), LONGEST * span) for rest, sign in ((start, 1), (end, -1))
+        min(FADED / rest.zeros.rate(sign), longest * span)
+        for rest, sign in zip(ends, (1, -1), strict=True)
     )
+    before, after = (max(time, SHORTEST * span) for time in (before, after))
+    return mesh_between(path.start - before, path.end + after, path.breaks, span / count)
+
+
+def _solved(problem: TipProblem, ends: tuple[Rest, Rest]) -> TipMotion | None:
+    """The exact motion, or None where Newton's method finds none."""
     for count in INTERVALS:
-        mesh = mesh_between(path.start - before, path.end + after, path.breaks, span / count)
-        try:
-            return problem.solve(mesh, problem.slow(mesh, start.q), start, end)
-        except FlexuraError:
-            if count == INTERVALS[-1]:
-                raise
-    raise AssertionError
+        mesh = _mesh(problem.path, ends, LONGEST, count)
+        found = problem.solve(mesh, problem.slow(mesh, ends[0].q), *ends)
+        if found is not None:
+            return found
+    return None
 
 
 def finer(robot: Robot) -> Robot:
@@ -214,20 +241,27 @@ def _beyond_limits(system: System, run: Run) -> list[dict[str, Any]]:
     return events
 
 
-def output_times(times: np.ndarray, motion: TipMotion, joints: np.ndarray) -> np.ndarray:
+def output_times(times: np.ndarray, span: np.ndarray, signals: list[Signal]) -> np.ndarray:
     """The times of the Run: those of the path, so many between them that cubic splines through the
-    rows give the motions of the joints, rows of q, and as often before and after."""
+    rows give the joints' motions, and as often before and after, within `span` (2,)."""
     from scipy.interpolate import CubicSpline
 
     step = float(np.median(np.diff(times)))
-    low, high = motion.mesh.nodes[[0, -1]]
-    before = times[0] - step * np.arange(1, int((times[0] - low) / step) + 1)[::-1]
-    after = times[-1] + step * np.arange(1, int((high - times[-1]) / step) + 1)
+    before = times[0] - step * np.arange(1, int((times[0] - span[0]) / step) + 1)[::-1]
+    after = times[-1] + step * np.arange(1, int((span[1] - times[-1]) / step) + 1)
     rows = np.concatenate([before, times, after])
-    position = lambda t: motion.mesh.at(t, motion.coefficients)[0][:, joints]
+    position = lambda t: np.column_stack([values(signal, t) for signal in signals])
     while True:
         middles = (rows[:-1] + rows[1:]) / 2
         through = CubicSpline(rows, position(rows), bc_type="natural")
         if np.abs(through(middles) - position(middles)).max() < SMOOTH or 2 * len(rows) > MOST_ROWS:
             return rows
         rows = np.sort(np.concatenate([rows, middles]))
+
+
+def values(signal: Signal, t: np.ndarray) -> np.ndarray:
+    """A signal of polynomials at times t (T,), all at once."""
+    segments = signal.segments
+    own = segments[np.clip(np.searchsorted(segments[:, 0], t, side="right") - 1, 0, None)]
+    s = np.maximum(t - own[:, 0], 0.0)
+    return np.asarray((own[:, 1:7] * s[:, None] ** np.arange(6)).sum(axis=1))

@@ -32,7 +32,8 @@ class ZeroDynamics:
     def rate(self, sign: int) -> float:
         """The slowest rate [1/s] at which what is before (sign 1) or after (-1) the path fades."""
         real = sign * self.zeros.real
-        return float(real[real > 0].min(initial=np.inf))
+        fades = real > ON_AXIS * np.abs(self.zeros)
+        return float(real[fades].min(initial=np.inf))
 
 
 def zero_dynamics(
