@@ -19,14 +19,16 @@ from .io import Run
 from .population import Batch, Population
 from .robot import Robot, load, save
 from .signals import Drive, JointDrive, Manoeuvre, Signal, load_manoeuvre
-from .simulation import inverse
+from .simulation import feedforward, inverse, inverse_kinematics, invert
 from .system import (
+    FrequencyResponse,
     Modes,
     NoEquilibrium,
     StateSpace,
     System,
     assemble,
     frequencies,
+    frequency_response,
     holding,
     linearize,
     modes,
@@ -42,6 +44,7 @@ __all__ = [
     "Drive",
     "FlexuraError",
     "Force",
+    "FrequencyResponse",
     "InputError",
     "JointDrive",
     "Manoeuvre",
@@ -58,9 +61,13 @@ __all__ = [
     "Stepper",
     "System",
     "assemble",
+    "feedforward",
     "frequencies",
+    "frequency_response",
     "holding",
     "inverse",
+    "inverse_kinematics",
+    "invert",
     "linearize",
     "load",
     "load_manoeuvre",

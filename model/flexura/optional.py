@@ -23,6 +23,7 @@ EXTRAS = {
     "rerun": "view",
     "rerun_cli": "view",
     "PIL": "lab",
+    "control": "control",
 }
 
 

@@ -1,7 +1,7 @@
 """Functions of time: motions to follow, forces and torques to apply, and their reading from
 tables."""
 
-from . import shaping, signal
+from . import paths, shaping, signal
 from .conversion import FunctionSignal, as_signal, as_signals, spline
 from .drive import Drive, JointDrive, check_smooth
 from .manoeuvre import STARTS, Manoeuvre, load_manoeuvre
@@ -44,6 +44,7 @@ __all__ = [
     "is_finite",
     "load_manoeuvre",
     "matched_cycloid",
+    "paths",
     "piecewise",
     "plausible",
     "polynomial",

@@ -10,10 +10,12 @@ import numpy as np
 
 from ..errors import FlexuraError, InputError, guarded
 from ..io import choice, summary
+from ..optional import Optional
 from .statics import static
 from .system import System, assemble, jacobian
 
 INFINITE = 1e5  # times the fastest pole: a zero beyond is one at infinity, and round-off
+control = Optional("control")
 
 
 @dataclass(frozen=True, repr=False)
@@ -145,6 +147,19 @@ class StateSpace:
         N, L = null_space(c[None]), null_space(b[None])
         found = _roots(L.T @ N, L.T @ G @ N, L.T @ K @ N)
         return found[np.abs(found) < INFINITE * max(1.0, np.abs(self.poles).max())]
+
+    def to_control(self) -> Any:
+        """This system as a `control.StateSpace` of python-control, with the names of states, inputs
+        and outputs. Raises Missing where python-control is not installed."""
+        return control.ss(
+            self.A,
+            self.B,
+            self.C,
+            self.D,
+            states=[name.replace(".", "_") for name in self.states],
+            inputs=list(self.inputs),
+            outputs=list(self.outputs),
+        )
 
     def transfer(self, s: complex) -> np.ndarray:
         """The transfer matrix C (s - A)^-1 B.
