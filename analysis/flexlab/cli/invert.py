@@ -14,7 +14,7 @@ from flexura.io import FILE, write_toml
 from ..studies.drive_requirements import efforts
 from . import tables
 from .options import Force, Json, Out, RobotFile
-from .output import message, print_results, progress_bars
+from .output import message, print_results, progress_bars, report_saved
 from .results import results
 
 MANOEUVRE = "manoeuvre.toml"
