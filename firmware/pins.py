@@ -191,7 +191,9 @@ def check(pins: dict[str, Any]) -> None:
         if not unit_of(name, entry):
             raise Mistake(f"pins.{name}: {where} cannot serve; {name} needs {NEEDS[name].words}")
     for motor in motors(pins):
-        forward, reverse = (unit_of(name, pins[name]) for name in (f"{motor}_forward", f"{motor}_reverse"))
+        forward, reverse = (
+            unit_of(name, pins[name]) for name in (f"{motor}_forward", f"{motor}_reverse")
+        )
         if forward[:3] != reverse[:3]:
             raise Mistake(
                 f"pins.{motor}_reverse: {reverse} belongs to timer {reverse[2]}, "

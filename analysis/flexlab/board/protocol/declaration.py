@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 NAME = "flexura-rig"
 VERSION = 1
-DECLARATION = 0x2CDE2BC4
+DECLARATION = 0x894ED125
 BAUD_BIT_S = 500000
 CONTROL_HZ = 1000
 TELEMETRY_EVERY_TICKS = 2
@@ -442,12 +442,12 @@ CONFIG: dict[str, Item] = {
     "flex_c1_m": Item(
         13,
         0.0,
-        -5.0,
-        5.0,
+        -10.0,
+        10.0,
         "tip deflection = c1 x + c2 x^2 + c3 x^3, x = reading - zero",
     ),
-    "flex_c2_m": Item(14, 0.0, -5.0, 5.0, "see flex_c1_m"),
-    "flex_c3_m": Item(15, 0.0, -5.0, 5.0, "see flex_c1_m"),
+    "flex_c2_m": Item(14, 0.0, -10.0, 10.0, "see flex_c1_m"),
+    "flex_c3_m": Item(15, 0.0, -10.0, 10.0, "see flex_c1_m"),
     "flex_min": Item(16, 0.05, 0.0, 1.0, "below: fault flex_low, fraction of full scale"),
     "flex_max": Item(17, 0.95, 0.0, 1.0, "above: fault flex_high"),
     "position_min_1_m": Item(18, -0.02, -10.0, 10.0, "range of joint 1 on a screw"),

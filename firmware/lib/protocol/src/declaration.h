@@ -4,7 +4,7 @@
 
 namespace flexura {
 
-constexpr uint32_t kDeclaration = 0x2CDE2BC4;
+constexpr uint32_t kDeclaration = 0x894ED125;
 constexpr uint8_t kProtocolVersion = 1;
 constexpr uint32_t kBaudBitS = 500000;
 constexpr uint16_t kControlHz = 1000;
@@ -769,9 +769,9 @@ struct Config {
   X(supply_min_V, 10.0f, 0.0f, 60.0f)                    \
   X(supply_max_V, 14.0f, 1.0f, 60.0f)                    \
   X(flex_zero, 0.5f, 0.0f, 1.0f)                         \
-  X(flex_c1_m, 0.0f, -5.0f, 5.0f)                        \
-  X(flex_c2_m, 0.0f, -5.0f, 5.0f)                        \
-  X(flex_c3_m, 0.0f, -5.0f, 5.0f)                        \
+  X(flex_c1_m, 0.0f, -10.0f, 10.0f)                      \
+  X(flex_c2_m, 0.0f, -10.0f, 10.0f)                      \
+  X(flex_c3_m, 0.0f, -10.0f, 10.0f)                      \
   X(flex_min, 0.05f, 0.0f, 1.0f)                         \
   X(flex_max, 0.95f, 0.0f, 1.0f)                         \
   X(position_min_1_m, -0.02f, -10.0f, 10.0f)             \
