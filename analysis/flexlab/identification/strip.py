@@ -13,6 +13,7 @@ third degree over time, are projected out. Residuals are in units of their noise
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
@@ -32,17 +33,20 @@ from ..comparison.replay.smoothing import (
 )
 from ..comparison.replay.stepper_relaxation import RelaxationState, simulate_with_stepper
 from ..recordings.unit_conversion import voltage_channel
-from ..rig.axes import motor_axes
+from ..rig.axes import MotorAxis, motor_axes
 from ..rig.description import Rig, strip_of
 from ..rig.plant.stepper import MagneticSpring
 from ..rig.plant.strip_sensor import StripSensor
 from ..rig.sensors import Flex, StrainGauge
 
 DRIFT_DEGREE = 3  # degree of the polynomial that offset and drift may follow
-MODES = 3
+MODES, MODES_BEFORE = 3, 1  # of the last link, and of one before it
 # relative to the holding torque; small, because derivatives are differences of such simulations
 TORQUE_TOLERANCE = 5e-5
 METHOD, RTOL = "implicit", 1e-3  # the cheapest where data break the drives every 2 ms
+# contacts begin and end within a step: differences of such simulations must be smooth
+GEAR_METHOD, GEAR_RTOL = "auto", 1e-4
+SHAFT_STEP_S = 1e-3
 TORQUE_STEP_S = 2e-3  # between two values of the stepper's torque that the relaxation corrects
 CURVATURE_STEP = 1e-3  # of the link's length: between the slopes whose difference is a curvature
 
@@ -82,8 +86,11 @@ class StripModel:
         for axis in motor_axes(rig):
             name = f"joint/{axis.number}/position"
             samples = recorded_samples(self.t, experiment[name][part], name)
-            shaft = smoothing_spline(*with_initial_rest(*samples))
-            self._shafts[axis] = np.array([shaft(at)[0] for at in self._times])
+            self._shafts[axis] = smoothing_spline(*with_initial_rest(*samples))
+        self._shaft_positions = {
+            axis: np.array([shaft(at)[0] for at in self._times])
+            for axis, shaft in self._shafts.items()
+        }
         kind = "flex" if isinstance(rig.sensor, Flex) else "strain_gauge"
         self.sensor_V = experiment[voltage_channel(self.link, kind)][part]
         resting = self.t < self.t[0] + 0.3
@@ -128,40 +135,13 @@ class StripModel:
             The run, with what the sensor feels as `strip/sensed` (bend [rad] or curvature [1/m]).
         """
         times = self._times
-        moved, joints = [], []
-        for axis, shaft in self._shafts.items():
-            own = self._friction.get(axis.number, 1.0) * values.get("give", 1.0)
-            play = lead_screw.backlash(axis.guide, own)
-            play += (values.get("backlash", 1.0) - 1.0) * axis.guide.backlash
-            x = lead_screw.backlash_output(shaft, play)
-            course = signals.Signal(signals.table(times, x).segments[:-1])
-            moved.append(JointDrive(motion=course, prescribed=True))
-            joints.append(x[0])
         robot = with_stepper_damping(with_parameters(self.robot, values), self.rig, elements)
         system = fx.assemble(robot)
         q0 = system.start()
         if self.stepper:
-            joints.append(self.pulses(times[0])[0])
-        q0[system.joint_rows] = joints
-        if self.stepper:
-            torque = self.stepper.holding_torque_N_m * values["holding"]
-            stepper = self.stepper.model_copy(update={"holding_torque_N_m": torque})
-            run = simulate_with_stepper(
-                (system, q0),
-                times,
-                moved[0],
-                self.pulses,
-                MagneticSpring(stepper),
-                rtol,
-                state=self._guess,
-                torque_step_s=TORQUE_STEP_S,
-                method=METHOD,
-                tolerance=TORQUE_TOLERANCE,
-            )
+            run = self._on_the_stepper(system, q0, values, rtol)
         else:
-            run = fx.simulate(
-                system, times, fx.Drive(tuple(moved)), q0=q0, rtol=rtol, method=METHOD
-            )
+            run = self._behind_gears(system, q0, values)
         kept = slice(len(times) - len(self.t), None)
         channels = run.channels | {"strip/sensed": self._sensed(system, run)}
         return fx.Run(
@@ -170,6 +150,76 @@ class StripModel:
             run.units | {"strip/sensed": "rad" if self.rig.flex else "1/m"},
             run.meta,
         )
+
+    def _on_the_stepper(
+        self, system: fx.System, q0: np.ndarray, values: dict[str, float], rtol: float
+    ) -> fx.Run:
+        """Joint 1 follows its motor behind the backlash, which its own friction holds in place."""
+        assert self.stepper is not None
+        times = self._times
+        ((axis, shaft),) = self._shaft_positions.items()
+        own = self._friction.get(axis.number, 1.0) * values.get("give", 1.0)
+        play = lead_screw.backlash(axis.guide, own)
+        play += (values.get("backlash", 1.0) - 1.0) * axis.guide.backlash
+        x = lead_screw.backlash_output(shaft, play)
+        course = signals.Signal(signals.table(times, x).segments[:-1])
+        q0[system.joint_rows] = x[0], self.pulses(times[0])[0]
+        torque = self.stepper.holding_torque_N_m * values["holding"]
+        stepper = self.stepper.model_copy(update={"holding_torque_N_m": torque})
+        return simulate_with_stepper(
+            (system, q0),
+            times,
+            JointDrive(motion=course, prescribed=True),
+            self.pulses,
+            MagneticSpring(stepper),
+            rtol,
+            state=self._guess,
+            torque_step_s=TORQUE_STEP_S,
+            method=METHOD,
+            tolerance=TORQUE_TOLERANCE,
+        )
+
+    def _behind_gears(self, system: fx.System, q0: np.ndarray, values: dict[str, float]) -> fx.Run:
+        """Joints on their gears' teeth: stiffness and damping of the contact beyond the backlash.
+
+        A link that a motor turns bends its gear back and forth, whatever way the motor goes.
+        """
+        gears = [
+            (
+                self._sampled[axis],
+                0.5 * values.get("backlash", 1.0) * axis.guide.backlash,
+                axis.guide.contact_stiffness / values.get("give", 1.0),
+                axis.guide.contact_damping,
+            )
+            for axis in self._shafts
+        ]
+        begin, last = float(self._times[0]), len(next(iter(self._sampled.values()))) - 2
+        q0[system.joint_rows] = [x[0] for x in self._shaft_positions.values()]
+
+        def teeth(t: float, position: np.ndarray, velocity: np.ndarray, tip: float) -> list[float]:
+            k = min(max(int((t - begin) / SHAFT_STEP_S), 0), last)
+            part = (t - begin) / SHAFT_STEP_S - k
+            out = []
+            for (shaft, half, stiffness, damping), angle, speed in zip(
+                gears, position.tolist(), velocity.tolist(), strict=True
+            ):
+                (x, v), (y, w) = shaft[k], shaft[k + 1]
+                rate = v + part * (w - v)
+                # of the cubic that has both positions and both rates
+                off = angle - hermite(part, x, v * SHAFT_STEP_S, y, w * SHAFT_STEP_S)
+                beyond = off - half if off > half else off + half if off < -half else 0.0
+                slip = damping * (speed - rate) if beyond else 0.0
+                out.append(-stiffness * beyond - slip)
+            return out
+
+        return fx.simulate(system, self._times, teeth, q0=q0, rtol=GEAR_RTOL, method=GEAR_METHOD)
+
+    @functools.cached_property
+    def _sampled(self) -> dict[MotorAxis, list[tuple[float, float]]]:
+        """Positions and rates of the motors' shafts, every SHAFT_STEP_S."""
+        begin, end = float(self._times[0]), float(self._times[-1])
+        t = begin + SHAFT_STEP_S * np.arange(round((end - begin) / SHAFT_STEP_S) + 2)
+        return {axis: [shaft(float(at))[:2] for at in t] for axis, shaft in self._shafts.items()}
 
     def _sensed(self, system: fx.System, run: fx.Run) -> np.ndarray:
         """What the sensor feels (T,) in a run with states: bend [rad] or curvature [1/m]."""
@@ -195,6 +245,12 @@ class StripModel:
         quiet = StripSensor(self.sensor, None, np.random.default_rng(0), 1.0, values["sensor_gain"])
         volts = np.array([quiet.voltage(felt) for felt in run["strip/sensed"].tolist()])
         return np.asarray(CubicSpline(self.t, volts)(self.t - values["delay_s"]))
+
+
+def hermite(s: float, x: float, v: float, y: float, w: float) -> float:
+    """The cubic with positions x, y and rates v, w at s = 0 and 1."""
+    change = y - x
+    return x + s * (v + s * (3 * change - 2 * v - w + s * (v + w - 2 * change)))
 
 
 def with_parameters(robot: fx.Robot, values: dict[str, float]) -> fx.Robot:
@@ -240,7 +296,8 @@ def with_stepper_damping(robot: fx.Robot, rig: Rig, elements: int = 0) -> fx.Rob
     changes: dict[str, Any] = {}
     for number, link in enumerate(robot.links, 1):
         if link.flexible:
-            changes[f"link.{number}.modes"] = MODES
+            last = number == len(robot.links)
+            changes[f"link.{number}.modes"] = MODES if last else MODES_BEFORE
             changes[f"link.{number}.elements"] = link.elements + elements
     if rig.stepper:
         damping = robot.links[1].joint.viscous_friction + rig.stepper.damping_N_m_s
