@@ -315,9 +315,8 @@ class System:
                 f"expected places from 0 to the link's length, {length:g} m", key="s", value=s
             )
         if self.exact:
-            return tuple(
-                np.ascontiguousarray(self.equations.line(self.check(q), link - 1, places).T)
-            )  # type: ignore[return-value]
+            x, y, angle = np.array(self.equations.line(self.check(q), link - 1, places)).T.copy()
+            return x, y, angle
         return self.assembly.line(self.check(q), link, places)
 
     def angles(self, link: int, s: Any) -> np.ndarray:
