@@ -12,11 +12,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from board_library import FIRMWARE, HERE, ROOT, compiled
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import flexura as fx
+from board_library import FIRMWARE, HERE, ROOT, compiled
 from flexlab.board.protocol import frames
 from flexlab.board.protocol.declaration import ADC_SAMPLES, CONFIG, CONTROL_HZ, DUTY_FULL
 from flexura import signals
