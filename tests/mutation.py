@@ -58,6 +58,8 @@ MAINS = {
     "unit": [f"-I{FIRMWARE / 'test'}", str(FIRMWARE / "test/test_lib/test_main.cpp")],
     "refusals": [f"-I{FIRMWARE / 'test'}", str(FIRMWARE / "test/test_refusals/test_main.cpp")],
     "faults": [f"-I{FIRMWARE / 'test'}", str(FIRMWARE / "test/test_faults/test_main.cpp")],
+    "rig": [f"-I{FIRMWARE / 'test'}", str(FIRMWARE / "test/test_rig/test_main.cpp")],
+    "session": [f"-I{FIRMWARE / 'test'}", str(FIRMWARE / "test/test_session/test_main.cpp")],
     "frames": [str(HERE / "fuzz_frames.cpp")],
     "replay": ["-DREPLAY", str(HERE / "fuzz_session.cpp")],
 }
@@ -65,7 +67,9 @@ ARGUMENTS = {
     "frames": ["100000", "7"],
     "replay": [str(path) for path in sorted((HERE / "corpus").iterdir())],
 }
-CXX = ["g++", "-std=gnu++14", "-O0", "-w"]
+# Undefined behaviour ends the program: of a mutant it is noticed, too.
+TRAPS = ["-fsanitize=undefined", "-fsanitize-undefined-trap-on-error"]
+CXX = ["g++", "-std=gnu++14", "-O0", "-w", *TRAPS]
 
 
 class Outcome(NamedTuple):

@@ -22,6 +22,7 @@ from flexlab.board.protocol.declaration import ADC_SAMPLES, CONFIG, CONTROL_HZ, 
 from flexura import signals
 from flexura.control import gains
 
+SUITES = {"test_refusals", "test_faults", "test_rig", "test_session"}
 TICK_S = 1 / CONTROL_HZ
 
 
@@ -364,8 +365,8 @@ def test_no_damaged_frame_is_obeyed(tmp_path, frames, seed):
 @pytest.mark.parametrize(
     "environment, suites",
     [
-        ("native", {"test_lib", "test_refusals", "test_faults"}),
-        ("simavr", {"test_lib", "test_refusals", "test_faults", "test_interrupts"}),
+        ("native", {"test_lib", *SUITES}),
+        ("simavr", {"test_lib", *SUITES, "test_interrupts"}),
     ],
 )
 def test_the_unit_tests_run_here_and_on_the_avr(environment, suites, tmp_path):
