@@ -1,5 +1,5 @@
 """Faults put into the board's library and the host's protocol on purpose: the tests notice at
-least nine of ten that are no other words for the original. `python tests/mutation.py` does it in
+least nine of ten that are no other words for the original. tests/support/mutation.py does it in
 parts."""
 
 import re

@@ -1,6 +1,6 @@
 """Runs the tests of the board's library, or of the host's protocol, against mutants of them.
 
-    python tests/mutation.py [--part K/N] [--out FILE] [NAME...]
+    python tests/support/mutation.py [--part K/N] [--out FILE] [NAME...]
 
 NAME is safety, protocol, control, rig or link; without it all. K/N takes every N-th mutant from the
 K-th on, so that one long run may be done in parts. Each mutant that no test notices is printed; the
