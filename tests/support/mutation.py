@@ -127,7 +127,8 @@ class Board:
         if mutant:
             place = self.folder / "mutant"
             shutil.rmtree(place, ignore_errors=True)
-            place.mkdir()
+            # With all that stands beside it: a header is looked for beside the one that names it.
+            shutil.copytree((ROOT / mutant.file).parent, place)
             text = (ROOT / mutant.file).read_text(encoding="utf-8")
             (place / Path(mutant.file).name).write_text(mutant.apply(text), encoding="utf-8")
             own = place / source.name

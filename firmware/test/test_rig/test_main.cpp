@@ -55,7 +55,7 @@ static void a_report_has_all_that_the_tick_knew() {
   drives.count = 8;
   for (uint8_t k = 0; k < 8; ++k) {
     drives.voltage[k] = 500;
-    drives.rate[k] = 3970;
+    drives.rate[k] = 3971;
   }
   CHECK(ask(Drives::kCode, &drives) == Result::ok);
   rig.report(report);
@@ -78,12 +78,12 @@ static void a_report_has_all_that_the_tick_knew() {
   CHECK(report.state == static_cast<uint8_t>(State::running) && report.tick == 22);
   CHECK(report.position_1 == 50 && report.position_2 == 50 && report.steps == 40 + pulses);
   CHECK(pulses > 70 && report.missed == 4 && report.buffered == 6);
-  CHECK(report.setpoint_1 == 500 && report.setpoint_2 == 3970);
+  CHECK(report.setpoint_1 == 500 && report.setpoint_2 == 3971);
   // 500 / 1024 x 5 V x 4.9 = 11.963 V.
   CHECK(report.flex == 3500 && report.supply >= 11960 && report.supply <= 11966);
   CHECK(report.voltage >= 498 && report.voltage <= 500);
-  // The rate in whole units of 1/4096 microstep a tick: 3970 microsteps/s are 16261 of them.
-  CHECK(report.rate == 3969);
+  // The rate in whole units of 1/4096 microstep a tick: 3971 microsteps/s are 16265 of them.
+  CHECK(report.rate == 3970);
   CHECK(is_set(report, Flag::bridge_enabled) && is_set(report, Flag::driver_enabled));
   CHECK(is_set(report, Flag::referenced) && !is_set(report, Flag::saturated));
   rig.trip(Fault::overrun);
@@ -292,19 +292,22 @@ static void refusals_carry_their_number() {
   rig.inputs().switches = 0;
   tick();
   const Arm arming = {2};
-  detail = 99;
+  rig.inputs().switches = 1;
+  for (uint8_t k = 0; k < 60; ++k) rig.tick(out);
+  rig.inputs().switches = 0;
+  rig.tick(out);
   CHECK(ask_for(Arm::kCode, &arming, detail) == Result::stop_unproven);
-  CHECK(detail == static_cast<uint16_t>(StopTrial::untried));
+  CHECK(detail == static_cast<uint16_t>(StopTrial::released));
   arm(Mode::position);
   Setpoints points = {};
   points.count = 1;
   CHECK(ask(Setpoints::kCode, &points) == Result::ok);
-  points.first = 9;
-  CHECK(ask_for(Setpoints::kCode, &points, detail) == Result::wrong_index && detail == 1);
   const Start start = {3}, slow = {7};
   CHECK(ask_for(Start::kCode, &start, detail) == Result::not_ready && detail == 1);
   points.first = 1;
   CHECK(ask(Setpoints::kCode, &points) == Result::ok);
+  points.first = 9;
+  CHECK(ask_for(Setpoints::kCode, &points, detail) == Result::wrong_index && detail == 2);
   CHECK(ask(Start::kCode, &slow) == Result::out_of_range);
   CHECK(ask(Start::kCode, &start) == Result::ok);
   arm(Mode::open_loop);

@@ -210,6 +210,7 @@ static void a_stop_is_obeyed_at_once_and_counts_only_in_order() {
   answer_size = session.saved(true, answer);
   CHECK(acknowledged(ConfigSave::kCode, 31, Result::ok));
   send(session, ConfigSave::kCode, 32);
+  CHECK(session.saving() && session.begin_saving());  // the memory is written anew
   answer_size = session.saved(false, answer);
   CHECK(acknowledged(ConfigSave::kCode, 32, Result::not_stored));
   CHECK(session.announce(frame) > 0);
