@@ -299,10 +299,11 @@ static void refusals_carry_their_number() {
   CHECK(ask_for(Arm::kCode, &arming, detail) == Result::stop_unproven);
   CHECK(detail == static_cast<uint16_t>(StopTrial::released));
   arm(Mode::position);
+  const Start start = {3}, slow = {7};
+  CHECK(ask_for(Start::kCode, &start, detail) == Result::not_ready && detail == 0);
   Setpoints points = {};
   points.count = 1;
   CHECK(ask(Setpoints::kCode, &points) == Result::ok);
-  const Start start = {3}, slow = {7};
   CHECK(ask_for(Start::kCode, &start, detail) == Result::not_ready && detail == 1);
   points.first = 1;
   CHECK(ask(Setpoints::kCode, &points) == Result::ok);
@@ -417,6 +418,12 @@ static void settings_are_in_use_at_once_or_not_at_all() {
   CHECK(ask(ConfigWrite::kCode, &write) == Result::ok);
   CHECK(rig.wrong_item() == write.item && rig.fixed().gains[0].limit == limit / 2);
   CHECK(ask(ConfigDefaults::kCode) == Result::ok && rig.fixed().gains[0].limit == limit);
+  CHECK(rig.may_configure());
+  rig.trip(Fault::speed_1);  // not in a fault, unless it is that of the settings
+  CHECK(!rig.may_configure() && ask(ConfigWrite::kCode, &write) == Result::wrong_state);
+  rig = Rig();
+  rig.begin(nullptr, 1, kFirmware);
+  CHECK(rig.may_configure());
 }
 
 static void arming_begins_everything_anew() {
