@@ -30,20 +30,20 @@ static const uint32_t kFirmware = 0x12345678;
 static const Build kBuild = {{0, 1, 0}, {5, 4, 0}, 1, 77};
 static Outputs out;
 
-static Result ask(uint8_t code, const void *fields = nullptr) {
+inline Result ask(uint8_t code, const void *fields = nullptr) {
   uint16_t detail;
   return rig.command(code, static_cast<const uint8_t *>(fields), detail);
 }
 
 // A board that comes up with these settings, its emergency stop proven.
-static void begin(const Config &config, uint8_t reset = 1, uint32_t proven = kFirmware) {
+inline void begin(const Config &config, uint8_t reset = 1, uint32_t proven = kFirmware) {
   rig = Rig();
   out = Outputs();
   const Stored stored = {config, proven};
   rig.begin(&stored, reset, kFirmware);
 }
 
-static inline void tick(uint16_t times = 1) {
+inline void tick(uint16_t times = 1) {
   while (times--) {
     Inputs &in = rig.inputs();
     in.moved[0] = in.moved[1] = 0;
@@ -55,7 +55,7 @@ static inline void tick(uint16_t times = 1) {
   }
 }
 
-static inline void healthy() {
+inline void healthy() {
   Config config = default_config();
   config.lost_step_rad() = 10;  // the encoder of joint 2 stands still in these tests
   begin(config);
@@ -66,7 +66,7 @@ static inline void healthy() {
   tick();
 }
 
-static inline void arm(Mode mode) {
+inline void arm(Mode mode) {
   healthy();
   const Reference reference = {0, 0, 0};
   const Arm arm = {static_cast<uint8_t>(mode)};
@@ -75,7 +75,7 @@ static inline void arm(Mode mode) {
   CHECK(ask(Arm::kCode, &arm) == Result::ok && rig.state() == State::armed);
 }
 
-static inline void run_open_loop(int16_t mV, int16_t rate, bool final = false) {
+inline void run_open_loop(int16_t mV, int16_t rate, bool final = false) {
   arm(Mode::open_loop);
   Drives drives = {};
   drives.count = 8;

@@ -37,6 +37,14 @@ static void the_least_gains_and_rates_count() {
   gains.slew = 1000;
   Pid fresh;
   CHECK(fresh.output() == 0);
+  gains.kp = 65536;
+  gains.fine = true;  // 1/16 counts
+  const PidSignals five = {5 * 16, 0, 0, 0};
+  CHECK(fresh.update(gains, five) == 5);
+  gains.fine = false;  // whole counts
+  const PidSignals seven = {7 * 256 + 255, 0, 0, 0};
+  CHECK(fresh.update(gains, seven) == 7);
+  gains.kp = 0;
   // Sums are in 2^-16 of u: what kd = 1 makes of a rate of 25600 is the rest to 1.
   gains.kd = 1;
   PidSignals in = {0, -25600, 0, 65536L - 25600};
