@@ -2,12 +2,12 @@
 
 import logging
 
-import archives
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+import archives
 import flexura as fx
 from flexura.io import seal
 

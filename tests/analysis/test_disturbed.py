@@ -6,12 +6,11 @@ import shutil
 import signal
 import sys
 from collections import Counter
-from pathlib import Path
 
-import archives
 import numpy as np
 import pytest
 
+import archives
 import flexura as fx
 from flexlab.tuning.history import History
 from flexura.io import DRAFT, read_toml, settle
