@@ -12,14 +12,11 @@ import pytest
 
 import archives
 import flexura as fx
+from disturbance import power
+from disturbance.calls import COMMANDS, Place, files
+from disturbance.programs import Program
 from flexlab.tuning.history import History
 from flexura.io import DRAFT, read_toml, settle
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "disturbance"))
-import power
-from programs import Program
-
-from commands import COMMANDS, Place, files
 
 KINDS = ("write", "sync", "rename", "create")
 QUICK = ("simulate", "new")
