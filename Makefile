@@ -15,7 +15,7 @@ ifneq ($(shell test -x $(VENV)/bin/python && cat $(READY) 2>/dev/null),$(CURDIR)
 .PHONY: $(READY)
 endif
 
-.PHONY: help setup demo test check quick lint types tests core core-sanitize test-slow test-long docs bench wheel firmware flash clean
+.PHONY: help setup demo test check quick lint types tests core core-sanitize test-slow test-long docs bench wheel release lock licences firmware flash clean
 
 help:
 	@echo "make demo       simulate the rig, cross-check it, and leave a review to look at"
@@ -27,6 +27,9 @@ help:
 	@echo "make docs       this project's documentation as a site, in build/docs"
 	@echo "make bench      how fast the solver is on this machine, and how busy the board"
 	@echo "make wheel      a wheel that needs no compiler, in dist"
+	@echo "make release    wheel, sources, bill of materials and their SHA-256 in dist: the same bytes each time"
+	@echo "make licences   the packages that the project uses, with their licences"
+	@echo "make lock       constraints.txt anew; make lock LOCK=--upgrade takes newer versions"
 	@echo "make firmware   build the board's program; its ELF file is named at the end"
 	@echo "make flash      build it and load it into the board: make flash PORT=/dev/ttyACM0 CONFIGURE=1"
 	@echo "make setup      only the setting up, which every target does by itself"
@@ -54,8 +57,8 @@ lint: $(READY)
 	@git ls-files '*.cpp' '*.hpp' '*.h' '*.c' 2>/dev/null | xargs -r $(VENV)/bin/clang-format --dry-run -Werror
 
 # The files that are quick and look at much; tests/test_setup.py holds that they are there.
-QUICK := tests/test_setup.py tests/model/test_formats.py tests/model/test_shipped.py tests/model/test_optional.py \
-  tests/model/test_run.py tests/model/test_statespace.py tests/model/test_shaping.py tests/model/system tests/model/link
+QUICK := tests/test_setup.py tests/model/io/test_formats.py tests/model/io/test_shipped.py tests/model/test_optional.py \
+  tests/model/io/test_run.py tests/model/signals/test_shaping.py tests/model/system tests/model/link
 
 quick: lint types $(CORE)
 	@$(VENV)/bin/pytest -q -n $(JOBS) -m "not slow and not long" $(QUICK)
@@ -94,6 +97,15 @@ bench: $(CORE)
 # all Pythons (pyproject.toml), in containers with old libraries.
 wheel: $(READY)
 	@$(VENV)/bin/python tools/wheel.py
+
+release: $(READY)
+	@$(VENV)/bin/python tools/release.py
+
+licences: $(READY)
+	@$(VENV)/bin/python tools/packages.py licences
+
+lock: $(READY)
+	@$(VENV)/bin/python tools/packages.py lock $(LOCK)
 
 # make flash PORT=/dev/ttyACM0, or without PORT the one Mega 2560 that is plugged in; CONFIGURE=1 writes the rig's constants too.
 flash: $(CORE)

@@ -287,3 +287,21 @@ def test_no_file_names_a_place_on_somebodys_machine():
                 if places.search(line):
                     found.append(f"{name}:{k}: {line[:100].decode(errors='replace')}")
     assert found == []
+
+
+# Modules of the standard library that Windows lacks.
+POSIX = {"crypt", "fcntl", "grp", "pty", "pwd", "resource", "syslog", "termios", "tty"}
+
+
+def test_what_windows_lacks_is_imported_under_a_test_of_the_platform():
+    bare, guarded = [], []
+    for module, path in MODULES.items():
+        tree = ast.parse(path.read_text())
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Import):
+                found = [f"{module}: {a.name}" for a in node.names if a.name in POSIX]
+                (bare if node in tree.body else guarded).extend(found)
+            elif isinstance(node, ast.ImportFrom) and not node.level and node.module in POSIX:
+                bare.append(f"{module}: {node.module}")
+    assert not bare
+    assert len(guarded) >= 3

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import ctypes
 import fcntl
+import glob
 import os
 import shutil
 import signal
@@ -75,10 +76,16 @@ BOARD = [
     Need("/usr/include/simavr/sim_avr.h", "libsimavr-dev", NO_EMULATOR, False),
     Need("simavr", "simavr", "no unit tests on the AVR", False),
 ]
-CLANG = Need(
-    "clang++", "clang", "the core is not tried with a second compiler", False
-)  # for continuous integration
-BUILDERS = ["cmake", "nanobind", "ninja", "scikit-build-core"]
+# For continuous integration.
+CLANG = [
+    Need("clang++", "clang", "the core is not tried with a second compiler", False),
+    Need(
+        "/usr/lib/llvm-*/lib/clang/*/lib/linux/libclang_rt.fuzzer-*.a",
+        "libclang-rt-dev",
+        "the board's receiver is not tried by a fuzzer",
+        False,
+    ),
+]
 # The environment is linked to the Python files in this checkout; build_core puts the compiled
 # modules beside them.
 LINKED = ["--no-build-isolation", "-C", "editable.mode=inplace", "-C", "wheel.cmake=false"]
@@ -86,9 +93,10 @@ DRIVER = Need("a Vulkan driver", "mesa-vulkan-drivers", NO_PICTURE, False)
 
 
 def has(what: str) -> bool:
-    """Whether the dynamic loader finds a library, the PATH a program, the disk a file."""
+    """Whether the dynamic loader finds a library, the PATH a program, the disk a file (a pattern
+    of names will do)."""
     if what.startswith("/"):
-        return Path(what).exists()
+        return bool(glob.glob(what))
     if ".so" not in what:
         return shutil.which(what) is not None
     try:
@@ -142,7 +150,8 @@ def missing(
     if system == "linux":  # on macOS the wheels use the system's own frameworks
         needs += [need for need in [*LIBRARIES, *BOARD] if not has(need.what)]
         needs += [] if drivers else [DRIVER]
-        needs += [CLANG] if os.environ.get("REQUIRE_CLANG") and not has(CLANG.what) else []
+        clang = CLANG if os.environ.get("REQUIRE_CLANG") else []
+        needs += [need for need in clang if not has(need.what)]
     return needs
 
 
@@ -301,21 +310,12 @@ def set_up(venv: Path) -> None:
             ROOT / "build", ignore_errors=True
         )  # CMake's folders know the place and the Python too
         step("environment", [python.path, "-m", "venv", "--clear", str(venv)])
-    pip = [
-        inside,
-        "-m",
-        "pip",
-        "install",
-        "-q",
-        "--disable-pip-version-check",
-        "-c",
-        "constraints.txt",
-    ]
-    step("what compiles the core", [*pip, *BUILDERS])
+    pip = [inside, "-m", "pip", "install", "-q", "--disable-pip-version-check"]
     step(
         "Python packages (about 400 MB to download the first time)",
-        [*pip, *LINKED, "-e", ".[test]"],
+        [*pip, "--require-hashes", "--only-binary", ":all:", "-r", "constraints.txt"],
     )
+    step("the project itself", [*pip, "--no-deps", *LINKED, "-e", "."])
     for link in venv.glob("lib/python*/site-packages/_editable_*flexura.pth"):
         paths = [line for line in link.read_text().splitlines() if not line.startswith("import ")]
         link.write_text(

@@ -2,9 +2,10 @@
 
     python tools/wheel.py [folder]        by default dist
 
-On Linux the wheel gets the manylinux tag that this machine's libraries allow: on an older system it
-is installed on more machines. Of the platforms in pyproject.toml's [tool.cibuildwheel] only Linux
-on x86-64 has been tried.
+The same sources give the same bytes: files carry the time of the last commit, or SOURCE_DATE_EPOCH,
+and no path of the machine. On Linux the wheel gets the manylinux tag that this machine's libraries
+allow: on an older system it is installed on more machines. Of the platforms in pyproject.toml's
+[tool.cibuildwheel] only Linux on x86-64 has been tried.
 """
 
 from __future__ import annotations
@@ -13,29 +14,53 @@ import os
 import shutil
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 
 
-def build(folder: Path) -> Path:
-    """The wheel of this checkout for this Python, in `folder`."""
+def moment(root: Path) -> str:
+    """SOURCE_DATE_EPOCH, or the time of the last commit, or the beginning of 2020 [s]."""
+    command = ["git", "-C", str(root), "log", "-1", "--format=%ct"]
+    try:
+        said = subprocess.run(command, capture_output=True, text=True).stdout.strip()
+    except OSError:
+        said = ""
+    return os.environ.get("SOURCE_DATE_EPOCH") or said or "1577836800"
+
+
+def build(folder: Path, root: Path = ROOT) -> Path:
+    """The wheel of a checkout, by default this one, for this Python, in `folder`."""
     raw = folder / "unrepaired"
     shutil.rmtree(raw, ignore_errors=True)
     pip = [sys.executable, "-m", "pip", "wheel", "-q", "--disable-pip-version-check"]
-    run([*pip, "--no-deps", "--no-build-isolation", "-w", str(raw), str(ROOT)])
+    dated = os.environ | {"SOURCE_DATE_EPOCH": moment(root)}
+    run([*pip, "--no-deps", "--no-build-isolation", "-w", str(raw), str(root)], env=dated)
     (wheel,) = raw.glob("*.whl")
     if sys.platform == "linux":
         repaired = raw / "repaired"
-        programs = os.environ | {"PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
+        programs = dated | {"PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
         auditwheel = [sys.executable, "-m", "auditwheel", "repair", "--strip"]
         run([*auditwheel, "-w", str(repaired), str(wheel)], env=programs)
         (wheel,) = repaired.glob("*.whl")
     for old in folder.glob("flexura-*.whl"):
         old.unlink()
-    out = Path(shutil.move(wheel, folder))
+    out = folder / wheel.name
+    without_rights(wheel, out)
     shutil.rmtree(raw)
     return out
+
+
+def without_rights(wheel: Path, out: Path) -> None:
+    """The same wheel; the rights of its files are the usual ones, not those of this checkout."""
+    with zipfile.ZipFile(wheel) as old, zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as new:
+        for about in old.infolist():
+            made = zipfile.ZipInfo(about.filename, about.date_time)
+            made.create_system = 3  # Unix
+            made.external_attr = 0o100644 << 16
+            made.compress_type = zipfile.ZIP_DEFLATED
+            new.writestr(made, old.read(about))
 
 
 def run(command: list[str], env: dict[str, str] | None = None) -> None:

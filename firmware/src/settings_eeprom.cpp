@@ -11,10 +11,10 @@ namespace {
 struct __attribute__((packed)) Image {
   uint32_t declaration;
   flexura::Stored stored;
-  uint16_t crc;
+  uint32_t crc;
 };
 uint8_t *const kPlace = reinterpret_cast<uint8_t *>(16);
-constexpr uint16_t kChecked = sizeof(Image) - sizeof(uint16_t);
+constexpr uint16_t kChecked = sizeof(Image) - sizeof(uint32_t);
 
 Image image;
 uint16_t written;
@@ -27,7 +27,7 @@ namespace eeprom {
 
 bool load(flexura::Stored &stored) {
   eeprom_read_block(&image, kPlace, sizeof image);
-  if (image.declaration != flexura::kDeclaration || image.crc != flexura::crc16(bytes(), kChecked))
+  if (image.declaration != flexura::kDeclaration || image.crc != flexura::crc32(bytes(), kChecked))
     return false;
   memcpy(&stored, &image.stored, sizeof stored);
   return true;
@@ -36,7 +36,7 @@ bool load(flexura::Stored &stored) {
 void begin_save(const flexura::Stored &stored) {
   image.declaration = flexura::kDeclaration;
   memcpy(&image.stored, &stored, sizeof stored);
-  image.crc = flexura::crc16(bytes(), kChecked);
+  image.crc = flexura::crc32(bytes(), kChecked);
   written = 0;
 }
 

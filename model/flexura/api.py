@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Callable
 from typing import Any, overload
 
-from .errors import InputError
+from .errors import InputError, within_memory
 from .io import Run
 from .population import Batch, Population
 from .population import simulate as simulate_population
@@ -43,6 +43,7 @@ def simulate(
     wall_time: float | None = None,
     progress: Progress = None,
 ) -> Run: ...
+@within_memory
 def simulate(
     robot: Any,
     t_eval: Any,
@@ -67,23 +68,25 @@ def simulate(
     Args:
         robot: a System, a Robot, the path or name of a robot file, or a Batch of robots, which
             gives a Population; `flexura.population.simulate` says what else that takes.
-        t_eval (T,): ascending times [s].
+        t_eval: ascending times (T,) [s].
         drive: a Drive, a sampled Controller, `Sampled(f, rate_Hz)`, or a function of (t) or of (t,
             position, velocity, tip_deflection) that gives (links,) forces and torques [N or N m].
             Such a function may be called again for times within a step, never before its start,
             and must have no memory. Or forces, one entry a joint: a number, a Signal, a function
             of t, an array of len(t_eval) values, or None; or an array (T, joints).
-        q0, qd0 (n,): the state at the start; without qd0 the robot is at rest.
+        q0: configuration at the start (n,); None: see `start`.
+        qd0: its rates (n,); None: at rest.
         rtol: the error that is asked for, of deflections and of a thousandth of the tip's path.
+        **options: the arguments below, by name.
         method: "auto", "explicit" (order 8), "implicit", or "exponential".
         start: where q0 is not given, "static", which is the default under gravity, or "straight".
         continue_from: a Run of `simulate`, at whose end this one starts, with its state and its
             work and losses; t_eval begins there, so that signals go on. Controllers begin anew.
         until: a function of (t, position, velocity, tip_deflection) that gives a bool, or a number
-            of which a change of sign counts. It is looked at at the times t_eval; the instant
-            between two of them is then found, by integrating again from the first of the two, and
-            the run ends there, complete, with the event "until". Under a Sampled or a Controller
-            the run ends at the time of t_eval itself.
+            of which a change of sign counts. It is evaluated at the times t_eval. The instant
+            between two of them is found by integrating again from the first of the two. The run
+            ends there, complete, with the event "until". Under a Sampled or a Controller it ends at
+            the time of t_eval: both may have a memory, so that no tick is computed twice.
         numerical_damping: exponential steps damp fast modes that change no output by more than the
             tolerance (94); False: they do not.
         max_steps: a budget of steps, rejected ones included, by default 20 million. It ends the run
@@ -91,7 +94,8 @@ def simulate(
         wall_time: seconds after which the run is stopped where it is, with the event "wall_time".
         progress: called with the finished fraction.
 
-    Returns: a Run, of a Batch a Population.
+    Returns:
+        A Run, of a Batch a Population.
 
     Raises:
         InputError: an argument is not what is expected, or a motion has nothing that follows it.

@@ -26,10 +26,15 @@ def levels() -> list[str]:
 def load(level: str) -> ModuleType:
     """The build of the core for processors of a level.
 
-    Args: level: a key of BUILDS, or "" for the best that is here and that this processor can run.
+    Args:
+        level: a key of BUILDS, or "" for the best that is here and that this processor can run.
 
-    Raises: ImportError: there is no such level, this processor lacks it, or the core was not
-    compiled for it or for this Python.
+    Returns:
+        The compiled module.
+
+    Raises:
+        ImportError: there is no such level, this processor lacks it, or the core was not compiled
+            for it or for this Python.
     """
     if level and level not in BUILDS:
         raise ImportError(f"FLEXURA_CORE is {level!r}: expected {' or '.join(BUILDS)}")
@@ -75,10 +80,11 @@ Sampler = _core.Sampler  # what is called once a tick: a PythonSampler, or a con
 PythonSampler = _core.PythonSampler
 bends = _core.bends  # tip deflection [m] and slope [rad] of a link
 Controller = _core.Controller  # a Sampler: the law of control.py for one robot
-Trials = _core.Trials  # one robot under many controllers
-joint_figures = _core.joint_figures
-strip_figures = _core.strip_figures
-least_vibration = _core.least_vibration
+GainSweep = _core.GainSweep  # one robot under many controllers
+board_pulses = _core.board_pulses  # joint 2's pulses by the firmware's code
+joint_metrics = _core.joint_metrics
+strip_metrics = _core.strip_metrics
+vibration_lower_bound = _core.vibration_lower_bound
 population = _core.population  # many robots at once, from rows of numbers to rows of channels
 Drive = _core.Drive  # what acts on robots of a population
 Watch = _core.Watch  # what another thread sees of a population, and stops it by

@@ -23,7 +23,11 @@ class FlexuraError(Exception):
 class InputError(FlexuraError):
     """A wrong value in a file or an argument.
 
-    Attributes: `file` (may be ""), `key`, `value` (as read), `expected` (in words, with the unit).
+    Attributes:
+        file: name of the file; may be "".
+        key: of the value.
+        value: as read.
+        expected: in words, with the unit.
     """
 
     def __init__(
@@ -38,8 +42,46 @@ class InputError(FlexuraError):
         )
 
     def in_file(self, file: str) -> InputError:
-        """The same error, with the file's name."""
+        """The same error, with the file's name.
+
+        Args:
+            file: name of the file.
+
+        Returns:
+            The error to raise.
+        """
         return InputError(self.expected, key=self.key, value=self.value, file=file)
+
+
+class OutOfMemory(FlexuraError, MemoryError):
+    """There is less memory than an array or the core asks for."""
+
+
+def within_memory(function: Callable[P, T]) -> Callable[P, T]:
+    """A function whose MemoryError, from whatever library, is OutOfMemory with its size."""
+
+    @functools.wraps(function)
+    def guarded(*arguments: P.args, **options: P.kwargs) -> T:
+        try:
+            return function(*arguments, **options)
+        except MemoryError as error:
+            raise out_of_memory(error) from None
+
+    return guarded
+
+
+def out_of_memory(error: MemoryError) -> OutOfMemory:
+    """The error that says what did not fit: NumPy and Arrow tell the size."""
+    if isinstance(error, OutOfMemory):
+        return error
+    size = str(error).replace("std::bad_alloc", "").replace("bad allocation", "")
+    what = f" ({size})" if size else " (a small piece more was refused)"
+    return OutOfMemory(
+        _one_line(
+            f"not enough memory{what}: ask for fewer samples, elements or robots at once, or give "
+            "the process more"
+        )
+    )
 
 
 class WrongValue(ValueError):
@@ -91,6 +133,8 @@ def guarded(what: str) -> Callable[[Callable[P, T]], Callable[P, T]]:
                 return function(*args, **kwargs)
             except FlexuraError:
                 raise
+            except MemoryError as error:
+                raise out_of_memory(error) from None
             except Exception as error:
                 why = numerical_failure(error)
                 if why is None:

@@ -18,7 +18,7 @@ NEW = {
     "forward": "simulation.dynamics",
     "gains": "control.gains",
     "lqr": "control.lqr_design",
-    "response": "control.step_response",
+    "response": "control.step_metrics",
     "run": "io.run",
     "sampled": "control.sampled",
     "shaping": "signals.shaping",

@@ -7,7 +7,7 @@ import pytest
 import flexura as fx
 import robots
 from flexura import control
-from flexura.control.step_response import joint_figures, strip_figures
+from flexura.control.step_metrics import joint_metrics, strip_metrics
 from flexura.signals import cycloid, harmonic, matched_cycloid, zv, zvd
 
 RATE = 100.0
@@ -294,7 +294,7 @@ def test_the_figures_of_a_motion():
     q = 0.1 + 0.5 * (1 - np.exp(-2 * t) * np.cos(5 * t))
     r = np.full_like(t, 0.6)
     y = (q - 0.1) / 0.5
-    figures = joint_figures(t, r, q)
+    figures = joint_metrics(t, r, q)
     outside = np.flatnonzero(np.abs(y - 1) > 0.02)[-1]
     trapezoid = lambda f: np.sum((f[1:] + f[:-1]) / 2 * np.diff(t))
     assert figures[2] == pytest.approx(max(0, (y - 1).max()))
@@ -302,4 +302,4 @@ def test_the_figures_of_a_motion():
     assert figures[4] == pytest.approx(trapezoid(t * np.abs(r - q)) / 0.5)
     w = 0.02 * np.exp(-t) * np.sin(9 * t) + 0.001
     rest = w[t >= 3.6].mean()
-    assert strip_figures(t, w, 1.0)[2] == pytest.approx(trapezoid(t * np.abs(w - rest)))
+    assert strip_metrics(t, w, 1.0)[2] == pytest.approx(trapezoid(t * np.abs(w - rest)))

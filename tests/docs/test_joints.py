@@ -7,7 +7,7 @@ import pytest
 import flexura as fx
 import robots
 from flexura.signals import Signal, cycloid, harmonic, polynomial, step
-from flexura.simulation import by_bisection, by_rigid_robot
+from flexura.simulation import rigid_feedforward, shoot_by_bisection
 
 M, C, J, G = 0.8, 0.2, 0.01, 9.81  # of a rigid pendulum
 VISCOUS, COULOMB, V0 = 0.05, 0.3, 1e-3
@@ -184,7 +184,7 @@ def test_drives_of_the_rigid_robot():
 
     motion, t = polynomial(0.6, 1.0), np.linspace(0, 1, 11)
     beam = robots.beam(0.5, 0.3, 2.0, 4, viscous_friction=VISCOUS, coulomb_friction=COULOMB)
-    run = by_rigid_robot(robots.system(beam, gravity=(0.0, -G)), t, [motion])
+    run = rigid_feedforward(robots.system(beam, gravity=(0.0, -G)), t, [motion])
     r, rd, rdd = np.array([motion(x) for x in t]).T
     tau = (
         0.3 * 0.5**3 / 3 * rdd
@@ -195,14 +195,14 @@ def test_drives_of_the_rigid_robot():
     assert run["joint/1/drive"] == pytest.approx(tau, abs=2e-5)
 
 
-def test_drives_by_bisection():
+def test_drives_shoot_by_bisection():
     """Position and rate at the end of each step, weighed as the equation says.
 
     Equations: 66
     """
 
     motion, t = polynomial(0.6, 1.0), np.linspace(0, 0.2, 21)
-    run = by_bisection(
+    run = shoot_by_bisection(
         robots.system(robots.beam(0.5, 0.3, 40.0, 1, hub_inertia_kg_m2=0.05)), t, [motion]
     )
     r, rd, _ = np.array([motion(x) for x in t]).T

@@ -19,13 +19,12 @@ CriticalSection::~CriticalSection() { (void)before_; }
 InterruptLock::InterruptLock() : before_(0) {}
 InterruptLock::~InterruptLock() { (void)before_; }
 
-static uint16_t crc_by_bits(const Bytes &bytes, size_t size) {
-  uint16_t crc = 0xFFFF;
+static uint32_t crc_by_bits(const Bytes &bytes, size_t size) {
+  uint32_t crc = 0xFFFFFFFF;
   for (size_t i = 0; i < size; ++i)
-    for (int bit = 7; bit >= 0; --bit)
-      crc =
-          static_cast<uint16_t>((crc << 1) ^ (((crc >> 15) ^ (bytes[i] >> bit & 1)) ? 0x1021 : 0));
-  return crc;
+    for (int bit = 0; bit < 8; ++bit)
+      crc = crc >> 1 ^ ((crc ^ bytes[i] >> bit) & 1 ? 0xEDB88320 : 0);
+  return ~crc;
 }
 
 // The payload of a frame (without its zero), or nothing.
@@ -38,9 +37,11 @@ static bool judge(const Bytes &frame, Bytes &payload) {
     at += code - 1;
     if (code != 255 && at < frame.size()) payload.push_back(0);
   }
-  if (payload.size() < 5 || payload.size() > kPayloadMaxBytes + 2u) return false;
-  const uint16_t crc = static_cast<uint16_t>(payload[payload.size() - 2] | payload.back() << 8);
-  payload.resize(payload.size() - 2);
+  if (payload.size() < 7 || payload.size() > kPayloadMaxBytes + 4u) return false;
+  uint32_t crc = 0;
+  for (unsigned k = 0; k < 4; ++k)
+    crc |= static_cast<uint32_t>(payload[payload.size() - 4 + k]) << 8 * k;
+  payload.resize(payload.size() - 4);
   return crc_by_bits(payload, payload.size()) == crc;
 }
 

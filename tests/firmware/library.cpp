@@ -11,7 +11,7 @@ InterruptLock::InterruptLock() : before_(0) {}
 InterruptLock::~InterruptLock() { (void)before_; }
 
 extern "C" {
-uint16_t c_crc(const uint8_t *data, uint16_t size) { return crc16(data, size); }
+uint32_t c_crc(const uint8_t *data, uint16_t size) { return crc32(data, size); }
 
 uint8_t c_encode(uint8_t code, uint16_t sequence, const uint8_t *fields, uint8_t size,
                  uint8_t *frame) {

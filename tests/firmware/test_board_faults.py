@@ -2,8 +2,8 @@
 each, the outputs are off in time (in cycles), the reason is right, the host is told, and only a
 person's `clear` gets out of it.
 
-The table in firmware/README.md is made of these measurements; `python tests/fault_table.py` writes
-it.
+The table in firmware/README.md is made of these measurements;
+`python tests/support/fault_table.py` writes it.
 """
 
 import pytest
@@ -40,7 +40,7 @@ def test_what_no_control_tick_detects(name, compiler):
 def is_in_the_readme(what, row, compiler):
     if compiler == "debian":
         assert agrees(what, row, table_in_readme()), (
-            f"python tests/fault_table.py; measured: {line(what, row)}"
+            f"python tests/support/fault_table.py; measured: {line(what, row)}"
         )
 
 

@@ -31,8 +31,8 @@ def test_cobs_examples(data, stuffed):
 
 
 def test_crc_check_value():
-    """The catalogue's check value of CRC-16/CCITT-FALSE is 0x29B1 for "123456789"."""
-    assert frames.uncobs(frames.encode(b"123456789")[:-1])[-2:] == b"\xb1\x29"
+    """The catalogue's check value of CRC-32/ISO-HDLC is 0xCBF43926 for "123456789"."""
+    assert frames.uncobs(frames.encode(b"123456789")[:-1])[-4:] == b"\x26\x39\xf4\xcb"
 
 
 @fast
@@ -46,7 +46,7 @@ def test_a_payload_comes_back(payload):
 @fast
 @given(st.binary(min_size=1, max_size=60), st.data())
 def test_a_flipped_bit_is_never_taken_for_the_payload(payload, data):
-    """A CRC of 16 bits finds every single flipped bit; where it turns a length byte into another
+    """The CRC finds every single flipped bit; where it turns a length byte into another
     the structure breaks as well."""
     frame = bytearray(frames.encode(payload)[:-1])
     at, bit = data.draw(st.integers(0, len(frame) - 1)), data.draw(st.integers(0, 7))

@@ -1,7 +1,7 @@
 """The proof of the emergency stop: nothing is armed before the board has seen it pressed and
 released with its own firmware."""
 
-from binascii import crc_hqx
+from zlib import crc32
 
 import pytest
 
@@ -71,8 +71,8 @@ def test_another_firmwares_proof_is_none(bit):
     firmware had been loaded."""
     image = bytearray(configured("debian", ()))
     image[PROVEN_AT + bit // 8] ^= 1 << bit % 8
-    checksum = crc_hqx(bytes(image[16 : PROVEN_AT + 4]), 0xFFFF)
-    image[PROVEN_AT + 4 : PROVEN_AT + 6] = checksum.to_bytes(2, "little")
+    checksum = crc32(bytes(image[16 : PROVEN_AT + 4]))
+    image[PROVEN_AT + 4 : PROVEN_AT + 8] = checksum.to_bytes(4, "little")
     with Rigged(blank=True, eeprom=bytes(image)) as r:
         assert r.link.identity.fault is Fault.none and not program(r.link).may_move
         r.link.command("reference", position_1=0, position_2=0, steps=0)

@@ -39,9 +39,9 @@ def works(copy, wanted):
     declare(copy, wanted)
     done = build(copy)
     assert done.returncode == 0, done.stderr
-    paths = [copy / "model", copy / "analysis", copy / "tests"]
+    paths = [copy / "model", copy / "analysis", copy / "tests" / "support"]
     probe = subprocess.run(
-        [sys.executable, copy / "tests" / "pin_map_probe.py"],
+        [sys.executable, copy / "tests" / "support" / "pin_map_probe.py"],
         capture_output=True,
         text=True,
         env=os.environ | {"PYTHONPATH": os.pathsep.join(map(str, paths))},

@@ -85,27 +85,42 @@ class Wrong:
     def write(self, data):
         self.inner.write(self._spoilt(data))
 
+    def close(self):
+        """The host is gone. Whatever state it left, the outputs are off when the board has noticed;
+        nothing reset it."""
+        self.inner.wait(0.3)
+        window = self.inner.simulator.window
+        self.safe = window.motor_on == window.stepper_on == window.resets == 0
+        self.inner.close()
+
     def __getattr__(self, name):
         return getattr(self.inner, name)
 
 
-def goes_on(rate, seed, folder, duration_s):
-    """A whole experiment through such a line, the self-test with it."""
+def ended(rate, seed, folder, duration_s):
+    """How a whole experiment through such a line ends, the self-test with it; safe in any case."""
     wrong = Wrong(board(), rate, seed)
     plan = plans.free_vibration(BENCH, SETTINGS, 0.3, duration_s)
     done = experiment(plan, folder, opened=OpenBoard(wrong, 0, {}, None))
-    assert done.ended.complete, done.ended.text
-    assert wrong.changed > 100 * duration_s * rate / 0.01
-    assert done.run["joint/2/position"][-1] == pytest.approx(0.3, abs=0.01)
+    assert wrong.safe, (seed, done.ended.text)
+    if done.ended.complete:
+        assert wrong.changed > 100 * duration_s * rate / 0.01
+        assert done.run["joint/2/position"][-1] == pytest.approx(0.3, abs=0.01)
+    return done.ended
 
 
 def test_a_run_goes_on_at_one_wrong_byte_in_a_hundred(tmp_path):
-    goes_on(0.01, 100, tmp_path / "run", 2.0)
+    end = ended(0.01, 100, tmp_path / "run", 2.0)
+    assert end.complete, end.text
 
 
 @SLOW
-@pytest.mark.timeout(1200)
-@pytest.mark.parametrize("rate", [0.003, 0.01])
-@pytest.mark.parametrize("seed", range(12))
-def test_eight_seconds_at_a_bad_line(rate, seed, tmp_path):
-    goes_on(rate, seed, tmp_path / "run", 8.0)
+@pytest.mark.timeout(3000)
+@pytest.mark.parametrize(("rate", "least"), [(0.003, 20), (0.01, 18)])
+def test_twenty_runs_of_eight_seconds_at_a_bad_line(rate, least, tmp_path, capsys):
+    """At three wrong bytes in a thousand all end well; at ten most do, and each is safe."""
+    ends = [ended(rate, seed, tmp_path / f"{seed}", 8.0) for seed in range(20)]
+    well = sum(end.complete for end in ends)
+    with capsys.disabled():
+        print(f"{well} of 20 runs end well at {100 * rate} % of wrong bytes")
+    assert well >= least, [end.text for end in ends if not end.complete]

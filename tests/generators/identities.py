@@ -17,8 +17,10 @@ def random_state(
     for i, (row, link) in enumerate(zip(sys.joint_rows, sys.robot.links, strict=True)):
         if link.joint.type != "R":
             qd[row] *= 0.3 * link.length_m
-        own = sys.own_rows(i)
+        own = sys.link_rows(i)
         for z, size in ((q, slope), (qd, 3.0)):
+            if i in sys.windup_rows:
+                z[sys.windup_rows[i]] = 0.3 * rng.normal()
             if len(own):
                 z[own] = bending(sys, i, size * rng.uniform(-1, 1, 3) / [1, 3, 9]) * (
                     1 + 0.1 * rng.normal(size=len(own))

@@ -14,15 +14,15 @@ from functools import partial
 import numpy as np
 import pytest
 import tomli_w
+from generators import files, robots
+from generators.drawn import Drawn
+from generators.identities import faults
+from generators.trial import Count, by_twin, by_two_methods, judge, trials
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import flexura as fx
 from flexura.control import load_gains
-from generators import files, robots
-from generators.drawn import Drawn
-from generators.identities import faults
-from generators.trial import Count, by_twin, by_two_methods, judge, trials
 
 MOST_REFUSED = 0.05  # of what is well-formed
 

@@ -214,7 +214,7 @@ def nodal(sys: fx.System) -> np.ndarray:
     the linear line."""
     T = np.eye(sys.n)
     for i, link in enumerate(sys.robot.links):
-        own, n = sys.own_rows(i), link.elements
+        own, n = sys.link_rows(i), link.elements
         if len(own):
             angle = sys.angles(i + 1, np.linspace(0, link.length_m, 2 * n + 1))
             T[own[1::2]] = angle[2::2]

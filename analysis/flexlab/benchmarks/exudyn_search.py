@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import flexura as fx
+from flexura.io import write_text
 
 from . import native
 from .exudyn_programs.run import Choice, run
@@ -232,7 +233,8 @@ def choice(name: str) -> Choice:
 
 def store(name: str, entry: dict[str, Any]) -> None:
     """Write one problem's entry of `settings.json`."""
-    FILE.write_text(json.dumps(dict(sorted((stored() | {name: entry}).items())), indent=1) + "\n")
+    entries = dict(sorted((stored() | {name: entry}).items()))
+    write_text(FILE, json.dumps(entries, indent=1) + "\n")
 
 
 def main(problems: list[Problem], log: Log = print) -> None:

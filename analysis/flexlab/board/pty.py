@@ -9,11 +9,16 @@ from __future__ import annotations
 
 import contextlib
 import os
+import sys
 import time
-import tty
 from collections.abc import Callable
 
+from flexura.errors import FlexuraError
+
 from .base import Board
+
+if sys.platform != "win32":
+    import tty
 
 STEP_S = 0.002
 
@@ -22,6 +27,8 @@ class Pty:
     """A board behind a pseudo-terminal; `device` is the name to open. Use as a context manager."""
 
     def __init__(self, board: Board) -> None:
+        if sys.platform == "win32":
+            raise FlexuraError("a board as a pseudo-terminal needs Linux or macOS")
         self.board = board
         self.lag_s = 0.0  # the largest so far
         self.dropped = 0  # bytes that nobody took in time, as with a real adapter

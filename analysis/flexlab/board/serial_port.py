@@ -95,12 +95,28 @@ class SerialBoard:
         return False
 
     def write(self, data: bytes) -> None:
+        """Send bytes to the board.
+
+        Args:
+            data: the bytes.
+
+        Raises:
+            BoardError: the line is gone.
+        """
         try:
             self._port.write(data)
         except OSError as error:
             raise BoardError(f"{self.label}: the line is gone ({error})") from None
 
     def read(self) -> bytes:
+        """The bytes that have come from the board.
+
+        Returns:
+            The bytes since the last call.
+
+        Raises:
+            BoardError: the line is gone.
+        """
         early, self._early = self._early, b""
         try:
             return early + self._port.read(self._port.in_waiting)
@@ -111,6 +127,14 @@ class SerialBoard:
             raise BoardError(f"{self.label}: the line is gone ({error})") from None
 
     def wait(self, seconds: float) -> None:
+        """Wait for a byte.
+
+        Args:
+            seconds: at most so long [s].
+
+        Raises:
+            BoardError: the line is gone.
+        """
         try:
             self._port.timeout = seconds
             self._early += self._port.read(1)
@@ -119,9 +143,15 @@ class SerialBoard:
             raise BoardError(f"{self.label}: the line is gone ({error})") from None
 
     def now(self) -> float:
+        """The time since the port was opened [s]."""
         return time.monotonic() - self._begin
 
     def reset(self) -> None:
+        """Reset the board by its DTR line.
+
+        Raises:
+            BoardError: the line is gone.
+        """
         try:
             self._port.dtr = False
             time.sleep(0.05)
@@ -132,4 +162,5 @@ class SerialBoard:
         self._early = b""
 
     def close(self) -> None:
+        """Close the port."""
         self._port.close()

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from .options import ForceFile, Json
-from .output import progress_bars, say, show
+from .output import message, print_results, progress_bars
 from .results import file_result
 from .runs import RobotNumber, one_run
 
@@ -45,5 +45,5 @@ def animate(
             progress=lambda fraction: report("pictures", fraction),
         )
     if json:
-        show(True, lambda: None, lambda: {"file": str(target)})
-    say(json, f"stored {target}")
+        print_results(True, lambda: None, lambda: {"file": str(target)})
+    message(json, f"stored {target}")

@@ -7,13 +7,13 @@ import errno
 import gc
 import importlib
 import sys
-from typing import Annotated, Any
+from typing import Annotated, Any, NoReturn
 
 import typer
 from typer.core import TyperGroup
 
 from flexura import __version__
-from flexura.errors import FlexuraError, InputError
+from flexura.errors import FlexuraError, InputError, out_of_memory
 
 from ..runs.formatting import printable
 from .verbosity import set_verbosity
@@ -61,12 +61,22 @@ class Commands(TyperGroup):
         command.name = cmd_name
         return command
 
+    def invoke(self, ctx: Any) -> Any:
+        """Call a command; Ctrl-C ends it with a word, where it does not keep what it has."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            typer.echo("flexura: interrupted", err=True)
+            raise typer.Exit(130) from None
+
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """The table of commands, without importing any."""
         with formatter.section("Commands"):
             formatter.write_dl(list(COMMANDS.items()))
 
 
+# what else than MemoryError says so: the loader of libraries, and threads
+SHORT_OF_MEMORY = ("failed to map segment", "cannot allocate memory", "can't start new thread")
 PLAIN: dict[str, Any] = {
     "add_completion": False,
     "rich_markup_mode": None,
@@ -113,14 +123,24 @@ def main() -> None:
         typer.echo("flexura: interrupted", err=True)
         sys.exit(130)
     except OSError as error:
-        said = f"flexura: {error.filename or 'a file'}: {error.strerror or error}"
+        if error.errno == errno.ENOMEM:
+            _end_without_memory(error)
+        said = f"flexura: {error.filename or 'standard output'}: {error.strerror or error}"
         typer.echo(printable(said), err=True)
         sys.exit(2 if error.errno == errno.ENAMETOOLONG else 1)  # no such file can be there
     except Exception as error:
+        if isinstance(error, MemoryError) or any(text in str(error) for text in SHORT_OF_MEMORY):
+            _end_without_memory(error)
         if not isinstance(error, FlexuraError):
             raise
         typer.echo(f"flexura: {error}", err=True)
         sys.exit(2 if isinstance(error, InputError) else 1)
+
+
+def _end_without_memory(error: Exception) -> NoReturn:
+    short = error if isinstance(error, MemoryError) else MemoryError(str(error).splitlines()[0])
+    typer.echo(f"flexura: {out_of_memory(short)}", err=True)
+    sys.exit(1)
 
 
 if __name__ == "__main__":

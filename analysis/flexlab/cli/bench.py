@@ -53,7 +53,9 @@ from .bench_tables import (
     selftest_table,
 )
 from .bench_tables import live as live_view
-from .output import events, say, show
+from .options import Force
+from .output import events, message, print_results
+from .results import refuse_taken
 
 app = typer.Typer(
     name="bench",
@@ -79,6 +81,7 @@ class BenchOptions:
     emulated: Emulated = False
     seed: Seed = 0
     out: Out = None
+    force: Force = False
     yes: Yes = False
     countdown_s: Countdown = None
     calibration: Calibrated = None
@@ -258,13 +261,13 @@ def recover(
     run = run_from_recording(folder)
     path = run.save(folder)
     if json:
-        show(
+        print_results(
             True,
             lambda: None,
             lambda: {"run": str(path), "rows": len(run), "emulated": run.meta["emulated"]},
         )
     events(run)
-    say(json, f"{run.meta['label']}: {len(run)} rows, {run.t[-1]:.3f} s", f"stored {path}")
+    message(json, f"{run.meta['label']}: {len(run)} rows, {run.t[-1]:.3f} s", f"stored {path}")
 
 
 def _run(rig: Path | None, ask: Any, options: BenchOptions, gains: Path | None = None) -> None:
@@ -273,6 +276,7 @@ def _run(rig: Path | None, ask: Any, options: BenchOptions, gains: Path | None =
         raise fx.InputError(
             "expected either a port or --emulated", key="--port", value=options.port
         )
+    refuse_taken(options.out, options.force)
     bench = rigs.load(rig or RIG)
     settings = rigs.configuration(bench) | ({} if gains is None else plan.gains(gains))
     asked = ask(bench, settings)
@@ -322,7 +326,9 @@ def _run(rig: Path | None, ask: Any, options: BenchOptions, gains: Path | None =
 
         watch = steps.Hooks(
             tested=lambda findings: (
-                None if options.json else show(False, lambda: selftest_table(findings, title), dict)
+                None
+                if options.json
+                else print_results(False, lambda: selftest_table(findings, title), dict)
             ),
             say=lambda text: typer.echo(text, err=True),
             may_start=lambda link: _countdown(link, pause, stop),
@@ -330,18 +336,20 @@ def _run(rig: Path | None, ask: Any, options: BenchOptions, gains: Path | None =
             observe=observe,
         )
         try:
-            done = steps.conduct(bench, asked, opened, folder, fitted, watch, options.configure)
+            done = steps.conduct(
+                bench, asked, opened, folder, fitted, watch, options.configure, options.force
+            )
         except steps.RefusedToStart as error:
             typer.echo(f"flexura: {error}", err=True)
             raise typer.Exit(130) from None
     kept = {key: done.run.meta[key] for key in TOLD_BY_JSON}
-    show(
+    print_results(
         options.json,
         lambda: result_table(done),
         lambda: kept | {"run": str(folder), "channels": numbers(done.run)},
     )
     events(done.run)
-    say(options.json, f"stored {folder}", f"look at it: flexura review {folder}")
+    message(options.json, f"stored {folder}", f"look at it: flexura review {folder}")
     if not done.ended.complete:
         typer.echo(f"flexura: not complete: {done.ended.text}", err=True)
         raise typer.Exit(130 if done.ended.interrupted else 1)

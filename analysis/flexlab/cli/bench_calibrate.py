@@ -29,7 +29,7 @@ from .bench_tables import (
     calibration_numbers,
     calibration_table,
 )
-from .output import say, show
+from .output import message, print_results
 
 
 def calibrate(
@@ -69,12 +69,12 @@ def calibrate(
     ) / "calibration.toml"
     fitting.write(found, path)
     label = {"label": opened.board.label, "emulated": opened.board.emulated}
-    show(
+    print_results(
         json,
         lambda: calibration_table(found, opened.board.label),
         lambda: label | calibration_numbers(found) | {"file": str(path)},
     )
-    say(json, f"stored {path}", f"use it: flexura bench inverse --calibration {path}")
+    message(json, f"stored {path}", f"use it: flexura bench inverse --calibration {path}")
 
 
 def _millimetres(text: str) -> tuple[float, ...]:

@@ -18,21 +18,24 @@ Emulated = Annotated[
     bool,
     typer.Option("--emulated", help="on the emulated board (the default): no hardware is touched"),
 ]
-Seed = Annotated[int, typer.Option(help="of the emulated rig's noise and dirt")]
+Seed = Annotated[
+    int, typer.Option(help="random seed of the emulated rig: noise, friction, backlash, drift")
+]
 Out = Annotated[
     Path | None,
     typer.Option(
-        "--out", metavar="FOLDER", help="where to keep it; default logs/<experiment>-<time>"
+        "--out", metavar="FOLDER", help="new folder for the recording; default logs/EXPERIMENT-TIME"
     ),
 ]
 Yes = Annotated[
     bool,
     typer.Option(
-        "--yes", help="ask nothing: both joints stand at their zero marks, nobody is in reach"
+        "--yes",
+        help="do not ask for confirmation: joints at their zero marks, nobody within reach",
     ),
 ]
 Countdown = Annotated[
-    float | None, typer.Option(min=0, help="before the start; default 3, emulated 0")
+    float | None, typer.Option(min=0, help="seconds before the start; default 3, emulated 0")
 ]
 Gains = Annotated[
     Path | None,
@@ -51,7 +54,7 @@ Configure = Annotated[
 Live = Annotated[
     bool,
     typer.Option(
-        "--live", help="a live view for Rerun, which a viewer may join late; its address is printed"
+        "--live", help="serve a live view for Rerun and print its address; viewers may join late"
     ),
 ]
 LivePort = Annotated[int, typer.Option(help="the live view's TCP port, on this machine only")]
@@ -64,7 +67,7 @@ Cut = Annotated[
     typer.Option(
         "--cut",
         metavar="NAME",
-        help="break the emulated wire of this entry of [pins]: who notices?",
+        help="break the emulated wire of this entry of [pins], to see which fault is reported",
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="print JSON instead of tables, for scripts")]

@@ -21,7 +21,7 @@ from ..comparison.report import html, png
 from ..review import picture as draw
 from ..review import write_review
 from .options import Force, Json, Rtol
-from .output import events, progress_bars, say, show
+from .output import events, message, print_results, progress_bars
 from .results import counted, file_result, results
 
 
@@ -100,10 +100,10 @@ def compare(
         folder = draft.keep(interrupted=first.interrupted)
     paths = [folder / name for name in names] + ([] if picture is None else [picture])
     data: dict[str, Any] = table.numbers(found) | {"stored": [str(path) for path in paths]}
-    show(json, lambda: table.table(found), lambda: data)
+    print_results(json, lambda: table.table(found), lambda: data)
     for each in (first, second):
         events(each)
-    say(
+    message(
         json,
         f"stored {folder}: {', '.join(map(str, names))}",
         f"look at it: flexura review {folder / 'review.rrd'}",

@@ -14,7 +14,15 @@ from ..crosscheck import crosscheck as cross
 from ..crosscheck import nine_structures
 from . import tables
 from .options import Force, Json, ManoeuvreFile, Out, Prescribed, Rtol, Start, stem
-from .output import events, followed, prepare, progress_bars, say, show, warn
+from .output import (
+    check_followed,
+    events,
+    load_request,
+    message,
+    print_results,
+    progress_bars,
+    warn,
+)
 from .results import results
 
 
@@ -66,8 +74,8 @@ def crosscheck(
                 raise InputError("expected without --all", key=key, value=str(given))
         _crosscheck_all(out, force, json)
         return
-    system, asked = prepare(robot, manoeuvre, prescribed, start)
-    followed(asked, manoeuvre, "call with --prescribed")
+    system, asked = load_request(robot, manoeuvre, prescribed, start)
+    check_followed(asked, manoeuvre, "call with --prescribed")
     with results(out, "crosscheck", robot.stem, *stem(manoeuvre), force=force) as draft:
         with progress_bars("native", "twin") as report:
             check = cross.crosscheck(
@@ -82,14 +90,14 @@ def crosscheck(
         review = cross.save(check, draft.folder).name
         stopped = check.simulation.interrupted or check.twin.interrupted
         folder = draft.keep(interrupted=stopped)
-    show(
+    print_results(
         json,
         lambda: tables.check_table(check),
         lambda: tables.check_json(check) | {"review": str(folder / review)},
     )
     for run in (check.simulation, check.twin):
         events(run)
-    say(
+    message(
         json,
         f"stored {folder}",
         f"look at it: flexura review {folder / 'simulation'} {folder / 'twin'}",
@@ -111,11 +119,11 @@ def _crosscheck_all(out: Path | None, force: bool, json: bool) -> None:
             rows = nine_structures.crosscheck_nine(progress=lambda f: report("all nine", f))
         review = nine_structures.save(rows, draft.folder).name
         folder = draft.keep()
-    show(
+    print_results(
         json,
         lambda: nine_structures.table(rows),
         lambda: nine_structures.numbers(rows) | {"review": str(folder / review)},
     )
-    say(json, f"stored {folder}", f"look at it: flexura review {folder / review}")
+    message(json, f"stored {folder}", f"look at it: flexura review {folder / review}")
     if not all(row.passed for row in rows):
         raise typer.Exit(1)

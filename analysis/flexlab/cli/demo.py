@@ -13,7 +13,7 @@ from ..runs.table import Table
 from . import tables
 from .demonstration import Demonstration, demonstrate, numbers
 from .options import Force, Json
-from .output import progress_bars, say, show
+from .output import message, print_results, progress_bars
 from .results import results
 
 
@@ -41,8 +41,8 @@ def demo(
         folder = draft.keep(interrupted=stopped)
         done = done.moved(draft.folder, folder)
     drawn = done.picture if isinstance(done.picture, Path) else None
-    show(json, lambda: _tables(done), lambda: _numbers(done))
-    say(json, *[f"left out: {text}" for text in done.left_out])
+    print_results(json, lambda: _tables(done), lambda: _numbers(done))
+    message(json, *[f"left out: {text}" for text in done.left_out])
     lines = [f"stored {folder}"]
     if done.review is not None and drawn is None:
         lines.append(f"no picture: {done.picture}")
@@ -56,7 +56,7 @@ def demo(
     lines += ["  flexura crosscheck two-link-arm", "  flexura robots", "  flexura --help"]
     if shutil.which("flexura") is None:
         lines.append("(the command is in .venv/bin; to find it: source .venv/bin/activate)")
-    say(json, *lines)
+    message(json, *lines)
     if not done.passed:
         raise typer.Exit(130 if stopped else 1)
 

@@ -66,25 +66,25 @@ def demonstrate(folder: Path, progress: cross.Progress | None = None) -> Demonst
     into `folder`/experiment, and compare it with its simulation in `folder`/comparison."""
     left_out: list[str] = []
 
-    def tried(part: str, work: Callable[[], T]) -> T | None:
+    def attempt(part: str, work: Callable[[], T]) -> T | None:
         try:
             return work()
         except Missing as error:
             left_out.append(f"no {part}: {error}")
             return None
 
-    check = tried("cross-check", lambda: _check(progress))
+    check = attempt("cross-check", lambda: _check(progress))
     if check is None:
         simulation = _native(progress)
         simulation.save(folder / "crosscheck" / "simulation")
     else:
         done, simulation = check, check.simulation
-        tried("review of the cross-check", lambda: cross.save(done, folder / "crosscheck"))
-    experiment = tried("experiment", lambda: _experiment(folder / "experiment", progress))
+        attempt("review of the cross-check", lambda: cross.save(done, folder / "crosscheck"))
+    experiment = attempt("experiment", lambda: _experiment(folder / "experiment", progress))
     if experiment is None:
         return Demonstration(simulation, check, left_out=left_out)
     found = compare(simulate_experiment(experiment), experiment)
-    paths = tried("report", lambda: save_comparison(found, folder / "comparison", simulated=True))
+    paths = attempt("report", lambda: save_comparison(found, folder / "comparison", simulated=True))
     if paths is None:
         return Demonstration(simulation, check, found, left_out=left_out)
     try:

@@ -12,8 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import typer
-from rich.markup import escape
-from rich.table import Table
 
 from flexura import core
 from flexura.errors import FlexuraError
@@ -24,17 +22,19 @@ from ..board.serial_port import ports
 from ..experiment.flash import RIG
 from ..rig import check_capability as check
 from ..rig import load as load_rig
+from ..runs.table import Styled, Table
 from .options import Json, RigFile
-from .output import show
+from .output import print_results
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing looked at.
+    """One part of the installation.
 
     Attributes:
-        what, found: its name, and what was found.
+        what: its name.
         state: "ok", "missing", "absent" (an extra), "wrong" or "note".
+        found: what was found.
         cost: what does not work without it.
     """
 
@@ -58,7 +58,7 @@ _EXTRAS = {
 }
 
 
-def examine(rig: Path | None = None) -> list[Finding]:
+def check_installation(rig: Path | None = None) -> list[Finding]:
     """Everything that flexura needs on this machine, the boards that are plugged in, and what the
     rig can do; one finding each.
 
@@ -187,24 +187,18 @@ def doctor(rig: RigFile = None, json: Json = False) -> None:
     \b
     Example: flexura doctor
     """
-    findings = examine(rig)
-
-    def table() -> Table:
-
-        out = Table(show_edge=False)
-        for name in ("", "found", "what it costs"):
-            out.add_column(name, overflow="fold")
-        mark = {
-            "ok": "[green]ok     [/]",
-            "missing": "[red]missing[/]",
-            "absent": "absent ",
-            "note": "note   ",
-            "wrong": "[red]wrong  [/]",
-        }
-        for f in findings:
-            out.add_row(f"{mark[f.state]} {escape(f.what)}", escape(f.found), escape(f.cost))
-        return out
-
-    show(json, table, lambda: [vars(f) for f in findings])
+    findings = check_installation(rig)
+    print_results(json, lambda: _table(findings), lambda: [vars(f) for f in findings])
     if any(f.state in ("missing", "wrong") for f in findings):
         raise typer.Exit(1)
+
+
+_COLOURS = {"ok": "green", "missing": "red", "wrong": "red"}
+
+
+def _table(findings: list[Finding]) -> Table:
+    heads = ("state", "", "found", "what it costs")
+    out = Table("installation", heads, heads)
+    for f in findings:
+        out.add(Styled(f.state, _COLOURS.get(f.state, "")), f.what, f.found, f.cost)
+    return out

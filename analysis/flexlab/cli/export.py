@@ -15,7 +15,7 @@ from flexura.population import is_population
 
 from ..runs.export import as_csv, as_mat, as_mcap, as_tdms, population
 from .options import ForceFile, Json
-from .output import say, show
+from .output import message, print_results
 from .results import file_result
 from .runs import RobotNumber, one_run
 
@@ -67,8 +67,8 @@ def export(
         about |= {"called": "population", "emulated": False, "rows": len(read.robots)}
         line = f"population: {about['rows']} of {read.count} robots"
     if json:
-        show(True, lambda: None, lambda: about)
-    say(json, line, f"stored {target}")
+        print_results(True, lambda: None, lambda: about)
+    message(json, line, f"stored {target}")
 
 
 def forms() -> dict[str, Callable[[Run], bytes]]:

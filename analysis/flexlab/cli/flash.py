@@ -9,7 +9,7 @@ import typer
 from ..experiment import flash as loader
 from ..rig import load
 from .options import Json, RigFile
-from .output import say, show
+from .output import message, print_results
 
 
 def flash(
@@ -38,11 +38,11 @@ def flash(
     Example: flexura flash --emulated --configure
     """
     done = loader.flash(
-        load(rig or loader.RIG), port, emulated, configure, say=lambda text: say(json, text)
+        load(rig or loader.RIG), port, emulated, configure, say=lambda text: message(json, text)
     )
-    show(json, lambda: loader.table(done), lambda: loader.data(done))
+    print_results(json, lambda: loader.table(done), lambda: loader.data(done))
     if done.differing:
-        say(
+        message(
             json,
             f"{len(done.differing)} settings are not the rig file's; to write them: flexura flash "
             f"--configure",

@@ -11,7 +11,7 @@ import flexura as fx
 from ..studies.transmission_zeros import transmission
 from . import tables
 from .options import Json, RobotFile
-from .output import show
+from .output import print_results
 
 
 def frequencies(
@@ -35,7 +35,7 @@ def frequencies(
     rows = transmission(fx.linearize(system)) if zeros else []
     title = described.name or robot.stem
     found = {"locked_Hz": locked.tolist(), "free_Hz": free.tolist()}
-    show(
+    print_results(
         json,
         lambda: tables.frequency_tables(locked, free, title, rows),
         lambda: found | ({"zeros": [row.numbers() for row in rows]} if zeros else {}),

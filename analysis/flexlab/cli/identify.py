@@ -13,7 +13,7 @@ from ..comparison import table as compared
 from ..identification import files, output
 from ..identification.identify import identify as identified
 from .options import ForceFile, Json
-from .output import progress_bars, say, show, warn
+from .output import message, print_results, progress_bars, warn
 from .results import counted, file_result
 
 
@@ -82,11 +82,11 @@ def identify(
             name: compared.numbers(c)
             for name, c in zip(("files", "identified"), judged, strict=True)
         }
-    show(
+    print_results(
         json,
         lambda: [output.table(found, experiment), *map(compared.table, judged or ())],
         lambda: data,
     )
     for sentence in missing:
         warn(sentence)
-    say(json, f"stored {', '.join(map(str, paths))}")
+    message(json, f"stored {', '.join(map(str, paths))}")

@@ -13,7 +13,7 @@ from flexura.io import FILE
 from ..studies.drive_requirements import efforts
 from . import tables
 from .options import Force, Json, MaxSteps, Out, RobotFile, Rtol, Start, WallTime
-from .output import prepare, show, simulate_asked, stored
+from .output import load_request, print_results, report_saved, simulate_asked
 from .results import results
 
 
@@ -41,7 +41,7 @@ def inverse(
     \b
     Example: flexura inverse rig rig-inverse-law
     """
-    system, asked = prepare(robot, manoeuvre, start=start)
+    system, asked = load_request(robot, manoeuvre, start=start)
     motions = [joint.motion for joint in asked.drive.joints]
     for i, (motion, link) in enumerate(zip(motions, system.robot.links, strict=True), 1):
         if motion is None and not link.joint.locked:
@@ -68,11 +68,11 @@ def inverse(
         run.save(draft.folder)
         folder = draft.keep(interrupted=run.stopped)
     rows = efforts(run) if len(run) > 1 else []
-    show(
+    print_results(
         json,
         lambda: tables.effort_table(rows, run),
         lambda: (
             tables.run_json(run) | {"drives": [vars(r) for r in rows], "run": str(folder / FILE)}
         ),
     )
-    stored(run, folder, json)
+    report_saved(run, folder, json)

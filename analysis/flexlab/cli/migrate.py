@@ -16,7 +16,7 @@ from flexura.io import check_format, read_toml, write_bytes
 from flexura.robot import OldKey, renamed
 
 from .options import Json
-from .output import say, show
+from .output import message, print_results
 
 _HEADER = re.compile(r"\s*(\[\[?)\s*([^\]#]*?)\s*\]")
 _TOKENS = re.compile(  # texts and comments are left alone
@@ -51,10 +51,10 @@ def migrate(
         str(file): [{"key": each.path, "new": each.new} for each in old] for file, _, old in done
     }
     if json:
-        show(True, lambda: None, lambda: found)
+        print_results(True, lambda: None, lambda: found)
     for file, _, old in done:
         lines = [f"{file}: {each.path} is now {each.new}" for each in old]
-        say(json, *lines or [f"{file}: nothing to rename"])
+        message(json, *lines or [f"{file}: nothing to rename"])
     if check and any(old for _, _, old in done):
         raise typer.Exit(1)
 

@@ -12,7 +12,7 @@ import flexura as fx
 from flexura.io import write_text
 
 from .options import ForceFile, Json
-from .output import say, show
+from .output import message, print_results
 from .results import file_result
 
 TEMPLATE = Path(__file__).with_name("new_robot.toml")
@@ -36,8 +36,8 @@ def new(
     with file_result(file, "FILE", force=force):
         write_text(file, TEMPLATE.read_text("utf-8").replace('name = "my robot"', named, 1))
     if json:
-        show(True, lambda: None, lambda: {"robot": str(file)})
-    say(
+        print_results(True, lambda: None, lambda: {"robot": str(file)})
+    message(
         json,
         f"wrote {file}",
         "next:",

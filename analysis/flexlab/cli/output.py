@@ -22,7 +22,7 @@ from ..runs.table import WIDTH
 from .verbosity import quiet
 
 
-def prepare(
+def load_request(
     robot: Path, manoeuvre: Path | None, prescribed: bool = False, start: str | None = None
 ) -> Any:
     """The assembled robot and what it is asked to do; a manoeuvre of its own is told on stderr."""
@@ -43,10 +43,10 @@ def prepare(
     return system, replace(asked, start=start or asked.start)
 
 
-def followed(asked: fx.Manoeuvre, manoeuvre: Path | None, options: str) -> None:
+def check_followed(asked: fx.Manoeuvre, manoeuvre: Path | None, options: str) -> None:
     """Refuse a motion that nothing follows; `options` of the command say what to do."""
     for i, joint in enumerate(asked.drive.joints, 1):
-        if joint.unfollowed:
+        if joint.has_unfollowed_motion:
             raise fx.InputError(
                 f"joint {i} has a motion, but neither gains nor prescribed: give it kp and kd, or "
                 f"{options}",
@@ -92,7 +92,7 @@ def simulate_asked(
     return run
 
 
-def show(json: bool, tables: Callable[[], Any], data: Callable[[], Any]) -> None:
+def print_results(json: bool, tables: Callable[[], Any], data: Callable[[], Any]) -> None:
     """Print a table, or several, or JSON; 80 columns wide where there is no terminal."""
     if json:
         typer.echo(json_.dumps(data(), indent=1))
@@ -107,7 +107,7 @@ def show(json: bool, tables: Callable[[], Any], data: Callable[[], Any]) -> None
         console.print(table)
 
 
-def say(json: bool, *lines: str) -> None:
+def message(json: bool, *lines: str) -> None:
     """Print lines, without the control characters that names may have; nothing beside JSON."""
     if not json and not quiet():
         for line in lines:
@@ -126,9 +126,9 @@ def events(run: Any) -> None:
         warn(f"{source}: {level} at t = {event['t']:.4g} s: {event['text']}")
 
 
-def stored(run: Any, folder: Path, json: bool) -> None:
+def report_saved(run: Any, folder: Path, json: bool) -> None:
     """Say what happened to a run and where it is; end with the status of an incomplete one."""
     events(run)
-    say(json, f"stored {folder / FILE}", f"look at it: flexura review {folder}")
+    message(json, f"stored {folder / FILE}", f"look at it: flexura review {folder}")
     if not run.complete:
         raise typer.Exit(130 if run.interrupted else 1)

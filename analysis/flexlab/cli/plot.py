@@ -12,9 +12,9 @@ from flexura.io import FILE, write_bytes
 from flexura.io.drawing import FORMS, figure, heading, saved
 
 from .options import ForceFile, Json
-from .output import say, show
+from .output import message, print_results
 from .results import file_result
-from .runs import RobotNumber, named, one_run
+from .runs import RobotNumber, legend_names, one_run
 
 
 def plot(
@@ -52,11 +52,11 @@ def plot(
     paths = [run, *beside]
     with file_result(target, force=force):
         runs = [one_run(path, robot) for path in paths]
-        drawing = figure(runs, patterns, names=named(paths, runs), title=title)
+        drawing = figure(runs, patterns, names=legend_names(paths, runs), title=title)
         write_bytes(target, saved(drawing, form, Title=title or heading(runs)))
     if json:
-        show(True, lambda: None, lambda: {"file": str(target)})
-    say(json, f"stored {target}")
+        print_results(True, lambda: None, lambda: {"file": str(target)})
+    message(json, f"stored {target}")
 
 
 def _is_run(text: str) -> bool:

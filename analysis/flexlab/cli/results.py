@@ -16,6 +16,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from flexura.errors import InputError
+from flexura.io import (
+    DRAFT,
+    FINISHED,
+    make_folder,
+    move,
+    replace_results,
+    settle,
+    unwritable,
+)
 
 from ..runs.formatting import file_name
 
@@ -36,22 +45,27 @@ class Draft:
 
         Interrupted work replaces no finished results: it stands in a folder beside.
         """
+        try:
+            return self._kept(interrupted)
+        except OSError as error:
+            raise unwritable(self.target, error, "--out") from None
+
+    def _kept(self, interrupted: bool) -> Path:
         target = self.target
         if self.counts or (interrupted and taken(target)):
             stem = target if self.counts else target.with_name(f"{target.name}-interrupted")
             while True:
                 target = counted(stem, folder=True)
                 try:
-                    os.rename(self.folder, target)
+                    move(self.folder, target)
                     return target
                 except OSError:
                     if not os.path.lexists(target):  # else another process took this number
                         raise
         if not target.exists():
-            os.rename(self.folder, target)
+            move(self.folder, target)
             return target
-        for entry in sorted(self.folder.iterdir()):
-            _replace(entry, target / entry.name, self.folder)
+        replace_results(self.folder, target)
         return target
 
 
@@ -65,14 +79,42 @@ def results(out: Path | None, *names: str, force: bool = False) -> Iterator[Draf
         InputError: `out` has something in it and `force` is false, or it cannot be written.
     """
     target = LOGS / "-".join(map(file_name, names)) if out is None else out
+    refuse_taken(out, force)
+    with _folder(target, out is None) as folder, _named(folder, target):
+        yield Draft(folder, target, out is None)
+
+
+def refuse_taken(out: Path | None, force: bool) -> None:
+    """Refuse a folder that has something in it.
+
+    Args:
+        out: the folder; None: a default that is not there yet.
+        force: files of the same names may be replaced.
+
+    Raises:
+        InputError: `out` has something in it and `force` is false.
+    """
     if out is not None and not force and taken(out):
         raise InputError(
             f"results are there: expected a new or empty folder, {REPLACE}",
             key="--out",
             value=str(out),
         )
-    with _folder(target, out is None) as folder:
-        yield Draft(folder, target, out is None)
+
+
+@contextmanager
+def replacing(folder: Path) -> Iterator[Path]:
+    """A draft of results that in the end replace those of the same names in `folder`, together.
+
+    Raises:
+        InputError: the folder cannot be written; the old results are as they were.
+    """
+    with _folder(folder, False) as draft, _named(draft, folder):
+        yield draft
+        try:
+            replace_results(draft, folder)
+        except OSError as error:
+            raise unwritable(folder, error, "--out") from None
 
 
 def continued(out: Path | None, *names: str, mark: str) -> Path:
@@ -115,12 +157,12 @@ def file_result(path: Path | None, key: str = "--out", *, force: bool = False) -
     made: list[Path] = []
     try:
         try:
-            made = _parents(path.parent)
-            trial = path.parent / f".flexura-{secrets.token_hex(4)}"
+            made = make_folder(path.parent)
+            trial = path.parent / f"{DRAFT}{secrets.token_hex(4)}"
             trial.touch(exist_ok=False)
             trial.unlink()
         except (OSError, ValueError) as error:
-            raise _unwritable(key, path, error) from None
+            raise unwritable(path, error, key) from None
         yield
     finally:
         _remove_empty(made)
@@ -136,9 +178,24 @@ def counted(path: Path, *, folder: bool = False) -> Path:
 def taken(path: Path) -> bool:
     """Whether something is there that results would stand on: a file, or a folder with entries."""
     try:
-        return os.path.lexists(path) and not (path.is_dir() and not any(path.iterdir()))
+        if not path.is_dir():
+            return os.path.lexists(path)
+        # what a killed process had in work is no result; a replacement that was decided is one
+        names = (entry.name for entry in path.iterdir())
+        return any(not name.startswith(DRAFT) or name == FINISHED for name in names)
     except (OSError, ValueError):  # what cannot be read is refused where it is tried
         return False
+
+
+@contextmanager
+def _named(draft: Path, target: Path) -> Iterator[None]:
+    """Errors name files where they would have been in the end."""
+    try:
+        yield
+    except InputError as error:
+        if error.file and Path(error.file).is_relative_to(draft):
+            raise error.in_file(str(target / Path(error.file).relative_to(draft))) from None
+        raise
 
 
 @contextmanager
@@ -150,8 +207,9 @@ def _folder(target: Path, counts: bool) -> Iterator[Path]:
         try:
             inside = not counts and target.is_dir()
             parent = target if inside else target.parent
-            folder = parent / f".flexura-{secrets.token_hex(4)}"
-            made = _parents(parent)
+            folder = parent / f"{DRAFT}{secrets.token_hex(4)}"
+            made = make_folder(parent)
+            settle(parent)
             if not inside and not counts and os.path.lexists(target):
                 raise NotADirectoryError(0, "a file, not a folder")
             folder.mkdir()
@@ -159,7 +217,7 @@ def _folder(target: Path, counts: bool) -> Iterator[Path]:
                 (folder / target.name).mkdir()  # a name that the file system refuses
                 (folder / target.name).rmdir()
         except (OSError, ValueError) as error:
-            raise _unwritable("--out", target, error) from None
+            raise unwritable(target, error, "--out") from None
         yield folder
     finally:
         if folder.name:
@@ -167,33 +225,7 @@ def _folder(target: Path, counts: bool) -> Iterator[Path]:
         _remove_empty(made)
 
 
-def _parents(folder: Path) -> list[Path]:
-    """Make a folder and those above it; returns the new ones, the outermost first."""
-    new = [p for p in (folder, *folder.parents) if not os.path.lexists(p)]
-    made: list[Path] = []
-    try:
-        for p in reversed(new):
-            p.mkdir()
-            made.append(p)
-    except OSError:
-        _remove_empty(made)
-        raise
-    return made
-
-
 def _remove_empty(folders: list[Path]) -> None:
     for folder in reversed(folders):
         with suppress(OSError):
             folder.rmdir()
-
-
-def _unwritable(key: str, path: Path, error: Exception) -> InputError:
-    why = getattr(error, "strerror", None) or str(error)
-    return InputError(f"cannot be written ({why})", key=key, value=str(path))
-
-
-def _replace(entry: Path, place: Path, old: Path) -> None:
-    """Move a result to its place; a folder that stands there goes into `old`."""
-    if os.path.lexists(place) and (place.is_dir() or entry.is_dir()):
-        os.rename(place, old / f".replaced-{entry.name}")
-    os.replace(entry, place)

@@ -12,7 +12,7 @@ from flexura.population import is_population
 
 from .. import review as rerun
 from .options import ForceFile, Json
-from .output import say, show
+from .output import message, print_results
 from .results import counted, file_result
 from .runs import RobotNumber, one_run
 
@@ -71,10 +71,10 @@ def review(
             rerun.write_review(target, read)
             if picture is not None:
                 rerun.picture(target, picture, time_s=time_s)
-        say(json, f"stored {target}")
+        message(json, f"stored {target}")
     if picture is not None:
-        say(json, f"stored {picture}")
+        message(json, f"stored {picture}")
     if json:
-        show(True, lambda: None, lambda: {"review": str(target), "picture": drawn})
+        print_results(True, lambda: None, lambda: {"review": str(target), "picture": drawn})
     if save is None and picture is None:
         rerun.open_viewer(target)

@@ -12,7 +12,7 @@ from flexura.io import shipped_files
 from ..runs.formatting import number
 from ..runs.table import Table
 from .options import Json
-from .output import say, show
+from .output import message, print_results
 
 
 def robots(json: Json = False) -> None:
@@ -24,8 +24,8 @@ def robots(json: Json = False) -> None:
     Example: flexura robots
     """
     rows = [_row(name) for name in shipped_files("robots")]
-    show(json, lambda: _table(rows), lambda: rows)
-    say(json, "use one: flexura frequencies rig; begin your own: flexura new my-arm.toml")
+    print_results(json, lambda: _table(rows), lambda: rows)
+    message(json, "use one: flexura frequencies rig; begin your own: flexura new my-arm.toml")
 
 
 def _row(name: str) -> dict[str, Any]:

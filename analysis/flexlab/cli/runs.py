@@ -45,7 +45,7 @@ def one_run(path: Path, robot: int | None = None) -> Run:
     return found.run(robot)
 
 
-def named(paths: Sequence[Path], runs: Sequence[Run]) -> list[str]:
+def legend_names(paths: Sequence[Path], runs: Sequence[Run]) -> list[str]:
     """What each run is called in a legend: its kind, and its folder where kinds are the same."""
     kinds = list(map(called, runs))
     folders = [(path if path.is_dir() else path.parent).resolve().name for path in paths]

@@ -27,13 +27,13 @@ from .options import (
     stem,
 )
 from .output import (
-    followed,
-    prepare,
+    check_followed,
+    load_request,
+    message,
+    print_results,
     progress_bars,
-    say,
-    show,
+    report_saved,
     simulate_asked,
-    stored,
     warn,
 )
 from .results import continued, results
@@ -105,9 +105,9 @@ def simulate(
         raise fx.InputError(
             "expected without --prescribed", key="--controller", value=str(controller)
         )
-    system, asked = prepare(robot, manoeuvre, prescribed, start)
+    system, asked = load_request(robot, manoeuvre, prescribed, start)
     if not controller:
-        followed(asked, manoeuvre, "call with --controller GAINS or --prescribed")
+        check_followed(asked, manoeuvre, "call with --controller GAINS or --prescribed")
     drive = controller_from_file(system, asked, controller) if controller else asked.drive
     with results(out, "simulate", robot.stem, *stem(manoeuvre), force=force) as draft:
         run = simulate_asked(
@@ -122,12 +122,12 @@ def simulate(
         )
         run.save(draft.folder)
         folder = draft.keep(interrupted=run.stopped)
-    show(
+    print_results(
         json,
         lambda: tables.run_table(run),
         lambda: tables.run_json(run) | {"run": str(folder / FILE)},
     )
-    stored(run, folder, json)
+    report_saved(run, folder, json)
 
 
 def _simulate_many(
@@ -144,8 +144,8 @@ def _simulate_many(
     budget: dict[str, Any],
 ) -> None:
     parameter_sweep.ranges(vary)  # the count is refused before anything is computed
-    system, asked = prepare(robot, manoeuvre, prescribed, start)
-    followed(asked, manoeuvre, "call with --prescribed")
+    system, asked = load_request(robot, manoeuvre, prescribed, start)
+    check_followed(asked, manoeuvre, "call with --prescribed")
     batch, chosen = parameter_sweep.grid(system.robot, vary)
     folder = continued(out, "population", robot.stem, *stem(manoeuvre), mark="population.json")
     with progress_bars("robots") as report:
@@ -168,7 +168,7 @@ def _simulate_many(
         )
         raise typer.Exit(130)
     found = parameter_sweep.numbers(done, chosen, folder)
-    show(json, lambda: parameter_sweep.tables(found), lambda: found)
-    say(json, f"stored {folder}; the same command goes on in it")
+    print_results(json, lambda: parameter_sweep.tables(found), lambda: found)
+    message(json, f"stored {folder}; the same command goes on in it")
     if set(found["ended"]) != {"done"}:
         raise typer.Exit(1)

@@ -11,7 +11,7 @@ from flexura.optional import need
 
 from .. import studies
 from .options import Force, Json, ManoeuvreFile, Out, RobotFile, Rtol, stem
-from .output import progress_bars, say, show, warn
+from .output import message, print_results, progress_bars, warn
 from .results import results
 
 
@@ -69,9 +69,11 @@ def study(
             )
         names = [path.name for path in studies.save(done, draft.folder)]
         folder = draft.keep(interrupted=not done.complete)
-    stored = [str(folder / name) for name in names]
-    show(json, lambda: studies.table(done), lambda: studies.numbers(done) | {"stored": stored})
-    say(json, f"stored {folder}: {', '.join(names)}")
+    report_saved = [str(folder / name) for name in names]
+    print_results(
+        json, lambda: studies.table(done), lambda: studies.numbers(done) | {"stored": report_saved}
+    )
+    message(json, f"stored {folder}: {', '.join(names)}")
     if not done.complete:
         warn(f"interrupted after {len(done.rows)} runs, which are stored in {folder}")
         raise typer.Exit(130)

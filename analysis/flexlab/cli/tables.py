@@ -63,6 +63,14 @@ _VERDICTS = {
 
 
 def check_json(check: Check) -> dict[str, Any]:
+    """A cross-check for JSON.
+
+    Args:
+        check: the cross-check.
+
+    Returns:
+        Deviations by channel, and both programs' run times.
+    """
     rows = {
         row.channel: {k: finite(v) for k, v in vars(row).items() if k != "channel"}
         | {"twin_error_relative": check.own_error.get(row.channel)}
@@ -145,6 +153,14 @@ def effort_table(rows: list[Effort], run: fx.Run) -> Table:
 
 
 def run_json(run: fx.Run) -> dict[str, Any]:
+    """A run for JSON.
+
+    Args:
+        run: the run.
+
+    Returns:
+        Metadata, and of each channel unit, start, end and extremes.
+    """
     about = {k: v for k, v in run.meta.items() if k not in ("robot", "drive")}
     channels = {
         n: {

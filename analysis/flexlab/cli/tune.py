@@ -25,8 +25,8 @@ from ..tuning.objective import Weights
 from ..tuning.search import Search, search
 from ..tuning.task import Task, perturbed_robots
 from .options import Json
-from .output import say, show
-from .results import continued
+from .output import message, print_results
+from .results import continued, replacing
 
 
 def tune(
@@ -163,7 +163,7 @@ def tune(
         described, outputs = with_nominal_drives(described, rigs.load(rig))
         given = Gains(given.settings, outputs, given.file)
     asked = fx.load_manoeuvre(manoeuvre, len(described.links))
-    frees = (
+    free_gains = (
         freedom.read(free_file)
         if free_file
         else [freedom.from_option(f) for f in free or []] or freedom.default_bounds(given)
@@ -174,27 +174,28 @@ def tune(
         _factors(payload_factors, "--payload-factors"),
         _factors(stiffness_factors, "--stiffness-factors"),
     )
-    task = Task(robots, asked, given, tuple(frees), weights, algorithm == "nsga2", rtol, modes)
+    task = Task(robots, asked, given, tuple(free_gains), weights, algorithm == "nsga2", rtol, modes)
     task.controllers  # noqa: B018 - refuses what can't be before anything is written
     folder = continued(out, "tune", robot.stem, manoeuvre.stem, mark=FILE)
     history = History.open(folder, task.digest(how.identity()))
     if history.stored:
-        say(json, f"going on after generation {history.stored} in {folder}")
+        message(json, f"going on after generation {history.stored} in {folder}")
     with (
         make_executor(task, scheduler, jobs) as runs,
-        _bar(how.generations + how.polish, task.goals) as report,
+        _bar(how.generations + how.polish, task.objectives) as report,
     ):
         complete = search(task, how, runs, history, report)
     if not len(history):
         raise typer.Exit(130)
     found = results.result(task, how, history, complete)
-    paths = results.save(found, folder)
-    show(
+    with replacing(folder) as draft:
+        paths = [folder / path.relative_to(draft) for path in results.save(found, draft)]
+    print_results(
         json,
         lambda: results.table(found),
         lambda: results.numbers(found) | {"stored": [str(path) for path in paths]},
     )
-    say(
+    message(
         json,
         f"stored {folder}: {', '.join(path.name for path in paths)}",
         f"use it: flexura bench step --gains {paths[0]}"
@@ -215,8 +216,10 @@ def _cases(
     with _bar(how.generations + how.polish, ("J",)) as report:
         found, complete = cases.study(["IV", "III"], how, folder, scheduler, jobs, report)
     if found:
-        show(json, lambda: cases.table(found), lambda: cases.data(found))
-    say(json, f"stored {folder}" + ("" if complete else "; interrupted: the same command goes on"))
+        print_results(json, lambda: cases.table(found), lambda: cases.data(found))
+    message(
+        json, f"stored {folder}" + ("" if complete else "; interrupted: the same command goes on")
+    )
     if not complete:
         raise typer.Exit(130)
 
@@ -239,7 +242,7 @@ def _factors(text: str, key: str) -> list[float]:
 
 
 @contextmanager
-def _bar(generations: int, goals: tuple[str, ...]) -> Iterator[Callable[[Any], None]]:
+def _bar(generations: int, objectives: tuple[str, ...]) -> Iterator[Callable[[Any], None]]:
     """A bar on a terminal's stderr with the best so far, nothing elsewhere."""
     if not sys.stderr.isatty():
         yield lambda history: None
@@ -258,7 +261,9 @@ def _bar(generations: int, goals: tuple[str, ...]) -> Iterator[Callable[[Any], N
 
         def report(history: Any) -> None:
             best = history.all("goals")[history.best]
-            text = ", ".join(f"{name} {value:.4g}" for name, value in zip(goals, best, strict=True))
+            text = ", ".join(
+                f"{name} {value:.4g}" for name, value in zip(objectives, best, strict=True)
+            )
             bars.update(task, completed=len(history), description=f"best {text}")
 
         yield report

@@ -74,6 +74,14 @@ def draw(c: Comparison, entry: Difference, upper: Any, lower: Any) -> None:
 
 
 def symbol(entry: Difference) -> str:
+    """The symbol of a quantity in a figure.
+
+    Args:
+        entry: of the comparison.
+
+    Returns:
+        Mathematical text, for example $q_{2}$.
+    """
     kind, number, _ = entry.channel.split("/")
     if kind == "link":
         return f"$w_{{{number}}}$"
@@ -81,6 +89,15 @@ def symbol(entry: Difference) -> str:
 
 
 def heading(c: Comparison, entry: Difference) -> str:
+    """The heading of a quantity's figure.
+
+    Args:
+        c: the comparison.
+        entry: the quantity.
+
+    Returns:
+        The text; nothing emulated goes without the word.
+    """
     text = entry.quantity[0].upper() + entry.quantity[1:]
     return (
         text
@@ -90,6 +107,14 @@ def heading(c: Comparison, entry: Difference) -> str:
 
 
 def is_emulated(c: Comparison) -> bool:
+    """Whether one of the two runs is emulated.
+
+    Args:
+        c: the comparison.
+
+    Returns:
+        True if one is.
+    """
     return emulated(c.simulation) or emulated(c.experiment)
 
 

@@ -79,6 +79,15 @@ def png(c: Comparison) -> bytes:
 
 
 def caption(c: Comparison, k: int) -> str:
+    """The caption of a figure in the report.
+
+    Args:
+        c: the comparison.
+        k: number of the figure, from 0.
+
+    Returns:
+        The text.
+    """
     like = {"forward": "Figs 4.16 to 4.18", "inverse": "Figs 4.19 to 4.21"}.get(c.experiment_kind)
     both = f"{called(c.simulation)} and {called(c.experiment)}"
     return f"Fig. {k + 1}. {heading(c, c.differences[k])}: {both}; below, their difference." + (

@@ -23,6 +23,14 @@ DRIVEN = {
 
 
 def title(c: Comparison) -> str:
+    """The title of a comparison.
+
+    Args:
+        c: the comparison.
+
+    Returns:
+        The robot and the two runs' names.
+    """
     name = c.simulation.meta.get("robot", {}).get("name") or "robot"
     return f"{name}: {called(c.simulation)} against {called(c.experiment)}" + (
         f", {c.experiment_kind}" if c.experiment_kind else ""

@@ -34,7 +34,7 @@ class Check:
     own_error: Mapping[str, float] = field(default_factory=dict)
 
     def verdict(self, channel: str) -> str:
-        """ "within" or "beyond" the tolerance, or "open".
+        """One of "within" and "beyond" the tolerance, and "open".
 
         A deviation beyond the tolerance is "open" if the twin's own error may explain it: less
         that error it is within the tolerance. Such a deviation says nothing about the native run.

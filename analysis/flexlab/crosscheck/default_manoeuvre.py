@@ -31,7 +31,8 @@ def modest(system: fx.System, duration_s: float | None = None) -> Manoeuvre:
         system: the robot.
         duration_s: of the motion [s]; None: 1 s, or two periods of the lowest natural frequency.
 
-    Returns: the manoeuvre, whose tables a manoeuvre file can hold.
+    Returns:
+        The manoeuvre, whose tables a manoeuvre file can hold.
     """
     if system.robot.nodal:  # its mass matrix is that of no single q
         system = fx.assemble(system.robot.replace({"sliding": "continuous"}))

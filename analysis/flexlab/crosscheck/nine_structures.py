@@ -52,6 +52,7 @@ class Row:
 
     @property
     def name(self) -> str:
+        """The dissertation's number of the structure, and its joints."""
         return f"{NUMERALS[self.structure]} {self.structure}"
 
     def worst(self, kind: int) -> float:
@@ -66,6 +67,7 @@ class Row:
 
     @property
     def passed(self) -> bool:
+        """Whether both runs are complete and all deviations are small enough."""
         return self.check.complete and all(
             self.worst(k) <= most for k, most in enumerate(ALLOWED[self.sliding])
         )

@@ -5,11 +5,11 @@ from __future__ import annotations
 import struct
 import subprocess
 import sys
-from binascii import crc_hqx
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from zlib import crc32
 
 from flexura.errors import FlexuraError, InputError
 from flexura.optional import Missing, load
@@ -68,8 +68,8 @@ def as_float32(value: float) -> float:
 
 
 def settings_crc(settings: dict[str, float]) -> int:
-    """The board's checksum of its settings: CRC-16 over all, in order, single precision."""
-    return crc_hqx(struct.pack(f"<{len(CONFIG)}f", *(settings[name] for name in CONFIG)), 0xFFFF)
+    """The board's checksum of its settings: CRC-32 over all, in order, single precision."""
+    return crc32(struct.pack(f"<{len(CONFIG)}f", *(settings[name] for name in CONFIG)))
 
 
 def build(*options: str, firmware: Path = FIRMWARE) -> Path:
@@ -164,7 +164,7 @@ def _configure(link: Link, wanted: dict[str, float], say: Say) -> Identity:
         raise BoardError(
             f"{link.board.label}: after a reset the board does not have the settings that were "
             f"stored (checksum "
-            f"{identity.configuration_crc:04x}, expected {settings_crc(wanted):04x}, fault "
+            f"{identity.configuration_crc:08x}, expected {settings_crc(wanted):08x}, fault "
             f"{identity.fault.name})"
         )
     say("reset: the board came up with them")

@@ -86,7 +86,7 @@ def gains(path: Path) -> dict[str, float]:
                 file=str(path),
             )
         item = CONFIG[name]
-        if not signals.finite(value) or not item.least <= value <= item.greatest:
+        if not signals.is_finite(value) or not item.least <= value <= item.greatest:
             expected = (
                 f"expected a number between {item.least:g} and {item.greatest:g} ({item.text})"
             )
@@ -280,7 +280,7 @@ def _profile(spec: dict[str, Any]) -> tuple[str, float, list[fx.Signal]]:
                 f"an unknown key; known here: {', '.join(DEFAULT_PROFILE)}", key=key, value=value
             )
     duration = spec.get("duration_s")
-    if duration is None or not signals.finite(duration) or not 0 < duration <= LONGEST_S:
+    if duration is None or not signals.is_finite(duration) or not 0 < duration <= LONGEST_S:
         raise InputError(
             f"expected a duration above 0 and at most {LONGEST_S:g} s",
             key="duration_s",

@@ -184,6 +184,7 @@ def conduct(
     calibration: Calibration,
     watch: Hooks,
     configure: bool = False,
+    replace: bool = False,
 ) -> ExperimentResult:
     """Test the rig, start and execute a plan, and make the Run.
 
@@ -198,14 +199,18 @@ def conduct(
         calibration: of the flex sensor.
         watch: what the person sees and says.
         configure: whether the rig's settings may be written into a board that has others.
+        replace: whether a recording in `folder` may be replaced.
+
+    Returns:
+        The Run, its folder, the self-test's findings, and how the stream ended.
 
     Raises:
-        InputError: the rig cannot follow the plan.
+        InputError: the rig cannot follow the plan, or the folder holds a recording.
         BoardError: the board fails before anything moves.
         RefusedToStart: a person did not want it.
     """
     check(plan)
-    recording = Recording(folder, session(setup, plan, opened, calibration))
+    recording = Recording(folder, session(setup, plan, opened, calibration), replace=replace)
     # The same experiment on the emulated board is the same byte for byte; a real line needs a
     # number that nobody played before.
     link = Link(
@@ -252,6 +257,8 @@ def conduct(
         recording.close()
     run = run_from_recording(folder)
     run.save(folder)
+    if recording.failed is not None and ended.complete:
+        raise recording.failed
     return ExperimentResult(run, folder, findings, ended)
 
 

@@ -1,7 +1,7 @@
 """Ways in which a person stops an experiment: stop key, Ctrl-C, a closing terminal.
 
 All set one flag. It is no exception, so that no frame and no record is cut, and the motors stop in
-order.
+order. Stop keys are read on Linux and macOS only; Ctrl-C works everywhere.
 """
 
 from __future__ import annotations
@@ -10,11 +10,13 @@ import os
 import select
 import signal
 import sys
-import termios
-import tty
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
+
+if sys.platform != "win32":
+    import termios
+    import tty
 
 KEYS = {b" ": "space", b"q": "q", b"\x1b": "Esc"}
 KEYS_HELP = "space, q or Esc stops the motors"
@@ -51,10 +53,10 @@ class StopRequest:
 @contextmanager
 def watch_for_stop() -> Iterator[StopRequest]:
     """Read keys as they are pressed, and turn SIGINT, SIGTERM and SIGHUP into a stop request."""
-    stop = StopRequest(sys.stdin.fileno() if sys.stdin is not None and sys.stdin.isatty() else None)
-    before = {
-        s: signal.signal(s, stop.signalled) for s in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-    }
+    keys = sys.platform != "win32" and sys.stdin is not None and sys.stdin.isatty()
+    stop = StopRequest(sys.stdin.fileno() if keys else None)
+    signals = [getattr(signal, name, None) for name in ("SIGINT", "SIGTERM", "SIGHUP")]
+    before = {s: signal.signal(s, stop.signalled) for s in signals if s is not None}
     try:
         with _single_keys(stop._stdin):
             yield stop
@@ -65,10 +67,9 @@ def watch_for_stop() -> Iterator[StopRequest]:
 
 @contextmanager
 def _single_keys(stdin: int | None) -> Iterator[None]:
-    if stdin is None:
+    if sys.platform == "win32" or stdin is None:
         yield
         return
-
     was = termios.tcgetattr(stdin)
     try:
         tty.setcbreak(stdin)

@@ -78,6 +78,9 @@ def run_from_recording(folder: str | Path) -> fx.Run:
                 "level": "WARN",
             }
         )
+    if stored.lost_events:
+        text = f"{stored.lost_events} lines of the host's events are damaged, and left out"
+        events.append({"t": float(t[-1]), "text": text, "level": "WARN"})
     if not end_events:
         events.append({"t": float(t[-1]), "text": UNEXPLAINED, "level": "ERROR"})
     meta = {key: value for key, value in session.items() if key != "settings"} | {

@@ -26,19 +26,38 @@ __all__ = ["open_viewer", "picture", "write_gallery", "write_review"]
 
 def write_review(path: str | Path, runs: Sequence[Run]) -> Path:
     """Write one run, or two to compare, with the layout of the viewer to one .rrd, as a whole or
-    not at all; returns its path.
+    not at all.
 
-    The first run is the reference: a deviation is second minus first. Raises InputError for no run,
-    more than two runs, or a run without samples.
+    The first run is the reference: a deviation is second minus first.
+
+    Args:
+        path: of the file.
+        runs: one or two.
+
+    Returns:
+        The path.
+
+    Raises:
+        InputError: no run, more than two runs, or a run without samples.
     """
     return write(path, {"": runs})
 
 
 def write_gallery(path: str | Path, groups: dict[str, Sequence[Run]]) -> Path:
-    """Write the runs of several robots, one or two each, by name, to one .rrd: all arms at a
-    glance, and a page for each robot.
+    """Write the runs of several robots to one .rrd: all arms at a glance, and a page for each
+    robot.
 
     Otherwise as `write_review`.
+
+    Args:
+        path: of the file.
+        groups: one or two runs of each robot, by name.
+
+    Returns:
+        The path.
+
+    Raises:
+        InputError: there is no robot, or a group is not one or two runs with samples.
     """
     if not groups:
         raise InputError("one robot or more", key="groups", value=len(groups))
@@ -52,21 +71,35 @@ def picture(
     time_s: float | None = None,
     size: tuple[int, int] = (1600, 900),
 ) -> Path:
-    """Draw the whole review, without a screen, with the time cursor at `time_s` [s]; returns the
-    PNG's path.
+    """Draw the whole review, without a screen.
 
-    `size` is in pixels. By default the cursor is where the tip deflection is largest. Raises
-    InputError for a file that is no review, FlexuraError when this machine has no Vulkan driver or
-    the viewer fails.
+    Args:
+        rrd: the review's file.
+        png: file of the picture.
+        time_s: of the time cursor [s]; None: where the tip deflection is largest.
+        size: width and height [pixels].
+
+    Returns:
+        The PNG's path.
+
+    Raises:
+        InputError: the file is no review.
+        FlexuraError: this machine has no Vulkan driver, or the viewer fails.
     """
     return draw(rrd, png, time_s=time_s, size=size)
 
 
 def open_viewer(rrd: str | Path) -> subprocess.Popen[bytes]:
-    """Open Rerun's viewer on a review, reachable from this machine only; returns its process, which
-    outlives the caller.
+    """Open Rerun's viewer on a review, reachable from this machine only.
 
-    Raises InputError for a file that isn't there, FlexuraError when there is no display or the
-    viewer does not start.
+    Args:
+        rrd: the review's file.
+
+    Returns:
+        The viewer's process, which outlives the caller.
+
+    Raises:
+        InputError: the file isn't there.
+        FlexuraError: there is no display, or the viewer does not start.
     """
     return open_window(rrd)

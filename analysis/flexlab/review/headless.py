@@ -53,7 +53,7 @@ def draw(
         client.set_time(
             "time", duration=float(at if time_s is None else time_s), play_state="paused"
         )
-        write_bytes(png, _without_menu(settled(client), size))
+        write_bytes(png, _without_menu(settled_picture(client), size))
     return Path(png)
 
 
@@ -175,7 +175,7 @@ def show(client: Any, rrd: str | Path, timeout: float = 60.0) -> Any:
     return state
 
 
-def settled(client: Any, view_id: Any = None, tries: int = 60) -> bytes:
+def settled_picture(client: Any, view_id: Any = None, tries: int = 60) -> bytes:
     """The PNG of a view, or of the whole window, once two in a row agree: axes and data arrive over
     several frames."""
     last = b""
@@ -244,6 +244,7 @@ def open_window(rrd: str | Path) -> subprocess.Popen[bytes]:
 
 
 def free_port() -> int:
+    """A TCP port of this machine that no program uses now."""
     with socket.socket() as s:
         s.bind((LOOPBACK, 0))
         return int(s.getsockname()[1])

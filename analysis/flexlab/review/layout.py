@@ -42,10 +42,12 @@ class Scene:
 
     @property
     def width(self) -> float:
+        """Width of the picture [m]."""
         return self.high[0] - self.low[0]
 
     @property
     def height(self) -> float:
+        """Height of the picture [m]."""
         return self.high[1] - self.low[1]
 
     @property
@@ -131,13 +133,13 @@ def _arms(scene: Scene, apart: bool = True) -> list[Any]:
             background=WHITE,
         )
 
-    shaped = [
+    has_shape = [
         (root, label, f"{colour} {label}") for root, label, colour, there in scene.sources if there
     ]
-    alone = [arm(label, [f"/{root}/arm/**"]) for root, label, _ in shaped]
-    if len(shaped) < 2:
+    alone = [arm(label, [f"/{root}/arm/**"]) for root, label, _ in has_shape]
+    if len(has_shape) < 2:
         return alone
-    (a, _, first), (b, _, second) = shaped
+    (a, _, first), (b, _, second) = has_shape
     # One ghost is enough where both arms lie on each other.
     title = f"{scene.name}: {first}, {second}" if scene.name else f"overlaid: {first}, {second}"
     both = arm(title, [f"/{a}/arm/**", f"/{b}/arm/**", f"- /{b}/arm/undeformed"])

@@ -58,7 +58,8 @@ class Source:
         return [name for name in self.run if not _HIDDEN.fullmatch(name)]
 
     @property
-    def shaped(self) -> bool:
+    def has_shape(self) -> bool:
+        """Whether the run's channels say where its links are."""
         return has_shapes(self.run)
 
 
@@ -113,7 +114,7 @@ def curve_colour(colour: Colour, k: int) -> Colour:
     return family[k % len(family)]
 
 
-def pale(colour: Colour, share: float) -> Colour:
+def lightened(colour: Colour, share: float) -> Colour:
     """A colour mixed with a share of white, for what is drawn on white."""
     r, g, b = (round(c + share * (255 - c)) for c in colour)
     return r, g, b
@@ -124,10 +125,18 @@ def entity(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9_/]", "_", name)
 
 
-def loaded(run: Run) -> bool:
+def has_payload(run: Run) -> bool:
     """Whether the robot of the run carries a payload."""
     return bool(run.meta.get("robot", {}).get("payload", {}).get("mass_kg", 0.0))
 
 
 def tip_meaning(run: Run) -> str:
-    return "large because it carries the payload" if loaded(run) else "without a payload"
+    """What the size of the tip's mark means.
+
+    Args:
+        run: the run.
+
+    Returns:
+        The end of a sentence.
+    """
+    return "large because it carries the payload" if has_payload(run) else "without a payload"

@@ -35,7 +35,7 @@ FIRST = (
 )
 
 
-def about(shown: list[Source], *, thinned_to: int | None = None) -> str:
+def summary(shown: list[Source], *, thinned_to: int | None = None) -> str:
     """The page; `thinned_to` is the number of samples that each curve was reduced to, if it was."""
     robot = Robot.from_dict(shown[0].run.meta["robot"]) if shown[0].run.meta.get("robot") else None
     parts = [

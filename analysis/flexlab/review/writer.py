@@ -5,10 +5,9 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-import os
 import re
-import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
 else:
     rr = Optional("rerun")
 
-from flexura.io import Run
+from flexura.io import Run, replaced, unwritable
 from flexura.io.drawing import MAX_SAMPLES, curves, extent, frames, grid, thinned
 
 from ..runs.deviation import TIP_DISTANCE, common, compared, deviation
@@ -33,15 +32,16 @@ from .sources import (
     against_experiment,
     curve_colour,
     entity,
-    loaded,
+    has_payload,
+    lightened,
     order,
-    pale,
     sources,
 )
-from .summary_page import about
+from .summary_page import summary
 from .ticks import Signal
 
 CHUNK = 10_000  # rows a chunk: large enough to be quick, small enough to be loaded in parts
+FOOTER = b"RRF2FOOT"  # how a recording ends, before four more bytes
 GHOST = (150, 150, 150)
 DARK = (60, 60, 60)
 LINES = (226, 228, 232)
@@ -56,15 +56,12 @@ def write(path: str | Path, groups: dict[str, Sequence[Run]]) -> Path:
     target = Path(path)
     parts = [_part(name if len(groups) > 1 else "", runs) for name, runs in groups.items()]
     scenes = [scene for _, scene in parts]
-    target.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".rrd")
-    os.close(handle)
-    try:
+    with replaced(target) as draft, _complete(draft, target):
         # The viewer keeps a layout by application id: reviews with the same layout share one,
         # others must not.
         key = hashlib.sha1(repr(scenes).encode()).hexdigest()[:8]
         with rr.RecordingStream(f"flexura-review-{key}") as rec:
-            rec.save(name, default_blueprint=blueprint(scenes))
+            rec.save(draft, default_blueprint=blueprint(scenes))
             rec.set_log_time_enabled(False)
             rec.send_recording_name("; ".join(dict.fromkeys(_title(shown) for shown, _ in parts)))
             rec.send_property(
@@ -72,12 +69,20 @@ def write(path: str | Path, groups: dict[str, Sequence[Run]]) -> Path:
             )
             for shown, scene in parts:
                 _write(rec, shown, scene)
-        os.chmod(name, 0o644)
-        os.replace(name, target)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
     return target
+
+
+@contextmanager
+def _complete(draft: Path, target: Path) -> Iterator[None]:
+    """Raises InputError if Rerun cannot write the file, or not all of it."""
+    try:
+        yield
+    except RuntimeError as error:
+        raise unwritable(target, Exception(str(error).splitlines()[0])) from None
+    with open(draft, "rb") as stream:
+        stream.seek(-min(len(FOOTER) + 4, draft.stat().st_size), 2)
+        if FOOTER not in stream.read():
+            raise unwritable(target, Exception("its end is missing"))
 
 
 def _part(name: str, runs: Sequence[Run]) -> tuple[list[Source], Scene]:
@@ -95,8 +100,8 @@ def _title(shown: list[Source]) -> str:
 
 
 def _scene(shown: list[Source], prefix: str, name: str) -> Scene:
-    shaped = [s.run for s in shown if s.shaped]
-    low, high = extent(shaped) if shaped else (np.array([-1.0, -1.0]), np.array([1.0, 1.0]))
+    has_shape = [s.run for s in shown if s.has_shape]
+    low, high = extent(has_shape) if has_shape else (np.array([-1.0, -1.0]), np.array([1.0, 1.0]))
     pair = [s.run for s in shown]
     names = compared(pair[0], pair[1]) if len(pair) == 2 else []
     # Without one time in common, or with a gap all the way, there is no deviation to show.
@@ -106,7 +111,7 @@ def _scene(shown: list[Source], prefix: str, name: str) -> Scene:
         if np.isfinite(values := deviation(pair[0], pair[1], name)[1]).any()
     }
     return Scene(
-        sources=tuple((s.root, s.label, NAMES[s.colour], s.shaped) for s in shown),
+        sources=tuple((s.root, s.label, NAMES[s.colour], s.has_shape) for s in shown),
         signals={
             f"/{s.root}/{entity(name)}": Signal(
                 s.run.units[name], _label(name, s.label, s.run.units[name]), *_range(s.run[name])
@@ -118,7 +123,7 @@ def _scene(shown: list[Source], prefix: str, name: str) -> Scene:
         deviations={
             f"{prefix}/deviation/{name}": Signal(
                 pair[0].units.get(name, "m"),
-                _apart(name, shown, pair[0].units.get(name, "m")),
+                _distinct_label(name, shown, pair[0].units.get(name, "m")),
                 *_range(values),
             )
             for name, values in apart.items()
@@ -147,9 +152,9 @@ def _write(rec: rr.RecordingStream, shown: list[Source], scene: Scene) -> None:
         rec.send_property(s.root.replace("/", "_"), rr.AnyValues(**_properties(s)))
         signals(rec, s, scene, budget)
         events(rec, s, scene)
-        if s.shaped:
+        if s.has_shape:
             shape(rec, s, scene, s is not first)
-    if any(s.shaped for s in shown):
+    if any(s.has_shape for s in shown):
         ground(rec, scene)
     places = order(
         [path.removeprefix(f"{scene.prefix}/deviation/") for path in scene.deviations],
@@ -162,7 +167,7 @@ def _write(rec: rr.RecordingStream, shown: list[Source], scene: Scene) -> None:
         curve(
             rec, path, t, values, step, signal, curve_colour(DEVIATION, places[name]), 1.8, budget
         )
-    page = about(shown, thinned_to=budget if samples > MAX_SAMPLES else None)
+    page = summary(shown, thinned_to=budget if samples > MAX_SAMPLES else None)
     rec.log(
         f"{scene.prefix}/about",
         rr.TextDocument(page, media_type=rr.MediaType.MARKDOWN),
@@ -237,14 +242,14 @@ def shape(rec: rr.RecordingStream, s: Source, scene: Scene, over: bool) -> None:
     index = times(s.run.t[c.index], c.index)
     rec.log(arm, rr.Transform3D(scale=[1.0, -1.0, 1.0]), static=True)  # a 2D view's y points down
     line: Any = rr.Radius.ui_points
-    dot = (0.75 if loaded(s.run) else 0.45) * size
+    dot = (0.75 if has_payload(s.run) else 0.45) * size
     strips(rec, f"{arm}/undeformed", index, c.undeformed, GHOST, line(0.9), 10)
     strips(
         rec,
         f"{arm}/rigid",
         index,
         c.rigid,
-        pale(s.colour, 0.5),
+        lightened(s.colour, 0.5),
         (0.25 if over else 0.45) * size,
         20 + over,
     )
@@ -260,7 +265,7 @@ def shape(rec: rr.RecordingStream, s: Source, scene: Scene, over: bool) -> None:
     if len(c.trace) > 1:
         path = rr.LineStrips2D(
             [c.trace.astype(np.float32)],
-            colors=[pale(s.colour, 0.75)],
+            colors=[lightened(s.colour, 0.75)],
             radii=[line(0.5 if over else 1.2)],
             draw_order=5.0 + over,
         )
@@ -385,19 +390,19 @@ def picture_time(runs: list[Run]) -> float:
 
 def _label(name: str, source: str, unit: str) -> str:
     """A curve's name in the legend: whose, from which run, in which unit."""
-    return f"{_whose(name)}, {source} [{unit}]"
+    return f"{_part_name(name)}, {source} [{unit}]"
 
 
-def _apart(name: str, shown: list[Source], unit: str) -> str:
+def _distinct_label(name: str, shown: list[Source], unit: str) -> str:
     a, b = shown[0].label, shown[1].label
     return (
         f"distance between the tips [{unit}]"
         if name == TIP_DISTANCE
-        else f"{_whose(name)}, {b} − {a} [{unit}]"
+        else f"{_part_name(name)}, {b} − {a} [{unit}]"
     )
 
 
-def _whose(name: str) -> str:
+def _part_name(name: str) -> str:
     """`joint/1/position` -> "joint 1" (the plot says what is shown), `energy/strain` ->
     "strain"."""
     if found := re.fullmatch(r"(joint|link)/(\d+)/\w+", name):

@@ -283,6 +283,9 @@ def load(path: str | os.PathLike[str]) -> RigSetup:
     Args:
         path: the file's path, or the name of a rig that comes with flexura, for example "rig".
 
+    Returns:
+        The rig with its robot and manoeuvre.
+
     Raises:
         InputError: no such file, or a wrong value; it names file, key, value and what was expected.
     """
@@ -332,6 +335,9 @@ def configuration(setup: RigSetup) -> dict[str, float]:
 
     Args:
         setup: the rig.
+
+    Returns:
+        Settings in SI units.
 
     Raises:
         InputError: a derived setting is outside the board's range.
@@ -391,6 +397,9 @@ def calibration(setup: RigSetup) -> Calibration:
 
     Args:
         setup: the rig.
+
+    Returns:
+        The calibration.
     """
     flex = setup.rig.flex
     if flex.calibration is not None:

@@ -156,6 +156,9 @@ def random_true_parameters(seed: int, ranges: Ranges | None = None) -> TrueParam
     Args:
         seed: the same seed gives the same rig.
         ranges: by default those of `Ranges`.
+
+    Returns:
+        The parameters.
     """
     random, within = np.random.default_rng([seed, 1]), ranges or Ranges()
     return TrueParameters(

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from flexura.io import write_bytes
+from flexura.io import sealed_parquet, write_bytes
 from flexura.optional import load
 
 from ..runs.formatting import number
@@ -28,7 +28,14 @@ _HEADS = {
 
 
 def table(study: Study) -> Table:
-    """One row a case, and the finding."""
+    """The study as a table.
+
+    Args:
+        study: the study.
+
+    Returns:
+        One row a case, and the finding below.
+    """
     own = [key for key in study.rows[0] if key in _HEADS] if study.rows else []
     every = dict.fromkeys(key for row in study.rows for key in row)
     peaks = [key for key in every if key.startswith("joint_")]
@@ -69,7 +76,14 @@ def verdict(study: Study) -> str:
 
 
 def numbers(study: Study) -> dict[str, Any]:
-    """For JSON: finding and rows."""
+    """The study for JSON.
+
+    Args:
+        study: the study.
+
+    Returns:
+        Finding and rows.
+    """
     clean = lambda v: None if isinstance(v, float) and not np.isfinite(v) else v
     found = study.finding
     return {
@@ -89,8 +103,15 @@ def numbers(study: Study) -> dict[str, Any]:
 
 
 def save(study: Study, folder: Path) -> list[Path]:
-    """Write study.parquet, study.png and study.svg into `folder`, each as a whole; returns their
-    paths."""
+    """Write study.parquet, study.png and study.svg, each as a whole.
+
+    Args:
+        study: the study.
+        folder: where to.
+
+    Returns:
+        Their paths.
+    """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -104,9 +125,10 @@ def save(study: Study, folder: Path) -> list[Path]:
         pa.table(columns).replace_schema_metadata({"flexura_study": json.dumps(about)}),
         sink,
         compression="zstd",
+        write_page_checksum=True,
     )
     paths = [folder / f"study.{kind}" for kind in ("parquet", "png", "svg")]
-    write_bytes(paths[0], sink.getvalue().to_pybytes())
+    write_bytes(paths[0], sealed_parquet(sink.getvalue().to_pybytes()))
     drawing = figure(study)
     for path in paths[1:]:
         buffer = io.BytesIO()

@@ -28,11 +28,24 @@ def run(
     progress: Callable[[float], None] = lambda fraction: None,
     channels: Path | None = None,
 ) -> Study:
-    """Do a study of `robot` along `manoeuvre`, or a default one of the study.
+    """Do a study of a robot.
 
-    `values`: "LOW:HIGH:COUNT" of its parameter (payload kg, ratio, free length m); `keep` as in
-    `length_ratio.KEEP`; `jobs`: processes, by default one a core; `channels`: a folder for all
-    runs. Raises InputError for a robot of which there is no such study.
+    Args:
+        kind: "payload", "length-ratio" or "boundary".
+        robot: the robot.
+        manoeuvre: what it does; None: a default one of the study.
+        values: "LOW:HIGH:COUNT" of the study's parameter: payload [kg], ratio, or free length [m].
+        keep: as in `length_ratio.KEEP`.
+        rtol: of the simulations.
+        jobs: processes; None: one a core.
+        progress: called with the finished fraction.
+        channels: a folder for all runs.
+
+    Returns:
+        The study.
+
+    Raises:
+        InputError: there is no such study of this robot.
     """
     if kind not in KINDS:
         raise fx.InputError(f"expected one of {', '.join(KINDS)}", key="KIND", value=kind)

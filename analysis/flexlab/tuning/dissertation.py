@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 import flexura as fx
-from flexura.control import ERROR, OVERSHOOT, RESIDUAL, SETTLING, Response, strip_figures
+from flexura.control import ERROR, OVERSHOOT, RESIDUAL, SETTLING, StepResponse, strip_metrics
 
 from ..runs.formatting import number
 from ..runs.table import Table
@@ -25,7 +25,7 @@ from .closed_loop import closed_loop_controller
 from .executor import make_executor
 from .history import History
 from .lqr_reference import LqrBaseline, tune_lqr_baseline
-from .result import Result, numbers, result, save
+from .result import TuningResult, numbers, result, save
 from .search import Search, search
 from .task import Task
 
@@ -41,13 +41,13 @@ class TwoCases:
     """
 
     name: str
-    results: tuple[Result, Result]
+    results: tuple[TuningResult, TuningResult]
     lqr: LqrBaseline
     residual_m: tuple[float, float, float]
     shortest_s: tuple[float, ...]
     zeros_1_s: dict[str, float]
 
-    def response(self, case: int) -> Response:
+    def response(self, case: int) -> StepResponse:
         """The step response of a case."""
         return self.results[case - 1].responses[0]
 
@@ -115,14 +115,16 @@ def study(
     return out, True
 
 
-def compare_cases(name: str, first: Result, second: Result, lqr: LqrBaseline) -> TwoCases:
+def compare_cases(
+    name: str, first: TuningResult, second: TuningResult, lqr: LqrBaseline
+) -> TwoCases:
     """Put two cases and the LQR side by side, with the limits of both."""
     settled, left = (
         float(np.nanmax([r.responses[0].joints[:, SETTLING] for r in (first, second)])),
         [],
     )
     for run in (first.runs[0], second.runs[0], lqr.run):
-        left.append(float(strip_figures(run.t, run["link/2/tip_deflection"], settled)[RESIDUAL]))
+        left.append(float(strip_metrics(run.t, run["link/2/tip_deflection"], settled)[RESIDUAL]))
     zeros = {
         row.drive: float(row.unstable.real.min()) for row in _zeros(first.task) if len(row.unstable)
     }

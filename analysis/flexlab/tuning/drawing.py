@@ -53,9 +53,9 @@ def figure(task: Task, history: History, run: fx.Run) -> Figure:
 
 def _progress(axes: Any, history: History) -> None:
     """The best objective so far, and the middle one of each generation."""
-    goals, starts = history.all("goals")[:, 0], [0, *history.ends[:-1]]
-    middle = [np.median(goals[a:b]) for a, b in zip(starts, history.ends, strict=True)]
-    best = [goals[:end].min() for end in history.ends]
+    objectives, starts = history.all("goals")[:, 0], [0, *history.ends[:-1]]
+    middle = [np.median(objectives[a:b]) for a, b in zip(starts, history.ends, strict=True)]
+    best = [objectives[:end].min() for end in history.ends]
     axes.plot(history.ends, middle, color=TRIED, linewidth=1.4, label="median of a generation")
     axes.plot(history.ends, best, color=COLOURS[0], linewidth=1.6, label="best so far")
     axes.set(xlabel="evaluations", ylabel="objective J [1]", yscale="log")
@@ -72,11 +72,18 @@ def _progress(axes: Any, history: History) -> None:
 
 def _front(axes: Any, history: History) -> None:
     """All gains that were tried by their two goals, the front, and the balanced ones."""
-    goals, front = history.all("goals"), history.pareto_front()
-    axes.plot(goals[:, 0], goals[:, 1], ".", color=TRIED, markersize=3, label="all tried")
-    axes.plot(goals[front, 0], goals[front, 1], "o-", color=COLOURS[0], markersize=3, label="front")
-    axes.plot(*goals[history.best], "D", color=COLOURS[1], label="balanced")
-    far = goals[front].max(axis=0)
+    objectives, front = history.all("goals"), history.pareto_front()
+    axes.plot(objectives[:, 0], objectives[:, 1], ".", color=TRIED, markersize=3, label="all tried")
+    axes.plot(
+        objectives[front, 0],
+        objectives[front, 1],
+        "o-",
+        color=COLOURS[0],
+        markersize=3,
+        label="front",
+    )
+    axes.plot(*objectives[history.best], "D", color=COLOURS[1], label="balanced")
+    far = objectives[front].max(axis=0)
     axes.set(xlabel="settling time [s]", ylabel="rms of the tip deflection [mm]")
     axes.set(xlim=(0, 1.5 * far[0]), ylim=(0, 2 * far[1]))
 

@@ -46,7 +46,7 @@ class ThreadExecutor:
     """Runs on this machine, one thread a core; the runs release Python's lock."""
 
     def __init__(self, task: Task, threads: int) -> None:
-        self.task, self.trials, self.stopped = task, task.trials(), threading.Event()
+        self.task, self.sweeps, self.stopped = task, task.gain_sweeps(), threading.Event()
         self.pool = ThreadPoolExecutor(threads)
 
     def __call__(self, points: np.ndarray, limits: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -58,7 +58,7 @@ class ThreadExecutor:
     def _chunk(self, points: np.ndarray, limits: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         if self.stopped.is_set():
             raise KeyboardInterrupt
-        return self.task.run(self.trials, points, limits)
+        return self.task.run(self.sweeps, points, limits)
 
     def __enter__(self) -> ThreadExecutor:
         return self
@@ -133,7 +133,7 @@ def _on_worker(
         )
     state = _worker_state(task.digest(), threading.get_ident())
     if not state:
-        state += [task, task.trials()]
+        state += [task, task.gain_sweeps()]
     return state[0].run(state[1], points, limits)
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import zipfile
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +12,22 @@ import numpy as np
 
 import flexura as fx
 from flexura.errors import InputError
-from flexura.io import write_bytes
+from flexura.io import Damaged, leftovers, read_sealed, say_unsealed, sealed, write_bytes
 
 FILE = "state.npz"
+ADVICE = "restore a copy, or remove it to begin the search again"
+NO_ARRAYS = (  # what NumPy raises for a file that has none
+    OSError,
+    ValueError,
+    EOFError,
+    AttributeError,
+    KeyError,
+    NotImplementedError,
+    RuntimeError,
+    SyntaxError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
 _ARRAYS = ("points", "goals", "figures", "reached")
 
 
@@ -43,14 +58,20 @@ class History:
         """
         history = History(digest, folder / FILE)
         assert history.path is not None
-        for leftover in folder.glob(f".{FILE}.*"):  # of a process that was killed while it wrote
+        for leftover in leftovers(history.path):  # of a process that was killed while it wrote
             leftover.unlink(missing_ok=True)
         if not history.path.exists():
             return history
         try:
-            with np.load(history.path) as data:
+            content, there = read_sealed(history.path, ADVICE, "a damaged state of a search")
+            with np.load(io.BytesIO(content)) as data:
                 found = {name: data[name] for name in data.files}
-        except (OSError, ValueError, EOFError) as error:
+            missing = {"digest", "ends", "wall_s", *_ARRAYS} - set(found)
+            if missing:
+                raise ValueError(f"without {', '.join(sorted(missing))}")
+        except Damaged:
+            raise
+        except NO_ARRAYS as error:
             raise InputError(
                 f"expected the state of a search ({error})", key="--out", file=str(history.path)
             ) from None
@@ -60,6 +81,8 @@ class History:
                 "and --patience alone may change"
             )
             raise InputError(expected, key="--out", value=str(folder))
+        if not there:
+            say_unsealed(history.path)
         history.ends, history.wall_s = found["ends"].tolist(), found["wall_s"].tolist()
         history.stored, begin = len(history.ends), 0
         for end in history.ends:
@@ -74,7 +97,7 @@ class History:
     def append(
         self,
         points: np.ndarray,
-        goals: np.ndarray,
+        objectives: np.ndarray,
         metrics: np.ndarray,
         reached: np.ndarray,
         wall_s: float,
@@ -83,12 +106,12 @@ class History:
 
         Args:
             points: in the unit cube (B, d).
-            goals: (B, 1 or 2).
+            objectives: (B, 1 or 2).
             metrics: of R robots (B, R, k).
             reached: fractions of the time reached (B, R).
             wall_s: duration [s].
         """
-        for name, array in zip(_ARRAYS, (points, goals, metrics, reached), strict=True):
+        for name, array in zip(_ARRAYS, (points, objectives, metrics, reached), strict=True):
             self._parts[name].append(np.array(array))
         self.ends.append(len(points) + (self.ends[-1] if self.ends else 0))
         self.wall_s.append(wall_s)
@@ -96,9 +119,9 @@ class History:
             sink = io.BytesIO()
             arrays: dict[str, Any] = {name: self.all(name) for name in _ARRAYS}
             np.savez(sink, digest=self.digest, ends=self.ends, wall_s=self.wall_s, **arrays)
-            write_bytes(self.path, sink.getvalue())
+            write_bytes(self.path, sealed(sink.getvalue()))
 
-    def goals_for_algorithm(self, generation: int, points: np.ndarray) -> np.ndarray:
+    def objectives_for_algorithm(self, generation: int, points: np.ndarray) -> np.ndarray:
         """The goals of a stored generation.
 
         Args:
@@ -137,27 +160,27 @@ class History:
 
         For two goals it is the one nearest to both ends of the front, each goal over its range.
         """
-        goals = self.all("goals")
-        if goals.shape[1] == 1:
-            return int(goals[:, 0].argmin())
+        objectives = self.all("goals")
+        if objectives.shape[1] == 1:
+            return int(objectives[:, 0].argmin())
         pareto_front = self.pareto_front()
-        low, high = goals[pareto_front].min(axis=0), goals[pareto_front].max(axis=0)
+        low, high = objectives[pareto_front].min(axis=0), objectives[pareto_front].max(axis=0)
         return int(
             pareto_front[
                 np.linalg.norm(
-                    (goals[pareto_front] - low) / np.maximum(high - low, 1e-300), axis=1
+                    (objectives[pareto_front] - low) / np.maximum(high - low, 1e-300), axis=1
                 ).argmin()
             ]
         )
 
     def pareto_front(self) -> np.ndarray:
         """Indices of the evaluations that no other beats in all goals, by the first goal."""
-        goals = self.all("goals")
-        order, members, least = np.lexsort(goals.T[::-1]), [], np.inf
+        objectives = self.all("goals")
+        order, members, least = np.lexsort(objectives.T[::-1]), [], np.inf
         for k in order:
-            if goals[k, -1] < least:
+            if objectives[k, -1] < least:
                 members.append(k)
-                least = goals[k, -1]
+                least = objectives[k, -1]
         return np.array(members)
 
     def convergence_measure(self, generation: int) -> float:
@@ -165,9 +188,9 @@ class History:
 
         For two goals: minus the area between the front and the median of the first generation.
         """
-        goals = self.all("goals")
-        tried = goals[: self.ends[generation - 1]]
-        if goals.shape[1] == 1:
+        objectives = self.all("goals")
+        tried = objectives[: self.ends[generation - 1]]
+        if objectives.shape[1] == 1:
             return float(tried[:, 0].min())
         corner = np.median(self._parts["goals"][0], axis=0)
         inside = tried[(tried < corner).all(axis=1)]
@@ -179,14 +202,18 @@ class History:
         return -area
 
     def run(
-        self, names: list[str], values: np.ndarray, goals: tuple[str, ...], meta: dict[str, Any]
+        self,
+        names: list[str],
+        values: np.ndarray,
+        objectives: tuple[str, ...],
+        meta: dict[str, Any],
     ) -> fx.Run:
         """The history as a Run over the number of the generation.
 
         Args:
             names: of the free settings.
             values: their values (E, d).
-            goals: names of the goals.
+            objectives: names of the goals.
             meta: further metadata.
 
         Returns:
@@ -195,7 +222,7 @@ class History:
         every, count = self.all("goals"), len(self)
         starts = [0, *self.ends[:-1]]
         channels, best = {}, np.array([int(every[:end, 0].argmin()) for end in self.ends])
-        for k, goal in enumerate(goals):
+        for k, goal in enumerate(objectives):
             channels[f"goal/{goal}/best"] = np.array([every[:end, k].min() for end in self.ends])
             channels[f"goal/{goal}/median"] = np.array(
                 [np.median(every[a:b, k]) for a, b in zip(starts, self.ends, strict=True)]

@@ -23,14 +23,14 @@ from typing import Any
 import numpy as np
 
 import flexura as fx
-from flexura.control import Gains, Response, lqr
+from flexura.control import Gains, StepResponse, lqr
 from flexura.errors import InputError
-from flexura.simulation import trials
+from flexura.simulation import prepare_gain_sweep
 
 from .cases import Structure
 from .closed_loop import closed_loop_controller
 from .history import History
-from .result import RTOL, figures
+from .result import RTOL, metrics
 from .search import Search, search
 from .search_space import FreeGain, settings
 from .task import with_modes
@@ -45,7 +45,7 @@ class LqrBaseline:
     J: float
     weights: dict[str, float]
     run: fx.Run
-    response: Response
+    response: StepResponse
     evaluations: int
 
 
@@ -63,7 +63,7 @@ class LqrDesigns:
             FreeGain("damping_s", 1e-3, 1.0, "log"),
             FreeGain("noise", 1e-6, 1e-2, "log"),
         )
-        self.pareto, self.goals, self.score = False, self.task.goals, self.task.score
+        self.pareto, self.objectives, self.score = False, self.task.objectives, self.task.score
 
     def start(self) -> np.ndarray:
         """The middle of the unit cube (d,)."""
@@ -119,7 +119,9 @@ class LqrDesigns:
                 drive = self.controller(values)
             except InputError:
                 continue
-            case = trials(self.plant, drive, m.duration_s, m.output_step_s, self.task.rtol)
+            case = prepare_gain_sweep(
+                self.plant, drive, m.duration_s, m.output_step_s, self.task.rtol
+            )
             out[k], reached[k] = case.run(drive.gains()[None], cost_weights, limits[k : k + 1])
         return out, reached
 
@@ -157,6 +159,6 @@ def tune_lqr_baseline(
         float(history.all("goals").min()),
         weights,
         run,
-        figures(run, controller),
+        metrics(run, controller),
         history.evaluations,
     )

@@ -20,7 +20,7 @@ import numpy as np
 
 from flexura.control import EFFORT, ERROR, ITAE, JOINT, OVERSHOOT, RMS, SETTLING, STRIP, VIBRATION
 from flexura.errors import InputError
-from flexura.signals import finite
+from flexura.signals import is_finite
 
 FAILURE_COST = 1e3
 HELP = """J = sum over joints of [ int t |r - q| dt / |step| + OVERSHOOT max(0, overshoot - 5 %)
@@ -39,7 +39,7 @@ class Weights:
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            if not (finite(value) and value >= 0):
+            if not (is_finite(value) and value >= 0):
                 raise InputError(
                     "expected a finite number of 0 or more",
                     key=f"--{name.replace('_', '-')}",

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 import flexura as fx
-from flexura.control import Gains, Response, of_run
+from flexura.control import Gains, StepResponse, step_response
 from flexura.io import write_bytes
 from flexura.io.drawing import saved
 
@@ -28,7 +28,7 @@ RTOL = 1e-6
 
 
 @dataclass(frozen=True)
-class Result:
+class TuningResult:
     """The best gains (of a front: the balanced ones), their runs on every robot of the task, and
     the history."""
 
@@ -38,7 +38,7 @@ class Result:
     complete: bool
     gains: Gains
     runs: tuple[fx.Run, ...]
-    responses: tuple[Response, ...]
+    responses: tuple[StepResponse, ...]
 
     @property
     def best(self) -> np.ndarray:
@@ -66,34 +66,34 @@ class Result:
         return own | {"search": vars(self.how), "task": self.task.spec(), "complete": self.complete}
 
 
-def result(task: Task, how: Search, history: History, complete: bool) -> Result:
+def result(task: Task, how: Search, history: History, complete: bool) -> TuningResult:
     """Simulate the best gains on every robot of the task with its own mesh, to RTOL."""
     values = task.values(history.all("points")[history.best][None])[0]
     tuned = task.tuned(values)
-    both = [simulated(fx.assemble(robot), task.manoeuvre, tuned) for robot in task.robots]
-    return Result(
+    both = [simulate_tuned(fx.assemble(robot), task.manoeuvre, tuned) for robot in task.robots]
+    return TuningResult(
         task, how, history, complete, tuned, tuple(b[0] for b in both), tuple(b[1] for b in both)
     )
 
 
-def simulated(
+def simulate_tuned(
     system: fx.System, asked: fx.Manoeuvre, gains: Gains, settled: float | None = None
-) -> tuple[fx.Run, Response]:
+) -> tuple[fx.Run, StepResponse]:
     """A run under gains, and its figures."""
     controller = closed_loop_controller(system, asked, gains)
     run = fx.simulate(system, asked.t, controller, rtol=RTOL)
     run.meta["manoeuvre"] = asked.name
-    return run, figures(run, controller, settled)
+    return run, metrics(run, controller, settled)
 
 
-def figures(run: fx.Run, controller: fx.Controller, settled: float | None = None) -> Response:
+def metrics(run: fx.Run, controller: fx.Controller, settled: float | None = None) -> StepResponse:
     """The figures of a run, simulated or not, under the controller that it had."""
     references = [
         np.array([pid.reference(t)[0] for t in run.t])
         for pid in controller.joints
         if isinstance(pid, fx.PID)
     ]
-    return of_run(
+    return step_response(
         run,
         references,
         [pid.limit for pid in controller.joints if isinstance(pid, fx.PID)],
@@ -101,7 +101,7 @@ def figures(run: fx.Run, controller: fx.Controller, settled: float | None = None
     )
 
 
-def save(found: Result, folder: Path) -> list[Path]:
+def save(found: TuningResult, folder: Path) -> list[Path]:
     """gains.toml, best/ (the nominal run), history/ (a Run), tuning.png and .svg; of a front also
     front/gains-NN.toml."""
     paths = [folder / "gains.toml", folder / "best", folder / "history"]
@@ -109,7 +109,7 @@ def save(found: Result, folder: Path) -> list[Path]:
     found.runs[0].save(paths[1])
     task, history = found.task, found.history
     values = task.values(history.all("points"))
-    history.run([f.name for f in task.free], values, task.goals, found.meta()).save(paths[2])
+    history.run([f.name for f in task.free], values, task.objectives, found.meta()).save(paths[2])
     if task.pareto:
         for number, k in enumerate(history.pareto_front(), 1):
             task.tuned(values[k]).write(folder / "front" / f"gains-{number:02d}.toml")
@@ -133,7 +133,7 @@ HEADS = (
 )
 
 
-def table(found: Result) -> Table:
+def table(found: TuningResult) -> Table:
     """The figures on every robot, the tuned settings, and what ended at its bound."""
     history, task = found.history, found.task
     title = f"{task.robots[0].name or 'robot'}: {task.manoeuvre.name}, {found.how.algorithm}"
@@ -147,9 +147,11 @@ def table(found: Result) -> Table:
                 *(number(factor * x, 3, missing="never") for factor, x in zip(_FACTORS, row)),
                 *(bent if i == 0 else ["", ""]),
             )
-    goals = ", ".join(f"{n} = {v:.5g}" for n, v in zip(task.goals, found.best, strict=True))
+    objectives = ", ".join(
+        f"{n} = {v:.5g}" for n, v in zip(task.objectives, found.best, strict=True)
+    )
     out.notes.append(
-        f"{goals}; {history.evaluations} evaluations in {len(history)} generations, "
+        f"{objectives}; {history.evaluations} evaluations in {len(history)} generations, "
         f"{sum(history.wall_s):.3g} s; seed {found.how.seed}"
     )
     if not found.complete:
@@ -170,7 +172,7 @@ def table(found: Result) -> Table:
 _FACTORS = (1.0, 1.0, 100.0, 100.0)  # of rise, settling, overshoot, error
 
 
-def _robot(found: Result, k: int) -> str:
+def _robot(found: TuningResult, k: int) -> str:
     if k == 0:
         return "nominal"
     one, nominal = found.task.robots[k], found.task.robots[0]
@@ -192,10 +194,10 @@ def _stiffness(link: Any) -> float:
     return float(EI if not isinstance(EI, list | tuple) else EI[0]["value"])
 
 
-def numbers(found: Result) -> dict[str, Any]:
+def numbers(found: TuningResult) -> dict[str, Any]:
     """For JSON."""
     return {
-        "goals": dict(zip(found.task.goals, map(float, found.best), strict=True)),
+        "goals": dict(zip(found.task.objectives, map(float, found.best), strict=True)),
         "settings": found.settings,
         "at_bounds": found.at_bounds,
         "evaluations": found.history.evaluations,

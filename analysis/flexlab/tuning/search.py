@@ -99,7 +99,7 @@ class SearchProblem(Protocol):
         ...
 
     @property
-    def goals(self) -> tuple[str, ...]:
+    def objectives(self) -> tuple[str, ...]:
         """Names of the goals."""
         ...
 
@@ -198,7 +198,7 @@ def _stage(
     d, generation = len(task.free), first
     core, static = load("pymoo.core.evaluator"), load("pymoo.problems.static")
     Problem = load("pymoo.core.problem").Problem
-    problem = Problem(n_var=d, n_obj=len(task.goals), xl=np.zeros(d), xu=np.ones(d))
+    problem = Problem(n_var=d, n_obj=len(task.objectives), xl=np.zeros(d), xu=np.ones(d))
     algorithm.setup(problem, termination=("n_gen", generations), seed=how.seed, verbose=False)
     while algorithm.has_next() and not (
         generation - first > how.patience and _stagnant(history, generation, how.patience)
@@ -208,14 +208,14 @@ def _stage(
             break
         points = np.asarray(asked.get("X"), dtype=float)
         if generation < len(history):
-            goals = history.goals_for_algorithm(generation, points)
+            objectives = history.objectives_for_algorithm(generation, points)
         else:
             begun = time.perf_counter()
             metrics, reached = evaluate(points, limits(algorithm, len(points)))
-            goals = task.score(metrics, reached)
-            history.append(points, goals, metrics, reached, time.perf_counter() - begun)
+            objectives = task.score(metrics, reached)
+            history.append(points, objectives, metrics, reached, time.perf_counter() - begun)
             progress(history)
-        core.Evaluator().eval(static.StaticProblem(problem, F=goals), asked)
+        core.Evaluator().eval(static.StaticProblem(problem, F=objectives), asked)
         algorithm.tell(infills=asked)
         generation += 1
     return generation

@@ -24,11 +24,11 @@ from flexura.control import (
     SETPOINT,
     SLEW,
     Gains,
-    smoothing,
+    filter_coefficient,
 )
 from flexura.errors import InputError
 from flexura.io import read_toml
-from flexura.signals import finite
+from flexura.signals import is_finite
 
 COLUMNS = {name: k for k, name in enumerate(GAINS)} | {
     "limit": LIMIT,
@@ -85,7 +85,7 @@ def free_gain(name: str, low: Any, high: Any, scale: str | None = None) -> FreeG
     if name not in NAMES and name not in _FILTERS:
         expected = "expected a setting of a gains file, see firmware/README.md, the controller"
         raise InputError(expected, key=f"free.{name}", value=name)
-    if not (finite(low) and finite(high) and low < high):
+    if not (is_finite(low) and is_finite(high) and low < high):
         raise InputError(
             "expected two finite numbers, LOW below HIGH", key=f"free.{name}", value=[low, high]
         )
@@ -152,23 +152,23 @@ def default_bounds(gains: Gains) -> list[FreeGain]:
     return out
 
 
-def settings(frees: Sequence[FreeGain], points: np.ndarray) -> np.ndarray:
+def settings(free_gains: Sequence[FreeGain], points: np.ndarray) -> np.ndarray:
     """Values (B, d) of the free settings at points (B, d) of the unit cube."""
-    return np.column_stack([f.from_unit_interval(points[:, k]) for k, f in enumerate(frees)])
+    return np.column_stack([f.from_unit_interval(points[:, k]) for k, f in enumerate(free_gains)])
 
 
-def named(frees: Sequence[FreeGain], values: np.ndarray) -> dict[str, float]:
+def named(free_gains: Sequence[FreeGain], values: np.ndarray) -> dict[str, float]:
     """The values (d,) by the names of the free settings."""
-    return {f.name: float(v) for f, v in zip(frees, values, strict=True)}
+    return {f.name: float(v) for f, v in zip(free_gains, values, strict=True)}
 
 
 AT_BOUND = 0.005  # of the range, on its scale: nearer counts as at the bound
 
 
-def at_bounds(frees: Sequence[FreeGain], values: Mapping[str, float]) -> list[str]:
+def at_bounds(free_gains: Sequence[FreeGain], values: Mapping[str, float]) -> list[str]:
     """A sentence for each setting whose value is at a bound of its range."""
     out = []
-    for f in frees:
+    for f in free_gains:
         place = f.to_unit_interval(values[f.name])
         for bound, word, near in ((f.low, "lower", place), (f.high, "upper", 1.0 - place)):
             if near <= AT_BOUND:
@@ -180,12 +180,12 @@ def at_bounds(frees: Sequence[FreeGain], values: Mapping[str, float]) -> list[st
 
 
 def rows(
-    frees: Sequence[FreeGain], values: np.ndarray, controller: fx.Controller, base: np.ndarray
+    free_gains: Sequence[FreeGain], values: np.ndarray, controller: fx.Controller, base: np.ndarray
 ) -> np.ndarray:
     """Rows of `Controller.gains` with free settings.
 
     Args:
-        frees: the free settings.
+        free_gains: the free settings.
         values: their values (B, d).
         controller: the controller.
         base: its own gains (N, 20).
@@ -194,38 +194,39 @@ def rows(
         (B, N, 20).
     """
     out, period = np.repeat(base[None], len(values), axis=0), 1 / controller.rate_Hz
-    for k, f in enumerate(frees):
+    for k, f in enumerate(free_gains):
         column = values[:, k]
         if f.name in _FILTERS:
             smooth = [
-                smoothing(v, period * (2 if f.name == "deflection_Hz" else 1)) for v in column
+                filter_coefficient(v, period * (2 if f.name == "deflection_Hz" else 1))
+                for v in column
             ]
             out[:, :, _FILTERS[f.name]] = np.array(smooth)[:, None]
             continue
         i, _, field = NAMES[f.name][0]
         out[:, i, COLUMNS[field]] = (
-            [smoothing(v, period) for v in column] if field == "setpoint_Hz" else column
+            [filter_coefficient(v, period) for v in column] if field == "setpoint_Hz" else column
         )
     return out
 
 
-def check(frees: Sequence[FreeGain], gains: Gains) -> None:
+def check(free_gains: Sequence[FreeGain], gains: Gains) -> None:
     """Check free settings against a controller.
 
     Raises:
         InputError: a setting is not one of its joints and outputs, or occurs twice.
     """
     kinds = gains.kinds
-    if not frees:
+    if not free_gains:
         raise InputError("expected at least one free setting", key="free")
-    for k, f in enumerate(frees):
+    for k, f in enumerate(free_gains):
         known = f.name in _FILTERS or any(
             i < len(kinds) and kind in ("", kinds[i]) for i, kind, _ in NAMES[f.name]
         )
         if not known:
             expected = f"expected a setting of joints whose outputs are {', '.join(kinds)}"
             raise InputError(expected, key=f"free.{f.name}", value=f.name)
-        if f.name in [other.name for other in frees[:k]]:
+        if f.name in [other.name for other in free_gains[:k]]:
             raise InputError("expected each setting once", key=f"free.{f.name}", value=f.name)
         if f.low <= 0 and (
             f.name in _FILTERS
@@ -234,6 +235,6 @@ def check(frees: Sequence[FreeGain], gains: Gains) -> None:
             raise InputError("expected bounds above 0", key=f"free.{f.name}", value=[f.low, f.high])
 
 
-def spec(frees: Sequence[FreeGain]) -> Mapping[str, Any]:
+def spec(free_gains: Sequence[FreeGain]) -> Mapping[str, Any]:
     """The free settings as the table [free] of a file."""
-    return {f.name: {"low": f.low, "high": f.high, "scale": f.scale} for f in frees}
+    return {f.name: {"low": f.low, "high": f.high, "scale": f.scale} for f in free_gains}

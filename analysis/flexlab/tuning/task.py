@@ -17,7 +17,7 @@ import numpy as np
 import flexura as fx
 from flexura.control import PID, Gains
 from flexura.errors import InputError
-from flexura.simulation import Trials, trials
+from flexura.simulation import GainSweep, prepare_gain_sweep
 
 from . import objective, search_space
 from .closed_loop import closed_loop_controller
@@ -85,7 +85,7 @@ class Task:
         )
 
     @property
-    def goals(self) -> tuple[str, ...]:
+    def objectives(self) -> tuple[str, ...]:
         """Names of the goals."""
         return ("settling_s", "rms_mm") if self.pareto else ("J",)
 
@@ -129,17 +129,17 @@ class Task:
             return objective.two_objectives(metrics, reached, self.manoeuvre.duration_s)
         return objective.scalar_cost(metrics, reached, self.cost_weights)
 
-    def trials(self) -> list[Trials]:
+    def gain_sweeps(self) -> list[GainSweep]:
         """The prepared runs of each robot; any number of threads may use them."""
         m = self.manoeuvre
         both = zip(self.systems, self.controllers, strict=True)
         return [
-            trials(system, controller, m.duration_s, m.output_step_s, self.rtol)
+            prepare_gain_sweep(system, controller, m.duration_s, m.output_step_s, self.rtol)
             for system, controller in both
         ]
 
     def run(
-        self, robots: Sequence[Trials], points: np.ndarray, limits: np.ndarray | None = None
+        self, robots: Sequence[GainSweep], points: np.ndarray, limits: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """Run points of the unit cube on all robots.
 
@@ -147,7 +147,7 @@ class Task:
         on robots that follow.
 
         Args:
-            robots: as `trials` returns them.
+            robots: as `gain_sweeps` returns them.
             points: (B, d).
             limits: largest useful J (B,); inf or None: no limit.
 
@@ -182,7 +182,7 @@ class Task:
             "outputs": [{"kind": type(o).__name__, **vars(o)} for o in self.gains.outputs],
             "free": search_space.spec(self.free),
             "weights": vars(self.weights),
-            "goals": list(self.goals),
+            "goals": list(self.objectives),
             "rtol": self.rtol,
             "modes": self.modes,
         }

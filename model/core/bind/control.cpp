@@ -3,6 +3,7 @@
 #include <nanobind/stl/unique_ptr.h>
 #include <nanobind/stl/vector.h>
 
+#include "control/board_pulses.hpp"
 #include "mechanics.hpp"
 #include "simulation/gain_sweep.hpp"
 
@@ -209,20 +210,42 @@ Samples samples_of(const Vector &t, const Vector &a, const Vector &b) {
 
 Array joint_figures_of(const Vector &t, const Vector &r, const Vector &q) {
   Array out = new_array({JOINT_FIGURES});
-  joint_figures(samples_of(t, r, q), r.data(), q.data(), out.data());
+  joint_metrics(samples_of(t, r, q), r.data(), q.data(), out.data());
   return out;
 }
 
 Array strip_figures_of(const Vector &t, const Vector &w, double settled) {
   Array out = new_array({STRIP_FIGURES});
-  strip_figures(samples_of(t, w, w), w.data(), settled, out.data());
+  strip_metrics(samples_of(t, w, w), w.data(), settled, out.data());
   return out;
 }
 
 double least_vibration_of(const Vector &t, const Vector &w, int seen, double enough) {
   const Samples at = samples_of(t, w, w);
   expect(0 <= seen && seen <= at.count, "there are not so many samples");
-  return least_vibration(at, w.data(), seen, enough);
+  return vibration_lower_bound(at, w.data(), seen, enough);
+}
+
+// knots (K, 4): positions of both joints, velocities of both.
+nb::tuple board_pulses_of(const Vector &settings, bool open_loop, int period_log2,
+                          const Counts &knots, std::int32_t given, int ticks) {
+  expect(int(settings.shape(0)) == board::settings_count(), "expected all settings of the board");
+  expect(knots.shape(0) > 0 && knots.shape(1) == 4, "expected knots of four numbers");
+  expect(0 <= period_log2 && period_log2 <= 6 && ticks >= 0, "expected a period of 1 to 64 ticks");
+  std::vector<board::KnotRow> rows;
+  const std::int64_t *data = knots.data();
+  for (std::size_t k = 0; k < knots.shape(0); ++k, data += 4)
+    rows.push_back({{data[0], data[1]}, {data[2], data[3]}});
+  const board::Pulses found =
+      board::step_pulses(std::vector<float>(settings.data(), settings.data() + settings.size()),
+                         open_loop, period_log2, rows, given, ticks);
+  if (found.wrong_setting >= 0)
+    throw std::invalid_argument("the firmware refuses setting number " +
+                                std::to_string(found.wrong_setting));
+  Array at = new_array({found.at.size()}), direction = new_array({found.at.size()});
+  std::copy(found.at.begin(), found.at.end(), at.data());
+  std::copy(found.direction.begin(), found.direction.end(), direction.data());
+  return nb::make_tuple(at, direction);
 }
 
 }  // namespace
@@ -245,15 +268,18 @@ void bind_control(nb::module_ &module) {
                    "Of all ticks since the start, (ticks, N, 6).")
       .def_prop_ro("prediction", &prediction, nb::rv_policy::move,
                    "z of a linear law for the next tick.");
-  nb::class_<GainSweep>(module, "Trials",
+  nb::class_<GainSweep>(module, "GainSweep",
                         "One robot under many controllers; may be called from several threads.")
       .def(nb::new_(&trials_of), "mechanics"_a, "controller"_a, "segments"_a, "index"_a, "gains"_a,
            "limits"_a, "t"_a, "q"_a, "references"_a, "rtol"_a, "method"_a)
       .def("run", &run, "prices"_a, "gains"_a, "limits"_a, "threads"_a)
       .def_prop_ro("method", [](const GainSweep &self) { return self.plan().method; });
-  module.def("joint_figures", &joint_figures_of, "t"_a, "r"_a, "q"_a);
-  module.def("strip_figures", &strip_figures_of, "t"_a, "w"_a, "settled"_a);
-  module.def("least_vibration", &least_vibration_of, "t"_a, "w"_a, "seen"_a, "enough"_a);
+  module.def("board_pulses", &board_pulses_of, "settings"_a, "open_loop"_a, "period_log2"_a,
+             "knots"_a, "given"_a, "ticks"_a,
+             "Counts of the step timer and directions of joint 2's pulses, by the firmware.");
+  module.def("joint_metrics", &joint_figures_of, "t"_a, "r"_a, "q"_a);
+  module.def("strip_metrics", &strip_figures_of, "t"_a, "w"_a, "settled"_a);
+  module.def("vibration_lower_bound", &least_vibration_of, "t"_a, "w"_a, "seen"_a, "enough"_a);
 }
 
 }  // namespace flexura

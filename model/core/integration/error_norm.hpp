@@ -53,6 +53,7 @@ class ErrorNorm {
     for (int k = 0; k < n; ++k) begun[k] = z[k];
     largest = {Real(0.0), Real(0.0), Real(0.0), Real(0.0), plant.energy(z, slow.data())};
     grow(z, Real(1.0));
+    renew();
   }
 
   const Sizes &sizes() const { return largest; }
@@ -61,6 +62,7 @@ class ErrorNorm {
   // Sizes with the state z too; `weight` is 1 / tolerance of each number of a state. Where `look`
   // is 1 also with its energy, which takes as long as a pass.
   void grow(const Real *z, const Real &look) {
+    const Sizes before = largest;
     Real way = 0.0, fast = 0.0;
     for (int i = 0; i < plant.joints; ++i) {
       const int e = plant.first[i], end = plant.first[i + 1];
@@ -76,7 +78,7 @@ class ErrorNorm {
     if (worst(look) > 0.0)
       largest.energy = choose_less(Real(0.5), look, larger(largest.energy, plant.energy(z, z + n)),
                                    largest.energy);
-    renew();
+    if (grown(before)) renew();
   }
 
   // 1 / tolerance of the accounts of a step to znew [1/J].
@@ -132,6 +134,14 @@ class ErrorNorm {
   int n;
   std::vector<Real> begun;
   Sizes largest;
+
+  // Has any size of a length or a speed grown, of any robot?
+  bool grown(const Sizes &before) const {
+    const Real by =
+        larger(larger(largest.deflection - before.deflection, largest.way - before.way),
+               larger(largest.deflecting - before.deflecting, largest.speed - before.speed));
+    return !(worst(by) <= 0.0);
+  }
 
   void renew() {
     const Real place = larger(larger(largest.deflection, largest.way * WAY), plant.reach * START);

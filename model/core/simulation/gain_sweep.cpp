@@ -147,7 +147,7 @@ class Trial {
       cost += prices.price[k] * std::fmax(0.0, figures[k] - prices.free[k]);
     if (prices.price[vibration] > 0.0 && cost <= limit)
       figures[vibration] =
-          least_vibration(at, row(joints), seen, (limit - cost) / prices.price[vibration]);
+          vibration_lower_bound(at, row(joints), seen, (limit - cost) / prices.price[vibration]);
     return cost + prices.price[vibration] * figures[vibration];
   }
 
@@ -158,13 +158,13 @@ class Trial {
     for (int i = 0; i < plan.joints(); ++i) {
       if (!controller.owns(i)) continue;
       double *each = figures + JOINT_FIGURES * i;
-      joint_figures(at, reference(i), row(i), each);
+      joint_metrics(at, reference(i), row(i), each);
       each[EFFORT] = effort(i, 0, ticks) / double(ticks);
       settled = std::isnan(settled) || std::isnan(each[SETTLING])
                     ? std::numeric_limits<double>::quiet_NaN()
                     : std::fmax(settled, each[SETTLING]);
     }
-    strip_figures(at, row(plan.joints()), settled, figures + JOINT_FIGURES * plan.joints());
+    strip_metrics(at, row(plan.joints()), settled, figures + JOINT_FIGURES * plan.joints());
   }
 };
 

@@ -73,7 +73,9 @@ void MethodSelection::choose() {
   else if (acting.sampler)
     chosen = method_under_ticks(acting.rate_Hz, bends);
   else if (acting.function)
-    chosen = !bends ? by_explicit() : c.plant.rides ? implicit() : race_forward(*implicit());
+    chosen = !bends          ? by_explicit()
+             : c.plant.rides ? implicit()
+                             : race_forward(*implicit(), COSTLY);
   else
     race();
 }
@@ -135,14 +137,14 @@ Method<double> *MethodSelection::method_under_ticks(double rate_Hz, bool bends) 
                   loop.integration);
   if (for_ticks->name() == std::string(TR_BDF2.name)) second_order = for_ticks.get();
   const bool stiff = second_order || for_ticks->name() == std::string(ESDIRK_4.name);
-  return stiff && bends && !sharp && !loop.integration.plant.rides ? race_forward(*for_ticks)
+  return stiff && bends && !sharp && !loop.integration.plant.rides ? race_forward(*for_ticks, 1.0)
                                                                    : for_ticks.get();
 }
 
 // The better one of exponential and implicit steps, which are tried one after the other on the
 // way: neither a controller nor a caller's function sees a time twice. Exponential steps go on as
 // long as they get faster, or if the rest of the run takes few of them.
-Method<double> *MethodSelection::race_forward(Method<double> &other) {
+Method<double> *MethodSelection::race_forward(Method<double> &other, double costly) {
   const RunState &c = loop.run_state[0];
   double reached = -1.0;
   for (double before = reached; !over(); before = reached) {
@@ -152,7 +154,7 @@ Method<double> *MethodSelection::race_forward(Method<double> &other) {
   }
   if (over()) return exponential();
   loop.run_state[0].fresh = true;
-  return COSTLY * trial(other, 2 * TRIAL) > reached ? &other : exponential();
+  return costly * trial(other, 2 * TRIAL) > reached ? &other : exponential();
 }
 
 // The other methods from `start` on, `step` being the first one that they try, against the best

@@ -30,8 +30,9 @@ class MethodSelection {
   static constexpr long TRIAL = 100, SHORT = 60,
                         AGAIN = 1500;  // TRIAL: of exponential steps in later races
   static constexpr double SLOWER = 4.0;
-  static constexpr double FASTER = 1.5, FEW = 300.0,
-                          COSTLY = 2.5;   // under a caller's function: see race_forward
+  // Under a caller's function or a sampled controller: see race_forward. Where each pass calls a
+  // function, a pass of exponential steps must get so much further.
+  static constexpr double FASTER = 1.5, FEW = 300.0, COSTLY = 2.5;
   static constexpr double SEVERAL = 1.8;  // steps of order 2 a tick: more are for order 4,
   static constexpr long ENOUGH = 1000;    // of so many at least
 
@@ -100,7 +101,7 @@ class MethodSelection {
   bool begin_exponential(double &reached);
   void race();
   Method<double> *method_under_ticks(double rate_Hz, bool bends);
-  Method<double> *race_forward(Method<double> &other);
+  Method<double> *race_forward(Method<double> &other, double costly);
   void race_of_others(const Mark &start, double step, Best &best);
   double trial(Method<double> &method, long most);
   bool gives_way();

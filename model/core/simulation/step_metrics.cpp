@@ -29,7 +29,7 @@ double weight(const double *t, int k, int count) {
 
 }  // namespace
 
-void joint_figures(const Samples &at, const double *r, const double *q, double *out) {
+void joint_metrics(const Samples &at, const double *r, const double *q, double *out) {
   const double *t = at.t, way = r[at.count - 1] - q[0];
   double low = NEVER, high = NEVER, settled = 0.0, most = 0.0, itae = 0.0, error = 0.0;
   int last = 0;
@@ -52,7 +52,7 @@ void joint_figures(const Samples &at, const double *r, const double *q, double *
   out[ITAE] = itae / std::fabs(way);
 }
 
-void strip_figures(const Samples &at, const double *w, double settled, double *out) {
+void strip_metrics(const Samples &at, const double *w, double settled, double *out) {
   const double *t = at.t, end = t[at.count - 1] - t[0];
   double rest = 0.0;
   int last = 0;
@@ -84,7 +84,7 @@ void joint_so_far(const Samples &at, const double *r, const double *q, int begin
   }
 }
 
-double least_vibration(const Samples &at, const double *w, int seen, double enough) {
+double vibration_lower_bound(const Samples &at, const double *w, int seen, double enough) {
   double sum = 0.0, moment = 0.0, low = INFINITE, high = -INFINITE;
   for (int k = 0; k < seen; ++k) {
     const double own = weight(at.t, k, seen);

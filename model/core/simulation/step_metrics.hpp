@@ -33,11 +33,11 @@ struct Samples {
 };
 
 // A joint's figures but the effort, into out (JOINT_FIGURES).
-void joint_figures(const Samples &at, const double *r, const double *q, double *out);
+void joint_metrics(const Samples &at, const double *r, const double *q, double *out);
 
 // The strip's figures into out (STRIP_FIGURES); `settled` [s], the slowest joint's, may be no
 // number.
-void strip_figures(const Samples &at, const double *w, double settled, double *out);
+void strip_metrics(const Samples &at, const double *w, double settled, double *out);
 
 // Adds the samples from `begin` to before `end` to a joint's overshoot and ITAE so far, which only
 // grow. r is known to its end.
@@ -50,6 +50,6 @@ void joint_so_far(const Samples &at, const double *r, const double *q, int begin
 //
 // g is convex: the tangents on both sides of its least value meet below it. They are drawn nearer
 // until the bound is above `enough` or g, and with it every bound, is not.
-double least_vibration(const Samples &at, const double *w, int seen, double enough);
+double vibration_lower_bound(const Samples &at, const double *w, int seen, double enough);
 
 }  // namespace flexura

@@ -1,6 +1,6 @@
-"""What acts in the joints beyond a plain drive: sampled controllers, their gains and figures,
-functions of the caller's."""
+"""Sampled controllers, their gains files and step metrics, LQR designs, functions as drives."""
 
+from .board_replay import board_pulses
 from .controller import (
     DEFLECTION,
     DERIVATIVE,
@@ -9,14 +9,14 @@ from .controller import (
     SLEW,
     Controller,
     Linear,
-    smoothing,
+    filter_coefficient,
 )
 from .gains import BOARD, NAMES, Gains
 from .gains import load as load_gains
 from .lqr_design import Design, lqr
 from .pid import GAINS, PID, Force, Motor, Output, Stepper
 from .sampled import DriveFunction, Sampled
-from .step_response import (
+from .step_metrics import (
     EFFORT,
     ERROR,
     ITAE,
@@ -27,9 +27,9 @@ from .step_response import (
     SETTLING,
     STRIP,
     VIBRATION,
-    Response,
-    of_run,
-    strip_figures,
+    StepResponse,
+    step_response,
+    strip_metrics,
 )
 
 __all__ = [
@@ -60,12 +60,13 @@ __all__ = [
     "Linear",
     "Motor",
     "Output",
-    "Response",
     "Sampled",
+    "StepResponse",
     "Stepper",
+    "board_pulses",
+    "filter_coefficient",
     "load_gains",
     "lqr",
-    "of_run",
-    "smoothing",
-    "strip_figures",
+    "step_response",
+    "strip_metrics",
 ]

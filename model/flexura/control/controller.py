@@ -36,7 +36,7 @@ from ..errors import InputError
 from ..io import Run, number
 from ..signals import Drive, JointDrive
 from ..system import System
-from .pid import GAINS, PID, Motor, Stepper, not_negative
+from .pid import GAINS, PID, Motor, Stepper, check_not_negative
 
 # what a joint's output is: not the controller's, a force or voltage, a rate
 NONE, EFFORT, STEPPER = 0, 1, 2
@@ -109,7 +109,7 @@ class Controller:
         if not number(self.rate_Hz, "rate_Hz", "expected a rate above 0 in hertz") > 0:
             raise InputError("expected a rate above 0 in hertz", key="rate_Hz", value=self.rate_Hz)
         for name in ("deflection_Hz", "deflection_quantum_m"):
-            not_negative(self, name)
+            check_not_negative(self, name)
         if not (self.linear is None or isinstance(self.linear, Linear)):
             raise InputError("expected a Linear or None", key="linear", value=self.linear)
         for i, joint in enumerate(self.joints, 1):
@@ -142,7 +142,15 @@ class Controller:
         )
 
     def within(self, start: float, end: float) -> Controller:
-        """The same controller for a run from `start` to `end` [s], see `Drive.within`."""
+        """The same controller for a run between two times, see `Drive.within`.
+
+        Args:
+            start: begin of the run [s].
+            end: end of the run [s].
+
+        Returns:
+            A controller whose functions of time are Signals.
+        """
         opened = self._open().within(start, end)
         joints = tuple(
             joint.within(start, end) if isinstance(joint, PID) else own
@@ -162,8 +170,14 @@ class Controller:
         )
 
     def sampler(self, system: System) -> Any:
-        """All that the core needs of this controller on a robot: a `core.Controller`, with the
-        memory and the log of one run."""
+        """What the core needs of this controller on a robot.
+
+        Args:
+            system: the robot.
+
+        Returns:
+            A `core.Controller`, with the state and the log of one run.
+        """
         index, parts = (
             np.zeros((len(self.joints), 5), dtype=np.int64),
             [np.zeros((0, signals.COLUMNS))],
@@ -203,14 +217,14 @@ class Controller:
         """The numbers of the law that a search may change, (N, 20): columns KP to DELAY."""
         g = np.zeros((len(self.joints), 20))
         for row, joint in zip(g, self.joints, strict=True):
-            row[DEFLECTION] = smoothing(self.deflection_Hz, 2 / self.rate_Hz)
+            row[DEFLECTION] = filter_coefficient(self.deflection_Hz, 2 / self.rate_Hz)
             if not isinstance(joint, PID):
                 continue
             row[:LIMIT] = [getattr(joint, name) for name in GAINS]
             row[LIMIT], row[SLEW] = joint.limit, joint.slew
             row[FORCE] = joint.output.force_per_V if isinstance(joint.output, Motor) else 1.0
-            row[SETPOINT] = smoothing(joint.setpoint_Hz, 1 / self.rate_Hz)
-            row[DERIVATIVE] = smoothing(joint.derivative_Hz, 1 / self.rate_Hz)
+            row[SETPOINT] = filter_coefficient(joint.setpoint_Hz, 1 / self.rate_Hz)
+            row[DERIVATIVE] = filter_coefficient(joint.derivative_Hz, 1 / self.rate_Hz)
             row[COUNT], row[DUTY], row[DELAY] = (
                 joint.count,
                 joint.duty,
@@ -221,8 +235,15 @@ class Controller:
         return g
 
     def recorded(self, run: Run, sampler: Any) -> Run:
-        """A Run with the law's own channels besides, joint/i/reference, joint/i/voltage and
-        joint/i/pulses, from the log of the `sampler` that ran in it."""
+        """A Run with the controller's own channels besides.
+
+        Args:
+            run: the Run.
+            sampler: that ran in it, with its log.
+
+        Returns:
+            The Run with joint/i/reference, joint/i/voltage and joint/i/pulses.
+        """
         log, start = np.asarray(sampler.log), float(run.t[0]) if len(run.t) else 0.0
         if len(log) == 0:  # no tick in it: a run of one instant
             log = np.zeros((1, len(self.joints), 6))
@@ -257,6 +278,14 @@ class Controller:
         }
 
 
-def smoothing(frequency_Hz: float, period_s: float) -> float:
-    """a of y += a (x - y): 1 - exp(-2 pi f T) (67); 1, no filter, for f = 0."""
+def filter_coefficient(frequency_Hz: float, period_s: float) -> float:
+    """a of the first-order filter y += a (x - y): a = 1 - exp(-2 pi f T) (67).
+
+    Args:
+        frequency_Hz: f, the corner frequency [Hz]; 0: no filter, a = 1.
+        period_s: T, the time of a tick [s].
+
+    Returns:
+        a, from 0 to 1.
+    """
     return 1.0 if frequency_Hz == 0 else -math.expm1(-2 * math.pi * frequency_Hz * period_s)

@@ -26,7 +26,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..io import find, read_toml, write_toml
-from ..signals import PLAUSIBLE, Signal, constant, plausible
+from ..signals import PLAUSIBLE, Signal, constant, is_plausible
 from .controller import Controller
 from .pid import PID, Force, Motor, Output, Stepper
 
@@ -166,9 +166,19 @@ class Gains:
     def controller(
         self, references: Sequence[Signal], outputs: Sequence[Output] | None = None
     ) -> Controller:
-        """The controller along `references` [m or rad], one a joint. `outputs` of the joints: by
-        default the file's; a force needs none, and a stepper's joint follows its pulses, one tick
-        late as on the board, unless `delay_2_s` says otherwise."""
+        """The controller along references.
+
+        Args:
+            references: one Signal a joint [m or rad].
+            outputs: one a joint; None: the file's. A force needs none. A stepper's joint follows
+                its pulses, one tick late as on the board, unless `delay_2_s` says otherwise.
+
+        Returns:
+            The Controller.
+
+        Raises:
+            InputError: another number of references, or a motor or stepper without its output.
+        """
         kinds, rate = self.kinds, self.settings.get("rate_Hz", 1000.0)
         if len(references) != len(kinds):
             expected = f"expected gains of {len(references)} joints, one for each reference"
@@ -212,8 +222,14 @@ class Gains:
         )
 
     def board(self) -> dict[str, float]:
-        """The board's settings in it. Raises InputError for what the board has not: terms in the
-        slope, forces, another rate."""
+        """The board's settings that these gains are.
+
+        Returns:
+            Settings by their names in the firmware.
+
+        Raises:
+            InputError: the board has no such term: terms in the slope, forces, another rate.
+        """
         for name, value in self.settings.items():
             if name == "rate_Hz" and value == 1000.0:
                 continue
@@ -223,7 +239,11 @@ class Gains:
         return {name: self.settings[name] for name in BOARD if name in self.settings}
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """A gains file."""
+        """Write a gains file.
+
+        Args:
+            path: where to; a file there is replaced as a whole.
+        """
         tables = []
         for kind, output in zip(self.kinds, self.outputs, strict=False):
             given = {
@@ -245,6 +265,9 @@ def load(path: str | os.PathLike[str]) -> Gains:
 
     Args:
         path: the file's path, or the name of a controller that comes with flexura.
+
+    Returns:
+        The Gains.
 
     Raises:
         InputError: no such file, or a wrong value; it names file, key, value and what was expected.
@@ -275,7 +298,7 @@ def _gains(data: dict[str, Any], file: str) -> Gains:
                 f"; did you mean {near[0]}?" if near else "; see firmware/README.md, the controller"
             )
             raise InputError(f"an unknown setting{hint}", key=f"controller.{key}", value=value)
-        if not plausible(value):
+        if not is_plausible(value):
             raise InputError(f"expected {PLAUSIBLE}", key=f"controller.{key}", value=value)
         settings[key] = float(value)
     tables = data.get("output", [])
@@ -321,7 +344,7 @@ def _read_output(entry: dict[str, Any], key: str) -> Output:
                 key=f"{key}.{name}",
                 value=value,
             )
-        if name != "kind" and not (plausible(value) and value >= 0):
+        if name != "kind" and not (is_plausible(value) and value >= 0):
             raise InputError(
                 "expected a finite number from 0 to 1e12", key=f"{key}.{name}", value=value
             )

@@ -6,7 +6,8 @@ tick T:
 
     x_k+1 = F x_k + G u_k,   y_k = C x_k,   [F G; 0 1] = exp([A B; 0 0] T)
 
-y: what the rig measures, joint positions and the deflection of the last flexible link. K and L
+y: what the rig measures, joint positions (the motor's, where a transmission is between) and the
+deflection of the last flexible link. K and L
 minimise and come from
 
     sum x^T Q x + u^T R u:   P = Q + F^T P (F - G K),  K = (R + G^T P G)^-1 G^T P F w ~ W, v ~ V:
@@ -74,15 +75,28 @@ def lqr(
     noise: Any = 1e-4,
     q: Any = None,
 ) -> tuple[Controller, Design]:
-    """`controller` with its PIDs' terms replaced by an LQR and observer about q (default: the
-    static equilibrium at the start): (74) to (76).
+    """A controller with its PIDs' terms replaced by an LQR and an observer (74) to (76).
 
-    Its references, outputs, limits, slews, rate and quantisation stay. Weights by Bryson's rule:
-    `effort` (m,) of each output, `position` (N,) [m or rad], `deflection` [m] of the tips and
-    `damping` [s], what counts as much: cost (e / position)^2 + (w / deflection)^2 + (damping w' /
-    deflection)^2 + (u / effort)^2. Observer: `disturbance` (m,), the standard deviation of what
-    acts at the outputs in a tick, `noise` (N + 1,) of the measurements. Raises InputError for
-    steppers, which have no force, and where no stabilising solution exists.
+    References, outputs, limits, slews, rate and quantisation stay. The weights follow Bryson's
+    rule, with the cost (e / position)^2 + (w / deflection)^2 + (damping w' / deflection)^2 +
+    (u / effort)^2.
+
+    Args:
+        robot: a System, a Robot, or the path or name of a robot file.
+        controller: the controller.
+        effort: of each output (m,), that counts as much as the deviations below.
+        position: deviation of each joint (N,) or of all [m or rad].
+        deflection: of the tips [m].
+        damping: time by which the rate of a deflection is weighted [s].
+        disturbance: standard deviation of what acts at the outputs in a tick, (m,) or one.
+        noise: standard deviation of the measurements, (N + 1,) or one.
+        q: configuration (n,) of the design; None: the static equilibrium at the start.
+
+    Returns:
+        The controller, and the Design with its matrices and poles.
+
+    Raises:
+        InputError: a stepper, which has no force, or no stabilising solution exists.
     """
     system = assemble(robot)
     if not isinstance(controller, Controller):
@@ -90,7 +104,7 @@ def lqr(
     if len(controller.joints) != len(system.robot.links):
         expected = f"expected a Controller of {len(system.robot.links)} joints"
         raise InputError(expected, key="controller", value=len(controller.joints))
-    deflection, damping = _many(deflection, 1, "deflection")[0], number(damping, "damping")
+    deflection, damping = _weight_matrix(deflection, 1, "deflection")[0], number(damping, "damping")
     linear, T = linearize(system, q), 1 / controller.rate_Hz
     joints, driven = controller.joints, []
     damp, scale = np.zeros(len(linear.M)), []
@@ -113,17 +127,20 @@ def lqr(
     exponential = expm(np.block([[A, B], [np.zeros((m, n + m))]]) * T)
     F, G = exponential[:n, :n], exponential[:n, n:]
     bent = [k for k, name in enumerate(linear.outputs) if name.endswith("tip_deflection")]
-    places = [linear.outputs.index(f"joint/{i + 1}/position") for i in driven]
-    C, W = linear.C[places + bent[-1:]], linear.C[places + bent]
+    hubs = [linear.outputs.index(f"joint/{i + 1}/position") for i in driven]
+    elastic = system.windup_rows
+    measured = [f"joint/{i + 1}/{'motor_' * (i in elastic)}position" for i in driven]
+    places = [linear.outputs.index(name) for name in measured]
+    C, W = linear.C[places + bent[-1:]], linear.C[hubs + bent]
     weights = np.concatenate(
-        [1 / _many(position, len(driven), "position"), np.full(len(bent), 1 / deflection)]
+        [1 / _weight_matrix(position, len(driven), "position"), np.full(len(bent), 1 / deflection)]
     )
     Q = (weights[:, None] * W).T @ (weights[:, None] * W)
     rates = np.roll(W[len(driven) :], n // 2, axis=1) * damping / deflection
     Q += rates.T @ rates
-    R = np.diag(1 / _many(effort, m, "effort") ** 2)
-    process = G @ np.diag(_many(disturbance, m, "disturbance") ** 2) @ G.T
-    V = np.diag(_many(noise, len(C), "noise") ** 2)
+    R = np.diag(1 / _weight_matrix(effort, m, "effort") ** 2)
+    process = G @ np.diag(_weight_matrix(disturbance, m, "disturbance") ** 2) @ G.T
+    V = np.diag(_weight_matrix(noise, len(C), "noise") ** 2)
     P, S = _riccati(F, G, Q, R, "effort"), _riccati(F.T, C.T, process, V, "noise")
     K = np.linalg.solve(R + G.T @ P @ G, G.T @ P @ F)
     L = np.linalg.solve(C @ S @ C.T + V, C @ S).T
@@ -189,7 +206,7 @@ def _linear(
     return Linear(d.F, G, L, measured, K, Kr, Kv, offset, held)
 
 
-def _many(value: Any, count: int, key: str) -> np.ndarray:
+def _weight_matrix(value: Any, count: int, key: str) -> np.ndarray:
     expected = f"expected a number above 0, or {count} of them"
     found = array(value, key, expected)
     if found.shape not in ((), (count,)) or not np.all(found > 0):

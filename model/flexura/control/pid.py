@@ -103,16 +103,24 @@ class PID:
         for name in GAINS:
             object.__setattr__(self, name, number(getattr(self, name), name))
         for name in ("setpoint_Hz", "derivative_Hz", "delay_s", "count", "duty"):
-            not_negative(self, name)
+            check_not_negative(self, name)
         for name in ("limit", "slew"):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int | float) or not value > 0:
                 raise InputError("expected a number above 0", key=name, value=value)
 
     def within(self, start: float, end: float) -> PID:
-        """The same law for a run from `start` to `end` [s]: functions of time become splines.
+        """The same law for a run between two times: functions of time become splines.
 
-        Raises: InputError: a function gives anything but finite numbers, or jumps.
+        Args:
+            start: begin of the run [s].
+            end: end of the run [s].
+
+        Returns:
+            A law whose reference and feedforward are Signals.
+
+        Raises:
+            InputError: a function gives anything but finite numbers, or jumps.
         """
         waves = {name: getattr(self, name) for name in ("reference", "feedforward")}
         made: dict[str, Any] = {
@@ -128,8 +136,16 @@ class PID:
         return isinstance(self.output, Stepper) and self.output.stiffness is None
 
     def one_sensor(self, length: float) -> PID:
-        """The same law for a strip of that free length [m] whose deflection alone is measured, as
-        on the rig: w'(L) is taken as 3 w(L) / (2 L), a cantilever's that its tip loads (73)."""
+        """The same law for a strip whose deflection alone is measured, as on the rig.
+
+        w'(L) is taken as 3 w(L) / (2 L), a cantilever's that its tip loads (73).
+
+        Args:
+            length: free length of the strip [m].
+
+        Returns:
+            A law without terms in the slope.
+        """
         per_m = 1.5 / length
         return replace(
             self, kf=self.kf + self.ks * per_m, kg=self.kg + self.kt * per_m, ks=0.0, kt=0.0
@@ -146,7 +162,7 @@ class PID:
         return out | ({"feedforward": self.feedforward.spec} if self.feedforward else {})
 
 
-def not_negative(given: Any, name: str) -> None:
+def check_not_negative(given: Any, name: str) -> None:
     """Raises InputError where a field is no finite number of 0 or more."""
     expected, value = "expected a finite number of 0 or more", getattr(given, name)
     if not number(value, name, expected) >= 0:

@@ -46,7 +46,8 @@ class DriveFunction:
     """A drive function of (t), or of (t, position, velocity, tip_deflection), for the forces of so
     many joints.
 
-    Raises: InputError: it takes other arguments.
+    Raises:
+        InputError: the function takes other arguments.
     """
 
     def __init__(self, function: Callable[..., Any], joints: int) -> None:
@@ -66,8 +67,18 @@ class DriveFunction:
         self.of_time = len(needed) == 1
 
     def read(self, given: Any, t: float) -> np.ndarray:
-        """The forces (joints,) that the function has given at t. Raises: InputError: it gave
-        something else."""
+        """The forces that the function has given.
+
+        Args:
+            given: its result.
+            t: time of the call [s].
+
+        Returns:
+            Forces (joints,) [N or N m].
+
+        Raises:
+            InputError: it gave something else.
+        """
         expected = f"expected {self.joints} finite forces from the drive function at t = {t:g} s"
         force = np.atleast_1d(array(given, "drive", expected))
         if force.shape != (self.joints,):

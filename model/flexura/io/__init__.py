@@ -14,25 +14,52 @@ from .arguments import (
     whole,
 )
 from .channels import CHANNELS, STATIONS, Channel, channel
+from .files import (
+    DRAFT,
+    FINISHED,
+    leftovers,
+    make_folder,
+    move,
+    replace_results,
+    replaced,
+    settle,
+    sync,
+    unwritable,
+    write_bytes,
+    write_text,
+)
 from .format import FORMAT, check_format
 from .labels import EMULATED, called, emulated, kind
 from .memory import check_memory
 from .run import FILE, Run
+from .seal import (
+    Damaged,
+    read_sealed,
+    read_sealed_json,
+    read_table,
+    say_unsealed,
+    sealed,
+    sealed_json,
+    sealed_parquet,
+)
 from .shipped import find, shipped_files
-from .toml_files import read_toml, write_bytes, write_text, write_toml
+from .toml_files import read_toml, write_toml
 from .trust import DOUBTED, REFUSED, balance_events, judged
 from .validation import MOST_LETTERS, explain, is_name
 
 __all__ = [
     "CHANNELS",
     "DOUBTED",
+    "DRAFT",
     "EMULATED",
     "FILE",
+    "FINISHED",
     "FORMAT",
     "MOST_LETTERS",
     "REFUSED",
     "STATIONS",
     "Channel",
+    "Damaged",
     "Run",
     "array",
     "balance_events",
@@ -51,11 +78,26 @@ __all__ = [
     "is_name",
     "judged",
     "kind",
+    "leftovers",
+    "make_folder",
+    "move",
     "number",
+    "read_sealed",
+    "read_sealed_json",
+    "read_table",
     "read_toml",
+    "replace_results",
+    "replaced",
+    "say_unsealed",
+    "sealed",
+    "sealed_json",
+    "sealed_parquet",
+    "settle",
     "shipped_files",
     "summary",
+    "sync",
     "takes",
+    "unwritable",
     "whole",
     "write_bytes",
     "write_text",

@@ -20,9 +20,16 @@ T = TypeVar("T")
 def number(value: Any, key: str, expected: str = "expected a finite number") -> float:
     """A finite number as a float.
 
-    Args: value: what was given; key: the argument's name; expected: what is said of a wrong value.
+    Args:
+        value: what was given.
+        key: name of the argument.
+        expected: what is said of a wrong value.
 
-    Raises: InputError: it is a text, a bool, an array, or not finite.
+    Returns:
+        The number.
+
+    Raises:
+        InputError: it is a text, a bool, an array, or not finite.
     """
     if isinstance(value, bool | np.bool_ | str | bytes | list | tuple | dict | set):
         raise InputError(expected, key=key, value=value)
@@ -42,11 +49,18 @@ def array(
 ) -> np.ndarray:
     """A new array of finite floats.
 
-    Args: value: what was given; key: the argument's name; expected: what is said of a wrong value;
+    Args:
+        value: what was given.
+        key: name of the argument.
+        expected: what is said of a wrong value.
         shape: the lengths that it must have, None for any length or, in place of the tuple, for any
-        shape.
+            shape.
 
-    Raises: InputError: it is no array of finite numbers of this shape.
+    Returns:
+        The array.
+
+    Raises:
+        InputError: it is no array of finite numbers of this shape.
     """
     try:
         found = np.asarray(value)
@@ -60,11 +74,19 @@ def array(
 
 
 def whole(value: Any, key: str, least: int, expected: str = "") -> int:
-    """A whole number of `least` or more.
+    """A whole number that is not too small.
 
-    Args: value: what was given; key: the argument's name; expected: what is said of a wrong value.
+    Args:
+        value: what was given.
+        key: name of the argument.
+        least: the smallest number that is good.
+        expected: what is said of a wrong value.
 
-    Raises: InputError: it is none.
+    Returns:
+        The number.
+
+    Raises:
+        InputError: it is none.
     """
     expected = expected or f"expected a whole number, {least} or more"
     if isinstance(value, bool) or not isinstance(value, int | np.integer):
@@ -77,9 +99,16 @@ def whole(value: Any, key: str, least: int, expected: str = "") -> int:
 def choice(value: Any, key: str, known: Sequence[str]) -> str:
     """One of the known words.
 
-    Args: value: what was given; key: the argument's name; known: the words.
+    Args:
+        value: what was given.
+        key: name of the argument.
+        known: the words.
 
-    Raises: InputError: it is none of them.
+    Returns:
+        The word.
+
+    Raises:
+        InputError: it is none of them.
     """
     if not isinstance(value, str) or value not in known:
         words = [f'"{word}"' for word in known]
@@ -91,9 +120,15 @@ def choice(value: Any, key: str, known: Sequence[str]) -> str:
 def flag(value: Any, key: str) -> bool:
     """True or False.
 
-    Args: value: what was given; key: the argument's name.
+    Args:
+        value: what was given.
+        key: name of the argument.
 
-    Raises: InputError: it is neither.
+    Returns:
+        The bool.
+
+    Raises:
+        InputError: it is neither.
     """
     if not isinstance(value, bool | np.bool_):
         raise InputError("expected True or False", key=key, value=value)
@@ -103,10 +138,17 @@ def flag(value: Any, key: str) -> bool:
 def function_of(value: Any, key: str, counts: Sequence[int], expected: str) -> Any:
     """A function that can be called with one of so many arguments.
 
-    Args: value: what was given; key: the argument's name; counts: of positional arguments;
+    Args:
+        value: what was given.
+        key: name of the argument.
+        counts: of positional arguments.
         expected: what is said of a wrong value.
 
-    Raises: InputError: it is none.
+    Returns:
+        The function.
+
+    Raises:
+        InputError: it is none.
     """
     if not callable(value) or not any(takes(value, count) for count in counts):
         raise InputError(expected, key=key, value=value)
@@ -114,7 +156,15 @@ def function_of(value: Any, key: str, counts: Sequence[int], expected: str) -> A
 
 
 def takes(function: Any, count: int) -> bool:
-    """Whether a function can be called with so many arguments."""
+    """Whether a function can be called with so many arguments.
+
+    Args:
+        function: the function.
+        count: number of positional arguments.
+
+    Returns:
+        True if it can, as far as its signature says.
+    """
     try:
         inspect.signature(function).bind(*[0.0] * count)
     except TypeError:
@@ -125,15 +175,29 @@ def takes(function: Any, count: int) -> bool:
 
 
 def check_progress(progress: Any) -> None:
-    """Raises InputError for what is neither None nor a function of the finished fraction."""
+    """Refuse what cannot show progress.
+
+    Args:
+        progress: what was given.
+
+    Raises:
+        InputError: it is neither None nor a function of the finished fraction.
+    """
     if progress is not None:
         function_of(progress, "progress", (1,), "expected a function of the finished fraction")
 
 
 def finite_arguments(function: Callable[P, T]) -> Callable[P, T]:
-    """The same function with its arguments that are annotated `float` or `int` read as numbers.
+    """Check the arguments of a function that are annotated `float` or `int`.
 
-    The function raises InputError, by the argument's name, for what is no finite number.
+    Args:
+        function: the function.
+
+    Returns:
+        The function; it raises InputError, by the argument's name, for what is no finite number.
+
+    Raises:
+        InputError: raised by the returned function only.
     """
     signature = inspect.signature(function)
     kinds = {name: str(p.annotation) for name, p in signature.parameters.items()}

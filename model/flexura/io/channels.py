@@ -45,7 +45,14 @@ class Channel:
     meaning: str
 
     def fits(self, name: str) -> bool:
-        """Whether a channel's name is one of these."""
+        """Whether a channel's name is one of these.
+
+        Args:
+            name: for example "joint/1/position".
+
+        Returns:
+            True if it is.
+        """
         parts = {"i": r"[1-9]\d*", "k": r"\d+", "NAME": r".+"}
         pattern = "/".join(parts.get(part, re.escape(part)) for part in self.name.split("/"))
         return re.fullmatch(pattern, name) is not None
@@ -80,7 +87,15 @@ CHANNELS = (
         TURN,
         "motor position",
         "Elastic joint: position of the rotor, reduced to the joint; equal to joint/i/position "
-        "where the transmission is not strained.",
+        "where the transmission is not strained. The drive acts on it, and a controller "
+        "measures it.",
+    ),
+    Channel(
+        "joint/i/motor_velocity",
+        RATE,
+        "motor velocity",
+        "Elastic joint: time derivative of joint/i/motor_position; the work of the drive is the "
+        "integral of drive times this velocity.",
     ),
     Channel(
         "joint/i/reference",

@@ -14,6 +14,10 @@ FORMAT = 1  # the one that is written
 def check_format(tables: Mapping[str, Any], file: str = "") -> None:
     """Refuse tables of a format that is not known; an absent key is the present one.
 
+    Args:
+        tables: of the file.
+        file: its name, for the message.
+
     Raises:
         InputError: not a whole number from 1 to `FORMAT`: a newer flexura wrote the file.
     """

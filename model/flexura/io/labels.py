@@ -11,18 +11,39 @@ EMULATED = "emulated: board and rig ran as programs, nothing here was measured o
 
 
 def kind(run: Run) -> str:
-    """What a run is of: "simulation", "twin" or "experiment"."""
+    """What a run is of.
+
+    Args:
+        run: the run.
+
+    Returns:
+        "simulation", "twin" or "experiment".
+    """
     return str(run.meta.get("source") or run.meta.get("kind") or "simulation")
 
 
 def emulated(run: Run) -> bool:
-    """Whether the run is of a board and a rig that ran as programs."""
+    """Whether a run is of a board and a rig that ran as programs.
+
+    Args:
+        run: the run.
+
+    Returns:
+        True if they were emulated.
+    """
     return bool(run.meta.get("emulated"))
 
 
 def called(run: Run, which: str = "") -> str:
-    """The kind of run, `which` of two, and in brackets what a reader must know of it: emulated,
-    incomplete."""
+    """What a run is called: its kind, and in brackets what a reader must know of it.
+
+    Args:
+        run: the run.
+        which: put after the kind, to tell two runs apart.
+
+    Returns:
+        For example "experiment (emulated)", "simulation (incomplete)".
+    """
     notes = [
         word
         for word, true in (("emulated", emulated(run)), ("incomplete", not run.complete))

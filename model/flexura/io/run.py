@@ -16,14 +16,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, within_memory
 from . import summary
 from .channels import SUFFIX
 from .drawing.film import animation
 from .drawing.over_time import FORMS, figure, heading, saved
+from .files import settle, write_bytes
 from .format import FORMAT, check_format
 from .frames import pandas_frame, xarray_dataset
-from .toml_files import write_bytes
+from .seal import Damaged, read_sealed, read_table, say_unsealed, sealed_parquet
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -71,7 +72,14 @@ class Run:
             raise ValueError(f"two channels would share a column: {', '.join(twice)}")
 
     def column(self, channel: str) -> str:
-        """The name of a channel's column in a file, its unit at the end."""
+        """The name of a channel's column in a file.
+
+        Args:
+            channel: name of the channel.
+
+        Returns:
+            The name with its unit at the end.
+        """
         return f"{channel}_{SUFFIX[self.units[channel]]}"
 
     def __getitem__(self, channel: str) -> np.ndarray:
@@ -220,12 +228,19 @@ class Run:
         return xarray_dataset(self.t, self.channels, self.units, self.meta)
 
     def save(self, folder: str | Path) -> Path:
-        """Write `run.parquet` into `folder` (made if need be) as a whole or not at all; returns its
-        path."""
+        """Write `run.parquet` as a whole or not at all.
+
+        Args:
+            folder: where to; it is made if need be.
+
+        Returns:
+            The file's path.
+        """
         path = Path(folder) / FILE
         write_bytes(path, self.parquet())
         return path
 
+    @within_memory
     def parquet(self) -> bytes:
         """The run as a Parquet file: one column a channel, its unit in the field, the metadata in
         the schema."""
@@ -246,31 +261,50 @@ class Run:
             compression="zstd",
             write_page_checksum=True,
         )
-        return bytes(sink.getvalue().to_pybytes())
+        return sealed_parquet(sink.getvalue().to_pybytes())
 
     @staticmethod
+    @within_memory
     def read(folder: str | Path) -> Run:
-        """Read a run's folder, or its Parquet file. Raises InputError for anything else."""
+        """Read a run.
+
+        Args:
+            folder: a run's folder, or its Parquet file.
+
+        Returns:
+            The Run.
+
+        Raises:
+            InputError: there is no run, or a byte of its file is not as it was written.
+        """
         import pyarrow as pa
-        import pyarrow.parquet as pq
 
         path = Path(folder)
         try:
+            for place in (path, path.parent):
+                settle(place)
             path = path / FILE if path.is_dir() else path
             there = path.is_file()
         except OSError:  # a name that is too long, a folder that may not be looked into
             there = False
         if not there:
             raise InputError(f"no run here: expected a folder with {FILE}", file=str(folder))
+        sealed = False
         try:
-            # a folder named a=b is just a folder
-            table = pq.read_table(path, partitioning=None, page_checksum_verification=True)
+            content, sealed = read_sealed(path, "restore a copy, or make it again", "a damaged run")
+            table = read_table(content)
+        except (Damaged, MemoryError):
+            raise
         except (pa.ArrowException, OSError, ValueError) as error:
-            raise InputError(
-                f"not a Parquet file ({(str(error) or 'damaged').splitlines()[0]})", file=str(path)
-            ) from None
+            why = (str(error) or "damaged").splitlines()[0]
+            what = (
+                "cannot be read now, though its checksum fits" if sealed else "not a Parquet file"
+            )
+            raise InputError(f"{what} ({why})", file=str(path)) from None
         try:
-            return Run._from_table(table, str(path))
+            run = Run._from_table(table, str(path))
+        except MemoryError:
+            raise
         except (
             pa.ArrowException,
             KeyError,
@@ -279,6 +313,9 @@ class Run:
             raise InputError(
                 f"a damaged run ({(str(error) or 'unreadable').splitlines()[0]})", file=str(path)
             ) from None
+        if not sealed:
+            say_unsealed(path)
+        return run
 
     @staticmethod
     def _from_table(table: Any, file: str) -> Run:

@@ -23,6 +23,9 @@ def shipped_files(kind: str) -> dict[str, Path]:
 
     Args:
         kind: a key of `KINDS`.
+
+    Returns:
+        Paths by name.
     """
     beside = PACKAGE.parent / kind
     if kind == "rigs":
@@ -36,11 +39,14 @@ _log = logging.getLogger("flexura")
 
 
 def find(path: str | os.PathLike[str], kind: str) -> Path:
-    """The file at this path or, where none is there, the shipped one of this name.
+    """The file at a path or, where none is there, the shipped one of this name.
 
     Args:
         path: a path, or a name without folder and suffix, for example "rig".
         kind: a key of `KINDS`.
+
+    Returns:
+        The file's path.
 
     Raises:
         InputError: neither; names that are near are said.

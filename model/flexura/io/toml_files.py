@@ -5,12 +5,11 @@ from __future__ import annotations
 
 import os
 import re
-import tempfile
 import tomllib
-from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
+from .files import write_text
 
 MAX_BYTES = 10_000_000
 # a.a.a.a...: tomllib's time and memory grow with the square
@@ -18,8 +17,17 @@ _TOO_DEEP = re.compile(r"""(?:\.[ \t]*[\w"'-]+[ \t]*){300}""")
 
 
 def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """The tables of a TOML file. Raises InputError for anything that is not a readable TOML
-    file."""
+    """The tables of a TOML file.
+
+    Args:
+        path: of the file.
+
+    Returns:
+        The tables.
+
+    Raises:
+        InputError: it is not a readable TOML file.
+    """
     if not isinstance(path, str | os.PathLike):
         raise InputError("expected the path of a TOML file", key="path", value=path)
     name = os.fspath(path)
@@ -53,28 +61,13 @@ def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
         raise InputError(f"not valid TOML ({error})", file=name) from None
 
 
-def write_text(path: str | os.PathLike[str], text: str) -> None:
-    """Write a file as a whole: a reader sees the old one or the new one."""
-    write_bytes(path, text.encode())
-
-
-def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
-    """Write a file as a whole: a reader sees the old one or the new one."""
-    target = Path(path)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            stream.write(data)
-        os.chmod(name, 0o644)
-        os.replace(name, target)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
-
-
 def write_toml(path: str | os.PathLike[str], data: dict[str, Any]) -> None:
-    """Write tables as a TOML file, as a whole."""
+    """Write tables as a TOML file, as a whole.
+
+    Args:
+        path: of the file.
+        data: the tables.
+    """
     import tomli_w
 
     write_text(path, tomli_w.dumps(data))

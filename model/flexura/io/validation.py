@@ -14,7 +14,14 @@ MOST_LETTERS = 200
 
 
 def is_name(value: Any) -> bool:
-    """Whether a value is a name: a text of one line, not too long, without control characters."""
+    """Whether a value is a name.
+
+    Args:
+        value: what was given.
+
+    Returns:
+        True for a text of one line, not too long, without control characters.
+    """
     if not isinstance(value, str) or len(value) > MOST_LETTERS:
         return False
     kinds = map(unicodedata.category, value)
@@ -24,8 +31,17 @@ def is_name(value: Any) -> bool:
 def explain(
     error: ValidationError, model: type[BaseModel], data: Any, file: str = ""
 ) -> InputError:
-    """The first problem of `error` as an InputError; keys are counted from 1, as in
-    `link[2].length_m`."""
+    """The first problem that pydantic found, as an InputError.
+
+    Args:
+        error: of pydantic.
+        model: what was to be read.
+        data: from what.
+        file: its name, for the message.
+
+    Returns:
+        The error to raise; its keys are counted from 1, as in `link[2].length_m`.
+    """
     problems = [
         problem for problem in error.errors() if _fits(problem["loc"], data)
     ] or error.errors()

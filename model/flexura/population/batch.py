@@ -64,11 +64,20 @@ class Batch:
 
     @staticmethod
     def of(robots: Any, count: int | None = None, seed: int = 0) -> Batch:
-        """A Batch of an iterable of Robot or (Robot, Drive), or of a function (k, random) that
-        makes the k-th.
+        """A Batch of robots that are given one by one.
 
-        `count` is needed where `robots` has no length. A generator is good for one simulation, a
-        list or a function for any.
+        Args:
+            robots: an iterable of Robot or (Robot, Drive), or a function (k, random) that makes
+                robot k. A generator is good for one simulation, a list or a function for any
+                number.
+            count: number of robots; needed where `robots` has no length.
+            seed: of `random`, one generator a robot.
+
+        Returns:
+            The Batch.
+
+        Raises:
+            InputError: an argument is not what is expected.
         """
         if count is None:
             if not isinstance(robots, Sized):
@@ -85,8 +94,19 @@ class Batch:
 
     @staticmethod
     def vary(robot: Any, changes: Mapping[str, Any]) -> Batch:
-        """The robots of `robot.replace({key: value})` along arrays of values, all of one length B:
-        {"payload.mass_kg": (B,)}."""
+        """One robot with some values varied.
+
+        Args:
+            robot: a Robot, or the path or name of a robot file.
+            changes: arrays of values (B,), all of one length, by keys as in `Robot.replace`:
+                {"payload.mass_kg": (B,)}.
+
+        Returns:
+            A Batch of B robots.
+
+        Raises:
+            InputError: an unknown key, arrays of different lengths, or a value that is not finite.
+        """
         robot = robot_of(robot)
         if not isinstance(changes, Mapping):
             raise InputError(
@@ -148,8 +168,14 @@ class Batch:
             )
 
     def shares(self, size: int) -> Iterator[Share]:
-        """The robots in shares of `size`; those of `vary` as rows of numbers, without making
-        them."""
+        """The robots in shares; those of `vary` as rows of numbers, without making them.
+
+        Args:
+            size: number of robots in a share.
+
+        Yields:
+            The shares, in the order of the robots.
+        """
         source = self.source
         if isinstance(source, _Varied) and source.quick:
             for k in range(0, self.count, size):
@@ -180,7 +206,7 @@ def _grouped(robots: Sequence[Robot]) -> list[tuple[np.ndarray, Rows]]:
     members: dict[bytes, list[int]] = {}
     parts = [one(robot) for robot in robots]
     for k, part in enumerate(parts):
-        members.setdefault(part.counts.tobytes(), []).append(k)
+        members.setdefault(part.topology, []).append(k)
     return [(np.array(group), joined([parts[k] for k in group])) for group in members.values()]
 
 

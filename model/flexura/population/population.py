@@ -44,9 +44,10 @@ class Population:
 
     `population["tip/x"]` is (count, T), a reduced number (count,), `population.status` (count,) of
     "done", "limit", "stuck", "unbalanced" (energies that miss more than a tenth) or "refused" (a
-    robot that cannot be assembled or starts outside its limits); a robot's values are NaN from where it stopped. Of an interrupted population only the
-    robots that are done have rows: `population.robots`, counted from 0. `base`: the robot that
-    `Batch.vary` began with; None for other batches.
+    robot that cannot be assembled or starts outside its limits); a robot's values are NaN from
+    where it stopped. Of an interrupted population only the robots that are done have rows:
+    `population.robots`, counted from 0. `base`: the robot that `Batch.vary` began with; None for
+    other batches.
     """
 
     t: np.ndarray
@@ -186,18 +187,38 @@ def simulate(
     max_steps: int | None = None,
     wall_time: float | None = None,
 ) -> Population:
-    """Simulate every robot of the batch as `simulate` does one, to the last bit.
+    """Simulate every robot of a batch as `flexura.simulate` does one, to the last bit.
 
-    `drive`, `q0`, `qd0` (n,) hold for robots without a drive of their own, and for all. Without
-    `q0` each robot has its own `start`, as in `flexura.simulate`. `channels`
-    are kept, by default joint positions and tip deflections; with `reduce(t, channels) -> number or
-    {name: number}` only these numbers are. `folder`: a Parquet file each `chunk` robots, written as
-    a whole or not at all; the same call goes on where it was stopped, by Ctrl-C or by force, and
-    one that asks for something else is refused by name. `threads`: by default one a core.
-    `scheduler`: the address of a Dask scheduler, whose workers then do the chunks. `max_steps`: the
-    budget of each robot, as in `flexura.simulate`. `wall_time`: seconds after which the population
-    is stopped; it then has the chunks that are done. Raises InputError for wrong arguments, and for
-    what does not fit into memory; a robot that fails ends alone.
+    A robot that fails ends alone.
+
+    Args:
+        batch: the robots.
+        t_eval: ascending times (T,) [s].
+        drive: of robots without a drive of their own.
+        q0: configuration of all at the start (n,); None: each robot's own `start`.
+        qd0: its rates (n,).
+        rtol: as in `flexura.simulate`.
+        method: as in `flexura.simulate`.
+        start: as in `flexura.simulate`.
+        numerical_damping: as in `flexura.simulate`.
+        progress: called with the finished fraction.
+        channels: that are kept; None: joint positions and tip deflections.
+        reduce: function of t and the channels that gives a number, or {name: number}; only these
+            numbers are kept.
+        folder: gets a Parquet file each `chunk` robots, written as a whole or not at all. The same
+            call goes on where it was stopped. One that asks for something else is refused by name.
+        chunk: robots in a file.
+        threads: None: one a core.
+        scheduler: address of a Dask scheduler, whose workers then do the chunks.
+        max_steps: the budget of each robot, as in `flexura.simulate`.
+        wall_time: seconds after which the population is stopped; it then has the chunks that are
+            done.
+
+    Returns:
+        The Population.
+
+    Raises:
+        InputError: an argument is not what is expected, or does not fit into memory.
     """
     request = Request.checked(
         t_eval, drive, q0, qd0, rtol, method, start, numerical_damping, channels, reduce, max_steps

@@ -151,7 +151,7 @@ def check_drive(drive: Drive, joints: int, key: str) -> None:
         raise InputError(
             f"expected {joints} joint drives, one a joint", key=key, value=len(drive.joints)
         )
-    if drive.calls:
+    if drive.has_functions:
         raise InputError("expected Signals as forces: a population runs in the core alone", key=key)
 
 

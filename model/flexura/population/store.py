@@ -4,7 +4,7 @@ A folder has `population.json`, the request, and `chunk-0000000.parquet`, ... na
 first robot: a row a robot, columns robot (from 1), status, reached_s, steps, event, digest, what
 was varied as `vary/KEY`, then each channel as a list of T numbers, or each reduced number. Every
 file appears as a whole or not at all, so that a folder never holds half a chunk, nor a robot
-twice. Every page of a file has a checksum, so that a damaged file is not read.
+twice. Every file is sealed: a damaged chunk is made again, a damaged request is refused.
 """
 
 from __future__ import annotations
@@ -18,9 +18,20 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..io import write_bytes, write_text
+from ..io import (
+    Damaged,
+    read_sealed,
+    read_sealed_json,
+    read_table,
+    say_unsealed,
+    sealed_json,
+    sealed_parquet,
+    write_bytes,
+)
 
 MANIFEST = "population.json"
+MENDED = "simulating again mends it"
+REQUEST_ADVICE = "restore a copy, or simulate into another folder"
 NOTES = ("base", "vary", "units")  # of the manifest, for readers; robots are told apart by digests
 
 
@@ -49,6 +60,7 @@ class Chunk:
             raise KeyError(f"no {name!r} was kept; there are: {', '.join(self.values)}") from None
 
     def to_parquet(self) -> bytes:
+        """The chunk as the content of a Parquet file, with a row a robot."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -76,16 +88,15 @@ class Chunk:
             use_dictionary=["status", "event"],
             write_page_checksum=True,
         )
-        return sink.getvalue().to_pybytes()
+        return sealed_parquet(sink.getvalue().to_pybytes())
 
     @staticmethod
     def from_parquet(path: Path) -> Chunk:
-        """Raises ValueError for a file that is none."""
+        """Raises InputError for a file that is none, or damaged."""
         import pyarrow as pa
-        import pyarrow.parquet as pq
 
         try:
-            table = pq.ParquetFile(path, page_checksum_verification=True).read().combine_chunks()
+            table = _table(path).combine_chunks()
             values = {}
             for name in table.column_names:
                 if name.startswith("values/"):
@@ -103,8 +114,10 @@ class Chunk:
                 name: table.column(name)
                 for name in ("robot", "status", "reached_s", "steps", "event", "digest")
             }
-        except (pa.ArrowException, OSError, KeyError) as error:
-            raise ValueError(str(error)) from None
+        except (Damaged, MemoryError):
+            raise
+        except (pa.ArrowException, OSError, KeyError, ValueError) as error:
+            raise Damaged(f"a damaged chunk ({error}); {MENDED}", file=str(path)) from None
         return Chunk(
             int(plain["robot"][0].as_py()) - 1,
             np.array(plain["status"].to_pylist()),
@@ -136,7 +149,7 @@ class Store:
                     f"chunks without their {MANIFEST}: expected an empty folder, or all of one",
                     file=str(folder),
                 )
-            write_text(path, json.dumps(asked))
+            write_bytes(path, sealed_json(asked))
             return Store(Path(folder))
         begun = manifest(folder)
         differing = [
@@ -161,6 +174,11 @@ class Store:
         return self.folder / f"chunk-{first:07d}.parquet"
 
     def put(self, chunk: Chunk) -> None:
+        """Keep a chunk: in its file, or in memory where there is no folder.
+
+        Args:
+            chunk: the chunk.
+        """
         if self.folder is None:
             self.kept[chunk.first] = chunk
         else:
@@ -194,16 +212,18 @@ class Store:
             yield from (self.kept[first] for first in sorted(self.kept))
             return
         for path in sorted(self.folder.glob("chunk-*.parquet")):
-            try:
-                yield Chunk.from_parquet(path)
-            except ValueError as error:
-                raise InputError(
-                    f"a damaged chunk ({error}); simulating again mends it", file=str(path)
-                ) from None
+            yield Chunk.from_parquet(path)
 
 
 def is_population(folder: str | Path) -> bool:
-    """Whether a folder is one of a population."""
+    """Whether a folder is one of a population.
+
+    Args:
+        folder: the folder.
+
+    Returns:
+        True if a population was stored there.
+    """
     return (Path(folder) / MANIFEST).is_file()
 
 
@@ -223,27 +243,38 @@ def manifest(folder: str | Path) -> dict[str, Any]:
     if not path.is_file():
         raise InputError(f"no population here: expected a folder with {MANIFEST}", file=str(folder))
     try:
-        found = json.loads(path.read_text())
+        found, sealed = read_sealed_json(path, REQUEST_ADVICE, "a damaged request of a population")
         if not isinstance(found, dict) or not {"t_s", "channels", "count"} <= set(found):
             raise ValueError("expected t_s, channels and count")
+    except Damaged:
+        raise
     except (ValueError, OSError, RecursionError) as error:
         raise InputError(f"not the request of a population ({error})", file=str(path)) from None
+    if not sealed:
+        say_unsealed(path)
     return found
+
+
+def _table(path: Path) -> Any:
+    """The table of a chunk's file, all of it verified."""
+    content, _ = read_sealed(path, MENDED, "a damaged chunk")
+    return read_table(content)
 
 
 def _digests(path: Path) -> list[bytes]:
     """The digests of a chunk's robots; none of a damaged file, which is then done again."""
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
     try:
-        table = pq.ParquetFile(path, page_checksum_verification=True).read(columns=["digest"])
-        return list(table.column("digest").to_pylist())
-    except (pa.ArrowException, OSError, KeyError):
+        return list(_table(path).column("digest").to_pylist())
+    except MemoryError:
+        raise
+    except (Damaged, pa.ArrowException, OSError, KeyError, ValueError):
         return []
 
 
 def in_memory() -> Store:
+    """A store without a folder."""
     return Store()
 
 

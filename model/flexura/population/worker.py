@@ -15,8 +15,8 @@ from ..io import STATIONS, balance_events
 from ..robot import Robot
 from ..signals import Drive
 from ..simulation.dynamics import simulate
-from ..simulation.recorder import LIMITS, LOSS, NUMERICAL, WORK, limit_event, observed
-from ..simulation.start import NO_START, outside, put_on_motions
+from ..simulation.recorder import LIMITS, LOSS, NUMERICAL, WORK, limit_event, recorded_channels
+from ..simulation.start import NO_START, apply_prescribed_motions, limit_error
 from ..system import NoEquilibrium, System, equilibrium
 from .batch import Share
 from .request import Request, check_drive
@@ -52,7 +52,17 @@ class Part(NamedTuple):
 def simulated(request: Request, share: Share, threads: int, watch: Any) -> Part:
     """Run and observe robots, or begin to, if `watch` is stopped meanwhile.
 
-    Raises: InputError: a drive has another number of joints.
+    Args:
+        request: what is asked.
+        share: the robots.
+        threads: how many work.
+        watch: by which another thread stops the work.
+
+    Returns:
+        What was computed of each robot.
+
+    Raises:
+        InputError: a drive has another number of joints.
     """
     b, T, N = len(share), len(request.t), len(share.robots[0].links)
     for k, drive in enumerate(share.drives, 1):
@@ -118,24 +128,32 @@ def _equilibrium(rows: Rows, drive: Drive | None, t: float) -> np.ndarray | None
     on their motion at t [s]; None: the core refuses the robot, and will say why."""
     try:
         robot = core.Mechanics(
-            rows.gravity[0], rows.payload[0], rows.counts, rows.numbers[0], rows.material[0]
+            rows.gravity[0],
+            rows.payload[0],
+            rows.counts,
+            rows.numbers[0],
+            rows.material[0],
+            rows.lumps[0],
         )
     except core.Fault:
         return None
     q = np.zeros(robot.n)
     q[robot.first] = rows.numbers[0, :, START]
     if drive is not None:
-        put_on_motions(robot.first, drive, t, q, np.zeros(robot.n))
+        apply_prescribed_motions(robot.first, drive, t, q, np.zeros(robot.n))
     return equilibrium(robot, q)
+
+
+OF_JOINTS = ("position", "velocity", "drive", "motor_position", "motor_velocity")
 
 
 def _columns(robot: Robot, names: Sequence[str]) -> list[tuple[str, int]] | None:
     """The channels as the core names them; None if it does not have one of them."""
     known: dict[str, tuple[str, int]] = {}
     for i in range(len(robot.links)):
-        known |= {f"joint/{i + 1}/{what}": (what, i) for what in ("position", "velocity", "drive")}
+        known |= {f"joint/{i + 1}/{what}": (what, i) for what in OF_JOINTS}
     accounts = {"energy/work": WORK, "energy/loss": LOSS, "energy/numerical_loss": NUMERICAL}
-    seen = [name for name in observed(robot)]
+    seen = [name for name in recorded_channels(robot)]
     known |= {name: ("account", k) for name, k in accounts.items()} | {
         name: ("seen", k) for k, name in enumerate(seen)
     }
@@ -186,6 +204,7 @@ def _together(
         rows.counts,
         rows.numbers,
         rows.material,
+        rows.lumps,
         rows.gravity,
         rows.payload,
         rows.limits,
@@ -239,7 +258,7 @@ def _event(
     if word == "refused" and text is None:
         limits = robot.links[joint].joint.limits
         assert limits is not None
-        return str(outside(joint, limits, float(position[joint])))
+        return str(limit_error(joint, limits, float(position[joint])))
     link, key, said = text or (-1, "", "")
     if word != "refused":
         return said

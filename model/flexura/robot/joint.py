@@ -26,6 +26,9 @@ def key_of(quantity: str, type: object) -> str:
     Args:
         quantity: a name of `KEYS`, or any other, which is its own key.
         type: "R", "Pa" or "Pb".
+
+    Returns:
+        The key.
     """
     turning, sliding = KEYS.get(quantity, (quantity, quantity))
     return turning if type == "R" else sliding
@@ -34,6 +37,32 @@ def key_of(quantity: str, type: object) -> str:
 def _limits(key: str, unit: str) -> Any:
     text = f"two numbers, the lower limit and a higher upper limit, in {unit}, {BOUNDS[key]}"
     return Field(None, strict=False, description=text)
+
+
+class Spring(Table):
+    """A spring beside a joint's drive (106)."""
+
+    stiffness_N_m_rad: float = quantity(
+        "stiffness_N_m_rad", "the stiffness of the spring of a joint R in N m/rad", 0.0
+    )
+    rest_rad: float = quantity("rest_rad", "where the spring of a joint R rests, in radians", 0.0)
+    stiffness_N_m: float = quantity(
+        "stiffness_N_m", "the stiffness of the spring of a joint Pa or Pb in N/m", 0.0
+    )
+    rest_m: float = quantity("rest_m", "where the spring of a joint Pa or Pb rests, in metres", 0.0)
+
+
+class Transmission(Table):
+    """What is between a rotor and its hub: a spring with a damper (107). All values are those at
+    the joint, the rotor's inertia too."""
+
+    stiffness_N_m_rad: float = Field(
+        gt=0, description="the stiffness at the joint in N m/rad, above 0"
+    )
+    damping_N_m_s_rad: float = quantity(
+        "damping_N_m_s_rad", "the damping at the joint in N m s/rad", 0.0
+    )
+    gear_ratio: float = quantity("gear_ratio", "turns of the motor in a turn of the joint", 1.0)
 
 
 class Joint(Table):
@@ -76,6 +105,17 @@ class Joint(Table):
     coulomb_friction_N: float = quantity(
         "coulomb_friction_N", "Coulomb friction of a joint Pa or Pb in N", 0.0
     )
+    hub_radius_m: float = quantity(
+        "hub_radius_m", "how far from the axis of a joint R its link begins, in metres", 0.0
+    )
+    spring: Spring | None = Field(
+        None,
+        description="a table { stiffness_N_m_rad, rest_rad }, of a joint Pa or Pb { stiffness_N_m, "
+        "rest_m }",
+    )
+    transmission: Transmission | None = Field(
+        None, description="a table { stiffness_N_m_rad, damping_N_m_s_rad, gear_ratio }"
+    )
     locked: bool = Field(False, description="true (the joint is clamped at its start) or false")
 
     @model_validator(mode="after")
@@ -86,6 +126,15 @@ class Joint(Table):
             if wrong in self.model_fields_set and value != type(self).model_fields[wrong].default:
                 right = key_of(name, self.type)
                 raise WrongValue(wrong, value, f"none: a joint {self.type} has {right}")
+        self._check_spring()
+        if self.type != "R":
+            for key in ("hub_radius_m", "transmission"):
+                if getattr(self, key):
+                    expected = f"none: a joint {self.type} slides; only a joint R has one"
+                    raise WrongValue(key, getattr(self, key), expected)
+        if self.transmission and not self.rotor_inertia > 0:
+            expected = "an inertia above 0: behind a transmission the rotor moves by itself"
+            raise WrongValue(self.key("rotor_inertia"), self.rotor_inertia, expected)
         if self.type == "R" and self.angle_rad != 0:
             raise WrongValue(
                 "angle_rad",
@@ -102,8 +151,49 @@ class Joint(Table):
                 )
         return self
 
+    def _check_spring(self) -> None:
+        if self.spring is None:
+            return
+        turning, sliding = ("stiffness_N_m_rad", "rest_rad"), ("stiffness_N_m", "rest_m")
+        wrong, right = (sliding, turning) if self.type == "R" else (turning, sliding)
+        for key, instead in zip(wrong, right, strict=True):
+            if key in self.spring.model_fields_set and getattr(self.spring, key) != 0.0:
+                expected = f"none: the spring of a joint {self.type} has {instead}"
+                raise WrongValue(f"spring.{key}", getattr(self.spring, key), expected)
+
+    @property
+    def spring_stiffness(self) -> float:
+        """Stiffness of the spring beside the drive [N m/rad, N/m]; 0: none."""
+        if self.spring is None:
+            return 0.0
+        return self.spring.stiffness_N_m_rad if self.type == "R" else self.spring.stiffness_N_m
+
+    @property
+    def spring_rest(self) -> float:
+        """Where that spring rests [rad, m]."""
+        if self.spring is None:
+            return 0.0
+        return self.spring.rest_rad if self.type == "R" else self.spring.rest_m
+
+    @property
+    def windup_stiffness(self) -> float:
+        """Stiffness of the transmission at the joint [N m/rad]; 0: none."""
+        return 0.0 if self.transmission is None else self.transmission.stiffness_N_m_rad
+
+    @property
+    def windup_damping(self) -> float:
+        """Damping of the transmission at the joint [N m s/rad]."""
+        return 0.0 if self.transmission is None else self.transmission.damping_N_m_s_rad
+
     def key(self, quantity: str) -> str:
-        """The key that holds a quantity of this joint."""
+        """The key that holds a quantity of this joint.
+
+        Args:
+            quantity: for example "start".
+
+        Returns:
+            The key, for example "start_rad".
+        """
         return key_of(quantity, self.type)
 
     @property

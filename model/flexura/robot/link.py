@@ -23,9 +23,10 @@ LEAST_FREE = (
 )
 
 
-_MASS, _STIFFNESS = BOUNDS["mass_per_length_kg_m"], BOUNDS["bending_stiffness_N_m2"]
-MassPerLength = Annotated[float, Field(ge=_MASS.low, le=_MASS.high)]
+_STIFFNESS = BOUNDS["bending_stiffness_N_m2"]
+MassPerLength = Annotated[float, Field(ge=0, le=BOUNDS["mass_per_length_kg_m"].high)]
 BendingStiffness = Annotated[float, Field(ge=_STIFFNESS.low, le=_STIFFNESS.high)]
+Pair = Annotated[tuple[float, float], Field(strict=False)]
 
 
 class Section(Table):
@@ -53,6 +54,16 @@ class Damping(Table):
 
     alpha_1_s: float = quantity("alpha_1_s", "the mass-proportional factor in 1/s", 0.0)
     beta_s: float = quantity("beta_s", "the stiffness-proportional factor in seconds", 0.0)
+
+
+class Lump(Table):
+    """A mass on the line of a link, with the inertia about its own centre (108)."""
+
+    at_m: float = Field(ge=0, description="the place along the link in metres, 0 or more")
+    mass_kg: float = Field(0.0, ge=0, description="a mass in kilograms, 0 or more")
+    inertia_kg_m2: float = Field(
+        0.0, ge=0, description="an inertia about the mass's own centre in kg m^2, 0 or more"
+    )
 
 
 _LINK_TEXT = {
@@ -102,11 +113,16 @@ class Link(Table):
         None, description=_LINK_TEXT["bending_stiffness_N_m2"]
     )
     mass_kg: float | None = quantity("mass_kg", "a rigid link's mass in kilograms", None)
-    centre_of_mass_m: float | None = quantity(
-        "centre_of_mass_m", "a rigid link's centre of mass from its origin in metres", None
+    centre_of_mass_m: float | Pair | None = Field(
+        None,
+        description="a rigid link's centre of mass from its origin in metres: a number along the "
+        f"link, or two, [along, across], {BOUNDS['centre_of_mass_m']}",
     )
     inertia_kg_m2: float | None = quantity(
         "inertia_kg_m2", "a rigid link's inertia about its centre of mass in kg m^2", None
+    )
+    mass: list[Lump] = Field(
+        default_factory=list, description="tables [[link.mass]] { at_m, mass_kg, inertia_kg_m2 }"
     )
     damping: Damping = Field(default_factory=Damping, description="a table { alpha_1_s, beta_s }")
     joint: Joint = Field(description='a table [link.joint] with at least type = "R", "Pa" or "Pb"')
@@ -138,6 +154,15 @@ class Link(Table):
             self._check_flexible()
         else:
             self._check_rigid()
+        for k, lump in enumerate(self.mass, 1):
+            if lump.at_m > self.length_m:
+                expected = f"a place on the link, at most its length, {self.length_m:g}"
+                raise WrongValue(f"mass[{k}].at_m", lump.at_m, expected)
+        if self.mass and self.flexible and self.joint.type == "Pb":
+            expected = (
+                "none: masses on a flexible link that moves through a sleeve are not modelled"
+            )
+            raise WrongValue("mass[1].at_m", self.mass[0].at_m, expected)
         for key in ("section", "mass_per_length_kg_m", "bending_stiffness_N_m2"):
             value = getattr(self, key)
             if isinstance(value, list) and (
@@ -225,6 +250,8 @@ class Link(Table):
             or self.mass_per_length_kg_m is not None
             or self.density_kg_m3 is not None
         )
+        if self.mass_per_length_kg_m == 0:
+            raise WrongValue("mass_per_length_kg_m", 0.0, "a number above 0, or mass_kg = 0.0")
         if self.mass_kg is None and not spread:
             raise WrongValue(
                 "mass_kg", None, "missing: a rigid link's mass in kilograms, 0 or more"
@@ -254,23 +281,43 @@ class Link(Table):
         )
 
     def mass_per_length(self, x: Any) -> np.ndarray:
-        """Mass per length [kg/m] at x [m] from the link's origin, linear between the given
-        places."""
+        """Mass per length, linear between the given places.
+
+        Args:
+            x: places from the link's origin [m].
+
+        Returns:
+            As many values [kg/m].
+        """
         if self.mass_per_length_kg_m is not None:
             return _spread(self.mass_per_length_kg_m, x)
         width, height = self._section_at(x)
         return _spread(self.density_kg_m3 * width * height, x)
 
     def bending_stiffness(self, x: Any) -> np.ndarray:
-        """Bending stiffness EI [N m^2] at x [m] from the link's origin."""
+        """Bending stiffness EI.
+
+        Args:
+            x: places from the link's origin [m].
+
+        Returns:
+            As many values [N m^2].
+        """
         if self.bending_stiffness_N_m2 is not None:
             return _spread(self.bending_stiffness_N_m2, x)
         width, height = self._section_at(x)
         return _spread(self.young_modulus_Pa * width * height**3 / 12, x)
 
     def axial_stiffness(self, x: Any) -> np.ndarray | None:
-        """Axial stiffness EA [N] at x [m], or None where the file gives EI only (the native model
-        has no axial unknowns)."""
+        """Axial stiffness EA.
+
+        Args:
+            x: places from the link's origin [m].
+
+        Returns:
+            As many values [N]; None where the file gives EI only. The native model has no axial
+            unknowns.
+        """
         if self.section is None or self.young_modulus_Pa is None:
             return None
         width, height = self._section_at(x)

@@ -24,9 +24,15 @@ class OldKey:
 
 
 def renamed(data: dict[str, Any]) -> tuple[dict[str, Any], list[OldKey]]:
-    """The tables of a robot file with the keys of today, and what was old.
+    """The tables of a robot file with the keys of today.
 
     A joint that has a quantity under both names keeps both, and the old one is an unknown key.
+
+    Args:
+        data: the tables.
+
+    Returns:
+        The tables, and what was old in them.
     """
     links = data.get("link") if isinstance(data, dict) else None
     if not isinstance(links, list):

@@ -19,17 +19,12 @@ from ..io import FORMAT, check_format, explain, find, read_toml, summary, write_
 from .joint import KEYS, key_of
 from .link import LEAST_FREE, Link
 from .old_keys import renamed
-from .table import BOUNDS, Table, name, quantity
+from .payload import Payload
+from .suitability import check_masses, check_stretch
+from .table import BOUNDS, Table, name
 
 MAX_LINKS = 256
 _log = logging.getLogger("flexura")
-
-
-class Payload(Table):
-    """A point mass with inertia at the tip of the last link."""
-
-    mass_kg: float = quantity("mass_kg", "the payload's mass in kilograms", 0.0)
-    inertia_kg_m2: float = quantity("inertia_kg_m2", "the payload's inertia in kg m^2", 0.0)
 
 
 class Robot(Table):
@@ -52,7 +47,8 @@ class Robot(Table):
         min_length=1, max_length=MAX_LINKS, description=f"1 to {MAX_LINKS} tables [[link]]"
     )
     payload: Payload = Field(
-        default_factory=Payload, description="a table { mass_kg, inertia_kg_m2 }"
+        default_factory=Payload,
+        description="a table { mass_kg, inertia_kg_m2, centre_of_mass_m }",
     )
     format: int = Field(
         FORMAT, ge=1, le=FORMAT, description=f"the file's format, a whole number up to {FORMAT}"
@@ -90,6 +86,12 @@ class Robot(Table):
         return self
 
     @model_validator(mode="after")
+    def _suits(self) -> Robot:
+        check_masses(self.link, self.payload)
+        check_stretch(self.link, self.payload, self.gravity_m_s2)
+        return self
+
+    @model_validator(mode="after")
     def _whole_meshes(self) -> Robot:
         if self.sliding == "nodal":
             for i, link in enumerate(self.link):
@@ -103,7 +105,14 @@ class Robot(Table):
         return self
 
     def rides(self, i: int) -> bool:
-        """Whether joint i (from 0) slides along a flexible link."""
+        """Whether a joint slides along a flexible link.
+
+        Args:
+            i: number of the joint, from 0.
+
+        Returns:
+            True for a Pa whose link before is flexible.
+        """
         return i > 0 and self.link[i].joint.type == "Pa" and self.link[i - 1].flexible
 
     @property
@@ -116,7 +125,14 @@ class Robot(Table):
         )
 
     def travel(self, i: int) -> tuple[float, float]:
-        """How far joint i (from 0) can go on its links: infinite for R and for a Pa on the base."""
+        """How far a joint can go on its links.
+
+        Args:
+            i: number of the joint, from 0.
+
+        Returns:
+            The lowest and the highest position [m]; infinite for R and for a Pa on the base.
+        """
         link = self.link[i]
         if link.joint.type == "Pb":
             return (LEAST_FREE * link.length_m if link.flexible else 0.0), link.length_m
@@ -144,7 +160,17 @@ class Robot(Table):
         """A robot from the tables of a robot file.
 
         Keys of 0.1 without a unit, as `start`, are read as those of today, and the logger "flexura"
-        names the new ones. Raises InputError, naming `file`, key, value and what was expected.
+        names the new ones.
+
+        Args:
+            data: the tables.
+            file: name of their file, for messages.
+
+        Returns:
+            The Robot.
+
+        Raises:
+            InputError: a wrong value; it names file, key, value and what was expected.
         """
         if isinstance(data, dict):
             check_format(data, file)
@@ -186,8 +212,18 @@ class Robot(Table):
         return self.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
 
     def replace(self, changes: dict[str, Any]) -> Robot:
-        """A robot with some values changed: `robot.replace({"payload.mass_kg": 0.1,
-        "link.2.length_m": 0.4})`, links counted from 1."""
+        """A robot with some values changed.
+
+        Args:
+            changes: values by key, links counted from 1: {"payload.mass_kg": 0.1,
+                "link.2.length_m": 0.4}.
+
+        Returns:
+            The new Robot; this one stays.
+
+        Raises:
+            InputError: an unknown key, or a wrong value.
+        """
         changes = {self._todays_path(path, changes): value for path, value in changes.items()}
         # says what is wrong in a file's words
         try:
@@ -242,6 +278,9 @@ def load(path: str | os.PathLike[str]) -> Robot:
     Args:
         path: the file's path, or the name of a robot that comes with flexura, for example "rig".
 
+    Returns:
+        The Robot.
+
     Raises:
         InputError: no such file or robot, or a wrong value; it names file, key, value and what was
             expected.
@@ -253,9 +292,15 @@ def load(path: str | os.PathLike[str]) -> Robot:
 def robot_of(robot: Any, key: str = "robot") -> Robot:
     """The Robot of what a function was given.
 
-    Args: robot: a Robot, the path or name of a robot file, or a System; key: the argument's name.
+    Args:
+        robot: a Robot, the path or name of a robot file, or a System.
+        key: name of the argument.
 
-    Raises: InputError: it is something else, or the file is wrong.
+    Returns:
+        The Robot.
+
+    Raises:
+        InputError: it is something else, or the file is wrong.
     """
     if isinstance(robot, Robot):
         return robot
@@ -269,5 +314,10 @@ def robot_of(robot: Any, key: str = "robot") -> Robot:
 
 
 def save(robot: Robot, path: str | os.PathLike[str]) -> None:
-    """Write a robot file (TOML) that `load` reads back to an equal robot."""
+    """Write a robot file (TOML) that `load` reads back to an equal robot.
+
+    Args:
+        robot: the robot.
+        path: where to; a file there is replaced as a whole.
+    """
     write_toml(path, {"format": FORMAT} | robot.to_dict())

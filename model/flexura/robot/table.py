@@ -51,7 +51,7 @@ BOUNDS = {
     "height_m": Bounds(1e-7, 10),
     "young_modulus_Pa": Bounds(1e3, 2e12),
     "density_kg_m3": Bounds(10, 25000),
-    "mass_per_length_kg_m": Bounds(1e-12, 1e6),
+    "mass_per_length_kg_m": Bounds(1e-12, 1e6, zero=True),
     "bending_stiffness_N_m2": Bounds(1e-18, 1e13),
     "mass_kg": MASS,
     "hub_mass_kg": MASS,
@@ -72,6 +72,13 @@ BOUNDS = {
     "viscous_friction_N_s_m": Bounds(1e-15, 1e9, zero=True),
     "coulomb_friction_N_m": Bounds(1e-20, 1e10, zero=True),
     "coulomb_friction_N": Bounds(1e-15, 1e9, zero=True),
+    "hub_radius_m": Bounds(0, 1000),
+    "stiffness_N_m_rad": Bounds(1e-20, 1e15, zero=True),
+    "stiffness_N_m": Bounds(1e-15, 1e15, zero=True),
+    "damping_N_m_s_rad": Bounds(1e-20, 1e10, zero=True),
+    "rest_rad": Bounds(0, 1e6, signed=True),
+    "rest_m": Bounds(0, 1e4, signed=True),
+    "gear_ratio": Bounds(1e-6, 1e6),
     "gravity_m_s2": Bounds(0, 1e4, signed=True),
 }
 

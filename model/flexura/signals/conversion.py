@@ -25,7 +25,17 @@ class FunctionSignal(Signal):
     key: str = "signal"
 
     def value(self, t: float) -> float:
-        """y at t [s]. Raises InputError where the function gives anything but a finite number."""
+        """The function's value.
+
+        Args:
+            t: time [s].
+
+        Returns:
+            y.
+
+        Raises:
+            InputError: the function gives anything but a finite number.
+        """
         given = self.function(t)
         if isinstance(given, np.ndarray) and given.size == 1:
             given = given.item()
@@ -41,13 +51,17 @@ class FunctionSignal(Signal):
 def as_signal(value: Any, key: str, t: np.ndarray | None = None) -> Signal | None:
     """A Signal from what a caller gives.
 
-    Args: value: None, a number, a Signal, a function of t [s], or values (T,) at the times `t`
-        (T,); key: the argument's name, for the message.
+    Args:
+        value: None, a number, a Signal, a function of t [s], or values (T,) at the times `t`.
+        key: name of the argument, for the message.
+        t: times (T,) [s].
 
-    Returns: numbers as constant Signals, arrays as cubic splines (`table`), functions as a
+    Returns:
+        Numbers as constant Signals, arrays as cubic splines (`table`), functions as a
         FunctionSignal.
 
-    Raises: InputError: anything else; an array without times, or of another length.
+    Raises:
+        InputError: anything else; an array without times, or of another length.
     """
     if value is None or isinstance(value, Signal):
         return value
@@ -55,7 +69,10 @@ def as_signal(value: Any, key: str, t: np.ndarray | None = None) -> Signal | Non
         return constant(number(value, key, EXPECTED))
     if callable(value):
         return FunctionSignal(
-            np.zeros((0, COLUMNS)), _named(value), function_of(value, key, (1,), EXPECTED), key
+            np.zeros((0, COLUMNS)),
+            _function_spec(value),
+            function_of(value, key, (1,), EXPECTED),
+            key,
         )
     if isinstance(value, str | bytes | dict | set):
         raise InputError(EXPECTED, key=key, value=value)
@@ -75,10 +92,18 @@ def as_signals(
 ) -> list[Signal | None]:
     """One Signal or function a joint.
 
-    Args: value: one entry a joint, each as `as_signal` reads it; or values (T, joints) at the times
-        `t` (T,); of a robot with one joint also its entry alone. key: the argument's name.
+    Args:
+        value: one entry a joint, each as `as_signal` reads it; or values (T, joints) at the times
+            `t`; of a robot with one joint also its entry alone.
+        joints: how many the robot has.
+        key: name of the argument, for the message.
+        t: times (T,) [s].
 
-    Raises: InputError: another number of entries, or an entry that is nothing of this.
+    Returns:
+        One entry a joint, None for a free one.
+
+    Raises:
+        InputError: another number of entries, or an entry that is nothing of this.
     """
     expected = f"expected {joints} entries, one a joint: numbers, Signals, functions of t or arrays"
     if isinstance(value, str | bytes | dict | set) or value is None:
@@ -89,28 +114,37 @@ def as_signals(
         entries = list(value.T) if t is not None and len(value) == len(t) else list(value)
     else:
         entries = list(value)
-    if joints == 1 and t is not None and len(entries) == len(t) > 1 and not _each(entries):
+    if joints == 1 and t is not None and len(entries) == len(t) > 1 and not _has_entries(entries):
         entries = [entries]
     if len(entries) != joints:
         raise InputError(expected, key=key, value=len(entries))
     return [as_signal(entry, f"{key}[{i}]", t) for i, entry in enumerate(entries, 1)]
 
 
-def _named(function: Callable[..., Any]) -> dict[str, Any]:
+def _function_spec(function: Callable[..., Any]) -> dict[str, Any]:
     return {"kind": "function", "name": getattr(function, "__name__", type(function).__name__)}
 
 
-def _each(value: Any) -> bool:
+def _has_entries(value: Any) -> bool:
     return any(isinstance(x, Signal) or callable(x) or np.iterable(x) for x in value)
 
 
 def spline(signal: FunctionSignal, start: float, end: float) -> Signal:
-    """A function of time as a spline of fifth order from `start` to `end` [s].
+    """A function of time as a spline of fifth order.
 
     As many equally spaced values are taken as the spline needs to meet the function between them.
     Where its acceleration jumps, the spline rounds the jump over a few thousandths of the time.
 
-    Raises: InputError: a value is no finite number; its position or velocity jumps.
+    Args:
+        signal: the function.
+        start: begin of the spline [s].
+        end: end of the spline [s].
+
+    Returns:
+        The Signal.
+
+    Raises:
+        InputError: a value is no finite number; its position or velocity jumps.
     """
     from scipy.interpolate import PPoly, make_interp_spline
 

@@ -48,12 +48,19 @@ class JointDrive:
         object.__setattr__(self, "prescribed", flag(self.prescribed, "prescribed"))
 
     @property
-    def unfollowed(self) -> bool:
+    def has_unfollowed_motion(self) -> bool:
         """Whether it has a motion, but neither gains nor `prescribed`: nothing would follow it."""
         return self.motion is not None and not (self.prescribed or self.kp or self.kd)
 
     def force_at(self, t: float) -> float:
-        """The feedforward at t [s], 0 without one."""
+        """The feedforward at a time.
+
+        Args:
+            t: time [s].
+
+        Returns:
+            Force or torque [N or N m], 0 without a feedforward.
+        """
         if self.force is None:
             return 0.0
         if isinstance(self.force, FunctionSignal):
@@ -90,7 +97,14 @@ class Drive:
 
     @staticmethod
     def none(joints: int) -> Drive:
-        """No drive at all: every joint is free."""
+        """No drive at all: every joint is free.
+
+        Args:
+            joints: how many the robot has.
+
+        Returns:
+            The Drive.
+        """
         return Drive((JointDrive(),) * whole(joints, "joints", 0))
 
     @staticmethod
@@ -100,7 +114,10 @@ class Drive:
         Args:
             signals: one entry a joint: a number, a Signal, a function of t [s], an array (T,) of
                 values at the times `t_s`, or None for a free joint.
-            t_s (T,): the times of arrays [s].
+            t_s: the times of arrays (T,) [s].
+
+        Returns:
+            The Drive.
 
         Raises:
             InputError: an argument is not what is expected.
@@ -115,7 +132,10 @@ class Drive:
             motions: one entry a joint, as in `force` [m or rad].
             kp: gains of the position, (joints,) or one for all [N/m or N m/rad].
             kd: gains of the rate, (joints,) or one for all [N s/m or N m s/rad].
-            t_s (T,): the times of arrays [s].
+            t_s: the times of arrays (T,) [s].
+
+        Returns:
+            The Drive.
 
         Raises:
             InputError: an argument is not what is expected.
@@ -139,7 +159,10 @@ class Drive:
 
         Args:
             motions: one entry a joint, as in `force` [m or rad]; None: the joint is free.
-            t_s (T,): the times of arrays [s].
+            t_s: the times of arrays (T,) [s].
+
+        Returns:
+            The Drive.
 
         Raises:
             InputError: an argument is not what is expected.
@@ -157,21 +180,35 @@ class Drive:
         return np.array([joint.prescribed and joint.motion is not None for joint in self.joints])
 
     @property
-    def calls(self) -> bool:
+    def has_functions(self) -> bool:
         """Whether a force is a Python function."""
         return any(isinstance(j.force, FunctionSignal) for j in self.joints)
 
-    def called(self, t: float) -> np.ndarray:
-        """The forces (n,) at t [s] of those joints whose force is a Python function."""
+    def function_forces(self, t: float) -> np.ndarray:
+        """The forces of those joints whose force is a Python function.
+
+        Args:
+            t: time [s].
+
+        Returns:
+            Forces (n,) [N or N m], 0 for the other joints.
+        """
         return np.array(
             [j.force.value(t) if isinstance(j.force, FunctionSignal) else 0.0 for j in self.joints]
         )
 
     def within(self, start: float, end: float) -> Drive:
-        """The same drive for a run from `start` to `end` [s]: its motions are Signals.
+        """The same drive for a run between two times: its motions are Signals.
 
         Functions become splines. A prescribed motion that jumps at `end` keeps to the end what it
         was before.
+
+        Args:
+            start: begin of the run [s].
+            end: end of the run [s].
+
+        Returns:
+            The Drive.
 
         Raises:
             InputError: a joint has a motion that nothing follows; a prescribed motion's position or
@@ -180,7 +217,7 @@ class Drive:
         joints = []
         for i, joint in enumerate(self.joints, 1):
             motion, key = joint.motion, f"motion of joint {i}"
-            if joint.unfollowed:
+            if joint.has_unfollowed_motion:
                 raise InputError(
                     f"joint {i} has a motion, but neither gains nor prescribed: give kp and kd, "
                     f"prescribe it (Drive.prescribed, manoeuvre.prescribed()), or take a "
@@ -199,6 +236,17 @@ class Drive:
     def __call__(
         self, t: float, position: Any, velocity: Any, tip_deflection: float = 0.0
     ) -> np.ndarray:
+        """The forces in a state.
+
+        Args:
+            t: time [s].
+            position: of the joints (n,) [m or rad].
+            velocity: of the joints (n,) [m/s or rad/s].
+            tip_deflection: not used.
+
+        Returns:
+            Forces (n,) [N or N m].
+        """
         out = np.zeros(len(self.joints))
         for i, joint in enumerate(self.joints):
             out[i] = joint.force_at(t)
@@ -255,8 +303,17 @@ class Drive:
 
 
 def check_smooth(motion: Signal, key: str, start: float = -np.inf, end: float = np.inf) -> None:
-    """Refuse a motion whose position or velocity jumps between `start` and `end` [s], both
-    excluded: no finite force follows it."""
+    """Refuse a motion whose position or velocity jumps: no finite force follows it.
+
+    Args:
+        motion: the motion.
+        key: name of the argument, for the message.
+        start: begin of the interval, itself excluded [s].
+        end: end of the interval, itself excluded [s].
+
+    Raises:
+        InputError: it jumps between `start` and `end`.
+    """
     for at in motion.breaks[1:]:
         if start < at < end and not _smooth_at(motion, float(at)):
             raise InputError(

@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import InputError
 from ..io import check_format, choice, find, is_name, read_toml, whole
 from .drive import Drive, JointDrive, check_smooth
-from .parsing import from_spec, plausible
+from .parsing import from_spec, is_plausible
 from .signal import Signal
 
 
@@ -78,6 +78,9 @@ def load_manoeuvre(path: str | os.PathLike[str], joints: int) -> Manoeuvre:
         path: the file's path, or the name of a manoeuvre that comes with flexura.
         joints: how many the robot has.
 
+    Returns:
+        The Manoeuvre.
+
     Raises:
         InputError: no such file, or a wrong value; it names file, key and value.
     """
@@ -91,7 +94,7 @@ def load_manoeuvre(path: str | os.PathLike[str], joints: int) -> Manoeuvre:
 
 def _manoeuvre(data: dict[str, Any], joints: int) -> Manoeuvre:
     check_format(data)
-    _known(data, _KEYS, "")
+    _check_keys(data, _KEYS, "")
     duration = _number(
         data, "duration_s", f"a duration above 0 in seconds, at most {LONGEST:g}", low=0.0
     )
@@ -126,7 +129,7 @@ def _manoeuvre(data: dict[str, Any], joints: int) -> Manoeuvre:
         key = f"joint[{i}]"
         if not isinstance(entry, dict):
             raise InputError("expected a table", key=key, value=entry)
-        _known(entry, _JOINT_KEYS, key + ".")
+        _check_keys(entry, _JOINT_KEYS, key + ".")
         force = from_spec(entry["force"], key=f"{key}.force") if "force" in entry else None
         motion = from_spec(entry["motion"], key=f"{key}.motion") if "motion" in entry else None
         gains = [
@@ -181,7 +184,7 @@ def _prescribed(entry: dict[str, Any], motion: Signal | None, key: str, duration
     return True
 
 
-def _known(data: dict[str, Any], keys: Sequence[str], prefix: str) -> None:
+def _check_keys(data: dict[str, Any], keys: Sequence[str], prefix: str) -> None:
     for key, value in data.items():
         if key not in keys:
             raise InputError(
@@ -202,6 +205,6 @@ def _number(
     value = data.get(name, default)
     if value is None:
         raise InputError(f"missing: expected {expected}", key=key + name)
-    if not plausible(value) or not (value >= low if closed else value > low):
+    if not is_plausible(value) or not (value >= low if closed else value > low):
         raise InputError(f"expected {expected}", key=key + name, value=value)
     return float(value)

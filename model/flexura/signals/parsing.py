@@ -14,7 +14,18 @@ from .signal import Signal
 
 
 def from_spec(spec: Any, *, key: str = "signal") -> Signal:
-    """A signal from its table, for example `{ kind = "cycloid", end = 1.0, duration_s = 0.5 }`."""
+    """A signal from its table, for example `{ kind = "cycloid", end = 1.0, duration_s = 0.5 }`.
+
+    Args:
+        spec: the table.
+        key: its name, for messages.
+
+    Returns:
+        The Signal.
+
+    Raises:
+        InputError: an unknown kind or key, or a wrong value.
+    """
     kinds = signal.KINDS | shaping.KINDS
     if not isinstance(spec, dict):
         raise InputError(
@@ -64,13 +75,20 @@ MOST = 1e12  # of a number of a manoeuvre or gains file, in its own unit: beyond
 PLAUSIBLE = "a finite number between -1e12 and 1e12"
 
 
-def plausible(value: Any) -> bool:
+def is_plausible(value: Any) -> bool:
     """Is it a finite number as files have them, at most `MOST` in size?"""
-    return finite(value) and abs(value) <= MOST
+    return is_finite(value) and abs(value) <= MOST
 
 
-def finite(value: Any) -> bool:
-    """Is it a finite number, as read from a file?"""
+def is_finite(value: Any) -> bool:
+    """Whether a value is a finite number, as read from a file.
+
+    Args:
+        value: the value.
+
+    Returns:
+        True for an int or a finite float, not for a bool.
+    """
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
     try:
@@ -80,11 +98,11 @@ def finite(value: Any) -> bool:
 
 
 def _numbers(value: Any) -> bool:
-    return isinstance(value, list) and all(map(plausible, value))
+    return isinstance(value, list) and all(map(is_plausible, value))
 
 
 _FORMS = {  # what a key takes, by the annotation of the parameter of its name
-    "float": (PLAUSIBLE, plausible),
+    "float": (PLAUSIBLE, is_plausible),
     "int": ("a whole number", lambda value: isinstance(value, int) and not isinstance(value, bool)),
     "Any": ("a list of finite numbers between -1e12 and 1e12", _numbers),
     "Signal": ("a table of a signal, with its kind", lambda value: isinstance(value, dict)),

@@ -9,30 +9,45 @@ import numpy as np
 
 from ..errors import InputError
 from ..io import finite_arguments
-from .signal import COLUMNS, Signal, cycloid, signal_of
+from .signal import COLUMNS, Signal, cycloid, from_segments
 
 MAX_SEGMENTS = 100_000  # shaping a shaped signal doubles its segments
 
 
 @finite_arguments
 def zv(signal: Signal, frequency_Hz: float, damping_ratio: float = 0.0) -> Signal:
-    """Zero vibration: the signal as two copies, y = [y(t) + k y(t - T/2)] / (1 + k), which leave
-    the mode at rest afterwards (78).
+    """Zero-vibration shaper: two copies, y = [y(t) + k y(t - T/2)] / (1 + k) (78).
 
-    k = exp(-pi zeta / sqrt(1 - zeta^2)); T = 1 / (f sqrt(1 - zeta^2)), the damped period of a mode
-    of natural frequency f and damping ratio zeta (Singer and Seering 1990, J. Dyn. Syst. Meas.
-    Control 112, 76-82). Longer by T/2; what the signal starts and ends with is kept. Exact in y,
-    dy/dt and d2y/dt2. A frequency off by e leaves a vibration proportional to e.
+    They leave the mode at rest afterwards. k = exp(-pi zeta / sqrt(1 - zeta^2)); T = 1 / (f sqrt(1
+    - zeta^2)), the damped period of the mode (Singer and Seering 1990, J. Dyn. Syst. Meas. Control
+    112, 76-82). What the signal starts and ends with is kept. Exact in y, dy/dt and d2y/dt2. A
+    frequency off by e leaves a vibration proportional to e.
+
+    Args:
+        signal: the signal.
+        frequency_Hz: f, natural frequency of the mode [Hz].
+        damping_ratio: zeta, its damping ratio.
+
+    Returns:
+        The shaped Signal, longer by T/2.
     """
     return _shape("zv", signal, frequency_Hz, damping_ratio, lambda k: [1, k])
 
 
 @finite_arguments
 def zvd(signal: Signal, frequency_Hz: float, damping_ratio: float = 0.0) -> Signal:
-    """Zero vibration and derivative: three copies, weights 1, 2k, k^2 over (1 + k)^2, at 0, T/2, T
-    (78); see `zv`.
+    """Zero-vibration-and-derivative shaper: three copies, weights 1, 2k, k^2 over (1 + k)^2, at 0,
+    T/2, T (78); see `zv`.
 
-    A frequency off by e leaves a vibration proportional to e^2 only; longer by T.
+    A frequency off by e leaves a vibration proportional to e^2 only.
+
+    Args:
+        signal: the signal.
+        frequency_Hz: natural frequency of the mode [Hz].
+        damping_ratio: its damping ratio.
+
+    Returns:
+        The shaped Signal, longer by T.
     """
     return _shape("zvd", signal, frequency_Hz, damping_ratio, lambda k: [1, 2 * k, k * k])
 
@@ -41,12 +56,25 @@ def zvd(signal: Signal, frequency_Hz: float, damping_ratio: float = 0.0) -> Sign
 def matched_cycloid(
     end: float, frequency_Hz: float, periods: int = 2, start: float = 0.0, at_s: float = 0.0
 ) -> Signal:
-    """A cycloid that takes `periods` (2 or more) whole periods of an undamped mode and so leaves it
-    at rest: T = periods / f (79).
+    """A cycloid of whole periods of an undamped mode, which leaves it at rest: T = periods / f
+    (79).
 
-    Its acceleration is one sine of period T; the mode's response to a whole number n of its periods
+    Its acceleration is one sine of period T. The mode's response to a whole number n of its periods
     is zero at the end, but for n = 1, its resonance. For a robot: `matched_cycloid(0.3,
     fx.frequencies(system)[0])`.
+
+    Args:
+        end: value at the end.
+        frequency_Hz: f, of the mode [Hz].
+        periods: whole number, 2 or more.
+        start: value before.
+        at_s: begin [s].
+
+    Returns:
+        The Signal.
+
+    Raises:
+        InputError: the frequency is not positive, or `periods` is below 2.
     """
     if periods < 2:
         raise InputError(
@@ -86,7 +114,7 @@ def _shape(
     rows = _sum(
         signal.segments, copies / copies.sum(), np.arange(len(copies)) / (2 * frequency_Hz * root)
     )
-    return signal_of(
+    return from_segments(
         rows, kind=kind, signal=signal.spec, frequency_Hz=frequency_Hz, damping_ratio=damping_ratio
     )
 

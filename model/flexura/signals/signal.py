@@ -23,15 +23,35 @@ from ..errors import InputError
 from ..io import array, finite_arguments
 
 COLUMNS = 10  # t0, c0 ... c5, A, w, phi
+FEW = 8  # segments that are looked through one by one
+
+
+def _segment(segments: np.ndarray, t: float) -> list[float]:
+    """The last one of segments (k, 10) that starts at or before t, else the first."""
+    if len(segments) > FEW:
+        low = max(int(np.searchsorted(segments[:, 0], t, side="right")) - 1, 0)
+        row: list[float] = segments[low].tolist()
+        return row
+    rows: list[list[float]] = segments.tolist()
+    for row in reversed(rows):
+        if row[0] <= t:
+            return row
+    return rows[0]
 
 
 def evaluate(segments: np.ndarray, t: float) -> tuple[float, float, float]:
-    """y, dy/dt and d2y/dt2 at t of segments (k, 10) (60); 0 where k = 0."""
+    """y, dy/dt and d2y/dt2 of packed segments (60).
+
+    Args:
+        segments: (k, 10).
+        t: time [s].
+
+    Returns:
+        The three numbers; 0 where k = 0.
+    """
     if len(segments) == 0:
         return 0.0, 0.0, 0.0
-    # the last segment that starts at or before t
-    low = max(int(np.searchsorted(segments[:, 0], t, side="right")) - 1, 0)
-    t0, c0, c1, c2, c3, c4, c5, A, w, phi = segments[low].tolist()
+    t0, c0, c1, c2, c3, c4, c5, A, w, phi = _segment(segments, t)
     s = t - t0
     if s < 0.0:  # before the first segment: hold
         return c0 + A * math.sin(phi), 0.0, 0.0
@@ -64,10 +84,19 @@ class Signal:
         object.__setattr__(self, "segments", given)
 
     def __call__(self, t: float) -> tuple[float, float, float]:
+        """y, dy/dt and d2y/dt2.
+
+        Args:
+            t: time [s].
+
+        Returns:
+            The three numbers.
+        """
         return evaluate(self.segments, float(t))
 
     @property
     def breaks(self) -> np.ndarray:
+        """Where segments begin (k,) [s]."""
         return self.segments[:, 0]
 
 
@@ -75,7 +104,19 @@ def _row(t0: float, *c: float, A: float = 0.0, w: float = 0.0, phi: float = 0.0)
     return [t0, *c, *([0.0] * (6 - len(c))), A, w, phi]
 
 
-def signal_of(rows: list[list[float]], **spec: Any) -> Signal:
+def from_segments(rows: list[list[float]], **spec: Any) -> Signal:
+    """A Signal from the rows of its segments (60).
+
+    Args:
+        rows: ten numbers each.
+        spec: the signal's table in a file.
+
+    Returns:
+        The Signal.
+
+    Raises:
+        InputError: a number is not finite.
+    """
     segments = np.array(rows, dtype=float).reshape(-1, COLUMNS)
     if not np.isfinite(segments).all():
         raise InputError(
@@ -87,23 +128,50 @@ def signal_of(rows: list[list[float]], **spec: Any) -> Signal:
 
 @finite_arguments
 def constant(value: float) -> Signal:
-    """y = value."""
-    return signal_of([_row(0.0, value)], kind="constant", value=value)
+    """y = value.
+
+    Args:
+        value: at all times.
+
+    Returns:
+        The Signal.
+    """
+    return from_segments([_row(0.0, value)], kind="constant", value=value)
 
 
 @finite_arguments
 def step(value: float, at_s: float = 0.0) -> Signal:
-    """0, then `value` from `at_s` on."""
-    return signal_of([_row(-1e300, 0.0), _row(at_s, value)], kind="step", value=value, at_s=at_s)
+    """0, then `value` from `at_s` on.
+
+    Args:
+        value: after the step.
+        at_s: instant of the step [s].
+
+    Returns:
+        The Signal.
+    """
+    return from_segments(
+        [_row(-1e300, 0.0), _row(at_s, value)], kind="step", value=value, at_s=at_s
+    )
 
 
 @finite_arguments
 def harmonic(
     amplitude: float, frequency_Hz: float, phase_rad: float = 0.0, offset: float = 0.0
 ) -> Signal:
-    """y = offset + amplitude cos(2 pi f t + phase), the form of the dissertation's inverse law."""
+    """y = offset + amplitude cos(2 pi f t + phase), the form of the dissertation's inverse law.
+
+    Args:
+        amplitude: of the oscillation.
+        frequency_Hz: f [Hz].
+        phase_rad: at t = 0 [rad].
+        offset: mean.
+
+    Returns:
+        The Signal.
+    """
     row = _row(0.0, offset, A=amplitude, w=2 * np.pi * frequency_Hz, phi=phase_rad + np.pi / 2)
-    return signal_of(
+    return from_segments(
         [row],
         kind="harmonic",
         amplitude=amplitude,
@@ -119,28 +187,59 @@ def ramp(end: float, duration_s: float, start: float = 0.0, at_s: float = 0.0) -
 
     Its velocity jumps at both ends of the line. As a prescribed motion it is good for runs that lie
     between them.
+
+    Args:
+        end: value at the end.
+        duration_s: of the line [s].
+        start: value before.
+        at_s: begin [s].
+
+    Returns:
+        The Signal.
     """
     _positive("duration_s", duration_s)
     rows = [_row(at_s, start, (end - start) / duration_s), _row(at_s + duration_s, end)]
-    return signal_of(rows, kind="ramp", end=end, duration_s=duration_s, start=start, at_s=at_s)
+    return from_segments(rows, kind="ramp", end=end, duration_s=duration_s, start=start, at_s=at_s)
 
 
 @finite_arguments
 def cycloid(end: float, duration_s: float, start: float = 0.0, at_s: float = 0.0) -> Signal:
-    """y = start + A [s/T - sin(2 pi s/T)/(2 pi)], A = end - start (61), then rest."""
+    """y = start + A [s/T - sin(2 pi s/T)/(2 pi)], A = end - start (61), then rest.
+
+    Args:
+        end: value at the end.
+        duration_s: T [s].
+        start: value before.
+        at_s: begin [s].
+
+    Returns:
+        The Signal.
+    """
     _positive("duration_s", duration_s)
     A, T = end - start, duration_s
     rows = [_row(at_s, start, A / T, A=-A / (2 * np.pi), w=2 * np.pi / T), _row(at_s + T, end)]
-    return signal_of(rows, kind="cycloid", end=end, duration_s=duration_s, start=start, at_s=at_s)
+    return from_segments(
+        rows, kind="cycloid", end=end, duration_s=duration_s, start=start, at_s=at_s
+    )
 
 
 @finite_arguments
 def polynomial(end: float, duration_s: float, start: float = 0.0, at_s: float = 0.0) -> Signal:
     """y = start + A (10 u^3 - 15 u^4 + 6 u^5), u = s/T: velocity and acceleration zero at both
-    ends."""
+    ends.
+
+    Args:
+        end: value at the end; A = end - start.
+        duration_s: T [s].
+        start: value before.
+        at_s: begin [s].
+
+    Returns:
+        The Signal.
+    """
     _positive("duration_s", duration_s)
     rows = [_rise(at_s, start, end - start, duration_s), _row(at_s + duration_s, end)]
-    return signal_of(
+    return from_segments(
         rows, kind="polynomial", end=end, duration_s=duration_s, start=start, at_s=at_s
     )
 
@@ -149,8 +248,21 @@ def polynomial(end: float, duration_s: float, start: float = 0.0, at_s: float = 
 def trapezoidal(
     end: float, duration_s: float, rise_s: float, start: float = 0.0, at_s: float = 0.0
 ) -> Signal:
-    """From start to end with a trapezoid of velocity: constant acceleration for `rise_s`, none, the
-    opposite for `rise_s`."""
+    """From start to end with a trapezoid of velocity.
+
+    Args:
+        end: value at the end.
+        duration_s: of the whole motion [s].
+        rise_s: of the constant acceleration, and of the opposite one at the end [s].
+        start: value before.
+        at_s: begin [s].
+
+    Returns:
+        The Signal.
+
+    Raises:
+        InputError: a time is not positive, or two rises do not fit into the duration.
+    """
     _positive("duration_s", duration_s)
     T, r = duration_s, rise_s
     if not 0 < r <= T / 2:
@@ -168,7 +280,7 @@ def trapezoidal(
         _row(brake, end - v * r / 2, v, -a / 2),
         _row(at_s + T, end),
     ]
-    return signal_of(
+    return from_segments(
         rows,
         kind="trapezoidal",
         end=end,
@@ -185,8 +297,18 @@ def bang_bang(
 ) -> Signal:
     """+amplitude for the first half of the duration, -amplitude for the second, then 0.
 
-    With `rise_s` every change takes that long along 10 u^3 - 15 u^4 + 6 u^5 and is centred on the
-    instant of the change, the first and last ones lie inside the duration.
+    Args:
+        amplitude: A.
+        duration_s: of both halves [s].
+        rise_s: time that every change takes, along 10 u^3 - 15 u^4 + 6 u^5 [s]. A change is centred
+            on its instant; the first and the last lie inside the duration.
+        at_s: begin [s].
+
+    Returns:
+        The Signal.
+
+    Raises:
+        InputError: a time is not positive, or the changes do not fit into the duration.
     """
     _positive("duration_s", duration_s)
     a, T, r = amplitude, duration_s, rise_s
@@ -209,14 +331,21 @@ def bang_bang(
         ]
     if at_s > 0:
         rows.insert(0, _row(0.0))
-    return signal_of(
+    return from_segments(
         rows, kind="bang_bang", amplitude=amplitude, duration_s=duration_s, rise_s=rise_s, at_s=at_s
     )
 
 
 def table(t_s: Any, y: Any) -> Signal:
-    """A cubic spline through (t_s, y), both (k,), k >= 2, with zero second derivative at its ends;
-    then the last value."""
+    """A cubic spline with zero second derivative at its ends; then the last value.
+
+    Args:
+        t_s: ascending times (k,) [s], k >= 2.
+        y: values at them (k,).
+
+    Returns:
+        The Signal.
+    """
     from scipy.interpolate import CubicSpline
 
     times, values = _columns("t_s", t_s, "y", y, 2)
@@ -226,15 +355,22 @@ def table(t_s: Any, y: Any) -> Signal:
     rows = [_row(times[k], *coefficients[::-1, k]) for k in range(len(times) - 1)] + [
         _row(times[-1], values[-1])
     ]
-    return signal_of(rows, kind="table", t_s=times.tolist(), y=values.tolist())
+    return from_segments(rows, kind="table", t_s=times.tolist(), y=values.tolist())
 
 
 def piecewise(at_s: Any, value: Any) -> Signal:
-    """Constant from each instant of `at_s` (k,) to the next, with the values (k,): the
-    dissertation's bang-bang torques."""
+    """Constant from each instant to the next: the dissertation's bang-bang torques.
+
+    Args:
+        at_s: instants (k,) [s].
+        value: values from them on (k,).
+
+    Returns:
+        The Signal.
+    """
     times, values = _columns("at_s", at_s, "value", value, 1)
     rows = [_row(t, v) for t, v in zip(times, values, strict=True)]
-    return signal_of(rows, kind="piecewise", at_s=times.tolist(), value=values.tolist())
+    return from_segments(rows, kind="piecewise", at_s=times.tolist(), value=values.tolist())
 
 
 KINDS = {

@@ -1,22 +1,22 @@
 """One robot: a problem is checked, solved and recorded."""
 
-from .approximate_inverse import by_bisection, by_rigid_robot, rigid_robot
+from .approximate_inverse import rigid_feedforward, rigid_robot, shoot_by_bisection
 from .dynamics import inverse, simulate
 from .feedforward import gravity, inverse_dynamics
-from .gain_sweep import Trials, trials
+from .gain_sweep import GainSweep, prepare_gain_sweep
 from .problem import METHODS
 from .recorder import channel_units
 
 __all__ = [
     "METHODS",
-    "Trials",
-    "by_bisection",
-    "by_rigid_robot",
+    "GainSweep",
     "channel_units",
     "gravity",
     "inverse",
     "inverse_dynamics",
+    "prepare_gain_sweep",
+    "rigid_feedforward",
     "rigid_robot",
+    "shoot_by_bisection",
     "simulate",
-    "trials",
 ]

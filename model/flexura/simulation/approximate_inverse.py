@@ -30,15 +30,24 @@ MAX_SWEEPS = 300  # joint after joint, in one step
 
 
 def rigid_robot(robot: Robot) -> Robot:
-    """The same robot with rigid links: masses, hubs, payload and joints as they are."""
+    """The same robot with rigid links and transmissions: masses, hubs, payload and joints as they
+    are.
+
+    Args:
+        robot: the robot.
+
+    Returns:
+        The rigid Robot.
+    """
     data = robot.to_dict()
     for link in data["link"]:
         for key in ("elements", "modes", "young_modulus_Pa", "bending_stiffness_N_m2", "damping"):
             link.pop(key, None)
+        link["joint"].pop("transmission", None)
     return Robot.from_dict(data)
 
 
-def by_rigid_robot(
+def rigid_feedforward(
     system: System,
     t_eval: Any,
     motion: Sequence[Signal],
@@ -53,8 +62,21 @@ def by_rigid_robot(
     Khoi 2017).
 
     tau = M_rigid(r) r'' + bias + gravity + friction (65), exact, as splines through values about
-    `step_s` apart. Neither the elastic displacements nor the joints' errors are compensated.
-    Arguments and errors otherwise as in `inverse`.
+    `step_s` apart. Neither the elastic displacements nor the joints' errors are compensated. Errors
+    otherwise as in `inverse`.
+
+    Args:
+        system: the robot.
+        t_eval: ascending times (T,) [s].
+        motion: one Signal a joint [m or rad].
+        q0: configuration at the start (n,).
+        qd0: its rates (n,).
+        rtol: as in `flexura.simulate`.
+        step_s: between two values of the splines [s].
+        progress: called with the finished fraction.
+
+    Returns:
+        A Run of the flexible robot.
     """
     t = check_times(t_eval)
     Drive.prescribed(*motion).within(t[0], t[-1])  # refuses motions that jump
@@ -66,7 +88,7 @@ def by_rigid_robot(
     return run
 
 
-def by_bisection(
+def shoot_by_bisection(
     system: System,
     t_eval: Any,
     motion: Sequence[Signal],
@@ -81,15 +103,31 @@ def by_bisection(
 
     After My and Bien (2020, Int. J. Adv. Robot. Syst.), whose abstract names the method; the rest
     is this project's reading. From the rigid robot's drives on, one forward step of the flexible
-    model under constant drives, each joint's bisected in a bracket until |e| < `joint_error` [m or
-    rad], joint after joint until all are; then the next step.
+    model is taken under constant drives. Each joint's drive is bisected in a bracket until |e| <
+    `joint_error`, joint after joint until all are; then comes the next step.
 
         e = (eta - r) + h (eta' - r')       at the end of the step, h long     (66)
 
     The second term is needed: position errors alone make the drives alternate, u_k = -u_(k-1) +
     ..., for a mass under held forces has its sampled zero at -1. `joint/i/drive` at t_k is the
-    value held until t_(k+1). Errors fall as h^3; a step that is long against the period of a mode
-    makes the drives diverge, which raises FlexuraError. Otherwise as in `inverse`.
+    value held until t_(k+1). Errors fall as h^3.
+
+    Args:
+        system: the robot.
+        t_eval: ascending times (T,) [s].
+        motion: one Signal a joint [m or rad].
+        q0: configuration at the start (n,).
+        qd0: its rates (n,).
+        rtol: as in `flexura.simulate`.
+        joint_error: largest |e| [m or rad].
+        progress: called with the finished fraction.
+
+    Returns:
+        A Run with the drives.
+
+    Raises:
+        InputError: as in `inverse`.
+        FlexuraError: the drives diverge: a step is long against the period of a mode.
     """
     t, n, rows = check_times(t_eval), system.n, system.joint_rows
     Drive.prescribed(*motion).within(t[0], t[-1])

@@ -41,8 +41,27 @@ def simulate(
     wall_time: float | None = None,
     progress: Progress = None,
 ) -> Run:
-    """Integrate the equations of motion of one robot (25); arguments and errors as in
-    `flexura.simulate`."""
+    """Integrate the equations of motion of one robot (25); errors as in `flexura.simulate`.
+
+    Args:
+        robot: a System, a Robot, or the path or name of a robot file.
+        t_eval: ascending times (T,) [s].
+        drive: as in `flexura.simulate`.
+        q0: configuration at the start (n,).
+        qd0: its rates (n,).
+        rtol: as in `flexura.simulate`.
+        method: as in `flexura.simulate`.
+        start: as in `flexura.simulate`.
+        continue_from: as in `flexura.simulate`.
+        until: as in `flexura.simulate`.
+        numerical_damping: as in `flexura.simulate`.
+        max_steps: as in `flexura.simulate`.
+        wall_time: as in `flexura.simulate`.
+        progress: called with the finished fraction.
+
+    Returns:
+        The Run.
+    """
     problem = initial_value_problem(
         robot,
         t_eval,
@@ -94,18 +113,28 @@ def inverse(
     forces that this takes.
 
     The elastic unknowns are integrated from q0, qd0 (n,), whose joint entries are replaced by the
-    motion's. Nothing is approximated by a rigid robot and nothing is iterated. Replaying the drives
+    motions. Nothing is approximated by a rigid robot and nothing is iterated. Replaying the drives
     through `simulate` returns the motion.
 
     Args:
         robot: a System, a Robot, or the path or name of a robot file.
-        t_eval (T,): ascending times [s].
+        t_eval: ascending times (T,) [s].
         motion: one entry a joint: a Signal, a function of t, an array of len(t_eval) values, or a
             number; or an array (T, joints). Arrays become cubic splines, functions splines of
             fifth order. None is good for a locked joint. A motion may begin and end with any
             velocity, but not jump inside the run.
-        q0, qd0, rtol, method, start, max_steps, wall_time, progress: as in `flexura.simulate`.
-            Under gravity the run starts in static equilibrium with the joints on their motions.
+        q0: configuration at the start (n,), as in `flexura.simulate`.
+        qd0: its rates (n,).
+        rtol: as in `flexura.simulate`.
+        method: as in `flexura.simulate`.
+        start: as in `flexura.simulate`. Under gravity the run starts in static equilibrium with the
+            joints on their motions.
+        max_steps: as in `flexura.simulate`.
+        wall_time: as in `flexura.simulate`.
+        progress: called with the finished fraction.
+
+    Returns:
+        A Run with the drives.
 
     Raises:
         InputError: an argument is not what is expected; a motion whose position or velocity jumps.

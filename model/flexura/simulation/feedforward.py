@@ -13,8 +13,16 @@ from .dynamics import inverse
 
 
 def gravity(system: System, motions: Sequence[Signal], t_s: Any) -> list[Signal]:
-    """Feedforwards that hold each joint against gravity along its motion, links straight: tables
-    over t_s (T,) [N or N m]."""
+    """Feedforwards that hold each joint against gravity along its motion, links straight.
+
+    Args:
+        system: the robot.
+        motions: one Signal a joint [m or rad].
+        t_s: times of the tables (T,) [s].
+
+    Returns:
+        One Signal a joint [N or N m].
+    """
     times = np.asarray(t_s, dtype=float)
     rows, held = system.joint_rows, np.zeros((len(times), len(motions)))
     for k, t in enumerate(times):
@@ -27,7 +35,16 @@ def gravity(system: System, motions: Sequence[Signal], t_s: Any) -> list[Signal]
 def inverse_dynamics(
     system: System, motions: Sequence[Signal], t_s: Any, rtol: float = 1e-7
 ) -> list[Signal]:
-    """Feedforwards that the motions take, the links' bending included: tables over t_s (T,) of
-    `fx.inverse` [N or N m]."""
+    """Feedforwards that the motions take, the links' bending included.
+
+    Args:
+        system: the robot.
+        motions: one Signal a joint [m or rad].
+        t_s: times of the tables (T,) [s].
+        rtol: of `flexura.inverse`.
+
+    Returns:
+        One Signal a joint [N or N m].
+    """
     run = inverse(system, t_s, motions, rtol=rtol)
     return [table(run.t, run[f"joint/{i}/drive"]) for i in range(1, len(motions) + 1)]

@@ -3,7 +3,7 @@ figures are kept.
 
 Nothing of Python runs between two rows, and a call leaves Python's lock. What a row gives does not
 depend on the others, nor on the number of threads. Several threads of the caller's may use one
-`Trials` at the same time.
+`GainSweep` at the same time.
 
 A row may have a limit to its cost, sum_k price_k max(0, figure_k - free_k) with prices on
 overshoot, ITAE, effort and vibration: it is abandoned as soon as it is certain to cost more.
@@ -26,7 +26,7 @@ PER_JOINT, OF_STRIP = len(JOINT), len(STRIP)
 
 
 @dataclass(frozen=True)
-class Trials:
+class GainSweep:
     """Runs of one robot from rest under the same references; `joints` N, `method` how they are
     integrated."""
 
@@ -41,49 +41,66 @@ class Trials:
     def run(
         self,
         gains: np.ndarray,
-        prices: np.ndarray | None = None,
+        weights: np.ndarray | None = None,
         limits: np.ndarray | None = None,
         threads: int = 1,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Figures (B, 6 N + 4), those of each joint, then the strip's, and what fraction of the
-        time each run reached (B,).
+        """Simulate rows of gains.
 
-        Args: gains (B, N, 20): rows of `Controller.gains`; prices (2, 6 N + 4): those of the
-        figures and what is free of each;
-            limits (B,), inf for none, which an abandoned row's cost would exceed by a billionth or
-            more; threads: how many work.
+        Args:
+            gains: rows of `Controller.gains` (B, N, 20).
+            weights: of the metrics, and what is free of each (2, 6 N + 4); None: no row is
+                abandoned.
+            limits: of the rows' costs (B,), inf for none. An abandoned row's cost would exceed its
+                limit by a billionth or more.
+            threads: how many work.
 
-        Returns: Of an abandoned row the figures are lower bounds, 0 where it has none, and of one
-        that failed NaN.
+        Returns:
+            Metrics (B, 6 N + 4), those of each joint, then the strip's; and what fraction of the
+            time each run reached (B,). Metrics of an abandoned row are lower bounds, 0 where there
+            is none. Those of one that failed are NaN.
         """
         rows = np.ascontiguousarray(gains, dtype=float)
         free = (
             np.zeros((2, PER_JOINT * self.joints + OF_STRIP))
-            if prices is None
-            else np.ascontiguousarray(prices, dtype=float)
+            if weights is None
+            else np.ascontiguousarray(weights, dtype=float)
         )
         most = (
             np.full(len(rows), np.inf)
             if limits is None
             else np.ascontiguousarray(limits, dtype=float)
         )
-        figures, reached = self.runs.run(free, rows, most, threads)
-        return np.asarray(figures), np.asarray(reached)
+        metrics, reached = self.runs.run(free, rows, most, threads)
+        return np.asarray(metrics), np.asarray(reached)
 
 
-def trials(
+def prepare_gain_sweep(
     system: System,
     controller: Controller,
     duration_s: float,
     output_step_s: float,
     rtol: float,
     method: str = "auto",
-) -> Trials:
-    """What rows of gains are run with, from rest as `simulate` starts: under gravity in static
-    equilibrium. Samples lie on ticks.
+) -> GainSweep:
+    """Prepare the runs of many rows of gains on one robot.
 
-    Raises: InputError: the robot is not on the exact line, or the controller is one of other
-    joints.
+    They begin at rest as `simulate` does: under gravity in static equilibrium. Samples lie on
+    ticks.
+
+    Args:
+        system: the robot.
+        controller: its references, outputs and rate.
+        duration_s: of a run [s].
+        output_step_s: between two samples [s].
+        rtol: as in `flexura.simulate`.
+        method: as in `flexura.simulate`.
+
+    Returns:
+        The GainSweep.
+
+    Raises:
+        InputError: the robot is not on the exact line, or the controller is one of other joints.
     """
     if not system.exact:
         raise InputError(
@@ -101,7 +118,7 @@ def trials(
     )
     segments, ranges, gains, follows, _ = controller.core_drives()
     index = np.column_stack([ranges, follows]).astype(np.int64)
-    runs = core.Trials(
+    runs = core.GainSweep(
         system.equations,
         controller.sampler(system),
         segments,
@@ -114,4 +131,4 @@ def trials(
         rtol,
         method,
     )
-    return Trials(len(controller.joints), runs)
+    return GainSweep(len(controller.joints), runs)

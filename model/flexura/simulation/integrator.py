@@ -44,7 +44,7 @@ class _Integration:
         )
         sampled = np.zeros(joints, dtype=np.uint8)
         if isinstance(drive, Drive):
-            function = DriveFunction(drive.called, joints) if drive.calls else None
+            function = DriveFunction(drive.function_forces, joints) if drive.has_functions else None
             segments, ranges, gains = drive.packed()
             follows = drive.follows.astype(np.uint8)
         elif isinstance(drive, Controller):

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..system.nodes import Nodes, cut, place, put_to_rest
+from ..system.nodes import Nodes, place, rest_node, rests_in_sleeve
 from .dense import Integration
 from .problem import Problem, Progress, Solution
 
@@ -45,7 +45,7 @@ class _Nodewise(Integration):
         out, links, nodes = self.system.limits.copy(), self.system.robot.links, self.system.nodes
         assert nodes is not None
         for i, link in enumerate(links):
-            if cut(link):
+            if rests_in_sleeve(link):
                 cell = (
                     link.length_m - place(link, nodes[i] + 1),
                     link.length_m - place(link, nodes[i]),
@@ -82,7 +82,7 @@ class _Nodewise(Integration):
         structure = self.system.assembly.structure
         assert isinstance(structure, Nodes) and self.system.nodes is not None
         nodes = list(self.system.nodes)
-        if cut(links[i]):
+        if rests_in_sleeve(links[i]):
             nodes[i] -= step
             said = (
                 f"node {nodes[i] + 1 if step > 0 else nodes[i]} of link {i + 1} "
@@ -90,7 +90,7 @@ class _Nodewise(Integration):
             )
             if step < 0:
                 for y in (self.z[:n], self.z[n : 2 * n]):
-                    put_to_rest(structure, i, nodes[i], y)
+                    rest_node(structure, i, nodes[i], y)
             if i + 1 < len(links) and self.system.robot.rides(i + 1):
                 nodes[i + 1] = max(nodes[i + 1], nodes[i] + 1)
         else:

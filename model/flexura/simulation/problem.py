@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..io import Run, array, check_memory, choice, flag, number, whole
 from ..signals import Drive, Signal, as_signals
 from ..system import System, assemble
-from .start import consistent_start, end_of, inside_limits, put_on_motions
+from .start import apply_prescribed_motions, check_limits, consistent_start, state_at_end
 
 METHODS = ("auto", "explicit", "implicit", "exponential")
 SHORT = ("explicit-3", "explicit-5")  # what "auto" takes under a Controller whose ticks are short
@@ -24,12 +24,20 @@ Progress = Callable[[float], None] | None
 
 @dataclass(frozen=True)
 class Problem:
-    """An initial value problem: robot, output times (T,) [s], drive, state q, qd (n,) at t[0],
-    tolerance and method.
+    """An initial value problem.
 
-    `drive` is a Drive, a Controller, a Sampled, or a DriveFunction. `start`: "static", "straight",
-    "given" or "continued". `accounts` (4,): those of the run that this one continues [J]. `ends`,
-    called with the times and states so far, says whether the rest is of no use.
+    Attributes:
+        system: the robot.
+        t: output times (T,) [s].
+        drive: a Drive, a Controller, a Sampled, or a DriveFunction.
+        q: configuration at t[0] (n,).
+        qd: its rates (n,).
+        rtol: relative tolerance.
+        method: as in `simulate`.
+        numerical_damping: whether exponential steps damp fast modes.
+        start: "static", "straight", "given" or "continued".
+        accounts: of the run that this one continues (4,) [J].
+        ends: called with the times and states so far; says whether the rest is of no use.
     """
 
     system: System
@@ -88,11 +96,15 @@ BUDGETS = {"exhausted": "max_steps", "wall_time": "wall_time"}
 class Solution:
     """What a solver computed, up to the end or to where it stopped.
 
-    Attributes: t (T,) [s]; states (T, 2n): q and qd; accounts (T, 4): work of the drives, losses,
-    what the method took out, and
-        the rise of the strain energy, each from its own integral [J]; forces (T, links) of the
-        drives; meta: steps, events and whether it is complete; seen (T, k): what `system.observe`
-        gives, where the solver knows it; jumps (T,) or 0: what the energy has jumped by so far [J];
+    Attributes:
+        t: times (T,) [s].
+        states: q and qd (T, 2n).
+        accounts: work of the drives, losses, what the method took out, and the rise of the strain
+            energy, each from its own integral (T, 4) [J].
+        forces: of the drives (T, links) [N or N m].
+        meta: steps, events and whether it is complete.
+        seen: what `system.observe` gives (T, k), where the solver knows it.
+        jumps: what the energy has jumped by so far, (T,) or 0 [J].
         sampler: of the core, with what a Controller computed at its ticks.
     """
 
@@ -121,10 +133,25 @@ def initial_value_problem(
 ) -> Problem:
     """The problem that a simulation solves.
 
-    Args: as those of `simulate`; before: the run that it continues.
+    Args:
+        robot: as in `simulate`.
+        t_eval: as in `simulate`.
+        drive: as in `simulate`.
+        q0: as in `simulate`.
+        qd0: as in `simulate`.
+        rtol: as in `simulate`.
+        method: as in `simulate`.
+        numerical_damping: as in `simulate`.
+        start: as in `simulate`.
+        before: the run that it continues.
+        budget: what it may take; None: the default.
 
-    Raises: InputError: an argument is not what is expected. NoEquilibrium: it should start in
-    static equilibrium, and there is none.
+    Returns:
+        The problem.
+
+    Raises:
+        InputError: an argument is not what is expected.
+        NoEquilibrium: it should start in static equilibrium, and there is none.
     """
     system, t = assemble(robot), check_request(t_eval, rtol, method)
     check_rows(system, len(t))
@@ -133,10 +160,10 @@ def initial_value_problem(
     if before is None:
         q, qd, start = consistent_start(system, t[0], acting, q0, qd0, start)
     else:
-        q, qd, accounts = end_of(before, system, t, {"q0": q0, "qd0": qd0, "start": start})
+        q, qd, accounts = state_at_end(before, system, t, {"q0": q0, "qd0": qd0, "start": start})
         start = "continued"
-        put_on_motions(system.joint_rows, acting, t[0], q, qd)
-        inside_limits(system, q)
+        apply_prescribed_motions(system.joint_rows, acting, t[0], q, qd)
+        check_limits(system, q)
     if not system.exact and isinstance(acting, Controller):
         expected = (
             'expected a robot with stiffening = true and sliding = "continuous" under a Controller'
@@ -169,14 +196,19 @@ def check_rows(system: System, count: int) -> None:
 
 
 def acting_drive(drive: Any, joints: int, t: np.ndarray) -> Drive | Controller | Sampled | Any:
-    """What acts in a run at the times t (T,) [s], as the solvers take it.
+    """What acts in a run, as the solvers take it.
 
-    Args: drive: as in `simulate`; joints: how many the robot has.
+    Args:
+        drive: as in `simulate`.
+        joints: how many the robot has.
+        t: output times (T,) [s].
 
-    Returns: a Drive whose motions are Signals, a Controller, a Sampled or a DriveFunction.
+    Returns:
+        A Drive whose motions are Signals, a Controller, a Sampled or a DriveFunction.
 
-    Raises: InputError: it is nothing of this, is for another number of joints, or has a motion that
-    nothing follows.
+    Raises:
+        InputError: it is nothing of this, is for another number of joints, or has a motion that
+            nothing follows.
     """
     if drive is None:
         return Drive.none(joints)
@@ -202,7 +234,19 @@ EXPECTED_DRIVE = (
 
 
 def check_request(t_eval: Any, rtol: Any, method: Any) -> np.ndarray:
-    """The times (T,) of a request whose tolerance and method are good. Raises InputError."""
+    """The times of a request whose tolerance and method are good.
+
+    Args:
+        t_eval: as in `simulate`.
+        rtol: as in `simulate`.
+        method: as in `simulate`.
+
+    Returns:
+        Times (T,) [s].
+
+    Raises:
+        InputError: an argument is not what is expected.
+    """
     t = check_times(t_eval)
     expected = "expected a relative tolerance between 1e-13 and 0.1"
     if not 1e-13 <= number(rtol, "rtol", expected) <= 0.1:
@@ -213,7 +257,17 @@ def check_request(t_eval: Any, rtol: Any, method: Any) -> np.ndarray:
 
 
 def check_times(t_eval: Any) -> np.ndarray:
-    """Ascending finite times (T,) [s]. Raises InputError."""
+    """Ascending finite times.
+
+    Args:
+        t_eval: what was given.
+
+    Returns:
+        Times (T,) [s].
+
+    Raises:
+        InputError: they are not.
+    """
     expected = "expected ascending finite times in seconds, one or more"
     if isinstance(t_eval, Sized):
         what = f"{len(t_eval)} output times; expected fewer"

@@ -13,7 +13,14 @@ from .problem import Solution
 
 
 def channel_units(robot: Robot) -> dict[str, str]:
-    """The channels that a simulation of this robot has, in their order, with their units."""
+    """The channels that a simulation of this robot has.
+
+    Args:
+        robot: the robot.
+
+    Returns:
+        Units by channel, in the order of the channels.
+    """
     units: dict[str, str] = {}
     for i, link in enumerate(robot.links, 1):
         turns = link.joint.type == "R"
@@ -22,6 +29,8 @@ def channel_units(robot: Robot) -> dict[str, str]:
             f"joint/{i}/{what}": unit
             for what, unit in zip(("position", "velocity", "drive"), kinds, strict=True)
         }
+        if link.joint.transmission is not None:
+            units |= {f"joint/{i}/motor_position": "rad", f"joint/{i}/motor_velocity": "rad/s"}
     for i, link in enumerate(robot.links, 1):
         units |= {f"link/{i}/x": "m", f"link/{i}/y": "m", f"link/{i}/angle": "rad"}
         if link.flexible:
@@ -31,7 +40,7 @@ def channel_units(robot: Robot) -> dict[str, str]:
     return units | {"tip/x": "m", "tip/y": "m"} | {f"energy/{name}": "J" for name in energies}
 
 
-def observed(robot: Robot) -> list[str]:
+def recorded_channels(robot: Robot) -> list[str]:
     """The channels that the core reads from a state, in the order of `System.observe`."""
     accounts = ("energy/work", "energy/loss", "energy/numerical_loss")
     return [
@@ -54,8 +63,10 @@ def record(system: System, solution: Solution) -> Run:
     q, v = np.ascontiguousarray(states[:, :n]), np.ascontiguousarray(states[:, n:])
     seen = system.observe(q, v) if solution.seen is None else solution.seen
     found: list[np.ndarray] = []
+    hubs, hub_rates = system.hub_positions(q), system.hub_positions(v)
     for i, row in enumerate(system.joint_rows):
-        found += [q[:, row], v[:, row], solution.forces[:, i]]
+        found += [hubs[:, i], hub_rates[:, i], solution.forces[:, i]]
+        found += [q[:, row], v[:, row]] if i in system.windup_rows else []
     found += [*seen.T, *accounts[:, :STRAIN].T]
     units = channel_units(system.robot)
     channels = {

@@ -20,22 +20,35 @@ NO_START = 'start = "straight" begins with straight links, q0 with a state of yo
 def consistent_start(
     system: System, t: float, drive: Any, q0: Any, qd0: Any, start: Any = None
 ) -> tuple[np.ndarray, np.ndarray, str]:
-    """q and qd (n,) at the start t [s], and which start it is: "given", "static" or "straight".
+    """The state at the start of a run.
 
     Locked joints are at rest, prescribed ones on their motion. Without q0 the links are straight,
-    or under gravity in static equilibrium with the joints held where they start (50).
+    or under gravity in static equilibrium with the joints held where they start (50). Given rates
+    are kept in either case.
 
-    Raises: InputError: wrong shapes, a drive of another number of joints, a joint outside its
-    limits. NoEquilibrium: there is none.
+    Args:
+        system: the robot.
+        t: the start [s].
+        drive: what acts.
+        q0: configuration (n,), or None.
+        qd0: its rates (n,), or None.
+        start: "static", "straight" or None.
+
+    Returns:
+        q and qd (n,), and which start it is: "given", "static" or "straight".
+
+    Raises:
+        InputError: wrong shapes, a drive of another number of joints, a joint outside its limits.
+        NoEquilibrium: there is none.
     """
     q, qd = (
         check_state(system, "q0", q0, system.start()),
         check_state(system, "qd0", qd0, np.zeros(system.n)),
     )
-    which = which_start(system.robot, q0, start)
+    which = resolve_start(system.robot, q0, start)
     qd[system.joint_rows[system.locked]] = 0.0
-    put_on_motions(system.joint_rows, drive, t, q, qd)
-    inside_limits(system, q)
+    apply_prescribed_motions(system.joint_rows, drive, t, q, qd)
+    check_limits(system, q)
     if which == "static":
         try:
             q = static(system, q[system.joint_rows])
@@ -44,10 +57,19 @@ def consistent_start(
     return q, qd, which
 
 
-def which_start(robot: Robot, q0: Any, start: Any) -> str:
-    """The start of a run: "given" by q0, or "static" or "straight", by default as gravity asks.
+def resolve_start(robot: Robot, q0: Any, start: Any) -> str:
+    """The start of a run, by default as gravity asks.
 
-    Raises: InputError: start is none of these, or given beside q0.
+    Args:
+        robot: the robot.
+        q0: configuration (n,), or None.
+        start: as given, or None.
+
+    Returns:
+        "given" by q0, "static" or "straight".
+
+    Raises:
+        InputError: start is none of these, or given beside q0.
     """
     if start is not None:
         choice(start, "start", STARTS)
@@ -59,13 +81,23 @@ def which_start(robot: Robot, q0: Any, start: Any) -> str:
     return start or ("static" if bends and any(robot.gravity_m_s2) else "straight")
 
 
-def end_of(
+def state_at_end(
     run: Any, system: System, t: np.ndarray, others: dict[str, Any]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """q, qd (n,) and accounts (4,) [J] at the end of a run that is continued at the times t (T,).
+    """The state at the end of a run that is continued.
 
-    Raises: InputError: it is no run of this robot with its states, t does not begin at its end, or
-    one of `others` is given besides.
+    Args:
+        run: the run.
+        system: the robot.
+        t: times (T,) of the new run [s].
+        others: arguments that must be None, by name.
+
+    Returns:
+        q, qd (n,) and accounts (4,) [J].
+
+    Raises:
+        InputError: it is no run of this robot with its states, t does not begin at its end, or one
+            of `others` is given besides.
     """
     key, n = "continue_from", system.n
     if not isinstance(run, Run):
@@ -89,16 +121,38 @@ def end_of(
 
 
 def check_state(system: System, key: str, value: Any, default: np.ndarray) -> np.ndarray:
-    """A state's q or qd (n,), or the default. Raises InputError."""
+    """A state's q or qd.
+
+    Args:
+        system: the robot.
+        key: name of the argument.
+        value: what was given, or None.
+        default: in place of None (n,).
+
+    Returns:
+        (n,).
+
+    Raises:
+        InputError: another shape, or a number that is not finite.
+    """
     if value is None:
         return default
     expected = f"expected {system.n} finite numbers, in the order of system.labels"
     return array(value, key, expected, (system.n,))
 
 
-def put_on_motions(joint_rows: Any, drive: Any, t: float, q: np.ndarray, qd: np.ndarray) -> None:
-    """Prescribed joints take position and velocity of their motions at t [s], in place; their
-    entries of q and qd (n,) are in `joint_rows` (links,)."""
+def apply_prescribed_motions(
+    joint_rows: Any, drive: Any, t: float, q: np.ndarray, qd: np.ndarray
+) -> None:
+    """Put prescribed joints on their motions, in place.
+
+    Args:
+        joint_rows: their entries of q and qd (links,).
+        drive: what acts.
+        t: time [s].
+        q: configuration (n,).
+        qd: its rates (n,).
+    """
     if not isinstance(drive, Drive | Controller):
         return
     for joint, row in zip(drive.joints, joint_rows, strict=True):
@@ -108,18 +162,35 @@ def put_on_motions(joint_rows: Any, drive: Any, t: float, q: np.ndarray, qd: np.
             q[row], qd[row], _ = joint.motion(t)
 
 
-def inside_limits(system: System, q: np.ndarray) -> None:
-    """Raises InputError for a joint that starts outside its limits."""
+def check_limits(system: System, q: np.ndarray) -> None:
+    """Refuse a joint that starts outside its limits.
+
+    Args:
+        system: the robot.
+        q: configuration (n,).
+
+    Raises:
+        InputError: a joint is outside.
+    """
     for i, (link, row) in enumerate(zip(system.robot.links, system.joint_rows, strict=True), 1):
         if (
             link.joint.limits is not None
             and not link.joint.limits[0] <= q[row] <= link.joint.limits[1]
         ):
-            raise outside(i - 1, link.joint.limits, float(q[row]))
+            raise limit_error(i - 1, link.joint.limits, float(q[row]))
 
 
-def outside(joint: int, limits: tuple[float, float], position: float) -> InputError:
-    """Why a joint (from 0) cannot start at a position."""
+def limit_error(joint: int, limits: tuple[float, float], position: float) -> InputError:
+    """Why a joint cannot start at a position.
+
+    Args:
+        joint: its number, from 0.
+        limits: the lowest and the highest position [m or rad].
+        position: the position [m or rad].
+
+    Returns:
+        The error to raise.
+    """
     return InputError(
         f"expected a start inside the limits of joint {joint + 1}, {list(limits)}",
         key="q0",

@@ -23,9 +23,12 @@ Solver = Callable[[Problem, Progress], Solution]
 class StopCondition:
     """Where a function becomes true, or changes its sign.
 
-    Args: function: of (t, position (N,), velocity (N,), tip_deflection [m]); problem: of the run.
+    Args:
+        function: of (t, position (N,), velocity (N,), tip_deflection [m]).
+        problem: of the run.
 
-    Raises: InputError: it is no such function, or gives anything but a bool or a finite number.
+    Raises:
+        InputError: it is no such function, or gives anything but a bool or a finite number.
     """
 
     def __init__(self, function: Any, problem: Problem) -> None:

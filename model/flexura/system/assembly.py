@@ -50,17 +50,28 @@ class Assembly:
         self.labels, self.n = self.structure.labels, self.structure.n
         self._rotors = np.array([link.joint.rotor_inertia for link in self.robot.links])
         self._coulomb = np.array([link.joint.coulomb_friction for link in self.robot.links])
+        # springs beside the drives (106): stiffness of each joint, and where all springs rest
+        self._springs = np.array([link.joint.spring_stiffness for link in self.robot.links])
+        self._rest = np.zeros(self.n)
+        self._rest[self.rows] = [link.joint.spring_rest for link in self.robot.links]
         self._g = complex(*self.robot.gravity_m_s2)
-        laws = [
-            (i, law)
-            for i, law in enumerate(self.structure.laws)
-            if law is not None and self.structure.sleeved(i)
+        materials = [
+            (i, material)
+            for i, material in enumerate(self.structure.materials)
+            if material is not None and self.structure.sleeved(i)
         ]
         # flexible links in a sleeve, with their materials
-        self._sleeved: dict[int, Material] = dict(laws)
+        self._sleeved: dict[int, Material] = dict(materials)
 
     def mass(self, q: np.ndarray) -> np.ndarray:
-        """M(q) (n, n) (40)."""
+        """The mass matrix M(q) (40).
+
+        Args:
+            q: configuration (n,).
+
+        Returns:
+            (n, n).
+        """
         return self._mass(self._inertia(self._at_rest(q))[0])
 
     def _mass(self, sums: masses.Sum) -> np.ndarray:
@@ -69,12 +80,27 @@ class Assembly:
         return M
 
     def bias(self, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
-        """Coriolis, centrifugal and convective forces (n,), on the left-hand side (41)."""
+        """Coriolis, centrifugal and convective forces, on the left-hand side (41).
+
+        Args:
+            q: configuration (n,).
+            qd: its rates (n,).
+
+        Returns:
+            Generalised forces (n,).
+        """
         sums, flow = self._inertia(self.structure.states(q, qd))
         return sums.forces + flow
 
     def gravity(self, q: np.ndarray) -> np.ndarray:
-        """Generalised gravity forces (n,), on the left-hand side (42)."""
+        """Forces of gravity, on the left-hand side (42).
+
+        Args:
+            q: configuration (n,).
+
+        Returns:
+            Generalised forces (n,).
+        """
         return self._inertia(self._at_rest(q), self._g)[0].forces
 
     def _inertia(
@@ -88,24 +114,40 @@ class Assembly:
             free = own[0]
             if state.number in self._sleeved and isinstance(free, masses.Masses):
                 flow += sleeve.flow_forces(state.lines[0], self._sleeved[state.number], free)
-        return masses.summed(parts, gravity), flow
+        return masses.total(parts, gravity), flow
 
     def elastic(self, q: np.ndarray) -> np.ndarray:
-        """Elastic forces (n,), on the left-hand side (43): K q, and of a sleeved link also dU/dd.
+        """Elastic forces, on the left-hand side (43): K q, of springs beside drives k (q - rest)
+        (106), and of a sleeved link also dU/dd.
 
         -dU/dd is the force that pushes a bent link out of its sleeve (36).
+
+        Args:
+            q: configuration (n,).
+
+        Returns:
+            Generalised forces (n,).
         """
         return self._elastic(self.stiffness_blocks(q), q)
 
     def _elastic(self, K: np.ndarray, q: np.ndarray) -> np.ndarray:
-        out = K @ q
+        out = K @ (q - self._rest)
         for i in self._sleeved:
             y = q[self.structure.own[i][0]]
             out[self.rows[i]] += 0.5 * y @ self._sleeve(i, q, 1) @ y
         return out
 
     def stiffness_blocks(self, q: np.ndarray) -> np.ndarray:
-        """K (n, n), with K(d) of sleeved links: twice the strain energy is q^T K q (9), (35)."""
+        """K, with K(d) of sleeved links (9), (35), and with the springs of joints.
+
+        Twice the strain energy is z^T K z, z = q less where the springs rest.
+
+        Args:
+            q: configuration (n,).
+
+        Returns:
+            (n, n).
+        """
         K = self._diagonal.copy()
         for i in self._sleeved:
             own = self.structure.own[i][0]
@@ -114,8 +156,11 @@ class Assembly:
 
     @cached_property
     def _diagonal(self) -> np.ndarray:
-        """K (n, n) of the pieces of constant length."""
+        """K (n, n) of the pieces of constant length and of the springs of joints."""
         K = np.zeros((self.n, self.n))
+        K[self.rows, self.rows] = self._springs
+        for i, row in self.structure.windups.items():
+            K[row, row] = self.robot.links[i].joint.windup_stiffness
         for link, owns in zip(self.structure.links, self.structure.own, strict=True):
             for piece, own in zip(link, owns, strict=True):
                 if piece.K.size:
@@ -129,7 +174,14 @@ class Assembly:
         )
 
     def stiffness(self, q: np.ndarray) -> np.ndarray:
-        """The second derivative of the strain energy (n, n), without loads (43)."""
+        """The second derivative of the strain energy, without loads (43).
+
+        Args:
+            q: configuration (n,).
+
+        Returns:
+            (n, n).
+        """
         K = self.stiffness_blocks(q)
         for i in self._sleeved:
             own, row = self.structure.own[i][0], self.rows[i]
@@ -140,28 +192,55 @@ class Assembly:
         return K
 
     def damping(self, q: np.ndarray) -> np.ndarray:
-        """D (n, n): viscous friction of joints, alpha M + beta K of elastic unknowns (26)."""
+        """D: viscous friction of joints, damping of transmissions (107), alpha M + beta K of links
+        (26).
+
+        Args:
+            q: configuration (n,).
+
+        Returns:
+            (n, n).
+        """
         return self._damping(self.stiffness_blocks(q), q)
 
     def _damping(self, K: np.ndarray, q: np.ndarray) -> np.ndarray:
         D = np.zeros((self.n, self.n))
         for i, (link, row) in enumerate(zip(self.robot.links, self.rows, strict=True)):
             D[row, row] = link.joint.viscous_friction
+            if i in self.structure.windups:
+                windup = self.structure.windups[i]
+                D[windup, windup] = link.joint.windup_damping
             if self.structure.own[i]:
-                own = slice(row + 1, self.structure.own[i][-1].stop)
+                own = slice(self.structure.own[i][0].start, self.structure.own[i][-1].stop)
                 D[own, own] = link.damping.beta_s * K[own, own]
                 if link.damping.alpha_1_s:
                     D[own, own] += link.damping.alpha_1_s * self._clamped_mass(i, q)[own, own]
         return D
 
     def coulomb(self, qd: np.ndarray) -> np.ndarray:
-        """Coulomb friction of the joints (n,), on the left-hand side (57)."""
+        """Coulomb friction of the joints, on the left-hand side (57).
+
+        Args:
+            qd: rates (n,).
+
+        Returns:
+            Generalised forces (n,).
+        """
         out = np.zeros(self.n)
         out[self.rows] = self._coulomb * np.tanh(qd[self.rows] / COULOMB_RATE)
         return out
 
     def forces(self, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
-        """The forces (n,) that a motion needs (59), without Coulomb friction."""
+        """The forces that a motion needs (59), without Coulomb friction.
+
+        Args:
+            q: configuration (n,).
+            qd: its rates (n,).
+            qdd: its accelerations (n,).
+
+        Returns:
+            Generalised forces (n,).
+        """
         return (
             self.mass(q) @ qdd
             + self.bias(q, qd)
@@ -171,7 +250,15 @@ class Assembly:
         )
 
     def terms(self, q: np.ndarray, qd: np.ndarray) -> Terms:
-        """All of (25) but drives and Coulomb friction, in one sweep for a time loop."""
+        """All of (25) but drives and Coulomb friction, in one sweep for a time loop.
+
+        Args:
+            q: configuration (n,).
+            qd: its rates (n,).
+
+        Returns:
+            The terms.
+        """
         states = self.structure.states(q, qd)
         sums, flow = self._inertia(states, self._g)
         K, D = (
@@ -188,12 +275,20 @@ class Assembly:
         return self._diagonal, self.damping(np.zeros(self.n))
 
     def observe(self, q: np.ndarray, qd: np.ndarray, stations: int) -> np.ndarray:
-        """What a Run shows of a state, in the order of `record.channel_units` (4), (6).
+        """What a Run shows of a state, in the order of `recorder.channel_units` (4), (6).
 
-        Link by link x, y [m], angle [rad] of its proximal end; if it bends its tip's distance
-        across the tangent at its hub (sleeve) [m], the tip's angle to it [rad], and that distance
-        at `stations` equally spaced abscissas [m]; then x, y of the tip; kinetic, strain and
+        Link by link x, y [m] and angle [rad] of its proximal end. If it bends, also its tip's
+        distance across the tangent at its hub (sleeve) [m], the tip's angle to it [rad], and that
+        distance at equally spaced abscissas [m]. Then x, y of the tip; kinetic, strain and
         potential energy [J].
+
+        Args:
+            q: configuration (n,).
+            qd: its rates (n,).
+            stations: number of abscissas.
+
+        Returns:
+            The row.
         """
         states, out = self.structure.states(q, qd), []
         for state, link in zip(states, self.robot.links, strict=True):
@@ -209,36 +304,81 @@ class Assembly:
         return np.array([*out, tip.real, tip.imag, *self._energies(states, q, qd)])
 
     def energies(self, q: np.ndarray, qd: np.ndarray) -> Energies:
-        """The energies in a state: kinetic (20), strain (9), of gravity (23)."""
+        """The energies in a state: kinetic (20), strain (9), of gravity (23).
+
+        Args:
+            q: configuration (n,).
+            qd: its rates (n,).
+
+        Returns:
+            Energies [J].
+        """
         return self._energies(self.structure.states(q, qd), q, qd)
 
     def _energies(self, states: list[LinkState], q: np.ndarray, qd: np.ndarray) -> Energies:
         parts = [part for state in states for part in self.structure.masses(state)]
         return Energies(
-            float(0.5 * qd @ self._mass(masses.summed(parts)) @ qd),
-            float(0.5 * q @ self.stiffness_blocks(q) @ q),
+            float(0.5 * qd @ self._mass(masses.total(parts)) @ qd),
+            self.strain(q, self.stiffness_blocks(q)),
             masses.potential(parts, self._g),
         )
 
+    def strain(self, q: np.ndarray, K: np.ndarray) -> float:
+        """The strain energy [J] in q (n,), K (n, n) its `stiffness_blocks` (9), (106), (107)."""
+        strained = q - self._rest
+        return float(0.5 * strained @ K @ strained)
+
     def loss(self, q: np.ndarray, qd: np.ndarray) -> float:
-        """The power that damping and friction take [W] (28)."""
+        """The power that damping and friction take (28).
+
+        Args:
+            q: configuration (n,).
+            qd: its rates (n,).
+
+        Returns:
+            Power [W].
+        """
         return float(qd @ (self.damping(q) @ qd + self.coulomb(qd)))
 
     def tip(self, q: np.ndarray, qd: np.ndarray | None = None) -> Frame:
-        """The frame of the robot's tip, with the columns of its place and angle (39)."""
+        """The frame of the robot's tip, with the columns of its place and angle (39).
+
+        Args:
+            q: configuration (n,).
+            qd: its rates (n,); None: at rest.
+
+        Returns:
+            The frame.
+        """
         return (self._at_rest(q) if qd is None else self.structure.states(q, qd))[-1].tip
 
     def line(
         self, q: np.ndarray, link: int, s: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """x, y [m] and the tangent's angle [rad] of a link (from 1) at s (S,) [m] along it (3)."""
+        """The shape of a link (3).
+
+        Args:
+            q: configuration (n,).
+            link: its number, from 1.
+            s: abscissas along it (S,) [m].
+
+        Returns:
+            x, y [m] and the tangent's angle [rad], each (S,).
+        """
         state = self._at_rest(q)[link - 1]
         frames = [self.structure.at(state, float(x)) for x in np.atleast_1d(s)]
         place = np.array([f.place for f in frames])
         return place.real, place.imag, np.array([f.angle for f in frames])
 
     def tip_deflections(self, q: np.ndarray) -> np.ndarray:
-        """The tips of the flexible links across the tangents at their hubs (k,) [m]: r_y (6)."""
+        """The tips of the flexible links across the tangents at their hubs: r_y (6).
+
+        Args:
+            q: configuration (n,).
+
+        Returns:
+            (k,) [m].
+        """
         states = [state for state in self._at_rest(q) if state.lines]
         return np.array(
             [((s.tip.place - s.hub.place) * s.hub.tangent.conjugate()).imag for s in states]
@@ -252,4 +392,4 @@ class Assembly:
         straight, still = np.zeros(self.n), np.zeros(self.n)
         straight[self.rows[i]] = q[self.rows[i]]
         state = self.structure.link(i, base(self.n), straight, still)
-        return masses.summed(self.structure.own_masses(state)).mass
+        return masses.total(self.structure.own_masses(state)).mass

@@ -39,7 +39,7 @@ def base(n: int) -> Frame:
     return Frame(0j, 0.0, np.zeros(n, dtype=complex), np.zeros(n))
 
 
-def turned(frame: Frame, angle: float, row: int | None = None) -> Frame:
+def rotate(frame: Frame, angle: float, row: int | None = None) -> Frame:
     """The frame turned by an angle, which is the unknown `row` (None: a constant)."""
     turning = frame.turning
     if row is not None:
@@ -48,8 +48,9 @@ def turned(frame: Frame, angle: float, row: int | None = None) -> Frame:
     return frame._replace(angle=frame.angle + float(angle), turning=turning)
 
 
-def ahead(frame: Frame, x: float, rows: list[int], qd: np.ndarray) -> Frame:
-    """The frame moved by x [m] along its x axis; the unknowns `rows` are summands of x."""
+def translate(frame: Frame, x: complex, rows: list[int], qd: np.ndarray) -> Frame:
+    """The frame moved by x [m] along its x axis (by the imaginary part of x across it); the
+    unknowns `rows` are summands of x."""
     t, spin = frame.tangent, float(frame.turning @ qd)
     velocity = frame.velocity + (1j * x * t) * frame.turning
     for row in rows:

@@ -22,7 +22,7 @@ class Masses(NamedTuple):
     rest: np.ndarray
 
 
-class Turning(NamedTuple):
+class RotaryInertia(NamedTuple):
     """A moment of inertia [kg m^2] that turns with a frame, with columns (n,) (39)."""
 
     inertia: float
@@ -30,7 +30,7 @@ class Turning(NamedTuple):
     rest: float
 
 
-Part = Masses | Turning
+Part = Masses | RotaryInertia
 
 
 class Sum(NamedTuple):
@@ -52,10 +52,10 @@ class Sum(NamedTuple):
         return (self.weight * self.rest) @ self.columns
 
 
-def summed(parts: list[Part], gravity: complex = 0j) -> Sum:
+def total(parts: list[Part], gravity: complex = 0j) -> Sum:
     """The rows of all parts; gravity is an acceleration of the base (42)."""
     points = [p for p in parts if isinstance(p, Masses)]
-    angles = [p for p in parts if isinstance(p, Turning)]
+    angles = [p for p in parts if isinstance(p, RotaryInertia)]
     mass, J = np.concatenate([p.mass for p in points]), np.concatenate([p.columns for p in points])
     a = np.concatenate([p.rest for p in points]) - gravity
     return Sum(
@@ -65,16 +65,16 @@ def summed(parts: list[Part], gravity: complex = 0j) -> Sum:
     )
 
 
-def lump(mass: float, frame: Frame) -> Masses:
+def point_mass(mass: float, frame: Frame) -> Masses:
     """A point mass in a frame's origin."""
     return Masses(
         np.array([mass]), np.array([frame.place]), frame.velocity[None], np.array([frame.rest])
     )
 
 
-def turning(inertia: float, frame: Frame) -> Turning:
+def turning(inertia: float, frame: Frame) -> RotaryInertia:
     """A moment of inertia that turns with a frame."""
-    return Turning(inertia, frame.turning, frame.rest_turning)
+    return RotaryInertia(inertia, frame.turning, frame.rest_turning)
 
 
 def line_masses(line: Line) -> Masses:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..robot import Link, Robot
-from .kinematics import Frame, ahead, station, turned
+from .kinematics import Frame, rotate, station, translate
 from .structure import LinkState, Structure
 
 SAME = 1e-9  # of an element: on the node
@@ -33,7 +33,7 @@ class Nodes(Structure):
         each = [
             row + 1 + np.arange(2 * k)
             for row, k, link in zip(self.rows, self.nodes, self.robot.links)
-            if cut(link)
+            if rests_in_sleeve(link)
         ]
         return np.concatenate([np.zeros(0, dtype=int), *each])
 
@@ -45,9 +45,9 @@ class Nodes(Structure):
     def link(self, i: int, hub: Frame, q: np.ndarray, qd: np.ndarray) -> LinkState:
         """Link i in a state; of a sleeved one `hub` is the exit, and the mesh begins L - d behind
         it."""
-        if not cut(self.robot.links[i]):
+        if not rests_in_sleeve(self.robot.links[i]):
             return super().link(i, hub, q, qd)
-        root = ahead(hub, q[self.rows[i]] - self.robot.links[i].length_m, [self.rows[i]], qd)
+        root = translate(hub, q[self.rows[i]] - self.robot.links[i].length_m, [self.rows[i]], qd)
         return super().link(i, root, q, qd)._replace(hub=hub)
 
     def _hub(self, i: int, before: LinkState | None, q: np.ndarray, qd: np.ndarray) -> Frame:
@@ -56,16 +56,16 @@ class Nodes(Structure):
         line, k = before.lines[0], self.nodes[i]
         at = k / self.robot.links[i - 1].elements
         node, root = station(line, at), line.start
-        moved = ahead(root, q[self.rows[i]] - at * line.free, [self.rows[i]], qd)
+        moved = translate(root, q[self.rows[i]] - at * line.free, [self.rows[i]], qd)
         frame = node._replace(
             place=node.place + moved.place - root.place,
             velocity=node.velocity + moved.velocity - root.velocity,
             rest=node.rest + moved.rest - root.rest,
         )
-        return turned(frame, self.robot.links[i].joint.angle_rad)
+        return rotate(frame, self.robot.links[i].joint.angle_rad)
 
 
-def cut(link: Link) -> bool:
+def rests_in_sleeve(link: Link) -> bool:
     """Whether a sleeve has nodes of this link at rest."""
     return link.joint.type == "Pb" and link.flexible
 
@@ -76,7 +76,7 @@ def nodes_at(robot: Robot, position: np.ndarray) -> tuple[int, ...]:
     out: list[int] = []
     for i, (link, x) in enumerate(zip(robot.links, position)):
         node = 0
-        if cut(link):
+        if rests_in_sleeve(link):
             node = int(
                 np.clip(
                     np.floor(link.elements * (1 - x / link.length_m) + SAME), 0, link.elements - 1
@@ -84,7 +84,7 @@ def nodes_at(robot: Robot, position: np.ndarray) -> tuple[int, ...]:
             )
         elif robot.rides(i):
             under = robot.links[i - 1]
-            first = out[i - 1] + 1 if cut(under) else 1
+            first = out[i - 1] + 1 if rests_in_sleeve(under) else 1
             node = int(
                 np.clip(np.ceil(under.elements * x / under.length_m - SAME), first, under.elements)
             )
@@ -97,7 +97,7 @@ def place(link: Link, node: int) -> float:
     return link.length_m * node / link.elements
 
 
-def put_to_rest(structure: Nodes, i: int, node: int, y: np.ndarray) -> None:
+def rest_node(structure: Nodes, i: int, node: int, y: np.ndarray) -> None:
     """Set deflection and angle of a node of link i to 0 in y (n,), unknowns or their rates; what
     other nodes have stays.
 

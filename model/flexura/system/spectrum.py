@@ -28,19 +28,22 @@ class Modes:
 def frequencies(
     robot: Any, q: Any = None, joints: str = "locked", *, count: int | None = None, qd: Any = None
 ) -> np.ndarray:
-    """Natural frequencies [Hz], ascending, of the undamped robot linearised about q (n,) (52),
-    (54).
+    """Natural frequencies of the undamped, linearised robot, ascending (52), (54).
 
-    Args: robot: a System, a Robot, or a robot file; q (n,): by default the static equilibrium at
-    the start; joints: "locked" (only
-        the elastic unknowns move) or "free" (rigid motions come out as 0); count: the lowest so
-        many, by default all; qd (n,): joint rates of a steady motion, for example a rotation at
-        constant speed, joints locked to it.
+    Args:
+        robot: a System, a Robot, or the path or name of a robot file.
+        q: configuration (n,); None: the static equilibrium at the start.
+        joints: "locked" (only the elastic unknowns move) or "free" (rigid motions come out as 0).
+        count: how many of the lowest; None: all.
+        qd: joint rates of a steady motion (n,), for example a rotation at constant speed; joints
+            are locked to it.
 
-    Returns: (k,). Frequencies of unstable directions are 0.
+    Returns:
+        (k,) [Hz]. Frequencies of unstable directions are 0.
 
-    Raises: InputError: an argument is not what is expected. NoEquilibrium: q is not given and there
-    is no static equilibrium.
+    Raises:
+        InputError: an argument is not what is expected.
+        NoEquilibrium: q is not given and there is no static equilibrium.
     """
     system = assemble(robot)
     _check(joints, count)
@@ -51,31 +54,49 @@ def frequencies(
         return _steady(
             system, static(system) if q is None else system.check(q), system.check(qd, "qd"), joints
         )[:count]
-    return _found(
+    return _eigenmodes(
         system, static(system) if q is None else system.check(q), joints, count, False
     ).frequencies_Hz
 
 
 @guarded("the natural modes")
 def modes(robot: Any, q: Any = None, joints: str = "locked", *, count: int | None = None) -> Modes:
-    """Natural modes of the undamped robot linearised about q (n,). Arguments and errors as in
-    `frequencies`."""
+    """Natural modes of the undamped, linearised robot. Errors as in `frequencies`.
+
+    Args:
+        robot: a System, a Robot, or the path or name of a robot file.
+        q: configuration (n,); None: the static equilibrium at the start.
+        joints: "locked" or "free".
+        count: how many of the lowest; None: all.
+
+    Returns:
+        Frequencies [Hz], ascending, and shapes.
+    """
     system = assemble(robot)
     _check(joints, count)
-    return _found(system, static(system) if q is None else system.check(q), joints, count, True)
+    return _eigenmodes(
+        system, static(system) if q is None else system.check(q), joints, count, True
+    )
 
 
-def _found(system: System, at: np.ndarray, joints: str, count: int | None, shapes: bool) -> Modes:
+def _eigenmodes(
+    system: System, at: np.ndarray, joints: str, count: int | None, shapes: bool
+) -> Modes:
     """The modes at q (n,); where frequencies are all that is asked for, shapes may be empty."""
     if not system.exact:
         return _dense(system, at, joints, count)
     free = np.full(len(system.joint_rows), joints == "free", dtype=np.uint8)
     squares, columns = system.equations.modes(at, free, count or 0, np.zeros(3), shapes)
     if joints == "free" and not any(system.robot.gravity_m_s2):
-        squares[: len(system.free_rows) - len(system.elastic_rows)] = (
-            0.0  # without gravity nothing holds a free joint
-        )
+        squares[: _unheld(system)] = 0.0
     return Modes(_hertz(squares), columns, at, system.labels)
+
+
+def _unheld(system: System) -> int:
+    """How many free joints nothing holds where there is no gravity: those without a spring."""
+    return sum(
+        not each.joint.locked and not each.joint.spring_stiffness for each in system.robot.links
+    )
 
 
 def _check(joints: Any, count: Any) -> None:
@@ -99,7 +120,7 @@ def _dense(system: System, at: np.ndarray, joints: str, count: int | None) -> Mo
     K = system.tangent(at)[pick]
     squares, shapes[rows] = eigh((K + K.T) / 2, system.mass(at)[pick])
     if joints == "free" and not any(system.robot.gravity_m_s2):
-        squares[: len(rows) - len(system.elastic_rows)] = 0.0
+        squares[: _unheld(system)] = 0.0
     return Modes(_hertz(squares)[:count], shapes[:, :count], at, system.labels)
 
 

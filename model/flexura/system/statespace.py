@@ -13,6 +13,8 @@ from ..io import choice, summary
 from .statics import static
 from .system import System, assemble, jacobian
 
+INFINITE = 1e5  # times the fastest pole: a zero beyond is one at infinity, and round-off
+
 
 @dataclass(frozen=True, repr=False)
 class StateSpace:
@@ -21,8 +23,9 @@ class StateSpace:
 
     From M dq'' + G dq' + K dq = E u, of which the fields are the matrices (m, m), (m, inputs): bias
     and gravity are in G and K. `states`, `inputs`, `outputs` are names, `units` their units: inputs
-    `joint/i/drive`, outputs `joint/i/position`, `link/i/tip_deflection`, `tip/x`, `tip/y`, as in a
-    Run. `hold` (N,): the drives [N or N m] that keep the robot there. Coulomb friction is left out.
+    `joint/i/drive`, outputs `joint/i/position` (behind a transmission also
+    `joint/i/motor_position`), `link/i/tip_deflection`, `tip/x`, `tip/y`, as in a Run. `hold` (N,):
+    the drives [N or N m] that keep the robot there. Coulomb friction is left out.
     """
 
     M: np.ndarray
@@ -84,26 +87,46 @@ class StateSpace:
     @property
     def poles(self) -> np.ndarray:
         """Eigenvalues of A (2m,) [1/s], by magnitude."""
-        from scipy.linalg import cholesky
-
-        R = cholesky(self.M)
+        R = self._root
         return _roots(np.eye(len(self.M)), _scaled(R, self.G), _scaled(R, self.K))
 
+    @property
+    def _root(self) -> np.ndarray:
+        """R (m, m), M = R^T R. Raises FlexuraError: M is singular to double precision."""
+        from scipy.linalg import cholesky
+
+        try:
+            return np.asarray(cholesky(self.M))
+        except np.linalg.LinAlgError:
+            raise FlexuraError(
+                "M is singular to double precision: a link has almost no mass beside what it "
+                "carries; fewer of its modes, as modes = 2, leave the rest out"
+            ) from None
+
     def zeros(self, drive: str, output: str) -> np.ndarray:
-        """Transmission zeros from an input to an output [1/s], by magnitude: where the output stays
-        0 while the drive acts.
+        """Transmission zeros from an input to an output, by magnitude: where the output stays 0
+        while the drive acts.
 
         Motions with c dq = 0 in the directions that the drive does not push, L^T (s^2 M + s G + K)
         N z = 0, N = ker c, L = ker b (56): the finite invariant zeros of the pencil
         [[A - s, B], [C, 0]], without its infinite ones. Those with a positive real part
-        (non-minimum phase) bound what feedback of that output can do. Raises InputError for unknown
-        names, and for an output that the drive does not move.
+        (non-minimum phase) bound what feedback of that output can do.
+
+        Args:
+            drive: name of the input, for example "joint/1/drive".
+            output: name of the output, for example "tip/x".
+
+        Returns:
+            Zeros (k,) [1/s], complex.
+
+        Raises:
+            InputError: unknown names, or an output that the drive does not move.
         """
-        from scipy.linalg import cholesky, null_space, solve_triangular
+        from scipy.linalg import null_space, solve_triangular
 
         b = self.E[:, _find(drive, self.inputs, "drive")]
         c = self.outlook[_find(output, self.outputs, "output")]
-        R = cholesky(self.M)  # coordinates in which M = 1
+        R = self._root  # coordinates in which M = 1
         b, c = solve_triangular(R, b, trans="T"), solve_triangular(R, c, trans="T")
         G, K, one = _scaled(R, self.G), _scaled(R, self.K), np.eye(len(self.M))
         for s in (
@@ -120,25 +143,39 @@ class StateSpace:
                     value=output,
                 )
         N, L = null_space(c[None]), null_space(b[None])
-        return _roots(L.T @ N, L.T @ G @ N, L.T @ K @ N)
+        found = _roots(L.T @ N, L.T @ G @ N, L.T @ K @ N)
+        return found[np.abs(found) < INFINITE * max(1.0, np.abs(self.poles).max())]
 
     def transfer(self, s: complex) -> np.ndarray:
-        """C (s - A)^-1 B at a complex frequency s [1/s], (outputs, inputs)."""
+        """The transfer matrix C (s - A)^-1 B.
+
+        Args:
+            s: complex frequency [1/s].
+
+        Returns:
+            (outputs, inputs), complex.
+        """
         return self.outlook @ np.linalg.solve(s * s * self.M + s * self.G + self.K, self.E)
 
 
 @guarded("the linear equations")
 def linearize(robot: Any, q: Any = None, qd: Any = None, joints: str = "free") -> StateSpace:
-    """The robot linearised about an equilibrium q (n,), by default the static one at the start, or
-    about a steady motion (52).
+    """The robot linearised about an equilibrium, or about a steady motion (52).
 
-    Args: robot: a System, a Robot, or a robot file; q (n,); qd (n,): joint rates of a steady
-    motion, a rotation or translation of the
-        whole robot, whose elastic equilibrium is found where q is not given; `tip/x`, `tip/y` are
-        then along axes that turn with it; joints: "free", or "locked": only the elastic unknowns
-        move, and there are no inputs.
+    Args:
+        robot: a System, a Robot, or the path or name of a robot file.
+        q: equilibrium (n,); None: the static one at the start.
+        qd: joint rates (n,) of a steady motion, a rotation or translation of the whole robot, whose
+            elastic equilibrium is found where q is not given. `tip/x`, `tip/y` are then along axes
+            that turn with it.
+        joints: "free", or "locked": only the elastic unknowns move, and there are no inputs.
 
-    Raises: InputError: q, qd are no equilibrium. FlexuraError: none is found.
+    Returns:
+        The StateSpace A, B, C, D with the names of states, inputs and outputs.
+
+    Raises:
+        InputError: q, qd are no equilibrium.
+        FlexuraError: none is found.
     """
     system = assemble(robot)
     choice(joints, "joints", ("free", "locked"))
@@ -150,11 +187,11 @@ def linearize(robot: Any, q: Any = None, qd: Any = None, joints: str = "free") -
     moved = [i for i, row in enumerate(system.joint_rows) if row in rows]
     K = system.tangent(at, rates if rates.any() else None)
     K = K if rates.any() else (K + K.T) / 2
-    look, outputs, units = _outputs(system, at)
+    outputs_at, outputs, units = _outputs(system, at)
     kept = [
         k
         for k, name in enumerate(outputs)
-        if not name.startswith("joint") or int(name.split("/")[1]) - 1 in moved
+        if not name.startswith("joint") or _number(name) in moved
     ]
     labels = [system.labels[row] for row in rows]
     drives = [f"joint/{i + 1}/drive" for i in moved]
@@ -165,7 +202,7 @@ def linearize(robot: Any, q: Any = None, qd: Any = None, joints: str = "free") -
         G=system.rate(at, rates)[pick],
         K=K[pick],
         E=(np.arange(system.n)[rows, None] == system.joint_rows[moved]).astype(float),
-        outlook=look[np.ix_(np.array(kept), rows)],
+        outlook=outputs_at[np.ix_(np.array(kept), rows)],
         states=(*labels, *(f"rate of {label.replace(']', '/s]')}" for label in labels)),
         inputs=tuple(drives),
         outputs=tuple(outputs[k] for k in kept),
@@ -174,6 +211,11 @@ def linearize(robot: Any, q: Any = None, qd: Any = None, joints: str = "free") -
         qd=rates,
         hold=system.forces(at, rates, np.zeros(system.n))[system.joint_rows],
     )
+
+
+def _number(name: str) -> int:
+    """The joint or link of an output, from 0."""
+    return int(name.split("/")[1]) - 1
 
 
 def _steady(system: System, rates: np.ndarray) -> np.ndarray:
@@ -242,18 +284,19 @@ def _outputs(system: System, q: np.ndarray) -> tuple[np.ndarray, list[str], dict
     units."""
     links = system.robot.links
     flexible = [i for i, link in enumerate(links) if link.flexible]
-    names = [f"joint/{i + 1}/position" for i in range(len(links))] + [
-        f"link/{i + 1}/tip_deflection" for i in flexible
-    ]
+    motors, rows = list(system.windup_rows), system.joint_rows
+    names = [f"joint/{i + 1}/position" for i in range(len(links))]
+    names += [f"joint/{i + 1}/motor_position" for i in motors]
+    names += [f"link/{i + 1}/tip_deflection" for i in flexible]
     units = {
-        name: "rad" if "joint" in name and links[i].joint.type == "R" else "m"
-        for i, name in enumerate(names)
+        name: "rad" if name.startswith("joint") and links[_number(name)].joint.type == "R" else "m"
+        for name in names
     }
 
-    def look(z: np.ndarray) -> np.ndarray:
-        return np.concatenate([z[system.joint_rows], *system.places(z)])
+    def outputs_at(z: np.ndarray) -> np.ndarray:
+        return np.concatenate([system.hub_positions(z), z[rows[motors]], *system.places(z)])
 
-    slopes = jacobian(look, q, np.full(system.n, 1e-5) / np.maximum(_steep(system), 1e-300))
+    slopes = jacobian(outputs_at, q, np.full(system.n, 1e-5) / np.maximum(_steep(system), 1e-300))
     return slopes, [*names, "tip/x", "tip/y"], units | {"tip/x": "m", "tip/y": "m"}
 
 

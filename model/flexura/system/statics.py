@@ -30,18 +30,19 @@ def static(
     tip_force: Any = (0.0, 0.0),
     tip_moment: float = 0.0,
 ) -> np.ndarray:
-    """The static equilibrium q (n,) with the joints held: elastic + gravity = J_tip^T load (50).
+    """The static equilibrium with the joints held: elastic + gravity = J_tip^T load (50).
 
     The load grows in steps from the straight robot, so that any bending is found: a cantilever
     under a dead transverse force P takes the shape of the elastica for any P L^2 / EI.
 
     Args:
         robot: a System, a Robot, or the path or name of a robot file.
-        joints (links,): positions [m or rad], by default their start.
+        joints: positions (links,) [m or rad]; None: their start.
         tip_force: x and y [N] at the last tip, in the base's axes.
         tip_moment: moment there [N m].
 
-    Returns: q (n,) in the order of `system.labels`.
+    Returns:
+        q (n,) in the order of `system.labels`.
 
     Raises:
         InputError: an argument is not what is expected.
@@ -50,17 +51,25 @@ def static(
     system = assemble(robot)
     force = array(tip_force, "tip_force", "expected a finite force (x, y) in newtons", (2,))
     load = np.array([*force, number(tip_moment, "tip_moment")])
-    q = held(system, joints)
+    q = joint_positions(system, joints)
     if not system.exact:
         return _dense(system.fixed(q), q, load)
     return equilibrium(system.equations, q, load)
 
 
 def equilibrium(equations: Any, q: np.ndarray, load: np.ndarray | None = None) -> np.ndarray:
-    """The static equilibrium (n,) of compiled equations with the joints where they are in q (n,),
-    under a `load` (3,) at the tip: force x, y [N] and moment [N m] (50).
+    """The static equilibrium with the joints where they are, under a load at the tip (50).
 
-    Raises: NoEquilibrium: there is none, or it was not found.
+    Args:
+        equations: the robot's equations in the core.
+        q: configuration (n,), whose joints stay.
+        load: force x, y [N] and moment [N m] (3,); None: none.
+
+    Returns:
+        The configuration (n,).
+
+    Raises:
+        NoEquilibrium: there is none, or it was not found.
     """
     free = np.zeros(len(equations.first), dtype=np.uint8)
     found, balance, share, _ = equations.equilibrium(q, np.zeros(3) if load is None else load, free)
@@ -78,12 +87,14 @@ def equilibrium(equations: Any, q: np.ndarray, load: np.ndarray | None = None) -
 
 @guarded("the holding forces")
 def holding(robot: Any, q: Any = None) -> np.ndarray:
-    """The drives (links,) [N or N m] that hold the joints at rest (25): elastic forces and gravity
-    in their rows.
+    """The drives that hold the joints at rest (25): elastic forces and gravity in their rows.
 
     Args:
         robot: a System, a Robot, or the path or name of a robot file.
-        q (n,): by default the static equilibrium at the start.
+        q: configuration (n,); None: the static equilibrium at the start.
+
+    Returns:
+        Drives (links,) [N or N m].
 
     Raises:
         InputError: an argument is not what is expected.
@@ -95,7 +106,7 @@ def holding(robot: Any, q: Any = None) -> np.ndarray:
     return system.forces(at, rest, rest)[system.joint_rows]
 
 
-def held(system: System, joints: Any) -> np.ndarray:
+def joint_positions(system: System, joints: Any) -> np.ndarray:
     """q (n,) of the straight robot with the joints at `joints` (links,) [m or rad], by default
     their start. Raises InputError."""
     q = system.start()
@@ -108,11 +119,14 @@ def held(system: System, joints: Any) -> np.ndarray:
 
 
 def tip_pose(robot: Any, q: Any) -> np.ndarray:
-    """x, y [m] and angle [rad] of the last link's tip in the base's axes.
+    """x, y and angle of the last link's tip in the base's axes.
 
     Args:
         robot: a System, a Robot, or the path or name of a robot file.
-        q (n,): the configuration, in the order of `system.labels`.
+        q: configuration (n,), in the order of `system.labels`.
+
+    Returns:
+        x, y [m] and angle [rad] (3,).
 
     Raises:
         InputError: an argument is not what is expected.

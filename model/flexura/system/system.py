@@ -19,7 +19,13 @@ from .constants import equations
 from .nodes import Nodes, nodes_at
 from .structure import Structure, structure
 
-_UNITS = {"rotation": "rad", "bubble": "rad", "shape": "rad", "mode": "kg^(1/2) m"}
+_UNITS = {
+    "rotation": "rad",
+    "bubble": "rad",
+    "shape": "rad",
+    "mode": "kg^(1/2) m",
+    "windup": "rad",
+}
 
 
 @dataclass(frozen=True)
@@ -55,8 +61,14 @@ class System:
         return f"System of {self.robot.name or 'a robot'}, {self.robot.structure}", rows
 
     def fixed(self, q: Any) -> System:
-        """The robot of fixed structure at q (n,): itself; where it slides from node to node, with
-        the nodes that it has there."""
+        """The robot of fixed structure at a configuration.
+
+        Args:
+            q: configuration (n,).
+
+        Returns:
+            This System; for one that slides from node to node, that with the nodes it has at q.
+        """
         if not self.robot.nodal:
             return self
         at = self._array(q, "q")
@@ -124,10 +136,30 @@ class System:
     def _resting(self) -> np.ndarray:
         return np.zeros(0, dtype=int) if self.nodes is None else self.assembly.structure.resting  # type: ignore[attr-defined]
 
-    def own_rows(self, link: int) -> np.ndarray:
-        """Rows of the elastic unknowns of a link (from 0)."""
+    @cached_property
+    def windup_rows(self) -> dict[int, int]:
+        """Rows of the windups of transmissions, by the number of the link (from 0) (107)."""
+        return self._structure.windups
+
+    def link_rows(self, link: int) -> np.ndarray:
+        """Rows of the elastic unknowns of a link, without the windup of its joint.
+
+        Args:
+            link: number of the link, from 0.
+
+        Returns:
+            Indices into q (k,).
+        """
         ends = np.append(self.joint_rows, self.n)
-        return np.arange(ends[link] + 1, ends[link + 1])
+        return np.arange(ends[link] + 1 + (link in self.windup_rows), ends[link + 1])
+
+    def hub_positions(self, z: np.ndarray) -> np.ndarray:
+        """Positions (or rates) of the joints' hubs (..., links) from q (or qd) (..., n): behind a
+        transmission the rotor's and the windup (107)."""
+        out = np.array(z[..., self.joint_rows])
+        for link, row in self.windup_rows.items():
+            out[..., link] += z[..., row]
+        return out
 
     @cached_property
     def limits(self) -> np.ndarray:
@@ -146,12 +178,25 @@ class System:
         return q
 
     def mass(self, q: Any) -> np.ndarray:
-        """M(q) (n, n) (40)."""
+        """The mass matrix M(q) (40).
+
+        Args:
+            q: configuration (n,).
+
+        Returns:
+            (n, n), symmetric and positive definite.
+        """
         return self.assembly.mass(self.check(q))
 
     def stiffness(self, q: Any = None) -> np.ndarray:
-        """K (n, n) at the start; with q the tangent stiffness there, the slope of elastic and
-        gravity forces (43), (51)."""
+        """The stiffness matrix: the slope of elastic and gravity forces (43), (51).
+
+        Args:
+            q: configuration (n,); None: K at the start, without loads.
+
+        Returns:
+            (n, n).
+        """
         if q is None:
             return self.assembly.stiffness_blocks(self.check(self.start()))
         return self.tangent(q)
@@ -163,29 +208,76 @@ class System:
         return self.damping_at(self.start())
 
     def damping_at(self, q: Any) -> np.ndarray:
-        """D (n, n) at q: it depends on the free length of a sleeved link, on nothing else (26)."""
+        """The damping matrix D; it depends on the free length of a sleeved link, on nothing else
+        (26).
+
+        Args:
+            q: configuration (n,).
+
+        Returns:
+            (n, n).
+        """
         return self.assembly.damping(self.check(q))
 
     def elastic(self, q: Any) -> np.ndarray:
-        """Elastic forces (n,), on the left-hand side (43)."""
+        """Elastic forces, on the left-hand side (43).
+
+        Args:
+            q: configuration (n,).
+
+        Returns:
+            Generalised forces (n,).
+        """
         return self.assembly.elastic(self.check(q))
 
     def gravity(self, q: Any) -> np.ndarray:
-        """Generalised gravity forces (n,), on the left-hand side (42)."""
+        """Forces of gravity, on the left-hand side (42).
+
+        Args:
+            q: configuration (n,).
+
+        Returns:
+            Generalised forces (n,).
+        """
         return self.assembly.gravity(self.check(q))
 
     def bias(self, q: Any, qd: Any) -> np.ndarray:
-        """Coriolis and centrifugal forces (n,), on the left-hand side (41)."""
+        """Coriolis and centrifugal forces, on the left-hand side (41).
+
+        Args:
+            q: configuration (n,).
+            qd: its rates (n,).
+
+        Returns:
+            Generalised forces (n,).
+        """
         return self.assembly.bias(self.check(q), self.check(qd, "qd"))
 
     def forces(self, q: Any, qd: Any, qdd: Any) -> np.ndarray:
-        """Generalised forces (n,) that the motion needs: the whole left-hand side, Coulomb friction
-        left out (59)."""
+        """The forces that a motion needs: the whole left-hand side without Coulomb friction (59).
+
+        Args:
+            q: configuration (n,).
+            qd: its rates (n,).
+            qdd: its accelerations (n,).
+
+        Returns:
+            Generalised forces (n,).
+        """
         return self.assembly.forces(self.check(q), self.check(qd, "qd"), self.check(qdd, "qdd"))
 
     def accelerations(self, q: Any, qd: Any, force: Any) -> np.ndarray:
-        """qdd (n,) under generalised forces (n,), locked joints at rest; Coulomb friction left out
-        (44) to (47)."""
+        """Accelerations under forces, with locked joints at rest and without Coulomb friction (44)
+        to (47).
+
+        Args:
+            q: configuration (n,).
+            qd: its rates (n,).
+            force: generalised forces (n,).
+
+        Returns:
+            qdd (n,).
+        """
         at, rates, acting = self.check(q), self.check(qd, "qd"), self.check(force, "force")
         if self.exact:
             return np.asarray(self.equations.accelerations(at, rates, acting))
@@ -195,15 +287,19 @@ class System:
         return out
 
     def line(self, q: Any, link: int, s: Any = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """x, y [m] and the tangent's angle theta [rad] in the base's axes of a link (from 1) at q.
+        """The shape of a link in the base's axes (3).
 
-        Args: q (n,); link: its number; s (S,) [m] along it from its proximal end, by default 101
-        places from end to end.
+        Args:
+            q: configuration (n,).
+            link: number of the link, from 1.
+            s: places along it from its proximal end (S,) [m]; None: 101 places from end to end.
 
-        Returns: three arrays (S,). Of a sleeved link what is inside or behind the sleeve lies on
-        its axis.
+        Returns:
+            x, y [m] and the tangent's angle theta [rad], each (S,). Of a sleeved link what is
+            inside or behind the sleeve lies on its axis.
 
-        Raises: InputError: there is no such link, or a place is not on it.
+        Raises:
+            InputError: there is no such link, or a place is not on it.
         """
         expected = f"expected a link from 1 to {len(self.robot.links)}"
         if number(link, "link", expected) not in range(1, len(self.robot.links) + 1):
@@ -225,8 +321,15 @@ class System:
         return self.assembly.line(self.check(q), link, places)
 
     def angles(self, link: int, s: Any) -> np.ndarray:
-        """What each unknown turns the tangent by (S, n), against the hub, at s (S,) [m] along a
-        link (from 1) of constant length: B of (2)."""
+        """What each unknown turns the tangent by, against the hub: B of (2).
+
+        Args:
+            link: number of the link, from 1; one of constant length.
+            s: abscissas along it (S,) [m].
+
+        Returns:
+            (S, n).
+        """
         places = np.atleast_1d(np.asarray(s, dtype=float))
         out, start = np.zeros((len(places), self.n)), 0.0
         for piece, own in zip(
@@ -238,15 +341,29 @@ class System:
         return out
 
     def observe(self, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
-        """What a Run shows of states q, qd (T, n): rows of poses, deflections, tip and energies, as
-        `record.channel_units` names them from `link/1/x` to `energy/potential` (4), (6)."""
+        """What a Run shows of states (4), (6).
+
+        Args:
+            q: configurations (T, n).
+            qd: their rates (T, n).
+
+        Returns:
+            Rows of poses, deflections, tip and energies, in the order of `recorder.channel_units`
+            from `link/1/x` to `energy/potential`.
+        """
         if self.exact:
             return np.asarray(self.equations.observe(q, qd, STATIONS))
         return np.array([self.assembly.observe(a, b, STATIONS) for a, b in zip(q, qd, strict=True)])
 
     def places(self, q: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Tip deflections of the flexible links (k,) [m] and the last tip's x, y [m] at q: what a
-        Run shows of them."""
+        """What a Run shows of deflections and the tip.
+
+        Args:
+            q: configuration (n,).
+
+        Returns:
+            Tip deflections of the flexible links (k,) [m], and x, y of the last tip (2,) [m].
+        """
         at = self.check(q)
         if self.exact:
             row = self.equations.observe(at[None], np.zeros((1, self.n)), 2)[0]
@@ -265,8 +382,18 @@ class System:
         return self.robot.stiffening and not self.robot.nodal
 
     def check(self, q: Any, key: str = "q") -> np.ndarray:
-        """An array (n,) of floats. Raises InputError for another shape, and for robots that slide
-        from node to node."""
+        """A checked vector of the unknowns.
+
+        Args:
+            q: what was given.
+            key: name of the argument, for the message.
+
+        Returns:
+            An array (n,) of floats.
+
+        Raises:
+            InputError: another shape, or a robot that slides from node to node.
+        """
         if self.robot.nodal and self.nodes is None:
             text = (
                 'expected "continuous": sliding from node to node has other matrices between '
@@ -283,8 +410,15 @@ class System:
         return found
 
     def tangent(self, q: Any, qd: Any = None) -> np.ndarray:
-        """The derivative of bias, elastic and gravity forces by q (n, n), at rest or at rates qd
-        (n,) (52)."""
+        """The derivative of bias, elastic and gravity forces by q (52).
+
+        Args:
+            q: configuration (n,).
+            qd: its rates (n,); None: at rest.
+
+        Returns:
+            (n, n).
+        """
         at, rates = self.check(q), None if qd is None else self.check(qd, "qd")
         if self.exact:
             return np.asarray(self.equations.stiffness(at, np.zeros(0) if rates is None else rates))
@@ -295,8 +429,15 @@ class System:
         return jacobian(forces, at, np.full(self.n, 1e-6))
 
     def rate(self, q: Any, qd: Any) -> np.ndarray:
-        """The derivative of all forces by qd (n, n) at (q, qd): damping, friction, and the
-        gyroscopic terms of a motion (52)."""
+        """The derivative of all forces by the rates: damping, friction, and gyroscopic terms (52).
+
+        Args:
+            q: configuration (n,).
+            qd: its rates (n,).
+
+        Returns:
+            (n, n).
+        """
         at, rates = self.check(q), self.check(qd, "qd")
         if self.exact:
             return np.asarray(self.equations.rates(at, rates))
@@ -322,9 +463,9 @@ class System:
             coefficients = coefficients_of_legendre_sums(np.asarray(sums)[: count + 1])
         else:
             coefficients = np.linalg.lstsq(legendre_shapes(count, pieces[0].xi), B.T, rcond=None)[0]
-        law = self._structure.laws[link]
-        assert law is not None
-        return (whole_piece(law, pieces[0].points, coefficients, K),)
+        material = self._structure.materials[link]
+        assert material is not None
+        return (whole_piece(material, pieces[0].points, coefficients, K),)
 
     def _unit(self, name: str) -> str:
         parts = name.split("/")
@@ -339,6 +480,9 @@ def assemble(robot: Any) -> System:
 
     Args:
         robot: a Robot, the path or name of a robot file, or a System, which is returned as it is.
+
+    Returns:
+        The System.
 
     Raises:
         InputError: an argument is not what is expected; a joint moves no mass.

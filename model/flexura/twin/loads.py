@@ -77,7 +77,7 @@ def actuation(drive: Any, start: np.ndarray, speeds: np.ndarray, t: np.ndarray) 
                 value=len(drive.joints),
             )
         acting = drive.within(0.0, float(t[-1]))
-        breaks = None if acting.calls else acting.breaks
+        breaks = None if acting.has_functions else acting.breaks
         return Actuation(acting.gains, acting, lambda t: _plan(acting, t), breaks, acting.follows)
 
     expected = "expected a Drive or a function (t) or (t, position, velocity, tip_deflection)"

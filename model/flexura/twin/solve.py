@@ -21,7 +21,7 @@ from .extrapolation import LENGTH_FACTOR, extrapolate
 from .joints.mesh import check_supported, mesh, slide_range, sliding_kinds
 from .links import ancf, geometrically_exact
 from .loads import Actuation, Loads, actuation
-from .start import at_positions, equilibrium, put, start_speeds, which_start
+from .start import at_positions, equilibrium, put, resolve_start, start_speeds
 from .steps import Steps, plan_steps, suggest_step
 
 exu = Optional("exudyn")
@@ -72,7 +72,8 @@ def simulate(
             as in `flexura.simulate`.
         qd0: joint velocities at the start (n,) [m/s or rad/s]; None: at rest.
         start: "static", links in equilibrium with the joints held, which is the default under
-            gravity and needs a robot at rest, or "straight". `meta["start"]` says which was used.
+            gravity, or "straight". Joints keep the velocities qd0, but a robot with a joint that
+            slides on a flexible link must be at rest. `meta["start"]` says which was used.
         beam: "ancf" (ObjectANCFCable2D, Euler-Bernoulli) or "ge" (ObjectBeamGeometricallyExact2D of
             three nodes, with shear).
         elements: beam elements a flexible link; None: twice the robot file's and at least 8, or 32
@@ -119,7 +120,7 @@ def simulate(
         on = act.plan(0.0)
         robot = at_positions(robot, np.where(act.guided, on[:, 1], robot.start))
         speeds = np.where(act.guided, on[:, 2], speeds)
-    begins = which_start(robot, start, speeds)
+    begins = resolve_start(robot, start, speeds)
     kinds = sliding_kinds(robot) if hub_length_m is None else []
     share, report = 1 / (1 + len(kinds)), progress or (lambda fraction: None)
 
@@ -130,7 +131,7 @@ def simulate(
         def new() -> TwinModel:
             model = build(robot, beam, shape, speeds, act.gains, act.guided)
             if bent is not None:
-                put(model, bent)
+                put(model, bent, speeds)
             return model
 
         tries = 1 if step_s else ATTEMPTS

@@ -13,7 +13,7 @@ from ..optional import Optional
 from ..robot import Robot
 from ..signals import STARTS
 from .build import TwinModel, build
-from .joints.mesh import Mesh
+from .joints.mesh import Mesh, sliding_kinds
 
 exu = Optional("exudyn")
 
@@ -44,29 +44,49 @@ def start_speeds(robot: Robot, qd0: Any) -> np.ndarray:
     return speeds
 
 
-def which_start(robot: Robot, start: Any, speeds: np.ndarray) -> str:
+def resolve_start(robot: Robot, start: Any, speeds: np.ndarray) -> str:
     """The start of a run, "static" or "straight", by default as gravity asks.
 
-    Args: start: as given, or None; speeds (n,) of the joints at the start.
+    A static start gives the positions. The joints keep their velocities, as in the native solver.
 
-    Raises: InputError: start is neither, or is static while joints move.
+    Args:
+        robot: the robot.
+        start: as given, or None.
+        speeds: joint velocities at the start (n,) [m/s or rad/s].
+
+    Returns:
+        "static" or "straight".
+
+    Raises:
+        InputError: start is neither, or it is static, joints move and one of the robot's joints
+            slides on a flexible link: the twin does not know the velocities of its hub or sleeve.
     """
     if start is not None:
         choice(start, "start", STARTS)
     bends = any(link.flexible for link in robot.links) and any(robot.gravity_m_s2)
     which = start or ("static" if bends else "straight")
-    if which == "static" and speeds.any():
+    if which == "static" and speeds.any() and sliding_kinds(robot):
         expected = (
-            'expected "straight" with joints that move: from equilibrium the twin starts at rest'
+            'expected "straight", or a robot at rest: a joint slides on a flexible link, and from '
+            "equilibrium the twin starts such a robot at rest"
         )
         raise InputError(expected, key="start", value=which)
     return str(which)
 
 
 def equilibrium(robot: Robot, beam: str, mesh: Mesh) -> np.ndarray:
-    """The coordinates of a robot with this mesh in static equilibrium, without the reference.
+    """The coordinates of a robot in static equilibrium, without the reference.
 
-    Raises: FlexuraError: Exudyn finds none.
+    Args:
+        robot: the robot, with its joints at their start.
+        beam: "ancf" or "ge".
+        mesh: elements, hubs and sleeves.
+
+    Returns:
+        Displacements of all coordinates.
+
+    Raises:
+        FlexuraError: Exudyn finds none.
     """
     n = len(robot.links)
     for steps in LOAD_STEPS:
@@ -82,9 +102,54 @@ def equilibrium(robot: Robot, beam: str, mesh: Mesh) -> np.ndarray:
     )
 
 
-def put(model: TwinModel, coordinates: np.ndarray) -> None:
-    """Let a model start with these coordinates, its velocities as they are."""
-    model.mbs.systemData.SetODE2Coordinates(coordinates, exu.ConfigurationType.Initial)
+def put(model: TwinModel, coordinates: np.ndarray, speeds: np.ndarray) -> None:
+    """Let a model start in static equilibrium.
+
+    Args:
+        model: the model.
+        coordinates: displacements of the equilibrium from the reference.
+        speeds: joint velocities at the start (n,) [m/s or rad/s].
+    """
+    data, initial = model.mbs.systemData, exu.ConfigurationType.Initial
+    data.SetODE2Coordinates(coordinates, initial)
+    if speeds.any():
+        rates = np.array(data.GetODE2Coordinates_t(initial))
+        data.SetODE2Coordinates_t(_rigid_rates(model, coordinates, speeds, rates), initial)
+
+
+def _rigid_rates(
+    model: TwinModel, coordinates: np.ndarray, speeds: np.ndarray, rates: np.ndarray
+) -> np.ndarray:
+    """Velocities of all coordinates when the joints move and the links keep their shapes.
+
+    Args:
+        model: a model without joints that slide on flexible links.
+        coordinates: displacements from the reference.
+        speeds: joint velocities (n,) [m/s or rad/s].
+        rates: velocities of the coordinates that belong to no link, such as rotors.
+    """
+    total, rates = model.reference + coordinates, rates.copy()
+    across = lambda r: np.stack([-r[..., 1], r[..., 0]], axis=-1)
+    # a point of the body before with its velocity; the body's angle and angular velocity
+    place, v, angle, omega = np.zeros(2), np.zeros(2), 0.0, 0.0
+    for link, part, index, speed in zip(model.robot.links, model.parts, model.index, speeds):
+        q = total[index]
+        origin = part.motion_at_origin(q[None], np.zeros_like(q[None]))
+        at, turned = origin.r[0], float(origin.angle[0])
+        v = v + omega * across(at - place)
+        if link.joint.type == "R":
+            omega += speed
+        else:
+            along = angle if link.joint.type == "Pa" else turned
+            v = v + speed * np.array([np.cos(along), np.sin(along)])
+        nodes = q.reshape(-1, part.width)
+        rate = np.full_like(nodes, omega)
+        rate[:, :2] = v + omega * across(nodes[:, :2] - at)
+        if part.width == 4:  # a slope vector in place of an angle
+            rate[:, 2:] = omega * across(nodes[:, 2:])
+        rates[index] = rate.ravel()
+        place, angle = at, turned
+    return rates
 
 
 def _settings(model: TwinModel, steps: int) -> Any:

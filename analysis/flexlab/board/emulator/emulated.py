@@ -95,23 +95,41 @@ class EmulatedBoard:
     # ---- a board
 
     def write(self, data: bytes) -> None:
+        """Send bytes to the board.
+
+        Args:
+            data: the bytes.
+        """
         self.simulator.send(data)
 
     def read(self) -> bytes:
+        """The bytes that have come from the board.
+
+        Returns:
+            The bytes since the last call.
+        """
         return self.simulator.receive()
 
     def wait(self, seconds: float) -> None:
+        """Let emulated time pass.
+
+        Args:
+            seconds: at least so much [s].
+        """
         target = self.simulator.cycle + seconds * CLOCK_HZ
         while self._until < target:
             self.step()
 
     def now(self) -> float:
+        """The emulated time since the start [s]."""
         return self.simulator.cycle / CLOCK_HZ
 
     def reset(self) -> None:
+        """Reset the board, as the button or DTR does."""
         self.simulator.reset("external")
 
     def close(self) -> None:
+        """End the emulation."""
         self.simulator.close()
 
     # ---- in lockstep

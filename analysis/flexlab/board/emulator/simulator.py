@@ -12,7 +12,6 @@ import ctypes
 import hashlib
 import os
 import subprocess
-import tempfile
 from collections.abc import Iterable
 from ctypes import (
     c_char,
@@ -29,6 +28,7 @@ from pathlib import Path
 from typing import Any
 
 from flexura.errors import FlexuraError
+from flexura.io import replaced
 from flexura.optional import Missing
 
 from .elf import read
@@ -71,6 +71,8 @@ class Window(ctypes.Structure):
 
 
 class Edge(ctypes.Structure):
+    """A change of a traced line: at which cycle, which line, and its level from then on."""
+
     _fields_ = (("cycle", c_uint64), ("line", c_uint32), ("level", c_uint32))
 
 
@@ -117,35 +119,20 @@ def compile_shim() -> Path:
     target = folder / f"board-{digest}.so"
     if target.exists():
         return target
-    folder.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=folder, suffix=".so")
-    os.close(handle)
-    try:
-        parts = [str(path) for path in _SOURCES if path.suffix == ".c"]
-        command = [
-            "cc",
-            "-O2",
-            "-shared",
-            "-fPIC",
-            f"-I{_HEADERS}",
-            "-o",
-            name,
-            *parts,
-            "-lsimavr",
-            "-lm",
-        ]
-        done = subprocess.run(command, capture_output=True, text=True)
+    parts = [str(path) for path in _SOURCES if path.suffix == ".c"]
+    options = ["-O2", "-shared", "-fPIC", f"-I{_HEADERS}"]
+    with replaced(target) as draft:
+        command = ["cc", *options, "-o", str(draft), *parts, "-lsimavr", "-lm"]
+        try:
+            done = subprocess.run(command, capture_output=True, text=True)
+        except FileNotFoundError:
+            raise Missing(
+                f"the emulated board needs a C compiler, and there is no cc; {_INSTALL}"
+            ) from None
         if done.returncode:
             raise FlexuraError(
                 f"the emulated board's shim does not compile; {_INSTALL}\n{done.stderr.strip()}"
             )
-        os.replace(name, target)
-    except FileNotFoundError:
-        raise Missing(
-            f"the emulated board needs a C compiler, and there is no cc; {_INSTALL}"
-        ) from None
-    finally:
-        Path(name).unlink(missing_ok=True)
     return target
 
 
@@ -183,6 +170,7 @@ class Simulator:
         self._bytes, self._edges = (c_uint8 * _ROOM)(), (Edge * _ROOM)()
 
     def close(self) -> None:
+        """Free the emulated processor."""
         if self._board:
             self._lib.board_free(self._board)
             self._board = c_void_p()
@@ -197,10 +185,12 @@ class Simulator:
 
     @property
     def cycle(self) -> int:
+        """Cycles of the processor since the start."""
         return self._lib.board_cycle(self._board)
 
     @property
     def pc(self) -> int:
+        """The program counter [bytes]."""
         return self._lib.board_pc(self._board)
 
     def line(
@@ -220,6 +210,12 @@ class Simulator:
         self._lib.board_cut(self._board, line, broken)
 
     def trace(self, line: int, on: bool) -> None:
+        """Record the edges of a line, or stop doing so.
+
+        Args:
+            line: its number.
+            on: whether edges are recorded.
+        """
         self._lib.board_trace(self._board, line, on)
 
     def encoder(self, number: int, a: tuple[str, int], b: tuple[str, int]) -> None:
@@ -242,6 +238,12 @@ class Simulator:
         self._lib.board_stick(self._board, port.encode(), bit, -1 if level is None else int(level))
 
     def adc(self, channel: int, millivolts: int) -> None:
+        """Set the voltage at an analogue input.
+
+        Args:
+            channel: of the converter.
+            millivolts: the voltage [mV].
+        """
         self._lib.board_adc(self._board, self.cycle, channel, millivolts)
 
     def send(self, data: bytes) -> None:
@@ -274,11 +276,26 @@ class Simulator:
         self._lib.board_reset(self._board, RESET_CAUSES[cause])
 
     def read_eeprom(self, offset: int, size: int) -> bytes:
+        """Bytes of the EEPROM.
+
+        Args:
+            offset: of the first byte.
+            size: number of bytes.
+
+        Returns:
+            The bytes.
+        """
         got = (c_uint8 * size)()
         self._lib.board_eeprom(self._board, 0, got, offset, size)
         return bytes(got)
 
     def write_eeprom(self, offset: int, data: bytes) -> None:
+        """Write bytes into the EEPROM.
+
+        Args:
+            offset: of the first byte.
+            data: the bytes.
+        """
         self._lib.board_eeprom(self._board, 1, (c_uint8 * len(data))(*data), offset, len(data))
 
     def symbol(self, name: str) -> int:

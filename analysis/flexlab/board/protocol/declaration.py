@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 NAME = "flexura-rig"
 VERSION = 1
-DECLARATION = 0x41A4921D
+DECLARATION = 0xCB159926
 BAUD_BIT_S = 500000
 CONTROL_HZ = 1000
 TELEMETRY_EVERY_TICKS = 2
@@ -277,7 +277,7 @@ MESSAGES: dict[str, Message] = {
     "identity": Message(
         "identity",
         128,
-        "<IB3B3BBBBHI",
+        "<IB3B3BBBBII",
         (
             Field("declaration", "", 1),
             Field("protocol", "", 1),

@@ -1,13 +1,14 @@
-"""Frames on the serial line: COBS(payload, CRC-16) and a zero byte.
+"""Frames on the serial line: COBS(payload, CRC-32) and a zero byte.
 
 COBS: S. Cheshire and M. Baker, Consistent overhead byte stuffing, IEEE/ACM Trans. Networking 7
-(1999) 159-172. CRC-16/CCITT-FALSE: polynomial 0x1021, start 0xFFFF, low byte first.
+(1999) 159-172. The CRC is that of IEEE 802.3, low byte first.
 """
 
 from __future__ import annotations
 
-from binascii import crc_hqx
+from zlib import crc32
 
+CRC_BYTES = 4
 MAX_PENDING = 4096  # without a zero byte in this many the line carries something else
 
 
@@ -39,20 +40,17 @@ def uncobs(data: bytes) -> bytes | None:
 
 def encode(payload: bytes) -> bytes:
     """The bytes that go on the line for a payload."""
-    return cobs(payload + crc_hqx(payload, 0xFFFF).to_bytes(2, "little")) + b"\0"
+    return cobs(payload + crc32(payload).to_bytes(CRC_BYTES, "little")) + b"\0"
 
 
 def decode(frame: bytes) -> bytes | None:
     """The payload of what stood before a zero byte, or None when it is no frame or its CRC is
     wrong."""
     data = uncobs(frame)
-    if (
-        data is None
-        or len(data) < 3
-        or crc_hqx(data[:-2], 0xFFFF) != int.from_bytes(data[-2:], "little")
-    ):
+    if data is None or len(data) <= CRC_BYTES:
         return None
-    return data[:-2]
+    payload, crc = data[:-CRC_BYTES], data[-CRC_BYTES:]
+    return payload if crc32(payload) == int.from_bytes(crc, "little") else None
 
 
 class Deframer:
@@ -64,6 +62,14 @@ class Deframer:
         self._rest = b""
 
     def feed(self, data: bytes) -> list[bytes]:
+        """Take received bytes.
+
+        Args:
+            data: the bytes; a frame may be spread over several calls.
+
+        Returns:
+            The payloads of the good frames that they complete. `bad` counts the others.
+        """
         *frames, rest = (self._rest + data).split(b"\0")
         self._rest = rest[-MAX_PENDING:]
         payloads = [(frame, decode(frame)) for frame in frames if frame]

@@ -46,6 +46,14 @@ def head(payload: bytes) -> tuple[int, int] | None:
 
 
 def body(payload: bytes) -> bytes:
+    """The payload of a frame without its head.
+
+    Args:
+        payload: the payload.
+
+    Returns:
+        The bytes of the message's fields.
+    """
     return payload[_HEAD.size :]
 
 

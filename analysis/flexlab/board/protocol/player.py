@@ -35,6 +35,7 @@ class Knots:
 
     @property
     def command(self) -> str:
+        """The command that carries these knots."""
         return "setpoints" if self.mode is Mode.position else "drives"
 
     def __len__(self) -> int:
@@ -42,6 +43,7 @@ class Knots:
 
     @property
     def period_s(self) -> float:
+        """Time between two knots [s]."""
         return 2**self.period_log2 / CONTROL_HZ
 
 

@@ -83,6 +83,7 @@ class Command:
 
     @property
     def done(self) -> bool:
+        """Whether the board has answered."""
         return self.result is not None
 
 

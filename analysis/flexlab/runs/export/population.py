@@ -9,6 +9,7 @@ import json
 import numpy as np
 
 import flexura as fx
+from flexura.io import sealed_parquet
 
 from .as_mat import packed
 
@@ -40,7 +41,7 @@ def as_parquet(population: fx.Population) -> bytes:
     sink = pa.BufferOutputStream()
     table = pa.table(arrays, schema=pa.schema(fields))
     pq.write_table(table, sink, compression="zstd", write_page_checksum=True)
-    return bytes(sink.getvalue().to_pybytes())
+    return sealed_parquet(sink.getvalue().to_pybytes())
 
 
 def as_mat(population: fx.Population) -> bytes:

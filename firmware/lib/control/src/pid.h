@@ -18,6 +18,7 @@ namespace flexura {
 // u is in 1/16 PWM counts for joint 1 and in 1/4096 microsteps per tick for joint 2. 16 bits hold u
 // and the sum of two of it. "count" stands for either joint's unit of position.
 constexpr int16_t kOutputMax = 16383;
+static_assert(2L * kOutputMax <= INT16_MAX, "16 bits hold the sum of two");
 
 // The comments give the board's scales. In the model all is in SI units, ki is multiplied by the
 // tick, and `fine` has no meaning.

@@ -43,8 +43,9 @@ void StepGenerator::plan(int16_t rate, StepPlan &plan) {
     given_ -= count;
     ahead_ = static_cast<int16_t>(ahead_ + way);
   }
-  const uint16_t first =
-      from < kThreshold ? kThreshold - from : 0;  // 0: a rate turned round without a step between
+  // More than 0: the tick before gave the step otherwise, and a rate that turned round starts
+  // below.
+  const uint16_t first = static_cast<uint16_t>(kThreshold - from);
   if (count == 1) {
     plan.at[0] = static_cast<uint16_t>(unsigned_product(ratio(first, pace), kTickCounts) >> 12);
     return;

@@ -25,7 +25,7 @@ void TrajectoryPlayer::add(const Knot &knot, bool final) {
   knots_.put(knot);
   ++added_;
   fresh_ = false;
-  closed_ = closed_ || final;
+  closed_ = final;
 }
 
 void TrajectoryPlayer::start(uint8_t period_log2, bool cubic, const uint16_t *filter) {

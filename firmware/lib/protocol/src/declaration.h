@@ -4,7 +4,7 @@
 
 namespace flexura {
 
-constexpr uint32_t kDeclaration = 0x41A4921D;
+constexpr uint32_t kDeclaration = 0xCB159926;
 constexpr uint8_t kProtocolVersion = 1;
 constexpr uint32_t kBaudBitS = 500000;
 constexpr uint16_t kControlHz = 1000;
@@ -164,7 +164,7 @@ enum class StopTrial : uint8_t {
 // Announced from reset until a `hello` is accepted, and after it once more.
 struct __attribute__((packed)) Identity {
   static constexpr uint8_t kCode = 128;
-  static constexpr uint8_t kSize = 20;
+  static constexpr uint8_t kSize = 22;
   // hash of the declaration
   uint32_t declaration;
   // its version
@@ -179,8 +179,8 @@ struct __attribute__((packed)) Identity {
   uint8_t state;
   // [faults]
   uint8_t fault;
-  // CRC-16 of the configuration in use, items in their order as f32
-  uint16_t configuration_crc;
+  // CRC-32 of the configuration in use, items in their order as f32
+  uint32_t configuration_crc;
   // tick
   uint32_t tick;
 };

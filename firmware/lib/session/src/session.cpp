@@ -36,7 +36,7 @@ uint8_t Session::announce(uint8_t *frame) const {
   identity.fault = static_cast<uint8_t>(rig_.fault());
   const float *values = rig_.config().values;
   identity.configuration_crc =
-      crc16(reinterpret_cast<const uint8_t *>(values), sizeof rig_.config().values);
+      crc32(reinterpret_cast<const uint8_t *>(values), sizeof rig_.config().values);
   identity.tick = rig_.now();
   return encode(0, identity, frame);
 }

@@ -12,6 +12,9 @@
 //     material_k int eta_k'^2 dt + int rest dt, numerical      = sum_k added_k int eta_k'^2 dt -
 //     lag_k int N_k' eta_k' dt.
 //
+// Where the drives' forces are constant and nothing is lost, the work is u_j [eta_j] and needs no
+// integral: most steps of an undamped robot under torques.
+//
 // `rest` is the power lost less the first two terms at the same instant (Coulomb friction, material
 // whose damping couples modes). What is left out are products of two different free motions, which
 // average out.
@@ -58,7 +61,9 @@ class EnergyIntegrals {
       take(phi, s.n * room), take(phi2, s.n * room);
     });
     for (const Joint &joint : joints)
-      damped = damped || worst(abs(joint.kd) + abs(joint.viscous)) > 0.0;
+      for (int k = 0; k < LANES; ++k)
+        damped_of[k] = damped_of[k] || lane(abs(joint.kd) + abs(joint.viscous), k) > 0.0;
+    for (bool of_robot : damped_of) damped = damped || of_robot;
   }
 
   const std::vector<Joint> &free_joints() const { return joints; }
@@ -85,6 +90,28 @@ class EnergyIntegrals {
 
   // The rest of the loss in a row: it is another one in other modes.
   Real &rest_of(Real *extra) const { return extra[count]; }
+  // Robots whose step just corrected has forces that are constant over all values looked back on,
+  // and no loss: 1, else 0.
+  Real steady() const {
+    Real out = 0.0;
+    for (int k = 0; k < LANES; ++k)
+      if (lossless(k) && equal_values[k] >= s.count[k] - 1 && same(k)) set_lane(out, k, 1.0);
+    return out;
+  }
+  // The accounts of such a step: the joints' places are q0 at its start, q1 at its end.
+  Real steady_work(const Real *q0, const Real *q1) const {
+    const Real *force = s.extra(s.new_row());
+    Real work = 0.0;
+    for (int j = 0; j < count; ++j) {
+      const Joint &joint = joints[static_cast<std::size_t>(j)];
+      const Real a = q0[joint.row], b = q1[joint.row];
+      work += (force[j] - 0.5 * joint.kp * (b + a)) * (b - a);
+    }
+    return work;
+  }
+  // To be called before a robot's step is accepted, and when it begins with one value.
+  void accept(int k) { equal_values[k] = same(k) ? equal_values[k] + 1 : 0; }
+  void restart(int k) { equal_values[k] = 0; }
 
   // To be called when `DenseOutput` was built for a step of length h: what its integrals have in
   // common.
@@ -163,8 +190,22 @@ class EnergyIntegrals {
                                 // Z: Z_j's share of int x^m v_j dt
   Real *total, *error, *squares;  // (room) int u_j v_j dt, its uncertain part; int v_j^2 dt
   Real *square, *added;           // (stride) scratch; `square` is written by record() too
-  bool damped = false,
+  long equal_values[LANES] = {};  // the last ones that have the newest's forces, of each robot
+  bool damped_of[LANES] = {}, damped = false,
        turns = false;  // has any joint damping; does any mode have free motion in this step?
+
+  // Is nothing lost by robot k, to friction, gains, material or added damping? (`rest`: see same.)
+  bool lossless(int k) const { return !(damped_of[k] || s.b.lossy_of[k] || s.b.damped_of[k]); }
+
+  // Are robot k's forces in the new row those of the newest one, and its powers zero in both?
+  bool same(int k) const {
+    const Real *now = s.extra(s.new_row()), *before = s.extra(s.newest());
+    bool out = true;
+    for (int j = 0; j < count; ++j) out = out && lane(now[j], k) == lane(before[j], k);
+    for (int j = count; j < count + 2; ++j)
+      out = out && lane(now[j], k) == 0.0 && lane(before[j], k) == 0.0;
+    return out;
+  }
 
   // The joints' part of several quantities of the modes: out (COUNT, room), sum_k phi_kj x_k.
   template <int COUNT>

@@ -2,7 +2,8 @@
 // (predictor_corrector.hpp), which are taken again as it moves (modal_basis.hpp), with fast modes
 // damped that the tolerance does not ask for (numerical_damping.hpp).
 //
-// A step costs one pass. It begins anew, with one value and a short step, where what acts may jump.
+// A step costs one pass. It begins anew, with one value and a short step, where what acts may jump;
+// at a tick of a sampled controller it goes on with the past, shifted by the jump, for one pass.
 #pragma once
 #include "integration/exponential/energy_integrals.hpp"
 #include "integration/exponential/matrices_by_passes.hpp"
@@ -21,7 +22,7 @@ class Exponential : public Method<Real> {
   static constexpr double SAFETY = 0.85;
   static constexpr double TIGHT = 10.0;  // the local error is kept so far below the tolerance: few
                                          // long steps add up what many short ones average out
-  static constexpr double TINY = 1e-4;   // an error after which a step grows threefold, not twofold
+  static constexpr double TINY = 1e-4;   // an error after which a step may grow further
   static constexpr double SLIDING =
       2.0;  // and further where a joint slides along a link that bends
   using Options = ExponentialOptions;
@@ -42,31 +43,43 @@ class Exponential : public Method<Real> {
       take(state, 2 * modes.stride + 8), take(slope, 2 * modes.stride + 8);
     });
     held.reset(new bool[static_cast<std::size_t>(n)]());
-    for (int i = 0; i < c.plant.joints; ++i) held[c.plant.first[i]] = given_motion(c, i);
+    for (int i = 0; i < c.plant.joints; ++i) {
+      held[c.plant.first[i]] = given_motion(c, i);
+      driven = driven || (given_motion(c, i) && !c.plant.locked[i]);
+    }
   }
 
   const char *name() const override { return "exponential"; }
   double cutoff(int k) const { return modes.cutoff[k]; }  // [rad/s]; infinity: nothing is damped
   int modes_taken(int k) const { return modes.taken[k]; }
 
+  // At a tick to which the last step has led, the past is kept and the old values of N are shifted
+  // by its jump; else a robot begins with one value.
   void begin(const Real &which, const Real &t) override {
     const Real *q = c.z.data(), *v = q + n;
     for (int k = 0; k < LANES; ++k) {
       if (lane(which, k) < 0.5) continue;
-      if (modes.has_moved(k, c.plant, q)) take_modes(k, q, v, lane(t, k));
+      goes_on[k] = c.acts.acting(k).sampler != nullptr && steps.reached(k, lane(t, k));
+      const bool taken = modes.has_moved(k, c.plant, q) && take_modes(k, q, v, lane(t, k));
+      if (goes_on[k] && !taken && !driven) continue;
       put_origin(k, q, v);
+      if (goes_on[k]) transform_history(k);
+      if (taken) steps.forget_tables(k);
     }
     std::copy(c.z.begin(), c.z.begin() + 2 * n, state);
     strain = c.plant.strain(q);
     strain_before = choose_less(Real(0.5), which, strain, strain_before);
     look(t, steps.eta, steps.etad);
-    const int from = steps.new_row(), to = steps.newest();
+    Real weigh = 0.0;
     for (int k = 0; k < LANES; ++k) {
       if (lane(which, k) < 0.5) continue;
-      for (int i = 0; i < modes.stride + steps.extras; ++i)
-        set_lane(steps.N[to][i], k, lane(steps.N[from][i], k));
-      steps.restart(k, lane(t, k)), set_error_weights(k, c.end - lane(t, k)), since[k] = 0;
+      if (goes_on[k])
+        steps.shift_history(k, lane(t, k), 2 * n);
+      else
+        steps.restart(k, lane(t, k)), accounts.restart(k), since[k] = 0;
+      if (!goes_on[k] || weights_changed(k)) set_lane(weigh, k, 1.0);
     }
+    set_error_weights(weigh, t);
   }
 
   Real attempt(const Real &t, const Real &h, const Real &last) override {
@@ -78,7 +91,8 @@ class Exponential : public Method<Real> {
     steps.correct();
     place(steps.corrected[0], steps.corrected[1], c.znew.data());
     c.acts.prescribe(c.znew.data(), c.znew.data() + n);
-    within.build(h), accounts.prepare(h);
+    steady = accounts.steady(), built = least(steady) < 0.5;
+    if (built) build(h);
     Real uncertain[2];
     account(h, Real(1.0), true, c.znew.data(), uncertain);
     strain_after = strain;
@@ -98,21 +112,27 @@ class Exponential : public Method<Real> {
   }
 
   void accept(const Real &which) override {
+    for (int k = 0; k < LANES; ++k)
+      if (lane(which, k) > 0.5) accounts.accept(k);
     steps.accept(which, end);
     strain_before = choose_less(Real(0.5), which, strain_after, strain_before);
+    Real weigh = 0.0;
     for (int k = 0; k < LANES; ++k) {
       if (lane(which, k) < 0.5) continue;
       const Real *q = c.znew.data(), *v = q + n;
       if (++since[k] % 8 == 0 || steps.count[k] < ORDER || weights_changed(k))
-        set_error_weights(k, c.end - lane(end, k));
+        set_lane(weigh, k, 1.0);
       if (!modes.has_moved(k, c.plant, q) || !take_modes(k, q, v, lane(end, k))) continue;
       put_origin(k, q, v);
-      transform_history(k);
-      set_error_weights(k, c.end - lane(end, k));
+      transform_history(k), steps.forget_tables(k);
+      set_lane(weigh, k, 1.0);
     }
+    set_error_weights(weigh, end);
   }
 
-  void prepare(const Real &, const Real &, const Real &) override {}
+  void prepare(const Real &, const Real &h, const Real &) override {
+    if (!built) build(h), built = true;
+  }
 
   void between(const Real &h, const Real &x, Real *out) override {
     within.at(h, x, y, v_);
@@ -123,7 +143,8 @@ class Exponential : public Method<Real> {
   }
 
   double restart(int k, double wish, bool first) override {
-    return first ? wish : larger(0.1 * wish, 1e-3 * wished_step[k]);
+    if (first || goes_on[k]) return wish;
+    return larger(0.1 * wish, 1e-3 * wished_step[k]);
   }
 
   double fit(int k, double wish, double left, double) override {
@@ -145,8 +166,9 @@ class Exponential : public Method<Real> {
     double most = 1.0;  // with a larger error a step does not grow
     for (int i = 0; i < order; ++i) most *= SAFETY / GROWTH;
     if (!(starts || steps.equal_steps[k] >= 2) || lately[k] > most) return wished_step[k];
-    const double wish =
-        smaller(factor(lately[k]) * h, (lately[k] < TINY ? 3.0 : 2.0) * wished_step[k]);
+    const bool tiny = lately[k] < TINY;
+    const double growth = starts ? (tiny ? 8.0 : 4.0) : (tiny ? 3.0 : 2.0);
+    const double wish = smaller(factor(lately[k]) * h, growth * wished_step[k]);
     if (!(wish > GROWTH * wished_step[k])) return wished_step[k];
     lately[k] = 0.0;
     return wish;
@@ -170,10 +192,14 @@ class Exponential : public Method<Real> {
       *slope;                    // y = origin + sum eta phi; error weights of the modes; scratch
   std::unique_ptr<bool[]> held;  // (n) rows of joints whose motion is given
   Real end = 0.0;                // of the step being tried
+  Real steady = 0.0;             // robots whose last attempt has accounts without integrals
+  bool built = false;            // is the motion within the last attempt described?
   Real strain = 0.0, strain_before = 0.0, strain_after = 0.0;  // twice the strain energy
   double wished_step[LANES] = {}, lately[LANES] = {};          // lately: the largest error, fading
   double weighed[2][LANES] = {};  // what the error weights of the modes were taken from
   long since[LANES] = {};         // steps since the start or a break
+  bool goes_on[LANES] = {};       // has the robot kept its past at the last break?
+  bool driven = false;            // has any joint a motion that is given?
 
   // Behind N, a row of the history keeps the accounts' numbers, then a, y and v, and the power lost
   // but to the joints' viscous friction.
@@ -232,9 +258,21 @@ class Exponential : public Method<Real> {
     std::copy(state, state + 2 * n, keep + n);
   }
 
+  void build(const Real &h) { within.build(h), accounts.prepare(h); }
+
+  // Sums of `which` robots that are work alone, and of the others.
+  using Sums = typename EnergyIntegrals<Real>::Sums;
+  static Sums choose(const Real &which, const Real &work, const Sums &others) {
+    auto take = [&](Real alone, Real other) { return choose_less(Real(0.5), which, alone, other); };
+    return {take(work, others.work), take(0.0, others.loss), take(0.0, others.numerical),
+            take(0.0, others.work_error), take(0.0, others.loss_error)};
+  }
+
   // The accounts of the state at the fraction x of the step, q its place.
   void account(const Real &h, const Real &x, bool whole, Real *z, Real *uncertain) {
-    const auto sums = accounts.over(h, x, whole, c.z.data(), z);
+    Sums sums{0.0, 0.0, 0.0, 0.0, 0.0};
+    if (least(steady) < 0.5) sums = accounts.over(h, x, whole, c.z.data(), z);
+    if (worst(steady) > 0.5) sums = choose(steady, accounts.steady_work(c.z.data(), z), sums);
     const Real *before = c.z.data() + 2 * n;
     Real *now = z + 2 * n;
     strain = c.plant.strain(z);
@@ -263,24 +301,25 @@ class Exponential : public Method<Real> {
     return false;
   }
 
-  // (92): error weights of robot k's modes from those of its unknowns. An error of a rate moves the
-  // tips until the end of the run at `left`, or for a part of a period.
-  void set_error_weights(int k, double left) {
-    const auto &w = c.weights.weight;
-    for (int e = 0; e < 2; ++e) weighed[e][k] = lane(w[e * n], k);
+  // (92): error weights of the modes of robots `which` at the times t, from those of its unknowns.
+  // An error of a rate moves the tips until the end of the run, or for a part of a period.
+  void set_error_weights(const Real &which, const Real &t) {
+    if (worst(which) < 0.5) return;
+    const Real *w = c.weights.weight.data();
+    for (int k = 0; k < LANES; ++k)
+      for (int e = 0; e < 2 && lane(which, k) > 0.5; ++e) weighed[e][k] = lane(w[e * n], k);
+    const Real left = c.end - t;
     for (int mode = 0; mode < n; ++mode) {
-      double sum[2] = {0.0, 0.0};
+      const Real *phi = modes.phi + mode * modes.stride;
+      Real sum[2];
       for (int e = 0; e < 2; ++e) {
-        for (int i = 0; i < n; ++i) {
-          const double x = lane(modes.phi[mode * modes.stride + i], k) * lane(w[e * n + i], k);
-          sum[e] += x * x;
-        }
-        sum[e] = root(sum[e]);
+        for (int i = 0; i < n; ++i) y[i] = phi[i] * w[e * n + i];
+        sum[e] = root(dot(n, y, y));
       }
-      const double rate = root(lane(modes.w2[mode], k)),
-                   lasting = rate * left > 1.0 ? 1.0 / rate : left;
-      set_lane(size[0][mode], k, sum[0]),
-          set_lane(size[1][mode], k, larger(sum[1], lasting * sum[0]));
+      const Real rate = root(modes.w2[mode]), turned = rate * left,
+                 lasting = left / larger(turned, Real(1.0));
+      take(which, sum, &size[0][mode], 1);
+      sum[1] = larger(sum[1], lasting * sum[0]), take(which, sum + 1, &size[1][mode], 1);
     }
   }
 
@@ -313,7 +352,6 @@ class Exponential : public Method<Real> {
       }
       set_lane(accounts.rest_of(steps.extra(row)), k, rest);
     }
-    steps.forget_tables(k);
   }
 
   // Takes robot k's modes at q if they are poor there; true if so. The cutoff is found once, at the

@@ -53,7 +53,8 @@ class ModalBasis {
   Real *d2, *lag;  // (stride): damping with what is added above the cutoff; added / w2
   double cutoff[LANES];  // modes above this frequency are damped [rad/s]; infinity: none
   int taken[LANES];      // how often modes were taken
-  bool lossy = false, damped = false;  // does any robot's material have damping, is any added?
+  // Does a robot's material have damping, is any added? Of each robot, and of any.
+  bool lossy_of[LANES] = {}, damped_of[LANES] = {}, lossy = false, damped = false;
 
   explicit ModalBasis(int count)
       : n(count), chunks(chunks_of<Real>(count)), stride(room_of<Real>(count)) {
@@ -136,7 +137,7 @@ class ModalBasis {
         decay += x * lost[at(i, mode)];
         if (!held_row[i]) joints += x * x * m.joint_damping[std::size_t(i)];
       }
-      lossy = lossy || decay > 0.0;
+      lossy_of[k] = lossy_of[k] || decay > 0.0, lossy = lossy || decay > 0.0;
       set_lane(material[mode], k, decay), set_lane(own[mode], k, decay + joints);
     }
     damp(k, zeta);
@@ -149,7 +150,7 @@ class ModalBasis {
     for (int mode = 0; mode < n; ++mode) {
       const double square = lane(w2[mode], k), w = root(square),
                    added = square > 0.0 && w > cutoff[k] ? 2.0 * zeta * w : 0.0;
-      damped = damped || added > 0.0;
+      damped_of[k] = damped_of[k] || added > 0.0, damped = damped || added > 0.0;
       set_lane(d2[mode], k, lane(own[mode], k) + added),
           set_lane(lag[mode], k, added > 0.0 ? added / square : 0.0);
     }

@@ -30,6 +30,9 @@ class ExponentialAdams {
  public:
   static constexpr int LANES = LanesOf<Real>::value, ROWS = ORDER + 1;
 
+  // Lengths of steps that differ by less than this part of them are one: what is left to a tick.
+  static constexpr double ALIKE = 1e-10;
+
   const ModalBasis<Real> &b;
   const int n, chunks, stride;
   Real *eta, *etad;  // (stride) the state at the start of the step
@@ -77,8 +80,29 @@ class ExponentialAdams {
 
   double length(int k) const { return span[k]; }  // of the step that robot k's tables are for
 
-  // Robot k has one value, now in row(0), and modes that are new.
-  void restart(int k, double t) { count[k] = 1, set_lane(time[head], k, t), span[k] = -1.0; }
+  // Has robot k's last step led to the time t, or to the instant before it?
+  bool reached(int k, double t) const {
+    const double newest = lane(time[head], k);
+    return count[k] > 0 && newest <= t && t <= std::nextafter(newest, t);
+  }
+
+  // Robot k has one value, that of the new row, and modes that are new.
+  void restart(int k, double t) {
+    copy_row(k, new_row(), head);
+    count[k] = 1, set_lane(time[head], k, t), span[k] = -1.0;
+  }
+
+  // At a jump of what acts: robot k's newest value becomes that of the new row, and the older ones
+  // are shifted by the same jump; all but the last `still` numbers of a row.
+  void shift_history(int k, double t, int still) {
+    for (int i = 0; i < stride + extras - still; ++i) {
+      const double jump = lane(N[new_row()][i], k) - lane(N[head][i], k);
+      for (int age = 1; age < count[k]; ++age)
+        set_lane(N[row(age)][i], k, lane(N[row(age)][i], k) + jump);
+    }
+    copy_row(k, new_row(), head);
+    set_lane(time[head], k, t);
+  }
   void forget_tables(int k) { span[k] = -1.0; }
 
   // The tables of a step of length h; 0: nothing moves. True: of any robot the length or the modes
@@ -88,7 +112,7 @@ class ExponentialAdams {
     bool any = false, fresh = false;
     for (int k = 0; k < LANES; ++k) {
       const double own = lane(h, k);
-      if (own != span[k])
+      if (!(abs(own - span[k]) <= ALIKE * own))
         tabulate_modes(k, own), span[k] = own, equal_steps[k] = 0, fresh = true;
       else if (equal_steps[k] > ORDER)
         continue;
@@ -157,7 +181,7 @@ class ExponentialAdams {
         for (int age = 0; age < ORDER; ++age) {
           const int to = row(age), from = row(age + 1);
           set_lane(time[to], k, lane(time[from], k));
-          for (int i = 0; i < stride + extras; ++i) set_lane(N[to][i], k, lane(N[from][i], k));
+          copy_row(k, from, to);
         }
       }
     }
@@ -176,6 +200,10 @@ class ExponentialAdams {
   }
 
  private:
+  void copy_row(int k, int from, int to) {
+    for (int i = 0; i < stride + extras; ++i) set_lane(N[to][i], k, lane(N[from][i], k));
+  }
+
   Block<Real> memory;
   Block<double> one;  // one robot's, for tabulate_modes
   Real *step[4], *A, *B,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import os
 import shutil
 import subprocess
 import tempfile
@@ -16,7 +15,7 @@ import numpy as np
 
 from ...errors import FlexuraError, InputError
 from ...optional import Missing, load
-from ..toml_files import write_bytes
+from ..files import replaced, write_bytes
 from .over_time import AXES, COLOURS, GRID, INK, STYLE, heading
 from .poses import with_poses
 from .shapes import Curves, curves, extent, has_shapes
@@ -244,32 +243,25 @@ def _gif(pictures: Iterator[np.ndarray], frame_rate: float) -> bytes:
 
 def _mp4(pictures: Iterator[np.ndarray], frame_rate: float, encoder: str, target: Path) -> None:
     """Pictures through ffmpeg into a file of another name, which then takes its place."""
-    target.parent.mkdir(parents=True, exist_ok=True)
     first = next(pictures)
     high, wide = first.shape[0] // 2 * 2, first.shape[1] // 2 * 2  # what players can show
-    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".mp4")
-    os.close(handle)
     command = [encoder, "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"]
     command += ["-s", f"{wide}x{high}", "-r", f"{frame_rate:g}", "-i", "-", "-an"]
-    command += ["-pix_fmt", "yuv420p", "-movflags", "+faststart", name]
-    try:
-        with tempfile.TemporaryFile() as said:
-            process = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=said)
-            assert process.stdin is not None
-            try:
-                for picture in chain([first], pictures):
-                    process.stdin.write(picture[:high, :wide].tobytes())
-                process.stdin.close()
-            except BrokenPipeError:
-                pass
-            except BaseException:
-                process.kill()
-                raise
-            if process.wait():
-                said.seek(0)
-                last = said.read().decode(errors="replace").strip().splitlines() or ["no answer"]
-                raise FlexuraError(f"the encoder {encoder} failed: {last[-1]}")
-        os.chmod(name, 0o644)
-        os.replace(name, target)
-    finally:
-        Path(name).unlink(missing_ok=True)
+    command += ["-pix_fmt", "yuv420p", "-movflags", "+faststart"]
+    with replaced(target) as draft, tempfile.TemporaryFile() as said:
+        process = subprocess.Popen([*command, str(draft)], stdin=subprocess.PIPE, stderr=said)
+        assert process.stdin is not None
+        try:
+            for picture in chain([first], pictures):
+                process.stdin.write(picture[:high, :wide].tobytes())
+            process.stdin.close()
+        except BrokenPipeError:
+            pass
+        except BaseException:
+            process.kill()
+            process.wait()
+            raise
+        if process.wait():
+            said.seek(0)
+            last = said.read().decode(errors="replace").strip().splitlines() or ["no answer"]
+            raise FlexuraError(f"the encoder {encoder} failed: {last[-1]}")

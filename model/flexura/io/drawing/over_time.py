@@ -78,6 +78,9 @@ def figure(
         title: above the figure; by default the robot and what the runs are called.
         interactive: a figure of pyplot, which `matplotlib.pyplot.show()` shows.
 
+    Returns:
+        The figure.
+
     Raises:
         InputError: a pattern fits no channel, or a run has no samples.
         Missing: matplotlib is not installed.
@@ -136,7 +139,14 @@ def chosen(runs: Sequence[Run], patterns: Sequence[str]) -> list[list[str]]:
 
 
 def heading(runs: Sequence[Run]) -> str:
-    """The robot, and what the runs are called; nothing emulated goes without the word."""
+    """The title of a picture: the robot, and what the runs are called.
+
+    Args:
+        runs: the runs.
+
+    Returns:
+        The title; nothing emulated goes without the word.
+    """
     robots = dict.fromkeys(
         str(name) for run in runs if (name := (run.meta.get("robot") or {}).get("name"))
     )
@@ -152,6 +162,9 @@ def saved(drawing: Figure, form: str, **metadata: str) -> bytes:
         drawing: the figure.
         form: "pdf", "svg" or "png".
         metadata: kept in the file, such as Title.
+
+    Returns:
+        The content of the file.
 
     Raises:
         InputError: another form.

@@ -11,8 +11,14 @@ MAX_SAMPLES = 1_000_000  # scalars of one review: beyond, the viewer needs secon
 
 
 def frames(t: np.ndarray) -> np.ndarray:
-    """Indices (F,) of the samples whose shape is drawn: at most FRAME_RATE a second and MAX_FRAMES
-    in all, both ends included."""
+    """The samples whose shape is drawn: at most FRAME_RATE a second and MAX_FRAMES in all.
+
+    Args:
+        t: times (T,) [s].
+
+    Returns:
+        Indices (F,), both ends included.
+    """
     t = np.asarray(t, dtype=float)
     if len(t) == 0:
         return np.zeros(0, dtype=np.int64)
@@ -23,8 +29,15 @@ def frames(t: np.ndarray) -> np.ndarray:
 
 
 def thinned(y: np.ndarray, budget: int) -> np.ndarray:
-    """Ascending indices (K,), K <= budget + 2, that keep the smallest and largest value and one gap
-    (NaN) of each equal block."""
+    """The samples that keep the smallest and largest value and one gap (NaN) of each equal block.
+
+    Args:
+        y: values (T,).
+        budget: number of samples to keep.
+
+    Returns:
+        Ascending indices (K,), K <= budget + 2.
+    """
     y = np.asarray(y, dtype=float)
     if len(y) <= budget:
         return np.arange(len(y), dtype=np.int64)

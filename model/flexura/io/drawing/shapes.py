@@ -41,7 +41,14 @@ class Curves:
 
 
 def has_shapes(run: Run) -> bool:
-    """Whether the run's channels say where its links are."""
+    """Whether the run's channels say where its links are.
+
+    Args:
+        run: the run.
+
+    Returns:
+        True if they do.
+    """
     links = len(outlines(run.meta))
     poses = (f"link/{i}/{part}" for i in range(1, links + 1) for part in ("x", "y", "angle"))
     return (
@@ -52,7 +59,16 @@ def has_shapes(run: Run) -> bool:
 
 
 def curves(run: Run, index: np.ndarray, size: float) -> Curves:
-    """The shapes at the samples `index` (F,); `size` is half the length of a slider's mark [m]."""
+    """The shapes of a robot at some samples.
+
+    Args:
+        run: the run.
+        index: samples (F,).
+        size: half the length of a slider's mark [m].
+
+    Returns:
+        The curves.
+    """
     links = outlines(run.meta)
     undeformed, deformed, rigid, pins, sliders = [], [], [], [], []
     end = np.zeros((len(index), 2))
@@ -90,8 +106,17 @@ def curves(run: Run, index: np.ndarray, size: float) -> Curves:
 
 
 def bent(run: Run, i: int, link: Outline, index: np.ndarray) -> np.ndarray:
-    """Link i's curve in its hub frame, (F, POINTS, 2) [m]; straight where the run has no
-    stations."""
+    """The curve of a link in its hub's frame.
+
+    Args:
+        run: the run.
+        i: number of the link.
+        link: its outline.
+        index: samples (F,).
+
+    Returns:
+        Points (F, POINTS, 2) [m]; straight where the run has no stations.
+    """
     x = np.linspace(0.0, link.length_m, POINTS)
     names = [f"link/{i}/deflection/{k}" for k in range(STATIONS)]
     if not all(name in run for name in names):
@@ -149,8 +174,14 @@ def rail(run: Run, link: Outline, size: float) -> np.ndarray | None:
 
 
 def extent(runs: list[Run]) -> tuple[np.ndarray, np.ndarray]:
-    """The lower left and the upper right corner [m] of everything that moves in the runs, with a
-    margin."""
+    """The corners of everything that moves in the runs, with a margin.
+
+    Args:
+        runs: the runs.
+
+    Returns:
+        The lower left and the upper right corner (2,) [m].
+    """
     seen = []
     for run in runs:
         c = curves(run, np.unique(np.linspace(0, len(run) - 1, 400).astype(int)), 0.0)
@@ -177,8 +208,15 @@ def extent(runs: list[Run]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def grid(low: np.ndarray, high: np.ndarray) -> tuple[float, np.ndarray]:
-    """A round spacing [m] and the lines (n, 2, 2) of a square grid that covers the picture and as
-    much again on every side."""
+    """A square grid that covers the picture and as much again on every side.
+
+    Args:
+        low: lower left corner (2,) [m].
+        high: upper right corner (2,) [m].
+
+    Returns:
+        A round spacing [m], and the lines (n, 2, 2) [m].
+    """
     rough = float(max(high - low)) / 4.5
     power = 10.0 ** np.floor(np.log10(rough))
     step = float(power * max(m for m in (1.0, 2.0, 5.0) if m * power <= rough * 1.0001))

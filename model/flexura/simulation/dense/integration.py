@@ -14,7 +14,7 @@ from ...io import STATIONS
 from ...signals import Drive
 from ...system import System
 from ..problem import Problem, Progress, Solution
-from ..recorder import limit_event, observed
+from ..recorder import limit_event, recorded_channels
 from .equations import Equations
 from .exponential import Exponential
 from .weights import Weights
@@ -41,8 +41,14 @@ def solve(problem: Problem, progress: Progress = None) -> Solution:
 
     Work, loss and strain energy are integrated beside the motion and under the same error control
     (27), (28). Methods are "explicit" (DOP853), "implicit" (Radau with the slope of the linear
-    forces), "exponential" (`exponential`), or "auto", one of them. The solution goes up to the end,
-    a limit, an interruption, or where no step is short enough.
+    forces), "exponential" (`exponential`), or "auto", one of them.
+
+    Args:
+        problem: the initial value problem.
+        progress: called with the finished fraction.
+
+    Returns:
+        The solution up to the end, a limit, an interruption, or where no step is short enough.
     """
     return Integration(problem, progress).run()
 
@@ -64,7 +70,8 @@ class Integration:
         self.ticks, marks, self.span = np.zeros(0), np.zeros(0), float(t[-1] - t[0])
         self.longest = (
             self.span / LEAST_STEPS
-            if isinstance(drive, DriveFunction) or (isinstance(drive, Drive) and drive.calls)
+            if isinstance(drive, DriveFunction)
+            or (isinstance(drive, Drive) and drive.has_functions)
             else np.inf
         )
         if isinstance(drive, Drive):
@@ -89,7 +96,11 @@ class Integration:
         self.asked, self.method = method, method
 
     def use(self, system: System) -> None:
-        """Go on with a robot that has the same unknowns and the same drives."""
+        """Go on with a robot that has the same unknowns and the same drives.
+
+        Args:
+            system: the robot.
+        """
         self.evaluations += self.equations.evaluations if self.equations else 0
         self.system, self.rows = system, system.joint_rows
         slides = [link.joint.type != "R" for link in system.robot.links]
@@ -131,8 +142,15 @@ class Integration:
         return self.solution(meta)
 
     def solution(self, meta: dict[str, Any]) -> Solution:
-        """What was computed."""
-        widths = (2 * self.system.n, 4, len(self.rows), len(observed(self.system.robot)))
+        """What was computed.
+
+        Args:
+            meta: of the Solution.
+
+        Returns:
+            The Solution up to here.
+        """
+        widths = (2 * self.system.n, 4, len(self.rows), len(recorded_channels(self.system.robot)))
         empty = [np.zeros(0), *(np.zeros((0, width)) for width in widths), np.zeros(0)]
         times, states, accounts, forces, seen, jumps = [
             np.array(part) for part in zip(*self.found, strict=True)
@@ -144,14 +162,30 @@ class Integration:
         return self.system.limits
 
     def crossed(self, joint: int, upwards: bool) -> bool:
-        """What a joint (from 0) beyond its bounds does: it ends the run (false)."""
+        """What happens when a joint is beyond its bounds.
+
+        Args:
+            joint: its number, from 0.
+            upwards: whether it passed the upper bound.
+
+        Returns:
+            False: the run ends.
+        """
         self.events.append(
             limit_event(self.system, joint, self.now, self.position(self.now, self.z))
         )
         return False
 
     def position(self, t: float, z: np.ndarray) -> np.ndarray:
-        """The joints' positions (N,) at t in the state z."""
+        """The joints' positions in a state.
+
+        Args:
+            t: time [s].
+            z: state (2 n,).
+
+        Returns:
+            Positions (N,) [m or rad].
+        """
         return self.equations.state(t, z)[0][self.rows]
 
     def energy(self) -> float:

@@ -45,7 +45,13 @@ class Modes:
     w2 (m,) [rad^2/s^2]; (q, v, accounts) = origin + out y, y = into ((q, v, accounts) - origin),
     and N = rows a + linear y.
 
-    Args: powers: of time in N; accounts: how many there are.
+    Args:
+        M: mass matrix (m, m).
+        K: stiffness matrix (m, m).
+        D: damping matrix (m, m).
+        q0: configuration of the free rows (m,).
+        powers: of time in N.
+        accounts: how many there are.
     """
 
     def __init__(

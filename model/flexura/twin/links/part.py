@@ -35,6 +35,9 @@ class Frame(NamedTuple):
             slide: velocity along this frame [m/s].
             turn: rotation [rad].
             spin: additional angular velocity [rad/s].
+
+        Returns:
+            The frame.
         """
         c, n = self.axis
         return Frame(
@@ -78,40 +81,132 @@ class Part(Protocol):
     tip: Attachment
 
     def motion_at_origin(self, q: np.ndarray, v: np.ndarray) -> Motion:
-        """Motion of the link's origin."""
+        """Motion of the link's origin.
+
+        Args:
+            q: coordinates of the part's nodes (T, k).
+            v: their velocities (T, k).
+
+        Returns:
+            The motion.
+        """
         ...
 
     def motion_at_tip(self, q: np.ndarray, v: np.ndarray) -> Motion:
-        """Motion of the link's tip."""
+        """Motion of the link's tip.
+
+        Args:
+            q: coordinates of the part's nodes (T, k).
+            v: their velocities (T, k).
+
+        Returns:
+            The motion.
+        """
         ...
 
     def point(self, q: np.ndarray, x: float) -> np.ndarray:
-        """The material point x [m] from the origin, (T, 2) [m]."""
+        """A material point of the link.
+
+        Args:
+            q: coordinates of the part's nodes (T, k).
+            x: distance from the origin [m].
+
+        Returns:
+            Its place (T, 2) [m].
+        """
         ...
 
     def kinetic(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Kinetic energy [J], (T,)."""
+        """Kinetic energy.
+
+        Args:
+            q: coordinates of the part's nodes (T, k).
+            v: their velocities (T, k).
+
+        Returns:
+            (T,) [J].
+        """
         ...
 
     def strain(self, q: np.ndarray) -> np.ndarray:
-        """Strain energy of bending, axial and shear strains [J], (T,)."""
+        """Strain energy of bending, axial and shear strains.
+
+        Args:
+            q: coordinates of the part's nodes (T, k).
+
+        Returns:
+            (T,) [J].
+        """
         ...
 
     def moment(self, q: np.ndarray) -> np.ndarray:
-        """The integral of position over mass [kg m], (T, 2)."""
+        """The integral of position over mass.
+
+        Args:
+            q: coordinates of the part's nodes (T, k).
+
+        Returns:
+            (T, 2) [kg m].
+        """
         ...
 
 
 @dataclass
 class PointMass:
-    """A mass [kg] and inertia [kg m^2] on a beam's node: hub or payload."""
+    """A body on a beam's node or line: mass [kg], inertia about its centre [kg m^2], and the centre
+    `along` and `across` [m] the line's tangent there."""
 
     mass: float = 0.0
     inertia: float = 0.0
+    along: float = 0.0
+    across: float = 0.0
+
+    @property
+    def offset(self) -> np.ndarray:
+        """(2, 2): what of the tangent (cos, sin) is the way to the centre."""
+        return np.array([[self.along, -self.across], [self.across, self.along]])
+
+    def centre(self, motion: Motion) -> Motion:
+        """The motion of its centre from that of the place where it is fixed."""
+        if not (self.along or self.across):
+            return motion
+        way = _tangent(motion.angle) @ self.offset.T
+        left = np.stack([-way[:, 1], way[:, 0]], axis=-1)
+        return motion._replace(r=motion.r + way, v=motion.v + motion.omega[:, None] * left)
 
     def kinetic(self, motion: Motion) -> np.ndarray:
-        """Kinetic energy (T,) [J]."""
-        return 0.5 * self.mass * (motion.v**2).sum(axis=-1) + 0.5 * self.inertia * motion.omega**2
+        """Kinetic energy of the mass.
+
+        Args:
+            motion: of its node over time.
+
+        Returns:
+            (T,) [J].
+        """
+        speed = (self.centre(motion).v ** 2).sum(axis=-1)
+        return 0.5 * self.mass * speed + 0.5 * self.inertia * motion.omega**2
+
+    def moment(self, motion: Motion) -> np.ndarray:
+        """Mass times the centre's place.
+
+        Args:
+            motion: of its node over time.
+
+        Returns:
+            (T, 2) [kg m].
+        """
+        return self.mass * self.centre(motion).r
+
+
+class Lump(NamedTuple):
+    """A body on the line of a link, at the distance `at` [m] from its origin."""
+
+    at: float
+    body: PointMass
+
+
+def _tangent(angle: np.ndarray) -> np.ndarray:
+    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 
 @dataclass
@@ -123,7 +218,14 @@ class Ground:
 
     @staticmethod
     def add(mbs: Any) -> Ground:
-        """Add the base to Exudyn's system."""
+        """Add the base to Exudyn's system.
+
+        Args:
+            mbs: Exudyn's system.
+
+        Returns:
+            The base.
+        """
 
         body = mbs.AddObject(eii.ObjectGround())
         here = Attachment(
@@ -133,7 +235,14 @@ class Ground:
 
     @staticmethod
     def motion(times: int) -> Motion:
-        """The base's motion at a number of times: none."""
+        """The base's motion: none.
+
+        Args:
+            times: number of times T.
+
+        Returns:
+            Zeros.
+        """
         return Motion(np.zeros((times, 2)), np.zeros(times), np.zeros((times, 2)), np.zeros(times))
 
 

@@ -1,0 +1,49 @@
+"""Every branch of firmware/lib is taken by the unit tests and the fuzzer's corpus, or explained in
+branches.toml."""
+
+import shutil
+import subprocess
+import tomllib
+from collections import Counter
+
+import pytest
+from board_library import FIRMWARE, HERE, INCLUDES, SOURCES
+from branch_coverage import branches, missed
+
+FLAGS = ["-std=gnu++14", "-O0", "--coverage", "-fno-exceptions", "-fprofile-abs-path", *INCLUDES]
+TESTS = {
+    "unit": [f"-I{FIRMWARE / 'test'}", str(FIRMWARE / "test/test_lib/test_main.cpp")],
+    "refusals": [f"-I{FIRMWARE / 'test'}", str(FIRMWARE / "test/test_refusals/test_main.cpp")],
+    "replay": ["-DREPLAY", str(HERE / "fuzz_session.cpp")],
+    "frames": [str(HERE / "fuzz_frames.cpp")],
+}
+ARGUMENTS = {
+    "replay": [str(path) for path in sorted((HERE / "corpus").iterdir())],
+    "frames": ["300000", "1"],
+}
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not shutil.which("gcov"), reason="no gcov on this machine")
+def test_every_branch_is_taken_or_explained(tmp_path, capsys):
+    """g++ without optimization and without exceptions, so that a branch is one of the source."""
+    objects = []
+    for source in SOURCES:
+        objects.append(str(tmp_path / f"{len(objects)}.o"))
+        subprocess.run(["g++", *FLAGS, "-c", source, "-o", objects[-1]], check=True)
+    for name, arguments in TESTS.items():
+        main, program = str(tmp_path / f"{name}.o"), str(tmp_path / name)
+        subprocess.run(["g++", *FLAGS, *arguments, "-c", "-o", main], check=True)
+        subprocess.run(["g++", "--coverage", main, *objects, "-o", program], check=True)
+        subprocess.run([program, *ARGUMENTS.get(name, [])], check=True, stdout=subprocess.DEVNULL)
+    found = branches(tmp_path, FIRMWARE / "lib")
+    total = sum(map(len, found.values()))
+    untaken: Counter[tuple[str, str]] = Counter()
+    for line, count in missed(found).items():
+        untaken[line.file, line.text] += count
+    with capsys.disabled():
+        print(f"{total - untaken.total()} of {total} branches of firmware/lib taken")
+    listed = tomllib.loads((HERE / "branches.toml").read_text(encoding="utf-8"))["branch"]
+    assert all(len(one["reason"]) > 40 for one in listed)
+    assert dict(untaken) == {(one["file"], one["text"]): one["missed"] for one in listed}
+    assert total > 700
