@@ -46,7 +46,7 @@ class Calibration(Table):
 
 
 def _calibration() -> Calibration | None:
-    return Field(None, description="a table { zero, c1_m, c2_m, c3_m }, measured")  # type: ignore[no-any-return]
+    return Field(None, description="a table { zero, c1_m, c2_m, c3_m }, measured")
 
 
 class Flex(Table):

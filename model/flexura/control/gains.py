@@ -26,7 +26,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..io import find, read_toml, write_toml
-from ..signals import PLAUSIBLE, Signal, constant, plausible
+from ..signals import PLAUSIBLE, Signal, constant, is_plausible
 from .controller import Controller
 from .pid import PID, Force, Motor, Output, Stepper
 
@@ -341,7 +341,7 @@ def _gains(data: dict[str, Any], file: str) -> Gains:
                 f"; did you mean {near[0]}?" if near else "; see firmware/README.md, the controller"
             )
             raise InputError(f"an unknown setting{hint}", key=f"controller.{key}", value=value)
-        if not plausible(value):
+        if not is_plausible(value):
             raise InputError(f"expected {PLAUSIBLE}", key=f"controller.{key}", value=value)
         settings[key] = float(value)
     tables = data.get("output", [])
@@ -388,7 +388,7 @@ def _read_output(entry: dict[str, Any], key: str) -> Output:
                 key=f"{key}.{name}",
                 value=value,
             )
-        if name != "kind" and not (plausible(value) and value >= 0):
+        if name != "kind" and not (is_plausible(value) and value >= 0):
             raise InputError(
                 "expected a finite number from 0 to 1e12", key=f"{key}.{name}", value=value
             )

@@ -4,6 +4,7 @@ pictures."""
 from . import summary
 from .arguments import (
     array,
+    check_memory,
     check_progress,
     choice,
     finite_arguments,
@@ -30,7 +31,6 @@ from .files import (
 )
 from .format import FORMAT, check_format
 from .labels import EMULATED, called, emulated, kind
-from .memory import check_memory
 from .run import FILE, Run
 from .seal import (
     Damaged,

@@ -23,8 +23,8 @@ LEAST_FREE = (
 )
 
 
-_MASS, _STIFFNESS = BOUNDS["mass_per_length_kg_m"], BOUNDS["bending_stiffness_N_m2"]
-MassPerLength = Annotated[float, Field(ge=_MASS.low, le=_MASS.high)]
+_STIFFNESS = BOUNDS["bending_stiffness_N_m2"]
+MassPerLength = Annotated[float, Field(ge=0, le=BOUNDS["mass_per_length_kg_m"].high)]
 BendingStiffness = Annotated[float, Field(ge=_STIFFNESS.low, le=_STIFFNESS.high)]
 Pair = Annotated[tuple[float, float], Field(strict=False)]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from .table import Table, quantity
+from .table import BOUNDS, Table, quantity
 
 
 class Payload(Table):
@@ -18,5 +18,5 @@ class Payload(Table):
         (0.0, 0.0),
         strict=False,
         description="the payload's centre from the tip in metres, two numbers [along, across] the "
-        "tip's tangent",
+        f"tip's tangent, {BOUNDS['centre_of_mass_m']}",
     )

@@ -5,7 +5,7 @@ from . import paths, shaping, signal
 from .conversion import FunctionSignal, as_signal, as_signals, spline
 from .drive import Drive, JointDrive, check_smooth
 from .manoeuvre import STARTS, Manoeuvre, load_manoeuvre
-from .parsing import PLAUSIBLE, from_spec, is_finite, plausible
+from .parsing import PLAUSIBLE, from_spec, is_finite, is_plausible
 from .shaping import matched_cycloid, zv, zvd
 from .signal import (
     COLUMNS,
@@ -42,11 +42,11 @@ __all__ = [
     "from_spec",
     "harmonic",
     "is_finite",
+    "is_plausible",
     "load_manoeuvre",
     "matched_cycloid",
     "paths",
     "piecewise",
-    "plausible",
     "polynomial",
     "ramp",
     "shaping",

@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import InputError
 from ..io import check_format, choice, find, is_name, read_toml, whole
 from .drive import Drive, JointDrive, check_smooth
-from .parsing import from_spec, plausible
+from .parsing import from_spec, is_plausible
 from .signal import Signal
 
 
@@ -205,6 +205,6 @@ def _number(
     value = data.get(name, default)
     if value is None:
         raise InputError(f"missing: expected {expected}", key=key + name)
-    if not plausible(value) or not (value >= low if closed else value > low):
+    if not is_plausible(value) or not (value >= low if closed else value > low):
         raise InputError(f"expected {expected}", key=key + name, value=value)
     return float(value)

@@ -75,7 +75,7 @@ MOST = 1e12  # of a number of a manoeuvre or gains file, in its own unit: beyond
 PLAUSIBLE = "a finite number between -1e12 and 1e12"
 
 
-def plausible(value: Any) -> bool:
+def is_plausible(value: Any) -> bool:
     """Whether a value is a finite number as files have them, at most `MOST` in size.
 
     Args:
@@ -105,11 +105,11 @@ def is_finite(value: Any) -> bool:
 
 
 def _numbers(value: Any) -> bool:
-    return isinstance(value, list) and all(map(plausible, value))
+    return isinstance(value, list) and all(map(is_plausible, value))
 
 
 _FORMS = {  # what a key takes, by the annotation of the parameter of its name
-    "float": (PLAUSIBLE, plausible),
+    "float": (PLAUSIBLE, is_plausible),
     "int": ("a whole number", lambda value: isinstance(value, int) and not isinstance(value, bool)),
     "Any": ("a list of finite numbers between -1e12 and 1e12", _numbers),
     "Signal": ("a table of a signal, with its kind", lambda value: isinstance(value, dict)),

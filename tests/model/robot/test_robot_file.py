@@ -335,13 +335,13 @@ VALUES = {
         BY_NUMBER | {STRIP + "mass_per_length_kg_m": -1.0},
         "link[2].mass_per_length_kg_m",
         -1.0,
-        "a number between 1e-12 and 1e6 or a list",
+        "a number 0 or between 1e-12 and 1e6 or a list",
     ),
     "a mass per length as text": (
         BY_NUMBER | {STRIP + "mass_per_length_kg_m": "1"},
         "link[2].mass_per_length_kg_m",
         "1",
-        "a number between 1e-12 and 1e6 or a list",
+        "a number 0 or between 1e-12 and 1e6 or a list",
     ),
     "a mass per length as a truth value": (
         BY_NUMBER | {STRIP + "mass_per_length_kg_m": True},

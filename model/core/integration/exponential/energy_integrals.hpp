@@ -88,6 +88,8 @@ class EnergyIntegrals {
     return all;
   }
 
+  // The rest of the loss in a row: it is another one in other modes.
+  Real &rest_of(Real *extra) const { return extra[count]; }
   // Robots whose step just corrected has forces that are constant over all values looked back on,
   // and no loss: 1, else 0.
   Real steady() const {
@@ -110,8 +112,6 @@ class EnergyIntegrals {
   // To be called before a robot's step is accepted, and when it begins with one value.
   void accept(int k) { equal_values[k] = same(k) ? equal_values[k] + 1 : 0; }
   void restart(int k) { equal_values[k] = 0; }
-  // The rest of the loss in a row: it is another one in other modes.
-  Real &rest_of(Real *extra) const { return extra[count]; }
 
   // To be called when `DenseOutput` was built for a step of length h: what its integrals have in
   // common.
