@@ -9,7 +9,7 @@ from numpy.polynomial.polynomial import polyfromroots, polyint, polyval
 import flexura as fx
 import robots
 from flexura.link.line import pieces
-from flexura.link.modes import clamped_matrices, clamped_modes
+from flexura.link.modes import ClampedBody, clamped_matrices, clamped_modes
 from flexura.link.quadrature import lagrange, lagrange_integrals
 from flexura.link.section import material
 from flexura.link.shapes import legendre_shapes
@@ -241,7 +241,7 @@ def test_the_clamped_matrices(steel):
     Equations: 17
     """
     M, K, w_tip, tip_angle = own_matrices(6, 7, 0.05, 2e-4)
-    found = clamped_matrices(material(steel), L, 6, 7, 0.05, 2e-4)
+    found = clamped_matrices(material(steel), L, 6, 7, [ClampedBody(L, 0.05, 2e-4)])
     assert found[0] == pytest.approx(M, rel=1e-9, abs=1e-13)
     assert found[1] == pytest.approx(K, rel=1e-9, abs=1e-9)
     assert found[2] == pytest.approx(np.vstack([w_tip, tip_angle]), abs=1e-13)
@@ -253,7 +253,7 @@ def test_the_clamped_modes(steel):
     Equations: 18
     """
     M, K, w_tip, _ = own_matrices(8, 8, 0.05)
-    _, made, tip = clamped_matrices(material(steel), L, 8, 8, 0.05)
+    _, made, tip = clamped_matrices(material(steel), L, 8, 8, [ClampedBody(L, 0.05, 0.0)])
     V, squares = clamped_modes(M, made, tip, 3, False)
     expected = np.sort(np.linalg.eigvals(np.linalg.solve(M, K)).real)[:3]
     assert squares == pytest.approx(expected, rel=1e-8)

@@ -102,13 +102,16 @@ nb::tuple whole_link(const Mechanics &self, int link) {
 }  // namespace
 
 Robot robot_of(const Vector &gravity, const Vector &payload, const Counts &counts,
-               const Matrix &numbers, const Matrix &material) {
-  expect(gravity.size() == 2 && payload.size() == 2, "gravity and payload have two numbers each");
-  expect(counts.shape(1) == COUNTS && numbers.shape(1) == NUMBERS && material.shape(1) == MATERIAL,
+               const Matrix &numbers, const Matrix &material, const Matrix &lumps) {
+  expect(gravity.size() == 2 && payload.size() == PAYLOAD,
+         "gravity has two numbers, the payload four");
+  expect(counts.shape(1) == COUNTS && numbers.shape(1) == NUMBERS &&
+             material.shape(1) == MATERIAL && lumps.shape(1) == LUMP,
          "rows of other lengths were expected");
   expect(counts.shape(0) == numbers.shape(0), "counts and numbers need a row a link");
   Table table;
-  table.links = int(counts.shape(0)), table.intervals = int(material.shape(0));
+  table.links = int(counts.shape(0)), table.intervals = int(material.shape(0)),
+  table.lumps = int(lumps.shape(0)), table.lump = lumps.data();
   table.counts = counts.data(), table.numbers = numbers.data(), table.material = material.data();
   table.gravity = gravity.data(), table.payload = payload.data();
   return robot_of(table, 0);
@@ -125,9 +128,9 @@ void bind_mechanics(nb::module_ &module) {
     }
   });
   nb::class_<Mechanics> type(module, "Mechanics", "The equations of one robot.");
-  type.def(nb::init<const Vector &, const Vector &, const Counts &, const Matrix &,
+  type.def(nb::init<const Vector &, const Vector &, const Counts &, const Matrix &, const Matrix &,
                     const Matrix &>(),
-           "gravity"_a, "payload"_a, "counts"_a, "numbers"_a, "material"_a)
+           "gravity"_a, "payload"_a, "counts"_a, "numbers"_a, "material"_a, "lumps"_a)
       .def_prop_ro(
           "n", [](const Mechanics &self) { return self.model->n; }, "How many unknowns there are.")
       .def_prop_ro(

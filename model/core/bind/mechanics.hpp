@@ -13,15 +13,15 @@ using Counts = nb::ndarray<const std::int64_t, nb::ndim<2>, nb::c_contig, nb::de
 
 // The physical constants of flexura/core.py's rows as a Robot.
 Robot robot_of(const Vector &gravity, const Vector &payload, const Counts &counts,
-               const Matrix &numbers, const Matrix &material);
+               const Matrix &numbers, const Matrix &material, const Matrix &lumps);
 
 struct Mechanics {
   std::shared_ptr<const Model<double>> model;
 
   Mechanics(const Vector &gravity, const Vector &payload, const Counts &counts,
-            const Matrix &numbers, const Matrix &material)
+            const Matrix &numbers, const Matrix &material, const Matrix &lumps)
       : model(std::make_shared<const Model<double>>(
-            assemble(robot_of(gravity, payload, counts, numbers, material)))) {}
+            assemble(robot_of(gravity, payload, counts, numbers, material, lumps)))) {}
 };
 
 void add_solve(nb::class_<Mechanics> &type);  // solve.cpp

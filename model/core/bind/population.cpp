@@ -31,32 +31,34 @@ struct PackedDrive {
 };
 
 Channel::Of kind_of(const std::string &name) {
-  const char *names[] = {"position", "velocity", "drive", "account", "seen"};
-  for (int k = 0; k < 5; ++k)
+  const char *names[] = {"position", "velocity",       "drive",         "account",
+                         "seen",     "motor_position", "motor_velocity"};
+  for (int k = 0; k < 7; ++k)
     if (name == names[k]) return Channel::Of(k);
   throw std::invalid_argument("there is no channel " + name);
 }
 
 nb::tuple run_population(const Counts &counts, const Cube &numbers, const Cube &material,
-                         const Matrix &gravity, const Matrix &payload, const Cube &limits,
-                         const std::vector<PackedDrive *> &drives, const Indices &drive_of,
-                         const Vector &t, const Vector &q, const Vector &v, double rtol,
-                         const std::string &method, bool numerical_damping, long most_steps,
-                         const std::vector<std::pair<std::string, int>> &channels, int stations,
-                         int threads, Watch &watch) {
+                         const Cube &lumps, const Matrix &gravity, const Matrix &payload,
+                         const Cube &limits, const std::vector<PackedDrive *> &drives,
+                         const Indices &drive_of, const Vector &t, const Vector &q, const Vector &v,
+                         double rtol, const std::string &method, bool numerical_damping,
+                         long most_steps, const std::vector<std::pair<std::string, int>> &channels,
+                         int stations, int threads, Watch &watch) {
   const std::size_t robots = numbers.shape(0), links = counts.shape(0);
   if (counts.shape(1) != COUNTS || numbers.shape(1) != links || numbers.shape(2) != NUMBERS ||
       material.shape(0) != robots || material.shape(2) != MATERIAL || gravity.shape(0) != robots ||
-      gravity.shape(1) != 2 || payload.shape(0) != robots || payload.shape(1) != 2 ||
-      limits.shape(0) != robots || limits.shape(1) != links || limits.shape(2) != 2 ||
-      drive_of.shape(0) != robots || t.shape(0) < 1)
+      lumps.shape(0) != robots || lumps.shape(2) != LUMP || gravity.shape(1) != 2 ||
+      payload.shape(0) != robots || payload.shape(1) != PAYLOAD || limits.shape(0) != robots ||
+      limits.shape(1) != links || limits.shape(2) != 2 || drive_of.shape(0) != robots ||
+      t.shape(0) < 1)
     throw std::invalid_argument("rows of another shape were expected");
   Population population;
   Table &table = population.robots;
   table.count = int(robots), table.links = int(links), table.intervals = int(material.shape(1)),
   table.counts = counts.data();
   table.numbers = numbers.data(), table.material = material.data(), table.gravity = gravity.data(),
-  table.payload = payload.data();
+  table.payload = payload.data(), table.lumps = int(lumps.shape(1)), table.lump = lumps.data();
   population.limits = limits.data();
   for (const PackedDrive *drive : drives) {
     if (drive->acting.joints.size() != links)
@@ -115,10 +117,10 @@ void bind_population(nb::module_ &module) {
       .def(nb::init<const Matrix &, const Ranges &, const Matrix &, const Flags &, const Flags &,
                     const Matrix &>(),
            "segments"_a, "ranges"_a, "gains"_a, "prescribed"_a, "sampled"_a, "limits"_a);
-  module.def("population", &run_population, "counts"_a, "numbers"_a, "material"_a, "gravity"_a,
-             "payload"_a, "limits"_a, "drives"_a, "drive_of"_a, "t"_a, "q"_a, "v"_a, "rtol"_a,
-             "method"_a, "numerical_damping"_a, "most_steps"_a, "channels"_a, "stations"_a,
-             "threads"_a, "watch"_a,
+  module.def("population", &run_population, "counts"_a, "numbers"_a, "material"_a, "lumps"_a,
+             "gravity"_a, "payload"_a, "limits"_a, "drives"_a, "drive_of"_a, "t"_a, "q"_a, "v"_a,
+             "rtol"_a, "method"_a, "numerical_damping"_a, "most_steps"_a, "channels"_a,
+             "stations"_a, "threads"_a, "watch"_a,
              "Values (channels, robots, times); of each robot how it ended, the time reached, "
              "steps, joint, "
              "positions of the joints; texts by robot.");

@@ -28,6 +28,10 @@ class ModelPlant : public Plant<Real> {
   void powers(const Real *q, const Real *v, Real &strain, Real &loss) override {
     strain = loss = Real(0.0);
     for (const Piece<Real> &c : model.pieces) {
+      if (c.joint != HubJoint::none) {
+        const std::size_t link = std::size_t(c.link);
+        strain += model.spring[link] * (q[c.first] - model.rest[link]) * v[c.first];
+      }
       if (c.joint == HubJoint::sleeve) {
         sleeve_powers(c, q, v, strain, loss);
         continue;
@@ -44,11 +48,13 @@ class ModelPlant : public Plant<Real> {
 
   Real strain(const Real *q) override {
     Real twice = 0.0, sleeves = 0.0;
-    for (const Piece<Real> &c : model.pieces)
+    for (const Piece<Real> &c : model.pieces) {
+      if (c.joint != HubJoint::none) sleeves += spring_energy(model, c, q);
       if (c.joint == HubJoint::sleeve)
         sleeves += sleeve_strain(c, q);
       else
         for (int l = 0; l < c.m; ++l) twice += c.K[l] * q[c.own() + l] * q[c.own() + l];
+    }
     return 0.5 * twice + sleeves;
   }
 
@@ -106,6 +112,10 @@ class ModelPlant : public Plant<Real> {
         unit[std::size_t(i)] = Real(0.0);
         for (int j = 0; j < n; ++j) D[j * n + i] = lane(lost[std::size_t(j)], lane_);
       }
+    }
+    for (int i = 0; i < this->joints; ++i) {
+      const std::size_t row = std::size_t(this->first[std::size_t(i)]);
+      K[row * size + row] = lane(model.spring[std::size_t(i)], lane_);
     }
     for (const Piece<Real> &c : model.pieces)
       for (int l = 0; l < c.m; ++l) {
@@ -175,7 +185,9 @@ class ModelPlant : public Plant<Real> {
     energy_ = lost = Real(0.0);
     for (const Piece<Real> &c : model.pieces) {
       if (c.joint != HubJoint::none) {
-        const Real stiffness = pass.held[c.link] ? Real(0.0) : pass.stiffness[c.link];
+        const Real stiffness = pass.held[c.link]
+                                   ? Real(0.0)
+                                   : pass.stiffness[c.link] + model.spring[std::size_t(c.link)];
         force[std::size_t(c.first)] = stiffness * z[c.first],
         energy_ += stiffness * z[c.first] * z[c.first];
       }
@@ -249,6 +261,10 @@ class ModelPlant : public Plant<Real> {
     for (int i = 0; i < this->joints; ++i) {
       Real &own = this->lever[std::size_t(this->first[std::size_t(i)])];
       if (model.kind[std::size_t(i)] == JointKind::revolute) own = larger(own, LEAST * this->reach);
+      if (model.elastic_joint(i)) {
+        Real &windup = this->lever[std::size_t(this->first[std::size_t(i)]) + 1];
+        windup = larger(windup, LEAST * this->reach);
+      }
     }
     this->travel.assign(std::size_t(this->joints),
                         Real(0.0));  // sleeves and sliders on links that bend

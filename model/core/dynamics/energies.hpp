@@ -45,6 +45,14 @@ Real sleeve_strain(const Piece<Real> &c, const Real *y) {
   return out;
 }
 
+// Energy of the spring beside a joint's drive (106).
+template <class Real>
+Real spring_energy(const Model<Real> &model, const Piece<Real> &c, const Real *y) {
+  const std::size_t link = std::size_t(c.link);
+  const Real wound = y[c.first] - model.rest[link];
+  return 0.5 * model.spring[link] * wound * wound;
+}
+
 // Twice the kinetic energy of a sleeved piece (33), (34), without its rotor: a quadratic form in
 // the rates of its hub, its own unknowns and d.
 template <class Real>
@@ -85,6 +93,12 @@ Real kinetic_energy(const Piece<Real> &c, const PieceState<Real> &k, const Real 
   }
   out += c.mass * (vx * vx + vy * vy) + c.hub * k.omega * k.omega +
          2.0 * (vx * momentum_x + vy * momentum_y);
+  if (c.turning)
+    for (int a = 0; a <= c.m; ++a) {
+      Real moment = c.spin[a * (c.m + 1)] * k.omega;
+      for (int i = 0; i < c.m; ++i) moment += c.spin[a * (c.m + 1) + 1 + i] * v[c.own() + i];
+      out += moment * (a == 0 ? k.omega : v[c.own() + a - 1]);
+    }
   if (last) {  // the payload's rotary inertia, 1/2 I_tip Omega_L^2 (22)
     Real turning = k.omega;
     for (int i = 0; i < c.m; ++i) turning += c.tip_angle[i] * v[c.own() + i];
@@ -110,6 +124,7 @@ Energies<Real> energies(const Model<Real> &model, Workspace<Real> &work, const R
         model.gravity[0] * (c.mass * hub.x + x) + model.gravity[1] * (c.mass * hub.y + up);
     out.kinetic += kinetic_energy(c, k, hub.vx, hub.vy, i + 1 == count, y, v);
     advance_hub(c, k, y, v, i + 1 < count ? &model.pieces[i + 1] : nullptr, hub);
+    if (c.joint != HubJoint::none) out.strain += spring_energy(model, c, y);
     if (c.joint == HubJoint::sleeve)
       out.strain += sleeve_strain(c, y);
     else

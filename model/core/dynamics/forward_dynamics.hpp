@@ -22,11 +22,12 @@ struct Held {
 // The joint of a piece: its motion is along s (for a sleeve the flow), coupled with the hub's
 // acceleration by `pull`.
 template <class Real>
-inline void eliminate_joint(const Piece<Real> &c, PieceState<Real> &k, const Stage<Real> &stage,
-                            const Real &viscous, const Real &force, const Held<Real> &hold,
+inline void eliminate_joint(const Model<Real> &model, const Piece<Real> &c, PieceState<Real> &k,
+                            const Stage<Real> &stage, const Real &force, const Held<Real> &hold,
                             const Real *flow, ArticulatedInertia<Real> &beyond) {
   const std::size_t i = std::size_t(c.link);
   const Real stiffness = stage.stiffness ? stage.stiffness[i] : Real(0.0);
+  const Real spring = model.spring[i], viscous = model.viscous[i];
   const Real damping = stage.damping ? stage.damping[i] + viscous : viscous;
   Real own = c.rotor, bias = 0.0;
   if (c.joint == HubJoint::sleeve) {
@@ -36,8 +37,9 @@ inline void eliminate_joint(const Piece<Real> &c, PieceState<Real> &k, const Sta
     k.pull = beyond.A * k.along;
     own += dot(k.along, k.pull), bias = dot(k.along, beyond.b);
   }
-  const Real passive = stiffness * stage.y[c.first] + damping * stage.v[c.first];
-  own += stage.gq * stiffness + stage.gv * damping;
+  const Real passive = stiffness * stage.y[c.first] + damping * stage.v[c.first] +
+                       spring * (stage.y[c.first] - model.rest[i]);  // (106)
+  own += stage.gq * (stiffness + spring) + stage.gv * damping;
   if (hold.held && hold.held[i]) {  // its acceleration is known
     k.inverse = own, k.rest = -(bias + passive);
     beyond.b = beyond.b + hold.given[i] * k.pull;
@@ -105,8 +107,7 @@ void accelerate(const Model<Real> &model, Workspace<Real> &work, const Real *y, 
         condense_elastic(c, k, stage, force + c.own(), last, m, P, beyond);
       });
     if (c.joint != HubJoint::none)
-      eliminate_joint(c, k, stage, model.viscous[std::size_t(c.link)], force[c.first], hold, flow,
-                      beyond);
+      eliminate_joint(model, c, k, stage, force[c.first], hold, flow, beyond);
   }
   Vec3<Real> u{-model.gravity[0], -model.gravity[1], 0.0};
   for (std::size_t i = 0; i < count; ++i) {

@@ -53,6 +53,12 @@ inline Vec3<Real> inertial(const Piece<Real> &c, const PieceState<Real> &k, cons
     wrench.t += c.tip * turning;
     for (int i = 0; i < m; ++i) out[i] += c.tip * c.tip_angle[i] * turning;
   }
+  if (c.turning)
+    for (int i = 0; i <= m; ++i) {
+      Real moment = c.spin[i * (m + 1)] * u.t;
+      for (int l = 0; l < m; ++l) moment += c.spin[i * (m + 1) + 1 + l] * a[l];
+      (i == 0 ? wrench.t : out[i - 1]) += moment;
+    }
   return wrench;
 }
 
@@ -136,7 +142,9 @@ void forces(const Model<Real> &model, Workspace<Real> &work, const Real *y, cons
     beyond = Vec3<Real>{wrench[i].x + beyond.x, wrench[i].y + beyond.y, wrench[i].t + meets(0)};
     if (c.joint == HubJoint::none) continue;
     if (!g) out[c.first] += dot(k.along, beyond);
-    if (terms.damping) out[c.first] += model.viscous[std::size_t(c.link)] * v[c.first];
+    const std::size_t link = std::size_t(c.link);
+    if (terms.stiffness) out[c.first] += model.spring[link] * (y[c.first] - model.rest[link]);
+    if (terms.damping) out[c.first] += model.viscous[link] * v[c.first];
   }
   if (terms.damping && model.mass_damped) add_mass_damping(model, y, v, out);
 }

@@ -2,34 +2,21 @@
 
 #include <algorithm>
 
+#include "numbers/pack_lane.hpp"
 #include "numbers/quadrature.hpp"
 
 namespace flexura {
-namespace {
-
-template <class Real>
-bool bends(const Model<Real> &model, int link) {
-  return model.elastic[std::size_t(link)] > 0;
-}
-
-// The first piece of a link that moves with it: behind its sleeve, if it has one.
-template <class Real>
-int first_moving(const Model<Real> &model, int link) {
-  return model.begin[std::size_t(link)] + (model.kind[std::size_t(link)] == JointKind::sleeve);
-}
-
-}  // namespace
 
 int last_flexible(const Model<double> &model) {
   int link = model.links() - 1;
-  while (link >= 0 && !bends(model, link)) --link;
+  while (link >= 0 && !model.bends(link)) --link;
   return link;
 }
 
 template <class Real>
 BendOf<Real> bend(const Model<Real> &model, Workspace<Real> &work, const Real *y, int link) {
   Real phi = 0.0, up = 0.0;  // in the hub's own axes
-  for (int i = first_moving(model, link); i < model.begin[std::size_t(link) + 1]; ++i) {
+  for (int i = model.line[std::size_t(link)]; i < model.begin[std::size_t(link) + 1]; ++i) {
     const Piece<Real> &c = model.pieces[std::size_t(i)];
     PieceState<Real> &k = work.kept[std::size_t(i)];
     const Real *q = y + c.own();
@@ -50,16 +37,25 @@ Observer<Real>::Observer(const Model<Real> &model, int stations)
       poses_(std::size_t(model.links()) + 1) {
   for (int link = 0; link < model.links(); ++link) {
     part_.insert(part_.end(), 3, POSES);
-    if (!bends(model, link)) continue;
+    if (!model.bends(link)) continue;
     part_.insert(part_.end(), 2, BENDS), part_.insert(part_.end(), std::size_t(stations), STATIONS);
-    const int first = first_moving(model, link),
-              count = model.begin[std::size_t(link) + 1] - first;  // pieces of equal length
+    const int first = model.line[std::size_t(link)],
+              count = model.begin[std::size_t(link) + 1] - first;
+    std::vector<double> ends{0.0};  // of the pieces, by the length of the first
+    for (int i = 0; i < count; ++i) {
+      const Piece<Real> &c = model.pieces[std::size_t(first + i)];
+      const double unit = lane(model.pieces[std::size_t(first)].length, 0);
+      ends.push_back(c.turning ? ends.back() + lane(c.length, 0) / unit : i + 1);  // else equal
+    }
     const bool sleeved = model.kind[std::size_t(link)] == JointKind::sleeve;
     for (int k = 0; k < stations; ++k) {
-      const double along = double(k * count) / (stations - 1);
-      const int piece = std::min(int(along), count - 1),
-                P = model.pieces[std::size_t(first + piece)].P;
-      Station station{first + piece, along - piece, std::vector<double>(std::size_t(P))};
+      const double along = k * ends.back() / (stations - 1);
+      int piece = 0;
+      while (piece + 1 < count && along >= ends[std::size_t(piece) + 1]) ++piece;
+      const int P = model.pieces[std::size_t(first + piece)].P;
+      const double begin = ends[std::size_t(piece)];
+      Station station{first + piece, (along - begin) / (ends[std::size_t(piece) + 1] - begin),
+                      std::vector<double>(std::size_t(P))};
       if (!sleeved)
         line_weights(line_rule(P), 2.0 * station.share - 1.0, 0.5, station.weight.data());
       stations_[std::size_t(link)].push_back(std::move(station));
@@ -71,7 +67,7 @@ Observer<Real>::Observer(const Model<Real> &model, int stations)
 // How far the stations of a link lie from the tangent at its hub; after `outward_kinematics`.
 template <class Real>
 void Observer<Real>::place_stations(const Real *y, int link, Real *out) {
-  const int first = first_moving(model_, link);
+  const int first = model_.line[std::size_t(link)];
   Real sine, cosine,
       x = 0.0, up = 0.0;  // of the hub's axes; from the hub to the piece's, in the base's axes
   sincos(work_.kept[std::size_t(first)].phi, sine, cosine);
@@ -117,7 +113,7 @@ void Observer<Real>::observe(const Real *y, const Real *v, Real *row, int parts)
     const Pose<Real> &pose = poses_[std::size_t(link)];
     if (parts & POSES) out[0] = pose.x, out[1] = pose.y, out[2] = pose.angle;
     out += 3;
-    if (!bends(model_, link)) continue;
+    if (!model_.bends(link)) continue;
     if (parts & STATIONS) place_stations(y, link, out + 2);
     if (parts & BENDS) {
       const BendOf<Real> tip = bend(model_, work_, y, link);

@@ -30,7 +30,7 @@ Pose<double> point_on_piece(const Piece<double> &c, const PieceState<double> &k,
 
 void line_points(const Model<double> &model, const Workspace<double> &work, const double *y,
                  int link, const double *s, int count, Pose<double> *out) {
-  const int begin = model.begin[std::size_t(link)], end = model.begin[std::size_t(link) + 1];
+  const int begin = model.line[std::size_t(link)], end = model.begin[std::size_t(link) + 1];
   const std::vector<double> still(std::size_t(model.n), 0.0);
   Hub<double> hub = first_hub(model, y, still.data());
   std::vector<Hub<double>> hubs;
@@ -43,7 +43,7 @@ void line_points(const Model<double> &model, const Workspace<double> &work, cons
   }
   for (int a = 0; a < count; ++a) {
     const bool sleeved = model.pieces[std::size_t(end) - 1].joint == HubJoint::sleeve;
-    int i = model.kind[std::size_t(link)] == JointKind::sleeve ? begin + 1 : begin;
+    int i = begin;
     double x = s[a], length = model.pieces[std::size_t(i)].length;
     if (sleeved) {
       const Piece<double> &c = model.pieces[std::size_t(i)];

@@ -52,9 +52,7 @@ void hub_poses(const Model<Real> &model, const Workspace<Real> &work, const Real
   for (std::size_t i = 0; i < count; ++i) {
     const Piece<Real> &c = model.pieces[i];
     const PieceState<Real> &k = work.kept[i];
-    const bool begins = int(i) == model.begin[std::size_t(c.link)];
-    const bool sleeved = model.kind[std::size_t(c.link)] == JointKind::sleeve;
-    if (sleeved ? !begins : begins) {
+    if (int(i) == model.line[std::size_t(c.link)]) {
       Real back = 0.0, sine, cosine;
       if (c.joint == HubJoint::sleeve) back = y[c.first] - c.length;
       sincos(k.phi, sine, cosine);

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "dynamics/inverse_dynamics.hpp"
+#include "dynamics/mass_matrix.hpp"
 #include "link/link_pieces.hpp"
 #include "numbers/eigenproblem.hpp"
 #include "robot/input_fault.hpp"
@@ -31,7 +31,14 @@ void fill_piece(Piece<double> &c, const PieceDraft &d, double *block) {
   auto into = [&](const double *array) { return block + (array - block); };
   const int m = d.m, P = d.P, stride = padded(m + 2);
   put(into(c.tip_angle), d.tip_angle), put(into(c.K), d.K);
-  for (int i = 0; i < m; ++i) into(c.D)[i] = d.beta * d.K[std::size_t(i)];
+  for (int i = 0; i < m; ++i)
+    into(c.D)[i] = d.D.empty() ? d.beta * d.K[std::size_t(i)] : d.D[std::size_t(i)];
+  for (const Spin &spin : d.spins)  // (108)
+    for (int a = 0; a <= m; ++a)
+      for (int b = 0; b <= m; ++b)
+        into(c.spin)[a * (m + 1) + b] += spin.inertia *
+                                         (a == 0 ? 1.0 : spin.b[std::size_t(a) - 1]) *
+                                         (b == 0 ? 1.0 : spin.b[std::size_t(b) - 1]);
   put(into(c.B), d.B, m, P), put(into(c.w), d.w), put(into(c.rails), d.rails);
   for (int p = 0; p < P; ++p) {
     double *row = into(c.columns) + p * stride;
@@ -58,15 +65,33 @@ void check_masses(const Model<double> &model, const Robot &robot) {
   const std::size_t n = std::size_t(model.n), links = robot.links.size();
   std::vector<double> q(n, 0.0), zero(n, 0.0), a(n), given(links, 0.0), reaction(links);
   std::vector<char> held(model.locked);
+  std::vector<double> M;  // where a link has no mass, what bends with it leaves round-off
+  if (std::any_of(robot.links.begin(), robot.links.end(), [](const Link &link) {
+        return link.elements > 0 && link.material[0].mass[0] == 0.0;
+      }))
+    M.resize(n * n);
+  auto least = [&](int row) { return M.empty() ? 0.0 : 1e-14 * M[std::size_t(row) * (n + 1)]; };
   for (std::size_t i = 0; i < links; ++i) q[std::size_t(model.first[i])] = model.start[i];
+  if (!M.empty()) {
+    std::vector<Vec3<double>> wrench(n);
+    mass_matrix(model, work, q.data(), zero.data(), wrench.data(), M.data());
+  }
   const Stage<double> plain{q.data(), zero.data(), 0.0, 0.0, nullptr, nullptr};
   accelerate(model, work, q.data(), zero.data(), plain, zero.data(),
              Held<double>{held.data(), given.data(), reaction.data()}, a.data());
   for (std::size_t i = 0; i < model.pieces.size(); ++i) {
     const Piece<double> &c = model.pieces[i];
+    if (c.m > 0 && int(i) < model.line[std::size_t(c.link)]) {
+      const double pivot = 1.0 / work.kept[i].inverses[0];
+      if (!(pivot > 0.0) || !std::isfinite(pivot))
+        throw Fault(
+            c.link, "joint.transmission",
+            "nothing to accelerate: expected a mass or inertia (link, hub or payload) beyond "
+            "the transmission");
+    }
     if (c.joint == HubJoint::none || held[std::size_t(c.link)]) continue;
     const double pivot = 1.0 / work.kept[i].inverse;
-    if (!(pivot > 0.0) || !std::isfinite(pivot))
+    if (!(pivot > least(c.first)) || !std::isfinite(pivot))
       throw Fault(c.link, "joint",
                   "nothing to accelerate: expected a mass or inertia (link, hub, rotor or payload) "
                   "that this "
@@ -77,6 +102,7 @@ void check_masses(const Model<double> &model, const Robot &robot) {
 // A robot in the making, link by link.
 struct Blank {
   std::vector<LinkDraft> links;
+  std::vector<PieceDraft> tool;  // a payload off the tip
 };
 
 void begin(const Robot &robot, Blank &out) {
@@ -87,8 +113,12 @@ void begin(const Robot &robot, Blank &out) {
     Attachments attached;
     attached.follower = !last,
     attached.slider = !last && robot.links[i + 1].joint.kind == JointKind::slider;
-    if (last)
+    if (last) {
       attached.payload_mass = robot.payload_mass, attached.payload_inertia = robot.payload_inertia;
+      attached.payload_along = robot.payload_along, attached.payload_across = robot.payload_across;
+      attached.off_tip = robot.payload_off_tip;
+      out.tool = off_tip(attached, int(i));
+    }
     out.links.push_back(begin_link(robot.links[i], int(i), attached));
   }
 }
@@ -148,6 +178,7 @@ Model<double> numbered(const Robot &robot, Blank &blank) {
   for (std::size_t i = 0; i < robot.links.size(); ++i) {
     const Link &link = robot.links[i];
     model.begin.push_back(int(drafts.size()));
+    model.line.push_back(int(drafts.size()) + blank.links[i].line);
     model.first.push_back(model.n);
     int elastic = 0;
     for (PieceDraft &piece : blank.links[i].pieces) {
@@ -159,12 +190,14 @@ Model<double> numbered(const Robot &robot, Blank &blank) {
     model.elastic.push_back(elastic);
     model.kind.push_back(link.joint.kind), model.locked.push_back(link.joint.locked);
     model.viscous.push_back(link.joint.viscous), model.coulomb.push_back(link.joint.coulomb);
+    model.spring.push_back(link.joint.spring), model.rest.push_back(link.joint.rest);
     model.alpha.push_back(link.elements > 0 ? link.alpha : 0.0),
         model.mass_damped |= model.alpha.back() != 0.0;
     model.start.push_back(link.joint.start), model.low.push_back(link.joint.low),
         model.high.push_back(link.joint.high);
   }
   model.begin.push_back(int(drafts.size()));
+  for (PieceDraft &piece : blank.tool) piece.first = model.n, drafts.push_back(&piece);
   model.gravity[0] = robot.gravity[0], model.gravity[1] = robot.gravity[1];
   std::size_t size = 0;
   model.pieces.resize(drafts.size());
@@ -226,13 +259,15 @@ template <class Real, class Number>
 Model<Real> converted(const Model<double> &one, Number number) {
   Model<Real> out;
   out.n = one.n, out.first = one.first, out.elastic = one.elastic, out.begin = one.begin,
-  out.kind = one.kind, out.locked = one.locked;
+  out.line = one.line, out.kind = one.kind, out.locked = one.locked;
   out.start = one.start, out.low = one.low, out.high = one.high, out.mass_damped = one.mass_damped;
   for (int k = 0; k < 2; ++k)
     out.gravity[k] = number([k](const Model<double> &m) { return m.gravity[k]; });
   for (std::size_t i = 0; i < one.first.size(); ++i) {
     out.viscous.push_back(number([i](const Model<double> &m) { return m.viscous[i]; }));
     out.coulomb.push_back(number([i](const Model<double> &m) { return m.coulomb[i]; }));
+    out.spring.push_back(number([i](const Model<double> &m) { return m.spring[i]; }));
+    out.rest.push_back(number([i](const Model<double> &m) { return m.rest[i]; }));
     out.alpha.push_back(number([i](const Model<double> &m) { return m.alpha[i]; }));
   }
   for (std::size_t i = 0; i < one.numbers.size(); ++i)

@@ -1,5 +1,8 @@
 #include "link/link_pieces.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 #include "robot/input_fault.hpp"
 
 namespace flexura {
@@ -16,9 +19,27 @@ PieceDraft rigid(double length, double mass, double centre, double about_centre)
   return out;
 }
 
+// A mass whose centre is `along`, `across` from the hub: without length, turned to the centre
+// (109).
+PieceDraft off_line(double mass, double along, double across, double about_centre) {
+  PieceDraft out = rigid(0.0, mass, std::hypot(along, across), about_centre);
+  out.angle = std::atan2(across, along);
+  return out;
+}
+
+// The hub of a revolute joint, from its axis to the beginning of the line (110); with a
+// transmission behind the windup, its one unknown (107).
+PieceDraft hub_piece(const Joint &joint) {
+  PieceDraft out = rigid(joint.hub_radius, 0.0, 0.0, 0.0);
+  if (!joint.elastic) return out;
+  out.m = 1, out.B = out.tip_angle = {1.0};
+  out.K = {joint.transmission_stiffness}, out.D = {joint.transmission_damping};
+  return out;
+}
+
 // An element of a mesh (10), (11): the first shape x less as much of the bubble 6 x (1 - x) as
 // makes K diagonal.
-PieceDraft element(const Link &link, double from, double to) {
+PieceDraft element(const Link &link, double from, double to, bool last) {
   PieceDraft out;
   out.m = 2, out.P = 3, out.beta = link.beta;
   const double h = to - from;
@@ -39,6 +60,39 @@ PieceDraft element(const Link &link, double from, double to) {
   }
   out.K = {K11 - mix * K12, K22}, out.tip_angle = {1.0, 0.0};
   inertia(out, link.material, from, to);
+  add_lumps(out, link.lumps, from, to, last, [mix](double x, double *b) {
+    const double bubble = 6.0 * x * (1.0 - x);
+    b[0] = x - mix * bubble, b[1] = bubble;
+  });
+  return out;
+}
+
+// Where the elements of a mesh end (108): they are of equal length between the ends of the link and
+// its lumps, where the curvature or its slope jumps. Lumps within a quarter of an element of an end
+// or of one another get no node. As in flexura/link/line.py.
+Numbers mesh_nodes(const Link &link) {
+  const double length = link.length, least = 0.25 * length / link.elements;
+  Numbers at, ends{0.0};
+  for (const Lump &lump : link.lumps) at.push_back(lump.at);
+  std::sort(at.begin(), at.end());
+  for (double x : at)
+    if (x - ends.back() >= least && length - x >= least && int(ends.size()) < link.elements)
+      ends.push_back(x);
+  ends.push_back(length);
+  std::vector<int> count(ends.size() - 1, 1);
+  for (int spare = link.elements - int(count.size()); spare > 0; --spare) {
+    std::size_t longest = 0;
+    auto element = [&](std::size_t k) { return (ends[k + 1] - ends[k]) / count[k]; };
+    for (std::size_t k = 1; k < count.size(); ++k)
+      if (element(k) > element(longest)) longest = k;
+    ++count[longest];
+  }
+  Numbers out{0.0};
+  for (std::size_t k = 0; k < count.size(); ++k) {
+    for (int e = 1; e < count[k]; ++e)
+      out.push_back(ends[k] + (ends[k + 1] - ends[k]) * e / count[k]);
+    out.push_back(ends[k + 1]);
+  }
   return out;
 }
 
@@ -55,31 +109,54 @@ LinkDraft begin_link(const Link &link, int index, const Attachments &attached) {
   if (sleeve)
     out.pieces.push_back(rigid(0.0, 0.0, 0.0, 0.0));  // the sleeve itself, fixed to the link before
   out.has_whole = flexible && (sleeve || link.modes >= 0 || attached.slider);
+  if (joint.has_hub) out.pieces.push_back(hub_piece(joint));
+  if (!flexible && link.off_line)
+    out.pieces.push_back(off_line(link.mass, link.centre, link.centre_across, link.inertia));
+  out.line = int(out.pieces.size());
   if (!flexible) {
-    out.pieces.push_back(rigid(link.length, link.mass, link.centre, link.inertia));
-    add_payload(out.pieces.back(), attached);
-    if (sleeve) out.pieces.back().offset = -link.length;
+    out.pieces.push_back(link.off_line ? rigid(link.length, 0.0, 0.0, 0.0)
+                                       : rigid(link.length, link.mass, link.centre, link.inertia));
+    PieceDraft &body = out.pieces.back();
+    if (link.off_line) body.angle = -out.pieces[out.pieces.size() - 2].angle;
+    for (const Lump &lump : link.lumps)
+      add_point_mass(body, lump.mass, {lump.at}), body.W[0] += lump.inertia;
+    add_payload(body, attached);
   } else if (out.has_whole) {
     out.whole = sleeve ? begin_sleeved(link, attached) : begin_single_piece(link, attached);
     out.pieces.emplace_back();
   } else {
-    for (int e = 0; e < link.elements; ++e)
-      out.pieces.push_back(
-          element(link, link.length * e / link.elements,
-                  e + 1 == link.elements ? link.length : link.length * (e + 1) / link.elements));
+    const Numbers nodes = mesh_nodes(link);
+    for (std::size_t e = 0; e + 1 < nodes.size(); ++e)
+      out.pieces.push_back(element(link, nodes[e], nodes[e + 1], e + 2 == nodes.size()));
     add_payload(out.pieces.back(), attached);
   }
   auto piece = [&](std::size_t k) -> PieceDraft & {
     return out.has_whole && k + 1 == out.pieces.size() ? out.whole.piece : out.pieces[k];
   };
   PieceDraft &base = piece(0), &moving = piece(sleeve ? 1 : 0);
-  base.angle = joint.kind == JointKind::revolute ? 0.0 : joint.angle;
-  base.mass += joint.hub_mass, base.hub += joint.hub_inertia;
+  if (joint.kind != JointKind::revolute) base.angle += joint.angle;
+  base.mass += joint.hub_mass;
+  if (joint.elastic)
+    base.W[0] += joint.hub_inertia;  // turns with the windup
+  else
+    base.hub += joint.hub_inertia;
+  if (sleeve && !flexible) moving.offset = -link.length;
   moving.joint = joint.kind == JointKind::revolute ? HubJoint::revolute
                  : sleeve && flexible              ? HubJoint::sleeve
                                                    : HubJoint::slider;
   moving.rotor = joint.rotor;
   for (std::size_t k = 0; k < out.pieces.size(); ++k) piece(k).link = index;
+  return out;
+}
+
+std::vector<PieceDraft> off_tip(const Attachments &attached, int index) {
+  std::vector<PieceDraft> out;
+  if (!attached.off_tip) return out;
+  out.push_back(off_line(attached.payload_mass, attached.payload_along, attached.payload_across,
+                         attached.payload_inertia));
+  out.push_back(rigid(0.0, 0.0, 0.0, 0.0));
+  out.back().angle = -out.front().angle;
+  for (PieceDraft &piece : out) piece.link = index;
   return out;
 }
 

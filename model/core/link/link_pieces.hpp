@@ -9,11 +9,15 @@ namespace flexura {
 struct LinkDraft {
   std::vector<PieceDraft> pieces;
   bool has_whole = false;
+  int line = 0;  // the first piece of the link's line
   SinglePieceLink whole;
 };
 
 // The pieces of link `index` (from 0), all but the modes. Throws Fault.
 LinkDraft begin_link(const Link &link, int index, const Attachments &attached);
+
+// The payload as pieces of its own, if its centre is off the tip (109).
+std::vector<PieceDraft> off_tip(const Attachments &attached, int index);
 
 // Changes the last piece's shapes for its modes, if it has any.
 void finish_link(LinkDraft &draft, const Link &link, const ClampedModes<double> &modes);

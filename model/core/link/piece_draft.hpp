@@ -14,17 +14,26 @@ inline std::size_t at(int row, int column, int width) {
   return std::size_t(row) * std::size_t(width) + std::size_t(column);
 }
 
+// A moment of inertia that turns at the rate b_0 of the hub and b_k of the unknowns (108).
+struct Spin {
+  double inertia = 0.0;
+  Numbers b;  // (m)
+};
+
 // Names as in Piece. Arrays are not padded.
 struct PieceDraft : Shape {
   double mass = 0.0, hub = 0.0, tip = 0.0, angle = 0.0, offset = 0.0, rotor = 0.0, length = 0.0,
          railing = 0.0, payload = 0.0, beta = 0.0;
   Numbers tip_angle, K, B, W, moment, w, rails;  // B (m, P), W (P, P), rails (rail, P + m)
   Numbers xi, weight, C, bend, material;         // of a sleeve
+  Numbers D;                                     // (m), if damping is not beta K
+  std::vector<Spin> spins;                       // lumped inertias
 };
 
 // What stands on a link: a payload at its tip, another link there, a slider along it.
 struct Attachments {
-  double payload_mass = 0.0, payload_inertia = 0.0;
+  double payload_mass = 0.0, payload_inertia = 0.0, payload_along = 0.0, payload_across = 0.0;
+  bool off_tip = false;  // the payload is a piece of its own, behind the link
   bool follower = false, slider = false;
 };
 
@@ -93,16 +102,42 @@ inline void inertia(PieceDraft &out, const std::vector<Interval> &material, doub
   });
 }
 
+// A point mass at the place sum_j w_j e_j of the line: m, m w and m w w^T (22), (108).
+inline void add_point_mass(PieceDraft &out, double m, const Numbers &w) {
+  out.mass += m;
+  if (m == 0.0) return;
+  for (int j = 0; j < out.P; ++j) {
+    out.moment[std::size_t(j)] += m * w[std::size_t(j)];
+    for (int l = 0; l < out.P; ++l)
+      out.W[at(j, l, out.P)] += m * w[std::size_t(j)] * w[std::size_t(l)];
+  }
+}
+
 // A payload m_p with the rotary inertia I_tip at the tip: m_p, m_p w, m_p w w^T and I_tip Omega_L^2
 // of the kinetic energy (22).
 inline void add_payload(PieceDraft &out, const Attachments &attached) {
-  const double m = attached.payload_mass;
-  out.mass += m, out.tip = attached.payload_inertia;
-  if (m == 0.0) return;
-  for (int j = 0; j < out.P; ++j) {
-    out.moment[std::size_t(j)] += m * out.w[std::size_t(j)];
-    for (int l = 0; l < out.P; ++l)
-      out.W[at(j, l, out.P)] += m * out.w[std::size_t(j)] * out.w[std::size_t(l)];
+  if (attached.off_tip) return;
+  add_point_mass(out, attached.payload_mass, out.w);
+  out.tip = attached.payload_inertia;
+}
+
+// The lumps of a link that are on a piece from `from` to `to`, the last of its link or not;
+// shapes(x, b): what its unknowns turn the line by at x of [0, 1].
+template <class F>
+void add_lumps(PieceDraft &out, const std::vector<Lump> &lumps, double from, double to, bool last,
+               F shapes) {
+  out.turning = !lumps.empty();
+  for (const Lump &lump : lumps) {
+    if (lump.at < from || (lump.at >= to && !last)) continue;
+    const double x = std::min((lump.at - from) / (to - from), 1.0);
+    Numbers w(std::size_t(out.P)), b(std::size_t(out.m));
+    if (x < 1.0)
+      line_weights(line_rule(out.P), 2.0 * x - 1.0, 0.5 * (to - from), w.data());
+    else
+      w = out.w;
+    add_point_mass(out, lump.mass, w);
+    shapes(x, b.data());
+    out.spins.push_back({lump.inertia, b});
   }
 }
 

@@ -17,6 +17,7 @@ int mesh_count(const Link &link) { return std::min(2 * link.elements, MOST_WHOLE
 // How many describe it in modes: enough for the last mode to be right to 1e-5 in a uniform link.
 int shape_count(const Link &link) {
   if (link.modes < 0) return mesh_count(link);
+  if (!link.lumps.empty()) return MOST_SHAPES;  // their forces bend the modes sharply
   const int few = std::min(link.modes, MOST_SHAPES - 5) + 5;
   return uniform(link.material) ? few : std::max(few, mesh_count(link));
 }
@@ -89,9 +90,10 @@ Numbers stiffness_matrix(const std::vector<Interval> &material, double from, dou
   return K;
 }
 
-// Mass matrix B W B^T (+ payload's inertia), the tip's deflection and angle of a straight clamped
-// link in its shapes.
-void clamp(const PieceDraft &line, const PieceDraft &shaped, ClampedLink<double> &out) {
+// Mass matrix B W B^T (+ inertias of payload and lumps), the tip's deflection and angle of a
+// straight clamped link in its shapes.
+void clamp(const PieceDraft &line, const PieceDraft &shaped, const Attachments &attached,
+           ClampedLink<double> &out) {
   const int m = shaped.m, P = line.P;
   out.m = m, out.angle = shaped.tip_angle, out.deflection.assign(std::size_t(m), 0.0);
   Numbers transposed(at(P, 0, m));
@@ -105,6 +107,20 @@ void clamp(const PieceDraft &line, const PieceDraft &shaped, ClampedLink<double>
       out.M[at(i, l, m)] +=
           line.tip * shaped.tip_angle[std::size_t(i)] * shaped.tip_angle[std::size_t(l)];
   }
+  for (const Spin &spin : shaped.spins)
+    for (int i = 0; i < m; ++i)
+      for (int l = 0; l < m; ++l)
+        out.M[at(i, l, m)] += spin.inertia * spin.b[std::size_t(i)] * spin.b[std::size_t(l)];
+  if (!attached.off_tip) return;
+  const double across = attached.payload_across,
+               turning = attached.payload_inertia + attached.payload_mass * across * across;
+  auto lever = [&](int i) {
+    return out.deflection[std::size_t(i)] + attached.payload_along * out.angle[std::size_t(i)];
+  };
+  for (int i = 0; i < m; ++i)
+    for (int l = 0; l < m; ++l)
+      out.M[at(i, l, m)] += attached.payload_mass * lever(i) * lever(l) +
+                            turning * out.angle[std::size_t(i)] * out.angle[std::size_t(l)];
 }
 
 // Changes m shapes for sums of them, X (m, kept).
@@ -118,6 +134,12 @@ void combine(SinglePieceLink &whole, const Numbers &X, int kept) {
       for (int p = 0; p < P; ++p) B[at(k, p, P)] += part * piece.B[at(i, p, P)];
       tip[std::size_t(k)] += part * piece.tip_angle[std::size_t(i)];
     }
+  for (Spin &spin : piece.spins) {
+    Numbers b(std::size_t(kept), 0.0);
+    for (int k = 0; k < kept; ++k)
+      for (int i = 0; i < m; ++i) b[std::size_t(k)] += X[at(i, k, kept)] * spin.b[std::size_t(i)];
+    spin.b = std::move(b);
+  }
   if (whole.slider || whole.sleeve)
     for (int n = 0; n < whole.rows; ++n)
       for (int i = 0; i < m; ++i)
@@ -153,8 +175,14 @@ SinglePieceLink begin_single_piece(const Link &link, const Attachments &attached
   inertia(piece, link.material, 0.0, link.length);
   add_payload(piece, attached);
   put_shapes(out, count);
+  add_lumps(piece, link.lumps, 0.0, link.length, true, [&](double x, double *b) {
+    Numbers value(std::size_t(count) + 2), first(value.size()), second(value.size());
+    legendre(2.0 * x - 1.0, count, value.data(), first.data(), second.data());
+    for (int k = 0; k < count; ++k)
+      for (int n = 0; n <= count; ++n) b[k] += out.shapes[at(n, k, count)] * value[std::size_t(n)];
+  });
   out.clamped.K = stiffness_matrix(link.material, 0.0, link.length, count);
-  clamp(piece, piece, out.clamped);
+  clamp(piece, piece, attached, out.clamped);
   return out;
 }
 
@@ -174,8 +202,9 @@ SinglePieceLink begin_sleeved(const Link &link, const Attachments &attached) {
   }
   integrate(link.material, 0.0, link.length, 3,
             [&](double, double weight, double mass, double) { piece.mass += weight * mass; });
-  piece.mass += attached.payload_mass, piece.payload = attached.payload_mass,
-                                       piece.tip = attached.payload_inertia;
+  if (!attached.off_tip)
+    piece.mass += attached.payload_mass, piece.payload = attached.payload_mass,
+                                         piece.tip = attached.payload_inertia;
   put_shapes(out, count);
   if (out.own) {  // its modes at the start's free length
     PieceDraft start;
@@ -184,7 +213,7 @@ SinglePieceLink begin_sleeved(const Link &link, const Attachments &attached) {
     inertia(start, link.material, from, link.length);
     add_payload(start, attached);
     out.clamped.K = stiffness_matrix(link.material, from, link.length, count);
-    clamp(start, piece, out.clamped);
+    clamp(start, piece, attached, out.clamped);
   }
   for (const Interval &part : link.material) {
     piece.material.insert(piece.material.end(), {part.from, part.to});

@@ -5,7 +5,9 @@
 // angle of its tangent is linear in its m unknowns q, Theta_j = phi + sum_k B_jk q_k (2). A rigid
 // link is a piece with one point and no unknowns; a link of n elements is n pieces of two unknowns
 // with no joint between; a link in its own modes, one that carries a slider, and one in a sleeve
-// are one piece.
+// are one piece. A hub with a radius is a rigid piece before the link's line; with a transmission
+// its one unknown is the windup (107). A mass whose centre is off the line is a piece without
+// length, turned to the centre, followed by one that turns back (109).
 #pragma once
 #include <cstddef>
 #include <vector>
@@ -33,7 +35,8 @@ struct Shape {
   int first = 0;     // row of its joint's unknown, or of its first own one, among all unknowns
   int rail = 0;  // Legendre polynomials that describe the line, if the next piece slides along it;
                  // 0: that piece sits at the tip
-  int intervals = 0;  // of the material of a sleeved piece
+  int intervals = 0;     // of the material of a sleeved piece
+  bool turning = false;  // has lumped inertias that turn with its line
   int own() const { return first + (joint != HubJoint::none); }  // row of the first own unknown
 };
 
@@ -59,6 +62,7 @@ struct Piece : Shape {
   const Real *bend;         // sleeve: (m, P): d Theta / d xi, per unknown
   const Real *material;     // sleeve: (intervals, 10): from, to, mass per length, stiffness (8)
   Real payload, beta;       // sleeve: mass at the tip; D = beta K
+  const Real *spin;  // turning: (m + 1, m + 1), lumped inertias by hub's turning and unknowns (108)
 };
 
 // What an evaluation leaves of a piece for its next sweep.
@@ -85,21 +89,43 @@ struct Model {
   std::vector<Piece<Real>> pieces;
   std::vector<Real> numbers;        // all arrays of all pieces
   std::vector<int> first, elastic;  // per link: row of its joint; count of its elastic unknowns
-  std::vector<int> begin;           // per link: its first and, at link + 1, its last piece + 1
+  std::vector<int> begin;  // per link: its first and, at link + 1, its last piece + 1; what comes
+                           // after the last link's is a payload off the tip
+  std::vector<int> line;   // per link: the first piece of its line, behind sleeve and hub
   std::vector<JointKind> kind;
   std::vector<char> locked;
   std::vector<Real> viscous, coulomb;  // per link
+  std::vector<Real> spring, rest;      // per link: beside the drive (106)
   std::vector<Real> alpha;             // per link: mass-proportional damping [1/s]
   std::vector<double> start, low, high;
   bool mass_damped = false;
   Real gravity[2];
 
   int links() const { return int(first.size()); }
+  bool bends(int link) const { return pieces[std::size_t(begin[std::size_t(link) + 1]) - 1].m > 0; }
+  bool elastic_joint(int link) const {  // a transmission is between rotor and hub
+    const Piece<Real> &hub = pieces[std::size_t(begin[std::size_t(link)])];
+    return hub.m > 0 && begin[std::size_t(link)] < line[std::size_t(link)];
+  }
+  // The payload, if its centre is off the tip, or null.
+  const Piece<Real> *tool() const {
+    const std::size_t at = std::size_t(begin.back());
+    return at < pieces.size() ? &pieces[at] : nullptr;
+  }
   Model() = default;
   Model(Model &&) noexcept = default;
   Model &operator=(Model &&) noexcept = default;
   Model(const Model &) = delete;
 };
+
+// Position of a joint's hub from unknowns q (n), or its rate from their rates: behind a
+// transmission the rotor's and the windup (107).
+template <class Real>
+inline double hub_position(const Model<Real> &model, int link, const double *q) {
+  const std::size_t i = std::size_t(link);
+  const double *joint = q + model.first[i];
+  return model.elastic_joint(link) ? joint[0] + joint[1] : joint[0];
+}
 
 // Points every array of a piece at its place in a block of numbers; returns how many there are.
 // With a null block it only counts.
@@ -115,6 +141,7 @@ std::size_t place_arrays(Piece<Real> &c, const Real *block) {
   take(c.B, m * padded(P)), take(c.columns, P * padded(m + 2)), take(c.R, P * P), take(c.moment, P),
       take(c.w, P);
   take(c.rails, c.rail * (P + m));
+  if (c.turning) take(c.spin, (m + 1) * (m + 1));
   if (c.joint == HubJoint::sleeve)
     take(c.xi, P), take(c.weight, P), take(c.C, P * P), take(c.bend, m * padded(P)),
         take(c.material, c.intervals * 10);

@@ -314,8 +314,10 @@ class Worker {
                        const double *drive, const std::vector<Four> &seen, int k) {
     const std::size_t i = std::size_t(channel.index);
     switch (channel.of) {
-      case Channel::position: return z[model.first[i]];
-      case Channel::velocity: return z[model.n + model.first[i]];
+      case Channel::position: return hub_position(model, channel.index, z);
+      case Channel::velocity: return hub_position(model, channel.index, z + model.n);
+      case Channel::motor_position: return z[model.first[i]];
+      case Channel::motor_velocity: return z[model.n + model.first[i]];
       case Channel::drive: return drive[i];
       case Channel::account: return z[2 * model.n + channel.index];
       case Channel::seen: return seen[i][k];

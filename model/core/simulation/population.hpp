@@ -17,7 +17,7 @@ namespace flexura {
 // What is kept of a run: of joint `index` position, velocity or drive; account `index`; column
 // `index` of an Observer.
 struct Channel {
-  enum Of { position, velocity, drive, account, seen } of;
+  enum Of { position, velocity, drive, account, seen, motor_position, motor_velocity } of;
   int index;
 };
 

@@ -85,6 +85,9 @@ ChainAtRest::ChainAtRest(const Model<double> &model, const double *q, const char
     out.mass = c.mass, out.hub = c.hub, out.rotor = c.rotor, out.tip = i + 1 == count ? c.tip : 0.0;
     const bool turns = c.joint == HubJoint::revolute && free && free[c.link];
     if (c.joint != HubJoint::none) (turns ? out.joint : out.held) = c.first;
+    if (turns)
+      out.spring = model.spring[std::size_t(c.link)], out.rest = model.rest[std::size_t(c.link)];
+    if (c.turning) out.spin = c.spin;
     if (c.joint == HubJoint::revolute && !turns) out.angle += q[c.first];
     if (i == 0 && c.joint == HubJoint::slider) base_ = q[c.first] + c.offset;
     out.sine = take(padded(P)), out.cosine = take(padded(P)), out.J = take(3 * wide),
@@ -114,8 +117,11 @@ double ChainAtRest::energy(const double *q, const TipLoad &load, double share, d
   size = 0.0, weighed_ = false;
   for (PieceAtRest &c : pieces_) {
     phi += c.angle;
-    if (c.joint >= 0) phi += q[c.joint];
     double sx = c.mass * x, sy = c.mass * y, dx = 0.0, dy = 0.0, strain = 0.0;
+    if (c.joint >= 0) {
+      const double wound = q[c.joint] - c.rest;
+      phi += q[c.joint], strain = 0.5 * c.spring * wound * wound;
+    }
     if (c.rod != 0.0) {
       sincos(phi, c.hub_sine, c.hub_cosine);
       sx += c.rod * c.hub_cosine, sy += c.rod * c.hub_sine;
@@ -168,7 +174,7 @@ void ChainAtRest::gradient(const double *q, const TipLoad &load, double share, d
       }
     });
     b.x -= c.mass * gx, b.y -= c.mass * gy;
-    if (c.joint >= 0) out[c.joint] = b.t;
+    if (c.joint >= 0) out[c.joint] = b.t + c.spring * (q[c.joint] - c.rest);
     if (c.held >= 0) out[c.held] = 0.0;
   }
 }

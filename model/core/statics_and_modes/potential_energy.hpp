@@ -39,11 +39,12 @@ struct PieceAtRest {
   double angle = 0.0;  // that its hub adds to the angle of the piece before, held joint included
   double mass = 0.0, rod = 0.0;  // [kg]; s_0 [kg m]
   double hub = 0.0, tip = 0.0;   // inertia of hub (with the rod behind) and payload [kg m^2]
-  double rotor = 0.0;            // of a free joint
-  const double *B, *w, *s, *a;   // (m, P) padded, (P), (P), (m)
-  const double *R;               // (squares, P): W = R^T R (16)
-  double *K;                     // (m, m)
-  double *sine, *cosine;         // of Theta at the points
+  double rotor = 0.0, spring = 0.0, rest = 0.0;  // of a free joint
+  const double *B, *w, *s, *a;                   // (m, P) padded, (P), (P), (m)
+  const double *R;                               // (squares, P): W = R^T R (16)
+  const double *spin = nullptr;                  // (m + 1, m + 1): lumped inertias, or null
+  double *K;                                     // (m, m)
+  double *sine, *cosine;                         // of Theta at the points
   double hub_sine = 0.0, hub_cosine = 1.0;
   double *J;                // (3, m + 1): motion of the next hub by turning and own unknowns
   double *inertia, *first;  // M of turning and own unknowns (m + 1, m + 1), with the hub (m + 1, 2)

@@ -43,6 +43,9 @@ void weigh(PieceAtRest &c, M m, N P) {
   for (int a = 0; a < wide; ++a)
     for (int k = a; k < wide; ++k) c.inertia[a * wide + k] = c.tip * jt[a] * jt[k];
   c.inertia[0] += c.hub;
+  if (c.spin)
+    for (int a = 0; a < wide; ++a)
+      for (int k = a; k < wide; ++k) c.inertia[a * wide + k] += c.spin[a * wide + k];
   for (int p = 0; p < c.squares; ++p) {
     for (int a = 0; a < wide; ++a) zx[a] = zy[a] = 0.0;
     for (int j = 0; j < P; ++j)
@@ -171,7 +174,7 @@ int ChainAtRest::tangent(const TipLoad &load, double share, double shift, bool d
     if (c.joint < 0) continue;
     Sym3<double> &A = beyond.A;  // a free joint turns the hub
     c.pull = {A.xt, A.yt, A.tt};
-    c.inverse = inverse_of(A.tt + shift * c.rotor, size + std::fabs(A.tt));
+    c.inverse = inverse_of(A.tt + c.spring + shift * c.rotor, size + std::fabs(A.tt) + c.spring);
     subtract(A, c.pull, c.inverse);
   }
   return wrong;

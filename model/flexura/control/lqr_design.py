@@ -6,7 +6,8 @@ tick T:
 
     x_k+1 = F x_k + G u_k,   y_k = C x_k,   [F G; 0 1] = exp([A B; 0 0] T)
 
-y: what the rig measures, joint positions and the deflection of the last flexible link. K and L
+y: what the rig measures, joint positions (the motor's, where a transmission is between) and the
+deflection of the last flexible link. K and L
 minimise and come from
 
     sum x^T Q x + u^T R u:   P = Q + F^T P (F - G K),  K = (R + G^T P G)^-1 G^T P F w ~ W, v ~ V:
@@ -126,8 +127,11 @@ def lqr(
     exponential = expm(np.block([[A, B], [np.zeros((m, n + m))]]) * T)
     F, G = exponential[:n, :n], exponential[:n, n:]
     bent = [k for k, name in enumerate(linear.outputs) if name.endswith("tip_deflection")]
-    places = [linear.outputs.index(f"joint/{i + 1}/position") for i in driven]
-    C, W = linear.C[places + bent[-1:]], linear.C[places + bent]
+    hubs = [linear.outputs.index(f"joint/{i + 1}/position") for i in driven]
+    elastic = system.windup_rows
+    measured = [f"joint/{i + 1}/{'motor_' * (i in elastic)}position" for i in driven]
+    places = [linear.outputs.index(name) for name in measured]
+    C, W = linear.C[places + bent[-1:]], linear.C[hubs + bent]
     weights = np.concatenate(
         [1 / _weight_matrix(position, len(driven), "position"), np.full(len(bent), 1 / deflection)]
     )

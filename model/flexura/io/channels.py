@@ -87,7 +87,15 @@ CHANNELS = (
         TURN,
         "motor position",
         "Elastic joint: position of the rotor, reduced to the joint; equal to joint/i/position "
-        "where the transmission is not strained.",
+        "where the transmission is not strained. The drive acts on it, and a controller "
+        "measures it.",
+    ),
+    Channel(
+        "joint/i/motor_velocity",
+        RATE,
+        "motor velocity",
+        "Elastic joint: time derivative of joint/i/motor_position; the work of the drive is the "
+        "integral of drive times this velocity.",
     ),
     Channel(
         "joint/i/reference",

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..robot import Link
-from .modes import clamped_matrices, clamped_modes, orthogonal_shapes
+from ..robot import Link, Payload
+from .modes import ClampedBody, clamped_matrices, clamped_modes, orthogonal_shapes
 from .quadrature import collocation, gauss, lagrange, lagrange_integrals, legendre, legendre_at
 from .section import Material, material
 from .shapes import ElementShapes, MeshShapes, WholeShapes
@@ -173,6 +173,8 @@ def piece_orders(link: Link, followed: bool) -> tuple[int, int]:
     mesh, sleeve = min(2 * link.elements, MAX_UNKNOWNS), link.joint.type == "Pb"
     if link.modes is None:
         return mesh, mesh + 1
+    if link.mass:  # their forces bend the modes sharply
+        return MAX_SHAPES, MAX_SHAPES + (1 if followed or sleeve else 0)
     few = min(link.modes, MAX_SHAPES - 5) + 5
     count = few if material(link).uniform else max(few, mesh)
     return count, count + (1 if followed or sleeve else 0)
@@ -195,25 +197,28 @@ def is_one_piece(link: Link, beyond: Link | None) -> bool:
 
 
 def pieces(
-    link: Link, beyond: Link | None = None, mass: float = 0.0, inertia: float = 0.0
+    link: Link, beyond: Link | None = None, load: Payload | None = None
 ) -> tuple[Piece, ...]:
     """The pieces of a flexible link.
 
     Args:
         link: the link.
         beyond: the next link; None: the link carries the payload.
-        mass: of the payload [kg].
-        inertia: of the payload [kg m^2].
+        load: the payload.
     """
     properties = material(link)
     if not is_one_piece(link, beyond):
-        return mesh(properties, link.elements)
+        return mesh(properties, nodes(link))
     count, points = piece_orders(link, beyond is not None)
     sleeve = link.joint.type == "Pb"
     if sleeve and link.modes is None:
         return (whole_piece(properties, points, np.eye(count), np.zeros(0)),)
     free = link.joint.start if sleeve else link.length_m
-    M, K, tip = clamped_matrices(properties, free, count, points, mass, inertia)
+    bodies = [ClampedBody(each.at_m, each.mass_kg, each.inertia_kg_m2) for each in link.mass]
+    if load is not None:
+        centre = load.centre_of_mass_m
+        bodies.append(ClampedBody(link.length_m, load.mass_kg, load.inertia_kg_m2, *centre))
+    M, K, tip = clamped_matrices(properties, free, count, points, bodies)
     if link.modes is None:
         return (whole_piece(properties, points, *orthogonal_shapes(K)),)
     kept = min(link.modes, count)
@@ -236,14 +241,34 @@ def whole_piece(
     return Piece(properties.length, points, WholeShapes(coefficients), K, s / properties.length, dm)
 
 
-def mesh(properties: Material, elements: int) -> tuple[Piece, ...]:
-    """The pieces of a link of equal elements (10).
+def nodes(link: Link) -> np.ndarray:
+    """Where the elements of a link end (elements + 1,) [m] (108).
+
+    They are of equal length between the ends of the link and its lumped masses, where the curvature
+    or its slope jumps. Masses within a quarter of an element of an end or of one another get no
+    node.
+    """
+    length, count = link.length_m, link.elements
+    least, ends = 0.25 * length / count, [0.0]
+    for x in sorted(each.at_m for each in link.mass):
+        if x - ends[-1] >= least and length - x >= least and len(ends) < count:
+            ends.append(x)
+    spans, each = np.diff([*ends, length]), np.ones(len(ends), dtype=int)
+    for _ in range(count - len(each)):
+        each[np.argmax(spans / each)] += 1
+    inner = [
+        np.linspace(a, b, n, endpoint=False) for a, b, n in zip(ends, [*ends[1:], length], each)
+    ]
+    return np.append(np.concatenate(inner), length)
+
+
+def mesh(properties: Material, ends: np.ndarray) -> tuple[Piece, ...]:
+    """The pieces of a link of elements (10).
 
     Args:
         properties: its mass and stiffness.
-        elements: their number.
+        ends: where the elements end (elements + 1,) [m].
     """
-    ends = np.linspace(0, properties.length, elements + 1)
     return tuple(_element(properties, a, b) for a, b in pairwise(ends))
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import numpy as np
 
 from .quadrature import gauss, lagrange_integrals
@@ -9,13 +12,26 @@ from .section import Material
 from .shapes import legendre_shapes
 
 
+class ClampedBody(NamedTuple):
+    """A body on a link (108), (109).
+
+    Place [m], mass [kg], inertia about its centre [kg m^2], and the centre along and across the
+    tangent there [m].
+    """
+
+    at: float
+    mass: float
+    inertia: float
+    along: float = 0.0
+    across: float = 0.0
+
+
 def clamped_matrices(
     properties: Material,
     free: float,
     count: int,
     points: int,
-    mass: float = 0.0,
-    inertia: float = 0.0,
+    bodies: Sequence[ClampedBody] = (),
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Matrices of a straight link whose last `free` metres are clamped at their start (17).
 
@@ -26,8 +42,7 @@ def clamped_matrices(
         free: the free length [m].
         count: number of polynomials.
         points: number of points.
-        mass: of a payload at the tip [kg].
-        inertia: of that payload [kg m^2].
+        bodies: on the link, places from its proximal end.
 
     Returns:
         M [kg m^2] and K [N m], (count, count), and the tip's deflection and angle of each shape,
@@ -42,7 +57,12 @@ def clamped_matrices(
     )
     tip = np.vstack([free * lagrange_integrals(points, ends) @ B, legendre_shapes(count, ends)])
     M = deflection.T @ ((properties.mass_per_length(s) * ds)[:, None] * deflection)
-    M += tip.T @ (np.array([[mass], [inertia]]) * tip)
+    for body in bodies:
+        at = np.array([(body.at - L + free) / free])
+        place = np.vstack([free * lagrange_integrals(points, at) @ B, legendre_shapes(count, at)])
+        lever = place[0] + body.along * place[1]
+        turning = body.inertia + body.mass * body.across**2
+        M += body.mass * np.outer(lever, lever) + turning * np.outer(place[1], place[1])
     return M, slope.T @ ((properties.bending_stiffness(s) * ds)[:, None] * slope), tip
 
 

@@ -206,7 +206,7 @@ def _grouped(robots: Sequence[Robot]) -> list[tuple[np.ndarray, Rows]]:
     members: dict[bytes, list[int]] = {}
     parts = [one(robot) for robot in robots]
     for k, part in enumerate(parts):
-        members.setdefault(part.counts.tobytes(), []).append(k)
+        members.setdefault(part.topology, []).append(k)
     return [(np.array(group), joined([parts[k] for k in group])) for group in members.values()]
 
 

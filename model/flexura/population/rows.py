@@ -11,11 +11,11 @@ import numpy as np
 
 from ..errors import InputError
 from ..robot import LEAST_FREE, Link, Robot
-from ..system.constants import rows
+from ..system.constants import payload, rows
 
 # Columns of `numbers`, as system/constants.py gives them.
 LENGTH, MASS, CENTRE, INERTIA, START, LOW, HIGH = 0, 1, 2, 3, 7, 13, 14
-ELEMENTS = 2  # column of `counts`
+ELEMENTS, LUMPS = 2, 5  # columns of `counts`
 OF_JOINT = {
     "angle_rad": 6,
     "hub_mass_kg": 8,
@@ -42,12 +42,13 @@ PA, PB = 1, 2  # kinds of joints in `counts`
 
 @dataclass(frozen=True)
 class Rows:
-    """B robots: counts (N, 5) of them all, numbers (B, N, 15), material (B, K, 10), gravity (B, 2)
-    and payload (B, 2)."""
+    """B robots: counts (N, 8) of them all, numbers (B, N, 21), material (B, K, 10), lumped masses
+    (B, J, 3), gravity (B, 2) and payload (B, 4)."""
 
     counts: np.ndarray
     numbers: np.ndarray
     material: np.ndarray
+    lumps: np.ndarray
     gravity: np.ndarray
     payload: np.ndarray
 
@@ -60,14 +61,23 @@ class Rows:
             self.counts,
             *(
                 np.ascontiguousarray(a[some])
-                for a in (self.numbers, self.material, self.gravity, self.payload)
+                for a in (self.numbers, self.material, self.lumps, self.gravity, self.payload)
             ),
         )
 
     def contents(self, k: int) -> bytes:
         """All numbers of robot k, to the last bit."""
-        arrays = (self.counts, self.numbers[k], self.material[k], self.gravity[k], self.payload[k])
+        varied = (self.numbers, self.material, self.lumps, self.gravity, self.payload)
+        arrays = (self.counts, *(each[k] for each in varied))
         return b"".join(np.ascontiguousarray(a).tobytes() for a in arrays)
+
+    @property
+    def topology(self) -> bytes:
+        """What is the same in robots that the core takes together: the counts, and at which shares
+        of their links the lumped masses of the first are, by which its meshes are made."""
+        on = np.repeat(np.arange(len(self.counts)), self.counts[:, LUMPS])
+        shares = self.lumps[0, :, 0] / np.maximum(self.numbers[0, on, LENGTH], 1e-300)
+        return self.counts.tobytes() + np.round(shares, 12).tobytes()
 
     @property
     def limits(self) -> np.ndarray:
@@ -91,10 +101,14 @@ class Rows:
 
 def one(robot: Robot) -> Rows:
     """The rows of one robot."""
-    counts, numbers, material = rows(robot)
-    payload = np.array([[robot.payload.mass_kg, robot.payload.inertia_kg_m2]])
+    counts, numbers, material, lumps = rows(robot)
     return Rows(
-        counts, numbers[None], material[None], np.array([robot.gravity_m_s2], dtype=float), payload
+        counts,
+        numbers[None],
+        material[None],
+        lumps[None],
+        np.array([robot.gravity_m_s2], dtype=float),
+        payload(robot)[None],
     )
 
 
@@ -105,7 +119,7 @@ def joined(parts: Sequence[Rows]) -> Rows:
         first.counts,
         *(
             np.concatenate([getattr(p, name) for p in parts])
-            for name in ("numbers", "material", "gravity", "payload")
+            for name in ("numbers", "material", "lumps", "gravity", "payload")
         ),
     )
 
@@ -123,6 +137,7 @@ def varied(robot: Robot, columns: Mapping[str, np.ndarray]) -> Rows | None:
         base.counts,
         again(base.numbers),
         again(base.material),
+        again(base.lumps),
         again(base.gravity),
         again(base.payload),
     )
@@ -157,6 +172,8 @@ def _vary_link(link: Link, i: int, out: Rows, changes: Mapping[str, np.ndarray])
                 out.numbers[:, i, column] = rest.pop(f"{table}.{name}")
     if not rest:
         return True
+    if link.mass and "length_m" in rest:  # the masses must stay on the link
+        return False
     if not link.flexible:
         return _vary_rigid(link, i, out, rest)
     simple = not any(
@@ -188,6 +205,8 @@ def _vary_link(link: Link, i: int, out: Rows, changes: Mapping[str, np.ndarray])
 
 def _vary_rigid(link: Link, i: int, out: Rows, changes: Mapping[str, np.ndarray]) -> bool:
     if link.mass_kg is None or not set(changes) <= set(OF_RIGID):
+        return False
+    if isinstance(link.centre_of_mass_m, tuple):
         return False
     for name, values in changes.items():
         out.numbers[:, i, OF_RIGID[name]] = values

@@ -129,7 +129,12 @@ def _equilibrium(rows: Rows, drive: Drive | None, t: float) -> np.ndarray | None
     on their motion at t [s]; None: the core refuses the robot, and will say why."""
     try:
         robot = core.Mechanics(
-            rows.gravity[0], rows.payload[0], rows.counts, rows.numbers[0], rows.material[0]
+            rows.gravity[0],
+            rows.payload[0],
+            rows.counts,
+            rows.numbers[0],
+            rows.material[0],
+            rows.lumps[0],
         )
     except core.Fault:
         return None
@@ -140,11 +145,14 @@ def _equilibrium(rows: Rows, drive: Drive | None, t: float) -> np.ndarray | None
     return equilibrium(robot, q)
 
 
+OF_JOINTS = ("position", "velocity", "drive", "motor_position", "motor_velocity")
+
+
 def _columns(robot: Robot, names: Sequence[str]) -> list[tuple[str, int]] | None:
     """The channels as the core names them; None if it does not have one of them."""
     known: dict[str, tuple[str, int]] = {}
     for i in range(len(robot.links)):
-        known |= {f"joint/{i + 1}/{what}": (what, i) for what in ("position", "velocity", "drive")}
+        known |= {f"joint/{i + 1}/{what}": (what, i) for what in OF_JOINTS}
     accounts = {"energy/work": WORK, "energy/loss": LOSS, "energy/numerical_loss": NUMERICAL}
     seen = [name for name in recorded_channels(robot)]
     known |= {name: ("account", k) for name, k in accounts.items()} | {
@@ -197,6 +205,7 @@ def _together(
         rows.counts,
         rows.numbers,
         rows.material,
+        rows.lumps,
         rows.gravity,
         rows.payload,
         rows.limits,

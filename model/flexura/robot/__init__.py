@@ -1,9 +1,20 @@
 """The robot file: a frozen, validated description of a robot in SI units."""
 
-from .joint import Joint, key_of
-from .link import LEAST_FREE, MAX_ELEMENTS, MOST_MODES, Damping, Link, Section, SectionAt, ValueAt
+from .joint import Joint, Spring, Transmission, key_of
+from .link import (
+    LEAST_FREE,
+    MAX_ELEMENTS,
+    MOST_MODES,
+    Damping,
+    Link,
+    Lump,
+    Section,
+    SectionAt,
+    ValueAt,
+)
 from .old_keys import OldKey, renamed
-from .robot import MAX_LINKS, Payload, Robot, load, robot_of, save
+from .payload import Payload
+from .robot import MAX_LINKS, Robot, load, robot_of, save
 from .table import Table
 
 __all__ = [
@@ -14,12 +25,15 @@ __all__ = [
     "Damping",
     "Joint",
     "Link",
+    "Lump",
     "OldKey",
     "Payload",
     "Robot",
     "Section",
     "SectionAt",
+    "Spring",
     "Table",
+    "Transmission",
     "ValueAt",
     "key_of",
     "load",

@@ -43,6 +43,28 @@ def _number(what: str, unit: str) -> Any:
     return Field(0.0, ge=0, description=f"{what} in {unit}, 0 or more")
 
 
+class Spring(Table):
+    """A spring beside a joint's drive (106)."""
+
+    stiffness_N_m_rad: float = _number("the stiffness of the spring of a joint R", "N m/rad")
+    rest_rad: float = Field(0.0, description="where the spring of a joint R rests, in radians")
+    stiffness_N_m: float = _number("the stiffness of the spring of a joint Pa or Pb", "N/m")
+    rest_m: float = Field(0.0, description="where the spring of a joint Pa or Pb rests, in metres")
+
+
+class Transmission(Table):
+    """What is between a rotor and its hub: a spring with a damper (107). All values are those at
+    the joint, the rotor's inertia too."""
+
+    stiffness_N_m_rad: float = Field(
+        gt=0, description="the stiffness at the joint in N m/rad, above 0"
+    )
+    damping_N_m_s_rad: float = _number("the damping at the joint", "N m s/rad")
+    gear_ratio: float = Field(
+        1.0, gt=0, description="turns of the motor in a turn of the joint, above 0"
+    )
+
+
 class Joint(Table):
     """The joint at the proximal side of a link: R, Pa or Pb (dissertation, table 2.1).
 
@@ -79,6 +101,20 @@ class Joint(Table):
     viscous_friction_N_s_m: float = _number("viscous friction of a joint Pa or Pb", "N s/m")
     coulomb_friction_N_m: float = _number("Coulomb friction of a joint R", "N m")
     coulomb_friction_N: float = _number("Coulomb friction of a joint Pa or Pb", "N")
+    hub_radius_m: float = Field(
+        0.0,
+        ge=0,
+        le=1000,
+        description="how far from the axis of a joint R its link begins, in metres, 0 to 1000",
+    )
+    spring: Spring | None = Field(
+        None,
+        description="a table { stiffness_N_m_rad, rest_rad }, of a joint Pa or Pb { stiffness_N_m, "
+        "rest_m }",
+    )
+    transmission: Transmission | None = Field(
+        None, description="a table { stiffness_N_m_rad, damping_N_m_s_rad, gear_ratio }"
+    )
     locked: bool = Field(False, description="true (the joint is clamped at its start) or false")
 
     @model_validator(mode="after")
@@ -89,6 +125,15 @@ class Joint(Table):
             if wrong in self.model_fields_set and value != type(self).model_fields[wrong].default:
                 right = key_of(quantity, self.type)
                 raise WrongValue(wrong, value, f"none: a joint {self.type} has {right}")
+        self._check_spring()
+        if self.type != "R":
+            for key in ("hub_radius_m", "transmission"):
+                if getattr(self, key):
+                    expected = f"none: a joint {self.type} slides; only a joint R has one"
+                    raise WrongValue(key, getattr(self, key), expected)
+        if self.transmission and not self.rotor_inertia > 0:
+            expected = "an inertia above 0: behind a transmission the rotor moves by itself"
+            raise WrongValue(self.key("rotor_inertia"), self.rotor_inertia, expected)
         if self.type == "R" and self.angle_rad != 0:
             raise WrongValue(
                 "angle_rad",
@@ -104,6 +149,40 @@ class Joint(Table):
                     key, given, f"limits that contain the start position, {self.start:g}"
                 )
         return self
+
+    def _check_spring(self) -> None:
+        if self.spring is None:
+            return
+        turning, sliding = ("stiffness_N_m_rad", "rest_rad"), ("stiffness_N_m", "rest_m")
+        wrong, right = (sliding, turning) if self.type == "R" else (turning, sliding)
+        for key, instead in zip(wrong, right, strict=True):
+            if key in self.spring.model_fields_set and getattr(self.spring, key) != 0.0:
+                expected = f"none: the spring of a joint {self.type} has {instead}"
+                raise WrongValue(f"spring.{key}", getattr(self.spring, key), expected)
+
+    @property
+    def spring_stiffness(self) -> float:
+        """Stiffness of the spring beside the drive [N m/rad, N/m]; 0: none."""
+        if self.spring is None:
+            return 0.0
+        return self.spring.stiffness_N_m_rad if self.type == "R" else self.spring.stiffness_N_m
+
+    @property
+    def spring_rest(self) -> float:
+        """Where that spring rests [rad, m]."""
+        if self.spring is None:
+            return 0.0
+        return self.spring.rest_rad if self.type == "R" else self.spring.rest_m
+
+    @property
+    def windup_stiffness(self) -> float:
+        """Stiffness of the transmission at the joint [N m/rad]; 0: none."""
+        return 0.0 if self.transmission is None else self.transmission.stiffness_N_m_rad
+
+    @property
+    def windup_damping(self) -> float:
+        """Damping of the transmission at the joint [N m s/rad]."""
+        return 0.0 if self.transmission is None else self.transmission.damping_N_m_s_rad
 
     def key(self, quantity: str) -> str:
         """The key that holds a quantity of this joint.

@@ -24,6 +24,8 @@ LEAST_FREE = (
 
 
 Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+Pair = Annotated[tuple[float, float], Field(strict=False)]
 
 
 class Section(Table):
@@ -72,12 +74,23 @@ class Damping(Table):
     )
 
 
+class Lump(Table):
+    """A mass on the line of a link, with the inertia about its own centre (108)."""
+
+    at_m: float = Field(ge=0, description="the place along the link in metres, 0 or more")
+    mass_kg: float = Field(0.0, ge=0, description="a mass in kilograms, 0 or more")
+    inertia_kg_m2: float = Field(
+        0.0, ge=0, description="an inertia about the mass's own centre in kg m^2, 0 or more"
+    )
+
+
 _LINK_TEXT = {
     "section": (
         "a table { width_m, height_m } or a list of { at_m, width_m, height_m } in order of at_m"
     ),
     "mass_per_length_kg_m": (
-        "mass per length in kg/m, a number above 0 or a list of { at_m, value } in order of at_m"
+        "mass per length in kg/m, a number of 0 or more, or a list of { at_m, value } in order of "
+        "at_m"
     ),
     "bending_stiffness_N_m2": (
         "bending stiffness EI in N m^2, a number above 0 or a list of { "
@@ -113,9 +126,9 @@ class Link(Table):
     section: Section | list[SectionAt] | None = Field(None, description=_LINK_TEXT["section"])
     young_modulus_Pa: float | None = Field(
         None,
-        ge=1e5,
+        ge=1e3,
         le=2e12,
-        description="Young's modulus in pascals, between 1e5 and 2e12 (steel: 2.0e11, not 200)",
+        description="Young's modulus in pascals, between 1e3 and 2e12 (steel: 2.0e11, not 200)",
     )
     density_kg_m3: float | None = Field(
         None,
@@ -123,7 +136,7 @@ class Link(Table):
         le=25000,
         description="the density in kg/m^3, between 10 and 25000 (steel: 7850)",
     )
-    mass_per_length_kg_m: Positive | list[ValueAt] | None = Field(
+    mass_per_length_kg_m: NotNegative | list[ValueAt] | None = Field(
         None, description=_LINK_TEXT["mass_per_length_kg_m"]
     )
     bending_stiffness_N_m2: Positive | list[ValueAt] | None = Field(
@@ -132,13 +145,18 @@ class Link(Table):
     mass_kg: float | None = Field(
         None, ge=0, description="a rigid link's mass in kilograms, 0 or more"
     )
-    centre_of_mass_m: float | None = Field(
-        None, description="a rigid link's centre of mass from its origin in metres"
+    centre_of_mass_m: float | Pair | None = Field(
+        None,
+        description="a rigid link's centre of mass from its origin in metres: a number along the "
+        "link, or two, [along, across]",
     )
     inertia_kg_m2: float | None = Field(
         None,
         ge=0,
         description="a rigid link's inertia about its centre of mass in kg m^2, 0 or more",
+    )
+    mass: list[Lump] = Field(
+        default_factory=list, description="tables [[link.mass]] { at_m, mass_kg, inertia_kg_m2 }"
     )
     damping: Damping = Field(default_factory=Damping, description="a table { alpha_1_s, beta_s }")
     joint: Joint = Field(description='a table [link.joint] with at least type = "R", "Pa" or "Pb"')
@@ -165,6 +183,15 @@ class Link(Table):
             self._check_flexible()
         else:
             self._check_rigid()
+        for k, lump in enumerate(self.mass, 1):
+            if lump.at_m > self.length_m:
+                expected = f"a place on the link, at most its length, {self.length_m:g}"
+                raise WrongValue(f"mass[{k}].at_m", lump.at_m, expected)
+        if self.mass and self.flexible and self.joint.type == "Pb":
+            expected = (
+                "none: masses on a flexible link that moves through a sleeve are not modelled"
+            )
+            raise WrongValue("mass[1].at_m", self.mass[0].at_m, expected)
         for key in ("section", "mass_per_length_kg_m", "bending_stiffness_N_m2"):
             value = getattr(self, key)
             if isinstance(value, list) and (
@@ -252,6 +279,8 @@ class Link(Table):
             or self.mass_per_length_kg_m is not None
             or self.density_kg_m3 is not None
         )
+        if self.mass_per_length_kg_m == 0:
+            raise WrongValue("mass_per_length_kg_m", 0.0, "a number above 0, or mass_kg = 0.0")
         if self.mass_kg is None and not spread:
             raise WrongValue(
                 "mass_kg", None, "missing: a rigid link's mass in kilograms, 0 or more"

@@ -19,19 +19,12 @@ from ..io import FORMAT, check_format, explain, find, is_name, read_toml, summar
 from .joint import KEYS, key_of
 from .link import LEAST_FREE, Link
 from .old_keys import renamed
+from .payload import Payload
+from .suitability import check_masses, check_stretch
 from .table import Table
 
 MAX_LINKS = 256
 _log = logging.getLogger("flexura")
-
-
-class Payload(Table):
-    """A point mass with inertia at the tip of the last link."""
-
-    mass_kg: float = Field(0.0, ge=0, description="the payload's mass in kilograms, 0 or more")
-    inertia_kg_m2: float = Field(
-        0.0, ge=0, description="the payload's inertia in kg m^2, 0 or more"
-    )
 
 
 class Robot(Table):
@@ -57,7 +50,8 @@ class Robot(Table):
         min_length=1, max_length=MAX_LINKS, description=f"1 to {MAX_LINKS} tables [[link]]"
     )
     payload: Payload = Field(
-        default_factory=Payload, description="a table { mass_kg, inertia_kg_m2 }"
+        default_factory=Payload,
+        description="a table { mass_kg, inertia_kg_m2, centre_of_mass_m }",
     )
     format: int = Field(
         FORMAT, ge=1, le=FORMAT, description=f"the file's format, a whole number up to {FORMAT}"
@@ -99,6 +93,12 @@ class Robot(Table):
                 if joint.start < exit_m:
                     ahead = f"a start ahead of the sleeve of link {i}, at {exit_m:g} m or more"
                     raise WrongValue(f"{key}.{joint.key('start')}", joint.start, ahead)
+        return self
+
+    @model_validator(mode="after")
+    def _suits(self) -> Robot:
+        check_masses(self.link, self.payload)
+        check_stretch(self.link, self.payload, self.gravity_m_s2)
         return self
 
     @model_validator(mode="after")

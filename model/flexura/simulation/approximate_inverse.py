@@ -30,7 +30,8 @@ MAX_SWEEPS = 300  # joint after joint, in one step
 
 
 def rigid_robot(robot: Robot) -> Robot:
-    """The same robot with rigid links: masses, hubs, payload and joints as they are.
+    """The same robot with rigid links and transmissions: masses, hubs, payload and joints as they
+    are.
 
     Args:
         robot: the robot.
@@ -42,6 +43,7 @@ def rigid_robot(robot: Robot) -> Robot:
     for link in data["link"]:
         for key in ("elements", "modes", "young_modulus_Pa", "bending_stiffness_N_m2", "damping"):
             link.pop(key, None)
+        link["joint"].pop("transmission", None)
     return Robot.from_dict(data)
 
 

@@ -29,6 +29,8 @@ def channel_units(robot: Robot) -> dict[str, str]:
             f"joint/{i}/{what}": unit
             for what, unit in zip(("position", "velocity", "drive"), kinds, strict=True)
         }
+        if link.joint.transmission is not None:
+            units |= {f"joint/{i}/motor_position": "rad", f"joint/{i}/motor_velocity": "rad/s"}
     for i, link in enumerate(robot.links, 1):
         units |= {f"link/{i}/x": "m", f"link/{i}/y": "m", f"link/{i}/angle": "rad"}
         if link.flexible:
@@ -63,8 +65,10 @@ def record(system: System, solution: Solution) -> Run:
     q, v = np.ascontiguousarray(states[:, :n]), np.ascontiguousarray(states[:, n:])
     seen = system.observe(q, v) if solution.seen is None else solution.seen
     found: list[np.ndarray] = []
+    hubs, hub_rates = system.hub_positions(q), system.hub_positions(v)
     for i, row in enumerate(system.joint_rows):
-        found += [q[:, row], v[:, row], solution.forces[:, i]]
+        found += [hubs[:, i], hub_rates[:, i], solution.forces[:, i]]
+        found += [q[:, row], v[:, row]] if i in system.windup_rows else []
     found += [*seen.T, *accounts[:, :STRAIN].T]
     units = channel_units(system.robot)
     channels = {

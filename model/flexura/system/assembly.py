@@ -50,6 +50,10 @@ class Assembly:
         self.labels, self.n = self.structure.labels, self.structure.n
         self._rotors = np.array([link.joint.rotor_inertia for link in self.robot.links])
         self._coulomb = np.array([link.joint.coulomb_friction for link in self.robot.links])
+        # springs beside the drives (106): stiffness of each joint, and where all springs rest
+        self._springs = np.array([link.joint.spring_stiffness for link in self.robot.links])
+        self._rest = np.zeros(self.n)
+        self._rest[self.rows] = [link.joint.spring_rest for link in self.robot.links]
         self._g = complex(*self.robot.gravity_m_s2)
         materials = [
             (i, material)
@@ -113,7 +117,8 @@ class Assembly:
         return masses.total(parts, gravity), flow
 
     def elastic(self, q: np.ndarray) -> np.ndarray:
-        """Elastic forces, on the left-hand side (43): K q, and of a sleeved link also dU/dd.
+        """Elastic forces, on the left-hand side (43): K q, of springs beside drives
+        k (q - rest) (106), and of a sleeved link also dU/dd.
 
         -dU/dd is the force that pushes a bent link out of its sleeve (36).
 
@@ -126,14 +131,16 @@ class Assembly:
         return self._elastic(self.stiffness_blocks(q), q)
 
     def _elastic(self, K: np.ndarray, q: np.ndarray) -> np.ndarray:
-        out = K @ q
+        out = K @ (q - self._rest)
         for i in self._sleeved:
             y = q[self.structure.own[i][0]]
             out[self.rows[i]] += 0.5 * y @ self._sleeve(i, q, 1) @ y
         return out
 
     def stiffness_blocks(self, q: np.ndarray) -> np.ndarray:
-        """K, with K(d) of sleeved links: twice the strain energy is q^T K q (9), (35).
+        """K, with K(d) of sleeved links (9), (35), and with the springs of joints.
+
+        Twice the strain energy is z^T K z, z = q less where the springs rest.
 
         Args:
             q: configuration (n,).
@@ -149,8 +156,11 @@ class Assembly:
 
     @cached_property
     def _diagonal(self) -> np.ndarray:
-        """K (n, n) of the pieces of constant length."""
+        """K (n, n) of the pieces of constant length and of the springs of joints."""
         K = np.zeros((self.n, self.n))
+        K[self.rows, self.rows] = self._springs
+        for i, row in self.structure.windups.items():
+            K[row, row] = self.robot.links[i].joint.windup_stiffness
         for link, owns in zip(self.structure.links, self.structure.own, strict=True):
             for piece, own in zip(link, owns, strict=True):
                 if piece.K.size:
@@ -182,7 +192,8 @@ class Assembly:
         return K
 
     def damping(self, q: np.ndarray) -> np.ndarray:
-        """D: viscous friction of joints, alpha M + beta K of elastic unknowns (26).
+        """D: viscous friction of joints, damping of transmissions (107), alpha M
+        + beta K of elastic unknowns (26).
 
         Args:
             q: configuration (n,).
@@ -196,8 +207,11 @@ class Assembly:
         D = np.zeros((self.n, self.n))
         for i, (link, row) in enumerate(zip(self.robot.links, self.rows, strict=True)):
             D[row, row] = link.joint.viscous_friction
+            if i in self.structure.windups:
+                windup = self.structure.windups[i]
+                D[windup, windup] = link.joint.windup_damping
             if self.structure.own[i]:
-                own = slice(row + 1, self.structure.own[i][-1].stop)
+                own = slice(self.structure.own[i][0].start, self.structure.own[i][-1].stop)
                 D[own, own] = link.damping.beta_s * K[own, own]
                 if link.damping.alpha_1_s:
                     D[own, own] += link.damping.alpha_1_s * self._clamped_mass(i, q)[own, own]
@@ -305,9 +319,14 @@ class Assembly:
         parts = [part for state in states for part in self.structure.masses(state)]
         return Energies(
             float(0.5 * qd @ self._mass(masses.total(parts)) @ qd),
-            float(0.5 * q @ self.stiffness_blocks(q) @ q),
+            self.strain(q, self.stiffness_blocks(q)),
             masses.potential(parts, self._g),
         )
+
+    def strain(self, q: np.ndarray, K: np.ndarray) -> float:
+        """The strain energy [J] in q (n,), K (n, n) its `stiffness_blocks` (9), (106), (107)."""
+        strained = q - self._rest
+        return float(0.5 * strained @ K @ strained)
 
     def loss(self, q: np.ndarray, qd: np.ndarray) -> float:
         """The power that damping and friction take (28).

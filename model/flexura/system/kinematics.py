@@ -48,8 +48,9 @@ def rotate(frame: Frame, angle: float, row: int | None = None) -> Frame:
     return frame._replace(angle=frame.angle + float(angle), turning=turning)
 
 
-def translate(frame: Frame, x: float, rows: list[int], qd: np.ndarray) -> Frame:
-    """The frame moved by x [m] along its x axis; the unknowns `rows` are summands of x."""
+def translate(frame: Frame, x: complex, rows: list[int], qd: np.ndarray) -> Frame:
+    """The frame moved by x [m] along its x axis (by the imaginary part of x across it); the
+    unknowns `rows` are summands of x."""
     t, spin = frame.tangent, float(frame.turning @ qd)
     velocity = frame.velocity + (1j * x * t) * frame.turning
     for row in rows:

@@ -85,10 +85,15 @@ def _eigenmodes(
     free = np.full(len(system.joint_rows), joints == "free", dtype=np.uint8)
     squares, columns = system.equations.modes(at, free, count or 0, np.zeros(3), shapes)
     if joints == "free" and not any(system.robot.gravity_m_s2):
-        squares[: len(system.free_rows) - len(system.elastic_rows)] = (
-            0.0  # without gravity nothing holds a free joint
-        )
+        squares[: _unheld(system)] = 0.0
     return Modes(_hertz(squares), columns, at, system.labels)
+
+
+def _unheld(system: System) -> int:
+    """How many free joints nothing holds where there is no gravity: those without a spring."""
+    return sum(
+        not each.joint.locked and not each.joint.spring_stiffness for each in system.robot.links
+    )
 
 
 def _check(joints: Any, count: Any) -> None:
@@ -112,7 +117,7 @@ def _dense(system: System, at: np.ndarray, joints: str, count: int | None) -> Mo
     K = system.tangent(at)[pick]
     squares, shapes[rows] = eigh((K + K.T) / 2, system.mass(at)[pick])
     if joints == "free" and not any(system.robot.gravity_m_s2):
-        squares[: len(rows) - len(system.elastic_rows)] = 0.0
+        squares[: _unheld(system)] = 0.0
     return Modes(_hertz(squares)[:count], shapes[:, :count], at, system.labels)
 
 

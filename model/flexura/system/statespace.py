@@ -13,6 +13,8 @@ from ..io import choice, summary
 from .statics import static
 from .system import System, assemble, jacobian
 
+INFINITE = 1e5  # times the fastest pole: a zero beyond is one at infinity, and round-off
+
 
 @dataclass(frozen=True, repr=False)
 class StateSpace:
@@ -21,8 +23,9 @@ class StateSpace:
 
     From M dq'' + G dq' + K dq = E u, of which the fields are the matrices (m, m), (m, inputs): bias
     and gravity are in G and K. `states`, `inputs`, `outputs` are names, `units` their units: inputs
-    `joint/i/drive`, outputs `joint/i/position`, `link/i/tip_deflection`, `tip/x`, `tip/y`, as in a
-    Run. `hold` (N,): the drives [N or N m] that keep the robot there. Coulomb friction is left out.
+    `joint/i/drive`, outputs `joint/i/position` (behind a transmission also
+    `joint/i/motor_position`), `link/i/tip_deflection`, `tip/x`, `tip/y`, as in a Run. `hold` (N,):
+    the drives [N or N m] that keep the robot there. Coulomb friction is left out.
     """
 
     M: np.ndarray
@@ -84,10 +87,21 @@ class StateSpace:
     @property
     def poles(self) -> np.ndarray:
         """Eigenvalues of A (2m,) [1/s], by magnitude."""
+        R = self._root
+        return _roots(np.eye(len(self.M)), _scaled(R, self.G), _scaled(R, self.K))
+
+    @property
+    def _root(self) -> np.ndarray:
+        """R (m, m), M = R^T R. Raises FlexuraError: M is singular to double precision."""
         from scipy.linalg import cholesky
 
-        R = cholesky(self.M)
-        return _roots(np.eye(len(self.M)), _scaled(R, self.G), _scaled(R, self.K))
+        try:
+            return np.asarray(cholesky(self.M))
+        except np.linalg.LinAlgError:
+            raise FlexuraError(
+                "M is singular to double precision: a link has almost no mass beside what it "
+                "carries; fewer of its modes, as modes = 2, leave the rest out"
+            ) from None
 
     def zeros(self, drive: str, output: str) -> np.ndarray:
         """Transmission zeros from an input to an output, by magnitude: where the output stays 0
@@ -108,11 +122,11 @@ class StateSpace:
         Raises:
             InputError: unknown names, or an output that the drive does not move.
         """
-        from scipy.linalg import cholesky, null_space, solve_triangular
+        from scipy.linalg import null_space, solve_triangular
 
         b = self.E[:, _find(drive, self.inputs, "drive")]
         c = self.outlook[_find(output, self.outputs, "output")]
-        R = cholesky(self.M)  # coordinates in which M = 1
+        R = self._root  # coordinates in which M = 1
         b, c = solve_triangular(R, b, trans="T"), solve_triangular(R, c, trans="T")
         G, K, one = _scaled(R, self.G), _scaled(R, self.K), np.eye(len(self.M))
         for s in (
@@ -129,7 +143,8 @@ class StateSpace:
                     value=output,
                 )
         N, L = null_space(c[None]), null_space(b[None])
-        return _roots(L.T @ N, L.T @ G @ N, L.T @ K @ N)
+        found = _roots(L.T @ N, L.T @ G @ N, L.T @ K @ N)
+        return found[np.abs(found) < INFINITE * max(1.0, np.abs(self.poles).max())]
 
     def transfer(self, s: complex) -> np.ndarray:
         """The transfer matrix C (s - A)^-1 B.
@@ -175,7 +190,7 @@ def linearize(robot: Any, q: Any = None, qd: Any = None, joints: str = "free") -
     kept = [
         k
         for k, name in enumerate(outputs)
-        if not name.startswith("joint") or int(name.split("/")[1]) - 1 in moved
+        if not name.startswith("joint") or _number(name) in moved
     ]
     labels = [system.labels[row] for row in rows]
     drives = [f"joint/{i + 1}/drive" for i in moved]
@@ -195,6 +210,11 @@ def linearize(robot: Any, q: Any = None, qd: Any = None, joints: str = "free") -
         qd=rates,
         hold=system.forces(at, rates, np.zeros(system.n))[system.joint_rows],
     )
+
+
+def _number(name: str) -> int:
+    """The joint or link of an output, from 0."""
+    return int(name.split("/")[1]) - 1
 
 
 def _steady(system: System, rates: np.ndarray) -> np.ndarray:
@@ -263,16 +283,17 @@ def _outputs(system: System, q: np.ndarray) -> tuple[np.ndarray, list[str], dict
     units."""
     links = system.robot.links
     flexible = [i for i, link in enumerate(links) if link.flexible]
-    names = [f"joint/{i + 1}/position" for i in range(len(links))] + [
-        f"link/{i + 1}/tip_deflection" for i in flexible
-    ]
+    motors, rows = list(system.windup_rows), system.joint_rows
+    names = [f"joint/{i + 1}/position" for i in range(len(links))]
+    names += [f"joint/{i + 1}/motor_position" for i in motors]
+    names += [f"link/{i + 1}/tip_deflection" for i in flexible]
     units = {
-        name: "rad" if "joint" in name and links[i].joint.type == "R" else "m"
-        for i, name in enumerate(names)
+        name: "rad" if name.startswith("joint") and links[_number(name)].joint.type == "R" else "m"
+        for name in names
     }
 
     def outputs_at(z: np.ndarray) -> np.ndarray:
-        return np.concatenate([z[system.joint_rows], *system.places(z)])
+        return np.concatenate([system.hub_positions(z), z[rows[motors]], *system.places(z)])
 
     slopes = jacobian(outputs_at, q, np.full(system.n, 1e-5) / np.maximum(_steep(system), 1e-300))
     return slopes, [*names, "tip/x", "tip/y"], units | {"tip/x": "m", "tip/y": "m"}

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..link.line import Piece, mesh, pieces
+from ..link.line import Piece, is_one_piece, mesh, pieces
 from ..link.mesh import joined
 from ..link.section import Material, material
 from ..link.shapes import WholeShapes
@@ -44,15 +44,27 @@ class Structure:
     @cached_property
     def rows(self) -> list[int]:
         """The unknown of each joint."""
-        sizes = [1 + sum(p.count for p in link) for link in self.links]
+        sizes = [
+            1 + elastic_joint(link) + sum(p.count for p in made)
+            for link, made in zip(self.robot.links, self.links, strict=True)
+        ]
         return [sum(sizes[:i]) for i in range(len(sizes))]
+
+    @cached_property
+    def windups(self) -> dict[int, int]:
+        """The unknown of each transmission, by the number of its link (from 0) (107)."""
+        links = zip(self.robot.links, self.rows, strict=True)
+        return {i: row + 1 for i, (link, row) in enumerate(links) if elastic_joint(link)}
 
     @cached_property
     def own(self) -> list[list[slice]]:
         """The unknowns of each piece of each link."""
         ends = [
-            [row + 1 + sum(p.count for p in link[:k]) for k in range(len(link) + 1)]
-            for row, link in zip(self.rows, self.links, strict=True)
+            [
+                row + 1 + (i in self.windups) + sum(p.count for p in link[:k])
+                for k in range(len(link) + 1)
+            ]
+            for i, (row, link) in enumerate(zip(self.rows, self.links, strict=True))
         ]
         return [[slice(a, b) for a, b in pairwise(e)] for e in ends]
 
@@ -61,7 +73,7 @@ class Structure:
         """The names of the unknowns."""
         out: list[str] = []
         for i, link in enumerate(self.links, 1):
-            out.append(f"joint/{i}")
+            out += [f"joint/{i}", f"link/{i}/windup"] if i - 1 in self.windups else [f"joint/{i}"]
             if link and isinstance(link[0].shapes, WholeShapes):
                 kind = "mode" if link[0].K.size else "shape"
                 out += [f"link/{i}/{kind}/{j}" for j in range(1, link[0].count + 1)]
@@ -123,7 +135,10 @@ class Structure:
         joint, row = self.robot.links[i].joint, self.rows[i]
         tip = before.tip if before else base(self.n)
         if joint.type == "R":
-            return rotate(tip, q[row], row)
+            hub = rotate(tip, q[row], row)
+            if i in self.windups:  # (107)
+                hub = rotate(hub, q[self.windups[i]], self.windups[i])
+            return translate(hub, joint.hub_radius_m, [], qd) if joint.hub_radius_m else hub  # (110)
         if joint.type == "Pb":
             return rotate(tip, joint.angle_rad)
         if before is None:
@@ -138,9 +153,10 @@ class Structure:
         x, rows = self._along(state.number, s, state.q)
         if not state.lines or x < 0:
             return translate(state.hub, x, rows, state.qd)
-        h = state.lines[0].free
-        k = min(int(x / h), len(state.lines) - 1)
-        return station(state.lines[k], x / h - k)
+        k, last = 0, len(state.lines) - 1
+        while k < last and x >= state.lines[k].free:
+            x, k = x - state.lines[k].free, k + 1
+        return station(state.lines[k], x / state.lines[k].free)
 
     def places(self, state: LinkState, s: np.ndarray) -> np.ndarray:
         """Places of a flexible link at arc lengths s (S,) [m] from its proximal end (4)."""
@@ -165,7 +181,8 @@ class Structure:
         """A link's masses: its material, its hub, and the payload of the last one (21), (22)."""
         joint, parts = self.robot.links[state.number].joint, self.own_masses(state)
         if joint.hub_mass_kg:
-            parts.append(point_mass(joint.hub_mass_kg, state.hub))
+            axis = translate(state.hub, -joint.hub_radius_m, [], state.qd)
+            parts.append(point_mass(joint.hub_mass_kg, axis if joint.hub_radius_m else state.hub))
         if joint.hub_inertia_kg_m2:
             parts.append(turning(joint.hub_inertia_kg_m2, state.hub))
         return parts
@@ -176,15 +193,21 @@ class Structure:
         parts: list[Part] = []
         if material is None:
             mass, centre, inertia = rigid_body(self.robot, i)
-            frame = translate(state.hub, *self._along(i, centre, state.q), state.qd)
+            x, rows = self._along(i, centre.real, state.q)
+            frame = translate(state.hub, complex(x, centre.imag), rows, state.qd)
             parts += [point_mass(mass, frame), turning(inertia, frame)]
         elif self.sleeved(i):
             parts += sleeve.masses(state.lines[0], material)
         else:
             parts += [line_masses(x) for x in state.lines]
+        for each in self.robot.links[i].mass:  # (108)
+            frame = self.at(state, each.at_m)
+            parts += [point_mass(each.mass_kg, frame), turning(each.inertia_kg_m2, frame)]
         if i == len(self.links) - 1:
-            load = self.robot.payload
-            parts += [point_mass(load.mass_kg, state.tip), turning(load.inertia_kg_m2, state.tip)]
+            load, frame = self.robot.payload, state.tip
+            if any(load.centre_of_mass_m):  # (109)
+                frame = translate(frame, complex(*load.centre_of_mass_m), [], state.qd)
+            parts += [point_mass(load.mass_kg, frame), turning(load.inertia_kg_m2, frame)]
         return parts
 
 
@@ -201,23 +224,29 @@ def structure(robot: Robot, linear: bool | None = None) -> Structure:
 def _pieces(robot: Robot, link: Link, after: Link | None, linear: bool) -> tuple[Piece, ...]:
     """The pieces of a link: with nodal sliding a mesh; what the core does not have is one piece."""
     slides = link.joint.type == "Pb" or (after is not None and after.joint.type == "Pa")
-    if robot.nodal and slides:
-        made = mesh(material(link), link.elements)
-    elif after is not None:
-        made = pieces(link, after)
+    equal = slides if robot.nodal else not is_one_piece(link, after)
+    if (linear or robot.nodal) and equal:
+        made = mesh(material(link), np.linspace(0, link.length_m, link.elements + 1))
     else:
-        made = pieces(link, None, robot.payload.mass_kg, robot.payload.inertia_kg_m2)
+        made = pieces(link, after, robot.payload if after is None else None)
     return (joined(made),) if linear or robot.nodal else made
 
 
-def rigid_body(robot: Robot, i: int) -> tuple[float, float, float]:
-    """Mass [kg], centre [m] from the proximal end, inertia [kg m^2] about it: rigid link i (15)."""
+def elastic_joint(link: Link) -> bool:
+    """Whether a transmission is between the rotor and the hub of a link."""
+    return link.joint.transmission is not None
+
+
+def rigid_body(robot: Robot, i: int) -> tuple[float, complex, float]:
+    """Mass [kg], centre along + i across [m] from the proximal end, inertia [kg m^2] about it:
+    rigid link i (15), (109)."""
     link = robot.links[i]
     if link.mass_kg is not None:
-        centre = link.length_m / 2 if link.centre_of_mass_m is None else link.centre_of_mass_m
+        given = link.length_m / 2 if link.centre_of_mass_m is None else link.centre_of_mass_m
+        centre = complex(*given) if isinstance(given, tuple) else complex(given)
         return link.mass_kg, centre, link.inertia_kg_m2 or 0.0
     s, ds = material(link).quadrature(0.0, link.length_m, 3)
     dm = link.mass_per_length(s) * ds
     mass = float(dm.sum())
     centre = float(dm @ s) / mass
-    return mass, centre, float(dm @ (s - centre) ** 2)
+    return mass, complex(centre), float(dm @ (s - centre) ** 2)

@@ -19,7 +19,13 @@ from .constants import equations
 from .nodes import Nodes, nodes_at
 from .structure import Structure, structure
 
-_UNITS = {"rotation": "rad", "bubble": "rad", "shape": "rad", "mode": "kg^(1/2) m"}
+_UNITS = {
+    "rotation": "rad",
+    "bubble": "rad",
+    "shape": "rad",
+    "mode": "kg^(1/2) m",
+    "windup": "rad",
+}
 
 
 @dataclass(frozen=True)
@@ -130,8 +136,13 @@ class System:
     def _resting(self) -> np.ndarray:
         return np.zeros(0, dtype=int) if self.nodes is None else self.assembly.structure.resting  # type: ignore[attr-defined]
 
+    @cached_property
+    def windup_rows(self) -> dict[int, int]:
+        """Rows of the windups of transmissions, by the number of the link (from 0) (107)."""
+        return self._structure.windups
+
     def link_rows(self, link: int) -> np.ndarray:
-        """Rows of the elastic unknowns of a link.
+        """Rows of the elastic unknowns of a link, without the windup of its joint.
 
         Args:
             link: number of the link, from 0.
@@ -140,7 +151,15 @@ class System:
             Indices into q (k,).
         """
         ends = np.append(self.joint_rows, self.n)
-        return np.arange(ends[link] + 1, ends[link + 1])
+        return np.arange(ends[link] + 1 + (link in self.windup_rows), ends[link + 1])
+
+    def hub_positions(self, z: np.ndarray) -> np.ndarray:
+        """Positions (or rates) of the joints' hubs (..., links) from q (or qd) (..., n): behind a
+        transmission the rotor's and the windup (107)."""
+        out = np.array(z[..., self.joint_rows])
+        for link, row in self.windup_rows.items():
+            out[..., link] += z[..., row]
+        return out
 
     @cached_property
     def limits(self) -> np.ndarray:

@@ -13,7 +13,7 @@ from .joints import connect
 from .joints.mesh import Mesh
 from .links.ancf import CableLink
 from .links.geometrically_exact import GeometricallyExactLink
-from .links.part import Frame, Ground, Part, PointMass
+from .links.part import Frame, Ground, Lump, Part, PointMass
 from .links.properties import NEGLIGIBLE, beam_values, link_inertia, total_mass
 from .links.rigid import RigidLink
 
@@ -28,8 +28,9 @@ class TwinModel:
 
     `mbs`: Exudyn's system. `parts`, `coordinates`: one entry a link and a joint. `index[i]`:
     indices of part i's coordinates in the system. `slides[i]`: index of the position of a joint
-    that slides on a flexible link, else None. `reference`: the system's coordinates before any
-    displacement. `container` owns `mbs` and must live as long.
+    that slides on a flexible link, `rotors[i]`: of the rotor behind a transmission, else None.
+    `reference`: the system's coordinates before any displacement. `container` owns `mbs` and must
+    live as long.
 
     Exudyn's own sum of reference and displacement, GetODE2CoordinatesTotal, corrupts memory from
     about 100 coordinates on (1.13.6).
@@ -41,6 +42,7 @@ class TwinModel:
     coordinates: list[connect.Coordinate]
     index: list[np.ndarray]
     slides: list[int | None]
+    rotors: list[int | None]
     mesh: Mesh
     reference: np.ndarray
     container: Any
@@ -114,8 +116,14 @@ def build(
         for part in parts
     ]
     slides = [None if node is None else int(mbs.GetNodeODE2Index(node)) for node in nodes]
+    rotors = [
+        None if joint.rotor is None else int(mbs.GetNodeODE2Index(joint.rotor))
+        for joint in coordinates
+    ]
     reference = np.array(mbs.systemData.GetODE2Coordinates(exu.ConfigurationType.Reference))
-    return TwinModel(robot, mbs, parts, coordinates, index, slides, mesh, reference, container)
+    return TwinModel(
+        robot, mbs, parts, coordinates, index, slides, rotors, mesh, reference, container
+    )
 
 
 def _add_link(
@@ -133,22 +141,29 @@ def _add_link(
     singular.
     """
     link, last = robot.links[i], i == len(robot.links) - 1
+    load = robot.payload
     ending = (
-        PointMass(robot.payload.mass_kg, robot.payload.inertia_kg_m2)
+        PointMass(load.mass_kg, load.inertia_kg_m2, *load.centre_of_mass_m)
         if last
         else _hub_on(robot.links[i + 1], "Pb")
     )
     hub = _hub_on(link, "R", "Pa")
+    lumps = [Lump(each.at_m, PointMass(each.mass_kg, each.inertia_kg_m2)) for each in link.mass]
     if link.flexible:
         stubs = [mesh.stubs[i]] if any(mesh.stubs[i]) else []
         return beam(
-            mbs, beam_values(link, mesh.elements[i]), hub, ending, frame, robot.gravity_m_s2, *stubs
+            mbs,
+            beam_values(link, mesh.elements[i]),
+            hub,
+            ending,
+            frame,
+            robot.gravity_m_s2,
+            *stubs,
+            lumps=lumps,
         )
-    inertia = (
-        link_inertia(link)
-        .plus(hub.mass, 0.0, hub.inertia)
-        .plus(ending.mass, link.length_m, ending.inertia)
-    )
+    inertia = link_inertia(link)
+    for at, body in (Lump(0.0, hub), Lump(link.length_m, ending), *lumps):
+        inertia = inertia.plus(body.mass, complex(at + body.along, body.across), body.inertia)
     inertia = inertia._replace(
         mass=max(inertia.mass, negligible[0]), inertia=max(inertia.inertia, negligible[1])
     )
@@ -162,7 +177,7 @@ def _hub_on(link: Link, *types: str) -> PointMass:
     """
     joint = link.joint
     return (
-        PointMass(joint.hub_mass_kg, joint.hub_inertia_kg_m2)
+        PointMass(joint.hub_mass_kg, joint.hub_inertia_kg_m2, -joint.hub_radius_m)
         if joint.type in types
         else PointMass()
     )

@@ -35,6 +35,7 @@ def channels(
     gravity = np.array(model.robot.gravity_m_s2)
     kinetic, strain, potential = np.zeros(len(t)), np.zeros(len(t)), np.zeros(len(t))
     position, speed = np.zeros((len(t), len(model.parts))), np.zeros((len(t), len(model.parts)))
+    motor = np.zeros_like(position), np.zeros_like(position)
     origin = tip = Ground.motion(len(t))
     deflection = np.zeros(len(t))
     for i, (link, part, index) in enumerate(
@@ -77,13 +78,20 @@ def channels(
                 place = part.point(own, k * link.length_m / (STATIONS - 1))
                 out[f"link/{i + 1}/deflection/{k}"] = _transverse(hub, place), "m"
         kinetic += part.kinetic(own, rate)
+        motor[0][:, i], motor[1][:, i] = position[:, i], speed[:, i]
+        rotor = model.rotors[i]
+        if rotor is not None:
+            motor[0][:, i], motor[1][:, i] = q[:, rotor], v[:, rotor]
+            strain += 0.5 * joint.windup_stiffness * (position[:, i] - q[:, rotor]) ** 2
+        strain += 0.5 * joint.spring_stiffness * (motor[0][:, i] - joint.spring_rest) ** 2
         if not joint.locked:
-            kinetic += 0.5 * joint.rotor_inertia * speed[:, i] ** 2
+            kinetic += 0.5 * joint.rotor_inertia * motor[1][:, i] ** 2
         strain += part.strain(own)
         potential -= part.moment(own) @ gravity
         origin, tip = hub, end
     bent = deflection * bool(model.mesh.elements[-1])
-    out = _joints(model, act, t, position, speed, bent, reaction) | out
+    hubs = position, speed
+    out = _joints(model, act, t, hubs, motor, bent, reaction) | out
     out |= {"tip/x": (tip.r[:, 0], "m"), "tip/y": (tip.r[:, 1], "m")}
     out |= {
         "energy/kinetic": (kinetic, "J"),
@@ -99,22 +107,26 @@ def _joints(
     model: TwinModel,
     act: Actuation,
     t: np.ndarray,
-    position: np.ndarray,
-    speed: np.ndarray,
+    hubs: tuple[np.ndarray, np.ndarray],
+    motors: tuple[np.ndarray, np.ndarray],
     deflection: np.ndarray,
     reaction: np.ndarray,
 ) -> dict[str, tuple[np.ndarray, str]]:
-    """Position, velocity and drive of the joints, with units."""
+    """Position, velocity and drive of the joints, with units; hubs, motors: positions and
+    velocities (T, n)."""
     drive = np.array(
-        [act.call(*sample) for sample in zip(t, position, speed, deflection, strict=True)]
-    ).reshape(position.shape)
+        [act.call(*sample) for sample in zip(t, *motors, deflection, strict=True)]
+    ).reshape(motors[0].shape)
     drive = drive + reaction
     out = {}
     for i, link in enumerate(model.robot.links):
         length, force = ("rad", "N m") if link.joint.type == "R" else ("m", "N")
-        out[f"joint/{i + 1}/position"] = position[:, i], length
-        out[f"joint/{i + 1}/velocity"] = speed[:, i], f"{length}/s"
+        out[f"joint/{i + 1}/position"] = hubs[0][:, i], length
+        out[f"joint/{i + 1}/velocity"] = hubs[1][:, i], f"{length}/s"
         out[f"joint/{i + 1}/drive"] = drive[:, i], force
+        if link.joint.transmission is not None:
+            out[f"joint/{i + 1}/motor_position"] = motors[0][:, i], length
+            out[f"joint/{i + 1}/motor_velocity"] = motors[1][:, i], f"{length}/s"
     return out
 
 

@@ -79,6 +79,43 @@ def random_robot(rng: np.random.Generator) -> fx.Robot:
     )
 
 
+def furnished(bot: fx.Robot, rng: np.random.Generator) -> fx.Robot:
+    """The same chain with springs, transmissions, hub radii, lumped masses and centres off the
+    line, each on every second joint or link."""
+    tables, rarely = bot.to_dict(), lambda: rng.random() < 0.5
+    for table, after in zip(tables["link"], [*tables["link"][1:], tables["link"][0]], strict=True):
+        joint, L, turns = table["joint"], table["length_m"], table["joint"]["type"] == "R"
+        mass = float(10 ** rng.uniform(-2, 1))
+        if rarely():
+            keys = ("stiffness_N_m_rad", "rest_rad") if turns else ("stiffness_N_m", "rest_m")
+            joint["spring"] = dict(zip(keys, (mass * 100, float(rng.uniform(-1, 1))), strict=True))
+        if turns and rarely():
+            joint["hub_radius_m"] = float(rng.uniform(0, 1)) * L
+        if turns and rarely():
+            joint["rotor_inertia_kg_m2"] = mass * L**2 * float(10 ** rng.uniform(-3, 1))
+            joint["transmission"] = {
+                "stiffness_N_m_rad": float(10 ** rng.uniform(0, 6)),
+                "damping_N_m_s_rad": float(rng.choice([0.0, 0.1])),
+            }
+        if rarely() and not ("elements" in table and joint["type"] == "Pb"):
+            table["mass"] = [
+                {
+                    "at_m": float(rng.choice([0.0, rng.uniform(0, 1), 1.0])) * L,
+                    "mass_kg": mass,
+                    "inertia_kg_m2": mass * L**2 * float(rng.choice([0.0, 0.01])),
+                }
+                for _ in range(rng.integers(1, 4))
+            ]
+            if "modes" in table or after["joint"]["type"] == "Pa":  # needs a mesh
+                for lump in table["mass"]:
+                    lump["inertia_kg_m2"] *= lump["at_m"] in (0.0, L)
+        if "elements" not in table and rarely():
+            table["centre_of_mass_m"] = (L * rng.uniform(-1, 1, 2)).tolist()
+    if bot.payload.mass_kg and rarely():
+        tables["payload"]["centre_of_mass_m"] = (L * rng.uniform(-1, 1, 2)).tolist()
+    return fx.Robot.from_dict(tables)
+
+
 def random_state(
     sys: fx.System, rng: np.random.Generator, slope: float = 2.0
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -89,6 +126,8 @@ def random_state(
             qd[row] *= 0.3 * link.length_m
         own = sys.link_rows(i)
         for z, size in ((q, slope), (qd, 3.0)):
+            if i in sys.windup_rows:
+                z[sys.windup_rows[i]] = 0.3 * rng.normal()
             if len(own):
                 z[own] = bending(sys, i, size * rng.uniform(-1, 1, 3) / [1, 3, 9]) * (
                     1 + 0.1 * rng.normal(size=len(own))
@@ -101,6 +140,8 @@ def judge(seed: int) -> list[str]:
     rng, wrong = np.random.default_rng(seed), []
     for k in range(PER_SEED):
         bot = random_robot(rng)
+        if k % 2:
+            bot = furnished(bot, np.random.default_rng([seed, k]))
         found = faults(fx.assemble(bot), rng)
         wrong += [f"seed {seed}, chain {k} ({bot.structure}): {text}" for text in found]
     return wrong

@@ -6,7 +6,7 @@ from scipy.optimize import brentq
 from scipy.special import iv, jv
 
 from flexura.link.line import pieces
-from flexura.link.modes import clamped_matrices, clamped_modes
+from flexura.link.modes import ClampedBody, clamped_matrices, clamped_modes
 from flexura.link.section import Material
 from flexura.robot import Link
 from robots import beam
@@ -25,8 +25,8 @@ def roots(function, start, end, count):
     return np.array([brentq(function, x[k], x[k + 1], xtol=1e-14) for k in signs])
 
 
-def modes(law, count=20, kept=4, free=1.0, **payload):
-    matrices = clamped_matrices(law, free, count, count + 1, **payload)
+def modes(law, count=20, kept=4, free=1.0, mass=0.0):
+    matrices = clamped_matrices(law, free, count, count + 1, [ClampedBody(1.0, mass, 0.0)])
     return matrices, *clamped_modes(*matrices, kept, False)
 
 
@@ -55,7 +55,7 @@ def test_the_free_length_of_a_sleeve_is_a_cantilever_of_this_length():
 
 @pytest.mark.parametrize("statics", [False, True])
 def test_modes_are_mass_normalised_and_move_the_tip_to_the_left(statics):
-    M, K, tip = clamped_matrices(WEDGE, 1.0, 12, 13, 0.2, 0.1)
+    M, K, tip = clamped_matrices(WEDGE, 1.0, 12, 13, [ClampedBody(1.0, 0.2, 0.1)])
     V, lam = clamped_modes(M, K, tip, 3, statics)
     assert V.shape == (12, 5 if statics else 3)
     assert V.T @ M @ V == pytest.approx(np.eye(len(lam)), abs=1e-9)

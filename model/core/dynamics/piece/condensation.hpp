@@ -129,6 +129,9 @@ inline void elastic_rows(const Piece<Real> &c, const PieceState<Real> &k, bool l
   times(rows.x, Real(-1.0), y, columns), rows.y = x;
   rows.xx = c.mass, rows.xy = 0.0, rows.yy = c.mass;
   rows.row[0].set(0, rows.row[0][0] + c.hub);
+  if (c.turning)
+    for (int a = 0; a <= m; ++a)
+      for (int b = a; b <= m; ++b) rows.row[a].set(b, rows.row[a][b] + c.spin[a * (m + 1) + b]);
   if (!last) return;
   rows.row[0].set(0, rows.row[0][0] + c.tip);  // the payload turns with the tip
   for (int i = 0; i < m; ++i) {

@@ -40,6 +40,7 @@ template <class Real, bool many = many_sizes<Real>, class F>
 inline void sized(int m, int P, F f) {
   switch (100 * m + P) {
     case 1: return f(Fixed<0>(), Fixed<1>());    // a rigid link
+    case 101: return f(Fixed<1>(), Fixed<1>());  // a hub behind its transmission
     case 203: return f(Fixed<2>(), Fixed<3>());  // an element of a mesh
     default: break;
   }

@@ -30,18 +30,47 @@ inline void add_sleeve_damping(const Piece<Real> &c, const Real &alpha, const Re
   for (int k = 0; last && k < m; ++k) rows[k] += alpha * c.tip * c.tip_angle[k] * tip;
 }
 
+// Force across and moment at the tip that accelerations of it, across and turning, take for a
+// payload whose centre is off the tip of a straight link (109).
+template <class Real>
+inline void pull_tool(const Piece<Real> &tool, const Real &deflection, const Real &slope, Real &up,
+                      Real &moment) {
+  Real sine, cosine;
+  sincos(tool.angle, sine, cosine);
+  const Real along = tool.moment[0] * cosine;
+  up = tool.mass * deflection + along * slope;
+  moment = along * deflection + tool.R[0] * tool.R[0] * slope;
+}
+
+// The same as add_sleeve_damping, of such a payload.
+template <class Real>
+inline void add_tool_damping(const Piece<Real> &c, const Piece<Real> &tool, const Real &alpha,
+                             const Real &d, const Real *rate, Real *rows) {
+  Real lever[Free::most], deflection = 0.0, slope = 0.0, up, moment;
+  for (int k = 0; k < c.m; ++k) {
+    lever[k] = 0.0;
+    for (int j = 0; j < c.P; ++j) lever[k] += d * c.w[j] * c.B[k * padded(c.P) + j];
+    deflection += lever[k] * rate[k], slope += c.tip_angle[k] * rate[k];
+  }
+  pull_tool(tool, deflection, slope, up, moment);
+  for (int k = 0; k < c.m; ++k) rows[k] += alpha * (lever[k] * up + c.tip_angle[k] * moment);
+}
+
 // out (n) += sum over links of alpha M_clamped v, at (y, v) (n): y matters for the free length of
 // sleeved links only.
 template <class Real>
 void add_mass_damping(const Model<Real> &model, const Real *y, const Real *v, Real *out) {
   for (int link = 0; link < model.links(); ++link) {
-    const int begin = model.begin[std::size_t(link)], end = model.begin[std::size_t(link) + 1];
+    const int begin = model.line[std::size_t(link)], end = model.begin[std::size_t(link) + 1];
     const bool last = link + 1 == model.links();
     const Real alpha = model.alpha[std::size_t(link)];
     if (worst(abs(alpha)) == 0.0) continue;
     const Piece<Real> &only = model.pieces[std::size_t(end) - 1];
     if (only.joint == HubJoint::sleeve) {
       add_sleeve_damping(only, alpha, y[only.first], v + only.own(), last, out + only.own());
+      if (last && model.tool())
+        add_tool_damping(only, *model.tool(), alpha, y[only.first], v + only.own(),
+                         out + only.own());
       continue;
     }
     std::vector<Real> force(std::size_t(end - begin)), turning(force.size());  // on the piece's hub
@@ -68,6 +97,15 @@ void add_mass_damping(const Model<Real> &model, const Real *y, const Real *v, Re
         moment += own;
         for (int k = 0; k < c.m; ++k) row[k] += alpha * c.B[k * padded(c.P) + j] * own;
       }
+      if (c.turning)
+        for (int a = 0; a <= c.m; ++a) {
+          Real own = c.spin[a * (c.m + 1)] * slope;
+          for (int k = 0; k < c.m; ++k) own += c.spin[a * (c.m + 1) + 1 + k] * rate[k];
+          if (a == 0)
+            moment += own;
+          else
+            row[a - 1] += alpha * own;
+        }
       Real tip = slope;
       for (int j = 0; j < c.P; ++j) deflection += c.w[j] * z[std::size_t(j)];
       for (int k = 0; k < c.m; ++k) tip += c.tip_angle[k] * rate[k];
@@ -78,6 +116,7 @@ void add_mass_damping(const Model<Real> &model, const Real *y, const Real *v, Re
       slope = tip;
     }
     Real up = 0.0, moment = 0.0;  // of all beyond, at the piece's tip
+    if (last && model.tool()) pull_tool(*model.tool(), deflection, slope, up, moment);
     for (int i = end; i-- > begin;) {
       const Piece<Real> &c = model.pieces[std::size_t(i)];
       Real reach = 0.0;

@@ -97,12 +97,13 @@ class Equations:
     def energy(self) -> float:
         """The kinetic and strain energy at the last evaluation [J]."""
         terms, q, v = self.seen
-        return 0.5 * float(v @ terms.mass @ v + q @ terms.stiffness @ q)
+        strain = self.system.assembly.strain(q, terms.stiffness)
+        return 0.5 * float(v @ terms.mass @ v) + strain
 
     def strain(self, z: np.ndarray) -> float:
         """The strain energy in the state z [J]."""
         q = z[: self.n]
-        return 0.5 * float(q @ self.system.assembly.stiffness_blocks(q) @ q)
+        return self.system.assembly.strain(q, self.system.assembly.stiffness_blocks(q))
 
     def deflection(self, q: np.ndarray) -> float:
         """The tip deflection of the last flexible link [m], 0 without one."""

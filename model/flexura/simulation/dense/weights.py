@@ -60,9 +60,12 @@ def _levers(system: System) -> tuple[np.ndarray, np.ndarray, float]:
             )
             own += piece.length
         beyond += links[i].length_m
+        if i in system.windup_rows:
+            lever[system.windup_rows[i]], deflect[i, system.windup_rows[i]] = beyond, own
         if links[i].joint.type == "R":
             lever[system.joint_rows[i]] = beyond
     reach = beyond if beyond > 1e-9 else 1.0
     turns = [row for row, link in zip(system.joint_rows, links) if link.joint.type == "R"]
+    turns += system.windup_rows.values()
     lever[turns] = np.maximum(lever[turns], LEAST * reach)
     return lever, deflect, reach

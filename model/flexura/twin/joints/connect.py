@@ -4,7 +4,8 @@ The coordinate is a marker of Exudyn whose value is the joint's position [m or r
 Jacobian is the direction of virtual work. A force on it acts on the hub and back on the previous
 link, at the point and along the line where they touch. Drive, friction, lock and rotor attach to
 it. The rotor is a mass of its own with one coordinate tied to the joint's, which gives exactly 1/2
-I (d eta/dt)^2 between two moving links.
+I (d eta/dt)^2 between two moving links. A transmission is a spring-damper between the two
+coordinates; all else then attaches to the rotor's.
 """
 
 from __future__ import annotations
@@ -32,7 +33,8 @@ class Coordinate:
 
     `marker` measures it, `load` acts on it, `servo` is its PD controller or None, `guide` the
     constraint that puts it on a prescribed motion or None. `references` keeps objects that Exudyn
-    only refers to.
+    only refers to. `rotor`: the node of a rotor behind a transmission, whose coordinate this then
+    is, or None.
     """
 
     marker: Any
@@ -40,6 +42,7 @@ class Coordinate:
     servo: Any = None
     references: Any = None
     guide: Any = None
+    rotor: Any = None
 
 
 def start_frame(link: Link, previous: Frame, length: float, speed: float) -> Frame:
@@ -53,7 +56,8 @@ def start_frame(link: Link, previous: Frame, length: float, speed: float) -> Fra
     """
     joint = link.joint
     if joint.type == "R":
-        return previous.along(length, turn=joint.start, spin=speed)
+        axis = previous.along(length, turn=joint.start, spin=speed)
+        return axis.along(joint.hub_radius_m) if joint.hub_radius_m else axis
     if joint.type == "Pa":
         return previous.along(joint.start, slide=speed, turn=joint.angle_rad)
     return previous.along(length, turn=joint.angle_rad).along(
@@ -93,7 +97,13 @@ def connect(
     """
     joint, mbs = link.joint, on.mbs
     if joint.type == "R":
-        return _revolute(mbs, joint, previous.tip, part.origin), None
+        hub = part.origin
+        if joint.hub_radius_m:
+            body = sliding.rigid_carrier(mbs, hub, on.origin, on.negligible).body
+            place = [-joint.hub_radius_m, 0.0, 0.0]
+            marker = mbs.AddMarker(eii.MarkerBodyRigid(bodyNumber=body, localPosition=place))
+            hub = Attachment(body, place, marker)
+        return _revolute(mbs, joint, previous.tip, hub), None
     if joint.type == "Pa":
         if places is None:
             return _prismatic(
@@ -179,14 +189,25 @@ def add_drive_and_friction(
         held: a joint that is not locked stays at its start all the same, with the same unknowns.
     """
 
+    behind = None
+    if joint.transmission is not None:
+        behind, marker = _rotor(mbs, joint, marker, speed)
     load = mbs.AddLoad(eii.LoadCoordinate(markerNumber=marker, load=0.0))
     guide = None
     if joint.locked or guided or held:
         guide = mbs.AddObject(
             eii.ObjectConnectorCoordinate(markerNumbers=[fixed, marker], offset=joint.start)
         )
+    if joint.spring_stiffness:
+        mbs.AddObject(
+            eii.ObjectConnectorCoordinateSpringDamper(
+                markerNumbers=[fixed, marker],
+                stiffness=joint.spring_stiffness,
+                offset=joint.spring_rest,
+            )
+        )
     if joint.locked:
-        return Coordinate(marker, load)
+        return Coordinate(marker, load, rotor=behind)
     servo = references = None
     if any(gains):
         # Its offsets follow the motion. A load kp r against a spring without offset is equivalent,
@@ -209,21 +230,35 @@ def add_drive_and_friction(
         if joint.coulomb_friction:
             references = _friction(mbs, spring, joint.coulomb_friction)
             mbs.SetObjectParameter(spring, "springForceUserFunction", references)
-    if joint.rotor_inertia:
-        rotor = mbs.AddNode(
-            eii.NodeGenericODE2(
-                numberOfODE2Coordinates=1,
-                referenceCoordinates=[0.0],
-                initialCoordinates=[joint.start],
-                initialCoordinates_t=[speed],
+    if joint.rotor_inertia and joint.transmission is None:
+        _rotor(mbs, joint, marker, speed)
+    return Coordinate(marker, load, servo, references, guide if guided else None, behind)
+
+
+def _rotor(mbs: Any, joint: Joint, marker: Any, speed: float) -> tuple[Any, Any]:
+    """The rotor's node and the marker of its coordinate, tied to the joint's or connected to it by
+    the transmission."""
+    rotor = mbs.AddNode(
+        eii.NodeGenericODE2(
+            numberOfODE2Coordinates=1,
+            referenceCoordinates=[0.0],
+            initialCoordinates=[joint.start],
+            initialCoordinates_t=[speed],
+        )
+    )
+    mbs.AddObject(eii.ObjectGenericODE2(nodeNumbers=[rotor], massMatrix=[[joint.rotor_inertia]]))
+    own = mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=rotor, coordinate=0))
+    if joint.transmission is None:
+        mbs.AddObject(eii.ObjectConnectorCoordinate(markerNumbers=[own, marker]))
+    else:
+        mbs.AddObject(
+            eii.ObjectConnectorCoordinateSpringDamper(
+                markerNumbers=[own, marker],
+                stiffness=joint.transmission.stiffness_N_m_rad,
+                damping=joint.transmission.damping_N_m_s_rad,
             )
         )
-        mbs.AddObject(
-            eii.ObjectGenericODE2(nodeNumbers=[rotor], massMatrix=[[joint.rotor_inertia]])
-        )
-        own = mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=rotor, coordinate=0))
-        mbs.AddObject(eii.ObjectConnectorCoordinate(markerNumbers=[own, marker]))
-    return Coordinate(marker, load, servo, references, guide if guided else None)
+    return rotor, own
 
 
 def _friction(mbs: Any, spring: Any, coulomb: float) -> Any:

@@ -2,19 +2,21 @@
 
 Coordinates of a node: position x, y and slope vector r' = (x', y'), with Hermite cubics between.
 Hub and payload are ObjectGenericODE2 on the end nodes with diag(m, m, J, J): exact for rotation if
-|r'| = 1, and no joint is needed.
+|r'| = 1, and no joint is needed. A centre off the node is r + offset r', and a lump between nodes
+sits at the cubics' r and r': linear in the coordinates too, so that its mass matrix is constant.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from ...optional import Optional
-from .part import Attachment, Frame, Motion, PointMass, add_gravity
+from .part import Attachment, Frame, Lump, Motion, PointMass, add_gravity
 from .properties import BeamValues
 
 eii = Optional("exudyn.itemInterface")
@@ -43,6 +45,7 @@ class CableLink:
         frame: Frame,
         gravity: tuple[float, float],
         stubs: tuple[float, float] = (0.0, 0.0),
+        lumps: Sequence[Lump] = (),
     ) -> None:
         """Add the link to Exudyn's system.
 
@@ -58,8 +61,9 @@ class CableLink:
             gravity: [m/s^2].
             stubs: lengths [m] by which the beam continues, straight and almost without mass, before
                 its origin and after its tip.
+            lumps: bodies on the line.
         """
-        self.values, self.hub, self.payload = values, hub, payload
+        self.values, self.hub, self.payload, self.lumps = values, hub, payload, lumps
         count, length = len(values), values.length
         ends = np.concatenate(
             [
@@ -82,6 +86,10 @@ class CableLink:
             add_gravity(mbs, element, gravity)
         for node, lump in ((self.nodes[0], hub), (self.nodes[-1], payload)):
             _add_lump(mbs, node, lump, gravity)
+        for at, body in lumps:
+            k, value, first_ = self._place(at)
+            shapes = np.kron(value, np.eye(2)), np.kron(first_, np.eye(2))
+            _add_body(mbs, self.nodes[k : k + 2], body, *shapes, gravity)
         self.origin = _end(mbs, own[0], 0.0, self.nodes[0])
         self.tip = _end(mbs, own[-1], length, self.nodes[-1])
 
@@ -115,6 +123,21 @@ class CableLink:
             for element in elements
         ]
 
+    def _place(self, x: float) -> tuple[int, np.ndarray, np.ndarray]:
+        """The element that x [m] is on, and its cubics there and their slopes (4,)."""
+        length = self.values.length
+        k = min(int(x / length), len(self.values) - 1)
+        return k, *_shapes(x / length - k, length)[:2]
+
+    def _motion(self, q: np.ndarray, v: np.ndarray, x: float) -> Motion:
+        k, value, first = self._place(x)
+        ends, rates = _elements(q)[:, k], _elements(v)[:, k]
+        both = (
+            np.concatenate([np.einsum("k,tkd->td", s, z) for s in (value, first)], axis=-1)
+            for z in (ends, rates)
+        )
+        return _node_motion(*both)
+
     def motion_at_origin(self, q: np.ndarray, v: np.ndarray) -> Motion:
         """See `Part`."""
         return _node_motion(q[:, :4], v[:, :4])
@@ -125,9 +148,8 @@ class CableLink:
 
     def point(self, q: np.ndarray, x: float) -> np.ndarray:
         """See `Part`."""
-        length = self.values.length
-        k = min(int(x / length), len(self.values) - 1)
-        return np.einsum("k,tkd->td", _shapes(x / length - k, length)[0], _elements(q)[:, k])
+        k, value, _ = self._place(x)
+        return np.einsum("k,tkd->td", value, _elements(q)[:, k])
 
     def kinetic(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """See `Part`."""
@@ -137,6 +159,7 @@ class CableLink:
         lumps = self.hub.kinetic(self.motion_at_origin(q, v)) + self.payload.kinetic(
             self.motion_at_tip(q, v)
         )
+        lumps = lumps + sum(body.kinetic(self._motion(q, v, at)) for at, body in self.lumps)
         return 0.5 * products @ self.values.mass + lumps
 
     def strain(self, q: np.ndarray) -> np.ndarray:
@@ -164,7 +187,9 @@ class CableLink:
         length = self.values.length
         mean = np.array([1 / 2, length / 12, 1 / 2, -length / 12])  # means of the Hermite cubics
         beam = np.einsum("e,k,tekd->td", self.values.mass * length, mean, _elements(q))
-        return beam + self.hub.mass * q[:, :2] + self.payload.mass * q[:, -4:-2]
+        beam += sum(body.moment(self._motion(q, q, at)) for at, body in self.lumps)
+        ends = self.motion_at_origin(q, q), self.motion_at_tip(q, q)
+        return beam + self.hub.moment(ends[0]) + self.payload.moment(ends[1])
 
 
 def _stub(length: float, size: float) -> np.ndarray:
@@ -213,6 +238,9 @@ def _add_lump(mbs: Any, node: Any, lump: PointMass, gravity: tuple[float, float]
 
     if lump.mass == 0 and lump.inertia == 0:
         return
+    if lump.along or lump.across:
+        _add_body(mbs, [node], lump, np.eye(4)[:2], np.eye(4)[2:], gravity)
+        return
     m, j = lump.mass, lump.inertia
     mbs.AddObject(eii.ObjectGenericODE2(nodeNumbers=[node], massMatrix=np.diag([m, m, j, j])))
     if any(gravity):
@@ -222,6 +250,25 @@ def _add_lump(mbs: Any, node: Any, lump: PointMass, gravity: tuple[float, float]
                 markerNumber=marker, loadVector=[m * gravity[0], m * gravity[1], 0.0]
             )
         )
+
+
+def _add_body(
+    mbs: Any,
+    nodes: list[Any],
+    body: PointMass,
+    place: np.ndarray,
+    slope: np.ndarray,
+    gravity: tuple[float, float],
+) -> None:
+    """Add a body to nodes; place, slope (2, coordinates): r and r' where it is fixed, by theirs."""
+    centre = place + body.offset @ slope
+    mbs.AddObject(
+        eii.ObjectGenericODE2(
+            nodeNumbers=nodes,
+            massMatrix=body.mass * centre.T @ centre + body.inertia * slope.T @ slope,
+            forceVector=body.mass * centre.T @ gravity,
+        )
+    )
 
 
 def _end(mbs: Any, element: Any, x: float, node: Any) -> Attachment:

@@ -6,12 +6,13 @@ between. Hub and payload are ObjectRigidBody2D on the end nodes.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from ...optional import Optional
-from .part import Attachment, Frame, Motion, PointMass, add_gravity
+from .part import Attachment, Frame, Lump, Motion, PointMass, add_gravity
 from .properties import BeamValues
 
 eii = Optional("exudyn.itemInterface")
@@ -35,9 +36,10 @@ class GeometricallyExactLink:
         payload: PointMass,
         frame: Frame,
         gravity: tuple[float, float],
+        lumps: Sequence[Lump] = (),
     ) -> None:
 
-        self.values, self.hub, self.payload = values, hub, payload
+        self.values, self.hub, self.payload, self.lumps = values, hub, payload, lumps
         self.nodes = []
         for k in range(2 * len(values) + 1):
             here = frame.along(k * values.length / 2)
@@ -64,6 +66,28 @@ class GeometricallyExactLink:
             add_gravity(mbs, element, gravity)
         self.origin = _end(mbs, self.nodes[0], hub, gravity)
         self.tip = _end(mbs, self.nodes[-1], payload, gravity)
+        for at, body in lumps:
+            k, value = self._place(at)
+            centre = np.kron(value, np.eye(3)[:2])
+            turning = np.kron(value, np.eye(3)[2])
+            mbs.AddObject(
+                eii.ObjectGenericODE2(
+                    nodeNumbers=self.nodes[2 * k : 2 * k + 3],
+                    massMatrix=body.mass * centre.T @ centre
+                    + body.inertia * np.outer(turning, turning),
+                    forceVector=body.mass * centre.T @ gravity,
+                )
+            )
+
+    def _place(self, x: float) -> tuple[int, np.ndarray]:
+        """The element that x [m] is on, and its polynomials there (3,)."""
+        k = min(int(x / self.values.length), len(self.values) - 1)
+        return k, _shapes(2 * (x / self.values.length - k) - 1, self.values.length)[0]
+
+    def _motion(self, q: np.ndarray, v: np.ndarray, x: float) -> Motion:
+        k, value = self._place(x)
+        place, rate = (np.einsum("k,tkd->td", value, _elements(z)[:, k]) for z in (q, v))
+        return Motion(place[:, :2], place[:, 2], rate[:, :2], rate[:, 2])
 
     def motion_at_origin(self, q: np.ndarray, v: np.ndarray) -> Motion:
         """See `Part`."""
@@ -75,8 +99,7 @@ class GeometricallyExactLink:
 
     def point(self, q: np.ndarray, x: float) -> np.ndarray:
         """See `Part`."""
-        k = min(int(x / self.values.length), len(self.values) - 1)
-        value, _ = _shapes(2 * (x / self.values.length - k) - 1, self.values.length)
+        k, value = self._place(x)
         return np.einsum("k,tkd->td", value, _elements(q)[:, k, :, :2])
 
     def kinetic(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -88,6 +111,7 @@ class GeometricallyExactLink:
                 ..., 2
             ] ** 2 @ self.values.rotary
             out += 0.25 * self.values.length * w * density
+        out += sum(body.kinetic(self._motion(q, v, at)) for at, body in self.lumps)
         return (
             out
             + self.hub.kinetic(self.motion_at_origin(q, v))
@@ -118,14 +142,22 @@ class GeometricallyExactLink:
         beam = np.einsum(
             "e,k,tekd->td", self.values.mass * self.values.length, simpson, _elements(q)[..., :2]
         )
-        return beam + self.hub.mass * q[:, :2] + self.payload.mass * q[:, -3:-1]
+        beam += sum(body.moment(self._motion(q, q, at)) for at, body in self.lumps)
+        ends = self.motion_at_origin(q, q), self.motion_at_tip(q, q)
+        return beam + self.hub.moment(ends[0]) + self.payload.moment(ends[1])
 
 
 def _end(mbs: Any, node: Any, lump: PointMass, gravity: tuple[float, float]) -> Attachment:
 
     # also without mass: a joint's coordinate needs a body, and the beam's elements don't offer one
-    body = mbs.AddObject(
-        eii.ObjectRigidBody2D(mass=lump.mass, inertia=lump.inertia, nodeNumber=node)
+    along, across = lump.along, lump.across
+    body = mbs.AddObject(  # Exudyn takes the inertia about the node
+        eii.ObjectRigidBody2D(
+            mass=lump.mass,
+            inertia=lump.inertia + lump.mass * (along**2 + across**2),
+            centerOfMass=[along, across],
+            nodeNumber=node,
+        )
     )
     if lump.mass > 0:
         add_gravity(mbs, body, gravity)

@@ -153,13 +153,29 @@ class Part(Protocol):
 
 @dataclass
 class PointMass:
-    """A mass [kg] and inertia [kg m^2] on a beam's node: hub or payload."""
+    """A body on a beam's node or line: mass [kg], inertia about its centre [kg m^2], and the centre
+    `along` and `across` [m] the line's tangent there."""
 
     mass: float = 0.0
     inertia: float = 0.0
+    along: float = 0.0
+    across: float = 0.0
+
+    @property
+    def offset(self) -> np.ndarray:
+        """(2, 2): what of the tangent (cos, sin) is the way to the centre."""
+        return np.array([[self.along, -self.across], [self.across, self.along]])
+
+    def centre(self, motion: Motion) -> Motion:
+        """The motion of its centre from that of the place where it is fixed."""
+        if not (self.along or self.across):
+            return motion
+        way = _tangent(motion.angle) @ self.offset.T
+        left = np.stack([-way[:, 1], way[:, 0]], axis=-1)
+        return motion._replace(r=motion.r + way, v=motion.v + motion.omega[:, None] * left)
 
     def kinetic(self, motion: Motion) -> np.ndarray:
-        """Kinetic energy of the mass.
+        """Kinetic energy of the body.
 
         Args:
             motion: of its node over time.
@@ -167,7 +183,23 @@ class PointMass:
         Returns:
             (T,) [J].
         """
-        return 0.5 * self.mass * (motion.v**2).sum(axis=-1) + 0.5 * self.inertia * motion.omega**2
+        speed = (self.centre(motion).v ** 2).sum(axis=-1)
+        return 0.5 * self.mass * speed + 0.5 * self.inertia * motion.omega**2
+
+    def moment(self, motion: Motion) -> np.ndarray:
+        """Mass times the centre's place (T, 2) [kg m]."""
+        return self.mass * self.centre(motion).r
+
+
+class Lump(NamedTuple):
+    """A body on the line of a link, at the distance `at` [m] from its origin."""
+
+    at: float
+    body: PointMass
+
+
+def _tangent(angle: np.ndarray) -> np.ndarray:
+    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 
 @dataclass

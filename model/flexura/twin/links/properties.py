@@ -103,18 +103,18 @@ def _means(function: Any, ends: np.ndarray, kinks: np.ndarray) -> np.ndarray:
 
 
 class Inertia(NamedTuple):
-    """Mass [kg], distance of its centre along the link [m], inertia about the centre [kg m^2]."""
+    """Mass [kg], its centre along + i across the link [m], inertia about the centre [kg m^2]."""
 
     mass: float
-    centre: float
+    centre: complex
     inertia: float
 
-    def plus(self, mass: float, at: float, inertia: float) -> Inertia:
+    def plus(self, mass: float, at: complex, inertia: float) -> Inertia:
         """Both together, by the parallel-axis theorem.
 
         Args:
             mass: to be added [kg].
-            at: its distance along the link [m].
+            at: where it is, along + i across the link [m].
             inertia: about its own centre [kg m^2].
         """
         total = self.mass + mass
@@ -124,8 +124,8 @@ class Inertia(NamedTuple):
         about = (
             self.inertia
             + inertia
-            + self.mass * (self.centre - centre) ** 2
-            + mass * (at - centre) ** 2
+            + self.mass * abs(self.centre - centre) ** 2
+            + mass * abs(at - centre) ** 2
         )
         return Inertia(total, centre, about)
 
@@ -144,8 +144,9 @@ def link_inertia(link: Link) -> Inertia:
     return _spread_inertia(link)
 
 
-def _centre(link: Link) -> float:
-    return link.length_m / 2 if link.centre_of_mass_m is None else link.centre_of_mass_m
+def _centre(link: Link) -> complex:
+    given = link.length_m / 2 if link.centre_of_mass_m is None else link.centre_of_mass_m
+    return complex(*given) if isinstance(given, tuple) else complex(given)
 
 
 def _spread_inertia(link: Link) -> Inertia:
@@ -170,7 +171,7 @@ def total_mass(links: list[Link], payload: Payload) -> float:
     """
     total = payload.mass_kg
     for link in links:
-        total += link.joint.hub_mass_kg
+        total += link.joint.hub_mass_kg + sum(each.mass_kg for each in link.mass)
         if link.flexible:
             ends, kinks = np.array([0.0, link.length_m]), np.array(link.breaks())
             total += float(_means(link.mass_per_length, ends, kinks)[0]) * link.length_m

@@ -35,7 +35,10 @@ class RigidLink:
         # Exudyn takes the inertia about the reference point, here the link's origin
         body = mbs.AddObject(
             eii.ObjectRigidBody2D(
-                mass=m, inertia=about + m * c**2, centerOfMass=[c, 0.0], nodeNumber=node
+                mass=m,
+                inertia=about + m * abs(c) ** 2,
+                centerOfMass=[c.real, c.imag],
+                nodeNumber=node,
             )
         )
         add_gravity(mbs, body, gravity)
@@ -57,9 +60,9 @@ class RigidLink:
         """See `Part`."""
         return self._motion(q, v, self.length)
 
-    def point(self, q: np.ndarray, x: float) -> np.ndarray:
-        """See `Part`."""
-        return q[:, :2] + x * np.stack([np.cos(q[:, 2]), np.sin(q[:, 2])], axis=-1)
+    def point(self, q: np.ndarray, x: complex) -> np.ndarray:
+        """See `Part`; across the link by the imaginary part of x."""
+        return q[:, :2] + _turned(q[:, 2], x)
 
     def kinetic(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """See `Part`."""
@@ -77,6 +80,12 @@ class RigidLink:
         """See `Part`."""
         return self.inertia.mass * self.point(q, self.inertia.centre)
 
-    def _motion(self, q: np.ndarray, v: np.ndarray, x: float) -> Motion:
-        normal = np.stack([-np.sin(q[:, 2]), np.cos(q[:, 2])], axis=-1)
-        return Motion(self.point(q, x), q[:, 2], v[:, :2] + x * v[:, 2:3] * normal, v[:, 2])
+    def _motion(self, q: np.ndarray, v: np.ndarray, x: complex) -> Motion:
+        speed = v[:, :2] + v[:, 2:3] * _turned(q[:, 2], 1j * x)
+        return Motion(self.point(q, x), q[:, 2], speed, v[:, 2])
+
+
+def _turned(angle: np.ndarray, x: complex) -> np.ndarray:
+    """The vector x (real, imaginary) turned by angles (T,): (T, 2)."""
+    out = x * np.exp(1j * angle)
+    return np.stack([out.real, out.imag], axis=-1)

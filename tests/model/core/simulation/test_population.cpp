@@ -23,17 +23,17 @@ struct Many {
 
   Many(int count, int modes, int elements = 4) : robots(count) {
     check::Random random;
-    counts = {1, 0, 0, -1, 0, 0, 0, elements, modes, 1};
+    counts = {1, 0, 0, -1, 0, 0, 0, 0, 0, 0, elements, modes, 1, 0, 0, 0};
     for (int k = 0; k < count; ++k) {
       const double length = random(0.2, 0.4);
-      numbers.insert(numbers.end(), {0.1, 0.6, 0.05, 5e-4, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.1,
-                                     0.0, -FREE, FREE});
-      numbers.insert(numbers.end(), {length, 0.0, 0.0, 0.0, 0.0, 1e-4, 0.0, 0.0, 0.0, 1e-3, 0.0,
-                                     0.0, 0.0, -FREE, FREE});
+      numbers.insert(numbers.end(), {0.1, 0.6, 0.05,  5e-4, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+                                     0.1, 0.0, -FREE, FREE, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0});
+      numbers.insert(numbers.end(), {length, 0.0, 0.0,   0.0,  0.0, 1e-4, 0.0, 0.0, 0.0, 1e-3, 0.0,
+                                     0.0,    0.0, -FREE, FREE, 0.0, 0.0,  0.0, 0.0, 0.0, 0.0});
       material.insert(material.end(), {0.0, length, random(0.1, 0.3), 0.0, 0.0, random(0.2, 3.0),
                                        0.0, 0.0, 0.0, 0.0});
       gravity.insert(gravity.end(), {0.0, -9.81}),
-          payload.insert(payload.end(), {random(0.0, 0.05), 0.0});
+          payload.insert(payload.end(), {random(0.0, 0.05), 0.0, 0.0, 0.0});
       limits.insert(limits.end(), {-FREE, FREE, -FREE, FREE});
     }
   }
@@ -52,15 +52,22 @@ struct Many {
     };
     take(out.numbers, numbers, 2 * NUMBERS), take(out.material, material, MATERIAL),
         take(out.gravity, gravity, 2);
-    take(out.payload, payload, 2), take(out.limits, limits, 4);
+    take(out.payload, payload, PAYLOAD), take(out.limits, limits, 4);
     return out;
   }
 
   Population population(const std::string &method, double rtol) const {
     Population out;
-    out.robots = {
-        robots,        2, 1, counts.data(), numbers.data(), material.data(), gravity.data(),
-        payload.data()};
+    out.robots = {robots,
+                  2,
+                  1,
+                  0,
+                  counts.data(),
+                  numbers.data(),
+                  material.data(),
+                  nullptr,
+                  gravity.data(),
+                  payload.data()};
     out.limits = limits.data(), out.method = method, out.rtol = rtol;
     Inputs acting(2);
     acting.joints[0].force = {Segment{0.0, {1.0, 0, 0, 0, 0, 0}, 0, 0, 0},
@@ -179,8 +186,9 @@ TEST(
   Many many = good;
   many.limits[4 * 1] = -1e-4, many.limits[4 * 1 + 1] = 1e-4;  // robot 1 meets a limit
   many.number(2, 0, 1) = many.number(2, 0, 3) = 0.0,
-                    many.material[2 * MATERIAL + 2] = many.payload[4] = 0.0;  // moves nothing
-  many.number(3, 0, 13) = 0.1, many.number(3, 0, 14) = 0.2;                   // starts outside
+                    many.material[2 * MATERIAL + 2] = many.payload[2 * PAYLOAD] =
+                        0.0;                                                 // moves nothing
+  many.number(3, 0, 13) = 0.1, many.number(3, 0, 14) = 0.2;                  // starts outside
   many.material[4 * MATERIAL + 6] = -0.1 * many.material[4 * MATERIAL + 5];  // tapered: more shapes
   const Results whole = results(good.population("implicit", 1e-4), 1),
                 out = results(many.population("implicit", 1e-4), 2);
