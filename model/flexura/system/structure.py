@@ -138,7 +138,9 @@ class Structure:
             hub = rotate(tip, q[row], row)
             if i in self.windups:  # (107)
                 hub = rotate(hub, q[self.windups[i]], self.windups[i])
-            return translate(hub, joint.hub_radius_m, [], qd) if joint.hub_radius_m else hub  # (110)
+            return (
+                translate(hub, joint.hub_radius_m, [], qd) if joint.hub_radius_m else hub
+            )  # (110)
         if joint.type == "Pb":
             return rotate(tip, joint.angle_rad)
         if before is None:

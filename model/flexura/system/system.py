@@ -154,8 +154,15 @@ class System:
         return np.arange(ends[link] + 1 + (link in self.windup_rows), ends[link + 1])
 
     def hub_positions(self, z: np.ndarray) -> np.ndarray:
-        """Positions (or rates) of the joints' hubs (..., links) from q (or qd) (..., n): behind a
-        transmission the rotor's and the windup (107)."""
+        """Positions or rates of the joints' hubs: behind a transmission the rotor's and the windup
+        (107).
+
+        Args:
+            z: configurations q or their rates qd (..., n).
+
+        Returns:
+            (..., links) [rad or m, or per second].
+        """
         out = np.array(z[..., self.joint_rows])
         for link, row in self.windup_rows.items():
             out[..., link] += z[..., row]

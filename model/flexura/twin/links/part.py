@@ -167,7 +167,14 @@ class PointMass:
         return np.array([[self.along, -self.across], [self.across, self.along]])
 
     def centre(self, motion: Motion) -> Motion:
-        """The motion of its centre from that of the place where it is fixed."""
+        """The motion of its centre.
+
+        Args:
+            motion: of the place where it is fixed, over time.
+
+        Returns:
+            The Motion of the centre.
+        """
         if not (self.along or self.across):
             return motion
         way = _tangent(motion.angle) @ self.offset.T
@@ -187,7 +194,14 @@ class PointMass:
         return 0.5 * self.mass * speed + 0.5 * self.inertia * motion.omega**2
 
     def moment(self, motion: Motion) -> np.ndarray:
-        """Mass times the centre's place (T, 2) [kg m]."""
+        """Mass times the centre's place.
+
+        Args:
+            motion: of the place where it is fixed, over time.
+
+        Returns:
+            (T, 2) [kg m].
+        """
         return self.mass * self.centre(motion).r
 
 
