@@ -22,7 +22,7 @@ class Exponential : public Method<Real> {
   static constexpr double SAFETY = 0.85;
   static constexpr double TIGHT = 10.0;  // the local error is kept so far below the tolerance: few
                                          // long steps add up what many short ones average out
-  static constexpr double TINY = 1e-4;   // an error after which a step may grow further
+  static constexpr double TINY = 1e-4;   // an error after which a step grows threefold, not twofold
   static constexpr double SLIDING =
       2.0;  // and further where a joint slides along a link that bends
   using Options = ExponentialOptions;
@@ -83,7 +83,7 @@ class Exponential : public Method<Real> {
   }
 
   Real attempt(const Real &t, const Real &h, const Real &last) override {
-    if (steps.tabulate(h)) within.tabulate(h);
+    if (steps.tabulate(t, h)) within.tabulate(h);
     steps.predict();
     place(steps.predicted[0], steps.predicted[1], state);
     end = smaller(t + h, last);
@@ -166,9 +166,8 @@ class Exponential : public Method<Real> {
     double most = 1.0;  // with a larger error a step does not grow
     for (int i = 0; i < order; ++i) most *= SAFETY / GROWTH;
     if (!(starts || steps.equal_steps[k] >= 2) || lately[k] > most) return wished_step[k];
-    const bool tiny = lately[k] < TINY;
-    const double growth = starts ? (tiny ? 8.0 : 4.0) : (tiny ? 3.0 : 2.0);
-    const double wish = smaller(factor(lately[k]) * h, growth * wished_step[k]);
+    const double wish =
+        smaller(factor(lately[k]) * h, (lately[k] < TINY ? 3.0 : 2.0) * wished_step[k]);
     if (!(wish > GROWTH * wished_step[k])) return wished_step[k];
     lately[k] = 0.0;
     return wish;
@@ -260,12 +259,13 @@ class Exponential : public Method<Real> {
 
   void build(const Real &h) { within.build(h), accounts.prepare(h); }
 
-  // Sums of `which` robots that are work alone, and of the others.
+  // Sums of `which` robots that are work alone, and of the others. A work that is not finite is an
+  // error.
   using Sums = typename EnergyIntegrals<Real>::Sums;
   static Sums choose(const Real &which, const Real &work, const Sums &others) {
     auto take = [&](Real alone, Real other) { return choose_less(Real(0.5), which, alone, other); };
     return {take(work, others.work), take(0.0, others.loss), take(0.0, others.numerical),
-            take(0.0, others.work_error), take(0.0, others.loss_error)};
+            take(0.0 * work, others.work_error), take(0.0, others.loss_error)};
   }
 
   // The accounts of the state at the fraction x of the step, q its place.

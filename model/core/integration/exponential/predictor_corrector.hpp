@@ -30,8 +30,9 @@ class ExponentialAdams {
  public:
   static constexpr int LANES = LanesOf<Real>::value, ROWS = ORDER + 1;
 
-  // Lengths of steps that differ by less than this part of them are one: what is left to a tick.
-  static constexpr double ALIKE = 1e-10;
+  // Lengths of steps that differ by less than this part of the time are one: what is left to a
+  // tick.
+  static constexpr double ALIKE = 1e-15;
 
   const ModalBasis<Real> &b;
   const int n, chunks, stride;
@@ -105,14 +106,14 @@ class ExponentialAdams {
   }
   void forget_tables(int k) { span[k] = -1.0; }
 
-  // The tables of a step of length h; 0: nothing moves. True: of any robot the length or the modes
-  // are new.
-  bool tabulate(const Real &h) {
+  // The tables of a step of length h from the time t; 0: nothing moves. True: of any robot the
+  // length or the modes are new.
+  bool tabulate(const Real &t, const Real &h) {
     Real changed = 0.0;
     bool any = false, fresh = false;
     for (int k = 0; k < LANES; ++k) {
       const double own = lane(h, k);
-      if (!(abs(own - span[k]) <= ALIKE * own))
+      if (!(abs(own - span[k]) <= ALIKE * abs(lane(t, k))) || (own == 0.0) != (span[k] == 0.0))
         tabulate_modes(k, own), span[k] = own, equal_steps[k] = 0, fresh = true;
       else if (equal_steps[k] > ORDER)
         continue;
