@@ -3,11 +3,21 @@
 import numpy as np
 import pandas as pd
 import pytest
-from logs import bag, hdf5_file, json_mcap, klipper, lvm_file, mapped, numbers, tdms_file, text_file
 from scipy.io import savemat
 
 import flexura as fx
 from flexura.io.logs import read_log, read_map, understood
+from foreign_logs import (
+    bag,
+    hdf5_file,
+    json_mcap,
+    klipper,
+    lvm_file,
+    mapped,
+    numbers,
+    tdms_file,
+    text_file,
+)
 
 T, A, W, F = numbers()
 WHOLE = np.rint(T * 1e9) / 1e9  # a clock that nanoseconds hold
@@ -46,7 +56,9 @@ def csv_with_decimal_commas_and_tabs(p):
 
 
 def text_of_numpy(p):
-    np.savetxt(p / "g.txt", np.column_stack(DATA), fmt="%.17g", header="Time Angle Deflection Force")
+    np.savetxt(
+        p / "g.txt", np.column_stack(DATA), fmt="%.17g", header="Time Angle Deflection Force"
+    )
     return p / "g.txt", mapped(*HEADS), T
 
 
@@ -198,7 +210,13 @@ def written(tmp_path, text, name="log.csv", encoding="utf-8"):
 
 @pytest.mark.parametrize(
     ("head", "unit"),
-    [("Time [s]", "s"), ("time_ms", "ms"), ("t (us)", "us"), ("Zeit in s", "s"), ("Time / ms", "ms")],
+    [
+        ("Time [s]", "s"),
+        ("time_ms", "ms"),
+        ("t (us)", "us"),
+        ("Zeit in s", "s"),
+        ("Time / ms", "ms"),
+    ],
 )
 def test_the_first_column_in_a_unit_of_time_is_the_clock(head, unit, tmp_path):
     size = {"s": 1, "ms": 1e3, "us": 1e6}[unit]
@@ -300,7 +318,7 @@ def test_what_is_wrong_is_said_in_one_sentence(text, said, tmp_path):
 def test_milliseconds_under_a_head_of_seconds_are_refused(t, tmp_path):
     start = 1_700_000_000_000 if t == "epoch ms as s" else 0
     rows = "".join(f"{start + 2 * k},{k}\n" for k in range(100))
-    with pytest.raises(fx.InputError, match="row .*milliseconds"):
+    with pytest.raises(fx.InputError, match=r"row .*milliseconds"):
         understood(read_log(written(tmp_path, f"Time [s],joint/1/position [rad]\n{rows}")))
 
 

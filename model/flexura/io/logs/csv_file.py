@@ -81,8 +81,12 @@ def read(raw: bytes, file: str) -> Log:
         form = "accelerometer CSV of Klipper"
         notes.append("accelerations are in mm/s^2, as Klipper writes them")
         columns = [columns[0], *map(_acceleration, columns[1:])]
+    if not text.endswith(("\n", "\r")):
+        notes.append(f"line {every[-1].number} has no end: the last number may be cut off")
     about = own.get("meta")
-    return Log(file, form, columns, meta=about or {}, own=about is not None, lines=places, notes=notes)
+    return Log(
+        file, form, columns, meta=about or {}, own=about is not None, lines=places, notes=notes
+    )
 
 
 def _acceleration(column: Column) -> Column:
@@ -155,9 +159,7 @@ def _from_comments(comments: list[_Line], separator: str, width: int) -> list[li
     return []
 
 
-def _named(
-    heads: list[list[str]], width: int, own: dict[str, str]
-) -> list[tuple[str, str, str]]:
+def _named(heads: list[list[str]], width: int, own: dict[str, str]) -> list[tuple[str, str, str]]:
     """Head, name and unit of each column, from up to three rows of heads; `own`: units by head."""
     rows = [row for row in heads if not _units(row)]
     given = next((row for row in heads if _units(row)), None)

@@ -75,6 +75,8 @@ class Log:
 def damaged(path: object, form: str, error: BaseException) -> InputError:
     """What a reader of another project says of a damaged file, in one sentence."""
     reason = (str(error).strip() or type(error).__name__).splitlines()[0]
+    if isinstance(error, KeyError):
+        reason = f"{reason} is missing"
     return InputError(f"a damaged {form} ({reason[:120]})", file=str(path))
 
 

@@ -49,6 +49,7 @@ def read(raw: bytes, file: str) -> Log:
             raise InputError(
                 "expected a row of names and rows of numbers", key=f"line {start + 1}", file=file
             )
+        _counted(own, len(rows), start + 2, file)
         places += range(start + 2, end + 1)
         parts = _segment(names, rows, layout, comma, own, separator, start + 2, file)
         for name, (t, values, said) in parts.items():
@@ -126,8 +127,21 @@ def _numbers(rows: list[list[str]], k: int, comma: bool, line: int, file: str) -
         if wrong < 0:
             return values
     raise InputError(
-        f"{cells[wrong][:40]!r} is no number", key=f"row {wrong + 1} (line {line + wrong})", file=file
+        f"{cells[wrong][:40]!r} is no number",
+        key=f"row {wrong + 1} (line {line + wrong})",
+        file=file,
     )
+
+
+def _counted(own: dict[str, str], rows: int, line: int, file: str) -> None:
+    """Refuse a segment with fewer rows than its header says."""
+    said = own.get("Samples", "")
+    if said.isdigit() and int(said) > rows:
+        raise InputError(
+            f"{rows} rows, the header says {said} samples: expected the whole segment",
+            key=f"line {line + rows}",
+            file=file,
+        )
 
 
 def _base(

@@ -14,7 +14,18 @@ _STROKE = re.compile(r"(.*[^\s/])\s*/\s*(\S+)")
 _TAILS = tuple(
     (f"_{text.replace('^', '').replace('/', '_').replace(' ', '_')}", text)
     for text in (
-        *("rad/s^2", "deg/s^2", "mm/s^2", "m/s^2", "rad/s", "deg/s", "mm/s", "m/s", "N m", "kg m^2"),
+        *(
+            "rad/s^2",
+            "deg/s^2",
+            "mm/s^2",
+            "m/s^2",
+            "rad/s",
+            "deg/s",
+            "mm/s",
+            "m/s",
+            "N m",
+            "kg m^2",
+        ),
         *("mm", "um", "cm", "m", "deg", "mrad", "rad", "rev", "rpm", "ms", "us", "ns", "s", "sec"),
         *("mV", "V", "mA", "A", "mN", "kN", "N", "Nm", "J", "Hz", "degC", "K", "percent", "counts"),
         *("g", "kg", "Pa", "bar", "W", "1"),

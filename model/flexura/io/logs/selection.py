@@ -163,9 +163,7 @@ def _clock(log: Log, asked: Map | None) -> Column | None:
     return next(iter(timed + bare), None)
 
 
-def _timebase(
-    log: Log, asked: Map | None, clock: Column | None, columns: list[Column]
-) -> Timebase:
+def _timebase(log: Log, asked: Map | None, clock: Column | None, columns: list[Column]) -> Timebase:
     """The times of the run."""
     if asked is not None and asked.rate is not None:
         return from_rate(asked.rate, len(columns[0].values))
@@ -224,9 +222,7 @@ def _unit(log: Log, name: str, column: Column, source: Source) -> Unit:
     return own
 
 
-def _meta(
-    log: Log, chosen: dict[str, tuple[Column, Source]], base: Timebase
-) -> dict[str, Any]:
+def _meta(log: Log, chosen: dict[str, tuple[Column, Source]], base: Timebase) -> dict[str, Any]:
     """Where a run comes from."""
     columns = {
         name: {"column": column.head, "unit": source.unit or column.unit or "1"}
@@ -255,5 +251,5 @@ def _nothing(log: Log) -> str:
 
 
 def _heads(log: Log) -> str:
-    heads = [column.head for column in log.columns]
+    heads = [column.head for column in log.columns] or ["no columns of numbers"]
     return ", ".join(heads[:12]) + (f" and {len(heads) - 12} more" if len(heads) > 12 else "")

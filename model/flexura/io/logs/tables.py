@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+from typing import Any
 
 import numpy as np
 
@@ -39,5 +40,5 @@ def read(raw: bytes, file: str) -> Log:
         raise
     except Exception as error:  # whatever a damaged file makes of it
         raise damaged(file, "Parquet file", error) from None
-    own = isinstance(meta, dict)
-    return Log(file, "Parquet", columns, meta=meta if own else {}, own=own)
+    own: dict[str, Any] | None = meta if isinstance(meta, dict) else None
+    return Log(file, "Parquet", columns, meta=own or {}, own=own is not None)

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import io
 import json
+import logging
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -24,7 +27,10 @@ def read(raw: bytes, file: str) -> Log:
     """
     nptdms = load("nptdms")
     try:
-        found = nptdms.TdmsFile.read(io.BytesIO(raw))
+        with _complaints() as complaints:
+            found = nptdms.TdmsFile.read(io.BytesIO(raw))
+        if complaints:
+            raise ValueError(complaints[0])
         parts = [(group, channel) for group in found.groups() for channel in group.channels()]
         parts = [part for part in parts if part[1].dtype.kind in "iufbM"]
         data = [channel[:] for _, channel in parts]
@@ -52,6 +58,25 @@ def read(raw: bytes, file: str) -> Log:
     return Log(file, "TDMS", columns, clocks, own or {}, own=own is not None)
 
 
+@contextmanager
+def _complaints() -> Iterator[list[str]]:
+    """What npTDMS says meanwhile of a loss after which it reads on; kept off the terminal."""
+    texts: list[str] = []
+
+    def keep(record: logging.LogRecord) -> bool:
+        texts.append(record.getMessage())
+        return False
+
+    loggers = [logging.getLogger(f"nptdms.{part}") for part in ("reader", "tdms_segment")]
+    for logger in loggers:
+        logger.addFilter(keep)
+    try:
+        yield texts
+    finally:
+        for logger in loggers:
+            logger.removeFilter(keep)
+
+
 def _json(text: Any) -> dict[str, Any] | None:
     """Metadata of an export of flexura."""
     try:
@@ -69,7 +94,9 @@ def _base(properties: Any, length: int, file: str) -> Clock | None:
     try:
         step, offset = float(step), float(properties.get("wf_start_offset") or 0.0)
     except (TypeError, ValueError):
-        raise InputError("expected a time base", key="wf_increment", value=step, file=file) from None
+        raise InputError(
+            "expected a time base", key="wf_increment", value=step, file=file
+        ) from None
     begin = properties.get("wf_start_time")
     start = 0.0
     if isinstance(begin, np.datetime64) and not np.isnat(begin):

@@ -38,7 +38,9 @@ def mapped(time, position, deflection, force):
     """map.toml for four columns, by name or number."""
     spelt = {"time": time, "position": position, "deflection": deflection, "force": force}
     text = MAP.format(**{key: json.dumps(value) for key, value in spelt.items()})
-    return text if time is not None else text.replace('column = null\nunit = "s"\n', "rate_Hz = 500\n")
+    return (
+        text if time is not None else text.replace('column = null\nunit = "s"\n', "rate_Hz = 500\n")
+    )
 
 
 def text_file(path, columns, heads, separator=",", comma=False, encoding="utf-8", above=""):
@@ -71,9 +73,20 @@ def lvm_file(path, t, columns, separator="\t", comma=False, layout="One"):
     n, sign = len(columns), "," if comma else "."
     spell = lambda x: repr(float(x)).replace(".", sign)
     row = lambda key, values: separator.join([key, *values])
-    lines = ["LabVIEW Measurement\t", "Writer_Version\t2", "Reader_Version\t2", f"Separator\t{word}"]
+    lines = [
+        "LabVIEW Measurement\t",
+        "Writer_Version\t2",
+        "Reader_Version\t2",
+        f"Separator\t{word}",
+    ]
     lines += [f"Decimal_Separator\t{sign}", "Multi_Headings\tYes", f"X_Columns\t{layout}"]
-    lines += ["Time_Pref\tRelative", "Date\t2026/03/02", "Time\t10:20:30", "***End_of_Header***\t", ""]
+    lines += [
+        "Time_Pref\tRelative",
+        "Date\t2026/03/02",
+        "Time\t10:20:30",
+        "***End_of_Header***\t",
+        "",
+    ]
     step = 0.002
     lines += [row("Channels", [str(n)]), row("Samples", [str(len(t))] * n)]
     lines += [row("Date", ["2026/03/02"] * n), row("Time", ["10:20:30.5"] * n)]
@@ -81,8 +94,13 @@ def lvm_file(path, t, columns, separator="\t", comma=False, layout="One"):
     lines += [row("X0", [spell(0.0)] * n), row("Delta_X", [spell(step)] * n), "***End_of_Header***"]
     names = ["Angle", "Deflection", "Force"][:n]
     if layout == "Multi":
-        lines.append(separator.join(f"X_Value{separator}{name}" for name in names) + f"{separator}Comment")
-        body = [separator.join(f"{spell(t[k])}{separator}{spell(c[k])}" for c in columns) for k in range(len(t))]
+        lines.append(
+            separator.join(f"X_Value{separator}{name}" for name in names) + f"{separator}Comment"
+        )
+        body = [
+            separator.join(f"{spell(t[k])}{separator}{spell(c[k])}" for c in columns)
+            for k in range(len(t))
+        ]
     else:
         lines.append(row("X_Value", [*names, "Comment"]))
         first = [""] * len(t) if layout == "No" else [spell(x) for x in t]
@@ -131,14 +149,20 @@ def bag(path, t, columns, storage="sqlite3", stamped=True):
     types = store.types
     state, header, time = (
         types[name]
-        for name in ("sensor_msgs/msg/JointState", "std_msgs/msg/Header", "builtin_interfaces/msg/Time")
+        for name in (
+            "sensor_msgs/msg/JointState",
+            "std_msgs/msg/Header",
+            "builtin_interfaces/msg/Time",
+        )
     )
     plugin = StoragePlugin.MCAP if storage == "mcap" else StoragePlugin.SQLITE3
     with Writer(path, version=9, storage_plugin=plugin) as writer:
         connection = writer.add_connection("/joint_states", state.__msgtype__, typestore=store)
         for k, x in enumerate(t.tolist()):
             stamp = 1_700_000_000_000_000_000 + round(x * 1e9)
-            head = header(time(*divmod(stamp, 10**9)), "base") if stamped else header(time(0, 0), "")
+            head = (
+                header(time(*divmod(stamp, 10**9)), "base") if stamped else header(time(0, 0), "")
+            )
             message = state(
                 header=head,
                 name=["hub", "tip", "load"],
