@@ -23,6 +23,13 @@ BEFORE = {
     "migrate": [["new", "my-arm.toml"]],
     "identify": [["bench", "excite", "--seed", "1", "--out", "logs/excite"]],
 }
+# files of others that an example begins with
+FILES = {
+    "import": {
+        "log.csv": "Zeit;Weg\n[s];[mm]\n0,00;1,5\n0,01;1,6\n0,02;1,7\n",
+        "map.toml": '[channel."joint/1/position"]\ncolumn = "Weg"\n',
+    }
+}
 ELSEWHERE = {"bench recover", "bench step"}  # go on from an experiment that is no example's
 MOST_WORDS = 25
 
@@ -52,6 +59,8 @@ def test_a_command_has_one_complete_example(name):
     ],
 )
 def test_the_example_of_a_command_runs(name, place):
+    for file, text in FILES.get(name, {}).items():
+        (place / file).write_text(text)
     for arguments in BEFORE.get(name, ()):
         assert run(arguments)[0] == 0
     (example,) = examples(COMMANDS[name])
