@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from ...errors import InputError
-from . import csv_file, lvm, mat, mcap_file, rosbag, tables, tdms
+from .formats import csv_file, lvm, mat, mcap_file, rosbag, tables, tdms
 from .log import Log
 
 HDF5 = b"\x89HDF\r\n\x1a\n"

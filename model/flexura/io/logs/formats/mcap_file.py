@@ -8,10 +8,10 @@ import struct
 from collections.abc import Callable
 from typing import Any
 
-from ...errors import InputError
-from ...optional import load
+from ....errors import InputError
+from ....optional import load
+from ..log import Log, damaged
 from . import messages
-from .log import Log, damaged
 
 FLOAT64 = "std_msgs/msg/Float64"
 Decoder = Callable[[bytes], Any]

@@ -9,10 +9,10 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import Any
 
-from ...errors import InputError
-from ..units import suffix, unit
-from .log import Column, Log
-from .names import parted
+from ....errors import InputError
+from ...units import suffix, unit
+from ..log import Column, Log
+from ..names import parted
 from .text import decoded, gap, number, numbers, numeric
 
 SEPARATORS = ("\t", ";", ",", "|", " ")

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError
-from ...optional import load
-from .log import Column, Log, damaged, floats
-from .names import parted
+from ....errors import InputError
+from ....optional import load
+from ..log import Column, Log, damaged, floats
+from ..names import parted
 
 DEEPEST = 12  # structs in structs
 MOST_COLUMNS = 200  # of one matrix

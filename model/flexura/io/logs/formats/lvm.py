@@ -7,8 +7,8 @@ from itertools import count
 
 import numpy as np
 
-from ...errors import InputError
-from .log import Clock, Column, Log
+from ....errors import InputError
+from ..log import Clock, Column, Log
 from .text import decoded, numbers
 
 END = "***End_of_Header***"

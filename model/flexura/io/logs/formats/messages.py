@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from .log import Clock, Column
-from .names import known, parted
+from ..log import Clock, Column
+from ..names import known, parted
 
 LONGEST = 64  # numbers of one array field
 # The units of fields of common messages, by the end of their path.

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ...errors import InputError
-from ...optional import load
+from ....errors import InputError
+from ....optional import load
+from ..log import Log, damaged
 from . import messages
-from .log import Log, damaged
 
 
 def read(path: Path) -> Log:

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError
-from ...optional import load
-from .log import Clock, Column, Log, damaged, floats
-from .names import parted
+from ....errors import InputError
+from ....optional import load
+from ..log import Clock, Column, Log, damaged, floats
+from ..names import parted
 
 
 def read(raw: bytes, file: str) -> Log:

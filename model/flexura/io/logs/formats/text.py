@@ -10,7 +10,7 @@ from decimal import Decimal, InvalidOperation
 
 import numpy as np
 
-from ...errors import InputError
+from ....errors import InputError
 
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError
-from ..units import suffix
-from .log import Column, Log, damaged, floats
-from .names import parted
+from ....errors import InputError
+from ...units import suffix
+from ..log import Column, Log, damaged, floats
+from ..names import parted
 
 
 def read(raw: bytes, file: str) -> Log:
