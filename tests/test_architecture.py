@@ -45,7 +45,7 @@ FLOORS = {
         {"crosscheck"},
         {"identification"},
         {"review"},
-        {"comparison", "experiment"},
+        {"comparison", "experiment", "vibration"},
         {"recordings"},
         {"rig"},
         {"board"},

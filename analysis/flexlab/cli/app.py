@@ -28,6 +28,7 @@ COMMANDS = {
     "tune": "Find a controller's gains on the simulator.",
     "bench": "Run experiments on the rig, real or emulated.",
     "identify": "Identify physical parameters from an experiment.",
+    "vibration": "Find frequency and damping of a free vibration.",
     "compare": "Compare an experiment with its simulation, or two runs.",
     "review": "Look at one run, or at two side by side, in Rerun.",
     "plot": "Draw a run over time, for a screen or for print.",

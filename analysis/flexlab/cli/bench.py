@@ -28,6 +28,7 @@ from ..recordings.recording import unfinished
 from ..recordings.run_from_recording import run_from_recording
 from ..recordings.unit_conversion import Sensor
 from ..review.live import serve
+from ..vibration.shapers import read_shaper, shaped
 from .bench_calibrate import calibrate
 from .bench_options import (
     Calibrated,
@@ -53,7 +54,7 @@ from .bench_tables import (
     selftest_table,
 )
 from .bench_tables import live as live_view
-from .options import Force
+from .options import Force, ShaperFile
 from .output import events, message, print_results
 from .results import refuse_taken
 
@@ -161,6 +162,7 @@ def inverse(
         ),
     ] = None,
     gains: Gains = None,
+    shaper: ShaperFile = None,
     *,
     options: BenchOptions,
 ) -> None:
@@ -172,10 +174,12 @@ def inverse(
     Example: flexura bench inverse --manoeuvre rig-inverse-law
     """
     asked = None if manoeuvre is None else fx.load_manoeuvre(manoeuvre, 2)
+    filed = None if shaper is None else read_shaper(shaper)
 
     def ask(bench: Any, settings: Any) -> Any:
         try:
-            return plan.inverse(bench, settings, asked)
+            chosen = asked or bench.manoeuvre
+            return plan.inverse(bench, settings, shaped(chosen, filed) if filed else chosen)
         except fx.InputError as error:
             raise error.in_file(str(manoeuvre) if manoeuvre else bench.rig.manoeuvre) from None
 

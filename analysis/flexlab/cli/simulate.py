@@ -12,8 +12,20 @@ from flexura.io import FILE
 
 from ..studies import parameter_sweep
 from ..tuning.closed_loop import controller_from_file
+from ..vibration.shapers import read_shaper, shaped
 from . import tables
-from .options import Force, Json, ManoeuvreFile, Out, Prescribed, RobotFile, Rtol, Start, stem
+from .options import (
+    Force,
+    Json,
+    ManoeuvreFile,
+    Out,
+    Prescribed,
+    RobotFile,
+    Rtol,
+    ShaperFile,
+    Start,
+    stem,
+)
 from .output import (
     check_followed,
     load_request,
@@ -42,6 +54,7 @@ def simulate(
     ] = None,
     prescribed: Prescribed = False,
     start: Start = None,
+    shaper: ShaperFile = None,
     vary: Annotated[
         list[str] | None,
         typer.Option(
@@ -70,7 +83,8 @@ def simulate(
             value=scheduler,
         )
     if vary:
-        for key, given in (("--force", force), ("--controller", controller)):
+        refused = (("--force", force), ("--controller", controller), ("--shaper", shaper))
+        for key, given in refused:
             if given:
                 raise fx.InputError("expected without --vary", key=key, value=str(given))
         _simulate_many(
@@ -82,6 +96,8 @@ def simulate(
             "expected without --prescribed", key="--controller", value=str(controller)
         )
     system, asked = load_request(robot, manoeuvre, prescribed, start)
+    if shaper is not None:
+        asked = shaped(asked, read_shaper(shaper))
     if not controller:
         check_followed(asked, manoeuvre, "call with --controller GAINS or --prescribed")
     drive = controller_from_file(system, asked, controller) if controller else asked.drive

@@ -112,7 +112,9 @@ def _named(log: Log, every: bool) -> dict[str, tuple[Column, Source]]:
             continue
         name = column.name if log.own else known(column.name)
         if not log.own and (not name or not column.unit):
-            name = sensor(column.name or str(place)) if every and not column.fault else ""
+            fits = clock is None or len(column.values) == len(clock.values)
+            free = every and fits and not column.fault
+            name = sensor(column.name or str(place)) if free else ""
         if not name:
             continue
         if name in chosen:
@@ -159,7 +161,7 @@ def _clock(log: Log, asked: Map | None) -> Column | None:
         return None
     free = [column for column in log.columns if not known(column.name)]
     timed = [column for column in free if in_time(column.unit)]
-    bare = [c for c in free if not c.unit and c.name.lower() in TIMES]
+    bare = [c for c in free if not c.unit and c.name.lower().rpartition(".")[2] in TIMES]
     return next(iter(timed + bare), None)
 
 
