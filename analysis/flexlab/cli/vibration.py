@@ -14,7 +14,7 @@ from flexura.io import find, read_toml, write_toml
 
 from ..runs.formatting import finite, number, percent
 from ..runs.table import Table
-from ..vibration.damped_sinusoids import Fit, Mode, fit
+from ..vibration.damped_sinusoids import Fit, Mode, changes, fit, strongest
 from ..vibration.record import Record, record
 from ..vibration.shapers import KINDS, Shaper, shaped
 from .options import Force, Json
@@ -32,12 +32,13 @@ class Found:
 
     record: Record
     fit: Fit
+    halves: tuple[Mode, ...]
     steps: dict[str, dict[str, float | None]]
 
     @property
     def strongest(self) -> Mode:
         """The mode that holds most of the vibration: what the shapers are for."""
-        return max(self.fit.modes, key=lambda mode: mode.power(self.record.length))
+        return strongest(self.fit, self.record.length)
 
     @property
     def shapers(self) -> list[Shaper]:
@@ -53,9 +54,7 @@ def vibration(
         float | None,
         typer.Option(help="begin there [s]; default: after the last command, where it is free"),
     ] = None,
-    to_s: Annotated[
-        float | None, typer.Option(help="end there [s]; default: the end")
-    ] = None,
+    to_s: Annotated[float | None, typer.Option(help="end there [s]; default: the end")] = None,
     modes: Annotated[int, typer.Option(min=1, max=12, help="at most so many")] = MODES,
     manoeuvre: Annotated[
         Path | None,
@@ -83,8 +82,9 @@ def vibration(
         raise fx.InputError("expected together with --out", key="--manoeuvre", value=str(manoeuvre))
     read = one_run(run, robot)
     part = record(read, channel, from_s, to_s)
-    found = Found(part, fit(part.t, part.y, modes), _steps(read))
-    if not found.fit.modes:
+    fitted = fit(part.t, part.y, modes)
+    found = Found(part, fitted, changes(fitted, part.t, part.y, modes), _steps(read))
+    if not fitted.modes:
         raise fx.InputError(
             f"no vibration stands out of the noise {part.why}: expected a free vibration",
             key=f"channel {part.channel}",
@@ -150,8 +150,16 @@ def _tables(found: Found, run: fx.Run) -> list[Table]:
         f"{part.why}: {len(part.t)} samples, {cycles:.3g} cycles of the strongest mode; "
         f"noise {found.fit.noise:.2g} {part.unit}"
     )
+    if found.halves:
+        first, second = (number(mode.frequency, 5) for mode in found.halves)
+        modes.notes.append(
+            f"the strongest mode is not linear: {first} Hz in the first half, {second} Hz in the "
+            "second; the interval is of the whole"
+        )
     modes.notes.append("the frequency is the undamped one; amplitudes are at the start")
-    shapers = Table("shapers of the strongest mode", ("shaper", "lengthens a motion by [s]"), ("shaper",))
+    shapers = Table(
+        "shapers of the strongest mode", ("shaper", "lengthens a motion by [s]"), ("shaper",)
+    )
     for shaper in found.shapers:
         shapers.add(shaper.kind.upper(), number(shaper.lengthens_s, 4))
     out = [modes, shapers]
@@ -180,6 +188,7 @@ def _data(found: Found) -> dict[str, Any]:
             }
             for mode in found.fit.modes
         ],
+        "halves_Hz": [mode.frequency for mode in found.halves],
         "noise": found.fit.noise,
         "unit": part.unit,
         "shapers": [shaper.tables()["shaper"] for shaper in found.shapers],

@@ -123,6 +123,33 @@ def fit(t: np.ndarray, y: np.ndarray, most: int = 4) -> Fit:
     return Fit(tuple(modes), scale * (z - left), scale * float(np.sqrt(variance)))
 
 
+def strongest(found: Fit, length: float) -> Mode:
+    """The mode that holds most of a record of this length [s]."""
+    return max(found.modes, key=lambda mode: mode.power(length))
+
+
+def changes(found: Fit, t: np.ndarray, y: np.ndarray, most: int = 4) -> tuple[Mode, ...]:
+    """The strongest mode in both halves of a record, if its frequency changes; else nothing.
+
+    It changes if both values differ by more than four standard deviations: what rings is not
+    linear.
+    """
+    if not found.modes:
+        return ()
+    whole = strongest(found, float(t[-1] - t[0]))
+    half = len(t) // 2
+    both = []
+    for part in (slice(None, half), slice(half, None)):
+        modes = fit(t[part], y[part], most).modes
+        near = [m for m in modes if abs(m.frequency / whole.frequency - 1) < 0.1]
+        if not near:
+            return ()
+        both.append(min(near, key=lambda mode: abs(mode.frequency - whole.frequency)))
+    first, second = both
+    apart = abs(first.frequency - second.frequency)
+    return tuple(both) if apart > 4 * np.hypot(first.frequency_std, second.frequency_std) else ()
+
+
 def _line(t: np.ndarray, y: np.ndarray) -> np.ndarray:
     """The straight line through y."""
     basis = np.column_stack([np.ones_like(t), t / t[-1]])
