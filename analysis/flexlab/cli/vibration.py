@@ -157,12 +157,9 @@ def _tables(found: Found, run: fx.Run) -> list[Table]:
             "second; the interval is of the whole"
         )
     modes.notes.append("the frequency is the undamped one; amplitudes are at the start")
-    shapers = Table(
-        "shapers of the strongest mode", ("shaper", "lengthens a motion by [s]"), ("shaper",)
-    )
-    for shaper in found.shapers:
-        shapers.add(shaper.kind.upper(), number(shaper.lengthens_s, 4))
-    out = [modes, shapers]
+    longer = (f"{s.kind.upper()} {s.lengthens_s:.3g} s" for s in found.shapers)
+    modes.notes.append(f"shapers of the strongest mode lengthen a motion by: {', '.join(longer)}")
+    out = [modes]
     if found.steps:
         heads = ("joint", "rise [s]", "settling [s]", "overshoot", "remaining error")
         steps = Table("steps", heads, ("joint",))

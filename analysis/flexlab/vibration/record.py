@@ -125,4 +125,6 @@ def _free(t: np.ndarray, y: np.ndarray) -> int:
     step = float(t[-1] - t[0]) / (len(t) - 1)
     spectrum = np.abs(np.fft.rfft(y - y.mean()))
     period = len(y) / max(int(spectrum[1:].argmax()) + 1, 1) * step
-    return 0 if (beyond * step) < 0.5 * period else int(size.argmax())
+    largest = int(size.argmax())
+    free = beyond * step < 0.5 * period or len(y) - largest < FEWEST
+    return 0 if free else largest
