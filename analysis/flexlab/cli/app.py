@@ -30,7 +30,7 @@ COMMANDS = {
     "identify": "Identify physical parameters from an experiment.",
     "vibration": "Find frequency and damping of a free vibration.",
     "compare": "Compare an experiment with its simulation, or two runs.",
-    "review": "Look at one run, or at two side by side, in Rerun.",
+    "review": "Look at one run, or several side by side, in Rerun.",
     "plot": "Draw a run over time, for a screen or for print.",
     "animate": "Write a run as a film.",
     "import": "Read a log of another program as a run.",
