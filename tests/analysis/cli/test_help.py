@@ -9,7 +9,7 @@ from commands import commands, examples, run
 
 COMMANDS = {" ".join(words): command for words, command in commands()}
 FASTER = {"tune": ["--population", "8", "--generations", "1"]}  # beside what the example says
-SLOW = {"flash", "demo", "compare", "identify", "doctor"}
+SLOW = {"flash", "demo", "compare", "identify", "doctor", "vibration"}
 SLOW |= {name for name in COMMANDS if name.startswith("bench ")}
 # what an example goes on from; {name} is the folder of the command's own example
 FIRST = ["simulate", "rig", "rig-inverse-law"]
@@ -20,6 +20,7 @@ BEFORE = {
     "plot": [[*FIRST, "--out", "logs/first"]],
     "animate": [[*FIRST, "--out", "logs/first"]],
     "compare": [[*EXPERIMENT, "--out", "logs/experiment"]],
+    "vibration": [[*EXPERIMENT, "--out", "logs/free-vibration"]],
     "migrate": [["new", "my-arm.toml"]],
     "identify": [["bench", "excite", "--seed", "1", "--out", "logs/excite"]],
 }
