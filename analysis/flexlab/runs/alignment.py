@@ -12,7 +12,7 @@ from flexura.io import Run
 
 from .deviation import compared, interpolate
 
-COARSE = 2000  # samples a run in the search over all shifts
+COARSE = 20_000  # samples a run in the search over all shifts
 FEWEST = 8
 
 
@@ -54,6 +54,8 @@ def best_shift(first: Run, second: Run) -> Shift:
     Raises:
         InputError: the runs have no channel in common that moves in both.
     """
+    from scipy.signal import correlate
+
     pairs = [pair for name in compared(first, second) if (pair := _pair(first, second, name))]
     if not pairs:
         raise InputError(
@@ -64,12 +66,16 @@ def best_shift(first: Run, second: Run) -> Shift:
     long1, long2 = (max(float(np.ptp(t)) for t in ts) for ts in _times(pairs))
     begin1, begin2 = (min(float(t[0]) for t in ts) for ts in _times(pairs))
     step = max(long1, long2) / COARSE
-    grid = begin1 + np.arange(-long2, long1 + long2 + step, step)
-    lags = (begin1 - begin2) + np.arange(-long2, long1 + step, step)
+    grid = np.arange(-long2, long1 + long2 + step, step)  # from the first run's begin on
+    lags = np.arange(-long2, long1 + step, step) + (begin1 - begin2)
+    lead = len(lags) - 1
+    later = begin2 + step * np.arange(-lead, len(grid))
     costs = np.zeros(len(lags))
-    for (t1, y1), (t2, y2) in pairs:
-        held = np.interp(grid, t1, y1)
-        costs += [float(np.sum((held - np.interp(grid - lag, t2, y2)) ** 2)) for lag in lags]
+    for (t1, y1), (t2, y2) in pairs:  # held at both ends
+        a, b = np.interp(begin1 + grid, t1, y1), np.interp(later, t2, y2)
+        squares = np.concatenate([[0.0], np.cumsum(b**2)])
+        own = squares[len(grid) :] - squares[: -len(grid)]
+        costs += (own - 2 * correlate(b, a, "valid", "fft"))[::-1]
     near = float(lags[int(np.argmin(costs))])
     found = _refined(pairs, near, step)
     return Shift(found, _correlation(pairs, found))
