@@ -15,7 +15,7 @@ from flexura.io.logs import Understood, read_log, read_map, understood
 from ..runs.formatting import number
 from ..runs.table import Table
 from .options import Force, Json
-from .output import say, show
+from .output import message, print_results
 from .results import results
 
 
@@ -62,14 +62,17 @@ def import_(
     tables = None if robot is None else fx.load(robot).to_dict()
     if look:
         found = understood(read_log(file), asked, robot=tables, every=every)
-        show(json, lambda: table(found, file), lambda: data(found))
+        print_results(json, lambda: table(found, file), lambda: data(found))
         return
     with results(out, "import", file.stem, force=force) as draft:
         found = understood(read_log(file), asked, robot=tables, every=every)
-        show(json, lambda: table(found, file), lambda: data(found) | {"run": str(draft.target)})
+        if not json:
+            print_results(False, lambda: table(found, file), dict)
         found.run.save(draft.folder)
         folder = draft.keep()
-    say(json, f"stored {folder / FILE}", f"look at it: flexura review {folder}")
+    if json:
+        print_results(True, lambda: None, lambda: data(found) | {"run": str(folder / FILE)})
+    message(json, f"stored {folder / FILE}", f"look at it: flexura review {folder}")
 
 
 def table(found: Understood, file: Path) -> Table:

@@ -18,7 +18,7 @@ from ..vibration.damped_sinusoids import Fit, Mode, changes, fit, strongest
 from ..vibration.record import Record, record
 from ..vibration.shapers import KINDS, Shaper, shaped
 from .options import Force, Json
-from .output import say, show
+from .output import message, print_results
 from .results import results
 from .runs import RobotNumber, one_run
 
@@ -103,10 +103,11 @@ def vibration(
             for name, tables in written.items():
                 write_toml(draft.folder / name, tables)
             draft.keep()
-    show(json, lambda: _tables(found, read), lambda: _data(found) | {"files": list(written)})
+    told = lambda: _data(found) | {"files": list(written)}
+    print_results(json, lambda: _tables(found, read), told)
     if out is not None:
-        say(json, f"stored {out}: {', '.join(written)}")
-        say(json, f"use it: flexura simulate ROBOT MANOEUVRE --shaper {out / 'zvd.toml'}")
+        message(json, f"stored {out}: {', '.join(written)}")
+        message(json, f"use it: flexura simulate ROBOT MANOEUVRE --shaper {out / 'zvd.toml'}")
 
 
 def _joints(manoeuvre: Path) -> int:

@@ -129,7 +129,7 @@ def order(names: list[str], units: dict[str, str]) -> dict[str, int]:
 
 def curve_colour(colour: Colour, k: int) -> Colour:
     """The colour of the k-th curve (from 0) of one source in one plot."""
-    family = FAMILIES.get(colour, (colour, pale(colour, 0.4)))
+    family = FAMILIES.get(colour, (colour, lightened(colour, 0.4)))
     return family[k % len(family)]
 
 

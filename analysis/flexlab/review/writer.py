@@ -100,16 +100,9 @@ def _title(shown: list[Source]) -> str:
 
 
 def _scene(shown: list[Source], prefix: str, name: str) -> Scene:
-<<<<<<< HEAD
     has_shape = [s.run for s in shown if s.has_shape]
     low, high = extent(has_shape) if has_shape else (np.array([-1.0, -1.0]), np.array([1.0, 1.0]))
-    pair = [s.run for s in shown]
-    names = compared(pair[0], pair[1]) if len(pair) == 2 else []
-=======
-    shaped = [s.run for s in shown if s.shaped]
-    low, high = extent(shaped) if shaped else (np.array([-1.0, -1.0]), np.array([1.0, 1.0]))
     first = shown[0].run
->>>>>>> 4e92d8e (compare --align and --shift; several runs in one review; logs drawn as another run's robot)
     # Without one time in common, or with a gap all the way, there is no deviation to show.
     apart = {
         path: (name, other, values)
@@ -127,15 +120,9 @@ def _scene(shown: list[Source], prefix: str, name: str) -> Scene:
             if np.isfinite(s.run[name]).any()
         },
         deviations={
-<<<<<<< HEAD
-            f"{prefix}/deviation/{name}": Signal(
-                pair[0].units.get(name, "m"),
-                _distinct_label(name, shown, pair[0].units.get(name, "m")),
-=======
             path: Signal(
                 first.units.get(name, "m"),
-                _apart(name, [shown[0], other], first.units.get(name, "m")),
->>>>>>> 4e92d8e (compare --align and --shift; several runs in one review; logs drawn as another run's robot)
+                _distinct_label(name, [shown[0], other], first.units.get(name, "m")),
                 *_range(values),
             )
             for path, (name, other, values) in apart.items()
@@ -179,20 +166,6 @@ def _write(rec: rr.RecordingStream, shown: list[Source], scene: Scene) -> None:
             shape(rec, s, scene, s is not first)
     if any(s.has_shape for s in shown):
         ground(rec, scene)
-<<<<<<< HEAD
-    places = order(
-        [path.removeprefix(f"{scene.prefix}/deviation/") for path in scene.deviations],
-        first.run.units,
-    )
-    for path, signal in scene.deviations.items():
-        name = path.removeprefix(f"{scene.prefix}/deviation/")
-        t, values = deviation(first.run, shown[1].run, name)
-        step = np.flatnonzero(common(first.run, shown[1].run))
-        curve(
-            rec, path, t, values, step, signal, curve_colour(DEVIATION, places[name]), 1.8, budget
-        )
-    page = summary(shown, thinned_to=budget if samples > MAX_SAMPLES else None)
-=======
     found = pairs(shown, scene.prefix)
     for other in shown[1:]:
         own = {path: name for path, (name, s) in found.items() if s is other}
@@ -206,8 +179,7 @@ def _write(rec: rr.RecordingStream, shown: list[Source], scene: Scene) -> None:
             base = DEVIATION if len(shown) == 2 else other.colour
             colour = curve_colour(base, places[name])
             curve(rec, path, t, values, step, scene.deviations[path], colour, 1.8, budget)
-    page = about(shown, thinned_to=budget if samples > MAX_SAMPLES else None)
->>>>>>> 4e92d8e (compare --align and --shift; several runs in one review; logs drawn as another run's robot)
+    page = summary(shown, thinned_to=budget if samples > MAX_SAMPLES else None)
     rec.log(
         f"{scene.prefix}/about",
         rr.TextDocument(page, media_type=rr.MediaType.MARKDOWN),
