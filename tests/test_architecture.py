@@ -45,7 +45,7 @@ FLOORS = {
         {"crosscheck"},
         {"identification"},
         {"review"},
-        {"comparison", "experiment", "vibration"},
+        {"comparison", "experiment"},
         {"recordings"},
         {"rig"},
         {"board"},

@@ -23,12 +23,12 @@ from ..experiment import excitation, plan
 from ..experiment import run_experiment as steps
 from ..experiment.flash import RIG
 from ..experiment.stop_requests import KEYS_HELP, watch_for_stop
+from ..identification.vibration.shapers import read_shaper, shaped
 from ..recordings.flex_calibration import read as read_calibration
 from ..recordings.recording import unfinished
 from ..recordings.run_from_recording import run_from_recording
 from ..recordings.unit_conversion import Sensor
 from ..review.live import serve
-from ..vibration.shapers import read_shaper, shaped
 from .bench_calibrate import calibrate
 from .bench_options import (
     Calibrated,

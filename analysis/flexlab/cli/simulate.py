@@ -10,9 +10,9 @@ import typer
 import flexura as fx
 from flexura.io import FILE
 
+from ..identification.vibration.shapers import read_shaper, shaped
 from ..studies import parameter_sweep
 from ..tuning.closed_loop import controller_from_file
-from ..vibration.shapers import read_shaper, shaped
 from . import tables
 from .options import (
     Force,

@@ -12,11 +12,11 @@ import flexura as fx
 from flexura.control import step_figures
 from flexura.io import find, read_toml, write_toml
 
+from ..identification.vibration.damped_sinusoids import Fit, Mode, changes, fit, strongest
+from ..identification.vibration.record import Record, record
+from ..identification.vibration.shapers import KINDS, Shaper, shaped
 from ..runs.formatting import finite, number, percent
 from ..runs.table import Table
-from ..vibration.damped_sinusoids import Fit, Mode, changes, fit, strongest
-from ..vibration.record import Record, record
-from ..vibration.shapers import KINDS, Shaper, shaped
 from .options import Force, Json
 from .output import message, print_results
 from .results import results

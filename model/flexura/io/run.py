@@ -18,14 +18,13 @@ import numpy as np
 
 from ..errors import InputError, within_memory
 from . import summary
-from .clock import fault, from_first
 from .drawing.film import animation
 from .drawing.over_time import FORMS, figure, heading, saved
 from .files import settle, write_bytes
 from .format import FORMAT, check_format
 from .frames import pandas_frame, xarray_dataset
+from .quantities import converted, fault, from_first, suffix, unit
 from .seal import Damaged, read_sealed, read_table, say_unsealed, sealed_parquet
-from .units import converted, suffix, unit
 
 if TYPE_CHECKING:
     import pandas as pd

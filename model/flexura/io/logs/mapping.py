@@ -8,8 +8,8 @@ from typing import Any
 
 from ...errors import InputError
 from ..arguments import number
+from ..quantities import unit
 from ..toml_files import read_toml
-from ..units import unit
 from ..validation import is_name
 
 _TIME = ("column", "unit", "rate_Hz")

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import re
 
-from ..channels import CHANNELS
-from ..units import unit
+from ..quantities import CHANNELS, unit
 
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*")
 _WORD = re.compile(r"(.*\S)\s+(?:in|/)\s+(\S+)")

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ..channels import channel
+from ..quantities import Unit, channel, unit
 from ..run import Run
-from ..units import Unit, unit
 from .log import Column, Log
 from .mapping import Map, Source
 from .names import TIMES, known, sensor

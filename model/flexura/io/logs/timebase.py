@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...errors import InputError
-from ..clock import EPOCH_S, LATEST_S, fault
-from ..units import unit
+from ..quantities import EPOCH_S, LATEST_S, fault, unit
 from .log import Column, Log
 
 LATE_S = 1000.0  # a clock that begins later counts from the first sample

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ....errors import InputError
-from ...units import suffix, unit
+from ...quantities import suffix, unit
 from ..log import Column, Log
 from ..names import parted
 from .text import decoded, gap, number, numbers, numeric

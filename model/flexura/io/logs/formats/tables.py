@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ....errors import InputError
-from ...units import suffix
+from ...quantities import suffix
 from ..log import Column, Log, damaged, floats
 from ..names import parted
 

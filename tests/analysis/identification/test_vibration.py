@@ -11,9 +11,9 @@ from scipy.optimize import brentq
 import flexura as fx
 from commands import run as command
 from flexlab import rig as rigs
-from flexlab.vibration.damped_sinusoids import fit
-from flexlab.vibration.record import record
-from flexlab.vibration.shapers import Shaper, read_shaper
+from flexlab.identification.vibration.damped_sinusoids import fit
+from flexlab.identification.vibration.record import record
+from flexlab.identification.vibration.shapers import Shaper, read_shaper
 from flexura import signals
 from flexura.control import step_figures
 from flexura.io import Run
