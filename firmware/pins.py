@@ -102,6 +102,9 @@ NEEDS = {
     "motor_forward": PWM,
     "motor_reverse": PWM,
     "motor_enable": ANY,
+    "motor_2_forward": PWM,
+    "motor_2_reverse": PWM,
+    "motor_2_enable": ANY,
     "encoder_1_a": EDGE,
     "encoder_1_b": EDGE,
     "encoder_2_a": EDGE,
@@ -117,6 +120,9 @@ NEEDS = {
     "busy": ANY,
     "lamp": ANY,
 }
+
+# A map may leave these out, all together: joint 2 then has no motor.
+MOTOR_2 = ("motor_2_forward", "motor_2_reverse", "motor_2_enable")
 
 
 def port_of(entry: dict[str, Any]) -> str:
@@ -166,7 +172,7 @@ def _check_place(name: str, entry: Any) -> None:
 def check(pins: dict[str, Any]) -> None:
     """Every function has a pin of its own that can do what it needs. Raises Mistake."""
     for name in NEEDS:
-        if name not in pins:
+        if name not in pins and (name not in MOTOR_2 or any(other in pins for other in MOTOR_2)):
             raise Mistake(f"pins.{name}: missing; it needs {NEEDS[name].words}")
     users: dict[str, str] = {}
     for name, entry in pins.items():
@@ -184,13 +190,21 @@ def check(pins: dict[str, Any]) -> None:
         users[port] = name
         if not unit_of(name, entry):
             raise Mistake(f"pins.{name}: {where} cannot serve; {name} needs {NEEDS[name].words}")
-    forward, reverse = (unit_of(name, pins[name]) for name in ("motor_forward", "motor_reverse"))
-    if forward[:3] != reverse[:3]:
-        raise Mistake(
-            f"pins.motor_reverse: {reverse} belongs to timer {reverse[2]}, "
-            f"motor_forward ({forward}) to timer {forward[2]}; "
-            "motor_reverse needs a compare output of the same timer"
+    for motor in motors(pins):
+        forward, reverse = (
+            unit_of(name, pins[name]) for name in (f"{motor}_forward", f"{motor}_reverse")
         )
+        if forward[:3] != reverse[:3]:
+            raise Mistake(
+                f"pins.{motor}_reverse: {reverse} belongs to timer {reverse[2]}, "
+                f"{motor}_forward ({forward}) to timer {forward[2]}; "
+                f"{motor}_reverse needs a compare output of the same timer"
+            )
+
+
+def motors(pins: dict[str, Any]) -> list[str]:
+    """The motors of a map: their pins' names begin with these."""
+    return ["motor", "motor_2"] if MOTOR_2[0] in pins else ["motor"]
 
 
 def digest(pins: dict[str, Any]) -> int:
@@ -241,17 +255,22 @@ def header(pins: dict[str, Any], said: str) -> str:
             *_special(name, unit),
             "};",
         ]
-    timer = unit_of("motor_forward", pins["motor_forward"])[2]
+    for motor in motors(pins):
+        timer = unit_of(f"{motor}_forward", pins[f"{motor}_forward"])[2]
+        out += [
+            "",
+            f"// The timer of {motor}_forward and {motor}_reverse.",
+            f"struct {motor}_timer {{",
+            f"  static volatile uint8_t &control_a() {{ return TCCR{timer}A; }}",
+            f"  static volatile uint8_t &control_b() {{ return TCCR{timer}B; }}",
+            f"  static volatile uint16_t &top() {{ return ICR{timer}; }}",
+            "};",
+        ]
     out += [
         "",
-        "// The timer of motor_forward and motor_reverse.",
-        "struct motor_timer {",
-        f"  static volatile uint8_t &control_a() {{ return TCCR{timer}A; }}",
-        f"  static volatile uint8_t &control_b() {{ return TCCR{timer}B; }}",
-        f"  static volatile uint16_t &top() {{ return ICR{timer}; }}",
-        "};",
-        "",
         "}  // namespace pin",
+        "",
+        f"#define FLEXURA_MOTORS {len(motors(pins))}",
         "",
         "// Names of interrupts are macros: a struct cannot hold them.",
     ]

@@ -52,7 +52,7 @@ FLOORS = {
         {"runs", "paths"},
     ],
 }
-MAX_LINES = 400
+MAX_LINES = 360  # without docstrings, which describe each argument on a line of its own
 GENERATED = {"flexlab.board.protocol.declaration"}  # tables, not to be read through
 LONGER = {
     "flexlab.review.writer": "one archetype after another",
@@ -239,8 +239,15 @@ def test_a_bare_import_of_the_model_loads_nothing_heavy():
 
 @pytest.mark.parametrize("module", MODULES)
 def test_a_module_can_be_read_in_one_sitting(module):
-    lines = len(MODULES[module].read_text().splitlines())
-    assert module in GENERATED or lines <= (500 if module in LONGER else MAX_LINES)
+    text = MODULES[module].read_text()
+    documented = (ast.Module, ast.ClassDef, ast.FunctionDef)
+    described = [
+        node.body[0].end_lineno - node.body[0].lineno + 1
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, documented) and ast.get_docstring(node) is not None
+    ]
+    lines = len(text.splitlines()) - sum(described)
+    assert module in GENERATED or lines <= (410 if module in LONGER else MAX_LINES)
 
 
 @pytest.mark.parametrize("module", MODULES)

@@ -54,8 +54,9 @@ uint8_t reset_cause __attribute__((section(".noinit")));
 constexpr uint16_t kMagic = 0xB17E;
 
 void outputs_off() {
-  motor::drive(0);
-  motor::enable(false);
+  constexpr int16_t kStill[2] = {0, 0};
+  motor::drive(kStill);
+  motor::enable(false, false);
   stepper::stop();
   stepper::enable(false);
 }
@@ -121,9 +122,10 @@ ISR(TIMER5_COMPA_vect) {
   board.rig.tick(board.outputs);
   cli();
   if (board.rig.active()) {  // nothing has tripped meanwhile
+    using flexura::Drive;
     motor::drive(board.outputs.duty);
-    motor::enable(true);
-    stepper::enable(true);
+    motor::enable(true, board.rig.drive(1) == Drive::motor);
+    stepper::enable(board.rig.drive(1) == Drive::stepper);
     stepper::queue(board.outputs.steps, due + flexura::kTickCounts);
   } else {
     outputs_off();
@@ -153,7 +155,7 @@ void setup() {
 
   flexura::Stored stored;
   const bool found = eeprom::load(stored);
-  board.rig.begin(found ? &stored : nullptr, reset_cause, FLEXURA_FIRMWARE_HASH);
+  board.rig.begin(found ? &stored : nullptr, reset_cause, FLEXURA_FIRMWARE_HASH, FLEXURA_MOTORS);
 
   // Timer 5 runs free at 2 MHz: OC5A gives the control ticks, another output the step edges.
   TCCR5A = 0;

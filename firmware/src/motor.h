@@ -1,13 +1,13 @@
 // Copyright (c) 2026 the flexura authors. SPDX-License-Identifier: MIT
-// The motor's bridge: 20 kHz PWM on one of two lines, and its enable.
+// The motors' bridges: 20 kHz PWM on one of two lines each, and their enables.
 #pragma once
 #include <stdint.h>
 
 namespace motor {
 
 void begin();
-void drive(int16_t duty);  // counts of kDutyFull, + up. Interrupts off.
-void enable(bool on);      // interrupts off
-bool enabled();
+void drive(const int16_t duty[2]);     // counts of kDutyFull, + up. Interrupts off.
+void enable(bool first, bool second);  // interrupts off
+bool enabled();                        // one of them
 
 }  // namespace motor

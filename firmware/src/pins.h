@@ -4,9 +4,9 @@
 
 namespace pin {
 
-constexpr uint32_t kHash = 0x4BDEB14B;  // which function is where
+constexpr uint32_t kHash = 0x7C6FE1B1;  // which function is where
 
-// 6, OC4A: PWM 20 kHz: bridge input that drives the carriage up
+// 6, OC4A: PWM 20 kHz: bridge input that drives joint 1 up
 struct motor_forward {
   static constexpr uint8_t bit = 3;
   static constexpr uint8_t mask = 8;
@@ -18,7 +18,7 @@ struct motor_forward {
   static constexpr uint8_t connected = _BV(COM4A1);
 };
 
-// 7, OC4B: PWM 20 kHz: bridge input that drives the carriage down
+// 7, OC4B: PWM 20 kHz: bridge input that drives joint 1 down
 struct motor_reverse {
   static constexpr uint8_t bit = 4;
   static constexpr uint8_t mask = 16;
@@ -40,7 +40,41 @@ struct motor_enable {
   static volatile uint8_t &input() { return PINH; }
 };
 
-// 18, INT3: motor encoder; A leads B when the carriage goes up
+// 11, OC1A: the same of a second motor, at joint 2
+struct motor_2_forward {
+  static constexpr uint8_t bit = 5;
+  static constexpr uint8_t mask = 32;
+  static constexpr bool bit_addressable = true;
+  static volatile uint8_t &port() { return PORTB; }
+  static volatile uint8_t &direction() { return DDRB; }
+  static volatile uint8_t &input() { return PINB; }
+  static volatile uint16_t &compare() { return OCR1A; }
+  static constexpr uint8_t connected = _BV(COM1A1);
+};
+
+// 12, OC1B: the same of a second motor, at joint 2
+struct motor_2_reverse {
+  static constexpr uint8_t bit = 6;
+  static constexpr uint8_t mask = 64;
+  static constexpr bool bit_addressable = true;
+  static volatile uint8_t &port() { return PORTB; }
+  static volatile uint8_t &direction() { return DDRB; }
+  static volatile uint8_t &input() { return PINB; }
+  static volatile uint16_t &compare() { return OCR1B; }
+  static constexpr uint8_t connected = _BV(COM1B1);
+};
+
+// 9, digital: the same of a second motor, at joint 2
+struct motor_2_enable {
+  static constexpr uint8_t bit = 6;
+  static constexpr uint8_t mask = 64;
+  static constexpr bool bit_addressable = false;
+  static volatile uint8_t &port() { return PORTH; }
+  static volatile uint8_t &direction() { return DDRH; }
+  static volatile uint8_t &input() { return PINH; }
+};
+
+// 18, INT3: encoder of joint 1; A leads B upwards
 struct encoder_1_a {
   static constexpr uint8_t bit = 3;
   static constexpr uint8_t mask = 8;
@@ -51,7 +85,7 @@ struct encoder_1_a {
   static constexpr uint8_t interrupt = 3;
 };
 
-// 19, INT2: motor encoder
+// 19, INT2: encoder of joint 1
 struct encoder_1_b {
   static constexpr uint8_t bit = 2;
   static constexpr uint8_t mask = 4;
@@ -199,7 +233,16 @@ struct motor_timer {
   static volatile uint16_t &top() { return ICR4; }
 };
 
+// The timer of motor_2_forward and motor_2_reverse.
+struct motor_2_timer {
+  static volatile uint8_t &control_a() { return TCCR1A; }
+  static volatile uint8_t &control_b() { return TCCR1B; }
+  static volatile uint16_t &top() { return ICR1; }
+};
+
 }  // namespace pin
+
+#define FLEXURA_MOTORS 2
 
 // Names of interrupts are macros: a struct cannot hold them.
 #define FLEXURA_ENCODER_1_A_VECTOR INT3_vect

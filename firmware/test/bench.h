@@ -23,25 +23,27 @@ CriticalSection::~CriticalSection() { (void)before_; }
 InterruptLock::InterruptLock() : before_(0) { lock(); }
 InterruptLock::~InterruptLock() { (void)before_; }
 
+#define ITEM(name) static_cast<uint8_t>(Item::name)
+
 static Rig rig;
 static const uint32_t kFirmware = 0x12345678;
 static const Build kBuild = {{0, 1, 0}, {5, 4, 0}, 1, 77};
 static Outputs out;
 
-static Result ask(uint8_t code, const void *fields = nullptr) {
+inline Result ask(uint8_t code, const void *fields = nullptr) {
   uint16_t detail;
   return rig.command(code, static_cast<const uint8_t *>(fields), detail);
 }
 
 // A board that comes up with these settings, its emergency stop proven.
-static void begin(const Config &config, uint8_t reset = 1, uint32_t proven = kFirmware) {
+inline void begin(const Config &config, uint8_t reset = 1, uint32_t proven = kFirmware) {
   rig = Rig();
   out = Outputs();
   const Stored stored = {config, proven};
   rig.begin(&stored, reset, kFirmware);
 }
 
-static void tick(uint16_t times = 1) {
+inline void tick(uint16_t times = 1) {
   while (times--) {
     Inputs &in = rig.inputs();
     in.moved[0] = in.moved[1] = 0;
@@ -53,7 +55,7 @@ static void tick(uint16_t times = 1) {
   }
 }
 
-static void healthy() {
+inline void healthy() {
   Config config = default_config();
   config.lost_step_rad() = 10;  // the encoder of joint 2 stands still in these tests
   begin(config);
@@ -64,7 +66,7 @@ static void healthy() {
   tick();
 }
 
-static void arm(Mode mode) {
+inline void arm(Mode mode) {
   healthy();
   const Reference reference = {0, 0, 0};
   const Arm arm = {static_cast<uint8_t>(mode)};
@@ -73,13 +75,13 @@ static void arm(Mode mode) {
   CHECK(ask(Arm::kCode, &arm) == Result::ok && rig.state() == State::armed);
 }
 
-static void run_open_loop(int16_t voltage, int16_t rate, bool final = false) {
+inline void run_open_loop(int16_t mV, int16_t rate, bool final = false) {
   arm(Mode::open_loop);
   Drives drives = {};
   drives.count = 8;
   drives.final = final;
   for (uint8_t k = 0; k < 8; ++k) {
-    drives.voltage[k] = voltage;
+    drives.voltage[k] = mV / 2;
     drives.rate[k] = rate;
   }
   CHECK(ask(Drives::kCode, &drives) == Result::ok);

@@ -14,19 +14,21 @@ from types import ModuleType
 from . import moved, signals
 from .api import simulate
 from .control import PID, Controller, Force, Motor, Sampled, Stepper
-from .errors import FlexuraError, InputError
+from .errors import FlexuraError, InputError, NumericalError
 from .io import Run
 from .population import Batch, Population
 from .robot import Robot, load, save
 from .signals import Drive, JointDrive, Manoeuvre, Signal, load_manoeuvre
-from .simulation import inverse
+from .simulation import feedforward, inverse, inverse_kinematics, invert
 from .system import (
+    FrequencyResponse,
     Modes,
     NoEquilibrium,
     StateSpace,
     System,
     assemble,
     frequencies,
+    frequency_response,
     holding,
     linearize,
     modes,
@@ -42,12 +44,14 @@ __all__ = [
     "Drive",
     "FlexuraError",
     "Force",
+    "FrequencyResponse",
     "InputError",
     "JointDrive",
     "Manoeuvre",
     "Modes",
     "Motor",
     "NoEquilibrium",
+    "NumericalError",
     "Population",
     "Robot",
     "Run",
@@ -57,9 +61,13 @@ __all__ = [
     "Stepper",
     "System",
     "assemble",
+    "feedforward",
     "frequencies",
+    "frequency_response",
     "holding",
     "inverse",
+    "inverse_kinematics",
+    "invert",
     "linearize",
     "load",
     "load_manoeuvre",

@@ -39,6 +39,8 @@ def simulate(
     continue_from: Run | None = None,
     until: Callable[..., Any] | None = None,
     numerical_damping: bool = True,
+    max_steps: int | None = None,
+    wall_time: float | None = None,
     progress: Progress = None,
 ) -> Run: ...
 @within_memory
@@ -60,7 +62,8 @@ def simulate(
     an event says what happened and where, and `meta["complete"]` is false. `meta["energy_error"]`
     is how far the energies are from balancing, relative to the largest; beyond 1e-3 an event says
     so, beyond 0.1 the run is not complete. Each event has a name: "limit", "end_of_link", "sleeve",
-    "interrupted", "stuck", "diverged", "exhausted", "balance", "node", "until", "still".
+    "interrupted", "stuck", "diverged", "exhausted", "wall_time", "balance", "not_finite", "node",
+    "until", "still".
 
     Args:
         robot: a System, a Robot, the path or name of a robot file, or a Batch of robots, which
@@ -86,6 +89,9 @@ def simulate(
             the time of t_eval: both may have a memory, so that no tick is computed twice.
         numerical_damping: exponential steps damp fast modes that change no output by more than the
             tolerance (94); False: they do not.
+        max_steps: a budget of steps, rejected ones included, by default 20 million. It ends the run
+            with the event "exhausted", at the same step on every machine.
+        wall_time: seconds after which the run is stopped where it is, with the event "wall_time".
         progress: called with the finished fraction.
 
     Returns:
@@ -94,6 +100,7 @@ def simulate(
     Raises:
         InputError: an argument is not what is expected, or a motion has nothing that follows it.
         NoEquilibrium: there is no static equilibrium to start in.
+        NumericalError: the equations are singular or not finite, or there is too little memory.
     """
     if isinstance(robot, Batch):
         if not (drive is None or isinstance(drive, Drive)):

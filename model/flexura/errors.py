@@ -1,14 +1,18 @@
-"""The one error that bad input raises: it names the file, the key, the value and what was
-expected."""
+"""The errors of flexura: of bad input, which names the file, the key, the value and what was
+expected, and of numbers that fail."""
 
 from __future__ import annotations
 
 import functools
+import sys
+import traceback
 from collections.abc import Callable
 from typing import ParamSpec, TypeVar
 
 P = ParamSpec("P")
 T = TypeVar("T")
+LIBRARIES = frozenset({"numpy", "scipy", "exudyn"})
+OURS = LIBRARIES | {"flexura", "flexlab"}
 
 
 class FlexuraError(Exception):
@@ -106,3 +110,68 @@ def _cut(text: str, limit: int) -> str:
 def _one_line(text: str) -> str:
     """Line ends and what no terminal shows, from a key or a file's name, as escapes."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+class NumericalError(FlexuraError):
+    """A calculation failed in its numbers: what was computed, why it failed, and what to try."""
+
+
+def guarded(what: str) -> Callable[[Callable[P, T]], Callable[P, T]]:
+    """A function whose numerical failures are `NumericalError`s.
+
+    Args:
+        what: the function computes, as the message says it: "the natural frequencies".
+
+    Returns:
+        A decorator. Failures of the caller's own code, as of a drive function, pass unchanged.
+    """
+
+    def decorated(function: Callable[P, T]) -> Callable[P, T]:
+        @functools.wraps(function)
+        def call(*args: P.args, **kwargs: P.kwargs) -> T:
+            try:
+                return function(*args, **kwargs)
+            except FlexuraError:
+                raise
+            except MemoryError as error:
+                raise out_of_memory(error) from None
+            except Exception as error:
+                why = numerical_failure(error)
+                if why is None:
+                    raise
+                raise NumericalError(f"{what} cannot be computed: {why}") from error
+
+        return call
+
+    return decorated
+
+
+def numerical_failure(error: BaseException) -> str | None:
+    """Why numbers failed, in words, if that is what an exception says; None for any other.
+
+    What passes through a module that is neither of this project nor of a library that it calls is
+    the caller's own failure.
+    """
+    frames = [f.f_globals.get("__name__", "") for f, _ in traceback.walk_tb(error.__traceback__)]
+    homes = [name.partition(".")[0] for name in frames]
+    if not all(home in OURS or home in sys.stdlib_module_names - {"__main__"} for home in homes):
+        return None
+    kind = type(error).__name__
+    if kind == "LinAlgError":
+        return (
+            f"its equations are singular or not finite ({error}); look for masses, lengths or "
+            "stiffnesses that are many orders of magnitude apart"
+        )
+    in_library = bool(homes) and homes[-1] in LIBRARIES
+    if (
+        isinstance(error, ArithmeticError)
+        or kind.startswith("Arpack")
+        or (isinstance(error, ValueError) and in_library)
+    ):
+        return (
+            f"its numbers are too large, too small or not finite ({error}); look for values that "
+            "are many orders of magnitude apart"
+        )
+    if type(error) is RuntimeError and (in_library or homes[-1:] == ["flexura"]):
+        return str(error) or "the compiled core failed"
+    return None

@@ -25,6 +25,7 @@ EXTRAS = {
     "rerun": "view",
     "rerun_cli": "view",
     "PIL": "lab",
+    "control": "control",
 }
 
 

@@ -6,21 +6,17 @@ import shutil
 import signal
 import sys
 from collections import Counter
-from pathlib import Path
 
-import archives
 import numpy as np
 import pytest
 
+import archives
 import flexura as fx
+from disturbance import power
+from disturbance.calls import COMMANDS, Place, files
+from disturbance.programs import Program
 from flexlab.tuning.history import History
 from flexura.io import DRAFT, read_toml, settle
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "disturbance"))
-import power
-from programs import Program
-
-from commands import COMMANDS, Place, files
 
 KINDS = ("write", "sync", "rename", "create")
 QUICK = ("simulate", "new")
@@ -215,7 +211,8 @@ def numbers(out):
 # Memory
 
 
-@pytest.mark.parametrize("name", [*QUICK, *SLOW])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", COMMANDS)
 def test_two_limits_of_memory(name, place):
     short_memory(name, place, [2, 40])
 
@@ -238,13 +235,8 @@ def short_memory(name, place, limits):
     print(f"{name}: statuses {dict(counts)}")
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "simulate",
-        *(pytest.param(n, marks=pytest.mark.slow) for n in ("simulate --vary", "inverse", "tune")),
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["simulate", "simulate --vary", "inverse", "tune"])
 def test_every_allocation_of_the_core_fails_once(name, place):
     n, faults, binding = 1, 0, 0
     while True:
@@ -308,7 +300,7 @@ def outcomes(place, name, folder, before, *more, count=6, seed=1):
         yield folder / "after" / command.out, disk.said
 
 
-@pytest.mark.parametrize("old", [False, True])
+@pytest.mark.parametrize("old", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_loss_of_power_while_a_run_is_saved(old, place, tmp_path):
     command, work = ready(place, "simulate")
     assert place.run(command, work).status == 0
@@ -320,7 +312,7 @@ def test_a_loss_of_power_while_a_run_is_saved(old, place, tmp_path):
     texts["old"] = same(place.folder / "work" / "out")
     more = (*command.other, *(("--force",) if old else ()))
     counts = Counter()
-    for out, said in outcomes(place, "simulate", tmp_path, before, *more):
+    for out, said in outcomes(place, "simulate", tmp_path, before, *more, count=6 if old else 4):
         if not out.exists() or not any(out.iterdir()):
             found = "nothing"
         else:

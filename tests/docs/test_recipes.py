@@ -6,12 +6,12 @@ from contextlib import redirect_stdout
 from functools import cache
 from pathlib import Path
 
-import beams
 import numpy as np
 import pytest
-from beams import Beam, Body
 
+import beams
 import flexura as fx
+from beams import Beam, Body
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "guide" / "robots.md"
 

@@ -87,7 +87,7 @@ int c_steps(const int16_t *rates, uint32_t size, int64_t *at, int8_t *direction)
 
 // A whole board through a closed run: every tick has its own set-point (counts
 // / 256, microsteps / 256), encoder counts and reading. Out: the motor's
-// voltage [mV] and the stepper's rate [microstep/s] as reported. The first
+// voltage [2 mV] and the stepper's rate [microstep/s] as reported. The first
 // played tick is an even one.
 struct Told {
   int32_t setpoint[2];

@@ -7,6 +7,7 @@ import tomllib
 from collections import Counter
 
 import pytest
+
 from board_library import FIRMWARE, HERE, INCLUDES, SOURCES
 from branch_coverage import branches, missed
 

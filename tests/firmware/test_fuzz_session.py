@@ -8,6 +8,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+
 from board_library import HERE, INCLUDES, SOURCES, compiled
 
 CORPUS = HERE / "corpus"

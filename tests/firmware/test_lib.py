@@ -12,16 +12,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from board_library import FIRMWARE, HERE, ROOT, compiled
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import flexura as fx
+from board_library import FIRMWARE, HERE, ROOT, compiled
 from flexlab.board.protocol import frames
 from flexlab.board.protocol.declaration import ADC_SAMPLES, CONFIG, CONTROL_HZ, DUTY_FULL
 from flexura import signals
 from flexura.control import gains
 
+SUITES = {"test_refusals", "test_faults", "test_rig", "test_session"}
 TICK_S = 1 / CONTROL_HZ
 
 
@@ -364,8 +365,9 @@ def test_no_damaged_frame_is_obeyed(tmp_path, frames, seed):
 @pytest.mark.parametrize(
     "environment, suites",
     [
-        ("native", {"test_lib", "test_refusals", "test_faults"}),
-        ("simavr", {"test_lib", "test_refusals", "test_faults", "test_interrupts"}),
+        ("native", {"test_lib", *SUITES}),
+        ("simavr", {"test_lib", "test_interrupts"}),
+        pytest.param("simavr", SUITES, marks=pytest.mark.slow),
     ],
 )
 def test_the_unit_tests_run_here_and_on_the_avr(environment, suites, tmp_path):
@@ -373,7 +375,8 @@ def test_the_unit_tests_run_here_and_on_the_avr(environment, suites, tmp_path):
     handlers in assembly are compared with their C++ too. Each must have run all its tests."""
     report = tmp_path / "report.json"
     build = [sys.executable, FIRMWARE / "build.py", "--compiler", "debian"]
-    command = [*build, "pio", "test", "-e", environment, "--without-uploading"]
+    chosen = [word for name in sorted(suites) for word in ("-f", name)]
+    command = [*build, "pio", "test", "-e", environment, "--without-uploading", *chosen]
     done = subprocess.run([*command, "--json-output-path", report], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr
     ran = {

@@ -1,13 +1,13 @@
 """Masses on links, centres off the line, hub radii and springs beside drives, against textbook
 answers to 1e-5, and their energies."""
 
-import beams
 import numpy as np
 import pytest
-from beams import Beam, Body
 from scipy.special import ellipk
 
+import beams
 import flexura as fx
+from beams import Beam, Body
 from flexura import signals
 from robots import beam, rigid, robot
 

@@ -1,11 +1,11 @@
 """A rotor behind a transmission: two masses in closed form, case m02, controllers, energies."""
 
-import beams
 import numpy as np
 import pytest
-from beams import Beam
 
+import beams
 import flexura as fx
+from beams import Beam
 from flexura import signals
 from flexura.control import PID, Controller, Force, lqr
 from robots import beam, rigid, robot

@@ -9,19 +9,21 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-from flexura.signals import harmonic
+from flexura.signals import Signal, harmonic
 
 from ..board.commissioning import commission
 from ..board.emulator.emulated import EmulatedBoard
 from ..board.emulator.simulator import CLOCK_HZ
 from ..board.protocol.declaration import CONTROL_HZ
-from ..board.protocol.player import Player, setpoints
+from ..board.protocol.player import Knots, Player, setpoints
 from ..board.protocol.session import Link
 from ..rig import RigSetup, configuration
+from ..rig.board_axes import board_axes
 from ..rig.plant.plant import rig_plant
 from ..rig.plant.rigid_plant import RigidPlant
 
@@ -103,7 +105,7 @@ def measure(elf: Path, setup: RigSetup, seconds: float = 2.0, every_term: bool =
         simulator.data[address] = PAINT
     link = _ready(board, settings)
     carriage, joint = (harmonic(way / 2, 1.0, math.pi, way / 2) for way in (0.0398, 2.498))
-    player = Player(link, setpoints(carriage, joint, seconds + 1.0, settings))
+    player = Player(link, _setpoints((carriage, joint), seconds + 1.0, settings))
     player.start()
     before, begin, wall = simulator.interrupts(), simulator.cycle, time.process_time()
     simulator.trace(board.lines["busy"], True)
@@ -168,7 +170,7 @@ def experiment(elf: Path, setup: RigSetup, seconds: float = 4.0) -> tuple[float,
     carriage, joint = (
         harmonic(amplitude, 1.0, math.pi, amplitude) for amplitude in (0.012, math.pi / 6)
     )
-    player = Player(link, setpoints(carriage, joint, seconds + 1.0, settings))
+    player = Player(link, _setpoints((carriage, joint), seconds + 1.0, settings))
     player.start()
     wall = time.process_time()
     player.run(seconds)
@@ -178,6 +180,10 @@ def experiment(elf: Path, setup: RigSetup, seconds: float = 4.0) -> tuple[float,
     alone = _alone(board)
     board.close()
     return seconds / wall, IDLE_S / alone
+
+
+def _setpoints(motions: Sequence[Signal], duration_s: float, settings: dict[str, float]) -> Knots:
+    return setpoints(motions, duration_s, [axis.setpoints for axis in board_axes(settings)])
 
 
 def _ready(board: EmulatedBoard, settings: dict[str, float]) -> Link:

@@ -46,7 +46,7 @@ def drive(work: Work) -> Any:
     if work.of_time is not None or work.of_state is not None:
         return work.of_time or work.of_state
     if work.tick is not None:
-        return fx.Sampled(work.tick(), work.rate_Hz)  # type: ignore[attr-defined]
+        return fx.Sampled(work.tick(), work.rate_Hz)
     if work.rate_Hz:
         laws = [
             fx.PID(m, kp=p, kd=d, derivative_Hz=0.0)

@@ -22,6 +22,7 @@ from .verbosity import set_verbosity
 COMMANDS = {
     "simulate": "Simulate a robot; with --vary, a population of robots.",
     "inverse": "Compute the forces that a manoeuvre's motions take.",
+    "invert": "Compute drives with which the tip follows a path.",
     "frequencies": "Compute natural frequencies, joints locked and free.",
     "crosscheck": "Simulate a robot here and in Exudyn, and compare both.",
     "study": "Study a robot's payload, link lengths, or sleeve.",

@@ -27,8 +27,9 @@ from ..identification.vibration.shapers import read_shaper, shaped
 from ..recordings.flex_calibration import read as read_calibration
 from ..recordings.recording import unfinished
 from ..recordings.run_from_recording import run_from_recording
-from ..recordings.unit_conversion import Sensor
+from ..recordings.strip_sensor import sensor_of
 from ..review.live import serve
+from ..rig.board_axes import board_axes
 from .bench_calibrate import calibrate
 from .bench_options import (
     Calibrated,
@@ -118,7 +119,7 @@ def experiment(function: Any) -> Any:
     parameters = [*own, *shared]
     command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     command.__annotations__ = {p.name: p.annotation for p in parameters}
-    del command.__wrapped__  # type: ignore[attr-defined]
+    del command.__wrapped__
     return command
 
 
@@ -131,17 +132,17 @@ def forward(
         typer.Option(
             metavar="FILE",
             help=(
-                "name, duration_s, and the signals voltage_V and rate_rad_s (TOML, as in a "
-                "manoeuvre)"
+                "name, duration_s, and the signals voltage_V and, of joint 2, rate_rad_s or "
+                "voltage_2_V (TOML, as in a manoeuvre)"
             ),
         ),
     ] = None,
     *,
     options: BenchOptions,
 ) -> None:
-    """Drive motor and stepper open loop.
+    """Drive the joints open loop.
 
-    The motor gets a voltage, the stepper pulses.
+    A motor gets a voltage, a stepper pulses.
 
     \b
     Example: flexura bench forward --emulated --seed 1
@@ -158,7 +159,7 @@ def inverse(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="manoeuvre file with a motion of both joints; default: the rig file's",
+            help="manoeuvre file with a motion of each joint; default: the rig file's",
         ),
     ] = None,
     gains: Gains = None,
@@ -173,10 +174,11 @@ def inverse(
     \b
     Example: flexura bench inverse --manoeuvre rig-inverse-law
     """
-    asked = None if manoeuvre is None else fx.load_manoeuvre(manoeuvre, 2)
     filed = None if shaper is None else read_shaper(shaper)
 
     def ask(bench: Any, settings: Any) -> Any:
+        joints = bench.rig.joints
+        asked = None if manoeuvre is None else fx.load_manoeuvre(manoeuvre, joints)
         try:
             chosen = asked or bench.manoeuvre
             return plan.inverse(bench, settings, shaped(chosen, filed) if filed else chosen)
@@ -190,9 +192,16 @@ def inverse(
 @experiment
 def step(
     rig: RigFile = None,
-    step_1_m: Annotated[float, typer.Option(help="height of joint 1's step")] = 0.005,
-    step_2_rad: Annotated[float, typer.Option(help="height of joint 2's step")] = 0.1,
-    duration_s: Annotated[float, typer.Option(help="of both steps together")] = 4.0,
+    step_1_m: Annotated[
+        float | None, typer.Option(help="height of joint 1's step on a rail; default 0.005")
+    ] = None,
+    step_1_rad: Annotated[
+        float | None, typer.Option(help="the same where joint 1 turns; default 0.1")
+    ] = None,
+    step_2_rad: Annotated[
+        float | None, typer.Option(help="height of joint 2's step; default 0.1")
+    ] = None,
+    duration_s: Annotated[float, typer.Option(help="of the steps together")] = 4.0,
     apart_s: Annotated[
         float | None,
         typer.Option(help="joint 2's step after joint 1's; default: half the duration"),
@@ -206,9 +215,16 @@ def step(
     \b
     Example: flexura bench step --gains gains.toml --step-1-m 0.004
     """
-    ask = lambda bench, settings: plan.step(
-        bench, settings, step_1_m, step_2_rad, duration_s, apart_s
-    )
+    given = {"--step-1-m": step_1_m, "--step-1-rad": step_1_rad, "--step-2-rad": step_2_rad}
+
+    def ask(bench: Any, settings: Any) -> Any:
+        axes = [f"--step-{axis.number}-{axis.unit}" for axis in board_axes(settings)]
+        for key, value in given.items():
+            if value is not None and key not in axes:
+                known = f"expected a step of this rig: {', '.join(axes)}"
+                raise fx.InputError(known, key=key, value=value)
+        return plan.step(bench, settings, [given[key] for key in axes], duration_s, apart_s)
+
     _run(rig, ask, options, gains)
 
 
@@ -216,12 +232,14 @@ def step(
 @experiment
 def free_vibration(
     rig: RigFile = None,
-    turn_rad: Annotated[float, typer.Option(help="how far joint 2 turns before it stops")] = 0.1,
+    turn_rad: Annotated[
+        float, typer.Option(help="how far the last joint turns before it stops")
+    ] = 0.1,
     duration_s: Annotated[float, typer.Option(help="of the whole")] = 6.0,
     *,
     options: BenchOptions,
 ) -> None:
-    """Stop joint 2 after a fast move; the strip rings.
+    """Stop the last joint after a fast move; the strip rings.
 
     \b
     Example: flexura bench free-vibration --duration-s 10
@@ -287,11 +305,8 @@ def _run(rig: Path | None, ask: Any, options: BenchOptions, gains: Path | None =
     steps.check(asked)
     if gains is not None:
         asked = replace(asked, asked=asked.asked | {"gains": str(gains)})
-    fitted = (
-        rigs.calibration(bench)
-        if options.calibration is None
-        else read_calibration(options.calibration)
-    )
+    given = options.calibration
+    sensor = sensor_of(bench, None if given is None else read_calibration(given))
     emulated = "" if options.port else "emulated-"
     folder = (
         options.out
@@ -312,12 +327,10 @@ def _run(rig: Path | None, ask: Any, options: BenchOptions, gains: Path | None =
     with contextlib.ExitStack() as stack:
         stack.callback(opened.board.close)
         stop = stack.enter_context(watch_for_stop())
-        seers = [stack.enter_context(live_view(asked, Sensor(fitted, fitted.zero), title))]
+        seers = [stack.enter_context(live_view(asked, sensor, title))]
         if options.live:
             seers.append(
-                stack.enter_context(
-                    serve(asked, Sensor(fitted, fitted.zero), bench.robot, title, options.live_port)
-                )
+                stack.enter_context(serve(asked, sensor, bench.robot, title, options.live_port))
             )
             typer.echo(
                 f"live view: rerun --connect rerun+http://127.0.0.1:{options.live_port}/proxy",
@@ -341,7 +354,7 @@ def _run(rig: Path | None, ask: Any, options: BenchOptions, gains: Path | None =
         )
         try:
             done = steps.conduct(
-                bench, asked, opened, folder, fitted, watch, options.configure, options.force
+                bench, asked, opened, folder, sensor, watch, options.configure, options.force
             )
         except steps.RefusedToStart as error:
             typer.echo(f"flexura: {error}", err=True)
@@ -385,7 +398,7 @@ def _confirm() -> None:
             key="--yes",
         )
     typer.confirm(
-        "Do both joints stand at their zero marks, and is nobody in reach of the arm?",
+        "Do the joints stand at their zero marks, and is nobody in reach of the arm?",
         abort=True,
         err=True,
     )

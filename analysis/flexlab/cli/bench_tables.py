@@ -14,13 +14,15 @@ from typing import Any
 import numpy as np
 
 from ..board.protocol.declaration import Flag, Mode, State
-from ..board.protocol.player import FRACTION
+from ..board.protocol.player import FRACTION, VOLT_UNIT_V
 from ..experiment.plan import Plan
 from ..experiment.run_experiment import ExperimentResult
 from ..experiment.stop_requests import KEYS_HELP
 from ..recordings.flex_calibration import Fit
-from ..recordings.unit_conversion import Sensor, flex_reading
+from ..recordings.unit_conversion import DEFLECTION_SENSORS, Sensor, flex_reading
 from ..rig import Check
+from ..rig.board_axes import board_axes
+from ..rig.checks import scale_of
 from ..runs.formatting import number
 from ..runs.table import Styled, Table
 
@@ -66,35 +68,30 @@ def live_table(report: Any, part: float, plan: Plan, sensor: Sensor, title: str)
     from rich.table import Table as Drawing
     from rich.text import Text
 
-    settings = plan.settings
-    per_m, per_rad, per_step = (
-        settings[name]
-        for name in ("motor_counts_per_m", "stepper_counts_per_rad", "stepper_steps_per_rad")
-    )
     out = Drawing(
         title=Text(title), title_justify="left", caption=KEYS_HELP, caption_justify="left"
     )
     for name in ("", "position", "set-point", "drive"):
         out.add_column(name, justify="left" if not name else "right", min_width=14)
     tracked = plan.knots.mode is Mode.position and report["state"] == State.running
-    wanted = [
-        f"{1e3 * report['setpoint_1'] / FRACTION / per_m:.2f} mm",
-        f"{report['setpoint_2'] / FRACTION / per_step:.4f} rad",
-    ]
-    one, two = wanted if tracked else ("", "")
-    out.add_row(
-        "joint 1",
-        f"{1e3 * report['position_1'] / per_m:.2f} mm",
-        one,
-        f"{report['voltage'] / 1000:.2f} V",
-    )
-    out.add_row(
-        "joint 2",
-        f"{report['position_2'] / per_rad:.4f} rad",
-        two,
-        f"{report['rate'] / per_step:.3f} rad/s",
-    )
-    out.add_row("tip deflection", f"{1e3 * float(sensor.tip(flex_reading(report['flex']))):.2f} mm")
+    for axis in board_axes(plan.settings):
+        n = axis.number
+        factor, unit, _ = scale_of(axis)
+        digits = 2 if unit == "mm" else 4
+        wanted = factor * report[f"setpoint_{n}"] / FRACTION / axis.setpoints
+        if axis.kind == "motor":
+            drive = f"{report['voltage' if n == 1 else 'voltage_2'] * VOLT_UNIT_V:.2f} V"
+        else:
+            drive = f"{report['rate'] / axis.setpoints:.3f} rad/s"
+        out.add_row(
+            f"joint {n}",
+            f"{factor * report[f'position_{n}'] / axis.counts:.{digits}f} {unit}",
+            f"{wanted:.{digits}f} {unit}" if tracked else "",
+            drive,
+        )
+    if sensor.kind in DEFLECTION_SENSORS:
+        tip = float(sensor.tip(flex_reading(report["flex"])))
+        out.add_row("tip deflection", f"{1e3 * tip:.2f} mm")
     limited = ", voltage at its limit" if report["flags"] >> Flag.saturated & 1 else ""
     out.add_row(
         "board",

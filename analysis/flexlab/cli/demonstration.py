@@ -17,6 +17,7 @@ from ..comparison.replay.simulate_experiment import simulate_experiment
 from ..crosscheck import crosscheck as cross
 from ..experiment import plan, run_experiment
 from ..experiment.flash import RIG, build
+from ..recordings.strip_sensor import sensor_of
 from ..review import picture
 from .compare import save as save_comparison
 
@@ -120,9 +121,7 @@ def _experiment(folder: Path, progress: cross.Progress | None) -> fx.Run:
         observe=lambda reports, part: progress("emulated", part) if progress else None
     )
     try:
-        return run_experiment.conduct(
-            bench, asked, opened, folder, rig.calibration(bench), watch
-        ).run
+        return run_experiment.conduct(bench, asked, opened, folder, sensor_of(bench), watch).run
     finally:
         opened.board.close()
 

@@ -67,7 +67,7 @@ def identify(
         file_result(files.beside(path), force=force or out is None),
     ):
         try:
-            with progress_bars("joint 1", "strip") as report:
+            with progress_bars("joints", "strip") as report:
                 found = identified(experiment, report)
         except fx.InputError as error:
             raise error if error.file else error.in_file(str(run)) from None

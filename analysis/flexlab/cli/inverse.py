@@ -12,7 +12,7 @@ from flexura.io import FILE
 
 from ..studies.drive_requirements import efforts
 from . import tables
-from .options import Force, Json, Out, RobotFile, Rtol, Start
+from .options import Force, Json, MaxSteps, Out, RobotFile, Rtol, Start, WallTime
 from .output import load_request, print_results, report_saved, simulate_asked
 from .results import results
 
@@ -28,6 +28,8 @@ def inverse(
     out: Out = None,
     rtol: Rtol = 1e-7,
     method: Annotated[str, typer.Option(help="auto, explicit or implicit")] = "auto",
+    max_steps: MaxSteps = None,
+    wall_time: WallTime = None,
     force: Force = False,
     start: Start = None,
     json: Json = False,
@@ -53,9 +55,18 @@ def inverse(
     except fx.InputError as error:
         raise error.in_file(str(manoeuvre)) from None
     with results(out, "inverse", robot.stem, manoeuvre.stem, force=force) as draft:
-        run = simulate_asked(system, asked, drive, "inverse", rtol=rtol, method=method)
+        run = simulate_asked(
+            system,
+            asked,
+            drive,
+            "inverse",
+            rtol=rtol,
+            method=method,
+            max_steps=max_steps,
+            wall_time=wall_time,
+        )
         run.save(draft.folder)
-        folder = draft.keep(interrupted=run.interrupted)
+        folder = draft.keep(interrupted=run.stopped)
     rows = efforts(run) if len(run) > 1 else []
     print_results(
         json,

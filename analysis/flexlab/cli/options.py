@@ -47,6 +47,14 @@ ShaperFile = Annotated[
         help="input shaper (TOML, of flexura vibration): the manoeuvre's motions are shaped",
     ),
 ]
+MaxSteps = Annotated[
+    int | None,
+    typer.Option(metavar="N", help="budget of steps; it ends the run; default 20 million"),
+]
+WallTime = Annotated[
+    float | None,
+    typer.Option(metavar="SECONDS", help="stop after so many seconds; keep what is computed"),
+]
 Start = Annotated[
     str | None,
     typer.Option(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -18,12 +18,14 @@ from .options import (
     Force,
     Json,
     ManoeuvreFile,
+    MaxSteps,
     Out,
     Prescribed,
     RobotFile,
     Rtol,
     ShaperFile,
     Start,
+    WallTime,
     stem,
 )
 from .output import (
@@ -65,6 +67,8 @@ def simulate(
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="with --vary: a Dask scheduler, tcp://...")
     ] = None,
+    max_steps: MaxSteps = None,
+    wall_time: WallTime = None,
     force: Force = False,
     json: Json = False,
 ) -> None:
@@ -88,7 +92,17 @@ def simulate(
             if given:
                 raise fx.InputError("expected without --vary", key=key, value=str(given))
         _simulate_many(
-            robot, manoeuvre, prescribed, start, vary, out, rtol, method, scheduler, json
+            robot,
+            manoeuvre,
+            prescribed,
+            start,
+            vary,
+            out,
+            rtol,
+            method,
+            scheduler,
+            json,
+            {"max_steps": max_steps, "wall_time": wall_time},
         )
         return
     if controller and prescribed:
@@ -102,9 +116,18 @@ def simulate(
         check_followed(asked, manoeuvre, "call with --controller GAINS or --prescribed")
     drive = controller_from_file(system, asked, controller) if controller else asked.drive
     with results(out, "simulate", robot.stem, *stem(manoeuvre), force=force) as draft:
-        run = simulate_asked(system, asked, drive, "native", rtol=rtol, method=method)
+        run = simulate_asked(
+            system,
+            asked,
+            drive,
+            "native",
+            rtol=rtol,
+            method=method,
+            max_steps=max_steps,
+            wall_time=wall_time,
+        )
         run.save(draft.folder)
-        folder = draft.keep(interrupted=run.interrupted)
+        folder = draft.keep(interrupted=run.stopped)
     print_results(
         json,
         lambda: tables.run_table(run),
@@ -124,6 +147,7 @@ def _simulate_many(
     method: str,
     scheduler: str | None,
     json: bool,
+    budget: dict[str, Any],
 ) -> None:
     parameter_sweep.ranges(vary)  # the count is refused before anything is computed
     system, asked = load_request(robot, manoeuvre, prescribed, start)
@@ -141,6 +165,7 @@ def _simulate_many(
             folder=folder,
             scheduler=scheduler,
             progress=lambda f: report("robots", f),
+            **budget,
         )
     if not done.complete:
         warn(

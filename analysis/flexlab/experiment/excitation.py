@@ -8,6 +8,8 @@
                    millimetre: backlash
     9.0 to 10 s    free vibration: damping
 
+Motors that turn their joints take turns in such strokes and sweeps through both modes.
+
 Frequencies and rates follow from the nominal robot, so that a strip of another length is excited as
 well.
 """
@@ -30,41 +32,66 @@ STROKE_RAD_S, CHIRP_RAD_S = 0.5, 0.9
 TURN_RAD, TURN_S, TURN_AT_S = 1.2, 1.2, 4.2
 SWEEP = (5.4, 8.9)
 STROKE_V, SWEEP_V = (3.0, 6.0), 2.8
+# of motors that turn their joints: a voltage is a speed, and the second mode takes more of it
+SWEEP_TURNING_V, FAST_V = 2.2, 9.0
 # the board's limit in this experiment: a jump of the rate by a microstep is harmless
 ACCELERATION_RAD_S2 = 500.0
 
 
 def plan(setup: RigSetup, settings: dict[str, float]) -> Plan:
-    """The plan of the excitation, whatever the rig's limit of joint 2's acceleration.
+    """The plan of the excitation, whatever the rig's limit of a stepper's acceleration.
 
     Args:
         setup: the rig.
         settings: the board's settings, by name.
     """
-    return forward(
-        setup, settings | {"acceleration_max_2_rad_s2": ACCELERATION_RAD_S2}, profile(setup.robot)
-    )
+    if setup.rig.stepper:
+        settings = settings | {"acceleration_max_2_rad_s2": ACCELERATION_RAD_S2}
+    return forward(setup, settings, profile(setup))
 
 
-def profile(robot: fx.Robot) -> dict[str, Any]:
-    """Tables of a profile for `flexura bench forward`: motor voltage, rate of joint 2.
+def profile(setup: RigSetup) -> dict[str, Any]:
+    """Tables of a profile for `flexura bench forward`: what each drive gets.
 
     Args:
-        robot: the nominal robot.
+        setup: the rig.
     """
-    first, second = fx.frequencies(fx.assemble(robot), joints="locked")[:2]
+    first, second = fx.frequencies(fx.assemble(setup.robot), joints="locked")[:2]
     t = np.arange(round(DURATION_S / STEP_S)) * STEP_S
     hold = lambda values: {
         "kind": "piecewise",
         "at_s": t.round(6).tolist(),
         "value": values.round(6).tolist(),
     }
-    return {
-        "name": "excitation for the identification",
-        "duration_s": DURATION_S,
-        "voltage_V": hold(_voltage(t, first)),
-        "rate_rad_s": hold(_rate(t, first, second)),
-    }
+    out = {"name": "excitation for the identification", "duration_s": DURATION_S}
+    if setup.rig.screw:
+        return out | {
+            "voltage_V": hold(_voltage(t, first)),
+            "rate_rad_s": hold(_rate(t, first, second)),
+        }
+    keys = ("voltage_V", "rate_rad_s" if setup.rig.stepper else "voltage_2_V")[: setup.rig.joints]
+    # the joints take turns: each moves while the others hold
+    length = (SWEEP[1] - CHIRP[0]) / len(keys)
+    for k, key in enumerate(keys):
+        begin = CHIRP[0] + k * length
+        course = (
+            _rate(t, first, second)
+            if key == "rate_rad_s"
+            else _turning(t, begin, begin + length, first, second)
+        )
+        out[key] = hold(course)
+    return out
+
+
+def _turning(t: np.ndarray, a: float, b: float, first_Hz: float, second_Hz: float) -> np.ndarray:
+    """Voltage of a motor that turns its joint, from a to b [s]: strokes, then both modes."""
+    third = (b - a) / 3
+    strokes = STROKE_V[1] * np.cos(2 * np.pi * 1.0 * (t - a)) * _window(t, a, a + third)
+    low = _chirp(t, a + third, a + 2 * third, 0.78 * first_Hz, 1.18 * first_Hz)
+    high = _chirp(t, a + 2 * third, b, 0.8 * second_Hz, 1.1 * second_Hz)
+    sweep = SWEEP_TURNING_V * np.cos(2 * np.pi * low) * _window(t, a + third, a + 2 * third)
+    fast = FAST_V * np.cos(2 * np.pi * high) * _window(t, a + 2 * third, b)
+    return strokes + sweep + fast
 
 
 def _voltage(t: np.ndarray, first_Hz: float) -> np.ndarray:

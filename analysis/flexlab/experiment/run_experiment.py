@@ -22,9 +22,9 @@ from ..board.protocol.session import Link
 from ..board.serial_port import SerialBoard
 from ..recordings.recording import Recording, RecordingBoard
 from ..recordings.run_from_recording import knots_spec, run_from_recording
+from ..recordings.strip_sensor import sensor_spec
 from ..recordings.unit_conversion import Sensor
 from ..rig import Check, RigSetup, configuration
-from ..rig.description import Calibration
 from ..rig.plant.plant import rig_plant
 from .flash import build
 from .plan import Plan
@@ -136,16 +136,14 @@ def open_board(
     return OpenBoard(board, seed, dict(plant.truth), plant, cut or "")
 
 
-def session(
-    setup: RigSetup, plan: Plan, opened: OpenBoard, calibration: Calibration
-) -> dict[str, Any]:
+def session(setup: RigSetup, plan: Plan, opened: OpenBoard, sensor: Sensor) -> dict[str, Any]:
     """What is known before the board is greeted, for session.json and the run's metadata.
 
     Args:
         setup: the rig.
         plan: the experiment.
         opened: the board.
-        calibration: of the flex sensor.
+        sensor: of the strip, calibrated.
     """
     board = opened.board
     assert board.label.startswith("emulated") == board.emulated
@@ -169,8 +167,8 @@ def session(
             "phases": plan.phases,
             "settings": plan.settings,
             "knots": knots_spec(plan.knots),
-            "calibration": calibration.model_dump(mode="json"),
         }
+        | sensor_spec(sensor)
         | ({"plant": type(opened.plant).__name__, "truth": opened.truth} if board.emulated else {})
         | ({"cut": opened.cut} if opened.cut else {})
     )
@@ -181,7 +179,7 @@ def conduct(
     plan: Plan,
     opened: OpenBoard,
     folder: Path,
-    calibration: Calibration,
+    sensor: Sensor,
     watch: Hooks,
     configure: bool = False,
     replace: bool = False,
@@ -196,7 +194,7 @@ def conduct(
         plan: the experiment.
         opened: the board.
         folder: of the recording.
-        calibration: of the flex sensor.
+        sensor: of the strip, calibrated.
         watch: what the person sees and says.
         configure: whether the rig's settings may be written into a board that has others.
         replace: whether a recording in `folder` may be replaced.
@@ -210,7 +208,7 @@ def conduct(
         RefusedToStart: a person did not want it.
     """
     check(plan)
-    recording = Recording(folder, session(setup, plan, opened, calibration), replace=replace)
+    recording = Recording(folder, session(setup, plan, opened, sensor), replace=replace)
     # The same experiment on the emulated board is the same byte for byte; a real line needs a
     # number that nobody played before.
     link = Link(
@@ -222,7 +220,7 @@ def conduct(
             recording,
             setup,
             plan,
-            calibration,
+            sensor,
             opened.board.emulated or configure,
             lambda link: commission(link, opened.board, watch.say, watch.stop_asked),
         )
@@ -267,11 +265,11 @@ def _ready(
     recording: Recording,
     setup: RigSetup,
     plan: Plan,
-    calibration: Calibration,
+    sensor: Sensor,
     write: bool,
     commission: Callable[[Link], Program],
 ) -> list[Check]:
-    """Greet the board, configure and test it, and tell it that both joints stand at 0."""
+    """Greet the board, configure and test it, and tell it that the joints stand at 0."""
     identity = link.connect()
     runs = program(link)
     recording.write_session(
@@ -286,9 +284,7 @@ def _ready(
     )
     findings = prepare(link, identity, configuration(setup), plan.settings, write, commission)
     if all(finding.passed for finding in findings):
-        more, rest = run_selftest(
-            link, plan.settings, lambda r: float(Sensor(calibration, calibration.zero).tip(r))
-        )
+        more, rest = run_selftest(link, plan.settings, sensor)
         findings += more
         recording.write_session(rest=rest.spec())
         link.command("reference", position_1=0, position_2=0, steps=0)

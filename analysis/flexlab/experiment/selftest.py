@@ -2,7 +2,7 @@
 
 Nothing moves in it. `Link.connect` compares the declaration's hash when the session opens. The
 self-test checks pins, configuration, faults, the proof of the emergency stop, supply, switches,
-encoders and the flex sensor at rest.
+encoders and the strip's sensor at rest.
 """
 
 from __future__ import annotations
@@ -17,8 +17,9 @@ from ..board.base import BoardError
 from ..board.commissioning import Program, program, where
 from ..board.protocol.declaration import FAULTS, PINS_HASH, Fault, Flag, Result, State
 from ..board.protocol.session import Identity, Link, Refused
-from ..recordings.unit_conversion import flex_reading
+from ..recordings.unit_conversion import DEFLECTION_SENSORS, Sensor, flex_reading
 from ..rig import Check
+from ..rig.board_axes import board_axes
 from .flash import as_float32
 
 REST_S = 0.4  # how long the rig is watched at rest
@@ -27,7 +28,7 @@ BENT_M = 0.03  # a tip deflection at rest that is no drift of the sensor any mor
 
 @dataclass(frozen=True)
 class Rest:
-    """The flex sensor's reading with the strip at rest.
+    """The sensor's reading with the strip at rest.
 
     `zero`: mean. `noise`: standard deviation of one report. `reports`: their number.
     """
@@ -150,16 +151,18 @@ def _stop_proof(runs: Program) -> Check:
     )
 
 
-def run_selftest(link: Link, settings: dict[str, float], tip_m: Any) -> tuple[list[Check], Rest]:
+def run_selftest(
+    link: Link, settings: dict[str, float], sensor: Sensor
+) -> tuple[list[Check], Rest]:
     """Watch the rig at rest.
 
     Args:
         link: the session with the board.
         settings: of the experiment, by name.
-        tip_m: tip deflection [m] of a reading, by the calibration.
+        sensor: of the strip, calibrated.
 
     Returns:
-        The checks, and the flex sensor's reading at rest.
+        The checks, and the sensor's reading at rest.
 
     Raises:
         BoardError: reports are missing.
@@ -200,7 +203,10 @@ def run_selftest(link: Link, settings: dict[str, float], tip_m: Any) -> tuple[li
                 fault[1],
             )
         )
-    for number in (1, 2):
+    for axis in board_axes(settings):
+        if not axis.encoder:
+            continue
+        number = axis.number
         counts = seen[f"position_{number}"]
         spread = int(counts.max() - counts.min())
         found = "still" if spread <= 1 else f"moved by {spread} counts"
@@ -215,24 +221,28 @@ def run_selftest(link: Link, settings: dict[str, float], tip_m: Any) -> tuple[li
         )
     missed = int(seen["missed"][-1] - seen["missed"][0])
     out.append(Check("missed edges", missed == 0, str(missed), "0", "check the encoders' wires"))
-    low, high = settings["flex_min"], settings["flex_max"]
-    tip = tip_m(rest.zero)
-    out += [
-        Check(
-            "flex sensor",
-            bool(low < x.min() and x.max() < high),
-            f"{rest.zero:.4f} +- {rest.noise:.4f}",
-            f"{low:g} to {high:g}",
-            "check the sensor and its wires",
-        ),
-        Check(
-            "strip at rest",
-            abs(tip) < BENT_M,
-            f"{1e3 * tip:.1f} mm by the calibration",
-            f"within {1e3 * BENT_M:g} mm",
-            "free the strip, or calibrate: flexura bench calibrate",
-        ),
-    ]
+    if sensor.kind:
+        low, high = settings["flex_min"], settings["flex_max"]
+        out.append(
+            Check(
+                sensor.kind.replace("_", " ") + (" sensor" if sensor.kind == "flex" else ""),
+                bool(low < x.min() and x.max() < high),
+                f"{rest.zero:.4f} +- {rest.noise:.4f}",
+                f"{low:g} to {high:g}",
+                "check the sensor and its wires",
+            )
+        )
+    if sensor.kind in DEFLECTION_SENSORS:
+        tip = float(sensor.tip(np.asarray(rest.zero)))
+        out.append(
+            Check(
+                "strip at rest",
+                abs(tip) < BENT_M,
+                f"{1e3 * tip:.1f} mm by the calibration",
+                f"within {1e3 * BENT_M:g} mm",
+                "free the strip, or calibrate: flexura bench calibrate",
+            )
+        )
     return out, rest
 
 

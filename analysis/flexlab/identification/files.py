@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +15,12 @@ from flexura.errors import InputError
 from flexura.io import find, write_toml
 
 from ..recordings import flex_calibration
-from ..recordings.unit_conversion import ADC_V, Sensor
-from ..rig.description import Calibration, Rig
+from ..recordings.strip_sensor import sensor_of_session
+from ..recordings.unit_conversion import ADC_V, voltage_channel
+from ..rig.axes import MotorAxis, motor_axes
+from ..rig.description import Rig
 from ..rig.plant.motor import resistance
+from ..rig.sensors import Calibration
 from ..rig.toml_table import named_file
 from .identify import Identified
 from .strip import with_parameters
@@ -29,8 +33,8 @@ def robot(found: Identified) -> fx.Robot:
     return with_parameters(found.nominal.robot, found.strip.values)
 
 
-def with_identified_friction(old: Rig, factor: float) -> dict[str, Any]:
-    """The rig file's tables with all friction of motor, screw and rail times one factor.
+def with_identified_friction(old: Rig, factors: Mapping[int, float]) -> dict[str, Any]:
+    """The rig file's tables with all friction of each motor and its joint times one factor.
 
     Voltage and speed cannot tell these frictions apart. A motor with more friction takes more
     current without load and turns slower; its constant and gear stay the same: I_0' = f I_0, n_0' =
@@ -38,40 +42,54 @@ def with_identified_friction(old: Rig, factor: float) -> dict[str, Any]:
 
     Args:
         old: the rig.
-        factor: f.
+        factors: f of each joint with a motor, by its number.
     """
-    tables, motor = old.model_dump(mode="json", exclude_none=True), old.motor
-    before, after = motor.no_load_current_A, factor * motor.no_load_current_A
-    emf = lambda current: motor.rated_voltage_V - resistance(old) * current
-    left = lambda current: motor.stall_current_A - current
-    tables["motor"] |= {
-        "no_load_current_A": after,
-        "no_load_speed_rpm": motor.no_load_speed_rpm * emf(after) / emf(before),
-        "stall_torque_N_m": motor.stall_torque_N_m * left(after) / left(before),
-    }
-    emulated = tables["emulated"]
-    for table, name in (
-        ("motor", "starts_at_V"),
-        ("screw", "coulomb_friction_N_m"),
-        ("carriage", "coulomb_friction_N"),
-        ("screw", "viscous_friction_N_m_s"),
-        ("carriage", "viscous_friction_N_s_m"),
-    ):
-        emulated[table][name] *= factor
+    tables = old.model_dump(mode="json", exclude_none=True)
+    for axis in motor_axes(old):
+        motor, factor = axis.motor, factors[axis.number]
+        before, after = motor.no_load_current_A, factor * motor.no_load_current_A
+        emf = lambda current, motor=motor: motor.rated_voltage_V - resistance(motor) * current
+        left = lambda current, motor=motor: motor.stall_current_A - current
+        tables[axis.table] |= {
+            "no_load_current_A": after,
+            "no_load_speed_rpm": motor.no_load_speed_rpm * emf(after) / emf(before),
+            "stall_torque_N_m": motor.stall_torque_N_m * left(after) / left(before),
+        }
+        own = guide_table(old, axis)
+        for table in (axis.table, "screw", own):
+            if table == "screw" and axis.turns:
+                continue
+            for name in tables[table]:
+                if name == "starts_at_V" or name.startswith(("coulomb_", "viscous_")):
+                    tables[table][name] *= factor
     return tables
+
+
+def guide_table(rig: Rig, axis: MotorAxis) -> str:
+    """The table with a joint's own friction and backlash."""
+    if rig.screw and axis.number == 1:
+        return "carriage"
+    return "bearing" if axis.number == 1 else "bearing_2"
 
 
 def rig(found: Identified) -> Rig:
     """The rig with the identified friction, backlash, holding torque and calibration."""
     nominal, values = found.nominal, found.strip.values
-    tables = with_identified_friction(
-        nominal.rig, found.carriage.values["coulomb_N"] / nominal.line.coulomb_N
-    )
-    tables["stepper"]["holding_torque_N_m"] *= values["holding"]
-    tables["flex"]["ohm_per_rad"] *= values["flex_gain"]
-    tables["flex"]["calibration"] = calibration(found).model_dump(exclude_none=True)
-    tables["emulated"]["carriage"]["backlash_m"] = values["backlash_m"]
-    tables["emulated"].pop("truth", None)  # factors on figures that are no more
+    tables = with_identified_friction(nominal.rig, found.friction)
+    if nominal.rig.stepper:
+        tables["stepper"]["holding_torque_N_m"] *= values["holding"]
+    if nominal.rig.flex:
+        tables["flex"]["ohm_per_rad"] *= values["sensor_gain"]
+    else:
+        tables["strain_gauge"]["V_per_strain"] *= values["sensor_gain"]
+    sensor = "flex" if nominal.rig.flex else "strain_gauge"
+    tables[sensor]["calibration"] = calibration(found).model_dump(exclude_none=True)
+    for axis in nominal.axes:
+        tables[guide_table(nominal.rig, axis)][f"backlash_{axis.unit}"] *= values.get(
+            "backlash", 1.0
+        )
+    # factors on figures that are no more
+    tables.get("emulated", {}).pop("truth", None)
     return Rig.model_validate(tables)
 
 
@@ -85,12 +103,14 @@ def calibration(found: Identified) -> Calibration:
     run = data.simulate(values)
     readings, tips = (
         data.voltage(run, values | {"delay_s": 0.0}) / ADC_V,
-        run["link/2/tip_deflection"],
+        run[f"link/{data.link}/tip_deflection"],
     )
     some = np.linspace(0, len(tips) - 1, CALIBRATION_POINTS).astype(int)
     fitted = flex_calibration.fit(readings[some], tips[some]).calibration
     c = np.array([0.0, fitted.c1_m, fitted.c2_m, fitted.c3_m])
-    spread = np.array(fitted.covariance) + np.outer(c, c) * found.strip.deviation("flex_gain") ** 2
+    spread = (
+        np.array(fitted.covariance) + np.outer(c, c) * found.strip.deviation("sensor_gain") ** 2
+    )
     return fitted.model_copy(update={"covariance": spread.tolist()})
 
 
@@ -102,15 +122,17 @@ def with_identified_files(experiment: fx.Run, found: Identified) -> fx.Run:
         found: the identification.
     """
     made = rig(found)
-    assert made.flex.calibration is not None
-    rest = experiment.meta.get("rest") or {"zero": made.flex.calibration.zero}
-    sensor = Sensor(made.flex.calibration, **rest)
-    reading = experiment["link/2/flex_voltage"] / ADC_V
+    table = made.flex or made.strain_gauge
+    assert table is not None and table.calibration is not None
+    session = experiment.meta | {"calibration": table.calibration.model_dump(mode="json")}
+    sensor = sensor_of_session(session)
+    reading = experiment[voltage_channel(sensor.strip, sensor.kind)] / ADC_V
+    tip = f"link/{sensor.strip}/tip_deflection"
     channels = experiment.channels | {
-        "link/2/tip_deflection": sensor.tip(reading),
-        "link/2/tip_deflection_std": sensor.tip_std(reading),
+        tip: sensor.tip(reading),
+        f"{tip}_std": sensor.tip_std(reading),
     }
-    units = experiment.units | {"link/2/tip_deflection_std": "m"}
+    units = experiment.units | {f"{tip}_std": "m"}
     meta = experiment.meta | {"robot": robot(found).to_dict(), "rig": made.model_dump(mode="json")}
     return dataclasses.replace(experiment, channels=channels, units=units, meta=meta)
 

@@ -1,6 +1,6 @@
 """Identification of a robot and its rig from one experiment.
 
-1. Joint 1: friction, from voltage and motor speed (`carriage`).
+1. Joints with motors: friction, from voltage and speed (`motor_friction`).
 2. Start values: the first 2 s are simulated for a grid of stiffnesses; the best fit is taken. A
    mode's phase over 10 s has many local minima, over 2 s one.
 3. All parameters: stiffness, damping, payload, gain of the sensor, backlash, holding torque of the
@@ -25,21 +25,15 @@ from scipy.linalg import eigh
 import flexura as fx
 from flexura.errors import InputError
 
-from ..rig.description import Rig, rig_of_recording
-from ..rig.emulation import Emulated
-from ..rig.plant.motor import JointLine, joint_line_of
+from ..recordings.unit_conversion import voltage_channel
+from ..rig.axes import MotorAxis, motor_axes
+from ..rig.description import Rig, rig_of_recording, strip_of
+from ..rig.plant.motor import JointLine, joint_line
 from ..rig.plant.stepper import MagneticSpring
-from . import carriage
+from . import motor_friction
 from .estimate import Estimate, Parameter, estimate
 from .strip import StripModel, with_parameters
 
-REQUIRED_CHANNELS = (
-    "joint/1/position",
-    "joint/1/voltage",
-    "joint/2/position",
-    "joint/2/pulses",
-    "link/2/flex_voltage",
-)
 FIRST_PART_S = 2.0
 # 5 % of stiffness are 2 % of frequency, a sixth of a period in 2 s
 STIFFNESS_GRID = np.exp(np.linspace(np.log(0.7), np.log(1.4), 15))
@@ -49,27 +43,40 @@ CORRELATION_S = 0.4  # two periods of the first mode
 
 @dataclass(frozen=True)
 class Nominal:
-    """The robot, the rig, and joint 1 by these files."""
+    """The robot, the rig, and its joints with motors by these files."""
 
     robot: fx.Robot
     rig: Rig
-    line: JointLine
+    axes: tuple[MotorAxis, ...]
 
     @property
-    def emulated(self) -> Emulated:
-        """The rig file's [emulated]; its true parameters are not used."""
-        assert self.rig.emulated is not None
-        return self.rig.emulated
+    def lines(self) -> dict[int, JointLine]:
+        """The joints with motors as linear motors, by their numbers."""
+        return {axis.number: joint_line(axis) for axis in self.axes}
 
 
 @dataclass(frozen=True)
 class Identified:
-    """Estimates of joint 1 and of the strip, and the nominal values."""
+    """Estimates of the joints with motors (by number) and of the strip; the nominal values."""
 
     nominal: Nominal
-    carriage: Estimate
+    joints: dict[int, Estimate]
     strip: Estimate
     data: StripModel
+
+    @property
+    def friction(self) -> dict[int, float]:
+        """Factors on the friction of the joints with motors."""
+        lines = self.nominal.lines
+        return {n: found.values["coulomb"] / lines[n].coulomb for n, found in self.joints.items()}
+
+
+def required_channels(rig: Rig, strip: int) -> list[str]:
+    """The channels that an experiment must have."""
+    out = [f"joint/{n}/position" for n in range(1, rig.joints + 1)]
+    out += ["joint/1/voltage"] + ["joint/2/voltage"] * bool(rig.motor_2)
+    out += ["joint/2/pulses"] * bool(rig.stepper)
+    return [*out, voltage_channel(strip, "strain_gauge" if rig.strain_gauge else "flex")]
 
 
 def read_nominal(experiment: fx.Run) -> Nominal:
@@ -78,32 +85,31 @@ def read_nominal(experiment: fx.Run) -> Nominal:
     Raises:
         InputError: a channel or a value is missing or wrong.
     """
-    missing = [name for name in REQUIRED_CHANNELS if name not in experiment]
-    if missing:
-        raise InputError(
-            f"expected an experiment with {missing[0]}; it has: {', '.join(experiment)}", key="RUN"
-        )
     tables, robot = experiment.meta.get("rig"), experiment.meta.get("robot")
     for key, value in (("rig", tables), ("robot", robot)):
         if not isinstance(value, dict):
             raise InputError(f"missing: the run has no {key} file in its metadata", key=key)
     rig = rig_of_recording(tables)
-    if rig.emulated is None:
-        raise InputError(
-            "missing: the rotor's inertia, the rig's friction and play to begin with",
-            key="rig.emulated",
-        )
     assert isinstance(robot, dict)
     made = fx.Robot.from_dict(robot)
+    missing = [n for n in required_channels(rig, strip_of(made)) if n not in experiment]
+    if missing:
+        raise InputError(
+            f"expected an experiment with {missing[0]}; it has: {', '.join(experiment)}", key="RUN"
+        )
+    strip = strip_of(made)
     for key, value in (
-        ("link[2].damping.beta_s", made.links[1].damping.beta_s),
+        (f"link[{strip}].damping.beta_s", made.links[strip - 1].damping.beta_s),
         ("payload.mass_kg", made.payload.mass_kg),
     ):
         if value == 0.0:
             raise InputError(
                 "expected a value above 0 to begin with", key=f"robot.{key}", value=value
             )
-    return Nominal(made, rig, joint_line_of(rig, rig.emulated))
+    try:
+        return Nominal(made, rig, motor_axes(rig))
+    except InputError as error:
+        raise InputError(error.expected, key=f"rig.{error.key}", value=error.value) from None
 
 
 def identify(
@@ -120,49 +126,49 @@ def identify(
     """
     report = progress or (lambda name, part: None)
     nominal = read_nominal(experiment)
-    _require_motion(experiment)
-    found = carriage.fit(
-        experiment, nominal.robot, nominal.line, nominal.emulated.driver.dead_zone_V
-    )
-    report("joint 1", 1.0)
-    friction = found.values["coulomb_N"] / nominal.line.coulomb_N
+    robot, rig, lines = nominal.robot, nominal.rig, nominal.lines
+    _require_motion(experiment, nominal)
+    joints = {}
+    for k, axis in enumerate(nominal.axes):
+        joints[axis.number] = motor_friction.fit(
+            experiment, robot, axis, lines[axis.number], rig.driver.dead_zone_V
+        )
+        report("joints", (k + 1) / len(nominal.axes))
+    friction = {n: found.values["coulomb"] / lines[n].coulomb for n, found in joints.items()}
     values = _start_values(experiment, nominal, lambda part: report("strip", 0.3 * part))
-    data = StripModel(experiment, nominal.rig, nominal.emulated, nominal.robot, friction)
+    data = StripModel(experiment, rig, robot, friction)
     correlation_samples = round(CORRELATION_S / float(np.median(np.diff(data.t))))
     strip = estimate(
         data.residuals,
-        parameters(values),
+        parameters(nominal, values),
         correlation_samples,
         _same_frequency_direction(nominal, values),
     )
     report("strip", 1.0)
-    elements = nominal.robot.links[1].elements
     variations: tuple[tuple[dict[str, float], int], ...] = (
-        ({}, elements - 1),
-        ({"mass": 1 + MASS_UNCERTAINTY}, elements),
-        ({"gyration_m": GYRATION_UNCERTAINTY_M}, elements),
-        ({"give": 1 + NUT_COMPLIANCE_UNCERTAINTY}, elements),
+        ({}, -1),
+        ({"mass": 1 + MASS_UNCERTAINTY}, 0),
+        ({"gyration_m": GYRATION_UNCERTAINTY_M}, 0),
+        ({"give": 1 + NUT_COMPLIANCE_UNCERTAINTY}, 0),
     )
-    for more, mesh in variations:
+    for more, elements in variations:
         strip = strip.with_model_uncertainty(
-            data.residuals(strip.values | more, mesh) - strip.residuals
+            data.residuals(strip.values | more, elements) - strip.residuals
         )
-    return Identified(nominal, found, strip, data)
+    return Identified(nominal, joints, strip, data)
 
 
 def _start_values(
     experiment: fx.Run, nominal: Nominal, report: Callable[[float], None]
 ) -> dict[str, float]:
     """Start values that are close enough for the whole experiment."""
-    data = StripModel(
-        experiment, nominal.rig, nominal.emulated, nominal.robot, until_s=FIRST_PART_S
-    )
+    data = StripModel(experiment, nominal.rig, nominal.robot, until_s=FIRST_PART_S)
     values = {
         "stiffness": 1.0,
         "damping": 1.0,
         "payload": 1.0,
-        "flex_gain": 1.0,
-        "backlash_m": nominal.emulated.carriage.backlash_m,
+        "sensor_gain": 1.0,
+        "backlash": 1.0,
         "holding": 1.0,
         "delay_s": 1e-3,
     }
@@ -173,8 +179,8 @@ def _start_values(
     values["stiffness"] = float(STIFFNESS_GRID[np.argmin(misfits)])
     some = [
         u
-        for u in parameters(values)
-        if u.name in ("stiffness", "payload", "flex_gain", "damping", "delay_s")
+        for u in parameters(nominal, values)
+        if u.name in ("stiffness", "payload", "sensor_gain", "damping", "delay_s")
     ]
     rest = {name: value for name, value in values.items() if name not in {u.name for u in some}}
     found = estimate(
@@ -188,15 +194,18 @@ def _same_frequency_direction(
 ) -> dict[str, dict[str, float]]:
     """Change of the stiffness with the payload that keeps the first frequency.
 
-    Joint 2 is on the stepper's magnetic spring, not clamped.
+    Motors hold their joints; a stepper's joint is on its magnetic spring.
     """
-    stepper_stiffness_N_m = MagneticSpring(nominal.rig.stepper, nominal.emulated.stepper).on_N_m
+    stepper = nominal.rig.stepper
+    field_N_m = MagneticSpring(stepper).on_N_m if stepper else 0.0
 
     def log_first_frequency(more: dict[str, float]) -> float:
         system = fx.assemble(with_parameters(nominal.robot, values | more))
         K, M = system.stiffness(), system.mass(system.start())
-        K[system.joint_rows[1], system.joint_rows[1]] += stepper_stiffness_N_m
-        rows = np.arange(system.joint_rows[1], system.n)  # the motor holds the carriage
+        held = [system.joint_rows[axis.number - 1] for axis in nominal.axes]
+        if stepper:
+            K[system.joint_rows[1], system.joint_rows[1]] += field_N_m
+        rows = np.setdiff1d(np.arange(system.n), held)
         return float(
             np.log(eigh(K[np.ix_(rows, rows)], M[np.ix_(rows, rows)], eigvals_only=True)[0])
         )
@@ -208,34 +217,43 @@ def _same_frequency_direction(
     return {"payload": {"stiffness": -payload / stiffness}}
 
 
-def parameters(values: dict[str, float]) -> list[Parameter]:
+def parameters(nominal: Nominal, values: dict[str, float]) -> list[Parameter]:
     """The strip's parameters, with start `values`.
 
-    Steps are small against what changes a mode's phase over the experiment.
+    Steps are small against what changes a mode's phase over the experiment. A rig without stepper
+    has no holding torque, one without backlash none to find.
     """
     steps = {
         "stiffness": (3e-4, (0.3, 3.0)),
         "damping": (0.03, (0.02, 50.0)),
         "payload": (1e-2, (0.1, 10.0)),
-        "flex_gain": (0.01, (0.1, 10.0)),
-        "backlash_m": (0.05, (1e-6, 2e-3)),
+        "sensor_gain": (0.01, (0.1, 10.0)),
+        "backlash": (0.05, (0.01, 15.0)),
         "holding": (2e-3, (0.2, 5.0)),
         "delay_s": (1e-4, (-5e-3, 0.02)),
     }
+    if not nominal.rig.stepper:
+        del steps["holding"]
+    if not any(axis.guide.backlash for axis in nominal.axes):
+        del steps["backlash"]
     return [
         Parameter(name, values[name], step, bounds, name != "delay_s")
         for name, (step, bounds) in steps.items()
     ]
 
 
-def _require_motion(experiment: fx.Run) -> None:
+def _require_motion(experiment: fx.Run, nominal: Nominal) -> None:
     """Raise InputError if a joint does not move."""
-    for name, least, unit in (("joint/1/position", 1e-3, "m"), ("joint/2/pulses", 0.05, "rad")):
+    least = {"m": 1e-3, "rad": 0.05}
+    channels = [(f"joint/{axis.number}/position", axis.unit) for axis in nominal.axes]
+    if nominal.rig.stepper:
+        channels.append(("joint/2/pulses", "rad"))
+    for name, unit in channels:
         y = experiment[name][np.isfinite(experiment[name])]
         moved = float(np.ptp(y)) if len(y) else 0.0
-        if moved < least:
+        if moved < least[unit]:
             raise InputError(
-                f"expected an experiment in which it moves by at least {least:g} {unit}",
+                f"expected an experiment in which it moves by at least {least[unit]:g} {unit}",
                 key=name,
                 value=moved,
             )

@@ -12,6 +12,7 @@ from flexura.io import EMULATED, called, emulated
 
 from ..comparison.measures import Comparison, compare
 from ..comparison.replay.simulate_experiment import simulate_experiment
+from ..rig.axes import MotorAxis
 from ..runs.formatting import finite, number, percent
 from ..runs.table import Table
 from .estimate import Estimate
@@ -40,45 +41,47 @@ class Quantity:
 
 def quantities(found: Identified) -> list[Quantity]:
     """The rows of the table."""
-    nominal, more = found.nominal, found.nominal.emulated
-    strip = nominal.robot.links[1]
-    flex, stepper = nominal.rig.flex.ohm_per_rad, nominal.rig.stepper.holding_torque_N_m
+    nominal = found.nominal
+    rig, strip = nominal.rig, nominal.robot.links[-1]
     rows = [
         ("bending stiffness", "N m^2", "stiffness", float(strip.bending_stiffness(np.zeros(1))[0])),
         ("damping beta", "s", "damping", strip.damping.beta_s),
         ("payload", "kg", "payload", nominal.robot.payload.mass_kg),
-        ("flex sensor", "ohm/rad", "flex_gain", flex),
-        ("stepper's holding torque", "N m", "holding", stepper),
+    ]
+    if rig.flex:
+        rows.append(("flex sensor", "ohm/rad", "sensor_gain", rig.flex.ohm_per_rad))
+    if rig.strain_gauge:
+        rows.append(("strain gauge", "V", "sensor_gain", rig.strain_gauge.V_per_strain))
+    if rig.stepper:
+        rows.append(("stepper's holding torque", "N m", "holding", rig.stepper.holding_torque_N_m))
+    rows += [
+        (_of("backlash", axis, len(nominal.axes)), axis.unit, "backlash", axis.guide.backlash)
+        for axis in nominal.axes
+        if "backlash" in found.strip.values
     ]
     out = [_row(name, unit, found.strip, key, value, value) for name, unit, key, value in rows]
-    out.append(_row("backlash", "m", found.strip, "backlash_m", more.carriage.backlash_m, 1.0))
-    out.append(_row("flex sensor's delay", "s", found.strip, "delay_s", 0.0, 1.0))
-    out.append(
-        _row(
-            "joint 1: Coulomb friction",
-            "N",
-            found.carriage,
-            "coulomb_N",
-            nominal.line.coulomb_N,
-            1.0,
-        )
-    )
-    out.append(
-        _row(
-            "joint 1: viscous, with back-EMF",
-            "N s/m",
-            found.carriage,
-            "viscous_N_s_m",
-            nominal.line.viscous_N_s_m,
-            1.0,
-        )
-    )
+    out.append(_row("sensor's delay", "s", found.strip, "delay_s", 0.0, 1.0))
+    for axis in nominal.axes:
+        n, line, estimate = axis.number, nominal.lines[axis.number], found.joints[axis.number]
+        name, per = f"joint {n}: Coulomb friction", f"{axis.force_unit} s/{axis.unit}"
+        key = f"joint_{n}_coulomb"
+        out.append(_row(name, axis.force_unit, estimate, "coulomb", line.coulomb, 1.0, key))
+        name, key = f"joint {n}: viscous, with back-EMF", f"joint_{n}_viscous"
+        out.append(_row(name, per, estimate, "viscous", line.viscous, 1.0, key))
     return out
 
 
-def _row(name: str, unit: str, found: Estimate, key: str, nominal: float, scale: float) -> Quantity:
+def _of(name: str, axis: MotorAxis, count: int) -> str:
+    """The name of a joint's quantity; a rig with one motor needs no number."""
+    return name if count == 1 else f"joint {axis.number}: {name}"
+
+
+def _row(
+    name: str, unit: str, found: Estimate, key: str, nominal: float, scale: float, said: str = ""
+) -> Quantity:
     low, high = found.interval(key)
-    return Quantity(key, name, unit, nominal, scale * found.values[key], scale * low, scale * high)
+    value = scale * found.values[key]
+    return Quantity(said or key, name, unit, nominal, value, scale * low, scale * high)
 
 
 def check(found: Identified, other: fx.Run, by: str = "commanded") -> tuple[Comparison, Comparison]:
@@ -121,7 +124,8 @@ def table(found: Identified, experiment: fx.Run) -> Table:
     rms = np.sqrt(np.mean(found.strip.residuals**2, axis=1))
     out.notes += [EMULATED] if emulated(experiment) else []
     out.notes += [
-        f"residuals / noise: flex sensor {rms[0]:.2f}, joint 2 {rms[1]:.2f}",
+        f"residuals / noise: sensor {rms[0]:.2f}"
+        + (f", joint 2 {rms[1]:.2f}" if len(rms) > 1 else ""),
         "low, high: the 95 % interval, from noise (Newey-West), mesh, the strip's mass to 0.5 %, "
         "the payload's radius of gyration to 5.6 mm, the nut's give to half",
     ]
@@ -132,9 +136,11 @@ def table(found: Identified, experiment: fx.Run) -> Table:
 def at_bounds(found: Identified) -> list[str]:
     """A sentence for each figure that is at the bound of its search: its interval says nothing."""
     names = {q.key: q.name for q in quantities(found)}
+    parts = [("", found.strip)] + [(f"joint_{n}_", part) for n, part in found.joints.items()]
     return [
-        f"{names[unknown.name]}: at the {word} bound of the search; its value is not known"
-        for part in (found.strip, found.carriage)
+        f"{names.get(prefix + unknown.name, unknown.name)}: at the {word} bound of the search; its "
+        "value is not known"
+        for prefix, part in parts
         for unknown, word in part.at_bounds()
     ]
 
@@ -150,5 +156,6 @@ def numbers(found: Identified, experiment: fx.Run) -> dict[str, Any]:
             for q in quantities(found)
         ],
         "at_bounds": at_bounds(found),
-        "evaluations": found.strip.evaluations + found.carriage.evaluations,
+        "evaluations": found.strip.evaluations
+        + sum(part.evaluations for part in found.joints.values()),
     }

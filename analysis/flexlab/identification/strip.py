@@ -1,24 +1,26 @@
-"""The strip as seen by the flex sensor and by joint 2's encoder, for given parameters.
+"""The strip as seen by its sensor and by a stepper's encoder, for given parameters.
 
-The carriage follows the motor behind the backlash, which the rail's friction widens by 2 F/k (k:
-stiffness of the nut). Joint 2 is on the stepper's magnetic spring, about the angle of the pulses.
-The native simulation of both gives the sensor's voltage,
+A joint with a motor follows the motor behind the backlash, which the joint's friction widens by
+2 F/k (k: stiffness of the contact). A joint with a stepper is on its magnetic spring, about the
+angle of the pulses. The native simulation of all gives the sensor's voltage; of a flex sensor
 
-    alpha = angle(s_0 + l) - angle(s_0),   sin angle = w'(s)
+    alpha = angle(s_0 + l) - angle(s_0)
     U = U_cc R_f / (R_0 + g k alpha (1 + n alpha) + R_f)
 
 taken tau late (the mean of conversions, the board's ticks). Offset and slow drift, a polynomial of
-third degree over time, are projected out. Both residuals are in units of their noise.
+third degree over time, are projected out. Residuals are in units of their noise.
 """
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
 
 import flexura as fx
 from flexura import signals
+from flexura.errors import InputError
 from flexura.signals import JointDrive
 
 from ..comparison.replay import lead_screw
@@ -30,17 +32,23 @@ from ..comparison.replay.smoothing import (
     with_initial_rest,
 )
 from ..comparison.replay.stepper_relaxation import RelaxationState, simulate_with_stepper
-from ..rig.description import Rig
-from ..rig.emulation import Emulated
-from ..rig.plant.flex_sensor import LOGIC_V
+from ..recordings.unit_conversion import voltage_channel
+from ..rig.axes import MotorAxis, motor_axes
+from ..rig.description import Rig, strip_of
 from ..rig.plant.stepper import MagneticSpring
+from ..rig.plant.strip_sensor import StripSensor
+from ..rig.sensors import Flex, StrainGauge
 
 DRIFT_DEGREE = 3  # degree of the polynomial that offset and drift may follow
-MODES = 3
+MODES, MODES_BEFORE = 3, 1  # of the last link, and of one before it
 # relative to the holding torque; small, because derivatives are differences of such simulations
 TORQUE_TOLERANCE = 5e-5
 METHOD, RTOL = "implicit", 1e-3  # the cheapest where data break the drives every 2 ms
+# contacts begin and end within a step: differences of such simulations must be smooth
+GEAR_METHOD, GEAR_RTOL = "auto", 1e-4
+SHAFT_STEP_S = 1e-3
 TORQUE_STEP_S = 2e-3  # between two values of the stepper's torque that the relaxation corrects
+CURVATURE_STEP = 1e-3  # of the link's length: between the slopes whose difference is a curvature
 
 
 class StripModel:
@@ -50,9 +58,8 @@ class StripModel:
         self,
         experiment: fx.Run,
         rig: Rig,
-        emulated: Emulated,
         robot: fx.Robot,
-        friction: float = 1.0,
+        friction: dict[int, float] | None = None,
         until_s: float = np.inf,
     ) -> None:
         """Prepare the data.
@@ -60,108 +67,171 @@ class StripModel:
         Args:
             experiment: the run.
             rig: its rig file.
-            emulated: the table [emulated] of the rig file.
             robot: the nominal robot.
-            friction: factor on the rail's friction.
+            friction: factors on the friction of joints with motors, by their numbers.
             until_s: end of the data used, from their start [s].
+
+        Raises:
+            InputError: the rig has no flex sensor and no strain gauge.
         """
+        if not isinstance(rig.sensor, Flex | StrainGauge):
+            raise InputError("expected a rig with a flex sensor or a strain gauge", key="rig.flex")
         part = experiment.t <= experiment.t[0] + until_s
         self.t = experiment.t[part]
-        self.rig, self.emulated, self.robot = rig, emulated, robot
+        self.rig, self.robot, self.link = rig, robot, strip_of(robot)
+        self.sensor = rig.sensor
         self._times = np.concatenate([initial_rest(self.t), self.t])
-        nut = smoothing_spline(
-            *with_initial_rest(
-                *recorded_samples(self.t, experiment["joint/1/position"][part], "joint/1/position")
-            )
-        )
-        self._nut_m = np.array([nut(at)[0] for at in self._times])
-        self._friction = friction
-        self.pulses, _ = joint_2_pulse_angle(experiment)
-        self.flex_V, self.joint_rad = (
-            experiment["link/2/flex_voltage"][part],
-            experiment["joint/2/position"][part],
-        )
-        tolerance = self.t < self.t[0] + 0.3
-        self.flex_noise_V = max(float(np.nanstd(self.flex_V[tolerance])), 1e-4)
-        self.joint_noise_rad = 2 * np.pi / (4 * rig.stepper.encoder_pulses) / np.sqrt(12)
-        self._guess = RelaxationState(MagneticSpring(rig.stepper, emulated.stepper).on_N_m)
+        self._friction = friction or {}
+        self._shafts = {}
+        for axis in motor_axes(rig):
+            name = f"joint/{axis.number}/position"
+            samples = recorded_samples(self.t, experiment[name][part], name)
+            self._shafts[axis] = smoothing_spline(*with_initial_rest(*samples))
+        self._shaft_positions = {
+            axis: np.array([shaft(at)[0] for at in self._times])
+            for axis, shaft in self._shafts.items()
+        }
+        kind = "flex" if isinstance(rig.sensor, Flex) else "strain_gauge"
+        self.sensor_V = experiment[voltage_channel(self.link, kind)][part]
+        resting = self.t < self.t[0] + 0.3
+        self.sensor_noise_V = max(float(np.nanstd(self.sensor_V[resting])), 1e-4)
+        self.stepper = rig.stepper
+        self.encoder = bool(rig.stepper and rig.stepper.encoder_pulses)
+        if self.stepper:
+            self.pulses, _ = joint_2_pulse_angle(experiment)
+            self._guess = RelaxationState(MagneticSpring(self.stepper).on_N_m)
+        if self.stepper and self.stepper.encoder_pulses:
+            self.joint_rad = experiment["joint/2/position"][part]
+            counts = 4 * self.stepper.encoder_pulses
+            self.joint_noise_rad = 2 * np.pi / counts / np.sqrt(12)
 
-    def residuals(self, values: dict[str, float], elements: int | None = None) -> np.ndarray:
-        """Residuals of flex voltage and joint 2, 0 for a missing sample.
+    def residuals(self, values: dict[str, float], elements: int = 0) -> np.ndarray:
+        """Residuals of the sensor's voltage and of a stepper's encoder, 0 for a missing sample.
 
         Args:
             values: parameters by name, as in `simulate`.
-            elements: of the strip, by default those of the file.
+            elements: more (or less) elements of each link than the file's.
 
         Returns:
-            (2, T), in units of the noise.
+            (1, T) or (2, T), in units of the noise.
         """
         run = self.simulate(values, elements)
-        flex = (self.voltage(run, values) - self.flex_V) / self.flex_noise_V
-        joint = (run["joint/2/position"] - self.joint_rad) / self.joint_noise_rad
-        return np.stack(
-            [_without_drift(self.t, flex, DRIFT_DEGREE), _without_drift(self.t, joint, 0)]
-        )
+        sensor = (self.voltage(run, values) - self.sensor_V) / self.sensor_noise_V
+        out = [_without_drift(self.t, sensor, DRIFT_DEGREE)]
+        if self.encoder:
+            joint = (run["joint/2/position"] - self.joint_rad) / self.joint_noise_rad
+            out.append(_without_drift(self.t, joint, 0))
+        return np.stack(out)
 
-    def simulate(
-        self, values: dict[str, float], elements: int | None = None, rtol: float = RTOL
-    ) -> fx.Run:
+    def simulate(self, values: dict[str, float], elements: int = 0, rtol: float = RTOL) -> fx.Run:
         """Simulate the experiment at its own times.
 
         Args:
-            values: factors on the files' values, backlash [m], delay [s], by name.
-            elements: of the strip, by default those of the file.
+            values: factors on the files' values, delay [s], by name.
+            elements: more (or less) elements of each link than the file's.
             rtol: tolerance.
 
         Returns:
-            The run, with the bend under the sensor as `link/2/bend` [rad].
+            The run, with what the sensor feels as `strip/sensed` (bend [rad] or curvature [1/m]).
         """
         times = self._times
-        nut = self.emulated.carriage.model_copy(update={"backlash_m": values["backlash_m"]})
-        x = lead_screw.backlash_output(
-            self._nut_m, lead_screw.backlash(nut, self._friction * values.get("give", 1.0))
-        )
-        moved = JointDrive(
-            motion=signals.Signal(signals.table(times, x).segments[:-1]), prescribed=True
-        )
-        stepper = self.rig.stepper.model_copy(
-            update={"holding_torque_N_m": self.rig.stepper.holding_torque_N_m * values["holding"]}
-        )
-        system = fx.assemble(
-            with_stepper_damping(with_parameters(self.robot, values), self.emulated, elements)
-        )
+        robot = with_stepper_damping(with_parameters(self.robot, values), self.rig, elements)
+        system = fx.assemble(robot)
         q0 = system.start()
+        if self.stepper:
+            run = self._on_the_stepper(system, q0, values, rtol)
+        else:
+            run = self._behind_gears(system, q0, values)
+        kept = slice(len(times) - len(self.t), None)
+        channels = run.channels | {"strip/sensed": self._sensed(system, run)}
+        return fx.Run(
+            self.t,
+            {n: v[kept] for n, v in channels.items()},
+            run.units | {"strip/sensed": "rad" if self.rig.flex else "1/m"},
+            run.meta,
+        )
+
+    def _on_the_stepper(
+        self, system: fx.System, q0: np.ndarray, values: dict[str, float], rtol: float
+    ) -> fx.Run:
+        """Joint 1 follows its motor behind the backlash, which its own friction holds in place."""
+        assert self.stepper is not None
+        times = self._times
+        ((axis, shaft),) = self._shaft_positions.items()
+        own = self._friction.get(axis.number, 1.0) * values.get("give", 1.0)
+        play = lead_screw.backlash(axis.guide, own)
+        play += (values.get("backlash", 1.0) - 1.0) * axis.guide.backlash
+        x = lead_screw.backlash_output(shaft, play)
+        course = signals.Signal(signals.table(times, x).segments[:-1])
         q0[system.joint_rows] = x[0], self.pulses(times[0])[0]
-        spring = MagneticSpring(stepper, self.emulated.stepper)
-        run = simulate_with_stepper(
+        torque = self.stepper.holding_torque_N_m * values["holding"]
+        stepper = self.stepper.model_copy(update={"holding_torque_N_m": torque})
+        return simulate_with_stepper(
             (system, q0),
             times,
-            moved,
+            JointDrive(motion=course, prescribed=True),
             self.pulses,
-            spring,
+            MagneticSpring(stepper),
             rtol,
             state=self._guess,
             torque_step_s=TORQUE_STEP_S,
             method=METHOD,
             tolerance=TORQUE_TOLERANCE,
         )
-        kept = slice(len(times) - len(self.t), None)
-        channels = run.channels | {"link/2/bend": self._bend(system, run)}
-        return fx.Run(
-            self.t,
-            {n: v[kept] for n, v in channels.items()},
-            run.units | {"link/2/bend": "rad"},
-            run.meta,
-        )
 
-    def _bend(self, system: fx.System, run: fx.Run) -> np.ndarray:
-        """The bend under the sensor (T,) [rad] of a run that holds its states."""
+    def _behind_gears(self, system: fx.System, q0: np.ndarray, values: dict[str, float]) -> fx.Run:
+        """Joints on their gears' teeth: stiffness and damping of the contact beyond the backlash.
+
+        A link that a motor turns bends its gear back and forth, whatever way the motor goes.
+        """
+        gears = [
+            (
+                self._sampled[axis],
+                0.5 * values.get("backlash", 1.0) * axis.guide.backlash,
+                axis.guide.contact_stiffness / values.get("give", 1.0),
+                axis.guide.contact_damping,
+            )
+            for axis in self._shafts
+        ]
+        begin, last = float(self._times[0]), len(next(iter(self._sampled.values()))) - 2
+        q0[system.joint_rows] = [x[0] for x in self._shaft_positions.values()]
+
+        def teeth(t: float, position: np.ndarray, velocity: np.ndarray, tip: float) -> list[float]:
+            k = min(max(int((t - begin) / SHAFT_STEP_S), 0), last)
+            part = (t - begin) / SHAFT_STEP_S - k
+            out = []
+            for (shaft, half, stiffness, damping), angle, speed in zip(
+                gears, position.tolist(), velocity.tolist(), strict=True
+            ):
+                (x, v), (y, w) = shaft[k], shaft[k + 1]
+                rate = v + part * (w - v)
+                # of the cubic that has both positions and both rates
+                off = angle - hermite(part, x, v * SHAFT_STEP_S, y, w * SHAFT_STEP_S)
+                beyond = off - half if off > half else off + half if off < -half else 0.0
+                slip = damping * (speed - rate) if beyond else 0.0
+                out.append(-stiffness * beyond - slip)
+            return out
+
+        return fx.simulate(system, self._times, teeth, q0=q0, rtol=GEAR_RTOL, method=GEAR_METHOD)
+
+    @functools.cached_property
+    def _sampled(self) -> dict[MotorAxis, list[tuple[float, float]]]:
+        """Positions and rates of the motors' shafts, every SHAFT_STEP_S."""
+        begin, end = float(self._times[0]), float(self._times[-1])
+        t = begin + SHAFT_STEP_S * np.arange(round((end - begin) / SHAFT_STEP_S) + 2)
+        return {axis: [shaft(float(at))[:2] for at in t] for axis, shaft in self._shafts.items()}
+
+    def _sensed(self, system: fx.System, run: fx.Run) -> np.ndarray:
+        """What the sensor feels (T,) in a run with states: bend [rad] or curvature [1/m]."""
         assert run.states is not None
-        ends = np.array(
-            [self.emulated.flex.from_m, self.emulated.flex.from_m + self.rig.flex.length_m]
-        )
-        low, high = system.angles(2, ends) @ run.states[:, : system.n].T
-        return np.asarray(high - low)
+        if isinstance(self.sensor, Flex):
+            ends, size = [self.sensor.from_m, self.sensor.from_m + self.sensor.length_m], 1.0
+        else:
+            step = CURVATURE_STEP * self.robot.links[-1].length_m
+            ends, size = [max(self.sensor.at_m - step, 0.0), self.sensor.at_m + step], 0.0
+            size = ends[1] - ends[0]
+        low, high = system.angles(self.link, np.array(ends)) @ run.states[:, : system.n].T
+        return np.asarray((high - low) / size)
 
     def voltage(self, run: fx.Run, values: dict[str, float]) -> np.ndarray:
         """The sensor's voltage (T,) [V] without offset and noise.
@@ -172,13 +242,15 @@ class StripModel:
         """
         from scipy.interpolate import CubicSpline
 
-        flex, emulated = self.rig.flex, self.emulated.flex
-        a = run["link/2/bend"]
-        ohm = flex.straight_ohm + values["flex_gain"] * flex.ohm_per_rad * a * (
-            1 + emulated.nonlinearity_1_rad * a
-        )
-        volts = LOGIC_V * flex.divider_ohm / (ohm + flex.divider_ohm)
-        return CubicSpline(self.t, volts)(self.t - values["delay_s"])
+        quiet = StripSensor(self.sensor, None, np.random.default_rng(0), 1.0, values["sensor_gain"])
+        volts = np.array([quiet.voltage(felt) for felt in run["strip/sensed"].tolist()])
+        return np.asarray(CubicSpline(self.t, volts)(self.t - values["delay_s"]))
+
+
+def hermite(s: float, x: float, v: float, y: float, w: float) -> float:
+    """The cubic with positions x, y and rates v, w at s = 0 and 1."""
+    change = y - x
+    return x + s * (v + s * (3 * change - 2 * v - w + s * (v + w - 2 * change)))
 
 
 def with_parameters(robot: fx.Robot, values: dict[str, float]) -> fx.Robot:
@@ -186,24 +258,28 @@ def with_parameters(robot: fx.Robot, values: dict[str, float]) -> fx.Robot:
 
     Args:
         robot: the nominal robot.
-        values: factors `stiffness`, `damping`, `payload` and, if given, `mass` of the strip;
-            `gyration_m`, radius of gyration of the payload [m].
+        values: factors `stiffness`, `damping`, `payload` and, if given, `mass` of the flexible
+            links; `gyration_m`, radius of gyration of the payload [m].
     """
-    strip = robot.links[1]
-    heavy = "density_kg_m3" if strip.density_kg_m3 is not None else "mass_per_length_kg_m"
-    given = "young_modulus_Pa" if strip.young_modulus_Pa is not None else "bending_stiffness_N_m2"
     mass = values["payload"] * robot.payload.mass_kg
-    times = lambda key, factor: _times(robot.to_dict()["link"][1][key], factor)
-    return robot.replace(
-        {
-            f"link.2.{given}": times(given, values["stiffness"]),
-            f"link.2.{heavy}": times(heavy, values.get("mass", 1.0)),
-            "link.2.damping.beta_s": values["damping"] * strip.damping.beta_s,
-            "payload.mass_kg": mass,
-            "payload.inertia_kg_m2": values["payload"] * robot.payload.inertia_kg_m2
-            + mass * values.get("gyration_m", 0.0) ** 2,
-        }
-    )
+    changes: dict[str, Any] = {
+        "payload.mass_kg": mass,
+        "payload.inertia_kg_m2": values["payload"] * robot.payload.inertia_kg_m2
+        + mass * values.get("gyration_m", 0.0) ** 2,
+    }
+    tables = robot.to_dict()["link"]
+    for number, link in enumerate(robot.links, 1):
+        if not link.flexible:
+            continue
+        heavy = "density_kg_m3" if link.density_kg_m3 is not None else "mass_per_length_kg_m"
+        given = (
+            "young_modulus_Pa" if link.young_modulus_Pa is not None else "bending_stiffness_N_m2"
+        )
+        own, at = tables[number - 1], f"link.{number}"
+        changes[f"{at}.{given}"] = _times(own[given], values["stiffness"])
+        changes[f"{at}.{heavy}"] = _times(own[heavy], values.get("mass", 1.0))
+        changes[f"{at}.damping.beta_s"] = values["damping"] * link.damping.beta_s
+    return robot.replace(changes)
 
 
 def _times(value: Any, factor: float) -> Any:
@@ -215,19 +291,18 @@ def _times(value: Any, factor: float) -> Any:
     )
 
 
-def with_stepper_damping(
-    robot: fx.Robot, emulated: Emulated, elements: int | None = None
-) -> fx.Robot:
-    """The robot with the strip's lowest modes and the stepper's damping in joint 2."""
-    strip = robot.links[1]
-    return robot.replace(
-        {
-            "link.2.modes": MODES,
-            "link.2.elements": elements or strip.elements,
-            "link.2.joint.viscous_friction": strip.joint.viscous_friction
-            + emulated.stepper.damping_N_m_s,
-        }
-    )
+def with_stepper_damping(robot: fx.Robot, rig: Rig, elements: int = 0) -> fx.Robot:
+    """The robot with its links' lowest modes, and a stepper's damping in joint 2."""
+    changes: dict[str, Any] = {}
+    for number, link in enumerate(robot.links, 1):
+        if link.flexible:
+            last = number == len(robot.links)
+            changes[f"link.{number}.modes"] = MODES if last else MODES_BEFORE
+            changes[f"link.{number}.elements"] = link.elements + elements
+    if rig.stepper:
+        damping = robot.links[1].joint.viscous_friction + rig.stepper.damping_N_m_s
+        changes["link.2.joint.viscous_friction_N_m_s_rad"] = damping
+    return robot.replace(changes)
 
 
 def _without_drift(t: np.ndarray, y: np.ndarray, degree: int) -> np.ndarray:

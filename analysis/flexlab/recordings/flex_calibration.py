@@ -23,9 +23,10 @@ from ..board.emulator.emulated import Outputs, Sensors
 from ..board.protocol.declaration import CONFIG
 from ..board.protocol.session import Link
 from ..rig import RigSetup
-from ..rig.description import Calibration, tip_per_bend
-from ..rig.plant.rigid_plant import RigidPlant
-from .unit_conversion import ADC_V, flex_reading
+from ..rig.configuration import tip_per_bend, tip_per_curvature
+from ..rig.plant.strip_sensor import StripSensor
+from ..rig.sensors import Calibration
+from .unit_conversion import flex_reading
 
 SETTLE_S, SAMPLE_S = 0.1, 0.4
 _RISING = [float(w) for w in np.linspace(-0.02, 0.02, 9)]
@@ -160,11 +161,24 @@ class DeflectedPlant:
 
     The sensor is the plant's own, with noise, drift and nonlinearity. A `RigidPlant` has none; its
     sensor follows the data sheet. `tip_m` is the deflection [m].
+
+    Raises:
+        InputError: the rig has no deflection sensor.
     """
 
     def __init__(self, plant: Any, setup: RigSetup) -> None:
-        self._plant, self._flex, self._tip_per_bend = plant, setup.rig.flex, tip_per_bend(setup)
-        self.tip_m = 0.0
+        rig = setup.rig
+        if rig.strain_gauge:
+            self._tip = tip_per_curvature(setup, rig.strain_gauge)
+        elif rig.flex:
+            self._tip = tip_per_bend(setup)
+        else:
+            raise InputError(
+                "expected a rig with a flex sensor or a strain gauge", key="RIG", file=setup.file
+            )
+        self._plant, self.tip_m = plant, 0.0
+        quiet = StripSensor(rig.sensor, None, np.random.default_rng(0), 1.0)
+        self._voltage = plant.sensor.sample if hasattr(plant, "sensor") else quiet.voltage
 
     def hold(self, tip_m: float) -> float:
         """Hold the tip at a deflection [m]; returns it."""
@@ -174,14 +188,8 @@ class DeflectedPlant:
     def advance(self, seconds: float, outputs: Outputs) -> Sensors:
         """Advance the plant, its flex voltage replaced by that of the held strip."""
         sensors: Sensors = self._plant.advance(seconds, outputs)
-        sensors.flex_V = self._voltage(self.tip_m / self._tip_per_bend)
+        sensors.flex_V = float(self._voltage(self.tip_m / self._tip))
         return sensors
-
-    def _voltage(self, bend_rad: float) -> float:
-        if not isinstance(self._plant, RigidPlant):
-            return float(self._plant.flex.sample(bend_rad))
-        ohm = self._flex.straight_ohm + self._flex.ohm_per_rad * bend_rad
-        return ADC_V * self._flex.divider_ohm / (ohm + self._flex.divider_ohm)
 
 
 def write(found: Fit, path: Path) -> None:

@@ -6,6 +6,7 @@ The same function ends every experiment and recovers one whose host was killed.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,20 +19,14 @@ from ..board.protocol import messages
 from ..board.protocol.declaration import CONTROL_HZ, FAULTS, MESSAGES, Fault, Mode, State
 from ..board.protocol.frames import Deframer
 from ..board.protocol.player import Knots
-from ..rig.description import Calibration
+from ..rig.board_axes import BoardAxis, board_axes
 from . import recording
 from .delay_estimation import estimate_delay
-from .unit_conversion import UNITS, Sensor, channels_of_reports, start_tick
+from .strip_sensor import sensor_of_session
+from .unit_conversion import DEFLECTION_SENSORS, channels_of_reports, start_tick, units_of
 
 TICK = slice(messages.HEAD_BYTES, messages.HEAD_BYTES + 4)  # the first field of a report
 UNEXPLAINED = "the host ended without a word; rebuilt from what had been received"
-_COMMAND_OF = {  # what a channel follows
-    Mode.position: {
-        "joint/1/position": "joint/1/reference",
-        "joint/2/position": "joint/2/reference",
-    },
-    Mode.open_loop: {"joint/1/velocity": "joint/1/voltage", "joint/2/position": "joint/2/pulses"},
-}
 
 
 def run_from_recording(folder: str | Path) -> fx.Run:
@@ -46,15 +41,14 @@ def run_from_recording(folder: str | Path) -> fx.Run:
     stored = recording.read(folder)
     session = stored.session
     knots = knots_from(session["knots"])
-    settings, rest = session["settings"], session.get("rest")
+    settings = session["settings"]
     deframer = Deframer()
     reports, numbers = _reports(deframer.feed(stored.received))
     if not len(reports):
         raise fx.InputError(
             "no report of the board was received in this recording", file=str(folder)
         )
-    calibration = Calibration.model_validate(session["calibration"])
-    sensor = Sensor(calibration, **rest) if rest else Sensor(calibration, calibration.zero)
+    sensor, axes = sensor_of_session(session), board_axes(settings)
     start_found = start_tick(reports, knots, settings)
     start, uncertainty_s = (
         start_found if start_found is not None else (float(reports["tick"][0]), 0.0)
@@ -94,11 +88,13 @@ def run_from_recording(folder: str | Path) -> fx.Run:
             "bad_frames": deframer.bad,
             "bytes": len(stored.received),
         },
-        "tip_deflection_std": "noise, resolution, zero"
-        + (", calibration" if calibration.covariance else "; calibration unknown"),
     }
-    run = _with_tip(fx.Run(t, values, dict(UNITS), meta))
-    meta["delays"] = _delays(run, knots.mode)
+    if sensor.kind in DEFLECTION_SENSORS:
+        known = ", calibration" if sensor.calibration.covariance else "; calibration unknown"
+        meta["tip_deflection_std"] = f"noise, resolution, zero{known}"
+    run = fx.Run(t, values, units_of(axes, sensor.strip, sensor.kind), meta)
+    run = _with_tip(run)
+    meta["delays"] = _delays(run, knots.mode, axes)
     return run
 
 
@@ -184,7 +180,10 @@ def _events_from_board(reports: np.ndarray, start: float) -> list[dict[str, Any]
 
 
 def _with_tip(run: fx.Run) -> fx.Run:
-    """Add the tip in the base frame, from the joints' encoders and the flex sensor."""
+    """Add the tip in the base frame, from the joints' encoders and the strip's sensor.
+
+    A flexible link without a sensor counts as straight.
+    """
     placed, _ = with_poses(run)
     names = ("tip/x", "tip/y")
     return dataclasses.replace(
@@ -194,10 +193,22 @@ def _with_tip(run: fx.Run) -> fx.Run:
     )
 
 
-def _delays(run: fx.Run, mode: Mode) -> dict[str, Any]:
+def _followed(mode: Mode, axes: Sequence[BoardAxis]) -> Iterator[tuple[str, str]]:
+    """Channels, and what each follows: a set-point, a motor's voltage, a stepper's pulses."""
+    for axis in axes:
+        name = f"joint/{axis.number}"
+        if mode is Mode.position:
+            yield f"{name}/position", f"{name}/reference"
+        elif axis.kind == "motor":
+            yield f"{name}/velocity", axis.command
+        else:
+            yield f"{name}/position", axis.command
+
+
+def _delays(run: fx.Run, mode: Mode, axes: Sequence[BoardAxis]) -> dict[str, Any]:
     """The delay of each channel behind what it follows."""
     out = {}
-    for channel, command in _COMMAND_OF[mode].items():
+    for channel, command in _followed(mode, axes):
         if found := estimate_delay(run.t, run[command], run[channel]):
             out[channel] = {
                 "behind": command,

@@ -1,7 +1,7 @@
 """Conversion of the board's reports to physical quantities.
 
-    d1 = counts / motor_counts_per_m           theta2 = counts / stepper_counts_per_rad
-    pulses = steps / stepper_steps_per_rad     r = sum of the conversions / (adc_samples 1024)
+    q = counts / (counts for 1 m or 1 rad)     pulses = steps / stepper_steps_per_rad
+    r = sum of the conversions / (adc_samples 1024)
     w = c1 x + c2 x^2 + c3 x^3,  x = r - zero
 
 A report that did not arrive is NaN in every channel, and so is what depends on it.
@@ -9,44 +9,64 @@ A report that did not arrive is NaN in every channel, and so is what depends on 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..board.protocol.declaration import ADC_SAMPLES, CONTROL_HZ, Mode, State
-from ..board.protocol.player import FRACTION, Knots
-from ..rig.description import Calibration
+from ..board.protocol.player import FRACTION, JOINTS, VOLT_UNIT_V, Knots
+from ..rig.board_axes import BoardAxis, board_axes
+from ..rig.sensors import Calibration
 
 ADC_COUNTS, ADC_V = 1024, 5.0
 # reports in the window of the velocity's local cubic: -3 dB at some 36 Hz, no phase lag
 VELOCITY_WINDOW = 21
-UNITS = {
-    "joint/1/position": "m",
-    "joint/2/position": "rad",
-    "joint/1/velocity": "m/s",
-    "joint/2/velocity": "rad/s",
-    "joint/1/reference": "m",
-    "joint/2/reference": "rad",
-    "joint/1/voltage": "V",
-    "joint/2/pulses": "rad",
-    "link/2/tip_deflection": "m",
-    "link/2/tip_deflection_std": "m",
-    "link/2/flex_voltage": "V",
-}
+DEFLECTION_SENSORS = ("flex", "strain_gauge")
+
+
+def units_of(axes: Sequence[BoardAxis], strip: int, sensor: str) -> dict[str, str]:
+    """The channels of an experiment and their units, in their order.
+
+    Args:
+        axes: the joints.
+        strip: number of the link that has the sensor.
+        sensor: kind of the sensor: "flex", "strain_gauge", "accelerometer", or "" for none.
+    """
+    out = {f"joint/{axis.number}/position": axis.unit for axis in axes}
+    out |= {f"joint/{axis.number}/velocity": f"{axis.unit}/s" for axis in axes}
+    out |= {f"joint/{axis.number}/reference": axis.unit for axis in axes}
+    out |= {axis.command: axis.command_unit for axis in axes}
+    if sensor in DEFLECTION_SENSORS:
+        out |= {f"link/{strip}/tip_deflection": "m", f"link/{strip}/tip_deflection_std": "m"}
+    if sensor:
+        out[voltage_channel(strip, sensor)] = "V"
+    if sensor == "accelerometer":
+        out["sensor/accelerometer"] = "m/s^2"
+    return out
+
+
+def voltage_channel(strip: int, sensor: str) -> str:
+    """The channel of the sensor's voltage."""
+    return f"link/{strip}/{sensor}_voltage"
 
 
 @dataclass(frozen=True)
 class Sensor:
-    """The calibrated flex sensor.
+    """The calibrated sensor of a link.
 
     `zero`: today's reading of the straight strip, the mean of `reports` reports. `noise`: standard
-    deviation of one report.
+    deviation of one report. `kind`: its table in the rig file, "" for no sensor. `strip`: number of
+    its link. `V_s2_per_m`: of an accelerometer.
     """
 
     calibration: Calibration
     zero: float
     noise: float = 0.0
     reports: int = 1
+    kind: str = "flex"
+    strip: int = 2
+    V_s2_per_m: float = 1.0
 
     def tip(self, r: np.ndarray) -> np.ndarray:
         """Tip deflection [m] of readings (fractions of full scale)."""
@@ -114,11 +134,11 @@ def channels_of_reports(
         reports: the reports (n,), ascending in time.
         mode: the mode of the experiment.
         settings: the board's settings, by name.
-        sensor: the calibrated flex sensor.
+        sensor: the calibrated sensor.
         numbers: the reports' numbers, as in `ticks_of_reports`.
 
     Returns:
-        Ticks (T,), and the channels of UNITS, (T,) each.
+        Ticks (T,), and the channels of `units_of`, (T,) each.
     """
     ticks, arrived = ticks_of_reports(reports, numbers)
 
@@ -127,37 +147,35 @@ def channels_of_reports(
         out[arrived] = values
         return out
 
-    per_m, per_rad, per_step = (
-        settings[name]
-        for name in ("motor_counts_per_m", "stepper_counts_per_rad", "stepper_steps_per_rad")
-    )
+    axes = board_axes(settings)
     half_V = settings["supply_divider"] * ADC_V / ADC_COUNTS / 2  # a conversion rounds down
+    # the board reports duty times the supply in its settings; a motor gets duty times the actual
+    # supply
+    supply = (reports["supply"] / 1000 + half_V) / settings["supply_V"]
     tracked = (reports["state"] == State.running) & (mode is Mode.position)
     r = flex_reading(reports["flex"])
-    out = {
-        "joint/1/position": at_ticks(reports["position_1"] / per_m),
-        "joint/2/position": at_ticks(reports["position_2"] / per_rad),
-        "joint/1/reference": at_ticks(
-            np.where(tracked, reports["setpoint_1"] / (FRACTION * per_m), np.nan)
-        ),
-        "joint/2/reference": at_ticks(
-            np.where(tracked, reports["setpoint_2"] / (FRACTION * per_step), np.nan)
-        ),
-        # the board reports duty times the supply in its settings; the motor gets duty times the
-        # actual supply
-        "joint/1/voltage": at_ticks(
-            reports["voltage"] / 1000 * ((reports["supply"] / 1000 + half_V) / settings["supply_V"])
-        ),
-        "joint/2/pulses": at_ticks(reports["steps"] / per_step),
-        "link/2/tip_deflection": at_ticks(sensor.tip(r)),
-        "link/2/tip_deflection_std": at_ticks(sensor.tip_std(r)),
-        "link/2/flex_voltage": at_ticks(ADC_V * r),
-    }
-    for number in (1, 2):
-        out[f"joint/{number}/velocity"] = velocity(
-            ticks / CONTROL_HZ, out[f"joint/{number}/position"]
-        )
-    return ticks, {name: out[name] for name in UNITS}
+    out = {}
+    for axis in axes:
+        n = axis.number
+        setpoint = reports[f"setpoint_{n}"] / (FRACTION * axis.setpoints)
+        out[f"joint/{n}/position"] = at_ticks(reports[f"position_{n}"] / axis.counts)
+        out[f"joint/{n}/reference"] = at_ticks(np.where(tracked, setpoint, np.nan))
+        if axis.kind == "motor":
+            volts = reports["voltage" if n == 1 else "voltage_2"] * VOLT_UNIT_V
+            out[axis.command] = at_ticks(volts * supply)
+        else:
+            out[axis.command] = at_ticks(reports["steps"] / axis.setpoints)
+        out[f"joint/{n}/velocity"] = velocity(ticks / CONTROL_HZ, out[f"joint/{n}/position"])
+    link = f"link/{sensor.strip}"
+    if sensor.kind in DEFLECTION_SENSORS:
+        out[f"{link}/tip_deflection"] = at_ticks(sensor.tip(r))
+        out[f"{link}/tip_deflection_std"] = at_ticks(sensor.tip_std(r))
+    if sensor.kind:
+        out[voltage_channel(sensor.strip, sensor.kind)] = at_ticks(ADC_V * r)
+    if sensor.kind == "accelerometer":
+        measured = ADC_V * (r - sensor.zero) / sensor.V_s2_per_m
+        out["sensor/accelerometer"] = at_ticks(measured)
+    return ticks, {name: out[name] for name in units_of(axes, sensor.strip, sensor.kind)}
 
 
 def velocity(t: np.ndarray, position: np.ndarray, samples: int = VELOCITY_WINDOW) -> np.ndarray:
@@ -209,25 +227,22 @@ def planned_setpoints(knots: Knots, settings: dict[str, float]) -> np.ndarray:
     """
     period = 2**knots.period_log2
     if knots.mode is Mode.open_loop:
-        return np.repeat(
-            np.stack([knots.columns["voltage"], knots.columns["rate"]], axis=1).astype(float),
-            period,
-            axis=0,
-        )
+        # joint 2 has one of the two drives; knots of older recordings have no voltage_2
+        second = np.asarray(knots.columns["rate"]) + np.asarray(knots.columns.get("voltage_2", 0))
+        both = np.stack([np.asarray(knots.columns["voltage"]), second], axis=1)
+        return np.repeat(both.astype(float), period, axis=0)
     from scipy.interpolate import CubicHermiteSpline
     from scipy.signal import lfilter
 
     at = np.arange(len(knots)) * period
     out = []
-    for number in (1, 2):
+    for number in JOINTS:
         position, speed = (
             np.asarray(knots.columns[f"{name}_{number}"], dtype=float)
             for name in ("position", "velocity")
         )
         if len(knots) == 1:
-            return np.repeat(
-                [[float(knots.columns[f"position_{n}"][0]) for n in (1, 2)]], 1, axis=0
-            )
+            return np.array([[float(knots.columns[f"position_{n}"][0]) for n in JOINTS]])
         course = CubicHermiteSpline(at, position, speed)(np.arange(1, at[-1] + 1))
         if cut := settings[f"setpoint_{number}_Hz"]:
             a = 1 - np.exp(-2 * np.pi * cut / CONTROL_HZ)

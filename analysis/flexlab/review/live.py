@@ -35,17 +35,13 @@ from flexura.io.drawing import with_poses
 
 from ..board.protocol.declaration import CONTROL_HZ, State
 from ..experiment.plan import Plan
-from ..recordings.unit_conversion import UNITS, Sensor, channels_of_reports
+from ..recordings.unit_conversion import DEFLECTION_SENSORS, Sensor, channels_of_reports, units_of
+from ..rig.board_axes import board_axes
 from .writer import times
 
 HOST = "127.0.0.1"
 MEMORY = "500MB"  # what the server keeps for viewers that join late
-PLOTS = {
-    "joint 1 [m]": ("joint/1/position", "joint/1/reference"),
-    "joint 2 [rad]": ("joint/2/position", "joint/2/reference", "joint/2/pulses"),
-    "tip deflection [m]": ("link/2/tip_deflection",),
-    "motor voltage [V]": ("joint/1/voltage",),
-}
+POINTS = 9  # of a flexible link's line, as in a run's deflection channels
 COLOURS = ((32, 164, 84), (150, 150, 150), (160, 84, 204))  # measured, asked, commanded
 
 
@@ -60,11 +56,11 @@ def serve(
     with rr.RecordingStream("flexura-live") as rec:
         rec.set_sinks(
             rr.GrpcServerSink(HOST, port, server_memory_limit=MEMORY),
-            default_blueprint=_blueprint(title, robot),
+            default_blueprint=_blueprint(title, robot, plots(plan, sensor)),
         )
         rec.set_log_time_enabled(False)
         rec.send_recording_name(title)
-        _style(rec, title)
+        _style(rec, title, plots(plan, sensor))
         writer = threading.Thread(
             target=_write, args=(rec, waiting, plan, sensor, robot), name="live view", daemon=True
         )
@@ -92,7 +88,25 @@ def _free(port: int) -> None:
             raise InputError(expected, key="--live-port", value=port) from None
 
 
-def _blueprint(title: str, robot: fx.Robot) -> rrb.Blueprint:
+def plots(plan: Plan, sensor: Sensor) -> dict[str, list[str]]:
+    """The plots of a live view: titles, and the channels in each."""
+    axes = board_axes(plan.settings)
+    out = {}
+    for axis in axes:
+        n = f"joint/{axis.number}"
+        names = [f"{n}/position", f"{n}/reference"]
+        out[f"joint {axis.number} [{axis.unit}]"] = names + [axis.command] * (
+            axis.kind == "stepper"
+        )
+    if sensor.kind in DEFLECTION_SENSORS:
+        out["tip deflection [m]"] = [f"link/{sensor.strip}/tip_deflection"]
+    elif sensor.kind:
+        out["acceleration [m/s^2]"] = ["sensor/accelerometer"]
+    motors = [axis.command for axis in axes if axis.kind == "motor"]
+    return out | {"motor voltage [V]": motors}
+
+
+def _blueprint(title: str, robot: fx.Robot, shown: dict[str, list[str]]) -> rrb.Blueprint:
     reach = sum(link.length_m for link in robot.links)
     low, high = robot.links[0].joint.limits or (0.0, 0.0)
     half = 0.6 * reach
@@ -101,7 +115,7 @@ def _blueprint(title: str, robot: fx.Robot) -> rrb.Blueprint:
     )
     plots = [
         rrb.TimeSeriesView(origin="/", contents=[f"/experiment/{c}" for c in names], name=name)
-        for name, names in PLOTS.items()
+        for name, names in shown.items()
     ]
     arm = rrb.Spatial2DView(
         origin="/", contents=["/experiment/arm"], name=title, visual_bounds=bounds
@@ -117,7 +131,7 @@ def _blueprint(title: str, robot: fx.Robot) -> rrb.Blueprint:
     )
 
 
-def _style(rec: rr.RecordingStream, title: str) -> None:
+def _style(rec: rr.RecordingStream, title: str, shown: dict[str, list[str]]) -> None:
     text = (
         f"# {title}\n\nLive. The recording itself is in the run's folder.\n\nGreen: measured. "
         f"Grey: set-point. Violet: pulses."
@@ -128,7 +142,7 @@ def _style(rec: rr.RecordingStream, title: str) -> None:
     rec.log("experiment/arm", style, static=True)
     # a 2D view's y points down
     rec.log("experiment/arm", rr.Transform3D(scale=[1.0, -1.0, 1.0]), static=True)
-    for names in PLOTS.values():
+    for names in shown.values():
         for name, colour in zip(names, COLOURS, strict=False):
             kind = name.rpartition("/")[2].replace("_", " ")
             rec.log(
@@ -150,13 +164,13 @@ def _write(
             continue
         ticks, values = channels_of_reports(reports, plan.knots.mode, plan.settings, sensor)
         index = times((ticks - start) / CONTROL_HZ, ticks - start)
-        for names in PLOTS.values():
+        for names in plots(plan, sensor).values():
             for name in names:
                 if np.isfinite(values[name]).any():
                     rec.send_columns(
                         f"experiment/{name}", index, rr.Scalars.columns(scalars=values[name])
                     )
-        line = _arm({name: v[-1:] for name, v in values.items()}, robot)
+        line = _arm({name: v[-1:] for name, v in values.items()}, robot, sensor, plan)
         if np.isfinite(line).all():
             strip = rr.LineStrips2D.columns(strips=[line.astype(np.float32)])
             rec.send_columns(
@@ -166,19 +180,16 @@ def _write(
             )
 
 
-def _arm(values: dict[str, np.ndarray], robot: fx.Robot) -> np.ndarray:
+def _arm(values: dict[str, np.ndarray], robot: fx.Robot, sensor: Sensor, plan: Plan) -> np.ndarray:
     """The arm's line at one instant, (points, 2) in the base frame."""
-    run, _ = with_poses(
-        fx.Run(
-            np.zeros(1), values, {name: UNITS[name] for name in values}, {"robot": robot.to_dict()}
-        )
-    )
-    x1, y1, a1 = (float(run[f"link/1/{part}"][0]) for part in ("x", "y", "angle"))
-    x2, y2, a2 = (float(run[f"link/2/{part}"][0]) for part in ("x", "y", "angle"))
-    w = np.array([run[f"link/2/deflection/{k}"][0] for k in range(9)])
-    along = np.linspace(0.0, robot.links[1].length_m, 9)
-    strip = np.stack(
-        [x2 + along * np.cos(a2) - w * np.sin(a2), y2 + along * np.sin(a2) + w * np.cos(a2)], axis=1
-    )
-    length = robot.links[0].length_m
-    return np.concatenate([[[x1, y1], [x1 + length * np.cos(a1), y1 + length * np.sin(a1)]], strip])
+    units = units_of(board_axes(plan.settings), sensor.strip, sensor.kind)
+    run, _ = with_poses(fx.Run(np.zeros(1), values, units, {"robot": robot.to_dict()}))
+    parts = []
+    for i, link in enumerate(robot.links, 1):
+        x, y, angle = (float(run[f"link/{i}/{part}"][0]) for part in ("x", "y", "angle"))
+        along = np.linspace(0.0, link.length_m, POINTS if link.flexible else 2)
+        names = [f"link/{i}/deflection/{k}" for k in range(len(along))]
+        w = np.array([run[name][0] if name in run else 0.0 for name in names])
+        c, s = np.cos(angle), np.sin(angle)
+        parts.append(np.stack([x + along * c - w * s, y + along * s + w * c], axis=1))
+    return np.concatenate(parts)

@@ -6,8 +6,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import re
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
 else:
     rr = Optional("rerun")
 
-from flexura.io import Run, replaced, unwritable
+from flexura.io import Run, write_bytes
 from flexura.io.drawing import MAX_SAMPLES, curves, extent, frames, grid, thinned
 
 from ..runs.deviation import TIP_DISTANCE, common, compared, deviation
@@ -41,7 +40,6 @@ from .summary_page import summary
 from .ticks import Signal
 
 CHUNK = 10_000  # rows a chunk: large enough to be quick, small enough to be loaded in parts
-FOOTER = b"RRF2FOOT"  # how a recording ends, before four more bytes
 GHOST = (150, 150, 150)
 DARK = (60, 60, 60)
 LINES = (226, 228, 232)
@@ -56,33 +54,24 @@ def write(path: str | Path, groups: dict[str, Sequence[Run]]) -> Path:
     target = Path(path)
     parts = [_part(name if len(groups) > 1 else "", runs) for name, runs in groups.items()]
     scenes = [scene for _, scene in parts]
-    with replaced(target) as draft, _complete(draft, target):
-        # The viewer keeps a layout by application id: reviews with the same layout share one,
-        # others must not.
-        key = hashlib.sha1(repr(scenes).encode()).hexdigest()[:8]
-        with rr.RecordingStream(f"flexura-review-{key}") as rec:
-            rec.save(draft, default_blueprint=blueprint(scenes))
-            rec.set_log_time_enabled(False)
-            rec.send_recording_name("; ".join(dict.fromkeys(_title(shown) for shown, _ in parts)))
-            rec.send_property(
-                "review", rr.AnyValues(picture_time_s=picture_time([s.run for s in parts[0][0]]))
-            )
-            for shown, scene in parts:
-                _write(rec, shown, scene)
+    # The viewer keeps a layout by application id: reviews with the same layout share one, others
+    # must not.
+    key = hashlib.sha1(repr(scenes).encode()).hexdigest()[:8]
+    with rr.RecordingStream(f"flexura-review-{key}") as rec:
+        # in memory: a thread of Rerun's that cannot write leaves the others waiting for ever
+        held = rec.memory_recording()
+        rec.send_blueprint(blueprint(scenes), make_active=False, make_default=True)
+        rec.set_log_time_enabled(False)
+        rec.send_recording_name("; ".join(dict.fromkeys(_title(shown) for shown, _ in parts)))
+        rec.send_property(
+            "review", rr.AnyValues(picture_time_s=picture_time([s.run for s in parts[0][0]]))
+        )
+        for shown, scene in parts:
+            _write(rec, shown, scene)
+        rec.flush()
+        content = held.drain_as_bytes()
+    write_bytes(target, content)
     return target
-
-
-@contextmanager
-def _complete(draft: Path, target: Path) -> Iterator[None]:
-    """Raises InputError if Rerun cannot write the file, or not all of it."""
-    try:
-        yield
-    except RuntimeError as error:
-        raise unwritable(target, Exception(str(error).splitlines()[0])) from None
-    with open(draft, "rb") as stream:
-        stream.seek(-min(len(FOOTER) + 4, draft.stat().st_size), 2)
-        if FOOTER not in stream.read():
-            raise unwritable(target, Exception("its end is missing"))
 
 
 def _part(name: str, runs: Sequence[Run]) -> tuple[list[Source], Scene]:

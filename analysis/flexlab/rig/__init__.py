@@ -1,7 +1,8 @@
 """The rig: its file, the board's settings that follow from it, and checks of its capability."""
 
 from .checks import Check, check_capability
-from .description import Rig, RigSetup, calibration, configuration, load
+from .configuration import calibration, configuration
+from .description import Rig, RigSetup, load
 from .emulation import TrueParameters, random_true_parameters
 
 __all__ = [

@@ -12,7 +12,10 @@ import numpy as np
 
 import flexura as fx
 
-from .description import RigSetup, calibration, configuration, tip_per_bend
+from .board_axes import BoardAxis, board_axes
+from .configuration import calibration, configuration, tip_per_bend
+from .description import RigSetup
+from .sheets import MotorSheet
 
 STEP_RATE_MAX_1_S = 4000.0  # what the firmware's step generator is made for
 EDGE_RATE_MAX_1_S = 20000.0  # encoder edges of both encoders together that the firmware is made for
@@ -64,75 +67,118 @@ def check_capability(setup: RigSetup, manoeuvre: fx.Manoeuvre | None = None) -> 
     Returns:
         One check for each requirement.
     """
-    asked = manoeuvre or setup.manoeuvre
+    asked, settings = manoeuvre or setup.manoeuvre, configuration(setup)
+    axes = board_axes(settings)
     motions: list[Peaks | None] = [
         peaks(joint.motion, asked.duration_s) if joint.motion is not None else None
         for joint in asked.drive.joints
     ]
     out = [*_always(setup)]
-    if motions[0] is not None:
-        out += _carriage(setup, motions[0])
-    if motions[1] is not None:
-        out += _rotary(setup, motions[1])
-    if motions[0] is not None and motions[1] is not None:
-        out.append(_edges(setup, motions[0], motions[1]))
+    for axis, peak in zip(axes, motions, strict=True):
+        if peak is not None:
+            check = _motor if axis.kind == "motor" else _stepper
+            out += check(setup, settings, axis, peak, motions)
+    encoders = [
+        axis.counts * peak.speed
+        for axis, peak in zip(axes, motions, strict=True)
+        if peak and axis.encoder
+    ]
+    if len(encoders) == len(axes):
+        out.append(_edges(sum(encoders)))
     return out
 
 
-def _carriage(setup: RigSetup, peak: Peaks) -> list[Check]:
-    """Checks of joint 1.
+def scale_of(axis: BoardAxis) -> tuple[float, str, str]:
+    """How a joint's position is printed: factor, unit, unit of the speed."""
+    return (1e3, "mm", "mm/s") if axis.unit == "m" else (1.0, "rad", "rad/s")
 
-    Speed by the motor's line n = n0 U / U0 (1 - M / (M0 U / U0)), torque M = F lead / (2 pi
-    efficiency).
+
+def inertias(setup: RigSetup) -> np.ndarray:
+    """The joints' mass matrix (J, J) of the straight robot [kg, kg m, kg m^2], without rotors."""
+    system = fx.assemble(setup.robot)
+    rows = system.joint_rows
+    mass = np.asarray(system.mass(system.start()))[np.ix_(rows, rows)]
+    return np.asarray(mass - np.diag([link.joint.rotor_inertia for link in setup.robot.links]))
+
+
+def _needed(setup: RigSetup, axis: BoardAxis, motions: list[Peaks | None]) -> float:
+    """The largest force or torque for the motions of all joints, straight links [N or N m]."""
+    row = np.abs(inertias(setup)[axis.number - 1])
+    return float(sum(m * peak.acceleration for m, peak in zip(row, motions, strict=True) if peak))
+
+
+def _motor(
+    setup: RigSetup,
+    settings: dict[str, float],
+    axis: BoardAxis,
+    peak: Peaks,
+    motions: list[Peaks | None],
+) -> list[Check]:
+    """Checks of a joint with a motor.
+
+    Speed by the motor's line n = n0 U / U0 (1 - M / (M0 U / U0)), torque M = F r / efficiency.
     """
-    rig, settings = setup.rig, configuration(setup)
-    motor, screw = rig.motor, rig.screw
+    rig, what = setup.rig, axis.what
+    motor = rig.motor if axis.number == 1 else rig.motor_2
+    assert motor is not None
+    screw = rig.screw if axis.number == 1 else None
     part = min(settings["voltage_max_V"], rig.driver.supply_V) / motor.rated_voltage_V
-    free = part * motor.no_load_speed_rpm / 60 * screw.lead_m
-    mass = moved_mass(setup)
-    torque = mass * peak.acceleration * screw.lead_m / (2 * math.pi * screw.efficiency)
+    per_turn = screw.lead_m if screw else 2 * math.pi
+    free = part * motor.no_load_speed_rpm / 60 * per_turn
+    needed = _needed(setup, axis, motions)
+    torque = needed * per_turn / (2 * math.pi * (screw.efficiency if screw else 1.0))
     stall = part * motor.stall_torque_N_m
     loaded = free * max(0.0, 1 - torque / stall)
-    rpm = 60 / screw.lead_m
+    rpm = 60 / per_turn
+    factor, unit, speed_unit = scale_of(axis)
+    shaft, force = ("screw", f"{needed:.3g} N") if screw else ("gear", f"{needed:.3g} N m")
     return [
         Check(
-            "carriage speed",
+            f"{what} speed",
             peak.speed <= loaded,
-            f"{1e3 * peak.speed:.1f} mm/s = {rpm * peak.speed:.0f} rpm of the screw",
-            f"{1e3 * loaded:.1f} mm/s = {rpm * loaded:.0f} rpm under load, {1e3 * free:.1f} mm/s "
-            f"without",
-            "a motor of a lower gear ratio, a screw of a larger lead, or a slower motion",
+            f"{factor * peak.speed:.4g} {speed_unit} = {rpm * peak.speed:.0f} rpm of the {shaft}",
+            f"{factor * loaded:.4g} {speed_unit} = {rpm * loaded:.0f} rpm under load, "
+            f"{factor * free:.4g} {speed_unit} without",
+            "a motor of a lower gear ratio, or a slower motion",
         ),
         Check(
-            "carriage force",
+            f"{what} force" if screw else f"{what} torque",
             torque <= 0.5 * stall,
-            f"{torque:.3f} N m at the screw for {mass:.2f} kg at {peak.acceleration:.2f} m/s^2",
+            f"{torque:.3f} N m at the {shaft} for {force} at {peak.acceleration:.2f} "
+            f"{axis.unit}/s^2",
             f"half of {stall:.2f} N m at rest",
             "a stronger motor or a slower motion",
         ),
-        _inside("carriage range", peak, setup.limits[0], 1e3, "mm"),
+        _inside(f"{what} range", peak, setup.limits[axis.number - 1], factor, unit),
         _below(
-            "carriage speed limit",
+            f"{what} speed limit",
             peak.speed,
-            settings["speed_max_1_m_s"],
-            "speed_max_1_m_s",
-            1e3,
-            "mm/s",
+            settings[axis.names["speed"]],
+            axis.names["speed"],
+            factor,
+            speed_unit,
         ),
     ]
 
 
-def _rotary(setup: RigSetup, peak: Peaks) -> list[Check]:
-    settings = configuration(setup)
-    rate = peak.speed * settings["stepper_steps_per_rad"]
-    strip, payload = setup.robot.links[1], setup.robot.payload
-    x = np.linspace(0.0, strip.length_m, 201)
-    inertia = (
-        float(np.trapezoid(strip.mass_per_length(x) * x**2, x))
-        + payload.mass_kg * strip.length_m**2
+def _stepper(
+    setup: RigSetup,
+    settings: dict[str, float],
+    axis: BoardAxis,
+    peak: Peaks,
+    motions: list[Peaks | None],
+) -> list[Check]:
+    assert setup.rig.stepper is not None
+    rate, what = peak.speed * axis.setpoints, axis.what
+    strip = setup.robot.links[-1]
+    # the rotor turns with the joint
+    torque = (inertias(setup)[1, 1] + strip.joint.rotor_inertia) * peak.acceleration
+    holding = setup.rig.stepper.holding_torque_N_m
+    limits = (
+        ("speed limit", peak.speed, "speed_max_2_rad_s", "rad/s"),
+        ("rate limit", peak.speed, "rate_max_2_rad_s", "rad/s"),
+        ("acceleration", peak.acceleration, "acceleration_max_2_rad_s2", "rad/s^2"),
     )
-    inertia += payload.inertia_kg_m2 + strip.joint.hub_inertia_kg_m2 + strip.joint.rotor_inertia
-    torque, holding = inertia * peak.acceleration, setup.rig.stepper.holding_torque_N_m
     return [
         Check(
             "step rate",
@@ -143,105 +189,90 @@ def _rotary(setup: RigSetup, peak: Peaks) -> list[Check]:
         ),
         Check(
             "stepper torque",
-            torque <= 0.5 * holding,
+            bool(torque <= 0.5 * holding),
             f"{torque:.3f} N m for the straight strip with its payload",
             f"half of {holding:.2f} N m holding torque",
             "a stronger stepper or a slower motion",
         ),
-        _inside("joint 2 range", peak, setup.limits[1], 1.0, "rad"),
-        _below(
-            "joint 2 speed limit",
-            peak.speed,
-            settings["speed_max_2_rad_s"],
-            "speed_max_2_rad_s",
-            1.0,
-            "rad/s",
-        ),
-        _below(
-            "joint 2 rate limit",
-            peak.speed,
-            settings["rate_max_2_rad_s"],
-            "rate_max_2_rad_s",
-            1.0,
-            "rad/s",
-        ),
-        _below(
-            "joint 2 acceleration",
-            peak.acceleration,
-            settings["acceleration_max_2_rad_s2"],
-            "acceleration_max_2_rad_s2",
-            1.0,
-            "rad/s^2",
-        ),
+        _inside(f"{what} range", peak, setup.limits[1], 1.0, "rad"),
+        *[
+            _below(f"{what} {name}", found, settings[key], key, 1.0, unit)
+            for name, found, key, unit in limits
+        ],
     ]
 
 
-def _edges(setup: RigSetup, one: Peaks, two: Peaks) -> Check:
-    settings = configuration(setup)
-    rate = (
-        one.speed * settings["motor_counts_per_m"] + two.speed * settings["stepper_counts_per_rad"]
-    )
-    advice = "encoders of fewer pulses, or a slower motion"
+def _edges(rate: float) -> Check:
     return Check(
         "encoder edges",
         rate <= EDGE_RATE_MAX_1_S,
         f"{rate:.0f} 1/s",
         f"{EDGE_RATE_MAX_1_S:.0f} 1/s",
-        advice,
+        "encoders of fewer pulses, or a slower motion",
     )
 
 
 def _always(setup: RigSetup) -> list[Check]:
     rig, settings = setup.rig, configuration(setup)
-    part = min(settings["voltage_max_V"], rig.driver.supply_V) / rig.motor.rated_voltage_V
-    stall = part * rig.motor.stall_current_A
-    fitted = calibration(setup)
-    count_mm = 1e3 * abs(fitted.c1_m) / 1024
-    return [
-        Check(
-            "motor current",
-            stall <= rig.driver.current_max_A,
-            f"{stall:.1f} A when the carriage is blocked",
-            f"{rig.driver.current_max_A:.1f} A of the driver",
-            "a lower voltage_max_V or a stronger driver",
-        ),
+    out = []
+    motors: list[tuple[str, MotorSheet]] = [("", rig.motor)]
+    if rig.motor_2:
+        motors.append((" 2", rig.motor_2))
+    blocked = "the carriage is" if rig.screw else "it is"
+    for number, motor in motors:
+        part = min(settings["voltage_max_V"], rig.driver.supply_V) / motor.rated_voltage_V
+        stall = part * motor.stall_current_A
+        out.append(
+            Check(
+                f"motor{number} current",
+                stall <= rig.driver.current_max_A,
+                f"{stall:.1f} A when {blocked} blocked",
+                f"{rig.driver.current_max_A:.1f} A of the driver",
+                "a lower voltage_max_V or a stronger driver",
+            )
+        )
+    out.append(
         Check(
             "supply",
             settings["supply_min_V"] < rig.driver.supply_V < settings["supply_max_V"],
             f"{rig.driver.supply_V:g} V",
             f"{settings['supply_min_V']:g} to {settings['supply_max_V']:g} V before a fault",
             "settings supply_min_V and supply_max_V around the supply",
-        ),
-        Check(
-            "flex sensor at rest",
-            settings["flex_min"] < fitted.zero < settings["flex_max"],
-            f"reads {fitted.zero:.3f} of full scale",
-            f"{settings['flex_min']:g} to {settings['flex_max']:g} before a fault",
-            "another divider_ohm, or settings flex_min and flex_max around it",
-        ),
-        Check(
-            "flex sensor's resolution",
-            count_mm <= 4.0,
-            f"{count_mm:.2f} mm of tip deflection for a count of 10 bits "
-            f"({tip_per_bend(setup):.3f} m for a radian of bend)",
-            "4 mm",
-            "a divider_ohm near the sensor's resistance",
-        ),
-    ]
-
-
-def moved_mass(setup: RigSetup) -> float:
-    """The mass that joint 1 moves [kg], without the motor's own inertia."""
-    carriage, strip = setup.robot.links
-    x = np.linspace(0.0, strip.length_m, 201)
-    own = carriage.mass_kg
-    if own is None:
-        along = np.linspace(0.0, carriage.length_m, 201)
-        own = float(np.trapezoid(carriage.mass_per_length(along), along))
-    hubs = sum(link.joint.hub_mass_kg for link in (carriage, strip))
-    return (
-        own + hubs + float(np.trapezoid(strip.mass_per_length(x), x)) + setup.robot.payload.mass_kg
+        )
     )
+    if rig.sensor:
+        zero, name = settings["flex_zero"], _sensor_name(setup)
+        out.append(
+            Check(
+                f"{name} at rest",
+                settings["flex_min"] < zero < settings["flex_max"],
+                f"reads {zero:.3f} of full scale",
+                f"{settings['flex_min']:g} to {settings['flex_max']:g} before a fault",
+                "another divider_ohm or zero_V, or settings flex_min and flex_max around it",
+            )
+        )
+    fitted = calibration(setup)
+    if fitted is not None:
+        count_mm = 1e3 * abs(fitted.c1_m) / 1024
+        about = f" ({tip_per_bend(setup):.3f} m for a radian of bend)" if rig.flex else ""
+        out.append(
+            Check(
+                f"{_sensor_name(setup)}'s resolution",
+                count_mm <= 4.0,
+                f"{count_mm:.2f} mm of tip deflection for a count of 10 bits{about}",
+                "4 mm",
+                "a divider_ohm near the sensor's resistance"
+                if rig.flex
+                else "an amplifier of a higher gain",
+            )
+        )
+    return out
+
+
+def _sensor_name(setup: RigSetup) -> str:
+    """The strip's sensor in words."""
+    rig = setup.rig
+    return "flex sensor" if rig.flex else "strain gauge" if rig.strain_gauge else "accelerometer"
 
 
 def _inside(what: str, peak: Peaks, limits: tuple[float, float], factor: float, unit: str) -> Check:

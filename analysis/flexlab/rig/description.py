@@ -1,13 +1,17 @@
 """The rig file: a frozen, validated description of motors, drives and sensors.
 
-The robot file has the strip's length and the carriage's limits. The protocol has names, ranges and
-defaults of the board's settings. No constant stands in two places.
+The robot file has the links and the joints' limits. The protocol has names, ranges and defaults of
+the board's settings. No constant stands in two places.
+
+Joint 1 has a [motor]: on a [screw] with a [carriage], or turning the joint with a [bearing]. Joint
+2 has a [stepper], a [motor_2] with a [bearing_2], or is not there. The last flexible link has one
+sensor or none: [flex], [strain_gauge] or [accelerometer].
 """
 
 from __future__ import annotations
 
 import difflib
-import math
+import logging
 import os
 from dataclasses import dataclass
 from typing import Any
@@ -16,14 +20,24 @@ from pydantic import Field, ValidationError, model_validator
 
 import flexura as fx
 from flexura.errors import InputError, WrongValue
-from flexura.io import FORMAT, check_format, explain, find, read_toml
+from flexura.io import FORMAT, check_format, explain, find, is_name, read_toml
 
 from ..board.protocol.declaration import CONFIG
 from .emulation import Emulated
-from .toml_table import Table, above, named_file
+from .old_layout import with_constants_in_their_tables
+from .sensors import Accelerometer, Flex, StrainGauge
+from .sheets import Bearing, Carriage, Driver, MotorSheet, Screw, StepperSheet
+from .toml_table import Table, named_file
+
+log = logging.getLogger(__name__)
 
 DERIVED_SETTINGS = (  # settings of the board that follow from the other tables
+    "drive_1",
+    "drive_2",
+    "encoder_2",
     "motor_counts_per_m",
+    "motor_1_counts_per_rad",
+    "motor_2_counts_per_rad",
     "stepper_steps_per_rad",
     "stepper_counts_per_rad",
     "supply_V",
@@ -34,147 +48,13 @@ DERIVED_SETTINGS = (  # settings of the board that follow from the other tables
     "flex_c3_m",
     "position_min_1_m",
     "position_max_1_m",
+    "position_min_1_rad",
+    "position_max_1_rad",
     "position_min_2_rad",
     "position_max_2_rad",
 )
-
-
-class MotorSheet(Table):
-    """Data sheet of joint 1's geared DC motor; torque and speed at the output shaft.
-
-    Its encoder is on the motor's own shaft.
-    """
-
-    rated_voltage_V: float = above("volts", "the voltage of the motor's data", 60)
-    no_load_speed_rpm: float = above(
-        "turns a minute", "the output shaft's speed without load at the rated voltage", 2e4
-    )
-    no_load_current_A: float = above("amperes", "the current without load", 50)
-    stall_torque_N_m: float = above(
-        "newton metres", "the output shaft's torque at rest at the rated voltage", 100
-    )
-    stall_current_A: float = above("amperes", "the current at rest at the rated voltage", 200)
-    gear_ratio: float = Field(
-        ge=1,
-        le=1e4,
-        description="turns of the motor for one of the output shaft, between 1 and 10000",
-    )
-    encoder_pulses: int = Field(
-        ge=1,
-        le=10000,
-        description=(
-            "pulses of each encoder line in a turn of the motor, a whole number from 1 to 10000"
-        ),
-    )
-
-
-class Screw(Table):
-    """The lead screw of joint 1."""
-
-    lead_m: float = Field(
-        gt=0,
-        le=0.1,
-        description=(
-            "the carriage's travel in a turn of the screw in metres, above 0 and at most "
-            "0.1 (0.008, not 8)"
-        ),
-    )
-    efficiency: float = Field(
-        gt=0, le=1, description="force x travel / work at the screw, above 0 and at most 1"
-    )
-
-
-class Driver(Table):
-    """The motor's bridge and supply."""
-
-    supply_V: float = above("volts", "the motor's supply", 30)
-    supply_divider: float = Field(
-        ge=1, le=10, description="motor supply / voltage at A1, between 1 and 10"
-    )
-    current_max_A: float = above(
-        "amperes", "the current that bridge, supply and fuse give for seconds", 200
-    )
-
-
-class StepperSheet(Table):
-    """Data sheet of joint 2's stepper, on the joint's axis, and the joint's encoder."""
-
-    full_steps_per_turn: int = Field(
-        ge=4, le=10000, description="full steps in a turn, a whole number from 4 to 10000"
-    )
-    microsteps: int = Field(ge=1, le=256, description="microsteps in a full step: 1, 2, 4, ... 256")
-    holding_torque_N_m: float = above("newton metres", "the holding torque", 100)
-    encoder_pulses: int = Field(
-        ge=1,
-        le=100000,
-        description=(
-            "pulses of each encoder line in a turn of the joint, a whole number from 1 to 100000"
-        ),
-    )
-    limits_rad: tuple[float, float] | None = Field(
-        None,
-        strict=False,
-        description=(
-            "two numbers in rad, the lower limit and a higher one, unless the robot file has them"
-        ),
-    )
-
-    @model_validator(mode="after")
-    def _consistent(self) -> StepperSheet:
-        if self.microsteps & (self.microsteps - 1):
-            raise WrongValue("microsteps", self.microsteps, "a power of two: 1, 2, 4, ... 256")
-        if self.limits_rad is not None and not self.limits_rad[0] < self.limits_rad[1]:
-            raise WrongValue(
-                "limits_rad",
-                list(self.limits_rad),
-                "the lower limit first, then a higher upper limit",
-            )
-        return self
-
-
-class Calibration(Table):
-    """A measured calibration: tip deflection = c1 x + c2 x^2 + c3 x^3, x = reading - zero.
-
-    Readings are fractions of 5 V.
-    """
-
-    zero: float = Field(
-        gt=0,
-        lt=1,
-        description="the straight strip's reading, a fraction of full scale between 0 and 1",
-    )
-    c1_m: float = Field(description="metres for x, a finite number")
-    c2_m: float = Field(0.0, description="metres for x^2, a finite number")
-    c3_m: float = Field(0.0, description="metres for x^3, a finite number")
-    covariance: list[list[float]] | None = Field(
-        None, description="four rows of four numbers: the covariance of zero, c1_m, c2_m, c3_m"
-    )
-
-    @model_validator(mode="after")
-    def _square(self) -> Calibration:
-        if self.covariance is not None and [len(row) for row in self.covariance] != [4] * 4:
-            raise WrongValue(
-                "covariance",
-                self.covariance,
-                "four rows of four numbers, of zero, c1_m, c2_m, c3_m",
-            )
-        return self
-
-
-class Flex(Table):
-    """The flex sensor in its divider: straight_ohm + ohm_per_rad times the bend over its length."""
-
-    length_m: float = above("metres", "the sensor's active length from the strip's root on", 1)
-    straight_ohm: float = above("ohms", "the resistance on the straight strip", 1e7)
-    ohm_per_rad: float = Field(
-        gt=0,
-        le=1e7,
-        description="ohms for a radian of bend over its length, above 0 and at most 1e7",
-    )
-    divider_ohm: float = above("ohms", "the resistor from A0 to ground", 1e7)
-    calibration: Calibration | None = Field(
-        None, description="a table { zero, c1_m, c2_m, c3_m }, measured"
-    )
+SENSORS = ("flex", "strain_gauge", "accelerometer")
+ONE_LINE = "the rig's name, one line of at most 200 characters without control codes"
 
 
 class Rig(Table):
@@ -183,9 +63,7 @@ class Rig(Table):
     format: int = Field(
         FORMAT, ge=1, le=FORMAT, description=f"the file's format, a whole number up to {FORMAT}"
     )
-    name: str = Field(
-        "", max_length=200, description="the rig's name, a text of at most 200 characters"
-    )
+    name: str = Field("", max_length=200, description=ONE_LINE)
     robot: str = Field(
         description="the path of the robot file from the rig file's folder, or a shipped name"
     )
@@ -195,10 +73,16 @@ class Rig(Table):
         )
     )
     motor: MotorSheet = Field(description="a table [motor]")
-    screw: Screw = Field(description="a table [screw]")
+    screw: Screw | None = Field(None, description="a table [screw]")
+    carriage: Carriage | None = Field(None, description="a table [carriage]")
+    bearing: Bearing | None = Field(None, description="a table [bearing]")
+    motor_2: MotorSheet | None = Field(None, description="a table [motor_2]")
+    bearing_2: Bearing | None = Field(None, description="a table [bearing_2]")
+    stepper: StepperSheet | None = Field(None, description="a table [stepper]")
     driver: Driver = Field(description="a table [driver]")
-    stepper: StepperSheet = Field(description="a table [stepper]")
-    flex: Flex = Field(description="a table [flex]")
+    flex: Flex | None = Field(None, description="a table [flex]")
+    strain_gauge: StrainGauge | None = Field(None, description="a table [strain_gauge]")
+    accelerometer: Accelerometer | None = Field(None, description="a table [accelerometer]")
     emulated: Emulated | None = Field(None, description="a table [emulated], for the emulated rig")
     board: dict[str, float] = Field(
         default_factory=dict,
@@ -206,7 +90,28 @@ class Rig(Table):
     )
 
     @model_validator(mode="after")
+    def _fits_together(self) -> Rig:
+        if self.stepper and self.motor_2:
+            raise WrongValue("motor_2", "[motor_2]", "one drive of joint 2: [stepper] is there too")
+        for table, wanted in (
+            ("carriage", "screw"),
+            ("bearing_2", "motor_2"),
+        ):
+            if getattr(self, table) and not getattr(self, wanted):
+                raise WrongValue(table, f"[{table}]", f"absent, for there is no [{wanted}]")
+        if self.bearing and self.screw:
+            raise WrongValue("bearing", "[bearing]", "absent: the motor drives a [screw]")
+        sensors = [name for name in SENSORS if getattr(self, name)]
+        if len(sensors) > 1:
+            raise WrongValue(
+                sensors[1], f"[{sensors[1]}]", f"one sensor: [{sensors[0]}] is there too"
+            )
+        return self
+
+    @model_validator(mode="after")
     def _settings(self) -> Rig:
+        if not is_name(self.name):
+            raise WrongValue("name", self.name, ONE_LINE)
         for name, value in self.board.items():
             if name in DERIVED_SETTINGS:
                 raise WrongValue(f"board.{name}", value, "absent: it follows from the other tables")
@@ -223,34 +128,49 @@ class Rig(Table):
                 )
         return self
 
+    @property
+    def sensor(self) -> Flex | StrainGauge | Accelerometer | None:
+        """The sensor of the last flexible link."""
+        return self.flex or self.strain_gauge or self.accelerometer
+
+    @property
+    def joints(self) -> int:
+        """How many joints the rig drives: 1 or 2."""
+        return 2 if self.stepper or self.motor_2 else 1
+
+    @property
+    def structure(self) -> str:
+        """The joints of the robot that fits: "PaR", "RR", "R"."""
+        return ("Pa" if self.screw else "R") + ("R" if self.joints == 2 else "")
+
 
 @dataclass(frozen=True)
 class RigSetup:
     """A rig file with the files that it names.
 
-    `limits`: of both joints [m, rad], from the rig file or the robot file.
+    `limits`: of each joint [m or rad], from the rig file or the robot file.
     """
 
     file: str
     rig: Rig
     robot: fx.Robot
     manoeuvre: fx.Manoeuvre
-    limits: tuple[tuple[float, float], tuple[float, float]]
+    limits: tuple[tuple[float, float], ...]
 
     @property
     def emulated(self) -> Emulated:
-        """The rig file's table [emulated].
+        """The rig file's table [emulated]; without one nothing is noisy and nothing differs."""
+        return self.rig.emulated or Emulated()
 
-        Raises:
-            InputError: there is none.
-        """
-        if self.rig.emulated is None:
-            raise InputError(
-                "missing: the emulated rig is described in a table [emulated]",
-                key="emulated",
-                file=self.file,
-            )
-        return self.rig.emulated
+    @property
+    def strip(self) -> int:
+        """The number of the last flexible link, which has the sensor."""
+        return strip_of(self.robot)
+
+
+def strip_of(robot: fx.Robot) -> int:
+    """The number of the last flexible link (from 1), which has the sensor."""
+    return max(i for i, link in enumerate(robot.links, 1) if link.flexible)
 
 
 def rig_of_recording(tables: Any) -> Rig:
@@ -263,7 +183,7 @@ def rig_of_recording(tables: Any) -> Rig:
         InputError: they are not valid.
     """
     try:
-        return Rig.model_validate(tables)
+        return Rig.model_validate(with_constants_in_their_tables(tables)[0])
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))
@@ -288,119 +208,82 @@ def load(path: str | os.PathLike[str]) -> RigSetup:
     """
     found = find(path, "rigs")
     name = os.fspath(found)
-    data = read_toml(found)
+    data, moved = with_constants_in_their_tables(read_toml(found))
     check_format(data, name)
     try:
         rig = Rig.model_validate(data)
     except ValidationError as error:
         raise explain(error, Rig, data, name) from None
+    for line in moved:
+        log.warning("%s: %s", name, line)
     robot = fx.load(named_file(found, rig.robot))
-    carriage, strip = (robot.links * 2)[:2]
-    if robot.structure != "PaR" or carriage.flexible or not strip.flexible:
-        expected = (
-            "expected a robot of type IV: a rigid link with joint Pa, a flexible one with joint R"
-        )
-        raise InputError(expected, key="robot", value=rig.robot, file=name)
-    if carriage.joint.limits is None:
-        raise InputError(
-            "expected a robot whose carriage has limits", key="robot", value=rig.robot, file=name
-        )
-    here, there = rig.stepper.limits_rad, strip.joint.limits
-    turn = here or there
-    if turn is None:
-        raise InputError(
-            "missing: the limits of joint 2 in rad, here or in the robot file",
-            key="stepper.limits_rad",
-            file=name,
-        )
-    if here and there:
-        expected = "expected limits in one place: the robot file has them too"
-        raise InputError(expected, key="stepper.limits_rad", value=list(here), file=name)
-    return RigSetup(
-        name,
-        rig,
-        robot,
-        fx.load_manoeuvre(named_file(found, rig.manoeuvre), 2),
-        (carriage.joint.limits, turn),
+    _check_robot(rig, robot, name)
+    _check_sensor(rig, robot, name)
+    manoeuvre = fx.load_manoeuvre(named_file(found, rig.manoeuvre), rig.joints)
+    return RigSetup(name, rig, robot, manoeuvre, _limits(rig, robot, name))
+
+
+def _check_robot(rig: Rig, robot: fx.Robot, file: str) -> None:
+    wanted = rig.structure
+    fits = robot.structure == wanted and robot.links[-1].flexible
+    if fits and (not rig.screw or not robot.links[0].flexible):
+        return
+    words = {
+        "PaR": "a robot of type IV: a rigid link with joint Pa, a flexible one with joint R",
+        "RR": "a robot of two links with joints R, the last one flexible",
+        "R": "a robot of one flexible link with joint R",
+    }[wanted]
+    raise InputError(
+        f"expected {words}; that is what these drives move", key="robot", value=rig.robot, file=file
     )
 
 
-def configuration(setup: RigSetup) -> dict[str, float]:
-    """All settings of the board, by name, in the protocol's order.
+def _check_sensor(rig: Rig, robot: fx.Robot, file: str) -> None:
+    length = robot.links[-1].length_m
+    if rig.flex and rig.flex.from_m + rig.flex.length_m > length:
+        raise InputError(
+            f"expected a sensor that ends on the strip of {length:g} m",
+            key="flex.length_m",
+            value=rig.flex.length_m,
+            file=file,
+        )
+    if rig.strain_gauge and rig.strain_gauge.at_m >= length:
+        raise InputError(
+            f"expected a place on the strip of {length:g} m",
+            key="strain_gauge.at_m",
+            value=rig.strain_gauge.at_m,
+            file=file,
+        )
 
-    d = lead counts / (4 pulses ratio), theta = 2 pi steps / (full steps x microsteps).
 
-    Args:
-        setup: the rig.
-
-    Returns:
-        Settings in SI units.
-
-    Raises:
-        InputError: a derived setting is outside the board's range.
-    """
-    rig = setup.rig
-    (low_1, high_1), (low_2, high_2) = setup.limits
-    turn = 2 * math.pi
-    derived = {
-        "motor_counts_per_m": 4
-        * rig.motor.encoder_pulses
-        * rig.motor.gear_ratio
-        / rig.screw.lead_m,
-        "stepper_steps_per_rad": rig.stepper.full_steps_per_turn * rig.stepper.microsteps / turn,
-        "stepper_counts_per_rad": 4 * rig.stepper.encoder_pulses / turn,
-        "supply_V": rig.driver.supply_V,
-        "supply_divider": rig.driver.supply_divider,
-        **{
-            f"flex_{key}": value
-            for key, value in calibration(setup).model_dump(exclude={"covariance"}).items()
-        },
-        "position_min_1_m": low_1,
-        "position_max_1_m": high_1,
-        "position_min_2_rad": low_2,
-        "position_max_2_rad": high_2,
-    }
-    assert set(derived) == set(DERIVED_SETTINGS)
-    for name, value in derived.items():
-        item = CONFIG[name]
-        if not item.least <= value <= item.greatest:
-            expected = (
-                f"a rig whose {name} lies between {item.least:g} and {item.greatest:g} "
-                f"({item.text})"
+def _limits(rig: Rig, robot: fx.Robot, file: str) -> tuple[tuple[float, float], ...]:
+    out: list[tuple[float, float]] = []
+    sheets = (
+        ("motor", rig.motor),
+        ("motor_2" if rig.motor_2 else "stepper", rig.motor_2 or rig.stepper),
+    )
+    for (table, sheet), link in zip(sheets, robot.links, strict=False):
+        here, there = getattr(sheet, "limits_rad", None), link.joint.limits
+        key = f"{table}.limits_rad"
+        if here and there:
+            expected = "expected limits in one place: the robot file has them too"
+            raise InputError(expected, key=key, value=list(here), file=file)
+        if here and link.joint.type != "R":
+            expected = "absent: a screw's limits are those of the robot file"
+            raise InputError(expected, key=key, value=list(here), file=file)
+        found = here or there
+        if found is None and link.joint.type != "R":
+            raise InputError(
+                "expected a robot whose carriage has limits",
+                key="robot",
+                value=rig.robot,
+                file=file,
             )
-            raise InputError(expected, key=name, value=value, file=setup.file)
-    return {name: (derived | rig.board).get(name, item.default) for name, item in CONFIG.items()}
-
-
-def tip_per_bend(setup: RigSetup) -> float:
-    """Tip deflection for a radian of bend under the sensor [m/rad], of a strip loaded at its tip.
-
-    alpha = (P / EI)(L s - s^2 / 2), w = P L^3 / (3 EI), so w / alpha = L^3 / (3 (L s - s^2 / 2))
-    (Euler-Bernoulli).
-
-    Args:
-        setup: the rig.
-    """
-    length, sensor = setup.robot.links[1].length_m, setup.rig.flex.length_m
-    return length**3 / (3 * (length * sensor - sensor**2 / 2))
-
-
-def calibration(setup: RigSetup) -> Calibration:
-    """The measured calibration, or that of the sensor's data sheet.
-
-    With the reading r = R_f / (R_s + R_f), and z that of the straight strip, the bend is (R_f /
-    k)(1 / r - 1 / z). Its expansion to third order in x = r - z, times the tip deflection for a
-    radian, is the calibration.
-
-    Args:
-        setup: the rig.
-
-    Returns:
-        The calibration.
-    """
-    flex = setup.rig.flex
-    if flex.calibration is not None:
-        return flex.calibration
-    z = flex.divider_ohm / (flex.straight_ohm + flex.divider_ohm)
-    scale = tip_per_bend(setup) * flex.divider_ohm / flex.ohm_per_rad
-    return Calibration(zero=z, c1_m=-scale / z**2, c2_m=scale / z**3, c3_m=-scale / z**4)
+        if found is None:
+            raise InputError(
+                f"missing: the limits of joint {len(out) + 1} in rad, here or in the robot file",
+                key=key,
+                file=file,
+            )
+        out.append(found)
+    return tuple(out)

@@ -19,9 +19,17 @@ def above(unit: str, what: str, most: float) -> Any:
     return Field(gt=0, le=most, description=f"{what} in {unit}, above 0 and at most {most:g}")
 
 
-def from_zero(unit: str, what: str, most: float) -> Any:
-    """A field for a number from 0 to `most`."""
-    return Field(ge=0, le=most, description=f"{what} in {unit}, from 0 to {most:g}")
+def from_zero(unit: str, what: str, most: float, default: float | None = None) -> Any:
+    """A field for a number from 0 to `most`; required if there is no default."""
+    said = f"{what} in {unit}, from 0 to {most:g}"
+    if default is None:
+        return Field(ge=0, le=most, description=said)
+    return Field(float(default), ge=0, le=most, description=said)
+
+
+def within(what: str, most: float, default: Any = ...) -> Any:
+    """A field for a number of either sign, at most `most` in size; without a default required."""
+    return Field(default, ge=-most, le=most, description=f"{what}, at most {most:g} in size")
 
 
 def named_file(file: Path, named: str) -> str | Path:

@@ -93,6 +93,8 @@ def type_4() -> Structure:
     of the speed at which the board switches off.
     """
     bench = rigs.load(FIRMWARE / "rig.toml")
+    stepper = bench.rig.stepper
+    assert stepper is not None
     robot, outputs = with_nominal_drives(fx.load("rig"), bench)
     board = rigs.configuration(bench)
     settings = {
@@ -133,7 +135,7 @@ def type_4() -> Structure:
         ),
         Gains(
             {name: value for name, value in settings.items() if "_2_" not in name}
-            | {"kp_2_N_m_rad": 1.0, "torque_max_2_N_m": bench.rig.stepper.holding_torque_N_m},
+            | {"kp_2_N_m_rad": 1.0, "torque_max_2_N_m": stepper.holding_torque_N_m},
             outputs[:1],
         ),
     )

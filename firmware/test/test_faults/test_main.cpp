@@ -23,6 +23,8 @@ static bool used;  // the monitor has seen much before
 // Limits of which each is another number.
 static void set_limits() {
   limits = FaultLimits();
+  limits.drive[0] = Drive::motor;
+  limits.drive[1] = Drive::stepper;
   limits.travel_low[0] = -1000;
   limits.travel_high[0] = 1100;
   limits.travel_low[1] = -1200;
@@ -30,9 +32,9 @@ static void set_limits() {
   limits.speed[0] = 160;
   limits.speed[1] = 96;
   limits.stall_duty = 50;
-  limits.stall_speed = 20;
+  limits.stall_speed[0] = 20;
   limits.stall_ticks = 30;
-  limits.runaway = 40;
+  limits.runaway[0] = 40;
   limits.lost = 5000;
   limits.against = 12;
   limits.following[0] = 700;
@@ -62,7 +64,7 @@ static void begin() {
     for (uint8_t k = 0; k < 3; ++k) {
       in.supply = 300;
       in.flex = 100;
-      now.duty = 100;
+      now.duty[0] = 100;
       in.edges[0][0] = in.edges[1][1] = 2;
       in.missed[0] = in.missed[1] = 1;
       in.stepped = 1;
@@ -70,9 +72,9 @@ static void begin() {
       CHECK(monitor.check(limits, in, now) == Fault::none);
     }
     at_rest();
-    now.duty = 100;
+    now.duty[0] = 100;
     for (uint8_t k = 0; k < 20; ++k) CHECK(monitor.check(limits, in, now) == Fault::none);
-    now.duty = 0;
+    now.duty[0] = 0;
     for (uint8_t k = 0; k < 3; ++k) {
       in.supply = 300;
       in.flex = 100;
@@ -186,29 +188,29 @@ static void lone_edges_of_joint_1() {
   for (int8_t sign = -1; sign <= 1; sign = static_cast<int8_t>(sign + 2)) {
     begin();
     now.velocity[0] = 1000;  // no stall
-    now.duty = static_cast<int16_t>(51 * sign);
+    now.duty[0] = static_cast<int16_t>(51 * sign);
     in.edges[0][0] = 1;
     CHECK(until(Fault::encoder_1) == 9);
     begin();
     now.velocity[0] = 1000;
-    now.duty = static_cast<int16_t>(50 * sign);  // not driven
+    now.duty[0] = static_cast<int16_t>(50 * sign);  // not driven
     in.edges[0][0] = 3;
     CHECK(quiet(60));
-    now.duty = static_cast<int16_t>(51 * sign);  // what trembled before does not count
+    now.duty[0] = static_cast<int16_t>(51 * sign);  // what trembled before does not count
     CHECK(until(Fault::encoder_1) == 3);
     begin();
     now.velocity[0] = 1000;
-    now.duty = static_cast<int16_t>(51 * sign);
+    now.duty[0] = static_cast<int16_t>(51 * sign);
     in.edges[0][1] = 4;
     CHECK(quiet(2));
-    now.duty = 0;  // not driven for a tick: forgotten
+    now.duty[0] = 0;  // not driven for a tick: forgotten
     CHECK(quiet(1));
-    now.duty = static_cast<int16_t>(51 * sign);
+    now.duty[0] = static_cast<int16_t>(51 * sign);
     CHECK(quiet(2) && until(Fault::encoder_1) == 1);
   }
   begin();
   now.velocity[0] = 1000;
-  now.duty = 100;
+  now.duty[0] = 100;
   for (uint8_t k = 0; k < 40; ++k) {  // alternating lines: a shaft that turns
     in.edges[0][k & 1] = 8;
     in.edges[0][~k & 1] = 0;
@@ -219,7 +221,7 @@ static void lone_edges_of_joint_1() {
   CHECK(quiet(1) && until(Fault::encoder_1) == 1);
   begin();
   now.velocity[0] = 1000;
-  now.duty = 100;
+  now.duty[0] = 100;
   in.edges[0][0] = 8;
   CHECK(quiet(1));
   in.edges[0][1] = 1;  // both in one tick: begun anew
@@ -270,12 +272,12 @@ static void running_away_and_standing_still() {
   for (int8_t sign = -1; sign <= 1; sign = static_cast<int8_t>(sign + 2)) {
     begin();
     now.velocity[0] = 1000;
-    now.duty = static_cast<int16_t>(51 * sign);
+    now.duty[0] = static_cast<int16_t>(51 * sign);
     in.moved[0] = static_cast<int8_t>(-2 * sign);
     CHECK(until(Fault::runaway_1) == 21);  // 42 counts against a drive; 40 are allowed
     begin();
     now.velocity[0] = 1000;
-    now.duty = static_cast<int16_t>(51 * sign);
+    now.duty[0] = static_cast<int16_t>(51 * sign);
     in.moved[0] = static_cast<int8_t>(-2 * sign);
     CHECK(quiet(20));
     in.moved[0] = static_cast<int8_t>(sign);  // with the drive again: forgotten as far as it goes
@@ -284,7 +286,7 @@ static void running_away_and_standing_still() {
     CHECK(until(Fault::runaway_1) == 6);
     begin();
     now.velocity[0] = 1000;
-    now.duty = static_cast<int16_t>(51 * sign);
+    now.duty[0] = static_cast<int16_t>(51 * sign);
     in.moved[0] = static_cast<int8_t>(4 * sign);  // far with the drive gives no credit
     CHECK(quiet(20));
     in.moved[0] = static_cast<int8_t>(-2 * sign);
@@ -292,31 +294,31 @@ static void running_away_and_standing_still() {
     begin();
     now.velocity[0] = 1000;
     in.moved[0] = static_cast<int8_t>(-2 * sign);
-    now.duty = static_cast<int16_t>(51 * sign);
+    now.duty[0] = static_cast<int16_t>(51 * sign);
     CHECK(quiet(20));
-    now.duty = 0;  // no drive, nothing against it
+    now.duty[0] = 0;  // no drive, nothing against it
     CHECK(quiet(1));
-    now.duty = static_cast<int16_t>(51 * sign);
+    now.duty[0] = static_cast<int16_t>(51 * sign);
     CHECK(until(Fault::runaway_1) == 21);
 
     begin();
-    now.duty = static_cast<int16_t>(51 * sign);
+    now.duty[0] = static_cast<int16_t>(51 * sign);
     now.velocity[0] = static_cast<int16_t>(20 * sign);
     CHECK(until(Fault::stall_1) == 30);
     begin();
-    now.duty = static_cast<int16_t>(51 * sign);
+    now.duty[0] = static_cast<int16_t>(51 * sign);
     CHECK(quiet(29));
     now.velocity[0] = static_cast<int16_t>(-21 * sign);  // it moves for a tick
     CHECK(quiet(1));
     now.velocity[0] = 0;
     CHECK(until(Fault::stall_1) == 30);
     begin();
-    now.duty = static_cast<int16_t>(50 * sign);
+    now.duty[0] = static_cast<int16_t>(50 * sign);
     CHECK(quiet(90));
     begin();
     limits.stall_duty = 0;  // the least drive counts
     now.velocity[0] = 1000;
-    now.duty = sign;
+    now.duty[0] = sign;
     in.moved[0] = static_cast<int8_t>(-2 * sign);
     CHECK(until(Fault::runaway_1) == 21);
   }

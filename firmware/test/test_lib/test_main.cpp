@@ -380,7 +380,7 @@ static void states_follow_each_other_and_nothing_else() {
   CHECK(ask(Start::kCode, &start) == Result::not_ready);
   CHECK(ask(Arm::kCode, &again) == Result::wrong_state && ask(Halt::kCode) == Result::wrong_state);
   tick();
-  CHECK(out.on && out.duty == 0);
+  CHECK(out.on && out.duty[0] == 0);
   Setpoints points = {};
   points.count = 2;
   points.final = 1;
@@ -393,10 +393,10 @@ static void states_follow_each_other_and_nothing_else() {
   CHECK(ask(Setpoints::kCode, &points) == Result::ok);
   CHECK(ask(Start::kCode, &start) == Result::ok);
   tick(20);
-  CHECK(out.duty > 0);  // 5 mm x 200 V/m = 1 V
+  CHECK(out.duty[0] > 0);  // 5 mm x 200 V/m = 1 V
   CHECK(ask(Halt::kCode) == Result::ok && rig.state() == State::armed);
   tick();
-  CHECK(out.on && out.duty == 0);
+  CHECK(out.on && out.duty[0] == 0);
   CHECK(ask(Stop::kCode) == Result::ok && rig.state() == State::idle);
   tick();
   CHECK(!out.on);
@@ -405,10 +405,10 @@ static void states_follow_each_other_and_nothing_else() {
 static void the_first_fault_is_kept_until_cleared_by_name() {
   run_open_loop(1000, 0);
   tick(5);
-  CHECK(out.on && out.duty > 0);
+  CHECK(out.on && out.duty[0] > 0);
   rig.inputs().switches = 1 << static_cast<uint8_t>(Flag::limit_high);
   tick();
-  CHECK(!out.on && out.duty == 0 && rig.fault() == Fault::limit_high);
+  CHECK(!out.on && out.duty[0] == 0 && rig.fault() == Fault::limit_high);
   rig.inputs().switches |= 1 << static_cast<uint8_t>(Flag::emergency_stop);
   tick();
   rig.trip(Fault::overrun);
@@ -423,8 +423,8 @@ static void the_first_fault_is_kept_until_cleared_by_name() {
   CHECK(ask(Clear::kCode, &clear) == Result::ok && rig.state() == State::idle);
 }
 
-static Fault fault_when(void (*wrong)(uint16_t), int16_t voltage, int16_t rate, uint16_t most) {
-  run_open_loop(voltage, rate);
+static Fault fault_when(void (*wrong)(uint16_t), int16_t mV, int16_t rate, uint16_t most) {
+  run_open_loop(mV, rate);
   for (uint16_t k = 0; k < most && rig.state() != State::fault; ++k) {
     if (k % 50 == 0) rig.host_spoke();
     Inputs &in = rig.inputs();
@@ -435,7 +435,7 @@ static Fault fault_when(void (*wrong)(uint16_t), int16_t voltage, int16_t rate, 
     rig.prepare();
     rig.tick(out);
   }
-  if (rig.state() == State::fault) CHECK(!out.on && out.duty == 0);
+  if (rig.state() == State::fault) CHECK(!out.on && out.duty[0] == 0);
   return rig.fault();
 }
 
@@ -621,8 +621,6 @@ static void a_silent_host_stops_all() {
   CHECK(rig.fault() == Fault::host_silent && !out.on);
 }
 
-#define ITEM(name) static_cast<uint8_t>(Item::name)
-
 static void a_configuration_must_make_sense() {
   FixedPointConfig fixed;
   Config config = default_config();
@@ -726,7 +724,7 @@ static void host_and_board_compute_the_same() {
     rig.prepare();
     rig.tick(out);
     pulses = static_cast<uint16_t>(pulses + out.steps.count);
-    crc = crc32(reinterpret_cast<const uint8_t *>(&out.duty), 2, crc);
+    crc = crc32(reinterpret_cast<const uint8_t *>(&out.duty[0]), 2, crc);
     crc = crc32(&out.steps.count, 1, crc);
     crc = crc32(reinterpret_cast<const uint8_t *>(out.steps.at),
                 static_cast<uint16_t>(2 * out.steps.count), crc);

@@ -84,22 +84,22 @@ nb::tuple run_population(const Counts &counts, const Cube &numbers, const Cube &
     endings = run(population, threads, values.data(), watch.stop, watch.done);
   }
   const std::size_t count = endings.size();
-  Array reached = new_array({count}), steps = new_array({count}), joint = new_array({count}),
-        position = new_array({count, links});
+  Array reached = new_array({count}), balance = new_array({count}), steps = new_array({count}),
+        joint = new_array({count}), position = new_array({count, links});
   nb::list words;
   nb::dict texts;
   for (std::size_t k = 0; k < count; ++k) {
     const Ending &end = endings[k];
     words.append(end.refusal == Ending::none ? word(end.status) : "refused");
     reached.data()[k] = end.reached, steps.data()[k] = double(end.steps),
-    joint.data()[k] = end.joint;
+    joint.data()[k] = end.joint, balance.data()[k] = end.balance;
     std::copy(end.position.begin(), end.position.end(), position.data() + k * links);
     if (end.refusal == Ending::fault)
       texts[nb::int_(k)] = nb::make_tuple(end.joint, end.key, end.text);
     else if (end.status != Status::done && end.refusal == Ending::none)
       texts[nb::int_(k)] = nb::make_tuple(-1, "", end.text);
   }
-  return nb::make_tuple(values, words, reached, steps, joint, position, texts);
+  return nb::make_tuple(values, words, reached, steps, joint, position, texts, balance);
 }
 
 }  // namespace
@@ -123,7 +123,7 @@ void bind_population(nb::module_ &module) {
              "stations"_a, "threads"_a, "watch"_a,
              "Values (channels, robots, times); of each robot how it ended, the time reached, "
              "steps, joint, "
-             "positions of the joints; texts by robot.");
+             "positions of the joints; texts by robot; balances of the energies.");
 }
 
 }  // namespace flexura

@@ -3,6 +3,7 @@
 
 #include "mechanics.hpp"
 #include "statics_and_modes/equilibrium.hpp"
+#include "statics_and_modes/force_derivatives.hpp"
 #include "statics_and_modes/natural_modes.hpp"
 
 namespace flexura {
@@ -83,6 +84,31 @@ Array rates_of(const Mechanics &self, const Vector &q, const Vector &v) {
   return out;
 }
 
+// Of T states, rows of q, v, a (T, n): the forces, their derivatives by q, v and a, the tip's places
+// and their derivatives by q.
+nb::tuple force_derivatives_of(const Mechanics &self, const Matrix &q, const Matrix &v,
+                               const Matrix &a) {
+  const std::size_t n = std::size_t(self.model->n), count = q.shape(0), square = n * n;
+  for (const Matrix *x : {&q, &v, &a})
+    if (x->shape(1) != n || x->shape(0) != count)
+      throw std::invalid_argument("q, v and a need a row a state and a column an unknown");
+  Array force = new_array({count, n}), by_position = new_array({count, n, n}),
+        by_rate = new_array({count, n, n}), by_acceleration = new_array({count, n, n}),
+        tip = new_array({count, 2}), tip_by_position = new_array({count, 2, n});
+  {
+    nb::gil_scoped_release release;
+    ForceDerivatives derivatives(*self.model);
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::size_t row = k * n;
+      derivatives.at(q.data() + row, v.data() + row, a.data() + row, force.data() + row,
+                     by_position.data() + k * square, by_rate.data() + k * square,
+                     tip.data() + 2 * k, tip_by_position.data() + 2 * row);
+      mass_matrix(*self.model, q.data() + row, by_acceleration.data() + k * square);
+    }
+  }
+  return nb::make_tuple(force, by_position, by_rate, by_acceleration, tip, tip_by_position);
+}
+
 }  // namespace
 
 void add_solve(nb::class_<Mechanics> &type) {
@@ -94,6 +120,9 @@ void add_solve(nb::class_<Mechanics> &type) {
       .def("mass", &mass_of, "q"_a, "M(q) (n, n).")
       .def("stiffness", &stiffness_of, "q"_a, "v"_a,
            "Derivative of the forces at q (and rates v, if any) by q, (n, n).")
+      .def("force_derivatives", &force_derivatives_of, "q"_a, "v"_a, "a"_a,
+           "Of T states: forces (T, n), their derivatives by q, v and a (T, n, n), the tip's places "
+           "(T, 2), their derivatives by q (T, 2, n).")
       .def("rates", &rates_of, "q"_a, "v"_a, "Derivative of the forces by v, (n, n).");
 }
 

@@ -67,7 +67,7 @@ void MethodSelection::choose() {
   Integration<double> &c = loop.integration;
   const Inputs &acting = c.acts_of(0);
   const bool bends = c.n > c.plant.joints;
-  sharp = rtol < SHARPEST;
+  sharp = rtol < SHARPEST, begun = loop.snapshot();
   if (const char *name = method_without_trial(c, loop.run_state[0].t, rtol))
     chosen = std::string(name) == "implicit" ? implicit() : by_explicit();
   else if (acting.sampler)
@@ -186,12 +186,19 @@ double MethodSelection::trial(Method<double> &method, long most) {
          static_cast<double>(std::max(loop.integration.passes - half, 1L));
 }
 
-// Where exponential steps get stuck, implicit ones may not.
+// Where exponential steps get stuck, implicit ones may not. They begin at the start of the run: the
+// state where the others got stuck may be far off.
 bool MethodSelection::gives_way() {
   RunState &c = loop.run_state[0];
   if (chosen != exponential_.get() || (c.status != Status::stuck && c.status != Status::diverged))
     return false;
   chosen = implicit(), raced = false, in_window = 0;
+  const Inputs &acting = loop.integration.acts_of(0);
+  if (!acting.function && !acting.sampler) {
+    const long tried = c.steps + c.rejected;
+    loop.restore(begun);
+    c.rejected += tried;  // they count against the budget
+  }
   c.status = Status::running, c.fresh = true, c.failed = 0;
   c.wish = 1e-6 * (c.end - c.t);
   return true;

@@ -6,6 +6,9 @@
 // progress a pass has fallen to a quarter, at most once in AGAIN passes. Passes are counted, not
 // time: a run's digits do not depend on the machine's load.
 //
+// Exponential steps that get stuck may have lost the motion before: the run begins again with
+// implicit steps, where a caller's function or a controller does not forbid it.
+//
 // There is no race either where exponential steps end soon (first_steps.hpp), or where it is
 // decided beforehand: rigid robots without gains or friction and tolerances below 1e-9 are for
 // explicit steps; a slider on a link that moves through a sleeve is for implicit ones, as its modes
@@ -74,6 +77,7 @@ class MethodSelection {
   bool raced = false,
        goes_on = false;  // goes_on: with the exponential steps that the run began with
   int held = 0;
+  Loop<double>::Snapshot begun;  // where the run started
   long last_race = 0, in_window = 0, window_passes = 0;
   double window_t = 0.0;
   double speed = 0.0;  // seconds a pass, when chosen

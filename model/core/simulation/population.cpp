@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <exception>
 #include <limits>
 #include <mutex>
@@ -267,6 +268,7 @@ class Worker {
     for (int k = 0; k < count; ++k)
       end(model, ran[std::size_t(k)], endings_[std::size_t(robots[std::size_t(k)])]);
     Observer<Four> observer(model, all_.stations);
+    balance(observer, n, robots, ran);
     int parts = 0, most = 0, rows[LANES];
     for (const Channel &channel : all_.channels)
       parts |= channel.of == Channel::seen ? observer.part_of(channel.index) : 0;
@@ -291,6 +293,46 @@ class Worker {
           if (row < rows[k])
             *value(c, robots[std::size_t(k)], row) =
                 number(all_.channels[c], model, z[k], drive[k], seen, k);
+    }
+  }
+
+  // (101) at the ends of robots that are done: by how much their energies and accounts do not
+  // balance, relative to the largest of them at LOOKS rows.
+  void balance(Observer<Four> &observer, int n, const std::vector<int> &robots,
+               const std::vector<Ran> &ran) const {
+    constexpr int LOOKS = 5, KINDS = 3;  // kinetic, strain, potential
+    const std::size_t count = robots.size(), size = std::size_t(2 * n + ACCOUNTS),
+                      energies = std::size_t(observer.columns() - KINDS);
+    std::vector<Four> state(std::size_t(2 * n)), seen(std::size_t(observer.columns()));
+    const double *z[LANES] = {};
+    double first[LANES][KINDS] = {}, last[LANES][KINDS] = {}, scale[LANES] = {};
+    for (int look = 0; look < LOOKS; ++look) {
+      for (std::size_t k = 0; k < LANES; ++k) {
+        const Record &record = *ran[k < count ? k : 0].record;
+        if (record.rows == 0) return;
+        z[k] = record.state.data() + std::size_t((record.rows - 1) * look / (LOOKS - 1)) * size;
+        for (std::size_t j = 0; j < state.size(); ++j) state[j].set(int(k), z[k][j]);
+      }
+      observer.observe(state.data(), state.data() + n, seen.data(), Observer<Four>::ENERGIES);
+      for (std::size_t k = 0; k < LANES; ++k)
+        for (std::size_t e = 0; e < KINDS; ++e) {
+          last[k][e] = seen[energies + e][int(k)];
+          if (look == 0) first[k][e] = last[k][e];
+          scale[k] = std::fmax(
+              scale[k], std::fmax(std::fabs(last[k][e]), std::fabs(last[k][e] - first[k][e])));
+        }
+    }
+    for (std::size_t k = 0; k < count; ++k) {
+      if (ran[k].run_state->status != Status::done) continue;
+      const double *account = z[k] + 2 * n;
+      double missing = account[LOSS] + account[NUMERICAL] - account[WORK];
+      for (std::size_t e = 0; e < KINDS; ++e) missing += last[k][e] - first[k][e];
+      const double strain = last[k][1] - first[k][1] - account[STRAIN];
+      for (int of : {WORK, LOSS, NUMERICAL}) scale[k] = std::fmax(scale[k], std::fabs(account[of]));
+      const double whole = std::fabs(missing) > std::fabs(strain) || std::isnan(missing)
+                               ? std::fabs(missing)
+                               : std::fabs(strain);
+      endings_[std::size_t(robots[k])].balance = whole / std::fmax(scale[k], 1e-300);
     }
   }
 

@@ -2,7 +2,7 @@
 model, board and tuning.
 
     [controller]
-    kp_1_V_m = 2000.0          # joint 1 on a motor: u in V
+    kp_1_V_m = 2000.0          # joint 1 on a motor: u in V; kp_1_V_rad where it turns
     ki_1_V_m_s = 4000.0
     voltage_max_V = 12.0
     kp_2_1_s = 20.0            # joint 2 on a stepper: u in rad/s
@@ -26,7 +26,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..io import find, read_toml, write_toml
-from ..signals import Signal, constant, is_finite
+from ..signals import PLAUSIBLE, Signal, constant, plausible
 from .controller import Controller
 from .pid import PID, Force, Motor, Output, Stepper
 
@@ -42,6 +42,19 @@ _ENDS = {
         "ks": "ks_{}_V_rad",
         "kt": "kt_{}_V_s_rad",
         "kv": "kv_{}_V_s_m",
+        "kc": "kc_{}_V",
+        "limit": "voltage_max_{}_V",
+        "slew": "voltage_slew_{}_V_s",
+    },
+    "turning motor": {  # its joint turns, and positions are in radians
+        "kp": "kp_{}_V_rad",
+        "ki": "ki_{}_V_rad_s",
+        "kd": "kd_{}_V_s_rad",
+        "kf": "kf_{}_V_m",
+        "kg": "kg_{}_V_s_m",
+        "ks": "ks_{}_V_rad",
+        "kt": "kt_{}_V_s_rad",
+        "kv": "kv_{}_V_s_rad",
         "kc": "kc_{}_V",
         "limit": "voltage_max_{}_V",
         "slew": "voltage_slew_{}_V_s",
@@ -86,7 +99,7 @@ _ENDS = {
     },
 }
 _ANY = {"setpoint_Hz": "setpoint_{}_Hz", "delay_s": "delay_{}_s"}
-# the board has one motor
+# the board's motors share these
 _BOARDS = {
     "voltage_max_V": "voltage_max_1_V",
     "voltage_slew_V_s": "voltage_slew_1_V_s",
@@ -110,13 +123,31 @@ BOARD = (  # the settings of the board that are a controller's, in its order
     "kf_2_rad_s_m",
     "kg_2_rad_m",
     "kv_2",
+    "kp_1_V_rad",
+    "ki_1_V_rad_s",
+    "kd_1_V_s_rad",
+    "kv_1_V_s_rad",
+    "kp_2_V_rad",
+    "ki_2_V_rad_s",
+    "kd_2_V_s_rad",
+    "kf_2_V_m",
+    "kg_2_V_s_m",
+    "kv_2_V_s_rad",
+    "kc_2_V",
     "derivative_Hz",
     "deflection_Hz",
     "setpoint_1_Hz",
     "setpoint_2_Hz",
     "feedback_2",
 )
-_OUTPUTS = {"motor": Motor, "stepper": Stepper, "force": Force, "torque": Force}
+_MOTORS = ("motor", "turning motor")
+_OUTPUTS = {
+    "motor": Motor,
+    "turning motor": Motor,
+    "stepper": Stepper,
+    "force": Force,
+    "torque": Force,
+}
 
 
 def _names() -> dict[str, list[tuple[int, str, str]]]:
@@ -147,13 +178,16 @@ class Gains:
 
     @property
     def kinds(self) -> list[str]:
-        """Each joint's output: "motor", "stepper", "force" or "torque"."""
+        """Each joint's output: "motor", "turning motor", "stepper", "force" or "torque"."""
         found: dict[int, set[str]] = {}
         for name in self.settings:
             if name not in _SHARED:
                 kinds = {kind for _, kind, _ in NAMES[name]} - {""}
                 i = NAMES[name][0][0]
                 found[i] = found.get(i, set(_ENDS)) & (kinds or set(_ENDS))
+        for i, kinds in found.items():
+            if kinds == set(_MOTORS):  # no name tells them apart: no term in a position
+                found[i] = {"motor"}
         for i in range(max(found, default=0) + 1):
             if len(found.get(i, ())) != 1:
                 expected = (
@@ -196,7 +230,7 @@ class Gains:
                     given |= {
                         field: value
                         for j, own, field in NAMES[name]
-                        if j == i and own in ("", kind)
+                        if (j == i or name in _BOARDS) and own in ("", kind)
                     }
             encoder = given.pop("encoder", 0.0) >= 0.5
             output = self._output(i, kind, outputs)
@@ -216,7 +250,7 @@ class Gains:
         if kind == "stepper" and i >= len(have):
             return Stepper()
         raise InputError(
-            f'missing: expected a table with kind = "{kind}"',
+            f'missing: expected a table with kind = "{kind.rpartition(" ")[2]}"',
             key=f"output[{i + 1}]",
             file=self.file,
         )
@@ -251,13 +285,22 @@ class Gains:
                 for name, value in vars(output).items()
                 if name != "encoder" and value is not None
             }
-            tables.append({"kind": kind, **given})
+            tables.append({"kind": kind.rpartition(" ")[2], **given})
         write_toml(path, {"controller": self.settings} | ({"output": tables} if tables else {}))
 
 
 def from_board(values: Mapping[str, float]) -> Gains:
-    """The gains among all settings of a board."""
-    return Gains({name: float(values[name]) for name in BOARD})
+    """The gains among all settings of a board, of the drives that it has."""
+    first = "turning motor" if values.get("drive_1", 1.0) > 1.5 else "motor"
+    second = ("", "stepper", "turning motor")[round(values.get("drive_2", 1.0))]
+
+    def has(name: str) -> bool:
+        if name in _SHARED or name in _BOARDS:
+            return True
+        here = (first, second)
+        return any(here[i] and kind in ("", here[i]) for i, kind, _ in NAMES[name] if i < 2)
+
+    return Gains({name: float(values[name]) for name in BOARD if has(name)})
 
 
 def load(path: str | os.PathLike[str]) -> Gains:
@@ -298,8 +341,8 @@ def _gains(data: dict[str, Any], file: str) -> Gains:
                 f"; did you mean {near[0]}?" if near else "; see firmware/README.md, the controller"
             )
             raise InputError(f"an unknown setting{hint}", key=f"controller.{key}", value=value)
-        if not is_finite(value):
-            raise InputError("expected a finite number", key=f"controller.{key}", value=value)
+        if not plausible(value):
+            raise InputError(f"expected {PLAUSIBLE}", key=f"controller.{key}", value=value)
         settings[key] = float(value)
     tables = data.get("output", [])
     if not isinstance(tables, list) or not all(isinstance(entry, dict) for entry in tables):
@@ -334,8 +377,9 @@ def _padded(gains: Gains) -> list[tuple[str, Output | None]]:
 
 def _read_output(entry: dict[str, Any], key: str) -> Output:
     kind = entry.get("kind")
-    if not isinstance(kind, str) or kind not in _OUTPUTS:
-        raise InputError(f"expected one of {', '.join(_OUTPUTS)}", key=f"{key}.kind", value=kind)
+    known_kinds = [name for name in _OUTPUTS if " " not in name]
+    if not isinstance(kind, str) or kind not in known_kinds:
+        raise InputError(f"expected one of {', '.join(known_kinds)}", key=f"{key}.kind", value=kind)
     known = [f.name for f in fields(_OUTPUTS[kind]) if f.name != "encoder"]
     for name, value in entry.items():
         if name != "kind" and name not in known:
@@ -344,9 +388,9 @@ def _read_output(entry: dict[str, Any], key: str) -> Output:
                 key=f"{key}.{name}",
                 value=value,
             )
-        if name != "kind" and not (is_finite(value) and value >= 0):
+        if name != "kind" and not (plausible(value) and value >= 0):
             raise InputError(
-                "expected a finite number of 0 or more", key=f"{key}.{name}", value=value
+                "expected a finite number from 0 to 1e12", key=f"{key}.{name}", value=value
             )
     if kind == "motor" and not {"force_per_V", "damping"} <= set(entry):
         raise InputError(
@@ -358,6 +402,7 @@ def _read_output(entry: dict[str, Any], key: str) -> Output:
 _REST = constant(0.0)
 _ANYTHING: dict[str, Output] = {
     "motor": Motor(1.0, 0.0),
+    "turning motor": Motor(1.0, 0.0),
     "stepper": Stepper(),
     "force": Force(),
     "torque": Force(),

@@ -29,6 +29,7 @@ from .files import (
 )
 from .format import FORMAT, check_format
 from .labels import EMULATED, called, emulated, kind
+from .memory import check_memory
 from .quantities import CHANNELS, STATIONS, Channel, channel
 from .run import FILE, Run
 from .seal import (
@@ -43,23 +44,29 @@ from .seal import (
 )
 from .shipped import find, shipped_files
 from .toml_files import read_toml, write_toml
-from .validation import explain, is_name
+from .trust import DOUBTED, REFUSED, balance_events, judged
+from .validation import MOST_LETTERS, explain, is_name
 
 __all__ = [
     "CHANNELS",
+    "DOUBTED",
     "DRAFT",
     "EMULATED",
     "FILE",
     "FINISHED",
     "FORMAT",
+    "MOST_LETTERS",
+    "REFUSED",
     "STATIONS",
     "Channel",
     "Damaged",
     "Run",
     "array",
+    "balance_events",
     "called",
     "channel",
     "check_format",
+    "check_memory",
     "check_progress",
     "choice",
     "emulated",
@@ -69,6 +76,7 @@ __all__ = [
     "flag",
     "function_of",
     "is_name",
+    "judged",
     "kind",
     "leftovers",
     "make_folder",

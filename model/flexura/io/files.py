@@ -27,12 +27,21 @@ FINISHED, REPLACED = ".flexura-finished", ".flexura-replaced"
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:
-    """Write a file as a whole; see `write_bytes`."""
+    """Write a file as a whole; see `write_bytes`.
+
+    Args:
+        path: of the file.
+        text: its content.
+    """
     write_bytes(path, text.encode())
 
 
 def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
     """Write a file as a whole: a reader sees the old one or the new one.
+
+    Args:
+        path: of the file.
+        data: its content.
 
     Raises:
         InputError: it cannot be written; the old one is still there.
@@ -48,6 +57,12 @@ def replaced(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A new, empty file beside `path` with its extension, which takes its place in the end.
 
     Folders are made if need be. If the body fails, the draft is removed and `path` is as it was.
+
+    Args:
+        path: of the file to replace.
+
+    Yields:
+        The path of the draft.
 
     Raises:
         InputError: the file system refuses something.
@@ -75,12 +90,23 @@ def replaced(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def leftovers(path: Path) -> Iterator[Path]:
-    """Drafts of a file that a process left which was killed while it wrote."""
+    """Drafts of a file that a process left which was killed while it wrote.
+
+    Args:
+        path: of the file.
+
+    Yields:
+        The drafts.
+    """
     yield from path.parent.glob(f"{DRAFT}{path.stem[:40]}-*{path.suffix[:20]}")
 
 
 def move(source: Path, target: Path) -> None:
     """Rename a file or folder on one file system, and synchronise both parents.
+
+    Args:
+        source: its present path.
+        target: its new path.
 
     Raises:
         OSError: the file system refuses it.
@@ -93,6 +119,9 @@ def move(source: Path, target: Path) -> None:
 
 def make_folder(folder: Path) -> list[Path]:
     """Make a folder and those above it, on the disk itself.
+
+    Args:
+        folder: the folder.
 
     Returns:
         The new ones, the outermost first.
@@ -125,6 +154,9 @@ def sync(path: Path) -> None:
 
     Some file systems cannot do that with folders; then it is theirs to keep the names.
 
+    Args:
+        path: of the file or folder.
+
     Raises:
         OSError: the disk fails.
     """
@@ -141,7 +173,16 @@ def sync(path: Path) -> None:
 
 
 def unwritable(path: str | os.PathLike[str], error: Exception, key: str = "") -> InputError:
-    """The error that says which file or folder cannot be written, and why."""
+    """The error that says which file or folder cannot be written, and why.
+
+    Args:
+        path: of the file or folder.
+        error: of the file system.
+        key: name of the argument that has the path.
+
+    Returns:
+        The error to raise.
+    """
     why = getattr(error, "strerror", None) or str(error)
     text = f"cannot be written ({why})"
     if key:
@@ -170,6 +211,9 @@ def replace_results(draft: Path, folder: Path) -> None:
 
 def settle(folder: Path) -> None:
     """End a replacement of results that was killed; does nothing where there is none.
+
+    Args:
+        folder: of the results.
 
     Raises:
         OSError: the file system refuses something.

@@ -149,6 +149,12 @@ class Run:
         """Whether Ctrl-C ended the run."""
         return any(event["text"] == "interrupted" for event in self.meta.get("events", []))
 
+    @property
+    def stopped(self) -> bool:
+        """Whether the run was stopped from outside: by Ctrl-C, or as its wall time was over."""
+        late = any(event.get("name") == "wall_time" for event in self.meta.get("events", []))
+        return late or self.interrupted
+
     def __repr__(self) -> str:
         return summary.text(self._title(), self._rows())
 

@@ -37,6 +37,9 @@ def sealed(data: bytes, at: int | None = None) -> bytes:
     Args:
         data: the content.
         at: where; by default at the end.
+
+    Returns:
+        The sealed content.
     """
     at = len(data) if at is None else at
     digest = hashlib.sha256(data).hexdigest().encode()
@@ -44,12 +47,27 @@ def sealed(data: bytes, at: int | None = None) -> bytes:
 
 
 def sealed_parquet(data: bytes) -> bytes:
-    """Seal a Parquet file before its footer, where no reader of Parquet looks."""
+    """Seal a Parquet file before its footer, where no reader of Parquet looks.
+
+    Args:
+        data: the content of the file.
+
+    Returns:
+        The sealed content.
+    """
     return sealed(data, len(data) - FOOTER - int.from_bytes(data[-FOOTER:-4], "little"))
 
 
 def sealed_json(table: dict[str, Any], indent: int | None = None) -> bytes:
-    """A table as sealed JSON: its first key is `seal`."""
+    """A table as sealed JSON: its first key is `seal`.
+
+    Args:
+        table: the table.
+        indent: as in `json.dumps`.
+
+    Returns:
+        The content of the file.
+    """
     text = json.dumps({KEY: ""} | table, indent=indent).encode()
     return sealed(text, text.index(b'""') + 1)
 
@@ -87,7 +105,15 @@ def read_sealed(
 def read_sealed_json(
     path: str | os.PathLike[str], advice: str, damaged: str = "damaged"
 ) -> tuple[Any, bool]:
-    """What a JSON file holds, without its seal, and whether there was one; see `read_sealed`.
+    """What a JSON file holds, without its seal; see `read_sealed`.
+
+    Args:
+        path: of the file.
+        advice: what to do about a damaged file, for the message.
+        damaged: what is said of a damaged file.
+
+    Returns:
+        The table, and whether there was a seal.
 
     Raises:
         Damaged: a byte differs.
@@ -107,6 +133,12 @@ def read_table(content: bytes) -> Any:
 
     Small ones are read without threads: Arrow ends the process if there is no memory for one.
 
+    Args:
+        content: of the file.
+
+    Returns:
+        Arrow's table.
+
     Raises:
         pyarrow.ArrowException, OSError, ValueError: it is no Parquet file.
     """
@@ -121,7 +153,11 @@ def read_table(content: bytes) -> Any:
 
 
 def say_unsealed(path: str | os.PathLike[str]) -> None:
-    """Say in one line, by the logger "flexura", that a file has no seal."""
+    """Say in one line, by the logger "flexura", that a file has no seal.
+
+    Args:
+        path: of the file.
+    """
     _log.warning("%s: of an older version, without a checksum: damage is not seen", path)
 
 

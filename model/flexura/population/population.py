@@ -3,6 +3,8 @@ cluster, and restartable."""
 
 from __future__ import annotations
 
+import math
+import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -10,16 +12,18 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
+from threading import Timer
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .. import core
 from ..errors import InputError
-from ..io import Run, check_progress, summary, whole
+from ..io import Run, check_memory, check_progress, summary, whole
 from ..optional import Optional
 from ..robot import Robot
 from ..signals import Drive
+from ..simulation.problem import Budget
 from ..simulation.recorder import channel_units
 from . import dask_cluster, worker
 from .batch import Batch, Share
@@ -39,10 +43,11 @@ class Population:
     `complete`, and their chunks.
 
     `population["tip/x"]` is (count, T), a reduced number (count,), `population.status` (count,) of
-    "done", "limit", "stuck" or "refused" (a robot that cannot be assembled or starts outside its
-    limits); a robot's values are NaN from where it stopped. Of an interrupted population only the
-    robots that are done have rows: `population.robots`, counted from 0. `base`: the robot that
-    `Batch.vary` began with; None for other batches.
+    "done", "limit", "stuck", "unbalanced" (energies that miss more than a tenth) or "refused" (a
+    robot that cannot be assembled or starts outside its limits). A robot's values are NaN from
+    where it stopped. Of an interrupted population only the robots that are done have rows:
+    `population.robots`, counted from 0. `base`: the robot that `Batch.vary` began with; None for
+    other batches.
     """
 
     t: np.ndarray
@@ -179,6 +184,8 @@ def simulate(
     chunk: int = 256,
     threads: int | None = None,
     scheduler: str | None = None,
+    max_steps: int | None = None,
+    wall_time: float | None = None,
 ) -> Population:
     """Simulate every robot of a batch as `flexura.simulate` does one, to the last bit.
 
@@ -203,16 +210,20 @@ def simulate(
         chunk: robots in a file.
         threads: None: one a core.
         scheduler: address of a Dask scheduler, whose workers then do the chunks.
+        max_steps: the budget of each robot, as in `flexura.simulate`.
+        wall_time: seconds after which the population is stopped; it then has the chunks that are
+            done.
 
     Returns:
         The Population.
 
     Raises:
-        InputError: an argument is not what is expected.
+        InputError: an argument is not what is expected, or does not fit into memory.
     """
     request = Request.checked(
-        t_eval, drive, q0, qd0, rtol, method, start, numerical_damping, channels, reduce
+        t_eval, drive, q0, qd0, rtol, method, start, numerical_damping, channels, reduce, max_steps
     )
+    late = time.perf_counter() + Budget.checked(None, wall_time).wall_s
     for key, value in (("chunk", chunk), ("threads", 1 if threads is None else threads)):
         whole(value, key, 1)
     for key, text in (("folder", folder), ("scheduler", scheduler)):
@@ -220,11 +231,13 @@ def simulate(
             raise InputError("expected a text", key=key, value=text)
     check_progress(progress)
     store, units, complete, done = in_memory(), {}, False, 0
+    _check_memory(batch, request, chunk, folder)
     shares = batch.shares(chunk)
     try:
         first = next(shares)
         example = first.robots[0]
         request = request.fitted(example)
+        _check_memory(batch, request, chunk, folder)
         units = (
             {}
             if request.reduce
@@ -237,7 +250,7 @@ def simulate(
         )
         todo = _todo(chain([first], shares), store)
         source = (
-            _local(request, todo, threads or worker.cores())
+            _local(request, todo, threads or worker.cores(), late)
             if scheduler is None
             else dask_cluster.run(request, todo, scheduler)
         )
@@ -250,7 +263,9 @@ def simulate(
                 done += len(made)
                 if progress is not None:
                     progress(done / batch.count)
-        complete = True
+                if time.perf_counter() > late:
+                    break
+        complete = done == batch.count
     except KeyboardInterrupt:
         pass
     return Population(request.t, units, batch.count, complete, store, batch.base)
@@ -274,12 +289,34 @@ def _todo(shares: Iterator[Share], store: Store) -> Iterator[worker.Work | range
             yield share, digests
 
 
+A_ROBOT = 4096  # bytes that the description of one takes
+
+
+def _check_memory(batch: Batch, request: Request, chunk: int, folder: Any) -> None:
+    """Raises InputError for a population that does not fit into memory."""
+    wide = 8.0 * len(request.t) * max(len(request.channels), 1)
+    rows = "a chunk of" if folder is not None or request.reduce else ""
+    count = min(chunk, batch.count) if rows else batch.count
+    what = (
+        f"{len(request.channels) or 'the'} channels at {len(request.t)} times of {rows} {count} "
+        f"robots; "
+        f"expected {'smaller chunks' if rows else 'a folder'}, fewer channels, times or robots"
+    )
+    check_memory(
+        3.0 * wide * count + A_ROBOT * min(chunk, batch.count),
+        " ".join(what.split()),
+        "chunk" if rows else "robots",
+        count,
+    )
+
+
 def _local(
-    request: Request, todo: Iterator[worker.Work | range], threads: int
+    request: Request, todo: Iterator[worker.Work | range], threads: int, late: float = math.inf
 ) -> Generator[Chunk | range, None, None]:
     """The chunks, each worked on by all threads of the core; the rows of the next one are made here
-    meanwhile."""
+    meanwhile. At the time `late` they are stopped, and what is not done is not given."""
     watch = core.Watch()
+    timer = Timer(max(late - time.perf_counter(), 0.0), watch.stop) if late < math.inf else None
     waiting: deque[tuple[worker.Work | range, Future[worker.Part] | None]] = deque()
 
     def finished() -> Chunk | range:
@@ -291,6 +328,8 @@ def _local(
 
     with ThreadPoolExecutor(1) as pool:
         try:
+            if timer is not None:
+                timer.start()
             for work in todo:
                 part = (
                     None
@@ -298,11 +337,20 @@ def _local(
                     else pool.submit(worker.simulated, request, work[0], threads, watch)
                 )
                 waiting.append((work, part))
-                if len(waiting) > 2:
-                    yield finished()
+                while len(waiting) > 2:
+                    made = finished()
+                    if watch.stopped:
+                        return
+                    yield made
             while waiting:
-                yield finished()
+                made = finished()
+                if watch.stopped:
+                    return
+                yield made
         except BaseException:
             watch.stop()
             pool.shutdown(wait=False, cancel_futures=True)
             raise
+        finally:
+            if timer is not None:
+                timer.cancel()

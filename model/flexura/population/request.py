@@ -20,7 +20,7 @@ from ..errors import InputError
 from ..io import array, choice, flag, function_of
 from ..robot import Robot
 from ..signals import STARTS, Drive
-from ..simulation.problem import check_request
+from ..simulation.problem import MOST_STEPS, Budget, check_request
 from ..simulation.recorder import channel_units
 from ..system.structure import structure
 
@@ -40,6 +40,7 @@ class Request:
     numerical_damping: bool
     channels: tuple[str, ...]
     reduce: Callable[[np.ndarray, dict[str, np.ndarray]], Any] | None
+    max_steps: int = MOST_STEPS
 
     @staticmethod
     def checked(
@@ -53,6 +54,7 @@ class Request:
         numerical_damping: bool,
         channels: Sequence[str] | None,
         reduce: Any,
+        max_steps: int | None = None,
     ) -> Request:
         """A request whose arguments are good as far as that can be told without a robot. Raises
         InputError."""
@@ -87,6 +89,7 @@ class Request:
             flag(numerical_damping, "numerical_damping"),
             tuple(channels or ()),
             reduce,
+            Budget.checked(max_steps, None).steps,
         )
 
     def fitted(self, robot: Robot) -> Request:
@@ -137,6 +140,7 @@ class Request:
             "start": self.start,
             "numerical_damping": self.numerical_damping,
             "channels": list(self.channels),
+            "max_steps": self.max_steps,
             "reduce": None if self.reduce is None else identity(self.reduce),
         }
 

@@ -92,12 +92,13 @@ def _run(population: Simulated, chunk: Chunk, k: int) -> Run:
     end = len(there) - int(there[::-1].argmax()) if there.any() else 0
     values = {key: float(column[k]) for key, column in chunk.vary.items()}
     status, event = str(chunk.status[k]), chunk.event[k]
+    level = "WARN" if status == "done" else "ERROR"
     meta = {
         "source": "simulation",
         "program": "flexura",
         "population": {"robot": chunk.first + k + 1, "vary": values},
         "complete": status == "done",
-        "events": [{"t": float(chunk.reached_s[k]), "level": "ERROR", "text": event}]
+        "events": [{"t": float(chunk.reached_s[k]), "level": level, "text": event}]
         if event
         else [],
     }

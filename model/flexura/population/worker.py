@@ -11,11 +11,10 @@ import numpy as np
 
 from .. import core
 from ..errors import InputError
-from ..io import STATIONS
+from ..io import STATIONS, balance_events
 from ..robot import Robot
 from ..signals import Drive
 from ..simulation.dynamics import simulate
-from ..simulation.problem import MOST_STEPS
 from ..simulation.recorder import LIMITS, LOSS, NUMERICAL, WORK, limit_event, recorded_channels
 from ..simulation.start import NO_START, apply_prescribed_motions, limit_error
 from ..system import NoEquilibrium, System, equilibrium
@@ -24,7 +23,7 @@ from .request import Request, check_drive
 from .rows import ELEMENTS, START, Rows
 from .store import Chunk
 
-WORDS = ("done", "limit", "stuck", "refused")
+WORDS = ("done", "limit", "stuck", "refused", "unbalanced")
 
 
 Work = tuple[Share, list[bytes]]
@@ -201,7 +200,7 @@ def _together(
     }
     packed = [_packed(drive) for drive in {id(drive): drive for drive in drives}.values()]
     start = [np.zeros(0) if q is None else q.ravel() for q in (q0, request.qd0)]
-    values, words, reached, steps, joints, positions, texts = core.population(
+    values, words, reached, steps, joints, positions, texts, balances = core.population(
         rows.counts,
         rows.numbers,
         rows.material,
@@ -216,7 +215,7 @@ def _together(
         request.rtol,
         request.method,
         request.numerical_damping,
-        MOST_STEPS,
+        request.max_steps,
         columns,
         STATIONS,
         threads,
@@ -230,10 +229,19 @@ def _together(
         part.status[k] = word if word in WORDS else "stuck"
         if word != "refused":
             part.reached[k] = reached[j]
-        if word != "done":
+        if word == "done":
+            part.status[k], part.events[k] = _trust(float(balances[j]))
+        else:
             part.events[k] = _event(
                 share.robots[k], word, int(joints[j]), float(reached[j]), positions[j], texts.get(j)
             )
+
+
+def _trust(balance: float) -> tuple[str, str]:
+    """What a balance (101) makes of a robot that is done, and what is said of it."""
+    said = balance_events(balance, 0.0)
+    text = said[0]["text"] if said else ""
+    return "unbalanced" if said and said[0]["level"] == "ERROR" else "done", text
 
 
 def _event(
@@ -275,22 +283,26 @@ def _one_by_one(request: Request, share: Share, watch: Any, part: Part) -> None:
                 method=request.method,
                 start=request.start,
                 numerical_damping=request.numerical_damping,
+                max_steps=request.max_steps,
             )
         except (InputError, NoEquilibrium) as error:
             part.status[k], part.events[k] = "refused", str(error)
             continue
-        errors = [event for event in run.meta["events"] if event["level"] == "ERROR"]
+        said = [e for e in run.meta["events"] if e["name"] not in ("still", "node")]
+        names = {event["name"] for event in said}
         part.status[k] = (
             "done"
             if run.complete
             else "limit"
-            if any(event.get("name") in LIMITS for event in errors)
+            if names & set(LIMITS)
+            else "unbalanced"
+            if names <= {"balance", "not_finite"}
             else "stuck"
         )
         part.reached[k], part.steps[k], part.events[k] = (
             run.t[-1],
             run.meta["steps"],
-            "" if run.complete else "; ".join(event["text"] for event in errors),
+            "; ".join(event["text"] for event in said),
         )
         rows = int(np.count_nonzero(np.isin(run.t, request.t)))
         for name in request.channels:

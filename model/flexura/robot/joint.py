@@ -8,7 +8,7 @@ from typing import Any, Literal
 from pydantic import Field, model_validator
 
 from ..errors import WrongValue
-from .table import Table
+from .table import BOUNDS, Table, quantity
 
 # Quantities of a joint: the key of a joint that turns (R), and of one that slides (Pa, Pb).
 KEYS = {
@@ -34,22 +34,22 @@ def key_of(quantity: str, type: object) -> str:
     return turning if type == "R" else sliding
 
 
-def _limits(unit: str) -> Any:
-    text = f"two numbers, the lower limit and a higher upper limit, in {unit}"
+def _limits(key: str, unit: str) -> Any:
+    text = f"two numbers, the lower limit and a higher upper limit, in {unit}, {BOUNDS[key]}"
     return Field(None, strict=False, description=text)
-
-
-def _number(what: str, unit: str) -> Any:
-    return Field(0.0, ge=0, description=f"{what} in {unit}, 0 or more")
 
 
 class Spring(Table):
     """A spring beside a joint's drive (106)."""
 
-    stiffness_N_m_rad: float = _number("the stiffness of the spring of a joint R", "N m/rad")
-    rest_rad: float = Field(0.0, description="where the spring of a joint R rests, in radians")
-    stiffness_N_m: float = _number("the stiffness of the spring of a joint Pa or Pb", "N/m")
-    rest_m: float = Field(0.0, description="where the spring of a joint Pa or Pb rests, in metres")
+    stiffness_N_m_rad: float = quantity(
+        "stiffness_N_m_rad", "the stiffness of the spring of a joint R in N m/rad", 0.0
+    )
+    rest_rad: float = quantity("rest_rad", "where the spring of a joint R rests, in radians", 0.0)
+    stiffness_N_m: float = quantity(
+        "stiffness_N_m", "the stiffness of the spring of a joint Pa or Pb in N/m", 0.0
+    )
+    rest_m: float = quantity("rest_m", "where the spring of a joint Pa or Pb rests, in metres", 0.0)
 
 
 class Transmission(Table):
@@ -57,12 +57,12 @@ class Transmission(Table):
     the joint, the rotor's inertia too."""
 
     stiffness_N_m_rad: float = Field(
-        gt=0, description="the stiffness at the joint in N m/rad, above 0"
+        gt=0, le=1e12, description="the stiffness at the joint in N m/rad, above 0 and at most 1e12"
     )
-    damping_N_m_s_rad: float = _number("the damping at the joint", "N m s/rad")
-    gear_ratio: float = Field(
-        1.0, gt=0, description="turns of the motor in a turn of the joint, above 0"
+    damping_N_m_s_rad: float = quantity(
+        "damping_N_m_s_rad", "the damping at the joint in N m s/rad", 0.0
     )
+    gear_ratio: float = quantity("gear_ratio", "turns of the motor in a turn of the joint", 1.0)
 
 
 class Joint(Table):
@@ -73,39 +73,40 @@ class Joint(Table):
     """
 
     type: Literal["R", "Pa", "Pb"] = Field(description='the joint type, "R", "Pa" or "Pb"')
-    angle_rad: float = Field(
+    angle_rad: float = quantity("angle_rad", "the fixed angle gamma of a Pa or Pb in radians", 0.0)
+    start_rad: float = quantity(
+        "start_rad", "the position of a joint R at the start in radians, a finite number", 0.0
+    )
+    start_m: float = quantity(
+        "start_m",
+        "the position of a joint Pa or Pb at the start in metres (Pb: the free length), a finite "
+        "number",
         0.0,
-        ge=-7,
-        le=7,
-        description="the fixed angle gamma of a Pa or Pb in radians, between -7 and 7",
     )
-    start_rad: float = Field(
-        0.0, description="the position of a joint R at the start in radians, a finite number"
+    limits_rad: tuple[float, float] | None = _limits("limits_rad", "radians, of a joint R")
+    limits_m: tuple[float, float] | None = _limits("limits_m", "metres, of a joint Pa or Pb")
+    hub_mass_kg: float = quantity("hub_mass_kg", "the hub's mass in kilograms", 0.0)
+    hub_inertia_kg_m2: float = quantity("hub_inertia_kg_m2", "the hub's inertia in kg m^2", 0.0)
+    rotor_inertia_kg_m2: float = quantity(
+        "rotor_inertia_kg_m2", "the rotor's inertia reflected to a joint R in kg m^2", 0.0
     )
-    start_m: float = Field(
-        0.0,
-        description=(
-            "the position of a joint Pa or Pb at the start in metres (Pb: the free length), a "
-            "finite number"
-        ),
+    rotor_mass_kg: float = quantity(
+        "rotor_mass_kg", "the rotor's inertia reflected to a joint Pa or Pb in kg", 0.0
     )
-    limits_rad: tuple[float, float] | None = _limits("radians, of a joint R")
-    limits_m: tuple[float, float] | None = _limits("metres, of a joint Pa or Pb")
-    hub_mass_kg: float = Field(0.0, ge=0, description="the hub's mass in kilograms, 0 or more")
-    hub_inertia_kg_m2: float = Field(
-        0.0, ge=0, description="the hub's inertia in kg m^2, 0 or more"
+    viscous_friction_N_m_s_rad: float = quantity(
+        "viscous_friction_N_m_s_rad", "viscous friction of a joint R in N m s/rad", 0.0
     )
-    rotor_inertia_kg_m2: float = _number("the rotor's inertia reflected to a joint R", "kg m^2")
-    rotor_mass_kg: float = _number("the rotor's inertia reflected to a joint Pa or Pb", "kg")
-    viscous_friction_N_m_s_rad: float = _number("viscous friction of a joint R", "N m s/rad")
-    viscous_friction_N_s_m: float = _number("viscous friction of a joint Pa or Pb", "N s/m")
-    coulomb_friction_N_m: float = _number("Coulomb friction of a joint R", "N m")
-    coulomb_friction_N: float = _number("Coulomb friction of a joint Pa or Pb", "N")
-    hub_radius_m: float = Field(
-        0.0,
-        ge=0,
-        le=1000,
-        description="how far from the axis of a joint R its link begins, in metres, 0 to 1000",
+    viscous_friction_N_s_m: float = quantity(
+        "viscous_friction_N_s_m", "viscous friction of a joint Pa or Pb in N s/m", 0.0
+    )
+    coulomb_friction_N_m: float = quantity(
+        "coulomb_friction_N_m", "Coulomb friction of a joint R in N m", 0.0
+    )
+    coulomb_friction_N: float = quantity(
+        "coulomb_friction_N", "Coulomb friction of a joint Pa or Pb in N", 0.0
+    )
+    hub_radius_m: float = quantity(
+        "hub_radius_m", "how far from the axis of a joint R its link begins, in metres", 0.0
     )
     spring: Spring | None = Field(
         None,
@@ -119,11 +120,11 @@ class Joint(Table):
 
     @model_validator(mode="after")
     def _consistent(self) -> Joint:
-        for quantity, (turning, sliding) in KEYS.items():
+        for name, (turning, sliding) in KEYS.items():
             wrong = sliding if self.type == "R" else turning
             value = getattr(self, wrong)
             if wrong in self.model_fields_set and value != type(self).model_fields[wrong].default:
-                right = key_of(quantity, self.type)
+                right = key_of(name, self.type)
                 raise WrongValue(wrong, value, f"none: a joint {self.type} has {right}")
         self._check_spring()
         if self.type != "R":

@@ -10,7 +10,7 @@ from pydantic import Field, field_validator, model_validator
 
 from ..errors import WrongValue
 from .joint import Joint
-from .table import Table
+from .table import BOUNDS, Table, name, quantity
 
 MAX_ELEMENTS = 200
 
@@ -23,55 +23,37 @@ LEAST_FREE = (
 )
 
 
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
+_MASS, _STIFFNESS = BOUNDS["mass_per_length_kg_m"], BOUNDS["bending_stiffness_N_m2"]
+MassPerLength = Annotated[float, Field(ge=_MASS.low, le=_MASS.high)]
+BendingStiffness = Annotated[float, Field(ge=_STIFFNESS.low, le=_STIFFNESS.high)]
 Pair = Annotated[tuple[float, float], Field(strict=False)]
 
 
 class Section(Table):
     """A rectangular cross-section; `height_m` lies in the plane of bending."""
 
-    width_m: float = Field(
-        gt=0, le=10, description="the section's width in metres, above 0 and at most 10"
-    )
-    height_m: float = Field(
-        gt=0,
-        le=10,
-        description=(
-            "the section's height in the plane of bending in metres, above 0 and at most 10"
-        ),
-    )
+    width_m: float = quantity("width_m", "the section's width in metres")
+    height_m: float = quantity("height_m", "the section's height in the plane of bending in metres")
 
 
 class SectionAt(Section):
     """A cross-section at a place along a tapered link."""
 
-    at_m: float = Field(
-        ge=0, description="the place of this section along the link in metres, 0 or more"
-    )
+    at_m: float = quantity("at_m", "the place of this section along the link in metres")
 
 
 class ValueAt(Table):
     """A value at a place along a link."""
 
-    at_m: float = Field(
-        ge=0, description="the place of this value along the link in metres, 0 or more"
-    )
+    at_m: float = quantity("at_m", "the place of this value along the link in metres")
     value: float = Field(gt=0, description="a number above 0, in the unit of the key")
 
 
 class Damping(Table):
     """Rayleigh damping of the elastic unknowns, D = alpha M + beta K."""
 
-    alpha_1_s: float = Field(
-        0.0, ge=0, description="the mass-proportional factor in 1/s, 0 or more"
-    )
-    beta_s: float = Field(
-        0.0,
-        ge=0,
-        le=10,
-        description="the stiffness-proportional factor in seconds, between 0 and 10",
-    )
+    alpha_1_s: float = quantity("alpha_1_s", "the mass-proportional factor in 1/s", 0.0)
+    beta_s: float = quantity("beta_s", "the stiffness-proportional factor in seconds", 0.0)
 
 
 class Lump(Table):
@@ -89,12 +71,12 @@ _LINK_TEXT = {
         "a table { width_m, height_m } or a list of { at_m, width_m, height_m } in order of at_m"
     ),
     "mass_per_length_kg_m": (
-        "mass per length in kg/m, a number of 0 or more, or a list of { at_m, value } in order of "
-        "at_m"
+        f"mass per length in kg/m, a number {BOUNDS['mass_per_length_kg_m']} or a list of "
+        "{ at_m, value } in order of at_m"
     ),
     "bending_stiffness_N_m2": (
-        "bending stiffness EI in N m^2, a number above 0 or a list of { "
-        "at_m, value } in order of at_m"
+        f"bending stiffness EI in N m^2, a number {BOUNDS['bending_stiffness_N_m2']} or a list of "
+        "{ at_m, value } in order of at_m"
     ),
 }
 
@@ -102,15 +84,9 @@ _LINK_TEXT = {
 class Link(Table):
     """One link with the joint at its proximal side; rigid when `elements` is 0."""
 
-    name: str = Field(
-        "", max_length=200, description="the link's name, a text of at most 200 characters"
-    )
-    length_m: float = Field(
-        ge=0,
-        le=1000,
-        description=(
-            "the link's length in metres, above 0 and at most 1000 (0 is allowed for a rigid link)"
-        ),
+    name: str = name("the link's")
+    length_m: float = quantity(
+        "length_m", "the link's length in metres", more=" (0 is for rigid links)"
     )
     elements: int = Field(
         0,
@@ -124,36 +100,26 @@ class Link(Table):
         description="how many of the link's own modes to keep, a whole number of 1 or more",
     )
     section: Section | list[SectionAt] | None = Field(None, description=_LINK_TEXT["section"])
-    young_modulus_Pa: float | None = Field(
-        None,
-        ge=1e3,
-        le=2e12,
-        description="Young's modulus in pascals, between 1e3 and 2e12 (steel: 2.0e11, not 200)",
+    young_modulus_Pa: float | None = quantity(
+        "young_modulus_Pa", "Young's modulus in pascals", None, " (steel: 2.0e11, not 200)"
     )
-    density_kg_m3: float | None = Field(
-        None,
-        ge=10,
-        le=25000,
-        description="the density in kg/m^3, between 10 and 25000 (steel: 7850)",
+    density_kg_m3: float | None = quantity(
+        "density_kg_m3", "the density in kg/m^3", None, " (steel: 7850)"
     )
-    mass_per_length_kg_m: NotNegative | list[ValueAt] | None = Field(
+    mass_per_length_kg_m: MassPerLength | list[ValueAt] | None = Field(
         None, description=_LINK_TEXT["mass_per_length_kg_m"]
     )
-    bending_stiffness_N_m2: Positive | list[ValueAt] | None = Field(
+    bending_stiffness_N_m2: BendingStiffness | list[ValueAt] | None = Field(
         None, description=_LINK_TEXT["bending_stiffness_N_m2"]
     )
-    mass_kg: float | None = Field(
-        None, ge=0, description="a rigid link's mass in kilograms, 0 or more"
-    )
+    mass_kg: float | None = quantity("mass_kg", "a rigid link's mass in kilograms", None)
     centre_of_mass_m: float | Pair | None = Field(
         None,
         description="a rigid link's centre of mass from its origin in metres: a number along the "
-        "link, or two, [along, across]",
+        f"link, or two, [along, across], {BOUNDS['centre_of_mass_m']}",
     )
-    inertia_kg_m2: float | None = Field(
-        None,
-        ge=0,
-        description="a rigid link's inertia about its centre of mass in kg m^2, 0 or more",
+    inertia_kg_m2: float | None = quantity(
+        "inertia_kg_m2", "a rigid link's inertia about its centre of mass in kg m^2", None
     )
     mass: list[Lump] = Field(
         default_factory=list, description="tables [[link.mass]] { at_m, mass_kg, inertia_kg_m2 }"
@@ -175,6 +141,11 @@ class Link(Table):
                 raise WrongValue(info.field_name, at, "a list of at least two entries with at_m")
             if any(b <= a for a, b in pairwise(at)):
                 raise WrongValue(info.field_name, at, "entries in ascending order of at_m")
+            for k, entry in enumerate(value, 1):
+                bounds = BOUNDS.get(info.field_name)
+                if bounds is not None and not bounds.hold(entry.value):
+                    key = f"{info.field_name}[{k}].value"
+                    raise WrongValue(key, entry.value, f"a number {bounds}")
         return value
 
     @model_validator(mode="after")

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from .table import Table
+from .table import Table, quantity
 
 
 class Payload(Table):
     """A body at the tip of the last link."""
 
-    mass_kg: float = Field(0.0, ge=0, description="the payload's mass in kilograms, 0 or more")
-    inertia_kg_m2: float = Field(
-        0.0,
-        ge=0,
-        description="the payload's inertia about its own centre in kg m^2, 0 or more",
+    mass_kg: float = quantity("mass_kg", "the payload's mass in kilograms", 0.0)
+    inertia_kg_m2: float = quantity(
+        "inertia_kg_m2", "the payload's inertia about its own centre in kg m^2", 0.0
     )
     centre_of_mass_m: tuple[float, float] = Field(
         (0.0, 0.0),

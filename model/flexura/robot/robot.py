@@ -12,16 +12,16 @@ import os
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, Field, ValidationError, field_validator, model_validator
+from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from ..errors import InputError, WrongValue
-from ..io import FORMAT, check_format, explain, find, is_name, read_toml, summary, write_toml
+from ..io import FORMAT, check_format, explain, find, read_toml, summary, write_toml
 from .joint import KEYS, key_of
 from .link import LEAST_FREE, Link
 from .old_keys import renamed
 from .payload import Payload
 from .suitability import check_masses, check_stretch
-from .table import Table
+from .table import BOUNDS, Table, name
 
 MAX_LINKS = 256
 _log = logging.getLogger("flexura")
@@ -31,15 +31,12 @@ class Robot(Table):
     """A serial planar chain of rigid and flexible links with joints R, Pa and Pb. Frozen; SI
     units."""
 
-    name: str = Field(
-        "",
-        max_length=200,
-        description="the robot's name, one line of at most 200 characters without control codes",
-    )
+    name: str = name("the robot's")
     gravity_m_s2: tuple[float, float] = Field(
         (0.0, 0.0),
         strict=False,
-        description="gravity in the base frame, two numbers [x, y] in m/s^2, y up",
+        description="gravity in the base frame, two numbers [x, y] in m/s^2, y up, "
+        f"{BOUNDS['gravity_m_s2']}",
     )
     stiffening: bool = Field(True, description="true, or false for the dissertation's linear model")
     sliding: Literal["continuous", "nodal"] = Field(
@@ -56,13 +53,6 @@ class Robot(Table):
     format: int = Field(
         FORMAT, ge=1, le=FORMAT, description=f"the file's format, a whole number up to {FORMAT}"
     )
-
-    @field_validator("name")
-    @classmethod
-    def _one_line(cls, name: str) -> str:
-        if not is_name(name):
-            raise ValueError("expected one line without control codes")
-        return name
 
     @model_validator(mode="after")
     def _starts_on_its_links(self) -> Robot:

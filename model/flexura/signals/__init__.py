@@ -1,11 +1,11 @@
 """Functions of time: motions to follow, forces and torques to apply, and their reading from
 tables."""
 
-from . import shaping, signal
+from . import paths, shaping, signal
 from .conversion import FunctionSignal, as_signal, as_signals, spline
 from .drive import Drive, JointDrive, check_smooth
 from .manoeuvre import STARTS, Manoeuvre, load_manoeuvre
-from .parsing import from_spec, is_finite
+from .parsing import PLAUSIBLE, from_spec, is_finite, plausible
 from .shaping import ei, matched_cycloid, zv, zvd
 from .signal import (
     COLUMNS,
@@ -25,6 +25,7 @@ from .signal import (
 
 __all__ = [
     "COLUMNS",
+    "PLAUSIBLE",
     "STARTS",
     "Drive",
     "FunctionSignal",
@@ -44,7 +45,9 @@ __all__ = [
     "is_finite",
     "load_manoeuvre",
     "matched_cycloid",
+    "paths",
     "piecewise",
+    "plausible",
     "polynomial",
     "ramp",
     "shaping",

@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import InputError
 from ..io import check_format, choice, find, is_name, read_toml, whole
 from .drive import Drive, JointDrive, check_smooth
-from .parsing import from_spec, is_finite
+from .parsing import from_spec, plausible
 from .signal import Signal
 
 
@@ -65,6 +65,7 @@ class Manoeuvre:
         return own | {"joint": self.drive.spec()}
 
 
+LONGEST = 1e8  # of a manoeuvre [s]: three years
 STARTS = ("static", "straight")
 _KEYS = ("name", "duration_s", "output_step_s", "start", "joint", "format")
 _JOINT_KEYS = ("force", "motion", "kp", "kd", "prescribed")
@@ -94,7 +95,12 @@ def load_manoeuvre(path: str | os.PathLike[str], joints: int) -> Manoeuvre:
 def _manoeuvre(data: dict[str, Any], joints: int) -> Manoeuvre:
     check_format(data)
     _check_keys(data, _KEYS, "")
-    duration = _number(data, "duration_s", "a duration above 0 in seconds", low=0.0)
+    duration = _number(
+        data, "duration_s", f"a duration above 0 in seconds, at most {LONGEST:g}", low=0.0
+    )
+    if duration > LONGEST:
+        expected = f"expected a duration above 0 in seconds, at most {LONGEST:g}"
+        raise InputError(expected, key="duration_s", value=duration)
     step = _number(
         data,
         "output_step_s",
@@ -199,6 +205,6 @@ def _number(
     value = data.get(name, default)
     if value is None:
         raise InputError(f"missing: expected {expected}", key=key + name)
-    if not is_finite(value) or not (value >= low if closed else value > low):
+    if not plausible(value) or not (value >= low if closed else value > low):
         raise InputError(f"expected {expected}", key=key + name, value=value)
     return float(value)

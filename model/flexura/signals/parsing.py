@@ -71,6 +71,22 @@ def from_spec(spec: Any, *, key: str = "signal") -> Signal:
         ) from None
 
 
+MOST = 1e12  # of a number of a manoeuvre or gains file, in its own unit: beyond is a slip
+PLAUSIBLE = "a finite number between -1e12 and 1e12"
+
+
+def plausible(value: Any) -> bool:
+    """Whether a value is a finite number as files have them, at most `MOST` in size.
+
+    Args:
+        value: the value.
+
+    Returns:
+        True for an int or a float, not for a bool.
+    """
+    return is_finite(value) and abs(value) <= MOST
+
+
 def is_finite(value: Any) -> bool:
     """Whether a value is a finite number, as read from a file.
 
@@ -89,12 +105,12 @@ def is_finite(value: Any) -> bool:
 
 
 def _numbers(value: Any) -> bool:
-    return isinstance(value, list) and all(map(is_finite, value))
+    return isinstance(value, list) and all(map(plausible, value))
 
 
 _FORMS = {  # what a key takes, by the annotation of the parameter of its name
-    "float": ("a finite number", is_finite),
+    "float": (PLAUSIBLE, plausible),
     "int": ("a whole number", lambda value: isinstance(value, int) and not isinstance(value, bool)),
-    "Any": ("a list of finite numbers", _numbers),
+    "Any": ("a list of finite numbers between -1e12 and 1e12", _numbers),
     "Signal": ("a table of a signal, with its kind", lambda value: isinstance(value, dict)),
 }

@@ -6,14 +6,18 @@ from .feedforward import gravity, inverse_dynamics
 from .gain_sweep import GainSweep, prepare_gain_sweep
 from .problem import METHODS
 from .recorder import channel_units
+from .trajectory import feedforward, inverse_kinematics, invert
 
 __all__ = [
     "METHODS",
     "GainSweep",
     "channel_units",
+    "feedforward",
     "gravity",
     "inverse",
     "inverse_dynamics",
+    "inverse_kinematics",
+    "invert",
     "prepare_gain_sweep",
     "rigid_feedforward",
     "rigid_robot",

@@ -202,6 +202,9 @@ def shoot_by_bisection(
     )
 
 
+STEPS_A_TRIAL = 200  # of the integrator between two instants of a bisection, at most
+
+
 class _Trial:
     """Forward steps from one state under drives that are tried, without limits."""
 
@@ -236,7 +239,7 @@ class _Trial:
             0.0,
             b - a,
             True,
-            0,
+            STEPS_A_TRIAL,
         )
         while run.advance(10_000):
             pass

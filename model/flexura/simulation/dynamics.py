@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from ..control import Controller, Sampled
-from ..errors import InputError, within_memory
+from ..errors import InputError, guarded
 from ..io import Run, check_progress
 from ..signals import Drive, as_signals
 from ..system import System, assemble
 from . import dense, integrator, nodewise_run
-from .problem import Problem, Progress, Solution, check_times, initial_value_problem
+from .problem import Budget, Problem, Progress, Solution, check_times, initial_value_problem
 from .recorder import record, still
 from .stop_condition import StopCondition
 
@@ -23,6 +23,7 @@ DriveLike = (
 )
 
 
+@guarded("the motion")
 def simulate(
     robot: Any,
     t_eval: Any,
@@ -36,6 +37,8 @@ def simulate(
     continue_from: Run | None = None,
     until: Callable[..., Any] | None = None,
     numerical_damping: bool = True,
+    max_steps: int | None = None,
+    wall_time: float | None = None,
     progress: Progress = None,
 ) -> Run:
     """Integrate the equations of motion of one robot (25); errors as in `flexura.simulate`.
@@ -52,13 +55,25 @@ def simulate(
         continue_from: as in `flexura.simulate`.
         until: as in `flexura.simulate`.
         numerical_damping: as in `flexura.simulate`.
+        max_steps: as in `flexura.simulate`.
+        wall_time: as in `flexura.simulate`.
         progress: called with the finished fraction.
 
     Returns:
         The Run.
     """
     problem = initial_value_problem(
-        robot, t_eval, drive, q0, qd0, rtol, method, numerical_damping, start, continue_from
+        robot,
+        t_eval,
+        drive,
+        q0,
+        qd0,
+        rtol,
+        method,
+        numerical_damping,
+        start,
+        continue_from,
+        Budget.checked(max_steps, wall_time),
     )
     check_progress(progress)
     solver = _solver(problem.system)
@@ -79,7 +94,7 @@ def simulate(
     return run
 
 
-@within_memory
+@guarded("the inverse dynamics")
 def inverse(
     robot: Any,
     t_eval: Any,
@@ -90,6 +105,8 @@ def inverse(
     *,
     method: str = "auto",
     start: str | None = None,
+    max_steps: int | None = None,
+    wall_time: float | None = None,
     progress: Progress = None,
 ) -> Run:
     """Inverse dynamics (59): joints follow `motion` exactly; the Run has `joint/i/drive`, the
@@ -112,6 +129,8 @@ def inverse(
         method: as in `flexura.simulate`.
         start: as in `flexura.simulate`. Under gravity the run starts in static equilibrium with the
             joints on their motions.
+        max_steps: as in `flexura.simulate`.
+        wall_time: as in `flexura.simulate`.
         progress: called with the finished fraction.
 
     Returns:
@@ -129,7 +148,19 @@ def inverse(
                 "missing: expected a motion of every joint", key=f"motion[{i}]", value="None"
             )
     drive = Drive.prescribed(*motions)
-    return simulate(system, t, drive, q0, qd0, rtol, method=method, start=start, progress=progress)
+    return simulate(
+        system,
+        t,
+        drive,
+        q0,
+        qd0,
+        rtol,
+        method=method,
+        start=start,
+        max_steps=max_steps,
+        wall_time=wall_time,
+        progress=progress,
+    )
 
 
 def _solver(system: System) -> Callable[[Problem, Progress], Solution]:

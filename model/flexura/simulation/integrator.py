@@ -11,7 +11,7 @@ import numpy as np
 from .. import core
 from ..control import Controller, DriveFunction, Sampled
 from ..signals import COLUMNS, Drive
-from .problem import MOST_STEPS, Problem, Progress, Solution
+from .problem import Problem, Progress, Solution
 from .recorder import limit_event
 
 STEPS_A_CALL = 400  # between two looks at the progress bar and the keyboard
@@ -76,14 +76,17 @@ class _Integration:
             rate,
             0.0,
             problem.numerical_damping,
-            MOST_STEPS,
+            problem.budget.steps,
         )
 
     def run(self, progress: Progress) -> Solution:
         begun, t, ends = time.perf_counter(), self.t, self.problem.ends
-        interrupted = False
+        interrupted = late = False
         try:
             while len(t) > 1 and self.core.advance(STEPS_A_CALL if ends is None else STEPS_A_LOOK):
+                if time.perf_counter() - begun > self.problem.budget.wall_s:
+                    late = True
+                    break
                 if ends is not None and ends(*(np.asarray(a) for a in self.core.rows()[:2])):
                     break
                 if progress is not None:
@@ -97,6 +100,8 @@ class _Integration:
         about = self.core.progress()
         times, states, accounts, forces = (np.asarray(a) for a in self.core.rows())
         events = [] if interrupted else self._events(about)
+        if late:
+            events = [self._budget_event("wall_time", about)]
         if interrupted or about["status"] == "interrupted":
             name = "interrupted"
             events = [{"t": about["t"], "level": "WARN", "name": name, "text": name}]
@@ -106,6 +111,7 @@ class _Integration:
             "evaluations": about["passes"],
             "wall_s": time.perf_counter() - begun,
             "complete": about["status"] == "done" and not interrupted,
+            "max_steps": self.problem.budget.steps,
             "events": events,
             "drive": self.drive.spec() if hasattr(self.drive, "spec") else "Python function",
             "rtol": self.rtol,
@@ -121,6 +127,8 @@ class _Integration:
         z = np.asarray(self.core.state())
         if status == "limit":
             return [limit_event(self.system, int(about["joint"]), at, z[self.system.joint_rows])]
+        if status == "exhausted":
+            return [self._budget_event(status, about)]
         i = int(about["joint"]) + 1
         where = (
             "" if i == 0 else f" in {'the bending of link' if about['elastic'] else 'joint'} {i}"
@@ -130,8 +138,6 @@ class _Integration:
             "try another tolerance or method, look at gains and forces",
             "diverged": f"the state is not a number any more{where}; "
             "a gain, a force or a start value is too large",
-            "exhausted": f"{MOST_STEPS} steps are used up{where}; "
-            'try method = "implicit", a larger rtol or a shorter time',
         }[status]
         return [
             {
@@ -141,3 +147,10 @@ class _Integration:
                 "text": f"the simulation got no further than t = {at:.6g} s: {what}",
             }
         ]
+
+    def _budget_event(self, name: str, about: dict[str, Any]) -> dict[str, Any]:
+        """What is said of a run whose budget is used up."""
+        steps = int(about["steps"]) + int(about["rejected"])
+        return self.problem.budget.event(
+            name, float(about["t"]), about["method"], steps, float(self.t[0])
+        )

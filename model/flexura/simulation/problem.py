@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sized
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,14 +10,14 @@ import numpy as np
 
 from ..control import Controller, DriveFunction, Sampled
 from ..errors import InputError
-from ..io import Run, array, choice, flag, number
+from ..io import Run, array, check_memory, choice, flag, number, whole
 from ..signals import Drive, Signal, as_signals
 from ..system import System, assemble
 from .start import apply_prescribed_motions, check_limits, consistent_start, state_at_end
 
 METHODS = ("auto", "explicit", "implicit", "exponential")
 SHORT = ("explicit-3", "explicit-5")  # what "auto" takes under a Controller whose ticks are short
-MOST_STEPS = 50_000_000  # of a run
+MOST_STEPS = 20_000_000  # of a run, attempts included, unless it is asked for others
 
 Progress = Callable[[float], None] | None
 
@@ -51,6 +51,45 @@ class Problem:
     start: str = "given"
     accounts: np.ndarray = field(default_factory=lambda: np.zeros(4))
     ends: Callable[[np.ndarray, np.ndarray], bool] | None = None
+    budget: Budget = field(default_factory=lambda: Budget())
+
+
+@dataclass(frozen=True)
+class Budget:
+    """What a run may take: `steps`, rejected ones included, which are the same on every machine,
+    and seconds of time, `wall_s`, which only stop it."""
+
+    steps: int = MOST_STEPS
+    wall_s: float = float("inf")
+
+    @staticmethod
+    def checked(max_steps: Any, wall_time: Any) -> Budget:
+        """The budget of these arguments, None for the default. Raises InputError."""
+        steps = MOST_STEPS if max_steps is None else whole(max_steps, "max_steps", 1)
+        expected = "expected a time above 0 in seconds"
+        wall = float("inf") if wall_time is None else number(wall_time, "wall_time", expected)
+        if not wall > 0:
+            raise InputError(expected, key="wall_time", value=wall_time)
+        return Budget(steps, wall)
+
+    def event(self, name: str, t: float, method: str, steps: int, since: float) -> dict[str, Any]:
+        """What ended a run: "exhausted" or "wall_time", after `steps` from `since` to t [s]."""
+        used = (
+            f"{self.steps} steps are used up"
+            if name == "exhausted"
+            else (f"the {self.wall_s:g} s of wall time are over, after {steps} steps")
+        )
+        mean = f" of {(t - since) / steps:.2g} s in the mean" if steps else ""
+        text = (
+            f"the simulation got no further than t = {t:.6g} s: {used}{mean} by the method "
+            f'"{method}"; what is fast sets them: try another method, a larger rtol, fewer '
+            f"elements or a few modes, damping, or a longer {BUDGETS[name]}"
+        )
+        level = "ERROR" if name == "exhausted" else "WARN"
+        return {"t": t, "level": level, "name": name, "text": text}
+
+
+BUDGETS = {"exhausted": "max_steps", "wall_time": "wall_time"}
 
 
 @dataclass(frozen=True)
@@ -90,6 +129,7 @@ def initial_value_problem(
     numerical_damping: Any = True,
     start: Any = None,
     before: Run | None = None,
+    budget: Budget | None = None,
 ) -> Problem:
     """The problem that a simulation solves.
 
@@ -104,6 +144,7 @@ def initial_value_problem(
         numerical_damping: as in `simulate`.
         start: as in `simulate`.
         before: the run that it continues.
+        budget: of passes and seconds; None: the default.
 
     Returns:
         The problem.
@@ -113,6 +154,7 @@ def initial_value_problem(
         NoEquilibrium: it should start in static equilibrium, and there is none.
     """
     system, t = assemble(robot), check_request(t_eval, rtol, method)
+    check_rows(system, len(t))
     acting = acting_drive(drive, len(system.robot.links), t)
     accounts = np.zeros(4)
     if before is None:
@@ -128,7 +170,29 @@ def initial_value_problem(
         )
         raise InputError(expected, key="drive", value="Controller")
     damping = flag(numerical_damping, "numerical_damping")
-    return Problem(system, t, acting, q, qd, float(rtol), method, damping, start, accounts)
+    return Problem(
+        system,
+        t,
+        acting,
+        q,
+        qd,
+        float(rtol),
+        method,
+        damping,
+        start,
+        accounts,
+        budget=budget or Budget(),
+    )
+
+
+COPIES = 3  # of a run's rows, while it is recorded
+
+
+def check_rows(system: System, count: int) -> None:
+    """Raises InputError for more output times than memory has room for."""
+    wide = 2 * system.n + 4 + 20 * len(system.robot.links)
+    what = f"{count} output times of a robot with {system.n} unknowns; expected fewer times"
+    check_memory(8.0 * COPIES * count * wide, what, "t_eval", count)
 
 
 def acting_drive(drive: Any, joints: int, t: np.ndarray) -> Drive | Controller | Sampled | Any:
@@ -205,6 +269,9 @@ def check_times(t_eval: Any) -> np.ndarray:
         InputError: they are not.
     """
     expected = "expected ascending finite times in seconds, one or more"
+    if isinstance(t_eval, Sized):
+        what = f"{len(t_eval)} output times; expected fewer"
+        check_memory(16.0 * len(t_eval), what, "t_eval", len(t_eval))
     t = array(t_eval, "t_eval", expected, (None,))
     if len(t) < 1 or not np.all(np.diff(t) > 0):
         raise InputError(expected, key="t_eval", value=t_eval)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..io import STATIONS, Run
+from ..io import STATIONS, Run, judged
 from ..robot import Robot
 from ..system import System
 from .problem import Solution
@@ -54,8 +54,6 @@ def recorded_channels(robot: Robot) -> list[str]:
 WORK, LOSS, NUMERICAL, STRAIN = range(4)
 LIMITS = ("limit", "end_of_link", "sleeve")  # names of events that stop a joint
 STILL = 1e-9  # m or rad: a robot whose unknowns change by less does not move
-# of the energies: a balance beyond is a note, an event, the end of trust in a run
-NOTED, DOUBTED, REFUSED = 1e-3, 1e-2, 0.1
 
 
 def record(system: System, solution: Solution) -> Run:
@@ -77,22 +75,7 @@ def record(system: System, solution: Solution) -> Run:
     about = describe(system, energy_error(seen[:, -3:], accounts, solution.jumps)) | solution.meta
     if len(t):
         about["numerical_loss_J"] = float(accounts[-1, NUMERICAL])
-    return with_balance_event(Run(t, channels, units, about, states))
-
-
-def with_balance_event(run: Run) -> Run:
-    """The Run with what its energy balance says of it: nothing, a note, a warning, or that it is
-    not to be trusted."""
-    error, end = run.meta["energy_error"], float(run.t[-1]) if len(run.t) else 0.0
-    if not error > NOTED:
-        return run
-    text = f"the energies do not balance: {error:.1%} of the largest of them is missing"
-    level = "INFO" if error <= DOUBTED else "WARN" if error <= REFUSED else "ERROR"
-    event = {"t": end, "level": level, "name": "balance", "text": text}
-    run.meta["events"] = [*run.meta.get("events", []), event]
-    if not error <= REFUSED:
-        run.meta["complete"] = False
-    return run
+    return judged(Run(t, channels, units, about, states))
 
 
 def still(run: Run) -> list[dict[str, Any]]:

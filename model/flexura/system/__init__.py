@@ -5,6 +5,7 @@ core where that is faster.
 """
 
 from .assembly import Assembly
+from .frequency_response import FrequencyResponse, frequency_response
 from .spectrum import Modes, frequencies, modes
 from .statespace import StateSpace, linearize
 from .statics import NoEquilibrium, equilibrium, holding, static, tip_pose
@@ -12,6 +13,7 @@ from .system import System, assemble
 
 __all__ = [
     "Assembly",
+    "FrequencyResponse",
     "Modes",
     "NoEquilibrium",
     "StateSpace",
@@ -19,6 +21,7 @@ __all__ = [
     "assemble",
     "equilibrium",
     "frequencies",
+    "frequency_response",
     "holding",
     "linearize",
     "modes",

@@ -324,7 +324,15 @@ class Assembly:
         )
 
     def strain(self, q: np.ndarray, K: np.ndarray) -> float:
-        """The strain energy [J] in q (n,), K (n, n) its `stiffness_blocks` (9), (106), (107)."""
+        """The strain energy (9), (106), (107).
+
+        Args:
+            q: configuration (n,).
+            K: its `stiffness_blocks` (n, n).
+
+        Returns:
+            Energy [J].
+        """
         strained = q - self._rest
         return float(0.5 * strained @ K @ strained)
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import within_memory
-from ..io import choice, whole
+from ..errors import InputError, guarded
+from ..io import Run, choice, number, whole
+from .mode_motion import moving_run
 from .statics import static
 from .system import System, assemble
 
@@ -16,15 +18,59 @@ from .system import System, assemble
 @dataclass(frozen=True)
 class Modes:
     """Natural modes at q (n,): frequencies_Hz (k,) ascending, shapes (n, k) with x . M x = 1, in
-    the order of `labels`."""
+    the order of `labels`.
+
+    `damping_ratios` (k,): x . D x / (2 omega) (157), exact where D is proportional to stiffness and
+    mass; 0 where omega is.
+    """
 
     frequencies_Hz: np.ndarray
     shapes: np.ndarray
     q: np.ndarray
     labels: tuple[str, ...]
+    damping_ratios: np.ndarray
+    system: System = field(repr=False, compare=False)
+
+    def run(self, mode: int = 1, *, amplitude_m: float | None = None, periods: int = 1) -> Run:
+        """A Run of the robot in one of its modes, undamped.
+
+        Args:
+            mode: its number, from 1.
+            amplitude_m: how far what moves most of tip and joints goes [m or rad]; by default a
+                tenth of the robot's length.
+            periods: how many; a mode without frequency takes a second.
+
+        Raises:
+            InputError: there is no such mode, or another argument is not what is expected.
+        """
+        expected = f"expected a mode from 1 to {len(self.frequencies_Hz)}"
+        if number(mode, "mode", expected) not in range(1, len(self.frequencies_Hz) + 1):
+            raise InputError(expected, key="mode", value=mode)
+        most = 0.1 * sum(link.length_m for link in self.system.robot.links)
+        if amplitude_m is not None:
+            most = number(amplitude_m, "amplitude_m")
+        count = whole(periods, "periods", 1)
+        shape = self.shapes[:, mode - 1]
+        return moving_run(
+            self.system, self.q, shape, float(self.frequencies_Hz[mode - 1]), most, count
+        )
+
+    def animate(self, out: str | Path, mode: int = 1, **options: Any) -> Path:
+        """Write a mode as a film.
+
+        Args:
+            out: the file, .gif, or .mp4 where an encoder is installed.
+            mode: its number, from 1.
+            options: as in `Run.animate`.
+
+        Raises:
+            InputError: a wrong argument.
+            Missing: matplotlib or pillow is not installed.
+        """
+        return self.run(mode).animate(out, **options)
 
 
-@within_memory
+@guarded("the natural frequencies")
 def frequencies(
     robot: Any, q: Any = None, joints: str = "locked", *, count: int | None = None, qd: Any = None
 ) -> np.ndarray:
@@ -59,18 +105,18 @@ def frequencies(
     ).frequencies_Hz
 
 
-@within_memory
-def modes(robot: Any, q: Any = None, joints: str = "locked", *, count: int | None = None) -> Modes:
+@guarded("the natural modes")
+def modes(robot: Any, q: Any = None, count: int | None = 10, *, joints: str = "locked") -> Modes:
     """Natural modes of the undamped, linearised robot. Errors as in `frequencies`.
 
     Args:
         robot: a System, a Robot, or the path or name of a robot file.
         q: configuration (n,); None: the static equilibrium at the start.
-        joints: "locked" or "free".
         count: how many of the lowest; None: all.
+        joints: "locked" or "free".
 
     Returns:
-        Frequencies [Hz], ascending, and shapes.
+        Frequencies [Hz], ascending, damping ratios and shapes.
     """
     system = assemble(robot)
     _check(joints, count)
@@ -89,7 +135,7 @@ def _eigenmodes(
     squares, columns = system.equations.modes(at, free, count or 0, np.zeros(3), shapes)
     if joints == "free" and not any(system.robot.gravity_m_s2):
         squares[: _unheld(system)] = 0.0
-    return Modes(_hertz(squares), columns, at, system.labels)
+    return _modes(system, squares, columns, at)
 
 
 def _unheld(system: System) -> int:
@@ -116,12 +162,22 @@ def _dense(system: System, at: np.ndarray, joints: str, count: int | None) -> Mo
     rows = system.elastic_rows if joints == "locked" else system.free_rows
     pick, shapes = np.ix_(rows, rows), np.zeros((system.n, len(rows)))
     if len(rows) == 0:
-        return Modes(np.zeros(0), shapes, at, system.labels)
+        return _modes(system, np.zeros(0), shapes, at)
     K = system.tangent(at)[pick]
     squares, shapes[rows] = eigh((K + K.T) / 2, system.mass(at)[pick])
     if joints == "free" and not any(system.robot.gravity_m_s2):
         squares[: _unheld(system)] = 0.0
-    return Modes(_hertz(squares)[:count], shapes[:, :count], at, system.labels)
+    return _modes(system, squares[:count], shapes[:, :count], at)
+
+
+def _modes(system: System, squares: np.ndarray, shapes: np.ndarray, at: np.ndarray) -> Modes:
+    """Modes whose damping is known where their shapes are."""
+    hertz = _hertz(squares)
+    damped = np.zeros(len(hertz))
+    if shapes.size:
+        damped = np.einsum("nk,nm,mk->k", shapes, system.damping_at(at), shapes)
+    ratios = np.where(hertz > 0, damped / np.maximum(4 * np.pi * hertz, 1e-300), 0.0)
+    return Modes(hertz, shapes, at, system.labels, ratios, system)
 
 
 def _steady(system: System, at: np.ndarray, rates: np.ndarray, joints: str) -> np.ndarray:

@@ -8,12 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import FlexuraError, InputError, within_memory
+from ..errors import FlexuraError, InputError, guarded
 from ..io import choice, summary
+from ..optional import Optional
 from .statics import static
 from .system import System, assemble, jacobian
 
 INFINITE = 1e5  # times the fastest pole: a zero beyond is one at infinity, and round-off
+control = Optional("control")
 
 
 @dataclass(frozen=True, repr=False)
@@ -146,6 +148,19 @@ class StateSpace:
         found = _roots(L.T @ N, L.T @ G @ N, L.T @ K @ N)
         return found[np.abs(found) < INFINITE * max(1.0, np.abs(self.poles).max())]
 
+    def to_control(self) -> Any:
+        """This system as a `control.StateSpace` of python-control, with the names of states, inputs
+        and outputs. Raises Missing where python-control is not installed."""
+        return control.ss(
+            self.A,
+            self.B,
+            self.C,
+            self.D,
+            states=[name.replace(".", "_") for name in self.states],
+            inputs=list(self.inputs),
+            outputs=list(self.outputs),
+        )
+
     def transfer(self, s: complex) -> np.ndarray:
         """The transfer matrix C (s - A)^-1 B.
 
@@ -158,7 +173,7 @@ class StateSpace:
         return self.outlook @ np.linalg.solve(s * s * self.M + s * self.G + self.K, self.E)
 
 
-@within_memory
+@guarded("the linear equations")
 def linearize(robot: Any, q: Any = None, qd: Any = None, joints: str = "free") -> StateSpace:
     """The robot linearised about an equilibrium, or about a steady motion (52).
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import FlexuraError, within_memory
+from ..errors import FlexuraError, guarded
 from ..io import array, number
 from .system import System, assemble
 
@@ -23,7 +23,7 @@ class NoEquilibrium(FlexuraError):
         self.q, self.share = q, share
 
 
-@within_memory
+@guarded("the static equilibrium")
 def static(
     robot: Any,
     joints: Any = None,
@@ -85,7 +85,7 @@ def equilibrium(equations: Any, q: np.ndarray, load: np.ndarray | None = None) -
     raise NoEquilibrium(text, np.asarray(found), float(share))
 
 
-@within_memory
+@guarded("the holding forces")
 def holding(robot: Any, q: Any = None) -> np.ndarray:
     """The drives that hold the joints at rest (25): elastic forces and gravity in their rows.
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, within_memory
+from ..errors import InputError, guarded
 from ..io import STATIONS, array, number, summary
 from ..link.line import Piece, whole_piece
 from ..link.shapes import coefficients_of_legendre_sums, legendre_shapes
@@ -154,8 +154,15 @@ class System:
         return np.arange(ends[link] + 1 + (link in self.windup_rows), ends[link + 1])
 
     def hub_positions(self, z: np.ndarray) -> np.ndarray:
-        """Positions (or rates) of the joints' hubs (..., links) from q (or qd) (..., n): behind a
-        transmission the rotor's and the windup (107)."""
+        """Positions, or rates, of the joints' hubs: behind a transmission the rotor's and the
+        windup (107).
+
+        Args:
+            z: configurations, or rates (..., n).
+
+        Returns:
+            (..., links).
+        """
         out = np.array(z[..., self.joint_rows])
         for link, row in self.windup_rows.items():
             out[..., link] += z[..., row]
@@ -315,9 +322,8 @@ class System:
                 f"expected places from 0 to the link's length, {length:g} m", key="s", value=s
             )
         if self.exact:
-            return tuple(
-                np.ascontiguousarray(self.equations.line(self.check(q), link - 1, places).T)
-            )  # type: ignore[return-value]
+            x, y, angle = np.array(self.equations.line(self.check(q), link - 1, places)).T.copy()
+            return x, y, angle
         return self.assembly.line(self.check(q), link, places)
 
     def angles(self, link: int, s: Any) -> np.ndarray:
@@ -474,7 +480,7 @@ class System:
         return "rad" if self.robot.links[int(parts[1]) - 1].joint.type == "R" else "m"
 
 
-@within_memory
+@guarded("the equations of motion")
 def assemble(robot: Any) -> System:
     """The System of a robot.
 

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import FlexuraError, InputError
-from ..io import Run, array, check_progress, choice, number, whole
+from ..errors import FlexuraError, InputError, guarded
+from ..io import Run, array, check_progress, choice, judged, number, whole
 from ..optional import Optional
 from ..robot import MAX_ELEMENTS, robot_of
 from .build import TwinModel, build
@@ -42,6 +42,7 @@ class DidNotConverge(FlexuraError):
     """Exudyn's solver gave up on a step; a shorter one may help."""
 
 
+@guarded("the twin's motion")
 def simulate(
     robot: Any,
     t_eval: Any,
@@ -206,7 +207,7 @@ def _run(
         "labels": [f"joint/{i}" for i in range(1, len(model.parts) + 1)],
         "hub_length_m": model.mesh.hubs,
     }
-    return Run(t, values, units, meta)
+    return judged(Run(t, values, units, meta))
 
 
 def _times(t_eval: Any) -> np.ndarray:

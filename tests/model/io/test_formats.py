@@ -98,7 +98,7 @@ def test_replacing_takes_either_name(type, keys, caplog):
         ("R", {"start": 0.3, "start_rad": 0.3}, "start", "an unknown key"),
         ("R", {"limits": [1.0, -1.0]}, "limits_rad", "the lower limit first"),
         ("Pb", {"start": 0.2}, "start_m", "the free length at the start, between 0 and 0.1 m"),
-        ("R", {"coulomb_friction": -1.0}, "coulomb_friction_N_m", "in N m, 0 or more"),
+        ("R", {"coulomb_friction": -1.0}, "coulomb_friction_N_m", "in N m, 0 or between"),
     ],
 )
 def test_a_wrong_key_of_a_joint_is_named(type, joint, key, words):

@@ -108,7 +108,7 @@ VALUES = {
         {STRIP + "length_m": -0.3},
         "link[2].length_m",
         -0.3,
-        "above 0 and at most 1000",
+        "0 or between 1e-5 and 1000",
     ),
     "no length for a flexible link": (
         {STRIP + "length_m": 0.0},
@@ -120,7 +120,7 @@ VALUES = {
         {STRIP + "length_m": 2e3},
         "link[2].length_m",
         2e3,
-        "at most 1000",
+        "and 1000",
     ),
     "a length that is no number": (
         {STRIP + "length_m": nan},
@@ -169,7 +169,7 @@ VALUES = {
         {STRIP + "young_modulus_Pa": 2e14},
         "link[2].young_modulus_Pa",
         2e14,
-        "between 1e3 and 2e12",
+        "between 1000 and 2e12",
     ),
     "no modulus": (
         {STRIP + "young_modulus_Pa": ABSENT},
@@ -218,7 +218,7 @@ VALUES = {
         {STRIP + "section.width_m": 20.0},
         "link[2].section.width_m",
         20.0,
-        "at most 10",
+        "between 1e-7 and 10",
     ),
     "a section without a width": (
         {STRIP + "section": {"height_m": 1e-3}},
@@ -284,7 +284,7 @@ VALUES = {
         {STRIP + "section": sections((0.0, 1e-3), (0.3, -1e-3))},
         "link[2].section[2].height_m",
         -1e-3,
-        "above 0",
+        "between 1e-7 and 10",
     ),
     "a list's height in millimetres": (
         {STRIP + "section": sections((0.0, 1e-3), (0.3, 1.0))},
@@ -335,13 +335,13 @@ VALUES = {
         BY_NUMBER | {STRIP + "mass_per_length_kg_m": -1.0},
         "link[2].mass_per_length_kg_m",
         -1.0,
-        "a number of 0 or more, or a list",
+        "a number between 1e-12 and 1e6 or a list",
     ),
     "a mass per length as text": (
         BY_NUMBER | {STRIP + "mass_per_length_kg_m": "1"},
         "link[2].mass_per_length_kg_m",
         "1",
-        "a number of 0 or more, or a list",
+        "a number between 1e-12 and 1e6 or a list",
     ),
     "a mass per length as a truth value": (
         BY_NUMBER | {STRIP + "mass_per_length_kg_m": True},
@@ -458,13 +458,13 @@ VALUES = {
         {CART + "mass_kg": -0.6},
         "link[1].mass_kg",
         -0.6,
-        "mass in kilograms, 0 or more",
+        "mass in kilograms, 0 or between 1e-15 and 1e9",
     ),
     "a negative inertia": (
         {CART + "inertia_kg_m2": -1.0},
         "link[1].inertia_kg_m2",
         -1.0,
-        "0 or more",
+        "0 or between 1e-24 and 1e13",
     ),
     "a centre of mass in space": (
         {CART + "centre_of_mass_m": [0.05, 0.0, 0.0]},
@@ -525,7 +525,7 @@ VALUES = {
         {STRIP + "joint.hub_mass_kg": -1.0},
         "link[2].joint.hub_mass_kg",
         -1.0,
-        "0 or more",
+        "0 or between 1e-15 and 1e9",
     ),
     "a hub inertia as text": (
         {STRIP + "joint.hub_inertia_kg_m2": "1"},
@@ -703,13 +703,13 @@ VALUES = {
         {"payload.mass_kg": -1.0},
         "payload.mass_kg",
         -1.0,
-        "mass in kilograms, 0 or more",
+        "mass in kilograms, 0 or between 1e-15 and 1e9",
     ),
     "negative damping": (
         {STRIP + "damping.beta_s": -1.0},
         "link[2].damping.beta_s",
         -1.0,
-        "between 0 and 10",
+        "0 or between 1e-15 and 10",
     ),
     "damping in milliseconds": (
         {STRIP + "damping.beta_s": 20.0},
@@ -1100,6 +1100,10 @@ def number(low, high, **options):
     return st.floats(low, high, allow_nan=False, **options)
 
 
+def zero_or(low, high):
+    return st.one_of(st.just(0.0), number(low, high))
+
+
 def optional(**keys):
     return st.fixed_dictionaries({}, optional=keys)
 
@@ -1108,11 +1112,11 @@ def optional(**keys):
 def joints(draw):
     joint = draw(
         optional(
-            hub_mass_kg=number(0, 100),
-            hub_inertia_kg_m2=number(0, 100),
-            rotor_inertia=number(0, 100),
-            viscous_friction=number(0, 100),
-            coulomb_friction=number(0, 100),
+            hub_mass_kg=zero_or(1e-9, 100),
+            hub_inertia_kg_m2=zero_or(1e-9, 100),
+            rotor_inertia=zero_or(1e-9, 100),
+            viscous_friction=zero_or(1e-9, 100),
+            coulomb_friction=zero_or(1e-9, 100),
             locked=st.booleans(),
         )
     )
@@ -1127,14 +1131,14 @@ def chains(draw):
     """Links whose joints start, and have their limits, on what they slide along."""
     chain = draw(st.lists(links(), min_size=1, max_size=5))
     for i, link in enumerate(chain):
-        joint, (low, high) = link["joint"], (-1e6, 1e6)
+        joint, (low, high) = link["joint"], (-1e4, 1e4)
         if i and joint["type"] == "Pa":
             before = chain[i - 1]
             low, high = 0.0, before["length_m"]
             if before["joint"]["type"] == "Pb":
                 low = high - before["joint"]["start"]
             if high == 0:
-                joint["type"], (low, high) = "R", (-1e6, 1e6)
+                joint["type"], (low, high) = "R", (-1e4, 1e4)
                 joint.pop("angle_rad")
         elif joint["type"] == "Pb":
             high = link["length_m"]
@@ -1159,32 +1163,35 @@ def along(draw, length, entry):
 
 @st.composite
 def links(draw):
-    link = {"name": draw(st.text(max_size=20)), "joint": draw(joints())}
+    link = {"name": draw(st.text(max_size=20).filter(is_name)), "joint": draw(joints())}
     link["length_m"] = length = draw(number(1e-3, 1000))
-    section = st.fixed_dictionaries({"width_m": number(1e-6, 10), "height_m": number(1e-9, 9e-4)})
-    value = st.fixed_dictionaries({"value": number(0, 1e6, exclude_min=True)})
+    section = st.fixed_dictionaries({"width_m": number(1e-6, 10), "height_m": number(1e-7, 9e-4)})
+    value = st.fixed_dictionaries({"value": number(1e-9, 1e6)})
     if draw(st.booleans()):
         link |= {
             "elements": 0,
             "length_m": draw(st.sampled_from([0.0, length])),
-            "mass_kg": draw(number(0, 1e3)),
+            "mass_kg": draw(zero_or(1e-9, 1e3)),
         }
-        return link | draw(optional(centre_of_mass_m=number(-10, 10), inertia_kg_m2=number(0, 10)))
+        return link | draw(
+            optional(centre_of_mass_m=number(-10, 10), inertia_kg_m2=zero_or(1e-9, 10))
+        )
     link["elements"] = draw(st.integers(1, 200))
     if draw(st.booleans()):
         link["modes"] = draw(st.integers(1, min(14, 2 * link["elements"])))
     if draw(st.booleans()):
         link["section"] = draw(st.one_of(section, along(length, section)))
         link |= {
-            "young_modulus_Pa": draw(number(1e5, 2e12)),
+            "young_modulus_Pa": draw(number(1e3, 2e12)),
             "density_kg_m3": draw(number(10, 25000)),
         }
     else:
         for key in ("mass_per_length_kg_m", "bending_stiffness_N_m2"):
-            link[key] = draw(st.one_of(number(0, 1e6, exclude_min=True), along(length, value)))
+            link[key] = draw(st.one_of(number(1e-9, 1e6), along(length, value)))
     return link | draw(
         st.fixed_dictionaries(
-            {}, optional={"damping": optional(alpha_1_s=number(0, 1e6), beta_s=number(0, 10))}
+            {},
+            optional={"damping": optional(alpha_1_s=zero_or(1e-9, 1e6), beta_s=zero_or(1e-9, 10))},
         )
     )
 
@@ -1215,7 +1222,7 @@ robots = (
             "gravity_m_s2": st.lists(number(-1e3, 1e3), min_size=2, max_size=2),
             "stiffening": st.booleans(),
             "sliding": st.sampled_from(["continuous", "nodal"]),
-            "payload": optional(mass_kg=number(0, 1e3), inertia_kg_m2=number(0, 1e3)),
+            "payload": optional(mass_kg=zero_or(1e-9, 1e3), inertia_kg_m2=zero_or(1e-9, 1e3)),
         },
     )
     .map(whole_meshes)

@@ -34,8 +34,8 @@ def test_nothing_depends_on_the_sleeves_own_velocity(kind):
 def test_the_carriage_carries_the_whole_mass(kind):
     assembly = Assembly(robot(CARRIAGE, KINDS[kind], payload=0.3))
     q, _ = chains.random_state(assembly, np.random.default_rng(1))
-    s, ds = assembly.structure.laws[1].quadrature(0.0, 1.0, 3)
-    mass = ds @ assembly.structure.laws[1].mass_per_length(s)
+    s, ds = assembly.structure.materials[1].quadrature(0.0, 1.0, 3)
+    mass = ds @ assembly.structure.materials[1].mass_per_length(s)
     assert assembly.mass(q)[0, 0] == pytest.approx(0.8 + mass, rel=1e-13)
 
 

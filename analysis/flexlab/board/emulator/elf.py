@@ -7,6 +7,7 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from flexura.errors import InputError
 
@@ -68,7 +69,9 @@ class _Damaged(Exception):
     """What is wrong in a file of the right kind."""
 
 
-def _table(data: bytes, row: struct.Struct, at: int, size: int, count: int) -> list[tuple]:
+def _table(
+    data: bytes, row: struct.Struct, at: int, size: int, count: int
+) -> list[tuple[Any, ...]]:
     if size != row.size or not count or at + size * count > len(data):
         raise _Damaged("its headers are not in it")
     return [row.unpack_from(data, at + size * k) for k in range(count)]
@@ -80,7 +83,7 @@ def _part(data: bytes, at: int, size: int) -> bytes:
     return data[at : at + size]
 
 
-def _flash(data: bytes, segments: list[tuple]) -> bytes:
+def _flash(data: bytes, segments: list[tuple[Any, ...]]) -> bytes:
     """What is loaded below the addresses of data, at its place."""
     out = bytearray()
     for kind, at, _, address, size, *_ in segments:
@@ -95,7 +98,7 @@ def _flash(data: bytes, segments: list[tuple]) -> bytes:
     return bytes(out)
 
 
-def _symbols(data: bytes, sections: list[tuple]) -> dict[str, int]:
+def _symbols(data: bytes, sections: list[tuple[Any, ...]]) -> dict[str, int]:
     """Global symbols, and local ones where no global one has their name."""
     out: dict[str, int] = {}
     for _, kind, _, _, at, size, link, *_ in sections:

@@ -22,6 +22,9 @@ _OUTPUTS = {  # pin, role for the plant, level without the firmware
     "motor_forward": ("forward", False),
     "motor_reverse": ("reverse", False),
     "motor_enable": ("enable", False),
+    "motor_2_forward": ("forward_2", False),
+    "motor_2_reverse": ("reverse_2", False),
+    "motor_2_enable": ("enable_2", False),
     "step": ("step", False),
     "step_direction": ("step_up", False),
     "step_disable": ("step_disable", True),
@@ -34,10 +37,11 @@ _SWITCHES = ("limit_low", "limit_high", "emergency_stop")
 class Outputs:
     """What the board did to the rig during a window."""
 
-    duty: float = 0.0  # mean voltage at the motor / supply, -1 to 1; 0 while the bridge is off
+    # mean voltage at each motor / supply, -1 to 1; 0 while its bridge is off
+    duty: tuple[float, float] = (0.0, 0.0)
     # mean of the microsteps since the start, up minus down, those that found the driver enabled
     steps: float = 0.0
-    motor_on: bool = False  # bridge enabled at the window's end
+    motor_on: tuple[bool, bool] = (False, False)  # bridges enabled at the window's end
     stepper_on: bool = False  # stepper driver enabled at the window's end
 
 
@@ -45,7 +49,7 @@ class Outputs:
 class Sensors:
     """What the rig's wires say at the end of a window."""
 
-    encoder_1: float = 0.0  # motor encoder, counts (x4), fractions too
+    encoder_1: float = 0.0  # encoder of joint 1, counts (x4), fractions too
     encoder_2: float = 0.0  # encoder of joint 2
     flex_V: float = 2.5  # at pin flex
     supply_V: float = 2.45  # at pin supply, behind the divider
@@ -82,6 +86,7 @@ class EmulatedBoard:
         self.lines = {
             name: self.simulator.line(PINS[name].port, PINS[name].bit, ROLES[role], rest=rest)
             for name, (role, rest) in _OUTPUTS.items()
+            if name in PINS
         }
         self.lines["busy"] = self.simulator.line(PINS["busy"].port, PINS["busy"].bit)
         self._swapped = {1: False, 2: False}
@@ -156,8 +161,10 @@ class EmulatedBoard:
         self._until += self._window
         simulator.run(self._until)
         out = self.outputs
-        out.duty, out.steps = window.duty, window.steps_mean
-        out.motor_on, out.stepper_on = window.motor_on != 0, window.stepper_on != 0
+        one, two = window.duty
+        out.duty, out.steps = (one, two), window.steps_mean
+        on, on_2 = window.motor_on
+        out.motor_on, out.stepper_on = (on != 0, on_2 != 0), window.stepper_on != 0
         self.sensors = sensors
 
     # ---- wiring, right and wrong

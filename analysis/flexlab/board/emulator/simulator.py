@@ -37,7 +37,20 @@ from .simavr_patches import repair
 CLOCK_HZ = 16_000_000
 ROLES = {
     name: k
-    for k, name in enumerate(("forward", "reverse", "enable", "step", "step_up", "step_disable"), 1)
+    for k, name in enumerate(
+        (
+            "forward",
+            "reverse",
+            "enable",
+            "forward_2",
+            "reverse_2",
+            "enable_2",
+            "step",
+            "step_up",
+            "step_disable",
+        ),
+        1,
+    )
 }
 RESET_CAUSES = {"power-on": 1, "external": 2, "brown-out": 4, "watchdog": 8}  # MCUSR
 _PIN_REGISTERS = {p: 0x20 + 3 * k for k, p in enumerate("ABCDEFG")} | {
@@ -54,13 +67,13 @@ class Window(ctypes.Structure):
 
     _fields_ = (
         ("encoder", ctypes.c_double * 2),
+        ("duty", ctypes.c_double * 2),
+        ("steps", ctypes.c_double),
+        ("steps_mean", ctypes.c_double),
+        ("motor_on", ctypes.c_double * 2),
         *[
             (name, ctypes.c_double)
             for name in (
-                "duty",
-                "steps",
-                "steps_mean",
-                "motor_on",
                 "stepper_on",
                 "driven_cycle",
                 "step_cycle",

@@ -8,7 +8,7 @@ there in time is the fault `underrun`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +18,8 @@ from .declaration import CONTROL_HZ, LOOKAHEAD_KNOTS, Flag, Mode, Result
 from .session import Command, Link, Refused
 
 FRACTION = 256  # set-points count in 1/256 of a count or microstep
+VOLT_UNIT_V = 0.002  # voltages count in 2 mV
+JOINTS = (1, 2)  # of the protocol
 _SHARE = {"setpoints": 4, "drives": 8}  # knots in one command
 
 # t [s] -> position, velocity, acceleration, as a flexura Signal
@@ -53,36 +55,50 @@ def _times(duration_s: float, period_log2: int) -> np.ndarray:
 
 
 def setpoints(
-    carriage: Function,
-    joint: Function,
+    motions: Sequence[Function],
     duration_s: float,
-    settings: dict[str, float],
+    scales: Sequence[float],
     period_log2: int = 3,
 ) -> Knots:
-    """Knots of two motions [m, rad] from 0 to the duration, the last of them held."""
+    """Knots of the joints' motions from 0 to the duration, the last of them held.
+
+    Args:
+        motions: one a joint [m, rad]; a joint that is missing stays at 0.
+        duration_s: end of the motions [s].
+        scales: units of the board's set-points for 1 m or 1 rad, one a joint.
+        period_log2: knots are 2^period_log2 ticks apart.
+    """
     t = _times(duration_s, period_log2)
-    scales = FRACTION * settings["motor_counts_per_m"], FRACTION * settings["stepper_steps_per_rad"]
     columns = {}
-    for number, (motion, scale) in enumerate(zip((carriage, joint), scales, strict=True), 1):
-        r, v, _ = np.array([motion(float(at)) for at in t]).T
-        v[-1] = 0.0  # the last one is held
-        columns[f"position_{number}"] = np.round(scale * r).astype(int)
-        columns[f"velocity_{number}"] = np.round(scale * v / CONTROL_HZ).astype(int)
+    for number in JOINTS:
+        r = v = np.zeros(len(t))
+        if number <= len(motions):
+            motion, scale = motions[number - 1], FRACTION * scales[number - 1]
+            r, v, _ = np.array([motion(float(at)) for at in t]).T
+            v[-1] = 0.0  # the last one is held
+            r, v = scale * r, scale * v
+        columns[f"position_{number}"] = np.round(r).astype(int)
+        columns[f"velocity_{number}"] = np.round(v / CONTROL_HZ).astype(int)
     return Knots(Mode.position, period_log2, columns)
 
 
 def drives(
-    voltage: Callable[[float], float],
-    rate: Callable[[float], float],
-    duration_s: float,
-    settings: dict[str, float],
-    period_log2: int = 3,
+    courses: Mapping[str, Callable[[float], float]], duration_s: float, period_log2: int = 3
 ) -> Knots:
-    """Knots of a motor voltage [V] and a rate of joint 2 [rad/s], each held for one period."""
+    """Knots of what the drives get, each held for one period.
+
+    Args:
+        courses: "voltage" and "voltage_2" of motors [V], "rate" of a stepper [microstep/s]; what is
+            missing is 0.
+        duration_s: end of the profile [s].
+        period_log2: knots are 2^period_log2 ticks apart.
+    """
     t = _times(duration_s, period_log2)[:-1]
-    volts = np.array([round(1000 * voltage(float(at))) for at in t])
-    steps = np.array([round(settings["stepper_steps_per_rad"] * rate(float(at))) for at in t])
-    return Knots(Mode.open_loop, period_log2, {"voltage": volts, "rate": steps})
+    columns = {}
+    for name, unit in (("voltage", VOLT_UNIT_V), ("rate", 1.0), ("voltage_2", VOLT_UNIT_V)):
+        course = courses.get(name, lambda at: 0.0)
+        columns[name] = np.array([round(course(float(at)) / unit) for at in t], dtype=int)
+    return Knots(Mode.open_loop, period_log2, columns)
 
 
 class Player:

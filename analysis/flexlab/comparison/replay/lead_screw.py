@@ -1,4 +1,4 @@
-"""Joint 1 from its motor's voltage: the nut with static friction, the carriage behind backlash.
+"""A carriage from its motor's voltage: the nut with static friction, the carriage behind backlash.
 
     m s'' = F - c s' - f sign s'       moving; f: Coulomb friction
     s'' = 0                            at rest, if |F| <= f_0, the static friction
@@ -20,24 +20,21 @@ import numpy as np
 
 from flexura.signals import Signal
 
-from ...rig.emulation import EmulatedCarriage
+from ...rig.axes import Guide
 from ...rig.plant.motor import JointLine
 
 STEP_S = 2.5e-4
 FLANK_TOLERANCE = 1e-9  # of the play
 
 
-def backlash(carriage: EmulatedCarriage, friction: float = 1.0) -> float:
-    """The nut's backlash, and how far the rail's friction presses it into its flanks [m].
+def backlash(guide: Guide, friction: float = 1.0) -> float:
+    """A drive's backlash, and how far the joint's friction presses it into its flanks [m or rad].
 
     Args:
-        carriage: the rig file's table.
-        friction: factor on the rail's Coulomb friction.
+        guide: the joint's own friction and play.
+        friction: factor on its Coulomb friction.
     """
-    return (
-        carriage.backlash_m
-        + 2 * friction * carriage.coulomb_friction_N / carriage.contact_stiffness_N_m
-    )
+    return guide.backlash + 2 * friction * guide.coulomb / guide.contact_stiffness
 
 
 def nut_and_carriage(
@@ -57,7 +54,7 @@ def nut_and_carriage(
         Nut position [m], its speed [m/s], and carriage position [m], (3, T).
     """
     out = np.empty((3, len(t)))
-    half, rate, step = play_m / 2, line.viscous_N_s_m / mass_kg, float(t[1] - t[0])
+    half, rate, step = play_m / 2, line.viscous / mass_kg, float(t[1] - t[0])
     decay = math.exp(-rate * step)
     travel = (1 - decay) / rate
     nut = carriage = start_m
@@ -67,11 +64,11 @@ def nut_and_carriage(
         F = force(at + step / 2)[0]
         direction = math.copysign(1.0, speed or F)
         released_N = (
-            0.0 if direction * (nut - carriage) >= half - FLANK_TOLERANCE * play_m else line.rail_N
+            0.0 if direction * (nut - carriage) >= half - FLANK_TOLERANCE * play_m else line.guide
         )
-        if speed == 0.0 and abs(F) <= line.static_N - released_N:
+        if speed == 0.0 and abs(F) <= line.static - released_N:
             continue
-        final = (F - direction * (line.coulomb_N - released_N)) / line.viscous_N_s_m
+        final = (F - direction * (line.coulomb - released_N)) / line.viscous
         after = final + (speed - final) * decay
         if after * direction >= 0.0:
             nut += final * step + (speed - final) * travel

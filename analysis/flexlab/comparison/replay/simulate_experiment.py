@@ -2,10 +2,10 @@
 
 The joints are driven in one of three ways:
 
-- `commanded`: the motor's voltage moves the nut, and the nut the carriage behind its backlash
-  (`lead_screw`). The stepper's pulses act through its magnetic spring (`stepper_relaxation`).
-  All is predicted from the rig file, so that every error of the drives' data adds up. Joint 1's
-  position is that of the nut, as its encoder sees it.
+- `commanded`: a motor's voltage moves the nut, and the nut the carriage behind its backlash
+  (`lead_screw`), or it turns the joint. A stepper's pulses act through its magnetic spring
+  (`stepper_relaxation`). All is predicted from the rig file, so that every error of the drives'
+  data adds up. A carriage's position is that of the nut, as its encoder sees it.
 - `reference`: the joints follow their set-points exactly, as in the dissertation's inverse
   comparison. The deviation contains the controllers' errors.
 - `measured`: the joints follow their smoothed encoders. The deviation is that of the elastic model
@@ -25,9 +25,10 @@ from flexura.errors import InputError
 from flexura.io import called
 from flexura.signals import JointDrive
 
+from ...rig.axes import MotorAxis, motor_axes
 from ...rig.description import Rig, rig_of_recording
-from ...rig.emulation import Emulated
-from ...rig.plant.motor import JointLine, joint_line_of, resistance
+from ...rig.nominal_robot import with_drives
+from ...rig.plant.motor import JointLine, joint_line, resistance
 from ...rig.plant.stepper import MagneticSpring
 from . import lead_screw
 from .pulses import pulses_of_run
@@ -44,11 +45,22 @@ from .stepper_relaxation import StartState, simulate_with_stepper
 # reported
 VOLTAGE_DELAY_S = 5e-4
 DRIVEN_BY = ("commanded", "reference", "measured")
-REQUIRED_CHANNELS = {
-    "commanded": ("joint/1/voltage", "joint/2/pulses"),
-    "reference": ("joint/1/reference", "joint/2/reference"),
-    "measured": ("joint/1/position", "joint/2/position"),
-}
+
+
+def required_channels(experiment: fx.Run, by: str) -> list[str]:
+    """The channels that drive the joints of a simulation.
+
+    Args:
+        experiment: the run.
+        by: one of `DRIVEN_BY`.
+    """
+    joints = sum(name.endswith("/position") for name in experiment if name.startswith("joint/"))
+    if by != "commanded":
+        end = "reference" if by == "reference" else "position"
+        return [f"joint/{n}/{end}" for n in range(1, joints + 1)]
+    stepper = joints == 2 and "joint/2/pulses" in experiment
+    kinds = ["voltage", "pulses" if stepper else "voltage"]
+    return [f"joint/{n}/{kind}" for n, kind in zip(range(1, joints + 1), kinds, strict=False)]
 
 
 def simulate_experiment(
@@ -76,10 +88,14 @@ def simulate_experiment(
     """
     if by not in DRIVEN_BY:
         raise InputError(f"expected one of {', '.join(DRIVEN_BY)}", key="by", value=by)
-    missing = [name for name in REQUIRED_CHANNELS[by] if name not in experiment]
-    if missing:
+    required = required_channels(experiment, by)
+    missing = [name for name in required if name not in experiment]
+    if missing or not required:
         raise InputError(
-            f"expected a run with {missing[0]}; it has: {', '.join(experiment)}", key="by", value=by
+            f"expected a run with {missing[0] if missing else 'joint/1/position'}; it has: "
+            f"{', '.join(experiment)}",
+            key="by",
+            value=by,
         )
     if by == "reference" and experiment.meta.get("experiment") == "step":
         raise InputError(
@@ -88,48 +104,19 @@ def simulate_experiment(
             value=by,
         )
     robot = robot or _robot(experiment)
-    if len(robot.links) != 2:
+    if len(robot.links) != len(required):
         raise InputError(
-            "expected a robot of two links, as the rig's", key="robot", value=robot.name
+            f"expected a robot of {len(required)} links, as the rig's",
+            key="robot",
+            value=robot.name,
         )
-    t = experiment.t
     if by == "commanded":
-        rig, more = _rig(experiment)
-        carriage = joint_line_of(rig, more)
-        robot = _with_drives(robot, carriage, more.stepper.damping_N_m_s)
-        pulses, jumps = joint_2_pulse_angle(experiment)
-        times, volts = recorded_samples(t, experiment["joint/1/voltage"], "joint/1/voltage")
-        volts = np.sign(volts) * np.maximum(np.abs(volts) - more.driver.dead_zone_V, 0.0)
-        force = hold_midpoints(
-            times + VOLTAGE_DELAY_S + more.motor.inductance_H / resistance(rig),
-            carriage.force_N_V * volts,
-        )
-        at_start = (
-            recorded_samples(t, experiment["joint/1/position"], "joint/1/position")[1][0],
-            pulses(t[0])[0],
-        )
-        spring = MagneticSpring(rig.stepper, more.stepper)
-        method = "implicit" if jumps else "auto"  # one every millisecond
-        start = _start_at(robot, at_start)
-        mass_kg = float(start[0].mass(start[1])[0, 0])
-        fine_t = np.arange(t[0], t[-1] + lead_screw.STEP_S, lead_screw.STEP_S)
-        nut, speed, x = lead_screw.nut_and_carriage(
-            fine_t, force, carriage, mass_kg, lead_screw.backlash(more.carriage), at_start[0]
-        )
-        carriage_drive = JointDrive(
-            force=force, motion=continue_past_end(t, np.interp(t, fine_t, x)), prescribed=True
-        )
-        run = simulate_with_stepper(
-            start, t, carriage_drive, pulses, spring, rtol, progress, method=method
-        )
-        if run.meta["relaxation_rounds"] is not None:
-            nut_channels = {
-                "joint/1/position": np.interp(run.t, fine_t, nut),
-                "joint/1/velocity": np.interp(run.t, fine_t, speed),
-            }
-            run = dataclasses.replace(run, channels=run.channels | nut_channels)
+        rig = _rig(experiment)
+        drive = _by_screw_and_stepper if rig.screw and rig.stepper else _by_motors
+        run = drive(experiment, rig, robot, rtol, progress)
     else:
-        motions = [_motion(experiment, name, by) for name in REQUIRED_CHANNELS[by]]
+        t = experiment.t
+        motions = [_motion(experiment, name, by) for name in required]
         rest_t = initial_rest(t)
         system, q0 = _start_at(robot, [motion(rest_t[0])[0] for motion in motions])
         run = fx.simulate(
@@ -153,6 +140,92 @@ def simulate_experiment(
         filter(None, (experiment.meta.get("experiment"), called(experiment)))
     )
     return run
+
+
+def _by_screw_and_stepper(
+    experiment: fx.Run,
+    rig: Rig,
+    robot: fx.Robot,
+    rtol: float,
+    progress: Callable[[float], None] | None,
+) -> fx.Run:
+    """Joint 1 behind a lead screw from its voltage, joint 2 on its stepper from the pulses."""
+    assert rig.stepper is not None
+    t = experiment.t
+    (axis,) = motor_axes(rig)
+    line = joint_line(axis)
+    robot = with_drives(robot, rig, [(axis, line)])
+    pulses, jumps = joint_2_pulse_angle(experiment)
+    force = motor_force(experiment, rig, axis, line)
+    at_start = (_first_position(experiment, 1), pulses(t[0])[0])
+    method = "implicit" if jumps else "auto"  # one every millisecond
+    start = _start_at(robot, at_start)
+    mass_kg = float(start[0].mass(start[1])[0, 0])
+    fine_t = np.arange(t[0], t[-1] + lead_screw.STEP_S, lead_screw.STEP_S)
+    nut, speed, x = lead_screw.nut_and_carriage(
+        fine_t, force, line, mass_kg, lead_screw.backlash(axis.guide), at_start[0]
+    )
+    carriage_drive = JointDrive(
+        force=force, motion=continue_past_end(t, np.interp(t, fine_t, x)), prescribed=True
+    )
+    run = simulate_with_stepper(
+        start, t, carriage_drive, pulses, MagneticSpring(rig.stepper), rtol, progress, method=method
+    )
+    if run.meta["relaxation_rounds"] is not None:
+        nut_channels = {
+            "joint/1/position": np.interp(run.t, fine_t, nut),
+            "joint/1/velocity": np.interp(run.t, fine_t, speed),
+        }
+        run = dataclasses.replace(run, channels=run.channels | nut_channels)
+    return run
+
+
+def _by_motors(
+    experiment: fx.Run,
+    rig: Rig,
+    robot: fx.Robot,
+    rtol: float,
+    progress: Callable[[float], None] | None,
+) -> fx.Run:
+    """Joints that motors turn, from their voltages; a stepper's joint from its pulses.
+
+    Rotor, friction and back-EMF are the joints' own, so that the links act back on the motors. The
+    gears' backlash is left out.
+    """
+    t = experiment.t
+    lines = [(axis, joint_line(axis)) for axis in motor_axes(rig)]
+    robot = with_drives(robot, rig, lines)
+    forces = [motor_force(experiment, rig, axis, line) for axis, line in lines]
+    at_start = [_first_position(experiment, n) for n in range(1, rig.joints + 1)]
+    if not rig.stepper:
+        system, q0 = _start_at(robot, at_start)
+        return fx.simulate(system, t, fx.Drive.force(*forces), q0=q0, rtol=rtol, progress=progress)
+    pulses, jumps = joint_2_pulse_angle(experiment)
+    start = _start_at(robot, [at_start[0], pulses(t[0])[0]])
+    spring = MagneticSpring(rig.stepper)
+    method = "implicit" if jumps else "auto"
+    return simulate_with_stepper(start, t, forces[0], pulses, spring, rtol, progress, method=method)
+
+
+def motor_force(experiment: fx.Run, rig: Rig, axis: MotorAxis, line: JointLine) -> signals.Signal:
+    """The force or torque of a motor's recorded voltage at its joint [N or N m].
+
+    Args:
+        experiment: the run.
+        rig: its rig.
+        axis: the joint.
+        line: the joint as a linear motor.
+    """
+    name = f"joint/{axis.number}/voltage"
+    times, volts = recorded_samples(experiment.t, experiment[name], name)
+    volts = np.sign(volts) * np.maximum(np.abs(volts) - rig.driver.dead_zone_V, 0.0)
+    late = VOLTAGE_DELAY_S + (axis.motor.inductance_H or 0.0) / resistance(axis.motor)
+    return hold_midpoints(times + late, line.force_per_V * volts)
+
+
+def _first_position(experiment: fx.Run, number: int) -> float:
+    name = f"joint/{number}/position"
+    return float(recorded_samples(experiment.t, experiment[name], name)[1][0])
 
 
 def joint_2_pulse_angle(experiment: fx.Run) -> tuple[signals.Signal, bool]:
@@ -207,31 +280,10 @@ def _robot(experiment: fx.Run) -> fx.Robot:
     return fx.Robot.from_dict(tables)
 
 
-def _with_drives(robot: fx.Robot, carriage: JointLine, damping_N_m_s: float) -> fx.Robot:
-    """The robot with motor friction and inertia in joint 1, stepper damping in joint 2."""
-    data = robot.to_dict()
-    first, second = (link["joint"] for link in data["link"])
-    more = (
-        (first, "viscous_friction_N_s_m", carriage.viscous_N_s_m),
-        (first, "coulomb_friction_N", carriage.coulomb_N),
-        (first, "rotor_mass_kg", carriage.reflected_mass_kg),
-        (second, "viscous_friction_N_m_s_rad", damping_N_m_s),
-    )
-    for joint, key, value in more:
-        joint[key] = joint.get(key, 0.0) + value
-    return fx.Robot.from_dict(data)
-
-
-def _rig(experiment: fx.Run) -> tuple[Rig, Emulated]:
+def _rig(experiment: fx.Run) -> Rig:
     tables = experiment.meta.get("rig")
     if not isinstance(tables, dict):
         raise InputError(
             "missing: the run has no rig file in its metadata, which `commanded` needs", key="rig"
         )
-    rig = rig_of_recording(tables)
-    if rig.emulated is None:
-        raise InputError(
-            "missing: `commanded` needs the rotor's inertia and the rig's friction from there",
-            key="rig.emulated",
-        )
-    return rig, rig.emulated
+    return rig_of_recording(tables)

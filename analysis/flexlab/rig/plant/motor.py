@@ -1,12 +1,12 @@
-"""The DC motor of joint 1 with its gear and lead screw, driven by a voltage.
+"""A DC motor with its gear, and a lead screw if it drives one, driven by a voltage.
 
-All is referred to the output shaft, which turns the screw at omega [rad/s]:
+All is referred to the output shaft, which turns at omega [rad/s]; r is the transmission:
 
     L di/dt = u - R i - K omega               R = U0 / I_stall,  K = (U0 - R I0) / omega0
     J domega/dt = K i - T_f - M_load          T_f = K I0 and the screw's friction
     T_f = K U_start / R and the screw's friction at rest
-    M_load = F lead / (2 pi eta)              the motor drives the load, eta = eta_gear eta_screw
-    M_load = F lead eta' / (2 pi)             the load drives the motor, eta' = max(0, 2 - 1/eta)
+    M_load = F r / eta                        the motor drives the load, eta = eta_gear eta_screw
+    M_load = F r eta'                         the load drives the motor, eta' = max(0, 2 - 1/eta)
     eta_gear = M_stall / (K (I_stall - I0))   so that the torque at rest is the data sheet's
 
 K is both the torque and the back-EMF constant: a motor without losses but friction meets the data
@@ -21,8 +21,8 @@ from dataclasses import dataclass
 
 from flexura.errors import InputError
 
-from ..description import Rig, RigSetup
-from ..emulation import Emulated, EmulatedMotor
+from ..axes import MotorAxis
+from ..sheets import MotorSheet
 
 # the current is exact for a constant speed; far below the mechanical time constant of 30 ms
 SUBSTEP_S = 2.5e-4
@@ -41,21 +41,20 @@ class MotorData:
     gear_efficiency: float
 
 
-def motor_data(rig: Rig, emulated: EmulatedMotor) -> MotorData:
+def motor_data(axis: MotorAxis) -> MotorData:
     """Constants of the motor from the data sheet's no-load and stall points.
 
     Args:
-        rig: the rig file.
-        emulated: the table [emulated.motor].
+        axis: the joint.
 
     Raises:
-        InputError: no motor has both points.
+        InputError: no motor has both points, or rotor, inductance or starting voltage are missing.
     """
-    motor = rig.motor
+    motor, key = axis.motor, axis.table
     if motor.no_load_current_A >= motor.stall_current_A:
         expected = f"expected less than the current at rest, {motor.stall_current_A:g} A"
-        raise InputError(expected, key="motor.no_load_current_A", value=motor.no_load_current_A)
-    ohm = resistance(rig)
+        raise InputError(expected, key=f"{key}.no_load_current_A", value=motor.no_load_current_A)
+    ohm = resistance(motor)
     constant = (motor.rated_voltage_V - ohm * motor.no_load_current_A) / (
         motor.no_load_speed_rpm * 2 * math.pi / 60
     )
@@ -65,21 +64,29 @@ def motor_data(rig: Rig, emulated: EmulatedMotor) -> MotorData:
             f"expected at most {max_torque:.3g} N m, what speed and currents allow without any "
             f"loss in the gear"
         )
-        raise InputError(expected, key="motor.stall_torque_N_m", value=motor.stall_torque_N_m)
+        raise InputError(expected, key=f"{key}.stall_torque_N_m", value=motor.stall_torque_N_m)
+    given = motor.inductance_H, motor.rotor_inertia_kg_m2, motor.starts_at_V
+    names = ("inductance_H", "rotor_inertia_kg_m2", "starts_at_V")
+    for name, value in zip(names, given, strict=True):
+        if value is None:
+            raise InputError(
+                "missing: the motor cannot be simulated without it", key=f"{key}.{name}"
+            )
+    inductance, inertia, starts = (float(value or 0.0) for value in given)
     return MotorData(
         ohm,
-        emulated.inductance_H,
+        inductance,
         constant,
-        emulated.rotor_inertia_kg_m2 * motor.gear_ratio**2,
+        inertia * motor.gear_ratio**2,
         constant * motor.no_load_current_A,
-        constant * emulated.starts_at_V / ohm,
+        constant * starts / ohm,
         motor.stall_torque_N_m / max_torque,
     )
 
 
-def resistance(rig: Rig) -> float:
-    """Resistance R of the motor at rest [ohm]."""
-    return rig.motor.rated_voltage_V / rig.motor.stall_current_A
+def resistance(motor: MotorSheet) -> float:
+    """Resistance R of a motor at rest [ohm]."""
+    return motor.rated_voltage_V / motor.stall_current_A
 
 
 def back_driven_efficiency(efficiency: float) -> float:
@@ -155,58 +162,43 @@ class DCMotor:
 
 @dataclass(frozen=True)
 class JointLine:
-    """Joint 1 as a linear motor with friction: F = force_N_V u - viscous v - coulomb sign v.
+    """A joint with a motor as a linear motor with friction: F = force_per_V u - viscous v -
+    coulomb sign v.
 
-    F acts on `reflected_mass_kg` and the robot's own mass. Inductance, dead zone and backlash are
-    left out. `static_N` holds at rest. `rail_N` is the rail's part of `coulomb_N` and `static_N`;
-    it is missing while the nut crosses its backlash.
+    F [N or N m] acts on `inertia` [kg or kg m^2], the rotor's at the joint, and the robot's own.
+    Inductance, dead zone and backlash are left out. `static` holds at rest. `guide` is the joint's
+    own part of `coulomb` and `static`; it is missing while the motor crosses the backlash.
     """
 
-    force_N_V: float
-    viscous_N_s_m: float
-    coulomb_N: float
-    reflected_mass_kg: float
-    static_N: float
-    rail_N: float
+    force_per_V: float
+    viscous: float
+    coulomb: float
+    inertia: float
+    static: float
+    guide: float
 
 
-def joint_line(setup: RigSetup, friction: float = 1.0) -> JointLine:
-    """Joint 1 as a linear motor, from the rig's nominal data.
+def joint_line(axis: MotorAxis, friction: float = 1.0) -> JointLine:
+    """A joint with a motor as a linear motor, from the rig's nominal data.
 
-    With r = lead / (2 pi): force K / (R r), back-EMF K^2 / (R r^2), mass J / r^2. The motor always
-    drives the rail's friction, which counts 1 / (eta_gear eta_screw) times.
+    Force K / (R r), back-EMF K^2 / (R r^2), inertia J / r^2. The motor always drives the joint's
+    own friction, which counts 1 / (eta_gear eta_screw) times.
 
     Args:
-        setup: the rig.
+        axis: the joint.
         friction: factor on Coulomb and viscous friction, not on the back-EMF.
     """
-    return joint_line_of(setup.rig, setup.emulated, friction)
-
-
-def joint_line_of(rig: Rig, emulated: Emulated, friction: float = 1.0) -> JointLine:
-    """As `joint_line`, from a rig file's tables without the files that they name.
-
-    Args:
-        rig: the rig file.
-        emulated: its table [emulated].
-        friction: factor on Coulomb and viscous friction.
-    """
-    data, r = motor_data(rig, emulated.motor), rig.screw.lead_m / (2 * math.pi)
-    efficiency = data.gear_efficiency * rig.screw.efficiency
-    rail = emulated.carriage.coulomb_friction_N / efficiency
-    coulomb = (data.friction_N_m + emulated.screw.coulomb_friction_N_m) / r + rail
-    static = (
-        max(data.breakaway_N_m, data.friction_N_m) + emulated.screw.coulomb_friction_N_m
-    ) / r + rail
-    viscous = (
-        emulated.screw.viscous_friction_N_m_s / r**2
-        + emulated.carriage.viscous_friction_N_s_m / efficiency
-    )
+    data, r, guide = motor_data(axis), axis.transmission, axis.guide
+    efficiency = data.gear_efficiency * axis.efficiency
+    own = guide.coulomb / efficiency
+    coulomb = (data.friction_N_m + axis.screw_coulomb_N_m) / r + own
+    static = (max(data.breakaway_N_m, data.friction_N_m) + axis.screw_coulomb_N_m) / r + own
+    viscous = axis.screw_viscous_N_m_s / r**2 + guide.viscous / efficiency
     return JointLine(
         data.constant_N_m_A / (data.resistance_ohm * r),
         data.constant_N_m_A**2 / (data.resistance_ohm * r**2) + friction * viscous,
         friction * coulomb,
         data.inertia_kg_m2 / r**2,
         friction * static,
-        friction * rail,
+        friction * own,
     )

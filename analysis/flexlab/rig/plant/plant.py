@@ -1,30 +1,26 @@
-"""The emulated rig: Exudyn's mechanics behind motor, screw, stepper, encoders and flex sensor.
+"""The emulated rig: Exudyn's mechanics behind motors, screw, stepper, encoders and sensor.
 
-    board = EmulatedBoard(elf, rig_plant(load("firmware/rig.toml"), seed=3))
+    board = EmulatedBoard(elf, rig_plant(load("rig"), seed=3))
 
-The plant runs one step (h = 0.5 ms) behind the board. Each step uses the mean voltage and the mean
+The plant runs one step (h = 0.5 ms) behind the board. Each step uses the mean voltages and the mean
 pulse count of its own interval, so that volt-seconds are exact and each pulse acts from when it
 came. An implicit step's end value acts as if spread evenly about the end, a mean stands for the
-step's middle; the command therefore leads by half of its last change.
+step's middle; the stepper's command therefore leads by half of its last change.
 
-Encoder positions for the interval that the board has already started are extrapolated linearly. The
-motor's error is 0.01 counts, the joint's 0.06 on the mean and 0.3 at most, in the ripple of the
-microsteps. Between steps encoders move evenly, so that edges come one by one. The same seed gives
-the same bytes. The data stand in `firmware/rig.toml`, [emulated].
+Encoder positions for the interval that the board has already started are extrapolated linearly. A
+motor's error is 0.01 counts, the stepper's joint's 0.06 on the mean and 0.3 at most, in the ripple
+of the microsteps. Between steps encoders move evenly, so that edges come one by one. The same seed
+gives the same bytes. What moves the joints is in `drives`.
 
-The nut touches a flank of the screw (spring and damper), or none while it crosses the backlash b.
-The rail holds the carriage by an elastic-plastic spring that gives way by d and then slides:
-
-    F_nut  = -k (x - s -+ b/2) - c (x' - s')     if x - s is beyond +-b/2, s = lead angle / (2 pi)
-    F_rail = -(F_c / d) (x - z) - c_r x'         z follows x at no more than d
-
-Error against steps of 0.05 ms and 8 elements under the same 520 pulses a second, relative to the
-peak: tip deflection (5 mm, with the ripple of the microsteps) 0.9 % rms, joint 0.03 %.
+Error of the rig of type IV against steps of 0.05 ms and 8 elements under the same 520 pulses a
+second, relative to the peak: tip deflection (5 mm, with the ripple of the microsteps) 0.9 % rms,
+joint 0.03 %.
 """
 
 from __future__ import annotations
 
-import math
+import dataclasses
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -35,12 +31,15 @@ from flexura.errors import InputError
 from flexura.io import explain
 
 from ...board.emulator.emulated import Outputs, Sensors
-from ..description import RigSetup, configuration
-from ..emulation import FACTORS, Emulated, TrueParameters
-from .flex_sensor import FlexSensor
+from ..axes import motor_axes
+from ..board_axes import board_axes
+from ..configuration import configuration
+from ..description import Rig, RigSetup
+from ..emulation import FACTORS, TrueParameters
+from .drives import MotorDrive, StepperDrive
 from .mechanics import ELEMENTS, STEP_S, Mechanics
-from .motor import DCMotor, joint_line, motor_data
-from .stepper import MagneticSpring
+from .motor import joint_line
+from .strip_sensor import StripSensor
 
 
 def rig_plant(
@@ -48,7 +47,7 @@ def rig_plant(
     seed: int = 0,
     *,
     truth: TrueParameters | None = None,
-    start: tuple[float, float] = (0.0, 0.0),
+    start: Sequence[float] | None = None,
     step_s: float = STEP_S,
     elements: int = ELEMENTS,
     **what_differs: Any,
@@ -59,129 +58,125 @@ def rig_plant(
         setup: the rig.
         seed: of noise and drift.
         truth: factors by which the rig differs from its files; None: the rig file's own.
-        start: carriage [m] and joint 2 [rad], at rest.
+        start: the joints [m, rad], at rest; None: at 0.
         step_s: step of the plant [s].
-        elements: cables of the strip.
-        what_differs: values of [emulated] by their path, with two underscores for the dot, as
-            `flex__noise_V=0.0`.
+        elements: cables of a flexible link.
+        what_differs: values of the rig file by their path, with two underscores for the dot, as
+            `emulated__sensor__noise_V=0.0`.
 
     Raises:
-        InputError: the rig file has no [emulated], or a name is unknown.
+        InputError: a constant that the plant needs is not in the rig file, or a name is unknown.
     """
+    changed = dataclasses.replace(setup, rig=_changed(setup, what_differs))
     return RigPlant(
-        setup,
-        _changed(setup, what_differs),
+        changed,
         seed,
         truth or setup.emulated.truth,
-        start,
+        [0.0] * setup.rig.joints if start is None else start,
         step_s,
         elements,
     )
 
 
-def _changed(setup: RigSetup, changes: dict[str, Any]) -> Emulated:
-    data = setup.emulated.model_dump()
+def _changed(setup: RigSetup, changes: dict[str, Any]) -> Rig:
+    if not changes:
+        return setup.rig
+    data = setup.rig.model_dump(exclude_none=True)
     for path, value in changes.items():
-        table, _, name = path.partition("__")
-        if name not in data.get(table, {}):
-            expected = "expected a value of [emulated], such as flex__noise_V"
-            raise InputError(
-                expected, key=f"emulated.{path.replace('__', '.')}", value=value, file=setup.file
-            )
-        data[table][name] = value
+        *tables, name = path.split("__")
+        table: Any = data
+        for key in tables:
+            table = table.get(key, {})
+        if name not in table:
+            expected = "expected a value of the rig file, such as emulated__sensor__noise_V"
+            raise InputError(expected, key=path.replace("__", "."), value=value, file=setup.file)
+        table[name] = value
     try:
-        return Emulated.model_validate(data)
+        return Rig.model_validate(data)
     except ValidationError as error:
-        wrong = explain(error, Emulated, data, setup.file)
-        raise InputError(
-            wrong.expected, key=f"emulated.{wrong.key}", value=wrong.value, file=setup.file
-        ) from None
+        raise explain(error, Rig, data, setup.file) from None
 
 
 def true_robot(robot: fx.Robot, truth: TrueParameters) -> fx.Robot:
     """The robot as the emulated rig has it: stiffness, damping and payload by their factors."""
-    strip, payload = robot.links[1], robot.payload
-    given = "young_modulus_Pa" if strip.young_modulus_Pa is not None else "bending_stiffness_N_m2"
-    values = robot.to_dict()["link"][1]
-    stiffness = values[given]
-    if isinstance(stiffness, list):
-        stiffness = [entry | {"value": truth.stiffness * entry["value"]} for entry in stiffness]
-    else:
-        stiffness = truth.stiffness * stiffness
     changes: dict[str, Any] = {
-        f"link.2.{given}": stiffness,
-        "payload.mass_kg": truth.payload * payload.mass_kg,
-        "payload.inertia_kg_m2": truth.payload * payload.inertia_kg_m2,
+        "payload.mass_kg": truth.payload * robot.payload.mass_kg,
+        "payload.inertia_kg_m2": truth.payload * robot.payload.inertia_kg_m2,
     }
-    if strip.damping.beta_s:
-        changes["link.2.damping.beta_s"] = truth.damping * strip.damping.beta_s
+    tables = robot.to_dict()["link"]
+    for number, link in enumerate(robot.links, 1):
+        if not link.flexible:
+            continue
+        given = (
+            "young_modulus_Pa" if link.young_modulus_Pa is not None else "bending_stiffness_N_m2"
+        )
+        stiffness = tables[number - 1][given]
+        if isinstance(stiffness, list):
+            stiffness = [entry | {"value": truth.stiffness * entry["value"]} for entry in stiffness]
+        else:
+            stiffness = truth.stiffness * stiffness
+        changes[f"link.{number}.{given}"] = stiffness
+        if link.damping.beta_s:
+            changes[f"link.{number}.damping.beta_s"] = truth.damping * link.damping.beta_s
     return robot.replace(changes)
 
 
 class RigPlant:
     """The emulated rig as a plant (`board.emulated.Plant`).
 
-    `truth`: its true parameters, which an identification must not read. `carriage_m`, `joint_rad`,
-    `tip_deflection_m`: its true position. `emergency_stop` may be set.
+    `truth`: its true parameters, which an identification must not read. `positions`,
+    `tip_deflection_m`: where it truly is. `emergency_stop` may be set.
     """
 
     def __init__(
         self,
         setup: RigSetup,
-        emulated: Emulated,
         seed: int,
         truth: TrueParameters,
-        start: tuple[float, float],
+        start: Sequence[float],
         step_s: float,
         elements: int,
     ) -> None:
         rig, settings = setup.rig, configuration(setup)
         robot = true_robot(setup.robot, truth)
-        first, strip = emulated.flex.from_m, robot.links[1]
-        if first + rig.flex.length_m > strip.length_m:
-            expected = (
-                f"expected a sensor of {rig.flex.length_m:g} m that ends on the strip of "
-                f"{strip.length_m:g} m"
+        flex = rig.flex
+        ends = (flex.from_m, flex.from_m + flex.length_m) if flex else (0.0, 0.0)
+        self.mechanics = Mechanics(robot, start, step_s, elements, sensor_m=ends)
+        self._motors = [
+            (
+                axis.number - 1,
+                MotorDrive(axis, truth, start[axis.number - 1], step_s, rig.driver.dead_zone_V),
             )
-            raise InputError(expected, key="emulated.flex.from_m", value=first, file=setup.file)
-        self.mechanics = Mechanics(
-            robot, start, step_s, elements, sensor_m=(first, first + rig.flex.length_m)
-        )
-        screw, carriage = emulated.screw, emulated.carriage
-        self.motor = DCMotor(
-            motor_data(rig, emulated.motor),
-            rig.screw.efficiency,
-            screw.coulomb_friction_N_m,
-            screw.viscous_friction_N_m_s,
-            truth.friction,
-        )
-        self.spring = MagneticSpring(rig.stepper, emulated.stepper)
-        self.flex = FlexSensor(
-            rig.flex, emulated.flex, np.random.default_rng([seed, 0]), step_s, truth.flex_gain
+            for axis in motor_axes(rig)
+        ]
+        self.stepper = StepperDrive(rig.stepper, start[1]) if rig.stepper else None
+        self.drives: list[MotorDrive | StepperDrive] = [drive for _, drive in self._motors]
+        if self.stepper:
+            self.drives.append(self.stepper)
+        more = setup.rig.emulated
+        self.sensor = StripSensor(
+            rig.sensor,
+            more.sensor if more else None,
+            np.random.default_rng([seed, 0]),
+            step_s,
+            truth.flex_gain,
         )
         self.supply_V, self.emergency_stop = rig.driver.supply_V, False
         self.truth = _truth_for_metadata(setup, truth, robot, seed)
-        self._dead_zone_V = emulated.driver.dead_zone_V
-        self._lead, self._start = rig.screw.lead_m / (2 * math.pi), start
-        self._half_backlash = 0.5 * truth.backlash * carriage.backlash_m
-        self._contact = carriage.contact_stiffness_N_m, carriage.contact_damping_N_s_m
-        self._presliding = carriage.presliding_m
-        self._rail_stiffness = truth.friction * carriage.coulomb_friction_N / carriage.presliding_m
-        self._rail_damping = truth.friction * carriage.viscous_friction_N_s_m
-        self._rotor_damping = emulated.stepper.damping_N_m_s
+        self._start = list(start)
         self._ends = setup.limits[0]
-        self._counts = settings["motor_counts_per_m"], settings["stepper_counts_per_rad"]
+        self._counts = [axis.counts for axis in board_axes(settings)]
         self._step_s = step_s
         self._unused_s = 0.0  # of the step that was made last [s]
-        self._volt_s = self._microstep_s = self._since = 0.0
-        self._anchor = self._x = start[0]
-        self._theta = start[1]
-        self._load_N_m = self._steps = self._bend = 0.0
+        self._volt_s = [0.0, 0.0]
+        self._microstep_s = self._since = 0.0
+        self._felt = self.sensor.measure(self.mechanics)
         self._counts_now = self._shafts()
         # what the encoders say at the ends of the step that the board is in
         self._previous = self._extrapolated = self._counts_now
         self._sensors = Sensors(
-            flex_V=self.flex.sample(0.0), supply_V=self.supply_V / rig.driver.supply_divider
+            flex_V=self.sensor.sample(self._felt),
+            supply_V=self.supply_V / rig.driver.supply_divider,
         )
 
     # ---- what it truly does
@@ -192,23 +187,18 @@ class RigPlant:
         return self._step_s
 
     @property
-    def carriage_m(self) -> float:
-        """Position of the carriage [m]."""
-        return self.mechanics.x_m
+    def positions(self) -> list[float]:
+        """Positions of the joints [m, rad]."""
+        return self.mechanics.positions
 
     @property
-    def nut_m(self) -> float:
-        """The carriage's position by the motor's encoder, without backlash [m]."""
-        return self._start[0] + self._lead * self.motor.angle_rad
-
-    @property
-    def joint_rad(self) -> float:
-        """Angle of joint 2 [rad]."""
-        return self.mechanics.angle_rad
+    def motor(self) -> MotorDrive:
+        """The motor of joint 1."""
+        return self._motors[0][1]
 
     @property
     def tip_deflection_m(self) -> float:
-        """Deflection of the strip's tip [m]."""
+        """Deflection of the last link's tip [m]."""
         return self.mechanics.tip_deflection_m
 
     # ---- in lockstep
@@ -220,98 +210,79 @@ class RigPlant:
             seconds: time to advance [s].
             outputs: of the board, constant in this time.
         """
-        self._volt_s += outputs.duty * self.supply_V * seconds
+        for k, duty in enumerate(outputs.duty):
+            self._volt_s[k] += duty * self.supply_V * seconds
         self._microstep_s += outputs.steps * seconds
         self._since += seconds
         if self._unused_s < seconds - 1e-9:
-            voltage, steps = self._volt_s / self._since, self._microstep_s / self._since
-            self._volt_s = self._microstep_s = self._since = 0.0
+            voltages = [volt_s / self._since for volt_s in self._volt_s]
+            steps = self._microstep_s / self._since
+            self._volt_s, self._microstep_s, self._since = [0.0, 0.0], 0.0, 0.0
             while self._unused_s < seconds - 1e-9:
-                self._step(outputs, voltage, steps)
+                self._step(outputs, voltages, steps)
                 self._unused_s += self._step_s
         self._unused_s -= seconds
         part = 1.0 - self._unused_s / self._step_s
-        (one, two), (a, b) = self._previous, self._extrapolated
         sensors = self._sensors
-        sensors.encoder_1, sensors.encoder_2 = one + part * (a - one), two + part * (b - two)
+        now = [
+            one + part * (next_one - one)
+            for one, next_one in zip(self._previous, self._extrapolated, strict=True)
+        ]
+        sensors.encoder_1 = now[0]
+        if len(now) > 1:
+            sensors.encoder_2 = now[1]
         sensors.emergency_stop = self.emergency_stop
         return sensors
 
-    def _step(self, outputs: Outputs, voltage: float, steps: float) -> None:
-        voltage = math.copysign(max(0.0, abs(voltage) - self._dead_zone_V), voltage)
-        self.motor.advance(self._step_s, voltage if outputs.motor_on else None, self._load_N_m)
+    def _step(self, outputs: Outputs, voltages: list[float], steps: float) -> None:
+        for k, motor in self._motors:
+            motor.advance(voltages[k], outputs.motor_on[k])
+        if self.stepper:
+            self.stepper.advance(steps, outputs.stepper_on)
         mechanics = self.mechanics
-        here, turned = mechanics.x_m, mechanics.angle_rad
-        on = outputs.stepper_on
-        command = self._start[1] + (1.5 * steps - 0.5 * self._steps) * self.spring.rad_per_step
-        self._steps = steps
-        mechanics.hold_joint(self.spring.stiffness(on), self._rotor_damping)
-        centre = self.spring.centre(command, 2 * turned - self._theta, on)
-        nut, flank = self._carriage(2 * here - self._x)
-        mechanics.step(nut, centre)
-        self._x, self._theta = here, turned
-        if flank is None:
-            self._load_N_m = 0.0
-        else:
-            stiffness, damping = self._contact
-            slip = (mechanics.x_m - here) / self._step_s - self._lead * self.motor.speed_rad_s
-            self._load_N_m = -self._lead * (stiffness * (mechanics.x_m - flank) + damping * slip)
+        before = list(mechanics.positions)
+        zeros = []
+        for k, drive in enumerate(self.drives):
+            spring = drive.spring(before[k])
+            mechanics.hold(k, spring.stiffness, spring.damping)
+            zeros.append(spring.zero)
+        mechanics.step(*zeros)
+        for k, drive in enumerate(self.drives):
+            drive.finish(before[k], mechanics.positions[k])
         sensors = self._sensors
-        before, self._bend = self._bend, mechanics.bend_rad
+        felt, self._felt = self._felt, self.sensor.measure(mechanics)
         # in the middle of the step that the board is in
-        sensors.flex_V = self.flex.sample(1.5 * self._bend - 0.5 * before)
-        sensors.limit_low, sensors.limit_high = (
-            mechanics.x_m <= self._ends[0],
-            mechanics.x_m >= self._ends[1],
-        )
-        now, (one, two) = self._shafts(), self._counts_now
-        self._previous, self._extrapolated, self._counts_now = (
-            self._extrapolated,
-            (2 * now[0] - one, 2 * now[1] - two),
-            now,
-        )
+        sensors.flex_V = self.sensor.sample(1.5 * self._felt - 0.5 * felt)
+        here = mechanics.positions[0]
+        sensors.limit_low, sensors.limit_high = here <= self._ends[0], here >= self._ends[1]
+        now = self._shafts()
+        ahead = [2 * new - old for new, old in zip(now, self._counts_now, strict=True)]
+        self._previous, self._extrapolated, self._counts_now = self._extrapolated, ahead, now
 
-    def _carriage(self, expected: float) -> tuple[float, float | None]:
-        """Set the carriage's spring for a step that is expected to end at `expected` [m].
-
-        One spring stands for nut and rail; its zero makes its force the sum of both: k x_0 + c s' =
-        k_1 z + k_2 flank + c s'.
-
-        Returns:
-            The zero [m], and the flank that the nut touches [m] or None.
-        """
-        self._anchor = min(
-            max(self._anchor, expected - self._presliding), expected + self._presliding
-        )
-        stiffness, damping, pull = (
-            self._rail_stiffness,
-            self._rail_damping,
-            self._rail_stiffness * self._anchor,
-        )
-        nut, flank = self.nut_m, None
-        if expected - nut >= self._half_backlash:
-            flank = nut + self._half_backlash
-        elif nut - expected >= self._half_backlash:
-            flank = nut - self._half_backlash
-        if flank is not None:
-            stiffness, damping = stiffness + self._contact[0], damping + self._contact[1]
-            pull += (
-                self._contact[0] * flank + self._contact[1] * self._lead * self.motor.speed_rad_s
-            )
-        self.mechanics.hold_carriage(stiffness, damping)
-        return pull / stiffness if stiffness else 0.0, flank
-
-    def _shafts(self) -> tuple[float, float]:
-        """Both encoders in counts, from their positions at the start."""
-        turned = self.mechanics.angle_rad - self._start[1]
-        return self._counts[0] * self._lead * self.motor.angle_rad, self._counts[1] * turned
+    def _shafts(self) -> list[float]:
+        """The encoders in counts, from their positions at the start."""
+        turned = [
+            drive.shaft if isinstance(drive, MotorDrive) else self.positions[k]
+            for k, drive in enumerate(self.drives)
+        ]
+        return [
+            count * (at - start)
+            for count, at, start in zip(self._counts, turned, self._start, strict=False)
+        ]
 
 
 def _truth_for_metadata(
     setup: RigSetup, truth: TrueParameters, robot: fx.Robot, seed: int
 ) -> dict[str, Any]:
-    line = joint_line(setup, truth.friction)
-    strip = robot.links[1]
+    strip = robot.links[-1]
+    joints = {}
+    for axis in motor_axes(setup.rig):
+        line = joint_line(axis, truth.friction)
+        joints[f"joint_{axis.number}"] = {
+            f"coulomb_{axis.force_unit.replace(' ', '_')}": line.coulomb,
+            f"viscous_{axis.force_unit.replace(' ', '_')}_s_{axis.unit}": line.viscous,
+            f"backlash_{axis.unit}": truth.backlash * axis.guide.backlash,
+        }
     return {
         "seed": seed,
         "factors": {name: getattr(truth, name) for name in FACTORS},
@@ -319,8 +290,5 @@ def _truth_for_metadata(
         "bending_stiffness_N_m2": float(strip.bending_stiffness(np.zeros(1))[0]),
         "beta_s": strip.damping.beta_s,
         "payload_kg": robot.payload.mass_kg,
-        "joint_1_coulomb_N": line.coulomb_N,
-        "joint_1_viscous_N_s_m": line.viscous_N_s_m,
-        "backlash_m": truth.backlash * setup.emulated.carriage.backlash_m,
-        "flex_ohm_per_rad": truth.flex_gain * setup.rig.flex.ohm_per_rad,
+        **joints,
     }

@@ -18,16 +18,15 @@ import math
 
 import numpy as np
 
-from ..description import StepperSheet
-from ..emulation import EmulatedStepper
+from ..sheets import StepperSheet
 
 
 class MagneticSpring:
     """Torque and stiffness of the stepper, energised or with its detent only."""
 
-    def __init__(self, stepper: StepperSheet, emulated: EmulatedStepper) -> None:
+    def __init__(self, stepper: StepperSheet) -> None:
         self.pole_pairs = stepper.full_steps_per_turn / 4
-        self.holding_N_m, self.detent_N_m = stepper.holding_torque_N_m, emulated.detent_torque_N_m
+        self.holding_N_m, self.detent_N_m = stepper.holding_torque_N_m, stepper.detent_torque_N_m
         self.rad_per_step = 2 * math.pi / (stepper.full_steps_per_turn * stepper.microsteps)
         self.on_N_m = self.pole_pairs * self.holding_N_m
         self.off_N_m = max(4 * self.pole_pairs * self.detent_N_m, 1e-3 * self.on_N_m)

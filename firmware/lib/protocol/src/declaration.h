@@ -4,7 +4,7 @@
 
 namespace flexura {
 
-constexpr uint32_t kDeclaration = 0xCB159926;
+constexpr uint32_t kDeclaration = 0x2D7BA87C;
 constexpr uint8_t kProtocolVersion = 1;
 constexpr uint32_t kBaudBitS = 500000;
 constexpr uint16_t kControlHz = 1000;
@@ -18,7 +18,7 @@ constexpr uint16_t kDutyFull = 800;
 enum class State : uint8_t {
   // Outputs off. The only state in which configuration and reference may change.
   idle = 0,
-  // Motor bridge and stepper driver enabled, motor at 0 V, stepper holds its place.
+  // Drives enabled: motors at 0 V, the stepper holds its place.
   armed = 1,
   // Set-points are played; after the final one it is held until `halt`, `stop` or a fault.
   running = 2,
@@ -27,7 +27,7 @@ enum class State : uint8_t {
 };
 
 enum class Mode : uint8_t {
-  // `drives`: each knot's voltage and step rate hold for one period.
+  // `drives`: each knot's voltages and step rate hold for one period.
   open_loop = 1,
   // `setpoints`: cubic between knots, extended PID on both joints.
   position = 2,
@@ -38,31 +38,31 @@ enum class Fault : uint8_t {
   none = 0,
   // The emergency stop is pressed, or its wire is broken.
   emergency_stop = 1,
-  // The switch at the carriage's low end is open.
+  // The switch at joint 1's low end is open.
   limit_low = 2,
-  // The switch at the carriage's high end is open.
+  // The switch at joint 1's high end is open.
   limit_high = 3,
-  // The carriage left its configured range.
+  // Joint 1 left its configured range.
   travel_1 = 4,
-  // The rotary joint left its configured range.
+  // Joint 2 left its configured range.
   travel_2 = 5,
-  // The carriage is faster than configured.
+  // Joint 1 is faster than configured.
   speed_1 = 6,
-  // The rotary joint is faster than configured.
+  // Joint 2 is faster than configured.
   speed_2 = 7,
-  // The motor is driven and does not turn: blocked, unplugged, or both encoder wires cut.
+  // Joint 1's motor is driven and does not turn: blocked, unplugged, or both encoder wires cut.
   stall_1 = 8,
-  // Steps were lost: the encoder of joint 2 does not follow the pulses.
+  // Joint 2's encoder does not follow its drive: steps lost, or a motor blocked or unplugged.
   stall_2 = 9,
-  // The motor moves against its drive: encoder or motor wires swapped.
+  // Joint 1 moves against its drive: encoder or motor wires swapped.
   runaway_1 = 10,
-  // Joint 2 moves against its pulses: encoder or coil wires swapped.
+  // Joint 2 moves against its drive: encoder, motor or coil wires swapped.
   runaway_2 = 11,
-  // The motor's encoder misses edges, or only one of its wires moves.
+  // Joint 1's encoder misses edges, or only one of its wires moves.
   encoder_1 = 12,
   // Joint 2's encoder misses edges, or only one of its wires moves.
   encoder_2 = 13,
-  // The carriage is farther from its set-point than configured.
+  // Joint 1 is farther from its set-point than configured.
   following_1 = 14,
   // Joint 2 is farther from its set-point than configured.
   following_2 = 15,
@@ -129,7 +129,7 @@ enum class Flag : uint8_t {
   limit_low = 1,
   // The high switch's circuit is open.
   limit_high = 2,
-  // The motor bridge is enabled.
+  // A motor bridge is enabled.
   bridge_enabled = 3,
   // The stepper driver is enabled.
   driver_enabled = 4,
@@ -137,7 +137,7 @@ enum class Flag : uint8_t {
   referenced = 5,
   // The final set-point is being held.
   final = 6,
-  // The motor's voltage is at its limit.
+  // A motor's voltage is at its limit.
   saturated = 7,
 };
 
@@ -203,7 +203,7 @@ static_assert(sizeof(Ack) == Ack::kSize, "layout");
 // for want of room.
 struct __attribute__((packed)) Telemetry {
   static constexpr uint8_t kCode = 130;
-  static constexpr uint8_t kSize = 44;
+  static constexpr uint8_t kSize = 46;
   // tick
   uint32_t tick;
   // [states]
@@ -216,18 +216,20 @@ struct __attribute__((packed)) Telemetry {
   uint8_t flags;
   // set-points waiting
   uint8_t buffered;
-  // count; motor encoder
+  // count; encoder of joint 1
   int32_t position_1;
-  // count; encoder of joint 2
+  // count; encoder of joint 2; without one its pulses
   int32_t position_2;
   // microstep; pulses given, counter-clockwise minus clockwise
   int32_t steps;
   // count/256; filtered set-point
   int32_t setpoint_1;
-  // microstep/256; filtered set-point
+  // microstep/256; filtered set-point; count/256 of a motor
   int32_t setpoint_2;
-  // mV; commanded to the motor
+  // 2 mV; commanded to the motor
   int16_t voltage;
+  // 2 mV; commanded to the motor at joint 2
+  int16_t voltage_2;
   // microstep/s; commanded to the stepper
   int16_t rate;
   // ADC; sum of adc_samples conversions of the tick before
@@ -322,11 +324,11 @@ struct __attribute__((packed)) Setpoints {
   uint8_t final;
   // count/256
   int32_t position_1[4];
-  // microstep/256
+  // microstep/256; count/256 of a motor; 0 without joint 2
   int32_t position_2[4];
   // count/256/tick
   int16_t velocity_1[4];
-  // microstep/256/tick
+  // microstep/256/tick; count/256/tick of a motor
   int16_t velocity_2[4];
 };
 static_assert(sizeof(Setpoints) == Setpoints::kSize, "layout");
@@ -334,17 +336,19 @@ static_assert(sizeof(Setpoints) == Setpoints::kSize, "layout");
 // Up to eight knots of a drive profile, mode open_loop. Armed and Running.
 struct __attribute__((packed)) Drives {
   static constexpr uint8_t kCode = 7;
-  static constexpr uint8_t kSize = 36;
+  static constexpr uint8_t kSize = 52;
   // as in setpoints
   uint16_t first;
   // 1 to 8
   uint8_t count;
-  // 1: the last of these is the final one; after its period both drives are 0
+  // 1: the last of these is the final one; after its period all drives are 0
   uint8_t final;
-  // mV
+  // 2 mV
   int16_t voltage[8];
-  // microstep/s
+  // microstep/s; 0 without a stepper
   int16_t rate[8];
+  // 2 mV; 0 without a motor at joint 2
+  int16_t voltage_2[8];
 };
 static_assert(sizeof(Drives) == Drives::kSize, "layout");
 
@@ -358,7 +362,8 @@ struct __attribute__((packed)) Start {
 };
 static_assert(sizeof(Start) == Start::kSize, "layout");
 
-// Running to Armed: motor at 0 V, the stepper brakes at its acceleration limit, look-ahead emptied.
+// Running to Armed: motors at 0 V, the stepper brakes at its acceleration limit, look-ahead
+// emptied.
 struct __attribute__((packed)) Halt {
   static constexpr uint8_t kCode = 9;
   static constexpr uint8_t kSize = 0;
@@ -440,251 +445,360 @@ struct __attribute__((packed)) Commission {
 
 // Numbers of the settings.
 enum class Item : uint8_t {
-  motor_counts_per_m = 0,
-  stepper_steps_per_rad = 1,
-  stepper_counts_per_rad = 2,
-  supply_V = 3,
-  supply_divider = 4,
-  supply_min_V = 5,
-  supply_max_V = 6,
-  flex_zero = 7,
-  flex_c1_m = 8,
-  flex_c2_m = 9,
-  flex_c3_m = 10,
-  flex_min = 11,
-  flex_max = 12,
-  position_min_1_m = 13,
-  position_max_1_m = 14,
-  position_min_2_rad = 15,
-  position_max_2_rad = 16,
-  speed_max_1_m_s = 17,
-  speed_max_2_rad_s = 18,
-  voltage_max_V = 19,
-  voltage_slew_V_s = 20,
-  rate_max_2_rad_s = 21,
-  acceleration_max_2_rad_s2 = 22,
-  following_max_1_m = 23,
-  following_max_2_rad = 24,
-  host_timeout_s = 25,
-  stall_voltage_V = 26,
-  stall_speed_m_s = 27,
-  stall_time_s = 28,
-  runaway_distance_m = 29,
-  lost_step_rad = 30,
-  missed_edges_max = 31,
-  one_sided_edges_max = 32,
-  kp_1_V_m = 33,
-  ki_1_V_m_s = 34,
-  kd_1_V_s_m = 35,
-  kf_1_V_m = 36,
-  kg_1_V_s_m = 37,
-  kv_1_V_s_m = 38,
-  kc_1_V = 39,
-  kp_2_1_s = 40,
-  ki_2_1_s2 = 41,
-  kd_2 = 42,
-  kf_2_rad_s_m = 43,
-  kg_2_rad_m = 44,
-  kv_2 = 45,
-  derivative_Hz = 46,
-  deflection_Hz = 47,
-  setpoint_1_Hz = 48,
-  setpoint_2_Hz = 49,
-  feedback_2 = 50,
+  drive_1 = 0,
+  drive_2 = 1,
+  encoder_2 = 2,
+  motor_counts_per_m = 3,
+  motor_1_counts_per_rad = 4,
+  motor_2_counts_per_rad = 5,
+  stepper_steps_per_rad = 6,
+  stepper_counts_per_rad = 7,
+  supply_V = 8,
+  supply_divider = 9,
+  supply_min_V = 10,
+  supply_max_V = 11,
+  flex_zero = 12,
+  flex_c1_m = 13,
+  flex_c2_m = 14,
+  flex_c3_m = 15,
+  flex_min = 16,
+  flex_max = 17,
+  position_min_1_m = 18,
+  position_max_1_m = 19,
+  position_min_1_rad = 20,
+  position_max_1_rad = 21,
+  position_min_2_rad = 22,
+  position_max_2_rad = 23,
+  speed_max_1_m_s = 24,
+  speed_max_1_rad_s = 25,
+  speed_max_2_rad_s = 26,
+  voltage_max_V = 27,
+  voltage_slew_V_s = 28,
+  rate_max_2_rad_s = 29,
+  acceleration_max_2_rad_s2 = 30,
+  following_max_1_m = 31,
+  following_max_1_rad = 32,
+  following_max_2_rad = 33,
+  host_timeout_s = 34,
+  stall_voltage_V = 35,
+  stall_speed_m_s = 36,
+  stall_speed_1_rad_s = 37,
+  stall_speed_2_rad_s = 38,
+  stall_time_s = 39,
+  runaway_distance_m = 40,
+  runaway_distance_1_rad = 41,
+  runaway_distance_2_rad = 42,
+  lost_step_rad = 43,
+  missed_edges_max = 44,
+  one_sided_edges_max = 45,
+  kp_1_V_m = 46,
+  ki_1_V_m_s = 47,
+  kd_1_V_s_m = 48,
+  kf_1_V_m = 49,
+  kg_1_V_s_m = 50,
+  kv_1_V_s_m = 51,
+  kc_1_V = 52,
+  kp_2_1_s = 53,
+  ki_2_1_s2 = 54,
+  kd_2 = 55,
+  kf_2_rad_s_m = 56,
+  kg_2_rad_m = 57,
+  kv_2 = 58,
+  kp_1_V_rad = 59,
+  ki_1_V_rad_s = 60,
+  kd_1_V_s_rad = 61,
+  kv_1_V_s_rad = 62,
+  kp_2_V_rad = 63,
+  ki_2_V_rad_s = 64,
+  kd_2_V_s_rad = 65,
+  kf_2_V_m = 66,
+  kg_2_V_s_m = 67,
+  kv_2_V_s_rad = 68,
+  kc_2_V = 69,
+  derivative_Hz = 70,
+  deflection_Hz = 71,
+  setpoint_1_Hz = 72,
+  setpoint_2_Hz = 73,
+  feedback_2 = 74,
 };
-constexpr uint8_t kConfigItems = 51;
+constexpr uint8_t kConfigItems = 75;
 
 // The settings in use, by number and by name.
 struct Config {
   float values[kConfigItems];
 
+  // joint 1: 1 = motor on a lead screw, 2 = motor that turns the joint
+  float &drive_1() { return values[0]; }
+  float drive_1() const { return values[0]; }
+  // joint 2: 0 = none, 1 = stepper, 2 = motor that turns the joint
+  float &drive_2() { return values[1]; }
+  float drive_2() const { return values[1]; }
+  // 1 = joint 2 has an encoder; 0 = its position is the stepper's pulses
+  float &encoder_2() { return values[2]; }
+  float encoder_2() const { return values[2]; }
   // 4 x pulses x gear ratio / screw lead
-  float &motor_counts_per_m() { return values[0]; }
-  float motor_counts_per_m() const { return values[0]; }
+  float &motor_counts_per_m() { return values[3]; }
+  float motor_counts_per_m() const { return values[3]; }
+  // 4 x pulses x gear ratio / 2 pi, of a motor that turns joint 1
+  float &motor_1_counts_per_rad() { return values[4]; }
+  float motor_1_counts_per_rad() const { return values[4]; }
+  // the same of joint 2
+  float &motor_2_counts_per_rad() { return values[5]; }
+  float motor_2_counts_per_rad() const { return values[5]; }
   // microsteps
-  float &stepper_steps_per_rad() { return values[1]; }
-  float stepper_steps_per_rad() const { return values[1]; }
+  float &stepper_steps_per_rad() { return values[6]; }
+  float stepper_steps_per_rad() const { return values[6]; }
   // encoder of joint 2
-  float &stepper_counts_per_rad() { return values[2]; }
-  float stepper_counts_per_rad() const { return values[2]; }
+  float &stepper_counts_per_rad() { return values[7]; }
+  float stepper_counts_per_rad() const { return values[7]; }
   // voltage at full duty
-  float &supply_V() { return values[3]; }
-  float supply_V() const { return values[3]; }
+  float &supply_V() { return values[8]; }
+  float supply_V() const { return values[8]; }
   // motor supply / voltage at A1
-  float &supply_divider() { return values[4]; }
-  float supply_divider() const { return values[4]; }
+  float &supply_divider() { return values[9]; }
+  float supply_divider() const { return values[9]; }
   // below: fault supply_low
-  float &supply_min_V() { return values[5]; }
-  float supply_min_V() const { return values[5]; }
+  float &supply_min_V() { return values[10]; }
+  float supply_min_V() const { return values[10]; }
   // above: fault supply_high
-  float &supply_max_V() { return values[6]; }
-  float supply_max_V() const { return values[6]; }
+  float &supply_max_V() { return values[11]; }
+  float supply_max_V() const { return values[11]; }
   // reading of the straight strip, fraction of full scale
-  float &flex_zero() { return values[7]; }
-  float flex_zero() const { return values[7]; }
+  float &flex_zero() { return values[12]; }
+  float flex_zero() const { return values[12]; }
   // tip deflection = c1 x + c2 x^2 + c3 x^3, x = reading - zero
-  float &flex_c1_m() { return values[8]; }
-  float flex_c1_m() const { return values[8]; }
+  float &flex_c1_m() { return values[13]; }
+  float flex_c1_m() const { return values[13]; }
   // see flex_c1_m
-  float &flex_c2_m() { return values[9]; }
-  float flex_c2_m() const { return values[9]; }
+  float &flex_c2_m() { return values[14]; }
+  float flex_c2_m() const { return values[14]; }
   // see flex_c1_m
-  float &flex_c3_m() { return values[10]; }
-  float flex_c3_m() const { return values[10]; }
+  float &flex_c3_m() { return values[15]; }
+  float flex_c3_m() const { return values[15]; }
   // below: fault flex_low, fraction of full scale
-  float &flex_min() { return values[11]; }
-  float flex_min() const { return values[11]; }
+  float &flex_min() { return values[16]; }
+  float flex_min() const { return values[16]; }
   // above: fault flex_high
-  float &flex_max() { return values[12]; }
-  float flex_max() const { return values[12]; }
-  // range of the carriage
-  float &position_min_1_m() { return values[13]; }
-  float position_min_1_m() const { return values[13]; }
-  // range of the carriage
-  float &position_max_1_m() { return values[14]; }
-  float position_max_1_m() const { return values[14]; }
+  float &flex_max() { return values[17]; }
+  float flex_max() const { return values[17]; }
+  // range of joint 1 on a screw
+  float &position_min_1_m() { return values[18]; }
+  float position_min_1_m() const { return values[18]; }
+  // range of joint 1 on a screw
+  float &position_max_1_m() { return values[19]; }
+  float position_max_1_m() const { return values[19]; }
+  // range of joint 1 where it turns
+  float &position_min_1_rad() { return values[20]; }
+  float position_min_1_rad() const { return values[20]; }
+  // range of joint 1 where it turns
+  float &position_max_1_rad() { return values[21]; }
+  float position_max_1_rad() const { return values[21]; }
   // range of joint 2
-  float &position_min_2_rad() { return values[15]; }
-  float position_min_2_rad() const { return values[15]; }
+  float &position_min_2_rad() { return values[22]; }
+  float position_min_2_rad() const { return values[22]; }
   // range of joint 2
-  float &position_max_2_rad() { return values[16]; }
-  float position_max_2_rad() const { return values[16]; }
+  float &position_max_2_rad() { return values[23]; }
+  float position_max_2_rad() const { return values[23]; }
   // above: fault speed_1
-  float &speed_max_1_m_s() { return values[17]; }
-  float speed_max_1_m_s() const { return values[17]; }
+  float &speed_max_1_m_s() { return values[24]; }
+  float speed_max_1_m_s() const { return values[24]; }
+  // above: fault speed_1, where joint 1 turns
+  float &speed_max_1_rad_s() { return values[25]; }
+  float speed_max_1_rad_s() const { return values[25]; }
   // above: fault speed_2
-  float &speed_max_2_rad_s() { return values[18]; }
-  float speed_max_2_rad_s() const { return values[18]; }
-  // limit of the motor's voltage
-  float &voltage_max_V() { return values[19]; }
-  float voltage_max_V() const { return values[19]; }
+  float &speed_max_2_rad_s() { return values[26]; }
+  float speed_max_2_rad_s() const { return values[26]; }
+  // limit of a motor's voltage
+  float &voltage_max_V() { return values[27]; }
+  float voltage_max_V() const { return values[27]; }
   // limit of its rate
-  float &voltage_slew_V_s() { return values[20]; }
-  float voltage_slew_V_s() const { return values[20]; }
+  float &voltage_slew_V_s() { return values[28]; }
+  float voltage_slew_V_s() const { return values[28]; }
   // limit of the commanded rate of joint 2; 4000 microsteps/s at most
-  float &rate_max_2_rad_s() { return values[21]; }
-  float rate_max_2_rad_s() const { return values[21]; }
+  float &rate_max_2_rad_s() { return values[29]; }
+  float rate_max_2_rad_s() const { return values[29]; }
   // limit of its change
-  float &acceleration_max_2_rad_s2() { return values[22]; }
-  float acceleration_max_2_rad_s2() const { return values[22]; }
+  float &acceleration_max_2_rad_s2() { return values[30]; }
+  float acceleration_max_2_rad_s2() const { return values[30]; }
   // above: fault following_1
-  float &following_max_1_m() { return values[23]; }
-  float following_max_1_m() const { return values[23]; }
+  float &following_max_1_m() { return values[31]; }
+  float following_max_1_m() const { return values[31]; }
+  // above: fault following_1, where joint 1 turns
+  float &following_max_1_rad() { return values[32]; }
+  float following_max_1_rad() const { return values[32]; }
   // above: fault following_2
-  float &following_max_2_rad() { return values[24]; }
-  float following_max_2_rad() const { return values[24]; }
+  float &following_max_2_rad() { return values[33]; }
+  float following_max_2_rad() const { return values[33]; }
   // silence of the host
-  float &host_timeout_s() { return values[25]; }
-  float host_timeout_s() const { return values[25]; }
+  float &host_timeout_s() { return values[34]; }
+  float host_timeout_s() const { return values[34]; }
   // stall, runaway and one-sided encoder are judged above this voltage
-  float &stall_voltage_V() { return values[26]; }
-  float stall_voltage_V() const { return values[26]; }
+  float &stall_voltage_V() { return values[35]; }
+  float stall_voltage_V() const { return values[35]; }
   // slower is a stall
-  float &stall_speed_m_s() { return values[27]; }
-  float stall_speed_m_s() const { return values[27]; }
+  float &stall_speed_m_s() { return values[36]; }
+  float stall_speed_m_s() const { return values[36]; }
+  // slower is a stall, of a motor that turns joint 1
+  float &stall_speed_1_rad_s() { return values[37]; }
+  float stall_speed_1_rad_s() const { return values[37]; }
+  // the same of joint 2
+  float &stall_speed_2_rad_s() { return values[38]; }
+  float stall_speed_2_rad_s() const { return values[38]; }
   // for this long
-  float &stall_time_s() { return values[28]; }
-  float stall_time_s() const { return values[28]; }
+  float &stall_time_s() { return values[39]; }
+  float stall_time_s() const { return values[39]; }
   // moved against the drive
-  float &runaway_distance_m() { return values[29]; }
-  float runaway_distance_m() const { return values[29]; }
+  float &runaway_distance_m() { return values[40]; }
+  float runaway_distance_m() const { return values[40]; }
+  // turned against the drive, of a motor that turns joint 1
+  float &runaway_distance_1_rad() { return values[41]; }
+  float runaway_distance_1_rad() const { return values[41]; }
+  // the same of joint 2
+  float &runaway_distance_2_rad() { return values[42]; }
+  float runaway_distance_2_rad() const { return values[42]; }
   // encoder against pulses of joint 2
-  float &lost_step_rad() { return values[30]; }
-  float lost_step_rad() const { return values[30]; }
+  float &lost_step_rad() { return values[43]; }
+  float lost_step_rad() const { return values[43]; }
   // of one encoder since it was armed
-  float &missed_edges_max() { return values[31]; }
-  float missed_edges_max() const { return values[31]; }
+  float &missed_edges_max() { return values[44]; }
+  float missed_edges_max() const { return values[44]; }
   // edges of one wire in a row while driven
-  float &one_sided_edges_max() { return values[32]; }
-  float one_sided_edges_max() const { return values[32]; }
+  float &one_sided_edges_max() { return values[45]; }
+  float one_sided_edges_max() const { return values[45]; }
   // joint 1, proportional
-  float &kp_1_V_m() { return values[33]; }
-  float kp_1_V_m() const { return values[33]; }
+  float &kp_1_V_m() { return values[46]; }
+  float kp_1_V_m() const { return values[46]; }
   // joint 1, integral
-  float &ki_1_V_m_s() { return values[34]; }
-  float ki_1_V_m_s() const { return values[34]; }
+  float &ki_1_V_m_s() { return values[47]; }
+  float ki_1_V_m_s() const { return values[47]; }
   // joint 1, derivative
-  float &kd_1_V_s_m() { return values[35]; }
-  float kd_1_V_s_m() const { return values[35]; }
+  float &kd_1_V_s_m() { return values[48]; }
+  float kd_1_V_s_m() const { return values[48]; }
   // joint 1, tip deflection
-  float &kf_1_V_m() { return values[36]; }
-  float kf_1_V_m() const { return values[36]; }
+  float &kf_1_V_m() { return values[49]; }
+  float kf_1_V_m() const { return values[49]; }
   // joint 1, rate of the tip deflection
-  float &kg_1_V_s_m() { return values[37]; }
-  float kg_1_V_s_m() const { return values[37]; }
+  float &kg_1_V_s_m() { return values[50]; }
+  float kg_1_V_s_m() const { return values[50]; }
   // joint 1, velocity feed-forward
-  float &kv_1_V_s_m() { return values[38]; }
-  float kv_1_V_s_m() const { return values[38]; }
+  float &kv_1_V_s_m() { return values[51]; }
+  float kv_1_V_s_m() const { return values[51]; }
   // joint 1, friction feed-forward
-  float &kc_1_V() { return values[39]; }
-  float kc_1_V() const { return values[39]; }
+  float &kc_1_V() { return values[52]; }
+  float kc_1_V() const { return values[52]; }
   // joint 2, proportional
-  float &kp_2_1_s() { return values[40]; }
-  float kp_2_1_s() const { return values[40]; }
+  float &kp_2_1_s() { return values[53]; }
+  float kp_2_1_s() const { return values[53]; }
   // joint 2, integral
-  float &ki_2_1_s2() { return values[41]; }
-  float ki_2_1_s2() const { return values[41]; }
+  float &ki_2_1_s2() { return values[54]; }
+  float ki_2_1_s2() const { return values[54]; }
   // joint 2, derivative
-  float &kd_2() { return values[42]; }
-  float kd_2() const { return values[42]; }
+  float &kd_2() { return values[55]; }
+  float kd_2() const { return values[55]; }
   // joint 2, tip deflection
-  float &kf_2_rad_s_m() { return values[43]; }
-  float kf_2_rad_s_m() const { return values[43]; }
+  float &kf_2_rad_s_m() { return values[56]; }
+  float kf_2_rad_s_m() const { return values[56]; }
   // joint 2, rate of the tip deflection
-  float &kg_2_rad_m() { return values[44]; }
-  float kg_2_rad_m() const { return values[44]; }
+  float &kg_2_rad_m() { return values[57]; }
+  float kg_2_rad_m() const { return values[57]; }
   // joint 2, velocity feed-forward
-  float &kv_2() { return values[45]; }
-  float kv_2() const { return values[45]; }
+  float &kv_2() { return values[58]; }
+  float kv_2() const { return values[58]; }
+  // joint 1, proportional
+  float &kp_1_V_rad() { return values[59]; }
+  float kp_1_V_rad() const { return values[59]; }
+  // joint 1, integral
+  float &ki_1_V_rad_s() { return values[60]; }
+  float ki_1_V_rad_s() const { return values[60]; }
+  // joint 1, derivative
+  float &kd_1_V_s_rad() { return values[61]; }
+  float kd_1_V_s_rad() const { return values[61]; }
+  // joint 1, velocity feed-forward
+  float &kv_1_V_s_rad() { return values[62]; }
+  float kv_1_V_s_rad() const { return values[62]; }
+  // joint 2, proportional
+  float &kp_2_V_rad() { return values[63]; }
+  float kp_2_V_rad() const { return values[63]; }
+  // joint 2, integral
+  float &ki_2_V_rad_s() { return values[64]; }
+  float ki_2_V_rad_s() const { return values[64]; }
+  // joint 2, derivative
+  float &kd_2_V_s_rad() { return values[65]; }
+  float kd_2_V_s_rad() const { return values[65]; }
+  // joint 2, tip deflection
+  float &kf_2_V_m() { return values[66]; }
+  float kf_2_V_m() const { return values[66]; }
+  // joint 2, rate of the tip deflection
+  float &kg_2_V_s_m() { return values[67]; }
+  float kg_2_V_s_m() const { return values[67]; }
+  // joint 2, velocity feed-forward
+  float &kv_2_V_s_rad() { return values[68]; }
+  float kv_2_V_s_rad() const { return values[68]; }
+  // joint 2, friction feed-forward
+  float &kc_2_V() { return values[69]; }
+  float kc_2_V() const { return values[69]; }
   // first-order filter of measured velocities
-  float &derivative_Hz() { return values[46]; }
-  float derivative_Hz() const { return values[46]; }
+  float &derivative_Hz() { return values[70]; }
+  float derivative_Hz() const { return values[70]; }
   // first-order filter of the tip deflection and its rate
-  float &deflection_Hz() { return values[47]; }
-  float deflection_Hz() const { return values[47]; }
+  float &deflection_Hz() { return values[71]; }
+  float deflection_Hz() const { return values[71]; }
   // first-order filter of the set-point; 0 = none
-  float &setpoint_1_Hz() { return values[48]; }
-  float setpoint_1_Hz() const { return values[48]; }
+  float &setpoint_1_Hz() { return values[72]; }
+  float setpoint_1_Hz() const { return values[72]; }
   // first-order filter of the set-point; 0 = none
-  float &setpoint_2_Hz() { return values[49]; }
-  float setpoint_2_Hz() const { return values[49]; }
-  // joint 2 is controlled on 0 = its pulses, 1 = its encoder
-  float &feedback_2() { return values[50]; }
-  float feedback_2() const { return values[50]; }
+  float &setpoint_2_Hz() { return values[73]; }
+  float setpoint_2_Hz() const { return values[73]; }
+  // a stepper is controlled on 0 = its pulses, 1 = its encoder
+  float &feedback_2() { return values[74]; }
+  float feedback_2() const { return values[74]; }
 };
 
 // X(name, default, least, greatest) of every setting.
 #define FLEXURA_CONFIG(X)                                \
+  X(drive_1, 1.0f, 1.0f, 2.0f)                           \
+  X(drive_2, 1.0f, 0.0f, 2.0f)                           \
+  X(encoder_2, 1.0f, 0.0f, 1.0f)                         \
   X(motor_counts_per_m, 80000.0f, 100.0f, 1000000.0f)    \
+  X(motor_1_counts_per_rad, 100.0f, 0.1f, 100000.0f)     \
+  X(motor_2_counts_per_rad, 100.0f, 0.1f, 100000.0f)     \
   X(stepper_steps_per_rad, 509.29582f, 1.0f, 100000.0f)  \
   X(stepper_counts_per_rad, 381.97186f, 1.0f, 100000.0f) \
-  X(supply_V, 12.0f, 1.0f, 30.0f)                        \
-  X(supply_divider, 4.9f, 1.0f, 10.0f)                   \
-  X(supply_min_V, 10.0f, 0.0f, 30.0f)                    \
-  X(supply_max_V, 14.0f, 1.0f, 30.0f)                    \
+  X(supply_V, 12.0f, 1.0f, 60.0f)                        \
+  X(supply_divider, 4.9f, 1.0f, 20.0f)                   \
+  X(supply_min_V, 10.0f, 0.0f, 60.0f)                    \
+  X(supply_max_V, 14.0f, 1.0f, 60.0f)                    \
   X(flex_zero, 0.5f, 0.0f, 1.0f)                         \
-  X(flex_c1_m, 0.0f, -5.0f, 5.0f)                        \
-  X(flex_c2_m, 0.0f, -5.0f, 5.0f)                        \
-  X(flex_c3_m, 0.0f, -5.0f, 5.0f)                        \
+  X(flex_c1_m, 0.0f, -10.0f, 10.0f)                      \
+  X(flex_c2_m, 0.0f, -10.0f, 10.0f)                      \
+  X(flex_c3_m, 0.0f, -10.0f, 10.0f)                      \
   X(flex_min, 0.05f, 0.0f, 1.0f)                         \
   X(flex_max, 0.95f, 0.0f, 1.0f)                         \
   X(position_min_1_m, -0.02f, -10.0f, 10.0f)             \
   X(position_max_1_m, 0.02f, -10.0f, 10.0f)              \
+  X(position_min_1_rad, -0.2f, -1000.0f, 1000.0f)        \
+  X(position_max_1_rad, 0.2f, -1000.0f, 1000.0f)         \
   X(position_min_2_rad, -0.2f, -1000.0f, 1000.0f)        \
   X(position_max_2_rad, 0.2f, -1000.0f, 1000.0f)         \
   X(speed_max_1_m_s, 0.05f, 0.0f, 10.0f)                 \
+  X(speed_max_1_rad_s, 1.0f, 0.0f, 1000.0f)              \
   X(speed_max_2_rad_s, 1.0f, 0.0f, 1000.0f)              \
-  X(voltage_max_V, 4.0f, 0.0f, 30.0f)                    \
-  X(voltage_slew_V_s, 200.0f, 1.0f, 30000.0f)            \
+  X(voltage_max_V, 4.0f, 0.0f, 60.0f)                    \
+  X(voltage_slew_V_s, 200.0f, 1.0f, 60000.0f)            \
   X(rate_max_2_rad_s, 1.0f, 0.0f, 1000.0f)               \
   X(acceleration_max_2_rad_s2, 10.0f, 0.01f, 10000.0f)   \
   X(following_max_1_m, 0.01f, 0.0f, 10.0f)               \
+  X(following_max_1_rad, 0.1f, 0.0f, 1000.0f)            \
   X(following_max_2_rad, 0.1f, 0.0f, 1000.0f)            \
   X(host_timeout_s, 0.2f, 0.02f, 5.0f)                   \
-  X(stall_voltage_V, 2.0f, 0.0f, 30.0f)                  \
+  X(stall_voltage_V, 2.0f, 0.0f, 60.0f)                  \
   X(stall_speed_m_s, 0.001f, 0.0f, 1.0f)                 \
+  X(stall_speed_1_rad_s, 0.02f, 0.0f, 100.0f)            \
+  X(stall_speed_2_rad_s, 0.02f, 0.0f, 100.0f)            \
   X(stall_time_s, 0.3f, 0.01f, 5.0f)                     \
   X(runaway_distance_m, 0.005f, 0.0f, 1.0f)              \
+  X(runaway_distance_1_rad, 0.1f, 0.0f, 10.0f)           \
+  X(runaway_distance_2_rad, 0.1f, 0.0f, 10.0f)           \
   X(lost_step_rad, 0.05f, 0.0f, 10.0f)                   \
   X(missed_edges_max, 4.0f, 0.0f, 1000.0f)               \
   X(one_sided_edges_max, 60.0f, 4.0f, 250.0f)            \
@@ -694,13 +808,24 @@ struct Config {
   X(kf_1_V_m, 0.0f, -100000.0f, 100000.0f)               \
   X(kg_1_V_s_m, 0.0f, -10000.0f, 10000.0f)               \
   X(kv_1_V_s_m, 0.0f, -10000.0f, 10000.0f)               \
-  X(kc_1_V, 0.0f, 0.0f, 30.0f)                           \
+  X(kc_1_V, 0.0f, 0.0f, 60.0f)                           \
   X(kp_2_1_s, 10.0f, -120.0f, 120.0f)                    \
   X(ki_2_1_s2, 0.0f, -10000.0f, 10000.0f)                \
   X(kd_2, 0.0f, -10.0f, 10.0f)                           \
   X(kf_2_rad_s_m, 0.0f, -10000.0f, 10000.0f)             \
   X(kg_2_rad_m, 0.0f, -1000.0f, 1000.0f)                 \
   X(kv_2, 1.0f, -2.0f, 2.0f)                             \
+  X(kp_1_V_rad, 5.0f, -100000.0f, 100000.0f)             \
+  X(ki_1_V_rad_s, 0.0f, -1000000.0f, 1000000.0f)         \
+  X(kd_1_V_s_rad, 0.0f, -10000.0f, 10000.0f)             \
+  X(kv_1_V_s_rad, 0.0f, -10000.0f, 10000.0f)             \
+  X(kp_2_V_rad, 5.0f, -100000.0f, 100000.0f)             \
+  X(ki_2_V_rad_s, 0.0f, -1000000.0f, 1000000.0f)         \
+  X(kd_2_V_s_rad, 0.0f, -10000.0f, 10000.0f)             \
+  X(kf_2_V_m, 0.0f, -100000.0f, 100000.0f)               \
+  X(kg_2_V_s_m, 0.0f, -10000.0f, 10000.0f)               \
+  X(kv_2_V_s_rad, 0.0f, -10000.0f, 10000.0f)             \
+  X(kc_2_V, 0.0f, 0.0f, 60.0f)                           \
   X(derivative_Hz, 50.0f, 0.1f, 500.0f)                  \
   X(deflection_Hz, 50.0f, 0.1f, 500.0f)                  \
   X(setpoint_1_Hz, 0.0f, 0.0f, 500.0f)                   \

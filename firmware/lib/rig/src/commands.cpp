@@ -60,10 +60,13 @@ Result Rig::handle(const Reference &command, uint16_t &) {
   if (state_ != State::idle) return Result::wrong_state;
   if (!near(command.position_1) || !near(command.position_2) || !near(command.steps))
     return Result::out_of_range;
-  // Where the encoder says joint 2 is, in microsteps; the pulses must agree with it.
+  if (drive(1) != Drive::stepper && command.steps != 0) return Result::out_of_range;
+  if (drive(1) == Drive::none && command.position_2 != 0) return Result::out_of_range;
+  // Where the encoder says a stepper is, in microsteps; the pulses must agree with it.
   const int64_t exact = static_cast<int64_t>(fixed_.ratio) * command.position_2;
   const int64_t lag = (exact >> 8) - static_cast<int64_t>(command.steps) * 256;
-  if (lag > fixed_.limits.lost || lag < -fixed_.limits.lost) return Result::out_of_range;
+  if (drive(1) == Drive::stepper && (lag > fixed_.limits.lost || lag < -fixed_.limits.lost))
+    return Result::out_of_range;
   CriticalSection section;
   measured_.position[0] = command.position_1;
   measured_.position[1] = command.position_2;
@@ -160,9 +163,16 @@ Result Rig::handle(const Drives &command, uint16_t &detail) {
   if (mode_ != Mode::open_loop) return Result::wrong_state;
   const Result result = may_add(command.first, command.count, 8, detail);
   if (result != Result::ok) return result;
-  for (uint8_t k = 0; k < command.count; ++k)
-    player_.add({{0, 0}, {command.voltage[k], command.rate[k]}},
-                command.final && k == command.count - 1);
+  const Drive second = drive(1);
+  for (uint8_t k = 0; k < command.count; ++k) {  // all of them or none
+    if ((second != Drive::stepper && command.rate[k] != 0) ||
+        (second != Drive::motor && command.voltage_2[k] != 0))
+      return Result::out_of_range;
+  }
+  for (uint8_t k = 0; k < command.count; ++k) {
+    const int16_t asked = second == Drive::motor ? command.voltage_2[k] : command.rate[k];
+    player_.add({{0, 0}, {command.voltage[k], asked}}, command.final && k == command.count - 1);
+  }
   return Result::ok;
 }
 
@@ -192,7 +202,7 @@ Result Rig::handle(const Start &command, uint16_t &detail) {
   CriticalSection section;
   if (state_ != State::armed) return Result::wrong_state;  // a fault meanwhile
   target_ = begin;
-  pid_[1].start(pid_[1].output());  // it may still be braking
+  pid_[1].start(pid_[1].output());  // a stepper may still be braking
   final_ = false;
   return enter(State::armed, State::running) ? Result::ok : Result::wrong_state;
 }
@@ -245,12 +255,24 @@ Result Rig::handle(const ConfigDefaults &, uint16_t &) {
   return Result::ok;
 }
 
+// As to_fixed_point; a second motor needs its pins.
+uint8_t Rig::convert(FixedPointConfig &fixed) const {
+  const uint8_t wrong = to_fixed_point(config_, fixed);
+  if (wrong == kAllValid && fixed.limits.drive[1] == Drive::motor && motors_ < 2)
+    return static_cast<uint8_t>(Item::drive_2);
+  return wrong;
+}
+
 // Settings that contradict each other change nothing for now, and nothing can be armed with them.
 void Rig::update_fixed_point() {
   FixedPointConfig made = fixed_;
-  wrong_item_ = to_fixed_point(config_, made);
+  wrong_item_ = convert(made);
   CriticalSection section;
-  if (wrong_item_ == kAllValid) fixed_ = made;
+  if (wrong_item_ != kAllValid) return;
+  // Other drives count in other units: where the joints are is not known any more.
+  if (made.limits.drive[1] != fixed_.limits.drive[1] || made.encoder_2 != fixed_.encoder_2)
+    referenced_ = false;
+  fixed_ = made;
 }
 
 }  // namespace flexura

@@ -32,8 +32,9 @@ constexpr float kTick = 0.001f, kQ8 = 256.0f, kQ16 = 65536.0f, kQ32 = 4294967296
 constexpr float kFull = 1024.0f * kAdcSamples;   // reading at the reference voltage
 constexpr float kDeflection = 1e5f;              // units of 10 um in a metre
 constexpr float kMilli = 1000.0f;                // mV in a volt
+constexpr float kVolts = 0.002f;                 // volts in a unit of voltage of a message
 constexpr float kRate = 4096.0f;                 // units of u_2 in a microstep per tick
-constexpr float kDutyUnits = 16.0f * kDutyFull;  // units of u_1 at the supply's voltage
+constexpr float kDutyUnits = 16.0f * kDutyFull;  // units of u at the supply's voltage
 constexpr float kReference = 5.0f;               // V at the ADC's full scale
 
 // a = 1 - exp(-2 pi f T) as Q16; nothing for f = 0.
@@ -61,28 +62,82 @@ int16_t change(float u) {
 
 int16_t to_16(float value) { return static_cast<int16_t>(clamp(value, -32767.0f, 32767.0f)); }
 
-// u per unit of one joint: all gains in the units of PidGains. `u` is units of output per V or
-// rad/s, `count` counts per m or rad.
-uint8_t joint_1(const Config &c, PidGains &g) {
-  const float u = kDutyUnits / c.supply_V(), count = c.motor_counts_per_m();
-  g.fine = false;
-  REQUIRE(gain(c.kp_1_V_m(), u / count * kQ16, g.kp), kp_1_V_m);
-  REQUIRE(to_fixed(c.ki_1_V_m_s(), u / count * kTick * kQ32, g.ki), ki_1_V_m_s);
-  REQUIRE(gain(c.kd_1_V_s_m(), u / count / kTick * kQ8, g.kd), kd_1_V_s_m);
-  REQUIRE(gain(c.kf_1_V_m(), u / kDeflection * kQ16, g.kf), kf_1_V_m);
-  REQUIRE(gain(c.kg_1_V_s_m(), u / kDeflection / (2 * kTick) * kQ8, g.kg), kg_1_V_s_m);
-  REQUIRE(gain(c.kv_1_V_s_m(), u / count / kTick * kQ8, g.kv), kv_1_V_s_m);
-  REQUIRE(c.kc_1_V() <= c.supply_V(), kc_1_V);
-  REQUIRE(c.voltage_max_V() <= c.supply_V(), voltage_max_V);
-  g.kc = static_cast<int16_t>(c.kc_1_V() * u);
-  g.limit = static_cast<int16_t>(c.voltage_max_V() * u);
-  g.slew = change(c.voltage_slew_V_s() * kTick * u);
+float of(const Config &c, Item item) { return c.values[static_cast<uint8_t>(item)]; }
+
+// The settings of a motor: on a screw in metres, or turning its joint in radians.
+struct MotorItems {
+  Item counts, low, high, speed, following, stall_speed, runaway, kp, ki, kd, kf, kg, kv, kc;
+};
+const MotorItems kOnScrew = {Item::motor_counts_per_m, Item::position_min_1_m,
+                             Item::position_max_1_m,   Item::speed_max_1_m_s,
+                             Item::following_max_1_m,  Item::stall_speed_m_s,
+                             Item::runaway_distance_m, Item::kp_1_V_m,
+                             Item::ki_1_V_m_s,         Item::kd_1_V_s_m,
+                             Item::kf_1_V_m,           Item::kg_1_V_s_m,
+                             Item::kv_1_V_s_m,         Item::kc_1_V};
+const MotorItems kTurning[2] = {
+    {Item::motor_1_counts_per_rad, Item::position_min_1_rad, Item::position_max_1_rad,
+     Item::speed_max_1_rad_s, Item::following_max_1_rad, Item::stall_speed_1_rad_s,
+     Item::runaway_distance_1_rad, Item::kp_1_V_rad, Item::ki_1_V_rad_s, Item::kd_1_V_s_rad,
+     Item::kf_1_V_m, Item::kg_1_V_s_m, Item::kv_1_V_s_rad, Item::kc_1_V},
+    {Item::motor_2_counts_per_rad, Item::position_min_2_rad, Item::position_max_2_rad,
+     Item::speed_max_2_rad_s, Item::following_max_2_rad, Item::stall_speed_2_rad_s,
+     Item::runaway_distance_2_rad, Item::kp_2_V_rad, Item::ki_2_V_rad_s, Item::kd_2_V_s_rad,
+     Item::kf_2_V_m, Item::kg_2_V_s_m, Item::kv_2_V_s_rad, Item::kc_2_V}};
+
+// As REQUIRE, for a setting that is not known by name.
+#define REQUIRE_ITEM(condition, item) \
+  if (!(condition)) return static_cast<uint8_t>(item)
+
+// Range, speed and following error of joint j. `unit`: set-point units in the unit of its settings.
+uint8_t travel(const Config &c, FixedPointConfig &s, uint8_t j, Item low, Item high, Item speed,
+               Item following, float unit, float count) {
+  REQUIRE_ITEM(of(c, low) < of(c, high), low);
+  // Half of 31 bits: differences of two positions must fit too.
+  REQUIRE_ITEM(to_fixed(of(c, low), unit * kQ8 * 2, s.span_low[j]), low);
+  REQUIRE_ITEM(to_fixed(of(c, high), unit * kQ8 * 2, s.span_high[j]), high);
+  s.span_low[j] /= 2;
+  s.span_high[j] /= 2;
+  FaultLimits &w = s.limits;
+  REQUIRE_ITEM(to_fixed(of(c, low), count, w.travel_low[j]), low);
+  REQUIRE_ITEM(to_fixed(of(c, high), count, w.travel_high[j]), high);
+  REQUIRE_ITEM(to_fixed(of(c, following), unit * kQ8, w.following[j]), following);
+  // and one count of chance
+  w.speed[j] = to_16(of(c, speed) * count * kTick * FaultMonitor::kWindow + 1);
   return kAllValid;
 }
 
-uint8_t joint_2(const Config &c, PidGains &g) {
-  const float step = c.stepper_steps_per_rad(),
-              u = kRate * kTick;  // a gain in rad/s per rad = microsteps/s per microstep
+// Gains in the units of PidGains. `u` is units of output per V, `count` counts per m or rad.
+uint8_t motor(const Config &c, FixedPointConfig &s, uint8_t j, const MotorItems &item) {
+  PidGains &g = s.gains[j];
+  FaultLimits &w = s.limits;
+  const float u = kDutyUnits / c.supply_V(), count = of(c, item.counts);
+  w.drive[j] = Drive::motor;
+  g.fine = false;
+  REQUIRE_ITEM(gain(of(c, item.kp), u / count * kQ16, g.kp), item.kp);
+  REQUIRE_ITEM(to_fixed(of(c, item.ki), u / count * kTick * kQ32, g.ki), item.ki);
+  REQUIRE_ITEM(gain(of(c, item.kd), u / count / kTick * kQ8, g.kd), item.kd);
+  REQUIRE_ITEM(gain(of(c, item.kf), u / kDeflection * kQ16, g.kf), item.kf);
+  REQUIRE_ITEM(gain(of(c, item.kg), u / kDeflection / (2 * kTick) * kQ8, g.kg), item.kg);
+  REQUIRE_ITEM(gain(of(c, item.kv), u / count / kTick * kQ8, g.kv), item.kv);
+  REQUIRE_ITEM(of(c, item.kc) <= c.supply_V(), item.kc);
+  REQUIRE(c.voltage_max_V() <= c.supply_V(), voltage_max_V);
+  g.kc = static_cast<int16_t>(of(c, item.kc) * u);
+  g.limit = static_cast<int16_t>(c.voltage_max_V() * u);
+  g.slew = change(c.voltage_slew_V_s() * kTick * u);
+  w.stall_speed[j] = to_16(of(c, item.stall_speed) * count * kTick * kQ8);
+  REQUIRE_ITEM(to_fixed(of(c, item.runaway), count, w.runaway[j]), item.runaway);
+  return travel(c, s, j, item.low, item.high, item.speed, item.following, count, count);
+}
+
+// The stepper of joint 2. `u` is units of output per rad/s.
+uint8_t stepper(const Config &c, FixedPointConfig &s) {
+  PidGains &g = s.gains[1];
+  FaultLimits &w = s.limits;
+  // a gain in rad/s per rad = microsteps/s per microstep
+  const float step = c.stepper_steps_per_rad(), u = kRate * kTick;
+  const float encoder = s.encoder_2 ? c.stepper_counts_per_rad() : step;
+  w.drive[1] = Drive::stepper;
   g.fine = true;
   REQUIRE(gain(c.kp_2_1_s(), u / 16 * kQ16, g.kp), kp_2_1_s);
   REQUIRE(to_fixed(c.ki_2_1_s2(), u / 16 * kTick * kQ32, g.ki), ki_2_1_s2);
@@ -95,44 +150,49 @@ uint8_t joint_2(const Config &c, PidGains &g) {
   REQUIRE(rate <= 4000.5f, rate_max_2_rad_s);
   g.limit = static_cast<int16_t>(clamp(rate * u + 0.5f, 0.0f, static_cast<float>(kOutputMax)));
   g.slew = change(c.acceleration_max_2_rad_s2() * step * kTick * u);
+  const uint8_t wrong = travel(c, s, 1, Item::position_min_2_rad, Item::position_max_2_rad,
+                               Item::speed_max_2_rad_s, Item::following_max_2_rad, step, encoder);
+  if (wrong != kAllValid) return wrong;
+  REQUIRE(to_fixed(c.lost_step_rad(), step * kQ8, w.lost), lost_step_rad);
+  REQUIRE(to_fixed(c.lost_step_rad(), encoder / 4, w.against), lost_step_rad);
+  REQUIRE(to_fixed(step / encoder, kQ16, s.ratio), stepper_counts_per_rad);
+  REQUIRE(s.ratio < (1L << 24),
+          stepper_counts_per_rad);  // 127 counts in a tick times the ratio stay within 32 bits
+  s.on_encoder = c.feedback_2() >= 0.5f && s.encoder_2;
   return kAllValid;
 }
 
-uint8_t travel(const Config &c, FixedPointConfig &s) {
-  const float count = c.motor_counts_per_m(), step = c.stepper_steps_per_rad(),
-              encoder = c.stepper_counts_per_rad();
-  REQUIRE(c.position_min_1_m() < c.position_max_1_m(), position_min_1_m);
-  REQUIRE(c.position_min_2_rad() < c.position_max_2_rad(), position_min_2_rad);
-  // Half of 31 bits: differences of two positions must fit too.
-  REQUIRE(to_fixed(c.position_min_1_m(), count * kQ8 * 2, s.span_low[0]), position_min_1_m);
-  REQUIRE(to_fixed(c.position_max_1_m(), count * kQ8 * 2, s.span_high[0]), position_max_1_m);
-  REQUIRE(to_fixed(c.position_min_2_rad(), step * kQ8 * 2, s.span_low[1]), position_min_2_rad);
-  REQUIRE(to_fixed(c.position_max_2_rad(), step * kQ8 * 2, s.span_high[1]), position_max_2_rad);
-  for (uint8_t j = 0; j < 2; ++j) {
-    s.span_low[j] /= 2;
-    s.span_high[j] /= 2;
-  }
+// Joint 2 is not there: it stays at 0.
+void nothing(FixedPointConfig &s) {
+  s.gains[1] = PidGains();
+  s.span_low[1] = s.span_high[1] = 0;
   FaultLimits &w = s.limits;
-  REQUIRE(to_fixed(c.position_min_1_m(), count, w.travel_low[0]), position_min_1_m);
-  REQUIRE(to_fixed(c.position_max_1_m(), count, w.travel_high[0]), position_max_1_m);
-  REQUIRE(to_fixed(c.position_min_2_rad(), encoder, w.travel_low[1]), position_min_2_rad);
-  REQUIRE(to_fixed(c.position_max_2_rad(), encoder, w.travel_high[1]), position_max_2_rad);
-  REQUIRE(to_fixed(c.following_max_1_m(), count * kQ8, w.following[0]), following_max_1_m);
-  REQUIRE(to_fixed(c.following_max_2_rad(), step * kQ8, w.following[1]), following_max_2_rad);
-  w.speed[0] = to_16(c.speed_max_1_m_s() * count * kTick * FaultMonitor::kWindow +
-                     1);  // and one count of chance
-  w.speed[1] = to_16(c.speed_max_2_rad_s() * encoder * kTick * FaultMonitor::kWindow + 1);
+  w.drive[1] = Drive::none;
+  w.travel_low[1] = w.travel_high[1] = w.following[1] = 0;
+  w.speed[1] = 0;
+}
+
+uint8_t drives(const Config &c, FixedPointConfig &s) {
+  const bool turns = c.drive_1() >= 1.5f;
+  const uint8_t wrong = motor(c, s, 0, turns ? kTurning[0] : kOnScrew);
+  if (wrong != kAllValid) return wrong;
+  s.on_encoder = false;
+  s.ratio = 0;
+  s.limits.lost = s.limits.against = 0;
+  s.encoder_2 = c.encoder_2() >= 0.5f && c.drive_2() >= 0.5f;
+  if (c.drive_2() >= 1.5f) {
+    REQUIRE(s.encoder_2, encoder_2);  // a motor cannot count its steps
+    return motor(c, s, 1, kTurning[1]);
+  }
+  if (c.drive_2() >= 0.5f) return stepper(c, s);
+  nothing(s);
   return kAllValid;
 }
 
 uint8_t monitoring(const Config &c, FixedPointConfig &s) {
   FaultLimits &w = s.limits;
   w.stall_duty = to_16(c.stall_voltage_V() * kDutyFull / c.supply_V());
-  w.stall_speed = to_16(c.stall_speed_m_s() * c.motor_counts_per_m() * kTick * kQ8);
   w.stall_ticks = static_cast<uint16_t>(c.stall_time_s() / kTick);
-  REQUIRE(to_fixed(c.runaway_distance_m(), c.motor_counts_per_m(), w.runaway), runaway_distance_m);
-  REQUIRE(to_fixed(c.lost_step_rad(), c.stepper_steps_per_rad() * kQ8, w.lost), lost_step_rad);
-  REQUIRE(to_fixed(c.lost_step_rad(), c.stepper_counts_per_rad() / 4, w.against), lost_step_rad);
   w.missed = static_cast<uint16_t>(c.missed_edges_max());
   w.alone = static_cast<uint16_t>(c.one_sided_edges_max());
   REQUIRE(c.flex_min() < c.flex_max(), flex_min);
@@ -156,15 +216,10 @@ uint8_t sensing(const Config &c, FixedPointConfig &s) {
   s.velocity_filter = filter(c.derivative_Hz());
   s.setpoint_filter[0] = filter(c.setpoint_1_Hz());
   s.setpoint_filter[1] = filter(c.setpoint_2_Hz());
-  REQUIRE(to_fixed(kDutyUnits / c.supply_V(), kQ16 / kMilli, s.duty), supply_V);
-  REQUIRE(to_fixed(c.supply_V() / kDutyUnits, kMilli * kQ16, s.voltage), supply_V);
-  REQUIRE(to_fixed(c.stepper_steps_per_rad() / c.stepper_counts_per_rad(), kQ16, s.ratio),
-          stepper_counts_per_rad);
-  REQUIRE(s.ratio < (1L << 24),
-          stepper_counts_per_rad);  // 127 counts in a tick times the ratio stay within 32 bits
+  REQUIRE(to_fixed(kDutyUnits / c.supply_V(), kQ16 * kVolts, s.duty), supply_V);
+  REQUIRE(to_fixed(c.supply_V() / kDutyUnits, kQ16 / kVolts, s.voltage), supply_V);
   s.supply =
       static_cast<uint16_t>(kReference * c.supply_divider() * kMilli / 1024.0f * 64.0f + 0.5f);
-  s.on_encoder = c.feedback_2() >= 0.5f;
   return kAllValid;
 }
 
@@ -184,9 +239,7 @@ bool in_range(uint8_t item, float value) {
 uint8_t to_fixed_point(const Config &config, FixedPointConfig &fixed) {
   for (uint8_t i = 0; i < kConfigItems; ++i)
     if (!in_range(i, config.values[i])) return i;
-  uint8_t wrong = joint_1(config, fixed.gains[0]);
-  if (wrong == kAllValid) wrong = joint_2(config, fixed.gains[1]);
-  if (wrong == kAllValid) wrong = travel(config, fixed);
+  uint8_t wrong = drives(config, fixed);
   if (wrong == kAllValid) wrong = monitoring(config, fixed);
   if (wrong == kAllValid) wrong = sensing(config, fixed);
   return wrong;

@@ -12,12 +12,13 @@ struct FixedPointConfig {
   FlexSensorScale tip;
   FaultLimits limits;
   uint16_t velocity_filter, setpoint_filter[2];  // Q16
-  int32_t duty;                                  // Q16, units of u_1 (1/16 PWM count) per mV
-  int32_t voltage;                               // Q16, mV in a unit of u_1
+  int32_t duty;                                  // Q16, units of u (1/16 PWM count) per 2 mV
+  int32_t voltage;                               // Q16, 2 mV in a unit of u
   int32_t ratio;                      // Q16, microsteps per count of the encoder of joint 2
-  int32_t span_low[2], span_high[2];  // travel in counts / 256, microsteps / 256
+  int32_t span_low[2], span_high[2];  // travel of the set-points: counts / 256, microsteps / 256
   uint16_t supply;                    // mV per 64 readings of the supply
-  bool on_encoder;                    // joint 2 is controlled on its encoder
+  bool on_encoder;                    // a stepper is controlled on its encoder
+  bool encoder_2;                     // joint 2 has an encoder
 };
 
 // What outlives a reset.

@@ -14,15 +14,16 @@ bool is_set(uint8_t bits, Flag flag) { return bits >> static_cast<uint8_t>(flag)
 bool is_set(uint8_t bits, Reset cause) { return bits >> static_cast<uint8_t>(cause) & 1; }
 }  // namespace
 
-void Rig::begin(const Stored *stored, uint8_t reset, uint32_t firmware) {
+void Rig::begin(const Stored *stored, uint8_t reset, uint32_t firmware, uint8_t motors) {
   firmware_ = firmware;
+  motors_ = motors;
   proven_ = stored ? stored->proven : 0;
   config_ = stored ? stored->config : default_config();
-  wrong_item_ = to_fixed_point(config_, fixed_);
+  wrong_item_ = convert(fixed_);
   stored_ = stored && wrong_item_ == kAllValid;
   if (!stored_) {
     config_ = default_config();
-    wrong_item_ = to_fixed_point(config_, fixed_);
+    wrong_item_ = convert(fixed_);
   }
   if (is_set(reset, Reset::watchdog)) trip(Fault::watchdog);
   if (is_set(reset, Reset::brown_out) && !is_set(reset, Reset::power_on)) trip(Fault::brown_out);
@@ -38,10 +39,19 @@ void Rig::trip(Fault fault) {
   state_ = State::fault;
 }
 
+// Without an encoder at joint 2 nobody reads its lines, and a stepper's pulses are its position.
+void Rig::replace_encoder_2() {
+  in_.moved[1] = drive(1) == Drive::stepper ? in_.stepped : 0;
+  in_.missed[1] = 0;
+  in_.edges[1][0] = in_.edges[1][1] = 0;
+  in_.flooded[1] = false;
+}
+
 void Rig::sense() {
+  if (!fixed_.encoder_2) replace_encoder_2();
   for (uint8_t j = 0; j < 2; ++j) {
     measured_.position[j] += in_.moved[j];
-    if (j == 0 || fixed_.on_encoder) {  // else the control does not need it
+    if (drive(j) == Drive::motor || fixed_.on_encoder) {  // else the control does not need it
       velocity_[j].update(in_.moved[j], fixed_.velocity_filter);
       measured_.velocity[j] = velocity_[j].value();
     }
@@ -50,11 +60,13 @@ void Rig::sense() {
   // Nobody judges encoders while the outputs are off; where the joints are is not known any more.
   if (!active() && (in_.missed[0] || in_.missed[1] || in_.flooded[0] || in_.flooded[1]))
     referenced_ = false;
-  steps_given_ += in_.stepped;
-  const int32_t rest = by_encoder_rest_ + fixed_.ratio * in_.moved[1];
-  by_encoder_ += upper(rest);
-  by_encoder_rest_ = lower(rest);
-  measured_.lag = to_q8(by_encoder_ - steps_given_) + (by_encoder_rest_ >> 8);
+  if (drive(1) == Drive::stepper) {
+    steps_given_ += in_.stepped;
+    const int32_t rest = by_encoder_rest_ + fixed_.ratio * in_.moved[1];
+    by_encoder_ += upper(rest);
+    by_encoder_rest_ = lower(rest);
+    measured_.lag = to_q8(by_encoder_ - steps_given_) + (by_encoder_rest_ >> 8);
+  }
   // The strip's slowness allows two ticks a reading, and noise asks for them.
   if (tick_ & 1) {
     flex_before_ = in_.flex;
@@ -78,7 +90,7 @@ void Rig::watch_stop() {
 // Set-points and positions lie within half of what 32 bits hold (fixed_point_config.cpp,
 // commands.cpp), so that their differences fit.
 int32_t Rig::error(uint8_t joint) const {
-  const int32_t position = joint == 0          ? to_q8(measured_.position[0])
+  const int32_t position = drive(joint) != Drive::stepper ? to_q8(measured_.position[joint])
                            : fixed_.on_encoder ? to_q8(by_encoder_) + (by_encoder_rest_ >> 8)
                                                : step_generator_.position();
   return static_cast<int32_t>(static_cast<uint32_t>(target_.of[joint]) -
@@ -113,24 +125,33 @@ void Rig::tick(Outputs &out) {
   if (active()) {
     control();
     out.on = true;
-    out.duty = measured_.duty;
-    step_generator_.plan(pid_[1].output(), out.steps);
+    if (drive(1) == Drive::stepper) step_generator_.plan(pid_[1].output(), out.steps);
   } else {
     watch_stop();
     out.on = false;
-    out.duty = 0;
-    measured_.duty = 0;
+    measured_.duty[0] = measured_.duty[1] = 0;
   }
+  for (uint8_t j = 0; j < 2; ++j) out.duty[j] = measured_.duty[j];
+}
+
+// What a knot's drive asks for, in units of u.
+int32_t Rig::open_loop(uint8_t joint) const {
+  const int16_t asked = static_cast<int16_t>(target_.of[joint]);
+  return drive(joint) == Drive::stepper ? multiply_high(kRateOfStep, asked)
+                                        : upper(multiply(fixed_.duty, asked));
 }
 
 void Rig::control() {
   const PidGains *gains = fixed_.gains;
   if (state_ == State::armed) {
     pid_[0].start(0);
-    pid_[1].track(gains[1], 0);
+    if (drive(1) == Drive::stepper) {
+      pid_[1].track(gains[1], 0);  // it brakes
+    } else {
+      pid_[1].start(0);
+    }
   } else if (mode_ == Mode::open_loop) {
-    pid_[0].track(gains[0], upper(multiply(fixed_.duty, static_cast<int16_t>(target_.of[0]))));
-    pid_[1].track(gains[1], multiply_high(kRateOfStep, static_cast<int16_t>(target_.of[1])));
+    for (uint8_t j = 0; j < 2; ++j) pid_[j].track(gains[j], open_loop(j));
   } else {
     // The deflection is new in every second tick. Joint 1 takes it at once, joint 2 in the next
     // tick: the products are shared between the two.
@@ -142,11 +163,14 @@ void Rig::control() {
     signals.error = measured_.error[1];
     signals.tip = tip_term_[1];
     signals.setpoint_rate = setpoint_rate_[1];
-    signals.rate = fixed_.on_encoder ? upper(multiply(fixed_.ratio, measured_.velocity[1]))
-                                     : static_cast<int16_t>(pid_[1].output() >> 4);
-    pid_[1].update(gains[1], signals);
+    signals.rate = drive(1) == Drive::motor ? measured_.velocity[1]
+                   : fixed_.on_encoder      ? upper(multiply(fixed_.ratio, measured_.velocity[1]))
+                                            : static_cast<int16_t>(pid_[1].output() >> 4);
+    if (drive(1) != Drive::none) pid_[1].update(gains[1], signals);
   }
-  measured_.duty = static_cast<int16_t>((pid_[0].output() + 8) >> 4);
+  for (uint8_t j = 0; j < 2; ++j)
+    measured_.duty[j] =
+        drive(j) == Drive::motor ? static_cast<int16_t>((pid_[j].output() + 8) >> 4) : int16_t(0);
 }
 
 uint32_t Rig::now() const {
@@ -155,8 +179,7 @@ uint32_t Rig::now() const {
 }
 
 void Rig::report(Telemetry &report) const {
-  int16_t duty;
-  int16_t rate;
+  int16_t output[2];
   bool on;
   {
     CriticalSection section;  // copies only: the control interrupt waits
@@ -177,20 +200,28 @@ void Rig::report(Telemetry &report) const {
     report.flex = in_.flex;
     report.supply = in_.supply;
     report.missed = missed_;
-    duty = pid_[0].output();
-    rate = pid_[1].output();
+    for (uint8_t j = 0; j < 2; ++j) output[j] = on ? pid_[j].output() : 0;
   }
-  const bool saturated = on && (duty >= fixed_.gains[0].limit || duty <= -fixed_.gains[0].limit);
+  int16_t voltage[2];
+  bool saturated = false;
+  for (uint8_t j = 0; j < 2; ++j) {
+    const bool motor = drive(j) == Drive::motor;
+    const int16_t limit = fixed_.gains[j].limit;
+    voltage[j] = motor ? upper(multiply(fixed_.voltage, output[j])) : int16_t(0);
+    saturated = saturated || (on && motor && (output[j] >= limit || output[j] <= -limit));
+  }
+  const bool steps = drive(1) == Drive::stepper;
   const bool holds = final_ && report.state == static_cast<uint8_t>(State::running);
   // From bridge_enabled on, in the order of Flag.
-  const bool bits[] = {on, on, referenced_, holds, saturated};
+  const bool bits[] = {on, on && steps, referenced_, holds, saturated};
   for (uint8_t k = 0; k < sizeof bits; ++k)
     if (bits[k])
       report.flags = static_cast<uint8_t>(report.flags |
                                           1 << (static_cast<uint8_t>(Flag::bridge_enabled) + k));
   report.buffered = player_.waiting();
-  report.voltage = on ? upper(multiply(fixed_.voltage, duty)) : 0;
-  report.rate = on ? static_cast<int16_t>(rate * 1000L / 4096) : 0;
+  report.voltage = voltage[0];
+  report.voltage_2 = voltage[1];
+  report.rate = steps ? static_cast<int16_t>(output[1] * 1000L / 4096) : 0;
   report.supply = static_cast<uint16_t>(static_cast<uint32_t>(report.supply) * fixed_.supply >> 6);
 }
 

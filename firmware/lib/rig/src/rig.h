@@ -40,15 +40,16 @@ class InterruptLock {
 
 // What the control interrupt does to the hardware.
 struct Outputs {
-  bool on = false;   // motor bridge and stepper driver enabled
-  int16_t duty = 0;  // PWM counts, + up
-  StepPlan steps;    // for the tick that comes next
+  bool on = false;           // the drives that the rig has are enabled
+  int16_t duty[2] = {0, 0};  // PWM counts, + up
+  StepPlan steps;            // for the tick that comes next
 };
 
 class Rig {
  public:
   // `stored` is what the memory holds, or nothing where its check failed. `reset`: bits of Reset.
-  void begin(const Stored *stored, uint8_t reset, uint32_t firmware);
+  // `motors`: how many bridges the pins have.
+  void begin(const Stored *stored, uint8_t reset, uint32_t firmware, uint8_t motors = 2);
 
   // Control interrupt: fill the inputs, then tick.
   Inputs &inputs() { return in_; }
@@ -69,6 +70,7 @@ class Rig {
   void stored() { stored_ = true; }  // the settings in use are the stored ones now
 
   State state() const { return state_; }
+  Drive drive(uint8_t joint) const { return fixed_.limits.drive[joint]; }
   bool active() const { return state_ == State::armed || state_ == State::running; }
   Fault fault() const { return fault_; }
   uint32_t now() const;
@@ -80,8 +82,10 @@ class Rig {
 
  private:
   void sense();
+  void replace_encoder_2();
   void watch_stop();
   int32_t error(uint8_t joint) const;  // counts / 256 or microsteps / 256
+  int32_t open_loop(uint8_t joint) const;
   void control();
 
   // One handler a command, called through the table in commands.cpp.
@@ -95,6 +99,7 @@ class Rig {
 
   bool enter(State from, State to);  // false if the state is another one by now
   Result may_add(uint16_t first, uint8_t count, uint8_t most, uint16_t &detail) const;
+  uint8_t convert(FixedPointConfig &fixed) const;
   void update_fixed_point();
 
   // What every tick touches comes first, within reach of one address register.
@@ -127,6 +132,7 @@ class Rig {
   uint8_t stop_open_ = 0;  // ticks
   uint32_t firmware_ = 0;
   uint32_t proven_ = 0;
+  uint8_t motors_ = 2;
   bool stored_ = false;
   uint8_t wrong_item_ = kAllValid;  // of the settings in use
   Config config_;

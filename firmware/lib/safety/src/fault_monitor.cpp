@@ -47,7 +47,6 @@ Fault standing(const FaultLimits &limits, const Inputs &in) {
 
 void FaultMonitor::start() {
   silent_ = 0;
-  stalled_ = 0;
   direction_ = 0;
   since_step_ = kEcho + 1;
   flex_out_ = 0;
@@ -57,6 +56,7 @@ void FaultMonitor::start() {
     missed_[j] = 0;
     alone_[j] = 0;
     against_[j] = 0;
+    stalled_[j] = 0;
     travelled_[j] = 0;
   }
 }
@@ -85,39 +85,52 @@ bool FaultMonitor::steps(int8_t stepped) {
   return since_step_ <= kEcho;
 }
 
+// A motor and its encoder.
+Fault FaultMonitor::motor(uint8_t j, const FaultLimits &limits, const Inputs &in,
+                          const Measured &now) {
+  const int16_t duty = now.duty[j];
+  const bool driven = duty > limits.stall_duty || duty < -limits.stall_duty;
+  // A shaft that nothing drives may rest on an edge and tremble, for as long as it likes.
+  if (!driven) {
+    alone_[j] = 0;
+    against_[j] = 0;
+    stalled_[j] = 0;
+    return Fault::none;
+  }
+  count_alone(j, in.edges[j]);
+  if (alone_[j] >= limits.alone) return j ? Fault::encoder_2 : Fault::encoder_1;
+  against_[j] = against(against_[j], duty > 0 ? 1 : -1, in.moved[j]);
+  if (against_[j] > limits.runaway[j]) return j ? Fault::runaway_2 : Fault::runaway_1;
+  stalled_[j] =
+      beyond(now.velocity[j], limits.stall_speed[j]) ? 0 : static_cast<uint16_t>(stalled_[j] + 1);
+  if (stalled_[j] >= limits.stall_ticks) return j ? Fault::stall_2 : Fault::stall_1;
+  return Fault::none;
+}
+
+// The stepper of joint 2 and its encoder.
+Fault FaultMonitor::stepper(const FaultLimits &limits, const Inputs &in, const Measured &now) {
+  if (steps(in.stepped)) count_alone(1, in.edges[1]);
+  if (alone_[1] >= limits.alone) return Fault::encoder_2;
+  against_[1] = against(against_[1], direction_, in.moved[1]);
+  if (!beyond(now.lag, limits.lost)) return Fault::none;
+  // Why: the encoder went the other way for a good part of it; or only one of its lines moves; or
+  // the motor did not follow.
+  if (against_[1] > limits.against) return Fault::runaway_2;
+  return alone_[1] >= 4 ? Fault::encoder_2 : Fault::stall_2;
+}
+
 Fault FaultMonitor::encoders(const FaultLimits &limits, const Inputs &in, const Measured &now) {
-  const bool driven = now.duty > limits.stall_duty || now.duty < -limits.stall_duty;
   for (uint8_t j = 0; j < 2; ++j) {
     if (!in.missed[j] && !in.flooded[j]) continue;
     missed_[j] = static_cast<uint16_t>(missed_[j] + in.missed[j]);
     if (in.flooded[j] || missed_[j] > limits.missed) return j ? Fault::encoder_2 : Fault::encoder_1;
   }
-  // A shaft that nothing drives may rest on an edge and tremble, for as long as it likes.
-  if (driven) {
-    count_alone(0, in.edges[0]);
-  } else {
-    alone_[0] = 0;
+  Fault fault = Fault::none;
+  for (uint8_t j = 0; j < 2 && fault == Fault::none; ++j) {
+    if (limits.drive[j] == Drive::motor) fault = motor(j, limits, in, now);
+    if (limits.drive[j] == Drive::stepper) fault = stepper(limits, in, now);
   }
-  if (alone_[0] >= limits.alone) return Fault::encoder_1;
-  if (steps(in.stepped)) count_alone(1, in.edges[1]);
-  if (alone_[1] >= limits.alone) return Fault::encoder_2;
-
-  against_[0] = driven ? against(against_[0], now.duty > 0 ? 1 : -1, in.moved[0]) : 0;
-  if (against_[0] > limits.runaway) return Fault::runaway_1;
-  if (driven && !beyond(now.velocity[0], limits.stall_speed)) {
-    if (++stalled_ >= limits.stall_ticks) return Fault::stall_1;
-  } else {
-    stalled_ = 0;
-  }
-
-  against_[1] = against(against_[1], direction_, in.moved[1]);
-  if (beyond(now.lag, limits.lost)) {
-    // Why: the encoder went the other way for a good part of it; or only one of its lines moves; or
-    // the motor did not follow.
-    if (against_[1] > limits.against) return Fault::runaway_2;
-    return alone_[1] >= 4 ? Fault::encoder_2 : Fault::stall_2;
-  }
-  return Fault::none;
+  return fault;
 }
 
 Fault FaultMonitor::check(const FaultLimits &limits, const Inputs &in, const Measured &now) {

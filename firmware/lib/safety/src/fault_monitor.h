@@ -6,16 +6,20 @@
 
 namespace flexura {
 
-// Joint 1 in encoder counts and PWM counts; joint 2 in encoder counts, its pulses in microsteps.
+// What moves a joint.
+enum class Drive : uint8_t { none, stepper, motor };
+
+// Positions in encoder counts, a motor's drive in PWM counts, a stepper's in microsteps.
 struct FaultLimits {
+  Drive drive[2];
   int32_t travel_low[2];   // counts
   int32_t travel_high[2];  // counts
   int16_t speed[2];        // counts in kWindow ticks
-  // PWM counts. Below it neither stall, runaway nor a broken encoder wire is judged.
+  // PWM counts. Below it neither stall, runaway nor a broken encoder wire of a motor is judged.
   int16_t stall_duty;
-  int16_t stall_speed;  // counts / 256 per tick
+  int16_t stall_speed[2];  // counts / 256 per tick
   uint16_t stall_ticks;
-  int32_t runaway;       // counts
+  int32_t runaway[2];    // counts
   int32_t lost;          // microsteps / 256, pulses against encoder
   int32_t against;       // counts of joint 2 against its pulses: wires swapped, not steps lost
   int32_t following[2];  // counts / 256, microsteps / 256
@@ -43,7 +47,7 @@ struct Inputs {
 struct Measured {
   int32_t position[2];  // counts
   int16_t velocity[2];  // counts / 256 per tick
-  int16_t duty;         // PWM counts that the motor had in this tick
+  int16_t duty[2];      // PWM counts that the motors had in this tick
   int32_t lag;          // microsteps / 256: encoder of joint 2 minus pulses given
   bool tracking;        // the errors below mean something
   int32_t error[2];     // counts / 256, microsteps / 256
@@ -62,10 +66,12 @@ class FaultMonitor {
  private:
   void count_alone(uint8_t joint, const uint8_t *edges);
   bool steps(int8_t stepped);
+  Fault motor(uint8_t joint, const FaultLimits &limits, const Inputs &in, const Measured &now);
+  Fault stepper(const FaultLimits &limits, const Inputs &in, const Measured &now);
   Fault encoders(const FaultLimits &limits, const Inputs &in, const Measured &now);
 
   uint16_t silent_ = 0;
-  uint16_t stalled_ = 0;
+  uint16_t stalled_[2] = {0, 0};
   uint16_t missed_[2] = {0, 0};
   int32_t against_[2] = {0, 0};  // counts moved against the drive
   int8_t direction_ = 0;         // of the last pulses

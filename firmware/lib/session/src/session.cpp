@@ -127,8 +127,6 @@ uint8_t Session::stop(uint8_t *frame) {
   if (!next_in_order()) return refuse(Result::ok, 0, frame);
   last_ = receiver_.sequence();
   saving_ = false;
-  save_begun_ = false;
-  rig_.host_spoke();
   return answer(Result::ok, 0, frame);
 }
 
@@ -155,7 +153,6 @@ uint8_t Session::hello(uint8_t *frame) {
   } else {
     open_ = true;
     saving_ = false;
-    save_begun_ = false;
     last_ = receiver_.sequence();
     reports_ = 0;
   }
@@ -179,7 +176,6 @@ uint8_t Session::config_save(uint8_t *frame) {
   if (!rig_.may_configure())
     return answer(Result::wrong_state, static_cast<uint16_t>(rig_.state()), frame);
   if (rig_.wrong_item() != kAllValid) return answer(Result::inconsistent, rig_.wrong_item(), frame);
-  ack_.command = ConfigSave::kCode;
   saving_ = true;
   save_begun_ = false;
   return 0;  // saved() answers

@@ -70,8 +70,8 @@ class EnergyIntegrals {
 
   // The numbers of a row at a state with the rates v (n) and eta' (stride): forces (joints) of the
   // drives there with their gains' part, the joints' places and rates in q, v; the power lost, and
-  // the power of prescribed joints.
-  void record(Real *extra, const Real *force, const Real *q, const Real *v, const Real *etad,
+  // the power of prescribed joints. Gives the power lost but to the joints' viscous friction.
+  Real record(Real *extra, const Real *force, const Real *q, const Real *v, const Real *etad,
               const Real &lost, const Real &prescribed) const {
     Real rest = lost;
     for (int j = 0; j < count; ++j) {
@@ -79,11 +79,13 @@ class EnergyIntegrals {
       extra[j] = force[j] + x.kp * q[x.row] + x.kd * v[x.row];
       rest -= x.viscous * v[x.row] * v[x.row];
     }
+    const Real all = rest;
     if (s.b.lossy) {
       for (int c = 0; c < s.chunks; ++c) put(square, c, get(etad, c) * get(etad, c));
       rest -= dot(s.n, s.b.material, square);
     }
     extra[count] = rest, extra[count + 1] = prescribed;
+    return all;
   }
 
   // Robots whose step just corrected has forces that are constant over all values looked back on,
@@ -108,6 +110,8 @@ class EnergyIntegrals {
   // To be called before a robot's step is accepted, and when it begins with one value.
   void accept(int k) { equal_values[k] = same(k) ? equal_values[k] + 1 : 0; }
   void restart(int k) { equal_values[k] = 0; }
+  // The rest of the loss in a row: it is another one in other modes.
+  Real &rest_of(Real *extra) const { return extra[count]; }
 
   // To be called when `DenseOutput` was built for a step of length h: what its integrals have in
   // common.

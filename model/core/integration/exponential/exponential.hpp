@@ -201,11 +201,12 @@ class Exponential : public Method<Real> {
   bool goes_on[LANES] = {};       // has the robot kept its past at the last break?
   bool driven = false;            // has any joint a motion that is given?
 
-  // Behind N, a row of the history keeps the accounts' numbers, then a, y and v.
+  // Behind N, a row of the history keeps the accounts' numbers, then a, y and v, and the power lost
+  // but to the joints' viscous friction.
   static int extras_of(const Integration<Real> &c) {
     int count = 0;
     for (int i = 0; i < c.plant.joints; ++i) count += !given_motion(c, i);
-    return EnergyIntegrals<Real>::extras(count) + 3 * c.n;
+    return EnergyIntegrals<Real>::extras(count) + 3 * c.n + 1;
   }
   static std::vector<typename EnergyIntegrals<Real>::Joint> free_joints(
       const Integration<Real> &c) {
@@ -225,7 +226,7 @@ class Exponential : public Method<Real> {
     return std::any_of(plant.travel.begin(), plant.travel.end(),
                        [](const Real &most) { return worst(most) > 0.0; });
   }
-  const Real *kept(int row) const { return steps.extra(row) + steps.extras - 3 * n; }
+  const Real *kept(int row) const { return steps.extra(row) + steps.extras - 3 * n - 1; }
 
   // q, v of a state of the modes, into z (room for 2 n + 4).
   void place(const Real *e, const Real *ed, Real *z) const {
@@ -251,8 +252,8 @@ class Exponential : public Method<Real> {
       else if (!c.plant.locked[i])
         given += c.acts.drive(i, q, v) * v[e_];
     }
-    accounts.record(steps.extra(row), forces, q, v, ed, slope[2 * n + LOSS], given);
-    Real *keep = steps.extra(row) + steps.extras - 3 * n;
+    Real *keep = steps.extra(row) + steps.extras - 3 * n - 1;
+    keep[3 * n] = accounts.record(steps.extra(row), forces, q, v, ed, slope[2 * n + LOSS], given);
     std::copy(slope + n, slope + 2 * n, keep);
     std::copy(state, state + 2 * n, keep + n);
   }
@@ -333,11 +334,12 @@ class Exponential : public Method<Real> {
     }
   }
 
-  // Robot k's last values of N, in its new modes.
+  // Robot k's last values of N, and of what it loses besides, in its new modes.
   void transform_history(int k) {
     for (int age = 0; age < steps.count[k]; ++age) {
       const int row = steps.row(age);
       const Real *a = kept(row), *q = a + n, *v = q + n;
+      double rest = lane(a[3 * n], k);
       for (int mode = 0; mode < n; ++mode) {
         double e = 0.0, ed = 0.0, force = 0.0;
         for (int i = 0; i < n; ++i) {
@@ -346,7 +348,9 @@ class Exponential : public Method<Real> {
         }
         set_lane(steps.N[row][mode], k,
                  force + lane(modes.w2[mode], k) * e + lane(modes.own[mode], k) * ed);
+        rest -= lane(modes.material[mode], k) * ed * ed;
       }
+      set_lane(accounts.rest_of(steps.extra(row)), k, rest);
     }
   }
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...control import DriveFunction, Sampled
+from ...errors import numerical_failure
 from ...io import STATIONS
 from ...signals import Drive
 from ...system import System
@@ -65,7 +66,7 @@ class Integration:
             problem.method,
         )
         self.t, self.drive, self.rtol, self.progress = t, drive, rtol, progress
-        self.ends, self.ended = problem.ends, False
+        self.ends, self.ended, self.budget = problem.ends, False, problem.budget
         self.ticks, marks, self.span = np.zeros(0), np.zeros(0), float(t[-1] - t[0])
         self.longest = (
             self.span / LEAST_STEPS
@@ -111,19 +112,28 @@ class Integration:
     def run(self) -> Solution:
         """The whole run."""
         begun, complete = time.perf_counter(), False
+        self.late = begun + self.budget.wall_s
         try:
-            self._arrive()
-            self.method = self._method(self.asked)
-            self._show(self.t[:1], lambda s: self.z)
-            complete = len(self.t) == 1 or self._go()
+            with np.errstate(all="ignore"):
+                self._arrive()
+                self.method = self._method(self.asked)
+                self._show(self.t[:1], lambda s: self.z)
+                complete = len(self.t) == 1 or self._go()
         except KeyboardInterrupt:
             name = "interrupted"
             self.events.append({"t": self.now, "level": "WARN", "name": name, "text": name})
+        except Exception as error:
+            why = numerical_failure(error)
+            if why is None:
+                raise
+            text = f"the simulation got no further than t = {self.now:.6g} s: {why}"
+            self.events.append({"t": self.now, "level": "ERROR", "name": "diverged", "text": text})
         meta = {
             "steps": self.steps,
             "evaluations": self.evaluations + self.equations.evaluations,
             "wall_s": time.perf_counter() - begun,
             "complete": complete,
+            "max_steps": self.budget.steps,
             "events": self.events,
             "drive": self.drive.spec() if hasattr(self.drive, "spec") else "Python function",
             "rtol": self.rtol,
@@ -234,6 +244,11 @@ class Integration:
                 self.events.append({"t": self.now, "level": "ERROR", "name": "stuck", "text": text})
                 return ()
             self.steps += 1
+            over = "exhausted" if self.steps >= self.budget.steps else "wall_time"
+            if over == "exhausted" or time.perf_counter() > self.late:
+                told = self.budget.event(over, self.now, self.method, self.steps, float(self.t[0]))
+                self.events.append(told)
+                return ()
             line, self.now, self.z, self.length = (
                 solver.dense_output(),
                 float(solver.t),

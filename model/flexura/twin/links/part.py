@@ -167,7 +167,14 @@ class PointMass:
         return np.array([[self.along, -self.across], [self.across, self.along]])
 
     def centre(self, motion: Motion) -> Motion:
-        """The motion of its centre from that of the place where it is fixed."""
+        """The motion of the body's centre.
+
+        Args:
+            motion: of the place where it is fixed.
+
+        Returns:
+            The centre's motion.
+        """
         if not (self.along or self.across):
             return motion
         way = _tangent(motion.angle) @ self.offset.T

@@ -11,6 +11,7 @@
 
 enum {
   ENCODERS = 2,
+  MOTORS = 2,
   LINES = 16,
   VECTORS = 64,
   PORTS = 12,
@@ -24,21 +25,25 @@ enum {
   FORWARD = 1,
   REVERSE,
   ENABLE,
+  FORWARD_2,
+  REVERSE_2,
+  ENABLE_2,
   STEP,
   STEP_UP,
-  STEP_DISABLE
+  STEP_DISABLE,
+  ROLES
 }; /* what a line does for the plant; 0: only watched */
 
 typedef struct {            /* shared with Python: all doubles, see simulator.py */
   double encoder[ENCODERS]; /* in: position at the window's end [counts, x4] */
-  double duty; /* out: mean of forward minus reverse while the bridge is enabled, over the window,
-                  -1..1 */
+  double duty[MOTORS]; /* out: mean of forward minus reverse while the bridge is enabled, over the
+                          window, -1..1 */
   double
       steps; /* out: steps taken since the start, with sign, counted while the driver was enabled */
   double steps_mean;   /* out: mean of `steps` over the window's time */
-  double motor_on;     /* out: 1 while the motor's driver is enabled */
+  double motor_on[MOTORS]; /* out: 1 while the motor's driver is enabled */
   double stepper_on;   /* out: 1 while the stepper's driver is enabled */
-  double driven_cycle; /* out: the last cycle at which the bridge was enabled */
+  double driven_cycle; /* out: the last cycle at which a bridge was enabled */
   double step_cycle;   /* out: the last cycle at which the stepper driver was enabled */
   double resets;       /* out: resets since the start, power-on not counted */
 } window_t;
@@ -91,14 +96,14 @@ struct board {
   encoder_t encoder[ENCODERS];
   line_t lines[LINES];
   uint32_t line_count;
-  uint8_t level_of[8];                /* by role */
-  const avr_timer_t *timer[STEP + 1]; /* of the compare pins, by role, and their comparators */
-  const avr_timer_comp_t *comparator[STEP + 1];
-  uint8_t cut[STEP_DISABLE + 1]; /* by role: its wire is broken */
+  uint8_t level_of[ROLES];         /* by role */
+  const avr_timer_t *timer[ROLES]; /* of the compare pins, by role, and their comparators */
+  const avr_timer_comp_t *comparator[ROLES];
+  uint8_t cut[ROLES];            /* by role: its wire is broken */
   int unsettled;                 /* a line is not at the level that simavr believes */
-  int motor;                     /* -1, 0, 1: how the pins drive the motor now */
-  uint64_t motor_since;
-  double motor_sum;
+  int motor[MOTORS];             /* -1, 0, 1: how the pins drive the motor now */
+  uint64_t motor_since[MOTORS];
+  double motor_sum[MOTORS];
   uint64_t begin; /* the window's first cycle */
   double
       steps_late; /* sum of the window's steps, each by how long after its begin it came [cycles] */

@@ -197,8 +197,8 @@ int board_run(board_t *b, uint64_t until, uint32_t slice) {
   avr_t *avr = b->avr;
   uint64_t armed = 0;
   const uint64_t begin = b->begin = avr->cycle;
-  b->motor_sum = b->steps_late = 0;
-  b->motor_since = begin;
+  b->steps_late = 0;
+  for (int m = 0; m < MOTORS; ++m) b->motor_sum[m] = 0, b->motor_since[m] = begin;
   for (int i = 0; i < ENCODERS; ++i)
     if (b->encoder[i].wired) turn(b, &b->encoder[i], b->window.encoder[i], begin, until);
   while (avr->cycle < until) {
@@ -239,7 +239,7 @@ int board_run(board_t *b, uint64_t until, uint32_t slice) {
   }
   on_drive(b);
   const double span = (double)(avr->cycle - begin);
-  b->window.duty = span > 0 ? b->motor_sum / span : 0;
+  for (int m = 0; m < MOTORS; ++m) b->window.duty[m] = span > 0 ? b->motor_sum[m] / span : 0;
   b->window.steps_mean = b->window.steps - (span > 0 ? b->steps_late / span : 0);
   return avr->state == cpu_Done || avr->state == cpu_Crashed;
 }

@@ -62,6 +62,10 @@ void turn(board_t *b, encoder_t *encoder, double position, uint64_t begin, uint6
 
 /* ---- what the firmware does */
 
+static int is_pwm(int role) {
+  return role == FORWARD || role == REVERSE || role == FORWARD_2 || role == REVERSE_2;
+}
+
 static int always_on(const board_t *b, int role) {
   const avr_timer_comp_t *comparator = b->comparator[role];
   if (!comparator || b->cut[role] || avr_regbit_get(b->avr, comparator->com) != avr_timer_com_clear)
@@ -84,15 +88,18 @@ static int still_high(const board_t *b, int role) {
 void on_drive(board_t *b) {
   const uint64_t now = b->avr->cycle;
   window_t *w = &b->window;
-  b->motor_sum += b->motor * (double)(now - b->motor_since);
-  b->motor_since = now;
-  if (w->motor_on != 0) w->driven_cycle = (double)now;
   if (w->stepper_on != 0) w->step_cycle = (double)now;
-  w->motor_on = b->level_of[ENABLE];
   w->stepper_on = !b->level_of[STEP_DISABLE];
-  const int forward = b->level_of[FORWARD] || always_on(b, FORWARD),
-            reverse = b->level_of[REVERSE] || always_on(b, REVERSE);
-  b->motor = b->level_of[ENABLE] ? forward - reverse : 0;
+  for (int m = 0; m < MOTORS; ++m) {
+    const int roles = m * (FORWARD_2 - FORWARD);
+    b->motor_sum[m] += b->motor[m] * (double)(now - b->motor_since[m]);
+    b->motor_since[m] = now;
+    if (w->motor_on[m] != 0) w->driven_cycle = (double)now;
+    w->motor_on[m] = b->level_of[ENABLE + roles];
+    const int forward = b->level_of[FORWARD + roles] || always_on(b, FORWARD + roles),
+              reverse = b->level_of[REVERSE + roles] || always_on(b, REVERSE + roles);
+    b->motor[m] = b->level_of[ENABLE + roles] ? forward - reverse : 0;
+  }
 }
 
 static void on_edge(struct avr_irq_t *irq, uint32_t value, void *param) {
@@ -101,8 +108,7 @@ static void on_edge(struct avr_irq_t *irq, uint32_t value, void *param) {
   board_t *b = line->board;
   const uint8_t level = line->cut ? line->rest : value & 1;
   if (level == line->level) return;
-  if ((line->role == FORWARD || line->role == REVERSE) && !level && !line->cut &&
-      still_high(b, line->role)) {
+  if (is_pwm(line->role) && !level && !line->cut && still_high(b, line->role)) {
     line->irq->flags |= IRQ_FLAG_INIT; /* simavr tells of the next change, which is none for it */
     return;
   }
@@ -181,7 +187,7 @@ int board_line(board_t *b, char port, int bit, int role, int rest, int traced) {
                    .rest = (uint8_t)rest,
                    .level = (uint8_t)rest};
   b->level_of[role] = (uint8_t)rest;
-  if (role == FORWARD || role == REVERSE || role == STEP) follow_timer(b, port, bit, role);
+  if (is_pwm(role) || role == STEP) follow_timer(b, port, bit, role);
   avr_irq_register_notify(irq, on_edge, line);
   return (int)line->index;
 }

@@ -1,6 +1,6 @@
 """Runs the tests of the board's library, or of the host's protocol, against mutants of them.
 
-    python tests/mutation.py [--part K/N] [--out FILE] [NAME...]
+    python tests/support/mutation.py [--part K/N] [--out FILE] [NAME...]
 
 NAME is safety, protocol, control, rig or link; without it all. K/N takes every N-th mutant from the
 K-th on, so that one long run may be done in parts. Each mutant that no test notices is printed; the
@@ -58,6 +58,8 @@ MAINS = {
     "unit": [f"-I{FIRMWARE / 'test'}", str(FIRMWARE / "test/test_lib/test_main.cpp")],
     "refusals": [f"-I{FIRMWARE / 'test'}", str(FIRMWARE / "test/test_refusals/test_main.cpp")],
     "faults": [f"-I{FIRMWARE / 'test'}", str(FIRMWARE / "test/test_faults/test_main.cpp")],
+    "rig": [f"-I{FIRMWARE / 'test'}", str(FIRMWARE / "test/test_rig/test_main.cpp")],
+    "session": [f"-I{FIRMWARE / 'test'}", str(FIRMWARE / "test/test_session/test_main.cpp")],
     "frames": [str(HERE / "fuzz_frames.cpp")],
     "replay": ["-DREPLAY", str(HERE / "fuzz_session.cpp")],
 }
@@ -65,7 +67,9 @@ ARGUMENTS = {
     "frames": ["100000", "7"],
     "replay": [str(path) for path in sorted((HERE / "corpus").iterdir())],
 }
-CXX = ["g++", "-std=gnu++14", "-O0", "-w"]
+# Undefined behaviour ends the program: of a mutant it is noticed, too.
+TRAPS = ["-fsanitize=undefined", "-fsanitize-undefined-trap-on-error"]
+CXX = ["g++", "-std=gnu++14", "-O0", "-w", *TRAPS]
 
 
 class Outcome(NamedTuple):
@@ -123,7 +127,8 @@ class Board:
         if mutant:
             place = self.folder / "mutant"
             shutil.rmtree(place, ignore_errors=True)
-            place.mkdir()
+            # With all that stands beside it: a header is looked for beside the one that names it.
+            shutil.copytree((ROOT / mutant.file).parent, place)
             text = (ROOT / mutant.file).read_text(encoding="utf-8")
             (place / Path(mutant.file).name).write_text(mutant.apply(text), encoding="utf-8")
             own = place / source.name

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from programs import Ended, Program
+from .programs import Ended, Program
 
 LAW = ["rig", "rig-inverse-law"]
 TUNE = ["tune", "rig", "rig-step", "--controller", "rig", "--rig", "rig", "--jobs", "1"]
@@ -107,7 +107,7 @@ class Place:
 
     def old_robot(self, work: Path) -> None:
         """A robot file with keys of an older version, for `migrate`."""
-        shipped = Path(__file__).resolve().parents[2] / "model" / "robots" / "single-r.toml"
+        shipped = Path(__file__).resolve().parents[3] / "model" / "robots" / "single-r.toml"
         text = shipped.read_text().replace(
             "[link.joint]", "[link.joint]\nviscous_friction = 0.001", 1
         )

@@ -6,7 +6,7 @@ import shutil
 import subprocess
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE, HERE = ROOT / "firmware", ROOT / "tests" / "firmware"
 SOURCES = [str(path) for path in sorted(FIRMWARE.glob("lib/*/src/*.cpp"))]
 INCLUDES = [f"-I{path}" for path in sorted(FIRMWARE.glob("lib/*/src"))]

@@ -17,18 +17,24 @@ import traceback
 from typing import Any
 
 KINDS = {"write": 1, "sync": 2, "rename": 3, "create": 4, "allocation": 5, "array": 6}
-HEAVY = ("matplotlib.backends.backend_agg", "matplotlib.backends.backend_svg", "pyarrow.parquet")
+LIGHT = ("simulate", "new")  # commands of the quick tests
+HEAVY = ("matplotlib.backends.backend_agg", "matplotlib.backends.backend_svg")
 HEAVY += ("matplotlib.pyplot", "rerun", "pymoo.algorithms.soo.nonconvex.ga", "scipy.io", "PIL")
 
 
 def main() -> None:
     shim = ctypes.CDLL(None)
     cli = importlib.import_module("flexlab.cli.app")
-    for name in (*HEAVY, *(f"flexlab.cli.{command}" for command in cli.COMMANDS)):
-        importlib.import_module(name)
+    importlib.import_module("flexlab.cli.simulate")
+    importlib.import_module("pyarrow.parquet")
     print("ready", flush=True)
+    light = True
     for line in sys.stdin:
         asked = json.loads(line)
+        if light and asked["arguments"][0] not in LIGHT:
+            light = False
+            for name in (*HEAVY, *(f"flexlab.cli.{command}" for command in cli.COMMANDS)):
+                importlib.import_module(name)
         child = os.fork()
         if child == 0:
             _run(cli, shim, asked)

@@ -1,0 +1,207 @@
+// Copyright (c) 2026 the flexura authors. SPDX-License-Identifier: MIT
+// Rigs with other drives than a carriage and a stepper: motors that turn their joints, one joint
+// alone, a stepper without an encoder.
+#include <stdlib.h>
+#include <string.h>
+
+#include "bench.h"
+#include "check.h"
+#include "session.h"  // PlatformIO looks for libraries in this file only
+
+static void nothing(uint16_t) {}
+
+// A rig whose joints are turned by motors, or which has but one joint.
+static void turning(float drive_2, float encoder_2 = 1) {
+  Config config = default_config();
+  config.drive_1() = 2;
+  config.drive_2() = drive_2;
+  config.encoder_2() = encoder_2;
+  begin(config);
+  Inputs &in = rig.inputs();
+  memset(&in, 0, sizeof in);
+  in.flex = 3500;
+  in.supply = 500;
+  tick();
+  const Reference reference = {0, 0, 0};
+  CHECK(ask(Reference::kCode, &reference) == Result::ok);
+}
+
+static Fault fault_of_motor_2(void (*moves)(uint16_t), int16_t mV, uint16_t most = 450) {
+  turning(2);
+  const Arm arm = {static_cast<uint8_t>(Mode::open_loop)};
+  const Start start = {6};
+  Drives drives = {};
+  drives.count = 8;
+  for (uint8_t k = 0; k < 8; ++k) drives.voltage_2[k] = mV / 2;
+  CHECK(ask(Arm::kCode, &arm) == Result::ok && ask(Drives::kCode, &drives) == Result::ok);
+  CHECK(ask(Start::kCode, &start) == Result::ok);
+  Inputs &in = rig.inputs();
+  for (uint16_t k = 0; k < most && rig.state() != State::fault; ++k) {
+    if (k % 50 == 0) rig.host_spoke();
+    in.moved[0] = in.moved[1] = 0;
+    memset(in.edges, 0, sizeof in.edges);
+    moves(k);
+    rig.prepare();
+    rig.tick(out);
+    CHECK(out.duty[0] == 0 && out.steps.count == 0);
+    if (k == 30 && mV) CHECK((out.duty[1] > 0) == (mV > 0));
+  }
+  return rig.fault();
+}
+
+static void turns(uint16_t k) {  // 0.5 rad/s at 100 counts/rad, forth and back
+  if (k % 20 == 0) {
+    rig.inputs().moved[1] = 1;
+    rig.inputs().edges[1][k % 40 == 0] = 1;
+  }
+}
+static void turns_back(uint16_t k) {
+  if (k % 20 == 0) {
+    rig.inputs().moved[1] = -1;
+    rig.inputs().edges[1][k % 40 == 0] = 1;
+  }
+}
+static void turns_fast(uint16_t) {
+  rig.inputs().moved[1] = 8;
+  rig.inputs().edges[1][0] = rig.inputs().edges[1][1] = 4;
+}
+static void one_line_of_2(uint16_t k) {
+  rig.inputs().moved[1] = k & 1 ? 1 : -1;
+  rig.inputs().edges[1][0] = 1;
+}
+static void misses_2(uint16_t) { rig.inputs().missed[1] = 1; }
+
+static void a_motor_at_joint_2_is_watched_as_one_at_joint_1() {
+  CHECK(fault_of_motor_2(nothing, 3000) == Fault::stall_2);
+  CHECK(fault_of_motor_2(nothing, 1000, 300) == Fault::none);
+  CHECK(fault_of_motor_2(turns, 3000, 300) == Fault::none);
+  CHECK(fault_of_motor_2(turns, 3000) == Fault::travel_2);  // 0.2 rad
+  CHECK(fault_of_motor_2(turns_back, 3000) == Fault::runaway_2);
+  CHECK(fault_of_motor_2(turns_back, -3000, 300) == Fault::none);
+  CHECK(fault_of_motor_2(turns_fast, 3000) == Fault::speed_2);
+  CHECK(fault_of_motor_2(one_line_of_2, 3000) == Fault::encoder_2);
+  CHECK(fault_of_motor_2(misses_2, 1000) == Fault::encoder_2);
+}
+
+static void both_motors_hold_their_set_points() {
+  turning(2);
+  const Arm arm = {static_cast<uint8_t>(Mode::position)};
+  CHECK(ask(Arm::kCode, &arm) == Result::ok);
+  Setpoints points = {};
+  points.count = 2;
+  points.final = 1;
+  for (uint8_t k = 0; k < 2; ++k) {  // off by less than a following error
+    points.position_1[k] = 5 * 256;
+    points.position_2[k] = -5 * 256;
+  }
+  const Start start = {3};
+  CHECK(ask(Setpoints::kCode, &points) == Result::ok && ask(Start::kCode, &start) == Result::ok);
+  tick(20);
+  // 5 V/rad x 0.05 rad of 12 V: 16.7 PWM counts of 800
+  CHECK(rig.state() == State::running && out.duty[0] == 17 && out.duty[1] == -17);
+  Telemetry report;
+  rig.report(report);
+  CHECK(abs(report.voltage - 125) <= 1 && abs(report.voltage_2 + 125) <= 1);  // 0.25 V
+  CHECK(report.rate == 0);
+  CHECK(!(report.flags >> static_cast<uint8_t>(Flag::driver_enabled) & 1));
+}
+
+static void a_rig_of_one_joint_moves_and_hears_nothing_of_a_second() {
+  turning(0);
+  const Reference elsewhere = {0, 3, 0}, pulses = {0, 0, 5};
+  CHECK(ask(Reference::kCode, &elsewhere) == Result::out_of_range);
+  CHECK(ask(Reference::kCode, &pulses) == Result::out_of_range);
+  Arm arm = {static_cast<uint8_t>(Mode::open_loop)};
+  CHECK(ask(Arm::kCode, &arm) == Result::ok);
+  Drives drives = {};
+  drives.count = 8;
+  drives.rate[7] = 1;
+  CHECK(ask(Drives::kCode, &drives) == Result::out_of_range);
+  drives.rate[7] = 0;
+  drives.voltage_2[3] = 1;
+  CHECK(ask(Drives::kCode, &drives) == Result::out_of_range);
+  CHECK(ask(Stop::kCode) == Result::ok);
+  arm.mode = static_cast<uint8_t>(Mode::position);
+  CHECK(ask(Arm::kCode, &arm) == Result::ok);
+  Setpoints points = {};
+  points.count = 2;
+  points.final = 1;
+  points.position_2[1] = 1;
+  CHECK(ask(Setpoints::kCode, &points) == Result::out_of_range);
+  points.position_2[1] = 0;
+  points.position_1[0] = points.position_1[1] = 5 * 256;
+  const Start start = {3};
+  CHECK(ask(Setpoints::kCode, &points) == Result::ok && ask(Start::kCode, &start) == Result::ok);
+  Inputs &in = rig.inputs();
+  in.missed[1] = 9;  // its wires hang in the air
+  in.flooded[1] = true;
+  in.moved[1] = 7;
+  rig.prepare();
+  rig.tick(out);
+  tick(20);
+  CHECK(rig.state() == State::running && out.duty[0] > 0 && out.duty[1] == 0);
+  CHECK(out.steps.count == 0);
+  Telemetry report;
+  rig.report(report);
+  CHECK(report.position_2 == 0 && report.missed == 0);
+}
+
+static void a_stepper_without_an_encoder_is_where_its_pulses_are() {
+  Config config = default_config();
+  config.encoder_2() = 0;
+  config.feedback_2() = 1;
+  begin(config);
+  Inputs &in = rig.inputs();
+  memset(&in, 0, sizeof in);
+  in.flex = 3500;
+  in.supply = 500;
+  tick();
+  const Reference reference = {0, 12, 12}, apart = {0, 500, 0};
+  CHECK(ask(Reference::kCode, &apart) == Result::out_of_range);
+  CHECK(ask(Reference::kCode, &reference) == Result::ok);
+  const Arm arm = {static_cast<uint8_t>(Mode::open_loop)};
+  CHECK(ask(Arm::kCode, &arm) == Result::ok);
+  Drives drives = {};
+  drives.count = 8;
+  for (uint8_t k = 0; k < 8; ++k) drives.rate[k] = 400;
+  const Start start = {6};
+  CHECK(ask(Drives::kCode, &drives) == Result::ok && ask(Start::kCode, &start) == Result::ok);
+  for (uint16_t k = 0; k < 150; ++k) {
+    in.moved[1] = 5;  // an open line catches noise
+    in.missed[1] = 1;
+    in.edges[1][0] = 5;
+    in.flooded[1] = true;
+    in.stepped = static_cast<int8_t>(out.steps.up ? out.steps.count : -out.steps.count);
+    rig.prepare();
+    rig.tick(out);
+  }
+  CHECK(rig.state() == State::running);
+  Telemetry report;
+  rig.report(report);
+  CHECK(report.steps > 30 && report.position_2 == report.steps);
+}
+
+static void a_motor_needs_its_pins_and_its_encoder() {
+  Config config = default_config();
+  FixedPointConfig fixed;
+  config.drive_2() = 2;
+  CHECK(to_fixed_point(config, fixed) == kAllValid);
+  config.encoder_2() = 0;
+  CHECK(to_fixed_point(config, fixed) == ITEM(encoder_2));
+  config.encoder_2() = 1;
+  const Stored stored = {config, kFirmware};
+  rig = Rig();
+  rig.begin(&stored, 1, kFirmware, 1);
+  CHECK(rig.fault() == Fault::bad_configuration && rig.drive(1) == Drive::stepper);
+  const ConfigWrite write = {ITEM(drive_2), 2.0f};
+  CHECK(ask(ConfigWrite::kCode, &write) == Result::ok && rig.wrong_item() == ITEM(drive_2));
+}
+
+static void tests() {
+  RUN(a_motor_at_joint_2_is_watched_as_one_at_joint_1);
+  RUN(both_motors_hold_their_set_points);
+  RUN(a_rig_of_one_joint_moves_and_hears_nothing_of_a_second);
+  RUN(a_stepper_without_an_encoder_is_where_its_pulses_are);
+  RUN(a_motor_needs_its_pins_and_its_encoder);
+}
+CHECK_MAIN(tests())

@@ -1,0 +1,7 @@
+"""Whole motions as the unknown: tip inversion, shortest motions, derivatives by parameters."""
+
+from .feedforward_manoeuvre import feedforward
+from .posture import inverse_kinematics
+from .tip_inversion import invert
+
+__all__ = ["feedforward", "inverse_kinematics", "invert"]

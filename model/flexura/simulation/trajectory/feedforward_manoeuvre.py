@@ -1,0 +1,45 @@
+"""A run's motions and drives as a manoeuvre: feedforward, and what a controller follows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ...io import Run, array, number
+from ...signals import Drive, JointDrive, Manoeuvre, table
+
+
+def feedforward(run: Run, kp: Any = 0.0, kd: Any = 0.0) -> Manoeuvre:
+    """A manoeuvre in which each joint has the run's drive as its force, and the run's position as
+    the motion to follow; it begins at 0 s.
+
+    Args:
+        run: of `invert`, `time_optimal` or `inverse`.
+        kp: gains of the positions, one for all joints or one a joint. Without gains a run of the
+            manoeuvre needs `manoeuvre.prescribed()` or a controller.
+        kd: gains of the velocities.
+
+    Raises:
+        InputError: an argument is not what is expected.
+    """
+    joints = sum(1 for name in run if name.startswith("joint/") and name.endswith("/drive"))
+    gains = []
+    for key, value in (("kp", kp), ("kd", kd)):
+        given = array(value, key, f"expected a number, or {joints} of them, one a joint")
+        gains.append(
+            [
+                number(given.item() if given.ndim == 0 else x, key)
+                for x in (given if given.ndim else [given] * joints)
+            ]
+        )
+    t = run.t - run.t[0]
+    drives = tuple(
+        JointDrive(
+            force=table(t, run[f"joint/{i}/drive"]),
+            motion=table(t, run[f"joint/{i}/position"]),
+            kp=p,
+            kd=d,
+        )
+        for i, (p, d) in enumerate(zip(*gains, strict=True), 1)
+    )
+    span = float(t[-1])
+    return Manoeuvre("feedforward", span, span / max(len(t) - 1, 1), Drive(drives))

@@ -1,0 +1,1 @@
+"""Commands that are disturbed: files that fail, memory that is short, signals, lost power."""

@@ -1,0 +1,1 @@
+"""Seeded generators of well-formed inputs, with what must hold of each."""
