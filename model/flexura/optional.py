@@ -15,6 +15,8 @@ EXTRAS = {
     "xarray": "export",
     "mcap": "export",
     "nptdms": "export",
+    "h5py": "logs",
+    "rosbags": "logs",
     "platformio": "board",
     "serial": "board",
     "SCons": "board",

@@ -6,6 +6,7 @@ from __future__ import annotations
 import errno
 import gc
 import importlib
+import keyword
 import sys
 from typing import Annotated, Any, NoReturn
 
@@ -28,10 +29,12 @@ COMMANDS = {
     "tune": "Find a controller's gains on the simulator.",
     "bench": "Run experiments on the rig, real or emulated.",
     "identify": "Identify physical parameters from an experiment.",
+    "vibration": "Find frequency and damping of a free vibration.",
     "compare": "Compare an experiment with its simulation, or two runs.",
-    "review": "Look at one run, or at two side by side, in Rerun.",
+    "review": "Look at one run, or several side by side, in Rerun.",
     "plot": "Draw a run over time, for a screen or for print.",
     "animate": "Write a run as a film.",
+    "import": "Read a log of another program as a run.",
     "export": "Write a run in another program's format.",
     "migrate": "Rename old keys of files.",
     "new": "Write a commented robot file to begin with.",
@@ -53,11 +56,12 @@ class Commands(TyperGroup):
         """Import a command; None for a name that is none."""
         if cmd_name not in COMMANDS:
             return None
-        module = importlib.import_module(f"flexlab.cli.{cmd_name}")
+        word = f"{cmd_name}_" if keyword.iskeyword(cmd_name) else cmd_name
+        module = importlib.import_module(f"flexlab.cli.{word}")
         own = getattr(module, "app", None)
         if own is None:
             own = typer.Typer(**PLAIN)
-            own.command(cmd_name)(getattr(module, cmd_name))
+            own.command(cmd_name)(getattr(module, word))
         command = typer.main.get_command(own)
         command.name = cmd_name
         return command

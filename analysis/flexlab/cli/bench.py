@@ -23,6 +23,7 @@ from ..experiment import excitation, plan
 from ..experiment import run_experiment as steps
 from ..experiment.flash import RIG
 from ..experiment.stop_requests import KEYS_HELP, watch_for_stop
+from ..identification.vibration.shapers import read_shaper, shaped
 from ..recordings.flex_calibration import read as read_calibration
 from ..recordings.recording import unfinished
 from ..recordings.run_from_recording import run_from_recording
@@ -54,7 +55,7 @@ from .bench_tables import (
     selftest_table,
 )
 from .bench_tables import live as live_view
-from .options import Force
+from .options import Force, ShaperFile
 from .output import events, message, print_results
 from .results import refuse_taken
 
@@ -162,6 +163,7 @@ def inverse(
         ),
     ] = None,
     gains: Gains = None,
+    shaper: ShaperFile = None,
     *,
     options: BenchOptions,
 ) -> None:
@@ -172,12 +174,14 @@ def inverse(
     \b
     Example: flexura bench inverse --manoeuvre rig-inverse-law
     """
+    filed = None if shaper is None else read_shaper(shaper)
 
     def ask(bench: Any, settings: Any) -> Any:
         joints = bench.rig.joints
         asked = None if manoeuvre is None else fx.load_manoeuvre(manoeuvre, joints)
         try:
-            return plan.inverse(bench, settings, asked)
+            chosen = asked or bench.manoeuvre
+            return plan.inverse(bench, settings, shaped(chosen, filed) if filed else chosen)
         except fx.InputError as error:
             raise error.in_file(str(manoeuvre) if manoeuvre else bench.rig.manoeuvre) from None
 

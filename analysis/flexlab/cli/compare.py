@@ -20,6 +20,9 @@ from ..comparison.replay.simulate_experiment import simulate_experiment
 from ..comparison.report import html, png
 from ..review import picture as draw
 from ..review import write_review
+from ..runs.alignment import best_shift, shifted
+from ..runs.deviation import common
+from ..runs.formatting import finite
 from .options import Force, Json, Rtol
 from .output import events, message, print_results, progress_bars
 from .results import counted, file_result, results
@@ -48,6 +51,14 @@ def compare(
         Path | None,
         typer.Option(metavar="ROBOT", help="robot file to simulate instead of the run's own"),
     ] = None,
+    align: Annotated[
+        bool,
+        typer.Option("--align", help="move RUN2 in time by what makes both agree best"),
+    ] = False,
+    shift: Annotated[
+        float | None,
+        typer.Option(metavar="SECONDS", help="add this to RUN2's times; may be negative"),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -69,6 +80,7 @@ def compare(
     Example: flexura compare logs/experiment --by commanded
     """
     need("matplotlib", "rerun")
+    moved = _moved(other, align, shift)
     first = fx.Run.read(run)
     home = run if run.is_dir() else run.parent
     target = counted(home / "comparison", folder=True) if out is None else out
@@ -81,7 +93,15 @@ def compare(
                         key=f"--{key}",
                         value=str(value),
                     )
-            first, second = simulation_first(first, fx.Run.read(other))
+            second = fx.Run.read(other)
+            if align:
+                found_shift = best_shift(first, second)
+                moved = (found_shift.seconds, found_shift.correlation)
+            if moved is not None:
+                second = shifted(second, moved[0])
+            if not common(first, second).any():
+                raise fx.InputError(_apart(first, second), key="RUN2", value=str(other))
+            first, second = simulation_first(first, second)
         else:
             described = None if robot is None else fx.load(robot)
             with progress_bars("native") as report:
@@ -100,7 +120,12 @@ def compare(
         folder = draft.keep(interrupted=first.interrupted)
     paths = [folder / name for name in names] + ([] if picture is None else [picture])
     data: dict[str, Any] = table.numbers(found) | {"stored": [str(path) for path in paths]}
+    if moved is not None:
+        data |= {"shift_s": moved[0], "correlation": finite(moved[1])}
     print_results(json, lambda: table.table(found), lambda: data)
+    if moved is not None:
+        fits = f"; correlation {moved[1]:.4f}" if align else ""
+        message(json, f"{other}: {moved[0]:.6g} s added to its times{fits}")
     for each in (first, second):
         events(each)
     message(
@@ -110,6 +135,23 @@ def compare(
     )
     if not first.complete:
         raise typer.Exit(130 if first.interrupted else 1)
+
+
+def _moved(other: Path | None, align: bool, shift: float | None) -> tuple[float, float] | None:
+    """The shift that is asked for, and NaN for its correlation; None for no shift, or --align."""
+    if align and shift is not None:
+        raise fx.InputError("expected --align or --shift, not both", key="--shift", value=shift)
+    if other is None and (align or shift is not None):
+        raise fx.InputError("expected two runs: the second is moved", key="RUN2")
+    return None if shift is None else (shift, float("nan"))
+
+
+def _apart(first: fx.Run, second: fx.Run) -> str:
+    spans = (
+        f"{run.t[0]:.6g} to {run.t[-1]:.6g} s" if len(run) else "nothing" for run in (first, second)
+    )
+    both = " and ".join(spans)
+    return f"no time in common: {both}; --align finds the shift, --shift SECONDS sets it"
 
 
 def save(c: Comparison, folder: Path, *, simulated: bool) -> list[Path]:

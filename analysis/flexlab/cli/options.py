@@ -39,6 +39,14 @@ Rtol = Annotated[float, typer.Option(help="relative tolerance of the native solv
 Prescribed = Annotated[
     bool, typer.Option("--prescribed", help="follow the manoeuvre's motions exactly")
 ]
+ShaperFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--shaper",
+        metavar="FILE",
+        help="input shaper (TOML, of flexura vibration): the manoeuvre's motions are shaped",
+    ),
+]
 MaxSteps = Annotated[
     int | None,
     typer.Option(metavar="N", help="budget of steps; it ends the run; default 20 million"),

@@ -11,8 +11,9 @@ import flexura as fx
 from flexura.population import is_population
 
 from .. import review as rerun
+from ..runs.deviation import common
 from .options import ForceFile, Json
-from .output import message, print_results
+from .output import message, print_results, warn
 from .results import counted, file_result
 from .runs import RobotNumber, one_run
 
@@ -21,8 +22,8 @@ def review(
     runs: Annotated[
         list[Path],
         typer.Argument(
-            metavar="RUN [RUN]",
-            help="one or two folders of runs, or of a population with --robot; or a review, .rrd",
+            metavar="RUN [RUN...]",
+            help="up to six folders of runs, or of a population with --robot; or a review, .rrd",
         ),
     ],
     save: Annotated[
@@ -43,13 +44,14 @@ def review(
     force: ForceFile = False,
     json: Json = False,
 ) -> None:
-    """Look at one run, or at two side by side, in Rerun.
+    """Look at one run, or at several side by side, in Rerun.
+
+    The first one is what the others are compared with. A log without a robot is drawn as the robot
+    of another run.
 
     \b
     Example: flexura review logs/first logs/second --save review.rrd
     """
-    if len(runs) > 2:
-        raise fx.InputError("expected one or two runs", key="RUN", value=[str(r) for r in runs])
     if time_s is not None and picture is None:
         raise fx.InputError("expected together with --picture", key="--time-s", value=time_s)
     drawn = None if picture is None else str(picture)
@@ -60,6 +62,9 @@ def review(
                 rerun.picture(target, picture, time_s=time_s)
     else:
         read = [one_run(folder, robot if is_population(folder) else None) for folder in runs]
+        for path, other in zip(runs[1:], read[1:], strict=True):
+            if not common(read[0], other).any():
+                warn(f"{path} has no time in common with {runs[0]}: there is no deviation")
         beside = (runs[0] if runs[0].is_dir() else runs[0].parent) / "review.rrd"
         target = save or (picture.with_suffix(".rrd") if picture else beside)
         if target == beside and target.exists() and not force:

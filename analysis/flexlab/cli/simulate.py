@@ -10,6 +10,7 @@ import typer
 import flexura as fx
 from flexura.io import FILE
 
+from ..identification.vibration.shapers import read_shaper, shaped
 from ..studies import parameter_sweep
 from ..tuning.closed_loop import controller_from_file
 from . import tables
@@ -22,6 +23,7 @@ from .options import (
     Prescribed,
     RobotFile,
     Rtol,
+    ShaperFile,
     Start,
     WallTime,
     stem,
@@ -54,6 +56,7 @@ def simulate(
     ] = None,
     prescribed: Prescribed = False,
     start: Start = None,
+    shaper: ShaperFile = None,
     vary: Annotated[
         list[str] | None,
         typer.Option(
@@ -84,7 +87,8 @@ def simulate(
             value=scheduler,
         )
     if vary:
-        for key, given in (("--force", force), ("--controller", controller)):
+        refused = (("--force", force), ("--controller", controller), ("--shaper", shaper))
+        for key, given in refused:
             if given:
                 raise fx.InputError("expected without --vary", key=key, value=str(given))
         _simulate_many(
@@ -106,6 +110,8 @@ def simulate(
             "expected without --prescribed", key="--controller", value=str(controller)
         )
     system, asked = load_request(robot, manoeuvre, prescribed, start)
+    if shaper is not None:
+        asked = shaped(asked, read_shaper(shaper))
     if not controller:
         check_followed(asked, manoeuvre, "call with --controller GAINS or --prescribed")
     drive = controller_from_file(system, asked, controller) if controller else asked.drive

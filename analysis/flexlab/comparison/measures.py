@@ -159,8 +159,7 @@ def quantity(channel: str) -> str:
 
 def _response(simulation: fx.Run, experiment: fx.Run, channel: str) -> ResponseTimes:
     first, second = (
-        response_time(simulation.t, simulation[channel]),
-        response_time(experiment.t, experiment[channel]),
+        response_time(run.t, run[channel]) - _begin(run) for run in (simulation, experiment)
     )
     relative = second / first - 1 if first > 0 else float("nan")
     return ResponseTimes(
@@ -171,6 +170,11 @@ def _response(simulation: fx.Run, experiment: fx.Run, channel: str) -> ResponseT
         relative,
         best_fit_delay(simulation, experiment, channel),
     )
+
+
+def _begin(run: fx.Run) -> float:
+    """The start of execution [s]: t = 0, or the first sample of a clock that began before."""
+    return max(0.0, float(run.t[0])) if len(run) and "shift_s" not in run.meta else 0.0
 
 
 def response_time(t: np.ndarray, y: np.ndarray) -> float:

@@ -86,6 +86,9 @@ def notes(c: Comparison) -> list[str]:
         "deviation: second minus first, of the first run's peak; the dissertation's figures are of "
         "its own rig"
     )
+    for run in (c.simulation, c.experiment):
+        if shift := run.meta.get("shift_s"):
+            lines.append(f"{called(run)}: {shift:.6g} s added to its times")
     if c.responses:
         lines.append(
             f"response time: from t = 0 until {100 * RESPONSE_LEVEL:g} % of the largest distance "

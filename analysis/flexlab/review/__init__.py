@@ -25,20 +25,20 @@ __all__ = ["open_viewer", "picture", "write_gallery", "write_review"]
 
 
 def write_review(path: str | Path, runs: Sequence[Run]) -> Path:
-    """Write one run, or two to compare, with the layout of the viewer to one .rrd, as a whole or
+    """Write one run, or several to compare, with the viewer's layout to one .rrd, as a whole or
     not at all.
 
-    The first run is the reference: a deviation is second minus first.
+    The first run is the reference: a deviation is another run minus the first.
 
     Args:
         path: of the file.
-        runs: one or two.
+        runs: one to six.
 
     Returns:
         The path.
 
     Raises:
-        InputError: no run, more than two runs, or a run without samples.
+        InputError: no run, too many runs, or a run without samples.
     """
     return write(path, {"": runs})
 

@@ -139,12 +139,15 @@ def _arms(scene: Scene, apart: bool = True) -> list[Any]:
     alone = [arm(label, [f"/{root}/arm/**"]) for root, label, _ in has_shape]
     if len(has_shape) < 2:
         return alone
-    (a, _, first), (b, _, second) = has_shape
-    # One ghost is enough where both arms lie on each other.
-    title = f"{scene.name}: {first}, {second}" if scene.name else f"overlaid: {first}, {second}"
-    both = arm(title, [f"/{a}/arm/**", f"/{b}/arm/**", f"- /{b}/arm/undeformed"])
+    words = ", ".join(said for _, _, said in has_shape)
+    title = f"{scene.name}: {words}" if scene.name else f"overlaid: {words}"
+    # One ghost is enough where the arms lie on each other.
+    ghosts = [f"- /{root}/arm/undeformed" for root, *_ in has_shape[1:]]
+    both = arm(title, [*(f"/{root}/arm/**" for root, *_ in has_shape), *ghosts])
     if not apart:
         return [both, *alone]
+    if len(has_shape) > 2:
+        return [both, rrb.Tabs(*alone)]
     return [
         both,
         rrb.Vertical(*alone) if scene.width > WIDE * scene.height else rrb.Horizontal(*alone),
@@ -217,7 +220,7 @@ def _plots(scene: Scene) -> list[Any]:
     """Up to four columns of plots: joints that slide, joints that turn, links, deviations; what
     belongs together in tabs."""
     signals, columns = scene.signals, []
-    group = CURVES // len(scene.sources)
+    group = max(CURVES // len(scene.sources), 1)
     for unit in ("m", "rad"):
         numbers = _numbers(
             (path for path, s in signals.items() if s.unit == unit), r"/joint/(\d+)/position"
@@ -269,7 +272,7 @@ def _deviations(scene: Scene) -> list[Any]:
     views += _one(
         "of the tip" if views else "deviation of the tip",
         apart,
-        r".*/deviation/(tip/[xy]|tip_distance)",
+        r".*/deviation/(\w+/)?(tip/[xy]|tip_distance)",
     )
     for unit in ("m", "rad"):
         same = {path: s for path, s in apart.items() if s.unit == unit}

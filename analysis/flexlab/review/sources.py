@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,6 +18,8 @@ COLOURS: dict[str, Colour] = {
     "experiment": (32, 164, 84),
 }
 SECOND: Colour = (160, 84, 204)  # the second of two runs from the same kind of source
+FURTHER: tuple[Colour, ...] = (SECOND, (196, 130, 30), (20, 150, 160), (200, 70, 70), (90, 110, 60))
+MOST = 6  # runs of one review
 OTHER: Colour = (110, 110, 110)
 DEVIATION: Colour = (214, 64, 140)
 # The curves of one source in one plot: its own colour, then others near it. Each is seen on the
@@ -35,6 +38,10 @@ NAMES = {
     COLOURS["experiment"]: "green",
     SECOND: "violet",
     OTHER: "grey",
+    FURTHER[1]: "ochre",
+    FURTHER[2]: "teal",
+    FURTHER[3]: "red",
+    FURTHER[4]: "olive",
 }
 
 # drawn as shapes, not as curves over time
@@ -64,10 +71,16 @@ class Source:
 
 
 def sources(runs: Sequence[Run]) -> list[Source]:
-    """One or two runs with their names. Raises InputError for another number of runs, or one
-    without samples."""
-    if not 1 <= len(runs) <= 2:
-        raise InputError("one run, or two to compare", key="runs", value=len(runs))
+    """Up to MOST runs with their names, the first one what others are compared with.
+
+    A run without a robot, as of a log, is drawn as the robot of another that fits its channels.
+
+    Raises:
+        InputError: another number of runs, or one without samples.
+    """
+    if not 1 <= len(runs) <= MOST:
+        raise InputError(f"expected one to {MOST} runs", key="runs", value=len(runs))
+    lent = next((run.meta["robot"] for run in runs if run.meta.get("robot")), None)
     found: list[Source] = []
     for run in runs:
         source = kind(run)
@@ -75,9 +88,15 @@ def sources(runs: Sequence[Run]) -> list[Source]:
             raise InputError("a run with samples; this one is empty", key="run", value=source)
         root = re.sub(r"[^a-z0-9_]", "_", source.lower())
         colour, again = COLOURS.get(source, OTHER), ""
-        if found and found[0].root == root:
-            root, colour, again = f"{root}_2", SECOND, " 2"
+        if count := sum(kind(s.run) == source for s in found):
+            root, again = f"{root}_{count + 1}", f" {count + 1}"
+            used = {s.colour for s in found}
+            colour = next(c for c in FURTHER if c not in used)
         placed, computed = with_poses(run)
+        if lent is not None and not run.meta.get("robot"):
+            borrowed = dataclasses.replace(run, meta={**run.meta, "robot": lent})
+            placed, computed = with_poses(borrowed)
+            placed = placed if has_shapes(placed) else run
         found.append(Source(root, called(run, again), colour, placed, computed))
     return found
 
@@ -110,7 +129,7 @@ def order(names: list[str], units: dict[str, str]) -> dict[str, int]:
 
 def curve_colour(colour: Colour, k: int) -> Colour:
     """The colour of the k-th curve (from 0) of one source in one plot."""
-    family = FAMILIES[colour]
+    family = FAMILIES.get(colour, (colour, lightened(colour, 0.4)))
     return family[k % len(family)]
 
 

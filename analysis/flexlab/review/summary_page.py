@@ -44,18 +44,16 @@ def summary(shown: list[Source], *, thinned_to: int | None = None) -> str:
         else "## run without a robot file",
         *_notes(shown),
     ]
-    if len(shown) == 2:
-        parts += _deviations(shown)
+    for other in shown[1:]:
+        parts += _deviations([shown[0], other])
     if robot:
         parts += _robot(robot)
-        if len(shown) == 2 and shown[1].run.meta.get("robot") not in (
-            None,
-            shown[0].run.meta["robot"],
-        ):
-            parts.append(
-                f"**The robot of {shown[1].label} differs** from that of {shown[0].label}, which "
-                f"is described here."
-            )
+        for other in shown[1:]:
+            if other.run.meta.get("robot") not in (None, shown[0].run.meta["robot"]):
+                parts.append(
+                    f"**The robot of {other.label} differs** from that of {shown[0].label}, which "
+                    f"is described here."
+                )
     parts += _runs(shown)
     parts += _reading(shown, thinned_to)
     return "\n\n".join(parts) + "\n"
@@ -207,9 +205,9 @@ def _reading(shown: list[Source], thinned_to: int | None) -> list[str]:
         "- Move the time cursor to see the arms at another time. `time` is in seconds, `step` "
         "counts the samples of a run.",
     ]
-    if len(shown) == 2:
+    for other in shown[1:]:
         lines.append(
-            f"- {shown[1].label} is interpolated onto the times of {shown[0].label} before it is "
+            f"- {other.label} is interpolated onto the times of {shown[0].label} before it is "
             f"subtracted."
         )
     for s in shown:

@@ -91,13 +91,12 @@ def _title(shown: list[Source]) -> str:
 def _scene(shown: list[Source], prefix: str, name: str) -> Scene:
     has_shape = [s.run for s in shown if s.has_shape]
     low, high = extent(has_shape) if has_shape else (np.array([-1.0, -1.0]), np.array([1.0, 1.0]))
-    pair = [s.run for s in shown]
-    names = compared(pair[0], pair[1]) if len(pair) == 2 else []
+    first = shown[0].run
     # Without one time in common, or with a gap all the way, there is no deviation to show.
     apart = {
-        name: values
-        for name in names
-        if np.isfinite(values := deviation(pair[0], pair[1], name)[1]).any()
+        path: (name, other, values)
+        for path, (name, other) in pairs(shown, prefix).items()
+        if np.isfinite(values := deviation(first, other.run, name)[1]).any()
     }
     return Scene(
         sources=tuple((s.root, s.label, NAMES[s.colour], s.has_shape) for s in shown),
@@ -110,12 +109,12 @@ def _scene(shown: list[Source], prefix: str, name: str) -> Scene:
             if np.isfinite(s.run[name]).any()
         },
         deviations={
-            f"{prefix}/deviation/{name}": Signal(
-                pair[0].units.get(name, "m"),
-                _distinct_label(name, shown, pair[0].units.get(name, "m")),
+            path: Signal(
+                first.units.get(name, "m"),
+                _distinct_label(name, [shown[0], other], first.units.get(name, "m")),
                 *_range(values),
             )
-            for name, values in apart.items()
+            for path, (name, other, values) in apart.items()
         },
         events=any(s.run.meta.get("events") for s in shown),
         phases=tuple(s.root for s in shown if s.run.meta.get("phases")),
@@ -125,6 +124,17 @@ def _scene(shown: list[Source], prefix: str, name: str) -> Scene:
         name=name,
         measured=against_experiment(shown),
     )
+
+
+def pairs(shown: list[Source], prefix: str) -> dict[str, tuple[str, Source]]:
+    """The channels of deviations from the first run, and the other run, by their paths; of more
+    than two runs with the other one's name in it."""
+    many = len(shown) > 2
+    return {
+        f"{prefix}/deviation/{f'{other.root}/' if many else ''}{name}": (name, other)
+        for other in shown[1:]
+        for name in compared(shown[0].run, other.run)
+    }
 
 
 def _write(rec: rr.RecordingStream, shown: list[Source], scene: Scene) -> None:
@@ -145,17 +155,19 @@ def _write(rec: rr.RecordingStream, shown: list[Source], scene: Scene) -> None:
             shape(rec, s, scene, s is not first)
     if any(s.has_shape for s in shown):
         ground(rec, scene)
-    places = order(
-        [path.removeprefix(f"{scene.prefix}/deviation/") for path in scene.deviations],
-        first.run.units,
-    )
-    for path, signal in scene.deviations.items():
-        name = path.removeprefix(f"{scene.prefix}/deviation/")
-        t, values = deviation(first.run, shown[1].run, name)
-        step = np.flatnonzero(common(first.run, shown[1].run))
-        curve(
-            rec, path, t, values, step, signal, curve_colour(DEVIATION, places[name]), 1.8, budget
-        )
+    found = pairs(shown, scene.prefix)
+    for other in shown[1:]:
+        own = {path: name for path, (name, s) in found.items() if s is other}
+        kept = [name for path, name in own.items() if path in scene.deviations]
+        places = order(kept, first.run.units)
+        for path, name in own.items():
+            if path not in scene.deviations:
+                continue
+            t, values = deviation(first.run, other.run, name)
+            step = np.flatnonzero(common(first.run, other.run))
+            base = DEVIATION if len(shown) == 2 else other.colour
+            colour = curve_colour(base, places[name])
+            curve(rec, path, t, values, step, scene.deviations[path], colour, 1.8, budget)
     page = summary(shown, thinned_to=budget if samples > MAX_SAMPLES else None)
     rec.log(
         f"{scene.prefix}/about",

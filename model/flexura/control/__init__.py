@@ -28,6 +28,7 @@ from .step_metrics import (
     STRIP,
     VIBRATION,
     StepResponse,
+    step_figures,
     step_response,
     strip_metrics,
 )
@@ -67,6 +68,7 @@ __all__ = [
     "filter_coefficient",
     "load_gains",
     "lqr",
+    "step_figures",
     "step_response",
     "strip_metrics",
 ]

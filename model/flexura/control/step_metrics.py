@@ -35,6 +35,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import core
+from ..errors import InputError
 from ..io import Run
 
 RISE, SETTLING, OVERSHOOT, ERROR, ITAE, EFFORT = range(6)  # columns of a joint's figures
@@ -135,6 +136,54 @@ def step_response(
         slowest = float(joints[:, SETTLING].max()) if settled is None else settled
         strip = strip_metrics(run.t, run[bent[-1]], slowest)
     return StepResponse(joints, strip)
+
+
+def step_figures(
+    run: Run, channel: str, target: float | None = None, start: float | None = None
+) -> dict[str, float | None]:
+    """Rise, settling, overshoot and remaining error of a step in any Run, measured too (80).
+
+    Args:
+        run: any run; gaps are left out.
+        channel: for example "joint/1/position".
+        target: what is to be reached, in the channel's unit; by default the end of
+            joint/i/reference if the run has it, else the mean of the last tenth of the time.
+        start: when the step begins [s]; by default when joint/i/reference moves, else at 0, or at
+            the first sample if that is later.
+
+    Returns:
+        rise_s, settling_s, overshoot [1], error [1]; None for what never happened.
+
+    Raises:
+        InputError: no such channel, or no two samples after the start, or nothing to go.
+    """
+    if channel not in run:
+        raise InputError(
+            f"expected a channel of the run: {', '.join(run)}", key="channel", value=channel
+        )
+    reference = run.channels.get(channel.replace("/position", "/reference"))
+    asked = None if reference is None or not channel.endswith("/position") else reference
+    there = np.isfinite(run[channel])
+    t, q = run.t[there], run[channel][there]
+    if len(t) and asked is not None and np.isfinite(asked[there]).all():
+        r = asked[there]
+        moved = np.flatnonzero(r != r[0])
+        target = float(r[-1]) if target is None else target
+        start = float(t[moved[0] - 1]) if start is None and len(moved) else start
+    start = max(0.0, float(t[0])) if start is None and len(t) else start
+    if len(t) < 2 or start is None or (t >= start).sum() < 2:
+        raise InputError("expected two samples after the start", key="start", value=start)
+    before = q[t <= start]
+    first = float(before[-1]) if len(before) else float(q[0])
+    t, q = t[t >= start] - start, q[t >= start].copy()
+    q[0] = first
+    if target is None:
+        target = float(q[t >= 0.9 * t[-1]].mean())
+    if target == first:
+        raise InputError("expected a step: it ends where it begins", key="channel", value=channel)
+    rise, settling, overshoot, error = joint_metrics(t, np.full(len(t), target), q)[:ITAE]
+    found = zip(JOINT, (rise, settling, overshoot, error), strict=False)
+    return {name: float(x) if np.isfinite(x) else None for name, x in found}
 
 
 def _effort(run: Run, joint: int, limit: float) -> float:

@@ -14,7 +14,6 @@ from .arguments import (
     takes,
     whole,
 )
-from .channels import CHANNELS, STATIONS, Channel, channel
 from .files import (
     DRAFT,
     FINISHED,
@@ -31,6 +30,7 @@ from .files import (
 )
 from .format import FORMAT, check_format
 from .labels import EMULATED, called, emulated, kind
+from .quantities import CHANNELS, STATIONS, Channel, channel
 from .run import FILE, Run
 from .seal import (
     Damaged,

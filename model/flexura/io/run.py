@@ -18,12 +18,12 @@ import numpy as np
 
 from ..errors import InputError, within_memory
 from . import summary
-from .channels import SUFFIX
 from .drawing.film import animation
 from .drawing.over_time import FORMS, figure, heading, saved
 from .files import settle, write_bytes
 from .format import FORMAT, check_format
 from .frames import pandas_frame, xarray_dataset
+from .quantities import converted, fault, from_first, suffix, unit
 from .seal import Damaged, read_sealed, read_table, say_unsealed, sealed_parquet
 
 if TYPE_CHECKING:
@@ -43,6 +43,13 @@ class Run:
     ended) and `events`, a list of `{"t": seconds, "text": ..., "level": "INFO" | "WARN" |
     "ERROR"}`. `states` (T, 2n), generalised positions and velocities, is there after a native
     simulation only and isn't archived.
+
+    Channels in other units than SI's are converted; `meta["original_units"]` keeps those. A clock
+    of the calendar counts from the first sample; `meta["clock_start_s"]` keeps its first time.
+
+    Raises:
+        InputError: times that are not finite, or do not ascend, by the row counted from 1.
+        ValueError: names, units and lengths that do not fit together.
     """
 
     t: np.ndarray
@@ -62,14 +69,39 @@ class Run:
                     f"channel {name} has shape {np.shape(values)}, the times have "
                     f"{np.shape(self.t)}"
                 )
-            if self.units[name] not in SUFFIX:
+            if unit(self.units[name]) is None and not name.startswith("sensor/"):
                 raise ValueError(
-                    f"channel {name} has the unit {self.units[name]!r}; known: {', '.join(SUFFIX)}"
+                    f"channel {name} has the unit {self.units[name]!r}; known: s, m, rad, mm, deg, "
+                    "m/s, N, N m, J, V, A, 1 and the like; sensor/NAME may have any"
                 )
+        self._in_si()
         columns = ["time_s", *map(self.column, self.channels)]
         twice = sorted(column for column, count in Counter(columns).items() if count > 1)
         if twice:
             raise ValueError(f"two channels would share a column: {', '.join(twice)}")
+        self._in_seconds()
+
+    def _in_seconds(self) -> None:
+        """Refuse a clock that is none; count from the first sample where it is a calendar's."""
+        wrong = fault(self.t, self.meta.get("source") == "experiment")
+        if wrong:
+            raise InputError(wrong.text, key=f"row {wrong.row}")
+        t, start = from_first(self.t)
+        if start:
+            self._set("t", t)
+            self._set("meta", {**self.meta, "clock_start_s": start})
+
+    def _in_si(self) -> None:
+        """Convert channels in other units; the metadata keep these."""
+        channels, units, replaced = converted(self.channels, self.units)
+        if replaced:
+            self._set("channels", channels)
+            self._set("units", units)
+            kept = {**replaced, **self.meta.get("original_units", {})}
+            self._set("meta", {**self.meta, "original_units": kept})
+
+    def _set(self, name: str, value: Any) -> None:
+        object.__setattr__(self, name, value)
 
     def column(self, channel: str) -> str:
         """The name of a channel's column in a file.
@@ -80,7 +112,7 @@ class Run:
         Returns:
             The name with its unit at the end.
         """
-        return f"{channel}_{SUFFIX[self.units[channel]]}"
+        return f"{channel}_{suffix(self.units[channel])}"
 
     def __getitem__(self, channel: str) -> np.ndarray:
         try:
@@ -334,10 +366,13 @@ class Run:
             if column.name == "time_s":
                 t = values
             else:
-                unit = (column.metadata or {}).get(b"unit", b"1").decode()
-                name = column.name.removesuffix(f"_{SUFFIX.get(unit, '')}")
-                channels[name], units[name] = values, unit
-        return Run(t, channels, units, meta)
+                stored_unit = (column.metadata or {}).get(b"unit", b"1").decode()
+                name = column.name.removesuffix(f"_{suffix(stored_unit)}")
+                channels[name], units[name] = values, stored_unit
+        try:
+            return Run(t, channels, units, meta)
+        except InputError as error:
+            raise error.in_file(file) from None
 
 
 def _float_column(values: np.ndarray) -> Any:

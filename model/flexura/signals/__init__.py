@@ -6,7 +6,7 @@ from .conversion import FunctionSignal, as_signal, as_signals, spline
 from .drive import Drive, JointDrive, check_smooth
 from .manoeuvre import STARTS, Manoeuvre, load_manoeuvre
 from .parsing import PLAUSIBLE, from_spec, is_finite, is_plausible
-from .shaping import matched_cycloid, zv, zvd
+from .shaping import ei, matched_cycloid, zv, zvd
 from .signal import (
     COLUMNS,
     Signal,
@@ -38,6 +38,7 @@ __all__ = [
     "check_smooth",
     "constant",
     "cycloid",
+    "ei",
     "evaluate",
     "from_spec",
     "harmonic",

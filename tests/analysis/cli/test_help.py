@@ -9,7 +9,7 @@ from commands import commands, examples, run
 
 COMMANDS = {" ".join(words): command for words, command in commands()}
 FASTER = {"tune": ["--population", "8", "--generations", "1"]}  # beside what the example says
-SLOW = {"flash", "demo", "compare", "identify", "doctor"}
+SLOW = {"flash", "demo", "compare", "identify", "doctor", "vibration"}
 SLOW |= {name for name in COMMANDS if name.startswith("bench ")}
 # what an example goes on from; {name} is the folder of the command's own example
 FIRST = ["simulate", "rig", "rig-inverse-law"]
@@ -20,8 +20,16 @@ BEFORE = {
     "plot": [[*FIRST, "--out", "logs/first"]],
     "animate": [[*FIRST, "--out", "logs/first"]],
     "compare": [[*EXPERIMENT, "--out", "logs/experiment"]],
+    "vibration": [[*EXPERIMENT, "--out", "logs/free-vibration"]],
     "migrate": [["new", "my-arm.toml"]],
     "identify": [["bench", "excite", "--seed", "1", "--out", "logs/excite"]],
+}
+# files of others that an example begins with
+FILES = {
+    "import": {
+        "log.csv": "Zeit;Weg\n[s];[mm]\n0,00;1,5\n0,01;1,6\n0,02;1,7\n",
+        "map.toml": '[channel."joint/1/position"]\ncolumn = "Weg"\n',
+    }
 }
 ELSEWHERE = {"bench recover", "bench step"}  # go on from an experiment that is no example's
 MOST_WORDS = 25
@@ -52,6 +60,8 @@ def test_a_command_has_one_complete_example(name):
     ],
 )
 def test_the_example_of_a_command_runs(name, place):
+    for file, text in FILES.get(name, {}).items():
+        (place / file).write_text(text)
     for arguments in BEFORE.get(name, ()):
         assert run(arguments)[0] == 0
     (example,) = examples(COMMANDS[name])

@@ -22,8 +22,9 @@ SCHEMA = "std_msgs/msg/Float64"
 
 
 def write(run: Run) -> bytes:
-    """Log times are the run's times after its start (`started`, or 1970), to a nanosecond; `/time`
-    has them exactly.
+    """Log times are the run's times after its start, to a nanosecond; `/time` has them exactly.
+
+    The start is `started`, its clock's, or 1970.
 
     Names and units of the channels stand in their metadata, the run's in the metadata record
     `flexura`. Raises InputError for a start that is no time, or a time before 1970.
@@ -67,7 +68,7 @@ def write(run: Run) -> bytes:
 def _start_ns(run: Run) -> int:
     started = run.meta.get("started")
     if started is None:
-        return 0
+        return round(float(run.meta.get("clock_start_s", 0.0)) * 1e9)
     try:
         moment = datetime.fromisoformat(str(started))
         return round(moment.timestamp() * 1e6) * 1000

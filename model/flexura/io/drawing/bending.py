@@ -13,7 +13,7 @@ from itertools import product
 
 import numpy as np
 
-from ..channels import STATIONS
+from ..quantities import STATIONS
 
 PER_STATION = 3  # curve points in each interval between stations
 POINTS = (STATIONS - 1) * PER_STATION + 1

@@ -11,8 +11,8 @@ import numpy as np
 
 from ...errors import InputError
 from ...optional import load
-from ..channels import channel
 from ..labels import called
+from ..quantities import channel
 from .sampling import thinned
 
 if TYPE_CHECKING:

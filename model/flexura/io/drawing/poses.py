@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..channels import STATIONS
+from ..quantities import STATIONS
 from .outline import Outline, outlines, shortens
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..channels import STATIONS
+from ..quantities import STATIONS
 from .bending import POINTS, inextensible
 from .outline import Outline, outlines, shortens
 

@@ -12,21 +12,6 @@ from dataclasses import dataclass
 
 STATIONS = 9  # places along a flexible link at which a Run holds the deflection
 
-# of a column's name in a file, by unit
-SUFFIX = {
-    "s": "s",
-    "m": "m",
-    "rad": "rad",
-    "m/s": "m_s",
-    "rad/s": "rad_s",
-    "N": "N",
-    "N m": "N_m",
-    "J": "J",
-    "V": "V",
-    "A": "A",
-    "1": "1",
-}
-
 
 @dataclass(frozen=True)
 class Channel:
@@ -165,10 +150,10 @@ CHANNELS = (
     ),
     Channel(
         "sensor/NAME",
-        ("m", "rad", "1", "m/s"),
+        (),
         "sensor",
         "Sensor of the robot file: deflection [m] and slope [rad] in the hub frame of its link, "
-        "strain [1] positive where the fibre is stretched.",
+        "strain [1] positive where the fibre is stretched. In an imported log: any quantity.",
     ),
     Channel("tip/x", LENGTH, "tip x", "Tip of the last link in the base frame."),
     Channel("tip/y", LENGTH, "tip y", "Tip of the last link in the base frame."),

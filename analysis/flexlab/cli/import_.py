@@ -1,0 +1,125 @@
+"""The command `flexura import`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+import flexura as fx
+from flexura.io import FILE
+from flexura.io.logs import Understood, read_log, read_map, understood
+
+from ..runs.formatting import number
+from ..runs.table import Table
+from .options import Force, Json
+from .output import message, print_results
+from .results import results
+
+
+def import_(
+    file: Annotated[
+        Path,
+        typer.Argument(metavar="FILE", help="a log, or the folder of a bag of ROS 2"),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", metavar="RUN", help="new folder for the run; default logs/import-FILE-1, ..."
+        ),
+    ] = None,
+    map_: Annotated[
+        Path | None,
+        typer.Option("--map", metavar="map.toml", help="which column is which channel"),
+    ] = None,
+    robot: Annotated[
+        Path | None,
+        typer.Option(metavar="ROBOT", help="the robot that was measured: it is drawn in reviews"),
+    ] = None,
+    every: Annotated[
+        bool, typer.Option("--all", help="take the other columns too, as sensor/NAME")
+    ] = False,
+    look: Annotated[
+        bool, typer.Option("--look", help="only show what is understood; write nothing")
+    ] = False,
+    force: Force = False,
+    json: Json = False,
+) -> None:
+    """Read a log of another program as a run.
+
+    It reads CSV, LVM, TDMS, MAT (all versions), HDF5, MCAP, Parquet, bags of ROS, accelerometer
+    logs of Klipper, and its own exports. Columns are converted to SI units.
+
+    Without --map it takes columns whose heads are channels with units, as joint/1/position [deg];
+    the first column in a unit of time is the clock.
+
+    \b
+    Example: flexura import log.csv --map map.toml --out logs/measured
+    """
+    asked = None if map_ is None else read_map(map_)
+    tables = None if robot is None else fx.load(robot).to_dict()
+    if look:
+        found = understood(read_log(file), asked, robot=tables, every=every)
+        print_results(json, lambda: table(found, file), lambda: data(found))
+        return
+    with results(out, "import", file.stem, force=force) as draft:
+        found = understood(read_log(file), asked, robot=tables, every=every)
+        if not json:
+            print_results(False, lambda: table(found, file), dict)
+        found.run.save(draft.folder)
+        folder = draft.keep()
+    if json:
+        print_results(True, lambda: None, lambda: data(found) | {"run": str(folder / FILE)})
+    message(json, f"stored {folder / FILE}", f"look at it: flexura review {folder}")
+
+
+def table(found: Understood, file: Path) -> Table:
+    """What was understood of a log."""
+    run = found.run
+    heads = ("channel", "column", "unit", "lowest", "highest", "gaps")
+    out = Table(f"{file.name}: {found.form}, {len(run)} rows", heads, ("channel", "column", "unit"))
+    for row in found.taken:
+        values = run[row.channel][np.isfinite(run[row.channel])]
+        low, high = (float(values.min()), float(values.max())) if len(values) else (np.nan, np.nan)
+        out.add(
+            f"{row.channel} [{row.si}]",
+            row.head,
+            row.unit,
+            number(low, 5),
+            number(high, 5),
+            str(row.gaps) if row.gaps else "",
+        )
+    start = run.meta.get("clock_start_s")
+    counted = f", counted from its first time, {start:.6f} s" if start else ""
+    out.notes.append(
+        f"clock: {found.clock}{counted}; {run.t[0]:.6g} to {run.t[-1]:.6g} s, "
+        f"{(len(run) - 1) / (run.t[-1] - run.t[0]):.5g} samples a second"
+    )
+    out.notes += found.notes
+    if found.left:
+        more = f" and {len(found.left) - 8} more" if len(found.left) > 8 else ""
+        out.notes.append(
+            f"left out: {', '.join(found.left[:8])}{more}; --map or --all takes other columns"
+        )
+    return out
+
+
+def data(found: Understood) -> dict[str, Any]:
+    """The same for JSON."""
+    run = found.run
+    return {
+        "format": found.form,
+        "rows": len(run),
+        "clock": found.clock,
+        "start_s": float(run.t[0]),
+        "end_s": float(run.t[-1]),
+        "clock_start_s": run.meta.get("clock_start_s"),
+        "channels": {
+            row.channel: {"column": row.head, "unit": row.unit, "si": row.si, "gaps": row.gaps}
+            for row in found.taken
+        },
+        "left_out": found.left,
+        "notes": found.notes,
+    }

@@ -1,0 +1,2 @@
+"""Free vibration: frequency and damping of each mode, with intervals, and the shapers they ask
+for."""

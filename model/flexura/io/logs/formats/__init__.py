@@ -1,0 +1,1 @@
+"""A module a format: its bytes as a Log."""

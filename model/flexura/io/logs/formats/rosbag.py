@@ -1,0 +1,46 @@
+"""Bags of ROS 2 (a folder with metadata.yaml) and of ROS 1 (.bag), read by rosbags."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ....errors import InputError
+from ....optional import load
+from ..log import Log, damaged
+from . import messages
+
+
+def read(path: Path) -> Log:
+    """The topics of a bag: a folder of ROS 2, or a file of ROS 1.
+
+    Raises:
+        InputError: the bag is damaged.
+        Missing: rosbags is not installed.
+    """
+    anyreader = load("rosbags.highlevel").AnyReader
+    types = load("rosbags.typesys")
+    topics: dict[str, messages.Topic] = {}
+    unread: set[str] = set()
+    try:
+        store = types.get_typestore(types.Stores.LATEST)
+        with anyreader([path], default_typestore=store) as reader:
+            for connection, stamp, raw in reader.messages():
+                name = connection.topic
+                if name in unread:
+                    continue
+                try:
+                    found = reader.deserialize(raw, connection.msgtype)
+                except KeyError:  # a type that neither the bag nor ROS describes
+                    unread.add(name)
+                    continue
+                topic = topics.setdefault(name, messages.Topic(name))
+                topic.add(messages.stamp_of(found) or stamp, messages.numbers(found))
+    except InputError:
+        raise
+    except Exception as error:  # whatever a damaged file makes of it
+        raise damaged(path, "bag", error) from None
+    if not topics:
+        raise InputError("a bag without messages that can be read", file=str(path))
+    columns, clocks = messages.columns(list(topics.values()))
+    notes = [f"{name} is left out: its type is not described" for name in sorted(unread)]
+    return Log(str(path), "ROS bag", columns, clocks, notes=notes)

@@ -1,0 +1,105 @@
+"""TDMS, the binary format of LabVIEW and DIAdem, read by npTDMS."""
+
+from __future__ import annotations
+
+import io
+import json
+import logging
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from ....errors import InputError
+from ....optional import load
+from ..log import Clock, Column, Log, damaged, floats
+from ..names import parted
+
+
+def read(raw: bytes, file: str) -> Log:
+    """The channels of a TDMS file, each with its time base where it has one.
+
+    Raises:
+        InputError: the file is damaged.
+        Missing: npTDMS is not installed.
+    """
+    nptdms = load("nptdms")
+    try:
+        with _complaints() as complaints:
+            found = nptdms.TdmsFile.read(io.BytesIO(raw))
+        if complaints:
+            raise ValueError(complaints[0])
+        parts = [(group, channel) for group in found.groups() for channel in group.channels()]
+        parts = [part for part in parts if part[1].dtype.kind in "iufbM"]
+        data = [channel[:] for _, channel in parts]
+    except InputError:
+        raise
+    except Exception as error:  # whatever a damaged file makes of it
+        raise damaged(file, "TDMS file", error) from None
+    about = found.properties.get("flexura")
+    own = _json(about)
+    times = Counter(channel.name for _, channel in parts)
+    columns: list[Column] = []
+    clocks: dict[str, Clock] = {}
+    for (group, channel), numbers in zip(parts, data, strict=True):
+        alone = times[channel.name] == 1
+        head = channel.name if alone else f"{group.name}/{channel.name}"
+        name, said = (head, "") if own is not None else parted(head)
+        said = str(channel.properties.get("unit_string") or said)
+        said = "s" if numbers.dtype.kind == "M" else said
+        values, since = floats(numbers)
+        base = _base(channel.properties, len(values), file)
+        if base is not None:
+            clocks[head] = base
+        clock = head if base is not None else ""
+        columns.append(Column(name, head, said, values, since, clock))
+    return Log(file, "TDMS", columns, clocks, own or {}, own=own is not None)
+
+
+@contextmanager
+def _complaints() -> Iterator[list[str]]:
+    """What npTDMS says meanwhile of a loss after which it reads on; kept off the terminal."""
+    texts: list[str] = []
+
+    def keep(record: logging.LogRecord) -> bool:
+        texts.append(record.getMessage())
+        return False
+
+    loggers = [logging.getLogger(f"nptdms.{part}") for part in ("reader", "tdms_segment")]
+    for logger in loggers:
+        logger.addFilter(keep)
+    try:
+        yield texts
+    finally:
+        for logger in loggers:
+            logger.removeFilter(keep)
+
+
+def _json(text: Any) -> dict[str, Any] | None:
+    """Metadata of an export of flexura."""
+    try:
+        found = json.loads(text) if isinstance(text, str) else None
+    except ValueError:
+        return None
+    return found if isinstance(found, dict) else None
+
+
+def _base(properties: Any, length: int, file: str) -> Clock | None:
+    """A channel's time base: offset + k increment after the start."""
+    step = properties.get("wf_increment")
+    if step is None:
+        return None
+    try:
+        step, offset = float(step), float(properties.get("wf_start_offset") or 0.0)
+    except (TypeError, ValueError):
+        raise InputError(
+            "expected a time base", key="wf_increment", value=step, file=file
+        ) from None
+    begin = properties.get("wf_start_time")
+    start = 0.0
+    if isinstance(begin, np.datetime64) and not np.isnat(begin):
+        start = begin.astype("datetime64[us]").astype(np.int64) / 1e6
+    said = f"the channels' time base, {step:g} s a sample"
+    return Clock(offset + step * np.arange(length), float(start), said)

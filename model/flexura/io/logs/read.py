@@ -1,0 +1,72 @@
+"""A foreign file by what it begins with, whatever its name is."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from ...errors import InputError
+from .formats import csv_file, lvm, mat, mcap_file, rosbag, tables, tdms
+from .log import Log
+
+HDF5 = b"\x89HDF\r\n\x1a\n"
+MOST_BYTES = 4_000_000_000
+
+
+def read_log(path: str | os.PathLike[str]) -> Log:
+    """Read a log: CSV, LVM, TDMS, MAT, HDF5, MCAP, Parquet, or a bag of ROS.
+
+    Args:
+        path: of the file, or of the folder of a bag.
+
+    Raises:
+        InputError: it is not there, not known, or damaged.
+        Missing: the package that reads it is not installed.
+    """
+    place = Path(path)
+    name = str(path)
+    try:
+        if place.is_dir():
+            if not (place / "metadata.yaml").is_file():
+                raise InputError(
+                    "a folder without metadata.yaml: expected a log, or a bag of ROS 2", file=name
+                )
+            return rosbag.read(place)
+        with open(place, "rb") as stream:
+            head = stream.read(1024)
+            if head.startswith(b"#ROSBAG V"):
+                return rosbag.read(place)
+            raw = head + stream.read(MOST_BYTES)
+    except FileNotFoundError:
+        raise InputError("no such file: expected a log", file=name) from None
+    except (OSError, ValueError) as error:
+        said = getattr(error, "strerror", None) or error
+        raise InputError(f"cannot be read ({said}): expected a log", file=name) from None
+    return _read(raw, place, name)
+
+
+def _read(raw: bytes, place: Path, name: str) -> Log:
+    if not raw.strip(b"\0 \t\r\n"):
+        raise InputError("empty: expected a log", file=name)
+    if raw.startswith(b"PAR1"):
+        return tables.read(raw, name)
+    if raw.startswith((b"TDSm", b"TDSh")):
+        return tdms.read(raw, name)
+    if raw.startswith(HDF5) or raw[512:520] == HDF5:
+        return mat.read_hdf5(raw, name)
+    if raw.startswith(b"\x89MCAP"):
+        return mcap_file.read(raw, name)
+    if raw.startswith(b"SQLite format 3"):
+        if (place.parent / "metadata.yaml").is_file():
+            return rosbag.read(place.parent)
+        raise InputError(
+            "the data of a bag of ROS 2: expected its folder, with metadata.yaml", file=name
+        )
+    if raw.startswith(b"MATLAB 5.0") or place.suffix.lower() == ".mat":
+        return mat.read(raw, name)
+    if raw.lstrip(b"\xef\xbb\xbf").startswith(b"LabVIEW Measurement"):
+        return lvm.read(raw, name)
+    binary = {".tdms": "TDMS", ".mcap": "MCAP", ".parquet": "Parquet", ".h5": "HDF5"}
+    if form := binary.get(place.suffix.lower()):
+        raise InputError(f"no {form} file: its first bytes are others", file=name)
+    return csv_file.read(raw, name)

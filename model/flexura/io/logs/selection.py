@@ -1,0 +1,256 @@
+"""A Run from the columns of a log: its clock, its channels in SI units, and what was left out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError
+from ..quantities import Unit, channel, unit
+from ..run import Run
+from .log import Column, Log
+from .mapping import Map, Source
+from .names import TIMES, known, sensor
+from .timebase import Timebase, from_clock, from_column, from_rate, in_time, on
+
+EQUAL = ({"N m", "J"},)  # SI units of one dimension that channels tell apart
+
+
+@dataclass(frozen=True)
+class Taken:
+    """A channel and where it comes from."""
+
+    channel: str
+    head: str
+    unit: str
+    si: str
+    gaps: int
+
+
+@dataclass(frozen=True)
+class Understood:
+    """What was understood of a log: the run, the clock in words, the columns, what was assumed."""
+
+    run: Run
+    form: str
+    clock: str
+    taken: list[Taken]
+    left: list[str]
+    notes: list[str] = field(default_factory=list)
+
+
+def understood(
+    log: Log, asked: Map | None = None, *, robot: dict[str, Any] | None = None, every: bool = False
+) -> Understood:
+    """Make a Run of a log.
+
+    Args:
+        log: the file's columns.
+        asked: which column is which channel; without, columns that are named as channels and have
+            a unit are taken, and the first column in a unit of time is the clock.
+        robot: the tables of a robot file, for the metadata.
+        every: take the other columns too, as sensor/NAME.
+
+    Raises:
+        InputError: a column is not there or is damaged, a unit does not fit, the clock is none.
+    """
+    chosen = _mapped(log, asked) if asked else _named(log, every)
+    clock = _clock(log, asked)
+    if not chosen:
+        raise InputError(_nothing(log), file=log.file)
+    base = _timebase(log, asked, clock, [column for column, _ in chosen.values()])
+    if len(base.t) < 2:
+        raise InputError("expected two rows or more", file=log.file)
+    channels, units, taken, replaced = {}, {}, [], {}
+    for name, (column, source) in chosen.items():
+        if column.fault:
+            raise InputError(column.fault, key=f"column {column.head!r}", file=log.file)
+        values = on(log, base, column)
+        own = _unit(log, name, column, source)
+        said = source.unit or column.unit
+        if (source.scale, source.offset) != (1.0, 0.0):
+            values = source.scale * values + source.offset
+        channels[name], units[name] = own.to_si(values), own.si
+        if said != own.si and said:
+            replaced[name] = said
+        gaps = int(np.isnan(channels[name]).sum())
+        taken.append(Taken(name, column.head, said or "none", own.si, gaps))
+    meta = dict(log.meta) if log.own else _meta(log, chosen, base)
+    if replaced and not log.own:
+        meta["original_units"] = replaced
+    if base.start:
+        meta["clock_start_s"] = base.start
+    if robot is not None:
+        meta["robot"] = robot
+    used = {id(column) for column, _ in chosen.values()} | {id(clock)}
+    left = [column.head for column in log.columns if id(column) not in used]
+    try:
+        run = Run(base.t, channels, units, meta)
+    except (InputError, ValueError) as error:
+        raise InputError(str(error), file=log.file) from None
+    return Understood(run, log.form, base.said, taken, left, [*log.notes, *base.notes])
+
+
+def _mapped(log: Log, asked: Map) -> dict[str, tuple[Column, Source]]:
+    """The column of each channel of map.toml."""
+    return {
+        name: (_found(log, source.column, f'channel."{name}".column', asked.file), source)
+        for name, source in asked.channels.items()
+    }
+
+
+def _named(log: Log, every: bool) -> dict[str, tuple[Column, Source]]:
+    """Columns that are named as channels and have a unit; of an own export all but the clock."""
+    chosen: dict[str, tuple[Column, Source]] = {}
+    clock = _clock(log, None)
+    for place, column in enumerate(log.columns, 1):
+        if column is clock:
+            continue
+        name = column.name if log.own else known(column.name)
+        if not log.own and (not name or not column.unit):
+            fits = clock is None or len(column.values) == len(clock.values)
+            free = every and fits and not column.fault
+            name = sensor(column.name or str(place)) if free else ""
+        if not name:
+            continue
+        if name in chosen:
+            raise InputError(
+                f"two columns for {name}, {chosen[name][0].head!r} and {column.head!r}: "
+                "choose one with --map",
+                file=log.file,
+            )
+        chosen[name] = (column, Source(place))
+    return chosen
+
+
+def _found(log: Log, asked: str | int, key: str, file: str) -> Column:
+    """A column by its number from 1, its head, or its name without the unit."""
+    if isinstance(asked, int):
+        if asked > len(log.columns):
+            expected = f"expected a number up to {len(log.columns)}, of the columns of {log.file}"
+            raise InputError(expected, key=key, value=asked, file=file)
+        return log.columns[asked - 1]
+    plain = " ".join(asked.split())
+    for of in (
+        lambda column: {column.head, column.name},
+        lambda column: {column.head.lower().strip("/"), column.name.lower().strip("/")},
+    ):
+        found = [column for column in log.columns if {plain, plain.lower().strip("/")} & of(column)]
+        if len(found) == 1:
+            return found[0]
+        if found:
+            expected = f"{len(found)} columns have this name: give the number"
+            raise InputError(expected, key=key, value=asked, file=file)
+    raise InputError(
+        f"no such column in {log.file}; there are: {_heads(log)}", key=key, value=asked, file=file
+    )
+
+
+def _clock(log: Log, asked: Map | None) -> Column | None:
+    """The column of the clock: map.toml's, else the first one in a unit of time."""
+    if asked is not None and asked.time is not None:
+        return _found(log, asked.time.column, "time.column", asked.file)
+    if asked is not None and asked.rate is not None:
+        return None
+    of_messages = not log.own and any(column.clock.startswith("/") for column in log.columns)
+    if of_messages:
+        return None
+    free = [column for column in log.columns if not known(column.name)]
+    timed = [column for column in free if in_time(column.unit)]
+    bare = [c for c in free if not c.unit and c.name.lower().rpartition(".")[2] in TIMES]
+    return next(iter(timed + bare), None)
+
+
+def _timebase(log: Log, asked: Map | None, clock: Column | None, columns: list[Column]) -> Timebase:
+    """The times of the run."""
+    if asked is not None and asked.rate is not None:
+        return from_rate(asked.rate, len(columns[0].values))
+    if clock is not None:
+        said = asked.time.unit if asked is not None and asked.time is not None else ""
+        scale = (asked.time.scale, asked.time.offset) if asked and asked.time else (1.0, 0.0)
+        return from_column(log, clock, said or clock.unit, scale)
+    own = [column for column in columns if column.clock in log.clocks]
+    if not own:
+        raise InputError(
+            "no clock: expected a column in a unit of time, as Time [s], or --map with [time]; "
+            f"there are: {_heads(log)}",
+            file=log.file,
+        )
+    return from_clock(log, max(own, key=lambda column: len(column.values)).clock)
+
+
+def _unit(log: Log, name: str, column: Column, source: Source) -> Unit:
+    """The unit of a column, if it is one of the channel's."""
+    said = source.unit or column.unit
+    about = channel(name)
+    free = name.startswith("sensor/")
+    if not said and (free or about.units == ("1",)):
+        return Unit("1")
+    own = unit(said) if said else None
+    expected = " or ".join(about.units) or "SI"
+    key = f"column {column.head!r}"
+    if not said:
+        raise InputError(
+            f"no unit: expected one for {name}, as {expected}, in the head or in --map",
+            key=key,
+            file=log.file,
+        )
+    if own is None:
+        if free:
+            return Unit(said)
+        raise InputError(
+            f"a unit that is not known: expected one for {name}, as {expected}",
+            key=f"unit of {key}",
+            value=said,
+            file=log.file,
+        )
+    if about.units and own.si not in about.units:
+        for pair in EQUAL:
+            if own.si in pair and (other := pair & set(about.units)):
+                return Unit(other.pop(), own.factor)
+        hint = ""
+        if own.si == "1":
+            hint = f'; in --map give unit = "{about.units[0]}" and the scale of a count'
+        raise InputError(
+            f"{name} is in {expected}, not in {own.si}{hint}",
+            key=f"unit of {key}",
+            value=said,
+            file=log.file,
+        )
+    return own
+
+
+def _meta(log: Log, chosen: dict[str, tuple[Column, Source]], base: Timebase) -> dict[str, Any]:
+    """Where a run comes from."""
+    columns = {
+        name: {"column": column.head, "unit": source.unit or column.unit or "1"}
+        | ({"scale": source.scale} if source.scale != 1.0 else {})
+        | ({"offset": source.offset} if source.offset != 0.0 else {})
+        for name, (column, source) in chosen.items()
+    }
+    about = {"file": Path(log.file).name, "format": log.form, "clock": base.said}
+    return {
+        "source": "experiment",
+        "program": "flexura import",
+        "complete": True,
+        "imported": about | {"columns": columns},
+    }
+
+
+def _nothing(log: Log) -> str:
+    """What is said where no column has a channel's name."""
+    bare = [column.head for column in log.columns if known(column.name) and not column.unit]
+    if bare:
+        return f"no unit: expected a head as {bare[0]} [rad], or --map with unit, for {bare[0]!r}"
+    return (
+        "no column is named as a channel: expected heads as joint/1/position [deg], or --map "
+        f"map.toml, or --all; there are: {_heads(log)}"
+    )
+
+
+def _heads(log: Log) -> str:
+    heads = [column.head for column in log.columns] or ["no columns of numbers"]
+    return ", ".join(heads[:12]) + (f" and {len(heads) - 12} more" if len(heads) > 12 else "")

@@ -1,0 +1,69 @@
+"""The clock of a run: times are finite and ascend, and count from the first sample where they are
+those of a calendar."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+EPOCH_S = 1e8  # a later first time is one of a calendar, of 1973 or after
+LATEST_S = 1e10  # the year 2286: later times are in another unit
+SLOWEST_S = 0.45  # a measured robot is sampled faster; slower clocks are in milliseconds
+FEW = 8  # samples that tell nothing about a clock's unit
+
+
+class Fault(NamedTuple):
+    """What is wrong with a clock: the row, counted from 1, and a sentence."""
+
+    row: int
+    text: str
+
+
+def fault(t: np.ndarray, measured: bool = False) -> Fault | None:
+    """The first fault of a clock.
+
+    Args:
+        t: times (T,) [s].
+        measured: whether a logger took the times, so that milliseconds may pass for seconds.
+
+    Returns:
+        None if the times are finite and ascend, and, if measured, are likely in seconds.
+    """
+    wrong = ~np.isfinite(t)
+    wrong[1:] |= ~(np.diff(t) > 0)
+    if wrong.any():
+        k = int(wrong.argmax())
+        return Fault(k + 1, _sentence(t, k))
+    if measured and len(t) and t[0] > LATEST_S:
+        return Fault(1, f"the time is {t[0]:.6g} s: expected seconds, not milliseconds or less")
+    if measured and len(t) >= FEW and np.median(np.diff(t)) > SLOWEST_S:
+        step = float(t[1] - t[0])
+        return Fault(
+            2, f"the time is {step:.4g} s after row 1: milliseconds, which pass for seconds?"
+        )
+    return None
+
+
+def _sentence(t: np.ndarray, k: int) -> str:
+    if not np.isfinite(t[k]):
+        return f"the time is {t[k]}: expected a finite number of seconds"
+    before = float(t[k - 1])
+    if t[k] == before:
+        return f"the time {before:.9g} s stands there twice: expected ascending times"
+    after_first = t[k] - t[0] < 0.5 * (before - t[0])
+    reset = "; the clock was reset" if k > 1 and after_first else ""
+    return f"the time falls from {before:.9g} to {float(t[k]):.9g} s{reset}"
+
+
+def from_first(t: np.ndarray) -> tuple[np.ndarray, float]:
+    """Times that count from the first sample if they are those of a calendar.
+
+    Args:
+        t: times (T,) [s], finite and ascending.
+
+    Returns:
+        Times (T,) [s], and what was taken off [s]: 0 for a clock of another kind.
+    """
+    start = float(t[0]) if len(t) and t[0] > EPOCH_S else 0.0
+    return (t - start, start) if start else (t, 0.0)

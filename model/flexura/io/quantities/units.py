@@ -1,0 +1,241 @@
+"""Units as loggers write them, and their SI units.
+
+A unit is a product of symbols with prefixes and exponents: `mm`, `deg/s`, `m/s^2`, `N m`, `µs`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+G = 9.80665  # m/s^2, standard gravity
+TURN = 2 * np.pi
+
+# metre, kilogram, second, ampere, kelvin, radian
+Dimension = tuple[int, int, int, int, int, int]
+
+_NAMES: dict[Dimension, str] = {
+    (0, 0, 0, 0, 0, 0): "1",
+    (1, 0, 0, 0, 0, 0): "m",
+    (0, 1, 0, 0, 0, 0): "kg",
+    (0, 0, 1, 0, 0, 0): "s",
+    (0, 0, 0, 1, 0, 0): "A",
+    (0, 0, 0, 0, 1, 0): "K",
+    (0, 0, 0, 0, 0, 1): "rad",
+    (0, 0, -1, 0, 0, 0): "Hz",
+    (1, 0, -1, 0, 0, 0): "m/s",
+    (1, 0, -2, 0, 0, 0): "m/s^2",
+    (1, 0, -3, 0, 0, 0): "m/s^3",
+    (0, 0, -1, 0, 0, 1): "rad/s",
+    (0, 0, -2, 0, 0, 1): "rad/s^2",
+    (1, 1, -2, 0, 0, 0): "N",
+    (2, 1, -2, 0, 0, 0): "N m",
+    (-1, 1, -2, 0, 0, 0): "Pa",
+    (2, 1, -3, 0, 0, 0): "W",
+    (2, 1, -3, -1, 0, 0): "V",
+    (2, 1, -3, -2, 0, 0): "ohm",
+    (0, 1, -2, -1, 0, 0): "T",
+    (0, 0, 1, 1, 0, 0): "C",
+    (0, 1, -2, 0, 0, 0): "N/m",
+    (2, 1, -2, 0, 0, -1): "N m/rad",
+    (2, 1, 0, 0, 0, 0): "kg m^2",
+    (2, 0, 0, 0, 0, 0): "m^2",
+}
+_DIMENSIONS = {name: dimension for dimension, name in _NAMES.items()}
+_DIMENSIONS["J"] = _DIMENSIONS["N m"]
+_BASE = ("m", "kg", "s", "A", "K", "rad")
+
+_PREFIXES = {
+    "p": 1e-12,
+    "n": 1e-9,
+    "u": 1e-6,
+    "m": 1e-3,
+    "c": 1e-2,
+    "d": 1e-1,
+    "k": 1e3,
+    "M": 1e6,
+    "G": 1e9,
+}
+# Symbols that take a prefix, and their SI unit.
+_PREFIXED = ("m", "s", "A", "K", "rad", "Hz", "N", "Pa", "W", "V", "ohm", "T", "C", "J")
+# Other symbols: a number of an SI unit.
+_OTHERS: dict[str, tuple[float, str]] = {
+    "1": (1.0, "1"),
+    "%": (1e-2, "1"),
+    "percent": (1e-2, "1"),
+    "permille": (1e-3, "1"),
+    "ppm": (1e-6, "1"),
+    "ustrain": (1e-6, "1"),
+    "ue": (1e-6, "1"),
+    "strain": (1.0, "1"),
+    **dict.fromkeys(("count", "counts", "cts", "tick", "ticks", "LSB", "digits"), (1.0, "1")),
+    **dict.fromkeys(("pulse", "pulses", "imp", "step", "steps", "-", "bool"), (1.0, "1")),
+    **dict.fromkeys(("deg", "degree", "degrees", "°", "grad°"), (np.pi / 180, "rad")),
+    **dict.fromkeys(("arcmin",), (np.pi / 10800, "rad")),
+    **dict.fromkeys(("arcsec",), (np.pi / 648000, "rad")),
+    **dict.fromkeys(("gon",), (np.pi / 200, "rad")),
+    **dict.fromkeys(("rev", "revs", "turn", "turns", "revolution"), (TURN, "rad")),
+    **dict.fromkeys(("revolutions", "U", "cycles", "tr"), (TURN, "rad")),
+    **dict.fromkeys(("rpm", "RPM", "1/min", "U/min"), (TURN / 60, "rad/s")),
+    **dict.fromkeys(("radian", "radians"), (1.0, "rad")),
+    "mrad": (1e-3, "rad"),
+    "dps": (np.pi / 180, "rad/s"),
+    "g": (G, "m/s^2"),
+    "mg": (1e-3 * G, "m/s^2"),
+    "g0": (G, "m/s^2"),
+    "gn": (G, "m/s^2"),
+    "G": (G, "m/s^2"),
+    "gram": (1e-3, "kg"),
+    "kg": (1.0, "kg"),
+    "kgf": (G, "N"),
+    "lbf": (4.4482216152605, "N"),
+    "in": (0.0254, "m"),
+    "inch": (0.0254, "m"),
+    "ft": (0.3048, "m"),
+    "mil": (2.54e-5, "m"),
+    "micron": (1e-6, "m"),
+    **dict.fromkeys(("metre", "metres", "meter", "meters"), (1.0, "m")),
+    **dict.fromkeys(("sec", "secs", "second", "seconds", "Sekunden"), (1.0, "s")),
+    **dict.fromkeys(("msec", "millisecond", "milliseconds"), (1e-3, "s")),
+    **dict.fromkeys(("usec", "microsecond", "microseconds"), (1e-6, "s")),
+    **dict.fromkeys(("nsec", "nanosecond", "nanoseconds"), (1e-9, "s")),
+    **dict.fromkeys(("min", "minute", "minutes"), (60.0, "s")),
+    **dict.fromkeys(("h", "hour", "hours"), (3600.0, "s")),
+    **dict.fromkeys(("volt", "volts", "Volt", "Volts"), (1.0, "V")),
+    **dict.fromkeys(("amp", "amps", "ampere", "Amp", "Amps"), (1.0, "A")),
+    **dict.fromkeys(("newton", "Newton", "newtons"), (1.0, "N")),
+    "bar": (1e5, "Pa"),
+    "mbar": (1e2, "Pa"),
+    "gauss": (1e-4, "T"),
+    "Ω": (1.0, "ohm"),
+    "Nm": (1.0, "N m"),
+    "mNm": (1e-3, "N m"),
+    "cNm": (1e-2, "N m"),
+    "kNm": (1e3, "N m"),
+    "Ncm": (1e-2, "N m"),
+    "Nmm": (1e-3, "N m"),
+    "Wh": (3600.0, "J"),
+}
+_CELSIUS = ("degC", "°C", "℃", "Celsius", "celsius", "deg C", "C°", "deg_C")
+_FAHRENHEIT = ("degF", "°F", "deg F", "Fahrenheit", "deg_F")
+_SUPERSCRIPTS = str.maketrans("⁻⁰¹²³", "-0123")
+_FACTOR = re.compile(r"(.+?)\s*(?:(?:\^|\*\*)\s*\(?([+-]?\d+)\)?|(?<=[A-Za-z])([+-]?[1-4]))?")
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit: value in `si` = factor x value + offset."""
+
+    si: str
+    factor: float = 1.0
+    offset: float = 0.0
+
+    def to_si(self, values: np.ndarray) -> np.ndarray:
+        """Values (T,) in the SI unit. A division by a whole number is exact to the last digit."""
+        if self.factor == 1.0 and self.offset == 0.0:
+            return values
+        whole = round(1 / self.factor) if 0 < self.factor < 1 else 0
+        exact = whole > 0 and abs(whole * self.factor - 1) < 1e-15
+        scaled = values / whole if exact else values * self.factor
+        return scaled + self.offset if self.offset else scaled
+
+
+@lru_cache(maxsize=1000)
+def unit(text: str) -> Unit | None:
+    """A unit by what a logger calls it.
+
+    Args:
+        text: for example "mm", "[deg/s]", "m/s²", "degC", "%".
+
+    Returns:
+        None for a text that is no unit.
+    """
+    plain = text.strip().strip("[]()").strip().translate(_SUPERSCRIPTS)
+    plain = plain.replace("µ", "u").replace("μ", "u").replace("′", "'")
+    if plain in _CELSIUS:
+        return Unit("K", 1.0, 273.15)
+    if plain in _FAHRENHEIT:
+        return Unit("K", 5 / 9, 459.67 * 5 / 9)
+    if plain in _OTHERS or plain in _DIMENSIONS:
+        factor, name = _OTHERS.get(plain, (1.0, plain))
+        return Unit(name, factor)
+    return _product(plain)
+
+
+def _product(text: str) -> Unit | None:
+    """A product and quotient of symbols; what stands behind a stroke is divided by."""
+    above, *below = text.replace("·", " ").replace("⋅", " ").split("/")
+    factor, dimension, symbols = 1.0, np.zeros(6, int), 0
+    for sign, part in [(1, above), *((-1, part) for part in below)]:
+        for token in re.split(r"(?<!\*)\*(?!\*)|\s+", part.strip(" ()")):
+            if token == "" or (token == "1" and sign == 1):
+                continue
+            found = _symbol(token)
+            if found is None:
+                return None
+            size, own, power = found
+            factor *= size ** (sign * power)
+            dimension += sign * power * np.array(own)
+            symbols += 1
+    if symbols == 0:
+        return None
+    key = tuple(int(x) for x in dimension)
+    single = text.strip()
+    name = "J" if single.endswith("J") and key == _DIMENSIONS["J"] else _name(key)  # type: ignore[arg-type]
+    return Unit(name, factor)
+
+
+def _symbol(token: str) -> tuple[float, Dimension, int] | None:
+    """Size, dimension and exponent of one symbol."""
+    matched = _FACTOR.fullmatch(token)
+    if matched is None:
+        return None
+    name, power = matched[1], int(matched[2] or matched[3] or 1)
+    if name in _OTHERS:
+        factor, base = _OTHERS[name]
+        return factor, _DIMENSIONS[base], power
+    if name in _PREFIXED:
+        return 1.0, _DIMENSIONS[name], power
+    if name[:1] in _PREFIXES and name[1:] in _PREFIXED:
+        return _PREFIXES[name[0]], _DIMENSIONS[name[1:]], power
+    return None
+
+
+def _name(dimension: Dimension) -> str:
+    """The name of an SI unit; of one without a name, its product of base units."""
+    if dimension in _NAMES:
+        return _NAMES[dimension]
+    parts = zip(_BASE, dimension, strict=True)
+    return " ".join(base if n == 1 else f"{base}^{n}" for base, n in parts if n)
+
+
+def suffix(text: str) -> str:
+    """A unit as the end of a column's name: "m/s" is `m_s`, "m/s^2" is `m_s2`."""
+    plain = text.replace("^", "").replace("%", "percent").replace("°", "deg")
+    return re.sub(r"\W+", "_", plain).strip("_") or "unit"
+
+
+def converted(
+    channels: Mapping[str, np.ndarray], units: Mapping[str, str]
+) -> tuple[dict[str, np.ndarray], dict[str, str], dict[str, str]]:
+    """Channels in SI units.
+
+    Args:
+        channels: values (T,) by name.
+        units: by the same names.
+
+    Returns:
+        Channels, their SI units, and the units that were replaced. A unit that is not known stays.
+    """
+    values, names, replaced = dict(channels), dict(units), {}
+    for name, text in units.items():
+        known = unit(text)
+        if known is not None and known.si != text:
+            values[name] = known.to_si(np.asarray(values[name], dtype=float))
+            names[name] = known.si
+            replaced[name] = text
+    return values, names, replaced
