@@ -250,9 +250,9 @@ void feed_watchdog(uint32_t now) {
 void __attribute__((noinline, used)) loop() {
   const uint32_t now = board.rig.now();
   feed_watchdog(now);
+  send_reports(now);  // first: what a report says is that of its own tick
   poll_commands();
   if (board.rig.state() == State::running) board.rig.prepare();
   poll_eeprom_save();
-  send_reports(now);
   update_lamp(now);
 }

@@ -26,7 +26,7 @@ class Bench:
         self.duties = []
 
     def advance(self, seconds: float, outputs: Outputs) -> Sensors:
-        self.duties.append(outputs.duty)
+        self.duties.append(outputs.duty[0])
         self.sensors.encoder_1 += self.speed * seconds
         return self.sensors
 
@@ -91,7 +91,7 @@ def test_pwm_is_on_for_compare_plus_one_of_800_cycles(board, compare):
 
 def test_without_the_enable_there_is_no_voltage(board):
     ask(board, "p", 0, 799)
-    assert duty(board) == 0.0 and not board.outputs.motor_on
+    assert duty(board) == 0.0 and not any(board.outputs.motor_on)
     ask(board, "e")
     assert duty(board) == 1.0 and board.outputs.motor_on
     ask(board, "d")
@@ -228,11 +228,11 @@ def test_after_a_reset_outputs_rest_and_inputs_keep_their_levels(board):
     ask(board, "e")
     ask(board, "p", 0, 799)
     ask(board, "u")
-    assert board.outputs.motor_on and board.outputs.stepper_on
+    assert board.outputs.motor_on[0] and board.outputs.stepper_on
     board.simulator.reset("brown-out")
     board.wait(0.0003)
     assert (
-        not board.outputs.motor_on
+        not any(board.outputs.motor_on)
         and not board.outputs.stepper_on
         and board.simulator.window.resets == 1
     )

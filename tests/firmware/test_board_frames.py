@@ -102,7 +102,9 @@ def test_a_field_that_does_not_fit_is_refused():
     with pytest.raises(ValueError, match="reference"):
         messages.pack("reference", 0, position_1=2**31, position_2=0, steps=0)
     with pytest.raises(ValueError, match=r"drives\.rate: at most 8 numbers, not 9"):
-        messages.pack("drives", 0, first=0, count=8, final=0, voltage=[0] * 8, rate=[0] * 9)
+        messages.pack(
+            "drives", 0, first=0, count=8, final=0, voltage=[0] * 8, rate=[0] * 9, voltage_2=[0] * 8
+        )
 
 
 def test_reports_become_arrays():

@@ -16,6 +16,7 @@ from flexlab.board.protocol.player import Player, setpoints
 from flexlab.board.protocol.session import Link
 from flexlab.experiment import plan as plans
 from flexlab.experiment.run_experiment import open_board
+from flexlab.rig.board_axes import board_axes
 from flexlab.rig.plant.plant import RigPlant, rig_plant
 from flexura.signals import harmonic
 
@@ -47,7 +48,10 @@ def session(seed, seconds, watch=None):
     carriage, joint = (
         harmonic(amplitude, 1.0, math.pi, amplitude) for amplitude in (AMPLITUDE_M, AMPLITUDE_RAD)
     )
-    player = Player(link, setpoints(carriage, joint, seconds + 1.0, settings))
+    player = Player(
+        link,
+        setpoints((carriage, joint), seconds + 1.0, [a.setpoints for a in board_axes(settings)]),
+    )
     player.start()
     for _ in range(round(seconds / 0.01)):
         player.run(0.01)
@@ -83,7 +87,9 @@ def test_the_emulated_rig_follows_the_inverse_law():
     board, link, _ = session(
         0,
         1.5,
-        lambda board, p: seen.append((board.now(), p.carriage_m, p.joint_rad, p.tip_deflection_m)),
+        lambda board, p: seen.append(
+            (board.now(), p.positions[0], p.positions[1], p.tip_deflection_m)
+        ),
     )
     assert (
         State(link.newest["state"]) is State.running and Fault(link.newest["fault"]) is Fault.none
@@ -94,7 +100,7 @@ def test_the_emulated_rig_follows_the_inverse_law():
     assert 0.005 < np.abs(deflection).max() < 0.015
     table = link.telemetry()
     measured = table["position_1"] / rig.configuration(BENCH)["motor_counts_per_m"]
-    play = BENCH.emulated.carriage.backlash_m
+    play = BENCH.rig.carriage.backlash_m
     assert (
         abs(measured.max() - carriage.max()) < play
     )  # the motor's encoder does not see the nut's play

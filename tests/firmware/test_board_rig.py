@@ -12,7 +12,8 @@ import flexura as fx
 from flexlab import rig
 from flexlab.board.emulator.emulated import Outputs
 from flexlab.board.protocol.declaration import CONFIG
-from flexlab.rig.description import DERIVED_SETTINGS, tip_per_bend
+from flexlab.rig.configuration import tip_per_bend
+from flexlab.rig.description import DERIVED_SETTINGS
 from flexlab.rig.plant.rigid_plant import RigidPlant
 from flexura.signals import harmonic
 
@@ -144,10 +145,10 @@ def test_a_motion_beyond_the_carriage(bench):
         ({"board__kp_1_V_mm": 1.0}, "board.kp_1_V_mm", 1.0, "did you mean kp_1_V_m?"),
         ({"board__kp_1_V_m": 1e9}, "board.kp_1_V_m", 1e9, "between -100000 and 100000"),
         ({"board__supply_V": 12.0}, "board.supply_V", 12.0, "follows from the other tables"),
-        ({"emulated__flex__nois_V": 0.1}, "emulated.flex.nois_V", 0.1, "did you mean noise_V?"),
+        ({"emulated__sensor__nois_V": 0.1}, "emulated.sensor.nois_V", 0.1, "did you mean noise_V?"),
         (
-            {"emulated__carriage__backlash_m": 0.15},
-            "emulated.carriage.backlash_m",
+            {"carriage__backlash_m": 0.15},
+            "carriage.backlash_m",
             0.15,
             "in metres, from 0 to 0.01",
         ),
@@ -190,11 +191,11 @@ def test_the_drives_of_the_plant_keep_to_the_motors_data(bench):
     voltage."""
     plant = RigidPlant(bench)
     for _ in range(4000):
-        plant.advance(250e-6, Outputs(duty=1.0, motor_on=True))
+        plant.advance(250e-6, Outputs(duty=(1.0, 0.0), motor_on=(True, True)))
     assert plant.speed_m_s == pytest.approx(0.008 * 1000 / 60, rel=1e-6)
     still = RigidPlant(bench)
     for duty, on in ((0.07, True), (1.0, False)):
-        assert still.advance(0.1, Outputs(duty=duty, motor_on=on)).encoder_1 == 0.0
+        assert still.advance(0.1, Outputs(duty=(duty, 0.0), motor_on=(on, on))).encoder_1 == 0.0
     np.testing.assert_allclose(
         still.advance(0.1, Outputs(steps=3200.0, stepper_on=True)).encoder_2, 2400
     )

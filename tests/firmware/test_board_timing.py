@@ -96,7 +96,7 @@ def test_a_trajectory_ends_at_its_last_set_point_to_the_microstep(compiler):
         r.until(lambda: r.player.done, 2.0)
         r.run(0.5)
         assert r.link.newest["steps"] == round(0.8 * r.settings["stepper_steps_per_rad"])
-        assert r.plant.carriage_m == pytest.approx(0.02, abs=2e-4)
+        assert r.plant.positions[0] == pytest.approx(0.02, abs=2e-4)
 
 
 @both

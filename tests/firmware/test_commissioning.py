@@ -16,6 +16,7 @@ from flexlab.board.protocol.declaration import PINS_HASH, Fault, Result, StopTri
 from flexlab.board.protocol.session import Link, Refused
 from flexlab.experiment import plan as plans
 from flexlab.experiment.run_experiment import Hooks, OpenBoard, RefusedToStart, conduct
+from flexlab.recordings.strip_sensor import sensor_of
 from flexlab.rig.plant.rigid_plant import RigidPlant
 
 PROVEN_AT = 16 + 4 + 4 * len(SETTINGS)  # in the EEPROM: after the declaration and the settings
@@ -108,10 +109,10 @@ def test_a_person_presses_once_and_never_again(tmp_path):
     inner, said = unproven(), []
     begin = inner.now()
     real = Real(inner, lambda now: inner.press_stop(2.5 < now - begin < 2.9))
-    plan, calibration = plans.free_vibration(BENCH, SETTINGS, 0.1, 1.1), rig.calibration(BENCH)
+    plan, sensor = plans.free_vibration(BENCH, SETTINGS, 0.1, 1.1), sensor_of(BENCH)
     for name in ("first", "second"):
         watch, opened = Hooks(say=said.append), OpenBoard(real, 0, {}, None)
-        done = conduct(BENCH, plan, opened, tmp_path / name, calibration, watch)
+        done = conduct(BENCH, plan, opened, tmp_path / name, sensor, watch)
         assert done.run.complete and len(said) == 1
         assert "emergency stop proven" in [finding.what for finding in done.findings]
         inner.reset()

@@ -171,7 +171,7 @@ def board(lib, values, rows):
     done = np.zeros(len(rows), np.dtype([("voltage", "<i2"), ("rate", "<i2")]))
     array = (ctypes.c_float * len(values))(*values.values())
     assert lib.c_board(array, told.ctypes, len(rows), done.ctypes) == 0
-    return done["voltage"] / 1000, done["rate"] / values["stepper_steps_per_rad"]
+    return done["voltage"] * 0.002, done["rate"] / values["stepper_steps_per_rad"]
 
 
 def model(values, rows):

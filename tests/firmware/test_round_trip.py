@@ -90,7 +90,7 @@ class Wrong:
         nothing reset it."""
         self.inner.wait(0.3)
         window = self.inner.simulator.window
-        self.safe = window.motor_on == window.stepper_on == window.resets == 0
+        self.safe = not any(window.motor_on) and window.stepper_on == window.resets == 0
         self.inner.close()
 
     def __getattr__(self, name):

@@ -137,8 +137,8 @@ def test_a_controller_measures_the_motor():
     quiet, design = lqr(bot, Controller([pid], 200.0), [50.0], position=0.05, deflection=0.05)
     assert design.outputs[0] == "joint/1/motor_position"
     assert np.abs(design.poles).max() < 1
-    settled = fx.simulate(bot, np.linspace(0, 12, 61), quiet)
-    assert settled["joint/1/position"][-5:] == pytest.approx([goal] * 5, abs=0.01)
+    settled_picture = fx.simulate(bot, np.linspace(0, 12, 61), quiet)
+    assert settled_picture["joint/1/position"][-5:] == pytest.approx([goal] * 5, abs=0.01)
 
 
 def test_a_population_is_its_robots():

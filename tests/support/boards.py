@@ -19,6 +19,7 @@ from flexlab.board.protocol.declaration import Fault, State
 from flexlab.board.protocol.player import Knots, Player, drives, setpoints
 from flexlab.board.protocol.session import Link
 from flexlab.experiment.flash import RIG, build
+from flexlab.rig.board_axes import board_axes
 from flexlab.rig.plant.rigid_plant import RigidPlant
 from flexura.signals import harmonic
 
@@ -103,10 +104,12 @@ class Rigged:
     ) -> Knots:
         """Both joints from rest at 0 and back, once a second."""
         carriage, joint = (harmonic(way / 2, 1.0, PI, way / 2) for way in (travel_m, turn_rad))
-        return setpoints(carriage, joint, duration_s, self.settings)
+        scales = [axis.setpoints for axis in board_axes(self.settings)]
+        return setpoints((carriage, joint), duration_s, scales)
 
     def open_loop(self, voltage: float, rate: float, duration_s: float = 20.0) -> Knots:
-        return drives(lambda t: voltage, lambda t: rate, duration_s, self.settings)
+        steps = rate * self.settings["stepper_steps_per_rad"]
+        return drives({"voltage": lambda t: voltage, "rate": lambda t: steps}, duration_s)
 
     def go(self, knots: Knots, seconds: float = 0.3) -> None:
         """Reference, arm, start, and move for so long."""
@@ -131,7 +134,7 @@ class Rigged:
     def driven(self) -> bool:
         """A driver is enabled."""
         window = self.board.simulator.window
-        return window.motor_on != 0 or window.stepper_on != 0
+        return any(window.motor_on) or window.stepper_on != 0
 
     @property
     def last_driven(self) -> int:

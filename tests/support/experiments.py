@@ -19,6 +19,7 @@ from flexlab.board.pty import Pty
 from flexlab.experiment import run_experiment as steps
 from flexlab.experiment.plan import Plan
 from flexlab.experiment.run_experiment import ExperimentResult, Hooks, OpenBoard, conduct
+from flexlab.recordings.strip_sensor import sensor_of
 from flexlab.rig.plant.rigid_plant import RigidPlant
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -42,7 +43,7 @@ def experiment(
     """One experiment in this process."""
     opened = opened or OpenBoard(board(), 0, {}, None)
     try:
-        return conduct(BENCH, plan, opened, folder, rig.calibration(BENCH), watch or Hooks())
+        return conduct(BENCH, plan, opened, folder, sensor_of(BENCH), watch or Hooks())
     finally:
         opened.board.close()
 
@@ -96,7 +97,7 @@ class Line:
     @property
     def driven(self) -> bool:
         window = self.board.simulator.window
-        return window.motor_on != 0 or window.stepper_on != 0
+        return any(window.motor_on) or window.stepper_on != 0
 
     def wait(self, condition: Callable[[], bool], seconds: float = 30.0) -> None:
         end = time.monotonic() + seconds

@@ -54,6 +54,13 @@ def plant(**values: object) -> Act:
     return act
 
 
+def at_zero(joint: int) -> Act:
+    def act(r: Rigged) -> None:
+        r.plant.positions[joint] = 0.0
+
+    return act
+
+
 def cut(*pins: str) -> Act:
     return lambda r: [r.board.cut(pin) for pin in pins] and None
 
@@ -129,9 +136,9 @@ CASES = {
     "limit high": Case(
         Fault.limit_high,
         "high switch hit at full speed",
-        plant(ends_m=(-0.05, 0.0)),
+        plant(ends=(-0.05, 0.0)),
         0.001,
-        plant(ends_m=(-0.05, 0.15)),
+        plant(ends=(-0.05, 0.15)),
         FAST,
         WIDE,
         persists=True,
@@ -139,9 +146,9 @@ CASES = {
     "limit low": Case(
         Fault.limit_low,
         "low switch hit at full speed",
-        plant(ends_m=(0.0, 0.15)),
+        plant(ends=(0.0, 0.15)),
         0.001,
-        plant(ends_m=(-0.05, 0.15)),
+        plant(ends=(-0.05, 0.15)),
         open_loop(-12.0, 1.0),
         WIDE | {"position_min_1_m": -1.0},
         persists=True,
@@ -149,9 +156,9 @@ CASES = {
     "travel 1": Case(
         Fault.travel_1,
         "carriage driven beyond its range, no switch there",
-        plant(ends_m=(-9.0, 9.0)),
+        plant(ends=(-9.0, 9.0)),
         1.2,
-        plant(carriage_m=0.0),
+        at_zero(0),
         FAST,
         WIDE,
     ),
@@ -160,7 +167,7 @@ CASES = {
         "joint 2 driven beyond its range",
         nothing,
         2.0,
-        plant(joint_rad=0.0),
+        at_zero(1),
         open_loop(0.0, 1.0),
     ),
     "speed 1": Case(
@@ -180,7 +187,7 @@ CASES = {
         settings={"speed_max_2_rad_s": 3.0},
     ),
     "blocked motor": Case(
-        Fault.stall_1, "carriage held", plant(blocked=True), 0.45, plant(blocked=False), FAST, WIDE
+        Fault.stall_1, "carriage held", plant(blocked={1}), 0.45, plant(blocked=set()), FAST, WIDE
     ),
     "unplugged encoder": Case(
         Fault.stall_1,
@@ -194,9 +201,9 @@ CASES = {
     "blocked joint": Case(
         Fault.stall_2,
         "joint 2 held: steps are lost",
-        plant(joint_blocked=True),
+        plant(blocked={2}),
         0.2,
-        plant(joint_blocked=False),
+        plant(blocked=set()),
         SLOW_TURN,
     ),
     "swapped encoder": Case(

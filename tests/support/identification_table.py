@@ -19,15 +19,16 @@ from pathlib import Path
 from flexlab.identification.identify import Identified, identify
 from rigs import excited
 
-FACTORS = ("stiffness", "damping", "payload", "flex_gain")
+FACTORS = {"stiffness": "stiffness", "damping": "damping", "payload": "payload"}
+FACTORS["flex_gain"] = "sensor_gain"
 
 
 def errors(found: Identified, truth: dict) -> dict[str, tuple[float, bool]]:
     """Relative error of every figure, and whether its interval holds the true value."""
-    known = {name: (found.strip, name, truth["factors"][name]) for name in FACTORS}
-    known["backlash"] = found.strip, "backlash_m", truth["backlash_m"]
-    known["Coulomb"] = found.carriage, "coulomb_N", truth["joint_1_coulomb_N"]
-    known["viscous"] = found.carriage, "viscous_N_s_m", truth["joint_1_viscous_N_s_m"]
+    known = {name: (found.strip, key, truth["factors"][name]) for name, key in FACTORS.items()}
+    known["backlash"] = found.strip, "backlash", truth["factors"]["backlash"]
+    known["Coulomb"] = found.joints[1], "coulomb", truth["joint_1"]["coulomb_N"]
+    known["viscous"] = found.joints[1], "viscous", truth["joint_1"]["viscous_N_s_m"]
     out = {}
     for title, (part, name, true) in known.items():
         low, high = part.interval(name)

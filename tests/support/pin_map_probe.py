@@ -41,8 +41,8 @@ def motion() -> dict[str, object]:
         carriage, joint = [], []
         for _ in range(100):
             r.run(0.01)
-            carriage.append(r.plant.carriage_m)
-            joint.append(r.plant.joint_rad)
+            carriage.append(r.plant.positions[0])
+            joint.append(r.plant.positions[1])
         newest, lit = r.link.newest, level(r, "lamp")
         assert r.state is State.running
         busy = r.board.simulator.edges()
@@ -69,7 +69,7 @@ def duty(voltage: float) -> float:
         for _ in range(200):
             r.board.step()
             r.link.poll()
-            windows.append(r.board.outputs.duty)
+            windows.append(r.board.outputs.duty[0])
         return sum(windows) / len(windows)
 
 

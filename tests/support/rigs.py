@@ -24,12 +24,19 @@ class Seen:
 
     def __init__(self, plant: Any) -> None:
         self.plant, self.window_s, self.truth = plant, plant.window_s, plant.truth
-        self.rows: list[tuple[float, ...]] = [(0.0, plant.tip_deflection_m, plant.joint_rad, 0.0)]
+        self.rows: list[tuple[float, ...]] = [
+            (0.0, plant.tip_deflection_m, plant.positions[1], 0.0)
+        ]
 
     def advance(self, seconds: float, outputs: Outputs) -> Sensors:
         sensors, plant = self.plant.advance(seconds, outputs), self.plant
         self.rows.append(
-            (self.rows[-1][0] + seconds, plant.tip_deflection_m, plant.joint_rad, sensors.encoder_1)
+            (
+                self.rows[-1][0] + seconds,
+                plant.tip_deflection_m,
+                plant.positions[1],
+                sensors.encoder_1,
+            )
         )
         return sensors
 

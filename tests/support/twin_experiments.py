@@ -13,6 +13,7 @@ import numpy as np
 
 import flexura as fx
 from flexlab.rig import load
+from flexlab.rig.axes import motor_axes
 from flexlab.rig.plant.motor import motor_data
 from flexura import twin
 from flexura.io import Run
@@ -51,8 +52,8 @@ def experiment(
 ):
     """A Run of the bench's form; `differs`: factors of `robot`."""
     bench = load(rig)
-    figures, more = bench.rig, bench.emulated
-    data, r = motor_data(figures, more.motor), figures.screw.lead_m / (2 * math.pi)
+    figures = more = bench.rig
+    data, r = motor_data(motor_axes(figures)[0]), figures.screw.lead_m / (2 * math.pi)
     volts, turn, points = profiles(kind)
     teeth = figures.stepper.full_steps_per_turn / 4
 
@@ -136,8 +137,8 @@ def as_driven(rig):
     """The rig's tables as these equations have it: without play, and nothing holds the motor more
     at rest than when it slides."""
     tables = rig.model_dump(mode="json")
-    tables["emulated"]["carriage"]["backlash_m"] = 0.0
-    tables["emulated"]["motor"]["starts_at_V"] = 0.1
+    tables["carriage"]["backlash_m"] = 0.0
+    tables["motor"]["starts_at_V"] = 0.1
     return tables
 
 

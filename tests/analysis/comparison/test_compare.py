@@ -30,6 +30,7 @@ from flexlab.comparison.replay.smoothing import (
     smoothing_spline,
 )
 from flexlab.rig import load
+from flexlab.rig.axes import motor_axes
 from flexlab.rig.plant.motor import JointLine, joint_line
 from flexlab.rig.plant.stepper import MagneticSpring
 from flexlab.runs.deviation import deviations
@@ -148,7 +149,7 @@ def test_the_relaxed_field_is_the_sine(pulse, prescribed):
     steps. A carriage that nothing drives hardly moves; one that is told to stand goes by its force
     where steps are lost."""
     bench = load(RIG)
-    spring = MagneticSpring(bench.rig.stepper, bench.emulated.stepper)
+    spring = MagneticSpring(bench.rig.stepper)
     robot = bench.robot.replace(
         {"link.1.joint.viscous_friction": 1e3, "link.2.joint.viscous_friction": 2e-3}
     )
@@ -174,9 +175,9 @@ def test_the_relaxed_field_is_the_sine(pulse, prescribed):
 
 
 def test_a_constant_voltage_ends_at_the_lines_speed():
-    """v = (a u - f) / b of `rig.motor.joint_line`."""
+    """v = (a u - f) / b of `rig.plant.motor.joint_line`."""
     bench = load(RIG)
-    line, dead = joint_line(bench), bench.emulated.driver.dead_zone_V
+    line, dead = joint_line(motor_axes(bench.rig)[0]), bench.rig.driver.dead_zone_V
     t = np.arange(201) / 200.0
     still = np.zeros(len(t))
     measured = run(t, joint__1__position=still, joint__2__position=still, joint__2__pulses=still)
@@ -190,19 +191,19 @@ def test_a_constant_voltage_ends_at_the_lines_speed():
         "source": "experiment",
     }
     simulated = simulate_experiment(Run(t, channels, units, meta))
-    speed = (line.force_N_V * (6.0 - dead) - line.coulomb_N) / line.viscous_N_s_m
+    speed = (line.force_per_V * (6.0 - dead) - line.coulomb) / line.viscous
     assert simulated["joint/1/velocity"][-1] == pytest.approx(speed, rel=1e-4)
 
 
 # --- joint 1 by its voltage
 
 LINE = JointLine(
-    force_N_V=50.0,
-    viscous_N_s_m=4e3,
-    coulomb_N=36.0,
-    reflected_mass_kg=120.0,
-    static_N=56.0,
-    rail_N=4.0,
+    force_per_V=50.0,
+    viscous=4e3,
+    coulomb=36.0,
+    inertia=120.0,
+    static=56.0,
+    guide=4.0,
 )
 
 
@@ -222,7 +223,7 @@ def test_the_nut_runs_and_coasts_as_the_line_says():
     """v = v_1 (1 - exp(-c t / m)), v_1 = (F - f) / c; from v_0 it coasts  m v_0 / c - (f m / c^2)
     ln(1 + c v_0 / f)."""
     t, nut, speed, _ = pushed(fx.signals.piecewise([0.0, 0.3], [236.0, 0.0]))
-    c, m, f = LINE.viscous_N_s_m, 121.0, LINE.coulomb_N
+    c, m, f = LINE.viscous, 121.0, LINE.coulomb
     until = np.searchsorted(t, 0.3 - 1e-9)
     np.testing.assert_allclose(
         speed[:until], 0.05 * (1 - np.exp(-c / m * t[:until])), rtol=1e-9, atol=1e-15
@@ -238,14 +239,14 @@ def test_the_nut_crosses_its_play_without_the_rail_and_then_takes_the_carriage_a
     b = 3e-4
     t, nut, speed, carriage = pushed(fx.signals.constant(236.0), b)
     free = np.abs(nut) < b / 2
-    c, m = LINE.viscous_N_s_m, 121.0
+    c, m = LINE.viscous, 121.0
     np.testing.assert_allclose(
         speed[free], (236.0 - 32.0) / c * (1 - np.exp(-c / m * t[free])), rtol=1e-9, atol=1e-15
     )
     assert not carriage[free].any() and free.sum() > 20
     np.testing.assert_allclose(carriage[~free], nut[~free] - b / 2, atol=1e-15)
     assert speed[-1] == pytest.approx((236.0 - 36.0) / c, rel=1e-6)
-    held_by_rail = dataclasses.replace(LINE, static_N=50.0, coulomb_N=50.0, rail_N=40.0)
+    held_by_rail = dataclasses.replace(LINE, static=50.0, coulomb=50.0, guide=40.0)
     _, nut, _, carriage = pushed(fx.signals.constant(45.0), b, seconds=2.0, line=held_by_rail)
     assert nut[-1] == nut[-2] and 0.0 < carriage[-1] < b / 2  # the flank soon stops it
     assert carriage[-1] == pytest.approx(nut[-1] - b / 2)

@@ -12,15 +12,14 @@ from PIL import Image
 
 import flexura as fx
 from experiments import BENCH, SETTINGS, experiment
-from flexlab import rig
 from flexlab.experiment import plan as plans
 from flexlab.experiment.run_experiment import Hooks
-from flexlab.recordings.unit_conversion import Sensor
-from flexlab.review.headless import free_port, settled, viewer
+from flexlab.recordings.strip_sensor import sensor_of
+from flexlab.review.headless import free_port, settled_picture, viewer
 from flexlab.review.live import COLOURS, serve
 from flexura.errors import FlexuraError
 
-SENSOR = Sensor(rig.calibration(BENCH), rig.calibration(BENCH).zero)
+SENSOR = sensor_of(BENCH)
 
 
 @contextmanager
@@ -61,7 +60,7 @@ def test_a_viewer_that_joins_late_sees_the_past_and_follows(tmp_path):
         with unseen() as client:
             client.open(f"rerun+http://127.0.0.1:{port}/proxy")
             until(lambda: title in {view.name for view in client.get_state().views})
-            first = settled(client)
+            first = settled_picture(client)
             for reports in seen[half:]:
                 observe(reports, 0.5)
             until(
@@ -71,7 +70,7 @@ def test_a_viewer_that_joins_late_sees_the_past_and_follows(tmp_path):
                     > 300
                 )
             )
-            (tmp_path / "live.png").write_bytes(settled(client))
+            (tmp_path / "live.png").write_bytes(settled_picture(client))
 
 
 def test_a_port_in_use_is_refused():

@@ -20,7 +20,9 @@ from flexlab.experiment import plan as plans
 from flexlab.experiment.run_experiment import Hooks, OpenBoard, check, conduct
 from flexlab.recordings import recording
 from flexlab.recordings.run_from_recording import UNEXPLAINED, knots_from, run_from_recording
-from flexlab.recordings.unit_conversion import UNITS, Sensor, planned_setpoints
+from flexlab.recordings.strip_sensor import sensor_of
+from flexlab.recordings.unit_conversion import planned_setpoints, units_of
+from flexlab.rig.board_axes import board_axes
 from flexura.io import write_toml
 from flexura.signals import harmonic
 
@@ -53,7 +55,8 @@ def test_a_run_says_what_it_is_and_where_it_comes_from(tracked):
     )
     assert about["settings"] == SETTINGS and "T" in about["started"]
     assert about["asked"] == BENCH.manoeuvre.spec() | {"lead_s": 1.0, "out_s": 1.0}
-    assert set(UNITS) | {"tip/x", "tip/y"} == set(run) and run.units["joint/2/pulses"] == "rad"
+    units = units_of(board_axes(SETTINGS), 2, "flex")
+    assert set(units) | {"tip/x", "tip/y"} == set(run) and run.units["joint/2/pulses"] == "rad"
     assert about["line"] == {
         "reports": len(run),
         "missing": 0,
@@ -136,7 +139,7 @@ def test_step_uses_the_gains_that_it_was_given(tmp_path):
             f"kp_1_V_m = {kp}\nki_1_V_m_s = 0.0\nkv_1_V_s_m = 0.0\nkc_1_V = 0.0\n"
         )
         settings = SETTINGS | plans.gains(tmp_path / "gains.toml")
-        run = experiment(plans.step(BENCH, settings, 0.003, 0.05, 2.0), tmp_path / f"{kp}").run
+        run = experiment(plans.step(BENCH, settings, (0.003, 0.05), 2.0), tmp_path / f"{kp}").run
         first = np.flatnonzero(run["joint/1/reference"] > 0.0015)[0]
         assert run.t[first] == pytest.approx(0.2, abs=0.011) and run[
             "joint/1/reference"
@@ -242,7 +245,7 @@ def creeping(plant):
     advance = plant.advance
 
     def crept(seconds, outputs):
-        plant.carriage_m += 1e-3 * seconds
+        plant.positions[0] += 1e-3 * seconds
         return advance(seconds, outputs)
 
     plant.advance = crept
@@ -269,7 +272,7 @@ def faulty(tmp_path, expected, change=lambda plant: None, plan=None, **more):
             "emergency stop: open; expected closed; Release it",
             lambda plant: setattr(plant, "emergency_stop", True),
         ),
-        ("limit high", lambda plant: setattr(plant, "carriage_m", 0.2)),
+        ("limit high", lambda plant: plant.positions.__setitem__(0, 0.2)),
         ("flex sensor", lambda plant: setattr(plant, "flex_V", 0.0)),
         ("strip at rest", lambda plant: setattr(plant, "flex_V", plant.flex_V - 0.2)),
         ("encoder 1: moved by", lambda plant: creeping(plant)),
@@ -305,7 +308,7 @@ def test_settings_of_another_rig_are_not_written_without_permission(tmp_path):
             plans.inverse(bench, settings),
             opened,
             tmp_path / "run",
-            rig.calibration(bench),
+            sensor_of(bench),
             Hooks(),
         )
     made.close()
@@ -318,7 +321,7 @@ def _rest():
 @pytest.mark.parametrize(
     "plan, key",
     [
-        (lambda: plans.step(BENCH, SETTINGS, 0.3, 0.1), "carriage range"),
+        (lambda: plans.step(BENCH, SETTINGS, (0.3, 0.1)), "carriage range"),
         (lambda: plans.free_vibration(BENCH, SETTINGS, 1.55), "step rate"),
         (lambda: plans.inverse(BENCH, SETTINGS, _swing(0.06)), "carriage range"),
     ],
@@ -395,7 +398,7 @@ def test_every_table_says_that_the_board_is_emulated(tracked):
     tables = [
         result_table(tracked),
         selftest_table(tracked.findings, title),
-        live_table(last, 0.3, plan, Sensor(rig.calibration(BENCH), 0.6), title),
+        live_table(last, 0.3, plan, sensor_of(BENCH), title),
     ]
     for table in tables:
         assert title in shown(table)
@@ -405,7 +408,7 @@ def test_every_table_says_that_the_board_is_emulated(tracked):
 def test_a_fault_ends_the_experiment_and_is_told(tmp_path):
     """The carriage is blocked on the way."""
     made = board()
-    begun = lambda reports, part: setattr(made.plant, "blocked", made.plant.blocked or part > 0.2)
+    begun = lambda reports, part: made.plant.blocked.update({1} if part > 0.2 else ())
     done = experiment(
         plans.inverse(BENCH, SETTINGS),
         tmp_path / "run",

@@ -16,10 +16,11 @@ from boards import BENCH
 from flexlab import rig as rigs
 from flexlab.comparison.replay import lead_screw
 from flexlab.experiment import excitation
-from flexlab.identification import carriage, files, output
+from flexlab.identification import files, motor_friction, output
 from flexlab.identification.estimate import Parameter, covariance, estimate
 from flexlab.identification.identify import identify, read_nominal
-from flexlab.rig.plant.motor import joint_line_of
+from flexlab.rig.axes import motor_axes
+from flexlab.rig.plant.motor import joint_line
 from rigs import excited, ran
 
 FOLDER = Path(files.__file__).parent
@@ -108,21 +109,21 @@ def test_the_excitation_is_what_the_rig_can_do():
     stiffer = dataclasses.replace(
         BENCH, robot=BENCH.robot.replace({"link.2.young_modulus_Pa": 3e11})
     )
-    rates = [excitation.profile(bench.robot)["rate_rad_s"]["value"] for bench in (BENCH, stiffer)]
+    rates = [excitation.profile(bench)["rate_rad_s"]["value"] for bench in (BENCH, stiffer)]
     assert rates[0] != rates[1]  # its chirp follows the robot's second mode
 
 
 def test_more_friction_leaves_constant_and_gear_of_the_motor_alone():
     rig = BENCH.rig
-    more = rigs.Rig.model_validate(files.with_identified_friction(rig, 1.4))
+    more = rigs.Rig.model_validate(files.with_identified_friction(rig, {1: 1.4}))
     old, new, wanted = (
-        joint_line_of(rig, rig.emulated),
-        joint_line_of(more, more.emulated),
-        joint_line_of(rig, rig.emulated, 1.4),
+        joint_line(motor_axes(rig)[0]),
+        joint_line(motor_axes(more)[0]),
+        joint_line(motor_axes(rig)[0], 1.4),
     )
-    assert new.force_N_V == pytest.approx(old.force_N_V, rel=1e-12)
-    assert new.coulomb_N == pytest.approx(1.4 * old.coulomb_N, rel=1e-12)
-    assert new.viscous_N_s_m == pytest.approx(wanted.viscous_N_s_m, rel=1e-12)
+    assert new.force_per_V == pytest.approx(old.force_per_V, rel=1e-12)
+    assert new.coulomb == pytest.approx(1.4 * old.coulomb, rel=1e-12)
+    assert new.viscous == pytest.approx(wanted.viscous, rel=1e-12)
 
 
 def test_nothing_here_looks_at_what_an_emulated_plant_says_of_itself():
@@ -150,11 +151,13 @@ def excitement(tmp_path_factory):
 def test_friction_is_found_from_one_run(excitement):
     run = excitement.run
     nominal = read_nominal(run)
-    found = carriage.fit(run, nominal.robot, nominal.line, nominal.emulated.driver.dead_zone_V)
-    truth = run.meta["truth"]
-    assert found.values["coulomb_N"] == pytest.approx(truth["joint_1_coulomb_N"], rel=0.15)
-    assert found.values["viscous_N_s_m"] == pytest.approx(truth["joint_1_viscous_N_s_m"], rel=0.15)
-    assert 0 < found.deviation("coulomb_N") < 0.05
+    found = motor_friction.fit(
+        run, nominal.robot, nominal.axes[0], nominal.lines[1], nominal.rig.driver.dead_zone_V
+    )
+    truth = run.meta["truth"]["joint_1"]
+    assert found.values["coulomb"] == pytest.approx(truth["coulomb_N"], rel=0.15)
+    assert found.values["viscous"] == pytest.approx(truth["viscous_N_s_m"], rel=0.15)
+    assert 0 < found.deviation("coulomb") < 0.05
     assert found.evaluations < 100
 
 
@@ -195,11 +198,14 @@ def test_a_random_rig_is_found_from_one_run(excitement, found, tmp_path):
         ("stiffness", 0.02),
         ("damping", 0.10),
         ("payload", 0.03),
-        ("flex_gain", 0.05),
+        ("sensor_gain", 0.05),
     ):
-        assert found.strip.values[name] == pytest.approx(truth["factors"][name], rel=least), name
-    assert found.carriage.values["coulomb_N"] == pytest.approx(truth["joint_1_coulomb_N"], rel=0.15)
-    assert found.strip.values["backlash_m"] == pytest.approx(truth["backlash_m"], abs=5e-5)
+        true = truth["factors"][name.replace("sensor", "flex")]
+        assert found.strip.values[name] == pytest.approx(true, rel=least), name
+    joint = truth["joint_1"]
+    assert found.joints[1].values["coulomb"] == pytest.approx(joint["coulomb_N"], rel=0.15)
+    play = found.nominal.axes[0].guide.backlash * found.strip.values["backlash"]
+    assert play == pytest.approx(joint["backlash_m"], abs=5e-5)
     (robot, rig), missing = files.save(found, excitement.run, tmp_path / "robot.toml")
     assert missing == []
     assert fx.load(robot).payload.mass_kg == files.robot(found).payload.mass_kg

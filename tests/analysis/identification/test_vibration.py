@@ -240,7 +240,7 @@ def test_the_emulated_strip_rings_at_the_plants_own_frequency(tmp_path):
     run = Run.read(tmp_path / "a")
     bench = rigs.load("rig")
     n, holding = bench.rig.stepper.full_steps_per_turn / 4, bench.rig.stepper.holding_torque_N_m
-    detent, asked = bench.emulated.stepper.detent_torque_N_m, run["joint/2/pulses"][-1]
+    detent, asked = bench.rig.stepper.detent_torque_N_m, run["joint/2/pulses"][-1]
     torque = lambda q: holding * np.sin(n * (asked - q)) - detent * np.sin(4 * n * q)
     q2 = brentq(torque, asked - 0.01, asked + 0.01)
     spring = -(torque(q2 + 1e-7) - torque(q2 - 1e-7)) / 2e-7

@@ -23,7 +23,8 @@ from flexlab.recordings.unit_conversion import (
     ticks_of_reports,
     velocity,
 )
-from flexlab.rig.description import Calibration
+from flexlab.rig.board_axes import board_axes
+from flexlab.rig.sensors import Calibration
 from flexura.signals import bang_bang, evaluate, harmonic, polynomial, table
 
 CUBIC = Calibration(zero=0.61, c1_m=-1.85, c2_m=3.0, c3_m=-4.9)
@@ -48,7 +49,7 @@ def test_conversions_by_hand():
         "setpoint_1": 256 * 400,
         "setpoint_2": 256 * 1600,
     }
-    seen = reports(**places, voltage=6000, supply=11400)
+    seen = reports(**places, voltage=3000, supply=11400)
     ticks, found = channels_of_reports(seen, Mode.position, SETTINGS, Sensor(CUBIC, 0.61))
     x = 2500 / 4096 - 0.61
     expected = {
@@ -186,7 +187,7 @@ def test_no_delay_where_nothing_moves():
 @pytest.mark.parametrize("lost", [0, 7])
 def test_the_start_is_found_from_the_set_points_also_when_the_first_reports_are_lost(lost):
     carriage, joint = (harmonic(way / 2, 1.0, np.pi, way / 2) for way in (0.02, 0.8))
-    knots = setpoints(carriage, joint, 1.0, SETTINGS)
+    knots = setpoints((carriage, joint), 1.0, [a.setpoints for a in board_axes(SETTINGS)])
     course = np.round(planned_setpoints(knots, SETTINGS))
     for start in (1041, 1042):
         ticks = 1000 + 2 * np.arange(200)
@@ -202,7 +203,7 @@ def test_the_start_is_found_from_the_set_points_also_when_the_first_reports_are_
 
 
 def test_drives_that_hold_for_a_period_leave_half_a_tick():
-    knots = drives(lambda t: 3.0 * (t > 0.1), lambda t: 0.0, 0.5, SETTINGS)
+    knots = drives({"voltage": lambda t: 3.0 * (t > 0.1)}, 0.5)
     course = planned_setpoints(knots, SETTINGS)
     k = 1000 + 2 * np.arange(100) - 1041 - 1
     seen = reports(100, 1000, state=np.where(k >= 0, State.running, State.armed))

@@ -13,6 +13,7 @@ from scipy.optimize import least_squares
 import flexura as fx
 from flexlab import rig
 from flexlab.board.emulator.emulated import Outputs
+from flexlab.rig.axes import motor_axes
 from flexlab.rig.emulation import FACTORS, Ranges, TrueParameters, random_true_parameters
 from flexlab.rig.plant.mechanics import STEP_S, Mechanics
 from flexlab.rig.plant.motor import DCMotor, back_driven_efficiency, joint_line, motor_data
@@ -21,25 +22,27 @@ from flexura.errors import InputError
 
 ROOT = Path(__file__).resolve().parents[3]
 BENCH = rig.load(ROOT / "firmware" / "rig.toml")
-DATA = motor_data(BENCH.rig, BENCH.emulated.motor)
+AXIS = motor_axes(BENCH.rig)[0]
+DATA = motor_data(AXIS)
 SAME = TrueParameters()
 STIFF = 1e9, 0.0
-QUIET = {"flex__noise_V": 0.0, "flex__drift_V": 0.0}
+QUIET = {"emulated__sensor__noise_V": 0.0, "emulated__sensor__drift_V": 0.0}
 
 
 def run(plant, seconds, outputs, window=STEP_S):
     """Advance a plant; `outputs(t)` gives duty and steps. Returns t, carriage, nut, joint, tip
     deflection."""
     rows = np.empty((round(seconds / window), 5))
-    out = Outputs(motor_on=True, stepper_on=True)
+    out = Outputs(motor_on=(True, True), stepper_on=True)
     for k in range(len(rows)):
-        out.duty, out.steps = outputs(k * window)
+        duty, out.steps = outputs(k * window)
+        out.duty = duty, 0.0
         plant.advance(window, out)
         rows[k] = (
             (k + 1) * window,
-            plant.carriage_m,
-            plant.nut_m,
-            plant.joint_rad,
+            plant.positions[0],
+            plant.motor.shaft,
+            plant.positions[1],
             plant.tip_deflection_m,
         )
     return rows.T
@@ -65,8 +68,8 @@ def test_the_held_strip_vibrates_and_decays_as_the_model_says():
     """Clamped: the first frequency of the native model's mesh of 12 elements; decay beta omega^2 /
     2."""
     mechanics = Mechanics(BENCH.robot)
-    mechanics.hold_carriage(*STIFF)
-    mechanics.hold_joint(2e4, 0.0)
+    mechanics.hold(0, *STIFF)
+    mechanics.hold(1, 2e4, 0.0)
     for k in range(60):
         mechanics.step(0.0, 0.03 * (k + 1) / 60)
     deflection = np.empty(4000)
@@ -86,18 +89,18 @@ def test_energy_of_what_nothing_drives_or_damps_stays():
     """Thrown: carriage and strip turn and vibrate freely. The scheme damps what it does not
     resolve, and adds nothing."""
     mechanics = Mechanics(BENCH.robot.replace({"link.2.damping.beta_s": 0.0}))
-    mechanics.hold_carriage(1e3, 0.0)
-    mechanics.hold_joint(2.0, 0.0)
+    mechanics.hold(0, 1e3, 0.0)
+    mechanics.hold(1, 2.0, 0.0)
     for k in range(round(0.05 / STEP_S)):
         mechanics.step(0.2 * STEP_S * k, 4.0 * STEP_S * k)
-    mechanics.hold_carriage(0.0, 0.0)
-    mechanics.hold_joint(0.0, 0.0)
+    mechanics.hold(0, 0.0, 0.0)
+    mechanics.hold(1, 0.0, 0.0)
     energy = []
     for _ in range(round(1.0 / STEP_S)):
         mechanics.step(0.0, 0.0)
         energy.append(mechanics.energy_J)
     energy = np.array(energy[round(0.05 / STEP_S) :])
-    assert abs(mechanics.angle_rad) > 1.0  # it did turn
+    assert abs(mechanics.positions[1]) > 1.0  # it did turn
     assert energy.max() <= energy[0] * (1 + 2e-3) and energy[-1] > 0.98 * energy[0]
 
 
@@ -109,8 +112,8 @@ def test_the_sensor_integrates_the_slope_of_a_loaded_cantilever(angle):
     gravity = [weight * math.sin(angle), -weight * math.cos(angle)]
     robot = BENCH.robot.replace({"gravity_m_s2": gravity, "link.2.damping.beta_s": 0.05})
     mechanics = Mechanics(robot, (0.0, angle), sensor_m=(first, last))
-    mechanics.hold_carriage(*STIFF)
-    mechanics.hold_joint(2e4, 0.0)
+    mechanics.hold(0, *STIFF)
+    mechanics.hold(1, 2e4, 0.0)
     for _ in range(3000):
         mechanics.step(0.0, angle)
     strip = robot.links[1]
@@ -169,7 +172,7 @@ def test_the_blocked_motor_takes_its_stall_current_with_the_coil_s_time_constant
 
 
 def test_the_motor_starts_at_its_voltage_and_the_friction_of_the_truth_moves_it():
-    starts = BENCH.emulated.motor.starts_at_V
+    starts = BENCH.rig.motor.starts_at_V
     for factor in (1.0, 1.3):
         for volts, turns in ((0.98 * factor * starts, False), (1.03 * factor * starts, True)):
             motor = DCMotor(DATA, friction=factor)
@@ -224,7 +227,7 @@ def test_a_load_costs_the_motor_more_than_it_gives_back(efficiency):
 def test_the_carriage_lags_by_the_play(factor):
     """Slowly up and down: the carriage minus the nut differs, between the ways, by the play and
     twice the nut's give F / k."""
-    emulated = BENCH.emulated.carriage
+    emulated = BENCH.rig.carriage
     plant = rig_plant(BENCH, truth=TrueParameters(backlash=factor), **QUIET)
     _, carriage, nut, _, _ = run(plant, 4.0, lambda t: (0.25 if t < 2.0 else -0.25, 0))
     up, down = (carriage - nut)[round(1.75 / STEP_S)], (carriage - nut)[round(3.75 / STEP_S)]
@@ -237,13 +240,13 @@ def test_the_carriage_lags_by_the_play(factor):
 def test_the_line_of_joint_1_is_what_the_plant_does():
     """Steady speed at a voltage, by force = viscous v + coulomb, with the bridge's dead zone
     beside."""
-    line = joint_line(BENCH)
+    line = joint_line(AXIS)
     plant = rig_plant(BENCH, truth=SAME, **QUIET)
     _, _, nut, _, _ = run(plant, 1.0, lambda t: (0.5, 0))
     speed = (nut[-1] - nut[-401]) / (400 * STEP_S)
-    volts = 6.0 - BENCH.emulated.driver.dead_zone_V
+    volts = 6.0 - BENCH.rig.driver.dead_zone_V
     assert speed == pytest.approx(
-        (line.force_N_V * volts - line.coulomb_N) / line.viscous_N_s_m, rel=2e-3
+        (line.force_per_V * volts - line.coulomb) / line.viscous, rel=2e-3
     )
 
 
@@ -272,7 +275,7 @@ def test_the_stepper_swings_about_its_step_with_its_magnetic_spring():
     inertia = 0.02 + strip.joint.rotor_inertia + mass * strip.length_m**2 / 3
     n = stepper.full_steps_per_turn / 4
     expected = math.sqrt(
-        n * (stepper.holding_torque_N_m + 4 * bench.emulated.stepper.detent_torque_N_m) / inertia
+        n * (stepper.holding_torque_N_m + 4 * bench.rig.stepper.detent_torque_N_m) / inertia
     )
     swing = joint[t > 0.25]
     assert np.ptp(swing) < 0.01
@@ -302,11 +305,11 @@ def test_an_overloaded_stepper_loses_steps_by_fours_and_a_spared_one_none():
 def test_a_stepper_without_current_lets_the_joint_go():
     plant = rig_plant(BENCH, truth=SAME, start=(0.0, 0.01), stepper__detent_torque_N_m=0.0, **QUIET)
     out = Outputs(stepper_on=False)
-    plant.mechanics.hold_joint(1.0, 0.0)
+    plant.mechanics.hold(1, 1.0, 0.0)
     plant.mechanics.step(0.0, 0.3)
     for _ in range(2000):
         plant.advance(STEP_S, out)
-    assert abs(plant.joint_rad - 0.01) > 0.001
+    assert abs(plant.positions[1] - 0.01) > 0.001
 
 
 # ---- sensor
@@ -316,7 +319,7 @@ def test_the_flex_sensor_divides_the_supply_by_its_bend():
     plant = rig_plant(BENCH, truth=TrueParameters(flex_gain=0.9), **QUIET)
     flex, more = BENCH.rig.flex, BENCH.emulated.flex
     for bend in (-0.03, 0.0, 0.02):
-        volts = plant.flex.voltage(bend)
+        volts = plant.sensor.voltage(bend)
         ohms = flex.divider_ohm * (5.0 / volts - 1.0)
         assert ohms == pytest.approx(
             flex.straight_ohm + 0.9 * flex.ohm_per_rad * bend * (1 + more.nonlinearity_1_rad * bend)
@@ -324,13 +327,21 @@ def test_the_flex_sensor_divides_the_supply_by_its_bend():
 
 
 def test_noise_and_drift_are_as_large_and_as_slow_as_the_file_says():
-    flex = rig_plant(BENCH, seed=5, flex__noise_V=0.0, flex__drift_V=0.01, flex__drift_s=0.05).flex
+    flex = rig_plant(
+        BENCH,
+        seed=5,
+        emulated__sensor__noise_V=0.0,
+        emulated__sensor__drift_V=0.01,
+        emulated__sensor__drift_s=0.05,
+    ).sensor
     drift = np.array([flex.sample(0.0) for _ in range(400_000)]) - flex.voltage(0.0)
     assert drift.std() == pytest.approx(0.01, rel=0.1)
     assert np.mean(drift[100:] * drift[:-100]) / drift.var() == pytest.approx(
         math.exp(-100 * STEP_S / 0.05), abs=0.06
     )
-    flex = rig_plant(BENCH, seed=5, flex__noise_V=0.004, flex__drift_V=0.0).flex
+    flex = rig_plant(
+        BENCH, seed=5, emulated__sensor__noise_V=0.004, emulated__sensor__drift_V=0.0
+    ).flex
     noise = np.array([flex.sample(0.0) for _ in range(20_000)]) - flex.voltage(0.0)
     assert (
         noise.std() == pytest.approx(0.004, rel=0.03)
@@ -387,14 +398,15 @@ def test_encoders_are_drawn_on_by_a_step():
     """After each step they say where the shafts are a step later: the motor's to a hundredth of a
     count, the joint's to what the microsteps' ripple makes of it; half a second later they stand
     there."""
-    plant, out = rig_plant(BENCH, **QUIET), Outputs(motor_on=True, stepper_on=True)
+    plant, out = rig_plant(BENCH, **QUIET), Outputs(motor_on=(True, True), stepper_on=True)
     told, true = [], []
     for k in range(3000):
         t = k * STEP_S
-        out.duty, out.steps = profile(t) if t < 1.0 else (0.0, 0.0)
+        duty, out.steps = profile(t) if t < 1.0 else (0.0, 0.0)
+        out.duty = duty, 0.0
         sensors = plant.advance(STEP_S, out)
         told.append((sensors.encoder_1, sensors.encoder_2))
-        true.append((plant.nut_m / 0.008 * 640, plant.joint_rad / (2 * math.pi) * 2400))
+        true.append((plant.motor.shaft / 0.008 * 640, plant.positions[1] / (2 * math.pi) * 2400))
     ahead = np.abs(np.array(told[:-1]) - np.array(true[1:]))
     assert (ahead.max(axis=0) < (0.02, 0.4)).all() and (ahead.mean(axis=0) < (0.01, 0.1)).all()
     assert np.ptp(np.array(true), axis=0).min() > 100 and (ahead[-1] < (1e-9, 1e-3)).all()
@@ -402,7 +414,7 @@ def test_encoders_are_drawn_on_by_a_step():
 
 def test_windows_shorter_than_a_step_change_nothing_but_the_time_between():
     one, two = rig_plant(BENCH, seed=1), rig_plant(BENCH, seed=1)
-    out = Outputs(duty=0.4, motor_on=True, stepper_on=True)
+    out = Outputs(duty=(0.4, 0.0), motor_on=(True, True), stepper_on=True)
     for _ in range(200):
         a = dataclasses.replace(one.advance(STEP_S, out))
         half = dataclasses.replace(two.advance(STEP_S / 2, out))
@@ -411,12 +423,15 @@ def test_windows_shorter_than_a_step_change_nothing_but_the_time_between():
             (b.encoder_1, b.encoder_2, b.flex_V), rel=1e-12, abs=1e-12
         )
         assert half.encoder_1 <= b.encoder_1
-    assert one.carriage_m == two.carriage_m > 0
+    assert one.positions[0] == two.positions[0] > 0
 
 
 def test_the_same_seed_is_the_same_rig_and_another_one_is_not():
     def readings(seed):
-        plant, out = rig_plant(BENCH, seed), Outputs(duty=0.3, motor_on=True, stepper_on=True)
+        plant, out = (
+            rig_plant(BENCH, seed),
+            Outputs(duty=(0.3, 0.0), motor_on=(True, True), stepper_on=True),
+        )
         return [plant.advance(STEP_S, out).flex_V for _ in range(50)]
 
     assert readings(1) == readings(1) != readings(2)
@@ -443,7 +458,7 @@ def test_the_truth_is_told_and_is_in_the_robot():
     assert (
         told["payload_kg"] == pytest.approx(1.2 * nominal.payload.mass_kg) == robot.payload.mass_kg
     )
-    assert told["joint_1_coulomb_N"] == pytest.approx(1.1 * joint_line(BENCH).coulomb_N)
+    assert told["joint_1"]["coulomb_N"] == pytest.approx(1.1 * joint_line(AXIS).coulomb)
     given = {
         "mass_per_length_kg_m": 0.157,
         "bending_stiffness_N_m2": [{"at_m": 0.0, "value": 0.3}, {"at_m": 0.3, "value": 0.2}],
