@@ -12,6 +12,7 @@ from flexura.io import Run
 
 from .deviation import compared, interpolate
 
+Pair = tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 COARSE = 20_000  # samples a run in the search over all shifts
 FEWEST = 8
 
@@ -81,9 +82,7 @@ def best_shift(first: Run, second: Run) -> Shift:
     return Shift(found, _correlation(pairs, found))
 
 
-def _pair(
-    first: Run, second: Run, name: str
-) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]] | None:
+def _pair(first: Run, second: Run, name: str) -> Pair | None:
     """Times and values of a channel in both runs, of range 1; None if it does not move in both."""
     if name not in first:  # the distance of the tips
         return None
@@ -102,11 +101,11 @@ def _pair(
     return (t1, y1 / scale), (t2, y2 / scale)
 
 
-def _times(pairs: list) -> tuple[list[np.ndarray], list[np.ndarray]]:
+def _times(pairs: list[Pair]) -> tuple[list[np.ndarray], list[np.ndarray]]:
     return [first[0] for first, _ in pairs], [second[0] for _, second in pairs]
 
 
-def _refined(pairs: list, near: float, step: float) -> float:
+def _refined(pairs: list[Pair], near: float, step: float) -> float:
     from scipy.optimize import minimize_scalar
 
     def cost(lag: float) -> float:
@@ -129,7 +128,7 @@ def _refined(pairs: list, near: float, step: float) -> float:
     return float(found.x if found.fun <= cost(best) else best)
 
 
-def _correlation(pairs: list, lag: float) -> float:
+def _correlation(pairs: list[Pair], lag: float) -> float:
     """The least correlation of a channel where both runs have samples; NaN without any."""
     found = []
     for (t1, y1), (t2, y2) in pairs:

@@ -56,8 +56,8 @@ def zvd(signal: Signal, frequency_Hz: float, damping_ratio: float = 0.0) -> Sign
 def ei(
     signal: Signal, frequency_Hz: float, damping_ratio: float = 0.0, tolerance: float = 0.05
 ) -> Signal:
-    """Extra-insensitive shaper: three copies, weights (1 + V) / 4, k (1 - V) / 2, k^2 (1 + V) / 4 over
-    their sum, at 0, T/2, T; see `zv`.
+    """Extra-insensitive shaper: three copies, weights (1 + V) / 4, k (1 - V) / 2, k^2 (1 + V) / 4
+    over their sum, at 0, T/2, T; see `zv`.
 
     V, the `tolerance`, is the vibration that stays at the frequency itself, as a share of the
     unshaped motion's. For it the frequency may be off by more than with `zvd`: by 20 % either way
