@@ -12,10 +12,7 @@ from flexura.io import Run
 
 from .deviation import compared, interpolate
 
-# two courses (t, y) of one channel, that of each run
-Course = tuple[np.ndarray, np.ndarray]
-Pair = tuple[Course, Course]
-
+Pair = tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 COARSE = 20_000  # samples a run in the search over all shifts
 FEWEST = 8
 
@@ -85,9 +82,7 @@ def best_shift(first: Run, second: Run) -> Shift:
     return Shift(found, _correlation(pairs, found))
 
 
-def _pair(
-    first: Run, second: Run, name: str
-) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]] | None:
+def _pair(first: Run, second: Run, name: str) -> Pair | None:
     """Times and values of a channel in both runs, of range 1; None if it does not move in both."""
     if name not in first:  # the distance of the tips
         return None

@@ -56,12 +56,24 @@ def zvd(signal: Signal, frequency_Hz: float, damping_ratio: float = 0.0) -> Sign
 def ei(
     signal: Signal, frequency_Hz: float, damping_ratio: float = 0.0, tolerance: float = 0.05
 ) -> Signal:
-    """Extra insensitive: three copies, weights (1 + V) / 4, k (1 - V) / 2, k^2 (1 + V) / 4 over
-    their sum, at 0, T/2, T; see `zv`.
+    """Extra-insensitive shaper: three copies, weights (1 + V) / 4, k (1 - V) / 2, k^2 (1 + V) / 4
+    over their sum, at 0, T/2, T; see `zv`.
 
     V, the `tolerance`, is the vibration that stays at the frequency itself, as a share of the
     unshaped motion's. For it the frequency may be off by more than with `zvd`: by 20 % either way
     with V = 0.05 (Singhose, Seering and Singer 1994, J. Mech. Design 116, 654-659).
+
+    Args:
+        signal: the signal.
+        frequency_Hz: natural frequency of the mode [Hz].
+        damping_ratio: its damping ratio.
+        tolerance: V, from 0 to below 1.
+
+    Returns:
+        The shaped Signal, longer by T.
+
+    Raises:
+        InputError: a tolerance that is none.
     """
     if not 0 <= tolerance < 1:
         raise InputError("expected a share from 0 to below 1", key="tolerance", value=tolerance)

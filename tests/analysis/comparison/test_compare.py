@@ -417,9 +417,12 @@ def test_a_run_without_the_channels_is_named(by):
         simulate_experiment(run([0, 1], tip__x=[0, 1]), by)
 
 
-def test_a_rig_without_its_emulated_figures_is_told_what_is_missing(forward):
+def test_a_rig_without_its_friction_is_told_what_is_missing(forward):
+    """A real rig needs no [emulated]; its friction and play have tables of their own."""
     rig = forward[0].meta["rig"] | {"emulated": None}
-    with pytest.raises(InputError, match=r"rig.emulated: missing"):
+    simulate_experiment(replace(forward[0], meta=forward[0].meta | {"rig": rig}))
+    rig = rig | {"carriage": None}
+    with pytest.raises(InputError, match=r"carriage: missing"):
         simulate_experiment(replace(forward[0], meta=forward[0].meta | {"rig": rig}))
 
 

@@ -297,7 +297,9 @@ def test_an_overloaded_stepper_loses_steps_by_fours_and_a_spared_one_none():
     ):  # 2.4 rad/s^2 at most is 0.05 N m; 20 times as fast is beyond the holding torque
         plant = rig_plant(bench, truth=SAME, stepper__damping_N_m_s=0.05, **QUIET)
         _, _, _, joint, _ = run(plant, ramp + 3.0, lambda t, ramp=ramp: (0, smooth(t / ramp)))
-        after[ramp] = (steps * plant.spring.rad_per_step - joint[-1]) / (4 * math.radians(1.8))
+        after[ramp] = (steps * plant.stepper.field.rad_per_step - joint[-1]) / (
+            4 * math.radians(1.8)
+        )
     assert after[2.0] == pytest.approx(0.0, abs=0.01)
     assert abs(after[0.1]) > 0.9 and after[0.1] == pytest.approx(round(after[0.1]), abs=0.02)
 
@@ -317,12 +319,12 @@ def test_a_stepper_without_current_lets_the_joint_go():
 
 def test_the_flex_sensor_divides_the_supply_by_its_bend():
     plant = rig_plant(BENCH, truth=TrueParameters(flex_gain=0.9), **QUIET)
-    flex, more = BENCH.rig.flex, BENCH.emulated.flex
+    flex = BENCH.rig.flex
     for bend in (-0.03, 0.0, 0.02):
         volts = plant.sensor.voltage(bend)
         ohms = flex.divider_ohm * (5.0 / volts - 1.0)
         assert ohms == pytest.approx(
-            flex.straight_ohm + 0.9 * flex.ohm_per_rad * bend * (1 + more.nonlinearity_1_rad * bend)
+            flex.straight_ohm + 0.9 * flex.ohm_per_rad * bend * (1 + flex.nonlinearity_1_rad * bend)
         )
 
 
@@ -341,7 +343,7 @@ def test_noise_and_drift_are_as_large_and_as_slow_as_the_file_says():
     )
     flex = rig_plant(
         BENCH, seed=5, emulated__sensor__noise_V=0.004, emulated__sensor__drift_V=0.0
-    ).flex
+    ).sensor
     noise = np.array([flex.sample(0.0) for _ in range(20_000)]) - flex.voltage(0.0)
     assert (
         noise.std() == pytest.approx(0.004, rel=0.03)
@@ -485,7 +487,7 @@ def test_random_truths_lie_in_their_ranges_and_follow_their_seed():
 
 @pytest.mark.parametrize(
     "change, key",
-    [({"flex__nois_V": 0.0}, "emulated.flex.nois_V"), ({"noise_V": 0.0}, "emulated.noise_V")],
+    [({"emulated__sensor__nois_V": 0.0}, "emulated.sensor.nois_V"), ({"noise_V": 0.0}, "noise_V")],
 )
 def test_what_is_not_in_the_table_cannot_differ(change, key):
     with pytest.raises(InputError) as caught:
@@ -503,7 +505,6 @@ def test_a_value_that_cannot_be_is_refused_with_its_key():
     [
         ("motor", {"no_load_current_A": 7.5}, "motor.no_load_current_A"),
         ("motor", {"stall_torque_N_m": 0.8}, "motor.stall_torque_N_m"),
-        ("flex", {"length_m": 0.299}, "emulated.flex.from_m"),
     ],
 )
 def test_data_that_contradict_each_other_are_refused(table, change, key):
@@ -514,7 +515,11 @@ def test_data_that_contradict_each_other_are_refused(table, change, key):
     assert caught.value.key == key and caught.value.value is not None
 
 
-def test_a_rig_file_without_the_table_has_no_plant():
-    bench = dataclasses.replace(BENCH, rig=BENCH.rig.model_copy(update={"emulated": None}))
-    with pytest.raises(InputError, match="emulated"):
+def test_a_rig_file_without_friction_has_no_plant_and_one_without_noise_is_quiet():
+    bench = dataclasses.replace(BENCH, rig=BENCH.rig.model_copy(update={"carriage": None}))
+    with pytest.raises(InputError, match=r"carriage: missing"):
         rig_plant(bench)
+    bench = dataclasses.replace(BENCH, rig=BENCH.rig.model_copy(update={"emulated": None}))
+    plant = rig_plant(bench)
+    volts = {plant.advance(STEP_S, Outputs()).flex_V for _ in range(5)}
+    assert len(volts) == 1

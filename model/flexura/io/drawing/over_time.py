@@ -11,8 +11,8 @@ import numpy as np
 
 from ...errors import InputError
 from ...optional import load
-from ..labels import called
 from ..quantities import channel
+from ..quantities.labels import called
 from .sampling import thinned
 
 if TYPE_CHECKING:

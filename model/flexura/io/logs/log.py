@@ -67,7 +67,14 @@ class Log:
     notes: list[str] = field(default_factory=list)
 
     def row(self, number: int) -> str:
-        """A row by its number from 1, and its line in a text file."""
+        """What a row is called in an error.
+
+        Args:
+            number: of the row, from 1.
+
+        Returns:
+            "row 7", and its line in a text file.
+        """
         line = f" (line {self.lines[number - 1]})" if number <= len(self.lines) else ""
         return f"row {number}{line}"
 

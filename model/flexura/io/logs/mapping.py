@@ -39,6 +39,12 @@ class Map:
 def read_map(path: str | os.PathLike[str]) -> Map:
     """Read map.toml.
 
+    Args:
+        path: of the file.
+
+    Returns:
+        Which column is which channel.
+
     Raises:
         InputError: by file, key and value, for what is wrong in it.
     """

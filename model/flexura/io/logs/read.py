@@ -19,6 +19,9 @@ def read_log(path: str | os.PathLike[str]) -> Log:
     Args:
         path: of the file, or of the folder of a bag.
 
+    Returns:
+        Its columns of numbers.
+
     Raises:
         InputError: it is not there, not known, or damaged.
         Missing: the package that reads it is not installed.

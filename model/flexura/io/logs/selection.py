@@ -54,6 +54,9 @@ def understood(
         robot: the tables of a robot file, for the metadata.
         every: take the other columns too, as sensor/NAME.
 
+    Returns:
+        The run, and what was taken, left out and assumed.
+
     Raises:
         InputError: a column is not there or is damaged, a unit does not fit, the clock is none.
     """

@@ -135,7 +135,14 @@ class Unit:
     offset: float = 0.0
 
     def to_si(self, values: np.ndarray) -> np.ndarray:
-        """Values (T,) in the SI unit. A division by a whole number is exact to the last digit."""
+        """Convert; a division by a whole number is exact to the last digit.
+
+        Args:
+            values: (T,) in this unit.
+
+        Returns:
+            (T,) in the SI unit.
+        """
         if self.factor == 1.0 and self.offset == 0.0:
             return values
         whole = round(1 / self.factor) if 0 < self.factor < 1 else 0
@@ -214,7 +221,14 @@ def _name(dimension: Dimension) -> str:
 
 
 def suffix(text: str) -> str:
-    """A unit as the end of a column's name: "m/s" is `m_s`, "m/s^2" is `m_s2`."""
+    """A unit as the end of a column's name.
+
+    Args:
+        text: the unit.
+
+    Returns:
+        For example `m_s2` of "m/s^2".
+    """
     plain = text.replace("^", "").replace("%", "percent").replace("°", "deg")
     return re.sub(r"\W+", "_", plain).strip("_") or "unit"
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .run import Run
+    from ..run import Run
 
 EMULATED = "emulated: board and rig ran as programs, nothing here was measured on a physical rig"
 
