@@ -19,7 +19,7 @@ from .io import Run
 from .population import Batch, Population
 from .robot import Robot, load, save
 from .signals import Drive, JointDrive, Manoeuvre, Signal, load_manoeuvre
-from .simulation import feedforward, inverse, inverse_kinematics, invert
+from .simulation import feedforward, inverse, inverse_kinematics, invert, time_optimal
 from .system import (
     FrequencyResponse,
     Modes,
@@ -76,6 +76,7 @@ __all__ = [
     "signals",
     "simulate",
     "static",
+    "time_optimal",
     "tip_pose",
 ]
 

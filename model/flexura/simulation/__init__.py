@@ -6,7 +6,7 @@ from .feedforward import gravity, inverse_dynamics
 from .gain_sweep import GainSweep, prepare_gain_sweep
 from .problem import METHODS
 from .recorder import channel_units
-from .trajectory import feedforward, inverse_kinematics, invert
+from .trajectory import feedforward, inverse_kinematics, invert, time_optimal
 
 __all__ = [
     "METHODS",
@@ -23,4 +23,5 @@ __all__ = [
     "rigid_robot",
     "shoot_by_bisection",
     "simulate",
+    "time_optimal",
 ]

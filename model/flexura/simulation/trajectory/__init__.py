@@ -2,6 +2,7 @@
 
 from .feedforward_manoeuvre import feedforward
 from .posture import inverse_kinematics
+from .time_optimal import time_optimal
 from .tip_inversion import invert
 
-__all__ = ["feedforward", "inverse_kinematics", "invert"]
+__all__ = ["feedforward", "inverse_kinematics", "invert", "time_optimal"]
