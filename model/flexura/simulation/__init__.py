@@ -6,7 +6,7 @@ from .feedforward import gravity, inverse_dynamics
 from .gain_sweep import GainSweep, prepare_gain_sweep
 from .problem import METHODS
 from .recorder import channel_units
-from .trajectory import feedforward, inverse_kinematics, invert, time_optimal
+from .trajectory import feedforward, inverse_kinematics, invert, parameter_derivatives, time_optimal
 
 __all__ = [
     "METHODS",
@@ -18,6 +18,7 @@ __all__ = [
     "inverse_dynamics",
     "inverse_kinematics",
     "invert",
+    "parameter_derivatives",
     "prepare_gain_sweep",
     "rigid_feedforward",
     "rigid_robot",
