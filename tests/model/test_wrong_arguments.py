@@ -86,8 +86,8 @@ CALLS = {
     "inverse_kinematics": (fx.inverse_kinematics, {"robot": RIG, "tip": [0.3, 0.2]}
         | {"joints": None}),
     "feedforward": (fx.feedforward, {"run": RUN, "kp": 0.0, "kd": 0.0}),
-    "parameter_derivatives": (fx.parameter_derivatives, {"robot": STRIP, "t_eval": T}
-        | {"drive": [0.1], "parameters": ["payload.mass_kg"], "q0": None}),
+    "parameter_derivatives": (fx.parameter_derivatives, {"robot": RIG, "t_eval": T}
+        | {"drive": [0.1, 0.0], "parameters": ["payload.mass_kg"], "q0": None}),
     "time_optimal": (fx.time_optimal, {"robot": STRIP, "start": [0.0], "end": [0.5]}
         | {"limits": {"drive": [0.5]}, "robust": 0.0, "intervals": 20}),
     "line_path": (signals.paths.line, {"start": [0.0, 0.0], "end": [1.0, 0.0], "duration_s": 1.0}

@@ -9,7 +9,7 @@ import numpy as np
 from ...errors import InputError
 from ...io import Run
 from ...robot import Robot
-from ...signals import Drive
+from ...signals import Drive, as_signals
 from ...system import System, assemble, static
 from ..dynamics import simulate
 from ..problem import check_times
@@ -47,11 +47,18 @@ def parameter_derivatives(
         InputError: an argument is not what is expected.
     """
     system, t = exact_system(robot), check_times(t_eval)
-    if isinstance(parameters, str):
-        parameters = [parameters]
+    keys = [parameters] if isinstance(parameters, str) else parameters
+    if not isinstance(keys, list | tuple) or not keys:
+        raise InputError("expected keys of the robot file", key="parameters", value=parameters)
     if len(t) < 2:
         raise InputError("expected two times or more", key="t_eval", value=t)
-    forces = drive if isinstance(drive, Drive) else Drive.force(*drive, t_s=t)
+    forces = (
+        drive
+        if isinstance(drive, Drive)
+        else Drive.force(*as_signals(drive, len(system.robot.links), "drive", t))
+    )
+    if len(forces.joints) != len(system.robot.links):
+        raise InputError("expected forces, one a joint of the robot", key="drive")
     if any(joint.motion is not None for joint in forces.joints):
         raise InputError("expected forces, without motions to follow", key="drive")
     at = stage_times(t)
@@ -70,11 +77,11 @@ def parameter_derivatives(
         acting[:, row] = [forces.joints[i].force_at(float(x)) for x in at]
     a = np.array([system.accelerations(*x) for x in zip(q, v, acting, strict=True)])
     along = variation(system, t, q, v, a, rows)
-    changed = np.stack([_changed(system.robot, str(key), q, v, a) for key in parameters], axis=2)
+    changed = np.stack([_changed(system.robot, str(key), q, v, a) for key in keys], axis=2)
     places, rates = along.integrate(-changed[:, rows])
     out = {}
     last = slice(2, None, 3)
-    for k, key in enumerate(parameters):
+    for k, key in enumerate(keys):
         dq, dv = np.zeros((len(t), n)), np.zeros((len(t), n))
         dq[1:, rows], dv[1:, rows] = places[last, :, k], rates[last, :, k]
         states = np.vstack([np.append(start, np.zeros(n)), run.states[3::3]])
@@ -85,12 +92,13 @@ def parameter_derivatives(
 def _changed(robot: Robot, key: str, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
     """The derivative of the forces of a motion (T, n) by a number of the robot."""
     value = _value(robot, key)
-    step = SHARE * abs(value) if value else SHARE
-    found = []
-    for sign in (1, -1):
-        other = assemble(robot.replace({key: value + sign * step}))
-        found.append(other.equations.force_derivatives(q, v, a)[0])
-    return (found[0] - found[1]) / (2 * step)
+    other = lambda x: assemble(robot.replace({key: x})).equations.force_derivatives(q, v, a)[0]
+    if value:
+        step = SHARE * abs(value)
+        return np.asarray((other(value + step) - other(value - step)) / (2 * step))
+    # below 0 there may be no robot
+    step = SHARE
+    return np.asarray((4 * other(step) - 3 * other(0.0) - other(2 * step)) / (2 * step))
 
 
 def _value(robot: Robot, key: str) -> float:

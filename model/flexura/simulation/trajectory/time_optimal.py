@@ -122,9 +122,11 @@ def _plant(system: System, first: np.ndarray, last: np.ndarray, left: float) -> 
 
 def _positions(system: System, value: Any, key: str) -> np.ndarray:
     joints = len(system.robot.links)
-    found = array(value, key, f"expected {joints} finite positions of joints, one a joint")
+    found = array(value, key, f"expected {joints} finite positions, one a joint of the robot")
     if found.shape not in ((joints,), (() if joints == 1 else (joints,))):
-        raise InputError(f"expected {joints} positions, one a joint", key=key, value=value)
+        raise InputError(
+            f"expected {joints} positions, one a joint of the robot", key=key, value=value
+        )
     return found.reshape(joints)
 
 
