@@ -19,7 +19,14 @@ from .io import Run
 from .population import Batch, Population
 from .robot import Robot, load, save
 from .signals import Drive, JointDrive, Manoeuvre, Signal, load_manoeuvre
-from .simulation import feedforward, inverse, inverse_kinematics, invert
+from .simulation import (
+    feedforward,
+    inverse,
+    inverse_kinematics,
+    invert,
+    parameter_derivatives,
+    time_optimal,
+)
 from .system import (
     FrequencyResponse,
     Modes,
@@ -72,10 +79,12 @@ __all__ = [
     "load",
     "load_manoeuvre",
     "modes",
+    "parameter_derivatives",
     "save",
     "signals",
     "simulate",
     "static",
+    "time_optimal",
     "tip_pose",
 ]
 

@@ -109,3 +109,18 @@ def test_python_control_gets_names_and_poles():
     assert made.input_labels == list(lin.inputs) and made.output_labels == list(lin.outputs)
     theirs, mine = (np.sort(np.abs(x)) for x in (control.poles(made), lin.poles))
     assert theirs == pytest.approx(mine, rel=1e-6, abs=1e-3)
+
+
+def test_matlab_gets_the_state_space_with_names(tmp_path):
+    from scipy.io import loadmat
+
+    from commands import run
+
+    fx.save(arm(), tmp_path / "arm.toml")
+    status, _, err = run(["export", str(tmp_path / "arm.toml"), "--to", "mat"])
+    assert status == 0, err
+    found, lin = loadmat(tmp_path / "arm.mat"), fx.linearize(arm())
+    assert found["A"] == pytest.approx(lin.A) and found["C"] == pytest.approx(lin.C)
+    assert [str(x[0]) for x in found["outputs"].ravel()] == list(lin.outputs)
+    status, _, err = run(["export", str(tmp_path / "arm.toml"), "--to", "csv"])
+    assert status == 2 and "mat" in err

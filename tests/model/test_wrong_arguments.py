@@ -52,6 +52,11 @@ WRONG = [
 ]
 SIGNAL = signals.constant(1.0)
 PID2 = (fx.PID(0.1), fx.PID(0.2))
+STRIP = fx.Robot.from_dict(
+    {"name": "strip", "link": [{"length_m": 0.6, "elements": 1, "joint": {"type": "R"}}
+        | {"mass_per_length_kg_m": 0.2, "bending_stiffness_N_m2": 0.5}]}
+)  # fmt: skip
+RISE = signals.polynomial(0.1, 1.0)
 RUN = fx.simulate(RIG, T, [0.1, 0.0])
 BATCH = fx.Batch.vary(RIG, {"payload.mass_kg": [0.1]})
 
@@ -74,6 +79,23 @@ CALLS = {
     "frequencies": (fx.frequencies, {"robot": RIG, "q": None, "joints": "locked"}
         | {"count": None, "qd": None}),
     "modes": (fx.modes, {"robot": RIG, "q": None, "joints": "locked", "count": None}),
+    "frequency_response": (fx.frequency_response, {"robot": RIG, "drive": "joint/1/drive"}
+        | {"channel": "tip/x", "frequencies_Hz": [1.0], "q": None}),
+    "invert": (fx.invert, {"robot": STRIP, "t": [0.0, 1.0], "tip": RISE, "least_squares": False}
+        | {"progress": None}),
+    "inverse_kinematics": (fx.inverse_kinematics, {"robot": RIG, "tip": [0.3, 0.2]}
+        | {"joints": None}),
+    "feedforward": (fx.feedforward, {"run": RUN, "kp": 0.0, "kd": 0.0}),
+    "parameter_derivatives": (fx.parameter_derivatives, {"robot": RIG, "t_eval": T}
+        | {"drive": [0.1, 0.0], "parameters": ["payload.mass_kg"], "q0": None}),
+    "time_optimal": (fx.time_optimal, {"robot": STRIP, "start": [0.0], "end": [0.5]}
+        | {"limits": {"drive": [0.5]}, "robust": 0.0, "intervals": 20}),
+    "line_path": (signals.paths.line, {"start": [0.0, 0.0], "end": [1.0, 0.0], "duration_s": 1.0}
+        | {"at_s": 0.0}),
+    "polyline": (signals.paths.polyline, {"points": [[0.0, 0.0], [1.0, 0.0]], "duration_s": 1.0}
+        | {"at_s": 0.0}),
+    "circle": (signals.paths.circle, {"centre": [0.0, 0.0], "radius": 1.0, "duration_s": 1.0}
+        | {"start_rad": 0.0, "turn_rad": 1.0, "at_s": 0.0}),
     "linearize": (fx.linearize, {"robot": RIG, "q": None, "qd": None, "joints": "free"}),
     "assemble": (fx.assemble, {"robot": RIG}),
     "tip_pose": (fx.tip_pose, {"robot": RIG, "q": np.zeros(10)}),

@@ -23,7 +23,10 @@ from .runs import RobotNumber, one_run
 def export(
     run: Annotated[
         Path,
-        typer.Argument(metavar="RUN", help="folder of a run or population, or a run.parquet"),
+        typer.Argument(
+            metavar="RUN",
+            help="folder of a run or population, a run.parquet, or a robot file: its state space",
+        ),
     ],
     to: Annotated[
         str,
@@ -46,6 +49,9 @@ def export(
     \b
     Example: flexura export logs/first --to csv
     """
+    if run.suffix == ".toml":
+        _state_space(run, to, out, force, json)
+        return
     table = is_population(run) and robot is None
     writers: dict[str, Callable[[Any], bytes]] = dict(tables() if table else forms())
     if to not in writers:
@@ -69,6 +75,22 @@ def export(
     if json:
         print_results(True, lambda: None, lambda: about)
     message(json, line, f"stored {target}")
+
+
+def _state_space(robot: Path, to: str, out: Path | None, force: bool, json: bool) -> None:
+    """Write the matrices of a robot's small motions about its start, with names."""
+    if to != "mat":
+        raise InputError(
+            "expected mat: a robot is written as its state space", key="--to", value=to
+        )
+    lin = fx.linearize(fx.load(robot))
+    target = out or robot.with_suffix(".mat")
+    with file_result(target, force=force):
+        write_bytes(target, as_mat.state_space(lin))
+    about = {"file": str(target), "states": len(lin.states), "outputs": list(lin.outputs)}
+    if json:
+        show(True, lambda: None, lambda: about)
+    say(json, f"state space: {len(lin.states)} states", f"stored {target}")
 
 
 def forms() -> dict[str, Callable[[Run], bytes]]:

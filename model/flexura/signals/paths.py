@@ -29,7 +29,10 @@ def smooth_rise(u: Any) -> Any:
 @finite_arguments
 def line(start: Any, end: Any, duration_s: float, at_s: float = 0.0) -> tuple[Signal, Signal]:
     """A straight way from start to end, both (x, y) [m]."""
-    return polyline([start, end], duration_s, at_s)
+    ends = [array(place, key, POINT, (2,)) for key, place in (("start", start), ("end", end))]
+    if not np.any(ends[0] != ends[1]):
+        raise InputError("expected an end other than the start", key="end", value=end)
+    return polyline(ends, duration_s, at_s)
 
 
 @finite_arguments

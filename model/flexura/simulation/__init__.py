@@ -6,7 +6,7 @@ from .feedforward import gravity, inverse_dynamics
 from .gain_sweep import GainSweep, prepare_gain_sweep
 from .problem import METHODS
 from .recorder import channel_units
-from .trajectory import feedforward, inverse_kinematics, invert
+from .trajectory import feedforward, inverse_kinematics, invert, parameter_derivatives, time_optimal
 
 __all__ = [
     "METHODS",
@@ -18,9 +18,11 @@ __all__ = [
     "inverse_dynamics",
     "inverse_kinematics",
     "invert",
+    "parameter_derivatives",
     "prepare_gain_sweep",
     "rigid_feedforward",
     "rigid_robot",
     "shoot_by_bisection",
     "simulate",
+    "time_optimal",
 ]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
-from ..io import array, write_bytes
+from ..io import array, choice, write_bytes
 from ..optional import Optional
 from .mode_motion import observed_units
 from .statespace import StateSpace, linearize
@@ -96,8 +96,7 @@ def frequency_response(
     """
     system = assemble(robot)
     lin = linearize(system, q)
-    if drive not in lin.inputs:
-        raise InputError(f"expected one of {', '.join(lin.inputs)}", key="drive", value=drive)
+    choice(drive, "drive", lin.inputs)
     row, unit, rate = _output(system, lin, channel)
     if frequencies_Hz is None:
         hertz = np.abs(lin.poles) / (2 * np.pi)
@@ -122,6 +121,8 @@ def frequency_response(
 
 def _output(system: System, lin: StateSpace, channel: str) -> tuple[np.ndarray, str, bool]:
     """The row (m,) that gives a channel of the free unknowns, its unit, if it is a rate."""
+    if not isinstance(channel, str):
+        raise InputError("expected the name of a channel", key="channel", value=channel)
     free = system.free_rows
     names = observed_units(system)
     for i, row in enumerate(system.joint_rows, 1):

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from flexura import StateSpace
 from flexura.io import EMULATED, Run, called, emulated
 
 from .names import variables
@@ -25,6 +26,26 @@ def write(run: Run) -> bytes:
     about = run.meta | {"label": called(run), "json": json.dumps(run.meta)}
     about |= {"description": EMULATED} if emulated(run) else {}
     return packed({"t": run.t, **run.channels}, {"t": "s", **run.units}, about)
+
+
+def state_space(lin: StateSpace) -> bytes:
+    """`A`, `B`, `C`, `D`, the names `states`, `inputs`, `outputs` as cells, `units` by output and
+    input, the configuration `q`, and the drives `hold` that keep the robot there."""
+    from scipy.io import savemat
+
+    names = {key: _cells(getattr(lin, key)) for key in ("states", "inputs", "outputs")}
+    units = _cells([lin.units[name] for name in (*lin.inputs, *lin.outputs)])
+    held = {"A": lin.A, "B": lin.B, "C": lin.C, "D": lin.D, "q": lin.q, "hold": lin.hold}
+    out = io.BytesIO()
+    savemat(out, {**held, **names, "units": units}, oned_as="column", do_compression=True)
+    text = b"MATLAB 5.0 MAT-file, written by flexura"
+    return text.ljust(HEADER) + out.getvalue()[HEADER:]
+
+
+def _cells(texts: Any) -> np.ndarray:
+    cells = np.empty(len(texts), dtype=object)
+    cells[:] = list(texts)
+    return cells
 
 
 def packed(

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from ...io import Run, array, number
+import numpy as np
+
+from ...errors import InputError
+from ...io import Run, array
 from ...signals import Drive, JointDrive, Manoeuvre, table
 
 
@@ -21,16 +24,16 @@ def feedforward(run: Run, kp: Any = 0.0, kd: Any = 0.0) -> Manoeuvre:
     Raises:
         InputError: an argument is not what is expected.
     """
+    if not isinstance(run, Run) or len(run) < 2:
+        raise InputError("expected a Run of two rows or more", key="run", value=run)
     joints = sum(1 for name in run if name.startswith("joint/") and name.endswith("/drive"))
     gains = []
     for key, value in (("kp", kp), ("kd", kd)):
-        given = array(value, key, f"expected a number, or {joints} of them, one a joint")
-        gains.append(
-            [
-                number(given.item() if given.ndim == 0 else x, key)
-                for x in (given if given.ndim else [given] * joints)
-            ]
-        )
+        expected = f"expected a number of 0 or more, or {joints} of them, one a joint"
+        given = array(value, key, expected)
+        if given.shape not in ((), (joints,)) or not np.all(given >= 0):
+            raise InputError(expected, key=key, value=value)
+        gains.append(np.broadcast_to(given, (joints,)).tolist())
     t = run.t - run.t[0]
     drives = tuple(
         JointDrive(

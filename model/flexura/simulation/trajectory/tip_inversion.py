@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import FlexuraError
-from ...io import Run, flag
+from ...io import Run, check_progress, flag
 from ...robot import Robot
 from ...signals import Signal
 from ...system import System, assemble, static
@@ -75,6 +75,7 @@ def invert(
     """
     system, times = exact_system(robot), check_times(t)
     flag(least_squares, "least_squares")
+    check_progress(progress)
     path = tip_path(system, times, tip)
     problem = TipProblem(system, path)
     report = progress or (lambda fraction: None)

@@ -1,0 +1,147 @@
+"""Derivatives of a run's channels by numbers of the robot file."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError
+from ...io import Run
+from ...robot import Robot
+from ...signals import Drive, as_signals
+from ...system import System, assemble, static
+from ..dynamics import simulate
+from ..problem import check_times
+from ..recorder import channel_units, observed
+from .posture import exact_system
+from .variation import stage_times, variation
+
+SHARE = 1e-4  # of a parameter: the step of its differences, at a state that is the same
+STEP = 1e-6  # of a state, along a derivative: from states to channels
+RTOL = 1e-10
+
+
+def parameter_derivatives(
+    robot: Any, t_eval: Any, drive: Any, parameters: Any, q0: Any = None
+) -> dict[str, Run]:
+    """How the channels of a simulation change with numbers of the robot file (155).
+
+    The equations of motion are linearised exactly along the run, by the core's dual numbers. What a
+    parameter changes of the forces, at the run's own states, is found by differences of the robot's
+    constants (of which the core has no derivatives). Both give the change of the states.
+
+    Args:
+        robot: a System, a Robot, or the path or name of a robot file.
+        t_eval (T,): ascending times [s], so dense that the run's fastest motion that matters is
+            resolved: they are the steps of the variation.
+        drive: forces as in `fx.simulate`, one entry a joint; without feedback.
+        parameters: keys of the robot file, as "payload.mass_kg" or "link.2.length_m".
+        q0 (n,): the start; by default as in `fx.simulate`. It does not change with a parameter.
+
+    Returns:
+        For each key a Run at t_eval whose channels are derivatives; `units` are those of the
+        channels, for each unit of the parameter.
+
+    Raises:
+        InputError: an argument is not what is expected.
+    """
+    system, t = exact_system(robot), check_times(t_eval)
+    keys = [parameters] if isinstance(parameters, str) else parameters
+    if not isinstance(keys, list | tuple) or not keys:
+        raise InputError("expected keys of the robot file", key="parameters", value=parameters)
+    if len(t) < 2:
+        raise InputError("expected two times or more", key="t_eval", value=t)
+    forces = (
+        drive
+        if isinstance(drive, Drive)
+        else Drive.force(*as_signals(drive, len(system.robot.links), "drive", t))
+    )
+    if len(forces.joints) != len(system.robot.links):
+        raise InputError("expected forces, one a joint of the robot", key="drive")
+    if any(joint.motion is not None for joint in forces.joints):
+        raise InputError("expected forces, without motions to follow", key="drive")
+    at = stage_times(t)
+    start = (
+        q0
+        if q0 is not None
+        else (static(system) if any(system.robot.gravity_m_s2) else system.start())
+    )
+    run = simulate(system, np.append(t[0], at), forces, start, rtol=RTOL)
+    if run.states is None or len(run) <= len(at):
+        raise InputError("expected a run that comes to its end", key="t_eval")
+    n, rows = system.n, system.free_rows
+    q, v = (np.ascontiguousarray(x) for x in (run.states[1:, :n], run.states[1:, n:]))
+    acting = np.zeros((len(at), n))
+    for i, row in enumerate(system.joint_rows):
+        acting[:, row] = [forces.joints[i].force_at(float(x)) for x in at]
+    a = np.array([system.accelerations(*x) for x in zip(q, v, acting, strict=True)])
+    along = variation(system, t, q, v, a, rows)
+    changed = np.stack([_changed(system.robot, str(key), q, v, a) for key in keys], axis=2)
+    places, rates = along.integrate(-changed[:, rows])
+    out = {}
+    last = slice(2, None, 3)
+    for k, key in enumerate(keys):
+        dq, dv = np.zeros((len(t), n)), np.zeros((len(t), n))
+        dq[1:, rows], dv[1:, rows] = places[last, :, k], rates[last, :, k]
+        states = np.vstack([np.append(start, np.zeros(n)), run.states[3::3]])
+        out[str(key)] = _channels(system, str(key), t, states[:, :n], states[:, n:], dq, dv)
+    return out
+
+
+def _changed(robot: Robot, key: str, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+    """The derivative of the forces of a motion (T, n) by a number of the robot."""
+    value = _value(robot, key)
+    other = lambda x: assemble(robot.replace({key: x})).equations.force_derivatives(q, v, a)[0]
+    if value:
+        step = SHARE * abs(value)
+        return np.asarray((other(value + step) - other(value - step)) / (2 * step))
+    # below 0 there may be no robot
+    step = SHARE
+    return np.asarray((4 * other(step) - 3 * other(0.0) - other(2 * step)) / (2 * step))
+
+
+def _value(robot: Robot, key: str) -> float:
+    """A number of the robot, by its key as in `Robot.replace`."""
+    expected = "expected the key of a number that the robot has, as payload.mass_kg"
+    found: Any = robot
+    for part in key.split("."):
+        try:
+            found = (
+                found[int(part) - 1] if isinstance(found, list | tuple) else getattr(found, part)
+            )
+        except (AttributeError, IndexError, ValueError):
+            raise InputError(expected, key="parameters", value=key) from None
+    if isinstance(found, bool) or not isinstance(found, int | float):
+        raise InputError(expected, key="parameters", value=key)
+    return float(found)
+
+
+def _channels(
+    system: System,
+    key: str,
+    t: np.ndarray,
+    q: np.ndarray,
+    v: np.ndarray,
+    dq: np.ndarray,
+    dv: np.ndarray,
+) -> Run:
+    """Changes of states as changes of the channels that depend on the state alone."""
+    size = max(float(np.abs(dq).max()), float(np.abs(dv).max()), 1e-300)
+    h = STEP / size
+    up, down = (
+        system.observe(np.ascontiguousarray(q + s * h * dq), np.ascontiguousarray(v + s * h * dv))
+        for s in (1, -1)
+    )
+    channels: dict[str, np.ndarray] = {}
+    units: dict[str, str] = {}
+    for i, (row, link) in enumerate(zip(system.joint_rows, system.robot.links, strict=True), 1):
+        unit = "rad" if link.joint.type == "R" else "m"
+        channels |= {f"joint/{i}/position": dq[:, row], f"joint/{i}/velocity": dv[:, row]}
+        units |= {f"joint/{i}/position": unit, f"joint/{i}/velocity": f"{unit}/s"}
+    known = channel_units(system.robot)
+    for k, name in enumerate(observed(system.robot)):
+        if not name.startswith("energy"):
+            channels[name], units[name] = (up[:, k] - down[:, k]) / (2 * h), known[name]
+    meta = {"source": "derivative", "program": "flexura", "parameter": key}
+    return Run(t, channels, units, meta | {"robot": system.robot.to_dict(), "events": []})

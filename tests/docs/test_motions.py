@@ -1,0 +1,166 @@
+"""Equations of docs/theory/13-motions.md, written down with plain NumPy, against what computes
+them."""
+
+import numpy as np
+import pytest
+
+import flexura as fx
+import robots
+from flexura.signals import paths
+from flexura.simulation.trajectory.collocation import POINTS, Mesh
+from flexura.simulation.trajectory.inverse_motion import TipProblem, mesh_between
+from flexura.simulation.trajectory.nearest_motion import nearest_motion
+from flexura.simulation.trajectory.shortest_motion import Plant, answer
+from flexura.simulation.trajectory.tip_output import tip_path
+from flexura.simulation.trajectory.variation import stage_times, variation
+from flexura.simulation.trajectory.zero_dynamics import zero_dynamics
+
+
+def arm(beta=2e-3):
+    return robots.system(
+        robots.beam(0.6, 0.2355, 0.5, 3, hub_inertia_kg_m2=2e-3, damping={"beta_s": beta}),
+        payload=0.05,
+    )
+
+
+def test_150_an_equation_holds_at_the_points_of_gauss():
+    mesh = Mesh(np.array([0.0, 0.1, 0.25, 0.4]))
+    g = np.polynomial.legendre.leggauss(POINTS)[0]
+    h = np.diff(mesh.nodes)
+    points = mesh.nodes[:-1, None] + h[:, None] * (1 + g) / 2
+    assert mesh.t == pytest.approx(points.ravel())
+    # q'' + 4 q = 0 with q(0) = 0 and q(0.4) = sin 0.8: 2 c_b unknowns fewer than equations by two
+    one = np.ones((len(mesh.t), 1, 1))
+    band = mesh.band([4 * one, 0 * one, one], mesh.ends[0, :1], mesh.ends[0, 1:])
+    right = np.zeros(mesh.count)
+    right[-1] = np.sin(0.8)
+    t = np.linspace(0.0, 0.4, 9)
+    assert mesh.at(t, band.solve(right)[:, None])[0][:, 0] == pytest.approx(np.sin(2 * t), abs=1e-9)
+
+
+def test_151_zeros_make_the_pencil_singular():
+    system = arm()
+    q, zero = system.start(), np.zeros((1, system.n))
+    _, K, G, M, _, tip = system.equations.force_derivatives(q[None], zero, zero)
+    K, G, M, g = K[0], G[0], M[0], tip[0][1:]
+    e, j = system.elastic_rows, system.joint_rows
+    zeros = zero_dynamics(M, G, K, g, e, j).zeros
+    N = np.zeros((system.n, len(e)))
+    N[e] = np.eye(len(e))
+    N[j] = -np.linalg.solve(g[:, j], g[:, e])
+    A, B, C = (x[e] @ N for x in (M, G, K))
+    for s in zeros[:4]:
+        pencil = s * s * A + s * B + C
+        values = np.linalg.svd(pencil / np.abs(pencil).max(axis=1)[:, None], compute_uv=False)
+        assert values[-1] < 1e-9 * values[0]
+
+
+def test_152_a_posture_balances_and_reaches():
+    heavy = robots.system(
+        robots.beam(0.3, 0.3, 0.8, 2), robots.beam(0.3, 0.3, 0.8, 2), gravity=(0.0, -9.81)
+    )
+    q = fx.inverse_kinematics(heavy, (0.35, 0.2), joints=[0.1, 0.8])
+    balance = heavy.elastic(q) + heavy.gravity(q)
+    assert np.abs(balance[heavy.elastic_rows]).max() < 1e-10
+    assert fx.tip_pose(heavy, q)[:2] == pytest.approx([0.35, 0.2], abs=1e-12)
+
+
+def test_153_the_elastic_rows_balance_and_the_tip_is_on_its_path():
+    system = arm()
+    path = tip_path(system, np.array([0.0, 0.6]), lambda t: paths.smooth_rise(t / 0.6))
+    problem = TipProblem(system, path)
+    start = problem.rest(0.0, system.start())
+    end = problem.rest(0.6, problem.along(np.linspace(0, 0.6, 9), start.q)[-1])
+    mesh = mesh_between(-0.3, 0.9, path.breaks, 0.03)
+    found = problem.solve(mesh, problem.slow(mesh, start.q), start, end)
+    q, v, a = mesh.here(found.coefficients)
+    force = np.array([system.forces(*x) for x in zip(q, v, a, strict=True)])
+    assert np.abs(force[:, system.elastic_rows]).max() < 1e-8 * np.abs(force).max()
+    tips = np.array([fx.tip_pose(system, x)[:2] for x in q])
+    assert np.arctan2(*tips.T[::-1]) == pytest.approx(path.at(mesh.t)[:, 0], abs=1e-9)
+    for rest, rows, k in ((start, start.zeros.decaying, 0), (end, end.zeros.growing, -1)):
+        at = mesh.at(mesh.nodes[[k]], found.coefficients)
+        e = system.elastic_rows
+        state = np.concatenate([(at[0][0] - rest.q)[e], at[1][0][e]])
+        size = np.abs(rows).max(axis=1)
+        assert np.abs(rows @ state / size).max() < 1e-9
+
+
+def test_154_the_way_has_four_derivatives_of_zero_at_its_ends():
+    u = np.polynomial.Polynomial([0] * 5 + [126, -420, 540, -315, 70])
+    x = np.linspace(0, 1, 11)
+    assert paths.smooth_rise(x) == pytest.approx(u(x), abs=1e-14)
+    for k in range(1, 5):
+        assert u.deriv(k)(np.array([0.0, 1.0])) == pytest.approx([0.0, 0.0], abs=1e-9)
+    x, y = paths.line((0.1, 0.2), (0.4, 0.1), 2.0)
+    assert [x(1.0)[0], y(0.5)[0]] == pytest.approx([0.25, 0.2 - 0.1 * u(0.25)], abs=1e-10)
+
+
+def test_155_the_variation_of_a_motion_is_the_difference_of_two():
+    system, nodes = arm(), np.linspace(0.0, 0.3, 61)
+    t = stage_times(nodes)
+    push = lambda size: [lambda s: 0.2 * np.sin(20 * s) + size * np.cos(9 * s)]
+    run = fx.simulate(system, np.append(0.0, t), push(0.0), rtol=1e-11)
+    n = system.n
+    q, v = np.ascontiguousarray(run.states[1:, :n]), np.ascontiguousarray(run.states[1:, n:])
+    force = np.zeros((len(t), n))
+    force[:, 0] = 0.2 * np.sin(20 * t)
+    a = np.array([system.accelerations(*x) for x in zip(q, v, force, strict=True)])
+    along = variation(system, nodes, q, v, a, system.free_rows)
+    f = np.zeros((len(t), n, 1))
+    f[:, 0, 0] = np.cos(9 * t)
+    places, _ = along.integrate(f)
+    h = 1e-4
+    up, down = (fx.simulate(system, np.append(0.0, t), push(s * h), rtol=1e-11) for s in (1, -1))
+    slope = (up.states[1:, :n] - down.states[1:, :n]) / (2 * h)
+    assert places[:, :, 0] == pytest.approx(slope, abs=2e-4 * np.abs(slope).max())
+
+
+def test_156_the_nearest_motion_is_the_exact_one_where_there_is_one():
+    system = arm()
+    path = tip_path(system, np.array([0.0, 0.6]), lambda t: 0.5 * paths.smooth_rise(t / 0.6))
+    mesh = mesh_between(-0.35, 1.2, path.breaks, 0.03)
+    found = nearest_motion(system, path, mesh, system.start())
+    t = np.linspace(-0.35, 0.8, 200)
+    run = fx.inverse(system, t, found.signals, rtol=1e-8)
+    off = np.arctan2(run["tip/y"], run["tip/x"]) - path.at(t)[:, 0]
+    assert np.abs(off).max() < 1e-5
+
+
+def test_157_damping_ratios():
+    system = arm()
+    found = fx.modes(system, count=3)
+    D = system.damping_at(found.q)
+    for k, x in enumerate(found.shapes.T):
+        zeta = x @ D @ x / (2 * 2 * np.pi * found.frequencies_Hz[k])
+        assert found.damping_ratios[k] == pytest.approx(zeta, rel=1e-12)
+
+
+def test_158_a_frequency_response():
+    system, f = arm(), 3.0
+    found = fx.frequency_response(system, "joint/1/drive", "tip/y", [f])
+    lin, w = fx.linearize(system), 2 * np.pi * f
+    c = lin.outlook[lin.outputs.index("tip/y")]
+    H = c @ np.linalg.solve(lin.K + 1j * w * lin.G - w * w * lin.M, lin.E[:, 0])
+    assert found.values[0] == pytest.approx(H, rel=1e-7)
+
+
+def test_159_what_is_asked_of_the_drives_at_the_end():
+    system = arm()
+    plant = Plant(system, system.start(), fx.static(system, [0.5]), 0.0)
+    omega, into = plant.modes
+    assert omega[0] == 0.0
+    assert omega[1:4] / (2 * np.pi) == pytest.approx(
+        fx.frequencies(system, plant.end, "free")[1:4], rel=1e-9
+    )
+    u = np.zeros((21, 1))
+    u[5] = 0.1
+    found = answer(plant, u, 0.4, np.array([0]), False)
+    du = np.zeros_like(u)
+    du[9] = 1e-3
+    up, down = (answer(plant, u + s * du, 0.4, np.array([0]), False).end for s in (1, -1))
+    slope = (up - down) / 2e-3
+    n = system.n
+    for part in (slice(0, n), slice(n, 2 * n)):
+        asked = into[:3] @ found.slope[part][:, 8]
+        assert asked == pytest.approx(into[:3] @ slope[part], rel=2e-2, abs=1e-3)
