@@ -25,7 +25,8 @@ from board_library import FIRMWARE, HERE, INCLUDES, ROOT, SOURCES
 
 LIST = HERE / "equivalent.toml"
 LIB = FIRMWARE / "lib"
-SECONDS = 20  # of processor time for one program; a mutant that needs more hangs
+# Of processor time for one program, and for a file of the host's tests; what needs more hangs.
+SECONDS, HOST_SECONDS = 20, 400
 
 # What is mutated, and which source is compiled again for it.
 BOARD = {
@@ -85,17 +86,16 @@ class Outcome(NamedTuple):
         return self.killed / max(1, self.killed + len(self.survived))
 
 
-def limited() -> None:
-    """In a child: no more processor time than this, no core file."""
-    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-
-
-def passes(command: list[str], **more: object) -> bool:
+def passes(command: list[str], seconds: int = SECONDS, **more: object) -> bool:
     """Whether a program ends well within its time."""
+
+    def limited() -> None:
+        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     try:
-        done = subprocess.run(command, preexec_fn=limited, timeout=600, **quiet, **more)
+        done = subprocess.run(command, preexec_fn=limited, timeout=1800, **quiet, **more)
     except subprocess.TimeoutExpired:
         return False
     return done.returncode == 0
@@ -152,12 +152,12 @@ class Board:
         return None
 
 
-def host(folder: Path, mutant: mutants.Mutant, tests: list[str]) -> str | None:
-    """The first test file of the host that fails with this mutant."""
+def host(folder: Path, mutant: mutants.Mutant | None, tests: list[str]) -> str | None:
+    """The first test file of the host that fails with this mutant, or without one."""
     copy = folder / "analysis"
     if not copy.exists():
         shutil.copytree(ROOT / "analysis", copy)
-    place = folder / mutant.file
+    place = folder / mutant.file if mutant else copy / "flexlab/__init__.py"
     original = place.read_text(encoding="utf-8")
     surroundings = os.environ | {
         "PYTHONPATH": f"{copy}:{ROOT / 'model'}",
@@ -165,11 +165,11 @@ def host(folder: Path, mutant: mutants.Mutant, tests: list[str]) -> str | None:
     }
     pytest = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "--no-header"]
     chosen = ["-m", "not slow and not long", "--timeout", "60"]
-    place.write_text(mutant.apply(original), encoding="utf-8")
+    place.write_text(mutant.apply(original) if mutant else original, encoding="utf-8")
     try:
         for name in tests:
             command = [*pytest, *chosen, str(HERE / name)]
-            if not passes(command, env=surroundings, cwd=ROOT):
+            if not passes(command, HOST_SECONDS, env=surroundings, cwd=ROOT):
                 return name
     finally:
         place.write_text(original, encoding="utf-8")
@@ -193,6 +193,8 @@ def run(name: str, part: tuple[int, int] = (1, 1), say=print) -> Outcome:
         for file, again in (BOARD | HOST)[name].items():
             path = (LIB if board else PROTOCOL) / file
             todo += [(mutant, again) for mutant in mutants.of(path, ROOT)]
+            if not board:
+                assert host(folder, None, list(again)) is None, "without a mutant all must pass"
         for mutant, again in todo[k - 1 :: n]:
             if mutant.name in known:
                 same += 1
