@@ -55,12 +55,9 @@ HOST = {
 }
 NAMES = [*BOARD, *HOST]
 
+UNIT = sorted(path for path in FIRMWARE.glob("test/test_*/") if path.name != "test_interrupts")
 MAINS = {
-    "unit": [f"-I{FIRMWARE / 'test'}", str(FIRMWARE / "test/test_lib/test_main.cpp")],
-    "refusals": [f"-I{FIRMWARE / 'test'}", str(FIRMWARE / "test/test_refusals/test_main.cpp")],
-    "faults": [f"-I{FIRMWARE / 'test'}", str(FIRMWARE / "test/test_faults/test_main.cpp")],
-    "rig": [f"-I{FIRMWARE / 'test'}", str(FIRMWARE / "test/test_rig/test_main.cpp")],
-    "session": [f"-I{FIRMWARE / 'test'}", str(FIRMWARE / "test/test_session/test_main.cpp")],
+    **{p.name: [f"-I{FIRMWARE / 'test'}", str(p / "test_main.cpp")] for p in UNIT},
     "frames": [str(HERE / "fuzz_frames.cpp")],
     "replay": ["-DREPLAY", str(HERE / "fuzz_session.cpp")],
 }
@@ -136,7 +133,7 @@ class Board:
                 shutil.copy(source, own)
             try:
                 mutated = self.compiled(own, f"-I{place}", out="mutant.o")
-                for name in ("unit", "refusals") if mutant.file.endswith(".h") else ():
+                for name in ("test_lib", "test_refusals") if mutant.file.endswith(".h") else ():
                     mains[name] = place / f"{name}.o"
                     before = [*CXX, f"-I{place}", *INCLUDES, *MAINS[name], "-c"]
                     subprocess.run([*before, "-o", str(mains[name])], check=True)
