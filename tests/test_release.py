@@ -38,8 +38,8 @@ def released(root: Path, umask: int) -> dict[str, bytes]:
 
 def test_a_release_is_the_same_in_another_folder(tmp_path):
     """Two copies of the sources, of other paths, times and rights."""
-    one = released(copied(tmp_path / "a"), 0o022)
-    other = released(copied(tmp_path / "a-much-longer-name" / "b"), 0o077)
+    first, second = copied(tmp_path / "a"), copied(tmp_path / "a-much-longer-name" / "b")
+    one, other = released(first, 0o022), released(second, 0o077)
     assert set(one) == set(other) and len(one) == 4
     for name in one:
         assert hashlib.sha256(one[name]).digest() == hashlib.sha256(other[name]).digest(), name

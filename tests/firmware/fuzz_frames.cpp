@@ -130,7 +130,7 @@ int main(int count, char **words) {
       if (session.saving()) session.saved(below(2), answer);
       rig.prepare();
       rig.tick(out);
-      if (out.on != rig.active() || (!out.on && out.duty))
+      if (out.on != rig.active() || (!out.on && (out.duty[0] || out.duty[1])))
         return fprintf(stderr, "outputs on in state %d\n", static_cast<int>(rig.state())), 1;
     }
   }

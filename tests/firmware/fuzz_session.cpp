@@ -75,8 +75,8 @@ class Board {
     rig_.prepare();
     rig_.tick(out_);
     REQUIRE(out_.on == rig_.active());
-    REQUIRE(out_.on || (out_.duty == 0 && out_.steps.count == 0));
-    REQUIRE(out_.duty >= -800 && out_.duty <= 800);
+    REQUIRE(out_.on || (out_.duty[0] == 0 && out_.duty[1] == 0 && out_.steps.count == 0));
+    for (const int16_t duty : out_.duty) REQUIRE(duty >= -800 && duty <= 800);
     uint8_t bytes[kFrameMaxBytes];
     REQUIRE(session_.telemetry(0, bytes) <= sizeof bytes);
     REQUIRE(session_.announce(bytes) <= sizeof bytes);

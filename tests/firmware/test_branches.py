@@ -12,9 +12,9 @@ from board_library import FIRMWARE, HERE, INCLUDES, SOURCES
 from branch_coverage import branches, missed
 
 FLAGS = ["-std=gnu++14", "-O0", "--coverage", "-fno-exceptions", "-fprofile-abs-path", *INCLUDES]
+UNIT = sorted(path for path in FIRMWARE.glob("test/test_*/") if path.name != "test_interrupts")
 TESTS = {
-    "unit": [f"-I{FIRMWARE / 'test'}", str(FIRMWARE / "test/test_lib/test_main.cpp")],
-    "refusals": [f"-I{FIRMWARE / 'test'}", str(FIRMWARE / "test/test_refusals/test_main.cpp")],
+    **{p.name: [f"-I{FIRMWARE / 'test'}", str(p / "test_main.cpp")] for p in UNIT},
     "replay": ["-DREPLAY", str(HERE / "fuzz_session.cpp")],
     "frames": [str(HERE / "fuzz_frames.cpp")],
 }

@@ -22,7 +22,7 @@ from flexlab.board.protocol.declaration import ADC_SAMPLES, CONFIG, CONTROL_HZ, 
 from flexura import signals
 from flexura.control import gains
 
-SUITES = {"test_refusals", "test_faults", "test_rig", "test_session"}
+SUITES = {"test_drives", "test_refusals", "test_faults", "test_rig", "test_session"}
 TICK_S = 1 / CONTROL_HZ
 
 

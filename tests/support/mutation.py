@@ -25,7 +25,8 @@ from board_library import FIRMWARE, HERE, INCLUDES, ROOT, SOURCES
 
 LIST = HERE / "equivalent.toml"
 LIB = FIRMWARE / "lib"
-SECONDS = 20  # of processor time for one program; a mutant that needs more hangs
+# Of processor time for one program, and for a file of the host's tests; what needs more hangs.
+SECONDS, HOST_SECONDS = 20, 400
 
 # What is mutated, and which source is compiled again for it.
 BOARD = {
@@ -54,12 +55,9 @@ HOST = {
 }
 NAMES = [*BOARD, *HOST]
 
+UNIT = sorted(path for path in FIRMWARE.glob("test/test_*/") if path.name != "test_interrupts")
 MAINS = {
-    "unit": [f"-I{FIRMWARE / 'test'}", str(FIRMWARE / "test/test_lib/test_main.cpp")],
-    "refusals": [f"-I{FIRMWARE / 'test'}", str(FIRMWARE / "test/test_refusals/test_main.cpp")],
-    "faults": [f"-I{FIRMWARE / 'test'}", str(FIRMWARE / "test/test_faults/test_main.cpp")],
-    "rig": [f"-I{FIRMWARE / 'test'}", str(FIRMWARE / "test/test_rig/test_main.cpp")],
-    "session": [f"-I{FIRMWARE / 'test'}", str(FIRMWARE / "test/test_session/test_main.cpp")],
+    **{p.name: [f"-I{FIRMWARE / 'test'}", str(p / "test_main.cpp")] for p in UNIT},
     "frames": [str(HERE / "fuzz_frames.cpp")],
     "replay": ["-DREPLAY", str(HERE / "fuzz_session.cpp")],
 }
@@ -85,17 +83,16 @@ class Outcome(NamedTuple):
         return self.killed / max(1, self.killed + len(self.survived))
 
 
-def limited() -> None:
-    """In a child: no more processor time than this, no core file."""
-    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-
-
-def passes(command: list[str], **more: object) -> bool:
+def passes(command: list[str], seconds: int = SECONDS, **more: object) -> bool:
     """Whether a program ends well within its time."""
+
+    def limited() -> None:
+        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     try:
-        done = subprocess.run(command, preexec_fn=limited, timeout=600, **quiet, **more)
+        done = subprocess.run(command, preexec_fn=limited, timeout=1800, **quiet, **more)
     except subprocess.TimeoutExpired:
         return False
     return done.returncode == 0
@@ -136,7 +133,7 @@ class Board:
                 shutil.copy(source, own)
             try:
                 mutated = self.compiled(own, f"-I{place}", out="mutant.o")
-                for name in ("unit", "refusals") if mutant.file.endswith(".h") else ():
+                for name in ("test_lib", "test_refusals") if mutant.file.endswith(".h") else ():
                     mains[name] = place / f"{name}.o"
                     before = [*CXX, f"-I{place}", *INCLUDES, *MAINS[name], "-c"]
                     subprocess.run([*before, "-o", str(mains[name])], check=True)
@@ -152,12 +149,12 @@ class Board:
         return None
 
 
-def host(folder: Path, mutant: mutants.Mutant, tests: list[str]) -> str | None:
-    """The first test file of the host that fails with this mutant."""
+def host(folder: Path, mutant: mutants.Mutant | None, tests: list[str]) -> str | None:
+    """The first test file of the host that fails with this mutant, or without one."""
     copy = folder / "analysis"
     if not copy.exists():
         shutil.copytree(ROOT / "analysis", copy)
-    place = folder / mutant.file
+    place = folder / mutant.file if mutant else copy / "flexlab/__init__.py"
     original = place.read_text(encoding="utf-8")
     surroundings = os.environ | {
         "PYTHONPATH": f"{copy}:{ROOT / 'model'}",
@@ -165,11 +162,11 @@ def host(folder: Path, mutant: mutants.Mutant, tests: list[str]) -> str | None:
     }
     pytest = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "--no-header"]
     chosen = ["-m", "not slow and not long", "--timeout", "60"]
-    place.write_text(mutant.apply(original), encoding="utf-8")
+    place.write_text(mutant.apply(original) if mutant else original, encoding="utf-8")
     try:
         for name in tests:
             command = [*pytest, *chosen, str(HERE / name)]
-            if not passes(command, env=surroundings, cwd=ROOT):
+            if not passes(command, HOST_SECONDS, env=surroundings, cwd=ROOT):
                 return name
     finally:
         place.write_text(original, encoding="utf-8")
@@ -193,6 +190,8 @@ def run(name: str, part: tuple[int, int] = (1, 1), say=print) -> Outcome:
         for file, again in (BOARD | HOST)[name].items():
             path = (LIB if board else PROTOCOL) / file
             todo += [(mutant, again) for mutant in mutants.of(path, ROOT)]
+            if not board:
+                assert host(folder, None, list(again)) is None, "without a mutant all must pass"
         for mutant, again in todo[k - 1 :: n]:
             if mutant.name in known:
                 same += 1
