@@ -29,7 +29,6 @@ from .files import (
     write_text,
 )
 from .format import FORMAT, check_format
-from .memory import check_memory
 from .quantities import CHANNELS, STATIONS, Channel, channel
 from .quantities.labels import EMULATED, called, emulated, kind
 from .run import FILE, Run
