@@ -84,8 +84,8 @@ Array rates_of(const Mechanics &self, const Vector &q, const Vector &v) {
   return out;
 }
 
-// Of T states, rows of q, v, a (T, n): the forces, their derivatives by q, v and a, the tip's places
-// and their derivatives by q.
+// Of T states, rows of q, v, a (T, n): the forces, their derivatives by q, v and a, the tip's
+// places and their derivatives by q.
 nb::tuple force_derivatives_of(const Mechanics &self, const Matrix &q, const Matrix &v,
                                const Matrix &a) {
   const std::size_t n = std::size_t(self.model->n), count = q.shape(0), square = n * n;
@@ -120,9 +120,10 @@ void add_solve(nb::class_<Mechanics> &type) {
       .def("mass", &mass_of, "q"_a, "M(q) (n, n).")
       .def("stiffness", &stiffness_of, "q"_a, "v"_a,
            "Derivative of the forces at q (and rates v, if any) by q, (n, n).")
-      .def("force_derivatives", &force_derivatives_of, "q"_a, "v"_a, "a"_a,
-           "Of T states: forces (T, n), their derivatives by q, v and a (T, n, n), the tip's places "
-           "(T, 2), their derivatives by q (T, 2, n).")
+      .def(
+          "force_derivatives", &force_derivatives_of, "q"_a, "v"_a, "a"_a,
+          "Of T states: forces (T, n), their derivatives by q, v and a (T, n, n), the tip's places "
+          "(T, 2), their derivatives by q (T, 2, n).")
       .def("rates", &rates_of, "q"_a, "v"_a, "Derivative of the forces by v, (n, n).");
 }
 

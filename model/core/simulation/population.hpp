@@ -50,7 +50,7 @@ struct Ending {
   int joint = -1;  // that met its limit, starts outside of it, or where the run got stuck; of a
                    // fault: the link
   long steps = 0;
-  double balance = 0.0;  // of a robot that is done: see Worker::balance
+  double balance = 0.0;          // of a robot that is done: see Worker::balance
   std::vector<double> position;  // (links) of the joints at the end
   std::string key, text;  // of a fault the key and what was expected; else why the run ended early
 };

@@ -1,5 +1,5 @@
-// Derivatives of the forces of a motion (59), and the tip's place with its own: what Newton's method
-// needs where a whole motion is the unknown.
+// Derivatives of the forces of a motion (59), and the tip's place with its own: what Newton's
+// method needs where a whole motion is the unknown.
 #pragma once
 #include <vector>
 
@@ -7,7 +7,8 @@
 
 namespace flexura {
 
-// The robot with dual numbers, and the memory of its evaluations: for many states one after another.
+// The robot with dual numbers, and the memory of its evaluations: for many states one after
+// another.
 class ForceDerivatives {
  public:
   explicit ForceDerivatives(const Model<double> &model);

@@ -17,9 +17,9 @@
 #include <atomic>
 #include <new>
 
-extern "C" void* __libc_malloc(size_t);
-extern "C" void* __libc_calloc(size_t, size_t);
-extern "C" void* __libc_realloc(void*, size_t);
+extern "C" void *__libc_malloc(size_t);
+extern "C" void *__libc_calloc(size_t, size_t);
+extern "C" void *__libc_realloc(void *, size_t);
 
 namespace {
 
@@ -33,11 +33,12 @@ int log_file = -1;
 uintptr_t library_begin, library_end;
 size_t least_bytes;
 
-template <class Function> Function next(const char* name) {
+template <class Function>
+Function next(const char *name) {
   return reinterpret_cast<Function>(dlsym(RTLD_NEXT, name));
 }
 
-bool below(const char* path) {
+bool below(const char *path) {
   if (!folder_size || !path) return false;
   char whole[8192];
   if (path[0] != '/') {
@@ -50,7 +51,7 @@ bool below(const char* path) {
 }
 
 // The path of an open file below the folder, or false.
-bool place(int file, char* path) {
+bool place(int file, char *path) {
   if (!folder_size) return false;
   char link[64];
   snprintf(link, sizeof link, "/proc/self/fd/%d", file);
@@ -69,10 +70,10 @@ bool fails(Kind what, bool again = false) {
   return true;
 }
 
-void put(const void* data, size_t size) { syscall(SYS_write, log_file, data, size); }
+void put(const void *data, size_t size) { syscall(SYS_write, log_file, data, size); }
 
-void note(char what, const char* path, const char* other = "", int64_t offset = 0,
-          const void* data = nullptr, size_t size = 0) {
+void note(char what, const char *path, const char *other = "", int64_t offset = 0,
+          const void *data = nullptr, size_t size = 0) {
   if (log_file < 0) return;
   uint32_t lengths[3] = {(uint32_t)strlen(path), (uint32_t)strlen(other), (uint32_t)size};
   put(&what, 1);
@@ -83,15 +84,15 @@ void note(char what, const char* path, const char* other = "", int64_t offset = 
   if (size) put(data, size);
 }
 
-const char* whole(const char* path, char* buffer) {
+const char *whole(const char *path, char *buffer) {
   if (path[0] == '/') return path;
   if (!getcwd(buffer, 4096)) return path;
   strcat(buffer, "/");
   return strncat(buffer, path, 4000);
 }
 
-int opened(const char* name, const char* path, int flags, mode_t mode) {
-  static auto real = next<int (*)(const char*, int, ...)>("open64");
+int opened(const char *name, const char *path, int flags, mode_t mode) {
+  static auto real = next<int (*)(const char *, int, ...)>("open64");
   (void)name;
   bool own = (flags & (O_CREAT | O_TRUNC)) && below(path), there = own && !access(path, F_OK);
   if (own && !there && fails(creating)) {
@@ -107,9 +108,9 @@ int opened(const char* name, const char* path, int flags, mode_t mode) {
   return file;
 }
 
-ssize_t written(int file, const void* data, size_t size, int64_t at) {
-  static auto real = next<ssize_t (*)(int, const void*, size_t)>("write");
-  static auto real_at = next<ssize_t (*)(int, const void*, size_t, off64_t)>("pwrite64");
+ssize_t written(int file, const void *data, size_t size, int64_t at) {
+  static auto real = next<ssize_t (*)(int, const void *, size_t)>("write");
+  static auto real_at = next<ssize_t (*)(int, const void *, size_t, off64_t)>("pwrite64");
   char path[4096];
   bool own = place(file, path);
   if (own && fails(writing)) {
@@ -119,9 +120,8 @@ ssize_t written(int file, const void* data, size_t size, int64_t at) {
   int64_t offset = at;
   if (own && at < 0) {
     struct stat state;
-    offset = (fcntl(file, F_GETFL) & O_APPEND) && !fstat(file, &state)
-                 ? state.st_size
-                 : lseek(file, 0, SEEK_CUR);
+    offset = (fcntl(file, F_GETFL) & O_APPEND) && !fstat(file, &state) ? state.st_size
+                                                                       : lseek(file, 0, SEEK_CUR);
   }
   ssize_t done = at < 0 ? real(file, data, size) : real_at(file, data, size, at);
   if (own && done > 0) note('w', path, "", offset, data, done);
@@ -129,7 +129,7 @@ ssize_t written(int file, const void* data, size_t size, int64_t at) {
   return done;
 }
 
-int synchronised(int file, const char* name) {
+int synchronised(int file, const char *name) {
   char path[4096];
   bool own = place(file, path);
   if (own && fails(syncing)) {
@@ -141,12 +141,12 @@ int synchronised(int file, const char* name) {
   return done;
 }
 
-bool of_library(void* caller) {
+bool of_library(void *caller) {
   auto at = reinterpret_cast<uintptr_t>(caller);
   return at >= library_begin && at < library_end;
 }
 
-bool refused(void* caller, size_t size, Kind what) {
+bool refused(void *caller, size_t size, Kind what) {
   return kind == what && size >= least_bytes && of_library(caller) && fails(what);
 }
 
@@ -155,18 +155,19 @@ bool refused(void* caller, size_t size, Kind what) {
 extern "C" {
 
 // Fail the n-th operation of a kind on files below a folder.
-void disturb_files(const char* below_this, int what, long n, const char* log) {
+void disturb_files(const char *below_this, int what, long n, const char *log) {
   strncpy(folder, below_this, sizeof folder - 1);
   folder_size = strlen(folder);
   counted = fired = 0;
   countdown = n;
   kind = what;
-  log_file = log[0] ? (int)syscall(SYS_openat, AT_FDCWD, log, O_CREAT | O_WRONLY | O_APPEND, 0644) : -1;
+  log_file =
+      log[0] ? (int)syscall(SYS_openat, AT_FDCWD, log, O_CREAT | O_WRONLY | O_APPEND, 0644) : -1;
 }
 
 // Fail the n-th allocation of at least so many bytes by a library that is loaded; 0: not found.
-int disturb_memory(const char* name, int what, long n, size_t bytes) {
-  FILE* maps = fopen("/proc/self/maps", "r");
+int disturb_memory(const char *name, int what, long n, size_t bytes) {
+  FILE *maps = fopen("/proc/self/maps", "r");
   char line[8192];
   library_begin = library_end = 0;
   while (maps && fgets(line, sizeof line, maps)) {
@@ -187,7 +188,7 @@ int disturb_memory(const char* name, int what, long n, size_t bytes) {
 long disturbed() { return fired; }
 long operations() { return counted; }
 
-int open(const char* path, int flags, ...) {
+int open(const char *path, int flags, ...) {
   va_list more;
   va_start(more, flags);
   mode_t mode = flags & (O_CREAT | O_TMPFILE) ? va_arg(more, mode_t) : 0;
@@ -195,7 +196,7 @@ int open(const char* path, int flags, ...) {
   return opened("open", path, flags, mode);
 }
 
-int open64(const char* path, int flags, ...) {
+int open64(const char *path, int flags, ...) {
   va_list more;
   va_start(more, flags);
   mode_t mode = flags & (O_CREAT | O_TMPFILE) ? va_arg(more, mode_t) : 0;
@@ -203,20 +204,20 @@ int open64(const char* path, int flags, ...) {
   return opened("open64", path, flags, mode);
 }
 
-ssize_t write(int file, const void* data, size_t size) { return written(file, data, size, -1); }
+ssize_t write(int file, const void *data, size_t size) { return written(file, data, size, -1); }
 
-ssize_t pwrite(int file, const void* data, size_t size, off_t at) {
+ssize_t pwrite(int file, const void *data, size_t size, off_t at) {
   return written(file, data, size, at);
 }
 
-ssize_t pwrite64(int file, const void* data, size_t size, off64_t at) {
+ssize_t pwrite64(int file, const void *data, size_t size, off64_t at) {
   return written(file, data, size, at);
 }
 
-ssize_t writev(int file, const struct iovec* parts, int count) {
+ssize_t writev(int file, const struct iovec *parts, int count) {
   char path[4096];
   if (!place(file, path)) {
-    static auto real = next<ssize_t (*)(int, const struct iovec*, int)>("writev");
+    static auto real = next<ssize_t (*)(int, const struct iovec *, int)>("writev");
     return real(file, parts, count);
   }
   ssize_t all = 0;
@@ -232,8 +233,8 @@ ssize_t writev(int file, const struct iovec* parts, int count) {
 int fsync(int file) { return synchronised(file, "fsync"); }
 int fdatasync(int file) { return synchronised(file, "fdatasync"); }
 
-int rename(const char* from, const char* to) {
-  static auto real = next<int (*)(const char*, const char*)>("rename");
+int rename(const char *from, const char *to) {
+  static auto real = next<int (*)(const char *, const char *)>("rename");
   bool own = below(from) || below(to);
   if (own && fails(renaming)) {
     errno = EIO;
@@ -245,8 +246,8 @@ int rename(const char* from, const char* to) {
   return done;
 }
 
-int mkdir(const char* path, mode_t mode) {
-  static auto real = next<int (*)(const char*, mode_t)>("mkdir");
+int mkdir(const char *path, mode_t mode) {
+  static auto real = next<int (*)(const char *, mode_t)>("mkdir");
   bool own = below(path);
   if (own && fails(creating)) {
     errno = ENOSPC;
@@ -258,24 +259,24 @@ int mkdir(const char* path, mode_t mode) {
   return done;
 }
 
-int unlink(const char* path) {
-  static auto real = next<int (*)(const char*)>("unlink");
+int unlink(const char *path) {
+  static auto real = next<int (*)(const char *)>("unlink");
   int done = real(path);
   char a[8192];
   if (!done && below(path)) note('u', whole(path, a));
   return done;
 }
 
-int rmdir(const char* path) {
-  static auto real = next<int (*)(const char*)>("rmdir");
+int rmdir(const char *path) {
+  static auto real = next<int (*)(const char *)>("rmdir");
   int done = real(path);
   char a[8192];
   if (!done && below(path)) note('u', whole(path, a));
   return done;
 }
 
-int unlinkat(int parent, const char* name, int flags) {
-  static auto real = next<int (*)(int, const char*, int)>("unlinkat");
+int unlinkat(int parent, const char *name, int flags) {
+  static auto real = next<int (*)(int, const char *, int)>("unlinkat");
   char path[8192];
   bool own = parent != AT_FDCWD && place(parent, path);
   int done = real(parent, name, flags);
@@ -286,47 +287,47 @@ int unlinkat(int parent, const char* name, int flags) {
   return done;
 }
 
-void* malloc(size_t size) {
+void *malloc(size_t size) {
   if (refused(__builtin_return_address(0), size, array)) return errno = ENOMEM, nullptr;
   return __libc_malloc(size);
 }
 
-void* calloc(size_t count, size_t size) {
+void *calloc(size_t count, size_t size) {
   if (refused(__builtin_return_address(0), count * size, array)) return errno = ENOMEM, nullptr;
   return __libc_calloc(count, size);
 }
 
-void* realloc(void* old, size_t size) {
+void *realloc(void *old, size_t size) {
   if (refused(__builtin_return_address(0), size, array)) return errno = ENOMEM, nullptr;
   return __libc_realloc(old, size);
 }
 
 }  // extern "C"
 
-void* operator new(size_t size) {
+void *operator new(size_t size) {
   if (refused(__builtin_return_address(0), size, allocation)) throw std::bad_alloc();
-  if (void* got = __libc_malloc(size ? size : 1)) return got;
+  if (void *got = __libc_malloc(size ? size : 1)) return got;
   throw std::bad_alloc();
 }
 
-void* operator new[](size_t size) {
+void *operator new[](size_t size) {
   if (refused(__builtin_return_address(0), size, allocation)) throw std::bad_alloc();
-  if (void* got = __libc_malloc(size ? size : 1)) return got;
+  if (void *got = __libc_malloc(size ? size : 1)) return got;
   throw std::bad_alloc();
 }
 
-void* operator new(size_t size, const std::nothrow_t&) noexcept {
+void *operator new(size_t size, const std::nothrow_t &) noexcept {
   if (refused(__builtin_return_address(0), size, allocation)) return nullptr;
   return __libc_malloc(size ? size : 1);
 }
 
-void* operator new[](size_t size, const std::nothrow_t&) noexcept {
+void *operator new[](size_t size, const std::nothrow_t &) noexcept {
   if (refused(__builtin_return_address(0), size, allocation)) return nullptr;
   return __libc_malloc(size ? size : 1);
 }
 
-void* operator new(size_t size, std::align_val_t to) {
-  void* got = nullptr;
+void *operator new(size_t size, std::align_val_t to) {
+  void *got = nullptr;
   if (refused(__builtin_return_address(0), size, allocation) ||
       posix_memalign(&got, (size_t)to, size ? size : 1))
     throw std::bad_alloc();

@@ -40,12 +40,12 @@ typedef struct {            /* shared with Python: all doubles, see simulator.py
                           window, -1..1 */
   double
       steps; /* out: steps taken since the start, with sign, counted while the driver was enabled */
-  double steps_mean;   /* out: mean of `steps` over the window's time */
+  double steps_mean;       /* out: mean of `steps` over the window's time */
   double motor_on[MOTORS]; /* out: 1 while the motor's driver is enabled */
-  double stepper_on;   /* out: 1 while the stepper's driver is enabled */
-  double driven_cycle; /* out: the last cycle at which a bridge was enabled */
-  double step_cycle;   /* out: the last cycle at which the stepper driver was enabled */
-  double resets;       /* out: resets since the start, power-on not counted */
+  double stepper_on;       /* out: 1 while the stepper's driver is enabled */
+  double driven_cycle;     /* out: the last cycle at which a bridge was enabled */
+  double step_cycle;       /* out: the last cycle at which the stepper driver was enabled */
+  double resets;           /* out: resets since the start, power-on not counted */
 } window_t;
 
 typedef struct {
@@ -99,9 +99,9 @@ struct board {
   uint8_t level_of[ROLES];         /* by role */
   const avr_timer_t *timer[ROLES]; /* of the compare pins, by role, and their comparators */
   const avr_timer_comp_t *comparator[ROLES];
-  uint8_t cut[ROLES];            /* by role: its wire is broken */
-  int unsettled;                 /* a line is not at the level that simavr believes */
-  int motor[MOTORS];             /* -1, 0, 1: how the pins drive the motor now */
+  uint8_t cut[ROLES]; /* by role: its wire is broken */
+  int unsettled;      /* a line is not at the level that simavr believes */
+  int motor[MOTORS];  /* -1, 0, 1: how the pins drive the motor now */
   uint64_t motor_since[MOTORS];
   double motor_sum[MOTORS];
   uint64_t begin; /* the window's first cycle */
