@@ -13,7 +13,7 @@ from ...signals import Drive, as_signals
 from ...system import System, assemble, static
 from ..dynamics import simulate
 from ..problem import check_times
-from ..recorder import channel_units, observed
+from ..recorder import channel_units, recorded_channels
 from .posture import exact_system
 from .variation import stage_times, variation
 
@@ -140,7 +140,7 @@ def _channels(
         channels |= {f"joint/{i}/position": dq[:, row], f"joint/{i}/velocity": dv[:, row]}
         units |= {f"joint/{i}/position": unit, f"joint/{i}/velocity": f"{unit}/s"}
     known = channel_units(system.robot)
-    for k, name in enumerate(observed(system.robot)):
+    for k, name in enumerate(recorded_channels(system.robot)):
         if not name.startswith("energy"):
             channels[name], units[name] = (up[:, k] - down[:, k]) / (2 * h), known[name]
     meta = {"source": "derivative", "program": "flexura", "parameter": key}
