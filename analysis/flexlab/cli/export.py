@@ -89,8 +89,8 @@ def _state_space(robot: Path, to: str, out: Path | None, force: bool, json: bool
         write_bytes(target, as_mat.state_space(lin))
     about = {"file": str(target), "states": len(lin.states), "outputs": list(lin.outputs)}
     if json:
-        show(True, lambda: None, lambda: about)
-    say(json, f"state space: {len(lin.states)} states", f"stored {target}")
+        print_results(True, lambda: None, lambda: about)
+    message(json, f"state space: {len(lin.states)} states", f"stored {target}")
 
 
 def forms() -> dict[str, Callable[[Run], bytes]]:
