@@ -56,6 +56,12 @@ def exact_system(robot: Any) -> System:
             key="stiffening",
             value=system.robot.stiffening,
         )
+    for i, link in enumerate(system.robot.links, 1):
+        if link.joint.transmission is not None:
+            raise InputError(
+                "expected none: motions that are asked for need drives that act on the hub",
+                key=f"link[{i}].joint.transmission",
+            )
     return system
 
 

@@ -15,13 +15,13 @@ from .variation import stage_times, variation
 
 STEPS = 8  # linear programs for one time, at most
 LONGER = 12  # times by which the first guess may be too short
-RTOL = 1e-9
-SUBSTEPS = 2  # of each interval, for derivatives
+RTOL, METHOD = 1e-9, "implicit"
+SUBSTEPS = 3  # of each interval, for derivatives
 SETTLED = 1.5e-3  # of the time: how near to the least it comes
 MET = 2e-4  # of the reference: what is left of the motion where nothing is to remain
 NEAR = 1e-4  # what a change of all drives by their limit costs, in shares missed
 MODES = 5  # that bend the robot and are brought to rest
-RESOLVED = 0.7  # rad: a mode turns by less in an interval
+RESOLVED = 1.6  # rad: a mode turns by less in an interval
 SIDES = 16  # of the polygon in which a mode's state must end
 
 
@@ -100,7 +100,7 @@ def answer(plant: Plant, u: np.ndarray, T: float, free: np.ndarray, bends: bool)
     nodes, fine = np.linspace(0.0, T, m + 1), np.linspace(0.0, T, SUBSTEPS * m + 1)
     t = stage_times(fine)
     drive = Drive.force(*(linear_drive(nodes, column) for column in u.T))
-    run = simulate(system, np.append(0.0, t), drive, plant.start, rtol=RTOL)
+    run = simulate(system, np.append(0.0, t), drive, plant.start, rtol=RTOL, method=METHOD)
     if len(run) <= len(t) or run.states is None or not np.isfinite(run.states).all():
         return None
     n, rows = system.n, system.free_rows

@@ -15,9 +15,9 @@ from ...system import System, assemble, static
 from ..approximate_inverse import rigid_robot
 from ..dynamics import inverse, simulate
 from .posture import exact_system
-from .shortest_motion import RTOL, Limits, Plant, ShortestMotion, linear_drive
+from .shortest_motion import METHOD, RTOL, Limits, Plant, ShortestMotion, linear_drive
 
-INTERVALS = 160  # of the drives
+INTERVALS = 120  # of the drives
 REMAINS = 0.02  # of the unshaped residual, at frequencies within the band of `robust`
 BAND = (-1.0, -0.5, 0.5, 1.0)  # of `robust`: the plants between which the motion is robust
 CAREFUL = 1.15  # of the first guess's time: its drives are below their limits
@@ -205,7 +205,7 @@ def _unshaped(plant: Plant, limits: Limits, T: float) -> tuple[float, np.ndarray
     drive = Drive.force(*(linear_drive(times, column) for column in values["u"].T))
     omega, into = plant.modes
     later = span + np.linspace(h, PERIODS * 2 * np.pi / omega[joints], 400)
-    run = simulate(system, np.append(0.0, later), drive, plant.start, rtol=RTOL)
+    run = simulate(system, np.append(0.0, later), drive, plant.start, rtol=RTOL, method=METHOD)
     bends = _bends(run, plant)[1:]
     assert run.states is not None
     n = system.n
@@ -233,14 +233,14 @@ def _recorded(
     system = plant.system
     nodes = np.linspace(0.0, T, len(u))
     drive = Drive.force(*(linear_drive(nodes, column) for column in u.T))
-    run = simulate(system, nodes, drive, plant.start, rtol=RTOL)
+    run = simulate(system, nodes, drive, plant.start, rtol=RTOL, method=METHOD)
     residual = 0.0
     if len(system.elastic_rows):
         omega, _ = plant.modes
         joints = len(system.free_rows) - len(system.elastic_rows)
         span = PERIODS * 2 * np.pi / omega[joints]
         later = np.concatenate([[0.0], T + np.linspace(0.0, span, 400)])
-        after = simulate(system, later, drive, plant.start, rtol=RTOL)
+        after = simulate(system, later, drive, plant.start, rtol=RTOL, method=METHOD)
         residual = float(np.abs(_bends(after, plant)[1:]).max())
     run.meta.update(
         duration_s=T,
