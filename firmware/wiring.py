@@ -11,7 +11,7 @@ Box = tuple[str, list[tuple[str, str]], str]
 # Boxes of each side: title, lines (function, words), remark. {flex} stands for that pin's number.
 LEFT: list[Box] = [
     (
-        "Motor bridge (BTS7960 or L298N)",
+        "Motor bridge of joint 1 (BTS7960 or L298N)",
         [
             ("motor_forward", "RPWM / IN1"),
             ("motor_reverse", "LPWM / IN2"),
@@ -28,7 +28,20 @@ LEFT: list[Box] = [
         ],
         "NEMA 17",
     ),
-    ("Motor encoder, 5 V", [("encoder_1_a", "A"), ("encoder_1_b", "B")], "on the motor's shaft"),
+    (
+        "Second bridge, where joint 2 has a motor",
+        [
+            ("motor_2_forward", "RPWM / IN1"),
+            ("motor_2_reverse", "LPWM / IN2"),
+            ("motor_2_enable", "R_EN + L_EN / ENA, 10 k to ground"),
+        ],
+        "",
+    ),
+    (
+        "Encoder of joint 1, 5 V",
+        [("encoder_1_a", "A"), ("encoder_1_b", "B")],
+        "on the motor's shaft",
+    ),
     ("Encoder of joint 2, 5 V", [("encoder_2_a", "A"), ("encoder_2_b", "B")], "on the joint"),
 ]
 RIGHT: list[Box] = [
@@ -36,8 +49,8 @@ RIGHT: list[Box] = [
         "Switches to ground, normally closed",
         [
             ("emergency_stop", "emergency stop"),
-            ("limit_low", "carriage, low end"),
-            ("limit_high", "carriage, high end"),
+            ("limit_low", "joint 1, low end"),
+            ("limit_high", "joint 1, high end"),
         ],
         "opened = hit, pressed or broken",
     ),
@@ -78,6 +91,8 @@ def _boxes(boxes: list[Box], left: bool, numbers: dict[str, str]) -> list[str]:
     out, y = [], TOP
     x = 20 if left else 690
     for title, lines, remark in boxes:
+        if lines[0][0] not in numbers:  # a map without a second motor
+            continue
         height = 24 + LINE * (len(lines) + bool(remark))
         middle = x + 145
         out.append(
@@ -111,14 +126,14 @@ def picture(pins: dict[str, Any], said: str) -> str:
     """
     numbers = {name: number_of(entry) for name, entry in pins.items()}
     parts = [
-        '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1000 640" '
+        '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1000 740" '
         'font-family="sans-serif" font-size="13">',
         f"<!-- {said} -->",
         "<title>Wiring of the rig: Arduino Mega 2560 between drives and sensors</title>",
-        '<rect width="1000" height="640" fill="#fff"/>',
-        '<rect x="400" y="30" width="200" height="580" rx="10" fill="#e6f1f5" stroke="#1c6e8c"/>',
+        '<rect width="1000" height="740" fill="#fff"/>',
+        '<rect x="400" y="30" width="200" height="680" rx="10" fill="#e6f1f5" stroke="#1c6e8c"/>',
         '<text x="500" y="56" text-anchor="middle" font-weight="bold">Arduino Mega 2560</text>',
-        '<text x="500" y="598" text-anchor="middle" fill="#555">USB: host, 500 kbit/s</text>',
+        '<text x="500" y="698" text-anchor="middle" fill="#555">USB: host, 500 kbit/s</text>',
         *_boxes(LEFT, True, numbers),
         *_boxes(RIGHT, False, numbers),
         "</svg>",

@@ -46,8 +46,10 @@ from .bench_options import (
     Port,
     RigFile,
     Seed,
+    Serve,
     Yes,
 )
+from .bench_serve import serve_board
 from .bench_tables import (
     heading,
     numbers,
@@ -63,6 +65,7 @@ app = typer.Typer(
     name="bench",
     add_completion=False,
     no_args_is_help=True,
+    invoke_without_command=True,
     rich_markup_mode=None,
     help=(
         "Experiments on the rig: self-test, execute, handle the signals. Emulated unless a port "
@@ -73,6 +76,24 @@ app = typer.Typer(
 TOLD_BY_JSON = ["kind", "emulated", "label", "experiment", "complete", "line", "delays", "firmware"]
 
 app.command()(calibrate)
+
+
+@app.callback()
+def bench(
+    context: typer.Context,
+    serve: Serve = False,
+    rig: Annotated[
+        Path | None, typer.Option("--rig", metavar="RIG", help="of --serve; default rig")
+    ] = None,
+    seed: Seed = 0,
+    firmware: Firmware = None,
+    json: Json = False,
+) -> None:
+    """Serve the emulated board where no experiment is named."""
+    if context.invoked_subcommand is None:
+        if not serve:
+            raise InputError("expected an experiment, or --serve", key="bench")
+        serve_board(rig, port=None, seed=seed, firmware=firmware, cut=None, json=json)
 
 
 @dataclass(frozen=True)
@@ -92,6 +113,7 @@ class BenchOptions:
     live_port: LivePort = 9876
     firmware: Firmware = None
     cut: Cut = None
+    serve: Serve = False
     json: Json = False
 
 
@@ -294,6 +316,16 @@ def recover(
 
 def _run(rig: Path | None, ask: Any, options: BenchOptions, gains: Path | None = None) -> None:
     """What all experiments have in common, from the files to the table."""
+    if options.serve:
+        serve_board(
+            rig,
+            port=options.port,
+            seed=options.seed,
+            firmware=options.firmware,
+            cut=options.cut,
+            json=options.json,
+        )
+        return
     if options.emulated and options.port:
         raise fx.InputError(
             "expected either a port or --emulated", key="--port", value=options.port

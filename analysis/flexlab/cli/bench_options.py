@@ -70,4 +70,10 @@ Cut = Annotated[
         help="break the emulated wire of this entry of [pins], to see which fault is reported",
     ),
 ]
+Serve = Annotated[
+    bool,
+    typer.Option(
+        "--serve", help="offer the emulated board as a serial port to another host; run nothing"
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="print JSON instead of tables, for scripts")]

@@ -133,7 +133,7 @@ def flash(
         )
         say(f"first good frame: {versions}")
         if configure:
-            identity = _configure(link, wanted, say)
+            identity = write_and_reset(link, wanted, say)
         found = link.read_configuration()
         if not program(link).may_move:
             say(
@@ -151,8 +151,20 @@ def flash(
     return done
 
 
-def _configure(link: Link, wanted: dict[str, float], say: Say) -> Identity:
-    """Write and store all settings, reset the board, and see that it comes up with them."""
+def write_and_reset(link: Link, wanted: dict[str, float], say: Say) -> Identity:
+    """Write and store all settings, reset the board, and see that it comes up with them.
+
+    Args:
+        link: an open session; a new one is open afterwards.
+        wanted: all settings, by name.
+        say: tells what was done.
+
+    Returns:
+        What the board says of itself.
+
+    Raises:
+        BoardError: it does not come up with them.
+    """
     link.command("config_defaults")
     link.write_configuration(wanted)
     say(f"wrote and stored {len(wanted)} settings")
