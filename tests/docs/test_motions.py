@@ -23,7 +23,11 @@ def arm(beta=2e-3):
     )
 
 
-def test_150_an_equation_holds_at_the_points_of_gauss():
+def test_an_equation_holds_at_the_points_of_gauss():
+    """Polynomials that satisfy an equation at the points of Gauss.
+
+    Equations: 111
+    """
     mesh = Mesh(np.array([0.0, 0.1, 0.25, 0.4]))
     g = np.polynomial.legendre.leggauss(POINTS)[0]
     h = np.diff(mesh.nodes)
@@ -38,7 +42,11 @@ def test_150_an_equation_holds_at_the_points_of_gauss():
     assert mesh.at(t, band.solve(right)[:, None])[0][:, 0] == pytest.approx(np.sin(2 * t), abs=1e-9)
 
 
-def test_151_zeros_make_the_pencil_singular():
+def test_zeros_make_the_pencil_singular():
+    """The zeros of the motion with the tip at rest.
+
+    Equations: 112
+    """
     system = arm()
     q, zero = system.start(), np.zeros((1, system.n))
     _, K, G, M, _, tip = system.equations.force_derivatives(q[None], zero, zero)
@@ -55,7 +63,11 @@ def test_151_zeros_make_the_pencil_singular():
         assert values[-1] < 1e-9 * values[0]
 
 
-def test_152_a_posture_balances_and_reaches():
+def test_a_posture_balances_and_reaches():
+    """A posture under gravity.
+
+    Equations: 113
+    """
     heavy = robots.system(
         robots.beam(0.3, 0.3, 0.8, 2), robots.beam(0.3, 0.3, 0.8, 2), gravity=(0.0, -9.81)
     )
@@ -65,7 +77,11 @@ def test_152_a_posture_balances_and_reaches():
     assert fx.tip_pose(heavy, q)[:2] == pytest.approx([0.35, 0.2], abs=1e-12)
 
 
-def test_153_the_elastic_rows_balance_and_the_tip_is_on_its_path():
+def test_the_elastic_rows_balance_and_the_tip_is_on_its_path():
+    """What the inverse motion satisfies.
+
+    Equations: 114
+    """
     system = arm()
     path = tip_path(system, np.array([0.0, 0.6]), lambda t: paths.smooth_rise(t / 0.6))
     problem = TipProblem(system, path)
@@ -86,7 +102,11 @@ def test_153_the_elastic_rows_balance_and_the_tip_is_on_its_path():
         assert np.abs(rows @ state / size).max() < 1e-9
 
 
-def test_154_the_way_has_four_derivatives_of_zero_at_its_ends():
+def test_the_way_has_four_derivatives_of_zero_at_its_ends():
+    """A path from rest to rest.
+
+    Equations: 115
+    """
     u = np.polynomial.Polynomial([0] * 5 + [126, -420, 540, -315, 70])
     x = np.linspace(0, 1, 11)
     assert paths.smooth_rise(x) == pytest.approx(u(x), abs=1e-14)
@@ -96,7 +116,11 @@ def test_154_the_way_has_four_derivatives_of_zero_at_its_ends():
     assert [x(1.0)[0], y(0.5)[0]] == pytest.approx([0.25, 0.2 - 0.1 * u(0.25)], abs=1e-10)
 
 
-def test_155_the_variation_of_a_motion_is_the_difference_of_two():
+def test_the_variation_of_a_motion_is_the_difference_of_two():
+    """The derivative of a motion by a number.
+
+    Equations: 116
+    """
     system, nodes = arm(), np.linspace(0.0, 0.3, 61)
     t = stage_times(nodes)
     push = lambda size: [lambda s: 0.2 * np.sin(20 * s) + size * np.cos(9 * s)]
@@ -116,7 +140,11 @@ def test_155_the_variation_of_a_motion_is_the_difference_of_two():
     assert places[:, :, 0] == pytest.approx(slope, abs=2e-4 * np.abs(slope).max())
 
 
-def test_156_the_nearest_motion_is_the_exact_one_where_there_is_one():
+def test_the_nearest_motion_is_the_exact_one_where_there_is_one():
+    """The nearest motion.
+
+    Equations: 117
+    """
     system = arm()
     path = tip_path(system, np.array([0.0, 0.6]), lambda t: 0.5 * paths.smooth_rise(t / 0.6))
     mesh = mesh_between(-0.35, 1.2, path.breaks, 0.03)
@@ -127,7 +155,11 @@ def test_156_the_nearest_motion_is_the_exact_one_where_there_is_one():
     assert np.abs(off).max() < 1e-5
 
 
-def test_157_damping_ratios():
+def test_damping_ratios():
+    """Damping of modes.
+
+    Equations: 118
+    """
     system = arm()
     found = fx.modes(system, count=3)
     D = system.damping_at(found.q)
@@ -136,7 +168,11 @@ def test_157_damping_ratios():
         assert found.damping_ratios[k] == pytest.approx(zeta, rel=1e-12)
 
 
-def test_158_a_frequency_response():
+def test_a_frequency_response():
+    """Response at a frequency.
+
+    Equations: 119
+    """
     system, f = arm(), 3.0
     found = fx.frequency_response(system, "joint/1/drive", "tip/y", [f])
     lin, w = fx.linearize(system), 2 * np.pi * f
@@ -145,7 +181,11 @@ def test_158_a_frequency_response():
     assert found.values[0] == pytest.approx(H, rel=1e-7)
 
 
-def test_159_what_is_asked_of_the_drives_at_the_end():
+def test_what_is_asked_of_the_drives_at_the_end():
+    """Constraints of the linear program.
+
+    Equations: 120
+    """
     system = arm()
     plant = Plant(system, system.start(), fx.static(system, [0.5]), 0.0)
     omega, into = plant.modes

@@ -24,6 +24,9 @@ def configuration(setup: RigSetup) -> dict[str, float]:
     Args:
         setup: the rig.
 
+    Returns:
+        Settings in SI units.
+
     Raises:
         InputError: a derived setting is outside the board's range.
     """
@@ -49,7 +52,7 @@ def configuration(setup: RigSetup) -> dict[str, float]:
             )
             raise InputError(expected, key=name, value=value, file=setup.file)
     unread = {} if rig.sensor else dict(zip(("flex_min", "flex_max"), FULL_RANGE, strict=True))
-    given = unread | derived | rig.board
+    given = derived | rig.board | unread
     return {name: given.get(name, item.default) for name, item in CONFIG.items()}
 
 
@@ -105,6 +108,9 @@ def calibration(setup: RigSetup) -> Calibration | None:
 
     Args:
         setup: the rig.
+
+    Returns:
+        The calibration, or None.
     """
     sensor = setup.rig.sensor
     if sensor is None or isinstance(sensor, Accelerometer):

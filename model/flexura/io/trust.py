@@ -14,7 +14,14 @@ NOTED, DOUBTED, REFUSED = 1e-3, 1e-2, 0.1
 
 def judged(run: Run) -> Run:
     """The Run with an event for numbers that are not finite, and one for energies that do not
-    balance; it is complete no more if it is not to be trusted."""
+    balance; it is complete no more if it is not to be trusted.
+
+    Args:
+        run: the Run, which is changed.
+
+    Returns:
+        The same Run.
+    """
     end = float(run.t[-1]) if len(run.t) else 0.0
     found = [*_not_finite(run), *balance_events(run.meta.get("energy_error", 0.0), end)]
     if found:
@@ -25,7 +32,15 @@ def judged(run: Run) -> Run:
 
 
 def balance_events(error: float, end: float) -> list[dict[str, Any]]:
-    """The event of a balance (101) at the end of a run [s], if there is something to be said."""
+    """The event of a balance (101), if there is something to be said.
+
+    Args:
+        error: share of the largest energy that is missing.
+        end: of the run [s].
+
+    Returns:
+        Events as in `run.meta["events"]`.
+    """
     if error <= NOTED:
         return []
     missing = (

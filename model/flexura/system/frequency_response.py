@@ -26,7 +26,7 @@ pyplot = Optional("matplotlib.pyplot")
 @dataclass(frozen=True)
 class FrequencyResponse:
     """A channel's small motions under a harmonic drive: `values` (F,), complex, at `frequencies_Hz`
-    (F,) (158)."""
+    (F,) (119)."""
 
     frequencies_Hz: np.ndarray
     values: np.ndarray
@@ -49,6 +49,9 @@ class FrequencyResponse:
 
         Args:
             out: a file to write, .pdf, .svg or .png.
+
+        Returns:
+            The figure of matplotlib.
 
         Raises:
             InputError: `out` has another ending.
@@ -80,7 +83,7 @@ class FrequencyResponse:
 def frequency_response(
     robot: Any, drive: str, channel: str, frequencies_Hz: Any = None, q: Any = None
 ) -> FrequencyResponse:
-    """The response of a channel to a harmonic drive, for small motions about an equilibrium (158).
+    """The response of a channel to a harmonic drive, for small motions about an equilibrium (119).
 
     Args:
         robot: a System, a Robot, or the path or name of a robot file.
@@ -90,6 +93,9 @@ def frequency_response(
         frequencies_Hz: (F,), by default from a tenth of the lowest natural frequency to ten times
             the tenth.
         q: the equilibrium (n,), by default the static one at the start.
+
+    Returns:
+        Frequencies, magnitude and phase.
 
     Raises:
         InputError: an argument is not what is expected.

@@ -20,7 +20,7 @@ class Modes:
     """Natural modes at q (n,): frequencies_Hz (k,) ascending, shapes (n, k) with x . M x = 1, in
     the order of `labels`.
 
-    `damping_ratios` (k,): x . D x / (2 omega) (157), exact where D is proportional to stiffness and
+    `damping_ratios` (k,): x . D x / (2 omega) (118), exact where D is proportional to stiffness and
     mass; 0 where omega is.
     """
 
@@ -39,6 +39,9 @@ class Modes:
             amplitude_m: how far what moves most of tip and joints goes [m or rad]; by default a
                 tenth of the robot's length.
             periods: how many; a mode without frequency takes a second.
+
+        Returns:
+            The Run.
 
         Raises:
             InputError: there is no such mode, or another argument is not what is expected.
@@ -62,6 +65,9 @@ class Modes:
             out: the file, .gif, or .mp4 where an encoder is installed.
             mode: its number, from 1.
             options: as in `Run.animate`.
+
+        Returns:
+            The file.
 
         Raises:
             InputError: a wrong argument.

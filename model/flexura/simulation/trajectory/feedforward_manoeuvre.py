@@ -21,6 +21,9 @@ def feedforward(run: Run, kp: Any = 0.0, kd: Any = 0.0) -> Manoeuvre:
             manoeuvre needs `manoeuvre.prescribed()` or a controller.
         kd: gains of the velocities.
 
+    Returns:
+        The manoeuvre.
+
     Raises:
         InputError: an argument is not what is expected.
     """

@@ -25,7 +25,7 @@ RTOL = 1e-10
 def parameter_derivatives(
     robot: Any, t_eval: Any, drive: Any, parameters: Any, q0: Any = None
 ) -> dict[str, Run]:
-    """How the channels of a simulation change with numbers of the robot file (155).
+    """How the channels of a simulation change with numbers of the robot file (116).
 
     The equations of motion are linearised exactly along the run, by the core's dual numbers. What a
     parameter changes of the forces, at the run's own states, is found by differences of the robot's
@@ -33,11 +33,11 @@ def parameter_derivatives(
 
     Args:
         robot: a System, a Robot, or the path or name of a robot file.
-        t_eval (T,): ascending times [s], so dense that the run's fastest motion that matters is
+        t_eval: (T,), ascending times [s], so dense that the run's fastest motion that matters is
             resolved: they are the steps of the variation.
         drive: forces as in `fx.simulate`, one entry a joint; without feedback.
         parameters: keys of the robot file, as "payload.mass_kg" or "link.2.length_m".
-        q0 (n,): the start; by default as in `fx.simulate`. It does not change with a parameter.
+        q0: (n,), the start; by default as in `fx.simulate`. It does not change with a parameter.
 
     Returns:
         For each key a Run at t_eval whose channels are derivatives; `units` are those of the

@@ -17,7 +17,7 @@ LONGEST = 0.3  # m or rad: a step of a joint
 
 
 def inverse_kinematics(robot: Any, tip: Any, joints: Any = None) -> np.ndarray:
-    """Postures q (n,) or (T, n) in static equilibrium whose tip is at a place (152).
+    """Postures q (n,) or (T, n) in static equilibrium whose tip is at a place (113).
 
     Links are bent by their weight, so a rigid robot's answer is corrected by their deflection.
 
@@ -26,7 +26,7 @@ def inverse_kinematics(robot: Any, tip: Any, joints: Any = None) -> np.ndarray:
             move.
         tip: x and y [m] of a robot with two joints; with one, the polar angle [rad] seen from its
             axis, or the place along its rail [m]. Or rows of these, (T, 2) or (T,).
-        joints (links,): where the search begins [m or rad], by default their start: it decides on
+        joints: (links,), where the search begins [m or rad], by default their start: it decides on
             which side the elbow is.
 
     Returns:

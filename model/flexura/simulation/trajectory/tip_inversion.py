@@ -45,7 +45,7 @@ def invert(
     least_squares: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> Run:
-    """Joint motions and drives for which the tip follows a path, by stable inversion (153).
+    """Joint motions and drives for which the tip follows a path, by stable inversion (114).
 
     The joints move before the tip does and go on after it has stopped; for that the Run begins
     before t[0] and ends after t[-1]. The nonlinear equations are solved as a boundary value problem
@@ -55,7 +55,7 @@ def invert(
     Args:
         robot: a System, a Robot, or the path or name of a robot file, with one or two joints that
             move.
-        t (T,): ascending times [s]; the tip rests where the path begins before t[0], and where it
+        t: (T,), ascending times [s]; the tip rests where the path begins before t[0], and where it
             ends after t[-1].
         tip: of a robot with two joints (x, y) [m]; with one, the polar angle of the tip seen from
             its axis [rad], or the place along its rail [m]. Signals, functions of time, or values
