@@ -56,8 +56,12 @@ def test_generated_robots_that_shrink(data):
 @pytest.mark.parametrize("seed", range(20))
 def test_identities_of_generated_robots(seed):
     rng = np.random.default_rng(seed)
-    tables = robots.robot(rng)
-    system = fx.assemble(fx.Robot.from_dict(tables | {"stiffening": True}))
+    tables = robots.robot(rng) | {"stiffening": True}
+    try:
+        system = fx.assemble(fx.Robot.from_dict(tables))
+    except fx.InputError as error:  # a soft link under a load that would stretch it
+        assert "does not stretch" in error.expected
+        return
     if system.n <= 80:
         assert faults(system, rng) == []
 

@@ -135,6 +135,7 @@ CALLS = {
     "piecewise": (signals.piecewise, {"at_s": [0.0, 1.0], "value": [0.0, 1.0]}),
     "zv": (signals.zv, {"signal": SIGNAL, "frequency_Hz": 1.0, "damping_ratio": 0.0}),
     "zvd": (signals.zvd, {"signal": SIGNAL, "frequency_Hz": 1.0, "damping_ratio": 0.0}),
+    "ei": (signals.shaping.ei, {"signal": SIGNAL, "frequency_Hz": 1.0, "damping_ratio": 0.0}),
     "matched_cycloid": (signals.matched_cycloid, {"end": 1.0, "frequency_Hz": 1.0, "periods": 2}
         | {"start": 0.0, "at_s": 0.0}),
 }  # fmt: skip
