@@ -8,13 +8,12 @@ from .link import (
     Damping,
     Link,
     Lump,
-    Section,
-    SectionAt,
     ValueAt,
 )
 from .old_keys import OldKey, renamed
 from .payload import Payload
 from .robot import MAX_LINKS, Robot, load, robot_of, save
+from .section import Section, SectionAt, form_of
 from .table import Table
 
 __all__ = [
@@ -35,6 +34,7 @@ __all__ = [
     "Table",
     "Transmission",
     "ValueAt",
+    "form_of",
     "key_of",
     "load",
     "renamed",

@@ -10,6 +10,7 @@ from pydantic import Field, field_validator, model_validator
 
 from ..errors import WrongValue
 from .joint import Joint
+from .section import FORMS, Section, SectionAt, check_sections, dimensions_at, form_of
 from .table import BOUNDS, Table, name, quantity
 
 MAX_ELEMENTS = 200
@@ -27,19 +28,6 @@ _STIFFNESS = BOUNDS["bending_stiffness_N_m2"]
 MassPerLength = Annotated[float, Field(ge=0, le=BOUNDS["mass_per_length_kg_m"].high)]
 BendingStiffness = Annotated[float, Field(ge=_STIFFNESS.low, le=_STIFFNESS.high)]
 Pair = Annotated[tuple[float, float], Field(strict=False)]
-
-
-class Section(Table):
-    """A rectangular cross-section; `height_m` lies in the plane of bending."""
-
-    width_m: float = quantity("width_m", "the section's width in metres")
-    height_m: float = quantity("height_m", "the section's height in the plane of bending in metres")
-
-
-class SectionAt(Section):
-    """A cross-section at a place along a tapered link."""
-
-    at_m: float = quantity("at_m", "the place of this section along the link in metres")
 
 
 class ValueAt(Table):
@@ -67,9 +55,7 @@ class Lump(Table):
 
 
 _LINK_TEXT = {
-    "section": (
-        "a table { width_m, height_m } or a list of { at_m, width_m, height_m } in order of at_m"
-    ),
+    "section": f"a table {FORMS}, or a list of one of these with at_m, in order of at_m",
     "mass_per_length_kg_m": (
         f"mass per length in kg/m, a number {BOUNDS['mass_per_length_kg_m']} or a list of "
         "{ at_m, value } in order of at_m"
@@ -173,18 +159,8 @@ class Link(Table):
                     [e.at_m for e in value],
                     f"entries from at_m = 0 to the link's length, {self.length_m:g}",
                 )
-        if self.section is not None and self.length_m > 0:
-            listed = isinstance(self.section, list)
-            for k, s in enumerate(
-                self.section if isinstance(self.section, list) else [self.section], 1
-            ):
-                if s.height_m >= self.length_m:
-                    raise WrongValue(
-                        f"section[{k}].height_m" if listed else "section.height_m",
-                        s.height_m,
-                        f"a height below the link's length, {self.length_m:g} (metres, not "
-                        f"millimetres?)",
-                    )
+        if self.section is not None:
+            check_sections(self.section, self.length_m)
         return self
 
     def _check_flexible(self) -> None:
@@ -291,8 +267,7 @@ class Link(Table):
         """
         if self.mass_per_length_kg_m is not None:
             return _spread(self.mass_per_length_kg_m, x)
-        width, height = self._section_at(x)
-        return _spread(self.density_kg_m3 * width * height, x)
+        return _spread(self.density_kg_m3 * self._of_section("area", x), x)
 
     def bending_stiffness(self, x: Any) -> np.ndarray:
         """Bending stiffness EI.
@@ -305,8 +280,7 @@ class Link(Table):
         """
         if self.bending_stiffness_N_m2 is not None:
             return _spread(self.bending_stiffness_N_m2, x)
-        width, height = self._section_at(x)
-        return _spread(self.young_modulus_Pa * width * height**3 / 12, x)
+        return _spread(self.young_modulus_Pa * self._of_section("second_moment", x), x)
 
     def axial_stiffness(self, x: Any) -> np.ndarray | None:
         """Axial stiffness EA.
@@ -320,17 +294,12 @@ class Link(Table):
         """
         if self.section is None or self.young_modulus_Pa is None:
             return None
-        width, height = self._section_at(x)
-        return _spread(self.young_modulus_Pa * width * height, x)
+        return _spread(self.young_modulus_Pa * self._of_section("area", x), x)
 
-    def _section_at(self, x: Any) -> tuple[Any, Any]:
-        if isinstance(self.section, list):
-            at = [s.at_m for s in self.section]
-            return np.interp(x, at, [s.width_m for s in self.section]), np.interp(
-                x, at, [s.height_m for s in self.section]
-            )
+    def _of_section(self, what: str, x: Any) -> Any:
+        """The area [m^2] or the second moment [m^4] of the section at x (8)."""
         assert self.section is not None
-        return self.section.width_m, self.section.height_m
+        return getattr(form_of(self.section), what)(*dimensions_at(self.section, x))
 
     def breaks(self) -> list[float]:
         """Places along the link [m] where a given property has a kink, the ends included."""

@@ -230,7 +230,7 @@ VALUES = {
         {STRIP + "section.at_m": 0.0},
         "link[2].section.at_m",
         0.0,
-        "an unknown key; known here: width_m, height_m",
+        "none: sections with a place stand in a list",
     ),
     "a section as a number": (
         {STRIP + "section": 0.02},
