@@ -140,6 +140,8 @@ def varied(robot: Robot, columns: Mapping[str, np.ndarray]) -> Rows | None:
         again(base.gravity),
         again(base.payload),
     )
+    if any(link.damping.by_ratio for link in robot.links):  # it follows from all of a link
+        return None
     links: dict[int, dict[str, np.ndarray]] = {}
     for key, values in columns.items():
         parts = key.split(".")

@@ -1,11 +1,11 @@
 """The robot file: a frozen, validated description of a robot in SI units."""
 
+from .damping import Damping
 from .joint import Joint, Spring, Transmission, key_of
 from .link import (
     LEAST_FREE,
     MAX_ELEMENTS,
     MOST_MODES,
-    Damping,
     Link,
     Lump,
     ValueAt,

@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from ..errors import WrongValue
+from .damping import Damping
 from .joint import Joint
 from .section import FORMS, Section, SectionAt, check_sections, dimensions_at, form_of
 from .table import BOUNDS, Table, name, quantity
@@ -37,13 +38,6 @@ class ValueAt(Table):
     value: float = Field(gt=0, description="a number above 0, in the unit of the key")
 
 
-class Damping(Table):
-    """Rayleigh damping of the elastic unknowns, D = alpha M + beta K."""
-
-    alpha_1_s: float = quantity("alpha_1_s", "the mass-proportional factor in 1/s", 0.0)
-    beta_s: float = quantity("beta_s", "the stiffness-proportional factor in seconds", 0.0)
-
-
 class Lump(Table):
     """A mass on the line of a link, with the inertia about its own centre (108)."""
 
@@ -55,7 +49,10 @@ class Lump(Table):
 
 
 _LINK_TEXT = {
-    "section": f"a table {FORMS}, or a list of one of these with at_m, in order of at_m",
+    "section": (
+        "a table { width_m, height_m } or a list of { at_m, width_m, height_m } in order of at_m; "
+        f"other shapes: {FORMS}"
+    ),
     "mass_per_length_kg_m": (
         f"mass per length in kg/m, a number {BOUNDS['mass_per_length_kg_m']} or a list of "
         "{ at_m, value } in order of at_m"
@@ -110,7 +107,10 @@ class Link(Table):
     mass: list[Lump] = Field(
         default_factory=list, description="tables [[link.mass]] { at_m, mass_kg, inertia_kg_m2 }"
     )
-    damping: Damping = Field(default_factory=Damping, description="a table { alpha_1_s, beta_s }")
+    damping: Damping = Field(
+        default_factory=Damping,
+        description="a table { alpha_1_s, beta_s }, { ratio } or { ratios }",
+    )
     joint: Joint = Field(description='a table [link.joint] with at least type = "R", "Pa" or "Pb"')
 
     @property

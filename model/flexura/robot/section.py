@@ -67,7 +67,7 @@ SHAPES = {
 }
 
 FORMS = (
-    '{ width_m, height_m }, { shape = "round", diameter_m }, '
+    '{ shape = "round", diameter_m }, '
     '{ shape = "tube", outer_diameter_m, wall_m }, { shape = "box", width_m, height_m, wall_m }, '
     '{ shape = "I", width_m, height_m, flange_m, web_m } or { area_m2, second_moment_m4 }'
 )
@@ -120,7 +120,9 @@ class Section(Table):
         for key in given:
             if key not in self.form.keys:
                 own = "by its area" if self.kind == "general" else f'of shape "{self.kind}"'
-                expected = f"none: a section {own} has {', '.join(self.form.keys)}; it is {FORMS}"
+                expected = (
+                    f"none: a section {own} has {', '.join(self.form.keys)}; other shapes: {FORMS}"
+                )
                 raise WrongValue(key, getattr(self, key), expected)
         for key in self.form.keys:
             if getattr(self, key) is None:

@@ -69,6 +69,7 @@ BOUNDS = {
     "centre_of_mass_m": Bounds(0, 1000, signed=True),
     "at_m": Bounds(0, 1000),
     "alpha_1_s": Bounds(1e-9, 1e6, zero=True),
+    "ratio": Bounds(1e-12, 0.99),
     "beta_s": Bounds(1e-15, 10, zero=True),
     "angle_rad": Bounds(0, 7, signed=True),
     "start_rad": Bounds(0, 1e6, signed=True),
