@@ -14,6 +14,7 @@ from .old_keys import OldKey, renamed
 from .payload import Payload
 from .robot import MAX_LINKS, Robot, load, robot_of, save
 from .section import Section, SectionAt, form_of
+from .sensor import Sensor
 from .table import Table
 
 __all__ = [
@@ -30,6 +31,7 @@ __all__ = [
     "Robot",
     "Section",
     "SectionAt",
+    "Sensor",
     "Spring",
     "Table",
     "Transmission",

@@ -12,6 +12,7 @@ from ..errors import WrongValue
 from .damping import Damping
 from .joint import Joint
 from .section import FORMS, Section, SectionAt, check_sections, dimensions_at, form_of
+from .sensor import Sensor
 from .table import BOUNDS, Table, name, quantity
 
 MAX_ELEMENTS = 200
@@ -104,6 +105,9 @@ class Link(Table):
     inertia_kg_m2: float | None = quantity(
         "inertia_kg_m2", "a rigid link's inertia about its centre of mass in kg m^2", None
     )
+    sensor: list[Sensor] = Field(
+        default_factory=list, description="tables [[link.sensor]] { name, kind, at_m }"
+    )
     mass: list[Lump] = Field(
         default_factory=list, description="tables [[link.mass]] { at_m, mass_kg, inertia_kg_m2 }"
     )
@@ -144,6 +148,7 @@ class Link(Table):
             if lump.at_m > self.length_m:
                 expected = f"a place on the link, at most its length, {self.length_m:g}"
                 raise WrongValue(f"mass[{k}].at_m", lump.at_m, expected)
+        self._check_sensors()
         if self.mass and self.flexible and self.joint.type == "Pb":
             expected = (
                 "none: masses on a flexible link that moves through a sleeve are not modelled"
@@ -162,6 +167,18 @@ class Link(Table):
         if self.section is not None:
             check_sections(self.section, self.length_m)
         return self
+
+    def _check_sensors(self) -> None:
+        for k, sensor in enumerate(self.sensor, 1):
+            if sensor.at_m > self.length_m:
+                expected = f"a place on the link, at most its length, {self.length_m:g}"
+                raise WrongValue(f"sensor[{k}].at_m", sensor.at_m, expected)
+            if not self.flexible and sensor.kind != "acceleration":
+                expected = '"acceleration": a rigid link (elements = 0) does not bend'
+                raise WrongValue(f"sensor[{k}].kind", sensor.kind, expected)
+            if self.flexible and self.joint.type == "Pb":
+                expected = "none: no sensors are on a flexible link that moves through a sleeve"
+                raise WrongValue(f"sensor[{k}].at_m", sensor.at_m, expected)
 
     def _check_flexible(self) -> None:
         if self.length_m <= 0:

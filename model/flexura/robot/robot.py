@@ -104,6 +104,20 @@ class Robot(Table):
         return self
 
     @model_validator(mode="after")
+    def _sensors(self) -> Robot:
+        seen: set[str] = set()
+        for i, link in enumerate(self.link, 1):
+            for k, sensor in enumerate(link.sensor, 1):
+                key = f"link[{i}].sensor[{k}].name"
+                if sensor.name in seen:
+                    raise WrongValue(key, sensor.name, "another name for each sensor of the robot")
+                if self.nodal:
+                    expected = 'none: a robot with sliding = "nodal" has no sensors'
+                    raise WrongValue(key, sensor.name, expected)
+                seen.add(sensor.name)
+        return self
+
+    @model_validator(mode="after")
     def _whole_meshes(self) -> Robot:
         if self.sliding == "nodal":
             for i, link in enumerate(self.link):
