@@ -173,7 +173,7 @@ def _vary_link(link: Link, i: int, out: Rows, changes: Mapping[str, np.ndarray])
                 out.numbers[:, i, column] = rest.pop(f"{table}.{name}")
     if not rest:
         return True
-    if link.mass and "length_m" in rest:  # the masses must stay on the link
+    if (link.mass or link.sensor) and "length_m" in rest:  # these must stay on the link
         return False
     if not link.flexible:
         return _vary_rigid(link, i, out, rest)
