@@ -27,14 +27,14 @@ def test_the_twins_beam():
 
     Equations: 103
     """
-    values = beam_values(Link.model_validate(STEEL | {"section": SECTION}), 5)
+    values = beam_values(Link.model_validate(STEEL | {"section": SECTION}), 5, 0.0)
     area, second = 0.02 * 0.004, 0.02 * 0.004**3 / 12
     assert values.axial == pytest.approx(
         np.full(5, 2e11 * area)
     ) and values.bending == pytest.approx(np.full(5, 2e11 * second))
     assert values.shear == pytest.approx(values.axial * (5 / 6) / (2 * (1 + 0.3)))
     assert values.rotary == pytest.approx(np.full(5, 7850 * area * second / area))
-    plain = beam_values(Link.model_validate(robots.beam(0.5, 0.3, 0.8, 4)), 5)
+    plain = beam_values(Link.model_validate(robots.beam(0.5, 0.3, 0.8, 4)), 5, 0.0)
     assert plain.axial == pytest.approx(
         np.full(5, 1e5 * 0.8 / 0.5**2)
     ) and plain.shear == pytest.approx(plain.axial)

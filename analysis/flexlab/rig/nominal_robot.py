@@ -55,6 +55,10 @@ def with_drives(
         back_emf: whether a motor's viscous friction and back-EMF are the joint's too.
     """
     data = robot.to_dict()
+    for i, link in enumerate(robot.links):  # measured values scale the factors
+        if link.damping.by_ratio:
+            alpha, beta = robot.rayleigh(i)
+            data["link"][i]["damping"] = {"alpha_1_s": alpha, "beta_s": beta}
     joints: list[dict[str, Any]] = [link["joint"] for link in data["link"]]
 
     def add(joint: dict[str, Any], key: str, more: float) -> None:

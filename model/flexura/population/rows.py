@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..robot import LEAST_FREE, Link, Robot
+from ..robot import LEAST_FREE, Link, Robot, Section
 from ..system.constants import payload, rows
 
 # Columns of `numbers`, as system/constants.py gives them.
@@ -36,7 +36,6 @@ OF_MATERIAL = (
     "mass_per_length_kg_m",
     "bending_stiffness_N_m2",
 )
-OF_SECTION = ("width_m", "height_m")
 PA, PB = 1, 2  # kinds of joints in `counts`
 
 
@@ -141,6 +140,8 @@ def varied(robot: Robot, columns: Mapping[str, np.ndarray]) -> Rows | None:
         again(base.gravity),
         again(base.payload),
     )
+    if any(link.damping.by_ratio for link in robot.links):  # it follows from all of a link
+        return None
     links: dict[int, dict[str, np.ndarray]] = {}
     for key, values in columns.items():
         parts = key.split(".")
@@ -172,7 +173,7 @@ def _vary_link(link: Link, i: int, out: Rows, changes: Mapping[str, np.ndarray])
                 out.numbers[:, i, column] = rest.pop(f"{table}.{name}")
     if not rest:
         return True
-    if link.mass and "length_m" in rest:  # the masses must stay on the link
+    if (link.mass or link.sensor) and "length_m" in rest:  # these must stay on the link
         return False
     if not link.flexible:
         return _vary_rigid(link, i, out, rest)
@@ -181,24 +182,22 @@ def _vary_link(link: Link, i: int, out: Rows, changes: Mapping[str, np.ndarray])
         for v in (link.section, link.mass_per_length_kg_m, link.bending_stiffness_N_m2)
     )
     given = [name for name in OF_MATERIAL if getattr(link, name) is not None]
-    given += [f"section.{name}" for name in OF_SECTION if link.section is not None]
+    section = link.section if isinstance(link.section, Section) else None
+    if section is not None and section.kind == "rectangle":  # others have bounds in one another
+        given += [f"section.{name}" for name in section.form.keys]
     if not simple or not set(rest) <= set(given):
         return False
     row = int(out.counts[:i, 4].sum())
     value: Callable[[str], Any] = lambda name: rest[name] if name in rest else getattr(link, name)
     if "length_m" in rest:
         out.numbers[:, i, LENGTH] = out.material[:, row, 1] = rest["length_m"]
-    if link.section is None:
+    if section is None:
         mass, stiffness = value("mass_per_length_kg_m"), value("bending_stiffness_N_m2")
     else:  # in the order of Link.mass_per_length and Link.bending_stiffness
-        width, height = (
-            rest.get(f"section.{name}", getattr(link.section, name)) for name in OF_SECTION
-        )
-        cube = np.array([h**3 for h in np.atleast_1d(height).tolist()])
-        mass, stiffness = (
-            value("density_kg_m3") * width * height,
-            value("young_modulus_Pa") * width * cube / 12,
-        )
+        form = section.form
+        size = [rest.get(f"section.{key}", getattr(section, key)) for key in form.keys]
+        mass = value("density_kg_m3") * form.area(*size)
+        stiffness = value("young_modulus_Pa") * form.second_moment(*size)
     out.material[:, row, 2], out.material[:, row, 5] = mass, stiffness
     return True
 

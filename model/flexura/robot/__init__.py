@@ -1,20 +1,20 @@
 """The robot file: a frozen, validated description of a robot in SI units."""
 
+from .damping import Damping
 from .joint import Joint, Spring, Transmission, key_of
 from .link import (
     LEAST_FREE,
     MAX_ELEMENTS,
     MOST_MODES,
-    Damping,
     Link,
     Lump,
-    Section,
-    SectionAt,
     ValueAt,
 )
 from .old_keys import OldKey, renamed
 from .payload import Payload
 from .robot import MAX_LINKS, Robot, load, robot_of, save
+from .section import Section, SectionAt, form_of
+from .sensor import Sensor
 from .table import Table
 
 __all__ = [
@@ -31,10 +31,12 @@ __all__ = [
     "Robot",
     "Section",
     "SectionAt",
+    "Sensor",
     "Spring",
     "Table",
     "Transmission",
     "ValueAt",
+    "form_of",
     "key_of",
     "load",
     "renamed",

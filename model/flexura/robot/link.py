@@ -9,7 +9,10 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from ..errors import WrongValue
+from .damping import Damping
 from .joint import Joint
+from .section import FORMS, Section, SectionAt, check_sections, dimensions_at, form_of
+from .sensor import Sensor
 from .table import BOUNDS, Table, name, quantity
 
 MAX_ELEMENTS = 200
@@ -29,31 +32,11 @@ BendingStiffness = Annotated[float, Field(ge=_STIFFNESS.low, le=_STIFFNESS.high)
 Pair = Annotated[tuple[float, float], Field(strict=False)]
 
 
-class Section(Table):
-    """A rectangular cross-section; `height_m` lies in the plane of bending."""
-
-    width_m: float = quantity("width_m", "the section's width in metres")
-    height_m: float = quantity("height_m", "the section's height in the plane of bending in metres")
-
-
-class SectionAt(Section):
-    """A cross-section at a place along a tapered link."""
-
-    at_m: float = quantity("at_m", "the place of this section along the link in metres")
-
-
 class ValueAt(Table):
     """A value at a place along a link."""
 
     at_m: float = quantity("at_m", "the place of this value along the link in metres")
     value: float = Field(gt=0, description="a number above 0, in the unit of the key")
-
-
-class Damping(Table):
-    """Rayleigh damping of the elastic unknowns, D = alpha M + beta K."""
-
-    alpha_1_s: float = quantity("alpha_1_s", "the mass-proportional factor in 1/s", 0.0)
-    beta_s: float = quantity("beta_s", "the stiffness-proportional factor in seconds", 0.0)
 
 
 class Lump(Table):
@@ -68,7 +51,8 @@ class Lump(Table):
 
 _LINK_TEXT = {
     "section": (
-        "a table { width_m, height_m } or a list of { at_m, width_m, height_m } in order of at_m"
+        "a table { width_m, height_m } or a list of { at_m, width_m, height_m } in order of at_m; "
+        f"other shapes: {FORMS}"
     ),
     "mass_per_length_kg_m": (
         f"mass per length in kg/m, a number {BOUNDS['mass_per_length_kg_m']} or a list of "
@@ -121,10 +105,16 @@ class Link(Table):
     inertia_kg_m2: float | None = quantity(
         "inertia_kg_m2", "a rigid link's inertia about its centre of mass in kg m^2", None
     )
+    sensor: list[Sensor] = Field(
+        default_factory=list, description="tables [[link.sensor]] { name, kind, at_m }"
+    )
     mass: list[Lump] = Field(
         default_factory=list, description="tables [[link.mass]] { at_m, mass_kg, inertia_kg_m2 }"
     )
-    damping: Damping = Field(default_factory=Damping, description="a table { alpha_1_s, beta_s }")
+    damping: Damping = Field(
+        default_factory=Damping,
+        description="a table { alpha_1_s, beta_s }, { ratio } or { ratios }",
+    )
     joint: Joint = Field(description='a table [link.joint] with at least type = "R", "Pa" or "Pb"')
 
     @property
@@ -158,6 +148,7 @@ class Link(Table):
             if lump.at_m > self.length_m:
                 expected = f"a place on the link, at most its length, {self.length_m:g}"
                 raise WrongValue(f"mass[{k}].at_m", lump.at_m, expected)
+        self._check_sensors()
         if self.mass and self.flexible and self.joint.type == "Pb":
             expected = (
                 "none: masses on a flexible link that moves through a sleeve are not modelled"
@@ -173,19 +164,21 @@ class Link(Table):
                     [e.at_m for e in value],
                     f"entries from at_m = 0 to the link's length, {self.length_m:g}",
                 )
-        if self.section is not None and self.length_m > 0:
-            listed = isinstance(self.section, list)
-            for k, s in enumerate(
-                self.section if isinstance(self.section, list) else [self.section], 1
-            ):
-                if s.height_m >= self.length_m:
-                    raise WrongValue(
-                        f"section[{k}].height_m" if listed else "section.height_m",
-                        s.height_m,
-                        f"a height below the link's length, {self.length_m:g} (metres, not "
-                        f"millimetres?)",
-                    )
+        if self.section is not None:
+            check_sections(self.section, self.length_m)
         return self
+
+    def _check_sensors(self) -> None:
+        for k, sensor in enumerate(self.sensor, 1):
+            if sensor.at_m > self.length_m:
+                expected = f"a place on the link, at most its length, {self.length_m:g}"
+                raise WrongValue(f"sensor[{k}].at_m", sensor.at_m, expected)
+            if not self.flexible and sensor.kind != "acceleration":
+                expected = '"acceleration": a rigid link (elements = 0) does not bend'
+                raise WrongValue(f"sensor[{k}].kind", sensor.kind, expected)
+            if self.flexible and self.joint.type == "Pb":
+                expected = "none: no sensors are on a flexible link that moves through a sleeve"
+                raise WrongValue(f"sensor[{k}].at_m", sensor.at_m, expected)
 
     def _check_flexible(self) -> None:
         if self.length_m <= 0:
@@ -291,8 +284,7 @@ class Link(Table):
         """
         if self.mass_per_length_kg_m is not None:
             return _spread(self.mass_per_length_kg_m, x)
-        width, height = self._section_at(x)
-        return _spread(self.density_kg_m3 * width * height, x)
+        return _spread(self.density_kg_m3 * self._of_section("area", x), x)
 
     def bending_stiffness(self, x: Any) -> np.ndarray:
         """Bending stiffness EI.
@@ -305,8 +297,7 @@ class Link(Table):
         """
         if self.bending_stiffness_N_m2 is not None:
             return _spread(self.bending_stiffness_N_m2, x)
-        width, height = self._section_at(x)
-        return _spread(self.young_modulus_Pa * width * height**3 / 12, x)
+        return _spread(self.young_modulus_Pa * self._of_section("second_moment", x), x)
 
     def axial_stiffness(self, x: Any) -> np.ndarray | None:
         """Axial stiffness EA.
@@ -320,17 +311,12 @@ class Link(Table):
         """
         if self.section is None or self.young_modulus_Pa is None:
             return None
-        width, height = self._section_at(x)
-        return _spread(self.young_modulus_Pa * width * height, x)
+        return _spread(self.young_modulus_Pa * self._of_section("area", x), x)
 
-    def _section_at(self, x: Any) -> tuple[Any, Any]:
-        if isinstance(self.section, list):
-            at = [s.at_m for s in self.section]
-            return np.interp(x, at, [s.width_m for s in self.section]), np.interp(
-                x, at, [s.height_m for s in self.section]
-            )
+    def _of_section(self, what: str, x: Any) -> Any:
+        """The area [m^2] or the second moment [m^4] of the section at x (8)."""
         assert self.section is not None
-        return self.section.width_m, self.section.height_m
+        return getattr(form_of(self.section), what)(*dimensions_at(self.section, x))
 
     def breaks(self) -> list[float]:
         """Places along the link [m] where a given property has a kink, the ends included."""

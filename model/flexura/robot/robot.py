@@ -16,6 +16,7 @@ from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from ..errors import InputError, WrongValue
 from ..io import FORMAT, check_format, explain, find, read_toml, summary, write_toml
+from .damping import rayleigh
 from .joint import KEYS, key_of
 from .link import LEAST_FREE, Link
 from .old_keys import renamed
@@ -89,6 +90,31 @@ class Robot(Table):
     def _suits(self) -> Robot:
         check_masses(self.link, self.payload)
         check_stretch(self.link, self.payload, self.gravity_m_s2)
+        for i, link in enumerate(self.link):
+            if link.damping.by_ratio and not link.flexible:
+                key = "ratio" if link.damping.ratios is None else "ratios"
+                where = f"link[{i + 1}].damping.{key}"
+                value = getattr(link.damping, key)
+                raise WrongValue(where, value, "none: a rigid link has no modes")
+            try:
+                self.rayleigh(i)
+            except WrongValue as error:
+                where = f"link[{i + 1}].{error.key}"
+                raise WrongValue(where, error.value, error.expected) from None
+        return self
+
+    @model_validator(mode="after")
+    def _sensors(self) -> Robot:
+        seen: set[str] = set()
+        for i, link in enumerate(self.link, 1):
+            for k, sensor in enumerate(link.sensor, 1):
+                key = f"link[{i}].sensor[{k}].name"
+                if sensor.name in seen:
+                    raise WrongValue(key, sensor.name, "another name for each sensor of the robot")
+                if self.nodal:
+                    expected = 'none: a robot with sliding = "nodal" has no sensors'
+                    raise WrongValue(key, sensor.name, expected)
+                seen.add(sensor.name)
         return self
 
     @model_validator(mode="after")
@@ -103,6 +129,17 @@ class Robot(Table):
                         'absent with sliding = "nodal", which goes by its nodes',
                     )
         return self
+
+    def rayleigh(self, i: int) -> tuple[float, float]:
+        """The damping of a link, D = alpha M + beta K (26).
+
+        Args:
+            i: number of the link, from 0.
+
+        Returns:
+            alpha [1/s] and beta [s], given or by damping ratios.
+        """
+        return rayleigh(self.link[i], self.payload if i + 1 == len(self.link) else None)
 
     def rides(self, i: int) -> bool:
         """Whether a joint slides along a flexible link.

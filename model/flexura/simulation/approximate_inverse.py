@@ -41,7 +41,8 @@ def rigid_robot(robot: Robot) -> Robot:
     """
     data = robot.to_dict()
     for link in data["link"]:
-        for key in ("elements", "modes", "young_modulus_Pa", "bending_stiffness_N_m2", "damping"):
+        bending = ("elements", "modes", "young_modulus_Pa", "bending_stiffness_N_m2", "damping")
+        for key in (*bending, "sensor"):
             link.pop(key, None)
         link["joint"].pop("transmission", None)
     return Robot.from_dict(data)

@@ -10,6 +10,7 @@ from ..io import STATIONS, Run, judged
 from ..robot import Robot
 from ..system import System
 from .problem import Solution
+from .sensors import sensor_channels
 
 
 def channel_units(robot: Robot) -> dict[str, str]:
@@ -72,6 +73,8 @@ def record(system: System, solution: Solution) -> Run:
     channels = {
         name: np.ascontiguousarray(values) for name, values in zip(units, found, strict=True)
     }
+    channels |= sensor_channels(system, q, v, solution.forces)
+    units |= {f"sensor/{s.name}": s.unit for link in system.robot.links for s in link.sensor}
     about = describe(system, energy_error(seen[:, -3:], accounts, solution.jumps)) | solution.meta
     if len(t):
         about["numerical_loss_J"] = float(accounts[-1, NUMERICAL])

@@ -54,6 +54,7 @@ class Assembly:
         self._springs = np.array([link.joint.spring_stiffness for link in self.robot.links])
         self._rest = np.zeros(self.n)
         self._rest[self.rows] = [link.joint.spring_rest for link in self.robot.links]
+        self._rayleigh = [self.robot.rayleigh(i) for i in range(len(self.robot.links))]
         self._g = complex(*self.robot.gravity_m_s2)
         materials = [
             (i, material)
@@ -212,9 +213,10 @@ class Assembly:
                 D[windup, windup] = link.joint.windup_damping
             if self.structure.own[i]:
                 own = slice(self.structure.own[i][0].start, self.structure.own[i][-1].stop)
-                D[own, own] = link.damping.beta_s * K[own, own]
-                if link.damping.alpha_1_s:
-                    D[own, own] += link.damping.alpha_1_s * self._clamped_mass(i, q)[own, own]
+                alpha, beta = self._rayleigh[i]
+                D[own, own] = beta * K[own, own]
+                if alpha:
+                    D[own, own] += alpha * self._clamped_mass(i, q)[own, own]
         return D
 
     def coulomb(self, qd: np.ndarray) -> np.ndarray:

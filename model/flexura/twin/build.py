@@ -153,7 +153,7 @@ def _add_link(
         stubs = [mesh.stubs[i]] if any(mesh.stubs[i]) else []
         return beam(
             mbs,
-            beam_values(link, mesh.elements[i]),
+            beam_values(link, mesh.elements[i], robot.rayleigh(i)[1]),
             hub,
             ending,
             frame,

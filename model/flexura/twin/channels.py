@@ -77,6 +77,10 @@ def channels(
             for k in range(STATIONS):
                 place = part.point(own, k * link.length_m / (STATIONS - 1))
                 out[f"link/{i + 1}/deflection/{k}"] = _transverse(hub, place), "m"
+            for sensor in link.sensor:
+                if sensor.kind == "deflection":
+                    place = part.point(own, sensor.at_m)
+                    out[f"sensor/{sensor.name}"] = _transverse(hub, place), sensor.unit
         kinetic += part.kinetic(own, rate)
         motor[0][:, i], motor[1][:, i] = position[:, i], speed[:, i]
         rotor = model.rotors[i]

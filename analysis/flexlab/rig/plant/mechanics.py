@@ -138,7 +138,7 @@ class Mechanics:
         self, robot: fx.Robot, i: int, elements: int, hub: PointMass, frame: Frame
     ) -> CableLink:
         link, payload = robot.links[i], robot.payload
-        values = beam_values(link, elements)
+        values = beam_values(link, elements, robot.rayleigh(i)[1])
         soft = AXIAL_RATIO * values.bending.mean() / link.length_m**2
         values = dataclasses.replace(values, axial=np.minimum(values.axial, soft))
         last = i == len(robot.links) - 1

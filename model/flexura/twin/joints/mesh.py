@@ -150,12 +150,13 @@ def check_supported(robot: Robot, beam: str) -> None:
         raise InputError(expected, key="stiffening", value=False)
     for i, link in enumerate(robot.links):
         joint, on = link.joint, sliding_on(robot, i)
-        if link.damping.alpha_1_s:
+        if robot.rayleigh(i)[0]:
+            key = "alpha_1_s" if link.damping.ratios is None else "ratios"
             raise InputError(
                 "expected 0: damping in proportion to mass has no counterpart in the twin; use "
-                "beta_s",
-                key=f"link[{i + 1}].damping.alpha_1_s",
-                value=link.damping.alpha_1_s,
+                "beta_s or ratio",
+                key=f"link[{i + 1}].damping.{key}",
+                value=getattr(link.damping, key),
             )
         if on is not None and beam != "ancf":
             expected = (

@@ -43,12 +43,13 @@ class BeamValues:
         return len(self.mass)
 
 
-def beam_values(link: Link, elements: int) -> BeamValues:
+def beam_values(link: Link, elements: int, beta: float) -> BeamValues:
     """Values of a flexible link's elements (103).
 
     Args:
         link: the link.
         elements: their number.
+        beta: the stiffness-proportional damping [s].
 
     Returns:
         The values.
@@ -70,7 +71,7 @@ def beam_values(link: Link, elements: int) -> BeamValues:
         axial,
         shear,
         mass * bending / axial,
-        link.damping.beta_s,
+        beta,
     )
 
 

@@ -1,0 +1,79 @@
+"""What the sensors on the links of a robot show of the states of a run."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..robot import Sensor
+from ..system import System
+
+
+def sensor_channels(
+    system: System, q: np.ndarray, qd: np.ndarray, drive: np.ndarray
+) -> dict[str, np.ndarray]:
+    """The channels of a robot's sensors.
+
+    Args:
+        system: the robot.
+        q: configurations (T, n).
+        qd: their rates (T, n).
+        drive: forces of the drives (T, links) [N or N m].
+
+    Returns:
+        Values (T,) by channel, in the unit of the sensor.
+    """
+    out, rates = {}, None
+    for i, link in enumerate(system.robot.links):
+        for sensor in link.sensor:
+            if sensor.kind == "acceleration":
+                rates = _rates(system, q, qd, drive) if rates is None else rates
+                values = _acceleration(system, i, sensor.at_m, q, qd, rates)
+            else:
+                values = _bending(system, i, sensor, q)
+            out[f"sensor/{sensor.name}"] = values
+    return out
+
+
+def _bending(system: System, i: int, sensor: Sensor, q: np.ndarray) -> np.ndarray:
+    """Deflection [m] (6), slope [rad] or strain [1] of link i (from 0) at a sensor, (T,): the
+    curvature is dTheta/ds (2)."""
+    structure, left = system.assembly.structure, sensor.at_m
+    across, turned = np.zeros(len(q)), np.zeros(len(q))
+    pieces = list(zip(structure.links[i], structure.own[i], strict=True))
+    for k, (piece, own) in enumerate(pieces):
+        last = left <= piece.length or k + 1 == len(pieces)
+        xi = np.array([min(left / piece.length, 1.0)])
+        angle = turned[:, None] + q[:, own] @ piece.B.T
+        rise = angle if structure.linear else np.sin(angle)
+        across = across + piece.length * rise @ piece.integrals(xi if last else np.ones(1))[0]
+        if last:
+            if sensor.kind == "strain":
+                assert sensor.distance_m is not None
+                curvature = q[:, own] @ piece.shapes(xi, 1)[0] / piece.length
+                return np.asarray(-sensor.distance_m * curvature)
+            turned = turned + q[:, own] @ piece.shapes(xi)[0]
+            break
+        turned = turned + q[:, own] @ piece.shapes(np.ones(1))[0]
+        left -= piece.length
+    return across if sensor.kind == "deflection" else turned
+
+
+def _rates(system: System, q: np.ndarray, qd: np.ndarray, drive: np.ndarray) -> np.ndarray:
+    """The accelerations of the unknowns (T, n) (44), with Coulomb friction (57)."""
+    force = np.zeros_like(q)
+    force[:, system.joint_rows] = drive
+    force -= np.array([system.assembly.coulomb(rates) for rates in qd]).reshape(q.shape)
+    rows = zip(q, qd, force, strict=True)
+    return np.array([system.accelerations(*row) for row in rows]).reshape(q.shape)
+
+
+def _acceleration(
+    system: System, i: int, at: float, q: np.ndarray, qd: np.ndarray, rates: np.ndarray
+) -> np.ndarray:
+    """The acceleration of a place of link i across its tangent, to the left (T,) [m/s^2] (39)."""
+    structure, out = system.assembly.structure, np.empty(len(q))
+    for k, (here, speed, rate) in enumerate(zip(q, qd, rates, strict=True)):
+        frame = structure.at(structure.states(here, speed)[i], at)
+        full = frame.rest + frame.velocity @ rate
+        out[k] = (full * frame.tangent.conjugate()).imag
+    return out
