@@ -16,7 +16,7 @@ from scipy.linalg import expm
 import flexura as fx
 from flexura import signals
 from flexura.control import controller, gains, lqr
-from flexura.simulation import gain_sweep, inverse_dynamics
+from flexura.simulation import gain_sweep, gravity, inverse_dynamics
 from robots import beam, rigid, robot, system
 
 TICK, ROOT = 1e-3, Path(__file__).resolve().parents[3]
@@ -488,7 +488,7 @@ def test_feedforwards_carry_the_motion():
     )
     assert np.abs(with_).max() < 0.05 * np.abs(without).max()
     hanging = system(rigid(0.5, 1.0, 0.25, 0.02, "R"), gravity=(0.0, -9.81))
-    (ahead,) = feedforward.gravity(hanging, [signals.constant(0.3)], [0.0, 5.0])
+    (ahead,) = gravity(hanging, [signals.constant(0.3)], [0.0, 5.0])
     arm = fx.PID(signals.constant(0.3), kp=20.0, kd=2.0, feedforward=ahead)
     assert fx.simulate(hanging, [0.0, 5.0], fx.Controller((arm,)))["joint/1/position"][
         -1

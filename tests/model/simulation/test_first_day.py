@@ -1,6 +1,7 @@
 """A newcomer's first day: starts under gravity, motions from whatever there is, runs that go on,
 end where they are told to, or say why they do nothing."""
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -239,7 +240,8 @@ def test_robots_paths_and_systems_are_one():
         assert all(np.array_equal(results[0], found) for found in results), name
 
 
-def test_the_old_module_of_signals_answers():
+def test_the_old_module_of_signals_answers(monkeypatch):
+    monkeypatch.delitem(sys.modules, "flexura.signal", raising=False)
     with pytest.warns(DeprecationWarning):
         import flexura.signal as old
     assert old.step(1.0)(0.5)[0] == 1.0
