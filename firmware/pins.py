@@ -121,8 +121,13 @@ NEEDS = {
     "lamp": ANY,
 }
 
-# A map may leave these out, all together: joint 2 then has no motor.
+# Those of the table [second_motor]; without them joint 2 has no motor.
 MOTOR_2 = ("motor_2_forward", "motor_2_reverse", "motor_2_enable")
+
+
+def place_of(entry: Any) -> str:
+    """As `port_of`, of an entry that may be anything."""
+    return f"P{entry.get('port')}{entry.get('bit')}" if isinstance(entry, dict) else ""
 
 
 def port_of(entry: dict[str, Any]) -> str:

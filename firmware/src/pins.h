@@ -4,7 +4,7 @@
 
 namespace pin {
 
-constexpr uint32_t kHash = 0x7C6FE1B1;  // which function is where
+constexpr uint32_t kHash = 0x13738ADE;  // which function is where
 
 // 6, OC4A: PWM 20 kHz: bridge input that drives joint 1 up
 struct motor_forward {
@@ -34,40 +34,6 @@ struct motor_reverse {
 struct motor_enable {
   static constexpr uint8_t bit = 5;
   static constexpr uint8_t mask = 32;
-  static constexpr bool bit_addressable = false;
-  static volatile uint8_t &port() { return PORTH; }
-  static volatile uint8_t &direction() { return DDRH; }
-  static volatile uint8_t &input() { return PINH; }
-};
-
-// 11, OC1A: the same of a second motor, at joint 2
-struct motor_2_forward {
-  static constexpr uint8_t bit = 5;
-  static constexpr uint8_t mask = 32;
-  static constexpr bool bit_addressable = true;
-  static volatile uint8_t &port() { return PORTB; }
-  static volatile uint8_t &direction() { return DDRB; }
-  static volatile uint8_t &input() { return PINB; }
-  static volatile uint16_t &compare() { return OCR1A; }
-  static constexpr uint8_t connected = _BV(COM1A1);
-};
-
-// 12, OC1B: the same of a second motor, at joint 2
-struct motor_2_reverse {
-  static constexpr uint8_t bit = 6;
-  static constexpr uint8_t mask = 64;
-  static constexpr bool bit_addressable = true;
-  static volatile uint8_t &port() { return PORTB; }
-  static volatile uint8_t &direction() { return DDRB; }
-  static volatile uint8_t &input() { return PINB; }
-  static volatile uint16_t &compare() { return OCR1B; }
-  static constexpr uint8_t connected = _BV(COM1B1);
-};
-
-// 9, digital: the same of a second motor, at joint 2
-struct motor_2_enable {
-  static constexpr uint8_t bit = 6;
-  static constexpr uint8_t mask = 64;
   static constexpr bool bit_addressable = false;
   static volatile uint8_t &port() { return PORTH; }
   static volatile uint8_t &direction() { return DDRH; }
@@ -224,6 +190,40 @@ struct lamp {
   static volatile uint8_t &port() { return PORTB; }
   static volatile uint8_t &direction() { return DDRB; }
   static volatile uint8_t &input() { return PINB; }
+};
+
+// 11, OC1A: PWM 20 kHz: bridge input that drives joint 2 up
+struct motor_2_forward {
+  static constexpr uint8_t bit = 5;
+  static constexpr uint8_t mask = 32;
+  static constexpr bool bit_addressable = true;
+  static volatile uint8_t &port() { return PORTB; }
+  static volatile uint8_t &direction() { return DDRB; }
+  static volatile uint8_t &input() { return PINB; }
+  static volatile uint16_t &compare() { return OCR1A; }
+  static constexpr uint8_t connected = _BV(COM1A1);
+};
+
+// 12, OC1B: PWM 20 kHz: bridge input that drives joint 2 down
+struct motor_2_reverse {
+  static constexpr uint8_t bit = 6;
+  static constexpr uint8_t mask = 64;
+  static constexpr bool bit_addressable = true;
+  static volatile uint8_t &port() { return PORTB; }
+  static volatile uint8_t &direction() { return DDRB; }
+  static volatile uint8_t &input() { return PINB; }
+  static volatile uint16_t &compare() { return OCR1B; }
+  static constexpr uint8_t connected = _BV(COM1B1);
+};
+
+// 24, digital: bridge enable of joint 2, high = on; pull-down 10 k
+struct motor_2_enable {
+  static constexpr uint8_t bit = 2;
+  static constexpr uint8_t mask = 4;
+  static constexpr bool bit_addressable = true;
+  static volatile uint8_t &port() { return PORTA; }
+  static volatile uint8_t &direction() { return DDRA; }
+  static volatile uint8_t &input() { return PINA; }
 };
 
 // The timer of motor_forward and motor_reverse.

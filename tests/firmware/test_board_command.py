@@ -96,7 +96,7 @@ def test_doctor_says_before_anything_moves_that_the_motor_is_too_slow(tmp_path, 
     assert done.returncode == 1 and [f["what"] for f in wrong] == ["rig: carriage speed"]
     assert (
         "75.4 mm/s" in wrong[0]["found"]
-        and "33.5 mm/s" in wrong[0]["found"]
+        and "33.47 mm/s" in wrong[0]["found"]
         and "cannot follow" in wrong[0]["cost"]
     )
 

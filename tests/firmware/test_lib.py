@@ -230,7 +230,7 @@ def test_the_models_law_is_the_boards(lib, seed, g, tight, filters):
 
     The board's errors are whole counts of joint 1 and 1/16 microsteps of joint 2, rounded down; its
     rates 1/256 of them a tick, its deflection 10 um; its filters, rounded down too, end 1/256 of a
-    count / a short; gains and slews are rounded to a thousandth. `bound` is these through the
+    count / a short; gains and slews are rounded to a thousandth; a report is in 2 mV. `bound` is these through the
     gains. (59.9218 rad/s^2 is a whole number of its units.)
     """
     r, T = np.random.default_rng(seed), 400
@@ -282,7 +282,7 @@ def test_the_models_law_is_the_boards(lib, seed, g, tight, filters):
         fine = 1 / values[name] / 256
         short = 1 / (1 - np.exp(-2 * np.pi * filters[j] * TICK_S)) if filters[j] else 0
         error, rate, strip = fine * ((256, 18)[j] + short), 2 * fine / TICK_S, 3e-5
-        reported = (0.001, 256 * fine)[j]
+        reported = (0.002, 256 * fine)[j]
         bound = (P + I * t) * error + (D + V) * rate + F * strip + G * strip / (8 * TICK_S)
         bound += 2 * reported + 1e-3 * np.abs(wanted[j])
         if tight:  # a limit hands an earlier error on, and pulses add it up
@@ -388,5 +388,5 @@ def test_the_unit_tests_run_here_and_on_the_avr(environment, suites, tmp_path):
     for suite, cases in ran.items():
         text = (FIRMWARE / "test" / suite / "test_main.cpp").read_text()
         written = len(re.findall(r"^  RUN\(", text, re.M))
-        assert written > 5 and len(cases) == written
+        assert written >= 5 and len(cases) == written
         assert all(case["status"] == "PASSED" for case in cases)

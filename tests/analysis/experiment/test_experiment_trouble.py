@@ -11,6 +11,7 @@ import random
 import resource
 import signal
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -267,11 +268,17 @@ def test_the_disk_is_full_in_the_middle(line, tmp_path):
     ok(line, tmp_path, "next")
 
 
-def test_no_space_left_on_device(tmp_path):
+def test_no_space_left_on_device(tmp_path, monkeypatch):
     """/dev/full answers every write with ENOSPC: the first byte from the board ends it before
     anything moves."""
-    (tmp_path / "run").mkdir()
-    (tmp_path / "run" / recording.RECEIVED).symlink_to("/dev/full")
+    opened = os.open
+
+    def full(path, *arguments, **options):
+        if Path(path).name == recording.RECEIVED:
+            return opened("/dev/full", os.O_WRONLY)
+        return opened(path, *arguments, **options)
+
+    monkeypatch.setattr(recording.os, "open", full)
     made = board()
     with pytest.raises(recording.RecordingError, match="No space left on device"):
         experiment(

@@ -106,12 +106,6 @@ def test_a_gap_stays_a_gap_and_grows_no_further_than_its_neighbours():
     assert row.max == 1 and row.rms == 1
 
 
-def test_times_that_occur_twice_are_harmless():
-    jump = run([0, 1, 1, 2], tip__x=[0, 0, 1, 1])
-    _, values = deviation(run([0, 0.5, 1, 1.5, 2], tip__x=np.zeros(5)), jump, "tip/x")
-    assert values.tolist() == [0, 0, 1, 1, 1]
-
-
 def test_the_distance_of_the_tips():
     a, b = run([0, 1], tip__x=[3, 3], tip__y=[4, 4]), run([0, 1], tip__x=[3, 6], tip__y=[4, 8])
     assert deviation(a, b, "tip_distance")[1].tolist() == [0, 5]

@@ -175,7 +175,7 @@ def test_the_emulated_rig_does_what_the_simulation_says(tmp_path):
     from flexlab.experiment.run_experiment import open_board
 
     file = CONTROLLERS / "rig-steps.toml"
-    plan = plans.step(BENCH, SETTINGS | plans.gains(file), 0.10, np.pi / 4, 5.0, 0.0)
+    plan = plans.step(BENCH, SETTINGS | plans.gains(file), (0.10, np.pi / 4), 5.0, 0.0)
     run = experiment(plan, tmp_path / "step", opened=open_board(BENCH, None, 1, elf())).run
     assert run.meta["emulated"] and run.meta["complete"]
     at = 0.2
@@ -226,7 +226,7 @@ def test_a_gains_file_is_the_whole_law_on_the_bench_too():
     assert own["kv_1_V_s_m"] != 0 and told["kv_1_V_s_m"] == told["kc_1_V"] == told["kv_2"] == 0
     assert all(told[name] == value for name, value in given.settings.items())
     assert told["speed_max_1_m_s"] == own["speed_max_1_m_s"] and told["deflection_Hz"] == 50
-    plan = plans.step(bench, told, 0.1, 0.5, 3.0, 0.0)
+    plan = plans.step(bench, told, (0.1, 0.5), 3.0, 0.0)
     assert [entry["at_s"] for entry in plan.asked["steps"]] == [0.2, 0.2]
     with pytest.raises(fx.InputError, match="less than the duration"):
-        plans.step(bench, told, 0.1, 0.5, 3.0, 2.9)
+        plans.step(bench, told, (0.1, 0.5), 3.0, 2.9)

@@ -551,14 +551,11 @@ CONFIG: dict[str, Item] = {
     ),
 }
 
-PINS_HASH = 0x7C6FE1B1
+PINS_HASH = 0x13738ADE
 PINS: dict[str, Pin] = {
     "motor_forward": Pin("6", "H", 3, "PWM 20 kHz: bridge input that drives joint 1 up"),
     "motor_reverse": Pin("7", "H", 4, "PWM 20 kHz: bridge input that drives joint 1 down"),
     "motor_enable": Pin("8", "H", 5, "bridge enable, high = on; pull-down 10 k"),
-    "motor_2_forward": Pin("11", "B", 5, "the same of a second motor, at joint 2"),
-    "motor_2_reverse": Pin("12", "B", 6, "the same of a second motor, at joint 2"),
-    "motor_2_enable": Pin("9", "H", 6, "the same of a second motor, at joint 2"),
     "encoder_1_a": Pin("18", "D", 3, "encoder of joint 1; A leads B upwards"),
     "encoder_1_b": Pin("19", "D", 2, "encoder of joint 1"),
     "encoder_2_a": Pin("3", "E", 5, "encoder of joint 2; A leads B counter-clockwise"),
@@ -578,4 +575,7 @@ PINS: dict[str, Pin] = {
     "supply": Pin("A1", "F", 1, "motor supply's divider"),
     "busy": Pin("34", "C", 3, "high inside the control interrupt, for an oscilloscope"),
     "lamp": Pin("13", "B", 7, "off Idle, on Armed and Running, blinks Fault"),
+    "motor_2_forward": Pin("11", "B", 5, "PWM 20 kHz: bridge input that drives joint 2 up"),
+    "motor_2_reverse": Pin("12", "B", 6, "PWM 20 kHz: bridge input that drives joint 2 down"),
+    "motor_2_enable": Pin("24", "A", 2, "bridge enable of joint 2, high = on; pull-down 10 k"),
 }

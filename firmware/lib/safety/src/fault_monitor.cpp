@@ -61,7 +61,8 @@ void FaultMonitor::start() {
   }
 }
 
-void FaultMonitor::count_alone(uint8_t j, const uint8_t *edges) {
+template <uint8_t j>
+void FaultMonitor::count_alone(const uint8_t *edges) {
   const uint8_t a = edges[0];
   const uint8_t b = edges[1];
   if (!a && !b) return;
@@ -86,8 +87,8 @@ bool FaultMonitor::steps(int8_t stepped) {
 }
 
 // A motor and its encoder.
-Fault FaultMonitor::motor(uint8_t j, const FaultLimits &limits, const Inputs &in,
-                          const Measured &now) {
+template <uint8_t j>
+Fault FaultMonitor::motor(const FaultLimits &limits, const Inputs &in, const Measured &now) {
   const int16_t duty = now.duty[j];
   const bool driven = duty > limits.stall_duty || duty < -limits.stall_duty;
   // A shaft that nothing drives may rest on an edge and tremble, for as long as it likes.
@@ -97,7 +98,7 @@ Fault FaultMonitor::motor(uint8_t j, const FaultLimits &limits, const Inputs &in
     stalled_[j] = 0;
     return Fault::none;
   }
-  count_alone(j, in.edges[j]);
+  count_alone<j>(in.edges[j]);
   if (alone_[j] >= limits.alone) return j ? Fault::encoder_2 : Fault::encoder_1;
   against_[j] = against(against_[j], duty > 0 ? 1 : -1, in.moved[j]);
   if (against_[j] > limits.runaway[j]) return j ? Fault::runaway_2 : Fault::runaway_1;
@@ -109,7 +110,7 @@ Fault FaultMonitor::motor(uint8_t j, const FaultLimits &limits, const Inputs &in
 
 // The stepper of joint 2 and its encoder.
 Fault FaultMonitor::stepper(const FaultLimits &limits, const Inputs &in, const Measured &now) {
-  if (steps(in.stepped)) count_alone(1, in.edges[1]);
+  if (steps(in.stepped)) count_alone<1>(in.edges[1]);
   if (alone_[1] >= limits.alone) return Fault::encoder_2;
   against_[1] = against(against_[1], direction_, in.moved[1]);
   if (!beyond(now.lag, limits.lost)) return Fault::none;
@@ -119,18 +120,33 @@ Fault FaultMonitor::stepper(const FaultLimits &limits, const Inputs &in, const M
   return alone_[1] >= 4 ? Fault::encoder_2 : Fault::stall_2;
 }
 
+template <uint8_t j>
+Fault FaultMonitor::lines(const FaultLimits &limits, const Inputs &in) {
+  if (!in.missed[j] && !in.flooded[j]) return Fault::none;
+  missed_[j] = static_cast<uint16_t>(missed_[j] + in.missed[j]);
+  const bool broken = in.flooded[j] || missed_[j] > limits.missed;
+  return !broken ? Fault::none : j ? Fault::encoder_2 : Fault::encoder_1;
+}
+
 Fault FaultMonitor::encoders(const FaultLimits &limits, const Inputs &in, const Measured &now) {
-  for (uint8_t j = 0; j < 2; ++j) {
-    if (!in.missed[j] && !in.flooded[j]) continue;
-    missed_[j] = static_cast<uint16_t>(missed_[j] + in.missed[j]);
-    if (in.flooded[j] || missed_[j] > limits.missed) return j ? Fault::encoder_2 : Fault::encoder_1;
-  }
-  Fault fault = Fault::none;
-  for (uint8_t j = 0; j < 2 && fault == Fault::none; ++j) {
-    if (limits.drive[j] == Drive::motor) fault = motor(j, limits, in, now);
-    if (limits.drive[j] == Drive::stepper) fault = stepper(limits, in, now);
-  }
-  return fault;
+  Fault fault = lines<0>(limits, in);
+  if (fault == Fault::none) fault = lines<1>(limits, in);
+  if (fault == Fault::none && limits.drive[0] == Drive::motor) fault = motor<0>(limits, in, now);
+  if (fault != Fault::none || limits.drive[1] == Drive::none) return fault;
+  return limits.drive[1] == Drive::motor ? motor<1>(limits, in, now) : stepper(limits, in, now);
+}
+
+template <uint8_t j>
+Fault FaultMonitor::bounds(const FaultLimits &limits, const Measured &now) {
+  if (now.position[j] < limits.travel_low[j] || now.position[j] > limits.travel_high[j])
+    return j ? Fault::travel_2 : Fault::travel_1;
+  if (now.tracking && beyond(now.error[j], limits.following[j]))
+    return j ? Fault::following_2 : Fault::following_1;
+  if (turn_ % kWindow != j) return Fault::none;
+  const int16_t way = travelled_[j];
+  travelled_[j] = 0;
+  if (way <= limits.speed[j] && way >= -limits.speed[j]) return Fault::none;
+  return j ? Fault::speed_2 : Fault::speed_1;
 }
 
 Fault FaultMonitor::check(const FaultLimits &limits, const Inputs &in, const Measured &now) {
@@ -148,16 +164,8 @@ Fault FaultMonitor::check(const FaultLimits &limits, const Inputs &in, const Mea
   turn_ = static_cast<uint8_t>((turn_ + 1) % (2 * kWindow));
   travelled_[0] = static_cast<int16_t>(travelled_[0] + in.moved[0]);
   travelled_[1] = static_cast<int16_t>(travelled_[1] + in.moved[1]);
-  const uint8_t j = turn_ & 1;
-  if (now.position[j] < limits.travel_low[j] || now.position[j] > limits.travel_high[j])
-    return j ? Fault::travel_2 : Fault::travel_1;
-  if (now.tracking && beyond(now.error[j], limits.following[j]))
-    return j ? Fault::following_2 : Fault::following_1;
-  if (turn_ % kWindow == j) {
-    const int16_t way = travelled_[j];
-    travelled_[j] = 0;
-    if (way > limits.speed[j] || way < -limits.speed[j]) return j ? Fault::speed_2 : Fault::speed_1;
-  }
+  fault = turn_ & 1 ? bounds<1>(limits, now) : bounds<0>(limits, now);
+  if (fault != Fault::none) return fault;
 
   fault = flex(limits, in.flex);
   flex_out_ = fault == Fault::none ? 0 : static_cast<uint8_t>(flex_out_ + 1);

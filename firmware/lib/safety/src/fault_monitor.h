@@ -64,11 +64,18 @@ class FaultMonitor {
   void host_spoke() { silent_ = 0; }
 
  private:
-  void count_alone(uint8_t joint, const uint8_t *edges);
+  // The joint is known when it compiles: indices cost time on this machine.
+  template <uint8_t joint>
+  void count_alone(const uint8_t *edges);
   bool steps(int8_t stepped);
-  Fault motor(uint8_t joint, const FaultLimits &limits, const Inputs &in, const Measured &now);
+  template <uint8_t joint>
+  Fault motor(const FaultLimits &limits, const Inputs &in, const Measured &now);
   Fault stepper(const FaultLimits &limits, const Inputs &in, const Measured &now);
+  template <uint8_t joint>
+  Fault lines(const FaultLimits &limits, const Inputs &in);
   Fault encoders(const FaultLimits &limits, const Inputs &in, const Measured &now);
+  template <uint8_t joint>
+  Fault bounds(const FaultLimits &limits, const Measured &now);
 
   uint16_t silent_ = 0;
   uint16_t stalled_[2] = {0, 0};
