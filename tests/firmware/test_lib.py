@@ -230,8 +230,8 @@ def test_the_models_law_is_the_boards(lib, seed, g, tight, filters):
 
     The board's errors are whole counts of joint 1 and 1/16 microsteps of joint 2, rounded down; its
     rates 1/256 of them a tick, its deflection 10 um; its filters, rounded down too, end 1/256 of a
-    count / a short; gains and slews are rounded to a thousandth; a report is in 2 mV. `bound` is these through the
-    gains. (59.9218 rad/s^2 is a whole number of its units.)
+    count / a short; gains and slews are rounded to a thousandth; a report is in 2 mV.
+    `bound` is these through the gains. (59.9218 rad/s^2 is a whole number of its units.)
     """
     r, T = np.random.default_rng(seed), 400
     kp, ki, kd, kf, kg, kv, p2, i2, f2, g2 = (float(x) for x in g)

@@ -189,8 +189,9 @@ def _by_motors(
 ) -> fx.Run:
     """Joints that motors turn, from their voltages; a stepper's joint from its pulses.
 
-    Rotor, friction and back-EMF are the joints' own, so that the links act back on the motors. The
-    gears' backlash is left out.
+    Rotor, friction and back-EMF are the joints' own, so that the links act back on the motors.
+    Left out are the gears' backlash and what they lose of the links' load: motors that lose half
+    of it turn a tenth less far than predicted.
     """
     t = experiment.t
     lines = [(axis, joint_line(axis)) for axis in motor_axes(rig)]
