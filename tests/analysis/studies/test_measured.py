@@ -4,6 +4,7 @@ The data are not part of the project: docs/guide/measured.md says where they are
 variable FLEXURA_QUANSER names their folder.
 """
 
+import json
 import os
 from pathlib import Path
 
@@ -11,7 +12,8 @@ import numpy as np
 import pytest
 
 import flexura as fx
-from flexlab.studies.measured import ring
+from commands import run as command
+from flexlab.studies.measured import GAUGE, measured, ring
 
 
 @pytest.fixture
@@ -60,3 +62,47 @@ def test_the_data_sheet_is_within_7_percent_of_every_measured_step(data):
         run = loadmat(path, squeeze_me=True)
         found = ring(run["time"], run["theta12"])
         assert 1.79 < found < 1.88 and abs(own / found - 1) < 0.07, path.name
+
+
+@pytest.fixture
+def written(tmp_path):
+    """Step runs of a stiffer strip, written as the published ones are."""
+    from scipy.io import savemat
+
+    stiff = fx.load("quanser-2dsfl").replace({"link.1.young_modulus_Pa": 2.2e11})
+    t = np.arange(2000) / 500
+    motion = fx.signals.cycloid(0.3, 0.4)
+    hub = np.array([motion(x)[0] for x in t])
+    run = fx.simulate(stiff, t, fx.Drive.prescribed(motion))
+    angle = 2 * run["link/1/tip_deflection"] / 0.202 - 2 / 3 * run["link/1/tip_slope"]
+    (tmp_path / "lqg").mkdir()
+    path = tmp_path / "lqg" / "lqg_step_17deg_run01.mat"
+    savemat(path, {"time": t[:, None], "theta11": hub[:, None], "theta12": angle[:, None]})
+    return path
+
+
+@pytest.mark.slow
+def test_the_study_finds_a_stiffer_strip_by_its_ring(written, tmp_path):
+    out = tmp_path / "out"
+    status, _, said = command(["study", "measured", "--data", written.parents[1], "--out", out])
+    assert status == 0, said
+    (row,) = json.loads((out / "measured.json").read_text())["runs"]
+    ratio = np.sqrt(2.068427e11 / 2.2e11)
+    assert row["simulated_deviation"] == pytest.approx(ratio - 1, abs=2e-3)
+    assert row["held_deviation"] == pytest.approx(ratio - 1, abs=4e-3)
+    assert (out / "measured.png").stat().st_size > 10_000
+    folder = out / written.stem
+    assert (folder / "review.rrd").is_file() and GAUGE in fx.Run.read(folder / "experiment")
+
+
+def test_what_is_no_such_run_is_refused(tmp_path):
+    from scipy.io import savemat
+
+    robot = fx.load("quanser-2dsfl")
+    with pytest.raises(fx.InputError, match=r"no \*step\*.mat"):
+        measured(robot, tmp_path)
+    savemat(tmp_path / "a_step.mat", {"time": np.arange(9.0)[:, None]})
+    with pytest.raises(fx.InputError, match="theta11"):
+        measured(robot, tmp_path)
+    with pytest.raises(fx.InputError, match="one flexible link"):
+        measured(fx.load("rig"), tmp_path)
