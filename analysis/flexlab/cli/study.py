@@ -59,7 +59,7 @@ def study(
     force: Force = False,
     json: Json = False,
 ) -> None:
-    """Study a robot's payload, ratio of link lengths, or sleeve, or a measured robot.
+    """Study a robot's payload, link lengths or sleeve, or a measured robot.
 
     It stores a table (Parquet) and a figure. KIND boundary: with and without a sleeve. KIND
     measured: simulations over published measurements, with a review of each run.
