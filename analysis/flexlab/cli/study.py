@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -10,14 +11,24 @@ import flexura as fx
 from flexura.optional import need
 
 from .. import studies
-from .options import Force, Json, ManoeuvreFile, Out, RobotFile, Rtol, stem
+from .options import Force, Json, ManoeuvreFile, Out, Rtol, stem
 from .output import message, print_results, progress_bars, warn
 from .results import results
+from .study_measured import study_measured
 
 
 def study(
-    kind: Annotated[str, typer.Argument(metavar="KIND", help="payload, length-ratio or boundary")],
-    robot: RobotFile,
+    kind: Annotated[
+        str, typer.Argument(metavar="KIND", help="payload, length-ratio, boundary or measured")
+    ],
+    robot: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="ROBOT",
+            help="robot file (TOML), or the name of a shipped one, as rig; KIND measured: by "
+            "default quanser-2dsfl",
+        ),
+    ] = None,
     manoeuvre: ManoeuvreFile = None,
     out: Out = None,
     rtol: Rtol = 1e-6,
@@ -38,19 +49,41 @@ def study(
     channels: Annotated[
         bool, typer.Option("--channels", help="store the channels of all runs too")
     ] = False,
+    data: Annotated[
+        Path | None,
+        typer.Option(
+            "--data", metavar="FOLDER", help="of measured: the folder of the measured step runs"
+        ),
+    ] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="processes; default: one a core")] = None,
     force: Force = False,
     json: Json = False,
 ) -> None:
-    """Study a robot's payload, ratio of link lengths, or sleeve.
+    """Study a robot's payload, link lengths or sleeve, or a measured robot.
 
-    It stores a table (Parquet) and a figure. KIND boundary: with and without a sleeve.
+    It stores a table (Parquet) and a figure. KIND boundary: with and without a sleeve. KIND
+    measured: simulations over published measurements, with a review of each run.
 
     \b
     Example: flexura study payload type-1-rr --values 0:0.2:11
     """
     if keep is not None and kind != "length-ratio":
         raise fx.InputError("expected with KIND length-ratio alone", key="--keep", value=keep)
+    if kind == "measured":
+        given = {"MANOEUVRE": manoeuvre, "--values": values, "--jobs": jobs}
+        for key, value in given.items():
+            if value is not None:
+                raise fx.InputError("expected none with KIND measured", key=key, value=str(value))
+        if channels:
+            raise fx.InputError(
+                "expected none with KIND measured: it stores them", key="--channels"
+            )
+        study_measured(robot or Path("quanser-2dsfl"), data, out, rtol, force=force, json=json)
+        return
+    if data is not None:
+        raise fx.InputError("expected with KIND measured alone", key="--data", value=str(data))
+    if robot is None:
+        raise fx.InputError("expected a robot file, or a shipped robot's name", key="ROBOT")
     described = fx.load(robot)
     need("matplotlib")
     asked = None if manoeuvre is None else fx.load_manoeuvre(manoeuvre, len(described.links))

@@ -1,0 +1,65 @@
+"""`flexura study measured`: simulations over the measurements of a robot."""
+
+from __future__ import annotations
+
+import json as json_
+from pathlib import Path
+
+import flexura as fx
+from flexura.io import write_bytes, write_text
+from flexura.optional import need
+
+from ..review import write_review
+from ..runs.formatting import number, percent
+from ..runs.table import Table
+from ..studies.measured import Measured, measured, numbers
+from ..studies.measured_figure import png
+from .output import message, print_results, progress_bars
+from .results import results
+
+
+def study_measured(
+    robot: Path, data: Path | None, out: Path | None, rtol: float, *, force: bool, json: bool
+) -> None:
+    """Simulate all measured step runs of a folder, and store figure, reviews, runs and figures."""
+    if data is None:
+        raise fx.InputError(
+            "expected the folder of the measured runs; docs/guide/measured.md says where they are",
+            key="--data",
+        )
+    described = fx.load(robot)
+    need("matplotlib", "rerun")
+    with results(out, "study-measured", robot.stem, force=force) as draft:
+        with progress_bars("measured") as report:
+            found = measured(described, data, rtol=rtol, progress=lambda f: report("measured", f))
+        names = ["measured.json", "measured.png"]
+        told = {"robot": described.name, "runs": numbers(found)}
+        write_text(draft.folder / names[0], json_.dumps(told, indent=1) + "\n")
+        write_bytes(draft.folder / names[1], png(described, found))
+        for m in found:
+            m.experiment.save(draft.folder / m.name / "experiment")
+            m.simulation.save(draft.folder / m.name / "simulation")
+            write_review(draft.folder / m.name / "review.rrd", [m.simulation, m.experiment])
+            names.append(f"{m.name}/review.rrd")
+        folder = draft.keep()
+    stored = [str(folder / name) for name in names]
+    print_results(json, lambda: table(described, found), lambda: told | {"stored": stored})
+    message(json, f"stored {folder}: {', '.join(names)}")
+
+
+def table(robot: fx.Robot, found: list[Measured]) -> Table:
+    """One row a run."""
+    heads = ("run", "measured [Hz]", "hub held [Hz]", "deviation", "hub as measured [Hz]")
+    out = Table(f"{robot.name}: measured", (*heads, "deviation", "RMS of peak"), ("run",))
+    for m in found:
+        out.add(
+            m.name.removesuffix("_run01"),
+            number(m.ring_Hz),
+            number(m.held_Hz),
+            percent(m.held_deviation),
+            number(m.simulated_Hz),
+            percent(m.simulated_deviation),
+            percent(m.rms_of_peak),
+        )
+    out.notes.append("frequencies of the ring later than 1.5 s; RMS deviation of the strain gauge")
+    return out

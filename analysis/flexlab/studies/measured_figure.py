@@ -1,0 +1,45 @@
+"""The figure of a measured robot: the gauge of each run, measured and simulated."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+
+import flexura as fx
+from flexura.optional import load
+
+from .measured import GAUGE, Measured
+
+
+def png(robot: fx.Robot, found: Sequence[Measured]) -> bytes:
+    """Draw measurement and simulation of all runs.
+
+    Args:
+        robot: the simulated robot.
+        found: the runs, one or more.
+
+    Returns:
+        A PNG picture.
+    """
+    Figure = load("matplotlib.figure").Figure
+
+    drawing = Figure(figsize=(8, 1.0 + 1.9 * len(found)), layout="constrained")
+    places = drawing.subplots(len(found), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, m in zip(places, found, strict=True):
+        axes.plot(m.experiment.t, 1e3 * m.experiment[GAUGE], color="C1", label="measured")
+        axes.plot(
+            m.simulation.t, 1e3 * m.simulation[GAUGE], color="C0", linewidth=1, label="simulated"
+        )
+        axes.set_title(
+            f"{m.name}: {m.ring_Hz:.3f} Hz measured, {m.simulated_Hz:.3f} Hz simulated",
+            fontsize="small",
+            loc="left",
+        )
+        axes.set_ylabel("gauge [mrad]")
+        axes.grid(alpha=0.3)
+    places[0].legend(frameon=False, loc="upper right")
+    places[-1].set_xlabel("t [s]")
+    drawing.suptitle(f"{robot.name}: hub motion as measured", fontsize="medium")
+    buffer = io.BytesIO()
+    drawing.savefig(buffer, format="png", dpi=150)
+    return buffer.getvalue()
