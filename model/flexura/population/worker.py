@@ -220,6 +220,7 @@ def _together(
         STATIONS,
         threads,
         watch,
+        np.zeros(0),
     )
     for name, found in zip(request.channels, values, strict=True):
         part.channels[name][members] = found
