@@ -5,6 +5,7 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include "mechanics.hpp"
 #include "packed.hpp"
 #include "simulation/method_by_name.hpp"
 
@@ -44,7 +45,8 @@ nb::tuple run_population(const Counts &counts, const Cube &numbers, const Cube &
                          const Indices &drive_of, const Vector &t, const Vector &q, const Vector &v,
                          double rtol, const std::string &method, bool numerical_damping,
                          long most_steps, const std::vector<std::pair<std::string, int>> &channels,
-                         int stations, int threads, Watch &watch, const Vector &held) {
+                         int stations, int threads, Watch &watch, const Vector &held,
+                         const Mechanics *same) {
   const std::size_t robots = numbers.shape(0), links = counts.shape(0);
   if (counts.shape(1) != COUNTS || numbers.shape(1) != links || numbers.shape(2) != NUMBERS ||
       material.shape(0) != robots || material.shape(2) != MATERIAL || gravity.shape(0) != robots ||
@@ -73,6 +75,10 @@ nb::tuple run_population(const Counts &counts, const Cube &numbers, const Cube &
   population.times.assign(t.data(), t.data() + t.shape(0));
   population.q.assign(q.data(), q.data() + q.shape(0)),
       population.v.assign(v.data(), v.data() + v.shape(0));
+  if (same) {
+    if (same->model->first.size() != links) throw std::invalid_argument("another robot");
+    population.same = same->model;
+  }
   population.held.assign(held.data(), held.data() + held.shape(0));
   population.rtol = rtol, population.method = method,
   population.numerical_damping = numerical_damping, population.most_steps = most_steps,
@@ -121,7 +127,7 @@ void bind_population(nb::module_ &module) {
   module.def("population", &run_population, "counts"_a, "numbers"_a, "material"_a, "lumps"_a,
              "gravity"_a, "payload"_a, "limits"_a, "drives"_a, "drive_of"_a, "t"_a, "q"_a, "v"_a,
              "rtol"_a, "method"_a, "numerical_damping"_a, "most_steps"_a, "channels"_a,
-             "stations"_a, "threads"_a, "watch"_a, "held"_a,
+             "stations"_a, "threads"_a, "watch"_a, "held"_a, "same"_a.none(),
              "Values (channels, robots, times); of each robot how it ended, the time reached, "
              "steps, joint, "
              "positions of the joints; texts by robot; balances of the energies.");

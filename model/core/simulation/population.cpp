@@ -88,7 +88,7 @@ class Worker {
     std::unique_ptr<Fault> faults[LANES];
     for (int k = first; k < end; ++k) robots.push_back(robot_of(all_.robots, k));
     for (int k = 0; k < end - first; ++k) pointers[k] = &robots[std::size_t(k)];
-    assemble(pointers, end - first, models, faults);
+    if (!all_.same) assemble(pointers, end - first, models, faults);
     std::vector<Starter> starters;
     for (int k = first; k < end; ++k) {
       Ending &ending = endings_[std::size_t(k)];
@@ -97,7 +97,9 @@ class Worker {
         ending.text = fault->what();
         continue;
       }
-      Starter starter = ready(k, std::move(models[k - first]));
+      Starter starter =
+          ready(k, all_.same ? all_.same
+                             : std::make_shared<const Model<double>>(std::move(models[k - first])));
       if (!inside_limits(starter, ending)) continue;
       if (starter.method == "auto")
         run_alone(starter);
@@ -125,8 +127,10 @@ class Worker {
     return std::ptrdiff_t(std::size_t(k) * wide);
   }
 
-  Starter ready(int k, Model<double> model) const {
+  Starter ready(int k, std::shared_ptr<const Model<double>> shared) const {
     Starter out;
+    out.shared = std::move(shared);
+    const Model<double> &model = out.model();
     out.robot = k, out.method = all_.method,
     out.acting = all_.drives[std::size_t(all_.drive_of[std::size_t(k)])];
     const std::size_t n = std::size_t(model.n);
@@ -155,7 +159,6 @@ class Worker {
       out.q[row] = motion.y, out.v[row] = motion.yd;
     }
     if (all_.method == "auto") choose_method(model, out);
-    out.shared = std::make_shared<const Model<double>>(std::move(model));
     return out;
   }
 

@@ -6,10 +6,12 @@
 // robot's digits depend on nothing but itself.
 #pragma once
 #include <atomic>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "integration/run_state.hpp"
+#include "robot/model.hpp"
 #include "robot/robot_table.hpp"
 
 namespace flexura {
@@ -23,6 +25,7 @@ struct Channel {
 
 struct Population {
   Table robots;
+  std::shared_ptr<const Model<double>> same;  // of all robots, if they have the same numbers
   const double *limits = nullptr;  // (robots, links, 2), the ends of links that slide included
   std::vector<Inputs> drives;      // limits apart; neither functions nor samplers
   std::vector<int> drive_of;       // (robots): index of the drive

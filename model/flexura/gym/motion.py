@@ -29,7 +29,7 @@ class Motion:
         count: number of copies, B.
         rate_Hz: of the actions.
         rtol: relative tolerance, as in `flexura.simulate`.
-        method: as in `flexura.simulate`.
+        method: as in `flexura.simulate`; "auto" looks for one with each action.
         threads: of the core; None: one a core of the processor.
 
     Attributes:
@@ -48,7 +48,7 @@ class Motion:
         count: int,
         rate_Hz: float = 50.0,
         rtol: float = 1e-3,
-        method: str = "auto",
+        method: str = "implicit",
         threads: int | None = None,
     ) -> None:
         self.robot = robot_of(robot)
@@ -144,6 +144,7 @@ class Motion:
             self.threads,
             core.Watch(),
             np.ascontiguousarray(force, dtype=float).ravel(),
+            self.system.equations,
         )
         n, k = self.system.n, self.bent.shape[1]
         last = np.asarray(values)[:, :, -1].T

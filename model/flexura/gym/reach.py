@@ -23,7 +23,7 @@ def _spaces(task: Task) -> tuple[Any, Any]:
     )
 
 
-class Reach(gymnasium.Env):  # type: ignore[name-defined]
+class Reach(gymnasium.Env):  # type: ignore[misc, name-defined]
     """One robot.
 
     Args:
@@ -69,7 +69,7 @@ class Reach(gymnasium.Env):  # type: ignore[name-defined]
         return self.task.observation()[0], float(reward[0]), bool(failed[0]), False, about
 
 
-class ReachVector(vector.VectorEnv):  # type: ignore[name-defined]
+class ReachVector(vector.VectorEnv):  # type: ignore[misc, name-defined]
     """Many robots that the core moves four at a time, on all cores.
 
     One whose episode has ended begins the next with the next step, whose action it ignores

@@ -221,6 +221,7 @@ def _together(
         threads,
         watch,
         np.zeros(0),
+        None,
     )
     for name, found in zip(request.channels, values, strict=True):
         part.channels[name][members] = found
