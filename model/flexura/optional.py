@@ -26,6 +26,7 @@ EXTRAS = {
     "rerun_cli": "view",
     "PIL": "lab",
     "control": "control",
+    "gymnasium": "gym",
 }
 
 
