@@ -4,14 +4,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+import gymnasium
 import numpy as np
 import pytest
 
 import flexura as fx
+from flexura import gym
 from flexura.errors import InputError
 
-gymnasium = pytest.importorskip("gymnasium")
-gym = pytest.importorskip("flexura.gym")
 MODEL = Path(fx.__file__).resolve().parents[1]
 
 
