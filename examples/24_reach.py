@@ -1,7 +1,7 @@
 """Many robots under random torques in an environment for learning.
 
-Equation (25) without bending and gravity: M(q) q'' + h(q, q') = u, with the mass matrix (40) and
-the bias (41). For two uniform rods textbooks have
+Equations (25), (40) and (41): M(q) q'' + h(q, q') = u, its mass matrix and its bias. For two
+uniform rods textbooks have
 
     a = m1 l1^2 / 3 + m2 l1^2,    b = m2 l2^2 / 3,    c = m2 l1 l2 / 2,
     M11 = a + b + 2 c cos q2,    M12 = b + c cos q2,    M22 = b,
