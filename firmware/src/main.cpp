@@ -252,6 +252,7 @@ void __attribute__((noinline, used)) loop() {
   feed_watchdog(now);
   send_reports(now);  // first: what a report says is that of its own tick
   poll_commands();
+  send_reports(board.rig.now());  // a command may have taken long
   if (board.rig.state() == State::running) board.rig.prepare();
   poll_eeprom_save();
   update_lamp(now);
