@@ -1,35 +1,16 @@
 """`flexura flash` and `flexura doctor` as a shell sees them; the board is emulated and says so."""
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from boards import elf
 from flexlab.board.protocol.declaration import CONFIG
+from processes import flexura
 
 ROOT = Path(__file__).resolve().parents[2]
 RIG = ROOT / "firmware" / "rig.toml"
-ENVIRONMENT = os.environ | {
-    "PYTHONPATH": os.pathsep.join(map(str, (ROOT / "model", ROOT / "analysis"))),
-    "COLUMNS": "120",
-}
-
-
-def flexura(*arguments, cwd):
-    command = [sys.executable, "-m", "flexlab.cli.app", *map(str, arguments)]
-    return subprocess.run(
-        command,
-        cwd=cwd,
-        env=ENVIRONMENT,
-        capture_output=True,
-        text=True,
-        timeout=250,
-        stdin=subprocess.DEVNULL,
-    )
 
 
 @pytest.fixture

@@ -3,9 +3,7 @@ over a pseudo-terminal."""
 
 from __future__ import annotations
 
-import os
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable
@@ -21,12 +19,8 @@ from flexlab.experiment.plan import Plan
 from flexlab.experiment.run_experiment import ExperimentResult, Hooks, OpenBoard, conduct
 from flexlab.recordings.strip_sensor import sensor_of
 from flexlab.rig.plant.rigid_plant import RigidPlant
+from processes import command_line, environment
 
-ROOT = Path(__file__).resolve().parents[2]
-ENVIRONMENT = os.environ | {
-    "PYTHONPATH": os.pathsep.join(map(str, (ROOT / "model", ROOT / "analysis"))),
-    "COLUMNS": "160",
-}
 SETTINGS = rig.configuration(BENCH)
 
 
@@ -108,10 +102,10 @@ class Line:
 
 def command(*arguments: object, cwd: Path, **more: object) -> subprocess.Popen[str]:
     """`flexura bench ...` as a process."""
-    line = [sys.executable, "-m", "flexlab.cli.app", "bench", *map(str, arguments)]
+    line = command_line("bench", *arguments)
     pipe, surroundings = subprocess.PIPE, {"stdin": subprocess.DEVNULL} | more
     return subprocess.Popen(
-        line, cwd=cwd, env=ENVIRONMENT, stdout=pipe, stderr=pipe, text=True, **surroundings
+        line, cwd=cwd, env=environment(160), stdout=pipe, stderr=pipe, text=True, **surroundings
     )
 
 

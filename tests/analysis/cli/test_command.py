@@ -16,29 +16,14 @@ from typer.testing import CliRunner
 
 import flexura as fx
 from flexlab.cli.app import COMMANDS, app
+from processes import command_line, environment, flexura
 
 ROOT = Path(__file__).resolve().parents[3]
 RIG = ROOT / "model" / "robots" / "rig.toml"
 LAW = ROOT / "model" / "manoeuvres" / "rig-inverse-law.toml"
-ENVIRONMENT = os.environ | {
-    "PYTHONPATH": os.pathsep.join(map(str, (ROOT / "model", ROOT / "analysis"))),
-    "COLUMNS": "120",
-}
+ENVIRONMENT = environment()
 HELP = {name: CliRunner().invoke(app, [name, "--help"]) for name in COMMANDS}
 HEAVY = ("exudyn", "rerun", "pyarrow", "matplotlib", "pymoo", "distributed")
-
-
-def flexura(*arguments, cwd):
-    command = [sys.executable, "-m", "flexlab.cli.app", *map(str, arguments)]
-    return subprocess.run(
-        command,
-        cwd=cwd,
-        env=ENVIRONMENT,
-        capture_output=True,
-        text=True,
-        timeout=250,
-        stdin=subprocess.DEVNULL,
-    )
 
 
 @pytest.fixture(scope="module")
@@ -271,20 +256,11 @@ def test_ctrl_c_stores_what_there_is_and_marks_it_incomplete(warm, tmp_path):
         .replace("output_step_s = 0.005", "output_step_s = 20.0")
     )
     (tmp_path / "long.toml").write_text(law)
-    command = [
-        sys.executable,
-        "-m",
-        "flexlab.cli.app",
-        "simulate",
-        str(RIG),
-        "long.toml",
-        "--out",
-        "out",
-    ]
+    command = command_line("simulate", RIG, "long.toml", "--out", "out")
     terminal, side = os.openpty()
-    environment = ENVIRONMENT | {"TERM": "xterm"}
+    surroundings = ENVIRONMENT | {"TERM": "xterm"}
     with subprocess.Popen(
-        command, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, stderr=side, text=True
+        command, cwd=tmp_path, env=surroundings, stdout=subprocess.PIPE, stderr=side, text=True
     ) as process:
         os.close(side)
         shown, deadline = b"", time.monotonic() + 120

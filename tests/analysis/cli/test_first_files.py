@@ -1,10 +1,8 @@
 """`flexura new`, `robots` and `migrate`, and what the command itself takes: --version, --quiet,
 --verbose."""
 
+import functools
 import json
-import os
-import subprocess
-import sys
 import tomllib
 from pathlib import Path
 
@@ -12,14 +10,11 @@ import pytest
 from typer.testing import CliRunner
 
 import flexura as fx
+import processes
 from flexlab.cli.app import app
 from flexura.io import shipped_files
 
 ROOT = Path(__file__).resolve().parents[3]
-ENVIRONMENT = os.environ | {
-    "PYTHONPATH": os.pathsep.join(map(str, (ROOT / "model", ROOT / "analysis"))),
-    "COLUMNS": "80",
-}
 OLD = """\
 # an arm on a rail
 name = "start = 1"                   # limits = no key
@@ -60,16 +55,7 @@ joint = { type = "R", start_rad = 0.3, viscous_friction_N_m_s_rad = 0.01 } # sta
 """
 
 
-def flexura(*arguments, cwd):
-    return subprocess.run(
-        [sys.executable, "-m", "flexlab.cli.app", *map(str, arguments)],
-        cwd=cwd,
-        env=ENVIRONMENT,
-        capture_output=True,
-        text=True,
-        timeout=120,
-        stdin=subprocess.DEVNULL,
-    )
+flexura = functools.partial(processes.flexura, columns=80, timeout=120)
 
 
 # --- migrate

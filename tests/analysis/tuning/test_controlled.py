@@ -3,9 +3,6 @@ do on the rig."""
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,21 +13,11 @@ import flexura as fx
 from flexlab.board.protocol.declaration import CONFIG
 from flexlab.tuning.closed_loop import controller_from_file
 from flexura.control import gains
+from processes import flexura
 
 ROOT = Path(__file__).resolve().parents[3]
 MODEL = ROOT / "model"
 STEP, GAINS = MODEL / "manoeuvres" / "rig-step.toml", MODEL / "controllers" / "rig.toml"
-ENVIRONMENT = os.environ | {
-    "PYTHONPATH": os.pathsep.join(map(str, (MODEL, ROOT / "analysis"))),
-    "COLUMNS": "120",
-}
-
-
-def flexura(*arguments, cwd):
-    command = [sys.executable, "-m", "flexlab.cli.app", *map(str, arguments)]
-    return subprocess.run(
-        command, cwd=cwd, env=ENVIRONMENT, capture_output=True, text=True, timeout=250
-    )
 
 
 def rig_with_rotor(modes: int = 2) -> fx.System:

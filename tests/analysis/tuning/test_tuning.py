@@ -4,10 +4,8 @@ resume and agree."""
 from __future__ import annotations
 
 import json
-import os
 import signal
 import subprocess
-import sys
 import time
 from dataclasses import replace
 from itertools import permutations
@@ -44,14 +42,11 @@ from flexura.control.step_metrics import (
     vibration_lower_bound,
 )
 from flexura.errors import InputError
+from processes import command_line, environment
 from tunings import FREE, GAINS, ROBOT, SWING, task
 
 ROOT = Path(__file__).resolve().parents[3]
 MODEL = ROOT / "model"
-ENVIRONMENT = os.environ | {
-    "PYTHONPATH": os.pathsep.join(map(str, (MODEL, ROOT / "analysis"))),
-    "COLUMNS": "140",
-}
 
 
 def joint(t, y, r=None):
@@ -490,9 +485,9 @@ SMALL = (
 
 
 def start(*arguments, cwd):
-    line = [sys.executable, "-m", "flexlab.cli.app", *map(str, arguments)]
+    pipe, line = subprocess.PIPE, command_line(*arguments)
     return subprocess.Popen(
-        line, cwd=cwd, env=ENVIRONMENT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        line, cwd=cwd, env=environment(140), stdout=pipe, stderr=pipe, text=True
     )
 
 
