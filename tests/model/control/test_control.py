@@ -35,6 +35,31 @@ def rig(**strip) -> fx.System:
     return system(carriage, link, payload=0.02)
 
 
+def rig_controller(**motor) -> fx.Controller:
+    """Steps of both joints of `rig`; `motor` are further gains of joint 1."""
+    return fx.Controller(
+        (
+            fx.PID(
+                signals.step(0.05),
+                fx.Motor(13.0, 120.0),
+                kp=300,
+                limit=6,
+                setpoint_Hz=2.0,
+                **motor,
+            ),
+            fx.PID(
+                signals.step(0.4),
+                fx.Stepper(20.0, 0.01),
+                kp=20,
+                limit=6,
+                slew=60,
+                setpoint_Hz=2.0,
+                delay_s=TICK,
+            ),
+        )
+    )
+
+
 def rounded(x: float, quantum: float) -> float:
     return quantum * np.floor(x / quantum + 0.5) if quantum else x
 
@@ -223,20 +248,7 @@ def test_a_run_begins_where_the_robot_stands():
 
 def test_rows_of_gains_are_runs_whatever_their_order_and_threads():
     sys = rig()
-    drive = fx.Controller(
-        (
-            fx.PID(signals.step(0.05), fx.Motor(13.0, 120.0), kp=300, limit=6, setpoint_Hz=2.0),
-            fx.PID(
-                signals.step(0.4),
-                fx.Stepper(20.0, 0.01),
-                kp=20,
-                limit=6,
-                slew=60,
-                setpoint_Hz=2.0,
-                delay_s=TICK,
-            ),
-        )
-    )
+    drive = rig_controller()
     rows = np.repeat(drive.gains()[None], 6, axis=0)
     rows[:, 0, controller.KP] = np.linspace(100, 600, 6)
     many = gain_sweep.prepare_gain_sweep(sys, drive, 1.0, 0.005, 1e-5)
@@ -294,29 +306,10 @@ def test_faster_sampling_tends_to_the_continuous_law_with_order_one():
 )
 def test_every_method_balances_energy_and_agrees(method, rtol, most):
     sys = rig()
-    pids = (
-        fx.PID(
-            signals.step(0.05),
-            fx.Motor(13.0, 120.0),
-            kp=300,
-            ki=100,
-            kv=9,
-            limit=6,
-            setpoint_Hz=2.0,
-        ),
-        fx.PID(
-            signals.step(0.4),
-            fx.Stepper(20.0, 0.01),
-            kp=20,
-            limit=6,
-            slew=60,
-            setpoint_Hz=2.0,
-            delay_s=TICK,
-        ),
-    )
+    drive = rig_controller(ki=100, kv=9)
     t = np.linspace(0, 0.6, 101)  # not on ticks
-    run = fx.simulate(sys, t, fx.Controller(pids), rtol=rtol, method=method)
-    exact = fx.simulate(sys, t, fx.Controller(pids), rtol=1e-11, method="explicit")
+    run = fx.simulate(sys, t, drive, rtol=rtol, method=method)
+    exact = fx.simulate(sys, t, drive, rtol=1e-11, method="explicit")
     assert run.meta["energy_error"] < most and run.meta["method"] == method
     for name in (
         "joint/1/position",
