@@ -83,7 +83,7 @@ class Exponential : public Method<Real> {
   }
 
   Real attempt(const Real &t, const Real &h, const Real &last) override {
-    if (steps.tabulate(t, h)) within.tabulate(h);
+    if (steps.tabulate(t, h)) within.tabulate(steps.lengths());
     steps.predict();
     place(steps.predicted[0], steps.predicted[1], state);
     end = smaller(t + h, last);

@@ -79,7 +79,14 @@ class ExponentialAdams {
   int new_row() const { return row(ROWS - 1); }
   int newest() const { return head; }
 
-  double length(int k) const { return span[k]; }  // of the step that robot k's tables are for
+  // Of the step that the tables of a robot, of all robots are for: of one whose tables stay, less
+  // by round-off than the step's own.
+  double length(int k) const { return span[k]; }
+  Real lengths() const {
+    Real out = 0.0;
+    for (int k = 0; k < LANES; ++k) set_lane(out, k, span[k]);
+    return out;
+  }
 
   // Has robot k's last step led to the time t, or to the instant before it?
   bool reached(int k, double t) const {

@@ -322,7 +322,7 @@ TEST("a first-order rise has its formulas") {
   for (int k = 0; k <= 20000; ++k)
     t.push_back(k / 4000.0), y.push_back(1.0 - std::exp(-t.back() / 0.2));
   double out[JOINT_FIGURES] = {};
-  joint_figures(Samples{t.data(), 20001}, r.data(), y.data(), out);
+  joint_metrics(Samples{t.data(), 20001}, r.data(), y.data(), out);
   CHECK_NEAR(out[RISE], 0.2 * std::log(9.0), 1e-5);
   CHECK_NEAR(out[SETTLING], 0.2 * std::log(50.0), 1e-5);
   CHECK_NEAR(out[ITAE], 0.04, 1e-6);
@@ -382,8 +382,8 @@ TEST(
     }
     double each[JOINT_FIGURES] = {}, of_strip[STRIP_FIGURES];
     const Samples at{plan.t.data(), int(plan.t.size())};
-    joint_figures(at, plan.reference.data(), q.data(), each);
-    strip_figures(at, w.data(), each[SETTLING], of_strip);
+    joint_metrics(at, plan.reference.data(), q.data(), each);
+    strip_metrics(at, w.data(), each[SETTLING], of_strip);
     for (int k = 0; k < EFFORT; ++k)
       CHECK(check::same_bits(each[k], figures[std::size_t(b * width + k)]));
     for (int k = 0; k < STRIP_FIGURES; ++k)
