@@ -90,3 +90,39 @@ def test_arguments_results_and_errors_are_described(name):
     assert not (arguments and gives) or section(text, "Returns") or section(text, "Yields")
     if re.search(r"^\s+raise [A-Z]", inspect.getsource(function), re.M):
         assert section(text, "Raises")
+
+
+def annotated() -> dict[str, Any]:
+    """What `import flexura` gives: functions, classes, and their public functions."""
+    out: dict[str, Any] = {}
+    for name in flexura.__all__:
+        x = getattr(flexura, name)
+        if inspect.isfunction(x):
+            out[name] = x
+        elif inspect.isclass(x):
+            out[name] = x
+            for own, member in vars(x).items():
+                for f in ("fget", "func", "__func__"):
+                    member = getattr(member, f, member)
+                if inspect.isfunction(member) and not own.startswith("_"):
+                    out[f"{name}.{own}"] = member
+        elif inspect.ismodule(x) and hasattr(x, "__all__"):
+            out |= {
+                f"{name}.{own}": getattr(x, own)
+                for own in x.__all__
+                if inspect.isfunction(getattr(x, own))
+            }
+    return out
+
+
+ANNOTATED = annotated()
+
+
+@pytest.mark.parametrize("name", ANNOTATED)
+def test_public_names_say_what_they_take_and_give(name):
+    given = inspect.get_annotations(ANNOTATED[name])
+    vague = {k: v for k, v in given.items() if k[0] != "_" and re.search(r"\bAny\b", str(v))}
+    assert not vague
+    if inspect.isfunction(ANNOTATED[name]):
+        asked = set(inspect.signature(ANNOTATED[name]).parameters) - {"self", "cls"}
+        assert asked | {"return"} <= set(given)

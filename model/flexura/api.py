@@ -6,6 +6,8 @@ import inspect
 from collections.abc import Callable
 from typing import Any, overload
 
+from numpy.typing import ArrayLike
+
 from .errors import InputError, within_memory
 from .io import Run
 from .population import Batch, Population
@@ -14,6 +16,7 @@ from .signals import Drive
 from .simulation.dynamics import DriveLike
 from .simulation.dynamics import simulate as simulate_robot
 from .simulation.problem import Progress
+from .system import RobotLike
 
 OF_ONE, OF_MANY = (
     {p.name for p in inspect.signature(f).parameters.values() if p.kind is p.KEYWORD_ONLY}
@@ -23,21 +26,27 @@ OF_ONE, OF_MANY = (
 
 @overload
 def simulate(
-    robot: Batch, t_eval: Any, drive: Drive | None = None, *state: Any, **options: Any
+    robot: Batch,
+    t_eval: ArrayLike,
+    drive: Drive | None = None,
+    q0: ArrayLike | None = None,
+    qd0: ArrayLike | None = None,
+    rtol: float = 1e-6,
+    **options: object,
 ) -> Population: ...
 @overload
 def simulate(
-    robot: Any,
-    t_eval: Any,
+    robot: RobotLike,
+    t_eval: ArrayLike,
     drive: DriveLike = None,
-    q0: Any = None,
-    qd0: Any = None,
+    q0: ArrayLike | None = None,
+    qd0: ArrayLike | None = None,
     rtol: float = 1e-6,
     *,
     method: str = "auto",
     start: str | None = None,
     continue_from: Run | None = None,
-    until: Callable[..., Any] | None = None,
+    until: Callable[..., bool | float] | None = None,
     numerical_damping: bool = True,
     max_steps: int | None = None,
     wall_time: float | None = None,
@@ -45,14 +54,14 @@ def simulate(
 ) -> Run: ...
 @within_memory
 def simulate(
-    robot: Any,
-    t_eval: Any,
-    drive: Any = None,
-    q0: Any = None,
-    qd0: Any = None,
+    robot: RobotLike | Batch,
+    t_eval: ArrayLike,
+    drive: DriveLike = None,
+    q0: ArrayLike | None = None,
+    qd0: ArrayLike | None = None,
     rtol: float = 1e-6,
-    **options: Any,
-) -> Any:
+    **options: object,
+) -> Run | Population:
     """Integrate the equations of motion from t_eval[0] on; the Run has its channels at t_eval (T,).
 
     Under gravity a run starts in static equilibrium, with the joints held where they start and the
@@ -102,6 +111,7 @@ def simulate(
         NoEquilibrium: there is no static equilibrium to start in.
         NumericalError: the equations are singular or not finite, or there is too little memory.
     """
+    given: dict[str, Any] = dict(options)
     if isinstance(robot, Batch):
         if not (drive is None or isinstance(drive, Drive)):
             raise InputError(
@@ -110,8 +120,8 @@ def simulate(
         for key in options:
             if key in OF_ONE and key not in OF_MANY:
                 raise InputError("expected this of one robot only, not of a Batch", key=key)
-        return simulate_population(robot, t_eval, drive, q0, qd0, rtol, **options)
+        return simulate_population(robot, t_eval, drive, q0, qd0, rtol, **given)
     for key in options:
         if key in OF_MANY and key not in OF_ONE:
             raise InputError("expected this of a Batch only, not of one robot", key=key)
-    return simulate_robot(robot, t_eval, drive, q0, qd0, rtol, **options)
+    return simulate_robot(robot, t_eval, drive, q0, qd0, rtol, **given)

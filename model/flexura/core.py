@@ -12,6 +12,7 @@ import importlib
 import importlib.util
 import os
 from types import ModuleType
+from typing import TYPE_CHECKING, Any
 
 BUILDS = {"plain": "_core_plain", "x86-64-v3": "_core_v3"}
 
@@ -72,14 +73,30 @@ _core = load(os.environ.get("FLEXURA_CORE", ""))
 level: str = _core.level  # the build in use, a key of BUILDS
 compiler: str = _core.compiler  # what compiled it
 
-Mechanics = _core.Mechanics  # the equations of one robot, from the rows of system/constants.py
+if TYPE_CHECKING:
+
+    class Compiled:
+        """An object of the core, which has no types of its own."""
+
+        def __init__(self, *arguments: Any) -> None: ...
+        def __getattr__(self, name: str) -> Any: ...
+
+    class Mechanics(Compiled):
+        """The equations of one robot, from the rows of system/constants.py."""
+
+    class Sampler(Compiled):
+        """What is called once a tick: a PythonSampler, or a controller of the core."""
+
+    class Controller(Sampler):
+        """The law of a controller for one robot."""
+
+else:
+    Mechanics, Sampler, Controller = _core.Mechanics, _core.Sampler, _core.Controller
 # what the core refuses: args are the link (from 0; -1: none), the key and what was expected
 Fault = _core.Fault
 Simulation = _core.Simulation  # a run in progress
-Sampler = _core.Sampler  # what is called once a tick: a PythonSampler, or a controller of the core
 PythonSampler = _core.PythonSampler
 bends = _core.bends  # tip deflection [m] and slope [rad] of a link
-Controller = _core.Controller  # a Sampler: the law of control.py for one robot
 GainSweep = _core.GainSweep  # one robot under many controllers
 board_pulses = _core.board_pulses  # joint 2's pulses by the firmware's code
 joint_metrics = _core.joint_metrics

@@ -77,11 +77,8 @@ def invert(
         raise fx.InputError(
             f"expected one of {', '.join(given)}", key="path", value=", ".join(asked) or "none"
         )
-    t = (
-        np.linspace(0.0, duration, max(round(duration / step), 1) + 1)
-        if _above(duration, step)
-        else None
-    )
+    _check_times(duration, step)
+    t = np.linspace(0.0, duration, max(round(duration / step), 1) + 1)
     tip: Any
     if table is not None:
         t, tip = _columns(table)
@@ -135,13 +132,12 @@ def invert(
     report_saved(run, folder, json)
 
 
-def _above(duration: float, step: float) -> bool:
+def _check_times(duration: float, step: float) -> None:
     for key, value in (("--duration", duration), ("--step", step)):
         if not 0 < value < 1e6:
             raise fx.InputError("expected a time above 0 in seconds", key=key, value=value)
     if duration / step > 1e6:
         raise fx.InputError("expected at most a million rows", key="--step", value=step)
-    return True
 
 
 def _place(text: str) -> list[float]:

@@ -27,13 +27,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any
 
 import numpy as np
 
 from .. import core, signals
 from ..errors import InputError
-from ..io import Run, number
+from ..io import Run, Tables, number
 from ..signals import Drive, JointDrive
 from ..system import System
 from .pid import GAINS, PID, Motor, Stepper, check_not_negative
@@ -169,7 +168,7 @@ class Controller:
             np.zeros(len(self.joints), dtype=np.uint8),
         )
 
-    def sampler(self, system: System) -> Any:
+    def sampler(self, system: System) -> core.Controller:
         """What the core needs of this controller on a robot.
 
         Args:
@@ -234,7 +233,7 @@ class Controller:
             row[ENCODER] = isinstance(joint.output, Stepper) and joint.output.encoder
         return g
 
-    def recorded(self, run: Run, sampler: Any) -> Run:
+    def recorded(self, run: Run, sampler: core.Sampler) -> Run:
         """A Run with the controller's own channels besides.
 
         Args:
@@ -265,7 +264,7 @@ class Controller:
                 channels[f"joint/{i + 1}/pulses"], units[f"joint/{i + 1}/pulses"] = place, unit
         return replace(run, channels=channels, units=units)
 
-    def spec(self) -> dict[str, Any]:
+    def spec(self) -> Tables:
         """What it is, for a Run's metadata."""
         own = {
             "rate_Hz": self.rate_Hz,

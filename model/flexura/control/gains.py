@@ -25,7 +25,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from ..errors import InputError
-from ..io import find, read_toml, write_toml
+from ..io import Tables, find, read_toml, write_toml
 from ..signals import PLAUSIBLE, Signal, constant, is_plausible
 from .controller import Controller
 from .pid import PID, Force, Motor, Output, Stepper
@@ -324,7 +324,7 @@ def load(path: str | os.PathLike[str]) -> Gains:
         raise error if error.file else error.in_file(name) from None
 
 
-def _gains(data: dict[str, Any], file: str) -> Gains:
+def _gains(data: Tables, file: str) -> Gains:
     for key, value in data.items():
         if key not in ("controller", "output"):
             raise InputError("an unknown key; known here: controller, output", key=key, value=value)

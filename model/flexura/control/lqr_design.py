@@ -25,6 +25,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..io import array, number
@@ -68,12 +69,12 @@ def lqr(
     controller: Controller,
     effort: Any,
     *,
-    position: Any = 1.0,
+    position: ArrayLike = 1.0,
     deflection: float = 1.0,
     damping: float = 0.0,
     disturbance: Any = 1.0,
     noise: Any = 1e-4,
-    q: Any = None,
+    q: ArrayLike | None = None,
 ) -> tuple[Controller, Design]:
     """A controller with its PIDs' terms replaced by an LQR and an observer (74) to (76).
 

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
 from ..errors import InputError
-from ..io import flag, number
+from ..io import Tables, flag, number
 from ..signals import FunctionSignal, Signal, as_signal, spline
 
 GAINS = ("kp", "ki", "kd", "kf", "kg", "ks", "kt", "kv", "kc")
@@ -151,7 +151,7 @@ class PID:
             self, kf=self.kf + self.ks * per_m, kg=self.kg + self.kt * per_m, ks=0.0, kt=0.0
         )
 
-    def spec(self) -> dict[str, Any]:
+    def spec(self) -> Tables:
         """What it is, for a Run's metadata; without what is infinite."""
         plain = {f.name: getattr(self, f.name) for f in fields(self) if f.type == "float"}
         out = {name: value for name, value in plain.items() if math.isfinite(value)}

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ..io import array, function_of, number
+from ..io import Tables, array, function_of, number
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class Sampled:
     the caller.
     """
 
-    function: Callable[..., Any]
+    function: Callable[..., ArrayLike]
     rate_Hz: float
 
     def __post_init__(self) -> None:
@@ -34,7 +35,7 @@ class Sampled:
         if not number(self.rate_Hz, "rate_Hz", "expected a rate above 0 in hertz") > 0:
             raise InputError("expected a rate above 0 in hertz", key="rate_Hz", value=self.rate_Hz)
 
-    def spec(self) -> dict[str, Any]:
+    def spec(self) -> Tables:
         """What it is, for a Run's metadata."""
         return {
             "function": getattr(self.function, "__name__", type(self.function).__name__),
@@ -50,7 +51,7 @@ class DriveFunction:
         InputError: the function takes other arguments.
     """
 
-    def __init__(self, function: Callable[..., Any], joints: int) -> None:
+    def __init__(self, function: Callable[..., ArrayLike], joints: int) -> None:
         self.function, self.joints = function, joints
         try:
             parameters = inspect.signature(function).parameters.values()

@@ -43,7 +43,7 @@ from .seal import (
     sealed_parquet,
 )
 from .shipped import find, shipped_files
-from .toml_files import read_toml, write_toml
+from .toml_files import Tables, read_toml, write_toml
 from .trust import DOUBTED, REFUSED, balance_events, judged
 from .validation import MOST_LETTERS, explain, is_name
 
@@ -61,6 +61,7 @@ __all__ = [
     "Channel",
     "Damaged",
     "Run",
+    "Tables",
     "array",
     "balance_events",
     "called",

@@ -25,6 +25,7 @@ from .format import FORMAT, check_format
 from .frames import pandas_frame, xarray_dataset
 from .quantities import converted, fault, from_first, suffix, unit
 from .seal import Damaged, read_sealed, read_table, say_unsealed, sealed_parquet
+from .toml_files import Tables
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -55,7 +56,7 @@ class Run:
     t: np.ndarray
     channels: dict[str, np.ndarray]
     units: dict[str, str]
-    meta: dict[str, Any] = field(default_factory=dict)
+    meta: Tables = field(default_factory=dict)
     states: np.ndarray | None = None
 
     def __post_init__(self) -> None:

@@ -6,10 +6,13 @@ from __future__ import annotations
 import os
 import re
 import tomllib
-from typing import Any
+from typing import Any, TypeAlias
 
 from ..errors import InputError
 from .files import write_text
+
+# Of a TOML or JSON file: its values are what the file says, until they are checked.
+Tables: TypeAlias = dict[str, Any]
 
 MAX_BYTES = 10_000_000
 # a.a.a.a...: tomllib's time and memory grow with the square

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from .run import Run
+from .toml_files import Tables
 
 # of the energies: a balance beyond is a note, a warning, the end of trust in a run
 NOTED, DOUBTED, REFUSED = 1e-3, 1e-2, 0.1
@@ -31,7 +32,7 @@ def judged(run: Run) -> Run:
     return run
 
 
-def balance_events(error: float, end: float) -> list[dict[str, Any]]:
+def balance_events(error: float, end: float) -> list[Tables]:
     """The event of a balance (101), if there is something to be said.
 
     Args:

@@ -11,11 +11,13 @@ from itertools import islice
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..io import array, whole
 from ..robot import Robot, robot_of
 from ..signals import Drive
+from ..system import RobotLike
 from .rows import Rows, good, joined, one, varied
 
 Item = tuple[Robot, Drive | None]  # None: the drive that all share
@@ -58,12 +60,16 @@ class Batch:
     whatever is simulated before, elsewhere, or not at all.
     """
 
-    source: Iterable[Any] | Callable[[int, np.random.Generator], Any]
+    source: Iterable[object] | Callable[[int, np.random.Generator], object]
     count: int
     seed: int = 0
 
     @staticmethod
-    def of(robots: Any, count: int | None = None, seed: int = 0) -> Batch:
+    def of(
+        robots: Iterable[object] | Callable[[int, np.random.Generator], object],
+        count: int | None = None,
+        seed: int = 0,
+    ) -> Batch:
         """A Batch of robots that are given one by one.
 
         Args:
@@ -93,7 +99,7 @@ class Batch:
         return Batch(robots, count, whole(seed, "seed", 0))
 
     @staticmethod
-    def vary(robot: Any, changes: Mapping[str, Any]) -> Batch:
+    def vary(robot: RobotLike, changes: Mapping[str, ArrayLike]) -> Batch:
         """One robot with some values varied.
 
         Args:

@@ -16,6 +16,7 @@ from threading import Timer
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .. import core
 from ..errors import InputError
@@ -168,10 +169,10 @@ class Population:
 
 def simulate(
     batch: Batch,
-    t_eval: Any,
+    t_eval: ArrayLike,
     drive: Drive | None = None,
-    q0: Any = None,
-    qd0: Any = None,
+    q0: ArrayLike | None = None,
+    qd0: ArrayLike | None = None,
     rtol: float = 1e-6,
     *,
     method: str = "auto",

@@ -14,10 +14,11 @@ from types import CodeType
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .. import core
 from ..errors import InputError
-from ..io import array, choice, flag, function_of
+from ..io import Tables, array, choice, flag, function_of
 from ..robot import Robot
 from ..signals import STARTS, Drive
 from ..simulation.problem import MOST_STEPS, Budget, check_request
@@ -44,10 +45,10 @@ class Request:
 
     @staticmethod
     def checked(
-        t_eval: Any,
+        t_eval: ArrayLike,
         drive: Drive | None,
-        q0: Any,
-        qd0: Any,
+        q0: ArrayLike | None,
+        qd0: ArrayLike | None,
         rtol: float,
         method: str,
         start: str | None,
@@ -113,7 +114,7 @@ class Request:
                 )
         return replace(self, channels=self.channels or tuple(default))
 
-    def reduced(self, channels: dict[str, np.ndarray], robot: int) -> dict[str, Any]:
+    def reduced(self, channels: dict[str, np.ndarray], robot: int) -> Tables:
         """The numbers that `reduce` makes of a robot's channels. Raises InputError for anything
         else than numbers."""
         assert self.reduce is not None
@@ -125,7 +126,7 @@ class Request:
             text = f"expected a number or a dictionary of numbers of robot {robot + 1}"
             raise InputError(text, key="reduce", value=found) from None
 
-    def spec(self) -> dict[str, Any]:
+    def spec(self) -> Tables:
         """The request as JSON can hold it: two requests that are equal here give the same numbers
         of the same robots."""
         start = [None if q is None else q.tolist() for q in (self.q0, self.qd0)]

@@ -20,6 +20,7 @@ import numpy as np
 from ..errors import InputError
 from ..io import (
     Damaged,
+    Tables,
     read_sealed,
     read_sealed_json,
     read_table,
@@ -138,7 +139,7 @@ class Store:
     kept: dict[int, Chunk] = field(default_factory=dict)
 
     @staticmethod
-    def opened(folder: str | Path, request: dict[str, Any]) -> Store:
+    def opened(folder: str | Path, request: Tables) -> Store:
         """The store of this request: a new folder, or one that the same request began. Raises
         InputError for another's."""
         path = Path(folder) / MANIFEST
@@ -227,7 +228,7 @@ def is_population(folder: str | Path) -> bool:
     return (Path(folder) / MANIFEST).is_file()
 
 
-def manifest(folder: str | Path) -> dict[str, Any]:
+def manifest(folder: str | Path) -> Tables:
     """The request that a folder was begun with.
 
     Args:

@@ -6,6 +6,7 @@ from itertools import pairwise
 from typing import Annotated, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import Field, field_validator, model_validator
 
 from ..errors import WrongValue
@@ -273,7 +274,7 @@ class Link(Table):
             or self.density_kg_m3 is not None
         )
 
-    def mass_per_length(self, x: Any) -> np.ndarray:
+    def mass_per_length(self, x: ArrayLike) -> np.ndarray:
         """Mass per length, linear between the given places.
 
         Args:
@@ -286,7 +287,7 @@ class Link(Table):
             return _spread(self.mass_per_length_kg_m, x)
         return _spread(self.density_kg_m3 * self._of_section("area", x), x)
 
-    def bending_stiffness(self, x: Any) -> np.ndarray:
+    def bending_stiffness(self, x: ArrayLike) -> np.ndarray:
         """Bending stiffness EI.
 
         Args:
@@ -299,7 +300,7 @@ class Link(Table):
             return _spread(self.bending_stiffness_N_m2, x)
         return _spread(self.young_modulus_Pa * self._of_section("second_moment", x), x)
 
-    def axial_stiffness(self, x: Any) -> np.ndarray | None:
+    def axial_stiffness(self, x: ArrayLike) -> np.ndarray | None:
         """Axial stiffness EA.
 
         Args:
@@ -313,7 +314,7 @@ class Link(Table):
             return None
         return _spread(self.young_modulus_Pa * self._of_section("area", x), x)
 
-    def _of_section(self, what: str, x: Any) -> Any:
+    def _of_section(self, what: str, x: ArrayLike) -> Any:
         """The area [m^2] or the second moment [m^4] of the section at x (8)."""
         assert self.section is not None
         return getattr(form_of(self.section), what)(*dimensions_at(self.section, x))

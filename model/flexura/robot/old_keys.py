@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
+from ..io import Tables
 from .joint import KEYS, key_of
 
 
@@ -23,7 +23,7 @@ class OldKey:
         return f"link[{self.link}].joint.{self.old}"
 
 
-def renamed(data: dict[str, Any]) -> tuple[dict[str, Any], list[OldKey]]:
+def renamed(data: Tables) -> tuple[Tables, list[OldKey]]:
     """The tables of a robot file with the keys of today.
 
     A joint that has a quantity under both names keeps both, and the old one is an unknown key.

@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from ..errors import InputError, WrongValue
-from ..io import FORMAT, check_format, explain, find, read_toml, summary, write_toml
+from ..io import FORMAT, Tables, check_format, explain, find, read_toml, summary, write_toml
 from .damping import rayleigh
 from .joint import KEYS, key_of
 from .link import LEAST_FREE, Link
@@ -193,7 +193,7 @@ class Robot(Table):
         return np.array([link.joint.start for link in self.link])
 
     @classmethod
-    def from_dict(cls, data: dict[str, Any], *, file: str = "") -> Robot:
+    def from_dict(cls, data: Tables, *, file: str = "") -> Robot:
         """A robot from the tables of a robot file.
 
         Keys of 0.1 without a unit, as `start`, are read as those of today, and the logger "flexura"
@@ -244,11 +244,11 @@ class Robot(Table):
             )
         return f"Robot: {self.name or 'without a name'}, {self.structure}", rows
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Tables:
         """The tables of a robot file, without the keys that have their default value."""
         return self.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
 
-    def replace(self, changes: dict[str, Any]) -> Robot:
+    def replace(self, changes: Tables) -> Robot:
         """A robot with some values changed.
 
         Args:
@@ -268,7 +268,7 @@ class Robot(Table):
         except ValidationError:
             return Robot.from_dict(_changed(self.to_dict(), changes))
 
-    def _todays_path(self, path: str, changes: dict[str, Any]) -> str:
+    def _todays_path(self, path: str, changes: Tables) -> str:
         """`link.2.joint.start_rad` of `link.2.joint.start`; any other path as it is."""
         parts = path.split(".")
         if len(parts) != 4 or parts[0] != "link" or parts[2] != "joint" or parts[3] not in KEYS:
@@ -278,7 +278,7 @@ class Robot(Table):
         return ".".join([*parts[:3], key_of(parts[3], kind)])
 
 
-def _changed(tables: Any, changes: dict[str, Any]) -> dict[str, Any]:
+def _changed(tables: Any, changes: Tables) -> dict[str, Any]:
     """A robot, or the tables of its file, with some values changed: tables along the way, and as
     they are the parts that do not change, which are not validated again."""
     copied = lambda table: dict(table.__dict__) if isinstance(table, BaseModel) else table.copy()

@@ -2,7 +2,7 @@
 tables."""
 
 from . import paths, shaping, signal
-from .conversion import FunctionSignal, as_signal, as_signals, spline
+from .conversion import FunctionSignal, SignalLike, as_signal, as_signals, spline
 from .drive import Drive, JointDrive, check_smooth
 from .manoeuvre import STARTS, Manoeuvre, load_manoeuvre
 from .parsing import PLAUSIBLE, from_spec, is_finite, is_plausible
@@ -32,6 +32,7 @@ __all__ = [
     "JointDrive",
     "Manoeuvre",
     "Signal",
+    "SignalLike",
     "as_signal",
     "as_signals",
     "bang_bang",

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..io import array, function_of, number
@@ -14,6 +15,8 @@ from .signal import COLUMNS, Signal, constant, table
 
 SAMPLES = (65, 257, 1025, 4097)  # of a function, the first that are enough
 GOOD, POOR = 1e-11, 1e-6  # of the range of its values: what a spline may be off by between them
+# What a signal can be given as; arrays (T,) go with times. None: no signal.
+SignalLike: TypeAlias = Signal | ArrayLike | Callable[[float], float] | None
 EXPECTED = "expected a number, a Signal, a function of time, or an array of a value each time"
 
 
@@ -48,7 +51,7 @@ class FunctionSignal(Signal):
         return y, (high - low) / (2 * h), (high - 2 * y + low) / h**2
 
 
-def as_signal(value: Any, key: str, t: np.ndarray | None = None) -> Signal | None:
+def as_signal(value: SignalLike, key: str, t: np.ndarray | None = None) -> Signal | None:
     """A Signal from what a caller gives.
 
     Args:
@@ -88,7 +91,7 @@ def as_signal(value: Any, key: str, t: np.ndarray | None = None) -> Signal | Non
 
 
 def as_signals(
-    value: Any, joints: int, key: str, t: np.ndarray | None = None
+    value: SignalLike | Sequence[SignalLike], joints: int, key: str, t: np.ndarray | None = None
 ) -> list[Signal | None]:
     """One Signal or function a joint.
 

@@ -15,10 +15,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ..io import array, flag, number, whole
-from .conversion import WHAT_TO_DO, FunctionSignal, as_signal, spline
+from ..io import Tables, array, flag, number, whole
+from .conversion import WHAT_TO_DO, FunctionSignal, SignalLike, as_signal, spline
 from .signal import COLUMNS, Signal
 
 _NONE = np.zeros((0, COLUMNS))
@@ -67,7 +68,7 @@ class JointDrive:
             return self.force.value(t)
         return self.force(t)[0]
 
-    def spec(self) -> dict[str, Any]:
+    def spec(self) -> Tables:
         """This joint's table of a manoeuvre file."""
         out: dict[str, Any] = {}
         if self.force is not None:
@@ -85,7 +86,7 @@ class Drive:
     tip_deflection)` gives (n,)."""
 
     joints: tuple[JointDrive, ...]
-    meta: dict[str, Any] = field(default_factory=dict)
+    meta: Tables = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         joints = self.joints
@@ -108,7 +109,7 @@ class Drive:
         return Drive((JointDrive(),) * whole(joints, "joints", 0))
 
     @staticmethod
-    def force(*signals: Any, t_s: Any = None) -> Drive:
+    def force(*signals: SignalLike, t_s: ArrayLike | None = None) -> Drive:
         """Open loop: a force or torque [N or N m] a joint.
 
         Args:
@@ -125,7 +126,12 @@ class Drive:
         return Drive(tuple(JointDrive(force=s) for s in _waves("force", signals, t_s)))
 
     @staticmethod
-    def pd(motions: Any, kp: Any, kd: Any, t_s: Any = None) -> Drive:
+    def pd(
+        motions: Sequence[SignalLike] | np.ndarray,
+        kp: ArrayLike,
+        kd: ArrayLike,
+        t_s: ArrayLike | None = None,
+    ) -> Drive:
         """Joint PD control along motions.
 
         Args:
@@ -152,7 +158,7 @@ class Drive:
         )
 
     @staticmethod
-    def prescribed(*motions: Any, t_s: Any = None) -> Drive:
+    def prescribed(*motions: SignalLike, t_s: ArrayLike | None = None) -> Drive:
         """Joints that follow their motions exactly.
 
         A motion whose position or velocity jumps inside a run is refused when the run begins.
@@ -234,7 +240,7 @@ class Drive:
         return self if same else replace(self, joints=tuple(joints))
 
     def __call__(
-        self, t: float, position: Any, velocity: Any, tip_deflection: float = 0.0
+        self, t: float, position: np.ndarray, velocity: np.ndarray, tip_deflection: float = 0.0
     ) -> np.ndarray:
         """The forces in a state.
 
@@ -255,7 +261,7 @@ class Drive:
                 out[i] += joint.kp * (r - position[i]) + joint.kd * (rd - velocity[i])
         return out
 
-    def spec(self) -> list[dict[str, Any]]:
+    def spec(self) -> list[Tables]:
         """The joints' tables of a manoeuvre file."""
         return [joint.spec() for joint in self.joints]
 
@@ -336,7 +342,7 @@ def _up_to(motion: Signal, end: float) -> Signal:
     return motion
 
 
-def _waves(key: str, given: Sequence[Any], t_s: Any) -> list[Signal | None]:
+def _waves(key: str, given: Sequence[Any], t_s: ArrayLike | None) -> list[Signal | None]:
     expected = "expected ascending finite times in seconds"
     t = None if t_s is None else array(t_s, "t_s", expected, (None,))
     if t is not None and not np.all(np.diff(t) > 0):

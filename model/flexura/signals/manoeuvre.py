@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..io import check_format, choice, find, is_name, read_toml, whole
+from ..io import Tables, check_format, choice, find, is_name, read_toml, whole
 from .drive import Drive, JointDrive, check_smooth
 from .parsing import from_spec, is_plausible
 from .signal import Signal
@@ -53,7 +53,7 @@ class Manoeuvre:
         ]
         return replace(self, drive=Drive(tuple(exact)))
 
-    def spec(self) -> dict[str, Any]:
+    def spec(self) -> Tables:
         """The tables of a manoeuvre file, every key given."""
         own: dict[str, Any] = {
             "name": self.name,
@@ -92,7 +92,7 @@ def load_manoeuvre(path: str | os.PathLike[str], joints: int) -> Manoeuvre:
         raise error if error.file else error.in_file(os.fspath(found)) from None
 
 
-def _manoeuvre(data: dict[str, Any], joints: int) -> Manoeuvre:
+def _manoeuvre(data: Tables, joints: int) -> Manoeuvre:
     check_format(data)
     _check_keys(data, _KEYS, "")
     duration = _number(
@@ -184,7 +184,7 @@ def _prescribed(entry: dict[str, Any], motion: Signal | None, key: str, duration
     return True
 
 
-def _check_keys(data: dict[str, Any], keys: Sequence[str], prefix: str) -> None:
+def _check_keys(data: Tables, keys: Sequence[str], prefix: str) -> None:
     for key, value in data.items():
         if key not in keys:
             raise InputError(
@@ -193,7 +193,7 @@ def _check_keys(data: dict[str, Any], keys: Sequence[str], prefix: str) -> None:
 
 
 def _number(
-    data: dict[str, Any],
+    data: Tables,
     name: str,
     expected: str,
     *,

@@ -13,7 +13,7 @@ from . import shaping, signal
 from .signal import Signal
 
 
-def from_spec(spec: Any, *, key: str = "signal") -> Signal:
+def from_spec(spec: object, *, key: str = "signal") -> Signal:
     """A signal from its table, for example `{ kind = "cycloid", end = 1.0, duration_s = 0.5 }`.
 
     Args:
@@ -75,7 +75,7 @@ MOST = 1e12  # of a number of a manoeuvre or gains file, in its own unit: beyond
 PLAUSIBLE = "a finite number between -1e12 and 1e12"
 
 
-def is_plausible(value: Any) -> bool:
+def is_plausible(value: object) -> bool:
     """Whether a value is a finite number as files have them, at most `MOST` in size.
 
     Args:
@@ -84,10 +84,10 @@ def is_plausible(value: Any) -> bool:
     Returns:
         True for an int or a float, not for a bool.
     """
-    return is_finite(value) and abs(value) <= MOST
+    return isinstance(value, int | float) and is_finite(value) and abs(value) <= MOST
 
 
-def is_finite(value: Any) -> bool:
+def is_finite(value: object) -> bool:
     """Whether a value is a finite number, as read from a file.
 
     Args:

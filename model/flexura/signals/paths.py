@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..io import array, finite_arguments
@@ -27,7 +28,9 @@ def smooth_rise(u: Any) -> Any:
 
 
 @finite_arguments
-def line(start: Any, end: Any, duration_s: float, at_s: float = 0.0) -> tuple[Signal, Signal]:
+def line(
+    start: ArrayLike, end: ArrayLike, duration_s: float, at_s: float = 0.0
+) -> tuple[Signal, Signal]:
     """A straight way from start to end, both (x, y) [m]."""
     ends = [array(place, key, POINT, (2,)) for key, place in (("start", start), ("end", end))]
     if not np.any(ends[0] != ends[1]):
@@ -36,7 +39,7 @@ def line(start: Any, end: Any, duration_s: float, at_s: float = 0.0) -> tuple[Si
 
 
 @finite_arguments
-def polyline(points: Any, duration_s: float, at_s: float = 0.0) -> tuple[Signal, Signal]:
+def polyline(points: ArrayLike, duration_s: float, at_s: float = 0.0) -> tuple[Signal, Signal]:
     """Straight ways from point to point (k, 2) [m], at rest in each; each takes its share of the
     length in the duration."""
     expected = "expected two places (x, y) or more, each other than the one before, in metres"

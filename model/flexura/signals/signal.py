@@ -18,9 +18,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ..io import array, finite_arguments
+from ..io import Tables, array, finite_arguments
 
 COLUMNS = 10  # t0, c0 ... c5, A, w, phi
 FEW = 8  # segments that are looked through one by one
@@ -70,7 +71,7 @@ class Signal:
     where it isn't smooth."""
 
     segments: np.ndarray
-    spec: dict[str, Any] = field(default_factory=dict)
+    spec: Tables = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         expected = f"expected segments (k, {COLUMNS}): t0, c0 to c5, A, w, phi"
@@ -336,7 +337,7 @@ def bang_bang(
     )
 
 
-def table(t_s: Any, y: Any) -> Signal:
+def table(t_s: ArrayLike, y: ArrayLike) -> Signal:
     """A cubic spline with zero second derivative at its ends; then the last value.
 
     Args:
@@ -358,7 +359,7 @@ def table(t_s: Any, y: Any) -> Signal:
     return from_segments(rows, kind="table", t_s=times.tolist(), y=values.tolist())
 
 
-def piecewise(at_s: Any, value: Any) -> Signal:
+def piecewise(at_s: ArrayLike, value: ArrayLike) -> Signal:
     """Constant from each instant to the next: the dissertation's bang-bang torques.
 
     Args:

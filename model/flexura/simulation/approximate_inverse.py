@@ -13,6 +13,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .. import core
 from ..errors import FlexuraError, InputError
@@ -50,10 +51,10 @@ def rigid_robot(robot: Robot) -> Robot:
 
 def rigid_feedforward(
     system: System,
-    t_eval: Any,
+    t_eval: ArrayLike,
     motion: Sequence[Signal],
-    q0: Any = None,
-    qd0: Any = None,
+    q0: ArrayLike | None = None,
+    qd0: ArrayLike | None = None,
     rtol: float = 1e-6,
     *,
     step_s: float = 1e-3,
@@ -91,10 +92,10 @@ def rigid_feedforward(
 
 def shoot_by_bisection(
     system: System,
-    t_eval: Any,
+    t_eval: ArrayLike,
     motion: Sequence[Signal],
-    q0: Any = None,
-    qd0: Any = None,
+    q0: ArrayLike | None = None,
+    qd0: ArrayLike | None = None,
     rtol: float = 1e-7,
     *,
     joint_error: float = 1e-10,
@@ -329,7 +330,7 @@ def _splines(
 
 
 def _start(
-    system: System, t: float, motion: Sequence[Signal], q0: Any, qd0: Any
+    system: System, t: float, motion: Sequence[Signal], q0: ArrayLike | None, qd0: ArrayLike | None
 ) -> tuple[np.ndarray, np.ndarray]:
     """The state at the start, its joints on their motions."""
     q, qd, _ = consistent_start(system, t, Drive.prescribed(*motion), q0, qd0)

@@ -4,38 +4,45 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..control import Controller, Sampled
 from ..errors import InputError, guarded
 from ..io import Run, check_progress
-from ..signals import Drive, as_signals
-from ..system import System, assemble
+from ..signals import Drive, SignalLike, as_signals
+from ..system import RobotLike, System, assemble
 from . import dense, integrator, nodewise_run
 from .problem import Budget, Problem, Progress, Solution, check_times, initial_value_problem
 from .recorder import record, still
 from .stop_condition import StopCondition
 
 DriveLike = (
-    Drive | Controller | Sampled | Callable[..., Any] | Sequence[Any] | np.ndarray | float | None
+    Drive
+    | Controller
+    | Sampled
+    | Callable[..., ArrayLike]
+    | Sequence[SignalLike]
+    | np.ndarray
+    | float
+    | None
 )
 
 
 @guarded("the motion")
 def simulate(
-    robot: Any,
-    t_eval: Any,
+    robot: RobotLike,
+    t_eval: ArrayLike,
     drive: DriveLike = None,
-    q0: Any = None,
-    qd0: Any = None,
+    q0: ArrayLike | None = None,
+    qd0: ArrayLike | None = None,
     rtol: float = 1e-6,
     *,
     method: str = "auto",
     start: str | None = None,
     continue_from: Run | None = None,
-    until: Callable[..., Any] | None = None,
+    until: Callable[..., bool | float] | None = None,
     numerical_damping: bool = True,
     max_steps: int | None = None,
     wall_time: float | None = None,
@@ -96,11 +103,11 @@ def simulate(
 
 @guarded("the inverse dynamics")
 def inverse(
-    robot: Any,
-    t_eval: Any,
-    motion: Any,
-    q0: Any = None,
-    qd0: Any = None,
+    robot: RobotLike,
+    t_eval: ArrayLike,
+    motion: Sequence[SignalLike] | np.ndarray,
+    q0: ArrayLike | None = None,
+    qd0: ArrayLike | None = None,
     rtol: float = 1e-6,
     *,
     method: str = "auto",

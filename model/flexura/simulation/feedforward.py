@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..signals import Signal, table
 from ..system import System
 from .dynamics import inverse
 
 
-def gravity(system: System, motions: Sequence[Signal], t_s: Any) -> list[Signal]:
+def gravity(system: System, motions: Sequence[Signal], t_s: ArrayLike) -> list[Signal]:
     """Feedforwards that hold each joint against gravity along its motion, links straight.
 
     Args:
@@ -33,7 +33,7 @@ def gravity(system: System, motions: Sequence[Signal], t_s: Any) -> list[Signal]
 
 
 def inverse_dynamics(
-    system: System, motions: Sequence[Signal], t_s: Any, rtol: float = 1e-7
+    system: System, motions: Sequence[Signal], t_s: ArrayLike, rtol: float = 1e-7
 ) -> list[Signal]:
     """Feedforwards that the motions take, the links' bending included.
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from .. import core
 from ..control import Controller, DriveFunction, Sampled
+from ..io import Tables
 from ..signals import COLUMNS, Drive
 from .problem import Problem, Progress, Solution
 from .recorder import limit_event
@@ -105,7 +106,7 @@ class _Integration:
         if interrupted or about["status"] == "interrupted":
             name = "interrupted"
             events = [{"t": about["t"], "level": "WARN", "name": name, "text": name}]
-        meta: dict[str, Any] = {
+        meta: Tables = {
             "steps": about["steps"],
             "rejected": about["rejected"],
             "evaluations": about["passes"],

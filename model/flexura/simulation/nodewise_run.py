@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from ..io import Tables
 from ..system.nodes import Nodes, place, rest_node, rests_in_sleeve
 from .dense import Integration
 from .problem import Problem, Progress, Solution
@@ -72,7 +73,7 @@ class _Nodewise(Integration):
         self.events.append({"t": self.now, "level": "INFO", "name": "node", "text": text})
         return True
 
-    def solution(self, meta: dict[str, Any]) -> Solution:
+    def solution(self, meta: Tables) -> Solution:
         """What was computed, with the energy's jumps."""
         return super().solution(meta | {"energy_jumps": self.jumps})
 

@@ -7,12 +7,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..control import Controller, DriveFunction, Sampled
 from ..errors import InputError
-from ..io import Run, array, check_memory, choice, flag, number, whole
+from ..io import Run, Tables, array, check_memory, choice, flag, number, whole
 from ..signals import Drive, Signal, as_signals
-from ..system import System, assemble
+from ..system import RobotLike, System, assemble
 from .start import apply_prescribed_motions, check_limits, consistent_start, state_at_end
 
 METHODS = ("auto", "explicit", "implicit", "exponential")
@@ -72,7 +73,7 @@ class Budget:
             raise InputError(expected, key="wall_time", value=wall_time)
         return Budget(steps, wall)
 
-    def event(self, name: str, t: float, method: str, steps: int, since: float) -> dict[str, Any]:
+    def event(self, name: str, t: float, method: str, steps: int, since: float) -> Tables:
         """What ended a run: "exhausted" or "wall_time", after `steps` from `since` to t [s]."""
         used = (
             f"{self.steps} steps are used up"
@@ -112,18 +113,18 @@ class Solution:
     states: np.ndarray
     accounts: np.ndarray
     forces: np.ndarray
-    meta: dict[str, Any]
+    meta: Tables
     seen: np.ndarray | None = None
     jumps: Any = 0.0
     sampler: Any = None
 
 
 def initial_value_problem(
-    robot: Any,
-    t_eval: Any,
+    robot: RobotLike,
+    t_eval: ArrayLike,
     drive: Any,
-    q0: Any,
-    qd0: Any,
+    q0: ArrayLike | None,
+    qd0: ArrayLike | None,
     rtol: Any,
     method: Any,
     numerical_damping: Any = True,
@@ -233,7 +234,7 @@ EXPECTED_DRIVE = (
 )
 
 
-def check_request(t_eval: Any, rtol: Any, method: Any) -> np.ndarray:
+def check_request(t_eval: ArrayLike, rtol: Any, method: Any) -> np.ndarray:
     """The times of a request whose tolerance and method are good.
 
     Args:
@@ -256,7 +257,7 @@ def check_request(t_eval: Any, rtol: Any, method: Any) -> np.ndarray:
     return t
 
 
-def check_times(t_eval: Any) -> np.ndarray:
+def check_times(t_eval: ArrayLike) -> np.ndarray:
     """Ascending finite times.
 
     Args:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..io import STATIONS, Run, judged
+from ..io import STATIONS, Run, Tables, judged
 from ..robot import Robot
 from ..system import System
 from .problem import Solution
@@ -81,7 +81,7 @@ def record(system: System, solution: Solution) -> Run:
     return judged(Run(t, channels, units, about, states))
 
 
-def still(run: Run) -> list[dict[str, Any]]:
+def still(run: Run) -> list[Tables]:
     """The event of a run in which nothing moves and no drive acts; none of another."""
     drives = [values for name, values in run.channels.items() if name.endswith("/drive")]
     if run.states is None or len(run.t) < 2 or any(values.any() for values in drives):
@@ -92,7 +92,7 @@ def still(run: Run) -> list[dict[str, Any]]:
     return [{"t": float(run.t[0]), "level": "INFO", "name": "still", "text": text}]
 
 
-def describe(system: System, error: float) -> dict[str, Any]:
+def describe(system: System, error: float) -> Tables:
     """What the metadata of every simulation says: of what, by what, and how well the energy
     balances."""
     robot = system.robot
@@ -126,7 +126,7 @@ def energy_error(energies: np.ndarray, accounts: np.ndarray, jumps: Any = 0.0) -
     return float(max(np.abs(balance).max(), np.abs(strain).max()) / scale)
 
 
-def limit_event(system: System, joint: int, t: float, position: np.ndarray) -> dict[str, Any]:
+def limit_event(system: System, joint: int, t: float, position: np.ndarray) -> Tables:
     """What stopped joint (from 0) at t (64), with the joints at `position` (N,)."""
     robot, (low, high) = system.robot, system.limits[joint]
     kind, own, travel = (

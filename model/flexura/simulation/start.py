@@ -6,6 +6,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..control import PID, Controller
 from ..errors import InputError
@@ -18,7 +19,12 @@ NO_START = 'start = "straight" begins with straight links, q0 with a state of yo
 
 
 def consistent_start(
-    system: System, t: float, drive: Any, q0: Any, qd0: Any, start: Any = None
+    system: System,
+    t: float,
+    drive: Any,
+    q0: ArrayLike | None,
+    qd0: ArrayLike | None,
+    start: Any = None,
 ) -> tuple[np.ndarray, np.ndarray, str]:
     """The state at the start of a run.
 
@@ -57,7 +63,7 @@ def consistent_start(
     return q, qd, which
 
 
-def resolve_start(robot: Robot, q0: Any, start: Any) -> str:
+def resolve_start(robot: Robot, q0: ArrayLike | None, start: Any) -> str:
     """The start of a run, by default as gravity asks.
 
     Args:

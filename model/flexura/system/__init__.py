@@ -9,13 +9,14 @@ from .frequency_response import FrequencyResponse, frequency_response
 from .spectrum import Modes, frequencies, modes
 from .statespace import StateSpace, linearize
 from .statics import NoEquilibrium, equilibrium, holding, static, tip_pose
-from .system import System, assemble
+from .system import RobotLike, System, assemble
 
 __all__ = [
     "Assembly",
     "FrequencyResponse",
     "Modes",
     "NoEquilibrium",
+    "RobotLike",
     "StateSpace",
     "System",
     "assemble",

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -20,7 +19,7 @@ HUB_RADIUS, HUB_TRANSMISSION = 1, 2
 OFF_LINK, OFF_PAYLOAD = 1, 2
 
 
-def equations(robot: Robot) -> Any:
+def equations(robot: Robot) -> core.Mechanics:
     """The compiled equations of a robot.
 
     Args:

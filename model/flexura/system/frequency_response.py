@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..io import array, choice, write_bytes
 from ..optional import Optional
 from .mode_motion import observed_units
 from .statespace import StateSpace, linearize
-from .system import System, assemble, jacobian
+from .system import RobotLike, System, assemble, jacobian
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -81,7 +82,11 @@ class FrequencyResponse:
 
 
 def frequency_response(
-    robot: Any, drive: str, channel: str, frequencies_Hz: Any = None, q: Any = None
+    robot: RobotLike,
+    drive: str,
+    channel: str,
+    frequencies_Hz: ArrayLike | None = None,
+    q: ArrayLike | None = None,
 ) -> FrequencyResponse:
     """The response of a channel to a harmonic drive, for small motions about an equilibrium (119).
 

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import InputError, guarded
 from ..io import Run, choice, number, whole
 from .mode_motion import moving_run
 from .statics import static
-from .system import System, assemble
+from .system import RobotLike, System, assemble
 
 
 @dataclass(frozen=True)
@@ -58,13 +60,23 @@ class Modes:
             self.system, self.q, shape, float(self.frequencies_Hz[mode - 1]), most, count
         )
 
-    def animate(self, out: str | Path, mode: int = 1, **options: Any) -> Path:
+    def animate(
+        self,
+        out: str | Path,
+        mode: int = 1,
+        *,
+        frame_rate: float = 25.0,
+        duration: float | None = None,
+        progress: Callable[[float], None] | None = None,
+    ) -> Path:
         """Write a mode as a film.
 
         Args:
             out: the file, .gif, or .mp4 where an encoder is installed.
             mode: its number, from 1.
-            options: as in `Run.animate`.
+            frame_rate: pictures a second of the film [1/s].
+            duration: of the film [s], as in `Run.animate`.
+            progress: called with the fraction that is done.
 
         Returns:
             The file.
@@ -73,12 +85,19 @@ class Modes:
             InputError: a wrong argument.
             Missing: matplotlib or pillow is not installed.
         """
-        return self.run(mode).animate(out, **options)
+        return self.run(mode).animate(
+            out, frame_rate=frame_rate, duration=duration, progress=progress
+        )
 
 
 @guarded("the natural frequencies")
 def frequencies(
-    robot: Any, q: Any = None, joints: str = "locked", *, count: int | None = None, qd: Any = None
+    robot: RobotLike,
+    q: ArrayLike | None = None,
+    joints: str = "locked",
+    *,
+    count: int | None = None,
+    qd: ArrayLike | None = None,
 ) -> np.ndarray:
     """Natural frequencies of the undamped, linearised robot, ascending (52), (54).
 
@@ -112,7 +131,9 @@ def frequencies(
 
 
 @guarded("the natural modes")
-def modes(robot: Any, q: Any = None, count: int | None = 10, *, joints: str = "locked") -> Modes:
+def modes(
+    robot: RobotLike, q: ArrayLike | None = None, count: int | None = 10, *, joints: str = "locked"
+) -> Modes:
     """Natural modes of the undamped, linearised robot. Errors as in `frequencies`.
 
     Args:
@@ -151,7 +172,7 @@ def _unheld(system: System) -> int:
     )
 
 
-def _check(joints: Any, count: Any) -> None:
+def _check(joints: ArrayLike, count: Any) -> None:
     choice(joints, "joints", ("locked", "free"))
     if count is not None:
         whole(count, "count", 1)

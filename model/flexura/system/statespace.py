@@ -4,15 +4,15 @@ rotation."""
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import FlexuraError, InputError, guarded
 from ..io import choice, summary
 from ..optional import Optional
 from .statics import static
-from .system import System, assemble, jacobian
+from .system import RobotLike, System, assemble, jacobian
 
 INFINITE = 1e5  # times the fastest pole: a zero beyond is one at infinity, and round-off
 control = Optional("control")
@@ -148,7 +148,7 @@ class StateSpace:
         found = _roots(L.T @ N, L.T @ G @ N, L.T @ K @ N)
         return found[np.abs(found) < INFINITE * max(1.0, np.abs(self.poles).max())]
 
-    def to_control(self) -> Any:
+    def to_control(self) -> object:
         """This system as a `control.StateSpace` of python-control, with the names of states, inputs
         and outputs. Raises Missing where python-control is not installed."""
         return control.ss(
@@ -174,7 +174,9 @@ class StateSpace:
 
 
 @guarded("the linear equations")
-def linearize(robot: Any, q: Any = None, qd: Any = None, joints: str = "free") -> StateSpace:
+def linearize(
+    robot: RobotLike, q: ArrayLike | None = None, qd: ArrayLike | None = None, joints: str = "free"
+) -> StateSpace:
     """The robot linearised about an equilibrium, or about a steady motion (52).
 
     Args:

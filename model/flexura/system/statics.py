@@ -6,10 +6,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import FlexuraError, guarded
 from ..io import array, number
-from .system import System, assemble
+from .system import RobotLike, System, assemble
 
 STABLE, UNSTABLE = 0, 1  # Balance of model/core/statics_and_modes/equilibrium.hpp
 
@@ -25,9 +26,9 @@ class NoEquilibrium(FlexuraError):
 
 @guarded("the static equilibrium")
 def static(
-    robot: Any,
-    joints: Any = None,
-    tip_force: Any = (0.0, 0.0),
+    robot: RobotLike,
+    joints: ArrayLike | None = None,
+    tip_force: ArrayLike = (0.0, 0.0),
     tip_moment: float = 0.0,
 ) -> np.ndarray:
     """The static equilibrium with the joints held: elastic + gravity = J_tip^T load (50).
@@ -86,7 +87,7 @@ def equilibrium(equations: Any, q: np.ndarray, load: np.ndarray | None = None) -
 
 
 @guarded("the holding forces")
-def holding(robot: Any, q: Any = None) -> np.ndarray:
+def holding(robot: RobotLike, q: ArrayLike | None = None) -> np.ndarray:
     """The drives that hold the joints at rest (25): elastic forces and gravity in their rows.
 
     Args:
@@ -106,7 +107,7 @@ def holding(robot: Any, q: Any = None) -> np.ndarray:
     return system.forces(at, rest, rest)[system.joint_rows]
 
 
-def joint_positions(system: System, joints: Any) -> np.ndarray:
+def joint_positions(system: System, joints: ArrayLike | None) -> np.ndarray:
     """q (n,) of the straight robot with the joints at `joints` (links,) [m or rad], by default
     their start. Raises InputError."""
     q = system.start()
@@ -118,7 +119,7 @@ def joint_positions(system: System, joints: Any) -> np.ndarray:
     return q
 
 
-def tip_pose(robot: Any, q: Any) -> np.ndarray:
+def tip_pose(robot: RobotLike, q: ArrayLike) -> np.ndarray:
     """x, y and angle of the last link's tip in the base's axes.
 
     Args:

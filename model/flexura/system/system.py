@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ..core import Mechanics
 from ..errors import InputError, guarded
 from ..io import STATIONS, array, number, summary
 from ..link.line import Piece, whole_piece
@@ -26,6 +28,9 @@ _UNITS = {
     "mode": "kg^(1/2) m",
     "windup": "rad",
 }
+
+# A System, a Robot, or the path or name of a robot file.
+RobotLike: TypeAlias = "System | Robot | str | os.PathLike[str]"
 
 
 @dataclass(frozen=True)
@@ -60,7 +65,7 @@ class System:
         rows += [] if self.nodes is None else [("nodes", summary.listed(self.nodes))]
         return f"System of {self.robot.name or 'a robot'}, {self.robot.structure}", rows
 
-    def fixed(self, q: Any) -> System:
+    def fixed(self, q: ArrayLike) -> System:
         """The robot of fixed structure at a configuration.
 
         Args:
@@ -95,7 +100,7 @@ class System:
         return Assembly(Structure(self.robot, links))
 
     @cached_property
-    def equations(self) -> Any:
+    def equations(self) -> Mechanics:
         """The compiled equations, `core.Mechanics`. Raises InputError where the core refuses the
         robot."""
         return equations(self.robot)
@@ -184,7 +189,7 @@ class System:
         q[self.joint_rows] = self.robot.start
         return q
 
-    def mass(self, q: Any) -> np.ndarray:
+    def mass(self, q: ArrayLike) -> np.ndarray:
         """The mass matrix M(q) (40).
 
         Args:
@@ -195,7 +200,7 @@ class System:
         """
         return self.assembly.mass(self.check(q))
 
-    def stiffness(self, q: Any = None) -> np.ndarray:
+    def stiffness(self, q: ArrayLike | None = None) -> np.ndarray:
         """The stiffness matrix: the slope of elastic and gravity forces (43), (51).
 
         Args:
@@ -214,7 +219,7 @@ class System:
         the joints (26)."""
         return self.damping_at(self.start())
 
-    def damping_at(self, q: Any) -> np.ndarray:
+    def damping_at(self, q: ArrayLike) -> np.ndarray:
         """The damping matrix D; it depends on the free length of a sleeved link, on nothing else
         (26).
 
@@ -226,7 +231,7 @@ class System:
         """
         return self.assembly.damping(self.check(q))
 
-    def elastic(self, q: Any) -> np.ndarray:
+    def elastic(self, q: ArrayLike) -> np.ndarray:
         """Elastic forces, on the left-hand side (43).
 
         Args:
@@ -237,7 +242,7 @@ class System:
         """
         return self.assembly.elastic(self.check(q))
 
-    def gravity(self, q: Any) -> np.ndarray:
+    def gravity(self, q: ArrayLike) -> np.ndarray:
         """Forces of gravity, on the left-hand side (42).
 
         Args:
@@ -248,7 +253,7 @@ class System:
         """
         return self.assembly.gravity(self.check(q))
 
-    def bias(self, q: Any, qd: Any) -> np.ndarray:
+    def bias(self, q: ArrayLike, qd: ArrayLike) -> np.ndarray:
         """Coriolis and centrifugal forces, on the left-hand side (41).
 
         Args:
@@ -260,7 +265,7 @@ class System:
         """
         return self.assembly.bias(self.check(q), self.check(qd, "qd"))
 
-    def forces(self, q: Any, qd: Any, qdd: Any) -> np.ndarray:
+    def forces(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> np.ndarray:
         """The forces that a motion needs: the whole left-hand side without Coulomb friction (59).
 
         Args:
@@ -273,7 +278,7 @@ class System:
         """
         return self.assembly.forces(self.check(q), self.check(qd, "qd"), self.check(qdd, "qdd"))
 
-    def accelerations(self, q: Any, qd: Any, force: Any) -> np.ndarray:
+    def accelerations(self, q: ArrayLike, qd: ArrayLike, force: ArrayLike) -> np.ndarray:
         """Accelerations under forces, with locked joints at rest and without Coulomb friction (44)
         to (47).
 
@@ -293,7 +298,9 @@ class System:
         out[free] = np.linalg.solve(terms.mass[np.ix_(free, free)], left[free])
         return out
 
-    def line(self, q: Any, link: int, s: Any = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def line(
+        self, q: ArrayLike, link: int, s: ArrayLike | None = None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The shape of a link in the base's axes (3).
 
         Args:
@@ -326,7 +333,7 @@ class System:
             return x, y, angle
         return self.assembly.line(self.check(q), link, places)
 
-    def angles(self, link: int, s: Any) -> np.ndarray:
+    def angles(self, link: int, s: ArrayLike) -> np.ndarray:
         """What each unknown turns the tangent by, against the hub: B of (2).
 
         Args:
@@ -361,7 +368,7 @@ class System:
             return np.asarray(self.equations.observe(q, qd, STATIONS))
         return np.array([self.assembly.observe(a, b, STATIONS) for a, b in zip(q, qd, strict=True)])
 
-    def places(self, q: Any) -> tuple[np.ndarray, np.ndarray]:
+    def places(self, q: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
         """What a Run shows of deflections and the tip.
 
         Args:
@@ -387,7 +394,7 @@ class System:
         dissertation's model is asked for."""
         return self.robot.stiffening and not self.robot.nodal
 
-    def check(self, q: Any, key: str = "q") -> np.ndarray:
+    def check(self, q: ArrayLike, key: str = "q") -> np.ndarray:
         """A checked vector of the unknowns.
 
         Args:
@@ -408,14 +415,14 @@ class System:
             raise InputError(text, key="sliding", value="nodal")
         return self._array(q, key)
 
-    def _array(self, q: Any, key: str) -> np.ndarray:
+    def _array(self, q: ArrayLike, key: str) -> np.ndarray:
         expected = f"expected an array of shape ({self.n},), in the order of system.labels"
         found = array(q, key, expected)
         if found.shape != (self.n,):
             raise InputError(expected, key=key, value=found.shape)
         return found
 
-    def tangent(self, q: Any, qd: Any = None) -> np.ndarray:
+    def tangent(self, q: ArrayLike, qd: ArrayLike | None = None) -> np.ndarray:
         """The derivative of bias, elastic and gravity forces by q (52).
 
         Args:
@@ -434,7 +441,7 @@ class System:
             forces = lambda z: still(z) + self.assembly.bias(z, rates)
         return jacobian(forces, at, np.full(self.n, 1e-6))
 
-    def rate(self, q: Any, qd: Any) -> np.ndarray:
+    def rate(self, q: ArrayLike, qd: ArrayLike) -> np.ndarray:
         """The derivative of all forces by the rates: damping, friction, and gyroscopic terms (52).
 
         Args:
@@ -481,7 +488,7 @@ class System:
 
 
 @guarded("the equations of motion")
-def assemble(robot: Any) -> System:
+def assemble(robot: RobotLike) -> System:
     """The System of a robot.
 
     Args:
@@ -500,8 +507,9 @@ def assemble(robot: Any) -> System:
         try:
             _ = system.equations
         except InputError as error:
-            named = isinstance(robot, str | os.PathLike) and not error.file
-            raise error.in_file(os.fspath(robot)) if named else error from None
+            if isinstance(robot, Robot) or error.file:
+                raise
+            raise error.in_file(os.fspath(robot)) from None
     return system
 
 

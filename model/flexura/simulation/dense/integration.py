@@ -10,7 +10,7 @@ import numpy as np
 
 from ...control import DriveFunction, Sampled
 from ...errors import numerical_failure
-from ...io import STATIONS
+from ...io import STATIONS, Tables
 from ...signals import Drive
 from ...system import System
 from ..problem import Problem, Progress, Solution
@@ -141,7 +141,7 @@ class Integration:
         }
         return self.solution(meta)
 
-    def solution(self, meta: dict[str, Any]) -> Solution:
+    def solution(self, meta: Tables) -> Solution:
         """What was computed.
 
         Args:

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...errors import InputError
 from ...io import Run, array
 from ...signals import Drive, JointDrive, Manoeuvre, table
 
 
-def feedforward(run: Run, kp: Any = 0.0, kd: Any = 0.0) -> Manoeuvre:
+def feedforward(run: Run, kp: ArrayLike = 0.0, kd: ArrayLike = 0.0) -> Manoeuvre:
     """A manoeuvre in which each joint has the run's drive as its force, and the run's position as
     the motion to follow; it begins at 0 s.
 

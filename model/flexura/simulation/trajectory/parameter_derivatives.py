@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...errors import InputError
 from ...io import Run
 from ...robot import Robot
-from ...signals import Drive, as_signals
-from ...system import System, assemble, static
+from ...signals import Drive, SignalLike, as_signals
+from ...system import RobotLike, System, assemble, static
 from ..dynamics import simulate
 from ..problem import check_times
 from ..recorder import channel_units, recorded_channels
@@ -23,7 +25,11 @@ RTOL = 1e-10
 
 
 def parameter_derivatives(
-    robot: Any, t_eval: Any, drive: Any, parameters: Any, q0: Any = None
+    robot: RobotLike,
+    t_eval: ArrayLike,
+    drive: Drive | SignalLike | Sequence[SignalLike],
+    parameters: str | Sequence[str],
+    q0: ArrayLike | None = None,
 ) -> dict[str, Run]:
     """How the channels of a simulation change with numbers of the robot file (116).
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...errors import FlexuraError, InputError
 from ...io import array
-from ...system import System, assemble, static
+from ...system import RobotLike, System, assemble, static
 from .tip_output import PLACE, TipPath, output_kind
 
 STEPS = 40  # of Newton's method
@@ -16,7 +15,9 @@ CLOSE = 1e-12  # m or rad
 LONGEST = 0.3  # m or rad: a step of a joint
 
 
-def inverse_kinematics(robot: Any, tip: Any, joints: Any = None) -> np.ndarray:
+def inverse_kinematics(
+    robot: RobotLike, tip: ArrayLike, joints: ArrayLike | None = None
+) -> np.ndarray:
     """Postures q (n,) or (T, n) in static equilibrium whose tip is at a place (113).
 
     Links are bent by their weight, so a rigid robot's answer is corrected by their deflection.
@@ -47,7 +48,7 @@ def inverse_kinematics(robot: Any, tip: Any, joints: Any = None) -> np.ndarray:
     return found[0] if places.ndim == count - 1 else found
 
 
-def exact_system(robot: Any) -> System:
+def exact_system(robot: RobotLike) -> System:
     """The System of a robot on the exact line. Raises InputError for the dissertation's models."""
     system = assemble(robot)
     if not system.exact:

@@ -6,12 +6,13 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...errors import FlexuraError, InputError
 from ...io import Run, array, number, whole
 from ...robot import Robot
 from ...signals import Drive, polynomial
-from ...system import System, assemble, static
+from ...system import RobotLike, System, assemble, static
 from ..approximate_inverse import rigid_robot
 from ..dynamics import inverse, simulate
 from .posture import exact_system
@@ -25,10 +26,10 @@ PERIODS = 3.0  # of the first mode, in which the residual is looked at
 
 
 def time_optimal(
-    robot: Any,
-    start: Any,
-    end: Any,
-    limits: Mapping[str, Any],
+    robot: RobotLike,
+    start: ArrayLike,
+    end: ArrayLike,
+    limits: Mapping[str, ArrayLike],
     robust: float = 0.0,
     *,
     intervals: int = INTERVALS,

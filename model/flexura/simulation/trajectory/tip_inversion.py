@@ -3,16 +3,17 @@ it rests."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...errors import FlexuraError
 from ...io import Run, check_progress, flag
 from ...robot import Robot
-from ...signals import Signal
-from ...system import System, assemble, static
+from ...signals import Signal, SignalLike
+from ...system import RobotLike, System, assemble, static
 from ..dynamics import inverse
 from ..problem import check_times
 from .collocation import Mesh
@@ -38,9 +39,9 @@ NO_EXACT = (
 
 
 def invert(
-    robot: Any,
-    t: Any,
-    tip: Any,
+    robot: RobotLike,
+    t: ArrayLike,
+    tip: SignalLike | Sequence[SignalLike],
     *,
     least_squares: bool = False,
     progress: Callable[[float], None] | None = None,
