@@ -8,9 +8,11 @@ environment variable FLEXURA_CORE, "plain" or "x86-64-v3", overrides the choice.
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 import importlib.util
 import os
+from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -35,7 +37,7 @@ def load(level: str) -> ModuleType:
 
     Raises:
         ImportError: there is no such level, this processor lacks it, or the core was not compiled
-            for it or for this Python.
+            for it or for this Python, or from other bindings than those of this checkout.
     """
     if level and level not in BUILDS:
         raise ImportError(f"FLEXURA_CORE is {level!r}: expected {' or '.join(BUILDS)}")
@@ -50,7 +52,29 @@ def load(level: str) -> ModuleType:
             f"FLEXURA_CORE asks for {level}, which was not compiled here: in the checkout type "
             f"cmake -DFLEXURA_PLAIN=ON build/core && make setup"
         )
-    return _module(BUILDS[level or (here or able)[-1]])
+    core = _module(BUILDS[level or (here or able)[-1]])
+    if core.bindings != bindings(Path(__file__).parents[1] / "core" / "bind", core.bindings):
+        raise ImportError(
+            f"The compiled core, {core.__file__}, is not that of this checkout. Compile it: make setup"
+        )
+    return core
+
+
+def bindings(folder: Path, otherwise: str) -> str:
+    """What tells the bindings' sources from any others, as bind/CMakeLists.txt computes it.
+
+    Args:
+        folder: of the sources.
+        otherwise: what is returned where there are none: the core was installed.
+
+    Returns:
+        A digest.
+    """
+    sources = sorted([*folder.glob("*.cpp"), *folder.glob("*.hpp")])
+    if not sources:
+        return otherwise
+    digests = "".join(hashlib.sha256(source.read_bytes()).hexdigest() for source in sources)
+    return hashlib.sha256(digests.encode()).hexdigest()
 
 
 def _able() -> list[str]:

@@ -75,6 +75,7 @@ static void bind_numbers(nb::module_ &module) {
 
 MODULE(FLEXURA_MODULE_NAME, module) {
   module.attr("level") = flexura::build_level();
+  module.attr("bindings") = FLEXURA_BINDINGS;
   module.attr("compiler") = flexura::build_compiler();
   module.attr("portable") = flexura::build_portable();
   flexura::bind_numbers(module);

@@ -111,6 +111,6 @@ def _numbers(value: Any) -> bool:
 _FORMS = {  # what a key takes, by the annotation of the parameter of its name
     "float": (PLAUSIBLE, is_plausible),
     "int": ("a whole number", lambda value: isinstance(value, int) and not isinstance(value, bool)),
-    "Any": ("a list of finite numbers between -1e12 and 1e12", _numbers),
+    "ArrayLike": ("a list of finite numbers between -1e12 and 1e12", _numbers),
     "Signal": ("a table of a signal, with its kind", lambda value: isinstance(value, dict)),
 }

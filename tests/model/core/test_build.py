@@ -239,3 +239,12 @@ def test_without_compiled_modules_the_message_says_what_to_type(tmp_path):
         and "The compiled core of flexura is missing" in done.stderr
         and "make setup" in done.stderr
     )
+
+
+def test_a_core_of_other_bindings_is_refused(monkeypatch, tmp_path):
+    (tmp_path / "module.cpp").write_text("// of another version")
+    other = core.bindings(tmp_path, "none")
+    assert core.bindings(tmp_path / "no such folder", "none") == "none"
+    monkeypatch.setattr(core, "bindings", lambda folder, otherwise: other)
+    with pytest.raises(ImportError, match="not that of this checkout. Compile it: make setup"):
+        core.load("")
