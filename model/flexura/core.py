@@ -55,7 +55,7 @@ def load(level: str) -> ModuleType:
     core = _module(BUILDS[level or (here or able)[-1]])
     if core.bindings != bindings(Path(__file__).parents[1] / "core" / "bind", core.bindings):
         raise ImportError(
-            f"The compiled core, {core.__file__}, is not that of this checkout. Compile it: make setup"
+            f"The compiled core, {core.__file__}, is not of this checkout: `make setup` compiles it"
         )
     return core
 

@@ -246,5 +246,5 @@ def test_a_core_of_other_bindings_is_refused(monkeypatch, tmp_path):
     other = core.bindings(tmp_path, "none")
     assert core.bindings(tmp_path / "no such folder", "none") == "none"
     monkeypatch.setattr(core, "bindings", lambda folder, otherwise: other)
-    with pytest.raises(ImportError, match="not that of this checkout. Compile it: make setup"):
+    with pytest.raises(ImportError, match="not of this checkout: `make setup`"):
         core.load("")
