@@ -341,7 +341,7 @@ def small_state(sys: fx.System, seed: int) -> dict[str, np.ndarray]:
     return {"q0": q, "qd0": qd}
 
 
-@fast
+@few
 @given(robots(max_links=4, stiffening=True), seeds)
 def test_energy_changes_by_the_work_of_the_drives_less_the_losses(bot, seed):
     """To 1e-8 of the largest energy (B12) at rtol 1e-11, since work and losses do not choose the

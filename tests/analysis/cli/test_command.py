@@ -53,18 +53,24 @@ prescribed = true
 
 def test_help_imports_nothing_heavy(tmp_path):
     code = (
-        "import sys; sys.argv = ['flexura', *sys.argv[1:]]; import atexit\n"
-        f"atexit.register(lambda: print('imported:', *[m for m in {HEAVY} if m in sys.modules], "
-        f"file=sys.stderr))\n"
-        "from flexlab.cli.app import main; main()"
+        "import sys; from flexlab.cli.app import main\n"
+        "for name in sys.argv[1:]:\n"
+        "    sys.argv = ['flexura', *name.split(), '--help']\n"
+        "    try: main()\n"
+        "    except SystemExit as end: assert not end.code, name\n"
+        f"    heavy = [m for m in {HEAVY} if m in sys.modules]\n"
+        "    assert not heavy, (name, heavy)"
     )
-    for arguments in (["--help"], *([name, "--help"] for name in COMMANDS)):
-        command = [sys.executable, "-c", code, *arguments]
-        done = subprocess.run(
-            command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, timeout=60
-        )
-        assert done.returncode == 0 and "Usage:" in done.stdout
-        assert done.stderr.strip() == "imported:", arguments
+    done = subprocess.run(
+        [sys.executable, "-c", code, "", *COMMANDS],
+        cwd=tmp_path,
+        env=ENVIRONMENT,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("Usage:") == 1 + len(COMMANDS) and done.stderr == ""
 
 
 def test_help_names_every_command(tmp_path):
@@ -252,8 +258,8 @@ def test_ctrl_c_stores_what_there_is_and_marks_it_incomplete(warm, tmp_path):
     """The interrupt comes when the progress bar shows that the solver is at work."""
     law = (
         LAW.read_text()
-        .replace("duration_s = 2.0", "duration_s = 2000000.0")
-        .replace("output_step_s = 0.005", "output_step_s = 20.0")
+        .replace("duration_s = 2.0", "duration_s = 200000.0")
+        .replace("output_step_s = 0.005", "output_step_s = 2.0")
     )
     (tmp_path / "long.toml").write_text(law)
     command = command_line("simulate", RIG, "long.toml", "--out", "out")
@@ -434,8 +440,10 @@ def test_crosscheck_of_the_rig_passes_and_leaves_both_runs_and_their_review(warm
 
 
 def test_crosscheck_beyond_its_tolerance_has_status_1_and_names_the_channels(warm, tmp_path):
+    short = LAW.read_text().replace("duration_s = 2.0", "duration_s = 0.2")
+    (tmp_path / "short.toml").write_text(short)
     done = flexura(
-        "crosscheck", RIG, LAW, "--out", tmp_path / "out", "--tolerance", "1e-12", cwd=tmp_path
+        *("crosscheck", RIG, "short.toml", "--out", "out", "--tolerance", "1e-12"), cwd=tmp_path
     )
     assert done.returncode == 1
     assert "beyond the tolerance" in done.stderr and "link/2/tip_deflection" in done.stderr

@@ -14,8 +14,15 @@ from flexlab.crosscheck import nine_structures
 ROBOTS = Path(__file__).resolve().parents[3] / "model" / "robots"
 
 
+DEAR = ("RPb", "PbR", "PbPa", "PbPb")
+
+
 @pytest.mark.parametrize(
-    "structure", sorted(nine_structures.FILES, key=lambda name: -name.count("Pb"))
+    "structure",
+    [
+        pytest.param(name, marks=pytest.mark.slow if name in DEAR else ())
+        for name in sorted(nine_structures.FILES, key=lambda name: -name.count("Pb"))
+    ],
 )
 def test_a_structure_agrees_with_exudyn(structure):
     """Positions, angles and tip deflections within what issue and references allow, with links bent

@@ -506,7 +506,7 @@ def test_killed_and_interrupted_the_same_command_comes_to_the_same_end(tmp_path)
     """kill -9, then a real Ctrl-C (SIGINT), then to the end; beside a run that nothing
     disturbed."""
     (tmp_path / "a").mkdir(), (tmp_path / "b").mkdir()
-    arguments = (*SMALL, "--generations", "30", "--json")
+    arguments = (*SMALL, "--generations", "16", "--json")
     for number, (sent, status) in enumerate(((signal.SIGKILL, -9), (signal.SIGINT, 130)), 1):
         process = start(*arguments, cwd=tmp_path / "a")
         until = time.monotonic() + 200
@@ -519,7 +519,7 @@ def test_killed_and_interrupted_the_same_command_comes_to_the_same_end(tmp_path)
         process.send_signal(sent)
         process.communicate(timeout=60)
         assert process.returncode == status
-        assert 3 * number <= len(state(tmp_path / "a")["ends"]) < 30
+        assert 3 * number <= len(state(tmp_path / "a")["ends"]) < 16
     code, out, err = flexura(*arguments, cwd=tmp_path / "a")
     assert code == 0, err
     other = flexura(*arguments, cwd=tmp_path / "b")

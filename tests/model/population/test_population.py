@@ -333,7 +333,9 @@ print("complete" if done.complete else f"interrupted {{len(done.robots)}}", flus
 """
 
 
-@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize(
+    "how", [pytest.param(signal.SIGINT, marks=pytest.mark.slow), signal.SIGKILL]
+)
 def test_a_stopped_population_goes_on_where_it_was(tmp_path, how):
     script = SCRIPT.format(path=[str(ROOT / "tests" / "support")], folder=str(tmp_path))
     environment = os.environ | {"PYTHONPATH": str(ROOT / "model")}
