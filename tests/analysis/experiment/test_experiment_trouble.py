@@ -251,7 +251,7 @@ def limited(size):
 def test_the_disk_is_full_in_the_middle(line, tmp_path):
     """The system refuses to let the file grow; what had been received is there, to the byte that
     still went in."""
-    size = 100_000
+    size = 250_000
     with running(
         line, *LONG, "--out", "run", cwd=tmp_path, preexec_fn=lambda: limited(size)
     ) as process:
