@@ -18,7 +18,7 @@ from .errors import FlexuraError, InputError, NumericalError
 from .io import Run
 from .population import Batch, Population
 from .robot import Robot, load, save
-from .signals import Drive, JointDrive, Manoeuvre, Signal, load_manoeuvre
+from .signals import Drive, JointDrive, Load, Manoeuvre, Signal, load_manoeuvre
 from .simulation import (
     feedforward,
     inverse,
@@ -54,6 +54,7 @@ __all__ = [
     "FrequencyResponse",
     "InputError",
     "JointDrive",
+    "Load",
     "Manoeuvre",
     "Modes",
     "Motor",

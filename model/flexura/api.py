@@ -12,7 +12,7 @@ from .errors import InputError, within_memory
 from .io import Run
 from .population import Batch, Population
 from .population import simulate as simulate_population
-from .signals import Drive
+from .signals import Drive, LoadsLike
 from .simulation.dynamics import DriveLike
 from .simulation.dynamics import simulate as simulate_robot
 from .simulation.problem import Progress
@@ -48,6 +48,7 @@ def simulate(
     continue_from: Run | None = None,
     until: Callable[..., bool | float] | None = None,
     numerical_damping: bool = True,
+    loads: LoadsLike = None,
     max_steps: int | None = None,
     wall_time: float | None = None,
     progress: Progress = None,
@@ -98,6 +99,8 @@ def simulate(
             the time of t_eval: both may have a memory, so that no tick is computed twice.
         numerical_damping: exponential steps damp fast modes that change no output by more than the
             tolerance (94); False: they do not.
+        loads: forces and moments on links (130): a list of `Load`, or of tables with its keys. In
+            a static start the loads of t_eval[0] act too. Their work is part of `energy/work`.
         max_steps: a budget of steps, rejected ones included, by default 20 million. It ends the run
             with the event "exhausted", at the same step on every machine.
         wall_time: seconds after which the run is stopped where it is, with the event "wall_time".

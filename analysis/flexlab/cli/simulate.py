@@ -152,6 +152,7 @@ def _simulate_many(
     parameter_sweep.ranges(vary)  # the count is refused before anything is computed
     system, asked = load_request(robot, manoeuvre, prescribed, start)
     check_followed(asked, manoeuvre, "call with --prescribed")
+    asked.refuse_loads("a population")
     batch, chosen = parameter_sweep.grid(system.robot, vary)
     folder = continued(out, "population", robot.stem, *stem(manoeuvre), mark="population.json")
     with progress_bars("robots") as report:

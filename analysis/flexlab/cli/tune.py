@@ -163,6 +163,7 @@ def tune(
         described, outputs = with_nominal_drives(described, rigs.load(rig))
         given = Gains(given.settings, outputs, given.file)
     asked = fx.load_manoeuvre(manoeuvre, len(described.links))
+    asked.refuse_loads("flexura tune")
     free_gains = (
         freedom.read(free_file)
         if free_file

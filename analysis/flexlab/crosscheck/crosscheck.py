@@ -99,6 +99,7 @@ def crosscheck(
         manoeuvre.drive,
         rtol=rtol,
         start=manoeuvre.start,
+        loads=manoeuvre.loads,
         progress=lambda f: report("native", f),
     )
     report("native", 1.0)
@@ -109,6 +110,7 @@ def crosscheck(
             native.t,
             manoeuvre.drive,
             start=manoeuvre.start,
+            loads=manoeuvre.loads,
             beam=beam,
             step_s=step,
             progress=lambda f: report("twin", begin + part * f),

@@ -142,7 +142,12 @@ def _row(work: _Work) -> Row:
         system = fx.assemble(robot)
         row["first_frequency_Hz"] = float(min(fx.frequencies(system), default=np.nan))
         run = fx.simulate(
-            system, case.manoeuvre.t, case.manoeuvre.drive, rtol=rtol, start=case.manoeuvre.start
+            system,
+            case.manoeuvre.t,
+            case.manoeuvre.drive,
+            rtol=rtol,
+            start=case.manoeuvre.start,
+            loads=case.manoeuvre.loads,
         )
     except fx.FlexuraError as error:
         return row | {"complete": False, "error": str(error)}

@@ -88,13 +88,18 @@ struct Running {
           const std::string &method, const Matrix &segments, const Ranges &ranges,
           const Matrix &gains, const Flags &prescribed, const Flags &sampled, const Matrix &limits,
           nb::object function_, nb::object sampler_, double rate_Hz, double first_step,
-          bool numerical_damping, long most_steps)
+          bool numerical_damping, long most_steps, const nb::object &loads)
       : function(std::move(function_)), sampler(std::move(sampler_)) {
     const std::size_t n = std::size_t(robot.model->n);
     if (q.shape(0) != n || v.shape(0) != n || t.shape(0) < 1 ||
         ranges.shape(0) != robot.model->first.size())
       throw std::invalid_argument("a run of another robot was expected");
     Inputs acting = acting_of(segments, ranges, gains, prescribed, sampled, limits);
+    if (!loads.is_none()) {
+      const nb::tuple parts = nb::cast<nb::tuple>(loads);
+      add_loads(acting, nb::cast<Matrix>(parts[0]), nb::cast<Ranges>(parts[1]),
+                nb::cast<Matrix>(parts[2]));
+    }
     if (!function.is_none()) {
       drive = std::make_unique<PythonDrive>(robot.model, function);
       acting.function = [this](double at, const double *place, const double *rate, double *force) {
@@ -174,10 +179,11 @@ void bind_simulation(nb::module_ &module) {
       .def(nb::init<const Mechanics &, const Vector &, const Vector &, const Vector &, double,
                     const std::string &, const Matrix &, const Ranges &, const Matrix &,
                     const Flags &, const Flags &, const Matrix &, nb::object, nb::object, double,
-                    double, bool, long>(),
+                    double, bool, long, const nb::object &>(),
            "robot"_a, "t"_a, "q"_a, "v"_a, "rtol"_a, "method"_a, "segments"_a, "ranges"_a,
            "gains"_a, "prescribed"_a, "sampled"_a, "limits"_a, "function"_a.none(),
-           "sampler"_a.none(), "rate_Hz"_a, "first_step"_a, "numerical_damping"_a, "most_steps"_a)
+           "sampler"_a.none(), "rate_Hz"_a, "first_step"_a, "numerical_damping"_a, "most_steps"_a,
+           "loads"_a = nb::none())
       .def("advance", &Running::advance, "steps"_a, "At most so many steps further; may it go on?")
       .def("progress", &Running::progress, "How far the run is, and how it ended.")
       .def("rows", &Running::rows, "Times, states, accounts and drive forces so far.")

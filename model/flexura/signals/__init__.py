@@ -4,6 +4,7 @@ tables."""
 from . import paths, shaping, signal
 from .conversion import FunctionSignal, SignalLike, as_signal, as_signals, spline
 from .drive import Drive, JointDrive, check_smooth
+from .load import Load, Loads, LoadsLike, as_loads
 from .manoeuvre import STARTS, Manoeuvre, load_manoeuvre
 from .parsing import PLAUSIBLE, from_spec, is_finite, is_plausible
 from .shaping import ei, matched_cycloid, zv, zvd
@@ -30,9 +31,13 @@ __all__ = [
     "Drive",
     "FunctionSignal",
     "JointDrive",
+    "Load",
+    "Loads",
+    "LoadsLike",
     "Manoeuvre",
     "Signal",
     "SignalLike",
+    "as_loads",
     "as_signal",
     "as_signals",
     "bang_bang",

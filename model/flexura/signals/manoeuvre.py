@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import InputError
 from ..io import Tables, check_format, choice, find, is_name, read_toml, whole
 from .drive import Drive, JointDrive, check_smooth
+from .load import Load, load_from_table
 from .parsing import from_spec, is_plausible
 from .signal import Signal
 
@@ -21,7 +22,8 @@ class Manoeuvre:
     """What a robot is asked to do: a drive, for how long, and how often the result is stored. Read
     from a TOML file.
 
-    `start`: "static" or "straight", as in `simulate`; None leaves it to gravity.
+    `start`: "static" or "straight", as in `simulate`; None leaves it to gravity. `loads`: forces
+    and moments on links.
     """
 
     name: str
@@ -29,6 +31,7 @@ class Manoeuvre:
     output_step_s: float
     drive: Drive
     start: str | None = None
+    loads: tuple[Load, ...] = ()
 
     @property
     def t(self) -> np.ndarray:
@@ -62,12 +65,26 @@ class Manoeuvre:
         }
         if self.start is not None:
             own["start"] = self.start
-        return own | {"joint": self.drive.spec()}
+        own |= {"joint": self.drive.spec()}
+        return own | ({"load": [load.spec() for load in self.loads]} if self.loads else {})
+
+    def refuse_loads(self, by: str) -> None:
+        """Refuse loads on links where they would be left out.
+
+        Args:
+            by: what leaves them out, for the message.
+
+        Raises:
+            InputError: the manoeuvre has loads.
+        """
+        if self.loads:
+            text = f"expected none: {by} takes no loads on links"
+            raise InputError(text, key="load", value=len(self.loads))
 
 
 LONGEST = 1e8  # of a manoeuvre [s]: three years
 STARTS = ("static", "straight")
-_KEYS = ("name", "duration_s", "output_step_s", "start", "joint", "format")
+_KEYS = ("name", "duration_s", "output_step_s", "start", "joint", "load", "format")
 _JOINT_KEYS = ("force", "motion", "kp", "kd", "prescribed")
 
 
@@ -161,7 +178,20 @@ def _manoeuvre(data: Tables, joints: int) -> Manoeuvre:
     start = data.get("start")
     if start is not None:
         choice(start, "start", STARTS)
-    return Manoeuvre(name, duration, step, Drive(tuple(drives)), start)
+    return Manoeuvre(name, duration, step, Drive(tuple(drives)), start, _loads(data, joints))
+
+
+def _loads(data: dict[str, Any], joints: int) -> tuple[Load, ...]:
+    """The tables [[load]]."""
+    tables = data.get("load", [])
+    if not isinstance(tables, list):
+        raise InputError("expected tables [[load]]", key="load", value=tables)
+    loads = tuple(load_from_table(entry, i) for i, entry in enumerate(tables, 1))
+    for i, load in enumerate(loads, 1):
+        if load.link > joints:
+            text = f"expected a link from 1 to {joints}"
+            raise InputError(text, key=f"load[{i}].link", value=load.link)
+    return loads
 
 
 def _prescribed(entry: dict[str, Any], motion: Signal | None, key: str, duration: float) -> bool:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ..control import Controller, Sampled
 from ..errors import InputError, guarded
 from ..io import Run, check_progress
-from ..signals import Drive, SignalLike, as_signals
+from ..signals import Drive, LoadsLike, SignalLike, as_signals
 from ..system import RobotLike, System, assemble
 from . import dense, integrator, nodewise_run
 from .problem import Budget, Problem, Progress, Solution, check_times, initial_value_problem
@@ -44,6 +44,7 @@ def simulate(
     continue_from: Run | None = None,
     until: Callable[..., bool | float] | None = None,
     numerical_damping: bool = True,
+    loads: LoadsLike = None,
     max_steps: int | None = None,
     wall_time: float | None = None,
     progress: Progress = None,
@@ -62,6 +63,7 @@ def simulate(
         continue_from: as in `flexura.simulate`.
         until: as in `flexura.simulate`.
         numerical_damping: as in `flexura.simulate`.
+        loads: as in `flexura.simulate`.
         max_steps: as in `flexura.simulate`.
         wall_time: as in `flexura.simulate`.
         progress: called with the finished fraction.
@@ -81,6 +83,7 @@ def simulate(
         start,
         continue_from,
         Budget.checked(max_steps, wall_time),
+        loads,
     )
     check_progress(progress)
     solver = _solver(problem.system)
@@ -94,7 +97,7 @@ def simulate(
         accounts=solution.accounts + problem.accounts,
         meta=solution.meta | {"start": problem.start},
     )
-    run = record(problem.system, solution)
+    run = record(problem.system, solution, problem.loads)
     run.meta["events"] = run.meta["events"] + still(run)
     if isinstance(problem.drive, Controller):
         return problem.drive.recorded(run, solution.sampler)
@@ -112,6 +115,7 @@ def inverse(
     *,
     method: str = "auto",
     start: str | None = None,
+    loads: LoadsLike = None,
     max_steps: int | None = None,
     wall_time: float | None = None,
     progress: Progress = None,
@@ -136,6 +140,7 @@ def inverse(
         method: as in `flexura.simulate`.
         start: as in `flexura.simulate`. Under gravity the run starts in static equilibrium with the
             joints on their motions.
+        loads: as in `flexura.simulate`; the drives bear them too.
         max_steps: as in `flexura.simulate`.
         wall_time: as in `flexura.simulate`.
         progress: called with the finished fraction.
@@ -164,6 +169,7 @@ def inverse(
         rtol,
         method=method,
         start=start,
+        loads=loads,
         max_steps=max_steps,
         wall_time=wall_time,
         progress=progress,

@@ -78,6 +78,7 @@ class _Integration:
             0.0,
             problem.numerical_damping,
             problem.budget.steps,
+            problem.loads.packed() if problem.loads else None,
         )
 
     def run(self, progress: Progress) -> Solution:

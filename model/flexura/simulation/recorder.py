@@ -8,6 +8,7 @@ import numpy as np
 
 from ..io import STATIONS, Run, Tables, judged
 from ..robot import Robot
+from ..signals import Loads
 from ..system import System
 from .problem import Solution
 from .sensors import sensor_channels
@@ -57,9 +58,9 @@ LIMITS = ("limit", "end_of_link", "sleeve")  # names of events that stop a joint
 STILL = 1e-9  # m or rad: a robot whose unknowns change by less does not move
 
 
-def record(system: System, solution: Solution) -> Run:
-    """The Run of a solution: its channels, the balance of its energies, and the solver's
-    metadata."""
+def record(system: System, solution: Solution, loads: Loads) -> Run:
+    """The Run of a solution under loads on links: its channels, the balance of its energies, and
+    the solver's metadata."""
     n, t, states, accounts = system.n, solution.t, solution.states, solution.accounts
     q, v = np.ascontiguousarray(states[:, :n]), np.ascontiguousarray(states[:, n:])
     seen = system.observe(q, v) if solution.seen is None else solution.seen
@@ -73,9 +74,11 @@ def record(system: System, solution: Solution) -> Run:
     channels = {
         name: np.ascontiguousarray(values) for name, values in zip(units, found, strict=True)
     }
-    channels |= sensor_channels(system, q, v, solution.forces)
+    channels |= sensor_channels(system, t, q, v, solution.forces, loads)
     units |= {f"sensor/{s.name}": s.unit for link in system.robot.links for s in link.sensor}
     about = describe(system, energy_error(seen[:, -3:], accounts, solution.jumps)) | solution.meta
+    if loads:
+        about["loads"] = loads.spec()
     if len(t):
         about["numerical_loss_J"] = float(accounts[-1, NUMERICAL])
     return judged(Run(t, channels, units, about, states))

@@ -5,19 +5,27 @@ from __future__ import annotations
 import numpy as np
 
 from ..robot import Sensor
-from ..system import System
+from ..signals import Loads
+from ..system import System, load_forces
 
 
 def sensor_channels(
-    system: System, q: np.ndarray, qd: np.ndarray, drive: np.ndarray
+    system: System,
+    t: np.ndarray,
+    q: np.ndarray,
+    qd: np.ndarray,
+    drive: np.ndarray,
+    loads: Loads,
 ) -> dict[str, np.ndarray]:
     """The channels of a robot's sensors.
 
     Args:
         system: the robot.
+        t: times (T,) [s].
         q: configurations (T, n).
         qd: their rates (T, n).
         drive: forces of the drives (T, links) [N or N m].
+        loads: forces and moments on links.
 
     Returns:
         Values (T,) by channel, in the unit of the sensor.
@@ -26,7 +34,8 @@ def sensor_channels(
     for i, link in enumerate(system.robot.links):
         for sensor in link.sensor:
             if sensor.kind == "acceleration":
-                rates = _rates(system, q, qd, drive) if rates is None else rates
+                if rates is None:
+                    rates = _rates(system, q, qd, drive, load_forces(system, q, loads, t))
                 values = _acceleration(system, i, sensor.at_m, q, qd, rates)
             else:
                 values = _bending(system, i, sensor, q)
@@ -58,10 +67,13 @@ def _bending(system: System, i: int, sensor: Sensor, q: np.ndarray) -> np.ndarra
     return across if sensor.kind == "deflection" else turned
 
 
-def _rates(system: System, q: np.ndarray, qd: np.ndarray, drive: np.ndarray) -> np.ndarray:
-    """The accelerations of the unknowns (T, n) (44), with Coulomb friction (57)."""
-    force = np.zeros_like(q)
-    force[:, system.joint_rows] = drive
+def _rates(
+    system: System, q: np.ndarray, qd: np.ndarray, drive: np.ndarray, acting: np.ndarray
+) -> np.ndarray:
+    """The accelerations of the unknowns (T, n) (44), with Coulomb friction (57), under generalised
+    forces `acting` (T, n) besides the drives."""
+    force = acting.copy()
+    force[:, system.joint_rows] += drive
     force -= np.array([system.assembly.coulomb(rates) for rates in qd]).reshape(q.shape)
     rows = zip(q, qd, force, strict=True)
     return np.array([system.accelerations(*row) for row in rows]).reshape(q.shape)

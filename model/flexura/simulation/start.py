@@ -12,7 +12,7 @@ from ..control import PID, Controller
 from ..errors import InputError
 from ..io import Run, array, choice
 from ..robot import Robot
-from ..signals import STARTS, Drive
+from ..signals import STARTS, Drive, Loads
 from ..system import NoEquilibrium, System, static
 
 NO_START = 'start = "straight" begins with straight links, q0 with a state of your own'
@@ -25,12 +25,13 @@ def consistent_start(
     q0: ArrayLike | None,
     qd0: ArrayLike | None,
     start: Any = None,
+    loads: Loads | None = None,
 ) -> tuple[np.ndarray, np.ndarray, str]:
     """The state at the start of a run.
 
     Locked joints are at rest, prescribed ones on their motion. Without q0 the links are straight,
-    or under gravity in static equilibrium with the joints held where they start (50). Given rates
-    are kept in either case.
+    or under gravity in static equilibrium with the joints held where they start (50), with the
+    loads that act at the start (133). Given rates are kept in either case.
 
     Args:
         system: the robot.
@@ -39,6 +40,7 @@ def consistent_start(
         q0: configuration (n,), or None.
         qd0: its rates (n,), or None.
         start: "static", "straight" or None.
+        loads: forces and moments on links, or None.
 
     Returns:
         q and qd (n,), and which start it is: "given", "static" or "straight".
@@ -57,7 +59,7 @@ def consistent_start(
     check_limits(system, q)
     if which == "static":
         try:
-            q = static(system, q[system.joint_rows])
+            q = static(system, q[system.joint_rows], loads=loads, t=t)
         except NoEquilibrium as error:
             raise NoEquilibrium(f"{error}; {NO_START}", error.q, error.share) from None
     return q, qd, which

@@ -6,6 +6,7 @@ core where that is faster.
 
 from .assembly import Assembly
 from .frequency_response import FrequencyResponse, frequency_response
+from .loads import acting_loads, load_forces
 from .spectrum import Modes, frequencies, modes
 from .statespace import StateSpace, linearize
 from .statics import NoEquilibrium, equilibrium, holding, static, tip_pose
@@ -19,12 +20,14 @@ __all__ = [
     "RobotLike",
     "StateSpace",
     "System",
+    "acting_loads",
     "assemble",
     "equilibrium",
     "frequencies",
     "frequency_response",
     "holding",
     "linearize",
+    "load_forces",
     "modes",
     "static",
     "tip_pose",

@@ -15,6 +15,7 @@ from ..errors import FlexuraError, InputError, guarded
 from ..io import Run, array, check_progress, choice, judged, number, whole
 from ..optional import Optional
 from ..robot import MAX_ELEMENTS, robot_of
+from ..signals import as_loads
 from .build import TwinModel, build
 from .channels import channels
 from .extrapolation import LENGTH_FACTOR, extrapolate
@@ -50,6 +51,7 @@ def simulate(
     qd0: Any = None,
     *,
     start: str | None = None,
+    loads: Any = None,
     beam: str = "ancf",
     elements: int | None = None,
     step_s: float | None = None,
@@ -74,6 +76,7 @@ def simulate(
         start: "static", links in equilibrium with the joints held, which is the default under
             gravity, or "straight". Joints keep the velocities qd0, but a robot with a joint that
             slides on a flexible link must be at rest. `meta["start"]` says which was used.
+        loads: forces and moments on links, as in `flexura.simulate`; on a "ge" beam at its nodes.
         beam: "ancf" (ObjectANCFCable2D, Euler-Bernoulli) or "ge" (ObjectBeamGeometricallyExact2D of
             three nodes, with shear).
         elements: beam elements a flexible link; None: twice the robot file's and at least 8, or 32
@@ -120,16 +123,18 @@ def simulate(
         on = act.plan(0.0)
         robot = at_positions(robot, np.where(act.guided, on[:, 1], robot.start))
         speeds = np.where(act.guided, on[:, 2], speeds)
+    lengths = [link.length_m for link in robot.links]
+    on_links = as_loads(loads, lengths, 0.0, float(t[-1]))
     begins = resolve_start(robot, start, speeds)
     kinds = sliding_kinds(robot) if hub_length_m is None else []
     share, report = 1 / (1 + len(kinds)), progress or (lambda fraction: None)
 
     def run(number: int, times: dict[str, float], longest: float) -> Run:
         shape = mesh(robot, elements, hub_length_m, times)
-        bent = equilibrium(robot, beam, shape) if begins == "static" else None
+        bent = equilibrium(robot, beam, shape, on_links) if begins == "static" else None
 
         def new() -> TwinModel:
-            model = build(robot, beam, shape, speeds, act.gains, act.guided)
+            model = build(robot, beam, shape, speeds, act.gains, act.guided, loads=on_links)
             if bent is not None:
                 put(model, bent, speeds)
             return model

@@ -81,7 +81,7 @@ class CableLink:
             _add_element(mbs, values, k - first, pair, size)
             for k, (pair, size) in enumerate(zip(self.pairs, self.lengths, strict=True))
         ]
-        own = elements[first : first + count]
+        self.own = own = elements[first : first + count]
         for element in own:
             add_gravity(mbs, element, gravity)
         for node, lump in ((self.nodes[0], hub), (self.nodes[-1], payload)):
@@ -150,6 +150,12 @@ class CableLink:
         """See `Part`."""
         k, value, _ = self._place(x)
         return np.einsum("k,tkd->td", value, _elements(q)[:, k])
+
+    def marker_at(self, mbs: Any, x: float) -> Any:
+        """See `Part`."""
+        k = self._place(x)[0]
+        place = [x - k * self.values.length, 0.0, 0.0]
+        return mbs.AddMarker(eii.MarkerBodyRigid(bodyNumber=self.own[k], localPosition=place))
 
     def kinetic(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """See `Part`."""
