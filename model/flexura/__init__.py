@@ -18,7 +18,7 @@ from .errors import FlexuraError, InputError, NumericalError
 from .io import Run
 from .population import Batch, Population
 from .robot import Robot, load, save
-from .signals import Drive, JointDrive, Load, Manoeuvre, Signal, load_manoeuvre
+from .signals import Drive, JointDrive, Load, Manoeuvre, PayloadChange, Signal, load_manoeuvre
 from .simulation import (
     feedforward,
     inverse,
@@ -60,6 +60,7 @@ __all__ = [
     "Motor",
     "NoEquilibrium",
     "NumericalError",
+    "PayloadChange",
     "Population",
     "Robot",
     "Run",

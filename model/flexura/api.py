@@ -12,7 +12,7 @@ from .errors import InputError, within_memory
 from .io import Run
 from .population import Batch, Population
 from .population import simulate as simulate_population
-from .signals import Drive, LoadsLike
+from .signals import Drive, LoadsLike, PayloadsLike
 from .simulation.dynamics import DriveLike
 from .simulation.dynamics import simulate as simulate_robot
 from .simulation.problem import Progress
@@ -49,6 +49,7 @@ def simulate(
     until: Callable[..., bool | float] | None = None,
     numerical_damping: bool = True,
     loads: LoadsLike = None,
+    payloads: PayloadsLike = None,
     max_steps: int | None = None,
     wall_time: float | None = None,
     progress: Progress = None,
@@ -73,7 +74,7 @@ def simulate(
     is how far the energies are from balancing, relative to the largest; beyond 1e-3 an event says
     so, beyond 0.1 the run is not complete. Each event has a name: "limit", "end_of_link", "sleeve",
     "interrupted", "stuck", "diverged", "exhausted", "wall_time", "balance", "not_finite", "node",
-    "until", "still".
+    "until", "still", "payload".
 
     Args:
         robot: a System, a Robot, the path or name of a robot file, or a Batch of robots, which
@@ -101,6 +102,8 @@ def simulate(
             tolerance (94); False: they do not.
         loads: forces and moments on links (130): a list of `Load`, or of tables with its keys. In
             a static start the loads of t_eval[0] act too. Their work is part of `energy/work`.
+        payloads: changes of the payload (134): a list of `PayloadChange`, or of tables with its
+            keys. Each is an event "payload"; the energy jumps by what the event says.
         max_steps: a budget of steps, rejected ones included, by default 20 million. It ends the run
             with the event "exhausted", at the same step on every machine.
         wall_time: seconds after which the run is stopped where it is, with the event "wall_time".

@@ -5,7 +5,7 @@ import pytest
 
 import flexura as fx
 from flexura.signals import Loads
-from flexura.system import acting_loads, load_forces
+from flexura.system import acting_loads, impact, load_forces
 from robots import beam, rigid, robot
 
 GRAVITY = (0.4, -2.0)
@@ -99,3 +99,32 @@ def test_a_static_equilibrium_under_loads(stiffening):
     left = system.elastic(q) + system.gravity(q) - Q
     assert np.abs(left[system.elastic_rows]).max() < 1e-9
     assert np.abs(Q[system.elastic_rows]).max() > 0.1
+
+
+def carrying(mass, inertia=0.0):
+    """A two-link arm with a payload of this mass."""
+    return fx.assemble(
+        robot(*CHAINS["RR"][:1], rigid(0.3, 0.2, 0.1, 1e-3), payload=mass, payload_inertia=inertia)
+    )
+
+
+def test_momentum_where_a_payload_is_taken_up():
+    """Rates from the core's mass matrices with and without it, and the energy in both forms.
+
+    Equations: 134, 135
+    """
+    before, after = carrying(0.1, 1e-3), carrying(0.25, 3e-3)
+    random = np.random.default_rng(5)
+    q, v = 0.3 * random.normal(size=before.n), random.normal(size=before.n)
+    M0, M = before.equations.mass(q), after.equations.mass(q)
+    expected = np.linalg.solve(M, M0 @ v)
+    found = impact(before, after, q, v, np.zeros(0, dtype=int))
+    assert found.qd == pytest.approx(expected, rel=1e-9)
+    fall = 0.5 * v @ M0 @ v - 0.5 * expected @ M @ expected
+    assert found.lost == pytest.approx(fall, rel=1e-9)
+    change = v - expected
+    carnot = 0.5 * change @ M0 @ change + 0.5 * expected @ (M - M0) @ expected
+    assert fall == pytest.approx(carnot, rel=1e-9)
+    back = impact(after, before, q, v, np.zeros(0, dtype=int))
+    assert back.qd == pytest.approx(v) and back.lost == 0.0
+    assert back.gone == pytest.approx(0.5 * v @ (M - M0) @ v, rel=1e-9)

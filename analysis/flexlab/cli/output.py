@@ -89,6 +89,7 @@ def simulate_asked(
             drive,
             start=asked.start,
             loads=asked.loads,
+            payloads=asked.payloads,
             progress=lambda fraction: report(bar, fraction),
             **how,
         )

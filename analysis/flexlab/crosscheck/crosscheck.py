@@ -100,6 +100,7 @@ def crosscheck(
         rtol=rtol,
         start=manoeuvre.start,
         loads=manoeuvre.loads,
+        payloads=manoeuvre.payloads,
         progress=lambda f: report("native", f),
     )
     report("native", 1.0)
@@ -111,6 +112,7 @@ def crosscheck(
             manoeuvre.drive,
             start=manoeuvre.start,
             loads=manoeuvre.loads,
+            payloads=manoeuvre.payloads,
             beam=beam,
             step_s=step,
             progress=lambda f: report("twin", begin + part * f),

@@ -148,6 +148,7 @@ def _row(work: _Work) -> Row:
             rtol=rtol,
             start=case.manoeuvre.start,
             loads=case.manoeuvre.loads,
+            payloads=case.manoeuvre.payloads,
         )
     except fx.FlexuraError as error:
         return row | {"complete": False, "error": str(error)}

@@ -7,6 +7,7 @@ from .drive import Drive, JointDrive, check_smooth
 from .load import Load, Loads, LoadsLike, as_loads
 from .manoeuvre import STARTS, Manoeuvre, load_manoeuvre
 from .parsing import PLAUSIBLE, from_spec, is_finite, is_plausible
+from .payload_change import PayloadChange, PayloadsLike, as_payloads
 from .shaping import ei, matched_cycloid, zv, zvd
 from .signal import (
     COLUMNS,
@@ -35,9 +36,12 @@ __all__ = [
     "Loads",
     "LoadsLike",
     "Manoeuvre",
+    "PayloadChange",
+    "PayloadsLike",
     "Signal",
     "SignalLike",
     "as_loads",
+    "as_payloads",
     "as_signal",
     "as_signals",
     "bang_bang",

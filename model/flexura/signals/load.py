@@ -44,7 +44,8 @@ class Load:
         if self.at_m is not None:
             object.__setattr__(self, "at_m", number(self.at_m, "at_m"))
         choice(self.frame, "frame", FRAMES)
-        parts, given = (None, None), self.force_N
+        given = self.force_N
+        parts: tuple[Signal | None, ...] = (None, None)
         expected = "expected two components, along x and y: numbers, Signals or functions of time"
         if given is not None:
             if not isinstance(given, Sequence | np.ndarray) or isinstance(given, str | bytes):

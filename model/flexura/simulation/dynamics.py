@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 from ..control import Controller, Sampled
 from ..errors import InputError, guarded
 from ..io import Run, check_progress
-from ..signals import Drive, LoadsLike, SignalLike, as_signals
+from ..signals import Drive, LoadsLike, PayloadsLike, SignalLike, as_payloads, as_signals
 from ..system import RobotLike, System, assemble
-from . import dense, integrator, nodewise_run
+from . import dense, integrator, nodewise_run, payload_changes
 from .problem import Budget, Problem, Progress, Solution, check_times, initial_value_problem
 from .recorder import record, still
 from .stop_condition import StopCondition
@@ -45,6 +45,7 @@ def simulate(
     until: Callable[..., bool | float] | None = None,
     numerical_damping: bool = True,
     loads: LoadsLike = None,
+    payloads: PayloadsLike = None,
     max_steps: int | None = None,
     wall_time: float | None = None,
     progress: Progress = None,
@@ -64,6 +65,7 @@ def simulate(
         until: as in `flexura.simulate`.
         numerical_damping: as in `flexura.simulate`.
         loads: as in `flexura.simulate`.
+        payloads: as in `flexura.simulate`.
         max_steps: as in `flexura.simulate`.
         wall_time: as in `flexura.simulate`.
         progress: called with the finished fraction.
@@ -87,11 +89,14 @@ def simulate(
     )
     check_progress(progress)
     solver = _solver(problem.system)
-    solution = (
-        solver(problem, progress)
-        if until is None
-        else StopCondition(until, problem).run(solver, progress)
-    )
+    changes = as_payloads(payloads, float(problem.t[0]), float(problem.t[-1]))
+    if changes:
+        payload_changes.check(problem, changes, until)
+        solution = payload_changes.solve(problem, changes, solver, progress)
+    elif until is None:
+        solution = solver(problem, progress)
+    else:
+        solution = StopCondition(until, problem).run(solver, progress)
     solution = replace(
         solution,
         accounts=solution.accounts + problem.accounts,
@@ -116,6 +121,7 @@ def inverse(
     method: str = "auto",
     start: str | None = None,
     loads: LoadsLike = None,
+    payloads: PayloadsLike = None,
     max_steps: int | None = None,
     wall_time: float | None = None,
     progress: Progress = None,
@@ -141,6 +147,7 @@ def inverse(
         start: as in `flexura.simulate`. Under gravity the run starts in static equilibrium with the
             joints on their motions.
         loads: as in `flexura.simulate`; the drives bear them too.
+        payloads: as in `flexura.simulate`; joints keep to their motions at the impact.
         max_steps: as in `flexura.simulate`.
         wall_time: as in `flexura.simulate`.
         progress: called with the finished fraction.
@@ -170,6 +177,7 @@ def inverse(
         method=method,
         start=start,
         loads=loads,
+        payloads=payloads,
         max_steps=max_steps,
         wall_time=wall_time,
         progress=progress,

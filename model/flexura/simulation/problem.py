@@ -108,6 +108,7 @@ class Solution:
         meta: steps, events and whether it is complete.
         seen: what `system.observe` gives (T, k), where the solver knows it.
         jumps: what the energy has jumped by so far, (T,) or 0 [J].
+        systems: where the payload changes, the robots and the row before which each ends.
         sampler: of the core, with what a Controller computed at its ticks.
     """
 
@@ -118,6 +119,7 @@ class Solution:
     meta: Tables
     seen: np.ndarray | None = None
     jumps: Any = 0.0
+    systems: tuple[tuple[System, int], ...] = ()
     sampler: Any = None
 
 

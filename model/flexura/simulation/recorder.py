@@ -74,7 +74,14 @@ def record(system: System, solution: Solution, loads: Loads) -> Run:
     channels = {
         name: np.ascontiguousarray(values) for name, values in zip(units, found, strict=True)
     }
-    channels |= sensor_channels(system, t, q, v, solution.forces, loads)
+    begin, sensors = 0, []
+    for carrying, end in solution.systems or ((system, len(t)),):
+        rows = slice(begin, end)
+        sensors.append(
+            sensor_channels(carrying, t[rows], q[rows], v[rows], solution.forces[rows], loads)
+        )
+        begin = end
+    channels |= {name: np.concatenate([part[name] for part in sensors]) for name in sensors[0]}
     units |= {f"sensor/{s.name}": s.unit for link in system.robot.links for s in link.sensor}
     about = describe(system, energy_error(seen[:, -3:], accounts, solution.jumps)) | solution.meta
     if loads:

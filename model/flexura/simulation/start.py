@@ -119,6 +119,7 @@ def state_at_end(
     if run.states.shape[1] != 2 * n:
         text = f"expected a run of a robot with {n} unknowns"
         raise InputError(text, key=key, value=run.states.shape[1] // 2)
+    _check_payload(run, system)
     end = float(run.t[-1])
     if abs(t[0] - end) > 1e-9 * max(1.0, abs(end)):
         text = f"expected times that begin at the end of the run that is continued, {end:g} s"
@@ -126,6 +127,21 @@ def state_at_end(
     accounts = [float(run[f"energy/{name}"][-1]) for name in ("work", "loss", "numerical_loss")]
     z = run.states[-1]
     return z[:n].copy(), z[n:].copy(), np.array([*accounts, 0.0])
+
+
+def _check_payload(run: Run, system: System) -> None:
+    """Refuse a robot whose payload is not the one that the run ended with."""
+    changes = run.meta.get("payloads")
+    own = system.robot.payload
+    if not changes:
+        return
+    last = changes[-1]
+    if (own.mass_kg, own.inertia_kg_m2) != (last["mass_kg"], last["inertia_kg_m2"]):
+        text = (
+            f"expected the payload at the end of the run that is continued, {last['mass_kg']:g} kg "
+            f"and {last['inertia_kg_m2']:g} kg m^2"
+        )
+        raise InputError(text, key="payload.mass_kg", value=own.mass_kg)
 
 
 def check_state(system: System, key: str, value: Any, default: np.ndarray) -> np.ndarray:

@@ -7,6 +7,7 @@ core where that is faster.
 from .assembly import Assembly
 from .frequency_response import FrequencyResponse, frequency_response
 from .loads import acting_loads, load_forces
+from .payload_change import Impact, impact, with_payload
 from .spectrum import Modes, frequencies, modes
 from .statespace import StateSpace, linearize
 from .statics import NoEquilibrium, equilibrium, holding, static, tip_pose
@@ -15,6 +16,7 @@ from .system import RobotLike, System, assemble
 __all__ = [
     "Assembly",
     "FrequencyResponse",
+    "Impact",
     "Modes",
     "NoEquilibrium",
     "RobotLike",
@@ -26,9 +28,11 @@ __all__ = [
     "frequencies",
     "frequency_response",
     "holding",
+    "impact",
     "linearize",
     "load_forces",
     "modes",
     "static",
     "tip_pose",
+    "with_payload",
 ]

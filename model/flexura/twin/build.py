@@ -71,6 +71,7 @@ def build(
     guided: np.ndarray | None = None,
     held: bool = False,
     loads: Loads = NO_LOADS,
+    since: float = 0.0,
 ) -> TwinModel:
     """Build a robot, straight at its start.
 
@@ -83,6 +84,7 @@ def build(
         guided: which joints follow a prescribed motion (n,); None: none does.
         held: all joints stay at their start.
         loads: forces and moments on links.
+        since: the loads' time at Exudyn's time 0 [s].
     """
 
     container = exu.SystemContainer()
@@ -116,7 +118,7 @@ def build(
         parts.append(part)
         nodes.append(node)
         previous, length = part, link.length_m
-    on_links = LinkLoads(mbs, parts, loads)
+    on_links = LinkLoads(mbs, parts, loads, since)
     mbs.Assemble()
     index = [
         np.concatenate([_coordinate_rows(mbs, node, part.width) for node in part.nodes])

@@ -146,7 +146,7 @@ class Loads:
         self.applied = np.zeros((len(model.coordinates), 3))
         end = (steps + 0.5) * step_s
         self.edges = _edges([] if act.breaks is None else act.breaks, step_s, end)
-        self.link_edges = _edges(model.loads.loads.breaks, step_s, end)
+        self.link_edges = _edges(model.loads.breaks, step_s, end)
         if act.plan is not None:
             self._apply(act.plan(0.0))
         else:
@@ -157,7 +157,7 @@ class Loads:
         on_links = self.model.loads
         if on_links.loads:
             jumps = self.link_edges.get(round(t / self.step_s), [])
-            on_links.apply(self._mean(on_links.loads.values, t, jumps))
+            on_links.apply(self._mean(on_links.values, t, jumps))
         if self.act.plan is None:
             return
         inside = [t] if self.act.breaks is None else self.edges.get(round(t / self.step_s))

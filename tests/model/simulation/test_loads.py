@@ -105,7 +105,7 @@ def test_the_drives_of_a_motion_bear_the_loads(stiffening):
     again = fx.simulate(bot, t, drives, rtol=1e-8, loads=LOADS[:2])
     for i in (1, 2):
         name = f"joint/{i}/position"
-        assert np.abs(again[name] - asked[name]).max() < 1e-5
+        assert np.abs(again[name] - asked[name]).max() < 1e-4  # of the drives between rows
 
 
 def test_a_load_on_a_link_that_slides():
