@@ -6,8 +6,7 @@ core where that is faster.
 
 from .assembly import Assembly
 from .frequency_response import FrequencyResponse, frequency_response
-from .loads import acting_loads, load_forces
-from .payload_change import Impact, impact, with_payload
+from .loads import Impact, acting_loads, impact, load_forces, with_payload
 from .spectrum import Modes, frequencies, modes
 from .statespace import StateSpace, linearize
 from .statics import NoEquilibrium, equilibrium, holding, static, tip_pose

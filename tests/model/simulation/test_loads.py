@@ -92,7 +92,7 @@ def test_a_static_start_takes_the_load_of_the_first_instant_in():
     assert moved[0] == pytest.approx(moved[1], abs=1e-9) and np.ptp(moved) > 0.01
 
 
-@pytest.mark.parametrize("stiffening", [True, False])
+@pytest.mark.parametrize("stiffening", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_the_drives_of_a_motion_bear_the_loads(stiffening):
     """The drives of inverse dynamics lead to the motion again, under the same loads."""
     bot, t = arm(stiffening=stiffening), np.linspace(0.0, 0.05, 51)

@@ -63,8 +63,8 @@ class Equations:
         return self.acted(t, z)[0]
 
     def acted(self, t: float, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """dz/dt, and the forces of the drives (N,), those that a motion needs included (25), (27),
-        (28), (132)."""
+        """dz/dt, and the forces of the drives (N,), those that a motion needs included (25), (28),
+        (132)."""
         q, v, a = self.state(t, z)
         self.evaluations += 1
         if self.held is not None:
