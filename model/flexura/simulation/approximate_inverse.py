@@ -19,7 +19,7 @@ from .. import core
 from ..errors import FlexuraError, InputError
 from ..io import Run
 from ..robot import Robot
-from ..signals import COLUMNS, Drive, Loads, Signal
+from ..signals import COLUMNS, Drive, Signal
 from ..system import System, assemble
 from .dynamics import simulate
 from .problem import Solution, check_times
@@ -201,7 +201,6 @@ def shoot_by_bisection(
     return record(
         system,
         Solution(t[:rows_done], z[:, : 2 * n], z[:, 2 * n :], np.array(forces[:rows_done]), meta),
-        Loads(),
     )
 
 

@@ -58,9 +58,10 @@ LIMITS = ("limit", "end_of_link", "sleeve")  # names of events that stop a joint
 STILL = 1e-9  # m or rad: a robot whose unknowns change by less does not move
 
 
-def record(system: System, solution: Solution, loads: Loads) -> Run:
+def record(system: System, solution: Solution, loads: Loads | None = None) -> Run:
     """The Run of a solution under loads on links: its channels, the balance of its energies, and
     the solver's metadata."""
+    loads = loads or Loads()
     n, t, states, accounts = system.n, solution.t, solution.states, solution.accounts
     q, v = np.ascontiguousarray(states[:, :n]), np.ascontiguousarray(states[:, n:])
     seen = system.observe(q, v) if solution.seen is None else solution.seen
