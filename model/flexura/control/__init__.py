@@ -1,4 +1,5 @@
-"""Sampled controllers, their gains files and step metrics, LQR designs, functions as drives."""
+"""Sampled controllers, their gains files and step metrics, LQR and LQG with the figures of their
+loops, functions as drives."""
 
 from .board_replay import board_pulses
 from .controller import (
@@ -13,7 +14,10 @@ from .controller import (
 )
 from .gains import BOARD, NAMES, Gains
 from .gains import load as load_gains
-from .lqr_design import Design, lqr
+from .gaussian_design import Design
+from .loop_figures import LoopFigures, LoopMargins, loop_figures
+from .lqg_design import lqg
+from .lqr_design import lqr
 from .pid import GAINS, PID, Force, Motor, Output, Stepper
 from .sampled import DriveFunction, Sampled
 from .step_metrics import (
@@ -59,6 +63,8 @@ __all__ = [
     "Force",
     "Gains",
     "Linear",
+    "LoopFigures",
+    "LoopMargins",
     "Motor",
     "Output",
     "Sampled",
@@ -67,6 +73,8 @@ __all__ = [
     "board_pulses",
     "filter_coefficient",
     "load_gains",
+    "loop_figures",
+    "lqg",
     "lqr",
     "step_figures",
     "step_response",

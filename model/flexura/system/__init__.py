@@ -6,6 +6,7 @@ core where that is faster.
 
 from .assembly import Assembly
 from .frequency_response import FrequencyResponse, frequency_response
+from .sensors import sensor_channels
 from .spectrum import Modes, frequencies, modes
 from .statespace import StateSpace, linearize
 from .statics import NoEquilibrium, equilibrium, holding, static, tip_pose
@@ -26,6 +27,7 @@ __all__ = [
     "holding",
     "linearize",
     "modes",
+    "sensor_channels",
     "static",
     "tip_pose",
 ]

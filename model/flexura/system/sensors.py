@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..robot import Sensor
-from ..system import System
+from .system import System
 
 
 def sensor_channels(
