@@ -19,6 +19,7 @@ from .loop_figures import LoopFigures, LoopMargins, loop_figures
 from .lqg_design import lqg
 from .lqr_design import lqr
 from .pid import GAINS, PID, Force, Motor, Output, Stepper
+from .predictive import nmpc
 from .sampled import DriveFunction, Sampled
 from .step_metrics import (
     EFFORT,
@@ -76,6 +77,7 @@ __all__ = [
     "loop_figures",
     "lqg",
     "lqr",
+    "nmpc",
     "step_figures",
     "step_response",
     "strip_metrics",

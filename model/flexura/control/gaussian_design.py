@@ -56,6 +56,33 @@ class Weights:
     noise: Any = 1e-4
 
 
+def driven_joints(linear: StateSpace) -> tuple[int, ...]:
+    """The joints that have a drive, from 0."""
+    return tuple(int(name.split("/")[1]) - 1 for name in linear.inputs)
+
+
+def deviation_rows(linear: StateSpace, given: Weights) -> np.ndarray:
+    """W (p, 2m): |W x|^2 is what deviations of joints and tips cost by Bryson's rule.
+
+    Args:
+        linear: the robot linearised.
+        given: the weights.
+
+    Raises:
+        InputError: a weight is not above 0.
+    """
+    m = len(linear.inputs)
+    bent = [k for k, name in enumerate(linear.outputs) if name.endswith("tip_deflection")]
+    hubs = [linear.outputs.index(f"joint/{i + 1}/position") for i in driven_joints(linear)]
+    W = linear.C[hubs + bent]
+    deflection = deviations(given.deflection, 1, "deflection")[0]
+    weights = np.concatenate(
+        [1 / deviations(given.position, m, "position"), np.full(len(bent), 1 / deflection)]
+    )
+    rates = np.roll(W[m:], len(linear.M), axis=1) * number(given.damping, "damping") / deflection
+    return np.concatenate([weights[:, None] * W, rates])
+
+
 def gaussian_design(
     linear: StateSpace,
     matrices: tuple[np.ndarray, np.ndarray, np.ndarray],
@@ -79,17 +106,10 @@ def gaussian_design(
         InputError: a weight is not above 0, or no stabilising solution exists.
     """
     F, G, C = matrices
-    n, m = G.shape
-    joints = tuple(int(name.split("/")[1]) - 1 for name in linear.inputs)
-    bent = [k for k, name in enumerate(linear.outputs) if name.endswith("tip_deflection")]
-    W = linear.C[[linear.outputs.index(f"joint/{i + 1}/position") for i in joints] + bent]
-    deflection = deviations(given.deflection, 1, "deflection")[0]
-    weights = np.concatenate(
-        [1 / deviations(given.position, m, "position"), np.full(len(bent), 1 / deflection)]
-    )
-    Q = (weights[:, None] * W).T @ (weights[:, None] * W)
-    rates = np.roll(W[m:], n // 2, axis=1) * number(given.damping, "damping") / deflection
-    Q += rates.T @ rates
+    m = G.shape[1]
+    joints = driven_joints(linear)
+    W = deviation_rows(linear, given)
+    Q = W.T @ W
     R = np.diag(1 / deviations(given.effort, m, "effort") ** 2)
     process = G @ np.diag(deviations(given.disturbance, m, "disturbance") ** 2) @ G.T
     V = np.diag(deviations(given.noise, len(C), "noise") ** 2)

@@ -76,7 +76,9 @@ def lqg(
         (F, G, measured.derivatives(linear)),
         rate,
         measured.names,
-        Weights(effort, position, deflection, damping, disturbance, _noise(noise, measured.names)),
+        Weights(
+            effort, position, deflection, damping, disturbance, noise_of(noise, measured.names)
+        ),
     )
     law = LinearQuadraticGaussian(
         system,
@@ -162,7 +164,7 @@ def limits(limit: Any, system: System) -> np.ndarray:
     return np.full(count, np.inf) if limit is None else deviations(limit, count, "limit")
 
 
-def _noise(noise: Any, names: Sequence[str]) -> Any:
+def noise_of(noise: Any, names: Sequence[str]) -> Any:
     """One number, or one of each measurement by its name."""
     if not isinstance(noise, Mapping):
         return array(noise, "noise", f"expected a number above 0, or {len(names)} of them")

@@ -1,0 +1,75 @@
+"""The quadratic program of a tick: condensed to the forces, solved by a dual active set."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...optional import Optional
+
+daqp = Optional("daqp")
+SOFT, FREE = 8, 1e30  # a constraint that may be broken at a price; no bound
+
+
+def condensed(
+    R: np.ndarray, G: np.ndarray, c: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The states of all intervals by the forces and the first state (152).
+
+    Args:
+        R: (N, n, n), of dx_k+1 = R_k dx_k + G_k du_k + c_k.
+        G: (N, n, inputs).
+        c: (N, n).
+
+    Returns:
+        by_force (N, n, N inputs), by_start (N, n, n), rest (N, n): dx_1 to dx_N.
+    """
+    N, n, inputs = G.shape
+    wide = N * inputs
+    out = np.zeros((N, n, wide + n + 1))
+    now = np.zeros((n, wide + n + 1))
+    now[:, wide : wide + n] = np.eye(n)
+    for k in range(N):
+        now = R[k] @ now
+        now[:, k * inputs : (k + 1) * inputs] = G[k]
+        now[:, -1] += c[k]
+        out[k] = now
+    return out[:, :, :wide], out[:, :, wide : wide + n], out[:, :, -1]
+
+
+class QuadraticProgram:
+    """min 1/2 U^T H U + g^T U with bounds on U and on rows of A U, by daqp (Arnström et al. 2022).
+
+    Rows of A may be broken at a quadratic price, so that there always is a solution.
+
+    Args:
+        variables: how many U has.
+        rows: how many rows A has.
+        price: of the square of what breaks a row.
+    """
+
+    def __init__(self, variables: int, rows: int, price: float) -> None:
+        self.variables, self.rows = variables, rows
+        self.soft = np.zeros(variables + rows, dtype=np.int32)
+        self.soft[variables:] = SOFT
+        self.settings = {"rho_soft": 1 / price, "iter_limit": 10 * (variables + rows)}
+        daqp.solve  # noqa: B018  the package is missed now, not at the first tick
+
+    def solve(
+        self,
+        H: np.ndarray,
+        g: np.ndarray,
+        A: np.ndarray,
+        low: np.ndarray,
+        high: np.ndarray,
+    ) -> tuple[np.ndarray, bool, int]:
+        """The solution U (variables,), whether it is one, and how many iterations it took.
+
+        Args:
+            H: (variables, variables), positive definite.
+            g: (variables,).
+            A: (rows, variables).
+            low: of U and of A U (variables + rows,).
+            high: as `low`.
+        """
+        U, _, flag, info = daqp.solve(H, g, A, high, low, self.soft.copy(), **self.settings)
+        return np.asarray(U), flag > 0, int(info["iterations"])
