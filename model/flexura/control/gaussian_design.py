@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..io import number
-from ..system import StateSpace
+from ..io import choice, number
+from ..system import StateSpace, System
 from .riccati import deviations, riccati
 
 
@@ -54,6 +54,7 @@ class Weights:
     damping: Any = 0.0
     disturbance: Any = 1.0
     noise: Any = 1e-4
+    follow: str = "joints"
 
 
 def driven_joints(linear: StateSpace) -> tuple[int, ...]:
@@ -61,12 +62,14 @@ def driven_joints(linear: StateSpace) -> tuple[int, ...]:
     return tuple(int(name.split("/")[1]) - 1 for name in linear.inputs)
 
 
-def deviation_rows(linear: StateSpace, given: Weights) -> np.ndarray:
+def deviation_rows(linear: StateSpace, given: Weights, system: System) -> np.ndarray:
     """W (p, 2m): |W x|^2 is what deviations of joints and tips cost by Bryson's rule.
 
     Args:
         linear: the robot linearised.
-        given: the weights.
+        given: the weights; if tips follow, a turning flexible link counts by the angle of the line
+            from its hub to its tip.
+        system: the robot.
 
     Raises:
         InputError: a weight is not above 0.
@@ -75,6 +78,11 @@ def deviation_rows(linear: StateSpace, given: Weights) -> np.ndarray:
     bent = [k for k, name in enumerate(linear.outputs) if name.endswith("tip_deflection")]
     hubs = [linear.outputs.index(f"joint/{i + 1}/position") for i in driven_joints(linear)]
     W = linear.C[hubs + bent]
+    choice(given.follow, "follow", ("joints", "tips"))
+    for row, i in enumerate(driven_joints(linear) if given.follow == "tips" else ()):
+        link, name = system.robot.links[i], f"link/{i + 1}/tip_deflection"
+        if link.joint.type == "R" and name in linear.outputs:
+            W[row] += linear.C[linear.outputs.index(name)] / link.length_m
     deflection = deviations(given.deflection, 1, "deflection")[0]
     weights = np.concatenate(
         [1 / deviations(given.position, m, "position"), np.full(len(bent), 1 / deflection)]
@@ -88,6 +96,7 @@ def gaussian_design(
     matrices: tuple[np.ndarray, np.ndarray, np.ndarray],
     rate_Hz: float,
     measured: tuple[str, ...],
+    system: System,
     given: Weights,
 ) -> Design:
     """The gains of feedback (75) and estimator (76).
@@ -97,6 +106,7 @@ def gaussian_design(
         matrices: F (n, n), G (n, m) of a tick (74), C (p, n) of the measurements.
         rate_Hz: ticks a second.
         measured: names of the measurements (p,).
+        system: the robot.
         given: weights and covariances.
 
     Returns:
@@ -108,7 +118,7 @@ def gaussian_design(
     F, G, C = matrices
     m = G.shape[1]
     joints = driven_joints(linear)
-    W = deviation_rows(linear, given)
+    W = deviation_rows(linear, given, system)
     Q = W.T @ W
     R = np.diag(1 / deviations(given.effort, m, "effort") ** 2)
     process = G @ np.diag(deviations(given.disturbance, m, "disturbance") ** 2) @ G.T

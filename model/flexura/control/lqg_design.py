@@ -25,6 +25,7 @@ def lqg(
     *,
     measure: Sequence[str] | None = None,
     limit: Any = None,
+    follow: str = "joints",
     position: Any = 1.0,
     deflection: float = 1.0,
     damping: float = 0.0,
@@ -48,6 +49,8 @@ def lqg(
         measure: names of the measurements; None: the joints and all sensors of deflection, slope
             and strain, or without such sensors the tip deflections.
         limit: of the forces, a number or one a joint [N or N m]; None: there is none.
+        follow: what `position` weights: "joints", or "tips", where a flexible link that turns
+            counts by the angle of the line from its hub to its tip.
         position: deviation of each free joint (m,) or of all [m or rad].
         deflection: of the tips [m].
         damping: time by which the rate of a deflection is weighted [s].
@@ -76,8 +79,15 @@ def lqg(
         (F, G, measured.derivatives(linear)),
         rate,
         measured.names,
+        system,
         Weights(
-            effort, position, deflection, damping, disturbance, noise_of(noise, measured.names)
+            effort,
+            position,
+            deflection,
+            damping,
+            disturbance,
+            noise_of(noise, measured.names),
+            follow,
         ),
     )
     law = LinearQuadraticGaussian(

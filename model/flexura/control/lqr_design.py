@@ -103,6 +103,7 @@ def lqr(
         (F, G, C),
         controller.rate_Hz,
         tuple(measured),
+        system,
         Weights(effort, position, deflection, damping, disturbance, noise),
     )
     return replace(

@@ -36,6 +36,7 @@ def nmpc(
     limit: Any = None,
     speed_limit: Any = None,
     deflection_limit: float | None = None,
+    follow: str = "tips",
     position: Any = 1.0,
     deflection: float = 1.0,
     damping: float = 0.0,
@@ -63,6 +64,7 @@ def nmpc(
         limit: of the forces, a number or one a joint [N or N m]; None: there is none.
         speed_limit: of the joints, a number or one a joint [m/s or rad/s]; None: there is none.
         deflection_limit: of every tip [m]; None: there is none.
+        follow: what follows the references, "tips" or "joints", as in `flexura.lqg`.
         position: deviation of each free joint (m,) or of all [m or rad].
         deflection: of the tips [m].
         damping: time by which the rate of a deflection is weighted [s].
@@ -98,11 +100,12 @@ def nmpc(
         raise InputError(expected, key="horizon_s", value=h * N)
     measured = Measurements(system, measure)
     given = Weights(
-        effort, position, deflection, damping, disturbance, noise_of(noise, measured.names)
+        effort, position, deflection, damping, disturbance, noise_of(noise, measured.names), follow
     )
     driven = list(driven_joints(linear))
     rows, bound = _bounds(system, linear, speed_limit, deflection_limit)
     problem = _problem(
+        system,
         linear,
         measured,
         given,
@@ -154,6 +157,7 @@ def _bounds(
 
 
 def _problem(
+    system: System,
     linear: StateSpace,
     measured: Measurements,
     given: Weights,
@@ -164,7 +168,7 @@ def _problem(
     """The fields of `Problem` but the limit of the forces."""
     T, h = times
     m = len(linear.inputs)
-    W = deviation_rows(linear, given)
+    W = deviation_rows(linear, given, system)
     effort = deviations(given.effort, m, "effort")
     F, G = discretised(linear.A, linear.B, float(h[-1]))
     end = riccati(F, G, h[-1] * W.T @ W, h[-1] * np.diag(1 / effort**2), "effort")

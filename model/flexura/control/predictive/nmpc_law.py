@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...signals import Signal
+from ...signals import Signal, evaluate_many
 from ...system import static
 from ..measurements import Measurements
 from .prediction import Prediction
@@ -70,16 +70,17 @@ class NonlinearPredictive:
     ) -> None:
         self.prediction, self.problem, self.measured, self.C = prediction, problem, measured, C
         self.references, self.driven, self.links = references, driven, len(references)
-        self.offset, self.q = measured.at(q), q
+        self.q = q
         N, m = len(problem.h), len(driven)
         self.before, self.failures, self.iterations = np.inf, 0, 0
         self.program = QuadraticProgram(N * m, N * len(problem.rows), problem.price)
         root = np.sqrt(problem.h)
-        self.ahead = np.concatenate([[0.0], np.cumsum(problem.h)])
+        self.ahead = np.cumsum(problem.h)
         self.W = root[:, None, None] * problem.weights
-        self.end = np.linalg.cholesky(problem.end + 1e-12 * np.eye(len(problem.end))).T
+        values, vectors = np.linalg.eigh((problem.end + problem.end.T) / 2)
+        self.end = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
         self.R = np.repeat(problem.h, m) * np.tile(1 / problem.effort**2, N)
-        self.turn = 0
+        self.turn, self.one = 0, np.eye(C.shape[1])
 
     def __call__(
         self,
@@ -92,7 +93,7 @@ class NonlinearPredictive:
         sensors: Mapping[str, float],
     ) -> np.ndarray:
         """The forces (links,) at a tick [N or N m]."""
-        y = self.measured.read(position, tip_deflections, sensors) - self.offset
+        y = self.measured.read(position, tip_deflections, sensors)
         if t <= self.before:
             self._begin(t, position)
         self.before = t
@@ -121,7 +122,8 @@ class NonlinearPredictive:
         q[system.joint_rows] = joints
         if any(system.robot.gravity_m_s2):
             q = static(system, joints=list(joints))
-        forces = system.forces(q, np.zeros(system.n), np.zeros(system.n))
+        still = np.zeros(system.n)
+        forces = np.asarray(system.equations.forces(q, still, still, True, True, True))
         x = np.concatenate([q[p.free], np.zeros(p.count)])
         return x, forces[system.joint_rows][self.driven]
 
@@ -129,10 +131,11 @@ class NonlinearPredictive:
         """Kalman's estimate from the measurements of a tick, its covariance with it (76)."""
         C, S = self.C, self.S
         gain = np.linalg.solve(C @ S @ C.T + self.problem.noise, C @ S).T
-        about = self.guess.copy()
-        about[: self.prediction.count] -= self.q[self.prediction.free]
-        self.S = S - gain @ (C @ S)
-        return self.guess + gain @ (y - C @ about)
+        left = self.one - gain @ C
+        self.S = left @ S @ left.T + gain @ self.problem.noise @ gain.T
+        return self.guess + gain @ (
+            y - self.measured.at(self.prediction.full(self.guess[None])[0][0])
+        )
 
     def _linearised(self) -> None:
         """Intervals along the predicted motion, all or every `spread`-th a tick; and the tick."""
@@ -192,11 +195,12 @@ class NonlinearPredictive:
     def _wanted(self, t: float) -> tuple[np.ndarray, np.ndarray]:
         """The states at the intervals' ends (N, 2m) and forces (N, inputs) to be near."""
         p = self.prediction
-        r = np.array([[s(t + d)[:2] for s in self.references] for d in self.ahead[1:]])
-        rest, hold = self._equilibrium_at(tuple(r[-1, :, 0]))
-        wanted = np.tile(rest, (len(r), 1))
-        wanted[:, p.joint_columns] = r[:, self.driven, 0]
-        wanted[:, p.count + p.joint_columns] = r[:, self.driven, 1]
+        times = t + self.ahead
+        r = [evaluate_many(self.references[i].segments, times) for i in range(self.links)]
+        rest, hold = self._equilibrium_at(tuple(float(place[-1]) for place, _ in r))
+        wanted = np.tile(rest, (len(times), 1))
+        for column, i in zip(p.joint_columns, self.driven, strict=True):
+            wanted[:, column], wanted[:, p.count + column] = r[i]
         return wanted, hold
 
     def _equilibrium_at(self, joints: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:

@@ -24,10 +24,13 @@ class Prediction:
         self.joint_columns = np.array(columns)
         self.push = np.zeros((self.count, self.inputs))
         self.push[columns, range(self.inputs)] = 1.0
+        self.whole = self.count == system.n
         self.pick = np.ix_(self.free, self.free)
 
     def full(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Unknowns and rates (T, n) of states (T, 2m) of what moves."""
+        if self.whole:
+            return x[:, : self.count].copy(), x[:, self.count :].copy()
         q = np.tile(self.system.start(), (len(x), 1))
         v = np.zeros_like(q)
         q[:, self.free], v[:, self.free] = x[:, : self.count], x[:, self.count :]
@@ -51,10 +54,12 @@ class Prediction:
         """
         m = self.count
         q, v = self.full(x)
-        a = np.zeros_like(q)
-        a[:, self.free] = guess
+        a = np.ascontiguousarray(guess)
+        if not self.whole:
+            a = np.zeros_like(q)
+            a[:, self.free] = guess
         force, K, G, M, _, _ = self.system.equations.force_derivatives(q, v, a)
-        if m < self.system.n:
+        if not self.whole:
             rows, columns = self.pick
             force = force[:, self.free]
             K, G, M = (X[:, rows, columns] for X in (K, G, M))
