@@ -12,7 +12,8 @@ from .controller import (
     Linear,
     filter_coefficient,
 )
-from .gains import BOARD, NAMES, Gains
+from .designed import Designed, design_setting
+from .gains import BOARD, NAMES, Gains, load_controller
 from .gains import load as load_gains
 from .gaussian_design import Design
 from .loop_figures import LoopFigures, LoopMargins, loop_figures
@@ -60,6 +61,7 @@ __all__ = [
     "VIBRATION",
     "Controller",
     "Design",
+    "Designed",
     "DriveFunction",
     "Force",
     "Gains",
@@ -72,7 +74,9 @@ __all__ = [
     "StepResponse",
     "Stepper",
     "board_pulses",
+    "design_setting",
     "filter_coefficient",
+    "load_controller",
     "load_gains",
     "loop_figures",
     "lqg",
