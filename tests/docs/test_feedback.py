@@ -8,6 +8,7 @@ import flexura as fx
 import robots
 from flexura.control import loop_figures
 from flexura.control.measurements import Measurements
+from flexura.control.predictive.prediction import Prediction
 from flexura.signals import step
 
 
@@ -140,3 +141,108 @@ def test_the_disc_margin_is_the_nearest_factor_that_ends_stability():
     for _ in range(60):
         delta = 0.99 * found.disc * np.exp(2j * np.pi * rng.uniform(size=2))
         assert closed(d, (1 + delta / 2) / (1 - delta / 2)) < 1
+
+
+def prediction():
+    system = two_links()
+    return system, Prediction(system, [0, 1]), np.random.default_rng(5)
+
+
+def test_the_prediction_is_linearised_exactly_and_damps_what_is_fast():
+    """Accelerations, their derivatives by differences, and the order of the step.
+
+    Equations: 151
+    """
+    system, p, rng = prediction()
+    n = system.n
+    x = 0.05 * rng.normal(size=(1, 2 * n)) * np.append(np.ones(n), 3 * np.ones(n))
+    u = rng.normal(size=(1, 2))
+
+    def rates(z, w):
+        force = np.zeros(n)
+        force[system.joint_rows] = w
+        return np.append(z[n:], system.accelerations(z[:n], z[n:], force))
+
+    guess = rates(x[0], u[0])[None, n:]
+    f, A, B = (found[0] for found in p.rates(x, u, guess))
+    assert f == pytest.approx(rates(x[0], u[0]), rel=1e-8, abs=1e-8 * np.abs(f).max())
+    assert p.rates(x, u, 0 * guess)[0][0] == pytest.approx(f, abs=1e-8 * np.abs(f).max())
+    step_ = 1e-6
+    for k in range(2 * n):
+        e = step_ * np.eye(2 * n)[k]
+        slope = (rates(x[0] + e, u[0]) - rates(x[0] - e, u[0])) / (2 * step_)
+        assert A[:, k] == pytest.approx(slope, abs=1e-5 * np.abs(A).max())
+    force = (rates(x[0], u[0] + [0, 1]) - rates(x[0], u[0])) / 1.0
+    assert B[:, 1] == pytest.approx(force, abs=1e-7 * np.abs(B).max())
+    one, errors = np.eye(2 * n), []
+    fastest = np.abs(np.linalg.eigvals(A)).max()
+    for h in (0.2 / fastest, 0.1 / fastest):
+        R, G, c = (found[0] for found in p.steps(f[None], A[None], B[None], np.array([h])))
+        Z = h * A
+        D = one - 2 / 3 * Z + Z @ Z / 6
+        assert D @ R == pytest.approx(one + Z / 3, abs=1e-9)
+        held = (one - Z / 6) @ (h * np.column_stack([B, f]))
+        assert D @ np.column_stack([G, c]) == pytest.approx(held, abs=1e-9 * np.abs(held).max())
+        exact, term = one.copy(), one.copy()
+        for k in range(1, 20):
+            term = term @ Z / k
+            exact = exact + term
+        values, vectors = np.linalg.eig(A)  # in coordinates without units
+        errors.append(np.abs(np.linalg.solve(vectors, (R - exact) @ vectors)).max())
+    assert errors[0] / errors[1] == pytest.approx(2**4, rel=0.2)
+    R = p.steps(f[None], A[None], B[None], np.array([1e3 / fastest]))[0][0]
+    values = np.linalg.eigvals(R)
+    assert np.abs(values).min() < 0.01
+
+
+def test_a_tick_is_one_step_of_newtons_method_with_limits():
+    """The program of a tick as bounded least squares, and its condensed matrices.
+
+    Equations: 152
+    """
+    from scipy.optimize import lsq_linear
+
+    system, p, _ = prediction()
+    n, N, T = system.n, 8, 0.005
+    weights = {"position": 0.02, "deflection": 0.05, "damping": 0.02, "noise": 1e-4}
+    effort, limit = np.array([1.0, 0.3]), np.array([0.9, 0.15])
+    law = fx.nmpc(
+        system,
+        [step(0.3), step(-0.2)],
+        effort,
+        1 / T,
+        intervals=N,
+        horizon_s=N * 0.02,
+        limit=limit,
+        disturbance=0.05,
+        **weights,
+    ).function
+    found = law(0.0, np.zeros(2), np.zeros(2), 0.0, tip_deflections=np.zeros(2), sensors={})
+    f, A, B = p.rates(np.zeros((1, 2 * n)), np.zeros((1, 2)), np.zeros((1, n)))
+    h = law.problem.h
+    assert h[0] == pytest.approx(T) and h.sum() == pytest.approx(N * 0.02)
+    assert h[1:] / h[:-1] == pytest.approx(h[1] / h[0]) and h[1] > h[0]
+    R, G, c = p.steps(*(np.repeat(z, N, axis=0) for z in (f, A, B)), h)
+    linear = fx.linearize(system)
+    names = [f"joint/{i}/position" for i in (1, 2)] + [f"link/{i}/tip_deflection" for i in (1, 2)]
+    C = linear.C[[linear.outputs.index(name) for name in names]]
+    W = np.vstack([(C[:2] + C[2:] / 0.3) / 0.02, C[2:] / 0.05])
+    W = np.vstack([W, np.roll(C[2:], n, axis=1) * 0.02 / 0.05])
+    wanted = np.zeros(2 * n)
+    wanted[system.joint_rows] = 0.3, -0.2
+    values, vectors = np.linalg.eigh(law.problem.end)
+    root = np.sqrt(np.maximum(values, 0))[:, None] * vectors.T
+    rows, right, state, rest = [], [], np.zeros((2 * n, 2 * N)), np.zeros(2 * n)
+    for k in range(N):
+        state, rest = R[k] @ state, R[k] @ rest + c[k]
+        state[:, 2 * k : 2 * k + 2] = G[k]
+        for X, scale in ((W, np.sqrt(h[k])), *(((root, 1.0),) if k == N - 1 else ())):
+            rows.append(scale * X @ state)
+            right.append(scale * X @ (wanted - rest))
+    rows.append(np.kron(np.diag(np.sqrt(h)), np.diag(1 / effort)))
+    right.append(np.zeros(2 * N))
+    best = lsq_linear(
+        np.vstack(rows), np.concatenate(right), (-np.tile(limit, N), np.tile(limit, N)), tol=1e-14
+    )
+    assert np.any(np.abs(best.x) > 0.999 * np.tile(limit, N))
+    assert found == pytest.approx(best.x[:2], rel=1e-4, abs=1e-5) and law.failures == 0

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 import flexura as fx
 from flexura.control import Designed, Gains, load_controller
 from flexura.signals import constant
@@ -37,6 +39,15 @@ def references(system: fx.System, asked: fx.Manoeuvre) -> list[fx.Signal]:
             raise fx.InputError(expected, key=f"joint[{i}].prescribed", value=True)
         motions.append(joint.motion or constant(float(start)))
     return motions
+
+
+def with_references(run: fx.Run, motions: list[fx.Signal]) -> fx.Run:
+    """The Run with joint/i/reference besides, as one under a PID has it."""
+    channels, units = dict(run.channels), dict(run.units)
+    for i, signal in enumerate(motions, 1):
+        channels[f"joint/{i}/reference"] = np.array([signal(float(t))[0] for t in run.t])
+        units[f"joint/{i}/reference"] = run.units[f"joint/{i}/position"]
+    return replace(run, channels=channels, units=units)
 
 
 def closed_loop_controller(

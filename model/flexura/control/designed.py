@@ -114,7 +114,7 @@ class Designed:
             every = argument in ("limit", "speed_limit")
             default = UNLIMITED if every else 1.0
             had = given.get(argument, [default] * len(links if every else free))
-            places = free if every else range(len(free))
+            places = free if every else list(range(len(free)))
             for place, i in zip(places, free, strict=True):
                 had[place] = found[i] if found[i] is not None else had[place]
             given[argument] = had
@@ -170,13 +170,17 @@ class Designed:
         Args:
             path: where to; a file there is replaced as a whole.
         """
+        write_toml(path, {"controller": self.table()})
+
+    def table(self) -> dict[str, Any]:
+        """The file's table [controller]."""
         table: dict[str, Any] = {"type": self.kind}
         for name, value in self.settings.items():
             table[name] = int(value) if name in COUNTS else value
         table |= {"follow": self.follow} if self.follow is not None else {}
         table |= {"measure": list(self.measure)} if self.measure is not None else {}
         table |= {"noise": self.noise} if self.noise is not None else {}
-        write_toml(path, {"controller": table})
+        return table
 
 
 def design_setting(name: str, kind: str = "mpc") -> bool:

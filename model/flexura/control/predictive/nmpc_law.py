@@ -21,14 +21,13 @@ class Problem:
 
     Attributes:
         T: length of a tick [s].
-        h: lengths of the intervals ahead (N,) [s].
+        h: lengths of the intervals ahead (N,) [s], the first a tick.
         weights: W (p, 2m): the cost is |W (x - x_r)|^2 h, and
         effort: |(u - u_r) / effort|^2 h for the forces (inputs,),
         end: (2m, 2m) with the last state's deviation as a quadratic form.
         limit: of the forces (inputs,) [N or N m].
         rows: (r, 2m), of the states of every interval, and
         bound: their limits (r,).
-        tips: rows for tip deflections (flexible, 2m).
         process: covariance of what acts at the drives in a tick (inputs, inputs).
         noise: covariance of the measurements (p, p).
         covariance: of the first estimate (2m, 2m).
@@ -138,7 +137,7 @@ class NonlinearPredictive:
         )
 
     def _linearised(self) -> None:
-        """Intervals along the predicted motion, all or every `spread`-th a tick; and the tick."""
+        """Intervals along the predicted motion: the first, and all or every `spread`-th other."""
         p, problem, N = self.prediction, self.problem, len(self.problem.h)
         rows = np.arange(N) if self.known is None else np.arange(self.turn, N, problem.spread)
         self.turn = (self.turn + 1) % problem.spread
@@ -146,17 +145,14 @@ class NonlinearPredictive:
             rows = np.concatenate([[0], rows])
         f, A, B = p.rates(self.x[rows], self.u[rows], self.a[rows])
         self.a[rows] = f[:, p.count :]
-        first = np.concatenate([[0], np.arange(len(rows))])
-        h = np.concatenate([[problem.T], problem.h[rows]])
-        R, G, c = p.steps(f[first], A[first], B[first], h)
-        x, u = self.x[rows[first]], self.u[rows[first]]
+        R, G, c = p.steps(f, A, B, problem.h[rows])
+        x, u = self.x[rows], self.u[rows]
         c += x - (R @ x[..., None])[..., 0] - (G @ u[..., None])[..., 0]
-        self.tick = R[0], G[0], c[0]
         if self.known is None:
-            self.known = R[1:], G[1:], c[1:]
+            self.known = R, G, c
         else:
             for old, new in zip(self.known, (R, G, c), strict=True):
-                old[rows] = new[1:]
+                old[rows] = new
 
     def _solved(self, t: float, x: np.ndarray) -> None:
         """One step of Newton's method: the program about the predicted motion (152)."""
@@ -211,7 +207,8 @@ class NonlinearPredictive:
 
     def _predicted(self, x: np.ndarray) -> None:
         """The estimate of the next tick from this one and the forces, and its covariance (76)."""
-        R, G, c = self.tick
+        assert self.known is not None
+        R, G, c = (x[0] for x in self.known)
         self.guess = R @ x + G @ self.u[0] + c
         self.S = R @ self.S @ R.T + G @ self.problem.process @ G.T
 

@@ -11,7 +11,8 @@ from ...errors import InputError
 from ...io import number, whole
 from ...system import StateSpace, System, assemble, frequencies, linearize
 from ..gaussian_design import Weights, deviation_rows, driven_joints
-from ..lqg_design import limits, motions, noise_of
+from ..lqg_design import limits as limits_of
+from ..lqg_design import motions, noise_of
 from ..measurements import Measurements
 from ..riccati import deviations, discretised, riccati
 from ..sampled import Sampled
@@ -20,7 +21,7 @@ from .prediction import Prediction
 
 PERIODS = 1.1  # of the first mode, which are looked ahead
 FEWEST, MOST = 2, 200  # intervals
-PRICE = 1e4  # of a broken limit of speed or deflection, times that of a deviation
+PRICE = 1e7  # of the square of what breaks a limit of speed or deflection, as a share of it
 
 
 def nmpc(
@@ -57,7 +58,8 @@ def nmpc(
         references: a Signal or a number for each joint [m or rad]; None is good for a locked one.
         effort: of each free joint (m,), that counts as much as the deviations below [N or N m].
         rate_Hz: ticks a second.
-        intervals: ahead, in which the forces are held.
+        intervals: ahead, in which the forces are held; the first is a tick, the others are longer
+            and longer.
         horizon_s: what is looked ahead [s]; None: 1.1 periods of the first mode with locked joints.
         spread: ticks over which the linearisation of the intervals is spread.
         measure: as in `flexura.lqg`.
@@ -94,10 +96,11 @@ def nmpc(
     linear = linearize(system, q)
     if not linear.inputs:
         raise InputError("expected a joint that is free to move", key="link.joint.locked")
-    h = _horizon(system, horizon_s) / N
-    if h < 1 / rate:
+    horizon = _horizon(system, horizon_s)
+    if horizon < N / rate:
         expected = f"expected intervals of a tick or more: a horizon of {N / rate:g} s or more"
-        raise InputError(expected, key="horizon_s", value=h * N)
+        raise InputError(expected, key="horizon_s", value=horizon)
+    h = growing(1 / rate, horizon, N)
     measured = Measurements(system, measure)
     given = Weights(
         effort, position, deflection, damping, disturbance, noise_of(noise, measured.names), follow
@@ -109,11 +112,11 @@ def nmpc(
         linear,
         measured,
         given,
-        (1 / rate, np.full(N, h)),
+        (1 / rate, h),
         (rows, bound),
         whole(spread, "spread", 1),
     )
-    problem = problem | {"limit": limits(limit, system)[driven]}
+    problem = problem | {"limit": limits_of(limit, system)[driven]}
     law = NonlinearPredictive(
         Prediction(system, driven),
         Problem(**problem),
@@ -139,21 +142,37 @@ def _horizon(system: System, given: float | None) -> float:
     return float(given)
 
 
+def growing(first: float, whole: float, count: int) -> np.ndarray:
+    """Lengths (count,) that grow by one factor from `first` to a sum of `whole`, at least
+    first x count [s]."""
+    low, high = 1.0, 10.0
+    for _ in range(60):
+        factor = (low + high) / 2
+        if first * np.sum(factor ** np.arange(count)) < whole:
+            low = factor
+        else:
+            high = factor
+    return np.asarray(first * low ** np.arange(count))
+
+
 def _bounds(
     system: System, linear: StateSpace, speed: Any, deflection: Any
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Rows (r, 2m) of the limited speeds and deflections, and their limits (r,)."""
+    """Rows (r, 2m) of the limited speeds and deflections, and their limits (r,) in which the rows
+    are measured."""
     rows, bounds = [np.zeros((0, linear.A.shape[0]))], [np.zeros(0)]
     driven = list(driven_joints(linear))
     if speed is not None:
         found = deviations(speed, len(system.robot.links), "speed_limit")
         hubs = linear.C[[linear.outputs.index(f"joint/{i + 1}/position") for i in driven]]
-        rows.append(np.roll(hubs, len(linear.M), axis=1)), bounds.append(found[driven])
+        rows.append(np.roll(hubs, len(linear.M), axis=1))
+        bounds.append(found[driven])
     if deflection is not None:
         bent = [k for k, name in enumerate(linear.outputs) if name.endswith("tip_deflection")]
         rows.append(linear.C[bent])
         bounds.append(np.full(len(bent), deviations(deflection, 1, "deflection_limit")[0]))
-    return np.concatenate(rows), np.concatenate(bounds)
+    limits = np.concatenate(bounds)
+    return np.concatenate(rows) / limits[:, None], np.ones(len(limits))
 
 
 def _problem(
