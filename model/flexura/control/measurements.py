@@ -55,6 +55,9 @@ class Measurements:
         if not asked or len(set(asked)) != len(asked):
             raise InputError("expected each measurement once", key="measure", value=names)
         self.names, self.system = tuple(asked), system
+        self._sensed = any(name in self.sensors for name in asked)
+        self._tipped = any(name in self.tips for name in asked)
+        self._still = np.zeros((1, system.n))
 
     def read(
         self, position: np.ndarray, tip_deflections: np.ndarray, sensors: Mapping[str, float]
@@ -66,13 +69,17 @@ class Measurements:
 
     def at(self, q: np.ndarray) -> np.ndarray:
         """The values g(q) (p,) at a configuration (n,)."""
-        at, still = q[None], np.zeros((1, self.system.n))
+        at, still = q[None], self._still
         sensors: dict[str, Any] = {}
-        if any(name in self.sensors for name in self.names):
+        if self._sensed:
             force = np.zeros((1, len(self.system.robot.links)))
             channels = sensor_channels(self.system, at, still, force)
             sensors = {name.removeprefix("sensor/"): x[0] for name, x in channels.items()}
-        return self.read(q[self.system.joint_rows], self.system.places(q)[0], sensors)
+        return self.read(q[self.system.joint_rows], self._bent(q), sensors)
+
+    def _bent(self, q: np.ndarray) -> np.ndarray:
+        """Tip deflections (flexible,), if they are measured."""
+        return self.system.places(q)[0] if self._tipped else np.zeros(0)
 
     def derivatives(self, linear: StateSpace) -> np.ndarray:
         """C (p, 2m), the derivative of the values by the states of a linearised robot (147)."""

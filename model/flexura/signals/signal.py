@@ -82,8 +82,10 @@ def evaluate_many(segments: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.n
     for k in range(6, 0, -1):
         yd = yd * s + y
         y = y * s + rows[:, k]
-    A, w, angle = rows[:, 7], rows[:, 8], rows[:, 8] * s + rows[:, 9]
-    y, yd = y + A * np.sin(angle), yd + A * w * np.cos(angle)
+    A, w = rows[:, 7], rows[:, 8]
+    if A.any():
+        angle = w * s + rows[:, 9]
+        y, yd = y + A * np.sin(angle), yd + A * w * np.cos(angle)
     return y, np.where(late < 0, 0.0, yd)
 
 

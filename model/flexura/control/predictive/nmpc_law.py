@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from ... import core
 from ...signals import Signal, evaluate_many
 from ...system import static
 from ..measurements import Measurements
 from .prediction import Prediction
-from .quadratic_program import FREE, QuadraticProgram, condensed
+from .quadratic_program import FREE, QuadraticProgram
 
 
 @dataclass(frozen=True)
@@ -79,6 +80,8 @@ class NonlinearPredictive:
         values, vectors = np.linalg.eigh((problem.end + problem.end.T) / 2)
         self.end = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
         self.R = np.repeat(problem.h, m) * np.tile(1 / problem.effort**2, N)
+        bounds = np.concatenate([np.tile(problem.limit, N), np.tile(problem.bound, N)])
+        self.bounds = np.minimum(bounds, FREE)
         self.turn, self.one = 0, np.eye(C.shape[1])
 
     def __call__(
@@ -132,9 +135,7 @@ class NonlinearPredictive:
         gain = np.linalg.solve(C @ S @ C.T + self.problem.noise, C @ S).T
         left = self.one - gain @ C
         self.S = left @ S @ left.T + gain @ self.problem.noise @ gain.T
-        return self.guess + gain @ (
-            y - self.measured.at(self.prediction.full(self.guess[None])[0][0])
-        )
+        return self.guess + gain @ (y - self.measured.at(self.prediction.full(self.guess)))
 
     def _linearised(self) -> None:
         """Intervals along the predicted motion: the first, and all or every `spread`-th other."""
@@ -143,44 +144,27 @@ class NonlinearPredictive:
         self.turn = (self.turn + 1) % problem.spread
         if rows[0] != 0:
             rows = np.concatenate([[0], rows])
-        f, A, B = p.rates(self.x[rows], self.u[rows], self.a[rows])
-        self.a[rows] = f[:, p.count :]
-        R, G, c = p.steps(f, A, B, problem.h[rows])
-        x, u = self.x[rows], self.u[rows]
-        c += x - (R @ x[..., None])[..., 0] - (G @ u[..., None])[..., 0]
+        R, G, d, self.a[rows] = p.steps(self.x[rows], self.u[rows], self.a[rows], problem.h[rows])
         if self.known is None:
-            self.known = R, G, c
+            self.known = R, G, d
         else:
-            for old, new in zip(self.known, (R, G, c), strict=True):
+            for old, new in zip(self.known, (R, G, d), strict=True):
                 old[rows] = new
 
     def _solved(self, t: float, x: np.ndarray) -> None:
         """One step of Newton's method: the program about the predicted motion (152)."""
         problem, N, m = self.problem, len(self.problem.h), len(self.driven)
         assert self.known is not None
-        R, G, c = self.known
-        x0, u0 = self.x[:-1, :, None], self.u[..., None]
-        by_force, by_start, rest = condensed(R, G, (R @ x0 + G @ u0)[..., 0] + c - self.x[1:])
-        moved = by_start @ (x - self.x[0]) + rest
+        R, G, d = self.known
         wanted, hold = self._wanted(t)
-        off = self.x[1:] + moved - wanted
-        last = by_force[-1]
-        J = np.concatenate([(self.W @ by_force).reshape(-1, N * m), self.end @ last])
-        e = np.concatenate([(self.W @ off[..., None]).ravel(), self.end @ off[-1]])
-        H = J.T @ J
+        H, g, A, at, by_force, moved = core.condensed_program(
+            R, G, d, self.x, self.u, x - self.x[0], wanted, self.W, self.end, problem.rows
+        )
         H[np.diag_indices(N * m)] += self.R
-        g = J.T @ e + self.R * (self.u - hold).ravel()
-        A = (problem.rows @ by_force).reshape(-1, N * m)
-        at = ((self.x[1:] + moved) @ problem.rows.T).ravel()
-        bound = np.tile(problem.bound, N)
-        limit, u = np.tile(problem.limit, N), self.u.ravel()
-        low, high = (
-            np.concatenate([-limit - u, -bound - at]),
-            np.concatenate([limit - u, bound - at]),
-        )
-        U, solved, self.iterations = self.program.solve(
-            H, g, A, np.maximum(low, -FREE), np.minimum(high, FREE)
-        )
+        g += self.R * (self.u - hold).ravel()
+        about = np.concatenate([self.u.ravel(), at])
+        low, high = -self.bounds - about, self.bounds - about
+        U, solved, self.iterations = self.program.solve(H, g, A, low, high)
         if not solved:
             self.failures += 1
             return
@@ -208,8 +192,8 @@ class NonlinearPredictive:
     def _predicted(self, x: np.ndarray) -> None:
         """The estimate of the next tick from this one and the forces, and its covariance (76)."""
         assert self.known is not None
-        R, G, c = (x[0] for x in self.known)
-        self.guess = R @ x + G @ self.u[0] + c
+        R, G, d = (part[0] for part in self.known)
+        self.guess = R @ x + G @ self.u[0] + d
         self.S = R @ self.S @ R.T + G @ self.problem.process @ G.T
 
     def _shifted(self) -> None:

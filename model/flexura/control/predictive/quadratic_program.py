@@ -1,4 +1,4 @@
-"""The quadratic program of a tick: condensed to the forces, solved by a dual active set."""
+"""The quadratic program of a tick, solved by a dual active set."""
 
 from __future__ import annotations
 
@@ -8,32 +8,6 @@ from ...optional import Optional
 
 daqp = Optional("daqp")
 SOFT, FREE = 8, 1e30  # a constraint that may be broken at a price; no bound
-
-
-def condensed(
-    R: np.ndarray, G: np.ndarray, c: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The states of all intervals by the forces and the first state (152).
-
-    Args:
-        R: (N, n, n), of dx_k+1 = R_k dx_k + G_k du_k + c_k.
-        G: (N, n, inputs).
-        c: (N, n).
-
-    Returns:
-        by_force (N, n, N inputs), by_start (N, n, n), rest (N, n): dx_1 to dx_N.
-    """
-    N, n, inputs = G.shape
-    wide = N * inputs
-    out = np.zeros((N, n, wide + n + 1))
-    now = np.zeros((n, wide + n + 1))
-    now[:, wide : wide + n] = np.eye(n)
-    for k in range(N):
-        now = R[k] @ now
-        now[:, k * inputs : (k + 1) * inputs] = G[k]
-        now[:, -1] += c[k]
-        out[k] = now
-    return out[:, :, :wide], out[:, :, wide : wide + n], out[:, :, -1]
 
 
 class QuadraticProgram:
