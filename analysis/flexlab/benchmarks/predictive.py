@@ -16,7 +16,7 @@ END, T_END, LIMIT = (0.8, -0.5), 0.3, np.array([2.0, 0.4])  # rad, s, N m
 INTERVALS, BETA_S, MODES = 20, 2e-3, 2
 CASES = ((500.0, 1, 2.0), (1000.0, 4, 1.0))  # rate, spread, required: ms of 99.9 % of the ticks
 SHARE = 0.1  # required: at most, of LQG's residual
-COMMON = {"limit": LIMIT, "disturbance": [0.05, 0.02], "damping": 0.02}
+COMMON: dict[str, Any] = {"limit": LIMIT, "disturbance": [0.05, 0.02], "damping": 0.02}
 
 
 def two_links(modes: int = 0) -> fx.Robot:
@@ -93,7 +93,7 @@ def measure(rounds: int) -> list[dict[str, Any]]:
     plant, t, rows = two_links(), np.linspace(0, 0.6, 301), []
     lqg = best_lqg(plant, t)
     for rate, spread, most in CASES:
-        law = fx.nmpc(
+        sampled = fx.nmpc(
             two_links(MODES),
             [polynomial(end, T_END) for end in END],
             3 * LIMIT,
@@ -106,11 +106,12 @@ def measure(rounds: int) -> list[dict[str, Any]]:
             speed_limit=8.0,
             **COMMON,
         )
+        law: Any = sampled.function
         times: list[float] = []
         gc.collect()
         gc.freeze()
         for _ in range(rounds):
-            timed = Timed(law.function)
+            timed = Timed(law)
             run = fx.simulate(plant, t, fx.Sampled(timed, rate))
             times += timed.times[1:]  # the first tick linearises everything
         gc.unfreeze()
@@ -125,7 +126,7 @@ def measure(rounds: int) -> list[dict[str, Any]]:
                 "p99_ms": float(high),
                 "p999_ms": float(highest),
                 "required_ms": most,
-                "failures": law.function.failures,
+                "failures": law.failures,
                 "residual_mm": 1e3 * residual(run, plant),
                 "lqg_residual_mm": 1e3 * lqg,
             }

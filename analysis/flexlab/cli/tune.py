@@ -169,9 +169,12 @@ def tune(
     asked = fx.load_manoeuvre(manoeuvre, len(described.links))
     if free_file:
         free_gains = freedom.read(free_file)
+    elif free:
+        free_gains = [freedom.from_option(f) for f in free]
+    elif isinstance(given, Designed):
+        free_gains = default_bounds(given)
     else:
-        default = default_bounds if isinstance(given, Designed) else freedom.default_bounds
-        free_gains = [freedom.from_option(f) for f in free or []] or default(given)
+        free_gains = freedom.default_bounds(given)
     weights = Weights(vibration, effort, overshoot)
     robots = perturbed_robots(
         described,

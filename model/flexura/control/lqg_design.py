@@ -6,11 +6,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..io import array, number
-from ..signals import FunctionSignal, Signal, as_signals, constant
-from ..system import System, assemble, linearize
+from ..signals import FunctionSignal, Signal, SignalLike, as_signals, constant
+from ..system import RobotLike, System, assemble, linearize
 from .gaussian_design import Design, Weights, gaussian_design
 from .measurements import Measurements
 from .riccati import deviations, discretised
@@ -18,20 +19,20 @@ from .sampled import Sampled
 
 
 def lqg(
-    robot: Any,
-    references: Any,
-    effort: Any,
+    robot: RobotLike,
+    references: SignalLike | Sequence[SignalLike],
+    effort: ArrayLike,
     rate_Hz: float = 1000.0,
     *,
     measure: Sequence[str] | None = None,
-    limit: Any = None,
+    limit: ArrayLike | None = None,
     follow: str = "joints",
-    position: Any = 1.0,
+    position: ArrayLike = 1.0,
     deflection: float = 1.0,
     damping: float = 0.0,
-    disturbance: Any = 1.0,
-    noise: Any = 1e-4,
-    q: Any = None,
+    disturbance: ArrayLike = 1.0,
+    noise: ArrayLike | Mapping[str, float] = 1e-4,
+    q: ArrayLike | None = None,
 ) -> tuple[Sampled, Design]:
     """A sampled controller of forces from the robot linearised: a regulator (75) on Kalman's
     estimate (76) from the robot's own sensors (147).
@@ -153,7 +154,7 @@ class LinearQuadraticGaussian:
         return u
 
 
-def motions(references: Any, system: System) -> list[Signal]:
+def motions(references: SignalLike | Sequence[SignalLike], system: System) -> list[Signal]:
     """The reference of each joint. Raises InputError where one is missing."""
     found = as_signals(references, len(system.robot.links), "references")
     out = []
@@ -168,7 +169,7 @@ def motions(references: Any, system: System) -> list[Signal]:
     return out
 
 
-def limits(limit: Any, system: System) -> np.ndarray:
+def limits(limit: ArrayLike | None, system: System) -> np.ndarray:
     """Limits of the forces (links,); None: infinite ones. Raises InputError."""
     count = len(system.robot.links)
     return np.full(count, np.inf) if limit is None else deviations(limit, count, "limit")

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...errors import InputError
 from ...io import number, whole
-from ...system import StateSpace, System, assemble, frequencies, linearize
+from ...signals import SignalLike
+from ...system import RobotLike, StateSpace, System, assemble, frequencies, linearize
 from ..gaussian_design import Weights, deviation_rows, driven_joints
 from ..lqg_design import limits as limits_of
 from ..lqg_design import motions, noise_of
@@ -25,25 +27,25 @@ PRICE = 1e7  # of the square of what breaks a limit of speed or deflection, as a
 
 
 def nmpc(
-    robot: Any,
-    references: Any,
-    effort: Any,
+    robot: RobotLike,
+    references: SignalLike | Sequence[SignalLike],
+    effort: ArrayLike,
     rate_Hz: float = 500.0,
     *,
     intervals: int = 24,
     horizon_s: float | None = None,
     spread: int = 1,
     measure: Sequence[str] | None = None,
-    limit: Any = None,
-    speed_limit: Any = None,
+    limit: ArrayLike | None = None,
+    speed_limit: ArrayLike | None = None,
     deflection_limit: float | None = None,
     follow: str = "tips",
-    position: Any = 1.0,
+    position: ArrayLike = 1.0,
     deflection: float = 1.0,
     damping: float = 0.0,
-    disturbance: Any = 1.0,
-    noise: Any = 1e-4,
-    q: Any = None,
+    disturbance: ArrayLike = 1.0,
+    noise: ArrayLike | Mapping[str, float] = 1e-4,
+    q: ArrayLike | None = None,
 ) -> Sampled:
     """A sampled controller that minimises the cost of the motion ahead on the nonlinear model, one
     step of Newton's method a tick (151), (152).

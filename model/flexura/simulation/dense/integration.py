@@ -218,7 +218,7 @@ class Integration:
         if np.any(np.abs(self.ticks - self.now) <= 1e-12 * max(abs(self.now), 1e-3)):
             q, v, _ = self.equations.state(self.now, self.z)
             self.equations.held = (
-                self.sampled.function(self.now, q, v)
+                np.asarray(self.sampled.function(self.now, q, v))
                 if self.sampled.of_state
                 else self.sampled(
                     self.now, q[self.rows], v[self.rows], self.equations.deflection(q)
