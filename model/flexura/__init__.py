@@ -13,7 +13,7 @@ from types import ModuleType
 
 from . import moved, signals
 from .api import simulate
-from .control import PID, Controller, Force, Motor, Sampled, Stepper
+from .control import PID, Controller, Force, Motor, Sampled, Stepper, lqg, nmpc
 from .errors import FlexuraError, InputError, NumericalError
 from .io import Run
 from .population import Batch, Population
@@ -80,7 +80,9 @@ __all__ = [
     "linearize",
     "load",
     "load_manoeuvre",
+    "lqg",
     "modes",
+    "nmpc",
     "parameter_derivatives",
     "save",
     "signals",

@@ -12,7 +12,7 @@ from flexura.io import FILE
 
 from ..identification.vibration.shapers import read_shaper, shaped
 from ..studies import parameter_sweep
-from ..tuning.closed_loop import controller_from_file
+from ..tuning.closed_loop import controller_from_file, references, with_references
 from . import tables
 from .options import (
     Force,
@@ -126,6 +126,8 @@ def simulate(
             max_steps=max_steps,
             wall_time=wall_time,
         )
+        if isinstance(drive, fx.Sampled):  # of a designed controller
+            run = with_references(run, references(system, asked))
         run.save(draft.folder)
         folder = draft.keep(interrupted=run.stopped)
     print_results(

@@ -20,11 +20,18 @@ class PythonDrive {
         link_(last_flexible(*model_)),
         function_(drive.attr("function")),
         read_(drive.attr("read")),
-        of_time_(nb::cast<bool>(drive.attr("of_time"))) {}
+        of_time_(nb::cast<bool>(drive.attr("of_time"))),
+        of_state_(nb::cast<bool>(drive.attr("of_state"))) {}
 
   // Forces (joints) at a state. The GIL is held.
   void call(double t, const double *q, const double *v, double *force) {
     if (of_time_) return take(function_(t), t, force);
+    if (of_state_) {
+      const std::size_t n = std::size_t(model_->n);
+      Array place = new_array({n}), rate = new_array({n});
+      std::copy_n(q, n, place.data()), std::copy_n(v, n, rate.data());
+      return take(function_(t, place, rate), t, force);
+    }
     const std::size_t joints = model_->first.size();
     Array position = new_array({joints}), velocity = new_array({joints});
     for (std::size_t i = 0; i < joints; ++i)
@@ -38,7 +45,7 @@ class PythonDrive {
   Workspace<double> work_;
   int link_;
   nb::object function_, read_;
-  bool of_time_;
+  bool of_time_, of_state_;
 
   // Arrays of finite doubles are read in place; all else by Python, which refuses what cannot be
   // forces.

@@ -1,4 +1,5 @@
-"""Sampled controllers, their gains files and step metrics, LQR designs, functions as drives."""
+"""Sampled controllers, their gains files and step metrics, LQR and LQG with the figures of their
+loops, functions as drives."""
 
 from .board_replay import board_pulses
 from .controller import (
@@ -11,10 +12,15 @@ from .controller import (
     Linear,
     filter_coefficient,
 )
-from .gains import BOARD, NAMES, Gains
+from .designed import Designed, design_setting
+from .gains import BOARD, NAMES, Gains, load_controller
 from .gains import load as load_gains
-from .lqr_design import Design, lqr
+from .gaussian_design import Design
+from .loop_figures import LoopFigures, LoopMargins, loop_figures
+from .lqg_design import lqg
+from .lqr_design import lqr
 from .pid import GAINS, PID, Force, Motor, Output, Stepper
+from .predictive import nmpc
 from .sampled import DriveFunction, Sampled
 from .step_metrics import (
     EFFORT,
@@ -55,19 +61,27 @@ __all__ = [
     "VIBRATION",
     "Controller",
     "Design",
+    "Designed",
     "DriveFunction",
     "Force",
     "Gains",
     "Linear",
+    "LoopFigures",
+    "LoopMargins",
     "Motor",
     "Output",
     "Sampled",
     "StepResponse",
     "Stepper",
     "board_pulses",
+    "design_setting",
     "filter_coefficient",
+    "load_controller",
     "load_gains",
+    "loop_figures",
+    "lqg",
     "lqr",
+    "nmpc",
     "step_figures",
     "step_response",
     "strip_metrics",

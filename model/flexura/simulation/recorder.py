@@ -9,9 +9,8 @@ import numpy as np
 from ..io import STATIONS, Run, Tables, judged
 from ..robot import Robot
 from ..signals import Loads
-from ..system import System
+from ..system import System, sensor_channels
 from .problem import Solution
-from .sensors import sensor_channels
 
 
 def channel_units(robot: Robot) -> dict[str, str]:

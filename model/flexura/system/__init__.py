@@ -7,6 +7,7 @@ core where that is faster.
 from .assembly import Assembly
 from .frequency_response import FrequencyResponse, frequency_response
 from .loads import Impact, acting_loads, impact, load_forces, with_payload
+from .sensors import sensor_channels
 from .spectrum import Modes, frequencies, modes
 from .statespace import StateSpace, linearize
 from .statics import NoEquilibrium, equilibrium, holding, static, tip_pose
@@ -31,6 +32,7 @@ __all__ = [
     "linearize",
     "load_forces",
     "modes",
+    "sensor_channels",
     "static",
     "tip_pose",
     "with_payload",

@@ -78,7 +78,7 @@ class Integration:
         if isinstance(drive, Drive):
             marks, self.longest = drive.breaks, min(self.longest, PART * drive.shortest_period)
         elif isinstance(drive, Sampled):
-            self.sampled = DriveFunction(drive.function, len(system.joint_rows))
+            self.sampled = DriveFunction(drive.function, len(system.joint_rows), system)
             self.ticks = marks = (
                 t[0] + np.arange(np.floor(self.span * drive.rate_Hz) + 1) / drive.rate_Hz
             )
@@ -221,8 +221,12 @@ class Integration:
             self.equations.until = np.nextafter(self.marks[0], -np.inf)
         if np.any(np.abs(self.ticks - self.now) <= 1e-12 * max(abs(self.now), 1e-3)):
             q, v, _ = self.equations.state(self.now, self.z)
-            self.equations.held = self.sampled(
-                self.now, q[self.rows], v[self.rows], self.equations.deflection(q)
+            self.equations.held = (
+                np.asarray(self.sampled.function(self.now, q, v))
+                if self.sampled.of_state
+                else self.sampled(
+                    self.now, q[self.rows], v[self.rows], self.equations.deflection(q)
+                )
             )
 
     def _solve(self, end: float) -> tuple[int, bool] | tuple[()] | None:

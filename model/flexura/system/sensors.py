@@ -6,7 +6,8 @@ import numpy as np
 
 from ..robot import Sensor
 from ..signals import Loads
-from ..system import System, load_forces
+from .loads import load_forces
+from .system import System
 
 
 def sensor_channels(
