@@ -31,6 +31,7 @@ from .plan import Plan
 from .selftest import prepare, run_selftest
 from .stream import StreamResult, execute, stop_motors
 
+SEQUENCES = 4099  # numbers of commands between two experiments on one emulated board
 SETTLE_S = {"forward": 1.0, "inverse": 0.5, "step": 0.5, "free-vibration": 0.0}
 
 
@@ -183,6 +184,7 @@ def conduct(
     watch: Hooks,
     configure: bool = False,
     replace: bool = False,
+    repeat: int = 0,
 ) -> ExperimentResult:
     """Test the rig, start and execute a plan, and make the Run.
 
@@ -198,6 +200,8 @@ def conduct(
         watch: what the person sees and says.
         configure: whether the rig's settings may be written into a board that has others.
         replace: whether a recording in `folder` may be replaced.
+        repeat: how many experiments came before on this open board. Its joints are told that they
+            stand at 0 before the first one only.
 
     Returns:
         The Run, its folder, the self-test's findings, and how the stream ended.
@@ -212,7 +216,8 @@ def conduct(
     # The same experiment on the emulated board is the same byte for byte; a real line needs a
     # number that nobody played before.
     link = Link(
-        RecordingBoard(opened.board, recording), sequence=1 if opened.board.emulated else None
+        RecordingBoard(opened.board, recording),
+        sequence=1 + (repeat * SEQUENCES) % 0x10000 if opened.board.emulated else None,
     )
     try:
         findings = _ready(
@@ -223,6 +228,7 @@ def conduct(
             sensor,
             opened.board.emulated or configure,
             lambda link: commission(link, opened.board, watch.say, watch.stop_asked),
+            repeat == 0,
         )
         watch.tested(findings)
         if failed := [finding for finding in findings if not finding.passed]:
@@ -268,8 +274,10 @@ def _ready(
     sensor: Sensor,
     write: bool,
     commission: Callable[[Link], Program],
+    reference: bool,
 ) -> list[Check]:
-    """Greet the board, configure and test it, and tell it that the joints stand at 0."""
+    """Greet the board, configure and test it, and tell it, if `reference`, that the joints stand
+    at 0."""
     identity = link.connect()
     runs = program(link)
     recording.write_session(
@@ -287,5 +295,6 @@ def _ready(
         more, rest = run_selftest(link, plan.settings, sensor)
         findings += more
         recording.write_session(rest=rest.spec())
-        link.command("reference", position_1=0, position_2=0, steps=0)
+        if reference:
+            link.command("reference", position_1=0, position_2=0, steps=0)
     return findings

@@ -1,4 +1,5 @@
-"""Sampled controllers, their gains files and step metrics, LQR designs, functions as drives."""
+"""Sampled controllers, their gains files and step metrics, LQR designs, iterative learning,
+functions as drives."""
 
 from .board_replay import board_pulses
 from .controller import (
@@ -13,6 +14,13 @@ from .controller import (
 )
 from .gains import BOARD, NAMES, Gains
 from .gains import load as load_gains
+from .ilc import (
+    JointLoop,
+    LearningFilter,
+    filter_length,
+    learning_filter,
+    reference_response,
+)
 from .lqr_design import Design, lqr
 from .pid import GAINS, PID, Force, Motor, Output, Stepper
 from .sampled import DriveFunction, Sampled
@@ -58,6 +66,8 @@ __all__ = [
     "DriveFunction",
     "Force",
     "Gains",
+    "JointLoop",
+    "LearningFilter",
     "Linear",
     "Motor",
     "Output",
@@ -66,8 +76,11 @@ __all__ = [
     "Stepper",
     "board_pulses",
     "filter_coefficient",
+    "filter_length",
+    "learning_filter",
     "load_gains",
     "lqr",
+    "reference_response",
     "step_figures",
     "step_response",
     "strip_metrics",

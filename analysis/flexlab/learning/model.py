@@ -1,0 +1,114 @@
+"""What is known of the rig: the identified model, how sure it is, and what a reference does to it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+import flexura as fx
+from flexura.control import (
+    JointLoop,
+    LearningFilter,
+    filter_length,
+    learning_filter,
+    reference_response,
+)
+
+from ..identification.identify import Identified
+from ..identification.strip import with_parameters
+from ..rig import RigSetup
+from ..rig.axes import motor_axes
+from ..rig.nominal_robot import with_drives
+from ..rig.plant.motor import joint_line
+from .task import STEP_S, Task
+
+HIGHEST_HZ = 12.0  # of what is learned; the board's knots are 8 ms apart
+SURELY = 2.0  # standard deviations
+MODEL = 0.02  # of the stiffness: what no interval has, the model's own error
+NAMES = ("stiffness", "damping", "payload")
+POSTURES = 3  # along the manoeuvre, where the robot is linearised
+
+
+@dataclass(frozen=True)
+class Knowledge:
+    """Parameters of the strip, as factors on the file's, and the robots that may be meant.
+
+    Attributes:
+        values: factors, by name.
+        others: the corners of the uncertainty: factors `stiffness`, `damping`, `payload`.
+    """
+
+    values: dict[str, float]
+    others: tuple[dict[str, float], ...]
+
+    @classmethod
+    def of(cls, found: Identified) -> Knowledge:
+        """From an identification's estimates and their covariance.
+
+        Along each principal axis of the covariance there are two robots, two standard deviations
+        away. Stiffness and payload that keep the first frequency are thus seen together.
+        """
+        strip = found.strip
+        rows = [[u.name for u in strip.parameters].index(name) for name in NAMES]
+        covariance = strip.covariance[np.ix_(rows, rows)] + np.diag([MODEL**2, 0.0, 0.0])
+        spread, axes = np.linalg.eigh(covariance)
+        centre = np.log([strip.values[name] for name in NAMES])
+        others = []
+        for size, axis in zip(np.sqrt(np.maximum(spread, 0.0)), axes.T, strict=True):
+            for sign in (-1, 1):
+                factors = np.exp(centre + sign * SURELY * size * axis)
+                others.append(dict(zip(NAMES, map(float, factors), strict=True)))
+        return cls(dict(strip.values), tuple(others))
+
+
+def loops(setup: RigSetup, settings: dict[str, float]) -> list[JointLoop | None]:
+    """The board's controllers: of each joint with a motor its gains; a stepper follows its pulses.
+
+    Args:
+        setup: the rig.
+        settings: the board's settings, by name.
+    """
+    out: list[JointLoop | None] = [None] * setup.rig.joints
+    for axis in motor_axes(setup.rig):
+        n, unit = axis.number, axis.unit
+        gain = lambda name, n=n: settings.get(f"{name[:2]}_{n}_{name[3:]}", 0.0)
+        out[n - 1] = JointLoop(
+            joint_line(axis).force_per_V,
+            gain(f"kp V_{unit}"),
+            gain(f"ki V_{unit}_s"),
+            gain(f"kd V_s_{unit}"),
+            gain(f"kv V_s_{unit}"),
+        )
+    return out
+
+
+def filter_of(task: Task, knowledge: Knowledge) -> LearningFilter:
+    """The learning filter of a task: from an error at the joints to their references.
+
+    Args:
+        task: what is learned.
+        knowledge: the model and its uncertainty.
+    """
+    count = filter_length(len(task.t))
+    f = np.fft.rfftfreq(count, STEP_S)
+    postures = task.first[np.linspace(0, len(task.t) - 1, POSTURES).astype(int)]
+    postures = np.unique(np.round(postures, 6), axis=0)
+    controllers = loops(task.setup, task.settings)
+    lines = [(axis, joint_line(axis)) for axis in motor_axes(task.setup.rig)]
+    responses = []
+    for factors in (knowledge.values, *knowledge.others):
+        robot = with_parameters(task.setup.robot, knowledge.values | factors)
+        system = fx.assemble(with_drives(robot, task.setup.rig, lines))
+        for posture in postures:
+            q = fx.static(system, joints=posture)
+            moved = reference_response(system, q, f[1:], controllers)
+            at = _output(task, posture) @ moved
+            responses.append(np.concatenate([at[:1].real.astype(complex), at]))
+    return learning_filter(np.array(responses), STEP_S, HIGHEST_HZ)
+
+
+def _output(task: Task, posture: np.ndarray) -> np.ndarray:
+    """From the tip's motion to the rigid robot's joints (J, 2) about a posture (J,)."""
+    slopes = task.slopes(posture[None])[0]
+    return np.asarray(np.linalg.pinv(slopes))

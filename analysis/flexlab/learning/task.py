@@ -1,0 +1,195 @@
+"""What is learned: references of the joints with which the tip goes where a rigid robot's would.
+
+A trial rests, does the manoeuvre, rests, and goes back to where it began:
+
+    0          REST_S           rest + manoeuvre        + HOLD_S        + return
+    | at rest  | the manoeuvre, with its leads | what is left to learn | to zero |
+
+References may change from the start to the end of the hold: the joints begin before the tip does.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+import flexura as fx
+from flexura import signals
+from flexura.errors import InputError
+
+from ..board.protocol.declaration import CONTROL_HZ
+from ..experiment import plan
+from ..experiment.lead_in import quintic, with_lead_in
+from ..rig import RigSetup
+from ..rig.board_axes import board_axes
+
+STEP_S = 2**plan.PERIOD_LOG2 / CONTROL_HZ  # of the board's knots
+REST_S, HOLD_S = 0.4, 0.4
+BLEND_S = 0.12  # at both ends, in which references stay where they are
+RETURN_S = 1.0  # at least
+RETURN_SPEED = 0.25  # of the board's limit
+STILL_S = 0.4  # at the end, so that the joints settle at zero
+
+
+@dataclass(frozen=True)
+class Task:
+    """A manoeuvre to learn, on a rig.
+
+    Attributes:
+        setup: the rig.
+        settings: the board's settings, by name.
+        manoeuvre: as it is asked.
+        motions: its joints' motions with leads, from REST_S on, one Signal a joint.
+        span_s: their duration [s].
+    """
+
+    setup: RigSetup
+    settings: dict[str, float]
+    manoeuvre: fx.Manoeuvre
+    motions: tuple[fx.Signal, ...]
+    span_s: float
+
+    @classmethod
+    def of(cls, setup: RigSetup, settings: dict[str, float], manoeuvre: fx.Manoeuvre) -> Task:
+        """The task of a manoeuvre; the rig is asked whether it can.
+
+        Args:
+            setup: the rig.
+            settings: the board's settings, by name.
+            manoeuvre: with a motion of each joint.
+
+        Raises:
+            InputError: a joint has no motion, a motion does not begin at 0, or the rig cannot
+                follow.
+        """
+        asked = plan.inverse(setup, settings, manoeuvre).asked
+        lead_s, out_s = asked["lead_s"], asked["out_s"]
+        motions = [joint.motion for joint in manoeuvre.drive.joints if joint.motion is not None]
+        led = [with_lead_in(m, manoeuvre.duration_s, lead_s, out_s) for m in motions]
+        for i, motion in enumerate(led, 1):
+            if abs(motion(0.0)[0]) > plan.AT_REST:
+                raise InputError(
+                    "expected a motion that begins at 0, where every trial begins",
+                    key=f"joint[{i}].motion",
+                    value=motion(0.0)[0],
+                )
+        return cls(setup, settings, manoeuvre, tuple(led), lead_s + manoeuvre.duration_s + out_s)
+
+    @cached_property
+    def t(self) -> np.ndarray:
+        """The board's knots, from the start to the end of the hold (T,) [s]."""
+        count = int(np.ceil((REST_S + self.span_s + HOLD_S) / STEP_S - 1e-9)) + 1
+        return np.asarray(STEP_S * np.arange(count))
+
+    @cached_property
+    def first(self) -> np.ndarray:
+        """References of the first trial: the manoeuvre's own motions (T, J) [m or rad]."""
+        return self.joints(self.t)
+
+    def joints(self, t: np.ndarray) -> np.ndarray:
+        """Where the joints of a rigid robot would be, at times (T,) (T, J) [m or rad]."""
+        inside = np.clip(t - REST_S, 0.0, self.span_s)
+        return np.array([[motion(float(at))[0] for motion in self.motions] for at in inside])
+
+    def wanted(self, t: np.ndarray) -> np.ndarray:
+        """Where the tip is asked to be, x and y at times (T,): a rigid robot's (T, 2) [m]."""
+        return self._tips(self.joints(t))
+
+    def _tips(self, joints: np.ndarray) -> np.ndarray:
+        system = fx.assemble(self.setup.robot)
+        q, out = np.zeros(system.n), []
+        for place in joints:
+            q[system.joint_rows] = place
+            out.append(fx.tip_pose(system, q)[:2])
+        return np.array(out)
+
+    def slopes(self, joints: np.ndarray) -> np.ndarray:
+        """How a rigid robot's joints at (T, J) move its tip (T, 2, J)."""
+        at, h = joints, 1e-5
+        columns = []
+        for i in range(at.shape[1]):
+            off = h * np.eye(at.shape[1])[i]
+            columns.append((self._tips(at + off) - self._tips(at - off)) / (2 * h))
+        return np.stack(columns, axis=-1)
+
+    def error(self, t: np.ndarray, tip: np.ndarray) -> np.ndarray:
+        """What the tip lacks along what the joints can move (T, J) [m].
+
+        One joint that turns: along its circle, by the tip's polar angle. Else x and y.
+
+        Args:
+            t: times (T,) [s].
+            tip: x and y (T, 2) [m].
+        """
+        wanted = self.wanted(t)
+        if self.setup.rig.joints > 1:
+            return wanted - tip
+        angle = np.arctan2(wanted[:, 1], wanted[:, 0]) - np.arctan2(tip[:, 1], tip[:, 0])
+        angle = (angle + np.pi) % (2 * np.pi) - np.pi
+        return np.asarray(angle * np.hypot(*wanted.T))[:, None]
+
+    def at_joints(self, t: np.ndarray, error: np.ndarray) -> np.ndarray:
+        """The joints' motions that a rigid robot would need for an error (T, J) [m or rad]."""
+        slopes = self.slopes(self.joints(t))
+        if self.setup.rig.joints == 1:
+            return error / np.linalg.norm(slopes[:, :, 0], axis=1)[:, None]
+        return np.asarray(np.linalg.solve(slopes, error[:, :, None])[:, :, 0])
+
+    def blended(self, change: np.ndarray) -> np.ndarray:
+        """A change of references (T, J) that begins at 0 and ends at rest."""
+        smooth = lambda u: np.clip(u, 0, 1) ** 3 * (
+            10 - 15 * np.clip(u, 0, 1) + 6 * np.clip(u, 0, 1) ** 2
+        )
+        begin = smooth((self.t - BLEND_S) / BLEND_S)[:, None]
+        end = smooth((self.t[-1] - BLEND_S - self.t) / BLEND_S)[:, None]
+        last = change[np.searchsorted(self.t, self.t[-1] - 1.5 * BLEND_S)]
+        return np.asarray(begin * (end * change + (1 - end) * last))
+
+    def asked(self, references: np.ndarray, name: str) -> fx.Manoeuvre:
+        """A trial as a manoeuvre: the references, and the way back.
+
+        Args:
+            references: (T, J) at `t` [m or rad].
+            name: of the manoeuvre.
+        """
+        back_s = RETURN_S
+        for axis, last in zip(board_axes(self.settings), references[-1], strict=True):
+            speed = RETURN_SPEED * self.settings[axis.names["speed"]]
+            back_s = max(back_s, 1.875 * abs(float(last)) / speed)
+        steps = int(np.ceil(back_s / STEP_S))
+        still = round(STILL_S / STEP_S)
+        t = STEP_S * np.arange(len(self.t) + steps + still)
+        motions = []
+        for column in references.T:
+            row = quintic(0.0, steps * STEP_S, (column[-1], 0.0, 0.0), (0.0, 0.0, 0.0))
+            s = STEP_S * np.arange(1, steps + 1)
+            way = np.polynomial.polynomial.polyval(s, row[1:7])
+            motions.append(signals.table(t, np.concatenate([column, way, np.zeros(still)])))
+        off = [0.0] * len(motions)
+        drive = fx.Drive.pd(motions, off, off)
+        return fx.Manoeuvre(name, float(t[-1]), STEP_S, drive)
+
+    def plan(self, references: np.ndarray, trial: int, **more: Any) -> plan.Plan:
+        """The plan of a trial, with the rig's checks of drive, travel, limits and speed.
+
+        Args:
+            references: (T, J) at `t` [m or rad].
+            trial: its number, from 1.
+            more: further entries of the Run's metadata.
+        """
+        name = f"trial {trial} of {self.manoeuvre.name or 'a manoeuvre'}"
+        made = plan.inverse(self.setup, self.settings, self.asked(references, name))
+        learning = {"trial": trial, "learned_s": [0.0, float(self.t[-1])]} | more
+        phases = [
+            {"t": 0.0, "name": "rest"},
+            {"t": REST_S, "name": "manoeuvre"},
+            {"t": REST_S + self.span_s, "name": "hold"},
+            {"t": float(self.t[-1]), "name": "way back"},
+        ]
+        return dataclasses.replace(
+            made, asked=made.asked | {"learning": learning}, phases=phases
+        )

@@ -1,0 +1,110 @@
+"""Where the tip was in a trial: what the sensors say, and, of an emulated rig, where it truly was."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+import flexura as fx
+
+from ..board.emulator.emulated import Outputs, Sensors
+from ..identification.identify import Identified
+from ..identification.strip import StripModel
+
+CORRECTED_HZ = 8.0  # of what the sensor says beyond the model
+DRIFT_DEGREE = 3
+REMEMBERED = 4  # trials over which that is averaged
+
+
+class Witness:
+    """A plant whose own tip is written down at every step.
+
+    It is a plant itself, and stands between the board and the plant.
+    """
+
+    def __init__(self, plant: Any) -> None:
+        """Args: plant: an emulated rig."""
+        self.plant, self.window_s, self.truth = plant, plant.window_s, plant.truth
+        self._rows: list[tuple[float, ...]] = [(0.0, *plant.mechanics.tip_m, 0.0)]
+
+    def advance(self, seconds: float, outputs: Outputs) -> Sensors:
+        """Advance the plant, as the plant itself does."""
+        sensors = self.plant.advance(seconds, outputs)
+        time = self._rows[-1][0] + seconds
+        self._rows.append((time, *self.plant.mechanics.tip_m, sensors.encoder_1))
+        return sensors
+
+    def tip(self, run: fx.Run, counts: float) -> np.ndarray:
+        """The plant's own tip at the times of a run, the newest one (T, 2) [m].
+
+        The run's clock is where its reports have the counts that the encoder of joint 1 had. The
+        mechanics are a window behind the encoder.
+
+        Args:
+            run: the run.
+            counts: of joint 1's encoder for 1 m or 1 rad.
+        """
+        rows = np.array(self._rows)
+        t, x, y, encoder = rows[rows[:, 0] > rows[-1, 0] - (run.t[-1] - run.t[0]) - 6.0].T
+        position = run["joint/1/position"]
+        there = np.isfinite(position)
+        seen = np.round(position[there] * counts)
+
+        def wrong(late: float) -> int:
+            off = np.floor(np.interp(run.t[there] + late, t, encoder)) - seen
+            return int((off != np.median(off)).sum())
+
+        late = min(np.arange(t[0], t[-1] - run.t[-1], 1e-3), key=wrong)
+        late = min(late + np.arange(-1e-3, 1e-3, 2e-5), key=wrong) + self.window_s
+        return np.column_stack([np.interp(run.t + late, t, place) for place in (x, y)])
+
+
+class Observer:
+    """The tip from encoders and sensor, through the identified model.
+
+    The model follows the measured joints, which gives the tip and what the sensor should say. What
+    the sensor says beyond that, slow drift taken away, corrects the tip. It is averaged over the
+    last trials: the motion repeats itself, noise does not.
+    """
+
+    def __init__(self, found: Identified) -> None:
+        """Args: found: the identification of this rig."""
+        self.found = found
+        self._beyond: list[np.ndarray] = []
+
+    def tip(self, run: fx.Run) -> np.ndarray:
+        """x and y of the tip at the run's times (T, 2) [m].
+
+        Args:
+            run: the newest trial, complete.
+        """
+        from scipy.signal import butter, sosfiltfilt
+
+        found = self.found
+        nominal, values = found.nominal, found.strip.values
+        data = StripModel(run, nominal.rig, nominal.robot, found.friction)
+        model = data.simulate(values)
+        said = data.voltage(model, values)
+        off = data.sensor_V - said
+        there = np.isfinite(off)
+        off = np.interp(run.t, run.t[there], off[there])
+        drift = np.polynomial.Legendre.fit(run.t, off, DRIFT_DEGREE)
+        rate = 1 / float(np.median(np.diff(run.t)))
+        low = butter(2, CORRECTED_HZ, output="sos", fs=rate)
+        deflection = model[f"link/{data.link}/tip_deflection"]
+        for_V = np.polyfit(said, deflection, 1)[0]
+        if len(self._beyond) == 1 or len(self._beyond) > REMEMBERED:
+            self._beyond.pop(0)  # the first trial's motion is another
+        beyond = for_V * sosfiltfilt(low, off - drift(run.t))
+        self._beyond.append(beyond)
+        mean = np.mean([_of_length(b, len(run.t)) for b in self._beyond], axis=0)
+        angle = model[f"link/{data.link}/angle"]
+        across = np.column_stack([-np.sin(angle), np.cos(angle)])
+        tips = np.column_stack([model["tip/x"], model["tip/y"]])
+        return np.asarray(tips + mean[:, None] * across)
+
+
+def _of_length(values: np.ndarray, count: int) -> np.ndarray:
+    """The values, cut or held to a length: trials end some reports earlier or later."""
+    return np.concatenate([values, np.full(max(count - len(values), 0), values[-1])])[:count]
