@@ -6,6 +6,7 @@ import pytest
 
 import flexura as fx
 import robots
+from flexura import control
 from flexura.signals import paths
 from flexura.simulation.trajectory.collocation import POINTS, Mesh
 from flexura.simulation.trajectory.inverse_motion import TipProblem, mesh_between
@@ -204,3 +205,113 @@ def test_what_is_asked_of_the_drives_at_the_end():
     for part in (slice(0, n), slice(n, 2 * n)):
         asked = into[:3] @ found.slope[part][:, 8]
         assert asked == pytest.approx(into[:3] @ slope[part], rel=2e-2, abs=1e-3)
+
+
+STEP_S = 0.008
+LOOP = control.JointLoop(0.4, kp=60.0, ki=120.0, kd=0.2, kv=1.4)
+
+
+def responses(*factors):
+    """From the joint's reference to the tip along its circle, of arms of other stiffness."""
+    f = np.fft.rfftfreq(1024, STEP_S)[1:]
+    out = []
+    for factor in factors:
+        link = robots.beam(0.4, 0.157, factor * 0.33, 3, hub_inertia_kg_m2=0.03)
+        link["damping"] = {"beta_s": 2e-4}
+        at = control.reference_response(robots.system(link, payload=0.02), None, f, [LOOP])
+        out.append(np.concatenate([at[:1, 1:].real, at[:, 1:]]))
+    return np.array(out)
+
+
+def test_trials_shrink_an_error_by_the_law_of_learning():
+    """Trials of a linear plant: each leaves (1 - w H L) of the error.
+
+    Equations: 140
+    """
+    H = responses(1.0, 0.9)
+    made = control.learning_filter(H[:1], STEP_S, 12.0)
+    t = STEP_S * np.arange(500)
+    u = np.clip((t - 0.4) / 0.7, 0, 1)
+    wanted = 0.3 * u**3 * (10 - 15 * u + 6 * u**2)
+    fade = 0.5 * (1 + np.cos(np.linspace(0, np.pi, 256)))
+    padded = lambda x: np.concatenate([x, x[-1] * fade, np.zeros(1024 - 256 - len(x))])
+    plant = H[1, :, 0, 0]
+    error = wanted - np.fft.irfft(plant * np.fft.rfft(padded(wanted / 0.4)))[:500]
+    change = made.update(error[:, None])[:, 0]
+    spectrum = np.fft.rfft(padded(error))
+    added = made.weight * made.inverse[:, 0, 0] * spectrum
+    assert change == pytest.approx(np.fft.irfft(added)[:500], abs=1e-12)
+    # what a plant that is 10 % softer leaves of it, in its own spectrum
+    left = spectrum - plant * added
+    assert left == pytest.approx((1 - made.weight * plant * made.inverse[:, 0, 0]) * spectrum)
+    low = made.frequencies_Hz < 1.5
+    assert np.abs(left[low]).max() < 0.05 * np.abs(spectrum).max()
+    # the change begins before the motion that it corrects
+    assert np.abs(change[: round(0.4 / STEP_S)]).max() > 1e-3 * np.abs(change).max()
+
+
+def test_the_response_to_a_reference_is_that_of_the_closed_loop():
+    """The loop of an arm, closed by hand at one frequency.
+
+    Equations: 141
+    """
+    arm_2 = robots.system(
+        robots.beam(0.3, 0.3, 0.8, 2, hub_inertia_kg_m2=0.01),
+        robots.beam(0.3, 0.3, 0.8, 2, hub_inertia_kg_m2=0.01),
+        payload=0.05,
+    )
+    f, q = 2.3, fx.static(arm_2, joints=[0.0, 0.4])
+    s = 2j * np.pi * f
+    found = control.reference_response(arm_2, q, [f], [LOOP, None])[0]
+    lin = fx.linearize(arm_2, q)
+    G = dict(zip(lin.outputs, lin.transfer(s), strict=True))
+    # unknown drives u for a unit of each reference
+    for k, r in enumerate(np.eye(2)):
+        back = 0.4 * (60.0 + 120.0 / s + 0.2 * s)
+        left = np.array([back * G["joint/1/position"] + [1, 0], G["joint/2/position"]])
+        u = np.linalg.solve(left, [(back + 0.4 * 1.4 * s) * r[0], r[1]])
+        assert G["joint/2/position"] @ u == pytest.approx(r[1], abs=1e-12)
+        assert found[:, k] == pytest.approx([G["tip/x"] @ u, G["tip/y"] @ u])
+    with pytest.raises(fx.InputError, match="a loop for each joint"):
+        control.reference_response(arm_2, q, [f], [None])
+
+
+def test_the_filter_is_the_inverse_and_cancels_where_robots_disagree():
+    """One robot is inverted; about an uncertain resonance the filter is small.
+
+    Equations: 142
+    """
+    H = responses(1.0, 0.8, 1.25)
+    alone = control.learning_filter(H[:1], STEP_S)
+    assert alone.inverse[1:200] @ H[0, 1:200] == pytest.approx(np.ones((199, 1, 1)))
+    many = control.learning_filter(H, STEP_S)
+    k = 40
+    expected = np.conj(H[:, k]).sum(axis=0) / (np.abs(H[:, k]) ** 2).sum(axis=0)
+    assert many.inverse[k] == pytest.approx(expected)
+    peaks = many.frequencies_Hz[np.abs(H[:, :80, 0, 0]).argmax(axis=1)]
+    between = (many.frequencies_Hz > peaks.min()) & (many.frequencies_Hz < peaks.max())
+    assert np.abs(many.inverse[between]).max() < 0.3 / np.abs(H[0, 0, 0, 0])
+
+
+def test_the_weight_leaves_the_least_for_the_worst_robot():
+    """What one trial leaves for the worst of the robots is never more than the error.
+
+    Equations: 143
+    """
+    H = responses(1.0, 0.7, 1.4)
+    made = control.learning_filter(H, STEP_S, 12.0)
+    left = np.abs(1 - made.weight * (H @ made.inverse)[:, :, 0, 0])
+    assert made.contraction == pytest.approx(left.max(axis=0))
+    assert made.contraction.max() <= 1 + 1e-12
+    learned = (made.weight > 0) & (made.frequencies_Hz < 8.0)
+    assert made.contraction[learned].max() < 0.9 and learned.sum() > 20
+    for w in np.linspace(0, 1, 11):
+        worst = np.abs(1 - w * (H @ made.inverse)[:, :, 0, 0]).max(axis=0)
+        assert np.all(made.contraction[learned] <= worst[learned] + 0.02)
+    assert not made.weight[made.frequencies_Hz >= 12.0].any()
+    low = made.frequencies_Hz < 12.0
+    assert (made.weight[low] == 0).any()  # about the resonance, which may be anywhere
+    with pytest.raises(fx.InputError, match="at most 512"):
+        made.update(np.zeros((513, 1)))
+    with pytest.raises(fx.InputError, match="move the outputs"):
+        control.learning_filter(0 * H, STEP_S)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -15,13 +16,11 @@ from flexura.control import LearningFilter
 from flexura.errors import FlexuraError, InputError
 
 from ..experiment.plan import Plan
-from ..experiment.run_experiment import Hooks, OpenBoard, check, conduct
+from ..experiment.run_experiment import ExperimentResult, RefusedToStart
 from ..identification.identify import Identified, identify
-from ..recordings.unit_conversion import Sensor
-from ..rig.board_axes import board_axes
 from .model import Knowledge, filter_of
 from .task import Task
-from .tip import Observer, Witness
+from .tip import Observer
 
 WORSE = 2  # trials in a row that end the learning
 SMALLEST = 1 / 16  # share of a change, below which limits end the learning
@@ -46,9 +45,9 @@ class Trial:
     number: int
     folder: Path
     references: np.ndarray
-    lacks: np.ndarray
-    sensed_m: float
-    sensed_rms_m: float
+    lacks: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    sensed_m: float = math.nan
+    sensed_rms_m: float = math.nan
     true_m: float | None = None
     true_rms_m: float | None = None
     note: str = ""
@@ -82,20 +81,25 @@ class Learned:
         return min(self.trials, key=lambda trial: trial.sensed_rms_m)
 
 
-class _Stopped(FlexuraError):
-    """A person ended the work between two trials."""
+class Rig(Protocol):
+    """A rig on which trials are done."""
+
+    def perform(self, plan: Plan, number: int, report: Callable[[float], None]) -> ExperimentResult:
+        """Do a trial; its joints then stand at 0 again."""
+
+    def stop_asked(self) -> str:
+        """Why to end early, or ""."""
+
+    def true_tip(self, run: fx.Run) -> np.ndarray | None:
+        """Where the tip truly was at the times of the newest run (T, 2) [m], if that is known."""
 
 
 def learn(
     task: Task,
-    opened: OpenBoard,
-    folder: Path,
-    sensor: Sensor,
+    rig: Rig,
     trials: int,
-    watch: Hooks | None = None,
     *,
     known: Identified | None = None,
-    configure: bool = False,
     progress: Callable[[str, float], None] = lambda what, part: None,
     done: Callable[[Learned], None] = lambda learned: None,
 ) -> Learned:
@@ -107,13 +111,9 @@ def learn(
 
     Args:
         task: what is learned.
-        opened: the board; its joints stand at 0.
-        folder: gets one Run a trial, trial-01, trial-02, ...
-        sensor: of the strip, calibrated.
+        rig: where, as `BoardTrials`.
         trials: how many at most.
-        watch: what the person sees and says.
         known: an identification of this rig.
-        configure: whether the rig's settings may be written into a board that has others.
         progress: called with what is being done and the finished fraction of all.
         done: called after each trial.
 
@@ -122,107 +122,75 @@ def learn(
 
     Raises:
         InputError: the rig cannot do the first trial, or has no sensor of the strip.
+        RefusedToStart: a person did not want the first trial, or its identification.
         FlexuraError: the first trial failed.
     """
     if trials < 1:
         raise InputError("expected 1 or more", key="--trials", value=trials)
-    witness = _witness(opened)
-    watch = watch or Hooks()
     out = Learned(task, found=known)
     observer: Observer | None = None
     references, worse, note = task.first, 0, ""
     for number in range(1, trials + 1):
         report = lambda part, n=number: progress(f"trial {n}", (n - 1 + part) / trials)
-        hooks = dataclasses.replace(watch, observe=_both(watch.observe, report))
-        plan = task.plan(references, number, note=note)
-        place = folder / f"trial-{number:02d}"
         try:
-            result = conduct(
-                task.setup, plan, opened, place, sensor, hooks, configure, repeat=number - 1
-            )
+            result = rig.perform(task.plan(references, number, note=note), number, report)
             if not result.ended.complete:
                 out.ended, out.interrupted = result.ended.text, result.ended.interrupted
                 return out
             if out.found is None:
-                out.found = _identified(result.run, watch, progress)
+                out.found = _identified(result.run, rig.stop_asked, progress)
             if observer is None:
                 observer = Observer(out.found)
                 out.filter = filter_of(task, Knowledge.of(out.found))
-            trial = _judged(task, result.run, place, number, references, observer, witness, note)
+            trial = Trial(number, result.folder, references, note=note)
+            trial = _judged(task, trial, result.run, observer, rig)
         except FlexuraError as error:
             if not out.trials:
                 raise
-            out.ended, out.interrupted = str(error), isinstance(error, _Stopped)
+            out.ended, out.interrupted = str(error), isinstance(error, RefusedToStart)
             return out
         out.trials.append(trial)
         done(out)
         worse = 0 if trial is out.best else worse + 1
         if worse == WORSE:
-            out.ended, out.complete = f"{WORSE} trials in a row were worse than the best", True
-            return out
-        assert out.filter is not None
-        if number < trials:
-            following = _following(task, out, 0.5**worse)
-            if following is None:
-                out.ended = "the rig's limits allow no further change"
-                out.complete = True
-                return out
+            out.ended = f"{WORSE} trials in a row were no better than the best"
+        elif number == trials:
+            out.ended = "all trials are done"
+        elif (following := _following(task, out, 0.5**worse)) is None:
+            out.ended = "the rig's limits allow no further change"
+        else:
             references, note = following
-    out.ended, out.complete = "all trials are done", True
+            continue
+        out.complete = True
+        break
     return out
 
 
-def _witness(opened: OpenBoard) -> Witness | None:
-    """Stands between an emulated board and its plant from now on."""
-    if opened.plant is None:
-        return None
-    witness = Witness(opened.plant)
-    opened.board.plant = witness  # type: ignore[attr-defined]
-    return witness
-
-
-def _both(
-    observe: Callable[[np.ndarray, float], None], report: Callable[[float], None]
-) -> Callable[[np.ndarray, float], None]:
-    def both(reports: np.ndarray, part: float) -> None:
-        observe(reports, part)
-        report(part)
-
-    return both
-
-
-def _identified(run: fx.Run, watch: Hooks, progress: Callable[[str, float], None]) -> Identified:
+def _identified(
+    run: fx.Run, stop_asked: Callable[[], str], progress: Callable[[str, float], None]
+) -> Identified:
     """The model from the first trial; a person may end it."""
 
     def report(what: str, part: float) -> None:
-        if why := watch.stop_asked():
-            raise _Stopped(why)
+        if why := stop_asked():
+            raise RefusedToStart(why)
         progress("identify", part)
 
     return identify(run, report)
 
 
-def _judged(
-    task: Task,
-    run: fx.Run,
-    folder: Path,
-    number: int,
-    references: np.ndarray,
-    observer: Observer,
-    witness: Witness | None,
-    note: str,
-) -> Trial:
-    """A trial with its errors, which its Run gets as channels and metadata."""
+def _judged(task: Task, trial: Trial, run: fx.Run, observer: Observer, rig: Rig) -> Trial:
+    """The trial with its errors, which its Run gets as channels and metadata."""
     learned = run.t <= task.t[-1]
     t = run.t[learned]
     lacks = task.error(t, observer.tip(run)[learned])
-    sensed = np.linalg.norm(lacks, axis=1)
     sampled = np.column_stack([np.interp(task.t, t, column) for column in lacks.T])
-    trial = Trial(number, folder, references, sampled, *_sizes(sensed), note=note)
+    sensed = np.linalg.norm(lacks, axis=1)
+    largest, rms = _sizes(sensed)
+    trial = dataclasses.replace(trial, lacks=sampled, sensed_m=largest, sensed_rms_m=rms)
     channels = {"sensor/tip_error": sensed}
-    if witness is not None:
-        counts = board_axes(task.settings)[0].counts
-        true = np.linalg.norm(task.error(t, witness.tip(run, counts)[learned]), axis=1)
+    if (tip := rig.true_tip(run)) is not None:
+        true = np.linalg.norm(task.error(t, tip[learned]), axis=1)
         largest, rms = _sizes(true)
         trial = dataclasses.replace(trial, true_m=largest, true_rms_m=rms)
         channels["sensor/true_tip_error"] = true
@@ -231,7 +199,8 @@ def _judged(
         padded[name][learned] = values
     meta = run.meta | {"learning": numbers_of(trial)}
     units = run.units | dict.fromkeys(padded, "m")
-    dataclasses.replace(run, channels=run.channels | padded, units=units, meta=meta).save(folder)
+    made = dataclasses.replace(run, channels=run.channels | padded, units=units, meta=meta)
+    made.save(trial.folder)
     return trial
 
 
@@ -275,6 +244,3 @@ def _following(task: Task, out: Learned, share: float) -> tuple[np.ndarray, str]
             return references, ", ".join(notes)
         failed, share = plan, share / 2
     return None
-
-
-__all__ = ["Learned", "Trial", "check", "learn", "numbers_of"]

@@ -1,4 +1,4 @@
-"""What is known of the rig: the identified model, how sure it is, and what a reference does to it."""
+"""What is known of the rig: the identified model, how sure it is, what a reference does to it."""
 
 from __future__ import annotations
 

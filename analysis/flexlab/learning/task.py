@@ -141,8 +141,8 @@ class Task:
 
     def blended(self, change: np.ndarray) -> np.ndarray:
         """A change of references (T, J) that begins at 0 and ends at rest."""
-        smooth = lambda u: np.clip(u, 0, 1) ** 3 * (
-            10 - 15 * np.clip(u, 0, 1) + 6 * np.clip(u, 0, 1) ** 2
+        smooth = lambda u: (
+            np.clip(u, 0, 1) ** 3 * (10 - 15 * np.clip(u, 0, 1) + 6 * np.clip(u, 0, 1) ** 2)
         )
         begin = smooth((self.t - BLEND_S) / BLEND_S)[:, None]
         end = smooth((self.t[-1] - BLEND_S - self.t) / BLEND_S)[:, None]
@@ -190,6 +190,4 @@ class Task:
             {"t": REST_S + self.span_s, "name": "hold"},
             {"t": float(self.t[-1]), "name": "way back"},
         ]
-        return dataclasses.replace(
-            made, asked=made.asked | {"learning": learning}, phases=phases
-        )
+        return dataclasses.replace(made, asked=made.asked | {"learning": learning}, phases=phases)

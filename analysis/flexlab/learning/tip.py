@@ -1,63 +1,17 @@
-"""Where the tip was in a trial: what the sensors say, and, of an emulated rig, where it truly was."""
+"""Where the tip was in a trial, by encoders, sensor and the identified model."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 
 import flexura as fx
 
-from ..board.emulator.emulated import Outputs, Sensors
 from ..identification.identify import Identified
 from ..identification.strip import StripModel
 
 CORRECTED_HZ = 8.0  # of what the sensor says beyond the model
 DRIFT_DEGREE = 3
 REMEMBERED = 4  # trials over which that is averaged
-
-
-class Witness:
-    """A plant whose own tip is written down at every step.
-
-    It is a plant itself, and stands between the board and the plant.
-    """
-
-    def __init__(self, plant: Any) -> None:
-        """Args: plant: an emulated rig."""
-        self.plant, self.window_s, self.truth = plant, plant.window_s, plant.truth
-        self._rows: list[tuple[float, ...]] = [(0.0, *plant.mechanics.tip_m, 0.0)]
-
-    def advance(self, seconds: float, outputs: Outputs) -> Sensors:
-        """Advance the plant, as the plant itself does."""
-        sensors = self.plant.advance(seconds, outputs)
-        time = self._rows[-1][0] + seconds
-        self._rows.append((time, *self.plant.mechanics.tip_m, sensors.encoder_1))
-        return sensors
-
-    def tip(self, run: fx.Run, counts: float) -> np.ndarray:
-        """The plant's own tip at the times of a run, the newest one (T, 2) [m].
-
-        The run's clock is where its reports have the counts that the encoder of joint 1 had. The
-        mechanics are a window behind the encoder.
-
-        Args:
-            run: the run.
-            counts: of joint 1's encoder for 1 m or 1 rad.
-        """
-        rows = np.array(self._rows)
-        t, x, y, encoder = rows[rows[:, 0] > rows[-1, 0] - (run.t[-1] - run.t[0]) - 6.0].T
-        position = run["joint/1/position"]
-        there = np.isfinite(position)
-        seen = np.round(position[there] * counts)
-
-        def wrong(late: float) -> int:
-            off = np.floor(np.interp(run.t[there] + late, t, encoder)) - seen
-            return int((off != np.median(off)).sum())
-
-        late = min(np.arange(t[0], t[-1] - run.t[-1], 1e-3), key=wrong)
-        late = min(late + np.arange(-1e-3, 1e-3, 2e-5), key=wrong) + self.window_s
-        return np.column_stack([np.interp(run.t + late, t, place) for place in (x, y)])
 
 
 class Observer:

@@ -119,9 +119,7 @@ class LearningFilter:
         e = np.asarray(error, dtype=float)
         count = 2 * (len(self.weight) - 1)
         if 2 * len(e) > count:
-            raise InputError(
-                f"expected at most {count // 2} samples", key="error", value=len(e)
-            )
+            raise InputError(f"expected at most {count // 2} samples", key="error", value=len(e))
         # what is off at the end fades afterwards
         fade = 0.5 * (1 + np.cos(np.linspace(0.0, np.pi, count // 4)))
         padded = np.zeros((count, e.shape[1]))
@@ -160,12 +158,14 @@ def learning_filter(
     H = np.asarray(responses, dtype=complex)
     conjugate = H.conj().swapaxes(-1, -2)
     normal = (conjugate @ H).sum(axis=0)
-    if np.linalg.svd(normal[0], compute_uv=False)[-1] < RESTED * np.abs(normal[0]).max():
+    if np.linalg.svd(normal[0], compute_uv=False)[-1] <= RESTED * np.abs(normal[0]).max():
         raise InputError("expected references that move the outputs", key="responses")
     inverse = np.linalg.solve(normal, conjugate.sum(axis=0))
     one = np.eye(H.shape[-1])
     passed = H @ inverse
-    left = np.array([np.linalg.norm(one - w * passed, 2, axis=(-2, -1)).max(axis=0) for w in WEIGHTS])
+    left = np.array(
+        [np.linalg.norm(one - w * passed, 2, axis=(-2, -1)).max(axis=0) for w in WEIGHTS]
+    )
     best = left.argmin(axis=0)
     weight = np.where(left.min(axis=0) < CONTRACTS, WEIGHTS[best], 0.0)
     f = np.fft.rfftfreq(2 * (len(weight) - 1), step_s)
