@@ -46,6 +46,9 @@ from .results import LOGS, counted, file_result, refuse_taken
 from .verbosity import quiet
 
 
+SEEDS = 1000  # a seed of the command has so many of its own, one a trial
+
+
 def learn(
     rig: Annotated[Path, typer.Argument(metavar="RIG", help="rig file (TOML), or a name")],
     manoeuvre: Annotated[
@@ -99,7 +102,7 @@ def learn(
     if manoeuvre is not None:
         asked = fx.load_manoeuvre(manoeuvre, setup.rig.joints)
     try:
-        task = Task.of(setup, settings, asked)
+        task = Task.of(setup, settings, asked, goes_back=port is not None)
     except fx.InputError as error:
         raise error.in_file(str(manoeuvre or setup.rig.manoeuvre)) from None
     steps.check(task.plan(task.first, 1))
@@ -113,21 +116,28 @@ def learn(
         stack.enter_context(file_result(folder / output.SUMMARY, force=force))
         report = stack.enter_context(progress_bars("trials", "identify"))
         known = None if given is None else _known(given, model, report)
-        opened = steps.open_board(setup, port, seed, firmware)
-        stack.callback(opened.board.close)
-        board = opened.board
-        title = heading(board.label, board.emulated, f"learning of {asked.name or name}")
         stop = stack.enter_context(watch_for_stop())
-        pause = (0.0 if board.emulated else 3.0) if countdown_s is None else countdown_s
+        pause = (3.0 if port else 0.0) if countdown_s is None else countdown_s
         watch = steps.Hooks(
             say=lambda text: typer.echo(text, err=True),
             may_start=lambda link: countdown(link, pause, stop),
             stop_asked=stop.asked,
         )
+        rig_trials = BoardTrials(
+            setup,
+            lambda number: steps.open_board(setup, port, SEEDS * seed + number - 1, firmware),
+            folder,
+            sensor,
+            watch,
+            configure,
+        )
+        stack.callback(rig_trials.close)
+        label, is_emulated = rig_trials.opened.board.label, rig_trials.opened.board.emulated
+        title = heading(label, is_emulated, f"learning of {asked.name or name}")
         _remove_trials(folder)
 
         def done(learned: Learned) -> None:
-            output.save(learned, folder, board.label, board.emulated)
+            output.save(learned, folder, label, is_emulated)
             if not quiet():
                 trial = learned.trials[-1]
                 warn(f"trial {trial.number}: {1e3 * trial.sensed_m:.3g} mm by the sensors")
@@ -135,7 +145,7 @@ def learn(
         try:
             learned = learned_of(
                 task,
-                BoardTrials(setup, opened, folder, sensor, watch, configure),
+                rig_trials,
                 trials,
                 known=known,
                 progress=lambda what, part: report(
@@ -147,8 +157,8 @@ def learn(
             warn(f"flexura: {error}")
             raise typer.Exit(130) from None
         if learned.trials:
-            output.save(learned, folder, board.label, board.emulated)
-    _tell(learned, folder, title, board.label, board.emulated, json)
+            output.save(learned, folder, label, is_emulated)
+    _tell(learned, folder, title, label, is_emulated, json)
 
 
 def _known(run: fx.Run, path: Path | None, report: Callable[[str, float], None]) -> Identified:

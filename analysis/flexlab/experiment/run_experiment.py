@@ -31,7 +31,6 @@ from .plan import Plan
 from .selftest import prepare, run_selftest
 from .stream import StreamResult, execute, stop_motors
 
-SEQUENCES = 4099  # numbers of commands between two experiments on one emulated board
 SETTLE_S = {"forward": 1.0, "inverse": 0.5, "step": 0.5, "free-vibration": 0.0}
 
 
@@ -184,7 +183,7 @@ def conduct(
     watch: Hooks,
     configure: bool = False,
     replace: bool = False,
-    repeat: int = 0,
+    reference: bool = True,
 ) -> ExperimentResult:
     """Test the rig, start and execute a plan, and make the Run.
 
@@ -200,8 +199,8 @@ def conduct(
         watch: what the person sees and says.
         configure: whether the rig's settings may be written into a board that has others.
         replace: whether a recording in `folder` may be replaced.
-        repeat: how many experiments came before on this open board. Its joints are told that they
-            stand at 0 before the first one only.
+        reference: whether the board is told that the joints stand at 0; else it knows where they
+            are from an experiment before on the same open board.
 
     Returns:
         The Run, its folder, the self-test's findings, and how the stream ended.
@@ -216,8 +215,7 @@ def conduct(
     # The same experiment on the emulated board is the same byte for byte; a real line needs a
     # number that nobody played before.
     link = Link(
-        RecordingBoard(opened.board, recording),
-        sequence=1 + (repeat * SEQUENCES) % 0x10000 if opened.board.emulated else None,
+        RecordingBoard(opened.board, recording), sequence=1 if opened.board.emulated else None
     )
     try:
         findings = _ready(
@@ -228,7 +226,7 @@ def conduct(
             sensor,
             opened.board.emulated or configure,
             lambda link: commission(link, opened.board, watch.say, watch.stop_asked),
-            repeat == 0,
+            reference,
         )
         watch.tested(findings)
         if failed := [finding for finding in findings if not finding.passed]:

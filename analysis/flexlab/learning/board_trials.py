@@ -1,5 +1,9 @@
-"""Trials on a board: one experiment after another, without a new reference of the joints between
-them. Of an emulated rig it is written down where the tip truly was."""
+"""Trials on a board, one experiment after another.
+
+A real rig goes back to its zero and waits until its strip is at rest. An emulated one is made anew
+for each trial, which is the same and quicker; its noise is another each time. Of an emulated rig it
+is written down where the tip truly was.
+"""
 
 from __future__ import annotations
 
@@ -20,6 +24,7 @@ from ..rig import RigSetup
 from ..rig.board_axes import board_axes
 
 BEFORE_S = 6.0  # of an experiment, in which the rig is tested
+FADES, SETTLE_S = 4.0, 60.0  # e-folds of the first mode between two trials, and at most so long
 
 
 class Witness:
@@ -71,28 +76,38 @@ class BoardTrials:
     def __init__(
         self,
         setup: RigSetup,
-        opened: OpenBoard,
+        open_one: Callable[[int], OpenBoard],
         folder: Path,
         sensor: Sensor,
         watch: Hooks | None = None,
         configure: bool = False,
     ) -> None:
-        """Stand between an emulated board and its plant from now on.
+        """Open the board for the first trial.
 
         Args:
             setup: the rig.
-            opened: its board; the joints stand at 0.
+            open_one: opens the board for a trial, by its number; of a real one called once, with
+                its joints at 0.
             folder: gets one recording with its Run a trial: trial-01, trial-02, ...
             sensor: of the strip, calibrated.
             watch: what the person sees and says.
             configure: whether the rig's settings may be written into a board that has others.
         """
-        self.setup, self.opened, self.folder, self.sensor = setup, opened, folder, sensor
+        self.setup, self.folder, self.sensor = setup, folder, sensor
         self.watch, self.configure = watch or Hooks(), configure
+        self._open_one = open_one
+        self._open(1)
+
+    def _open(self, number: int) -> None:
+        self.opened = self._open_one(number)
         self._witness: Witness | None = None
-        if opened.plant is not None:
-            self._witness = Witness(opened.plant)
-            opened.board.plant = self._witness  # type: ignore[attr-defined]
+        if self.opened.plant is not None:
+            self._witness = Witness(self.opened.plant)
+            self.opened.board.plant = self._witness  # type: ignore[attr-defined]
+
+    def close(self) -> None:
+        """Close the board."""
+        self.opened.board.close()
 
     def perform(self, plan: Plan, number: int, report: Callable[[float], None]) -> ExperimentResult:
         """One trial, as `conduct` does it.
@@ -107,6 +122,12 @@ class BoardTrials:
             self.watch.observe(reports, part)
             report(part)
 
+        emulated = self.opened.board.emulated
+        if number > 1 and emulated:
+            self.close()
+            self._open(number)
+        elif number > 1:
+            self._let_settle()
         return conduct(
             self.setup,
             plan,
@@ -115,8 +136,15 @@ class BoardTrials:
             self.sensor,
             dataclasses.replace(self.watch, observe=observe),
             self.configure,
-            repeat=number - 1,
+            reference=number == 1 or emulated,
         )
+
+    def _let_settle(self) -> None:
+        """Wait until the strip of a real rig no longer vibrates; a stop is seen by the trial."""
+        slowest = np.min(-fx.linearize(self.setup.robot, joints="locked").poles.real)
+        end = self.opened.board.now() + min(SETTLE_S, FADES / max(float(slowest), 1e-9))
+        while self.opened.board.now() < end and not self.watch.stop_asked():
+            self.opened.board.wait(0.2)
 
     def stop_asked(self) -> str:
         """Why to end early, or ""."""

@@ -13,6 +13,7 @@ from flexura.control import (
     filter_length,
     learning_filter,
     reference_response,
+    transform_points,
 )
 
 from ..identification.identify import Identified
@@ -91,7 +92,7 @@ def filter_of(task: Task, knowledge: Knowledge) -> LearningFilter:
         knowledge: the model and its uncertainty.
     """
     count = filter_length(len(task.t))
-    f = np.fft.rfftfreq(count, STEP_S)
+    points = transform_points(count, STEP_S)
     postures = task.first[np.linspace(0, len(task.t) - 1, POSTURES).astype(int)]
     postures = np.unique(np.round(postures, 6), axis=0)
     controllers = loops(task.setup, task.settings)
@@ -102,9 +103,8 @@ def filter_of(task: Task, knowledge: Knowledge) -> LearningFilter:
         system = fx.assemble(with_drives(robot, task.setup.rig, lines))
         for posture in postures:
             q = fx.static(system, joints=posture)
-            moved = reference_response(system, q, f[1:], controllers)
-            at = _output(task, posture) @ moved
-            responses.append(np.concatenate([at[:1].real.astype(complex), at]))
+            moved = reference_response(system, q, points, controllers)
+            responses.append(_output(task, posture) @ moved)
     return learning_filter(np.array(responses), STEP_S, HIGHEST_HZ)
 
 

@@ -1,11 +1,7 @@
 """What is learned: references of the joints with which the tip goes where a rigid robot's would.
 
-A trial rests, does the manoeuvre, rests, and goes back to where it began:
-
-    0          REST_S           rest + manoeuvre        + HOLD_S        + return
-    | at rest  | the manoeuvre, with its leads | what is left to learn | to zero |
-
-References may change from the start to the end of the hold: the joints begin before the tip does.
+A trial rests for REST_S, does the manoeuvre, and holds for HOLD_S. On a real rig it then goes back
+to where it began. The joints may begin before the tip does.
 """
 
 from __future__ import annotations
@@ -29,7 +25,10 @@ from ..rig.board_axes import board_axes
 
 STEP_S = 2**plan.PERIOD_LOG2 / CONTROL_HZ  # of the board's knots
 REST_S, HOLD_S = 0.4, 0.4
-BLEND_S = 0.12  # at both ends, in which references stay where they are
+SPACING_S = 0.04  # of the splines of which changes are made
+BEFORE_S, AFTER_S = 0.2, 0.06  # the joint's motion, in which its references may change
+MOVING = 0.02  # of its largest speed
+PERIODS = 1.5  # of the first mode, in which an error after the motion counts an e-th
 RETURN_S = 1.0  # at least
 RETURN_SPEED = 0.25  # of the board's limit
 STILL_S = 0.4  # at the end, so that the joints settle at zero
@@ -45,6 +44,7 @@ class Task:
         manoeuvre: as it is asked.
         motions: its joints' motions with leads, from REST_S on, one Signal a joint.
         span_s: their duration [s].
+        goes_back: whether a trial ends where it began, as on a real rig.
     """
 
     setup: RigSetup
@@ -52,15 +52,23 @@ class Task:
     manoeuvre: fx.Manoeuvre
     motions: tuple[fx.Signal, ...]
     span_s: float
+    goes_back: bool = True
 
     @classmethod
-    def of(cls, setup: RigSetup, settings: dict[str, float], manoeuvre: fx.Manoeuvre) -> Task:
+    def of(
+        cls,
+        setup: RigSetup,
+        settings: dict[str, float],
+        manoeuvre: fx.Manoeuvre,
+        goes_back: bool = True,
+    ) -> Task:
         """The task of a manoeuvre; the rig is asked whether it can.
 
         Args:
             setup: the rig.
             settings: the board's settings, by name.
             manoeuvre: with a motion of each joint.
+            goes_back: whether a trial ends where it began.
 
         Raises:
             InputError: a joint has no motion, a motion does not begin at 0, or the rig cannot
@@ -77,7 +85,8 @@ class Task:
                     key=f"joint[{i}].motion",
                     value=motion(0.0)[0],
                 )
-        return cls(setup, settings, manoeuvre, tuple(led), lead_s + manoeuvre.duration_s + out_s)
+        span_s = lead_s + manoeuvre.duration_s + out_s
+        return cls(setup, settings, manoeuvre, tuple(led), span_s, goes_back)
 
     @cached_property
     def t(self) -> np.ndarray:
@@ -139,18 +148,51 @@ class Task:
             return error / np.linalg.norm(slopes[:, :, 0], axis=1)[:, None]
         return np.asarray(np.linalg.solve(slopes, error[:, :, None])[:, :, 0])
 
-    def blended(self, change: np.ndarray) -> np.ndarray:
-        """A change of references (T, J) that begins at 0 and ends at rest."""
-        smooth = lambda u: (
-            np.clip(u, 0, 1) ** 3 * (10 - 15 * np.clip(u, 0, 1) + 6 * np.clip(u, 0, 1) ** 2)
-        )
-        begin = smooth((self.t - BLEND_S) / BLEND_S)[:, None]
-        end = smooth((self.t[-1] - BLEND_S - self.t) / BLEND_S)[:, None]
-        last = change[np.searchsorted(self.t, self.t[-1] - 1.5 * BLEND_S)]
-        return np.asarray(begin * (end * change + (1 - end) * last))
+    @cached_property
+    def basis(self) -> list[np.ndarray]:
+        """Of each joint the functions (T, n) of which a change of its references is made.
+
+        They are cubic B-splines from shortly before the joint moves until shortly after; the last
+        one stays. A joint at rest sticks, and does not follow what is smaller than its friction.
+        """
+        from scipy.interpolate import BSpline
+
+        spline = BSpline.basis_element(np.arange(5.0), extrapolate=False)
+        out = []
+        for first, last in self.moving:
+            begin, end = first - BEFORE_S, last + AFTER_S
+            count = int(np.ceil((end - begin) / SPACING_S))
+            places = (self.t[:, None] - begin) / SPACING_S - np.arange(
+                2 + int(self.t[-1] / SPACING_S)
+            )
+            functions = np.nan_to_num(spline(places))
+            stays = functions[:, count:].sum(axis=1)
+            out.append(np.column_stack([functions[:, :count], stays]))
+        return out
+
+    @cached_property
+    def moving(self) -> list[tuple[float, float]]:
+        """From when to when each joint moves in the first trial [s]."""
+        out = []
+        for column in self.first.T:
+            speed = np.abs(np.gradient(column, STEP_S))
+            times = self.t[speed > MOVING * max(speed.max(), 1e-12)]
+            out.append((times[0], times[-1]) if len(times) else (REST_S, REST_S))
+        return out
+
+    @cached_property
+    def share(self) -> np.ndarray:
+        """What the tip's error counts at each time (T,): less and less after the motion.
+
+        A vibration that is stopped in its first periods does not come back. Later its phase shows
+        what the model's frequency is off, and a change that follows it would be wrong.
+        """
+        end = max(last for _, last in self.moving) + AFTER_S
+        period = 1 / fx.frequencies(self.setup.robot, count=1)[0]
+        return np.asarray(np.exp(-np.maximum(self.t - end, 0.0) / (PERIODS * period)))
 
     def asked(self, references: np.ndarray, name: str) -> fx.Manoeuvre:
-        """A trial as a manoeuvre: the references, and the way back.
+        """A trial as a manoeuvre: the references, and the way back if there is one.
 
         Args:
             references: (T, J) at `t` [m or rad].
@@ -160,14 +202,13 @@ class Task:
         for axis, last in zip(board_axes(self.settings), references[-1], strict=True):
             speed = RETURN_SPEED * self.settings[axis.names["speed"]]
             back_s = max(back_s, 1.875 * abs(float(last)) / speed)
-        steps = int(np.ceil(back_s / STEP_S))
-        still = round(STILL_S / STEP_S)
+        steps = int(np.ceil(back_s / STEP_S)) if self.goes_back else 0
+        still = round(STILL_S / STEP_S) if self.goes_back else 0
         t = STEP_S * np.arange(len(self.t) + steps + still)
-        motions = []
+        s, motions = STEP_S * np.arange(1, steps + 1), []
         for column in references.T:
-            row = quintic(0.0, steps * STEP_S, (column[-1], 0.0, 0.0), (0.0, 0.0, 0.0))
-            s = STEP_S * np.arange(1, steps + 1)
-            way = np.polynomial.polynomial.polyval(s, row[1:7])
+            row = quintic(0.0, back_s, (column[-1], 0.0, 0.0), (0.0, 0.0, 0.0))
+            way = np.polynomial.polynomial.polyval(np.minimum(s, back_s), row[1:7])
             motions.append(signals.table(t, np.concatenate([column, way, np.zeros(still)])))
         off = [0.0] * len(motions)
         drive = fx.Drive.pd(motions, off, off)
@@ -188,6 +229,7 @@ class Task:
             {"t": 0.0, "name": "rest"},
             {"t": REST_S, "name": "manoeuvre"},
             {"t": REST_S + self.span_s, "name": "hold"},
-            {"t": float(self.t[-1]), "name": "way back"},
         ]
+        if self.goes_back:
+            phases.append({"t": float(self.t[-1]), "name": "way back"})
         return dataclasses.replace(made, asked=made.asked | {"learning": learning}, phases=phases)

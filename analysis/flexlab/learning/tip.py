@@ -46,13 +46,14 @@ class Observer:
         drift = np.polynomial.Legendre.fit(run.t, off, DRIFT_DEGREE)
         rate = 1 / float(np.median(np.diff(run.t)))
         low = butter(2, CORRECTED_HZ, output="sos", fs=rate)
-        deflection = model[f"link/{data.link}/tip_deflection"]
-        for_V = np.polyfit(said, deflection, 1)[0]
+        for_V = np.polyfit(said, model[f"link/{data.link}/tip_deflection"], 1)[0]
         if len(self._beyond) == 1 or len(self._beyond) > REMEMBERED:
             self._beyond.pop(0)  # the first trial's motion is another
-        beyond = for_V * sosfiltfilt(low, off - drift(run.t))
-        self._beyond.append(beyond)
+        self._beyond.append(for_V * sosfiltfilt(low, off - drift(run.t)))
         mean = np.mean([_of_length(b, len(run.t)) for b in self._beyond], axis=0)
+        # of what is left, noise of the sensor is no motion
+        noise = (for_V * data.sensor_noise_V) ** 2 * 2 * CORRECTED_HZ / rate / len(self._beyond)
+        mean *= max(0.0, 1.0 - noise / max(float(np.mean(mean**2)), 1e-30))
         angle = model[f"link/{data.link}/angle"]
         across = np.column_stack([-np.sin(angle), np.cos(angle)])
         tips = np.column_stack([model["tip/x"], model["tip/y"]])

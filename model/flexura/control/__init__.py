@@ -18,8 +18,10 @@ from .ilc import (
     JointLoop,
     LearningFilter,
     filter_length,
+    inverse_of_many,
     learning_filter,
     reference_response,
+    transform_points,
 )
 from .lqr_design import Design, lqr
 from .pid import GAINS, PID, Force, Motor, Output, Stepper
@@ -77,6 +79,7 @@ __all__ = [
     "board_pulses",
     "filter_coefficient",
     "filter_length",
+    "inverse_of_many",
     "learning_filter",
     "load_gains",
     "lqr",
@@ -84,4 +87,5 @@ __all__ = [
     "step_figures",
     "step_response",
     "strip_metrics",
+    "transform_points",
 ]

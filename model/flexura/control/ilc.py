@@ -16,6 +16,8 @@ from ..system import assemble, linearize
 
 WEIGHTS = np.linspace(0.0, 1.0, 41)  # that are tried
 CONTRACTS = 0.9  # of an error: what a trial must leave less than
+FORGETS = 7.0  # e-folds in the duration of a transform
+RIDGE = 1e-3  # of the largest square: what moves the tip less is left alone
 RESTED = 1e-9  # of the largest response: a reference that moves the tip less does nothing
 
 
@@ -38,16 +40,17 @@ class JointLoop:
     kv: float = 0.0
 
 
-def reference_response(
-    robot: Any, q: Any, frequencies_Hz: Any, loops: Sequence[JointLoop | None]
-) -> np.ndarray:
+def reference_response(robot: Any, q: Any, s: Any, loops: Sequence[JointLoop | None]) -> np.ndarray:
     """The tip's small motions under the joints' references, through the controllers (141).
+
+    The controllers move the robot as if it were rigid. Its links vibrate on joints that move as
+    prescribed: friction and gear hold a joint against them.
 
     Args:
         robot: a System, a Robot, or the path or name of a robot file, with the drives' inertia and
             damping in its joints.
         q: the equilibrium (n,), or None: the static one at the start.
-        frequencies_Hz: (F,), above 0.
+        s: complex frequencies (F,) [1/s], as of `transform_points`; not 0.
         loops: one a joint; None: the joint follows its reference exactly.
 
     Returns:
@@ -61,20 +64,21 @@ def reference_response(
     joints = len(system.robot.links)
     if len(loops) != joints or len(lin.inputs) != joints:
         raise InputError("expected a loop for each joint, none locked", key="loops")
-    s = 2j * np.pi * np.asarray(frequencies_Hz, dtype=float)[:, None, None]
+    s = np.asarray(s, dtype=complex)[:, None, None]
     moved = np.linalg.solve(s**2 * lin.M + s * lin.G + lin.K, lin.E[None])
-    rows = [lin.outputs.index(f"joint/{i + 1}/position") for i in range(joints)]
-    joint = lin.outlook[rows] @ moved
-    tip = lin.outlook[[lin.outputs.index("tip/x"), lin.outputs.index("tip/y")]] @ moved
-    left, right = joint.copy(), np.zeros_like(joint)
+    place = [lin.outputs.index(f"joint/{i + 1}/position") for i in range(joints)]
+    tip = [lin.outputs.index("tip/x"), lin.outputs.index("tip/y")]
+    left = np.asarray(lin.E.T @ (s**2 * lin.M + s * lin.G + lin.K) @ lin.E)
+    right = np.zeros_like(left)
     for i, loop in enumerate(loops):
-        right[:, i, i] = 1.0
-        if loop is not None:
-            back = loop.force_per_V * (loop.kp + loop.ki / s + loop.kd * s)[:, 0, 0]
-            left[:, i] *= back[:, None]
-            left[:, i, i] += 1.0
-            right[:, i, i] = back + loop.force_per_V * loop.kv * s[:, 0, 0]
-    return np.asarray(tip @ np.linalg.solve(left, right))
+        if loop is None:
+            left[:, i], left[:, i, i], right[:, i, i] = 0.0, 1.0, 1.0
+            continue
+        back = loop.force_per_V * (loop.kp + loop.ki / s + loop.kd * s)[:, 0, 0]
+        left[:, i, i] += back
+        right[:, i, i] = back + loop.force_per_V * loop.kv * s[:, 0, 0]
+    joint = np.linalg.solve(left, right)
+    return np.asarray(lin.outlook[tip] @ moved @ np.linalg.solve(lin.outlook[place] @ moved, joint))
 
 
 @dataclass(frozen=True)
@@ -83,20 +87,30 @@ class LearningFilter:
 
     Attributes:
         step_s: time between two samples [s].
-        inverse: L (F, m, m), complex, at the frequencies of `numpy.fft.rfftfreq`.
+        responses: H_p (P, F, m, m), complex, at `transform_points`.
         weight: w (F,), between 0 and 1.
         contraction: what one trial leaves of an error at the worst (F,); 1 where w is 0.
     """
 
     step_s: float
-    inverse: np.ndarray
+    responses: np.ndarray
     weight: np.ndarray
     contraction: np.ndarray
 
     @property
+    def samples(self) -> int:
+        """Samples of a transform."""
+        return 2 * (len(self.weight) - 1)
+
+    @property
     def frequencies_Hz(self) -> np.ndarray:
         """Frequencies (F,) [Hz]."""
-        return np.fft.rfftfreq(2 * (len(self.weight) - 1), self.step_s)
+        return np.fft.rfftfreq(self.samples, self.step_s)
+
+    @property
+    def shift(self) -> float:
+        """The real part of the points at which responses are taken [1/s]."""
+        return FORGETS / (self.samples * self.step_s)
 
     @property
     def bandwidth_Hz(self) -> float:
@@ -104,11 +118,17 @@ class LearningFilter:
         low = np.flatnonzero(self.weight < 0.5)
         return float(self.frequencies_Hz[low[0] - 1 if len(low) and low[0] else -1])
 
-    def update(self, error: Any) -> np.ndarray:
+    def update(
+        self, error: Any, basis: Sequence[np.ndarray], share: np.ndarray | None = None
+    ) -> np.ndarray:
         """Changes of the references for a trial's error (140), before and after it in time.
 
         Args:
             error: (T, m), what the outputs lack, at rest at its start.
+            basis: one a reference: functions (T, n) of which its change is made. They are 0 at the
+                start and constant at the end.
+            share: what each sample counts (T,), 1 where it is left out. Long after a motion the
+                phase of a model's vibration is no longer the robot's.
 
         Returns:
             (T, m).
@@ -117,35 +137,90 @@ class LearningFilter:
             InputError: the trial is longer than half of what the filter is made for.
         """
         e = np.asarray(error, dtype=float)
-        count = 2 * (len(self.weight) - 1)
-        if 2 * len(e) > count:
-            raise InputError(f"expected at most {count // 2} samples", key="error", value=len(e))
-        # what is off at the end fades afterwards
-        fade = 0.5 * (1 + np.cos(np.linspace(0.0, np.pi, count // 4)))
-        padded = np.zeros((count, e.shape[1]))
-        padded[: len(e)] = e
-        padded[len(e) : len(e) + len(fade)] = e[-1] * fade[:, None]
-        spectrum = np.fft.rfft(padded, axis=0)
-        change = self.weight[:, None] * (self.inverse @ spectrum[:, :, None])[:, :, 0]
-        return np.asarray(np.fft.irfft(change, count, axis=0)[: len(e)])
+        rows, joints = e.shape
+        if 2 * rows > self.samples:
+            raise InputError(
+                f"expected at most {self.samples // 2} samples", key="error", value=rows
+            )
+        counts = np.ones(rows) if share is None else np.asarray(share, dtype=float)
+        wanted = counts[:, None] * self._weighted(e)
+        normal, right = 0.0, 0.0
+        for H in self.responses:
+            columns = [self._moved(H[:, :, j], one) for j, one in enumerate(basis)]
+            A = self._weighted(np.concatenate(columns, axis=-1).reshape(rows, -1))
+            A = (counts[:, None] * A).reshape(rows * joints, -1)
+            normal, right = normal + A.T @ A, right + A.T @ wanted.ravel()
+        normal += RIDGE * np.diag(normal).max() * np.eye(len(normal))
+        found = np.split(
+            np.linalg.solve(normal, right), np.cumsum([b.shape[1] for b in basis])[:-1]
+        )
+        return np.column_stack([b @ c for b, c in zip(basis, found, strict=True)])
+
+    def _moved(self, H: np.ndarray, one: np.ndarray) -> np.ndarray:
+        """The outputs (T, m, n) under functions (T, n) of one reference, H (F, m)."""
+        rows = len(one)
+        grow = np.exp(self.shift * self.step_s * np.arange(rows))[:, None, None]
+        spectrum = np.fft.rfft(one / grow[:, 0], self.samples, axis=0)
+        moved = np.fft.irfft(H[:, :, None] * spectrum[:, None], self.samples, axis=0)
+        return np.asarray(grow * moved[:rows])
+
+    def _weighted(self, values: np.ndarray) -> np.ndarray:
+        """Values (T, n) through the weight, which has no phase; what is left at the end fades."""
+        fade = 0.5 * (1 + np.cos(np.linspace(0.0, np.pi, self.samples // 4)))
+        padded = np.concatenate([values, fade[:, None] * values[-1]])
+        spectrum = self.weight[:, None] * np.fft.rfft(padded, self.samples, axis=0)
+        return np.asarray(np.fft.irfft(spectrum, self.samples, axis=0)[: len(values)])
 
 
 def filter_length(samples: int) -> int:
-    """Samples of a filter for trials of so many: a power of two, at least twice as many."""
+    """Samples of a transform for trials of so many: a power of two, at least twice as many."""
     return 1 << int(np.ceil(np.log2(2 * samples)))
+
+
+def transform_points(samples: int, step_s: float) -> np.ndarray:
+    """Complex frequencies s (F,) [1/s] of a transform that forgets.
+
+    Their real part is above 0, so that a motion that rings for long does not come round again.
+
+    Args:
+        samples: of the transform, as of `filter_length`.
+        step_s: time between two samples [s].
+    """
+    return FORGETS / (samples * step_s) + 2j * np.pi * np.fft.rfftfreq(samples, step_s)
+
+
+def inverse_of_many(responses: np.ndarray) -> np.ndarray:
+    """The least-squares inverse of all responses together (142).
+
+    Where they agree it inverts them. Where a resonance may be on either side, they cancel.
+
+    Args:
+        responses: H_p (P, F, m, m), complex.
+
+    Returns:
+        L (F, m, m), complex.
+
+    Raises:
+        InputError: a reference does not move the outputs.
+    """
+    H = np.asarray(responses, dtype=complex)
+    conjugate = H.conj().swapaxes(-1, -2)
+    normal = (conjugate @ H).sum(axis=0)
+    if np.linalg.svd(normal[0], compute_uv=False)[-1] <= RESTED * np.abs(normal[0]).max():
+        raise InputError("expected references that move the outputs", key="responses")
+    return np.asarray(np.linalg.solve(normal, conjugate.sum(axis=0)))
 
 
 def learning_filter(
     responses: np.ndarray, step_s: float, highest_Hz: float = np.inf
 ) -> LearningFilter:
-    """The inverse of robots that may be meant (142), and how much of it is safe (143).
+    """How much of an error is safe to learn at each frequency (143).
 
-    L is the least-squares inverse of all responses together. Where they agree it inverts them.
-    Where a resonance may be on either side, they cancel. The weight w is that which leaves the
-    least of an error for the worst robot, 0 where an error might not shrink.
+    The weight w is that which leaves the least of an error for the worst robot, 0 where an error
+    might not shrink.
 
     Args:
-        responses: H_p (P, F, m, m), complex, of P robots at the frequencies of `rfftfreq`.
+        responses: H_p (P, F, m, m), complex, of P robots at `transform_points`.
         step_s: time between two samples [s].
         highest_Hz: nothing is learned above; the weight falls to 0 within half an octave below.
 
@@ -156,21 +231,14 @@ def learning_filter(
         InputError: a reference does not move the outputs.
     """
     H = np.asarray(responses, dtype=complex)
-    conjugate = H.conj().swapaxes(-1, -2)
-    normal = (conjugate @ H).sum(axis=0)
-    if np.linalg.svd(normal[0], compute_uv=False)[-1] <= RESTED * np.abs(normal[0]).max():
-        raise InputError("expected references that move the outputs", key="responses")
-    inverse = np.linalg.solve(normal, conjugate.sum(axis=0))
-    one = np.eye(H.shape[-1])
-    passed = H @ inverse
+    one, passed = np.eye(H.shape[-1]), H @ inverse_of_many(H)
     left = np.array(
         [np.linalg.norm(one - w * passed, 2, axis=(-2, -1)).max(axis=0) for w in WEIGHTS]
     )
-    best = left.argmin(axis=0)
-    weight = np.where(left.min(axis=0) < CONTRACTS, WEIGHTS[best], 0.0)
+    weight = np.where(left.min(axis=0) < CONTRACTS, WEIGHTS[left.argmin(axis=0)], 0.0)
     f = np.fft.rfftfreq(2 * (len(weight) - 1), step_s)
     with np.errstate(divide="ignore"):
         octaves = np.log2(highest_Hz / f)
     weight *= 0.5 * (1 - np.cos(np.pi * np.clip(2 * octaves, 0.0, 1.0)))
     contraction = np.linalg.norm(one - weight[:, None, None] * passed, 2, axis=(-2, -1)).max(axis=0)
-    return LearningFilter(step_s, inverse, weight, contraction)
+    return LearningFilter(step_s, H, weight, contraction)
