@@ -45,7 +45,6 @@ from .output import message, print_results, progress_bars, warn
 from .results import LOGS, counted, file_result, refuse_taken
 from .verbosity import quiet
 
-
 SEEDS = 1000  # a seed of the command has so many of its own, one a trial
 
 

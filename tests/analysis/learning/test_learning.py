@@ -33,6 +33,7 @@ TRUE = {
     "delay_s": 1e-3,
 }
 NOISE_V = 4e-3
+PEAK_RAD_S = 0.4 * 1.875 / 0.5  # of the swing
 DONE = StreamResult(True, "all done", True)
 
 
@@ -121,14 +122,19 @@ def test_a_task_rests_moves_and_goes_back():
     assert made.error(t, round_by(2.5e-3)) == pytest.approx(-1e-3)
     assert made.error(t, 0.99 * at) == pytest.approx(0)
     assert made.at_joints(t, np.array([[1e-3]])) == pytest.approx(2.5e-3)
-    change = made.blended(np.ones((len(made.t), 1)))
-    assert change[0] == 0 and change[-1] == 1 and np.ptp(change[-10:]) == 0
+    (basis,) = made.basis
+    assert not basis[: round(0.2 / 0.008)].any()
+    assert basis[-1] == pytest.approx(np.eye(basis.shape[1])[-1]) and np.ptp(basis[-9:, -1]) < 1e-9
+    assert made.share[0] == 1 > made.share[-1] > 0
+    once = dataclasses.replace(made, goes_back=False).plan(made.first, 1)
+    assert once.knots.columns["position_1"][-1] == position.max()
 
 
 def test_a_motion_that_does_not_begin_at_zero_is_refused():
     drive = fx.Drive.pd([fx.signals.constant(0.3)], [0.0], [0.0])
-    with pytest.raises(fx.InputError, match=r"joint\[1\].motion.*begins at 0"):
+    with pytest.raises(fx.InputError, match="begins at 0") as caught:
         Task.of(SETUP, SETTINGS, fx.Manoeuvre("held", 1.0, 0.01, drive))
+    assert caught.value.key == "joint[1].motion"
 
 
 def test_an_uncertain_model_learns_less():
@@ -166,9 +172,9 @@ def test_trials_get_better_and_what_is_best_is_kept(tmp_path):
     assert played == pytest.approx(made.best.references[:, 0], abs=1e-9)
 
 
+@pytest.mark.slow
 def test_worse_trials_are_left_and_end_the_learning(tmp_path):
-    wrong = dataclasses.replace(known(), strip=dataclasses.replace(known().strip))
-    made = learn(task(), Drunken(tmp_path), 9, known=wrong)
+    made = learn(task(), Drunken(tmp_path), 9, known=known())
     assert made.complete and "in a row" in made.ended
     assert len(made.trials) == made.best.number + 2
     assert made.trials[-1].note.startswith(f"from trial {made.best.number}, 0.5 of the change")
@@ -197,13 +203,12 @@ def test_what_is_finished_is_kept_when_a_trial_ends_early(tmp_path):
 
 def test_limits_hold_a_change_back(tmp_path):
     """The speed limit of the board is just above the first trial's speed."""
-    settings = SETTINGS | {"speed_max_1_rad_s": 0.4 * 1.875 / 0.5 * 1.02}
+    settings = SETTINGS | {"speed_max_1_rad_s": 1.001 * PEAK_RAD_S}
     rig = NativeRig(tmp_path)
     made = learn(Task.of(SETUP, settings, swing()), rig, 2, known=known())
     assert all(not plan.failed for plan in rig.plans)
-    assert made.ended == "the rig's limits allow no further change" or "limit: " in (
-        made.trials[1].note
-    )
+    second = made.trials[1].note if len(made.trials) > 1 else ""
+    assert made.ended == "the rig's limits allow no further change" or "limit: " in second
 
 
 @pytest.mark.parametrize(
