@@ -19,7 +19,7 @@ from flexura.errors import InputError
 
 from ..board.protocol.declaration import CONTROL_HZ
 from ..experiment import plan
-from ..experiment.lead_in import quintic, with_lead_in
+from ..experiment.lead_in import AT_REST, quintic, with_lead_in
 from ..rig import RigSetup
 from ..rig.board_axes import board_axes
 
@@ -79,7 +79,7 @@ class Task:
         motions = [joint.motion for joint in manoeuvre.drive.joints if joint.motion is not None]
         led = [with_lead_in(m, manoeuvre.duration_s, lead_s, out_s) for m in motions]
         for i, motion in enumerate(led, 1):
-            if abs(motion(0.0)[0]) > plan.AT_REST:
+            if abs(motion(0.0)[0]) > AT_REST:
                 raise InputError(
                     "expected a motion that begins at 0, where every trial begins",
                     key=f"joint[{i}].motion",
