@@ -107,7 +107,7 @@ def learn(
 
     The first trial is the manoeuvre as it is. Without `known` the model is identified from it. Each
     further trial adds to the best one's references what the learning filter makes of its error. A
-    trial that is worse is left; the next one goes half as far. After two in a row it ends.
+    trial that is worse is left; from then on changes go half as far. After two in a row it ends.
 
     Args:
         task: what is learned.
@@ -129,7 +129,7 @@ def learn(
         raise InputError("expected 1 or more", key="--trials", value=trials)
     out = Learned(task, found=known)
     observer: Observer | None = None
-    references, worse, note = task.first, 0, ""
+    references, worse, missed, note = task.first, 0, 0, ""
     for number in range(1, trials + 1):
         report = lambda part, n=number: progress(f"trial {n}", (n - 1 + part) / trials)
         try:
@@ -152,11 +152,12 @@ def learn(
         out.trials.append(trial)
         done(out)
         worse = 0 if trial is out.best else worse + 1
+        missed += worse > 0
         if worse == WORSE:
             out.ended = f"{WORSE} trials in a row were no better than the best"
         elif number == trials:
             out.ended = "all trials are done"
-        elif (following := _following(task, out, 0.5**worse)) is None:
+        elif (following := _following(task, out, max(0.5**missed, SMALLEST))) is None:
             out.ended = "the rig's limits allow no further change"
         else:
             references, note = following
