@@ -231,8 +231,7 @@ def _following(task: Task, out: Learned, share: float) -> tuple[np.ndarray, str]
     nothing is left."""
     assert out.filter is not None
     best = out.best
-    lacks = task.at_joints(task.t, best.lacks)
-    change = out.filter.update(lacks, task.basis, task.share)
+    change = out.filter.update(best.lacks, task.basis, task.directions, task.share)
     notes = [] if best is out.trials[-1] else [f"from trial {best.number}"]
     failed: Plan | None = None
     while share >= SMALLEST:

@@ -15,6 +15,7 @@ from flexura.control import (
     reference_response,
     transform_points,
 )
+from flexura.errors import InputError
 
 from ..identification.identify import Identified
 from ..identification.strip import with_parameters
@@ -29,6 +30,7 @@ SURELY = 2.0  # standard deviations
 MODEL = 0.02  # of the stiffness: what no interval has, the model's own error
 NAMES = ("stiffness", "damping", "payload")
 POSTURES = 3  # along the manoeuvre, where the robot is linearised
+WORST, SINGULAR = 20.0, 1e4  # condition of the joints' slopes there
 
 
 @dataclass(frozen=True)
@@ -90,25 +92,40 @@ def filter_of(task: Task, knowledge: Knowledge) -> LearningFilter:
     Args:
         task: what is learned.
         knowledge: the model and its uncertainty.
+
+    Raises:
+        InputError: the joints cannot move the tip in every direction, anywhere on the way.
     """
-    count = filter_length(len(task.t))
-    points = transform_points(count, STEP_S)
-    postures = task.first[np.linspace(0, len(task.t) - 1, POSTURES).astype(int)]
-    postures = np.unique(np.round(postures, 6), axis=0)
+    points = transform_points(filter_length(len(task.t)), STEP_S)
     controllers = loops(task.setup, task.settings)
     lines = [(axis, joint_line(axis)) for axis in motor_axes(task.setup.rig)]
-    responses = []
+    postures = _postures(task)
+    slopes, across = task.slopes(postures), task.across(postures)
+    responses, motions = [], []
     for factors in (knowledge.values, *knowledge.others):
         robot = with_parameters(task.setup.robot, knowledge.values | factors)
         system = fx.assemble(with_drives(robot, task.setup.rig, lines))
-        for posture in postures:
+        for posture, by_joints, normal in zip(postures, slopes, across, strict=True):
             q = fx.static(system, joints=posture)
-            moved = reference_response(system, q, points, controllers)
-            responses.append(_output(task, posture) @ moved)
-    return learning_filter(np.array(responses), STEP_S, HIGHEST_HZ)
+            tip, joints = reference_response(system, q, points, controllers)
+            responses.append(np.linalg.pinv(by_joints) @ tip)
+            bent = normal @ (tip - by_joints @ joints)
+            motions.append(np.concatenate([joints, bent[:, None]], axis=1))
+    return learning_filter(np.array(responses), STEP_S, HIGHEST_HZ, np.array(motions))
 
 
-def _output(task: Task, posture: np.ndarray) -> np.ndarray:
-    """From the tip's motion to the rigid robot's joints (J, 2) about a posture (J,)."""
-    slopes = task.slopes(posture[None])[0]
-    return np.asarray(np.linalg.pinv(slopes))
+def _postures(task: Task) -> np.ndarray:
+    """Some postures on the way (k, J) in which the joints move the tip in every direction."""
+    begin = min(first for first, _ in task.moving)
+    end = max(last for _, last in task.moving)
+    way = task.joints(np.linspace(begin, end, 8 * POSTURES + 1))
+    conditions = np.linalg.cond(task.slopes(way))
+    good = way[conditions < max(WORST, 3 * conditions.min())]
+    if conditions.min() > SINGULAR:
+        raise InputError(
+            "expected a manoeuvre on which the joints can move the tip in every direction",
+            key="manoeuvre",
+            value=task.manoeuvre.name,
+        )
+    some = good[np.linspace(0, len(good) - 1, POSTURES).round().astype(int)]
+    return np.unique(np.round(some, 6), axis=0)

@@ -141,12 +141,23 @@ class Task:
         angle = (angle + np.pi) % (2 * np.pi) - np.pi
         return np.asarray(angle * np.hypot(*wanted.T))[:, None]
 
-    def at_joints(self, t: np.ndarray, error: np.ndarray) -> np.ndarray:
-        """The joints' motions that a rigid robot would need for an error (T, J) [m or rad]."""
-        slopes = self.slopes(self.joints(t))
-        if self.setup.rig.joints == 1:
-            return error / np.linalg.norm(slopes[:, :, 0], axis=1)[:, None]
-        return np.asarray(np.linalg.solve(slopes, error[:, :, None])[:, :, 0])
+    @cached_property
+    def directions(self) -> np.ndarray:
+        """What the joints and the last link's deflection do to what `error` measures, at `t` (T, m,
+        J + 1)."""
+        slopes, across = self.slopes(self.first), self.across(self.first)
+        both = np.concatenate([slopes, across[:, :, None]], axis=2)
+        if self.setup.rig.joints > 1:
+            return both
+        return np.asarray(across[:, None] @ both)
+
+    def across(self, joints: np.ndarray) -> np.ndarray:
+        """Unit vectors across the last link of a rigid robot whose joints are at (T, J) (T, 2)."""
+        links = self.setup.robot.links
+        turns = [link.joint.type == "R" for link in links]
+        angle = joints @ np.array(turns, dtype=float)
+        angle = angle + sum(link.joint.angle_rad for link in links)
+        return np.column_stack([-np.sin(angle), np.cos(angle)])
 
     @cached_property
     def basis(self) -> list[np.ndarray]:

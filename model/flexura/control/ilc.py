@@ -41,7 +41,7 @@ class JointLoop:
 
 
 def reference_response(robot: Any, q: Any, s: Any, loops: Sequence[JointLoop | None]) -> np.ndarray:
-    """The tip's small motions under the joints' references, through the controllers (141).
+    """Small motions of tip and joints under the joints' references, through the controllers (141).
 
     The controllers move the robot as if it were rigid. Its links vibrate on joints that move as
     prescribed: friction and gear hold a joint against them.
@@ -54,7 +54,8 @@ def reference_response(robot: Any, q: Any, s: Any, loops: Sequence[JointLoop | N
         loops: one a joint; None: the joint follows its reference exactly.
 
     Returns:
-        (F, 2, joints), complex: x and y of the tip for a unit of each reference.
+        H (F, 2, joints) and T (F, joints, joints), complex: x and y of the tip, and the joints, for
+        a unit of each reference.
 
     Raises:
         InputError: there are not as many loops as joints, or a joint is locked.
@@ -78,7 +79,7 @@ def reference_response(robot: Any, q: Any, s: Any, loops: Sequence[JointLoop | N
         left[:, i, i] += back
         right[:, i, i] = back + loop.force_per_V * loop.kv * s[:, 0, 0]
     joint = np.linalg.solve(left, right)
-    return np.asarray(lin.outlook[tip] @ moved @ np.linalg.solve(lin.outlook[place] @ moved, joint))
+    return lin.outlook[tip] @ moved @ np.linalg.solve(lin.outlook[place] @ moved, joint), joint
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,7 @@ class LearningFilter:
 
     Attributes:
         step_s: time between two samples [s].
-        responses: H_p (P, F, m, m), complex, at `transform_points`.
+        responses: H_p (P, F, k, J), complex, at `transform_points`: of k motions to J references.
         weight: w (F,), between 0 and 1.
         contraction: what one trial leaves of an error at the worst (F,); 1 where w is 0.
     """
@@ -119,7 +120,11 @@ class LearningFilter:
         return float(self.frequencies_Hz[low[0] - 1 if len(low) and low[0] else -1])
 
     def update(
-        self, error: Any, basis: Sequence[np.ndarray], share: np.ndarray | None = None
+        self,
+        error: Any,
+        basis: Sequence[np.ndarray],
+        directions: np.ndarray,
+        share: np.ndarray | None = None,
     ) -> np.ndarray:
         """Changes of the references for a trial's error (140), before and after it in time.
 
@@ -127,17 +132,18 @@ class LearningFilter:
             error: (T, m), what the outputs lack, at rest at its start.
             basis: one a reference: functions (T, n) of which its change is made. They are 0 at the
                 start and constant at the end.
+            directions: what the k motions do to the outputs (T, m, k).
             share: what each sample counts (T,), 1 where it is left out. Long after a motion the
                 phase of a model's vibration is no longer the robot's.
 
         Returns:
-            (T, m).
+            (T, J).
 
         Raises:
             InputError: the trial is longer than half of what the filter is made for.
         """
         e = np.asarray(error, dtype=float)
-        rows, joints = e.shape
+        rows = len(e)
         if 2 * rows > self.samples:
             raise InputError(
                 f"expected at most {self.samples // 2} samples", key="error", value=rows
@@ -147,8 +153,8 @@ class LearningFilter:
         normal, right = 0.0, 0.0
         for H in self.responses:
             columns = [self._moved(H[:, :, j], one) for j, one in enumerate(basis)]
-            A = self._weighted(np.concatenate(columns, axis=-1).reshape(rows, -1))
-            A = (counts[:, None] * A).reshape(rows * joints, -1)
+            A = self._weighted((directions @ np.concatenate(columns, axis=-1)).reshape(rows, -1))
+            A = (counts[:, None] * A).reshape(e.size, -1)
             normal, right = normal + A.T @ A, right + A.T @ wanted.ravel()
         normal += RIDGE * np.diag(normal).max() * np.eye(len(normal))
         found = np.split(
@@ -157,7 +163,7 @@ class LearningFilter:
         return np.column_stack([b @ c for b, c in zip(basis, found, strict=True)])
 
     def _moved(self, H: np.ndarray, one: np.ndarray) -> np.ndarray:
-        """The outputs (T, m, n) under functions (T, n) of one reference, H (F, m)."""
+        """The motions (T, k, n) under functions (T, n) of one reference, H (F, k)."""
         rows = len(one)
         grow = np.exp(self.shift * self.step_s * np.arange(rows))[:, None, None]
         spectrum = np.fft.rfft(one / grow[:, 0], self.samples, axis=0)
@@ -212,7 +218,10 @@ def inverse_of_many(responses: np.ndarray) -> np.ndarray:
 
 
 def learning_filter(
-    responses: np.ndarray, step_s: float, highest_Hz: float = np.inf
+    responses: np.ndarray,
+    step_s: float,
+    highest_Hz: float = np.inf,
+    motions: np.ndarray | None = None,
 ) -> LearningFilter:
     """How much of an error is safe to learn at each frequency (143).
 
@@ -220,9 +229,11 @@ def learning_filter(
     might not shrink.
 
     Args:
-        responses: H_p (P, F, m, m), complex, of P robots at `transform_points`.
+        responses: H_p (P, F, m, m), complex, of P robots at `transform_points`: from which the
+            weight follows.
         step_s: time between two samples [s].
         highest_Hz: nothing is learned above; the weight falls to 0 within half an octave below.
+        motions: (P, F, k, J), what the references do, for the changes; None: `responses`.
 
     Returns:
         The filter.
@@ -241,4 +252,4 @@ def learning_filter(
         octaves = np.log2(highest_Hz / f)
     weight *= 0.5 * (1 - np.cos(np.pi * np.clip(2 * octaves, 0.0, 1.0)))
     contraction = np.linalg.norm(one - weight[:, None, None] * passed, 2, axis=(-2, -1)).max(axis=0)
-    return LearningFilter(step_s, H, weight, contraction)
+    return LearningFilter(step_s, H if motions is None else motions, weight, contraction)
