@@ -219,7 +219,7 @@ def responses(*factors):
         link = robots.beam(0.4, 0.157, factor * 0.33, 3, hub_inertia_kg_m2=0.03)
         link["damping"] = {"beta_s": 2e-4}
         made = robots.system(link, payload=0.02)
-        out.append(control.reference_response(made, None, POINTS_S, [LOOP])[:, 1:])
+        out.append(control.reference_response(made, None, POINTS_S, [LOOP])[0][:, 1:])
     return np.array(out)
 
 
@@ -244,6 +244,7 @@ def test_a_change_is_the_least_of_what_all_robots_lack():
     u = np.clip((t - 0.4) / 0.5, 0, 1)
     error = 0.02 * np.sin(np.pi * u) + 0.003 * u
     share = np.exp(-np.maximum(t - 1.1, 0.0) / 0.5)
+    far = 1 + 0.2 * t  # what the motion does to the output
     fade = 0.5 * (1 + np.cos(np.linspace(0, np.pi, 256)))
 
     def weighted(x):
@@ -255,22 +256,22 @@ def test_a_change_is_the_least_of_what_all_robots_lack():
     rows = []
     for one in H[:, :, 0, 0]:
         impulse = (grow * np.fft.irfft(one, 1024))[: len(t)]
-        moved = [np.convolve(impulse, column)[: len(t)] for column in basis.T]
+        moved = [far * np.convolve(impulse, column)[: len(t)] for column in basis.T]
         rows.append(weighted(np.column_stack(moved)))
     A, right = np.concatenate(rows), np.tile(weighted(error[:, None])[:, 0], 2)
     rho = np.sqrt(1e-3 * np.diag(A.T @ A).max())
     A = np.concatenate([A, rho * np.eye(basis.shape[1])])
     right = np.concatenate([right, np.zeros(basis.shape[1])])
     c = np.linalg.lstsq(A, right)[0]
-    change = made.update(error[:, None], [basis], share)[:, 0]
+    change = made.update(error[:, None], [basis], far[:, None, None], share)[:, 0]
     assert change == pytest.approx(basis @ c, abs=5e-3 * np.abs(change).max())
     # trials on the softer robot
     plant, e, sizes = H[1, :, 0, 0], error[:, None], []
     impulse = (grow * np.fft.irfft(plant, 1024))[: len(t)]
     for _ in range(4):
         sizes.append(np.linalg.norm(share * e[:, 0]))
-        change = made.update(e, [basis], share)[:, 0]
-        e = e - np.convolve(impulse, change)[: len(t), None]
+        change = made.update(e, [basis], far[:, None, None], share)[:, 0]
+        e = e - (far * np.convolve(impulse, change)[: len(t)])[:, None]
     assert sizes[1] < 0.3 * sizes[0] and sizes[3] < 0.1 * sizes[0]
 
 
@@ -285,7 +286,7 @@ def test_the_response_to_a_reference_is_that_of_the_loop():
         payload=0.05,
     )
     s, q = 0.4 + 14j, fx.static(arm_2, joints=[0.0, 0.4])
-    found = control.reference_response(arm_2, q, [s], [LOOP, None])[0]
+    found, joints = (x[0] for x in control.reference_response(arm_2, q, [s], [LOOP, None]))
     lin, e, j = fx.linearize(arm_2, q), arm_2.elastic_rows, arm_2.joint_rows
     whole = s * s * lin.M + s * lin.G + lin.K
     back = 0.4 * (60.0 + 120.0 / s + 0.2 * s)
@@ -297,6 +298,7 @@ def test_the_response_to_a_reference_is_that_of_the_loop():
         moved[j] = [first, r[1]]
         moved[e] = np.linalg.solve(whole[np.ix_(e, e)], -whole[np.ix_(e, j)] @ moved[j])
         assert found[:, k] == pytest.approx(tip @ moved)
+        assert joints[:, k] == pytest.approx(moved[j])
     with pytest.raises(fx.InputError, match="a loop for each joint"):
         control.reference_response(arm_2, q, [s], [None])
 
@@ -339,4 +341,4 @@ def test_the_weight_leaves_the_least_for_the_worst_robot():
     low = made.frequencies_Hz < 12.0
     assert (made.weight[low] == 0).any()  # about the resonance, which may be anywhere
     with pytest.raises(fx.InputError, match="at most 512"):
-        made.update(np.zeros((513, 1)), [np.zeros((513, 1))])
+        made.update(np.zeros((513, 1)), [np.zeros((513, 1))], np.ones((513, 1, 1)))

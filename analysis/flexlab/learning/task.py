@@ -15,11 +15,10 @@ import numpy as np
 
 import flexura as fx
 from flexura import signals
-from flexura.errors import InputError
 
 from ..board.protocol.declaration import CONTROL_HZ
 from ..experiment import plan
-from ..experiment.lead_in import AT_REST, quintic, with_lead_in
+from ..experiment.lead_in import quintic, with_lead_in
 from ..rig import RigSetup
 from ..rig.board_axes import board_axes
 
@@ -62,7 +61,7 @@ class Task:
         manoeuvre: fx.Manoeuvre,
         goes_back: bool = True,
     ) -> Task:
-        """The task of a manoeuvre; the rig is asked whether it can.
+        """The task of a manoeuvre, with leads where it does not begin and end at rest.
 
         Args:
             setup: the rig.
@@ -71,20 +70,12 @@ class Task:
             goes_back: whether a trial ends where it began.
 
         Raises:
-            InputError: a joint has no motion, a motion does not begin at 0, or the rig cannot
-                follow.
+            InputError: a joint has no motion.
         """
         asked = plan.inverse(setup, settings, manoeuvre).asked
         lead_s, out_s = asked["lead_s"], asked["out_s"]
         motions = [joint.motion for joint in manoeuvre.drive.joints if joint.motion is not None]
         led = [with_lead_in(m, manoeuvre.duration_s, lead_s, out_s) for m in motions]
-        for i, motion in enumerate(led, 1):
-            if abs(motion(0.0)[0]) > AT_REST:
-                raise InputError(
-                    "expected a motion that begins at 0, where every trial begins",
-                    key=f"joint[{i}].motion",
-                    value=motion(0.0)[0],
-                )
         span_s = lead_s + manoeuvre.duration_s + out_s
         return cls(setup, settings, manoeuvre, tuple(led), span_s, goes_back)
 
@@ -163,8 +154,9 @@ class Task:
     def basis(self) -> list[np.ndarray]:
         """Of each joint the functions (T, n) of which a change of its references is made.
 
-        They are cubic B-splines from shortly before the joint moves until shortly after; the last
-        one stays. A joint at rest sticks, and does not follow what is smaller than its friction.
+        They are cubic B-splines from shortly before the joint moves until shortly after. A joint at
+        rest sticks: it does not follow what is smaller than its friction, until the controller's
+        integral makes it slip. So a change ends with the motion; under gravity its last one stays.
         """
         from scipy.interpolate import BSpline
 
@@ -177,8 +169,8 @@ class Task:
                 2 + int(self.t[-1] / SPACING_S)
             )
             functions = np.nan_to_num(spline(places))
-            stays = functions[:, count:].sum(axis=1)
-            out.append(np.column_stack([functions[:, :count], stays]))
+            stays = [functions[:, count:].sum(axis=1)] if any(self.setup.robot.gravity_m_s2) else []
+            out.append(np.column_stack([functions[:, :count], *stays]))
         return out
 
     @cached_property

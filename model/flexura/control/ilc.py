@@ -179,7 +179,14 @@ class LearningFilter:
 
 
 def filter_length(samples: int) -> int:
-    """Samples of a transform for trials of so many: a power of two, at least twice as many."""
+    """Samples of a transform for trials of so many: a power of two, at least twice as many.
+
+    Args:
+        samples: of a trial.
+
+    Returns:
+        How many.
+    """
     return 1 << int(np.ceil(np.log2(2 * samples)))
 
 
@@ -191,6 +198,9 @@ def transform_points(samples: int, step_s: float) -> np.ndarray:
     Args:
         samples: of the transform, as of `filter_length`.
         step_s: time between two samples [s].
+
+    Returns:
+        (F,), at the frequencies of `numpy.fft.rfftfreq`.
     """
     return FORGETS / (samples * step_s) + 2j * np.pi * np.fft.rfftfreq(samples, step_s)
 
