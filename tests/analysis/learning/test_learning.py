@@ -35,7 +35,6 @@ TRUE = {
     "delay_s": 0.0,
 }
 NOISE_V = 4e-3
-PEAK_RAD_S = 0.4 * 1.875 / 0.5  # of the swing
 DONE = StreamResult(True, "all done", True)
 
 
@@ -206,9 +205,8 @@ def test_what_is_finished_is_kept_when_a_trial_ends_early(tmp_path):
 
 
 def test_limits_hold_a_change_back(tmp_path):
-    """The speed limit of the board is just above the first trial's speed."""
-    board = SETUP.rig.board | {"speed_max_1_rad_s": 1.001 * PEAK_RAD_S}
-    setup = dataclasses.replace(SETUP, rig=SETUP.rig.model_copy(update={"board": board}))
+    """The joint has to begin backwards, and its limit is just there."""
+    setup = dataclasses.replace(SETUP, limits=((-5e-5, 1.6),))
     rig, settings = NativeRig(tmp_path), rigs.configuration(setup)
     made = learn(Task.of(setup, settings, swing(), goes_back=False), rig, 2, known=known())
     assert all(not plan.failed for plan in rig.plans)
