@@ -276,7 +276,7 @@ def test_a_change_is_the_least_of_what_all_robots_lack():
 
 
 def test_the_response_to_a_reference_is_that_of_the_loop():
-    """Two joints, one in a loop and one exact, by hand at one point.
+    """A motor in its loop and a stepper on its spring, by hand at one point.
 
     Equations: 141
     """
@@ -286,21 +286,26 @@ def test_the_response_to_a_reference_is_that_of_the_loop():
         payload=0.05,
     )
     s, q = 0.4 + 14j, fx.static(arm_2, joints=[0.0, 0.4])
-    found, joints = (x[0] for x in control.reference_response(arm_2, q, [s], [LOOP, None]))
-    lin, e, j = fx.linearize(arm_2, q), arm_2.elastic_rows, arm_2.joint_rows
+    loops = [LOOP, control.JointSpring(20.0)]
+    found, joints = (x[0] for x in control.reference_response(arm_2, q, [s], loops))
+    lin, (first, second) = fx.linearize(arm_2, q), arm_2.joint_rows
     whole = s * s * lin.M + s * lin.G + lin.K
     back = 0.4 * (60.0 + 120.0 / s + 0.2 * s)
-    rigid = whole[np.ix_(j, j)] + np.diag([back, 0.0])
-    tip = lin.outlook[-2:]
+    free = np.setdiff1d(np.arange(arm_2.n), [first])
     for k, r in enumerate(np.eye(2)):
-        first = ((back + 0.4 * 1.4 * s) * r[0] - rigid[0, 1] * r[1]) / rigid[0, 0]
+        # the motor's joint, as the rigid robot's, whose second joint is where its pulses are
+        asked = (back + 0.4 * 1.4 * s) * r[0] - whole[first, second] * r[1]
         moved = np.zeros(arm_2.n, dtype=complex)
-        moved[j] = [first, r[1]]
-        moved[e] = np.linalg.solve(whole[np.ix_(e, e)], -whole[np.ix_(e, j)] @ moved[j])
-        assert found[:, k] == pytest.approx(tip @ moved)
-        assert joints[:, k] == pytest.approx(moved[j])
+        moved[first] = asked / (whole[first, first] + back)
+        soft = whole.copy()
+        soft[second, second] += 20.0
+        right = -soft[free, first] * moved[first]
+        right[free == second] += 20.0 * r[1]
+        moved[free] = np.linalg.solve(soft[np.ix_(free, free)], right)
+        assert found[:, k] == pytest.approx(lin.outlook[-2:] @ moved)
+        assert joints[:, k] == pytest.approx(moved[[first, second]])
     with pytest.raises(fx.InputError, match="a loop for each joint"):
-        control.reference_response(arm_2, q, [s], [None])
+        control.reference_response(arm_2, q, [s], loops[:1])
 
 
 def test_the_inverse_cancels_where_robots_disagree():

@@ -9,6 +9,7 @@ import numpy as np
 import flexura as fx
 from flexura.control import (
     JointLoop,
+    JointSpring,
     LearningFilter,
     filter_length,
     learning_filter,
@@ -23,6 +24,7 @@ from ..rig import RigSetup
 from ..rig.axes import motor_axes
 from ..rig.nominal_robot import with_drives
 from ..rig.plant.motor import joint_line
+from ..rig.plant.stepper import MagneticSpring
 from .task import STEP_S, Task
 
 HIGHEST_HZ = 12.0  # of what is learned; the board's knots are 8 ms apart
@@ -65,24 +67,31 @@ class Knowledge:
         return cls(dict(strip.values), tuple(others))
 
 
-def loops(setup: RigSetup, settings: dict[str, float]) -> list[JointLoop | None]:
-    """The board's controllers: of each joint with a motor its gains; a stepper follows its pulses.
+def loops(
+    setup: RigSetup, settings: dict[str, float], holding: float = 1.0
+) -> list[JointLoop | JointSpring]:
+    """What moves the joints: the board's controllers of motors, and a stepper's magnetic spring.
 
     Args:
         setup: the rig.
         settings: the board's settings, by name.
+        holding: factor on the stepper's holding torque.
     """
-    out: list[JointLoop | None] = [None] * setup.rig.joints
+    out: list[JointLoop | JointSpring] = []
     for axis in motor_axes(setup.rig):
         n, unit = axis.number, axis.unit
         gain = lambda name, n=n: settings.get(f"{name[:2]}_{n}_{name[3:]}", 0.0)
-        out[n - 1] = JointLoop(
-            joint_line(axis).force_per_V,
-            gain(f"kp V_{unit}"),
-            gain(f"ki V_{unit}_s"),
-            gain(f"kd V_s_{unit}"),
-            gain(f"kv V_s_{unit}"),
+        out.append(
+            JointLoop(
+                joint_line(axis).force_per_V,
+                gain(f"kp V_{unit}"),
+                gain(f"ki V_{unit}_s"),
+                gain(f"kd V_s_{unit}"),
+                gain(f"kv V_s_{unit}"),
+            )
         )
+    if setup.rig.stepper:
+        out.append(JointSpring(holding * MagneticSpring(setup.rig.stepper).on_N_m))
     return out
 
 
@@ -97,7 +106,7 @@ def filter_of(task: Task, knowledge: Knowledge) -> LearningFilter:
         InputError: the joints cannot move the tip in every direction, anywhere on the way.
     """
     points = transform_points(filter_length(len(task.t)), STEP_S)
-    controllers = loops(task.setup, task.settings)
+    controllers = loops(task.setup, task.settings, knowledge.values.get("holding", 1.0))
     lines = [(axis, joint_line(axis)) for axis in motor_axes(task.setup.rig)]
     postures = _postures(task)
     slopes, across = task.slopes(postures), task.across(postures)

@@ -16,6 +16,7 @@ from .gains import BOARD, NAMES, Gains
 from .gains import load as load_gains
 from .ilc import (
     JointLoop,
+    JointSpring,
     LearningFilter,
     filter_length,
     inverse_of_many,
@@ -69,6 +70,7 @@ __all__ = [
     "Force",
     "Gains",
     "JointLoop",
+    "JointSpring",
     "LearningFilter",
     "Linear",
     "Motor",

@@ -40,18 +40,31 @@ class JointLoop:
     kv: float = 0.0
 
 
-def reference_response(robot: Any, q: Any, s: Any, loops: Sequence[JointLoop | None]) -> np.ndarray:
+@dataclass(frozen=True)
+class JointSpring:
+    """A stepper: its pulses follow the reference, and a magnetic spring pulls the joint after them.
+
+    Attributes:
+        stiffness: of the spring [N/m or N m/rad].
+    """
+
+    stiffness: float
+
+
+def reference_response(
+    robot: Any, q: Any, s: Any, loops: Sequence[JointLoop | JointSpring]
+) -> tuple[np.ndarray, np.ndarray]:
     """Small motions of tip and joints under the joints' references, through the controllers (141).
 
     The controllers move the robot as if it were rigid. Its links vibrate on joints that move as
-    prescribed: friction and gear hold a joint against them.
+    prescribed: friction and gear hold a motor's joint against them. A stepper's joint gives way.
 
     Args:
         robot: a System, a Robot, or the path or name of a robot file, with the drives' inertia and
             damping in its joints.
         q: the equilibrium (n,), or None: the static one at the start.
         s: complex frequencies (F,) [1/s], as of `transform_points`; not 0.
-        loops: one a joint; None: the joint follows its reference exactly.
+        loops: one a joint.
 
     Returns:
         H (F, 2, joints) and T (F, joints, joints), complex: x and y of the tip, and the joints, for
@@ -66,20 +79,28 @@ def reference_response(robot: Any, q: Any, s: Any, loops: Sequence[JointLoop | N
     if len(loops) != joints or len(lin.inputs) != joints:
         raise InputError("expected a loop for each joint, none locked", key="loops")
     s = np.asarray(s, dtype=complex)[:, None, None]
-    moved = np.linalg.solve(s**2 * lin.M + s * lin.G + lin.K, lin.E[None])
-    place = [lin.outputs.index(f"joint/{i + 1}/position") for i in range(joints)]
-    tip = [lin.outputs.index("tip/x"), lin.outputs.index("tip/y")]
-    left = np.asarray(lin.E.T @ (s**2 * lin.M + s * lin.G + lin.K) @ lin.E)
-    right = np.zeros_like(left)
+    whole = s**2 * lin.M + s * lin.G + lin.K
+    rigid, input_ = lin.E.T @ whole @ lin.E, np.zeros((len(s), joints, joints), dtype=complex)
     for i, loop in enumerate(loops):
-        if loop is None:
-            left[:, i], left[:, i, i], right[:, i, i] = 0.0, 1.0, 1.0
+        if isinstance(loop, JointSpring):
+            rigid[:, i], rigid[:, i, i], input_[:, i, i] = 0.0, 1.0, 1.0
             continue
         back = loop.force_per_V * (loop.kp + loop.ki / s + loop.kd * s)[:, 0, 0]
-        left[:, i, i] += back
-        right[:, i, i] = back + loop.force_per_V * loop.kv * s[:, 0, 0]
-    joint = np.linalg.solve(left, right)
-    return lin.outlook[tip] @ moved @ np.linalg.solve(lin.outlook[place] @ moved, joint), joint
+        rigid[:, i, i] += back
+        input_[:, i, i] = back + loop.force_per_V * loop.kv * s[:, 0, 0]
+    asked = np.linalg.solve(rigid, input_)
+    stiffness = [loop.stiffness if isinstance(loop, JointSpring) else 0.0 for loop in loops]
+    moved = np.linalg.solve(whole + lin.E @ np.diag(stiffness) @ lin.E.T, lin.E[None])
+    place = [lin.outputs.index(f"joint/{i + 1}/position") for i in range(joints)]
+    tip = [lin.outputs.index("tip/x"), lin.outputs.index("tip/y")]
+    # forces that move motors' joints as asked, and those of springs
+    left = lin.outlook[place] @ moved
+    for i, k in enumerate(stiffness):
+        if k:
+            left[:, i], left[:, i, i], asked[:, i] = 0.0, 1.0, k * asked[:, i]
+    forces = np.linalg.solve(left, asked)
+    response: np.ndarray = lin.outlook[tip] @ moved @ forces
+    return response, lin.outlook[place] @ moved @ forces
 
 
 @dataclass(frozen=True)
@@ -150,7 +171,8 @@ class LearningFilter:
             )
         counts = np.ones(rows) if share is None else np.asarray(share, dtype=float)
         wanted = counts[:, None] * self._weighted(e)
-        normal, right = 0.0, 0.0
+        count = sum(one.shape[1] for one in basis)
+        normal, right = np.zeros((count, count)), np.zeros(count)
         for H in self.responses:
             columns = [self._moved(H[:, :, j], one) for j, one in enumerate(basis)]
             A = self._weighted((directions @ np.concatenate(columns, axis=-1)).reshape(rows, -1))
