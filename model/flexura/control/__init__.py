@@ -1,5 +1,5 @@
 """Sampled controllers, their gains files and step metrics, LQR and LQG with the figures of their
-loops, functions as drives."""
+loops, iterative learning, functions as drives."""
 
 from .board_replay import board_pulses
 from .controller import (
@@ -16,6 +16,16 @@ from .designed import Designed, design_setting
 from .gains import BOARD, NAMES, Gains, load_controller
 from .gains import load as load_gains
 from .gaussian_design import Design
+from .ilc import (
+    JointLoop,
+    JointSpring,
+    LearningFilter,
+    filter_length,
+    inverse_of_many,
+    learning_filter,
+    reference_response,
+    transform_points,
+)
 from .loop_figures import LoopFigures, LoopMargins, loop_figures
 from .lqg_design import lqg
 from .lqr_design import lqr
@@ -65,6 +75,9 @@ __all__ = [
     "DriveFunction",
     "Force",
     "Gains",
+    "JointLoop",
+    "JointSpring",
+    "LearningFilter",
     "Linear",
     "LoopFigures",
     "LoopMargins",
@@ -76,13 +89,18 @@ __all__ = [
     "board_pulses",
     "design_setting",
     "filter_coefficient",
+    "filter_length",
+    "inverse_of_many",
+    "learning_filter",
     "load_controller",
     "load_gains",
     "loop_figures",
     "lqg",
     "lqr",
     "nmpc",
+    "reference_response",
     "step_figures",
     "step_response",
     "strip_metrics",
+    "transform_points",
 ]
