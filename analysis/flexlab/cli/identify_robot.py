@@ -118,7 +118,8 @@ def identify_asked(
                 progress=lambda fraction: told("fit", fraction),
             )
         errors = None if other is None else _errors(found, other)
-        stored, missing = [], ""
+        stored: list[Path] = []
+        missing = ""
         if json:  # one document says all of it
             stored, missing = _written(found, out, home)
         data: dict[str, Any] = report.numbers(found) | {"stored": list(map(str, stored))}

@@ -69,6 +69,26 @@ class Identification:
     residuals: dict[str, dict[str, float]]
     findings: tuple[str, ...]
 
+    def readings(self, run: fx.Run, *, identified: bool = True) -> dict[str, np.ndarray]:
+        """What the channels of another run would have read.
+
+        Args:
+            run: a run with the same inputs and channels.
+            identified: with the identified values, else with those of the file.
+
+        Returns:
+            Values (T,) by channel.
+        """
+        first = self.experiments[0]
+        other = Experiment(
+            run, first.inputs, first.channels, _span(run, None, None), first.controller
+        )
+        values = self.values
+        if not identified:
+            at = {q.name: q.file for q in self.quantities if np.isfinite(q.file)}
+            values = {**values, **{key: x for key, x in at.items() if of_channel(key)[0] == ""}}
+        return dict(zip(other.channels, other.readings(self.nominal, values), strict=True))
+
     def predict(self, run: fx.Run, *, identified: bool = True) -> dict[str, float]:
         """How far the simulation of another run is off, by channel.
 
@@ -79,19 +99,12 @@ class Identification:
         Returns:
             RMS deviation by the channel's largest measured value.
         """
-        first = self.experiments[0]
-        other = Experiment(
-            run, first.inputs, first.channels, _span(run, None, None), first.controller
-        )
-        values = self.values
-        if not identified:
-            at = {q.name: q.file for q in self.quantities if np.isfinite(q.file)}
-            values = {**values, **{key: x for key, x in at.items() if of_channel(key)[0] == ""}}
-        z = other.readings(self.nominal, values)
-        return {
-            name: _rms((z[k] - y)[other.counted[k]]) / float(np.nanmax(np.abs(y)))
-            for k, (name, y) in enumerate(zip(other.channels, other.measured, strict=True))
-        }
+        out = {}
+        for name, z in self.readings(run, identified=identified).items():
+            y = run[name]
+            there = np.isfinite(y)
+            out[name] = _rms((z - y)[there]) / float(np.abs(y[there]).max())
+        return out
 
 
 def identify_robot(
