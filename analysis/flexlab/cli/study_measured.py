@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json as json_
 from pathlib import Path
+from typing import Any
 
 import flexura as fx
 from flexura.io import write_bytes, write_text
@@ -45,7 +46,7 @@ def study_measured(
             found = measured(described, data, rtol=rtol, progress=lambda f: report("measured", f))
             fit = measured_fit(described, found, fit_on, lambda f: report("fit", f))
         names = ["measured.json", "measured.png", "identified.toml"]
-        told = {"robot": described.name, "runs": numbers(found)}
+        told: dict[str, Any] = {"robot": described.name, "runs": numbers(found)}
         told |= {"identified": measured_fit_numbers(fit)}
         write_text(draft.folder / names[0], json_.dumps(told, indent=1) + "\n")
         write_bytes(draft.folder / names[1], png(described, found, fit))

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..signals import Loads
 from ..system import StateSpace, System, sensor_channels
 from ..system.system import jacobian
 
@@ -73,7 +74,7 @@ class Measurements:
         sensors: dict[str, Any] = {}
         if self._sensed:
             force = np.zeros((1, len(self.system.robot.links)))
-            channels = sensor_channels(self.system, at, still, force)
+            channels = sensor_channels(self.system, np.zeros(1), at, still, force, Loads())
             sensors = {name.removeprefix("sensor/"): x[0] for name, x in channels.items()}
         return self.read(q[self.system.joint_rows], self._bent(q), sensors)
 

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..io import Tables, array, function_of, number
+from ..signals import Loads
 from ..system import System, sensor_channels
 
 MEASURED = ("q", "qd", "tip_deflections", "sensors")  # what a Sampled's function may ask for
@@ -63,7 +64,11 @@ class DriveFunction:
     """
 
     def __init__(
-        self, function: Callable[..., ArrayLike], joints: int, system: System | None = None
+        self,
+        function: Callable[..., ArrayLike],
+        joints: int,
+        system: System | None = None,
+        loads: Loads | None = None,
     ) -> None:
         self.function, self.joints, self.of_state = function, joints, False
         try:
@@ -80,7 +85,7 @@ class DriveFunction:
             raise InputError(expected, key="drive", value=function)
         self.of_time = len(needed) == 1
         if system is not None and (asked := asked_measurements(function)):
-            self.function, self.of_state = _Measured(self, system, asked, self.of_time), True
+            self.function, self.of_state = _Measured(self, system, asked, loads), True
             self.of_time = False
 
     def read(self, given: Any, t: float) -> np.ndarray:
@@ -118,10 +123,10 @@ class _Measured:
     """A function of (t, q, qd) that measures what another one asks for."""
 
     def __init__(
-        self, drive: DriveFunction, system: System, asked: tuple[str, ...], of_time: bool
+        self, drive: DriveFunction, system: System, asked: tuple[str, ...], loads: Loads | None
     ) -> None:
         self.f, self.read, self.system = drive.function, drive.read, system
-        self.asked, self.of_time = asked, of_time
+        self.asked, self.of_time, self.loads = asked, drive.of_time, loads or Loads()
         self.force = np.zeros(drive.joints)
 
     def __call__(self, t: float, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
@@ -129,7 +134,9 @@ class _Measured:
         bent = self.system.places(q)[0]
         known: dict[str, Any] = {"q": q, "qd": qd, "tip_deflections": bent}
         if "sensors" in self.asked:
-            channels = sensor_channels(self.system, q[None], qd[None], self.force[None])
+            channels = sensor_channels(
+                self.system, np.array([t]), q[None], qd[None], self.force[None], self.loads
+            )
             known["sensors"] = {
                 name.removeprefix("sensor/"): float(value[0]) for name, value in channels.items()
             }

@@ -53,7 +53,9 @@ class _Integration:
             sampler, rate = drive.sampler(system), float(drive.rate_Hz)
         elif isinstance(drive, Sampled):
             sampler, rate = (
-                core.PythonSampler(system.equations, DriveFunction(drive.function, joints, system)),
+                core.PythonSampler(
+                    system.equations, DriveFunction(drive.function, joints, system, problem.loads)
+                ),
                 float(drive.rate_Hz),
             )
         else:

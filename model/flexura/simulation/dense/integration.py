@@ -78,7 +78,9 @@ class Integration:
         if isinstance(drive, Drive):
             marks, self.longest = drive.breaks, min(self.longest, PART * drive.shortest_period)
         elif isinstance(drive, Sampled):
-            self.sampled = DriveFunction(drive.function, len(system.joint_rows), system)
+            self.sampled = DriveFunction(
+                drive.function, len(system.joint_rows), system, problem.loads
+            )
             self.ticks = marks = (
                 t[0] + np.arange(np.floor(self.span * drive.rate_Hz) + 1) / drive.rate_Hz
             )
