@@ -61,7 +61,7 @@ def figure(study: Mapping[str, tuple[Task, list[Judged]]]) -> Any:
 def _over_time(axis: Any, task: Task, judged: list[Judged]) -> None:
     for row, (colour, dashes, _) in zip(judged, _styles(judged), strict=True):
         t = row.run.t - row.begin_s
-        away = np.maximum(1e3 * from_end(task, row.run), LEAST_MM)
+        away = np.maximum(1e3 * from_end(task, row.run), 1e-9)
         shown = t >= 0
         axis.semilogy(t[shown], away[shown], dashes, color=colour, linewidth=1.1, label=row.method)
     longest = max(float(row.run.t[-1]) - row.begin_s for row in judged)

@@ -11,7 +11,7 @@ import numpy as np
 
 import flexura as fx
 from flexura.control import lqr
-from flexura.signals import Signal, table, zv, zvd
+from flexura.signals import Signal, zv, zvd
 
 from .tasks import DERIVATIVE_HZ, RATE_HZ, Task
 
@@ -19,7 +19,6 @@ INTEGRAL = 0.2  # ki over kp and the pole of the joints' loops
 # LQR: what counts the same, in shares of the ways, of the last link's length, of the drives' limits
 NEAR, BENT, EFFORT = 0.005, 0.02, 0.3
 MODES, LQR_HZ = 2, 2000.0  # modes of each link that an LQR is designed on, and its rate
-FINER = 20  # rows of a shortest motion that is followed, for each of its intervals
 BAND = 0.1  # of frequencies, of the robust shortest motion
 
 
@@ -120,11 +119,7 @@ def shortest(robust: float) -> Callable[[Task], Motion]:
 
     def motion(task: Task) -> Motion:
         limits = {"drive": task.limits}
-        found = fx.time_optimal(task.robot, task.start, task.end, limits, robust)
-        # with more rows, between which the velocities of the motion hardly jump
-        t = np.linspace(0.0, found.t[-1], FINER * (len(found) - 1) + 1)
-        drives = [table(found.t, found[f"joint/{i}/drive"]) for i in (1, 2)]
-        run = fx.simulate(task.robot, t, fx.Drive.force(*drives), rtol=1e-8)
+        run = fx.time_optimal(task.robot, task.start, task.end, limits, robust)
         return _feedforward(task, run, None, float(run.t[-1]))
 
     return motion

@@ -23,6 +23,7 @@ INTERVALS = 160  # of the drives
 COARSE = 40  # so many at least in a first, coarse motion
 ROUGHLY = 5e-3  # of the time: what a coarse motion may leave to finer ones
 FEWEST = 20
+ROWS = 20  # of the Run in each interval: a spline through them hardly leaves the drives
 FIRST = 120  # in which the first motion's drives are looked at
 LONGER = 12  # times by which the first motion may be too short
 REMAINS = 0.0192  # of the unshaped residual, at frequencies within the band of `robust`
@@ -245,7 +246,8 @@ def _recorded(plants: list[Plant], u: np.ndarray, T: float, count: int, share: f
     nodes = np.linspace(0.0, T, len(u))
     drive = Drive.force(*(linear_drive(nodes, column) for column in u.T))
     system, unshaped = plants[0].system, plants[0].unshaped
-    run = simulate(system, nodes, drive, plants[0].start, rtol=RTOL, method=METHOD)
+    rows = np.linspace(0.0, T, ROWS * (len(u) - 1) + 1)
+    run = simulate(system, rows, drive, plants[0].start, rtol=RTOL, method=METHOD)
     left = [_residual(plant, drive, T) for plant in plants]
     run.meta.update(
         duration_s=T,
