@@ -48,6 +48,7 @@ def simulate(
     continue_from: Run | None = None,
     until: Callable[..., bool | float] | None = None,
     numerical_damping: bool = True,
+    internal_forces: bool = False,
     max_steps: int | None = None,
     wall_time: float | None = None,
     progress: Progress = None,
@@ -98,6 +99,9 @@ def simulate(
             the time of t_eval: both may have a memory, so that no tick is computed twice.
         numerical_damping: exponential steps damp fast modes that change no output by more than the
             tolerance (94); False: they do not.
+        internal_forces: the Run also has the reactions of the joints, and bending moment, shear
+            force, axial force and stress along the links (121) to (128). They take about a
+            millisecond a link and time.
         max_steps: a budget of steps, rejected ones included, by default 20 million. It ends the run
             with the event "exhausted", at the same step on every machine.
         wall_time: seconds after which the run is stopped where it is, with the event "wall_time".

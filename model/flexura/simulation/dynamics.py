@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 
 from ..control import Controller, Sampled
 from ..errors import InputError, guarded
-from ..io import Run, check_progress
+from ..io import Run, check_progress, flag
 from ..signals import Drive, SignalLike, as_signals
-from ..system import RobotLike, System, assemble
+from ..system import RobotLike, System, assemble, check_continuous
 from . import dense, integrator, nodewise_run
 from .problem import Budget, Problem, Progress, Solution, check_times, initial_value_problem
 from .recorder import record, still
@@ -44,6 +44,7 @@ def simulate(
     continue_from: Run | None = None,
     until: Callable[..., bool | float] | None = None,
     numerical_damping: bool = True,
+    internal_forces: bool = False,
     max_steps: int | None = None,
     wall_time: float | None = None,
     progress: Progress = None,
@@ -62,6 +63,7 @@ def simulate(
         continue_from: as in `flexura.simulate`.
         until: as in `flexura.simulate`.
         numerical_damping: as in `flexura.simulate`.
+        internal_forces: as in `flexura.simulate`.
         max_steps: as in `flexura.simulate`.
         wall_time: as in `flexura.simulate`.
         progress: called with the finished fraction.
@@ -83,6 +85,9 @@ def simulate(
         Budget.checked(max_steps, wall_time),
     )
     check_progress(progress)
+    within = flag(internal_forces, "internal_forces")
+    if within:
+        check_continuous(problem.system)
     solver = _solver(problem.system)
     solution = (
         solver(problem, progress)
@@ -94,7 +99,7 @@ def simulate(
         accounts=solution.accounts + problem.accounts,
         meta=solution.meta | {"start": problem.start},
     )
-    run = record(problem.system, solution)
+    run = record(problem.system, solution, within)
     run.meta["events"] = run.meta["events"] + still(run)
     if isinstance(problem.drive, Controller):
         return problem.drive.recorded(run, solution.sampler)
@@ -112,6 +117,7 @@ def inverse(
     *,
     method: str = "auto",
     start: str | None = None,
+    internal_forces: bool = False,
     max_steps: int | None = None,
     wall_time: float | None = None,
     progress: Progress = None,
@@ -136,6 +142,7 @@ def inverse(
         method: as in `flexura.simulate`.
         start: as in `flexura.simulate`. Under gravity the run starts in static equilibrium with the
             joints on their motions.
+        internal_forces: as in `flexura.simulate`.
         max_steps: as in `flexura.simulate`.
         wall_time: as in `flexura.simulate`.
         progress: called with the finished fraction.
@@ -164,6 +171,7 @@ def inverse(
         rtol,
         method=method,
         start=start,
+        internal_forces=internal_forces,
         max_steps=max_steps,
         wall_time=wall_time,
         progress=progress,

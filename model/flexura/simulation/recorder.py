@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -9,8 +10,9 @@ import numpy as np
 from ..io import STATIONS, Run, Tables, judged
 from ..robot import Robot
 from ..system import System
+from .internal_forces import force_channels
 from .problem import Solution
-from .sensors import sensor_channels
+from .sensors import accelerations, sensor_channels
 
 
 def channel_units(robot: Robot) -> dict[str, str]:
@@ -57,9 +59,9 @@ LIMITS = ("limit", "end_of_link", "sleeve")  # names of events that stop a joint
 STILL = 1e-9  # m or rad: a robot whose unknowns change by less does not move
 
 
-def record(system: System, solution: Solution) -> Run:
+def record(system: System, solution: Solution, internal_forces: bool = False) -> Run:
     """The Run of a solution: its channels, the balance of its energies, and the solver's
-    metadata."""
+    metadata; if asked for with the forces within the robot."""
     n, t, states, accounts = system.n, solution.t, solution.states, solution.accounts
     q, v = np.ascontiguousarray(states[:, :n]), np.ascontiguousarray(states[:, n:])
     seen = system.observe(q, v) if solution.seen is None else solution.seen
@@ -73,8 +75,13 @@ def record(system: System, solution: Solution) -> Run:
     channels = {
         name: np.ascontiguousarray(values) for name, values in zip(units, found, strict=True)
     }
-    channels |= sensor_channels(system, q, v, solution.forces)
-    units |= {f"sensor/{s.name}": s.unit for link in system.robot.links for s in link.sensor}
+    qdd = cache(lambda: accelerations(system, q, v, solution.forces))
+    for more, own in (
+        sensor_channels(system, q, v, qdd),
+        force_channels(system, q, v, qdd, internal_forces),
+    ):
+        channels |= more
+        units |= own
     about = describe(system, energy_error(seen[:, -3:], accounts, solution.jumps)) | solution.meta
     if len(t):
         about["numerical_loss_J"] = float(accounts[-1, NUMERICAL])

@@ -5,7 +5,15 @@ core where that is faster.
 """
 
 from .assembly import Assembly
+from .balance import Balance, Load
 from .frequency_response import FrequencyResponse, frequency_response
+from .internal_forces import (
+    InternalForces,
+    LinkForces,
+    check_continuous,
+    internal_forces,
+    sections_known,
+)
 from .spectrum import Modes, frequencies, modes
 from .statespace import StateSpace, linearize
 from .statics import NoEquilibrium, equilibrium, holding, static, tip_pose
@@ -13,19 +21,26 @@ from .system import RobotLike, System, assemble
 
 __all__ = [
     "Assembly",
+    "Balance",
     "FrequencyResponse",
+    "InternalForces",
+    "LinkForces",
+    "Load",
     "Modes",
     "NoEquilibrium",
     "RobotLike",
     "StateSpace",
     "System",
     "assemble",
+    "check_continuous",
     "equilibrium",
     "frequencies",
     "frequency_response",
     "holding",
+    "internal_forces",
     "linearize",
     "modes",
+    "sections_known",
     "static",
     "tip_pose",
 ]
