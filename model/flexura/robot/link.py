@@ -199,8 +199,8 @@ class Link(Table):
         if sensor.kind == "stress" and self.section is None:
             expected = "missing: a stress needs the section; the bending stiffness alone gives none"
             raise WrongValue("section", None, expected)
-        at = np.array([sensor.at_m])
-        if sensor.kind == "stress" and self.bending_stress(at, at, sensor.distance_m) is None:
+        stressed = self.bending_stress(0.0, sensor.at_m, sensor.distance_m) is not None
+        if sensor.kind == "stress" and not stressed:
             expected = (
                 "missing: expected the distance of the fibre from the axis in metres; a section "
                 "by area_m2 and second_moment_m4 has no height"
@@ -340,9 +340,7 @@ class Link(Table):
             return None
         return _spread(self.young_modulus_Pa * self._of_section("area", x), x)
 
-    def bending_stress(
-        self, moment: np.ndarray, x: np.ndarray, distance: float | None = None
-    ) -> np.ndarray | None:
+    def bending_stress(self, moment: Any, x: Any, distance: float | None = None) -> Any:
         """The stress of a fibre under a bending moment, positive where it is drawn out (128).
 
         Args:

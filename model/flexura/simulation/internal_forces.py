@@ -3,22 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 
 from ..io import STATIONS
-from ..robot import FORCE_KINDS, Robot, Sensor
-from ..system import Balance, System, check_continuous, sections_known
+from ..robot import FORCE_KINDS, Link, Robot
+from ..system import Balance, SectionForces, System, check_continuous, sections_known
 
-SECTION = ("bending_moment", "shear_force", "axial_force")  # as SectionForces has them
-
-
-class Wanted(NamedTuple):
-    """Channels with their units, and their values in a state, in that order."""
-
-    units: dict[str, str]
-    values: Callable[[Balance], list[float]]
+ROWS = 500  # times in one sweep, which bounds the memory it takes
 
 
 def force_channels(
@@ -39,83 +31,93 @@ def force_channels(
     Raises:
         InputError: a robot that slides from node to node.
     """
-    robot = system.robot
-    wanted = [*_reactions(robot), *_along(robot)] if everything else []
-    wanted += _sensors(robot)
-    if not wanted:
+    units = force_units(system.robot, everything)
+    if not units:
         return {}, {}
     check_continuous(system)
-    table = np.empty((len(q), sum(len(each.units) for each in wanted)))
-    for row, at, rates, more in zip(table, q, qd, qdd(), strict=True):
-        balance = Balance(system.assembly, at, rates, more)
-        row[:] = [value for each in wanted for value in each.values(balance)]
-    units = {name: unit for each in wanted for name, unit in each.units.items()}
-    columns = np.ascontiguousarray(table.T)
+    states, parts = (q, qd, qdd()), []
+    for first in range(0, max(len(q), 1), ROWS):
+        rows = [x[first : first + ROWS] for x in states]
+        balance = Balance(system.assembly.structure, *rows)
+        found = (_joint_values(balance) + _link_values(balance)) if everything else []
+        parts.append(np.array(found + _sensor_values(balance)))
+    columns = np.concatenate(parts, axis=1)
     return dict(zip(units, columns, strict=True)), units
 
 
-def _reactions(robot: Robot) -> list[Wanted]:
+def force_units(robot: Robot, everything: bool) -> dict[str, str]:
+    """Units by channel of the forces within a robot, in the order of the channels.
+
+    Args:
+        robot: the robot.
+        everything: also of all joints and along all links, not of its sensors alone.
+
+    Returns:
+        Units by channel.
+    """
+    units: dict[str, str] = {}
+    for i, link in enumerate(robot.links if everything else (), 1):
+        own = {"x": "N", "y": "N", "moment": "N m"}
+        own |= {"along": "N", "across": "N"} if link.joint.type != "R" else {}
+        units |= {f"joint/{i}/reaction_{name}": unit for name, unit in own.items()}
+    for i, link in enumerate(robot.links if everything else (), 1):
+        if sections_known(robot, i - 1):
+            own = {"bending_moment": "N m", "shear_force": "N", "axial_force": "N"}
+            own |= {"stress": "Pa"} if _stressed(link) else {}
+            units |= {
+                f"link/{i}/{name}/{k}": unit for name, unit in own.items() for k in range(STATIONS)
+            }
+    sensors = [s for link in robot.links for s in link.sensor if s.kind in FORCE_KINDS]
+    return units | {f"sensor/{s.name}": s.unit for s in sensors}
+
+
+def _joint_values(balance: Balance) -> list[np.ndarray]:
     """Of all joints (121), (122); of those that slide also along and across their line."""
-
-    def wanted(i: int, slides: bool) -> Wanted:
-        def values(balance: Balance) -> list[float]:
-            force, moment, _, axis = balance.reaction(i)
+    out = []
+    for i, link in enumerate(balance.robot.links):
+        force, moment, _, axis = balance.reaction(i)
+        out += [force.real, force.imag, moment]
+        if link.joint.type != "R":
             turned = force * np.exp(-1j * axis)
-            return [force.real, force.imag, moment, *([turned.real, turned.imag] * slides)]
-
-        units = {"x": "N", "y": "N", "moment": "N m"}
-        units |= {"along": "N", "across": "N"} if slides else {}
-        return Wanted({f"joint/{i + 1}/reaction_{k}": u for k, u in units.items()}, values)
-
-    return [wanted(i, link.joint.type != "R") for i, link in enumerate(robot.links)]
+            out += [turned.real, turned.imag]
+    return out
 
 
-def _along(robot: Robot) -> list[Wanted]:
-    """Of all links whose sections are known, at equally spaced places (123), (128)."""
-
-    def wanted(i: int) -> Wanted:
-        link = robot.links[i]
-        shares = np.linspace(0.0, 1.0, STATIONS)
-        stressed = link.bending_stress(np.zeros(1), np.zeros(1)) is not None
-
-        def values(balance: Balance) -> list[float]:
-            length = link.length_m
-            free = balance.q[balance.structure.rows[i]] if link.joint.type == "Pb" else length
-            places = np.minimum(length - free + shares * free, length)
-            found = np.array([balance.section(i, float(s)) for s in places])
-            out = [*found.T.ravel()]
-            if stressed:
-                stress = link.bending_stress(found[:, 0], places)
-                assert stress is not None
-                out += [*stress]
-            return out
-
-        units = {"bending_moment": "N m", "shear_force": "N", "axial_force": "N"}
-        units |= {"stress": "Pa"} if stressed else {}
-        names = {f"link/{i + 1}/{k}/{j}": u for k, u in units.items() for j in range(STATIONS)}
-        return Wanted(names, values)
-
-    return [wanted(i) for i in range(len(robot.links)) if sections_known(robot, i)]
+def _link_values(balance: Balance) -> list[np.ndarray]:
+    """Of all links whose sections are known (123), (128): at equally spaced places, of a link in a
+    sleeve on its free length."""
+    out = []
+    for i, link in enumerate(balance.robot.links):
+        if not sections_known(balance.robot, i):
+            continue
+        ahead, length = balance.motions[i].ahead.value, link.length_m
+        places = [
+            np.minimum(share * (length + ahead) - ahead, length)
+            for share in np.linspace(0.0, 1.0, STATIONS)
+        ]
+        found = [balance.section(i, s) for s in places]
+        out += [getattr(each, name) for name in SectionForces._fields for each in found]
+        if _stressed(link):
+            out += [link.bending_stress(f[0], s) for f, s in zip(found, places, strict=True)]
+    return out
 
 
-def _sensors(robot: Robot) -> list[Wanted]:
+def _sensor_values(balance: Balance) -> list[np.ndarray]:
     """Of the sensors of forces (123), (128)."""
+    out = []
+    for i, link in enumerate(balance.robot.links):
+        for sensor in link.sensor:
+            if sensor.kind in FORCE_KINDS:
+                found = balance.section(i, sensor.at_m)
+                if sensor.kind == "stress":
+                    out.append(
+                        link.bending_stress(found.bending_moment, sensor.at_m, sensor.distance_m)
+                    )
+                else:
+                    out.append(getattr(found, sensor.kind))
+    return out
 
-    def wanted(i: int, sensor: Sensor) -> Wanted:
-        def values(balance: Balance) -> list[float]:
-            found = balance.section(i, sensor.at_m)
-            if sensor.kind != "stress":
-                return [getattr(found, sensor.kind)]
-            moment, at = np.array([found.bending_moment]), np.array([sensor.at_m])
-            stress = robot.links[i].bending_stress(moment, at, sensor.distance_m)
-            assert stress is not None
-            return [float(stress[0])]
 
-        return Wanted({f"sensor/{sensor.name}": sensor.unit}, values)
-
-    return [
-        wanted(i, sensor)
-        for i, link in enumerate(robot.links)
-        for sensor in link.sensor
-        if sensor.kind in FORCE_KINDS
-    ]
+def _stressed(link: Link) -> bool:
+    """Whether a link's section has a height, and so an outer fibre."""
+    return link.bending_stress(0.0, 0.0) is not None

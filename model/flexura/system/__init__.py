@@ -5,7 +5,7 @@ core where that is faster.
 """
 
 from .assembly import Assembly
-from .balance import Balance, Load
+from .balance import Balance, Load, Reaction, SectionForces
 from .frequency_response import FrequencyResponse, frequency_response
 from .internal_forces import (
     InternalForces,
@@ -28,7 +28,9 @@ __all__ = [
     "Load",
     "Modes",
     "NoEquilibrium",
+    "Reaction",
     "RobotLike",
+    "SectionForces",
     "StateSpace",
     "System",
     "assemble",

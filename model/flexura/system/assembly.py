@@ -62,7 +62,7 @@ class Assembly:
             if material is not None and self.structure.sleeved(i)
         ]
         # flexible links in a sleeve, with their materials
-        self.sleeved: dict[int, Material] = dict(materials)
+        self._sleeved: dict[int, Material] = dict(materials)
 
     def mass(self, q: np.ndarray) -> np.ndarray:
         """The mass matrix M(q) (40).
@@ -113,8 +113,8 @@ class Assembly:
             own = self.structure.masses(state)
             parts += own
             free = own[0]
-            if state.number in self.sleeved and isinstance(free, masses.Masses):
-                flow += sleeve.flow_forces(state.lines[0], self.sleeved[state.number], free)
+            if state.number in self._sleeved and isinstance(free, masses.Masses):
+                flow += sleeve.flow_forces(state.lines[0], self._sleeved[state.number], free)
         return masses.total(parts, gravity), flow
 
     def elastic(self, q: np.ndarray) -> np.ndarray:
@@ -133,7 +133,7 @@ class Assembly:
 
     def _elastic(self, K: np.ndarray, q: np.ndarray) -> np.ndarray:
         out = K @ (q - self._rest)
-        for i in self.sleeved:
+        for i in self._sleeved:
             y = q[self.structure.own[i][0]]
             out[self.rows[i]] += 0.5 * y @ self._sleeve(i, q, 1) @ y
         return out
@@ -150,7 +150,7 @@ class Assembly:
             (n, n).
         """
         K = self._diagonal.copy()
-        for i in self.sleeved:
+        for i in self._sleeved:
             own = self.structure.own[i][0]
             K[own, own] = self._sleeve(i, q)
         return K
@@ -171,7 +171,7 @@ class Assembly:
     def _sleeve(self, i: int, q: np.ndarray, derivative: int = 0) -> np.ndarray:
         """K(d) of the link i in a sleeve, or its derivatives by d (35)."""
         return sleeve.stiffness(
-            self.structure.links[i][0], float(q[self.rows[i]]), self.sleeved[i], derivative
+            self.structure.links[i][0], float(q[self.rows[i]]), self._sleeved[i], derivative
         )
 
     def stiffness(self, q: np.ndarray) -> np.ndarray:
@@ -184,7 +184,7 @@ class Assembly:
             (n, n).
         """
         K = self.stiffness_blocks(q)
-        for i in self.sleeved:
+        for i in self._sleeved:
             own, row = self.structure.own[i][0], self.rows[i]
             slope = self._sleeve(i, q, 1) @ q[own]
             K[own, row] += slope
@@ -265,7 +265,7 @@ class Assembly:
         sums, flow = self._inertia(states, self._g)
         K, D = (
             self._constant
-            if not self.sleeved
+            if not self._sleeved
             else (K := self.stiffness_blocks(q), self._damping(K, q))
         )
         return Terms(self._mass(sums), sums.forces + flow, self._elastic(K, q), K, D)

@@ -1,98 +1,80 @@
-"""Forces within a robot in a state, from the balance of what lies beyond a cut: (121) to (125)."""
+"""Forces within a robot, from the balance of what lies beyond a cut: (121) to (125)."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..link.section import material
-from . import masses, sleeve
-from .assembly import Assembly
-from .kinematics import Line, base, translate
-from .masses import Masses, Part
-from .structure import LinkState
+from ..link.section import Material
+from ..link.section import material as material_of
+from . import inertia
+from .damping_forces import damping_beyond
+from .inertia import Wrench, cross, total
+from .motion import LinkMotion, link_motions
+from .structure import Structure, rigid_body
 
 SAME = 1e-9  # of a link's length: what is closer to a cut is at it
 
 
 class Load(NamedTuple):
-    """A load from outside on link `link` (from 0): x + iy [N] at the abscissa `at` [m], moment
-    [N m]."""
+    """A load from outside on link `link` (from 0), at the abscissa `at` [m]: force x + iy [N] in
+    the base's axes and moment [N m], constant or (T,)."""
 
     link: int
     at: float
-    force: complex = 0j
-    moment: float = 0.0
-
-
-class Wrench(NamedTuple):
-    """A force x + iy [N] in the base's axes, and a moment [N m] about a point."""
-
-    force: complex = 0j
-    moment: float = 0.0
-
-    def plus(self, other: Wrench) -> Wrench:
-        """The sum of two about one point."""
-        return Wrench(self.force + other.force, self.moment + other.moment)
-
-    def about(self, place: complex) -> Wrench:
-        """The same one about a place, if this is about the origin."""
-        return Wrench(self.force, self.moment - _cross(place, self.force))
+    force: Any = 0j
+    moment: Any = 0.0
 
 
 class Reaction(NamedTuple):
     """What link i-1 exerts on link i: force x + iy [N], moment about the joint [N m], place of the
-    joint [m], angle of the axis on which a joint slides [rad]."""
+    joint [m], angle of the axis on which a joint slides [rad]; each (T,)."""
 
-    force: complex
-    moment: float
-    place: complex
-    axis: float
+    force: np.ndarray
+    moment: np.ndarray
+    place: np.ndarray
+    axis: np.ndarray
 
 
 class SectionForces(NamedTuple):
-    """Bending moment [N m], shear force and axial force [N] in a section of a link (123)."""
+    """Bending moment [N m], shear force and axial force [N] in a section of a link, each (T,)
+    (123)."""
 
-    bending_moment: float
-    shear_force: float
-    axial_force: float
-
-
-NO_SECTION = SectionForces(np.nan, np.nan, np.nan)
+    bending_moment: np.ndarray
+    shear_force: np.ndarray
+    axial_force: np.ndarray
 
 
 class Balance:
-    """The forces that move all masses of a robot as q, qd, qdd (n,) say, under loads from outside.
+    """The forces that all masses of a robot take at T times, less loads from outside.
 
-    The base gets three unknowns more, its place and angle at rest. Lagrange's equations (40) to
-    (42) of some parts have force and moment about the origin in the rows of these: so they hold
-    for every part that the equations of motion know.
+    Args:
+        structure: the robot's numbering and pieces.
+        q: configurations (T, n).
+        qd: their rates (T, n).
+        qdd: their accelerations (T, n).
+        loads: forces and moments from outside.
     """
 
     def __init__(
         self,
-        assembly: Assembly,
+        structure: Structure,
         q: np.ndarray,
         qd: np.ndarray,
         qdd: np.ndarray,
         loads: Sequence[Load] = (),
     ) -> None:
-        self.structure, self.robot = assembly.structure, assembly.robot
-        self.assembly, self.n, self.loads = assembly, assembly.n, loads
-        self.q, self.qd, self.qdd = (np.concatenate([x, np.zeros(3)]) for x in (q, qd, qdd))
-        self.gravity = complex(*self.robot.gravity_m_s2)
-        root = base(self.n + 3)
-        root.velocity[self.n :] = 1.0, 1j, 0.0
-        root.turning[self.n + 2] = 1.0
-        self.states = self.structure.states(self.q, self.qd, root)
+        self.structure, self.robot, self.loads = structure, structure.robot, loads
+        self.q, self.gravity = q, complex(*structure.robot.gravity_m_s2)
+        self.motions = link_motions(structure, q, qd, qdd)
 
     def reaction(self, i: int) -> Reaction:
         """The force that link i-1 exerts on link i (both from 0, the base is -1) at joint i (121),
         (122)."""
-        joint, hub = self.robot.links[i].joint, self.states[i].hub
+        joint, hub = self.robot.links[i].joint, self.motions[i].hub
         place = hub.place - joint.hub_radius_m * hub.tangent
         axis = hub.angle - (joint.angle_rad if joint.type == "Pa" else 0.0)
         needed = self._beyond[i + 1].plus(self._own[i])
@@ -100,190 +82,136 @@ class Balance:
             needed = needed.plus(self._hubs[i])
         return Reaction(*needed.about(place), place, axis)
 
-    def section(self, i: int, s: float) -> SectionForces:
-        """The forces in the section of link i (from 0) at the abscissa s [m], from its proximal
-        end (123).
+    def section(self, i: int, s: Any) -> SectionForces:
+        """The forces in the section of link i (from 0) at the abscissa s [m] from its proximal end,
+        of a link in a sleeve also (T,) (123).
 
         What is fixed at s is beyond the cut, but for the hub of the link. In and behind a sleeve
         they are not known: nan.
         """
-        state, near = self.states[i], SAME * self.robot.links[i].length_m
-        ahead = self.structure._along(i, s, self.q)[0]
-        if ahead < -near:
-            return NO_SECTION
-        cut = self.structure.at(state, s)
+        motion, near = self.motions[i], SAME * self.robot.links[i].length_m
+        x = motion.ahead.value + s
+        cut = motion.at(s)
         needed = self._fixed_beyond(i, s - near).plus(self._material_beyond(i, s))
-        force, moment = needed.about(cut.place)
-        damping = self._damping_beyond(i, max(ahead, 0.0), s - near)
-        force, moment = force - damping.force, moment - damping.moment
-        across = force * cut.tangent.conjugate()
-        return SectionForces(-moment, -across.imag, -across.real)
+        needed = needed.about(cut.place).less(
+            damping_beyond(self.robot, motion, self.structure.materials[i], s, near)
+        )
+        across = needed.force * cut.tangent.conj()
+        known = np.where(x < -near, np.nan, 1.0)
+        return SectionForces(-needed.moment * known, -across.imag * known, -across.real * known)
+
+    @cached_property
+    def _pieces(self) -> list[list[Wrench]]:
+        """What the material of each piece of each flexible link takes, about the origin."""
+        out = []
+        for motion in self.motions:
+            if motion.lines and self.structure.sleeved(motion.number):
+                material = self._material(motion.number)
+                out.append([inertia.sleeved(motion, material, self.gravity)])
+            else:
+                out.append([inertia.line(line, self.gravity) for line in motion.lines])
+        return out
 
     @cached_property
     def _own(self) -> list[Wrench]:
         """What the masses and loads of each link without its hub take, about the origin."""
         out = []
-        for state in self.states:
-            parts = self.structure.own_masses(state)
-            inertia = self._inertia(parts).plus(self._flow(state, parts[0]))
-            out.append(inertia.plus(self._outside(state, -np.inf)))
+        for motion, pieces in zip(self.motions, self._pieces, strict=True):
+            parts = [*pieces, self._lumps(motion, -np.inf), self._payload(motion)]
+            parts += [] if motion.lines else [self._body(motion)]
+            out.append(total([*parts, self._outside(motion, -np.inf)], len(self.q)))
         return out
 
     @cached_property
     def _hubs(self) -> list[Wrench]:
-        """What the hub of each link takes, about the origin."""
-        return [self._inertia(self.structure.hub_masses(state)) for state in self.states]
+        """What the hub of each link takes, about the origin; its mass is at the axis (21)."""
+        out = []
+        for motion in self.motions:
+            joint, hub = self.robot.links[motion.number].joint, motion.hub
+            axis = hub.moved(-joint.hub_radius_m) if joint.hub_radius_m else hub
+            out.append(inertia.body(joint.hub_mass_kg, joint.hub_inertia_kg_m2, axis, self.gravity))
+        return out
 
     @cached_property
     def _beyond(self) -> list[Wrench]:
         """What link i and all after it take with their hubs, about the origin; of no link the
         last."""
-        out = [Wrench()]
+        out = [total([], len(self.q))]
         for own, hub in zip(reversed(self._own), reversed(self._hubs), strict=True):
             out.append(out[-1].plus(own).plus(hub))
         return out[::-1]
 
-    def _inertia(self, parts: list[Part]) -> Wrench:
-        """What parts take against inertia and gravity, about the origin (121), (122)."""
-        out = Wrench()
-        for part in parts:
-            acceleration = part.columns @ self.qdd + part.rest
-            if isinstance(part, Masses):
-                force = part.mass * (acceleration - self.gravity)
-                out = out.plus(Wrench(complex(force.sum()), _cross(part.place, force)))
-            else:
-                out = out.plus(Wrench(0j, part.inertia * float(acceleration)))
-        return out
+    def _material(self, i: int) -> Material:
+        found = self.structure.materials[i]
+        assert found is not None
+        return found
 
-    def _flow(self, state: LinkState, free: Part) -> Wrench:
-        """What the flow terms of (37) add for a flexible link in a sleeve, about the origin."""
-        own = self.assembly.sleeved.get(state.number)
-        if own is None or not isinstance(free, Masses):
-            return Wrench()
-        x, y, moment = sleeve.flow_forces(state.lines[0], own, free)[self.n :]
-        return Wrench(complex(x, y), float(moment))
+    def _body(self, motion: LinkMotion) -> Wrench:
+        """What a rigid link takes, about the origin (15), (109)."""
+        mass, centre, own = rigid_body(self.robot, motion.number)
+        return inertia.body(mass, own, motion.at(centre.real).moved(1j * centre.imag), self.gravity)
 
-    def _outside(self, state: LinkState, s: float) -> Wrench:
-        """What loads from outside take away, from the abscissa s of a link on, about the origin."""
-        out = Wrench()
+    def _lumps(self, motion: LinkMotion, s: Any) -> Wrench:
+        """What the lumped masses on a link from the abscissa s on take, about the origin (108)."""
+        parts = [
+            inertia.body(
+                each.mass_kg, each.inertia_kg_m2, motion.at(each.at_m), self.gravity
+            ).where(each.at_m >= s)
+            for each in self.robot.links[motion.number].mass
+        ]
+        return total(parts, len(self.q))
+
+    def _payload(self, motion: LinkMotion) -> Wrench:
+        """What the payload of the last link takes, about the origin (22), (109)."""
+        load = self.robot.payload
+        if motion.number + 1 < len(self.motions):
+            return total([], len(self.q))
+        centre = motion.tip.moved(complex(*load.centre_of_mass_m))
+        return inertia.body(load.mass_kg, load.inertia_kg_m2, centre, self.gravity)
+
+    def _outside(self, motion: LinkMotion, s: Any) -> Wrench:
+        """What loads from outside take off, from the abscissa s of a link on, about the origin."""
+        out = total([], len(self.q))
         for load in self.loads:
-            if load.link == state.number and load.at >= s:
-                place = self.structure.at(state, load.at).place
-                moment = _cross(place, load.force) + load.moment
-                out = out.plus(Wrench(-load.force, -moment))
+            if load.link == motion.number:
+                moment = cross(motion.at(load.at).place, load.force) + load.moment
+                out = out.less(Wrench(load.force, moment).where(load.at >= s))
         return out
 
-    def _fixed_beyond(self, i: int, s: float) -> Wrench:
+    def _fixed_beyond(self, i: int, s: Any) -> Wrench:
         """What is fixed to link i from the abscissa s on takes, about the origin: masses, loads,
         payload, and the links after it unless they slide on it before s."""
-        state, out = self.states[i], self._outside(self.states[i], s)
-        after = i + 1 < len(self.states) and self.robot.links[i + 1].joint
-        parts = self.structure.lumps(state, s)
-        if not after or after.type != "Pa" or self.q[self.structure.rows[i + 1]] >= s:
-            out = out.plus(self._beyond[i + 1])
-            parts += self.structure.load_masses(state)
-        return out.plus(self._inertia(parts))
+        motion, after = self.motions[i], self._beyond[i + 1]
+        if i + 1 < len(self.motions) and self.robot.links[i + 1].joint.type == "Pa":
+            after = after.where(self.q[:, self.structure.rows[i + 1]] >= s)
+        parts = [self._lumps(motion, s), self._outside(motion, s), self._payload(motion), after]
+        return total(parts, len(self.q))
 
-    def _material_beyond(self, i: int, s: float) -> Wrench:
+    def _material_beyond(self, i: int, s: Any) -> Wrench:
         """What the material of link i beyond s takes, about the origin."""
-        state, link = self.states[i], self.robot.links[i]
-        if not state.lines:
-            return self._rigid_beyond(state, s)
-        own, out = self.structure.materials[i], Wrench()
-        assert own is not None
-        start = link.length_m - sum(line.free for line in state.lines)
-        for line in state.lines:
-            low = max(s, start)
-            if low < start + line.free:
-                X, dX = own.quadrature(low, start + line.free, line.piece.points + 2)
-                place, acceleration = self._motion(line, (X - start) / line.free)
-                force = own.mass_per_length(X) * dX * (acceleration - self.gravity)
-                out = out.plus(Wrench(complex(force.sum()), _cross(place, force)))
-            start += line.free
-        return out
+        motion = self.motions[i]
+        if not motion.lines:
+            return self._rigid_beyond(motion, s)
+        if self.structure.sleeved(i):
+            return inertia.line_beyond(
+                motion.lines[0], self._material(i), s, -motion.ahead.value, self.gravity
+            )
+        parts, start = [], 0.0
+        for line, whole in zip(motion.lines, self._pieces[i], strict=True):
+            end = start + line.free.value
+            if s <= start:
+                parts.append(whole)
+            elif s < end:
+                parts.append(inertia.line_beyond(line, self._material(i), s, start, self.gravity))
+            start = end
+        return total(parts, len(self.q))
 
-    def _rigid_beyond(self, state: LinkState, s: float) -> Wrench:
+    def _rigid_beyond(self, motion: LinkMotion, s: Any) -> Wrench:
         """What a rigid link beyond s takes: its mass per length, or at its ends its whole mass."""
-        i, link = state.number, self.robot.links[state.number]
-        if link.mass_kg is not None:
-            if link.mass_kg and s > SAME * link.length_m:
-                return Wrench() if s >= (1 - SAME) * link.length_m else Wrench(np.nan, np.nan)
-            return self._inertia(self.structure.body(state))
-        X, dX = material(link).quadrature(s, link.length_m, 3)
-        mass, out = link.mass_per_length(X) * dX, Wrench()
-        for x, dm in zip(X, mass, strict=True):
-            frame = translate(state.hub, *self.structure._along(i, x, self.q), self.qd)
-            out = out.plus(self._inertia([masses.point_mass(float(dm), frame)]))
-        return out
-
-    def _motion(self, line: Line, xi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Places and accelerations (S,) of the material at xi (S,) of a line (4), (5), (31)."""
-        d, piece, start = line.free, line.piece, line.start
-        w, bent = piece.integrals(xi), line.E @ self.qdd + line.N
-        place = start.place + d * (w @ line.e)
-        out = start.rest + start.velocity @ self.qdd + d * (w @ bent)
-        if line.row is not None:  # it runs through the mesh
-            l, dl = piece.lagrange(xi), piece.lagrange(xi, 1)
-            left, rate, more = 1 - xi, line.rate, float(self.qdd[line.row])
-            run = left * rate / d
-            out += (w @ line.e + left * (l @ line.e)) * more + 2 * rate * (w @ line.rates)
-            out += d * run * (2 * (l @ line.rates) + run * (dl @ line.e))
-        return place, out
-
-    def _damping_beyond(self, i: int, ahead: float, s: float) -> Wrench:
-        """What damping in proportion to the mass exerts on link i beyond a cut, about the cut
-        (125): the forces alpha M_c qd of (26) on the straight link, their reaction is at the hub.
-        """
-        alpha = self.robot.rayleigh(i)[0] if self.robot.links[i].flexible else 0.0
-        if not alpha:
-            return Wrench()
-        state, own = self.states[i], self.structure.materials[i]
-        assert own is not None
-        hub, length = float(state.hub.turning @ self.qd), self.robot.links[i].length_m
-        start, across, moved, moment = length - sum(x.free for x in state.lines), 0.0, 0.0, 0.0
-        begin = start
-        for line in state.lines:
-            rates = float(line.start.turning @ self.qd) - hub + line.piece.B @ self.qd[line.own]
-            low = max(begin + ahead, start)
-            if low < start + line.free:
-                X, dX = own.quadrature(low, start + line.free, line.piece.points + 2)
-                dm = own.mass_per_length(X) * dX
-                dm *= across + line.free * (line.piece.integrals((X - start) / line.free) @ rates)
-                moved, moment = moved + dm.sum(), moment + dm @ (X - begin - ahead)
-            across += line.free * float(line.piece.weights @ rates)
-            start += line.free
-        bodies = [(m.at_m, m.mass_kg, m.inertia_kg_m2, 0j) for m in self.robot.links[i].mass]
-        if i + 1 == len(self.states):
-            load = self.robot.payload
-            centre = complex(*load.centre_of_mass_m)
-            bodies.append((length, load.mass_kg, load.inertia_kg_m2, centre))
-        along = 0.0
-        for at, mass, inertia, centre in bodies:
-            if at >= s:
-                rise, turn = self._straight_rates(state, at - begin, hub)
-                velocity = 1j * rise + 1j * centre * turn
-                lever = at - begin - ahead + centre
-                moved, along = moved + mass * velocity.imag, along + mass * velocity.real
-                moment += mass * _cross(lever, velocity) + inertia * turn
-        force = -alpha * complex(along, moved) * state.hub.tangent
-        return Wrench(force, -alpha * float(moment))
-
-    def _straight_rates(self, state: LinkState, x: float, hub: float) -> tuple[float, float]:
-        """Rates of the deflection [m/s] and of the angle [rad/s] of a straight link, x [m] ahead of
-        its hub."""
-        across = 0.0
-        for k, line in enumerate(state.lines):
-            xi = min(x / line.free, 1.0)
-            start = float(line.start.turning @ self.qd) - hub
-            rates = start + line.piece.B @ self.qd[line.own]
-            across += line.free * float(line.piece.integrals(np.array([xi]))[0] @ rates)
-            if x <= line.free * (1 + SAME) or k + 1 == len(state.lines):
-                turn = start + float(line.piece.shapes(np.array([xi]))[0] @ self.qd[line.own])
-                return across, turn
-            x -= line.free
-        raise AssertionError("a flexible link has a line")
-
-
-def _cross(place: complex | np.ndarray, force: complex | np.ndarray) -> float:
-    """The moment of forces at places about the origin [N m]."""
-    return float(np.sum((np.conj(place) * force).imag))
+        link = self.robot.links[motion.number]
+        if link.mass_kg is None:
+            return inertia.straight(motion, material_of(link), s, link.length_m, self.gravity)
+        near, own = SAME * link.length_m, self._body(motion)
+        unknown = (s > near) & (s < link.length_m - near) & (link.mass_kg > 0)
+        known = np.where(unknown, np.nan, 1.0)
+        return Wrench(*(known * x for x in own.where(s <= near)))

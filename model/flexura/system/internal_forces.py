@@ -55,7 +55,7 @@ class InternalForces:
         expected = f"expected a joint from 1 to {count}"
         if number(joint, "joint", expected) not in range(1, count + 1):
             raise InputError(expected, key="joint", value=joint)
-        return self._balance.reaction(joint - 1)
+        return Reaction(*(x.item() for x in self._balance.reaction(joint - 1)))
 
     def link(self, link: int, s: Any = None) -> LinkForces:
         """The forces in sections of a link (123), (128).
@@ -125,7 +125,9 @@ def internal_forces(
     )
     last = len(system.robot.links)
     load = Load(last - 1, system.robot.links[-1].length_m, complex(*force), float(moment))
-    return InternalForces(system, Balance(system.assembly, at, rates, more, [load]))
+    return InternalForces(
+        system, Balance(system.assembly.structure, at[None], rates[None], more[None], [load])
+    )
 
 
 def check_continuous(system: System) -> None:

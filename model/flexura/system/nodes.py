@@ -50,11 +50,9 @@ class Nodes(Structure):
         root = translate(hub, q[self.rows[i]] - self.robot.links[i].length_m, [self.rows[i]], qd)
         return super().link(i, root, q, qd)._replace(hub=hub)
 
-    def _hub(
-        self, i: int, before: LinkState | None, tip: Frame, q: np.ndarray, qd: np.ndarray
-    ) -> Frame:
+    def _hub(self, i: int, before: LinkState | None, q: np.ndarray, qd: np.ndarray) -> Frame:
         if before is None or not self.robot.rides(i):
-            return super()._hub(i, before, tip, q, qd)
+            return super()._hub(i, before, q, qd)
         line, k = before.lines[0], self.nodes[i]
         at = k / self.robot.links[i - 1].elements
         node, root = station(line, at), line.start

@@ -96,14 +96,11 @@ class Structure:
         """Whether link i slides through a sleeve."""
         return self.robot.links[i].joint.type == "Pb"
 
-    def states(self, q: np.ndarray, qd: np.ndarray, root: Frame | None = None) -> list[LinkState]:
-        """The links in a state, from the base outwards (39); `root`: the base's frame, if it has
-        columns of its own."""
+    def states(self, q: np.ndarray, qd: np.ndarray) -> list[LinkState]:
+        """The links in a state, from the base outwards (39)."""
         out: list[LinkState] = []
         for i in range(len(self.links)):
-            before = out[-1] if out else None
-            tip = before.tip if before else root or base(self.n)
-            out.append(self.link(i, self._hub(i, before, tip, q, qd), q, qd))
+            out.append(self.link(i, self._hub(i, out[-1] if out else None, q, qd), q, qd))
         return out
 
     def link(self, i: int, hub: Frame, q: np.ndarray, qd: np.ndarray) -> LinkState:
@@ -133,12 +130,10 @@ class Structure:
             else (s, [])
         )
 
-    def _hub(
-        self, i: int, before: LinkState | None, tip: Frame, q: np.ndarray, qd: np.ndarray
-    ) -> Frame:
-        """The frame of link i's hub (Pb: of the sleeve's exit) on the link before it (1), (30);
-        `tip`: of that link, or the base."""
+    def _hub(self, i: int, before: LinkState | None, q: np.ndarray, qd: np.ndarray) -> Frame:
+        """The frame of link i's hub (Pb: of the sleeve's exit) on the link before it (1), (30)."""
         joint, row = self.robot.links[i].joint, self.rows[i]
+        tip = before.tip if before else base(self.n)
         if joint.type == "R":
             hub = rotate(tip, q[row], row)
             if i in self.windups:  # (107)
@@ -186,11 +181,7 @@ class Structure:
 
     def masses(self, state: LinkState) -> list[Part]:
         """A link's masses: its material, its hub, and the payload of the last one (21), (22)."""
-        return self.own_masses(state) + self.hub_masses(state)
-
-    def hub_masses(self, state: LinkState) -> list[Part]:
-        """The masses of a link's hub (21)."""
-        joint, parts = self.robot.links[state.number].joint, list[Part]()
+        joint, parts = self.robot.links[state.number].joint, self.own_masses(state)
         if joint.hub_mass_kg:
             axis = translate(state.hub, -joint.hub_radius_m, [], state.qd)
             parts.append(point_mass(joint.hub_mass_kg, axis if joint.hub_radius_m else state.hub))
@@ -201,38 +192,25 @@ class Structure:
     def own_masses(self, state: LinkState) -> list[Part]:
         """A link's masses without its hub."""
         i, material = state.number, self.materials[state.number]
-        if material is None:
-            parts = self.body(state)
-        elif self.sleeved(i):
-            parts = sleeve.masses(state.lines[0], material)
-        else:
-            parts = [line_masses(x) for x in state.lines]
-        return parts + self.lumps(state) + self.load_masses(state)
-
-    def body(self, state: LinkState) -> list[Part]:
-        """A rigid link's masses (15), (109)."""
-        mass, centre, inertia = rigid_body(self.robot, state.number)
-        x, rows = self._along(state.number, centre.real, state.q)
-        frame = translate(state.hub, complex(x, centre.imag), rows, state.qd)
-        return [point_mass(mass, frame), turning(inertia, frame)]
-
-    def lumps(self, state: LinkState, s: float = 0.0) -> list[Part]:
-        """The lumped masses on a link from the abscissa s on (108)."""
         parts: list[Part] = []
-        for each in self.robot.links[state.number].mass:
-            if each.at_m >= s:
-                frame = self.at(state, each.at_m)
-                parts += [point_mass(each.mass_kg, frame), turning(each.inertia_kg_m2, frame)]
+        if material is None:
+            mass, centre, inertia = rigid_body(self.robot, i)
+            x, rows = self._along(i, centre.real, state.q)
+            frame = translate(state.hub, complex(x, centre.imag), rows, state.qd)
+            parts += [point_mass(mass, frame), turning(inertia, frame)]
+        elif self.sleeved(i):
+            parts += sleeve.masses(state.lines[0], material)
+        else:
+            parts += [line_masses(x) for x in state.lines]
+        for each in self.robot.links[i].mass:  # (108)
+            frame = self.at(state, each.at_m)
+            parts += [point_mass(each.mass_kg, frame), turning(each.inertia_kg_m2, frame)]
+        if i == len(self.links) - 1:
+            load, frame = self.robot.payload, state.tip
+            if any(load.centre_of_mass_m):  # (109)
+                frame = translate(frame, complex(*load.centre_of_mass_m), [], state.qd)
+            parts += [point_mass(load.mass_kg, frame), turning(load.inertia_kg_m2, frame)]
         return parts
-
-    def load_masses(self, state: LinkState) -> list[Part]:
-        """The payload of the last link (22), (109); none of another."""
-        if state.number != len(self.links) - 1:
-            return []
-        load, frame = self.robot.payload, state.tip
-        if any(load.centre_of_mass_m):
-            frame = translate(frame, complex(*load.centre_of_mass_m), [], state.qd)
-        return [point_mass(load.mass_kg, frame), turning(load.inertia_kg_m2, frame)]
 
 
 def structure(robot: Robot, linear: bool | None = None) -> Structure:
