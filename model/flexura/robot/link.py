@@ -340,7 +340,7 @@ class Link(Table):
             return None
         return _spread(self.young_modulus_Pa * self._of_section("area", x), x)
 
-    def bending_stress(self, moment: Any, x: Any, distance: float | None = None) -> Any:
+    def bending_stress(self, moment: ArrayLike, x: ArrayLike, distance: float | None = None) -> Any:
         """The stress of a fibre under a bending moment, positive where it is drawn out (128).
 
         Args:
@@ -353,7 +353,7 @@ class Link(Table):
             distance is given.
         """
         arm = None if self.section is None else fibre(self.section, x, distance)
-        return None if arm is None else -moment * arm
+        return None if arm is None else -np.asarray(moment) * arm
 
     def _of_section(self, what: str, x: ArrayLike) -> Any:
         """The area [m^2] or the second moment [m^4] of the section at x (8)."""

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import Field, model_validator
 
 from ..errors import WrongValue
@@ -188,7 +189,7 @@ def form_of(section: Section | list[SectionAt]) -> Shape:
     return (section if isinstance(section, Section) else section[0]).form
 
 
-def fibre(section: Section | list[SectionAt], x: Any, distance: float | None = None) -> Any:
+def fibre(section: Section | list[SectionAt], x: ArrayLike, distance: float | None = None) -> Any:
     """Distance of a fibre from the axis over the second moment of area, y / I (128).
 
     Args:

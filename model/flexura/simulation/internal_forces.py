@@ -37,8 +37,8 @@ def force_channels(
     check_continuous(system)
     states, parts = (q, qd, qdd()), []
     for first in range(0, max(len(q), 1), ROWS):
-        rows = [x[first : first + ROWS] for x in states]
-        balance = Balance(system.assembly.structure, *rows)
+        here, rates, more = (x[first : first + ROWS] for x in states)
+        balance = Balance(system.assembly.structure, here, rates, more)
         found = (_joint_values(balance) + _link_values(balance)) if everything else []
         parts.append(np.array(found + _sensor_values(balance)))
     columns = np.concatenate(parts, axis=1)

@@ -5,15 +5,18 @@ core where that is faster.
 """
 
 from .assembly import Assembly
-from .balance import Balance, Load, Reaction, SectionForces
-from .frequency_response import FrequencyResponse, frequency_response
-from .internal_forces import (
+from .balance import (
+    Balance,
     InternalForces,
     LinkForces,
+    Load,
+    Reaction,
+    SectionForces,
     check_continuous,
     internal_forces,
     sections_known,
 )
+from .frequency_response import FrequencyResponse, frequency_response
 from .spectrum import Modes, frequencies, modes
 from .statespace import StateSpace, linearize
 from .statics import NoEquilibrium, equilibrium, holding, static, tip_pose

@@ -321,7 +321,7 @@ class System:
             return x, y, angle
         return self.assembly.line(self.check(q), link, places)
 
-    def abscissas(self, link: int, s: Any = None) -> np.ndarray:
+    def abscissas(self, link: int, s: ArrayLike | None = None) -> np.ndarray:
         """Checked places on a link.
 
         Args:

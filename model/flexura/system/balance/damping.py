@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from ..link.section import Material
-from ..robot import Robot
+from ...link.section import Material
+from ...robot import Robot
 from .inertia import Wrench, cross, stretches
 from .motion import Lines, LinkMotion, column, mixed
 

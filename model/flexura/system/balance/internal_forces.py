@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ..errors import InputError, guarded
-from ..io import array, number
-from ..robot import Robot
-from .balance import Balance, Load, Reaction
-from .statics import static
-from .system import System, assemble
+from ...errors import InputError, guarded
+from ...io import array, number
+from ...robot import Robot
+from ..statics import static
+from ..system import RobotLike, System, assemble
+from .cuts import Balance, Load, Reaction
 
 
 class LinkForces(NamedTuple):
@@ -57,7 +58,7 @@ class InternalForces:
             raise InputError(expected, key="joint", value=joint)
         return Reaction(*(x.item() for x in self._balance.reaction(joint - 1)))
 
-    def link(self, link: int, s: Any = None) -> LinkForces:
+    def link(self, link: int, s: ArrayLike | None = None) -> LinkForces:
         """The forces in sections of a link (123), (128).
 
         Args:
@@ -86,12 +87,12 @@ class InternalForces:
 
 @guarded("the internal forces")
 def internal_forces(
-    robot: Any,
-    q: Any = None,
-    qd: Any = None,
-    qdd: Any = None,
+    robot: RobotLike,
+    q: ArrayLike | None = None,
+    qd: ArrayLike | None = None,
+    qdd: ArrayLike | None = None,
     *,
-    tip_force: Any = (0.0, 0.0),
+    tip_force: ArrayLike = (0.0, 0.0),
     tip_moment: float = 0.0,
 ) -> InternalForces:
     """The forces within a robot in a state: of its joints, and along its links (121) to (128).
@@ -131,7 +132,14 @@ def internal_forces(
 
 
 def check_continuous(system: System) -> None:
-    """Raises InputError for a robot that slides from node to node, whose cuts have no balance."""
+    """Refuse a robot that slides from node to node, whose cuts have no balance.
+
+    Args:
+        system: the robot.
+
+    Raises:
+        InputError: it does.
+    """
     if system.robot.nodal:
         text = (
             'expected "continuous": sliding from node to node puts hubs beside their line, so that '
@@ -141,6 +149,14 @@ def check_continuous(system: System) -> None:
 
 
 def sections_known(robot: Robot, i: int) -> bool:
-    """Whether forces are known in every section of link i (from 0): a rigid link with a mass says
-    how it is spread."""
+    """Whether forces are known in every section of a link: a rigid one with a mass must say how it
+    is spread.
+
+    Args:
+        robot: the robot.
+        i: number of the link, from 0.
+
+    Returns:
+        True if they are.
+    """
     return robot.links[i].flexible or not robot.links[i].mass_kg

@@ -8,13 +8,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..link.section import Material
-from ..link.section import material as material_of
+from ...link.section import Material
+from ...link.section import material as material_of
+from ..structure import Structure, rigid_body
 from . import inertia
-from .damping_forces import damping_beyond
+from .damping import damping_beyond
 from .inertia import Wrench, cross, total
 from .motion import LinkMotion, link_motions
-from .structure import Structure, rigid_body
 
 SAME = 1e-9  # of a link's length: what is closer to a cut is at it
 
@@ -49,15 +49,8 @@ class SectionForces(NamedTuple):
 
 
 class Balance:
-    """The forces that all masses of a robot take at T times, less loads from outside.
-
-    Args:
-        structure: the robot's numbering and pieces.
-        q: configurations (T, n).
-        qd: their rates (T, n).
-        qdd: their accelerations (T, n).
-        loads: forces and moments from outside.
-    """
+    """The forces that all masses of a robot take at T times, less `loads` from outside; q, qd and
+    qdd (T, n)."""
 
     def __init__(
         self,
@@ -72,8 +65,14 @@ class Balance:
         self.motions = link_motions(structure, q, qd, qdd)
 
     def reaction(self, i: int) -> Reaction:
-        """The force that link i-1 exerts on link i (both from 0, the base is -1) at joint i (121),
-        (122)."""
+        """What link i-1 exerts on link i at joint i (121), (122); link -1 is the base.
+
+        Args:
+            i: number of the joint, from 0.
+
+        Returns:
+            Force, moment about the joint, place and axis, (T,) each.
+        """
         joint, hub = self.robot.links[i].joint, self.motions[i].hub
         place = hub.place - joint.hub_radius_m * hub.tangent
         axis = hub.angle - (joint.angle_rad if joint.type == "Pa" else 0.0)
@@ -83,11 +82,16 @@ class Balance:
         return Reaction(*needed.about(place), place, axis)
 
     def section(self, i: int, s: Any) -> SectionForces:
-        """The forces in the section of link i (from 0) at the abscissa s [m] from its proximal end,
-        of a link in a sleeve also (T,) (123).
+        """The forces in a section of a link (123).
 
-        What is fixed at s is beyond the cut, but for the hub of the link. In and behind a sleeve
-        they are not known: nan.
+        What is fixed at s is beyond the cut, but for the hub of the link.
+
+        Args:
+            i: number of the link, from 0.
+            s: abscissa from its proximal end [m]; of a link in a sleeve also (T,).
+
+        Returns:
+            The forces, (T,) each. In and behind a sleeve they are not known: nan.
         """
         motion, near = self.motions[i], SAME * self.robot.links[i].length_m
         x = motion.ahead.value + s

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..link.quadrature import gauss
-from ..link.section import Material
+from ...link.quadrature import gauss
+from ...link.section import Material
 from .motion import Frames, Lines, LinkMotion, column, mixed
 
 

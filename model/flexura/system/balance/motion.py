@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..link.line import Piece
-from .structure import Structure
+from ...link.line import Piece
+from ..structure import Structure
 
 
 class Frames(NamedTuple):
