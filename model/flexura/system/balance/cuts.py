@@ -1,4 +1,4 @@
-"""Forces within a robot, from the balance of what lies beyond a cut: (121) to (125)."""
+"""Forces within a robot, from the balance of what lies beyond a cut: chapter 14 of the theory."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ class Load(NamedTuple):
 
 class Reaction(NamedTuple):
     """What link i-1 exerts on link i: force x + iy [N], moment about the joint [N m], place of the
-    joint [m], angle of the axis on which a joint slides [rad]; each (T,)."""
+    joint [m], angle of the axis on which a joint slides [rad]; each (T,). What of it drive and
+    friction give says (126)."""
 
     force: np.ndarray
     moment: np.ndarray
@@ -41,7 +42,8 @@ class Reaction(NamedTuple):
 
 class SectionForces(NamedTuple):
     """Bending moment [N m], shear force and axial force [N] in a section of a link, each (T,)
-    (123)."""
+    (123). The shear force is minus the slope of the moment (124); a fine mesh has the same moment
+    by its curvature (127)."""
 
     bending_moment: np.ndarray
     shear_force: np.ndarray

@@ -1,4 +1,4 @@
-"""Places and accelerations of a robot at T times: (1) to (7), (30), (31), (107) to (110).
+"""Places and accelerations of a robot at T times: chapters 1, 4 and 12 of the theory.
 
 `kinematics` has the same with the columns of all unknowns, for one state.
 """
