@@ -22,8 +22,8 @@ def force_tables(run: fx.Run) -> list[Table]:
     heads = ("largest of", "value", "place", "at")
     table = Table("internal forces", heads, heads[:1])
     for name in filter(_REACTION.fullmatch, run):
-        row = int(np.argmax(np.abs(run[name])))
-        table.add(f"{name} [{run.units[name]}]", number(run[name][row], 5), "", _time(run, row))
+        late = int(np.argmax(np.abs(run[name])))
+        table.add(f"{name} [{run.units[name]}]", number(run[name][late], 5), "", _time(run, late))
     sleeved = [link["joint"]["type"] == "Pb" for link in run.meta["robot"]["link"]]
     for link, kind in (found.groups() for found in map(_ALONG.fullmatch, run) if found):
         names = [f"link/{link}/{kind}/{k}" for k in range(STATIONS)]

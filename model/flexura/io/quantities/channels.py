@@ -220,8 +220,8 @@ CHANNELS = (
         (),
         "sensor",
         "Sensor of the robot file: deflection [m] and slope [rad] in the hub frame of its link, "
-        "strain [1] positive where the fibre is stretched; bending moment, shear force, axial force "
-        "and stress as the channels of links. In an imported log: any quantity.",
+        "strain [1] positive where the fibre is stretched; bending moment, shear force, axial "
+        "force and stress as the channels of links. In an imported log: any quantity.",
     ),
     Channel("tip/x", LENGTH, "tip x", "Tip of the last link in the base frame."),
     Channel("tip/y", LENGTH, "tip y", "Tip of the last link in the base frame."),
