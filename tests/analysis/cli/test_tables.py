@@ -200,7 +200,7 @@ def test_internal_forces_are_stored_and_the_largest_are_shown(command, tmp_path)
         "section = { width_m = 0.02, height_m = 0.002 }\nyoung_modulus_Pa = 2.0e11\n"
         'density_kg_m3 = 7850.0\n[link.joint]\ntype = "R"\n'
     )
-    rise = 'duration_s = 0.2\nstep_s = 0.05\n[[joint]]\nmotion = { kind = "polynomial", '
+    rise = 'duration_s = 0.2\noutput_step_s = 0.05\n[[joint]]\nmotion = { kind = "polynomial", '
     (tmp_path / "arm.toml").write_text(table)
     (tmp_path / "rise.toml").write_text(rise + "end = 0.2, duration_s = 0.2 }\n")
     files = [tmp_path / "arm.toml", tmp_path / "rise.toml", "--out", tmp_path / command]
