@@ -29,6 +29,7 @@ from .simulation import (
 )
 from .system import (
     FrequencyResponse,
+    InternalForces,
     Modes,
     NoEquilibrium,
     StateSpace,
@@ -37,6 +38,7 @@ from .system import (
     frequencies,
     frequency_response,
     holding,
+    internal_forces,
     linearize,
     modes,
     static,
@@ -53,6 +55,7 @@ __all__ = [
     "Force",
     "FrequencyResponse",
     "InputError",
+    "InternalForces",
     "JointDrive",
     "Load",
     "Manoeuvre",
@@ -74,6 +77,7 @@ __all__ = [
     "frequencies",
     "frequency_response",
     "holding",
+    "internal_forces",
     "inverse",
     "inverse_kinematics",
     "invert",

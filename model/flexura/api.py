@@ -50,6 +50,7 @@ def simulate(
     numerical_damping: bool = True,
     loads: LoadsLike = None,
     payloads: PayloadsLike = None,
+    internal_forces: bool = False,
     max_steps: int | None = None,
     wall_time: float | None = None,
     progress: Progress = None,
@@ -104,6 +105,9 @@ def simulate(
             a static start the loads of t_eval[0] act too. Their work is part of `energy/work`.
         payloads: changes of the payload (134): a list of `PayloadChange`, or of tables with its
             keys. Each is an event "payload"; the energy jumps by what the event says.
+        internal_forces: the Run also has the reactions of the joints, and bending moment, shear
+            force, axial force and stress along the links (121) to (128). They take about a
+            millisecond a link and time.
         max_steps: a budget of steps, rejected ones included, by default 20 million. It ends the run
             with the event "exhausted", at the same step on every machine.
         wall_time: seconds after which the run is stopped where it is, with the event "wall_time".

@@ -64,12 +64,16 @@ BATCH = fx.Batch.vary(RIG, {"payload.mass_kg": [0.1]})
 CALLS = {
     "simulate": (fx.simulate, {"robot": RIG, "t_eval": T, "drive": [0.1, 0.0], "q0": None}
         | {"qd0": None, "rtol": 1e-4, "method": "auto", "start": None, "continue_from": None}
-        | {"until": None, "numerical_damping": True, "progress": None}),
+        | {"until": None, "numerical_damping": True, "progress": None}
+        | {"internal_forces": False}),
     "population": (fx.simulate, {"robot": BATCH, "t_eval": T, "drive": None, "q0": None}
         | {"qd0": None, "rtol": 1e-4, "method": "auto", "start": None, "channels": None}
         | {"numerical_damping": True, "progress": None, "reduce": None, "chunk": 2, "threads": 1}),
     "inverse": (fx.inverse, {"robot": RIG, "t_eval": T, "motion": [0.0, 0.0], "q0": None}
-        | {"qd0": None, "rtol": 1e-4, "method": "auto", "start": None, "progress": None}),
+        | {"qd0": None, "rtol": 1e-4, "method": "auto", "start": None, "progress": None}
+        | {"internal_forces": False}),
+    "internal_forces": (fx.internal_forces, {"robot": RIG, "q": None, "qd": None, "qdd": None}
+        | {"tip_force": (0.0, 0.0), "tip_moment": 0.0}),
     "twin": (twin.simulate, {"robot": RIG, "t_eval": T, "drive": [0.1, 0.0], "qd0": None}
         | {"start": None, "beam": "ancf", "elements": 4, "step_s": 5e-4, "hub_length_m": None}
         | {"progress": None}),

@@ -12,7 +12,8 @@ from flexura.io import FILE
 
 from ..studies.drive_requirements import efforts
 from . import tables
-from .options import Force, Json, MaxSteps, Out, RobotFile, Rtol, Start, WallTime
+from .internal_forces import force_tables
+from .options import Force, InternalForces, Json, MaxSteps, Out, RobotFile, Rtol, Start, WallTime
 from .output import load_request, print_results, report_saved, simulate_asked
 from .results import results
 
@@ -32,6 +33,7 @@ def inverse(
     wall_time: WallTime = None,
     force: Force = False,
     start: Start = None,
+    internal_forces: InternalForces = False,
     json: Json = False,
 ) -> None:
     """Compute the forces and torques that a manoeuvre's motions take.
@@ -64,13 +66,14 @@ def inverse(
             method=method,
             max_steps=max_steps,
             wall_time=wall_time,
+            internal_forces=internal_forces,
         )
         run.save(draft.folder)
         folder = draft.keep(interrupted=run.stopped)
     rows = efforts(run) if len(run) > 1 else []
     print_results(
         json,
-        lambda: tables.effort_table(rows, run),
+        lambda: [tables.effort_table(rows, run), *force_tables(run)],
         lambda: (
             tables.run_json(run) | {"drives": [vars(r) for r in rows], "run": str(folder / FILE)}
         ),

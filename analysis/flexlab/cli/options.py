@@ -55,6 +55,13 @@ WallTime = Annotated[
     float | None,
     typer.Option(metavar="SECONDS", help="stop after so many seconds; keep what is computed"),
 ]
+InternalForces = Annotated[
+    bool,
+    typer.Option(
+        "--internal-forces",
+        help="store the reactions of joints, and moment, forces and stress along links, too",
+    ),
+]
 Start = Annotated[
     str | None,
     typer.Option(

@@ -14,8 +14,10 @@ from ..identification.vibration.shapers import read_shaper, shaped
 from ..studies import parameter_sweep
 from ..tuning.closed_loop import controller_from_file, references, with_references
 from . import tables
+from .internal_forces import force_tables
 from .options import (
     Force,
+    InternalForces,
     Json,
     ManoeuvreFile,
     MaxSteps,
@@ -57,6 +59,7 @@ def simulate(
     prescribed: Prescribed = False,
     start: Start = None,
     shaper: ShaperFile = None,
+    internal_forces: InternalForces = False,
     vary: Annotated[
         list[str] | None,
         typer.Option(
@@ -87,7 +90,12 @@ def simulate(
             value=scheduler,
         )
     if vary:
-        refused = (("--force", force), ("--controller", controller), ("--shaper", shaper))
+        refused = (
+            ("--force", force),
+            ("--controller", controller),
+            ("--shaper", shaper),
+            ("--internal-forces", internal_forces),
+        )
         for key, given in refused:
             if given:
                 raise fx.InputError("expected without --vary", key=key, value=str(given))
@@ -125,6 +133,7 @@ def simulate(
             method=method,
             max_steps=max_steps,
             wall_time=wall_time,
+            internal_forces=internal_forces,
         )
         if isinstance(drive, fx.Sampled):  # of a designed controller
             run = with_references(run, references(system, asked))
@@ -132,7 +141,7 @@ def simulate(
         folder = draft.keep(interrupted=run.stopped)
     print_results(
         json,
-        lambda: tables.run_table(run),
+        lambda: [tables.run_table(run), *force_tables(run)],
         lambda: tables.run_json(run) | {"run": str(folder / FILE)},
     )
     report_saved(run, folder, json)

@@ -98,9 +98,8 @@ def run_table(run: fx.Run) -> Table:
         ("channel",),
     )
     for name in run:
-        if name.startswith(("link", "energy")) and not name.endswith(
-            ("tip_deflection", "tip_slope")
-        ):
+        shown = not name.startswith(("link", "energy")) and "/reaction_" not in name
+        if not (shown or name.endswith(("tip_deflection", "tip_slope"))):
             continue
         values = run[name]
         table.add(

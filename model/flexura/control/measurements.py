@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..signals import Loads
+from ..robot import FORCE_KINDS
 from ..system import StateSpace, System, sensor_channels
 from ..system.system import jacobian
 
@@ -43,7 +43,7 @@ class Measurements:
             f"sensor/{sensor.name}": sensor.name
             for link in links
             for sensor in link.sensor
-            if sensor.kind != "acceleration"
+            if sensor.kind not in ("acceleration", *FORCE_KINDS)
         }
         known = [*self.joints, *self.tips, *self.sensors]
         asked = [*self.joints, *(self.sensors or self.tips)] if names is None else list(names)
@@ -51,7 +51,7 @@ class Measurements:
             if name not in known:
                 expected = f"expected one of {', '.join(known)}"
                 if isinstance(name, str) and name.startswith("sensor/"):
-                    expected += "; an accelerometer shows forces too, which no estimator here takes"
+                    expected += "; sensors of accelerations and forces are none that an estimator here takes"
                 raise InputError(expected, key="measure", value=name)
         if not asked or len(set(asked)) != len(asked):
             raise InputError("expected each measurement once", key="measure", value=names)
@@ -73,8 +73,7 @@ class Measurements:
         at, still = q[None], self._still
         sensors: dict[str, Any] = {}
         if self._sensed:
-            force = np.zeros((1, len(self.system.robot.links)))
-            channels = sensor_channels(self.system, np.zeros(1), at, still, force, Loads())
+            channels = sensor_channels(self.system, at, still, lambda: still)[0]
             sensors = {name.removeprefix("sensor/"): x[0] for name, x in channels.items()}
         return self.read(q[self.system.joint_rows], self._bent(q), sensors)
 

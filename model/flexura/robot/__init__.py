@@ -14,11 +14,12 @@ from .old_keys import OldKey, renamed
 from .payload import Payload
 from .robot import MAX_LINKS, Robot, load, robot_of, save
 from .section import Section, SectionAt, form_of
-from .sensor import Sensor
+from .sensor import FORCE_KINDS, Sensor
 from .table import BOUNDS, Bounds, Table
 
 __all__ = [
     "BOUNDS",
+    "FORCE_KINDS",
     "LEAST_FREE",
     "MAX_ELEMENTS",
     "MAX_LINKS",

@@ -12,8 +12,8 @@ from pydantic import Field, field_validator, model_validator
 from ..errors import WrongValue
 from .damping import Damping
 from .joint import Joint
-from .section import FORMS, Section, SectionAt, check_sections, dimensions_at, form_of
-from .sensor import Sensor
+from .section import FORMS, Section, SectionAt, check_sections, dimensions_at, fibre, form_of
+from .sensor import FORCE_KINDS, Sensor
 from .table import BOUNDS, Table, name, quantity
 
 MAX_ELEMENTS = 200
@@ -174,12 +174,38 @@ class Link(Table):
             if sensor.at_m > self.length_m:
                 expected = f"a place on the link, at most its length, {self.length_m:g}"
                 raise WrongValue(f"sensor[{k}].at_m", sensor.at_m, expected)
-            if not self.flexible and sensor.kind != "acceleration":
-                expected = '"acceleration": a rigid link (elements = 0) does not bend'
+            if not self.flexible and sensor.kind not in ("acceleration", *FORCE_KINDS):
+                expected = '"acceleration" or a force: a rigid link (elements = 0) does not bend'
                 raise WrongValue(f"sensor[{k}].kind", sensor.kind, expected)
+            if sensor.kind in FORCE_KINDS:
+                self._check_force_sensor(k, sensor)
             if self.flexible and self.joint.type == "Pb":
                 expected = "none: no sensors are on a flexible link that moves through a sleeve"
                 raise WrongValue(f"sensor[{k}].at_m", sensor.at_m, expected)
+
+    def _check_force_sensor(self, k: int, sensor: Sensor) -> None:
+        if self.mass_kg and 0 < sensor.at_m < self.length_m:
+            expected = (
+                "a place at an end: how the mass of this rigid link is spread is not given by "
+                "mass_kg; mass_per_length_kg_m gives it"
+            )
+            raise WrongValue(f"sensor[{k}].at_m", sensor.at_m, expected)
+        if self.joint.type == "Pb":
+            expected = (
+                'none on a link that moves through a sleeve: simulate with "internal_forces", '
+                "which has the forces on its free length"
+            )
+            raise WrongValue(f"sensor[{k}].at_m", sensor.at_m, expected)
+        if sensor.kind == "stress" and self.section is None:
+            expected = "missing: a stress needs the section; the bending stiffness alone gives none"
+            raise WrongValue("section", None, expected)
+        stressed = self.bending_stress(0.0, sensor.at_m, sensor.distance_m) is not None
+        if sensor.kind == "stress" and not stressed:
+            expected = (
+                "missing: expected the distance of the fibre from the axis in metres; a section "
+                "by area_m2 and second_moment_m4 has no height"
+            )
+            raise WrongValue(f"sensor[{k}].distance_m", None, expected)
 
     def _check_flexible(self) -> None:
         if self.length_m <= 0:
@@ -313,6 +339,21 @@ class Link(Table):
         if self.section is None or self.young_modulus_Pa is None:
             return None
         return _spread(self.young_modulus_Pa * self._of_section("area", x), x)
+
+    def bending_stress(self, moment: ArrayLike, x: ArrayLike, distance: float | None = None) -> Any:
+        """The stress of a fibre under a bending moment, positive where it is drawn out (128).
+
+        Args:
+            moment: bending moments, positive to the left (S,) [N m].
+            x: their places from the link's origin (S,) [m].
+            distance: of the fibre, to the left of the tangent [m]; None: the outer one.
+
+        Returns:
+            Stresses (S,) [Pa]; None: the link has no section, or one without a height where no
+            distance is given.
+        """
+        arm = None if self.section is None else fibre(self.section, x, distance)
+        return None if arm is None else -np.asarray(moment) * arm
 
     def _of_section(self, what: str, x: ArrayLike) -> Any:
         """The area [m^2] or the second moment [m^4] of the section at x (8)."""

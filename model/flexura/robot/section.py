@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import Field, model_validator
 
 from ..errors import WrongValue
@@ -186,6 +187,25 @@ def form_of(section: Section | list[SectionAt]) -> Shape:
         The shape.
     """
     return (section if isinstance(section, Section) else section[0]).form
+
+
+def fibre(section: Section | list[SectionAt], x: ArrayLike, distance: float | None = None) -> Any:
+    """Distance of a fibre from the axis over the second moment of area, y / I (128).
+
+    Args:
+        section: one, or a list along the link.
+        x: places from the link's origin [m].
+        distance: of the fibre, to the left of the tangent [m]; None: the outer one, at half the
+            height or diameter.
+
+    Returns:
+        As many values [1/m^3]; None: the section has no height, and no distance is given.
+    """
+    form, dimensions = form_of(section), dimensions_at(section, x)
+    second = form.second_moment(*dimensions)
+    if distance is not None:
+        return distance / second
+    return dimensions[form.keys.index(form.depth)] / 2 / second if form.depth else None
 
 
 def check_sections(section: Section | list[SectionAt], length: float) -> None:

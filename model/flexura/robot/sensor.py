@@ -10,7 +10,17 @@ from pydantic import Field, model_validator
 from ..errors import WrongValue
 from .table import BOUNDS, Table, name
 
-UNITS = {"deflection": "m", "slope": "rad", "strain": "1", "acceleration": "m/s^2"}
+UNITS = {
+    "deflection": "m",
+    "slope": "rad",
+    "strain": "1",
+    "acceleration": "m/s^2",
+    "bending_moment": "N m",
+    "shear_force": "N",
+    "axial_force": "N",
+    "stress": "Pa",
+}
+FORCE_KINDS = ("bending_moment", "shear_force", "axial_force", "stress")
 _NAME = re.compile(r"[A-Za-z0-9_.-]+")
 
 
@@ -19,19 +29,30 @@ class Sensor(Table):
 
     `deflection`: across the tangent at the link's hub. `slope`: the tangent's angle to that one.
     `strain`: -distance_m x curvature. `acceleration`: across the tangent at the place, to its
-    left, without gravity.
+    left, without gravity. `bending_moment`, `shear_force`, `axial_force`: in the section there.
+    `stress`: the bending stress there, at distance_m or at the outer fibre to the left.
     """
 
     name: str = name("the sensor's")
-    kind: Literal["deflection", "slope", "strain", "acceleration"] = Field(
-        description='what it measures, "deflection", "slope", "strain" or "acceleration"'
+    kind: Literal[
+        "deflection",
+        "slope",
+        "strain",
+        "acceleration",
+        "bending_moment",
+        "shear_force",
+        "axial_force",
+        "stress",
+    ] = Field(
+        description='what it measures, "deflection", "slope", "strain", "acceleration", '
+        '"bending_moment", "shear_force", "axial_force" or "stress"'
     )
     at_m: float = Field(ge=0, description="the place along the link in metres, 0 or more")
     distance_m: float | None = Field(
         None,
         ge=-BOUNDS["height_m"].high,
         le=BOUNDS["height_m"].high,
-        description="of a strain: how far from the line it is measured, in metres, to the left of "
+        description="of a strain or stress: how far from the line it is, in metres, to the left of "
         "the tangent",
     )
 
@@ -43,7 +64,7 @@ class Sensor(Table):
         if self.kind == "strain" and self.distance_m is None:
             said = type(self).model_fields["distance_m"].description
             raise WrongValue("distance_m", None, f"missing: expected {said}")
-        if self.kind != "strain" and self.distance_m is not None:
+        if self.kind not in ("strain", "stress") and self.distance_m is not None:
             raise WrongValue("distance_m", self.distance_m, f"none: a {self.kind} has no distance")
         return self
 

@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 
 from ..control import Controller, Sampled
 from ..errors import InputError, guarded
-from ..io import Run, check_progress
+from ..io import Run, check_progress, flag
 from ..signals import Drive, LoadsLike, PayloadsLike, SignalLike, as_payloads, as_signals
-from ..system import RobotLike, System, assemble
+from ..system import RobotLike, System, assemble, check_continuous
 from . import dense, integrator, nodewise_run, payload_changes
 from .problem import Budget, Problem, Progress, Solution, check_times, initial_value_problem
 from .recorder import record, still
@@ -46,6 +46,7 @@ def simulate(
     numerical_damping: bool = True,
     loads: LoadsLike = None,
     payloads: PayloadsLike = None,
+    internal_forces: bool = False,
     max_steps: int | None = None,
     wall_time: float | None = None,
     progress: Progress = None,
@@ -66,6 +67,7 @@ def simulate(
         numerical_damping: as in `flexura.simulate`.
         loads: as in `flexura.simulate`.
         payloads: as in `flexura.simulate`.
+        internal_forces: as in `flexura.simulate`.
         max_steps: as in `flexura.simulate`.
         wall_time: as in `flexura.simulate`.
         progress: called with the finished fraction.
@@ -88,6 +90,9 @@ def simulate(
         loads,
     )
     check_progress(progress)
+    within = flag(internal_forces, "internal_forces")
+    if within:
+        check_continuous(problem.system)
     solver = _solver(problem.system)
     changes = as_payloads(payloads, float(problem.t[0]), float(problem.t[-1]))
     if changes:
@@ -102,7 +107,7 @@ def simulate(
         accounts=solution.accounts + problem.accounts,
         meta=solution.meta | {"start": problem.start},
     )
-    run = record(problem.system, solution, problem.loads)
+    run = record(problem.system, solution, problem.loads, within)
     run.meta["events"] = run.meta["events"] + still(run)
     if isinstance(problem.drive, Controller):
         return problem.drive.recorded(run, solution.sampler)
@@ -122,6 +127,7 @@ def inverse(
     start: str | None = None,
     loads: LoadsLike = None,
     payloads: PayloadsLike = None,
+    internal_forces: bool = False,
     max_steps: int | None = None,
     wall_time: float | None = None,
     progress: Progress = None,
@@ -148,6 +154,7 @@ def inverse(
             joints on their motions.
         loads: as in `flexura.simulate`; the drives bear them too.
         payloads: as in `flexura.simulate`; joints keep to their motions at the impact.
+        internal_forces: as in `flexura.simulate`.
         max_steps: as in `flexura.simulate`.
         wall_time: as in `flexura.simulate`.
         progress: called with the finished fraction.
@@ -178,6 +185,7 @@ def inverse(
         start=start,
         loads=loads,
         payloads=payloads,
+        internal_forces=internal_forces,
         max_steps=max_steps,
         wall_time=wall_time,
         progress=progress,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from ..io import STATIONS, Run, Tables, judged
 from ..robot import Robot
 from ..signals import Loads
-from ..system import System, sensor_channels
+from ..system import System, accelerations, force_channels, sensor_channels
 from .problem import Solution
 
 
@@ -57,9 +58,11 @@ LIMITS = ("limit", "end_of_link", "sleeve")  # names of events that stop a joint
 STILL = 1e-9  # m or rad: a robot whose unknowns change by less does not move
 
 
-def record(system: System, solution: Solution, loads: Loads | None = None) -> Run:
+def record(
+    system: System, solution: Solution, loads: Loads | None = None, internal_forces: bool = False
+) -> Run:
     """The Run of a solution under loads on links: its channels, the balance of its energies, and
-    the solver's metadata."""
+    the solver's metadata; if asked for with the forces within the robot."""
     loads = loads or Loads()
     n, t, states, accounts = system.n, solution.t, solution.states, solution.accounts
     q, v = np.ascontiguousarray(states[:, :n]), np.ascontiguousarray(states[:, n:])
@@ -74,15 +77,16 @@ def record(system: System, solution: Solution, loads: Loads | None = None) -> Ru
     channels = {
         name: np.ascontiguousarray(values) for name, values in zip(units, found, strict=True)
     }
-    begin, sensors = 0, []
+    begin, parts = 0, []
     for carrying, end in solution.systems or ((system, len(t)),):
-        rows = slice(begin, end)
-        sensors.append(
-            sensor_channels(carrying, t[rows], q[rows], v[rows], solution.forces[rows], loads)
-        )
-        begin = end
-    channels |= {name: np.concatenate([part[name] for part in sensors]) for name in sensors[0]}
-    units |= {f"sensor/{s.name}": s.unit for link in system.robot.links for s in link.sensor}
+        rows, begin = slice(begin, end), end
+        state = t[rows], q[rows], v[rows]
+        qdd = cache(partial(accelerations, carrying, *state, solution.forces[rows], loads))
+        shown, own = sensor_channels(carrying, *state[1:], qdd)
+        within, more = force_channels(carrying, *state, qdd, loads, internal_forces)
+        parts.append(shown | within)
+        units |= own | more
+    channels |= {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     about = describe(system, energy_error(seen[:, -3:], accounts, solution.jumps)) | solution.meta
     if loads:
         about["loads"] = loads.spec()

@@ -5,9 +5,21 @@ core where that is faster.
 """
 
 from .assembly import Assembly
+from .balance import (
+    Balance,
+    ExternalLoad,
+    InternalForces,
+    LinkForces,
+    Reaction,
+    SectionForces,
+    check_continuous,
+    force_channels,
+    internal_forces,
+    sections_known,
+)
 from .frequency_response import FrequencyResponse, frequency_response
 from .loads import Impact, acting_loads, impact, load_forces, with_payload
-from .sensors import sensor_channels
+from .sensors import accelerations, sensor_channels
 from .spectrum import Modes, frequencies, modes
 from .statespace import StateSpace, linearize
 from .statics import NoEquilibrium, equilibrium, holding, static, tip_pose
@@ -15,23 +27,34 @@ from .system import RobotLike, System, assemble
 
 __all__ = [
     "Assembly",
+    "Balance",
+    "ExternalLoad",
     "FrequencyResponse",
     "Impact",
+    "InternalForces",
+    "LinkForces",
     "Modes",
     "NoEquilibrium",
+    "Reaction",
     "RobotLike",
+    "SectionForces",
     "StateSpace",
     "System",
+    "accelerations",
     "acting_loads",
     "assemble",
+    "check_continuous",
     "equilibrium",
+    "force_channels",
     "frequencies",
     "frequency_response",
     "holding",
     "impact",
+    "internal_forces",
     "linearize",
     "load_forces",
     "modes",
+    "sections_known",
     "sensor_channels",
     "static",
     "tip_pose",

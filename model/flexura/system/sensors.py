@@ -2,46 +2,42 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
-from ..robot import Sensor
+from ..robot import FORCE_KINDS, Sensor
 from ..signals import Loads
 from .loads import load_forces
 from .system import System
 
 
 def sensor_channels(
-    system: System,
-    t: np.ndarray,
-    q: np.ndarray,
-    qd: np.ndarray,
-    drive: np.ndarray,
-    loads: Loads,
-) -> dict[str, np.ndarray]:
-    """The channels of a robot's sensors.
+    system: System, q: np.ndarray, qd: np.ndarray, qdd: Callable[[], np.ndarray]
+) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    """The channels of a robot's sensors but for those of forces.
 
     Args:
         system: the robot.
-        t: times (T,) [s].
         q: configurations (T, n).
         qd: their rates (T, n).
-        drive: forces of the drives (T, links) [N or N m].
-        loads: forces and moments on links.
+        qdd: gives their accelerations (T, n).
 
     Returns:
-        Values (T,) by channel, in the unit of the sensor.
+        Values (T,) and units by channel.
     """
-    out, rates = {}, None
+    out, units = {}, {}
     for i, link in enumerate(system.robot.links):
         for sensor in link.sensor:
+            if sensor.kind in FORCE_KINDS:
+                continue
+            name = f"sensor/{sensor.name}"
+            units[name] = sensor.unit
             if sensor.kind == "acceleration":
-                if rates is None:
-                    rates = _rates(system, q, qd, drive, load_forces(system, q, loads, t))
-                values = _acceleration(system, i, sensor.at_m, q, qd, rates)
+                out[name] = _acceleration(system, i, sensor.at_m, q, qd, qdd())
             else:
-                values = _bending(system, i, sensor, q)
-            out[f"sensor/{sensor.name}"] = values
-    return out
+                out[name] = _bending(system, i, sensor, q)
+    return out, units
 
 
 def _bending(system: System, i: int, sensor: Sensor, q: np.ndarray) -> np.ndarray:
@@ -68,12 +64,28 @@ def _bending(system: System, i: int, sensor: Sensor, q: np.ndarray) -> np.ndarra
     return across if sensor.kind == "deflection" else turned
 
 
-def _rates(
-    system: System, q: np.ndarray, qd: np.ndarray, drive: np.ndarray, acting: np.ndarray
+def accelerations(
+    system: System,
+    t: np.ndarray,
+    q: np.ndarray,
+    qd: np.ndarray,
+    drive: np.ndarray,
+    loads: Loads,
 ) -> np.ndarray:
-    """The accelerations of the unknowns (T, n) (44), with Coulomb friction (57), under generalised
-    forces `acting` (T, n) besides the drives."""
-    force = acting.copy()
+    """The accelerations of the unknowns (44), with Coulomb friction (57) and loads on links (132).
+
+    Args:
+        system: the robot.
+        t: times (T,) [s].
+        q: configurations (T, n).
+        qd: their rates (T, n).
+        drive: forces of the drives (T, links) [N or N m].
+        loads: forces and moments on links.
+
+    Returns:
+        (T, n).
+    """
+    force = load_forces(system, q, loads, t)
     force[:, system.joint_rows] += drive
     force -= np.array([system.assembly.coulomb(rates) for rates in qd]).reshape(q.shape)
     rows = zip(q, qd, force, strict=True)

@@ -315,6 +315,25 @@ class System:
         Raises:
             InputError: there is no such link, or a place is not on it.
         """
+        places = self.abscissas(link, s)
+        if self.exact:
+            x, y, angle = np.array(self.equations.line(self.check(q), link - 1, places)).T.copy()
+            return x, y, angle
+        return self.assembly.line(self.check(q), link, places)
+
+    def abscissas(self, link: int, s: ArrayLike | None = None) -> np.ndarray:
+        """Checked places on a link.
+
+        Args:
+            link: number of the link, from 1.
+            s: places along it from its proximal end (S,) [m]; None: 101 places from end to end.
+
+        Returns:
+            (S,) [m].
+
+        Raises:
+            InputError: there is no such link, or a place is not on it.
+        """
         expected = f"expected a link from 1 to {len(self.robot.links)}"
         if number(link, "link", expected) not in range(1, len(self.robot.links) + 1):
             raise InputError(expected, key="link", value=link)
@@ -328,10 +347,7 @@ class System:
             raise InputError(
                 f"expected places from 0 to the link's length, {length:g} m", key="s", value=s
             )
-        if self.exact:
-            x, y, angle = np.array(self.equations.line(self.check(q), link - 1, places)).T.copy()
-            return x, y, angle
-        return self.assembly.line(self.check(q), link, places)
+        return places
 
     def angles(self, link: int, s: ArrayLike) -> np.ndarray:
         """What each unknown turns the tangent by, against the hub: B of (2).

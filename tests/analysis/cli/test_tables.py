@@ -5,9 +5,11 @@ import random
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from rich.console import Console
 
+import flexura as fx
 from commands import drawn, run
 from flexlab.runs.formatting import duration, finite, number, percent, printable
 from flexlab.runs.table import Styled, Table, text
@@ -188,3 +190,29 @@ def test_the_tables_of_a_slow_command_fit(arguments, place):
 def test_the_tables_of_an_identification_fit(place):
     assert run(["bench", "excite", "--seed", "1", "--out", "logs/excite"])[0] == 0
     assert assert_tables_fit(["identify", "logs/excite", "--check", "logs/excite"])
+
+
+@pytest.mark.parametrize("command", ["simulate", "inverse"])
+def test_internal_forces_are_stored_and_the_largest_are_shown(command, tmp_path):
+    """Of joints and links, with place and time; without the option there are none."""
+    table = (
+        "gravity_m_s2 = [0.0, -9.81]\n[[link]]\nlength_m = 0.5\nelements = 2\n"
+        "section = { width_m = 0.02, height_m = 0.002 }\nyoung_modulus_Pa = 2.0e11\n"
+        'density_kg_m3 = 7850.0\n[link.joint]\ntype = "R"\n'
+    )
+    rise = 'duration_s = 0.2\noutput_step_s = 0.05\n[[joint]]\nmotion = { kind = "polynomial", '
+    (tmp_path / "arm.toml").write_text(table)
+    (tmp_path / "rise.toml").write_text(rise + "end = 0.2, duration_s = 0.2 }\n")
+    files = [tmp_path / "arm.toml", tmp_path / "rise.toml", "--out", tmp_path / command]
+    files += ["--prescribed"] if command == "simulate" else []
+    status, shown, told = run([command, *files, "--internal-forces"])
+    assert status == 0, told
+    stored = fx.Run.read(tmp_path / command)
+    for name, row in (("joint/1/reaction_y [N]", "joint/1/reaction_y"),):
+        assert name in shown and number(np.abs(stored[row]).max(), 5) in shown
+    stress = max(np.abs(stored[f"link/1/stress/{k}"]).max() for k in range(9))
+    assert "link/1/stress [Pa]" in shown and number(stress, 5) in shown
+    assert "0/8 of the length" in shown
+    status, shown, _ = run([command, *files, "--force"])
+    assert status == 0 and "internal forces" not in shown
+    assert "joint/1/reaction_x" not in fx.Run.read(tmp_path / command)

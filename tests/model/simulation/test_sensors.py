@@ -80,6 +80,62 @@ def test_an_accelerometer_on_a_rigid_arm_in_a_prescribed_turn():
     assert run["sensor/acc"] == pytest.approx(0.2 * np.array(signal), rel=1e-6, abs=1e-9)
 
 
+def test_sensors_of_forces_are_those_of_the_cut():
+    """In a run and in inverse dynamics; a rigid link has them at its ends, or with its mass
+    spread."""
+    section = {"width_m": 0.02, "height_m": 0.001}
+    kinds = ("bending_moment", "shear_force", "axial_force", "stress")
+    sensors = [{"name": kind, "kind": kind, "at_m": 0.1} for kind in kinds]
+    sensors.append({"name": "near", "kind": "stress", "at_m": 0.1, "distance_m": -0.0002})
+    strip = {"length_m": L, "elements": 4, "young_modulus_Pa": 2e11, "density_kg_m3": 7850.0}
+    arm = {"length_m": 0.2, "mass_kg": 0.2, "joint": {"type": "R"}}
+    arm["sensor"] = [{"name": "root", "kind": "bending_moment", "at_m": 0.0}]
+    strip |= {"section": section, "sensor": sensors, "joint": {"type": "R"}}
+    made = fx.Robot.from_dict({"link": [arm, strip], "gravity_m_s2": [0.0, -9.81]})
+    run = fx.inverse(made, [0.0, 0.1], [fx.signals.harmonic(0.5, 1.0), 0.0], internal_forces=True)
+    units = [run.units[f"sensor/{kind}"] for kind in (*kinds, "near")]
+    assert units == ["N m", "N", "N", "Pa", "Pa"]
+    assert run["sensor/root"] == pytest.approx(-run["joint/1/reaction_moment"], rel=1e-12)
+    assert run["link/2/bending_moment/2"] == pytest.approx(run["sensor/bending_moment"], rel=1e-12)
+    assert run["link/2/stress/2"] == pytest.approx(run["sensor/stress"], rel=1e-12)
+    stress = -run["sensor/bending_moment"] * 6 / (0.02 * 0.001**2)
+    assert run["sensor/stress"] == pytest.approx(stress, rel=1e-9)
+    assert run["sensor/near"] == pytest.approx(-0.4 * stress, rel=1e-9)
+    assert "link/1/bending_moment/0" not in run
+    alone = fx.inverse(made, [0.0, 0.1], [fx.signals.harmonic(0.5, 1.0), 0.0])
+    assert alone["sensor/axial_force"] == pytest.approx(run["sensor/axial_force"], rel=1e-12)
+    assert "joint/1/reaction_x" not in alone
+
+
+FORCES_REFUSED = {
+    "a stress without section": ({}, {"kind": "stress"}, "section"),
+    "a section by its values": (
+        {"section": {"area_m2": 2e-5, "second_moment_m4": 2e-12}},
+        {"kind": "stress"},
+        "sensor[1].distance_m",
+    ),
+    "a moment at a distance": ({}, {"kind": "bending_moment", "distance_m": 0.1}, "sensor[1]."),
+    "in a sleeve": ({"joint": {"type": "Pb", "start_m": 0.2}}, {"kind": "shear_force"}, "sensor["),
+    "within a lumped rigid link": (
+        {"elements": 0, "mass_kg": 0.1},
+        {"kind": "axial_force"},
+        "sensor[1].at_m",
+    ),
+}
+
+
+@pytest.mark.parametrize(("link", "sensor", "key"), FORCES_REFUSED.values(), ids=FORCES_REFUSED)
+def test_forces_that_are_not_known_are_refused(link, sensor, key):
+    by_section = {"young_modulus_Pa": 2e11, "density_kg_m3": 7850.0} if "section" in link else {}
+    by_number = {"mass_per_length_kg_m": RHO, "bending_stiffness_N_m2": EI}
+    own = by_section or ({} if "mass_kg" in link else by_number)
+    table = {"length_m": L, "elements": 4, "joint": {"type": "R"}} | own | link
+    table["sensor"] = [{"name": "s", "at_m": 0.1} | sensor]
+    with pytest.raises(fx.InputError) as refused:
+        fx.Robot.from_dict({"link": [table]})
+    assert refused.value.key.startswith(f"link[1].{key}")
+
+
 REFUSED = {
     "beyond the link": ({"kind": "slope", "at_m": 0.5}, "at_m", "at most its length, 0.4"),
     "a strain without distance": ({"kind": "strain", "at_m": 0.1}, "distance_m", "missing"),

@@ -45,6 +45,12 @@ class Channel:
 
 TURN, LENGTH, RATE, FORCE = ("rad", "m"), ("m",), ("rad/s", "m/s"), ("N m", "N")
 
+# of the channels along a link
+_PLACES = (
+    f"at the arc length k L / {STATIONS - 1} from the link's origin; Pb: at k / {STATIONS - 1} of "
+    f"the free length from the sleeve's exit, k = 0 ... {STATIONS - 1}."
+)
+
 CHANNELS = (
     Channel(
         "joint/i/position",
@@ -106,6 +112,41 @@ CHANNELS = (
         "motor current",
         "Current of the motor of joint i, with the voltage's sign.",
     ),
+    Channel(
+        "joint/i/reaction_x",
+        ("N",),
+        "reaction x",
+        "Force that link i-1 (i = 1: the base) exerts on link i at the joint, along the base "
+        "frame's x.",
+    ),
+    Channel(
+        "joint/i/reaction_y",
+        ("N",),
+        "reaction y",
+        "Force that link i-1 (i = 1: the base) exerts on link i at the joint, along the base "
+        "frame's y.",
+    ),
+    Channel(
+        "joint/i/reaction_moment",
+        ("N m",),
+        "reaction moment",
+        "Moment that link i-1 exerts on link i, counter-clockwise, about the joint: R: its axis, "
+        "Pa: the hub, Pb: the sleeve's exit. R: what drive, spring and friction give, less what "
+        "the rotor's inertia takes.",
+    ),
+    Channel(
+        "joint/i/reaction_along",
+        ("N",),
+        "reaction along the slide",
+        "Pa, Pb: the part of the reaction along the line on which the joint slides, towards "
+        "larger joint/i/position: what drive, spring and friction give.",
+    ),
+    Channel(
+        "joint/i/reaction_across",
+        ("N",),
+        "reaction across the slide",
+        "Pa, Pb: the part of the reaction across that line, to its left: what the guide gives.",
+    ),
     Channel("link/i/x", LENGTH, "hub x", "Origin of link i's hub frame in the base frame."),
     Channel("link/i/y", LENGTH, "hub y", "Origin of link i's hub frame in the base frame."),
     Channel(
@@ -137,6 +178,32 @@ CHANNELS = (
         f"from the link's origin, k = 0 ... {STATIONS - 1}.",
     ),
     Channel(
+        "link/i/bending_moment/k",
+        ("N m",),
+        "bending moment",
+        f"Bending moment in a section, positive where the link bends to the left, {_PLACES}",
+    ),
+    Channel(
+        "link/i/shear_force/k",
+        ("N",),
+        "shear force",
+        "Force that the part beyond a section exerts on the part before, across the tangent to "
+        f"its left, {_PLACES}",
+    ),
+    Channel(
+        "link/i/axial_force/k",
+        ("N",),
+        "axial force",
+        f"Force along the tangent in a section, positive where it pulls, {_PLACES}",
+    ),
+    Channel(
+        "link/i/stress/k",
+        ("Pa",),
+        "bending stress",
+        "Bending stress of the outer fibre to the left, positive where it is drawn out; the fibre "
+        f"to the right has the opposite; {_PLACES}",
+    ),
+    Channel(
         "link/i/tip_deflection_std",
         LENGTH,
         "standard deviation of the tip deflection",
@@ -153,7 +220,8 @@ CHANNELS = (
         (),
         "sensor",
         "Sensor of the robot file: deflection [m] and slope [rad] in the hub frame of its link, "
-        "strain [1] positive where the fibre is stretched. In an imported log: any quantity.",
+        "strain [1] positive where the fibre is stretched; bending moment, shear force, axial "
+        "force and stress as the channels of links. In an imported log: any quantity.",
     ),
     Channel("tip/x", LENGTH, "tip x", "Tip of the last link in the base frame."),
     Channel("tip/y", LENGTH, "tip y", "Tip of the last link in the base frame."),
