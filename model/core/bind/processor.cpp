@@ -1,5 +1,5 @@
 // What the processor can do, for flexura/core.py. Compiled for every processor of the architecture.
-#include "../numbers/processor.hpp"
+#include "processor.hpp"
 
 #include <nanobind/nanobind.h>
 

@@ -1,4 +1,4 @@
-"""The robot of an FMU as its library reads it: model/core/fmi/robot_file.hpp has the format."""
+"""The robot of an FMU as its library reads it: model/fmi/robot_file.hpp has the format."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ class Variable:
 
     Attributes:
         name: the channel's, or "rtol".
-        reference: by which the library knows it, as `References` of model/core/fmi counts.
+        reference: by which the library knows it, as `References` of model/fmi counts.
         unit: of the channel; "" for none.
         causality: "input", "output" or "parameter".
         start: the value before the simulation, which may be set; None: it is computed.
@@ -127,7 +127,14 @@ def sensors(system: System) -> list[LinkSensor]:
 
 
 def fmu_lacks(robot: Robot) -> list[str]:
-    """Channels of a Run of the robot that its FMU lacks: drives of locked joints, accelerations."""
+    """Channels of a Run of a robot that its FMU lacks: drives of locked joints, accelerations.
+
+    Args:
+        robot: the robot.
+
+    Returns:
+        Their names.
+    """
     kinds = [sensor for link in robot.links for sensor in link.sensor]
     locked = [f"joint/{i}/drive" for i, link in enumerate(robot.links, 1) if link.joint.locked]
     return locked + [f"sensor/{s.name}" for s in kinds if s.kind == "acceleration"]

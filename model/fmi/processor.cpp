@@ -1,5 +1,5 @@
 // Whether the core inside runs here. Compiled for every processor of the architecture.
-#include "numbers/processor.hpp"
+#include "bind/processor.hpp"
 
 namespace flexura {
 
