@@ -8,13 +8,12 @@ import keyword
 import re
 import uuid
 import zipfile
-from typing import Any
 
 from ...errors import InputError
 from ...io import number
 from ...robot import Robot, robot_of
 from ...simulation.start import resolve_start
-from ...system import assemble, static
+from ...system import RobotLike, assemble, static
 from .description import Model, description
 from .library import library
 from .robot_file import robot_file
@@ -24,7 +23,7 @@ VERSIONS = (2, 3)
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest that an archive can hold: the same bytes each time
 
 
-def fmu(robot: Any, fmi: int = 2, rtol: float = 1e-6) -> bytes:
+def fmu(robot: RobotLike, fmi: int = 2, rtol: float = 1e-6) -> bytes:
     """A robot as an FMU for co-simulation.
 
     Variables have the names of channels. Inputs are the drives of the joints; they hold from one

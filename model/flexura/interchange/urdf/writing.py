@@ -5,19 +5,19 @@ from __future__ import annotations
 import cmath
 import math
 import xml.etree.ElementTree as ET
-from typing import Any
 
 import numpy as np
 
 from ...errors import InputError
 from ...link.section import material
 from ...robot import Robot, robot_of
+from ...system import RobotLike
 from ...system.structure import rigid_body
 from .description import ENDLESS
 from .plane import GRAVITY, Mass
 
 
-def urdf(robot: Any) -> tuple[str, list[str]]:
+def urdf(robot: RobotLike) -> tuple[str, list[str]]:
     """A robot as a URDF file.
 
     Without gravity the chain lies level, in the plane of x and y. With gravity it stands in that
