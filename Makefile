@@ -43,7 +43,7 @@ $(READY): pyproject.toml constraints.txt tools/setup.py
 	@"$(PYTHON)" tools/setup.py
 
 # Folders stand in the list too: their time changes when a file comes or goes.
-$(CORE): $(READY) CMakeLists.txt $(shell find model/core)
+$(CORE): $(READY) CMakeLists.txt $(shell find model/core model/fmi)
 	@$(VENV)/bin/python tools/setup.py core
 
 demo: $(CORE)

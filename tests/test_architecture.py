@@ -24,7 +24,7 @@ MODULES = {
 # The rooms of each house, the top floor first: a room imports only what stands on floors below it.
 FLOORS = {
     "flexura": [
-        {"gym"},
+        {"gym", "interchange"},
         {"api", "moved"},
         {"population"},
         {"simulation"},

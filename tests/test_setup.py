@@ -210,7 +210,7 @@ def test_the_core_is_compiled_again_when_a_file_of_it_changes():
     """What the Makefile says is needed for the stamp of the core: the files, and their folders for
     those that come and go."""
     text = (ROOT / "Makefile").read_text(encoding="utf-8")
-    assert "$(CORE): $(READY) CMakeLists.txt $(shell find model/core)" in text
+    assert "$(CORE): $(READY) CMakeLists.txt $(shell find model/core model/fmi)" in text
     assert "tests: $(CORE)" in text
 
 

@@ -75,7 +75,7 @@ def lock(options: list[str]) -> None:
 
 
 # The metadata of these have the licence's text in place of its name.
-BY_THEIR_TEXT = {"graphemeu": "MIT"}
+BY_THEIR_TEXT = {"fmpy": "BSD-2-Clause", "graphemeu": "MIT"}
 
 
 def licence(name: str) -> str:

@@ -17,12 +17,24 @@ ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"
 SCRIPTS = sorted(EXAMPLES.glob("[0-9]*.py"))
 NOTEBOOKS = sorted((EXAMPLES / "notebooks").glob("*.ipynb"))
-LIBRARIES = {"argparse", "collections", "comparison", "flexura", "gymnasium", "numpy", "scipy"}
+LIBRARIES = {
+    "argparse",
+    "collections",
+    "comparison",
+    "flexura",
+    "fmpy",
+    "gymnasium",
+    "numpy",
+    "pathlib",
+    "scipy",
+    "tempfile",
+}
 MODULES = {
     "flexura.control",
     "flexura.signals.shaping",
     "flexura.signals",
     "flexura.gym",
+    "flexura.interchange",
 }  # public, though not names of `flexura` itself
 ROW = re.compile(r"^.+  +(\S+)  +(\S+)  +(\d\.\de[+-]\d\d)$")
 PNG = b"\x89PNG\r\n"

@@ -14,6 +14,7 @@ from flexura.io import FILE, Run, called, write_bytes
 from flexura.population import is_population
 
 from ..runs.export import as_csv, as_mat, as_mcap, as_tdms, population
+from .export_robot import ROBOT_FORMS, export_robot
 from .options import ForceFile, Json
 from .output import message, print_results
 from .results import file_result
@@ -25,32 +26,43 @@ def export(
         Path,
         typer.Argument(
             metavar="RUN",
-            help="folder of a run or population, a run.parquet, or a robot file: its state space",
+            help="folder of a run or population, a run.parquet, or a robot (--to mat, fmu, urdf)",
         ),
     ],
     to: Annotated[
         str,
-        typer.Option("--to", help="csv, parquet, mat (MATLAB), tdms (LabVIEW) or mcap (ROS 2)"),
+        typer.Option(
+            "--to",
+            help="csv, parquet, mat (MATLAB), tdms (LabVIEW) or mcap (ROS 2); a robot: fmu, urdf, "
+            "or mat, its state space",
+        ),
     ],
     out: Annotated[
         Path | None,
         typer.Option("--out", metavar="FILE", help="a new file; default: run.FORMAT beside RUN"),
     ] = None,
+    fmi: Annotated[
+        int | None, typer.Option("--fmi", metavar="2|3", help="version of an FMU; default 2")
+    ] = None,
     robot: RobotNumber = None,
     force: ForceFile = False,
     json: Json = False,
 ) -> None:
-    """Write a run in another program's format.
+    """Write a run, or a robot, in another program's format.
 
     The file has all numbers, units and metadata.
 
     Of a population a table, one row a robot: what was varied, how it ended, peaks and last values.
 
+    Of a robot an FMU for co-simulation, which runs without flexura, or a URDF.
+
     \b
     Example: flexura export logs/first --to csv
     """
-    if run.suffix == ".toml":
-        _state_space(run, to, out, force, json)
+    if fmi is not None and to != "fmu":
+        raise InputError("none: only an FMU has a version of FMI", key="--fmi", value=fmi)
+    if run.suffix == ".toml" or to in ROBOT_FORMS:
+        export_robot(run, to, out, fmi or 2, force=force, json=json)
         return
     table = is_population(run) and robot is None
     writers: dict[str, Callable[[Any], bytes]] = dict(tables() if table else forms())
@@ -75,22 +87,6 @@ def export(
     if json:
         print_results(True, lambda: None, lambda: about)
     message(json, line, f"stored {target}")
-
-
-def _state_space(robot: Path, to: str, out: Path | None, force: bool, json: bool) -> None:
-    """Write the matrices of a robot's small motions about its start, with names."""
-    if to != "mat":
-        raise InputError(
-            "expected mat: a robot is written as its state space", key="--to", value=to
-        )
-    lin = fx.linearize(fx.load(robot))
-    target = out or robot.with_suffix(".mat")
-    with file_result(target, force=force):
-        write_bytes(target, as_mat.state_space(lin))
-    about = {"file": str(target), "states": len(lin.states), "outputs": list(lin.outputs)}
-    if json:
-        print_results(True, lambda: None, lambda: about)
-    message(json, f"state space: {len(lin.states)} states", f"stored {target}")
 
 
 def forms() -> dict[str, Callable[[Run], bytes]]:

@@ -9,11 +9,13 @@ import numpy as np
 import typer
 
 import flexura as fx
+from flexura.errors import InputError
 from flexura.io import FILE
 from flexura.io.logs import Understood, read_log, read_map, understood
 
 from ..runs.formatting import number
 from ..runs.table import Table
+from .import_robot import import_robot
 from .options import Force, Json
 from .output import message, print_results
 from .results import results
@@ -22,12 +24,15 @@ from .results import results
 def import_(
     file: Annotated[
         Path,
-        typer.Argument(metavar="FILE", help="a log, or the folder of a bag of ROS 2"),
+        typer.Argument(metavar="FILE", help="a log, the folder of a bag of ROS 2, or a URDF"),
     ],
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", metavar="RUN", help="new folder for the run; default logs/import-FILE-1, ..."
+            "--out",
+            metavar="RUN",
+            help="new folder for the run; default logs/import-FILE-1, ...; of a URDF the new robot "
+            "file; default NAME.toml beside it",
         ),
     ] = None,
     map_: Annotated[
@@ -38,6 +43,10 @@ def import_(
         Path | None,
         typer.Option(metavar="ROBOT", help="the robot that was measured: it is drawn in reviews"),
     ] = None,
+    sections: Annotated[
+        Path | None,
+        typer.Option(metavar="table.toml", help="of a URDF: which links bend, and how"),
+    ] = None,
     every: Annotated[
         bool, typer.Option("--all", help="take the other columns too, as sensor/NAME")
     ] = False,
@@ -47,7 +56,7 @@ def import_(
     force: Force = False,
     json: Json = False,
 ) -> None:
-    """Read a log of another program as a run.
+    """Read a log of another program as a run, or a URDF as a robot.
 
     It reads CSV, LVM, TDMS, MAT (all versions), HDF5, MCAP, Parquet, bags of ROS, accelerometer
     logs of Klipper, and its own exports. Columns are converted to SI units.
@@ -55,9 +64,19 @@ def import_(
     Without --map it takes columns whose heads are channels with units, as joint/1/position [deg];
     the first column in a unit of time is the clock.
 
+    A URDF is a serial planar chain; what is not is refused with the joint and the reason.
+
     \b
     Example: flexura import log.csv --map map.toml --out logs/measured
     """
+    if file.suffix.lower() == ".urdf":
+        for option, given in (("--map", map_), ("--robot", robot), ("--all", every or None)):
+            if given is not None:
+                raise InputError("none: it is for logs", key=option, value=str(given))
+        import_robot(file, sections, out, look=look, force=force, json=json)
+        return
+    if sections is not None:
+        raise InputError("none: it is for a URDF", key="--sections", value=str(sections))
     asked = None if map_ is None else read_map(map_)
     tables = None if robot is None else fx.load(robot).to_dict()
     if look:

@@ -59,7 +59,7 @@ struct Inputs {
   std::vector<double> low, high;  // limits [m or rad]
   ForceFunction function;         // empty: none
   Sampler *sampler = nullptr;
-  double rate_Hz = 0.0;  // of the sampler
+  double rate_Hz = 0.0;  // of the sampler, or of what holds the signals from step to step
   SampledOutput held;
 
   explicit Inputs(int count = 0)

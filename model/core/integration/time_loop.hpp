@@ -53,6 +53,10 @@ class Loop {
 
   void start(const Real *q0, const Real *v0, double first_step);
 
+  // A run that is done goes on to a later end, as if it had been asked for before. `horizon`: how
+  // far it may go on after that [s]; `jumped`: what acts jumps or kinks where it is.
+  void go_on(double end, double horizon, bool jumped);
+
   // At most so many steps further with that method; is any robot still running?
   bool advance(Method<Real> &method, long steps);
 
@@ -336,6 +340,21 @@ void Loop<Real>::start(const Real *q0, const Real *v0, double first_step) {
     run_state[k].t = run_state[k].start = outputs.front(), run_state[k].end = outputs.back(),
     run_state[k].wish = first_step;
     record[k].open(outputs.size() + 1, integration.size, integration.plant.joints);
+  }
+}
+
+template <class Real>
+void Loop<Real>::go_on(double end, double horizon, bool jumped) {
+  outputs.assign(1, end);
+  integration.end = std::fmax(end, horizon);
+  for (int k = 0; k < LANES; ++k) {
+    RunState &c = run_state[k];
+    const Inputs &acting = integration.acts_of(k);
+    breaks[k] = acting.breaks(), most[k] = PART * acting.shortest_period();
+    c.end = end, c.next_break = 0, c.row = 0, c.status = Status::running;
+    c.tick += acting.sampler == nullptr;  // as many as were asked for
+    c.fresh = c.fresh || jumped;
+    record[k].rows = 0;
   }
 }
 

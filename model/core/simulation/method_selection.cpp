@@ -70,7 +70,7 @@ void MethodSelection::choose() {
   sharp = rtol < SHARPEST, begun = loop.snapshot();
   if (const char *name = method_without_trial(c, loop.run_state[0].t, rtol))
     chosen = std::string(name) == "implicit" ? implicit() : by_explicit();
-  else if (acting.sampler)
+  else if (acting.rate_Hz > 0.0)
     chosen = method_under_ticks(acting.rate_Hz, bends);
   else if (acting.function)
     chosen = !bends          ? by_explicit()

@@ -47,6 +47,9 @@ class MethodSelection {
   // than these did? The run, which has just been started, is of no use after that.
   bool outdone(double exponential_speed, double step);
 
+  // The run is never begun again before where it is.
+  void begin_here() { begun = loop.snapshot(); }
+
   const char *name() const { return chosen ? chosen->name() : "auto"; }
   int races() const { return held; }
 

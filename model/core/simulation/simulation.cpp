@@ -13,6 +13,7 @@ struct Simulation::Parts {
   Loop<double> loop;
   std::unique_ptr<Method<double>> method;  // or
   std::unique_ptr<MethodSelection> selection;
+  long budget = 0;
 
   Parts(const Model<double> &model, Inputs inputs, const Request &request)
       : work(model),
@@ -34,7 +35,7 @@ Simulation::Simulation(std::shared_ptr<const Model<double>> model, Inputs acting
       parts_(std::make_unique<Parts>(*model_, std::move(acting), request)) {
   Loop<double> &loop = parts_->loop;
   loop.interrupt = &interrupt;
-  if (request.most_steps > 0) loop.most_steps = request.most_steps;
+  if (request.most_steps > 0) loop.most_steps = parts_->budget = request.most_steps;
   const double span = request.times.back() - request.times.front();
   loop.start(request.q.data(), request.v.data(),
              request.first_step > 0.0 ? request.first_step : FIRST_STEP * span);
@@ -45,6 +46,14 @@ bool Simulation::advance(long steps) {
   return parts_->method ? parts_->loop.advance(*parts_->method, steps)
                         : parts_->selection->advance(steps);
 }
+void Simulation::go_on(double end, double horizon, bool jumped) {
+  Loop<double> &loop = parts_->loop;
+  loop.go_on(end, horizon, jumped);
+  if (parts_->selection) parts_->selection->begin_here();
+  const RunState &c = loop.run_state[0];
+  if (parts_->budget > 0) loop.most_steps = c.steps + c.rejected + parts_->budget;
+}
+Inputs &Simulation::acting() { return parts_->acting; }
 bool Simulation::outdone(double exponential_speed, double step) {
   return parts_->selection->outdone(exponential_speed, step);
 }

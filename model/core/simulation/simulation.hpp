@@ -33,6 +33,11 @@ class Simulation {
   // At most so many steps further; may it go on?
   bool advance(long steps);
 
+  // Goes on to a later end, after what acts has been changed: see Loop::go_on. `most_steps` are
+  // counted from here.
+  void go_on(double end, double horizon, bool jumped);
+  Inputs &acting();
+
   // Of "auto", a run that has just been made: see MethodSelection::outdone.
   bool outdone(double exponential_speed, double step);
 
