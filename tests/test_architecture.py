@@ -43,7 +43,7 @@ FLOORS = {
         {"cli", "benchmarks"},
         {"tuning"},
         {"studies"},
-        {"crosscheck"},
+        {"crosscheck", "learning"},
         {"identification"},
         {"review"},
         {"comparison", "experiment"},

@@ -13,12 +13,12 @@ from types import ModuleType
 
 from . import moved, signals
 from .api import simulate
-from .control import PID, Controller, Force, Motor, Sampled, Stepper
+from .control import PID, Controller, Force, Motor, Sampled, Stepper, lqg, nmpc
 from .errors import FlexuraError, InputError, NumericalError
 from .io import Run
 from .population import Batch, Population
 from .robot import Robot, load, save
-from .signals import Drive, JointDrive, Manoeuvre, Signal, load_manoeuvre
+from .signals import Drive, JointDrive, Load, Manoeuvre, PayloadChange, Signal, load_manoeuvre
 from .simulation import (
     feedforward,
     inverse,
@@ -57,11 +57,13 @@ __all__ = [
     "InputError",
     "InternalForces",
     "JointDrive",
+    "Load",
     "Manoeuvre",
     "Modes",
     "Motor",
     "NoEquilibrium",
     "NumericalError",
+    "PayloadChange",
     "Population",
     "Robot",
     "Run",
@@ -82,7 +84,9 @@ __all__ = [
     "linearize",
     "load",
     "load_manoeuvre",
+    "lqg",
     "modes",
+    "nmpc",
     "parameter_derivatives",
     "save",
     "signals",

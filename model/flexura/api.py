@@ -12,7 +12,7 @@ from .errors import InputError, within_memory
 from .io import Run
 from .population import Batch, Population
 from .population import simulate as simulate_population
-from .signals import Drive
+from .signals import Drive, LoadsLike, PayloadsLike
 from .simulation.dynamics import DriveLike
 from .simulation.dynamics import simulate as simulate_robot
 from .simulation.problem import Progress
@@ -48,6 +48,8 @@ def simulate(
     continue_from: Run | None = None,
     until: Callable[..., bool | float] | None = None,
     numerical_damping: bool = True,
+    loads: LoadsLike = None,
+    payloads: PayloadsLike = None,
     internal_forces: bool = False,
     max_steps: int | None = None,
     wall_time: float | None = None,
@@ -73,7 +75,7 @@ def simulate(
     is how far the energies are from balancing, relative to the largest; beyond 1e-3 an event says
     so, beyond 0.1 the run is not complete. Each event has a name: "limit", "end_of_link", "sleeve",
     "interrupted", "stuck", "diverged", "exhausted", "wall_time", "balance", "not_finite", "node",
-    "until", "still".
+    "until", "still", "payload".
 
     Args:
         robot: a System, a Robot, the path or name of a robot file, or a Batch of robots, which
@@ -99,6 +101,10 @@ def simulate(
             the time of t_eval: both may have a memory, so that no tick is computed twice.
         numerical_damping: exponential steps damp fast modes that change no output by more than the
             tolerance (94); False: they do not.
+        loads: forces and moments on links (130): a list of `Load`, or of tables with its keys. In
+            a static start the loads of t_eval[0] act too. Their work is part of `energy/work`.
+        payloads: changes of the payload (134): a list of `PayloadChange`, or of tables with its
+            keys. Each is an event "payload"; the energy jumps by what the event says.
         internal_forces: the Run also has the reactions of the joints, and bending moment, shear
             force, axial force and stress along the links (121) to (128). They take about a
             millisecond a link and time.

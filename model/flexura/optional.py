@@ -27,6 +27,7 @@ EXTRAS = {
     "PIL": "lab",
     "control": "control",
     "gymnasium": "gym",
+    "daqp": "mpc",
 }
 
 

@@ -6,6 +6,7 @@ import pytest
 
 import flexura as fx
 import robots
+from flexura import control
 from flexura.signals import paths
 from flexura.simulation.trajectory.collocation import POINTS, Mesh
 from flexura.simulation.trajectory.inverse_motion import TipProblem, mesh_between
@@ -204,3 +205,145 @@ def test_what_is_asked_of_the_drives_at_the_end():
     for part in (slice(0, n), slice(n, 2 * n)):
         asked = into[:3] @ found.slope[part][:, 8]
         assert asked == pytest.approx(into[:3] @ slope[part], rel=2e-2, abs=1e-3)
+
+
+STEP_S = 0.008
+LOOP = control.JointLoop(0.4, kp=60.0, ki=120.0, kd=0.2, kv=1.4)
+POINTS_S = control.transform_points(1024, STEP_S)
+
+
+def responses(*factors):
+    """From the joint's reference to the tip along its circle, of arms of other stiffness."""
+    out = []
+    for factor in factors:
+        link = robots.beam(0.4, 0.157, factor * 0.33, 3, hub_inertia_kg_m2=0.03)
+        link["damping"] = {"beta_s": 2e-4}
+        made = robots.system(link, payload=0.02)
+        out.append(control.reference_response(made, None, POINTS_S, [LOOP])[0][:, 1:])
+    return np.array(out)
+
+
+def splines(t, begin, end, every=0.04):
+    """Columns of cubic B-splines, written as fourth differences of truncated powers; the last one
+    stays."""
+    cube = lambda u: np.maximum(u, 0.0) ** 3 / 6
+    count = round((end - begin) / every)
+    one = lambda u: cube(u) - 4 * cube(u - 1) + 6 * cube(u - 2) - 4 * cube(u - 3) + cube(u - 4)
+    each = [one((t - begin) / every - k) for k in range(count + 200)]
+    return np.column_stack([*each[:count], np.sum(each[count:], axis=0)])
+
+
+def test_a_change_is_the_least_of_what_all_robots_lack():
+    """The law of learning as a least-squares problem in time, by convolution.
+
+    Equations: 140
+    """
+    t = STEP_S * np.arange(300)
+    H, basis = responses(1.0, 0.9), splines(t, 0.3, 1.1)
+    made = control.learning_filter(H, STEP_S, 12.0)
+    u = np.clip((t - 0.4) / 0.5, 0, 1)
+    error = 0.02 * np.sin(np.pi * u) + 0.003 * u
+    share = np.exp(-np.maximum(t - 1.1, 0.0) / 0.5)
+    far = 1 + 0.2 * t  # what the motion does to the output
+    fade = 0.5 * (1 + np.cos(np.linspace(0, np.pi, 256)))
+
+    def weighted(x):
+        padded = np.concatenate([x, x[-1:] * fade[:, None]])
+        spectrum = np.fft.rfft(padded, 1024, axis=0) * made.weight[:, None]
+        return share[:, None] * np.fft.irfft(spectrum, 1024, axis=0)[: len(x)]
+
+    grow = np.exp(made.shift * STEP_S * np.arange(1024))
+    rows = []
+    for one in H[:, :, 0, 0]:
+        impulse = (grow * np.fft.irfft(one, 1024))[: len(t)]
+        moved = [far * np.convolve(impulse, column)[: len(t)] for column in basis.T]
+        rows.append(weighted(np.column_stack(moved)))
+    A, right = np.concatenate(rows), np.tile(weighted(error[:, None])[:, 0], 2)
+    rho = np.sqrt(1e-3 * np.diag(A.T @ A).max())
+    A = np.concatenate([A, rho * np.eye(basis.shape[1])])
+    right = np.concatenate([right, np.zeros(basis.shape[1])])
+    c = np.linalg.lstsq(A, right)[0]
+    change = made.update(error[:, None], [basis], far[:, None, None], share)[:, 0]
+    assert change == pytest.approx(basis @ c, abs=5e-3 * np.abs(change).max())
+    # trials on the softer robot
+    plant, e, sizes = H[1, :, 0, 0], error[:, None], []
+    impulse = (grow * np.fft.irfft(plant, 1024))[: len(t)]
+    for _ in range(4):
+        sizes.append(np.linalg.norm(share * e[:, 0]))
+        change = made.update(e, [basis], far[:, None, None], share)[:, 0]
+        e = e - (far * np.convolve(impulse, change)[: len(t)])[:, None]
+    assert sizes[1] < 0.3 * sizes[0] and sizes[3] < 0.1 * sizes[0]
+
+
+def test_the_response_to_a_reference_is_that_of_the_loop():
+    """A motor in its loop and a stepper on its spring, by hand at one point.
+
+    Equations: 141
+    """
+    arm_2 = robots.system(
+        robots.beam(0.3, 0.3, 0.8, 2, hub_inertia_kg_m2=0.01),
+        robots.beam(0.3, 0.3, 0.8, 2, hub_inertia_kg_m2=0.01),
+        payload=0.05,
+    )
+    s, q = 0.4 + 14j, fx.static(arm_2, joints=[0.0, 0.4])
+    loops = [LOOP, control.JointSpring(20.0)]
+    found, joints = (x[0] for x in control.reference_response(arm_2, q, [s], loops))
+    lin, (first, second) = fx.linearize(arm_2, q), arm_2.joint_rows
+    whole = s * s * lin.M + s * lin.G + lin.K
+    back = 0.4 * (60.0 + 120.0 / s + 0.2 * s)
+    free = np.setdiff1d(np.arange(arm_2.n), [first])
+    for k, r in enumerate(np.eye(2)):
+        # the motor's joint, as the rigid robot's, whose second joint is where its pulses are
+        asked = (back + 0.4 * 1.4 * s) * r[0] - whole[first, second] * r[1]
+        moved = np.zeros(arm_2.n, dtype=complex)
+        moved[first] = asked / (whole[first, first] + back)
+        soft = whole.copy()
+        soft[second, second] += 20.0
+        right = -soft[free, first] * moved[first]
+        right[free == second] += 20.0 * r[1]
+        moved[free] = np.linalg.solve(soft[np.ix_(free, free)], right)
+        assert found[:, k] == pytest.approx(lin.outlook[-2:] @ moved)
+        assert joints[:, k] == pytest.approx(moved[[first, second]])
+    with pytest.raises(fx.InputError, match="a loop for each joint"):
+        control.reference_response(arm_2, q, [s], loops[:1])
+
+
+def test_the_inverse_cancels_where_robots_disagree():
+    """One robot is inverted; about an uncertain resonance the inverse of many is small.
+
+    Equations: 142
+    """
+    H = responses(1.0, 0.8, 1.25)
+    alone = control.inverse_of_many(H[:1])
+    assert alone @ H[0] == pytest.approx(np.ones_like(alone))
+    many = control.inverse_of_many(H)
+    k = 40
+    expected = np.conj(H[:, k]).sum(axis=0) / (np.abs(H[:, k]) ** 2).sum(axis=0)
+    assert many[k] == pytest.approx(expected)
+    peaks = np.abs(H[:, :80, 0, 0]).argmax(axis=1)
+    between = many[peaks.min() + 1 : peaks.max()]
+    assert np.abs(between).max() < 0.3 / np.abs(H[0, 0, 0, 0])
+    with pytest.raises(fx.InputError, match="move the outputs"):
+        control.inverse_of_many(0 * H)
+
+
+def test_the_weight_leaves_the_least_for_the_worst_robot():
+    """What one trial leaves for the worst of the robots is never more than the error.
+
+    Equations: 143
+    """
+    H = responses(1.0, 0.7, 1.4)
+    made = control.learning_filter(H, STEP_S, 12.0)
+    passed = (H @ control.inverse_of_many(H))[:, :, 0, 0]
+    assert made.contraction == pytest.approx(np.abs(1 - made.weight * passed).max(axis=0))
+    assert made.contraction.max() <= 1 + 1e-12
+    learned = (made.weight > 0) & (made.frequencies_Hz < 8.0)
+    assert made.contraction[learned].max() < 0.9 and learned.sum() > 20
+    for w in np.linspace(0, 1, 11):
+        worst = np.abs(1 - w * passed).max(axis=0)
+        assert np.all(made.contraction[learned] <= worst[learned] + 0.02)
+    assert not made.weight[made.frequencies_Hz >= 12.0].any()
+    low = made.frequencies_Hz < 12.0
+    assert (made.weight[low] == 0).any()  # about the resonance, which may be anywhere
+    with pytest.raises(fx.InputError, match="at most 512"):
+        made.update(np.zeros((513, 1)), [np.zeros((513, 1))], np.ones((513, 1, 1)))

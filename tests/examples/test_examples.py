@@ -19,6 +19,7 @@ SCRIPTS = sorted(EXAMPLES.glob("[0-9]*.py"))
 NOTEBOOKS = sorted((EXAMPLES / "notebooks").glob("*.ipynb"))
 LIBRARIES = {"argparse", "collections", "comparison", "flexura", "gymnasium", "numpy", "scipy"}
 MODULES = {
+    "flexura.control",
     "flexura.signals.shaping",
     "flexura.signals",
     "flexura.gym",

@@ -27,6 +27,23 @@ def test_a_derivative_is_that_of_differences(key):
         assert found[channel] == pytest.approx(slope, abs=2e-4 * np.abs(slope).max()), channel
 
 
+@pytest.mark.parametrize("key", ["payload.mass_kg", "link.1.length_m"])
+def test_a_channel_that_the_parameter_itself_changes(key):
+    """A payload changes the shapes of modes, a length the place of the tip."""
+    robot = fx.load("single-r").replace({"link.1.elements": 3, "link.1.modes": 1})
+    t = np.linspace(0.0, 0.3, 151)
+    drive = [lambda s: 0.3 * np.sin(2 * np.pi * s / 0.4)]
+    found = fx.parameter_derivatives(robot, t, drive, [key])[key]
+    value = robot.value(key)
+    h = 1e-3 * value
+    up, down = (
+        fx.simulate(robot.replace({key: value + s * h}), t, drive, rtol=1e-11) for s in (1, -1)
+    )
+    for channel in ("link/1/tip_deflection", "tip/x", "tip/y"):
+        slope = (up[channel] - down[channel]) / (2 * h)
+        assert found[channel] == pytest.approx(slope, abs=2e-4 * np.abs(slope).max()), channel
+
+
 def test_a_key_that_is_no_number_is_refused():
     with pytest.raises(InputError, match=r"payload\.mass"):
         fx.parameter_derivatives("single-r", [0.0, 0.1], [0.1], "payload.weight")

@@ -1,6 +1,6 @@
 """The command: python -m flexlab.benchmarks [PART ...] [PROBLEM ...].
 
-Parts: motions, statics, population, scaling, board, accuracy, passes, search.
+Parts: motions, statics, population, scaling, predictive, board, accuracy, passes, search.
 """
 
 from __future__ import annotations
@@ -15,13 +15,22 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from . import accuracy, board_load, equal_error, exudyn_search, population, report, scaling
+from . import (
+    accuracy,
+    board_load,
+    equal_error,
+    exudyn_search,
+    population,
+    predictive,
+    report,
+    scaling,
+)
 from .problems.motions import all_motions
 from .problems.problem import Problem
 from .problems.statics import StaticProblem, all_statics
 
 # measured by default
-PARTS = ("motions", "statics", "population", "scaling", "board")
+PARTS = ("motions", "statics", "population", "scaling", "predictive", "board")
 OTHERS = ("accuracy", "passes", "search")
 ROUNDS = 7
 
@@ -111,6 +120,7 @@ def measured(
         "statics": lambda: each("statics", statics, lambda p: equal_error.statics_row(p, rounds)),
         "population": lambda: each("population", [rounds], population.measure)[0],
         "scaling": lambda: each("scaling", [5 * rounds], scaling.measure)[0],
+        "predictive": lambda: each("predictive", [rounds], predictive.measure)[0],
         "board": lambda: each("board", ["emulated"], lambda _: board_load.measure())[0],
         "accuracy": lambda: each("accuracy", [p for p in motions if p.available], accuracy.errors),
         "passes": lambda: each("passes", [p for p in motions if p.available], accuracy.passes),
@@ -130,6 +140,7 @@ def tables(found: dict[str, Any]) -> list[Any]:
         ],
         "population": lambda rows: [report.populations(rows)],
         "scaling": lambda rows: [report.growths(rows)],
+        "predictive": lambda rows: [report.predictions(rows)],
         "board": lambda rows: [report.boards(rows)],
         "accuracy": lambda rows: [
             report.accuracies(rows),

@@ -130,6 +130,22 @@ def growths(rows: Rows) -> Table:
     return table
 
 
+def predictions(rows: Rows) -> Table:
+    """Table of the ticks of predictive control, and of what is left of its motion."""
+    table = _table(
+        "predictive control", "spread", "median ms", "99.9 %", "at most", "left mm", "LQG mm"
+    )
+    for row in rows:
+        numbers = (row["median_ms"], row["p999_ms"], row["required_ms"])
+        left = (row["residual_mm"], row["lqg_residual_mm"])
+        table.add_row(
+            f"{row['rate_Hz']:.0f} Hz, {row['intervals']} intervals",
+            str(row["spread"]),
+            *(figure(x) for x in (*numbers, *left)),
+        )
+    return table
+
+
 def boards(rows: list[tuple[str, str, float]]) -> Table:
     """Table of the emulated board's load."""
     table = _table("emulated board under its hardest load", "")

@@ -28,6 +28,7 @@ COMMANDS = {
     "study": "Study a robot's payload, link lengths, or sleeve.",
     "tune": "Find a controller's gains on the simulator.",
     "bench": "Run experiments on the rig, real or emulated.",
+    "learn": "Repeat a manoeuvre on the rig until the tip follows.",
     "identify": "Identify physical parameters from an experiment.",
     "vibration": "Find frequency and damping of a free vibration.",
     "compare": "Compare an experiment with its simulation, or two runs.",

@@ -6,8 +6,6 @@ from __future__ import annotations
 import contextlib
 import functools
 import inspect
-import math
-import sys
 import time
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -22,7 +20,7 @@ from .. import rig as rigs
 from ..experiment import excitation, plan
 from ..experiment import run_experiment as steps
 from ..experiment.flash import RIG
-from ..experiment.stop_requests import KEYS_HELP, watch_for_stop
+from ..experiment.stop_requests import watch_for_stop
 from ..identification.vibration.shapers import read_shaper, shaped
 from ..recordings.flex_calibration import read as read_calibration
 from ..recordings.recording import unfinished
@@ -50,6 +48,7 @@ from .bench_options import (
     Yes,
 )
 from .bench_serve import serve_board
+from .bench_start import confirm, countdown
 from .bench_tables import (
     heading,
     numbers,
@@ -346,7 +345,7 @@ def _run(rig: Path | None, ask: Any, options: BenchOptions, gains: Path | None =
     )
     _recover_beside(folder, options.json)
     if options.port is not None and not options.yes:
-        _confirm()
+        confirm()
     opened = steps.open_board(bench, options.port, options.seed, options.firmware, options.cut)
     title = heading(opened.board.label, opened.board.emulated, asked.experiment)
     pause = (
@@ -380,7 +379,7 @@ def _run(rig: Path | None, ask: Any, options: BenchOptions, gains: Path | None =
                 else print_results(False, lambda: selftest_table(findings, title), dict)
             ),
             say=lambda text: typer.echo(text, err=True),
-            may_start=lambda link: _countdown(link, pause, stop),
+            may_start=lambda link: countdown(link, pause, stop),
             stop_asked=stop.asked,
             observe=observe,
         )
@@ -420,32 +419,3 @@ def _recover_beside(folder: Path, json: bool) -> None:
             f"received",
             err=True,
         )
-
-
-def _confirm() -> None:
-    if not sys.stdin.isatty():
-        raise fx.InputError(
-            "missing: nobody can be asked here whether the joints stand at zero and nobody is in "
-            "reach",
-            key="--yes",
-        )
-    typer.confirm(
-        "Do the joints stand at their zero marks, and is nobody in reach of the arm?",
-        abort=True,
-        err=True,
-    )
-
-
-def _countdown(link: Any, seconds: float, stop: Any) -> str:
-    """Count the seconds down with the session alive; says why the experiment is not to start, or
-    ""."""
-    end = link.board.now() + seconds
-    said = -1
-    while (left := end - link.board.now()) > 0:
-        if (whole := math.ceil(left)) != said:
-            said = whole
-            typer.echo(f"starts in {whole} s; {KEYS_HELP}", err=True)
-        link.run(min(0.05, left))
-        if why := stop.asked():
-            return why
-    return stop.asked()

@@ -12,18 +12,56 @@ import flexura as fx
 from ..comparison import table as compared
 from ..identification import files, output
 from ..identification.identify import identify as identified
+from .identify_robot import asked_of, identify_asked
 from .options import ForceFile, Json
 from .output import message, print_results, progress_bars, warn
 from .results import counted, file_result
 
 
 def identify(
-    run: Annotated[
-        Path,
+    paths: Annotated[
+        list[Path],
         typer.Argument(
-            metavar="RUN", help="folder of an experiment, best from flexura bench excite"
+            metavar="[ROBOT] RUN...",
+            help="folder of a rig's experiment, best from flexura bench excite; or with --fit a "
+            "robot file and runs of that robot",
         ),
     ],
+    fit: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="KEY[=START]",
+            help="what to fit: a number of the robot file, or CHANNEL.gain, .offset, .delay_s, "
+            ".cutoff_Hz, .cutoff_ratio",
+        ),
+    ] = None,
+    fix: Annotated[
+        list[str] | None, typer.Option(metavar="KEY=VALUE", help="what is known besides the file")
+    ] = None,
+    inputs: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--input",
+            metavar="CHANNEL",
+            help="what moves a joint, as joint/1/drive or 1:CHANNEL; default: its measured "
+            "position, else its drive",
+        ),
+    ] = None,
+    channels: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--channel",
+            metavar="CHANNEL",
+            help="what is compared; default: sensors, tip deflections, positions that are not "
+            "inputs",
+        ),
+    ] = None,
+    controller: Annotated[
+        Path | None,
+        typer.Option(metavar="GAINS", help="gains file of the controller that was at work"),
+    ] = None,
+    from_s: Annotated[float | None, typer.Option(help="compare from then on [s]")] = None,
+    to_s: Annotated[float | None, typer.Option(help="compare until then [s]")] = None,
     check: Annotated[
         Path | None,
         typer.Option(
@@ -42,7 +80,7 @@ def identify(
             "--out",
             metavar="FILE.toml",
             help="robot file to write, with the rig's beside it as FILE-rig.toml; "
-            "default robot.toml in RUN/identified-1, -2, ...",
+            "default robot.toml in RUN/identified-1, -2, ...; with --fit a report FILE-report.json",
         ),
     ] = None,
     force: ForceFile = False,
@@ -50,12 +88,43 @@ def identify(
 ) -> None:
     """Identify physical parameters from an experiment.
 
-    It finds stiffness, damping, payload, friction, play and the sensor's gain, each with its 95 %
-    interval. It writes a new robot file and a new rig file.
+    Of a rig it finds stiffness, damping, payload, friction, play and the sensor's gain, each with
+    its 95 % interval. It writes a new robot file and a new rig file.
+
+    With --fit it takes any robot and any runs of it, and fits what is named: flexura identify
+    my.toml logs/swing --fit payload.mass_kg --fit link.1.damping.beta_s
 
     \b
     Example: flexura identify logs/excite
     """
+    asked = asked_of(paths, fit or [])
+    if asked is not None:
+        if by is not None:
+            raise fx.InputError("expected without --fit", key="--by", value=by)
+        identify_asked(
+            asked,
+            fix=fix or [],
+            inputs=inputs or [],
+            channels=channels or [],
+            controller=controller,
+            span=(from_s, to_s),
+            check=check,
+            out=out,
+            force=force,
+            json=json,
+        )
+        return
+    for key, given in (
+        ("--fix", fix),
+        ("--input", inputs),
+        ("--channel", channels),
+        ("--controller", controller),
+        ("--from-s", from_s),
+        ("--to-s", to_s),
+    ):
+        if given is not None and given != []:
+            raise fx.InputError("expected together with --fit", key=key, value=str(given))
+    run = paths[0]
     experiment = fx.Run.read(run)
     if by is not None and check is None:
         raise fx.InputError("expected together with --check", key="--by", value=by)

@@ -14,6 +14,7 @@ import typer
 
 import flexura as fx
 from flexura.io import FILE
+from flexura.signals import as_loads
 
 from ..crosscheck.default_manoeuvre import described as described_manoeuvre
 from ..crosscheck.default_manoeuvre import modest
@@ -38,6 +39,8 @@ def load_request(
             typer.echo(described_manoeuvre(asked, described), err=True)
     try:
         asked = asked.prescribed() if prescribed else asked
+        lengths = [link.length_m for link in described.links]
+        as_loads(asked.loads, lengths, 0.0, asked.duration_s)
     except fx.InputError as error:
         raise error.in_file(str(manoeuvre)) from None
     return system, replace(asked, start=start or asked.start)
@@ -85,6 +88,8 @@ def simulate_asked(
             asked.t,
             drive,
             start=asked.start,
+            loads=asked.loads,
+            payloads=asked.payloads,
             progress=lambda fraction: report(bar, fraction),
             **how,
         )

@@ -12,7 +12,7 @@ from flexura.io import FILE
 
 from ..identification.vibration.shapers import read_shaper, shaped
 from ..studies import parameter_sweep
-from ..tuning.closed_loop import controller_from_file
+from ..tuning.closed_loop import controller_from_file, references, with_references
 from . import tables
 from .internal_forces import force_tables
 from .options import (
@@ -135,6 +135,8 @@ def simulate(
             wall_time=wall_time,
             internal_forces=internal_forces,
         )
+        if isinstance(drive, fx.Sampled):  # of a designed controller
+            run = with_references(run, references(system, asked))
         run.save(draft.folder)
         folder = draft.keep(interrupted=run.stopped)
     print_results(
@@ -161,6 +163,7 @@ def _simulate_many(
     parameter_sweep.ranges(vary)  # the count is refused before anything is computed
     system, asked = load_request(robot, manoeuvre, prescribed, start)
     check_followed(asked, manoeuvre, "call with --prescribed")
+    asked.refuse_loads("a population")
     batch, chosen = parameter_sweep.grid(system.robot, vary)
     folder = continued(out, "population", robot.stem, *stem(manoeuvre), mark="population.json")
     with progress_bars("robots") as report:

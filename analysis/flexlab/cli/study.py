@@ -55,6 +55,10 @@ def study(
             "--data", metavar="FOLDER", help="of measured: the folder of the measured step runs"
         ),
     ] = None,
+    fit_on: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="of measured: the run to fit to; default lqg_step_10deg"),
+    ] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="processes; default: one a core")] = None,
     force: Force = False,
     json: Json = False,
@@ -78,10 +82,13 @@ def study(
             raise fx.InputError(
                 "expected none with KIND measured: it stores them", key="--channels"
             )
-        study_measured(robot or Path("quanser-2dsfl"), data, out, rtol, force=force, json=json)
+        study_measured(
+            robot or Path("quanser-2dsfl"), data, out, rtol, fit_on, force=force, json=json
+        )
         return
-    if data is not None:
-        raise fx.InputError("expected with KIND measured alone", key="--data", value=str(data))
+    for key, value in (("--data", data), ("--fit-on", fit_on)):
+        if value is not None:
+            raise fx.InputError("expected with KIND measured alone", key=key, value=str(value))
     if robot is None:
         raise fx.InputError("expected a robot file, or a shipped robot's name", key="ROBOT")
     described = fx.load(robot)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json as json_
 from pathlib import Path
+from typing import Any
 
 import flexura as fx
 from flexura.io import write_bytes, write_text
@@ -14,28 +15,42 @@ from ..runs.formatting import number, percent
 from ..runs.table import Table
 from ..studies.measured import Measured, measured, numbers
 from ..studies.measured_figure import png
+from ..studies.measured_fit import MeasuredFit, angle_per_strain, measured_fit
+from ..studies.measured_fit import numbers as measured_fit_numbers
 from .output import message, print_results, progress_bars
 from .results import results
 
 
 def study_measured(
-    robot: Path, data: Path | None, out: Path | None, rtol: float, *, force: bool, json: bool
+    robot: Path,
+    data: Path | None,
+    out: Path | None,
+    rtol: float,
+    fit_on: str | None = None,
+    *,
+    force: bool,
+    json: bool,
 ) -> None:
-    """Simulate all measured step runs of a folder, and store figure, reviews, runs and figures."""
+    """Simulate all measured step runs of a folder, fit the robot to one of them, and store figure,
+    reviews, runs, the fitted robot and figures."""
     if data is None:
         raise fx.InputError(
             "expected the folder of the measured runs; docs/guide/measured.md says where they are",
             key="--data",
         )
     described = fx.load(robot)
+    angle_per_strain(described)
     need("matplotlib", "rerun")
     with results(out, "study-measured", robot.stem, force=force) as draft:
-        with progress_bars("measured") as report:
+        with progress_bars("measured", "fit") as report:
             found = measured(described, data, rtol=rtol, progress=lambda f: report("measured", f))
-        names = ["measured.json", "measured.png"]
-        told = {"robot": described.name, "runs": numbers(found)}
+            fit = measured_fit(described, found, fit_on, lambda f: report("fit", f))
+        names = ["measured.json", "measured.png", "identified.toml"]
+        told: dict[str, Any] = {"robot": described.name, "runs": numbers(found)}
+        told |= {"identified": measured_fit_numbers(fit)}
         write_text(draft.folder / names[0], json_.dumps(told, indent=1) + "\n")
-        write_bytes(draft.folder / names[1], png(described, found))
+        write_bytes(draft.folder / names[1], png(described, found, fit))
+        fx.save(fit.found.robot, draft.folder / names[2])
         for m in found:
             m.experiment.save(draft.folder / m.name / "experiment")
             m.simulation.save(draft.folder / m.name / "simulation")
@@ -43,7 +58,11 @@ def study_measured(
             names.append(f"{m.name}/review.rrd")
         folder = draft.keep()
     stored = [str(folder / name) for name in names]
-    print_results(json, lambda: table(described, found), lambda: told | {"stored": stored})
+    print_results(
+        json,
+        lambda: [table(described, found), fitted_table(fit)],
+        lambda: told | {"stored": stored},
+    )
     message(json, f"stored {folder}: {', '.join(names)}")
 
 
@@ -62,4 +81,24 @@ def table(robot: fx.Robot, found: list[Measured]) -> Table:
             percent(m.rms_of_peak),
         )
     out.notes.append("frequencies of the ring later than 1.5 s; RMS deviation of the strain gauge")
+    return out
+
+
+def fitted_table(fit: MeasuredFit) -> Table:
+    """One row a run, by the robot that was fitted to one of them."""
+    heads = ("run", "measured [Hz]", "predicted [Hz]", "deviation", "RMS of peak")
+    out = Table(f"fitted to {fit.name}, hub as measured", heads, ("run",))
+    for p in fit.runs:
+        out.add(
+            p.name.removesuffix("_run01"),
+            number(p.ring_Hz),
+            number(p.simulated_Hz),
+            percent(p.deviation),
+            percent(p.rms_of_peak),
+        )
+    for q in fit.found.quantities:
+        out.notes.append(
+            f"{q.name} = {number(q.value)} {q.unit}, 95 %: {number(q.low)} to {number(q.high)}"
+        )
+    out.notes.append("the gauge's filter is the maker's: second order, 2 Hz, damping ratio 0.9")
     return out

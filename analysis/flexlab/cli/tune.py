@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 
 import flexura as fx
-from flexura.control import BOARD, Gains, load_gains
+from flexura.control import BOARD, Designed, Gains, load_controller
 from flexura.optional import need
 
 from .. import rig as rigs
@@ -19,6 +19,7 @@ from ..rig.nominal_robot import with_nominal_drives
 from ..tuning import dissertation as cases
 from ..tuning import result as results
 from ..tuning import search_space as freedom
+from ..tuning.designed_task import DesignedTask, default_bounds
 from ..tuning.executor import make_executor
 from ..tuning.history import FILE, History
 from ..tuning.objective import Weights
@@ -158,23 +159,35 @@ def tune(
             key="ROBOT",
             value=str(robot),
         )
-    described, given = fx.load(robot), load_gains(controller)
+    described, given = fx.load(robot), load_controller(controller)
     if rig is not None:
+        if isinstance(given, Designed):
+            expected = "expected without --rig: a designed controller has forces and torques"
+            raise fx.InputError(expected, key="--rig", value=str(rig))
         described, outputs = with_nominal_drives(described, rigs.load(rig))
         given = Gains(given.settings, outputs, given.file)
     asked = fx.load_manoeuvre(manoeuvre, len(described.links))
-    free_gains = (
-        freedom.read(free_file)
-        if free_file
-        else [freedom.from_option(f) for f in free or []] or freedom.default_bounds(given)
-    )
+    asked.refuse_loads("flexura tune")
+    if free_file:
+        free_gains = freedom.read(free_file)
+    elif free:
+        free_gains = [freedom.from_option(f) for f in free]
+    elif isinstance(given, Designed):
+        free_gains = default_bounds(given)
+    else:
+        free_gains = freedom.default_bounds(given)
     weights = Weights(vibration, effort, overshoot)
     robots = perturbed_robots(
         described,
         _factors(payload_factors, "--payload-factors"),
         _factors(stiffness_factors, "--stiffness-factors"),
     )
-    task = Task(robots, asked, given, tuple(free_gains), weights, algorithm == "nsga2", rtol, modes)
+    chosen = (tuple(free_gains), weights, algorithm == "nsga2", rtol, modes)
+    task = (
+        DesignedTask(robots, asked, given, *chosen)
+        if isinstance(given, Designed)
+        else Task(robots, asked, given, *chosen)
+    )
     task.controllers  # noqa: B018 - refuses what can't be before anything is written
     folder = continued(out, "tune", robot.stem, manoeuvre.stem, mark=FILE)
     history = History.open(folder, task.digest(how.identity()))
@@ -199,7 +212,7 @@ def tune(
         json,
         f"stored {folder}: {', '.join(path.name for path in paths)}",
         f"use it: flexura bench step --gains {paths[0]}"
-        if set(given.settings) <= set(BOARD)
+        if not isinstance(given, Designed) and set(given.settings) <= set(BOARD)
         else f"use it: flexura simulate {robot} {manoeuvre} --controller {paths[0]}",
     )
     if not complete:

@@ -99,6 +99,8 @@ def crosscheck(
         manoeuvre.drive,
         rtol=rtol,
         start=manoeuvre.start,
+        loads=manoeuvre.loads,
+        payloads=manoeuvre.payloads,
         progress=lambda f: report("native", f),
     )
     report("native", 1.0)
@@ -109,6 +111,8 @@ def crosscheck(
             native.t,
             manoeuvre.drive,
             start=manoeuvre.start,
+            loads=manoeuvre.loads,
+            payloads=manoeuvre.payloads,
             beam=beam,
             step_s=step,
             progress=lambda f: report("twin", begin + part * f),

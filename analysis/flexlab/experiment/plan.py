@@ -113,6 +113,7 @@ def inverse(
         InputError: a joint has no motion.
     """
     asked = manoeuvre or setup.manoeuvre
+    asked.refuse_loads("the bench")
     motions = []
     for number, joint in enumerate(asked.drive.joints, 1):
         if joint.motion is None:

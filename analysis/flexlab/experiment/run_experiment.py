@@ -183,6 +183,7 @@ def conduct(
     watch: Hooks,
     configure: bool = False,
     replace: bool = False,
+    reference: bool = True,
 ) -> ExperimentResult:
     """Test the rig, start and execute a plan, and make the Run.
 
@@ -198,6 +199,8 @@ def conduct(
         watch: what the person sees and says.
         configure: whether the rig's settings may be written into a board that has others.
         replace: whether a recording in `folder` may be replaced.
+        reference: whether the board is told that the joints stand at 0; else it knows where they
+            are from an experiment before on the same open board.
 
     Returns:
         The Run, its folder, the self-test's findings, and how the stream ended.
@@ -223,6 +226,7 @@ def conduct(
             sensor,
             opened.board.emulated or configure,
             lambda link: commission(link, opened.board, watch.say, watch.stop_asked),
+            reference,
         )
         watch.tested(findings)
         if failed := [finding for finding in findings if not finding.passed]:
@@ -268,8 +272,10 @@ def _ready(
     sensor: Sensor,
     write: bool,
     commission: Callable[[Link], Program],
+    reference: bool,
 ) -> list[Check]:
-    """Greet the board, configure and test it, and tell it that the joints stand at 0."""
+    """Greet the board, configure and test it, and tell it, if `reference`, that the joints stand
+    at 0."""
     identity = link.connect()
     runs = program(link)
     recording.write_session(
@@ -287,5 +293,6 @@ def _ready(
         more, rest = run_selftest(link, plan.settings, sensor)
         findings += more
         recording.write_session(rest=rest.spec())
-        link.command("reference", position_1=0, position_2=0, steps=0)
+        if reference:
+            link.command("reference", position_1=0, position_2=0, steps=0)
     return findings

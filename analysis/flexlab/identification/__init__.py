@@ -1,4 +1,6 @@
-"""Identification: parameters of robot and rig from one experiment, with their intervals.
+"""Identification: parameters with their intervals, of a rig from its experiment, and of any robot
+from runs of it."""
 
-A second experiment validates them.
-"""
+from .fit.identify import Identification, Quantity, identify_robot
+
+__all__ = ["Identification", "Quantity", "identify_robot"]

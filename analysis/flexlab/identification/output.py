@@ -19,6 +19,8 @@ from .estimate import Estimate
 from .files import with_identified_files
 from .identify import Identified
 
+CONTRADICTS = 0.2  # of a viscous part: further off, data sheet and run do not agree
+
 
 @dataclass(frozen=True)
 class Quantity:
@@ -129,7 +131,7 @@ def table(found: Identified, experiment: fx.Run) -> Table:
         "low, high: the 95 % interval, from noise (Newey-West), mesh, the strip's mass to 0.5 %, "
         "the payload's radius of gyration to 5.6 mm, the nut's give to half",
     ]
-    out.notes += at_bounds(found)
+    out.notes += at_bounds(found) + contradictions(found)
     return out
 
 
@@ -145,6 +147,21 @@ def at_bounds(found: Identified) -> list[str]:
     ]
 
 
+def contradictions(found: Identified) -> list[str]:
+    """A sentence for each motor whose back-EMF is not that of its data sheet.
+
+    Nearly all of the viscous part is back-EMF, which the data sheet has. An encoder with other
+    pulses, another lead or another gear scales it.
+    """
+    return [
+        f"{q.name}: {q.estimate / q.nominal:.3g} times what the files say, and nearly all of it is "
+        "the motor's back-EMF: the encoder's pulses, the lead, the gear ratio or the motor's data "
+        "in the rig file contradict the run"
+        for q in quantities(found)
+        if q.key.endswith("_viscous") and abs(q.estimate / q.nominal - 1) > CONTRADICTS
+    ]
+
+
 def numbers(found: Identified, experiment: fx.Run) -> dict[str, Any]:
     """For JSON."""
     return {
@@ -156,6 +173,7 @@ def numbers(found: Identified, experiment: fx.Run) -> dict[str, Any]:
             for q in quantities(found)
         ],
         "at_bounds": at_bounds(found),
+        "contradictions": contradictions(found),
         "evaluations": found.strip.evaluations
         + sum(part.evaluations for part in found.joints.values()),
     }

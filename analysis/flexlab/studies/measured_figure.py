@@ -9,14 +9,16 @@ import flexura as fx
 from flexura.optional import load
 
 from .measured import GAUGE, Measured
+from .measured_fit import MeasuredFit
 
 
-def png(robot: fx.Robot, found: Sequence[Measured]) -> bytes:
+def png(robot: fx.Robot, found: Sequence[Measured], fit: MeasuredFit | None = None) -> bytes:
     """Draw measurement and simulation of all runs.
 
     Args:
         robot: the simulated robot.
         found: the runs, one or more.
+        fit: the robot fitted to one of them.
 
     Returns:
         A PNG picture.
@@ -25,11 +27,15 @@ def png(robot: fx.Robot, found: Sequence[Measured]) -> bytes:
 
     drawing = Figure(figsize=(8, 1.0 + 1.9 * len(found)), layout="constrained")
     places = drawing.subplots(len(found), 1, sharex=True, squeeze=False)[:, 0]
+    fitted = {p.name: p for p in fit.runs} if fit else {}
     for axes, m in zip(places, found, strict=True):
         axes.plot(m.experiment.t, 1e3 * m.experiment[GAUGE], color="C1", label="measured")
         axes.plot(
             m.simulation.t, 1e3 * m.simulation[GAUGE], color="C0", linewidth=1, label="simulated"
         )
+        if m.name in fitted:
+            gauge = fitted[m.name].gauge
+            axes.plot(m.experiment.t, 1e3 * gauge, color="C2", linewidth=1, label="fitted")
         axes.set_title(
             f"{m.name}: {m.ring_Hz:.3f} Hz measured, {m.simulated_Hz:.3f} Hz simulated",
             fontsize="small",

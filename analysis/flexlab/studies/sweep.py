@@ -142,7 +142,13 @@ def _row(work: _Work) -> Row:
         system = fx.assemble(robot)
         row["first_frequency_Hz"] = float(min(fx.frequencies(system), default=np.nan))
         run = fx.simulate(
-            system, case.manoeuvre.t, case.manoeuvre.drive, rtol=rtol, start=case.manoeuvre.start
+            system,
+            case.manoeuvre.t,
+            case.manoeuvre.drive,
+            rtol=rtol,
+            start=case.manoeuvre.start,
+            loads=case.manoeuvre.loads,
+            payloads=case.manoeuvre.payloads,
         )
     except fx.FlexuraError as error:
         return row | {"complete": False, "error": str(error)}

@@ -5,14 +5,49 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 import flexura as fx
-from flexura.control import Gains, load_gains
+from flexura.control import Designed, Gains, load_controller
 from flexura.signals import constant
 
 
-def controller_from_file(system: fx.System, asked: fx.Manoeuvre, file: Path) -> fx.Controller:
-    """The controller with the gains of a file; as `closed_loop_controller`."""
-    return closed_loop_controller(system, asked, load_gains(file))
+def controller_from_file(
+    system: fx.System, asked: fx.Manoeuvre, file: Path
+) -> fx.Controller | fx.Sampled:
+    """The controller of a gains file: `closed_loop_controller`, or what is designed."""
+    found = load_controller(file)
+    if isinstance(found, Designed):
+        return found.sampled(system.robot, references(system, asked))
+    return closed_loop_controller(system, asked, found)
+
+
+def references(system: fx.System, asked: fx.Manoeuvre) -> list[fx.Signal]:
+    """A manoeuvre's motions, joints without one at their start.
+
+    Args:
+        system: the robot.
+        asked: the manoeuvre.
+
+    Raises:
+        InputError: the manoeuvre prescribes a joint.
+    """
+    motions = []
+    for i, (joint, start) in enumerate(zip(asked.drive.joints, system.robot.start, strict=True), 1):
+        if joint.prescribed:
+            expected = "expected no prescribed joint under a controller"
+            raise fx.InputError(expected, key=f"joint[{i}].prescribed", value=True)
+        motions.append(joint.motion or constant(float(start)))
+    return motions
+
+
+def with_references(run: fx.Run, motions: list[fx.Signal]) -> fx.Run:
+    """The Run with joint/i/reference besides, as one under a PID has it."""
+    channels, units = dict(run.channels), dict(run.units)
+    for i, signal in enumerate(motions, 1):
+        channels[f"joint/{i}/reference"] = np.array([signal(float(t))[0] for t in run.t])
+        units[f"joint/{i}/reference"] = run.units[f"joint/{i}/position"]
+    return replace(run, channels=channels, units=units)
 
 
 def closed_loop_controller(
@@ -31,13 +66,7 @@ def closed_loop_controller(
     Raises:
         InputError: the manoeuvre prescribes a joint, or the numbers of joints differ.
     """
-    motions = []
-    for i, (joint, start) in enumerate(zip(asked.drive.joints, system.robot.start, strict=True), 1):
-        if joint.prescribed:
-            expected = "expected no prescribed joint under a controller"
-            raise fx.InputError(expected, key=f"joint[{i}].prescribed", value=True)
-        motions.append(joint.motion or constant(float(start)))
-    made = settings.controller(motions)
+    made = settings.controller(references(system, asked))
     pids = []
     for joint, pid in zip(asked.drive.joints, made.joints, strict=True):
         assert isinstance(pid, fx.PID)

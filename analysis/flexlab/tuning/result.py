@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 import flexura as fx
-from flexura.control import Gains, StepResponse, step_response
+from flexura.control import Designed, Gains, StepResponse, step_response
 from flexura.io import write_bytes
 from flexura.io.drawing import saved
 
 from ..runs.formatting import number
 from ..runs.table import Table
 from . import search_space as freedom
-from .closed_loop import closed_loop_controller
+from .closed_loop import closed_loop_controller, references, with_references
 from .drawing import figure
 from .history import History
 from .objective import HELP
@@ -36,7 +36,7 @@ class TuningResult:
     how: Search
     history: History
     complete: bool
-    gains: Gains
+    gains: Gains | Designed
     runs: tuple[fx.Run, ...]
     responses: tuple[StepResponse, ...]
 
@@ -70,16 +70,30 @@ def result(task: Task, how: Search, history: History, complete: bool) -> TuningR
     """Simulate the best gains on every robot of the task with its own mesh, to RTOL."""
     values = task.values(history.all("points")[history.best][None])[0]
     tuned = task.tuned(values)
-    both = [simulate_tuned(fx.assemble(robot), task.manoeuvre, tuned) for robot in task.robots]
+    both = [
+        simulate_tuned(fx.assemble(robot), task.manoeuvre, tuned, nominal=task.robots[0])
+        for robot in task.robots
+    ]
     return TuningResult(
         task, how, history, complete, tuned, tuple(b[0] for b in both), tuple(b[1] for b in both)
     )
 
 
 def simulate_tuned(
-    system: fx.System, asked: fx.Manoeuvre, gains: Gains, settled: float | None = None
+    system: fx.System,
+    asked: fx.Manoeuvre,
+    gains: Gains | Designed,
+    settled: float | None = None,
+    nominal: fx.Robot | None = None,
 ) -> tuple[fx.Run, StepResponse]:
-    """A run under gains, and its figures."""
+    """A run under gains, or under the design for the nominal robot, and its figures."""
+    if isinstance(gains, Designed):
+        refs = references(system, asked)
+        law = gains.sampled(system.robot if nominal is None else nominal, refs)
+        run = with_references(fx.simulate(system, asked.t, law, rtol=RTOL), refs)
+        run.meta["manoeuvre"] = asked.name
+        r = [run[f"joint/{i}/reference"] for i in range(1, len(refs) + 1)]
+        return run, step_response(run, r, gains.limits(len(refs)), settled)
     controller = closed_loop_controller(system, asked, gains)
     run = fx.simulate(system, asked.t, controller, rtol=RTOL)
     run.meta["manoeuvre"] = asked.name

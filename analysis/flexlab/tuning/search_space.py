@@ -24,6 +24,7 @@ from flexura.control import (
     SETPOINT,
     SLEW,
     Gains,
+    design_setting,
     filter_coefficient,
 )
 from flexura.errors import InputError
@@ -82,7 +83,7 @@ def free_gain(name: str, low: Any, high: Any, scale: str | None = None) -> FreeG
     Raises:
         InputError: the name is unknown, or the bounds do not fit.
     """
-    if name not in NAMES and name not in _FILTERS:
+    if name not in NAMES and name not in _FILTERS and not design_setting(name):
         expected = "expected a setting of a gains file, see firmware/README.md, the controller"
         raise InputError(expected, key=f"free.{name}", value=name)
     if not (is_finite(low) and is_finite(high) and low < high):
@@ -221,7 +222,7 @@ def check(free_gains: Sequence[FreeGain], gains: Gains) -> None:
         raise InputError("expected at least one free setting", key="free")
     for k, f in enumerate(free_gains):
         known = f.name in _FILTERS or any(
-            i < len(kinds) and kind in ("", kinds[i]) for i, kind, _ in NAMES[f.name]
+            i < len(kinds) and kind in ("", kinds[i]) for i, kind, _ in NAMES.get(f.name, ())
         )
         if not known:
             expected = f"expected a setting of joints whose outputs are {', '.join(kinds)}"

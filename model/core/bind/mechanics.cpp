@@ -6,6 +6,8 @@
 #include <nanobind/stl/vector.h>
 
 #include "dynamics/outputs.hpp"
+#include "dynamics/point_loads.hpp"
+#include "packed.hpp"
 #include "robot/input_fault.hpp"
 #include "robot/robot_table.hpp"
 
@@ -72,6 +74,23 @@ Array line_of(const Mechanics &self, const Vector &q, int link, const Vector &s)
   for (std::size_t k = 0; k < poses.size(); ++k)
     out.data()[3 * k] = poses[k].x, out.data()[3 * k + 1] = poses[k].y,
                    out.data()[3 * k + 2] = poses[k].angle;
+  return out;
+}
+
+// Generalised forces (T, n) of loads at q (T, n): rows of `load_places_of`, values (T, 3 L).
+Array load_forces(const Mechanics &self, const Matrix &q, const Matrix &rows,
+                  const Matrix &values) {
+  const Model<double> &model = *self.model;
+  const std::vector<LoadPlace> places = load_places_of(rows, model.links());
+  expect(q.shape(1) == std::size_t(model.n) && values.shape(0) == q.shape(0) &&
+             values.shape(1) == 3 * places.size(),
+         "a row a state, a column an unknown, three values a load were expected");
+  Workspace<double> work(model);
+  Array out = new_array({q.shape(0), q.shape(1)});
+  for (std::size_t k = 0; k < q.shape(0); ++k)
+    add_point_loads(model, work, places.data(), int(places.size()),
+                    values.data() + k * values.shape(1), q.data() + k * q.shape(1),
+                    out.data() + k * q.shape(1));
   return out;
 }
 
@@ -147,6 +166,8 @@ void bind_mechanics(nb::module_ &module) {
       .def("forces", &inverse_dynamics, "q"_a, "v"_a, "a"_a, "gravity"_a, "stiffness"_a,
            "damping"_a)
       .def("observe", &observations, "q"_a, "v"_a, "stations"_a)
+      .def("loads", &load_forces, "q"_a, "rows"_a, "values"_a,
+           "Generalised forces (T, n) of forces and moments on links.")
       .def("line", &line_of, "q"_a, "link"_a, "s"_a)
       .def("loss", &loss_of, "q"_a, "v"_a)
       .def("whole_link", &whole_link, "link"_a);

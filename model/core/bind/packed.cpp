@@ -36,6 +36,32 @@ Inputs acting_of(const Matrix &segments, const Ranges &ranges, const Matrix &gai
   return acting;
 }
 
+std::vector<LoadPlace> load_places_of(const Matrix &rows, int links) {
+  if (rows.shape(1) != 3) throw std::invalid_argument("loads of another shape were expected");
+  std::vector<LoadPlace> out(rows.shape(0));
+  for (std::size_t a = 0; a < out.size(); ++a) {
+    const double *row = rows.data() + 3 * a;
+    if (!(0.0 <= row[0] && row[0] < links)) throw std::invalid_argument("there is no such link");
+    out[a].link = int(row[0]), out[a].at = row[1], out[a].follower = row[2] != 0.0;
+  }
+  return out;
+}
+
+void add_loads(Inputs &acting, const Matrix &rows, const Ranges &ranges, const Matrix &segments) {
+  const std::vector<LoadPlace> places = load_places_of(rows, int(acting.joints.size()));
+  if (ranges.shape(0) != places.size() || ranges.shape(1) != 6 || segments.shape(1) != 10)
+    throw std::invalid_argument("loads of another shape were expected");
+  for (std::size_t a = 0; a < places.size(); ++a) {
+    PointLoad load;
+    load.place = places[a];
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::int64_t *range = ranges.data() + 6 * a + 2 * k;
+      load.value[k] = signal_of(segments, range[0], range[1]);
+    }
+    acting.loads.push_back(load);
+  }
+}
+
 const char *word(Status status) {
   switch (status) {
     case Status::running: return "running";

@@ -20,11 +20,18 @@ class PythonDrive {
         link_(last_flexible(*model_)),
         function_(drive.attr("function")),
         read_(drive.attr("read")),
-        of_time_(nb::cast<bool>(drive.attr("of_time"))) {}
+        of_time_(nb::cast<bool>(drive.attr("of_time"))),
+        of_state_(nb::cast<bool>(drive.attr("of_state"))) {}
 
   // Forces (joints) at a state. The GIL is held.
   void call(double t, const double *q, const double *v, double *force) {
     if (of_time_) return take(function_(t), t, force);
+    if (of_state_) {
+      const std::size_t n = std::size_t(model_->n);
+      Array place = new_array({n}), rate = new_array({n});
+      std::copy_n(q, n, place.data()), std::copy_n(v, n, rate.data());
+      return take(function_(t, place, rate), t, force);
+    }
     const std::size_t joints = model_->first.size();
     Array position = new_array({joints}), velocity = new_array({joints});
     for (std::size_t i = 0; i < joints; ++i)
@@ -38,7 +45,7 @@ class PythonDrive {
   Workspace<double> work_;
   int link_;
   nb::object function_, read_;
-  bool of_time_;
+  bool of_time_, of_state_;
 
   // Arrays of finite doubles are read in place; all else by Python, which refuses what cannot be
   // forces.
@@ -88,13 +95,18 @@ struct Running {
           const std::string &method, const Matrix &segments, const Ranges &ranges,
           const Matrix &gains, const Flags &prescribed, const Flags &sampled, const Matrix &limits,
           nb::object function_, nb::object sampler_, double rate_Hz, double first_step,
-          bool numerical_damping, long most_steps)
+          bool numerical_damping, long most_steps, const nb::object &loads)
       : function(std::move(function_)), sampler(std::move(sampler_)) {
     const std::size_t n = std::size_t(robot.model->n);
     if (q.shape(0) != n || v.shape(0) != n || t.shape(0) < 1 ||
         ranges.shape(0) != robot.model->first.size())
       throw std::invalid_argument("a run of another robot was expected");
     Inputs acting = acting_of(segments, ranges, gains, prescribed, sampled, limits);
+    if (!loads.is_none()) {
+      const nb::tuple parts = nb::cast<nb::tuple>(loads);
+      add_loads(acting, nb::cast<Matrix>(parts[0]), nb::cast<Ranges>(parts[1]),
+                nb::cast<Matrix>(parts[2]));
+    }
     if (!function.is_none()) {
       drive = std::make_unique<PythonDrive>(robot.model, function);
       acting.function = [this](double at, const double *place, const double *rate, double *force) {
@@ -174,10 +186,11 @@ void bind_simulation(nb::module_ &module) {
       .def(nb::init<const Mechanics &, const Vector &, const Vector &, const Vector &, double,
                     const std::string &, const Matrix &, const Ranges &, const Matrix &,
                     const Flags &, const Flags &, const Matrix &, nb::object, nb::object, double,
-                    double, bool, long>(),
+                    double, bool, long, const nb::object &>(),
            "robot"_a, "t"_a, "q"_a, "v"_a, "rtol"_a, "method"_a, "segments"_a, "ranges"_a,
            "gains"_a, "prescribed"_a, "sampled"_a, "limits"_a, "function"_a.none(),
-           "sampler"_a.none(), "rate_Hz"_a, "first_step"_a, "numerical_damping"_a, "most_steps"_a)
+           "sampler"_a.none(), "rate_Hz"_a, "first_step"_a, "numerical_damping"_a, "most_steps"_a,
+           "loads"_a = nb::none())
       .def("advance", &Running::advance, "steps"_a, "At most so many steps further; may it go on?")
       .def("progress", &Running::progress, "How far the run is, and how it ended.")
       .def("rows", &Running::rows, "Times, states, accounts and drive forces so far.")

@@ -18,7 +18,7 @@ class DriveForces {
   static constexpr int LANES = LanesOf<Real>::value;
   std::vector<Real> reaction;  // (joints) of the pass just made
 
-  DriveForces(const Plant<Real> &robot, Inputs *const *acting)
+  DriveForces(Plant<Real> &robot, Inputs *const *acting)
       : reaction(robot.joints, Real(0.0)),
         plant(robot),
         held(new char[robot.joints]),
@@ -38,6 +38,9 @@ class DriveForces {
     }
     for (int k = 0; k < LANES; ++k) calls |= static_cast<bool>(of[k]->function);
     scratch.assign(2 * plant.n + plant.joints, 0.0);
+    if (LANES > 1) return;
+    for (const PointLoad &load : of[0]->loads) places.push_back(load.place);
+    values.assign(3 * places.size(), Real(0.0)), loads.assign(plant.n, Real(0.0));
   }
 
   Inputs &acting(int k) const { return *of[k]; }
@@ -61,6 +64,8 @@ class DriveForces {
         else
           set_lane(set_point[i], k, m.y), set_lane(set_point_rate[i], k, m.yd);
       }
+    for (std::size_t a = 0; a < values.size(); ++a)
+      values[a] = evaluate(of[0]->loads[a / 3].value[a % 3], lane(t, 0)).y;
   }
 
   // Puts prescribed joints where their motion has them.
@@ -72,9 +77,10 @@ class DriveForces {
   // The forces of a plain pass at (q, v).
   void load(const Real *q, const Real *v) {
     call(q, v);
+    put_loads(q);
     for (int i = 0; i < plant.joints; ++i) {
       if (held[i]) continue;
-      force[plant.first[i]] = constant(i);
+      force[plant.first[i]] = constant(i) + on_unknown(plant.first[i]);
       if (has_coulomb(i)) force[plant.first[i]] -= coulomb(i, v[plant.first[i]]);
       stiffness[i] = gains[2 * i], damping[i] = gains[2 * i + 1];
     }
@@ -85,10 +91,11 @@ class DriveForces {
   // of v0 between iterates, else by the line through zero, which never overshoots.
   void load_stage(const Real *q, const Real *v, bool first) {
     call(q, v);
+    put_loads(q);
     for (int i = 0; i < plant.joints; ++i) {
       if (held[i]) continue;
       Real &f = force[plant.first[i]];
-      f = constant(i) + function_stiffness[i] * q[plant.first[i]] +
+      f = constant(i) + on_unknown(plant.first[i]) + function_stiffness[i] * q[plant.first[i]] +
           function_damping[i] * v[plant.first[i]];
       stiffness[i] = gains[2 * i] + function_stiffness[i],
       damping[i] = gains[2 * i + 1] + function_damping[i];
@@ -133,13 +140,22 @@ class DriveForces {
   // The force of joint i's drive at (q, v), after `load` and, if it is prescribed, after the pass.
   Real drive(int i, const Real *q, const Real *v) const {
     const int e = plant.first[i];
-    if (follows(i)) return reaction[i] + coulomb(i, v[e]);
+    if (follows(i)) return reaction[i] + coulomb(i, v[e]) - on_unknown(e);
     return constant(i) - gains[2 * i] * q[e] - gains[2 * i + 1] * v[e];
   }
 
-  // Power of all drives [W].
+  bool has_loads() const { return !places.empty(); }
+  // The generalised force of all loads on links, at the last pass, in row e (130).
+  Real on_unknown(int e) const { return loads.empty() ? Real(0.0) : loads[e]; }
+  // The same at q, of loads of other sizes: `value` (loads, 3), into `out` (n).
+  void loads_at(const Real *q, const Real *value, Real *out) const {
+    plant.add_loads(places.data(), int(places.size()), value, q, out);
+  }
+
+  // Power of all drives and loads [W].
   Real work(const Real *q, const Real *v) const {
     Real sum = 0.0;
+    for (std::size_t e = 0; e < loads.size(); ++e) sum += loads[e] * v[e];
     for (int i = 0; i < plant.joints; ++i)
       if (!plant.locked[i]) sum += drive(i, q, v) * v[plant.first[i]];
     return sum;
@@ -156,7 +172,7 @@ class DriveForces {
   }
 
  private:
-  const Plant<Real> &plant;
+  Plant<Real> &plant;
   std::array<Inputs *, LANES> of;
   std::unique_ptr<char[]> held;
   std::vector<Real> force, stiffness, damping, given, steady, set_point, set_point_rate, place,
@@ -165,6 +181,9 @@ class DriveForces {
       function_damping;     // how the caller's functions fall with a joint's own position and speed
   std::vector<Real> gains;  // kp, kd of each joint
   std::vector<double> scratch;
+  std::vector<LoadPlace> places;  // of loads on links
+  std::vector<Real> values,       // (loads, 3) now
+      loads;                      // (n) their generalised forces at the last pass; or empty
   Real time = 0.0;
   bool calls = false;
 
@@ -180,6 +199,14 @@ class DriveForces {
   Real coulomb(int i, const Real &speed) const {  // Coulomb friction
     return worst(plant.coulomb[i]) > 0.0 ? coulomb_friction(plant.coulomb[i], speed, plant.slow)
                                          : Real(0.0);
+  }
+
+  // The generalised forces of the loads at q: those of the elastic unknowns into `force`.
+  void put_loads(const Real *q) {
+    if (places.empty()) return;
+    std::fill(loads.begin(), loads.end(), Real(0.0));
+    loads_at(q, values.data(), loads.data());
+    force = loads;
   }
 
   // The caller's functions at (q, v).

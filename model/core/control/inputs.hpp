@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "control/signal.hpp"
+#include "dynamics/load_place.hpp"
 
 namespace flexura {
 
@@ -45,8 +46,16 @@ struct JointDrive {
   bool follows() const { return sampled || !motion.empty(); }
 };
 
+// A force and a moment on a point of a link: signals of the force's two components [N] and of the
+// moment [N m]; empty: none.
+struct PointLoad {
+  LoadPlace place;
+  Signal value[3];
+};
+
 struct Inputs {
   std::vector<JointDrive> joints;
+  std::vector<PointLoad> loads;
   std::vector<double> low, high;  // limits [m or rad]
   ForceFunction function;         // empty: none
   Sampler *sampler = nullptr;
@@ -77,23 +86,29 @@ struct Inputs {
     return evaluate(joints[joint].force, t).y + held.force[joint];
   }
 
+  std::vector<const Signal *> signals() const {
+    std::vector<const Signal *> out;
+    for (const JointDrive &d : joints) out.insert(out.end(), {&d.force, &d.motion});
+    for (const PointLoad &load : loads)
+      for (const Signal &value : load.value) out.push_back(&value);
+    return out;
+  }
+
   // The shortest period of the signals [s]: a step that is longer would see a wave at like phases
   // and take it for still.
   double shortest_period() const {
     double w = 0.0;
-    for (const JointDrive &d : joints)
-      for (const Signal *signal : {&d.force, &d.motion})
-        for (const Segment &g : *signal)
-          if (g.A != 0.0) w = std::max(w, std::fabs(g.w));
+    for (const Signal *signal : signals())
+      for (const Segment &g : *signal)
+        if (g.A != 0.0) w = std::max(w, std::fabs(g.w));
     return w > 0.0 ? 6.283185307179586 / w : std::numeric_limits<double>::infinity();
   }
 
   // Times at which a signal jumps or kinks, ascending, each once.
   std::vector<double> breaks() const {
     std::vector<double> out;
-    for (const JointDrive &d : joints)
-      for (const Signal *signal : {&d.force, &d.motion})
-        for (const Segment &g : *signal) out.push_back(g.t0);
+    for (const Signal *signal : signals())
+      for (const Segment &g : *signal) out.push_back(g.t0);
     std::sort(out.begin(), out.end());
     out.erase(std::unique(out.begin(), out.end()), out.end());
     return out;

@@ -1,8 +1,11 @@
 // A Model as the time loop sees it.
 #pragma once
+#include <type_traits>
+
 #include "control/plant.hpp"
 #include "dynamics/energies.hpp"
 #include "dynamics/mass_matrix.hpp"
+#include "dynamics/point_loads.hpp"
 #include "numbers/pack_lane.hpp"
 
 namespace flexura {
@@ -152,6 +155,14 @@ class ModelPlant : public Plant<Real> {
     out[this->joints] = lane(poses.back().x, lane_),
     out[this->joints + 1] = lane(poses.back().y, lane_);
     return true;
+  }
+
+  void add_loads(const LoadPlace *places, int count, const Real *values, const Real *q,
+                 Real *out) override {
+    if constexpr (std::is_same_v<Real, double>)
+      add_point_loads(model, work, places, count, values, q, out);
+    else
+      Plant<Real>::add_loads(places, count, values, q, out);
   }
 
   // A slider that has run into the sleeve of the link it rides on.

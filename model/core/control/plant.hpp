@@ -8,13 +8,14 @@
 #include <memory>
 #include <vector>
 
+#include "dynamics/load_place.hpp"
 #include "numbers/scalars.hpp"
 
 namespace flexura {
 
 // Integrals over time, under the same error control as the motion but for STRAIN [J].
 enum Account { WORK, LOSS, NUMERICAL, STRAIN, ACCOUNTS };
-// WORK of the drives; LOSS to friction and to the material's damping; NUMERICAL: what the method
+// WORK of the drives and the loads; LOSS to friction and to the material's damping; NUMERICAL: what the method
 // itself takes out on purpose; STRAIN: the rise of the strain energy.
 
 // A pass that a plant is asked for: linear terms at ys + gq a, vs + gv a, all else at (q, v). Plain
@@ -74,6 +75,12 @@ struct Plant {
   // the last tip [m]; room for joints + 2. False: not known, then no mode is damped.
   virtual bool observe(int lane, const Real *q, double *out) {
     return (void)lane, (void)q, (void)out, false;
+  }
+  // Adds the generalised forces of loads on links at q to `out` (n): of each its force's two
+  // components and its moment, `values` (count, 3) (130). Packs of robots have no loads.
+  virtual void add_loads(const LoadPlace *places, int count, const Real *values, const Real *q,
+                         Real *out) {
+    (void)places, (void)count, (void)values, (void)q, (void)out;
   }
   // A joint that stands where it cannot be beyond its own limits, or -1; of robot `lane`.
   virtual int blocked(int lane, const Real *q) const { return (void)lane, (void)q, -1; }

@@ -6,23 +6,31 @@ namespace flexura {
 namespace {
 
 // The point at the abscissa `x` of a bent piece: its place from the hub and the angle there, (2)
-// and (4) with Lagrange's polynomials through its points.
+// and (4) with Lagrange's polynomials through its points. The angle also has its value at the tip:
+// P_P is zero at the points and 1 there.
 Pose<double> point_on_piece(const Piece<double> &c, const PieceState<double> &k, const double *q,
                             double x, double length) {
   const LineRule &rule = line_rule(c.P);
   std::vector<double> value(std::size_t(c.P) + 1), first(value.size()), second(value.size());
   const double u = length > 0.0 ? 2.0 * x / length - 1.0 : -1.0;
+  std::vector<double> slopes(value.size());  // of the polynomials at the tip
+  legendre(1.0, c.P, value.data(), slopes.data(), second.data());
   legendre(u, c.P, value.data(), first.data(), second.data());
   Pose<double> out{0.0, 0.0, k.phi};
+  double left = 0.0;  // at the tip
+  for (int i = 0; i < c.m; ++i) left += c.tip_angle[i] * q[i];
   for (int j = 0; j < c.P; ++j) {
-    double w = 0.0, l = 0.0, turned = 0.0;
+    double w = 0.0, l = 0.0, end = 0.0, turned = 0.0;
     for (int n = 0; n <= c.P; ++n) {
       w += 0.5 * length * rule.integrals[std::size_t(n * c.P + j)] * value[std::size_t(n)];
       l += rule.integrals[std::size_t(n * c.P + j)] * first[std::size_t(n)];
+      end += rule.integrals[std::size_t(n * c.P + j)] * slopes[std::size_t(n)];
     }
     for (int i = 0; i < c.m; ++i) turned += c.B[i * padded(c.P) + j] * q[i];
     out.x += w * k.cosine[j], out.y += w * k.sine[j], out.angle += l * turned;
+    left -= end * turned;
   }
+  out.angle += left * value[std::size_t(c.P)];
   return out;
 }
 

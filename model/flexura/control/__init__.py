@@ -1,4 +1,5 @@
-"""Sampled controllers, their gains files and step metrics, LQR designs, functions as drives."""
+"""Sampled controllers, their gains files and step metrics, LQR and LQG with the figures of their
+loops, iterative learning, functions as drives."""
 
 from .board_replay import board_pulses
 from .controller import (
@@ -11,10 +12,25 @@ from .controller import (
     Linear,
     filter_coefficient,
 )
-from .gains import BOARD, NAMES, Gains
+from .designed import Designed, design_setting
+from .gains import BOARD, NAMES, Gains, load_controller
 from .gains import load as load_gains
-from .lqr_design import Design, lqr
+from .gaussian_design import Design
+from .ilc import (
+    JointLoop,
+    JointSpring,
+    LearningFilter,
+    filter_length,
+    inverse_of_many,
+    learning_filter,
+    reference_response,
+    transform_points,
+)
+from .loop_figures import LoopFigures, LoopMargins, loop_figures
+from .lqg_design import lqg
+from .lqr_design import lqr
 from .pid import GAINS, PID, Force, Motor, Output, Stepper
+from .predictive import nmpc
 from .sampled import DriveFunction, Sampled
 from .step_metrics import (
     EFFORT,
@@ -55,20 +71,36 @@ __all__ = [
     "VIBRATION",
     "Controller",
     "Design",
+    "Designed",
     "DriveFunction",
     "Force",
     "Gains",
+    "JointLoop",
+    "JointSpring",
+    "LearningFilter",
     "Linear",
+    "LoopFigures",
+    "LoopMargins",
     "Motor",
     "Output",
     "Sampled",
     "StepResponse",
     "Stepper",
     "board_pulses",
+    "design_setting",
     "filter_coefficient",
+    "filter_length",
+    "inverse_of_many",
+    "learning_filter",
+    "load_controller",
     "load_gains",
+    "loop_figures",
+    "lqg",
     "lqr",
+    "nmpc",
+    "reference_response",
     "step_figures",
     "step_response",
     "strip_metrics",
+    "transform_points",
 ]

@@ -28,6 +28,7 @@ from ..errors import InputError
 from ..io import Tables, find, read_toml, write_toml
 from ..signals import PLAUSIBLE, Signal, constant, is_plausible
 from .controller import Controller
+from .designed import Designed, read_design
 from .pid import PID, Force, Motor, Output, Stepper
 
 MAX_JOINTS = 9
@@ -304,7 +305,7 @@ def from_board(values: Mapping[str, float]) -> Gains:
 
 
 def load(path: str | os.PathLike[str]) -> Gains:
-    """Read a gains file.
+    """Read a gains file of a PID.
 
     Args:
         path: the file's path, or the name of a controller that comes with flexura.
@@ -315,10 +316,32 @@ def load(path: str | os.PathLike[str]) -> Gains:
     Raises:
         InputError: no such file, or a wrong value; it names file, key, value and what was expected.
     """
+    found = load_controller(path)
+    if isinstance(found, Designed):
+        expected = "expected the gains of a PID: a controller that is designed runs in simulations"
+        raise InputError(expected, key="controller.type", value=found.kind, file=found.file)
+    return found
+
+
+def load_controller(path: str | os.PathLike[str]) -> Gains | Designed:
+    """Read a gains file of any type; see `load`.
+
+    Args:
+        path: the file's path, or the name of a controller that comes with flexura.
+
+    Returns:
+        The Gains of a PID, or with `type = "lqg"` or `"mpc"` the design.
+
+    Raises:
+        InputError: as `load`.
+    """
     found = find(path, "controllers")
     name = os.fspath(found)
     data = read_toml(found)
     try:
+        table = data.get("controller")
+        if isinstance(table, dict) and "type" in table:
+            return read_design(data, name)
         return _gains(data, name)
     except InputError as error:
         raise error if error.file else error.in_file(name) from None

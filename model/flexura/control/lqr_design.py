@@ -21,47 +21,18 @@ tick = F z^ + G u with u as the limits left it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ..io import array, number
 from ..system import System, assemble, linearize
 from .controller import Controller, Linear
+from .gaussian_design import Design, Weights, gaussian_design
 from .pid import PID, Motor, Stepper
-
-
-@dataclass(frozen=True)
-class Design:
-    """A discrete LQR (75) with its observer (76): this module's matrices; x0^T P x0 is the cost, S
-    the observer's covariance.
-
-    `states`, `outputs` are names; `inputs` (m,) the joints that it drives, from 0.
-    """
-
-    F: np.ndarray
-    G: np.ndarray
-    C: np.ndarray
-    K: np.ndarray
-    L: np.ndarray
-    P: np.ndarray
-    S: np.ndarray
-    states: tuple[str, ...]
-    outputs: tuple[str, ...]
-    inputs: tuple[int, ...]
-
-    @property
-    def poles(self) -> np.ndarray:
-        """Of the closed loop F - G K, in the z plane."""
-        return np.linalg.eigvals(self.F - self.G @ self.K)
-
-    @property
-    def observer_poles(self) -> np.ndarray:
-        """Of the observer's error F (1 - L C), in the z plane."""
-        return np.linalg.eigvals(self.F @ (np.eye(len(self.F)) - self.L @ self.C))
+from .riccati import discretised
 
 
 def lqr(
@@ -105,7 +76,6 @@ def lqr(
     if len(controller.joints) != len(system.robot.links):
         expected = f"expected a Controller of {len(system.robot.links)} joints"
         raise InputError(expected, key="controller", value=len(controller.joints))
-    deflection, damping = _weight_matrix(deflection, 1, "deflection")[0], number(damping, "damping")
     linear, T = linearize(system, q), 1 / controller.rate_Hz
     joints, driven = controller.joints, []
     damp, scale = np.zeros(len(linear.M)), []
@@ -121,65 +91,24 @@ def lqr(
             scale.append(joint.output.force_per_V if isinstance(joint.output, Motor) else 1.0)
             if motor:
                 damp += linear.E[:, len(driven) - 1] * joint.output.damping  # type: ignore[union-attr]
-    from scipy.linalg import expm
-
     A, B = replace(linear, G=linear.G + np.diag(damp)).A, linear.B @ np.diag(scale)
-    n, m = B.shape
-    exponential = expm(np.block([[A, B], [np.zeros((m, n + m))]]) * T)
-    F, G = exponential[:n, :n], exponential[:n, n:]
+    F, G = discretised(A, B, T)
     bent = [k for k, name in enumerate(linear.outputs) if name.endswith("tip_deflection")]
-    hubs = [linear.outputs.index(f"joint/{i + 1}/position") for i in driven]
-    elastic = system.windup_rows
-    measured = [f"joint/{i + 1}/{'motor_' * (i in elastic)}position" for i in driven]
-    places = [linear.outputs.index(name) for name in measured]
-    C, W = linear.C[places + bent[-1:]], linear.C[hubs + bent]
-    weights = np.concatenate(
-        [1 / _weight_matrix(position, len(driven), "position"), np.full(len(bent), 1 / deflection)]
-    )
-    Q = (weights[:, None] * W).T @ (weights[:, None] * W)
-    rates = np.roll(W[len(driven) :], n // 2, axis=1) * damping / deflection
-    Q += rates.T @ rates
-    R = np.diag(1 / _weight_matrix(effort, m, "effort") ** 2)
-    process = G @ np.diag(_weight_matrix(disturbance, m, "disturbance") ** 2) @ G.T
-    V = np.diag(_weight_matrix(noise, len(C), "noise") ** 2)
-    P, S = _riccati(F, G, Q, R, "effort"), _riccati(F.T, C.T, process, V, "noise")
-    K = np.linalg.solve(R + G.T @ P @ G, G.T @ P @ F)
-    L = np.linalg.solve(C @ S @ C.T + V, C @ S).T
-    design = Design(
-        F,
-        G,
-        C,
-        K,
-        L,
-        P,
-        S,
-        linear.states,
-        tuple(linear.outputs[k] for k in places + bent[-1:]),
-        tuple(driven),
+    measured = [f"joint/{i + 1}/{'motor_' * (i in system.windup_rows)}position" for i in driven] + [
+        linear.outputs[k] for k in bent[-1:]
+    ]
+    C = linear.C[[linear.outputs.index(name) for name in measured]]
+    design = gaussian_design(
+        linear,
+        (F, G, C),
+        controller.rate_Hz,
+        tuple(measured),
+        system,
+        Weights(effort, position, deflection, damping, disturbance, noise),
     )
     return replace(
         controller, linear=_linear(system, design, linear.q, linear.hold, scale, len(joints))
     ), design
-
-
-def _riccati(F: np.ndarray, G: np.ndarray, Q: np.ndarray, R: np.ndarray, key: str) -> np.ndarray:
-    """The stabilising solution of P = Q + F^T P (F - G K). SciPy's balancing sometimes spoils its
-    reordering: then without."""
-    from scipy.linalg import solve_discrete_are
-
-    for balanced in (True, False):
-        try:
-            P = solve_discrete_are(F, G, Q, R, balanced=balanced)
-        except (np.linalg.LinAlgError, ValueError):
-            continue
-        if (
-            np.abs(np.linalg.eigvals(F - G @ np.linalg.solve(R + G.T @ P @ G, G.T @ P @ F))).max()
-            < 1
-        ):
-            return P
-    raise InputError(
-        "expected weights and measurements that a stabilising controller exists for", key=key
-    )
 
 
 def _linear(
@@ -205,11 +134,3 @@ def _linear(
         L[:, joints], measured[joints] = d.L[:, -1], d.C[-1]
         offset[joints] = system.places(q)[0][-1]
     return Linear(d.F, G, L, measured, K, Kr, Kv, offset, held)
-
-
-def _weight_matrix(value: Any, count: int, key: str) -> np.ndarray:
-    expected = f"expected a number above 0, or {count} of them"
-    found = array(value, key, expected)
-    if found.shape not in ((), (count,)) or not np.all(found > 0):
-        raise InputError(expected, key=key, value=value)
-    return np.broadcast_to(found, (count,))

@@ -15,14 +15,16 @@ from .payload import Payload
 from .robot import MAX_LINKS, Robot, load, robot_of, save
 from .section import Section, SectionAt, form_of
 from .sensor import FORCE_KINDS, Sensor
-from .table import Table
+from .table import BOUNDS, Bounds, Table
 
 __all__ = [
+    "BOUNDS",
     "FORCE_KINDS",
     "LEAST_FREE",
     "MAX_ELEMENTS",
     "MAX_LINKS",
     "MOST_MODES",
+    "Bounds",
     "Damping",
     "Joint",
     "Link",

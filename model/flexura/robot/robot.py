@@ -253,7 +253,7 @@ class Robot(Table):
 
         Args:
             changes: values by key, links counted from 1: {"payload.mass_kg": 0.1,
-                "link.2.length_m": 0.4}.
+                "link.2.length_m": 0.4}. "joint.2." is short for "link.2.joint.".
 
         Returns:
             The new Robot; this one stays.
@@ -268,8 +268,39 @@ class Robot(Table):
         except ValidationError:
             return Robot.from_dict(_changed(self.to_dict(), changes))
 
+    def value(self, key: str) -> float:
+        """One number of the robot.
+
+        Args:
+            key: as in `replace`, for example "payload.mass_kg".
+
+        Returns:
+            The value, in the unit of the key.
+
+        Raises:
+            InputError: the robot has no number there.
+        """
+        found: Any = self
+        for part in self._todays_path(key, {}).split("."):
+            try:
+                found = (
+                    found[_number(found, part, key, None)]
+                    if isinstance(found, list | tuple)
+                    else getattr(found, part)
+                )
+            except (AttributeError, InputError):
+                found = None
+        if isinstance(found, bool) or not isinstance(found, int | float):
+            raise InputError(
+                "expected the key of a number that the robot has, as payload.mass_kg", key=key
+            )
+        return float(found)
+
     def _todays_path(self, path: str, changes: Tables) -> str:
-        """`link.2.joint.start_rad` of `link.2.joint.start`; any other path as it is."""
+        """`link.2.joint.start_rad` of `link.2.joint.start` and of `joint.2.start`; any other path
+        as it is."""
+        if path.startswith("joint."):
+            path = ".".join(["link", *path.split(".")[1:2], "joint", *path.split(".")[2:]])
         parts = path.split(".")
         if len(parts) != 4 or parts[0] != "link" or parts[2] != "joint" or parts[3] not in KEYS:
             return path
@@ -300,7 +331,7 @@ def _changed(tables: Any, changes: Tables) -> dict[str, Any]:
     return out
 
 
-def _number(table: list[Any], part: str, path: str, value: Any) -> int:
+def _number(table: list[Any] | tuple[Any, ...], part: str, path: str, value: Any) -> int:
     """The index of an entry of a list, from its number as people count."""
     if not (part.isascii() and part.isdigit() and 1 <= int(part[:9]) <= len(table)):
         raise InputError(

@@ -24,7 +24,14 @@ class Bounds:
     signed: bool = False
 
     def hold(self, value: float) -> bool:
-        """Whether a value lies within."""
+        """Whether a value lies within.
+
+        Args:
+            value: the value, in the unit of its key.
+
+        Returns:
+            True if it does.
+        """
         size = abs(value) if self.signed else value
         return self.low <= size <= self.high or (self.zero and value == 0)
 

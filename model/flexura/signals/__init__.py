@@ -4,8 +4,10 @@ tables."""
 from . import paths, shaping, signal
 from .conversion import FunctionSignal, SignalLike, as_signal, as_signals, spline
 from .drive import Drive, JointDrive, check_smooth
+from .load import Load, Loads, LoadsLike, as_loads
 from .manoeuvre import STARTS, Manoeuvre, load_manoeuvre
 from .parsing import PLAUSIBLE, from_spec, is_finite, is_plausible
+from .payload_change import PayloadChange, PayloadsLike, as_payloads
 from .shaping import ei, matched_cycloid, zv, zvd
 from .signal import (
     COLUMNS,
@@ -14,6 +16,7 @@ from .signal import (
     constant,
     cycloid,
     evaluate,
+    evaluate_many,
     harmonic,
     piecewise,
     polynomial,
@@ -30,9 +33,16 @@ __all__ = [
     "Drive",
     "FunctionSignal",
     "JointDrive",
+    "Load",
+    "Loads",
+    "LoadsLike",
     "Manoeuvre",
+    "PayloadChange",
+    "PayloadsLike",
     "Signal",
     "SignalLike",
+    "as_loads",
+    "as_payloads",
     "as_signal",
     "as_signals",
     "bang_bang",
@@ -41,6 +51,7 @@ __all__ = [
     "cycloid",
     "ei",
     "evaluate",
+    "evaluate_many",
     "from_spec",
     "harmonic",
     "is_finite",

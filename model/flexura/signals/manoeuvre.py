@@ -12,7 +12,9 @@ import numpy as np
 from ..errors import InputError
 from ..io import Tables, check_format, choice, find, is_name, read_toml, whole
 from .drive import Drive, JointDrive, check_smooth
+from .load import Load, load_from_table
 from .parsing import from_spec, is_plausible
+from .payload_change import PayloadChange, as_payloads, payload_from_table
 from .signal import Signal
 
 
@@ -21,7 +23,8 @@ class Manoeuvre:
     """What a robot is asked to do: a drive, for how long, and how often the result is stored. Read
     from a TOML file.
 
-    `start`: "static" or "straight", as in `simulate`; None leaves it to gravity.
+    `start`: "static" or "straight", as in `simulate`; None leaves it to gravity. `loads`: forces
+    and moments on links. `payloads`: what is taken up and let go.
     """
 
     name: str
@@ -29,6 +32,8 @@ class Manoeuvre:
     output_step_s: float
     drive: Drive
     start: str | None = None
+    loads: tuple[Load, ...] = ()
+    payloads: tuple[PayloadChange, ...] = ()
 
     @property
     def t(self) -> np.ndarray:
@@ -62,12 +67,33 @@ class Manoeuvre:
         }
         if self.start is not None:
             own["start"] = self.start
-        return own | {"joint": self.drive.spec()}
+        own |= {"joint": self.drive.spec()}
+        if self.loads:
+            own["load"] = [load.spec() for load in self.loads]
+        if self.payloads:
+            own["payload"] = [change.spec() for change in self.payloads]
+        return own
+
+    def refuse_loads(self, by: str) -> None:
+        """Refuse loads on links, and payloads that change, where they would be left out.
+
+        Args:
+            by: what leaves them out, for the message.
+
+        Raises:
+            InputError: the manoeuvre has some.
+        """
+        if self.loads:
+            text = f"expected none: {by} takes no loads on links"
+            raise InputError(text, key="load", value=len(self.loads))
+        if self.payloads:
+            text = f"expected none: {by} takes no payload that changes"
+            raise InputError(text, key="payload", value=len(self.payloads))
 
 
 LONGEST = 1e8  # of a manoeuvre [s]: three years
 STARTS = ("static", "straight")
-_KEYS = ("name", "duration_s", "output_step_s", "start", "joint", "format")
+_KEYS = ("name", "duration_s", "output_step_s", "start", "joint", "load", "payload", "format")
 _JOINT_KEYS = ("force", "motion", "kp", "kd", "prescribed")
 
 
@@ -161,7 +187,36 @@ def _manoeuvre(data: Tables, joints: int) -> Manoeuvre:
     start = data.get("start")
     if start is not None:
         choice(start, "start", STARTS)
-    return Manoeuvre(name, duration, step, Drive(tuple(drives)), start)
+    return Manoeuvre(
+        name,
+        duration,
+        step,
+        Drive(tuple(drives)),
+        start,
+        _loads(data, joints),
+        _payloads(data, duration),
+    )
+
+
+def _payloads(data: dict[str, Any], duration: float) -> tuple[PayloadChange, ...]:
+    """The tables [[payload]]."""
+    tables = data.get("payload", [])
+    if not isinstance(tables, list):
+        raise InputError("expected tables [[payload]]", key="payload", value=tables)
+    return as_payloads([payload_from_table(x, i) for i, x in enumerate(tables, 1)], 0.0, duration)
+
+
+def _loads(data: dict[str, Any], joints: int) -> tuple[Load, ...]:
+    """The tables [[load]]."""
+    tables = data.get("load", [])
+    if not isinstance(tables, list):
+        raise InputError("expected tables [[load]]", key="load", value=tables)
+    loads = tuple(load_from_table(entry, i) for i, entry in enumerate(tables, 1))
+    for i, load in enumerate(loads, 1):
+        if load.link > joints:
+            text = f"expected a link from 1 to {joints}"
+            raise InputError(text, key=f"load[{i}].link", value=load.link)
+    return loads
 
 
 def _prescribed(entry: dict[str, Any], motion: Signal | None, key: str, duration: float) -> bool:

@@ -65,6 +65,30 @@ def evaluate(segments: np.ndarray, t: float) -> tuple[float, float, float]:
     return y, yd, ydd
 
 
+def evaluate_many(segments: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """y and dy/dt (T,) of packed segments (60) at many times.
+
+    Args:
+        segments: (k, 10), one or more.
+        t: times (T,) [s].
+
+    Returns:
+        The two arrays.
+    """
+    rows = segments[np.maximum(np.searchsorted(segments[:, 0], t, side="right") - 1, 0)]
+    late = t - rows[:, 0]
+    s = np.maximum(late, 0.0)
+    y, yd = np.zeros(len(s)), np.zeros(len(s))
+    for k in range(6, 0, -1):
+        yd = yd * s + y
+        y = y * s + rows[:, k]
+    A, w = rows[:, 7], rows[:, 8]
+    if A.any():
+        angle = w * s + rows[:, 9]
+        y, yd = y + A * np.sin(angle), yd + A * w * np.cos(angle)
+    return y, np.where(late < 0, 0.0, yd)
+
+
 @dataclass(frozen=True)
 class Signal:
     """A function of time (60): `signal(t)` gives (y, dy/dt, d2y/dt2); `segments` (k, 10); `breaks`

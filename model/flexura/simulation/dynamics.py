@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 from ..control import Controller, Sampled
 from ..errors import InputError, guarded
 from ..io import Run, check_progress, flag
-from ..signals import Drive, SignalLike, as_signals
+from ..signals import Drive, LoadsLike, PayloadsLike, SignalLike, as_payloads, as_signals
 from ..system import RobotLike, System, assemble, check_continuous
-from . import dense, integrator, nodewise_run
+from . import dense, integrator, nodewise_run, payload_changes
 from .problem import Budget, Problem, Progress, Solution, check_times, initial_value_problem
 from .recorder import record, still
 from .stop_condition import StopCondition
@@ -44,6 +44,8 @@ def simulate(
     continue_from: Run | None = None,
     until: Callable[..., bool | float] | None = None,
     numerical_damping: bool = True,
+    loads: LoadsLike = None,
+    payloads: PayloadsLike = None,
     internal_forces: bool = False,
     max_steps: int | None = None,
     wall_time: float | None = None,
@@ -63,6 +65,8 @@ def simulate(
         continue_from: as in `flexura.simulate`.
         until: as in `flexura.simulate`.
         numerical_damping: as in `flexura.simulate`.
+        loads: as in `flexura.simulate`.
+        payloads: as in `flexura.simulate`.
         internal_forces: as in `flexura.simulate`.
         max_steps: as in `flexura.simulate`.
         wall_time: as in `flexura.simulate`.
@@ -83,23 +87,27 @@ def simulate(
         start,
         continue_from,
         Budget.checked(max_steps, wall_time),
+        loads,
     )
     check_progress(progress)
     within = flag(internal_forces, "internal_forces")
     if within:
         check_continuous(problem.system)
     solver = _solver(problem.system)
-    solution = (
-        solver(problem, progress)
-        if until is None
-        else StopCondition(until, problem).run(solver, progress)
-    )
+    changes = as_payloads(payloads, float(problem.t[0]), float(problem.t[-1]))
+    if changes:
+        payload_changes.check(problem, changes, until)
+        solution = payload_changes.solve(problem, changes, solver, progress)
+    elif until is None:
+        solution = solver(problem, progress)
+    else:
+        solution = StopCondition(until, problem).run(solver, progress)
     solution = replace(
         solution,
         accounts=solution.accounts + problem.accounts,
         meta=solution.meta | {"start": problem.start},
     )
-    run = record(problem.system, solution, within)
+    run = record(problem.system, solution, problem.loads, within)
     run.meta["events"] = run.meta["events"] + still(run)
     if isinstance(problem.drive, Controller):
         return problem.drive.recorded(run, solution.sampler)
@@ -117,6 +125,8 @@ def inverse(
     *,
     method: str = "auto",
     start: str | None = None,
+    loads: LoadsLike = None,
+    payloads: PayloadsLike = None,
     internal_forces: bool = False,
     max_steps: int | None = None,
     wall_time: float | None = None,
@@ -142,6 +152,8 @@ def inverse(
         method: as in `flexura.simulate`.
         start: as in `flexura.simulate`. Under gravity the run starts in static equilibrium with the
             joints on their motions.
+        loads: as in `flexura.simulate`; the drives bear them too.
+        payloads: as in `flexura.simulate`; joints keep to their motions at the impact.
         internal_forces: as in `flexura.simulate`.
         max_steps: as in `flexura.simulate`.
         wall_time: as in `flexura.simulate`.
@@ -171,6 +183,8 @@ def inverse(
         rtol,
         method=method,
         start=start,
+        loads=loads,
+        payloads=payloads,
         internal_forces=internal_forces,
         max_steps=max_steps,
         wall_time=wall_time,

@@ -53,7 +53,9 @@ class _Integration:
             sampler, rate = drive.sampler(system), float(drive.rate_Hz)
         elif isinstance(drive, Sampled):
             sampler, rate = (
-                core.PythonSampler(system.equations, DriveFunction(drive.function, joints)),
+                core.PythonSampler(
+                    system.equations, DriveFunction(drive.function, joints, system, problem.loads)
+                ),
                 float(drive.rate_Hz),
             )
         else:
@@ -78,6 +80,7 @@ class _Integration:
             0.0,
             problem.numerical_damping,
             problem.budget.steps,
+            problem.loads.packed() if problem.loads else None,
         )
 
     def run(self, progress: Progress) -> Solution:

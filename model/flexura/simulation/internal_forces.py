@@ -1,74 +1,69 @@
-"""The forces within a robot over a run: of its joints, along its links, and of its sensors."""
+"""The forces within a robot over a run: of its joints and along its links."""
 
 from __future__ import annotations
-
-from collections.abc import Callable
 
 import numpy as np
 
 from ..io import STATIONS
-from ..robot import FORCE_KINDS, Link, Robot
-from ..system import Balance, SectionForces, System, check_continuous, sections_known
-
-ROWS = 500  # times in one sweep, which bounds the memory it takes
+from ..robot import Link, Robot
+from ..signals import Loads
+from ..system import Balance, SectionForces, System, accelerations, balances, sections_known
 
 
 def force_channels(
-    system: System, q: np.ndarray, qd: np.ndarray, qdd: Callable[[], np.ndarray], everything: bool
-) -> tuple[dict[str, np.ndarray], dict[str, str]]:
-    """The channels of forces within the robot: those of its sensors, and if asked for all.
+    system: System,
+    t: np.ndarray,
+    q: np.ndarray,
+    qd: np.ndarray,
+    drive: np.ndarray,
+    loads: Loads,
+) -> dict[str, np.ndarray]:
+    """The reactions of all joints, and the forces along all links.
 
     Args:
         system: the robot.
+        t: times (T,) [s].
         q: configurations (T, n).
         qd: their rates (T, n).
-        qdd: gives their accelerations (T, n).
-        everything: also the reactions of all joints, and the forces along all links.
+        drive: forces of the drives (T, links) [N or N m].
+        loads: forces and moments on links.
 
     Returns:
-        Values (T,) and units by channel.
+        Values (T,) by channel, in the order of `force_units`.
 
     Raises:
         InputError: a robot that slides from node to node.
     """
-    units = force_units(system.robot, everything)
-    if not units:
-        return {}, {}
-    check_continuous(system)
-    states, parts = (q, qd, qdd()), []
-    for first in range(0, max(len(q), 1), ROWS):
-        here, rates, more = (x[first : first + ROWS] for x in states)
-        balance = Balance(system.assembly.structure, here, rates, more)
-        found = (_joint_values(balance) + _link_values(balance)) if everything else []
-        parts.append(np.array(found + _sensor_values(balance)))
-    columns = np.concatenate(parts, axis=1)
-    return dict(zip(units, columns, strict=True)), units
+    qdd = accelerations(system, t, q, qd, drive, loads)
+    parts = [
+        np.array(_joint_values(balance) + _link_values(balance))
+        for balance in balances(system, t, q, qd, qdd, loads)
+    ]
+    return dict(zip(force_units(system.robot), np.concatenate(parts, axis=1), strict=True))
 
 
-def force_units(robot: Robot, everything: bool) -> dict[str, str]:
-    """Units by channel of the forces within a robot, in the order of the channels.
+def force_units(robot: Robot) -> dict[str, str]:
+    """The channels of the forces within a robot.
 
     Args:
         robot: the robot.
-        everything: also of all joints and along all links, not of its sensors alone.
 
     Returns:
-        Units by channel.
+        Units by channel, in the order of the channels.
     """
     units: dict[str, str] = {}
-    for i, link in enumerate(robot.links if everything else (), 1):
+    for i, link in enumerate(robot.links, 1):
         own = {"x": "N", "y": "N", "moment": "N m"}
         own |= {"along": "N", "across": "N"} if link.joint.type != "R" else {}
         units |= {f"joint/{i}/reaction_{name}": unit for name, unit in own.items()}
-    for i, link in enumerate(robot.links if everything else (), 1):
+    for i, link in enumerate(robot.links, 1):
         if sections_known(robot, i - 1):
             own = {"bending_moment": "N m", "shear_force": "N", "axial_force": "N"}
             own |= {"stress": "Pa"} if _stressed(link) else {}
             units |= {
                 f"link/{i}/{name}/{k}": unit for name, unit in own.items() for k in range(STATIONS)
             }
-    sensors = [s for link in robot.links for s in link.sensor if s.kind in FORCE_KINDS]
-    return units | {f"sensor/{s.name}": s.unit for s in sensors}
+    return units
 
 
 def _joint_values(balance: Balance) -> list[np.ndarray]:
@@ -99,22 +94,6 @@ def _link_values(balance: Balance) -> list[np.ndarray]:
         out += [getattr(each, name) for name in SectionForces._fields for each in found]
         if _stressed(link):
             out += [link.bending_stress(f[0], s) for f, s in zip(found, places, strict=True)]
-    return out
-
-
-def _sensor_values(balance: Balance) -> list[np.ndarray]:
-    """Of the sensors of forces (123), (128)."""
-    out = []
-    for i, link in enumerate(balance.robot.links):
-        for sensor in link.sensor:
-            if sensor.kind in FORCE_KINDS:
-                found = balance.section(i, sensor.at_m)
-                if sensor.kind == "stress":
-                    out.append(
-                        link.bending_stress(found.bending_moment, sensor.at_m, sensor.distance_m)
-                    )
-                else:
-                    out.append(getattr(found, sensor.kind))
     return out
 
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ..control import Controller, DriveFunction, Sampled
 from ..errors import InputError
 from ..io import Run, Tables, array, check_memory, choice, flag, number, whole
-from ..signals import Drive, Signal, as_signals
+from ..signals import Drive, Loads, LoadsLike, Signal, as_loads, as_signals
 from ..system import RobotLike, System, assemble
 from .start import apply_prescribed_motions, check_limits, consistent_start, state_at_end
 
@@ -38,6 +38,7 @@ class Problem:
         numerical_damping: whether exponential steps damp fast modes.
         start: "static", "straight", "given" or "continued".
         accounts: of the run that this one continues (4,) [J].
+        loads: forces and moments on links.
         ends: called with the times and states so far; says whether the rest is of no use.
     """
 
@@ -51,6 +52,7 @@ class Problem:
     numerical_damping: bool = True
     start: str = "given"
     accounts: np.ndarray = field(default_factory=lambda: np.zeros(4))
+    loads: Loads = field(default_factory=Loads)
     ends: Callable[[np.ndarray, np.ndarray], bool] | None = None
     budget: Budget = field(default_factory=lambda: Budget())
 
@@ -106,6 +108,7 @@ class Solution:
         meta: steps, events and whether it is complete.
         seen: what `system.observe` gives (T, k), where the solver knows it.
         jumps: what the energy has jumped by so far, (T,) or 0 [J].
+        systems: where the payload changes, the robots and the row before which each ends.
         sampler: of the core, with what a Controller computed at its ticks.
     """
 
@@ -116,6 +119,7 @@ class Solution:
     meta: Tables
     seen: np.ndarray | None = None
     jumps: Any = 0.0
+    systems: tuple[tuple[System, int], ...] = ()
     sampler: Any = None
 
 
@@ -131,6 +135,7 @@ def initial_value_problem(
     start: Any = None,
     before: Run | None = None,
     budget: Budget | None = None,
+    loads: LoadsLike = None,
 ) -> Problem:
     """The problem that a simulation solves.
 
@@ -146,6 +151,7 @@ def initial_value_problem(
         start: as in `simulate`.
         before: the run that it continues.
         budget: of passes and seconds; None: the default.
+        loads: as in `simulate`.
 
     Returns:
         The problem.
@@ -157,9 +163,11 @@ def initial_value_problem(
     system, t = assemble(robot), check_request(t_eval, rtol, method)
     check_rows(system, len(t))
     acting = acting_drive(drive, len(system.robot.links), t)
+    lengths = [link.length_m for link in system.robot.links]
+    on_links = as_loads(loads, lengths, float(t[0]), float(t[-1]))
     accounts = np.zeros(4)
     if before is None:
-        q, qd, start = consistent_start(system, t[0], acting, q0, qd0, start)
+        q, qd, start = consistent_start(system, t[0], acting, q0, qd0, start, on_links)
     else:
         q, qd, accounts = state_at_end(before, system, t, {"q0": q0, "qd0": qd0, "start": start})
         start = "continued"
@@ -182,6 +190,7 @@ def initial_value_problem(
         damping,
         start,
         accounts,
+        on_links,
         budget=budget or Budget(),
     )
 

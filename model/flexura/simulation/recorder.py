@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
 
 import numpy as np
 
 from ..io import STATIONS, Run, Tables, judged
 from ..robot import Robot
-from ..system import System
-from .internal_forces import force_channels
+from ..signals import Loads
+from ..system import System, sensor_channels
+from .internal_forces import force_channels, force_units
 from .problem import Solution
-from .sensors import accelerations, sensor_channels
 
 
 def channel_units(robot: Robot) -> dict[str, str]:
@@ -59,9 +58,15 @@ LIMITS = ("limit", "end_of_link", "sleeve")  # names of events that stop a joint
 STILL = 1e-9  # m or rad: a robot whose unknowns change by less does not move
 
 
-def record(system: System, solution: Solution, internal_forces: bool = False) -> Run:
-    """The Run of a solution: its channels, the balance of its energies, and the solver's
-    metadata; if asked for with the forces within the robot."""
+def record(
+    system: System,
+    solution: Solution,
+    loads: Loads | None = None,
+    internal_forces: bool = False,
+) -> Run:
+    """The Run of a solution under loads on links: its channels, the balance of its energies, and
+    the solver's metadata; if asked for, with the forces within the robot."""
+    loads = loads or Loads()
     n, t, states, accounts = system.n, solution.t, solution.states, solution.accounts
     q, v = np.ascontiguousarray(states[:, :n]), np.ascontiguousarray(states[:, n:])
     seen = system.observe(q, v) if solution.seen is None else solution.seen
@@ -75,14 +80,20 @@ def record(system: System, solution: Solution, internal_forces: bool = False) ->
     channels = {
         name: np.ascontiguousarray(values) for name, values in zip(units, found, strict=True)
     }
-    qdd = cache(lambda: accelerations(system, q, v, solution.forces))
-    for more, own in (
-        sensor_channels(system, q, v, qdd),
-        force_channels(system, q, v, qdd, internal_forces),
-    ):
-        channels |= more
-        units |= own
+    begin, sensors = 0, []
+    for carrying, end in solution.systems or ((system, len(t)),):
+        rows = slice(begin, end)
+        now = (carrying, t[rows], q[rows], v[rows], solution.forces[rows], loads)
+        sensors.append(sensor_channels(*now))
+        if internal_forces:
+            sensors[-1] |= force_channels(*now)
+        begin = end
+    channels |= {name: np.concatenate([part[name] for part in sensors]) for name in sensors[0]}
+    units |= {f"sensor/{s.name}": s.unit for link in system.robot.links for s in link.sensor}
+    units |= force_units(system.robot) if internal_forces else {}
     about = describe(system, energy_error(seen[:, -3:], accounts, solution.jumps)) | solution.meta
+    if loads:
+        about["loads"] = loads.spec()
     if len(t):
         about["numerical_loss_J"] = float(accounts[-1, NUMERICAL])
     return judged(Run(t, channels, units, about, states))

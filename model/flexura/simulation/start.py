@@ -12,7 +12,7 @@ from ..control import PID, Controller
 from ..errors import InputError
 from ..io import Run, array, choice
 from ..robot import Robot
-from ..signals import STARTS, Drive
+from ..signals import STARTS, Drive, Loads
 from ..system import NoEquilibrium, System, static
 
 NO_START = 'start = "straight" begins with straight links, q0 with a state of your own'
@@ -25,12 +25,13 @@ def consistent_start(
     q0: ArrayLike | None,
     qd0: ArrayLike | None,
     start: Any = None,
+    loads: Loads | None = None,
 ) -> tuple[np.ndarray, np.ndarray, str]:
     """The state at the start of a run.
 
     Locked joints are at rest, prescribed ones on their motion. Without q0 the links are straight,
-    or under gravity in static equilibrium with the joints held where they start (50). Given rates
-    are kept in either case.
+    or under gravity in static equilibrium with the joints held where they start (50), with the
+    loads that act at the start (133). Given rates are kept in either case.
 
     Args:
         system: the robot.
@@ -39,6 +40,7 @@ def consistent_start(
         q0: configuration (n,), or None.
         qd0: its rates (n,), or None.
         start: "static", "straight" or None.
+        loads: forces and moments on links, or None.
 
     Returns:
         q and qd (n,), and which start it is: "given", "static" or "straight".
@@ -57,7 +59,7 @@ def consistent_start(
     check_limits(system, q)
     if which == "static":
         try:
-            q = static(system, q[system.joint_rows])
+            q = static(system, q[system.joint_rows], loads=loads, t=t)
         except NoEquilibrium as error:
             raise NoEquilibrium(f"{error}; {NO_START}", error.q, error.share) from None
     return q, qd, which
@@ -117,6 +119,7 @@ def state_at_end(
     if run.states.shape[1] != 2 * n:
         text = f"expected a run of a robot with {n} unknowns"
         raise InputError(text, key=key, value=run.states.shape[1] // 2)
+    _check_payload(run, system)
     end = float(run.t[-1])
     if abs(t[0] - end) > 1e-9 * max(1.0, abs(end)):
         text = f"expected times that begin at the end of the run that is continued, {end:g} s"
@@ -124,6 +127,21 @@ def state_at_end(
     accounts = [float(run[f"energy/{name}"][-1]) for name in ("work", "loss", "numerical_loss")]
     z = run.states[-1]
     return z[:n].copy(), z[n:].copy(), np.array([*accounts, 0.0])
+
+
+def _check_payload(run: Run, system: System) -> None:
+    """Refuse a robot whose payload is not the one that the run ended with."""
+    changes = run.meta.get("payloads")
+    own = system.robot.payload
+    if not changes:
+        return
+    last = changes[-1]
+    if (own.mass_kg, own.inertia_kg_m2) != (last["mass_kg"], last["inertia_kg_m2"]):
+        text = (
+            f"expected the payload at the end of the run that is continued, {last['mass_kg']:g} kg "
+            f"and {last['inertia_kg_m2']:g} kg m^2"
+        )
+        raise InputError(text, key="payload.mass_kg", value=own.mass_kg)
 
 
 def check_state(system: System, key: str, value: Any, default: np.ndarray) -> np.ndarray:

@@ -362,6 +362,25 @@ class Assembly:
         """
         return (self._at_rest(q) if qd is None else self.structure.states(q, qd))[-1].tip
 
+    def loads(self, q: np.ndarray, rows: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """The generalised forces of forces and moments on links (132).
+
+        Args:
+            q: configuration (n,).
+            rows: where they act (L, 3): link from 0, abscissa [m], 1 if the force is along and
+                across the line there (131).
+            values: the force's two components [N] and the moment [N m], (L, 3).
+
+        Returns:
+            Generalised forces (n,).
+        """
+        states, out = self._at_rest(q), np.zeros(self.n)
+        for (link, at, turns), (x, y, moment) in zip(rows, values, strict=True):
+            frame = self.structure.at(states[int(link)], float(at))
+            force = complex(x, y) * (frame.tangent if turns else 1.0)
+            out += np.real(frame.velocity.conj() * force) + moment * frame.turning
+        return out
+
     def line(
         self, q: np.ndarray, link: int, s: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -58,11 +58,7 @@ class FrequencyResponse:
             InputError: `out` has another ending.
             Missing: matplotlib is not installed.
         """
-        form = "" if out is None else Path(out).suffix.lower().removeprefix(".")
-        if out is not None and form not in ("pdf", "svg", "png"):
-            raise InputError(
-                "expected a file that ends with .pdf, .svg or .png", key="out", value=str(out)
-            )
+        form = _picture_form(out)
         figure, (above, below) = pyplot.subplots(2, 1, sharex=True, layout="constrained")
         above.loglog(self.frequencies_Hz, self.magnitude)
         above.set_ylabel(f"{self.channel} [{self.unit}]")
@@ -71,14 +67,53 @@ class FrequencyResponse:
         below.set(xlabel="frequency [Hz]", ylabel="phase [deg]")
         for axes in (above, below):
             axes.grid(alpha=0.3)
-        if out is not None:
-            import io
+        return _written(figure, out, form)
 
-            picture = io.BytesIO()
-            figure.savefig(picture, format=form)
-            pyplot.close(figure)
-            write_bytes(out, picture.getvalue())
-        return figure
+    def nyquist(self, out: str | Path | None = None) -> Figure:
+        """Draw the values in the complex plane, with the unit circle and the point -1 of a loop.
+
+        Args:
+            out: a file to write, .pdf, .svg or .png.
+
+        Returns:
+            The figure of matplotlib.
+
+        Raises:
+            InputError: `out` has another ending.
+            Missing: matplotlib is not installed.
+        """
+        form = _picture_form(out)
+        figure, axes = pyplot.subplots(layout="constrained")
+        round_one = np.exp(1j * np.linspace(0, 2 * np.pi, 181))
+        axes.plot(round_one.real, round_one.imag, color="0.7", linewidth=0.8)
+        axes.plot([-1.0], [0.0], "+", color="black")
+        axes.plot(self.values.real, self.values.imag)
+        axes.plot(self.values.real, -self.values.imag, linestyle="--", linewidth=0.8)
+        axes.set(xlabel="real part", ylabel="imaginary part", xlim=(-3, 3), ylim=(-3, 3))
+        axes.set(title=f"{self.drive} to {self.channel} [{self.unit}]", aspect="equal")
+        axes.grid(alpha=0.3)
+        return _written(figure, out, form)
+
+
+def _picture_form(out: str | Path | None) -> str:
+    """The format of a picture's file, "" if there is none. Raises InputError."""
+    form = "" if out is None else Path(out).suffix.lower().removeprefix(".")
+    if out is not None and form not in ("pdf", "svg", "png"):
+        raise InputError(
+            "expected a file that ends with .pdf, .svg or .png", key="out", value=str(out)
+        )
+    return form
+
+
+def _written(figure: Figure, out: str | Path | None, form: str) -> Figure:
+    if out is not None:
+        import io
+
+        picture = io.BytesIO()
+        figure.savefig(picture, format=form)
+        pyplot.close(figure)
+        write_bytes(out, picture.getvalue())
+    return figure
 
 
 def frequency_response(

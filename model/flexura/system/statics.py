@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import FlexuraError, guarded
+from ..errors import FlexuraError, InputError, guarded
 from ..io import array, number
+from ..signals import Loads, LoadsLike, as_loads
+from .loads import borne
 from .system import RobotLike, System, assemble
 
 STABLE, UNSTABLE = 0, 1  # Balance of model/core/statics_and_modes/equilibrium.hpp
@@ -30,6 +32,9 @@ def static(
     joints: ArrayLike | None = None,
     tip_force: ArrayLike = (0.0, 0.0),
     tip_moment: float = 0.0,
+    *,
+    loads: LoadsLike = None,
+    t: float = 0.0,
 ) -> np.ndarray:
     """The static equilibrium with the joints held: elastic + gravity = J_tip^T load (50).
 
@@ -41,6 +46,8 @@ def static(
         joints: positions (links,) [m or rad]; None: their start.
         tip_force: x and y [N] at the last tip, in the base's axes.
         tip_moment: moment there [N m].
+        loads: forces and moments on links (133), as in `flexura.simulate`.
+        t: the time whose loads act [s].
 
     Returns:
         q (n,) in the order of `system.labels`.
@@ -53,9 +60,30 @@ def static(
     force = array(tip_force, "tip_force", "expected a finite force (x, y) in newtons", (2,))
     load = np.array([*force, number(tip_moment, "tip_moment")])
     q = joint_positions(system, joints)
+    on_links = as_loads(loads, [link.length_m for link in system.robot.links], t, t)
     if not system.exact:
-        return _dense(system.fixed(q), q, load)
-    return equilibrium(system.equations, q, load)
+        system = system.fixed(q)
+        return _with_loads(system, _dense(system, q, load), load, on_links, t)
+    return _with_loads(system, equilibrium(system.equations, q, load), load, on_links, t)
+
+
+def _with_loads(
+    system: System, q: np.ndarray, tip: np.ndarray, loads: Loads, t: float
+) -> np.ndarray:
+    """The equilibrium under loads on links, from the one without them."""
+    if not loads or not loads.values(t).any():
+        return q
+    if tip.any():
+        text = "expected a load at the tip or loads on links, not both: give both as loads"
+        raise InputError(text, key="loads", value=len(loads.each))
+    found, share, unstable = borne(system, q, loads, t)
+    if share == 1.0:
+        return found
+    if unstable:
+        text = f"no stable static equilibrium: beyond {share:.4g} of the loads a link buckles"
+    else:
+        text = f"no static equilibrium found beyond {share:.4g} of the loads"
+    raise NoEquilibrium(text, found, share)
 
 
 def equilibrium(equations: Any, q: np.ndarray, load: np.ndarray | None = None) -> np.ndarray:

@@ -9,8 +9,10 @@ import numpy as np
 
 from ..optional import Optional
 from ..robot import Link, Robot
+from ..signals import Loads
 from .joints import connect
 from .joints.mesh import Mesh
+from .link_loads import LinkLoads
 from .links.ancf import CableLink
 from .links.geometrically_exact import GeometricallyExactLink
 from .links.part import Frame, Ground, Lump, Part, PointMass
@@ -19,6 +21,7 @@ from .links.rigid import RigidLink
 
 exu = Optional("exudyn")
 eii = Optional("exudyn.itemInterface")
+NO_LOADS = Loads()
 BEAMS = {"ancf": CableLink, "ge": GeometricallyExactLink}
 
 
@@ -30,7 +33,7 @@ class TwinModel:
     indices of part i's coordinates in the system. `slides[i]`: index of the position of a joint
     that slides on a flexible link, `rotors[i]`: of the rotor behind a transmission, else None.
     `reference`: the system's coordinates before any displacement. `container` owns `mbs` and must
-    live as long.
+    live as long. `loads`: on its links.
 
     Exudyn's own sum of reference and displacement, GetODE2CoordinatesTotal, corrupts memory from
     about 100 coordinates on (1.13.6).
@@ -46,6 +49,7 @@ class TwinModel:
     mesh: Mesh
     reference: np.ndarray
     container: Any
+    loads: LinkLoads
 
     @property
     def reach(self) -> float:
@@ -66,6 +70,8 @@ def build(
     gains: np.ndarray,
     guided: np.ndarray | None = None,
     held: bool = False,
+    loads: Loads = NO_LOADS,
+    since: float = 0.0,
 ) -> TwinModel:
     """Build a robot, straight at its start.
 
@@ -77,6 +83,8 @@ def build(
         gains: of the joints' PD controllers (n, 2).
         guided: which joints follow a prescribed motion (n,); None: none does.
         held: all joints stay at their start.
+        loads: forces and moments on links.
+        since: the loads' time at Exudyn's time 0 [s].
     """
 
     container = exu.SystemContainer()
@@ -110,6 +118,7 @@ def build(
         parts.append(part)
         nodes.append(node)
         previous, length = part, link.length_m
+    on_links = LinkLoads(mbs, parts, loads, since)
     mbs.Assemble()
     index = [
         np.concatenate([_coordinate_rows(mbs, node, part.width) for node in part.nodes])
@@ -122,7 +131,7 @@ def build(
     ]
     reference = np.array(mbs.systemData.GetODE2Coordinates(exu.ConfigurationType.Reference))
     return TwinModel(
-        robot, mbs, parts, coordinates, index, slides, rotors, mesh, reference, container
+        robot, mbs, parts, coordinates, index, slides, rotors, mesh, reference, container, on_links
     )
 
 

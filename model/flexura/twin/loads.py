@@ -144,13 +144,9 @@ class Loads:
         """
         self.model, self.act, self.step_s, self.stop = model, act, step_s, stop
         self.applied = np.zeros((len(model.coordinates), 3))
-        self.edges: dict[int, list[float]] = {}
-        for t in (
-            []
-            if act.breaks is None
-            else act.breaks[(act.breaks > 0) & (act.breaks <= (steps + 0.5) * step_s)]
-        ):
-            self.edges.setdefault(round(t / step_s), []).append(t)
+        end = (steps + 0.5) * step_s
+        self.edges = _edges([] if act.breaks is None else act.breaks, step_s, end)
+        self.link_edges = _edges(model.loads.breaks, step_s, end)
         if act.plan is not None:
             self._apply(act.plan(0.0))
         else:
@@ -158,18 +154,28 @@ class Loads:
 
     def before_step(self, t: float) -> None:
         """Set what acts in the step that ends at t [s]."""
+        on_links = self.model.loads
+        if on_links.loads:
+            jumps = self.link_edges.get(round(t / self.step_s), [])
+            on_links.apply(self._mean(on_links.values, t, jumps))
         if self.act.plan is None:
             return
         inside = [t] if self.act.breaks is None else self.edges.get(round(t / self.step_s))
         if not inside:
             self._apply(self.act.plan(t))
             return
-        edges = np.array([t - self.step_s / 2, *inside, t + self.step_s / 2])
-        weights, middles = np.diff(edges) / self.step_s, (edges[1:] + edges[:-1]) / 2
-        mean = sum(w * self.act.plan(m) for w, m in zip(weights, middles, strict=True))
+        mean = self._mean(self.act.plan, t, inside)
         if self.act.guided is not None:
             mean[self.act.guided] = self.act.plan(t)[self.act.guided]
         self._apply(mean)
+
+    def _mean(self, plan: Callable[[float], np.ndarray], t: float, jumps: list[float]) -> Any:
+        """A plan's values in the step that ends at t [s]: without jumps those at t."""
+        if not jumps:
+            return plan(t)
+        edges = np.array([t - self.step_s / 2, *jumps, t + self.step_s / 2])
+        weights, middles = np.diff(edges) / self.step_s, (edges[1:] + edges[:-1]) / 2
+        return sum(w * plan(m) for w, m in zip(weights, middles, strict=True))
 
     def _apply(self, values: Any) -> None:
         mbs = self.model.mbs
@@ -209,6 +215,15 @@ class Loads:
             self.model.mbs.SetLoadParameter(
                 number, "loadUserFunction", first if i == 0 else lambda mbs, t, load, i=i: forces[i]
             )
+
+
+def _edges(breaks: Any, step_s: float, end: float) -> dict[int, list[float]]:
+    """Breaks in (0, end] by the number of the step [s] that they are next to."""
+    out: dict[int, list[float]] = {}
+    for t in breaks:
+        if 0 < t <= end:
+            out.setdefault(round(t / step_s), []).append(float(t))
+    return out
 
 
 class Sensors:

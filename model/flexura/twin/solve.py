@@ -14,13 +14,16 @@ import numpy as np
 from ..errors import FlexuraError, InputError, guarded
 from ..io import Run, array, check_progress, choice, judged, number, whole
 from ..optional import Optional
-from ..robot import MAX_ELEMENTS, robot_of
+from ..robot import MAX_ELEMENTS, Robot, robot_of
+from ..signals import LoadsLike, PayloadsLike, as_loads, as_payloads
 from .build import TwinModel, build
 from .channels import channels
 from .extrapolation import LENGTH_FACTOR, extrapolate
 from .joints.mesh import check_supported, mesh, slide_range, sliding_kinds
 from .links import ancf, geometrically_exact
 from .loads import Actuation, Loads, actuation
+from .payload_changes import End, in_parts, later
+from .payload_changes import put as put_state
 from .start import at_positions, equilibrium, put, resolve_start, start_speeds
 from .steps import Steps, plan_steps, suggest_step
 
@@ -50,6 +53,8 @@ def simulate(
     qd0: Any = None,
     *,
     start: str | None = None,
+    loads: LoadsLike = None,
+    payloads: PayloadsLike = None,
     beam: str = "ancf",
     elements: int | None = None,
     step_s: float | None = None,
@@ -74,6 +79,8 @@ def simulate(
         start: "static", links in equilibrium with the joints held, which is the default under
             gravity, or "straight". Joints keep the velocities qd0, but a robot with a joint that
             slides on a flexible link must be at rest. `meta["start"]` says which was used.
+        loads: forces and moments on links, as in `flexura.simulate`; on a "ge" beam at its nodes.
+        payloads: changes of the payload, as in `flexura.simulate`.
         beam: "ancf" (ObjectANCFCable2D, Euler-Bernoulli) or "ge" (ObjectBeamGeometricallyExact2D of
             three nodes, with shear).
         elements: beam elements a flexible link; None: twice the robot file's and at least 8, or 32
@@ -120,30 +127,42 @@ def simulate(
         on = act.plan(0.0)
         robot = at_positions(robot, np.where(act.guided, on[:, 1], robot.start))
         speeds = np.where(act.guided, on[:, 2], speeds)
+    lengths = [link.length_m for link in robot.links]
+    on_links = as_loads(loads, lengths, 0.0, float(t[-1]))
+    changes = as_payloads(payloads, 0.0, float(t[-1])) if payloads else ()
+    if changes and beam == "ge" and any(link.flexible for link in robot.links):
+        expected = 'expected "ancf" where the payload of a flexible link changes'
+        raise InputError(expected, key="beam", value=beam)
     begins = resolve_start(robot, start, speeds)
     kinds = sliding_kinds(robot) if hub_length_m is None else []
     share, report = 1 / (1 + len(kinds)), progress or (lambda fraction: None)
 
     def run(number: int, times: dict[str, float], longest: float) -> Run:
         shape = mesh(robot, elements, hub_length_m, times)
-        bent = equilibrium(robot, beam, shape) if begins == "static" else None
+        bent = equilibrium(robot, beam, shape, on_links) if begins == "static" else None
 
-        def new() -> TwinModel:
-            model = build(robot, beam, shape, speeds, act.gains, act.guided)
-            if bent is not None:
-                put(model, bent, speeds)
-            return model
+        def model_of(carrier: Robot, begin: float) -> TwinModel:
+            return build(
+                carrier, beam, shape, speeds, act.gains, act.guided, loads=on_links, since=begin
+            )
 
-        tries = 1 if step_s else ATTEMPTS
-        return _run(
-            new,
-            act,
-            t,
-            longest,
-            tries,
-            lambda fraction: report((number + fraction) * share),
-            PROGRAMS[beam],
-        )
+        def part(carrier: Robot, begin: float, state: End | None, at: np.ndarray) -> Any:
+            def new() -> TwinModel:
+                model = model_of(carrier, begin)
+                if state is not None:
+                    put_state(model, state)
+                elif bent is not None:
+                    put(model, bent, speeds)
+                return model
+
+            def told(fraction: float) -> None:
+                reached = 1.0 if t[-1] == 0 else (begin + fraction * at[-1]) / t[-1]
+                report((number + reached) * share)
+
+            tries = 1 if step_s else ATTEMPTS
+            return _run(new, later(act, begin), at, longest, tries, told, PROGRAMS[beam])
+
+        return in_parts(robot, changes, t, model_of, part, _settings(1.0, 1))
 
     with _quiet():
         coarse = mesh(robot, COARSE_ELEMENTS, hub_length_m)
@@ -175,10 +194,10 @@ def _run(
     tries: int,
     progress: Callable[[float], None],
     program: str,
-) -> Run:
+) -> tuple[Run, End]:
     """Simulate with steps of at most `longest` [s]; they are halved if Exudyn fails.
 
-    With one try, the step is the user's and stays.
+    With one try, the step is the user's and stays. The run, and where it ended.
     """
 
     for attempt in range(tries):
@@ -189,6 +208,8 @@ def _run(
         except DidNotConverge:
             if attempt == tries - 1:
                 raise
+    data = np.array(model.mbs.systemData.GetDataCoordinates())
+    end = End(record[1][-1], record[2][-1], data)
     at, *columns = (np.array(column) for column in record[:4])
     t, q, v = steps.at_times(t, at, *columns)
     q += model.reference
@@ -207,7 +228,7 @@ def _run(
         "labels": [f"joint/{i}" for i in range(1, len(model.parts) + 1)],
         "hub_length_m": model.mesh.hubs,
     }
-    return judged(Run(t, values, units, meta))
+    return judged(Run(t, values, units, meta)), end
 
 
 def _times(t_eval: Any) -> np.ndarray:

@@ -11,7 +11,7 @@ from ..errors import FlexuraError, InputError
 from ..io import array, choice
 from ..optional import Optional
 from ..robot import Robot
-from ..signals import STARTS
+from ..signals import STARTS, Loads
 from .build import TwinModel, build
 from .joints.mesh import Mesh, sliding_kinds
 
@@ -74,13 +74,14 @@ def resolve_start(robot: Robot, start: Any, speeds: np.ndarray) -> str:
     return str(which)
 
 
-def equilibrium(robot: Robot, beam: str, mesh: Mesh) -> np.ndarray:
+def equilibrium(robot: Robot, beam: str, mesh: Mesh, loads: Loads) -> np.ndarray:
     """The coordinates of a robot in static equilibrium, without the reference.
 
     Args:
         robot: the robot, with its joints at their start.
         beam: "ancf" or "ge".
         mesh: elements, hubs and sleeves.
+        loads: on links, as they are at time 0.
 
     Returns:
         Displacements of all coordinates.
@@ -90,7 +91,7 @@ def equilibrium(robot: Robot, beam: str, mesh: Mesh) -> np.ndarray:
     """
     n = len(robot.links)
     for steps in LOAD_STEPS:
-        model = build(robot, beam, mesh, np.zeros(n), np.zeros((n, 2)), held=True)
+        model = build(robot, beam, mesh, np.zeros(n), np.zeros((n, 2)), held=True, loads=loads)
         try:
             if model.mbs.SolveStatic(_settings(model, steps)):
                 return np.array(model.mbs.systemData.GetODE2Coordinates())

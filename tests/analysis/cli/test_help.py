@@ -8,8 +8,11 @@ import pytest
 from commands import commands, examples, run
 
 COMMANDS = {" ".join(words): command for words, command in commands()}
-FASTER = {"tune": ["--population", "8", "--generations", "1"]}  # beside what the example says
-SLOW = {"flash", "demo", "compare", "identify", "doctor", "vibration"}
+FASTER = {
+    "tune": ["--population", "8", "--generations", "1"],
+    "learn": ["--trials", "1"],
+}  # beside what the example says
+SLOW = {"flash", "demo", "compare", "identify", "doctor", "vibration", "learn"}
 SLOW |= {name for name in COMMANDS if name.startswith("bench ")}
 # what an example goes on from; {name} is the folder of the command's own example
 FIRST = ["simulate", "rig", "rig-inverse-law"]

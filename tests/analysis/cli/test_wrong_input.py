@@ -228,6 +228,7 @@ GOOD = {
     "study": ["payload", "robot.toml", "law.toml"],
     "tune": ["robot.toml", "law.toml", "--controller", "gains.toml"],
     "identify": ["run"],
+    "learn": ["rig-r", "rig-r-swing"],
     "compare": ["run"],
     "review": ["run"],
     "export": ["run", "--to", "csv"],
@@ -294,6 +295,13 @@ OPTIONS = {
         "--vibration": ("nan", "-1"),
         "--out": ("robot.toml", "run", "/dev/null/x"),
         "--jobs": ("0",),
+    },
+    "learn": {
+        "--trials": ("0", "-1", "x", "1.5"),
+        "--gains": ("absent.toml", "law.toml"),
+        "--model": ("absent", "robot.toml"),
+        "--calibration": ("absent.toml", "."),
+        "--out": ("robot.toml", "run", "/dev/null/x"),
     },
     "identify": {"--check": ("absent",), "--by": ("guess",), "--out": ("robot.toml", ".")},
     "compare": {

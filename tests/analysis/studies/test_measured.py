@@ -13,7 +13,9 @@ import pytest
 
 import flexura as fx
 from commands import run as command
+from flexlab.identification.fit.model import low_pass
 from flexlab.studies.measured import GAUGE, measured, ring
+from flexlab.studies.measured_fit import FILTER, angle_per_strain, measured_fit
 
 
 @pytest.fixture
@@ -64,6 +66,25 @@ def test_the_data_sheet_is_within_7_percent_of_every_measured_step(data):
         assert 1.79 < found < 1.88 and abs(own / found - 1) < 0.07, path.name
 
 
+@pytest.mark.slow
+def test_fitted_to_one_run_it_predicts_the_others(data):
+    robot = fx.load("quanser-2dsfl")
+    fit = measured_fit(robot, measured(robot, data))
+    assert fit.name == "lqg_step_10deg_run01" and len(fit.runs) >= 6
+    for run in fit.runs:
+        assert abs(run.deviation) < 0.02, run.name
+        assert run.rms_of_peak < 0.10, run.name
+
+
+def test_the_makers_filter_and_conversion_are_those_of_its_file(data):
+    from scipy.io import loadmat
+
+    made = loadmat(data / "lqr_full_10deg.mat", squeeze_me=True)
+    assert made["wcfa"] / (2 * np.pi) == pytest.approx(FILTER[f"{GAUGE}.cutoff_Hz"])
+    assert made["zetaf"] == FILTER[f"{GAUGE}.cutoff_ratio"]
+    assert made["K1_defl_b"] == pytest.approx(angle_per_strain(fx.load("quanser-2dsfl")))
+
+
 @pytest.fixture
 def written(tmp_path):
     """Step runs of a stiffer strip, written as the published ones are."""
@@ -74,7 +95,8 @@ def written(tmp_path):
     motion = fx.signals.cycloid(0.3, 0.4)
     hub = np.array([motion(x)[0] for x in t])
     run = fx.simulate(stiff, t, fx.Drive.prescribed(motion))
-    angle = 2 * run["link/1/tip_deflection"] / 0.202 - 2 / 3 * run["link/1/tip_slope"]
+    strain = run["sensor/strain_gauge"]
+    angle = low_pass(t, 0.202 / (3 * 0.000635) * strain, 2.0, 0.9)
     (tmp_path / "lqg").mkdir()
     path = tmp_path / "lqg" / "lqg_step_17deg_run01.mat"
     savemat(path, {"time": t[:, None], "theta11": hub[:, None], "theta12": angle[:, None]})
@@ -91,6 +113,12 @@ def test_the_study_finds_a_stiffer_strip_by_its_ring(written, tmp_path):
     assert row["simulated_deviation"] == pytest.approx(ratio - 1, abs=2e-3)
     assert row["held_deviation"] == pytest.approx(ratio - 1, abs=4e-3)
     assert (out / "measured.png").stat().st_size > 10_000
+    fit = json.loads((out / "measured.json").read_text())["identified"]
+    modulus, ratio, gain = (row["value"] for row in fit["parameters"])
+    assert modulus == pytest.approx(2.2e11, rel=1e-3) and ratio < 0.01
+    assert gain == pytest.approx(106.0367, rel=1e-3)
+    assert abs(fit["runs"][0]["deviation"]) < 1e-3 and fit["runs"][0]["rms_of_peak"] < 1e-2
+    assert fx.load(out / "identified.toml").links[0].young_modulus_Pa == modulus
     folder = out / written.stem
     assert (folder / "review.rrd").is_file() and GAUGE in fx.Run.read(folder / "experiment")
 

@@ -205,6 +205,7 @@ class Exponential : public Method<Real> {
   static int extras_of(const Integration<Real> &c) {
     int count = 0;
     for (int i = 0; i < c.plant.joints; ++i) count += !given_motion(c, i);
+    if (c.acts.has_loads()) count += c.n - c.plant.joints;
     return EnergyIntegrals<Real>::extras(count) + 3 * c.n + 1;
   }
   static std::vector<typename EnergyIntegrals<Real>::Joint> free_joints(
@@ -219,6 +220,11 @@ class Exponential : public Method<Real> {
       }
       out.push_back(j);
     }
+    if (!c.acts.has_loads()) return out;
+    std::vector<bool> elastic(std::size_t(c.n), true);
+    for (int i = 0; i < c.plant.joints; ++i) elastic[std::size_t(c.plant.first[i])] = false;
+    for (int e = 0; e < c.n; ++e)  // whose forces of loads work too
+      if (elastic[std::size_t(e)]) out.push_back({e, 0.0, 0.0, 0.0});
     return out;
   }
   static bool slides(const Plant<Real> &plant) {
@@ -246,11 +252,14 @@ class Exponential : public Method<Real> {
     int free = 0;
     for (int i = 0; i < c.plant.joints; ++i) {
       const int e_ = c.plant.first[i];
+      const Real force = c.acts.drive(i, q, v) + c.acts.on_unknown(e_);
       if (!held[e_])
-        forces[free++] = c.acts.drive(i, q, v);
+        forces[free++] = force;
       else if (!c.plant.locked[i])
-        given += c.acts.drive(i, q, v) * v[e_];
+        given += force * v[e_];
     }
+    for (; free < int(accounts.free_joints().size()); ++free)
+      forces[free] = c.acts.on_unknown(accounts.free_joints()[std::size_t(free)].row);
     Real *keep = steps.extra(row) + steps.extras - 3 * n - 1;
     keep[3 * n] = accounts.record(steps.extra(row), forces, q, v, ed, slope[2 * n + LOSS], given);
     std::copy(slope + n, slope + 2 * n, keep);

@@ -122,8 +122,29 @@ std::vector<std::vector<double>> outputs_of_modes(Integration<Real> &c,
   return seen;
 }
 
-// Forces on the modes of robot k (loads, n): of each joint's drive at its largest (or of what its
-// prescribed motion shakes), and what is out of balance at q. `harmonic`: the highest frequency in
+// Adds the forces on the modes of robot k of each force and moment on a link, at its largest.
+template <class Real>
+void add_loads_on_links(Integration<Real> &c, const ModalBasis<Real> &modes, int k, const Real *q,
+                        double t, std::vector<std::vector<double>> &loads, double &harmonic) {
+  if (!c.acts.has_loads()) return;
+  const std::size_t size = std::size_t(c.n), count = c.acts.acting(k).loads.size();
+  for (std::size_t a = 0; a < 3 * count; ++a) {
+    const Extremes most = extremes(c.acts.acting(k).loads[a / 3].value[a % 3], t, 0.0);
+    harmonic = larger(harmonic, most.frequency);
+    if (!(most.value > 0.0)) continue;
+    std::vector<Real> value(3 * count, Real(0.0)), force(size, Real(0.0));
+    value[a] = Real(most.value);
+    c.acts.loads_at(q, value.data(), force.data());
+    loads.emplace_back(size, 0.0);
+    for (std::size_t mode = 0; mode < size; ++mode)
+      for (std::size_t i = 0; i < size; ++i)
+        loads.back()[mode] +=
+            lane(modes.phi[mode * std::size_t(modes.stride) + i] * force[i], k);
+  }
+}
+
+// Forces on the modes of robot k (loads, n): of each joint's drive and load at its largest (or of what
+// a prescribed motion shakes), and what is out of balance at q. `harmonic`: the highest frequency in
 // a signal [rad/s]; m: its matrices; held (n): rows of given motions.
 template <class Real>
 std::vector<std::vector<double>> loads_on_modes(Integration<Real> &c, const ModalBasis<Real> &modes,
@@ -152,6 +173,7 @@ std::vector<std::vector<double>> loads_on_modes(Integration<Real> &c, const Moda
     }
     loads.push_back(load);
   }
+  add_loads_on_links(c, modes, k, q, t, loads, harmonic);
   std::vector<Real> zero(size, Real(0.0)), rest(size), none(count, Real(0.0)), reaction(count);
   std::vector<char> fixed(count, 0);
   for (int i = 0; i < joints; ++i) fixed[i] = given_motion(c, i);

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...signals import Drive, Signal
+from ...signals import Drive, Loads, Signal
 from ...system import System
 from ...system.assembly import COULOMB_RATE, Terms
 
@@ -18,12 +18,15 @@ class Equations:
     Args:
         system: the robot.
         drive: a Drive, a function of four arguments, or None where `held` has the forces.
+        loads: forces and moments on links.
     """
 
-    def __init__(self, system: System, drive: Drive | Callable[..., np.ndarray] | None) -> None:
+    def __init__(
+        self, system: System, drive: Drive | Callable[..., np.ndarray] | None, loads: Loads
+    ) -> None:
         from scipy.linalg.lapack import dposv
 
-        self.system, self.drive = system, drive
+        self.system, self.drive, self.loads = system, drive, loads
         # the latest time [s] at which signals are read, just before the next break
         self.until = np.inf
         self.held: np.ndarray | None = None  # forces (N,) of a sampled drive since the last tick
@@ -60,8 +63,8 @@ class Equations:
         return self.acted(t, z)[0]
 
     def acted(self, t: float, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """dz/dt, and the forces of the drives (N,), those that a motion needs included (25), (27),
-        (28)."""
+        """dz/dt, and the forces of the drives (N,), those that a motion needs included (25), (28),
+        (132)."""
         q, v, a = self.state(t, z)
         self.evaluations += 1
         if self.held is not None:
@@ -80,6 +83,11 @@ class Equations:
         if len(self.given):
             left -= terms.mass @ a
         left[self.rows] += force
+        pushed = np.zeros(self.n)
+        if self.loads:
+            values = self.loads.values(min(t, self.until))
+            pushed = self.system.assembly.loads(q, self.loads.rows, values)
+            left += pushed
         if len(free):
             _, a[free], singular = self._solve(
                 terms.mass if self._square else terms.mass[self._pick], left[free]
@@ -89,9 +97,9 @@ class Equations:
         rates = np.concatenate([v, a, [0.0, v @ lost, terms.elastic @ v]])
         if len(self.given):
             row = self.rows[self.given]
-            force[self.given] = (terms.mass @ a + terms.forces + terms.elastic + lost)[row]
+            force[self.given] = (terms.mass @ a + terms.forces + terms.elastic + lost - pushed)[row]
             rates[row] = rates[self.n + row] = 0.0
-        rates[2 * self.n] = force @ v[self.rows]
+        rates[2 * self.n] = force @ v[self.rows] + pushed @ v
         return rates, force
 
     def energy(self) -> float:

@@ -66,6 +66,7 @@ class Integration:
             problem.method,
         )
         self.t, self.drive, self.rtol, self.progress = t, drive, rtol, progress
+        self.loads = problem.loads
         self.ends, self.ended, self.budget = problem.ends, False, problem.budget
         self.ticks, marks, self.span = np.zeros(0), np.zeros(0), float(t[-1] - t[0])
         self.longest = (
@@ -77,10 +78,14 @@ class Integration:
         if isinstance(drive, Drive):
             marks, self.longest = drive.breaks, min(self.longest, PART * drive.shortest_period)
         elif isinstance(drive, Sampled):
-            self.sampled = DriveFunction(drive.function, len(system.joint_rows))
+            self.sampled = DriveFunction(
+                drive.function, len(system.joint_rows), system, problem.loads
+            )
             self.ticks = marks = (
                 t[0] + np.arange(np.floor(self.span * drive.rate_Hz) + 1) / drive.rate_Hz
             )
+        self.longest = min(self.longest, PART * self.loads.shortest_period)
+        marks = np.concatenate([marks, self.loads.breaks])
         self.marks = [*np.unique(marks[(marks > t[0]) & (marks < t[-1])]), t[-1]]
         self.now, self.z = float(t[0]), np.concatenate([problem.q, problem.qd, np.zeros(3)])
         self.length: float | None = None  # of the last step
@@ -106,7 +111,8 @@ class Integration:
         slides = [link.joint.type != "R" for link in system.robot.links]
         stops = np.isfinite(system.limits).any(axis=1) | slides
         self._bounded = [i for i in range(len(self.rows)) if stops[i] and not system.locked[i]]
-        self.equations = Equations(system, None if isinstance(self.drive, Sampled) else self.drive)
+        drive = None if isinstance(self.drive, Sampled) else self.drive
+        self.equations = Equations(system, drive, self.loads)
         self.exponential = Exponential(self.equations, self.span, self.longest)
 
     def run(self) -> Solution:
@@ -217,8 +223,12 @@ class Integration:
             self.equations.until = np.nextafter(self.marks[0], -np.inf)
         if np.any(np.abs(self.ticks - self.now) <= 1e-12 * max(abs(self.now), 1e-3)):
             q, v, _ = self.equations.state(self.now, self.z)
-            self.equations.held = self.sampled(
-                self.now, q[self.rows], v[self.rows], self.equations.deflection(q)
+            self.equations.held = (
+                np.asarray(self.sampled.function(self.now, q, v))
+                if self.sampled.of_state
+                else self.sampled(
+                    self.now, q[self.rows], v[self.rows], self.equations.deflection(q)
+                )
             )
 
     def _solve(self, end: float) -> tuple[int, bool] | tuple[()] | None:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,7 +19,6 @@ from .posture import exact_system
 from .variation import stage_times, variation
 
 SHARE = 1e-4  # of a parameter: the step of its differences, at a state that is the same
-STEP = 1e-6  # of a state, along a derivative: from states to channels
 RTOL = 1e-10
 
 
@@ -97,30 +95,18 @@ def parameter_derivatives(
 
 def _changed(robot: Robot, key: str, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
     """The derivative of the forces of a motion (T, n) by a number of the robot."""
-    value = _value(robot, key)
-    other = lambda x: assemble(robot.replace({key: x})).equations.force_derivatives(q, v, a)[0]
+    return _slope(robot, key, lambda system, _: system.equations.force_derivatives(q, v, a)[0])
+
+
+def _slope(robot: Robot, key: str, of: Callable[[System, float], np.ndarray]) -> np.ndarray:
+    """The derivative, by a number of the robot, of what robots and their steps of it give."""
+    value = robot.value(key)
+    at = lambda step: of(assemble(robot.replace({key: value + step})), step)
     if value:
         step = SHARE * abs(value)
-        return np.asarray((other(value + step) - other(value - step)) / (2 * step))
+        return np.asarray((at(step) - at(-step)) / (2 * step))
     # below 0 there may be no robot
-    step = SHARE
-    return np.asarray((4 * other(step) - 3 * other(0.0) - other(2 * step)) / (2 * step))
-
-
-def _value(robot: Robot, key: str) -> float:
-    """A number of the robot, by its key as in `Robot.replace`."""
-    expected = "expected the key of a number that the robot has, as payload.mass_kg"
-    found: Any = robot
-    for part in key.split("."):
-        try:
-            found = (
-                found[int(part) - 1] if isinstance(found, list | tuple) else getattr(found, part)
-            )
-        except (AttributeError, IndexError, ValueError):
-            raise InputError(expected, key="parameters", value=key) from None
-    if isinstance(found, bool) or not isinstance(found, int | float):
-        raise InputError(expected, key="parameters", value=key)
-    return float(found)
+    return np.asarray((4 * at(SHARE) - 3 * at(0.0) - at(2 * SHARE)) / (2 * SHARE))
 
 
 def _channels(
@@ -132,12 +118,13 @@ def _channels(
     dq: np.ndarray,
     dv: np.ndarray,
 ) -> Run:
-    """Changes of states as changes of the channels that depend on the state alone."""
-    size = max(float(np.abs(dq).max()), float(np.abs(dv).max()), 1e-300)
-    h = STEP / size
-    up, down = (
-        system.observe(np.ascontiguousarray(q + s * h * dq), np.ascontiguousarray(v + s * h * dv))
-        for s in (1, -1)
+    """Changes of states, and of the robot, as changes of the channels that the core reads."""
+    seen = _slope(
+        system.robot,
+        key,
+        lambda other, step: np.asarray(
+            other.observe(np.ascontiguousarray(q + step * dq), np.ascontiguousarray(v + step * dv))
+        ),
     )
     channels: dict[str, np.ndarray] = {}
     units: dict[str, str] = {}
@@ -148,6 +135,6 @@ def _channels(
     known = channel_units(system.robot)
     for k, name in enumerate(recorded_channels(system.robot)):
         if not name.startswith("energy"):
-            channels[name], units[name] = (up[:, k] - down[:, k]) / (2 * h), known[name]
+            channels[name], units[name] = seen[:, k], known[name]
     meta = {"source": "derivative", "program": "flexura", "parameter": key}
     return Run(t, channels, units, meta | {"robot": system.robot.to_dict(), "events": []})

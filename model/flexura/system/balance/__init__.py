@@ -1,9 +1,10 @@
 """Forces within a robot, from the balance of what lies beyond a cut: (121) to (128)."""
 
-from .cuts import Balance, Load, Reaction, SectionForces
+from .cuts import Balance, PointLoad, Reaction, SectionForces
 from .internal_forces import (
     InternalForces,
     LinkForces,
+    balances,
     check_continuous,
     internal_forces,
     sections_known,
@@ -13,9 +14,10 @@ __all__ = [
     "Balance",
     "InternalForces",
     "LinkForces",
-    "Load",
+    "PointLoad",
     "Reaction",
     "SectionForces",
+    "balances",
     "check_continuous",
     "internal_forces",
     "sections_known",

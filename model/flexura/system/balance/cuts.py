@@ -19,14 +19,15 @@ from .motion import LinkMotion, link_motions
 SAME = 1e-9  # of a link's length: what is closer to a cut is at it
 
 
-class Load(NamedTuple):
-    """A load from outside on link `link` (from 0), at the abscissa `at` [m]: force x + iy [N] in
-    the base's axes and moment [N m], constant or (T,)."""
+class PointLoad(NamedTuple):
+    """A load from outside on link `link` (from 0), at the abscissa `at` [m]: force x + iy [N] and
+    moment [N m], constant or (T,). `turns`: the force is along and across the line there (131)."""
 
     link: int
     at: float
     force: Any = 0j
     moment: Any = 0.0
+    turns: bool = False
 
 
 class Reaction(NamedTuple):
@@ -60,7 +61,7 @@ class Balance:
         q: np.ndarray,
         qd: np.ndarray,
         qdd: np.ndarray,
-        loads: Sequence[Load] = (),
+        loads: Sequence[PointLoad] = (),
     ) -> None:
         self.structure, self.robot, self.loads = structure, structure.robot, loads
         self.q, self.gravity = q, complex(*structure.robot.gravity_m_s2)
@@ -180,8 +181,10 @@ class Balance:
         out = total([], len(self.q))
         for load in self.loads:
             if load.link == motion.number:
-                moment = cross(motion.at(load.at).place, load.force) + load.moment
-                out = out.less(Wrench(load.force, moment).where(load.at >= s))
+                place = motion.at(load.at)
+                force = load.force * (place.tangent if load.turns else 1.0)
+                moment = cross(place.place, force) + load.moment
+                out = out.less(Wrench(force, moment).where(load.at >= s))
         return out
 
     def _fixed_beyond(self, i: int, s: Any) -> Wrench:

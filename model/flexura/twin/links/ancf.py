@@ -81,7 +81,7 @@ class CableLink:
             _add_element(mbs, values, k - first, pair, size)
             for k, (pair, size) in enumerate(zip(self.pairs, self.lengths, strict=True))
         ]
-        own = elements[first : first + count]
+        self.own = own = elements[first : first + count]
         for element in own:
             add_gravity(mbs, element, gravity)
         for node, lump in ((self.nodes[0], hub), (self.nodes[-1], payload)):
@@ -150,6 +150,34 @@ class CableLink:
         """See `Part`."""
         k, value, _ = self._place(x)
         return np.einsum("k,tkd->td", value, _elements(q)[:, k])
+
+    def axial_rates(self, q: np.ndarray) -> np.ndarray:
+        """The rates of stretch that an inextensible line does not have, as rows on the rates.
+
+        Args:
+            q: coordinates of the part's nodes (k,).
+
+        Returns:
+            Rows (2 elements + 1, k): r' . v' at the nodes, and its mean on the elements.
+        """
+        count, length = len(self.values), self.values.length
+        nodes, rows = q.reshape(-1, 4), np.zeros((2 * count + 1, len(q)))
+        for k, node in enumerate(nodes):
+            rows[k, 4 * k + 2 : 4 * k + 4] = node[2:]
+        for k in range(count):
+            own = q[4 * k : 4 * k + 8].reshape(4, 2)
+            for u, w in zip(*_BENDING, strict=True):
+                first = _shapes((u + 1) / 2, length)[1]
+                rows[count + 1 + k, 4 * k : 4 * k + 8] += (
+                    0.5 * w * np.outer(first, first @ own).ravel()
+                )
+        return rows
+
+    def marker_at(self, mbs: Any, x: float) -> Any:
+        """See `Part`."""
+        k = self._place(x)[0]
+        place = [x - k * self.values.length, 0.0, 0.0]
+        return mbs.AddMarker(eii.MarkerBodyRigid(bodyNumber=self.own[k], localPosition=place))
 
     def kinetic(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """See `Part`."""

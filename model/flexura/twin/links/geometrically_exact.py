@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ...errors import InputError
 from ...optional import Optional
 from .part import Attachment, Frame, Lump, Motion, PointMass, add_gravity
 from .properties import BeamValues
@@ -101,6 +102,17 @@ class GeometricallyExactLink:
         """See `Part`."""
         k, value = self._place(x)
         return np.einsum("k,tkd->td", value, _elements(q)[:, k, :, :2])
+
+    def marker_at(self, mbs: Any, x: float) -> Any:
+        """See `Part`. Exudyn's elements of this kind have no markers between their nodes."""
+        half = 0.5 * self.values.length
+        k = round(x / half)
+        if abs(x - k * half) > 1e-9 * half * len(self.nodes):
+            text = (
+                f'expected a place at a node of the beam, a multiple of {half:g} m, or beam "ancf"'
+            )
+            raise InputError(text, key="load.at_m", value=x)
+        return mbs.AddMarker(eii.MarkerNodeRigid(nodeNumber=self.nodes[k]))
 
     def kinetic(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """See `Part`."""

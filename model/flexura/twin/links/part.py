@@ -116,6 +116,18 @@ class Part(Protocol):
         """
         ...
 
+    def marker_at(self, mbs: Any, x: float) -> Any:
+        """A marker of the place and the section at a point of the link, for a load.
+
+        Args:
+            mbs: Exudyn's system.
+            x: distance from the origin [m].
+
+        Returns:
+            The marker.
+        """
+        ...
+
     def kinetic(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Kinetic energy.
 

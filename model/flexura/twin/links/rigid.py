@@ -42,7 +42,7 @@ class RigidLink:
             )
         )
         add_gravity(mbs, body, gravity)
-        self.nodes = [node]
+        self.nodes, self.body = [node], body
         self.origin, self.tip = (
             Attachment(
                 body,
@@ -63,6 +63,10 @@ class RigidLink:
     def point(self, q: np.ndarray, x: complex) -> np.ndarray:
         """See `Part`; across the link by the imaginary part of x."""
         return q[:, :2] + _turned(q[:, 2], x)
+
+    def marker_at(self, mbs: Any, x: float) -> Any:
+        """See `Part`."""
+        return mbs.AddMarker(eii.MarkerBodyRigid(bodyNumber=self.body, localPosition=[x, 0.0, 0.0]))
 
     def kinetic(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """See `Part`."""

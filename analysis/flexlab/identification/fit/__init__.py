@@ -1,0 +1,1 @@
+"""Parameters of any robot, fitted to runs: least squares of channels, with intervals."""

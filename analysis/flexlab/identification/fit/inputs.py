@@ -1,0 +1,149 @@
+"""How a run moves the model's joints: each joint has one channel of the run as its input.
+
+A position is prescribed as it was measured. A reference is what a controller follows whose gains
+are known. Any other channel is a force or torque, by its gain: the drive, a current, a voltage.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+import flexura as fx
+from flexura import signals
+from flexura.control import Gains
+from flexura.signals import COLUMNS, Signal
+
+from ...comparison.replay.smoothing import recorded_samples, resolution, smoothing_spline
+
+MOTION, FORCE, REFERENCE = "motion", "force", "reference"
+_GIVEN = re.compile(r"(?:(\d{1,3}):)?(.+)")
+_OF_JOINT = re.compile(r"joint/(\d{1,3})/(\w+)")
+# standard deviation of third differences of a white noise, and of the median's size
+_THIRD, _MEDIAN = np.sqrt(20.0), 0.674490
+
+
+@dataclass(frozen=True)
+class Input:
+    """What moves joint `joint` (from 1): a channel, as MOTION, FORCE or REFERENCE."""
+
+    joint: int
+    channel: str
+    kind: str
+
+
+def choose(
+    run: fx.Run, robot: fx.Robot, asked: Sequence[str], controller: Gains | None
+) -> tuple[Input, ...]:
+    """The inputs of all joints that are not locked.
+
+    Args:
+        run: the run.
+        robot: the robot.
+        asked: channels as joint/1/drive, or 1:CHANNEL for one that does not name its joint.
+        controller: gains, for references.
+
+    Returns:
+        One a joint. Without a wish: the reference under a controller, else the measured position,
+        else the drive.
+
+    Raises:
+        InputError: a channel is missing, or is none for a joint.
+    """
+    found: dict[int, Input] = {}
+    for text in asked:
+        joint, channel = _parsed(text, len(robot.links))
+        if channel not in run:
+            raise _missing(run, channel, "--input")
+        if joint in found:
+            raise fx.InputError(f"expected one input of joint {joint}", key="--input", value=text)
+        found[joint] = Input(joint, channel, _kind(robot, joint, channel, controller))
+    for i, link in enumerate(robot.links, 1):
+        if i in found or link.joint.locked:
+            continue
+        names = ["reference"] if controller else ["position", "drive"]
+        if not controller and link.joint.transmission is not None:
+            names[0] = "motor_position"
+        channel = next((f"joint/{i}/{n}" for n in names if f"joint/{i}/{n}" in run), "")
+        if not channel:
+            raise fx.InputError(
+                f"nothing moves joint {i}: expected a channel joint/{i}/{names[0]}, or --input; "
+                f"the run has {', '.join(run)}",
+                key="RUN",
+            )
+        found[i] = Input(i, channel, _kind(robot, i, channel, controller))
+    return tuple(found[i] for i in sorted(found))
+
+
+def _parsed(text: str, joints: int) -> tuple[int, str]:
+    match = _GIVEN.fullmatch(text)
+    assert match is not None or not text
+    number, channel = match.groups() if match else (None, "")
+    own = _OF_JOINT.fullmatch(channel)
+    joint = int(number or (own.group(1) if own else 0))
+    if not 1 <= joint <= joints:
+        raise fx.InputError(
+            f"expected joint/N/NAME, or N:CHANNEL with N from 1 to {joints}",
+            key="--input",
+            value=text,
+        )
+    return joint, channel
+
+
+def _kind(robot: fx.Robot, joint: int, channel: str, controller: Gains | None) -> str:
+    own = _OF_JOINT.fullmatch(channel)
+    name = own.group(2) if own else ""
+    elastic = robot.links[joint - 1].joint.transmission is not None
+    if name == "motor_position" or (name == "position" and not elastic):
+        return MOTION
+    if name == "position":
+        raise fx.InputError(
+            f"expected joint/{joint}/motor_position: behind a transmission the motor is moved",
+            key="--input",
+            value=channel,
+        )
+    if name == "reference":
+        if controller is None:
+            raise fx.InputError("expected together with --controller", key="--input", value=channel)
+        return REFERENCE
+    return FORCE
+
+
+def _missing(run: fx.Run, channel: str, key: str) -> fx.InputError:
+    return fx.InputError(
+        f"the run has no such channel; it has {', '.join(run)}", key=key, value=channel
+    )
+
+
+def force_unit(robot: fx.Robot, joint: int) -> str:
+    """The unit of a joint's drive, by its number from 1."""
+    return "N m" if robot.links[joint - 1].joint.type == "R" else "N"
+
+
+def wave(run: fx.Run, given: Input) -> Signal:
+    """A run's channel as a signal: motions smoothed as far as their noise, forces as splines,
+    references from sample to sample.
+
+    Raises:
+        InputError: the channel has too few samples.
+    """
+    t, y = recorded_samples(run.t, run[given.channel], given.channel)
+    if given.kind == MOTION:
+        return smoothing_spline(t, y, resolution(y) or noise(y) * np.sqrt(12))
+    if given.kind == FORCE:
+        return signals.table(t, y)
+    rows = np.zeros((len(t), COLUMNS))
+    rows[:, 0], rows[:, 1], rows[:-1, 2] = t, y, np.diff(y) / np.diff(t)
+    return Signal(rows, {"kind": "linear", "t_s": t.tolist(), "y": y.tolist()})
+
+
+def noise(y: np.ndarray) -> float:
+    """The standard deviation of a white noise in values (T,) of a smooth quantity, from their
+    third differences."""
+    y = y[np.isfinite(y)]
+    if len(y) < 8:
+        return 0.0
+    return float(np.median(np.abs(np.diff(y, 3))) / (_MEDIAN * _THIRD))

@@ -1,0 +1,5 @@
+"""Iterative learning on the rig: a manoeuvre is repeated, and its references get better.
+
+`task` says what the tip is asked and plans a trial, `model` is what is known of the rig, `tip` is
+where the tip was, `learn` has the trials in order, `board_trials` does them, `output` tells.
+"""

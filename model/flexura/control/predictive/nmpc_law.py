@@ -1,0 +1,204 @@
+"""The law of nonlinear model predictive control, once a tick: estimate, linearise, solve, apply."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ... import core
+from ...signals import Signal, evaluate_many
+from ...system import static
+from ..measurements import Measurements
+from .prediction import Prediction
+from .quadratic_program import FREE, QuadraticProgram
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What a predictive controller minimises, and within which bounds.
+
+    Attributes:
+        T: length of a tick [s].
+        h: lengths of the intervals ahead (N,) [s], the first a tick.
+        weights: W (p, 2m): the cost is |W (x - x_r)|^2 h, and
+        effort: |(u - u_r) / effort|^2 h for the forces (inputs,),
+        end: (2m, 2m) with the last state's deviation as a quadratic form.
+        limit: of the forces (inputs,) [N or N m].
+        rows: (r, 2m), of the states of every interval, and
+        bound: their limits (r,).
+        process: covariance of what acts at the drives in a tick (inputs, inputs).
+        noise: covariance of the measurements (p, p).
+        covariance: of the first estimate (2m, 2m).
+        spread: ticks over which the intervals are linearised.
+        price: of the square of what breaks a bound of `rows`.
+    """
+
+    T: float
+    h: np.ndarray
+    weights: np.ndarray
+    effort: np.ndarray
+    end: np.ndarray
+    limit: np.ndarray
+    rows: np.ndarray
+    bound: np.ndarray
+    process: np.ndarray
+    noise: np.ndarray
+    covariance: np.ndarray
+    spread: int
+    price: float
+
+
+class NonlinearPredictive:
+    """Real-time iteration: one step of Newton's method a tick on the motion ahead (152).
+
+    `failures` counts programs without a solution, at which the motion of the tick before goes on;
+    `iterations` has those of the last program.
+    """
+
+    def __init__(
+        self,
+        prediction: Prediction,
+        problem: Problem,
+        measured: Measurements,
+        C: np.ndarray,
+        references: list[Signal],
+        driven: list[int],
+        q: np.ndarray,
+    ) -> None:
+        self.prediction, self.problem, self.measured, self.C = prediction, problem, measured, C
+        self.references, self.driven, self.links = references, driven, len(references)
+        self.q = q
+        N, m = len(problem.h), len(driven)
+        self.before, self.failures, self.iterations = np.inf, 0, 0
+        self.program = QuadraticProgram(N * m, N * len(problem.rows), problem.price)
+        root = np.sqrt(problem.h)
+        self.ahead = np.cumsum(problem.h)
+        self.W = root[:, None, None] * problem.weights
+        values, vectors = np.linalg.eigh((problem.end + problem.end.T) / 2)
+        self.end = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
+        self.R = np.repeat(problem.h, m) * np.tile(1 / problem.effort**2, N)
+        bounds = np.concatenate([np.tile(problem.limit, N), np.tile(problem.bound, N)])
+        self.bounds = np.minimum(bounds, FREE)
+        self.turn, self.one = 0, np.eye(C.shape[1])
+
+    def __call__(
+        self,
+        t: float,
+        position: np.ndarray,
+        velocity: np.ndarray,
+        tip_deflection: float,
+        *,
+        tip_deflections: np.ndarray,
+        sensors: Mapping[str, float],
+    ) -> np.ndarray:
+        """The forces (links,) at a tick [N or N m]."""
+        y = self.measured.read(position, tip_deflections, sensors)
+        if t <= self.before:
+            self._begin(t, position)
+        self.before = t
+        x = self._corrected(y)
+        self._linearised()
+        self._solved(t, x)
+        self._predicted(x)
+        force = np.zeros(self.links)
+        force[self.driven] = self.u[0]
+        self._shifted()
+        return force
+
+    def _begin(self, t: float, position: np.ndarray) -> None:
+        """At rest, where the joints are measured."""
+        p, N = self.prediction, len(self.problem.h)
+        rest, hold = self._equilibrium(tuple(position))
+        self.x, self.u = np.tile(rest, (N + 1, 1)), np.tile(hold, (N, 1))
+        self.a = np.zeros((N, p.count))
+        self.guess, self.S = rest.copy(), self.problem.covariance
+        self.known: tuple[Any, ...] | None = None
+
+    def _equilibrium(self, joints: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
+        """The state (2m,) at rest with the joints somewhere, and the forces (inputs,) that hold."""
+        system, p = self.prediction.system, self.prediction
+        q = np.array(self.q)
+        q[system.joint_rows] = joints
+        if any(system.robot.gravity_m_s2):
+            q = static(system, joints=list(joints))
+        still = np.zeros(system.n)
+        forces = np.asarray(system.equations.forces(q, still, still, True, True, True))
+        x = np.concatenate([q[p.free], np.zeros(p.count)])
+        return x, forces[system.joint_rows][self.driven]
+
+    def _corrected(self, y: np.ndarray) -> np.ndarray:
+        """Kalman's estimate from the measurements of a tick, its covariance with it (76)."""
+        C, S = self.C, self.S
+        gain = np.linalg.solve(C @ S @ C.T + self.problem.noise, C @ S).T
+        left = self.one - gain @ C
+        self.S = left @ S @ left.T + gain @ self.problem.noise @ gain.T
+        return self.guess + gain @ (y - self.measured.at(self.prediction.full(self.guess)))
+
+    def _linearised(self) -> None:
+        """Intervals along the predicted motion: the first, and all or every `spread`-th other."""
+        p, problem, N = self.prediction, self.problem, len(self.problem.h)
+        rows = np.arange(N) if self.known is None else np.arange(self.turn, N, problem.spread)
+        self.turn = (self.turn + 1) % problem.spread
+        if rows[0] != 0:
+            rows = np.concatenate([[0], rows])
+        R, G, d, self.a[rows] = p.steps(self.x[rows], self.u[rows], self.a[rows], problem.h[rows])
+        if self.known is None:
+            self.known = R, G, d
+        else:
+            for old, new in zip(self.known, (R, G, d), strict=True):
+                old[rows] = new
+
+    def _solved(self, t: float, x: np.ndarray) -> None:
+        """One step of Newton's method: the program about the predicted motion (152)."""
+        problem, N, m = self.problem, len(self.problem.h), len(self.driven)
+        assert self.known is not None
+        R, G, d = self.known
+        wanted, hold = self._wanted(t)
+        H, g, A, at, by_force, moved = core.condensed_program(
+            R, G, d, self.x, self.u, x - self.x[0], wanted, self.W, self.end, problem.rows
+        )
+        H[np.diag_indices(N * m)] += self.R
+        g += self.R * (self.u - hold).ravel()
+        about = np.concatenate([self.u.ravel(), at])
+        low, high = -self.bounds - about, self.bounds - about
+        U, solved, self.iterations = self.program.solve(H, g, A, low, high)
+        if not solved:
+            self.failures += 1
+            return
+        self.x[0] = x
+        self.x[1:] += by_force @ U + moved
+        self.u = np.clip(self.u + U.reshape(N, m), -problem.limit, problem.limit)
+
+    def _wanted(self, t: float) -> tuple[np.ndarray, np.ndarray]:
+        """The states at the intervals' ends (N, 2m) and forces (N, inputs) to be near."""
+        p = self.prediction
+        times = t + self.ahead
+        r = [evaluate_many(self.references[i].segments, times) for i in range(self.links)]
+        rest, hold = self._equilibrium_at(tuple(float(place[-1]) for place, _ in r))
+        wanted = np.tile(rest, (len(times), 1))
+        for column, i in zip(p.joint_columns, self.driven, strict=True):
+            wanted[:, column], wanted[:, p.count + column] = r[i]
+        return wanted, hold
+
+    def _equilibrium_at(self, joints: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
+        """The equilibrium at the end of what is ahead, kept while that does not change."""
+        if getattr(self, "_at", None) != joints:
+            self._at, self._found = joints, self._equilibrium(joints)
+        return self._found
+
+    def _predicted(self, x: np.ndarray) -> None:
+        """The estimate of the next tick from this one and the forces, and its covariance (76)."""
+        assert self.known is not None
+        R, G, d = (part[0] for part in self.known)
+        self.guess = R @ x + G @ self.u[0] + d
+        self.S = R @ self.S @ R.T + G @ self.problem.process @ G.T
+
+    def _shifted(self) -> None:
+        """The motion ahead as the next tick sees it, one tick later."""
+        part = (self.problem.T / self.problem.h)[:, None]
+        self.x[:-1] += part * (self.x[1:] - self.x[:-1])
+        self.u[:-1] += part[:-1] * (self.u[1:] - self.u[:-1])
+        self.a[:-1] += part[:-1] * (self.a[1:] - self.a[:-1])
