@@ -126,7 +126,7 @@ def internal_forces(
     system = assemble(robot)
     check_continuous(system)
     force = array(tip_force, "tip_force", "expected a finite force (x, y) in newtons", (2,))
-    moment = number(tip_moment, "tip_moment")
+    moment, t = number(tip_moment, "tip_moment"), number(t, "t")
     at = static(system, None, force, moment, loads=loads, t=t) if q is None else system.check(q)
     rates, more = (
         np.zeros(system.n) if x is None else system.check(x, key)
