@@ -1,4 +1,4 @@
-"""An LQG controller of a rigid arm, and what its loop bears: closed forms of margins.
+"""An LQG controller of a rigid arm: margins of its loop in closed form.
 
 Equations (148), (149) and (150), here nearly in continuous time, for one moment of inertia J. The
 regulator's and the filter's poles are those of Butterworth at the speeds

@@ -1,4 +1,4 @@
-"""Nonlinear model predictive control of a cart, which is linear: the optimal cost, and limits.
+"""Predictive control of a cart, which is linear: the optimal cost, and limits.
 
 Equations (151) and (152). Without limits in its way the law is that of a linear regulator, whatever
 the horizon: for a mass m at the distance x0 the cost, the integral of (x / p)^2 + (u / e)^2, is
@@ -30,7 +30,7 @@ def course(end: float, **limits: float) -> fx.Run:
     return fx.simulate(robot, t, law, rtol=1e-9)
 
 
-show = Comparison(__doc__, bound=5e-3)
+show = Comparison(__doc__, bound=2e-3)
 run = course(START_M)
 cost = simpson(
     ((run["joint/1/position"] - START_M) / P) ** 2 + (run["joint/1/drive"] / E) ** 2, x=t

@@ -3,8 +3,8 @@
 `problems` has the motions, statics, frequencies and the error measure; `exudyn_programs` the same
 in Exudyn; `native` runs of flexura. `exudyn_search` finds Exudyn's cheapest settings and keeps them
 in settings.json; `native_search` finds flexura's. `equal_error` makes the rows, `timing` measures,
-`report` makes the tables. `accuracy` gives errors over tolerances; `population`, `scaling`,
-`predictive` and `board_load` stand alone.
+`report` makes the tables. `accuracy` gives errors over tolerances; `population`, `scaling`
+and `board_load` stand alone, as does `problems.predictive`.
 """
 
 import os

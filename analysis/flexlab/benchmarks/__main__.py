@@ -1,6 +1,6 @@
 """The command: python -m flexlab.benchmarks [PART ...] [PROBLEM ...].
 
-Parts: motions, statics, population, scaling, predictive, board, accuracy, passes, search.
+Parts: motions, statics, population, scaling, board, accuracy, passes, search.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from . import (
     equal_error,
     exudyn_search,
     population,
-    predictive,
     report,
     scaling,
 )
+from .problems import predictive
 from .problems.motions import all_motions
 from .problems.problem import Problem
 from .problems.statics import StaticProblem, all_statics

@@ -14,19 +14,21 @@ from .. import studies
 from .options import Force, Json, ManoeuvreFile, Out, Rtol, stem
 from .output import message, print_results, progress_bars, warn
 from .results import results
+from .study_control import study_control
 from .study_measured import study_measured
 
 
 def study(
     kind: Annotated[
-        str, typer.Argument(metavar="KIND", help="payload, length-ratio, boundary or measured")
+        str,
+        typer.Argument(metavar="KIND", help="payload, length-ratio, boundary, measured or control"),
     ],
     robot: Annotated[
         Path | None,
         typer.Argument(
             metavar="ROBOT",
             help="robot file (TOML), or the name of a shipped one, as rig; KIND measured: by "
-            "default quanser-2dsfl",
+            "default quanser-2dsfl; KIND control: rig or type-1-rr, by default both",
         ),
     ] = None,
     manoeuvre: ManoeuvreFile = None,
@@ -63,25 +65,25 @@ def study(
     force: Force = False,
     json: Json = False,
 ) -> None:
-    """Study a robot's payload, link lengths or sleeve, or a measured robot.
+    """Study a robot's payload, link lengths or sleeve, a measured robot, or methods of control.
 
     It stores a table (Parquet) and a figure. KIND boundary: with and without a sleeve. KIND
-    measured: simulations over published measurements, with a review of each run.
+    measured: simulations over published measurements, with a review of each run. KIND control:
+    what PID, shapers, LQR, inversion and least time buy, on rig or type-1-rr, by default both.
 
     \b
     Example: flexura study payload type-1-rr --values 0:0.2:11
     """
-    if keep is not None and kind != "length-ratio":
-        raise fx.InputError("expected with KIND length-ratio alone", key="--keep", value=keep)
-    if kind == "measured":
+    if kind in ("measured", "control"):
         given = {"MANOEUVRE": manoeuvre, "--values": values, "--jobs": jobs}
         for key, value in given.items():
             if value is not None:
-                raise fx.InputError("expected none with KIND measured", key=key, value=str(value))
+                raise fx.InputError(f"expected none with KIND {kind}", key=key, value=str(value))
         if channels:
-            raise fx.InputError(
-                "expected none with KIND measured: it stores them", key="--channels"
-            )
+            raise fx.InputError(f"expected none with KIND {kind}", key="--channels")
+    if keep is not None and kind != "length-ratio":
+        raise fx.InputError("expected with KIND length-ratio alone", key="--keep", value=keep)
+    if kind == "measured":
         study_measured(
             robot or Path("quanser-2dsfl"), data, out, rtol, fit_on, force=force, json=json
         )
@@ -89,6 +91,9 @@ def study(
     for key, value in (("--data", data), ("--fit-on", fit_on)):
         if value is not None:
             raise fx.InputError("expected with KIND measured alone", key=key, value=str(value))
+    if kind == "control":
+        study_control(robot, out, rtol, force=force, json=json)
+        return
     if robot is None:
         raise fx.InputError("expected a robot file, or a shipped robot's name", key="ROBOT")
     described = fx.load(robot)

@@ -124,7 +124,10 @@ def filter_of(task: Task, knowledge: Knowledge) -> LearningFilter:
 
 
 def _postures(task: Task) -> np.ndarray:
-    """Some postures on the way (k, J) in which the joints move the tip in every direction."""
+    """Some postures on the way (k, J) in which the joints move the tip in every direction.
+
+    They are those in which the last joint is farthest to one side, in the middle, and to the other.
+    """
     begin = min(first for first, _ in task.moving)
     end = max(last for _, last in task.moving)
     way = task.joints(np.linspace(begin, end, 8 * POSTURES + 1))
@@ -136,5 +139,6 @@ def _postures(task: Task) -> np.ndarray:
             key="manoeuvre",
             value=task.manoeuvre.name,
         )
+    good = good[np.argsort(good[:, -1], kind="stable")]
     some = good[np.linspace(0, len(good) - 1, POSTURES).round().astype(int)]
     return np.unique(np.round(some, 6), axis=0)

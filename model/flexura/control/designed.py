@@ -156,7 +156,14 @@ class Designed:
         return Robot.from_dict(data)
 
     def limits(self, joints: int) -> list[float]:
-        """The limits of the forces, infinite where there are none (joints,)."""
+        """The limits of the forces.
+
+        Args:
+            joints: how many the robot has.
+
+        Returns:
+            One a joint, infinite where there is none [N or N m].
+        """
         out = [float("inf")] * joints
         for name, value in self.settings.items():
             match = _NAME.fullmatch(name)
@@ -184,7 +191,15 @@ class Designed:
 
 
 def design_setting(name: str, kind: str = "mpc") -> bool:
-    """Whether a file of that kind may have a number of this name."""
+    """Whether a gains file of a designed controller may have a number of this name.
+
+    Args:
+        name: a key of the table [controller].
+        kind: "lqg" or "mpc".
+
+    Returns:
+        True if it may.
+    """
     match = _NAME.fullmatch(name)
     known = name == "rate_Hz" or name in OF_ALL or name in COUNTS
     known = known or bool(match and match[3] in JOINT[match[1]][1:])

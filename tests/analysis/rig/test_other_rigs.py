@@ -18,9 +18,11 @@ from flexlab.experiment.run_experiment import Hooks, OpenBoard, conduct
 from flexlab.identification.identify import identify
 from flexlab.recordings.strip_sensor import sensor_of
 from flexlab.rig.axes import motor_axes
+from flexlab.rig.nominal_robot import with_nominal_drives
 from flexlab.rig.plant.motor import motor_data
 from flexlab.rig.plant.plant import rig_plant
 from flexura.errors import InputError
+from flexura.signals import polynomial
 
 
 def bench(name, **tables):
@@ -183,3 +185,43 @@ def test_the_rigs_are_found_by_name_and_their_robots_too():
         assert rigs.load(name).robot == fx.load(name)
     with pytest.raises(ValidationError, match="one drive of joint 2"):
         bench("rig", motor_2=rigs.load("rig-rr").rig.motor_2.model_dump(exclude_none=True))
+
+
+END_RAD, BEGIN_S, ROW_S = 0.8, 0.1, 0.004
+
+
+def amplitude(run, begin):
+    """The largest amplitude [m] about the first frequency in a second after the motion."""
+    w = run["link/1/tip_deflection"]
+    there = (run.t > begin + 0.1) & (run.t < begin + 1.1) & np.isfinite(w)
+    t, found = run.t[there], []
+    for f in np.arange(2.5, 3.8, 0.05):
+        wave = 2 * np.pi * f * t
+        basis = np.column_stack([np.cos(wave), np.sin(wave), np.ones_like(t), t])
+        found.append(np.hypot(*np.linalg.lstsq(basis, w[there], rcond=None)[0][:2]))
+    return max(found)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_a_robust_motion_leaves_less_than_a_count_of_the_sensor(tmp_path):
+    setup = rigs.load("rig-r")
+    data = with_nominal_drives(setup.robot, setup)[0].to_dict()
+    data["link"][0]["joint"].pop("coulomb_friction_N_m", None)
+    robot = fx.Robot.from_dict(data)
+    limits = {"drive": [0.5], "speed": [5.0]}
+    run = fx.time_optimal(robot, [0.0], [END_RAD], limits, robust=0.1, intervals=80)
+    t = np.arange(0.0, 2.3, ROW_S)
+    after = fx.feedforward(run, kp=15.0, kd=1.5).drive  # the joint stays where it is
+    held = fx.simulate(robot, t, after, rtol=1e-8)["joint/1/position"]
+    shifted = np.concatenate([np.zeros(round(BEGIN_S / ROW_S)), held])[: len(t)]
+    left = {}
+    for name, drive in (
+        ("least", fx.Drive.pd([shifted], [1], [0], t_s=t)),
+        ("smooth", fx.Drive.pd([polynomial(END_RAD, run.t[-1], at_s=BEGIN_S)], [1], [0])),
+    ):
+        asked = plan.inverse(setup, settings(setup), fx.Manoeuvre(name, 2.25, 0.005, drive))
+        left[name] = amplitude(ran(setup, asked, tmp_path / name), BEGIN_S + run.t[-1])
+    count = abs(rigs.calibration(setup).c1_m) / 1024
+    print(f"left {left} m, a count is {count} m")
+    assert left["least"] < count < 0.25 * left["smooth"]

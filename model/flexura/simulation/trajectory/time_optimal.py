@@ -15,14 +15,28 @@ from ...signals import Drive, polynomial
 from ...system import RobotLike, System, assemble, static
 from ..approximate_inverse import rigid_robot
 from ..dynamics import inverse, simulate
+from .plant_motion import METHOD, PERIODS, RTOL, Plant, deflection_slope, linear_drive
 from .posture import exact_system
-from .shortest_motion import METHOD, RTOL, Limits, Plant, ShortestMotion, linear_drive
+from .shortest_motion import SETTLED, Limits, ShortestMotion
 
-INTERVALS = 120  # of the drives
-REMAINS = 0.02  # of the unshaped residual, at frequencies within the band of `robust`
-BAND = (-1.0, -0.5, 0.5, 1.0)  # of `robust`: the plants between which the motion is robust
+INTERVALS = 160  # of the drives
+COARSE = 40  # so many at least in a first, coarse motion
+ROUGHLY = 5e-3  # of the time: what a coarse motion may leave to finer ones
+FEWEST = 20
+ROWS = 20  # of the Run in each interval: a spline through them hardly leaves the drives
+FIRST = 120  # in which the first motion's drives are looked at
+LONGER = 12  # times by which the first motion may be too short
+REMAINS = 0.0192  # of the unshaped residual, at frequencies within the band of `robust`
+NOTHING = 0.001  # of it, at the model's own
+BAND = (
+    -1.0,
+    -0.6,
+    -0.25,
+    0.25,
+    0.6,
+    1.0,
+)  # of `robust`: the plants between which the motion is robust
 CAREFUL = 1.15  # of the first guess's time: its drives are below their limits
-PERIODS = 3.0  # of the first mode, in which the residual is looked at
 
 
 def time_optimal(
@@ -68,57 +82,47 @@ def time_optimal(
     share = number(robust, "robust")
     if not 0 <= share < 0.5:
         raise InputError("expected a share of 0 or more, below 0.5", key="robust", value=robust)
-    m = whole(intervals, "intervals", 20)
+    m = whole(intervals, "intervals", FEWEST)
     if not np.any(np.abs(last - first)[~system.locked] > 0):
         raise InputError("expected an end other than the start", key="end", value=end)
-    nominal = _plant(system, first, last, 0.0)
-    shortest = ShortestMotion([nominal], bounds, m)
-    u, T = _first_guess(nominal, bounds, m)
-    u, T, count = shortest.solve(u, T)
-    unshaped = _unshaped(nominal, bounds, T)
-    if share > 0:
-        u, T, more = _robust(nominal, bounds, m, share, u, T, unshaped)
-        count += more
-    return _recorded(nominal, u, T, count, unshaped, share)
+    ends = static(system, first), static(system, last)
+    nominal = Plant(system, *ends, _unshaped(system, *ends, bounds), NOTHING)
+    robots = share > 0 and len(nominal.unshaped) > 0
+    plants = _band(nominal, share, bounds) if robots else [nominal]
+    T, count = _first_time(nominal, bounds), 0
+    levels = [k for k in (m // 4, m // 2) if k >= COARSE] + [m]
+    for level in levels:  # coarse ones first
+        shortest = ShortestMotion(plants, bounds, level)
+        if level == levels[0]:
+            u, T = _solved(shortest, nominal, T, ROUGHLY if len(levels) > 1 else SETTLED)
+        else:
+            at, nodes = np.linspace(0, 1, level + 1), np.linspace(0, 1, len(u))
+            found = shortest.solve(np.column_stack([np.interp(at, nodes, x) for x in u.T]), T)
+            u, T = found or _solved(shortest, nominal, T, SETTLED)
+        count += shortest.programs
+    return _recorded(plants, u, T, count, share)
 
 
-def _robust(
-    nominal: Plant,
-    bounds: Limits,
-    m: int,
-    share: float,
-    u: np.ndarray,
-    T: float,
-    unshaped: tuple[float, np.ndarray],
-) -> tuple[np.ndarray, float, int]:
-    """The motion that also brings robots of other frequencies nearly to rest."""
-    system = nominal.system
-    rows = system.joint_rows
-    one = ShortestMotion([nominal], bounds, m)
-    joints = len(system.free_rows) - len(system.elastic_rows)
-    left = REMAINS * float(unshaped[1][0]) / one.reference(nominal, joints)
-    plants = [nominal]
+def _band(nominal: Plant, share: float, limits: Limits) -> list[Plant]:
+    """The robot, and robots of other frequencies; 2 % of the largest unshaped residual remains."""
+    rows, robots = nominal.system.joint_rows, [(nominal.system, nominal.start, nominal.end)]
     for part in BAND:
-        other = assemble(stiffer(system.robot, (1 + part * share) ** 2))
-        plants.append(_plant(other, nominal.start[rows], nominal.end[rows], left))
-    return ShortestMotion(plants, bounds, m).solve(u, T)
+        other = assemble(stiffer(nominal.system.robot, (1 + part * share) ** 2))
+        start, end = (static(other, q[rows]) for q in (nominal.start, nominal.end))
+        robots.append((other, start, end))
+    unshaped = np.max([_unshaped(*robot, limits) for robot in robots], axis=0)
+    return [Plant(*robot, unshaped, REMAINS) for robot in robots]
 
 
 def stiffer(robot: Robot, factor: float) -> Robot:
-    """The same robot with `factor` times the bending stiffness of each link, damped the same."""
+    """The same robot with `factor` times the bending stiffness of each link."""
     data = robot.to_dict()
     for link, table in zip(robot.links, data["link"], strict=True):
         if link.flexible:
             for key in ("young_modulus_Pa", "bending_stiffness_N_m2"):
                 if key in table:
                     table[key] *= factor
-            if "damping" in table and "beta_s" in table["damping"]:
-                table["damping"]["beta_s"] /= factor**0.5
     return Robot.from_dict(data)
-
-
-def _plant(system: System, first: np.ndarray, last: np.ndarray, left: float) -> Plant:
-    return Plant(system, static(system, first), static(system, last), left)
 
 
 def _positions(system: System, value: Any, key: str) -> np.ndarray:
@@ -158,61 +162,76 @@ def _limits(limits: Any, joints: int) -> Limits:
     return Limits(found["drive"], found["speed"], most)
 
 
-def _first_guess(plant: Plant, limits: Limits, m: int) -> tuple[np.ndarray, float]:
-    """Drives of the rigid robot on a smooth way, as quick as the limits let it be."""
-    system, rows = plant.system, plant.system.joint_rows
-    rigid = assemble(rigid_robot(system.robot))
+def _solved(
+    shortest: ShortestMotion, plant: Plant, T: float, settled: float
+) -> tuple[np.ndarray, float]:
+    """The shortest motion from a smooth one on, which may be longer than T."""
+    for _ in range(LONGER):
+        found = shortest.solve(_smooth_drives(plant, T, shortest.m)[0], T, settled)
+        if found:
+            return found
+        T *= CAREFUL
+    raise FlexuraError(
+        "no motion was found that keeps the limits and ends at rest: expected higher limits"
+    )
+
+
+def _first_time(plant: Plant, limits: Limits) -> float:
+    """A time in which the joints can go a smooth way within the limits."""
     T = 1.0
     for _ in range(30):
-        motion = [
-            None if locked else polynomial(float(b), T, float(a))
-            for a, b, locked in zip(plant.start[rows], plant.end[rows], system.locked, strict=True)
-        ]
-        run = inverse(rigid, np.linspace(0.0, T, m + 1), motion, rtol=1e-6)
-        u = np.column_stack([run[f"joint/{i + 1}/drive"] for i in range(len(rows))])
-        speeds = [np.abs(run[f"joint/{i + 1}/velocity"]).max() for i in range(len(rows))]
+        u, speeds = _smooth_drives(plant, T, FIRST)
         share = float(max((np.abs(u) / limits.drive).max(), (speeds / limits.speed).max() ** 2))
         if 0.4 < share <= 1.0:
             break
         T *= float(np.clip(CAREFUL * np.sqrt(share), 0.1, 10.0))
     if not share <= 1.0:
         raise FlexuraError("the drives cannot hold the robot on its way: expected higher limits")
+    return T
+
+
+def _smooth_drives(plant: Plant, T: float, m: int) -> tuple[np.ndarray, np.ndarray]:
+    """Drives (m + 1, links) of the robot whose joints go a smooth way, and largest speeds."""
+    system, rows = plant.system, plant.system.joint_rows
+    motion = [
+        None if locked else polynomial(float(b), T, float(a))
+        for a, b, locked in zip(plant.start[rows], plant.end[rows], system.locked, strict=True)
+    ]
+    run = inverse(system, np.linspace(0.0, T, m + 1), motion, rtol=1e-6)
+    u = np.column_stack([run[f"joint/{i + 1}/drive"] for i in range(len(rows))])
     u[0], u[-1] = plant.hold
-    return u, T
+    return u, np.array([np.abs(run[f"joint/{i + 1}/velocity"]).max() for i in range(len(rows))])
 
 
-def _unshaped(plant: Plant, limits: Limits, T: float) -> tuple[float, np.ndarray]:
-    """What remains after the rigid robot's fastest drives: the largest tip deflection [m], and the
-    first mode's amplitude as a rate (1,). With several joints, what a step of the largest drives
-    leaves."""
-    system = plant.system
+def _unshaped(system: System, start: np.ndarray, end: np.ndarray, limits: Limits) -> np.ndarray:
+    """The largest tip deflections (tips,) [m] after the rigid robot's fastest drives.
+
+    With several joints, or where there is gravity, those of the first mode after a step of the
+    largest drives.
+    """
     free = np.flatnonzero(~system.locked)
-    shortest = ShortestMotion([plant], limits, INTERVALS)
-    joints = len(system.free_rows) - len(system.elastic_rows)
     if not len(system.elastic_rows):
-        return 0.0, np.ones(1)
-    step = shortest.reference(plant, joints)
+        return np.zeros(0)
+    plant = Plant(system, start, end, np.ones(1), 1.0)
+    k = plant.joints
+    omega = plant.modes[0][k]
     if len(free) > 1 or any(system.robot.gravity_m_s2):
-        return np.nan, np.array([step])
+        mode = plant.shape(k)
+        rate = limits.drive[free] @ np.abs(mode[system.joint_rows[free]]) / omega
+        return np.abs(deflection_slope(system, end) @ mode) * rate / omega
     rigid = assemble(rigid_robot(system.robot))
     inertia = float(rigid.mass(rigid.start())[free[0], free[0]])
     way = plant.end[system.joint_rows[free[0]]] - plant.start[system.joint_rows[free[0]]]
     most = limits.drive[free[0]] * np.sign(way)
     span = 2 * np.sqrt(inertia * way / most)
-    values = {"u": np.zeros((5, len(system.robot.links)))}
     h = 1e-6 * span
     times = np.array([0.0, span / 2 - h, span / 2 + h, span - h, span + h])
-    values["u"][:, free[0]] = [most, most, -most, -most, 0.0]
-    drive = Drive.force(*(linear_drive(times, column) for column in values["u"].T))
-    omega, into = plant.modes
-    later = span + np.linspace(h, PERIODS * 2 * np.pi / omega[joints], 400)
+    values = np.zeros((5, len(system.robot.links)))
+    values[:, free[0]] = [most, most, -most, -most, 0.0]
+    drive = Drive.force(*(linear_drive(times, column) for column in values.T))
+    later = span + np.linspace(h, PERIODS * 2 * np.pi / omega, 400)
     run = simulate(system, np.append(0.0, later), drive, plant.start, rtol=RTOL, method=METHOD)
-    bends = _bends(run, plant)[1:]
-    assert run.states is not None
-    n = system.n
-    away, rate = run.states[1, :n] - plant.end, run.states[1, n:]
-    amplitude = float(np.hypot(omega[joints] * into[joints] @ away, into[joints] @ rate))
-    return float(np.abs(bends).max()), np.array([amplitude])
+    return np.asarray(np.abs(_bends(run, plant)[1:]).max(axis=0))
 
 
 def _bends(run: Run, plant: Plant) -> np.ndarray:
@@ -222,32 +241,30 @@ def _bends(run: Run, plant: Plant) -> np.ndarray:
     return np.column_stack([run[name] for name in names]) - rest if names else np.zeros((1, 1))
 
 
-def _recorded(
-    plant: Plant,
-    u: np.ndarray,
-    T: float,
-    count: int,
-    unshaped: tuple[float, np.ndarray],
-    share: float,
-) -> Run:
+def _recorded(plants: list[Plant], u: np.ndarray, T: float, count: int, share: float) -> Run:
     """The Run of the motion, and what remains after it."""
-    system = plant.system
     nodes = np.linspace(0.0, T, len(u))
     drive = Drive.force(*(linear_drive(nodes, column) for column in u.T))
-    run = simulate(system, nodes, drive, plant.start, rtol=RTOL, method=METHOD)
-    residual = 0.0
-    if len(system.elastic_rows):
-        omega, _ = plant.modes
-        joints = len(system.free_rows) - len(system.elastic_rows)
-        span = PERIODS * 2 * np.pi / omega[joints]
-        later = np.concatenate([[0.0], T + np.linspace(0.0, span, 400)])
-        after = simulate(system, later, drive, plant.start, rtol=RTOL, method=METHOD)
-        residual = float(np.abs(_bends(after, plant)[1:]).max())
+    system, unshaped = plants[0].system, plants[0].unshaped
+    rows = np.linspace(0.0, T, ROWS * (len(u) - 1) + 1)
+    run = simulate(system, rows, drive, plants[0].start, rtol=RTOL, method=METHOD)
+    left = [_residual(plant, drive, T) for plant in plants]
     run.meta.update(
         duration_s=T,
-        residual_m=residual,
-        unshaped_m=None if np.isnan(unshaped[0]) else unshaped[0],
+        residual_m=left[0],
+        unshaped_m=float(unshaped.max(initial=0.0)),
         programs=count,
         robust=share,
+        **({"residual_in_band_m": max(left)} if len(plants) > 1 else {}),
     )
     return run
+
+
+def _residual(plant: Plant, drive: Drive, T: float) -> float:
+    """The largest tip deflection after the motion [m]."""
+    if not len(plant.system.elastic_rows):
+        return 0.0
+    span = PERIODS * 2 * np.pi / plant.modes[0][plant.joints]
+    later = np.concatenate([[0.0], T + np.linspace(0.0, span, 400)])
+    after = simulate(plant.system, later, drive, plant.start, rtol=RTOL, method=METHOD)
+    return float(np.abs(_bends(after, plant)[1:]).max())

@@ -84,6 +84,31 @@ class Variation:
             x, v = places[own][-1], rates[own][-1]
         return places, rates
 
+    def transitions(self, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """How each step's end depends on its start and on its forces.
+
+        Args:
+            force: columns of forces at a step's stages (N, 3, r, k).
+
+        Returns:
+            Derivatives of (dq, dq') at the step's end by those at its start (N, 2 r, 2 r), and by
+            the columns (N, 2 r, k).
+        """
+        N, r = len(self.nodes) - 1, len(self.rows)
+        h = np.diff(self.nodes)[:, None, None, None]
+        pick = np.ix_(np.arange(3 * N), self.rows, self.rows)
+        G, K = (x[pick].reshape(N, 3, r, r) for x in (self.G, self.K))
+        left = np.concatenate([-K, -G - STAGES[:, None, None] * h * K, force], axis=3)
+        a = np.linalg.solve(self._matrices, left.reshape(N, 3 * r, -1)).reshape(N, 3, r, -1)
+        rates = h[:, 0] * np.einsum("k,nkrp->nrp", TABLE[2], a)
+        places = h[:, 0] ** 2 * np.einsum("k,nkrp->nrp", TWICE[2], a)
+        out = np.concatenate([places, rates], axis=1)
+        diagonal = np.arange(r)
+        out[:, diagonal, diagonal] += 1.0
+        out[:, diagonal, r + diagonal] += h[:, 0, :, 0]
+        out[:, r + diagonal, r + diagonal] += 1.0
+        return out[:, :, : 2 * r], out[:, :, 2 * r :]
+
 
 def variation(
     system: System, nodes: np.ndarray, q: np.ndarray, v: np.ndarray, a: np.ndarray, rows: np.ndarray
