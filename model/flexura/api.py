@@ -106,8 +106,8 @@ def simulate(
         payloads: changes of the payload (134): a list of `PayloadChange`, or of tables with its
             keys. Each is an event "payload"; the energy jumps by what the event says.
         internal_forces: the Run also has the reactions of the joints, and bending moment, shear
-            force, axial force and stress along the links (121) to (128). They take about a
-            millisecond a link and time.
+            force, axial force and stress along the links. They take about a millisecond a link
+            and time.
         max_steps: a budget of steps, rejected ones included, by default 20 million. It ends the run
             with the event "exhausted", at the same step on every machine.
         wall_time: seconds after which the run is stopped where it is, with the event "wall_time".

@@ -73,7 +73,7 @@ CALLS = {
         | {"qd0": None, "rtol": 1e-4, "method": "auto", "start": None, "progress": None}
         | {"internal_forces": False}),
     "internal_forces": (fx.internal_forces, {"robot": RIG, "q": None, "qd": None, "qdd": None}
-        | {"tip_force": (0.0, 0.0), "tip_moment": 0.0}),
+        | {"tip_force": (0.0, 0.0), "tip_moment": 0.0, "loads": None, "t": 0.0}),
     "twin": (twin.simulate, {"robot": RIG, "t_eval": T, "drive": [0.1, 0.0], "qd0": None}
         | {"start": None, "beam": "ancf", "elements": 4, "step_s": 5e-4, "hub_length_m": None}
         | {"progress": None}),

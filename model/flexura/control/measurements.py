@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..robot import FORCE_KINDS
+from ..signals import Loads
 from ..system import StateSpace, System, sensor_channels
 from ..system.system import jacobian
 
@@ -51,7 +52,7 @@ class Measurements:
             if name not in known:
                 expected = f"expected one of {', '.join(known)}"
                 if isinstance(name, str) and name.startswith("sensor/"):
-                    expected += "; sensors of accelerations and forces are none that an estimator here takes"
+                    expected += "; no estimator here takes accelerations or forces"
                 raise InputError(expected, key="measure", value=name)
         if not asked or len(set(asked)) != len(asked):
             raise InputError("expected each measurement once", key="measure", value=names)
@@ -73,7 +74,8 @@ class Measurements:
         at, still = q[None], self._still
         sensors: dict[str, Any] = {}
         if self._sensed:
-            channels = sensor_channels(self.system, at, still, lambda: still)[0]
+            force = np.zeros((1, len(self.system.robot.links)))
+            channels = sensor_channels(self.system, np.zeros(1), at, still, force, Loads())
             sensors = {name.removeprefix("sensor/"): x[0] for name, x in channels.items()}
         return self.read(q[self.system.joint_rows], self._bent(q), sensors)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from numpy.typing import ArrayLike
 from ..errors import InputError
 from ..io import Tables, array, function_of, number
 from ..signals import Loads
-from ..system import System, accelerations, force_channels, sensor_channels
+from ..system import System, sensor_channels
 
 MEASURED = ("q", "qd", "tip_deflections", "sensors")  # what a Sampled's function may ask for
 
@@ -135,10 +134,9 @@ class _Measured:
         bent = self.system.places(q)[0]
         known: dict[str, Any] = {"q": q, "qd": qd, "tip_deflections": bent}
         if "sensors" in self.asked:
-            state = np.array([t]), q[None], qd[None]
-            qdd = partial(accelerations, self.system, *state, self.force[None], self.loads)
-            channels = sensor_channels(self.system, *state[1:], qdd)[0]
-            channels |= force_channels(self.system, *state, qdd, self.loads, False)[0]
+            channels = sensor_channels(
+                self.system, np.array([t]), q[None], qd[None], self.force[None], self.loads
+            )
             known["sensors"] = {
                 name.removeprefix("sensor/"): float(value[0]) for name, value in channels.items()
             }

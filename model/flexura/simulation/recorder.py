@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,8 @@ import numpy as np
 from ..io import STATIONS, Run, Tables, judged
 from ..robot import Robot
 from ..signals import Loads
-from ..system import System, accelerations, force_channels, sensor_channels
+from ..system import System, sensor_channels
+from .internal_forces import force_channels, force_units
 from .problem import Solution
 
 
@@ -59,10 +59,13 @@ STILL = 1e-9  # m or rad: a robot whose unknowns change by less does not move
 
 
 def record(
-    system: System, solution: Solution, loads: Loads | None = None, internal_forces: bool = False
+    system: System,
+    solution: Solution,
+    loads: Loads | None = None,
+    internal_forces: bool = False,
 ) -> Run:
     """The Run of a solution under loads on links: its channels, the balance of its energies, and
-    the solver's metadata; if asked for with the forces within the robot."""
+    the solver's metadata; if asked for, with the forces within the robot."""
     loads = loads or Loads()
     n, t, states, accounts = system.n, solution.t, solution.states, solution.accounts
     q, v = np.ascontiguousarray(states[:, :n]), np.ascontiguousarray(states[:, n:])
@@ -77,16 +80,17 @@ def record(
     channels = {
         name: np.ascontiguousarray(values) for name, values in zip(units, found, strict=True)
     }
-    begin, parts = 0, []
+    begin, sensors = 0, []
     for carrying, end in solution.systems or ((system, len(t)),):
-        rows, begin = slice(begin, end), end
-        state = t[rows], q[rows], v[rows]
-        qdd = cache(partial(accelerations, carrying, *state, solution.forces[rows], loads))
-        shown, own = sensor_channels(carrying, *state[1:], qdd)
-        within, more = force_channels(carrying, *state, qdd, loads, internal_forces)
-        parts.append(shown | within)
-        units |= own | more
-    channels |= {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+        rows = slice(begin, end)
+        now = (carrying, t[rows], q[rows], v[rows], solution.forces[rows], loads)
+        sensors.append(sensor_channels(*now))
+        if internal_forces:
+            sensors[-1] |= force_channels(*now)
+        begin = end
+    channels |= {name: np.concatenate([part[name] for part in sensors]) for name in sensors[0]}
+    units |= {f"sensor/{s.name}": s.unit for link in system.robot.links for s in link.sensor}
+    units |= force_units(system.robot) if internal_forces else {}
     about = describe(system, energy_error(seen[:, -3:], accounts, solution.jumps)) | solution.meta
     if loads:
         about["loads"] = loads.spec()

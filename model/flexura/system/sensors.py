@@ -2,42 +2,66 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 
 from ..robot import FORCE_KINDS, Sensor
 from ..signals import Loads
+from .balance import Balance, balances
 from .loads import load_forces
 from .system import System
 
 
 def sensor_channels(
-    system: System, q: np.ndarray, qd: np.ndarray, qdd: Callable[[], np.ndarray]
-) -> tuple[dict[str, np.ndarray], dict[str, str]]:
-    """The channels of a robot's sensors but for those of forces.
+    system: System,
+    t: np.ndarray,
+    q: np.ndarray,
+    qd: np.ndarray,
+    drive: np.ndarray,
+    loads: Loads,
+) -> dict[str, np.ndarray]:
+    """The channels of a robot's sensors.
 
     Args:
         system: the robot.
+        t: times (T,) [s].
         q: configurations (T, n).
         qd: their rates (T, n).
-        qdd: gives their accelerations (T, n).
+        drive: forces of the drives (T, links) [N or N m].
+        loads: forces and moments on links.
 
     Returns:
-        Values (T,) and units by channel.
+        Values (T,) by channel, in the unit of the sensor.
     """
-    out, units = {}, {}
+    qdd = cache(lambda: accelerations(system, t, q, qd, drive, loads))
+    out, forces = {}, []
     for i, link in enumerate(system.robot.links):
         for sensor in link.sensor:
-            if sensor.kind in FORCE_KINDS:
-                continue
             name = f"sensor/{sensor.name}"
-            units[name] = sensor.unit
             if sensor.kind == "acceleration":
                 out[name] = _acceleration(system, i, sensor.at_m, q, qd, qdd())
+            elif sensor.kind in FORCE_KINDS:
+                forces.append((i, sensor))
             else:
                 out[name] = _bending(system, i, sensor, q)
-    return out, units
+    if forces:
+        parts = [
+            [_force(balance, i, sensor) for i, sensor in forces]
+            for balance in balances(system, t, q, qd, qdd(), loads)
+        ]
+        columns = np.concatenate(parts, axis=1)
+        out |= {f"sensor/{s.name}": each for (_, s), each in zip(forces, columns, strict=True)}
+    return out
+
+
+def _force(balance: Balance, i: int, sensor: Sensor) -> np.ndarray:
+    """A force or stress in a section of link i (from 0), (T,) (123), (128)."""
+    found = balance.section(i, sensor.at_m)
+    if sensor.kind != "stress":
+        return np.asarray(getattr(found, sensor.kind))
+    link = balance.robot.links[i]
+    return np.asarray(link.bending_stress(found.bending_moment, sensor.at_m, sensor.distance_m))
 
 
 def _bending(system: System, i: int, sensor: Sensor, q: np.ndarray) -> np.ndarray:
@@ -72,7 +96,7 @@ def accelerations(
     drive: np.ndarray,
     loads: Loads,
 ) -> np.ndarray:
-    """The accelerations of the unknowns (44), with Coulomb friction (57) and loads on links (132).
+    """The accelerations of the unknowns (44), with Coulomb friction (57), under drives and loads.
 
     Args:
         system: the robot.
@@ -85,7 +109,7 @@ def accelerations(
     Returns:
         (T, n).
     """
-    force = load_forces(system, q, loads, t)
+    force = load_forces(system, q, loads, t).copy()
     force[:, system.joint_rows] += drive
     force -= np.array([system.assembly.coulomb(rates) for rates in qd]).reshape(q.shape)
     rows = zip(q, qd, force, strict=True)

@@ -212,3 +212,39 @@ def test_wrong_tables_are_refused_by_file_and_key(tmp_path, old, new, key):
     with pytest.raises(fx.InputError) as error:
         fx.load_manoeuvre(path, 2)
     assert error.value.key == key and error.value.file == str(path)
+
+
+def test_loads_and_payloads_are_in_the_internal_forces():
+    """A load turns with its link, another acts on the tip: the clamp bears them, less what moves;
+    a payload that is taken up weighs on the joint from then on."""
+    strip = {"length_m": 0.5, "elements": 4, "mass_per_length_kg_m": 0.2}
+    strip |= {"bending_stiffness_N_m2": 2.0, "joint": {"type": "R", "locked": True}}
+    strip["sensor"] = [{"name": "root", "kind": "bending_moment", "at_m": 0.0}]
+    made = fx.Robot.from_dict({"link": [strip], "gravity_m_s2": [0.0, -9.81]})
+    loads = [
+        {"link": 1, "at_m": 0.3, "force_N": [0.0, 0.2], "frame": "link"},
+        {"link": 1, "force_N": [0.1, 0.0], "moment_N_m": 0.05},
+    ]
+    run = fx.simulate(made, [0.0, 0.01], loads=loads, internal_forces=True)
+    x, y, angle = fx.assemble(made).line(fx.static(made, loads=loads), 1, [0.3, 0.5])
+    turned = 0.2j * np.exp(1j * angle[0])
+    at = x + 1j * y
+    force = -0.1 - turned + 0.1 * 9.81j
+    assert run["joint/1/reaction_x"] == pytest.approx(force.real, rel=1e-6)
+    assert run["joint/1/reaction_y"] == pytest.approx(force.imag, rel=1e-6)
+    found = fx.internal_forces(made, loads=loads)
+    assert run["joint/1/reaction_moment"] == pytest.approx(found.reaction(1).moment, rel=1e-6)
+    assert run["sensor/root"] == pytest.approx(-run["joint/1/reaction_moment"], rel=1e-9)
+    own = fx.internal_forces(made, fx.static(made, loads=loads)).reaction(1).moment
+    moment = (at[0].conjugate() * turned).imag + (at[1].conjugate() * 0.1).imag + 0.05
+    assert found.reaction(1).moment == pytest.approx(own - moment, rel=1e-9)
+    ahead, behind = found.link(1, [0.3 + 1e-6]), found.link(1, [0.3 - 1e-6])
+    assert behind.shear_force - ahead.shear_force == pytest.approx([0.2], rel=1e-4)
+
+    bar = {"length_m": 0.5, "mass_kg": 0.0, "joint": {"type": "R", "hub_inertia_kg_m2": 1.0}}
+    arm = fx.Robot.from_dict({"link": [bar], "gravity_m_s2": [0.0, -9.81]})
+    arm = arm.replace({"payload.mass_kg": 0.1})
+    taken = [{"at_s": 0.1, "mass_kg": 0.3}]
+    run = fx.inverse(arm, [0.0, 0.05, 0.15, 0.2], [0.0], payloads=taken, internal_forces=True)
+    assert run["joint/1/reaction_y"] == pytest.approx(9.81 * np.array([0.1, 0.1, 0.3, 0.3]))
+    assert run["joint/1/reaction_moment"] == pytest.approx(run["joint/1/drive"])

@@ -1,10 +1,10 @@
 """Forces within a robot, from the balance of what lies beyond a cut: (121) to (128)."""
 
-from .cuts import Balance, ExternalLoad, Reaction, SectionForces
-from .force_channels import force_channels
+from .cuts import Balance, PointLoad, Reaction, SectionForces
 from .internal_forces import (
     InternalForces,
     LinkForces,
+    balances,
     check_continuous,
     internal_forces,
     sections_known,
@@ -12,13 +12,13 @@ from .internal_forces import (
 
 __all__ = [
     "Balance",
-    "ExternalLoad",
     "InternalForces",
     "LinkForces",
+    "PointLoad",
     "Reaction",
     "SectionForces",
+    "balances",
     "check_continuous",
-    "force_channels",
     "internal_forces",
     "sections_known",
 ]

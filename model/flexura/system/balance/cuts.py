@@ -19,10 +19,9 @@ from .motion import LinkMotion, link_motions
 SAME = 1e-9  # of a link's length: what is closer to a cut is at it
 
 
-class ExternalLoad(NamedTuple):
-    """A load on link `link` (from 0), at the abscissa `at` [m]: force x + iy [N] and moment [N m],
-    constant or (T,). The force is along the base's axes, or, if it `turns`, along and across the
-    line (131)."""
+class PointLoad(NamedTuple):
+    """A load from outside on link `link` (from 0), at the abscissa `at` [m]: force x + iy [N] and
+    moment [N m], constant or (T,). `turns`: the force is along and across the line there (131)."""
 
     link: int
     at: float
@@ -62,7 +61,7 @@ class Balance:
         q: np.ndarray,
         qd: np.ndarray,
         qdd: np.ndarray,
-        loads: Sequence[ExternalLoad] = (),
+        loads: Sequence[PointLoad] = (),
     ) -> None:
         self.structure, self.robot, self.loads = structure, structure.robot, loads
         self.q, self.gravity = q, complex(*structure.robot.gravity_m_s2)
@@ -182,9 +181,9 @@ class Balance:
         out = total([], len(self.q))
         for load in self.loads:
             if load.link == motion.number:
-                here = motion.at(load.at)
-                force = load.force * here.tangent if load.turns else load.force
-                moment = cross(here.place, force) + load.moment
+                place = motion.at(load.at)
+                force = load.force * (place.tangent if load.turns else 1.0)
+                moment = cross(place.place, force) + load.moment
                 out = out.less(Wrench(force, moment).where(load.at >= s))
         return out
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -10,9 +11,12 @@ from numpy.typing import ArrayLike
 from ...errors import InputError, guarded
 from ...io import array, number
 from ...robot import Robot
+from ...signals import Loads, LoadsLike, as_loads
 from ..statics import static
 from ..system import RobotLike, System, assemble
-from .cuts import Balance, ExternalLoad, Reaction
+from .cuts import Balance, PointLoad, Reaction
+
+ROWS = 500  # times in one sweep
 
 
 class LinkForces(NamedTuple):
@@ -94,11 +98,13 @@ def internal_forces(
     *,
     tip_force: ArrayLike = (0.0, 0.0),
     tip_moment: float = 0.0,
+    loads: LoadsLike = None,
+    t: float = 0.0,
 ) -> InternalForces:
     """The forces within a robot in a state: of its joints, and along its links (121) to (128).
 
-    They are what the masses beyond a cut take against inertia and gravity, less the load at the
-    tip. For all times of a simulation: `flexura.simulate(..., internal_forces=True)`.
+    They are what the masses beyond a cut take against inertia and gravity, less the loads.
+    For all times of a simulation: `flexura.simulate(..., internal_forces=True)`.
 
     Args:
         robot: a System, a Robot, or the path or name of a robot file.
@@ -107,6 +113,8 @@ def internal_forces(
         qdd: its accelerations (n,); None: none.
         tip_force: x and y [N] at the last tip, in the base's axes.
         tip_moment: moment there [N m].
+        loads: forces and moments on links, as in `flexura.simulate`.
+        t: the time whose loads act [s].
 
     Returns:
         The forces, by `reaction(joint)` and `link(link, s)`.
@@ -118,17 +126,60 @@ def internal_forces(
     system = assemble(robot)
     check_continuous(system)
     force = array(tip_force, "tip_force", "expected a finite force (x, y) in newtons", (2,))
-    moment = number(tip_moment, "tip_moment")
-    at = static(system, None, force, moment) if q is None else system.check(q)
+    moment, t = number(tip_moment, "tip_moment"), number(t, "t")
+    at = static(system, None, force, moment, loads=loads, t=t) if q is None else system.check(q)
     rates, more = (
         np.zeros(system.n) if x is None else system.check(x, key)
         for x, key in ((qd, "qd"), (qdd, "qdd"))
     )
     last = len(system.robot.links)
-    load = ExternalLoad(last - 1, system.robot.links[-1].length_m, complex(*force), float(moment))
-    return InternalForces(
-        system, Balance(system.assembly.structure, at[None], rates[None], more[None], [load])
-    )
+    tip = PointLoad(last - 1, system.robot.links[-1].length_m, complex(*force), float(moment))
+    on_links = as_loads(loads, [link.length_m for link in system.robot.links], t, t)
+    acting = [tip, *point_loads(on_links, np.array([t]))]
+    balance = Balance(system.assembly.structure, at[None], rates[None], more[None], acting)
+    return InternalForces(system, balance)
+
+
+def balances(
+    system: System,
+    t: np.ndarray,
+    q: np.ndarray,
+    qd: np.ndarray,
+    qdd: np.ndarray,
+    loads: Loads,
+) -> Iterator[Balance]:
+    """The balances of a run, of some hundred times each, which bounds the memory they take.
+
+    Args:
+        system: the robot.
+        t: times (T,) [s].
+        q: configurations (T, n).
+        qd: their rates (T, n).
+        qdd: their accelerations (T, n).
+        loads: forces and moments on links.
+
+    Yields:
+        One Balance after the other; one of no time, if there is none.
+
+    Raises:
+        InputError: the robot slides from node to node.
+    """
+    check_continuous(system)
+    for first in range(0, max(len(t), 1), ROWS):
+        rows = slice(first, first + ROWS)
+        acting = point_loads(loads, t[rows])
+        yield Balance(system.assembly.structure, q[rows], qd[rows], qdd[rows], acting)
+
+
+def point_loads(loads: Loads, t: np.ndarray) -> list[PointLoad]:
+    """The loads of a run at times (T,) [s], as the balance takes them (130), (131)."""
+    if not loads or not len(t):
+        return []
+    values = np.array([loads.values(float(at)) for at in t])  # (T, L, 3)
+    return [
+        PointLoad(int(link), float(at), own[:, 0] + 1j * own[:, 1], own[:, 2], bool(turns))
+        for (link, at, turns), own in zip(loads.rows, values.transpose(1, 0, 2), strict=True)
+    ]
 
 
 def check_continuous(system: System) -> None:
