@@ -86,9 +86,9 @@ def study(
             robot or Path("quanser-2dsfl"), data, out, rtol, fit_on, force=force, json=json
         )
         return
-    for key, given in (("--data", data), ("--fit-on", fit_on)):
-        if given is not None:
-            raise fx.InputError("expected with KIND measured alone", key=key, value=str(given))
+    for key, own in (("--data", data), ("--fit-on", fit_on)):
+        if own is not None:
+            raise fx.InputError("expected with KIND measured alone", key=key, value=str(own))
     if robot is None:
         raise fx.InputError("expected a robot file, or a shipped robot's name", key="ROBOT")
     described = fx.load(robot)
