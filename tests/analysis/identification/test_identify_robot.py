@@ -236,14 +236,17 @@ def test_results_that_cannot_be_written_are_said(found, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)  # 200 identifications, a minute of processor time
 def test_95_percent_intervals_hold_the_truth_in_93_to_97_percent_of_seeds(robot, swing):
-    """Each of four parameters, and all together, over 200 seeds."""
-    true = TRUE | {GAIN: 1.02}
+    true = {MASS: 0.055, DAMPING: 3e-3, GAIN: 1.02}
     held = dict.fromkeys(true, 0)
     seeds = 200
     for seed in range(seeds):
         run = measured(swing, seed=1000 + seed, scale=1.02)
-        for q in identify_robot(robot, run, list(true), inputs=["joint/1/drive"]).quantities:
+        found = identify_robot(
+            robot, run, list(true), fix={STIFFNESS: 0.47}, inputs=["joint/1/drive"]
+        )
+        for q in found.quantities:
             held[q.name] += q.low <= true[q.name] <= q.high
     shares = {name: count / seeds for name, count in held.items()}
     assert 0.93 <= np.mean(list(shares.values())) <= 0.97, shares
