@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json as json_
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from ..studies.measured import Measured, measured, numbers
 from ..studies.measured_figure import png
 from ..studies.measured_fit import MeasuredFit, angle_per_strain, measured_fit
 from ..studies.measured_fit import numbers as measured_fit_numbers
+from ..studies.measured_loop import Loop, closed_loop
 from .output import message, print_results, progress_bars
 from .results import results
 
@@ -45,9 +47,14 @@ def study_measured(
         with progress_bars("measured", "fit") as report:
             found = measured(described, data, rtol=rtol, progress=lambda f: report("measured", f))
             fit = measured_fit(described, found, fit_on, lambda f: report("fit", f))
+            loop = closed_loop(fit, data)
         names = ["measured.json", "measured.png", "identified.toml"]
-        told: dict[str, Any] = {"robot": described.name, "runs": numbers(found)}
-        told |= {"identified": measured_fit_numbers(fit)}
+        told: dict[str, Any] = {
+            "robot": described.name,
+            "runs": numbers(found),
+            "identified": measured_fit_numbers(fit),
+            "closed_loop": None if loop is None else asdict(loop),
+        }
         write_text(draft.folder / names[0], json_.dumps(told, indent=1) + "\n")
         write_bytes(draft.folder / names[1], png(described, found, fit))
         fx.save(fit.found.robot, draft.folder / names[2])
@@ -60,7 +67,7 @@ def study_measured(
     stored = [str(folder / name) for name in names]
     print_results(
         json,
-        lambda: [table(described, found), fitted_table(fit)],
+        lambda: [table(described, found), fitted_table(fit, loop)],
         lambda: told | {"stored": stored},
     )
     message(json, f"stored {folder}: {', '.join(names)}")
@@ -84,7 +91,7 @@ def table(robot: fx.Robot, found: list[Measured]) -> Table:
     return out
 
 
-def fitted_table(fit: MeasuredFit) -> Table:
+def fitted_table(fit: MeasuredFit, loop: Loop | None) -> Table:
     """One row a run, by the robot that was fitted to one of them."""
     heads = ("run", "measured [Hz]", "predicted [Hz]", "deviation", "RMS of peak")
     out = Table(f"fitted to {fit.name}, hub as measured", heads, ("run",))
@@ -99,6 +106,11 @@ def fitted_table(fit: MeasuredFit) -> Table:
     for q in fit.found.quantities:
         out.notes.append(
             f"{q.name} = {number(q.value)} {q.unit}, 95 %: {number(q.low)} to {number(q.high)}"
+        )
+    if loop is not None:
+        out.notes.append(
+            f"closed loop under the maker's LQR, RMS of peak: hub {percent(loop.hub)}, gauge "
+            f"{percent(loop.gauge)}, current {percent(loop.current)}"
         )
     out.notes.append("the gauge's filter is the maker's: second order, 2 Hz, damping ratio 0.9")
     return out

@@ -1,13 +1,13 @@
 """Parameters of any robot from runs of it: the truth comes back, with honest intervals."""
 
 import json
-import os
 
 import numpy as np
 import pytest
 
 import flexura as fx
 from commands import run as command
+from flexlab.cli.identify_robot import _written
 from flexlab.identification import identify_robot
 from flexlab.identification.fit.model import low_pass
 
@@ -75,6 +75,7 @@ def test_a_measured_motion_tells_the_strip(robot):
         assert q.value == pytest.approx(TRUE[q.name], rel=0.02 if q.name == STIFFNESS else 0.1)
 
 
+@pytest.mark.slow
 def test_a_closed_loop_with_known_gains_tells_them_too(robot, tmp_path):
     gains = tmp_path / "gains.toml"
     gains.write_text("[controller]\nrate_Hz = 500.0\nkp_1_N_m_rad = 4.0\nkd_1_N_m_s_rad = 0.3\n")
@@ -93,6 +94,7 @@ def test_a_closed_loop_with_known_gains_tells_them_too(robot, tmp_path):
     close(found, TRUE, spread=6.0)
 
 
+@pytest.mark.slow
 def test_joint_and_drive_of_a_robot_with_two_links():
     robot = fx.load("rig-rr")
     friction = "joint.1.viscous_friction_N_m_s_rad"
@@ -130,6 +132,7 @@ def test_the_derivatives_are_those_of_the_linearised_motion(robot):
             assert own / scale == pytest.approx(slope, abs=5e-3 * np.abs(slope).max())
 
 
+@pytest.mark.slow
 def test_what_has_the_same_effect_is_said(robot, swing):
     keys = [STIFFNESS, "joint/1/drive.gain", MASS, "link.1.mass_per_length_kg_m"]
     keys.append("link.1.joint.hub_inertia_kg_m2")
@@ -226,27 +229,24 @@ def test_the_command_shows_results_and_writes_a_robot_file(robot, swing, tmp_pat
     assert command(asked)[0] == 2  # the file is there
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="root writes everywhere")
-def test_results_come_before_files(swing, tmp_path):
-    measured(swing).save(tmp_path / "run")
-    (tmp_path / "run").chmod(0o500)
-    try:
-        asked = ["identify", tmp_path / "run", "--fit", MASS, "--input", "joint/1/drive"]
-        status, text, said = command(asked)
-    finally:
-        (tmp_path / "run").chmod(0o700)
-    assert status == 0 and MASS in text and "is not written" in said
+def test_results_that_cannot_be_written_are_said(found, tmp_path):
+    (tmp_path / "file").write_text("")
+    stored, missing = _written(found, None, tmp_path / "file")
+    assert stored == [] and "robot.toml is not written" in missing
 
 
 @pytest.mark.slow
-def test_95_percent_intervals_hold_the_truth_in_93_to_97_of_100_seeds(robot, swing):
-    """Each of four parameters, and all together, over 200 seeds."""
-    true = TRUE | {GAIN: 1.02}
+@pytest.mark.timeout(900)  # 200 identifications, a minute of processor time
+def test_95_percent_intervals_hold_the_truth_in_93_to_97_percent_of_seeds(robot, swing):
+    true = {MASS: 0.055, DAMPING: 3e-3, GAIN: 1.02}
     held = dict.fromkeys(true, 0)
     seeds = 200
     for seed in range(seeds):
         run = measured(swing, seed=1000 + seed, scale=1.02)
-        for q in identify_robot(robot, run, list(true), inputs=["joint/1/drive"]).quantities:
+        found = identify_robot(
+            robot, run, list(true), fix={STIFFNESS: 0.47}, inputs=["joint/1/drive"]
+        )
+        for q in found.quantities:
             held[q.name] += q.low <= true[q.name] <= q.high
     shares = {name: count / seeds for name, count in held.items()}
     assert 0.93 <= np.mean(list(shares.values())) <= 0.97, shares

@@ -16,6 +16,7 @@ from commands import run as command
 from flexlab.identification.fit.model import low_pass
 from flexlab.studies.measured import GAUGE, measured, ring
 from flexlab.studies.measured_fit import FILTER, angle_per_strain, measured_fit
+from flexlab.studies.measured_loop import closed_loop
 
 
 @pytest.fixture
@@ -67,13 +68,16 @@ def test_the_data_sheet_is_within_7_percent_of_every_measured_step(data):
 
 
 @pytest.mark.slow
-def test_fitted_to_one_run_it_predicts_the_others(data):
+def test_fitted_to_one_run_it_predicts_the_others_and_the_closed_loop(data):
     robot = fx.load("quanser-2dsfl")
     fit = measured_fit(robot, measured(robot, data))
     assert fit.name == "lqg_step_10deg_run01" and len(fit.runs) >= 6
     for run in fit.runs:
         assert abs(run.deviation) < 0.02, run.name
         assert run.rms_of_peak < 0.10, run.name
+    loop = closed_loop(fit, data)
+    assert loop is not None and max(loop.hub, loop.gauge, loop.current) < 0.20
+    assert loop.hub < 0.02
 
 
 def test_the_makers_filter_and_conversion_are_those_of_its_file(data):
