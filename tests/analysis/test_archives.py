@@ -12,9 +12,13 @@ import flexura as fx
 from flexura.io import seal
 
 
+LARGE = {"review": 13}  # of 70 kB one byte of so many
+
+
 @pytest.mark.parametrize("every", [83, pytest.param(1, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("kind", archives.KINDS)
 def test_every_flipped_byte_is_refused_or_said(kind, every, tmp_path, record_property):
+    every *= LARGE.get(kind, 1)
     counts = archives.damaged(archives.KINDS[kind](tmp_path / kind), every)
     print(f"{kind}: {dict(counts)}")
     record_property("flips", dict(counts))
@@ -27,7 +31,8 @@ def test_every_flipped_byte_is_refused_or_said(kind, every, tmp_path, record_pro
 def test_a_shortened_or_lengthened_archive_is_refused_or_the_same(kind, tmp_path):
     archive = archives.KINDS[kind](tmp_path / kind)
     good, right = archive.file.read_bytes(), archives.same(archive.read())
-    for content in [*(good[:size] for size in range(0, len(good), 41)), good + b"\0", good + good]:
+    step = 41 * LARGE.get(kind, 1)
+    for content in [*(good[:size] for size in range(0, len(good), step)), good + b"\0", good + good]:
         archive.file.write_bytes(content)
         try:
             found = archive.read()

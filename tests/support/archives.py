@@ -13,6 +13,8 @@ import pyarrow.parquet as pq
 
 import flexura as fx
 from flexlab.recordings import recording
+from flexlab.review import write_review
+from flexlab.review.headless import default_time
 from flexlab.studies import output
 from flexlab.studies.sweep import Finding, Study
 from flexlab.tuning import history as histories
@@ -146,12 +148,20 @@ def stored_recording(folder: Path, name: str) -> Archive:
     )
 
 
+def review(folder: Path) -> Archive:
+    folder.mkdir(parents=True, exist_ok=True)
+    made = fx.Run(T, {"tip/x": np.sin(T)}, {"tip/x": "m"}, {"source": "simulation"})
+    path = write_review(folder / "review.rrd", [made])
+    return Archive(path, lambda: default_time(path))
+
+
 KINDS: dict[str, Callable[[Path], Archive]] = {
     "run": run,
     "chunk": chunk,
     "request": request,
     "search": state,
     "study": study,
+    "review": review,
     "session": lambda folder: stored_recording(folder, recording.SESSION),
     "events": lambda folder: stored_recording(folder, recording.EVENTS),
 }

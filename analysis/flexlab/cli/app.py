@@ -3,11 +3,13 @@ or a call would wait."""
 
 from __future__ import annotations
 
+import _thread
 import errno
 import gc
 import importlib
 import keyword
 import sys
+import threading
 from typing import Annotated, Any, NoReturn
 
 import typer
@@ -66,13 +68,15 @@ class Commands(TyperGroup):
         command.name = cmd_name
         return command
 
-    def invoke(self, ctx: Any) -> Any:
+    def main(self, *args: Any, **keys: Any) -> Any:
         """Call a command; Ctrl-C ends it with a word, where it does not keep what it has."""
         try:
-            return super().invoke(ctx)
-        except KeyboardInterrupt:
-            typer.echo("flexura: interrupted", err=True)
-            raise typer.Exit(130) from None
+            return super().main(*args, **keys)
+        except SystemExit as end:
+            # typer ends an interrupt so, without a word
+            if isinstance(getattr(end.__context__, "__cause__", None), KeyboardInterrupt):
+                typer.echo("flexura: interrupted", err=True)
+            raise
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """The table of commands, without importing any."""
@@ -122,6 +126,7 @@ def main() -> None:
     in status 1."""
     # looking for garbage among a million objects just imported is a tenth of the start
     gc.set_threshold(100_000)
+    sys.unraisablehook = _unraisable
     try:
         app()
     except KeyboardInterrupt:
@@ -140,6 +145,16 @@ def main() -> None:
             raise
         typer.echo(f"flexura: {error}", err=True)
         sys.exit(2 if isinstance(error, InputError) else 1)
+
+
+def _unraisable(what: Any) -> None:
+    """An interrupt that compiled code could not pass on comes again, a moment later."""
+    if issubclass(what.exc_type, KeyboardInterrupt):
+        again = threading.Timer(0.01, _thread.interrupt_main)
+        again.daemon = True
+        again.start()
+    else:
+        sys.__unraisablehook__(what)
 
 
 def _end_without_memory(error: Exception) -> NoReturn:

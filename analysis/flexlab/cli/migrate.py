@@ -6,13 +6,14 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 import flexura as fx
-from flexura.io import check_format, read_toml, write_bytes
+from flexura.io import check_format, read_toml, replaced, write_bytes
 from flexura.robot import OldKey, renamed
 
 from .options import Json
@@ -44,9 +45,8 @@ def migrate(
     Example: flexura migrate my-arm.toml
     """
     done = [(file, *rewritten(file)) for file in files]
-    for file, text, old in done:
-        if old and not check:
-            write_bytes(file, text.encode())
+    if not check:
+        _write_all({file: text.encode() for file, text, old in done if old})
     found = {
         str(file): [{"key": each.path, "new": each.new} for each in old] for file, _, old in done
     }
@@ -57,6 +57,20 @@ def migrate(
         message(json, *lines or [f"{file}: nothing to rename"])
     if check and any(old for _, _, old in done):
         raise typer.Exit(1)
+
+
+def _write_all(new: dict[Path, bytes]) -> None:
+    """Write all files or none: no file takes its name before all of them are on the disk."""
+    old = {file: file.read_bytes() for file in new}
+    try:
+        with ExitStack() as drafts:
+            for file, data in new.items():
+                drafts.enter_context(replaced(file)).write_bytes(data)
+    except BaseException:
+        for file in new:
+            if file.read_bytes() != old[file]:
+                write_bytes(file, old[file])
+        raise
 
 
 def rewritten(file: Path) -> tuple[str, list[OldKey]]:

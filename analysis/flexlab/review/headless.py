@@ -25,6 +25,8 @@ from flexura.errors import FlexuraError, InputError
 from flexura.io import write_bytes
 from flexura.optional import Optional, load
 
+from .seal import check_review
+
 rerun_cli = Optional("rerun_cli")
 
 MENU_PX = 36  # the height of the viewer's menu, which stays as an empty strip when it is hidden
@@ -63,8 +65,7 @@ def default_time(rrd: str | Path) -> float:
     RrdReader = load("rerun.chunk").RrdReader
 
     path = Path(rrd)
-    if not path.is_file():
-        raise InputError("no such file: expected a review (.rrd)", file=str(rrd))
+    check_review(path)
     try:
         for chunk in RrdReader(path).stream().filter(content="/__properties/review"):
             batch = chunk.to_record_batch()
@@ -206,8 +207,7 @@ def _without_menu(png: bytes, size: tuple[int, int]) -> bytes:
 def open_window(rrd: str | Path) -> subprocess.Popen[bytes]:
     """Open the viewer's window; see `flexlab.review.open_viewer`."""
     path = Path(rrd)
-    if not path.is_file():
-        raise InputError("no such file: expected a review (.rrd)", file=str(rrd))
+    check_review(path)
     if sys.platform.startswith("linux") and not (
         os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     ):

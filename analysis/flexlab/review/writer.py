@@ -24,6 +24,7 @@ from flexura.io.drawing import MAX_SAMPLES, curves, extent, frames, grid, thinne
 
 from ..runs.deviation import TIP_DISTANCE, common, compared, deviation
 from .layout import Scene, blueprint
+from .seal import sealed_review
 from .sources import (
     DEVIATION,
     NAMES,
@@ -70,7 +71,7 @@ def write(path: str | Path, groups: dict[str, Sequence[Run]]) -> Path:
             _write(rec, shown, scene)
         rec.flush()
         content = held.drain_as_bytes()
-    write_bytes(target, content)
+    write_bytes(target, sealed_review(content))
     return target
 
 

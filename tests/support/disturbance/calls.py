@@ -1,4 +1,7 @@
-"""Every command that keeps something: a small call of it, what it makes, and what it needs."""
+"""Every command of `flexura`: a small call of it, what it makes, and what it needs.
+
+A test holds that no command is missing here.
+"""
 
 from __future__ import annotations
 
@@ -7,115 +10,154 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from .inputs import CALLED, LAW, MADE, VARY, cut_off
 from .programs import Ended, Program
 
-LAW = ["rig", "rig-inverse-law"]
 TUNE = ["tune", "rig", "rig-step", "--controller", "rig", "--rig", "rig", "--jobs", "1"]
 TUNE += ["--free", "kp_1_V_m=100:10000", "--population", "4", "--generations", "2"]
 STUDY = ["study", "payload", "type-1-rr", "type-1-bang-bang", "--values", "0:0.2:3", "--jobs", "1"]
-VARY = ["simulate", *LAW, "--vary", "payload.mass_kg=0:0.1:3"]
+INVERT = ["invert", "single-r", "--angle", "0", "0.2", "--duration", "0.3", "--step", "0.01"]
 
 
 @dataclass(frozen=True)
 class Command:
     """A call of `flexura`.
 
-    `out`: what it makes, below the working folder; `force`: whether it can replace that;
-    `resumes`: the same call goes on; `other`: arguments that change every number of the result.
+    Attributes:
+        arguments: after `flexura`.
+        out: what it makes, below the working folder; empty: it keeps nothing.
+        needs: its inputs, by name (disturbance/inputs.py).
+        own: which of them it changes, so that it gets a copy.
+        force: whether it can replace what is there.
+        resumes: the same call goes on with what was kept.
+        other: arguments that change every number of the result.
+        firmware: it takes a built firmware.
+        dear: it takes seconds, and is disturbed in the long tier alone.
     """
 
     arguments: list[Any]
-    out: str
+    out: str = ""
+    needs: tuple[str, ...] = ()
+    own: tuple[str, ...] = ()
     force: bool = True
     resumes: bool = False
     other: tuple[str, ...] = ()
     firmware: bool = False
+    dear: bool = False
 
     def call(self, firmware: Path | None = None) -> list[Any]:
         return [*self.arguments, *(("--firmware", firmware) if self.firmware else ())]
 
 
+def export(run: str, to: str) -> Command:
+    """A run or a population in another program's format."""
+    out = f"out.{to}"
+    return Command(["export", run, "--to", to, "--out", out], out, (run,))
+
+
+FINER = ("--rtol", "1e-4")
 COMMANDS = {
-    "simulate": Command(["simulate", *LAW, "--out", "out"], "out", other=("--rtol", "1e-4")),
-    "simulate --vary": Command([*VARY, "--out", "out"], "out", False, True),
+    "simulate": Command(["simulate", *LAW, "--out", "out"], "out", other=FINER),
+    "simulate --vary": Command([*VARY, "--out", "out"], "out", force=False, resumes=True),
     "inverse": Command(["inverse", *LAW, "--out", "out"], "out"),
-    "crosscheck": Command(["crosscheck", *LAW, "--out", "out"], "out", other=("--rtol", "1e-4")),
-    "study": Command([*STUDY, "--out", "out"], "out", other=("--rtol", "1e-4")),
-    "tune": Command([*TUNE, "--out", "out"], "out", False, True),
-    "compare": Command(["compare", "a", "b", "--out", "out"], "out"),
-    "review": Command(["review", "a", "--save", "out.rrd"], "out.rrd"),
-    "plot": Command(["plot", "a", "--out", "out.png"], "out.png"),
-    "animate": Command(["animate", "a", "--out", "out.gif"], "out.gif"),
-    "export csv": Command(["export", "a", "--to", "csv", "--out", "out.csv"], "out.csv"),
-    "export mat": Command(["export", "a", "--to", "mat", "--out", "out.mat"], "out.mat"),
-    "export tdms": Command(["export", "a", "--to", "tdms", "--out", "out.tdms"], "out.tdms"),
-    "export mcap": Command(["export", "a", "--to", "mcap", "--out", "out.mcap"], "out.mcap"),
-    "export parquet": Command(
-        ["export", "a", "--to", "parquet", "--out", "out.parquet"], "out.parquet"
+    "invert": Command([*INVERT, "--out", "out"], "out"),
+    "frequencies": Command(["frequencies", "rig"]),
+    "crosscheck": Command(["crosscheck", *LAW, "--out", "out"], "out", other=FINER),
+    "study": Command([*STUDY, "--out", "out"], "out", other=FINER),
+    "study measured": Command(
+        ["study", "measured", "--data", "measured", "--out", "out"], "out", ("measured",), dear=True
     ),
-    "export population": Command(["export", "p", "--to", "csv", "--out", "out.csv"], "out.csv"),
+    "tune": Command([*TUNE, "--out", "out"], "out", force=False, resumes=True),
+    "identify": Command(["identify", "e", "--out", "out.toml"], "out.toml", ("e",), dear=True),
+    "vibration": Command(["vibration", "v", "--out", "out"], "out", ("v",)),
+    "compare": Command(["compare", "a", "b", "--out", "out"], "out", ("a", "b")),
+    "review": Command(["review", "a", "--save", "out.rrd"], "out.rrd", ("a",)),
+    "plot": Command(["plot", "a", "--out", "out.png"], "out.png", ("a",)),
+    "animate": Command(["animate", "a", "--out", "out.gif"], "out.gif", ("a",), dear=True),
+    "import": Command(["import", "log.csv", "--out", "out"], "out", ("log.csv",)),
+    **{f"export {to}": export("a", to) for to in ("csv", "mat", "tdms", "mcap", "parquet")},
+    "export population": export("p", "csv"),
+    "migrate": Command(
+        ["migrate", "out.toml", "second.toml"], "out.toml", own=("out.toml", "second.toml")
+    ),
     "new": Command(["new", "out.toml"], "out.toml"),
-    "migrate": Command(["migrate", "out.toml"], "out.toml", False),
+    "robots": Command(["robots"]),
+    "doctor": Command(["doctor"]),
     "bench step": Command(
         ["bench", "step", "--duration-s", "0.9", "--emulated", "--out", "out"],
         "out",
-        False,
+        force=False,
         firmware=True,
     ),
     "bench calibrate": Command(
         ["bench", "calibrate", "--emulated", "--out", "out", "--tips-mm=-20,-12,-4,4,12,20"],
         "out",
-        False,
+        force=False,
         firmware=True,
     ),
-    "identify": Command(["identify", "e", "--out", "out.toml"], "out.toml"),
+    "bench recover": Command(["bench", "recover", "r"], "r", own=("r",)),
+}
+
+# Of the words of a command, why it is not among these.
+LEFT_OUT = {
+    **{
+        ("bench", name): "an experiment as `bench step`, by the same function from files to table"
+        for name in ("forward", "inverse", "free-vibration", "excite")
+    },
+    ("demo",): "simulate, crosscheck, bench and review, one after the other, into one draft",
+    ("flash",): "keeps nothing but PlatformIO's own build, and what is in the board",
 }
 
 
 class Place:
-    """A working folder with finished results `a`, `b`, `p`, `e`, from which it is made anew."""
+    """A working folder with inputs; each is made when the first command needs it."""
 
     def __init__(self, program: Program, folder: Path, firmware: Path | None = None) -> None:
-        self.program, self.folder, self.firmware = program, folder, firmware
+        self.program, self.folder, self._firmware = program, folder, firmware
         self.kept = folder / "kept"
         self.kept.mkdir(parents=True)
-        made = [
-            ["simulate", *LAW, "--out", "a"],
-            ["simulate", *LAW, "--out", "b", "--rtol", "1e-4"],
-        ]
-        made.append([*VARY, "--out", "p"])
-        for arguments in made:
-            ended = program.run(arguments, self.kept)
-            assert ended.status == 0, ended.err
 
-    def with_experiment(self) -> None:
-        """An emulated experiment `e` for `identify`; it takes some seconds."""
-        if (self.kept / "e").exists():
-            return
-        call = ["bench", "excite", "--emulated", "--firmware", self.firmware, "--out", "e"]
+    @property
+    def firmware(self) -> Path:
+        """The emulated board's program, built when it is first needed."""
+        if self._firmware is None:
+            from boards import elf
+
+            self._firmware = elf()
+        return self._firmware
+
+    def _input(self, name: str) -> Path:
+        path = self.kept / name
+        if path.exists():
+            return path
+        if name in MADE:
+            MADE[name](path)
+            return path
+        call = CALLED[name]
+        if call[0] == "bench":
+            call = [*call, "--firmware", self.firmware]
         ended = self.program.run(call, self.kept)
         assert ended.status == 0, ended.err
+        if name == "r":
+            cut_off(path)
+        return path
 
-    def fresh(self) -> Path:
-        """A working folder with the inputs alone; an older robot file for `migrate`."""
+    def fresh(self, command: Command | None = None) -> Path:
+        """A working folder with the inputs of a command alone."""
         work = self.folder / "work"
         shutil.rmtree(work, ignore_errors=True)
         work.mkdir()
-        for each in self.kept.iterdir():
-            (work / each.name).symlink_to(each)
+        for name in command.needs if command else ():
+            (work / name).symlink_to(self._input(name))
+        for name in command.own if command else ():
+            kept = self._input(name)
+            (shutil.copytree if kept.is_dir() else shutil.copyfile)(kept, work / name)
         return work
-
-    def old_robot(self, work: Path) -> None:
-        """A robot file with keys of an older version, for `migrate`."""
-        shipped = Path(__file__).resolve().parents[3] / "model" / "robots" / "single-r.toml"
-        text = shipped.read_text().replace(
-            "[link.joint]", "[link.joint]\nviscous_friction = 0.001", 1
-        )
-        (work / "out.toml").write_text(text)
 
     def run(self, command: Command, work: Path, *more: str, **disturbance: Any) -> Ended:
         """Run a command in a working folder."""
-        return self.program.run([*command.call(self.firmware), *more], work, **disturbance)
+        firmware = self.firmware if command.firmware else None
+        return self.program.run([*command.call(firmware), *more], work, **disturbance)
 
 
 def files(folder: Path) -> dict[str, bytes]:

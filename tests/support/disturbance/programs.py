@@ -20,7 +20,7 @@ PATHS = [ROOT / "model", ROOT / "analysis"]
 @dataclass(frozen=True)
 class Ended:
     """How a command ended; `operations`: how many of the disturbed kind there were; `disturbed`:
-    whether one failed."""
+    whether one failed; `sent`: whether it got the signal; `cpu_s`: its processor time."""
 
     status: int
     out: str
@@ -29,6 +29,7 @@ class Ended:
     operations: int
     disturbed: bool
     sent: bool
+    cpu_s: float
 
 
 @cache
@@ -108,4 +109,5 @@ class Program:
         out, err = (Path(files[name]).read_text(errors="replace") for name in ("out", "err"))
         counts = Path(files["counts"])
         many, fired = json.loads(counts.read_text() or "[0, 0]") if counts.exists() else (0, 0)
-        return Ended(done["status"], out, err, done["s"], many, bool(fired), done["sent"])
+        seen = (done["s"], many, bool(fired), done["sent"], done["cpu_s"])
+        return Ended(done["status"], out, err, *seen)

@@ -16,6 +16,9 @@ import time
 import traceback
 from typing import Any
 
+import typer
+
+SIGNALS = {signal.SIGINT, signal.SIGTERM}
 KINDS = {"write": 1, "sync": 2, "rename": 3, "create": 4, "allocation": 5, "array": 6}
 LIGHT = ("simulate", "new")  # commands of the quick tests
 HEAVY = ("matplotlib.backends.backend_agg", "matplotlib.backends.backend_svg")
@@ -33,10 +36,17 @@ def main() -> None:
         asked = json.loads(line)
         if light and asked["arguments"][0] not in LIGHT:
             light = False
-            for name in (*HEAVY, *(f"flexlab.cli.{command}" for command in cli.COMMANDS)):
+            group = typer.main.get_command(cli.app)
+            for name in HEAVY:
                 importlib.import_module(name)
+            for name in cli.COMMANDS:
+                group.get_command(None, name)
+        # a command gets no signal before it begins
+        signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
         child = os.fork()
-        if child == 0:
+        if child:
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+        else:
             _run(cli, shim, asked)
         print(json.dumps(_watched(child, asked)), flush=True)
 
@@ -46,7 +56,7 @@ def _watched(child: int, asked: dict[str, Any]) -> dict[str, Any]:
     began = time.monotonic()
     sent = False
     while True:
-        done, status = os.waitpid(child, os.WNOHANG)
+        done, status, used = os.wait4(child, os.WNOHANG)
         if done:
             break
         now = time.monotonic() - began
@@ -59,6 +69,7 @@ def _watched(child: int, asked: dict[str, Any]) -> dict[str, Any]:
     return {
         "status": os.waitstatus_to_exitcode(status),
         "s": time.monotonic() - began,
+        "cpu_s": used.ru_utime + used.ru_stime,
         "sent": sent,
     }
 
@@ -87,6 +98,10 @@ def _run(cli: Any, shim: Any, asked: dict[str, Any]) -> None:
             used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
             resource.setrlimit(resource.RLIMIT_AS, (used + asked["memory"],) * 2)
         try:
+            if signal.sigpending() & SIGNALS:
+                print("interrupted before it began", file=sys.stderr)
+                sys.exit(130)
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
             cli.main()
             status = 0
         except SystemExit as end:

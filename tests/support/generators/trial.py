@@ -3,6 +3,7 @@ the run says that they are not."""
 
 from __future__ import annotations
 
+import re
 import tempfile
 import time
 import traceback
@@ -226,9 +227,11 @@ def faults_of(run: fx.Run, took: float) -> list[str]:
 
 
 def _kind(error: Any) -> str:
+    """What was refused and why, without the robot's own numbers."""
     key = getattr(error, "key", "")
     text = getattr(error, "expected", "") or str(error)
-    return f"{type(error).__name__} {''.join(c for c in key if not c.isdigit())}: {text[:60]}"
+    bare = re.sub(r"[-+]?\d[\d.]*(e[-+]?\d+)?", "#", text)
+    return f"{type(error).__name__} {''.join(c for c in key if not c.isdigit())}: {bare[:60]}"
 
 
 def trials(first: int, count: int, odd: bool = False) -> Count:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import BinaryIO
 
 from ...errors import InputError
 from .formats import csv_file, lvm, mat, mcap_file, rosbag, tables, tdms
 from .log import Log
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
-MOST_BYTES = 4_000_000_000
+MOST_BYTES, PART_BYTES = 4_000_000_000, 1 << 24
 
 
 def read_log(path: str | os.PathLike[str]) -> Log:
@@ -39,13 +40,24 @@ def read_log(path: str | os.PathLike[str]) -> Log:
             head = stream.read(1024)
             if head.startswith(b"#ROSBAG V"):
                 return rosbag.read(place)
-            raw = head + stream.read(MOST_BYTES)
+            raw = _whole(head, stream, name)
     except FileNotFoundError:
         raise InputError("no such file: expected a log", file=name) from None
     except (OSError, ValueError) as error:
         said = getattr(error, "strerror", None) or error
         raise InputError(f"cannot be read ({said}): expected a log", file=name) from None
     return _read(raw, place, name)
+
+
+def _whole(head: bytes, stream: BinaryIO, name: str) -> bytes:
+    """All bytes of a file; they are read in parts, since a read takes the memory that it asks for."""
+    parts, count = [head], len(head)
+    while part := stream.read(PART_BYTES):
+        parts.append(part)
+        count += len(part)
+        if count > MOST_BYTES:
+            raise InputError("more than 4 GB: expected a shorter log", file=name)
+    return b"".join(parts)
 
 
 def _read(raw: bytes, place: Path, name: str) -> Log:
