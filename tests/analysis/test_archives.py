@@ -11,7 +11,6 @@ import archives
 import flexura as fx
 from flexura.io import seal
 
-
 LARGE = {"review": 13}  # of 70 kB one byte of so many
 
 
@@ -32,7 +31,11 @@ def test_a_shortened_or_lengthened_archive_is_refused_or_the_same(kind, tmp_path
     archive = archives.KINDS[kind](tmp_path / kind)
     good, right = archive.file.read_bytes(), archives.same(archive.read())
     step = 41 * LARGE.get(kind, 1)
-    for content in [*(good[:size] for size in range(0, len(good), step)), good + b"\0", good + good]:
+    for content in [
+        *(good[:size] for size in range(0, len(good), step)),
+        good + b"\0",
+        good + good,
+    ]:
         archive.file.write_bytes(content)
         try:
             found = archive.read()

@@ -1,7 +1,7 @@
 """Generated robots and files: each is refused in a sentence, or its numbers are right, or the run
 says that they are not.
 
-A failure names its seed: `trial(seed, odd)` of generators/trial.py repeats it.
+A failure names its seed. `PYTHONPATH=tests/support python -m generators SEED 1 [--odd]` repeats it.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import os
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
+from itertools import repeat
 
 import numpy as np
 import pytest
@@ -129,21 +130,17 @@ def test_the_twin_of_some_generated_robots():
 
 @pytest.mark.long
 @pytest.mark.timeout(10 * 3600)
-def test_100_000_generated_robots():
-    """A third of them with one odd number. Seeds are those of the blocks that are printed."""
+@pytest.mark.parametrize("part", range(10))
+def test_100_000_generated_robots(part, capsys):
+    """Ten parts of 10 000 seeds, a third of them with one odd number. What is wrong is printed when
+    it is found, with its seed; `python -m generators SEED 1` repeats it."""
+    firsts = range(100_000 + 10_000 * part, 110_000 + 10_000 * part, 100)
+    odds = [k % 3 == 0 for k in range(len(firsts))]
     total, odd = Count(), Count()
-    with ProcessPoolExecutor(os.cpu_count()) as pool:
-        firsts = range(100_000, 200_000, 100)
-        for k, found in enumerate(pool.map(_block, firsts)):
-            (odd if _odd(firsts[k]) else total).add(found)
-    print(total, odd, sep="\n")
+    with ProcessPoolExecutor(os.cpu_count()) as pool, capsys.disabled():
+        for with_odd, found in zip(odds, pool.map(trials, firsts, repeat(100), odds), strict=True):
+            (odd if with_odd else total).add(found)
+            print(*found.wrong, sep="\n", end="\n" * bool(found.wrong), flush=True)
+        print(f"\nwell-formed: {total}", f"with one odd number: {odd}", sep="\n")
     report(total)
     assert odd.wrong == []
-
-
-def _odd(first: int) -> bool:
-    return first % 300 == 0
-
-
-def _block(first: int) -> Count:
-    return trials(first, 100, _odd(first))

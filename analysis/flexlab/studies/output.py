@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from flexura.io import sealed_parquet, write_bytes
+from flexura.io import room_for_arrow, sealed_parquet, write_bytes
 from flexura.optional import load
 
 from ..runs.formatting import number
@@ -115,6 +115,7 @@ def save(study: Study, folder: Path) -> list[Path]:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
+    room_for_arrow()
     about = {key: v for key, v in numbers(study).items() if key != "rows"} | {
         "robot_file": study.robot.to_dict()
     }

@@ -24,7 +24,7 @@ from .files import settle, write_bytes
 from .format import FORMAT, check_format
 from .frames import pandas_frame, xarray_dataset
 from .quantities import converted, fault, from_first, suffix, unit
-from .seal import Damaged, read_sealed, read_table, say_unsealed, sealed_parquet
+from .seal import Damaged, read_sealed, read_table, room_for_arrow, say_unsealed, sealed_parquet
 from .toml_files import Tables
 
 if TYPE_CHECKING:
@@ -280,6 +280,7 @@ class Run:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
+        room_for_arrow(self.t.nbytes * (1 + len(self.channels)))
         columns = {"time_s": self.t} | {
             self.column(name): values for name, values in self.channels.items()
         }

@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import json
 import logging
+import mmap
 import os
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ DIGITS = 64
 SIZE = len(BEGIN) + DIGITS + len(END)
 KEY = "seal"
 LARGE = 10_000_000  # bytes
+ARROW = 16 << 20  # bytes that Arrow takes at most for itself
 FOOTER = 8  # of Parquet: the size of its metadata, and PAR1
 
 _log = logging.getLogger("flexura")
@@ -128,6 +130,22 @@ def read_sealed_json(
     return found, there
 
 
+def room_for_arrow(size: int = 0) -> None:
+    """Ask for memory before Arrow does: where a small piece is refused, Arrow ends the process or
+    waits for ever.
+
+    Args:
+        size: bytes of the table.
+
+    Raises:
+        MemoryError: there is not enough.
+    """
+    try:
+        mmap.mmap(-1, ARROW + size).close()  # as Arrow's own pool does, beside that of C
+    except OSError:
+        raise MemoryError(f"{(ARROW + size) / 1e6:.0f} MB for Parquet") from None
+
+
 def read_table(content: bytes) -> Any:
     """The table of a Parquet file's content.
 
@@ -145,6 +163,7 @@ def read_table(content: bytes) -> Any:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
+    room_for_arrow(len(content))
     large = len(content) > LARGE
     file = pq.ParquetFile(
         pa.BufferReader(content), pre_buffer=large, page_checksum_verification=True

@@ -24,6 +24,7 @@ from ..io import (
     read_sealed,
     read_sealed_json,
     read_table,
+    room_for_arrow,
     say_unsealed,
     sealed_json,
     sealed_parquet,
@@ -65,6 +66,7 @@ class Chunk:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
+        room_for_arrow(sum(values.nbytes for values in self.values.values()))
         columns: dict[str, Any] = {
             "robot": np.arange(self.first + 1, self.first + 1 + len(self)),
             "status": pa.array(self.status.tolist(), pa.string()),

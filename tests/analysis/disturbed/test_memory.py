@@ -15,7 +15,7 @@ FIRST = 6  # of a long series the first allocations fail, and of the rest ever f
 BINDING = 4  # objects of the core that a command makes: nanobind's own table of them may not fail
 CORE, NUMPY = "/flexura/_core", "_multiarray_umath"
 MEGABYTE = 1 << 20
-LIMITS = np.geomspace(0.25, 4000, 20)  # MB; Arrow reserves a gigabyte of addresses
+LIMITS = np.geomspace(0.25, 400, 20)  # MB
 
 
 @pytest.mark.slow

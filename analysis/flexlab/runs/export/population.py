@@ -9,7 +9,7 @@ import json
 import numpy as np
 
 import flexura as fx
-from flexura.io import sealed_parquet
+from flexura.io import room_for_arrow, sealed_parquet
 
 from .as_mat import packed
 
@@ -32,6 +32,7 @@ def as_parquet(population: fx.Population) -> bytes:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
+    room_for_arrow()
     columns, units = population.table()
     arrays = [pa.array(values.tolist()) for values in columns.values()]
     fields = [

@@ -50,7 +50,7 @@ def read_log(path: str | os.PathLike[str]) -> Log:
 
 
 def _whole(head: bytes, stream: BinaryIO, name: str) -> bytes:
-    """All bytes of a file; they are read in parts, since a read takes the memory that it asks for."""
+    """All bytes of a file, read in parts: a read takes all the memory that it asks for."""
     parts, count = [head], len(head)
     while part := stream.read(PART_BYTES):
         parts.append(part)
