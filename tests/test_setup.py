@@ -339,3 +339,13 @@ def test_all_extras_are_in_all():
     named = set(re.fullmatch(r"flexura\[(.*)\]", everything)[1].split(","))
     assert named == set(extras) - {"all", "build", "docs", "test"}
     assert any(text.startswith("flexura[all,build") for text in extras["test"])
+
+
+def test_what_is_broken_on_purpose_is_where_the_table_says():
+    text = (ROOT / "CONTRIBUTING.md").read_text()
+    rows = re.findall(r"^\|.* \| `(\S+\.py)` \| (.*) \|$", text, re.MULTILINE)
+    assert len(rows) > 15
+    for file, names in rows:
+        there = (ROOT / "tests" / file).read_text()
+        for name in re.findall(r"`(\w+)`", names):
+            assert f"def {name}(" in there, (file, name)
