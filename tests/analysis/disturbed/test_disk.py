@@ -14,7 +14,7 @@ QUICK = ("simulate", "new")
 KEEPING = [name for name, command in COMMANDS.items() if command.out]
 DEAR = [name for name in KEEPING if COMMANDS[name].dear]
 SLOW = [n for n in KEEPING if n not in (*QUICK, *DEAR)]
-FIRST, STEP = 6, 61  # of long series the first operations are failed, and of the rest a sample
+FIRST, STEP = 3, 61  # of long series the first operations are failed, and of the rest a sample
 pytestmark = pytest.mark.timeout(3600)  # a command is called up to some hundreds of times
 
 
@@ -51,7 +51,7 @@ def failing_disk(name, place, step):
                 assert ended.status == 0, ended.err
                 break
             assert ended.status in (1, 2), (kind, n, ended.err)
-            assert {k: files(work).get(k) for k in before} == before or name == "bench recover"
+            assert {k: files(work).get(k) for k in before} == before, "inputs were changed"
             counts[kind] += 1
             if command.resumes and kind == "write":
                 again = place.run(command, work)
@@ -95,4 +95,4 @@ def test_a_failing_disk_keeps_the_finished_results(name, place):
             faults += 1
             n += 1 if n < FIRST else STEP
     print(f"{name} over finished results: {faults} faults")
-    assert faults >= 8
+    assert faults >= 6
