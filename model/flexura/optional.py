@@ -64,6 +64,7 @@ def load(name: str, extra: str = "") -> Any:
 
     Raises:
         Missing: its package is not installed, or a library that it needs is not there.
+        MemoryError: a library does not fit into memory.
     """
     package = name.partition(".")[0]
     try:
@@ -74,6 +75,8 @@ def load(name: str, extra: str = "") -> Any:
             raise Missing(f"{package} is not installed; type: {command}") from None
         raise _broken(package, error) from None
     except ImportError as error:
+        if "failed to map segment" in str(error):  # the loader of libraries says so
+            raise MemoryError(f"{package} does not fit") from None
         raise _broken(package, error) from None
 
 

@@ -85,7 +85,12 @@ class Commands(TyperGroup):
 
 
 # what else than MemoryError says so: the loader of libraries, and threads
-SHORT_OF_MEMORY = ("failed to map segment", "cannot allocate memory", "can't start new thread")
+SHORT_OF_MEMORY = (
+    "failed to map segment",
+    "cannot allocate memory",
+    "can't start new thread",
+    "Failed to spawn background thread",
+)
 PLAIN: dict[str, Any] = {
     "add_completion": False,
     "rich_markup_mode": None,
