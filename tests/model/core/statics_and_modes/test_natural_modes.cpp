@@ -4,6 +4,7 @@
 
 #include "check.hpp"
 #include "dynamics/energies.hpp"
+#include "dynamics/piece/mass_proportional_damping.hpp"
 #include "link/assembly.hpp"
 #include "numbers/eigenproblem.hpp"
 #include "statics_and_modes/equilibrium.hpp"
@@ -62,6 +63,26 @@ double definiteness(int n, Numbers M) {
       if (i != j) M[i * n + j] /= std::sqrt(M[i * n + i] * M[j * n + j]);
   for (int i = 0; i < n; ++i) M[i * n + i] = 1.0;
   return cholesky(n, M.data());
+}
+
+// One link with damping alpha, and a payload; of each kind of link one.
+std::vector<Robot> damped(double alpha) {
+  std::vector<Robot> out;
+  for (int kind = 0; kind < 6; ++kind) {
+    Robot robot;
+    Link link = strip(0.5, 0.4, 2.0, 3);
+    link.alpha = alpha;
+    robot.payload_mass = 0.1, robot.payload_inertia = 2e-3;
+    if (kind == 1) link.modes = 2;
+    if (kind == 2 || kind == 5)
+      link.joint.kind = JointKind::sleeve, link.joint.start = 0.35, link.joint.hub_mass = 0.1;
+    if (kind == 3) link.lumps = {{0.2, 0.05, 1e-3}, {0.5, 0.02, 0.0}};
+    if (kind >= 4)
+      robot.payload_off_tip = true, robot.payload_along = 0.04, robot.payload_across = -0.02;
+    robot.links = {link};
+    out.push_back(robot);
+  }
+  return out;
 }
 
 }  // namespace
@@ -348,4 +369,27 @@ TEST("numbers that are none end every search") {
   CHECK(natural_modes(model, q.data(), nullptr, 5).squares.size() <= 5);
   CHECK(natural_modes(model, q.data(), nullptr, 0).squares.size() <= std::size_t(model.n));
   CHECK(equilibrium(model, q.data()).balance != Balance::stable);
+}
+
+TEST("damping in proportion to mass (26) is alpha times M of the straight, clamped link") {
+  check::Random random;
+  const double alpha = 1.7;
+  for (const Robot &robot : damped(alpha)) {
+    const Model<double> model = assemble(robot);
+    Numbers q(model.n), v(model.n), M(model.n * model.n), rows(model.n);
+    const int joint = model.first[0];
+    if (model.kind[0] == JointKind::sleeve) q[joint] = 0.35;
+    for (int k = 0; k < model.n; ++k) v[k] = k == joint ? 0.0 : random(-1.0, 1.0);
+    mass_matrix(model, q.data(), M.data());
+    add_mass_damping(model, q.data(), v.data(), rows.data());
+    double largest = 0.0;
+    for (int k = 0; k < model.n; ++k) {
+      if (k == joint) continue;
+      double expected = 0.0;
+      for (int l = 0; l < model.n; ++l) expected += alpha * M[k * model.n + l] * v[l];
+      CHECK_NEAR(rows[k], expected, 1e-14);
+      largest = std::fmax(largest, std::fabs(expected));
+    }
+    CHECK(largest > 1e-3);
+  }
 }
