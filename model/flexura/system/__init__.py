@@ -17,11 +17,17 @@ from .balance import (
     internal_forces,
     sections_known,
 )
-from .frequency_response import FrequencyResponse, frequency_response
 from .loads import Impact, acting_loads, impact, load_forces, with_payload
 from .sensors import accelerations, sensor_channels
-from .spectrum import Modes, frequencies, modes
-from .statespace import StateSpace, linearize
+from .small_motions import (
+    FrequencyResponse,
+    Modes,
+    StateSpace,
+    frequencies,
+    frequency_response,
+    linearize,
+    modes,
+)
 from .statics import NoEquilibrium, equilibrium, holding, static, tip_pose
 from .system import RobotLike, System, assemble
 

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import InputError
-from ..io import array, choice, write_bytes
-from ..optional import Optional
+from ...errors import InputError
+from ...io import array, choice, write_bytes
+from ...optional import Optional
 from .mode_motion import observed_units
 from .statespace import StateSpace, linearize
-from .system import RobotLike, System, assemble, jacobian
+from ..system import RobotLike, System, assemble, jacobian
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

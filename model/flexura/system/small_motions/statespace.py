@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import FlexuraError, InputError, guarded
-from ..io import choice, summary
-from ..optional import Optional
-from .statics import static
-from .system import RobotLike, System, assemble, jacobian
+from ...errors import FlexuraError, InputError, guarded
+from ...io import choice, summary
+from ...optional import Optional
+from ..statics import static
+from ..system import RobotLike, System, assemble, jacobian
 
 INFINITE = 1e5  # times the fastest pole: a zero beyond is one at infinity, and round-off
 control = Optional("control")

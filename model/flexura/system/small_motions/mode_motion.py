@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..io import STATIONS, Run
-from .system import System
+from ...io import STATIONS, Run
+from ..system import System
 
 FRAMES = 60  # of a period
 STEP = 1e-6  # of a shape, to see how far it moves the robot

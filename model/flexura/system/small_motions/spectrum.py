@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import InputError, guarded
-from ..io import Run, choice, number, whole
+from ...errors import InputError, guarded
+from ...io import Run, choice, number, whole
 from .mode_motion import moving_run
-from .statics import static
-from .system import RobotLike, System, assemble
+from ..statics import static
+from ..system import RobotLike, System, assemble
 
 
 @dataclass(frozen=True)
