@@ -17,7 +17,7 @@ NEW = {
     "drive": "signals.drive",
     "forward": "simulation.dynamics",
     "gains": "control.gains",
-    "lqr": "control.lqr_design",
+    "lqr": "control.linear_quadratic.lqr_design",
     "response": "control.step_metrics",
     "run": "io.run",
     "sampled": "control.sampled",

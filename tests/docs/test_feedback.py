@@ -7,7 +7,7 @@ import pytest
 import flexura as fx
 import robots
 from flexura.control import loop_figures
-from flexura.control.measurements import Measurements
+from flexura.control.linear_quadratic.measurements import Measurements
 from flexura.control.predictive.prediction import Prediction
 from flexura.signals import step
 

@@ -15,7 +15,6 @@ from .controller import (
 from .designed import Designed, design_setting
 from .gains import BOARD, NAMES, Gains, load_controller
 from .gains import load as load_gains
-from .gaussian_design import Design
 from .ilc import (
     JointLoop,
     JointSpring,
@@ -26,9 +25,10 @@ from .ilc import (
     reference_response,
     transform_points,
 )
-from .loop_figures import LoopFigures, LoopMargins, loop_figures
-from .lqg_design import lqg
-from .lqr_design import lqr
+from .linear_quadratic.gaussian_design import Design
+from .linear_quadratic.loop_figures import LoopFigures, LoopMargins, loop_figures
+from .linear_quadratic.lqg_design import lqg
+from .linear_quadratic.lqr_design import lqr
 from .pid import GAINS, PID, Force, Motor, Output, Stepper
 from .predictive import nmpc
 from .sampled import DriveFunction, Sampled

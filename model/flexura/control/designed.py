@@ -26,7 +26,7 @@ from ..errors import InputError
 from ..io import write_toml
 from ..robot import Robot
 from ..signals import PLAUSIBLE, Signal, is_plausible
-from .lqg_design import lqg
+from .linear_quadratic.lqg_design import lqg
 from .predictive import nmpc
 from .sampled import Sampled
 

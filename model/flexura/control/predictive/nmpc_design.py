@@ -12,11 +12,11 @@ from ...errors import InputError
 from ...io import number, whole
 from ...signals import SignalLike
 from ...system import RobotLike, StateSpace, System, assemble, frequencies, linearize
-from ..gaussian_design import Weights, deviation_rows, driven_joints
-from ..lqg_design import limits as limits_of
-from ..lqg_design import motions, noise_of
-from ..measurements import Measurements
-from ..riccati import deviations, discretised, riccati
+from ..linear_quadratic.gaussian_design import Weights, deviation_rows, driven_joints
+from ..linear_quadratic.lqg_design import limits as limits_of
+from ..linear_quadratic.lqg_design import motions, noise_of
+from ..linear_quadratic.measurements import Measurements
+from ..linear_quadratic.riccati import deviations, discretised, riccati
 from ..sampled import Sampled
 from .nmpc_law import NonlinearPredictive, Problem
 from .prediction import Prediction

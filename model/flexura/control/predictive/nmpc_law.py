@@ -11,7 +11,7 @@ import numpy as np
 from ... import core
 from ...signals import Signal, evaluate_many
 from ...system import static
-from ..measurements import Measurements
+from ..linear_quadratic.measurements import Measurements
 from .prediction import Prediction
 from .quadratic_program import FREE, QuadraticProgram
 

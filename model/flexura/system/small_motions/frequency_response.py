@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 from ...errors import InputError
 from ...io import array, choice, write_bytes
 from ...optional import Optional
+from ..system import RobotLike, System, assemble, jacobian
 from .mode_motion import observed_units
 from .statespace import StateSpace, linearize
-from ..system import RobotLike, System, assemble, jacobian
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 
 from ...errors import InputError, guarded
 from ...io import Run, choice, number, whole
-from .mode_motion import moving_run
 from ..statics import static
 from ..system import RobotLike, System, assemble
+from .mode_motion import moving_run
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..io import choice, number
-from ..system import StateSpace, System
+from ...io import choice, number
+from ...system import StateSpace, System
 from .riccati import deviations, riccati
 
 

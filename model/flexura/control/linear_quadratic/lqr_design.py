@@ -27,11 +27,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import InputError
-from ..system import System, assemble, linearize
-from .controller import Controller, Linear
+from ...errors import InputError
+from ...system import System, assemble, linearize
+from ..controller import Controller, Linear
+from ..pid import PID, Motor, Stepper
 from .gaussian_design import Design, Weights, gaussian_design
-from .pid import PID, Motor, Stepper
 from .riccati import discretised
 
 

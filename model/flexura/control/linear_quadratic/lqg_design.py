@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import InputError
-from ..io import array, number
-from ..signals import FunctionSignal, Signal, SignalLike, as_signals, constant
-from ..system import RobotLike, System, assemble, linearize
+from ...errors import InputError
+from ...io import array, number
+from ...signals import FunctionSignal, Signal, SignalLike, as_signals, constant
+from ...system import RobotLike, System, assemble, linearize
+from ..sampled import Sampled
 from .gaussian_design import Design, Weights, gaussian_design
 from .measurements import Measurements
 from .riccati import deviations, discretised
-from .sampled import Sampled
 
 
 def lqg(

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
-from ..robot import FORCE_KINDS
-from ..signals import Loads
-from ..system import StateSpace, System, sensor_channels
-from ..system.system import jacobian
+from ...errors import InputError
+from ...robot import FORCE_KINDS
+from ...signals import Loads
+from ...system import StateSpace, System, sensor_channels
+from ...system.system import jacobian
 
 STEP = 1e-6  # of differences [m or rad]
 

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
-from ..io import choice
-from ..system import FrequencyResponse
+from ...errors import InputError
+from ...io import choice
+from ...system import FrequencyResponse
 from .gaussian_design import Design
 
 POINTS = 1500

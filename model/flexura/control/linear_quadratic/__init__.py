@@ -1,0 +1,1 @@
+"""Linear quadratic designs: regulators, estimators, and what their loops bear."""
