@@ -246,7 +246,7 @@ def splines(t, begin, end, every=0.04):
 def test_a_change_is_the_least_of_what_all_robots_lack():
     """The law of learning as a least-squares problem in time, by convolution.
 
-    Equations: 140
+    Equations: 121
     """
     t = STEP_S * np.arange(300)
     H, basis = responses(1.0, 0.9), splines(t, 0.3, 1.1)
@@ -288,7 +288,7 @@ def test_a_change_is_the_least_of_what_all_robots_lack():
 def test_the_response_to_a_reference_is_that_of_the_loop():
     """A motor in its loop and a stepper on its spring, by hand at one point.
 
-    Equations: 141
+    Equations: 122
     """
     arm_2 = robots.system(
         robots.beam(0.3, 0.3, 0.8, 2, hub_inertia_kg_m2=0.01),
@@ -321,7 +321,7 @@ def test_the_response_to_a_reference_is_that_of_the_loop():
 def test_the_inverse_cancels_where_robots_disagree():
     """One robot is inverted; about an uncertain resonance the inverse of many is small.
 
-    Equations: 142
+    Equations: 123
     """
     H = responses(1.0, 0.8, 1.25)
     alone = control.inverse_of_many(H[:1])
@@ -340,7 +340,7 @@ def test_the_inverse_cancels_where_robots_disagree():
 def test_the_weight_leaves_the_least_for_the_worst_robot():
     """What one trial leaves for the worst of the robots is never more than the error.
 
-    Equations: 143
+    Equations: 124
     """
     H = responses(1.0, 0.7, 1.4)
     made = control.learning_filter(H, STEP_S, 12.0)

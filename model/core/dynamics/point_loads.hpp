@@ -1,4 +1,4 @@
-// Generalised forces of forces and moments that act on points of links (130) to (132).
+// Generalised forces of forces and moments that act on points of links (131) to (133).
 #pragma once
 #include "dynamics/load_place.hpp"
 #include "dynamics/positions.hpp"

@@ -54,7 +54,7 @@ class JointSpring:
 def reference_response(
     robot: Any, q: Any, s: Any, loops: Sequence[JointLoop | JointSpring]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Small motions of tip and joints under the joints' references, through the controllers (141).
+    """Small motions of tip and joints under the joints' references, through the controllers (122).
 
     The controllers move the robot as if it were rigid. Its links vibrate on joints that move as
     prescribed: friction and gear hold a motor's joint against them. A stepper's joint gives way.
@@ -147,7 +147,7 @@ class LearningFilter:
         directions: np.ndarray,
         share: np.ndarray | None = None,
     ) -> np.ndarray:
-        """Changes of the references for a trial's error (140), before and after it in time.
+        """Changes of the references for a trial's error (121), before and after it in time.
 
         Args:
             error: (T, m), what the outputs lack, at rest at its start.
@@ -228,7 +228,7 @@ def transform_points(samples: int, step_s: float) -> np.ndarray:
 
 
 def inverse_of_many(responses: np.ndarray) -> np.ndarray:
-    """The least-squares inverse of all responses together (142).
+    """The least-squares inverse of all responses together (123).
 
     Where they agree it inverts them. Where a resonance may be on either side, they cancel.
 
@@ -255,7 +255,7 @@ def learning_filter(
     highest_Hz: float = np.inf,
     motions: np.ndarray | None = None,
 ) -> LearningFilter:
-    """How much of an error is safe to learn at each frequency (143).
+    """How much of an error is safe to learn at each frequency (124).
 
     The weight w is that which leaves the least of an error for the worst robot, 0 where an error
     might not shrink.

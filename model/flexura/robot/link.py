@@ -341,7 +341,7 @@ class Link(Table):
         return _spread(self.young_modulus_Pa * self._of_section("area", x), x)
 
     def bending_stress(self, moment: ArrayLike, x: ArrayLike, distance: float | None = None) -> Any:
-        """The stress of a fibre under a bending moment, positive where it is drawn out (128).
+        """The stress of a fibre under a bending moment, positive where it is drawn out (144).
 
         Args:
             moment: bending moments, positive to the left (S,) [N m].

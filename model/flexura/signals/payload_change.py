@@ -18,7 +18,7 @@ EXPECTED = (
 
 @dataclass(frozen=True)
 class PayloadChange:
-    """The payload from an instant on (134).
+    """The payload from an instant on (135).
 
     at_s: the instant [s]. mass_kg: its mass from then on [kg]; 0: nothing. inertia_kg_m2: about its
     own centre. centre_of_mass_m: from the tip, along and across its tangent [m]; None: where the

@@ -363,12 +363,12 @@ class Assembly:
         return (self._at_rest(q) if qd is None else self.structure.states(q, qd))[-1].tip
 
     def loads(self, q: np.ndarray, rows: np.ndarray, values: np.ndarray) -> np.ndarray:
-        """The generalised forces of forces and moments on links (132).
+        """The generalised forces of forces and moments on links (133).
 
         Args:
             q: configuration (n,).
             rows: where they act (L, 3): link from 0, abscissa [m], 1 if the force is along and
-                across the line there (131).
+                across the line there (132).
             values: the force's two components [N] and the moment [N m], (L, 3).
 
         Returns:

@@ -56,7 +56,7 @@ def sensor_channels(
 
 
 def _force(balance: Balance, i: int, sensor: Sensor) -> np.ndarray:
-    """A force or stress in a section of link i (from 0), (T,) (123), (128)."""
+    """A force or stress in a section of link i (from 0), (T,) (139), (144)."""
     found = balance.section(i, sensor.at_m)
     if sensor.kind != "stress":
         return np.asarray(getattr(found, sensor.kind))

@@ -52,7 +52,7 @@ class Problem:
 
 
 class NonlinearPredictive:
-    """Real-time iteration: one step of Newton's method a tick on the motion ahead (152).
+    """Real-time iteration: one step of Newton's method a tick on the motion ahead (130).
 
     `failures` counts programs without a solution, at which the motion of the tick before goes on;
     `iterations` has those of the last program.
@@ -152,7 +152,7 @@ class NonlinearPredictive:
                 old[rows] = new
 
     def _solved(self, t: float, x: np.ndarray) -> None:
-        """One step of Newton's method: the program about the predicted motion (152)."""
+        """One step of Newton's method: the program about the predicted motion (130)."""
         problem, N, m = self.problem, len(self.problem.h), len(self.driven)
         assert self.known is not None
         R, G, d = self.known

@@ -21,7 +21,7 @@ SAME = 1e-9  # of a link's length: what is closer to a cut is at it
 
 class PointLoad(NamedTuple):
     """A load from outside on link `link` (from 0), at the abscissa `at` [m]: force x + iy [N] and
-    moment [N m], constant or (T,). `turns`: the force is along and across the line there (131)."""
+    moment [N m], constant or (T,). `turns`: the force is along and across the line there (132)."""
 
     link: int
     at: float
@@ -33,7 +33,7 @@ class PointLoad(NamedTuple):
 class Reaction(NamedTuple):
     """What link i-1 exerts on link i: force x + iy [N], moment about the joint [N m], place of the
     joint [m], angle of the axis on which a joint slides [rad]; each (T,). What of it drive and
-    friction give says (126)."""
+    friction give says (142)."""
 
     force: np.ndarray
     moment: np.ndarray
@@ -43,8 +43,8 @@ class Reaction(NamedTuple):
 
 class SectionForces(NamedTuple):
     """Bending moment [N m], shear force and axial force [N] in a section of a link, each (T,)
-    (123). The shear force is minus the slope of the moment (124); a fine mesh has the same moment
-    by its curvature (127)."""
+    (139). The shear force is minus the slope of the moment (140); a fine mesh has the same moment
+    by its curvature (143)."""
 
     bending_moment: np.ndarray
     shear_force: np.ndarray
@@ -68,7 +68,7 @@ class Balance:
         self.motions = link_motions(structure, q, qd, qdd)
 
     def reaction(self, i: int) -> Reaction:
-        """What link i-1 exerts on link i at joint i (121), (122); link -1 is the base.
+        """What link i-1 exerts on link i at joint i (137), (138); link -1 is the base.
 
         Args:
             i: number of the joint, from 0.
@@ -85,7 +85,7 @@ class Balance:
         return Reaction(*needed.about(place), place, axis)
 
     def section(self, i: int, s: Any) -> SectionForces:
-        """The forces in a section of a link (123).
+        """The forces in a section of a link (139).
 
         What is fixed at s is beyond the cut, but for the hub of the link.
 

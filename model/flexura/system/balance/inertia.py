@@ -1,5 +1,5 @@
 """What masses take against inertia and gravity at T times: sums of mu (r'' - g) over parts of a
-robot (121), (122)."""
+robot (137), (138)."""
 
 from __future__ import annotations
 
