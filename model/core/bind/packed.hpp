@@ -13,11 +13,12 @@ using Ranges = nb::ndarray<const std::int64_t, nb::ndim<2>, nb::c_contig, nb::de
 Inputs acting_of(const Matrix &segments, const Ranges &ranges, const Matrix &gains,
                  const Flags &prescribed, const Flags &sampled, const Matrix &limits);
 
-// Places of loads on links from rows (L, 3): link (from 0), abscissa [m], 1 for the line's own axes.
+// Places of loads on links from rows (L, 3): link (from 0), abscissa [m], 1 for the line's own
+// axes.
 std::vector<LoadPlace> load_places_of(const Matrix &rows, int links);
 
-// Adds the loads of such rows, with the ranges (L, 6) of their signals: force from, to twice, moment
-// from, to.
+// Adds the loads of such rows, with the ranges (L, 6) of their signals: force from, to twice,
+// moment from, to.
 void add_loads(Inputs &acting, const Matrix &rows, const Ranges &ranges, const Matrix &segments);
 
 const char *word(Status status);

@@ -15,8 +15,8 @@ namespace flexura {
 
 // Integrals over time, under the same error control as the motion but for STRAIN [J].
 enum Account { WORK, LOSS, NUMERICAL, STRAIN, ACCOUNTS };
-// WORK of the drives and the loads; LOSS to friction and to the material's damping; NUMERICAL: what the method
-// itself takes out on purpose; STRAIN: the rise of the strain energy.
+// WORK of the drives and the loads; LOSS to friction and to the material's damping; NUMERICAL: what
+// the method itself takes out on purpose; STRAIN: the rise of the strain energy.
 
 // A pass that a plant is asked for: linear terms at ys + gq a, vs + gv a, all else at (q, v). Plain
 // forward dynamics has ys = q, vs = v, gq = gv = 0.

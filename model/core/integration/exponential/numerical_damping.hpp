@@ -138,14 +138,13 @@ void add_loads_on_links(Integration<Real> &c, const ModalBasis<Real> &modes, int
     loads.emplace_back(size, 0.0);
     for (std::size_t mode = 0; mode < size; ++mode)
       for (std::size_t i = 0; i < size; ++i)
-        loads.back()[mode] +=
-            lane(modes.phi[mode * std::size_t(modes.stride) + i] * force[i], k);
+        loads.back()[mode] += lane(modes.phi[mode * std::size_t(modes.stride) + i] * force[i], k);
   }
 }
 
-// Forces on the modes of robot k (loads, n): of each joint's drive and load at its largest (or of what
-// a prescribed motion shakes), and what is out of balance at q. `harmonic`: the highest frequency in
-// a signal [rad/s]; m: its matrices; held (n): rows of given motions.
+// Forces on the modes of robot k (loads, n): of each joint's drive and load at its largest (or of
+// what a prescribed motion shakes), and what is out of balance at q. `harmonic`: the highest
+// frequency in a signal [rad/s]; m: its matrices; held (n): rows of given motions.
 template <class Real>
 std::vector<std::vector<double>> loads_on_modes(Integration<Real> &c, const ModalBasis<Real> &modes,
                                                 const bool *held, int k, const Matrices &m,
