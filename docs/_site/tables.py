@@ -126,10 +126,10 @@ def robot_file() -> str:
 
 def signals() -> str:
     """Every kind of signal with its arguments, which are the keys of its table."""
-    from flexura.signals import shaping, signal
+    from flexura.signals import KINDS
 
     def rows() -> Iterator[tuple[str, ...]]:
-        for kind, function in (signal.KINDS | shaping.KINDS).items():
+        for kind, function in KINDS.items():
             keys = []
             for name, p in inspect.signature(function).parameters.items():
                 given = "" if p.default is p.empty else f" ({p.default:g})"

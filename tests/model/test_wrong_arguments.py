@@ -140,6 +140,13 @@ CALLS = {
     "zv": (signals.zv, {"signal": SIGNAL, "frequency_Hz": 1.0, "damping_ratio": 0.0}),
     "zvd": (signals.zvd, {"signal": SIGNAL, "frequency_Hz": 1.0, "damping_ratio": 0.0}),
     "ei": (signals.shaping.ei, {"signal": SIGNAL, "frequency_Hz": 1.0, "damping_ratio": 0.0}),
+    "pulse": (signals.pulse, {"value": 1.0, "duration_s": 1.0, "at_s": 0.0}),
+    "chirp": (signals.chirp, {"amplitude": 1.0, "start_Hz": 1.0, "end_Hz": 2.0, "duration_s": 1.0}
+        | {"at_s": 0.0}),
+    "noise": (signals.noise, {"rms": 1.0, "cutoff_Hz": 5.0, "duration_s": 1.0, "seed": 0}
+        | {"at_s": 0.0}),
+    "delayed": (signals.delayed, {"signal": SIGNAL, "by_s": 1.0}),
+    "sum": (signals.sum, {"signals": [SIGNAL]}),
     "matched_cycloid": (signals.matched_cycloid, {"end": 1.0, "frequency_Hz": 1.0, "periods": 2}
         | {"start": 0.0, "at_s": 0.0}),
 }  # fmt: skip
@@ -166,7 +173,7 @@ def test_a_wrong_argument_is_named(name, argument):
 def test_every_public_function_is_tried():
     tried = {function for function, _ in CALLS.values()}
     public = {getattr(fx, n) for n in fx.__all__ if inspect.isfunction(getattr(fx, n))}
-    public |= {f for f in signals.signal.KINDS.values()} | set(signals.shaping.KINDS.values())
+    public |= set(signals.KINDS.values())
     assert public - tried <= {fx.save}
 
 

@@ -2,11 +2,12 @@
 tables."""
 
 from . import paths, shaping, signal
+from .composite import chirp, delayed, noise, pulse, sum
 from .conversion import FunctionSignal, SignalLike, as_signal, as_signals, spline
 from .drive import Drive, JointDrive, check_smooth
 from .load import Load, Loads, LoadsLike, as_loads
 from .manoeuvre import STARTS, Manoeuvre, load_manoeuvre
-from .parsing import PLAUSIBLE, from_spec, is_finite, is_plausible
+from .parsing import KINDS, PLAUSIBLE, from_spec, is_finite, is_plausible
 from .payload_change import PayloadChange, PayloadsLike, as_payloads
 from .shaping import ei, matched_cycloid, zv, zvd
 from .signal import (
@@ -28,6 +29,7 @@ from .signal import (
 
 __all__ = [
     "COLUMNS",
+    "KINDS",
     "PLAUSIBLE",
     "STARTS",
     "Drive",
@@ -47,8 +49,10 @@ __all__ = [
     "as_signals",
     "bang_bang",
     "check_smooth",
+    "chirp",
     "constant",
     "cycloid",
+    "delayed",
     "ei",
     "evaluate",
     "evaluate_many",
@@ -58,14 +62,17 @@ __all__ = [
     "is_plausible",
     "load_manoeuvre",
     "matched_cycloid",
+    "noise",
     "paths",
     "piecewise",
     "polynomial",
+    "pulse",
     "ramp",
     "shaping",
     "signal",
     "spline",
     "step",
+    "sum",
     "table",
     "trapezoidal",
     "zv",

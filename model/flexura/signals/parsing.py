@@ -9,8 +9,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from . import shaping, signal
+from . import composite, shaping, signal
 from .signal import Signal
+
+# what a table of a signal may be, by its kind
+KINDS = signal.KINDS | shaping.KINDS | composite.KINDS
 
 
 def from_spec(spec: object, *, key: str = "signal") -> Signal:
@@ -26,18 +29,17 @@ def from_spec(spec: object, *, key: str = "signal") -> Signal:
     Raises:
         InputError: an unknown kind or key, or a wrong value.
     """
-    kinds = signal.KINDS | shaping.KINDS
     if not isinstance(spec, dict):
         raise InputError(
-            f"expected a table with kind, one of {', '.join(kinds)}", key=key, value=spec
+            f"expected a table with kind, one of {', '.join(KINDS)}", key=key, value=spec
         )
     kind = spec.get("kind")
-    if not isinstance(kind, str) or kind not in kinds:
+    if not isinstance(kind, str) or kind not in KINDS:
         missing = "missing: " if kind is None else ""
         raise InputError(
-            f"{missing}expected one of {', '.join(kinds)}", key=f"{key}.kind", value=kind
+            f"{missing}expected one of {', '.join(KINDS)}", key=f"{key}.kind", value=kind
         )
-    known = inspect.signature(kinds[kind]).parameters
+    known = inspect.signature(KINDS[kind]).parameters
     for name, value in spec.items():
         if name != "kind" and name not in known:
             raise InputError(
@@ -52,14 +54,18 @@ def from_spec(spec: object, *, key: str = "signal") -> Signal:
             value = spec[name]
             if not good(value):
                 raise InputError(f"expected {expected}", key=f"{key}.{name}", value=value)
-            given[name] = (
-                from_spec(value, key=f"{key}.{name}") if isinstance(value, dict) else value
-            )
+            if str(parameter.annotation) == "Sequence[Signal]":
+                own = enumerate(value, 1)
+                given[name] = [from_spec(each, key=f"{key}.{name}[{i}]") for i, each in own]
+            else:
+                given[name] = (
+                    from_spec(value, key=f"{key}.{name}") if isinstance(value, dict) else value
+                )
         elif parameter.default is parameter.empty:
             raise InputError(f"missing: expected {expected}", key=f"{key}.{name}")
     try:
         with np.errstate(all="ignore"):
-            return kinds[kind](**given)
+            return KINDS[kind](**given)
     except InputError as error:
         raise InputError(error.expected, key=f"{key}.{error.key}", value=error.value) from None
     except (
@@ -112,5 +118,6 @@ _FORMS = {  # what a key takes, by the annotation of the parameter of its name
     "float": (PLAUSIBLE, is_plausible),
     "int": ("a whole number", lambda value: isinstance(value, int) and not isinstance(value, bool)),
     "ArrayLike": ("a list of finite numbers between -1e12 and 1e12", _numbers),
+    "Sequence[Signal]": ("a list of tables of signals", lambda value: isinstance(value, list)),
     "Signal": ("a table of a signal, with its kind", lambda value: isinstance(value, dict)),
 }

@@ -3,7 +3,7 @@ mode."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -142,35 +142,41 @@ def _shape(
         )
     root = np.sqrt(1 - damping_ratio**2)
     copies = np.array(weights(np.exp(-np.pi * damping_ratio / root)), dtype=float)
-    rows = _sum(
-        signal.segments, copies / copies.sum(), np.arange(len(copies)) / (2 * frequency_Hz * root)
-    )
+    most = MAX_SEGMENTS // len(copies)
+    if len(signal.segments) > most:
+        expected = f"expected a signal of at most {most} segments"
+        raise InputError(expected, key="signal", value=len(signal.segments))
+    turning = signal.segments[:, 7] != 0
+    if len(np.unique(signal.segments[turning, 8])) > 1:
+        expected = "expected a signal with a single frequency in all its segments"
+        raise InputError(expected, key="signal")
+    delays = np.arange(len(copies)) / (2 * frequency_Hz * root)
+    shares = zip(copies / copies.sum(), delays, strict=True)
+    rows = stretches([(weight, delay, signal.segments) for weight, delay in shares])
     return from_segments(
         rows, kind=kind, signal=signal.spec, frequency_Hz=frequency_Hz, damping_ratio=damping_ratio
     )
 
 
-def _sum(segments: np.ndarray, weights: np.ndarray, delays: np.ndarray) -> list[list[float]]:
-    """The segments of sum_k weights_k y(t - delays_k): on each stretch between two starts of any
-    copy, one segment."""
-    most = MAX_SEGMENTS // len(weights)
-    if len(segments) > most:
-        raise InputError(
-            f"expected a signal of at most {most} segments", key="signal", value=len(segments)
-        )
-    if len(np.unique(segments[segments[:, 7] != 0, 8])) > 1:
-        raise InputError(
-            "expected a signal with a single frequency in all its segments", key="signal"
-        )
-    starts = segments[:, 0] + delays[:, None]  # (copies, k)
+def stretches(parts: Sequence[tuple[float, float, np.ndarray]]) -> list[list[float]]:
+    """The segments of a sum of signals, sum_k weight_k y_k(t - delay_k): one segment on each
+    stretch between two starts.
+
+    Args:
+        parts: weight, delay [s] and segments (k, 10) of each; one frequency in all of them.
+
+    Returns:
+        Rows of segments.
+    """
+    starts = [segments[:, 0] + delay for _, delay, segments in parts]
     rows = []
-    for t0 in np.unique(starts):
+    for t0 in np.unique(np.concatenate(starts)):
         row, turning = np.zeros(COLUMNS), 0j
-        for weight, own in zip(weights, starts, strict=True):
+        for (weight, _, segments), own in zip(parts, starts, strict=True):
             k = np.searchsorted(own, t0, side="right") - 1
             piece, s = segments[max(k, 0)], t0 - own[k] if k >= 0 else 0.0
             c = np.array(piece[1:7])
-            if k < 0:  # this copy has not begun: it holds its first value
+            if k < 0:  # this one has not begun: it holds its first value
                 row[1] += weight * (c[0] + piece[7] * np.sin(piece[9]))
                 continue
             for i in range(5):  # the polynomial about its new origin, by repeated division (Horner)

@@ -219,7 +219,7 @@ def test_a_signal_without_segments_is_zero():
     assert signals.Signal(np.zeros((0, signals.COLUMNS)))(1.0) == (0.0, 0.0, 0.0)
 
 
-KINDS = ", ".join(signals.signal.KINDS | signals.shaping.KINDS)
+KINDS = ", ".join(signals.KINDS)
 nan, inf = math.nan, math.inf
 WRONG_SIGNALS = {
     "a number": (3, "signal", 3, "a table with kind"),
@@ -405,7 +405,7 @@ scalars = st.one_of(st.floats(), st.integers(), st.booleans(), st.text(max_size=
         | st.lists(scalars, max_size=3)
         | st.sampled_from([1.0, 0.1, {"kind": "constant", "value": 1.0}]),
     ),
-    st.sampled_from(sorted(signals.signal.KINDS | signals.shaping.KINDS)),
+    st.sampled_from(sorted(signals.KINDS)),
 )
 def test_any_table_is_a_signal_or_refused(spec, kind):
     for tried in (spec, spec | {"kind": kind}):
