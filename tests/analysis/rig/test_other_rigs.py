@@ -17,9 +17,7 @@ from flexlab.experiment import excitation, plan
 from flexlab.experiment.run_experiment import Hooks, OpenBoard, conduct
 from flexlab.identification.identify import identify
 from flexlab.recordings.strip_sensor import sensor_of
-from flexlab.rig.axes import motor_axes
 from flexlab.rig.nominal_robot import with_nominal_drives
-from flexlab.rig.plant.motor import motor_data
 from flexlab.rig.plant.plant import rig_plant
 from flexura.errors import InputError
 from flexura.signals import polynomial
@@ -54,16 +52,6 @@ def as_the_files_say(setup):
     return dataclasses.replace(setup, rig=setup.rig.model_copy(update={"emulated": same}))
 
 
-def with_lossless_gears(setup):
-    """The same motors with all the torque at rest that their current makes."""
-    made = {}
-    for axis in motor_axes(setup.rig):
-        data, motor = motor_data(axis), axis.motor
-        most = data.constant_N_m_A * (motor.stall_current_A - motor.no_load_current_A)
-        made[axis.table] = motor.model_copy(update={"stall_torque_N_m": (1 - 1e-9) * most})
-    return dataclasses.replace(setup, rig=setup.rig.model_copy(update=made))
-
-
 def settings(setup):
     return rigs.configuration(setup)
 
@@ -95,11 +83,13 @@ def test_a_motion_is_tracked_and_compares_as_the_rig_of_type_iv_does(name, link,
 
 @pytest.mark.parametrize("name", ["rig-r", "rig-rr"])
 def test_the_voltages_alone_predict_the_joints(name, tmp_path):
-    """Predicted to 2 % where the gears lose nothing of the load, nothing of the run fed back."""
-    setup = with_lossless_gears(as_the_files_say(rigs.load(name)))
+    """Predicted to 2.5 %, by gears that lose half of the load; nothing of the run is fed back."""
+    setup = as_the_files_say(rigs.load(name))
     run = ran(setup, plan.inverse(setup, settings(setup)), tmp_path / "run")
-    found = compare(simulate_experiment(run, "commanded"), run)
-    assert all(row.rms_relative < 0.02 for row in found.differences if "joint" in row.channel)
+    simulation = simulate_experiment(run, "commanded")
+    assert simulation.meta["gear_loss_rounds"]
+    found = compare(simulation, run)
+    assert all(row.rms_relative < 0.025 for row in found.differences if "joint" in row.channel)
 
 
 @pytest.mark.slow

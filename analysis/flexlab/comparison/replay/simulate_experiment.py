@@ -31,6 +31,7 @@ from ...rig.nominal_robot import with_drives
 from ...rig.plant.motor import JointLine, joint_line, resistance
 from ...rig.plant.stepper import MagneticSpring
 from . import lead_screw
+from .gear_loss import with_losses
 from .pulses import pulses_of_run
 from .smoothing import (
     continue_past_end,
@@ -190,8 +191,8 @@ def _by_motors(
     """Joints that motors turn, from their voltages; a stepper's joint from its pulses.
 
     Rotor, friction and back-EMF are the joints' own, so that the links act back on the motors.
-    Left out are the gears' backlash and what they lose of the links' load: motors that lose half
-    of it turn a tenth less far than predicted.
+    What gears lose of the links' load is found in rounds (`gear_loss`), beside a stepper it is left
+    out. The gears' backlash is left out.
     """
     t = experiment.t
     lines = [(axis, joint_line(axis)) for axis in motor_axes(rig)]
@@ -200,7 +201,7 @@ def _by_motors(
     at_start = [_first_position(experiment, n) for n in range(1, rig.joints + 1)]
     if not rig.stepper:
         system, q0 = _start_at(robot, at_start)
-        return fx.simulate(system, t, fx.Drive.force(*forces), q0=q0, rtol=rtol, progress=progress)
+        return with_losses(system, q0, t, forces, lines, rtol, progress)
     pulses, jumps = joint_2_pulse_angle(experiment)
     start = _start_at(robot, [at_start[0], pulses(t[0])[0]])
     spring = MagneticSpring(rig.stepper)
