@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "dynamics/outputs.hpp"
+#include "dynamics/places/outputs.hpp"
 #include "fmi/robot_file.hpp"
 #include "simulation/simulation.hpp"
 

@@ -65,7 +65,7 @@ def study(
     force: Force = False,
     json: Json = False,
 ) -> None:
-    """Study a robot's payload, link lengths or sleeve, a measured robot, or methods of control.
+    """Study payload, link lengths, a sleeve, a measured robot, or control.
 
     It stores a table (Parquet) and a figure. KIND boundary: with and without a sleeve. KIND
     measured: simulations over published measurements, with a review of each run. KIND control:

@@ -5,8 +5,8 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
-#include "dynamics/outputs.hpp"
-#include "dynamics/point_loads.hpp"
+#include "dynamics/places/outputs.hpp"
+#include "dynamics/places/point_loads.hpp"
 #include "packed.hpp"
 #include "robot/input_fault.hpp"
 #include "robot/robot_table.hpp"

@@ -3,7 +3,7 @@
 #include <nanobind/stl/vector.h>
 
 #include "control/controller.hpp"
-#include "dynamics/outputs.hpp"
+#include "dynamics/places/outputs.hpp"
 #include "mechanics.hpp"
 #include "packed.hpp"
 #include "simulation/simulation.hpp"

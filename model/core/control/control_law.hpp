@@ -20,7 +20,7 @@
 #include <vector>
 
 #include "control/inputs.hpp"
-#include "dynamics/outputs.hpp"
+#include "dynamics/places/outputs.hpp"
 #include "pid.h"
 
 namespace flexura {

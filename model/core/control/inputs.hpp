@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "control/signal.hpp"
-#include "dynamics/load_place.hpp"
+#include "dynamics/places/load_place.hpp"
 
 namespace flexura {
 

@@ -3,9 +3,9 @@
 #include <type_traits>
 
 #include "control/plant.hpp"
-#include "dynamics/energies.hpp"
 #include "dynamics/mass_matrix.hpp"
-#include "dynamics/point_loads.hpp"
+#include "dynamics/places/energies.hpp"
+#include "dynamics/places/point_loads.hpp"
 #include "numbers/pack_lane.hpp"
 
 namespace flexura {

@@ -8,7 +8,7 @@
 #include <memory>
 #include <vector>
 
-#include "dynamics/load_place.hpp"
+#include "dynamics/places/load_place.hpp"
 #include "numbers/scalars.hpp"
 
 namespace flexura {

@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "control/model_plant.hpp"
-#include "dynamics/outputs.hpp"
+#include "dynamics/places/outputs.hpp"
 #include "integration/time_loop.hpp"
 #include "link/assembly.hpp"
 #include "robot/input_fault.hpp"

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "dynamics/positions.hpp"
+#include "dynamics/places/positions.hpp"
 #include "link/assembly.hpp"
 
 namespace flexura {

@@ -229,6 +229,7 @@ def test_a_random_rig_is_found_from_one_run(excitement, found, tmp_path):
     assert "robot-rig.toml is not written" in missing and "/lab" in missing
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(1200)
 @pytest.mark.parametrize("experiment", ["forward", "inverse"])
 def test_what_was_found_predicts_other_experiments(found, experiment, tmp_path):

@@ -105,6 +105,7 @@ LEFT_OUT = {
         for name in ("forward", "inverse", "free-vibration", "excite")
     },
     ("demo",): "simulate, crosscheck, bench and review, one after the other, into one draft",
+    ("learn",): "minutes of trials, each an experiment as `bench` makes it and keeps it",
     ("flash",): "keeps nothing but PlatformIO's own build, and what is in the board",
 }
 

@@ -3,7 +3,7 @@
 // integrals over the robot of its state alone.
 #pragma once
 #include "control/plant.hpp"
-#include "dynamics/energies.hpp"
+#include "dynamics/places/energies.hpp"
 
 namespace flexura {
 

@@ -4,7 +4,7 @@
 
 #include "check.hpp"
 #include "control/plant.hpp"
-#include "dynamics/outputs.hpp"
+#include "dynamics/places/outputs.hpp"
 #include "link/assembly.hpp"
 #include "robot/input_fault.hpp"
 #include "simulation/simulation.hpp"

@@ -3,7 +3,7 @@
 #include "statics_and_modes/natural_modes.hpp"
 
 #include "check.hpp"
-#include "dynamics/energies.hpp"
+#include "dynamics/places/energies.hpp"
 #include "dynamics/piece/mass_proportional_damping.hpp"
 #include "link/assembly.hpp"
 #include "numbers/eigenproblem.hpp"

@@ -1,7 +1,7 @@
 // Generalised forces of forces and moments that act on points of links (131) to (133).
 #pragma once
-#include "dynamics/load_place.hpp"
-#include "dynamics/positions.hpp"
+#include "dynamics/places/load_place.hpp"
+#include "dynamics/places/positions.hpp"
 
 namespace flexura {
 

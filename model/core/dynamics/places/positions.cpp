@@ -1,4 +1,4 @@
-#include "dynamics/positions.hpp"
+#include "dynamics/places/positions.hpp"
 
 #include "numbers/quadrature.hpp"
 

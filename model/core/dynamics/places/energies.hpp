@@ -2,7 +2,7 @@
 // takes (28).
 #pragma once
 #include "dynamics/friction.hpp"
-#include "dynamics/positions.hpp"
+#include "dynamics/places/positions.hpp"
 
 namespace flexura {
 

@@ -3,7 +3,7 @@
 #pragma once
 #include <vector>
 
-#include "dynamics/energies.hpp"
+#include "dynamics/places/energies.hpp"
 
 namespace flexura {
 

@@ -1,4 +1,4 @@
-#include "dynamics/point_loads.hpp"
+#include "dynamics/places/point_loads.hpp"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "dynamics/outputs.hpp"
+#include "dynamics/places/outputs.hpp"
 
 #include <algorithm>
 
