@@ -109,6 +109,15 @@ CALLS = {
     "lqr": (lqr, {"robot": RIG, "controller": fx.Controller(PID2), "effort": [1.0, 1.0]}
         | {"position": 1.0, "deflection": 1.0, "damping": 0.0, "disturbance": 1.0, "noise": 1e-4}
         | {"q": None}),
+    "lqg": (fx.lqg, {"robot": RIG, "references": [SIGNAL] * 2, "effort": [1.0, 1.0]}
+        | {"rate_Hz": 500.0}
+        | {"measure": None, "limit": None, "follow": "joints", "position": 1.0, "deflection": 1.0}
+        | {"damping": 0.0, "disturbance": 1.0, "noise": 1e-4, "q": None}),
+    "nmpc": (fx.nmpc, {"robot": RIG, "references": [SIGNAL] * 2, "effort": [1.0, 1.0]}
+        | {"rate_Hz": 500.0}
+        | {"intervals": 4, "horizon_s": None, "spread": 1, "measure": None, "limit": None}
+        | {"speed_limit": None, "deflection_limit": None, "follow": "tips", "position": 1.0}
+        | {"deflection": 1.0, "damping": 0.0, "disturbance": 1.0, "noise": 1e-4, "q": None}),
     "Drive": (fx.Drive, {"joints": (fx.JointDrive(),), "meta": {}}),
     "Drive.none": (fx.Drive.none, {"joints": 2}),
     "Drive.pd": (fx.Drive.pd, {"motions": [SIGNAL], "kp": [1.0], "kd": [1.0], "t_s": None}),
@@ -151,7 +160,8 @@ CALLS = {
         | {"start": 0.0, "at_s": 0.0}),
 }  # fmt: skip
 CASES = [(name, argument) for name, (_, good) in CALLS.items() for argument in good]
-PAIRS = {"t_s": "y", "at_s": "value"}  # as many of the one as of the other
+# as many of the one as of the other; the one must fit into the other
+PAIRS = {"t_s": "y", "at_s": "value", "rate_Hz": "horizon_s"}
 
 
 @pytest.mark.parametrize("name, argument", CASES, ids=[f"{n}-{a}" for n, a in CASES])

@@ -47,6 +47,8 @@ class Measurements:
             if sensor.kind not in ("acceleration", *FORCE_KINDS)
         }
         known = [*self.joints, *self.tips, *self.sensors]
+        if not (names is None or isinstance(names, list | tuple)):
+            raise InputError("expected a list of measurements", key="measure", value=names)
         asked = [*self.joints, *(self.sensors or self.tips)] if names is None else list(names)
         for name in asked:
             if name not in known:

@@ -54,6 +54,11 @@ def parameter_derivatives(
     keys = [parameters] if isinstance(parameters, str) else parameters
     if not isinstance(keys, list | tuple) or not keys:
         raise InputError("expected keys of the robot file", key="parameters", value=parameters)
+    for i, key in enumerate(keys, 1):
+        try:
+            system.robot.value(str(key))
+        except InputError as error:
+            raise InputError(error.expected, key=f"parameters[{i}]", value=key) from None
     if len(t) < 2:
         raise InputError("expected two times or more", key="t_eval", value=t)
     forces = (
