@@ -3,8 +3,8 @@
 #include "statics_and_modes/natural_modes.hpp"
 
 #include "check.hpp"
-#include "dynamics/places/energies.hpp"
 #include "dynamics/piece/mass_proportional_damping.hpp"
+#include "dynamics/places/energies.hpp"
 #include "link/assembly.hpp"
 #include "numbers/eigenproblem.hpp"
 #include "statics_and_modes/equilibrium.hpp"
