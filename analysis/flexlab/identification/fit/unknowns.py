@@ -139,15 +139,15 @@ def unknown_of_robot(robot: fx.Robot, key: str, start: float | None) -> Unknown:
         raise fx.InputError(
             f"the file says 0: expected a value to begin with, as {key}=0.001", key=key
         )
-    elif bounds.zero and "stiffness" not in name:
-        edges = (0.0, min(WIDEST * value, bounds.high))
+    elif name in ("ratio", "ratios") or (bounds.zero and "stiffness" not in name):
+        least = 0.0 if bounds.zero else bounds.low  # a link may have next to no damping
+        edges = (least, min(WIDEST * value, bounds.high))
         parameter = Parameter(key, value, STEP * value, edges, factor=False)
     else:
         edges = (max(value / WIDEST, bounds.low, 1e-300), min(WIDEST * value, bounds.high))
         parameter = Parameter(key, value, STEP, edges)
     robot.replace({key: value * (1 + STEP)})
-    least = -math.inf if bounds.signed else bounds.low
-    return Unknown(parameter, unit_of(name), file, least=least)
+    return Unknown(parameter, unit_of(name), file, least=-math.inf if bounds.signed else bounds.low)
 
 
 def unknown_of_channel(key: str, start: float | None, unit: str, size: float, own: str) -> Unknown:
