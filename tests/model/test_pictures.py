@@ -317,3 +317,10 @@ def test_a_run_says_what_it_holds(run):
     assert re.search(r"0 to 0\.4 s, 81 samples", text)
     assert re.search(r"joint/1-2 +position, velocity, drive", text)
     assert list(run.keys()) == list(run) and dict(run.items()) == run.channels
+
+
+def test_an_unknown_channel_is_answered_with_numbered_channels_as_one_pattern():
+    run = fx.simulate("single-r", [0.0, 0.01], start="straight")
+    with pytest.raises(fx.InputError, match=r"link/1/deflection/\*") as caught:
+        run.plot("nope")
+    assert "link/1/deflection/0" not in str(caught.value)

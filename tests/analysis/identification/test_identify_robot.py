@@ -252,3 +252,15 @@ def test_95_percent_intervals_hold_the_truth_in_93_to_97_percent_of_seeds(robot,
     assert 0.93 <= np.mean(list(shares.values())) <= 0.97, shares
     # of one parameter alone the share itself is known to 1.5 % only
     assert all(0.90 <= share <= 0.99 for share in shares.values()), shares
+
+
+@pytest.mark.parametrize("key", ["loads", "payloads"])
+def test_a_run_under_what_a_fit_does_not_simulate_is_refused(robot, swing, key):
+    given = {
+        "loads": [fx.Load(link=1, force_N=[0.0, 0.1])],
+        "payloads": [fx.PayloadChange(at_s=0.4, mass_kg=0.1)],
+    }
+    flexible = robot.replace({"link.1.modes": None}) if key == "payloads" else robot
+    run = fx.simulate(flexible, T, fx.Drive.force(TORQUE), **{key: given[key]})
+    with pytest.raises(fx.InputError, match=f"{key} = 1: expected a run without loads"):
+        identify_robot(flexible, run, [MASS])

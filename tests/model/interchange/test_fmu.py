@@ -1,6 +1,7 @@
 """FMUs: valid by fmpy; the trajectory of `simulate`, with inputs that change, in a process that has
 no flexura; and what the library answers to misuse."""
 
+import io
 import subprocess
 import sys
 import zipfile
@@ -311,3 +312,16 @@ def test_what_cannot_be_an_fmu_is_refused():
         fmu(fx.load("rig").replace({"stiffening": False}))
     with pytest.raises(InputError, match="rtol"):
         fmu("rig", rtol=1.0)
+
+
+def test_sensors_of_internal_forces_are_left_out_and_named():
+    spec = fx.load("rig").to_dict()
+    kinds = ("bending_moment", "shear_force", "axial_force", "stress")
+    extra = {"stress": {"distance_m": 1e-3}}
+    spec["link"][-1]["sensor"] = [
+        {"name": kind, "kind": kind, "at_m": 0.05} | extra.get(kind, {}) for kind in kinds
+    ]
+    robot = fx.Robot.from_dict(spec)
+    assert fmu_lacks(robot) == [f"sensor/{kind}" for kind in kinds]
+    with zipfile.ZipFile(io.BytesIO(fmu(robot))) as file:
+        assert b"sensor/" not in file.read("modelDescription.xml")

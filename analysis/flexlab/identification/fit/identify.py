@@ -182,6 +182,13 @@ def _experiment(
     gains: Gains | None,
     span: tuple[float | None, float | None],
 ) -> Experiment:
+    for key in ("loads", "payloads"):
+        if run.meta.get(key):
+            raise fx.InputError(
+                "expected a run without loads and changing payloads: a fit does not simulate them",
+                key=key,
+                value=len(run.meta[key]),
+            )
     chosen = choose(run, robot, inputs, gains)
     simulated = _channels(robot)
     compared = tuple(channels) or default_channels(run, simulated, chosen)
@@ -206,7 +213,7 @@ def _experiment(
     if out.counted.sum() < FEWEST:
         raise fx.InputError(
             f"expected {FEWEST} samples or more between {out.span[0]:g} and {out.span[1]:g} s",
-            key="RUN",
+            key="samples",
             value=int(out.counted.sum()),
         )
     return out

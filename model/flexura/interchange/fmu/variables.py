@@ -13,6 +13,9 @@ from ...system import System
 ACCOUNTS = ("energy/work", "energy/loss", "energy/numerical_loss")
 
 
+SHOWN = ("deflection", "slope", "strain")
+
+
 @dataclass(frozen=True)
 class Variable:
     """A variable of the model description.
@@ -100,12 +103,12 @@ def _of_joint(robot: Robot, i: int, kind: str, plain: Variable, hub: float) -> l
 
 
 def sensors(system: System) -> list[LinkSensor]:
-    """The sensors of a robot that an FMU shows: all but accelerations, which depend on what acts
-    at the same instant."""
+    """The sensors of a robot that an FMU shows: those of the line's shape. Accelerations and
+    internal forces depend on what acts at the same instant."""
     structure, out = system.assembly.structure, []
     for i, link in enumerate(system.robot.links):
         for sensor in link.sensor:
-            if sensor.kind == "acceleration":
+            if sensor.kind not in SHOWN:
                 continue
             weights = None
             if sensor.kind != "deflection":
@@ -127,7 +130,8 @@ def sensors(system: System) -> list[LinkSensor]:
 
 
 def fmu_lacks(robot: Robot) -> list[str]:
-    """Channels of a Run of a robot that its FMU lacks: drives of locked joints, accelerations.
+    """Channels of a Run of a robot that its FMU lacks: drives of locked joints, accelerations,
+    internal forces.
 
     Args:
         robot: the robot.
@@ -137,4 +141,4 @@ def fmu_lacks(robot: Robot) -> list[str]:
     """
     kinds = [sensor for link in robot.links for sensor in link.sensor]
     locked = [f"joint/{i}/drive" for i, link in enumerate(robot.links, 1) if link.joint.locked]
-    return locked + [f"sensor/{s.name}" for s in kinds if s.kind == "acceleration"]
+    return locked + [f"sensor/{s.name}" for s in kinds if s.kind not in SHOWN]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
+from re import sub
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -117,8 +118,9 @@ def chosen(runs: Sequence[Run], patterns: Sequence[str]) -> list[list[str]]:
         for pattern in patterns:
             fitting = [name for name in known if fnmatchcase(name, pattern)]
             if not fitting:
+                short = dict.fromkeys(sub(r"/\d+$", "/*", name) for name in known)
                 raise InputError(
-                    f"expected one of {', '.join(known)}", key="channel", value=pattern
+                    f"expected one of {', '.join(short)}", key="channel", value=pattern
                 )
             wanted += fitting
         groups = [list(dict.fromkeys(wanted))]
