@@ -16,12 +16,12 @@ def arm(elements=6, beta=2e-3, **link):
     return fx.Robot.from_dict(data)
 
 
-def two_links(scale=1, beta=2e-3):
+def two_links(scale=1, beta=2e-3, elbow=0.6):
     data = fx.load("type-1-rr").to_dict()
     for link in data["link"]:
         link["elements"] *= scale
         link["damping"] = {"beta_s": beta}
-    data["link"][1]["joint"]["start_rad"] = 0.6
+    data["link"][1]["joint"]["start_rad"] = elbow
     return fx.Robot.from_dict(data)
 
 
@@ -29,13 +29,13 @@ def turn(duration):
     return lambda t: np.pi / 2 * paths.smooth_rise(t / duration)
 
 
-def on_rigid_path(duration, by):
+def on_rigid_path(duration, by, elbow=0.6):
     """x and y of the rigid RR robot's tip."""
 
     def place(t):
         u = paths.smooth_rise(t / duration)
         first = by[0] * u
-        second = first + 0.6 + by[1] * u
+        second = first + elbow + by[1] * u
         return 0.3 * np.array([np.cos(first) + np.cos(second), np.sin(first) + np.sin(second)])
 
     return (lambda t: place(t)[0]), (lambda t: place(t)[1])
@@ -83,6 +83,36 @@ def test_two_flexible_links_follow_the_rigid_robots_path():
     run = fx.invert(two_links(), np.linspace(0.0, 0.6, 301), pair)
     assert run.meta["tip_error_m"] < 1e-7
     assert off_place(replay(two_links(2), run), pair, 0.6) < 1e-3
+
+
+def test_two_flexible_links_follow_a_quick_path():
+    pair = on_rigid_path(0.45, (1.0, -0.7), elbow=0.8)
+    run = fx.invert(two_links(elbow=0.8), np.linspace(0.0, 0.45, 301), pair)
+    assert run.meta["exact"] and run.meta["tip_error_m"] < 1e-7
+    assert off_place(replay(two_links(2, elbow=0.8), run), pair, 0.45) < 1e-3
+
+
+@pytest.mark.slow
+def test_a_bent_arm_does_not_reach_as_far_as_a_straight_one():
+    # the same motion from another elbow: the rigid elbow is straight at 0.302 s, the links bent
+    t = np.linspace(0.0, 0.45, 301)
+    pair = on_rigid_path(0.45, (1.0, -0.7))
+    run = fx.invert(two_links(), t, pair)
+    (event,) = (e for e in run.meta["events"] if e["name"] == "nearest")
+    assert not run.meta["exact"] and "about t = 0.300 s the path passes a singular" in event["text"]
+    far = fx.assemble(two_links(2))
+    bent = replay(two_links(2), run)
+    row = np.abs(bent.t - 0.302).argmin()
+    q = bent.states[row, : far.n]
+
+    def reach(elbow):
+        q[far.joint_rows[1]] = elbow
+        return np.hypot(*fx.tip_pose(far, q)[:2])
+
+    # what the elbow's best angle leaves is what the tip lacks
+    short = 0.6 - max(reach(elbow) for elbow in np.linspace(-0.2, 0.2, 801))
+    assert short == pytest.approx(1.38e-4, abs=2e-6)
+    assert run.meta["tip_error_m"] == pytest.approx(short, abs=2e-6)
 
 
 @pytest.mark.parametrize("beta", [0.0, 2e-4])

@@ -7,7 +7,7 @@ import pytest
 
 from commands import run as command
 from flexlab.studies import control
-from flexlab.studies.control.methods import pid, shaped
+from flexlab.studies.control.methods import bang_bang, pid, shaped
 from flexura.signals import zv
 
 TASK = control.TASKS["rig"]
@@ -30,6 +30,21 @@ def test_shaped_set_points_leave_less_and_the_figures_are_those_of_the_run():
         assert away[late].max() <= 0.01 * away[0] < away[~late][-1]
         assert row.worst("residual_m") == max(f.residual_m for f in row.figures[1:])
         assert len({f.residual_m for f in row.figures}) == 3
+
+
+def test_bang_bang_takes_the_rigid_robots_drives_to_a_limit_and_reverses():
+    motion = bang_bang(TASK)
+    drives = motion.drive.joints
+    t = np.linspace(0.0, motion.end_s, 200, endpoint=False)
+    share = [
+        np.abs([joint.force(s)[0] for s in t]) / most
+        for joint, most in zip(drives, TASK.limits, strict=True)
+    ]
+    assert np.max(share) == pytest.approx(1.0, abs=1e-3)
+    for joint, end in zip(drives, TASK.end, strict=True):
+        first, second = (joint.motion(x * motion.end_s)[2] for x in (0.2, 0.8))
+        assert first == -second == pytest.approx(4 * end / motion.end_s**2)
+        assert joint.motion(motion.end_s)[0] == pytest.approx(end)
 
 
 @pytest.mark.parametrize(
@@ -65,8 +80,12 @@ def test_the_whole_study_shows_what_each_method_buys(tmp_path):
     assert nominal["inversion"]["residual_m"] < 1e-5
     quick = nominal["least time"]
     assert quick["time_s"] < 0.75 * min(
-        row["time_s"] for name, row in nominal.items() if not name.startswith("least")
+        row["time_s"]
+        for name, row in nominal.items()
+        if name != "bang-bang" and not name.startswith("least")
     )
-    assert quick["residual_m"] < 0.1 * plain["residual_m"]
+    blunt = nominal["bang-bang"]
+    assert quick["time_s"] < blunt["time_s"] < plain["time_s"]
+    assert quick["residual_m"] < 0.1 * min(plain["residual_m"], blunt["residual_m"])
     for row in nominal.values():  # feedback adds little to the drives of the shortest motions
         assert row["peak_drive_1"] < 1.1 * TASK.limits[0]

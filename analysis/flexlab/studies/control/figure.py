@@ -17,6 +17,7 @@ STYLES = (
     ("#000000", "-", "o"),
     ("#E69F00", "--", "s"),
     ("#D55E00", ":", "D"),
+    ("#7F7F7F", "-.", "<"),
     ("#009E73", "-", "^"),
     ("#0072B2", "-", "v"),
     ("#CC79A7", "--", "P"),
@@ -53,7 +54,9 @@ def figure(study: Mapping[str, tuple[Task, list[Judged]]]) -> Any:
             axis.grid(alpha=0.25, linewidth=0.5)
             axis.tick_params(width=0.6, length=2.5)
         handles, labels = rows[0][0].get_legend_handles_labels()
-        drawing.legend(handles, labels, loc="outside lower center", ncols=7, frameon=False)
+        drawing.legend(
+            handles, labels, loc="outside lower center", ncols=8, columnspacing=1.2, frameon=False
+        )
         drawing.canvas.draw()
     return drawing
 

@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.optimize import brentq
 
 import flexura as fx
 from flexura.control import lqr
-from flexura.signals import Signal, zv, zvd
+from flexura.signals import Drive, JointDrive, Signal, piecewise, trapezoidal, zv, zvd
 
 from .tasks import DERIVATIVE_HZ, RATE_HZ, Task
 
@@ -19,6 +20,7 @@ INTEGRAL = 0.2  # ki over kp and the pole of the joints' loops
 # LQR: what counts the same, in shares of the ways, of the last link's length, of the drives' limits
 NEAR, BENT, EFFORT = 0.005, 0.02, 0.3
 MODES, LQR_HZ = 2, 2000.0  # modes of each link that an LQR is designed on, and its rate
+HOLDS = 400  # of the drives in a bang-bang motion
 BAND = 0.1  # of frequencies, of the robust shortest motion
 
 
@@ -69,6 +71,30 @@ def _controller(task: Task, joints: tuple[Signal, ...]) -> fx.Controller:
 def pid(task: Task) -> Motion:
     """A PID in each joint follows the set-points."""
     return _on_set_points(task, task.set_points, _controller(task, task.set_points))
+
+
+def bang_bang(task: Task) -> Motion:
+    """The rigid robot's drives for constant accelerations of the joints and then the opposite ones,
+    as short as the limits of the drives allow, and a PD in each joint."""
+
+    def motion(duration: float) -> tuple[tuple[Signal, ...], np.ndarray, np.ndarray]:
+        """The joints, the instants at which the drives change, and the drives (HOLDS, 2)."""
+        ends = zip(task.start, task.end, strict=True)
+        joints = tuple(trapezoidal(b, duration, duration / 2, a) for a, b in ends)
+        t = np.linspace(0.0, duration, HOLDS + 1)
+        run = fx.inverse(task.rigid, (t[:-1] + t[1:]) / 2, list(joints))
+        return joints, t, np.column_stack([run[f"joint/{i}/drive"] for i in (1, 2)])
+
+    over = lambda duration: float(np.max(np.abs(motion(duration)[2]) / task.limits)) - 1.0
+    joints, t, drives = motion(brentq(over, task.duration_s / 4, 4 * task.duration_s, xtol=1e-6))
+    rows = zip(drives.T, joints, *task.gains, strict=True)
+    drive = Drive(
+        tuple(
+            JointDrive(piecewise(t, np.append(u, 0.0)), joint, kp=float(kp), kd=float(kd))
+            for u, joint, kp, kd in rows
+        )
+    )
+    return _on_set_points(task, joints, drive)
 
 
 def shaped(shaper: Callable[..., Signal]) -> Callable[[Task], Motion]:
@@ -129,6 +155,7 @@ METHODS = (
     Method("PID", pid),
     Method("PID, ZV", shaped(zv)),
     Method("PID, ZVD", shaped(zvd)),
+    Method("bang-bang", bang_bang),
     Method("LQR", regulator),
     Method("inversion", inversion),
     Method("least time", shortest(0.0)),

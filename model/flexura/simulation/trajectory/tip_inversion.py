@@ -32,10 +32,7 @@ RTOL = 1e-9  # of the runs that judge
 SMOOTH = 2e-9  # m or rad: what a cubic spline through the rows of a Run may be off by
 MOST_ROWS = 20_001
 EXACT = 1e-6  # of the reach: a nearest motion that is off by less follows the path
-NO_EXACT = (
-    "no exact inverse was found: the path is too quick, or passes a posture in which the joints "
-    "cannot move the tip in every direction"
-)
+SINGULAR = 0.02  # smallest over largest singular value of the tip by the joints: a singular posture
 
 
 def invert(
@@ -99,7 +96,7 @@ def invert(
     if motion is None and run.meta["tip_error_m"] > EXACT * sum(
         link.length_m for link in system.robot.links
     ):
-        why = why or NO_EXACT
+        why = why or _no_exact(problem, ends[0])
         text = f"{why}; this is the nearest motion, off by {run.meta['tip_error_m']:.3g} m"
         event = {"t": path.start, "level": "WARN", "name": "nearest", "text": text}
         run.meta["events"] = [*run.meta["events"], event]
@@ -115,8 +112,11 @@ def rests(problem: TipProblem) -> tuple[Rest, Rest]:
     """The robot at rest where the path begins and where it ends."""
     path = problem.path
     start = problem.rest(path.start, static(problem.system))
-    times = np.linspace(path.start, path.end, 61)
-    return start, problem.rest(path.end, problem.along(times, start.q)[-1])
+    return start, problem.rest(path.end, problem.along(_coarse(path), start.q)[-1])
+
+
+def _coarse(path: TipPath) -> np.ndarray:
+    return np.linspace(path.start, path.end, 61)
 
 
 def _forbidden(ends: tuple[Rest, Rest]) -> str:
@@ -130,6 +130,24 @@ def _forbidden(ends: tuple[Rest, Rest]) -> str:
                 f"moves it from the axis"
             )
     return ""
+
+
+def _no_exact(problem: TipProblem, start: Rest) -> str:
+    """Why Newton's method may have found no motion: a singular posture on the way, or the speed."""
+    times = _coarse(problem.path)
+    q = problem.along(times, start.q)
+    zero = np.zeros_like(q)
+    _, _, _, _, tip, slope = problem.system.equations.force_derivatives(q, zero, zero)
+    by_q = problem.path.deviation(tip, slope, problem.path.at(times))[1]
+    sizes = np.linalg.svd(by_q[:, :, problem.free], compute_uv=False)
+    share = sizes[:, -1] / sizes[:, 0]
+    if share.min() > SINGULAR:
+        return "no exact inverse was found: the path is too quick"
+    return (
+        f"no exact inverse was found: about t = {times[share.argmin()]:.3f} s the path passes a "
+        f"singular posture, in which the joints cannot move the tip in every direction. Links that "
+        f"are bent there do not reach as far as straight ones"
+    )
 
 
 def _mesh(path: TipPath, ends: tuple[Rest, Rest], longest: float, count: int) -> Mesh:
