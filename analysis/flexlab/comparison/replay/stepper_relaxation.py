@@ -31,6 +31,9 @@ StartState = tuple[fx.System, np.ndarray]  # and its state at the start (n,)
 MAX_ROUNDS = 40
 # rounds in which k changes; assumed torques from which the next one is made
 STIFFNESS_ROUNDS, ANDERSON_DEPTH = 3, 6
+# rounds without progress after which what is left is the integrator's own error, if it is so small
+# a multiple of the tolerance
+STALLED, PROGRESS, FLOOR = 6, 0.8, 4.0
 TORQUE_TOLERANCE = (
     5e-4  # of the holding torque: what the assumed torque may differ by from the field's
 )
@@ -97,6 +100,8 @@ def simulate_with_stepper(
     history: list[
         tuple[np.ndarray, np.ndarray]
     ] = []  # (what was assumed, what came of it less that)
+    best = mark = np.inf
+    since, nearest, found = 0, None, (k, assumed)
     for n in range(1, MAX_ROUNDS + 1):
         stepper_drive = JointDrive(force=correction, motion=pulses, kp=k)
         try:
@@ -116,10 +121,15 @@ def simulate_with_stepper(
         e, torque = command[:m] - theta, spring.torques(command[:m], theta)
         residual = np.abs(k * e + assumed[:m] - torque).max(initial=0.0) / spring.holding_N_m
         report(1 - 1 / (n + 1))
-        if residual < tolerance:
-            relaxed.stiffness_N_m, relaxed.torque_N_m = k, assumed
-            run.meta["relaxation_rounds"] = n
-            return _every_nth_row(run, parts)
+        if residual < best:
+            best, nearest, found = residual, run, (k, assumed.copy())
+        if best < PROGRESS * mark:
+            mark, since = best, n
+        stalled = n - since >= STALLED and best < FLOOR * tolerance
+        if nearest is not None and (best < tolerance or stalled):
+            relaxed.stiffness_N_m, relaxed.torque_N_m = found
+            nearest.meta["relaxation_rounds"] = n
+            return _every_nth_row(nearest, parts)
         if n <= STIFFNESS_ROUNDS and relaxed.torque_N_m is None:
             k = float(np.clip(e @ torque / (e @ e), 0.05 * spring.on_N_m, spring.on_N_m))
             assumed[:m] = torque - k * e

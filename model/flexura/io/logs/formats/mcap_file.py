@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import struct
+import zlib
 from collections.abc import Callable
 from typing import Any
 
@@ -30,6 +31,7 @@ def read(raw: bytes, file: str) -> Log:
     meta: dict[str, Any] | None = None
     unread: dict[str, str] = {}
     try:
+        _check_summary(raw)
         reader = make_reader(io.BytesIO(raw), validate_crcs=True)
         for record in reader.iter_metadata():
             if record.name == "flexura":
@@ -64,6 +66,14 @@ def read(raw: bytes, file: str) -> Log:
     columns, clocks = messages.columns(list(topics.values()))
     notes = [f"{topic} is left out: its encoding is {said}" for topic, said in unread.items()]
     return Log(file, "MCAP", columns, clocks, meta or {}, own=meta is not None, notes=notes)
+
+
+def _check_summary(raw: bytes) -> None:
+    """Compare the summary, from which the reader takes the channels, with its CRC-32 in the footer;
+    the reader checks those of chunks alone. Raises ValueError."""
+    start, _, wanted = struct.unpack("<QQI", raw[-8 - 20 : -8])
+    if start and wanted and zlib.crc32(raw[start : -8 - 4]) != wanted:
+        raise ValueError("the checksum of the summary is wrong")
 
 
 def _decoder(schema: Any, encoding: str) -> Decoder | None:
