@@ -92,7 +92,8 @@ def tip_path(system: System, t: np.ndarray, tip: Any) -> TipPath:
     if isinstance(tip, str | bytes | dict | set) or pair != _is_pair(tip, t, pair):
         counted = "two entries, (x, y)" if pair else "one entry, not a pair"
         text = f"expected a path of {counted}: so many of the robot's joints can move"
-        raise InputError(text, key="tip", value=tip)
+        shown = "a function" if callable(tip) else tip
+        raise InputError(text, key="tip", value=shown)
     signals = as_signals(list(tip) if pair else [tip], 2 if pair else 1, "tip", t)
     if any(s is None for s in signals):
         raise InputError("expected a path, not None", key="tip")
