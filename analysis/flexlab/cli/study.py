@@ -74,7 +74,9 @@ def study(
     \b
     Example: flexura study payload type-1-rr --values 0:0.2:11
     """
-    if kind in ("measured", "control"):
+    if kind not in (known := (*studies.KINDS, "measured", "control")):
+        raise fx.InputError(f"expected one of {', '.join(known)}", key="KIND", value=kind)
+    if kind in known[-2:]:
         given = {"MANOEUVRE": manoeuvre, "--values": values, "--jobs": jobs}
         for key, value in given.items():
             if value is not None:

@@ -48,9 +48,7 @@ def run(
         InputError: there is no such study of this robot.
     """
     if kind not in KINDS:
-        raise fx.InputError(
-            f"expected one of {', '.join([*KINDS, 'measured', 'control'])}", key="KIND", value=kind
-        )
+        raise fx.InputError(f"expected one of {', '.join(KINDS)}", key="KIND", value=kind)
     last_flexible(robot)
     low, high, count = KINDS[kind].values(robot) if values is None else _values(values)
     if kind == "length-ratio":
