@@ -147,13 +147,14 @@ def test_a_loss_of_power_while_an_experiment_is_recorded(place, tmp_path):
 
 
 def equal_or_missing(run, whole):
-    """Every number of a run is the whole one's, or NaN; time may begin some ticks apart, since the
-    start is estimated from what there is. Where nothing had moved, a run says so."""
+    """Every number of a run is the whole one's, or NaN; time may begin as far apart as the run says,
+    since the start is estimated from what there is. Where nothing had moved, a run says so."""
     if any(event["text"] == "nothing was moved" for event in run.meta["events"]):
         return
     names = ("joint/1/position", "joint/2/position", "link/2/flex_voltage")
     step = np.median(np.diff(whole.t))
-    for shift in sorted(range(-5, 6), key=abs):
+    unsure = 1 + round(run.meta["start_uncertainty_s"] / step)
+    for shift in sorted(range(-max(unsure, 5), max(unsure, 5) + 1), key=abs):
         at = np.rint((run.t - whole.t[0]) / step).astype(int) + shift
         there = (at >= 0) & (at < len(whole.t))
         pairs = [(run[name][there], whole[name][at[there]]) for name in names]
