@@ -148,7 +148,8 @@ def test_a_loss_of_power_while_an_experiment_is_recorded(place, tmp_path):
 
 def equal_or_missing(run, whole):
     """Every number of a run is the whole one's, or NaN; time may begin as far apart as the run
-    says, since the start is estimated from what there is. Where nothing had moved, a run says so."""
+    says, since the start is estimated from what there is. Where nothing had moved, a run says
+    so."""
     if any(event["text"] == "nothing was moved" for event in run.meta["events"]):
         return
     names = ("joint/1/position", "joint/2/position", "link/2/flex_voltage")
