@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...errors import FlexuraError, InputError
-from ...io import Run, array, number, whole
+from ...io import Run, Tables, array, number, whole
 from ...robot import Robot
 from ...signals import Drive, polynomial
 from ...system import RobotLike, System, assemble, static
@@ -23,6 +23,7 @@ INTERVALS = 160  # of the drives
 COARSE = 40  # so many at least in a first, coarse motion
 ROUGHLY = 5e-3  # of the time: what a coarse motion may leave to finer ones
 FEWEST = 20
+KEPT = 0.01  # of a limit of speed or deflection: what a motion may exceed it by without an event
 ROWS = 20  # of the Run in each interval: a spline through them hardly leaves the drives
 FIRST = 120  # in which the first motion's drives are looked at
 LONGER = 12  # times by which the first motion may be too short
@@ -67,7 +68,8 @@ def time_optimal(
     Returns:
         A Run whose drives are linear between its rows; after its last row they hold the robot.
         `meta` has `duration_s`, `residual_m` and `unshaped_m` (the largest tip deflection after the
-        motion, and after that of the rigid robot's fastest drives), `programs`.
+        motion, and after that of the rigid robot's fastest drives), `programs`. An event
+        "limit_exceeded" names a speed or deflection that is more than 1 % beyond its limit.
 
     Raises:
         InputError: an argument is not what is expected.
@@ -100,7 +102,9 @@ def time_optimal(
             found = shortest.solve(np.column_stack([np.interp(at, nodes, x) for x in u.T]), T)
             u, T = found or _solved(shortest, nominal, T, SETTLED)
         count += shortest.programs
-    return _recorded(plants, u, T, count, share)
+    run = _recorded(plants, u, T, count, share)
+    run.meta["events"] = run.meta["events"] + _exceeded(run, bounds)
+    return run
 
 
 def _band(nominal: Plant, share: float, limits: Limits) -> list[Plant]:
@@ -258,6 +262,20 @@ def _recorded(plants: list[Plant], u: np.ndarray, T: float, count: int, share: f
         **({"residual_in_band_m": max(left)} if len(plants) > 1 else {}),
     )
     return run
+
+
+def _exceeded(run: Run, limits: Limits) -> list[Tables]:
+    """Events of the limits that the motion does not keep between the nodes of its program."""
+    of = [(f"joint/{i}/velocity", most) for i, most in enumerate(limits.speed, 1)]
+    of += [(name, limits.deflection_m) for name in run if name.endswith("/tip_deflection")]
+    out: list[Tables] = []
+    for name, most in of:
+        size = np.abs(run[name])
+        if size.max() > most * (1 + KEPT):
+            text = f"{name} reaches {size.max():.4g}, beyond its limit {most:.4g}"
+            at = float(run.t[size.argmax()])
+            out.append({"t": at, "level": "WARN", "name": "limit_exceeded", "text": text})
+    return out
 
 
 def _residual(plant: Plant, drive: Drive, T: float) -> float:
