@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..io import finite_arguments, whole
 from .conversion import FunctionSignal
 from .shaping import MAX_SEGMENTS, stretches
-from .signal import COLUMNS, Signal, from_segments
+from .signal import COLUMNS, Signal, from_segments, segment
 
 BEFORE = -1e300  # s: a segment that begins there is what was always
 PIECES = 64  # polynomials of fifth order in a period of a chirp: they are off by 2e-11 of it
@@ -48,7 +48,7 @@ def pulse(value: float, duration_s: float, at_s: float = 0.0) -> Signal:
         InputError: a duration that is not positive.
     """
     _positive("duration_s", duration_s)
-    rows = [ZERO, _row(at_s, value), _row(at_s + duration_s, 0.0)]
+    rows = [ZERO, segment(at_s, value), segment(at_s + duration_s, 0.0)]
     return from_segments(rows, kind="pulse", value=value, duration_s=duration_s, at_s=at_s)
 
 
@@ -86,7 +86,7 @@ def chirp(
     phase, speed = rate * s + growth * s**2 / 2, rate + growth * s
     y = amplitude * np.array([np.sin(phase), speed * np.cos(phase), -(speed**2) * np.sin(phase)])
     y[2] += amplitude * growth * np.cos(phase)
-    rows = [ZERO, *_hermite(at_s + s, y), _row(at_s + duration_s, 0.0)]
+    rows = [ZERO, *_hermite(at_s + s, y), segment(at_s + duration_s, 0.0)]
     return from_segments(
         rows,
         kind="chirp",
@@ -132,9 +132,9 @@ def noise(
     values = rms * np.random.default_rng(seed).standard_normal(len(times))
     values[[0, -1]] = 0.0
     c = CubicSpline(times, values, bc_type="clamped").c[::-1].T
-    rows = [_row(at_s + t, *own) for t, own in zip(times, c.tolist(), strict=False)]
+    rows = [segment(at_s + t, *own) for t, own in zip(times, c.tolist(), strict=False)]
     return from_segments(
-        [ZERO, *rows, _row(at_s + duration_s, 0.0)],
+        [ZERO, *rows, segment(at_s + duration_s, 0.0)],
         kind="noise",
         rms=rms,
         cutoff_Hz=cutoff_Hz,
@@ -203,10 +203,6 @@ def _segments(signal: Signal, key: str) -> np.ndarray:
     return signal.segments
 
 
-def _row(t0: float, *c: float) -> list[float]:
-    return [t0, *c, *([0.0] * (COLUMNS - 1 - len(c)))]
-
-
 def _hermite(t: np.ndarray, y: np.ndarray) -> list[list[float]]:
     """Segments of fifth order between times (k,) with the values and derivatives y (3, k)."""
     h, a, b = np.diff(t), y[:, :-1], y[:, 1:]
@@ -215,7 +211,7 @@ def _hermite(t: np.ndarray, y: np.ndarray) -> list[list[float]]:
     c3 = (10 * gap - 4 * slope + bend / 2) / h**3
     c4 = (-15 * gap + 7 * slope - bend) / h**4
     c5 = (6 * gap - 3 * slope + bend / 2) / h**5
-    return [_row(*own) for own in np.array([t[:-1], *a[:2], a[2] / 2, c3, c4, c5]).T.tolist()]
+    return [segment(*own) for own in np.array([t[:-1], *a[:2], a[2] / 2, c3, c4, c5]).T.tolist()]
 
 
 def _positive(key: str, value: float) -> None:

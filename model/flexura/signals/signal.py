@@ -125,7 +125,19 @@ class Signal:
         return self.segments[:, 0]
 
 
-def _row(t0: float, *c: float, A: float = 0.0, w: float = 0.0, phi: float = 0.0) -> list[float]:
+def segment(t0: float, *c: float, A: float = 0.0, w: float = 0.0, phi: float = 0.0) -> list[float]:
+    """One segment's row (60).
+
+    Args:
+        t0: where it begins [s].
+        *c: coefficients c0, c1, ... up to c5; the others are 0.
+        A: amplitude of its wave.
+        w: the wave's frequency [rad/s].
+        phi: the wave's phase [rad].
+
+    Returns:
+        Ten numbers.
+    """
     return [t0, *c, *([0.0] * (6 - len(c))), A, w, phi]
 
 
@@ -161,7 +173,7 @@ def constant(value: float) -> Signal:
     Returns:
         The Signal.
     """
-    return from_segments([_row(0.0, value)], kind="constant", value=value)
+    return from_segments([segment(0.0, value)], kind="constant", value=value)
 
 
 @finite_arguments
@@ -176,7 +188,7 @@ def step(value: float, at_s: float = 0.0) -> Signal:
         The Signal.
     """
     return from_segments(
-        [_row(-1e300, 0.0), _row(at_s, value)], kind="step", value=value, at_s=at_s
+        [segment(-1e300, 0.0), segment(at_s, value)], kind="step", value=value, at_s=at_s
     )
 
 
@@ -195,7 +207,7 @@ def harmonic(
     Returns:
         The Signal.
     """
-    row = _row(0.0, offset, A=amplitude, w=2 * np.pi * frequency_Hz, phi=phase_rad + np.pi / 2)
+    row = segment(0.0, offset, A=amplitude, w=2 * np.pi * frequency_Hz, phi=phase_rad + np.pi / 2)
     return from_segments(
         [row],
         kind="harmonic",
@@ -223,7 +235,10 @@ def ramp(end: float, duration_s: float, start: float = 0.0, at_s: float = 0.0) -
         The Signal.
     """
     _positive("duration_s", duration_s)
-    rows = [_row(at_s, start, (end - start) / duration_s), _row(at_s + duration_s, end)]
+    rows = [
+        segment(at_s, start, (end - start) / duration_s),
+        segment(at_s + duration_s, end),
+    ]
     return from_segments(rows, kind="ramp", end=end, duration_s=duration_s, start=start, at_s=at_s)
 
 
@@ -242,7 +257,10 @@ def cycloid(end: float, duration_s: float, start: float = 0.0, at_s: float = 0.0
     """
     _positive("duration_s", duration_s)
     A, T = end - start, duration_s
-    rows = [_row(at_s, start, A / T, A=-A / (2 * np.pi), w=2 * np.pi / T), _row(at_s + T, end)]
+    rows = [
+        segment(at_s, start, A / T, A=-A / (2 * np.pi), w=2 * np.pi / T),
+        segment(at_s + T, end),
+    ]
     return from_segments(
         rows, kind="cycloid", end=end, duration_s=duration_s, start=start, at_s=at_s
     )
@@ -263,7 +281,7 @@ def polynomial(end: float, duration_s: float, start: float = 0.0, at_s: float = 
         The Signal.
     """
     _positive("duration_s", duration_s)
-    rows = [_rise(at_s, start, end - start, duration_s), _row(at_s + duration_s, end)]
+    rows = [_rise(at_s, start, end - start, duration_s), segment(at_s + duration_s, end)]
     return from_segments(
         rows, kind="polynomial", end=end, duration_s=duration_s, start=start, at_s=at_s
     )
@@ -300,10 +318,10 @@ def trapezoidal(
     a = v / r
     brake = at_s + max(T - r, r)
     rows = [
-        _row(at_s, start, 0.0, a / 2),
-        _row(at_s + r, start + v * r / 2, v),
-        _row(brake, end - v * r / 2, v, -a / 2),
-        _row(at_s + T, end),
+        segment(at_s, start, 0.0, a / 2),
+        segment(at_s + r, start + v * r / 2, v),
+        segment(brake, end - v * r / 2, v, -a / 2),
+        segment(at_s + T, end),
     ]
     return from_segments(
         rows,
@@ -344,18 +362,18 @@ def bang_bang(
             value=r,
         )
     if r == 0:
-        rows = [_row(at_s, a), _row(at_s + T / 2, -a), _row(at_s + T, 0.0)]
+        rows = [segment(at_s, a), segment(at_s + T / 2, -a), segment(at_s + T, 0.0)]
     else:
         rows = [
             _rise(at_s, 0.0, a, r),
-            _row(at_s + r, a),
+            segment(at_s + r, a),
             _rise(at_s + T / 2 - r / 2, a, -2 * a, r),
-            _row(at_s + T / 2 + r / 2, -a),
+            segment(at_s + T / 2 + r / 2, -a),
             _rise(at_s + T - r, -a, a, r),
-            _row(at_s + T, 0.0),
+            segment(at_s + T, 0.0),
         ]
     if at_s > 0:
-        rows.insert(0, _row(0.0))
+        rows.insert(0, segment(0.0))
     return from_segments(
         rows, kind="bang_bang", amplitude=amplitude, duration_s=duration_s, rise_s=rise_s, at_s=at_s
     )
@@ -377,8 +395,8 @@ def table(t_s: ArrayLike, y: ArrayLike) -> Signal:
     coefficients = CubicSpline(
         times, values, bc_type="natural"
     ).c  # (4, k - 1), highest power first
-    rows = [_row(times[k], *coefficients[::-1, k]) for k in range(len(times) - 1)] + [
-        _row(times[-1], values[-1])
+    rows = [segment(times[k], *coefficients[::-1, k]) for k in range(len(times) - 1)] + [
+        segment(times[-1], values[-1])
     ]
     return from_segments(rows, kind="table", t_s=times.tolist(), y=values.tolist())
 
@@ -394,7 +412,7 @@ def piecewise(at_s: ArrayLike, value: ArrayLike) -> Signal:
         The Signal.
     """
     times, values = _columns("at_s", at_s, "value", value, 1)
-    rows = [_row(t, v) for t, v in zip(times, values, strict=True)]
+    rows = [segment(t, v) for t, v in zip(times, values, strict=True)]
     return from_segments(rows, kind="piecewise", at_s=times.tolist(), value=values.tolist())
 
 
@@ -417,7 +435,7 @@ KINDS = {
 
 def _rise(t0: float, start: float, change: float, duration: float) -> list[float]:
     try:
-        return _row(
+        return segment(
             t0,
             start,
             0.0,
