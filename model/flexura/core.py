@@ -129,5 +129,6 @@ vibration_lower_bound = _core.vibration_lower_bound
 population = _core.population  # many robots at once, from rows of numbers to rows of channels
 Drive = _core.Drive  # what acts on robots of a population
 Watch = _core.Watch  # what another thread sees of a population, and stops it by
+Copies = _core.Copies  # of one robot that take equal steps together
 PredictedMotion = _core.PredictedMotion  # the motion ahead of a predictive controller
 condensed_program = _core.condensed_program  # of its tick, states eliminated

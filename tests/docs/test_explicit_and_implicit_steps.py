@@ -10,6 +10,7 @@ from scipy.integrate._ivp import dop853_coefficients as dop853
 import flexura as fx
 import robots
 from core_steps import simulation, steps
+from flexura import core
 from flexura.signals import polynomial
 
 L, RHO, EI = 0.5, 0.3, 0.8
@@ -173,3 +174,27 @@ def test_the_method_that_gets_furthest_a_pass():
         and progress["implicit"] > 4 * progress["explicit"]
     )
     assert run.meta["method"] == "implicit"
+
+
+def test_step_of_a_given_length():
+    """(165) with matrices, of a clamped link that is linear."""
+    system, M, K = clamped(damping={"beta_s": 2e-3})
+    h, gamma = 4e-3, 1 - 1 / np.sqrt(2)
+    q, v = np.array([[0.0, 2e-7, -1e-7]]), np.array([[0.0, 3e-6, 2e-6]])
+    z = np.concatenate([q[0, 1:], v[0, 1:]])
+    fall = -np.linalg.solve(M, np.hstack([K, 2e-3 * K]))
+    A = np.vstack([np.hstack([np.zeros((2, 2)), np.eye(2)]), fall])
+    for _ in range(3):
+        k1 = np.linalg.solve(np.eye(4) - gamma * h * A, A @ z)
+        k2 = np.linalg.solve(np.eye(4) - gamma * h * A, A @ (z + h * k1) - 2 * k1)
+        z = z + h * (1.5 * k1 + 0.5 * k2)
+    tips = np.zeros((1, 1)), np.zeros((1, 2))
+    moves, arrived = np.ones(1, dtype=bool), np.zeros(1, dtype=bool)
+    free = np.array([[-np.inf], [np.inf]])
+    core.Copies(system.equations).advance(
+        q, v, np.zeros((1, 1)), free, moves, *tips, arrived, h, 3, 1
+    )
+    assert arrived.all() and q[0, 0] == 0
+    assert q[0, 1:] == pytest.approx(z[:2], rel=1e-9)
+    assert v[0, 1:] == pytest.approx(z[2:], rel=1e-9)
+    assert tips[0][0, 0] == pytest.approx(np.array([L / 2, L]) @ q[0, 1:], rel=1e-9)

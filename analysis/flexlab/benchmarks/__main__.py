@@ -1,6 +1,7 @@
 """The command: python -m flexlab.benchmarks [PART ...] [PROBLEM ...].
 
-Parts: motions, statics, population, scaling, board, accuracy, passes, search.
+Parts: motions, statics, population, scaling, predictive, learning, board, accuracy, passes,
+search.
 """
 
 from __future__ import annotations
@@ -24,13 +25,13 @@ from . import (
     report,
     scaling,
 )
-from .problems import predictive
+from .problems import learning, predictive
 from .problems.motions import all_motions
 from .problems.problem import Problem
 from .problems.statics import StaticProblem, all_statics
 
 # measured by default
-PARTS = ("motions", "statics", "population", "scaling", "predictive", "board")
+PARTS = ("motions", "statics", "population", "scaling", "predictive", "learning", "board")
 OTHERS = ("accuracy", "passes", "search")
 ROUNDS = 7
 
@@ -121,6 +122,7 @@ def measured(
         "population": lambda: each("population", [rounds], population.measure)[0],
         "scaling": lambda: each("scaling", [5 * rounds], scaling.measure)[0],
         "predictive": lambda: each("predictive", [rounds], predictive.measure)[0],
+        "learning": lambda: each("learning", [rounds], learning.measure)[0],
         "board": lambda: each("board", ["emulated"], lambda _: board_load.measure())[0],
         "accuracy": lambda: each("accuracy", [p for p in motions if p.available], accuracy.errors),
         "passes": lambda: each("passes", [p for p in motions if p.available], accuracy.passes),
@@ -141,6 +143,7 @@ def tables(found: dict[str, Any]) -> list[Any]:
         "population": lambda rows: [report.populations(rows)],
         "scaling": lambda rows: [report.growths(rows)],
         "predictive": lambda rows: [report.predictions(rows)],
+        "learning": lambda rows: [report.environments(rows)],
         "board": lambda rows: [report.boards(rows)],
         "accuracy": lambda rows: [
             report.accuracies(rows),

@@ -146,6 +146,18 @@ def predictions(rows: Rows) -> Table:
     return table
 
 
+def environments(rows: Rows) -> Table:
+    """Table of the environment for learning: times real time, and the error of its steps."""
+    table = _table(
+        "robots that learn", "x real time", "of 2 cores", "at least", "error mm", "largest"
+    )
+    for row in rows:
+        speed = (row["times_real_time"], row["of_two_processors"], row["required"])
+        error = (row["median_error_mm"], row["largest_error_mm"])
+        table.add_row(f"{row['robots']}, {row['name']}", *(figure(x) for x in (*speed, *error)))
+    return table
+
+
 def boards(rows: list[tuple[str, str, float]]) -> Table:
     """Table of the emulated board's load."""
     table = _table("emulated board under its hardest load", "")

@@ -5,7 +5,6 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
-#include "mechanics.hpp"
 #include "packed.hpp"
 #include "simulation/method_by_name.hpp"
 
@@ -32,9 +31,9 @@ struct PackedDrive {
 };
 
 Channel::Of kind_of(const std::string &name) {
-  const char *names[] = {"position", "velocity",       "drive",          "account",
-                         "seen",     "motor_position", "motor_velocity", "state"};
-  for (int k = 0; k < 8; ++k)
+  const char *names[] = {"position", "velocity",       "drive",         "account",
+                         "seen",     "motor_position", "motor_velocity"};
+  for (int k = 0; k < 7; ++k)
     if (name == names[k]) return Channel::Of(k);
   throw std::invalid_argument("there is no channel " + name);
 }
@@ -45,15 +44,14 @@ nb::tuple run_population(const Counts &counts, const Cube &numbers, const Cube &
                          const Indices &drive_of, const Vector &t, const Vector &q, const Vector &v,
                          double rtol, const std::string &method, bool numerical_damping,
                          long most_steps, const std::vector<std::pair<std::string, int>> &channels,
-                         int stations, int threads, Watch &watch, const Vector &held,
-                         const Mechanics *same) {
+                         int stations, int threads, Watch &watch) {
   const std::size_t robots = numbers.shape(0), links = counts.shape(0);
   if (counts.shape(1) != COUNTS || numbers.shape(1) != links || numbers.shape(2) != NUMBERS ||
       material.shape(0) != robots || material.shape(2) != MATERIAL || gravity.shape(0) != robots ||
       lumps.shape(0) != robots || lumps.shape(2) != LUMP || gravity.shape(1) != 2 ||
       payload.shape(0) != robots || payload.shape(1) != PAYLOAD || limits.shape(0) != robots ||
       limits.shape(1) != links || limits.shape(2) != 2 || drive_of.shape(0) != robots ||
-      t.shape(0) < 1 || (held.shape(0) != 0 && held.shape(0) != robots * links))
+      t.shape(0) < 1)
     throw std::invalid_argument("rows of another shape were expected");
   Population population;
   Table &table = population.robots;
@@ -75,11 +73,6 @@ nb::tuple run_population(const Counts &counts, const Cube &numbers, const Cube &
   population.times.assign(t.data(), t.data() + t.shape(0));
   population.q.assign(q.data(), q.data() + q.shape(0)),
       population.v.assign(v.data(), v.data() + v.shape(0));
-  if (same) {
-    if (same->model->first.size() != links) throw std::invalid_argument("another robot");
-    population.same = same->model;
-  }
-  population.held.assign(held.data(), held.data() + held.shape(0));
   population.rtol = rtol, population.method = method,
   population.numerical_damping = numerical_damping, population.most_steps = most_steps,
   population.stations = stations;
@@ -127,7 +120,7 @@ void bind_population(nb::module_ &module) {
   module.def("population", &run_population, "counts"_a, "numbers"_a, "material"_a, "lumps"_a,
              "gravity"_a, "payload"_a, "limits"_a, "drives"_a, "drive_of"_a, "t"_a, "q"_a, "v"_a,
              "rtol"_a, "method"_a, "numerical_damping"_a, "most_steps"_a, "channels"_a,
-             "stations"_a, "threads"_a, "watch"_a, "held"_a, "same"_a.none(),
+             "stations"_a, "threads"_a, "watch"_a,
              "Values (channels, robots, times); of each robot how it ended, the time reached, "
              "steps, joint, "
              "positions of the joints; texts by robot; balances of the energies.");

@@ -88,7 +88,7 @@ class Worker {
     std::unique_ptr<Fault> faults[LANES];
     for (int k = first; k < end; ++k) robots.push_back(robot_of(all_.robots, k));
     for (int k = 0; k < end - first; ++k) pointers[k] = &robots[std::size_t(k)];
-    if (!all_.same) assemble(pointers, end - first, models, faults);
+    assemble(pointers, end - first, models, faults);
     std::vector<Starter> starters;
     for (int k = first; k < end; ++k) {
       Ending &ending = endings_[std::size_t(k)];
@@ -97,9 +97,7 @@ class Worker {
         ending.text = fault->what();
         continue;
       }
-      Starter starter =
-          ready(k, all_.same ? all_.same
-                             : std::make_shared<const Model<double>>(std::move(models[k - first])));
+      Starter starter = ready(k, std::move(models[k - first]));
       if (!inside_limits(starter, ending)) continue;
       if (starter.method == "auto")
         run_alone(starter);
@@ -122,31 +120,18 @@ class Worker {
   std::vector<Ending> &endings_;
   bool balanced_ = false;  // are accounts asked for?
 
-  // Where the row of robot k begins, in rows of so many numbers.
-  static std::ptrdiff_t first_of(int k, std::size_t wide) {
-    return std::ptrdiff_t(std::size_t(k) * wide);
-  }
-
-  Starter ready(int k, std::shared_ptr<const Model<double>> shared) const {
+  Starter ready(int k, Model<double> model) const {
     Starter out;
-    out.shared = std::move(shared);
-    const Model<double> &model = out.model();
     out.robot = k, out.method = all_.method,
     out.acting = all_.drives[std::size_t(all_.drive_of[std::size_t(k)])];
     const std::size_t n = std::size_t(model.n);
-    const std::size_t every = std::size_t(all_.robots.count) * n;
-    const bool own = all_.q.empty(), each = all_.q.size() == every, still = all_.v.empty(),
-               each_v = all_.v.size() == every;
-    if ((!own && !each && all_.q.size() != n) || (!still && !each_v && all_.v.size() != n))
+    const bool own = all_.q.empty(), each = all_.q.size() == std::size_t(all_.robots.count) * n;
+    if ((!own && !each && all_.q.size() != n) || (!all_.v.empty() && all_.v.size() != n))
       throw std::invalid_argument("the start needs an entry an unknown");
-    const auto first = all_.q.begin() + (each ? first_of(k, n) : 0);
+    const auto first = all_.q.begin() + (each ? std::ptrdiff_t(std::size_t(k) * n) : 0);
     out.q =
         own ? std::vector<double>(n, 0.0) : std::vector<double>(first, first + std::ptrdiff_t(n)),
-    out.v.assign(n, 0.0);
-    if (!still) std::copy_n(all_.v.begin() + (each_v ? first_of(k, n) : 0), n, out.v.begin());
-    if (!all_.held.empty())
-      std::copy_n(all_.held.begin() + first_of(k, out.acting.joints.size()),
-                  out.acting.joints.size(), out.acting.held.force.begin());
+    out.v = all_.v.empty() ? std::vector<double>(n, 0.0) : all_.v;
     for (int i = 0; i < model.links(); ++i) {
       const std::size_t link = std::size_t(i), row = std::size_t(model.first[link]);
       const double *limits = all_.limits + 2 * (std::size_t(k) * model.first.size() + link);
@@ -159,6 +144,7 @@ class Worker {
       out.q[row] = motion.y, out.v[row] = motion.yd;
     }
     if (all_.method == "auto") choose_method(model, out);
+    out.shared = std::make_shared<const Model<double>>(std::move(model));
     return out;
   }
 
@@ -377,7 +363,6 @@ class Worker {
       case Channel::drive: return drive[i];
       case Channel::account: return z[2 * model.n + channel.index];
       case Channel::seen: return seen[i][k];
-      case Channel::state: return z[i];
     }
     return 0.0;
   }

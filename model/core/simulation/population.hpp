@@ -6,34 +6,30 @@
 // robot's digits depend on nothing but itself.
 #pragma once
 #include <atomic>
-#include <memory>
 #include <string>
 #include <vector>
 
 #include "integration/run_state.hpp"
-#include "robot/model.hpp"
 #include "robot/robot_table.hpp"
 
 namespace flexura {
 
 // What is kept of a run: of joint `index` position, velocity or drive; account `index`; column
-// `index` of an Observer; entry `index` of the state, q (n) and then v (n).
+// `index` of an Observer.
 struct Channel {
-  enum Of { position, velocity, drive, account, seen, motor_position, motor_velocity, state } of;
+  enum Of { position, velocity, drive, account, seen, motor_position, motor_velocity } of;
   int index;
 };
 
 struct Population {
   Table robots;
-  std::shared_ptr<const Model<double>> same;  // of all robots, if they have the same numbers
   const double *limits = nullptr;  // (robots, links, 2), the ends of links that slide included
   std::vector<Inputs> drives;      // limits apart; neither functions nor samplers
   std::vector<int> drive_of;       // (robots): index of the drive
   std::vector<double> times;       // of the outputs; the first is the start
-  std::vector<double> q;     // (n) at the start, the same for all, or (robots, n); empty: each
-                             // robot's own start, links straight
-  std::vector<double> v;     // (n), the same for all, or (robots, n); empty: at rest
-  std::vector<double> held;  // (robots, links): forces beside the drives; empty: none
+  std::vector<double> q;  // (n) at the start, the same for all, or (robots, n); empty: each
+                          // robot's own start, links straight
+  std::vector<double> v;  // (n), the same for all; empty: at rest
   double rtol = 1e-6;
   std::string method = "auto";
   bool numerical_damping = true;

@@ -220,8 +220,6 @@ def _together(
         STATIONS,
         threads,
         watch,
-        np.zeros(0),
-        None,
     )
     for name, found in zip(request.channels, values, strict=True):
         part.channels[name][members] = found

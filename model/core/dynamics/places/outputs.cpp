@@ -127,6 +127,7 @@ void Observer<Real>::observe(const Real *y, const Real *v, Real *row, int parts)
 }
 
 template Bend bend(const Model<double> &, Workspace<double> &, const double *, int);
+template BendOf<Pack<4>> bend(const Model<Pack<4>> &, Workspace<Pack<4>> &, const Pack<4> *, int);
 template class Observer<double>;
 template class Observer<Pack<4>>;
 
