@@ -20,9 +20,18 @@ bool MethodSelection::advance(long steps) {
     const double progress =
         (loop.run_state[0].t - window_t) /
         static_cast<double>(std::max(loop.integration.passes - window_passes, 1L));
-    if (raced && loop.any() && progress * SLOWER < speed && since_race() > AGAIN) race();
+    if (raced && loop.any() && due(progress)) race();
   }
   return loop.any();
+}
+
+// Is a race to be held again, at `progress` seconds a pass?
+bool MethodSelection::due(double progress) {
+  if (progress * SLOWER < speed) return since_race() > AGAIN;
+  const double left = loop.run_state[0].end - loop.run_state[0].t;
+  if (left < LONG * progress || since_race() < patience) return false;
+  patience *= 2;
+  return true;
 }
 
 // For a robot whose exponential steps were made in a pack: does another method get further a pass

@@ -3,8 +3,10 @@
 // A run begins with exponential steps (first_steps.hpp); then the others go on from the same state
 // for SHORT passes. The one that gets furthest a pass, in the second half of its trial, goes on
 // from where its trial ended; what the others did is forgotten. The race is held again where
-// progress a pass has fallen to a quarter, at most once in AGAIN passes. Passes are counted, not
-// time: a run's digits do not depend on the machine's load.
+// progress a pass has fallen to a quarter, at most once in AGAIN passes, and where the rest of the
+// run takes more than LONG passes: a fast transient at the start may have let the wrong one win.
+// The second kind of race waits for twice as many passes each time. Passes are counted, not time: a
+// run's digits do not depend on the machine's load.
 //
 // Exponential steps that get stuck may have lost the motion before: the run begins again with
 // implicit steps, where a caller's function or a controller does not forbid it.
@@ -29,7 +31,7 @@ class MethodSelection {
  public:
   static constexpr long TRIAL = 100, SHORT = 60,
                         AGAIN = 1500;  // TRIAL: of exponential steps in later races
-  static constexpr double SLOWER = 4.0;
+  static constexpr double SLOWER = 4.0, LONG = 100'000.0;
   // Under a caller's function or a sampled controller: see race_forward. Where each pass calls a
   // function, a pass of exponential steps must get so much further.
   static constexpr double FASTER = 1.5, FEW = 300.0, COSTLY = 2.5;
@@ -81,6 +83,7 @@ class MethodSelection {
        goes_on = false;  // goes_on: with the exponential steps that the run began with
   int held = 0;
   Loop<double>::Snapshot begun;  // where the run started
+  long patience = AGAIN;         // passes before a race that is held as the rest is long
   long last_race = 0, in_window = 0, window_passes = 0;
   double window_t = 0.0;
   double speed = 0.0;  // seconds a pass, when chosen
@@ -108,6 +111,7 @@ class MethodSelection {
   void race_of_others(const Mark &start, double step, Best &best);
   double trial(Method<double> &method, long most);
   bool gives_way();
+  bool due(double progress);
 };
 
 }  // namespace flexura
