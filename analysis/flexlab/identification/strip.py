@@ -189,7 +189,7 @@ class StripModel:
             contacts[axis.number - 1] = Contact(
                 shaft,
                 values.get("backlash", 1.0) * axis.guide.backlash,
-                axis.guide.contact_stiffness / values.get("give", 1.0),
+                values.get("contact", 1.0) * axis.guide.contact_stiffness,
                 axis.guide.contact_damping,
             )
         q0[system.joint_rows] = [x[0] for x in self._shaft_positions.values()]
