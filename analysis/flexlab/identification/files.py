@@ -73,7 +73,7 @@ def guide_table(rig: Rig, axis: MotorAxis) -> str:
 
 
 def rig(found: Identified) -> Rig:
-    """The rig with the identified friction, backlash, holding torque and calibration."""
+    """The rig with the identified friction, backlash, contacts, holding torque and calibration."""
     nominal, values = found.nominal, found.strip.values
     tables = with_identified_friction(nominal.rig, found.friction)
     if nominal.rig.stepper:
@@ -85,9 +85,11 @@ def rig(found: Identified) -> Rig:
     sensor = "flex" if nominal.rig.flex else "strain_gauge"
     tables[sensor]["calibration"] = calibration(found).model_dump(exclude_none=True)
     for axis in nominal.axes:
-        tables[guide_table(nominal.rig, axis)][f"backlash_{axis.unit}"] *= values.get(
-            "backlash", 1.0
-        )
+        own = tables[guide_table(nominal.rig, axis)]
+        own[f"backlash_{axis.unit}"] *= values.get("backlash", 1.0)
+        for name in own:
+            if name.startswith("contact_stiffness"):
+                own[name] *= values.get("contact", 1.0)
     # factors on figures that are no more
     tables.get("emulated", {}).pop("truth", None)
     return Rig.model_validate(tables)

@@ -1,10 +1,11 @@
 """Identification of a robot and its rig from one experiment.
 
-1. Joints with motors: friction, from voltage and speed (`motor_friction`).
+1. A joint with a motor on a lead screw: friction, from voltage and speed (`motor_friction`).
 2. Start values: the first 2 s are simulated for a grid of stiffnesses; the best fit is taken. A
    mode's phase over 10 s has many local minima, over 2 s one.
-3. All parameters: stiffness, damping, payload, gain of the sensor, backlash, holding torque of the
-   stepper, delay of the sensor.
+3. All parameters: stiffness, damping, payload, gain of the sensor, backlash, contact stiffness of
+   gears, holding torque of the stepper, delay of the sensor.
+4. Joints that motors turn: friction, from voltage, speed and the torque of the identified strip.
 
 The intervals account for noise and add the uncertainty of fixed model parameters: one element less;
 0.5 % of the strip's mass (leads and glue of the sensor are in no file); and a payload radius of
@@ -129,11 +130,10 @@ def identify(
     robot, rig, lines = nominal.robot, nominal.rig, nominal.lines
     _require_motion(experiment, nominal)
     joints = {}
-    for k, axis in enumerate(nominal.axes):
-        joints[axis.number] = motor_friction.fit(
-            experiment, robot, axis, lines[axis.number], rig.driver.dead_zone_V
-        )
-        report("joints", (k + 1) / len(nominal.axes))
+    for axis in nominal.axes:
+        if not axis.turns:
+            joints[axis.number] = _joint(experiment, nominal, axis)
+    report("joints", len(joints) / len(nominal.axes))
     friction = {n: found.values["coulomb"] / lines[n].coulomb for n, found in joints.items()}
     values = _start_values(experiment, nominal, lambda part: report("strip", 0.3 * part))
     data = StripModel(experiment, rig, robot, friction)
@@ -149,13 +149,28 @@ def identify(
         ({}, -1),
         ({"mass": 1 + MASS_UNCERTAINTY}, 0),
         ({"gyration_m": GYRATION_UNCERTAINTY_M}, 0),
-        ({"give": 1 + NUT_COMPLIANCE_UNCERTAINTY}, 0),
     )
+    if not all(axis.turns for axis in nominal.axes):
+        variations += (({"give": 1 + NUT_COMPLIANCE_UNCERTAINTY}, 0),)
     for more, elements in variations:
         strip = strip.with_model_uncertainty(
             data.residuals(strip.values | more, elements) - strip.residuals
         )
+    run = data.simulate(strip.values)
+    for axis in nominal.axes:
+        if axis.turns:  # under the links' torque
+            torque = run[f"joint/{axis.number}/drive"]
+            joints[axis.number] = _joint(experiment, nominal, axis, torque)
+            report("joints", len(joints) / len(nominal.axes))
     return Identified(nominal, joints, strip, data)
+
+
+def _joint(
+    experiment: fx.Run, nominal: Nominal, axis: MotorAxis, torque: np.ndarray | None = None
+) -> Estimate:
+    """A motor's friction, `torque` (T,) [N m] being what its gear gives to the links."""
+    line, dead_zone_V = nominal.lines[axis.number], nominal.rig.driver.dead_zone_V
+    return motor_friction.fit(experiment, nominal.robot, axis, line, dead_zone_V, torque)
 
 
 def _start_values(
@@ -169,6 +184,7 @@ def _start_values(
         "payload": 1.0,
         "sensor_gain": 1.0,
         "backlash": 1.0,
+        "contact": 1.0,
         "holding": 1.0,
         "delay_s": 1e-3,
     }
@@ -221,7 +237,8 @@ def parameters(nominal: Nominal, values: dict[str, float]) -> list[Parameter]:
     """The strip's parameters, with start `values`.
 
     Steps are small against what changes a mode's phase over the experiment. A rig without stepper
-    has no holding torque, one without backlash none to find.
+    has no holding torque, one without backlash none to find. A gear's contact bends under the
+    links' torque, a nut's hardly.
     """
     steps = {
         "stiffness": (3e-4, (0.3, 3.0)),
@@ -229,6 +246,7 @@ def parameters(nominal: Nominal, values: dict[str, float]) -> list[Parameter]:
         "payload": (1e-2, (0.1, 10.0)),
         "sensor_gain": (0.01, (0.1, 10.0)),
         "backlash": (0.05, (0.01, 15.0)),
+        "contact": (0.02, (0.1, 10.0)),
         "holding": (2e-3, (0.2, 5.0)),
         "delay_s": (1e-4, (-5e-3, 0.02)),
     }
@@ -236,6 +254,8 @@ def parameters(nominal: Nominal, values: dict[str, float]) -> list[Parameter]:
         del steps["holding"]
     if not any(axis.guide.backlash for axis in nominal.axes):
         del steps["backlash"]
+    if not all(axis.turns for axis in nominal.axes):
+        del steps["contact"]
     return [
         Parameter(name, values[name], step, bounds, name != "delay_s")
         for name, (step, bounds) in steps.items()

@@ -1,12 +1,17 @@
 """A motor at its joint: its friction from voltage and speed.
 
-On the lead screw the motor turns a reflected mass of 100 kg, which the strip hardly moves. A geared
-motor that turns its joint is held by its back-EMF. A joint is therefore identified by itself, as
-one rigid body:
+On the lead screw the motor turns a reflected mass of 100 kg, which the strip hardly moves. Such a
+joint is identified by itself, with all that it carries as one rigid body of the mass m:
 
     (m + J/r^2) v' = F_V u(t - tau) - c v - F_c tanh(v / v_0)
 
-It is simulated natively and fitted in v; tau is the time from a voltage's report to its current.
+The links on a geared motor that turns its joint swing, and other motors move them. Their torque
+T(t) on the gear is that of the identified strip; the gear drives them with the efficiency eta:
+
+    J v' = K u(t - tau) / R - c v - F_c tanh(v / v_0) - T / eta       T v > 0
+    J v' = K u(t - tau) / R - c v - F_c tanh(v / v_0) - T eta'        else
+
+Both are simulated natively and fitted in v; tau is the time from a voltage's report to its current.
 Slow samples and those just after a reversal are left out, because stiction and backlash act there.
 """
 
@@ -15,6 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 import flexura as fx
+from flexura import signals
 from flexura.errors import InputError
 from flexura.signals import COLUMNS, Signal
 
@@ -23,7 +29,7 @@ from ..comparison.replay.simulate_experiment import hold_midpoints
 from ..comparison.replay.smoothing import recorded_samples, resolution
 from ..recordings.unit_conversion import velocity
 from ..rig.axes import MotorAxis
-from ..rig.plant.motor import JointLine
+from ..rig.plant.motor import JointLine, back_driven_efficiency, motor_data
 from .estimate import Estimate, Parameter, estimate
 
 # slower is no sliding [m/s, rad/s]; what must have been travelled after a reversal [m, rad]
@@ -33,6 +39,7 @@ MIN_SAMPLES = 200  # that slide
 # the supply is measured through a divider, the motor's constant is that of the data sheet
 VOLTAGE_UNCERTAINTY = 0.005
 CORRELATION_S = 0.4
+NOTHING = 1e-9  # kg m^2: the inertia of a body that is not there
 
 
 def fit(
@@ -41,6 +48,7 @@ def fit(
     axis: MotorAxis,
     line: JointLine,
     dead_zone_V: float,
+    torque_N_m: np.ndarray | None = None,
     rtol: float = 1e-5,
 ) -> Estimate:
     """Fit a joint's friction.
@@ -51,6 +59,7 @@ def fit(
         axis: the joint.
         line: the joint by the rig file, where the fit starts.
         dead_zone_V: dead zone of the motor's bridge [V].
+        torque_N_m: what the gear gives to the links (T,) [N m]; None: they are one rigid body.
         rtol: tolerance of the simulations.
 
     Returns:
@@ -75,11 +84,18 @@ def fit(
         )
         raise InputError(expected, key=position, value=int((weight > 0).sum()))
 
+    load = None
+    if torque_N_m is not None:
+        speed = np.interp(experiment.t, t, measured)
+        load = signals.table(experiment.t, -_given(axis, torque_N_m, speed))
+
     def model(values: dict[str, float]) -> np.ndarray:
         force = drive.segments * np.where(np.arange(COLUMNS) == 1, values.get("volts", 1.0), 1.0)
         force[:, 0] += values["voltage_delay_s"]
-        alone = _alone(robot, axis, line, values)
-        run = fx.simulate(alone, t, fx.Drive.force(Signal(force)), rtol=rtol)
+        moved = _carried(robot, axis) if load is None else NOTHING
+        acting = Signal(force) if load is None else signals.sum([Signal(force), load])
+        alone = _alone(axis, line, values, moved)
+        run = fx.simulate(alone, t, fx.Drive.force(acting), rtol=rtol)
         return np.nan_to_num((velocity(t, run["joint/1/position"]) - measured) * weight)[None, :]
 
     parameters = (
@@ -93,14 +109,26 @@ def fit(
     )
 
 
-def _alone(
-    robot: fx.Robot, axis: MotorAxis, line: JointLine, values: dict[str, float]
-) -> fx.System:
-    """The joint with all that it carries as one rigid body, from 0 and without limits."""
+def _given(axis: MotorAxis, torque_N_m: np.ndarray, speed: np.ndarray) -> np.ndarray:
+    """What the motor gives to its gear (T,) [N m] for the torque that the links take from it."""
+    forward = motor_data(axis).gear_efficiency * axis.efficiency
+    back = back_driven_efficiency(motor_data(axis).gear_efficiency)
+    back *= back_driven_efficiency(axis.efficiency)
+    return np.where(torque_N_m * speed > 0, torque_N_m / forward, torque_N_m * back)
+
+
+def _carried(robot: fx.Robot, axis: MotorAxis) -> float:
+    """Mass or inertia of all that the joint carries, without its rotor [kg or kg m^2]."""
     system = fx.assemble(robot)
     row = system.joint_rows[axis.number - 1]
     own = robot.links[axis.number - 1].joint.rotor_inertia
-    moved = float(system.mass(system.start())[row, row]) - own
+    return float(system.mass(system.start())[row, row]) - own
+
+
+def _alone(
+    axis: MotorAxis, line: JointLine, values: dict[str, float], moved: float
+) -> fx.System:
+    """The joint and a rigid body of `moved` [kg or kg m^2], from 0 and without limits."""
     if axis.turns:
         joint = {
             "type": "R",

@@ -59,7 +59,17 @@ def quantities(found: Identified) -> list[Quantity]:
     rows += [
         (_of("backlash", axis, len(nominal.axes)), axis.unit, "backlash", axis.guide.backlash)
         for axis in nominal.axes
-        if "backlash" in found.strip.values
+        if "backlash" in {u.name for u in found.strip.parameters}
+    ]
+    rows += [
+        (
+            _of("contact stiffness", axis, len(nominal.axes)),
+            f"{axis.force_unit}/{axis.unit}",
+            "contact",
+            axis.guide.contact_stiffness,
+        )
+        for axis in nominal.axes
+        if "contact" in {u.name for u in found.strip.parameters}
     ]
     out = [_row(name, unit, found.strip, key, value, value) for name, unit, key, value in rows]
     out.append(_row("sensor's delay", "s", found.strip, "delay_s", 0.0, 1.0))
@@ -129,7 +139,7 @@ def table(found: Identified, experiment: fx.Run) -> Table:
         f"residuals / noise: sensor {rms[0]:.2f}"
         + (f", joint 2 {rms[1]:.2f}" if len(rms) > 1 else ""),
         "low, high: the 95 % interval, from noise (Newey-West), mesh, the strip's mass to 0.5 %, "
-        "the payload's radius of gyration to 5.6 mm, the nut's give to half",
+        "the payload's radius of gyration to 5.6 mm, a nut's give to half",
     ]
     out.notes += at_bounds(found) + contradictions(found)
     return out

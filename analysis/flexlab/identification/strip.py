@@ -20,6 +20,7 @@ import numpy as np
 
 import flexura as fx
 from flexura import signals
+from flexura.control import Backlash, Contact
 from flexura.errors import InputError
 from flexura.signals import JointDrive
 
@@ -46,7 +47,6 @@ TORQUE_TOLERANCE = 5e-5
 METHOD, RTOL = "implicit", 1e-3  # the cheapest where data break the drives every 2 ms
 # contacts begin and end within a step: differences of such simulations must be smooth
 GEAR_METHOD, GEAR_RTOL = "auto", 1e-4
-SHAFT_STEP_S = 1e-3
 TORQUE_STEP_S = 2e-3  # between two values of the stepper's torque that the relaxation corrects
 CURVATURE_STEP = 1e-3  # of the link's length: between the slopes whose difference is a curvature
 
@@ -184,42 +184,17 @@ class StripModel:
 
         A link that a motor turns bends its gear back and forth, whatever way the motor goes.
         """
-        gears = [
-            (
-                self._sampled[axis],
-                0.5 * values.get("backlash", 1.0) * axis.guide.backlash,
-                axis.guide.contact_stiffness / values.get("give", 1.0),
+        contacts: list[Contact | None] = [None] * len(self.robot.links)
+        for axis, shaft in self._shafts.items():
+            contacts[axis.number - 1] = Contact(
+                shaft,
+                values.get("backlash", 1.0) * axis.guide.backlash,
+                values.get("contact", 1.0) * axis.guide.contact_stiffness,
                 axis.guide.contact_damping,
             )
-            for axis in self._shafts
-        ]
-        begin, last = float(self._times[0]), len(next(iter(self._sampled.values()))) - 2
         q0[system.joint_rows] = [x[0] for x in self._shaft_positions.values()]
-
-        def teeth(t: float, position: np.ndarray, velocity: np.ndarray, tip: float) -> list[float]:
-            k = min(max(int((t - begin) / SHAFT_STEP_S), 0), last)
-            part = (t - begin) / SHAFT_STEP_S - k
-            out = []
-            for (shaft, half, stiffness, damping), angle, speed in zip(
-                gears, position.tolist(), velocity.tolist(), strict=True
-            ):
-                (x, v), (y, w) = shaft[k], shaft[k + 1]
-                rate = v + part * (w - v)
-                # of the cubic that has both positions and both rates
-                off = angle - hermite(part, x, v * SHAFT_STEP_S, y, w * SHAFT_STEP_S)
-                beyond = off - half if off > half else off + half if off < -half else 0.0
-                slip = damping * (speed - rate) if beyond else 0.0
-                out.append(-stiffness * beyond - slip)
-            return out
-
+        teeth = Backlash(tuple(contacts))
         return fx.simulate(system, self._times, teeth, q0=q0, rtol=GEAR_RTOL, method=GEAR_METHOD)
-
-    @functools.cached_property
-    def _sampled(self) -> dict[MotorAxis, list[tuple[float, float]]]:
-        """Positions and rates of the motors' shafts, every SHAFT_STEP_S."""
-        begin, end = float(self._times[0]), float(self._times[-1])
-        t = begin + SHAFT_STEP_S * np.arange(round((end - begin) / SHAFT_STEP_S) + 2)
-        return {axis: [shaft(float(at))[:2] for at in t] for axis, shaft in self._shafts.items()}
 
     def _sensed(self, system: fx.System, run: fx.Run) -> np.ndarray:
         """What the sensor feels (T,) in a run with states: bend [rad] or curvature [1/m]."""
@@ -245,12 +220,6 @@ class StripModel:
         quiet = StripSensor(self.sensor, None, np.random.default_rng(0), 1.0, values["sensor_gain"])
         volts = np.array([quiet.voltage(felt) for felt in run["strip/sensed"].tolist()])
         return np.asarray(CubicSpline(self.t, volts)(self.t - values["delay_s"]))
-
-
-def hermite(s: float, x: float, v: float, y: float, w: float) -> float:
-    """The cubic with positions x, y and rates v, w at s = 0 and 1."""
-    change = y - x
-    return x + s * (v + s * (3 * change - 2 * v - w + s * (v + w - 2 * change)))
 
 
 def with_parameters(robot: fx.Robot, values: dict[str, float]) -> fx.Robot:

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "control/backlash.hpp"
+
 namespace flexura {
 namespace {
 
@@ -60,6 +62,24 @@ void add_loads(Inputs &acting, const Matrix &rows, const Ranges &ranges, const M
     }
     acting.loads.push_back(load);
   }
+}
+
+ForceFunction backlash_of(const Matrix &segments, const Matrix &rows,
+                          const std::vector<int> &first) {
+  if (segments.shape(1) != 10 || rows.shape(1) != 6)
+    throw std::invalid_argument("contacts of another shape were expected");
+  const double most = double(segments.shape(0));
+  std::vector<Backlash> contacts;
+  for (std::size_t k = 0; k < rows.shape(0); ++k) {
+    const double *row = rows.data() + 6 * k;
+    if (!(0.0 <= row[0] && row[0] < double(first.size())) ||
+        !(0.0 <= row[1] && row[1] <= row[2] && row[2] <= most))
+      throw std::invalid_argument("there is no such joint or motion");
+    contacts.push_back({int(row[0]),
+                        signal_of(segments, std::int64_t(row[1]), std::int64_t(row[2])), row[3],
+                        row[4], row[5]});
+  }
+  return backlash_forces(std::move(contacts), first);
 }
 
 const char *word(Status status) {

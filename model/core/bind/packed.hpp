@@ -21,6 +21,12 @@ std::vector<LoadPlace> load_places_of(const Matrix &rows, int links);
 // moment from, to.
 void add_loads(Inputs &acting, const Matrix &rows, const Ranges &ranges, const Matrix &segments);
 
+// What acts besides in the joints of a robot whose joints have the rows `first`: contacts behind
+// backlash. segments: of their motions; rows (contacts, 6): joint (from 0), motion from, to, play,
+// stiffness, damping.
+ForceFunction backlash_of(const Matrix &segments, const Matrix &rows,
+                          const std::vector<int> &first);
+
 const char *word(Status status);
 
 }  // namespace flexura

@@ -87,7 +87,8 @@ class PythonSampler : public Sampler {
 
 // A run and what Python objects it needs.
 struct Running {
-  nb::object function, sampler;  // a DriveFunction or None; a Sampler or None: kept alive
+  // a DriveFunction, a tuple of contacts or None; a Sampler or None: kept alive
+  nb::object function, sampler;
   std::unique_ptr<PythonDrive> drive;
   std::unique_ptr<Simulation> run;
 
@@ -107,7 +108,11 @@ struct Running {
       add_loads(acting, nb::cast<Matrix>(parts[0]), nb::cast<Ranges>(parts[1]),
                 nb::cast<Matrix>(parts[2]));
     }
-    if (!function.is_none()) {
+    if (nb::isinstance<nb::tuple>(function)) {  // of contacts: as backlash_of takes them
+      const nb::tuple parts = nb::cast<nb::tuple>(function);
+      acting.function =
+          backlash_of(nb::cast<Matrix>(parts[0]), nb::cast<Matrix>(parts[1]), robot.model->first);
+    } else if (!function.is_none()) {
       drive = std::make_unique<PythonDrive>(robot.model, function);
       acting.function = [this](double at, const double *place, const double *rate, double *force) {
         nb::gil_scoped_acquire lock;

@@ -1,6 +1,7 @@
 """Sampled controllers, their gains files and step metrics, LQR and LQG with the figures of their
 loops, iterative learning, functions as drives."""
 
+from .backlash import Backlash, Contact
 from .board_replay import board_pulses
 from .controller import (
     DEFLECTION,
@@ -69,6 +70,8 @@ __all__ = [
     "SLEW",
     "STRIP",
     "VIBRATION",
+    "Backlash",
+    "Contact",
     "Controller",
     "Design",
     "Designed",

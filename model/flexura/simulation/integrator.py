@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .. import core
-from ..control import Controller, DriveFunction, Sampled
+from ..control import Backlash, Controller, DriveFunction, Sampled
 from ..io import Tables
 from ..signals import COLUMNS, Drive
 from .problem import Problem, Progress, Solution
@@ -59,7 +59,8 @@ class _Integration:
                 float(drive.rate_Hz),
             )
         else:
-            function = drive
+            own = drive.function
+            function = own.packed() if isinstance(own, Backlash) else drive
         self.sampler = sampler
         self.core = core.Simulation(
             system.equations,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..control import Controller, DriveFunction, Sampled
+from ..control import Backlash, Controller, DriveFunction, Sampled
 from ..errors import InputError
 from ..io import Run, Tables, array, check_memory, choice, flag, number, whole
 from ..signals import Drive, Loads, LoadsLike, Signal, as_loads, as_signals
@@ -224,6 +224,9 @@ def acting_drive(drive: Any, joints: int, t: np.ndarray) -> Drive | Controller |
         return Drive.none(joints)
     if isinstance(drive, Sampled):
         return drive
+    if isinstance(drive, Backlash) and len(drive.contacts) != joints:
+        expected = f"expected {joints} contacts or None, one a joint"
+        raise InputError(expected, key="drive", value=len(drive.contacts))
     if not isinstance(drive, Drive | Controller):
         if callable(drive) and not isinstance(drive, Signal | type):
             return DriveFunction(drive, joints)

@@ -74,9 +74,10 @@ def test_csv_read_by_numpy(run, tmp_path):
     lines = path.read_text().splitlines()
     assert lines[0] == "# experiment (emulated)" and lines[1] == f"# {EMULATED}"
     units, meta = (json.loads(line.split(": ", 1)[1]) for line in lines[2:4])
+    assert lines[4].startswith("# digest: ")
     assert meta == run.meta
-    names = lines[4].split(",")
-    table = np.genfromtxt(path, delimiter=",", comments="#", skip_header=5)
+    names = lines[5].split(",")
+    table = np.genfromtxt(path, delimiter=",", comments="#", skip_header=6)
     assert table.shape == (len(run), len(names))
     for k, name in enumerate(["time", *run]):
         column = "time_s" if name == "time" else run.column(name)

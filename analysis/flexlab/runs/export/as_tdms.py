@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from flexura.io import EMULATED, Run, called, emulated
+from flexura.io.logs import digest
 from flexura.optional import load
 
 GROUP = "run"
@@ -30,6 +31,7 @@ def write(run: Run) -> bytes:
         for k, v in run.meta.items()
         if isinstance(v, bool | int | float | str) and k not in about
     }
+    about["digest"] = digest(run)
     if emulated(run):
         about["description"] = EMULATED
     base = _time_base(run.t)

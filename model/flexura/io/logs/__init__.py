@@ -1,5 +1,6 @@
 """Logs of other programs, read as Runs: CSV, LVM, TDMS, MAT, HDF5, MCAP, Parquet, bags of ROS."""
 
+from .damage import digest
 from .log import Clock, Column, Log
 from .mapping import Map, Source, read_map
 from .read import read_log
@@ -13,6 +14,7 @@ __all__ = [
     "Source",
     "Taken",
     "Understood",
+    "digest",
     "read_log",
     "read_map",
     "understood",

@@ -55,6 +55,7 @@ class Log:
         own: whether it is an export of flexura.
         lines: the line of a row's number in a text file, by row from 0.
         notes: what was assumed.
+        digest: of the numbers of an export of flexura, as it says, or "".
     """
 
     file: str
@@ -65,6 +66,7 @@ class Log:
     own: bool = False
     lines: list[int] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    digest: str = ""
 
     def row(self, number: int) -> str:
         """What a row is called in an error.

@@ -10,7 +10,6 @@ from ...errors import InputError
 from .formats import csv_file, lvm, mat, mcap_file, rosbag, tables, tdms
 from .log import Log
 
-HDF5 = b"\x89HDF\r\n\x1a\n"
 MOST_BYTES, PART_BYTES = 4_000_000_000, 1 << 24
 
 
@@ -67,7 +66,7 @@ def _read(raw: bytes, place: Path, name: str) -> Log:
         return tables.read(raw, name)
     if raw.startswith((b"TDSm", b"TDSh")):
         return tdms.read(raw, name)
-    if raw.startswith(HDF5) or raw[512:520] == HDF5:
+    if raw.startswith(mat.HDF5) or raw[512:520] == mat.HDF5:
         return mat.read_hdf5(raw, name)
     if raw.startswith(b"\x89MCAP"):
         return mcap_file.read(raw, name)

@@ -11,6 +11,7 @@ import numpy as np
 from ...errors import InputError
 from ..quantities import Unit, channel, unit
 from ..run import Run
+from .damage import changed, check_size, missing_rows
 from .log import Column, Log
 from .mapping import Map, Source
 from .names import TIMES, known, sensor
@@ -71,6 +72,7 @@ def understood(
     for name, (column, source) in chosen.items():
         if column.fault:
             raise InputError(column.fault, key=f"column {column.head!r}", file=log.file)
+        check_size(log, column.head, column.values)
         values = on(log, base, column)
         own = _unit(log, name, column, source)
         said = source.unit or column.unit
@@ -94,7 +96,10 @@ def understood(
         run = Run(base.t, channels, units, meta)
     except (InputError, ValueError) as error:
         raise InputError(str(error), file=log.file) from None
-    return Understood(run, log.form, base.said, taken, left, [*log.notes, *base.notes])
+    notes = [*log.notes, *base.notes, *missing_rows(log, run.t)]
+    if asked is None:
+        notes += changed(log, run)
+    return Understood(run, log.form, base.said, taken, left, notes)
 
 
 def _mapped(log: Log, asked: Map) -> dict[str, tuple[Column, Source]]:

@@ -85,7 +85,14 @@ def read(raw: bytes, file: str) -> Log:
         notes.append(f"line {every[-1].number} has no end: the last number may be cut off")
     about = own.get("meta")
     return Log(
-        file, form, columns, meta=about or {}, own=about is not None, lines=places, notes=notes
+        file,
+        form,
+        columns,
+        meta=about or {},
+        own=about is not None,
+        lines=places,
+        notes=notes,
+        digest=str(own.get("digest", {}).get("sha256", "")),
     )
 
 
@@ -190,7 +197,7 @@ def _own(comments: list[_Line]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for line in comments[:10]:
         key, _, text = line.text.lstrip("# ").partition(": ")
-        if key in ("units", "meta"):
+        if key in ("units", "meta", "digest"):
             try:
                 value = json.loads(text)
             except ValueError:

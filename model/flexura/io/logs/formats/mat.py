@@ -15,6 +15,7 @@ from ..log import Column, Log, damaged, floats
 from ..names import parted
 
 DEEPEST = 12  # structs in structs
+HDF5 = b"\x89HDF\r\n\x1a\n"
 MOST_COLUMNS = 200  # of one matrix
 
 
@@ -47,6 +48,7 @@ def read_hdf5(raw: bytes, file: str) -> Log:
         Missing: h5py is not installed.
     """
     h5py = load("h5py")
+    _check_end(raw, file)
     leaves: dict[str, Any] = {}
     matlab = False
     try:
@@ -73,6 +75,23 @@ def read_hdf5(raw: bytes, file: str) -> Log:
     except Exception as error:  # whatever a damaged file makes of it
         raise damaged(file, "HDF5 file", error) from None
     return _log(leaves, "MAT, version 7.3" if matlab else "HDF5", file)
+
+
+def _check_end(raw: bytes, file: str) -> None:
+    """Refuse an HDF5 file that is longer than its head says: bytes were put in."""
+    begin = 0 if raw.startswith(HDF5) else 512  # after MATLAB's own head
+    version = raw[begin + 8]
+    if version > 3:
+        return
+    wide = raw[begin + (13 if version < 2 else 9)]
+    # version 0 has 24 bytes before the addresses, version 1 four more, versions 2 and 3 have 12
+    first = begin + {0: 24, 1: 28}.get(version, 12)
+    base, end = (
+        int.from_bytes(raw[at : at + wide], "little") for at in (first, first + 2 * wide)
+    )
+    if len(raw) > end and len(raw) != base + end:
+        said = f"{len(raw)} bytes, its head says {end}"
+        raise InputError(f"a damaged HDF5 file ({said})", file=file)
 
 
 def _leaves(tree: Any, name: str = "", depth: int = 0) -> Iterator[tuple[str, Any]]:

@@ -55,7 +55,8 @@ def read(raw: bytes, file: str) -> Log:
             clocks[head] = base
         clock = head if base is not None else ""
         columns.append(Column(name, head, said, values, since, clock))
-    return Log(file, "TDMS", columns, clocks, own or {}, own=own is not None)
+    said = str(found.properties.get("digest", ""))
+    return Log(file, "TDMS", columns, clocks, own or {}, own=own is not None, digest=said)
 
 
 @contextmanager
