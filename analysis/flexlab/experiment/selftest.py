@@ -247,4 +247,5 @@ def run_selftest(
 
 
 def _some(names: list[str]) -> str:
-    return f"{len(names)} differ: {', '.join(names[:4])}{', ...' if len(names) > 4 else ''}"
+    more = f" and {len(names) - 4} more" if len(names) > 4 else ""
+    return f"{len(names)} differ: {', '.join(names[:4])}{more}"
