@@ -51,8 +51,10 @@ def test_a_coarse_motion_keeps_its_limits_and_ends_at_rest():
 @pytest.mark.parametrize("most", [0.5, 1.0, 2.0])
 def test_the_bench_arm_is_as_quick_as_the_rigid_one_and_then_at_rest(most):
     run = fx.time_optimal(bench_arm(), [0.0], [np.pi / 2], {"drive": [most]})
-    assert run.meta["duration_s"] <= 1.03 * bang_bang(most)
-    assert left(bench_arm(), run.t, run["joint/1/drive"]) < 5e-3 * unshaped(bench_arm(), most)
+    ratio = run.meta["duration_s"] / bang_bang(most)
+    share = left(bench_arm(), run.t, run["joint/1/drive"]) / unshaped(bench_arm(), most)
+    print(f"u = {most}: {ratio:.3f} of the rigid bang-bang, {100 * share:.2f} % of its residual")
+    assert ratio <= 1.03 and share < 5e-3
     assert np.abs(run["joint/1/drive"]).max() <= most * (1 + 1e-9)
 
 
@@ -61,11 +63,12 @@ def test_the_bench_arm_is_as_quick_as_the_rigid_one_and_then_at_rest(most):
 @pytest.mark.parametrize(("most", "ratio"), [(0.5, 1.15), (1.0, 1.18), (2.0, 1.30)])
 def test_other_frequencies_are_nearly_at_rest_too(most, ratio):
     run = fx.time_optimal(bench_arm(), [0.0], [np.pi / 2], {"drive": [most]}, robust=0.1)
-    assert run.meta["duration_s"] <= ratio * bang_bang(most)
+    found = run.meta["duration_s"] / bang_bang(most)
     robots = [bench_arm(0.5 * f**2) for f in np.linspace(0.9, 1.1, 9)]
     reference = max(unshaped(robot, most) for robot in robots)
-    for robot in robots:
-        assert left(robot, run.t, run["joint/1/drive"]) < 0.02 * reference
+    share = max(left(robot, run.t, run["joint/1/drive"]) for robot in robots) / reference
+    print(f"u = {most}: {found:.3f} of the rigid bang-bang, {100 * share:.2f} % within +-10 %")
+    assert found <= ratio and share < 0.02
 
 
 def shares(robot, start, limits, run):
