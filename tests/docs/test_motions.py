@@ -196,13 +196,13 @@ def test_what_is_asked_of_the_drives_at_the_end():
     )
     u = np.zeros((21, 1))
     u[5] = 0.1
-    found = answer(plant, u, 0.4, np.array([0]), False)
+    found = answer(plant, u, 0.4, np.array([0]))
     du = np.zeros_like(u)
     du[9] = 1e-3
-    up, down = (answer(plant, u + s * du, 0.4, np.array([0]), False).end for s in (1, -1))
+    up, down = (answer(plant, u + s * du, 0.4, np.array([0])).end for s in (1, -1))
     slope = (up - down) / 2e-3
-    longer = answer(plant, u, 0.4 * (1 + 1e-4), np.array([0]), False).end
-    shorter = answer(plant, u, 0.4 * (1 - 1e-4), np.array([0]), False).end
+    longer = answer(plant, u, 0.4 * (1 + 1e-4), np.array([0])).end
+    shorter = answer(plant, u, 0.4 * (1 - 1e-4), np.array([0])).end
     n = system.n
     for part in (slice(0, n), slice(n, 2 * n)):
         asked = into[:3] @ found.slope[part][:, 9]

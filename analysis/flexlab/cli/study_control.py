@@ -24,7 +24,7 @@ def study_control(
         expected = f"expected {' or '.join(TASKS)}, or none for both"
         raise fx.InputError(expected, key="ROBOT", value=str(robot))
     names = [str(robot)] if robot is not None else list(TASKS)
-    need("matplotlib")
+    need("matplotlib", "daqp")
     with results(out, "study-control", *names, force=force) as draft:
         with progress_bars(*names) as report:
             found = {}

@@ -1,4 +1,4 @@
-"""The figure of `flexura study control`: one row of axes a robot."""
+"""The figure of `flexura study control`, as wide as one column of a paper: a column a robot."""
 
 from __future__ import annotations
 
@@ -9,22 +9,34 @@ import numpy as np
 
 from flexura.optional import load
 
-from .judgement import PAYLOADS, Judged, from_end
+from .judgement import PAYLOADS, SETTLED, Judged, from_end
 from .tasks import Task
 
-# Okabe and Ito: told apart by colour-blind readers too, and by their dashes in print
-STYLES = (
-    ("#000000", "-", "o"),
-    ("#E69F00", "--", "s"),
-    ("#D55E00", ":", "D"),
-    ("#7F7F7F", "-.", "<"),
-    ("#009E73", "-", "^"),
-    ("#0072B2", "-", "v"),
-    ("#CC79A7", "--", "P"),
-    ("#56B4E9", "-", "X"),
-)
-FONT = {"font.size": 7, "axes.linewidth": 0.6, "svg.hashsalt": "flexura", "pdf.fonttype": 42}
-LEAST_MM = 1.2e-3  # what the axes show
+# Okabe and Ito: told apart by colour-blind readers too; markers and dashes tell them in print
+FAMILIES = {
+    "PID": ("#000000", "o"),
+    "bang": ("#E69F00", "D"),
+    "L": ("#0072B2", "s"),
+    "NMPC": ("#0072B2", "s"),
+    "least": ("#D55E00", "^"),
+}
+OTHERS = ("#009E73", "v")
+CURVES = {
+    "PID": ("#000000", "-"),
+    "PID, ZVD": ("#7F7F7F", (0, (1, 1))),
+    "NMPC": ("#0072B2", (0, (5, 1.5))),
+    "inversion": ("#009E73", "-"),
+    "least time": ("#D55E00", (0, (4, 1, 1, 1))),
+}
+FONT = {
+    "font.size": 6.5,
+    "axes.linewidth": 0.5,
+    "svg.hashsalt": "flexura",
+    "pdf.fonttype": 42,
+    "font.family": "DejaVu Sans",
+}
+WIDTH_IN, ROW_IN = 3.5, 0.125  # of a column, of a method in a panel
+LEAST_MM, MOST_MM = 5e-4, 2e2  # what the axes of lengths show
 
 
 def figure(study: Mapping[str, tuple[Task, list[Judged]]]) -> Any:
@@ -34,77 +46,129 @@ def figure(study: Mapping[str, tuple[Task, list[Judged]]]) -> Any:
         study: by robot, its task and methods.
 
     Returns:
-        A row a robot: the tip's distance from its end over time; what is left after the motion with
-        three payloads; time against the largest share of the drives.
+        A column a robot: the tip's distance from its end over time, for some methods; tip error and
+        residual, the time, and the largest share of the drives, for all, with three payloads.
     """
     matplotlib = load("matplotlib")
     Figure = load("matplotlib.figure").Figure
+    methods = max(len(judged) for _, judged in study.values())
+    heights = [1.15, *[ROW_IN * methods] * 3]
     with matplotlib.rc_context(FONT):
-        drawing = Figure(figsize=(7.2, 2.5 * len(study) + 0.3), layout="constrained")
-        rows = drawing.subplots(
-            len(study), 3, squeeze=False, gridspec_kw={"width_ratios": [1.5, 1.15, 1.0]}
+        drawing = Figure(figsize=(WIDTH_IN, sum(heights) + 2.0), layout="constrained")
+        drawing.get_layout_engine().set(w_pad=0.02, h_pad=0.03, hspace=0.01, wspace=0.02)
+        axes = drawing.subplots(
+            4, len(study), squeeze=False, gridspec_kw={"height_ratios": heights}
         )
-        for axes, (task, judged) in zip(rows, study.values(), strict=True):
-            _over_time(axes[0], task, judged)
-            _left(axes[1], judged)
-            _cost(axes[2], task, judged)
-            axes[0].set_title(task.robot.name, loc="left", fontweight="bold", fontsize=8)
-        for k, axis in enumerate(rows.flat):
-            axis.set_title(f"({chr(97 + k)})", loc="right", fontsize=8)
-            axis.grid(alpha=0.25, linewidth=0.5)
-            axis.tick_params(width=0.6, length=2.5)
-        handles, labels = rows[0][0].get_legend_handles_labels()
+        for k, (task, judged) in enumerate(study.values()):
+            _over_time(axes[0, k], task, judged)
+            _lengths(axes[1, k], judged)
+            _times(axes[2, k], judged)
+            _drives(axes[3, k], task, judged)
+            axes[0, k].set_title(task.robot.name, fontweight="bold", fontsize=7, pad=4)
+        for k, axis in enumerate(axes.flat):
+            axis.annotate(
+                f"({chr(97 + k)})",
+                (0, 1),
+                xytext=(1, 2),
+                xycoords="axes fraction",
+                textcoords="offset points",
+            )
+            axis.grid(alpha=0.3, linewidth=0.4)
+            axis.set_axisbelow(True)
+            axis.tick_params(width=0.5, length=2, pad=1.5)
+            if k % len(study) and axis.get_yticks().size:
+                axis.tick_params(labelleft=False)
+                axis.set_ylabel("")
+        handles, labels = axes[0, 0].get_legend_handles_labels()
         drawing.legend(
-            handles, labels, loc="outside lower center", ncols=8, columnspacing=1.2, frameon=False
+            handles,
+            labels,
+            loc="outside upper center",
+            ncols=3,
+            columnspacing=1.2,
+            handlelength=2.6,
+            frameon=False,
+            title="lines of the uppermost panels",
         )
         drawing.canvas.draw()
     return drawing
 
 
 def _over_time(axis: Any, task: Task, judged: list[Judged]) -> None:
-    for row, (colour, dashes, _) in zip(judged, _styles(judged), strict=True):
+    for row in judged:
+        if row.method not in CURVES:
+            continue
+        colour, dashes = CURVES[row.method]
         t = row.run.t - row.begin_s
         away = np.maximum(1e3 * from_end(task, row.run), 1e-9)
         shown = t >= 0
-        axis.semilogy(t[shown], away[shown], dashes, color=colour, linewidth=1.1, label=row.method)
-    longest = max(float(row.run.t[-1]) - row.begin_s for row in judged)
-    axis.set_xlim(0, min(longest, 2.2 * task.duration_s))
-    axis.set_ylim(bottom=1e-3)
-    axis.set_xlabel("time since the first drive [s]")
-    axis.set_ylabel("tip from its end [mm]")
+        axis.semilogy(
+            t[shown], away[shown], linestyle=dashes, color=colour, linewidth=0.9, label=row.method
+        )
+    axis.set_xlim(0, 2 * task.duration_s)
+    axis.set_ylim(1e-3, 1e3)
+    axis.set_yticks([1e-3, 1e-1, 1e1, 1e3])
+    axis.set_xlabel("time since the first drive [s]", labelpad=1)
+    axis.set_ylabel("tip from its end [mm]", labelpad=1)
 
 
-def _left(axis: Any, judged: list[Judged]) -> None:
-    for k, (row, (colour, _, mark)) in enumerate(zip(judged, _styles(judged), strict=True)):
-        for values, height, filled in (
-            ([1e3 * f.residual_m for f in row.figures], -0.15, True),
-            ([1e3 * f.error_m for f in row.figures], 0.2, False),
-        ):
-            if not np.isfinite(values).all():
-                continue
-            values = [max(value, LEAST_MM) for value in values]
-            at = k + height
-            axis.plot([min(values), max(values)], [at, at], "-", color=colour, linewidth=1.0)
-            face = colour if filled else "white"
-            axis.plot(values[0], at, mark, color=colour, markerfacecolor=face, markersize=4.5)
+def _lengths(axis: Any, judged: list[Judged]) -> None:
+    for name, height, filled in (("error_m", -0.2, False), ("residual_m", 0.2, True)):
+        rows = [[1e3 * getattr(f, name) for f in row.figures] for row in judged]
+        _marks(axis, judged, np.maximum(rows, 1.2 * LEAST_MM), height, filled)
     axis.set_xscale("log")
-    axis.set_xlim(1e-3, 1e2)
+    axis.set_xlim(LEAST_MM, MOST_MM)
+    axis.set_xticks([1e-3, 1e-1, 1e1])
+    axis.set_xlabel("tip error (open),\nresidual (filled) [mm]", labelpad=1)
+    _names(axis, judged)
+
+
+def _times(axis: Any, judged: list[Judged]) -> None:
+    _marks(axis, judged, np.array([[f.time_s for f in row.figures] for row in judged]))
+    axis.set_xlim(left=0)
+    axis.set_xlabel(f"time to {100 * SETTLED:.0f} % of the way [s]", labelpad=1)
+    _names(axis, judged)
+
+
+def _drives(axis: Any, task: Task, judged: list[Judged]) -> None:
+    shares = [[np.max(np.divide(f.peak, task.limits)) for f in row.figures] for row in judged]
+    _marks(axis, judged, np.array(shares))
+    axis.axvline(1.0, color="0.4", linewidth=0.7, linestyle="--")
+    axis.set_xlim(0, 1.1)
+    axis.set_xticks([0, 0.5, 1])
+    most = 100 * (max(PAYLOADS) - 1)
+    axis.set_xlabel(f"largest drive / limit\n(bars: payload ±{most:.0f} %)", labelpad=1)
+    _names(axis, judged)
+
+
+def _marks(
+    axis: Any, judged: list[Judged], values: np.ndarray, height: float = 0.0, filled: bool = True
+) -> None:
+    """A mark of the payload as it is, and a bar over all payloads; none where there is no value."""
+    for k, (row, three) in enumerate(zip(judged, values, strict=True)):
+        colour, mark = _style(row.method)
+        there = three[np.isfinite(three)]
+        if not len(there):
+            continue
+        at = k + height
+        axis.plot([there.min(), there.max()], [at, at], "-", color=colour, linewidth=0.9)
+        if np.isfinite(three[0]):
+            face = colour if filled else "white"
+            axis.plot(
+                three[0],
+                at,
+                mark,
+                color=colour,
+                markerfacecolor=face,
+                markersize=3,
+                markeredgewidth=0.7,
+            )
+
+
+def _names(axis: Any, judged: list[Judged]) -> None:
     axis.set_yticks(range(len(judged)), [row.method for row in judged])
     axis.set_ylim(len(judged) - 0.5, -0.5)
-    most = 100 * (max(PAYLOADS) - 1)
-    axis.set_xlabel(f"left (filled), tip error (open) [mm]\nlines: payload ±{most:.0f} %")
 
 
-def _cost(axis: Any, task: Task, judged: list[Judged]) -> None:
-    for row, (colour, _, mark) in zip(judged, _styles(judged), strict=True):
-        share = float(np.max(np.divide(row.nominal.peak, task.limits)))
-        if np.isfinite(row.nominal.time_s):
-            axis.plot(row.nominal.time_s, share, mark, color=colour, markersize=5)
-    axis.axhline(1.0, color="0.5", linewidth=0.7, linestyle="--")
-    axis.set_ylim(bottom=0)
-    axis.set_xlabel("time to 1 % of the way [s]")
-    axis.set_ylabel("largest drive / limit")
-
-
-def _styles(judged: list[Judged]) -> list[tuple[str, str, str]]:
-    return [STYLES[k % len(STYLES)] for k in range(len(judged))]
+def _style(method: str) -> tuple[str, str]:
+    return next((style for key, style in FAMILIES.items() if method.startswith(key)), OTHERS)

@@ -35,12 +35,13 @@ class Figures:
 @dataclass(frozen=True)
 class Judged:
     """A method on a task: figures of each payload, and the nominal run, whose motion begins at
-    `begin_s`."""
+    `begin_s`; `about` is a sentence for the table."""
 
     method: str
     figures: tuple[Figures, ...]
     run: fx.Run
     begin_s: float
+    about: str = ""
 
     @property
     def nominal(self) -> Figures:
@@ -94,7 +95,7 @@ def compare(
                 raise fx.FlexuraError(f"{method.name}, payload x {factor:g}: {texts}")
             runs.append(run)
         figures = tuple(_figures(task, motion, run) for run in runs)
-        out.append(Judged(method.name, figures, runs[0], _begin(runs[0])))
+        out.append(Judged(method.name, figures, runs[0], _begin(runs[0]), motion.about))
         progress((k + 1) / len(methods))
     return out
 

@@ -12,15 +12,19 @@ from scipy.optimize import brentq
 
 import flexura as fx
 from flexura.control import lqr
-from flexura.signals import Drive, JointDrive, Signal, piecewise, trapezoidal, zv, zvd
+from flexura.signals import Signal, evaluate_many, trapezoidal, zv, zvd
 
+from .following import following, following_run
+from .learning import PAYLOAD, STIFFNESS, trials
 from .tasks import DERIVATIVE_HZ, RATE_HZ, Task
 
 INTEGRAL = 0.2  # ki over kp and the pole of the joints' loops
 # LQR: what counts the same, in shares of the ways, of the last link's length, of the drives' limits
 NEAR, BENT, EFFORT = 0.005, 0.02, 0.3
-MODES, LQR_HZ = 2, 2000.0  # modes of each link that an LQR is designed on, and its rate
+MODES, LQR_HZ = 2, 2000.0  # modes of each link that feedback is designed on, and its rate
+NMPC_HZ, NMPC_INTERVALS, NMPC_EFFORT = 500.0, 20, 3.0
 HOLDS = 400  # of the drives in a bang-bang motion
+LEFT = 0.2  # of the drives' limits, that bang-bang and the shortest motions leave to the PD
 BAND = 0.1  # of frequencies, of the robust shortest motion
 
 
@@ -28,12 +32,14 @@ BAND = 0.1  # of frequencies, of the robust shortest motion
 class Motion:
     """What a method does: its drive from 0 s on, and when its motion is over [s].
 
-    `wanted(t)`: where the tip should be (2,) [m]; None if the method follows no path.
+    `wanted(t)`: where the tip should be (2,) [m]; None if the method follows no path. `about`: a
+    sentence for the table.
     """
 
     drive: Any
     end_s: float
     wanted: Callable[[float], np.ndarray] | None
+    about: str = ""
 
 
 @dataclass(frozen=True)
@@ -78,21 +84,23 @@ def bang_bang(task: Task) -> Motion:
     as short as the limits of the drives allow, and a PD in each joint."""
 
     def motion(duration: float) -> tuple[tuple[Signal, ...], np.ndarray, np.ndarray]:
-        """The joints, the instants at which the drives change, and the drives (HOLDS, 2)."""
+        """The joints, the instants of the drives (HOLDS,), and the drives (2, HOLDS)."""
         ends = zip(task.start, task.end, strict=True)
         joints = tuple(trapezoidal(b, duration, duration / 2, a) for a, b in ends)
-        t = np.linspace(0.0, duration, HOLDS + 1)
-        run = fx.inverse(task.rigid, (t[:-1] + t[1:]) / 2, list(joints))
-        return joints, t, np.column_stack([run[f"joint/{i}/drive"] for i in (1, 2)])
+        t = duration * (np.arange(HOLDS) + 0.5) / HOLDS
+        run = fx.inverse(task.rigid, t, list(joints))
+        return joints, t, np.array([run[f"joint/{i}/drive"] for i in (1, 2)])
 
-    over = lambda duration: float(np.max(np.abs(motion(duration)[2]) / task.limits)) - 1.0
-    joints, t, drives = motion(brentq(over, task.duration_s / 4, 4 * task.duration_s, xtol=1e-6))
-    rows = zip(drives.T, joints, *task.gains, strict=True)
-    drive = Drive(
-        tuple(
-            JointDrive(piecewise(t, np.append(u, 0.0)), joint, kp=float(kp), kd=float(kd))
-            for u, joint, kp, kd in rows
-        )
+    most = (1 - LEFT) * task.limits
+    over = lambda T: float(np.max(np.abs(motion(T)[2]) / most[:, None])) - 1.0
+    duration = brentq(over, task.duration_s / 4, 4 * task.duration_s, xtol=1e-6)
+    joints, at, drives = motion(duration)
+    t = np.linspace(0.0, duration, HOLDS + 1)
+    drive = following(
+        task,
+        t,
+        np.column_stack([evaluate_many(joint.segments, t)[0] for joint in joints]),
+        lambda s: np.array([np.where(s < duration, np.interp(s, at, u), 0.0) for u in drives]),
     )
     return _on_set_points(task, joints, drive)
 
@@ -107,27 +115,57 @@ def shaped(shaper: Callable[..., Signal]) -> Callable[[Task], Motion]:
     return motion
 
 
-def regulator(task: Task) -> Motion:
-    """An LQR with an estimator (74) to (76) follows the set-points."""
+def _design(task: Task) -> fx.Robot:
+    """The robot that feedback is designed on: some modes of each link."""
     data = task.robot.to_dict()
     for link, entry in zip(task.robot.links, data["link"], strict=True):
         if link.flexible:
             entry["modes"] = MODES
-    controller, _ = lqr(
-        fx.Robot.from_dict(data),
-        replace(_controller(task, task.set_points), rate_Hz=LQR_HZ),
+    return fx.Robot.from_dict(data)
+
+
+def _weights(task: Task) -> dict[str, Any]:
+    """What counts the same, for LQR, LQG and NMPC."""
+    return {
+        "position": NEAR * np.abs(np.subtract(task.end, task.start)),
+        "deflection": BENT * task.robot.links[-1].length_m,
+        "disturbance": 0.1 * task.limits,
+    }
+
+
+def regulator(task: Task) -> Motion:
+    """An LQR with an estimator (74) to (76) follows the set-points."""
+    pids = replace(_controller(task, task.set_points), rate_Hz=LQR_HZ)
+    controller, _ = lqr(_design(task), pids, EFFORT * task.limits, **_weights(task))
+    return _on_set_points(task, task.set_points, controller)
+
+
+def gaussian(task: Task) -> Motion:
+    """An LQG (125), whose tip follows the set-points."""
+    controller, _ = fx.lqg(
+        _design(task),
+        task.set_points,
         EFFORT * task.limits,
-        position=NEAR * np.abs(np.subtract(task.end, task.start)),
-        deflection=BENT * task.robot.links[-1].length_m,
-        disturbance=0.1 * task.limits,
+        LQR_HZ,
+        limit=task.limits,
+        follow="tips",
+        **_weights(task),
     )
     return _on_set_points(task, task.set_points, controller)
 
 
-def _feedforward(task: Task, run: fx.Run, wanted: Any, end_s: float) -> Motion:
-    """A run's drives, and a PD in each joint towards its positions."""
-    kp, kd = task.gains
-    return Motion(fx.feedforward(run, kp=kp, kd=kd).drive, end_s, wanted)
+def predictive(task: Task) -> Motion:
+    """An NMPC (129), (130), whose tip follows the set-points that it knows ahead."""
+    controller = fx.nmpc(
+        _design(task),
+        task.set_points,
+        NMPC_EFFORT * task.limits,
+        NMPC_HZ,
+        intervals=NMPC_INTERVALS,
+        limit=task.limits,
+        **_weights(task),
+    )
+    return _on_set_points(task, task.set_points, controller)
 
 
 def inversion(task: Task) -> Motion:
@@ -137,16 +175,29 @@ def inversion(task: Task) -> Motion:
     run = fx.invert(task.robot, t, path)
     before = -float(run.t[0])
     wanted = lambda s: task.tip(task.set_points, s - before)
-    return _feedforward(task, run, wanted, before + task.duration_s)
+    return Motion(following_run(task, run), before + task.duration_s, wanted)
+
+
+def learned(task: Task) -> Motion:
+    """The best of some trials, each of which learns from the one before."""
+    tried = trials(task)
+    best = min(tried, key=lambda trial: trial.error_m)
+    wanted = lambda s: task.tip(task.set_points, s - best.begin_s)
+    errors = ", ".join(f"{1e3 * trial.error_m:.3g}" for trial in tried)
+    about = (
+        f"learning: by a model with {STIFFNESS:g} of the stiffness and {PAYLOAD:g} of the payload; "
+        f"tip errors of its {len(tried)} trials: {errors} mm"
+    )
+    return Motion(best.drive, best.begin_s + task.duration_s, wanted, about)
 
 
 def shortest(robust: float) -> Callable[[Task], Motion]:
     """Feedforward by the shortest motion (120)."""
 
     def motion(task: Task) -> Motion:
-        limits = {"drive": task.limits}
+        limits = {"drive": (1 - LEFT) * task.limits}
         run = fx.time_optimal(task.robot, task.start, task.end, limits, robust)
-        return _feedforward(task, run, None, float(run.t[-1]))
+        return Motion(following_run(task, run), float(run.t[-1]), None)
 
     return motion
 
@@ -157,7 +208,10 @@ METHODS = (
     Method("PID, ZVD", shaped(zvd)),
     Method("bang-bang", bang_bang),
     Method("LQR", regulator),
+    Method("LQG", gaussian),
+    Method("NMPC", predictive),
     Method("inversion", inversion),
+    Method("learning", learned),
     Method("least time", shortest(0.0)),
     Method("least time, robust", shortest(BAND)),
 )

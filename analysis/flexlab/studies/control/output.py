@@ -15,6 +15,7 @@ from ...runs.formatting import finite, number
 from ...runs.table import Table
 from .figure import FONT, figure
 from .judgement import PAYLOADS, Judged
+from .methods import LEFT
 from .tasks import Task
 
 Study = Mapping[str, tuple[Task, list[Judged]]]
@@ -47,15 +48,16 @@ def table(task: Task, judged: list[Judged]) -> Table:
             number(1e3 * row.worst("error_m"), 3, missing=""),
             number(1e3 * row.worst("residual_m"), 3),
         )
-    out.notes += _notes(task)
+    out.notes += _notes(task) + [row.about for row in judged if row.about]
     return out
 
 
 def _notes(task: Task) -> list[str]:
     way = ", ".join(f"{a:g} to {b:.4g}" for a, b in zip(task.start, task.end, strict=True))
     lines = [
-        f"joints {way} [m or rad] in {task.duration_s:g} s; drives up to "
-        f"{', '.join(f'{x:.3g}' for x in task.limits)} (feedforward by inversion: as it asks)",
+        f"joints {way} [m or rad] in {task.duration_s:g} s; the drives of all methods saturate at "
+        f"{', '.join(f'{x:.3g}' for x in task.limits)}",
+        f"bang-bang and least time leave {100 * LEFT:.0f} % of these limits to the PD beside them",
         "tip error: from the rigid robot's tip on the method's own set-points, at every instant",
         "time: from the first drive until the tip stays within 1 % of its way from its end",
         f"other payload: the worse of {OFF} less and more, with the same method",
@@ -96,8 +98,9 @@ def numbers(study: Study) -> dict[str, Any]:
             "end": list(task.end),
             "duration_s": task.duration_s,
             "drive_limits": task.limits.tolist(),
+            "about": [row.about for row in judged if row.about],
         }
-        for name, (task, _) in study.items()
+        for name, (task, judged) in study.items()
     }
     return {"study": "control", "tasks": tasks, "rows": _rows(study)}
 

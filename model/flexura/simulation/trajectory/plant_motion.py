@@ -11,6 +11,7 @@ import numpy as np
 from ...signals import COLUMNS, Drive, Signal
 from ...system import System
 from ..dynamics import simulate
+from .limits import Limits
 from .variation import STAGES, Variation, stage_times, variation
 
 RTOL, METHOD = 1e-8, "implicit"
@@ -19,6 +20,7 @@ RESOLVED = 1.5  # rad: a mode turns by less in one of them
 MODES = 4  # that are to be resolved, above the rigid robot's
 PERIODS = 2.0  # of the first mode, in which the residual is looked at
 LOOKS = 65  # instants within them
+WATCHED = 0.8  # of a limit: from there on a motion is held to it between its drives' nodes too
 
 
 @dataclass(frozen=True)
@@ -94,14 +96,13 @@ class Plant:
 @dataclass(frozen=True)
 class Answer:
     """What a plant does under drives: its state at the end (2 n,), and the derivative (2 n, P + 1)
-    by the drives' nodes and the time; speeds and tip deflections at the nodes, and theirs."""
+    by the drives' nodes and the time; speeds and tip deflections on the way (W,) in shares of their
+    limits, and theirs (W, P + 1)."""
 
     end: np.ndarray
     slope: np.ndarray
-    speed: np.ndarray
-    speed_slope: np.ndarray
-    bend: np.ndarray
-    bend_slope: np.ndarray
+    limited: np.ndarray
+    limited_slope: np.ndarray
 
 
 def linear_drive(times: np.ndarray, values: np.ndarray) -> Signal:
@@ -113,24 +114,34 @@ def linear_drive(times: np.ndarray, values: np.ndarray) -> Signal:
     return Signal(rows, {"kind": "drive"})
 
 
-def answer(plant: Plant, u: np.ndarray, T: float, free: np.ndarray, bends: bool) -> Answer | None:
+def answer(
+    plant: Plant,
+    u: np.ndarray,
+    T: float,
+    free: np.ndarray,
+    limits: Limits | None = None,
+    finer: int = 1,
+) -> Answer | None:
     """What a plant does under drives in a time (116); None where it cannot run.
 
     With t = tau T and the drives kept over tau, a longer time acts as the force (2 M q'' + G q')/T.
+    Speeds and deflections are looked at where the drives have nodes; between these nodes, where
+    they are near a limit.
 
     Args:
         plant: the robot.
         u: drives (m + 1, links) at the nodes.
         T: the time [s].
         free: the joints that move.
-        bends: whether deflections are asked for.
+        limits: of speeds and deflections; None: these are not asked for.
+        finer: how many times as many steps in an interval.
 
     Returns:
         The Answer.
     """
     system, m = plant.system, len(u) - 1
     highest = plant.modes[0][: plant.joints + MODES][-1]
-    substeps = int(np.clip(np.ceil(highest * T / m / RESOLVED), *SUBSTEPS))
+    substeps = int(np.clip(np.ceil(highest * T / m / RESOLVED), *SUBSTEPS)) * finer
     nodes, fine = np.linspace(0.0, T, m + 1), np.linspace(0.0, T, substeps * m + 1)
     t = stage_times(fine)
     drive = Drive.force(*(linear_drive(nodes, column) for column in u.T))
@@ -145,31 +156,58 @@ def answer(plant: Plant, u: np.ndarray, T: float, free: np.ndarray, bends: bool)
     along = variation(system, fine, q, v, a, rows)
     index = np.searchsorted(rows, system.joint_rows[free])
     slower = (2 * along.M @ a[:, :, None] + along.G @ v[:, :, None])[:, rows] / T
-    states = _slopes(along, index, m, slower)
+    ends = slice(2, None, 3)  # the last stage of each step is its end
+    limited, watch = _watched(plant, limits, q[ends], v[ends], substeps)
+    state, limited_slope = _slopes(along, index, m, slower, watch)
     r = len(rows)
-    at = slice(3 * substeps - 1, None, 3 * substeps)  # the last stage of each interval is its end
-    states[:, r:, -1] -= v[at][:, rows] / T
-    slope = np.zeros((2 * n, states.shape[2]))
-    slope[rows], slope[n + rows] = states[-1, :r], states[-1, r:]
-    bend, bend_slope = np.zeros((m, 0)), np.zeros((m, 0, slope.shape[1]))
-    if bends:
-        bend = np.array([system.places(x)[0] for x in q[at]])
-        slopes = np.array([deflection_slope(system, x)[:, rows] for x in q[at]])
-        bend_slope = slopes @ states[:, :r]
-    return Answer(
-        np.concatenate([q[-1], v[-1]]),
-        slope,
-        v[at][:, system.joint_rows[free]],
-        states[:, r + index],
-        bend,
-        bend_slope,
-    )
+    state[r:, -1] -= v[-1][rows] / T
+    rates = [W[:, r:] @ now[rows] for W, now in zip(watch, v[ends], strict=True)]
+    limited_slope[:, -1] -= np.concatenate(rates) / T
+    slope = np.zeros((2 * n, state.shape[1]))
+    slope[rows], slope[n + rows] = state[:r], state[r:]
+    return Answer(np.concatenate([q[-1], v[-1]]), slope, limited, limited_slope)
 
 
-def _slopes(along: Variation, joints: np.ndarray, m: int, slower: np.ndarray) -> np.ndarray:
-    """Derivatives of the states at the ends of the intervals (m, 2 r, P + 1).
+def _watched(
+    plant: Plant, limits: Limits | None, q: np.ndarray, v: np.ndarray, substeps: int
+) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Speeds and deflections (W,) in shares of their limits, and their derivatives (w, 2 r) by the
+    state at the end of each of the N steps."""
+    system, rows, r = plant.system, plant.system.free_rows, len(plant.system.free_rows)
+    values: list[float] = []
+    watch = [np.zeros((0, 2 * r)) for _ in q]
+    if limits is None or not limits.of_states:
+        return np.zeros(0), watch
+    fast = [i for i in system.joint_rows if i in rows]
+    most = limits.speed[np.isin(system.joint_rows, fast)]
+    fast, most = np.array(fast)[np.isfinite(most)], most[np.isfinite(most)]
+    column = r + np.searchsorted(rows, fast)
+    for k, (place, rate) in enumerate(zip(q, v, strict=True)):
+        at_node = (k + 1) % substeps == 0
+        speed = rate[fast] / most
+        own = np.flatnonzero(at_node | (np.abs(speed) > WATCHED))
+        taken = np.zeros((len(own), 2 * r))
+        taken[np.arange(len(own)), column[own]] = 1 / most[own]
+        values += speed[own].tolist()
+        if np.isfinite(limits.deflection_m):
+            bend = system.places(place)[0] / limits.deflection_m
+            own = np.flatnonzero(at_node | (np.abs(bend) > WATCHED))
+            if len(own):
+                slope = deflection_slope(system, place)[own][:, rows] / limits.deflection_m
+                taken = np.concatenate([taken, np.hstack([slope, np.zeros_like(slope)])])
+                values += bend[own].tolist()
+        watch[k] = taken
+    return np.array(values), watch
 
-    Args: joints: their rows among those of `along`; slower (3 N, r, 1): what a longer time does.
+
+def _slopes(
+    along: Variation, joints: np.ndarray, m: int, slower: np.ndarray, watch: list[np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Derivatives by drives and time of the state at the end (2 r, P + 1), and of what is watched
+    at the ends of the N steps (W, P + 1).
+
+    Args: joints: their rows among those of `along`; slower (3 N, r, 1): what a longer time does;
+    watch: derivatives (w, 2 r) by the state, of each step.
     """
     N, r, k = len(along.nodes) - 1, len(along.rows), len(joints)
     substeps = N // m
@@ -181,15 +219,16 @@ def _slopes(along: Variation, joints: np.ndarray, m: int, slower: np.ndarray) ->
     force[..., -1] = slower.reshape(N, 3, r)
     step, own = along.transitions(force)
     Z = np.zeros((2 * r, k * (m + 1) + 1))
-    out = np.zeros((m, *Z.shape))
+    out = []
     for i in range(N):
         node = i // substeps
         Z = step[i] @ Z
         for j in range(k):
             Z[:, j * (m + 1) + node : j * (m + 1) + node + 2] += own[i, :, 2 * j : 2 * j + 2]
         Z[:, -1] += own[i, :, -1]
-        out[node] = Z
-    return np.delete(out, (m + 1) * np.arange(1, k + 1) - 1, axis=2)  # the last drive holds
+        out.append(watch[i] @ Z)
+    held = (m + 1) * np.arange(1, k + 1) - 1  # the last drive holds
+    return np.delete(Z, held, axis=1), np.delete(np.concatenate(out), held, axis=1)
 
 
 def _accelerations(system: System, q: np.ndarray, v: np.ndarray, force: np.ndarray) -> np.ndarray:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import FlexuraError
+from .limits import Limits
 from .plant_motion import Answer, Plant, answer
 
 STEPS = 10  # linear programs for one time, at most
@@ -16,15 +17,6 @@ MET = 2e-4  # what is missed at the end, in shares
 LESS = 0.6  # of what is missed: what a step may leave
 WEIGHT = 3.0  # of what is missed, in shares, against the time, in shares
 NEAR = 3e-4  # of the largest change of a drive, in shares of its limit
-
-
-@dataclass(frozen=True)
-class Limits:
-    """Largest drives and speeds of joints (links,) and deflection of tips [m]; infinity: none."""
-
-    drive: np.ndarray
-    speed: np.ndarray
-    deflection_m: float
 
 
 @dataclass(frozen=True)
@@ -52,8 +44,8 @@ class ShortestMotion:
     """The sequence of linear programs (120): least T over drives u that are linear in `m` equal
     intervals, so that every plant ends at rest."""
 
-    def __init__(self, plants: list[Plant], limits: Limits, m: int) -> None:
-        self.plants, self.limits, self.m = plants, limits, m
+    def __init__(self, plants: list[Plant], limits: Limits, m: int, finer: int = 1) -> None:
+        self.plants, self.limits, self.m, self.finer = plants, limits, m, finer
         self.programs = 0
         self.free = np.flatnonzero(~plants[0].system.locked)
         self.bound = np.repeat(limits.drive[self.free], m)
@@ -114,16 +106,16 @@ class ShortestMotion:
         """What the motion under the drives meets, or None where it does not run."""
         values, slopes, most = [], [], []
         for plant in self.plants:
-            bends = plant is self.plants[0] and bool(np.isfinite(self.limits.deflection_m))
-            found = answer(plant, u, T, self.free, bends)
+            first = plant is self.plants[0]
+            limits, finer = (self.limits, self.finer) if first else (None, 1)
+            found = answer(plant, u, T, self.free, limits, finer)
             if found is None:
                 return None
-            if plant is self.plants[0]:
+            if first:
                 equal, equal_slope = self._rigid(plant, found, T)
-                limited, limited_slope = self._limited(found)
-                values.append(limited)
-                slopes.append(limited_slope)
-                most.append(np.ones(len(limited)))
+                values.append(found.limited)
+                slopes.append(found.limited_slope)
+                most.append(np.ones(len(found.limited)))
             if len(plant.unshaped):
                 away = np.concatenate([plant.end, np.zeros(plant.system.n)])
                 values.append(plant.later @ (found.end - away))
@@ -148,18 +140,6 @@ class ShortestMotion:
         rate_slopes[:, -1] += rates / T
         place_slopes = into @ found.slope[:n] / size
         return np.concatenate([places, rates]), np.concatenate([place_slopes, rate_slopes])
-
-    def _limited(self, found: Answer) -> tuple[np.ndarray, np.ndarray]:
-        """Speeds and deflections in shares of their limits, and derivatives."""
-        values, slopes = [np.zeros(0)], [np.zeros((0, found.slope.shape[1]))]
-        for k, joint in enumerate(self.free):
-            if np.isfinite(most := self.limits.speed[joint]):
-                values.append(found.speed[:, k] / most)
-                slopes.append(found.speed_slope[:, k] / most)
-        for k in range(found.bend.shape[1]):
-            values.append(found.bend[:, k] / self.limits.deflection_m)
-            slopes.append(found.bend_slope[:, k] / self.limits.deflection_m)
-        return np.concatenate(values), np.concatenate(slopes)
 
     def _program(
         self, now: Conditions, u: np.ndarray, T: float, quicker: float

@@ -9,21 +9,25 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...errors import FlexuraError, InputError
-from ...io import Run, Tables, array, number, whole
+from ...io import Run, array, number, whole
 from ...robot import Robot
 from ...signals import Drive, polynomial
 from ...system import RobotLike, System, assemble, static
 from ..approximate_inverse import rigid_robot
 from ..dynamics import inverse, simulate
+from .limits import KEPT, Limits, read_limits
 from .plant_motion import METHOD, PERIODS, RTOL, Plant, deflection_slope, linear_drive
 from .posture import exact_system
-from .shortest_motion import SETTLED, Limits, ShortestMotion
+from .shortest_motion import SETTLED, ShortestMotion
 
 INTERVALS = 160  # of the drives
 COARSE = 40  # so many at least in a first, coarse motion
 ROUGHLY = 5e-3  # of the time: what a coarse motion may leave to finer ones
 FEWEST = 20
-KEPT = 0.01  # of a limit of speed or deflection: what a motion may exceed it by without an event
+ROUNDS = 8  # in which a motion that exceeds a limit between its nodes is mended
+FINER = 4  # times the steps in an interval, at most
+FAR = 0.02  # of a limit: a motion that exceeds it by more is looked at in finer steps
+STRETCHED = (1.0, 1.01, 1.03, 1.1)  # times in which a mended motion is sought
 ROWS = 20  # of the Run in each interval: a spline through them hardly leaves the drives
 FIRST = 120  # in which the first motion's drives are looked at
 LONGER = 12  # times by which the first motion may be too short
@@ -53,7 +57,9 @@ def time_optimal(
     vibrates (120).
 
     A sequence of linear programs on the nonlinear equations, linearised exactly along each motion.
-    The first of the robot's modes end at rest. The Run is that of a simulation.
+    The first of the robot's modes end at rest. The Run is that of a simulation. Limits hold at all
+    its rows, to 0.1 %: a motion that exceeds one is mended. Speeds and deflections of the other
+    robots of `robust` are not limited.
 
     Args:
         robot: a System, a Robot, or the path or name of a robot file.
@@ -69,7 +75,8 @@ def time_optimal(
         A Run whose drives are linear between its rows; after its last row they hold the robot.
         `meta` has `duration_s`, `residual_m` and `unshaped_m` (the largest tip deflection after the
         motion, and after that of the rigid robot's fastest drives), `programs`. An event
-        "limit_exceeded" names a speed or deflection that is more than 1 % beyond its limit.
+        "limit_exceeded" names what exceeds its limit by more than 0.1 %, if a motion could not be
+        mended.
 
     Raises:
         InputError: an argument is not what is expected.
@@ -80,7 +87,7 @@ def time_optimal(
     first, last = (
         _positions(system, value, key) for key, value in (("start", start), ("end", end))
     )
-    bounds = _limits(limits, joints)
+    bounds = read_limits(limits, joints)
     share = number(robust, "robust")
     if not 0 <= share < 0.5:
         raise InputError("expected a share of 0 or more, below 0.5", key="robust", value=robust)
@@ -102,9 +109,39 @@ def time_optimal(
             found = shortest.solve(np.column_stack([np.interp(at, nodes, x) for x in u.T]), T)
             u, T = found or _solved(shortest, nominal, T, SETTLED)
         count += shortest.programs
+    if bounds.of_states:
+        u, T, programs = _mended(plants, bounds, u, T)
+        count += programs
     run = _recorded(plants, u, T, count, share)
-    run.meta["events"] = run.meta["events"] + _exceeded(run, bounds)
+    run.meta["events"] = run.meta["events"] + bounds.exceeded(run)
     return run
+
+
+def _mended(
+    plants: list[Plant], limits: Limits, u: np.ndarray, T: float
+) -> tuple[np.ndarray, float, int]:
+    """A motion that keeps the limits between its nodes too, nearly; and how many programs it took.
+
+    A simulation says what a motion exceeds. Then its steps are made finer or its limits tighter.
+    """
+    inner, finer, count = limits, 1, 0
+    for _ in range(ROUNDS):
+        run = _simulated(plants[0], u, T)
+        excess = limits.excess(run)
+        if excess <= KEPT:
+            break
+        if excess > FAR and finer < FINER:
+            finer *= 2
+        else:
+            inner = inner.tightened(run, limits)
+        shortest = ShortestMotion(plants, inner, len(u) - 1, finer)
+        for longer in STRETCHED:
+            found = shortest.solve(u, T * longer)
+            if found:
+                break
+        u, T = found or _solved(shortest, plants[0], T, SETTLED)
+        count += shortest.programs
+    return u, T, count
 
 
 def _band(nominal: Plant, share: float, limits: Limits) -> list[Plant]:
@@ -137,33 +174,6 @@ def _positions(system: System, value: Any, key: str) -> np.ndarray:
             f"expected {joints} positions, one a joint of the robot", key=key, value=value
         )
     return found.reshape(joints)
-
-
-def _limits(limits: Any, joints: int) -> Limits:
-    known = ("drive", "speed", "deflection_m")
-    if not isinstance(limits, Mapping):
-        raise InputError(f"expected a table with {', '.join(known)}", key="limits", value=limits)
-    for key in limits:
-        if key not in known:
-            text = f"an unknown key; known: {', '.join(known)}"
-            raise InputError(text, key=f"limits.{key}", value=limits[key])
-    if "drive" not in limits:
-        raise InputError("missing: expected the largest drives, one a joint", key="limits.drive")
-    found = {}
-    for key in ("drive", "speed"):
-        if key not in limits or limits[key] is None:
-            found[key] = np.full(joints, np.inf)
-            continue
-        expected = f"expected {joints} numbers above 0, one a joint"
-        given = array(limits[key], f"limits.{key}", expected)
-        if given.size not in (1, joints) or not np.all(given > 0):
-            raise InputError(expected, key=f"limits.{key}", value=limits[key])
-        found[key] = np.broadcast_to(given.ravel(), (joints,)).astype(float)
-    bend = limits.get("deflection_m")
-    most = np.inf if bend is None else number(bend, "limits.deflection_m")
-    if not most > 0:
-        raise InputError("expected a length above 0", key="limits.deflection_m", value=bend)
-    return Limits(found["drive"], found["speed"], most)
 
 
 def _solved(
@@ -245,13 +255,20 @@ def _bends(run: Run, plant: Plant) -> np.ndarray:
     return np.column_stack([run[name] for name in names]) - rest if names else np.zeros((1, 1))
 
 
+def _drive(u: np.ndarray, T: float) -> Drive:
+    nodes = np.linspace(0.0, T, len(u))
+    return Drive.force(*(linear_drive(nodes, column) for column in u.T))
+
+
+def _simulated(plant: Plant, u: np.ndarray, T: float) -> Run:
+    """The motion under drives (m + 1, links), with `ROWS` rows in each interval."""
+    rows = np.linspace(0.0, T, ROWS * (len(u) - 1) + 1)
+    return simulate(plant.system, rows, _drive(u, T), plant.start, rtol=RTOL, method=METHOD)
+
+
 def _recorded(plants: list[Plant], u: np.ndarray, T: float, count: int, share: float) -> Run:
     """The Run of the motion, and what remains after it."""
-    nodes = np.linspace(0.0, T, len(u))
-    drive = Drive.force(*(linear_drive(nodes, column) for column in u.T))
-    system, unshaped = plants[0].system, plants[0].unshaped
-    rows = np.linspace(0.0, T, ROWS * (len(u) - 1) + 1)
-    run = simulate(system, rows, drive, plants[0].start, rtol=RTOL, method=METHOD)
+    run, unshaped, drive = _simulated(plants[0], u, T), plants[0].unshaped, _drive(u, T)
     left = [_residual(plant, drive, T) for plant in plants]
     run.meta.update(
         duration_s=T,
@@ -262,20 +279,6 @@ def _recorded(plants: list[Plant], u: np.ndarray, T: float, count: int, share: f
         **({"residual_in_band_m": max(left)} if len(plants) > 1 else {}),
     )
     return run
-
-
-def _exceeded(run: Run, limits: Limits) -> list[Tables]:
-    """Events of the limits that the motion does not keep between the nodes of its program."""
-    of = [(f"joint/{i}/velocity", most) for i, most in enumerate(limits.speed, 1)]
-    of += [(name, limits.deflection_m) for name in run if name.endswith("/tip_deflection")]
-    out: list[Tables] = []
-    for name, most in of:
-        size = np.abs(run[name])
-        if size.max() > most * (1 + KEPT):
-            text = f"{name} reaches {size.max():.4g}, beyond its limit {most:.4g}"
-            at = float(run.t[size.argmax()])
-            out.append({"t": at, "level": "WARN", "name": "limit_exceeded", "text": text})
-    return out
 
 
 def _residual(plant: Plant, drive: Drive, T: float) -> float:
