@@ -115,12 +115,12 @@ static void settings_that_do_not_fit_the_boards_numbers_are_named() {
 #undef WRONG
   Config observed = default_config();
   FixedPointConfig made;
+  observed.kp_1_V_m() = 1.0f;
+  observed.motor_counts_per_m() = 100.0f;
   observed.observer_1_Hz() = 100.0f;
   observed.jo_1_V_s2_m() = 1000.0f;
   CHECK(to_fixed_point(observed, made) == static_cast<uint8_t>(Item::jo_1_V_s2_m));
   observed.jo_1_V_s2_m() = 0.0f;
-  observed.kp_1_V_m() = 1.0f;
-  observed.motor_counts_per_m() = 100.0f;
   observed.bo_1_V_s_m() = 1e4f;
   CHECK(to_fixed_point(observed, made) == static_cast<uint8_t>(Item::bo_1_V_s_m));
   // Of joint 2 with so many microsteps that its rate must be small too.

@@ -123,8 +123,8 @@ uint8_t observer(const Config &c, ObserverGains &o, const MotorItems &item, floa
   const float inertia =
       of(c, item.inertia) / period * (expf(6.2831853f * frequency * period) - 1.0f);
   const float scale = u / count / kTick * kQ8;
-  REQUIRE_ITEM(gain(inertia, scale, o.inertia), item.inertia);
-  REQUIRE_ITEM(gain(inertia - of(c, item.damping), scale, o.moving), item.damping);
+  REQUIRE_ITEM(to_fixed(inertia, scale, o.inertia), item.inertia);
+  REQUIRE_ITEM(to_fixed(inertia - of(c, item.damping), scale, o.moving), item.damping);
   o.filter = filter(frequency, period);
   return kAllValid;
 }
