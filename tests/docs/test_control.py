@@ -125,6 +125,52 @@ def test_the_law_of_a_joint(limit, slew):
         assert np.mean(np.abs(found) > 0.999 * limit) > 0.3  # the output is held back
 
 
+def test_the_disturbance_observer():
+    """The sampled law beside the formulas on random measurements, and what the observer finds of a
+    constant load on the nominal joint.
+
+    Equations: 160, 161, 162, 163
+    """
+    jo, bo, frequency, ticks = 0.3, 0.8, 2.0, 200
+    pid = fx.PID(fx.signals.constant(0.0), kp=3.0, jo=jo, bo=bo, observer_Hz=frequency, limit=1.5)
+    system = robots.system(robots.rigid(0.1, 0.4, 0.05, 1e-3, "Pa"))
+    made = fx.Controller((pid,), rate_Hz=RATE).sampler(system)
+    a, a_q = smoothing(frequency, 2 * T), smoothing(50.0, T)
+    c = jo * a / (2 * T * (1 - a))
+    q = 0.3 * np.sin(5 * T * np.arange(ticks)) + 0.01 * RNG.normal(size=ticks)
+    made.start(system.start())
+    rate = z = d = taken = u = 0.0
+    for k in range(ticks):
+        rate += a_q * ((q[k] - q[max(k - 1, 0)]) / T - rate)
+        if k % 2 == 0:
+            taken = d
+        else:
+            z += a * (u + (c - bo) * rate - z)
+            d = z - c * rate
+        u = clip(3.0 * -q[k] + taken, 1.5)
+        found, _ = made.step(k, k * T, q[k : k + 1].copy(), 0.0, 0.0)
+        assert found[0] == pytest.approx(u, rel=1e-9, abs=1e-11)
+
+    load = 0.4  # on a joint that is the nominal one
+    cart = robots.system(robots.rigid(0.1, 0.5, 0.05, 1e-3, "Pa", viscous_friction_N_s_m=0.8))
+    ends = []
+    for given in (0.0, 5.0):
+        pid = fx.PID(
+            fx.signals.constant(0.0),
+            kp=20.0,
+            kd=5.0,
+            jo=0.5,
+            bo=0.8,
+            observer_Hz=given,
+        )
+        push = fx.Load(1, force_N=(-load, 0.0))
+        drive = fx.Controller((pid,), rate_Hz=1000.0)
+        run = fx.simulate(cart, np.linspace(0, 3, 301), drive, loads=(push,))
+        ends.append(run["joint/1/position"][-1])
+        assert run["joint/1/drive"][-1] == pytest.approx(load, rel=1e-4)
+    assert ends[0] == pytest.approx(-load / 20.0, rel=1e-3) and abs(ends[1]) < 1e-6
+
+
 def test_one_sensor_in_place_of_two():
     """Deflection gains that do the same for a cantilever loaded at its tip.
 

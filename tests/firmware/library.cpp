@@ -63,7 +63,7 @@ int c_pid(const float *values, uint8_t joint, const Row *rows, uint32_t size, in
   Pid pid;
   for (uint32_t k = 0; k < size; ++k) {
     PidSignals signals = rows[k].signals;
-    signals.tip = tip_term(fixed.gains[joint], rows[k].deflection, rows[k].deflection_rate);
+    signals.added = added_terms(fixed.gains[joint], rows[k].deflection, rows[k].deflection_rate, 0);
     outputs[k] = pid.update(fixed.gains[joint], signals);
   }
   return kAllValid;

@@ -222,8 +222,9 @@ WIDE = dict(
     g=st.tuples(*[GAINS] * 10),
     tight=st.booleans(),
     filters=st.tuples(*[st.sampled_from([0.0, 2.0, 20.0])] * 2),
+    observer=st.sampled_from([0.0, 4.0]),
 )
-def test_the_models_law_is_the_boards(lib, seed, g, tight, filters):
+def test_the_models_law_is_the_boards(lib, seed, g, tight, filters, observer):
     """Random gains, set-points, encoder counts and readings through the whole board: filters,
     strip, sum, pulses; and tight limits and slew, then without the sum, whose stop at a limit is a
     matter of round-off.
@@ -254,6 +255,9 @@ def test_the_models_law_is_the_boards(lib, seed, g, tight, filters):
         acceleration_max_2_rad_s2=8000,
         setpoint_1_Hz=filters[0],
         setpoint_2_Hz=filters[1],
+        observer_1_Hz=observer,
+        jo_1_V_s2_m=0.3 * kd,
+        bo_1_V_s_m=20 * kv,
     )
     if tight:
         own |= dict(
@@ -284,6 +288,10 @@ def test_the_models_law_is_the_boards(lib, seed, g, tight, filters):
         error, rate, strip = fine * ((256, 18)[j] + short), 2 * fine / TICK_S, 3e-5
         reported = (0.002, 256 * fine)[j]
         bound = (P + I * t) * error + (D + V) * rate + F * strip + G * strip / (8 * TICK_S)
+        if observer and j == 0:  # what u and the rate are off by, and what comes back through it
+            c = values["jo_1_V_s2_m"] * np.expm1(4e-3 * np.pi * observer) / (2 * TICK_S)
+            bound += (2 * c + values["bo_1_V_s_m"]) * rate
+            bound *= 1 + 2 * np.pi * observer * t
         bound += 2 * reported + 1e-3 * np.abs(wanted[j])
         if tight:  # a limit hands an earlier error on, and pulses add it up
             bound = np.maximum.accumulate(bound) * np.exp(P * t if j else 0 * t)

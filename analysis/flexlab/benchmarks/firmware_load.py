@@ -39,7 +39,7 @@ HARD = {  # settings for the fast trajectory: 16 000 + 4000 edges/s, 4000 steps/
     "speed_max_2_rad_s": 10.0,
     "rate_max_2_rad_s": 7.8539,
 }
-# of both controllers and both set-point filters, as small as they may be: what the processor can be
+# of both controllers, both set-point filters and an observer, as small as they may be: what the processor can be
 # asked at most
 EVERY_TERM = {
     "kd_1_V_s_m": -0.5,
@@ -50,6 +50,9 @@ EVERY_TERM = {
     "kf_2_rad_s_m": 0.5,
     "kg_2_rad_m": 0.02,
     "feedback_2": 1.0,
+    "observer_1_Hz": 10.0,
+    "jo_1_V_s2_m": 0.01,
+    "bo_1_V_s_m": 0.5,
     "setpoint_1_Hz": 100.0,
     "setpoint_2_Hz": 100.0,
 }

@@ -32,7 +32,9 @@ STEP = {"m": 0.005, "rad": 0.1}  # of a joint, where none is asked
 PERIOD_LOG2 = 3  # knots are 8 ms apart
 # checks of the rig that do not depend on the motion
 STATIC_CHECKS = ("current", "supply", "at rest")
-GAINS = tuple(name for name in CONFIG if name[:2] in ("kp", "ki", "kd", "kf", "kg", "kv", "kc")) + (
+_TERMS = ("kp_", "ki_", "kd_", "kf_", "kg_", "kv_", "kc_", "jo_", "bo_", "observer_")
+GAINS = (
+    *(name for name in CONFIG if name.startswith(_TERMS)),
     "derivative_Hz",
     "deflection_Hz",
     "setpoint_1_Hz",

@@ -21,6 +21,7 @@ from flexura.control import (
     GAINS,
     LIMIT,
     NAMES,
+    OBSERVER,
     SETPOINT,
     SLEW,
     Gains,
@@ -35,7 +36,9 @@ COLUMNS = {name: k for k, name in enumerate(GAINS)} | {
     "limit": LIMIT,
     "slew": SLEW,
     "setpoint_Hz": SETPOINT,
+    "observer_Hz": OBSERVER,
 }
+_JOINT_FILTERS = {"setpoint_Hz": 1, "observer_Hz": 2}  # ticks between their steps
 _FILTERS = {"derivative_Hz": DERIVATIVE, "deflection_Hz": DEFLECTION}  # of all joints
 SCALES = ("log", "linear")
 
@@ -189,10 +192,10 @@ def rows(
         free_gains: the free settings.
         values: their values (B, d).
         controller: the controller.
-        base: its own gains (N, 20).
+        base: its own gains (N, 23).
 
     Returns:
-        (B, N, 20).
+        (B, N, 23).
     """
     out, period = np.repeat(base[None], len(values), axis=0), 1 / controller.rate_Hz
     for k, f in enumerate(free_gains):
@@ -206,7 +209,9 @@ def rows(
             continue
         i, _, field = NAMES[f.name][0]
         out[:, i, COLUMNS[field]] = (
-            [filter_coefficient(v, period) for v in column] if field == "setpoint_Hz" else column
+            [filter_coefficient(v, _JOINT_FILTERS[field] * period) for v in column]
+            if field in _JOINT_FILTERS
+            else column
         )
     return out
 
@@ -231,7 +236,7 @@ def check(free_gains: Sequence[FreeGain], gains: Gains) -> None:
             raise InputError("expected each setting once", key=f"free.{f.name}", value=f.name)
         if f.low <= 0 and (
             f.name in _FILTERS
-            or any(field in ("limit", "slew", "setpoint_Hz") for _, _, field in NAMES[f.name])
+            or any(field in ("limit", "slew", *_JOINT_FILTERS) for _, _, field in NAMES[f.name])
         ):
             raise InputError("expected bounds above 0", key=f"free.{f.name}", value=[f.low, f.high])
 

@@ -115,7 +115,7 @@ class Task:
 
     @cached_property
     def _rows(self) -> list[np.ndarray]:
-        """The gains (N, 20) of each robot's controller."""
+        """The gains (N, 23) of each robot's controller."""
         return [c.gains() for c in self.controllers]
 
     def score(self, metrics: np.ndarray, reached: np.ndarray) -> np.ndarray:

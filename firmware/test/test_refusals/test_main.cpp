@@ -111,7 +111,18 @@ static void settings_that_do_not_fit_the_boards_numbers_are_named() {
   WRONG(flex_min, 0.95f, flex_max, 0.95f);
   WRONG(supply_min_V, 14.0f, supply_max_V, 14.0f);
   WRONG(stepper_counts_per_rad, 1.0f, stepper_steps_per_rad, 3999.0f);
+  WRONG(observer_2_Hz, 5.0f, supply_V, 12.0f);  // joint 2 has a stepper
 #undef WRONG
+  Config observed = default_config();
+  FixedPointConfig made;
+  observed.kp_1_V_m() = 1.0f;
+  observed.motor_counts_per_m() = 100.0f;
+  observed.observer_1_Hz() = 100.0f;
+  observed.jo_1_V_s2_m() = 1000.0f;
+  CHECK(to_fixed_point(observed, made) == static_cast<uint8_t>(Item::jo_1_V_s2_m));
+  observed.jo_1_V_s2_m() = 0.0f;
+  observed.bo_1_V_s_m() = 1e4f;
+  CHECK(to_fixed_point(observed, made) == static_cast<uint8_t>(Item::bo_1_V_s_m));
   // Of joint 2 with so many microsteps that its rate must be small too.
   Config config = default_config();
   FixedPointConfig fixed;

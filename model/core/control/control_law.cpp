@@ -90,18 +90,29 @@ GainsOf<ModelNumbers> ControlLaw::a_tick(const JointLaw &joint) const {
   return g;
 }
 
-// The extended PID (70) with its limits (71) and anti-windup (72).
+// The nominal joint as its observer takes it (161).
+ObserverGainsOf<ModelNumbers> ControlLaw::nominal(const JointLaw &joint) const {
+  ObserverGainsOf<ModelNumbers> g;
+  g.filter = joint.observer;
+  g.inertia = 0.5 * rate_Hz * joint.inertia * joint.observer / (1.0 - joint.observer);
+  g.moving = g.inertia - joint.damping;
+  return g;
+}
+
+// The extended PID (70) with its limits (71) and anti-windup (72), and the observer's d^ (163).
 double ControlLaw::pid_output(long k, double t, std::size_t i) {
   const JointLaw &joint = joints[i];
   const GainsOf<ModelNumbers> &g = joint.gains;
   Memory &m = memory_[i];
   const bool counts = joint.output == JointLaw::Output::stepper && !joint.encoder;
   if (k % 2 == long(i) % 2)
-    m.tip = g.kf * filtered_.deflection + g.kg * rate_.deflection + joint.ks * filtered_.slope +
-            joint.kt * rate_.slope;
+    m.added = g.kf * filtered_.deflection + g.kg * rate_.deflection + joint.ks * filtered_.slope +
+              joint.kt * rate_.slope + m.disturbance;
+  else
+    m.disturbance = m.observer.update(nominal(joint), m.given, m.rate);
   const double place = counts ? m.pulses : m.q, rate = counts ? m.u : m.rate;
   const SignalsOf<ModelNumbers> in{m.reference - place, rate, m.reference_rate,
-                                   m.tip + evaluate(joint.feedforward, t).y};
+                                   m.added + evaluate(joint.feedforward, t).y};
   return m.pid.update(a_tick(joint), in);
 }
 

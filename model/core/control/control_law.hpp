@@ -3,14 +3,15 @@
 // The PID is the firmware's own (firmware/lib/control/src/pid.h), computed in doubles.
 //
 //     u = kp e + ki sum(e) T + kd (r' - q') + kf w + kg w' + ks s + kt s' + kv r' + kc sign r' +
-//     f(t)                                                                                   (70)
+//     f(t) + d^                                                                       (70), (163)
 //
 // r: the reference through a first-order filter; r': its change / T; q': the filtered change of q /
 // T, and of a stepper that counts its own pulses u of the tick before; w, s: tip deflection and
 // slope, the mean of two ticks, every second tick, through a filter of their own, w' its change /
 // 2T; joint i takes them in ticks k with k mod 2 = i mod 2 (i from 0). |u| <= limit, and changes by
-// at most slew T a tick. Filters: y += a (x - y), a = 1 - exp(-2 pi f T). u becomes a force, or a
-// stepper's rate, after a whole number of ticks.
+// at most slew T a tick. d^: what the firmware's observer makes of u and q' in the other ticks
+// (disturbance_observer.h). Filters: y += a (x - y), a = 1 - exp(-2 pi f T). u becomes a force, or
+// a stepper's rate, after a whole number of ticks.
 //
 // A linear law takes the PID's place where LinearLaw::states > 0: z^ = z + L (y - C z), u = -K z^ +
 // Kr r + Kv r' + f(t), limits as above, and z of the next tick = F z^ + G u with the u that the
@@ -20,6 +21,7 @@
 #include <vector>
 
 #include "control/inputs.hpp"
+#include "disturbance_observer.h"
 #include "dynamics/places/outputs.hpp"
 #include "pid.h"
 
@@ -32,9 +34,11 @@ struct JointLaw {
     stepper
   };  // none: the joint is not this controller's; stepper: u is the pulses' rate
   Output output = Output::none;
-  GainsOf<ModelNumbers> gains;              // SI units; ki per second, limit, slew per second
-  double ks = 0.0, kt = 0.0;                // of the tip's slope and its rate
-  double force_per_u = 1.0;                 // a motor's [N/V or N m/V]
+  GainsOf<ModelNumbers> gains;  // SI units; ki per second, limit, slew per second
+  double ks = 0.0, kt = 0.0;    // of the tip's slope and its rate
+  double inertia = 0.0, damping = 0.0, observer = 0.0;  // of the nominal joint [u s^2, u s], and
+                                                        // a of its filter; 0: no observer
+  double force_per_u = 1.0;                             // a motor's [N/V or N m/V]
   double setpoint = 1.0, derivative = 1.0;  // a of the filters of reference and velocity; 1: none
   double count = 0.0, duty = 0.0;           // resolution of the encoder, of the output; 0: exact
   bool encoder = false;  // of a stepper: it measures the joint in place of counting pulses
@@ -79,8 +83,9 @@ class ControlLaw : public Sampler {
  private:
   struct Memory {
     PidOf<ModelNumbers> pid;
+    DisturbanceObserverOf<ModelNumbers> observer;
     double q = 0.0, rate = 0.0, reference = 0.0, reference_rate = 0.0, u = 0.0, pulses = 0.0,
-           given = 0.0, place = 0.0, tip = 0.0;
+           given = 0.0, place = 0.0, added = 0.0, disturbance = 0.0;
     std::vector<double> ring;  // outputs of the last ticks
   };
   std::vector<Memory> memory_;
@@ -95,6 +100,7 @@ class ControlLaw : public Sampler {
   void predict();
   void give(long k, double t, std::size_t i, SampledOutput &held);
   GainsOf<ModelNumbers> a_tick(const JointLaw &joint) const;
+  ObserverGainsOf<ModelNumbers> nominal(const JointLaw &joint) const;
 };
 
 }  // namespace flexura

@@ -28,6 +28,7 @@ void Controller::set_gains(const double *rows) {
     joint.gains.kp = g[KP], joint.gains.ki = g[KI], joint.gains.kd = g[KD], joint.gains.kf = g[KF],
     joint.gains.kg = g[KG];
     joint.ks = g[KS], joint.kt = g[KT], joint.gains.kv = g[KV], joint.gains.kc = g[KC];
+    joint.inertia = g[JO], joint.damping = g[BO], joint.observer = g[OBSERVER];
     joint.gains.limit = g[LIMIT], joint.gains.slew = g[SLEW], joint.force_per_u = g[FORCE];
     joint.setpoint = g[SETPOINT], joint.derivative = g[DERIVATIVE], joint.count = g[COUNT],
     joint.duty = g[DUTY];

@@ -8,9 +8,10 @@
 
 namespace flexura {
 
-// Columns of a joint's row of gains; flexura/control.py has the same. LIMIT, SLEW (a second) of the
-// output; FORCE: of a unit of it; SETPOINT, DERIVATIVE, DEFLECTION: a of the filters (the last is
-// joint 1's); COUNT, DUTY: what position and output are rounded to (0: nothing); ENCODER: a
+// Columns of a joint's row of gains; flexura/control.py has the same. JO, BO: of the
+// nominal joint. LIMIT, SLEW (a second) of the
+// output; FORCE: of a unit of it; SETPOINT, DERIVATIVE, DEFLECTION, OBSERVER: a of the filters (the
+// strip's is joint 1's); COUNT, DUTY: what position and output are rounded to (0: nothing); ENCODER: a
 // stepper's joint is measured; RIGID: no spring between pulses and joint; DELAY [ticks].
 enum Gain {
   KP,
@@ -22,12 +23,15 @@ enum Gain {
   KT,
   KV,
   KC,
+  JO,
+  BO,
   LIMIT,
   SLEW,
   FORCE,
   SETPOINT,
   DERIVATIVE,
   DEFLECTION,
+  OBSERVER,
   COUNT,
   DUTY,
   ENCODER,

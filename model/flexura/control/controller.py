@@ -4,6 +4,7 @@
 The law of one joint, with T the tick, e = r - q, w the tip deflection and s the tip slope (70):
 
     u = kp e + ki sum(e) T + kd (r' - q') + kf w + kg w' + ks s + kt s' + kv r' + kc sign r' + f(t)
+        + d^
 
 r: the reference through a first-order filter; r': its change / T; q': the filtered change of q / T,
 and of a stepper that counts its own pulses u of the tick before; w, s: the mean of two ticks, every
@@ -11,7 +12,8 @@ second tick, through a filter of their own, w' its change / 2T; joint i takes th
 mod 2 = i mod 2 (i from 0). |u| <= limit, and changes by at most slew T a tick. The sum's part of u
 stays within the limit, and stands still while limit or slew holds u back and e pushes it further.
 Filters: y += a (x - y), a = 1 - exp(-2 pi f T). u becomes a force, or a stepper's rate, after a
-whole number of ticks. The board's library (firmware/lib/control) computes it, in integers there and
+whole number of ticks. d^ is what the disturbance observer finds of a motor or a force (162), (163).
+The board's library (firmware/lib/control) computes it, in integers there and
 in floating point in the core.
 
     carriage = fx.PID(step(0.1), fx.Motor(force_per_V=13.1, damping=1180.0), kp=2000, ki=4000,
@@ -49,18 +51,21 @@ NONE, EFFORT, STEPPER = 0, 1, 2
     KT,
     KV,
     KC,
+    JO,
+    BO,
     LIMIT,
     SLEW,
     FORCE,
     SETPOINT,
     DERIVATIVE,
     DEFLECTION,
+    OBSERVER,
     COUNT,
     DUTY,
     ENCODER,
     RIGID,
     DELAY,
-) = range(20)  # columns of `Controller.gains`, as Gain of control/controller.hpp in the core
+) = range(23)  # columns of `Controller.gains`, as Gain of control/controller.hpp in the core
 
 
 @dataclass(frozen=True)
@@ -213,8 +218,8 @@ class Controller:
         )
 
     def gains(self) -> np.ndarray:
-        """The numbers of the law that a search may change, (N, 20): columns KP to DELAY."""
-        g = np.zeros((len(self.joints), 20))
+        """The numbers of the law that a search may change, (N, 23): columns KP to DELAY."""
+        g = np.zeros((len(self.joints), 23))
         for row, joint in zip(g, self.joints, strict=True):
             row[DEFLECTION] = filter_coefficient(self.deflection_Hz, 2 / self.rate_Hz)
             if not isinstance(joint, PID):
@@ -223,6 +228,8 @@ class Controller:
             row[LIMIT], row[SLEW] = joint.limit, joint.slew
             row[FORCE] = joint.output.force_per_V if isinstance(joint.output, Motor) else 1.0
             row[SETPOINT] = filter_coefficient(joint.setpoint_Hz, 1 / self.rate_Hz)
+            if joint.observer_Hz > 0:
+                row[OBSERVER] = filter_coefficient(joint.observer_Hz, 2 / self.rate_Hz)
             row[DERIVATIVE] = filter_coefficient(joint.derivative_Hz, 1 / self.rate_Hz)
             row[COUNT], row[DUTY], row[DELAY] = (
                 joint.count,

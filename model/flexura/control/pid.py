@@ -10,7 +10,7 @@ from ..errors import InputError
 from ..io import Tables, flag, number
 from ..signals import FunctionSignal, Signal, as_signal, spline
 
-GAINS = ("kp", "ki", "kd", "kf", "kg", "ks", "kt", "kv", "kc")
+GAINS = ("kp", "ki", "kd", "kf", "kg", "ks", "kt", "kv", "kc", "jo", "bo")
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,8 @@ class PID:
 
     `reference` [m or rad] through a filter of `setpoint_Hz` (0: none), `feedforward` [units of the
     output], `derivative_Hz` (0: none) for the measured velocity. `limit`, `slew` (per second) of
-    the output. `delay_s`, a whole number of ticks, from measurement to output. `count`: the
+    the output. `observer_Hz` (0: none) for the disturbance observer (162), whose nominal joint
+    is u = jo q'' + bo q'; a stepper has none. `delay_s`, a whole number of ticks, from measurement to output. `count`: the
     encoder's resolution [m or rad], `duty`: that of the output; 0: exact.
     """
 
@@ -83,10 +84,13 @@ class PID:
     kt: float = 0.0
     kv: float = 0.0
     kc: float = 0.0
+    jo: float = 0.0
+    bo: float = 0.0
     limit: float = math.inf
     slew: float = math.inf
     setpoint_Hz: float = 0.0
     derivative_Hz: float = 50.0
+    observer_Hz: float = 0.0
     feedforward: Signal | None = None
     delay_s: float = 0.0
     count: float = 0.0
@@ -102,8 +106,11 @@ class PID:
             raise InputError(expected, key="output", value=self.output)
         for name in GAINS:
             object.__setattr__(self, name, number(getattr(self, name), name))
-        for name in ("setpoint_Hz", "derivative_Hz", "delay_s", "count", "duty"):
+        for name in ("setpoint_Hz", "derivative_Hz", "observer_Hz", "jo", "bo", "delay_s", "count", "duty"):
             check_not_negative(self, name)
+        if self.observer_Hz > 0 and isinstance(self.output, Stepper):
+            expected = "expected 0: a stepper's joint is where its pulses are"
+            raise InputError(expected, key="observer_Hz", value=self.observer_Hz)
         for name in ("limit", "slew"):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int | float) or not value > 0:

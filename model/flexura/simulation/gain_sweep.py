@@ -48,7 +48,7 @@ class GainSweep:
         """Simulate rows of gains.
 
         Args:
-            gains: rows of `Controller.gains` (B, N, 20).
+            gains: rows of `Controller.gains` (B, N, 23).
             weights: of the metrics, and what is free of each (2, 6 N + 4); None: no row is
                 abandoned.
             limits: of the rows' costs (B,), inf for none. An abandoned row's cost would exceed its

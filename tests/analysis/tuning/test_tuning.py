@@ -294,6 +294,9 @@ def test_rows_of_the_law_are_those_of_a_controller_with_the_same_settings():
         "derivative_Hz": 33.0,
         "deflection_Hz": 21.0,
         "torque_slew_1_N_m_s": 9.0,
+        "observer_1_Hz": 4.0,
+        "jo_1_N_m_s2_rad": 0.01,
+        "bo_1_N_m_s_rad": 0.02,
     }
     free_gains = [free_gain(name, value / 2, value * 2) for name, value in settings.items()]
     system = fx.assemble(ROBOT)

@@ -131,7 +131,7 @@ def law_by_hand(pids, drive, positions, w, s):
     T, smooth = 1 / drive.rate_Hz, lambda f, T: 1 - np.exp(-2 * np.pi * f * T) if f else 1.0
     strip = [np.zeros(2), np.zeros(2)]  # value and rate of deflection, of slope
     m = [
-        dict(sum=0.0, u=0.0, r=p.reference(-1e-9)[0], speed=0.0, last=x, pulses=x, tip=0.0)
+        dict(sum=0.0, u=0.0, r=p.reference(-1e-9)[0], speed=0.0, last=x, pulses=x, tip=0.0, z=0.0, d=0.0)
         for p, x in zip(pids, positions[0])
     ]
     out = np.zeros(positions.shape)
@@ -163,7 +163,13 @@ def law_by_hand(pids, drive, positions, w, s):
                     + p.kg * strip[0][1]
                     + p.ks * strip[1][0]
                     + p.kt * strip[1][1]
+                    + own["d"]
                 )
+            elif p.observer_Hz:
+                a = smooth(p.observer_Hz, 2 * T)
+                c = p.jo * a / (2 * T * (1 - a))
+                own["z"] += a * (own["u"] + (c - p.bo) * speed - own["z"])
+                own["d"] = own["z"] - c * speed
             e = own["r"] - q
             grown = own["sum"] + p.ki * e * T
             grown = grown if abs(grown) <= p.limit else own["sum"]
@@ -206,6 +212,9 @@ def test_every_term_is_that_of_the_law_written_out(seed):
             derivative_Hz=r.choice([0.0, 50.0]),
             limit=r.choice([3.0, np.inf]),
             slew=r.choice([500.0, np.inf]),
+            observer_Hz=8.0 if isinstance(output, fx.Force) else 0.0,
+            jo=r.uniform(0.0, 0.01),
+            bo=r.uniform(0.0, 0.5),
             **dict(zip(controller.GAINS, r.uniform(-0.5, 0.9, 9))),
         )
         for output in (fx.Force(), fx.Stepper(), fx.Stepper(encoder=True))
@@ -542,6 +551,9 @@ def test_slope_terms_are_deflection_terms_on_a_strip_loaded_at_its_tip():
         (dict(limit=0.0), "limit"),
         (dict(slew=-1.0), "slew"),
         (dict(setpoint_Hz=-1.0), "setpoint_Hz"),
+        (dict(observer_Hz=-1.0), "observer_Hz"),
+        (dict(observer_Hz=5.0, output=fx.Stepper()), "observer_Hz"),
+        (dict(jo=-1.0), "jo"),
     ],
 )
 def test_a_law_that_makes_no_sense_is_refused(change, key):

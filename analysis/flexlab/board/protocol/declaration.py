@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 NAME = "flexura-rig"
 VERSION = 1
-DECLARATION = 0x2D7BA87C
+DECLARATION = 0x2E56F653
 BAUD_BIT_S = 500000
 CONTROL_HZ = 1000
 TELEMETRY_EVERY_TICKS = 2
@@ -549,6 +549,44 @@ CONFIG: dict[str, Item] = {
         1.0,
         "a stepper is controlled on 0 = its pulses, 1 = its encoder",
     ),
+    "observer_1_Hz": Item(
+        75,
+        0.0,
+        0.0,
+        100.0,
+        "joint 1, filter of the disturbance observer; 0 = none",
+    ),
+    "jo_1_V_s2_m": Item(76, 0.0, 0.0, 1000.0, "joint 1 on a screw, inertia / force of a volt"),
+    "bo_1_V_s_m": Item(
+        77,
+        0.0,
+        0.0,
+        10000.0,
+        "joint 1 on a screw, damping / force of a volt: back-EMF",
+    ),
+    "jo_1_V_s2_rad": Item(
+        78,
+        0.0,
+        0.0,
+        1000.0,
+        "joint 1 where it turns, inertia / torque of a volt",
+    ),
+    "bo_1_V_s_rad": Item(
+        79,
+        0.0,
+        0.0,
+        10000.0,
+        "joint 1 where it turns, damping / torque of a volt",
+    ),
+    "observer_2_Hz": Item(
+        80,
+        0.0,
+        0.0,
+        100.0,
+        "joint 2 with a motor, filter of the disturbance observer; 0 = none",
+    ),
+    "jo_2_V_s2_rad": Item(81, 0.0, 0.0, 1000.0, "joint 2 with a motor, inertia / torque of a volt"),
+    "bo_2_V_s_rad": Item(82, 0.0, 0.0, 10000.0, "joint 2 with a motor, damping / torque of a volt"),
 }
 
 PINS_HASH = 0x13738ADE

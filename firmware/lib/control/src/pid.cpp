@@ -3,8 +3,8 @@
 
 namespace flexura {
 
-int32_t tip_term(const PidGains &gains, int16_t deflection, int16_t rate) {
-  Accumulator48 sum;
+int32_t added_terms(const PidGains &gains, int16_t deflection, int16_t rate, int32_t disturbance) {
+  Accumulator48 sum(disturbance);
   sum.add(gains.kf, deflection);
   sum.add(gains.kg, rate);
   return sum.value();

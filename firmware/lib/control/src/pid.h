@@ -5,11 +5,12 @@
 // e = r - q, T = 1 tick and w = tip deflection:
 //
 //   i* = i_{k-1} + ki e T, or i_{k-1} if |i*| would pass the limit
-//   u* = kp e + i* + kd (r' - q') + kf w + kg w' + kv r' + kc sign(r')          (70)
+//   u* = kp e + i* + kd (r' - q') + kf w + kg w' + kv r' + kc sign(r') + d^     (70), (163)
 //   u  = saturation of u*: |u| <= limit, |u - u_{k-1}| <= slew                (71)
 //   i_k = i*, or i_{k-1} if the saturation holds u back and e would push it further     (72)
 //
-// q' and w' are filtered differences (filter.h, flex_sensor.h).
+// q' and w' are filtered differences (filter.h, flex_sensor.h), d^ is the observer's
+// (disturbance_observer.h).
 #pragma once
 #include "numbers.h"
 
@@ -41,7 +42,7 @@ struct SignalsOf {
   typename N::Wide error;           // e, counts / 256
   typename N::Value rate;           // q', counts / 256 per tick
   typename N::Value setpoint_rate;  // r', counts / 256 per tick
-  typename N::Wide tip;             // kf w + kg w', Q16 of u: tip_term(), new in every second tick
+  typename N::Wide added;           // kf w + kg w' + d^, Q16 of u: added_terms()
 };
 
 template <class N>
@@ -86,7 +87,7 @@ typename N::Value PidOf<N>::update(const GainsOf<N> &gains, const SignalsOf<N> &
   if (N::outside(integral, gains.limit)) integral = integral_;
 
   Accumulator sum(integral.integer_part());
-  sum.add(in.tip);
+  sum.add(in.added);
   sum.add(gains.kp, error);
   if (gains.kd != 0) sum.add(gains.kd, N::difference(in.setpoint_rate, in.rate));
   sum.add(gains.kv, in.setpoint_rate);
@@ -105,7 +106,8 @@ using PidSignals = SignalsOf<BoardNumbers>;
 using Pid = PidOf<BoardNumbers>;
 extern template class PidOf<BoardNumbers>;  // pid.cpp
 
-// kf w + kg w' as Q16 of u; deflection [10 um], its rate [10 um / 256 in two ticks].
-int32_t tip_term(const PidGains &gains, int16_t deflection, int16_t rate);
+// kf w + kg w' + d^ as Q16 of u; deflection [10 um], its rate [10 um / 256 in two ticks],
+// disturbance d^ as the observer gives it.
+int32_t added_terms(const PidGains &gains, int16_t deflection, int16_t rate, int32_t disturbance);
 
 }  // namespace flexura

@@ -4,7 +4,7 @@
 
 namespace flexura {
 
-constexpr uint32_t kDeclaration = 0x2D7BA87C;
+constexpr uint32_t kDeclaration = 0x2E56F653;
 constexpr uint8_t kProtocolVersion = 1;
 constexpr uint32_t kBaudBitS = 500000;
 constexpr uint16_t kControlHz = 1000;
@@ -520,8 +520,16 @@ enum class Item : uint8_t {
   setpoint_1_Hz = 72,
   setpoint_2_Hz = 73,
   feedback_2 = 74,
+  observer_1_Hz = 75,
+  jo_1_V_s2_m = 76,
+  bo_1_V_s_m = 77,
+  jo_1_V_s2_rad = 78,
+  bo_1_V_s_rad = 79,
+  observer_2_Hz = 80,
+  jo_2_V_s2_rad = 81,
+  bo_2_V_s_rad = 82,
 };
-constexpr uint8_t kConfigItems = 75;
+constexpr uint8_t kConfigItems = 83;
 
 // The settings in use, by number and by name.
 struct Config {
@@ -752,6 +760,30 @@ struct Config {
   // a stepper is controlled on 0 = its pulses, 1 = its encoder
   float &feedback_2() { return values[74]; }
   float feedback_2() const { return values[74]; }
+  // joint 1, filter of the disturbance observer; 0 = none
+  float &observer_1_Hz() { return values[75]; }
+  float observer_1_Hz() const { return values[75]; }
+  // joint 1 on a screw, inertia / force of a volt
+  float &jo_1_V_s2_m() { return values[76]; }
+  float jo_1_V_s2_m() const { return values[76]; }
+  // joint 1 on a screw, damping / force of a volt: back-EMF
+  float &bo_1_V_s_m() { return values[77]; }
+  float bo_1_V_s_m() const { return values[77]; }
+  // joint 1 where it turns, inertia / torque of a volt
+  float &jo_1_V_s2_rad() { return values[78]; }
+  float jo_1_V_s2_rad() const { return values[78]; }
+  // joint 1 where it turns, damping / torque of a volt
+  float &bo_1_V_s_rad() { return values[79]; }
+  float bo_1_V_s_rad() const { return values[79]; }
+  // joint 2 with a motor, filter of the disturbance observer; 0 = none
+  float &observer_2_Hz() { return values[80]; }
+  float observer_2_Hz() const { return values[80]; }
+  // joint 2 with a motor, inertia / torque of a volt
+  float &jo_2_V_s2_rad() { return values[81]; }
+  float jo_2_V_s2_rad() const { return values[81]; }
+  // joint 2 with a motor, damping / torque of a volt
+  float &bo_2_V_s_rad() { return values[82]; }
+  float bo_2_V_s_rad() const { return values[82]; }
 };
 
 // X(name, default, least, greatest) of every setting.
@@ -830,6 +862,14 @@ struct Config {
   X(deflection_Hz, 50.0f, 0.1f, 500.0f)                  \
   X(setpoint_1_Hz, 0.0f, 0.0f, 500.0f)                   \
   X(setpoint_2_Hz, 0.0f, 0.0f, 500.0f)                   \
-  X(feedback_2, 0.0f, 0.0f, 1.0f)
+  X(feedback_2, 0.0f, 0.0f, 1.0f)                        \
+  X(observer_1_Hz, 0.0f, 0.0f, 100.0f)                   \
+  X(jo_1_V_s2_m, 0.0f, 0.0f, 1000.0f)                    \
+  X(bo_1_V_s_m, 0.0f, 0.0f, 10000.0f)                    \
+  X(jo_1_V_s2_rad, 0.0f, 0.0f, 1000.0f)                  \
+  X(bo_1_V_s_rad, 0.0f, 0.0f, 10000.0f)                  \
+  X(observer_2_Hz, 0.0f, 0.0f, 100.0f)                   \
+  X(jo_2_V_s2_rad, 0.0f, 0.0f, 1000.0f)                  \
+  X(bo_2_V_s_rad, 0.0f, 0.0f, 10000.0f)
 
 }  // namespace flexura

@@ -105,7 +105,8 @@ Result Rig::handle(const Arm &command, uint16_t &detail) {
   for (uint8_t j = 0; j < 2; ++j) {
     velocity_[j].start();
     pid_[j].start(0);
-    tip_term_[j] = 0;
+    observer_[j].start();
+    added_[j] = disturbance_[j] = 0;
   }
   target_ = {{0, 0}};
   final_ = false;

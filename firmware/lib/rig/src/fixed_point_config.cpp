@@ -67,6 +67,7 @@ float of(const Config &c, Item item) { return c.values[static_cast<uint8_t>(item
 // The settings of a motor: on a screw in metres, or turning its joint in radians.
 struct MotorItems {
   Item counts, low, high, speed, following, stall_speed, runaway, kp, ki, kd, kf, kg, kv, kc;
+  Item inertia, damping, observer;
 };
 const MotorItems kOnScrew = {Item::motor_counts_per_m, Item::position_min_1_m,
                              Item::position_max_1_m,   Item::speed_max_1_m_s,
@@ -74,16 +75,20 @@ const MotorItems kOnScrew = {Item::motor_counts_per_m, Item::position_min_1_m,
                              Item::runaway_distance_m, Item::kp_1_V_m,
                              Item::ki_1_V_m_s,         Item::kd_1_V_s_m,
                              Item::kf_1_V_m,           Item::kg_1_V_s_m,
-                             Item::kv_1_V_s_m,         Item::kc_1_V};
+                             Item::kv_1_V_s_m,         Item::kc_1_V,
+                             Item::jo_1_V_s2_m,        Item::bo_1_V_s_m,
+                             Item::observer_1_Hz};
 const MotorItems kTurning[2] = {
     {Item::motor_1_counts_per_rad, Item::position_min_1_rad, Item::position_max_1_rad,
      Item::speed_max_1_rad_s, Item::following_max_1_rad, Item::stall_speed_1_rad_s,
      Item::runaway_distance_1_rad, Item::kp_1_V_rad, Item::ki_1_V_rad_s, Item::kd_1_V_s_rad,
-     Item::kf_1_V_m, Item::kg_1_V_s_m, Item::kv_1_V_s_rad, Item::kc_1_V},
+     Item::kf_1_V_m, Item::kg_1_V_s_m, Item::kv_1_V_s_rad, Item::kc_1_V, Item::jo_1_V_s2_rad,
+     Item::bo_1_V_s_rad, Item::observer_1_Hz},
     {Item::motor_2_counts_per_rad, Item::position_min_2_rad, Item::position_max_2_rad,
      Item::speed_max_2_rad_s, Item::following_max_2_rad, Item::stall_speed_2_rad_s,
      Item::runaway_distance_2_rad, Item::kp_2_V_rad, Item::ki_2_V_rad_s, Item::kd_2_V_s_rad,
-     Item::kf_2_V_m, Item::kg_2_V_s_m, Item::kv_2_V_s_rad, Item::kc_2_V}};
+     Item::kf_2_V_m, Item::kg_2_V_s_m, Item::kv_2_V_s_rad, Item::kc_2_V, Item::jo_2_V_s2_rad,
+     Item::bo_2_V_s_rad, Item::observer_2_Hz}};
 
 // As REQUIRE, for a setting that is not known by name.
 #define REQUIRE_ITEM(condition, item) \
@@ -107,6 +112,23 @@ uint8_t travel(const Config &c, FixedPointConfig &s, uint8_t j, Item low, Item h
   return kAllValid;
 }
 
+// Inertia and damping of the nominal joint in the units of ObserverGains (161). `u` is units of
+// output per V, `count` counts per m or rad.
+uint8_t observer(const Config &c, ObserverGains &o, const MotorItems &item, float u, float count) {
+  o = ObserverGains();
+  const float frequency = of(c, item.observer);
+  if (frequency <= 0) return kAllValid;
+  // a / (1 - a) of the filter
+  const float period = 2 * kTick;
+  const float inertia =
+      of(c, item.inertia) / period * (expf(6.2831853f * frequency * period) - 1.0f);
+  const float scale = u / count / kTick * kQ8;
+  REQUIRE_ITEM(to_fixed(inertia, scale, o.inertia), item.inertia);
+  REQUIRE_ITEM(to_fixed(inertia - of(c, item.damping), scale, o.moving), item.damping);
+  o.filter = filter(frequency, period);
+  return kAllValid;
+}
+
 // Gains in the units of PidGains. `u` is units of output per V, `count` counts per m or rad.
 uint8_t motor(const Config &c, FixedPointConfig &s, uint8_t j, const MotorItems &item) {
   PidGains &g = s.gains[j];
@@ -125,6 +147,8 @@ uint8_t motor(const Config &c, FixedPointConfig &s, uint8_t j, const MotorItems 
   g.kc = static_cast<int16_t>(of(c, item.kc) * u);
   g.limit = static_cast<int16_t>(c.voltage_max_V() * u);
   g.slew = change(c.voltage_slew_V_s() * kTick * u);
+  const uint8_t wrong = observer(c, s.observer[j], item, u, count);
+  if (wrong != kAllValid) return wrong;
   w.stall_speed[j] = to_16(of(c, item.stall_speed) * count * kTick * kQ8);
   REQUIRE_ITEM(to_fixed(of(c, item.runaway), count, w.runaway[j]), item.runaway);
   return travel(c, s, j, item.low, item.high, item.speed, item.following, count, count);
@@ -138,6 +162,8 @@ uint8_t stepper(const Config &c, FixedPointConfig &s) {
   const float step = c.stepper_steps_per_rad(), u = kRate * kTick;
   const float encoder = s.encoder_2 ? c.stepper_counts_per_rad() : step;
   w.drive[1] = Drive::stepper;
+  s.observer[1] = ObserverGains();
+  REQUIRE(c.observer_2_Hz() <= 0, observer_2_Hz);  // a joint is where its pulses are
   g.fine = true;
   REQUIRE(gain(c.kp_2_1_s(), u / 16 * kQ16, g.kp), kp_2_1_s);
   REQUIRE(to_fixed(c.ki_2_1_s2(), u / 16 * kTick * kQ32, g.ki), ki_2_1_s2);
@@ -165,6 +191,7 @@ uint8_t stepper(const Config &c, FixedPointConfig &s) {
 // Joint 2 is not there: it stays at 0.
 void nothing(FixedPointConfig &s) {
   s.gains[1] = PidGains();
+  s.observer[1] = ObserverGains();
   s.span_low[1] = s.span_high[1] = 0;
   FaultLimits &w = s.limits;
   w.drive[1] = Drive::none;

@@ -3,12 +3,14 @@
 #pragma once
 #include "fault_monitor.h"
 #include "flex_sensor.h"
+#include "disturbance_observer.h"
 #include "pid.h"
 
 namespace flexura {
 
 struct FixedPointConfig {
   PidGains gains[2];
+  ObserverGains observer[2];
   FlexSensorScale tip;
   FaultLimits limits;
   uint16_t velocity_filter, setpoint_filter[2];  // Q16

@@ -156,12 +156,19 @@ void Rig::control() {
     // The deflection is new in every second tick. Joint 1 takes it at once, joint 2 in the next
     // tick: the products are shared between the two.
     const uint8_t turn = tick_ & 1;
-    tip_term_[turn] = tip_term(gains[turn], flex_sensor_.deflection(), flex_sensor_.rate());
-    PidSignals signals = {measured_.error[0], measured_.velocity[0], setpoint_rate_[0],
-                          tip_term_[0]};
+    added_[turn] = added_terms(gains[turn], flex_sensor_.deflection(), flex_sensor_.rate(),
+                               disturbance_[turn]);
+    // The observers take turns too, each while the other joint has its products.
+    if (turn == 1)
+      disturbance_[0] =
+          observer_[0].update(fixed_.observer[0], pid_[0].output(), measured_.velocity[0]);
+    else if (drive(1) == Drive::motor)
+      disturbance_[1] =
+          observer_[1].update(fixed_.observer[1], pid_[1].output(), measured_.velocity[1]);
+    PidSignals signals = {measured_.error[0], measured_.velocity[0], setpoint_rate_[0], added_[0]};
     pid_[0].update(gains[0], signals);
     signals.error = measured_.error[1];
-    signals.tip = tip_term_[1];
+    signals.added = added_[1];
     signals.setpoint_rate = setpoint_rate_[1];
     signals.rate = drive(1) == Drive::motor ? measured_.velocity[1]
                    : fixed_.on_encoder      ? upper(multiply(fixed_.ratio, measured_.velocity[1]))

@@ -3,6 +3,7 @@
 // in its emulator and in host tests.
 #pragma once
 #include "declaration.h"
+#include "disturbance_observer.h"
 #include "fault_monitor.h"
 #include "filter.h"
 #include "fixed_point_config.h"
@@ -119,9 +120,11 @@ class Rig {
   int16_t setpoint_rate_[2] = {0, 0};  // counts / 256 per tick
   uint16_t flex_before_ = 0;           // reading of the tick before
   Pid pid_[2];
+  DisturbanceObserver observer_[2];
   StepGenerator step_generator_;
   FlexSensor flex_sensor_;
-  int32_t tip_term_[2] = {0, 0};  // pid.h
+  int32_t added_[2] = {0, 0};        // pid.h
+  int32_t disturbance_[2] = {0, 0};  // disturbance_observer.h, Q16 of u
   FaultMonitor monitor_;
   FixedPointConfig fixed_;
   TrajectoryPlayer player_;

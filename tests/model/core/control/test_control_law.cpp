@@ -174,3 +174,35 @@ TEST("the board's integers compute what the doubles compute, to their resolution
     CHECK_NEAR(a, b, 8.0);
   }
 }
+
+TEST("the board's observer finds what that of doubles finds, to its resolution") {
+  ObserverGainsOf<BoardNumbers> board;
+  board.moving = 900 * 256, board.inertia = 1200 * 256, board.filter = 4096;
+  ObserverGainsOf<ModelNumbers> model;  // rates in counts / 256
+  model.moving = 900.0 / 256, model.inertia = 1200.0 / 256, model.filter = 1.0 / 16;
+  DisturbanceObserverOf<BoardNumbers> integers;
+  DisturbanceObserverOf<ModelNumbers> doubles;
+  integers.start(), doubles.start();
+  check::Random random;
+  for (int k = 0; k < 2000; ++k) {
+    const int16_t u = static_cast<int16_t>(random(-16000.0, 16000.0)),
+                  rate = static_cast<int16_t>(random(-2000.0, 2000.0));
+    CHECK_NEAR(integers.update(board, u, rate) / 65536.0, doubles.update(model, u, rate), 1e-3);
+  }
+  board.filter = 0;
+  CHECK(integers.update(board, 100, 100) == 0);
+}
+
+TEST("with an observer a constant load leaves no error, and the next tick's law takes it") {
+  ControlLaw law = one_joint();
+  JointLaw &j = law.joints[0];
+  j.gains.kp = 4.0, j.inertia = 0.5, j.damping = 0.8, j.observer = 0.2;
+  SampledOutput held = outputs(1);
+  double q = 0.0, v = 0.0;
+  for (long k = 0; k < 4000; ++k) {
+    const double u = force_at(law, k, q, held);
+    for (int part = 0; part < 10; ++part) q += 1e-3 * v, v += 1e-3 * (u - 0.8 * v - 0.3) / 0.5;
+  }
+  CHECK_NEAR(q, 0.0, 1e-6);
+  CHECK_NEAR(held.force[0], 0.3, 1e-6);
+}

@@ -145,7 +145,7 @@ TEST(
       if (whole(0, 9) == 0) error = whole(-7, 7);
       const int e = 4096 * error, rate = whole(-9, 9), setpoint_rate = whole(-9, 9),
                 w = whole(-50, 50), w_rate = whole(-20, 20);
-      const int32_t tip = tip_term(board, int16_t(w), int16_t(256 * w_rate));
+      const int32_t tip = added_terms(board, int16_t(w), int16_t(256 * w_rate), 0);
       const double tip_real = board.kf / 65536.0 * w + board.kg / 256.0 * w_rate;
       CHECK(tip / 65536.0 == tip_real);
       const int16_t u = pid.update(
