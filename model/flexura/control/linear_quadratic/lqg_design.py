@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...errors import InputError
-from ...io import array, number
+from ...io import array, tick_rate
 from ...signals import FunctionSignal, Signal, SignalLike, as_signals, constant
 from ...system import RobotLike, System, assemble, linearize
 from ..sampled import Sampled
@@ -67,9 +67,7 @@ def lqg(
         InputError: an argument is not what is expected, or no stabilising solution exists.
     """
     system = assemble(robot)
-    rate = number(rate_Hz, "rate_Hz", "expected a rate above 0 in hertz")
-    if not rate > 0:
-        raise InputError("expected a rate above 0 in hertz", key="rate_Hz", value=rate_Hz)
+    rate = tick_rate(rate_Hz)
     linear = linearize(system, q)
     if not linear.inputs:
         raise InputError("expected a joint that is free to move", key="link.joint.locked")

@@ -57,7 +57,7 @@ class Measurements:
                     expected += "; no estimator here takes accelerations or forces"
                 raise InputError(expected, key="measure", value=name)
         if not asked or len(set(asked)) != len(asked):
-            raise InputError("expected each measurement once", key="measure", value=names)
+            raise InputError("expected each measurement once", key="measure", value=asked)
         self.names, self.system = tuple(asked), system
         self._sensed = any(name in self.sensors for name in asked)
         self._tipped = any(name in self.tips for name in asked)
