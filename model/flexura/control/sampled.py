@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ..errors import InputError
 from ..io import Tables, array, function_of, tick_rate
 from ..signals import Loads
-from ..system import System, sensor_channels
+from ..system import RunStates, System, sensor_channels
 
 MEASURED = ("q", "qd", "tip_deflections", "sensors")  # what a Sampled's function may ask for
 
@@ -133,9 +133,8 @@ class _Measured:
         bent = self.system.places(q)[0]
         known: dict[str, Any] = {"q": q, "qd": qd, "tip_deflections": bent}
         if "sensors" in self.asked:
-            channels = sensor_channels(
-                self.system, np.array([t]), q[None], qd[None], self.force[None], self.loads
-            )
+            now = (np.array([t]), q[None], qd[None], self.force[None])
+            channels = sensor_channels(RunStates(self.system, *now, self.loads))
             known["sensors"] = {
                 name.removeprefix("sensor/"): float(value[0]) for name, value in channels.items()
             }
