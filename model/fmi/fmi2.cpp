@@ -55,9 +55,7 @@ EXPORT Component fmi2Instantiate(Text name, Type type, Text guid, Text resources
                                  const Callbacks *callbacks, Boolean, Boolean) {
   const Callbacks by = *callbacks;
   if (!flexura::processor_suffices()) {
-    if (by.logger)
-      by.logger(by.environment, name, ERROR, "logStatusError",
-                "the FMU was made for processors of the level x86-64-v3; this is an older one");
+    if (by.logger) by.logger(by.environment, name, ERROR, "logStatusError", flexura::OLD_PROCESSOR);
     return nullptr;
   }
   // The message is a format of printf; loggers of some languages see nothing else.

@@ -40,9 +40,7 @@ EXPORT Component fmi3InstantiateCoSimulation(Text, Text token, Text resources, b
                                              bool, const Reference *, std::size_t,
                                              void *environment, Log logger, void *) {
   if (!flexura::processor_suffices()) {
-    if (logger)
-      logger(environment, ERROR, "logStatusError",
-             "the FMU was made for processors of the level x86-64-v3; this is an older one");
+    if (logger) logger(environment, ERROR, "logStatusError", flexura::OLD_PROCESSOR);
     return nullptr;
   }
   auto log = [logger, environment](const std::string &text) {

@@ -9,6 +9,8 @@
 namespace flexura {
 
 bool processor_suffices();  // processor.cpp: whether the core inside runs here
+constexpr const char *OLD_PROCESSOR =
+    "the FMU was made for processors of the level x86-64-v3; this is an older one";
 
 struct Instance {
   std::function<void(const std::string &)> log;  // an error

@@ -12,7 +12,12 @@ from flexura.io import FILE
 
 from ..identification.vibration.shapers import read_shaper, shaped
 from ..studies import parameter_sweep
-from ..tuning.closed_loop import controller_from_file, references, with_references
+from ..tuning.closed_loop import (
+    controller_from_file,
+    references,
+    unused_forces,
+    with_references,
+)
 from . import tables
 from .internal_forces import force_tables
 from .options import (
@@ -123,6 +128,8 @@ def simulate(
     if not controller:
         check_followed(asked, manoeuvre, "call with --controller GAINS or --prescribed")
     drive = controller_from_file(system, asked, controller) if controller else asked.drive
+    for i in unused_forces(asked, drive):
+        warn(f"the force of joint {i} in the manoeuvre is not used: the controller gives none")
     with results(out, "simulate", robot.stem, *stem(manoeuvre), force=force) as draft:
         run = simulate_asked(
             system,

@@ -1,6 +1,6 @@
 """Conversion of the board's reports to physical quantities.
 
-    q = counts / (counts for 1 m or 1 rad)     pulses = steps / stepper_steps_per_rad
+    q = counts / (counts for 1 m or 1 rad),   pulses = steps / stepper_steps_per_rad
     r = sum of the conversions / (adc_samples 1024)
     w = c1 x + c2 x^2 + c3 x^3,  x = r - zero
 

@@ -22,6 +22,18 @@ def controller_from_file(
     return closed_loop_controller(system, asked, found)
 
 
+def unused_forces(asked: fx.Manoeuvre, drive: object) -> list[int]:
+    """The joints, from 1, whose force in the manoeuvre a controller does not take.
+
+    A PID feeds a force forward if its output is one; a controller that is designed takes none.
+    """
+    joints = drive.joints if isinstance(drive, fx.Controller) else ()
+    fed = [isinstance(j, fx.PID) and isinstance(j.output, fx.Force) for j in joints]
+    fed = fed or [not isinstance(drive, fx.Sampled)] * len(asked.drive.joints)
+    given = [joint.force is not None for joint in asked.drive.joints]
+    return [i for i, (has, used) in enumerate(zip(given, fed, strict=True), 1) if has and not used]
+
+
 def references(system: fx.System, asked: fx.Manoeuvre) -> list[fx.Signal]:
     """A manoeuvre's motions, joints without one at their start.
 

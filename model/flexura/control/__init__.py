@@ -14,8 +14,7 @@ from .controller import (
     Linear,
     filter_coefficient,
 )
-from .designed import Designed, design_setting
-from .gains import BOARD, NAMES, Gains, load_controller
+from .gains import BOARD, NAMES, Designed, Gains, design_setting, load_controller
 from .gains import load as load_gains
 from .ilc import (
     JointLoop,

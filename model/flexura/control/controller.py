@@ -16,9 +16,10 @@ whole number of ticks. d^ is what the disturbance observer finds of a motor or a
 The board's library (firmware/lib/control) computes it, in integers there and
 in floating point in the core.
 
-    carriage = fx.PID(step(0.1), fx.Motor(force_per_V=13.1, damping=1180.0), kp=2000, ki=4000,
-    limit=12) drive = fx.Controller((carriage, fx.PID(step(0.7), kp=6, kd=0.2))) run =
-    fx.simulate(system, t_eval, drive)
+    motor = fx.Motor(force_per_V=13.1, damping=1180.0)
+    carriage = fx.PID(step(0.1), motor, kp=2000, ki=4000, limit=12)
+    drive = fx.Controller((carriage, fx.PID(step(0.7), kp=6, kd=0.2)))
+    run = fx.simulate(system, t_eval, drive)
 
 The Run has `joint/i/reference` besides, and `joint/i/voltage` of a motor, `joint/i/pulses` of a
 stepper.
@@ -34,7 +35,7 @@ import numpy as np
 
 from .. import core, signals
 from ..errors import InputError
-from ..io import Run, Tables, number
+from ..io import Run, Tables, tick_rate
 from ..signals import Drive, JointDrive
 from ..system import System
 from .pid import GAINS, PID, Motor, Stepper, check_not_negative
@@ -110,8 +111,7 @@ class Controller:
         ):
             raise InputError("expected a PID or a JointDrive a joint", key="joints", value=joints)
         object.__setattr__(self, "joints", tuple(joints))
-        if not number(self.rate_Hz, "rate_Hz", "expected a rate above 0 in hertz") > 0:
-            raise InputError("expected a rate above 0 in hertz", key="rate_Hz", value=self.rate_Hz)
+        tick_rate(self.rate_Hz)
         for name in ("deflection_Hz", "deflection_quantum_m"):
             check_not_negative(self, name)
         if not (self.linear is None or isinstance(self.linear, Linear)):

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ..io import Tables, array, function_of, number
+from ..io import Tables, array, function_of, tick_rate
 from ..signals import Loads
-from ..system import System, sensor_channels
+from ..system import RunStates, System, sensor_channels
 
 MEASURED = ("q", "qd", "tip_deflections", "sensors")  # what a Sampled's function may ask for
 
@@ -41,8 +41,7 @@ class Sampled:
         expected = "expected a function of (t) or of (t, position, velocity, tip_deflection)"
         if not asked_measurements(self.function):
             function_of(self.function, "function", (1, 4), expected)
-        if not number(self.rate_Hz, "rate_Hz", "expected a rate above 0 in hertz") > 0:
-            raise InputError("expected a rate above 0 in hertz", key="rate_Hz", value=self.rate_Hz)
+        tick_rate(self.rate_Hz)
 
     def spec(self) -> Tables:
         """What it is, for a Run's metadata."""
@@ -134,9 +133,8 @@ class _Measured:
         bent = self.system.places(q)[0]
         known: dict[str, Any] = {"q": q, "qd": qd, "tip_deflections": bent}
         if "sensors" in self.asked:
-            channels = sensor_channels(
-                self.system, np.array([t]), q[None], qd[None], self.force[None], self.loads
-            )
+            now = (np.array([t]), q[None], qd[None], self.force[None])
+            channels = sensor_channels(RunStates(self.system, *now, self.loads))
             known["sensors"] = {
                 name.removeprefix("sensor/"): float(value[0]) for name, value in channels.items()
             }

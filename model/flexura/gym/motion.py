@@ -8,7 +8,7 @@ import numpy as np
 
 from .. import core
 from ..errors import InputError
-from ..io import number, whole
+from ..io import tick_rate, whole
 from ..population import cores
 from ..population.rows import one
 from ..robot import robot_of
@@ -51,9 +51,7 @@ class Motion:
     ) -> None:
         self.robot = robot_of(robot)
         self.count = whole(count, "count", 1)
-        rate = number(rate_Hz, "rate_Hz", "expected a rate above 0 in hertz")
-        if not rate > 0:
-            raise InputError("expected a rate above 0 in hertz", key="rate_Hz", value=rate_Hz)
+        rate = tick_rate(rate_Hz)
         if not self.robot.stiffening or self.robot.nodal:
             expected = 'expected a robot with stiffening = true and sliding = "continuous"'
             raise InputError(expected, key="robot", value=self.robot.name)

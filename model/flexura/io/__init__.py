@@ -3,6 +3,7 @@ pictures."""
 
 from . import summary
 from .arguments import (
+    MOST_HZ,
     array,
     check_memory,
     check_progress,
@@ -12,6 +13,7 @@ from .arguments import (
     function_of,
     number,
     takes,
+    tick_rate,
     whole,
 )
 from .files import (
@@ -56,6 +58,7 @@ __all__ = [
     "FILE",
     "FINISHED",
     "FORMAT",
+    "MOST_HZ",
     "MOST_LETTERS",
     "REFUSED",
     "STATIONS",
@@ -100,6 +103,7 @@ __all__ = [
     "summary",
     "sync",
     "takes",
+    "tick_rate",
     "unwritable",
     "whole",
     "write_bytes",

@@ -45,6 +45,28 @@ def number(value: Any, key: str, expected: str = "expected a finite number") -> 
     return found
 
 
+MOST_HZ = 1e6  # ticks a second: beyond, a run of seconds would not end
+
+
+def tick_rate(value: Any) -> float:
+    """A rate of ticks, `rate_Hz`, as a float.
+
+    Args:
+        value: what was given.
+
+    Returns:
+        The rate [Hz].
+
+    Raises:
+        InputError: it is no number above 0 and up to 1e6.
+    """
+    expected = "expected a rate above 0 and up to 1e6 in hertz"
+    rate = number(value, "rate_Hz", expected)
+    if not 0 < rate <= MOST_HZ:
+        raise InputError(expected, key="rate_Hz", value=value)
+    return rate
+
+
 def array(
     value: Any, key: str, expected: str, shape: tuple[int | None, ...] | None = None
 ) -> np.ndarray:

@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..io import finite_arguments, whole
 from .conversion import FunctionSignal
 from .shaping import MAX_SEGMENTS, stretches
-from .signal import COLUMNS, Signal, from_segments, segment
+from .signal import COLUMNS, Signal, check_duration, from_segments, segment
 
 BEFORE = -1e300  # s: a segment that begins there is what was always
 PIECES = 64  # polynomials of fifth order in a period of a chirp: they are off by 2e-11 of it
@@ -47,7 +47,7 @@ def pulse(value: float, duration_s: float, at_s: float = 0.0) -> Signal:
     Raises:
         InputError: a duration that is not positive.
     """
-    _positive("duration_s", duration_s)
+    check_duration(duration_s)
     rows = [ZERO, segment(at_s, value), segment(at_s + duration_s, 0.0)]
     return from_segments(rows, kind="pulse", value=value, duration_s=duration_s, at_s=at_s)
 
@@ -73,7 +73,7 @@ def chirp(
     Raises:
         InputError: a duration or frequencies that are not positive, or too many periods.
     """
-    _positive("duration_s", duration_s)
+    check_duration(duration_s)
     for key, value in (("start_Hz", start_Hz), ("end_Hz", end_Hz)):
         if value < 0:
             raise InputError("expected a frequency of 0 or more in hertz", key=key, value=value)
@@ -122,8 +122,10 @@ def noise(
     """
     from scipy.interpolate import CubicSpline
 
-    _positive("duration_s", duration_s)
-    _positive("cutoff_Hz", cutoff_Hz)
+    check_duration(duration_s)
+    if not cutoff_Hz > 0:
+        expected = "expected a frequency above 0 in hertz"
+        raise InputError(expected, key="cutoff_Hz", value=cutoff_Hz)
     seed = whole(seed, "seed", 0)
     if 2 * cutoff_Hz * duration_s > MAX_SEGMENTS:
         expected = f"expected at most {MAX_SEGMENTS // 2} periods of the cutoff"
@@ -212,8 +214,3 @@ def _hermite(t: np.ndarray, y: np.ndarray) -> list[list[float]]:
     c4 = (-15 * gap + 7 * slope - bend) / h**4
     c5 = (6 * gap - 3 * slope + bend / 2) / h**5
     return [segment(*own) for own in np.array([t[:-1], *a[:2], a[2] / 2, c3, c4, c5]).T.tolist()]
-
-
-def _positive(key: str, value: float) -> None:
-    if not value > 0:
-        raise InputError("expected a number above 0", key=key, value=value)

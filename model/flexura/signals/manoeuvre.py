@@ -146,7 +146,7 @@ def _manoeuvre(data: Tables, joints: int) -> Manoeuvre:
     if not isinstance(tables, list) or len(tables) != joints:
         count = len(tables) if isinstance(tables, list) else tables
         raise InputError(
-            f"expected {joints} tables [[joint]], one for each joint of the robot",
+            f"expected a table [[joint]] for each joint of the robot, {joints} in all",
             key="joint",
             value=count,
         )

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from ..errors import InputError
 from ..io import array, finite_arguments
 from .conversion import FunctionSignal, spline
-from .signal import COLUMNS, Signal
+from .signal import COLUMNS, Signal, check_duration
 
 POINT = "expected a place (x, y) in metres"
 
@@ -47,7 +47,7 @@ def polyline(points: ArrayLike, duration_s: float, at_s: float = 0.0) -> tuple[S
     lengths = np.linalg.norm(np.diff(places, axis=0), axis=1)
     if len(places) < 2 or not np.all(lengths > 0):
         raise InputError(expected, key="points", value=points)
-    _positive(duration_s)
+    check_duration(duration_s)
     marks = at_s + duration_s * np.append(0.0, np.cumsum(lengths) / lengths.sum())
     parts = []
     for a, b, t0, t1 in zip(places[:-1], places[1:], marks[:-1], marks[1:], strict=True):
@@ -70,7 +70,7 @@ def circle(
     middle = array(centre, "centre", POINT, (2,))
     if not radius > 0:
         raise InputError("expected a radius above 0 in metres", key="radius", value=radius)
-    _positive(duration_s)
+    check_duration(duration_s)
 
     turned = lambda u: start_rad + turn_rad * smooth_rise(u)
     ways = [lambda u: np.cos(turned(u)), lambda u: np.sin(turned(u))]
@@ -99,8 +99,3 @@ def _joined(parts: list[list[np.ndarray]]) -> tuple[Signal, Signal]:
         np.concatenate([*(part[k][:-1] for part in parts[:-1]), parts[-1][k]]) for k in range(2)
     )
     return Signal(x, {"kind": "path"}), Signal(y, {"kind": "path"})
-
-
-def _positive(duration: float) -> None:
-    if not duration > 0:
-        raise InputError("expected a duration above 0 in seconds", key="duration_s", value=duration)

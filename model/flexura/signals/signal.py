@@ -234,7 +234,7 @@ def ramp(end: float, duration_s: float, start: float = 0.0, at_s: float = 0.0) -
     Returns:
         The Signal.
     """
-    _positive("duration_s", duration_s)
+    check_duration(duration_s)
     rows = [
         segment(at_s, start, (end - start) / duration_s),
         segment(at_s + duration_s, end),
@@ -255,7 +255,7 @@ def cycloid(end: float, duration_s: float, start: float = 0.0, at_s: float = 0.0
     Returns:
         The Signal.
     """
-    _positive("duration_s", duration_s)
+    check_duration(duration_s)
     A, T = end - start, duration_s
     rows = [
         segment(at_s, start, A / T, A=-A / (2 * np.pi), w=2 * np.pi / T),
@@ -280,7 +280,7 @@ def polynomial(end: float, duration_s: float, start: float = 0.0, at_s: float = 
     Returns:
         The Signal.
     """
-    _positive("duration_s", duration_s)
+    check_duration(duration_s)
     rows = [_rise(at_s, start, end - start, duration_s), segment(at_s + duration_s, end)]
     return from_segments(
         rows, kind="polynomial", end=end, duration_s=duration_s, start=start, at_s=at_s
@@ -306,7 +306,7 @@ def trapezoidal(
     Raises:
         InputError: a time is not positive, or two rises do not fit into the duration.
     """
-    _positive("duration_s", duration_s)
+    check_duration(duration_s)
     T, r = duration_s, rise_s
     if not 0 < r <= T / 2:
         raise InputError(
@@ -353,7 +353,7 @@ def bang_bang(
     Raises:
         InputError: a time is not positive, or the changes do not fit into the duration.
     """
-    _positive("duration_s", duration_s)
+    check_duration(duration_s)
     a, T, r = amplitude, duration_s, rise_s
     if not 0 <= r <= T / 4:
         raise InputError(
@@ -463,6 +463,8 @@ def _columns(
     return t, array(values, other, f"expected {len(t)} finite values, one a time", (len(t),))
 
 
-def _positive(key: str, value: float) -> None:
-    if not value > 0:
-        raise InputError("expected a duration above 0 in seconds", key=key, value=value)
+def check_duration(duration_s: float) -> None:
+    """Refuse a duration that is not above 0 s. Raises InputError."""
+    if not duration_s > 0:
+        expected = "expected a duration above 0 in seconds"
+        raise InputError(expected, key="duration_s", value=duration_s)

@@ -6,27 +6,14 @@ import numpy as np
 
 from ..io import STATIONS
 from ..robot import Link, Robot
-from ..signals import Loads
-from ..system import Balance, SectionForces, System, accelerations, balances, sections_known
+from ..system import Balance, RunStates, SectionForces, sections_known
 
 
-def force_channels(
-    system: System,
-    t: np.ndarray,
-    q: np.ndarray,
-    qd: np.ndarray,
-    drive: np.ndarray,
-    loads: Loads,
-) -> dict[str, np.ndarray]:
+def force_channels(states: RunStates) -> dict[str, np.ndarray]:
     """The reactions of all joints, and the forces along all links.
 
     Args:
-        system: the robot.
-        t: times (T,) [s].
-        q: configurations (T, n).
-        qd: their rates (T, n).
-        drive: forces of the drives (T, links) [N or N m].
-        loads: forces and moments on links.
+        states: the states of a run (T,).
 
     Returns:
         Values (T,) by channel, in the order of `force_units`.
@@ -34,12 +21,8 @@ def force_channels(
     Raises:
         InputError: a robot that slides from node to node.
     """
-    qdd = accelerations(system, t, q, qd, drive, loads)
-    parts = [
-        np.array(_joint_values(balance) + _link_values(balance))
-        for balance in balances(system, t, q, qd, qdd, loads)
-    ]
-    return dict(zip(force_units(system.robot), np.concatenate(parts, axis=1), strict=True))
+    values = _joint_values(states.balance) + _link_values(states.balance)
+    return dict(zip(force_units(states.system.robot), values, strict=True))
 
 
 def force_units(robot: Robot) -> dict[str, str]:

@@ -9,7 +9,7 @@ import numpy as np
 from ..io import STATIONS, Run, Tables, judged
 from ..robot import Robot
 from ..signals import Loads
-from ..system import System, sensor_channels
+from ..system import RunStates, System, sensor_channels
 from .internal_forces import force_channels, force_units
 from .problem import Solution
 
@@ -83,10 +83,11 @@ def record(
     begin, sensors = 0, []
     for carrying, end in solution.systems or ((system, len(t)),):
         rows = slice(begin, end)
-        now = (carrying, t[rows], q[rows], v[rows], solution.forces[rows], loads)
-        sensors.append(sensor_channels(*now))
-        if internal_forces:
-            sensors[-1] |= force_channels(*now)
+        now = (t[rows], q[rows], v[rows], solution.forces[rows])
+        for block in RunStates(carrying, *now, loads).blocks():
+            sensors.append(sensor_channels(block))
+            if internal_forces:
+                sensors[-1] |= force_channels(block)
         begin = end
     channels |= {name: np.concatenate([part[name] for part in sensors]) for name in sensors[0]}
     units |= {f"sensor/{s.name}": s.unit for link in system.robot.links for s in link.sensor}
@@ -145,7 +146,7 @@ def energy_error(energies: np.ndarray, accounts: np.ndarray, jumps: Any = 0.0) -
 
 
 def limit_event(system: System, joint: int, t: float, position: np.ndarray) -> Tables:
-    """What stopped joint (from 0) at t (64), with the joints at `position` (N,)."""
+    """The event of the stop at a limit (64): joint (from 0) at t, with all at `position` (N,)."""
     robot, (low, high) = system.robot, system.limits[joint]
     kind, own, travel = (
         robot.links[joint].joint.type,

@@ -12,13 +12,13 @@ from .balance import (
     PointLoad,
     Reaction,
     SectionForces,
-    balances,
     check_continuous,
     internal_forces,
     sections_known,
 )
 from .loads import Impact, acting_loads, impact, load_forces, with_payload
-from .sensors import accelerations, sensor_channels
+from .run_states import RunStates, accelerations
+from .sensors import sensor_channels
 from .small_motions import (
     FrequencyResponse,
     Modes,
@@ -43,13 +43,13 @@ __all__ = [
     "PointLoad",
     "Reaction",
     "RobotLike",
+    "RunStates",
     "SectionForces",
     "StateSpace",
     "System",
     "accelerations",
     "acting_loads",
     "assemble",
-    "balances",
     "check_continuous",
     "equilibrium",
     "frequencies",

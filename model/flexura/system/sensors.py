@@ -2,56 +2,36 @@
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 
 from ..robot import FORCE_KINDS, Sensor
-from ..signals import Loads
-from .balance import Balance, balances
-from .loads import load_forces
+from .balance import Balance
+from .run_states import RunStates
 from .system import System
 
 
-def sensor_channels(
-    system: System,
-    t: np.ndarray,
-    q: np.ndarray,
-    qd: np.ndarray,
-    drive: np.ndarray,
-    loads: Loads,
-) -> dict[str, np.ndarray]:
+def sensor_channels(states: RunStates) -> dict[str, np.ndarray]:
     """The channels of a robot's sensors.
 
     Args:
-        system: the robot.
-        t: times (T,) [s].
-        q: configurations (T, n).
-        qd: their rates (T, n).
-        drive: forces of the drives (T, links) [N or N m].
-        loads: forces and moments on links.
+        states: the states of a run (T,).
 
     Returns:
         Values (T,) by channel, in the unit of the sensor.
+
+    Raises:
+        InputError: a sensor of forces on a robot that slides from node to node.
     """
-    qdd = cache(lambda: accelerations(system, t, q, qd, drive, loads))
-    out, forces = {}, []
-    for i, link in enumerate(system.robot.links):
+    out = {}
+    for i, link in enumerate(states.system.robot.links):
         for sensor in link.sensor:
-            name = f"sensor/{sensor.name}"
             if sensor.kind == "acceleration":
-                out[name] = _acceleration(system, i, sensor.at_m, q, qd, qdd())
+                values = _acceleration(states, i, sensor.at_m)
             elif sensor.kind in FORCE_KINDS:
-                forces.append((i, sensor))
+                values = _force(states.balance, i, sensor)
             else:
-                out[name] = _bending(system, i, sensor, q)
-    if forces:
-        parts = [
-            [_force(balance, i, sensor) for i, sensor in forces]
-            for balance in balances(system, t, q, qd, qdd(), loads)
-        ]
-        columns = np.concatenate(parts, axis=1)
-        out |= {f"sensor/{s.name}": each for (_, s), each in zip(forces, columns, strict=True)}
+                values = _bending(states.system, i, sensor, states.q)
+            out[f"sensor/{sensor.name}"] = values
     return out
 
 
@@ -88,40 +68,11 @@ def _bending(system: System, i: int, sensor: Sensor, q: np.ndarray) -> np.ndarra
     return across if sensor.kind == "deflection" else turned
 
 
-def accelerations(
-    system: System,
-    t: np.ndarray,
-    q: np.ndarray,
-    qd: np.ndarray,
-    drive: np.ndarray,
-    loads: Loads,
-) -> np.ndarray:
-    """The accelerations of the unknowns (44), with Coulomb friction (57), under drives and loads.
-
-    Args:
-        system: the robot.
-        t: times (T,) [s].
-        q: configurations (T, n).
-        qd: their rates (T, n).
-        drive: forces of the drives (T, links) [N or N m].
-        loads: forces and moments on links.
-
-    Returns:
-        (T, n).
-    """
-    force = load_forces(system, q, loads, t).copy()
-    force[:, system.joint_rows] += drive
-    force -= np.array([system.assembly.coulomb(rates) for rates in qd]).reshape(q.shape)
-    rows = zip(q, qd, force, strict=True)
-    return np.array([system.accelerations(*row) for row in rows]).reshape(q.shape)
-
-
-def _acceleration(
-    system: System, i: int, at: float, q: np.ndarray, qd: np.ndarray, rates: np.ndarray
-) -> np.ndarray:
+def _acceleration(states: RunStates, i: int, at: float) -> np.ndarray:
     """The acceleration of a place of link i across its tangent, to the left (T,) [m/s^2] (39)."""
-    structure, out = system.assembly.structure, np.empty(len(q))
-    for k, (here, speed, rate) in enumerate(zip(q, qd, rates, strict=True)):
+    structure, out = states.system.assembly.structure, np.empty(len(states.q))
+    rows = zip(states.q, states.qd, states.accelerations, strict=True)
+    for k, (here, speed, rate) in enumerate(rows):
         frame = structure.at(structure.states(here, speed)[i], at)
         full = frame.rest + frame.velocity @ rate
         out[k] = (full * frame.tangent.conjugate()).imag

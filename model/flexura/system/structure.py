@@ -180,7 +180,8 @@ class Structure:
         return state.hub.place + self._along(state.number, 0.0, state.q)[0] * state.hub.tangent
 
     def masses(self, state: LinkState) -> list[Part]:
-        """A link's masses: its material, its hub, and the payload of the last one (21), (22)."""
+        """What has kinetic energy on a link: its material, its hub (21), and on the last one the
+        payload with its rotary inertia (22)."""
         joint, parts = self.robot.links[state.number].joint, self.own_masses(state)
         if joint.hub_mass_kg:
             axis = translate(state.hub, -joint.hub_radius_m, [], state.qd)

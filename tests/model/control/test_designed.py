@@ -82,6 +82,8 @@ def test_a_predictive_one(tmp_path):
         ("deflection_m = 0.05", "deflection_m = 0.0", "controller.deflection_m"),
         ("deflection_m = 0.05", "intervals = 20", "controller.intervals"),
         ("damping_s = 0.02", "damping_s = -1", "controller.damping_s"),
+        ("effort_2_N_m = 1.2", "effort_2_N_m = 1e-200", "controller.effort_2_N_m"),
+        ("rate_Hz = 500.0", "rate_Hz = 1e11", "controller.rate_Hz"),
         ("modes = 2", "modes = 2.5", "controller.modes"),
         ('"tips"', '"hubs"', "controller.follow"),
         ('measure = ["joint/1/position", ', "measure = [1, ", "controller.measure"),
@@ -103,7 +105,13 @@ def test_a_wrong_file_names_what_is_wrong(tmp_path, old, new, key):
         ("effort_2_N_m = 1.2\n", "", "controller.effort_2_N_m"),
         ("torque_max_1_N_m", "force_max_1_N", "controller.force_max_1_N"),
         ("torque_max_1_N_m", "torque_max_3_N_m", "controller.torque_max_3_N_m"),
-        ("link/2/tip_deflection", "sensor/gauge", "measure"),
+        ("1_N_m = 6.0", "1_N_m = 6.0\neffort_1_N = 6.0", "controller.effort_1_N"),
+        ("link/2/tip_deflection", "sensor/gauge", "controller.measure"),
+        ('"link/2/tip_deflection" = 1e-5', "", "controller.noise.link/2/tip_deflection"),
+        ('"link/2/tip_deflection" = 1e-5', '"tip" = 1', "controller.noise.tip"),
+        ("damping_s = 0.02", "damping_s = 1e11", "controller"),
+        ('"lqg"', '"mpc"\nintervals = 1', "controller.intervals"),
+        ('"lqg"', '"mpc"\nhorizon_s = 0.001', "controller.horizon_s"),
     ],
 )
 def test_what_does_not_fit_the_robot_is_refused(tmp_path, old, new, key):

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...errors import InputError
-from ...io import array, number
+from ...io import array, tick_rate
 from ...signals import FunctionSignal, Signal, SignalLike, as_signals, constant
 from ...system import RobotLike, System, assemble, linearize
 from ..sampled import Sampled
 from .gaussian_design import Design, Weights, gaussian_design
-from .measurements import Measurements
+from .measurements import MeasuredLaw, Measurements
 from .riccati import deviations, discretised
 
 
@@ -67,9 +67,7 @@ def lqg(
         InputError: an argument is not what is expected, or no stabilising solution exists.
     """
     system = assemble(robot)
-    rate = number(rate_Hz, "rate_Hz", "expected a rate above 0 in hertz")
-    if not rate > 0:
-        raise InputError("expected a rate above 0 in hertz", key="rate_Hz", value=rate_Hz)
+    rate = tick_rate(rate_Hz)
     linear = linearize(system, q)
     if not linear.inputs:
         raise InputError("expected a joint that is free to move", key="link.joint.locked")
@@ -103,7 +101,7 @@ def lqg(
     return Sampled(law, rate), design
 
 
-class LinearQuadraticGaussian:
+class LinearQuadraticGaussian(MeasuredLaw):
     """The law (77) as a Python object with a memory, the estimate: what `lqg` samples."""
 
     def __init__(
@@ -116,33 +114,25 @@ class LinearQuadraticGaussian:
         hold: np.ndarray,
         limit: np.ndarray,
     ) -> None:
-        self.design, self.measured, self.references = design, measured, references
+        super().__init__(measured)
+        self.design, self.references = design, references
         self.hold, self.limit, self.driven = hold, limit, list(design.inputs)
         self.offset = measured.at(q)
         rows = [
             int(np.flatnonzero(system.free_rows == system.joint_rows[i])[0]) for i in self.driven
         ]
         self.rows, self.rest = np.array(rows), q[system.joint_rows][self.driven]
-        self.before, self.predicted = np.inf, np.zeros(len(design.F))
+        self.predicted = np.zeros(len(design.F))
 
-    def __call__(
-        self,
-        t: float,
-        position: np.ndarray,
-        velocity: np.ndarray,
-        tip_deflection: float,
-        *,
-        tip_deflections: np.ndarray,
-        sensors: Mapping[str, float],
-    ) -> np.ndarray:
-        """The forces (links,) at a tick [N or N m]."""
+    def begin(self, position: np.ndarray) -> None:
+        """The estimate is the equilibrium with the joints at `position` (links,)."""
+        self.predicted = np.zeros(len(self.design.F))
+        self.predicted[self.rows] = position[self.driven] - self.rest
+
+    def tick(self, t: float, y: np.ndarray) -> np.ndarray:
+        """The forces (links,) from the measurements (p,) at time t [s]."""
         d = self.design
-        y = self.measured.read(position, tip_deflections, sensors) - self.offset
-        if t <= self.before:  # a run begins
-            self.predicted = np.zeros(len(d.F))
-            self.predicted[self.rows] = position[self.driven] - self.rest
-        self.before = t
-        estimate = self.predicted + d.L @ (y - d.C @ self.predicted)
+        estimate = self.predicted + d.L @ (y - self.offset - d.C @ self.predicted)
         wanted = np.zeros(len(d.F))
         for row, i, rest in zip(self.rows, self.driven, self.rest, strict=True):
             wanted[row], wanted[len(d.F) // 2 + row] = self.references[i](t)[:2]

@@ -7,15 +7,17 @@ tick T:
     x_k+1 = F x_k + G u_k,   y_k = C x_k,   [F G; 0 1] = exp([A B; 0 0] T)
 
 y: what the rig measures, joint positions (the motor's, where a transmission is between) and the
-deflection of the last flexible link. K and L
-minimise and come from
+deflection of the last flexible link. The feedback K minimises sum x^T Q x + u^T R u:
 
-    sum x^T Q x + u^T R u:   P = Q + F^T P (F - G K),  K = (R + G^T P G)^-1 G^T P F w ~ W, v ~ V:
-    S = F (S - S C^T (C S C^T + V)^-1 C S) F^T + W,  L = S C^T (C S C^T + V)^-1
+    P = Q + F^T P (F - G K),   K = (R + G^T P G)^-1 G^T P F
 
-(Anderson and Moore, Optimal Control: Linear Quadratic Methods, 1990). The law is z^ = z + L (y - C
-z), u = -K (z^ - x_r), where x_r has the references at the joints and their rates; z of the next
-tick = F z^ + G u with u as the limits left it.
+The observer's L is Kalman's for disturbances and noise with the covariances W and V:
+
+    S = F (S - S C^T (C S C^T + V)^-1 C S) F^T + W,   L = S C^T (C S C^T + V)^-1
+
+(Anderson and Moore, Optimal Control: Linear Quadratic Methods, 1990). The law is
+z^ = z + L (y - C z), u = -K (z^ - x_r), where x_r has the references at the joints and their rates.
+z of the next tick is F z^ + G u with u as the limits left it.
 """
 
 from __future__ import annotations

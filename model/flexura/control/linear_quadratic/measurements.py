@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 from ...errors import InputError
 from ...robot import FORCE_KINDS
 from ...signals import Loads
-from ...system import StateSpace, System, sensor_channels
+from ...system import RunStates, StateSpace, System, sensor_channels
 from ...system.system import jacobian
 
 STEP = 1e-6  # of differences [m or rad]
@@ -57,7 +58,7 @@ class Measurements:
                     expected += "; no estimator here takes accelerations or forces"
                 raise InputError(expected, key="measure", value=name)
         if not asked or len(set(asked)) != len(asked):
-            raise InputError("expected each measurement once", key="measure", value=names)
+            raise InputError("expected each measurement once", key="measure", value=asked)
         self.names, self.system = tuple(asked), system
         self._sensed = any(name in self.sensors for name in asked)
         self._tipped = any(name in self.tips for name in asked)
@@ -77,8 +78,10 @@ class Measurements:
         sensors: dict[str, Any] = {}
         if self._sensed:
             force = np.zeros((1, len(self.system.robot.links)))
-            channels = sensor_channels(self.system, np.zeros(1), at, still, force, Loads())
-            sensors = {name.removeprefix("sensor/"): x[0] for name, x in channels.items()}
+            states = RunStates(self.system, np.zeros(1), at, still, force, Loads())
+            sensors = {
+                name.removeprefix("sensor/"): x[0] for name, x in sensor_channels(states).items()
+            }
         return self.read(q[self.system.joint_rows], self._bent(q), sensors)
 
     def _bent(self, q: np.ndarray) -> np.ndarray:
@@ -98,3 +101,39 @@ class Measurements:
         if name in self.tips:
             return float(tips[self.tips[name]])
         return float(sensors[self.sensors[name]])
+
+
+class MeasuredLaw(ABC):
+    """A law with a memory that a Sampled calls: it begins anew with every run.
+
+    Args:
+        measured: what it measures.
+    """
+
+    def __init__(self, measured: Measurements) -> None:
+        self.measured, self.before = measured, np.inf
+
+    def __call__(
+        self,
+        t: float,
+        position: np.ndarray,
+        velocity: np.ndarray,
+        tip_deflection: float,
+        *,
+        tip_deflections: np.ndarray,
+        sensors: Mapping[str, float],
+    ) -> np.ndarray:
+        """The forces (links,) at a tick [N or N m]."""
+        y = self.measured.read(position, tip_deflections, sensors)
+        if t <= self.before:
+            self.begin(position)
+        self.before = t
+        return self.tick(t, y)
+
+    @abstractmethod
+    def begin(self, position: np.ndarray) -> None:
+        """A run begins with the joints at `position` (links,): at rest, as far as is known."""
+
+    @abstractmethod
+    def tick(self, t: float, y: np.ndarray) -> np.ndarray:
+        """The forces (links,) from the measurements (p,) at time t [s]."""

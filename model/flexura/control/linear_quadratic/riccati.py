@@ -19,8 +19,19 @@ def discretised(A: np.ndarray, B: np.ndarray, T: float) -> tuple[np.ndarray, np.
     return exponential[:n, :n], exponential[:n, n:]
 
 
+# the largest and the smallest deviation whose square is a number with room for products
+LEAST, MOST = 1e-100, 1e100
+SOUGHT = {  # by the first of the arguments that Riccati's equation comes from
+    "effort": "effort, position, deflection and damping that a stable regulator exists for, at "
+    "this rate_Hz",
+    "noise": "measurements, noise and disturbance that a stable estimator exists for, at this "
+    "rate_Hz",
+}
+
+
 def riccati(F: np.ndarray, G: np.ndarray, Q: np.ndarray, R: np.ndarray, key: str) -> np.ndarray:
-    """The stabilising solution of P = Q + F^T P (F - G K) (75). Raises InputError.
+    """The stabilising solution of P = Q + F^T P (F - G K) (75), of the regulator (`key`: "effort")
+    or the estimator ("noise"). Raises InputError.
 
     SciPy's balancing sometimes spoils its reordering: then without.
     """
@@ -36,15 +47,13 @@ def riccati(F: np.ndarray, G: np.ndarray, Q: np.ndarray, R: np.ndarray, key: str
             < 1
         ):
             return P
-    raise InputError(
-        "expected weights and measurements that a stabilising controller exists for", key=key
-    )
+    raise InputError(f"expected {SOUGHT[key]}", key=key)
 
 
 def deviations(value: Any, count: int, key: str) -> np.ndarray:
     """Numbers above 0, one or `count` of them, (count,). Raises InputError."""
     expected = f"expected a number above 0, or {count} of them"
     found = array(value, key, expected)
-    if found.shape not in ((), (count,)) or not np.all(found > 0):
+    if found.shape not in ((), (count,)) or not np.all((found > LEAST) & (found < MOST)):
         raise InputError(expected, key=key, value=value)
     return np.broadcast_to(found, (count,))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...errors import InputError
-from ...io import number, whole
+from ...io import number, tick_rate, whole
 from ...signals import SignalLike
 from ...system import RobotLike, StateSpace, System, assemble, frequencies, linearize
 from ..linear_quadratic.gaussian_design import Weights, deviation_rows, driven_joints
@@ -87,10 +87,7 @@ def nmpc(
     if not system.exact:
         expected = 'expected a robot with stiffening = true and sliding = "continuous"'
         raise InputError(expected, key="robot", value=system.robot.name)
-    expected = "expected a rate above 0 in hertz"
-    rate = number(rate_Hz, "rate_Hz", expected)
-    if not rate > 0:
-        raise InputError(expected, key="rate_Hz", value=rate_Hz)
+    rate = tick_rate(rate_Hz)
     N = whole(intervals, "intervals", FEWEST)
     if N > MOST:
         expected = f"expected from {FEWEST} to {MOST} intervals"

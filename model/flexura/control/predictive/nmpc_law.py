@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +10,7 @@ import numpy as np
 from ... import core
 from ...signals import Signal, evaluate_many
 from ...system import static
-from ..linear_quadratic.measurements import Measurements
+from ..linear_quadratic.measurements import MeasuredLaw, Measurements
 from .prediction import Prediction
 from .quadratic_program import FREE, QuadraticProgram
 
@@ -51,7 +50,7 @@ class Problem:
     price: float
 
 
-class NonlinearPredictive:
+class NonlinearPredictive(MeasuredLaw):
     """Real-time iteration: one step of Newton's method a tick on the motion ahead (130).
 
     `failures` counts programs without a solution, at which the motion of the tick before goes on;
@@ -68,11 +67,12 @@ class NonlinearPredictive:
         driven: list[int],
         q: np.ndarray,
     ) -> None:
-        self.prediction, self.problem, self.measured, self.C = prediction, problem, measured, C
+        super().__init__(measured)
+        self.prediction, self.problem, self.C = prediction, problem, C
         self.references, self.driven, self.links = references, driven, len(references)
         self.q = q
         N, m = len(problem.h), len(driven)
-        self.before, self.failures, self.iterations = np.inf, 0, 0
+        self.failures, self.iterations = 0, 0
         self.program = QuadraticProgram(N * m, N * len(problem.rows), problem.price)
         root = np.sqrt(problem.h)
         self.ahead = np.cumsum(problem.h)
@@ -84,21 +84,8 @@ class NonlinearPredictive:
         self.bounds = np.minimum(bounds, FREE)
         self.turn, self.one = 0, np.eye(C.shape[1])
 
-    def __call__(
-        self,
-        t: float,
-        position: np.ndarray,
-        velocity: np.ndarray,
-        tip_deflection: float,
-        *,
-        tip_deflections: np.ndarray,
-        sensors: Mapping[str, float],
-    ) -> np.ndarray:
-        """The forces (links,) at a tick [N or N m]."""
-        y = self.measured.read(position, tip_deflections, sensors)
-        if t <= self.before:
-            self._begin(t, position)
-        self.before = t
+    def tick(self, t: float, y: np.ndarray) -> np.ndarray:
+        """The forces (links,) from the measurements (p,) at time t [s]."""
         x = self._corrected(y)
         self._linearised()
         self._solved(t, x)
@@ -108,8 +95,8 @@ class NonlinearPredictive:
         self._shifted()
         return force
 
-    def _begin(self, t: float, position: np.ndarray) -> None:
-        """At rest, where the joints are measured."""
+    def begin(self, position: np.ndarray) -> None:
+        """The motion ahead is rest with the joints at `position` (links,)."""
         p, N = self.prediction, len(self.problem.h)
         rest, hold = self._equilibrium(tuple(position))
         self.x, self.u = np.tile(rest, (N + 1, 1)), np.tile(hold, (N, 1))

@@ -4,9 +4,9 @@ from .cuts import Balance, PointLoad, Reaction, SectionForces
 from .internal_forces import (
     InternalForces,
     LinkForces,
-    balances,
     check_continuous,
     internal_forces,
+    point_loads,
     sections_known,
 )
 
@@ -17,8 +17,8 @@ __all__ = [
     "PointLoad",
     "Reaction",
     "SectionForces",
-    "balances",
     "check_continuous",
     "internal_forces",
+    "point_loads",
     "sections_known",
 ]

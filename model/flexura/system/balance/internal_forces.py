@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -15,8 +14,6 @@ from ...signals import Loads, LoadsLike, as_loads
 from ..statics import static
 from ..system import RobotLike, System, assemble
 from .cuts import Balance, PointLoad, Reaction
-
-ROWS = 500  # times in one sweep
 
 
 class LinkForces(NamedTuple):
@@ -138,37 +135,6 @@ def internal_forces(
     acting = [tip, *point_loads(on_links, np.array([t]))]
     balance = Balance(system.assembly.structure, at[None], rates[None], more[None], acting)
     return InternalForces(system, balance)
-
-
-def balances(
-    system: System,
-    t: np.ndarray,
-    q: np.ndarray,
-    qd: np.ndarray,
-    qdd: np.ndarray,
-    loads: Loads,
-) -> Iterator[Balance]:
-    """The balances of a run, of some hundred times each, which bounds the memory they take.
-
-    Args:
-        system: the robot.
-        t: times (T,) [s].
-        q: configurations (T, n).
-        qd: their rates (T, n).
-        qdd: their accelerations (T, n).
-        loads: forces and moments on links.
-
-    Yields:
-        One Balance after the other; one of no time, if there is none.
-
-    Raises:
-        InputError: the robot slides from node to node.
-    """
-    check_continuous(system)
-    for first in range(0, max(len(t), 1), ROWS):
-        rows = slice(first, first + ROWS)
-        acting = point_loads(loads, t[rows])
-        yield Balance(system.assembly.structure, q[rows], qd[rows], qdd[rows], acting)
 
 
 def point_loads(loads: Loads, t: np.ndarray) -> list[PointLoad]:

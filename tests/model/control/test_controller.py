@@ -1,11 +1,9 @@
-"""Sampled controllers: a cart's recursion written out, the continuous limit, the linear model, LQR,
-and the gains file."""
+"""Sampled controllers: a cart's recursion written out, the continuous limit, the linear model."""
 
 from __future__ import annotations
 
 import itertools
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,50 +12,11 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 import flexura as fx
+from controlled_robots import TICK, cart, rig, rig_controller
 from flexura import signals
-from flexura.control import controller, gains, lqr
-from flexura.simulation import gain_sweep, gravity, inverse_dynamics
+from flexura.control import controller, lqr
+from flexura.simulation import gain_sweep
 from robots import beam, rigid, robot, system
-
-TICK, ROOT = 1e-3, Path(__file__).resolve().parents[3]
-
-
-def cart(mass: float = 2.0, **keys) -> fx.System:
-    return system(rigid(0.0, mass, 0.0, 0.0, "Pa"), **keys)
-
-
-def rig(**strip) -> fx.System:
-    """Type IV with two modes."""
-    carriage = rigid(0.1, 0.6, 0.05, 5e-4, "Pa")
-    link = beam(
-        0.3, 0.157, 0.3333, 4, modes=2, damping={"beta_s": 2e-4}, rotor_inertia=1e-3, **strip
-    )
-    return system(carriage, link, payload=0.02)
-
-
-def rig_controller(**motor) -> fx.Controller:
-    """Steps of both joints of `rig`; `motor` are further gains of joint 1."""
-    return fx.Controller(
-        (
-            fx.PID(
-                signals.step(0.05),
-                fx.Motor(13.0, 120.0),
-                kp=300,
-                limit=6,
-                setpoint_Hz=2.0,
-                **motor,
-            ),
-            fx.PID(
-                signals.step(0.4),
-                fx.Stepper(20.0, 0.01),
-                kp=20,
-                limit=6,
-                slew=60,
-                setpoint_Hz=2.0,
-                delay_s=TICK,
-            ),
-        )
-    )
 
 
 def rounded(x: float, quantum: float) -> float:
@@ -408,142 +367,6 @@ def test_small_motions_are_those_of_the_sampled_linear_model():
     )  # 1e-4 of the motion, its square
 
 
-def quiet(sys: fx.System, references, **keys):
-    pids = tuple(fx.PID(reference, **keys) for reference in references)
-    return lqr(sys, fx.Controller(pids), [5.0, 0.5], position=[0.01, 0.05], deflection=0.005)
-
-
-def test_the_lqrs_cost_is_its_riccati_matrix():
-    """At rest beside small references, which the observer knows exactly: the weighted squares add
-    up to x^T P x, x = -x_r."""
-    sys, r = rig(), np.array([1e-5, 1e-4])
-    drive, d = quiet(sys, [signals.constant(r[0]), signals.constant(r[1])])
-    run = fx.simulate(sys, np.arange(4001) * TICK, drive, rtol=1e-9, method="explicit")
-    weighed = [
-        (run["joint/1/position"] - r[0]) / 0.01,
-        (run["joint/2/position"] - r[1]) / 0.05,
-        run["link/2/tip_deflection"] / 0.005,
-        run["joint/1/drive"] / 5.0,
-        run["joint/2/drive"] / 0.5,
-    ]
-    x = np.zeros(len(d.F))
-    x[sys.joint_rows] = r
-    assert sum(np.sum(w[:-1] ** 2) for w in weighed) == pytest.approx(x @ d.P @ x, rel=1e-4)
-    assert np.abs(d.poles).max() < 1 and np.abs(d.observer_poles).max() < 1
-
-
-def test_the_observers_error_falls_with_its_poles():
-    """The law on the linear plant, from a small state that it does not know: z - x = (F (1 - L
-    C))^k (z0 - x0)."""
-    sys = rig()
-    drive, d = quiet(sys, [signals.constant(0.0)] * 2)
-    sampled = drive.sampler(sys)
-    sampled.start(sys.start())
-    x, wrong = np.linspace(1, 2, len(d.F)) * 1e-6, None
-    half = len(d.F) // 2
-    for k in range(200):
-        error = np.asarray(sampled.prediction) - x
-        wrong = error if wrong is None else d.F @ (np.eye(len(d.F)) - d.L @ d.C) @ wrong
-        np.testing.assert_allclose(error, wrong, rtol=1e-7, atol=1e-9 * np.abs(x).max())
-        force, _ = sampled.tick(k, k * TICK, x[:half].copy())
-        x = d.F @ x + d.G @ force
-    assert np.abs(d.observer_poles).max() < 1
-
-
-def test_an_lqr_brings_the_rig_to_rest_where_pd_leaves_it_swinging():
-    sys, t = rig(), np.arange(0, 2, TICK)
-    references = [signals.cycloid(0.05, 0.4), signals.cycloid(0.4, 0.4)]
-    drive, _ = quiet(sys, references, limit=20.0)
-    pd = fx.Controller(
-        tuple(fx.PID(m, kp=p, kd=d) for m, p, d in zip(references, (900, 6), (50, 0.1)))
-    )
-    good, plain = (fx.simulate(sys, t, c, rtol=1e-6) for c in (drive, pd))
-    late = t > 1.0
-    assert (
-        np.abs(good["link/2/tip_deflection"][late]).max()
-        < 0.1 * np.abs(plain["link/2/tip_deflection"][late]).max()
-    )
-    assert good["joint/2/position"][-1] == pytest.approx(0.4, abs=1e-3)
-
-
-def test_an_lqr_is_found_for_a_light_rotor_too():
-    """On the rig's own file, whose rotor of 5 g cm^2 makes the states' scales differ by six
-    orders."""
-    tables = fx.load(ROOT / "model" / "robots" / "rig.toml").to_dict()
-    tables["link"][1]["modes"] = 2
-    _, d = quiet(fx.assemble(fx.Robot.from_dict(tables)), [signals.constant(0.0)] * 2)
-    assert np.abs(d.poles).max() < 1 and np.abs(d.observer_poles).max() < 1
-
-
-def test_feedforwards_carry_the_motion():
-    """Inverse dynamics in place of feedback; gravity in place of a sum."""
-    sys, t = rig(), np.arange(0, 0.6, TICK)
-    motions = [signals.cycloid(0.05, 0.5), signals.cycloid(0.4, 0.5)]
-    ahead = inverse_dynamics(sys, motions, t)
-    pids = tuple(
-        fx.PID(m, kp=p, kd=d, feedforward=f)
-        for m, f, p, d in zip(motions, ahead, (100, 1), (10, 0.05))
-    )
-    with_, without = (
-        fx.simulate(sys, t, fx.Controller(c))["joint/2/position"] - [motions[1](s)[0] for s in t]
-        for c in (pids, tuple(replace(p, feedforward=None) for p in pids))
-    )
-    assert np.abs(with_).max() < 0.05 * np.abs(without).max()
-    hanging = system(rigid(0.5, 1.0, 0.25, 0.02, "R"), gravity=(0.0, -9.81))
-    (ahead,) = gravity(hanging, [signals.constant(0.3)], [0.0, 5.0])
-    arm = fx.PID(signals.constant(0.3), kp=20.0, kd=2.0, feedforward=ahead)
-    assert fx.simulate(hanging, [0.0, 5.0], fx.Controller((arm,)))["joint/1/position"][
-        -1
-    ] == pytest.approx(0.3, abs=1e-6)
-
-
-def test_shaped_references_leave_the_strip_at_rest():
-    """ZV, ZVD and a matched cycloid at the clamped frequency, given to a stepper that counts its
-    pulses."""
-    sys, t = rig(), np.arange(0, 1.5, TICK)
-    f = fx.frequencies(sys)[0]
-    move = signals.polynomial(0.4, 0.25)
-    held = fx.PID(signals.constant(0.0), kp=9000, kd=500)
-
-    def left(reference) -> float:
-        step = fx.PID(reference, fx.Stepper(), kp=20, kv=1, delay_s=TICK)
-        return float(
-            np.abs(
-                fx.simulate(sys, t, fx.Controller((held, step)))["link/2/tip_deflection"][t > 0.8]
-            ).max()
-        )
-
-    plain = left(move)
-    for reference in (
-        signals.shaping.zv(move, f),
-        signals.shaping.zvd(move, f),
-        signals.shaping.matched_cycloid(0.4, f),
-    ):
-        assert left(reference) < 0.1 * plain
-
-
-def test_slope_terms_are_deflection_terms_on_a_strip_loaded_at_its_tip():
-    c = fx.PID(signals.constant(0.0), kf=1.0, kg=0.5, ks=2.0, kt=0.1)
-    one = c.one_sensor(0.3)
-    assert (one.kf, one.kg, one.ks, one.kt) == pytest.approx(
-        (1.0 + 2.0 * 5.0, 0.5 + 0.1 * 5.0, 0.0, 0.0)
-    )
-    bent = fx.static(rig(), tip_force=(0.0, 0.1))
-    pulled = fx.simulate(
-        rig(),
-        [0.0, TICK],
-        fx.Controller((fx.PID(signals.constant(0.0)), c), deflection_Hz=0.0),
-        q0=bent,
-    )["joint/2/drive"][0]
-    same = fx.simulate(
-        rig(),
-        [0.0, TICK],
-        fx.Controller((fx.PID(signals.constant(0.0)), one), deflection_Hz=0.0),
-        q0=bent,
-    )
-    assert pulled == 0.0 and same["joint/2/drive"][0] == 0.0  # joint 2 takes the strip in odd ticks
-
-
 @pytest.mark.parametrize(
     "change, key",
     [
@@ -587,80 +410,3 @@ def test_delays_between_ticks_nodal_robots_and_wrong_counts_are_refused():
         fx.simulate(nodal, [0.0, 0.1], fx.Controller((c, c)))
     with pytest.raises(fx.InputError, match="stepper"):
         lqr(rig(), fx.Controller((c, replace(c, output=fx.Stepper()))), 1.0)
-
-
-# The gains file
-
-FILE = """
-[controller]
-kp_1_V_m = 2000.0
-ki_1_V_m_s = 4000
-voltage_max_V = 12.0
-kp_2_1_s = 20.0
-kg_2_rad_m = -1.5
-kd_2 = 0.1
-rate_max_2_rad_s = 6.0
-setpoint_2_Hz = 2.0
-derivative_Hz = 40.0
-
-[[output]]
-kind = "motor"
-force_per_V = 13.1
-damping = 1180.0
-"""
-
-
-def test_a_gains_file_is_the_controller_that_it_names(tmp_path):
-    path = tmp_path / "gains.toml"
-    path.write_text(FILE)
-    read = gains.load(path)
-    one, two = read.controller([signals.step(0.1), signals.step(0.7)]).joints
-    assert (one.kp, one.ki, one.limit, one.derivative_Hz) == (
-        2000,
-        4000,
-        12,
-        40,
-    ) and one.output == fx.Motor(13.1, 1180.0)
-    assert (two.kp, two.kg, two.kd, two.limit, two.setpoint_Hz) == (
-        20,
-        -1.5,
-        0.1,
-        6,
-        2,
-    ) and two.output == fx.Stepper()
-    assert two.delay_s == 1e-3 and one.delay_s == 0.0
-    read.write(tmp_path / "again.toml")
-    again = gains.load(tmp_path / "again.toml")
-    assert again.settings == read.settings and again.outputs == read.outputs
-    assert read.board()["kp_1_V_m"] == 2000 and "rate_Hz" not in read.board()
-
-
-@pytest.mark.parametrize(
-    "old, new, key",
-    [
-        ("kp_1_V_m = 2000.0", "kp_1_V = 2000.0", "controller.kp_1_V"),
-        ("kp_1_V_m = 2000.0", "kp_1_V_m = nan", "controller.kp_1_V_m"),
-        ("kp_1_V_m = 2000.0", "kp_1_N_m = 2000.0", "controller"),
-        ("voltage_max_V = 12.0", "voltage_max_V = -12.0", "controller.voltage_max_V"),
-        ("setpoint_2_Hz = 2.0", "setpoint_2_Hz = -2.0", "controller.setpoint_2_Hz"),
-        ("derivative_Hz = 40.0", "derivative_Hz = -40.0", "controller.derivative_Hz"),
-        ("derivative_Hz = 40.0", "rate_Hz = 0.0", "controller.rate_Hz"),
-        ("derivative_Hz = 40.0", "kp_4_1_s = 1.0", "controller"),
-        ('kind = "motor"', 'kind = "steam"', "output[1].kind"),
-        ("force_per_V = 13.1", "", "output[1]"),
-        ("damping = 1180.0", "damping = -1.0", "output[1].damping"),
-        ("[controller]", "[control]", "control"),
-    ],
-)
-def test_a_wrong_gains_file_is_refused_by_key(tmp_path, old, new, key):
-    path = tmp_path / "gains.toml"
-    assert old in FILE
-    path.write_text(FILE.replace(old, new))
-    with pytest.raises(fx.InputError) as caught:
-        gains.load(path)
-    assert caught.value.key == key and caught.value.file == str(path)
-
-
-def test_what_the_board_has_not_is_not_sent_to_it():
-    with pytest.raises(fx.InputError, match="the board has too"):
-        gains.Gains({"kp_1_V_m": 1.0, "ks_1_V_rad": 2.0, "kp_2_1_s": 1.0}).board()

@@ -8,6 +8,7 @@ measure = ["joint/1/position", "sensor/gauge"]
 effort_1_N_m = 0.5
 position_1_rad = 0.02
 torque_max_1_N_m = 1.0
+
 [controller.noise]
 "joint/1/position" = 1e-4
 "sensor/gauge" = 1e-6
@@ -22,15 +23,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..errors import InputError
-from ..io import write_toml
-from ..robot import Robot
-from ..signals import PLAUSIBLE, Signal, is_plausible
-from .linear_quadratic.lqg_design import lqg
-from .predictive import nmpc
-from .sampled import Sampled
+from ...errors import InputError
+from ...io import MOST_HZ, write_toml
+from ...robot import Robot
+from ...signals import PLAUSIBLE, Signal, is_plausible
+from ..linear_quadratic.lqg_design import lqg
+from ..predictive import nmpc
+from ..sampled import Sampled
 
 TYPES = ("lqg", "mpc")
+LEAST = 1e-12  # of a number that must be above 0
 UNLIMITED = 1e12  # of a joint without a limit beside others with one [N, N m, m/s, rad/s]
 # of a joint: the argument, and the units for one that turns and one that slides
 JOINT = {
@@ -48,6 +50,7 @@ OF_ALL = {
     "horizon_s": "horizon_s",
 }
 COUNTS = {"intervals": "intervals", "spread": "spread", "modes": ""}
+OF_DESIGN = ("effort", "noise", "measure", "rate_Hz", "intervals", "horizon_s", "spread")
 OF_MPC = ("speed_max", "deflection_max_m", "horizon_s", "intervals", "spread")
 _NAME = re.compile(rf"({'|'.join(JOINT)})_([1-9])_([a-zA-Z_]+)")
 
@@ -88,7 +91,22 @@ class Designed:
         try:
             return self._sampled(robot, references)
         except InputError as error:
-            raise error if error.file else error.in_file(self.file) from None
+            raise error if error.file else self._of_the_file(error) from None
+
+    def _of_the_file(self, error: InputError) -> InputError:
+        """An error of `flexura.lqg` or `flexura.nmpc` with the file's key and value."""
+        argument, value = error.key, error.value
+        if argument == "noise" and isinstance(value, str):
+            argument, value = f"noise.{value}", (self.noise or {}).get(value)
+        key, _, part = argument.partition(".")
+        if key not in OF_DESIGN:
+            return error.in_file(self.file)
+        name = f"controller.{argument}"
+        if key in self.settings:
+            value = self.settings[key]
+        elif key in ("effort", "noise") and not part:  # no single setting is at fault
+            name = "controller"
+        return InputError(error.expected, key=name, value=value, file=self.file)
 
     def _sampled(self, robot: Robot, references: Sequence[Signal]) -> Sampled:
         given: dict[str, Any] = {
@@ -134,18 +152,20 @@ class Designed:
     def _of_joint(self, word: str, i: int, turns: bool) -> float | None:
         """A joint's setting, None if the file has none. Raises InputError for another unit."""
         unit = JOINT[word][1 if turns else 2]
+        out = None
         for name, value in self.settings.items():
             match = _NAME.fullmatch(name)
             if match and match[1] == word and int(match[2]) == i + 1:
                 if match[3] == unit:
-                    return value
+                    out = value
+                    continue
                 fit = JOINT["force_max" if word == "torque_max" and not turns else word][
                     1 if turns else 2
                 ]
                 expected = f"expected the unit of a joint that {'turns' if turns else 'slides'}"
                 expected += f", {fit}" if fit else ""
                 raise InputError(expected, key=f"controller.{name}", value=value)
-        return None
+        return out
 
     def _model(self, robot: Robot) -> Robot:
         """The robot of the design."""
@@ -236,10 +256,9 @@ def read_design(data: dict[str, Any], file: str) -> Designed:
         expected = "expected a table [controller.noise] of standard deviations by measurement"
         raise InputError(expected, key="controller.noise", value=noise)
     for name, value in (noise or {}).items():
-        if not (is_plausible(value) and value > 0):
-            raise InputError(
-                "expected a number above 0", key=f"controller.noise.{name}", value=value
-            )
+        if not (is_plausible(value) and value >= LEAST):
+            expected = "expected a number from 1e-12 to 1e12"
+            raise InputError(expected, key=f"controller.noise.{name}", value=value)
     for name, value in table.items():
         _check_setting(name, value, kind)
     numbers = {name: float(value) for name, value in table.items()}
@@ -260,7 +279,9 @@ def _check_setting(name: str, value: Any, kind: str) -> None:
         raise InputError(f"expected {PLAUSIBLE}", key=key, value=value)
     if name in COUNTS and (isinstance(value, float) or value < (0 if name == "modes" else 1)):
         raise InputError("expected a whole number", key=key, value=value)
-    if name != "damping_s" and name not in COUNTS and not value > 0:
-        raise InputError("expected a number above 0", key=key, value=value)
+    if name != "damping_s" and name not in COUNTS and not value >= LEAST:
+        raise InputError("expected a number from 1e-12 to 1e12", key=key, value=value)
+    if name == "rate_Hz" and not value <= MOST_HZ:
+        raise InputError("expected a rate of at most 1e6 Hz", key=key, value=value)
     if name == "damping_s" and value < 0:
         raise InputError("expected a number of 0 or more", key=key, value=value)
