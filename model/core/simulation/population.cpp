@@ -101,7 +101,7 @@ class Worker {
           ready(k, all_.same ? all_.same
                              : std::make_shared<const Model<double>>(std::move(models[k - first])));
       if (!inside_limits(starter, ending)) continue;
-      if (starter.method == "auto")
+      if (starter.method == "auto" || !starter.acting.loads.empty())
         run_alone(starter);
       else
         starters.push_back(std::move(starter));
@@ -158,7 +158,7 @@ class Worker {
       const Motion motion = out.acting.motion(i, all_.times.front());
       out.q[row] = motion.y, out.v[row] = motion.yd;
     }
-    if (all_.method == "auto") choose_method(model, out);
+    if (all_.method == "auto" && out.acting.loads.empty()) choose_method(model, out);
     return out;
   }
 

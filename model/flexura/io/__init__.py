@@ -14,6 +14,7 @@ from .arguments import (
     takes,
     whole,
 )
+from .changes import changed, index_of
 from .files import (
     DRAFT,
     FINISHED,
@@ -66,6 +67,7 @@ __all__ = [
     "array",
     "balance_events",
     "called",
+    "changed",
     "channel",
     "check_format",
     "check_memory",
@@ -77,6 +79,7 @@ __all__ = [
     "finite_arguments",
     "flag",
     "function_of",
+    "index_of",
     "is_name",
     "judged",
     "kind",
