@@ -14,7 +14,6 @@ from .arguments import (
     takes,
     whole,
 )
-from .changes import changed, index_of
 from .files import (
     DRAFT,
     FINISHED,
@@ -45,7 +44,7 @@ from .seal import (
     sealed_parquet,
 )
 from .shipped import find, shipped_files
-from .toml_files import Tables, read_toml, write_toml
+from .toml_files import Tables, changed, index_of, read_toml, write_toml
 from .trust import DOUBTED, REFUSED, balance_events, judged
 from .validation import MOST_LETTERS, explain, is_name
 
