@@ -126,6 +126,9 @@ def index_of(table: list[Any] | tuple[Any, ...], part: str, path: str, value: An
     Raises:
         InputError: there is no such entry.
     """
+    if not table:
+        text = "expected a key that leads somewhere: there are no entries to count here"
+        raise InputError(text, key=path, value=value)
     if not (part.isascii() and part.isdigit() and 1 <= int(part[:9]) <= len(table)):
         raise InputError(
             f"expected a number from 1 to {len(table)}, not {part!r}", key=path, value=value

@@ -198,6 +198,8 @@ def test_a_manoeuvre_file_has_loads(tmp_path):
         ("0.5, {", '"much", {', "load[1].force_N[1]"),
         ('frame = "link"', "frames = 1", "load[1].frames"),
         ("moment_N_m = 0.1", "", "load[2].force_N"),
+        ("0.5, {", "1e15, {", "load[1].force_N[1]"),
+        ("moment_N_m = 0.1", "moment_N_m = -1e15", "load[2].moment_N_m"),
         ("moment_N_m = 0.1", 'moment_N_m = { kind = "steps" }', "load[2].moment_N_m.kind"),
     ],
 )

@@ -132,7 +132,8 @@ def test_a_sampled_drive_keeps_its_ticks():
 WRONG = [
     ({"at_s": 0.0, "mass_kg": 1.0}, "within the run"),
     ({"at_s": 0.1, "mass_kg": 1.0}, "within the run"),
-    ({"at_s": 0.05, "mass_kg": -1.0}, "0 or more in kilograms"),
+    ({"at_s": 0.05, "mass_kg": -1.0}, "in kilograms, 0 or between"),
+    ({"at_s": 0.05, "mass_kg": 1e12}, "in kilograms, 0 or between"),
     ({"at_s": 0.05}, "missing"),
     ({"at_s": 0.05, "mass": 1.0}, "an unknown key"),
     ({"at_s": 0.05, "mass_kg": 1.0, "centre_of_mass_m": 3}, "two numbers in metres"),
