@@ -13,7 +13,7 @@ from flexura.optional import need
 from ..crosscheck import crosscheck as cross
 from ..crosscheck import nine_structures
 from . import tables
-from .options import Force, Json, ManoeuvreFile, Out, Prescribed, Rtol, Start, stem
+from .options import Force, InternalForces, Json, ManoeuvreFile, Out, Prescribed, Rtol, Start, stem
 from .output import (
     check_followed,
     events,
@@ -50,6 +50,7 @@ def crosscheck(
         float | None,
         typer.Option(help="Exudyn's step [s]; default: from the robot's frequencies"),
     ] = None,
+    internal_forces: InternalForces = False,
     force: Force = False,
     json: Json = False,
 ) -> None:
@@ -69,7 +70,8 @@ def crosscheck(
                 key="ROBOT",
                 value=robot and str(robot),
             )
-        for key, given in (("--step-s", step_s), ("MANOEUVRE", manoeuvre)):
+        options = (("--step-s", step_s), ("MANOEUVRE", manoeuvre))
+        for key, given in (*options, ("--internal-forces", internal_forces or None)):
             if given is not None:
                 raise InputError("expected without --all", key=key, value=str(given))
         _crosscheck_all(out, force, json)
@@ -85,6 +87,7 @@ def crosscheck(
                 rtol=rtol,
                 tolerance=tolerance,
                 step_s=step_s,
+                internal_forces=internal_forces,
                 progress=report,
             )
         review = cross.save(check, draft.folder).name

@@ -69,7 +69,7 @@ def simulate(
         list[str] | None,
         typer.Option(
             metavar="KEY=LOW:HIGH:COUNT",
-            help="vary a number of the robot file; several are combined",
+            help="vary a number of the robot file, of a load or of a payload; several are combined",
         ),
     ] = None,
     scheduler: Annotated[
@@ -96,26 +96,33 @@ def simulate(
         )
     if vary:
         refused = (
-            ("--force", force),
-            ("--controller", controller),
-            ("--shaper", shaper),
-            ("--internal-forces", internal_forces),
+            ("--force", force, "a population goes on in its folder; remove that to begin anew"),
+            (
+                "--controller",
+                controller,
+                "a population has Drives alone, no controllers",
+            ),
         )
-        for key, given in refused:
+        for key, given, why in refused:
             if given:
-                raise fx.InputError("expected without --vary", key=key, value=str(given))
+                raise fx.InputError(f"expected without --vary: {why}", key=key, value=str(given))
         _simulate_many(
             robot,
             manoeuvre,
             prescribed,
             start,
+            shaper,
             vary,
             out,
-            rtol,
-            method,
             scheduler,
             json,
-            {"max_steps": max_steps, "wall_time": wall_time},
+            {
+                "rtol": rtol,
+                "method": method,
+                "internal_forces": internal_forces,
+                "max_steps": max_steps,
+                "wall_time": wall_time,
+            },
         )
         return
     if controller and prescribed:
@@ -159,32 +166,32 @@ def _simulate_many(
     manoeuvre: Path | None,
     prescribed: bool,
     start: str | None,
+    shaper: Path | None,
     vary: list[str],
     out: Path | None,
-    rtol: float,
-    method: str,
     scheduler: str | None,
     json: bool,
-    budget: dict[str, Any],
+    options: dict[str, Any],
 ) -> None:
     parameter_sweep.ranges(vary)  # the count is refused before anything is computed
     system, asked = load_request(robot, manoeuvre, prescribed, start)
     check_followed(asked, manoeuvre, "call with --prescribed")
-    asked.refuse_loads("a population")
-    batch, chosen = parameter_sweep.grid(system.robot, vary)
+    if shaper is not None:
+        asked = shaped(asked, read_shaper(shaper))
+    batch, chosen = parameter_sweep.grid(system.robot, vary, asked, str(robot))
     folder = continued(out, "population", robot.stem, *stem(manoeuvre), mark="population.json")
     with progress_bars("robots") as report:
         done = fx.simulate(
             batch,
             asked.t,
             asked.drive,
-            rtol=rtol,
-            method=method,
             start=asked.start,
+            loads=asked.loads,
+            payloads=asked.payloads,
             folder=folder,
             scheduler=scheduler,
             progress=lambda f: report("robots", f),
-            **budget,
+            **options,
         )
     if not done.complete:
         warn(

@@ -167,7 +167,7 @@ def tune(
         described, outputs = with_nominal_drives(described, rigs.load(rig))
         given = Gains(given.settings, outputs, given.file)
     asked = fx.load_manoeuvre(manoeuvre, len(described.links))
-    asked.refuse_loads("flexura tune")
+    asked.refuse_payloads("a controller's memory would begin anew at the impact")
     if free_file:
         free_gains = freedom.read(free_file)
     elif free:

@@ -11,8 +11,9 @@ from flexura import twin
 from flexura.signals import Manoeuvre
 
 from ..review import write_review
-from ..runs.deviation import Deviation, deviations
+from ..runs.deviation import Deviation
 from . import step_error
+from .rows import rows
 
 TOLERANCE = 0.01  # of a channel's largest magnitude
 STILL = 1e-9  # m or rad: a deviation below counts as none, the channel does not move
@@ -75,11 +76,13 @@ def crosscheck(
     tolerance: float = TOLERANCE,
     step_s: float | None = None,
     own_error: bool = True,
+    internal_forces: bool = False,
     progress: Progress | None = None,
 ) -> Check:
     """Simulate a robot natively and in Exudyn along the same manoeuvre, and compare.
 
-    The table's channels: joint positions, tip deflections, the tip's position.
+    The table's channels: joint positions, tip deflections, the tip's position, sensors, and
+    internal forces if asked for.
 
     Args:
         robot: the robot of both.
@@ -90,6 +93,7 @@ def crosscheck(
         step_s: Exudyn's step [s]; None: chosen from the robot, and shortened if its own error
             leaves the verdict open.
         own_error: estimate the twin's own error, by one more run of the twin or a few.
+        internal_forces: compare reactions, and forces along the flexible links, too.
         progress: called with "native" or "twin" and the finished fraction.
     """
     report = progress or (lambda name, fraction: None)
@@ -101,6 +105,7 @@ def crosscheck(
         start=manoeuvre.start,
         loads=manoeuvre.loads,
         payloads=manoeuvre.payloads,
+        internal_forces=internal_forces,
         progress=lambda f: report("native", f),
     )
     report("native", 1.0)
@@ -115,6 +120,7 @@ def crosscheck(
             payloads=manoeuvre.payloads,
             beam=beam,
             step_s=step,
+            internal_forces=internal_forces,
             progress=lambda f: report("twin", begin + part * f),
         )
 
@@ -127,7 +133,7 @@ def crosscheck(
     report("twin", 1.0)
     for run in (native, other):
         run.meta["manoeuvre"] = manoeuvre.name
-    return Check(native, other, deviations(native, other), tolerance, errors)
+    return Check(native, other, rows(native, other), tolerance, errors)
 
 
 def save(check: Check, folder: Path) -> Path:

@@ -13,7 +13,7 @@ import numpy as np
 
 import flexura as fx
 
-from ..runs.deviation import deviation, deviations
+from .rows import rows, values
 
 ORDER = 2
 PART = 0.25  # of the tolerance: how small a refined step makes the twin's own error
@@ -75,8 +75,8 @@ def estimate(native: fx.Run, fine: fx.Run, coarse: fx.Run) -> dict[str, float]:
     """The error of the finer run by channel, relative to the native run's largest magnitude."""
     weight = 1 / ((_step(coarse) / _step(fine)) ** ORDER - 1)
     errors = {}
-    for row in deviations(native, fine):
-        _, change = deviation(fine, coarse, row.channel)
+    for row in rows(native, fine):
+        change = values(fine, coarse, row.channel)
         size = float(np.abs(change).max(initial=0.0))
         errors[row.channel] = weight * size / row.peak if row.peak > 0 else 0.0
     return errors
@@ -86,7 +86,7 @@ def _undecided(
     native: fx.Run, fine: fx.Run, errors: dict[str, float], tolerance: float
 ) -> list[float]:
     """The twin's own errors of channels that deviate by more than the tolerance."""
-    return [errors[row.channel] for row in deviations(native, fine) if row.max_relative > tolerance]
+    return [errors[row.channel] for row in rows(native, fine) if row.max_relative > tolerance]
 
 
 def _other(twin: fx.Run, simulated: Callable[[float], fx.Run]) -> fx.Run | None:

@@ -115,7 +115,8 @@ def inverse(
         InputError: a joint has no motion.
     """
     asked = manoeuvre or setup.manoeuvre
-    asked.refuse_loads("the bench")
+    asked.refuse_loads("a rig has nothing that pushes its links")
+    asked.refuse_payloads("a rig has nothing that takes up a payload or lets it go")
     motions = []
     for number, joint in enumerate(asked.drive.joints, 1):
         if joint.motion is None:

@@ -1,5 +1,5 @@
-"""`flexura simulate --vary KEY=LOW:HIGH:COUNT`: a robot file with some of its numbers varied, as
-one population."""
+"""`flexura simulate --vary KEY=LOW:HIGH:COUNT`: a robot file, and the loads and payloads of a
+manoeuvre file, with some of their numbers varied, as one population."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 import flexura as fx
+from flexura.signals import Acting, acts
 
 from ..runs.formatting import number
 from ..runs.table import Table
@@ -47,14 +48,23 @@ def ranges(texts: Sequence[str]) -> dict[str, tuple[float, float, int]]:
     return found
 
 
-def grid(robot: fx.Robot, texts: Sequence[str]) -> tuple[fx.Batch, dict[str, np.ndarray]]:
-    """The robots at every combination of the values of KEY=LOW:HIGH:COUNT, and these values (B,) by
-    key. Raises InputError for a wrong text or key."""
+def grid(
+    robot: fx.Robot, texts: Sequence[str], asked: fx.Manoeuvre, file: str = ""
+) -> tuple[fx.Batch, dict[str, np.ndarray]]:
+    """The robots and loads at every combination of the values of KEY=LOW:HIGH:COUNT, and these
+    values (B,) by key. Raises InputError for a wrong text, key or value; it names the robot's
+    `file`, or the manoeuvre's."""
     columns = {key: np.linspace(*values) for key, values in ranges(texts).items()}
     every = np.array(list(product(*columns.values())), dtype=float)
     chosen = {key: every[:, k] for k, key in enumerate(columns)}
+    acting = Acting(asked.loads, asked.payloads)
     for key, values in columns.items():
-        robot.replace({key: float(values[0])})
+        for value in (values[0], values[-1]):
+            of, at = (acting.varied, asked.file) if acts(key) else (robot.replace, file)
+            try:
+                of({key: float(value)})
+            except fx.InputError as error:
+                raise error.in_file(at) from None
     return fx.Batch.vary(robot, chosen), chosen
 
 

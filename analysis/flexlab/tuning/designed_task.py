@@ -85,7 +85,9 @@ class DesignedTask(Task):
         refs = references(system, asked)
         try:
             law = tuned.sampled(self.robots[0], refs)
-            run = fx.simulate(system, asked.t, law, rtol=self.rtol)
+            run = fx.simulate(
+                system, asked.t, law, rtol=self.rtol, start=asked.start, loads=asked.loads
+            )
         except (InputError, fx.NumericalError):
             return nothing, 0.0
         if not run.complete:

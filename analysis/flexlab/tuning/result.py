@@ -87,15 +87,16 @@ def simulate_tuned(
     nominal: fx.Robot | None = None,
 ) -> tuple[fx.Run, StepResponse]:
     """A run under gains, or under the design for the nominal robot, and its figures."""
+    acts: dict[str, Any] = {"start": asked.start, "loads": asked.loads}
     if isinstance(gains, Designed):
         refs = references(system, asked)
         law = gains.sampled(system.robot if nominal is None else nominal, refs)
-        run = with_references(fx.simulate(system, asked.t, law, rtol=RTOL), refs)
+        run = with_references(fx.simulate(system, asked.t, law, rtol=RTOL, **acts), refs)
         run.meta["manoeuvre"] = asked.name
         r = [run[f"joint/{i}/reference"] for i in range(1, len(refs) + 1)]
         return run, step_response(run, r, gains.limits(len(refs)), settled)
     controller = closed_loop_controller(system, asked, gains)
-    run = fx.simulate(system, asked.t, controller, rtol=RTOL)
+    run = fx.simulate(system, asked.t, controller, rtol=RTOL, **acts)
     run.meta["manoeuvre"] = asked.name
     return run, metrics(run, controller, settled)
 

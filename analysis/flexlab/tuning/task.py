@@ -134,7 +134,15 @@ class Task:
         m = self.manoeuvre
         both = zip(self.systems, self.controllers, strict=True)
         return [
-            prepare_gain_sweep(system, controller, m.duration_s, m.output_step_s, self.rtol)
+            prepare_gain_sweep(
+                system,
+                controller,
+                m.duration_s,
+                m.output_step_s,
+                self.rtol,
+                start=m.start,
+                loads=m.loads,
+            )
             for system, controller in both
         ]
 

@@ -5,6 +5,7 @@
 
 #include "control/board_pulses.hpp"
 #include "mechanics.hpp"
+#include "packed.hpp"
 #include "simulation/gain_sweep.hpp"
 
 namespace flexura {
@@ -168,7 +169,7 @@ std::unique_ptr<GainSweep> trials_of(const Mechanics &mechanics, const Controlle
                                      const Matrix &segments, const Counts &index,
                                      const Matrix &gains, const Matrix &limits, const Vector &t,
                                      const Vector &q, const Matrix &references, double rtol,
-                                     const std::string &method) {
+                                     const std::string &method, const nb::object &loads) {
   check_state(controller, q);
   expect(t.shape(0) > 1 && references.shape(0) == std::size_t(controller.count()) &&
              references.shape(1) == t.shape(0),
@@ -181,6 +182,7 @@ std::unique_ptr<GainSweep> trials_of(const Mechanics &mechanics, const Controlle
             numbers(references),
             rtol,
             method};
+  add_loads(plan.acting, loads);
   nb::gil_scoped_release release;
   return std::make_unique<GainSweep>(std::move(plan));
 }
@@ -271,7 +273,7 @@ void bind_control(nb::module_ &module) {
   nb::class_<GainSweep>(module, "GainSweep",
                         "One robot under many controllers; may be called from several threads.")
       .def(nb::new_(&trials_of), "mechanics"_a, "controller"_a, "segments"_a, "index"_a, "gains"_a,
-           "limits"_a, "t"_a, "q"_a, "references"_a, "rtol"_a, "method"_a)
+           "limits"_a, "t"_a, "q"_a, "references"_a, "rtol"_a, "method"_a, "loads"_a = nb::none())
       .def("run", &run, "prices"_a, "gains"_a, "limits"_a, "threads"_a)
       .def_prop_ro("method", [](const GainSweep &self) { return self.plan().method; });
   module.def("board_pulses", &board_pulses_of, "settings"_a, "open_loop"_a, "period_log2"_a,

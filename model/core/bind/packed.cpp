@@ -49,7 +49,11 @@ std::vector<LoadPlace> load_places_of(const Matrix &rows, int links) {
   return out;
 }
 
-void add_loads(Inputs &acting, const Matrix &rows, const Ranges &ranges, const Matrix &segments) {
+void add_loads(Inputs &acting, const nb::object &loads) {
+  if (loads.is_none()) return;
+  const nb::tuple parts = nb::cast<nb::tuple>(loads);
+  const Matrix rows = nb::cast<Matrix>(parts[0]), segments = nb::cast<Matrix>(parts[2]);
+  const Ranges ranges = nb::cast<Ranges>(parts[1]);
   const std::vector<LoadPlace> places = load_places_of(rows, int(acting.joints.size()));
   if (ranges.shape(0) != places.size() || ranges.shape(1) != 6 || segments.shape(1) != 10)
     throw std::invalid_argument("loads of another shape were expected");

@@ -17,9 +17,9 @@ Inputs acting_of(const Matrix &segments, const Ranges &ranges, const Matrix &gai
 // axes.
 std::vector<LoadPlace> load_places_of(const Matrix &rows, int links);
 
-// Adds the loads of such rows, with the ranges (L, 6) of their signals: force from, to twice,
-// moment from, to.
-void add_loads(Inputs &acting, const Matrix &rows, const Ranges &ranges, const Matrix &segments);
+// Adds loads (rows, ranges, segments), or none for None: such rows, the ranges (L, 6) of their
+// signals (force from, to twice, moment from, to), and the segments of these.
+void add_loads(Inputs &acting, const nb::object &loads);
 
 // What acts besides in the joints of a robot whose joints have the rows `first`: contacts behind
 // backlash. segments: of their motions; rows (contacts, 6): joint (from 0), motion from, to, play,

@@ -26,8 +26,11 @@ struct Watch {
 struct PackedDrive {
   Inputs acting;
   PackedDrive(const Matrix &segments, const Ranges &ranges, const Matrix &gains,
-              const Flags &prescribed, const Flags &sampled, const Matrix &limits)
-      : acting(acting_of(segments, ranges, gains, prescribed, sampled, limits)) {}
+              const Flags &prescribed, const Flags &sampled, const Matrix &limits,
+              const nb::object &loads)
+      : acting(acting_of(segments, ranges, gains, prescribed, sampled, limits)) {
+    add_loads(acting, loads);
+  }
 };
 
 Channel::Of kind_of(const std::string &name) {
@@ -115,8 +118,9 @@ void bind_population(nb::module_ &module) {
           "done", [](const Watch &self) { return self.done.load(); }, "How many robots are done.");
   nb::class_<PackedDrive>(module, "Drive", "What acts on robots that share it.")
       .def(nb::init<const Matrix &, const Ranges &, const Matrix &, const Flags &, const Flags &,
-                    const Matrix &>(),
-           "segments"_a, "ranges"_a, "gains"_a, "prescribed"_a, "sampled"_a, "limits"_a);
+                    const Matrix &, const nb::object &>(),
+           "segments"_a, "ranges"_a, "gains"_a, "prescribed"_a, "sampled"_a, "limits"_a,
+           "loads"_a = nb::none());
   module.def("population", &run_population, "counts"_a, "numbers"_a, "material"_a, "lumps"_a,
              "gravity"_a, "payload"_a, "limits"_a, "drives"_a, "drive_of"_a, "t"_a, "q"_a, "v"_a,
              "rtol"_a, "method"_a, "numerical_damping"_a, "most_steps"_a, "channels"_a,

@@ -103,11 +103,7 @@ struct Running {
         ranges.shape(0) != robot.model->first.size())
       throw std::invalid_argument("a run of another robot was expected");
     Inputs acting = acting_of(segments, ranges, gains, prescribed, sampled, limits);
-    if (!loads.is_none()) {
-      const nb::tuple parts = nb::cast<nb::tuple>(loads);
-      add_loads(acting, nb::cast<Matrix>(parts[0]), nb::cast<Ranges>(parts[1]),
-                nb::cast<Matrix>(parts[2]));
-    }
+    add_loads(acting, loads);
     if (nb::isinstance<nb::tuple>(function)) {  // of contacts: as backlash_of takes them
       const nb::tuple parts = nb::cast<nb::tuple>(function);
       acting.function =

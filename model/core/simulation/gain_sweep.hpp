@@ -24,7 +24,7 @@ struct Prices {
 // What all rows have in common.
 struct Plan {
   std::shared_ptr<const Model<double>> robot;
-  Inputs acting;  // drives of joints that are not the controller's, limits
+  Inputs acting;  // drives of joints that are not the controller's, loads on links, limits
   Controller controller;
   std::vector<double> t;          // of the samples, from the start to the end, on ticks
   std::vector<double> start;      // (n) at rest

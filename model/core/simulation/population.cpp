@@ -99,7 +99,7 @@ class Worker {
       }
       Starter starter = ready(k, std::move(models[k - first]));
       if (!inside_limits(starter, ending)) continue;
-      if (starter.method == "auto")
+      if (starter.method == "auto" || !starter.acting.loads.empty())
         run_alone(starter);
       else
         starters.push_back(std::move(starter));
@@ -143,7 +143,7 @@ class Worker {
       const Motion motion = out.acting.motion(i, all_.times.front());
       out.q[row] = motion.y, out.v[row] = motion.yd;
     }
-    if (all_.method == "auto") choose_method(model, out);
+    if (all_.method == "auto" && out.acting.loads.empty()) choose_method(model, out);
     out.shared = std::make_shared<const Model<double>>(std::move(model));
     return out;
   }

@@ -3,7 +3,7 @@
 //
 // Four robots are assembled together, put into packs, run, and observed; of one that differs in its
 // kind of equations (another number of shapes, prescribed joints) a pack is made of its own. A
-// robot's digits depend on nothing but itself.
+// robot with loads on its links runs alone. A robot's digits depend on nothing but itself.
 #pragma once
 #include <atomic>
 #include <string>
@@ -24,7 +24,7 @@ struct Channel {
 struct Population {
   Table robots;
   const double *limits = nullptr;  // (robots, links, 2), the ends of links that slide included
-  std::vector<Inputs> drives;      // limits apart; neither functions nor samplers
+  std::vector<Inputs> drives;      // and loads on links, limits apart; no functions nor samplers
   std::vector<int> drive_of;       // (robots): index of the drive
   std::vector<double> times;       // of the outputs; the first is the start
   std::vector<double> q;  // (n) at the start, the same for all, or (robots, n); empty: each

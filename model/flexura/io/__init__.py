@@ -46,7 +46,7 @@ from .seal import (
     sealed_parquet,
 )
 from .shipped import find, shipped_files
-from .toml_files import Tables, read_toml, write_toml
+from .toml_files import Tables, changed, index_of, read_toml, write_toml
 from .trust import DOUBTED, REFUSED, balance_events, judged
 from .validation import MOST_LETTERS, explain, is_name
 
@@ -69,6 +69,7 @@ __all__ = [
     "array",
     "balance_events",
     "called",
+    "changed",
     "channel",
     "check_format",
     "check_memory",
@@ -80,6 +81,7 @@ __all__ = [
     "finite_arguments",
     "flag",
     "function_of",
+    "index_of",
     "is_name",
     "judged",
     "kind",

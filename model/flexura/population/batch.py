@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Sized
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import islice
 from typing import Any
@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from ..errors import InputError
 from ..io import array, whole
 from ..robot import Robot, robot_of
-from ..signals import Drive
+from ..signals import Drive, acts
 from ..system import RobotLike
 from .rows import Rows, good, joined, one, varied
 
@@ -28,13 +28,14 @@ class Share:
     """Some robots of a batch in their order; `first` is the number of the first, from 0.
 
     `groups`: the numbers, from 0 within the share, of robots that have the same counts, and their
-    rows.
+    rows. `acting`: what is varied of loads and payloads, by key.
     """
 
     first: int
     robots: Sequence[Robot]
     drives: Sequence[Drive | None]
     groups: list[tuple[np.ndarray, Rows]]
+    acting: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.drives)
@@ -43,11 +44,16 @@ class Share:
     def digests(self) -> list[bytes]:
         """16 bytes a robot that tell it and its drive from any other."""
         out = [b""] * len(self)
-        exact = self.robots[0].stiffening
+        alike = self.robots[0] if isinstance(self.robots, _Varied) else None
         for members, rows in self.groups:
             for j, k in enumerate(members):
-                out[k] = _digest(rows, j, exact, self.drives[k])
+                robot, own = alike or self.robots[k], list(self.values(k).values())
+                out[k] = _digest(rows, j, robot, self.drives[k], own)
         return out
+
+    def values(self, k: int) -> dict[str, float]:
+        """What is varied of the loads and payloads of robot k, from 0 within the share, by key."""
+        return {key: float(column[k]) for key, column in self.acting.items()}
 
 
 @dataclass(frozen=True)
@@ -105,7 +111,9 @@ class Batch:
         Args:
             robot: a Robot, or the path or name of a robot file.
             changes: arrays of values (B,), all of one length, by keys as in `Robot.replace`:
-                {"payload.mass_kg": (B,)}.
+                {"payload.mass_kg": (B,)}; and of the loads and changes of the payload that
+                `simulate` is given, counted from 1: {"load.1.force_N.2": (B,), "payload.1.at_s":
+                (B,)}.
 
         Returns:
             A Batch of B robots.
@@ -161,12 +169,6 @@ class Batch:
                     key=f"robots[{k + 1}]",
                     value=shape,
                 )
-            if robot.nodal:
-                raise InputError(
-                    'expected "continuous" in a batch',
-                    key=f"robots[{k + 1}].sliding",
-                    value="nodal",
-                )
             yield robot, drive
         if k + 1 < self.count:
             raise InputError(
@@ -183,20 +185,24 @@ class Batch:
             The shares, in the order of the robots.
         """
         source = self.source
+        loaded = {key: values for key, values in self.varied.items() if acts(key)}
+        own = lambda k: {key: values[k : k + size] for key, values in loaded.items()}
         if isinstance(source, _Varied) and source.quick:
             for k in range(0, self.count, size):
                 part = _Varied(
                     source.robot,
                     {key: values[k : k + size] for key, values in source.columns.items()},
                 )
-                rows = varied(part.robot, part.columns)
+                rows = varied(part.robot, part.of_robot, len(part))
                 assert rows is not None
-                yield Share(k, part, [None] * len(part), [(np.arange(len(part)), rows)])
+                groups = [(np.arange(len(part)), rows)]
+                yield Share(k, part, [None] * len(part), groups, own(k))
             return
         items, first = iter(self), 0
         while some := list(islice(items, size)):
             robots = [robot for robot, _ in some]
-            yield Share(first, robots, [drive for _, drive in some], _grouped(robots))
+            drives = [drive for _, drive in some]
+            yield Share(first, robots, drives, _grouped(robots), own(first))
             first += len(some)
 
     def _given(self) -> Iterator[Any]:
@@ -229,31 +235,43 @@ class _Varied(Sequence[Robot]):
     def __getitem__(self, k: Any) -> Any:
         if not -len(self) <= k < len(self):
             raise IndexError(k)
-        return self.robot.replace({key: float(values[k]) for key, values in self.columns.items()})
+        return self.robot.replace({key: float(values[k]) for key, values in self.of_robot.items()})
+
+    @cached_property
+    def of_robot(self) -> dict[str, np.ndarray]:
+        """The columns of the robot's own numbers; the others are of loads and payloads."""
+        return {key: values for key, values in self.columns.items() if not acts(key)}
 
     @cached_property
     def quick(self) -> bool:
         """Whether rows of numbers can be made without the robots."""
-        some = {key: values[:1] for key, values in self.columns.items()}
-        plain = not self.robot.nodal and good(self.robot, self.columns)
-        return plain and varied(self.robot, some) is not None
+        some = {key: values[:1] for key, values in self.of_robot.items()}
+        plain = not self.robot.nodal and good(self.robot, self.of_robot)
+        return plain and varied(self.robot, some, 1) is not None
 
 
 def topology(robot: Robot) -> tuple[Any, ...]:
     """What robots of one batch share: a tuple (joint type, elements, modes, locked) a link, and
-    whether links stiffen."""
-    return robot.stiffening, *(
-        (k.joint.type, k.elements, k.modes, k.joint.locked) for k in robot.links
+    whether links stiffen and slide node by node."""
+    return (
+        robot.stiffening,
+        robot.nodal,
+        *((k.joint.type, k.elements, k.modes, k.joint.locked) for k in robot.links),
     )
 
 
 def digest(robot: Robot, drive: Drive | None) -> bytes:
     """16 bytes that tell this robot and drive from any other: of all numbers, to the last bit."""
-    return _digest(one(robot), 0, robot.stiffening, drive)
+    return _digest(one(robot), 0, robot, drive)
 
 
-def _digest(rows: Rows, k: int, stiffening: bool, drive: Drive | None) -> bytes:
-    found = hashlib.blake2b(rows.contents(k) + bytes([stiffening]), digest_size=16)
+def _digest(
+    rows: Rows, k: int, robot: Robot, drive: Drive | None, acting: Sequence[float] = ()
+) -> bytes:
+    kind = bytes([robot.stiffening + 2 * robot.nodal])
+    sensors = repr([link.sensor for link in robot.links if link.sensor]).encode()
+    own = kind + sensors + np.array(acting, dtype=float).tobytes()
+    found = hashlib.blake2b(rows.contents(k) + own, digest_size=16)
     if drive is not None:
         segments, ranges, gains = drive.packed()
         for array in (segments, ranges, gains, drive.follows):

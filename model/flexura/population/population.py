@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
 from threading import Timer
@@ -20,15 +20,14 @@ from numpy.typing import ArrayLike
 
 from .. import core
 from ..errors import InputError
-from ..io import Run, check_memory, check_progress, summary, whole
+from ..io import Run, Tables, check_memory, check_progress, summary, whole
 from ..optional import Optional
 from ..robot import Robot
-from ..signals import Drive
+from ..signals import Drive, LoadsLike, PayloadsLike, acts
 from ..simulation.problem import Budget
-from ..simulation.recorder import channel_units
 from . import dask_cluster, worker
 from .batch import Batch, Share
-from .request import Request
+from .request import Request, units_of
 from .results import one_run, tabulated
 from .store import MANIFEST, Chunk, Store, in_memory, manifest
 
@@ -48,7 +47,7 @@ class Population:
     robot that cannot be assembled or starts outside its limits). A robot's values are NaN from
     where it stopped. Of an interrupted population only the robots that are done have rows:
     `population.robots`, counted from 0. `base`: the robot that `Batch.vary` began with; None for
-    other batches.
+    other batches. `acting`: tables of the loads and changes of the payload, if there were any.
     """
 
     t: np.ndarray
@@ -57,6 +56,7 @@ class Population:
     complete: bool
     store: Store
     base: Robot | None = None
+    acting: Mapping[str, list[Tables]] = field(default_factory=dict)
 
     @staticmethod
     def read(folder: str | Path) -> Population:
@@ -76,12 +76,14 @@ class Population:
             base = None if begun.get("base") is None else Robot.from_dict(begun["base"])
             t, count = np.array(begun["t_s"], dtype=float), int(begun["count"])
             units = {str(name): str(unit) for name, unit in begun.get("units", {}).items()}
+            acting = begun.get("acting") or {}
+            acting = {name: acting[name] for name in ("loads", "payloads") if name in acting}
         except (ValueError, TypeError, AttributeError) as error:
             raise InputError(
                 f"not the request of a population ({error})", file=str(Path(folder) / MANIFEST)
             ) from None
         store = Store(Path(folder))
-        return Population(t, units, count, store.rows() == count, store, base)
+        return Population(t, units, count, store.rows() == count, store, base, acting)
 
     def __iter__(self) -> Iterator[Chunk]:
         """The chunks that are done, in order, one in memory at a time."""
@@ -187,6 +189,9 @@ def simulate(
     scheduler: str | None = None,
     max_steps: int | None = None,
     wall_time: float | None = None,
+    loads: LoadsLike = None,
+    payloads: PayloadsLike = None,
+    internal_forces: bool = False,
 ) -> Population:
     """Simulate every robot of a batch as `flexura.simulate` does one, to the last bit.
 
@@ -214,6 +219,10 @@ def simulate(
         max_steps: the budget of each robot, as in `flexura.simulate`.
         wall_time: seconds after which the population is stopped; it then has the chunks that are
             done.
+        loads: as in `flexura.simulate`; `Batch.vary` varies their numbers.
+        payloads: as in `flexura.simulate`; `Batch.vary` varies their numbers.
+        internal_forces: all channels of internal forces are kept too. Some of them, and sensors,
+            are named in `channels`.
 
     Returns:
         The Population.
@@ -222,8 +231,22 @@ def simulate(
         InputError: an argument is not what is expected, or does not fit into memory.
     """
     request = Request.checked(
-        t_eval, drive, q0, qd0, rtol, method, start, numerical_damping, channels, reduce, max_steps
+        t_eval,
+        drive,
+        q0,
+        qd0,
+        rtol,
+        method,
+        start,
+        numerical_damping,
+        channels,
+        reduce,
+        max_steps,
+        loads,
+        payloads,
+        internal_forces,
     )
+    _check_varied(batch, request)
     late = time.perf_counter() + Budget.checked(None, wall_time).wall_s
     for key, value in (("chunk", chunk), ("threads", 1 if threads is None else threads)):
         whole(value, key, 1)
@@ -242,7 +265,7 @@ def simulate(
         units = (
             {}
             if request.reduce
-            else {k: v for k, v in channel_units(example).items() if k in request.channels}
+            else {k: v for k, v in units_of(example).items() if k in request.channels}
         )
         store = (
             in_memory()
@@ -269,7 +292,16 @@ def simulate(
         complete = done == batch.count
     except KeyboardInterrupt:
         pass
-    return Population(request.t, units, batch.count, complete, store, batch.base)
+    acting = request.acting.spec()
+    return Population(request.t, units, batch.count, complete, store, batch.base, acting)
+
+
+def _check_varied(batch: Batch, request: Request) -> None:
+    """Raises InputError for a key of loads and payloads that leads nowhere, and for a value that is
+    wrong at an end of its range."""
+    for key, values in batch.varied.items():
+        for end in (values.min(), values.max()) if acts(key) else ():
+            request.acting.varied({key: float(end)})
 
 
 def _contents(batch: Batch, chunk: int, units: Mapping[str, str]) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import hashlib
 import pickle
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -20,16 +20,17 @@ from .. import core
 from ..errors import InputError
 from ..io import Tables, array, choice, flag, function_of
 from ..robot import Robot
-from ..signals import STARTS, Drive
+from ..signals import STARTS, Acting, Drive, LoadsLike, PayloadsLike
+from ..simulation.internal_forces import force_units
 from ..simulation.problem import MOST_STEPS, Budget, check_request
-from ..simulation.recorder import channel_units
+from ..simulation.recorder import channel_units, sensor_units
 from ..system.structure import structure
 
 
 @dataclass(frozen=True)
 class Request:
-    """Times (T,) [s], the shared drive and start, tolerance and method, and what is kept: channels,
-    or a function of them."""
+    """Times (T,) [s], the shared drive and start, what acts, tolerance and method, what is kept:
+    channels, those of the internal forces too, or a function of them."""
 
     t: np.ndarray
     drive: Drive | None
@@ -42,6 +43,8 @@ class Request:
     channels: tuple[str, ...]
     reduce: Callable[[np.ndarray, dict[str, np.ndarray]], Any] | None
     max_steps: int = MOST_STEPS
+    acting: Acting = field(default_factory=Acting)
+    internal_forces: bool = False
 
     @staticmethod
     def checked(
@@ -56,6 +59,9 @@ class Request:
         channels: Sequence[str] | None,
         reduce: Any,
         max_steps: int | None = None,
+        loads: LoadsLike = None,
+        payloads: PayloadsLike = None,
+        internal_forces: bool = False,
     ) -> Request:
         """A request whose arguments are good as far as that can be told without a robot. Raises
         InputError."""
@@ -91,12 +97,14 @@ class Request:
             tuple(channels or ()),
             reduce,
             Budget.checked(max_steps, None).steps,
+            Acting.of(loads, payloads, float(t[0]), float(t[-1])),
+            flag(internal_forces, "internal_forces"),
         )
 
     def fitted(self, robot: Robot) -> Request:
         """The request for robots like this one: with the default channels, and its names and shapes
         checked."""
-        known, links = channel_units(robot), robot.links
+        known, links = units_of(robot), robot.links
         default = [f"joint/{i}/position" for i in range(1, len(links) + 1)]
         default += [f"link/{i}/tip_deflection" for i, link in enumerate(links, 1) if link.flexible]
         for name in self.channels:
@@ -104,6 +112,10 @@ class Request:
                 raise InputError(f"expected one of {', '.join(known)}", key="channels", value=name)
         if self.drive is not None:
             check_drive(self.drive, len(links), "drive")
+        for i, load in enumerate(self.acting.loads, 1):
+            if load.link > len(links):
+                expected = f"expected a link from 1 to {len(links)}"
+                raise InputError(expected, key=f"load[{i}].link", value=load.link)
         for key, value in (("q0", self.q0), ("qd0", self.qd0)):
             n = 0 if value is None else structure(robot).n
             if value is not None and (value.shape != (n,) or not np.isfinite(value).all()):
@@ -112,7 +124,9 @@ class Request:
                     key=key,
                     value=value,
                 )
-        return replace(self, channels=self.channels or tuple(default))
+        asked = dict.fromkeys(self.channels or default)
+        asked |= dict.fromkeys(force_units(robot) if self.internal_forces else ())
+        return replace(self, channels=tuple(asked))
 
     def reduced(self, channels: dict[str, np.ndarray], robot: int) -> Tables:
         """The numbers that `reduce` makes of a robot's channels. Raises InputError for anything
@@ -134,6 +148,7 @@ class Request:
             "program": program(),
             "t_s": self.t.tolist(),
             "drive": None if self.drive is None else [joint.spec() for joint in self.drive.joints],
+            "acting": self.acting.spec() | {"digest": self.acting.digest} if self.acting else None,
             "q0": start[0],
             "qd0": start[1],
             "rtol": self.rtol,
@@ -144,6 +159,13 @@ class Request:
             "max_steps": self.max_steps,
             "reduce": None if self.reduce is None else identity(self.reduce),
         }
+
+
+def units_of(robot: Robot) -> dict[str, str]:
+    """The channels that the robots of a population have, and their units: those of one run with its
+    sensors and internal forces."""
+    forces = {} if robot.nodal else force_units(robot)
+    return channel_units(robot) | sensor_units(robot) | forces
 
 
 def check_drive(drive: Drive, joints: int, key: str) -> None:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from ..errors import InputError
-from ..io import Run
+from ..io import Run, Tables, changed
+from ..signals import acts
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -31,6 +32,10 @@ class Simulated(Protocol):
     @property
     def count(self) -> int:
         """Of robots."""
+
+    @property
+    def acting(self) -> Mapping[str, list[Tables]]:
+        """Tables of loads and changes of the payload."""
 
     @property
     def base(self) -> Robot | None:
@@ -102,8 +107,11 @@ def _run(population: Simulated, chunk: Chunk, k: int) -> Run:
         if event
         else [],
     }
+    tables = {name.removesuffix("s"): each for name, each in population.acting.items()}
+    acting = changed(tables, {key: value for key, value in values.items() if acts(key)})
+    meta |= {f"{name}s": each for name, each in acting.items()}
     if population.base is not None:
-        described = population.base.replace(values)
+        described = population.base.replace({k: v for k, v in values.items() if not acts(k)})
         meta |= {"name": described.name, "robot": described.to_dict()}
     return Run(
         population.t[:end],

@@ -123,14 +123,13 @@ def joined(parts: Sequence[Rows]) -> Rows:
     )
 
 
-def varied(robot: Robot, columns: Mapping[str, np.ndarray]) -> Rows | None:
+def varied(robot: Robot, columns: Mapping[str, np.ndarray], B: int) -> Rows | None:
     """The rows of `robot.replace({key: value})` along columns (B,), to the last bit, without making
     the robots.
 
     None: a key is not one that maps to numbers by itself. The values are taken as good (`good`).
     """
     base = one(robot)
-    B = len(next(iter(columns.values())))
     again = lambda a: np.repeat(a, B, axis=0)
     out = Rows(
         base.counts,

@@ -13,16 +13,23 @@ from .. import core
 from ..errors import InputError
 from ..io import STATIONS, balance_events
 from ..robot import Robot
-from ..signals import Drive
+from ..signals import Drive, Loads, as_loads
 from ..simulation.dynamics import simulate
+from ..simulation.internal_forces import force_units
 from ..simulation.recorder import LIMITS, LOSS, NUMERICAL, WORK, limit_event, recorded_channels
-from ..simulation.start import NO_START, apply_prescribed_motions, limit_error
+from ..simulation.start import (
+    NO_START,
+    apply_prescribed_motions,
+    consistent_start,
+    limit_error,
+)
 from ..system import NoEquilibrium, System, equilibrium
 from .batch import Share
 from .request import Request, check_drive
 from .rows import ELEMENTS, START, Rows
 from .store import Chunk
 
+SILENT = ("still", "node", "payload")  # events that are no fault of a robot
 WORDS = ("done", "limit", "stuck", "refused", "unbalanced")
 
 
@@ -75,16 +82,38 @@ def simulated(request: Request, share: Share, threads: int, watch: Any) -> Part:
         [""] * b,
         {name: np.full((b, T), np.nan) for name in request.channels},
     )
-    columns = _columns(share.robots[0], request.channels)
-    if columns is None or not share.robots[0].stiffening:
-        _one_by_one(request, share, watch, part)
+    first, columns = share.robots[0], _columns(share.robots[0], request.channels)
+    dense = not first.stiffening or first.nodal
+    if columns is None or dense or request.acting.payloads:
+        _one_by_one(request, share, threads, watch, part)
         return part
+    loads = _loads(request, share, part)
     for members, rows in share.groups:
-        for some, q0 in _starts(request, share, members, rows, threads, part):
+        good = np.array([j for j, k in enumerate(members) if not part.status[k]], dtype=int)
+        if len(good) < len(members):
+            members, rows = members[good], rows.of(good.tolist())
+        for some, q0 in _starts(request, share, members, rows, threads, part, loads):
             if len(some) and not watch.stopped:
                 own = rows if len(some) == len(rows) else rows.of(some.tolist())
-                _together(request, share, members[some], own, q0, columns, threads, watch, part)
+                _together(
+                    request, share, members[some], own, q0, columns, threads, watch, part, loads
+                )
     return part
+
+
+def _loads(request: Request, share: Share, part: Part) -> dict[int, Loads]:
+    """The loads on the links of each robot, by its number; `part` refuses one on which they have no
+    place."""
+    out: dict[int, Loads] = {}
+    begin, end = float(request.t[0]), float(request.t[-1])
+    for k in range(len(share)) if request.acting.loads else ():
+        try:
+            lengths = [link.length_m for link in share.robots[k].links]
+            acting = request.acting.varied(share.values(k))
+            out[k] = as_loads(acting.loads, lengths, begin, end)
+        except InputError as error:
+            part.status[k], part.events[k] = "refused", str(error)
+    return out
 
 
 def _bent(request: Request, rows: Rows) -> np.ndarray:
@@ -97,19 +126,35 @@ def _bent(request: Request, rows: Rows) -> np.ndarray:
 
 
 def _starts(
-    request: Request, share: Share, members: np.ndarray, rows: Rows, threads: int, part: Part
+    request: Request,
+    share: Share,
+    members: np.ndarray,
+    rows: Rows,
+    threads: int,
+    part: Part,
+    loads: dict[int, Loads],
 ) -> list[tuple[np.ndarray, np.ndarray | None]]:
     """Robots of the same counts (B,) by their starts: which of them, and q0, (n,) for all of these,
-    (count, n) for each, or None for straight links. `part` refuses one without equilibrium."""
+    (count, n) for each, or None for straight links. `part` refuses one without equilibrium.
+
+    loads: on the links of each robot, by its number; empty: none.
+    """
     bent = _bent(request, rows)
     which = np.flatnonzero(bent)
 
     def start(j: int) -> np.ndarray | str | None:
-        drive = share.drives[members[j]] or request.drive
+        k, t = int(members[j]), float(request.t[0])
+        drive = share.drives[k] or request.drive
         try:
-            return _equilibrium(rows.of([j]), drive, float(request.t[0]))
+            if not loads:
+                return _equilibrium(rows.of([j]), drive, t)
+            return consistent_start(
+                System(share.robots[k]), t, drive, None, None, "static", loads[k]
+            )[0]
         except NoEquilibrium as error:
-            return f"{error}; {NO_START}"
+            return f"{error}" if loads else f"{error}; {NO_START}"
+        except InputError as error:
+            return str(error)
 
     with ThreadPoolExecutor(threads) as pool:
         found = dict(zip(which, pool.map(start, map(int, which)), strict=True))
@@ -160,8 +205,8 @@ def _columns(robot: Robot, names: Sequence[str]) -> list[tuple[str, int]] | None
     return [known[name] for name in names] if all(name in known for name in names) else None
 
 
-def _packed(drive: Drive) -> Any:
-    """A drive as the core takes it. Limits are each robot's own."""
+def _packed(drive: Drive, loads: Loads | None) -> Any:
+    """A drive, and loads on links, as the core takes them. Limits are each robot's own."""
     segments, ranges, gains = drive.packed()
     N = len(drive.joints)
     flags = drive.follows.astype(np.uint8)
@@ -172,6 +217,7 @@ def _packed(drive: Drive) -> Any:
         flags,
         np.zeros(N, dtype=np.uint8),
         np.tile([-np.inf, np.inf], (N, 1)),
+        loads.packed() if loads else None,
     )
 
 
@@ -185,20 +231,20 @@ def _together(
     threads: int,
     watch: Any,
     part: Part,
+    loads: dict[int, Loads],
 ) -> None:
     """Robots of the same counts through the core, into their places of `part`.
 
-    q0: as `_starts` gives it.
+    q0, loads: as `_starts` gives and takes them.
     """
     common = request.drive or Drive.none(rows.numbers.shape[1])
     begin, end = float(request.t[0]), float(request.t[-1])
     given = [share.drives[k] or common for k in members]
     within = {id(drive): drive.within(begin, end) for drive in given}
-    drives = [within[id(drive)] for drive in given]
-    number = {
-        id(drive): j for j, drive in enumerate({id(drive): drive for drive in drives}.values())
-    }
-    packed = [_packed(drive) for drive in {id(drive): drive for drive in drives}.values()]
+    # robots that share a drive share its rows; one with loads of its own has its own
+    keys = [(id(drive), k if loads else -1) for drive, k in zip(given, members, strict=True)]
+    number = {key: j for j, key in enumerate(dict.fromkeys(keys))}
+    packed = [_packed(within[drive], loads.get(k)) for drive, k in number]
     start = [np.zeros(0) if q is None else q.ravel() for q in (q0, request.qd0)]
     values, words, reached, steps, joints, positions, texts, balances = core.population(
         rows.counts,
@@ -209,7 +255,7 @@ def _together(
         rows.payload,
         rows.limits,
         packed,
-        np.array([number[id(drive)] for drive in drives]),
+        np.array([number[key] for key in keys]),
         request.t,
         *start,
         request.rtol,
@@ -265,48 +311,65 @@ def _event(
     return str(InputError(said, key=key if link < 0 else f"link[{link + 1}].{key}"))
 
 
-def _one_by_one(request: Request, share: Share, watch: Any, part: Part) -> None:
-    """Robots by `simulate`: of the dissertation's model, and for channels that the core does not
-    have."""
-    for k in range(len(share)):
-        if watch.stopped:
-            return
-        drive = share.drives[k] or request.drive
-        try:
-            run = simulate(
-                share.robots[k],
-                request.t,
-                drive,
-                request.q0,
-                request.qd0,
-                request.rtol,
-                method=request.method,
-                start=request.start,
-                numerical_damping=request.numerical_damping,
-                max_steps=request.max_steps,
-            )
-        except (InputError, NoEquilibrium) as error:
-            part.status[k], part.events[k] = "refused", str(error)
-            continue
-        said = [e for e in run.meta["events"] if e["name"] not in ("still", "node")]
-        names = {event["name"] for event in said}
-        part.status[k] = (
-            "done"
-            if run.complete
-            else "limit"
-            if names & set(LIMITS)
-            else "unbalanced"
-            if names <= {"balance", "not_finite"}
-            else "stuck"
+def _one_by_one(request: Request, share: Share, threads: int, watch: Any, part: Part) -> None:
+    """Robots by `simulate`: of the dissertation's models, with payloads that change, and for
+    channels that the core does not have (sensors, internal forces)."""
+
+    def work(k: int) -> None:
+        if not watch.stopped:
+            _alone(request, share, k, part)
+
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(work, range(len(share))))
+
+
+def _alone(request: Request, share: Share, k: int, part: Part) -> None:
+    """Robot k by `simulate`, into its place of `part`."""
+    robot = share.robots[k]
+    forces = set() if robot.nodal else set(force_units(robot))
+    try:
+        acting = request.acting.varied(share.values(k))
+        run = simulate(
+            robot,
+            request.t,
+            share.drives[k] or request.drive,
+            request.q0,
+            request.qd0,
+            request.rtol,
+            method=request.method,
+            start=request.start,
+            numerical_damping=request.numerical_damping,
+            loads=acting.loads,
+            payloads=acting.payloads,
+            internal_forces=not forces.isdisjoint(request.channels),
+            max_steps=request.max_steps,
         )
-        part.reached[k], part.steps[k], part.events[k] = (
-            run.t[-1],
-            run.meta["steps"],
-            "; ".join(event["text"] for event in said),
-        )
-        rows = int(np.count_nonzero(np.isin(run.t, request.t)))
         for name in request.channels:
-            part.channels[name][k, :rows] = run[name][:rows]
+            if name not in run:
+                text = "expected a robot with the channels of the first one"
+                raise InputError(text, key="channels", value=name)
+    except (InputError, NoEquilibrium) as error:
+        part.status[k], part.events[k] = "refused", str(error)
+        return
+    said = [e for e in run.meta["events"] if e["name"] not in SILENT]
+    names = {event["name"] for event in said}
+    part.status[k] = (
+        "done"
+        if run.complete
+        else "limit"
+        if names & set(LIMITS)
+        else "unbalanced"
+        if names <= {"balance", "not_finite"}
+        else "stuck"
+    )
+    part.reached[k], part.steps[k], part.events[k] = (
+        run.t[-1],
+        run.meta["steps"],
+        "; ".join(event["text"] for event in said),
+    )
+    rows = int(np.count_nonzero(np.isin(run.t, request.t)))
+    for name in request.channels:
+        part.channels[name][k, :rows] = run[name][:rows]
 
 
 def chunk_of(request: Request, share: Share, digests: list[bytes], part: Part) -> Chunk:

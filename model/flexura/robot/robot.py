@@ -12,10 +12,21 @@ import os
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from ..errors import InputError, WrongValue
-from ..io import FORMAT, Tables, check_format, explain, find, read_toml, summary, write_toml
+from ..io import (
+    FORMAT,
+    Tables,
+    changed,
+    check_format,
+    explain,
+    find,
+    index_of,
+    read_toml,
+    summary,
+    write_toml,
+)
 from .damping import rayleigh
 from .joint import KEYS, key_of
 from .link import LEAST_FREE, Link
@@ -264,9 +275,9 @@ class Robot(Table):
         changes = {self._todays_path(path, changes): value for path, value in changes.items()}
         # says what is wrong in a file's words
         try:
-            return Robot.model_validate(_changed(self, changes))
+            return Robot.model_validate(changed(self, changes))
         except ValidationError:
-            return Robot.from_dict(_changed(self.to_dict(), changes))
+            return Robot.from_dict(changed(self.to_dict(), changes))
 
     def value(self, key: str) -> float:
         """One number of the robot.
@@ -284,7 +295,7 @@ class Robot(Table):
         for part in self._todays_path(key, {}).split("."):
             try:
                 found = (
-                    found[_number(found, part, key, None)]
+                    found[index_of(found, part, key)]
                     if isinstance(found, list | tuple)
                     else getattr(found, part)
                 )
@@ -304,40 +315,9 @@ class Robot(Table):
         parts = path.split(".")
         if len(parts) != 4 or parts[0] != "link" or parts[2] != "joint" or parts[3] not in KEYS:
             return path
-        number = _number(self.link, parts[1], path, None)
+        number = index_of(self.link, parts[1], path)
         kind = changes.get(f"link.{parts[1]}.joint.type", self.link[number].joint.type)
         return ".".join([*parts[:3], key_of(parts[3], kind)])
-
-
-def _changed(tables: Any, changes: Tables) -> dict[str, Any]:
-    """A robot, or the tables of its file, with some values changed: tables along the way, and as
-    they are the parts that do not change, which are not validated again."""
-    copied = lambda table: dict(table.__dict__) if isinstance(table, BaseModel) else table.copy()
-    out: dict[str, Any] = copied(tables)
-    for path, value in changes.items():
-        *parents, last = path.split(".")
-        table: Any = out
-        for part in parents:
-            key: Any = _number(table, part, path, value) if isinstance(table, list) else part
-            inner = table[key] if isinstance(table, list) else table.get(key)
-            inner = {} if inner is None else list(inner) if isinstance(inner, tuple) else inner
-            if not isinstance(inner, dict | list | BaseModel):
-                raise InputError(
-                    f"expected a place in a robot file; {part} isn't a table", key=path, value=value
-                )
-            table[key] = copied(inner)
-            table = table[key]
-        table[_number(table, last, path, value) if isinstance(table, list) else last] = value
-    return out
-
-
-def _number(table: list[Any] | tuple[Any, ...], part: str, path: str, value: Any) -> int:
-    """The index of an entry of a list, from its number as people count."""
-    if not (part.isascii() and part.isdigit() and 1 <= int(part[:9]) <= len(table)):
-        raise InputError(
-            f"expected a number from 1 to {len(table)}, not {part!r}", key=path, value=value
-        )
-    return int(part) - 1
 
 
 def load(path: str | os.PathLike[str]) -> Robot:

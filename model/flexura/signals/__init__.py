@@ -2,6 +2,7 @@
 tables."""
 
 from . import paths, shaping, signal
+from .acting import Acting, acts
 from .composite import chirp, delayed, noise, pulse, sum
 from .conversion import FunctionSignal, SignalLike, as_signal, as_signals, spline
 from .drive import Drive, JointDrive, check_smooth
@@ -32,6 +33,7 @@ __all__ = [
     "KINDS",
     "PLAUSIBLE",
     "STARTS",
+    "Acting",
     "Drive",
     "FunctionSignal",
     "JointDrive",
@@ -43,6 +45,7 @@ __all__ = [
     "PayloadsLike",
     "Signal",
     "SignalLike",
+    "acts",
     "as_loads",
     "as_payloads",
     "as_signal",

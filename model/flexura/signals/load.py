@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import InputError
 from ..io import Tables, choice, number, whole
 from .conversion import FunctionSignal, SignalLike, as_signal, spline
-from .parsing import from_spec
+from .parsing import PLAUSIBLE, from_spec, is_plausible
 from .signal import COLUMNS, Signal, constant
 
 FRAMES = ("base", "link")
@@ -52,9 +52,9 @@ class Load:
                 raise InputError(expected, key="force_N", value=given)
             if len(given) != 2:
                 raise InputError(expected, key="force_N", value=len(given))
-            parts = tuple(as_signal(part, f"force_N[{k}]") for k, part in enumerate(given, 1))
+            parts = tuple(_bounded(part, f"force_N[{k}]") for k, part in enumerate(given, 1))
         object.__setattr__(self, "force_N", parts)
-        object.__setattr__(self, "moment_N_m", as_signal(self.moment_N_m, "moment_N_m"))
+        object.__setattr__(self, "moment_N_m", _bounded(self.moment_N_m, "moment_N_m"))
         if all(signal is None for signal in self.signals):
             raise InputError("missing: expected a force_N or a moment_N_m", key="force_N")
 
@@ -86,6 +86,15 @@ class Load:
         if moment is not None:
             out["moment_N_m"] = moment.spec
         return out | {"frame": self.frame}
+
+
+def _bounded(value: SignalLike, key: str) -> Signal | None:
+    """A signal, or a number within the bounds of a manoeuvre file."""
+    made = as_signal(value, key)
+    plain = made is not None and made is not value and not isinstance(made, FunctionSignal)
+    if made is not None and plain and not is_plausible(made(0.0)[0]):
+        raise InputError(f"expected {PLAUSIBLE}", key=key, value=value)
+    return made
 
 
 def _value(signal: Signal | None, t: float) -> float:
@@ -203,10 +212,28 @@ def _on_link(entry: Any, i: int, lengths: Sequence[float], start: float, end: fl
     if not 0.0 <= at <= length * (1 + 1e-12):
         text = f"expected a place from 0 to the link's length, {length:g} m"
         raise InputError(text, key=f"{key}.at_m", value=at)
-    *parts, moment = entry.signals
-    force = tuple(_as_spline(part, f"{key}.force_N", start, end) for part in parts)
-    moment = _as_spline(moment, f"{key}.moment_N_m", start, end)
-    return replace(entry, at_m=min(at, length), force_N=force, moment_N_m=moment)
+    return replace(splined(entry, i, start, end), at_m=min(at, length))
+
+
+def splined(load: Load, i: int, start: float, end: float) -> Load:
+    """A load whose functions of time are splines of fifth order.
+
+    Args:
+        load: the load.
+        i: its number, from 1.
+        start: begin of the run [s].
+        end: end of the run [s].
+
+    Returns:
+        The Load.
+
+    Raises:
+        InputError: a function that jumps.
+    """
+    *parts, moment = load.signals
+    force = tuple(_as_spline(part, f"load[{i}].force_N", start, end) for part in parts)
+    moment = _as_spline(moment, f"load[{i}].moment_N_m", start, end)
+    return replace(load, force_N=force, moment_N_m=moment)
 
 
 def _as_spline(signal: Signal | None, key: str, start: float, end: float) -> Signal | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,8 @@ class Manoeuvre:
     from a TOML file.
 
     `start`: "static" or "straight", as in `simulate`; None leaves it to gravity. `loads`: forces
-    and moments on links. `payloads`: what is taken up and let go.
+    and moments on links. `payloads`: what is taken up and let go. `file`: the file that it was read
+    from, for messages.
     """
 
     name: str
@@ -34,6 +35,7 @@ class Manoeuvre:
     start: str | None = None
     loads: tuple[Load, ...] = ()
     payloads: tuple[PayloadChange, ...] = ()
+    file: str = field(default="", compare=False)
 
     @property
     def t(self) -> np.ndarray:
@@ -74,21 +76,31 @@ class Manoeuvre:
             own["payload"] = [change.spec() for change in self.payloads]
         return own
 
-    def refuse_loads(self, by: str) -> None:
-        """Refuse loads on links, and payloads that change, where they would be left out.
+    def refuse_loads(self, why: str) -> None:
+        """Refuse loads on links where they would be left out.
 
         Args:
-            by: what leaves them out, for the message.
+            why: the reason, for the message.
 
         Raises:
-            InputError: the manoeuvre has some.
+            InputError: the manoeuvre has some; it names its file.
         """
         if self.loads:
-            text = f"expected none: {by} takes no loads on links"
-            raise InputError(text, key="load", value=len(self.loads))
+            text = f"expected no [[load]]: {why}"
+            raise InputError(text, key="load", value=len(self.loads), file=self.file)
+
+    def refuse_payloads(self, why: str) -> None:
+        """Refuse payloads that change where they would be left out.
+
+        Args:
+            why: the reason, for the message.
+
+        Raises:
+            InputError: the manoeuvre has some; it names its file.
+        """
         if self.payloads:
-            text = f"expected none: {by} takes no payload that changes"
-            raise InputError(text, key="payload", value=len(self.payloads))
+            text = f"expected no [[payload]]: {why}"
+            raise InputError(text, key="payload", value=len(self.payloads), file=self.file)
 
 
 LONGEST = 1e8  # of a manoeuvre [s]: three years
@@ -113,7 +125,7 @@ def load_manoeuvre(path: str | os.PathLike[str], joints: int) -> Manoeuvre:
     joints = whole(joints, "joints", 1, "expected how many joints the robot has")
     found = find(path, "manoeuvres")
     try:
-        return _manoeuvre(read_toml(found), joints)
+        return replace(_manoeuvre(read_toml(found), joints), file=os.fspath(found))
     except InputError as error:
         raise error if error.file else error.in_file(os.fspath(found)) from None
 

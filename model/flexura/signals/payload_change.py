@@ -8,6 +8,7 @@ from typing import Any, TypeAlias
 
 from ..errors import InputError
 from ..io import Tables, array, number
+from ..robot import BOUNDS
 
 KEYS = ("at_s", "mass_kg", "inertia_kg_m2", "centre_of_mass_m")
 EXPECTED = (
@@ -20,8 +21,8 @@ EXPECTED = (
 class PayloadChange:
     """The payload from an instant on (135).
 
-    at_s: the instant [s]. mass_kg: its mass from then on [kg]; 0: nothing. inertia_kg_m2: about its
-    own centre. centre_of_mass_m: from the tip, along and across its tangent [m]; None: where the
+    at_s: the instant [s]. mass_kg: its mass from then on [kg]; 0 without inertia: nothing.
+    inertia_kg_m2: about its own centre. centre_of_mass_m: from the tip, along and across its tangent [m]; None: where the
     payload before had it. What is taken up was at rest; what is let go flies on. Raises InputError
     for other arguments.
     """
@@ -34,14 +35,17 @@ class PayloadChange:
     def __post_init__(self) -> None:
         object.__setattr__(self, "at_s", number(self.at_s, "at_s"))
         for name, unit in (("mass_kg", "kilograms"), ("inertia_kg_m2", "kg m^2")):
-            expected = f"expected a number of 0 or more in {unit}"
+            expected = f"expected a number in {unit}, {BOUNDS[name]}"
             found = number(getattr(self, name), name, expected)
-            if found < 0:
+            if not BOUNDS[name].hold(found):
                 raise InputError(expected, key=name, value=found)
             object.__setattr__(self, name, found)
         if self.centre_of_mass_m is not None:
             expected = "expected two numbers in metres, along and across the tip's tangent"
             centre = array(self.centre_of_mass_m, "centre_of_mass_m", expected, (2,))
+            if not all(map(BOUNDS["centre_of_mass_m"].hold, centre)):
+                expected = f"{expected}, {BOUNDS['centre_of_mass_m']}"
+                raise InputError(expected, key="centre_of_mass_m", value=centre.tolist())
             object.__setattr__(self, "centre_of_mass_m", tuple(map(float, centre)))
 
     def spec(self) -> Tables:

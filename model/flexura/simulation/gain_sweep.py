@@ -19,6 +19,7 @@ import numpy as np
 from .. import core
 from ..control import JOINT, PID, STRIP, Controller
 from ..errors import InputError
+from ..signals import LoadsLike, as_loads
 from ..system import System
 from .start import consistent_start
 
@@ -82,6 +83,8 @@ def prepare_gain_sweep(
     output_step_s: float,
     rtol: float,
     method: str = "auto",
+    start: str | None = None,
+    loads: LoadsLike = None,
 ) -> GainSweep:
     """Prepare the runs of many rows of gains on one robot.
 
@@ -95,6 +98,8 @@ def prepare_gain_sweep(
         output_step_s: between two samples [s].
         rtol: as in `flexura.simulate`.
         method: as in `flexura.simulate`.
+        start: as in `flexura.simulate`.
+        loads: as in `flexura.simulate`.
 
     Returns:
         The GainSweep.
@@ -116,6 +121,8 @@ def prepare_gain_sweep(
     references = np.array(
         [[j.reference(at)[0] if isinstance(j, PID) else 0.0 for at in t] for j in controller.joints]
     )
+    lengths = [link.length_m for link in system.robot.links]
+    on_links = as_loads(loads, lengths, float(t[0]), float(t[-1]))
     segments, ranges, gains, follows, _ = controller.core_drives()
     index = np.column_stack([ranges, follows]).astype(np.int64)
     runs = core.GainSweep(
@@ -126,9 +133,10 @@ def prepare_gain_sweep(
         gains,
         np.ascontiguousarray(system.limits),
         t,
-        consistent_start(system, float(t[0]), controller, None, None)[0],
+        consistent_start(system, float(t[0]), controller, None, None, start, on_links)[0],
         references,
         rtol,
         method,
+        on_links.packed() if on_links else None,
     )
     return GainSweep(len(controller.joints), runs)

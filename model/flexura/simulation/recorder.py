@@ -42,6 +42,18 @@ def channel_units(robot: Robot) -> dict[str, str]:
     return units | {"tip/x": "m", "tip/y": "m"} | {f"energy/{name}": "J" for name in energies}
 
 
+def sensor_units(robot: Robot) -> dict[str, str]:
+    """The channels of a robot's sensors.
+
+    Args:
+        robot: the robot.
+
+    Returns:
+        Units by channel.
+    """
+    return {f"sensor/{s.name}": s.unit for link in robot.links for s in link.sensor}
+
+
 def recorded_channels(robot: Robot) -> list[str]:
     """The channels that the core reads from a state, in the order of `System.observe`."""
     accounts = ("energy/work", "energy/loss", "energy/numerical_loss")
@@ -90,7 +102,7 @@ def record(
                 sensors[-1] |= force_channels(block)
         begin = end
     channels |= {name: np.concatenate([part[name] for part in sensors]) for name in sensors[0]}
-    units |= {f"sensor/{s.name}": s.unit for link in system.robot.links for s in link.sensor}
+    units |= sensor_units(system.robot)
     units |= force_units(system.robot) if internal_forces else {}
     about = describe(system, energy_error(seen[:, -3:], accounts, solution.jumps)) | solution.meta
     if loads:

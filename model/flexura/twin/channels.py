@@ -5,8 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from ..io import STATIONS
+from ..robot import Sensor
+from . import internal_forces as forces
 from .build import TwinModel
-from .links.part import Ground, Motion
+from .links.ancf import CableLink
+from .links.part import Ground, Motion, Part
+from .links.rigid import RigidLink
 from .loads import Actuation
 
 
@@ -16,7 +20,9 @@ def channels(
     t: np.ndarray,
     q: np.ndarray,
     v: np.ndarray,
+    more: np.ndarray,
     reaction: np.ndarray,
+    internal_forces: bool = False,
 ) -> tuple[dict[str, np.ndarray], dict[str, str]]:
     """Channels of a run from the system's coordinates.
 
@@ -26,7 +32,9 @@ def channels(
         t: times (T,) [s].
         q: total coordinates of the system (T, coordinates).
         v: their velocities (T, coordinates).
+        more: their accelerations (T, coordinates).
         reaction: forces of the constraints that hold joints to a motion (T, n).
+        internal_forces: whether reactions and forces along the links are channels too.
 
     Returns:
         Channels (T,) and their units, by name.
@@ -38,13 +46,16 @@ def channels(
     motor = np.zeros_like(position), np.zeros_like(position)
     origin = tip = Ground.motion(len(t))
     deflection = np.zeros(len(t))
+    places: list[tuple[np.ndarray, np.ndarray]] = []  # of the joints, and their axes
     for i, (link, part, index) in enumerate(
         zip(model.robot.links, model.parts, model.index, strict=True)
     ):
         own, rate = q[:, index], v[:, index]
         hub, end = part.motion_at_origin(own, rate), part.motion_at_tip(own, rate)
         joint = link.joint
+        place = hub.r
         if joint.type == "R":
+            place = hub.r - joint.hub_radius_m * _axis(hub.angle)
             turned = _unwrap(t, hub.angle - tip.angle, hub.omega - tip.omega, joint.start)
             position[:, i], speed[:, i] = turned, hub.omega - tip.omega
             hub = hub._replace(angle=tip.angle + turned)
@@ -54,9 +65,11 @@ def channels(
             position[:, i], speed[:, i] = _slide(origin, hub)
             hub = hub._replace(angle=origin.angle + turned + joint.angle_rad)
         else:
+            place = tip.r
             sleeve = tip._replace(angle=tip.angle + joint.angle_rad)
             position[:, i], speed[:, i] = _slide(sleeve, end)
             hub = hub._replace(angle=sleeve.angle)
+        places.append((place, hub.angle - (joint.angle_rad if joint.type == "Pa" else 0.0)))
         slides = model.slides[i]
         if slides is not None:
             position[:, i], speed[:, i] = q[:, slides], v[:, slides]
@@ -77,10 +90,7 @@ def channels(
             for k in range(STATIONS):
                 place = part.point(own, k * link.length_m / (STATIONS - 1))
                 out[f"link/{i + 1}/deflection/{k}"] = _transverse(hub, place), "m"
-            for sensor in link.sensor:
-                if sensor.kind == "deflection":
-                    place = part.point(own, sensor.at_m)
-                    out[f"sensor/{sensor.name}"] = _transverse(hub, place), sensor.unit
+            out |= _bending_sensors(link.sensor, part, own, hub)
         kinetic += part.kinetic(own, rate)
         motor[0][:, i], motor[1][:, i] = position[:, i], speed[:, i]
         rotor = model.rotors[i]
@@ -93,6 +103,12 @@ def channels(
         strain += part.strain(own)
         potential -= part.moment(own) @ gravity
         origin, tip = hub, end
+    whole = all(isinstance(part, CableLink | RigidLink) for part in model.parts)
+    if whole and (internal_forces or any(link.sensor for link in model.robot.links)):
+        cuts = forces.Cuts(model, t, (q, v, more), position)
+        out |= forces.sensor_channels(cuts)
+        if internal_forces:
+            out |= forces.reaction_channels(cuts, places) | forces.link_channels(cuts)
     bent = deflection * bool(model.mesh.elements[-1])
     hubs = position, speed
     out = _joints(model, act, t, hubs, motor, bent, reaction) | out
@@ -105,6 +121,28 @@ def channels(
     return {name: values for name, (values, _) in out.items()}, {
         name: unit for name, (_, unit) in out.items()
     }
+
+
+def _bending_sensors(
+    sensors: list[Sensor], part: Part, own: np.ndarray, hub: Motion
+) -> dict[str, tuple[np.ndarray, str]]:
+    """Sensors of deflection, and on a beam of cubics of slope and strain: by its curvature, whose
+    error is of second order in the elements' length."""
+    out = {}
+    for sensor in sensors:
+        if sensor.kind == "deflection":
+            value = _transverse(hub, part.point(own, sensor.at_m))
+        elif sensor.kind in ("slope", "strain") and isinstance(part, CableLink):
+            _, slope, bend = part.at(own, np.full(len(own), sensor.at_m))
+            value = _wrap(np.arctan2(slope[:, 1], slope[:, 0]) - hub.angle)
+            if sensor.kind == "strain":
+                assert sensor.distance_m is not None
+                turned = slope[:, 0] * bend[:, 1] - slope[:, 1] * bend[:, 0]
+                value = -sensor.distance_m * turned / (slope**2).sum(axis=-1)
+        else:
+            continue
+        out[f"sensor/{sensor.name}"] = value, sensor.unit
+    return out
 
 
 def _joints(

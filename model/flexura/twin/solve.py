@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import FlexuraError, InputError, guarded
-from ..io import Run, array, check_progress, choice, judged, number, whole
+from ..io import Run, array, check_progress, choice, flag, judged, number, whole
 from ..optional import Optional
 from ..robot import MAX_ELEMENTS, Robot, robot_of
 from ..signals import LoadsLike, PayloadsLike, as_loads, as_payloads
@@ -59,6 +59,7 @@ def simulate(
     elements: int | None = None,
     step_s: float | None = None,
     hub_length_m: float | None = None,
+    internal_forces: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> Run:
     """Simulate a robot in Exudyn, as a check of the native solver.
@@ -91,6 +92,8 @@ def simulate(
         hub_length_m: length of the hub of a Pa on a flexible link, and of the spans of a flexible
             Pb's sleeve [m], see `mesh`. None: short ones, extrapolated to none by one more run for
             each of the two types (`extrapolation`).
+        internal_forces: the Run also has the reactions of the joints, and the forces along the
+            flexible links, by the accelerations that Exudyn finds; of an "ancf" beam only.
         progress: called with the finished fraction.
 
     Returns:
@@ -107,6 +110,10 @@ def simulate(
     robot = robot_of(robot)
     choice(beam, "beam", tuple(PROGRAMS))
     check_supported(robot, beam)
+    within = flag(internal_forces, "internal_forces")
+    if within and beam == "ge" and any(link.flexible for link in robot.links):
+        expected = 'expected "ancf" for internal forces: a "ge" beam has no cubics to cut'
+        raise InputError(expected, key="beam", value=beam)
     t, speeds = _times(t_eval), start_speeds(robot, qd0)
     if elements is not None:
         most = 2 * MAX_ELEMENTS
@@ -160,7 +167,8 @@ def simulate(
                 report((number + reached) * share)
 
             tries = 1 if step_s else ATTEMPTS
-            return _run(new, later(act, begin), at, longest, tries, told, PROGRAMS[beam])
+            acting, program = later(act, begin), PROGRAMS[beam]
+            return _run(new, acting, at, longest, tries, told, program, within)
 
         return in_parts(robot, changes, t, model_of, part, _settings(1.0, 1))
 
@@ -194,6 +202,7 @@ def _run(
     tries: int,
     progress: Callable[[float], None],
     program: str,
+    internal_forces: bool,
 ) -> tuple[Run, End]:
     """Simulate with steps of at most `longest` [s]; they are halved if Exudyn fails.
 
@@ -211,10 +220,10 @@ def _run(
     data = np.array(model.mbs.systemData.GetDataCoordinates())
     end = End(record[1][-1], record[2][-1], data)
     at, *columns = (np.array(column) for column in record[:4])
-    t, q, v = steps.at_times(t, at, *columns)
+    t, q, v, more = steps.at_times(t, at, *columns)
     q += model.reference
     reaction = np.column_stack([np.interp(t, at, column) for column in np.array(record[4]).T])
-    values, units = channels(model, act, t, q, v, reaction)
+    values, units = channels(model, act, t, q, v, more, reaction, internal_forces)
     meta = {
         "source": "twin",
         "program": f"Exudyn {exu.__version__} ({program})",

@@ -39,7 +39,7 @@ class Steps:
 
     def at_times(
         self, t: np.ndarray, at: np.ndarray, q: np.ndarray, v: np.ndarray, a: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Coordinates at the output times that the record reached.
 
         Args:
@@ -50,13 +50,15 @@ class Steps:
             a: accelerations (K, n).
 
         Returns:
-            Times (k,), coordinates and velocities (k, n).
+            Times (k,), coordinates, velocities and accelerations (k, n); the last are linear
+                between steps.
         """
         t = t[t <= at[-1] + 1e-3 * self.length]  # round-off of many steps
         if self.exact:
             own = np.searchsorted(at, t - self.length / 2)
-            return t, q[own], v[own]
-        return t, *_interpolate(t, at, q, v, a)
+            return t, q[own], v[own], a[own]
+        more = [np.interp(t, at, column) for column in a.T]
+        return t, *_interpolate(t, at, q, v, a), np.array(more).reshape(a.shape[1], -1).T
 
 
 def plan_steps(t: np.ndarray, longest: float, forced: bool) -> Steps:

@@ -159,6 +159,10 @@ def test_what_nothing_depends_on_is_said_and_has_no_interval(robot, swing):
     (without,) = [q for q in found.quantities if "rotor" in q.name]
     assert np.isnan([without.low, without.high]).all()
     assert any("nothing that was compared depends on it" in text for text in found.findings)
+    assert without.value == without.file == robot.links[0].joint.rotor_inertia
+    assert found.robot.links[0].joint.rotor_inertia == robot.links[0].joint.rotor_inertia
+    (damping,) = [q for q in found.quantities if q.name == DAMPING]
+    assert found.robot.value(DAMPING) == damping.value != robot.value(DAMPING)
 
 
 TRUE_REST = {STIFFNESS: 0.47, MASS: 0.055}
@@ -194,6 +198,7 @@ def test_a_reading_through_a_filter_is_that_of_a_harmonic():
     ("fit", "options", "message"),
     [
         (["payload.weight"], {}, "payload.weight"),
+        (["link.1.elements"], {}, "elements is a count"),
         (["link.1.joint.viscous_friction_N_m_s_rad"], {}, "a value to begin with"),
         (["link/1/tip_slope.gain"], {}, "a channel that is used"),
         ([MASS], {"inputs": ["joint/1/current"]}, "no such channel"),

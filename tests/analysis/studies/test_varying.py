@@ -46,13 +46,13 @@ def test_the_largest_peak_is_that_of_its_robot(tmp_path):
 )
 def test_a_wrong_variation_is_named(text):
     with pytest.raises(fx.InputError) as raised:
-        parameter_sweep.grid(fx.load(RIG), [text])
+        parameter_sweep.grid(fx.load(RIG), [text], fx.load_manoeuvre(LAW, 2))
     assert raised.value.key == "--vary" and raised.value.value == text
 
 
 def test_a_key_that_is_no_number_of_the_robot_is_named():
     with pytest.raises(fx.InputError, match="unknown key"):
-        parameter_sweep.grid(fx.load(RIG), ["payload.weight=0:1:2"])
+        parameter_sweep.grid(fx.load(RIG), ["payload.weight=0:1:2"], fx.load_manoeuvre(LAW, 2))
 
 
 def run_command(*arguments):

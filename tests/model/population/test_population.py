@@ -112,14 +112,14 @@ def test_a_varied_robot_has_the_rows_of_the_robot_made_anew():
         ),
     ]
     for template, columns in cases:
-        rows = vary(template, columns)
+        rows = vary(template, columns, len(next(iter(columns.values()))))
         assert rows is not None
         for k, (each, _) in enumerate(fx.Batch.vary(template, columns)):
             assert rows.contents(k) == one(each).contents(0), (k, columns)
             assert np.array_equal(rows.limits[k], fx.System(each).limits)
     assert (
-        vary(ARM, {"link.2.joint.start": np.zeros(2)}) is None
-        and vary(ARM, {"link.3.length_m": np.ones(2)}) is None
+        vary(ARM, {"link.2.joint.start": np.zeros(2)}, 2) is None
+        and vary(ARM, {"link.3.length_m": np.ones(2)}, 2) is None
     )
 
 

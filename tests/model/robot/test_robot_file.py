@@ -201,6 +201,12 @@ def test_replacing_counts_links_from_1(path):
     assert caught.value.key == path
 
 
+def test_replacing_in_a_list_without_entries_is_refused():
+    with pytest.raises(fx.InputError, match="there are no entries to count") as caught:
+        fx.Robot.from_dict(BASE).replace({"link.2.mass.1.mass_kg": 0.1})
+    assert caught.value.key == "link.2.mass.1.mass_kg"
+
+
 @pytest.mark.parametrize("path", ["name.x", "link.2.name.x", "payload.mass_kg.x"])
 def test_replacing_inside_a_value_is_refused(path):
     with pytest.raises(fx.InputError, match="isn't a table"):

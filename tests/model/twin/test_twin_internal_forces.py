@@ -1,5 +1,5 @@
-"""Reactions of joints and forces along links against Exudyn's own outputs: the forces of its
-joints, and torque and force of its cable elements."""
+"""Reactions of joints and forces along links against Exudyn: the forces of its joints, torque and
+force of its cable elements, and the channels that the twin finds from Exudyn's accelerations."""
 
 import exudyn as exu
 import numpy as np
@@ -121,3 +121,66 @@ def test_a_slider_and_a_link_on_it(built):
     (force,) = joint_forces(mbs)
     own = complex(end["joint/2/reaction_x"], end["joint/2/reaction_y"])
     assert abs(own - force) < NEAR * abs(force)
+
+
+SENSED = [
+    {"name": "acc", "kind": "acceleration", "at_m": 0.3},
+    {"name": "slope", "kind": "slope", "at_m": 0.3},
+    {"name": "gauge", "kind": "strain", "at_m": 0.3, "distance_m": 1e-3},
+    {"name": "shear", "kind": "shear_force", "at_m": 0.31},
+]
+
+
+def wound():
+    """A transmission between two links of which the first winds up, and a hub with a radius."""
+    one = beam(LENGTH, 0.3, 4.0, 8, hub_inertia_kg_m2=0.01, damping={"beta_s": 1e-3})
+    one["joint"] |= {
+        "transmission": {"stiffness_N_m_rad": 50.0, "damping_N_m_s_rad": 0.2},
+        "rotor_inertia_kg_m2": 0.02,
+    }
+    two = beam(LENGTH, 0.2, 2.0, 8, start=0.6, damping={"beta_s": 1e-3})
+    two["joint"]["hub_radius_m"] = 0.05
+    two["mass"] = [{"at_m": 0.25, "mass_kg": 0.1, "inertia_kg_m2": 1e-4}]
+    two["sensor"] = SENSED
+    made = robot(one, two, gravity=(0.0, -9.81), payload=0.1, payload_inertia=1e-3)
+    return made.replace({"payload.centre_of_mass_m": [0.03, -0.02]})
+
+
+def sleeved():
+    """A flexible link in a sleeve on a rigid one that turns."""
+    two = beam(LENGTH, 0.2, 2.0, 8, "Pb", start=0.3, hub_mass_kg=0.1, damping={"beta_s": 1e-3})
+    two["joint"]["angle_rad"] = 0.2
+    return robot(rigid(0.1, 0.6, 0.05, 5e-4, start=0.3), two, gravity=(0.0, -9.81), payload=0.1)
+
+
+def ridden():
+    """A slider on a flexible link that turns."""
+    one = beam(LENGTH, 0.3, 4.0, 8, damping={"beta_s": 1e-3})
+    two = rigid(0.1, 0.2, 0.05, 5e-4, type="Pa", start=0.2, angle_rad=0.5)
+    return robot(one, two, gravity=(0.0, -9.81), payload=0.1)
+
+
+MOVING = {
+    "transmission": (wound, (0.4, -0.5), (0.0, 0.6), 1e-3),
+    "sleeve": (sleeved, (0.8, 0.4), (0.3, 0.3), 3e-3),
+    "slider": (ridden, (0.4, 0.3), (0.0, 0.2), 3e-3),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("made", "ends", "starts", "near"), MOVING.values(), ids=MOVING)
+def test_the_twins_forces_of_any_joint(made, ends, starts, near):
+    """All reactions, forces along links and sensors, under loads, of the largest of their unit: the
+    twin has no convective term."""
+    motion = [signals.polynomial(a, 0.5, start=b) for a, b in zip(ends, starts, strict=True)]
+    loads = [fx.Load(2, None, (0.3, 0.0)), fx.Load(1, 0.05, moment_N_m=0.2, frame="link")]
+    ours = fx.inverse(made(), T, motion, rtol=1e-8, internal_forces=True, loads=loads)
+    drive = fx.Drive.prescribed(*motion)
+    theirs = twin.simulate(made(), T, drive, elements=ELEMENTS, internal_forces=True, loads=loads)
+    kinds = ("reaction", "moment", "force", "sensor")
+    names = [name for name in theirs if any(kind in name for kind in kinds)]
+    assert len(names) > 30 and set(names) <= set(ours)
+    for name in names:
+        unit = ours.units[name]
+        scale = max(abs(ours[each]).max() for each in names if ours.units[each] == unit)
+        assert abs(ours[name] - theirs[name]).max() < near * scale, name

@@ -33,7 +33,8 @@ def told(found: Estimate) -> set[str]:
     return out if J.any() else set()
 
 
-def _without_effect(found: Estimate) -> list[str]:
+def without_effect(found: Estimate) -> list[str]:
+    """The names of parameters on which nothing that was compared depends."""
     J = found.derivatives.reshape(len(found.parameters), -1)
     size = np.linalg.norm(J, axis=1) * [_reach(u) for u in found.parameters]
     return [u.name for u, x in zip(found.parameters, size, strict=True) if x < 1e-6]
@@ -71,8 +72,11 @@ def sentences(search: Search, found: Estimate, quantities: Sequence[object]) -> 
         One a finding.
     """
     out = []
-    nothing = _without_effect(found)
-    out += [f"{name}: nothing that was compared depends on it" for name in nothing]
+    nothing = without_effect(found)
+    out += [
+        f"{name}: nothing that was compared depends on it; the robot file keeps its own value"
+        for name in nothing
+    ]
     mixed = [name for name in _mixed(found) if name not in nothing]
     if mixed:
         out.append(f"cannot be told apart by these runs: {', '.join(mixed)}; fix one of them")

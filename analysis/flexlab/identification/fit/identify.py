@@ -292,15 +292,22 @@ def _search(search: Search, progress: Callable[[float], None]) -> Estimate:
 def _concluded(
     described: fx.Robot, unknowns: Sequence[Unknown], search: Search, found: Estimate
 ) -> Identification:
-    told = findings.told(found)
+    told, idle = findings.told(found), findings.without_effect(found)
+    # what nothing depends on stays as it is, and what the file does not have stays away
+    kept = {u.name: u.file for u in unknowns if u.name in idle}
+    values = {**search.fixed, **found.values}
+    values = {**values, **{name: value for name, value in kept.items() if np.isfinite(value)}}
     quantities = []
     for u in unknowns:
         low, high = found.interval(u.name) if u.name in told else (np.nan, np.nan)
         edges = u.parameter.bounds
         low, high = max(low, min(edges)), min(high, max(edges))
-        quantities.append(Quantity(u.name, u.unit, u.file, found.values[u.name], low, high))
-    values = {**search.fixed, **found.values}
-    own = {key: value for key, value in values.items() if not of_channel(key)[0]}
+        quantities.append(Quantity(u.name, u.unit, u.file, values[u.name], low, high))
+    own = {
+        key: value
+        for key, value in values.items()
+        if not of_channel(key)[0] and np.isfinite(kept.get(key, 0.0))
+    }
     return Identification(
         described,
         described.replace(own) if own else described,

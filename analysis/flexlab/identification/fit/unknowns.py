@@ -24,6 +24,7 @@ from ..estimate import Parameter
 
 WIDEST = 20.0  # a value is sought between the first one's 20th part and its twentyfold
 STEP = 1e-3  # of a value, for differences
+COUNTS = ("elements", "modes", "format")  # whole numbers of a robot file
 OF_CHANNELS = {
     "gain": Bounds(0, math.inf, signed=True),
     "offset": Bounds(0, math.inf, signed=True),
@@ -124,6 +125,11 @@ def unknown_of_robot(robot: fx.Robot, key: str, start: float | None) -> Unknown:
         InputError: no such number, or one that gives the search nothing to begin with.
     """
     name = next((part for part in reversed(key.split(".")) if not part.isdigit()), key)
+    if name in COUNTS:
+        raise fx.InputError(
+            f"expected a quantity: {name} is a count, which a robot file has and no run tells",
+            key=key,
+        )
     # a table that the file does not have, as a transmission, is new
     value = (robot if start is None else robot.replace({key: start})).value(key)
     bounds = BOUNDS.get(name, Bounds(1e-12, 1e15))

@@ -9,7 +9,7 @@ sits at the cubics' r and r': linear in the coordinates too, so that its mass ma
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -29,6 +29,7 @@ STUB_MASS_RATIO = 1e-4  # mass per length of a stub, relative to the link's end
 # Exudyn's own integration points: more of them would see the axial strain between its points
 _AXIAL = np.polynomial.legendre.leggauss(5)
 _BENDING = np.polynomial.legendre.leggauss(3)
+_MOMENTS = np.polynomial.legendre.leggauss(4)  # exact for products of two cubics
 
 
 class CableLink:
@@ -150,6 +151,45 @@ class CableLink:
         """See `Part`."""
         k, value, _ = self._place(x)
         return np.einsum("k,tkd->td", value, _elements(q)[:, k])
+
+    def at(self, q: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """r, r' and r'' by x at x (T,) [m], (T, 2) each; of velocities and accelerations theirs.
+
+        Args:
+            q: coordinates of the part's nodes, or their derivatives by time (T, k).
+            x: distances from the origin (T,) [m].
+        """
+        length = self.values.length
+        k = np.clip((x / length).astype(int), 0, len(self.values) - 1)
+        own, shapes = _elements(q)[np.arange(len(q)), k], _shapes(x / length - k, length)
+        r, slope, bend = (np.einsum("kt,tkd->td", each, own) for each in shapes)
+        return r, slope, bend
+
+    def add_line(
+        self,
+        q: np.ndarray,
+        more: np.ndarray,
+        x: np.ndarray,
+        gravity: np.ndarray,
+        add: Callable[[np.ndarray, np.ndarray], None],
+    ) -> None:
+        """What the beam's mass beyond x takes, rho A (r'' - g) of its points (137), to be added.
+
+        Args:
+            q: coordinates of the part's nodes (T, k).
+            more: their accelerations (T, k).
+            x: distances from the origin (T,) [m].
+            gravity: [m/s^2].
+            add: takes places and forces, (T, 2) each.
+        """
+        length = self.values.length
+        for k, mass in enumerate(self.values.mass):
+            start = np.clip(x, k * length, (k + 1) * length)
+            size = (k + 1) * length - start
+            for u, w in zip(*_MOMENTS, strict=True):
+                at = start + 0.5 * (u + 1) * size
+                force = (0.5 * w * mass * size)[:, None] * (self.at(more, at)[0] - gravity)
+                add(self.at(q, at)[0], force)
 
     def axial_rates(self, q: np.ndarray) -> np.ndarray:
         """The rates of stretch that an inextensible line does not have, as rows on the rates.

@@ -60,9 +60,24 @@ class RigidLink:
         """See `Part`."""
         return self._motion(q, v, self.length)
 
-    def point(self, q: np.ndarray, x: complex) -> np.ndarray:
+    def point(self, q: np.ndarray, x: Any) -> np.ndarray:
         """See `Part`; across the link by the imaginary part of x."""
         return q[:, :2] + _turned(q[:, 2], x)
+
+    def acceleration(self, q: np.ndarray, v: np.ndarray, more: np.ndarray, x: Any) -> np.ndarray:
+        """The acceleration of a point.
+
+        Args:
+            q: coordinates (T, 3).
+            v: their rates (T, 3).
+            more: the rates of these (T, 3).
+            x: distance from the origin, across the link by its imaginary part [m].
+
+        Returns:
+            (T, 2) [m/s^2].
+        """
+        turn, spin = _turned(q[:, 2], 1j * x), _turned(q[:, 2], x)
+        return np.asarray(more[:, :2] + more[:, 2:3] * turn - v[:, 2:3] ** 2 * spin)
 
     def marker_at(self, mbs: Any, x: float) -> Any:
         """See `Part`."""
@@ -89,7 +104,7 @@ class RigidLink:
         return Motion(self.point(q, x), q[:, 2], speed, v[:, 2])
 
 
-def _turned(angle: np.ndarray, x: complex) -> np.ndarray:
+def _turned(angle: np.ndarray, x: Any) -> np.ndarray:
     """The vector x (real, imaginary) turned by angles (T,): (T, 2)."""
     out = x * np.exp(1j * angle)
     return np.stack([out.real, out.imag], axis=-1)
