@@ -48,13 +48,14 @@ nb::tuple run_population(const Counts &counts, const Cube &numbers, const Cube &
                          int stations, int threads, Watch &watch, const Vector &held,
                          const Mechanics *same) {
   const std::size_t robots = numbers.shape(0), links = counts.shape(0);
-  if (counts.shape(1) != COUNTS || numbers.shape(1) != links || numbers.shape(2) != NUMBERS ||
-      material.shape(0) != robots || material.shape(2) != MATERIAL || gravity.shape(0) != robots ||
-      lumps.shape(0) != robots || lumps.shape(2) != LUMP || gravity.shape(1) != 2 ||
-      payload.shape(0) != robots || payload.shape(1) != PAYLOAD || limits.shape(0) != robots ||
-      limits.shape(1) != links || limits.shape(2) != 2 || drive_of.shape(0) != robots ||
-      t.shape(0) < 1 || (held.shape(0) != 0 && held.shape(0) != robots * links))
-    throw std::invalid_argument("rows of another shape were expected");
+  expect(counts.shape(1) == COUNTS && numbers.shape(1) == links && numbers.shape(2) == NUMBERS &&
+             material.shape(0) == robots && material.shape(2) == MATERIAL &&
+             gravity.shape(0) == robots && lumps.shape(0) == robots && lumps.shape(2) == LUMP &&
+             gravity.shape(1) == 2 && payload.shape(0) == robots && payload.shape(1) == PAYLOAD &&
+             limits.shape(0) == robots && limits.shape(1) == links && limits.shape(2) == 2 &&
+             drive_of.shape(0) == robots && t.shape(0) >= 1 &&
+             (held.shape(0) == 0 || held.shape(0) == robots * links),
+         "rows of another shape were expected");
   Population population;
   Table &table = population.robots;
   table.count = int(robots), table.links = int(links), table.intervals = int(material.shape(1)),
@@ -63,20 +64,19 @@ nb::tuple run_population(const Counts &counts, const Cube &numbers, const Cube &
   table.payload = payload.data(), table.lumps = int(lumps.shape(1)), table.lump = lumps.data();
   population.limits = limits.data();
   for (const PackedDrive *drive : drives) {
-    if (drive->acting.joints.size() != links)
-      throw std::invalid_argument("drives need an entry a joint");
+    expect(drive->acting.joints.size() == links, "drives need an entry a joint");
     population.drives.push_back(drive->acting);
   }
   for (std::size_t k = 0; k < robots; ++k) {
-    if (drive_of.data()[k] < 0 || std::size_t(drive_of.data()[k]) >= drives.size())
-      throw std::invalid_argument("there is no such drive");
+    expect(drive_of.data()[k] >= 0 && std::size_t(drive_of.data()[k]) < drives.size(),
+           "there is no such drive");
     population.drive_of.push_back(int(drive_of.data()[k]));
   }
   population.times.assign(t.data(), t.data() + t.shape(0));
   population.q.assign(q.data(), q.data() + q.shape(0)),
       population.v.assign(v.data(), v.data() + v.shape(0));
   if (same) {
-    if (same->model->first.size() != links) throw std::invalid_argument("another robot");
+    expect(same->model->first.size() == links, "another robot");
     population.same = same->model;
   }
   population.held.assign(held.data(), held.data() + held.shape(0));
