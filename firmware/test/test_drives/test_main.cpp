@@ -87,6 +87,8 @@ static void both_motors_hold_their_set_points() {
   turning(2);
   const Arm arm = {static_cast<uint8_t>(Mode::position)};
   CHECK(ask(Arm::kCode, &arm) == Result::ok);
+  tick();
+  CHECK(rig.state() == State::armed && out.duty[0] == 0 && out.duty[1] == 0);
   Setpoints points = {};
   points.count = 2;
   points.final = 1;
@@ -197,11 +199,32 @@ static void a_motor_needs_its_pins_and_its_encoder() {
   CHECK(ask(ConfigWrite::kCode, &write) == Result::ok && rig.wrong_item() == ITEM(drive_2));
 }
 
+static Result written(Item item, float value) {
+  const ConfigWrite write = {static_cast<uint8_t>(item), value};
+  CHECK(ask(ConfigWrite::kCode, &write) == Result::ok && rig.wrong_item() == kAllValid);
+  const Arm arm = {static_cast<uint8_t>(Mode::open_loop)};
+  const Result armed = ask(Arm::kCode, &arm);
+  if (armed == Result::ok) CHECK(ask(Stop::kCode) == Result::ok);
+  const Reference reference = {0, 0, 0};
+  CHECK(ask(Reference::kCode, &reference) == Result::ok);
+  return armed;
+}
+
+static void another_drive_or_encoder_asks_for_a_reference_anew() {
+  turning(1);
+  CHECK(written(Item::kp_1_V_rad, 6.0f) == Result::ok);
+  CHECK(written(Item::drive_2, 0.0f) == Result::not_referenced);
+  CHECK(written(Item::drive_2, 1.0f) == Result::not_referenced);
+  CHECK(written(Item::encoder_2, 0.0f) == Result::not_referenced);
+  CHECK(written(Item::kp_1_V_rad, 5.0f) == Result::ok);
+}
+
 static void tests() {
   RUN(a_motor_at_joint_2_is_watched_as_one_at_joint_1);
   RUN(both_motors_hold_their_set_points);
   RUN(a_rig_of_one_joint_moves_and_hears_nothing_of_a_second);
   RUN(a_stepper_without_an_encoder_is_where_its_pulses_are);
   RUN(a_motor_needs_its_pins_and_its_encoder);
+  RUN(another_drive_or_encoder_asks_for_a_reference_anew);
 }
 CHECK_MAIN(tests())

@@ -417,6 +417,16 @@ static void speeds() {
     }
 }
 
+static void nothing_drives_joint_1() {
+  begin();
+  now.duty[0] = 100;
+  CHECK(until(Fault::stall_1) == 30);
+  begin();
+  limits.drive[0] = Drive::none;
+  now.duty[0] = 100;
+  CHECK(quiet(60));
+}
+
 static void silence_and_all_others() {
   both(silence);
   both(switches_and_their_order);
@@ -427,7 +437,10 @@ static void edges_of_one_line_alone() {
   both(lone_edges_of_joint_1);
   both(lone_edges_of_joint_2);
 }
-static void a_motor_that_stands_or_runs_away() { both(running_away_and_standing_still); }
+static void a_motor_that_stands_or_runs_away() {
+  both(running_away_and_standing_still);
+  both(nothing_drives_joint_1);
+}
 static void a_stepper_that_does_not_follow() { both(steps_that_are_lost); }
 static void joints_out_of_their_place() { both(places); }
 static void joints_that_are_too_fast() { both(speeds); }

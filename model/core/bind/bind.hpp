@@ -12,6 +12,7 @@
 
 #include <cstddef>
 #include <initializer_list>
+#include <stdexcept>
 
 namespace flexura {
 
@@ -20,6 +21,11 @@ namespace nb = nanobind;
 using Vector = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using Matrix = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using Array = nb::ndarray<nb::numpy, double, nb::c_contig>;
+
+// Refuses arrays that do not fit each other.
+inline void expect(bool good, const char *text) {
+  if (!good) throw std::invalid_argument(text);
+}
 
 // An array of zeros that NumPy owns.
 inline Array new_array(std::initializer_list<std::size_t> shape) {

@@ -11,23 +11,11 @@
 namespace flexura {
 namespace {
 
-void expect(bool good, const char *text) {
-  if (!good) throw std::invalid_argument(text);
-}
-
 using Cube = nb::ndarray<const double, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 
 template <class Any>
 std::vector<double> numbers(const Any &array) {
   return std::vector<double>(array.data(), array.data() + array.size());
-}
-
-Signal signal_of(const Matrix &segments, std::int64_t from, std::int64_t to) {
-  expect(segments.shape(1) == 10, "segments have ten numbers");
-  expect(0 <= from && from <= to && std::size_t(to) <= segments.shape(0),
-         "there are no such segments");
-  const Segment *rows = reinterpret_cast<const Segment *>(segments.data());
-  return Signal(rows + from, rows + to);
 }
 
 // (F, G, L, C, K, Kr, Kv), (offset, hold); none: there is no linear law.

@@ -17,10 +17,11 @@ void advance(const Copies &copies, const Rows &q, const Rows &v, const Matrix &f
   const auto shaped = [](const auto &array, std::size_t rows, std::size_t columns) {
     return array.shape(0) == rows && array.shape(1) == columns;
   };
-  if (!shaped(q, count, n) || !shaped(v, count, n) || !shaped(force, count, joints) ||
-      !shaped(limits, 2, joints) || !shaped(deflection, count, bending) || !shaped(tip, count, 2) ||
-      moves.shape(0) != count || arrived.shape(0) != count)
-    throw std::invalid_argument("rows of another shape were expected");
+  expect(shaped(q, count, n) && shaped(v, count, n) && shaped(force, count, joints) &&
+             shaped(limits, 2, joints) && shaped(deflection, count, bending) &&
+             shaped(tip, count, 2) && moves.shape(0) == count && arrived.shape(0) == count &&
+             steps > 0 && threads > 0,
+         "rows of another shape were expected");
   const Copies::States states{int(count),    q.data(),          v.data(),
                               force.data(),  limits.data(),     limits.data() + joints,
                               moves.data(),  deflection.data(), tip.data(),

@@ -14,10 +14,6 @@
 namespace flexura {
 namespace {
 
-void expect(bool good, const char *text) {
-  if (!good) throw std::invalid_argument(text);
-}
-
 Array accelerations(const Mechanics &self, const Vector &q, const Vector &v, const Vector &force) {
   const Model<double> &model = *self.model;
   const std::size_t n = std::size_t(model.n), links = model.first.size();

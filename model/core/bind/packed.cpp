@@ -6,26 +6,22 @@
 #include "control/backlash.hpp"
 
 namespace flexura {
-namespace {
 
 Signal signal_of(const Matrix &segments, std::int64_t from, std::int64_t to) {
-  Signal out;
-  for (std::int64_t k = from; k < to; ++k) {
-    Segment row;
-    std::copy_n(segments.data() + 10 * k, 10, reinterpret_cast<double *>(&row));
-    out.push_back(row);
-  }
-  return out;
+  expect(segments.shape(1) == 10, "segments have ten numbers");
+  expect(0 <= from && from <= to && std::size_t(to) <= segments.shape(0),
+         "there are no such segments");
+  const Segment *rows = reinterpret_cast<const Segment *>(segments.data());
+  return Signal(rows + from, rows + to);
 }
-
-}  // namespace
 
 Inputs acting_of(const Matrix &segments, const Ranges &ranges, const Matrix &gains,
                  const Flags &prescribed, const Flags &sampled, const Matrix &limits) {
   const std::size_t joints = ranges.shape(0);
-  if (segments.shape(1) != 10 || ranges.shape(1) != 4 || gains.shape(0) != joints ||
-      limits.shape(0) != joints)
-    throw std::invalid_argument("drives of another shape were expected");
+  expect(ranges.shape(1) == 4 && gains.shape(0) == joints && gains.shape(1) == 2 &&
+             prescribed.shape(0) == joints && sampled.shape(0) == joints &&
+             limits.shape(0) == joints && limits.shape(1) == 2,
+         "drives of another shape were expected");
   Inputs acting((int(joints)));
   for (std::size_t i = 0; i < joints; ++i) {
     JointDrive &joint = acting.joints[i];
@@ -39,11 +35,11 @@ Inputs acting_of(const Matrix &segments, const Ranges &ranges, const Matrix &gai
 }
 
 std::vector<LoadPlace> load_places_of(const Matrix &rows, int links) {
-  if (rows.shape(1) != 3) throw std::invalid_argument("loads of another shape were expected");
+  expect(rows.shape(1) == 3, "loads of another shape were expected");
   std::vector<LoadPlace> out(rows.shape(0));
   for (std::size_t a = 0; a < out.size(); ++a) {
     const double *row = rows.data() + 3 * a;
-    if (!(0.0 <= row[0] && row[0] < links)) throw std::invalid_argument("there is no such link");
+    expect(0.0 <= row[0] && row[0] < links, "there is no such link");
     out[a].link = int(row[0]), out[a].at = row[1], out[a].follower = row[2] != 0.0;
   }
   return out;
@@ -55,8 +51,8 @@ void add_loads(Inputs &acting, const nb::object &loads) {
   const Matrix rows = nb::cast<Matrix>(parts[0]), segments = nb::cast<Matrix>(parts[2]);
   const Ranges ranges = nb::cast<Ranges>(parts[1]);
   const std::vector<LoadPlace> places = load_places_of(rows, int(acting.joints.size()));
-  if (ranges.shape(0) != places.size() || ranges.shape(1) != 6 || segments.shape(1) != 10)
-    throw std::invalid_argument("loads of another shape were expected");
+  expect(ranges.shape(0) == places.size() && ranges.shape(1) == 6,
+         "loads of another shape were expected");
   for (std::size_t a = 0; a < places.size(); ++a) {
     PointLoad load;
     load.place = places[a];

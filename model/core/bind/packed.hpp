@@ -8,6 +8,9 @@ namespace flexura {
 using Flags = nb::ndarray<const std::uint8_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using Ranges = nb::ndarray<const std::int64_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
+// Rows `from` to `to` of segments (N, 10).
+Signal signal_of(const Matrix &segments, std::int64_t from, std::int64_t to);
+
 // Drives of the joints: rows of signals, their ranges (joints, 4) [force from, to; motion from,
 // to], gains (joints, 2), flags.
 Inputs acting_of(const Matrix &segments, const Ranges &ranges, const Matrix &gains,

@@ -49,13 +49,13 @@ nb::tuple run_population(const Counts &counts, const Cube &numbers, const Cube &
                          long most_steps, const std::vector<std::pair<std::string, int>> &channels,
                          int stations, int threads, Watch &watch) {
   const std::size_t robots = numbers.shape(0), links = counts.shape(0);
-  if (counts.shape(1) != COUNTS || numbers.shape(1) != links || numbers.shape(2) != NUMBERS ||
-      material.shape(0) != robots || material.shape(2) != MATERIAL || gravity.shape(0) != robots ||
-      lumps.shape(0) != robots || lumps.shape(2) != LUMP || gravity.shape(1) != 2 ||
-      payload.shape(0) != robots || payload.shape(1) != PAYLOAD || limits.shape(0) != robots ||
-      limits.shape(1) != links || limits.shape(2) != 2 || drive_of.shape(0) != robots ||
-      t.shape(0) < 1)
-    throw std::invalid_argument("rows of another shape were expected");
+  expect(counts.shape(1) == COUNTS && numbers.shape(1) == links && numbers.shape(2) == NUMBERS &&
+             material.shape(0) == robots && material.shape(2) == MATERIAL &&
+             gravity.shape(0) == robots && lumps.shape(0) == robots && lumps.shape(2) == LUMP &&
+             gravity.shape(1) == 2 && payload.shape(0) == robots && payload.shape(1) == PAYLOAD &&
+             limits.shape(0) == robots && limits.shape(1) == links && limits.shape(2) == 2 &&
+             drive_of.shape(0) == robots && t.shape(0) >= 1,
+         "rows of another shape were expected");
   Population population;
   Table &table = population.robots;
   table.count = int(robots), table.links = int(links), table.intervals = int(material.shape(1)),
@@ -64,13 +64,12 @@ nb::tuple run_population(const Counts &counts, const Cube &numbers, const Cube &
   table.payload = payload.data(), table.lumps = int(lumps.shape(1)), table.lump = lumps.data();
   population.limits = limits.data();
   for (const PackedDrive *drive : drives) {
-    if (drive->acting.joints.size() != links)
-      throw std::invalid_argument("drives need an entry a joint");
+    expect(drive->acting.joints.size() == links, "drives need an entry a joint");
     population.drives.push_back(drive->acting);
   }
   for (std::size_t k = 0; k < robots; ++k) {
-    if (drive_of.data()[k] < 0 || std::size_t(drive_of.data()[k]) >= drives.size())
-      throw std::invalid_argument("there is no such drive");
+    expect(drive_of.data()[k] >= 0 && std::size_t(drive_of.data()[k]) < drives.size(),
+           "there is no such drive");
     population.drive_of.push_back(int(drive_of.data()[k]));
   }
   population.times.assign(t.data(), t.data() + t.shape(0));

@@ -99,9 +99,9 @@ struct Running {
           bool numerical_damping, long most_steps, const nb::object &loads)
       : function(std::move(function_)), sampler(std::move(sampler_)) {
     const std::size_t n = std::size_t(robot.model->n);
-    if (q.shape(0) != n || v.shape(0) != n || t.shape(0) < 1 ||
-        ranges.shape(0) != robot.model->first.size())
-      throw std::invalid_argument("a run of another robot was expected");
+    expect(q.shape(0) == n && v.shape(0) == n && t.shape(0) >= 1 &&
+               ranges.shape(0) == robot.model->first.size(),
+           "a run of another robot was expected");
     Inputs acting = acting_of(segments, ranges, gains, prescribed, sampled, limits);
     add_loads(acting, loads);
     if (nb::isinstance<nb::tuple>(function)) {  // of contacts: as backlash_of takes them
@@ -166,6 +166,8 @@ struct Running {
 };
 
 Array bends_of(const Mechanics &self, const Matrix &q, int link) {
+  expect(q.shape(1) == std::size_t(self.model->n), "q needs a column an unknown");
+  expect(0 <= link && link < self.model->links(), "there is no such link");
   Workspace<double> work(*self.model);
   Array out = new_array({q.shape(0), 2});
   for (std::size_t k = 0; k < q.shape(0); ++k) {

@@ -16,20 +16,18 @@ namespace {
 using Flags = nb::ndarray<const std::uint8_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
 void check_state(const Mechanics &self, const Vector &q) {
-  if (q.shape(0) != std::size_t(self.model->n))
-    throw std::invalid_argument("q needs an entry an unknown");
+  expect(q.shape(0) == std::size_t(self.model->n), "q needs an entry an unknown");
 }
 
 TipLoad load_of(const Vector &load) {
-  if (load.shape(0) != 3) throw std::invalid_argument("a load is two forces and a moment");
+  expect(load.shape(0) == 3, "a load is two forces and a moment");
   TipLoad out;
   out.force[0] = load.data()[0], out.force[1] = load.data()[1], out.moment = load.data()[2];
   return out;
 }
 
 std::vector<char> free_joints(const Mechanics &self, const Flags &free) {
-  if (free.shape(0) != self.model->first.size())
-    throw std::invalid_argument("a flag a joint was expected");
+  expect(free.shape(0) == self.model->first.size(), "a flag a joint was expected");
   std::vector<char> out(free.data(), free.data() + free.shape(0));
   for (std::size_t i = 0; i < out.size(); ++i) out[i] = out[i] && !self.model->locked[i];
   return out;
@@ -76,6 +74,7 @@ Array mass_of(const Mechanics &self, const Vector &q) {
 
 Array stiffness_of(const Mechanics &self, const Vector &q, const Vector &v) {
   check_state(self, q);
+  if (v.shape(0) != 0) check_state(self, v);
   Array out = new_array({q.shape(0), q.shape(0)});
   stiffness_matrix(*self.model, q.data(), v.shape(0) ? v.data() : nullptr, TipLoad{}, out.data());
   return out;
@@ -94,8 +93,8 @@ nb::tuple force_derivatives_of(const Mechanics &self, const Matrix &q, const Mat
                                const Matrix &a) {
   const std::size_t n = std::size_t(self.model->n), count = q.shape(0), square = n * n;
   for (const Matrix *x : {&q, &v, &a})
-    if (x->shape(1) != n || x->shape(0) != count)
-      throw std::invalid_argument("q, v and a need a row a state and a column an unknown");
+    expect(x->shape(1) == n && x->shape(0) == count,
+           "q, v and a need a row a state and a column an unknown");
   Array force = new_array({count, n}), by_position = new_array({count, n, n}),
         by_rate = new_array({count, n, n}), by_acceleration = new_array({count, n, n}),
         tip = new_array({count, 2}), tip_by_position = new_array({count, 2, n});
@@ -121,9 +120,9 @@ nb::tuple steps_of(PredictedMotion &self, const Matrix &x, const Matrix &u, cons
                    const Vector &h) {
   const std::size_t T = h.shape(0), n = std::size_t(self.states()), m = n / 2,
                     p = std::size_t(self.inputs());
-  if (!(x.shape(0) == T && x.shape(1) == n && u.shape(0) == T && u.shape(1) == p &&
-        a.shape(0) == T && a.shape(1) == m))
-    throw std::invalid_argument("x, u and a need a row an interval");
+  expect(x.shape(0) == T && x.shape(1) == n && u.shape(0) == T && u.shape(1) == p &&
+             a.shape(0) == T && a.shape(1) == m,
+         "x, u and a need a row an interval");
   Array R = new_array({T, n, n}), G = new_array({T, n, p}), d = new_array({T, n}),
         rates = new_array({T, m});
   std::copy_n(a.data(), T * m, rates.data());
@@ -145,12 +144,12 @@ nb::tuple condensed_of(const Cube &R, const Cube &G, const Matrix &d, const Matr
                        const Matrix &end, const Matrix &limited) {
   const std::size_t N = R.shape(0), n = R.shape(1), p = G.shape(2), V = N * p,
                     rows = limited.shape(0);
-  if (!(R.shape(2) == n && G.shape(0) == N && G.shape(1) == n && d.shape(0) == N &&
-        d.shape(1) == n && x.shape(0) == N + 1 && x.shape(1) == n && u.shape(0) == N &&
-        u.shape(1) == p && start.shape(0) == n && wanted.shape(0) == N && wanted.shape(1) == n &&
-        W.shape(0) == N && W.shape(2) == n && end.shape(0) == n && end.shape(1) == n &&
-        limited.shape(1) == n))
-    throw std::invalid_argument("matrices of a program with N intervals were expected");
+  expect(R.shape(2) == n && G.shape(0) == N && G.shape(1) == n && d.shape(0) == N &&
+             d.shape(1) == n && x.shape(0) == N + 1 && x.shape(1) == n && u.shape(0) == N &&
+             u.shape(1) == p && start.shape(0) == n && wanted.shape(0) == N &&
+             wanted.shape(1) == n && W.shape(0) == N && W.shape(2) == n && end.shape(0) == n &&
+             end.shape(1) == n && limited.shape(1) == n,
+         "matrices of a program with N intervals were expected");
   TickProgram program;
   program.N = int(N), program.n = int(n), program.inputs = int(p);
   program.outputs = int(W.shape(1)), program.rows = int(rows);

@@ -79,7 +79,7 @@ void check_masses(const Model<double> &model, const Robot &robot) {
   const Stage<double> plain{q.data(), zero.data(), 0.0, 0.0, nullptr, nullptr};
   accelerate(model, work, q.data(), zero.data(), plain, zero.data(),
              Held<double>{held.data(), given.data(), reaction.data()}, a.data());
-  for (std::size_t i = 0; i < model.pieces.size(); ++i) {
+  for (std::size_t i = model.pieces.size(); i-- > 0;) {  // a fault spoils the pivots before it
     const Piece<double> &c = model.pieces[i];
     if (c.m > 0 && int(i) < model.line[std::size_t(c.link)]) {
       const double pivot = 1.0 / work.kept[i].inverses[0];

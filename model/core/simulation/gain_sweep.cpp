@@ -1,6 +1,7 @@
 #include "simulation/gain_sweep.hpp"
 
 #include <atomic>
+#include <stdexcept>
 #include <thread>
 
 #include "integration/time_loop.hpp"
@@ -56,6 +57,8 @@ class Trial {
     method = plan.method == "auto"
                  ? method_for_ticks(*plan.robot, acting, plan.start.data(), plan.rtol)
                  : plan.method;
+    if (!make_method(method, loop.integration))
+      throw std::invalid_argument("there is no method " + method);
   }
 
   std::string method;

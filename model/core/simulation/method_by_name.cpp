@@ -1,6 +1,5 @@
 #include "simulation/method_by_name.hpp"
 
-#include <cmath>
 #include <cstdio>
 
 #include "integration/exponential/exponential.hpp"
@@ -28,9 +27,6 @@ const char *method_for_ticks(double rate_Hz, double fastest, double rtol) {
   if (rtol < SHARPEST) return "explicit";
   if (fastest > 2.0 * Explicit<double>::STABLE * rate_Hz)
     return rtol >= LOOSE ? TR_BDF2.name : ESDIRK_4.name;  // explicit steps would be many a tick
-  const double turns = fastest / rate_Hz, three = 3.0 * std::ceil(turns / PAIR_3.stable),
-               eight = 13.0 * std::ceil(turns / Explicit<double>::STABLE);
-  if (eight < three) return "explicit";
   return rtol >= 1e-6 ? PAIR_3.name : PAIR_5.name;
 }
 

@@ -1,5 +1,7 @@
 #include "simulation/simulation.hpp"
 
+#include <stdexcept>
+
 #include "control/model_plant.hpp"
 #include "simulation/method_selection.hpp"
 
@@ -23,9 +25,11 @@ struct Simulation::Parts {
         loop(plant, &acting_pointer, request.times, request.rtol),
         method(make_method<double>(request.method, loop.integration, request.rtol,
                                    {request.numerical_damping})) {
-    if (!method)
-      selection = std::make_unique<MethodSelection>(loop, request.rtol,
-                                                    ExponentialOptions{request.numerical_damping});
+    if (method) return;
+    if (request.method != "auto")
+      throw std::invalid_argument("there is no method " + request.method);
+    selection = std::make_unique<MethodSelection>(loop, request.rtol,
+                                                  ExponentialOptions{request.numerical_damping});
   }
 };
 

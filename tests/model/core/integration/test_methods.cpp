@@ -202,13 +202,3 @@ TEST("a robot that stands still, with a locked joint, takes long steps") {
     CHECK(run.state(2)[0] == 0.0 && run.state(2)[run.model.n - 1] == 0.0);
   }
 }
-
-TEST("the end of a run in a sentence") {
-  RunState run_state;
-  run_state.status = Status::limit, run_state.joint = 1, run_state.t = 0.25;
-  CHECK(explain(run_state, "implicit", 1e-6) == "joint 2 meets its limit at t = 0.25 s");
-  run_state.status = Status::stuck, run_state.elastic = run_state.rate = true,
-  run_state.step = 1e-17;
-  CHECK(explain(run_state, "implicit", 1e-6).find("the rate of bending of link 2") !=
-        std::string::npos);
-}
