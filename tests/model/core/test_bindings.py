@@ -269,7 +269,6 @@ WRONG: list[tuple[str, dict[str, Any], str]] = [
     ("population", {"drive_of": np.array([0, 1, 0])}, "no such drive"),
     ("population", {"drive_of": np.array([0, -1, 0])}, "no such drive"),
     ("population", {"channels": [("colour", 0)]}, "no channel colour"),
-    ("population from states", {"same": OTHER}, "another robot"),
     ("vibration_lower_bound", {"seen": -1}, "not so many"),
     ("vibration_lower_bound", {"seen": 4}, "not so many"),
     ("board_pulses", {"period_log2": -1}, "1 to 64 ticks"),

@@ -20,7 +20,8 @@ TEST(force_is_that_of_the_flank_and_none_between) {
   const double v[] = {0.0, 0.0, 7.0};
   const struct {
     double place, force;
-  } cases[] = {{0.7, 0.0}, {0.61, 0.0}, {0.85, -100.0 * 0.05 - 3.0 * 5.0}, {0.5, 100.0 * 0.1 - 15.0}};
+  } cases[] = {
+      {0.7, 0.0}, {0.61, 0.0}, {0.85, -100.0 * 0.05 - 3.0 * 5.0}, {0.5, 100.0 * 0.1 - 15.0}};
   for (const auto &each : cases) {
     const double q[] = {9.0, 9.0, each.place};
     double force[] = {1.0, 1.0};
