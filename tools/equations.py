@@ -2,6 +2,9 @@
 
     python tools/equations.py            writes the table
     python tools/equations.py --check    status 1 if the table is not up to date
+    python tools/equations.py --renumber numbers all equations anew in the order of the chapters,
+                                         wherever they are cited: for one that was put between
+
 
 A numbered equation stands in a chapter as
 
@@ -19,15 +22,22 @@ several as (7) to (9). A test in tests/docs says in its docstring which equation
 from __future__ import annotations
 
 import ast
+import io
 import re
 import sys
-from collections.abc import Iterator
+import tokenize
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent
 THEORY, TESTS = "docs/theory", "tests/docs"
 PYTHON, CPP = "model/flexura", ("model/core", "firmware/lib")
+# where equations are cited
+PAGES = ("docs/**/*.md", "*.md", "examples/**/*.md", "examples/**/*.ipynb", "examples/*.py")
+PAGES += tuple(f"{part}/**/*.{kind}" for part in ("model", "analysis") for kind in ("py", "md"))
+PAGES += ("model/core/**/*.[hc]pp", "firmware/**/*.md", "firmware/lib/**/*.h", "tests/**/*.py")
+PAGES += ("firmware/lib/**/*.cpp", "tests/model/core/**/*.[hc]pp")
 HEAD = """# Table of equations
 
 `python tools/equations.py` writes this page. Do not edit it.
@@ -168,8 +178,65 @@ def table(root: Path = ROOT) -> str:
     return "".join(out)
 
 
+def renumber(root: Path = ROOT) -> dict[int, int]:
+    """Numbers the equations from 1 in the order in which they stand, and all that cites them.
+
+    Citations are looked for in pages, in comments and strings of Python, in comments of C++.
+
+    Returns: the numbers that change, by the old ones.
+
+    Raises: ValueError: a number stands twice.
+    """
+    old = [e.number for e in equations(root)]
+    if twice := sorted({n for n in old if old.count(n) > 1}):
+        raise ValueError(f"numbers that stand twice: {twice}")
+    new = {n: k for k, n in enumerate(old, 1) if n != k}
+    number = lambda found: str(new.get(int(found[0]), int(found[0])))
+    cite = lambda found: re.sub(r"\d+", number, found[0])
+
+    def prose(text: str) -> str:
+        text = re.sub(
+            r"\beq-\d+|\\tag\{\d+\}|^ *Equations: [\d, ]+$", cite, text, flags=re.MULTILINE
+        )
+        return _CITATION.sub(cite, text)
+
+    for path in sorted(p for kind in PAGES for p in root.glob(kind)):
+        text = path.read_text(encoding="utf-8")
+        if path.suffix == ".py":
+            changed = _prose_of_python(text, prose)
+        elif path.suffix in (".cpp", ".hpp", ".h"):
+            changed = _COMMENT.sub(lambda comment: prose(comment[0]), text)
+        else:
+            changed = prose(text)
+        if changed != text:
+            path.write_text(changed, encoding="utf-8")
+    return new
+
+
+def _prose_of_python(text: str, change: Callable[[str], str]) -> str:
+    """A Python source with its comments and strings changed, and nothing else."""
+    lines, out = text.splitlines(keepends=True), []
+    row, column = 1, 0
+    for token in tokenize.generate_tokens(io.StringIO(text).readline):
+        if token.type not in (tokenize.COMMENT, tokenize.STRING):
+            continue
+        out += _between(lines, (row, column), token.start), change(token.string)
+        row, column = token.end
+    return "".join([*out, _between(lines, (row, column), (len(lines) + 1, 0))])
+
+
+def _between(lines: list[str], start: tuple[int, int], end: tuple[int, int]) -> str:
+    """The text from one place, its row from 1 and its column, to another one."""
+    if start[0] == end[0]:
+        return lines[start[0] - 1][start[1] : end[1]]
+    last = lines[end[0] - 1][: end[1]] if end[0] <= len(lines) else ""
+    return "".join([lines[start[0] - 1][start[1] :], *lines[start[0] : end[0] - 1], last])
+
+
 def main() -> int:
     """Writes the table, or compares it with the file."""
+    if "--renumber" in sys.argv[1:]:
+        print("\n".join(f"({a}) is ({b})" for a, b in renumber().items()))
     path, made = ROOT / THEORY / "equations.md", table()
     if "--check" in sys.argv[1:]:
         if path.exists() and path.read_text(encoding="utf-8") == made:

@@ -112,3 +112,23 @@ def test_a_number_without_a_name_is_refused(tmp_path):
     (tmp_path / "docs" / "theory" / "01-x.md").write_text("$$ a = b \\tag{1} $$")
     with pytest.raises(ValueError, match=r"01-x\.md"):
         table.equations(tmp_path)
+
+
+def test_renumbering_changes_citations_and_nothing_else(tmp_path):
+    """An equation that was put between the first two."""
+    chapter = tmp_path / "docs" / "theory" / "01-a.md"
+    code = tmp_path / "model" / "flexura" / "a.py"
+    for path in (chapter, code):
+        path.parent.mkdir(parents=True)
+    entry = '<a id="eq-{0}"></a>**Name {0}.**\n\n$$\nx = {0} \\tag{{{0}}}\n$$\n'
+    chapter.write_text("".join(entry.format(n) for n in (1, 3, 2)) + "By (1) to (2), (12).\n")
+    code.write_text('def f(x):\n    """As (2), (3)."""\n    return (2) + x[(3)]  # (2)\n')
+    assert table.renumber(tmp_path) == {3: 2, 2: 3}
+    assert [e.number for e in table.equations(tmp_path)] == [1, 2, 3]
+    assert "x = 3 \\tag{2}" in chapter.read_text() and "By (1) to (3), (12)." in chapter.read_text()
+    assert code.read_text() == (
+        'def f(x):\n    """As (3), (2)."""\n    return (2) + x[(3)]  # (3)\n'
+    )
+    chapter.write_text(entry.format(1) * 2)
+    with pytest.raises(ValueError, match="twice"):
+        table.renumber(tmp_path)

@@ -177,7 +177,10 @@ def test_the_method_that_gets_furthest_a_pass():
 
 
 def test_step_of_a_given_length():
-    """(165) with matrices, of a clamped link that is linear."""
+    """Of a clamped link that is linear, with matrices.
+
+    Equations: 165
+    """
     system, M, K = clamped(damping={"beta_s": 2e-3})
     h, gamma = 4e-3, 1 - 1 / np.sqrt(2)
     q, v = np.array([[0.0, 2e-7, -1e-7]]), np.array([[0.0, 3e-6, 2e-6]])
