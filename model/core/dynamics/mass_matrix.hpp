@@ -5,16 +5,16 @@
 namespace flexura {
 
 // The inertia of a piece and of all beyond it, with no unknown eliminated: (48).
-template <class Real, class R, class Size>
-inline void composite(const Piece<Real> &c, R &rows, int row, Size m, int flow, Vec3<Real> *wrench,
-                      Sym3<Real> &A, Real *M, int n) {
+template <class Real, int MOST, int FLOW, class Size>
+inline void composite(const Piece<Real> &c, Rows<Real, MOST, FLOW> &rows, int row, Size m,
+                      Vec3<Real> *wrench, Sym3<Real> &A, Real *M, int n) {
   const int own = c.own();
   for (int i = 0; i < m; ++i) {
     wrench[own + i] = {rows.x[1 + i], rows.y[1 + i], rows.row[0][1 + i]};
     for (int l = i; l < m; ++l) M[(own + i) * n + own + l] = rows.row[1 + i][1 + l];
-    if (flow) M[row * n + own + i] = rows.row[1 + i][m + 1];
+    if constexpr (FLOW > 0) M[row * n + own + i] = rows.row[1 + i][m + 1];
   }
-  if (flow)
+  if constexpr (FLOW > 0)
     wrench[row] = {rows.x[m + 1], rows.y[m + 1], rows.row[0][m + 1]},
     M[row * n + row] = rows.row[m + 1][m + 1] + c.rotor;
   A = {rows.xx, rows.xy, rows.x[0], rows.yy, rows.y[0], rows.row[0][0]};
@@ -49,13 +49,13 @@ void mass_matrix(const Model<Real> &model, Workspace<Real> &work, const Real *y,
       SleeveRows<Real> rows;
       sleeve_rows(c, k, y, rest, last, rows);
       if (!last) add_beyond(rows, k, m, 1, stride, beyond);
-      composite(c, rows, row, Free{m}, 1, wrench, A, M, n);
+      composite(c, rows, row, Free{m}, wrench, A, M, n);
     } else {
       sized<Real, false>(c.m, c.P, [&](auto fixed, auto P) {
         Rows<Real, decltype(fixed)::most, 0> rows;
         elastic_rows(c, k, last, fixed, P, rows);
         if (!last) add_beyond(rows, k, m, 0, stride, beyond);
-        composite(c, rows, row, fixed, 0, wrench, A, M, n);
+        composite(c, rows, row, fixed, wrench, A, M, n);
       });
     }
     beyond.A = A;
