@@ -125,9 +125,7 @@ def _carried(robot: fx.Robot, axis: MotorAxis) -> float:
     return float(system.mass(system.start())[row, row]) - own
 
 
-def _alone(
-    axis: MotorAxis, line: JointLine, values: dict[str, float], moved: float
-) -> fx.System:
+def _alone(axis: MotorAxis, line: JointLine, values: dict[str, float], moved: float) -> fx.System:
     """The joint and a rigid body of `moved` [kg or kg m^2], from 0 and without limits."""
     if axis.turns:
         joint = {

@@ -13,7 +13,6 @@ third degree over time, are projected out. Residuals are in units of their noise
 
 from __future__ import annotations
 
-import functools
 from typing import Any
 
 import numpy as np
@@ -34,7 +33,7 @@ from ..comparison.replay.smoothing import (
 )
 from ..comparison.replay.stepper_relaxation import RelaxationState, simulate_with_stepper
 from ..recordings.unit_conversion import voltage_channel
-from ..rig.axes import MotorAxis, motor_axes
+from ..rig.axes import motor_axes
 from ..rig.description import Rig, strip_of
 from ..rig.plant.stepper import MagneticSpring
 from ..rig.plant.strip_sensor import StripSensor

@@ -86,9 +86,7 @@ def _check_end(raw: bytes, file: str) -> None:
     wide = raw[begin + (13 if version < 2 else 9)]
     # version 0 has 24 bytes before the addresses, version 1 four more, versions 2 and 3 have 12
     first = begin + {0: 24, 1: 28}.get(version, 12)
-    base, end = (
-        int.from_bytes(raw[at : at + wide], "little") for at in (first, first + 2 * wide)
-    )
+    base, end = (int.from_bytes(raw[at : at + wide], "little") for at in (first, first + 2 * wide))
     if len(raw) > end and len(raw) != base + end:
         said = f"{len(raw)} bytes, its head says {end}"
         raise InputError(f"a damaged HDF5 file ({said})", file=file)
