@@ -99,6 +99,7 @@ def estimate(
     parameters: Sequence[Parameter],
     correlation_samples: int,
     directions: dict[str, dict[str, float]] | None = None,
+    fixed: dict[str, float] | None = None,
     max_steps: int = 12,
 ) -> Estimate:
     """Fit parameters by nonlinear least squares.
@@ -112,6 +113,7 @@ def estimate(
         directions: for a name, how much other parameters change with it in the finite differences,
             per unit of its scaled value. If two parameters have nearly the same effect, the
             difference between their effects needs a longer step.
+        fixed: values by name of what is not estimated, for the model; they are in the result too.
         max_steps: the largest number of steps.
     """
     from scipy.optimize import least_squares
@@ -119,7 +121,8 @@ def estimate(
     count = 0
 
     def physical(scaled: np.ndarray) -> dict[str, float]:
-        return {u.name: u.to_physical(x) for u, x in zip(parameters, scaled, strict=True)}
+        own = {u.name: u.to_physical(x) for u, x in zip(parameters, scaled, strict=True)}
+        return (fixed or {}) | own
 
     def residuals(scaled: np.ndarray) -> np.ndarray:
         nonlocal count

@@ -39,6 +39,7 @@ FIRST_PART_S = 2.0
 # 5 % of stiffness are 2 % of frequency, a sixth of a period in 2 s
 STIFFNESS_GRID = np.exp(np.linspace(np.log(0.7), np.log(1.4), 15))
 MASS_UNCERTAINTY, GYRATION_UNCERTAINTY_M, NUT_COMPLIANCE_UNCERTAINTY = 0.005, 5.6e-3, 0.5
+CONTACT = "contact"  # sought last: it moves the first frequency as stiffness and payload do
 CORRELATION_S = 0.4  # two periods of the first mode
 
 
@@ -138,12 +139,9 @@ def identify(
     values = _start_values(experiment, nominal, lambda part: report("strip", 0.3 * part))
     data = StripModel(experiment, rig, robot, friction)
     correlation_samples = round(CORRELATION_S / float(np.median(np.diff(data.t))))
-    strip = estimate(
-        data.residuals,
-        parameters(nominal, values),
-        correlation_samples,
-        _same_frequency_direction(nominal, values),
-    )
+    strip = _strip(data, nominal, values, correlation_samples, CONTACT)
+    if all(axis.turns for axis in nominal.axes):
+        strip = _strip(data, nominal, strip.values, correlation_samples)
     report("strip", 1.0)
     variations: tuple[tuple[dict[str, float], int], ...] = (
         ({}, -1),
@@ -165,6 +163,23 @@ def identify(
     return Identified(nominal, joints, strip, data)
 
 
+def _strip(
+    data: StripModel,
+    nominal: Nominal,
+    values: dict[str, float],
+    correlation_samples: int,
+    known: str = "",
+) -> Estimate:
+    """All parameters of the strip but a `known` one, from start `values`."""
+    return estimate(
+        data.residuals,
+        [u for u in parameters(nominal, values) if u.name != known],
+        correlation_samples,
+        _same_frequency_direction(nominal, values, known),
+        values,
+    )
+
+
 def _joint(
     experiment: fx.Run, nominal: Nominal, axis: MotorAxis, torque: np.ndarray | None = None
 ) -> Estimate:
@@ -184,7 +199,7 @@ def _start_values(
         "payload": 1.0,
         "sensor_gain": 1.0,
         "backlash": 1.0,
-        "contact": 1.0,
+        CONTACT: 1.0,
         "holding": 1.0,
         "delay_s": 1e-3,
     }
@@ -199,18 +214,19 @@ def _start_values(
         if u.name in ("stiffness", "payload", "sensor_gain", "damping", "delay_s")
     ]
     rest = {name: value for name, value in values.items() if name not in {u.name for u in some}}
-    found = estimate(
-        lambda v: data.residuals(rest | v), some, 1, _same_frequency_direction(nominal, values)
-    )
+    directions = _same_frequency_direction(nominal, values, CONTACT)
+    found = estimate(data.residuals, some, 1, directions, rest)
     return rest | found.values
 
 
 def _same_frequency_direction(
-    nominal: Nominal, values: dict[str, float]
+    nominal: Nominal, values: dict[str, float], known: str = ""
 ) -> dict[str, dict[str, float]]:
-    """Change of the stiffness with the payload that keeps the first frequency.
+    """Changes of the stiffness with the payload, and with the contact stiffness of gears, that keep
+    the first frequency.
 
-    Motors hold their joints; a stepper's joint is on its magnetic spring.
+    A lead screw holds its joint; other joints are on their gears' contacts or on the stepper's
+    magnetic spring.
     """
     stepper = nominal.rig.stepper
     field_N_m = MagneticSpring(stepper).on_N_m if stepper else 0.0
@@ -218,7 +234,13 @@ def _same_frequency_direction(
     def log_first_frequency(more: dict[str, float]) -> float:
         system = fx.assemble(with_parameters(nominal.robot, values | more))
         K, M = system.stiffness(), system.mass(system.start())
-        held = [system.joint_rows[axis.number - 1] for axis in nominal.axes]
+        held = []
+        for axis in nominal.axes:
+            row = system.joint_rows[axis.number - 1]
+            if axis.turns:
+                K[row, row] += (values | more)[CONTACT] * axis.guide.contact_stiffness
+            else:
+                held.append(row)
         if stepper:
             K[system.joint_rows[1], system.joint_rows[1]] += field_N_m
         rows = np.setdiff1d(np.arange(system.n), held)
@@ -226,11 +248,16 @@ def _same_frequency_direction(
             np.log(eigh(K[np.ix_(rows, rows)], M[np.ix_(rows, rows)], eigvals_only=True)[0])
         )
 
+    names = ["payload", "stiffness"]
+    if all(axis.turns for axis in nominal.axes) and known != CONTACT:
+        names.append(CONTACT)
     base = log_first_frequency({})
-    payload, stiffness = (
-        log_first_frequency({name: 1.01 * values[name]}) - base for name in ("payload", "stiffness")
-    )
-    return {"payload": {"stiffness": -payload / stiffness}}
+    slopes = {name: log_first_frequency({name: 1.01 * values[name]}) - base for name in names}
+    return {
+        name: {"stiffness": -slopes[name] / slopes["stiffness"]}
+        for name in names
+        if name != "stiffness"
+    }
 
 
 def parameters(nominal: Nominal, values: dict[str, float]) -> list[Parameter]:
@@ -246,7 +273,7 @@ def parameters(nominal: Nominal, values: dict[str, float]) -> list[Parameter]:
         "payload": (1e-2, (0.1, 10.0)),
         "sensor_gain": (0.01, (0.1, 10.0)),
         "backlash": (0.05, (0.01, 15.0)),
-        "contact": (0.02, (0.1, 10.0)),
+        CONTACT: (0.02, (0.1, 10.0)),
         "holding": (2e-3, (0.2, 5.0)),
         "delay_s": (1e-4, (-5e-3, 0.02)),
     }
@@ -255,7 +282,7 @@ def parameters(nominal: Nominal, values: dict[str, float]) -> list[Parameter]:
     if not any(axis.guide.backlash for axis in nominal.axes):
         del steps["backlash"]
     if not all(axis.turns for axis in nominal.axes):
-        del steps["contact"]
+        del steps[CONTACT]
     return [
         Parameter(name, values[name], step, bounds, name != "delay_s")
         for name, (step, bounds) in steps.items()

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from ..errors import InputError
 from ..io import Tables, array, flag, number, whole
 from .conversion import WHAT_TO_DO, FunctionSignal, SignalLike, as_signal, spline
-from .signal import COLUMNS, Signal
+from .signal import COLUMNS, Signal, evaluate_many
 
 _NONE = np.zeros((0, COLUMNS))
 
@@ -320,24 +320,31 @@ def check_smooth(motion: Signal, key: str, start: float = -np.inf, end: float = 
     Raises:
         InputError: it jumps between `start` and `end`.
     """
-    for at in motion.breaks[1:]:
-        if start < at < end and not _smooth_at(motion, float(at)):
-            raise InputError(
-                f"expected a motion without jumps in position and velocity; it has one at t = "
-                f"{at:g} s: {WHAT_TO_DO}",
-                key=key,
-            )
+    breaks = motion.breaks[1:]
+    inside = breaks[(breaks > start) & (breaks < end)]
+    jumps = inside[~_smooth_at(motion, inside)]
+    if len(jumps):
+        raise InputError(
+            f"expected a motion without jumps in position and velocity; it has one at t = "
+            f"{jumps[0]:g} s: {WHAT_TO_DO}",
+            key=key,
+        )
 
 
-def _smooth_at(motion: Signal, at: float) -> bool:
-    before, after = np.array(motion(np.nextafter(at, -np.inf))[:2]), np.array(motion(at)[:2])
-    return np.allclose(before, after, rtol=1e-7, atol=1e-9)
+def _smooth_at(motion: Signal, at: np.ndarray) -> np.ndarray:
+    """Whether position and velocity do not jump, for each of the times (k,)."""
+    if not len(at):
+        return np.ones(0, dtype=bool)
+    before = np.array(evaluate_many(motion.segments, np.nextafter(at, -np.inf)))
+    after = np.array(evaluate_many(motion.segments, at))
+    return np.asarray(np.isclose(before, after, rtol=1e-7, atol=1e-9).all(axis=0))
 
 
 def _up_to(motion: Signal, end: float) -> Signal:
     """The motion without what it jumps to at `end` [s]."""
     kept = int(np.searchsorted(motion.breaks, end))
-    if 0 < kept < len(motion.breaks) and motion.breaks[kept] == end and not _smooth_at(motion, end):
+    last = motion.breaks[kept : kept + 1]
+    if kept > 0 and (last == end).any() and not _smooth_at(motion, last).all():
         return Signal(motion.segments[:kept], motion.spec)
     return motion
 
