@@ -22,9 +22,9 @@ class PayloadChange:
     """The payload from an instant on (135).
 
     at_s: the instant [s]. mass_kg: its mass from then on [kg]; 0 without inertia: nothing.
-    inertia_kg_m2: about its own centre. centre_of_mass_m: from the tip, along and across its tangent [m]; None: where the
-    payload before had it. What is taken up was at rest; what is let go flies on. Raises InputError
-    for other arguments.
+    inertia_kg_m2: about its own centre. centre_of_mass_m: from the tip, along and across its
+    tangent [m]; None: where the payload before had it. What is taken up was at rest; what is let go
+    flies on. Raises InputError for other arguments.
     """
 
     at_s: float
