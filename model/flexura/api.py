@@ -22,6 +22,10 @@ OF_ONE, OF_MANY = (
     {p.name for p in inspect.signature(f).parameters.values() if p.kind is p.KEYWORD_ONLY}
     for f in (simulate_robot, simulate_population)
 )
+WHY = {
+    "until": "robots would end at times of their own, and it would run in Python",
+    "continue_from": "a Run has the state of one robot",
+}
 
 
 @overload
@@ -129,7 +133,8 @@ def simulate(
             )
         for key in options:
             if key in OF_ONE and key not in OF_MANY:
-                raise InputError("expected this of one robot only, not of a Batch", key=key)
+                text = f"expected this of one robot only, not of a Batch: {WHY[key]}"
+                raise InputError(text, key=key)
         return simulate_population(robot, t_eval, drive, q0, qd0, rtol, **given)
     for key in options:
         if key in OF_MANY and key not in OF_ONE:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import hashlib
 import pickle
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -24,6 +25,7 @@ from ..signals import STARTS, Acting, Drive, LoadsLike, PayloadsLike
 from ..simulation.internal_forces import force_units
 from ..simulation.problem import MOST_STEPS, Budget, check_request
 from ..simulation.recorder import channel_units, sensor_units
+from ..system import System, check_continuous
 from ..system.structure import structure
 
 
@@ -107,9 +109,13 @@ class Request:
         known, links = units_of(robot), robot.links
         default = [f"joint/{i}/position" for i in range(1, len(links) + 1)]
         default += [f"link/{i}/tip_deflection" for i, link in enumerate(links, 1) if link.flexible]
+        if self.internal_forces:
+            check_continuous(System(robot))
         for name in self.channels:
             if name not in known:
-                raise InputError(f"expected one of {', '.join(known)}", key="channels", value=name)
+                short = dict.fromkeys(re.sub(r"/\d+$", "/K", each) for each in known)
+                text = f"expected one of {', '.join(short)}"
+                raise InputError(text, key="channels", value=name)
         if self.drive is not None:
             check_drive(self.drive, len(links), "drive")
         for i, load in enumerate(self.acting.loads, 1):

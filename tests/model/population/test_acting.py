@@ -116,8 +116,10 @@ def test_robots_that_slide_from_node_to_node_run_in_a_batch():
     done = fx.simulate(batch, T, fx.Drive.force(0.1))
     run = fx.simulate(batch.base.replace({"payload.mass_kg": 0.2}), T, fx.Drive.force(0.1))
     assert np.array_equal(done["joint/1/position"][1], run["joint/1/position"])
-    with pytest.raises(fx.InputError, match="joint/1/position"):
+    with pytest.raises(fx.InputError, match="link/1/deflection/K"):
         fx.simulate(batch, T, channels=["joint/1/reaction_x"])
+    with pytest.raises(fx.InputError, match="forces at a cut do not balance"):
+        fx.simulate(batch, T, internal_forces=True)
 
 
 def test_a_robot_that_is_too_short_for_a_load_ends_alone():

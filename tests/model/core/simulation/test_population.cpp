@@ -20,6 +20,7 @@ struct Many {
   std::vector<std::int64_t> counts;
   std::vector<double> numbers, material, gravity, payload, limits;
   int robots;
+  bool pushed = false;  // by a load on the flexible link
 
   Many(int count, int modes, int elements = 4) : robots(count) {
     check::Random random;
@@ -73,6 +74,8 @@ struct Many {
     acting.joints[0].force = {Segment{0.0, {1.0, 0, 0, 0, 0, 0}, 0, 0, 0},
                               Segment{0.1, {-1.0, 0, 0, 0, 0, 0}, 0, 0, 0}};
     acting.joints[1].force = {Segment{0.0, {0, 0, 0, 0, 0, 0}, 0.05, 9.0, 0}};
+    if (pushed)
+      acting.loads = {{{1, 0.15, true}, {{}, {Segment{0.0, {0.1, 0, 0, 0, 0, 0}, 0, 0, 0}}, {}}}};
     out.drives = {acting}, out.drive_of.assign(std::size_t(robots), 0);
     for (int k = 0; k <= 10; ++k) out.times.push_back(0.02 * k);
     out.channels = {{Channel::position, 0},
@@ -170,6 +173,18 @@ TEST("a robot of a population is the robot of a single run") {
   for (const char *method : {"explicit", "implicit", "exponential"})
     check_single_runs(Many(3, 2), method, 1e-5, method);
   check_single_runs(Many(3, 2), "auto", 1e-5, "exponential");
+}
+
+TEST("a robot of a population under a load is the robot of a single run") {
+  Many many(5, 2);
+  const Results free = results(many.population("exponential", 1e-5), 1);
+  many.pushed = true;
+  for (const char *method : {"explicit", "implicit", "exponential"})
+    check_single_runs(many, method, 1e-5, method);
+  check_single_runs(many, "auto", 1e-5, "exponential");
+  const Results whole = results(many.population("exponential", 1e-5), 3);
+  CHECK(!same(free, 0, whole, 0));
+  CHECK(same(results(many.of({4, 1}).population("exponential", 1e-5), 1), 1, whole, 1));
 }
 
 TEST("in a population too, auto takes implicit steps under a strong damper") {
