@@ -35,7 +35,7 @@ FONT = {
     "pdf.fonttype": 42,
     "font.family": "DejaVu Sans",
 }
-WIDTH_IN, ROW_IN = 3.5, 0.125  # of a column, of a method in a panel
+WIDTH_IN, ROW_IN = 3.5, 0.115  # of a column, of a method in a panel
 LEAST_MM, MOST_MM = 5e-4, 2e2  # what the axes of lengths show
 
 
@@ -64,7 +64,7 @@ def figure(study: Mapping[str, tuple[Task, list[Judged]]]) -> Any:
             _lengths(axes[1, k], judged)
             _times(axes[2, k], judged)
             _drives(axes[3, k], task, judged)
-            axes[0, k].set_title(task.robot.name, fontweight="bold", fontsize=7, pad=4)
+            axes[0, k].set_title(task.robot.name, fontweight="bold", fontsize=7, pad=10)
         for k, axis in enumerate(axes.flat):
             axis.annotate(
                 f"({chr(97 + k)})",
@@ -76,6 +76,7 @@ def figure(study: Mapping[str, tuple[Task, list[Judged]]]) -> Any:
             axis.grid(alpha=0.3, linewidth=0.4)
             axis.set_axisbelow(True)
             axis.tick_params(width=0.5, length=2, pad=1.5)
+            axis.minorticks_off()
             if k % len(study) and axis.get_yticks().size:
                 axis.tick_params(labelleft=False)
                 axis.set_ylabel("")
@@ -88,7 +89,7 @@ def figure(study: Mapping[str, tuple[Task, list[Judged]]]) -> Any:
             columnspacing=1.2,
             handlelength=2.6,
             frameon=False,
-            title="lines of the uppermost panels",
+            title="top row",
         )
         drawing.canvas.draw()
     return drawing
@@ -108,7 +109,7 @@ def _over_time(axis: Any, task: Task, judged: list[Judged]) -> None:
     axis.set_xlim(0, 2 * task.duration_s)
     axis.set_ylim(1e-3, 1e3)
     axis.set_yticks([1e-3, 1e-1, 1e1, 1e3])
-    axis.set_xlabel("time since the first drive [s]", labelpad=1)
+    axis.set_xlabel("time [s]", labelpad=1)
     axis.set_ylabel("tip from its end [mm]", labelpad=1)
 
 
@@ -126,7 +127,7 @@ def _lengths(axis: Any, judged: list[Judged]) -> None:
 def _times(axis: Any, judged: list[Judged]) -> None:
     _marks(axis, judged, np.array([[f.time_s for f in row.figures] for row in judged]))
     axis.set_xlim(left=0)
-    axis.set_xlabel(f"time to {100 * SETTLED:.0f} % of the way [s]", labelpad=1)
+    axis.set_xlabel(f"time to {100 * SETTLED:.0f} % [s]", labelpad=1)
     _names(axis, judged)
 
 

@@ -22,7 +22,7 @@ INTEGRAL = 0.2  # ki over kp and the pole of the joints' loops
 # LQR: what counts the same, in shares of the ways, of the last link's length, of the drives' limits
 NEAR, BENT, EFFORT = 0.005, 0.02, 0.3
 MODES, LQR_HZ = 2, 2000.0  # modes of each link that feedback is designed on, and its rate
-NMPC_HZ, NMPC_INTERVALS, NMPC_EFFORT = 500.0, 20, 3.0
+NMPC_HZ, NMPC_INTERVALS = 500.0, 20
 HOLDS = 400  # of the drives in a bang-bang motion
 LEFT = 0.2  # of the drives' limits, that bang-bang and the shortest motions leave to the PD
 BAND = 0.1  # of frequencies, of the robust shortest motion
@@ -159,7 +159,7 @@ def predictive(task: Task) -> Motion:
     controller = fx.nmpc(
         _design(task),
         task.set_points,
-        NMPC_EFFORT * task.limits,
+        task.limits,
         NMPC_HZ,
         intervals=NMPC_INTERVALS,
         limit=task.limits,
