@@ -131,3 +131,4 @@ Drive = _core.Drive  # what acts on robots of a population
 Watch = _core.Watch  # what another thread sees of a population, and stops it by
 PredictedMotion = _core.PredictedMotion  # the motion ahead of a predictive controller
 condensed_program = _core.condensed_program  # of its tick, states eliminated
+renewed_program = _core.renewed_program  # its vectors, from a state on

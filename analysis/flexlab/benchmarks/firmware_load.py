@@ -39,8 +39,8 @@ HARD = {  # settings for the fast trajectory: 16 000 + 4000 edges/s, 4000 steps/
     "speed_max_2_rad_s": 10.0,
     "rate_max_2_rad_s": 7.8539,
 }
-# of both controllers, both set-point filters and an observer, as small as they may be: what the processor can be
-# asked at most
+# of both controllers, both set-point filters and an observer, as small as they may be: what the
+# processor can be asked at most
 EVERY_TERM = {
     "kd_1_V_s_m": -0.5,
     "kf_1_V_m": 1.0,

@@ -68,9 +68,9 @@ class PID:
 
     `reference` [m or rad] through a filter of `setpoint_Hz` (0: none), `feedforward` [units of the
     output], `derivative_Hz` (0: none) for the measured velocity. `limit`, `slew` (per second) of
-    the output. `observer_Hz` (0: none) for the disturbance observer (162), whose nominal joint
-    is u = jo q'' + bo q'; a stepper has none. `delay_s`, a whole number of ticks, from measurement to output. `count`: the
-    encoder's resolution [m or rad], `duty`: that of the output; 0: exact.
+    the output. `observer_Hz` (0: none) for the disturbance observer (162), whose nominal joint is
+    u = jo q'' + bo q'; a stepper has none. `delay_s`, a whole number of ticks, from measurement to
+    output. `count`: the encoder's resolution [m or rad], `duty`: that of the output; 0: exact.
     """
 
     reference: Signal
@@ -106,7 +106,16 @@ class PID:
             raise InputError(expected, key="output", value=self.output)
         for name in GAINS:
             object.__setattr__(self, name, number(getattr(self, name), name))
-        for name in ("setpoint_Hz", "derivative_Hz", "observer_Hz", "jo", "bo", "delay_s", "count", "duty"):
+        for name in (
+            "setpoint_Hz",
+            "derivative_Hz",
+            "observer_Hz",
+            "jo",
+            "bo",
+            "delay_s",
+            "count",
+            "duty",
+        ):
             check_not_negative(self, name)
         if self.observer_Hz > 0 and isinstance(self.output, Stepper):
             expected = "expected 0: a stepper's joint is where its pulses are"

@@ -131,7 +131,17 @@ def law_by_hand(pids, drive, positions, w, s):
     T, smooth = 1 / drive.rate_Hz, lambda f, T: 1 - np.exp(-2 * np.pi * f * T) if f else 1.0
     strip = [np.zeros(2), np.zeros(2)]  # value and rate of deflection, of slope
     m = [
-        dict(sum=0.0, u=0.0, r=p.reference(-1e-9)[0], speed=0.0, last=x, pulses=x, tip=0.0, z=0.0, d=0.0)
+        dict(
+            sum=0.0,
+            u=0.0,
+            r=p.reference(-1e-9)[0],
+            speed=0.0,
+            last=x,
+            pulses=x,
+            tip=0.0,
+            z=0.0,
+            d=0.0,
+        )
         for p, x in zip(pids, positions[0])
     ]
     out = np.zeros(positions.shape)
