@@ -132,3 +132,4 @@ Watch = _core.Watch  # what another thread sees of a population, and stops it by
 Copies = _core.Copies  # of one robot that take equal steps together
 PredictedMotion = _core.PredictedMotion  # the motion ahead of a predictive controller
 condensed_program = _core.condensed_program  # of its tick, states eliminated
+renewed_program = _core.renewed_program  # its vectors, from a state on

@@ -138,28 +138,44 @@ Array array_of(const std::vector<double> &values, std::initializer_list<std::siz
   return out;
 }
 
-// H (V, V), g (V), A (N rows, V), at (N rows), by_force (N, n, V), moved (N, n).
-nb::tuple condensed_of(const Cube &R, const Cube &G, const Matrix &d, const Matrix &x,
-                       const Matrix &u, const Vector &start, const Matrix &wanted, const Cube &W,
+TickProgram program_of(const Cube &R, const Cube &G, const Matrix &d, const Cube &W,
                        const Matrix &end, const Matrix &limited) {
-  const std::size_t N = R.shape(0), n = R.shape(1), p = G.shape(2), V = N * p,
-                    rows = limited.shape(0);
+  const std::size_t N = R.shape(0), n = R.shape(1), p = G.shape(2);
   expect(R.shape(2) == n && G.shape(0) == N && G.shape(1) == n && d.shape(0) == N &&
-             d.shape(1) == n && x.shape(0) == N + 1 && x.shape(1) == n && u.shape(0) == N &&
-             u.shape(1) == p && start.shape(0) == n && wanted.shape(0) == N &&
-             wanted.shape(1) == n && W.shape(0) == N && W.shape(2) == n && end.shape(0) == n &&
+             d.shape(1) == n && W.shape(0) == N && W.shape(2) == n && end.shape(0) == n &&
              end.shape(1) == n && limited.shape(1) == n,
          "matrices of a program with N intervals were expected");
   TickProgram program;
   program.N = int(N), program.n = int(n), program.inputs = int(p);
-  program.outputs = int(W.shape(1)), program.rows = int(rows);
-  program.R = R.data(), program.G = G.data(), program.d = d.data(), program.x = x.data();
-  program.u = u.data(), program.start = start.data(), program.wanted = wanted.data();
+  program.outputs = int(W.shape(1)), program.rows = int(limited.shape(0));
+  program.R = R.data(), program.G = G.data(), program.d = d.data();
   program.W = W.data(), program.end = end.data(), program.limited = limited.data();
+  return program;
+}
+
+// H (V, V), A (N rows, V), by_force (N, n, V).
+nb::tuple condensed_of(const Cube &R, const Cube &G, const Matrix &d, const Cube &W,
+                       const Matrix &end, const Matrix &limited) {
+  const TickProgram program = program_of(R, G, d, W, end, limited);
+  const std::size_t N = program.N, n = program.n, V = N * program.inputs, rows = program.rows;
   const CondensedProgram found = condense(program);
-  return nb::make_tuple(array_of(found.H, {V, V}), array_of(found.g, {V}),
-                        array_of(found.A, {N * rows, V}), array_of(found.at, {N * rows}),
-                        array_of(found.by_force, {N, n, V}), array_of(found.moved, {N, n}));
+  return nb::make_tuple(array_of(found.H, {V, V}), array_of(found.A, {N * rows, V}),
+                        array_of(found.by_force, {N, n, V}));
+}
+
+// x (N, n), g (V), at (N rows).
+nb::tuple renewed_of(const Cube &R, const Cube &G, const Matrix &d, const Cube &W,
+                     const Matrix &end, const Matrix &limited, const Cube &by_force,
+                     const Vector &start, const Matrix &u, const Matrix &wanted) {
+  const TickProgram program = program_of(R, G, d, W, end, limited);
+  const std::size_t N = program.N, n = program.n, V = N * program.inputs, rows = program.rows;
+  expect(by_force.shape(0) == N && by_force.shape(1) == n && by_force.shape(2) == V &&
+             start.shape(0) == n && u.shape(0) == N && u.shape(1) == G.shape(2) &&
+             wanted.shape(0) == N && wanted.shape(1) == n,
+         "vectors of a program with N intervals were expected");
+  const TickVectors found = renew(program, by_force.data(), start.data(), u.data(), wanted.data());
+  return nb::make_tuple(array_of(found.x, {N, n}), array_of(found.g, {V}),
+                        array_of(found.at, {N * rows}));
 }
 
 }  // namespace
@@ -192,9 +208,11 @@ void bind_prediction(nb::module_ &module) {
           "robot"_a, "free"_a, "driven"_a)
       .def("steps", &steps_of, "x"_a, "u"_a, "a"_a, "h"_a,
            "R, G, d of x+ = R x + G u + d in each interval, and the accelerations.");
-  module.def("condensed_program", &condensed_of, "R"_a, "G"_a, "d"_a, "x"_a, "u"_a, "start"_a,
-             "wanted"_a, "W"_a, "end"_a, "limited"_a,
-             "H, g, A, at, by_force, moved of a tick's program.");
+  module.def("condensed_program", &condensed_of, "R"_a, "G"_a, "d"_a, "W"_a, "end"_a, "limited"_a,
+             "H, A, by_force of a tick's program.");
+  module.def("renewed_program", &renewed_of, "R"_a, "G"_a, "d"_a, "W"_a, "end"_a, "limited"_a,
+             "by_force"_a, "start"_a, "u"_a, "wanted"_a,
+             "x, g, at of a tick's program from a state on.");
 }
 
 }  // namespace flexura

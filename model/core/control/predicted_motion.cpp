@@ -21,6 +21,22 @@ void add_product(const double *A, const double *B, double *C, int n, int m, int 
     }
 }
 
+// to (columns) += sum of factors (rows) times rows of `from`, each `stride` numbers after the
+// other.
+void add_rows(const double *factors, const double *from, double *to, int rows, int stride,
+              int columns) {
+  int l = 0;
+  for (; l + 4 <= rows; l += 4) {  // a sum in memory is read and written for four of them
+    const double *a = from + l * stride, *b = a + stride, *c = b + stride, *d = c + stride;
+    const double p = factors[l], q = factors[l + 1], r = factors[l + 2], s = factors[l + 3];
+    for (int j = 0; j < columns; ++j) to[j] = to[j] + p * a[j] + q * b[j] + r * c[j] + s * d[j];
+  }
+  for (; l < rows; ++l) {
+    const double *a = from + l * stride;
+    for (int j = 0; j < columns; ++j) to[j] += factors[l] * a[j];
+  }
+}
+
 }  // namespace
 
 void eliminate_dense(std::vector<double> &A, std::vector<double> &B, int n, int columns) {
@@ -129,45 +145,25 @@ void PredictedMotion::step(const double *x, const double *u, double *a, double h
 CondensedProgram condense(const TickProgram &s) {
   const int V = s.N * s.inputs, n = s.n;
   CondensedProgram out;
-  out.H.assign(V * V, 0.0), out.g.assign(V, 0.0);
-  out.A.assign(s.N * s.rows * V, 0.0), out.at.assign(s.N * s.rows, 0.0);
-  out.by_force.assign(s.N * n * V, 0.0), out.moved.assign(s.N * n, 0.0);
-  std::vector<double> off(n), weighted, shown;
+  out.H.assign(V * V, 0.0), out.A.assign(s.N * s.rows * V, 0.0);
+  out.by_force.assign(s.N * n * V, 0.0);
+  std::vector<double> weighted;
   for (int k = 0; k < s.N; ++k) {
-    double *now = out.by_force.data() + k * n * V, *moved = out.moved.data() + k * n;
-    const double *R = s.R + k * n * n, *before = k ? moved - n : s.start;
-    const double *here = s.x + k * n, *after = here + n;
+    double *now = out.by_force.data() + k * n * V;
+    const double *R = s.R + k * n * n;
     const int used = k * s.inputs;  // columns that are not 0 before this interval
-    for (int i = 0; i < n; ++i) {
-      moved[i] = s.d[k * n + i] - after[i];
-      for (int j = 0; j < s.inputs; ++j)
-        moved[i] += s.G[(k * n + i) * s.inputs + j] * s.u[k * s.inputs + j];
-      for (int l = 0; l < n; ++l) {
-        const double factor = R[i * n + l];
-        moved[i] += factor * (before[l] + here[l]);
-        if (k == 0) continue;
-        const double *from = now - n * V + l * V;
-        for (int j = 0; j < used; ++j) now[i * V + j] += factor * from[j];
-      }
-      for (int j = 0; j < s.inputs; ++j) now[i * V + used + j] = s.G[(k * n + i) * s.inputs + j];
-      off[i] = after[i] + moved[i] - s.wanted[k * n + i];
-    }
     const int columns = used + s.inputs;
+    for (int i = 0; i < n; ++i) {
+      if (k > 0) add_rows(R + i * n, now - n * V, now + i * V, n, V, used);
+      for (int j = 0; j < s.inputs; ++j) now[i * V + used + j] = s.G[(k * n + i) * s.inputs + j];
+    }
     auto pay = [&](const double *W, int outputs) {
-      weighted.assign(outputs * columns, 0.0), shown.assign(outputs, 0.0);
-      for (int o = 0; o < outputs; ++o)
-        for (int i = 0; i < n; ++i) {
-          const double factor = W[o * n + i];
-          if (factor == 0.0) continue;
-          shown[o] += factor * off[i];
-          for (int j = 0; j < columns; ++j) weighted[o * columns + j] += factor * now[i * V + j];
-        }
+      weighted.assign(outputs * columns, 0.0);
       for (int o = 0; o < outputs; ++o) {
-        const double *row = weighted.data() + o * columns;
-        for (int i = 0; i < columns; ++i) {
-          out.g[i] += row[i] * shown[o];
+        double *row = weighted.data() + o * columns;
+        add_rows(W + o * n, now, row, n, V, columns);
+        for (int i = 0; i < columns; ++i)
           for (int j = 0; j <= i; ++j) out.H[i * V + j] += row[i] * row[j];
-        }
       }
     };
     pay(s.W + k * s.outputs * n, s.outputs);
@@ -177,13 +173,48 @@ CondensedProgram condense(const TickProgram &s) {
       for (int i = 0; i < n; ++i) {
         const double factor = s.limited[r * n + i];
         if (factor == 0.0) continue;
-        out.at[k * s.rows + r] += factor * (after[i] + moved[i]);
         for (int j = 0; j < columns; ++j) row[j] += factor * now[i * V + j];
       }
     }
   }
   for (int i = 0; i < V; ++i)
     for (int j = i + 1; j < V; ++j) out.H[i * V + j] = out.H[j * V + i];
+  return out;
+}
+
+TickVectors renew(const TickProgram &s, const double *by_force, const double *start,
+                  const double *u, const double *wanted) {
+  const int V = s.N * s.inputs, n = s.n;
+  TickVectors out;
+  out.x.assign(s.N * n, 0.0), out.g.assign(V, 0.0), out.at.assign(s.N * s.rows, 0.0);
+  std::vector<double> off(n), price(n);
+  for (int k = 0; k < s.N; ++k) {
+    double *now = out.x.data() + k * n;
+    const double *before = k ? now - n : start;
+    for (int i = 0; i < n; ++i) {
+      now[i] = s.d[k * n + i];
+      for (int l = 0; l < n; ++l) now[i] += s.R[(k * n + i) * n + l] * before[l];
+      for (int j = 0; j < s.inputs; ++j)
+        now[i] += s.G[(k * n + i) * s.inputs + j] * u[k * s.inputs + j];
+      off[i] = now[i] - wanted[k * n + i];
+    }
+    std::fill(price.begin(), price.end(), 0.0);
+    auto pay = [&](const double *W, int outputs) {
+      for (int o = 0; o < outputs; ++o) {
+        double shown = 0.0;
+        for (int i = 0; i < n; ++i) shown += W[o * n + i] * off[i];
+        for (int i = 0; i < n; ++i) price[i] += W[o * n + i] * shown;
+      }
+    };
+    pay(s.W + k * s.outputs * n, s.outputs);
+    if (k + 1 == s.N) pay(s.end, n);
+    for (int i = 0; i < n; ++i) {
+      const double *row = by_force + (k * n + i) * V;
+      for (int j = 0; j < (k + 1) * s.inputs; ++j) out.g[j] += price[i] * row[j];
+    }
+    for (int r = 0; r < s.rows; ++r)
+      for (int i = 0; i < n; ++i) out.at[k * s.rows + r] += s.limited[r * n + i] * now[i];
+  }
   return out;
 }
 

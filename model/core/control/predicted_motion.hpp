@@ -40,17 +40,24 @@ void eliminate_dense(std::vector<double> &A, std::vector<double> &B, int n, int 
 struct TickProgram {
   int N, n, inputs, outputs, rows;  // intervals, states, forces, rows of W, limited rows
   const double *R, *G, *d;          // of x+ = R x + G u + d: (N, n, n), (N, n, inputs), (N, n)
-  const double *x, *u, *start;      // the motion (N + 1, n), its forces (N, inputs), dx_0 (n)
-  const double *wanted;             // what the states after the intervals are to be (N, n)
   const double *W, *end, *limited;  // (N, outputs, n), (n, n), (rows, n)
 };
 
-// Its matrices: |W (x + dx - wanted)|^2 + |end (x_N + dx_N - wanted_N)|^2 = U^T H U + 2 g^T U + ...
-// with dx = by_force U + moved; the limited rows are A U + at.
+// Its matrices: the states after the intervals are by_force U + those without U, the limited rows
+// A U + theirs, and the cost is U^T H U + 2 g^T U + ...
 struct CondensedProgram {
-  std::vector<double> H, g, A, at, by_force, moved;
+  std::vector<double> H, A, by_force;
 };
 
 CondensedProgram condense(const TickProgram &program);
+
+// Its vectors for changes U of forces u (N, inputs) from a state on: the states x (N, n), the
+// limited rows `at`, and g, for the cost |W (x - wanted)|^2 + |end (x_N - wanted_N)|^2.
+struct TickVectors {
+  std::vector<double> x, g, at;
+};
+
+TickVectors renew(const TickProgram &program, const double *by_force, const double *start,
+                  const double *u, const double *wanted);
 
 }  // namespace flexura

@@ -433,6 +433,26 @@ def test_the_search_finds_what_scipys_differential_evolution_finds(algorithm):
     assert history.all("goals").min() == pytest.approx(known.fun, rel=0.01)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("algorithm", ["ga", "pso"])
+def test_an_observer_is_tuned_like_any_gain(algorithm):
+    """A joint with dry friction: J falls if the observer's settings are free too."""
+    data = ROBOT.to_dict()
+    data["link"][0]["joint"]["coulomb_friction_N_m"] = 0.05
+    robot = fx.Robot.from_dict(data)
+    settings = GAINS.settings | {"jo_1_N_m_s2_rad": 5e-3}
+    observer = (
+        free_gain("observer_1_Hz", 0.1, 10),
+        free_gain("jo_1_N_m_s2_rad", 1e-3, 1e-1),
+    )
+    least = []
+    for more in ((), observer):
+        one = task(robots=(robot,), gains=gains.Gains(settings), free=(*FREE[:2], *more))
+        history, _ = tuned(one, Search(algorithm, population=24, generations=20, seed=3))
+        least.append(history.all("goals").min())
+    assert least[1] < 0.6 * least[0]
+
+
 def test_the_front_is_of_gains_that_none_other_beats():
     one = task(pareto=True)
     history, _ = tuned(one, Search("nsga2", population=16, generations=10))

@@ -5,6 +5,7 @@ import pytest
 
 import flexura as fx
 import robots
+from flexura import core
 from flexura.errors import InputError
 from flexura.signals import polynomial, step
 
@@ -98,6 +99,17 @@ def test_a_linearisation_that_is_spread_over_ticks_does_nearly_the_same():
     whole, spread = (fx.simulate(arm(), t, turning(arm(), 200.0, spread=k)) for k in (1, 4))
     assert spread["joint/1/position"] == pytest.approx(whole["joint/1/position"], abs=0.06)
     assert np.abs(spread["link/1/tip_deflection"][-20:]).max() < 0.01
+
+
+def test_a_tick_that_is_spread_does_less(monkeypatch):
+    """Intervals that are linearised in a tick, and programs that are condensed."""
+    law = turning(arm(), 200.0, spread=5)
+    own, rows, made = law.function, [], []
+    steps, condensed = own.prediction.steps, core.condensed_program
+    monkeypatch.setattr(own.prediction, "steps", lambda *a: (rows.append(len(a[3])), steps(*a))[1])
+    monkeypatch.setattr(core, "condensed_program", lambda *a: (made.append(1), condensed(*a))[1])
+    fx.simulate(arm(), np.linspace(0, 0.1, 21), law)
+    assert rows == [20] + [5, 1, 5, 1, 5, 1, 5, 1, 1] * 4 and len(made) == 1 + 4
 
 
 def test_gravity_is_held():

@@ -105,9 +105,9 @@ COPIES |= {"moves": np.ones(3, dtype=bool), "arrived": np.zeros(3, dtype=bool)}
 COPIES |= {"deflection": np.zeros((3, BENDING)), "tip": np.zeros((3, 2))}
 COPIES |= {"step_s": 1e-3, "steps": 2, "threads": 1}
 PROGRAM = {"R": np.zeros((3, 4, 4)), "G": np.zeros((3, 4, 1)), "d": np.zeros((3, 4))}
-PROGRAM |= {"x": np.zeros((4, 4)), "u": np.zeros((3, 1)), "start": np.zeros(4)}
-PROGRAM |= {"wanted": np.zeros((3, 4)), "W": np.zeros((3, 2, 4)), "end": np.eye(4)}
-PROGRAM |= {"limited": np.zeros((1, 4))}
+PROGRAM |= {"W": np.zeros((3, 2, 4)), "end": np.eye(4), "limited": np.zeros((1, 4))}
+RENEWED = PROGRAM | {"by_force": np.zeros((3, 4, 3)), "u": np.zeros((3, 1))}
+RENEWED |= {"start": np.zeros(4), "wanted": np.zeros((3, 4))}
 AHEAD = core.PredictedMotion(EQUATIONS, [int(k) for k in SYSTEM.free_rows], [0])
 M = len(SYSTEM.free_rows)
 BOARD = {"settings": np.array([float(item.default) for item in CONFIG.values()])}
@@ -200,6 +200,7 @@ CALLS: dict[str, Call] = {
         set(),
     ),
     "condensed_program": (core.condensed_program, PROGRAM, {("limited", 0), ("W", 1)}),
+    "renewed_program": (core.renewed_program, RENEWED, {("limited", 0), ("W", 1)}),
 }
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -31,7 +30,7 @@ class Problem:
         process: covariance of what acts at the drives in a tick (inputs, inputs).
         noise: covariance of the measurements (p, p).
         covariance: of the first estimate (2m, 2m).
-        spread: ticks over which the intervals are linearised.
+        spread: ticks over which the intervals are linearised and the program is condensed.
         price: of the square of what breaks a bound of `rows`.
     """
 
@@ -52,6 +51,10 @@ class Problem:
 
 class NonlinearPredictive(MeasuredLaw):
     """Real-time iteration: one step of Newton's method a tick on the motion ahead (130).
+
+    The program's matrices come from the linearised intervals; its vectors are new in every tick.
+    With `spread` ticks a part of the intervals is linearised in each but the last of them, in which
+    the matrices are made; until then those before are used.
 
     `failures` counts programs without a solution, at which the motion of the tick before goes on;
     `iterations` has those of the last program.
@@ -80,14 +83,15 @@ class NonlinearPredictive(MeasuredLaw):
         values, vectors = np.linalg.eigh((problem.end + problem.end.T) / 2)
         self.end = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
         self.R = np.repeat(problem.h, m) * np.tile(1 / problem.effort**2, N)
+        self.costs = self.W, self.end, problem.rows
         bounds = np.concatenate([np.tile(problem.limit, N), np.tile(problem.bound, N)])
         self.bounds = np.minimum(bounds, FREE)
-        self.turn, self.one = 0, np.eye(C.shape[1])
+        self.one = np.eye(C.shape[1])
 
     def tick(self, t: float, y: np.ndarray) -> np.ndarray:
         """The forces (links,) from the measurements (p,) at time t [s]."""
         x = self._corrected(y)
-        self._linearised()
+        self._prepared()
         self._solved(t, x)
         self._predicted(x)
         force = np.zeros(self.links)
@@ -102,7 +106,10 @@ class NonlinearPredictive(MeasuredLaw):
         self.x, self.u = np.tile(rest, (N + 1, 1)), np.tile(hold, (N, 1))
         self.a = np.zeros((N, p.count))
         self.guess, self.S = rest.copy(), self.problem.covariance
-        self.known: tuple[Any, ...] | None = None
+        self.coming = self._steps(slice(None))
+        self._condensed()
+        self.turn = 0
+        self.sampled: list[tuple[float, np.ndarray]] = []
 
     def _equilibrium(self, joints: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
         """The state (2m,) at rest with the joints somewhere, and the forces (inputs,) that hold."""
@@ -124,50 +131,71 @@ class NonlinearPredictive(MeasuredLaw):
         self.S = left @ S @ left.T + gain @ self.problem.noise @ gain.T
         return self.guess + gain @ (y - self.measured.at(self.prediction.full(self.guess)))
 
-    def _linearised(self) -> None:
-        """Intervals along the predicted motion: the first, and all or every `spread`-th other."""
-        p, problem, N = self.prediction, self.problem, len(self.problem.h)
-        rows = np.arange(N) if self.known is None else np.arange(self.turn, N, problem.spread)
-        self.turn = (self.turn + 1) % problem.spread
-        if rows[0] != 0:
-            rows = np.concatenate([[0], rows])
-        R, G, d, self.a[rows] = p.steps(self.x[rows], self.u[rows], self.a[rows], problem.h[rows])
-        if self.known is None:
-            self.known = R, G, d
-        else:
-            for old, new in zip(self.known, (R, G, d), strict=True):
+    def _steps(self, rows: slice) -> tuple[np.ndarray, ...]:
+        """R, G, d of some intervals along the predicted motion (129)."""
+        p, h = self.prediction, self.problem.h
+        x, u = self.x[:-1], self.u
+        R, G, d, self.a[rows] = p.steps(x[rows], u[rows], self.a[rows], h[rows])
+        return R, G, d
+
+    def _condensed(self) -> None:
+        """The program's matrices, from the intervals as they are linearised now (130)."""
+        self.known, self.coming = self.coming, tuple(part.copy() for part in self.coming)
+        found = core.condensed_program(*self.known, *self.costs)
+        self.H, self.A, self.by_force = (np.asarray(part) for part in found)
+        self.H.flat[:: len(self.R) + 1] += self.R
+
+    def _prepared(self) -> None:
+        """A tick's share of the linearisation, and the interval in which it is itself."""
+        N, spread = len(self.problem.h), self.problem.spread
+        parts, part = max(spread - 1, 1), self.turn
+        self.turn = (self.turn + 1) % spread
+        if part < parts:
+            rows = slice(part * N // parts, (part + 1) * N // parts)
+            for old, new in zip(self.coming, self._steps(rows), strict=True):
                 old[rows] = new
+        if self.turn == 0:
+            self._condensed()
+        first = self.known if spread == 1 else self._steps(slice(0, 1))
+        self.first = tuple(each[0] for each in first)
 
     def _solved(self, t: float, x: np.ndarray) -> None:
         """One step of Newton's method: the program about the predicted motion (130)."""
         problem, N, m = self.problem, len(self.problem.h), len(self.driven)
-        assert self.known is not None
-        R, G, d = self.known
         wanted, hold = self._wanted(t)
-        H, g, A, at, by_force, moved = core.condensed_program(
-            R, G, d, self.x, self.u, x - self.x[0], wanted, self.W, self.end, problem.rows
+        ahead, g, at = core.renewed_program(
+            *self.known, *self.costs, self.by_force, x, self.u, wanted
         )
-        H[np.diag_indices(N * m)] += self.R
-        g += self.R * (self.u - hold).ravel()
+        g = g + self.R * (self.u - hold).ravel()
         about = np.concatenate([self.u.ravel(), at])
         low, high = -self.bounds - about, self.bounds - about
-        U, solved, self.iterations = self.program.solve(H, g, A, low, high)
+        U, solved, self.iterations = self.program.solve(self.H, g, self.A, low, high)
         if not solved:
             self.failures += 1
             return
         self.x[0] = x
-        self.x[1:] += by_force @ U + moved
+        by_force = self.by_force.reshape(-1, len(U))
+        self.x[1:] = ahead + (by_force @ U).reshape(ahead.shape)
         self.u = np.clip(self.u + U.reshape(N, m), -problem.limit, problem.limit)
 
     def _wanted(self, t: float) -> tuple[np.ndarray, np.ndarray]:
-        """The states at the intervals' ends (N, 2m) and forces (N, inputs) to be near."""
+        """The states at the intervals' ends (N, 2m) and forces (N, inputs) to be near.
+
+        The references of `spread` ticks are evaluated together.
+        """
         p = self.prediction
-        times = t + self.ahead
-        r = [evaluate_many(self.references[i].segments, times) for i in range(self.links)]
-        rest, hold = self._equilibrium_at(tuple(float(place[-1]) for place, _ in r))
-        wanted = np.tile(rest, (len(times), 1))
-        for column, i in zip(p.joint_columns, self.driven, strict=True):
-            wanted[:, column], wanted[:, p.count + column] = r[i]
+        N, T = len(self.ahead), self.problem.T
+        if not self.sampled or abs(self.sampled[0][0] - t) > 0.1 * T:
+            ticks = t + T * np.arange(self.problem.spread)
+            times = (ticks[:, None] + self.ahead).ravel()
+            found = [evaluate_many(wave.segments, times) for wave in self.references]
+            r = np.array(found).reshape(self.links, 2, len(ticks), N)
+            self.sampled = [(float(at), r[:, :, k]) for k, at in enumerate(ticks)]
+        _, now = self.sampled.pop(0)
+        rest, hold = self._equilibrium_at(tuple(now[:, 0, -1].tolist()))
+        wanted = np.tile(rest, (N, 1))
+        wanted[:, p.joint_columns] = now[self.driven, 0].T
+        wanted[:, p.count + p.joint_columns] = now[self.driven, 1].T
         return wanted, hold
 
     def _equilibrium_at(self, joints: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
@@ -178,8 +206,7 @@ class NonlinearPredictive(MeasuredLaw):
 
     def _predicted(self, x: np.ndarray) -> None:
         """The estimate of the next tick from this one and the forces, and its covariance (76)."""
-        assert self.known is not None
-        R, G, d = (part[0] for part in self.known)
+        R, G, d = self.first
         self.guess = R @ x + G @ self.u[0] + d
         self.S = R @ self.S @ R.T + G @ self.problem.process @ G.T
 

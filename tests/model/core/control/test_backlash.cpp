@@ -15,7 +15,7 @@ Signal line(double y, double rate) {
   return {Segment{0.0, {y, rate, 0.0, 0.0, 0.0, 0.0}, 0.0, 0.0, 0.0}};
 }
 
-TEST(force_is_that_of_the_flank_and_none_between) {
+TEST("force is that of the flank and none between") {
   const ForceFunction f = backlash_forces({{1, line(0.5, 2.0), 0.2, 100.0, 3.0}}, {0, 2});
   const double v[] = {0.0, 0.0, 7.0};
   const struct {

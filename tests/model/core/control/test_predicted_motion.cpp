@@ -67,22 +67,21 @@ TEST("a program without its states is that with them") {
   const int N = 3, n = 4, p = 2, outputs = 3, rows = 1, V = N * p;
   check::Random random;
   const Numbers R = some(N * n * n, 1.0, random), G = some(N * n * p, 1.0, random),
-                d = some(N * n, 1.0, random), x = some((N + 1) * n, 1.0, random),
-                u = some(V, 1.0, random), start = some(n, 1.0, random),
-                wanted = some(N * n, 1.0, random), W = some(N * outputs * n, 1.0, random),
-                end = some(n * n, 1.0, random), limited = some(n, 1.0, random),
-                U = some(V, 1.0, random);
+                d = some(N * n, 1.0, random), u = some(V, 1.0, random),
+                start = some(n, 1.0, random), wanted = some(N * n, 1.0, random),
+                W = some(N * outputs * n, 1.0, random), end = some(n * n, 1.0, random),
+                limited = some(n, 1.0, random), U = some(V, 1.0, random);
   TickProgram program;
   program.N = N, program.n = n, program.inputs = p, program.outputs = outputs, program.rows = rows;
-  program.R = R.data(), program.G = G.data(), program.d = d.data(), program.x = x.data();
-  program.u = u.data(), program.start = start.data(), program.wanted = wanted.data();
+  program.R = R.data(), program.G = G.data(), program.d = d.data();
   program.W = W.data(), program.end = end.data(), program.limited = limited.data();
   const CondensedProgram found = condense(program);
+  const TickVectors of =
+      renew(program, found.by_force.data(), start.data(), u.data(), wanted.data());
   // the states under u + U, and what they cost, against the same with U = 0
   auto cost = [&](const Numbers &more, bool compare) {
-    Numbers now(n);
+    Numbers now = start;
     double sum = 0.0;
-    for (int i = 0; i < n; ++i) now[i] = x[i] + start[i];
     for (int k = 0; k < N; ++k) {
       Numbers next(n);
       for (int i = 0; i < n; ++i) {
@@ -92,10 +91,10 @@ TEST("a program without its states is that with them") {
           next[i] += G[(k * n + i) * p + j] * (u[k * p + j] + more[k * p + j]);
       }
       now = next;
-      double shown = 0.0, row = found.at[k];
+      double shown = 0.0, row = of.at[k];
       for (int i = 0; i < n; ++i) {
         shown += limited[i] * now[i];
-        double state = x[(k + 1) * n + i] + found.moved[k * n + i];
+        double state = of.x[k * n + i];
         for (int j = 0; j < V; ++j) state += found.by_force[(k * n + i) * V + j] * more[j];
         if (compare) CHECK_NEAR(state, now[i], 1e-12 * (1 + std::fabs(now[i])));
       }
@@ -115,7 +114,7 @@ TEST("a program without its states is that with them") {
   };
   double quadratic = 0.0;
   for (int i = 0; i < V; ++i) {
-    quadratic += 2.0 * found.g[i] * U[i];
+    quadratic += 2.0 * of.g[i] * U[i];
     for (int j = 0; j < V; ++j) quadratic += U[i] * found.H[i * V + j] * U[j];
   }
   const double more = cost(U, true) - cost(Numbers(V, 0.0), true);
