@@ -139,17 +139,25 @@ WRONG_MANOEUVRES = {
         "name = 5",
         "name = 5: expected one line of at most 200",
     ),
-    "a joint too few": ("[[joint]]\n" + F, "", "joint = 1: expected 2 tables [[joint]]"),
+    "a joint too few": (
+        "[[joint]]\n" + F,
+        "",
+        "joint = 1: expected a table [[joint]] for each joint",
+    ),
     "a joint too many": (
         "[[joint]]\n" + F,
         "[[joint]]\n[[joint]]\n",
-        "joint = 3: expected 2 tables [[joint]]",
+        "joint = 3: expected a table [[joint]] for each joint",
     ),
-    "no joints": (GOOD[GOOD.index("[[joint]]") :], "", "joint = 0: expected 2 tables [[joint]]"),
+    "no joints": (
+        GOOD[GOOD.index("[[joint]]") :],
+        "",
+        "joint = 0: expected a table [[joint]] for each joint",
+    ),
     "joints as a number": (
         GOOD[GOOD.index("[[joint]]") :],
         "joint = 2",
-        "joint = 2: expected 2 tables [[joint]]",
+        "joint = 2: expected a table [[joint]] for each joint",
     ),
     "joints as numbers": (
         GOOD[GOOD.index("[[joint]]") :],
@@ -159,7 +167,7 @@ WRONG_MANOEUVRES = {
     "joints as one table": (
         GOOD[GOOD.index("[[joint]]") :],
         "[joint]\nkp = 1.0",
-        "expected 2 tables [[joint]]",
+        "expected a table [[joint]] for each joint",
     ),
     "an unknown key of a joint": (
         "kd = 0.25",
