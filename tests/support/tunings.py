@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 import flexura as fx
+from flexlab.tuning.executor import ThreadExecutor
+from flexlab.tuning.history import History
+from flexlab.tuning.search import search
 from flexlab.tuning.search_space import free_gain
 from flexlab.tuning.task import Task
 from flexura.control.gains import Gains
@@ -35,3 +40,16 @@ def task(**changes) -> Task:
     return Task(
         **({"robots": (ROBOT,), "manoeuvre": SWING, "gains": GAINS, "free": FREE} | changes)
     )
+
+
+def tuned(one, how, folder=None, make_executor=None, generations=None):
+    history = History.open(folder, one.digest(how.identity())) if folder else History("")
+    with ThreadExecutor(one, 1) as runs:
+        done = search(
+            one,
+            replace(how, generations=generations or how.generations),
+            make_executor or runs,
+            history,
+            lambda h: None,
+        )
+    return history, done

@@ -10,7 +10,7 @@ import typer
 
 import flexura as fx
 from flexura.errors import InputError
-from flexura.io import FILE, Run, called, write_bytes
+from flexura.io import FILE, Run, called, shipped_files, write_bytes
 from flexura.population import is_population
 
 from ..runs.export import as_csv, as_mat, as_mcap, as_tdms, population
@@ -61,7 +61,8 @@ def export(
     """
     if fmi is not None and to != "fmu":
         raise InputError("none: only an FMU has a version of FMI", key="--fmi", value=fmi)
-    if run.suffix == ".toml" or to in ROBOT_FORMS:
+    shipped = not run.exists() and str(run) in shipped_files("robots")
+    if shipped or run.suffix == ".toml" or to in ROBOT_FORMS:
         export_robot(run, to, out, fmi or 2, force=force, json=json)
         return
     table = is_population(run) and robot is None

@@ -31,7 +31,7 @@ def export_robot(
         json: print JSON.
     """
     if to not in ("mat", *ROBOT_FORMS):
-        expected = "expected mat (its state space), fmu or urdf: the file is a robot's"
+        expected = "expected mat (its state space), fmu or urdf: this is a robot"
         raise InputError(expected, key="--to", value=to)
     robot, target = fx.load(path), out or path.with_suffix(f".{to}")
     about: dict[str, Any] = {"file": str(target)}

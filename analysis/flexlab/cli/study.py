@@ -69,7 +69,7 @@ def study(
 
     It stores a table (Parquet) and a figure. KIND boundary: with and without a sleeve. KIND
     measured: simulations over published measurements, with a review of each run. KIND control:
-    what PID, shapers, LQR, inversion and least time buy, on rig or type-1-rr, by default both.
+    what PID, shapers, LQR, inversion and least time achieve, on rig or type-1-rr, by default both.
 
     \b
     Example: flexura study payload type-1-rr --values 0:0.2:11

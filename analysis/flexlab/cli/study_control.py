@@ -1,4 +1,4 @@
-"""`flexura study control`: what each method of control buys."""
+"""`flexura study control`: what each method of control achieves."""
 
 from __future__ import annotations
 

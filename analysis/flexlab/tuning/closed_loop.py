@@ -76,8 +76,10 @@ def closed_loop_controller(
         settings: the gains.
 
     Raises:
-        InputError: the manoeuvre prescribes a joint, or the numbers of joints differ.
+        InputError: the manoeuvre prescribes a joint, the numbers of joints differ, or a unit does
+            not fit its joint.
     """
+    settings.check_joints([link.joint.type == "R" for link in system.robot.links])
     made = settings.controller(references(system, asked))
     pids = []
     for joint, pid in zip(asked.drive.joints, made.joints, strict=True):

@@ -19,34 +19,20 @@ from ..robot import Robot, robot_of
 from .assembly import Assembly
 from .constants import equations
 from .nodes import Nodes, nodes_at
-from .structure import Structure, structure
-
-_UNITS = {
-    "rotation": "rad",
-    "bubble": "rad",
-    "shape": "rad",
-    "mode": "kg^(1/2) m",
-    "windup": "rad",
-}
+from .numbering import Numbering
+from .structure import Structure
 
 # A System, a Robot, or the path or name of a robot file.
 RobotLike: TypeAlias = "System | Robot | str | os.PathLike[str]"
 
 
 @dataclass(frozen=True)
-class System:
+class System(Numbering):
     """A robot's equations M(q) qdd + bias(q, qd) + damping qd + elastic(q) + gravity(q) = F (25).
 
-    q (n,) is numbered [joint 1, elastic unknowns of link 1, joint 2, ...], named by `labels`: of a
-    mesh the rotation across each element and its bubble [rad] (10), of a link in its own modes
-    mass-normalised coordinates [kg^(1/2) m], of a sleeved link its shapes [rad] (12). F has entries
-    in the joints' rows. Constant; solvers keep their memory apart from it.
+    `Numbering` says what q (n,) is. F has entries in the joints' rows. A System is constant;
+    solvers keep their memory apart from it.
     """
-
-    robot: Robot
-    nodes: tuple[int, ...] | None = (
-        None  # that sliders and sleeves keep, where they go from node to node: `nodes.Nodes`
-    )
 
     def __repr__(self) -> str:
         return summary.text(*self._summary())
@@ -83,12 +69,6 @@ class System:
         return {"robot": self.robot, "nodes": self.nodes}  # the rest is computed again
 
     @cached_property
-    def _structure(self) -> Structure:
-        """The numbering and the pieces with shapes of their own: found once, for the modes of links
-        cost time."""
-        return structure(self.robot)
-
-    @cached_property
     def assembly(self) -> Assembly:
         """The same equations as dense sums, to be read; with the shapes that the core uses."""
         made = self._structure
@@ -104,90 +84,6 @@ class System:
         """The compiled equations, `core.Mechanics`. Raises InputError where the core refuses the
         robot."""
         return equations(self.robot)
-
-    @property
-    def n(self) -> int:
-        """How many unknowns there are."""
-        return len(self.labels)
-
-    @cached_property
-    def labels(self) -> tuple[str, ...]:
-        """Names and units of the unknowns, for example "link/1/element/2/rotation [rad]"."""
-        return tuple(f"{name} [{self._unit(name)}]" for name in self._structure.labels)
-
-    @cached_property
-    def joint_rows(self) -> np.ndarray:
-        """Rows of the joints in q, (links,)."""
-        return np.array([row for row, name in enumerate(self.labels) if name.startswith("joint/")])
-
-    @cached_property
-    def elastic_rows(self) -> np.ndarray:
-        """Rows of the elastic unknowns in q, without those of nodes at rest in a sleeve."""
-        return np.setdiff1d(np.arange(self.n), np.append(self.joint_rows, self._resting))
-
-    @cached_property
-    def locked(self) -> np.ndarray:
-        """Which joints are locked, (links,) bool."""
-        return np.array([link.joint.locked for link in self.robot.links])
-
-    @cached_property
-    def free_rows(self) -> np.ndarray:
-        """Rows of q that can move: all but locked joints and nodes at rest in a sleeve."""
-        return np.setdiff1d(
-            np.arange(self.n), np.append(self.joint_rows[self.locked], self._resting)
-        )
-
-    @property
-    def _resting(self) -> np.ndarray:
-        return np.zeros(0, dtype=int) if self.nodes is None else self.assembly.structure.resting  # type: ignore[attr-defined]
-
-    @cached_property
-    def windup_rows(self) -> dict[int, int]:
-        """Rows of the windups of transmissions, by the number of the link (from 0) (107)."""
-        return self._structure.windups
-
-    def link_rows(self, link: int) -> np.ndarray:
-        """Rows of the elastic unknowns of a link, without the windup of its joint.
-
-        Args:
-            link: number of the link, from 0.
-
-        Returns:
-            Indices into q (k,).
-        """
-        ends = np.append(self.joint_rows, self.n)
-        return np.arange(ends[link] + 1 + (link in self.windup_rows), ends[link + 1])
-
-    def hub_positions(self, z: np.ndarray) -> np.ndarray:
-        """Positions, or rates, of the joints' hubs: behind a transmission the rotor's and the
-        windup (107).
-
-        Args:
-            z: configurations, or rates (..., n).
-
-        Returns:
-            (..., links).
-        """
-        out = np.array(z[..., self.joint_rows])
-        for link, row in self.windup_rows.items():
-            out[..., link] += z[..., row]
-        return out
-
-    @cached_property
-    def limits(self) -> np.ndarray:
-        """Lower and upper limits of the joints (links, 2) [m or rad]: those of the file, and the
-        ends of the links that slide."""
-        own = np.array([link.joint.limits or (-np.inf, np.inf) for link in self.robot.links])
-        ends = np.array([self.robot.travel(i) for i in range(len(self.robot.links))])
-        return np.column_stack(
-            [np.maximum(own[:, 0], ends[:, 0]), np.minimum(own[:, 1], ends[:, 1])]
-        )
-
-    def start(self) -> np.ndarray:
-        """The configuration at the start (n,): joints at their `start`, links straight."""
-        q = np.zeros(self.n)
-        q[self.joint_rows] = self.robot.start
-        return q
 
     def mass(self, q: ArrayLike) -> np.ndarray:
         """The mass matrix M(q) (40).
@@ -404,40 +300,6 @@ class System:
             [(tip := self.assembly.tip(at)).place.real, tip.place.imag]
         )
 
-    @property
-    def exact(self) -> bool:
-        """Whether the robot is on the exact line, which the compiled core has; else the
-        dissertation's model is asked for."""
-        return self.robot.stiffening and not self.robot.nodal
-
-    def check(self, q: ArrayLike, key: str = "q") -> np.ndarray:
-        """A checked vector of the unknowns.
-
-        Args:
-            q: what was given.
-            key: name of the argument, for the message.
-
-        Returns:
-            An array (n,) of floats.
-
-        Raises:
-            InputError: another shape, or a robot that slides from node to node.
-        """
-        if self.robot.nodal and self.nodes is None:
-            text = (
-                'expected "continuous": sliding from node to node has other matrices between '
-                "every two nodes"
-            )
-            raise InputError(text, key="sliding", value="nodal")
-        return self._array(q, key)
-
-    def _array(self, q: ArrayLike, key: str) -> np.ndarray:
-        expected = f"expected an array of shape ({self.n},), in the order of system.labels"
-        found = array(q, key, expected)
-        if found.shape != (self.n,):
-            raise InputError(expected, key=key, value=found.shape)
-        return found
-
     def tangent(self, q: ArrayLike, qd: ArrayLike | None = None) -> np.ndarray:
         """The derivative of bias, elastic and gravity forces by q (52).
 
@@ -495,12 +357,6 @@ class System:
         material = self._structure.materials[link]
         assert material is not None
         return (whole_piece(material, pieces[0].points, coefficients, K),)
-
-    def _unit(self, name: str) -> str:
-        parts = name.split("/")
-        if parts[0] != "joint":
-            return _UNITS[parts[-1] if parts[2] == "element" else parts[2]]
-        return "rad" if self.robot.links[int(parts[1]) - 1].joint.type == "R" else "m"
 
 
 @guarded("the equations of motion")

@@ -1,4 +1,4 @@
-"""`flexura study control`: what each method buys, measured on one motion of two robots."""
+"""`flexura study control`: what each method achieves, measured on one motion of two robots."""
 
 import json
 

@@ -67,6 +67,10 @@ def test_a_gains_file_is_the_controller_that_it_names(tmp_path):
         ("force_per_V = 13.1", "", "output[1]"),
         ("damping = 1180.0", "damping = -1.0", "output[1].damping"),
         ("[controller]", "[control]", "control"),
+        ("kd_2 = 0.1", "feedback_2 = 7", "controller.feedback_2"),
+        ("kd_2 = 0.1", "delay_2_s = 0.0012", "controller.delay_2_s"),
+        ("kd_2 = 0.1", "voltage_max_1_V = 5.0", "controller.voltage_max_1_V"),
+        ("[[output]]", '[[output]]\nkind = "stepper"\n' * 2 + "[[output]]", "output"),
     ],
 )
 def test_a_wrong_gains_file_is_refused_by_key(tmp_path, old, new, key):
@@ -76,6 +80,15 @@ def test_a_wrong_gains_file_is_refused_by_key(tmp_path, old, new, key):
     with pytest.raises(fx.InputError) as caught:
         gains.load(path)
     assert caught.value.key == key and caught.value.file == str(path)
+
+
+def test_units_of_the_other_kind_of_joint_are_refused(tmp_path):
+    path = tmp_path / "gains.toml"
+    path.write_text(FILE)
+    gains.load(path).check_joints([False, True])
+    with pytest.raises(fx.InputError, match="a joint that turns") as caught:
+        gains.load(path).check_joints([True, True])
+    assert caught.value.key == "controller.kp_1_V_m" and caught.value.file == str(path)
 
 
 def test_what_the_board_has_not_is_not_sent_to_it():

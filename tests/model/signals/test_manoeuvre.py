@@ -68,6 +68,7 @@ def test_the_output_step_is_a_200th_of_the_duration_unless_given(tmp_path):
 
 F = 'force = { kind = "bang_bang", amplitude = 1.0, duration_s = 1.0 }'
 M = 'motion = { kind = "cycloid", end = 1.0, duration_s = 0.5 }'
+EACH = "expected a table [[joint]] for each joint"
 WRONG_MANOEUVRES = {
     "no duration": (
         "duration_s = 2.0\n",
@@ -139,17 +140,25 @@ WRONG_MANOEUVRES = {
         "name = 5",
         "name = 5: expected one line of at most 200",
     ),
-    "a joint too few": ("[[joint]]\n" + F, "", "joint = 1: expected 2 tables [[joint]]"),
+    "a joint too few": (
+        "[[joint]]\n" + F,
+        "",
+        f"joint = 1: {EACH}",
+    ),
     "a joint too many": (
         "[[joint]]\n" + F,
         "[[joint]]\n[[joint]]\n",
-        "joint = 3: expected 2 tables [[joint]]",
+        f"joint = 3: {EACH}",
     ),
-    "no joints": (GOOD[GOOD.index("[[joint]]") :], "", "joint = 0: expected 2 tables [[joint]]"),
+    "no joints": (
+        GOOD[GOOD.index("[[joint]]") :],
+        "",
+        "joint = 0: expected a table [[joint]] for each joint",
+    ),
     "joints as a number": (
         GOOD[GOOD.index("[[joint]]") :],
         "joint = 2",
-        "joint = 2: expected 2 tables [[joint]]",
+        f"joint = 2: {EACH}",
     ),
     "joints as numbers": (
         GOOD[GOOD.index("[[joint]]") :],
@@ -159,7 +168,7 @@ WRONG_MANOEUVRES = {
     "joints as one table": (
         GOOD[GOOD.index("[[joint]]") :],
         "[joint]\nkp = 1.0",
-        "expected 2 tables [[joint]]",
+        EACH,
     ),
     "an unknown key of a joint": (
         "kd = 0.25",

@@ -1,4 +1,4 @@
-"""What each method of control buys: one motion, all methods, two robots.
+"""What each method of control achieves: one motion, all methods, two robots.
 
 `tasks` has the robots and their motions, `methods` the list of methods, `judgement` what is
 measured, `output` the table, JSON, the Parquet file and the figure.

@@ -36,7 +36,7 @@ def table(task: Task, judged: list[Judged]) -> Table:
     heads = ["method", "tip error [mm]", "time [s]", "residual [mm]"]
     heads += [f"drive {i} [{unit}]" for i, unit in enumerate(units, 1)]
     heads += ["error, other payload [mm]", "residual, other payload [mm]"]
-    out = Table(f"{task.robot.name}: what each method buys", heads, ("method",))
+    out = Table(f"{task.robot.name}: what each method achieves", heads, ("method",))
     for row in judged:
         one = row.nominal
         out.add(

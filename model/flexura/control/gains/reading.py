@@ -28,7 +28,7 @@ from ...io import Tables, find, read_toml
 from ...signals import PLAUSIBLE, constant, is_plausible
 from ..pid import Force, Motor, Output, Stepper
 from .designed import Designed, read_design
-from .names import NAMES, SHARED
+from .names import BOARDS, NAMES, SHARED
 from .settings import OUTPUTS, Gains
 
 
@@ -92,7 +92,13 @@ def _gains(data: Tables, file: str) -> Gains:
             raise InputError(f"an unknown setting{hint}", key=f"controller.{key}", value=value)
         if not is_plausible(value):
             raise InputError(f"expected {PLAUSIBLE}", key=f"controller.{key}", value=value)
+        if key.startswith("feedback_") and value not in (0, 1):
+            raise InputError("expected 0 or 1", key=f"controller.{key}", value=value)
         settings[key] = float(value)
+    for board, name in BOARDS.items():
+        if board in settings and name in settings:
+            expected = f"expected absent beside {board}, which is the same"
+            raise InputError(expected, key=f"controller.{name}", value=settings[name])
     tables = data.get("output", [])
     if not isinstance(tables, list) or not all(isinstance(entry, dict) for entry in tables):
         raise InputError("expected tables [[output]], one a joint", key="output", value=tables)
@@ -101,16 +107,20 @@ def _gains(data: Tables, file: str) -> Gains:
         tuple(_read_output(entry, f"output[{i}]") for i, entry in enumerate(tables, 1)),
         file,
     )
+    if len(tables) > len(gains.kinds):
+        expected = f"expected at most {len(gains.kinds)} tables [[output]], one a joint"
+        raise InputError(expected, key="output", value=len(tables))
     try:
         gains.controller([_REST] * len(gains.kinds), [o or _ANYTHING[k] for k, o in _padded(gains)])
     except InputError as error:
         if error.key.startswith(("output", "controller")):
             raise
+        asked = error.key.rpartition(" ")[2]  # "joint 1: delay_s" of a Controller
         shown = next(
             (
                 name
                 for name in settings
-                if any(field == error.key for _, _, field in NAMES.get(name, []))
+                if any(field == asked for _, _, field in NAMES.get(name, []))
             ),
             error.key,
         )

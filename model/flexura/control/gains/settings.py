@@ -15,6 +15,10 @@ from ..pid import PID, Force, Motor, Output, Stepper
 from .names import BOARD, BOARDS, ENDS, NAMES, SHARED
 
 _MOTORS = ("motor", "turning motor")
+FITTING = {  # outputs of a joint that turns, and of one that slides; "": any
+    True: {"turning motor", "stepper", "torque", ""},
+    False: {"motor", "stepper", "force", ""},
+}
 OUTPUTS = {
     "motor": Motor,
     "turning motor": Motor,
@@ -54,6 +58,24 @@ class Gains:
                 raise InputError(expected, key="controller", file=self.file)
         return [found[i].copy().pop() for i in range(len(found))]
 
+    def check_joints(self, turns: Sequence[bool]) -> None:
+        """Refuse settings whose units do not fit a robot's joints.
+
+        Args:
+            turns: whether each joint turns.
+
+        Raises:
+            InputError: a setting of a joint that turns is in m, or one of a joint that slides in
+                rad.
+        """
+        for name, value in self.settings.items():
+            if name in SHARED or name in BOARDS:
+                continue
+            i, kinds = NAMES[name][0][0], {kind for _, kind, _ in NAMES[name]}
+            if i < len(turns) and not kinds & FITTING[turns[i]]:
+                expected = f"expected the unit of a joint that {'turns' if turns[i] else 'slides'}"
+                raise InputError(expected, key=f"controller.{name}", value=value, file=self.file)
+
     def controller(
         self, references: Sequence[Signal], outputs: Sequence[Output] | None = None
     ) -> Controller:
@@ -72,8 +94,9 @@ class Gains:
         """
         kinds, rate = self.kinds, self.settings.get("rate_Hz", 1000.0)
         if len(references) != len(kinds):
-            expected = f"expected gains of {len(references)} joints, one for each reference"
-            raise InputError(expected, key="controller", value=len(kinds), file=self.file)
+            expected = f"gains of {len(kinds)} joints: expected those of {len(references)}, one "
+            expected += "for each reference"
+            raise InputError(expected, key="controller", file=self.file)
         joints = []
         for i, (kind, reference) in enumerate(zip(kinds, references, strict=True)):
             given: dict[str, Any] = {"delay_s": 1 / rate} if kind == "stepper" and rate > 0 else {}
