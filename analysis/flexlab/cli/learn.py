@@ -20,7 +20,7 @@ from ..identification.identify import Identified
 from ..identification.identify import identify as identified
 from ..learning import output
 from ..learning.board_trials import BoardTrials
-from ..learning.learn import Learned
+from ..learning.learn import Learned, Trial
 from ..learning.learn import learn as learned_of
 from ..learning.task import Task
 from ..recordings.flex_calibration import read as read_calibration
@@ -45,6 +45,7 @@ from .output import message, print_results, progress_bars, warn
 from .results import LOGS, counted, file_result, refuse_taken
 from .verbosity import quiet
 
+REVIEWED = 6  # runs in a review
 SEEDS = 1000  # a seed of the command has so many of its own, one a trial
 
 
@@ -84,8 +85,9 @@ def learn(
 ) -> None:
     """Repeat a manoeuvre until the tip goes where a rigid robot's would.
 
-    The first trial is the manoeuvre as it is. Each further one changes the joints' references by
-    what the model's inverse makes of the error. Limits are checked before each trial.
+    The first trial is the manoeuvre as it is. Each further one changes the joints' motions by what
+    the model's inverse makes of the error. Limits are checked before each trial, and none is done
+    for which more than 1.5 times the first error is predicted.
 
     \b
     Example: flexura learn rig-r rig-r-swing --trials 10 --emulated
@@ -176,6 +178,12 @@ def _remove_trials(folder: Path) -> None:
         (folder / name).unlink(missing_ok=True)
 
 
+def _side_by_side(learned: Learned) -> list[Trial]:
+    """The trials that a review has room for: the first ones, and the best."""
+    first = [trial for trial in learned.trials if trial is not learned.best][: REVIEWED - 1]
+    return sorted([*first, learned.best], key=lambda trial: trial.number)
+
+
 def _tell(
     learned: Learned, folder: Path, title: str, label: str, emulated: bool, json: bool
 ) -> None:
@@ -187,8 +195,7 @@ def _tell(
             lambda: output.numbers(learned, label, emulated) | {"folder": str(folder)},
         )
     if learned.trials:
-        seen = [learned.trials[0].folder]
-        seen += [learned.best.folder] if learned.best.folder != seen[0] else []
+        seen = [trial.folder for trial in _side_by_side(learned)]
         message(json, f"stored {folder}; the best manoeuvre: {folder / output.BEST}")
         message(json, f"look at it: flexura review {' '.join(map(str, seen))}")
     if not learned.complete:

@@ -12,18 +12,21 @@ from typing import Any, Protocol
 import numpy as np
 
 import flexura as fx
-from flexura.control import LearningFilter
 from flexura.errors import FlexuraError, InputError
 
 from ..experiment.plan import Plan
 from ..experiment.run_experiment import ExperimentResult, RefusedToStart
 from ..identification.identify import Identified, identify
-from .model import Knowledge, filter_of
+from ..rig import Check
+from ..rig.axes import motor_axes
+from .knowledge import Knowledge
+from .model import RigModel
 from .task import Task
 from .tip import Observer
 
 WORSE = 2  # trials in a row that end the learning
 SMALLEST = 1 / 16  # share of a change, below which limits end the learning
+GUARD = 1.5  # of the first trial's error: what no robot that may be meant may predict
 
 
 @dataclass(frozen=True)
@@ -34,22 +37,28 @@ class Trial:
         number: from 1.
         folder: of its Run.
         references: of the joints at the task's times (T, J) [m or rad].
+        motions: the joints' motions that the references are for (T, J) [m or rad].
+        run: what was measured.
         lacks: what the tip lacks by the sensors, at the task's times (T, J) [m].
         sensed_m: largest distance of the tip from its path by the sensors [m].
         sensed_rms_m: root of its mean square [m].
         true_m: the same of an emulated plant's own tip [m].
         true_rms_m: and its root mean square [m].
+        drives_V: largest voltage of each motor [V], by its joint.
         note: what was special, or "".
     """
 
     number: int
     folder: Path
     references: np.ndarray
+    motions: np.ndarray
+    run: fx.Run
     lacks: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     sensed_m: float = math.nan
     sensed_rms_m: float = math.nan
     true_m: float | None = None
     true_rms_m: float | None = None
+    drives_V: dict[int, float] = field(default_factory=dict)
     note: str = ""
 
 
@@ -61,7 +70,7 @@ class Learned:
         task: what was learned.
         trials: the complete ones.
         found: the identified model.
-        filter: the learning filter.
+        model: the rig's model, with the law of learning.
         ended: why it ended.
         complete: whether all trials were done, or no further one would help.
         interrupted: whether a person ended it.
@@ -70,7 +79,7 @@ class Learned:
     task: Task
     trials: list[Trial] = field(default_factory=list)
     found: Identified | None = None
-    filter: LearningFilter | None = None
+    model: RigModel | None = None
     ended: str = ""
     complete: bool = False
     interrupted: bool = False
@@ -106,8 +115,9 @@ def learn(
     """Learn a manoeuvre on a rig, trial by trial.
 
     The first trial is the manoeuvre as it is. Without `known` the model is identified from it. Each
-    further trial adds to the best one's references what the learning filter makes of its error. A
-    trial that is worse is left; from then on changes go half as far. After two in a row it ends.
+    further trial adds to the best one's joint motions what the law of learning makes of its error.
+    A trial that is worse is left; from then on changes go half as far, and a model that was given
+    is identified anew from the best trial. After two in a row it ends.
 
     Args:
         task: what is learned.
@@ -127,44 +137,60 @@ def learn(
     """
     if trials < 1:
         raise InputError("expected 1 or more", key="--trials", value=trials)
-    out = Learned(task, found=known)
-    observer: Observer | None = None
-    references, worse, missed, note = task.first, 0, 0, ""
+    out, observer, given = Learned(task, found=known), None, known is not None
+    following = _Following(task.first, task.first, [], "")
+    worse, missed = 0, 0
     for number in range(1, trials + 1):
         report = lambda part, n=number: progress(f"trial {n}", (n - 1 + part) / trials)
+        references, motions, note = following.references, following.motions, following.note
+        moved = None if number == 1 else motions
+        plan = task.plan(references, number, moved, following.checks, note=note)
         try:
-            result = rig.perform(task.plan(references, number, note=note), number, report)
+            result = rig.perform(plan, number, report)
             if not result.ended.complete:
                 out.ended, out.interrupted = result.ended.text, result.ended.interrupted
                 return out
             if out.found is None:
                 out.found = _identified(result.run, rig.stop_asked, progress)
-            if observer is None:
+            if observer is None or out.model is None:
                 observer = Observer(out.found)
-                out.filter = filter_of(task, Knowledge.of(out.found))
-            trial = Trial(number, result.folder, references, note=note)
-            trial = _judged(task, trial, result.run, observer, rig)
+                out.model = RigModel(task, Knowledge.of(out.found))
+                motions = out.model.moved(observer.followed(result.run))
+            trial = Trial(number, result.folder, references, motions, result.run, note=note)
+            out.trials.append(_judged(task, trial, observer, rig))
+            done(out)
+            worse = 0 if out.trials[-1] is out.best else worse + 1
+            missed += worse > 0
+            if worse == 1 and given and number < trials:
+                given = False
+                observer = _identify_anew(out, rig, progress)
         except FlexuraError as error:
             if not out.trials:
                 raise
             out.ended, out.interrupted = str(error), isinstance(error, RefusedToStart)
             return out
-        out.trials.append(trial)
-        done(out)
-        worse = 0 if trial is out.best else worse + 1
-        missed += worse > 0
         if worse == WORSE:
             out.ended = f"{WORSE} trials in a row were no better than the best"
         elif number == trials:
             out.ended = "all trials are done"
-        elif (following := _following(task, out, max(0.5**missed, SMALLEST))) is None:
+        elif (found := _following(out, max(0.5**missed, SMALLEST))) is None:
             out.ended = "the rig's limits allow no further change"
         else:
-            references, note = following
+            following = found
             continue
         out.complete = True
         break
     return out
+
+
+def _identify_anew(out: Learned, rig: Rig, progress: Callable[[str, float], None]) -> Observer:
+    """Identify the model from the best trial, and judge that trial by it."""
+    best = out.best
+    out.found = _identified(best.run, rig.stop_asked, progress)
+    out.model, observer = RigModel(out.task, Knowledge.of(out.found)), Observer(out.found)
+    again = dataclasses.replace(best, lacks=_sampled(out.task, best.run, observer)[1])
+    out.trials[out.trials.index(best)] = again
+    return observer
 
 
 def _identified(
@@ -180,15 +206,21 @@ def _identified(
     return identify(run, report)
 
 
-def _judged(task: Task, trial: Trial, run: fx.Run, observer: Observer, rig: Rig) -> Trial:
+def _judged(task: Task, trial: Trial, observer: Observer, rig: Rig) -> Trial:
     """The trial with its errors, which its Run gets as channels and metadata."""
+    run = trial.run
     learned = run.t <= task.t[-1]
     t = run.t[learned]
-    lacks = task.error(t, observer.tip(run)[learned])
-    sampled = np.column_stack([np.interp(task.t, t, column) for column in lacks.T])
+    lacks, sampled = _sampled(task, run, observer)
     sensed = np.linalg.norm(lacks, axis=1)
     largest, rms = _sizes(sensed)
-    trial = dataclasses.replace(trial, lacks=sampled, sensed_m=largest, sensed_rms_m=rms)
+    drives = {
+        axis.number: float(np.nanmax(np.abs(run[f"joint/{axis.number}/voltage"][learned])))
+        for axis in motor_axes(task.setup.rig)
+    }
+    trial = dataclasses.replace(
+        trial, lacks=sampled, sensed_m=largest, sensed_rms_m=rms, drives_V=drives
+    )
     channels = {"sensor/tip_error": sensed}
     if (tip := rig.true_tip(run)) is not None:
         true = np.linalg.norm(task.error(t, tip[learned]), axis=1)
@@ -198,11 +230,19 @@ def _judged(task: Task, trial: Trial, run: fx.Run, observer: Observer, rig: Rig)
     padded = {name: np.full(len(run.t), np.nan) for name in channels}
     for name, values in channels.items():
         padded[name][learned] = values
-    meta = run.meta | {"learning": numbers_of(trial)}
+    meta = run.meta | {"learning": run.meta.get("learning", {}) | numbers_of(trial)}
     units = run.units | dict.fromkeys(padded, "m")
     made = dataclasses.replace(run, channels=run.channels | padded, units=units, meta=meta)
     made.save(trial.folder)
-    return trial
+    return dataclasses.replace(trial, run=made)
+
+
+def _sampled(task: Task, run: fx.Run, observer: Observer) -> tuple[np.ndarray, np.ndarray]:
+    """What the tip lacks by the sensors, at the run's times and at the task's."""
+    learned = run.t <= task.t[-1]
+    t = run.t[learned]
+    lacks = task.error(t, observer.tip(run)[learned])
+    return lacks, np.column_stack([np.interp(task.t, t, column) for column in lacks.T])
 
 
 def _sizes(distance: np.ndarray) -> tuple[float, float]:
@@ -222,26 +262,42 @@ def numbers_of(trial: Trial) -> dict[str, Any]:
         "error_of": "the emulated plant's own tip" if true else "the tip by the sensors",
         "sensed_error_m": trial.sensed_m,
         "sensed_error_rms_m": trial.sensed_rms_m,
+        "peak_drive_V": {f"joint/{n}": volts for n, volts in trial.drives_V.items()},
         "note": trial.note,
     }
 
 
-def _following(task: Task, out: Learned, share: float) -> tuple[np.ndarray, str] | None:
-    """The next trial's references, within the rig's limits, and what was special; None where
-    nothing is left."""
-    assert out.filter is not None
-    best = out.best
-    change = out.filter.update(best.lacks, task.basis, task.directions, task.share)
+@dataclass(frozen=True)
+class _Following:
+    """The next trial: references, the joint motions that they are for, checks, what is special."""
+
+    references: np.ndarray
+    motions: np.ndarray
+    checks: list[Check]
+    note: str
+
+
+def _following(out: Learned, share: float) -> _Following | None:
+    """The next trial within the rig's limits and the guard; None where nothing is left."""
+    assert out.model is not None
+    task, best, law = out.task, out.best, out.model.law
+    change = law.update(best.lacks)
+    most = GUARD * out.trials[0].sensed_m
     notes = [] if best is out.trials[-1] else [f"from trial {best.number}"]
-    failed: Plan | None = None
+    held = ""
     while share >= SMALLEST:
-        references = best.references + share * change
-        plan = task.plan(references, best.number + 1)
-        if not plan.failed:
-            if failed is not None:
-                notes.append(f"limit: {failed.failed[0].what}")
-            if share < 1:
-                notes.append(f"{share:.3g} of the change")
-            return references, ", ".join(notes)
-        failed, share = plan, share / 2
+        parts = np.split(share * change, np.cumsum(law.counts)[:-1])
+        moves = [basis @ part for basis, part in zip(task.basis, parts, strict=True)]
+        motions = best.motions + np.column_stack(moves)
+        made = out.model.drives(motions)
+        plan = task.plan(made.references, best.number + 1, motions, made.checks)
+        if plan.failed:
+            held = f"limit: {plan.failed[0].what}"
+        elif law.predicted(best.lacks, share * change).max() > most:
+            held = f"{GUARD:g} times the first error is predicted for more"
+        else:
+            notes += [held] if held else []
+            notes += [f"{share:.3g} of the change"] if share < 1 else []
+            return _Following(made.references, motions, made.checks, ", ".join(notes))
+        share /= 2
     return None

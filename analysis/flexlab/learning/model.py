@@ -1,144 +1,92 @@
-"""What is known of the rig: the identified model, how sure it is, what a reference does to it."""
+"""What is known of the rig: the identified model, how sure it is, what a motion does to its tip."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 import flexura as fx
-from flexura.control import (
-    JointLoop,
-    JointSpring,
-    LearningFilter,
-    filter_length,
-    learning_filter,
-    reference_response,
-    transform_points,
-)
+from flexura.control import JointSpring, LearningLaw, motion_response
 from flexura.errors import InputError
 
-from ..identification.identify import Identified
-from ..identification.strip import with_parameters
-from ..rig import RigSetup
-from ..rig.axes import motor_axes
-from ..rig.nominal_robot import with_drives
-from ..rig.plant.motor import joint_line
-from ..rig.plant.stepper import MagneticSpring
-from .task import STEP_S, Task
+from ..identification.strip import with_parameters, with_stepper_damping
+from .drives import DriveInverse, drive_inverse, loops
+from .knowledge import Knowledge
+from .task import Task
 
-HIGHEST_HZ = 12.0  # of what is learned; the board's knots are 8 ms apart
-SURELY = 2.0  # standard deviations
-MODEL = 0.02  # of the stiffness: what no interval has, the model's own error
-NAMES = ("stiffness", "damping", "payload")
-POSTURES = 3  # along the manoeuvre, where the robot is linearised
-WORST, SINGULAR = 20.0, 1e4  # condition of the joints' slopes there
+SINGULAR = 1e4  # condition of the joints' slopes
 
 
 @dataclass(frozen=True)
-class Knowledge:
-    """Parameters of the strip, as factors on the file's, and the robots that may be meant.
+class RigModel:
+    """A task with what is known of its rig.
 
     Attributes:
-        values: factors, by name.
-        others: the corners of the uncertainty: factors `stiffness`, `damping`, `payload`.
-    """
-
-    values: dict[str, float]
-    others: tuple[dict[str, float], ...]
-
-    @classmethod
-    def of(cls, found: Identified) -> Knowledge:
-        """From an identification's estimates and their covariance.
-
-        Along each principal axis of the covariance there are two robots, two standard deviations
-        away. Stiffness and payload that keep the first frequency are thus seen together.
-        """
-        strip = found.strip
-        rows = [[u.name for u in strip.parameters].index(name) for name in NAMES]
-        covariance = strip.covariance[np.ix_(rows, rows)] + np.diag([MODEL**2, 0.0, 0.0])
-        spread, axes = np.linalg.eigh(covariance)
-        centre = np.log([strip.values[name] for name in NAMES])
-        others = []
-        for size, axis in zip(np.sqrt(np.maximum(spread, 0.0)), axes.T, strict=True):
-            for sign in (-1, 1):
-                factors = np.exp(centre + sign * SURELY * size * axis)
-                others.append(dict(zip(NAMES, map(float, factors), strict=True)))
-        return cls(dict(strip.values), tuple(others))
-
-
-def loops(
-    setup: RigSetup, settings: dict[str, float], holding: float = 1.0
-) -> list[JointLoop | JointSpring]:
-    """What moves the joints: the board's controllers of motors, and a stepper's magnetic spring.
-
-    Args:
-        setup: the rig.
-        settings: the board's settings, by name.
-        holding: factor on the stepper's holding torque.
-    """
-    out: list[JointLoop | JointSpring] = []
-    for axis in motor_axes(setup.rig):
-        n, unit = axis.number, axis.unit
-        gain = lambda name, n=n: settings.get(f"{name[:2]}_{n}_{name[3:]}", 0.0)
-        out.append(
-            JointLoop(
-                joint_line(axis).force_per_V,
-                gain(f"kp V_{unit}"),
-                gain(f"ki V_{unit}_s"),
-                gain(f"kd V_s_{unit}"),
-                gain(f"kv V_s_{unit}"),
-            )
-        )
-    if setup.rig.stepper:
-        out.append(JointSpring(holding * MagneticSpring(setup.rig.stepper).on_N_m))
-    return out
-
-
-def filter_of(task: Task, knowledge: Knowledge) -> LearningFilter:
-    """The learning filter of a task: from an error at the joints to their references.
-
-    Args:
         task: what is learned.
         knowledge: the model and its uncertainty.
-
-    Raises:
-        InputError: the joints cannot move the tip in every direction, anywhere on the way.
     """
-    points = transform_points(filter_length(len(task.t)), STEP_S)
-    controllers = loops(task.setup, task.settings, knowledge.values.get("holding", 1.0))
-    lines = [(axis, joint_line(axis)) for axis in motor_axes(task.setup.rig)]
-    postures = _postures(task)
-    slopes, across = task.slopes(postures), task.across(postures)
-    responses, motions = [], []
-    for factors in (knowledge.values, *knowledge.others):
-        robot = with_parameters(task.setup.robot, knowledge.values | factors)
-        system = fx.assemble(with_drives(robot, task.setup.rig, lines))
-        for posture, by_joints, normal in zip(postures, slopes, across, strict=True):
-            q = fx.static(system, joints=posture)
-            tip, joints = reference_response(system, q, points, controllers)
-            responses.append(np.linalg.pinv(by_joints) @ tip)
-            bent = normal @ (tip - by_joints @ joints)
-            motions.append(np.concatenate([joints, bent[:, None]], axis=1))
-    return learning_filter(np.array(responses), STEP_S, HIGHEST_HZ, np.array(motions))
 
+    task: Task
+    knowledge: Knowledge
 
-def _postures(task: Task) -> np.ndarray:
-    """Some postures on the way (k, J) in which the joints move the tip in every direction.
+    def _robot(self, factors: dict[str, float]) -> fx.Robot:
+        setup = self.task.setup
+        values = self.knowledge.values | factors
+        return with_stepper_damping(with_parameters(setup.robot, values), setup.rig)
 
-    They are those in which the last joint is farthest to one side, in the middle, and to the other.
-    """
-    begin = min(first for first, _ in task.moving)
-    end = max(last for _, last in task.moving)
-    way = task.joints(np.linspace(begin, end, 8 * POSTURES + 1))
-    conditions = np.linalg.cond(task.slopes(way))
-    good = way[conditions < max(WORST, 3 * conditions.min())]
-    if conditions.min() > SINGULAR:
-        raise InputError(
-            "expected a manoeuvre on which the joints can move the tip in every direction",
-            key="manoeuvre",
-            value=task.manoeuvre.name,
-        )
-    good = good[np.argsort(good[:, -1], kind="stable")]
-    some = good[np.linspace(0, len(good) - 1, POSTURES).round().astype(int)]
-    return np.unique(np.round(some, 6), axis=0)
+    @cached_property
+    def law(self) -> LearningLaw:
+        """The law of learning: from the tip's error to changes of the joints' motions.
+
+        Raises:
+            InputError: the joints cannot move the tip in every direction, anywhere on the way.
+        """
+        task = self.task
+        slopes = task.slopes(task.first)
+        if task.first.shape[1] > 1 and np.linalg.cond(slopes).min() > SINGULAR:
+            raise InputError(
+                "expected a manoeuvre on which the joints can move the tip in every direction",
+                key="manoeuvre",
+                value=task.manoeuvre.name,
+            )
+        holding = self.knowledge.values.get("holding", 1.0)
+        drives = loops(task.setup, task.settings, holding)
+        springs = [drive if isinstance(drive, JointSpring) else None for drive in drives]
+        responses = [
+            task.along(
+                motion_response(self._robot(factors), task.t, task.first, task.basis, springs)
+            )
+            for factors in ({}, *self.knowledge.others)
+        ]
+        counts = tuple(one.shape[1] for one in task.basis)
+        return LearningLaw(np.array(responses), counts, task.share)
+
+    def drives(self, motions: np.ndarray) -> DriveInverse:
+        """The references of joint motions (T, J) at the task's times [m or rad]."""
+        task, knowledge = self.task, self.knowledge
+        system = fx.assemble(self._robot({}))
+        return drive_inverse(task.setup, task.settings, system, knowledge, task.t, motions)
+
+    def moved(self, run: fx.Run) -> np.ndarray:
+        """The joints' motions in a run, of a stepper its pulses', in the task's functions.
+
+        Args:
+            run: a trial as the model follows it.
+
+        Returns:
+            (T, J) [m or rad].
+        """
+        task, out = self.task, self.task.first.copy()
+        drives = loops(task.setup, task.settings)
+        for j, (drive, basis) in enumerate(zip(drives, task.basis, strict=True)):
+            if isinstance(drive, JointSpring):
+                continue
+            measured = run[f"joint/{j + 1}/position"]
+            there = np.isfinite(measured)
+            off = np.interp(task.t, run.t[there], measured[there]) - out[:, j]
+            size = basis.shape[1]
+            A = np.concatenate([basis, 1e-2 * np.eye(size)])
+            out[:, j] += basis @ np.linalg.lstsq(A, np.append(off, np.zeros(size)), rcond=None)[0]
+        return out

@@ -16,8 +16,8 @@ from ..rig.board_axes import board_axes
 from ..rig.configuration import calibration
 from ..runs.formatting import number
 from ..runs.table import Styled, Table
+from .knowledge import NAMES
 from .learn import Learned, numbers_of
-from .model import NAMES
 from .task import Task
 
 SUMMARY, BEST = "learning.json", "best.toml"
@@ -54,8 +54,8 @@ def numbers(learned: Learned, label: str, emulated: bool) -> dict[str, Any]:
         emulated: whether the board is.
 
     Returns:
-        `trials` in order, the `best` one's number, the model's factors with their intervals, the
-        frequency up to which it learns, and what limits it.
+        `trials` in order, the `best` one's number, the model's factors with their intervals, and
+        what limits it.
     """
     return {
         "emulated": emulated,
@@ -66,7 +66,6 @@ def numbers(learned: Learned, label: str, emulated: bool) -> dict[str, Any]:
         "trials": [numbers_of(t) | {"run": t.folder.name} for t in learned.trials],
         "best": learned.best.number if learned.trials else None,
         "model": _model(learned.found) if learned.found else None,
-        "learned_to_Hz": learned.filter.bandwidth_Hz if learned.filter else None,
         "resolution": resolution(learned.task),
     }
 
@@ -80,10 +79,11 @@ def table(learned: Learned, title: str) -> Table:
     """
     true = "plant's own "
     heads = (f"{true}max [mm]", f"{true}RMS [mm]", "sensors' max [mm]", "sensors' RMS [mm]")
-    out = Table(title, ("trial", *heads, "note"), ("note",))
+    out = Table(title, ("trial", *heads, "peak drive [V]", "note"), ("note",))
     for t in learned.trials:
         sizes = (t.true_m, t.true_rms_m, t.sensed_m, t.sensed_rms_m)
         cells = ["" if size is None else number(1e3 * size, 3) for size in sizes]
+        cells.append(number(max(t.drives_V.values()), 3) if t.drives_V else "")
         name = f"{t.number}"
         best = t is learned.best
         out.add(Styled(f"{name} best", "green") if best else name, *cells, t.note)
@@ -97,8 +97,8 @@ def table(learned: Learned, title: str) -> Table:
     }
     seen = "; ".join(f"{words[name]}: {number(1e3 * size, 2)} mm" for name, size in limits.items())
     out.notes.append(f"what limits, at the tip: {seen}")
-    if learned.filter is not None:
-        out.notes.append(f"learned up to {learned.filter.bandwidth_Hz:.3g} Hz; {learned.ended}")
+    if learned.ended:
+        out.notes.append(learned.ended)
     return out
 
 

@@ -7,6 +7,7 @@ to where it began. The joints may begin before the tip does.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -19,7 +20,7 @@ from flexura import signals
 from ..board.protocol.declaration import CONTROL_HZ
 from ..experiment import plan
 from ..experiment.lead_in import quintic, with_lead_in
-from ..rig import RigSetup
+from ..rig import Check, RigSetup, check_capability
 from ..rig.board_axes import board_axes
 
 STEP_S = 2**plan.PERIOD_LOG2 / CONTROL_HZ  # of the board's knots
@@ -132,15 +133,11 @@ class Task:
         angle = (angle + np.pi) % (2 * np.pi) - np.pi
         return np.asarray(angle * np.hypot(*wanted.T))[:, None]
 
-    @cached_property
-    def directions(self) -> np.ndarray:
-        """What the joints and the last link's deflection do to what `error` measures, at `t` (T, m,
-        J + 1)."""
-        slopes, across = self.slopes(self.first), self.across(self.first)
-        both = np.concatenate([slopes, across[:, :, None]], axis=2)
+    def along(self, moved: np.ndarray) -> np.ndarray:
+        """Small motions of the tip, as `error` measures them: (T, 2, n) becomes (T, m, n)."""
         if self.setup.rig.joints > 1:
-            return both
-        return np.asarray(across[:, None] @ both)
+            return moved
+        return np.asarray(self.across(self.first)[:, None] @ moved)
 
     def across(self, joints: np.ndarray) -> np.ndarray:
         """Unit vectors across the last link of a rigid robot whose joints are at (T, J) (T, 2)."""
@@ -155,8 +152,8 @@ class Task:
         """Of each joint the functions (T, n) of which a change of its references is made.
 
         They are cubic B-splines from shortly before the joint moves until shortly after. A joint at
-        rest sticks: it does not follow what is smaller than its friction, until the controller's
-        integral makes it slip. So a change ends with the motion; under gravity its last one stays.
+        rest sticks, so that a change ends with the motion. The last one stays: the joint stops
+        elsewhere.
         """
         from scipy.interpolate import BSpline
 
@@ -165,12 +162,9 @@ class Task:
         for first, last in self.moving:
             begin, end = first - BEFORE_S, last + AFTER_S
             count = int(np.ceil((end - begin) / SPACING_S))
-            places = (self.t[:, None] - begin) / SPACING_S - np.arange(
-                2 + int(self.t[-1] / SPACING_S)
-            )
-            functions = np.nan_to_num(spline(places))
-            stays = [functions[:, count:].sum(axis=1)] if any(self.setup.robot.gravity_m_s2) else []
-            out.append(np.column_stack([functions[:, :count], *stays]))
+            places = (self.t[:, None] - begin) / SPACING_S
+            each = np.nan_to_num(spline(places - np.arange(4 + int(places[-1, 0]))))
+            out.append(np.column_stack([each[:, :count], each[:, count:].sum(axis=1)]))
         return out
 
     @cached_property
@@ -217,12 +211,21 @@ class Task:
         drive = fx.Drive.pd(motions, off, off)
         return fx.Manoeuvre(name, float(t[-1]), STEP_S, drive)
 
-    def plan(self, references: np.ndarray, trial: int, **more: Any) -> plan.Plan:
+    def plan(
+        self,
+        references: np.ndarray,
+        trial: int,
+        motions: np.ndarray | None = None,
+        checks: Sequence[Check] = (),
+        **more: Any,
+    ) -> plan.Plan:
         """The plan of a trial, with the rig's checks of drive, travel, limits and speed.
 
         Args:
             references: (T, J) at `t` [m or rad].
             trial: its number, from 1.
+            motions: of the joints, where references differ from what they are for (T, J).
+            checks: further ones.
             more: further entries of the Run's metadata.
         """
         name = f"trial {trial} of {self.manoeuvre.name or 'a manoeuvre'}"
@@ -235,4 +238,13 @@ class Task:
         ]
         if self.goes_back:
             phases.append({"t": float(self.t[-1]), "name": "way back"})
-        return dataclasses.replace(made, asked=made.asked | {"learning": learning}, phases=phases)
+        found = made.checks
+        if motions is not None:  # a reference's own speed and force are the controller's
+            moved = check_capability(self.setup, self.asked(motions, name))
+            found = moved + [check for check in found if check.what.endswith("range")]
+        return dataclasses.replace(
+            made,
+            checks=[*found, *checks],
+            asked=made.asked | {"learning": learning},
+            phases=phases,
+        )

@@ -27,6 +27,16 @@ class Observer:
         self.found = found
         self._beyond: list[np.ndarray] = []
 
+    def followed(self, run: fx.Run) -> fx.Run:
+        """A trial as the model follows its measured drives, joints behind their backlash.
+
+        Args:
+            run: the trial.
+        """
+        found = self.found
+        data = StripModel(run, found.nominal.rig, found.nominal.robot, found.friction)
+        return data.simulate(found.strip.values)
+
     def tip(self, run: fx.Run) -> np.ndarray:
         """x and y of the tip at the run's times (T, 2) [m].
 

@@ -19,12 +19,8 @@ from .gains import load as load_gains
 from .ilc import (
     JointLoop,
     JointSpring,
-    LearningFilter,
-    filter_length,
-    inverse_of_many,
-    learning_filter,
-    reference_response,
-    transform_points,
+    LearningLaw,
+    motion_response,
 )
 from .linear_quadratic.gaussian_design import Design
 from .linear_quadratic.loop_figures import LoopFigures, LoopMargins, loop_figures
@@ -81,7 +77,7 @@ __all__ = [
     "Gains",
     "JointLoop",
     "JointSpring",
-    "LearningFilter",
+    "LearningLaw",
     "Linear",
     "LoopFigures",
     "LoopMargins",
@@ -93,18 +89,14 @@ __all__ = [
     "board_pulses",
     "design_setting",
     "filter_coefficient",
-    "filter_length",
-    "inverse_of_many",
-    "learning_filter",
     "load_controller",
     "load_gains",
     "loop_figures",
     "lqg",
     "lqr",
+    "motion_response",
     "nmpc",
-    "reference_response",
     "step_figures",
     "step_response",
     "strip_metrics",
-    "transform_points",
 ]

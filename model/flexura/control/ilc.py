@@ -1,6 +1,7 @@
-"""Iterative learning control: what a trial teaches the next one's references.
+"""Iterative learning control: what a trial teaches the next one's joint motions.
 
-The learning filter is the model's inverse, noncausal, over all robots that the uncertainty allows.
+The model is linearised along the motion, and its inverse is that of least squares over all robots
+that the uncertainty allows.
 """
 
 from __future__ import annotations
@@ -12,18 +13,19 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..system import assemble, linearize
+from ..system import assemble, linearize, static
 
-WEIGHTS = np.linspace(0.0, 1.0, 41)  # that are tried
-CONTRACTS = 0.9  # of an error: what a trial must leave less than
-FORGETS = 7.0  # e-folds in the duration of a transform
-RIDGE = 1e-3  # of the largest square: what moves the tip less is left alone
-RESTED = 1e-9  # of the largest response: a reference that moves the tip less does nothing
+RIDGE = 1e-3  # of the largest square of a joint: what moves the tip less is left alone
+SMOOTH = 1e-3  # of it: second differences of the splines' coefficients
+POSTURE_S = 0.04  # between two postures in which the robot is linearised
+STEP_S = 0.002  # at most, of the midpoint rule
+MODES = 4  # of the links with held joints
+SAME = 1e-4  # m or rad: postures that are not told apart
 
 
 @dataclass(frozen=True)
 class JointLoop:
-    """The controller of one joint's motor: F = force_per_V u, u = kp e + ki int e + kd e' + kv r'.
+    """The controller of one joint's motor: u = kp e + ki int e + kd e' + kv r' + kc sign r'.
 
     Attributes:
         force_per_V: force or torque of the motor at the joint [N/V or N m/V].
@@ -31,6 +33,7 @@ class JointLoop:
         ki: of its integral [V/(m s) or V/(rad s)].
         kd: of its rate [V s/m or V s/rad].
         kv: of the reference's rate [V s/m or V s/rad].
+        kc: with the sign of the reference's rate [V].
     """
 
     force_per_V: float
@@ -38,6 +41,31 @@ class JointLoop:
     ki: float = 0.0
     kd: float = 0.0
     kv: float = 0.0
+    kc: float = 0.0
+
+    def reference(
+        self, step_s: float, position: np.ndarray, voltage: np.ndarray, side: np.ndarray
+    ) -> np.ndarray:
+        """The reference with which a joint that moves so gets this voltage (123).
+
+        Args:
+            step_s: time between two samples [s].
+            position: of the joint (T,) [m or rad], at rest at the start.
+            voltage: that moves it (T,) [V].
+            side: sign of its velocity, smooth at reversals (T,).
+
+        Returns:
+            (T,) [m or rad].
+        """
+        rate = np.gradient(position, step_s)
+        own = np.asarray(voltage) - self.kv * rate - self.kc * np.asarray(side)
+        slow = (self.kd + self.kv) / step_s
+        error, total, out = 0.0, 0.0, np.zeros(len(own))
+        for k in range(1, len(own)):
+            error = (slow * error + own[k] - self.ki * total) / (slow + self.kp + self.ki * step_s)
+            total += step_s * error
+            out[k] = error
+        return np.asarray(position + out)
 
 
 @dataclass(frozen=True)
@@ -51,237 +79,153 @@ class JointSpring:
     stiffness: float
 
 
-def reference_response(
-    robot: Any, q: Any, s: Any, loops: Sequence[JointLoop | JointSpring]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Small motions of tip and joints under the joints' references, through the controllers (122).
+def motion_response(
+    robot: Any,
+    t: Any,
+    joints: np.ndarray,
+    changes: Sequence[np.ndarray],
+    springs: Sequence[JointSpring | None] = (),
+) -> np.ndarray:
+    """What changes of the joints' motions do to the tip, along a motion (122).
 
-    The controllers move the robot as if it were rigid. Its links vibrate on joints that move as
-    prescribed: friction and gear hold a motor's joint against them. A stepper's joint gives way.
+    A joint is where its motion says. One with a spring gives way; its motion is that of the pulses.
 
     Args:
-        robot: a System, a Robot, or the path or name of a robot file, with the drives' inertia and
-            damping in its joints.
-        q: the equilibrium (n,), or None: the static one at the start.
-        s: complex frequencies (F,) [1/s], as of `transform_points`; not 0.
-        loops: one a joint.
+        robot: a System, a Robot, or the path or name of a robot file.
+        t: evenly spaced times (T,) [s].
+        joints: the motion (T, J) along which the robot is linearised, links in static equilibrium.
+        changes: one a joint: functions (T, n_j), at rest at the start.
+        springs: one a joint, or None; empty: there is none.
 
     Returns:
-        H (F, 2, joints) and T (F, joints, joints), complex: x and y of the tip, and the joints, for
-        a unit of each reference.
+        x and y of the tip for a unit of each function, (T, 2, sum of n_j) [m].
 
     Raises:
-        InputError: there are not as many loops as joints, or a joint is locked.
+        InputError: there are not as many changes or springs as joints.
     """
-    system = assemble(robot)
-    lin = linearize(system, q)
-    joints = len(system.robot.links)
-    if len(loops) != joints or len(lin.inputs) != joints:
-        raise InputError("expected a loop for each joint, none locked", key="loops")
-    s = np.asarray(s, dtype=complex)[:, None, None]
-    whole = s**2 * lin.M + s * lin.G + lin.K
-    rigid, input_ = lin.E.T @ whole @ lin.E, np.zeros((len(s), joints, joints), dtype=complex)
-    for i, loop in enumerate(loops):
-        if isinstance(loop, JointSpring):
-            rigid[:, i], rigid[:, i, i], input_[:, i, i] = 0.0, 1.0, 1.0
-            continue
-        back = loop.force_per_V * (loop.kp + loop.ki / s + loop.kd * s)[:, 0, 0]
-        rigid[:, i, i] += back
-        input_[:, i, i] = back + loop.force_per_V * loop.kv * s[:, 0, 0]
-    asked = np.linalg.solve(rigid, input_)
-    stiffness = [loop.stiffness if isinstance(loop, JointSpring) else 0.0 for loop in loops]
-    moved = np.linalg.solve(whole + lin.E @ np.diag(stiffness) @ lin.E.T, lin.E[None])
-    place = [lin.outputs.index(f"joint/{i + 1}/position") for i in range(joints)]
-    tip = [lin.outputs.index("tip/x"), lin.outputs.index("tip/y")]
-    # forces that move motors' joints as asked, and those of springs
-    left = lin.outlook[place] @ moved
-    for i, k in enumerate(stiffness):
-        if k:
-            left[:, i], left[:, i, i], asked[:, i] = 0.0, 1.0, k * asked[:, i]
-    forces = np.linalg.solve(left, asked)
-    response: np.ndarray = lin.outlook[tip] @ moved @ forces
-    return response, lin.outlook[place] @ moved @ forces
+    from scipy.interpolate import CubicSpline
+
+    system, t = assemble(robot), np.asarray(t, dtype=float)
+    count = len(system.robot.links)
+    held = tuple(springs) or (None,) * count
+    if not len(changes) == len(held) == np.shape(joints)[1] == count:
+        raise InputError("expected changes of each joint", key="changes", value=len(changes))
+    parts = max(int(np.ceil((t[1] - t[0]) / STEP_S - 1e-9)), 1)
+    h = (t[1] - t[0]) / parts
+    fine = t[0] + h * np.arange(parts * (len(t) - 1) + 1)
+    nodes, M, G, K, O = _along(system, t, joints)
+    columns = np.cumsum([0, *(c.shape[1] for c in changes)])
+    asked = np.zeros((len(fine), count, columns[-1]))
+    for j, change in enumerate(changes):
+        asked[:, j, columns[j] : columns[j + 1]] = CubicSpline(t, change)(fine)
+    x = np.zeros((M.shape[1], columns[-1]))
+    v, out = x.copy(), np.zeros((len(t), 2, columns[-1]))
+    for k in range(1, len(fine)):
+        s = (fine[k] - 0.5 * h - nodes[0]) / (nodes[1] - nodes[0])
+        i = min(int(s), len(nodes) - 2)
+        at = lambda A, i=i, s=s: (1 + i - s) * A[i] + (s - i) * A[i + 1]
+        m, g, stiff = at(M), at(G), at(K)
+        force = np.zeros_like(x)
+        for j, spring in enumerate(held):
+            if spring is not None:
+                stiff[j, j] += spring.stiffness
+                force[j] = 0.5 * spring.stiffness * (asked[k, j] + asked[k - 1, j])
+        A = m / h + g / 2 + h / 4 * stiff
+        right = force + (m / h - g / 2 - h / 4 * stiff) @ v - stiff @ x
+        for j, spring in enumerate(held):
+            if spring is None:
+                A[j], A[j, j] = 0.0, 1.0
+                right[j] = 2 * (asked[k, j] - asked[k - 1, j]) / h - v[j]
+        after = np.linalg.solve(A, right)
+        x, v = x + h / 2 * (v + after), after
+        if k % parts == 0:
+            out[k // parts] = at(O) @ x
+    return out
+
+
+def _along(
+    system: Any, t: np.ndarray, joints: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """M, G, K and the tip's rows at postures on the way, in joints and the links' lowest modes."""
+    from scipy.linalg import eigh
+
+    count = max(int(np.ceil((t[-1] - t[0]) / POSTURE_S)) + 1, 2)
+    nodes = np.linspace(t[0], t[-1], count)
+    way = np.column_stack([np.interp(nodes, t, column) for column in np.asarray(joints).T])
+    linear, last = [], None
+    for posture in way:
+        if last is None or np.abs(posture - last).max() > SAME:
+            lin, last = linearize(system, static(system, joints=posture)), posture
+        linear.append(lin)
+    first = linear[count // 2]
+    links = np.setdiff1d(np.arange(system.n), system.joint_rows)
+    some = min(MODES, len(links))
+    shapes = np.zeros((system.n, way.shape[1] + some))
+    shapes[list(system.joint_rows), np.arange(way.shape[1])] = 1.0
+    if some:
+        own = np.ix_(links, links)
+        shapes[links, way.shape[1] :] = eigh(first.K[own], first.M[own])[1][:, :some]
+    tip = [first.outputs.index(name) for name in ("tip/x", "tip/y")]
+    small = [
+        np.array([shapes.T @ matrix(lin) @ shapes for lin in linear])
+        for matrix in (lambda lin: lin.M, lambda lin: lin.G, lambda lin: lin.K)
+    ]
+    seen = np.array([lin.outlook[tip] @ shapes for lin in linear])
+    return nodes, small[0], small[1], small[2], seen
 
 
 @dataclass(frozen=True)
-class LearningFilter:
-    """What is added to the references for an error of a trial.
+class LearningLaw:
+    """What is added to the joints' motions for an error of a trial, as coefficients of functions.
 
     Attributes:
-        step_s: time between two samples [s].
-        responses: H_p (P, F, k, J), complex, at `transform_points`: of k motions to J references.
-        weight: w (F,), between 0 and 1.
-        contraction: what one trial leaves of an error at the worst (F,); 1 where w is 0.
+        responses: Y_p (P, T, m, n) of the robots that may be meant, the likeliest one first: what n
+            functions do to m outputs.
+        counts: of the functions of each joint; their sum is n.
+        share: what each sample counts (T,), 1 where all of it does.
     """
 
-    step_s: float
     responses: np.ndarray
-    weight: np.ndarray
-    contraction: np.ndarray
+    counts: tuple[int, ...]
+    share: np.ndarray
 
-    @property
-    def samples(self) -> int:
-        """Samples of a transform."""
-        return 2 * (len(self.weight) - 1)
-
-    @property
-    def frequencies_Hz(self) -> np.ndarray:
-        """Frequencies (F,) [Hz]."""
-        return np.fft.rfftfreq(self.samples, self.step_s)
-
-    @property
-    def shift(self) -> float:
-        """The real part of the points at which responses are taken [1/s]."""
-        return FORGETS / (self.samples * self.step_s)
-
-    @property
-    def bandwidth_Hz(self) -> float:
-        """The frequency below which all is learned with at least half the weight [Hz]."""
-        low = np.flatnonzero(self.weight < 0.5)
-        return float(self.frequencies_Hz[low[0] - 1 if len(low) and low[0] else -1])
-
-    def update(
-        self,
-        error: Any,
-        basis: Sequence[np.ndarray],
-        directions: np.ndarray,
-        share: np.ndarray | None = None,
-    ) -> np.ndarray:
-        """Changes of the references for a trial's error (121), before and after it in time.
+    def update(self, error: np.ndarray) -> np.ndarray:
+        """The coefficients of a change (121).
 
         Args:
-            error: (T, m), what the outputs lack, at rest at its start.
-            basis: one a reference: functions (T, n) of which its change is made. They are 0 at the
-                start and constant at the end.
-            directions: what the k motions do to the outputs (T, m, k).
-            share: what each sample counts (T,), 1 where it is left out. Long after a motion the
-                phase of a model's vibration is no longer the robot's.
+            error: (T, m), what the outputs lack.
 
         Returns:
-            (T, J).
+            (n,).
 
         Raises:
-            InputError: the trial is longer than half of what the filter is made for.
+            InputError: the functions do not move the outputs.
         """
-        e = np.asarray(error, dtype=float)
-        rows = len(e)
-        if 2 * rows > self.samples:
-            raise InputError(
-                f"expected at most {self.samples // 2} samples", key="error", value=rows
-            )
-        counts = np.ones(rows) if share is None else np.asarray(share, dtype=float)
-        wanted = counts[:, None] * self._weighted(e)
-        count = sum(one.shape[1] for one in basis)
-        normal, right = np.zeros((count, count)), np.zeros(count)
-        for H in self.responses:
-            columns = [self._moved(H[:, :, j], one) for j, one in enumerate(basis)]
-            A = self._weighted((directions @ np.concatenate(columns, axis=-1)).reshape(rows, -1))
-            A = (counts[:, None] * A).reshape(e.size, -1)
-            normal, right = normal + A.T @ A, right + A.T @ wanted.ravel()
-        normal += RIDGE * np.diag(normal).max() * np.eye(len(normal))
-        found = np.split(
-            np.linalg.solve(normal, right), np.cumsum([b.shape[1] for b in basis])[:-1]
-        )
-        return np.column_stack([b @ c for b, c in zip(basis, found, strict=True)])
+        wanted = (self.share[:, None] * error).ravel()
+        normal, right = np.zeros((sum(self.counts),) * 2), np.zeros(sum(self.counts))
+        for Y in self.responses:
+            A = (self.share[:, None, None] * Y).reshape(len(wanted), -1)
+            normal, right = normal + A.T @ A, right + A.T @ wanted
+        start = 0
+        for count in self.counts:
+            own = slice(start, start + count)
+            size = np.diag(normal)[own].max()
+            if not size > 0:
+                raise InputError("expected motions that move the outputs", key="responses")
+            bend = np.diff(np.eye(count), 2, axis=0)
+            normal[own, own] += size * (RIDGE * np.eye(count) + SMOOTH * bend.T @ bend)
+            start += count
+        return np.asarray(np.linalg.solve(normal, right))
 
-    def _moved(self, H: np.ndarray, one: np.ndarray) -> np.ndarray:
-        """The motions (T, k, n) under functions (T, n) of one reference, H (F, k)."""
-        rows = len(one)
-        grow = np.exp(self.shift * self.step_s * np.arange(rows))[:, None, None]
-        spectrum = np.fft.rfft(one / grow[:, 0], self.samples, axis=0)
-        moved = np.fft.irfft(H[:, :, None] * spectrum[:, None], self.samples, axis=0)
-        return np.asarray(grow * moved[:rows])
+    def predicted(self, error: np.ndarray, change: np.ndarray) -> np.ndarray:
+        """The largest error that each robot predicts for a change (124).
 
-    def _weighted(self, values: np.ndarray) -> np.ndarray:
-        """Values (T, n) through the weight, which has no phase; what is left at the end fades."""
-        fade = 0.5 * (1 + np.cos(np.linspace(0.0, np.pi, self.samples // 4)))
-        padded = np.concatenate([values, fade[:, None] * values[-1]])
-        spectrum = self.weight[:, None] * np.fft.rfft(padded, self.samples, axis=0)
-        return np.asarray(np.fft.irfft(spectrum, self.samples, axis=0)[: len(values)])
+        Args:
+            error: (T, m), what the outputs lack without it.
+            change: coefficients (n,).
 
-
-def filter_length(samples: int) -> int:
-    """Samples of a transform for trials of so many: a power of two, at least twice as many.
-
-    Args:
-        samples: of a trial.
-
-    Returns:
-        How many.
-    """
-    return 1 << int(np.ceil(np.log2(2 * samples)))
-
-
-def transform_points(samples: int, step_s: float) -> np.ndarray:
-    """Complex frequencies s (F,) [1/s] of a transform that forgets.
-
-    Their real part is above 0, so that a motion that rings for long does not come round again.
-
-    Args:
-        samples: of the transform, as of `filter_length`.
-        step_s: time between two samples [s].
-
-    Returns:
-        (F,), at the frequencies of `numpy.fft.rfftfreq`.
-    """
-    return FORGETS / (samples * step_s) + 2j * np.pi * np.fft.rfftfreq(samples, step_s)
-
-
-def inverse_of_many(responses: np.ndarray) -> np.ndarray:
-    """The least-squares inverse of all responses together (123).
-
-    Where they agree it inverts them. Where a resonance may be on either side, they cancel.
-
-    Args:
-        responses: H_p (P, F, m, m), complex.
-
-    Returns:
-        L (F, m, m), complex.
-
-    Raises:
-        InputError: a reference does not move the outputs.
-    """
-    H = np.asarray(responses, dtype=complex)
-    conjugate = H.conj().swapaxes(-1, -2)
-    normal = (conjugate @ H).sum(axis=0)
-    if np.linalg.svd(normal[0], compute_uv=False)[-1] <= RESTED * np.abs(normal[0]).max():
-        raise InputError("expected references that move the outputs", key="responses")
-    return np.asarray(np.linalg.solve(normal, conjugate.sum(axis=0)))
-
-
-def learning_filter(
-    responses: np.ndarray,
-    step_s: float,
-    highest_Hz: float = np.inf,
-    motions: np.ndarray | None = None,
-) -> LearningFilter:
-    """How much of an error is safe to learn at each frequency (124).
-
-    The weight w is that which leaves the least of an error for the worst robot, 0 where an error
-    might not shrink.
-
-    Args:
-        responses: H_p (P, F, m, m), complex, of P robots at `transform_points`: from which the
-            weight follows.
-        step_s: time between two samples [s].
-        highest_Hz: nothing is learned above; the weight falls to 0 within half an octave below.
-        motions: (P, F, k, J), what the references do, for the changes; None: `responses`.
-
-    Returns:
-        The filter.
-
-    Raises:
-        InputError: a reference does not move the outputs.
-    """
-    H = np.asarray(responses, dtype=complex)
-    one, passed = np.eye(H.shape[-1]), H @ inverse_of_many(H)
-    left = np.array(
-        [np.linalg.norm(one - w * passed, 2, axis=(-2, -1)).max(axis=0) for w in WEIGHTS]
-    )
-    weight = np.where(left.min(axis=0) < CONTRACTS, WEIGHTS[left.argmin(axis=0)], 0.0)
-    f = np.fft.rfftfreq(2 * (len(weight) - 1), step_s)
-    with np.errstate(divide="ignore"):
-        octaves = np.log2(highest_Hz / f)
-    weight *= 0.5 * (1 - np.cos(np.pi * np.clip(2 * octaves, 0.0, 1.0)))
-    contraction = np.linalg.norm(one - weight[:, None, None] * passed, 2, axis=(-2, -1)).max(axis=0)
-    return LearningFilter(step_s, H if motions is None else motions, weight, contraction)
+        Returns:
+            (P,), in the outputs' unit.
+        """
+        left = error - self.responses @ change
+        return np.asarray(np.linalg.norm(left, axis=2).max(axis=1))
