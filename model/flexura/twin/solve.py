@@ -202,7 +202,7 @@ def _run(
     tries: int,
     progress: Callable[[float], None],
     program: str,
-    internal_forces: bool,
+    internal_forces: bool = False,
 ) -> tuple[Run, End]:
     """Simulate with steps of at most `longest` [s]; they are halved if Exudyn fails.
 

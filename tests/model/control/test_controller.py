@@ -13,8 +13,8 @@ from scipy.linalg import expm
 
 import flexura as fx
 from controlled_robots import TICK, cart, rig, rig_controller
-from flexura import control, signals
-from flexura.control import controller, lqr, step_response
+from flexura import signals
+from flexura.control import controller, lqr
 from flexura.simulation import gain_sweep
 from robots import beam, rigid, robot, system
 
@@ -234,27 +234,6 @@ def test_rows_of_gains_are_runs_whatever_their_order_and_threads():
     assert (reached == 1.0).all()
     again, _ = many.run(rows[::-1], threads=3)
     np.testing.assert_array_equal(again[::-1], figures)
-
-
-def test_a_row_of_gains_under_a_load_is_a_run_under_it():
-    """The figures of the run, and others than without the load; a run's effort is that of the
-    instants that it shows."""
-    sys, drive = rig(), rig_controller()
-    push = fx.Load(2, force_N=(0.0, signals.pulse(0.05, 0.1, 0.3)))
-    many = gain_sweep.prepare_gain_sweep(sys, drive, 1.0, 0.005, 1e-5, loads=push)
-    figures, _ = many.run(drive.gains()[None])
-    t = np.arange(0, 1001, 5) * 1e-3
-    run = fx.simulate(sys, t, drive, rtol=1e-5, method=many.method, loads=push)
-    references = [np.array([joint.reference(at)[0] for at in t]) for joint in drive.joints]
-    limits = [joint.limit for joint in drive.joints]
-    found = step_response(run, references, limits)
-    told = np.concatenate([found.joints.ravel(), found.strip])
-    rest = np.setdiff1d(np.arange(len(told)), [control.EFFORT, len(control.JOINT) + control.EFFORT])
-    assert figures[0, rest] == pytest.approx(told[rest], rel=1e-9, nan_ok=True)
-    without, _ = gain_sweep.prepare_gain_sweep(sys, drive, 1.0, 0.005, 1e-5).run(
-        drive.gains()[None]
-    )
-    assert np.nanmax(np.abs(without - figures)) > 1e-3
 
 
 def test_the_sum_does_not_wind_up():

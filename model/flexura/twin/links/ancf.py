@@ -153,11 +153,14 @@ class CableLink:
         return np.einsum("k,tkd->td", value, _elements(q)[:, k])
 
     def at(self, q: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """r, r' and r'' by x at x (T,) [m], (T, 2) each; of velocities and accelerations theirs.
+        """The line at x, and its derivatives by x; of rates of coordinates those of the line.
 
         Args:
             q: coordinates of the part's nodes, or their derivatives by time (T, k).
             x: distances from the origin (T,) [m].
+
+        Returns:
+            r, r' and r'', (T, 2) each.
         """
         length = self.values.length
         k = np.clip((x / length).astype(int), 0, len(self.values) - 1)
