@@ -37,7 +37,8 @@ class _Integration:
             problem.rtol,
         )
         joints = len(system.robot.links)
-        follows, function, sampler, rate = np.zeros(joints, dtype=np.uint8), None, None, 0.0
+        follows, sampler, rate = np.zeros(joints, dtype=np.uint8), None, 0.0
+        function: Any = None
         segments, ranges, gains = (
             np.zeros((0, COLUMNS)),
             np.zeros((joints, 4), dtype=np.int64),

@@ -1,11 +1,6 @@
-// A joint behind backlash: its force at a state, and a wheel that is let go beside a flank.
-#include <cmath>
-
+// A joint behind backlash: its force at a state.
 #include "check.hpp"
 #include "control/backlash.hpp"
-#include "integration/time_loop.hpp"
-#include "link/assembly.hpp"
-#include "simulation/simulation.hpp"
 
 using namespace flexura;
 
@@ -15,12 +10,13 @@ Signal line(double y, double rate) {
   return {Segment{0.0, {y, rate, 0.0, 0.0, 0.0, 0.0}, 0.0, 0.0, 0.0}};
 }
 
-TEST(force_is_that_of_the_flank_and_none_between) {
+TEST("the force is that of the flank, and none between") {
   const ForceFunction f = backlash_forces({{1, line(0.5, 2.0), 0.2, 100.0, 3.0}}, {0, 2});
   const double v[] = {0.0, 0.0, 7.0};
   const struct {
     double place, force;
-  } cases[] = {{0.7, 0.0}, {0.61, 0.0}, {0.85, -100.0 * 0.05 - 3.0 * 5.0}, {0.5, 100.0 * 0.1 - 15.0}};
+  } cases[] = {
+      {0.7, 0.0}, {0.61, 0.0}, {0.85, -100.0 * 0.05 - 3.0 * 5.0}, {0.5, 100.0 * 0.1 - 15.0}};
   for (const auto &each : cases) {
     const double q[] = {9.0, 9.0, each.place};
     double force[] = {1.0, 1.0};
