@@ -84,18 +84,19 @@ def fit(
         )
         raise InputError(expected, key=position, value=int((weight > 0).sum()))
 
-    load = None
-    if torque_N_m is not None:
+    loads, moved = [], NOTHING
+    if torque_N_m is None:
+        moved = _carried(robot, axis)
+    else:
         speed = np.interp(experiment.t, t, measured)
-        load = signals.table(experiment.t, -_given(axis, torque_N_m, speed))
+        taken = signals.table(experiment.t, -_given(axis, torque_N_m, speed))
+        loads = [fx.Load(link=1, at_m=0.0, moment_N_m=taken)]
 
     def model(values: dict[str, float]) -> np.ndarray:
         force = drive.segments * np.where(np.arange(COLUMNS) == 1, values.get("volts", 1.0), 1.0)
         force[:, 0] += values["voltage_delay_s"]
-        moved = _carried(robot, axis) if load is None else NOTHING
-        acting = Signal(force) if load is None else signals.sum([Signal(force), load])
         alone = _alone(axis, line, values, moved)
-        run = fx.simulate(alone, t, fx.Drive.force(acting), rtol=rtol)
+        run = fx.simulate(alone, t, fx.Drive.force(Signal(force)), loads=loads, rtol=rtol)
         return np.nan_to_num((velocity(t, run["joint/1/position"]) - measured) * weight)[None, :]
 
     parameters = (

@@ -165,6 +165,8 @@ def test_a_bad_clock_ends_with_its_row_and_no_figure(name, form, tmp_path):
         commands = [
             ["import", path, "--out", tmp_path / "run"],
             ["plot", path],
+            ["vibration", path],
+            ["identify", path],
             ["review", path, "--save", tmp_path / "x.rrd"],
             ["compare", path, path, "--out", tmp_path / "x"],
             ["export", path, "--to", "csv"],

@@ -92,6 +92,9 @@ def test_the_voltages_alone_predict_the_joints(name, tmp_path):
     assert all(row.rms_relative < 0.025 for row in found.differences if "joint" in row.channel)
 
 
+KEYS = ("stiffness", "payload", "damping", "backlash")  # of the strip and its joints
+
+
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("name", ["rig-r", "rig-rr"])
@@ -101,6 +104,14 @@ def test_its_true_parameters_are_found_from_one_run(name, tmp_path):
     factors = run.meta["truth"]["factors"]
     known = {key: run.meta[key] for key in run.meta if key not in ("truth", "seed")}
     found = identify(dataclasses.replace(run, meta=known))
+    off = {key: found.strip.values[key] / factors[key] - 1 for key in factors if key in KEYS}
+    for n, joint in found.joints.items():
+        truth = run.meta["truth"][f"joint_{n}"]
+        for key, most in (("coulomb", 0.15), ("viscous", 0.05)):
+            true = next(value for name, value in truth.items() if name.startswith(key))
+            off[f"joint {n}: {key}"] = joint.values[key] / true - 1
+            assert joint.values[key] == pytest.approx(true, rel=most), (n, key)
+    print(name, {key: f"{100 * value:.2f} %" for key, value in off.items()})
     assert found.strip.values["stiffness"] == pytest.approx(factors["stiffness"], rel=0.02)
     assert found.strip.values["payload"] == pytest.approx(factors["payload"], rel=0.02)
 

@@ -114,7 +114,7 @@ def test_a_tapered_round_bends_as_its_integral_says():
     s = L / 2 * (x + 1)
     exact = force * np.sum(L / 2 * w * (L - s) ** 2 / cone.links[0].bending_stiffness(s))
     assert exact == pytest.approx(force * L**3 / (3 * E * math.pi * d0**4 / 64) * d0 / d1, rel=1e-9)
-    assert y[0] == pytest.approx(exact, rel=1e-4)
+    assert y[0] == pytest.approx(exact, rel=1e-5)
 
 
 REFUSED = {

@@ -1,11 +1,6 @@
-// A joint behind backlash: its force at a state, and a wheel that is let go beside a flank.
-#include <cmath>
-
+// A joint behind backlash: its force at a state.
 #include "check.hpp"
 #include "control/backlash.hpp"
-#include "integration/time_loop.hpp"
-#include "link/assembly.hpp"
-#include "simulation/simulation.hpp"
 
 using namespace flexura;
 
@@ -15,7 +10,7 @@ Signal line(double y, double rate) {
   return {Segment{0.0, {y, rate, 0.0, 0.0, 0.0, 0.0}, 0.0, 0.0, 0.0}};
 }
 
-TEST("force is that of the flank and none between") {
+TEST("the force is that of the flank, and none between") {
   const ForceFunction f = backlash_forces({{1, line(0.5, 2.0), 0.2, 100.0, 3.0}}, {0, 2});
   const double v[] = {0.0, 0.0, 7.0};
   const struct {
