@@ -14,7 +14,6 @@ import flexura as fx
 from flexura import signals
 from flexura.control import JointLoop, JointSpring
 
-from ..recordings.strip_sensor import sensor_of
 from ..rig import Check, RigSetup
 from ..rig.axes import MotorAxis, motor_axes
 from ..rig.configuration import calibration
@@ -179,10 +178,11 @@ def _sensor_range(setup: RigSetup, settings: dict[str, float], links: fx.Run) ->
     """Whether the strip's sensor stays within the readings at which the board stops."""
     bent = links[f"link/{setup.strip}/tip_deflection"]
     found = f"{1e3 * bent.min():.4g} to {1e3 * bent.max():.4g} mm"
-    if calibration(setup) is None or not setup.rig.flex:
+    fitted = calibration(setup)
+    if fitted is None or not setup.rig.flex:
         return Check("deflection", True, found, "any")
     readings = np.array([settings["flex_min"], settings["flex_max"]])
-    low, high = np.sort(sensor_of(setup).tip(readings))
+    low, high = np.sort(fitted.c1_m * (readings - fitted.zero))
     inside = bool(low <= bent.min() and bent.max() <= high)
     expected = f"{1e3 * low:.4g} to {1e3 * high:.4g}"
     return Check("deflection", inside, found, expected, "a slower motion")
