@@ -11,8 +11,8 @@ namespace flexura {
 // Columns of a joint's row of gains; flexura/control.py has the same. JO, BO: of the
 // nominal joint. LIMIT, SLEW (a second) of the
 // output; FORCE: of a unit of it; SETPOINT, DERIVATIVE, DEFLECTION, OBSERVER: a of the filters (the
-// strip's is joint 1's); COUNT, DUTY: what position and output are rounded to (0: nothing); ENCODER: a
-// stepper's joint is measured; RIGID: no spring between pulses and joint; DELAY [ticks].
+// strip's is joint 1's); COUNT, DUTY: what position and output are rounded to (0: nothing);
+// ENCODER: a stepper's joint is measured; RIGID: no spring between pulses and joint; DELAY [ticks].
 enum Gain {
   KP,
   KI,

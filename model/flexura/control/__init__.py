@@ -14,7 +14,8 @@ from .controller import (
     filter_coefficient,
 )
 from .designed import Designed, design_setting
-from .gains import BOARD, NAMES, Gains, load_controller
+from .gain_names import BOARD, NAMES
+from .gains import Gains, load_controller
 from .gains import load as load_gains
 from .ilc import (
     JointLoop,

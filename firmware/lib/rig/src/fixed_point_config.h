@@ -1,9 +1,9 @@
 // Copyright (c) 2026 the flexura authors. SPDX-License-Identifier: MIT
 // What the control interrupt computes with, made from the configuration in SI units.
 #pragma once
+#include "disturbance_observer.h"
 #include "fault_monitor.h"
 #include "flex_sensor.h"
-#include "disturbance_observer.h"
 #include "pid.h"
 
 namespace flexura {
