@@ -323,6 +323,19 @@ def test_both_stop_their_sums_at_a_limit(lib):
         assert np.abs(got[j] - wanted[j])[1:].max() < 4 * share[j] + (0.05, 0.01)[j]
 
 
+def test_settings_of_an_older_firmware_are_still_read():
+    """A recording from before the observer has no settings of it: there was none."""
+    values, _ = settings_of(kp_1_V_m=300.0)
+    new = ("observer_", "jo_", "bo_")
+    older = {name: value for name, value in values.items() if not name.startswith(new)}
+    made = gains.from_board(older)
+    assert made.settings["kp_1_V_m"] == 300.0 and not any(n.startswith(new) for n in made.settings)
+    motor = fx.Motor(1.0, 0.0)
+    drive = made.controller([signals.constant(0.0)] * 2, [motor, fx.Stepper()])
+    now = gains.from_board(values).controller([signals.constant(0.0)] * 2, [motor, fx.Stepper()])
+    assert np.array_equal(drive.gains(), now.gains())
+
+
 @given(st.lists(st.integers(-16383, 16383), min_size=1, max_size=60))
 def test_no_step_is_lost_or_added_and_none_is_too_soon(lib, rates):
     rates = np.repeat(rates, 5).astype(np.int16)

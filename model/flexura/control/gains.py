@@ -29,138 +29,9 @@ from ..io import Tables, find, read_toml, write_toml
 from ..signals import PLAUSIBLE, Signal, constant, is_plausible
 from .controller import Controller
 from .designed import Designed, read_design
+from .gain_names import BOARD, BOARDS, ENDS, NAMES, SHARED
 from .pid import PID, Force, Motor, Output, Stepper
 
-MAX_JOINTS = 9
-# names of PID's fields, {} the joint's number, by output
-_ENDS = {
-    "motor": {
-        "kp": "kp_{}_V_m",
-        "ki": "ki_{}_V_m_s",
-        "kd": "kd_{}_V_s_m",
-        "kf": "kf_{}_V_m",
-        "kg": "kg_{}_V_s_m",
-        "ks": "ks_{}_V_rad",
-        "kt": "kt_{}_V_s_rad",
-        "kv": "kv_{}_V_s_m",
-        "kc": "kc_{}_V",
-        "jo": "jo_{}_V_s2_m",
-        "bo": "bo_{}_V_s_m",
-        "limit": "voltage_max_{}_V",
-        "slew": "voltage_slew_{}_V_s",
-    },
-    "turning motor": {  # its joint turns, and positions are in radians
-        "kp": "kp_{}_V_rad",
-        "ki": "ki_{}_V_rad_s",
-        "kd": "kd_{}_V_s_rad",
-        "kf": "kf_{}_V_m",
-        "kg": "kg_{}_V_s_m",
-        "ks": "ks_{}_V_rad",
-        "kt": "kt_{}_V_s_rad",
-        "kv": "kv_{}_V_s_rad",
-        "kc": "kc_{}_V",
-        "jo": "jo_{}_V_s2_rad",
-        "bo": "bo_{}_V_s_rad",
-        "limit": "voltage_max_{}_V",
-        "slew": "voltage_slew_{}_V_s",
-    },
-    "stepper": {
-        "kp": "kp_{}_1_s",
-        "ki": "ki_{}_1_s2",
-        "kd": "kd_{}",
-        "kf": "kf_{}_rad_s_m",
-        "kg": "kg_{}_rad_m",
-        "ks": "ks_{}_1_s",
-        "kt": "kt_{}",
-        "kv": "kv_{}",
-        "limit": "rate_max_{}_rad_s",
-        "slew": "acceleration_max_{}_rad_s2",
-    },
-    "force": {
-        "kp": "kp_{}_N_m",
-        "ki": "ki_{}_N_m_s",
-        "kd": "kd_{}_N_s_m",
-        "kf": "kf_{}_N_m",
-        "kg": "kg_{}_N_s_m",
-        "ks": "ks_{}_N_rad",
-        "kt": "kt_{}_N_s_rad",
-        "kv": "kv_{}_N_s_m",
-        "kc": "kc_{}_N",
-        "jo": "jo_{}_N_s2_m",
-        "bo": "bo_{}_N_s_m",
-        "limit": "force_max_{}_N",
-        "slew": "force_slew_{}_N_s",
-    },
-    "torque": {
-        "kp": "kp_{}_N_m_rad",
-        "ki": "ki_{}_N_m_rad_s",
-        "kd": "kd_{}_N_m_s_rad",
-        "kf": "kf_{}_N_m_m",
-        "kg": "kg_{}_N_m_s_m",
-        "ks": "ks_{}_N_m_rad",
-        "kt": "kt_{}_N_m_s_rad",
-        "kv": "kv_{}_N_m_s_rad",
-        "kc": "kc_{}_N_m",
-        "jo": "jo_{}_N_m_s2_rad",
-        "bo": "bo_{}_N_m_s_rad",
-        "limit": "torque_max_{}_N_m",
-        "slew": "torque_slew_{}_N_m_s",
-    },
-}
-_ANY = {
-    "setpoint_Hz": "setpoint_{}_Hz",
-    "observer_Hz": "observer_{}_Hz",
-    "delay_s": "delay_{}_s",
-}
-# the board's motors share these
-_BOARDS = {
-    "voltage_max_V": "voltage_max_1_V",
-    "voltage_slew_V_s": "voltage_slew_1_V_s",
-}
-_SHARED = ("rate_Hz", "derivative_Hz", "deflection_Hz")
-BOARD = (  # the settings of the board that are a controller's, in its order
-    "voltage_max_V",
-    "voltage_slew_V_s",
-    "rate_max_2_rad_s",
-    "acceleration_max_2_rad_s2",
-    "kp_1_V_m",
-    "ki_1_V_m_s",
-    "kd_1_V_s_m",
-    "kf_1_V_m",
-    "kg_1_V_s_m",
-    "kv_1_V_s_m",
-    "kc_1_V",
-    "kp_2_1_s",
-    "ki_2_1_s2",
-    "kd_2",
-    "kf_2_rad_s_m",
-    "kg_2_rad_m",
-    "kv_2",
-    "kp_1_V_rad",
-    "ki_1_V_rad_s",
-    "kd_1_V_s_rad",
-    "kv_1_V_s_rad",
-    "kp_2_V_rad",
-    "ki_2_V_rad_s",
-    "kd_2_V_s_rad",
-    "kf_2_V_m",
-    "kg_2_V_s_m",
-    "kv_2_V_s_rad",
-    "kc_2_V",
-    "derivative_Hz",
-    "deflection_Hz",
-    "setpoint_1_Hz",
-    "setpoint_2_Hz",
-    "feedback_2",
-    "observer_1_Hz",
-    "jo_1_V_s2_m",
-    "bo_1_V_s_m",
-    "jo_1_V_s2_rad",
-    "bo_1_V_s_rad",
-    "observer_2_Hz",
-    "jo_2_V_s2_rad",
-    "bo_2_V_s_rad",
-)
 _MOTORS = ("motor", "turning motor")
 _OUTPUTS = {
     "motor": Motor,
@@ -169,23 +40,6 @@ _OUTPUTS = {
     "force": Force,
     "torque": Force,
 }
-
-
-def _names() -> dict[str, list[tuple[int, str, str]]]:
-    """Known names: joint (from 0), output ("" any) and PID's field of each; `ks_1_N_m_rad` is a
-    torque's alone."""
-    out: dict[str, list[tuple[int, str, str]]] = {}
-    for i in range(MAX_JOINTS):
-        for kind, ends in _ENDS.items():
-            for field, name in ends.items():
-                out.setdefault(name.format(i + 1), []).append((i, kind, field))
-        for field, name in _ANY.items():
-            out[name.format(i + 1)] = [(i, "", field)]
-        out[f"feedback_{i + 1}"] = [(i, "stepper", "encoder")]
-    return out | {board: out[name] for board, name in _BOARDS.items()}
-
-
-NAMES = _names()
 
 
 @dataclass(frozen=True)
@@ -202,10 +56,10 @@ class Gains:
         """Each joint's output: "motor", "turning motor", "stepper", "force" or "torque"."""
         found: dict[int, set[str]] = {}
         for name in self.settings:
-            if name not in _SHARED:
+            if name not in SHARED:
                 kinds = {kind for _, kind, _ in NAMES[name]} - {""}
                 i = NAMES[name][0][0]
-                found[i] = found.get(i, set(_ENDS)) & (kinds or set(_ENDS))
+                found[i] = found.get(i, set(ENDS)) & (kinds or set(ENDS))
         for i, kinds in found.items():
             if kinds == set(_MOTORS):  # no name tells them apart: no term in a position
                 found[i] = {"motor"}
@@ -247,11 +101,11 @@ class Gains:
                 else {}
             )
             for name, value in self.settings.items():
-                if name not in _SHARED:
+                if name not in SHARED:
                     given |= {
                         field: value
                         for j, own, field in NAMES[name]
-                        if (j == i or name in _BOARDS) and own in ("", kind)
+                        if (j == i or name in BOARDS) and own in ("", kind)
                     }
             encoder = given.pop("encoder", 0.0) >= 0.5
             output = self._output(i, kind, outputs)
@@ -311,17 +165,21 @@ class Gains:
 
 
 def from_board(values: Mapping[str, float]) -> Gains:
-    """The gains among all settings of a board, of the drives that it has."""
+    """The gains among the settings of a board, of the drives that it has.
+
+    A setting that is missing, in a run of an older firmware, is off.
+    """
     first = "turning motor" if values.get("drive_1", 1.0) > 1.5 else "motor"
     second = ("", "stepper", "turning motor")[round(values.get("drive_2", 1.0))]
 
     def has(name: str) -> bool:
-        if name in _SHARED or name in _BOARDS:
+        if name in SHARED or name in BOARDS:
             return True
         here = (first, second)
         return any(here[i] and kind in ("", here[i]) for i, kind, _ in NAMES[name] if i < 2)
 
-    return Gains({name: float(values[name]) for name in BOARD if has(name)})
+    here = [name for name in BOARD if name in values and has(name)]
+    return Gains({name: float(values[name]) for name in here})
 
 
 def load(path: str | os.PathLike[str]) -> Gains:
@@ -378,8 +236,8 @@ def _gains(data: Tables, file: str) -> Gains:
         )
     settings = {}
     for key, value in table.items():
-        if key not in NAMES and key not in _SHARED:
-            near = difflib.get_close_matches(key, [*NAMES, *_SHARED], 1, 0.6)
+        if key not in NAMES and key not in SHARED:
+            near = difflib.get_close_matches(key, [*NAMES, *SHARED], 1, 0.6)
             hint = (
                 f"; did you mean {near[0]}?" if near else "; see firmware/README.md, the controller"
             )
