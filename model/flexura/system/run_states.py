@@ -43,8 +43,8 @@ class RunStates:
         """The same states, of at most 500 times each; one block of no time, if there is none."""
         for first in range(0, max(len(self.t), 1), ROWS):
             part = slice(first, first + ROWS)
-            rows = (x[part] for x in (self.t, self.q, self.qd, self.drive))
-            yield RunStates(self.system, *rows, self.loads)
+            t, q, qd, drive = (x[part] for x in (self.t, self.q, self.qd, self.drive))
+            yield RunStates(self.system, t, q, qd, drive, self.loads)
 
     @cached_property
     def accelerations(self) -> np.ndarray:
