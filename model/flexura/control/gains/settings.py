@@ -170,7 +170,14 @@ class Gains:
 
 
 def from_board(values: Mapping[str, float]) -> Gains:
-    """The gains among all settings of a board, of the drives that it has."""
+    """The gains among all settings of a board.
+
+    Args:
+        values: settings by their names in the firmware.
+
+    Returns:
+        The Gains of the drives that the board has.
+    """
     first = "turning motor" if values.get("drive_1", 1.0) > 1.5 else "motor"
     second = ("", "stepper", "turning motor")[round(values.get("drive_2", 1.0))]
 

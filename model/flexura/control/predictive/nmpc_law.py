@@ -85,7 +85,15 @@ class NonlinearPredictive(MeasuredLaw):
         self.turn, self.one = 0, np.eye(C.shape[1])
 
     def tick(self, t: float, y: np.ndarray) -> np.ndarray:
-        """The forces (links,) from the measurements (p,) at time t [s]."""
+        """One step of Newton's method (130).
+
+        Args:
+            t: the time [s].
+            y: the measurements (p,).
+
+        Returns:
+            The forces (links,) [N or N m].
+        """
         x = self._corrected(y)
         self._linearised()
         self._solved(t, x)
@@ -96,7 +104,11 @@ class NonlinearPredictive(MeasuredLaw):
         return force
 
     def begin(self, position: np.ndarray) -> None:
-        """The motion ahead is rest with the joints at `position` (links,)."""
+        """Begin a run: the motion ahead is rest.
+
+        Args:
+            position: of the joints (links,) [m or rad].
+        """
         p, N = self.prediction, len(self.problem.h)
         rest, hold = self._equilibrium(tuple(position))
         self.x, self.u = np.tile(rest, (N + 1, 1)), np.tile(hold, (N, 1))
