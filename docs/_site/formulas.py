@@ -14,8 +14,16 @@ from docutils import nodes
 SCRIPT = "tex-svg-full.js"  # with its glyphs inside: one file is all of MathJax that is needed
 SETTINGS = """window.MathJax = {
   tex: {inlineMath: [["\\\\(", "\\\\)"]], displayMath: [["\\\\[", "\\\\]"]]},
-  options: {enableMenu: false, processHtmlClass: "math"}
+  options: {enableMenu: false, processHtmlClass: "math"},
+  startup: {pageReady: () => MathJax.startup.defaultPageReady().then(() => {
+    for (const formula of document.querySelectorAll("div.math")) {
+      const share = formula.clientWidth / formula.scrollWidth;
+      if (share < 1) formula.style.fontSize = 100 * Math.max(share, 0.7) + "%";
+    }
+  })}
 };"""
+# A display formula wider than the page is set smaller, to 70 % at most; wider still, it is moved
+# sideways.
 _ANCHOR = re.compile(r'<a id="(eq-\d+)"></a>')
 # formulas, code, links and targets are passed over, and what follows a number; left is (7)
 _NUMBER = re.compile(

@@ -26,7 +26,12 @@ def blocks(page: Path) -> list[tuple[str, str]]:
 
 def commands(page: Path) -> list[str]:
     """The commands of a page in their order."""
-    return [line for kind, text in blocks(page) if kind == "sh" for line in text.splitlines()]
+    return [
+        line
+        for kind, text in blocks(page)
+        if kind == "sh"
+        for line in text.replace("\\\n", " ").splitlines()
+    ]
 
 
 @pytest.mark.slow

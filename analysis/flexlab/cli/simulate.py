@@ -136,9 +136,7 @@ def simulate(
         check_followed(asked, manoeuvre, "call with --controller GAINS or --prescribed")
     drive = controller_from_file(system, asked, controller) if controller else asked.drive
     for i in unused_forces(asked, drive):
-        warn(
-            f"the force of joint {i} in the manoeuvre is not used: the controller does not take it"
-        )
+        warn(f"the manoeuvre's force of joint {i} is not used: the controller does not take it")
     with results(out, "simulate", robot.stem, *stem(manoeuvre), force=force) as draft:
         run = simulate_asked(
             system,

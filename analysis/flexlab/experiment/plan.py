@@ -18,7 +18,7 @@ import flexura as fx
 from flexura import signals
 from flexura.control import BOARD, load_gains
 from flexura.errors import InputError
-from flexura.io import read_toml
+from flexura.io import find, read_toml
 
 from ..board.protocol.declaration import CONFIG
 from ..board.protocol.player import VOLT_UNIT_V, Knots, drives, setpoints
@@ -74,11 +74,12 @@ def gains(path: Path) -> dict[str, float]:
     that it does not name are off.
 
     Args:
-        path: the file.
+        path: the file, or the name of a controller that comes with flexura.
 
     Raises:
         InputError: names file, key and value.
     """
+    path = find(path, "controllers")
     data, known = read_toml(path), GAINS
     if "controller" in data:
         data, known = ALL_TERMS_OFF | load_gains(path).board(), BOARD

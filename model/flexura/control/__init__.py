@@ -14,9 +14,7 @@ from .controller import (
     Linear,
     filter_coefficient,
 )
-from .designed import Designed, design_setting
-from .gain_names import BOARD, NAMES
-from .gains import Gains, load_controller
+from .gains import BOARD, NAMES, Designed, Gains, design_setting, load_controller
 from .gains import load as load_gains
 from .ilc import (
     JointLoop,

@@ -64,5 +64,5 @@ def find(path: str | os.PathLike[str], kind: str) -> Path:
         return found
     near = difflib.get_close_matches(name, known, 3, 0.4)
     said = f"did you mean {' or '.join(near)}?" if near else f"known: {', '.join(known) or 'none'}"
-    expected = f"no such file, and no {KINDS[kind]} of this name comes with flexura; {said}"
+    expected = f"no such file, and no {KINDS[kind]} file of this name comes with flexura; {said}"
     raise InputError(expected, file=name)

@@ -11,13 +11,14 @@ from .balance import (
     LinkForces,
     PointLoad,
     Reaction,
+    RunStates,
     SectionForces,
+    accelerations,
     check_continuous,
     internal_forces,
     sections_known,
 )
 from .loads import Impact, acting_loads, impact, load_forces, with_payload
-from .run_states import RunStates, accelerations
 from .sensors import sensor_channels
 from .small_motions import (
     FrequencyResponse,

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..robot import FORCE_KINDS, Sensor
-from .balance import Balance
-from .run_states import RunStates
+from .balance import Balance, RunStates
 from .system import System
 
 

@@ -59,11 +59,11 @@ def test_a_folder_of_that_name_does_not(elsewhere):
 @pytest.mark.parametrize(
     ("load", "name", "words"),
     [
-        (fx.load, "rigg", "no robot of this name comes with flexura; did you mean rig"),
+        (fx.load, "rigg", "no robot file of this name comes with flexura; did you mean rig"),
         (fx.load, "two-link", "did you mean two-link-arm?"),
         (fx.load, "zzzzzz", "known: chain-r-pb-pa, quanser-2dsfl, rig"),
         (lambda name: fx.load_manoeuvre(name, 2), "rig-stap", "did you mean rig-step"),
-        (load_gains, "rigs", "no gains of this name comes with flexura; did you mean rig"),
+        (load_gains, "rigs", "no gains file of this name comes with flexura; did you mean rig"),
     ],
 )
 def test_a_wrong_name_is_answered_with_the_near_ones(elsewhere, load, name, words):

@@ -15,6 +15,8 @@ ENDS = {
         "kt": "kt_{}_V_s_rad",
         "kv": "kv_{}_V_s_m",
         "kc": "kc_{}_V",
+        "jo": "jo_{}_V_s2_m",
+        "bo": "bo_{}_V_s_m",
         "limit": "voltage_max_{}_V",
         "slew": "voltage_slew_{}_V_s",
     },
@@ -28,6 +30,8 @@ ENDS = {
         "kt": "kt_{}_V_s_rad",
         "kv": "kv_{}_V_s_rad",
         "kc": "kc_{}_V",
+        "jo": "jo_{}_V_s2_rad",
+        "bo": "bo_{}_V_s_rad",
         "limit": "voltage_max_{}_V",
         "slew": "voltage_slew_{}_V_s",
     },
@@ -53,6 +57,8 @@ ENDS = {
         "kt": "kt_{}_N_s_rad",
         "kv": "kv_{}_N_s_m",
         "kc": "kc_{}_N",
+        "jo": "jo_{}_N_s2_m",
+        "bo": "bo_{}_N_s_m",
         "limit": "force_max_{}_N",
         "slew": "force_slew_{}_N_s",
     },
@@ -66,11 +72,17 @@ ENDS = {
         "kt": "kt_{}_N_m_s_rad",
         "kv": "kv_{}_N_m_s_rad",
         "kc": "kc_{}_N_m",
+        "jo": "jo_{}_N_m_s2_rad",
+        "bo": "bo_{}_N_m_s_rad",
         "limit": "torque_max_{}_N_m",
         "slew": "torque_slew_{}_N_m_s",
     },
 }
-_ANY = {"setpoint_Hz": "setpoint_{}_Hz", "delay_s": "delay_{}_s"}
+_ANY = {
+    "setpoint_Hz": "setpoint_{}_Hz",
+    "observer_Hz": "observer_{}_Hz",
+    "delay_s": "delay_{}_s",
+}
 # the board's motors share these
 BOARDS = {
     "voltage_max_V": "voltage_max_1_V",
@@ -111,6 +123,14 @@ BOARD = (  # the settings of the board that are a controller's, in its order
     "setpoint_1_Hz",
     "setpoint_2_Hz",
     "feedback_2",
+    "observer_1_Hz",
+    "jo_1_V_s2_m",
+    "bo_1_V_s_m",
+    "jo_1_V_s2_rad",
+    "bo_1_V_s_rad",
+    "observer_2_Hz",
+    "jo_2_V_s2_rad",
+    "bo_2_V_s_rad",
 )
 
 

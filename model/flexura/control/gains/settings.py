@@ -170,7 +170,15 @@ class Gains:
 
 
 def from_board(values: Mapping[str, float]) -> Gains:
-    """The gains among all settings of a board, of the drives that it has."""
+    """The gains among all settings of a board.
+
+    Args:
+        values: settings by their names in the firmware. One that is missing, in a run of an older
+            firmware, is off.
+
+    Returns:
+        The Gains of the drives that the board has.
+    """
     first = "turning motor" if values.get("drive_1", 1.0) > 1.5 else "motor"
     second = ("", "stepper", "turning motor")[round(values.get("drive_2", 1.0))]
 
@@ -180,4 +188,4 @@ def from_board(values: Mapping[str, float]) -> Gains:
         here = (first, second)
         return any(here[i] and kind in ("", here[i]) for i, kind, _ in NAMES[name] if i < 2)
 
-    return Gains({name: float(values[name]) for name in BOARD if has(name)})
+    return Gains({name: float(values[name]) for name in BOARD if name in values and has(name)})

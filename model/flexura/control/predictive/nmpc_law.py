@@ -89,7 +89,15 @@ class NonlinearPredictive(MeasuredLaw):
         self.one = np.eye(C.shape[1])
 
     def tick(self, t: float, y: np.ndarray) -> np.ndarray:
-        """The forces (links,) from the measurements (p,) at time t [s]."""
+        """One step of Newton's method (130).
+
+        Args:
+            t: the time [s].
+            y: the measurements (p,).
+
+        Returns:
+            The forces (links,) [N or N m].
+        """
         x = self._corrected(y)
         self._prepared()
         self._solved(t, x)
@@ -100,7 +108,11 @@ class NonlinearPredictive(MeasuredLaw):
         return force
 
     def begin(self, position: np.ndarray) -> None:
-        """The motion ahead is rest with the joints at `position` (links,)."""
+        """Begin a run: the motion ahead is rest.
+
+        Args:
+            position: of the joints (links,) [m or rad].
+        """
         p, N = self.prediction, len(self.problem.h)
         rest, hold = self._equilibrium(tuple(position))
         self.x, self.u = np.tile(rest, (N + 1, 1)), np.tile(hold, (N, 1))

@@ -9,6 +9,7 @@ from .internal_forces import (
     point_loads,
     sections_known,
 )
+from .run_states import RunStates, accelerations
 
 __all__ = [
     "Balance",
@@ -16,7 +17,9 @@ __all__ = [
     "LinkForces",
     "PointLoad",
     "Reaction",
+    "RunStates",
     "SectionForces",
+    "accelerations",
     "check_continuous",
     "internal_forces",
     "point_loads",

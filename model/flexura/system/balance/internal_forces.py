@@ -138,7 +138,15 @@ def internal_forces(
 
 
 def point_loads(loads: Loads, t: np.ndarray) -> list[PointLoad]:
-    """The loads of a run at times (T,) [s], as the balance takes them (131), (132)."""
+    """The loads of a run, as the balance takes them (131), (132).
+
+    Args:
+        loads: forces and moments on links.
+        t: times (T,) [s].
+
+    Returns:
+        One PointLoad a load, each with T values.
+    """
     if not loads or not len(t):
         return []
     values = np.array([loads.values(float(at)) for at in t])  # (T, L, 3)

@@ -7,10 +7,11 @@ from functools import cached_property
 
 import numpy as np
 
-from ..signals import Loads
-from .balance import Balance, check_continuous, point_loads
-from .loads import load_forces
-from .system import System
+from ...signals import Loads
+from ..loads import load_forces
+from ..system import System
+from .cuts import Balance
+from .internal_forces import check_continuous, point_loads
 
 ROWS = 500  # times in one block, which bounds the memory that a balance takes
 
@@ -75,5 +76,17 @@ def accelerations(
     drive: np.ndarray,
     loads: Loads,
 ) -> np.ndarray:
-    """The accelerations of the unknowns of a run (T, n); the arguments are those of `RunStates`."""
+    """The accelerations of the unknowns of a run (44), (57).
+
+    Args:
+        system: the robot.
+        t: times (T,) [s].
+        q: configurations (T, n).
+        qd: their rates (T, n).
+        drive: forces of the drives (T, links) [N or N m].
+        loads: forces and moments on links.
+
+    Returns:
+        (T, n).
+    """
     return RunStates(system, t, q, qd, drive, loads).accelerations
