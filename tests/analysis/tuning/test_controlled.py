@@ -12,7 +12,7 @@ import pytest
 import flexura as fx
 from flexlab.board.protocol.declaration import CONFIG
 from flexlab.tuning.closed_loop import controller_from_file
-from flexura.control import gain_names, gains
+from flexura.control import gains
 from processes import flexura
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -30,9 +30,7 @@ def rig_with_rotor(modes: int = 2) -> fx.System:
 
 
 def test_every_name_of_the_board_is_a_name_of_the_file():
-    assert set(gain_names.BOARD) <= set(CONFIG) and set(gain_names.BOARD) <= set(
-        gain_names.NAMES
-    ) | {
+    assert set(gains.BOARD) <= set(CONFIG) and set(gains.BOARD) <= set(gains.NAMES) | {
         "derivative_Hz",
         "deflection_Hz",
     }
@@ -49,9 +47,9 @@ def test_every_name_of_the_board_is_a_name_of_the_file():
         "deflection",
     )
     own = [name for name in CONFIG if name.startswith(starts)]
-    assert set(own) | {"feedback_2"} == set(gain_names.BOARD)
+    assert set(own) | {"feedback_2"} == set(gains.BOARD)
     assert list(gains.load(GAINS).board()) == [
-        name for name in gain_names.BOARD if name in gains.load(GAINS).settings
+        name for name in gains.BOARD if name in gains.load(GAINS).settings
     ]
 
 
