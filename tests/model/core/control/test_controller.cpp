@@ -349,7 +349,7 @@ TEST(
   }
   std::vector<double> price(std::size_t(width), 0.0), free(price);
   price[ITAE] = 1.0, price[OVERSHOOT] = 1.0, price[EFFORT] = 0.01,
-  price[JOINT_FIGURES + VIBRATION] = 300.0, free[OVERSHOOT] = 0.05;
+  price[int(JOINT_FIGURES) + VIBRATION] = 300.0, free[OVERSHOOT] = 0.05;
   const Prices prices{price.data(), free.data()};
   trials.run(prices, gains.data(), limits.data(), rows, 1, figures.data(), reached.data());
 
