@@ -3,8 +3,6 @@
 
 #include <algorithm>
 
-#include "control/backlash.hpp"
-
 namespace flexura {
 
 Signal signal_of(const Matrix &segments, std::int64_t from, std::int64_t to) {

@@ -1,6 +1,6 @@
 // A joint behind backlash: its force at a state.
 #include "check.hpp"
-#include "control/backlash.hpp"
+#include "control/inputs.hpp"
 
 using namespace flexura;
 

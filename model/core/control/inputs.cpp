@@ -1,4 +1,4 @@
-#include "control/backlash.hpp"
+#include "control/inputs.hpp"
 
 #include <utility>
 
