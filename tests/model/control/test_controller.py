@@ -85,7 +85,7 @@ def test_a_cart_follows_the_recursion_written_out(data):
 
 
 def law_by_hand(pids, drive, positions, w, s):
-    """Outputs (K, N) of the law as control.py states it, from measured positions (K, N),
+    """Outputs (K, N) of the law as controller.py states it, from measured positions (K, N),
     deflections and slopes (K,)."""
     T, smooth = 1 / drive.rate_Hz, lambda f, T: 1 - np.exp(-2 * np.pi * f * T) if f else 1.0
     strip = [np.zeros(2), np.zeros(2)]  # value and rate of deflection, of slope
