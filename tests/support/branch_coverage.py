@@ -42,6 +42,7 @@ def function_name(demangled: str) -> str:
     """A function without its arguments and those of its templates; a lambda is one of where it
     stands."""
     name = demangled.replace("(anonymous namespace)::", "").replace("operator()", "call")
+    name = name.replace("[abi:cxx11]", "")
     name = re.sub(r"operator(<<=?|>>=?|<=|>=|<|>|->\*?)", "operator", name)
     while (shorter := re.sub(r"<[^<>]*>|\([^()]*\)|#\d+", "", name)) != name:
         name = shorter
@@ -94,7 +95,7 @@ def branches(objects: Path, sources: Path) -> dict[Line, list[int]]:
             taken = decisions(line["branches"])
             if not taken or not DECIDES.search(texts[name][number - 1].split("//")[0]):
                 continue
-            by_size = counts[name, number, names[line["function_name"]]]
+            by_size = counts[name, number, names.get(line.get("function_name", ""), "")]
             before = by_size.get(len(taken), [0] * len(taken))
             by_size[len(taken)] = [a + b for a, b in zip(before, taken, strict=True)]
     return {

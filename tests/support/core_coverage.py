@@ -1,10 +1,10 @@
 """Which branches of model/core its tests take.
 
-    python tests/support/core_coverage.py FOLDER [--python TESTS...] [--missed FILE...]
+    python tests/support/core_coverage.py FOLDER [--missed FILE...]
 
-It builds the core for gcov in FOLDER (minutes, without optimisation) and runs the C++ tests there.
---python also builds the Python module in FOLDER, and runs these tests with it. It prints one row a
-file. --missed prints the lines of these files with branches that no test took.
+It builds the core and its module for gcov in FOLDER (minutes, without optimisation), and runs the
+C++ tests and those of PYTHON there. It prints one row a file. --missed prints the lines of these
+files with branches that no test took. branch_coverage.py says what a branch is.
 """
 
 from __future__ import annotations
@@ -17,37 +17,63 @@ import sys
 from collections import defaultdict
 from pathlib import Path
 
+import cmake
+import ninja
+
 from branch_coverage import Line, branches, missed
+from flexura import core
 
 ROOT = Path(__file__).resolve().parents[2]
 CORE = ROOT / "model" / "core"
+CMAKE, NINJA = Path(cmake.CMAKE_BIN_DIR) / "cmake", Path(ninja.BIN_DIR) / "ninja"
+
+# Tests in Python that take what the C++ tests do not: the bindings, and runs of whole robots.
+PYTHON = [
+    "tests/model/core/test_bindings.py",
+]
 
 
-def built(folder: Path, *options: str, target: str = "all") -> None:
-    """Configure and build with branches counted."""
-    coverage = ["-DFLEXURA_COVERAGE=ON", "-DCMAKE_BUILD_TYPE=Debug", *options]
-    subprocess.run(["cmake", "-S", str(ROOT), "-B", str(folder), *coverage], check=True)
-    subprocess.run(["cmake", "--build", str(folder), "--target", target], check=True)
-
-
-def run_python(folder: Path, tests: list[str]) -> None:
-    """Tests in Python, with the module that counts in the place of the installed one."""
-    options = [
-        "-DFLEXURA_MODULE=ON",
-        "-DFLEXURA_PLAIN=OFF",
-        f"-DPython_EXECUTABLE={sys.executable}",
-    ]
-    built(folder / "module", *options)
-    copy = folder / "model"
+def measured(folder: Path, jobs: int = 1) -> dict[Line, list[int]]:
+    """How often each branch of the core was taken by its tests, built and run in a folder."""
+    copy = folder / "python"
+    for old in folder.rglob("*.gcda"):
+        old.unlink()
+    settings = {
+        "FLEXURA_COVERAGE": "ON",
+        "FLEXURA_MODULE": "ON",
+        "FLEXURA_LEVEL": "" if core.level == "plain" else core.level,
+        "CMAKE_BUILD_TYPE": "Debug",
+        "CMAKE_MAKE_PROGRAM": NINJA,
+        "Python_EXECUTABLE": sys.executable,
+    }
+    options = [f"-D{name}={value}" for name, value in settings.items()]
+    run(CMAKE, "-S", ROOT, "-B", folder, "-G", "Ninja", *options)
+    run(CMAKE, "--build", folder, "--parallel", jobs, "--target", "core_tests")
+    run(
+        CMAKE,
+        "--build",
+        folder,
+        "--parallel",
+        jobs,
+        "--target",
+        core.BUILDS[core.level],
+        "_processor",
+    )
+    run(CMAKE.with_name("ctest"), "--test-dir", folder, "--output-on-failure")
     shutil.rmtree(copy, ignore_errors=True)
     leave = shutil.ignore_patterns("*.so", "__pycache__")
     shutil.copytree(ROOT / "model", copy, ignore=leave)
-    for made in (folder / "module").rglob("_*.so"):
+    for made in (folder / "model/core/bind").glob("_*.so"):
         shutil.copy(made, copy / "flexura")
     paths = os.pathsep.join(map(str, (copy, ROOT / "analysis")))
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--timeout", "3600"]
-    # a test that fails by its time says nothing of branches
-    subprocess.run([*command, *tests], cwd=ROOT, env=os.environ | {"PYTHONPATH": paths})
+    pytest = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--timeout", "3600"]
+    run(*pytest, *PYTHON, PYTHONPATH=paths, FLEXURA_CORE=core.level)
+    return branches(folder, CORE)
+
+
+def run(*command: object, **environment: str) -> None:
+    """A command that must succeed, in the checkout."""
+    subprocess.run([*map(str, command)], cwd=ROOT, env=os.environ | environment, check=True)
 
 
 def table(found: dict[Line, list[int]]) -> list[tuple[str, int, int]]:
@@ -62,17 +88,9 @@ def table(found: dict[Line, list[int]]) -> list[tuple[str, int, int]]:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--python", nargs="+", default=[], metavar="TESTS")
     parser.add_argument("--missed", nargs="+", default=[], metavar="FILE")
     asked = parser.parse_args()
-    folder = asked.folder.resolve()
-    for old in folder.rglob("*.gcda") if folder.exists() else ():
-        old.unlink()
-    built(folder / "core")
-    subprocess.run(["ctest", "--test-dir", str(folder / "core")], check=True)
-    if asked.python:
-        run_python(folder, asked.python)
-    found = branches(folder, CORE)
+    found = measured(asked.folder.resolve())
     rows = table(found)
     for file, taken, all_ in rows:
         print(f"| {file} | {taken} | {all_} | {100 * taken / all_:.0f} % |")
@@ -80,7 +98,7 @@ def main() -> int:
     print(f"| model/core | {taken} | {all_} | {100 * taken / all_:.1f} % |")
     for line, count in missed(found).items():
         if line.file in asked.missed:
-            print(f"{line.file}:{line.number}: {count}: {line.text}")
+            print(f"{line.file}:{line.number}: {line.function}: {count}: {line.text}")
     return 0
 
 

@@ -104,7 +104,7 @@ class Board:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.objects = {source: self.compiled(Path(source)) for source in SOURCES}
-        self.mains = {}
+        self.mains, self.order = {}, list(MAINS)
         for name, arguments in MAINS.items():
             self.mains[name] = folder / f"main_{name}.o"
             command = [*CXX, *INCLUDES, *arguments, "-c", "-o", str(self.mains[name])]
@@ -140,11 +140,13 @@ class Board:
             except subprocess.CalledProcessError:
                 return "the compiler"
         others = [str(o) for s, o in self.objects.items() if s != str(source)]
-        for name, main in mains.items():
+        for name in self.order:
             program = str(self.folder / name)
-            linked = ["g++", str(mutated), str(main), *others, "-o", program]
+            linked = ["g++", str(mutated), str(mains[name]), *others, "-o", program]
             subprocess.run(linked, check=True)
             if not passes([program, *ARGUMENTS.get(name, [])]):
+                self.order.remove(name)
+                self.order.insert(0, name)  # the next mutant is often noticed by the same
                 return name
         return None
 

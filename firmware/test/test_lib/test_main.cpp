@@ -298,6 +298,44 @@ static void an_observer_finds_a_load() {
   }
   CHECK(fabs(found - load) < 0.02f);
 }
+#ifndef __AVR__
+static void the_law_in_doubles_is_its_formula_to_the_digit() {
+  GainsOf<ModelNumbers> g;
+  g.kp = 3;
+  g.ki = 0.5;
+  g.kd = 0.25;
+  g.kv = 0.125;
+  g.kc = 2;
+  g.limit = 40;
+  g.slew = 9;
+  PidOf<ModelNumbers> pid;
+  double integral = 0, last = 0;
+  for (uint16_t k = 0; k < 400; ++k) {
+    const double e = between(-64, 64) / 4.0, rate = between(-64, 64), setpoint = between(-8, 8),
+                 tip = between(-16, 16);
+    const SignalsOf<ModelNumbers> s = {e, rate, setpoint, tip};
+    double grown = integral + 0.5 * e;
+    if (grown > 40 || grown < -40) grown = integral;
+    const double u = grown + tip + 3 * e + 0.25 * (setpoint - rate) + 0.125 * setpoint +
+                     (setpoint > 0   ? 2
+                      : setpoint < 0 ? -2
+                                     : 0);
+    const double limited = u > 40 ? 40 : u < -40 ? -40 : u;
+    const double held = limited > last + 9 ? last + 9 : limited < last - 9 ? last - 9 : limited;
+    if (!(u > held && e >= 0) && !(u < held && e < 0)) integral = grown;
+    last = held;
+    CHECK(pid.update(g, s) == held);
+  }
+}
+
+static void a_sum_at_its_limit_is_not_outside() {
+  using Sum = ModelNumbers::Accumulator;
+  CHECK(!ModelNumbers::outside(Sum(2.0), 2.0) && !ModelNumbers::outside(Sum(-2.0), 2.0));
+  CHECK(ModelNumbers::outside(Sum(2.25), 2.0) && ModelNumbers::outside(Sum(-2.25), 2.0));
+  CHECK(!ModelNumbers::outside(Sum(0.0), 2.0) && Sum().sum == 0.0);
+  CHECK(ModelNumbers::outside(Sum(NAN), 2.0));
+}
+#endif
 
 // ---- motion
 
@@ -851,6 +889,10 @@ static void tests() {
   RUN(integral_stops_at_the_limit);
   RUN(an_observer_equals_its_formula);
   RUN(an_observer_finds_a_load);
+#ifndef __AVR__
+  RUN(the_law_in_doubles_is_its_formula_to_the_digit);
+  RUN(a_sum_at_its_limit_is_not_outside);
+#endif
   RUN(steps_come_when_they_are_due);
   RUN(cubic_goes_through_its_knots);
   RUN(a_missing_knot_is_an_underrun);

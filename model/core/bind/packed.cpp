@@ -81,16 +81,9 @@ ForceFunction backlash_of(const Matrix &segments, const Matrix &rows,
 }
 
 const char *word(Status status) {
-  switch (status) {
-    case Status::running: return "running";
-    case Status::done: return "done";
-    case Status::limit: return "limit";
-    case Status::stuck: return "stuck";
-    case Status::diverged: return "diverged";
-    case Status::exhausted: return "exhausted";
-    case Status::interrupted: return "interrupted";
-  }
-  return "";
+  static const char *const words[] = {"running",  "done",      "limit",      "stuck",
+                                      "diverged", "exhausted", "interrupted"};
+  return words[int(status)];
 }
 
 }  // namespace flexura

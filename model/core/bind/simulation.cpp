@@ -2,6 +2,8 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <cstring>
+
 #include "control/controller.hpp"
 #include "dynamics/places/outputs.hpp"
 #include "mechanics.hpp"
@@ -61,8 +63,8 @@ class PythonDrive {
     if (PyObject_GetBuffer(given.ptr(), &view, PyBUF_ND | PyBUF_FORMAT | PyBUF_C_CONTIGUOUS) != 0)
       return PyErr_Clear(), false;
     const std::size_t joints = model_->first.size();
-    const bool doubles = view.format && view.format[0] == 'd' && view.format[1] == '\0' &&
-                         view.ndim == 1 && std::size_t(view.shape[0]) == joints;
+    const bool doubles = std::strcmp(view.format, "d") == 0 && view.ndim == 1 &&
+                         std::size_t(view.shape[0]) == joints;
     bool finite = doubles;
     for (std::size_t i = 0; doubles && i < joints; ++i)
       force[i] = static_cast<const double *>(view.buf)[i],
@@ -115,7 +117,10 @@ struct Running {
         drive->call(at, place, rate, force);
       };
     }
-    if (!sampler.is_none()) acting.sampler = nb::cast<Sampler *>(sampler), acting.rate_Hz = rate_Hz;
+    if (!sampler.is_none()) {
+      acting.sampler = nb::cast<Sampler *>(sampler);
+      acting.rate_Hz = rate_Hz;
+    }
     if (auto *controller = dynamic_cast<Controller *>(acting.sampler))
       controller->start(acting, q.data());
     Request request;

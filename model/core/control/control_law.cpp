@@ -42,7 +42,7 @@ void ControlLaw::tick(long k, double t, const double *q, const double *, Sampled
     if (joints[i].output != JointLaw::Output::none) {
       memory_[i].u = linear.states > 0 ? linear_output(t, i) : pid_output(k, t, i);
       give(k, t, i, held);
-    } else if (logging) {
+    } else {
       log.push_back(Tick{});
     }
   }
@@ -166,7 +166,7 @@ void ControlLaw::give(long k, double t, std::size_t i, SampledOutput &held) {
     m.place += T * (row.held[1] + row.held[2] * T);
     held.motion[i] = {t, {row.held[0], row.held[1], row.held[2], 0.0, 0.0, 0.0}, 0.0, 0.0, 0.0};
   }
-  if (logging) log.push_back(row);
+  log.push_back(row);
 }
 
 }  // namespace flexura

@@ -70,8 +70,7 @@ class ControlLaw : public Sampler {
   double quantum = 0.0;                        // of the measured deflection [m]; 0: exact
   std::vector<int> first;                      // (joints) their rows
   std::function<Bend(const double *q)> strip;  // empty: no deflection is measured
-  std::vector<Tick> log;                       // (ticks, joints) if `logging`
-  bool logging = true;
+  std::vector<Tick> log;                       // (ticks, joints)
 
   // Back to before tick 0.
   void reset();

@@ -34,7 +34,7 @@ void Controller::set_gains(const double *rows) {
     joint.duty = g[DUTY];
     joint.encoder = g[ENCODER] != 0.0, joint.rigid = g[RIGID] != 0.0, joint.delay = int(g[DELAY]);
   }
-  if (!law_.joints.empty()) law_.deflection = rows[DEFLECTION];
+  law_.deflection = rows[DEFLECTION];
 }
 
 void Controller::start(Inputs &acting, const double *q) {

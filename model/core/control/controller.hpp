@@ -68,7 +68,7 @@ class Controller : public Sampler {
   const ControlLaw &law() const { return law_; }
   const Model<double> &robot() const { return *robot_; }
   int count() const { return int(law_.joints.size()); }
-  long ticks() const { return count() ? long(law_.log.size()) / count() : 0; }
+  long ticks() const { return long(law_.log.size()) / count(); }
   bool owns(int i) const { return law_.joints[std::size_t(i)].output != JointLaw::Output::none; }
   // Joint i's tick k in the log.
   const Tick &logged(long k, int i) const { return law_.log[std::size_t(k * count() + i)]; }

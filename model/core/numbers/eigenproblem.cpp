@@ -82,8 +82,7 @@ void eigen_tridiagonal(int n, double *d, double *e, int width, double *Q) {
       double g = (d[l + 1] - d[l]) / (2.0 * e[l]), r = std::sqrt(g * g + 1.0);
       g = d[m] - d[l] + e[l] / (g + (g < 0.0 ? -r : r));
       double s = 1.0, c = 1.0, p = 0.0;
-      int i = m - 1;
-      for (; i >= l; --i) {
+      for (int i = m - 1; i >= l; --i) {
         const double f = s * e[i], b = c * e[i];
         const double large = std::max(std::fabs(f), std::fabs(g));
         r = large == 0.0 ? 0.0
@@ -106,7 +105,7 @@ void eigen_tridiagonal(int n, double *d, double *e, int width, double *Q) {
           y[k] = s * x[k] + c * a, x[k] = c * x[k] - s * a;
         }
       }
-      if (r == 0.0 && i >= l) continue;
+      if (r == 0.0) continue;
       d[l] -= p, e[l] = g, e[m] = 0.0;
     }
 }

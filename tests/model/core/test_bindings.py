@@ -228,6 +228,21 @@ def test_another_shape_is_refused(name):
         assert str(refused.value)
 
 
+def test_a_load_bends_the_strip_and_pulses_follow_knots():
+    pull = SEGMENTS + [0.0, 0.0, *[0.0] * 8]
+    pull[1, 1] = 1.0
+    at = (np.array([[1.0, 0.3, 1.0]]), np.array([[0, 1, 1, 2, 0, 0]]), pull)
+    assert np.asarray(ran(loads=at).state())[1] != 0.0
+    knots = np.array([[0, 0, 0, 0], [0, 4096, 0, 64], [0, 8192, 0, 64], [0, 12288, 0, 0]] * 4)
+    for others, rates in ({"open_loop": True}, [0, 400, -400, 0]), ({"open_loop": False}, None):
+        rows = knots if rates is None else np.array([[0, 0, 0, rate] for rate in rates] * 4)
+        times, directions = core.board_pulses(
+            **(BOARD | {"period_log2": 6, "knots": rows, "given": 0, "ticks": 900} | others)
+        )
+        times, directions = np.asarray(times), np.asarray(directions)
+        assert len(times) > 10 and (np.diff(times) > 0).all() and set(directions) <= {1.0, -1.0}
+
+
 def test_a_linear_law_of_another_shape_is_refused():
     core.Controller(**linear())
     shapes = {"F": (3, 4), "G": (3, 1), "L": (3, 1), "C": (1, 3), "K": (2, 2), "Kr": (2, 1)}

@@ -101,6 +101,15 @@ TEST("robots of unlike spaces of modes are assembled together with the numbers o
   robots[1] = of({strip(0.5, 8, 4)});  // as many shapes, another number of modes: no pack either
   assemble(pointers, 2, models, faults);
   for (int k = 0; k < 2; ++k) CHECK(!faults[k] && models[k].numbers == assemble(robots[k]).numbers);
+  for (int modes : {-1, 3}) {  // a pack of three, with a slider on them
+    for (int k = 0; k < 3; ++k) {
+      robots[k] = of({strip(0.5 + 0.1 * k, 4, modes), rigid(0.1, 0.2)});
+      robots[k].links[1].joint.kind = JointKind::slider, robots[k].links[1].joint.start = 0.3;
+    }
+    assemble(pointers, 3, models, faults);
+    for (int k = 0; k < 3; ++k)
+      CHECK(!faults[k] && models[k].numbers == assemble(robots[k]).numbers);
+  }
   robots[0] = of({});
   assemble(pointers, 1, models, faults);
   CHECK(faults[0] && faults[0]->key == "link");

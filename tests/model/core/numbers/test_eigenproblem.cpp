@@ -152,6 +152,11 @@ TEST("free directions have w = 0, unstable ones w^2 < 0, massless ones w infinit
   CHECK_NEAR(y[0], 0.5, 1e-15);
 }
 
+TEST("no unknowns have no modes") {
+  eigen_symmetric(0, nullptr, nullptr, nullptr);
+  CHECK(eigen_pencil(0, nullptr, nullptr, nullptr, nullptr) == 0);
+}
+
 TEST("a rigid motion beside stiff and soft modes does not spoil the soft ones") {
   // K = diag(0, 1, 1e8, 1e12), M = 1 + a a^T: compare with the same without the free row, and the
   // free one moved by 1e-6

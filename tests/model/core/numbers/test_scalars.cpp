@@ -102,6 +102,17 @@ TEST("ends of the range") {
     CHECK(flexura::power_of_two(static_cast<double>(k)) == std::ldexp(1.0, k));
 }
 
+TEST("of two duals the larger or smaller one keeps its derivative, and what is not a number") {
+  using flexura::larger, flexura::smaller, flexura::choose_less;
+  Dual<2> a(1.0), b(2.0), none(NONE);
+  a.d.set(0, 5.0), b.d.set(0, 7.0);
+  CHECK(larger(a, b).d[0] == 7.0 && larger(b, a).d[0] == 7.0);
+  CHECK(smaller(a, b).d[0] == 5.0 && smaller(b, a).d[0] == 5.0);
+  CHECK(choose_less(a, b, a, b).d[0] == 5.0 && choose_less(b, a, a, b).d[0] == 7.0);
+  CHECK(std::isnan(larger(none, a).v) && std::isnan(larger(a, none).v));
+  CHECK(std::isnan(smaller(none, a).v) && std::isnan(smaller(a, none).v));
+}
+
 TEST("larger, smaller, worst and least keep what is not a number") {
   using flexura::larger, flexura::smaller;
   CHECK(larger(1.0, 2.0) == 2.0 && smaller(1.0, 2.0) == 1.0 && larger(-INFINITE, 3.0) == 3.0);

@@ -16,7 +16,7 @@ constexpr double INFINITE = std::numeric_limits<double>::infinity();
 constexpr int JOINTS = 2, WIDTH = JOINT_FIGURES * JOINTS + STRIP_FIGURES;
 
 // Two carts, one on the other; the controller has the second, a spring of the drive's the first.
-Plan carts(const char *method, double limit = INFINITE) {
+Plan carts(const char *method, double limit = INFINITE, bool both = false) {
   Robot robot;
   Link cart;
   cart.length = 0.0, cart.mass = 1.0, cart.joint.kind = JointKind::slider;
@@ -25,6 +25,7 @@ Plan carts(const char *method, double limit = INFINITE) {
   std::vector<JointLaw> laws(2);
   laws[1].output = JointLaw::Output::force;
   laws[1].reference = {Segment{0.0, {0.1, 0.0, 0.0, 0.0, 0.0, 0.0}, 0.0, 0.0, 0.0}};
+  if (both) laws[0] = laws[1];
   Controller controller(model, laws, {Coupling(), Coupling()}, 1000.0, 0.0, LinearLaw());
   Inputs acting(2);
   acting.joints[0].motion = {Segment{0.0, {0.0}, 0.0, 0.0, 0.0}};
@@ -40,10 +41,9 @@ struct Gains {
   Gains(double kp, double kd, double limit) {
     for (int i = 0; i < JOINTS; ++i) {
       double *g = rows + i * GAINS;
-      g[LIMIT] = limit, g[SLEW] = INFINITE;
+      g[KP] = kp, g[KD] = kd, g[LIMIT] = limit, g[SLEW] = INFINITE;
       g[FORCE] = g[SETPOINT] = g[DERIVATIVE] = g[DEFLECTION] = 1.0;
     }
-    rows[GAINS + KP] = kp, rows[GAINS + KD] = kd;
   }
 };
 
@@ -52,10 +52,10 @@ struct Found {
   const double *joint(int i) const { return figures + i * JOINT_FIGURES; }
 };
 
-Found found(const Plan &plan, const Gains &row, double most = INFINITE) {
+Found found(const Plan &plan, const Gains &row, double most = INFINITE, double vibration = 1.0) {
   double price[WIDTH] = {}, free[WIDTH] = {};
   price[JOINT_FIGURES + ITAE] = price[JOINT_FIGURES + OVERSHOOT] = 1.0;
-  price[JOINT_FIGURES + EFFORT] = 0.01;
+  price[JOINT_FIGURES + EFFORT] = 0.01, price[2 * JOINT_FIGURES + VIBRATION] = vibration;
   Found out;
   GainSweep sweep(plan);
   sweep.run({price, free}, row.rows, &most, 1, 1, out.figures, &out.reached);
@@ -92,6 +92,8 @@ TEST(
 TEST("a row that does not settle has no settling; one that meets a limit has no figures") {
   const Found weak = found(carts("auto"), Gains(1.0, 0.0, INFINITE));
   CHECK(weak.reached == 1.0 && std::isnan(weak.joint(1)[SETTLING]));
+  const Found both = found(carts("auto", INFINITE, true), Gains(1.0, 0.0, INFINITE));
+  for (int i = 0; i < JOINTS; ++i) CHECK(std::isnan(both.joint(i)[SETTLING]));
   for (double most : {INFINITE, 1e3}) {
     const Found stopped = found(carts("auto", 0.05), Gains(400.0, 30.0, INFINITE), most);
     CHECK(0.0 < stopped.reached && stopped.reached < 1.0);
@@ -101,7 +103,23 @@ TEST("a row that does not settle has no settling; one that meets a limit has no 
 
 TEST("a row that costs too much is given up with lower bounds") {
   const Gains row(400.0, 30.0, 50.0);
-  const Found whole = found(carts("auto"), row), part = found(carts("auto"), row, 1e-3);
+  const Found whole = found(carts("auto"), row), part = found(carts("auto"), row, 1e-3, 0.0);
   CHECK(part.reached < 1.0 && part.joint(1)[ITAE] > 0.0);
   CHECK(part.joint(1)[ITAE] <= whole.joint(1)[ITAE]);
+}
+
+TEST("two rows by two threads are those of each alone") {
+  const Gains one(400.0, 30.0, 50.0), two(300.0, 20.0, 50.0);
+  std::vector<double> rows(one.rows, one.rows + JOINTS * GAINS);
+  rows.insert(rows.end(), two.rows, two.rows + JOINTS * GAINS);
+  const double price[WIDTH] = {}, limits[2] = {INFINITE, INFINITE};
+  double figures[2 * WIDTH] = {}, reached[2] = {};
+  GainSweep sweep(carts("auto"));
+  sweep.run({price, price}, rows.data(), limits, 2, 2, figures, reached);
+  for (int k = 0; k < 2; ++k) {
+    const Found alone = found(carts("auto"), k ? two : one);
+    CHECK(reached[k] == 1.0);
+    for (int f = 0; f < WIDTH; ++f)
+      CHECK(check::same_bits(figures[k * WIDTH + f], alone.figures[f]));
+  }
 }

@@ -41,7 +41,7 @@ TEST("every method by its name, and no other") {
   for (const char *name : {"explicit", "implicit", "exponential", "auto"}) {
     Simulation run(model, Inputs(1), request(*model, name));
     CHECK(finished(run) == Status::done && run.record().rows == 3);
-    CHECK(std::string(name) == "auto" || run.method() == name);
+    CHECK((run.method() == name) == (std::string(name) != "auto"));
   }
   bool refused = false;
   try {
@@ -82,6 +82,10 @@ TEST("a run that goes on is the run to the later end; its budget is counted from
     CHECK(finished(few) == Status::exhausted);
     few.go_on(0.2, 0.2, true);
     CHECK(finished(few) == Status::exhausted);
+    Simulation free(model, Inputs(1), request(*model, name));
+    CHECK(finished(free) == Status::done);
+    free.go_on(0.2, 0.2, true);
+    CHECK(finished(free) == Status::done && free.run_state().t == 0.2);
     CHECK(few.run_state().steps + few.run_state().rejected == 6);
   }
 }

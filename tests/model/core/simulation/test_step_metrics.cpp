@@ -99,6 +99,9 @@ TEST("a vibration's lower bound tells whether it is more than enough, and is nev
       CHECK(0.0 <= bound && bound <= least * (1.0 + 1e-12));
       CHECK((bound > part * least) == (part < 1.0));
     }
+    // as near as cannot be told: close to it
+    const double near = vibration_lower_bound(samples(t), w.data(), seen, (1.0 - 1e-6) * least);
+    CHECK(0.998 * least <= near && near <= least * (1.0 + 1e-12));
   }
 }
 

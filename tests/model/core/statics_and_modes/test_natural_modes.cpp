@@ -330,6 +330,29 @@ TEST("the lowest 20 of many: as from the matrices; two equal arms; rigid motions
 }
 
 TEST(
+    "a free slider, or many of the modes: from the matrices, to the same squares as in the "
+    "search") {
+  Robot robot;
+  robot.links = {strip(1.0, 0.5, 20.0, 30), strip(0.8, 0.4, 10.0, 30)};
+  robot.links[1].joint.hub_mass = 0.3, robot.payload_mass = 0.2;
+  const char turns[2] = {0, 1}, none[2] = {0, 0};
+  for (bool slides : {false, true}) {
+    if (slides) robot.links[1].joint.kind = JointKind::slider, robot.links[1].joint.start = 0.9;
+    const Model<double> model = assemble(robot);
+    Numbers q(model.n, 0.0);
+    if (slides) q[model.first[1]] = 0.9;
+    const NaturalModes few = natural_modes(model, q.data(), turns, 5),
+                       many = natural_modes(model, q.data(), turns, model.n / 2);
+    CHECK(few.count == 5 && many.count == model.n / 2);
+    for (int k = 1; k < 5; ++k) CHECK_NEAR(few.squares[k], many.squares[k], 1e-7 * many.squares[4]);
+    TipLoad load;  // a load on its own is not idle
+    load.force[slides] = 1e-9, load.moment = slides ? 0.0 : 1e-9;
+    CHECK_NEAR(natural_modes(model, q.data(), none, 3, load).squares[2],
+               natural_modes(model, q.data(), none, 3).squares[2], 1e-3 * many.squares[4]);
+  }
+}
+
+TEST(
     "the linearised motion: M da/df = 1, M da/dq = -K at rest, -D by the rates, held joints stay") {
   const Model<double> model = assemble(mixed());
   const int n = model.n;
