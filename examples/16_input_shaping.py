@@ -1,6 +1,6 @@
 """A shaped motion leaves a mode at rest.
 
-Equation (87), one mode: y'' + w^2 y = -G a(t). A cart with the acceleration a carries a link
+Equation (88), one mode: y'' + w^2 y = -G a(t). A cart with the acceleration a carries a link
 across its rail; y is the tip's deflection, and G = 1.56598 in the first mode. The acceleration of
 a cycloid of length A and duration T is one sine with n = 2 pi / T. It leaves the amplitude
 

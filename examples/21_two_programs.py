@@ -1,6 +1,6 @@
 """A strip is let go under gravity: flexura, Exudyn, and the series of its modes.
 
-Equation (86): the motion as a sum of modes. A clamped, level strip with a payload is let go
+Equation (87): the motion as a sum of modes. A clamped, level strip with a payload is let go
 straight. A mode u(x) with u(L) = 1 has the modal mass M and the weight f, the integral of g u
 over the mass. For small deflections the tip moves as
 

@@ -44,7 +44,7 @@ def spring_and_force():
 def test_motion_and_accounts_within_steps(method):
     """Outputs within steps, work and loss against the integrals of an exact motion.
 
-    Equations: 97, 99, 100
+    Equations: 98, 100, 101
     """
     system, drive, exact, (kp, c, r) = spring_and_force()
     t = np.linspace(0, 0.9, 301)
@@ -67,7 +67,7 @@ def test_motion_and_accounts_within_steps(method):
 def test_the_strain_account_and_the_balance_of_a_run():
     """What a run says of its own energies, from its channels.
 
-    Equations: 101, 99
+    Equations: 102, 100
     """
     beam = robots.beam(
         L, RHO, EI, 3, hub_inertia_kg_m2=1e-2, viscous_friction=0.02, damping={"beta_s": 1e-4}
@@ -96,7 +96,7 @@ def test_the_strain_account_and_the_balance_of_a_run():
 def test_functions_of_the_linear_part():
     """The tables of the dense equations against matrix exponentials, and the formulas of doubling.
 
-    Equations: 98
+    Equations: 99
     """
     M, K, D = np.diag([1.0, 2.0, 0.5]), np.diag([0.0, 50.0, 4e4]), np.diag([0.1, 0.3, 1.0]) + 0.05
     modes, h = Modes(M, K, D, np.zeros(3), 6, 0), 0.4

@@ -149,7 +149,7 @@ def test_explicit_steps_their_errors_and_lengths():
 def test_the_method_that_gets_furthest_a_pass():
     """Progress in the second half of a trial of 60 passes decides what "auto" takes.
 
-    Equations: 102
+    Equations: 103
     """
     beam = robots.beam(L, RHO, EI, 4, hub_inertia_kg_m2=1e-3, coulomb_friction=0.05)
     system = robots.system(beam, payload=0.1)
@@ -179,7 +179,7 @@ def test_the_method_that_gets_furthest_a_pass():
 def test_step_of_a_given_length():
     """Of a clamped link that is linear, with matrices.
 
-    Equations: 165
+    Equations: 86
     """
     system, M, K = clamped(damping={"beta_s": 2e-3})
     h, gamma = 4e-3, 1 - 1 / np.sqrt(2)

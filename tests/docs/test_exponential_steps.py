@@ -31,7 +31,7 @@ def moments(w2, d, h, count=6):
 def test_moments_by_recurrence():
     """Integrals of the impulse response by parts.
 
-    Equations: 89
+    Equations: 90
     """
     for w2, d, h in ((9.0, 0.4, 2.0), (400.0, 1.0, 0.5), (4.0, 0.0, 0.1)):
         g, _, A, B = moments(w2, d, h)
@@ -49,7 +49,7 @@ PENDULUM = (0.8, 0.2, 0.01, 9.81)  # mass, place of its centre, inertia, gravity
 def test_exponential_steps():
     """A pendulum on a spring: predictor, pass, corrector, error and next length, step by step.
 
-    Equations: 86, 87, 88, 89, 90, 91, 92
+    Equations: 87, 88, 89, 90, 91, 92, 93
     """
     m, c, J, g0 = PENDULUM
     I, kp, kd, viscous, rtol, end = J + m * c * c, 20.0, 0.3, 0.05, 1e-4, 50.0
@@ -125,7 +125,7 @@ def test_exponential_steps():
 def test_when_modes_are_taken_again():
     """The dense equations judge changes just below and above what is put up with, 1/20 there.
 
-    Equations: 93
+    Equations: 94
     """
     rng = np.random.default_rng(1)
     root = rng.normal(size=(3, 3))
@@ -167,7 +167,7 @@ def modal_link(first, ratio):
 def test_numerical_damping(ratio, damped):
     """A mode is damped if its share is below a quarter of rtol; its decay, and what it loses.
 
-    Equations: 94, 95, 96, 100
+    Equations: 95, 96, 97, 101
     """
     rtol = 1e-3
     system, q0, omega, share = modal_link(1e-6, ratio * rtol / 4)
@@ -192,7 +192,7 @@ def test_numerical_damping(ratio, damped):
 def test_the_cutoff_is_above_harmonic_forces():
     """With a harmonic drive of a fifth of the second mode's frequency no mode is damped.
 
-    Equations: 96
+    Equations: 97
     """
     lost = []
     for factor in (0.1, 0.3):

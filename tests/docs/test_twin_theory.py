@@ -25,7 +25,7 @@ STEEL = {
 def test_the_twins_beam():
     """Stiffnesses and rotary inertia of a rectangular section, and of a link that gives EI alone.
 
-    Equations: 103
+    Equations: 104
     """
     values = beam_values(Link.model_validate(STEEL | {"section": SECTION}), 5, 0.0)
     area, second = 0.02 * 0.004, 0.02 * 0.004**3 / 12
@@ -43,7 +43,7 @@ def test_the_twins_beam():
 def test_the_points_of_a_sleeve():
     """Spans near the exit, and the two points of a hub.
 
-    Equations: 104
+    Equations: 105
     """
     delta, h = 0.03, 0.02
     expected = delta / (2 * np.sqrt(3)) - 0.0108 * h**3 / delta**2 - delta * np.arange(4)
@@ -56,7 +56,7 @@ def test_the_points_of_a_sleeve():
 def test_the_extrapolation():
     """Channels with errors of order 1 and 2 in the hubs' length lose them.
 
-    Equations: 105
+    Equations: 106
     """
     t = np.linspace(0, 1, 5)
     y0, first, second = (

@@ -1,7 +1,7 @@
 """From the joints' motions to the references with which the drives make them.
 
 A motor's force bears rotor, friction, the links' load and what the gear loses of it. The board's
-controller gives its voltage at a reference that is found by inversion (123).
+controller gives its voltage at a reference that is found by inversion (124).
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ def drive_inverse(
     t: np.ndarray,
     motions: np.ndarray,
 ) -> DriveInverse:
-    """The references with which the joints move so, by the model (123).
+    """The references with which the joints move so, by the model (124).
 
     Args:
         setup: the rig.

@@ -60,7 +60,7 @@ struct Integration {
 
   const Inputs &acts_of(int lane_) const { return acts.acting(lane_); }
 
-  // The rates of the accounts (99), after the pass that `acts` was loaded for.
+  // The rates of the accounts (100), after the pass that `acts` was loaded for.
   void rates(const Real *q, const Real *v, Real *account) {
     plant.powers(q, v, account[STRAIN], account[LOSS]);
     account[WORK] = acts.work(q, v);

@@ -30,7 +30,7 @@ class Copies {
     bool *arrived;  // (count): no limit was passed at the end of a step, and the state is finite
   };
 
-  // `steps` steps of the length `step_s` (165), and what is seen at their end.
+  // `steps` steps of the length `step_s` (86), and what is seen at their end.
   void advance(const States &states, double step_s, int steps, int threads) const;
 
  private:

@@ -181,7 +181,7 @@ void MethodSelection::race_of_others(const Mark &start, double step, Best &best)
   }
 }
 
-// (102): seconds a pass in the second half of `most` passes; -1: the method got stuck.
+// (103): seconds a pass in the second half of `most` passes; -1: the method got stuck.
 double MethodSelection::trial(Method<double> &method, long most) {
   const long begin = loop.integration.passes;
   long half = begin;

@@ -1,4 +1,4 @@
-// The method "auto" (102): which method takes fewest passes is measured, not guessed.
+// The method "auto" (103): which method takes fewest passes is measured, not guessed.
 //
 // A run begins with exponential steps (first_steps.hpp); then the others go on from the same state
 // for SHORT passes. The one that gets furthest a pass, in the second half of its trial, goes on

@@ -296,7 +296,7 @@ class Worker {
     }
   }
 
-  // (101) at the ends of robots that are done: by how much their energies and accounts do not
+  // (102) at the ends of robots that are done: by how much their energies and accounts do not
   // balance, relative to the largest of them at LOOKS rows.
   void balance(Observer<Four> &observer, int n, const std::vector<int> &robots,
                const std::vector<Ran> &ran) const {

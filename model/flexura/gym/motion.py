@@ -21,7 +21,7 @@ CAUTION = 1e-9  # a joint may be so far beyond its limit, relative to it: round-
 class Motion:
     """B copies of a robot and their states; a step holds the forces of the joints for 1/rate.
 
-    Each is moved by equal steps of a method of order 2 (165): their error falls by four where
+    Each is moved by equal steps of a method of order 2 (86): their error falls by four where
     `steps` is doubled. `flexura.simulate` has the same equations and controls its error.
 
     Args:

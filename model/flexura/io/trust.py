@@ -33,7 +33,7 @@ def judged(run: Run) -> Run:
 
 
 def balance_events(error: float, end: float) -> list[Tables]:
-    """The event of a balance (101), if there is something to be said.
+    """The event of a balance (102), if there is something to be said.
 
     Args:
         error: share of the largest energy that is missing.

@@ -284,7 +284,7 @@ def _together(
 
 
 def _trust(balance: float) -> tuple[str, str]:
-    """What a balance (101) makes of a robot that is done, and what is said of it."""
+    """What a balance (102) makes of a robot that is done, and what is said of it."""
     said = balance_events(balance, 0.0)
     text = said[0]["text"] if said else ""
     return "unbalanced" if said and said[0]["level"] == "ERROR" else "done", text

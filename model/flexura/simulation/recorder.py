@@ -140,7 +140,7 @@ def describe(system: System, error: float) -> Tables:
 
 def energy_error(energies: np.ndarray, accounts: np.ndarray, jumps: Any = 0.0) -> float:
     """How far the energies (T, 3) and accounts (T, 4) of a run are from balancing, relative to the
-    largest of them (101).
+    largest of them (102).
 
     The larger of |E - E(0) - work + loss + numerical loss - jumps| and |strain - strain(0) - its
     own integral|; `jumps` (T,): what E has jumped by so far.

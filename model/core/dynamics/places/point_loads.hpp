@@ -1,4 +1,4 @@
-// Generalised forces of forces and moments that act on points of links (131) to (133).
+// Generalised forces of forces and moments that act on points of links (132) to (134).
 #pragma once
 #include "dynamics/places/load_place.hpp"
 #include "dynamics/places/positions.hpp"

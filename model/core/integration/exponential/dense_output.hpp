@@ -1,4 +1,4 @@
-// The motion of the modes within a step just made (97).
+// The motion of the modes within a step just made (98).
 //
 // Over the step N is a polynomial, so a mode's motion is another polynomial in x = t/h and free
 // motion about it:

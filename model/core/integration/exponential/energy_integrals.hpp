@@ -1,5 +1,5 @@
 // Work, loss and what the added damping takes, within a step of the modes: integrals of the motion
-// that `DenseOutput` describes, in closed form however often a mode turns within the step (100).
+// that `DenseOutput` describes, in closed form however often a mode turns within the step (101).
 //
 // With P_j, Z_j the parts of joint j's rate that are a polynomial in x = t/h and free motion
 // (dense_output.hpp), u_j its drive's force without the part of the gains, and H_mq = 1 / (m + q +

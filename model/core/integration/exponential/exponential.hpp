@@ -310,7 +310,7 @@ class Exponential : public Method<Real> {
     return false;
   }
 
-  // (92): error weights of the modes of robots `which` at the times t, from those of its unknowns.
+  // (93): error weights of the modes of robots `which` at the times t, from those of its unknowns.
   // An error of a rate moves the tips until the end of the run, or for a part of a period.
   void set_error_weights(const Real &which, const Real &t) {
     if (worst(which) < 0.5) return;

@@ -1,10 +1,10 @@
-// The modes of a robot at one configuration (86), which exponential steps solve exactly.
+// The modes of a robot at one configuration (87), which exponential steps solve exactly.
 //
 // With M, K, D the matrices of mass, stiffness and damping there (the drives' linear gains in K and
 // D), the modes are the rows of Phi: Phi M Phi^T = 1, Phi K Phi^T = diag(w2); of Phi D Phi^T the
 // diagonal is kept. Joints that are held (locked or prescribed) move in no mode but their own, the
 // unit vector. The modes need not be exact and need not follow the robot: what they leave out is
-// integrated as a force. They are taken again where they have become poor (93).
+// integrated as a force. They are taken again where they have become poor (94).
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -67,7 +67,7 @@ class ModalBasis {
       gone[k] = 0.0;
   }
 
-  // Has robot k gone far since its configuration was last looked at, so that (93) is to be asked?
+  // Has robot k gone far since its configuration was last looked at, so that (94) is to be asked?
   bool has_moved(int k, const Plant<Real> &plant, const Real *q) const {
     if (taken[k] == 0) return true;
     double way = 0.0;
@@ -145,7 +145,7 @@ class ModalBasis {
     return true;
   }
 
-  // Adds the damping rate 2 zeta w (94) to robot k's modes above its cutoff.
+  // Adds the damping rate 2 zeta w (95) to robot k's modes above its cutoff.
   void damp(int k, double zeta) {
     for (int mode = 0; mode < n; ++mode) {
       const double square = lane(w2[mode], k), w = root(square),
@@ -164,7 +164,7 @@ class ModalBasis {
 
   std::size_t at(int i, int j) const { return std::size_t(i) * std::size_t(n) + std::size_t(j); }
 
-  // (93): Frobenius' norm of Phi A Phi^T less what it was, relative to scale_i scale_j: the larger
+  // (94): Frobenius' norm of Phi A Phi^T less what it was, relative to scale_i scale_j: the larger
   // one of A = M and A = K.
   double change(int k, const std::vector<double> &turned_M, const std::vector<double> &turned_K,
                 double slow) const {

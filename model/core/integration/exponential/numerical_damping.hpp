@@ -1,5 +1,5 @@
-// Numerical damping (94): the cutoff frequency above which modes are damped, those that the
-// tolerance does not ask for (95), (96).
+// Numerical damping (95): the cutoff frequency above which modes are damped, those that the
+// tolerance does not ask for (96), (97).
 //
 // The share of a mode is the largest tip deflection, or change of the tips' place, that it has in
 // the answer to the loads, over the largest static tip deflection under them. Loads: each drive's

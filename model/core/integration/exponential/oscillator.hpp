@@ -1,4 +1,4 @@
-// One damped oscillator x'' + d2 x' + w2 x = f, solved exactly over a step h (88): the free motion,
+// One damped oscillator x'' + d2 x' + w2 x = f, solved exactly over a step h (89): the free motion,
 // and the response to powers of time.
 //
 // With g the response to an impulse (g'' + d2 g' + w2 g = 0, g(0) = 0, g'(0) = 1) and f = sum_m f_m
@@ -7,7 +7,7 @@
 //     x(h)  = (g' + d2 g) x(0) + g x'(0) + sum_m A_m f_m      A_m = int_0^h g(h - t) (t/h)^m dt
 //     x'(h) = -w2 g x(0)      + g' x'(0) + sum_m B_m f_m      B_m = int_0^h g'(h - t) (t/h)^m dt
 //
-// By parts, B_m = m A_(m-1) / h (m > 0), B_0 = g, and a_m = A_m / h^2 obeys (89)
+// By parts, B_m = m A_(m-1) / h (m > 0), B_0 = g, and a_m = A_m / h^2 obeys (90)
 //
 //     w2 h^2 a_m + d2 h m a_(m-1) + m (m - 1) a_(m-2) = 1,     m > 1.
 //
@@ -61,7 +61,7 @@ inline Run run_of(double w2, double d2, double h) {
   return dd < 3.0 || dd * dd < 4.2 * x2 ? Run::down : Run::bounded;
 }
 
-// (89): a_m, m < POWERS, upwards from a_0 and a_1. Number: double or Lanes.
+// (90): a_m, m < POWERS, upwards from a_0 and a_1. Number: double or Lanes.
 template <class Number>
 inline void moments_upwards(Number x2, Number dd, Number g_h, Number dg, Number *a) {
   const Number inverse = 1.0 / x2;
@@ -71,7 +71,7 @@ inline void moments_upwards(Number x2, Number dd, Number g_h, Number dg, Number 
     a[m] = (1.0 - dd * double(m) * a[m - 1] - double(m * (m - 1)) * a[m - 2]) * inverse;
 }
 
-// (89) downwards from far above, where a_m is nearly 1 / m^2; what is wrong with the guess is gone
+// (90) downwards from far above, where a_m is nearly 1 / m^2; what is wrong with the guess is gone
 // below round-off at the end.
 template <class Number>
 inline void moments_downwards(Number x2, Number dd, int from, Number *a) {

@@ -1,19 +1,19 @@
-// Exponential steps of Adams' kind: predictor (90) and corrector (91). The linear part of each mode
-// is solved exactly (88).
+// Exponential steps of Adams' kind: predictor (91) and corrector (92). The linear part of each mode
+// is solved exactly (89).
 //
 // With y = origin + sum_k eta_k phi_k the equations of motion are
 //
 //     eta'' + own eta' + w2 eta = N,      N = rows a + own eta' + w2 eta,
 //
-// a the accelerations of a pass (87): exact, whatever the modes. N varies with the motion and not
+// a the accelerations of a pass (88): exact, whatever the modes. N varies with the motion and not
 // with the vibration. A polynomial in time through its last values goes into the
 // variation-of-constants formula of each mode (oscillator.hpp), the equations are looked at once
 // where that leads, and the polynomial through the new value too makes the step: predict, evaluate,
 // correct (exponential multistep methods: Hochbruck, Ostermann, Acta Numerica 19 (2010), 2.5). The
-// error is estimated as Shampine and Gordon do, by leaving out the oldest value (92). Steps need
+// error is estimated as Shampine and Gordon do, by leaving out the oldest value (93). Steps need
 // not resolve any frequency of the robot.
 //
-// Damping that is added to modes above a cutoff acts on the motion about the quasi-static one (94),
+// Damping that is added to modes above a cutoff acts on the motion about the quasi-static one (95),
 // N / w2:
 //
 //     eta'' + own eta' + added (eta' - N' / w2) + w2 eta = N,   so   d2 = own + added,   f = N +
@@ -136,7 +136,7 @@ class ExponentialAdams {
     return fresh;
   }
 
-  // The predictor (90): where a step leads without a look at the equations; minus that N in
+  // The predictor (91): where a step leads without a look at the equations; minus that N in
   // `pece_difference`.
   void predict() {
     int most = 0;
@@ -154,14 +154,14 @@ class ExponentialAdams {
     }
   }
 
-  // N of (87) from accelerations a (n) at a state of the modes, into `out`.
+  // N of (88) from accelerations a (n) at a state of the modes, into `out`.
   void force(const Real *a, const Real *y, const Real *v, Real *out) const {
     for (int c = 0; c < chunks; ++c)
       put(out, c, get(b.w2, c) * get(y, c) + get(b.own, c) * get(v, c));
     add_rows(n, chunks, a, b.rows, stride, out);
   }
 
-  // The corrector (91): the step, with N found where `predict` led, in the new row.
+  // The corrector (92): the step, with N found where `predict` led, in the new row.
   void correct() {
     const Real *found = N[new_row()];
     for (int c = 0; c < chunks; ++c) {

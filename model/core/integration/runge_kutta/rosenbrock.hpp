@@ -1,6 +1,6 @@
 // Steps of a given length at a cost that is known beforehand: the two-stage method of Rosenbrock's
 // kind of Verwer, Spee, Blom and Hundsdorfer (1999, SIAM J. Sci. Comput. 20, ROS2), of order 2
-// whatever the matrix in its stages, L-stable with the exact one (165).
+// whatever the matrix in its stages, L-stable with the exact one (86).
 //
 // One pass a stage, no iteration, no error estimate, no memory of what was before: the state (q, v)
 // is all that there is. Stiffness, damping and the joints' friction are in the stage's matrix;

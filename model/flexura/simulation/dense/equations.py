@@ -64,7 +64,7 @@ class Equations:
 
     def acted(self, t: float, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """dz/dt, and the forces of the drives (N,), those that a motion needs included (25), (28),
-        (133)."""
+        (134)."""
         q, v, a = self.state(t, z)
         self.evaluations += 1
         if self.held is not None:
@@ -120,7 +120,7 @@ class Equations:
 
     def linear(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """M, K and D (m, m) in the free rows at the last evaluation, with the drives' gains and the
-        slope of friction (86)."""
+        slope of friction (87)."""
         terms, _, v = self.seen
         K, D = terms.stiffness.copy(), terms.damping.copy()
         D[self.rows, self.rows] += (

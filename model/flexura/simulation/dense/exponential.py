@@ -1,8 +1,8 @@
-"""The method "exponential": Adams' method in the robot's modes (predictor (90), corrector (91)), as
+"""The method "exponential": Adams' method in the robot's modes (predictor (91), corrector (92)), as
 a solver like those of scipy.integrate.
 
 A step costs one evaluation and may be long against the periods of all modes: the linear part is
-solved in closed form (`propagator`), and the rest, N of (87), is a polynomial in time through its
+solved in closed form (`propagator`), and the rest, N of (88), is a polynomial in time through its
 last values. The accounts of work and loss are integrals of such polynomials too, under the same
 error control. That of the strain energy is its own rise.
 """
@@ -40,8 +40,8 @@ class Look(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """A step of length h by its last k values of N, the exponential predictor (90), and by its gap,
-    the new value less what they lead to one expects, the corrector (91).
+    """A step of length h by its last k values of N, the exponential predictor (91), and by its gap,
+    the new value less what they lead to one expects, the corrector (92).
 
     Powers in t/h (powers, k, m) of the values' polynomials and (powers, m) of the gap's; y(h) =
     free y(0) + old (all values) + late gap; `end` (k, m) leads from the values to x = 1; an error
@@ -197,7 +197,7 @@ class Exponential:
         )
 
     def _force(self, rates: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """N of (87), and the rates of the accounts, (m + 3,)."""
+        """N of (88), and the rates of the accounts, (m + 3,)."""
         m, out = self.modes.m, rates.copy()
         out[:m] = self.modes.rows @ rates[:m] + self.modes.linear @ y
         return out

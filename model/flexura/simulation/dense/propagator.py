@@ -1,9 +1,9 @@
 """The linear part of a robot's equations, solved in closed form over a step: modes, and functions
 of their matrix.
 
-In the modes at one configuration, eta'' + C eta' + w^2 eta = N with C = Phi^T D Phi (87). C
+In the modes at one configuration, eta'' + C eta' + w^2 eta = N with C = Phi^T D Phi (88). C
 is kept whole: damping that couples modes is in the linear part. With y = (eta, eta'), y' = L y +
-(0, N), and N = sum_p f_p (t/h)^p, the variation of constants (88) gives
+(0, N), and N = sum_p f_p (t/h)^p, the variation of constants (89) gives
 
     y(h) = e^(Lh) y(0) + sum_p h p! phi_(p+1)(Lh) (0, f_p),     phi_k(X) = sum_j X^j / (j + k)!
 
@@ -11,7 +11,7 @@ These functions are found from their series at h / 2^s, where Lh is small, and d
 Functions of Matrices, 10.7):
 
     phi_k(2X) = 2^-k ( e^X phi_k(X) + sum_(j=1..k) phi_j(X) / (k - j)! ),
-    e^2X - 1 = 2 (e^X - 1) + (e^X - 1)^2.                                              (98)
+    e^2X - 1 = 2 (e^X - 1) + (e^X - 1)^2.                                              (99)
 
 The second form keeps the digits of slow modes beside those of fast ones. Accounts stand behind y:
 their rates are behind N.
@@ -25,14 +25,14 @@ from typing import NamedTuple
 import numpy as np
 
 FREE = 1e-4  # w^2 below this is none [rad^2/s^2]
-POOR = 0.05  # the change of M, K and C in the modes that is put up with (93)
+POOR = 0.05  # the change of M, K and C in the modes that is put up with (94)
 MOST = 200  # tables that are kept
 AHEAD = 3  # how often longer a step is doubled than the one that is asked for: steps grow
 TERMS = 18  # of the series, where no row sum of Lh is above 1
 
 
 class Table(NamedTuple):
-    """A step of length h, with i accounts: y(h) = free y(0) + sum_p forced[p] f_p (88); (2m + i,
+    """A step of length h, with i accounts: y(h) = free y(0) + sum_p forced[p] f_p (89); (2m + i,
     2m + i), (powers, 2m + i, m + i)."""
 
     free: np.ndarray
@@ -40,7 +40,7 @@ class Table(NamedTuple):
 
 
 class Modes:
-    """The modes of the free rows at q0 (m,), with M, K, D (m, m) there (86).
+    """The modes of the free rows at q0 (m,), with M, K, D (m, m) there (87).
 
     w2 (m,) [rad^2/s^2]; (q, v, accounts) = origin + out y, y = into ((q, v, accounts) - origin),
     and N = rows a + linear y.
@@ -78,7 +78,7 @@ class Modes:
         self._tables: dict[float, Table] = {}
 
     def poor(self, M: np.ndarray, K: np.ndarray, D: np.ndarray, slow: float) -> bool:
-        """Whether the robot's matrices have changed too much (93); `slow` [rad/s] is the frequency
+        """Whether the robot's matrices have changed too much (94); `slow` [rad/s] is the frequency
         that is as good as zero."""
         w, d = np.maximum(np.sqrt(self.w2), slow), np.sqrt(np.maximum(np.diag(self.C), slow))
         changes = (
@@ -113,7 +113,7 @@ class Modes:
         return X, np.concatenate([size, np.ones(m)])
 
     def _double(self, h: float) -> None:
-        """The tables of h, h / 2, ..., h / 2^levels (98)."""
+        """The tables of h, h / 2, ..., h / 2^levels (99)."""
         levels, count, one = max(self.halvings(h), AHEAD), self.powers, np.eye(2 * self.m)
         X, size = self._matrix(h)
         X = X / 2.0**levels

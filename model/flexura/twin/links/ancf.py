@@ -176,7 +176,7 @@ class CableLink:
         gravity: np.ndarray,
         add: Callable[[np.ndarray, np.ndarray], None],
     ) -> None:
-        """What the beam's mass beyond x takes, rho A (r'' - g) of its points (137), to be added.
+        """What the beam's mass beyond x takes, rho A (r'' - g) of its points (138), to be added.
 
         Args:
             q: coordinates of the part's nodes (T, k).

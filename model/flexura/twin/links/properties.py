@@ -44,7 +44,7 @@ class BeamValues:
 
 
 def beam_values(link: Link, elements: int, beta: float) -> BeamValues:
-    """Values of a flexible link's elements (103).
+    """Values of a flexible link's elements (104).
 
     Args:
         link: the link.
