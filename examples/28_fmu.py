@@ -1,7 +1,7 @@
 """A robot as an FMU that another program moves, from step to step.
 
-Equation (100), the accounts of work and losses. fmpy gives the torque of a link's joint, another one
-every 10 ms, and the FMU holds it. The torques' work is a sum over the steps,
+Equation (100), the accounts of work and losses. fmpy gives the torque of a link's joint, another
+one every 10 ms, and the FMU holds it. The torques' work is a sum over the steps,
 
     W = sum_k u_k (q(t_k+1) - q(t_k)),
 
