@@ -164,6 +164,8 @@ def learn(
             if worse == 1 and given and number < trials:
                 given = False
                 observer = _identify_anew(out, rig, progress)
+            last = worse == WORSE or number == trials
+            found = None if last else _following(out, max(0.5**missed, SMALLEST))
         except FlexuraError as error:
             if not out.trials:
                 raise
@@ -173,7 +175,7 @@ def learn(
             out.ended = f"{WORSE} trials in a row were no better than the best"
         elif number == trials:
             out.ended = "all trials are done"
-        elif (found := _following(out, max(0.5**missed, SMALLEST))) is None:
+        elif found is None:
             out.ended = "the rig's limits allow no further change"
         else:
             following = found

@@ -164,7 +164,7 @@ def test_friction_is_given_before_a_joint_moves():
     v = np.zeros(1000)
     v[300:500], v[500:700] = 1.0, -1.0
     side = friction_side(v)
-    assert side[280] > 0.9 and side[499] == pytest.approx(0.0, abs=0.05) and side[720] < -0.9
+    assert side[280] > 0.9 and side[499] == pytest.approx(0.0, abs=0.1) and side[720] < -0.9
     assert not side[:200].any() and not side[-200:].any() and not friction_side(0 * v).any()
 
 
@@ -258,9 +258,9 @@ def test_wrong_calls_end_in_one_line(arguments, said, tmp_path, monkeypatch):
     assert {p.name for p in tmp_path.iterdir()} == {"fast.toml", "full"}
 
 
-SWING = """duration_s = 0.8
+SWING = """duration_s = 1.0
 [[joint]]
-motion = { kind = "polynomial", end = 0.5, duration_s = 0.5 }
+motion = { kind = "polynomial", end = 0.8, duration_s = 0.7 }
 """
 
 
