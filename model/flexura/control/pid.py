@@ -68,7 +68,7 @@ class PID:
 
     `reference` [m or rad] through a filter of `setpoint_Hz` (0: none), `feedforward` [units of the
     output], `derivative_Hz` (0: none) for the measured velocity. `limit`, `slew` (per second) of
-    the output. `observer_Hz` (0: none) for the disturbance observer (162), whose nominal joint is
+    the output. `observer_Hz` (0: none) for the disturbance observer, whose nominal joint is
     u = jo q'' + bo q'; a stepper has none. `delay_s`, a whole number of ticks, from measurement to
     output. `count`: the encoder's resolution [m or rad], `duty`: that of the output; 0: exact.
     """

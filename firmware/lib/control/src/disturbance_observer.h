@@ -1,8 +1,8 @@
 // Copyright (c) 2026 the flexura authors. SPDX-License-Identifier: MIT
 // The disturbance observer of one joint.
 //
-// The nominal joint is u = jo q'' + bo q' + d, in units of the output. In every second tick k, with
-// a the factor of the first-order filter Q over 2 T and c = jo a / (2 T (1 - a)):
+// The nominal joint is u = jo q'' + bo q' + d, in units of the output (160). In every second tick
+// k, with a the factor of the first-order filter Q over 2 T and c = jo a / (2 T (1 - a)):
 //
 //   x_k = u_{k-1} + (c - bo) q'_k,   z_k = z_{k-2} + a (x_k - z_{k-2})                     (161)
 //   d^_k = z_k - c q'_k                                                                    (162)
