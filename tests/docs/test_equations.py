@@ -63,24 +63,23 @@ def test_citations_are_found_in_docstrings_and_comments(tmp_path):
 
 
 FIELD = {  # what somebody looks for by the field's word, and where it is computed
-    "point on a bent link": (3, "system.assembly.Assembly.line"),
-    "condensation": (46, "dynamics/piece/condensation.hpp"),
-    "out of its sleeve": (36, "system.assembly.Assembly.elastic"),
-    "coulomb friction": (57, "system.assembly.Assembly.coulomb"),
-    "exponential predictor": (90, "integration/exponential/predictor_corrector.hpp"),
-    "pid with anti-windup": (72, "control.pid.PID"),
-    "stop at a limit": (64, "integration/joint_limits.hpp"),
-    "payload with its rotary inertia": (22, "system.structure.Structure.masses"),
+    "point on a bent link": "system.assembly.Assembly.line",
+    "condensation": "dynamics/piece/condensation.hpp",
+    "out of its sleeve": "system.assembly.Assembly.elastic",
+    "coulomb friction": "system.assembly.Assembly.coulomb",
+    "exponential predictor": "integration/exponential/predictor_corrector.hpp",
+    "pid with anti-windup": "control.pid.PID",
+    "stop at a limit": "integration/joint_limits.hpp",
+    "payload with its rotary inertia": "system.structure.Structure.masses",
 }
 
 
 @pytest.mark.parametrize("word", FIELD)
 def test_an_equation_is_found_by_the_fields_word_in_two_look_ups(word):
     """The word is in a name or two of the table; the row names what computes the equation."""
-    number, code = FIELD[word]
     found = [e.number for e in EQUATIONS if word in e.name.lower()]
-    assert number in found and len(found) <= 2
-    assert code in CITATIONS[number]
+    assert 1 <= len(found) <= 2
+    assert any(FIELD[word] in CITATIONS[number] for number in found)
 
 
 def test_tests_name_equations_that_there_are():

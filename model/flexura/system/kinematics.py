@@ -99,8 +99,8 @@ def line(
     qd: np.ndarray,
     linear: bool = False,
 ) -> Line:
-    """The line of a piece that begins at `start`: the place of a point on a bent link is the
-    integral of these tangents (2), (3), (5). With `linear` (7) it is on the hub's frame `axis`."""
+    """The line of a piece that begins at `start`: a point on a bent link is the integral of its
+    tangents (3), (5). With `linear` (7) it is on the hub's frame `axis`."""
     bent, bending = piece.B @ q[own], piece.B @ qd[own]
     spin = float(start.turning @ qd)
     if not linear:
