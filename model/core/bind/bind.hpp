@@ -39,8 +39,7 @@ inline Array new_array(std::initializer_list<std::size_t> shape) {
 void bind_mechanics(nb::module_ &module);   // mechanics.cpp
 void bind_simulation(nb::module_ &module);  // simulation.cpp
 void bind_control(nb::module_ &module);     // control.cpp, after simulation.cpp
-void bind_population(nb::module_ &module);  // population.cpp
-void bind_copies(nb::module_ &module);      // copies.cpp, after mechanics.cpp
+void bind_population(nb::module_ &module);  // population.cpp, after mechanics.cpp
 void bind_prediction(nb::module_ &module);  // solve.cpp, after mechanics.cpp
 
 }  // namespace flexura

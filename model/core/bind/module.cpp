@@ -83,6 +83,5 @@ MODULE(FLEXURA_MODULE_NAME, module) {
   flexura::bind_simulation(module);
   flexura::bind_control(module);
   flexura::bind_population(module);
-  flexura::bind_copies(module);
   flexura::bind_prediction(module);
 }

@@ -199,7 +199,7 @@ CALLS: dict[str, Call] = {
         | {"h": np.full(2, 1e-3)},
         set(),
     ),
-    "condensed_program": (core.condensed_program, PROGRAM, {("limited", 0), ("W", 1)}),
+    "condensed_program": (core.condensed_program, PROGRAM, {("limited", 0), ("W", 1), ("G", 2)}),
     "renewed_program": (core.renewed_program, RENEWED, {("limited", 0), ("W", 1)}),
 }
 

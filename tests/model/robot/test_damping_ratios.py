@@ -122,7 +122,7 @@ def test_a_rigid_link_has_no_damping_ratio():
 
 def test_ratios_follow_what_a_population_varies(tmp_path):
     made = robot({"ratio": 0.005})
-    assert rows.varied(made, {"payload.mass_kg": np.array([0.0, 0.1])}) is None
+    assert rows.varied(made, {"payload.mass_kg": np.array([0.0, 0.1])}, 2) is None
     heavy = made.replace({"payload.mass_kg": 0.1})
     assert heavy.rayleigh(0)[1] > made.rayleigh(0)[1]
     fx.save(heavy, tmp_path / "heavy.toml")

@@ -187,7 +187,7 @@ def test_sections_come_back_from_their_file(tmp_path):
 @pytest.mark.parametrize("name", SECTIONS)
 def test_a_population_varies_the_material_around_any_section(name):
     base, moduli = robot(SECTIONS[name][0]), np.array([6e10, 7.1e10])
-    together = rows.varied(base, {"link.1.young_modulus_Pa": moduli})
+    together = rows.varied(base, {"link.1.young_modulus_Pa": moduli}, len(moduli))
     assert together is not None
     for k, modulus in enumerate(moduli):
         alone = rows.one(base.replace({"link.1.young_modulus_Pa": float(modulus)}))

@@ -131,7 +131,7 @@ Fault FaultMonitor::lines(const FaultLimits &limits, const Inputs &in) {
 Fault FaultMonitor::encoders(const FaultLimits &limits, const Inputs &in, const Measured &now) {
   Fault fault = lines<0>(limits, in);
   if (fault == Fault::none) fault = lines<1>(limits, in);
-  if (fault == Fault::none) fault = motor<0>(limits, in, now);  // joint 1 has nothing else
+  if (fault == Fault::none && limits.drive[0] == Drive::motor) fault = motor<0>(limits, in, now);
   if (fault != Fault::none || limits.drive[1] == Drive::none) return fault;
   return limits.drive[1] == Drive::motor ? motor<1>(limits, in, now) : stepper(limits, in, now);
 }
