@@ -67,6 +67,7 @@ class Estimate:
         """
         J = self.derivatives.reshape(len(self.parameters), -1)
         scale = np.linalg.norm(J, axis=1)
+        scale[scale == 0.0] = 1.0  # what nothing depends on
         shift, *_ = np.linalg.lstsq((J / scale[:, None]).T, -change.ravel(), rcond=None)
         shift /= scale
         return replace(self, covariance=self.covariance + np.outer(shift, shift))

@@ -139,7 +139,7 @@ def learn(
         raise InputError("expected 1 or more", key="--trials", value=trials)
     out, observer, given = Learned(task, found=known), None, known is not None
     following = _Following(task.first, task.first, [], "")
-    worse, missed = 0, 0
+    worse, missed, kept = 0, 0, ""
     for number in range(1, trials + 1):
         report = lambda part, n=number: progress(f"trial {n}", (n - 1 + part) / trials)
         references, motions, note = following.references, following.motions, following.note
@@ -163,9 +163,11 @@ def learn(
             missed += worse > 0
             if worse == 1 and given and number < trials:
                 given = False
-                observer = _identify_anew(out, rig, progress)
+                observer, kept = _identify_anew(out, rig, observer, progress)
             last = worse == WORSE or number == trials
             found = None if last else _following(out, max(0.5**missed, SMALLEST))
+            if found and kept:
+                found, kept = dataclasses.replace(found, note=f"{found.note}; {kept}"), ""
         except FlexuraError as error:
             if not out.trials:
                 raise
@@ -185,14 +187,25 @@ def learn(
     return out
 
 
-def _identify_anew(out: Learned, rig: Rig, progress: Callable[[str, float], None]) -> Observer:
-    """Identify the model from the best trial, and judge that trial by it."""
+def _identify_anew(
+    out: Learned, rig: Rig, observer: Observer, progress: Callable[[str, float], None]
+) -> tuple[Observer, str]:
+    """Identify the model from the best trial, and judge that trial by it.
+
+    Returns:
+        The observer by this model. Where the trial does not tell one, the old model is kept: its
+        observer, and why.
+    """
     best = out.best
-    out.found = _identified(best.run, rig.stop_asked, progress)
-    out.model, observer = RigModel(out.task, Knowledge.of(out.found)), Observer(out.found)
+    try:
+        found = _identified(best.run, rig.stop_asked, progress)
+        model, observer = RigModel(out.task, Knowledge.of(found)), Observer(found)
+    except InputError as error:
+        return observer, f"the model is kept: {error}"
+    out.found, out.model = found, model
     again = dataclasses.replace(best, lacks=_sampled(out.task, best.run, observer)[1])
     out.trials[out.trials.index(best)] = again
-    return observer
+    return observer, ""
 
 
 def _identified(

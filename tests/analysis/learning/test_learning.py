@@ -39,6 +39,7 @@ TRUE = {
     "payload": 0.92,
     "sensor_gain": 1.05,
     "backlash": 0.01,
+    "contact": 1.0,
     "delay_s": 0.0,
 }
 NOISE_V = 4e-3
