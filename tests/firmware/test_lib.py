@@ -408,6 +408,8 @@ def test_the_unit_tests_run_here_and_on_the_avr(environment, suites, tmp_path):
     assert set(ran) == suites
     for suite, cases in ran.items():
         text = (FIRMWARE / "test" / suite / "test_main.cpp").read_text()
+        if environment == "simavr":  # what stands in no program of the board
+            text = re.sub(r"^#ifndef __AVR__$.*?^#endif$", "", text, flags=re.M | re.S)
         written = len(re.findall(r"^  RUN\(", text, re.M))
         assert written >= 5 and len(cases) == written
         assert all(case["status"] == "PASSED" for case in cases)

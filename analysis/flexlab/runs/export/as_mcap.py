@@ -40,8 +40,9 @@ def write(run: Run) -> bytes:
         )
     label = called(run)
     out = io.BytesIO()
+    writing = load("mcap.writer")
     load("zstandard", "export")  # mcap does not say what is wrong with it
-    writer = load("mcap.writer").Writer(out)
+    writer = writing.Writer(out)
     writer.start(profile="ros2", library="flexura")
     schema = writer.register_schema(name=SCHEMA, encoding="ros2msg", data=b"float64 data\n")
     about = {"label": label, "start_ns": str(start), "meta": json.dumps(run.meta)}
