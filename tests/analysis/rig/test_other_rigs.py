@@ -81,7 +81,7 @@ def test_a_motion_is_tracked_and_compares_as_the_rig_of_type_iv_does(name, link,
     assert rows[f"link/{link}/tip_deflection"].rms < count
 
 
-@pytest.mark.parametrize("name", ["rig-r", "rig-rr"])
+@pytest.mark.parametrize("name", ["rig-r", pytest.param("rig-rr", marks=pytest.mark.slow)])
 def test_the_voltages_alone_predict_the_joints(name, tmp_path):
     """Predicted to 2.5 %, by gears that lose half of the load; nothing of the run is fed back."""
     setup = as_the_files_say(rigs.load(name))
