@@ -64,15 +64,14 @@ void add_loads(Inputs &acting, const nb::object &loads) {
 
 ForceFunction backlash_of(const Matrix &segments, const Matrix &rows,
                           const std::vector<int> &first) {
-  if (segments.shape(1) != 10 || rows.shape(1) != 6)
-    throw std::invalid_argument("contacts of another shape were expected");
+  expect(segments.shape(1) == 10 && rows.shape(1) == 6, "contacts of another shape were expected");
   const double most = double(segments.shape(0));
   std::vector<Backlash> contacts;
   for (std::size_t k = 0; k < rows.shape(0); ++k) {
     const double *row = rows.data() + 6 * k;
-    if (!(0.0 <= row[0] && row[0] < double(first.size())) ||
-        !(0.0 <= row[1] && row[1] <= row[2] && row[2] <= most))
-      throw std::invalid_argument("there is no such joint or motion");
+    expect(0.0 <= row[0] && row[0] < double(first.size()) && 0.0 <= row[1] && row[1] <= row[2] &&
+               row[2] <= most,
+           "there is no such joint or motion");
     contacts.push_back({int(row[0]),
                         signal_of(segments, std::int64_t(row[1]), std::int64_t(row[2])), row[3],
                         row[4], row[5]});

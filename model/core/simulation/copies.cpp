@@ -43,7 +43,9 @@ class Copies::Worker {
         method_(plant_, acts_),
         q_(std::size_t(padded(n_)), Four(0.0)),
         v_(q_),
-        poses_(std::size_t(joints_) + 1) {}
+        poses_(std::size_t(joints_) + 1) {
+    for (int i = 0; i < joints_; ++i) inputs_[0].limit(i, states.low[i], states.high[i]);
+  }
 
   // Copies `first` to `first + 3`, as far as there are so many.
   void move(int first) {
@@ -103,7 +105,7 @@ class Copies::Worker {
     bool out = std::isfinite(sum);
     for (std::size_t i = 0; i < std::size_t(joints_); ++i) {
       const double place = q_[std::size_t(plant_.first[i])][k];
-      out = out && states_.low[i] <= place && place <= states_.high[i];
+      out = out && inputs_[0].low[i] <= place && place <= inputs_[0].high[i];
     }
     return out;
   }

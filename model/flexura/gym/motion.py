@@ -15,7 +15,6 @@ from ..robot import robot_of
 from ..system import assemble
 
 STEPS = 4  # of the integration, between two actions at 50 Hz
-CAUTION = 1e-9  # a joint may be so far beyond its limit, relative to it: round-off
 
 
 class Motion:
@@ -60,9 +59,7 @@ class Motion:
         self.step_s = 1.0 / rate / self.steps
         self.threads = cores() if threads is None else whole(threads, "threads", 1)
         self.limits = one(self.robot).of([0]).limits[0]
-        wide = CAUTION * np.maximum(1.0, np.abs(self.limits)) * [-1.0, 1.0]
-        with np.errstate(invalid="ignore"):
-            self._bounds = np.where(np.isfinite(self.limits), self.limits + wide, self.limits).T
+        self._bounds = np.ascontiguousarray(self.limits.T)
         self._copies = core.Copies(self.system.equations)
         n = self.system.n
         self.q, self.v = np.zeros((self.count, n)), np.zeros((self.count, n))
@@ -111,7 +108,7 @@ class Motion:
             self.q,
             self.v,
             np.ascontiguousarray(forces, dtype=float),
-            np.ascontiguousarray(self._bounds),
+            self._bounds,
             moves,
             self.bent,
             self.tip,

@@ -15,7 +15,7 @@ import numpy as np
 import flexura as fx
 from flexura import signals
 from flexura.signals import Loads, Signal
-from flexura.system import System, accelerations
+from flexura.system import RunStates, System
 
 from ...rig.axes import MotorAxis
 from ...rig.plant.motor import JointLine, back_driven_efficiency, motor_data
@@ -82,7 +82,7 @@ def losses(
     n, rows = system.n, system.joint_rows
     q, qd = np.split(run.states, [n], axis=1)
     drive = np.column_stack([run[f"joint/{i + 1}/drive"] for i in range(len(rows))])
-    qdd = accelerations(system, run.t, q, qd, drive, Loads())
+    qdd = RunStates(system, run.t, q, qd, drive, Loads()).accelerations
     out = []
     for axis, line in lines:
         i = axis.number - 1

@@ -9,7 +9,7 @@ from .internal_forces import (
     point_loads,
     sections_known,
 )
-from .run_states import RunStates, accelerations
+from .run_states import RunStates
 
 __all__ = [
     "Balance",
@@ -19,7 +19,6 @@ __all__ = [
     "Reaction",
     "RunStates",
     "SectionForces",
-    "accelerations",
     "check_continuous",
     "internal_forces",
     "point_loads",

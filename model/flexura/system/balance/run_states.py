@@ -66,27 +66,3 @@ class RunStates:
         acting = point_loads(self.loads, self.t)
         structure = self.system.assembly.structure
         return Balance(structure, self.q, self.qd, self.accelerations, acting)
-
-
-def accelerations(
-    system: System,
-    t: np.ndarray,
-    q: np.ndarray,
-    qd: np.ndarray,
-    drive: np.ndarray,
-    loads: Loads,
-) -> np.ndarray:
-    """The accelerations of the unknowns of a run (44), (57).
-
-    Args:
-        system: the robot.
-        t: times (T,) [s].
-        q: configurations (T, n).
-        qd: their rates (T, n).
-        drive: forces of the drives (T, links) [N or N m].
-        loads: forces and moments on links.
-
-    Returns:
-        (T, n).
-    """
-    return RunStates(system, t, q, qd, drive, loads).accelerations
