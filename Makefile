@@ -58,7 +58,8 @@ lint: $(READY)
 
 # The files that are quick and look at much; tests/test_setup.py holds that they are there.
 QUICK := tests/test_setup.py tests/model/io/test_formats.py tests/model/io/test_shipped.py tests/model/test_optional.py \
-  tests/model/io/test_run.py tests/model/signals/test_shaping.py tests/model/system tests/model/link
+  tests/model/io/test_run.py tests/model/signals/test_shaping.py tests/model/system tests/model/link \
+  tests/docs/test_equations.py
 
 quick: lint types $(CORE)
 	@$(VENV)/bin/pytest -q -n $(JOBS) -m "not slow and not long" $(QUICK)

@@ -326,7 +326,13 @@ def test_the_quick_choice_is_there():
 
 def test_what_is_run_before_a_commit_is_what_the_lint_target_runs():
     hooks = (ROOT / ".pre-commit-config.yaml").read_text(encoding="utf-8")
-    for program in ("ruff check", "ruff format", "clang-format", "mypy"):
+    for program in (
+        "ruff check",
+        "ruff format",
+        "clang-format",
+        "mypy",
+        "python tools/equations.py",
+    ):
         assert f"entry: .venv/bin/{program}" in hooks
 
 
