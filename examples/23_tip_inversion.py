@@ -1,6 +1,6 @@
 """A tip that turns by a right angle in 0.6 s, and rests before and after.
 
-Equation (115), stable inversion. The joint begins before the tip does. How far it moves before the
+Equation (116), stable inversion. The joint begins before the tip does. How far it moves before the
 path begins, from one time to an earlier one, falls with the slowest zero z > 0 of (56):
 
     ln(q(t_1) / q(t_2)) = z (t_1 - t_2),      zeros of a free link with a mass at its tip.

@@ -1,12 +1,12 @@
 """A swinging rod takes a payload up and lets it go.
 
-Equations (136) and (137): what is taken up was at rest. A rod turns about an axis without friction,
+Equations (137) and (138): what is taken up was at rest. A rod turns about an axis without friction,
 J its inertia there, and takes up a mass m at its tip, dJ = m L^2. Angular momentum is kept:
 
     w1 = w J / (J + dJ),    T - T1 = J dJ w^2 / (2 (J + dJ)).
 
 What is let go takes dJ w1^2 / 2 along, and the rod keeps its speed. A force across the tip that
-turns with it has brought the rod to speed before: w = F L t / J, by (132) and (133).
+turns with it has brought the rod to speed before: w = F L t / J, by (133) and (134).
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
 """An LQG controller of a rigid arm: margins of its loop in closed form.
 
-Equations (127), (128) and (129), here nearly in continuous time, for one moment of inertia J. The
+Equations (128), (129) and (130), here nearly in continuous time, for one moment of inertia J. The
 regulator's and the filter's poles are those of Butterworth at the speeds
 
     a = sqrt(u / (p J)),    b = sqrt(d / (v J)),

@@ -1,6 +1,6 @@
 """Predictive control of a cart, which is linear: the optimal cost, and limits.
 
-Equations (130) and (131). Without limits in its way the law is that of a linear regulator, whatever
+Equations (131) and (132). Without limits in its way the law is that of a linear regulator, whatever
 the horizon: for a mass m at the distance x0 the cost, the integral of (x / p)^2 + (u / e)^2, is
 
     sqrt(2 m) r^(1/4) q^(3/4) x0^2,    q = 1 / p^2,  r = 1 / e^2.

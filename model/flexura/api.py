@@ -105,9 +105,9 @@ def simulate(
             the time of t_eval: both may have a memory, so that no tick is computed twice.
         numerical_damping: exponential steps damp fast modes that change no output by more than the
             tolerance (95); False: they do not.
-        loads: forces and moments on links (132): a list of `Load`, or of tables with its keys. In
+        loads: forces and moments on links (133): a list of `Load`, or of tables with its keys. In
             a static start the loads of t_eval[0] act too. Their work is part of `energy/work`.
-        payloads: changes of the payload (136): a list of `PayloadChange`, or of tables with its
+        payloads: changes of the payload (137): a list of `PayloadChange`, or of tables with its
             keys. Each is an event "payload"; the energy jumps by what the event says.
         internal_forces: the Run also has the reactions of the joints, and bending moment, shear
             force, axial force and stress along the links. They take about a millisecond a link

@@ -129,7 +129,7 @@ def test_the_disturbance_observer():
     """The sampled law beside the formulas on random measurements, and what the observer finds of a
     constant load on the nominal joint.
 
-    Equations: 146, 147, 148, 149
+    Equations: 147, 148, 149, 150
     """
     jo, bo, frequency, ticks = 0.3, 0.8, 2.0, 200
     pid = fx.PID(fx.signals.constant(0.0), kp=3.0, jo=jo, bo=bo, observer_Hz=frequency, limit=1.5)

@@ -59,7 +59,7 @@ def closed(d, factors, delay=0):
 def test_measurements_are_linear_about_the_equilibrium():
     """Values near the equilibrium, by the derivative.
 
-    Equations: 126
+    Equations: 127
     """
     system = arm()
     linear = fx.linearize(system)
@@ -79,7 +79,7 @@ def test_measurements_are_linear_about_the_equilibrium():
 def test_the_loop_is_controller_times_robot(at):
     """Transfer matrices of controller and robot, and the sensitivity of one loop.
 
-    Equations: 127
+    Equations: 128
     """
     d = design(two_links())
     one = np.eye(len(d.F))
@@ -99,7 +99,7 @@ def test_the_loop_is_controller_times_robot(at):
 def test_margins_are_where_the_closed_loop_ends():
     """Poles of the closed loop with other gains and delays.
 
-    Equations: 128
+    Equations: 129
     """
     d = design(two_links())
     found = loop_figures(d)
@@ -123,7 +123,7 @@ def test_margins_are_where_the_closed_loop_ends():
 def test_the_disc_margin_is_the_nearest_factor_that_ends_stability():
     """A factor on the border of the disc, at the worst frequency; factors inside it.
 
-    Equations: 129
+    Equations: 130
     """
     d = design(two_links())
     found = loop_figures(d)
@@ -151,7 +151,7 @@ def prediction():
 def test_the_prediction_is_linearised_exactly_and_damps_what_is_fast():
     """Accelerations, their derivatives by differences, and the order of the step.
 
-    Equations: 130
+    Equations: 131
     """
     system, p, rng = prediction()
     n = system.n
@@ -193,7 +193,7 @@ def test_the_prediction_is_linearised_exactly_and_damps_what_is_fast():
 def test_a_tick_is_one_step_of_newtons_method_with_limits():
     """The program of a tick as bounded least squares, and its condensed matrices.
 
-    Equations: 131
+    Equations: 132
     """
     from scipy.optimize import lsq_linear
 

@@ -55,7 +55,7 @@ def place(system, link, s):
 
 
 def beyond(system, q, qd, qdd, low, about):
-    """(138), (139) of what lies beyond the abscissa `low` of link 1, about a place."""
+    """(139), (140) of what lies beyond the abscissa `low` of link 1, about a place."""
     parts = []
     for link, start, end in ((1, low, LENGTH), (2, 0.0, 0.4)):
         s, mass = points(system, link, start, end)
@@ -79,7 +79,7 @@ def beyond(system, q, qd, qdd, low, about):
 def test_force_and_moment_of_a_joint():
     """Sums over many points, with the hub on the axis, a load at the tip, and the second joint.
 
-    Equations: 138, 139
+    Equations: 139, 140
     """
     system = arm()
     q, qd, qdd = state(system)
@@ -105,7 +105,7 @@ def test_force_and_moment_of_a_joint():
 def test_forces_in_a_section(s):
     """The cut's force along and across the tangent, with the damping in proportion to the mass.
 
-    Equations: 140, 142
+    Equations: 141, 143
     """
     system = arm()
     q, qd, qdd = state(system)
@@ -139,7 +139,7 @@ def test_the_slope_of_the_bending_moment():
     """dM/ds = -Q in a link without damping in proportion to its mass, by differences; the place of
     a coarse mesh turns with its angle to the error of (4) only.
 
-    Equations: 141
+    Equations: 142
     """
     system = fx.assemble(arm(16).robot.replace({"link.1.damping": {"beta_s": BETA}}))
     q, qd, qdd = state(system)
@@ -151,7 +151,7 @@ def test_the_slope_of_the_bending_moment():
 def test_what_a_joint_transmits_of_its_drive():
     """The joint's row of Lagrange's equations, for R and for a Pa on a bent link.
 
-    Equations: 143
+    Equations: 144
     """
     one = beam(0.6, RHO, EI, 4)
     two = rigid(0.3, 0.2, 0.1, 0.01, type="Pa", start_m=0.35, angle_rad=0.4)
@@ -173,7 +173,7 @@ def test_what_a_joint_transmits_of_its_drive():
 def test_the_bending_moment_by_curvature():
     """EI times the curvature and beta times its rate, in a robot that moves by (25).
 
-    Equations: 144
+    Equations: 145
     """
     system = fx.assemble(arm(16).robot.replace({"link.1.damping": {"beta_s": BETA}}))
     system = fx.assemble(system.robot.replace({"link.1.mass": []}))
@@ -191,7 +191,7 @@ def test_the_bending_moment_by_curvature():
 def test_the_stress_of_a_fibre():
     """Of a box: half the height over the second moment of area.
 
-    Equations: 145
+    Equations: 146
     """
     b, h, wall, P = 0.02, 0.03, 0.002, 5.0
     box = {"shape": "box", "width_m": b, "height_m": h, "wall_m": wall}

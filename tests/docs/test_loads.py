@@ -39,7 +39,7 @@ def place(system, q, load):
 
 
 def force_of(system, q, load):
-    """(133): the force's components in the base's axes, and the moment."""
+    """(134): the force's components in the base's axes, and the moment."""
     f1, f2, m = load.at(0.0)
     turn = np.exp(1j * place(system, q, load)[2]) if load.frame == "link" else 1.0
     f = (f1 + 1j * f2) * turn
@@ -51,7 +51,7 @@ def force_of(system, q, load):
 def test_virtual_work_of_loads(name, stiffening):
     """Core and assembly against differences of places and angles.
 
-    Equations: 132, 133
+    Equations: 133, 134
     """
     system, q, loads = loaded(name, stiffening)
     expected, h = np.zeros(system.n), 1e-6
@@ -71,9 +71,9 @@ def test_virtual_work_of_loads(name, stiffening):
 
 @pytest.mark.parametrize("name", CHAINS)
 def test_power_of_the_loads(name):
-    """The rate of kinetic energy of a robot at rest under loads alone, and the power of (134).
+    """The rate of kinetic energy of a robot at rest under loads alone, and the power of (135).
 
-    Equations: 134
+    Equations: 135
     """
     system, q, loads = loaded(name)
     qd = np.random.default_rng(4).normal(size=system.n)
@@ -91,7 +91,7 @@ def test_power_of_the_loads(name):
 def test_a_static_equilibrium_under_loads(stiffening):
     """Elastic forces, gravity and loads are in balance in the elastic rows.
 
-    Equations: 135
+    Equations: 136
     """
     system, _, loads = loaded("RR", stiffening)
     q = fx.static(system, loads=loads)
@@ -111,7 +111,7 @@ def carrying(mass, inertia=0.0):
 def test_momentum_where_a_payload_is_taken_up():
     """Rates from the core's mass matrices with and without it, and the energy in both forms.
 
-    Equations: 136, 137
+    Equations: 137, 138
     """
     before, after = carrying(0.1, 1e-3), carrying(0.25, 3e-3)
     random = np.random.default_rng(5)

@@ -27,7 +27,7 @@ def arm(beta=2e-3):
 def test_an_equation_holds_at_the_points_of_gauss():
     """Polynomials that satisfy an equation at the points of Gauss.
 
-    Equations: 112
+    Equations: 113
     """
     mesh = Mesh(np.array([0.0, 0.1, 0.25, 0.4]))
     g = np.polynomial.legendre.leggauss(POINTS)[0]
@@ -46,7 +46,7 @@ def test_an_equation_holds_at_the_points_of_gauss():
 def test_zeros_make_the_pencil_singular():
     """The zeros of the motion with the tip at rest.
 
-    Equations: 113
+    Equations: 114
     """
     system = arm()
     q, zero = system.start(), np.zeros((1, system.n))
@@ -67,7 +67,7 @@ def test_zeros_make_the_pencil_singular():
 def test_a_posture_balances_and_reaches():
     """A posture under gravity.
 
-    Equations: 114
+    Equations: 115
     """
     heavy = robots.system(
         robots.beam(0.3, 0.3, 0.8, 2), robots.beam(0.3, 0.3, 0.8, 2), gravity=(0.0, -9.81)
@@ -81,7 +81,7 @@ def test_a_posture_balances_and_reaches():
 def test_the_elastic_rows_balance_and_the_tip_is_on_its_path():
     """What the inverse motion satisfies.
 
-    Equations: 115
+    Equations: 116
     """
     system = arm()
     path = tip_path(system, np.array([0.0, 0.6]), lambda t: paths.smooth_rise(t / 0.6))
@@ -106,7 +106,7 @@ def test_the_elastic_rows_balance_and_the_tip_is_on_its_path():
 def test_the_way_has_four_derivatives_of_zero_at_its_ends():
     """A path from rest to rest.
 
-    Equations: 116
+    Equations: 117
     """
     u = np.polynomial.Polynomial([0] * 5 + [126, -420, 540, -315, 70])
     x = np.linspace(0, 1, 11)
@@ -120,7 +120,7 @@ def test_the_way_has_four_derivatives_of_zero_at_its_ends():
 def test_the_variation_of_a_motion_is_the_difference_of_two():
     """The derivative of a motion by a number.
 
-    Equations: 117
+    Equations: 118
     """
     system, nodes = arm(), np.linspace(0.0, 0.3, 61)
     t = stage_times(nodes)
@@ -144,7 +144,7 @@ def test_the_variation_of_a_motion_is_the_difference_of_two():
 def test_the_nearest_motion_is_the_exact_one_where_there_is_one():
     """The nearest motion.
 
-    Equations: 118
+    Equations: 119
     """
     system = arm()
     path = tip_path(system, np.array([0.0, 0.6]), lambda t: 0.5 * paths.smooth_rise(t / 0.6))
@@ -159,7 +159,7 @@ def test_the_nearest_motion_is_the_exact_one_where_there_is_one():
 def test_damping_ratios():
     """Damping of modes.
 
-    Equations: 119
+    Equations: 120
     """
     system = arm()
     found = fx.modes(system, count=3)
@@ -172,7 +172,7 @@ def test_damping_ratios():
 def test_a_frequency_response():
     """Response at a frequency.
 
-    Equations: 120
+    Equations: 121
     """
     system, f = arm(), 3.0
     found = fx.frequency_response(system, "joint/1/drive", "tip/y", [f])
@@ -185,7 +185,7 @@ def test_a_frequency_response():
 def test_what_is_asked_of_the_drives_at_the_end():
     """Constraints of the linear program.
 
-    Equations: 121
+    Equations: 122
     """
     system = arm()
     plant = Plant(system, system.start(), fx.static(system, [0.5]), np.ones(1), 1e-3)
@@ -245,7 +245,7 @@ def softer(factor):
 def test_a_change_is_the_least_of_what_all_robots_lack():
     """The law of learning as one least-squares problem, and trials on the softer robot.
 
-    Equations: 122
+    Equations: 123
     """
     (t, stiff), (_, soft) = softer(1.0), softer(0.94)
     share = np.exp(-np.maximum(t - 0.6, 0.0) / 0.3)
@@ -270,7 +270,7 @@ def test_a_change_is_the_least_of_what_all_robots_lack():
 def test_the_response_along_a_motion_is_the_difference_of_two_runs():
     """Two flexible links on a wide motion; one joint follows, the other one is on a spring.
 
-    Equations: 123
+    Equations: 124
     """
     made = robots.system(
         robots.beam(0.3, 0.3, 0.8, 1, hub_inertia_kg_m2=0.01, damping={"beta_s": 1e-3}),
@@ -314,7 +314,7 @@ def test_the_response_along_a_motion_is_the_difference_of_two_runs():
 def test_a_reference_gives_its_voltage():
     """The controller's law, forwards, at the reference that its inverse found.
 
-    Equations: 124
+    Equations: 125
     """
     loop = control.JointLoop(0.4, kp=60.0, ki=120.0, kd=0.2, kv=1.4, kc=0.3)
     h = 1e-4
@@ -333,7 +333,7 @@ def test_a_reference_gives_its_voltage():
 def test_the_guard_sees_the_worst_robot():
     """What is left of an error, robot by robot.
 
-    Equations: 125
+    Equations: 126
     """
     responses = np.random.default_rng(1).standard_normal((3, 20, 2, 4))
     error, c = np.ones((20, 2)), np.array([0.1, 0.0, -0.2, 0.3])

@@ -72,7 +72,7 @@ def test_a_dead_link_stops_the_build(tmp_path):
     (tmp_path / "conf.py").write_text((DOCS / "conf.py").read_text(encoding="utf-8"))
     (tmp_path / "_site").symlink_to(DOCS / "_site")
     command = [sys.executable, "-m", "sphinx", "-W", "-q", "-b", "html"]
-    for text, missing in (("[nowhere](no-page.md)", "no-page.md"), ("Equation (107)", "eq-107")):
+    for text, missing in (("[nowhere](no-page.md)", "no-page.md"), ("Equation (108)", "eq-108")):
         (tmp_path / "index.md").write_text(f"# A page\n\n{text}\n")
         done = subprocess.run(
             [*command, str(tmp_path), str(tmp_path / "out")],

@@ -37,7 +37,7 @@ def moved(system, q, qd, of, h=1e-6):
 
 
 def body_energy(system, q, qd, of):
-    """Kinetic energy (110) of a body whose place and angle are a function of q."""
+    """Kinetic energy (111) of a body whose place and angle are a function of q."""
     _, rate = moved(system, q, qd, of)
     return 0.5 * MASS * (rate[0] ** 2 + rate[1] ** 2) + 0.5 * INERTIA * rate[2] ** 2
 
@@ -51,7 +51,7 @@ def kinetic(system, q, qd):
 def test_a_spring_beside_a_drive():
     """The energy and the force of the spring, in core and assembly.
 
-    Equations: 107
+    Equations: 108
     """
     with_spring, without = arm(), arm(**{"link.1.joint.spring.stiffness_N_m_rad": 0.0})
     q, qd = state(with_spring)
@@ -68,7 +68,7 @@ def test_a_spring_beside_a_drive():
 def test_a_transmission():
     """Rotor, windup and hub: energies, loss, and the angle of the hub.
 
-    Equations: 108
+    Equations: 109
     """
     system = arm()
     q, qd = state(system)
@@ -85,7 +85,7 @@ def test_a_transmission():
 def test_a_lumped_mass():
     """The kinetic energy of a lump at a node, from the line's place there.
 
-    Equations: 109
+    Equations: 110
     """
     system, q, qd = arm(), *state(arm())
     bare = (
@@ -106,7 +106,7 @@ def test_a_lumped_mass():
 def test_a_centre_off_the_line():
     """The kinetic energy of a payload off the tip, and of a rigid link off its line.
 
-    Equations: 110
+    Equations: 111
     """
     system, q, qd = arm(), *state(arm())
     bare = arm(**{"payload.mass_kg": 0.0, "payload.inertia_kg_m2": 0.0})
@@ -128,7 +128,7 @@ def test_a_centre_off_the_line():
 def test_a_hub_with_a_radius():
     """Where the line begins, and that the hub's mass stays at the axis.
 
-    Equations: 111
+    Equations: 112
     """
     system, q, qd = arm(), *state(arm())
     phi = q[0] + q[1]

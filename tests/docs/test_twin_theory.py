@@ -10,7 +10,7 @@ from flexura.io import Run
 from flexura.robot import Link
 from flexura.twin.extrapolation import extrapolate
 from flexura.twin.joints.mesh import hub_places, sleeve_places
-from flexura.twin.links.properties import beam_values
+from flexura.twin.links.properties import beam_values, without_ringing
 
 SECTION = {"width_m": 0.02, "height_m": 0.004}
 STEEL = {
@@ -40,10 +40,22 @@ def test_the_twins_beam():
     ) and plain.shear == pytest.approx(plain.axial)
 
 
+def test_the_twins_axial_damping():
+    """Critical for a mass as large as the link's on a bar without mass: c^2 = 4 k m.
+
+    Equations: 105
+    """
+    values = without_ringing(beam_values(Link.model_validate(STEEL | {"section": SECTION}), 5, 0.0))
+    length = 5 * values.length
+    stiffness, mass = values.axial[0] / length, values.mass[0] * length
+    damping = values.stretch * values.axial[0] / length
+    assert damping**2 == pytest.approx(4 * stiffness * mass)
+
+
 def test_the_points_of_a_sleeve():
     """Spans near the exit, and the two points of a hub.
 
-    Equations: 105
+    Equations: 106
     """
     delta, h = 0.03, 0.02
     expected = delta / (2 * np.sqrt(3)) - 0.0108 * h**3 / delta**2 - delta * np.arange(4)
@@ -56,7 +68,7 @@ def test_the_points_of_a_sleeve():
 def test_the_extrapolation():
     """Channels with errors of order 1 and 2 in the hubs' length lose them.
 
-    Equations: 106
+    Equations: 107
     """
     t = np.linspace(0, 1, 5)
     y0, first, second = (

@@ -17,7 +17,7 @@ from flexura.io import find, write_toml
 from ..recordings import flex_calibration
 from ..recordings.strip_sensor import sensor_of_session
 from ..recordings.unit_conversion import ADC_V, voltage_channel
-from ..rig.axes import MotorAxis, motor_axes
+from ..rig.axes import Friction, MotorAxis, motor_axes
 from ..rig.description import Rig
 from ..rig.plant.motor import resistance
 from ..rig.sensors import Calibration
@@ -33,10 +33,10 @@ def robot(found: Identified) -> fx.Robot:
     return with_parameters(found.nominal.robot, found.strip.values)
 
 
-def with_identified_friction(old: Rig, factors: Mapping[int, float]) -> dict[str, Any]:
-    """The rig file's tables with all friction of each motor and its joint times one factor.
+def with_identified_friction(old: Rig, factors: Mapping[int, Friction]) -> dict[str, Any]:
+    """The rig file's tables with the friction of each motor and its joint times their factors.
 
-    Voltage and speed cannot tell these frictions apart. A motor with more friction takes more
+    A motor with more friction takes more
     current without load and turns slower; its constant and gear stay the same: I_0' = f I_0, n_0' =
     n_0 (U_0 - R I_0') / (U_0 - R I_0), M_s' = M_s (I_s - I_0') / (I_s - I_0).
 
@@ -46,7 +46,7 @@ def with_identified_friction(old: Rig, factors: Mapping[int, float]) -> dict[str
     """
     tables = old.model_dump(mode="json", exclude_none=True)
     for axis in motor_axes(old):
-        motor, factor = axis.motor, factors[axis.number]
+        motor, (factor, own_factor) = axis.motor, factors[axis.number]
         before, after = motor.no_load_current_A, factor * motor.no_load_current_A
         emf = lambda current, motor=motor: motor.rated_voltage_V - resistance(motor) * current
         left = lambda current, motor=motor: motor.stall_current_A - current
@@ -55,13 +55,11 @@ def with_identified_friction(old: Rig, factors: Mapping[int, float]) -> dict[str
             "no_load_speed_rpm": motor.no_load_speed_rpm * emf(after) / emf(before),
             "stall_torque_N_m": motor.stall_torque_N_m * left(after) / left(before),
         }
-        own = guide_table(old, axis)
-        for table in (axis.table, "screw", own):
-            if table == "screw" and axis.turns:
-                continue
+        both = {axis.table: factor, guide_table(old, axis): own_factor}
+        for table, times in (both if axis.turns else both | {"screw": factor}).items():
             for name in tables[table]:
                 if name == "starts_at_V" or name.startswith(("coulomb_", "viscous_")):
-                    tables[table][name] *= factor
+                    tables[table][name] *= times
     return tables
 
 

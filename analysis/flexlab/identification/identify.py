@@ -4,8 +4,9 @@
 2. Start values: the first 2 s are simulated for a grid of stiffnesses; the best fit is taken. A
    mode's phase over 10 s has many local minima, over 2 s one.
 3. All parameters: stiffness, damping, payload, gain of the sensor, backlash, contact stiffness of
-   gears, holding torque of the stepper, delay of the sensor.
-4. Joints that motors turn: friction, from voltage, speed and the torque of the identified strip.
+   gears, friction of the bearings before gears, holding torque of the stepper, delay of the
+   sensor.
+4. Joints that motors turn: the motor's friction, from voltage, speed and the torque on its gear.
 
 The intervals account for noise and add the uncertainty of fixed model parameters: one element less;
 0.5 % of the strip's mass (leads and glue of the sensor are in no file); and a payload radius of
@@ -27,13 +28,13 @@ import flexura as fx
 from flexura.errors import InputError
 
 from ..recordings.unit_conversion import voltage_channel
-from ..rig.axes import MotorAxis, motor_axes
+from ..rig.axes import Friction, MotorAxis, motor_axes
 from ..rig.description import Rig, rig_of_recording, strip_of
 from ..rig.plant.motor import JointLine, joint_line
 from ..rig.plant.stepper import MagneticSpring
 from . import motor_friction
 from .estimate import Estimate, Parameter, estimate
-from .strip import StripModel, with_parameters
+from .strip import BEARING, StripModel, with_parameters
 
 FIRST_PART_S = 2.0
 # 5 % of stiffness are 2 % of frequency, a sixth of a period in 2 s
@@ -53,8 +54,13 @@ class Nominal:
 
     @property
     def lines(self) -> dict[int, JointLine]:
-        """The joints with motors as linear motors, by their numbers."""
-        return {axis.number: joint_line(axis) for axis in self.axes}
+        """The joints with motors as linear motors, by their numbers.
+
+        The strip shows the friction of a bearing that a gear turns: it is not in these.
+        """
+        return {
+            axis.number: joint_line(axis, own=0.0 if axis.turns else None) for axis in self.axes
+        }
 
 
 @dataclass(frozen=True)
@@ -67,10 +73,14 @@ class Identified:
     data: StripModel
 
     @property
-    def friction(self) -> dict[int, float]:
+    def friction(self) -> dict[int, Friction]:
         """Factors on the friction of the joints with motors."""
-        lines = self.nominal.lines
-        return {n: found.values["coulomb"] / lines[n].coulomb for n, found in self.joints.items()}
+        own, lines = self.strip.values.get(BEARING), self.nominal.lines
+        return {
+            n: Friction(motor, motor if own is None else own)
+            for n, found in self.joints.items()
+            for motor in [found.values["coulomb"] / lines[n].coulomb]
+        }
 
 
 def required_channels(rig: Rig, strip: int) -> list[str]:
@@ -135,7 +145,10 @@ def identify(
         if not axis.turns:
             joints[axis.number] = _joint(experiment, nominal, axis)
     report("joints", len(joints) / len(nominal.axes))
-    friction = {n: found.values["coulomb"] / lines[n].coulomb for n, found in joints.items()}
+    friction = {
+        n: Friction(*2 * [found.values["coulomb"] / lines[n].coulomb])
+        for n, found in joints.items()
+    }
     values = _start_values(experiment, nominal, lambda part: report("strip", 0.3 * part))
     data = StripModel(experiment, rig, robot, friction)
     correlation_samples = round(CORRELATION_S / float(np.median(np.diff(data.t))))
@@ -158,7 +171,8 @@ def identify(
     for axis in nominal.axes:
         if axis.turns:  # under the links' torque
             torque = run[f"joint/{axis.number}/drive"]
-            joints[axis.number] = _joint(experiment, nominal, axis, torque)
+            own = strip.values[BEARING] * strip.deviation(BEARING) * axis.guide.coulomb
+            joints[axis.number] = _joint(experiment, nominal, axis, torque, own)
             report("joints", len(joints) / len(nominal.axes))
     return Identified(nominal, joints, strip, data)
 
@@ -181,11 +195,16 @@ def _strip(
 
 
 def _joint(
-    experiment: fx.Run, nominal: Nominal, axis: MotorAxis, torque: np.ndarray | None = None
+    experiment: fx.Run,
+    nominal: Nominal,
+    axis: MotorAxis,
+    torque: np.ndarray | None = None,
+    own_deviation: float = 0.0,
 ) -> Estimate:
-    """A motor's friction, `torque` (T,) [N m] being what its gear gives to the links."""
+    """A motor's friction, `torque` (T,) [N m] being what its gear gives to the joint."""
     line, dead_zone_V = nominal.lines[axis.number], nominal.rig.driver.dead_zone_V
-    return motor_friction.fit(experiment, nominal.robot, axis, line, dead_zone_V, torque)
+    robot = nominal.robot
+    return motor_friction.fit(experiment, robot, axis, line, dead_zone_V, torque, own_deviation)
 
 
 def _start_values(
@@ -203,6 +222,8 @@ def _start_values(
         "holding": 1.0,
         "delay_s": 1e-3,
     }
+    if all(axis.turns for axis in nominal.axes):
+        values[BEARING] = 1.0
     misfits = []
     for k, factor in enumerate(STIFFNESS_GRID):
         misfits.append(float((data.residuals(values | {"stiffness": factor})[0] ** 2).sum()))
@@ -274,6 +295,7 @@ def parameters(nominal: Nominal, values: dict[str, float]) -> list[Parameter]:
         "sensor_gain": (0.01, (0.1, 10.0)),
         "backlash": (0.05, (0.01, 15.0)),
         CONTACT: (0.02, (0.1, 10.0)),
+        BEARING: (0.05, (0.01, 20.0)),
         "holding": (2e-3, (0.2, 5.0)),
         "delay_s": (1e-4, (-5e-3, 0.02)),
     }
@@ -283,6 +305,7 @@ def parameters(nominal: Nominal, values: dict[str, float]) -> list[Parameter]:
         del steps["backlash"]
     if not all(axis.turns for axis in nominal.axes):
         del steps[CONTACT]
+        del steps[BEARING]
     return [
         Parameter(name, values[name], step, bounds, name != "delay_s")
         for name, (step, bounds) in steps.items()

@@ -18,6 +18,7 @@ from ..runs.table import Table
 from .estimate import Estimate
 from .files import with_identified_files
 from .identify import Identified
+from .strip import BEARING
 
 CONTRADICTS = 0.2  # of a viscous part: further off, data sheet and run do not agree
 
@@ -71,11 +72,17 @@ def quantities(found: Identified) -> list[Quantity]:
         for axis in nominal.axes
         if "contact" in {u.name for u in found.strip.parameters}
     ]
+    rows += [
+        (_of("bearing's friction", axis, len(nominal.axes)), "N m", BEARING, axis.guide.coulomb)
+        for axis in nominal.axes
+        if BEARING in {u.name for u in found.strip.parameters}
+    ]
     out = [_row(name, unit, found.strip, key, value, value) for name, unit, key, value in rows]
     out.append(_row("sensor's delay", "s", found.strip, "delay_s", 0.0, 1.0))
     for axis in nominal.axes:
         n, line, estimate = axis.number, nominal.lines[axis.number], found.joints[axis.number]
-        name, per = f"joint {n}: Coulomb friction", f"{axis.force_unit} s/{axis.unit}"
+        whose = "motor's Coulomb friction" if axis.turns else "Coulomb friction"
+        name, per = f"joint {n}: {whose}", f"{axis.force_unit} s/{axis.unit}"
         key = f"joint_{n}_coulomb"
         out.append(_row(name, axis.force_unit, estimate, "coulomb", line.coulomb, 1.0, key))
         name, key = f"joint {n}: viscous, with back-EMF", f"joint_{n}_viscous"

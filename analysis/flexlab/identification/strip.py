@@ -1,7 +1,8 @@
 """The strip as seen by its sensor and by a stepper's encoder, for given parameters.
 
-A joint with a motor follows the motor behind the backlash, which the joint's friction widens by
-2 F/k (k: stiffness of the contact). A joint with a stepper is on its magnetic spring, about the
+A joint on a lead screw follows the motor behind the backlash, which the joint's friction widens by
+2 F/k (k: stiffness of the contact). A joint that a geared motor turns is on the teeth of the gear;
+its bearing's friction brakes the links. A joint with a stepper is on its magnetic spring, about the
 angle of the pulses. The native simulation of all gives the sensor's voltage; of a flex sensor
 
     alpha = angle(s_0 + l) - angle(s_0)
@@ -33,7 +34,7 @@ from ..comparison.replay.smoothing import (
 )
 from ..comparison.replay.stepper_relaxation import RelaxationState, simulate_with_stepper
 from ..recordings.unit_conversion import voltage_channel
-from ..rig.axes import motor_axes
+from ..rig.axes import Friction, motor_axes
 from ..rig.description import Rig, strip_of
 from ..rig.plant.stepper import MagneticSpring
 from ..rig.plant.strip_sensor import StripSensor
@@ -47,6 +48,7 @@ METHOD, RTOL = "implicit", 1e-3  # the cheapest where data break the drives ever
 # contacts begin and end within a step: differences of such simulations must be smooth
 GEAR_METHOD, GEAR_RTOL = "auto", 1e-4
 TORQUE_STEP_S = 2e-3  # between two values of the stepper's torque that the relaxation corrects
+BEARING = "bearing"  # the factor on the friction of bearings that gears turn
 CURVATURE_STEP = 1e-3  # of the link's length: between the slopes whose difference is a curvature
 
 
@@ -58,7 +60,7 @@ class StripModel:
         experiment: fx.Run,
         rig: Rig,
         robot: fx.Robot,
-        friction: dict[int, float] | None = None,
+        friction: dict[int, Friction] | None = None,
         until_s: float = np.inf,
     ) -> None:
         """Prepare the data.
@@ -135,6 +137,8 @@ class StripModel:
         """
         times = self._times
         robot = with_stepper_damping(with_parameters(self.robot, values), self.rig, elements)
+        if not self.stepper:
+            robot = self._with_bearings(robot, values[BEARING])
         system = fx.assemble(robot)
         q0 = system.start()
         if self.stepper:
@@ -157,7 +161,7 @@ class StripModel:
         assert self.stepper is not None
         times = self._times
         ((axis, shaft),) = self._shaft_positions.items()
-        own = self._friction.get(axis.number, 1.0) * values.get("give", 1.0)
+        own = self._friction.get(axis.number, Friction()).own * values.get("give", 1.0)
         play = lead_screw.backlash(axis.guide, own)
         play += (values.get("backlash", 1.0) - 1.0) * axis.guide.backlash
         x = lead_screw.backlash_output(shaft, play)
@@ -194,6 +198,19 @@ class StripModel:
         q0[system.joint_rows] = [x[0] for x in self._shaft_positions.values()]
         teeth = Backlash(tuple(contacts))
         return fx.simulate(system, self._times, teeth, q0=q0, rtol=GEAR_RTOL, method=GEAR_METHOD)
+
+    def _with_bearings(self, robot: fx.Robot, friction: float) -> fx.Robot:
+        """The robot with its bearings' friction in the joints, times a factor."""
+        changes = {}
+        for axis in self._shafts:
+            joint, at = robot.links[axis.number - 1].joint, f"link.{axis.number}.joint"
+            changes[f"{at}.coulomb_friction_N_m"] = (
+                joint.coulomb_friction + friction * axis.guide.coulomb
+            )
+            changes[f"{at}.viscous_friction_N_m_s_rad"] = (
+                joint.viscous_friction + friction * axis.guide.viscous
+            )
+        return robot.replace(changes)
 
     def _sensed(self, system: fx.System, run: fx.Run) -> np.ndarray:
         """What the sensor feels (T,) in a run with states: bend [rad] or curvature [1/m]."""

@@ -1,7 +1,7 @@
 """From the joints' motions to the references with which the drives make them.
 
 A motor's force bears rotor, friction, the links' load and what the gear loses of it. The board's
-controller gives its voltage at a reference that is found by inversion (124).
+controller gives its voltage at a reference that is found by inversion (125).
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ def drive_inverse(
     t: np.ndarray,
     motions: np.ndarray,
 ) -> DriveInverse:
-    """The references with which the joints move so, by the model (124).
+    """The references with which the joints move so, by the model (125).
 
     Args:
         setup: the rig.
@@ -150,7 +150,7 @@ def _voltage(
     """The voltage (T,) [V] that moves a motor's joint against a load, with the bridge's dead
     zone."""
     assert callable(course)
-    line, data = joint_line(axis, knowledge.friction_of(axis)), motor_data(axis)
+    line, data = joint_line(axis, *knowledge.friction_of(axis)), motor_data(axis)
     loss = (1 / (data.gear_efficiency * axis.efficiency) - 1) * np.abs(load)
     loss = np.where(load * side < 0, np.minimum(loss, np.abs(load)), loss)
     force = line.inertia * course(t, 2) + line.viscous * course(t, 1) + load
@@ -166,7 +166,7 @@ def _behind(
 
     It touches the flank on which it pushes links and the joint's own friction.
     """
-    guide, friction = axis.guide, knowledge.friction_of(axis)
+    guide, friction = axis.guide, knowledge.friction_of(axis).own
     own = friction * guide.coulomb
     pushed = load + own * side + friction * guide.viscous * rate
     flank = np.tanh(pushed / max(SOFT * own, 1e-9))

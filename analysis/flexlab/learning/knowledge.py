@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..identification.identify import Identified
-from ..rig.axes import MotorAxis
+from ..rig.axes import Friction, MotorAxis
 
 EXTREME = 100.0  # logarithm of a factor: beyond any range
 SURELY = 2.0  # standard deviations
@@ -27,7 +27,7 @@ class Knowledge:
 
     values: dict[str, float]
     others: tuple[dict[str, float], ...]
-    friction: dict[int, float]
+    friction: dict[int, Friction]
 
     @classmethod
     def of(cls, found: Identified) -> Knowledge:
@@ -51,6 +51,6 @@ class Knowledge:
                 others.append(dict(zip(NAMES, map(float, factors), strict=True)))
         return cls(dict(strip.values), tuple(others), dict(found.friction))
 
-    def friction_of(self, axis: MotorAxis) -> float:
-        """The factor on the friction of a joint with a motor."""
-        return self.friction.get(axis.number, 1.0)
+    def friction_of(self, axis: MotorAxis) -> Friction:
+        """The factors on the friction of a joint with a motor."""
+        return self.friction.get(axis.number, Friction())

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from flexura.errors import InputError
 
@@ -31,6 +32,13 @@ class Guide:
     def of(cls, table: Carriage | Bearing) -> Guide:
         """The values of a table, whose keys carry the units."""
         return cls(*table.model_dump().values())
+
+
+class Friction(NamedTuple):
+    """Factors on a joint's friction in the rig file: its motor's and screw's, and its own."""
+
+    motor: float = 1.0
+    own: float = 1.0
 
 
 @dataclass(frozen=True)

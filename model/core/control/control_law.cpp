@@ -90,7 +90,7 @@ GainsOf<ModelNumbers> ControlLaw::a_tick(const JointLaw &joint) const {
   return g;
 }
 
-// The nominal joint as its observer takes it (147).
+// The nominal joint as its observer takes it (148).
 ObserverGainsOf<ModelNumbers> ControlLaw::nominal(const JointLaw &joint) const {
   ObserverGainsOf<ModelNumbers> g;
   g.filter = joint.observer;
@@ -99,7 +99,7 @@ ObserverGainsOf<ModelNumbers> ControlLaw::nominal(const JointLaw &joint) const {
   return g;
 }
 
-// The extended PID (70) with its limits (71) and anti-windup (72), and the observer's d^ (149).
+// The extended PID (70) with its limits (71) and anti-windup (72), and the observer's d^ (150).
 double ControlLaw::pid_output(long k, double t, std::size_t i) {
   const JointLaw &joint = joints[i];
   const GainsOf<ModelNumbers> &g = joint.gains;

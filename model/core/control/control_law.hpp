@@ -3,7 +3,7 @@
 // The PID is the firmware's own (firmware/lib/control/src/pid.h), computed in doubles.
 //
 //     u = kp e + ki sum(e) T + kd (r' - q') + kf w + kg w' + ks s + kt s' + kv r' + kc sign r' +
-//     f(t) + d^                                                                       (70), (149)
+//     f(t) + d^                                                                       (70), (150)
 //
 // r: the reference through a first-order filter; r': its change / T; q': the filtered change of q /
 // T, and of a stepper that counts its own pulses u of the tick before; w, s: tip deflection and

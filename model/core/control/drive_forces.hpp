@@ -145,7 +145,7 @@ class DriveForces {
   }
 
   bool has_loads() const { return !places.empty(); }
-  // The generalised force of all loads on links, at the last pass, in row e (132).
+  // The generalised force of all loads on links, at the last pass, in row e (133).
   Real on_unknown(int e) const { return loads.empty() ? Real(0.0) : loads[e]; }
   // The same at q, of loads of other sizes: `value` (loads, 3), into `out` (n).
   void loads_at(const Real *q, const Real *value, Real *out) const {

@@ -77,7 +77,7 @@ struct Plant {
     return (void)lane, (void)q, (void)out, false;
   }
   // Adds the generalised forces of loads on links at q to `out` (n): of each its force's two
-  // components and its moment, `values` (count, 3) (132). Packs of robots have no loads.
+  // components and its moment, `values` (count, 3) (133). Packs of robots have no loads.
   virtual void add_loads(const LoadPlace *places, int count, const Real *values, const Real *q,
                          Real *out) {
     (void)places, (void)count, (void)values, (void)q, (void)out;

@@ -1,5 +1,5 @@
-// The motion ahead of a predictive controller: its intervals linearised (130), and the program of a
-// tick with the states eliminated (131).
+// The motion ahead of a predictive controller: its intervals linearised (131), and the program of a
+// tick with the states eliminated (132).
 #pragma once
 #include <memory>
 #include <vector>

@@ -38,7 +38,7 @@ inline void eliminate_joint(const Model<Real> &model, const Piece<Real> &c, Piec
     own += dot(k.along, k.pull), bias = dot(k.along, beyond.b);
   }
   const Real passive = stiffness * stage.y[c.first] + damping * stage.v[c.first] +
-                       spring * (stage.y[c.first] - model.rest[i]);  // (107)
+                       spring * (stage.y[c.first] - model.rest[i]);  // (108)
   own += stage.gq * (stiffness + spring) + stage.gv * damping;
   if (hold.held && hold.held[i]) {  // its acceleration is known
     k.inverse = own, k.rest = -(bias + passive);

@@ -33,7 +33,7 @@ void fill_piece(Piece<double> &c, const PieceDraft &d, double *block) {
   put(into(c.tip_angle), d.tip_angle), put(into(c.K), d.K);
   for (int i = 0; i < m; ++i)
     into(c.D)[i] = d.D.empty() ? d.beta * d.K[std::size_t(i)] : d.D[std::size_t(i)];
-  for (const Spin &spin : d.spins)  // (109)
+  for (const Spin &spin : d.spins)  // (110)
     for (int a = 0; a <= m; ++a)
       for (int b = 0; b <= m; ++b)
         into(c.spin)[a * (m + 1) + b] += spin.inertia *

@@ -20,15 +20,15 @@ PieceDraft rigid(double length, double mass, double centre, double about_centre)
 }
 
 // A mass whose centre is `along`, `across` from the hub: without length, turned to the centre
-// (110).
+// (111).
 PieceDraft off_line(double mass, double along, double across, double about_centre) {
   PieceDraft out = rigid(0.0, mass, std::hypot(along, across), about_centre);
   out.angle = std::atan2(across, along);
   return out;
 }
 
-// The hub of a revolute joint, from its axis to the beginning of the line (111); with a
-// transmission behind the windup, its one unknown (108).
+// The hub of a revolute joint, from its axis to the beginning of the line (112); with a
+// transmission behind the windup, its one unknown (109).
 PieceDraft hub_piece(const Joint &joint) {
   PieceDraft out = rigid(joint.hub_radius, 0.0, 0.0, 0.0);
   if (!joint.elastic) return out;
@@ -67,7 +67,7 @@ PieceDraft element(const Link &link, double from, double to, bool last) {
   return out;
 }
 
-// Where the elements of a mesh end (109): they are of equal length between the ends of the link and
+// Where the elements of a mesh end (110): they are of equal length between the ends of the link and
 // its lumps, where the curvature or its slope jumps. Lumps within a quarter of an element of an end
 // or of one another get no node. As in flexura/link/line.py.
 Numbers mesh_nodes(const Link &link) {

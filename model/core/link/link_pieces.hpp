@@ -16,7 +16,7 @@ struct LinkDraft {
 // The pieces of link `index` (from 0), all but the modes. Throws Fault.
 LinkDraft begin_link(const Link &link, int index, const Attachments &attached);
 
-// The payload as pieces of its own, if its centre is off the tip (110).
+// The payload as pieces of its own, if its centre is off the tip (111).
 std::vector<PieceDraft> off_tip(const Attachments &attached, int index);
 
 // Changes the last piece's shapes for its modes, if it has any.

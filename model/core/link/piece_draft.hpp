@@ -14,7 +14,7 @@ inline std::size_t at(int row, int column, int width) {
   return std::size_t(row) * std::size_t(width) + std::size_t(column);
 }
 
-// A moment of inertia that turns at the rate b_0 of the hub and b_k of the unknowns (109).
+// A moment of inertia that turns at the rate b_0 of the hub and b_k of the unknowns (110).
 struct Spin {
   double inertia = 0.0;
   Numbers b;  // (m)
@@ -102,7 +102,7 @@ inline void inertia(PieceDraft &out, const std::vector<Interval> &material, doub
   });
 }
 
-// A point mass at the place sum_j w_j e_j of the line: m, m w and m w w^T (22), (109).
+// A point mass at the place sum_j w_j e_j of the line: m, m w and m w w^T (22), (110).
 inline void add_point_mass(PieceDraft &out, double m, const Numbers &w) {
   out.mass += m;
   if (m == 0.0) return;

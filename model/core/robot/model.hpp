@@ -6,8 +6,8 @@
 // link is a piece with one point and no unknowns; a link of n elements is n pieces of two unknowns
 // with no joint between; a link in its own modes, one that carries a slider, and one in a sleeve
 // are one piece. A hub with a radius is a rigid piece before the link's line; with a transmission
-// its one unknown is the windup (108). A mass whose centre is off the line is a piece without
-// length, turned to the centre, followed by one that turns back (110).
+// its one unknown is the windup (109). A mass whose centre is off the line is a piece without
+// length, turned to the centre, followed by one that turns back (111).
 #pragma once
 #include <cstddef>
 #include <vector>
@@ -62,7 +62,7 @@ struct Piece : Shape {
   const Real *bend;         // sleeve: (m, P): d Theta / d xi, per unknown
   const Real *material;     // sleeve: (intervals, 10): from, to, mass per length, stiffness (8)
   Real payload, beta;       // sleeve: mass at the tip; D = beta K
-  const Real *spin;  // turning: (m + 1, m + 1), lumped inertias by hub's turning and unknowns (109)
+  const Real *spin;  // turning: (m + 1, m + 1), lumped inertias by hub's turning and unknowns (110)
 };
 
 // What an evaluation leaves of a piece for its next sweep.
@@ -95,7 +95,7 @@ struct Model {
   std::vector<JointKind> kind;
   std::vector<char> locked;
   std::vector<Real> viscous, coulomb;  // per link
-  std::vector<Real> spring, rest;      // per link: beside the drive (107)
+  std::vector<Real> spring, rest;      // per link: beside the drive (108)
   std::vector<Real> alpha;             // per link: mass-proportional damping [1/s]
   std::vector<double> start, low, high;
   bool mass_damped = false;
@@ -119,7 +119,7 @@ struct Model {
 };
 
 // Position of a joint's hub from unknowns q (n), or its rate from their rates: behind a
-// transmission the rotor's and the windup (108).
+// transmission the rotor's and the windup (109).
 template <class Real>
 inline double hub_position(const Model<Real> &model, int link, const double *q) {
   const std::size_t i = std::size_t(link);

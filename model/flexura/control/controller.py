@@ -12,7 +12,7 @@ second tick, through a filter of their own, w' its change / 2T; joint i takes th
 mod 2 = i mod 2 (i from 0). |u| <= limit, and changes by at most slew T a tick. The sum's part of u
 stays within the limit, and stands still while limit or slew holds u back and e pushes it further.
 Filters: y += a (x - y), a = 1 - exp(-2 pi f T). u becomes a force, or a stepper's rate, after a
-whole number of ticks. d^ is what the disturbance observer finds of a motor or a force (148), (149).
+whole number of ticks. d^ is what the disturbance observer finds of a motor or a force (149), (150).
 The board's library (firmware/lib/control) computes it, in integers there and
 in floating point in the core.
 

@@ -46,7 +46,7 @@ class JointLoop:
     def reference(
         self, step_s: float, position: np.ndarray, voltage: np.ndarray, side: np.ndarray
     ) -> np.ndarray:
-        """The reference with which a joint that moves so gets this voltage (124).
+        """The reference with which a joint that moves so gets this voltage (125).
 
         Args:
             step_s: time between two samples [s].
@@ -86,7 +86,7 @@ def motion_response(
     changes: Sequence[np.ndarray],
     springs: Sequence[JointSpring | None] = (),
 ) -> np.ndarray:
-    """What changes of the joints' motions do to the tip, along a motion (123).
+    """What changes of the joints' motions do to the tip, along a motion (124).
 
     A joint is where its motion says. One with a spring gives way; its motion is that of the pulses.
 
@@ -190,7 +190,7 @@ class LearningLaw:
     share: np.ndarray
 
     def update(self, error: np.ndarray) -> np.ndarray:
-        """The coefficients of a change (122).
+        """The coefficients of a change (123).
 
         Args:
             error: (T, m), what the outputs lack.
@@ -218,7 +218,7 @@ class LearningLaw:
         return np.asarray(np.linalg.solve(normal, right))
 
     def predicted(self, error: np.ndarray, change: np.ndarray) -> np.ndarray:
-        """The largest error that each robot predicts for a change (125).
+        """The largest error that each robot predicts for a change (126).
 
         Args:
             error: (T, m), what the outputs lack without it.

@@ -242,7 +242,7 @@ def whole_piece(
 
 
 def nodes(link: Link) -> np.ndarray:
-    """Where the elements of a link end (elements + 1,) [m] (109).
+    """Where the elements of a link end (elements + 1,) [m] (110).
 
     They are of equal length between the ends of the link and its lumped masses, where the curvature
     or its slope jumps. Masses within a quarter of an element of an end or of one another get no

@@ -13,7 +13,7 @@ from .shapes import legendre_shapes
 
 
 class ClampedBody(NamedTuple):
-    """A body on a link (109), (110).
+    """A body on a link (110), (111).
 
     Place [m], mass [kg], inertia about its centre [kg m^2], and the centre along and across the
     tangent there [m].

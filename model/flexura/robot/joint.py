@@ -40,7 +40,7 @@ def _limits(key: str, unit: str) -> Any:
 
 
 class Spring(Table):
-    """A spring beside a joint's drive (107)."""
+    """A spring beside a joint's drive (108)."""
 
     stiffness_N_m_rad: float = quantity(
         "stiffness_N_m_rad", "the stiffness of the spring of a joint R in N m/rad", 0.0
@@ -53,7 +53,7 @@ class Spring(Table):
 
 
 class Transmission(Table):
-    """What is between a rotor and its hub: a spring with a damper (108). All values are those at
+    """What is between a rotor and its hub: a spring with a damper (109). All values are those at
     the joint, the rotor's inertia too."""
 
     stiffness_N_m_rad: float = Field(

@@ -41,7 +41,7 @@ class ValueAt(Table):
 
 
 class Lump(Table):
-    """A mass on the line of a link, with the inertia about its own centre (109)."""
+    """A mass on the line of a link, with the inertia about its own centre (110)."""
 
     at_m: float = Field(ge=0, description="the place along the link in metres, 0 or more")
     mass_kg: float = Field(0.0, ge=0, description="a mass in kilograms, 0 or more")
@@ -341,7 +341,7 @@ class Link(Table):
         return _spread(self.young_modulus_Pa * self._of_section("area", x), x)
 
     def bending_stress(self, moment: ArrayLike, x: ArrayLike, distance: float | None = None) -> Any:
-        """The stress of a fibre under a bending moment, positive where it is drawn out (145).
+        """The stress of a fibre under a bending moment, positive where it is drawn out (146).
 
         Args:
             moment: bending moments, positive to the left (S,) [N m].

@@ -190,7 +190,7 @@ def form_of(section: Section | list[SectionAt]) -> Shape:
 
 
 def fibre(section: Section | list[SectionAt], x: ArrayLike, distance: float | None = None) -> Any:
-    """Distance of a fibre from the axis over the second moment of area, y / I (145).
+    """Distance of a fibre from the axis over the second moment of area, y / I (146).
 
     Args:
         section: one, or a list along the link.

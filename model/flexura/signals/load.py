@@ -24,7 +24,7 @@ EXPECTED = (
 
 @dataclass(frozen=True)
 class Load:
-    """A force and a moment on a point of a link (132), (133).
+    """A force and a moment on a point of a link (133), (134).
 
     link: its number, from 1. at_m: the place along it from its proximal end [m]; None: its tip.
     force_N: two components [N], each a number, a Signal, a function of time, or None. moment_N_m:

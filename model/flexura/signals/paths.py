@@ -1,6 +1,6 @@
 """Paths of a tip in the plane over time, from rest to rest: a pair of Signals, x and y [m].
 
-Along its way a tip goes as s(u) = u^5 (126 - 420 u + 540 u^2 - 315 u^3 + 70 u^4), u = t/T (116):
+Along its way a tip goes as s(u) = u^5 (126 - 420 u + 540 u^2 - 315 u^3 + 70 u^4), u = t/T (117):
 velocity, acceleration, jerk and its derivative are zero at both ends, so that a flexible robot can
 follow with modest drives.
 """
@@ -22,7 +22,7 @@ POINT = "expected a place (x, y) in metres"
 
 
 def smooth_rise(u: Any) -> Any:
-    """s(u) (116), 0 before u = 0 and 1 after u = 1."""
+    """s(u) (117), 0 before u = 0 and 1 after u = 1."""
     v = np.clip(u, 0.0, 1.0)
     return v**5 * (126 + v * (-420 + v * (540 + v * (-315 + v * 70))))
 

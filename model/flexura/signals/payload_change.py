@@ -19,7 +19,7 @@ EXPECTED = (
 
 @dataclass(frozen=True)
 class PayloadChange:
-    """The payload from an instant on (136).
+    """The payload from an instant on (137).
 
     at_s: the instant [s]. mass_kg: its mass from then on [kg]; 0 without inertia: nothing.
     inertia_kg_m2: about its own centre. centre_of_mass_m: from the tip, along and across its

@@ -50,7 +50,7 @@ def force_units(robot: Robot) -> dict[str, str]:
 
 
 def _joint_values(balance: Balance) -> list[np.ndarray]:
-    """Of all joints (138), (139); of those that slide also along and across their line."""
+    """Of all joints (139), (140); of those that slide also along and across their line."""
     out = []
     for i, link in enumerate(balance.robot.links):
         force, moment, _, axis = balance.reaction(i)
@@ -62,7 +62,7 @@ def _joint_values(balance: Balance) -> list[np.ndarray]:
 
 
 def _link_values(balance: Balance) -> list[np.ndarray]:
-    """Of all links whose sections are known (140), (145): at equally spaced places, of a link in a
+    """Of all links whose sections are known (141), (146): at equally spaced places, of a link in a
     sleeve on its free length."""
     out = []
     for i, link in enumerate(balance.robot.links):

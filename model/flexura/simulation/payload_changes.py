@@ -59,7 +59,7 @@ def solve(
         progress: called with the finished fraction.
 
     Returns:
-        The Solution; its `systems` say with which robot each row is. Its energy jumps by what (137)
+        The Solution; its `systems` say with which robot each row is. Its energy jumps by what (138)
             says and by what is let go.
     """
     t, parts = problem.t, []

@@ -31,7 +31,7 @@ def consistent_start(
 
     Locked joints are at rest, prescribed ones on their motion. Without q0 the links are straight,
     or under gravity in static equilibrium with the joints held where they start (50), with the
-    loads that act at the start (135). Given rates are kept in either case.
+    loads that act at the start (136). Given rates are kept in either case.
 
     Args:
         system: the robot.

@@ -50,7 +50,7 @@ class Assembly:
         self.labels, self.n = self.structure.labels, self.structure.n
         self._rotors = np.array([link.joint.rotor_inertia for link in self.robot.links])
         self._coulomb = np.array([link.joint.coulomb_friction for link in self.robot.links])
-        # springs beside the drives (107): stiffness of each joint, and where all springs rest
+        # springs beside the drives (108): stiffness of each joint, and where all springs rest
         self._springs = np.array([link.joint.spring_stiffness for link in self.robot.links])
         self._rest = np.zeros(self.n)
         self._rest[self.rows] = [link.joint.spring_rest for link in self.robot.links]
@@ -119,7 +119,7 @@ class Assembly:
 
     def elastic(self, q: np.ndarray) -> np.ndarray:
         """Elastic forces, on the left-hand side (43): K q, of springs beside drives k (q - rest)
-        (107), and of a sleeved link also dU/dd.
+        (108), and of a sleeved link also dU/dd.
 
         -dU/dd is the force that pushes a bent link out of its sleeve (36).
 
@@ -193,7 +193,7 @@ class Assembly:
         return K
 
     def damping(self, q: np.ndarray) -> np.ndarray:
-        """D: viscous friction of joints, damping of transmissions (108), alpha M + beta K of links
+        """D: viscous friction of joints, damping of transmissions (109), alpha M + beta K of links
         (26).
 
         Args:
@@ -326,7 +326,7 @@ class Assembly:
         )
 
     def strain(self, q: np.ndarray, K: np.ndarray) -> float:
-        """The strain energy (9), (107), (108).
+        """The strain energy (9), (108), (109).
 
         Args:
             q: configuration (n,).
@@ -363,12 +363,12 @@ class Assembly:
         return (self._at_rest(q) if qd is None else self.structure.states(q, qd))[-1].tip
 
     def loads(self, q: np.ndarray, rows: np.ndarray, values: np.ndarray) -> np.ndarray:
-        """The generalised forces of forces and moments on links (134).
+        """The generalised forces of forces and moments on links (135).
 
         Args:
             q: configuration (n,).
             rows: where they act (L, 3): link from 0, abscissa [m], 1 if the force is along and
-                across the line there (133).
+                across the line there (134).
             values: the force's two components [N] and the moment [N m], (L, 3).
 
         Returns:

@@ -19,7 +19,7 @@ CLOSE, ENOUGH = 1e-11, 1e-7  # of the unknowns: a last Newton step, and one that
 
 
 def load_forces(system: System, q: np.ndarray, loads: Loads, t: np.ndarray) -> np.ndarray:
-    """The generalised forces of loads in states (134).
+    """The generalised forces of loads in states (135).
 
     Args:
         system: the robot.
@@ -42,7 +42,7 @@ def load_forces(system: System, q: np.ndarray, loads: Loads, t: np.ndarray) -> n
 
 
 def acting_loads(system: System, q: np.ndarray, loads: Loads, t: float) -> np.ndarray:
-    """The loads that act at a time, in the base's axes (133).
+    """The loads that act at a time, in the base's axes (134).
 
     Args:
         system: the robot.
@@ -63,7 +63,7 @@ def acting_loads(system: System, q: np.ndarray, loads: Loads, t: float) -> np.nd
 
 
 def borne(system: System, q: np.ndarray, loads: Loads, t: float) -> tuple[np.ndarray, float, bool]:
-    """The elastic unknowns in equilibrium under gravity and loads with the joints held (135).
+    """The elastic unknowns in equilibrium under gravity and loads with the joints held (136).
 
     The loads grow in steps from the equilibrium without them.
 
@@ -137,7 +137,7 @@ def _newton(
 class Impact(NamedTuple):
     """A change of the payload at an instant.
 
-    qd: rates after it (n,). lost: kinetic energy that the impact takes [J] (137). gone: kinetic
+    qd: rates after it (n,). lost: kinetic energy that the impact takes [J] (138). gone: kinetic
     energy of what is let go [J].
     """
 
@@ -183,7 +183,7 @@ def with_payload(system: System, change: PayloadChange) -> System:
 def impact(
     before: System, after: System, q: np.ndarray, qd: np.ndarray, given: np.ndarray
 ) -> Impact:
-    """The rates after the payload has changed (136), and the energy that goes (137).
+    """The rates after the payload has changed (137), and the energy that goes (138).
 
     What both payloads have in common, mass and inertia with the same centre, stays. The rest of the
     old one is let go with its velocity. The rest of the new one was at rest.
@@ -222,7 +222,7 @@ def impact(
 def _inertia(
     system: System, q: np.ndarray, payload: Payload, mass: float, inertia: float
 ) -> np.ndarray:
-    """What a body at a payload's centre adds to M(q) (22), (110): (n, n)."""
+    """What a body at a payload's centre adds to M(q) (22), (111): (n, n)."""
     frame = system.assembly.tip(q)
     if any(payload.centre_of_mass_m):
         frame = translate(frame, complex(*payload.centre_of_mass_m), [], np.zeros(system.n))

@@ -86,7 +86,7 @@ class Numbering:
 
     @cached_property
     def windup_rows(self) -> dict[int, int]:
-        """Rows of the windups of transmissions, by the number of the link (from 0) (108)."""
+        """Rows of the windups of transmissions, by the number of the link (from 0) (109)."""
         return self._structure.windups
 
     def link_rows(self, link: int) -> np.ndarray:
@@ -103,7 +103,7 @@ class Numbering:
 
     def hub_positions(self, z: np.ndarray) -> np.ndarray:
         """Positions, or rates, of the joints' hubs: behind a transmission the rotor's and the
-        windup (108).
+        windup (109).
 
         Args:
             z: configurations, or rates (..., n).

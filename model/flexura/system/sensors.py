@@ -35,7 +35,7 @@ def sensor_channels(states: RunStates) -> dict[str, np.ndarray]:
 
 
 def _force(balance: Balance, i: int, sensor: Sensor) -> np.ndarray:
-    """A force or stress in a section of link i (from 0), (T,) (140), (145)."""
+    """A force or stress in a section of link i (from 0), (T,) (141), (146)."""
     found = balance.section(i, sensor.at_m)
     if sensor.kind != "stress":
         return np.asarray(getattr(found, sensor.kind))

@@ -46,7 +46,7 @@ def static(
         joints: positions (links,) [m or rad]; None: their start.
         tip_force: x and y [N] at the last tip, in the base's axes.
         tip_moment: moment there [N m].
-        loads: forces and moments on links (135), as in `flexura.simulate`.
+        loads: forces and moments on links (136), as in `flexura.simulate`.
         t: the time whose loads act [s].
 
     Returns:

@@ -52,7 +52,7 @@ class Structure:
 
     @cached_property
     def windups(self) -> dict[int, int]:
-        """The unknown of each transmission, by the number of its link (from 0) (108)."""
+        """The unknown of each transmission, by the number of its link (from 0) (109)."""
         links = zip(self.robot.links, self.rows, strict=True)
         return {i: row + 1 for i, (link, row) in enumerate(links) if elastic_joint(link)}
 
@@ -136,11 +136,11 @@ class Structure:
         tip = before.tip if before else base(self.n)
         if joint.type == "R":
             hub = rotate(tip, q[row], row)
-            if i in self.windups:  # (108)
+            if i in self.windups:  # (109)
                 hub = rotate(hub, q[self.windups[i]], self.windups[i])
             return (
                 translate(hub, joint.hub_radius_m, [], qd) if joint.hub_radius_m else hub
-            )  # (111)
+            )  # (112)
         if joint.type == "Pb":
             return rotate(tip, joint.angle_rad)
         if before is None:
@@ -203,12 +203,12 @@ class Structure:
             parts += sleeve.masses(state.lines[0], material)
         else:
             parts += [line_masses(x) for x in state.lines]
-        for each in self.robot.links[i].mass:  # (109)
+        for each in self.robot.links[i].mass:  # (110)
             frame = self.at(state, each.at_m)
             parts += [point_mass(each.mass_kg, frame), turning(each.inertia_kg_m2, frame)]
         if i == len(self.links) - 1:
             load, frame = self.robot.payload, state.tip
-            if any(load.centre_of_mass_m):  # (110)
+            if any(load.centre_of_mass_m):  # (111)
                 frame = translate(frame, complex(*load.centre_of_mass_m), [], state.qd)
             parts += [point_mass(load.mass_kg, frame), turning(load.inertia_kg_m2, frame)]
         return parts
@@ -242,7 +242,7 @@ def elastic_joint(link: Link) -> bool:
 
 def rigid_body(robot: Robot, i: int) -> tuple[float, complex, float]:
     """Mass [kg], centre along + i across [m] from the proximal end, inertia [kg m^2] about it:
-    rigid link i (15), (110)."""
+    rigid link i (15), (111)."""
     link = robot.links[i]
     if link.mass_kg is not None:
         given = link.length_m / 2 if link.centre_of_mass_m is None else link.centre_of_mass_m

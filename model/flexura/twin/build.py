@@ -16,7 +16,7 @@ from .link_loads import LinkLoads
 from .links.ancf import CableLink
 from .links.geometrically_exact import GeometricallyExactLink
 from .links.part import Frame, Ground, Lump, Part, PointMass
-from .links.properties import NEGLIGIBLE, beam_values, link_inertia, total_mass
+from .links.properties import NEGLIGIBLE, beam_values, link_inertia, total_mass, without_ringing
 from .links.rigid import RigidLink
 
 exu = Optional("exudyn")
@@ -162,7 +162,7 @@ def _add_link(
         stubs = [mesh.stubs[i]] if any(mesh.stubs[i]) else []
         return beam(
             mbs,
-            beam_values(link, mesh.elements[i], robot.rayleigh(i)[1]),
+            without_ringing(beam_values(link, mesh.elements[i], robot.rayleigh(i)[1])),
             hub,
             ending,
             frame,

@@ -14,7 +14,7 @@ JUDGED_CHANNELS = ("position", "tip_deflection")  # the channels that `meta["ext
 
 
 def extrapolate(run: Run, longer: Mapping[str, Run]) -> Run:
-    """The run as hubs and sleeves get infinitely short, delta -> 0 (106).
+    """The run as hubs and sleeves get infinitely short, delta -> 0 (107).
 
     Richardson's extrapolation: errors are c delta^p, with p = ORDER[type], and those of both types
     add up. `meta["extrapolation"]` has by type the largest change of a joint position or tip

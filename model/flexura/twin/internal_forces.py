@@ -2,8 +2,8 @@
 finds.
 
 All is in the base's axes: accelerations are those of Exudyn's own coordinates, by its own shapes,
-so that no joint has a convective term. What lies beyond a cut takes what comes through it (138),
-(139).
+so that no joint has a convective term. What lies beyond a cut takes what comes through it (139),
+(140).
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ class Cuts:
         return part.point(q, x), tangent, part.acceleration(q, v, more, x)
 
     def section(self, i: int, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Bending moment, shear force and axial force of a flexible link at x (T,) (140)."""
+        """Bending moment, shear force and axial force of a flexible link at x (T,) (141)."""
         part, (q, _, more) = self.model.parts[i], self.own[i]
         assert isinstance(part, CableLink)
         before = x - NEAR * self.model.robot.links[i].length_m
@@ -147,7 +147,7 @@ class Cuts:
 
 
 def reaction_channels(cuts: Cuts, places: list[tuple[np.ndarray, np.ndarray]]) -> Channels:
-    """Reactions of all joints (138), (139).
+    """Reactions of all joints (139), (140).
 
     Args:
         cuts: the run.
@@ -168,7 +168,7 @@ def reaction_channels(cuts: Cuts, places: list[tuple[np.ndarray, np.ndarray]]) -
 
 
 def link_channels(cuts: Cuts) -> Channels:
-    """Forces and stresses along the flexible links (140), (145), of one in a sleeve along its free
+    """Forces and stresses along the flexible links (141), (146), of one in a sleeve along its free
     length.
 
     Args:

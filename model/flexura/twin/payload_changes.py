@@ -50,7 +50,7 @@ def carrying(robot: Robot, change: PayloadChange, before: Robot | None = None) -
 
 
 def after_impact(kept: TwinModel, after: TwinModel, end: End, settings: Any) -> End:
-    """The state after the impact (136): M v+ + C^T p = M_0 v-, C v+ = C v-.
+    """The state after the impact (137): M v+ + C^T p = M_0 v-, C v+ = C v-.
 
     C has the constraints of the joints, and those of lines that do not stretch: an impact along a
     beam would else stay in waves of stretch at its tip.

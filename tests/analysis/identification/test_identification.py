@@ -19,7 +19,7 @@ from flexlab.experiment import excitation
 from flexlab.identification import files, motor_friction, output
 from flexlab.identification.estimate import Parameter, covariance, estimate
 from flexlab.identification.identify import identify, read_nominal
-from flexlab.rig.axes import motor_axes
+from flexlab.rig.axes import Friction, motor_axes
 from flexlab.rig.plant.motor import joint_line
 from rigs import excited, ran
 
@@ -115,7 +115,7 @@ def test_the_excitation_is_what_the_rig_can_do():
 
 def test_more_friction_leaves_constant_and_gear_of_the_motor_alone():
     rig = BENCH.rig
-    more = rigs.Rig.model_validate(files.with_identified_friction(rig, {1: 1.4}))
+    more = rigs.Rig.model_validate(files.with_identified_friction(rig, {1: Friction(1.4, 1.4)}))
     old, new, wanted = (
         joint_line(motor_axes(rig)[0]),
         joint_line(motor_axes(more)[0]),

@@ -179,7 +179,7 @@ def test_the_base_takes_the_change_of_momentum(kind, modes):
 @pytest.mark.parametrize("modes", [None, 3])
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_joint_hands_on_what_drive_spring_friction_and_rotor_leave(kind, modes):
-    """The row of each joint in Lagrange's equations (143): the moment of R, the force along a
+    """The row of each joint in Lagrange's equations (144): the moment of R, the force along a
     slider's or a rigid sleeve's line, on a bent link with its moment."""
     system = arm(kind, modes if kind != "Pa on a rigid link" else None)
     q, qd, qdd = state(system)
@@ -201,7 +201,7 @@ def test_a_joint_hands_on_what_drive_spring_friction_and_rotor_leave(kind, modes
 
 
 def test_the_force_that_pushes_a_bent_link_out_of_its_sleeve():
-    """At rest: force along the sleeve = drive + M0^2 / (2 EI) (36), (143)."""
+    """At rest: force along the sleeve = drive + M0^2 / (2 EI) (36), (144)."""
     strip = robot(beam(0.5, 0.2, 1.0, 8, type="Pb", start_m=0.3))
     P = (0.1, 0.4)
     system = fx.assemble(strip)
@@ -221,8 +221,8 @@ def test_the_force_that_pushes_a_bent_link_out_of_its_sleeve():
 @pytest.mark.parametrize("modes", [None, 3])
 @pytest.mark.parametrize("kind", KINDS)
 def test_bending_moments_do_the_work_of_elastic_forces(kind, modes):
-    """The integral of M db_k/ds is the elastic force of each unknown, with its damping beta (144),
-    in any motion, with damping in proportion to the mass beyond the cut (142)."""
+    """The integral of M db_k/ds is the elastic force of each unknown, with its damping beta (145),
+    in any motion, with damping in proportion to the mass beyond the cut (143)."""
     on_rigid = kind == "Pa on a rigid link"
     damping = {"link.2.damping": {"alpha_1_s": 2.0, "beta_s": 1e-3}} if kind != "rigid Pb" else {}
     damping |= {} if on_rigid else {"link.1.damping": {"alpha_1_s": 3.0, "beta_s": 2e-3}}
@@ -270,7 +270,7 @@ def test_modes_and_the_linear_line_agree_with_the_mesh():
 
 
 def test_a_row_is_one_state_and_forces_follow_their_slopes():
-    """Many times at once give what each gives alone; dM/ds = -V (141)."""
+    """Many times at once give what each gives alone; dM/ds = -V (142)."""
     system = arm("Pb")
     states = [np.array([state(system, seed, 0.001)[k] for seed in range(3)]) for k in range(3)]
     many = Balance(system.assembly.structure, *states)

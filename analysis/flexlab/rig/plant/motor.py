@@ -178,7 +178,7 @@ class JointLine:
     guide: float
 
 
-def joint_line(axis: MotorAxis, friction: float = 1.0) -> JointLine:
+def joint_line(axis: MotorAxis, friction: float = 1.0, own: float | None = None) -> JointLine:
     """A joint with a motor as a linear motor, from the rig's nominal data.
 
     Force K / (R r), back-EMF K^2 / (R r^2), inertia J / r^2. The motor always drives the joint's
@@ -187,18 +187,20 @@ def joint_line(axis: MotorAxis, friction: float = 1.0) -> JointLine:
     Args:
         axis: the joint.
         friction: factor on Coulomb and viscous friction, not on the back-EMF.
+        own: factor on the joint's own friction; None: the same.
     """
     data, r, guide = motor_data(axis), axis.transmission, axis.guide
     efficiency = data.gear_efficiency * axis.efficiency
-    own = guide.coulomb / efficiency
-    coulomb = (data.friction_N_m + axis.screw_coulomb_N_m) / r + own
-    static = (max(data.breakaway_N_m, data.friction_N_m) + axis.screw_coulomb_N_m) / r + own
-    viscous = axis.screw_viscous_N_m_s / r**2 + guide.viscous / efficiency
+    own = friction if own is None else own
+    rail = own * guide.coulomb / efficiency
+    coulomb = friction * (data.friction_N_m + axis.screw_coulomb_N_m) / r + rail
+    breakaway = max(data.breakaway_N_m, data.friction_N_m) + axis.screw_coulomb_N_m
+    viscous = friction * axis.screw_viscous_N_m_s / r**2 + own * guide.viscous / efficiency
     return JointLine(
         data.constant_N_m_A / (data.resistance_ohm * r),
-        data.constant_N_m_A**2 / (data.resistance_ohm * r**2) + friction * viscous,
-        friction * coulomb,
+        data.constant_N_m_A**2 / (data.resistance_ohm * r**2) + viscous,
+        coulomb,
         data.inertia_kg_m2 / r**2,
-        friction * static,
-        friction * own,
+        friction * breakaway / r + rail,
+        rail,
     )

@@ -141,7 +141,7 @@ def regulator(task: Task) -> Motion:
 
 
 def gaussian(task: Task) -> Motion:
-    """An LQG (126), whose tip follows the set-points."""
+    """An LQG (127), whose tip follows the set-points."""
     controller, _ = fx.lqg(
         _design(task),
         task.set_points,
@@ -155,7 +155,7 @@ def gaussian(task: Task) -> Motion:
 
 
 def predictive(task: Task) -> Motion:
-    """An NMPC (130), (131), whose tip follows the set-points that it knows ahead."""
+    """An NMPC (131), (132), whose tip follows the set-points that it knows ahead."""
     controller = fx.nmpc(
         _design(task),
         task.set_points,
@@ -169,7 +169,7 @@ def predictive(task: Task) -> Motion:
 
 
 def inversion(task: Task) -> Motion:
-    """Feedforward by stable inversion (115): the tip is on the rigid robot's path."""
+    """Feedforward by stable inversion (116): the tip is on the rigid robot's path."""
     t = np.linspace(0.0, task.duration_s, 301)
     path = tuple((lambda s, k=k: float(task.tip(task.set_points, float(s))[k])) for k in range(2))
     run = fx.invert(task.robot, t, path)
@@ -192,7 +192,7 @@ def learned(task: Task) -> Motion:
 
 
 def shortest(robust: float) -> Callable[[Task], Motion]:
-    """Feedforward by the shortest motion (121)."""
+    """Feedforward by the shortest motion (122)."""
 
     def motion(task: Task) -> Motion:
         limits = {"drive": (1 - LEFT) * task.limits}

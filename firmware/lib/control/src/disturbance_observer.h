@@ -1,11 +1,11 @@
 // Copyright (c) 2026 the flexura authors. SPDX-License-Identifier: MIT
 // The disturbance observer of one joint.
 //
-// The nominal joint is u = jo q'' + bo q' + d, in units of the output (146). In every second tick
+// The nominal joint is u = jo q'' + bo q' + d, in units of the output (147). In every second tick
 // k, with a the factor of the first-order filter Q over 2 T and c = jo a / (2 T (1 - a)):
 //
-//   x_k = u_{k-1} + (c - bo) q'_k,   z_k = z_{k-2} + a (x_k - z_{k-2})                     (147)
-//   d^_k = z_k - c q'_k                                                                    (148)
+//   x_k = u_{k-1} + (c - bo) q'_k,   z_k = z_{k-2} + a (x_k - z_{k-2})                     (148)
+//   d^_k = z_k - c q'_k                                                                    (149)
 //
 // That is Q of u - bo q' - jo q'' without a difference of rates. The law adds d^ to u: pid.h.
 #pragma once

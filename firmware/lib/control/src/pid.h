@@ -5,7 +5,7 @@
 // e = r - q, T = 1 tick and w = tip deflection:
 //
 //   i* = i_{k-1} + ki e T, or i_{k-1} if |i*| would pass the limit
-//   u* = kp e + i* + kd (r' - q') + kf w + kg w' + kv r' + kc sign(r') + d^     (70), (149)
+//   u* = kp e + i* + kd (r' - q') + kf w + kg w' + kv r' + kc sign(r') + d^     (70), (150)
 //   u  = saturation of u*: |u| <= limit, |u - u_{k-1}| <= slew                (71)
 //   i_k = i*, or i_{k-1} if the saturation holds u back and e would push it further     (72)
 //

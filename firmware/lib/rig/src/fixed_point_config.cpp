@@ -112,7 +112,7 @@ uint8_t travel(const Config &c, FixedPointConfig &s, uint8_t j, Item low, Item h
   return kAllValid;
 }
 
-// Inertia and damping of the nominal joint in the units of ObserverGains (147). `u` is units of
+// Inertia and damping of the nominal joint in the units of ObserverGains (148). `u` is units of
 // output per V, `count` counts per m or rad.
 uint8_t observer(const Config &c, ObserverGains &o, const MotorItems &item, float u, float count) {
   o = ObserverGains();

@@ -31,7 +31,7 @@ inline void add_sleeve_damping(const Piece<Real> &c, const Real &alpha, const Re
 }
 
 // Force across and moment at the tip that accelerations of it, across and turning, take for a
-// payload whose centre is off the tip of a straight link (110).
+// payload whose centre is off the tip of a straight link (111).
 template <class Real>
 inline void pull_tool(const Piece<Real> &tool, const Real &deflection, const Real &slope, Real &up,
                       Real &moment) {

@@ -45,7 +45,7 @@ Real sleeve_strain(const Piece<Real> &c, const Real *y) {
   return out;
 }
 
-// Energy of the spring beside a joint's drive (107).
+// Energy of the spring beside a joint's drive (108).
 template <class Real>
 Real spring_energy(const Model<Real> &model, const Piece<Real> &c, const Real *y) {
   const std::size_t link = std::size_t(c.link);

@@ -1,4 +1,4 @@
-// Generalised forces of forces and moments that act on points of links (132) to (134).
+// Generalised forces of forces and moments that act on points of links (133) to (135).
 #pragma once
 #include "dynamics/places/load_place.hpp"
 #include "dynamics/places/positions.hpp"

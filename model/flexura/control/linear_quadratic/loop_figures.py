@@ -1,7 +1,7 @@
 """What the loop of a linear controller bears: margins of gain, phase, delay, sensitivity, discs.
 
 Broken at one place, input or measurement i, with all others closed, the loop has the response
-l_i(z), z = exp(j w T); broken at all of them L(z) (127).
+l_i(z), z = exp(j w T); broken at all of them L(z) (128).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ ALL_GAINS = 1e-9  # a smallest gain that counts as none at all
 
 @dataclass(frozen=True)
 class LoopMargins:
-    """Margins of a loop broken at one place (128), (129); infinite where nothing bounds them.
+    """Margins of a loop broken at one place (129), (130); infinite where nothing bounds them.
 
     Attributes:
         place: the drive or the measurement.
@@ -49,7 +49,7 @@ class LoopMargins:
 
 @dataclass(frozen=True)
 class LoopFigures:
-    """A loop's margins at each place, and for changes at all of them together (127) to (129).
+    """A loop's margins at each place, and for changes at all of them together (128) to (130).
 
     `disc` is a lower bound of the disc margin for independent changes at all places at once;
     `responses` are l_i up to half the rate, with their Bode and Nyquist plots.
@@ -128,7 +128,7 @@ def structured(X: np.ndarray) -> np.ndarray:
 
 
 class _Loop:
-    """L(z), the loop broken at all drives or all measurements (127)."""
+    """L(z), the loop broken at all drives or all measurements (128)."""
 
     def __init__(self, d: Design, at: str) -> None:
         n, p = len(d.F), len(d.C)
@@ -187,7 +187,7 @@ def _margins(
     values: np.ndarray,
     T: float,
 ) -> LoopMargins:
-    """The margins (128), (129) of one loop from its response, crossings refined."""
+    """The margins (129), (130) of one loop from its response, crossings refined."""
     at = lambda x: complex(single(np.array([x]))[0])
     crossings = [at(x).real for x in _crossings(w, values.imag, lambda x: at(x).imag)]
     crossings += [complex(values[-1]).real] if abs(w[-1] * T - np.pi) < 1e-9 else []

@@ -35,7 +35,7 @@ def lqg(
     q: ArrayLike | None = None,
 ) -> tuple[Sampled, Design]:
     """A sampled controller of forces from the robot linearised: a regulator (75) on Kalman's
-    estimate (76) from the robot's own sensors (126).
+    estimate (76) from the robot's own sensors (127).
 
     The weights follow Bryson's rule, as in `flexura.control.lqr`. The controller begins anew with
     every run. `flexura.control.loop_figures` says what the loop bears.

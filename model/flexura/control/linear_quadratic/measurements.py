@@ -18,7 +18,7 @@ STEP = 1e-6  # of differences [m or rad]
 
 
 class Measurements:
-    """Chosen measurements of a robot, y = g(q) (126).
+    """Chosen measurements of a robot, y = g(q) (127).
 
     A joint's position is that of its motor, where a transmission is between.
 
@@ -89,7 +89,7 @@ class Measurements:
         return self.system.places(q)[0] if self._tipped else np.zeros(0)
 
     def derivatives(self, linear: StateSpace) -> np.ndarray:
-        """C (p, 2m), the derivative of the values by the states of a linearised robot (126)."""
+        """C (p, 2m), the derivative of the values by the states of a linearised robot (127)."""
         by_q = jacobian(self.at, linear.q, np.full(self.system.n, STEP))[:, self.system.free_rows]
         return np.hstack([by_q, np.zeros_like(by_q)])
 

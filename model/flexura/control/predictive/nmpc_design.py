@@ -48,7 +48,7 @@ def nmpc(
     q: ArrayLike | None = None,
 ) -> Sampled:
     """A sampled controller that minimises the cost of the motion ahead on the nonlinear model, one
-    step of Newton's method a tick (130), (131).
+    step of Newton's method a tick (131), (132).
 
     The state is Kalman's estimate (76) on the same model, from the robot's own sensors. Beyond the
     horizon the cost is that of a linear regulator. The references are known ahead. Coulomb friction

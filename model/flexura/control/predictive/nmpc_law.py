@@ -50,7 +50,7 @@ class Problem:
 
 
 class NonlinearPredictive(MeasuredLaw):
-    """Real-time iteration: one step of Newton's method a tick on the motion ahead (131).
+    """Real-time iteration: one step of Newton's method a tick on the motion ahead (132).
 
     The program's matrices come from the linearised intervals; its vectors are new in every tick.
     With `spread` ticks a part of the intervals is linearised in each but the last of them, in which
@@ -89,7 +89,7 @@ class NonlinearPredictive(MeasuredLaw):
         self.one = np.eye(C.shape[1])
 
     def tick(self, t: float, y: np.ndarray) -> np.ndarray:
-        """One step of Newton's method (131).
+        """One step of Newton's method (132).
 
         Args:
             t: the time [s].
@@ -144,14 +144,14 @@ class NonlinearPredictive(MeasuredLaw):
         return self.guess + gain @ (y - self.measured.at(self.prediction.full(self.guess)))
 
     def _steps(self, rows: slice) -> tuple[np.ndarray, ...]:
-        """R, G, d of some intervals along the predicted motion (130)."""
+        """R, G, d of some intervals along the predicted motion (131)."""
         p, h = self.prediction, self.problem.h
         x, u = self.x[:-1], self.u
         R, G, d, self.a[rows] = p.steps(x[rows], u[rows], self.a[rows], h[rows])
         return R, G, d
 
     def _condensed(self) -> None:
-        """The program's matrices, from the intervals as they are linearised now (131)."""
+        """The program's matrices, from the intervals as they are linearised now (132)."""
         self.known, self.coming = self.coming, tuple(part.copy() for part in self.coming)
         found = core.condensed_program(*self.known, *self.costs)
         self.H, self.A, self.by_force = (np.asarray(part) for part in found)
@@ -172,7 +172,7 @@ class NonlinearPredictive(MeasuredLaw):
         self.first = tuple(each[0] for each in first)
 
     def _solved(self, t: float, x: np.ndarray) -> None:
-        """One step of Newton's method: the program about the predicted motion (131)."""
+        """One step of Newton's method: the program about the predicted motion (132)."""
         problem, N, m = self.problem, len(self.problem.h), len(self.driven)
         wanted, hold = self._wanted(t)
         ahead, g, at = core.renewed_program(

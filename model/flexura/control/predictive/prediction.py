@@ -10,7 +10,7 @@ from ...system import System
 
 
 class Prediction:
-    """Steps about states along a predicted motion, over intervals of their own lengths (130).
+    """Steps about states along a predicted motion, over intervals of their own lengths (131).
 
     Args:
         system: the robot.
@@ -35,7 +35,7 @@ class Prediction:
         self, x: np.ndarray, u: np.ndarray, guess: np.ndarray, h: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Steps of Radau IIA of order 3 on the equations linearised by the core's dual numbers, the
-        forces held (130).
+        forces held (131).
 
         The derivatives are exact where `guess` is the acceleration itself.
 

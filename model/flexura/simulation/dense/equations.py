@@ -64,7 +64,7 @@ class Equations:
 
     def acted(self, t: float, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """dz/dt, and the forces of the drives (N,), those that a motion needs included (25), (28),
-        (134)."""
+        (135)."""
         q, v, a = self.state(t, z)
         self.evaluations += 1
         if self.held is not None:

@@ -2,7 +2,7 @@
 points of Gauss.
 
 On each interval of a mesh the unknowns q(t) (n,) are polynomials of degree k + 1 that join with
-their first derivatives. The equations hold at the interval's k points of Gauss (112):
+their first derivatives. The equations hold at the interval's k points of Gauss (113):
 
     q(t) = sum_b c_b B_b(t),    r(q, q', q'', t) = 0 at t_ij = t_i + h_i (1 + g_j) / 2.
 
@@ -26,7 +26,7 @@ POINTS = 4  # of Gauss in each interval
 
 @dataclass(frozen=True)
 class Mesh:
-    """Ascending times `nodes` (N + 1,) [s] between which motions are polynomials (112)."""
+    """Ascending times `nodes` (N + 1,) [s] between which motions are polynomials (113)."""
 
     nodes: np.ndarray
 

@@ -42,7 +42,7 @@ class TipMotion:
 
 class TipProblem:
     """Elastic rows of (25) and the tip on its path, at the points of Gauss; at both ends what would
-    grow is 0 (115)."""
+    grow is 0 (116)."""
 
     def __init__(self, system: System, path: TipPath) -> None:
         self.system, self.path = system, path

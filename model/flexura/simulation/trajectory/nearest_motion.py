@@ -66,10 +66,10 @@ class NearestMotion:
 
 
 def nearest_motion(system: System, path: TipPath, mesh: Mesh, start: np.ndarray) -> NearestMotion:
-    """Motions of the joints that bring the tip nearest to a path, in the mean over time (118).
+    """Motions of the joints that bring the tip nearest to a path, in the mean over time (119).
 
     Each step solves min |e + S dp|^2 + rho^2 |B'' dp|^2 over changes dp of the splines, with e the
-    tip's distance from the path in a run under the motions, and S its exact derivative (117). The
+    tip's distance from the path in a run under the motions, and S its exact derivative (118). The
     penalty rho grows after a step that does not help, and falls after one that does.
 
     Args: system: the robot; mesh: whose nodes are the splines' knots; start (n,): at rest, the tip

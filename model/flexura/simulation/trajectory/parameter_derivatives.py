@@ -29,7 +29,7 @@ def parameter_derivatives(
     parameters: str | Sequence[str],
     q0: ArrayLike | None = None,
 ) -> dict[str, Run]:
-    """How the channels of a simulation change with numbers of the robot file (117).
+    """How the channels of a simulation change with numbers of the robot file (118).
 
     The equations of motion are linearised exactly along the run, by the core's dual numbers. What a
     parameter changes of the forces, at the run's own states, is found by differences of the robot's

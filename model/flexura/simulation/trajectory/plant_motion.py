@@ -122,7 +122,7 @@ def answer(
     limits: Limits | None = None,
     finer: int = 1,
 ) -> Answer | None:
-    """What a plant does under drives in a time (117); None where it cannot run.
+    """What a plant does under drives in a time (118); None where it cannot run.
 
     With t = tau T and the drives kept over tau, a longer time acts as the force (2 M q'' + G q')/T.
     Speeds and deflections are looked at where the drives have nodes; between these nodes, where

@@ -18,7 +18,7 @@ LONGEST = 0.3  # m or rad: a step of a joint
 def inverse_kinematics(
     robot: RobotLike, tip: ArrayLike, joints: ArrayLike | None = None
 ) -> np.ndarray:
-    """Postures q (n,) or (T, n) in static equilibrium whose tip is at a place (114).
+    """Postures q (n,) or (T, n) in static equilibrium whose tip is at a place (115).
 
     Links are bent by their weight, so a rigid robot's answer is corrected by their deflection.
 

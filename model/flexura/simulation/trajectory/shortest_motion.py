@@ -41,7 +41,7 @@ class Conditions:
 
 
 class ShortestMotion:
-    """The sequence of linear programs (121): least T over drives u that are linear in `m` equal
+    """The sequence of linear programs (122): least T over drives u that are linear in `m` equal
     intervals, so that every plant ends at rest."""
 
     def __init__(self, plants: list[Plant], limits: Limits, m: int, finer: int = 1) -> None:

@@ -54,7 +54,7 @@ def time_optimal(
     intervals: int = INTERVALS,
 ) -> Run:
     """The shortest motion from rest to rest whose drives keep their limits, after which nothing
-    vibrates (121).
+    vibrates (122).
 
     A sequence of linear programs on the nonlinear equations, linearised exactly along each motion.
     The first of the robot's modes end at rest. The Run is that of a simulation. Limits hold at all

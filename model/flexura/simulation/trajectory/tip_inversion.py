@@ -43,7 +43,7 @@ def invert(
     least_squares: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> Run:
-    """Joint motions and drives for which the tip follows a path, by stable inversion (115).
+    """Joint motions and drives for which the tip follows a path, by stable inversion (116).
 
     The joints move before the tip does and go on after it has stopped; for that the Run begins
     before t[0] and ends after t[-1]. The nonlinear equations are solved as a boundary value problem

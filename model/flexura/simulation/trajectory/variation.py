@@ -1,7 +1,7 @@
 """Small changes of a motion: the equations of motion linearised along it, and integrated for many
 changes at once.
 
-About a motion q(t), M dq'' + G dq' + K dq = f (117), with the exact derivatives of the forces by
+About a motion q(t), M dq'' + G dq' + K dq = f (118), with the exact derivatives of the forces by
 the core's dual numbers. Steps are those of Radau IIA of three stages, order 5: what is stiff fades.
 """
 

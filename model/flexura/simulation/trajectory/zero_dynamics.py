@@ -12,7 +12,7 @@ ON_AXIS = 1e-6  # of |s|: a zero whose real part is smaller does not decay in ei
 @dataclass(frozen=True)
 class ZeroDynamics:
     """Small motions z = e - e0 of the elastic unknowns about an equilibrium while the outputs stay
-    where they are (113).
+    where they are (114).
 
     A z'' + B z' + C z = 0, of the rows that no drive pushes, in the motions that move no output.
     Its eigenvalues are the transmission zeros. `zeros` (2k,) [1/s] by magnitude; `decaying` and

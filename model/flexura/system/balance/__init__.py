@@ -1,4 +1,4 @@
-"""Forces within a robot, from the balance of what lies beyond a cut: (138) to (145)."""
+"""Forces within a robot, from the balance of what lies beyond a cut: (139) to (146)."""
 
 from .cuts import Balance, PointLoad, Reaction, SectionForces
 from .internal_forces import (

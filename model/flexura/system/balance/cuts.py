@@ -21,7 +21,7 @@ SAME = 1e-9  # of a link's length: what is closer to a cut is at it
 
 class PointLoad(NamedTuple):
     """A load from outside on link `link` (from 0), at the abscissa `at` [m]: force x + iy [N] and
-    moment [N m], constant or (T,). `turns`: the force is along and across the line there (133)."""
+    moment [N m], constant or (T,). `turns`: the force is along and across the line there (134)."""
 
     link: int
     at: float
@@ -33,7 +33,7 @@ class PointLoad(NamedTuple):
 class Reaction(NamedTuple):
     """What link i-1 exerts on link i: force x + iy [N], moment about the joint [N m], place of the
     joint [m], angle of the axis on which a joint slides [rad]; each (T,). What of it drive and
-    friction give says (143)."""
+    friction give says (144)."""
 
     force: np.ndarray
     moment: np.ndarray
@@ -43,8 +43,8 @@ class Reaction(NamedTuple):
 
 class SectionForces(NamedTuple):
     """Bending moment [N m], shear force and axial force [N] in a section of a link, each (T,)
-    (140). The shear force is minus the slope of the moment (141); a fine mesh has the same moment
-    by its curvature (144)."""
+    (141). The shear force is minus the slope of the moment (142); a fine mesh has the same moment
+    by its curvature (145)."""
 
     bending_moment: np.ndarray
     shear_force: np.ndarray
@@ -68,7 +68,7 @@ class Balance:
         self.motions = link_motions(structure, q, qd, qdd)
 
     def reaction(self, i: int) -> Reaction:
-        """What link i-1 exerts on link i at joint i (138), (139); link -1 is the base.
+        """What link i-1 exerts on link i at joint i (139), (140); link -1 is the base.
 
         Args:
             i: number of the joint, from 0.
@@ -85,7 +85,7 @@ class Balance:
         return Reaction(*needed.about(place), place, axis)
 
     def section(self, i: int, s: Any) -> SectionForces:
-        """The forces in a section of a link (140).
+        """The forces in a section of a link (141).
 
         What is fixed at s is beyond the cut, but for the hub of the link.
 
@@ -154,12 +154,12 @@ class Balance:
         return found
 
     def _body(self, motion: LinkMotion) -> Wrench:
-        """What a rigid link takes, about the origin (15), (110)."""
+        """What a rigid link takes, about the origin (15), (111)."""
         mass, centre, own = rigid_body(self.robot, motion.number)
         return inertia.body(mass, own, motion.at(centre.real).moved(1j * centre.imag), self.gravity)
 
     def _lumps(self, motion: LinkMotion, s: Any) -> Wrench:
-        """What the lumped masses on a link from the abscissa s on take, about the origin (109)."""
+        """What the lumped masses on a link from the abscissa s on take, about the origin (110)."""
         parts = [
             inertia.body(
                 each.mass_kg, each.inertia_kg_m2, motion.at(each.at_m), self.gravity
@@ -169,7 +169,7 @@ class Balance:
         return total(parts, len(self.q))
 
     def _payload(self, motion: LinkMotion) -> Wrench:
-        """What the payload of the last link takes, about the origin (22), (110)."""
+        """What the payload of the last link takes, about the origin (22), (111)."""
         load = self.robot.payload
         if motion.number + 1 < len(self.motions):
             return total([], len(self.q))

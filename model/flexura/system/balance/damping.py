@@ -1,4 +1,4 @@
-"""Forces of damping in proportion to the mass, alpha M_c q' of (26), at a cut of a link (142)."""
+"""Forces of damping in proportion to the mass, alpha M_c q' of (26), at a cut of a link (143)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .motion import Lines, LinkMotion, column, mixed
 def damping_beyond(
     robot: Robot, motion: LinkMotion, material: Material | None, s: Any, near: float
 ) -> Wrench:
-    """What they exert on a link beyond the abscissa s, about the cut (142).
+    """What they exert on a link beyond the abscissa s, about the cut (143).
 
     They act on the straight link, clamped at its hub, where their reaction is. Those on the links
     after it are none.

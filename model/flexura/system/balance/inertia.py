@@ -1,5 +1,5 @@
 """What masses take against inertia and gravity at T times: sums of mu (r'' - g) over parts of a
-robot (138), (139)."""
+robot (139), (140)."""
 
 from __future__ import annotations
 

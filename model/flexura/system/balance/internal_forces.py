@@ -17,12 +17,12 @@ from .cuts import Balance, PointLoad, Reaction
 
 
 class LinkForces(NamedTuple):
-    """Forces in the sections of a link at abscissas `s` [m] from its proximal end, each (S,) (140).
+    """Forces in the sections of a link at abscissas `s` [m] from its proximal end, each (S,) (141).
 
     `bending_moment` [N m]: positive where the link bends to the left. `shear_force` [N]: what the
     part beyond exerts on the part before, across the tangent to the left. `axial_force` [N]:
     positive where it pulls. `stress` [Pa]: bending stress of the outer fibre to the left, positive
-    where it is drawn out (145); None: the link has no section with a height. In and behind a sleeve
+    where it is drawn out (146); None: the link has no section with a height. In and behind a sleeve
     all are nan.
     """
 
@@ -34,13 +34,13 @@ class LinkForces(NamedTuple):
 
 
 class InternalForces:
-    """The forces within a robot in one state (138) to (145). Joints and links count from 1."""
+    """The forces within a robot in one state (139) to (146). Joints and links count from 1."""
 
     def __init__(self, system: System, balance: Balance) -> None:
         self._system, self._balance = system, balance
 
     def reaction(self, joint: int) -> Reaction:
-        """What link i-1 exerts on link i at joint i (138), (139).
+        """What link i-1 exerts on link i at joint i (139), (140).
 
         Args:
             joint: its number, from 1.
@@ -60,7 +60,7 @@ class InternalForces:
         return Reaction(*(x.item() for x in self._balance.reaction(joint - 1)))
 
     def link(self, link: int, s: ArrayLike | None = None) -> LinkForces:
-        """The forces in sections of a link (140), (145).
+        """The forces in sections of a link (141), (146).
 
         Args:
             link: its number, from 1.
@@ -98,7 +98,7 @@ def internal_forces(
     loads: LoadsLike = None,
     t: float = 0.0,
 ) -> InternalForces:
-    """The forces within a robot in a state: of its joints, and along its links (138) to (145).
+    """The forces within a robot in a state: of its joints, and along its links (139) to (146).
 
     They are what the masses beyond a cut take against inertia and gravity, less the loads.
     For all times of a simulation: `flexura.simulate(..., internal_forces=True)`.
@@ -138,7 +138,7 @@ def internal_forces(
 
 
 def point_loads(loads: Loads, t: np.ndarray) -> list[PointLoad]:
-    """The loads of a run, as the balance takes them (132), (133).
+    """The loads of a run, as the balance takes them (133), (134).
 
     Args:
         loads: forces and moments on links.

@@ -185,9 +185,9 @@ def _hub(
     tip = before.tip if before else base
     if joint.type == "R":
         hub = tip.turned(*own)
-        if i in structure.windups:  # (108)
+        if i in structure.windups:  # (109)
             hub = hub.turned(*(x[:, structure.windups[i]] for x in states))
-        return hub.moved(joint.hub_radius_m) if joint.hub_radius_m else hub  # (111)
+        return hub.moved(joint.hub_radius_m) if joint.hub_radius_m else hub  # (112)
     if joint.type == "Pb":
         return tip.turned(joint.angle_rad)
     if before is None:

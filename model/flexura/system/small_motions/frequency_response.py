@@ -27,7 +27,7 @@ pyplot = Optional("matplotlib.pyplot")
 @dataclass(frozen=True)
 class FrequencyResponse:
     """A channel's small motions under a harmonic drive: `values` (F,), complex, at `frequencies_Hz`
-    (F,) (120)."""
+    (F,) (121)."""
 
     frequencies_Hz: np.ndarray
     values: np.ndarray
@@ -123,7 +123,7 @@ def frequency_response(
     frequencies_Hz: ArrayLike | None = None,
     q: ArrayLike | None = None,
 ) -> FrequencyResponse:
-    """The response of a channel to a harmonic drive, for small motions about an equilibrium (120).
+    """The response of a channel to a harmonic drive, for small motions about an equilibrium (121).
 
     Args:
         robot: a System, a Robot, or the path or name of a robot file.

@@ -22,7 +22,7 @@ class Modes:
     """Natural modes at q (n,): frequencies_Hz (k,) ascending, shapes (n, k) with x . M x = 1, in
     the order of `labels`.
 
-    `damping_ratios` (k,): x . D x / (2 omega) (119), exact where D is proportional to stiffness and
+    `damping_ratios` (k,): x . D x / (2 omega) (120), exact where D is proportional to stiffness and
     mass; 0 where omega is.
     """
 

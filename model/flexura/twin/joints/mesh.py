@@ -119,7 +119,7 @@ def hub_places(delta: float) -> np.ndarray:
 
 
 def sleeve_places(delta: float, length: float, element: float) -> np.ndarray:
-    """The points of a sleeve, ahead of its exit [m] (105).
+    """The points of a sleeve, ahead of its exit [m] (106).
 
     There are enough to guide the whole link, so that its part behind the exit stays straight.
 

@@ -176,7 +176,7 @@ class CableLink:
         gravity: np.ndarray,
         add: Callable[[np.ndarray, np.ndarray], None],
     ) -> None:
-        """What the beam's mass beyond x takes, rho A (r'' - g) of its points (138), to be added.
+        """What the beam's mass beyond x takes, rho A (r'' - g) of its points (139), to be added.
 
         Args:
             q: coordinates of the part's nodes (T, k).
@@ -300,6 +300,7 @@ def _add_element(mbs: Any, values: BeamValues, k: int, nodes: tuple[Any, Any], s
             bendingStiffness=values.bending[near],
             axialStiffness=values.axial[near],
             bendingDamping=values.beta * values.bending[near],
+            axialDamping=values.stretch * values.axial[near],
             nodeNumbers=list(nodes),
         )
     )

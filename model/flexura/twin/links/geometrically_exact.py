@@ -61,6 +61,7 @@ class GeometricallyExactLink:
                     axialStiffness=values.axial[k],
                     shearStiffness=values.shear[k],
                     bendingDamping=values.beta * values.bending[k],
+                    axialDamping=values.stretch * values.axial[k],
                     nodeNumbers=self.nodes[2 * k : 2 * k + 3],
                 )
             )

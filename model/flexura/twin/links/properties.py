@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -28,7 +28,7 @@ class BeamValues:
     `mass` [kg/m] and the stiffnesses `bending` [N m^2], `axial` [N], `shear` [N] are means over the
     element: its integrals are right, and the error of a tapering link is of second order in the
     elements' length. `rotary` [kg m] is the section's moment of inertia, rhoA EI/EA. The bending
-    damping is beta EI, so that D = beta K.
+    damping is beta EI, so that D = beta K; the axial damping is `stretch` EA [s].
     """
 
     length: float
@@ -38,6 +38,7 @@ class BeamValues:
     shear: np.ndarray
     rotary: np.ndarray
     beta: float
+    stretch: float = 0.0
 
     def __len__(self) -> int:
         return len(self.mass)
@@ -73,6 +74,12 @@ def beam_values(link: Link, elements: int, beta: float) -> BeamValues:
         mass * bending / axial,
         beta,
     )
+
+
+def without_ringing(values: BeamValues) -> BeamValues:
+    """The values with the damping that ends axial vibration as it begins (105)."""
+    ratio = float(values.mass.mean() / values.axial.mean())
+    return replace(values, stretch=2 * values.length * len(values) * np.sqrt(ratio))
 
 
 def uniform(link: Link) -> bool:
