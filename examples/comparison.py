@@ -33,6 +33,7 @@ class Comparison:
         chosen = parser.parse_args()
         self.bound, self._file, self._rows = chosen.bound, chosen.plot, []
         self.plot = self._file is not None and _matplotlib()
+        self._figure: Any = None
 
     def add(self, quantity: str, found: float, analytic: float, scale: float | None = None) -> None:
         """Add a row.
@@ -63,7 +64,9 @@ class Comparison:
 
     def end(self) -> None:
         """Write the figure, print the table, and exit with status 1 if a row misses the bound."""
-        if self.plot:
+        if self.plot and self._figure is None:
+            print("this example has no figure: --plot is not followed", file=sys.stderr)
+        elif self.plot:
             names = self._figure.axes[0].get_legend_handles_labels()[1]
             self._figure.legend(loc="outside lower center", ncols=3 if len(names) == 3 else 2)
             self._figure.savefig(self._file, dpi=150)

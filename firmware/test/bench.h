@@ -35,9 +35,12 @@ inline Result ask(uint8_t code, const void *fields = nullptr) {
   return rig.command(code, static_cast<const uint8_t *>(fields), detail);
 }
 
+// Never inlined: a few rigs that are made on the stack of one function do not fit the AVR's memory.
+__attribute__((noinline)) static void fresh_rig() { rig = Rig(); }
+
 // A board that comes up with these settings, its emergency stop proven.
 inline void begin(const Config &config, uint8_t reset = 1, uint32_t proven = kFirmware) {
-  rig = Rig();
+  fresh_rig();
   out = Outputs();
   const Stored stored = {config, proven};
   rig.begin(&stored, reset, kFirmware);

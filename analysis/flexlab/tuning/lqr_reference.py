@@ -2,8 +2,7 @@
 
 It is designed on two modes of the strip, linear about a place on the way, and measures what the rig
 measures (joints and tip deflection). It has the same step, sampling and drive limits. It is tried
-on three modes, because it must not excite a mode that it does not know; the result runs on the
-whole mesh.
+on the whole mesh, because it must not excite a mode that it does not know.
 
 It needs a force in every joint. Instead of a stepper's rate it has the torque that the stepper can
 hold, without limits of rate and acceleration. Free are the place, the filters of the set-points,
@@ -33,7 +32,6 @@ from .history import History
 from .result import RTOL, metrics
 from .search import Search, search
 from .search_space import FreeGain, settings
-from .task import with_modes
 
 SEARCH = Search("ga", population=30, generations=30, seed=1, polish=40)
 
@@ -71,8 +69,8 @@ class LqrDesigns:
 
     @cached_property
     def plant(self) -> fx.System:
-        """The robot with one mode more than the design knows."""
-        return fx.assemble(with_modes(self.structure.robot, self.task.modes + 1))
+        """The robot as it is judged: a design may excite modes that it does not know."""
+        return fx.assemble(self.structure.robot)
 
     def controller(self, values: np.ndarray) -> fx.Controller:
         """The design for settings (d,), on two modes.

@@ -192,7 +192,7 @@ static void a_motor_needs_its_pins_and_its_encoder() {
   CHECK(to_fixed_point(config, fixed) == ITEM(encoder_2));
   config.encoder_2() = 1;
   const Stored stored = {config, kFirmware};
-  rig = Rig();
+  fresh_rig();
   rig.begin(&stored, 1, kFirmware, 1);
   CHECK(rig.fault() == Fault::bad_configuration && rig.drive(1) == Drive::stepper);
   const ConfigWrite write = {ITEM(drive_2), 2.0f};

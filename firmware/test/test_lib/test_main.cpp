@@ -717,7 +717,7 @@ static void a_configuration_must_make_sense() {
   config = default_config();
   config.voltage_max_V() = 13;
   CHECK(to_fixed_point(config, fixed) == ITEM(voltage_max_V));
-  rig = Rig();
+  fresh_rig();
   rig.begin(nullptr, 1, kFirmware);
   CHECK(rig.fault() == Fault::bad_configuration);
   const Clear clear = {static_cast<uint8_t>(Fault::bad_configuration)};

@@ -155,7 +155,7 @@ static void stored_settings_that_are_wrong_are_not_used() {
   config.flex_min() = 0.96f;  // more than flex_max
   begin(config);
   CHECK(rig.fault() == Fault::bad_configuration);
-  rig = Rig();
+  fresh_rig();
   rig.begin(nullptr, 1, kFirmware);
   CHECK(rig.fault() == Fault::bad_configuration && rig.proven() == 0);
 }
@@ -204,7 +204,7 @@ static void arming_asks_for_settings_firmware_mode_and_inputs() {
   CHECK(ask(Commission::kCode) == Result::wrong_state && reference() == Result::wrong_state);
 
   // A firmware without a hash proves nothing, even if the memory has the same.
-  rig = Rig();
+  fresh_rig();
   const Stored stored = {default_config(), 0};
   rig.begin(&stored, 1, 0);
   CHECK(reference() == Result::ok && arm_as(2, detail) == Result::stop_unproven);
@@ -374,7 +374,7 @@ static void a_reading_out_of_range_forbids_to_clear_its_own_fault_only() {
       CHECK(ask(Clear::kCode, &clear, detail) == (own ? Result::fault_persists : Result::ok));
       CHECK(!own || detail == static_cast<uint16_t>(fault));
     }
-  rig = Rig();
+  fresh_rig();
   rig.begin(nullptr, 1, kFirmware);  // nothing stored
   rig.inputs().flex = 3500;
   rig.inputs().supply = 500;

@@ -421,7 +421,7 @@ static void settings_are_in_use_at_once_or_not_at_all() {
   CHECK(rig.may_configure());
   rig.trip(Fault::speed_1);  // not in a fault, unless it is that of the settings
   CHECK(!rig.may_configure() && ask(ConfigWrite::kCode, &write) == Result::wrong_state);
-  rig = Rig();
+  fresh_rig();
   rig.begin(nullptr, 1, kFirmware);
   CHECK(rig.may_configure());
 }

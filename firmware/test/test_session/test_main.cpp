@@ -219,7 +219,7 @@ static void a_stop_is_obeyed_at_once_and_counts_only_in_order() {
 // Only what is stored ends the fault of a board without settings.
 static void settings_are_stored_only_if_the_memory_says_so() {
   for (uint8_t well = 0; well < 2; ++well) {
-    rig = Rig();
+    fresh_rig();
     rig.begin(nullptr, 1, kFirmware);
     rig.inputs().flex = 3500;
     rig.inputs().supply = 500;

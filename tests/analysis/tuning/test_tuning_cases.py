@@ -125,7 +125,7 @@ def test_ga_pso_and_cma_es_reach_the_same_objective_within_2_percent_from_five_s
             with ThreadExecutor(task, 2) as make_executor:
                 assert search(
                     task,
-                    Search(name, population, generations, seed, polish=80),
+                    Search(name, population, generations, seed, polish=400),
                     make_executor,
                     history,
                     lambda h: None,

@@ -93,6 +93,7 @@ def test_clang_gives_the_same_digits_and_no_warning(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1800)  # all of the core is compiled
 @pytest.mark.parametrize(
     "settings",
     [
@@ -143,8 +144,8 @@ from flexura.signals import constant, cycloid
 
 assert core.level == sys.argv[1], core.level
 for name in sys.argv[2:]:
-    system = fx.assemble(fx.Robot.load(name))
-    joints = len(system.robot.link)
+    system = fx.assemble(fx.load(name))
+    joints = len(system.robot.links)
     drive = fx.Drive.force(*[constant(0.05)] * joints)
     t = np.linspace(0.0, 0.2, 11)
     for method in ("explicit", "implicit", "exponential"):
@@ -154,6 +155,7 @@ for name in sys.argv[2:]:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1800)  # all of the core is compiled
 def test_the_build_for_any_processor_gives_the_digits_of_the_other(tmp_path):
     """Compiled as a checkout asks for it, chosen by FLEXURA_CORE; whole runs, to the last bit."""
     if core.level == "plain":

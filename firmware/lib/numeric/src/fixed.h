@@ -147,10 +147,10 @@ class Accumulator48 {
     __asm__(
         "mul %A4, %A5    \n\t"  // a0 x b0 -> bytes 0, 1
         "movw %A2, r0    \n\t"
-        "mulsu %C4, %A5  \n\t"  // a2 x b0, signed -> bytes 2, 3
+        "mulsu %7, %A5  \n\t"  // a2 x b0, signed -> bytes 2, 3
         "movw %C2, r0    \n\t"
         "sbc %3, %3      \n\t"  // its sign -> byte 4
-        "muls %C4, %B5   \n\t"  // a2 x b1, signed -> bytes 3, 4
+        "muls %7, %B5   \n\t"   // a2 x b1, signed -> bytes 3, 4
         "add %D2, r0     \n\t"
         "adc %3, r1      \n\t"
         "mul %B4, %A5    \n\t"  // a1 x b0 -> bytes 1, 2
@@ -180,8 +180,8 @@ class Accumulator48 {
         "adc %D0, %D2    \n\t"
         "adc %A1, %3     \n\t"
         "adc %B1, r0     \n\t"
-        : "+r"(low_), "+r"(high_), "=&r"(t), "=&r"(t4)
-        : "a"(a), "a"(b), "r"(static_cast<uint8_t>(0))
+        : "+l"(low_), "+l"(high_), "=&l"(t), "=&l"(t4)
+        : "a"(lower(a)), "a"(b), "r"(static_cast<uint8_t>(0)), "a"(static_cast<int8_t>(a >> 16))
         : "r0");
   }
 
