@@ -138,7 +138,7 @@ class StripModel:
         times = self._times
         robot = with_stepper_damping(with_parameters(self.robot, values), self.rig, elements)
         if not self.stepper:
-            robot = self._with_bearings(robot, values[BEARING])
+            robot = self._with_bearings(robot, values.get(BEARING, 1.0))
         system = fx.assemble(robot)
         q0 = system.start()
         if self.stepper:

@@ -103,6 +103,7 @@ def drive_inverse(
     knowledge: Knowledge,
     t: np.ndarray,
     motions: np.ndarray,
+    beyond: np.ndarray | None = None,
 ) -> DriveInverse:
     """The references with which the joints move so, by the model (125).
 
@@ -113,6 +114,7 @@ def drive_inverse(
         knowledge: of friction and backlash.
         t: times (T,) [s].
         motions: of the joints (T, J) [m or rad]; of a stepper, of its pulses.
+        beyond: how far beyond its last place each joint will stick (J,) [m or rad]; default 0.
     """
     from scipy.interpolate import CubicSpline
 
@@ -130,12 +132,27 @@ def drive_inverse(
         volts = _voltage(setup, axis, knowledge, course, fine, load, side)
         shaft = course(fine) + _behind(axis, knowledge, course(fine, 1), load, side)
         asked = controller.reference(STEP_S, shaft, volts, side)
+        asked = _held(asked, shaft, course(fine, 1), 0.0 if beyond is None else beyond[i])
         references[:, i] = np.interp(t, fine, asked)
         most, limit = float(np.abs(volts).max()), REACHES * settings["voltage_max_V"]
         what = f"motor {axis.number} voltage"
         expected = f"at most {limit:.4g}"
         checks.append(Check(what, most <= limit, f"{most:.4g} V", expected, "a slower motion"))
     return DriveInverse(references, checks)
+
+
+def _held(asked: np.ndarray, shaft: np.ndarray, velocity: np.ndarray, beyond: float) -> np.ndarray:
+    """The reference (T,), where the shaft sticks from shortly after the joint's last motion on.
+
+    Friction holds the joint while the links still swing. A motor that answered them, or that was
+    asked to be elsewhere, would push the joint until it slips.
+    """
+    moving = np.flatnonzero(np.abs(velocity) > SLOWEST * np.abs(velocity).max())
+    rests = (moving[-1] if len(moving) else 0) + round(REACH_S / STEP_S)
+    after = (np.arange(len(asked)) - rests) * STEP_S / ROUND_S
+    share = 0.5 + 0.5 * np.cos(np.pi * np.clip(after, 0.0, 1.0))
+    there = shaft[min(rests, len(shaft) - 1)] + beyond
+    return np.asarray(there + share * (asked - there))
 
 
 def _voltage(

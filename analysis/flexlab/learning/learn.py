@@ -299,12 +299,12 @@ def _following(out: Learned, share: float) -> _Following | None:
     change = law.update(best.lacks)
     most = GUARD * out.trials[0].sensed_m
     notes = [] if best is out.trials[-1] else [f"from trial {best.number}"]
-    held = ""
+    held, beyond = "", out.model.beyond(best.run, best.motions)
     while share >= SMALLEST:
         parts = np.split(share * change, np.cumsum(law.counts)[:-1])
         moves = [basis @ part for basis, part in zip(task.basis, parts, strict=True)]
         motions = best.motions + np.column_stack(moves)
-        made = out.model.drives(motions)
+        made = out.model.drives(motions, beyond)
         plan = task.plan(made.references, best.number + 1, motions, made.checks)
         if plan.failed:
             held = f"limit: {plan.failed[0].what}"

@@ -12,10 +12,12 @@ from flexura.control import JointSpring, LearningLaw, motion_response
 from flexura.errors import InputError
 
 from ..identification.strip import with_parameters, with_stepper_damping
+from ..rig.axes import motor_axes
 from .drives import DriveInverse, drive_inverse, loops
 from .knowledge import Knowledge
 from .task import Task
 
+STICKS_S = 0.2, 0.4  # after a joint's last motion: where it is then, it sticks
 SINGULAR = 1e4  # condition of the joints' slopes
 
 
@@ -63,11 +65,32 @@ class RigModel:
         counts = tuple(one.shape[1] for one in task.basis)
         return LearningLaw(np.array(responses), counts, task.share)
 
-    def drives(self, motions: np.ndarray) -> DriveInverse:
-        """The references of joint motions (T, J) at the task's times [m or rad]."""
+    def drives(self, motions: np.ndarray, beyond: np.ndarray | None = None) -> DriveInverse:
+        """The references of joint motions (T, J) at the task's times [m or rad].
+
+        Args:
+            motions: of the joints.
+            beyond: how far beyond its last place each joint will stick (J,); default 0.
+        """
         task, knowledge = self.task, self.knowledge
         system = fx.assemble(self._robot({}))
-        return drive_inverse(task.setup, task.settings, system, knowledge, task.t, motions)
+        return drive_inverse(task.setup, task.settings, system, knowledge, task.t, motions, beyond)
+
+    def beyond(self, run: fx.Run, motions: np.ndarray) -> np.ndarray:
+        """How far beyond their last places joints stuck in a trial (J,) [m or rad].
+
+        Args:
+            run: the trial.
+            motions: what its references were for (T, J).
+        """
+        task, wanted = self.task, self.drives(motions).references[-1]
+        out = np.zeros(len(wanted))
+        for axis in motor_axes(task.setup.rig):
+            last = task.moving[axis.number - 1][1]
+            holds = (run.t > last + STICKS_S[0]) & (run.t < last + STICKS_S[1])
+            place = np.nanmedian(run[f"joint/{axis.number}/position"][holds])
+            out[axis.number - 1] = place - wanted[axis.number - 1]
+        return out
 
     def moved(self, run: fx.Run) -> np.ndarray:
         """The joints' motions in a run, of a stepper its pulses', in the task's functions.

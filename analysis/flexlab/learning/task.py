@@ -26,7 +26,7 @@ from ..rig.board_axes import board_axes
 STEP_S = 2**plan.PERIOD_LOG2 / CONTROL_HZ  # of the board's knots
 REST_S, HOLD_S = 0.4, 0.4
 SPACING_S = 0.04  # of the splines of which changes are made
-BEFORE_S, AFTER_S = 0.2, 0.06  # the joint's motion, in which its references may change
+BEFORE_S, AFTER_S = 0.2, -0.1  # the joint's motion, in which its references may change
 MOVING = 0.02  # of its largest speed
 PERIODS = 2.5  # of the first mode, in which an error after the motion counts an e-th
 RETURN_S = 1.0  # at least
