@@ -112,6 +112,24 @@ def test_an_lqrs_figures_are_those_of_its_run_within_the_cases_drive_limits(monk
     )
 
 
+def test_a_saturated_lqr_on_a_sliding_strip_moves_alike_by_each_method():
+    """Its overdamped modes change as the joint slides, and its drives jump a thousand times a
+    second: once, exponential steps of any length grew there."""
+    designs = LqrDesigns(cases.type_3())
+    controller = designs.controller(
+        np.array([4.3545, 15.885, 17.607, 1.2532, 0.05066, 0.15248, 0.026078, 0.0031380])
+    )
+    t = np.linspace(0.0, 0.1, 51)
+    runs = [
+        fx.simulate(designs.plant, t, controller, rtol=rtol, method=method)
+        for method, rtol in (("explicit", 1e-7), ("exponential", 1e-5), ("auto", 1e-6))
+    ]
+    for run in runs:
+        assert run.complete and run.meta["energy_error"] < 1e-5
+        for name in ("joint/1/position", "joint/2/position", "tip/x", "tip/y"):
+            np.testing.assert_allclose(run[name], runs[0][name], atol=2e-6)
+
+
 @pytest.mark.slow
 @pytest.mark.timeout(3000)
 def test_ga_pso_and_cma_es_reach_the_same_objective_within_2_percent_from_five_seeds():

@@ -145,11 +145,13 @@ class ModalBasis {
     return true;
   }
 
-  // Adds the damping rate 2 zeta w (95) to robot k's modes above its cutoff.
+  // Robot k's modes above its cutoff get what their damping rate lacks of 2 zeta w (95). More would
+  // make the predictor of an overdamped mode unstable, however short the step.
   void damp(int k, double zeta) {
     for (int mode = 0; mode < n; ++mode) {
       const double square = lane(w2[mode], k), w = root(square),
-                   added = square > 0.0 && w > cutoff[k] ? 2.0 * zeta * w : 0.0;
+                   missing = 2.0 * zeta * w - lane(own[mode], k),
+                   added = square > 0.0 && w > cutoff[k] ? larger(missing, 0.0) : 0.0;
       damped_of[k] = damped_of[k] || added > 0.0, damped = damped || added > 0.0;
       set_lane(d2[mode], k, lane(own[mode], k) + added),
           set_lane(lag[mode], k, added > 0.0 ? added / square : 0.0);
