@@ -12,9 +12,11 @@ import numpy as np
 
 import flexura as fx
 
+from .axes import motor_axes
 from .board_axes import BoardAxis, board_axes
 from .configuration import calibration, configuration, tip_per_bend
 from .description import RigSetup
+from .plant.motor import joint_line
 from .sheets import MotorSheet
 
 STEP_RATE_MAX_1_S = 4000.0  # what the firmware's step generator is made for
@@ -212,6 +214,24 @@ def _edges(rate: float) -> Check:
     )
 
 
+def _stalls(setup: RigSetup, settings: dict[str, float]) -> list[Check]:
+    """A joint that rests within its friction must not pass for a blocked one."""
+    out = []
+    for axis in motor_axes(setup.rig) if setup.rig.motor.starts_at_V is not None else ():
+        line = joint_line(axis)
+        holds = line.static / line.force_per_V + (setup.rig.driver.dead_zone_V or 0.0)
+        out.append(
+            Check(
+                f"motor {axis.number} at rest",
+                holds < settings["stall_voltage_V"],
+                f"friction holds it up to {holds:.2f} V",
+                f"{settings['stall_voltage_V']:g} V before it counts as blocked",
+                "setting stall_voltage_V above that",
+            )
+        )
+    return out
+
+
 def _always(setup: RigSetup) -> list[Check]:
     rig, settings = setup.rig, configuration(setup)
     out = []
@@ -231,6 +251,7 @@ def _always(setup: RigSetup) -> list[Check]:
                 "a lower voltage_max_V or a stronger driver",
             )
         )
+    out += _stalls(setup, settings)
     out.append(
         Check(
             "supply",
