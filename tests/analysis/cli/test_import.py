@@ -69,6 +69,23 @@ def test_a_german_export_of_labview_comes_in_by_a_map(tmp_path):
     assert run.meta["original_units"] == {"joint/1/position": "mm", "link/2/tip_deflection": "mm"}
 
 
+@pytest.mark.parametrize(
+    "heads, row",
+    [
+        ('"Time [s]","joint/1/position [mm]"', '"{},{:02d}","{},50"'),  # commas in quotes
+        ("Bench 3, second day;;\nTime;joint/1/position;\ns;mm;", "{},{:02d};{},50;"),
+    ],
+)
+def test_what_spreadsheets_write_where_the_decimal_sign_is_a_comma(heads, row, tmp_path):
+    rows = [row.format(k // 100, k % 100, k) for k in range(250)]
+    (tmp_path / "log.csv").write_text("\n".join([heads, *rows, ""]))
+    status, _, err = command(["import", tmp_path / "log.csv", "--out", tmp_path / "run"])
+    assert (status, err) == (0, "")
+    run = Run.read(tmp_path / "run")
+    assert run.t == pytest.approx(np.arange(250) / 100)
+    assert run["joint/1/position"] == pytest.approx((np.arange(250) + 0.5) / 1000)
+
+
 def test_without_a_map_it_says_what_there_is_and_leaves_nothing(tmp_path):
     path, _ = german(tmp_path, *numbers())
     before = sorted(tmp_path.iterdir())

@@ -66,7 +66,7 @@ def read(raw: bytes, file: str) -> Log:
             key=f"line {lines[first - 1].number}",
             file=file,
         )
-    heads = [cells for cells in above if len(cells) == width][-3:]
+    heads = _without_titles([cells for cells in above if len(cells) == width])[-3:]
     own = _own(comments)
     named = _named(heads or _from_comments(comments, separator, width), width, own.get("units", {}))
     columns = []
@@ -104,8 +104,9 @@ def _acceleration(column: Column) -> Column:
 def _layout(lines: list[_Line], file: str) -> tuple[str, bool, int]:
     """The separator, whether the decimal sign is a comma, and the first line of numbers."""
     best: tuple[tuple[float, ...], str, bool, int] | None = None
+    quoted = any('"' in line.text for line in lines[: PREAMBLE + SAMPLE])
     for order, separator in enumerate(SEPARATORS):
-        for comma in (False, True) if separator != "," else (False,):
+        for comma in (False, True) if separator != "," or quoted else (False,):
             found = _first(lines, separator, comma)
             if found is not None:
                 first, same, width, share = found
@@ -155,6 +156,13 @@ def _heads(line: str, separator: str) -> list[str]:
     if separator == " ":
         return re.split(r"\s+(?![\[(])", line.strip())
     return _cells(line, separator)
+
+
+def _without_titles(heads: list[list[str]]) -> list[list[str]]:
+    """Rows of heads without titles, which a spreadsheet pads: words in the first cell alone."""
+    titles = [row for row in heads if row[0] and not any(row[1:]) and not _units(row)]
+    others = [row for row in heads if row not in titles]
+    return others if any(len(row) > 1 for row in others) else heads
 
 
 def _from_comments(comments: list[_Line], separator: str, width: int) -> list[list[str]]:
