@@ -106,7 +106,11 @@ def test_a_251_rpm_motor_is_too_slow_for_the_inverse_law(written):
         ({"stepper__holding_torque_N_m": 0.1}, {"stepper torque"}),
         ({"stepper__limits_rad": [-0.5, 0.5]}, {"joint 2 range"}),
         ({"stepper__encoder_pulses": 20000}, {"encoder edges"}),
-        ({"motor__stall_torque_N_m": 0.001}, {"carriage force", "carriage speed"}),
+        (
+            {"motor__stall_torque_N_m": 0.001},
+            {"carriage force", "carriage speed", "motor 1 at rest"},
+        ),
+        ({"board__stall_voltage_V": 1.3}, {"motor 1 at rest"}),
         ({"driver__current_max_A": 2.0}, {"motor current"}),
         ({"board__speed_max_1_m_s": 0.07}, {"carriage speed limit"}),
         ({"board__rate_max_2_rad_s": 3.0}, {"joint 2 rate limit"}),
