@@ -46,8 +46,8 @@ def moved(duration, by, elbow):
     return two_links(elbow), pair, lambda t, tip: np.hypot(*(tip - place(t)))
 
 
-# The arm of the twin stretches, EA = 1e5 EI / L^2: 0.035 mm at 0.45 s, 0.010 and 0.0025 mm with 4 and
-# 16 times the axial stiffness
+# The arm of the twin stretches (EA = 1e5 EI / L^2): 0.035 mm at 0.45 s; with 4 and 16 times the
+# axial stiffness 0.010 and 0.0025 mm
 CASES = {
     "arm, 0.6 s": (turned(0.6), 0.6, 0.05, 1.0),
     "arm, 0.45 s": (turned(0.45), 0.45, 0.05, 1.0),
