@@ -88,8 +88,9 @@ class RigModel:
         for axis in motor_axes(task.setup.rig):
             last = task.moving[axis.number - 1][1]
             holds = (run.t > last + STICKS_S[0]) & (run.t < last + STICKS_S[1])
-            place = np.nanmedian(run[f"joint/{axis.number}/position"][holds])
-            out[axis.number - 1] = place - wanted[axis.number - 1]
+            places = run[f"joint/{axis.number}/position"][holds]
+            if np.isfinite(places).any():  # not all are dropouts
+                out[axis.number - 1] = np.nanmedian(places) - wanted[axis.number - 1]
         return out
 
     def moved(self, run: fx.Run) -> np.ndarray:
