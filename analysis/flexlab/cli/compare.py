@@ -51,6 +51,15 @@ def compare(
         Path | None,
         typer.Option(metavar="ROBOT", help="robot file to simulate instead of the run's own"),
     ] = None,
+    channels: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--channel",
+            metavar="CHANNEL",
+            help="what is compared; default: joint positions and tip deflections, or else all that "
+            "both runs have",
+        ),
+    ] = None,
     align: Annotated[
         bool,
         typer.Option("--align", help="move RUN2 in time by what makes both agree best"),
@@ -95,7 +104,7 @@ def compare(
                     )
             second = fx.Run.read(other)
             if align:
-                found_shift = best_shift(first, second)
+                found_shift = best_shift(first, second, channels)
                 moved = (found_shift.seconds, found_shift.correlation)
             if moved is not None:
                 second = shifted(second, moved[0])
@@ -112,7 +121,7 @@ def compare(
                     )
                 except fx.InputError as error:
                     raise error if error.file else error.in_file(str(run)) from None
-        found = compared(first, second)
+        found = compared(first, second, channels)
         written = save(found, draft.folder, simulated=other is None)
         if picture is not None:
             draw(written[-1], picture)

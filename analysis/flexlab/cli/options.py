@@ -66,7 +66,7 @@ Start = Annotated[
     str | None,
     typer.Option(
         metavar="static|straight",
-        help="links at the start: in equilibrium under gravity, the default, or straight",
+        help="links at the start: in equilibrium, the default under gravity, or straight",
     ),
 ]
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from flexura.io import called, emulated
+from flexura.io import emulated
 from flexura.io.drawing import STYLE
 from flexura.optional import load
 
@@ -40,21 +40,20 @@ def draw(c: Comparison, entry: Difference, upper: Any, lower: Any) -> None:
         color=GREEN,
         linewidth=2.6,
         alpha=0.75,
-        label=called(second),
+        label=c.names[1],
     )
-    upper.plot(
-        first.t, scale * first[entry.channel], color=BLUE, linewidth=1.1, label=called(first)
-    )
+    upper.plot(first.t, scale * first[entry.channel], color=BLUE, linewidth=1.1, label=c.names[0])
     t, values = deviation(first, second, entry.channel)
     lower.plot(t, scale * values, color=PINK, linewidth=0.9)
     lower.axhline(0.0, color="#9aa0a8", linewidth=0.7)
     if np.isfinite(entry.at_s):
         size = scale * values[np.nanargmax(np.abs(values))]
         lower.plot([entry.at_s], [size], "o", color=PINK, markersize=4)
-        text = f"largest {abs(size):.3g} {unit}" + (
+        text = f"largest {abs(size):.3g} {unit}".removesuffix(" 1") + (
             f" = {100 * entry.max_relative:.3g} % of the peak" if entry.peak else ""
         )
         lower.set_title(text, fontsize=8, loc="right", pad=2, color=PINK)
+    upper.yaxis.set_offset_position("right")  # beside the legend
     upper.set_ylabel(f"{name} [{unit}]")
     lower.set_ylabel(f"difference\n[{unit}]")
     lower.set_xlabel("time [s]")
@@ -80,12 +79,15 @@ def symbol(entry: Difference) -> str:
         entry: of the comparison.
 
     Returns:
-        Mathematical text, for example $q_{2}$.
+        Mathematical text, for example $q_{2}$; of a channel without a symbol the last part of its
+        name.
     """
-    kind, number, _ = entry.channel.split("/")
-    if kind == "link":
+    *_, number, name = ("", *entry.channel.split("/"))
+    if name == "tip_deflection":
         return f"$w_{{{number}}}$"
-    return f"${'q' if entry.unit == 'rad' else 'd'}_{{{number}}}$"
+    if name == "position":
+        return f"${'q' if entry.unit == 'rad' else 'd'}_{{{number}}}$"
+    return name.replace("_", " ")
 
 
 def heading(c: Comparison, entry: Difference) -> str:
@@ -98,7 +100,8 @@ def heading(c: Comparison, entry: Difference) -> str:
     Returns:
         The text; nothing emulated goes without the word.
     """
-    text = entry.quantity[0].upper() + entry.quantity[1:]
+    named = entry.quantity != entry.channel
+    text = entry.quantity[0].upper() + entry.quantity[1:] if named else entry.channel
     return (
         text
         + (f", {c.experiment_kind}" if c.experiment_kind else "")
@@ -118,8 +121,9 @@ def is_emulated(c: Comparison) -> bool:
     return emulated(c.simulation) or emulated(c.experiment)
 
 
-def together(c: Comparison, size: tuple[float, float] = (8.3, 10.2)) -> Any:
+def together(c: Comparison, size: tuple[float, float] | None = None) -> Any:
     """All quantities in one figure, one below the other."""
+    size = size or (8.3, max(10.2, 3.4 * len(c.differences)))
     matplotlib = load("matplotlib")
     count = len(c.differences)
     with matplotlib.rc_context(STYLE):

@@ -13,15 +13,16 @@ motions. It is unknown if a dropout hides the instant.
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 import flexura as fx
 from flexura.errors import InputError
-from flexura.io import kind
+from flexura.io import called, kind
 
-from ..runs.deviation import deviation, deviations, interpolate
+from ..runs.deviation import compared, deviation, deviations, interpolate
 
 RESPONSE_LEVEL = 0.9  # of the largest distance, for the response time
 LONGEST_DELAY_S = 0.25
@@ -36,6 +37,7 @@ PUBLISHED = {
     },
 }
 _COMPARED = re.compile(r"joint/(\d+)/position|link/(\d+)/tip_deflection")
+_JOINT = re.compile(r"joint/\d+/(motor_)?position")
 
 
 @dataclass(frozen=True)
@@ -88,6 +90,12 @@ class Comparison:
         return str(self.experiment.meta.get("experiment", ""))
 
     @property
+    def names(self) -> tuple[str, str]:
+        """What both runs are called; the second has a number if it is called as the first."""
+        first, second = called(self.simulation), called(self.experiment)
+        return first, called(self.experiment, " 2") if second == first else second
+
+    @property
     def worst_response(self) -> float:
         """The largest relative deviation of a response time; NaN if none is known."""
         found = [abs(r.relative) for r in self.responses if np.isfinite(r.relative)]
@@ -104,21 +112,21 @@ def simulation_first(first: fx.Run, second: fx.Run) -> tuple[fx.Run, fx.Run]:
     return (second, first) if kind(first) == "experiment" != kind(second) else (first, second)
 
 
-def compare(simulation: fx.Run, experiment: fx.Run) -> Comparison:
-    """Compare joint variables and tip displacements that both runs have.
+def compare(
+    simulation: fx.Run, experiment: fx.Run, channels: Sequence[str] | None = None
+) -> Comparison:
+    """Compare channels that both runs have.
 
     Args:
         simulation: the first run.
         experiment: the second run.
+        channels: by default joint variables and tip displacements; without any in common, all
+            channels that both runs have in one unit.
 
     Raises:
         InputError: the runs have no such channel in common.
     """
-    names = [n for n in simulation if _COMPARED.fullmatch(n) and n in experiment]
-    if not names:
-        raise InputError(
-            "expected two runs with joint positions in common", key="RUN", value=list(experiment)
-        )
+    names = list(channels or _usual(simulation, experiment))
     published = PUBLISHED.get(str(experiment.meta.get("experiment", "")), {})
     rows = []
     for row in deviations(simulation, experiment, names):
@@ -139,7 +147,7 @@ def compare(simulation: fx.Run, experiment: fx.Run) -> Comparison:
                 published.get(row.channel),
             )
         )
-    joints = [n for n in names if n.startswith("joint")]
+    joints = [n for n in names if _JOINT.fullmatch(n)]
     gone = ~np.isfinite(np.array([experiment[n] for n in names])).all(axis=0)
     return Comparison(
         simulation,
@@ -151,10 +159,24 @@ def compare(simulation: fx.Run, experiment: fx.Run) -> Comparison:
 
 
 def quantity(channel: str) -> str:
-    """The name of a channel: `joint/1/position` is "joint variable 1"."""
+    """The name of a channel: `joint/1/position` is "joint variable 1"; others keep theirs."""
     found = _COMPARED.fullmatch(channel)
-    assert found
+    if found is None:
+        return channel
     return f"joint variable {found[1]}" if found[1] else f"tip displacement of link {found[2]}"
+
+
+def _usual(first: fx.Run, second: fx.Run) -> list[str]:
+    """Joint variables and tip displacements that both runs have, else all that both have."""
+    shared = [name for name in compared(first, second) if name in first]
+    names = [name for name in shared if _COMPARED.fullmatch(name)] or shared
+    if not names:
+        raise InputError(
+            f"expected two runs with a channel in common, in one unit; the first has: "
+            f"{', '.join(first) or 'none'}; the second: {', '.join(second) or 'none'}",
+            key="RUN",
+        )
+    return names
 
 
 def _response(simulation: fx.Run, experiment: fx.Run, channel: str) -> ResponseTimes:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-from flexura.io import EMULATED, called
+from flexura.io import EMULATED
 from flexura.io.drawing import STYLE
 from flexura.optional import load
 
@@ -39,7 +39,7 @@ def pdf(c: Comparison) -> bytes:
     """
     matplotlib = load("matplotlib")
     pages = load("matplotlib.backends.backend_pdf").PdfPages
-    subject = EMULATED if is_emulated(c) else called(c.experiment)
+    subject = EMULATED if is_emulated(c) else c.names[1]
     about_file = {"Title": title(c), "Subject": subject, "CreationDate": None}
     buffer = io.BytesIO()
     with matplotlib.rc_context(STYLE), pages(buffer, metadata=about_file) as file:
@@ -236,7 +236,7 @@ def _runs(sheets: Sheets, c: Comparison) -> None:
     sheets.room(0.2)
     sheets.lines(["The runs"], 11, fontweight="bold")
     sheets.gap(3)
-    head = ("", called(c.simulation), called(c.experiment))
+    head = ("", c.names[0], c.names[1])
     edges = (LEFT, 0.27, 0.60, RIGHT)
     columns = [Column(a, b) for a, b in pairwise(edges)]
     sheets.table(head, about(c), columns, 7.5)

@@ -8,7 +8,7 @@ import json
 import re
 from typing import Any
 
-from flexura.io import EMULATED, called
+from flexura.io import EMULATED
 from flexura.io.drawing import saved
 
 from .figures import figure, heading, is_emulated, together
@@ -62,8 +62,8 @@ def html(c: Comparison) -> str:
         f"<h1>{text(title(c))}</h1>{label}\n<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>\n"
         f"<ul>{''.join(f'<li>{text(line)}</li>' for line in notes(c))}</ul>\n{figures}\n<h2>The "
         f"runs</h2>\n"
-        f'<table class="about"><thead><tr><th></th><th>{text(called(c.simulation))}</th>'
-        f"<th>{text(called(c.experiment))}</th></tr></thead>"
+        f'<table class="about"><thead><tr><th></th><th>{text(c.names[0])}</th>'
+        f"<th>{text(c.names[1])}</th></tr></thead>"
         f"<tbody>{runs}</tbody></table>\n</body></html>\n"
     )
 
@@ -74,7 +74,7 @@ def png(c: Comparison) -> bytes:
         together(c),
         "png",
         Title=title(c),
-        Description=EMULATED if is_emulated(c) else called(c.experiment),
+        Description=EMULATED if is_emulated(c) else c.names[1],
     )
 
 
@@ -89,7 +89,7 @@ def caption(c: Comparison, k: int) -> str:
         The text.
     """
     like = {"forward": "Figs 4.16 to 4.18", "inverse": "Figs 4.19 to 4.21"}.get(c.experiment_kind)
-    both = f"{called(c.simulation)} and {called(c.experiment)}"
+    both = f"{c.names[0]} and {c.names[1]}"
     return f"Fig. {k + 1}. {heading(c, c.differences[k])}: {both}; below, their difference." + (
         f" In the manner of the dissertation's {like}." if like else ""
     )

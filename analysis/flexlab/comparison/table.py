@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from flexura.io import EMULATED, called, emulated
+from flexura.io import EMULATED, emulated
 
 from ..runs.formatting import percent
 from ..runs.table import Table
@@ -32,7 +32,7 @@ def title(c: Comparison) -> str:
         The robot and the two runs' names.
     """
     name = c.simulation.meta.get("robot", {}).get("name") or "robot"
-    return f"{name}: {called(c.simulation)} against {called(c.experiment)}" + (
+    return f"{name}: {c.names[0]} against {c.names[1]}" + (
         f", {c.experiment_kind}" if c.experiment_kind else ""
     )
 
@@ -42,8 +42,8 @@ def rows(c: Comparison) -> list[tuple[str, ...]]:
     out: list[tuple[str, ...]] = [
         (
             d.quantity,
-            _length(d.peak, d.unit),
-            _length(d.max, d.unit),
+            _size(d.peak, d.unit),
+            _size(d.max, d.unit),
             _seconds(d.at_s),
             percent(d.max_relative, 3),
             percent(d.rms_relative, 3),
@@ -75,20 +75,20 @@ def rows(c: Comparison) -> list[tuple[str, ...]]:
 
 def notes(c: Comparison) -> list[str]:
     """What a reader must know beside the numbers."""
+    both = tuple(zip(c.names, (c.simulation, c.experiment), strict=True))
     lines = [
-        f"{called(run)}: {EMULATED.removeprefix('emulated: ')}"
-        for run in (c.simulation, c.experiment)
-        if emulated(run)
+        f"{name}: {EMULATED.removeprefix('emulated: ')}" for name, run in both if emulated(run)
     ]
     if way := c.simulation.meta.get("driven_by"):
         lines.append(f"simulation {DRIVEN[way]} (--by {way})")
+    published = any(d.published_percent is not None for d in c.differences)
     lines.append(
-        "deviation: second minus first, of the first run's peak; the dissertation's figures are of "
-        "its own rig"
+        "deviation: second minus first, of the first run's peak"
+        + ("; the dissertation's figures are of its own rig" if published else "")
     )
-    for run in (c.simulation, c.experiment):
+    for name, run in both:
         if shift := run.meta.get("shift_s"):
-            lines.append(f"{called(run)}: {shift:.6g} s added to its times")
+            lines.append(f"{name}: {shift:.6g} s added to its times")
     if c.responses:
         lines.append(
             f"response time: from t = 0 until {100 * RESPONSE_LEVEL:g} % of the largest distance "
@@ -100,11 +100,9 @@ def notes(c: Comparison) -> list[str]:
             f"{c.lost} of {len(c.experiment)} samples are dropouts in at least one channel, and "
             f"are left out"
         )
-    for run in (c.simulation, c.experiment):
+    for name, run in both:
         if not run.complete:
-            lines.append(
-                f"{called(run)}: ends at {run.t[-1]:.4g} s; what comes after is not compared"
-            )
+            lines.append(f"{name}: ends at {run.t[-1]:.4g} s; what comes after is not compared")
     return lines
 
 
@@ -130,13 +128,16 @@ def numbers(c: Comparison) -> dict[str, Any]:
         for k, v in vars(entry).items()
     }
     about = {
-        name: {"called": called(run), "emulated": emulated(run), "complete": run.complete}
+        name: {"called": own, "emulated": emulated(run), "complete": run.complete}
         | {
             k: run.meta[k]
             for k in ("label", "driven_by", "started", "seed", "firmware", "host_version")
             if k in run.meta
         }
-        for name, run in (("first", c.simulation), ("second", c.experiment))
+        for name, own, run in (
+            ("first", c.names[0], c.simulation),
+            ("second", c.names[1], c.experiment),
+        )
     }
     worst = c.worst_response
     return {
@@ -153,8 +154,11 @@ def numbers(c: Comparison) -> dict[str, Any]:
     }
 
 
-def _length(value: float, unit: str) -> str:
-    return "-" if not np.isfinite(value) else f"{1e3 * value:.3g} m{unit}"
+def _size(value: float, unit: str) -> str:
+    if not np.isfinite(value):
+        return "-"
+    small = unit in ("m", "rad")
+    return f"{1e3 * value:.3g} m{unit}" if small else f"{value:.3g} {unit}".removesuffix(" 1")
 
 
 def _seconds(value: float) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,8 +46,13 @@ def shifted(run: Run, seconds: float) -> Run:
     return dataclasses.replace(run, t=run.t + seconds, meta=meta)
 
 
-def best_shift(first: Run, second: Run) -> Shift:
+def best_shift(first: Run, second: Run, channels: Sequence[str] | None = None) -> Shift:
     """The shift of the second run by which both agree best.
+
+    Args:
+        first: any run.
+        second: any run.
+        channels: by default those that `compared` names.
 
     The sum of squared differences of all channels that are compared, each by its range, is least.
     A run counts as at rest before its first and after its last sample. All shifts are tried first,
@@ -57,11 +63,11 @@ def best_shift(first: Run, second: Run) -> Shift:
     """
     from scipy.signal import correlate
 
-    pairs = [pair for name in compared(first, second) if (pair := _pair(first, second, name))]
+    names = compared(first, second) if channels is None else channels
+    pairs = [pair for name in names if (pair := _pair(first, second, name))]
     if not pairs:
         raise InputError(
-            "expected two runs with a channel in common that moves in both: "
-            "joint/i/position, link/i/tip_deflection or tip/x, tip/y",
+            "expected two runs with a channel in common, in one unit, that moves in both",
             key="--align",
         )
     long1, long2 = (max(float(np.ptp(t)) for t in ts) for ts in _times(pairs))
@@ -84,7 +90,7 @@ def best_shift(first: Run, second: Run) -> Shift:
 
 def _pair(first: Run, second: Run, name: str) -> Pair | None:
     """Times and values of a channel in both runs, of range 1; None if it does not move in both."""
-    if name not in first:  # the distance of the tips
+    if name not in first or name not in second:  # as the distance of the tips
         return None
     scale = 0.0
     out = []

@@ -158,7 +158,8 @@ def _manoeuvre(data: Tables, joints: int) -> Manoeuvre:
     if not isinstance(tables, list) or len(tables) != joints:
         count = len(tables) if isinstance(tables, list) else tables
         raise InputError(
-            f"expected a table [[joint]] for each joint of the robot, {joints} in all",
+            f"expected a table [[joint]] for each joint of the robot, {joints} in all; an empty "
+            "one is a joint without a drive",
             key="joint",
             value=count,
         )

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import flexura as fx
 from experiment_runs import run
 from flexlab.comparison.measures import (
     PUBLISHED,
@@ -106,5 +107,28 @@ def test_the_experiment_comes_last(forward):
 
 
 def test_runs_with_nothing_in_common_are_refused():
-    with pytest.raises(InputError, match="expected two runs with joint positions in common"):
-        compare(run([0, 1], tip__x=[0, 1]), run([0, 1], tip__x=[0, 1]))
+    with pytest.raises(InputError, match="the first has: tip/x; the second: tip/y"):
+        compare(run([0, 1], tip__x=[0, 1]), run([0, 1], tip__y=[0, 1]))
+    with pytest.raises(InputError, match="a channel of both runs; the second has: tip/y"):
+        compare(run([0, 1], tip__x=[0, 1]), run([0, 1], tip__y=[0, 1]), ["tip/x"])
+
+
+def test_runs_without_joint_positions_are_compared_by_what_both_have():
+    """Logs have drives, motor positions and sensors; 2 % and 10 ms stay what they are."""
+    t = np.arange(1001) / 1000
+    law = lambda s: np.sin(2 * np.pi * s)
+    units = {"sensor/strain": "1", "joint/1/motor_position": "rad", "joint/1/drive": "N m"}
+    made = lambda factor, late, **more: fx.Run(
+        t,
+        {name: factor * law(t - late) for name in units} | more,
+        units | dict.fromkeys(more, "V"),
+        {"source": "experiment"},
+    )
+    found = compare(made(1.0, 0.0, alone=t), made(1.02, 0.0))
+    assert [d.channel for d in found.differences] == list(units)
+    assert [d.quantity for d in found.differences] == list(units)
+    assert all(d.max_relative == pytest.approx(0.02) for d in found.differences)
+    found = compare(made(1.0, 0.0), made(1.0, 0.01), ["joint/1/motor_position"])
+    (response,) = found.responses
+    assert response.delay_s == pytest.approx(0.01, abs=2e-4)
+    assert len(found.differences) == 1

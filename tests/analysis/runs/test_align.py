@@ -62,7 +62,7 @@ def test_a_shift_moves_events_too():
 
 def test_what_does_not_move_is_not_aligned():
     still = Run(np.arange(9.0) / 100, {"joint/1/position": np.ones(9)}, {"joint/1/position": "m"})
-    with pytest.raises(fx.InputError, match="a channel in common that moves in both"):
+    with pytest.raises(fx.InputError, match="a channel in common, in one unit, that moves in both"):
         best_shift(measured(), still)
 
 

@@ -1,5 +1,7 @@
 """Logs of other programs: twenty files that their libraries wrote are read back bit for bit."""
 
+from datetime import UTC, datetime
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -252,6 +254,73 @@ def test_dates_are_a_clock(tmp_path):
     np.testing.assert_allclose(run.t, np.arange(30) / 100, atol=1e-6)
 
 
+CALENDARS = [
+    "2026-11-29 {h:02}:03:0{s:.2f}",
+    "2026/11/29 {h:02}:03:0{s:.2f}",
+    "2026-11-29T{h:02}:03:0{s:.2f}+01:00",
+    "29.11.2026 {h:02}:03:0{s:.2f}",
+    "11/29/2026 {half}:03:0{s:.2f} PM",
+    "29/11/2026 {h:02}:03:0{s:.2f}",
+    "29-Nov-2026 {h:02}:03:0{s:.2f}",
+    "Nov 29 2026 {h:02}:03:0{s:.2f}",
+    "{h:02}:03:0{s:.2f}",
+]
+
+
+@pytest.mark.parametrize("calendar", CALENDARS)
+@pytest.mark.parametrize("head", ["Zeit", "Date (local)"])
+def test_a_clock_as_a_program_or_a_spreadsheet_writes_it(calendar, head, tmp_path):
+    """Whatever its head says: dates and times of day are seconds."""
+    rows = "".join(
+        f"{calendar.format(h=14, half=2, s=k / 100)};{k}\n".replace(".", ",", 0) for k in range(30)
+    )
+    found = understood(read_log(written(tmp_path, f"{head};joint/1/position [rad]\n{rows}")))
+    np.testing.assert_allclose(found.run.t, np.arange(30) / 100, rtol=0, atol=1e-9)
+    if "2026" in calendar:
+        noon = datetime(2026, 11, 29, 13 if "+01" in calendar else 14, 3, tzinfo=UTC)
+        assert found.run.meta["clock_start_s"] == noon.timestamp()
+
+
+def test_a_date_that_does_not_tell_its_month_is_said(tmp_path):
+    rows = "".join(f"03/04/2026 10:00:0{k}.0,{k}\n" for k in (0, 1, 2))
+    rows += "".join(f"03/04/2026 10:00:02.{k},{k}\n" for k in range(1, 9))
+    found = understood(read_log(written(tmp_path, f"Time,joint/1/position [rad]\n{rows}")))
+    assert any("month/day/year" in note for note in found.notes)
+    rows = rows.replace("03/04", "13/04")
+    found = understood(read_log(written(tmp_path, f"Time,joint/1/position [rad]\n{rows}")))
+    assert not any("month" in note for note in found.notes)
+    assert found.run.meta["clock_start_s"] == datetime(2026, 4, 13, 10, tzinfo=UTC).timestamp()
+
+
+def test_a_day_passes_midnight(tmp_path):
+    rows = "".join(f"{'23:59:59' if k < 10 else '00:00:00'}.{k % 10},{k}\n" for k in range(20))
+    run = understood(read_log(written(tmp_path, f"Time,joint/1/position [rad]\n{rows}"))).run
+    np.testing.assert_allclose(run.t, np.arange(20) / 10, atol=1e-9)
+
+
+def test_thousands_that_are_set_apart_are_numbers(tmp_path):
+    for text in (
+        't [s],joint/1/position [m]\n0,"1,234.5"\n1e-3,"2,345,678"\n2e-3,1.5\n',
+        "t [s];joint/1/position [m]\n0;1.234,5\n0,001;2.345.678\n0,002;1,5\n",
+        "t [s];joint/1/position [m]\n0;1'234.5\n1e-3;2'345'678\n2e-3;1.5\n",
+        "t [s];joint/1/position [m]\n0;1\u202f234,5\n0,001;2\u202f345\u202f678\n0,002;1,5\n",
+    ):
+        run = understood(read_log(written(tmp_path, text))).run
+        assert run["joint/1/position"].tolist() == [1234.5, 2345678.0, 1.5]
+
+
+def test_a_unit_that_is_likely_wrong_or_not_known_is_said(tmp_path):
+    rows = "".join(f"{k / 1e3},{k}\n" for k in range(30))
+    found = understood(
+        read_log(written(tmp_path, f"Time [ms],sensor/p [furlong]\n{rows}")), every=True
+    )
+    assert "the clock has 1e+06 samples a second: is ms its unit?" in found.notes
+    assert any("unit furlong is not known" in note for note in found.notes)
+    rows = "".join(f"{1e3 * k},{k}\n" for k in range(30))
+    with pytest.raises(fx.InputError, match="milliseconds or microseconds"):
+        understood(read_log(written(tmp_path, f"Time [ms],sensor/p [psi]\n{rows}")), every=True)
+
+
 def test_an_accelerometer_log_of_klipper_needs_no_map(tmp_path):
     run = understood(read_log(klipper(tmp_path / "raw.csv", 5120.1 + T, (A, W, F)))).run
     assert list(run) == ["sensor/accel_x", "sensor/accel_y", "sensor/accel_z"]
@@ -302,6 +371,12 @@ WRONG = [
     ("t [s],a [rad],a [deg]\n0,1,2\n1e-3,1,2\n", "no column is named as a channel"),
     ("t [s],joint/1/position [rad],joint_1_position [deg]\n0,1,2\n1e-3,1,2\n", "two columns for"),
     ("hello\nworld\n", "no table of numbers"),
+    ("t [s],y [m]\n0 o'clock,a1\n1 o'clock,a2\n", r"line 2: \"0 o'clock\" is no number"),
+    ("When,y\n31.02.2026 10:00:00,a\n31.02.2026 10:00:01,b\n", "'31.02.2026 10:00:00' is no time"),
+    (
+        't [s],joint/1/position [rad]\n0,"1,234.5"\n1e-3,"1,235"\n2e-3,"1,236.5"\n',
+        r"row 2 \(line 3\): '1,235' has a decimal comma, or thousands set apart",
+    ),
     ("", "empty"),
     ("t [s];joint/1/position [rad];x\n0;1\n1e-3;2\n", "3 heads above rows of 2 cells"),
 ]

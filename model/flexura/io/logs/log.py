@@ -31,6 +31,7 @@ class Column:
         since: numbers (T,) less the first one, where they are too long for a double; else None.
         clock: a name in `Log.clocks`, or "".
         fault: what is wrong with a row, or "".
+        times: whether they are dates with times, or times of day.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Column:
     since: np.ndarray | None = None
     clock: str = ""
     fault: str = ""
+    times: bool = False
 
 
 @dataclass(frozen=True)

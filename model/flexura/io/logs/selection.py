@@ -97,6 +97,11 @@ def understood(
     except (InputError, ValueError) as error:
         raise InputError(str(error), file=log.file) from None
     notes = [*log.notes, *base.notes, *missing_rows(log, run.t)]
+    notes += [
+        f"{each.head!r}: the unit {each.si} is not known, and is kept as it is"
+        for each in taken
+        if not log.own and unit(each.si) is None
+    ]
     if asked is None:
         notes += changed(log, run)
     return Understood(run, log.form, base.said, taken, left, notes)
@@ -167,7 +172,7 @@ def _clock(log: Log, asked: Map | None) -> Column | None:
     if of_messages:
         return None
     free = [column for column in log.columns if not known(column.name)]
-    timed = [column for column in free if in_time(column.unit)]
+    timed = sorted((c for c in free if in_time(c.unit)), key=lambda c: c.times)
     bare = [c for c in free if not c.unit and c.name.lower().rpartition(".")[2] in TIMES]
     return next(iter(timed + bare), None)
 

@@ -10,6 +10,7 @@ from ...errors import InputError
 from ..quantities import EPOCH_S, LATEST_S, fault, unit
 from .log import Column, Log
 
+FASTEST_S = 2e-5  # most loggers of robots are slower
 LATE_S = 1000.0  # a clock that begins later counts from the first sample
 
 
@@ -47,6 +48,9 @@ def from_column(log: Log, column: Column, said: str, scale: tuple[float, float])
     if len(column.values) < 2:
         raise InputError("expected two rows or more", file=log.file)
     notes = []
+    if column.times and said != "s":
+        expected = "expected no other unit than s: its cells are dates or times of day"
+        raise InputError(expected, key=f"unit of {column.head!r}", value=said, file=log.file)
     if not said:
         said = _guessed(float(column.values[0]))
         notes.append(f"the clock {column.head!r} says no unit: {said} are taken")
@@ -60,6 +64,7 @@ def from_column(log: Log, column: Column, said: str, scale: tuple[float, float])
         t = own.to_si(scale[0] * column.since)
     measured = not log.own or log.meta.get("source") == "experiment"
     _check(log, t, f"clock {column.head!r}", measured, float(absolute[0]))
+    notes += _rate(t, said) if measured else []
     text = f"{column.head!r} in {said}"
     if column.since is not None and t is not absolute:
         return Timebase(t, float(absolute[0]), text, notes=notes)
@@ -109,6 +114,14 @@ def on(log: Log, base: Timebase, column: Column) -> np.ndarray:
         return np.full(len(t), np.nan)
     known, values = own.t[there], column.values[there]
     return np.interp(t, known, values, left=np.nan, right=np.nan)
+
+
+def _rate(t: np.ndarray, said: str) -> list[str]:
+    """A sentence on a clock that is faster than most loggers, or none."""
+    step = float(np.median(np.diff(t)))
+    if step > FASTEST_S:
+        return []
+    return [f"the clock has {1 / step:.4g} samples a second: is {said} its unit?"]
 
 
 def _check(log: Log, t: np.ndarray, said: str, measured: bool, first: float) -> None:

@@ -40,7 +40,8 @@ def fault(t: np.ndarray, measured: bool = False) -> Fault | None:
     if measured and len(t) >= FEW and np.median(np.diff(t)) > SLOWEST_S:
         step = float(t[1] - t[0])
         return Fault(
-            2, f"the time is {step:.4g} s after row 1: milliseconds, which pass for seconds?"
+            2,
+            f"the time is {step:.4g} s after row 1: is the clock in milliseconds or microseconds?",
         )
     return None
 

@@ -13,7 +13,7 @@ from ....errors import InputError
 from ...quantities import suffix, unit
 from ..log import Column, Log
 from ..names import parted
-from .text import decoded, gap, number, numbers, numeric
+from .text import decoded, gap, number, numbers, numeric, refused
 
 SEPARATORS = ("\t", ";", ",", "|", " ")
 NAMES = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": "strokes", " ": "blanks"}
@@ -69,14 +69,19 @@ def read(raw: bytes, file: str) -> Log:
     heads = _without_titles([cells for cells in above if len(cells) == width])[-3:]
     own = _own(comments)
     named = _named(heads or _from_comments(comments, separator, width), width, own.get("units", {}))
-    columns = []
+    columns, notes = [], []
     for k, (head, name, said) in enumerate(named):
-        values, since, wrong = numbers([cells[k] for cells in rows], comma)
+        found = numbers([cells[k] for cells in rows], comma)
         fault = ""
-        if wrong >= 0:
-            fault = f"row {wrong + 1} (line {places[wrong]}): {rows[wrong][k][:40]!r} is no number"
-        columns.append(Column(name, head, said, values, since, fault=fault))
-    form, notes = f"CSV, {encoding}, {NAMES[separator]}" + (", decimal comma" if comma else ""), []
+        if (wrong := found.wrong) >= 0:
+            fault = f"row {wrong + 1} (line {places[wrong]}): {refused(rows[wrong][k], comma)}"
+        said = "s" if found.times else said
+        columns.append(
+            Column(name, head, said, found.values, found.since, fault=fault, times=found.times)
+        )
+        if found.unordered:
+            notes.append(f"{head!r}: {rows[0][k]!r} is read as month/day/year")
+    form = f"CSV, {encoding}, {NAMES[separator]}" + (", decimal comma" if comma else "")
     if tuple(column.name for column in columns) == KLIPPER:
         form = "accelerometer CSV of Klipper"
         notes.append("accelerations are in mm/s^2, as Klipper writes them")
@@ -115,10 +120,26 @@ def _layout(lines: list[_Line], file: str) -> tuple[str, bool, int]:
                     best = rank, separator, comma, first
     if best is None:
         raise InputError(
-            "no table of numbers: expected rows of numbers under at most three rows of heads",
+            "no table of numbers: expected rows of numbers under at most three rows of heads"
+            + _seen(lines),
             file=file,
         )
     return best[1], best[2], best[3]
+
+
+def _seen(lines: list[_Line]) -> str:
+    """Where a file without a table looks most like one, and what is no number there."""
+    most, text = 0, ""
+    for line in lines[:PREAMBLE]:
+        there = [separator for separator in SEPARATORS[:-1] if separator in line.text]
+        for separator in there or SEPARATORS[-1:]:
+            cells = _cells(line.text, separator)
+            for comma in (False, True):
+                wrong = [cell for cell in cells if not numeric(cell, comma)]
+                count = sum(any(c.isdigit() for c in cell) for cell in cells)
+                if wrong and count > most:
+                    most, text = count, f"; line {line.number}: {refused(wrong[0], comma)}"
+    return text
 
 
 def _first(lines: list[_Line], separator: str, comma: bool) -> tuple[int, int, int, float] | None:

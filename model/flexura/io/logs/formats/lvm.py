@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from datetime import datetime
 from itertools import count
 
 import numpy as np
 
 from ....errors import InputError
 from ..log import Clock, Column, Log
-from .text import decoded, numbers
+from .moments import moment
+from .text import decoded, numbers, refused
 
 END = "***End_of_Header***"
 SEPARATORS = {"Tab": "\t", "Comma": ",", "Semicolon": ";"}
@@ -120,14 +120,15 @@ def _segment(
 
 def _numbers(rows: list[list[str]], k: int, comma: bool, line: int, file: str) -> np.ndarray:
     cells = [row[k] if k < len(row) else "" for row in rows]
-    values, _, wrong = numbers(cells, comma)
+    found = numbers(cells, comma)
+    wrong = found.wrong
     if wrong < 0:
         short = next((i for i, row in enumerate(rows[:-1]) if k >= len(row)), -1)
         wrong = short if k < len(rows[0]) else -1
         if wrong < 0:
-            return values
+            return found.values
     raise InputError(
-        f"{cells[wrong][:40]!r} is no number",
+        refused(cells[wrong], comma),
         key=f"row {wrong + 1} (line {line + wrong})",
         file=file,
     )
@@ -152,19 +153,14 @@ def _base(
     for key in ("X0", "Delta_X"):
         cells = own.get(key, "").split(separator)
         cell = cells[min(place, len(cells) - 1)]
-        value, _, wrong = numbers([cell], comma)
-        if wrong >= 0 or not np.isfinite(value[0]):
+        value = numbers([cell], comma)
+        if value.wrong >= 0 or not np.isfinite(value.values[0]):
             raise InputError("expected a number of seconds", key=key, value=cell, file=file)
-        found.append(float(value[0]))
+        found.append(float(value.values[0]))
     return found[0] + np.arange(length) * found[1]
 
 
 def _moment(date: str, time: str) -> float | None:
     """A header's date and time [s]."""
-    try:
-        clock = time.replace(",", ".")
-        whole, _, fraction = clock.partition(".")
-        moment = datetime.fromisoformat(f"{date.replace('/', '-')}T{whole}+00:00")
-        return moment.timestamp() + float(f"0.{fraction or 0}")
-    except ValueError:
-        return None
+    found = moment(f"{date} {time}")
+    return None if found is None else sum(found)

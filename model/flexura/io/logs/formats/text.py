@@ -5,12 +5,13 @@ from __future__ import annotations
 import codecs
 import math
 import re
-from datetime import datetime
+from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 
 import numpy as np
 
 from ....errors import InputError
+from .moments import day_first, moment
 
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
@@ -21,7 +22,16 @@ _MARKS = (
 )
 _GAPS = {"", "nan", "-nan", "+nan", "na", "n/a", "null", "none", "-", "--", "#n/a", "nan(ind)"}
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?|[+-]?inf(inity)?", re.IGNORECASE)
-_CLOCK = re.compile(r"(\d{1,2}):(\d\d):(\d\d(?:[.,]\d+)?)")
+# Thousands set apart, where no reading as a decimal sign is left: the key is the decimal comma.
+_GROUPED = {
+    comma: re.compile(
+        rf"[+-]?\d{{1,3}}(?:(?:{mark}\d{{3}})+{point}\d+|(?:{mark}\d{{3}}){{2,}})"
+        rf"|[+-]?\d{{1,3}}(?:[' \u00a0\u202f]\d{{3}})+(?:{point}\d+)?"
+    )
+    for comma, mark, point in ((False, ",", r"\."), (True, r"\.", ","))
+}
+_APART = re.compile("[' \u00a0\u202f]")
+DAY_S = 86400.0
 LONG = 15  # digits that a double holds in any case
 
 
@@ -45,7 +55,7 @@ def decoded(raw: bytes, file: str) -> tuple[str, str]:
         text, named = raw.decode("utf-8"), "UTF-8"
     except UnicodeDecodeError:
         text, named = raw.decode("cp1252", errors="replace"), "Windows-1252"
-    strange = sum(not (c.isprintable() or c in "\t\r\n\f") for c in text[:100_000])
+    strange = sum(not (c.isprintable() or c.isspace() or c in "\ufeff") for c in text[:100_000])
     if strange > 0.02 * min(len(text), 100_000):
         raise InputError("not a text, and no format of a log that is known", file=file)
     return text, named
@@ -68,6 +78,8 @@ def gap(cell: str) -> bool:
 def number(cell: str, comma: bool) -> float | None:
     """A cell as a number; None if it is none. `comma`: the decimal sign is a comma."""
     plain = cell.strip()
+    if _GROUPED[comma].fullmatch(plain):
+        plain = _APART.sub("", plain).replace("." if comma else ",", "")
     if comma:
         if "." in plain:
             return None
@@ -79,46 +91,72 @@ def number(cell: str, comma: bool) -> float | None:
 
 def numeric(cell: str, comma: bool) -> bool:
     """Whether a cell is a number, a gap or a time of day."""
-    return gap(cell) or number(cell, comma) is not None or moment(cell) is not None
+    if gap(cell) or number(cell, comma) is not None:
+        return True
+    return moment(cell) is not None or moment(cell, day_first=True) is not None
 
 
-def moment(cell: str) -> float | None:
-    """A date with a time, or a time of day, in seconds; None if it is none."""
-    plain = cell.strip()
-    if matched := _CLOCK.fullmatch(plain):
-        hours, minutes, seconds = matched.groups()
-        return 3600 * int(hours) + 60 * int(minutes) + float(seconds.replace(",", "."))
-    if ":" not in plain or not plain[:4].isdigit():
-        return None
-    try:
-        return datetime.fromisoformat(plain.replace("/", "-").replace(",", ".")).timestamp()
-    except (ValueError, OverflowError, OSError):
-        return None
+def refused(cell: str, comma: bool) -> str:
+    """Why a cell is no number."""
+    shown = repr(cell[:40])
+    if number(cell, not comma) is not None:
+        other = "point" if comma else "comma"
+        return (
+            f"{shown} has a decimal {other}, or thousands set apart: expected numbers without, "
+            f"and a decimal {'comma' if comma else 'point'}"
+        )
+    if ":" in cell and any(c.isdigit() for c in cell):
+        return f"{shown} is no time: expected one as 2026-11-29 14:03:05.1, or a time of day"
+    return f"{shown} is no number"
 
 
-def numbers(cells: list[str], comma: bool) -> tuple[np.ndarray, np.ndarray | None, int]:
+@dataclass(frozen=True)
+class Cells:
+    """A column of cells as numbers.
+
+    Attributes:
+        values: (T,); NaN in gaps.
+        since: the same less the first one if they are long or dates, or None.
+        wrong: place from 0 of the first cell that is no number, or -1; no later one is read.
+        times: whether they are dates with times, or times of day: values are in seconds.
+        unordered: whether they are dates, and none tells the day from the month.
+    """
+
+    values: np.ndarray
+    since: np.ndarray | None = None
+    wrong: int = -1
+    times: bool = False
+    unordered: bool = False
+
+
+def numbers(cells: list[str], comma: bool) -> Cells:
     """A column of cells as numbers.
 
     Args:
         cells: of one column.
         comma: whether the decimal sign is a comma.
-
-    Returns:
-        Values (T,), NaN in gaps; the same less the first one if they are long, or None; the place
-        from 0 of the first cell that is no number, or -1.
     """
-    out = np.full(len(cells), np.nan)
-    long = False
+    out: np.ndarray = np.full(len(cells), np.nan)
+    days: np.ndarray = np.zeros(len(cells))
+    long, times, order = False, False, None
     for k, cell in enumerate(cells):
         value = number(cell, comma)
         if value is None and not gap(cell):
-            value = moment(cell)
-            if value is None:
-                return out, None, k
+            order = day_first(cells) if not times else order
+            found = moment(cell, bool(order))
+            if found is None:
+                return Cells(out, wrong=k)
+            days[k], value = found
+            times = True
         if value is not None:
             out[k] = value
             long = long or (len(cell) > LONG and abs(value) > 1e8)
-    return out, _since(cells, comma) if long else None, -1
+    if times:
+        if not days.any():  # past midnight
+            days = DAY_S * np.cumsum(np.diff(out, prepend=out[0]) < -DAY_S / 2)
+        since = (days - days[0]) + (out - out[0])
+        return Cells(days + out, since, times=True, unordered=order is None)
+    return Cells(out, _since(cells, comma) if long else None)
 
 
 def _since(cells: list[str], comma: bool) -> np.ndarray | None:
@@ -128,7 +166,7 @@ def _since(cells: list[str], comma: bool) -> np.ndarray | None:
             None if gap(c) else Decimal(c.strip().replace(",", ".") if comma else c.strip())
             for c in cells
         ]
-    except InvalidOperation:  # dates
+    except InvalidOperation:  # thousands set apart
         return None
     first = next(value for value in exact if value is not None)
     if not all(v is None or v.is_finite() for v in exact):
