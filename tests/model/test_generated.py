@@ -23,6 +23,7 @@ from flexura.control import load_gains
 from generators import files, robots
 from generators.drawn import Drawn
 from generators.identities import faults
+from generators.loops import by_methods
 from generators.trial import Count, by_twin, by_two_methods, judge, trials
 
 MOST_REFUSED = 0.05  # of what is well-formed
@@ -107,6 +108,23 @@ def test_400_generated_robots(first):
     found = trials(first, 200, odd=True)
     print(found)
     assert found.wrong == []
+
+
+def test_some_sampled_loops():
+    found = Count()
+    for seed in range(50, 58):
+        found.add(by_methods(seed))
+    print(found)
+    assert found.wrong == [] and found.ends["auto alike"] > 2
+
+
+@pytest.mark.slow
+def test_300_sampled_loops():
+    found = Count()
+    for seed in range(1000, 1300):
+        found.add(by_methods(seed))
+    print(found)
+    assert found.wrong == [] and found.ends["auto alike"] > 90
 
 
 @pytest.mark.slow

@@ -22,16 +22,20 @@ def frequencies(
             "--zeros", help="also the transmission zeros from each drive to its joint and the tip"
         ),
     ] = False,
+    count: Annotated[
+        int | None,
+        typer.Option(min=1, metavar="N", help="only the lowest N frequencies; default: all"),
+    ] = None,
     json: Json = False,
 ) -> None:
     """Compute natural frequencies at the start, with joints locked and free.
 
     \b
-    Example: flexura frequencies two-link-arm --zeros
+    Example: flexura frequencies two-link-arm --count 6 --zeros
     """
     described = fx.load(robot)
     system = fx.assemble(described)
-    locked, free = (fx.frequencies(system, joints=joints) for joints in ("locked", "free"))
+    locked, free = (fx.frequencies(system, joints=j, count=count) for j in ("locked", "free"))
     rows = transmission(fx.linearize(system)) if zeros else []
     title = described.name or robot.stem
     found = {"locked_Hz": locked.tolist(), "free_Hz": free.tolist()}

@@ -52,6 +52,8 @@ def check_table(check: Check) -> Table:
             f"twin's own error: of its step of {number(check.twin.meta['step_s'], 3)} s, "
             "relative to the peak, from a run with another step"
         )
+    elif not (check.simulation.complete and check.twin.complete):
+        table.notes.append("twin's own error: not known, as a run did not come to its end")
     return table
 
 
@@ -186,6 +188,9 @@ def frequency_tables(
     )
     for k in range(max(len(locked), len(free))):
         table.add(str(k + 1), *(number(f[k], 5) if k < len(f) else "" for f in (locked, free)))
+    table.notes.append(
+        "frequencies near the highest of a mesh are the mesh's: more elements show which stay"
+    )
     return [table, *([_zero_table(zeros)] if zeros else [])]
 
 

@@ -74,14 +74,14 @@ def numbers(done: fx.Population, chosen: dict[str, np.ndarray], folder: Path) ->
     robots = done.robots
     peaks: list[dict[str, Any]] = []
     each: list[dict[str, Any]] = [
-        {"robot": int(k) + 1, "vary": {key: float(values[k]) for key, values in chosen.items()}}
+        {"robot": int(k), "vary": {key: float(values[k - 1]) for key, values in chosen.items()}}
         | {"ended": str(status), "peaks": {}}
         for k, status in zip(robots[:SHOWN], done.status[:SHOWN], strict=True)
     ]
     for name, unit in done.units.items():
         size = np.concatenate([np.nan_to_num(np.abs(chunk[name])).max(axis=1) for chunk in done])
         at = int(robots[int(size.argmax())])
-        where = {key: float(values[at]) for key, values in chosen.items()}
+        where = {key: float(values[at - 1]) for key, values in chosen.items()}
         for row, value in zip(each, size, strict=False):
             row["peaks"][name] = float(value)
         peaks.append(

@@ -70,6 +70,10 @@ class Batch:
     count: int
     seed: int = 0
 
+    def __repr__(self) -> str:
+        keys = ", ".join(self.varied)
+        return f"Batch: {self.count} robots" + (f", which differ in {keys}" if keys else "")
+
     @staticmethod
     def of(
         robots: Iterable[object] | Callable[[int, np.random.Generator], object],
@@ -137,6 +141,9 @@ class Batch:
                 key="changes",
                 value=sorted(counts),
             )
+        for key, values in columns.items():
+            if not acts(key):
+                _check_key(robot, key, values)
         return Batch(_Varied(robot, columns), counts.pop())
 
     @property
@@ -165,9 +172,10 @@ class Batch:
             first = first or shape
             if shape != first:
                 raise InputError(
-                    "expected robots of one topology, that of the first",
+                    "expected robots of one topology, as the first: joint types, elements, modes, "
+                    "locks",
                     key=f"robots[{k + 1}]",
-                    value=shape,
+                    value=robot.structure,
                 )
             yield robot, drive
         if k + 1 < self.count:
@@ -248,6 +256,19 @@ class _Varied(Sequence[Robot]):
         some = {key: values[:1] for key, values in self.of_robot.items()}
         plain = not self.robot.nodal and good(self.robot, self.of_robot)
         return plain and varied(self.robot, some, 1) is not None
+
+
+def _check_key(robot: Robot, key: str, values: np.ndarray) -> None:
+    """Refuse a key that the robot has not: none of its values is possible there."""
+    first: InputError | None = None
+    for value in {values[0], values[len(values) // 2], values[-1]}:
+        try:
+            robot.replace({key: float(value)})
+            return
+        except InputError as error:
+            first = first or error
+    if first is not None:
+        raise InputError(first.expected, key=f"changes[{key!r}]", value=first.value)
 
 
 def topology(robot: Robot) -> tuple[Any, ...]:

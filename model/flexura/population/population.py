@@ -46,7 +46,7 @@ class Population:
     "done", "limit", "stuck", "unbalanced" (energies that miss more than a tenth) or "refused" (a
     robot that cannot be assembled or starts outside its limits). A robot's values are NaN from
     where it stopped. Of an interrupted population only the robots that are done have rows:
-    `population.robots`, counted from 0. `base`: the robot that `Batch.vary` began with; None for
+    `population.robots`, counted from 1. `base`: the robot that `Batch.vary` began with; None for
     other batches. `acting`: tables of the loads and changes of the payload, if there were any.
     """
 
@@ -94,7 +94,8 @@ class Population:
         parts = [(chunk.values.get(name), len(chunk)) for chunk in self]
         known = next((values for values, _ in parts if values is not None), None)
         if known is None:
-            raise KeyError(f"no {name!r} was kept")
+            kept = ", ".join(next(iter(self)).values) if len(self.robots) else "nothing"
+            raise KeyError(f"no {name!r} was kept; kept are: {kept}")
         # a chunk of refused robots has no reduced numbers
         nothing = lambda rows: np.full((rows, *known.shape[1:]), np.nan)
         return np.concatenate(
@@ -103,9 +104,9 @@ class Population:
 
     @property
     def robots(self) -> np.ndarray:
-        """The numbers of the robots that are done, from 0."""
+        """The numbers of the robots that are done, from 1, as `run` takes them."""
         return np.concatenate(
-            [np.arange(c.first, c.first + len(c)) for c in self] or [np.zeros(0, dtype=int)]
+            [np.arange(c.first, c.first + len(c)) + 1 for c in self] or [np.zeros(0, dtype=int)]
         )
 
     @property

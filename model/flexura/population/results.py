@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from ..errors import InputError
-from ..io import Run, Tables, changed
+from ..io import Run, Tables, changed, whole
 from ..signals import acts
 
 if TYPE_CHECKING:
@@ -73,10 +73,10 @@ def tabulated(population: Simulated) -> tuple[dict[str, np.ndarray], dict[str, s
 
 def one_run(population: Simulated, robot: int) -> Run:
     """The channels of one robot, from 1; see `Population.run`."""
-    if isinstance(robot, bool) or not isinstance(robot, int) or not 1 <= robot <= population.count:
-        raise InputError(
-            f"expected the number of a robot, 1 to {population.count}", key="robot", value=robot
-        )
+    expected = f"expected the number of a robot, 1 to {population.count}"
+    robot = whole(robot, "robot", 1, expected)
+    if robot > population.count:
+        raise InputError(expected, key="robot", value=robot)
     for chunk in population:
         k = robot - 1 - chunk.first
         if 0 <= k < len(chunk):

@@ -302,9 +302,7 @@ def _event(
     if word == "limit":
         return str(limit_event(System(robot), joint, t, position)["text"])
     if word == "refused" and text is None:
-        limits = robot.links[joint].joint.limits
-        assert limits is not None
-        return str(limit_error(joint, limits, float(position[joint])))
+        return str(limit_error(System(robot), joint, float(position[joint])))
     link, key, said = text or (-1, "", "")
     if word != "refused":
         return said

@@ -108,6 +108,12 @@ class Signal:
             raise InputError("expected a table", key="spec", value=self.spec)
         object.__setattr__(self, "segments", given)
 
+    def __repr__(self) -> str:
+        """Its table, without the values of long lists."""
+        said = {k: f"{len(v)} values" if isinstance(v, list) else v for k, v in self.spec.items()}
+        parts = [f"{key}={value}" for key, value in said.items()] or [f"{len(self.segments)} rows"]
+        return f"Signal({', '.join(parts)})"
+
     def __call__(self, t: float) -> tuple[float, float, float]:
         """y, dy/dt and d2y/dt2.
 

@@ -172,7 +172,7 @@ def initial_value_problem(
         q, qd, accounts = state_at_end(before, system, t, {"q0": q0, "qd0": qd0, "start": start})
         start = "continued"
         apply_prescribed_motions(system.joint_rows, acting, t[0], q, qd)
-        check_limits(system, q)
+        check_limits(system, q, acting)
     if not system.exact and isinstance(acting, Controller):
         expected = (
             'expected a robot with stiffening = true and sliding = "continuous" under a Controller'

@@ -8,10 +8,10 @@ import numpy as np
 
 from ..io import STATIONS, Run, Tables, judged
 from ..robot import Robot
-from ..signals import Loads
+from ..signals import Drive, Loads
 from ..system import RunStates, System, sensor_channels
 from .internal_forces import force_channels, force_units
-from .problem import Solution
+from .problem import Problem, Solution
 
 
 def channel_units(robot: Robot) -> dict[str, str]:
@@ -112,6 +112,23 @@ def record(
     return judged(Run(t, channels, units, about, states))
 
 
+def off_motion(problem: Problem) -> list[Tables]:
+    """An event for each joint whose motion begins elsewhere than the joint that is to follow it."""
+    if not isinstance(problem.drive, Drive) or problem.start == "continued":
+        return []
+    out: list[Tables] = []
+    t, links = float(problem.t[0]), problem.system.robot.links
+    places = problem.q[problem.system.joint_rows]
+    for i, (own, link, q) in enumerate(zip(problem.drive.joints, links, places, strict=True), 1):
+        if own.motion is None or own.prescribed:
+            continue
+        begin, unit = own.motion(t)[0], "rad" if link.joint.type == "R" else "m"
+        if abs(begin - q) > STILL:
+            text = f"joint {i} starts at {q:.4g} {unit}, the motion that it follows at {begin:.4g}"
+            out.append({"t": t, "level": "INFO", "name": "off_motion", "text": text})
+    return out
+
+
 def still(run: Run) -> list[Tables]:
     """The event of a run in which nothing moves and no drive acts; none of another."""
     drives = [values for name, values in run.channels.items() if name.endswith("/drive")]
@@ -166,7 +183,8 @@ def limit_event(system: System, joint: int, t: float, position: np.ndarray) -> T
         robot.travel(joint),
     )
     bound = low if abs(position[joint] - low) < abs(position[joint] - high) else high
-    if abs(position[joint] - bound) > 1e-6 * max(1.0, abs(bound)):
+    inside = joint > 0 and robot.links[joint - 1].joint.type == "Pb" and kind == "Pa"
+    if inside and abs(position[joint] - bound) > 1e-6 * max(1.0, abs(bound)):
         name, text = (
             "sleeve",
             f"joint {joint + 1} (Pa) ran into the sleeve of link {joint}: stopped",

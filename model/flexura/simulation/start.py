@@ -15,6 +15,8 @@ from ..robot import Robot
 from ..signals import STARTS, Drive, Loads
 from ..system import NoEquilibrium, System, static
 
+SLACK = 1e-9  # of a limit, or m or rad: a motion may begin on one, up to round-off
+SAME_PLACE = 1e-6  # of the robot's length
 NO_START = 'start = "straight" begins with straight links, q0 with a state of your own'
 
 
@@ -56,7 +58,7 @@ def consistent_start(
     which = resolve_start(system.robot, q0, start)
     qd[system.joint_rows[system.locked]] = 0.0
     apply_prescribed_motions(system.joint_rows, drive, t, q, qd)
-    check_limits(system, q)
+    check_limits(system, q, drive)
     if which == "static":
         try:
             q = static(system, q[system.joint_rows], loads=loads, t=t)
@@ -117,9 +119,10 @@ def state_at_end(
         text = "expected a run of fx.simulate in this session: archived runs have no states"
         raise InputError(text, key=key, value=f"a run of {run.meta.get('source')}")
     if run.states.shape[1] != 2 * n:
-        text = f"expected a run of a robot with {n} unknowns"
-        raise InputError(text, key=key, value=run.states.shape[1] // 2)
+        text = f"expected a run of this robot, which has {n} unknowns"
+        raise InputError(text, key=key, value=f"a run with {run.states.shape[1] // 2}")
     _check_payload(run, system)
+    _check_places(run, system)
     end = float(run.t[-1])
     if abs(t[0] - end) > 1e-9 * max(1.0, abs(end)):
         text = f"expected times that begin at the end of the run that is continued, {end:g} s"
@@ -127,6 +130,19 @@ def state_at_end(
     accounts = [float(run[f"energy/{name}"][-1]) for name in ("work", "loss", "numerical_loss")]
     z = run.states[-1]
     return z[:n].copy(), z[n:].copy(), np.array([*accounts, 0.0])
+
+
+def _check_places(run: Run, system: System) -> None:
+    """Refuse a robot whose tip is elsewhere in the run's last state: its links are others."""
+    if run.states is None or "tip/x" not in run:
+        return
+    before = np.array([run["tip/x"][-1], run["tip/y"][-1]])
+    _, after = system.places(run.states[-1][: system.n])
+    size = sum(link.length_m for link in system.robot.links)
+    if np.hypot(*(after - before)) > SAME_PLACE * max(size, float(np.abs(before).max())):
+        shown = [f"({x:.6g}, {y:.6g})" for x, y in (before, after)]
+        text = f"expected a run of this robot; its tip would jump from {shown[0]} to {shown[1]} m"
+        raise InputError(text, key="continue_from", value="a run of another robot")
 
 
 def _check_payload(run: Run, system: System) -> None:
@@ -186,37 +202,49 @@ def apply_prescribed_motions(
             q[row], qd[row], _ = joint.motion(t)
 
 
-def check_limits(system: System, q: np.ndarray) -> None:
-    """Refuse a joint that starts outside its limits.
+def check_limits(system: System, q: np.ndarray, drive: Any = None) -> None:
+    """Refuse a joint that starts outside its limits, or beyond the end of the link that it is on.
 
     Args:
         system: the robot.
         q: configuration (n,).
+        drive: what acts: a prescribed joint starts on its motion.
 
     Raises:
         InputError: a joint is outside.
     """
-    for i, (link, row) in enumerate(zip(system.robot.links, system.joint_rows, strict=True), 1):
-        if (
-            link.joint.limits is not None
-            and not link.joint.limits[0] <= q[row] <= link.joint.limits[1]
-        ):
-            raise limit_error(i - 1, link.joint.limits, float(q[row]))
+    for i, (row, bounds) in enumerate(zip(system.joint_rows, system.limits, strict=True)):
+        slack = SLACK * np.maximum(1.0, np.abs(bounds))
+        if not bounds[0] - slack[0] <= q[row] <= bounds[1] + slack[1]:
+            raise limit_error(system, i, float(q[row]), _prescribed(drive, i))
 
 
-def limit_error(joint: int, limits: tuple[float, float], position: float) -> InputError:
+def limit_error(
+    system: System, joint: int, position: float, prescribed: bool = False
+) -> InputError:
     """Why a joint cannot start at a position.
 
     Args:
+        system: the robot.
         joint: its number, from 0.
-        limits: the lowest and the highest position [m or rad].
         position: the position [m or rad].
+        prescribed: whether its motion begins there.
 
     Returns:
         The error to raise.
     """
+    low, high = (float(bound) for bound in system.limits[joint])
+    ends = "" if system.robot.links[joint].joint.limits else "; it slides between a link's ends"
     return InputError(
-        f"expected a start inside the limits of joint {joint + 1}, {list(limits)}",
-        key="q0",
+        f"expected a start inside the limits of joint {joint + 1}, {low:g} to {high:g}{ends}",
+        key=f"motion of joint {joint + 1}" if prescribed else "q0",
         value=position,
     )
+
+
+def _prescribed(drive: Any, joint: int) -> bool:
+    """Whether a joint, from 0, is held to a motion."""
+    if not isinstance(drive, Drive | Controller):
+        return False
+    own = drive.joints[joint]
+    return not isinstance(own, PID) and own.prescribed and own.motion is not None

@@ -55,7 +55,7 @@ def test_a_killed_worker_loses_nothing_and_counts_nothing_twice(cluster, tmp_pat
     assert workers[0].wait(10) == -signal.SIGKILL and workers[1].poll() is None
     assert (
         done.complete
-        and list(done.robots) == list(range(400))
+        and list(done.robots) == list(range(1, 401))
         and len(seen) == 40
         and seen[-1] == 1.0
     )
@@ -78,7 +78,7 @@ def test_a_cluster_goes_on_with_a_folder_that_was_begun_here(cluster, tmp_path):
             raise KeyboardInterrupt
 
     part = fx.simulate(BATCH, T, DRIVE, folder=tmp_path, chunk=50, progress=stop)
-    assert not part.complete and list(part.robots) == list(range(150))
+    assert not part.complete and list(part.robots) == list(range(1, 151))
     whole = fx.simulate(BATCH, T, DRIVE, folder=tmp_path, chunk=50, scheduler=address)
     assert whole.complete and same(whole, fx.simulate(BATCH, T, DRIVE))
 

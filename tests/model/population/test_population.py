@@ -230,7 +230,7 @@ def test_chunks_do_not_change_the_numbers(tmp_path, chunk):
         and seen[-1] == 1.0
         and seen == sorted(seen)
     )
-    assert list(done.robots) == list(range(20))
+    assert list(done.robots) == list(range(1, 21))
 
 
 def test_what_is_done_is_not_done_again(tmp_path):
@@ -364,7 +364,7 @@ def test_a_stopped_population_goes_on_where_it_was(tmp_path, how):
     assert all((tmp_path / name).read_bytes() == content for name, content in files.items())
     batch = fx.Batch.vary(ARM, {"payload.mass_kg": np.linspace(0, 0.1, 600)})
     done = fx.simulate(batch, np.linspace(0, 2, 21), DRIVE, rtol=1e-9, folder=tmp_path, chunk=20)
-    assert list(done.robots) == list(range(600)) and done.complete
+    assert list(done.robots) == list(range(1, 601)) and done.complete
     whole = fx.simulate(batch, np.linspace(0, 2, 21), DRIVE, rtol=1e-9)
     assert same(done, whole)
 

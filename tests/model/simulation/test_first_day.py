@@ -336,8 +336,41 @@ def test_what_cannot_be_continued_says_why(tmp_path):
         assert caught.value.key == key
     with pytest.raises(fx.InputError, match=r"^t_eval = 0.3: expected times that begin at the end"):
         fx.simulate(RIG, t + 0.3, continue_from=first)
-    with pytest.raises(fx.InputError, match=r"^continue_from = 10: expected a run of a robot with"):
+    with pytest.raises(
+        fx.InputError, match=r"'a run with 10': expected a run of this robot, which"
+    ):
         fx.simulate(ARM, t + 0.2, continue_from=first)
+    longer = fx.load(RIG).replace({"link.2.length_m": 1.1 * fx.load(RIG).links[1].length_m})
+    with pytest.raises(fx.InputError, match=r"its tip would jump from .* to .* m$"):
+        fx.simulate(longer, t + 0.2, continue_from=first)
+
+
+@pytest.mark.parametrize(
+    ("name", "beyond", "key"),
+    [
+        ("single-pb", 5.0, "q0"),
+        ("single-pb", 0.0, "motion of joint 1"),
+        ("rig", 9.0, "q0"),
+        ("rig", -1.0, "motion of joint 1"),
+    ],
+)
+def test_a_start_beyond_the_ends_of_a_link_is_refused(name, beyond, key):
+    """A sleeve has a least free length; a slider of type IV has the file's limits, or none."""
+    robot = fx.load(name)
+    system, t = fx.assemble(robot), [0.0, 0.1]
+    if not np.isfinite(system.limits[0]).all():
+        robot = robot.replace({"link.1.joint.limits_m": [-0.5, 0.5]})
+        system = fx.assemble(robot)
+    low, high = system.limits[0]
+    with pytest.raises(
+        fx.InputError, match=f"inside the limits of joint 1, {low:g} to {high:g}"
+    ) as caught:
+        if key == "q0":
+            fx.simulate(robot, t, q0=np.r_[beyond, system.start()[1:]])
+        else:
+            others = [0.0] * (len(robot.links) - 1)
+            fx.inverse(robot, t, [fx.signals.constant(beyond), *others])
+    assert caught.value.key == key
 
 
 # ---- runs that are ended

@@ -97,7 +97,7 @@ def judge(rng: Any, odd: bool, name: str, made: fx.Robot | None = None) -> Count
             warnings.simplefilter("error")
             _try(rng, odd, out, name) if made is None else _manoeuvre(rng, made, out, name)
     except fx.FlexuraError as error:
-        out.refused[_kind(error)] += 1
+        out.refused[kind_of(error)] += 1
         if not str(error).isprintable() or len(str(error)) > 600:
             out.wrong.append(f"{name}: the message {str(error)!r}")
     except Exception:
@@ -151,7 +151,7 @@ def by_two_methods(seed: int) -> Count:
         other = "implicit" if one.meta["method"] != "implicit" else "explicit"
         two = fx.simulate(system, t, acting, method=other, rtol=1e-8, **keys)
     except fx.FlexuraError as error:
-        out.refused[_kind(error)] += 1
+        out.refused[kind_of(error)] += 1
         return out
     if not (one.complete and two.complete):
         out.ends["not both to the end"] += 1
@@ -226,7 +226,7 @@ def faults_of(run: fx.Run, took: float) -> list[str]:
     return wrong
 
 
-def _kind(error: Any) -> str:
+def kind_of(error: Any) -> str:
     """What was refused and why, without the robot's own numbers."""
     key = getattr(error, "key", "")
     text = getattr(error, "expected", "") or str(error)

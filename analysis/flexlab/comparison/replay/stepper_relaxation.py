@@ -32,8 +32,8 @@ MAX_ROUNDS = 40
 # rounds in which k changes; assumed torques from which the next one is made
 STIFFNESS_ROUNDS, ANDERSON_DEPTH = 3, 6
 # rounds without progress after which what is left is the integrator's own error, if it is so small
-# a multiple of the tolerance
-STALLED, PROGRESS, FLOOR = 6, 0.8, 4.0
+# a multiple of the tolerance, or of what the integrator may be wrong by
+STALLED, PROGRESS, FLOOR, OF_RTOL = 6, 0.8, 4.0, 0.5
 TORQUE_TOLERANCE = (
     5e-4  # of the holding torque: what the assumed torque may differ by from the field's
 )
@@ -125,7 +125,7 @@ def simulate_with_stepper(
             best, nearest, found = residual, run, (k, assumed.copy())
         if best < PROGRESS * mark:
             mark, since = best, n
-        stalled = n - since >= STALLED and best < FLOOR * tolerance
+        stalled = n - since >= STALLED and best < max(FLOOR * tolerance, OF_RTOL * rtol)
         if nearest is not None and (best < tolerance or stalled):
             relaxed.stiffness_N_m, relaxed.torque_N_m = found
             nearest.meta["relaxation_rounds"] = n

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...errors import InputError, guarded
-from ...io import Run, choice, number, whole
+from ...io import Run, choice, number, summary, whole
 from ..statics import static
 from ..system import RobotLike, System, assemble
 from .mode_motion import moving_run
@@ -32,6 +32,15 @@ class Modes:
     labels: tuple[str, ...]
     damping_ratios: np.ndarray
     system: System = field(repr=False, compare=False)
+
+    def __repr__(self) -> str:
+        rows = [
+            (str(k), f"{frequency:.6g} Hz, damping ratio {ratio:.3g}")
+            for k, (frequency, ratio) in enumerate(
+                zip(self.frequencies_Hz, self.damping_ratios, strict=True), 1
+            )
+        ]
+        return summary.text(f"Modes: {len(rows)} of {len(self.labels)} unknowns", rows)
 
     def run(self, mode: int = 1, *, amplitude_m: float | None = None, periods: int = 1) -> Run:
         """A Run of the robot in one of its modes, undamped.
