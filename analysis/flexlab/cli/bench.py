@@ -201,8 +201,8 @@ def inverse(
         joints = bench.rig.joints
         asked = None if manoeuvre is None else fx.load_manoeuvre(manoeuvre, joints)
         try:
-            chosen = asked or bench.manoeuvre
-            return plan.inverse(bench, settings, shaped(chosen, filed) if filed else chosen)
+            shape = None if filed is None else lambda whole: shaped(whole, filed)
+            return plan.inverse(bench, settings, asked, shape)
         except fx.InputError as error:
             raise error.in_file(str(manoeuvre) if manoeuvre else bench.rig.manoeuvre) from None
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -101,16 +101,21 @@ def gains(path: Path) -> dict[str, float]:
 
 
 def inverse(
-    setup: RigSetup, settings: dict[str, float], manoeuvre: fx.Manoeuvre | None = None
+    setup: RigSetup,
+    settings: dict[str, float],
+    manoeuvre: fx.Manoeuvre | None = None,
+    shape: Callable[[fx.Manoeuvre], fx.Manoeuvre] | None = None,
 ) -> Plan:
     """Plan of the inverse experiment: the firmware's controllers track a manoeuvre's motions.
 
-    A lead-in and lead-out are added if the motions do not start or end at rest.
+    A lead-in and lead-out are added if the motions do not start or end at rest. All of that, from
+    rest to rest, is shaped.
 
     Args:
         setup: the rig.
         settings: the board's settings, by name.
         manoeuvre: by default that of the rig file.
+        shape: makes a shaped manoeuvre of one.
 
     Raises:
         InputError: a joint has no motion.
@@ -133,6 +138,7 @@ def inverse(
     )
     led = [with_lead_in(motion, asked.duration_s, lead_s, out_s) for motion in motions]
     whole = _manoeuvre_of(asked.name, led, lead_s + asked.duration_s + out_s)
+    whole = shape(whole) if shape else whole
     parts = (
         (0.0, "lead in", lead_s),
         (lead_s, "manoeuvre", True),
@@ -141,7 +147,9 @@ def inverse(
     phases = [{"t": t, "name": name} for t, name, there in parts if there]
     plan = _tracking_plan("inverse", setup, settings, whole)
     return dataclasses.replace(
-        plan, asked=asked.spec() | {"lead_s": lead_s, "out_s": out_s}, phases=phases
+        plan,
+        asked=asked.spec() | {"lead_s": lead_s, "out_s": out_s, "shaped": shape is not None},
+        phases=phases,
     )
 
 

@@ -12,10 +12,10 @@ from boards import elf
 from experiments import BENCH, SETTINGS, experiment
 from flexlab.experiment import plan as plans
 from flexlab.experiment.run_experiment import open_board
+from flexlab.identification.vibration.shapers import Shaper, shaped
 from flexura import signals
 from flexura.signals import constant, trapezoidal
 
-pytestmark = pytest.mark.slow
 MOVE_S, END_RAD, SEED = 0.25, 0.5, 3
 
 
@@ -75,6 +75,20 @@ def turn(motion) -> plans.Plan:
     return plans.inverse(BENCH, SETTINGS, fx.Manoeuvre("turn and stop", 2.2, 0.01, drive))
 
 
+def test_a_motion_that_does_not_rest_is_shaped_with_its_lead_out():
+    """The rig's harmonic motions end at speed: shaped, they come to the same rest, a period
+    later."""
+    frequency = 4.76
+    plain = plans.inverse(BENCH, SETTINGS)
+    shaper = Shaper("zvd", frequency, 0.0)
+    made = plans.inverse(BENCH, SETTINGS, None, lambda whole: shaped(whole, shaper))
+    assert made.duration_s == pytest.approx(plain.duration_s + 1 / frequency)
+    for one, other in zip(plain.knots.columns.values(), made.knots.columns.values(), strict=True):
+        assert abs(one[-1] - other[-1]) <= 1 and abs(one[0] - other[0]) <= 1
+    assert made.phases == plain.phases and plain.asked["out_s"] > 0
+
+
+@pytest.mark.slow
 def test_shaping_from_the_identified_frequency_brings_the_strip_to_rest(tmp_path):
     """ZV and ZVD at the identified frequency: a twentieth of the unshaped vibration. 10 % off: ZVD
     still a tenth, ZV not."""

@@ -135,6 +135,13 @@ def test_simulate_and_bench_take_a_shaper(tmp_path):
         left[kind] = np.ptp(run["link/1/tip_deflection"][after])
     assert left["zv"] < 0.1 * left[None] and left["zvd"] < 0.1 * left[None]
     assert left["ei"] < 0.12 * left[None]
+    manoeuvre.write_text(
+        'name = "swing"\nduration_s = 1.5\n[[joint]]\nprescribed = true\n'
+        'motion = { kind = "harmonic", amplitude = 0.1, frequency_Hz = 0.5 }\n'
+    )
+    words = ["simulate", "single-r", manoeuvre, "--shaper", tmp_path / "zv.toml"]
+    status, _, err = command(words)
+    assert status == 2 and "joint[1].motion" in err and "comes to rest" in err
     status, _, err = command(["bench", "inverse", "--shaper", manoeuvre])
     assert status == 2 and "[shaper]" in err and "turn.toml" in err
 
@@ -147,6 +154,7 @@ def test_simulate_and_bench_take_a_shaper(tmp_path):
         ('kind = "zv"\nfrequency_Hz = -3.0\n', "shaper.frequency_Hz"),
         ('kind = "zv"\nfrequency_Hz = 3.0\ndamping_ratio = 1.5\n', "shaper.damping_ratio"),
         ('kind = "zv"\nfrequency_Hz = 3.0\nzeta = 0.5\n', "shaper.zeta"),
+        ('kind = "zv"\nfrequency_Hz = 3.0\ntolerance = 0.1\n', "shaper.tolerance"),
     ],
 )
 def test_a_wrong_shaper_is_refused_by_its_key(text, key, tmp_path):

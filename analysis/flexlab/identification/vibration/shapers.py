@@ -13,6 +13,7 @@ from flexura.io import read_toml
 from flexura.signals import Drive, Signal, ei, zv, zvd
 
 KINDS = {"zv": zv, "zvd": zvd, "ei": ei}
+AT_REST = 1e-9  # m/s or rad/s: a motion that is slower at its end comes to rest there
 _KEYS = ("kind", "frequency_Hz", "damping_ratio", "tolerance")
 
 
@@ -72,6 +73,13 @@ def read_shaper(path: str | Path) -> Shaper:
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise InputError("expected a number", key=f"shaper.{key}", value=value, file=file)
         found[key] = float(value)
+    if "tolerance" in table and kind != "ei":
+        raise InputError(
+            "expected no tolerance: only ei has one",
+            key="shaper.tolerance",
+            value=table["tolerance"],
+            file=file,
+        )
     made = Shaper(str(kind), **found)
     try:
         made.shape(fx.signals.step(1.0))
@@ -86,11 +94,20 @@ def shaped(asked: fx.Manoeuvre, shaper: Shaper) -> fx.Manoeuvre:
     """A manoeuvre whose motions are shaped, longer by what the shaper takes.
 
     Raises:
-        InputError: no joint has a motion.
+        InputError: no joint has a motion, or one goes on at the manoeuvre's end.
     """
     joints = asked.drive.joints
     if all(joint.motion is None for joint in joints):
         raise InputError("missing: no joint has a motion that could be shaped", key="motion")
+    for number, joint in enumerate(joints, 1):
+        speed = 0.0 if joint.motion is None else joint.motion(asked.duration_s)[1]
+        if abs(speed) > AT_REST:
+            raise InputError(
+                f"expected a motion that comes to rest: at the manoeuvre's end, "
+                f"{asked.duration_s:g} s, this one goes on",
+                key=f"joint[{number}].motion",
+                value=speed,
+            )
     new = [j if j.motion is None else replace(j, motion=shaper.shape(j.motion)) for j in joints]
     duration = asked.duration_s + shaper.lengthens_s
     return replace(asked, duration_s=duration, drive=Drive(tuple(new)))
