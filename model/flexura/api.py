@@ -1,4 +1,4 @@
-"""The door of `flexura`: one robot or many, by the same call."""
+"""Simulation of one robot or of many, by the same call."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The one door to the compiled core: flat arrays of float64 in, flat arrays out.
+"""The only interface to the compiled core: flat arrays of float64 in, flat arrays out.
 
 The core (`model/core`, C++) is compiled when flexura is installed, never later. On x86-64 a wheel
 has two builds of it: one for processors of the level x86-64-v3 (most since 2013) and a plain one

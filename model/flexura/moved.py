@@ -1,4 +1,4 @@
-"""Modules of flexura 0.1 by their old names: they answer with the new ones and a
+"""Modules by the names that they had in the release 0.1.0: they answer with the present ones and a
 DeprecationWarning."""
 
 from __future__ import annotations

@@ -45,7 +45,7 @@ def test_a_program_of_this_machine_is_refused_in_one_sentence(tmp_path):
         (18, 94, "it is for machine 94"),
         (36, 0x85, "it is for another AVR (architecture 5, not 6)"),
         (16, 1, "it is no program: it was not linked"),
-        (28, 0xFFFFFF, "it is damaged: its headers are not in it"),
+        (28, 0xFFFFFF, "it is damaged: its headers are outside the file"),
     ],
 )
 def test_what_is_wrong_is_said(tmp_path, at, value, why):

@@ -129,7 +129,7 @@ def flexura(
 
 def main() -> None:
     """Run the command; bad input ends in one line on stderr and status 2, whatever else goes wrong
-    in status 1."""
+    in status 1. typer prints the usage too where an option or a command is wrong."""
     # looking for garbage among a million objects just imported is a tenth of the start
     gc.set_threshold(100_000)
     sys.unraisablehook = _unraisable

@@ -68,7 +68,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     help=(
         "Experiments on the rig: self-test, execute, handle the signals. Emulated unless a port "
-        "is named."
+        "is named.\n\n\b\nExample: flexura bench forward --emulated --seed 1"
     ),
 )
 

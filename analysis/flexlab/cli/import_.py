@@ -72,11 +72,19 @@ def import_(
     if file.suffix.lower() == ".urdf":
         for option, given in (("--map", map_), ("--robot", robot), ("--all", every or None)):
             if given is not None:
-                raise InputError("none: it is for logs", key=option, value=str(given))
+                raise InputError(
+                    "expected a log: a URDF is read without this option",
+                    key=option,
+                    value=str(given),
+                )
         import_robot(file, sections, out, look=look, force=force, json=json)
         return
     if sections is not None:
-        raise InputError("none: it is for a URDF", key="--sections", value=str(sections))
+        raise InputError(
+            "expected a URDF: a log is read without this option",
+            key="--sections",
+            value=str(sections),
+        )
     asked = None if map_ is None else read_map(map_)
     tables = None if robot is None else fx.load(robot).to_dict()
     if look:

@@ -16,7 +16,7 @@ ManoeuvreFile = Annotated[
     typer.Argument(
         metavar="MANOEUVRE",
         help="manoeuvre file (TOML), or the name of a shipped one; default: every joint moves a "
-        "little, back and forth",
+        "little and then rests",
     ),
 ]
 RigFile = Annotated[

@@ -52,16 +52,16 @@ def rows(c: Comparison) -> list[tuple[str, ...]]:
         for d in c.differences
     ]
     for r in c.responses:
-        took = f"{_seconds(r.experiment_s)} s against {_seconds(r.simulation_s)} s"
+        took = f"{_seconds(r.experiment_s)}, {_seconds(r.simulation_s)} s"
         delayed = "-" if np.isnan(r.delay_s) else f"delay {1e3 * r.delay_s:.1f} ms"
         out.append(
-            (f"response time, {r.quantity}", "", took, "", percent(abs(r.relative), 3), delayed, "")
+            (f"{r.quantity}: response time", "", took, "", percent(abs(r.relative), 3), delayed, "")
         )
     if c.responses:
         worst = percent(c.worst_response, 3)
         out.append(
             (
-                "response time, the worse",
+                "worse response time",
                 "",
                 "",
                 "",
@@ -92,7 +92,7 @@ def notes(c: Comparison) -> list[str]:
     if c.responses:
         lines.append(
             f"response time: from t = 0 until {100 * RESPONSE_LEVEL:g} % of the largest distance "
-            f"from the start is first covered; "
+            f"from the start is first covered, of the second run and of the first; "
             "delay: the shift in time that fits best"
         )
     if c.lost:

@@ -284,7 +284,14 @@ def numbers_of(trial: Trial) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class _Following:
-    """The next trial: references, the joint motions that they are for, checks, what is special."""
+    """The next trial.
+
+    Attributes:
+        references: set-points of the joints, a row a time.
+        motions: the joint motions that they shall give.
+        checks: the rig's limits, each with what the trial needs of it.
+        note: on which trial it builds, and why the change was cut; "" for the whole change.
+    """
 
     references: np.ndarray
     motions: np.ndarray

@@ -63,6 +63,11 @@ def table(study: Study) -> Table:
             number(1e3 * row["later_m"], missing=""),
         ]
         out.add(*cells, *(number(row[key]) for key in peaks))
+    since = "the last change of the drives" if study.name == "payload" else "half of the time"
+    out.notes.append(
+        f"f1: lowest frequency at the start, joints locked; w{study.link}: tip deflection of link "
+        f"{study.link}, its largest in the whole run, and later: from {since} on"
+    )
     out.notes += verdict(study).split("\n")
     return out
 

@@ -61,7 +61,7 @@ def read(path: Path) -> Program:
             raise _refused(path, f"it has no symbol {name}: was it stripped?")
     begin, end = (found.symbols[name] for name in NEEDED)
     if not begin <= end <= len(found.flash):
-        raise _refused(path, "it is damaged: its code does not end in it")
+        raise _refused(path, "it is damaged: the symbols around its code point outside the flash")
     return found
 
 
@@ -73,13 +73,13 @@ def _table(
     data: bytes, row: struct.Struct, at: int, size: int, count: int
 ) -> list[tuple[Any, ...]]:
     if size != row.size or not count or at + size * count > len(data):
-        raise _Damaged("its headers are not in it")
+        raise _Damaged("its headers are outside the file")
     return [row.unpack_from(data, at + size * k) for k in range(count)]
 
 
 def _part(data: bytes, at: int, size: int) -> bytes:
     if at + size > len(data):
-        raise _Damaged("a part ends behind the file's end")
+        raise _Damaged("a section or segment is longer than the file")
     return data[at : at + size]
 
 
@@ -90,7 +90,9 @@ def _flash(data: bytes, segments: list[tuple[Any, ...]]) -> bytes:
         if kind != _LOADED or not size or address >= 0x800000:
             continue
         if address + size > FLASH_BYTES:
-            raise _Damaged(f"{size} bytes at address {address:#x}")
+            raise _Damaged(
+                f"{size} bytes at address {address:#x} are beyond the flash of {FLASH_BYTES} bytes"
+            )
         out.extend(b"\xff" * (address + size - len(out)))
         out[address : address + size] = _part(data, at, size)
     if not out:

@@ -47,8 +47,10 @@ def model(robot: fx.Robot) -> fx.Robot:
 
 
 def trials(task: Task, count: int = TRIALS) -> list[Trial]:
-    """Trials of a motion. The first is the model's inverse of the tip's path; the path of each
-    further one has what the tip lacked added to it.
+    """Trials of a motion, whose drives are the model's inverse of a path of the tip.
+
+    The first path is the wanted one. To the path of each further trial the error of the trial
+    before is added: the wanted place of the tip less the one that was reached.
 
     Args:
         task: the task, whose robot does the trials.

@@ -33,7 +33,7 @@ def riccati(F: np.ndarray, G: np.ndarray, Q: np.ndarray, R: np.ndarray, key: str
     """The stabilising solution of P = Q + F^T P (F - G K) (75), of the regulator (`key`: "effort")
     or the estimator ("noise"). Raises InputError.
 
-    SciPy's balancing sometimes spoils its reordering: then without.
+    SciPy's balancing sometimes makes its reordering fail. The equation is then solved without it.
     """
     from scipy.linalg import solve_discrete_are
 
@@ -51,7 +51,8 @@ def riccati(F: np.ndarray, G: np.ndarray, Q: np.ndarray, R: np.ndarray, key: str
 
 
 def deviations(value: Any, count: int, key: str) -> np.ndarray:
-    """Numbers above 0, one or `count` of them, (count,). Raises InputError."""
+    """Standard deviations as an array (count,), each above 0; one number stands for all. Raises
+    InputError, with `key`."""
     expected = f"expected a number above 0, or {count} of them"
     found = array(value, key, expected)
     if found.shape not in ((), (count,)) or not np.all((found > LEAST) & (found < MOST)):

@@ -290,8 +290,8 @@ def _add_node(mbs: Any, here: Frame) -> Any:
 
 
 def _add_element(mbs: Any, values: BeamValues, k: int, nodes: tuple[Any, Any], size: float) -> Any:
-    """Add element k of the link; others are stubs: as the link's end, but almost without mass."""
-
+    """Add element k of the link; k outside the mesh: a stub, as stiff as the link's end beside it,
+    almost without mass."""
     near = min(max(k, 0), len(values) - 1)
     return mbs.AddObject(
         eii.ObjectANCFCable2D(
