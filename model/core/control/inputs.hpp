@@ -70,7 +70,8 @@ struct Inputs {
     held.motion.assign(count, Segment{0.0, {0.0, 0.0, 0.0, 0.0, 0.0, 0.0}, 0.0, 0.0, 0.0});
   }
 
-  // Limits a billionth wider than given: a motion may end on one, and does so up to round-off.
+  // Limits wider than given by the epsilon of (64), a billionth: a motion may end on one, and does
+  // so up to round-off.
   void limit(int joint, double least, double most) {
     low[joint] = std::isfinite(least) ? least - 1e-9 * std::max(1.0, std::abs(least)) : least;
     high[joint] = std::isfinite(most) ? most + 1e-9 * std::max(1.0, std::abs(most)) : most;

@@ -74,7 +74,7 @@ class ModelPlant : public Plant<Real> {
     for (int k = 0; k < this->n; ++k)
       x[std::size_t(k)] = Real(k % 2 ? -1.0 - 0.01 * k : 1.0 + 0.013 * k);
     Real square = 0.0, damped = 0.0;
-    for (int tangent_angles = 0; tangent_angles < TURNS; ++tangent_angles) {
+    for (int turn = 0; turn < TURNS; ++turn) {
       Real before, after, lost;
       stretch(q, pass, x.data(), before, lost);
       const Real scale = 1.0 / root(larger(before, Real(1e-300)));
@@ -128,8 +128,7 @@ class ModelPlant : public Plant<Real> {
           continue;
         }
         for (int p = 0; p < c.P; ++p) {
-          const MaterialPoint<Real> here =
-              material_at(c, Real(c.length + q[c.first] * (c.xi[p] - 1.0)));
+          const MaterialPoint<Real> here = free_length_material(c, q[c.first], p);
           const Real moment =
               here.stiffness * c.weight[p] * c.bend[l * padded(c.P) + p] / q[c.first];
           for (int k = 0; k < c.m; ++k) {
@@ -182,7 +181,7 @@ class ModelPlant : public Plant<Real> {
   Workspace<Real> &work;
   std::vector<Real> x, rest, force, zero, reaction;
 
-  // Accelerations under forces (n) at rest, without K q.
+  // Accelerations under n forces at rest, without K q.
   void pull(const Real *q, const Real *forces_, const PassInputs<Real> &pass, Real *a) {
     const Stage<Real> still{zero.data(), zero.data(), Real(0.0), Real(0.0), nullptr, nullptr};
     std::vector<Real> given(reaction.size(), Real(0.0));
@@ -208,8 +207,7 @@ class ModelPlant : public Plant<Real> {
         for (int l = 0; l < c.m; ++l) force[std::size_t(c.own() + l)] = Real(0.0);
         for (int p = 0; p < c.P; ++p) {
           const Real moment =
-              material_at(c, Real(c.length + q[c.first] * (c.xi[p] - 1.0))).stiffness *
-              c.weight[p] * bent[p] / q[c.first];
+              free_length_material(c, q[c.first], p).stiffness * c.weight[p] * bent[p] / q[c.first];
           energy_ += moment * bent[p], lost += c.beta * moment * bent[p];
           for (int l = 0; l < c.m; ++l)
             force[std::size_t(c.own() + l)] += moment * c.bend[l * padded(c.P) + p];
@@ -230,13 +228,12 @@ class ModelPlant : public Plant<Real> {
     bending(c, q + c.own(), bent), bending(c, v + c.own(), moving);
     const Real inverse = 1.0 / q[c.first], flow = v[c.first];
     for (int p = 0; p < c.P; ++p) {
-      const MaterialPoint<Real> here =
-          material_at(c, Real(c.length + q[c.first] * (c.xi[p] - 1.0)));
+      const MaterialPoint<Real> here = free_length_material(c, q[c.first], p);
       const Real weight = here.stiffness * c.weight[p] * inverse;
-      const Real piece_kinematics =
+      const Real weight_slope =  // by d
           c.weight[p] * inverse *
           (here.stiffness_slope * (c.xi[p] - 1.0) - here.stiffness * inverse);
-      strain += weight * bent[p] * moving[p] + 0.5 * piece_kinematics * bent[p] * bent[p] * flow;
+      strain += weight * bent[p] * moving[p] + 0.5 * weight_slope * bent[p] * bent[p] * flow;
       loss += c.beta * weight * moving[p] * moving[p];
     }
   }

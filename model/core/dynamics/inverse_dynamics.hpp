@@ -96,7 +96,7 @@ Vec3<Real> inertial_sleeve(const Piece<Real> &c, const PieceState<Real> &k, cons
           product(rows.row[0], 0) + rows.x[0] * u.x + rows.y[0] * u.y};
 }
 
-// Forces (n) of a motion: M a + h(q, v), plus what `terms` names of stiffness, damping and (taken
+// The n forces of a motion: M a + h(q, v), plus what `terms` names of stiffness, damping and (taken
 // off) gravity. With v = 0 and no terms: M times a vector. `moved`: outward_kinematics was called
 // at (y, v) already.
 template <class Real>

@@ -20,8 +20,8 @@ inline void composite(const Piece<Real> &c, Rows<Real, MOST, FLOW> &rows, int ro
   A = {rows.xx, rows.xy, rows.x[0], rows.yy, rows.y[0], rows.row[0][0]};
 }
 
-// M (n, n) of (40) at y (n). `wrench` (n) is scratch: what a unit acceleration of an unknown takes
-// at the hub that the sweep has reached.
+// M of (40), n x n, at the n unknowns y. `wrench`, n values, is scratch: what a unit acceleration
+// of an unknown takes at the hub that the sweep has reached.
 template <class Real>
 void mass_matrix(const Model<Real> &model, Workspace<Real> &work, const Real *y, const Real *rest,
                  Vec3<Real> *wrench, Real *M) {

@@ -1,7 +1,7 @@
 // The time loop, for every method: outputs, breaks, ticks of a sampled controller, control of the
 // step, limits, failures.
 //
-//     Loop<double> loop(plant, &acting, times, rtol);   Explicit<double> method(loop.course);
+//     Loop<double> loop(plant, &acting, times, rtol);   Explicit<double> method(loop.integration);
 //     loop.start(q0, v0, first_step);
 //     while (loop.advance(method, 1000)) ...            // progress, interruption, another method
 //

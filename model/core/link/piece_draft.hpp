@@ -33,7 +33,7 @@ struct PieceDraft : Shape {
 // What stands on a link: a payload at its tip, another link there, a slider along it.
 struct Attachments {
   double payload_mass = 0.0, payload_inertia = 0.0, payload_along = 0.0, payload_across = 0.0;
-  bool off_tip = false;  // the payload is a piece of its own, behind the link
+  bool off_tip = false;  // the payload is a piece of its own, behind the link (111)
   bool follower = false, slider = false;
 };
 
@@ -114,7 +114,7 @@ inline void add_point_mass(PieceDraft &out, double m, const Numbers &w) {
 }
 
 // A payload m_p with the rotary inertia I_tip at the tip: m_p, m_p w, m_p w w^T and I_tip Omega_L^2
-// of the kinetic energy (22).
+// of the kinetic energy (22). One off the tip is a piece of its own: off_tip() of link_pieces.hpp.
 inline void add_payload(PieceDraft &out, const Attachments &attached) {
   if (attached.off_tip) return;
   add_point_mass(out, attached.payload_mass, out.w);

@@ -118,7 +118,7 @@ struct Model {
   Model(const Model &) = delete;
 };
 
-// Position of a joint's hub from unknowns q (n), or its rate from their rates: behind a
+// Position of a joint's hub from the n unknowns q, or its rate from their rates: behind a
 // transmission the rotor's and the windup (109).
 template <class Real>
 inline double hub_position(const Model<Real> &model, int link, const double *q) {

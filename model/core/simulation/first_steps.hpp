@@ -1,13 +1,13 @@
-// When "auto" holds no race. One robot and a robot in a pack ask the same functions.
+// When "auto" compares no methods. One robot and a robot in a pack ask the same functions.
 #pragma once
 #include "integration/method.hpp"
 #include "integration/run_state.hpp"
 
 namespace flexura {
 
-// DEAR: passes a second of explicit steps beyond which a sharp tolerance is left to a race without
-// exponential ones. STRONG: the rate at which a damper stops its joint [1/s] beyond which it
-// couples the modes so much that only implicit steps are long.
+// DEAR: passes a second of explicit steps beyond which a sharp tolerance is left to a comparison
+// without exponential ones. STRONG: the rate at which a damper stops its joint [1/s] beyond which
+// it couples the modes so much that only implicit steps are long.
 constexpr double DEAR = 2e6, STRONG = 1000.0;
 
 // The method that "auto" takes without a trial, "explicit" or "implicit"; null: a trial decides.
@@ -22,7 +22,7 @@ double fastest(Integration<double> &run, double t);
 bool explicit_is_slower(Integration<double> &run, double t, double speed);
 
 // The first exponential steps of a run. If the rest takes no more of them than the trials of the
-// other methods would take passes, they have no rival. What is counted are a robot's own attempts,
+// other methods would take passes, no other is tried. What is counted are a robot's own attempts,
 // accepted or not.
 struct FirstSteps {
   static constexpr long ATTEMPTS = 80, REST = 120;

@@ -20,16 +20,16 @@ bool MethodSelection::advance(long steps) {
     const double progress =
         (loop.run_state[0].t - window_t) /
         static_cast<double>(std::max(loop.integration.passes - window_passes, 1L));
-    if (raced && loop.any() && due(progress)) race();
+    if (compared && loop.any() && due(progress)) compare();
   }
   return loop.any();
 }
 
-// Is a race to be held again, at `progress` seconds a pass?
+// Are the methods to be compared again, at `progress` seconds a pass?
 bool MethodSelection::due(double progress) {
-  if (progress * SLOWER < speed) return since_race() > AGAIN;
+  if (progress * SLOWER < speed) return since_comparison() > AGAIN;
   const double left = loop.run_state[0].end - loop.run_state[0].t;
-  if (left < LONG * progress || since_race() < patience) return false;
+  if (left < LONG * progress || since_comparison() < patience) return false;
   patience *= 2;
   return true;
 }
@@ -38,7 +38,7 @@ bool MethodSelection::due(double progress) {
 // than these did? The run, which has just been started, is of no use after that.
 bool MethodSelection::outdone(double exponential_speed, double step) {
   Best best{Mark(), exponential(), exponential_speed};
-  race_of_others(mark(loop.record[0].rows), step, best);
+  compare_others(mark(loop.record[0].rows), step, best);
   return best.method != exponential();
 }
 
@@ -84,9 +84,9 @@ void MethodSelection::choose() {
   else if (acting.function)
     chosen = !bends          ? by_explicit()
              : c.plant.rides ? implicit()
-                             : race_forward(*implicit(), COSTLY);
+                             : compare_forward(*implicit(), COSTLY);
   else
-    race();
+    compare();
 }
 
 bool MethodSelection::hopeless(double speed_) {
@@ -95,8 +95,9 @@ bool MethodSelection::hopeless(double speed_) {
 
 // Where exponential steps go on that a run has begun with, their own attempts are counted, which
 // are the same in a pack.
-long MethodSelection::since_race() const {
-  return goes_on ? FirstSteps::attempts(loop.run_state[0]) : loop.integration.passes - last_race;
+long MethodSelection::since_comparison() const {
+  return goes_on ? FirstSteps::attempts(loop.run_state[0])
+                 : loop.integration.passes - last_comparison;
 }
 
 bool MethodSelection::over() const {
@@ -104,8 +105,8 @@ bool MethodSelection::over() const {
   return status == Status::limit || status == Status::interrupted || status == Status::done;
 }
 
-// The exponential steps that a run begins with: their speed, as far as `pace` tells it; have they
-// no rival?
+// The exponential steps that a run begins with: their speed, as far as `pace` tells it; is no
+// other method to be tried?
 bool MethodSelection::begin_exponential(double &reached) {
   FirstSteps pace;
   while (loop.advance(*exponential(), 1) && pace.look(loop.run_state[0])) {
@@ -114,7 +115,7 @@ bool MethodSelection::begin_exponential(double &reached) {
   return pace.settled(loop.run_state[0]);
 }
 
-void MethodSelection::race() {
+void MethodSelection::compare() {
   const int since = loop.record[0].rows;
   const Mark start = mark(since);
   const bool begun = chosen == nullptr;
@@ -124,17 +125,17 @@ void MethodSelection::race() {
   if (!sharp && !loop.integration.plant.rides) {
     double reached = 0.0;
     if (begun && begin_exponential(reached)) {
-      chosen = exponential(), raced = goes_on = true, speed = reached;
+      chosen = exponential(), compared = goes_on = true, speed = reached;
       return;
     }
     if (!begun) loop.run_state[0].fresh = true, reached = trial(*exponential(), TRIAL);
     best = {mark(since), exponential(), reached}, step = loop.run_state[0].wish;
   }
-  if (!over()) race_of_others(start, step, best);
+  if (!over()) compare_others(start, step, best);
   go_back(best.state, since);
   loop.resume(*best.method);
-  chosen = best.method, speed = best.speed, raced = true, last_race = loop.integration.passes,
-  ++held;
+  chosen = best.method, speed = best.speed, compared = true,
+  last_comparison = loop.integration.passes;
   goes_on = begun && chosen == exponential_.get();
 }
 
@@ -146,14 +147,15 @@ Method<double> *MethodSelection::method_under_ticks(double rate_Hz, bool bends) 
                   loop.integration);
   if (for_ticks->name() == std::string(TR_BDF2.name)) second_order = for_ticks.get();
   const bool stiff = second_order || for_ticks->name() == std::string(ESDIRK_4.name);
-  return stiff && bends && !sharp && !loop.integration.plant.rides ? race_forward(*for_ticks, 1.0)
-                                                                   : for_ticks.get();
+  return stiff && bends && !sharp && !loop.integration.plant.rides
+             ? compare_forward(*for_ticks, 1.0)
+             : for_ticks.get();
 }
 
 // The better one of exponential and implicit steps, which are tried one after the other on the
 // way: neither a controller nor a caller's function sees a time twice. Exponential steps go on as
 // long as they get faster, or if the rest of the run takes few of them.
-Method<double> *MethodSelection::race_forward(Method<double> &other, double costly) {
+Method<double> *MethodSelection::compare_forward(Method<double> &other, double costly) {
   const RunState &c = loop.run_state[0];
   double reached = -1.0;
   for (double before = reached; !over(); before = reached) {
@@ -168,7 +170,7 @@ Method<double> *MethodSelection::race_forward(Method<double> &other, double cost
 
 // The other methods from `start` on, `step` being the first one that they try, against the best
 // one so far.
-void MethodSelection::race_of_others(const Mark &start, double step, Best &best) {
+void MethodSelection::compare_others(const Mark &start, double step, Best &best) {
   const int since = start.rows;
   for (bool last : {false, true}) {
     if (last && hopeless(best.speed)) break;
@@ -201,7 +203,7 @@ bool MethodSelection::gives_way() {
   RunState &c = loop.run_state[0];
   if (chosen != exponential_.get() || (c.status != Status::stuck && c.status != Status::diverged))
     return false;
-  chosen = implicit(), raced = false, in_window = 0;
+  chosen = implicit(), compared = false, in_window = 0;
   const Inputs &acting = loop.integration.acts_of(0);
   if (!acting.function && !acting.sampler) {
     const long tried = c.steps + c.rejected;

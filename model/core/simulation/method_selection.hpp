@@ -2,16 +2,16 @@
 //
 // A run begins with exponential steps (first_steps.hpp); then the others go on from the same state
 // for SHORT passes. The one that gets furthest a pass, in the second half of its trial, goes on
-// from where its trial ended; what the others did is forgotten. The race is held again where
-// progress a pass has fallen to a quarter, at most once in AGAIN passes, and where the rest of the
-// run takes more than LONG passes: a fast transient at the start may have let the wrong one win.
-// The second kind of race waits for twice as many passes each time. Passes are counted, not time: a
-// run's digits do not depend on the machine's load.
+// from where its trial ended; what the others did is forgotten. The methods are compared again
+// where progress a pass has fallen to a quarter, at most once in AGAIN passes, and where the rest
+// of the run takes more than LONG passes: a fast transient at the start may have favoured the wrong
+// one. The second kind of comparison waits for twice as many passes each time. Passes are counted,
+// not time: a run's digits do not depend on the machine's load.
 //
 // Exponential steps that get stuck may have lost the motion before: the run begins again with
 // implicit steps, where a caller's function or a controller does not forbid it.
 //
-// There is no race either where exponential steps end soon (first_steps.hpp), or where it is
+// There is no comparison either where exponential steps end soon (first_steps.hpp), or where it is
 // decided beforehand: rigid robots without gains or friction and tolerances below 1e-9 are for
 // explicit steps; a slider on a link that moves through a sleeve is for implicit ones, as its modes
 // change with every step. Under a caller's function and under a sampled controller the run does not
@@ -30,9 +30,9 @@ namespace flexura {
 class MethodSelection {
  public:
   static constexpr long TRIAL = 100, SHORT = 60,
-                        AGAIN = 1500;  // TRIAL: of exponential steps in later races
+                        AGAIN = 1500;  // TRIAL: of exponential steps in later comparisons
   static constexpr double SLOWER = 4.0, LONG = 100'000.0;
-  // Under a caller's function or a sampled controller: see race_forward. Where each pass calls a
+  // Under a caller's function or a sampled controller: see compare_forward. Where each pass calls a
   // function, a pass of exponential steps must get so much further.
   static constexpr double FASTER = 1.5, FEW = 300.0, COSTLY = 2.5;
   static constexpr double SEVERAL = 1.8;  // steps of order 2 a tick: more are for order 4,
@@ -53,7 +53,6 @@ class MethodSelection {
   void begin_here() { begun = loop.snapshot(); }
 
   const char *name() const { return chosen ? chosen->name() : "auto"; }
-  int races() const { return held; }
 
  private:
   static constexpr long WINDOW = 50;  // steps between two looks at the progress
@@ -66,7 +65,7 @@ class MethodSelection {
     ErrorNorm<double>::Sizes sizes;
     int rows = 0;
   };
-  // How far methods got so far in a race.
+  // How far methods got so far in a comparison.
   struct Best {
     Mark state;
     Method<double> *method;
@@ -79,12 +78,11 @@ class MethodSelection {
   Steps exponential_, implicit_, explicit_, for_ticks;  // the last under a sampled controller
   Method<double> *chosen = nullptr, *second_order = nullptr;
   bool sharp = false;  // a tolerance that exponential steps are not for
-  bool raced = false,
-       goes_on = false;  // goes_on: with the exponential steps that the run began with
-  int held = 0;
+  bool compared = false,
+       goes_on = false;          // goes_on: with the exponential steps that the run began with
   Loop<double>::Snapshot begun;  // where the run started
-  long patience = AGAIN;         // passes before a race that is held as the rest is long
-  long last_race = 0, in_window = 0, window_passes = 0;
+  long patience = AGAIN;         // passes before a comparison that is made as the rest is long
+  long last_comparison = 0, in_window = 0, window_passes = 0;
   double window_t = 0.0;
   double speed = 0.0;  // seconds a pass, when chosen
 
@@ -102,13 +100,13 @@ class MethodSelection {
   void go_back(const Mark &m, int since);
   void choose();
   bool hopeless(double speed_);
-  long since_race() const;
+  long since_comparison() const;
   bool over() const;
   bool begin_exponential(double &reached);
-  void race();
+  void compare();
   Method<double> *method_under_ticks(double rate_Hz, bool bends);
-  Method<double> *race_forward(Method<double> &other, double costly);
-  void race_of_others(const Mark &start, double step, Best &best);
+  Method<double> *compare_forward(Method<double> &other, double costly);
+  void compare_others(const Mark &start, double step, Best &best);
   double trial(Method<double> &method, long most);
   bool gives_way();
   bool due(double progress);

@@ -31,8 +31,7 @@ struct Starter {
   std::shared_ptr<const Model<double>> shared;
   Inputs acting;
   std::string method;
-  bool open = false;  // "auto": the run goes on alone unless its exponential steps have no rival
-                      // (first_steps.hpp)
+  bool open = false;  // "auto": the run goes on alone unless FirstSteps settles its method
   std::vector<double> q, v;
   const Model<double> &model() const { return *shared; }
 };

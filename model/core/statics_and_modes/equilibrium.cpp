@@ -37,7 +37,7 @@ Search newton(ChainAtRest &still, const TipLoad &load, double share, bool descen
     still.solve(slope.data(), step.data());
     double fall = 0.0;
     for (std::size_t i = 0; i < n; ++i) step[i] = -step[i], fall += slope[i] * step[i];
-    out.residual = still.tangent_angles(step.data());
+    out.residual = still.largest_turn(step.data());
     if (!(out.residual < 1e6)) return out;
     if (out.residual < SMALL && wrong == 0) {
       for (std::size_t i = 0; i < n; ++i) q[i] += step[i];

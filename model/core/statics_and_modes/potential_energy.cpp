@@ -42,7 +42,7 @@ void sleeve_constants(const Piece<double> &c, double d, bool last, PieceAtRest &
                       double *R) {
   const int m = c.m, P = c.P;
   for (int p = 0; p < P; ++p) {
-    const MaterialPoint<double> here = material_at(c, c.length + d * (c.xi[p] - 1.0));
+    const MaterialPoint<double> here = free_length_material(c, d, p);
     const double mu = here.mass * d * c.weight[p], stiffness = here.stiffness * c.weight[p] / d;
     for (int j = 0; j < P; ++j)
       s[j] += mu * d * c.C[p * P + j], R[p * P + j] = std::sqrt(mu) * d * c.C[p * P + j];
@@ -179,7 +179,7 @@ void ChainAtRest::gradient(const double *q, const TipLoad &load, double share, d
   }
 }
 
-double ChainAtRest::tangent_angles(const double *step) const {
+double ChainAtRest::largest_turn(const double *step) const {
   double most = 0.0, hub = 0.0;
   for (const PieceAtRest &c : pieces_) {
     if (c.joint >= 0) hub += step[c.joint];

@@ -77,8 +77,9 @@ class ChainAtRest {
   // M x (n; entries of held joints are 0).
   void mass_times(const double *x, double *out);
 
-  double tangent_angles(
-      const double *step) const;  // the largest change of angle of a point that a step makes [rad]
+  // The largest change of angle of a point that a step makes [rad].
+  double largest_turn(const double *step) const;
+
   Vec3<double> tip() const { return tip_; }  // place and angle of the last tip
   bool idle(const TipLoad &load) const {     // nothing but elastic forces acts
     return gravity_[0] == 0.0 && gravity_[1] == 0.0 && load.none();

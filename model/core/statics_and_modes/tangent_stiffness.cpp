@@ -93,9 +93,9 @@ double condense(PieceAtRest &c, StillBeyond &beyond, Pivot inverse_of, M m, N P)
       for (int k = a; k < wide; ++k) rows.H[a * wide + k] += curved * turning[a] * turning[k];
     }
   }
-  const double rod_in_sleeve = c.rod * (beyond.gx * c.hub_cosine + beyond.gy * c.hub_sine),
+  const double rod_moment = c.rod * (beyond.gx * c.hub_cosine + beyond.gy * c.hub_sine),
                shift = beyond.shift;
-  rows.H[0] += rod_in_sleeve, rows.parts[0] += std::fabs(rod_in_sleeve);
+  rows.H[0] += rod_moment, rows.parts[0] += std::fabs(rod_moment);
   if (shift != 0.0)
     for (int a = 0; a < wide; ++a) {
       rows.x[a] += shift * c.first[2 * a], rows.y[a] += shift * c.first[2 * a + 1];

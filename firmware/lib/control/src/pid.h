@@ -5,12 +5,14 @@
 // e = r - q, T = 1 tick and w = tip deflection:
 //
 //   i* = i_{k-1} + ki e T, or i_{k-1} if |i*| would pass the limit
-//   u* = kp e + i* + kd (r' - q') + kf w + kg w' + kv r' + kc sign(r') + d^     (70), (150)
+//   u* = kp e + i* + kd (r' - q') + kf w + kg w' + ks s + kt s' + kv r' + kc sign(r') + f(t) + d^
+//                                                                             (70), (150)
 //   u  = saturation of u*: |u| <= limit, |u - u_{k-1}| <= slew                (71)
 //   i_k = i*, or i_{k-1} if the saturation holds u back and e would push it further     (72)
 //
 // q' and w' are filtered differences (filter.h, flex_sensor.h), d^ is the observer's
-// (disturbance_observer.h).
+// (disturbance_observer.h). The board has no tip slope s and no force f(t): ks, kt and f are the
+// model's (control_law.cpp).
 #pragma once
 #include "numbers.h"
 
@@ -42,7 +44,8 @@ struct SignalsOf {
   typename N::Wide error;           // e, counts / 256
   typename N::Value rate;           // q', counts / 256 per tick
   typename N::Value setpoint_rate;  // r', counts / 256 per tick
-  typename N::Wide added;           // kf w + kg w' + d^, Q16 of u: added_terms()
+  // kf w + kg w' + d^, Q16 of u: added_terms(). In the model also ks s + kt s' + f(t).
+  typename N::Wide added;
 };
 
 template <class N>

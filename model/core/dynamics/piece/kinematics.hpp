@@ -193,7 +193,7 @@ inline Vec3<Real> piece_kinematics(const Piece<Real> &c, PieceState<Real> &k, co
   return line_point_columns(c, k, q, rate, here, phi, omega);
 }
 
-// The outward sweep of the whole chain at (y, v) (n).
+// The outward sweep of the whole chain at (y, v), n values each.
 template <class Real>
 void outward_kinematics(const Model<Real> &model, Workspace<Real> &work, const Real *y,
                         const Real *v) {

@@ -15,9 +15,8 @@ inline void add_sleeve_damping(const Piece<Real> &c, const Real &alpha, const Re
   for (int k = 0; k < m; ++k) tip += c.tip_angle[k] * rate[k];
   for (int p = 0; p < P + last; ++p) {  // the last: the payload at the tip
     const bool end = p == P;
-    const Real mu = end ? c.payload
-                        : material_at(c, Real(c.length + d * (c.xi[end ? 0 : p] - 1.0))).mass * d *
-                              c.weight[end ? 0 : p];
+    const Real mu =
+        end ? c.payload : free_length_material(c, d, end ? 0 : p).mass * d * c.weight[end ? 0 : p];
     const Real *C = end ? c.w : c.C + p * P;
     Real lever[Free::most], deflection = 0.0;
     for (int k = 0; k < m; ++k) {
@@ -56,8 +55,8 @@ inline void add_tool_damping(const Piece<Real> &c, const Piece<Real> &tool, cons
   for (int k = 0; k < c.m; ++k) rows[k] += alpha * (lever[k] * up + c.tip_angle[k] * moment);
 }
 
-// out (n) += sum over links of alpha M_clamped v, at (y, v) (n): y matters for the free length of
-// sleeved links only.
+// out, n values, += sum over links of alpha M_clamped v, at (y, v), n values each: y matters for
+// the free length of sleeved links only.
 template <class Real>
 void add_mass_damping(const Model<Real> &model, const Real *y, const Real *v, Real *out) {
   for (int link = 0; link < model.links(); ++link) {

@@ -30,6 +30,12 @@ inline MaterialPoint<Real> material_at(const Piece<Real> &c, const Real &X) {
   return out;
 }
 
+// The material at point p of the free length d: at the abscissa L + d (xi_p - 1).
+template <class Real>
+inline MaterialPoint<Real> free_length_material(const Piece<Real> &c, const Real &d, int p) {
+  return material_at(c, Real(c.length + d * (c.xi[p] - 1.0)));
+}
+
 // Mass, first and second moment about the exit of the material that is still inside or behind, its
 // place X - X0 <= 0.
 template <class Real>
@@ -119,8 +125,7 @@ inline void free_length_stiffness(const Piece<Real> &c, const Real &d, Real *K) 
   const int m = c.m, P = c.P;
   for (int i = 0; i < m * m; ++i) K[i] = 0.0;
   for (int p = 0; p < P; ++p) {
-    const Real weight =
-        material_at(c, Real(c.length + d * (c.xi[p] - 1.0))).stiffness * c.weight[p] / d;
+    const Real weight = free_length_material(c, d, p).stiffness * c.weight[p] / d;
     for (int i = 0; i < m; ++i)
       for (int l = i; l < m; ++l)
         K[i * m + l] += weight * c.bend[i * padded(P) + p] * c.bend[l * padded(P) + p];
@@ -140,7 +145,7 @@ inline Real sleeve_force_row(const Piece<Real> &c, const Real *bent, const Real 
   const Real inverse = 1.0 / d;
   Real out = 0.0;
   for (int p = 0; p < c.P; ++p) {
-    const MaterialPoint<Real> here = material_at(c, Real(c.length + d * (c.xi[p] - 1.0)));
+    const MaterialPoint<Real> here = free_length_material(c, d, p);
     out += 0.5 * c.weight[p] * bent[p] * bent[p] * inverse *
            (here.stiffness_slope * (c.xi[p] - 1.0) - here.stiffness * inverse);
   }
@@ -205,7 +210,7 @@ void sleeve_rows(const Piece<Real> &c, const PieceState<Real> &k, const Real *y,
   rows.xx = c.mass, rows.xy = 0.0, rows.yy = c.mass;
   for (int p = 0; p < P; ++p) {
     const Real past = c.xi[p] - 1.0;
-    const MaterialPoint<Real> here = material_at(c, Real(c.length + d * past));
+    const MaterialPoint<Real> here = free_length_material(c, d, p);
     const MassPoint<Real> point{c.C + p * P,
                                 c.B + p,
                                 here.mass * d * c.weight[p],

@@ -25,7 +25,7 @@ void first_moment(const Piece<Real> &c, const PieceState<Real> &k, const Real *y
   sincos(k.phi, sine, cosine);
   x = first * cosine, up = first * sine;
   for (int p = 0; p < c.P; ++p) {
-    const Real mu = material_at(c, Real(c.length + d * (c.xi[p] - 1.0))).mass * d * c.weight[p];
+    const Real mu = free_length_material(c, d, p).mass * d * c.weight[p];
     for (int j = 0; j < c.P; ++j) {
       const Real lever = d * (mu * c.C[p * c.P + j] + (p == 0 ? c.payload * c.w[j] : Real(0.0)));
       x += lever * k.cosine[j], up += lever * k.sine[j];
@@ -40,8 +40,7 @@ Real sleeve_strain(const Piece<Real> &c, const Real *y) {
   bending(c, y + c.own(), bent);
   const Real d = y[c.first];
   for (int p = 0; p < c.P; ++p)
-    out += 0.5 * material_at(c, Real(c.length + d * (c.xi[p] - 1.0))).stiffness * c.weight[p] *
-           bent[p] * bent[p] / d;
+    out += 0.5 * free_length_material(c, d, p).stiffness * c.weight[p] * bent[p] * bent[p] / d;
   return out;
 }
 
@@ -73,8 +72,9 @@ Real sleeve_inertia(const Piece<Real> &c, const PieceState<Real> &k, const Real 
   return out;
 }
 
-// Kinetic energy (20), (16) of a piece whose hub moves at (vx, vy), with its rotor; of the last
-// piece also the payload's rotary inertia (22).
+// Kinetic energy (20), (16) of a piece whose hub moves at (vx, vy), with its rotor (21); of the
+// last piece also the payload's rotary inertia (22). A payload off the tip is a piece of its own
+// (111).
 template <class Real>
 Real kinetic_energy(const Piece<Real> &c, const PieceState<Real> &k, const Real &vx, const Real &vy,
                     bool last, const Real *y, const Real *v) {
@@ -107,7 +107,8 @@ Real kinetic_energy(const Piece<Real> &c, const PieceState<Real> &k, const Real 
   return 0.5 * out;
 }
 
-// Energies at (y, v) (n): kinetic; strain (9); potential of gravity, 0 with all mass at the origin.
+// Energies at (y, v), n values each: kinetic (20); strain (9); potential of gravity, 0 with all
+// mass at the origin.
 template <class Real>
 Energies<Real> energies(const Model<Real> &model, Workspace<Real> &work, const Real *y,
                         const Real *v) {
@@ -123,7 +124,7 @@ Energies<Real> energies(const Model<Real> &model, Workspace<Real> &work, const R
     out.potential -=
         model.gravity[0] * (c.mass * hub.x + x) + model.gravity[1] * (c.mass * hub.y + up);
     out.kinetic += kinetic_energy(c, k, hub.vx, hub.vy, i + 1 == count, y, v);
-    advance_hub(c, k, y, v, i + 1 < count ? &model.pieces[i + 1] : nullptr, hub);
+    advance_hub(c, k, v, i + 1 < count ? &model.pieces[i + 1] : nullptr, hub);
     if (c.joint != HubJoint::none) out.strain += spring_energy(model, c, y);
     if (c.joint == HubJoint::sleeve)
       out.strain += sleeve_strain(c, y);
@@ -133,7 +134,7 @@ Energies<Real> energies(const Model<Real> &model, Workspace<Real> &work, const R
   return out;
 }
 
-// Power [W] that damping and friction take at (y, v) (n): (28).
+// Power [W] that damping and friction take (28) at (y, v), n values each.
 template <class Real>
 Real loss(const Model<Real> &model, const Real *y, const Real *v) {
   Real out = 0.0;
@@ -142,15 +143,15 @@ Real loss(const Model<Real> &model, const Real *y, const Real *v) {
       const std::size_t link = std::size_t(c.link);
       const Real speed = v[c.first];
       out += model.viscous[link] * speed * speed +
-             model.coulomb[link] * speed * tanh(speed * (1.0 / COULOMB_SPEED));
+             speed * coulomb_friction(model.coulomb[link], speed);
     }
     if (c.joint == HubJoint::sleeve) {
       Real moving[Free::most];
       bending(c, v + c.own(), moving);
       const Real d = y[c.first];
       for (int p = 0; p < c.P; ++p)
-        out += c.beta * material_at(c, Real(c.length + d * (c.xi[p] - 1.0))).stiffness *
-               c.weight[p] * moving[p] * moving[p] / d;
+        out += c.beta * free_length_material(c, d, p).stiffness * c.weight[p] * moving[p] *
+               moving[p] / d;
     } else {
       for (int l = 0; l < c.m; ++l) out += c.D[l] * v[c.own() + l] * v[c.own() + l];
     }

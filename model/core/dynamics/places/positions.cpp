@@ -46,7 +46,7 @@ void line_points(const Model<double> &model, const Workspace<double> &work, cons
     const Piece<double> &c = model.pieces[std::size_t(i)];
     hubs.push_back(hub);
     const bool within = std::size_t(i) + 1 < model.pieces.size();
-    advance_hub(c, work.kept[std::size_t(i)], y, still.data(),
+    advance_hub(c, work.kept[std::size_t(i)], still.data(),
                 within ? &model.pieces[std::size_t(i) + 1] : nullptr, hub);
   }
   for (int a = 0; a < count; ++a) {

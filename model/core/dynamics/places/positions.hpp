@@ -9,7 +9,7 @@ struct Pose {
   Real x, y, angle;
 };
 
-// Place, angle and their rates of a hub on its way along the chain.
+// Place and velocity of a hub on the way along the chain. (Its angle: PieceState::phi.)
 template <class Real>
 struct Hub {
   Real x = 0.0, y = 0.0, vx = 0.0, vy = 0.0;
@@ -27,8 +27,8 @@ inline Hub<Real> first_hub(const Model<Real> &model, const Real *y, const Real *
 // Where a piece's tip, or the slider on it, is from its hub; and its velocity, from the columns
 // that `outward_kinematics` has left.
 template <class Real>
-inline void advance_hub(const Piece<Real> &c, const PieceState<Real> &k, const Real *y,
-                        const Real *v, const Piece<Real> *next, Hub<Real> &hub) {
+inline void advance_hub(const Piece<Real> &c, const PieceState<Real> &k, const Real *v,
+                        const Piece<Real> *next, Hub<Real> &hub) {
   const int stride = padded(columns_of(c)), g = c.joint == HubJoint::sleeve;
   const Real *tx = k.tip, *ty = tx + stride;
   hub.x += ty[0], hub.y -= tx[0];  // a quarter turn of the way is what turning moves
@@ -38,7 +38,6 @@ inline void advance_hub(const Piece<Real> &c, const PieceState<Real> &k, const R
   if (g) hub.vx += tx[c.m + 1] * v[c.first], hub.vy += ty[c.m + 1] * v[c.first];
   if (next == nullptr || next->joint != HubJoint::slider) return;
   hub.vx += k.slide.x * v[next->first], hub.vy += k.slide.y * v[next->first];
-  (void)y;
 }
 
 // Poses of the links' hubs (links + 1; the last: the tip of the last link), and the velocity of
@@ -58,7 +57,7 @@ void hub_poses(const Model<Real> &model, const Workspace<Real> &work, const Real
       sincos(k.phi, sine, cosine);
       poses[c.link] = {hub.x + back * cosine, hub.y + back * sine, k.phi};
     }
-    advance_hub(c, k, y, v, i + 1 < count ? &model.pieces[i + 1] : nullptr, hub);
+    advance_hub(c, k, v, i + 1 < count ? &model.pieces[i + 1] : nullptr, hub);
     if (i + 1 == count) {
       Real angle = k.phi;
       for (int l = 0; l < c.m; ++l) angle += c.tip_angle[l] * y[c.own() + l];

@@ -1,5 +1,6 @@
-// Polynomials in time through the last values of a quantity. Time counts in steps from the newest
-// value: x = 0 there, x = 1 at the end of the step to make, older values at x < 0.
+// Polynomials in time through the last values of a quantity, those of the exponential predictor
+// (91) and corrector (92). Time counts in steps from the newest value: x = 0 there, x = 1 at the
+// end of the step to make, older values at x < 0.
 #pragma once
 #include "numbers/modal_vectors.hpp"
 
@@ -12,10 +13,10 @@ constexpr int OLDEST =
     1;  // GAP's less the one that does without the oldest value: what a step is wrong by, about
 constexpr int COLUMNS = 8;
 
-// Coefficients by powers of x, [power][column]: Lagrange's polynomials of the values by age, GAP,
-// and OLDEST's. Each is multiplied up from its roots: those of younger values are shared, and so
-// are those of older ones. (Dividing the product of all by one would lose four digits where the
-// nodes lie far apart.)
+// Coefficients by powers of x, [power][column]: Lagrange's polynomials (91) of the values by age,
+// GAP's (92), and OLDEST's (93). Each is multiplied up from its roots: those of younger values are
+// shared, and so are those of older ones. (Dividing the product of all by one would lose four
+// digits where the nodes lie far apart.)
 template <class Real>
 inline void interpolate(int used, const Real *node, Real C[ORDER + 1][COLUMNS]) {
   Real young[ORDER + 1][ORDER + 1],

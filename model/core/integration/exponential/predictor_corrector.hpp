@@ -154,7 +154,7 @@ class ExponentialAdams {
     }
   }
 
-  // N of (88) from accelerations a (n) at a state of the modes, into `out`.
+  // N of (88) from the n accelerations a at a state of the modes, into `out`.
   void force(const Real *a, const Real *y, const Real *v, Real *out) const {
     for (int c = 0; c < chunks; ++c)
       put(out, c, get(b.w2, c) * get(y, c) + get(b.own, c) * get(v, c));
@@ -269,16 +269,16 @@ class ExponentialAdams {
     };
     Lanes a[POWERS], b[POWERS];
     for (int m = 0; m < POWERS; ++m) a[m] = get(A + m * stride, c), b[m] = get(B + m * stride, c);
-    auto set_error_weights = [&](int column, Real *place, Real *rate) {
+    auto set_weights = [&](int column, Real *place, Real *rate) {
       Lanes p = 0.0, q = 0.0;
       for (int m = 0; m <= ORDER; ++m)
         p += wide(poly[m][column]) * a[m], q += wide(poly[m][column]) * b[m];
       keep(place, p), keep(rate, q);
     };
     for (int j = 0; j < ORDER; ++j)
-      set_error_weights(j, predictor_weights[0][j], predictor_weights[1][j]);
-    set_error_weights(GAP, corrector_weights[0], corrector_weights[1]),
-        set_error_weights(OLDEST, corrector_weights[2], corrector_weights[3]);
+      set_weights(j, predictor_weights[0][j], predictor_weights[1][j]);
+    set_weights(GAP, corrector_weights[0], corrector_weights[1]),
+        set_weights(OLDEST, corrector_weights[2], corrector_weights[3]);
   }
 };
 

@@ -1,4 +1,5 @@
-// The method "auto": the cheapest method wins its race, whatever the robot; what a race may not do.
+// The method "auto": the cheapest method is chosen, whatever the robot; what a comparison may not
+// do.
 #include <cmath>
 
 #include "check.hpp"

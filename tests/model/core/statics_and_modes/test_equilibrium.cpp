@@ -68,7 +68,7 @@ double buckled_slope(double share) {
   for (int k = 0; k < 60; ++k) {
     const double a = 0.5 * (low + high);
     double x = 1.0, y = std::cos(0.5 * a);
-    for (int tangent_angles = 0; tangent_angles < 8; ++tangent_angles) {
+    for (int turn = 0; turn < 8; ++turn) {
       const double mean = 0.5 * (x + y);
       y = std::sqrt(x * y), x = mean;
     }
@@ -222,7 +222,7 @@ TEST("sliders, sleeves, rigid links, modes: held, and in balance") {
 }
 
 TEST(
-    "joints free to tangent_angles: a soft chain hangs down; a massless joint that nothing turns "
+    "joints free to turn: a soft chain hangs down; a massless joint that nothing turns "
     "stays") {
   Robot robot;
   robot.gravity[1] = -9.81;
