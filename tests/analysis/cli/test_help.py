@@ -76,6 +76,12 @@ def test_the_example_of_a_command_runs(name, place):
     assert left or name in ("frequencies", "doctor", "flash", "robots", "migrate")
 
 
+def test_the_help_of_a_group_has_an_example_of_one_of_its_commands():
+    status, shown, _ = run(["bench", "--help"])
+    (example,) = re.findall(r"Example: flexura (bench \S+)", shown)
+    assert status == 0 and example in COMMANDS
+
+
 def sentences(text):
     """The sentences of a help text, without formulas and examples."""
     text = re.sub(r"\x08\n.*?(\n\n|\Z)", "\n\n", text, flags=re.DOTALL)
