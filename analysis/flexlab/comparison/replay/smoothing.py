@@ -71,6 +71,21 @@ def continue_past_end(t: np.ndarray, y: np.ndarray) -> Signal:
     return Signal(through.segments[:-1], through.spec)
 
 
+def smoothed(t: np.ndarray, y: np.ndarray) -> Signal:
+    """The smoothing spline of positions with a noise of unknown size: lambda by generalised
+    cross-validation (Craven and Wahba, Numer. Math. 31 (1979) 377).
+
+    Args:
+        t: ascending times (k,) [s].
+        y: positions (k,).
+    """
+    from scipy.interpolate import make_smoothing_spline
+
+    if np.ptp(y) == 0.0:
+        return signals.constant(float(y[0]))
+    return continue_past_end(t, make_smoothing_spline(t, y)(t))
+
+
 def smoothing_spline(t: np.ndarray, y: np.ndarray, step: float | None = None) -> Signal:
     """The smoothing spline of measured positions.
 

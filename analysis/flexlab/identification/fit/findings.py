@@ -87,6 +87,7 @@ def sentences(search: Search, found: Estimate, quantities: Sequence[object]) -> 
         if u.name not in nothing
     ]
     out += _off(quantities)
+    out += _of_inputs(search, found)
     out += _left(search, found)
     out += _channels(search, found)
     return out
@@ -121,6 +122,21 @@ def _off(quantities: Sequence[object]) -> list[str]:
                 f"{name}: {value / file:.3g} times the file's value, which the interval excludes"
             )
     return out
+
+
+def _of_inputs(search: Search, found: Estimate) -> list[str]:
+    """Estimates whose intervals are mostly what the noise of measured motions does to them."""
+    if not search.mostly_inputs.any():
+        return []
+    named = zip(found.parameters, search.mostly_inputs, strict=True)
+    names = [u.name for u, mostly in named if mostly]
+    first = search.experiments[0]
+    motions = [each.channel for each in first.inputs if each.channel in first.run]
+    return [
+        f"{', '.join(names)}: most of the interval comes from the noise of the measured motion "
+        f"{', '.join(motions)}, which is an input; a drive, or the reference of a controller that "
+        "is known, has none"
+    ]
 
 
 def _left(search: Search, found: Estimate) -> list[str]:

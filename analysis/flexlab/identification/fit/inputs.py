@@ -6,6 +6,7 @@ are known. Any other channel is a force or torque, by its gain: the drive, a cur
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,13 +18,17 @@ from flexura import signals
 from flexura.control import Gains
 from flexura.signals import COLUMNS, Signal
 
-from ...comparison.replay.smoothing import recorded_samples, resolution, smoothing_spline
+from ...comparison.replay.smoothing import (
+    recorded_samples,
+    resolution,
+    smoothed,
+    smoothing_spline,
+)
 
 MOTION, FORCE, REFERENCE = "motion", "force", "reference"
 _GIVEN = re.compile(r"(?:(\d{1,3}):)?(.+)")
 _OF_JOINT = re.compile(r"joint/(\d{1,3})/(\w+)")
-# standard deviation of third differences of a white noise, and of the median's size
-_THIRD, _MEDIAN = np.sqrt(20.0), 0.674490
+_MEDIAN = 0.674490  # the median's size, by the standard deviation
 
 
 @dataclass(frozen=True)
@@ -123,16 +128,27 @@ def force_unit(robot: fx.Robot, joint: int) -> str:
     return "N m" if robot.links[joint - 1].joint.type == "R" else "N"
 
 
-def wave(run: fx.Run, given: Input) -> Signal:
-    """A run's channel as a signal: motions smoothed as far as their noise, forces as splines,
-    references from sample to sample.
+def wave(run: fx.Run, given: Input, smoother: bool = False) -> Signal:
+    """A run's channel as a signal: motions smoothed, forces as splines, references from sample to
+    sample.
+
+    Args:
+        run: the run.
+        given: the channel, and what it is.
+        smoother: smooth a motion as far as its noise allows, which blurs fast parts; else as far
+            as cross-validation finds, which leaves more noise at rest. A quantised motion is
+            smoothed as far as its quantisation in either case.
 
     Raises:
         InputError: the channel has too few samples.
     """
     t, y = recorded_samples(run.t, run[given.channel], given.channel)
     if given.kind == MOTION:
-        return smoothing_spline(t, y, resolution(y) or noise(y) * np.sqrt(12))
+        if resolution(y):
+            return smoothing_spline(t, y)
+        return smoothing_spline(t, y, noise(y) * np.sqrt(12)) if smoother else smoothed(t, y)
+    if held := _hold_s(run, given, t):
+        return _steps(t, y, held)
     if given.kind == FORCE:
         return signals.table(t, y)
     rows = np.zeros((len(t), COLUMNS))
@@ -140,10 +156,60 @@ def wave(run: fx.Run, given: Input) -> Signal:
     return Signal(rows, {"kind": "linear", "t_s": t.tolist(), "y": y.tolist()})
 
 
+def _hold_s(run: fx.Run, given: Input, t: np.ndarray) -> float:
+    """For how long a sampled controller of flexura held this drive [s]; 0: it is continuous."""
+    own = run.meta.get("drive")
+    rate = own.get("rate_Hz", 0.0) if isinstance(own, dict) else 0.0
+    drive = given.kind == FORCE and given.channel == f"joint/{given.joint}/drive"
+    return 1 / rate if rate and drive and len(t) > 1 else 0.0
+
+
+def _steps(t: np.ndarray, y: np.ndarray, held_s: float) -> Signal:
+    """A drive that is held: exact where each tick has a sample; where samples are further apart,
+    the curve through them, later by half a tick."""
+    if np.median(np.diff(t)) > 1.001 * held_s:
+        through = signals.table(t, y)
+        rows = through.segments.copy()
+        rows[:, 0] += held_s / 2
+        return Signal(rows, through.spec)
+    rows = np.zeros((len(t), COLUMNS))
+    rows[:, 0], rows[:, 1] = t, y
+    return Signal(rows, {"kind": "piecewise", "at_s": t.tolist(), "value": y.tolist()})
+
+
+def misread(run: fx.Run, given: Input, motion: Signal, seed: int) -> np.ndarray:
+    """What the channel of a motion might have read, had the joint moved on its smoothed motion.
+
+    Args:
+        run: the run.
+        given: a MOTION.
+        motion: its smoothed motion, `wave`.
+        seed: of the noise.
+
+    Returns:
+        Values (T,), NaN where the channel has none.
+    """
+    y, random = run[given.channel], np.random.default_rng(seed)
+    there = np.isfinite(y)
+    out, step = np.full(len(y), np.nan), resolution(y[there])
+    smooth = np.array([motion(at)[0] for at in run.t[there]])
+    if step:
+        phase = random.uniform(0, step)
+        out[there] = step * np.round((smooth + phase) / step) - phase
+    else:
+        out[there] = smooth + random.normal(0.0, noise(y), int(there.sum()))
+    return out
+
+
 def noise(y: np.ndarray) -> float:
     """The standard deviation of a white noise in values (T,) of a smooth quantity, from their
-    third differences."""
+    differences: of the order that leaves least of the quantity itself."""
     y = y[np.isfinite(y)]
-    if len(y) < 8:
-        return 0.0
-    return float(np.median(np.abs(np.diff(y, 3))) / (_MEDIAN * _THIRD))
+    orders = range(3, min(9, len(y) - 4))
+    return min(
+        (
+            float(np.median(np.abs(np.diff(y, k))) / (_MEDIAN * np.sqrt(math.comb(2 * k, k))))
+            for k in orders
+        ),
+        default=0.0,
+    )

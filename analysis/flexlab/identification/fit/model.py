@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,7 +12,7 @@ import flexura as fx
 from flexura.control import Gains
 from flexura.signals import JointDrive, Signal
 
-from .inputs import FORCE, MOTION, REFERENCE, Input, noise, wave
+from .inputs import FORCE, MOTION, REFERENCE, Input, misread, noise, wave
 from .unknowns import CUTOFF_RATIO, of_channel
 
 RTOL = 1e-7
@@ -26,7 +26,7 @@ class Experiment:
     """A run that parameters are fitted to.
 
     `channels`: those that are compared. `span`: from and to when [s]. `started`: names of keys that
-    say where joints start; the run's first positions stand in for others.
+    say where joints start; the run's first positions stand in for others. `smoother`: as in `wave`.
     """
 
     run: fx.Run
@@ -35,6 +35,7 @@ class Experiment:
     span: tuple[float, float]
     controller: Gains | None = None
     started: frozenset[str] = frozenset()
+    smoother: bool = False
     _cache: dict[tuple[tuple[str, float], ...], fx.Run] = field(default_factory=dict)
 
     @cached_property
@@ -51,7 +52,20 @@ class Experiment:
     @cached_property
     def waves(self) -> dict[int, Signal]:
         """The inputs as signals, by joint from 1."""
-        return {each.joint: wave(self.run, each) for each in self.inputs}
+        return {each.joint: wave(self.run, each, self.smoother) for each in self.inputs}
+
+    def misread(self, seed: int) -> Experiment | None:
+        """The same under motions as they might have been measured; None: no joint is prescribed."""
+        moved = [each for each in self.inputs if each.kind == MOTION]
+        if not moved:
+            return None
+        read = {
+            each.channel: misread(self.run, each, self.waves[each.joint], seed) for each in moved
+        }
+        run = replace(self.run, channels={**self.run.channels, **read})
+        out = replace(self, run=run, _cache={})
+        out.__dict__["measured"] = self.measured
+        return out
 
     def simulate(
         self, robot: fx.Robot, values: Mapping[str, float], end: float | None = None

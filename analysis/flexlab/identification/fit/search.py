@@ -17,6 +17,8 @@ from .unknowns import Unknown, of_channel
 STEPS = 30  # of one fit
 WEIGHTED = 4  # fits with weights of the one before
 SETTLED = 0.01  # change of the weights that ends this
+HALF = 0.5  # of a variance
+DRAWS = 8  # of the noise of measured motions
 FAILED = 1e3  # a residual of a simulation that ended early
 LEAST_NOISE = 1e-6  # of a channel's size
 
@@ -31,6 +33,8 @@ class Search:
     experiments: tuple[Experiment, ...]
     sigma: np.ndarray = field(default_factory=lambda: np.zeros(0))
     evaluations: int = 0
+    of_inputs: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    mostly_inputs: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
     def __post_init__(self) -> None:
         self.sizes = np.array([self._size(k) for k in range(len(self.experiments[0].channels))])
@@ -65,17 +69,21 @@ class Search:
         return float(found[0]) if len(found) else 0.0
 
     def residuals_at(
-        self, values: Mapping[str, float], ends: Sequence[float] | None = None
+        self,
+        values: Mapping[str, float],
+        ends: Sequence[float] | None = None,
+        experiments: Sequence[Experiment] | None = None,
     ) -> np.ndarray:
         """Deviations of all runs in units of sigma, one run after another (channels, T).
 
         Args:
             values: of the unknowns.
             ends: of each run [s]; None: the whole.
+            experiments: in place of the runs' own.
         """
         self.evaluations += 1
         parts = []
-        for k, each in enumerate(self.experiments):
+        for k, each in enumerate(experiments or self.experiments):
             try:
                 end = None if ends is None else ends[k]
                 z = each.readings(self.robot, {**self.fixed, **values}, end)
@@ -163,7 +171,41 @@ class Search:
         x = np.array([u.parameter.to_scaled(found.values[u.name]) for u in self.unknowns])
         J = self.jacobian(x, central=True)
         C = _covariance(J, found.residuals, self._lag(found.residuals))
+        self.of_inputs = self._of_inputs(found.values, J)
+        C += self.of_inputs
+        with np.errstate(invalid="ignore"):
+            self.mostly_inputs = np.diag(self.of_inputs) > HALF * np.diag(C)
         return replace(found, derivatives=J, covariance=C, evaluations=self.evaluations)
+
+    def smoother(self) -> Search:
+        """The same with motions that are smoothed more."""
+        return replace(
+            self,
+            experiments=tuple(replace(e, smoother=True, _cache={}) for e in self.experiments),
+            of_inputs=np.zeros((0, 0)),
+        )
+
+    def _of_inputs(self, values: Mapping[str, float], J: np.ndarray) -> np.ndarray:
+        """What the noise of measured motions does to the scaled values: the mean square (k, k) of
+        their changes where the motions are smoothed again from other readings of the same noise."""
+        flat = J.reshape(len(J), -1)
+        size = np.linalg.norm(flat, axis=1)
+        out, there = np.zeros((len(J), len(J))), size > 0
+        base = self.residuals_at(values)
+        for seed in range(DRAWS):
+            others = [each.misread(seed) for each in self.experiments]
+            if not there.any() or all(other is None for other in others):
+                break
+            drawn = [
+                own if other is None else other
+                for own, other in zip(self.experiments, others, strict=True)
+            ]
+            change = (self.residuals_at(values, experiments=drawn) - base).ravel()
+            moved = np.zeros(len(J))
+            scaled = (flat[there] / size[there, None]).T
+            moved[there] = -np.linalg.lstsq(scaled, change, rcond=None)[0] / size[there]
+            out += np.outer(moved, moved) / DRAWS
+        return out
 
     def _lag(self, r: np.ndarray) -> int:
         """Samples over which residuals hang together: 0 for white ones."""
