@@ -12,6 +12,7 @@ from ..runs.formatting import percent
 from ..runs.table import Table
 from .measures import RESPONSE_LEVEL, Comparison
 
+_FAR = 0.2  # of a joint's peak
 HEADS = ("quantity", "peak", "largest deviation", "at [s]", "of the peak", "RMS", "dissertation")
 
 
@@ -81,6 +82,12 @@ def notes(c: Comparison) -> list[str]:
     ]
     if way := c.simulation.meta.get("driven_by"):
         lines.append(f"simulation {DRIVEN[way]} (--by {way})")
+    far = any(d.max_relative > _FAR for d in c.differences if d.channel.startswith("joint/"))
+    if way == "commanded" and far:
+        lines.append(
+            "voltages alone do not tell where friction stops a joint: --by measured moves the "
+            "joints as they were measured, and flexura identify finds the friction"
+        )
     published = any(d.published_percent is not None for d in c.differences)
     lines.append(
         "deviation: second minus first, of the first run's peak"

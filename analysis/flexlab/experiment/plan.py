@@ -148,7 +148,9 @@ def inverse(
     plan = _tracking_plan("inverse", setup, settings, whole)
     return dataclasses.replace(
         plan,
-        asked=asked.spec() | {"lead_s": lead_s, "out_s": out_s, "shaped": shape is not None},
+        asked=asked.spec()
+        | {"lead_s": lead_s, "out_s": out_s}
+        | ({"shaped": True} if shape else {}),
         phases=phases,
     )
 

@@ -80,6 +80,8 @@ def fit(
             f"expected at least {MIN_SAMPLES} samples faster than {SLIDING[axis.unit]:g} "
             f"{axis.unit}/s and {clear_after:g} {axis.unit} after a turn"
         )
+        if not experiment.complete:
+            expected += f"; the run ended early, at {t[-1]:.3g} s"
         raise InputError(expected, key=position, value=int(slides.sum()))
 
     mass, given = line.inertia, np.zeros(len(t))

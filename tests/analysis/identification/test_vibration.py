@@ -262,3 +262,14 @@ def test_the_emulated_strip_rings_at_the_plants_own_frequency(tmp_path):
     own = np.sqrt(eigh(stiffness, np.array(system.mass(q)), eigvals_only=True)[0]) / (2 * np.pi)
     assert status == 0 and found["modes"][0]["frequency_Hz"][0] == pytest.approx(own, rel=5e-3)
     assert tomllib.loads((tmp_path / "b" / "zvd.toml").read_text())["shaper"]["kind"] == "zvd"
+
+
+def test_a_link_rings_free_from_when_its_prescribed_joint_rests():
+    """The motion's own frequency (3.3 Hz, with a damping ratio of 0.66) is none of the link's."""
+    robot = fx.load("single-r")
+    t = np.linspace(0.0, 4.0, 2001)
+    run = fx.inverse(robot, t, [signals.cycloid(0.04, 0.3, at_s=0.2)])
+    found = record(run)
+    assert "after the last command at 0.5 s" in found.why and found.t[0] > 0.49
+    first = max(fit(found.t, found.y).modes, key=lambda mode: mode.amplitude)
+    assert first.frequency == pytest.approx(fx.frequencies(robot)[0], rel=1e-3)

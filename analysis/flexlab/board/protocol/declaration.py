@@ -177,12 +177,12 @@ FAULTS: dict[Fault, tuple[str, str]] = {
         "Slower trajectory.",
     ),
     Fault.flex_low: (
-        "The flex sensor reads below its range: open circuit.",
-        "Check the sensor and its wires.",
+        "The strip's sensor reads below its range: open circuit.",
+        "Check the sensor, its wires and its gain.",
     ),
     Fault.flex_high: (
-        "The flex sensor reads above its range: short circuit.",
-        "Check the sensor and its wires.",
+        "The strip's sensor reads above its range: short circuit.",
+        "Check the sensor, its wires and its gain.",
     ),
     Fault.underrun: (
         "The next set-point was not there in time.",

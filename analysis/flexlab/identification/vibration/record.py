@@ -21,6 +21,7 @@ KINDS = (
     r".*",
 )
 COMMANDS = re.compile(r"joint/\d+/(reference|pulses|voltage)")
+JOINTS = re.compile(r"joint/\d+/(motor_)?position")
 LEVEL = 0.5  # of the largest swing: a record that begins beyond it begins free
 
 
@@ -105,12 +106,14 @@ def _swing(values: np.ndarray) -> float:
 
 
 def _last_command(run: fx.Run, end: float) -> float:
-    """When a set-point, pulses or a voltage last changed [s]; -inf if none does, or to the end."""
+    """When a set-point, pulses, a voltage or a joint that comes to rest last changed [s]; -inf if
+    none does, or to the end."""
     last = -np.inf
     for name, values in run.items():
-        if COMMANDS.fullmatch(name):
+        least = 1e-3 if COMMANDS.fullmatch(name) else 1e-6 if JOINTS.fullmatch(name) else None
+        if least is not None:
             step = np.abs(np.diff(values))
-            moved = np.flatnonzero(step > 1e-3 * np.nanmax(np.abs(values), initial=0.0))
+            moved = np.flatnonzero(step > least * np.nanmax(np.abs(values), initial=0.0))
             if len(moved) and run.t[moved[-1] + 1] < 0.8 * end:
                 last = max(last, float(run.t[moved[-1] + 1]))
     return last

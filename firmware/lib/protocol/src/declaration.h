@@ -66,9 +66,9 @@ enum class Fault : uint8_t {
   following_1 = 14,
   // Joint 2 is farther from its set-point than configured.
   following_2 = 15,
-  // The flex sensor reads below its range: open circuit.
+  // The strip's sensor reads below its range: open circuit.
   flex_low = 16,
-  // The flex sensor reads above its range: short circuit.
+  // The strip's sensor reads above its range: short circuit.
   flex_high = 17,
   // The next set-point was not there in time.
   underrun = 18,
