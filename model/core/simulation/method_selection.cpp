@@ -139,15 +139,13 @@ void MethodSelection::compare() {
   goes_on = begun && chosen == exponential_.get();
 }
 
-// Under a sampled controller: explicit steps if they are few a tick, else exponential or implicit
-// ones.
+// Under a sampled controller: explicit steps where one a tick is enough for the fastest mode, else
+// exponential ones beside explicit or implicit ones.
 Method<double> *MethodSelection::method_under_ticks(double rate_Hz, bool bends) {
-  for_ticks =
-      make_method(method_for_ticks(rate_Hz, fastest(loop.integration, loop.run_state[0].t), rtol),
-                  loop.integration);
+  const double rate = fastest(loop.integration, loop.run_state[0].t);
+  for_ticks = make_method(method_for_ticks(rate_Hz, rate, rtol), loop.integration);
   if (for_ticks->name() == std::string(TR_BDF2.name)) second_order = for_ticks.get();
-  const bool stiff = second_order || for_ticks->name() == std::string(ESDIRK_4.name);
-  return stiff && bends && !sharp && !loop.integration.plant.rides
+  return rate > rate_Hz && bends && !sharp && !loop.integration.plant.rides
              ? compare_forward(*for_ticks, 1.0)
              : for_ticks.get();
 }
