@@ -88,7 +88,7 @@ def damaged(path: object, form: str, error: BaseException) -> InputError:
     reason = (str(error).strip() or type(error).__name__).splitlines()[0]
     if isinstance(error, KeyError):
         reason = f"{reason} is missing"
-    return InputError(f"a damaged {form} ({reason[:120]})", file=str(path))
+    return InputError(f"a damaged {form} ({reason[:160]})", file=str(path))
 
 
 def floats(values: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
