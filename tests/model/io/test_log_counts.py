@@ -5,7 +5,7 @@ import pytest
 
 import flexura as fx
 from flexura.io.logs import read_log, understood
-from foreign_logs import bag, json_mcap, numbers
+from foreign_logs import bag, json_mcap, lvm_file, numbers
 
 T, A, W, F = numbers()
 
@@ -98,3 +98,28 @@ def test_a_bag_has_the_messages_that_its_metadata_say(storage, tmp_path):
     said = f"/joint_states: .* {len(T)} messages, the counts in its metadata.yaml say 250"
     with pytest.raises(fx.InputError, match=said):
         read_log(place)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("Channels\t3", "Channels\t4", "3 channels, the header says 4"),
+        ("240\t240\t240", "240\t241\t240", "channel 2 has 240 rows, the header says 241 samples"),
+    ],
+)
+@pytest.mark.parametrize("layout", ["One", "Multi", "No"])
+def test_a_segment_of_labview_has_the_channels_and_rows_that_it_says(
+    layout, old, new, said, tmp_path
+):
+    path = lvm_file(tmp_path / "a.lvm", T, (A, W, F), layout=layout)
+    path.write_text(path.read_text().replace(old, new, 1))
+    with pytest.raises(fx.InputError, match=said):
+        read_log(path)
+
+
+def test_channels_of_one_name_are_told_apart(tmp_path):
+    path = lvm_file(tmp_path / "a.lvm", T, (A, W, F))
+    path.write_text(path.read_text().replace("Deflection", "Angle"))
+    run = understood(read_log(path), every=True).run
+    assert list(run) == ["sensor/Angle", "sensor/Angle_2", "sensor/Force"]
+    assert (run["sensor/Angle_2"] == W).all()
