@@ -31,7 +31,8 @@ class Column:
         since: numbers (T,) less the first one, where they are too long for a double; else None.
         clock: a name in `Log.clocks`, or "".
         fault: what is wrong with a row, or "".
-        times: whether they are dates with times, or times of day.
+        calendar: "times" of day, "dates" alone, or "both" together; "" for numbers.
+        dates: the head of the column that has the dates of these times of day, or "".
     """
 
     name: str
@@ -41,7 +42,8 @@ class Column:
     since: np.ndarray | None = None
     clock: str = ""
     fault: str = ""
-    times: bool = False
+    calendar: str = ""
+    dates: str = ""
 
 
 @dataclass(frozen=True)

@@ -165,14 +165,16 @@ def _found(log: Log, asked: str | int, key: str, file: str) -> Column:
 def _clock(log: Log, asked: Map | None) -> Column | None:
     """The column of the clock: map.toml's, else the first one in a unit of time."""
     if asked is not None and asked.time is not None:
-        return _found(log, asked.time.column, "time.column", asked.file)
+        column = _found(log, asked.time.column, "time.column", asked.file)
+        dated = [c for c in log.columns if column.calendar == "dates" and c.dates == column.head]
+        return next(iter(dated), column)
     if asked is not None and asked.rate is not None:
         return None
     of_messages = not log.own and any(column.clock.startswith("/") for column in log.columns)
     if of_messages:
         return None
     free = [column for column in log.columns if not known(column.name)]
-    timed = sorted((c for c in free if in_time(c.unit)), key=lambda c: c.times)
+    timed = sorted((c for c in free if in_time(c.unit)), key=lambda c: bool(c.calendar))
     bare = [c for c in free if not c.unit and c.name.lower().rpartition(".")[2] in TIMES]
     return next(iter(timed + bare), None)
 

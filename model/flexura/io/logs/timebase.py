@@ -48,7 +48,7 @@ def from_column(log: Log, column: Column, said: str, scale: tuple[float, float])
     if len(column.values) < 2:
         raise InputError("expected two rows or more", file=log.file)
     notes = []
-    if column.times and said != "s":
+    if column.calendar and said != "s":
         expected = "expected no other unit than s: its cells are dates or times of day"
         raise InputError(expected, key=f"unit of {column.head!r}", value=said, file=log.file)
     if not said:
@@ -66,6 +66,8 @@ def from_column(log: Log, column: Column, said: str, scale: tuple[float, float])
     _check(log, t, f"clock {column.head!r}", measured, float(absolute[0]))
     notes += _rate(t, said) if measured else []
     text = f"{column.head!r} in {said}"
+    if column.dates:
+        text = f"{column.dates!r} and {column.head!r}"
     if column.since is not None and t is not absolute:
         return Timebase(t, float(absolute[0]), text, notes=notes)
     return _early(Timebase(t, 0.0, text, notes=notes), log.own)

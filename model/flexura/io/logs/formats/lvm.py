@@ -145,9 +145,7 @@ def _numbers(rows: list[list[str]], k: int, comma: bool, line: int, file: str) -
     )
 
 
-def _counted(
-    own: dict[str, str], lengths: list[int], separator: str, line: int, file: str
-) -> None:
+def _counted(own: dict[str, str], lengths: list[int], separator: str, line: int, file: str) -> None:
     """Refuse a segment with other channels, or fewer rows of one, than its header says; where a
     program writes one header for all, more rows follow."""
     said = own.get("Channels", "").split(separator)[0].strip()
