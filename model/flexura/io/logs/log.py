@@ -59,6 +59,7 @@ class Log:
         own: whether it is an export of flexura.
         lines: the line of a row's number in a text file, by row from 0.
         notes: what was assumed.
+        unread: what has no numbers to take, and why, by its head.
         digest: of the numbers of an export of flexura, as it says, or "".
     """
 
@@ -70,6 +71,7 @@ class Log:
     own: bool = False
     lines: list[int] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    unread: dict[str, str] = field(default_factory=dict)
     digest: str = ""
 
     def row(self, number: int) -> str:

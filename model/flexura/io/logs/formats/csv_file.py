@@ -79,6 +79,8 @@ def read(raw: bytes, file: str) -> Log:
         fault = ""
         if (wrong := found.wrong) >= 0:
             fault = f"row {wrong + 1} (line {places[wrong]}): {refused(rows[wrong][k], comma)}"
+            if not any(number(cells[k], comma) is not None for cells in rows):
+                fault = f"no numbers: {fault}"
         said = "s" if found.calendar in ("times", "both") else said
         kind = found.calendar
         columns.append(
