@@ -53,19 +53,19 @@ def test_an_mcap_file_without_checksums_has_the_messages_that_it_says(tmp_path):
     raw = path.read_bytes()
     at = of_message(raw, 40)
     changed(path, at + 1 + 5, 1)  # a record that takes in all that follow it
-    with pytest.raises(fx.InputError, match="a.mcap"):
+    with pytest.raises(fx.InputError, match=r"a.mcap"):
         read_log(path)
     path.write_bytes(raw)
     changed(path, at, 0x81)  # a record of a kind that is skipped
-    with pytest.raises(fx.InputError, match="/arm: .* 99 messages, the file's statistics say 100"):
+    with pytest.raises(fx.InputError, match=r"/arm: .* 99 messages, the file's statistics say 100"):
         read_log(path)
     path.write_bytes(raw)
     changed(path, at + 9, 2)  # of the other topic
-    with pytest.raises(fx.InputError, match="(99|101) messages, .* say 100"):
+    with pytest.raises(fx.InputError, match=r"(99|101) messages, .* say 100"):
         read_log(path)
     path.write_bytes(raw)
     changed(path, of_message(raw, 99) + 15 + 6, 99)  # a log time in another century
-    with pytest.raises(fx.InputError, match="log times from .* statistics say .* s"):
+    with pytest.raises(fx.InputError, match=r"log times from .* statistics say .* s"):
         read_log(path)
 
 

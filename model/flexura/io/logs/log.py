@@ -90,7 +90,7 @@ class Log:
 def damaged(path: object, form: str, error: BaseException) -> InputError:
     """What a reader of another project says of a damaged file, in one sentence."""
     reason = (str(error).strip() or type(error).__name__).splitlines()[0]
-    if isinstance(error, KeyError):
+    if isinstance(error, KeyError) and " " not in reason:
         reason = f"{reason} is missing"
     return InputError(f"a damaged {form} ({reason[:160]})", file=str(path))
 

@@ -67,7 +67,17 @@ def read(raw: bytes, file: str) -> Log:
     columns, clocks = messages.columns(topics)
     notes = messages.late(topics)
     notes += [f"{topic} is left out: its encoding is {said}" for topic, said in unread.items()]
-    return Log(file, "MCAP", columns, clocks, meta or {}, own=meta is not None, notes=notes)
+    unread_fields = messages.left(topics)
+    return Log(
+        file,
+        "MCAP",
+        columns,
+        clocks,
+        meta or {},
+        own=meta is not None,
+        notes=notes,
+        unread=unread_fields,
+    )
 
 
 def _topics(

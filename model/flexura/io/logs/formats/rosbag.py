@@ -51,4 +51,5 @@ def read(path: Path) -> Log:
     columns, clocks = messages.columns(list(topics.values()))
     notes = messages.late(list(topics.values()))
     notes += [f"{name} is left out: its type is not described" for name in sorted(unread)]
-    return Log(str(path), "ROS bag", columns, clocks, notes=notes)
+    unread_fields = messages.left(list(topics.values()))
+    return Log(str(path), "ROS bag", columns, clocks, notes=notes, unread=unread_fields)

@@ -17,6 +17,8 @@ from ....optional import load
 from ..log import Clock, Column, Log, damaged, floats
 from ..names import parted
 
+NO_UTF_8 = "Error decoding string"  # LabVIEW writes texts in the code page of its machine
+
 
 def read(raw: bytes, file: str) -> Log:
     """The channels of a TDMS file, each with its time base where it has one.
@@ -29,11 +31,12 @@ def read(raw: bytes, file: str) -> Log:
     try:
         with _complaints() as complaints:
             found = nptdms.TdmsFile.read(io.BytesIO(raw))
-        if complaints:
-            raise ValueError(complaints[0])
-        parts = [(group, channel) for group in found.groups() for channel in group.channels()]
-        parts = [part for part in parts if part[1].dtype.kind in "iufbM"]
-        data = [channel[:] for _, channel in parts]
+            every = [(group, channel) for group in found.groups() for channel in group.channels()]
+            parts = [part for part in every if part[1].dtype.kind in "iufbM"]
+            data = [channel[:] for _, channel in parts]
+        texts = [text for text in complaints if text.startswith(NO_UTF_8)]
+        if len(texts) < len(complaints):
+            raise ValueError(next(text for text in complaints if text not in texts))
     except InputError:
         raise
     except Exception as error:  # whatever a damaged file makes of it
@@ -55,8 +58,22 @@ def read(raw: bytes, file: str) -> Log:
             clocks[head] = base
         clock = head if base is not None else ""
         columns.append(Column(name, head, said, values, since, clock))
-    said = str(found.properties.get("digest", ""))
-    return Log(file, "TDMS", columns, clocks, own or {}, own=own is not None, digest=said)
+    notes = []
+    if texts:
+        count = "a text is" if len(texts) == 1 else f"{len(texts)} texts are"
+        notes = [f"{count} not UTF-8: \ufffd stands for what cannot be read"]
+    numbers_of = {id(channel) for _, channel in parts}
+    return Log(
+        file,
+        "TDMS",
+        columns,
+        clocks,
+        own or {},
+        own=own is not None,
+        notes=notes,
+        unread={c.name: "no numbers" for _, c in every if id(c) not in numbers_of},
+        digest=str(found.properties.get("digest", "")),
+    )
 
 
 @contextmanager
@@ -65,10 +82,12 @@ def _complaints() -> Iterator[list[str]]:
     texts: list[str] = []
 
     def keep(record: logging.LogRecord) -> bool:
-        texts.append(record.getMessage())
+        if record.levelno >= logging.WARNING:
+            texts.append(record.getMessage())
         return False
 
-    loggers = [logging.getLogger(f"nptdms.{part}") for part in ("reader", "tdms_segment")]
+    names = [name for name in logging.root.manager.loggerDict if name.startswith("nptdms")]
+    loggers = [logging.getLogger(name) for name in names]
     for logger in loggers:
         logger.addFilter(keep)
     try:

@@ -61,6 +61,15 @@ def decoded(raw: bytes, file: str) -> tuple[str, str]:
     return text, named
 
 
+def likely(raw: bytes) -> bool:
+    """Whether bytes are a text."""
+    try:
+        decoded(raw, "")
+    except InputError:
+        return False
+    return True
+
+
 def _decoded(raw: bytes, encoding: str, file: str) -> str:
     try:
         return raw.decode(encoding)
