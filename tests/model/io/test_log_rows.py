@@ -48,6 +48,23 @@ def test_a_damaged_first_row_is_no_row_of_heads(head, old, new, said, tmp_path):
         understood(read_log(path), every=True)
 
 
+@pytest.mark.parametrize("row", ["29.11.2026 14:00,50\n", "29.11.2026;14:03:05,12;1000,50\n"])
+def test_a_first_row_with_other_cells_is_no_title(row, tmp_path):
+    head, lines = german()
+    with pytest.raises(fx.InputError, match="line 2: a damaged row of numbers"):
+        read_log(written(tmp_path, head + row + "".join(lines[1:])))
+
+
+def test_rows_are_missing_in_a_clock_that_is_even_but_for_a_damaged_time(tmp_path):
+    rows = [f"{k / 20:.2f},{k}\n" for k in range(40)]
+    rows[20] = rows[20].replace("1.00", "1.005")
+    del rows[21:24]
+    found = understood(read_log(written(tmp_path, f"Time [s],{HEAD}\n" + "".join(rows))))
+    assert found.notes == [
+        "rows are missing after row 21 (line 22): a step of 0.195 s, the others are 0.05 s"
+    ]
+
+
 def test_two_damaged_rows_are_named_by_the_first(tmp_path):
     head, lines = german()
     lines[:2] = [line.replace("29.11.", "29.1k.") for line in lines[:2]]

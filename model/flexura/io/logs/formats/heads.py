@@ -96,11 +96,14 @@ def check_damage(above: list[Line], first: Line, separator: str, comma: bool, fi
     """
     below = cells_of(first.text, separator)
     found: tuple[Line, str] | None = None
-    for line in reversed(above):
+    for k, line in reversed(list(enumerate(above))):
         cells = cells_of(line.text, separator)
         wrong = None if is_units(cells) else _wrong(cells, below, comma)
-        if len(cells) == 1 < len(below) and _shape_differs(line.text, first.text) <= 2:
-            wrong = line.text.strip()
+        if len(cells) != len(below):
+            headed = any(len(cells_of(each.text, separator)) == len(below) for each in above[:k])
+            alike = _shape_differs(line.text, first.text) <= 2
+            if alike or (headed and _kind(line.text, comma) in ("spoilt", "number")):
+                wrong = line.text.strip()
         if wrong is None:
             break
         found = line, wrong
