@@ -193,7 +193,8 @@ def test_a_reader_says_nothing_past_the_notes(tmp_path, capfd, recwarn):
     raw = path.read_bytes()
     path.write_bytes(raw.replace("Gr\xf6\xdfe".encode(), b"Gr\xf6\xdfe.."))
     found = understood(read_log(path), every=True)
-    assert [note for note in found.notes if "not UTF-8" in note]
+    said = "texts are not UTF-8, \ufffd stands for what cannot be read: 'Gr\ufffd\ufffde..'"
+    assert said in found.notes
     path.write_bytes(raw.replace(b"\x68\x12\0\0", b"\x6a\x12\0\0", 1))
     with pytest.raises(fx.InputError, match="a damaged TDMS file"):
         read_log(path)
@@ -234,3 +235,10 @@ def test_dates_and_times_apart_in_parquet_are_one_clock(unit, tmp_path):
     if unit != "s":  # a row a second is too slow for a robot
         found = understood(log, every=True)
         assert found.clock == "'Date' and 'Clock'" and list(found.run) == ["sensor/n"]
+
+
+def test_a_channel_with_its_own_time_base_is_interpolated_beside_a_rate(tmp_path):
+    path = two_clocks(tmp_path / "a.tdms")
+    found = run_of(path, tmp_path, MAP.replace('column = "Time"', "rate_Hz = 250"))
+    assert "'slow' is interpolated" in found.notes[0] and len(found.run) == 300
+    np.testing.assert_allclose(found.run["sensor/slow"][:280], 3e-3 * T_FAST[:280], atol=1e-12)

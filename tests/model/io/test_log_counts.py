@@ -123,3 +123,27 @@ def test_channels_of_one_name_are_told_apart(tmp_path):
     run = understood(read_log(path), every=True).run
     assert list(run) == ["sensor/Angle", "sensor/Angle_2", "sensor/Force"]
     assert (run["sensor/Angle_2"] == W).all()
+
+
+def test_a_bag_of_ros_1_has_the_messages_that_its_index_says(tmp_path):
+    from rosbags.rosbag1 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC)
+    kind = "std_msgs/msg/Float64"
+    path = tmp_path / "a.bag"
+    with Writer(path) as writer:
+        connection = writer.add_connection("/force", kind, typestore=store)
+        for k, value in enumerate(F.tolist()):
+            raw = store.serialize_ros1(store.types[kind](value), kind)
+            writer.write(connection, 10**18 + 10**7 * k, raw)
+    found = understood(read_log(path), every=True)
+    assert (found.run["sensor/force"] == F).all() and "no stamps" in found.clock
+    raw = path.read_bytes()
+    count = len(F).to_bytes(4, "little")
+    at = raw.rindex(count)  # of the record of the chunk, at the end
+    path.write_bytes(raw[:at] + (len(F) + 9).to_bytes(4, "little") + raw[at + 4 :])
+    with pytest.raises(
+        fx.InputError, match=r"/force: .* 240 messages, the counts in its index say"
+    ):
+        read_log(path)

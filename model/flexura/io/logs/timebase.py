@@ -23,7 +23,7 @@ class Timebase:
         start: what was taken off them [s].
         said: what they are, in words.
         clock: the name in Log.clocks of the columns that have it, or "".
-        first: its times as the log has them, by which other clocks are told; None for a rate.
+        first: its times as the log has them, by which other clocks are told.
         notes: what was assumed.
         others: columns with other clocks, by what is said of them.
     """
@@ -31,8 +31,8 @@ class Timebase:
     t: np.ndarray
     start: float
     said: str
+    first: Clock
     clock: str = ""
-    first: Clock | None = None
     notes: list[str] = field(default_factory=list)
     others: dict[tuple[str, str], list[str]] = field(default_factory=dict)
 
@@ -55,7 +55,8 @@ def in_time(said: str) -> bool:
 
 def from_rate(rate: float, length: int) -> Timebase:
     """Times of a log without a clock, k / rate [s]."""
-    return Timebase(np.arange(length) / rate, 0.0, f"{rate:g} samples a second")
+    t, said = np.arange(length) / rate, f"{rate:g} samples a second"
+    return Timebase(t, 0.0, said, first=Clock(t, 0.0, said))
 
 
 def from_column(log: Log, column: Column, said: str, scale: tuple[float, float]) -> Timebase:
@@ -92,7 +93,7 @@ def from_column(log: Log, column: Column, said: str, scale: tuple[float, float])
     clock = column.clock if column.clock.startswith("/") else ""  # of messages
     start = float(absolute[0]) if column.since is not None and t is not absolute else 0.0
     first = log.clocks.get(clock, Clock(t, start, text))
-    base = Timebase(t, start, text, clock, first, notes)
+    base = Timebase(t, start, text, first, clock, notes)
     return base if start else _early(base, log.own)
 
 
@@ -106,8 +107,8 @@ def from_clock(log: Log, name: str) -> Timebase:
     _check(log, clock.t, clock.said, True, clock.start_s)
     if clock.start_s > EPOCH_S:
         start = clock.start_s + float(clock.t[0])
-        return Timebase(clock.t - clock.t[0], start, clock.said, name, clock)
-    return _early(Timebase(clock.t + clock.start_s, 0.0, clock.said, name, clock), log.own)
+        return Timebase(clock.t - clock.t[0], start, clock.said, clock, name)
+    return _early(Timebase(clock.t + clock.start_s, 0.0, clock.said, clock, name), log.own)
 
 
 def misfit(log: Log, base: Timebase, column: Column) -> str:
@@ -115,7 +116,7 @@ def misfit(log: Log, base: Timebase, column: Column) -> str:
     own = log.clocks.get(column.clock)
     if _by_row(log, base, column):
         return ""
-    if own is None or base.first is None:
+    if own is None:
         return f"{len(column.values)} rows, the clock has {len(base.t)}"
     if not len(own.t):
         return "no rows"
@@ -140,8 +141,8 @@ def on(log: Log, base: Timebase, column: Column) -> np.ndarray:
     if wrong := misfit(log, base, column):
         raise InputError(wrong, key=f"column {column.head!r}", file=log.file)
     own = log.clocks.get(column.clock)
-    if own is None or base.first is None or _by_row(log, base, column):
-        if own is not None and base.first is not None and _apart(own.t, base.first.t):
+    if own is None or _by_row(log, base, column):
+        if own is not None and _apart(own.t, base.first.t):
             said = f"own clock, {own.said}, is not taken"
             base.others.setdefault(("taken row by row", said), []).append(column.head)
         return column.values
@@ -160,7 +161,7 @@ def _by_row(log: Log, base: Timebase, column: Column) -> bool:
     own = log.clocks.get(column.clock)
     if len(column.values) != len(base.t):
         return False
-    if own is None or base.first is None or column.clock == base.clock or not base.clock:
+    if own is None or column.clock == base.clock or not base.clock:
         return True
     return own.start_s == base.first.start_s and np.array_equal(own.t, base.first.t)
 

@@ -29,14 +29,13 @@ def read(raw: bytes, file: str) -> Log:
     """
     nptdms = load("nptdms")
     try:
-        with _complaints() as complaints:
+        with _complaints() as (complaints, texts):
             found = nptdms.TdmsFile.read(io.BytesIO(raw))
             every = [(group, channel) for group in found.groups() for channel in group.channels()]
             parts = [part for part in every if part[1].dtype.kind in "iufbM"]
             data = [channel[:] for _, channel in parts]
-        texts = [text for text in complaints if text.startswith(NO_UTF_8)]
-        if len(texts) < len(complaints):
-            raise ValueError(next(text for text in complaints if text not in texts))
+        if complaints:
+            raise ValueError(complaints[0])
     except InputError:
         raise
     except Exception as error:  # whatever a damaged file makes of it
@@ -60,8 +59,8 @@ def read(raw: bytes, file: str) -> Log:
         columns.append(Column(name, head, said, values, since, clock))
     notes = []
     if texts:
-        count = "a text is" if len(texts) == 1 else f"{len(texts)} texts are"
-        notes = [f"{count} not UTF-8: \ufffd stands for what cannot be read"]
+        shown = ", ".join(map(repr, list(dict.fromkeys(texts))[:3]))
+        notes = [f"texts are not UTF-8, \ufffd stands for what cannot be read: {shown}"]
     numbers_of = {id(channel) for _, channel in parts}
     return Log(
         file,
@@ -77,13 +76,18 @@ def read(raw: bytes, file: str) -> Log:
 
 
 @contextmanager
-def _complaints() -> Iterator[list[str]]:
-    """What npTDMS says meanwhile of a loss after which it reads on; kept off the terminal."""
+def _complaints() -> Iterator[tuple[list[str], list[str]]]:
+    """What npTDMS says meanwhile, kept off the terminal: of a loss after which it reads on, and of
+    texts that it cannot decode."""
+    losses: list[str] = []
     texts: list[str] = []
 
     def keep(record: logging.LogRecord) -> bool:
-        if record.levelno >= logging.WARNING:
-            texts.append(record.getMessage())
+        raw = record.args[0] if isinstance(record.args, tuple) and record.args else None
+        if isinstance(raw, bytes) and str(record.msg).startswith(NO_UTF_8):
+            texts.append(raw.decode(errors="replace")[:60])
+        elif record.levelno >= logging.WARNING:
+            losses.append(record.getMessage())
         return False
 
     names = [name for name in logging.root.manager.loggerDict if name.startswith("nptdms")]
@@ -91,7 +95,7 @@ def _complaints() -> Iterator[list[str]]:
     for logger in loggers:
         logger.addFilter(keep)
     try:
-        yield texts
+        yield losses, texts
     finally:
         for logger in loggers:
             logger.removeFilter(keep)
