@@ -125,12 +125,24 @@ def table(found: Understood, file: Path) -> Table:
         f"{(len(run) - 1) / (run.t[-1] - run.t[0]):.5g} samples a second"
     )
     out.notes += found.notes
-    if found.left:
-        more = f" and {len(found.left) - 8} more" if len(found.left) > 8 else ""
-        out.notes.append(
-            f"left out: {', '.join(found.left[:8])}{more}; --map or --all takes other columns"
-        )
+    out.notes += _left(found)
     return out
+
+
+def _left(found: Understood) -> list[str]:
+    """What was left out: what an option takes, and why the rest is not taken."""
+    reasons: dict[str, list[str]] = {}
+    for head in found.left:
+        reasons.setdefault(found.why.get(head, "--map or --all takes other columns"), []).append(
+            head
+        )
+    notes = []
+    for reason, heads in list(reasons.items())[:8]:
+        more = f" and {len(heads) - 8} more" if len(heads) > 8 else ""
+        notes.append(f"left out: {', '.join(heads[:8])}{more}; {reason}")
+    if len(reasons) > 8:
+        notes.append(f"left out: {len(reasons) - 8} more, each for a reason of its own")
+    return notes
 
 
 def data(found: Understood) -> dict[str, Any]:
@@ -148,5 +160,6 @@ def data(found: Understood) -> dict[str, Any]:
             for row in found.taken
         },
         "left_out": found.left,
+        "left_out_because": {head: found.why[head] for head in found.left if head in found.why},
         "notes": found.notes,
     }

@@ -109,6 +109,22 @@ def test_look_writes_nothing_and_all_takes_every_column(tmp_path):
     assert found["channels"]["sensor/Auslenkung_Spitze"]["si"] == "m"
 
 
+def test_what_all_leaves_out_is_said_with_its_reason(tmp_path):
+    rows = "".join(f"{k / 100},{k},RUN,{k}\n" for k in range(20))
+    (tmp_path / "a.csv").write_text(f"Time [s],n,state,joint/1/position [deg]\n{rows}")
+    why = "no numbers: row 1 (line 2): 'RUN' is no number"
+    words = ["import", tmp_path / "a.csv", "--look"]
+    said = " ".join(command(words)[1].split())
+    assert "left out: n; --map or --all takes other columns" in said and why in said
+    said = " ".join(command([*words, "--all"])[1].split())
+    assert f"left out: state; {why}" in said and "--map or --all" not in said
+    found = json.loads(command([*words, "--all", "--json"])[1])
+    assert found["left_out"] == ["state"] and found["left_out_because"] == {"state": why}
+    (tmp_path / "b.csv").write_text("Time [s],state\n" + "0.0,RUN\n0.1,RUN\n" * 9)
+    status, _, err = command(["import", tmp_path / "b.csv", "--all", "--out", tmp_path / "run"])
+    assert status == 2 and "or --all" not in err and not (tmp_path / "run").exists()
+
+
 def test_a_missing_package_is_one_sentence(tmp_path, monkeypatch):
     path = hdf5_file(tmp_path / "a.h5", ["t"], [np.arange(9.0)], matlab=False)
     monkeypatch.setitem(sys.modules, "h5py", None)

@@ -31,7 +31,8 @@ class Column:
         since: numbers (T,) less the first one, where they are too long for a double; else None.
         clock: a name in `Log.clocks`, or "".
         fault: what is wrong with a row, or "".
-        times: whether they are dates with times, or times of day.
+        calendar: "times" of day, "dates" alone, or "both" together; "" for numbers.
+        dates: the head of the column that has the dates of these times of day, or "".
     """
 
     name: str
@@ -41,7 +42,8 @@ class Column:
     since: np.ndarray | None = None
     clock: str = ""
     fault: str = ""
-    times: bool = False
+    calendar: str = ""
+    dates: str = ""
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,7 @@ class Log:
         own: whether it is an export of flexura.
         lines: the line of a row's number in a text file, by row from 0.
         notes: what was assumed.
+        unread: what has no numbers to take, and why, by its head.
         digest: of the numbers of an export of flexura, as it says, or "".
     """
 
@@ -68,6 +71,7 @@ class Log:
     own: bool = False
     lines: list[int] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    unread: dict[str, str] = field(default_factory=dict)
     digest: str = ""
 
     def row(self, number: int) -> str:
@@ -86,9 +90,9 @@ class Log:
 def damaged(path: object, form: str, error: BaseException) -> InputError:
     """What a reader of another project says of a damaged file, in one sentence."""
     reason = (str(error).strip() or type(error).__name__).splitlines()[0]
-    if isinstance(error, KeyError):
+    if isinstance(error, KeyError) and " " not in reason:
         reason = f"{reason} is missing"
-    return InputError(f"a damaged {form} ({reason[:120]})", file=str(path))
+    return InputError(f"a damaged {form} ({reason[:160]})", file=str(path))
 
 
 def floats(values: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:

@@ -3,13 +3,25 @@
 from __future__ import annotations
 
 import os
+import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import BinaryIO
 
 from ...errors import InputError
-from .formats import csv_file, lvm, mat, mcap_file, rosbag, tables, tdms
+from .formats import csv_file, lvm, mat, mcap_file, rosbag, tables, tdms, text
 from .log import Log
 
+BINARY = {
+    ".tdms": "TDMS",
+    ".mcap": "MCAP",
+    ".parquet": "Parquet",
+    ".mat": "MAT",
+    ".h5": "HDF5",
+    ".hdf5": "HDF5",
+    ".bag": "ROS bag",
+    ".db3": "ROS bag",
+}
 MOST_BYTES, PART_BYTES = 4_000_000_000, 1 << 24
 
 
@@ -26,8 +38,16 @@ def read_log(path: str | os.PathLike[str]) -> Log:
         InputError: it is not there, not known, or damaged.
         Missing: the package that reads it is not installed.
     """
-    place = Path(path)
-    name = str(path)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        log = _opened(Path(path), str(path))
+    kinds = (DeprecationWarning, PendingDeprecationWarning, ResourceWarning, ImportWarning)
+    texts = [str(each.message) for each in said if not issubclass(each.category, kinds)]
+    notes = [f"its reader says: {' '.join(text.split())[:120]}" for text in dict.fromkeys(texts)]
+    return replace(log, notes=[*log.notes, *notes]) if notes else log
+
+
+def _opened(place: Path, name: str) -> Log:
     try:
         if place.is_dir():
             if not (place / "metadata.yaml").is_file():
@@ -76,11 +96,11 @@ def _read(raw: bytes, place: Path, name: str) -> Log:
         raise InputError(
             "the data of a bag of ROS 2: expected its folder, with metadata.yaml", file=name
         )
-    if raw.startswith(b"MATLAB 5.0") or place.suffix.lower() == ".mat":
+    if mat.known(raw):
         return mat.read(raw, name)
     if raw.lstrip(b"\xef\xbb\xbf").startswith(b"LabVIEW Measurement"):
         return lvm.read(raw, name)
-    binary = {".tdms": "TDMS", ".mcap": "MCAP", ".parquet": "Parquet", ".h5": "HDF5"}
-    if form := binary.get(place.suffix.lower()):
+    form = BINARY.get(place.suffix.lower())
+    if form and not text.likely(raw):
         raise InputError(f"no {form} file: its first bytes are others", file=name)
     return csv_file.read(raw, name)

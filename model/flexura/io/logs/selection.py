@@ -15,7 +15,7 @@ from .damage import changed, check_size, missing_rows
 from .log import Column, Log
 from .mapping import Map, Source
 from .names import TIMES, known, sensor
-from .timebase import Timebase, from_clock, from_column, from_rate, in_time, on
+from .timebase import Timebase, from_clock, from_column, from_rate, in_time, misfit, on
 
 EQUAL = ({"N m", "J"},)  # SI units of one dimension that channels tell apart
 
@@ -33,7 +33,17 @@ class Taken:
 
 @dataclass(frozen=True)
 class Understood:
-    """What was understood of a log: the run, the clock in words, the columns, what was assumed."""
+    """What was understood of a log.
+
+    Attributes:
+        run: of the columns that were taken.
+        form: the file's format in words.
+        clock: the run's times in words.
+        taken: channels and their columns.
+        left: heads of the other columns.
+        notes: what was assumed.
+        why: by head, why a column cannot be taken as it is; `left` has others that can.
+    """
 
     run: Run
     form: str
@@ -41,6 +51,7 @@ class Understood:
     taken: list[Taken]
     left: list[str]
     notes: list[str] = field(default_factory=list)
+    why: dict[str, str] = field(default_factory=dict)
 
 
 def understood(
@@ -61,13 +72,24 @@ def understood(
     Raises:
         InputError: a column is not there or is damaged, a unit does not fit, the clock is none.
     """
-    chosen = _mapped(log, asked) if asked else _named(log, every)
     clock = _clock(log, asked)
-    if not chosen:
-        raise InputError(_nothing(log), file=log.file)
-    base = _timebase(log, asked, clock, [column for column, _ in chosen.values()])
+    chosen = _mapped(log, asked) if asked else _named(log, clock)
+    free = _free(log, clock, chosen)
+    wanted = [column for column, _ in chosen.values()]
+    if every:
+        wanted += [column for column in free if not column.fault]
+    if not wanted:
+        raise InputError(_nothing(log, every), file=log.file)
+    base = _timebase(log, asked, clock, wanted)
     if len(base.t) < 2:
         raise InputError("expected two rows or more", file=log.file)
+    why = {c.head: text for c in free if (text := c.fault or misfit(log, base, c))}
+    if every:
+        for place, column in enumerate(log.columns, 1):
+            if column.head not in why and any(column is each for each in free):
+                _add(log, chosen, sensor(column.name or str(place)), column, Source(place))
+        if not chosen:
+            raise InputError(_nothing(log, every, why), file=log.file)
     channels, units, taken, replaced = {}, {}, [], {}
     for name, (column, source) in chosen.items():
         if column.fault:
@@ -90,13 +112,16 @@ def understood(
         meta["clock_start_s"] = base.start
     if robot is not None:
         meta["robot"] = robot
-    used = {id(column) for column, _ in chosen.values()} | {id(clock)}
-    left = [column.head for column in log.columns if id(column) not in used]
+    used = {id(column) for column, _ in chosen.values()}
+    left = [column.head for column in free if id(column) not in used]
+    if every and not log.own:
+        why |= log.unread
+        left += list(log.unread)
     try:
         run = Run(base.t, channels, units, meta)
     except (InputError, ValueError) as error:
         raise InputError(str(error), file=log.file) from None
-    notes = [*log.notes, *base.notes, *missing_rows(log, run.t)]
+    notes = [*log.notes, *base.notes, *base.of_others(), *missing_rows(log, run.t)]
     notes += [
         f"{each.head!r}: the unit {each.si} is not known, and is kept as it is"
         for each in taken
@@ -104,7 +129,7 @@ def understood(
     ]
     if asked is None:
         notes += changed(log, run)
-    return Understood(run, log.form, base.said, taken, left, notes)
+    return Understood(run, log.form, base.said, taken, left, notes, why)
 
 
 def _mapped(log: Log, asked: Map) -> dict[str, tuple[Column, Source]]:
@@ -115,28 +140,42 @@ def _mapped(log: Log, asked: Map) -> dict[str, tuple[Column, Source]]:
     }
 
 
-def _named(log: Log, every: bool) -> dict[str, tuple[Column, Source]]:
+def _named(log: Log, clock: Column | None) -> dict[str, tuple[Column, Source]]:
     """Columns that are named as channels and have a unit; of an own export all but the clock."""
     chosen: dict[str, tuple[Column, Source]] = {}
-    clock = _clock(log, None)
     for place, column in enumerate(log.columns, 1):
-        if column is clock:
-            continue
         name = column.name if log.own else known(column.name)
-        if not log.own and (not name or not column.unit):
-            fits = clock is None or len(column.values) == len(clock.values)
-            free = every and fits and not column.fault
-            name = sensor(column.name or str(place)) if free else ""
-        if not name:
-            continue
-        if name in chosen:
-            raise InputError(
-                f"two columns for {name}, {chosen[name][0].head!r} and {column.head!r}: "
-                "choose one with --map",
-                file=log.file,
-            )
-        chosen[name] = (column, Source(place))
+        if column is not clock and name and (log.own or column.unit):
+            _add(log, chosen, name, column, Source(place))
     return chosen
+
+
+def _add(
+    log: Log,
+    chosen: dict[str, tuple[Column, Source]],
+    name: str,
+    column: Column,
+    source: Source,
+) -> None:
+    """Choose a column for a channel. Raises InputError if it has one."""
+    if name in chosen:
+        raise InputError(
+            f"two columns for {name}, {chosen[name][0].head!r} and {column.head!r}: "
+            "choose one with --map",
+            file=log.file,
+        )
+    chosen[name] = (column, source)
+
+
+def _free(log: Log, clock: Column | None, chosen: dict[str, tuple[Column, Source]]) -> list[Column]:
+    """The columns that are no channel, and no part of the clock."""
+    used = {id(column) for column, _ in chosen.values()} | {id(clock)}
+    dates = clock.dates if clock is not None else ""
+    return [
+        column
+        for column in log.columns
+        if id(column) not in used and not (column.calendar == "dates" and column.head == dates)
+    ]
 
 
 def _found(log: Log, asked: str | int, key: str, file: str) -> Column:
@@ -165,14 +204,16 @@ def _found(log: Log, asked: str | int, key: str, file: str) -> Column:
 def _clock(log: Log, asked: Map | None) -> Column | None:
     """The column of the clock: map.toml's, else the first one in a unit of time."""
     if asked is not None and asked.time is not None:
-        return _found(log, asked.time.column, "time.column", asked.file)
+        column = _found(log, asked.time.column, "time.column", asked.file)
+        dated = [c for c in log.columns if column.calendar == "dates" and c.dates == column.head]
+        return next(iter(dated), column)
     if asked is not None and asked.rate is not None:
         return None
     of_messages = not log.own and any(column.clock.startswith("/") for column in log.columns)
     if of_messages:
         return None
     free = [column for column in log.columns if not known(column.name)]
-    timed = sorted((c for c in free if in_time(c.unit)), key=lambda c: c.times)
+    timed = sorted((c for c in free if in_time(c.unit)), key=lambda c: bool(c.calendar))
     bare = [c for c in free if not c.unit and c.name.lower().rpartition(".")[2] in TIMES]
     return next(iter(timed + bare), None)
 
@@ -253,8 +294,12 @@ def _meta(log: Log, chosen: dict[str, tuple[Column, Source]], base: Timebase) ->
     }
 
 
-def _nothing(log: Log) -> str:
-    """What is said where no column has a channel's name."""
+def _nothing(log: Log, every: bool, why: dict[str, str] | None = None) -> str:
+    """What is said where no column is taken."""
+    if every:
+        found = (why or {}) | log.unread
+        said = "; ".join(f"{head!r}: {text}" for head, text in list(found.items())[:8])
+        return f"no column can be taken: {said}" if said else "no columns of numbers"
     bare = [column.head for column in log.columns if known(column.name) and not column.unit]
     if bare:
         return f"no unit: expected a head as {bare[0]} [rad], or --map with unit, for {bare[0]!r}"

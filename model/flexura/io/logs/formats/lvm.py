@@ -13,6 +13,8 @@ from .text import decoded, numbers, refused
 
 END = "***End_of_Header***"
 SEPARATORS = {"Tab": "\t", "Comma": ",", "Semicolon": ";"}
+ROWS = ("X0", "Delta_X", "Y_Unit_Label", "Samples")  # entries of a value a channel
+NO_CHANNEL = ("", "X_Value", "Comment")
 UNITS = {"Volts": "V", "Volt": "V", "Amps": "A", "g": "g", "Newtons": "N"}
 
 
@@ -49,10 +51,10 @@ def read(raw: bytes, file: str) -> Log:
             raise InputError(
                 "expected a row of names and rows of numbers", key=f"line {start + 1}", file=file
             )
-        _counted(own, len(rows), start + 2, file)
         places += range(start + 2, end + 1)
         parts = _segment(names, rows, layout, comma, own, separator, start + 2, file)
-        for name, (t, values, said) in parts.items():
+        _counted(own, [len(values) for _, values, _ in parts], separator, start + 1, file)
+        for name, (t, values, said) in zip(_plain(names), parts, strict=True):
             earlier = clocks.setdefault(name, [])
             late = bool(earlier and len(t) and len(earlier[-1]) and t[0] <= earlier[-1][-1])
             earlier.append(t + shift if late else t)
@@ -85,8 +87,17 @@ def _header(
         key, _, rest = lines[k].partition(separator)
         if not rest and "\t" in lines[k]:  # the file's own header, before the separator is known
             key, _, rest = lines[k].partition("\t")
-        found[key] = rest if key in ("X0", "Delta_X", "Y_Unit_Label") else rest.split(separator)[0]
+        found[key] = rest if key in ROWS else rest.split(separator)[0]
     raise AssertionError
+
+
+def _plain(names: list[str]) -> list[str]:
+    """The names of channels; a number tells those apart that stand there twice."""
+    found: list[str] = []
+    for name in (name.strip() for name in names if name.strip() not in NO_CHANNEL):
+        again = sum(each == name or each.startswith(f"{name} (") for each in found)
+        found.append(f"{name} ({again + 1})" if again else name)
+    return found
 
 
 def _segment(
@@ -98,11 +109,11 @@ def _segment(
     separator: str,
     line: int,
     file: str,
-) -> dict[str, tuple[np.ndarray, np.ndarray, str]]:
+) -> list[tuple[np.ndarray, np.ndarray, str]]:
     """Clock [s], values and unit of each channel of one segment."""
-    every = [k for k, name in enumerate(names) if name.strip() not in ("", "X_Value", "Comment")]
+    every = [k for k, name in enumerate(names) if name.strip() not in NO_CHANNEL]
     labels = own.get("Y_Unit_Label", "").split(separator)
-    out = {}
+    out = []
     for place, k in enumerate(every):
         at = k - 1 if layout == "Multi" else 0
         values = _numbers(rows, k, comma, line, file)
@@ -114,7 +125,7 @@ def _segment(
         last = int(np.flatnonzero(there)[-1]) + 1 if there.any() else 0
         t, values = (t[:last], values[:last]) if layout == "Multi" else (t, values)
         said = labels[place].strip() if place < len(labels) else ""
-        out[names[k].strip()] = (t, values, UNITS.get(said, said))
+        out.append((t, values, UNITS.get(said, said)))
     return out
 
 
@@ -134,15 +145,24 @@ def _numbers(rows: list[list[str]], k: int, comma: bool, line: int, file: str) -
     )
 
 
-def _counted(own: dict[str, str], rows: int, line: int, file: str) -> None:
-    """Refuse a segment with fewer rows than its header says."""
-    said = own.get("Samples", "")
-    if said.isdigit() and int(said) > rows:
+def _counted(own: dict[str, str], lengths: list[int], separator: str, line: int, file: str) -> None:
+    """Refuse a segment with other channels, or fewer rows of one, than its header says; where a
+    program writes one header for all, more rows follow."""
+    said = own.get("Channels", "").split(separator)[0].strip()
+    if said.isdigit() and int(said) != len(lengths):
         raise InputError(
-            f"{rows} rows, the header says {said} samples: expected the whole segment",
-            key=f"line {line + rows}",
+            f"{len(lengths)} channels, the header says {said}: expected all of them",
+            key=f"line {line}",
             file=file,
         )
+    for k, said in enumerate(own.get("Samples", "").split(separator)[: len(lengths)], 1):
+        if said.strip().isdigit() and int(said) > lengths[k - 1]:
+            raise InputError(
+                f"channel {k} has {lengths[k - 1]} rows, the header says {said.strip()} samples: "
+                "expected the whole segment",
+                key=f"line {line + max(lengths)}",
+                file=file,
+            )
 
 
 def _base(

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import json
+import math
+import struct
 from collections.abc import Iterator
 from typing import Any
 
@@ -17,6 +19,33 @@ from ..names import parted
 DEEPEST = 12  # structs in structs
 HDF5 = b"\x89HDF\r\n\x1a\n"
 MOST_COLUMNS = 200  # of one matrix
+
+
+def known(raw: bytes) -> bool:
+    """Whether bytes begin as a MAT file of version 4 to 7."""
+    if raw.startswith(b"MATLAB 5.0") or raw[124:128] in (b"\0\1IM", b"\1\0MI"):
+        return True
+    return any(_version_4(raw, order) for order in "<>")
+
+
+def _version_4(raw: bytes, order: str) -> bool:
+    """Whether bytes begin as a matrix of version 4, whose head is five integers and a name."""
+    if len(raw) < 20:
+        return False
+    kind, rows, columns, imaginary, length = struct.unpack(f"{order}5i", raw[:20])
+    digits = (kind // 1000, kind // 100 % 10, kind // 10 % 10, kind % 10)
+    name = raw[20 : 20 + max(length, 0)]
+    return (
+        0 <= kind < 5000
+        and digits[1] == 0
+        and digits[2] <= 5
+        and digits[3] <= 2
+        and min(rows, columns) >= 0
+        and imaginary in (0, 1)
+        and 1 < length <= 256
+        and name.endswith(b"\0")
+        and name[:-1].isascii()
+    )
 
 
 def read(raw: bytes, file: str) -> Log:
@@ -37,7 +66,7 @@ def read(raw: bytes, file: str) -> Log:
         raise
     except Exception as error:  # whatever a damaged file makes of it
         raise damaged(file, "MAT file", error) from None
-    return _log(leaves, "MAT", file)
+    return _log(leaves, "MAT", file, [])
 
 
 def read_hdf5(raw: bytes, file: str) -> Log:
@@ -50,6 +79,7 @@ def read_hdf5(raw: bytes, file: str) -> Log:
     h5py = load("h5py")
     _check_end(raw, file)
     leaves: dict[str, Any] = {}
+    holes: list[str] = []
     matlab = False
     try:
         with h5py.File(io.BytesIO(raw), "r") as stored:
@@ -65,6 +95,7 @@ def read_hdf5(raw: bytes, file: str) -> Log:
                     leaves[key] = "".join(map(chr, np.asarray(item[()]).reshape(-1)))
                 elif item.dtype.kind in "iufb" and item.size and "MATLAB_empty" not in item.attrs:
                     data = item[()]
+                    holes.extend(_holes(key, item))
                     leaves[key] = data.T if kind and data.ndim == 2 else data
                     if said := _text(item.attrs.get("units", item.attrs.get("unit", b""))):
                         leaves[f"units.{key}"] = said
@@ -74,7 +105,21 @@ def read_hdf5(raw: bytes, file: str) -> Log:
         raise
     except Exception as error:  # whatever a damaged file makes of it
         raise damaged(file, "HDF5 file", error) from None
-    return _log(leaves, "MAT, version 7.3" if matlab else "HDF5", file)
+    return _log(leaves, "MAT, version 7.3" if matlab else "HDF5", file, holes)
+
+
+def _holes(name: str, item: Any) -> list[str]:
+    """A sentence on parts of an array that the file has not got, or none."""
+    if item.chunks is None:
+        return []
+    wanted = math.prod(-(-n // part) for n, part in zip(item.shape, item.chunks, strict=True))
+    stored = item.id.get_num_chunks()
+    if stored >= wanted:
+        return []
+    return [
+        f"{name!r}: {stored} of {wanted} parts are in the file, the others are read as "
+        f"{item.fillvalue:g}"
+    ]
 
 
 def _check_end(raw: bytes, file: str) -> None:
@@ -113,13 +158,20 @@ def _leaves(tree: Any, name: str = "", depth: int = 0) -> Iterator[tuple[str, An
         yield name, tree
 
 
-def _log(leaves: dict[str, Any], form: str, file: str) -> Log:
+def _log(leaves: dict[str, Any], form: str, file: str, notes: list[str]) -> Log:
     """Columns of the arrays, with the units and names that an export of flexura has beside them."""
     texts = {name: text for name, text in leaves.items() if isinstance(text, str)}
     columns = []
+    unread = {}
     for name, array in leaves.items():
-        if isinstance(array, str) or name.startswith("meta."):
+        if isinstance(array, str):
+            if not name.startswith("units."):
+                unread[name] = "a text"
             continue
+        if name.startswith("meta."):
+            continue
+        if text := _unfit(np.asarray(array)):
+            unread[name] = text
         for head, values in _vectors(name, np.asarray(array)):
             spelt = texts.get(f"channels.{head}")
             plain, said = (spelt, "") if spelt else parted(head)
@@ -131,7 +183,18 @@ def _log(leaves: dict[str, Any], form: str, file: str) -> Log:
     except ValueError:
         meta = None
     own = isinstance(meta, dict)
-    return Log(file, form, columns, meta=meta if own else {}, own=own)
+    return Log(file, form, columns, meta=meta if own else {}, own=own, notes=notes, unread=unread)
+
+
+def _unfit(array: np.ndarray) -> str:
+    """Why an array is no column, and no matrix of columns, or ""."""
+    if array.size < 2:
+        return "one number"
+    if array.ndim == 2 and min(array.shape) > MOST_COLUMNS:
+        return f"{min(array.shape)} columns, more than {MOST_COLUMNS}"
+    if array.ndim != 2 and array.size > max(array.shape):
+        return f"{array.ndim} dimensions"
+    return ""
 
 
 def _vectors(name: str, array: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ....errors import InputError
 from ...quantities import suffix
+from ..calendar import joined
 from ..log import Column, Log, damaged, floats
 from ..names import parted
 
@@ -20,6 +21,7 @@ def read(raw: bytes, file: str) -> Log:
     Raises:
         InputError: the file is damaged.
     """
+    import pyarrow as pa
     import pyarrow.parquet as pq
 
     try:
@@ -27,18 +29,45 @@ def read(raw: bytes, file: str) -> Log:
         about = table.schema.metadata or {}
         meta = json.loads(about[b"flexura"]) if b"flexura" in about else None
         columns = []
-        for field in table.schema:
-            array = table.column(field.name).to_numpy()
+        unread = {}
+        for place, field in enumerate(table.schema):
+            calendar = _calendar(field.type)
+            cells = table.column(place)
+            if calendar == "times":
+                cells = cells.cast(pa.time64("ns")).cast(pa.int64())
+            array = cells.to_numpy()
             if array.dtype.kind not in "iufbM":
+                unread[field.name] = "no numbers"
                 continue
             values, since = floats(np.asarray(array))
+            if calendar == "times":
+                values, since = values / 1e9, None
             said = (field.metadata or {}).get(b"unit", b"").decode()
             name = field.name.removesuffix(f"_{suffix(said)}") if said else field.name
             name, said = (name, said) if said else parted(field.name)
-            columns.append(Column(name, field.name, said, values, since))
+            said = "s" if calendar == "times" else said
+            columns.append(Column(name, field.name, said, values, since, calendar=calendar))
     except InputError:
         raise
     except Exception as error:  # whatever a damaged file makes of it
         raise damaged(file, "Parquet file", error) from None
     own: dict[str, Any] | None = meta if isinstance(meta, dict) else None
-    return Log(file, "Parquet", columns, meta=own or {}, own=own is not None)
+    columns, notes = joined(columns)
+    return Log(
+        file,
+        "Parquet",
+        columns,
+        meta=own or {},
+        own=own is not None,
+        notes=notes,
+        unread=unread,
+    )
+
+
+def _calendar(kind: Any) -> str:
+    """Whether a column has dates alone or times of day; "" for others."""
+    import pyarrow as pa
+
+    if pa.types.is_date(kind):
+        return "dates"
+    return "times" if pa.types.is_time(kind) else ""

@@ -17,6 +17,8 @@ from ....optional import load
 from ..log import Clock, Column, Log, damaged, floats
 from ..names import parted
 
+NO_UTF_8 = "Error decoding string"  # LabVIEW writes texts in the code page of its machine
+
 
 def read(raw: bytes, file: str) -> Log:
     """The channels of a TDMS file, each with its time base where it has one.
@@ -27,13 +29,13 @@ def read(raw: bytes, file: str) -> Log:
     """
     nptdms = load("nptdms")
     try:
-        with _complaints() as complaints:
+        with _complaints() as (complaints, texts):
             found = nptdms.TdmsFile.read(io.BytesIO(raw))
+            every = [(group, channel) for group in found.groups() for channel in group.channels()]
+            parts = [part for part in every if part[1].dtype.kind in "iufbM"]
+            data = [channel[:] for _, channel in parts]
         if complaints:
             raise ValueError(complaints[0])
-        parts = [(group, channel) for group in found.groups() for channel in group.channels()]
-        parts = [part for part in parts if part[1].dtype.kind in "iufbM"]
-        data = [channel[:] for _, channel in parts]
     except InputError:
         raise
     except Exception as error:  # whatever a damaged file makes of it
@@ -55,24 +57,45 @@ def read(raw: bytes, file: str) -> Log:
             clocks[head] = base
         clock = head if base is not None else ""
         columns.append(Column(name, head, said, values, since, clock))
-    said = str(found.properties.get("digest", ""))
-    return Log(file, "TDMS", columns, clocks, own or {}, own=own is not None, digest=said)
+    notes = []
+    if texts:
+        shown = ", ".join(map(repr, list(dict.fromkeys(texts))[:3]))
+        notes = [f"texts are not UTF-8, \ufffd stands for what cannot be read: {shown}"]
+    numbers_of = {id(channel) for _, channel in parts}
+    return Log(
+        file,
+        "TDMS",
+        columns,
+        clocks,
+        own or {},
+        own=own is not None,
+        notes=notes,
+        unread={c.name: "no numbers" for _, c in every if id(c) not in numbers_of},
+        digest=str(found.properties.get("digest", "")),
+    )
 
 
 @contextmanager
-def _complaints() -> Iterator[list[str]]:
-    """What npTDMS says meanwhile of a loss after which it reads on; kept off the terminal."""
+def _complaints() -> Iterator[tuple[list[str], list[str]]]:
+    """What npTDMS says meanwhile, kept off the terminal: of a loss after which it reads on, and of
+    texts that it cannot decode."""
+    losses: list[str] = []
     texts: list[str] = []
 
     def keep(record: logging.LogRecord) -> bool:
-        texts.append(record.getMessage())
+        raw = record.args[0] if isinstance(record.args, tuple) and record.args else None
+        if isinstance(raw, bytes) and str(record.msg).startswith(NO_UTF_8):
+            texts.append(raw.decode(errors="replace")[:60])
+        elif record.levelno >= logging.WARNING:
+            losses.append(record.getMessage())
         return False
 
-    loggers = [logging.getLogger(f"nptdms.{part}") for part in ("reader", "tdms_segment")]
+    names = [name for name in logging.root.manager.loggerDict if name.startswith("nptdms")]
+    loggers = [logging.getLogger(name) for name in names]
     for logger in loggers:
         logger.addFilter(keep)
     try:
-        yield texts
+        yield losses, texts
     finally:
         for logger in loggers:
             logger.removeFilter(keep)

@@ -11,7 +11,7 @@ from decimal import Decimal, InvalidOperation
 import numpy as np
 
 from ....errors import InputError
-from .moments import day_first, moment
+from .moments import day, day_first, moment
 
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
@@ -31,7 +31,7 @@ _GROUPED = {
     for comma, mark, point in ((False, ",", r"\."), (True, r"\.", ","))
 }
 _APART = re.compile("[' \u00a0\u202f]")
-DAY_S = 86400.0
+SAMPLE = 50  # cells that tell what a column is
 LONG = 15  # digits that a double holds in any case
 
 
@@ -59,6 +59,15 @@ def decoded(raw: bytes, file: str) -> tuple[str, str]:
     if strange > 0.02 * min(len(text), 100_000):
         raise InputError("not a text, and no format of a log that is known", file=file)
     return text, named
+
+
+def likely(raw: bytes) -> bool:
+    """Whether bytes are a text."""
+    try:
+        decoded(raw, "")
+    except InputError:
+        return False
+    return True
 
 
 def _decoded(raw: bytes, encoding: str, file: str) -> str:
@@ -90,10 +99,10 @@ def number(cell: str, comma: bool) -> float | None:
 
 
 def numeric(cell: str, comma: bool) -> bool:
-    """Whether a cell is a number, a gap or a time of day."""
+    """Whether a cell is a number, a gap, a date or a time of day."""
     if gap(cell) or number(cell, comma) is not None:
         return True
-    return moment(cell) is not None or moment(cell, day_first=True) is not None
+    return any(read(cell, first) is not None for read in (moment, day) for first in (False, True))
 
 
 def refused(cell: str, comma: bool) -> str:
@@ -118,14 +127,14 @@ class Cells:
         values: (T,); NaN in gaps.
         since: the same less the first one if they are long or dates, or None.
         wrong: place from 0 of the first cell that is no number, or -1; no later one is read.
-        times: whether they are dates with times, or times of day: values are in seconds.
+        calendar: "times" of day, "dates" alone, or "both" together: values are in seconds; or "".
         unordered: whether they are dates, and none tells the day from the month.
     """
 
     values: np.ndarray
     since: np.ndarray | None = None
     wrong: int = -1
-    times: bool = False
+    calendar: str = ""
     unordered: bool = False
 
 
@@ -138,25 +147,34 @@ def numbers(cells: list[str], comma: bool) -> Cells:
     """
     out: np.ndarray = np.full(len(cells), np.nan)
     days: np.ndarray = np.zeros(len(cells))
-    long, times, order = False, False, None
+    long, calendar, order, alone = False, False, None, False
     for k, cell in enumerate(cells):
         value = number(cell, comma)
         if value is None and not gap(cell):
-            order = day_first(cells) if not times else order
-            found = moment(cell, bool(order))
+            if not calendar:
+                order, alone = day_first(cells), _dates(cells)
+            begin = day(cell, bool(order)) if alone else None
+            found = moment(cell, bool(order)) if begin is None else (begin, 0.0)
             if found is None:
-                return Cells(out, wrong=k)
+                return Cells(out, wrong=k, calendar="dates" if alone else "")
             days[k], value = found
-            times = True
+            calendar = True
         if value is not None:
             out[k] = value
             long = long or (len(cell) > LONG and abs(value) > 1e8)
-    if times:
-        if not days.any():  # past midnight
-            days = DAY_S * np.cumsum(np.diff(out, prepend=out[0]) < -DAY_S / 2)
-        since = (days - days[0]) + (out - out[0])
-        return Cells(days + out, since, times=True, unordered=order is None)
+    if calendar:
+        if not days.any():
+            return Cells(out, calendar="times")
+        kind, since = "dates" if alone else "both", (days - days[0]) + (out - out[0])
+        return Cells(days + out, since, calendar=kind, unordered=order is None)
     return Cells(out, _since(cells, comma) if long else None)
+
+
+def _dates(cells: list[str]) -> bool:
+    """Whether most cells of a column are dates without times."""
+    there = [cell for cell in cells[:SAMPLE] if not gap(cell)]
+    found = sum(day(cell) is not None or day(cell, day_first=True) is not None for cell in there)
+    return 2 * found > len(there)
 
 
 def _since(cells: list[str], comma: bool) -> np.ndarray | None:
