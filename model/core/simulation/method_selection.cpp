@@ -21,17 +21,23 @@ bool MethodSelection::advance(long steps) {
         (loop.run_state[0].t - window_t) /
         static_cast<double>(std::max(loop.integration.passes - window_passes, 1L));
     if (compared && loop.any() && due(progress)) compare();
+    if (!others.empty() && loop.any() && slower(progress)) chosen = compare_forward();
   }
   return loop.any();
 }
 
 // Are the methods to be compared again, at `progress` seconds a pass?
 bool MethodSelection::due(double progress) {
-  if (progress * SLOWER < speed) return since_comparison() > AGAIN;
+  if (progress * SLOWER < speed) return slower(progress);
   const double left = loop.run_state[0].end - loop.run_state[0].t;
   if (left < LONG * progress || since_comparison() < patience) return false;
   patience *= 2;
   return true;
+}
+
+// Has progress a pass fallen far since the last comparison, and that long ago?
+bool MethodSelection::slower(double progress) const {
+  return progress * SLOWER < speed && since_comparison() > AGAIN;
 }
 
 // For a robot whose exponential steps were made in a pack: does another method get further a pass
@@ -84,7 +90,7 @@ void MethodSelection::choose() {
   else if (acting.function)
     chosen = !bends          ? by_explicit()
              : c.plant.rides ? implicit()
-                             : compare_forward(*implicit(), COSTLY);
+                             : compare_forward({implicit()}, COSTLY);
   else
     compare();
 }
@@ -145,25 +151,38 @@ Method<double> *MethodSelection::method_under_ticks(double rate_Hz, bool bends) 
   const double rate = fastest(loop.integration, loop.run_state[0].t);
   for_ticks = make_method(method_for_ticks(rate_Hz, rate, rtol), loop.integration);
   if (for_ticks->name() == std::string(TR_BDF2.name)) second_order = for_ticks.get();
-  return rate > rate_Hz && bends && !sharp && !loop.integration.plant.rides
-             ? compare_forward(*for_ticks, 1.0)
-             : for_ticks.get();
+  if (!(rate > rate_Hz && bends) || sharp) return for_ticks.get();
+  const bool stiff = second_order || for_ticks->name() == std::string(ESDIRK_4.name);
+  return stiff ? compare_forward({for_ticks.get()}, 1.0)
+               : compare_forward({for_ticks.get(), implicit()}, 1.0);
 }
 
-// The better one of exponential and implicit steps, which are tried one after the other on the
-// way: neither a controller nor a caller's function sees a time twice. Exponential steps go on as
-// long as they get faster, or if the rest of the run takes few of them.
-Method<double> *MethodSelection::compare_forward(Method<double> &other, double costly) {
+// The best of exponential steps and others, which are tried one after the other on the way: neither
+// a controller nor a caller's function sees a time twice. Exponential steps go on as long as they
+// get faster, or if the rest of the run takes few of them.
+Method<double> *MethodSelection::compare_forward(std::vector<Method<double> *> tried,
+                                                 double costly) {
+  others = std::move(tried), dear = costly;
+  return compare_forward();
+}
+Method<double> *MethodSelection::compare_forward() {
   const RunState &c = loop.run_state[0];
-  double reached = -1.0;
-  for (double before = reached; !over(); before = reached) {
-    reached = trial(*exponential(), TRIAL);
-    if (reached > 0.0 && (c.end - c.t) < FEW * reached) return exponential();
-    if (!(reached > FASTER * before)) break;
+  Method<double> *best = exponential();
+  loop.run_state[0].fresh = true, speed = -1.0;
+  for (double before = speed; !over(); before = speed) {
+    speed = trial(*exponential(), TRIAL);
+    if (speed > 0.0 && (c.end - c.t) < FEW * speed) break;
+    if (speed > FASTER * before) continue;
+    for (Method<double> *other : others) {
+      if (over()) break;
+      loop.run_state[0].fresh = true;
+      const double got = dear * trial(*other, 2 * TRIAL);
+      if (got > speed) best = other, speed = got;
+    }
+    break;
   }
-  if (over()) return exponential();
-  loop.run_state[0].fresh = true;
-  return costly * trial(other, 2 * TRIAL) > reached ? &other : exponential();
+  loop.run_state[0].fresh = true, last_comparison = loop.integration.passes;
+  return best;
 }
 
 // The other methods from `start` on, `step` being the first one that they try, against the best

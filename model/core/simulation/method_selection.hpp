@@ -15,7 +15,8 @@
 // decided beforehand: rigid robots without gains or friction and tolerances below 1e-9 are for
 // explicit steps; a slider on a link that moves through a sleeve is for implicit ones, as its modes
 // change with every step. Under a caller's function and under a sampled controller the run does not
-// go back: exponential and implicit steps are tried one after the other.
+// go back: exponential and other steps are tried one after the other, and again where progress a
+// pass has fallen to a quarter.
 #pragma once
 #include <memory>
 #include <string>
@@ -84,7 +85,9 @@ class MethodSelection {
   long patience = AGAIN;         // passes before a comparison that is made as the rest is long
   long last_comparison = 0, in_window = 0, window_passes = 0;
   double window_t = 0.0;
-  double speed = 0.0;  // seconds a pass, when chosen
+  double speed = 0.0;                    // seconds a pass, when chosen
+  std::vector<Method<double> *> others;  // that exponential steps are tried beside, on the way
+  double dear = 1.0;                     // by how much a pass of theirs is cheaper
 
   // A method, made when it is first needed.
   Method<double> *made(Steps &steps, const char *name) {
@@ -105,11 +108,13 @@ class MethodSelection {
   bool begin_exponential(double &reached);
   void compare();
   Method<double> *method_under_ticks(double rate_Hz, bool bends);
-  Method<double> *compare_forward(Method<double> &other, double costly);
+  Method<double> *compare_forward(std::vector<Method<double> *> tried, double costly);
+  Method<double> *compare_forward();
   void compare_others(const Mark &start, double step, Best &best);
   double trial(Method<double> &method, long most);
   bool gives_way();
   bool due(double progress);
+  bool slower(double progress) const;
 };
 
 }  // namespace flexura
