@@ -26,6 +26,7 @@ import io
 import re
 import sys
 import tokenize
+from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -42,8 +43,10 @@ HEAD = """# Table of equations
 
 `python tools/equations.py` writes this page. Do not edit it.
 
-`computed by` names what cites the equation: a function or class of `flexura`, a file of the core or
-of the firmware's library. `evaluated by` names the test in `tests/docs` that writes it down anew.
+Search this page for the field's word, such as condensation, Coulomb or anti-windup.
+
+`computed by` names what cites the equation: a function or class of `flexura`, or one of the core or
+of the firmware's library with its file. What is about this equation most stands first. `evaluated by` names the test in `tests/docs` that writes it down anew.
 
 | number | equation | computed by | evaluated by |
 | --- | --- | --- | --- |
@@ -54,6 +57,14 @@ _EQUATION = re.compile(
     re.DOTALL,
 )
 _CITATION = re.compile(r"(?<![\w)\]'])\(([1-9]\d{0,2})\)(?:\s+to\s+\((\d{1,3})\))?(?![\w(\[])")
+# at the beginning of a line, or in a class: a class, or a function with its parameters
+_DECLARED = re.compile(
+    r"(?:^|(?<=^  ))(?:(?:struct|class) (\w+)|"
+    r"(?!namespace|template|using|constexpr|static_assert|return|else|for|if|while|switch|case)"
+    r"[A-Za-z_][\w:<>,*& ]*?[ *&](?:\w+::)*(\w+)\()",
+    re.MULTILINE,
+)
+_BEFORE = re.compile(r"\s*(?:template [^\n]*\n\s*)?")  # between a comment and what it is of
 _COMMENT = re.compile(r"(?:^[ \t]*//.*\n)+|//.*", re.MULTILINE)
 
 
@@ -121,14 +132,25 @@ def docstrings(path: Path) -> Iterator[tuple[str, str]]:
     return inside(ast.parse(path.read_text(encoding="utf-8")), "")
 
 
-def comments(path: Path) -> list[str]:
-    """The comments of a C++ file, lines that follow each other as one, without their slashes."""
+def comments(path: Path) -> list[tuple[str, str]]:
+    """The comments of a C++ file, lines that follow each other as one, without their slashes; each
+    with the function or class that it stands before or in, "" at the head of the file."""
     text = path.read_text(encoding="utf-8")
-    return [re.sub(r"^\s*//+", " ", c[0], flags=re.MULTILINE) for c in _COMMENT.finditer(text)]
+    names = [(m.start(), m[1] or m[2]) for m in _DECLARED.finditer(text)]
+    found = []
+    for c in _COMMENT.finditer(text):
+        head = text[: c.start()].strip() == ""
+        after = c.end() + len(_BEFORE.match(text, c.end())[0])  # type: ignore[index]
+        own = [name for at, name in names if at == after]
+        last = [name for at, name in names if at < c.start()][-1:]
+        name = "" if head else (own or last or [""])[0]
+        found.append((name, re.sub(r"^\s*//+", " ", c[0], flags=re.MULTILINE)))
+    return found
 
 
 def citations(root: Path = ROOT) -> dict[int, list[str]]:
-    """By number, what computes an equation: functions and classes by name, C++ files by path."""
+    """By number, what computes an equation: functions and classes by name, those of C++ with their
+    file. What cites few equations stands first: it is about this one."""
     found: dict[int, list[str]] = {}
 
     def note(text: str, name: str) -> None:
@@ -143,9 +165,11 @@ def citations(root: Path = ROOT) -> dict[int, list[str]]:
                 note(text, f"{module}.{name}")
     for folder in CPP:
         for path in sorted((root / folder).rglob("*.[hc]*")):
-            for text in comments(path):
-                note(text, path.relative_to(root / folder).as_posix())
-    return found
+            file = path.relative_to(root / folder).as_posix()
+            for name, text in comments(path):
+                note(text, f"{file}: {name}" if name else file)
+    count = Counter(name for names in found.values() for name in names)
+    return {number: sorted(names, key=count.__getitem__) for number, names in found.items()}
 
 
 def tested(root: Path = ROOT) -> dict[int, list[str]]:

@@ -59,7 +59,8 @@ def test_citations_are_found_in_docstrings_and_comments(tmp_path):
     )
     assert dict(table.docstrings(tmp_path / "a.py")) == {"": "", "A": "", "A.f": "As (7)."}
     (tmp_path / "a.hpp").write_text("// From (7)\n// to (9).\nf(5);  // (1)\n")
-    assert [table.cited(text) for text in table.comments(tmp_path / "a.hpp")] == [{7, 8, 9}, {1}]
+    found = table.comments(tmp_path / "a.hpp")
+    assert [table.cited(text) for _, text in found] == [{7, 8, 9}, {1}]
 
 
 FIELD = {  # what somebody looks for by the field's word, and where it is computed
