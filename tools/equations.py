@@ -46,7 +46,8 @@ HEAD = """# Table of equations
 Search this page for the field's word, such as condensation, Coulomb or anti-windup.
 
 `computed by` names what cites the equation: a function or class of `flexura`, or one of the core or
-of the firmware's library with its file. What is about this equation most stands first. `evaluated by` names the test in `tests/docs` that writes it down anew.
+of the firmware's library with its file. What is about this equation most stands first.
+`evaluated by` names the test in `tests/docs` that writes it down anew.
 
 | number | equation | computed by | evaluated by |
 | --- | --- | --- | --- |

@@ -8,7 +8,7 @@ namespace flexura {
 
 // At most so many steps further; is the robot still running?
 bool MethodSelection::advance(long steps) {
-  if (!chosen) choose();
+  if (!chosen) choose(), gives_way();
   while (steps > 0 && loop.any()) {
     if (in_window == 0) window_passes = loop.integration.passes, window_t = loop.run_state[0].t;
     const long some = std::min(
@@ -21,7 +21,7 @@ bool MethodSelection::advance(long steps) {
         (loop.run_state[0].t - window_t) /
         static_cast<double>(std::max(loop.integration.passes - window_passes, 1L));
     if (compared && loop.any() && due(progress)) compare();
-    if (!others.empty() && loop.any() && slower(progress)) chosen = compare_forward();
+    if (!others.empty() && loop.any() && slower(progress)) chosen = compare_forward(), gives_way();
   }
   return loop.any();
 }
@@ -169,12 +169,12 @@ Method<double> *MethodSelection::compare_forward() {
   const RunState &c = loop.run_state[0];
   Method<double> *best = exponential();
   loop.run_state[0].fresh = true, speed = -1.0;
-  for (double before = speed; !over(); before = speed) {
+  for (double before = speed; loop.any(); before = speed) {
     speed = trial(*exponential(), TRIAL);
-    if (speed > 0.0 && (c.end - c.t) < FEW * speed) break;
+    if (!loop.any() || (c.end - c.t) < FEW * speed) break;
     if (speed > FASTER * before) continue;
     for (Method<double> *other : others) {
-      if (over()) break;
+      if (!loop.any()) break;
       loop.run_state[0].fresh = true;
       const double got = dear * trial(*other, 2 * TRIAL);
       if (got > speed) best = other, speed = got;

@@ -11,11 +11,19 @@ from ...io import array
 
 
 def discretised(A: np.ndarray, B: np.ndarray, T: float) -> tuple[np.ndarray, np.ndarray]:
-    """F (n, n) and G (n, m) of a tick of T seconds, over which the inputs are held (74)."""
+    """F (n, n) and G (n, m) of a tick of T seconds, over which the inputs are held (74).
+
+    Raises:
+        InputError: they are no finite numbers, as of a motion that grows without bound in a tick.
+    """
     from scipy.linalg import expm
 
     n, m = B.shape
-    exponential = expm(np.block([[A, B], [np.zeros((m, n + m))]]) * T)
+    with np.errstate(over="ignore", invalid="ignore"):
+        exponential = expm(np.block([[A, B], [np.zeros((m, n + m))]]) * T)
+    if not np.isfinite(exponential).all():
+        expected = "expected shorter ticks: the linear model has no finite numbers over one"
+        raise InputError(expected, key="rate_Hz", value=1 / T)
     return exponential[:n, :n], exponential[:n, n:]
 
 
