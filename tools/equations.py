@@ -33,7 +33,8 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent
 THEORY, TESTS = "docs/theory", "tests/docs"
-PYTHON, CPP = "model/flexura", ("model/core", "firmware/lib")
+LIBRARY = "firmware/lib"
+PYTHON, CPP = "model/flexura", ("model/core", LIBRARY)
 # where equations are cited
 PAGES = ("docs/**/*.md", "*.md", "examples/**/*.md", "examples/**/*.ipynb", "examples/*.py")
 PAGES += tuple(f"{part}/**/*.{kind}" for part in ("model", "analysis") for kind in ("py", "md"))
@@ -62,7 +63,7 @@ _CITATION = re.compile(r"(?<![\w)\]'])\(([1-9]\d{0,2})\)(?:\s+to\s+\((\d{1,3})\)
 _DECLARED = re.compile(
     r"(?:^|(?<=^  ))(?:(?:struct|class) (\w+)|"
     r"(?!namespace|template|using|constexpr|static_assert|return|else|for|if|while|switch|case)"
-    r"[A-Za-z_][\w:<>,*& ]*?[ *&](?:\w+::)*(\w+)\()",
+    r"[A-Za-z_][\w:<>,*& ]*?[ *&](?:[\w<>]+::)*(\w+)\()",
     re.MULTILINE,
 )
 _BEFORE = re.compile(r"\s*(?:template [^\n]*\n\s*)?")  # between a comment and what it is of
@@ -141,7 +142,8 @@ def comments(path: Path) -> list[tuple[str, str]]:
     found = []
     for c in _COMMENT.finditer(text):
         head = text[: c.start()].strip() == ""
-        after = c.end() + len(_BEFORE.match(text, c.end())[0])  # type: ignore[index]
+        skipped = _BEFORE.match(text, c.end())
+        after = skipped.end() if skipped else c.end()
         own = [name for at, name in names if at == after]
         last = [name for at, name in names if at < c.start()][-1:]
         name = "" if head else (own or last or [""])[0]
@@ -166,7 +168,7 @@ def citations(root: Path = ROOT) -> dict[int, list[str]]:
                 note(text, f"{module}.{name}")
     for folder in CPP:
         for path in sorted((root / folder).rglob("*.[hc]*")):
-            file = path.relative_to(root / folder).as_posix()
+            file = path.relative_to(root / folder if folder != LIBRARY else root).as_posix()
             for name, text in comments(path):
                 note(text, f"{file}: {name}" if name else file)
     count = Counter(name for names in found.values() for name in names)

@@ -22,9 +22,9 @@ class JointLimits {
       : c(shared), acting(shared.acts_of(which)), k(which) {}
 
   // The time at which a joint is beyond its limits first, less than a part in 1e13 of the step
-  // before; RunState::NEVER: none is. `at(t)` gives the state at a time in the step. Looked for at
-  // the step's end, at the outputs on its way and, where a joint turns round in the step, at seven
-  // instants between.
+  // before; RunState::NEVER: none is. `at(t)` gives the state at a time in the step. (64) is looked
+  // for at the step's end, at the outputs on its way and, where a joint turns round in the step, at
+  // seven instants between.
   template <class At>
   double first_beyond(const StepInterval &step, int &joint, At at) const {
     double inside = step.begin, outside = RunState::NEVER;

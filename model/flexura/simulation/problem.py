@@ -230,7 +230,10 @@ def acting_drive(drive: Any, joints: int, t: np.ndarray) -> Drive | Controller |
     if not isinstance(drive, Drive | Controller):
         if callable(drive) and not isinstance(drive, Signal | type):
             return DriveFunction(drive, joints)
-        if isinstance(drive, str | bytes | dict | type):
+        if isinstance(drive, str):
+            file = "; a file is read by load_manoeuvre(path, joints), which has a drive"
+            raise InputError(EXPECTED_DRIVE + file, key="drive", value=drive)
+        if isinstance(drive, bytes | dict | type):
             raise InputError(EXPECTED_DRIVE, key="drive", value=drive)
         drive = Drive.force(*as_signals(drive, joints, "drive", t))
     if len(drive.joints) != joints:

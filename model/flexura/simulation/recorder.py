@@ -175,7 +175,7 @@ def energy_error(energies: np.ndarray, accounts: np.ndarray, jumps: Any = 0.0) -
 
 
 def limit_event(system: System, joint: int, t: float, position: np.ndarray) -> Tables:
-    """The event of the stop at a limit (64): joint (from 0) at t, with all at `position` (N,)."""
+    """The event of the stop at a limit: joint (from 0) at t, with all at `position` (N,)."""
     robot, (low, high) = system.robot, system.limits[joint]
     kind, own, travel = (
         robot.links[joint].joint.type,

@@ -123,10 +123,10 @@ def line(
 
 
 def station(line: Line, xi: float, slider: int | None = None) -> Frame:
-    """The frame of a line at xi (30), (31): of a material point, or of a slider at the unknown
-    `slider`.
+    """The frame of a line at xi: a point on a bent link (3), (30), (31), of the material, or of a
+    slider at the unknown `slider`.
 
-    d xi' = eta' + (1 - xi) d' (29): a material point of a sleeved link runs through the mesh.
+    d xi' = eta' + (1 - xi) d': a material point of a sleeved link runs through the mesh.
     """
     d, start, y = line.free, line.start, line.q[line.own]
     w, l, dl, b, db, ddb = line.piece.tip if xi == 1.0 else line.piece.at(xi)

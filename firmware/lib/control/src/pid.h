@@ -81,6 +81,7 @@ typename N::Value PidOf<N>::saturate(const GainsOf<N> &gains, Wide unlimited) co
                       static_cast<Value>(output_ + gains.slew));
 }
 
+// One tick of the law (70), with its limits (71) and anti-windup (72).
 template <class N>
 typename N::Value PidOf<N>::update(const GainsOf<N> &gains, const SignalsOf<N> &in) {
   const Value error = N::error(in.error, gains.fine);

@@ -56,9 +56,9 @@ inline void add_beyond(R &rows, const PieceState<Real> &k, int m, int flow, int 
   rows.xx += A.xx, rows.xy += A.xy, rows.yy += A.yy;
 }
 
-// Eliminates the piece's own rows, H = L D L^T, and leaves the wrench on the hub in `beyond`;
-// `flow`: (x, y, angle, flow, rest) of a sleeve's row of d. Every pivot is positive: the rows are
-// those of a kinetic energy, a sum of squares (16), in a sleeve (33).
+// Condensation (46): eliminates the piece's own rows, H = L D L^T, and leaves the wrench on the hub
+// in `beyond`; `flow`: (x, y, angle, flow, rest) of a sleeve's row of d. Every pivot is positive:
+// the rows are those of a kinetic energy, a sum of squares (16), in a sleeve (33).
 template <class Real, int M, int G>
 inline void eliminate(Rows<Real, M, G> &rows, PieceState<Real> &k, int m,
                       ArticulatedInertia<Real> &beyond, Real *flow) {

@@ -137,9 +137,9 @@ inline void free_length_stiffness(const Piece<Real> &c, const Real &d, Real *K) 
     }
 }
 
-// The force out of a sleeve, -dU/dd at fixed shapes (36): M0^2 / (2 EI) for a uniform link at
-// rest with the bending moment M0 at the exit. Here its negative, the row of d; `bent`: the
-// curvature at the points, per d.
+// Of the force out of a sleeve (36) the part -dU/dd at fixed shapes; with what the loads do at
+// fixed shapes it is M0^2 / (2 EI) for a uniform link at rest with the bending moment M0 at the
+// exit. Here its negative, the row of d; `bent`: the curvature at the points, per d.
 template <class Real>
 inline Real sleeve_force_row(const Piece<Real> &c, const Real *bent, const Real &d) {
   const Real inverse = 1.0 / d;
@@ -234,8 +234,8 @@ void sleeve_rows(const Piece<Real> &c, const PieceState<Real> &k, const Real *y,
   }
 }
 
-// Condensation (46) of a sleeved piece; `flow`, five numbers: its row of d, coupled with the hub's
-// x, y, angle, its own pivot and rest.
+// Condensation of a sleeved piece, by `eliminate`; `flow`, five numbers: its row of d, coupled with
+// the hub's x, y, angle, its own pivot and rest.
 template <class Real>
 void condense_sleeve(const Piece<Real> &c, PieceState<Real> &k, const Real *y, const Real *v,
                      const Stage<Real> &stage, const Real *force, bool last,
