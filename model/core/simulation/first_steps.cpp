@@ -55,6 +55,10 @@ double fastest(Integration<double> &run, double t) {
   return run.plant.fastest(q, run.acts.pass(q, v, q, v, 0.0, 0.0));
 }
 
+bool strongly_damped(Integration<double> &run, double t) {
+  return strongest_damper(run, t) > STRONG;
+}
+
 bool explicit_is_slower(Integration<double> &run, double t, double speed) {
   return Explicit<double>::STABLE < 12.0 * speed * fastest(run, t);
 }
@@ -63,8 +67,7 @@ const char *method_without_trial(Integration<double> &run, double t, double rtol
   const bool bends = run.n > run.plant.joints, sharp = rtol < SHARPEST;
   if (sharp ? !bends || !explicit_is_slower(run, t, 1.0 / DEAR) : !bends && !resists(run))
     return "explicit";
-  if (!run.acts_of(0).sampler && bends && !sharp && strongest_damper(run, t) > STRONG)
-    return "implicit";
+  if (!run.acts_of(0).sampler && bends && !sharp && strongly_damped(run, t)) return "implicit";
   return nullptr;
 }
 

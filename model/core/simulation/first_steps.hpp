@@ -21,6 +21,9 @@ double fastest(Integration<double> &run, double t);
 // Are explicit steps, of 12 passes and as long as they may be, slower than `speed` [s a pass]?
 bool explicit_is_slower(Integration<double> &run, double t, double speed);
 
+// Would gains or friction of a joint stop it faster than STRONG, the bending of its link left free?
+bool strongly_damped(Integration<double> &run, double t);
+
 // The first exponential steps of a run. If the rest takes no more of them than the trials of the
 // other methods would take passes, no other is tried. What is counted are a robot's own attempts,
 // accepted or not.

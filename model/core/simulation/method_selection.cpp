@@ -145,13 +145,14 @@ void MethodSelection::compare() {
   goes_on = begun && chosen == exponential_.get();
 }
 
-// Under a sampled controller: explicit steps where one a tick is enough for the fastest mode, else
-// exponential ones beside explicit or implicit ones.
+// Under a sampled controller: explicit steps where one a tick is enough for the fastest mode, or
+// friction stops a joint faster than exponential steps follow; else exponential ones beside others.
 Method<double> *MethodSelection::method_under_ticks(double rate_Hz, bool bends) {
   const double rate = fastest(loop.integration, loop.run_state[0].t);
   for_ticks = make_method(method_for_ticks(rate_Hz, rate, rtol), loop.integration);
   if (for_ticks->name() == std::string(TR_BDF2.name)) second_order = for_ticks.get();
-  if (!(rate > rate_Hz && bends) || sharp) return for_ticks.get();
+  if (!(rate > rate_Hz && bends) || sharp || strongly_damped(loop.integration, loop.run_state[0].t))
+    return for_ticks.get();
   const bool stiff = second_order || for_ticks->name() == std::string(ESDIRK_4.name);
   return stiff ? compare_forward({for_ticks.get()}, 1.0)
                : compare_forward({for_ticks.get(), implicit()}, 1.0);
