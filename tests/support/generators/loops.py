@@ -30,8 +30,8 @@ def loop(rng: np.random.Generator, system: fx.System) -> fx.Controller:
     laws = []
     for i, (row, size) in enumerate(zip(system.joint_rows, inertia, strict=True)):
         omega = 2 * np.pi * float(10 ** rng.uniform(-0.5, 1))
-        reach = 0.1 if system.robot.links[i].joint.type == "R" else 0.05
-        reach *= 1.0 if system.robot.links[i].joint.type == "R" else system.robot.links[i].length_m
+        link = system.robot.links[i]
+        reach = 0.1 if link.joint.type == "R" else 0.05 * link.length_m
         asked = size * omega**2 * reach
         laws.append(
             fx.PID(

@@ -27,6 +27,7 @@ class Experiment:
 
     `channels`: those that are compared. `span`: from and to when [s]. `started`: names of keys that
     say where joints start; the run's first positions stand in for others. `smoother`: as in `wave`.
+    `moved_by`: has the inputs in place of the run.
     """
 
     run: fx.Run
@@ -36,6 +37,7 @@ class Experiment:
     controller: Gains | None = None
     started: frozenset[str] = frozenset()
     smoother: bool = False
+    moved_by: fx.Run | None = None
     _cache: dict[tuple[tuple[str, float], ...], fx.Run] = field(default_factory=dict)
 
     @cached_property
@@ -52,7 +54,8 @@ class Experiment:
     @cached_property
     def waves(self) -> dict[int, Signal]:
         """The inputs as signals, by joint from 1."""
-        return {each.joint: wave(self.run, each, self.smoother) for each in self.inputs}
+        run = self.run if self.moved_by is None else self.moved_by
+        return {each.joint: wave(run, each, self.smoother) for each in self.inputs}
 
     def misread(self, seed: int) -> Experiment | None:
         """The same under motions as they might have been measured; None: no joint is prescribed."""
@@ -62,10 +65,8 @@ class Experiment:
         read = {
             each.channel: misread(self.run, each, self.waves[each.joint], seed) for each in moved
         }
-        run = replace(self.run, channels={**self.run.channels, **read})
-        out = replace(self, run=run, _cache={})
-        out.__dict__["measured"] = self.measured
-        return out
+        other = replace(self.run, channels={**self.run.channels, **read})
+        return replace(self, moved_by=other, _cache={})
 
     def simulate(
         self, robot: fx.Robot, values: Mapping[str, float], end: float | None = None
