@@ -2,7 +2,8 @@
 // tolerance does not ask for (96), (97).
 //
 // The share of a mode is the largest tip deflection, or change of the tips' place, that it has in
-// the answer to the loads, over the largest static tip deflection under them. Loads: each drive's
+// the answer to the loads, over the largest tip deflection that they reach in the run: the static
+// one, or less where the run ends before a mode has answered. Loads: each drive's
 // largest force, what is out of balance at the start (gravity, a bent link), and the amplitude w^-1
 // eta' of a struck one. A force of unknown size, a controller's, is seen beside its own largest
 // deflection; where it follows its joint, the joint's place is an output, too. Modes are damped
@@ -52,23 +53,24 @@ struct ModalLoad {
 };
 
 // Shares (n) of one robot's modes: w2 (n); struck: eta' (n); seen: what a unit of a mode changes of
-// each output, (n, outputs), of which the first `deflections` are tip deflections. Loads of known
-// size are seen beside the largest deflection of them all, one of unknown size beside its own.
-// False: nothing bends.
+// each output, (n, outputs), of which the first `deflections` are tip deflections; left: of the run
+// [s]. Loads of known size are seen beside the largest deflection of them all, one of unknown size
+// beside its own. False: nothing bends.
 inline bool shares(int n, const double *w2, const std::vector<ModalLoad> &loads,
                    const double *struck, const std::vector<std::vector<double>> &seen,
-                   int deflections, double *share) {
+                   int deflections, double left, double *share) {
   const std::size_t size = static_cast<std::size_t>(n);
   std::vector<double> known(size, 0.0);
   double largest = 0.0;
   bool bends = false;
   for (int k = 0; k < n; ++k) share[k] = 0.0;
-  auto with = [&](auto amplitude, bool sized) {
+  // reached(k): what a mode reaches of its amplitude until the run's end.
+  auto with = [&](auto amplitude, auto reached, bool sized) {
     std::vector<double> sum(seen[0].size(), 0.0), own(size, 0.0);
     for (int k = 0; k < n; ++k)
       for (std::size_t o = 0; w2[k] > 0.0 && o < sum.size(); ++o) {
         const double x = amplitude(k) * seen[k][o];
-        sum[o] += x, own[k] = larger(own[k], abs(x));
+        sum[o] += smaller(1.0, reached(k)) * x, own[k] = larger(own[k], abs(x));
       }
     double most = 0.0;
     for (int o = 0; o < deflections; ++o) most = larger(most, abs(sum[o]));
@@ -81,10 +83,13 @@ inline bool shares(int n, const double *w2, const std::vector<ModalLoad> &loads,
         share[k] += own[k] / most;
   };
   for (const ModalLoad &load : loads)
-    with([&](int k) { return load.force[k] / w2[k]; }, load.sized);
+    with([&](int k) { return load.force[k] / w2[k]; },
+         [&](int k) { return 0.5 * w2[k] * left * left; }, load.sized);
   double moving = 0.0;
   for (int k = 0; k < n; ++k) moving = larger(moving, w2[k] > 0.0 ? abs(struck[k]) : 0.0);
-  if (moving > 0.0) with([&](int k) { return struck[k] / root(w2[k]); }, true);
+  if (moving > 0.0)
+    with([&](int k) { return struck[k] / root(w2[k]); },
+         [&](int k) { return root(w2[k]) * left; }, true);
   for (int k = 0; largest > 0.0 && k < n; ++k) share[k] += known[k] / largest;
   return bends;
 }
@@ -240,7 +245,8 @@ double find_cutoff(Integration<Real> &c, const ModalBasis<Real> &modes, const bo
     w2[mode] = lane(modes.w2[mode], k);
     for (int i = 0; i < n; ++i) struck[mode] += lane(modes.rows[i * modes.stride + mode] * v[i], k);
   }
-  if (!shares(n, w2.data(), loads, struck.data(), seen, c.plant.joints, share.data())) return none;
+  if (!shares(n, w2.data(), loads, struck.data(), seen, c.plant.joints, c.end - t, share.data()))
+    return none;
   add_shares_of_feedback(c, modes, held, k, share);
   return cutoff_of(n, w2.data(), share.data(), rtol, harmonic);
 }
