@@ -1,6 +1,6 @@
 """The command: python -m flexlab.benchmarks [PART ...] [PROBLEM ...].
 
-Parts: motions, statics, population, scaling, predictive, learning, board, accuracy, passes,
+Parts: motions, statics, population, scaling, predictive, learning, board, accuracy, passes, time,
 search.
 """
 
@@ -24,6 +24,7 @@ from . import (
     population,
     report,
     scaling,
+    time_parts,
 )
 from .problems import learning, predictive
 from .problems.motions import all_motions
@@ -32,7 +33,7 @@ from .problems.statics import StaticProblem, all_statics
 
 # measured by default
 PARTS = ("motions", "statics", "population", "scaling", "predictive", "learning", "board")
-OTHERS = ("accuracy", "passes", "search")
+OTHERS = ("accuracy", "passes", "time", "search")
 ROUNDS = 7
 
 
@@ -108,7 +109,7 @@ def measured(
 
     Args:
         parts: names of `PARTS` or `OTHERS`.
-        motions: problems for "motions", "accuracy" and "passes".
+        motions: problems for "motions", "accuracy", "passes" and "time".
         statics: problems for "statics".
         rounds: rounds in which the programs take turns.
 
@@ -126,6 +127,7 @@ def measured(
         "board": lambda: each("board", ["emulated"], lambda _: board_load.measure())[0],
         "accuracy": lambda: each("accuracy", [p for p in motions if p.available], accuracy.errors),
         "passes": lambda: each("passes", [p for p in motions if p.available], accuracy.passes),
+        "time": lambda: each("time", [p for p in motions if p.available], time_parts.of_motion),
     }
     for part in parts:
         out[part] = works[part]()
@@ -149,6 +151,7 @@ def tables(found: dict[str, Any]) -> list[Any]:
             report.accuracies(rows),
             "\n".join(accuracy.beyond(rows)) or "all within what is asked",
         ],
+        "time": lambda rows: [report.time_parts(rows)],
         "passes": lambda rows: [
             report.passes(rows),
             "\n".join(accuracy.slower(rows)) or "auto: all within what is asked",

@@ -189,6 +189,31 @@ def accuracies(rows: Rows) -> Table:
     return table
 
 
+def time_parts(rows: Rows) -> Table:
+    """Table of what a motion's time goes into, and of how fast it could be at most."""
+    table = _table(
+        "time of auto", "method", "passes", "ms", "of passes", "function", "ratio", "at most"
+    )
+    for row in rows:
+        if "ms" not in row:
+            table.add_row(row["name"], "fails")
+            continue
+        parts = [
+            f"{row[part] / row['ms']:.0%}" if row[part] else ""
+            for part in ("evaluations_ms", "function_ms")
+        ]
+        ratios = [figure(row["ratio"]), figure(row["ratio_at_most"])]
+        table.add_row(
+            row["name"],
+            row["method"][:3],
+            str(row["evaluations"]),
+            figure(row["ms"]),
+            *parts,
+            *ratios,
+        )
+    return table
+
+
 def passes(rows: Rows) -> Table:
     """Table of evaluations at each error, by method."""
     errors = [each["error"] for each in rows[0]["passes"]]

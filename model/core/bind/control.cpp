@@ -146,13 +146,6 @@ Array prediction(const Controller &self) {
   return out;
 }
 
-std::string method_of(Controller &self, const Vector &q, double rtol) {
-  check_state(self, q);
-  Inputs acting(self.count());
-  self.start(acting, q.data());
-  return method_for_ticks(self.robot(), acting, q.data(), rtol);
-}
-
 std::unique_ptr<GainSweep> trials_of(const Mechanics &mechanics, const Controller &controller,
                                      const Matrix &segments, const Counts &index,
                                      const Matrix &gains, const Matrix &limits, const Vector &t,
@@ -252,8 +245,6 @@ void bind_control(nb::module_ &module) {
            "Tick k at the state q: forces (N,), and motions (N, 3) that hold from then on.")
       .def("step", &step, "k"_a, "t"_a, "positions"_a, "deflection"_a, "slope"_a,
            "The same from what is measured.")
-      .def("method", &method_of, "q"_a, "rtol"_a,
-           "The method for a run from q, by the ticks; sets the controller back.")
       .def_prop_ro("log", &log_of, nb::rv_policy::move,
                    "Of all ticks since the start, (ticks, N, 6).")
       .def_prop_ro("prediction", &prediction, nb::rv_policy::move,
@@ -262,8 +253,7 @@ void bind_control(nb::module_ &module) {
                         "One robot under many controllers; may be called from several threads.")
       .def(nb::new_(&trials_of), "mechanics"_a, "controller"_a, "segments"_a, "index"_a, "gains"_a,
            "limits"_a, "t"_a, "q"_a, "references"_a, "rtol"_a, "method"_a, "loads"_a = nb::none())
-      .def("run", &run, "prices"_a, "gains"_a, "limits"_a, "threads"_a)
-      .def_prop_ro("method", [](const GainSweep &self) { return self.plan().method; });
+      .def("run", &run, "prices"_a, "gains"_a, "limits"_a, "threads"_a);
   module.def("board_pulses", &board_pulses_of, "settings"_a, "open_loop"_a, "period_log2"_a,
              "knots"_a, "given"_a, "ticks"_a,
              "Counts of the step timer and directions of joint 2's pulses, by the firmware.");

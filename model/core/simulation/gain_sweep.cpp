@@ -6,6 +6,7 @@
 
 #include "integration/time_loop.hpp"
 #include "simulation/method_by_name.hpp"
+#include "simulation/method_selection.hpp"
 
 namespace flexura {
 namespace {
@@ -26,17 +27,6 @@ Inputs driven(const Plan &plan, Controller &controller) {
 
 }  // namespace
 
-std::string method_for_ticks(const Model<double> &robot, Inputs &acting, const double *q,
-                             double rtol) {
-  Workspace<double> work(robot);
-  ModelPlant<double> plant(robot, work);
-  Inputs *list = &acting;
-  const DriveForces<double> acts(plant, &list);
-  const std::vector<double> still(std::size_t(robot.n), 0.0);
-  const double fastest = plant.fastest(q, acts.pass(q, still.data(), q, still.data(), 0.0, 0.0));
-  return method_for_ticks(acting.rate_Hz, fastest, rtol);
-}
-
 // The memory of one run at a time.
 class Trial {
  public:
@@ -54,14 +44,9 @@ class Trial {
         strip(last_flexible(*plan.robot)),
         end(plan.t.back() - plan.t.front()),
         ticks(long(std::ceil(end * controller.law().rate_Hz - 1e-6))) {
-    method = plan.method == "auto"
-                 ? method_for_ticks(*plan.robot, acting, plan.start.data(), plan.rtol)
-                 : plan.method;
-    if (!make_method(method, loop.integration))
-      throw std::invalid_argument("there is no method " + method);
+    if (plan.method != "auto" && !(steps = make_method(plan.method, loop.integration)))
+      throw std::invalid_argument("there is no method " + plan.method);
   }
-
-  std::string method;
 
   // One row; the fraction of the time that it reached.
   double run(const Prices &prices, const double *gains, double limit, double *figures) {
@@ -69,13 +54,15 @@ class Trial {
     controller.start(acting, plan.start.data());
     loop.most_steps = long(STEPS_A_TICK * end * controller.law().rate_Hz);
     loop.start(plan.start.data(), still.data(), end * FIRST);
-    const std::unique_ptr<Method<double>> steps = make_method(method, loop.integration);
+    steps = make_method(plan.method, loop.integration, plan.rtol);
+    MethodSelection selection(loop, plan.rtol);
     const bool limited = std::isfinite(limit);
     bool lost = false;
     seen = counted = 0, spent = 0;
     std::fill(figures, figures + plan.figures(), 0.0);
     for (bool running = true; running && !lost;) {
-      running = loop.advance(*steps, limited ? LOOK : CALL);
+      const long some = limited ? LOOK : CALL;
+      running = steps ? loop.advance(*steps, some) : selection.advance(some);
       if (!limited) continue;
       sample();
       lost = cost_so_far(prices, limit * CERTAIN, figures) > limit * CERTAIN;
@@ -96,6 +83,7 @@ class Trial {
   Inputs acting;
   Inputs *list;
   Loop<double> loop;
+  std::unique_ptr<Method<double>> steps;  // none: the method is selected
   std::vector<double> still;
   Samples at;
   std::vector<double> samples;  // (N + 1, T): positions of the joints, deflection
@@ -172,9 +160,7 @@ class Trial {
 };
 
 GainSweep::GainSweep(Plan plan) : plan_(std::move(plan)) {
-  std::unique_ptr<Trial> first = lend();
-  plan_.method = first->method;
-  take_back(std::move(first));
+  take_back(lend());  // (a plan that makes no run is refused here)
 }
 GainSweep::~GainSweep() = default;
 

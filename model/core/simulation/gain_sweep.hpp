@@ -30,16 +30,11 @@ struct Plan {
   std::vector<double> start;      // (n) at rest
   std::vector<double> reference;  // (N, T) of each joint, before any filter
   double rtol;
-  std::string method;  // of `make_method`, or "auto": by the ticks
+  std::string method;  // of `make_method`, or "auto": each run selects its own (103)
 
   int joints() const { return robot->links(); }
   int figures() const { return JOINT_FIGURES * joints() + STRIP_FIGURES; }
 };
-
-// The method for a run from q (n) under a controller, by its ticks and the robot's highest
-// frequency there. `acting` is as the controller's `start` has left it.
-std::string method_for_ticks(const Model<double> &robot, Inputs &acting, const double *q,
-                             double rtol);
 
 class Trial;
 

@@ -28,16 +28,10 @@ PER_JOINT, OF_STRIP = len(JOINT), len(STRIP)
 
 @dataclass(frozen=True)
 class GainSweep:
-    """Runs of one robot from rest under the same references; `joints` N, `method` how they are
-    integrated."""
+    """Runs of one robot from rest under the same references; `joints` N."""
 
     joints: int
-    runs: Any  # core.Trials
-
-    @property
-    def method(self) -> str:
-        """The method of integration."""
-        return str(self.runs.method)
+    runs: Any  # core.GainSweep
 
     def run(
         self,

@@ -84,14 +84,13 @@ def test_robust_gains_overshoot_by_at_most_10_percent_over_payloads_of_0_to_2_ti
 def test_an_lqrs_figures_are_those_of_its_run_within_the_cases_drive_limits(monkeypatch):
     """A design of type IV; weights for which there is none count as a failure."""
     designs = LqrDesigns(cases.type_4())
-    # few modes, so that both take the same steps
     designs.plant = fx.assemble(with_modes(designs.structure.robot, 3))
     points = np.vstack([designs.start(), designs.start() - 0.1])
     found, reached = designs(points, np.full(2, np.inf))
     assert (reached == 1).all()
     controller = designs.controller(settings(designs.free, points)[0])
     t, rtol = designs.structure.manoeuvre.t, designs.task.rtol
-    run = fx.simulate(designs.plant, t, controller, rtol=rtol, method="explicit-3")
+    run = fx.simulate(designs.plant, t, controller, rtol=rtol)
     direct = metrics(run, controller)
     joints, strip = split_metrics(found)
     assert direct.joints[:, :5] == pytest.approx(

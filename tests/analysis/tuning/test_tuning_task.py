@@ -22,7 +22,7 @@ from tunings import GAINS, ROBOT, SWING, task, tuned
 
 
 def test_a_row_is_the_run_of_simulate_and_rows_do_not_know_of_each_other():
-    """Figures as from fx.simulate by the same method to the bit; J from a Run by its definition;
+    """Figures as from fx.simulate to the bit; J from a Run by its definition;
     any order, any thread."""
     one = task(rtol=1e-6, modes=0)
     points = np.random.default_rng(3).random((9, 3))
@@ -38,7 +38,7 @@ def test_a_row_is_the_run_of_simulate_and_rows_do_not_know_of_each_other():
         system = fx.assemble(ROBOT)
         controller = closed_loop_controller(system, SWING, tuned)
         t = np.arange(0, 1001, 5) / 1000
-        run = fx.simulate(system, t, controller, rtol=1e-6, method="explicit-3")
+        run = fx.simulate(system, t, controller, rtol=1e-6)
         direct = metrics(run, controller)
         assert np.array_equal(
             np.delete(direct.joints[0], 5), np.delete(found[k, 0, :6], 5), equal_nan=True

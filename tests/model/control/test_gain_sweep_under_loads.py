@@ -32,7 +32,7 @@ def test_a_row_of_gains_under_a_load_is_a_run_under_it():
     many = gain_sweep.prepare_gain_sweep(robot, drive, 1.0, 0.005, 1e-5, loads=push)
     figures, _ = many.run(drive.gains()[None])
     t = np.arange(0, 1001, 5) * 1e-3
-    run = fx.simulate(robot, t, drive, rtol=1e-5, method=many.method, loads=push)
+    run = fx.simulate(robot, t, drive, rtol=1e-5, loads=push)
     references = [np.array([joint.reference(at)[0] for at in t]) for joint in drive.joints]
     found = control.step_response(run, references, [joint.limit for joint in drive.joints])
     told = np.concatenate([found.joints.ravel(), found.strip])

@@ -173,7 +173,6 @@ CALLS: dict[str, Call] = {
         {"k": 0, "t": 0.0, "positions": np.zeros(2), "deflection": 0.0, "slope": 0.0},
         set(),
     ),
-    "method": (LAW.method, {"q": Q, "rtol": 1e-3}, set()),
     "GainSweep": (
         core.GainSweep,
         SWEEP,
