@@ -30,7 +30,7 @@ struct Plan {
   std::vector<double> start;      // (n) at rest
   std::vector<double> reference;  // (N, T) of each joint, before any filter
   double rtol;
-  std::string method;  // of `make_method`, or "auto": each run selects its own (103)
+  std::string method;  // of `make_method`, or "auto": each run selects its own
 
   int joints() const { return robot->links(); }
   int figures() const { return JOINT_FIGURES * joints() + STRIP_FIGURES; }
