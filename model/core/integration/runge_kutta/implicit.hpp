@@ -52,6 +52,7 @@ template <class Real>
 class Implicit : public Method<Real> {
  public:
   static constexpr double TIGHT = 0.02;      // of the tolerance: what may be left of a stage
+  static constexpr int NODES = 3;            // of a stage's guess
   static constexpr int MOST = 10, SLOW = 4;  // passes of a stage, at most; what is slow
   static constexpr double CAUTION =
       4.0;  // errors of steps add up over a run more than those of order 8 do
@@ -67,7 +68,14 @@ class Implicit : public Method<Real> {
         vs(ys),
         a(ys),
         next(ys),
-        other(padded(integration.size), Real(0.0)) {}
+        other(padded(integration.size), Real(0.0)) {
+    for (int s = 1; s < s_.stages; ++s)
+      for (int j = first_node(s); j < last_node(s); ++j) {
+        scale[s][j] = 1.0;
+        for (int i = first_node(s); i < last_node(s); ++i)
+          if (i != j) scale[s][j] /= s_.C[j] - s_.C[i];
+      }
+  }
   const char *name() const override { return s_.name; }
 
   void begin(const Real &which, const Real &t) override {
@@ -75,7 +83,7 @@ class Implicit : public Method<Real> {
     c.slope(t, c.znew.data(), other.data());
     take(which, c.znew.data(), c.z.data(), c.size);
     take(which, other.data(), K[0], c.size);
-    steep = which;
+    steep = which, past = choose_less(Real(0.5), which, Real(0.0), past);
   }
 
   Real attempt(const Real &t, const Real &h, const Real &last) override {
@@ -84,8 +92,8 @@ class Implicit : public Method<Real> {
     Real refused = 0.0;
     if (worst(steep) > 0.0)
       c.acts.estimate_function_slopes(steep, t, c.z.data(), c.z.data() + n), steep = Real(0.0);
-    std::copy(K[0] + n, K[0] + 2 * n, a.data());
     for (int s = 1; s < s_.stages; ++s) {
+      guess(h, s);
       known(h, s);
       refused = larger(refused, solve(smaller(t + h * s_.C[s], last), h * s_.gamma));
       bool none = true;
@@ -101,10 +109,14 @@ class Implicit : public Method<Real> {
       znew[k] = c.z[k] + h * sum;
     }
     K.sum(nullptr, h, s_.E, s_.stages, c.error.data());
+    made = h;
     return larger(refused, CAUTION * c.weights.norm(c.error.data(), znew));
   }
 
-  void accept(const Real &which) override { take(which, K[s_.stages - 1], K[0], c.size); }
+  void accept(const Real &which) override {
+    take(which, K[s_.stages - 1], K[0], c.size);
+    past = choose_less(Real(0.5), which, made, Real(0.0));
+  }
 
   void prepare(const Real &, const Real &, const Real &) override {}
 
@@ -127,6 +139,9 @@ class Implicit : public Method<Real> {
   std::vector<Real> ys, vs, a, next, other;
   Real steep = 0.0;  // 1: slopes of the caller's function are to be found (again): at the start, or
                      // as a stage was slow to converge
+  double scale[6][6] = {};  // (stage, node): of Lagrange's polynomials of its guess
+  Real made = 0.0,
+       past = 0.0;         // length of the last step, and of the one whose stages K still holds
   Real contraction = 1.0;  // of what is left of a stage by a pass, as last measured
 
   // What stage s knows of its state (85): with the accelerations a that it looks for, ys + g^2 h^2
@@ -135,6 +150,31 @@ class Implicit : public Method<Real> {
     const int n = c.n;
     K.sum(c.z.data(), h, s_.A[s], s, other.data());
     for (int k = 0; k < n; ++k) vs[k] = other[n + k], ys[k] = other[k] + (h * s_.gamma) * vs[k];
+  }
+
+  // The stages whose accelerations give stage s a guess: the last ones before it, at most NODES;
+  // the first stage takes the last step's, whose first one K does not hold any more.
+  int last_node(int s) const { return s > 1 ? s : s_.stages; }
+  int first_node(int s) const { return std::max(s > 1 ? 0 : 1, last_node(s) - NODES); }
+
+  // A guess of the accelerations of stage s, into a: by the polynomial through those of its nodes.
+  // The first stage of a robot without a last step takes the accelerations at its start.
+  void guess(const Real &h, int s) {
+    const int n = c.n, last = last_node(s), first = first_node(s);
+    const Real none = choose_less(Real(0.0), past, Real(0.0), Real(1.0));
+    Real at = s_.C[s];
+    if (s == 1) at = 1.0 + s_.C[1] * h / larger(past, Real(1e-300)), past = Real(0.0);
+    Real weight[6];
+    for (int j = first; j < last; ++j) {
+      weight[j] = scale[s][j];
+      for (int i = first; i < last; ++i)
+        if (i != j) weight[j] *= at - s_.C[i];
+    }
+    for (int k = n; k < 2 * n; ++k) {
+      Real sum = 0.0;
+      for (int j = first; j < last; ++j) sum += weight[j] * K[j][k];
+      a[k - n] = s > 1 ? sum : choose_less(Real(0.5), none, K[0][k], sum);
+    }
   }
 
   // The state of a stage from its accelerations, into c.znew.
