@@ -53,6 +53,7 @@ class Implicit : public Method<Real> {
  public:
   static constexpr double TIGHT = 0.02;      // of the tolerance: what may be left of a stage
   static constexpr int NODES = 3;            // of a stage's guess
+  static constexpr double FARTHER = 2.0;     // a step so much longer than the last one goes without
   static constexpr int MOST = 10, SLOW = 4;  // passes of a stage, at most; what is slow
   static constexpr double CAUTION =
       4.0;  // errors of steps add up over a run more than those of order 8 do
@@ -158,12 +159,13 @@ class Implicit : public Method<Real> {
   int first_node(int s) const { return std::max(s > 1 ? 0 : 1, last_node(s) - NODES); }
 
   // A guess of the accelerations of stage s, into a: by the polynomial through those of its nodes.
-  // The first stage of a robot without a last step takes the accelerations at its start.
+  // The first stage takes the accelerations at its start where there is no last step, or a short
+  // one.
   void guess(const Real &h, int s) {
     const int n = c.n, last = last_node(s), first = first_node(s);
-    const Real none = choose_less(Real(0.0), past, Real(0.0), Real(1.0));
+    const Real none = choose_less(h, FARTHER * past, Real(0.0), Real(1.0));
     Real at = s_.C[s];
-    if (s == 1) at = 1.0 + s_.C[1] * h / larger(past, Real(1e-300)), past = Real(0.0);
+    if (s == 1) at = 1.0 + s_.C[1] * h / (past + none), past = Real(0.0);
     Real weight[6];
     for (int j = first; j < last; ++j) {
       weight[j] = scale[s][j];
