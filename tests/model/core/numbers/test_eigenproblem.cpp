@@ -209,3 +209,43 @@ TEST("triangles: A = L L^T, solves, a semidefinite matrix, one that is not defin
   Numbers N = {1, 2, 2, 3};
   CHECK(cholesky(2, N.data()) < 0.0);
 }
+
+TEST(
+    "K nearly diagonal, M nearly 1: exact in M, diagonal to what is asked, squares to its square") {
+  check::Random random;
+  for (int n : {1, 2, 5, 12, 40})
+    for (double left : {1e-1, 1e-3, 1e-6}) {
+      Numbers K(sized(n * n)), M(sized(n * n)), scale(sized(n)), squares(sized(n)), x(K);
+      for (int i = 0; i < n; ++i) scale[sized(i)] = std::exp(14.0 * i / n);  // frequencies
+      for (int i = 0; i < n; ++i)
+        for (int j = 0; j <= i; ++j) {
+          const double one = i == j;
+          at(M, n, i, j) = at(M, n, j, i) = one + 0.3 / n * random(-1.0, 1.0);
+          at(K, n, i, j) = at(K, n, j, i) =
+              (one + 0.3 / n * random(-1.0, 1.0)) * scale[sized(i)] * scale[sized(j)];
+        }
+      if (n >
+          2) {  // a direction that is free: what is beside it counts against `scale` all the same
+        for (int j = 0; j < n; ++j) at(K, n, 0, j) = at(K, n, j, 0) = 0.0;
+      }
+      eigen_nearly_diagonal(n, K.data(), M.data(), scale.data(), left, squares.data(), x.data());
+      CHECK(off(n, M, x, Numbers(sized(n), 1.0)) < 1e-13 * (1 + n));
+      double beside = 0.0;
+      for (int a = 0; a < n; ++a)
+        for (int b = 0; b < n; ++b) {
+          double sum = 0.0;
+          for (int i = 0; i < n; ++i)
+            for (int j = 0; j < n; ++j) sum += at(x, n, i, a) * at(K, n, i, j) * at(x, n, j, b);
+          const double entry = sum / (scale[sized(a)] * scale[sized(b)]);
+          if (a == b)
+            CHECK(std::fabs(sum - squares[sized(a)]) < 1e-8 * scale[sized(a)] * scale[sized(a)]);
+          else
+            beside += entry * entry;
+        }
+      CHECK(std::sqrt(beside) <= left);
+      Numbers exact(sized(n)), shapes(sized(n * n));
+      eigen_pencil(n, K.data(), M.data(), exact.data(), shapes.data());
+      for (int a = n > 2; a < n; ++a)
+        CHECK(std::fabs(squares[sized(a)] / exact[sized(a)] - 1.0) < 2.0 * left * left + 1e-8);
+    }
+}
