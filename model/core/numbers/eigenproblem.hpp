@@ -101,11 +101,4 @@ void eigen_tridiagonal(int n, double *values, double *off, int width, double *Q)
 // motion, infinite without mass; `shapes` (n, n), x . M x = 1. Returns how many squares are finite.
 int eigen_pencil(int n, const double *K, const double *M, double *squares, double *shapes);
 
-// The same where K is nearly diagonal and M nearly 1, which is positive definite: shapes^T M shapes
-// = 1 to round-off, shapes^T K shapes diagonal but for less than `left`: Frobenius' norm of what
-// stands beside the diagonal, entry i, j relative to scale_i scale_j. Values stand where those of K
-// stood.
-void eigen_nearly_diagonal(int n, const double *K, const double *M, const double *scale,
-                           double left, double *squares, double *shapes);
-
 }  // namespace flexura

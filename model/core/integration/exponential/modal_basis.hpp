@@ -39,7 +39,6 @@ class ModalBasis {
   static constexpr int LANES = LanesOf<Real>::value;
   static constexpr double POOR =
       0.1;  // the change of Phi M Phi^T, and of Phi K Phi^T against w_i w_j, that is put up with
-  static constexpr double LEFT = 0.01;  // of POOR: what modes that are taken again may leave of it
   static constexpr double TURN = 0.05;  // the configuration is looked at after so many radians
                                         // (metres of the tips over the reach),
   static constexpr double FAR =
@@ -118,11 +117,8 @@ class ModalBasis {
       patience[k] = smaller(larger(0.7 * gone[k] * (1.0 / root(larger(changed, 1e-3)) - 1.0), TURN),
                             FAR * TURN);  // were it to grow as a square
       if (changed < 1.0) return false;
-      std::vector<double> scale(squares);
-      for (int mode = 0; mode < n; ++mode)
-        scale[std::size_t(mode)] = larger(root(lane(w2[mode], k)), slow);
-      eigen_nearly_diagonal(n, turned_K.data(), turned_M.data(), scale.data(), LEFT * POOR,
-                            squares.data(), shapes.data());
+      eigen_pencil(n, turned_K.data(), turned_M.data(), squares.data(),
+                   shapes.data());  // nearly diagonal: soon done
       shapes = product(n, old, shapes);
     } else {
       eigen_pencil(n, K.data(), M.data(), squares.data(), shapes.data());
@@ -131,7 +127,7 @@ class ModalBasis {
     const bool loses = std::any_of(D.begin(), D.end(), [](double x) { return x != 0.0; });
     const std::vector<double> momenta = product(n, M, shapes),
                               lost = loses ? product(n, D, shapes) : D;
-    const double least = larger(FREE, 1e-14 * *std::max_element(squares.begin(), squares.end()));
+    const double least = larger(FREE, 1e-14 * squares[std::size_t(n - 1)]);
     for (int mode = 0; mode < n; ++mode) {
       const double square = squares[std::size_t(mode)];
       set_lane(w2[mode], k, square > least ? square : 0.0);
