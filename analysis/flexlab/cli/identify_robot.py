@@ -163,7 +163,7 @@ def _written(found: Identification, out: Path | None, home: Path) -> tuple[list[
     beside = path.with_name(f"{path.stem}-report.json")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        fx.save(found.robot, path)
+        fx.save(found.robot, path, overwrite=True)
         write_text(beside, json_.dumps(report.numbers(found), indent=1) + "\n")
     except (fx.InputError, OSError) as error:
         return [], f"{path} is not written: {error}"

@@ -248,7 +248,7 @@ def _judged(task: Task, trial: Trial, observer: Observer, rig: Rig) -> Trial:
     meta = run.meta | {"learning": run.meta.get("learning", {}) | numbers_of(trial)}
     units = run.units | dict.fromkeys(padded, "m")
     made = dataclasses.replace(run, channels=run.channels | padded, units=units, meta=meta)
-    made.save(trial.folder)
+    made.save(trial.folder, overwrite=True)
     return dataclasses.replace(trial, run=made)
 
 

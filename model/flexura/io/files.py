@@ -52,6 +52,22 @@ def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
             rest = rest[stream.write(rest) :]
 
 
+def refuse_taken(path: str | os.PathLike[str]) -> None:
+    """Refuse to write where a file is already.
+
+    Args:
+        path: of the file to write.
+
+    Raises:
+        InputError: it is there.
+    """
+    if os.path.lexists(path):
+        raise InputError(
+            "a file is there: expected another place, or overwrite=True to replace it",
+            file=os.fspath(path),
+        )
+
+
 @contextmanager
 def replaced(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A new, empty file beside `path` with its extension, which takes its place in the end.

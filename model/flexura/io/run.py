@@ -20,7 +20,7 @@ from ..errors import InputError, within_memory
 from . import summary
 from .drawing.film import animation
 from .drawing.over_time import FORMS, figure, heading, saved
-from .files import settle, write_bytes
+from .files import refuse_taken, settle, write_bytes
 from .format import FORMAT, check_format
 from .frames import pandas_frame, xarray_dataset
 from .quantities import converted, fault, from_first, suffix, unit
@@ -260,16 +260,22 @@ class Run:
         """
         return xarray_dataset(self.t, self.channels, self.units, self.meta)
 
-    def save(self, folder: str | Path) -> Path:
+    def save(self, folder: str | Path, *, overwrite: bool = False) -> Path:
         """Write `run.parquet` as a whole or not at all.
 
         Args:
             folder: where to; it is made if need be.
+            overwrite: whether a run that is there already may be replaced.
 
         Returns:
             The file's path.
+
+        Raises:
+            InputError: a run is there already, or the file cannot be written.
         """
         path = Path(folder) / FILE
+        if not overwrite:
+            refuse_taken(path)
         write_bytes(path, self.parquet())
         return path
 

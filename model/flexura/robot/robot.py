@@ -24,6 +24,7 @@ from ..io import (
     find,
     index_of,
     read_toml,
+    refuse_taken,
     summary,
     write_toml,
 )
@@ -361,11 +362,17 @@ def robot_of(robot: Any, key: str = "robot") -> Robot:
     raise InputError(expected, key=key, value=robot)
 
 
-def save(robot: Robot, path: str | os.PathLike[str]) -> None:
+def save(robot: Robot, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
     """Write a robot file (TOML) that `load` reads back to an equal robot.
 
     Args:
         robot: the robot.
-        path: where to; a file there is replaced as a whole.
+        path: where to.
+        overwrite: whether a file that is there already may be replaced, as a whole.
+
+    Raises:
+        InputError: a file is there already, or it cannot be written.
     """
+    if not overwrite:
+        refuse_taken(path)
     write_toml(path, {"format": FORMAT} | robot.to_dict())

@@ -5,7 +5,7 @@ from . import paths, shaping, signal
 from .acting import Acting, acts
 from .composite import chirp, delayed, noise, pulse, sum
 from .conversion import FunctionSignal, SignalLike, as_signal, as_signals, spline
-from .drive import Drive, JointDrive, check_smooth
+from .drive import Drive, JointDrive
 from .load import Load, Loads, LoadsLike, as_loads
 from .manoeuvre import STARTS, Manoeuvre, load_manoeuvre
 from .parsing import KINDS, PLAUSIBLE, from_spec, is_finite, is_plausible
@@ -27,6 +27,7 @@ from .signal import (
     table,
     trapezoidal,
 )
+from .smooth import check_smooth
 
 __all__ = [
     "COLUMNS",

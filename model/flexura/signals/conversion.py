@@ -20,7 +20,7 @@ SignalLike: TypeAlias = Signal | ArrayLike | Callable[[float], float] | None
 EXPECTED = "expected a number, a Signal, a function of time, or an array of a value each time"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class FunctionSignal(Signal):
     """A Python function of time as a Signal; `key` names it in messages. It has no segments."""
 

@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..io import Tables, check_format, choice, find, is_name, read_toml, whole
-from .drive import Drive, JointDrive, check_smooth
+from ..io import Tables, check_format, choice, find, is_name, read_toml, summary, whole
+from .drive import Drive, JointDrive
 from .load import Load, load_from_table
 from .parsing import from_spec, is_plausible
 from .payload_change import PayloadChange, as_payloads, payload_from_table
 from .signal import Signal
+from .smooth import check_smooth
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,20 @@ class Manoeuvre:
     loads: tuple[Load, ...] = ()
     payloads: tuple[PayloadChange, ...] = ()
     file: str = field(default="", compare=False)
+
+    def __repr__(self) -> str:
+        return summary.text(*self._summary())
+
+    def _repr_html_(self) -> str:
+        return summary.html(*self._summary())
+
+    def _summary(self) -> tuple[str, list[tuple[str, str]]]:
+        rows = [("t", f"0 to {self.duration_s:g} s, each {self.output_step_s:g} s")]
+        rows += self.drive.rows()
+        rows += [] if self.start is None else [("start", self.start)]
+        for name, parts in (("loads", self.loads), ("payloads", self.payloads)):
+            rows += [(name, str(len(parts)))] if parts else []
+        return f"Manoeuvre: {self.name}", rows
 
     @property
     def t(self) -> np.ndarray:

@@ -109,10 +109,17 @@ class Signal:
         object.__setattr__(self, "segments", given)
 
     def __repr__(self) -> str:
-        """Its table, without the values of long lists."""
-        said = {k: f"{len(v)} values" if isinstance(v, list) else v for k, v in self.spec.items()}
-        parts = [f"{key}={value}" for key, value in said.items()] or [f"{len(self.segments)} rows"]
-        return f"Signal({', '.join(parts)})"
+        return f"Signal: {self.said()}"
+
+    def said(self) -> str:
+        """Its kind and its table, without the values of long lists: "cycloid(end=0.8, ...)"."""
+        parts = []
+        for key, value in self.spec.items():
+            if key != "kind":
+                short = f"{len(value)} values" if isinstance(value, list) else value
+                parts.append(f"{key}={short:g}" if isinstance(short, float) else f"{key}={short}")
+        kind = self.spec.get("kind", "segments")
+        return f"{kind}({', '.join(parts) or f'{len(self.segments)} rows'})"
 
     def __call__(self, t: float) -> tuple[float, float, float]:
         """y, dy/dt and d2y/dt2.
