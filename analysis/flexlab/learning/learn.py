@@ -16,7 +16,7 @@ from flexura.errors import FlexuraError, InputError
 
 from ..experiment.plan import Plan
 from ..experiment.run_experiment import ExperimentResult, RefusedToStart
-from ..identification.identify import Identified, identify
+from ..identification.identify_rig import Identified, identify
 from ..rig import Check
 from ..rig.axes import motor_axes
 from .knowledge import Knowledge

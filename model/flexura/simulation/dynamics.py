@@ -83,11 +83,11 @@ def simulate(
         qd0,
         rtol,
         method,
-        numerical_damping,
-        start,
-        continue_from,
-        Budget.checked(max_steps, wall_time),
-        loads,
+        numerical_damping=numerical_damping,
+        start=start,
+        before=continue_from,
+        budget=Budget.checked(max_steps, wall_time),
+        loads=loads,
     )
     check_progress(progress)
     within = flag(internal_forces, "internal_forces")
@@ -142,10 +142,10 @@ def inverse(
     Args:
         robot: a System, a Robot, or the path or name of a robot file.
         t_eval: ascending times (T,) [s].
-        motion: one entry a joint: a Signal, a function of t, an array of len(t_eval) values, or a
-            number; or an array (T, joints). Arrays become cubic splines, functions splines of
-            fifth order. None is good for a locked joint. A motion may begin and end with any
-            velocity, but not jump inside the run.
+        motion: motions, never forces, one entry a joint: a Signal, a function of t, an array of
+            len(t_eval) values, or a number; or an array (T, joints). Arrays become cubic splines,
+            functions splines of fifth order. None is good for a locked joint. A motion may begin
+            and end with any velocity, but not jump inside the run.
         q0: configuration at the start (n,), as in `flexura.simulate`.
         qd0: its rates (n,).
         rtol: as in `flexura.simulate`.

@@ -131,6 +131,7 @@ def initial_value_problem(
     qd0: ArrayLike | None,
     rtol: Any,
     method: Any,
+    *,
     numerical_damping: Any = True,
     start: Any = None,
     before: Run | None = None,
@@ -178,19 +179,18 @@ def initial_value_problem(
             'expected a robot with stiffening = true and sliding = "continuous" under a Controller'
         )
         raise InputError(expected, key="drive", value="Controller")
-    damping = flag(numerical_damping, "numerical_damping")
     return Problem(
-        system,
-        t,
-        acting,
-        q,
-        qd,
-        float(rtol),
-        method,
-        damping,
-        start,
-        accounts,
-        on_links,
+        system=system,
+        t=t,
+        drive=acting,
+        q=q,
+        qd=qd,
+        rtol=float(rtol),
+        method=method,
+        numerical_damping=flag(numerical_damping, "numerical_damping"),
+        start=start,
+        accounts=accounts,
+        loads=on_links,
         budget=budget or Budget(),
     )
 

@@ -113,6 +113,11 @@ def test_runs_with_nothing_in_common_are_refused():
         compare(run([0, 1], tip__x=[0, 1]), run([0, 1], tip__y=[0, 1]), ["tip/x"])
 
 
+def test_a_tip_beside_other_channels_hides_none_of_them():
+    one = run([0, 1], tip__x=[0, 1], sensor__strain=[0, 1])
+    assert [d.channel for d in compare(one, one).differences] == ["tip/x", "sensor/strain"]
+
+
 def test_runs_without_joint_positions_are_compared_by_what_both_have():
     """Logs have drives, motor positions and sensors; 2 % and 10 ms stay what they are."""
     t = np.arange(1001) / 1000
