@@ -54,6 +54,9 @@ def asked_of(paths: Sequence[Path], fit: Sequence[str]) -> Asked | None:
         return None
     if not runs:
         raise fx.InputError("expected a run or more after ROBOT", key="RUN")
+    if late := [path for path in runs if path.suffix == ".toml"]:
+        expected = "expected runs here: the robot file stands before them"
+        raise fx.InputError(expected, key="RUN", value=str(late[0]))
     if not words:
         raise fx.InputError(
             "expected what to fit, as --fit payload.mass_kg --fit link.1.damping.beta_s",

@@ -148,10 +148,10 @@ def tune(
         _cases(how, out, scheduler, jobs, json)
         return
     if robot is None or manoeuvre is None or controller is None:
+        three = {"ROBOT": robot, "MANOEUVRE": manoeuvre, "--controller": controller}
         raise fx.InputError(
-            "expected ROBOT, MANOEUVRE and --controller GAINS, or --dissertation",
-            key="ROBOT",
-            value=str(robot),
+            "missing: expected ROBOT, MANOEUVRE and --controller GAINS, or --dissertation",
+            key=next(key for key, given in three.items() if given is None),
         )
     described, given = _controlled(robot, controller, rig)
     task = _task(

@@ -52,7 +52,25 @@ def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
             rest = rest[stream.write(rest) :]
 
 
-def refuse_taken(path: str | os.PathLike[str]) -> None:
+def path_of(given: object, key: str) -> Path:
+    """The path that an argument is.
+
+    Args:
+        given: a text or a path.
+        key: name of the argument, for the message.
+
+    Returns:
+        The path.
+
+    Raises:
+        InputError: it is something else.
+    """
+    if not isinstance(given, str | os.PathLike):
+        raise InputError("expected a path", key=key, value=given)
+    return Path(os.fspath(given))
+
+
+def refuse_taken(path: Path) -> None:
     """Refuse to write where a file is already.
 
     Args:

@@ -20,7 +20,7 @@ from ..errors import InputError, within_memory
 from . import summary
 from .drawing.film import animation
 from .drawing.over_time import FORMS, figure, heading, saved
-from .files import refuse_taken, settle, write_bytes
+from .files import path_of, refuse_taken, settle, write_bytes
 from .format import FORMAT, check_format
 from .frames import pandas_frame, xarray_dataset
 from .quantities import converted, fault, from_first, suffix, unit
@@ -202,7 +202,7 @@ class Run:
             InputError: a pattern fits no channel, the run is empty, or `out` has another ending.
             Missing: matplotlib is not installed.
         """
-        form = "" if out is None else Path(out).suffix.lower().removeprefix(".")
+        form = "" if out is None else path_of(out, "out").suffix.lower().removeprefix(".")
         if out is not None and form not in FORMS:
             raise InputError(
                 f"expected a file that ends with .{', .'.join(FORMS)}", key="out", value=str(out)
@@ -273,7 +273,7 @@ class Run:
         Raises:
             InputError: a run is there already, or the file cannot be written.
         """
-        path = Path(folder) / FILE
+        path = path_of(folder, "folder") / FILE
         if not overwrite:
             refuse_taken(path)
         write_bytes(path, self.parquet())

@@ -23,6 +23,7 @@ from ..io import (
     explain,
     find,
     index_of,
+    path_of,
     read_toml,
     refuse_taken,
     summary,
@@ -273,6 +274,8 @@ class Robot(Table):
         Raises:
             InputError: an unknown key, or a wrong value.
         """
+        if not isinstance(changes, dict):
+            raise InputError("expected values by key", key="changes", value=changes)
         changes = {self._todays_path(path, changes): value for path, value in changes.items()}
         # says what is wrong in a file's words
         try:
@@ -335,7 +338,10 @@ def load(path: str | os.PathLike[str]) -> Robot:
             expected.
     """
     found = find(path, "robots")
-    return Robot.from_dict(read_toml(found), file=os.fspath(found))
+    data = read_toml(found)
+    if "link" not in data and "duration_s" in data:
+        raise InputError("a manoeuvre file: expected a robot file", file=os.fspath(found))
+    return Robot.from_dict(data, file=os.fspath(found))
 
 
 def robot_of(robot: Any, key: str = "robot") -> Robot:
@@ -366,13 +372,14 @@ def save(robot: Robot, path: str | os.PathLike[str], *, overwrite: bool = False)
     """Write a robot file (TOML) that `load` reads back to an equal robot.
 
     Args:
-        robot: the robot.
+        robot: the robot, or a System of it.
         path: where to.
         overwrite: whether a file that is there already may be replaced, as a whole.
 
     Raises:
         InputError: a file is there already, or it cannot be written.
     """
+    described, target = robot_of(robot), path_of(path, "path")
     if not overwrite:
-        refuse_taken(path)
-    write_toml(path, {"format": FORMAT} | robot.to_dict())
+        refuse_taken(target)
+    write_toml(target, {"format": FORMAT} | described.to_dict())

@@ -147,6 +147,8 @@ def load_manoeuvre(path: str | os.PathLike[str], joints: int) -> Manoeuvre:
 
 def _manoeuvre(data: Tables, joints: int) -> Manoeuvre:
     check_format(data)
+    if "link" in data and "duration_s" not in data:
+        raise InputError("a robot file: expected a manoeuvre file")
     _check_keys(data, _KEYS, "")
     duration = _number(
         data, "duration_s", f"a duration above 0 in seconds, at most {LONGEST:g}", low=0.0

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ..control import Controller, Sampled
 from ..errors import InputError, guarded
 from ..io import Run, check_progress, flag
-from ..signals import Drive, LoadsLike, PayloadsLike, SignalLike, as_payloads, as_signals
+from ..signals import Drive, LoadsLike, Manoeuvre, PayloadsLike, SignalLike, as_payloads, as_signals
 from ..system import RobotLike, System, assemble, check_continuous
 from . import dense, integrator, nodewise_run, payload_changes
 from .problem import Budget, Problem, Progress, Solution, check_times, initial_value_problem
@@ -167,6 +167,9 @@ def inverse(
         NoEquilibrium: there is no static equilibrium to start in.
     """
     system, t = assemble(robot), check_times(t_eval)
+    if isinstance(motion, Drive | Controller | Sampled | Manoeuvre):
+        expected = "expected motions, one entry a joint; flexura.simulate takes drives"
+        raise InputError(expected, key="motion", value=type(motion).__name__)
     motions = as_signals(motion, len(system.robot.links), "motion", t)
     for i, (signal, link) in enumerate(zip(motions, system.robot.links, strict=True), 1):
         if signal is None and not link.joint.locked:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ..control import Backlash, Controller, DriveFunction, Sampled
 from ..errors import InputError
 from ..io import Run, Tables, array, check_memory, choice, flag, number, whole
-from ..signals import Drive, Loads, LoadsLike, Signal, as_loads, as_signals
+from ..signals import Drive, Loads, LoadsLike, Manoeuvre, Signal, as_loads, as_signals
 from ..system import RobotLike, System, assemble
 from .start import apply_prescribed_motions, check_limits, consistent_start, state_at_end
 
@@ -222,6 +222,9 @@ def acting_drive(drive: Any, joints: int, t: np.ndarray) -> Drive | Controller |
     """
     if drive is None:
         return Drive.none(joints)
+    if isinstance(drive, Manoeuvre):
+        expected = "expected the drive of it, manoeuvre.drive, at times such as manoeuvre.t"
+        raise InputError(expected, key="drive", value="Manoeuvre")
     if isinstance(drive, Sampled):
         return drive
     if isinstance(drive, Backlash) and len(drive.contacts) != joints:

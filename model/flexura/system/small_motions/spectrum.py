@@ -188,7 +188,9 @@ def _check(joints: ArrayLike, count: Any) -> None:
 
 
 def _hertz(squares: np.ndarray) -> np.ndarray:
-    return np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)
+    """Frequencies of squares [rad^2/s^2]; 0 for what is no more than round-off of the largest."""
+    known = squares > np.finfo(float).eps * squares.max(initial=0.0)
+    return np.sqrt(np.where(known, squares, 0.0)) / (2 * np.pi)
 
 
 def _dense(system: System, at: np.ndarray, joints: str, count: int | None) -> Modes:
