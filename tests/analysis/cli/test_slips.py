@@ -80,3 +80,11 @@ def test_a_rigid_motion_under_gravity_has_the_frequency_zero():
     )
     found = fx.frequencies(hanging, joints="free")
     assert found[0] == 0.0 and 0.5 < found[1] < 2.0
+
+
+def test_a_rigid_robot_is_not_told_of_meshes(files):
+    bare = RR.replace("elements = 2", "elements = 0").split("mass_per")[0] + "mass_kg = 0.1\n"
+    (files / "bar.toml").write_text(bare + RR[RR.index("[link.joint]") :])
+    said = {name: run(["frequencies", name]) for name in ("arm.toml", "bar.toml")}
+    assert [said[name][0] for name in said] == [0, 0]
+    assert "more elements" in said["arm.toml"][1] and "mesh" not in said["bar.toml"][1]

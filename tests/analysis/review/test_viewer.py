@@ -20,8 +20,6 @@ from reviews import (
 
 @pytest.fixture(scope="session")
 def viewer():
-    from flexlab.review import headless
-
     try:
         with headless.viewer((1200, 800)) as client:
             yield client
