@@ -48,7 +48,8 @@ Search this page for the field's word, such as condensation, Kalman or step size
 stand other words for it.
 
 `computed by` names what cites the equation: a function or class of `flexura`, or one of the core or
-of the firmware's library with its file. What is about this equation most stands first.
+of the firmware's library with its file. Functions stand before classes, and first what is about
+this equation most.
 `evaluated by` names the test in `tests/docs` that writes it down anew.
 
 | number | equation | computed by | evaluated by |
@@ -161,8 +162,9 @@ def comments(path: Path) -> list[tuple[str, str]]:
 
 def citations(root: Path = ROOT) -> dict[int, list[str]]:
     """By number, what computes an equation: functions and classes by name, those of C++ with their
-    file. What cites few equations stands first: it is about this one. A file stands for itself,
-    and last, if it cites an equation at its head and none of its functions does."""
+    file. Functions stand before classes, and what cites few equations first: it is about this one.
+    A file stands for itself, and last, if it cites an equation at its head and none of its
+    functions does."""
     found: dict[int, list[str]] = {}
 
     def note(text: str, name: str) -> None:
@@ -185,8 +187,12 @@ def citations(root: Path = ROOT) -> dict[int, list[str]]:
     for number, names in found.items():
         inside = {name.partition(": ")[0] for name in names if ": " in name}
         kept = [name for name in names if name not in inside]
-        out[number] = sorted(kept, key=lambda name: (is_file(name), count[name]))
+        out[number] = sorted(kept, key=lambda name: (is_file(name), _is_class(name), count[name]))
     return out
+
+
+def _is_class(name: str) -> bool:
+    return re.split(r"[. ]", name)[-1][0].isupper()
 
 
 def is_file(name: str) -> bool:
