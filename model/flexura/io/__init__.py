@@ -32,10 +32,10 @@ from .files import (
     write_bytes,
     write_text,
 )
-from .format import FORMAT, check_format
 from .quantities import CHANNELS, STATIONS, Channel, channel
 from .quantities.labels import EMULATED, called, emulated, kind
-from .run import FILE, Run
+from .run import Run
+from .run_file import FILE
 from .seal import (
     Damaged,
     read_sealed,
@@ -50,7 +50,7 @@ from .seal import (
 from .shipped import find, shipped_files
 from .toml_files import Tables, changed, index_of, read_toml, write_toml
 from .trust import DOUBTED, REFUSED, balance_events, judged
-from .validation import MOST_LETTERS, explain, is_name
+from .validation import FORMAT, MOST_LETTERS, check_format, explain, is_name
 
 __all__ = [
     "CHANNELS",
