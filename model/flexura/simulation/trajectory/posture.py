@@ -12,6 +12,7 @@ from .tip_output import PLACE, TipPath, output_kind
 
 STEPS = 40  # of Newton's method
 CLOSE = 1e-12  # m or rad
+ELBOW = 0.5  # rad
 LONGEST = 0.3  # m or rad: a step of a joint
 
 
@@ -28,7 +29,8 @@ def inverse_kinematics(
         tip: x and y [m] of a robot with two joints; with one, the polar angle [rad] seen from its
             axis, or the place along its rail [m]. Or rows of these, (T, 2) or (T,).
         joints: (links,), where the search begins [m or rad], by default their start: it decides on
-            which side the elbow is.
+            which side the elbow is. An arm that is stretched there begins with its elbow bent to
+            the left.
 
     Returns:
         q (n,), or (T, n) for rows.
@@ -44,8 +46,25 @@ def inverse_kinematics(
     if places.ndim > count or (count == 2 and places.shape[-1:] != (2,)):
         raise InputError(f"expected {count} numbers a place", key="tip", value=places.shape)
     path = TipPath(kind, (), 0.0, 0.0, angle)
-    found = postures(system, path, places.reshape(-1, count), static(system, joints))
+    rows = places.reshape(-1, count)
+    try:
+        found = postures(system, path, rows, static(system, joints))
+    except FlexuraError:
+        if joints is not None or (bent := _bent(system)) is None:
+            raise
+        found = postures(system, path, rows, static(system, bent))
     return found[0] if places.ndim == count - 1 else found
+
+
+def _bent(system: System) -> np.ndarray | None:
+    """The joints' start with the elbow, the last joint R that moves, bent to the left; None: the
+    robot has no elbow."""
+    links, start = system.robot.links, np.array(system.robot.start, dtype=float)
+    turning = [i for i, x in enumerate(links) if x.joint.type == "R" and not x.joint.locked]
+    if not turning or turning[-1] == 0:
+        return None
+    start[turning[-1]] += ELBOW
+    return start
 
 
 def exact_system(robot: RobotLike) -> System:
@@ -73,7 +92,7 @@ def postures(system: System, path: TipPath, places: np.ndarray, q: np.ndarray) -
         if before is None or not _near(place, before):
             q = _approach(system, path, place, q)
         else:
-            q = _newton(system, path, place, q)
+            q = _newton(system, path, place, place, q)
         before = place
         out.append(q)
     return np.array(out)
@@ -90,11 +109,14 @@ def _approach(system: System, path: TipPath, place: np.ndarray, q: np.ndarray) -
     off = path.deviation(tip, slope, place[None])[0][0]
     ways = max(2, int(np.ceil(np.abs(off).max() / (LONGEST / 6))))
     for share in np.linspace(0, 1, ways + 1)[1:]:
-        q = _newton(system, path, place + (1 - share) * off, q)
+        q = _newton(system, path, place + (1 - share) * off, place, q)
     return q
 
 
-def _newton(system: System, path: TipPath, place: np.ndarray, q: np.ndarray) -> np.ndarray:
+def _newton(
+    system: System, path: TipPath, place: np.ndarray, end: np.ndarray, q: np.ndarray
+) -> np.ndarray:
+    """A posture with the tip at a place (m,), which is on the way to `end` (m,), from q (n,) on."""
     zero, joints = np.zeros((1, system.n)), system.joint_rows
     free = joints[~system.locked]
     rows = np.concatenate([system.elastic_rows, free])
@@ -115,8 +137,9 @@ def _newton(system: System, path: TipPath, place: np.ndarray, q: np.ndarray) -> 
         q[rows] -= step * min(1.0, LONGEST / max(longest, 1e-300))
         if longest < CLOSE:
             return q
-    where = ", ".join(f"{x:.6g}" for x in place)
+    where, here = (", ".join(f"{x:.6g}" for x in xs) for xs in (end, place))
+    way = "" if here == where else f"; the straight way there ends before {here}"
     raise FlexuraError(
         f"no posture found with the tip at {where}: it is out of reach, or the joints cannot move "
-        f"it in every direction there"
+        f"it in every direction there{way}"
     )
