@@ -12,6 +12,7 @@ from .tip_output import PLACE, TipPath, output_kind
 
 STEPS = 40  # of Newton's method
 CLOSE = 1e-12  # m or rad
+STRETCHED = 0.01  # rad: an elbow's angle
 ELBOW = 0.5  # rad
 LONGEST = 0.3  # m or rad: a step of a joint
 
@@ -46,25 +47,8 @@ def inverse_kinematics(
     if places.ndim > count or (count == 2 and places.shape[-1:] != (2,)):
         raise InputError(f"expected {count} numbers a place", key="tip", value=places.shape)
     path = TipPath(kind, (), 0.0, 0.0, angle)
-    rows = places.reshape(-1, count)
-    try:
-        found = postures(system, path, rows, static(system, joints))
-    except FlexuraError:
-        if joints is not None or (bent := _bent(system)) is None:
-            raise
-        found = postures(system, path, rows, static(system, bent))
+    found = postures(system, path, places.reshape(-1, count), static(system, joints))
     return found[0] if places.ndim == count - 1 else found
-
-
-def _bent(system: System) -> np.ndarray | None:
-    """The joints' start with the elbow, the last joint R that moves, bent to the left; None: the
-    robot has no elbow."""
-    links, start = system.robot.links, np.array(system.robot.start, dtype=float)
-    turning = [i for i, x in enumerate(links) if x.joint.type == "R" and not x.joint.locked]
-    if not turning or turning[-1] == 0:
-        return None
-    start[turning[-1]] += ELBOW
-    return start
 
 
 def exact_system(robot: RobotLike) -> System:
@@ -89,13 +73,33 @@ def postures(system: System, path: TipPath, places: np.ndarray, q: np.ndarray) -
     """Postures (T, n) with the tip at `places` (T, m), one after another from q (n,) on."""
     out, before = [], None
     for place in places:
-        if before is None or not _near(place, before):
+        if before is None:
+            q = _first(system, path, place, q)
+        elif not _near(place, before):
             q = _approach(system, path, place, q)
         else:
             q = _newton(system, path, place, place, q)
         before = place
         out.append(q)
     return np.array(out)
+
+
+def _first(system: System, path: TipPath, place: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """A posture with the tip at a place (m,), from q (n,) on, or, if the arm is stretched there and
+    cannot move its tip towards the place, from q with the elbow bent to the left."""
+    try:
+        return _approach(system, path, place, q)
+    except FlexuraError:
+        rows = [
+            i
+            for i, x in zip(system.joint_rows, system.robot.links, strict=True)
+            if x.joint.type == "R" and not x.joint.locked
+        ]
+        if len(rows) < 2 or abs(np.sin(q[rows[-1]])) > STRETCHED:
+            raise
+        joints = q.copy()
+        joints[rows[-1]] += ELBOW
+        return _approach(system, path, place, static(system, joints[system.joint_rows]))
 
 
 def _near(place: np.ndarray, before: np.ndarray) -> bool:
