@@ -209,8 +209,19 @@ def test_a_place_that_is_no_path_is_named(place):
         run.plot(3)
     with pytest.raises(fx.InputError, match="robot: expected a Robot"):
         fx.save(None, "a.toml")
+    with pytest.raises(fx.InputError, match="folder"):
+        fx.Run.read(place)
+
+
+def test_what_is_no_table_and_no_key_of_a_robot_is_named():
+    robot = fx.load(RIG)
     with pytest.raises(fx.InputError, match="changes = 3: expected values by key"):
         robot.replace(3)
+    for call in (lambda: robot.value(3), lambda: robot.replace({3: 1.0})):
+        with pytest.raises(fx.InputError, match="key = 3: expected the key of a value"):
+            call()
+    with pytest.raises(fx.InputError, match="data = 3: expected the tables of a robot file"):
+        fx.Robot.from_dict(3)
 
 
 def test_drives_where_motions_are_expected_and_manoeuvres_where_drives_are():

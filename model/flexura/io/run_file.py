@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError, within_memory
-from .files import settle
+from .files import path_of, settle
 from .quantities import suffix
 from .seal import Damaged, read_sealed, read_table, room_for_arrow, say_unsealed, sealed_parquet
 from .toml_files import Tables
@@ -68,7 +68,7 @@ def read(folder: str | Path, made: Callable[..., Run]) -> Run:
     """
     import pyarrow as pa
 
-    path = Path(folder)
+    path = path_of(folder, "folder")
     try:
         for place in (path, path.parent):
             settle(place)

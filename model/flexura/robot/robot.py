@@ -224,6 +224,9 @@ class Robot(Table):
         """
         if isinstance(data, dict):
             check_format(data, file)
+        elif not isinstance(data, cls):
+            expected = "expected the tables of a robot file"
+            raise InputError(expected, key="data", value=data, file=file)
         data, old = renamed(data)
         if old:
             keys = ", ".join(f"{each.path} is {each.new}" for each in old)
@@ -314,6 +317,9 @@ class Robot(Table):
     def _todays_path(self, path: str, changes: Tables) -> str:
         """`link.2.joint.start_rad` of `link.2.joint.start` and of `joint.2.start`; any other path
         as it is."""
+        if not isinstance(path, str):
+            expected = "expected the key of a value, as payload.mass_kg"
+            raise InputError(expected, key="key", value=path)
         if path.startswith("joint."):
             path = ".".join(["link", *path.split(".")[1:2], "joint", *path.split(".")[2:]])
         parts = path.split(".")
