@@ -150,6 +150,31 @@ def _manoeuvre(data: Tables, joints: int) -> Manoeuvre:
     if "link" in data and "duration_s" not in data:
         raise InputError("a robot file: expected a manoeuvre file")
     _check_keys(data, _KEYS, "")
+    duration, step = _times(data)
+    drive = _drive(data, joints, duration)
+    name = data.get("name", "")
+    if not is_name(name):
+        raise InputError(
+            "expected one line of at most 200 characters without control codes",
+            key="name",
+            value=name,
+        )
+    start = data.get("start")
+    if start is not None:
+        choice(start, "start", STARTS)
+    return Manoeuvre(
+        name,
+        duration,
+        step,
+        drive,
+        start,
+        _loads(data, joints),
+        _payloads(data, duration),
+    )
+
+
+def _times(data: Tables) -> tuple[float, float]:
+    """Duration and step of the rows [s]."""
     duration = _number(
         data, "duration_s", f"a duration above 0 in seconds, at most {LONGEST:g}", low=0.0
     )
@@ -171,6 +196,11 @@ def _manoeuvre(data: Tables, joints: int) -> Manoeuvre:
         raise InputError(
             "expected at most 10 million output steps", key="output_step_s", value=step
         )
+    return duration, step
+
+
+def _drive(data: Tables, joints: int, duration: float) -> Drive:
+    """The tables [[joint]]."""
     tables = data.get("joint", [])
     if not isinstance(tables, list) or len(tables) != joints:
         count = len(tables) if isinstance(tables, list) else tables
@@ -207,25 +237,7 @@ def _manoeuvre(data: Tables, joints: int) -> Manoeuvre:
                 prescribed=_prescribed(entry, motion, key, duration),
             )
         )
-    name = data.get("name", "")
-    if not is_name(name):
-        raise InputError(
-            "expected one line of at most 200 characters without control codes",
-            key="name",
-            value=name,
-        )
-    start = data.get("start")
-    if start is not None:
-        choice(start, "start", STARTS)
-    return Manoeuvre(
-        name,
-        duration,
-        step,
-        Drive(tuple(drives)),
-        start,
-        _loads(data, joints),
-        _payloads(data, duration),
-    )
+    return Drive(tuple(drives))
 
 
 def _payloads(data: dict[str, Any], duration: float) -> tuple[PayloadChange, ...]:
