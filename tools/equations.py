@@ -8,7 +8,7 @@
 
 A numbered equation stands in a chapter as
 
-    <a id="eq-7"></a>**Name.** Source.
+    <a id="eq-7"></a>**Name.** Source. Also: other words of the field, by commas.
 
     $$
     ... \\tag{7}
@@ -44,10 +44,12 @@ HEAD = """# Table of equations
 
 `python tools/equations.py` writes this page. Do not edit it.
 
-Search this page for the field's word, such as condensation, Coulomb or anti-windup.
+Search this page for the field's word, such as condensation, Kalman or step size. Behind a name
+stand other words for it.
 
 `computed by` names what cites the equation: a function or class of `flexura`, or one of the core or
-of the firmware's library with its file. What is about this equation most stands first.
+of the firmware's library with its file. Functions stand before classes, and first what is about
+this equation most.
 `evaluated by` names the test in `tests/docs` that writes it down anew.
 
 | number | equation | computed by | evaluated by |
@@ -68,10 +70,11 @@ _DECLARED = re.compile(
 )
 _BEFORE = re.compile(r"\s*(?:template [^\n]*\n\s*)?")  # between a comment and what it is of
 _COMMENT = re.compile(r"(?:^[ \t]*//.*\n)+|//.*", re.MULTILINE)
+_ALSO = re.compile(r"(?:^|(?<=\. ))Also: ([^.]+)\.")
 
 
 class Equation(NamedTuple):
-    """A numbered equation of a chapter."""
+    """A numbered equation of a chapter. `also`: other words of the field for it."""
 
     number: int
     name: str
@@ -79,6 +82,12 @@ class Equation(NamedTuple):
     latex: str
     anchor: str
     chapter: Path
+
+    @property
+    def also(self) -> str:
+        """Other words of the field, by commas; "": none."""
+        found = _ALSO.search(self.source)
+        return found[1] if found else ""
 
 
 def chapters(root: Path = ROOT) -> list[Path]:
@@ -153,7 +162,9 @@ def comments(path: Path) -> list[tuple[str, str]]:
 
 def citations(root: Path = ROOT) -> dict[int, list[str]]:
     """By number, what computes an equation: functions and classes by name, those of C++ with their
-    file. What cites few equations stands first: it is about this one."""
+    file. Functions stand before classes, and what cites few equations first: it is about this one.
+    A file stands for itself, and last, if it cites an equation at its head and none of its
+    functions does."""
     found: dict[int, list[str]] = {}
 
     def note(text: str, name: str) -> None:
@@ -172,7 +183,21 @@ def citations(root: Path = ROOT) -> dict[int, list[str]]:
             for name, text in comments(path):
                 note(text, f"{file}: {name}" if name else file)
     count = Counter(name for names in found.values() for name in names)
-    return {number: sorted(names, key=count.__getitem__) for number, names in found.items()}
+    out = {}
+    for number, names in found.items():
+        inside = {name.partition(": ")[0] for name in names if ": " in name}
+        kept = [name for name in names if name not in inside]
+        out[number] = sorted(kept, key=lambda name: (is_file(name), _is_class(name), count[name]))
+    return out
+
+
+def _is_class(name: str) -> bool:
+    return re.split(r"[. ]", name)[-1][0].isupper()
+
+
+def is_file(name: str) -> bool:
+    """Whether a name of `citations` is that of a file alone."""
+    return "/" in name and ": " not in name
 
 
 def tested(root: Path = ROOT) -> dict[int, list[str]]:
@@ -201,7 +226,8 @@ def table(root: Path = ROOT) -> str:
         computed = ", ".join(f"`{name}`" for name in code.get(e.number, ()))
         evaluated = ", ".join(f"`{name.partition('::')[2]}`" for name in tests.get(e.number, ()))
         number = f"[({e.number})]({chapter.name}#{e.anchor})"
-        out.append(f"| {number} | {e.name} | {computed} | {evaluated} |\n")
+        name = f"{e.name}; {e.also}" if e.also else e.name
+        out.append(f"| {number} | {name} | {computed} | {evaluated} |\n")
     return "".join(out)
 
 

@@ -88,8 +88,9 @@ def simulate(
         drive: a Drive, a sampled Controller, `Sampled(f, rate_Hz)`, or a function of (t) or of (t,
             position, velocity, tip_deflection) that gives (links,) forces and torques [N or N m].
             Such a function may be called again for times within a step, never before its start,
-            and must have no memory. Or forces, one entry a joint: a number, a Signal, a function
-            of t, an array of len(t_eval) values, or None; or an array (T, joints).
+            and must have no memory. Or forces, never motions, one entry a joint: a number, a
+            Signal, a function of t, an array of len(t_eval) values, or None; or an array
+            (T, joints). Motions are in `Drive.pd`, `Drive.prescribed` and `inverse`.
         q0: configuration at the start (n,); None: see `start`.
         qd0: its rates (n,); None: at rest.
         rtol: the error that is asked for, of deflections and of a thousandth of the tip's path.

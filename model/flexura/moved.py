@@ -22,7 +22,7 @@ NEW = {
     "run": "io.run",
     "sampled": "control.sampled",
     "shaping": "signals.shaping",
-    "signal": "signals.signal",
+    "signal": "signals",
     "trials": "simulation.gain_sweep",
 }
 

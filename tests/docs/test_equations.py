@@ -38,7 +38,8 @@ def test_an_equation_is_evaluated_by_a_test(equation):
 
 @pytest.mark.parametrize("equation", EQUATIONS, ids=lambda e: str(e.number))
 def test_an_equation_is_cited_by_what_computes_it(equation):
-    assert CITATIONS.get(equation.number), f"no code cites ({equation.number}), {equation.name}"
+    named = [name for name in CITATIONS.get(equation.number, ()) if not table.is_file(name)]
+    assert named, f"no function cites ({equation.number}), {equation.name}"
 
 
 def test_the_code_cites_equations_that_there_are():
@@ -63,23 +64,57 @@ def test_citations_are_found_in_docstrings_and_comments(tmp_path):
     assert [table.cited(text) for _, text in found] == [{7, 8, 9}, {1}]
 
 
-FIELD = {  # what somebody looks for by the field's word, and where it is computed
-    "point on a bent link": "system.assembly.Assembly.line",
-    "condensation": "dynamics/piece/condensation.hpp",
-    "out of its sleeve": "system.assembly.Assembly.elastic",
-    "coulomb friction": "system.assembly.Assembly.coulomb",
-    "exponential predictor": "integration/exponential/predictor_corrector.hpp",
-    "pid with anti-windup": "control.pid.PID",
-    "stop at a limit": "integration/joint_limits.hpp",
-    "payload with its rotary inertia": "system.structure.Structure.masses",
+FIELD = {  # what somebody looks for by a word of the field, and where it is computed
+    "point on a bent link": "dynamics/piece/kinematics.hpp: tip_columns",
+    "condensation": "dynamics/piece/condensation.hpp: eliminate",
+    "out of its sleeve": "dynamics/piece/sleeve.hpp: sleeve_force_row",
+    "coulomb friction": "dynamics/friction.hpp: coulomb_friction",
+    "exponential predictor": "integration/exponential/predictor_corrector.hpp: predict",
+    "anti-windup": "firmware/lib/control/src/pid.h: update",
+    "stop at a limit": "integration/time_loop.hpp: stop_at_limit",
+    "payload with its rotary inertia": "link/piece_draft.hpp: add_payload",
+    "guyan": "dynamics/piece/condensation.hpp: eliminate",
+    "articulated-body": "dynamics/forward_dynamics.hpp: eliminate_joint",
+    "foreshortening": "system.kinematics.line",
+    "shape functions": "link.line.mesh",
+    "assumed modes": "link.modes.clamped_modes",
+    "tip mass": "link/piece_draft.hpp: add_payload",
+    "proportional damping": "robot.damping.rayleigh",
+    "coriolis and": "system.assembly.Assembly.bias",
+    "newton-raphson": "system.statics.equilibrium",
+    "eigenfrequencies": "statics_and_modes/natural_modes.hpp: natural_modes",
+    "lanczos": "statics_and_modes/natural_modes.hpp: lowest_modes",
+    "linearization": "statics_and_modes/linearization.hpp: linearise",
+    "dry friction": "dynamics/friction.hpp: coulomb_friction",
+    "back-emf": "control.pid.Motor",
+    "computed torque": "dynamics/inverse_dynamics.hpp: forces",
+    "low-pass filter": "control.controller.filter_coefficient",
+    "lqr": "control.linear_quadratic.riccati.riccati",
+    "kalman": "control.linear_quadratic.gaussian_design.gaussian_design",
+    "input shaping": "signals.shaping.zv",
+    "dormand-prince": "integration/runge_kutta/dop853.hpp: look",
+    "step size": "integration/method.hpp: next",
+    "rosenbrock": "simulation/copies.hpp: advance",
+    "adams-bashforth": "integration/exponential/predictor_corrector.hpp: predict",
+    "dense output": "integration/exponential/dense_output.hpp: at",
+    "matrix exponential": "simulation.dense.propagator.Modes._double",
+    "energy error": "simulation.recorder.energy_error",
+    "elastic joint": "robot.joint.Transmission",
+    "iterative learning": "control.ilc.LearningLaw.update",
+    "gain margin": "control.linear_quadratic.loop_figures.LoopMargins",
+    "follower force": "signals.load.Load",
+    "pick-up": "system.loads.impact",
+    "bearing force": "system.balance.cuts.Balance.reaction",
+    "shear force": "system.balance.cuts.Balance.section",
+    "disturbance estimate": "firmware/lib/control/src/disturbance_observer.h: update",
 }
 
 
 @pytest.mark.parametrize("word", FIELD)
 def test_an_equation_is_found_by_the_fields_word_in_two_look_ups(word):
-    """The word is in a name or two of the table; the row names what computes the equation."""
-    found = [e.number for e in EQUATIONS if word in e.name.lower()]
-    assert 1 <= len(found) <= 2
+    """The word is in three rows of the table at most; one names what computes the equation."""
+    found = [e.number for e in EQUATIONS if word in f"{e.name}; {e.also}".lower()]
+    assert 1 <= len(found) <= 3
     assert any(FIELD[word] in CITATIONS[number] for number in found)
 
 

@@ -297,7 +297,11 @@ def shown(run):
     population = fx.simulate(batch, np.linspace(0, 0.02, 3))
     odd = ARM.replace({"name": "<b>arm</b> [/] " + "x" * 100})
     coded = fx.Run(run.t, run.channels, run.units, {"robot": {"name": "\x1b[31m\n" + "x" * 100}})
-    return [run, ARM, long, odd, coded, system, fx.assemble(odd), fx.linearize(system), population]
+    drives = fx.Drive.pd([fx.signals.cycloid(0.8, 1.0), np.sin, 0.3] * 7, 100, 4)
+    asked = fx.load_manoeuvre("rig-step", 2)
+    inside = [fx.internal_forces(ARM), fx.internal_forces(long)]
+    models = [system, fx.assemble(odd), fx.linearize(system)]
+    return [run, ARM, long, odd, coded, *models, population, drives, asked, *inside]
 
 
 def test_twelve_lines_of_eighty_columns_and_a_table(run):
@@ -310,6 +314,26 @@ def test_twelve_lines_of_eighty_columns_and_a_table(run):
         assert type(thing).__name__ in html.text
     assert str(ARM) == repr(ARM)
     assert "<b>arm</b>" in Table(shown(run)[3]._repr_html_()).text
+
+
+def test_a_drive_says_what_each_joint_does():
+    motions = [fx.signals.cycloid(0.8, 1.0), np.sin]
+    assert repr(fx.Drive.pd(motions, [100, 20], 4)).splitlines() == [
+        "Drive of 2 joints",
+        "  joint 1  kp 100, kd 4 on cycloid(end=0.8, duration_s=1, start=0, at_s=0)",
+        "  joint 2  kp 20, kd 4 on function(name=sin)",
+    ]
+    force = fx.Drive((fx.JointDrive(force=2.0, motion=0.1, prescribed=True), fx.JointDrive()))
+    assert repr(force).splitlines()[1:] == [
+        "  joint 1  force constant(value=2); follows constant(value=0.1)",
+        "  joint 2  free",
+    ]
+
+
+def test_internal_forces_say_what_the_joints_bear():
+    lines = repr(fx.internal_forces(ARM)).splitlines()
+    reaction = fx.internal_forces(ARM).reaction(1)
+    assert f"{reaction.force.imag:.4g} N, moment {reaction.moment:.4g} N m" in lines[1]
 
 
 def test_a_run_says_what_it_holds(run):

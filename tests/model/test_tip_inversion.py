@@ -165,6 +165,18 @@ def test_postures_have_their_tip_where_it_should_be():
         fx.inverse_kinematics(heavy, (0.7, 0.0), joints=[0.2, 0.8])
 
 
+@pytest.mark.parametrize("tip", [(0.3, 0.4), (-0.3, 0.5), (0.6, -0.6), (0.0, 0.1)])
+def test_a_stretched_arm_begins_with_its_elbow_to_the_left(tip):
+    q = fx.inverse_kinematics("two-link-arm", tip)
+    assert fx.tip_pose("two-link-arm", q)[:2] == pytest.approx(tip, abs=1e-12)
+    assert q[fx.assemble("two-link-arm").joint_rows[1]] > 0
+
+
+def test_a_place_out_of_reach_is_named_as_it_was_asked_for():
+    with pytest.raises(FlexuraError, match="with the tip at 99, 0: it is out of reach"):
+        fx.inverse_kinematics("two-link-arm", (99, 0))
+
+
 def test_the_mesh_holds_polynomials_and_their_derivatives():
     mesh = Mesh(np.array([0.0, 0.1, 0.25, 0.3, 0.5, 0.8, 1.0]))
     f = lambda t: np.column_stack([t**5 - t**2, 3 * t**4])

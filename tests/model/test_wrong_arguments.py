@@ -190,3 +190,46 @@ def test_every_public_function_is_tried():
 def test_the_good_arguments_are_good():
     for function, good in CALLS.values():
         function(**good)
+
+
+@pytest.mark.parametrize("place", [None, 3, ["a"]])
+def test_a_place_that_is_no_path_is_named(place):
+    run = fx.Run(np.zeros(2) + [0, 1], {"a": np.zeros(2)}, {"a": "m"})
+    robot = fx.load(RIG)
+    calls = {
+        "folder": lambda: run.save(place),
+        "path": lambda: fx.save(robot, place),
+        "out": lambda: run.animate(place),
+    }
+    for key, call in calls.items():
+        with pytest.raises(fx.InputError, match="expected a path") as caught:
+            call()
+        assert caught.value.key == key
+    with pytest.raises(fx.InputError, match="channel = 3: expected a name"):
+        run.plot(3)
+    with pytest.raises(fx.InputError, match="robot: expected a Robot"):
+        fx.save(None, "a.toml")
+    with pytest.raises(fx.InputError, match="folder"):
+        fx.Run.read(place)
+
+
+def test_what_is_no_table_and_no_key_of_a_robot_is_named():
+    robot = fx.load(RIG)
+    with pytest.raises(fx.InputError, match="changes = 3: expected values by key"):
+        robot.replace(3)
+    for call in (lambda: robot.value(3), lambda: robot.replace({3: 1.0})):
+        with pytest.raises(fx.InputError, match="key = 3: expected the key of a value"):
+            call()
+    with pytest.raises(fx.InputError, match="data = 3: expected the tables of a robot file"):
+        fx.Robot.from_dict(3)
+
+
+def test_drives_where_motions_are_expected_and_manoeuvres_where_drives_are():
+    t, one = np.linspace(0, 0.1, 3), "single-r"
+    drive = fx.Drive.prescribed(0.1)
+    with pytest.raises(fx.InputError, match="motion = 'Drive': expected motions, one entry"):
+        fx.inverse(one, t, drive)
+    asked = fx.load_manoeuvre("rig-step", 2)
+    for call in (fx.simulate, fx.inverse):
+        with pytest.raises(fx.InputError, match="= 'Manoeuvre': expected"):
+            call("rig", t, asked)

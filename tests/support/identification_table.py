@@ -16,7 +16,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from flexlab.identification.identify import Identified, identify
+from flexlab.identification.identify_rig import Identified, identify
 from rigs import excited
 
 FACTORS = {"stiffness": "stiffness", "damping": "damping", "payload": "payload"}

@@ -51,6 +51,10 @@ COMMANDS = {
 class Commands(TyperGroup):
     """A group whose commands stand in modules of the same name beside this one."""
 
+    def __init__(self, **keys: Any) -> None:
+        super().__init__(**keys)
+        self.commands = dict.fromkeys(COMMANDS)  # type: ignore[assignment]  # for "Did you mean"
+
     def list_commands(self, ctx: Any) -> list[str]:
         """The names, in the order of a project's life."""
         return list(COMMANDS)

@@ -302,7 +302,7 @@ def recover(
     Example: flexura bench recover logs/forward-20260101-120000
     """
     run = run_from_recording(folder)
-    path = run.save(folder)
+    path = run.save(folder, overwrite=True)
     if json:
         print_results(
             True,
@@ -413,7 +413,7 @@ def _recover_beside(folder: Path, json: bool) -> None:
         ) as error:  # nothing was received, or it is damaged: that is no reason not to start
             typer.echo(f"not recovered: {error}", err=True)
             continue
-        run.save(left)
+        run.save(left, overwrite=True)
         typer.echo(
             f"recovered {left}: {len(run)} rows that a host which ended without a word had "
             f"received",

@@ -105,15 +105,25 @@ def crosscheck(
         f"stored {folder}",
         f"look at it: flexura review {folder / 'simulation'} {folder / 'twin'}",
     )
+    _advise(check, tolerance)
+    if not check.passed:
+        raise typer.Exit(130 if stopped else 1)
+
+
+def _advise(check: cross.Check, tolerance: float) -> None:
+    """Say which channels are too far apart, and what may bring them together."""
     if check.failed:
         warn(f"beyond the tolerance of {100 * tolerance:g} %: {', '.join(check.failed)}")
+        own = [link.get("elements", 0) for link in check.simulation.meta["robot"]["link"]]
+        if any(
+            0 < mesh < twin for mesh, twin in zip(own, check.twin.meta["elements"], strict=True)
+        ):
+            warn("the twin's mesh is finer: more elements in the robot file may bring both closer")
     if check.open:
         warn(
             f"open: {', '.join(check.open)}; the twin's own error may explain the deviation; "
             f"give it a step below {check.twin.meta['step_s']:.3g} s (--step-s)"
         )
-    if not check.passed:
-        raise typer.Exit(130 if stopped else 1)
 
 
 def _crosscheck_all(out: Path | None, force: bool, json: bool) -> None:

@@ -11,7 +11,7 @@ import flexura as fx
 
 from ..comparison import table as compared
 from ..identification import files, output
-from ..identification.identify import identify as identified
+from ..identification.identify_rig import identify as identified
 from .identify_robot import asked_of, identify_asked
 from .options import ForceFile, Json
 from .output import message, print_results, progress_bars, warn

@@ -54,6 +54,9 @@ def asked_of(paths: Sequence[Path], fit: Sequence[str]) -> Asked | None:
         return None
     if not runs:
         raise fx.InputError("expected a run or more after ROBOT", key="RUN")
+    if late := [path for path in runs if path.suffix == ".toml"]:
+        expected = "expected runs here: the robot file stands before them"
+        raise fx.InputError(expected, key="RUN", value=str(late[0]))
     if not words:
         raise fx.InputError(
             "expected what to fit, as --fit payload.mass_kg --fit link.1.damping.beta_s",
@@ -163,7 +166,7 @@ def _written(found: Identification, out: Path | None, home: Path) -> tuple[list[
     beside = path.with_name(f"{path.stem}-report.json")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        fx.save(found.robot, path)
+        fx.save(found.robot, path, overwrite=True)
         write_text(beside, json_.dumps(report.numbers(found), indent=1) + "\n")
     except (fx.InputError, OSError) as error:
         return [], f"{path} is not written: {error}"

@@ -37,7 +37,7 @@ def import_robot(
     with file_result(None if look else target, force=force):
         found = read_urdf(file, sections)
         if not look:
-            fx.save(found.robot, target)
+            fx.save(found.robot, target, overwrite=True)
     about = data(found) | ({} if look else {"file": str(target)})
     print_results(json, lambda: table(found, file), lambda: about)
     if not look:

@@ -16,8 +16,8 @@ from .. import rig as rigs
 from ..experiment import run_experiment as steps
 from ..experiment.plan import gains as read_gains
 from ..experiment.stop_requests import watch_for_stop
-from ..identification.identify import Identified
-from ..identification.identify import identify as identified
+from ..identification.identify_rig import Identified
+from ..identification.identify_rig import identify as identified
 from ..learning import output
 from ..learning.board_trials import BoardTrials
 from ..learning.learn import Learned, Trial

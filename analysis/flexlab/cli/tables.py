@@ -188,9 +188,10 @@ def frequency_tables(
     )
     for k in range(max(len(locked), len(free))):
         table.add(str(k + 1), *(number(f[k], 5) if k < len(f) else "" for f in (locked, free)))
-    table.notes.append(
-        "frequencies near the highest of a mesh are the mesh's: more elements show which stay"
-    )
+    if len(locked):
+        table.notes.append(
+            "frequencies near the highest of a mesh are the mesh's: more elements show which stay"
+        )
     return [table, *([_zero_table(zeros)] if zeros else [])]
 
 

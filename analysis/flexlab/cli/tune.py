@@ -144,51 +144,32 @@ def tune(
     need("pymoo", "matplotlib")
     if dissertation:
         own = (robot, manoeuvre, controller, free, free_file, rig)
-        for key, one in zip(_OWN, own, strict=True):
-            if one:
-                raise fx.InputError(
-                    "expected --dissertation without it: it brings its own",
-                    key=key,
-                    value=str(one),
-                )
+        _refuse_own(dict(zip(_OWN, own, strict=True)))
         _cases(how, out, scheduler, jobs, json)
         return
     if robot is None or manoeuvre is None or controller is None:
+        three = {"ROBOT": robot, "MANOEUVRE": manoeuvre, "--controller": controller}
         raise fx.InputError(
-            "expected ROBOT, MANOEUVRE and --controller GAINS, or --dissertation",
-            key="ROBOT",
-            value=str(robot),
+            "missing: expected ROBOT, MANOEUVRE and --controller GAINS, or --dissertation",
+            key=next(key for key, given in three.items() if given is None),
         )
-    described, given = fx.load(robot), load_controller(controller)
-    if rig is not None:
-        if isinstance(given, Designed):
-            expected = "expected without --rig: a designed controller has forces and torques"
-            raise fx.InputError(expected, key="--rig", value=str(rig))
-        described, outputs = with_nominal_drives(described, rigs.load(rig))
-        given = Gains(given.settings, outputs, given.file)
-    asked = fx.load_manoeuvre(manoeuvre, len(described.links))
-    asked.refuse_payloads("a controller's memory would begin anew at the impact")
-    if free_file:
-        free_gains = freedom.read(free_file)
-    elif free:
-        free_gains = [freedom.from_option(f) for f in free]
-    elif isinstance(given, Designed):
-        free_gains = default_bounds(given)
-    else:
-        free_gains = freedom.default_bounds(given)
-    weights = Weights(vibration, effort, overshoot)
-    robots = perturbed_robots(
-        described,
-        _factors(payload_factors, "--payload-factors"),
-        _factors(stiffness_factors, "--stiffness-factors"),
+    described, given = _controlled(robot, controller, rig)
+    task = _task(
+        perturbed_robots(
+            described,
+            _factors(payload_factors, "--payload-factors"),
+            _factors(stiffness_factors, "--stiffness-factors"),
+        ),
+        _set_points(manoeuvre, described),
+        given,
+        (
+            tuple(_free(free, free_file, given)),
+            Weights(vibration, effort, overshoot),
+            algorithm == "nsga2",
+            rtol,
+            modes,
+        ),
     )
-    chosen = (tuple(free_gains), weights, algorithm == "nsga2", rtol, modes)
-    task = (
-        DesignedTask(robots, asked, given, *chosen)
-        if isinstance(given, Designed)
-        else Task(robots, asked, given, *chosen)
-    )
-    task.controllers  # noqa: B018 - refuses what can't be before anything is written
     folder = continued(out, "tune", robot.stem, manoeuvre.stem, mark=FILE)
     history = History.open(folder, task.digest(how.identity()))
     if history.stored:
@@ -201,6 +182,76 @@ def tune(
     if not len(history):
         raise typer.Exit(130)
     found = results.result(task, how, history, complete)
+    on_board = not isinstance(given, Designed) and set(given.settings) <= set(BOARD)
+    _stored(found, folder, None if on_board else f"{robot} {manoeuvre}", json)
+    if not complete:
+        raise typer.Exit(130)
+
+
+_OWN = ("ROBOT", "MANOEUVRE", "--controller", "--free", "--free-file", "--rig")
+
+
+def _refuse_own(given: dict[str, Any]) -> None:
+    """Refuse what the dissertation's cases bring themselves."""
+    for key, value in given.items():
+        if value:
+            expected = "expected --dissertation without it: it brings its own"
+            raise fx.InputError(expected, key=key, value=str(value))
+
+
+def _controlled(
+    robot: Path, controller: Path, rig: Path | None
+) -> tuple[fx.Robot, Gains | Designed]:
+    """The robot, with a rig's drives, and the controller that is tuned."""
+    described, given = fx.load(robot), load_controller(controller)
+    if rig is None:
+        return described, given
+    if isinstance(given, Designed):
+        expected = "expected without --rig: a designed controller has forces and torques"
+        raise fx.InputError(expected, key="--rig", value=str(rig))
+    described, outputs = with_nominal_drives(described, rigs.load(rig))
+    return described, Gains(given.settings, outputs, given.file)
+
+
+def _set_points(manoeuvre: Path, robot: fx.Robot) -> fx.Manoeuvre:
+    """The manoeuvre whose motions a controller follows."""
+    asked = fx.load_manoeuvre(manoeuvre, len(robot.links))
+    asked.refuse_payloads("a controller's memory would begin anew at the impact")
+    return asked
+
+
+def _free(
+    options: list[str] | None, file: Path | None, given: Gains | Designed
+) -> list[freedom.FreeGain]:
+    """The settings that are searched, with their bounds."""
+    if file:
+        return freedom.read(file)
+    if options:
+        return [freedom.from_option(option) for option in options]
+    if isinstance(given, Designed):
+        return default_bounds(given)
+    return freedom.default_bounds(given)
+
+
+def _task(
+    robots: tuple[fx.Robot, ...],
+    asked: fx.Manoeuvre,
+    given: Gains | Designed,
+    chosen: tuple[Any, ...],
+) -> Task | DesignedTask:
+    """What is to be minimised; refuses what can't be before anything is written."""
+    task = (
+        DesignedTask(robots, asked, given, *chosen)
+        if isinstance(given, Designed)
+        else Task(robots, asked, given, *chosen)
+    )
+    task.controllers  # noqa: B018
+    return task
+
+
+def _stored(found: results.TuningResult, folder: Path, simulated: str | None, json: bool) -> None:
+    """Store what was found, print it, and say how to use it: by `flexura simulate` with the robot
+    and the manoeuvre `simulated`, or on the board."""
     with replacing(folder) as draft:
         paths = [folder / path.relative_to(draft) for path in results.save(found, draft)]
     print_results(
@@ -211,15 +262,10 @@ def tune(
     message(
         json,
         f"stored {folder}: {', '.join(path.name for path in paths)}",
-        f"use it: flexura bench step --gains {paths[0]}"
-        if not isinstance(given, Designed) and set(given.settings) <= set(BOARD)
-        else f"use it: flexura simulate {robot} {manoeuvre} --controller {paths[0]}",
+        f"use it: flexura simulate {simulated} --controller {paths[0]}"
+        if simulated
+        else f"use it: flexura bench step --gains {paths[0]}",
     )
-    if not complete:
-        raise typer.Exit(130)
-
-
-_OWN = ("ROBOT", "MANOEUVRE", "--controller", "--free", "--free-file", "--rig")
 
 
 def _cases(

@@ -22,7 +22,7 @@ import flexura as fx
 from flexura.errors import InputError
 from flexura.io import called, kind
 
-from ..runs.deviation import compared, deviation, deviations, interpolate
+from ..runs.deviation import deviation, deviations, interpolate, shared
 
 RESPONSE_LEVEL = 0.9  # of the largest distance, for the response time
 LONGEST_DELAY_S = 0.25
@@ -168,8 +168,8 @@ def quantity(channel: str) -> str:
 
 def _usual(first: fx.Run, second: fx.Run) -> list[str]:
     """Joint variables and tip displacements that both runs have, else all that both have."""
-    shared = [name for name in compared(first, second) if name in first]
-    names = [name for name in shared if _COMPARED.fullmatch(name)] or shared
+    both = shared(first, second)
+    names = [name for name in both if _COMPARED.fullmatch(name)] or both
     if not names:
         raise InputError(
             f"expected two runs with a channel in common, in one unit; the first has: "

@@ -82,6 +82,12 @@ def notes(c: Comparison) -> list[str]:
     ]
     if way := c.simulation.meta.get("driven_by"):
         lines.append(f"simulation {DRIVEN[way]} (--by {way})")
+    truth = c.experiment.meta.get("truth", {}).get("factors", {})
+    if way and any(factor != 1 for factor in truth.values()):
+        lines.append(
+            "the emulated rig is not quite its files, as a real one: friction, damping, payload "
+            "and sensor are others; flexura bench excite and flexura identify find them"
+        )
     far = any(d.max_relative > _FAR for d in c.differences if d.channel.startswith("joint/"))
     if way == "commanded" and far:
         lines.append(

@@ -258,7 +258,8 @@ def conduct(
     finally:
         recording.close()
     run = run_from_recording(folder)
-    run.save(folder)
+    # what a host that recovers recordings beside its own has made of this one is replaced
+    run.save(folder, overwrite=True)
     if recording.failed is not None and ended.complete:
         raise recording.failed
     return ExperimentResult(run, folder, findings, ended)

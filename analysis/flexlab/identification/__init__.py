@@ -1,6 +1,10 @@
-"""Identification: parameters with their intervals, of a rig from its experiment, and of any robot
-from runs of it."""
+"""Identification: parameters with their intervals.
 
-from .fit.identify import Identification, Quantity, identify_robot
+`identify_rig` is for a robot on a rig, from the rig's own experiment: motors, friction, play and
+the sensor have models of their own. `fit` is for any robot, from any runs of it, and fits what is
+named. Both minimise by `estimate`'s least squares; the command `flexura identify` has both.
+"""
+
+from .fit.identify_robot import Identification, Quantity, identify_robot
 
 __all__ = ["Identification", "Quantity", "identify_robot"]

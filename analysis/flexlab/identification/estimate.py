@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 NORMAL_95 = 1.959964
+HALF = 0.5  # of a variance
 AT_BOUND = 1e-3  # of the range between the bounds: nearer counts as at the bound
 
 
@@ -46,7 +47,8 @@ class Estimate:
     """Result of a fit with k parameters.
 
     `values`: by name. `covariance` (k, k): of the scaled values. `residuals` (s, T): by series.
-    `derivatives` (k, s, T): of the residuals by the scaled values.
+    `derivatives` (k, s, T): of the residuals by the scaled values. `of_inputs` (k, k): the part of
+    the covariance that the noise of measured inputs makes.
     """
 
     parameters: tuple[Parameter, ...]
@@ -55,6 +57,14 @@ class Estimate:
     residuals: np.ndarray
     derivatives: np.ndarray
     evaluations: int
+    of_inputs: np.ndarray | None = None
+
+    @property
+    def mostly_of_inputs(self) -> np.ndarray:
+        """Whether more than half of a value's variance comes from the inputs' noise (k,)."""
+        if self.of_inputs is None:
+            return np.zeros(len(self.parameters), dtype=bool)
+        return np.asarray(np.diag(self.of_inputs) > HALF * np.diag(self.covariance))
 
     def with_model_uncertainty(self, change: np.ndarray) -> Estimate:
         """Add the covariance due to an uncertainty of the model.
@@ -174,11 +184,25 @@ def estimate(
 def covariance(J: np.ndarray, residuals: np.ndarray, correlation_samples: int) -> np.ndarray:
     """Covariance (k, k) of the scaled values.
 
+    NaN for values that nothing depends on; infinite for what cannot be told apart.
+
     Args:
         J: derivatives (k, s, T).
         residuals: (s, T).
         correlation_samples: the largest lag m.
     """
+    there = np.einsum("ist,ist->i", J, J) > 0
+    out = np.full((len(J), len(J)), np.nan)
+    if there.any():
+        try:
+            out[np.ix_(there, there)] = _covariance(J[there], residuals, correlation_samples)
+        except np.linalg.LinAlgError:
+            out[np.ix_(there, there)] = np.inf
+    return out
+
+
+def _covariance(J: np.ndarray, residuals: np.ndarray, correlation_samples: int) -> np.ndarray:
+    """The same where each value has an effect."""
     scores = (J * residuals).sum(axis=1)  # (k, T)
     score_covariance = scores @ scores.T
     for lag in range(1, min(correlation_samples, scores.shape[1] - 1) + 1):

@@ -22,7 +22,7 @@ from ..rig.description import Rig
 from ..rig.plant.motor import resistance
 from ..rig.sensors import Calibration
 from ..rig.toml_table import named_file
-from .identify import Identified
+from .identify_rig import Identified
 from .strip import with_parameters
 
 CALIBRATION_POINTS = 400  # of the simulated course that the calibration is fitted to

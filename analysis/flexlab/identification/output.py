@@ -17,7 +17,7 @@ from ..runs.formatting import finite, number, percent
 from ..runs.table import Table
 from .estimate import Estimate
 from .files import with_identified_files
-from .identify import Identified
+from .identify_rig import Identified
 from .strip import BEARING
 
 CONTRADICTS = 0.2  # of a viscous part: further off, data sheet and run do not agree

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..identification.identify import Identified
+from ..identification.identify_rig import Identified
 from ..rig.axes import Friction, MotorAxis
 
 EXTREME = 100.0  # logarithm of a factor: beyond any range

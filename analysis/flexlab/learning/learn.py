@@ -16,7 +16,7 @@ from flexura.errors import FlexuraError, InputError
 
 from ..experiment.plan import Plan
 from ..experiment.run_experiment import ExperimentResult, RefusedToStart
-from ..identification.identify import Identified, identify
+from ..identification.identify_rig import Identified, identify
 from ..rig import Check
 from ..rig.axes import motor_axes
 from .knowledge import Knowledge
@@ -248,7 +248,7 @@ def _judged(task: Task, trial: Trial, observer: Observer, rig: Rig) -> Trial:
     meta = run.meta | {"learning": run.meta.get("learning", {}) | numbers_of(trial)}
     units = run.units | dict.fromkeys(padded, "m")
     made = dataclasses.replace(run, channels=run.channels | padded, units=units, meta=meta)
-    made.save(trial.folder)
+    made.save(trial.folder, overwrite=True)
     return dataclasses.replace(trial, run=made)
 
 

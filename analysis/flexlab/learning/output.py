@@ -9,7 +9,7 @@ import numpy as np
 
 from flexura.io import write_bytes, write_toml
 
-from ..identification.identify import Identified
+from ..identification.identify_rig import Identified
 from ..rig import RigSetup
 from ..rig.axes import motor_axes
 from ..rig.board_axes import board_axes

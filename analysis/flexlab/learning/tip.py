@@ -6,7 +6,7 @@ import numpy as np
 
 import flexura as fx
 
-from ..identification.identify import Identified
+from ..identification.identify_rig import Identified
 from ..identification.strip import StripModel
 
 CORRECTED_HZ = 8.0  # of what the sensor says beyond the model

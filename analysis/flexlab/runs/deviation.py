@@ -80,9 +80,14 @@ def deviations(first: Run, second: Run, channels: Iterable[str] | None = None) -
 def compared(first: Run, second: Run) -> list[str]:
     """The channels of the default comparison that both runs have in the same unit, in the first
     run's order; without any of them, all channels that both runs have so."""
-    shared = [name for name in first if name in second and first.units[name] == second.units[name]]
-    usual = [name for name in shared if _COMPARED.fullmatch(name)]
-    return (usual or shared) + ([TIP_DISTANCE] if {"tip/x", "tip/y"} <= set(usual) else [])
+    both = shared(first, second)
+    usual = [name for name in both if _COMPARED.fullmatch(name)]
+    return (usual or both) + ([TIP_DISTANCE] if {"tip/x", "tip/y"} <= set(usual) else [])
+
+
+def shared(first: Run, second: Run) -> list[str]:
+    """The channels that both runs have in the same unit, in the first run's order."""
+    return [name for name in first if name in second and first.units[name] == second.units[name]]
 
 
 def common(first: Run, second: Run) -> np.ndarray:

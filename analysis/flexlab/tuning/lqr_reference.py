@@ -151,7 +151,7 @@ def tune_lqr_baseline(
     controller = designs.controller(values)
     run = fx.simulate(fx.assemble(structure.robot), structure.manoeuvre.t, controller, rtol=RTOL)
     run.meta["manoeuvre"] = structure.manoeuvre.name
-    run.save(folder / "best")
+    run.save(folder / "best", overwrite=True)
     weights = {f.name: float(v) for f, v in zip(designs.free, values, strict=True)}
     return LqrBaseline(
         float(history.all("goals").min()),

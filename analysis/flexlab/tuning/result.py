@@ -121,10 +121,11 @@ def save(found: TuningResult, folder: Path) -> list[Path]:
     front/gains-NN.toml."""
     paths = [folder / "gains.toml", folder / "best", folder / "history"]
     found.gains.write(paths[0])
-    found.runs[0].save(paths[1])
+    found.runs[0].save(paths[1], overwrite=True)
     task, history = found.task, found.history
     values = task.values(history.all("points"))
-    history.run([f.name for f in task.free], values, task.objectives, found.meta()).save(paths[2])
+    whole = history.run([f.name for f in task.free], values, task.objectives, found.meta())
+    whole.save(paths[2], overwrite=True)
     if task.pareto:
         for number, k in enumerate(history.pareto_front(), 1):
             task.tuned(values[k]).write(folder / "front" / f"gains-{number:02d}.toml")

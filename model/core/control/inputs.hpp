@@ -82,7 +82,7 @@ struct Inputs {
     return d.sampled ? evaluate(held.motion[joint], t) : evaluate(d.motion, t);
   }
 
-  // The force of joint i that does not depend on the state: signal and what is held.
+  // The force of joint i in (58) that does not depend on the state: signal and what is held.
   double force(int joint, double t) const {
     return evaluate(joints[joint].force, t).y + held.force[joint];
   }

@@ -24,7 +24,7 @@ struct Motion {
   double y, yd, ydd;
 };
 
-// A segment at time t, whether it holds there or not.
+// A segment (60) at time t, whether it holds there or not.
 inline Motion evaluate(const Segment &g, double t) {
   const double s = t - g.t0, *c = g.c;
   Motion m;

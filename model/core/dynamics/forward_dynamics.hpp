@@ -1,9 +1,10 @@
 // Forward dynamics of a chain (44) to (47) in time proportional to its length: three sweeps over
 // its pieces.
 //
-//   outward   angles, rates, places of the joints kinematics.hpp inward    the wrench that moves a
-//   hub, A u + b: a piece's rows, its own unknowns and its joint eliminated condensation.hpp,
-//   sleeve.hpp outward   accelerations of joints and elastic unknowns
+// 1. Outward (kinematics.hpp): angles, rates and places of the joints.
+// 2. Inward (condensation.hpp, sleeve.hpp): the wrench A u + b that moves a hub. Of a piece's rows
+//    its own unknowns and its joint are eliminated.
+// 3. Outward: accelerations of joints and elastic unknowns.
 #pragma once
 #include "dynamics/piece/mass_proportional_damping.hpp"
 
@@ -19,8 +20,8 @@ struct Held {
       *reaction;  // (links) drive forces of held joints; friction that is not in `damping` left out
 };
 
-// The joint of a piece: its motion is along s (for a sleeve the flow), coupled with the hub's
-// acceleration by `pull`.
+// The joint of a piece (47): its motion is along s (for a sleeve the flow), coupled with the hub's
+// acceleration by `pull`. What is left is the articulated inertia of what is beyond.
 template <class Real>
 inline void eliminate_joint(const Model<Real> &model, const Piece<Real> &c, PieceState<Real> &k,
                             const Stage<Real> &stage, const Real &force, const Held<Real> &hold,
@@ -66,7 +67,7 @@ inline void own_accelerations(const Piece<Real> &c, const PieceState<Real> &k, c
   }
 }
 
-// The acceleration of the place where the next piece sits, from the columns of kinematics.hpp.
+// The acceleration of the place where the next piece sits (44), from the columns of kinematics.hpp.
 template <class Real>
 inline Vec3<Real> next_hub(const Piece<Real> &c, const PieceState<Real> &k, const Vec3<Real> &u,
                            const Real &flow, const Real *a) {

@@ -96,9 +96,9 @@ Vec3<Real> inertial_sleeve(const Piece<Real> &c, const PieceState<Real> &k, cons
           product(rows.row[0], 0) + rows.x[0] * u.x + rows.y[0] * u.y};
 }
 
-// The n forces of a motion: M a + h(q, v), plus what `terms` names of stiffness, damping and (taken
-// off) gravity. With v = 0 and no terms: M times a vector. `moved`: outward_kinematics was called
-// at (y, v) already.
+// The n forces of a motion (59): M a + h(q, v), plus what `terms` names of stiffness, damping and
+// (taken off) gravity. With v = 0 and no terms: M times a vector. `moved`: outward_kinematics was
+// called at (y, v) already.
 template <class Real>
 void forces(const Model<Real> &model, Workspace<Real> &work, const Real *y, const Real *v,
             const Real *a, const Terms &terms, Real *out, bool moved = false) {

@@ -59,8 +59,8 @@ class ErrorNorm {
   const Sizes &sizes() const { return largest; }
   void resume(const Sizes &from) { largest = from, renew(); }
 
-  // Sizes with the state z too; `weight` is 1 / tolerance of each number of a state. Where `look`
-  // is 1 also with its energy, which takes as long as a pass.
+  // Sizes (81) with the state z too; `weight` is 1 / tolerance of each number of a state. Where
+  // `look` is 1 also with its energy, which takes as long as a pass.
   void grow(const Real *z, const Real &look) {
     const Sizes before = largest;
     Real way = 0.0, fast = 0.0;
@@ -89,7 +89,7 @@ class ErrorNorm {
   }
 
   // The worst group of an error e (2 n + ACCOUNTS) of a step to znew, over its tolerance (82).
-  // What is   // not a number stays so.
+  // What is not a number stays so.
   Real norm(const Real *e, const Real *znew) const {
     const Real joule = joules(znew);
     Real most = 0.0;

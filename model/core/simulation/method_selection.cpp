@@ -26,9 +26,10 @@ bool MethodSelection::advance(long steps) {
   return loop.any();
 }
 
-// Are the methods to be compared again, at `progress` seconds a pass?
+// Are the methods to be compared again, at `progress` seconds a pass: is it slower, or is the rest
+// long?
 bool MethodSelection::due(double progress) {
-  if (progress * SLOWER < speed) return slower(progress);
+  if (slower(progress)) return true;
   const double left = loop.run_state[0].end - loop.run_state[0].t;
   if (left < LONG * progress || since_comparison() < patience) return false;
   patience *= 2;

@@ -27,10 +27,10 @@ struct Equilibrium {
   Vec3<double> tip{0, 0, 0};  // place [m] and angle [rad] of the last tip
 };
 
-// The equilibrium with the joints at their positions in q (n), its elastic unknowns put into q.
-// They are 0 on entry, or a first guess for the full load (to choose a branch). `free` (links) or
-// null: revolute joints that turn until nothing turns them, from their position in q; sliders and
-// sleeves are held. A free joint that nothing holds makes the answer unstable. Gravity is the
+// The equilibrium (50) with the joints at their positions in q (n), its elastic unknowns put into
+// q. They are 0 on entry, or a first guess for the full load (to choose a branch). `free` (links)
+// or null: revolute joints that turn until nothing turns them, from their position in q; sliders
+// and sleeves are held. A free joint that nothing holds makes the answer unstable. Gravity is the
 // model's.
 Equilibrium equilibrium(const Model<double> &model, double *q, const TipLoad &load = {},
                         const char *free = nullptr);

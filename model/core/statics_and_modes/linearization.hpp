@@ -15,8 +15,9 @@ struct Linear {
   std::vector<double> acceleration, by_position, by_rate, by_force;
 };
 
-// About the state (q, v) under the forces `force` (n) of joints and on elastic unknowns; gravity,
-// damping and viscous friction included. `held` (links) or null: joints that do not move.
+// The derivatives (52) about the state (q, v) under the forces `force` (n) of joints and on elastic
+// unknowns; gravity, damping and viscous friction included. `held` (links) or null: joints that do
+// not move.
 Linear linearise(const Model<double> &model, const double *q, const double *v, const double *force,
                  const char *held);
 

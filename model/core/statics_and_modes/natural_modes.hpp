@@ -61,14 +61,14 @@ struct NaturalModes {
   std::vector<double> frequencies() const;
 };
 
-// The lowest `most` modes at q (n) (all of them: most <= 0) under gravity and a load held at the
-// tip. Few of many unknowns, joints held or revolute, are found in time proportional to the number
-// of pieces
+// The lowest `most` modes (54) at q (n) (all of them: most <= 0) under gravity and a load held at
+// the tip. Few of many unknowns, joints held or revolute, are found in time proportional to the
+// number of pieces
 // (`lowest_modes`), others from the matrices. Without `shapes` only the squares are.
 NaturalModes natural_modes(const Model<double> &model, const double *q, const char *free, int most,
                            const TipLoad &load = {}, bool shapes = true);
 
-// Lanczos' method with the operator (K + s M)^-1 M, by sweeps of `ChainAtRest`: of joints only
+// Lanczos' method (55) with the operator (K + s M)^-1 M, by sweeps of `ChainAtRest`: of joints only
 // revolute ones may be free. That no mode is missing is known from the pivots of K - x M: as many
 // are negative as squares are below x (Sylvester's law).
 NaturalModes lowest_modes(const Model<double> &model, const double *q, const char *free, int most,

@@ -73,8 +73,8 @@ struct StillBeyond {
   Sym3<double> A;
 };
 
-// Forms a piece's rows, eliminates its own unknowns, and leaves A of its hub in `beyond`; gives the
-// size of what A's turning is made of.
+// Forms a piece's rows of (51), eliminates its own unknowns, and leaves A of its hub in `beyond`;
+// gives the size of what A's turning is made of.
 template <class M, class N, class Pivot>
 double condense(PieceAtRest &c, StillBeyond &beyond, Pivot inverse_of, M m, N P) {
   const int wide = m + 1;

@@ -22,6 +22,8 @@ from .files import (
     leftovers,
     make_folder,
     move,
+    path_of,
+    refuse_taken,
     replace_results,
     replaced,
     settle,
@@ -30,10 +32,10 @@ from .files import (
     write_bytes,
     write_text,
 )
-from .format import FORMAT, check_format
 from .quantities import CHANNELS, STATIONS, Channel, channel
 from .quantities.labels import EMULATED, called, emulated, kind
-from .run import FILE, Run
+from .run import Run
+from .run_file import FILE
 from .seal import (
     Damaged,
     read_sealed,
@@ -48,7 +50,7 @@ from .seal import (
 from .shipped import find, shipped_files
 from .toml_files import Tables, changed, index_of, read_toml, write_toml
 from .trust import DOUBTED, REFUSED, balance_events, judged
-from .validation import MOST_LETTERS, explain, is_name
+from .validation import FORMAT, MOST_LETTERS, check_format, explain, is_name
 
 __all__ = [
     "CHANNELS",
@@ -89,10 +91,12 @@ __all__ = [
     "make_folder",
     "move",
     "number",
+    "path_of",
     "read_sealed",
     "read_sealed_json",
     "read_table",
     "read_toml",
+    "refuse_taken",
     "replace_results",
     "replaced",
     "room_for_arrow",

@@ -52,6 +52,40 @@ def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
             rest = rest[stream.write(rest) :]
 
 
+def path_of(given: object, key: str) -> Path:
+    """The path that an argument is.
+
+    Args:
+        given: a text or a path.
+        key: name of the argument, for the message.
+
+    Returns:
+        The path.
+
+    Raises:
+        InputError: it is something else.
+    """
+    if not isinstance(given, str | os.PathLike):
+        raise InputError("expected a path", key=key, value=given)
+    return Path(os.fspath(given))
+
+
+def refuse_taken(path: Path) -> None:
+    """Refuse to write where a file is already.
+
+    Args:
+        path: of the file to write.
+
+    Raises:
+        InputError: it is there.
+    """
+    if os.path.lexists(path):
+        raise InputError(
+            "a file is there: expected another place, or overwrite=True to replace it",
+            file=os.fspath(path),
+        )
+
+
 @contextmanager
 def replaced(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A new, empty file beside `path` with its extension, which takes its place in the end.

@@ -7,7 +7,6 @@ channel_unit (`joint/1/position_rad`), metadata in the schema.
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Callable, ItemsView, Iterator, KeysView
 from dataclasses import dataclass, field
@@ -16,23 +15,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError, within_memory
-from . import summary
+from ..errors import InputError
+from . import run_file, summary
 from .drawing.film import animation
 from .drawing.over_time import FORMS, figure, heading, saved
-from .files import settle, write_bytes
-from .format import FORMAT, check_format
+from .files import path_of, refuse_taken, write_bytes
 from .frames import pandas_frame, xarray_dataset
 from .quantities import converted, fault, from_first, suffix, unit
-from .seal import Damaged, read_sealed, read_table, room_for_arrow, say_unsealed, sealed_parquet
+from .run_file import FILE
 from .toml_files import Tables
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
     from matplotlib.figure import Figure
-
-FILE = "run.parquet"
 
 
 @dataclass(frozen=True)
@@ -202,7 +198,7 @@ class Run:
             InputError: a pattern fits no channel, the run is empty, or `out` has another ending.
             Missing: matplotlib is not installed.
         """
-        form = "" if out is None else Path(out).suffix.lower().removeprefix(".")
+        form = "" if out is None else path_of(out, "out").suffix.lower().removeprefix(".")
         if out is not None and form not in FORMS:
             raise InputError(
                 f"expected a file that ends with .{', .'.join(FORMS)}", key="out", value=str(out)
@@ -260,45 +256,33 @@ class Run:
         """
         return xarray_dataset(self.t, self.channels, self.units, self.meta)
 
-    def save(self, folder: str | Path) -> Path:
+    def save(self, folder: str | Path, *, overwrite: bool = False) -> Path:
         """Write `run.parquet` as a whole or not at all.
 
         Args:
             folder: where to; it is made if need be.
+            overwrite: whether a run that is there already may be replaced.
 
         Returns:
             The file's path.
+
+        Raises:
+            InputError: a run is there already, or the file cannot be written.
         """
-        path = Path(folder) / FILE
+        path = path_of(folder, "folder") / FILE
+        if not overwrite:
+            refuse_taken(path)
         write_bytes(path, self.parquet())
         return path
 
-    @within_memory
     def parquet(self) -> bytes:
         """The run as a Parquet file: one column a channel, its unit in the field, the metadata in
         the schema."""
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
-        room_for_arrow(self.t.nbytes * (1 + len(self.channels)))
-        columns = {"time_s": self.t} | {
-            self.column(name): values for name, values in self.channels.items()
-        }
-        units = {"time_s": "s"} | {self.column(name): unit for name, unit in self.units.items()}
-        fields = [pa.field(name, pa.float64(), metadata={"unit": units[name]}) for name in columns]
-        about = {"flexura": json.dumps(self.meta), "format": str(FORMAT)}
-        schema = pa.schema(fields, metadata=about)
-        sink = pa.BufferOutputStream()
-        pq.write_table(
-            pa.table([_float_column(values) for values in columns.values()], schema=schema),
-            sink,
-            compression="zstd",
-            write_page_checksum=True,
-        )
-        return sealed_parquet(sink.getvalue().to_pybytes())
+        columns = {self.column(name): values for name, values in self.channels.items()}
+        units = {self.column(name): unit for name, unit in self.units.items()}
+        return run_file.written({"time_s": self.t} | columns, {"time_s": "s"} | units, self.meta)
 
     @staticmethod
-    @within_memory
     def read(folder: str | Path) -> Run:
         """Read a run.
 
@@ -311,75 +295,4 @@ class Run:
         Raises:
             InputError: there is no run, or a byte of its file is not as it was written.
         """
-        import pyarrow as pa
-
-        path = Path(folder)
-        try:
-            for place in (path, path.parent):
-                settle(place)
-            path = path / FILE if path.is_dir() else path
-            there = path.is_file()
-        except OSError:  # a name that is too long, a folder that may not be looked into
-            there = False
-        if not there:
-            raise InputError(f"no run here: expected a folder with {FILE}", file=str(folder))
-        sealed = False
-        try:
-            content, sealed = read_sealed(path, "restore a copy, or make it again", "a damaged run")
-            table = read_table(content)
-        except (Damaged, MemoryError):
-            raise
-        except (pa.ArrowException, OSError, ValueError) as error:
-            why = (str(error) or "damaged").splitlines()[0]
-            what = (
-                "cannot be read now, though its checksum fits" if sealed else "not a Parquet file"
-            )
-            raise InputError(f"{what} ({why})", file=str(path)) from None
-        try:
-            run = Run._from_table(table, str(path))
-        except MemoryError:
-            raise
-        except (
-            pa.ArrowException,
-            KeyError,
-            ValueError,
-        ) as error:  # ValueError: of Run, json and decode too
-            raise InputError(
-                f"a damaged run ({(str(error) or 'unreadable').splitlines()[0]})", file=str(path)
-            ) from None
-        if not sealed:
-            say_unsealed(path)
-        return run
-
-    @staticmethod
-    def _from_table(table: Any, file: str) -> Run:
-        stored = (table.schema.metadata or {}).get(b"flexura")
-        if stored is None or "time_s" not in table.column_names:
-            raise InputError(
-                "a Parquet file, but not a run of flexura: expected a column time_s and metadata",
-                file=file,
-            )
-        check_format({"format": int(table.schema.metadata.get(b"format", FORMAT))}, file)
-        meta, channels, units = json.loads(stored), {}, {}
-        if not isinstance(meta, dict):
-            raise ValueError("its metadata is not a table")
-        for column in table.schema:
-            values = table.column(column.name).cast("float64").to_numpy()
-            if column.name == "time_s":
-                t = values
-            else:
-                stored_unit = (column.metadata or {}).get(b"unit", b"1").decode()
-                name = column.name.removesuffix(f"_{suffix(stored_unit)}")
-                channels[name], units[name] = values, stored_unit
-        try:
-            return Run(t, channels, units, meta)
-        except InputError as error:
-            raise error.in_file(file) from None
-
-
-def _float_column(values: np.ndarray) -> Any:
-    """Numbers as a column of Arrow; its own conversion of an array first imports pandas."""
-    import pyarrow as pa
-
-    numbers = np.ascontiguousarray(values, dtype=float)
-    return pa.Array.from_buffers(pa.float64(), len(numbers), [None, pa.py_buffer(numbers)])
+        return run_file.read(folder, Run)

@@ -1,15 +1,17 @@
-"""Pydantic's complaint about a file, said in the project's words: key, value, what was expected."""
+"""What is wrong with the tables of a file, in plain words: key, value, what was expected."""
 
 from __future__ import annotations
 
 import difflib
 import unicodedata
+from collections.abc import Mapping
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
 from ..errors import InputError, WrongValue
 
+FORMAT = 1  # of the project's files, the one that is written
 MOST_LETTERS = 200
 
 
@@ -144,3 +146,24 @@ def _tables(annotation: Any) -> list[type[BaseModel]]:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     return [table for arg in get_args(annotation) for table in _tables(arg)]
+
+
+def check_format(tables: Mapping[str, Any], file: str = "") -> None:
+    """Refuse tables of a format that is not known; an absent key is the present one.
+
+    Args:
+        tables: of the file.
+        file: its name, for the message.
+
+    Raises:
+        InputError: not a whole number from 1 to `FORMAT`: a newer flexura wrote the file.
+    """
+    value = tables.get("format", FORMAT)
+    if not isinstance(value, int) or isinstance(value, bool) or value < 1:
+        expected = f"expected a whole number from 1 to {FORMAT}"
+        raise InputError(expected, key="format", value=value, file=file)
+    if value > FORMAT:
+        newer = "a newer flexura wrote this file; type: pip install --upgrade flexura"
+        raise InputError(
+            f"{newer}; known here: up to {FORMAT}", key="format", value=value, file=file
+        )

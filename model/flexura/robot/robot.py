@@ -23,7 +23,9 @@ from ..io import (
     explain,
     find,
     index_of,
+    path_of,
     read_toml,
+    refuse_taken,
     summary,
     write_toml,
 )
@@ -222,6 +224,9 @@ class Robot(Table):
         """
         if isinstance(data, dict):
             check_format(data, file)
+        elif not isinstance(data, cls):
+            expected = "expected the tables of a robot file"
+            raise InputError(expected, key="data", value=data, file=file)
         data, old = renamed(data)
         if old:
             keys = ", ".join(f"{each.path} is {each.new}" for each in old)
@@ -272,6 +277,8 @@ class Robot(Table):
         Raises:
             InputError: an unknown key, or a wrong value.
         """
+        if not isinstance(changes, dict):
+            raise InputError("expected values by key", key="changes", value=changes)
         changes = {self._todays_path(path, changes): value for path, value in changes.items()}
         # says what is wrong in a file's words
         try:
@@ -310,6 +317,9 @@ class Robot(Table):
     def _todays_path(self, path: str, changes: Tables) -> str:
         """`link.2.joint.start_rad` of `link.2.joint.start` and of `joint.2.start`; any other path
         as it is."""
+        if not isinstance(path, str):
+            expected = "expected the key of a value, as payload.mass_kg"
+            raise InputError(expected, key="key", value=path)
         if path.startswith("joint."):
             path = ".".join(["link", *path.split(".")[1:2], "joint", *path.split(".")[2:]])
         parts = path.split(".")
@@ -334,7 +344,10 @@ def load(path: str | os.PathLike[str]) -> Robot:
             expected.
     """
     found = find(path, "robots")
-    return Robot.from_dict(read_toml(found), file=os.fspath(found))
+    data = read_toml(found)
+    if "link" not in data and "duration_s" in data:
+        raise InputError("a manoeuvre file: expected a robot file", file=os.fspath(found))
+    return Robot.from_dict(data, file=os.fspath(found))
 
 
 def robot_of(robot: Any, key: str = "robot") -> Robot:
@@ -361,11 +374,18 @@ def robot_of(robot: Any, key: str = "robot") -> Robot:
     raise InputError(expected, key=key, value=robot)
 
 
-def save(robot: Robot, path: str | os.PathLike[str]) -> None:
+def save(robot: Robot, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
     """Write a robot file (TOML) that `load` reads back to an equal robot.
 
     Args:
-        robot: the robot.
-        path: where to; a file there is replaced as a whole.
+        robot: the robot, or a System of it.
+        path: where to.
+        overwrite: whether a file that is there already may be replaced, as a whole.
+
+    Raises:
+        InputError: a file is there already, or it cannot be written.
     """
-    write_toml(path, {"format": FORMAT} | robot.to_dict())
+    described, target = robot_of(robot), path_of(path, "path")
+    if not overwrite:
+        refuse_taken(target)
+    write_toml(target, {"format": FORMAT} | described.to_dict())

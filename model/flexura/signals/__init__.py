@@ -5,20 +5,11 @@ from . import paths, shaping, signal
 from .acting import Acting, acts
 from .composite import chirp, delayed, noise, pulse, sum
 from .conversion import FunctionSignal, SignalLike, as_signal, as_signals, spline
-from .drive import Drive, JointDrive, check_smooth
-from .load import Load, Loads, LoadsLike, as_loads
-from .manoeuvre import STARTS, Manoeuvre, load_manoeuvre
-from .parsing import KINDS, PLAUSIBLE, from_spec, is_finite, is_plausible
-from .payload_change import PayloadChange, PayloadsLike, as_payloads
-from .shaping import ei, matched_cycloid, zv, zvd
-from .signal import (
-    COLUMNS,
-    Signal,
+from .drive import Drive, JointDrive
+from .kinds import (
     bang_bang,
     constant,
     cycloid,
-    evaluate,
-    evaluate_many,
     harmonic,
     piecewise,
     polynomial,
@@ -27,6 +18,13 @@ from .signal import (
     table,
     trapezoidal,
 )
+from .load import Load, Loads, LoadsLike, as_loads
+from .manoeuvre import STARTS, Manoeuvre, load_manoeuvre
+from .parsing import KINDS, PLAUSIBLE, from_spec, is_finite, is_plausible
+from .payload_change import PayloadChange, PayloadsLike, as_payloads
+from .shaping import ei, matched_cycloid, zv, zvd
+from .signal import COLUMNS, Signal, evaluate, evaluate_many
+from .smooth import check_smooth
 
 __all__ = [
     "COLUMNS",

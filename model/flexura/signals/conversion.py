@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..io import array, function_of, number
-from .signal import COLUMNS, Signal, constant, table
+from .kinds import constant, table
+from .signal import COLUMNS, Signal
 
 SAMPLES = (65, 257, 1025, 4097)  # of a function, the first that are enough
 GOOD, POOR = 1e-11, 1e-6  # of the range of its values: what a spline may be off by between them
@@ -20,7 +21,7 @@ SignalLike: TypeAlias = Signal | ArrayLike | Callable[[float], float] | None
 EXPECTED = "expected a number, a Signal, a function of time, or an array of a value each time"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class FunctionSignal(Signal):
     """A Python function of time as a Signal; `key` names it in messages. It has no segments."""
 

@@ -18,9 +18,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ..io import Tables, array, flag, number, whole
-from .conversion import WHAT_TO_DO, FunctionSignal, SignalLike, as_signal, spline
-from .signal import COLUMNS, Signal, evaluate_many
+from ..io import Tables, array, flag, number, summary, whole
+from .conversion import FunctionSignal, SignalLike, as_signal, spline
+from .signal import COLUMNS, Signal
+from .smooth import check_smooth, up_to
 
 _NONE = np.zeros((0, COLUMNS))
 
@@ -68,6 +69,14 @@ class JointDrive:
             return self.force.value(t)
         return self.force(t)[0]
 
+    def said(self) -> str:
+        """What the joint does, in a line: "kp 100, kd 4 on cycloid(end=0.8, ...)"."""
+        parts = [] if self.force is None else [f"force {self.force.said()}"]
+        if self.motion is not None:
+            how = "follows" if self.prescribed else f"kp {self.kp:g}, kd {self.kd:g} on"
+            parts.append(f"{how} {self.motion.said()}")
+        return "; ".join(parts) or "free"
+
     def spec(self) -> Tables:
         """This joint's table of a manoeuvre file."""
         out: dict[str, Any] = {}
@@ -95,6 +104,20 @@ class Drive:
         if not isinstance(self.meta, dict):
             raise InputError("expected a dictionary", key="meta", value=self.meta)
         object.__setattr__(self, "joints", tuple(joints))
+
+    def __repr__(self) -> str:
+        return summary.text(*self._summary())
+
+    def _repr_html_(self) -> str:
+        return summary.html(*self._summary())
+
+    def _summary(self) -> tuple[str, list[tuple[str, str]]]:
+        rows = self.rows()
+        return f"Drive of {len(rows)} {'joint' if len(rows) == 1 else 'joints'}", rows
+
+    def rows(self) -> list[tuple[str, str]]:
+        """What each joint does: pairs of "joint 1" and a line."""
+        return [(f"joint {i}", joint.said()) for i, joint in enumerate(self.joints, 1)]
 
     @staticmethod
     def none(joints: int) -> Drive:
@@ -234,7 +257,7 @@ class Drive:
                 motion = spline(replace(motion, key=key), start, end)
             if motion is not None and joint.prescribed:
                 check_smooth(motion, key, start, end)
-                motion = _up_to(motion, end)
+                motion = up_to(motion, end)
             joints.append(joint if motion is joint.motion else replace(joint, motion=motion))
         same = all(a is b for a, b in zip(joints, self.joints, strict=True))
         return self if same else replace(self, joints=tuple(joints))
@@ -306,47 +329,6 @@ class Drive:
                     row += len(s.segments)
                 index[i, 2 * k + 1] = row
         return np.ascontiguousarray(np.concatenate(parts)), index, self.gains.copy()
-
-
-def check_smooth(motion: Signal, key: str, start: float = -np.inf, end: float = np.inf) -> None:
-    """Refuse a motion whose position or velocity jumps: no finite force follows it.
-
-    Args:
-        motion: the motion.
-        key: name of the argument, for the message.
-        start: begin of the interval, itself excluded [s].
-        end: end of the interval, itself excluded [s].
-
-    Raises:
-        InputError: it jumps between `start` and `end`.
-    """
-    breaks = motion.breaks[1:]
-    inside = breaks[(breaks > start) & (breaks < end)]
-    jumps = inside[~_smooth_at(motion, inside)]
-    if len(jumps):
-        raise InputError(
-            f"expected a motion without jumps in position and velocity; it has one at t = "
-            f"{jumps[0]:g} s: {WHAT_TO_DO}",
-            key=key,
-        )
-
-
-def _smooth_at(motion: Signal, at: np.ndarray) -> np.ndarray:
-    """Whether position and velocity do not jump, for each of the times (k,)."""
-    if not len(at):
-        return np.ones(0, dtype=bool)
-    before = np.array(evaluate_many(motion.segments, np.nextafter(at, -np.inf)))
-    after = np.array(evaluate_many(motion.segments, at))
-    return np.asarray(np.isclose(before, after, rtol=1e-7, atol=1e-9).all(axis=0))
-
-
-def _up_to(motion: Signal, end: float) -> Signal:
-    """The motion without what it jumps to at `end` [s]."""
-    kept = int(np.searchsorted(motion.breaks, end))
-    last = motion.breaks[kept : kept + 1]
-    if kept > 0 and (last == end).any() and not _smooth_at(motion, last).all():
-        return Signal(motion.segments[:kept], motion.spec)
-    return motion
 
 
 def _waves(key: str, given: Sequence[Any], t_s: ArrayLike | None) -> list[Signal | None]:

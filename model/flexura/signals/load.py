@@ -11,8 +11,9 @@ import numpy as np
 from ..errors import InputError
 from ..io import Tables, choice, number, whole
 from .conversion import FunctionSignal, SignalLike, as_signal, spline
+from .kinds import constant
 from .parsing import PLAUSIBLE, from_spec, is_plausible
-from .signal import COLUMNS, Signal, constant
+from .signal import COLUMNS, Signal
 
 FRAMES = ("base", "link")
 KEYS = ("link", "at_m", "force_N", "moment_N_m", "frame")

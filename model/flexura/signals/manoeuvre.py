@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..io import Tables, check_format, choice, find, is_name, read_toml, whole
-from .drive import Drive, JointDrive, check_smooth
+from ..io import Tables, check_format, choice, find, is_name, read_toml, summary, whole
+from .drive import Drive, JointDrive
 from .load import Load, load_from_table
 from .parsing import from_spec, is_plausible
 from .payload_change import PayloadChange, as_payloads, payload_from_table
 from .signal import Signal
+from .smooth import check_smooth
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,20 @@ class Manoeuvre:
     loads: tuple[Load, ...] = ()
     payloads: tuple[PayloadChange, ...] = ()
     file: str = field(default="", compare=False)
+
+    def __repr__(self) -> str:
+        return summary.text(*self._summary())
+
+    def _repr_html_(self) -> str:
+        return summary.html(*self._summary())
+
+    def _summary(self) -> tuple[str, list[tuple[str, str]]]:
+        rows = [("t", f"0 to {self.duration_s:g} s, each {self.output_step_s:g} s")]
+        rows += self.drive.rows()
+        rows += [] if self.start is None else [("start", self.start)]
+        for name, parts in (("loads", self.loads), ("payloads", self.payloads)):
+            rows += [(name, str(len(parts)))] if parts else []
+        return f"Manoeuvre: {self.name}", rows
 
     @property
     def t(self) -> np.ndarray:
@@ -132,7 +147,34 @@ def load_manoeuvre(path: str | os.PathLike[str], joints: int) -> Manoeuvre:
 
 def _manoeuvre(data: Tables, joints: int) -> Manoeuvre:
     check_format(data)
+    if "link" in data and "duration_s" not in data:
+        raise InputError("a robot file: expected a manoeuvre file")
     _check_keys(data, _KEYS, "")
+    duration, step = _times(data)
+    drive = _drive(data, joints, duration)
+    name = data.get("name", "")
+    if not is_name(name):
+        raise InputError(
+            "expected one line of at most 200 characters without control codes",
+            key="name",
+            value=name,
+        )
+    start = data.get("start")
+    if start is not None:
+        choice(start, "start", STARTS)
+    return Manoeuvre(
+        name,
+        duration,
+        step,
+        drive,
+        start,
+        _loads(data, joints),
+        _payloads(data, duration),
+    )
+
+
+def _times(data: Tables) -> tuple[float, float]:
+    """Duration and step of the rows [s]."""
     duration = _number(
         data, "duration_s", f"a duration above 0 in seconds, at most {LONGEST:g}", low=0.0
     )
@@ -154,6 +196,11 @@ def _manoeuvre(data: Tables, joints: int) -> Manoeuvre:
         raise InputError(
             "expected at most 10 million output steps", key="output_step_s", value=step
         )
+    return duration, step
+
+
+def _drive(data: Tables, joints: int, duration: float) -> Drive:
+    """The tables [[joint]]."""
     tables = data.get("joint", [])
     if not isinstance(tables, list) or len(tables) != joints:
         count = len(tables) if isinstance(tables, list) else tables
@@ -190,25 +237,7 @@ def _manoeuvre(data: Tables, joints: int) -> Manoeuvre:
                 prescribed=_prescribed(entry, motion, key, duration),
             )
         )
-    name = data.get("name", "")
-    if not is_name(name):
-        raise InputError(
-            "expected one line of at most 200 characters without control codes",
-            key="name",
-            value=name,
-        )
-    start = data.get("start")
-    if start is not None:
-        choice(start, "start", STARTS)
-    return Manoeuvre(
-        name,
-        duration,
-        step,
-        Drive(tuple(drives)),
-        start,
-        _loads(data, joints),
-        _payloads(data, duration),
-    )
+    return Drive(tuple(drives))
 
 
 def _payloads(data: dict[str, Any], duration: float) -> tuple[PayloadChange, ...]:

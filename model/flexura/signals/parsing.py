@@ -9,18 +9,18 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from . import composite, shaping, signal
+from . import composite, kinds, shaping
 from .signal import Signal
 
 # what a table of a signal may be, by its kind
-KINDS = signal.KINDS | shaping.KINDS | composite.KINDS
+KINDS = kinds.KINDS | shaping.KINDS | composite.KINDS
 
 
 def from_spec(spec: object, *, key: str = "signal") -> Signal:
     """A signal from its table, for example `{ kind = "cycloid", end = 1.0, duration_s = 0.5 }`.
 
     Args:
-        spec: the table.
+        spec: the table, or a number for a constant.
         key: its name, for messages.
 
     Returns:
@@ -29,10 +29,11 @@ def from_spec(spec: object, *, key: str = "signal") -> Signal:
     Raises:
         InputError: an unknown kind or key, or a wrong value.
     """
+    if is_plausible(spec):
+        spec = {"kind": "constant", "value": spec}
     if not isinstance(spec, dict):
-        raise InputError(
-            f"expected a table with kind, one of {', '.join(KINDS)}", key=key, value=spec
-        )
+        expected = f"expected a number, or a table with kind, one of {', '.join(KINDS)}"
+        raise InputError(expected, key=key, value=spec)
     kind = spec.get("kind")
     if not isinstance(kind, str) or kind not in KINDS:
         missing = "missing: " if kind is None else ""

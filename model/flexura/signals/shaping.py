@@ -9,7 +9,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..io import finite_arguments
-from .signal import COLUMNS, Signal, cycloid, from_segments
+from .kinds import cycloid
+from .signal import COLUMNS, Signal, from_segments
 
 MAX_SEGMENTS = 100_000  # shaping a shaped signal doubles its segments
 

@@ -148,23 +148,9 @@ def shoot_by_bisection(
     try:
         for a, b in pairwise(t):
             r, rd = np.array([m(b)[:2] for m in motion]).T
-            drives = _forces(rigid, motion, (a + b) / 2)
             error = lambda z: (z[rows] - r) + (b - a) * (z[n + rows] - rd)  # noqa: B023
-            width = 0.2 * np.abs(drives) + 1e-3 * inertia
-            for _ in range(MAX_SWEEPS):
-                for i in map(int, moving):
-                    before = drives[i]
-                    of_joint = lambda z: error(z)[i]  # noqa: B023
-                    step = (a, b, states[-1])
-                    after = _bisect(of_joint, trial, step, drives, i, width[i], joint_error)
-                    width[i] = 2 * abs(drives[i] - before) + 1e-9 * inertia[i]
-                if np.abs(error(after)[moving]).max() < joint_error:
-                    break
-            else:
-                raise FlexuraError(
-                    f"the bisection of the joints in turn did not settle at t = {a:.6g} s: "
-                    f"expected shorter steps"
-                )
+            drives = _forces(rigid, motion, (a + b) / 2)
+            after = _settled(error, trial, (a, b, states[-1]), drives, moving, inertia, joint_error)
             low, high = system.limits.T
             if np.any(beyond := (after[rows] < low) | (after[rows] > high)):
                 events.append(
@@ -204,6 +190,32 @@ def shoot_by_bisection(
     )
 
 
+def _settled(
+    error: Callable[[np.ndarray], np.ndarray],
+    trial: _Trial,
+    step: tuple[float, float, np.ndarray],
+    drives: np.ndarray,
+    moving: np.ndarray,
+    inertia: np.ndarray,
+    least: float,
+) -> np.ndarray:
+    """The state after a step, with the drives (joints,), which are changed, at which all errors of
+    the moving joints are below `least` (66). Raises FlexuraError if there are none."""
+    width = 0.2 * np.abs(drives) + 1e-3 * inertia
+    for _ in range(MAX_SWEEPS):
+        for i in map(int, moving):
+            before = drives[i]
+            of_joint = lambda z: error(z)[i]  # noqa: B023
+            after = _bisect(of_joint, trial, step, drives, i, width[i], least)
+            width[i] = 2 * abs(drives[i] - before) + 1e-9 * inertia[i]
+        if np.abs(error(after)[moving]).max() < least:
+            return after
+    raise FlexuraError(
+        f"the bisection of the joints in turn did not settle at t = {step[0]:.6g} s: "
+        f"expected shorter steps"
+    )
+
+
 STEPS_A_TRIAL = 200  # of the integrator between two instants of a bisection, at most
 
 
@@ -224,24 +236,24 @@ class _Trial:
         n = self.system.n
         self.rows[:, 0], self.rows[:, 1] = a, drives
         run = core.Simulation(
-            self.system.equations,
-            np.array([a, b]),
-            state[:n].copy(),
-            state[n : 2 * n].copy(),
-            self.rtol,
-            "implicit",
-            self.rows,
-            self.ranges,
-            self.gains,
-            self.none,
-            self.none,
-            self.free,
-            None,
-            None,
-            0.0,
-            b - a,
-            True,
-            STEPS_A_TRIAL,
+            robot=self.system.equations,
+            t=np.array([a, b]),
+            q=state[:n].copy(),
+            v=state[n : 2 * n].copy(),
+            rtol=self.rtol,
+            method="implicit",
+            segments=self.rows,
+            ranges=self.ranges,
+            gains=self.gains,
+            prescribed=self.none,
+            sampled=self.none,
+            limits=self.free,
+            function=None,
+            sampler=None,
+            rate_Hz=0.0,
+            first_step=b - a,
+            numerical_damping=True,
+            most_steps=STEPS_A_TRIAL,
         )
         while run.advance(10_000):
             pass

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ..control import Controller, Sampled
 from ..errors import InputError, guarded
 from ..io import Run, check_progress, flag
-from ..signals import Drive, LoadsLike, PayloadsLike, SignalLike, as_payloads, as_signals
+from ..signals import Drive, LoadsLike, Manoeuvre, PayloadsLike, SignalLike, as_payloads, as_signals
 from ..system import RobotLike, System, assemble, check_continuous
 from . import dense, integrator, nodewise_run, payload_changes
 from .problem import Budget, Problem, Progress, Solution, check_times, initial_value_problem
@@ -83,11 +83,11 @@ def simulate(
         qd0,
         rtol,
         method,
-        numerical_damping,
-        start,
-        continue_from,
-        Budget.checked(max_steps, wall_time),
-        loads,
+        numerical_damping=numerical_damping,
+        start=start,
+        before=continue_from,
+        budget=Budget.checked(max_steps, wall_time),
+        loads=loads,
     )
     check_progress(progress)
     within = flag(internal_forces, "internal_forces")
@@ -142,10 +142,10 @@ def inverse(
     Args:
         robot: a System, a Robot, or the path or name of a robot file.
         t_eval: ascending times (T,) [s].
-        motion: one entry a joint: a Signal, a function of t, an array of len(t_eval) values, or a
-            number; or an array (T, joints). Arrays become cubic splines, functions splines of
-            fifth order. None is good for a locked joint. A motion may begin and end with any
-            velocity, but not jump inside the run.
+        motion: motions, never forces, one entry a joint: a Signal, a function of t, an array of
+            len(t_eval) values, or a number; or an array (T, joints). Arrays become cubic splines,
+            functions splines of fifth order. None is good for a locked joint. A motion may begin
+            and end with any velocity, but not jump inside the run.
         q0: configuration at the start (n,), as in `flexura.simulate`.
         qd0: its rates (n,).
         rtol: as in `flexura.simulate`.
@@ -167,6 +167,9 @@ def inverse(
         NoEquilibrium: there is no static equilibrium to start in.
     """
     system, t = assemble(robot), check_times(t_eval)
+    if isinstance(motion, Drive | Controller | Sampled | Manoeuvre):
+        expected = "expected motions, one entry a joint; flexura.simulate takes drives"
+        raise InputError(expected, key="motion", value=type(motion).__name__)
     motions = as_signals(motion, len(system.robot.links), "motion", t)
     for i, (signal, link) in enumerate(zip(motions, system.robot.links, strict=True), 1):
         if signal is None and not link.joint.locked:

@@ -4,14 +4,14 @@ it."""
 from __future__ import annotations
 
 import time
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from .. import core
 from ..control import Backlash, Controller, DriveFunction, Sampled
 from ..io import Tables
-from ..signals import COLUMNS, Drive
+from ..signals import Drive
 from .problem import Problem, Progress, Solution
 from .recorder import limit_event
 
@@ -24,65 +24,60 @@ def solve(problem: Problem, progress: Progress = None) -> Solution:
     return _Integration(problem).run(progress)
 
 
+class _Acting(NamedTuple):
+    """What acts in a run, as `core.Simulation` takes it by these names: a Drive's signals, gains
+    and flags; a function of the state; a sampled controller and its rate."""
+
+    segments: np.ndarray
+    ranges: np.ndarray
+    gains: np.ndarray
+    prescribed: np.ndarray
+    sampled: np.ndarray
+    function: Any = None
+    sampler: Any = None
+    rate_Hz: float = 0.0
+
+    @staticmethod
+    def of(problem: Problem) -> _Acting:
+        system, drive = problem.system, problem.drive
+        joints = len(system.robot.links)
+        none = np.zeros(joints, dtype=np.uint8)
+        if isinstance(drive, Controller):
+            parts = drive.core_drives()
+            return _Acting(*parts, sampler=drive.sampler(system), rate_Hz=float(drive.rate_Hz))
+        if isinstance(drive, Drive):
+            function = DriveFunction(drive.function_forces, joints) if drive.has_functions else None
+            return _Acting(*drive.packed(), drive.follows.astype(np.uint8), none, function)
+        free = _Acting(*Drive.none(joints).packed(), none, none)
+        if isinstance(drive, Sampled):
+            called = DriveFunction(drive.function, joints, system, problem.loads)
+            sampler = core.PythonSampler(system.equations, called)
+            return free._replace(sampler=sampler, rate_Hz=float(drive.rate_Hz))
+        own = drive.function
+        return free._replace(function=own.packed() if isinstance(own, Backlash) else drive)
+
+
 class _Integration:
     """A run of the core in progress."""
 
     def __init__(self, problem: Problem) -> None:
-        system, drive, t = problem.system, problem.drive, problem.t
-        self.problem, self.system, self.t, self.drive, self.rtol = (
-            problem,
-            system,
-            t,
-            drive,
-            problem.rtol,
-        )
-        joints = len(system.robot.links)
-        follows, sampler, rate = np.zeros(joints, dtype=np.uint8), None, 0.0
-        function: DriveFunction | tuple[np.ndarray, np.ndarray] | None = None
-        segments, ranges, gains = (
-            np.zeros((0, COLUMNS)),
-            np.zeros((joints, 4), dtype=np.int64),
-            np.zeros((joints, 2)),
-        )
-        sampled = np.zeros(joints, dtype=np.uint8)
-        if isinstance(drive, Drive):
-            function = DriveFunction(drive.function_forces, joints) if drive.has_functions else None
-            segments, ranges, gains = drive.packed()
-            follows = drive.follows.astype(np.uint8)
-        elif isinstance(drive, Controller):
-            segments, ranges, gains, follows, sampled = drive.core_drives()
-            sampler, rate = drive.sampler(system), float(drive.rate_Hz)
-        elif isinstance(drive, Sampled):
-            sampler, rate = (
-                core.PythonSampler(
-                    system.equations, DriveFunction(drive.function, joints, system, problem.loads)
-                ),
-                float(drive.rate_Hz),
-            )
-        else:
-            own = drive.function
-            function = own.packed() if isinstance(own, Backlash) else drive
-        self.sampler = sampler
+        self.problem, self.system, self.drive = problem, problem.system, problem.drive
+        self.t, self.rtol = problem.t, problem.rtol
+        acting = _Acting.of(problem)
+        self.sampler = acting.sampler
         self.core = core.Simulation(
-            system.equations,
-            t,
-            problem.q,
-            problem.qd,
-            problem.rtol,
-            problem.method,
-            np.ascontiguousarray(segments),
-            ranges,
-            np.ascontiguousarray(gains),
-            follows,
-            sampled,
-            np.ascontiguousarray(system.limits),
-            function,
-            sampler,
-            rate,
-            0.0,
-            problem.numerical_damping,
-            problem.budget.steps,
-            problem.loads.packed() if problem.loads else None,
+            robot=self.system.equations,
+            t=self.t,
+            q=problem.q,
+            v=problem.qd,
+            rtol=self.rtol,
+            method=problem.method,
+            limits=np.ascontiguousarray(self.system.limits),
+            first_step=0.0,
+            numerical_damping=problem.numerical_damping,
+            most_steps=problem.budget.steps,
+            loads=problem.loads.packed() if problem.loads else None,
+            **acting._asdict(),
         )
 
     def run(self, progress: Progress) -> Solution:

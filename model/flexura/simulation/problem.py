@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ..control import Backlash, Controller, DriveFunction, Sampled
 from ..errors import InputError
 from ..io import Run, Tables, array, check_memory, choice, flag, number, whole
-from ..signals import Drive, Loads, LoadsLike, Signal, as_loads, as_signals
+from ..signals import Drive, Loads, LoadsLike, Manoeuvre, Signal, as_loads, as_signals
 from ..system import RobotLike, System, assemble
 from .start import apply_prescribed_motions, check_limits, consistent_start, state_at_end
 
@@ -131,6 +131,7 @@ def initial_value_problem(
     qd0: ArrayLike | None,
     rtol: Any,
     method: Any,
+    *,
     numerical_damping: Any = True,
     start: Any = None,
     before: Run | None = None,
@@ -178,19 +179,18 @@ def initial_value_problem(
             'expected a robot with stiffening = true and sliding = "continuous" under a Controller'
         )
         raise InputError(expected, key="drive", value="Controller")
-    damping = flag(numerical_damping, "numerical_damping")
     return Problem(
-        system,
-        t,
-        acting,
-        q,
-        qd,
-        float(rtol),
-        method,
-        damping,
-        start,
-        accounts,
-        on_links,
+        system=system,
+        t=t,
+        drive=acting,
+        q=q,
+        qd=qd,
+        rtol=float(rtol),
+        method=method,
+        numerical_damping=flag(numerical_damping, "numerical_damping"),
+        start=start,
+        accounts=accounts,
+        loads=on_links,
         budget=budget or Budget(),
     )
 
@@ -222,6 +222,9 @@ def acting_drive(drive: Any, joints: int, t: np.ndarray) -> Drive | Controller |
     """
     if drive is None:
         return Drive.none(joints)
+    if isinstance(drive, Manoeuvre):
+        expected = "expected the drive of it, manoeuvre.drive, at times such as manoeuvre.t"
+        raise InputError(expected, key="drive", value="Manoeuvre")
     if isinstance(drive, Sampled):
         return drive
     if isinstance(drive, Backlash) and len(drive.contacts) != joints:

@@ -1,7 +1,8 @@
 """Robot -> System: a robot's equations, its equilibria, its small motions.
 
-`assembly` is the theory, dense and readable; `system` serves it to everybody, with the compiled
-core where that is faster.
+A `System` is what everybody asks: it checks arguments and answers from an `Assembly` or from the
+compiled core. An `Assembly` is the theory itself, dense and readable: the reference for the core,
+and the equations of the models that the core does not have (linear lines, sliding by nodes).
 """
 
 from .assembly import Assembly

@@ -39,7 +39,8 @@ class Terms(NamedTuple):
 
 
 class Assembly:
-    """Lagrange's equations (24) as dense sums over the pieces; q and qd (n,) are named by `labels`.
+    """Lagrange's equations (24) as dense sums over the pieces: the theory written down, which a
+    `System` serves with its arguments checked. q and qd (n,) are named by `labels`.
 
     A `Structure` in place of a robot brings its own shapes, so that two programs can use one set.
     """

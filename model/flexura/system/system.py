@@ -30,6 +30,8 @@ RobotLike: TypeAlias = "System | Robot | str | os.PathLike[str]"
 class System(Numbering):
     """A robot's equations M(q) qdd + bias(q, qd) + damping qd + elastic(q) + gravity(q) = F (25).
 
+    It checks arguments and answers from an `Assembly` or from the compiled core.
+
     `Numbering` says what q (n,) is. F has entries in the joints' rows. A System is constant;
     solvers keep their memory apart from it.
     """

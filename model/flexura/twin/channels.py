@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..io import STATIONS
-from ..robot import Sensor
+from ..robot import Joint, Sensor
 from . import internal_forces as forces
 from .build import TwinModel
 from .links.ancf import CableLink
@@ -53,30 +53,14 @@ def channels(
         own, rate = q[:, index], v[:, index]
         hub, end = part.motion_at_origin(own, rate), part.motion_at_tip(own, rate)
         joint = link.joint
-        place = hub.r
-        if joint.type == "R":
-            place = hub.r - joint.hub_radius_m * _axis(hub.angle)
-            turned = _unwrap(t, hub.angle - tip.angle, hub.omega - tip.omega, joint.start)
-            position[:, i], speed[:, i] = turned, hub.omega - tip.omega
-            hub = hub._replace(angle=tip.angle + turned)
-        elif joint.type == "Pa":
-            # the tangent of a link turns by less than half a turn from its start
-            turned = _wrap(hub.angle - joint.angle_rad - origin.angle)
-            position[:, i], speed[:, i] = _slide(origin, hub)
-            hub = hub._replace(angle=origin.angle + turned + joint.angle_rad)
-        else:
-            place = tip.r
-            sleeve = tip._replace(angle=tip.angle + joint.angle_rad)
-            position[:, i], speed[:, i] = _slide(sleeve, end)
-            hub = hub._replace(angle=sleeve.angle)
+        place, hub, position[:, i], speed[:, i] = _joint(t, joint, origin, tip, hub, end)
         places.append((place, hub.angle - (joint.angle_rad if joint.type == "Pa" else 0.0)))
         slides = model.slides[i]
         if slides is not None:
             position[:, i], speed[:, i] = q[:, slides], v[:, slides]
             if joint.type == "Pb":  # what is behind the sleeve's exit is on its axis
-                hub = hub._replace(
-                    r=sleeve.r + (position[:, i] - link.length_m)[:, None] * _axis(sleeve.angle)
-                )
+                behind = (position[:, i] - link.length_m)[:, None] * _axis(hub.angle)
+                hub = hub._replace(r=tip.r + behind)
         slope = _wrap(end.angle - hub.angle)
         end = end._replace(angle=hub.angle + slope)
         out |= {f"link/{i + 1}/x": (hub.r[:, 0], "m"), f"link/{i + 1}/y": (hub.r[:, 1], "m")}
@@ -121,6 +105,33 @@ def channels(
     return {name: values for name, (values, _) in out.items()}, {
         name: unit for name, (_, unit) in out.items()
     }
+
+
+def _joint(
+    t: np.ndarray, joint: Joint, origin: Motion, tip: Motion, hub: Motion, end: Motion
+) -> tuple[np.ndarray, Motion, np.ndarray, np.ndarray]:
+    """A joint's place (T, 2), its hub with an angle that goes on, its position and rate (T,) each.
+
+    Args:
+        t: times (T,) [s].
+        joint: the joint.
+        origin: of the link before.
+        tip: of the link before.
+        hub: of the joint's own link.
+        end: the tip of the joint's own link.
+    """
+    if joint.type == "R":
+        rate = hub.omega - tip.omega
+        turned = _unwrap(t, hub.angle - tip.angle, rate, joint.start)
+        place = hub.r - joint.hub_radius_m * _axis(hub.angle)
+        return place, hub._replace(angle=tip.angle + turned), turned, rate
+    if joint.type == "Pa":
+        # the tangent of a link turns by less than half a turn from its start
+        turned = _wrap(hub.angle - joint.angle_rad - origin.angle)
+        turned_hub = hub._replace(angle=origin.angle + turned + joint.angle_rad)
+        return hub.r, turned_hub, *_slide(origin, hub)
+    sleeve = tip._replace(angle=tip.angle + joint.angle_rad)
+    return tip.r, hub._replace(angle=sleeve.angle), *_slide(sleeve, end)
 
 
 def _bending_sensors(

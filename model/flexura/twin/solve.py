@@ -108,25 +108,10 @@ def simulate(
             off the end of a flexible link; the message has the time.
     """
     robot = robot_of(robot)
-    choice(beam, "beam", tuple(PROGRAMS))
-    check_supported(robot, beam)
     within = flag(internal_forces, "internal_forces")
-    if within and beam == "ge" and any(link.flexible for link in robot.links):
-        expected = 'expected "ancf" for internal forces: a "ge" beam has no cubics to cut'
-        raise InputError(expected, key="beam", value=beam)
+    _check_beam(robot, beam, within)
     t, speeds = _times(t_eval), start_speeds(robot, qd0)
-    if elements is not None:
-        most = 2 * MAX_ELEMENTS
-        expected = f"expected a whole number from 1 to {most}"
-        if whole(elements, "elements", 1, expected) > most:
-            raise InputError(expected, key="elements", value=elements)
-    for key, given, unit in (
-        ("step_s", step_s, "time in seconds"),
-        ("hub_length_m", hub_length_m, "length in metres"),
-    ):
-        expected = f"expected a {unit}, above 0"
-        if given is not None and not number(given, key, expected) > 0:
-            raise InputError(expected, key=key, value=given)
+    _check_mesh(elements, step_s, hub_length_m)
     check_progress(progress)
     act = actuation(drive, robot.start, speeds, t)
     if act.guided is not None and act.guided.any():
@@ -238,6 +223,31 @@ def _run(
         "hub_length_m": model.mesh.hubs,
     }
     return judged(Run(t, values, units, meta)), end
+
+
+def _check_beam(robot: Robot, beam: Any, internal_forces: bool) -> None:
+    """Raises InputError for a beam that there is not, or that lacks what is asked for."""
+    choice(beam, "beam", tuple(PROGRAMS))
+    check_supported(robot, beam)
+    if internal_forces and beam == "ge" and any(link.flexible for link in robot.links):
+        expected = 'expected "ancf" for internal forces: a "ge" beam has no cubics to cut'
+        raise InputError(expected, key="beam", value=beam)
+
+
+def _check_mesh(elements: Any, step_s: Any, hub_length_m: Any) -> None:
+    """Raises InputError for numbers of a mesh, or a step, that are none."""
+    if elements is not None:
+        most = 2 * MAX_ELEMENTS
+        expected = f"expected a whole number from 1 to {most}"
+        if whole(elements, "elements", 1, expected) > most:
+            raise InputError(expected, key="elements", value=elements)
+    for key, given, unit in (
+        ("step_s", step_s, "time in seconds"),
+        ("hub_length_m", hub_length_m, "length in metres"),
+    ):
+        expected = f"expected a {unit}, above 0"
+        if given is not None and not number(given, key, expected) > 0:
+            raise InputError(expected, key=key, value=given)
 
 
 def _times(t_eval: Any) -> np.ndarray:

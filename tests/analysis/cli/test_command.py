@@ -105,7 +105,7 @@ WRONG = {
     ),
     "a robot for a manoeuvre": (
         ["simulate", RIG, RIG],
-        "an unknown key; known here: name, duration_s",
+        "a robot file: expected a manoeuvre file",
     ),
     "no motion to invert": (
         ["inverse", RIG, "free.toml"],

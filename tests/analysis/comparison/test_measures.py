@@ -13,6 +13,7 @@ from flexlab.comparison.measures import (
     response_time,
     simulation_first,
 )
+from flexlab.comparison.table import notes
 from flexura.errors import InputError
 
 
@@ -113,6 +114,11 @@ def test_runs_with_nothing_in_common_are_refused():
         compare(run([0, 1], tip__x=[0, 1]), run([0, 1], tip__y=[0, 1]), ["tip/x"])
 
 
+def test_a_tip_beside_other_channels_hides_none_of_them():
+    one = run([0, 1], tip__x=[0, 1], sensor__strain=[0, 1])
+    assert [d.channel for d in compare(one, one).differences] == ["tip/x", "sensor/strain"]
+
+
 def test_runs_without_joint_positions_are_compared_by_what_both_have():
     """Logs have drives, motor positions and sensors; 2 % and 10 ms stay what they are."""
     t = np.arange(1001) / 1000
@@ -132,3 +138,15 @@ def test_runs_without_joint_positions_are_compared_by_what_both_have():
     (response,) = found.responses
     assert response.delay_s == pytest.approx(0.01, abs=2e-4)
     assert len(found.differences) == 1
+
+
+def test_a_rig_that_is_not_its_files_is_explained():
+    t = np.arange(101) / 100
+    first = run(t, joint__1__position=np.sin(t))
+    first.meta["driven_by"] = "commanded"
+    for factor, said in ((1.0, False), (1.25, True)):
+        second = run(t, joint__1__position=np.sin(t))
+        second.meta["truth"] = {"seed": 0, "factors": {"friction": factor}}
+        assert (
+            any("is not quite its files" in line for line in notes(compare(first, second))) is said
+        )

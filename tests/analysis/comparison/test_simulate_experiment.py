@@ -163,7 +163,7 @@ def test_what_an_experiment_lacks_is_named(by, changes, words, forward):
 
 @pytest.mark.parametrize("by", DRIVEN_BY)
 def test_a_run_without_the_channels_is_named(by):
-    with pytest.raises(InputError, match=f"by = '{by}': expected a run with joint/1/"):
+    with pytest.raises(InputError, match=f"by = '{by}': expected an experiment with joint/1/"):
         simulate_experiment(run([0, 1], tip__x=[0, 1]), by)
 
 

@@ -18,7 +18,7 @@ from flexlab.comparison.replay import lead_screw
 from flexlab.experiment import excitation
 from flexlab.identification import files, motor_friction, output
 from flexlab.identification.estimate import Parameter, covariance, estimate
-from flexlab.identification.identify import identify, read_nominal
+from flexlab.identification.identify_rig import identify, read_nominal
 from flexlab.rig.axes import Friction, motor_axes
 from flexlab.rig.plant.motor import joint_line
 from rigs import excited, ran
@@ -43,6 +43,18 @@ def test_white_residuals_give_back_the_textbook_covariance():
         np.diag(wanted),
         rtol=0.08,
     )
+
+
+def test_what_nothing_depends_on_has_no_interval_and_leaves_the_others_theirs():
+    random = np.random.default_rng(2)
+    J, r = random.standard_normal((3, 1, 400)), 0.1 * random.standard_normal((1, 400))
+    J[1] = 0.0
+    found, kept = covariance(J, r, 4), [0, 2]
+    np.testing.assert_array_equal(found[np.ix_(kept, kept)], covariance(J[kept], r, 4))
+    assert np.isnan(found[1]).all() and np.isnan(found[:, 1]).all()
+    J[1] = J[0]
+    assert np.isinf(covariance(J, r, 4)).any() or covariance(J, r, 4)[0, 0] > 1e6
+    assert np.isnan(covariance(0 * J, r, 4)).all()
 
 
 @pytest.mark.parametrize("kept", [0.0, 0.9])

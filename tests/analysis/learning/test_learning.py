@@ -12,7 +12,7 @@ from flexlab import rig as rigs
 from flexlab.experiment.run_experiment import ExperimentResult, RefusedToStart
 from flexlab.experiment.stream import StreamResult
 from flexlab.identification.estimate import Estimate
-from flexlab.identification.identify import Identified, parameters, read_nominal
+from flexlab.identification.identify_rig import Identified, parameters, read_nominal
 from flexlab.identification.strip import with_parameters
 from flexlab.learning import output
 from flexlab.learning.drives import friction_side

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexlab.review import picture, write_gallery, write_review
+from flexlab.review import headless, picture, write_gallery, write_review
 from flexlab.review.sources import COLOURS
 from flexura.errors import FlexuraError, InputError
 from reviews import (
@@ -20,8 +20,6 @@ from reviews import (
 
 @pytest.fixture(scope="session")
 def viewer():
-    from flexlab.review import headless
-
     try:
         with headless.viewer((1200, 800)) as client:
             yield client
@@ -145,3 +143,23 @@ def test_the_picture_has_its_size_and_is_not_blank(viewer, rrd, tmp_path):
     assert image.size == (1000, 600)
     assert len(painted(np.asarray(image.convert("RGB")).astype(int), COLOURS["twin"])) > 50
     assert [p.name for p in tmp_path.iterdir()] == ["p.png"]
+
+
+class Busy:
+    """A client that is late with its first pictures, as on a busy machine; the real one is late
+    only there."""
+
+    def __init__(self, late):
+        self.late = late
+
+    def take_screenshot(self, _):
+        self.late -= 1
+        if self.late >= 0:
+            raise TimeoutError("Deadline expired")
+        return b"png"
+
+
+def test_a_picture_that_is_late_is_asked_for_again():
+    assert headless.settled_picture(Busy(3)) == b"png"
+    with pytest.raises(TimeoutError):
+        headless.settled_picture(Busy(4))

@@ -15,7 +15,7 @@ from flexlab.comparison.measures import compare
 from flexlab.comparison.replay.simulate_experiment import simulate_experiment
 from flexlab.experiment import excitation, plan
 from flexlab.experiment.run_experiment import Hooks, OpenBoard, conduct
-from flexlab.identification.identify import identify
+from flexlab.identification.identify_rig import identify
 from flexlab.recordings.strip_sensor import sensor_of
 from flexlab.rig.nominal_robot import with_nominal_drives
 from flexlab.rig.plant.motor import joint_line

@@ -81,7 +81,7 @@ def test_any_double_is_read_back_bit_for_bit_under_any_name(tmp_path_factory, pa
     if f"{name}_{UNITS[unit]}" == "time_s":
         return
     t = ROWS[: len(values)]
-    Run(t, {name: values}, {name: unit}).save(folder)
+    Run(t, {name: values}, {name: unit}).save(folder, overwrite=True)
     again = Run.read(folder)
     assert same_bits(again[name], values) and same_bits(again.t, t)
     assert again.units == {name: unit} and again.meta == {}
@@ -165,7 +165,7 @@ def test_a_run_is_complete_unless_it_says_otherwise():
 def test_a_run_without_samples_or_channels_is_a_run(tmp_path):
     Run(np.zeros(0), {"x": np.zeros(0)}, {"x": "m"}).save(tmp_path)
     assert len(Run.read(tmp_path)) == 0
-    Run(np.arange(3.0), {}, {}).save(tmp_path)
+    Run(np.arange(3.0), {}, {}).save(tmp_path, overwrite=True)
     assert list(Run.read(tmp_path)) == [] and len(Run.read(tmp_path)) == 3
 
 
@@ -279,8 +279,18 @@ def test_a_run_that_cannot_be_stored_leaves_what_was_there(tmp_path, monkeypatch
 
     monkeypatch.setattr(os, "replace", fail)
     with pytest.raises(fx.InputError, match=r"run\.parquet: cannot be written \(disk full\)"):
-        Run(ROWS[:2], {}, {}).save(tmp_path)
+        Run(ROWS[:2], {}, {}).save(tmp_path, overwrite=True)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_a_run_that_is_there_is_replaced_only_if_that_is_asked_for(tmp_path):
+    first = example().save(tmp_path).read_bytes()
+    other = Run(ROWS[:2], {}, {})
+    with pytest.raises(fx.InputError, match=r"run\.parquet: a file is there.*overwrite=True"):
+        other.save(tmp_path)
+    assert (tmp_path / "run.parquet").read_bytes() == first
+    other.save(tmp_path, overwrite=True)
+    assert len(Run.read(tmp_path)) == 2
 
 
 def test_a_run_interrupted_while_it_is_written_leaves_nothing(tmp_path, monkeypatch):

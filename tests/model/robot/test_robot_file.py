@@ -213,6 +213,16 @@ def test_replacing_inside_a_value_is_refused(path):
         fx.Robot.from_dict(BASE).replace({path: 0.1})
 
 
+def test_a_robot_file_that_is_there_is_replaced_only_if_that_is_asked_for(tmp_path):
+    robot, path = fx.Robot.from_dict(BASE), tmp_path / "robot.toml"
+    path.write_text("# mine\n")
+    with pytest.raises(fx.InputError, match=r"robot\.toml: a file is there.*overwrite=True"):
+        fx.save(robot, path)
+    assert path.read_text() == "# mine\n"
+    fx.save(robot, path, overwrite=True)
+    assert fx.load(path) == robot
+
+
 def test_saving_writes_the_whole_file_or_leaves_the_old_one(tmp_path, monkeypatch):
     robot, path = fx.Robot.from_dict(BASE), tmp_path / "new" / "robot.toml"
     fx.save(robot, path)
@@ -223,5 +233,5 @@ def test_saving_writes_the_whole_file_or_leaves_the_old_one(tmp_path, monkeypatc
 
     monkeypatch.setattr("os.replace", fail)
     with pytest.raises(fx.InputError, match="disk full"):
-        fx.save(robot.replace({"name": "another"}), path)
+        fx.save(robot.replace({"name": "another"}), path, overwrite=True)
     assert path.read_bytes() == before and [p.name for p in path.parent.iterdir()] == ["robot.toml"]

@@ -146,7 +146,7 @@ robots = (
 @given(robots)
 def test_a_robot_is_read_back_as_it_was_written(tmp_path_factory, robot):
     path = tmp_path_factory.getbasetemp() / "round.toml"
-    fx.save(robot, path)
+    fx.save(robot, path, overwrite=True)
     assert fx.load(path) == robot
     assert fx.Robot.from_dict(robot.to_dict()) == robot
     assert fx.Robot.from_dict(robot.model_dump(mode="json")) == robot

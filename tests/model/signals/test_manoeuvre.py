@@ -211,7 +211,7 @@ WRONG_MANOEUVRES = {
         "",
         "joint[2].motion: missing: gains kp and kd need a motion to follow",
     ),
-    "a force as a number": (F, "force = 1.0", "joint[1].force = 1.0: expected a table with kind"),
+    "a force as a text": (F, "force = '1'", "joint[1].force = '1': expected a number, or a table"),
     "a force without a kind": (
         F,
         "force = { value = 1.0 }",

@@ -143,7 +143,7 @@ def test_what_cannot_be_shaped_is_named():
 
 
 def test_kinds_of_all_modules_have_names_of_their_own():
-    each = (signals.signal.KINDS, signals.shaping.KINDS, signals.composite.KINDS)
+    each = (signals.kinds.KINDS, signals.shaping.KINDS, signals.composite.KINDS)
     assert sum(map(len, each)) == len(signals.KINDS)
 
 

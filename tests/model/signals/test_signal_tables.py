@@ -16,7 +16,7 @@ from flexura.signals import (
 KINDS = ", ".join(signals.KINDS)
 nan, inf = math.nan, math.inf
 WRONG_SIGNALS = {
-    "a number": (3, "signal", 3, "a table with kind"),
+    "a text alone": ("3", "signal", "3", "a number, or a table with kind"),
     "a list": ([1.0], "signal", [1.0], "a table with kind"),
     "an empty table": ({}, "signal.kind", None, "missing: expected one of constant, step"),
     "an unknown kind": ({"kind": "sine"}, "signal.kind", "sine", f"one of {KINDS}"),

@@ -15,6 +15,7 @@ The joints are driven in one of three ways:
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -92,9 +93,10 @@ def simulate_experiment(
     required = required_channels(experiment, by)
     missing = [name for name in required if name not in experiment]
     if missing or not required:
+        there = dict.fromkeys(re.sub(r"/\d+$", "/*", name) for name in experiment)
         raise InputError(
-            f"expected a run with {missing[0] if missing else 'joint/1/position'}; it has: "
-            f"{', '.join(experiment)}",
+            f"expected an experiment with {missing[0] if missing else 'joint/1/position'}, or a "
+            f"second run; it has: {', '.join(there)}",
             key="by",
             value=by,
         )

@@ -126,9 +126,9 @@ def _off(quantities: Sequence[object]) -> list[str]:
 
 def _of_inputs(search: Search, found: Estimate) -> list[str]:
     """Estimates whose intervals are mostly what the noise of measured motions does to them."""
-    if not search.mostly_inputs.any():
+    if not found.mostly_of_inputs.any():
         return []
-    named = zip(found.parameters, search.mostly_inputs, strict=True)
+    named = zip(found.parameters, found.mostly_of_inputs, strict=True)
     names = [u.name for u, mostly in named if mostly]
     first = search.experiments[0]
     motions = [each.channel for each in first.inputs if each.channel in first.run]

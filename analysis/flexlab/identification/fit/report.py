@@ -10,7 +10,7 @@ from flexura.io import EMULATED, emulated
 
 from ...runs.formatting import finite, number, percent
 from ...runs.table import Table
-from .identify import Identification
+from .identify_robot import Identification
 from .inputs import MOTION, REFERENCE
 
 HOW = {MOTION: "moved as measured", REFERENCE: "a controller's reference"}

@@ -17,7 +17,6 @@ from .unknowns import Unknown, of_channel
 STEPS = 30  # of one fit
 WEIGHTED = 4  # fits with weights of the one before
 SETTLED = 0.01  # change of the weights that ends this
-HALF = 0.5  # of a variance
 DRAWS = 8  # of the noise of measured motions
 FAILED = 1e3  # a residual of a simulation that ended early
 LEAST_NOISE = 1e-6  # of a channel's size
@@ -33,8 +32,6 @@ class Search:
     experiments: tuple[Experiment, ...]
     sigma: np.ndarray = field(default_factory=lambda: np.zeros(0))
     evaluations: int = 0
-    of_inputs: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
-    mostly_inputs: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
     def __post_init__(self) -> None:
         self.sizes = np.array([self._size(k) for k in range(len(self.experiments[0].channels))])
@@ -170,19 +167,21 @@ class Search:
                 break
         x = np.array([u.parameter.to_scaled(found.values[u.name]) for u in self.unknowns])
         J = self.jacobian(x, central=True)
-        C = _covariance(J, found.residuals, self._lag(found.residuals))
-        self.of_inputs = self._of_inputs(found.values, J)
-        C += self.of_inputs
-        with np.errstate(invalid="ignore"):
-            self.mostly_inputs = np.diag(self.of_inputs) > HALF * np.diag(C)
-        return replace(found, derivatives=J, covariance=C, evaluations=self.evaluations)
+        of_inputs = self._of_inputs(found.values, J)
+        C = covariance(J, found.residuals, self._lag(found.residuals)) + of_inputs
+        return replace(
+            found,
+            derivatives=J,
+            covariance=C,
+            of_inputs=of_inputs,
+            evaluations=self.evaluations,
+        )
 
     def smoother(self) -> Search:
         """The same with motions that are smoothed more."""
         return replace(
             self,
             experiments=tuple(replace(e, smoother=True, _cache={}) for e in self.experiments),
-            of_inputs=np.zeros((0, 0)),
         )
 
     def _of_inputs(self, values: Mapping[str, float], J: np.ndarray) -> np.ndarray:
@@ -239,17 +238,3 @@ class Search:
             peak = float(np.abs(np.concatenate(y)).max()) or 1.0
             out[name] = {"rms": rms, "noise": float(np.mean(level)), "by_peak": rms / peak}
         return out
-
-
-def _covariance(J: np.ndarray, r: np.ndarray, lag: int) -> np.ndarray:
-    """The covariance (k, k) of the scaled values; NaN for values that nothing depends on, and
-    large for what cannot be told apart."""
-    size = np.sqrt(np.einsum("kst,kst->k", J, J))
-    there = size > 0
-    out = np.full((len(J), len(J)), np.nan)
-    if there.any():
-        try:
-            out[np.ix_(there, there)] = covariance(J[there], r, lag)
-        except np.linalg.LinAlgError:
-            out[np.ix_(there, there)] = np.inf
-    return out

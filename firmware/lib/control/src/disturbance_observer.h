@@ -13,7 +13,8 @@
 
 namespace flexura {
 
-// The comments give the board's scales; in the model all is in SI units.
+// Gains by the nominal joint (147). The comments give the board's scales; in the model all is in
+// SI units.
 template <class N>
 struct ObserverGainsOf {
   typename N::Gain moving = 0;    // c - bo; Q8, u per (count / tick)
@@ -28,7 +29,8 @@ class DisturbanceObserverOf {
   using Wide = typename N::Wide;
 
   void start() { filtered_ = 0; }
-  // d^ as Q16 of u, from the output of the tick before and the rate q' [counts / 256 per tick].
+  // d^ (149) as Q16 of u, from the output of the tick before and the rate q' [counts / 256 per
+  // tick].
   Wide update(const ObserverGainsOf<N> &gains, Value output, Value rate) {
     if (gains.filter == 0) return 0;
     const Wide given = N::plus(N::widened(output), N::product(gains.moving, rate));

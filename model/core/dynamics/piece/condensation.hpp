@@ -142,7 +142,7 @@ inline void elastic_rows(const Piece<Real> &c, const PieceState<Real> &k, bool l
   }
 }
 
-// Condensation of a piece of constant length. force: on its own unknowns.
+// Condensation of a piece of constant length, from its rows (45) on. force: on its own unknowns.
 template <class Real, class M, class N>
 inline void condense_elastic(const Piece<Real> &c, PieceState<Real> &k, const Stage<Real> &stage,
                              const Real *force, bool last, M m, N P,

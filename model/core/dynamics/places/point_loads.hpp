@@ -5,8 +5,8 @@
 
 namespace flexura {
 
-// Adds the generalised forces of loads at q (n) to `out` (n). `values` (count, 3): of each load the
-// force's two components [N] and the moment [N m].
+// Adds the generalised forces (133), (134) of loads at q (n) to `out` (n). `values` (count, 3): of
+// each load the force's two components [N] and the moment [N m].
 void add_point_loads(const Model<double> &model, Workspace<double> &work, const LoadPlace *places,
                      int count, const double *values, const double *q, double *out);
 

@@ -67,8 +67,8 @@ void hub_poses(const Model<Real> &model, const Workspace<Real> &work, const Real
   }
 }
 
-// Places x, y and angles theta of a link's line at the abscissas s (count) [m] of its material, in
-// the base's axes, after `outward_kinematics`. Of a sleeved link what is inside or behind the
+// Places x, y (3) and angles theta of a link's line at the abscissas s (count) [m] of its material,
+// in the base's axes, after `outward_kinematics`. Of a sleeved link what is inside or behind the
 // sleeve lies on its axis.
 void line_points(const Model<double> &model, const Workspace<double> &work, const double *y,
                  int link, const double *s, int count, Pose<double> *out);

@@ -121,7 +121,7 @@ class DenseOutput {
   Lanes softness_of(int c) const { return get(softness, c); }  // 1 / w2
   Lanes lifetime_of(int c) const { return get(lifetime, c); }  // 1 / d2; 0: without damping
 
-  // eta, eta' (stride) at the fraction x.
+  // eta, eta' (98) (stride) at the fraction x.
   void at(const Real &h, const Real &x, Real *y, Real *v) const {
     const Lanes X = wide(x), per = wide(1.0 / choose_less(Real(0.0), h, h, Real(1.0)));
     for (int c = 0; c < s.chunks; ++c) {

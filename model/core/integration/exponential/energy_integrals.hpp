@@ -136,8 +136,8 @@ class EnergyIntegrals {
     for (int c = 0; c < s.chunks; ++c) turns = turns || w.oscillates(c);
   }
 
-  // Integrals from the start of the step of length h to its fraction x, where the joints' places
-  // are q1; q0 at the start. whole: x = 1.
+  // Integrals (101) from the start of the step of length h to its fraction x, where the joints'
+  // places are q1; q0 at the start. whole: x = 1.
   Sums over(const Real &h, const Real &x, bool whole, const Real *q0, const Real *q1) {
     Sums sum{0.0, 0.0, 0.0, 0.0, 0.0};
     const bool of_all_modes = s.b.lossy || s.b.damped;

@@ -52,10 +52,10 @@ struct ModalLoad {
   bool sized = true;
 };
 
-// Shares (n) of one robot's modes: w2 (n); struck: eta' (n); seen: what a unit of a mode changes of
-// each output, (n, outputs), of which the first `deflections` are tip deflections; left: of the run
-// [s]. Loads of known size are seen beside the largest deflection of them all, one of unknown size
-// beside its own. False: nothing bends.
+// Shares (96) (n) of one robot's modes: w2 (n); struck: eta' (n); seen: what a unit of a mode
+// changes of each output, (n, outputs), of which the first `deflections` are tip deflections; left:
+// of the run [s]. Loads of known size are seen beside the largest deflection of them all, one of
+// unknown size beside its own. False: nothing bends.
 inline bool shares(int n, const double *w2, const std::vector<ModalLoad> &loads,
                    const double *struck, const std::vector<std::vector<double>> &seen,
                    int deflections, double left, double *share) {
@@ -88,13 +88,13 @@ inline bool shares(int n, const double *w2, const std::vector<ModalLoad> &loads,
   double moving = 0.0;
   for (int k = 0; k < n; ++k) moving = larger(moving, w2[k] > 0.0 ? abs(struck[k]) : 0.0);
   if (moving > 0.0)
-    with([&](int k) { return struck[k] / root(w2[k]); },
-         [&](int k) { return root(w2[k]) * left; }, true);
+    with([&](int k) { return struck[k] / root(w2[k]); }, [&](int k) { return root(w2[k]) * left; },
+         true);
   for (int k = 0; largest > 0.0 && k < n; ++k) share[k] += known[k] / largest;
   return bends;
 }
 
-// The frequency [rad/s] above which modes (ascending) may be damped; infinity: none.
+// The frequency [rad/s] (97) above which modes (ascending) may be damped; infinity: none.
 inline double cutoff_of(int n, const double *w2, const double *share, double rtol,
                         double harmonic) {
   double tail = 0.0;

@@ -132,7 +132,7 @@ class Explicit : public Method<Real> {
     return x;
   }
 
-  // The longest stable step where the lanes `due` are.
+  // The longest stable step (83) where the lanes `due` are.
   void look(const Real &due) {
     if (!(worst(due) > 0.0)) return;
     const Real *q = c.z.data(), *v = q + c.n;

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...errors import FlexuraError, InputError
 from ...optional import Missing, load
-from ..files import replaced, write_bytes
+from ..files import path_of, replaced, write_bytes
 from .over_time import AXES, COLOURS, GRID, INK, STYLE, heading
 from .poses import with_poses
 from .shapes import Curves, curves, extent, has_shapes
@@ -61,7 +61,7 @@ def animation(
         FlexuraError: there is no encoder for MP4.
         Missing: matplotlib or pillow is not installed.
     """
-    target = Path(path)
+    target = path_of(path, "out")
     form = target.suffix.lower()
     if form not in FORMS:
         raise InputError(

@@ -116,6 +116,8 @@ def chosen(runs: Sequence[Run], patterns: Sequence[str]) -> list[list[str]]:
     if patterns:
         wanted: list[str] = []
         for pattern in patterns:
+            if not isinstance(pattern, str):
+                raise InputError("expected a name or a pattern", key="channel", value=pattern)
             fitting = [name for name in known if fnmatchcase(name, pattern)]
             if not fitting:
                 short = dict.fromkeys(sub(r"/\d+$", "/*", name) for name in known)

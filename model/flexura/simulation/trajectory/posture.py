@@ -12,6 +12,8 @@ from .tip_output import PLACE, TipPath, output_kind
 
 STEPS = 40  # of Newton's method
 CLOSE = 1e-12  # m or rad
+STRETCHED = 0.01  # rad: an elbow's angle
+ELBOW = 0.5  # rad
 LONGEST = 0.3  # m or rad: a step of a joint
 
 
@@ -28,7 +30,8 @@ def inverse_kinematics(
         tip: x and y [m] of a robot with two joints; with one, the polar angle [rad] seen from its
             axis, or the place along its rail [m]. Or rows of these, (T, 2) or (T,).
         joints: (links,), where the search begins [m or rad], by default their start: it decides on
-            which side the elbow is.
+            which side the elbow is. An arm that is stretched there begins with its elbow bent to
+            the left.
 
     Returns:
         q (n,), or (T, n) for rows.
@@ -70,13 +73,33 @@ def postures(system: System, path: TipPath, places: np.ndarray, q: np.ndarray) -
     """Postures (T, n) with the tip at `places` (T, m), one after another from q (n,) on."""
     out, before = [], None
     for place in places:
-        if before is None or not _near(place, before):
+        if before is None:
+            q = _first(system, path, place, q)
+        elif not _near(place, before):
             q = _approach(system, path, place, q)
         else:
-            q = _newton(system, path, place, q)
+            q = _newton(system, path, place, place, q)
         before = place
         out.append(q)
     return np.array(out)
+
+
+def _first(system: System, path: TipPath, place: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """A posture with the tip at a place (m,), from q (n,) on, or, if the arm is stretched there and
+    cannot move its tip towards the place, from q with the elbow bent to the left."""
+    try:
+        return _approach(system, path, place, q)
+    except FlexuraError:
+        rows = [
+            i
+            for i, x in zip(system.joint_rows, system.robot.links, strict=True)
+            if x.joint.type == "R" and not x.joint.locked
+        ]
+        if len(rows) < 2 or abs(np.sin(q[rows[-1]])) > STRETCHED:
+            raise
+        joints = q.copy()
+        joints[rows[-1]] += ELBOW
+        return _approach(system, path, place, static(system, joints[system.joint_rows]))
 
 
 def _near(place: np.ndarray, before: np.ndarray) -> bool:
@@ -90,11 +113,14 @@ def _approach(system: System, path: TipPath, place: np.ndarray, q: np.ndarray) -
     off = path.deviation(tip, slope, place[None])[0][0]
     ways = max(2, int(np.ceil(np.abs(off).max() / (LONGEST / 6))))
     for share in np.linspace(0, 1, ways + 1)[1:]:
-        q = _newton(system, path, place + (1 - share) * off, q)
+        q = _newton(system, path, place + (1 - share) * off, place, q)
     return q
 
 
-def _newton(system: System, path: TipPath, place: np.ndarray, q: np.ndarray) -> np.ndarray:
+def _newton(
+    system: System, path: TipPath, place: np.ndarray, end: np.ndarray, q: np.ndarray
+) -> np.ndarray:
+    """A posture with the tip at a place (m,), which is on the way to `end` (m,), from q (n,) on."""
     zero, joints = np.zeros((1, system.n)), system.joint_rows
     free = joints[~system.locked]
     rows = np.concatenate([system.elastic_rows, free])
@@ -115,8 +141,9 @@ def _newton(system: System, path: TipPath, place: np.ndarray, q: np.ndarray) -> 
         q[rows] -= step * min(1.0, LONGEST / max(longest, 1e-300))
         if longest < CLOSE:
             return q
-    where = ", ".join(f"{x:.6g}" for x in place)
+    where, here = (", ".join(f"{x:.6g}" for x in xs) for xs in (end, place))
+    way = "" if here == where else f"; the straight way there ends before {here}"
     raise FlexuraError(
         f"no posture found with the tip at {where}: it is out of reach, or the joints cannot move "
-        f"it in every direction there"
+        f"it in every direction there{way}"
     )

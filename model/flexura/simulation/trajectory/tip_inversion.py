@@ -80,7 +80,7 @@ def invert(
     ends = rests(problem)
     why = _forbidden(ends)
     if why and not least_squares:
-        raise FlexuraError(f"{why}; least_squares=True gives the nearest motion")
+        raise FlexuraError(f"{why}; least_squares=True (--least-squares) gives the nearest motion")
     motion = None if why else _solved(problem, ends)
     report(0.5)
     if motion is not None:

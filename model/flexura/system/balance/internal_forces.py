@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...errors import InputError, guarded
-from ...io import array, number
+from ...io import array, number, summary
 from ...robot import Robot
 from ...signals import Loads, LoadsLike, as_loads
 from ..statics import static
@@ -38,6 +38,25 @@ class InternalForces:
 
     def __init__(self, system: System, balance: Balance) -> None:
         self._system, self._balance = system, balance
+
+    def __repr__(self) -> str:
+        return summary.text(*self._summary())
+
+    def _repr_html_(self) -> str:
+        return summary.html(*self._summary())
+
+    def _summary(self) -> tuple[str, list[tuple[str, str]]]:
+        robot, rows = self._system.robot, []
+        for i in range(1, len(robot.links) + 1):
+            force, moment, *_ = self.reaction(i)
+            rows.append(
+                (
+                    f"joint {i}",
+                    f"force {force.real:.4g}, {force.imag:.4g} N, moment {moment:.4g} N m",
+                )
+            )
+        rows.append(("sections", "link(NUMBER): bending moment, shear and axial force, stress"))
+        return f"InternalForces of {robot.name or 'a robot'}, {robot.structure}", rows
 
     def reaction(self, joint: int) -> Reaction:
         """What link i-1 exerts on link i at joint i (139), (140).

@@ -171,6 +171,8 @@ def _eigenmodes(
     squares, columns = system.equations.modes(at, free, count or 0, np.zeros(3), shapes)
     if joints == "free" and not any(system.robot.gravity_m_s2):
         squares[: _unheld(system)] = 0.0
+    elif joints == "free" and _on_a_rail(system):
+        squares[np.abs(squares).argmin()] = 0.0
     return _modes(system, squares, columns, at)
 
 
@@ -179,6 +181,13 @@ def _unheld(system: System) -> int:
     return sum(
         not each.joint.locked and not each.joint.spring_stiffness for each in system.robot.links
     )
+
+
+def _on_a_rail(system: System) -> bool:
+    """Whether the first joint moves the whole robot along a line, and no spring holds it."""
+    first = system.robot.links[0]
+    slides = first.joint.type == "Pa" or (first.joint.type == "Pb" and not first.flexible)
+    return slides and not first.joint.locked and not first.joint.spring_stiffness
 
 
 def _check(joints: ArrayLike, count: Any) -> None:
@@ -203,6 +212,8 @@ def _dense(system: System, at: np.ndarray, joints: str, count: int | None) -> Mo
     squares, shapes[rows] = eigh((K + K.T) / 2, system.mass(at)[pick])
     if joints == "free" and not any(system.robot.gravity_m_s2):
         squares[: _unheld(system)] = 0.0
+    elif joints == "free" and _on_a_rail(system):
+        squares[np.abs(squares).argmin()] = 0.0
     return _modes(system, squares[:count], shapes[:, :count], at)
 
 

@@ -286,7 +286,7 @@ def _search(search: Search, progress: Callable[[float], None]) -> tuple[Search, 
         values = search.fit(values, window).values
         progress(0.3 + 0.4 * (k + 1) / len(windows))
     found = search.weighted_fit(values)
-    if search.mostly_inputs.any():
+    if found.mostly_of_inputs.any():
         other = search.smoother()
         again = other.weighted_fit(found.values)
         narrower = np.diag(again.covariance) / np.diag(found.covariance)
