@@ -66,6 +66,24 @@ def test_the_board_refuses_a_host_of_another_declaration():
         assert refused.value.result is Result.wrong_declaration
 
 
+@pytest.mark.parametrize(
+    ("result", "detail", "said"),
+    [
+        (Result.wrong_state, State.running, "running"),
+        (Result.wrong_state, 99, "99"),
+        (Result.fault_persists, Fault.limit_low, "limit_low"),
+        (Result.fault_persists, 99, "99"),
+        (Result.inconsistent, 0, next(iter(CONFIG))),
+        (Result.inconsistent, len(CONFIG) - 1, list(CONFIG)[-1]),
+        (Result.inconsistent, len(CONFIG), str(len(CONFIG))),
+        (Result.wrong_index, 1, "1"),
+    ],
+)
+def test_a_refusal_names_what_its_detail_is_a_number_of(result, detail, said):
+    """Or gives the number, where a board of another kind has more of them."""
+    assert str(Refused("arm", result, int(detail))).endswith(f"(detail {said})")
+
+
 def test_a_silent_line_is_no_board():
     class Silent:
         label, emulated, time = "emulated silence", True, 0.0
