@@ -30,6 +30,17 @@ def test_cobs_examples(data, stuffed):
     assert frames.cobs(data) == stuffed and frames.uncobs(stuffed) == data
 
 
+@pytest.mark.parametrize("bytes_kept", [4096, 4097])
+def test_4096_bytes_are_kept_of_what_does_not_end(bytes_kept):
+    """Noise in front of them is forgotten, a frame of one byte more with it."""
+    size = next(n for n in range(3000, 5000) if len(frames.encode(b"\1" * n)) == bytes_kept + 1)
+    frame, deframer = frames.encode(b"\1" * size), frames.Deframer()
+    deframer.feed(b"\1\1\1" + frame[:-1])
+    whole = bytes_kept == 4096
+    assert deframer.feed(frame[-1:]) == ([b"\1" * size] if whole else [])
+    assert deframer.bad == (not whole)
+
+
 def test_crc_check_value():
     """The catalogue's check value of CRC-32/ISO-HDLC is 0xCBF43926 for "123456789"."""
     assert frames.uncobs(frames.encode(b"123456789")[:-1])[-4:] == b"\x26\x39\xf4\xcb"

@@ -84,13 +84,21 @@ def test_a_refusal_names_what_its_detail_is_a_number_of(result, detail, said):
     assert str(Refused("arm", result, int(detail))).endswith(f"(detail {said})")
 
 
-def test_a_silent_line_is_no_board():
+@pytest.mark.parametrize(
+    ("asks", "seconds"),
+    [(lambda link: link.connect(2.0), 2.0), (Link.connect, 5.0), (Link.listen, 5.0)],
+)
+def test_a_silent_line_is_no_board(asks, seconds):
+    """Greeted after half the time, reset after three quarters; nothing was counted."""
+
     class Silent:
         label, emulated, time = "emulated silence", True, 0.0
-        resets = 0
+
+        def __init__(self):
+            self.writes, self.resets = [], []
 
         def write(self, data):
-            pass
+            self.writes.append(self.time)
 
         def read(self):
             return b""
@@ -102,14 +110,17 @@ def test_a_silent_line_is_no_board():
             return self.time
 
         def reset(self):
-            self.resets += 1
+            self.resets.append(self.time)
 
     silent = Silent()
-    with pytest.raises(
-        BoardError, match=r"emulated silence: no good frame within 2 s .*flexura flash"
-    ):
-        Link(silent).connect(2.0)
-    assert silent.resets == 1 and silent.time < 2.1
+    link = Link(silent)
+    said = rf"emulated silence: no good frame within {seconds:g} s .*flexura flash"
+    with pytest.raises(BoardError, match=said):
+        asks(link)
+    assert silent.writes == pytest.approx([seconds / 2], abs=0.01)
+    assert silent.resets == pytest.approx([0.75 * seconds], abs=0.01)
+    assert silent.time == pytest.approx(seconds, abs=0.01)
+    assert not any(vars(link.counts).values())
 
 
 def test_a_session_left_open_by_another_program_is_taken_over():
