@@ -23,6 +23,7 @@ from flexlab.board.protocol.declaration import (
     BAUD_BIT_S,
     CONFIG,
     DECLARATION,
+    MESSAGES,
     TELEMETRY_EVERY_TICKS,
     Fault,
     Result,
@@ -84,34 +85,37 @@ def test_a_refusal_names_what_its_detail_is_a_number_of(result, detail, said):
     assert str(Refused("arm", result, int(detail))).endswith(f"(detail {said})")
 
 
+class Silent:
+    """A line on which nothing answers by itself."""
+
+    label, emulated, time = "emulated silence", True, 0.0
+
+    def __init__(self):
+        self.writes, self.resets, self.arrived = [], [], b""
+
+    def write(self, data):
+        self.writes.append(self.time)
+
+    def read(self):
+        data, self.arrived = self.arrived, b""
+        return data
+
+    def wait(self, seconds):
+        self.time += seconds
+
+    def now(self):
+        return self.time
+
+    def reset(self):
+        self.resets.append(self.time)
+
+
 @pytest.mark.parametrize(
     ("asks", "seconds"),
     [(lambda link: link.connect(2.0), 2.0), (Link.connect, 5.0), (Link.listen, 5.0)],
 )
 def test_a_silent_line_is_no_board(asks, seconds):
     """Greeted after half the time, reset after three quarters; nothing was counted."""
-
-    class Silent:
-        label, emulated, time = "emulated silence", True, 0.0
-
-        def __init__(self):
-            self.writes, self.resets = [], []
-
-        def write(self, data):
-            self.writes.append(self.time)
-
-        def read(self):
-            return b""
-
-        def wait(self, seconds):
-            self.time += seconds
-
-        def now(self):
-            return self.time
-
-        def reset(self):
-            self.resets.append(self.time)
-
     silent = Silent()
     link = Link(silent)
     said = rf"emulated silence: no good frame within {seconds:g} s .*flexura flash"
@@ -121,6 +125,31 @@ def test_a_silent_line_is_no_board(asks, seconds):
     assert silent.resets == pytest.approx([0.75 * seconds], abs=0.01)
     assert silent.time == pytest.approx(seconds, abs=0.01)
     assert not any(vars(link.counts).values())
+
+
+@pytest.mark.parametrize(("name", "repeat_s", "end_s"), [("stop", 0.05, 1), ("config_save", 2, 40)])
+def test_a_command_without_an_answer_is_repeated_and_given_up(name, repeat_s, end_s):
+    """A command that takes long has more time."""
+    line = Silent()
+    link = Link(line)
+    with pytest.raises(BoardError, match=f"no answer to {name} after 20 attempts"):
+        link.command(name)
+    assert line.writes == pytest.approx(repeat_s * np.arange(20), abs=0.03)
+    assert line.time == pytest.approx(end_s, abs=0.02)
+    assert link.counts.repeated == 19 and link.idle
+
+
+def test_an_answer_to_another_command_is_none():
+    """A number may be that of a session before."""
+    line = Silent()
+    link = Link(line, sequence=7)
+    asked = link.submit("stop")
+    link.poll()
+    for name, number, done in (("keepalive", 7, False), ("stop", 8, False), ("stop", 7, True)):
+        answer = {"command": MESSAGES[name].code, "result": Result.ok, "detail": 0}
+        line.arrived = encode(messages.pack("ack", number, **answer))
+        link.poll()
+        assert asked.done == link.idle == done
 
 
 def test_a_session_left_open_by_another_program_is_taken_over():
