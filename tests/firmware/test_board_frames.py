@@ -24,6 +24,7 @@ RUN = bytes(range(1, 255))
         (b"\x11\x00\x00\x00", b"\x02\x11\x01\x01\x01"),
         (RUN[:253], b"\xfe" + RUN[:253]),
         (RUN + b"\xff", b"\xff" + RUN + b"\x02\xff"),
+        (RUN + b"\x00", b"\xff" + RUN + b"\x01\x01"),
     ],
 )
 def test_cobs_examples(data, stuffed):
