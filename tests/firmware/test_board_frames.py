@@ -42,6 +42,12 @@ def test_4096_bytes_are_kept_of_what_does_not_end(bytes_kept):
     assert deframer.bad == (not whole)
 
 
+def test_a_checksum_alone_is_no_payload():
+    """Four bytes of 0 have the checksum of nothing."""
+    assert frames.decode(frames.cobs(bytes(4))) is None
+    assert frames.decode(frames.encode(b"\0")[:-1]) == b"\0"
+
+
 def test_crc_check_value():
     """The catalogue's check value of CRC-32/ISO-HDLC is 0xCBF43926 for "123456789"."""
     assert frames.uncobs(frames.encode(b"123456789")[:-1])[-4:] == b"\x26\x39\xf4\xcb"
