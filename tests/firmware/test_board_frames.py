@@ -24,10 +24,28 @@ RUN = bytes(range(1, 255))
         (b"\x11\x00\x00\x00", b"\x02\x11\x01\x01\x01"),
         (RUN[:253], b"\xfe" + RUN[:253]),
         (RUN + b"\xff", b"\xff" + RUN + b"\x02\xff"),
+        (RUN + b"\x00", b"\xff" + RUN + b"\x01\x01"),
     ],
 )
 def test_cobs_examples(data, stuffed):
     assert frames.cobs(data) == stuffed and frames.uncobs(stuffed) == data
+
+
+@pytest.mark.parametrize("bytes_kept", [4096, 4097])
+def test_4096_bytes_are_kept_of_what_does_not_end(bytes_kept):
+    """Noise in front of them is forgotten, a frame of one byte more with it."""
+    size = next(n for n in range(3000, 5000) if len(frames.encode(b"\1" * n)) == bytes_kept + 1)
+    frame, deframer = frames.encode(b"\1" * size), frames.Deframer()
+    deframer.feed(b"\1\1\1" + frame[:-1])
+    whole = bytes_kept == 4096
+    assert deframer.feed(frame[-1:]) == ([b"\1" * size] if whole else [])
+    assert deframer.bad == (not whole)
+
+
+def test_a_checksum_alone_is_no_payload():
+    """Four bytes of 0 have the checksum of nothing."""
+    assert frames.decode(frames.cobs(bytes(4))) is None
+    assert frames.decode(frames.encode(b"\0")[:-1]) == b"\0"
 
 
 def test_crc_check_value():

@@ -23,6 +23,7 @@ from flexlab.board.protocol.declaration import (
     BAUD_BIT_S,
     CONFIG,
     DECLARATION,
+    MESSAGES,
     TELEMETRY_EVERY_TICKS,
     Fault,
     Result,
@@ -66,32 +67,89 @@ def test_the_board_refuses_a_host_of_another_declaration():
         assert refused.value.result is Result.wrong_declaration
 
 
-def test_a_silent_line_is_no_board():
-    class Silent:
-        label, emulated, time = "emulated silence", True, 0.0
-        resets = 0
+@pytest.mark.parametrize(
+    ("result", "detail", "said"),
+    [
+        (Result.wrong_state, State.running, "running"),
+        (Result.wrong_state, 99, "99"),
+        (Result.fault_persists, Fault.limit_low, "limit_low"),
+        (Result.fault_persists, 99, "99"),
+        (Result.inconsistent, 0, next(iter(CONFIG))),
+        (Result.inconsistent, len(CONFIG) - 1, list(CONFIG)[-1]),
+        (Result.inconsistent, len(CONFIG), str(len(CONFIG))),
+        (Result.wrong_index, 1, "1"),
+    ],
+)
+def test_a_refusal_names_what_its_detail_is_a_number_of(result, detail, said):
+    """Or gives the number, where a board of another kind has more of them."""
+    assert str(Refused("arm", result, int(detail))).endswith(f"(detail {said})")
 
-        def write(self, data):
-            pass
 
-        def read(self):
-            return b""
+class Silent:
+    """A line on which nothing answers by itself."""
 
-        def wait(self, seconds):
-            self.time += seconds
+    label, emulated, time = "emulated silence", True, 0.0
 
-        def now(self):
-            return self.time
+    def __init__(self):
+        self.writes, self.resets, self.arrived = [], [], b""
 
-        def reset(self):
-            self.resets += 1
+    def write(self, data):
+        self.writes.append(self.time)
 
+    def read(self):
+        data, self.arrived = self.arrived, b""
+        return data
+
+    def wait(self, seconds):
+        self.time += seconds
+
+    def now(self):
+        return self.time
+
+    def reset(self):
+        self.resets.append(self.time)
+
+
+@pytest.mark.parametrize(
+    ("asks", "seconds"),
+    [(lambda link: link.connect(2.0), 2.0), (Link.connect, 5.0), (Link.listen, 5.0)],
+)
+def test_a_silent_line_is_no_board(asks, seconds):
+    """Greeted after half the time, reset after three quarters; nothing was counted."""
     silent = Silent()
-    with pytest.raises(
-        BoardError, match=r"emulated silence: no good frame within 2 s .*flexura flash"
-    ):
-        Link(silent).connect(2.0)
-    assert silent.resets == 1 and silent.time < 2.1
+    link = Link(silent)
+    said = rf"emulated silence: no good frame within {seconds:g} s .*flexura flash"
+    with pytest.raises(BoardError, match=said):
+        asks(link)
+    assert silent.writes == pytest.approx([seconds / 2], abs=0.01)
+    assert silent.resets == pytest.approx([0.75 * seconds], abs=0.01)
+    assert silent.time == pytest.approx(seconds, abs=0.01)
+    assert not any(vars(link.counts).values())
+
+
+@pytest.mark.parametrize(("name", "repeat_s", "end_s"), [("stop", 0.05, 1), ("config_save", 2, 40)])
+def test_a_command_without_an_answer_is_repeated_and_given_up(name, repeat_s, end_s):
+    """A command that takes long has more time."""
+    line = Silent()
+    link = Link(line)
+    with pytest.raises(BoardError, match=f"no answer to {name} after 20 attempts"):
+        link.command(name)
+    assert line.writes == pytest.approx(repeat_s * np.arange(20), abs=0.03)
+    assert line.time == pytest.approx(end_s, abs=0.02)
+    assert link.counts.repeated == 19 and link.idle
+
+
+def test_an_answer_to_another_command_is_none():
+    """A number may be that of a session before."""
+    line = Silent()
+    link = Link(line, sequence=7)
+    asked = link.submit("stop")
+    link.poll()
+    for name, number, done in (("keepalive", 7, False), ("stop", 8, False), ("stop", 7, True)):
+        answer = {"command": MESSAGES[name].code, "result": Result.ok, "detail": 0}
+        line.arrived = encode(messages.pack("ack", number, **answer))
+        link.poll()
+        assert asked.done == link.idle == done
 
 
 def test_a_session_left_open_by_another_program_is_taken_over():

@@ -1,6 +1,6 @@
 """Runs the tests of the board's library, or of the host's protocol, against mutants of them.
 
-    python tests/support/mutation.py [--part K/N] [--out FILE] [NAME...]
+    python tests/support/mutation.py [--part K/N] [NAME...]
 
 NAME is safety, protocol, control, rig or link; without it all. K/N takes every N-th mutant from the
 K-th on, so that one long run may be done in parts. Each mutant that no test notices is printed; the
@@ -17,33 +17,29 @@ import subprocess
 import sys
 import tempfile
 import tomllib
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 import mutants
-from board_library import FIRMWARE, HERE, INCLUDES, ROOT, SOURCES
+from board_library import FIRMWARE, HERE, ROOT
 
 LIST = HERE / "equivalent.toml"
 LIB = FIRMWARE / "lib"
 # Of processor time for one program, and for a file of the host's tests; what needs more hangs.
 SECONDS, HOST_SECONDS = 20, 400
 
-# What is mutated, and which source is compiled again for it.
+# What is mutated, below lib/. Of a header all sources and programs are compiled again.
 BOARD = {
-    "safety": {"safety/src/fault_monitor.cpp": "safety/src/fault_monitor.cpp"},
-    "protocol": {
-        "protocol/src/frame.cpp": "protocol/src/frame.cpp",
-        "session/src/session.cpp": "session/src/session.cpp",
-    },
-    "control": {
-        "control/src/pid.h": "control/src/pid.cpp",
-        "control/src/numbers.h": "control/src/pid.cpp",
-        "control/src/filter.h": "rig/src/rig.cpp",
-    },
-    "rig": {
-        "rig/src/rig.cpp": "rig/src/rig.cpp",
-        "rig/src/commands.cpp": "rig/src/commands.cpp",
-    },
+    "safety": ["safety/src/fault_monitor.cpp"],
+    "protocol": ["protocol/src/frame.cpp", "session/src/session.cpp"],
+    "control": [
+        "control/src/pid.h",
+        "control/src/numbers.h",
+        "control/src/filter.h",
+        "control/src/disturbance_observer.h",
+    ],
+    "rig": ["rig/src/rig.cpp", "rig/src/commands.cpp"],
 }
 PROTOCOL = ROOT / "analysis/flexlab/board/protocol"
 HOST = {
@@ -65,8 +61,9 @@ ARGUMENTS = {
     "frames": ["100000", "7"],
     "replay": [str(path) for path in sorted((HERE / "corpus").iterdir())],
 }
-# Undefined behaviour ends the program: of a mutant it is noticed, too.
-TRAPS = ["-fsanitize=undefined", "-fsanitize-undefined-trap-on-error"]
+# Undefined behaviour ends the program: of a mutant it is noticed, too. A message's last array has
+# a length as well.
+TRAPS = ["-fsanitize=undefined,bounds-strict", "-fsanitize-undefined-trap-on-error"]
 CXX = ["g++", "-std=gnu++14", "-O0", "-w", *TRAPS]
 
 
@@ -99,51 +96,49 @@ def passes(command: list[str], seconds: int = SECONDS, **more: object) -> bool:
 
 
 class Board:
-    """The library compiled once; a mutant needs one source anew and the programs linked."""
+    """A copy of the library, compiled once. A mutant needs one source anew, or all of them."""
 
     def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self.objects = {source: self.compiled(Path(source)) for source in SOURCES}
-        self.mains, self.order = {}, list(MAINS)
-        for name, arguments in MAINS.items():
-            self.mains[name] = folder / f"main_{name}.o"
-            command = [*CXX, *INCLUDES, *arguments, "-c", "-o", str(self.mains[name])]
-            subprocess.run(command, check=True)
-        assert self.notices(None, LIB / "rig/src/rig.cpp") is None, "without a mutant all must pass"
+        self.folder, self.lib = folder, folder / "lib"
+        shutil.copytree(LIB, self.lib)
+        self.includes = [f"-I{path}" for path in sorted(self.lib.glob("*/src"))]
+        self.sources = sorted(self.lib.glob("*/src/*.cpp"))
+        self.order = list(MAINS)
+        self.made: dict[str, Path] = {}  # objects of the original
+        assert self.notices(None) is None, "without a mutant all must pass"
 
-    def compiled(self, source: Path, *before: str, out: str = "") -> Path:
-        made = self.folder / (out or f"{source.stem}.o")
-        command = [*CXX, *before, *INCLUDES, f"-I{source.parent}", "-c", str(source)]
-        subprocess.run([*command, "-o", str(made)], check=True, stderr=subprocess.DEVNULL)
-        return made
+    def compiled(self, made: dict[str, Path], name: str, *arguments: str) -> str:
+        """An object of the original, or of a mutant that changes it."""
+        if name not in made:
+            kind = "original" if made is self.made else "mutant"
+            out = self.folder / f"{Path(name).stem}_{kind}.o"
+            command = [*CXX, *self.includes, *arguments, "-c", "-o", str(out)]
+            subprocess.run(command, check=True, stderr=subprocess.DEVNULL)
+            made[name] = out
+        return str(made[name])
 
-    def notices(self, mutant: mutants.Mutant | None, source: Path) -> str | None:
-        """The name of the first program that fails; None: no program notices the mutant. Of a
-        header the unit tests are compiled again too: they have objects of its classes."""
-        mutated, mains = self.objects[str(source)], dict(self.mains)
-        if mutant:
-            place = self.folder / "mutant"
-            shutil.rmtree(place, ignore_errors=True)
-            # With all that stands beside it: a header is looked for beside the one that names it.
-            shutil.copytree((ROOT / mutant.file).parent, place)
-            text = (ROOT / mutant.file).read_text(encoding="utf-8")
-            (place / Path(mutant.file).name).write_text(mutant.apply(text), encoding="utf-8")
-            own = place / source.name
-            if not own.exists():
-                shutil.copy(source, own)
-            try:
-                mutated = self.compiled(own, f"-I{place}", out="mutant.o")
-                for name in ("test_lib", "test_refusals") if mutant.file.endswith(".h") else ():
-                    mains[name] = place / f"{name}.o"
-                    before = [*CXX, f"-I{place}", *INCLUDES, *MAINS[name], "-c"]
-                    subprocess.run([*before, "-o", str(mains[name])], check=True)
-            except subprocess.CalledProcessError:
-                return "the compiler"
-        others = [str(o) for s, o in self.objects.items() if s != str(source)]
+    def notices(self, mutant: mutants.Mutant | None) -> str | None:
+        """The name of the first program that fails; None: no program notices the mutant."""
+        if not mutant:
+            return self.fails(self.made)
+        place = self.folder / Path(mutant.file).relative_to("firmware")
+        original = place.read_text(encoding="utf-8")
+        place.write_text(mutant.apply(original), encoding="utf-8")
+        kept = {} if place.suffix == ".h" else self.made
+        try:
+            return self.fails({name: out for name, out in kept.items() if name != str(place)})
+        except subprocess.CalledProcessError:
+            return "the compiler"
+        finally:
+            place.write_text(original, encoding="utf-8")
+
+    def fails(self, made: dict[str, Path]) -> str | None:
+        """The first program that fails, with objects that are there and others made now."""
+        objects = [self.compiled(made, str(source), str(source)) for source in self.sources]
         for name in self.order:
             program = str(self.folder / name)
-            linked = ["g++", str(mutated), str(mains[name]), *others, "-o", program]
-            subprocess.run(linked, check=True)
+            main = self.compiled(made, name, *MAINS[name])
+            subprocess.run(["g++", main, *objects, "-o", program], check=True)
             if not passes([program, *ARGUMENTS.get(name, [])]):
                 self.order.remove(name)
                 self.order.insert(0, name)  # the next mutant is often noticed by the same
@@ -156,6 +151,7 @@ def host(folder: Path, mutant: mutants.Mutant | None, tests: list[str]) -> str |
     copy = folder / "analysis"
     if not copy.exists():
         shutil.copytree(ROOT / "analysis", copy)
+        (folder / "firmware").symlink_to(FIRMWARE)  # flexlab looks for it beside itself
     place = folder / mutant.file if mutant else copy / "flexlab/__init__.py"
     original = place.read_text(encoding="utf-8")
     surroundings = os.environ | {
@@ -184,24 +180,23 @@ def equivalent() -> dict[str, str]:
 def run(name: str, part: tuple[int, int] = (1, 1), say=print) -> Outcome:
     """Try the mutants of a name, or every N-th of them from the K-th on."""
     k, n = part
-    known, killed, same, survived = equivalent(), 0, 0, []
+    known, killed, same, survived, todo = equivalent(), 0, 0, [], []
     with tempfile.TemporaryDirectory(prefix="flexura-mutants-") as made:
         folder = Path(made)
-        board = Board(folder) if name in BOARD else None
-        todo = []
-        for file, again in (BOARD | HOST)[name].items():
-            path = (LIB if board else PROTOCOL) / file
-            todo += [(mutant, again) for mutant in mutants.of(path, ROOT)]
-            if not board:
-                assert host(folder, None, list(again)) is None, "without a mutant all must pass"
-        for mutant, again in todo[k - 1 :: n]:
+        if name in BOARD:
+            board = Board(folder)
+            for file in BOARD[name]:
+                todo += [(mutant, board.notices) for mutant in mutants.of(LIB / file, ROOT)]
+        else:
+            for file, tests in HOST[name].items():
+                notices = partial(host, folder, tests=tests)
+                assert notices(None) is None, "without a mutant all must pass"
+                todo += [(mutant, notices) for mutant in mutants.of(PROTOCOL / file, ROOT)]
+        for mutant, notices in todo[k - 1 :: n]:
             if mutant.name in known:
                 same += 1
                 continue
-            if board:
-                by = board.notices(mutant, LIB / str(again))
-            else:
-                by = host(folder, mutant, list(again))
+            by = notices(mutant)
             if by is None:
                 survived.append(mutant)
                 say(f"line {mutant.line}: {mutant.name}")

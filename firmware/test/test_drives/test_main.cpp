@@ -108,6 +108,71 @@ static void both_motors_hold_their_set_points() {
   CHECK(!(report.flags >> static_cast<uint8_t>(Flag::driver_enabled) & 1));
 }
 
+// Two motors whose gain is just less than 8 units of output a count: at one count 7, which is no
+// PWM count, and 8 with the least addition, which is one. Their observers take every output as a
+// load.
+static void motors_with_observers() {
+  Config config = default_config();
+  config.drive_1() = config.drive_2() = 2;
+  config.kp_1_V_rad() = config.kp_2_V_rad() = 524287 / 65536.0f * 0.09375f;
+  config.observer_1_Hz() = config.observer_2_Hz() = 20;
+  begin(config);
+  const FixedPointConfig &fixed = rig.fixed();
+  CHECK(fixed.gains[0].kp == 524287 && fixed.gains[1].kp == 524287);
+  CHECK(fixed.observer[0].filter && fixed.observer[1].filter);
+  Inputs &in = rig.inputs();
+  memset(&in, 0, sizeof in);
+  in.flex = 3500;
+  in.supply = 500;
+  tick();
+  const Reference reference = {0, 0, 0};
+  CHECK(ask(Reference::kCode, &reference) == Result::ok);
+}
+
+static void run_to(int32_t counts, uint16_t armed_ticks = 0) {
+  const Arm arm = {static_cast<uint8_t>(Mode::position)};
+  Setpoints points = {};
+  points.count = points.final = 1;
+  points.position_1[0] = points.position_2[0] = counts * 256;
+  const Start start = {3};
+  CHECK(ask(Arm::kCode, &arm) == Result::ok);
+  tick(armed_ticks);
+  CHECK(ask(Setpoints::kCode, &points) == Result::ok && ask(Start::kCode, &start) == Result::ok);
+}
+
+static void what_observers_found_does_not_reach_the_next_run() {
+  for (uint8_t odd = 0; odd < 2; ++odd) {  // the joints take turns
+    motors_with_observers();
+    run_to(5);
+    tick(static_cast<uint16_t>(60 + odd));
+    // 40 units without an observer, which are 2 PWM counts
+    CHECK(out.duty[0] > 10 && out.duty[1] > 10 && ask(Stop::kCode) == Result::ok);
+    run_to(1);
+    tick();
+    CHECK(out.on && out.duty[0] == 0 && out.duty[1] == 0);
+  }
+}
+
+// Output 215 / 16 of a PWM count in the first tick, from nothing: one unit more would be 14 counts.
+static void both_motors_start_from_nothing() {
+  Config config = default_config();
+  config.drive_1() = config.drive_2() = 2;
+  config.kp_1_V_rad() = config.kp_2_V_rad() = 10;
+  config.voltage_slew_V_s() = 201.5f;
+  begin(config);
+  Inputs &in = rig.inputs();
+  memset(&in, 0, sizeof in);
+  in.flex = 3500;
+  in.supply = 500;
+  tick();
+  const Reference reference = {0, 0, 0};
+  CHECK(ask(Reference::kCode, &reference) == Result::ok);
+  CHECK(rig.fixed().gains[1].slew == 215);
+  run_to(9, 3);
+  tick();
+  CHECK(out.duty[0] == (215 + 8) / 16 && out.duty[1] == (215 + 8) / 16);
+}
+
 static void a_rig_of_one_joint_moves_and_hears_nothing_of_a_second() {
   turning(0);
   const Reference elsewhere = {0, 3, 0}, pulses = {0, 0, 5};
@@ -117,11 +182,14 @@ static void a_rig_of_one_joint_moves_and_hears_nothing_of_a_second() {
   CHECK(ask(Arm::kCode, &arm) == Result::ok);
   Drives drives = {};
   drives.count = 8;
-  drives.rate[7] = 1;
-  CHECK(ask(Drives::kCode, &drives) == Result::out_of_range);
-  drives.rate[7] = 0;
-  drives.voltage_2[3] = 1;
-  CHECK(ask(Drives::kCode, &drives) == Result::out_of_range);
+  for (uint8_t k = 0; k < 8; ++k) {
+    drives.rate[k] = 1;
+    CHECK(ask(Drives::kCode, &drives) == Result::out_of_range);
+    drives.rate[k] = 0;
+    drives.voltage_2[k] = 1;
+    CHECK(ask(Drives::kCode, &drives) == Result::out_of_range);
+    drives.voltage_2[k] = 0;
+  }
   CHECK(ask(Stop::kCode) == Result::ok);
   arm.mode = static_cast<uint8_t>(Mode::position);
   CHECK(ask(Arm::kCode, &arm) == Result::ok);
@@ -222,6 +290,8 @@ static void another_drive_or_encoder_asks_for_a_reference_anew() {
 static void tests() {
   RUN(a_motor_at_joint_2_is_watched_as_one_at_joint_1);
   RUN(both_motors_hold_their_set_points);
+  RUN(what_observers_found_does_not_reach_the_next_run);
+  RUN(both_motors_start_from_nothing);
   RUN(a_rig_of_one_joint_moves_and_hears_nothing_of_a_second);
   RUN(a_stepper_without_an_encoder_is_where_its_pulses_are);
   RUN(a_motor_needs_its_pins_and_its_encoder);

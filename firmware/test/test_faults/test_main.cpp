@@ -74,11 +74,10 @@ static void begin() {
     at_rest();
     now.duty[0] = 100;
     for (uint8_t k = 0; k < 20; ++k) CHECK(monitor.check(limits, in, now) == Fault::none);
-    now.duty[0] = 0;
     for (uint8_t k = 0; k < 3; ++k) {
       in.supply = 300;
       in.flex = 100;
-      in.moved[0] = in.moved[1] = 30;
+      in.moved[0] = in.moved[1] = -10;
       CHECK(monitor.check(limits, in, now) == Fault::none);
     }
     at_rest();
@@ -311,6 +310,13 @@ static void running_away_and_standing_still() {
     now.velocity[0] = static_cast<int16_t>(-21 * sign);  // it moves for a tick
     CHECK(quiet(1));
     now.velocity[0] = 0;
+    CHECK(until(Fault::stall_1) == 30);
+    begin();
+    now.duty[0] = static_cast<int16_t>(51 * sign);
+    CHECK(quiet(29));
+    now.duty[0] = static_cast<int16_t>(50 * sign);  // not driven for a tick: forgotten
+    CHECK(quiet(1));
+    now.duty[0] = static_cast<int16_t>(51 * sign);
     CHECK(until(Fault::stall_1) == 30);
     begin();
     now.duty[0] = static_cast<int16_t>(50 * sign);

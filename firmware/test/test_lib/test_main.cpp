@@ -256,6 +256,22 @@ static void integral_stops_at_the_limit() {
   CHECK(ticks < 45);  // 12800 / (2^26 / 2^32 x 20000) = 41: no windup to undo
 }
 
+// The integral grows by one unit of output in each tick, from -150 or 150 that another term holds:
+// it stops within the limit of 100, at 99 and at -100, and the output is far from its own limit.
+static void integral_stops_at_the_limit_below_the_output() {
+  PidGains g;
+  g.ki = 1L << 22;
+  g.limit = 100;
+  g.slew = kOutputMax;
+  for (int8_t sign = -1; sign <= 1; sign = static_cast<int8_t>(sign + 2)) {
+    Pid pid;
+    const int32_t error = sign * (1024L * 256), held = sign * (-150L * 65536);
+    const PidSignals s = {error, 0, 0, held};
+    for (uint16_t k = 0; k < 300; ++k) pid.update(g, s);
+    CHECK(pid.output() == (sign > 0 ? 99 - 150 : -100 + 150));
+  }
+}
+
 static void an_observer_equals_its_formula() {
   ObserverGains g;
   g.moving = 70000;
@@ -326,6 +342,24 @@ static void the_law_in_doubles_is_its_formula_to_the_digit() {
     last = held;
     CHECK(pid.update(g, s) == held);
   }
+}
+
+static void an_observer_in_doubles_is_its_formula_to_the_digit() {
+  ObserverGainsOf<ModelNumbers> g;
+  g.moving = 1.5;
+  g.inertia = 4;
+  g.filter = 0.25;
+  DisturbanceObserverOf<ModelNumbers> observer;
+  double filtered = 0;
+  for (uint8_t k = 0; k < 20; ++k) {
+    const double output = between(-64, 64), rate = between(-64, 64);
+    filtered += 0.25 * (output + 1.5 * rate - filtered);
+    CHECK(observer.update(g, output, rate) == filtered - 4 * rate);
+  }
+  observer.start();
+  CHECK(observer.update(g, 8, 0) == 2);
+  g.filter = 0;
+  CHECK(observer.update(g, 8, 8) == 0);  // there is none
 }
 
 static void a_sum_at_its_limit_is_not_outside() {
@@ -887,10 +921,12 @@ static void tests() {
   RUN(proportional_is_exact_and_limited);
   RUN(pid_equals_its_formula);
   RUN(integral_stops_at_the_limit);
+  RUN(integral_stops_at_the_limit_below_the_output);
   RUN(an_observer_equals_its_formula);
   RUN(an_observer_finds_a_load);
 #ifndef __AVR__
   RUN(the_law_in_doubles_is_its_formula_to_the_digit);
+  RUN(an_observer_in_doubles_is_its_formula_to_the_digit);
   RUN(a_sum_at_its_limit_is_not_outside);
 #endif
   RUN(steps_come_when_they_are_due);

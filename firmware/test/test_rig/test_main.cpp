@@ -81,7 +81,7 @@ static void a_report_has_all_that_the_tick_knew() {
   CHECK(report.setpoint_1 == 500 && report.setpoint_2 == 3971);
   // 500 / 1024 x 5 V x 4.9 = 11.963 V.
   CHECK(report.flex == 3500 && report.supply >= 11960 && report.supply <= 11966);
-  CHECK(report.voltage >= 498 && report.voltage <= 500);
+  CHECK(report.voltage >= 498 && report.voltage <= 500 && report.voltage_2 == 0);
   // The rate in whole units of 1/4096 microstep a tick: 3971 microsteps/s are 16265 of them.
   CHECK(report.rate == 3970);
   CHECK(is_set(report, Flag::bridge_enabled) && is_set(report, Flag::driver_enabled));
@@ -95,6 +95,56 @@ static void a_report_has_all_that_the_tick_knew() {
   CHECK(report.tick == tripped + 3 && report.voltage == 0 && report.rate == 0);
   CHECK(!is_set(report, Flag::bridge_enabled) && !is_set(report, Flag::driver_enabled));
   CHECK(rig.now() == report.tick);
+}
+
+// At 60 V a unit of output is two of what a report counts in.
+static void without_a_drive_a_report_has_no_voltage() {
+  Config config = default_config();
+  config.supply_V() = 60;
+  begin_with(config);
+  Telemetry report;
+  rig.report(report);
+  CHECK(report.voltage == 0 && report.voltage_2 == 0 && report.rate == 0);
+}
+
+// 1000 microsteps/s, and a brake of 10 rad/s2 x 1 ms = 5.09 microsteps/s a tick.
+static void joint_2_brakes_after_a_halt_and_stands_after_a_stop() {
+  Config config = default_config();
+  config.lost_step_rad() = 10;
+  config.rate_max_2_rad_s() = 7;
+  config.position_max_2_rad() = 100;
+  for (uint8_t stops = 0; stops < 2; ++stops) {
+    begin_with(config);
+    CHECK(reference(0, 0, 0) == Result::ok && arm_as(Mode::open_loop) == Result::ok);
+    Drives drives = {};
+    drives.count = 8;
+    for (uint8_t k = 0; k < 8; ++k) drives.rate[k] = 1000;
+    const Start start = {6};
+    CHECK(ask(Drives::kCode, &drives) == Result::ok && ask(Start::kCode, &start) == Result::ok);
+    for (uint16_t k = 0; k < 300 || (k < 400 && out.steps.count == 0); ++k) {
+      if (k % 50 == 0) rig.host_spoke();
+      tick();
+    }
+    CHECK(out.steps.count == 1);
+    CHECK(out.on && ask(stops ? Stop::kCode : Halt::kCode) == Result::ok);
+    Telemetry report;
+    if (stops) {  // the steps that were planned are not given
+      still();
+      rig.tick(out);
+      CHECK(!out.on && out.steps.count == 0);
+      CHECK(arm_as(Mode::open_loop) == Result::ok);
+      tick();
+      rig.report(report);
+      CHECK(out.on && out.steps.count == 0 && report.rate == 0);
+    } else {
+      tick(100);
+      rig.report(report);
+      CHECK(report.rate > 480 && report.rate < 500);
+      tick(100);
+      rig.report(report);
+      CHECK(report.rate == 0);
+    }
+  }
 }
 
 static void a_refusal_says_the_state_and_stop_forgets_the_trajectory() {
@@ -471,6 +521,8 @@ static void arming_begins_everything_anew() {
 
 static void tests() {
   RUN(a_report_has_all_that_the_tick_knew);
+  RUN(without_a_drive_a_report_has_no_voltage);
+  RUN(joint_2_brakes_after_a_halt_and_stands_after_a_stop);
   RUN(a_refusal_says_the_state_and_stop_forgets_the_trajectory);
   RUN(a_reference_agrees_with_itself_to_the_count);
   RUN(steps_are_lost_to_the_fraction);

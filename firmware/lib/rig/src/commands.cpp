@@ -101,7 +101,6 @@ Result Rig::handle(const Arm &command, uint16_t &detail) {
   monitor_.start();
   step_generator_.start(steps_given_);
   flex_sensor_.start(fixed_.tip, static_cast<uint16_t>(2 * in_.flex));
-  flex_before_ = in_.flex;
   for (uint8_t j = 0; j < 2; ++j) {
     velocity_[j].start();
     pid_[j].start(0);
@@ -109,7 +108,6 @@ Result Rig::handle(const Arm &command, uint16_t &detail) {
     added_[j] = disturbance_[j] = 0;
   }
   target_ = {{0, 0}};
-  final_ = false;
   mode_ = static_cast<Mode>(command.mode);
   return enter(State::idle, State::armed) ? Result::ok : Result::wrong_state;
 }
