@@ -9,7 +9,7 @@ import pytest
 from boards import BENCH, COMPILERS, configured, elf, finish
 from experiments import SETTINGS, experiment
 from flexlab import rig
-from flexlab.benchmarks import firmware_load
+from flexlab.benchmarks.problems import firmware_load
 from flexlab.board.emulator.emulated import EmulatedBoard
 from flexlab.board.protocol.declaration import Fault, State
 from flexlab.board.protocol.player import Player, setpoints

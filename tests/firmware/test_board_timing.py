@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from boards import BENCH, COMPILERS, TICK, Rigged, elf
-from flexlab.benchmarks import firmware_load
+from flexlab.benchmarks.problems import firmware_load
 from flexlab.board.emulator.simulator import CLOCK_HZ
 from flexlab.board.protocol.declaration import Fault, State
 

@@ -3,8 +3,9 @@
 `problems` has the motions, statics, frequencies and the error measure; `exudyn_programs` the same
 in Exudyn; `native` runs of flexura. `exudyn_search` finds Exudyn's cheapest settings and keeps them
 in settings.json; `native_search` finds flexura's. `equal_error` makes the rows, `timing` measures,
-`report` makes the tables. `accuracy` gives errors over tolerances; `population`, `scaling`
-and `board_load` stand alone, as does `problems.predictive`.
+`report` makes the tables. `accuracy` gives errors over tolerances, `time_parts` what the time goes
+into; `population` and `scaling` stand alone, as do `predictive`, `learning` and `board_load` of
+`problems`.
 """
 
 import os

@@ -18,7 +18,6 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from . import (
     accuracy,
-    board_load,
     equal_error,
     exudyn_search,
     population,
@@ -26,7 +25,7 @@ from . import (
     scaling,
     time_parts,
 )
-from .problems import learning, predictive
+from .problems import board_load, learning, predictive
 from .problems.motions import all_motions
 from .problems.problem import Problem
 from .problems.statics import StaticProblem, all_statics

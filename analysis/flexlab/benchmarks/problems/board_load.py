@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from ..board.emulator.simulator import CLOCK_HZ
-from ..experiment.flash import RIG, build
-from ..rig import load as load_rig
+from ...board.emulator.simulator import CLOCK_HZ
+from ...experiment.flash import RIG, build
+from ...rig import load as load_rig
 from . import firmware_load
 
 

@@ -16,16 +16,16 @@ from pathlib import Path
 
 from flexura.signals import Signal, harmonic
 
-from ..board.commissioning import commission
-from ..board.emulator.emulated import EmulatedBoard
-from ..board.emulator.simulator import CLOCK_HZ
-from ..board.protocol.declaration import CONTROL_HZ
-from ..board.protocol.player import Knots, Player, setpoints
-from ..board.protocol.session import Link
-from ..rig import RigSetup, configuration
-from ..rig.board_axes import board_axes
-from ..rig.plant.plant import rig_plant
-from ..rig.plant.rigid_plant import RigidPlant
+from ...board.commissioning import commission
+from ...board.emulator.emulated import EmulatedBoard
+from ...board.emulator.simulator import CLOCK_HZ
+from ...board.protocol.declaration import CONTROL_HZ
+from ...board.protocol.player import Knots, Player, setpoints
+from ...board.protocol.session import Link
+from ...rig import RigSetup, configuration
+from ...rig.board_axes import board_axes
+from ...rig.plant.plant import rig_plant
+from ...rig.plant.rigid_plant import RigidPlant
 
 FLASH_BYTES, RAM_BYTES, RAM_BEGIN, RAM_END = 256 * 1024, 8192, 0x200, 0x2200
 CONTROL_VECTOR = 47  # TIMER5_COMPA
