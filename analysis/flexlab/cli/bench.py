@@ -331,7 +331,7 @@ def _run(rig: Path | None, ask: Any, options: BenchOptions, gains: Path | None =
         )
     refuse_taken(options.out, options.force)
     bench = rigs.load(rig or RIG)
-    settings = rigs.configuration(bench) | ({} if gains is None else plan.gains(gains))
+    settings = plan.board_settings(bench, gains)
     asked = ask(bench, settings)
     steps.check(asked)
     if gains is not None:

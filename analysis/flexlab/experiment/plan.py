@@ -22,7 +22,7 @@ from flexura.io import find, read_toml
 
 from ..board.protocol.declaration import CONFIG
 from ..board.protocol.player import VOLT_UNIT_V, Knots, drives, setpoints
-from ..rig import Check, RigSetup, check_capability
+from ..rig import Check, RigSetup, check_capability, configuration
 from ..rig.board_axes import BoardAxis, board_axes
 from ..rig.checks import STEP_RATE_MAX_1_S, scale_of
 from .lead_in import AT_REST, LEAD_IN_S, with_lead_in
@@ -98,6 +98,28 @@ def gains(path: Path) -> dict[str, float]:
             )
             raise InputError(expected, key=name, value=value, file=str(path))
     return {name: float(value) for name, value in data.items()}
+
+
+def board_settings(setup: RigSetup, file: Path | None) -> dict[str, float]:
+    """The board's settings of a rig, with the controllers of a gains file.
+
+    Args:
+        setup: the rig.
+        file: the gains file, or the name of a controller that comes with flexura; None: the rig's.
+
+    Raises:
+        InputError: the file is wrong, or has no gain for a joint on a motor.
+    """
+    own = configuration(setup)
+    if file is None:
+        return own
+    out = own | gains(file)
+    for axis in board_axes(out):
+        key = axis.names["kp"]
+        if axis.kind == "motor" and not out[key] > 0:
+            expected = f"expected a gain above 0 for joint {axis.number} of this rig"
+            raise InputError(expected, key=key, value=out[key], file=str(file))
+    return out
 
 
 def inverse(

@@ -244,6 +244,7 @@ def test_limits_hold_a_change_back(tmp_path):
         (["rig-r", "fast.toml"], "the rig cannot do this"),
         (["rig-r", "--out", "full"], "results are there"),
         (["rig-r", "--model", "absent"], "absent"),
+        (["rig-rr", "--gains", "rig"], "rig: kp_1_V_rad = 0.0: expected a gain above 0"),
     ],
 )
 def test_wrong_calls_end_in_one_line(arguments, said, tmp_path, monkeypatch):
