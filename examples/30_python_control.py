@@ -1,7 +1,7 @@
 """A driven link in python-control: frequency response and margins of a PD loop.
 
-Equation (53). `fx.linearize(robot).to_control()` has the names of drives and channels. A rigid link of
-inertia J turns with viscous friction d, so that from torque to angle
+Equation (53). `fx.linearize(robot).to_control()` has the names of drives and channels. A rigid
+link of inertia J turns with viscous friction d, so that from torque to angle
 
     G(s) = 1 / (J s^2 + d s).
 

@@ -14,7 +14,7 @@ import flexura as fx
 
 from .. import rig as rigs
 from ..experiment import run_experiment as steps
-from ..experiment.plan import board_settings
+from ..experiment.gains import board_settings
 from ..experiment.stop_requests import watch_for_stop
 from ..identification.identify import Identified
 from ..identification.identify import identify as identified
