@@ -74,6 +74,7 @@ def test_the_rig_of_type_iv_learns(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)
 def test_a_rig_of_two_motors_learns(tmp_path, monkeypatch):
     """10 times less in 6 trials; a count of its sensor is 2.4 mm at the tip.
 
