@@ -40,7 +40,7 @@ show.add("best friction [N m s/rad]", best.x[0], np.sqrt(STIFFNESS_N_M * INERTIA
 show.add("its cost [rad^2 s]", best.fun, START_RAD**2 / w)
 for z, found in zip((0.2, 0.8), costs(np.array([[0.2, 0.8]]) * 2 * w * INERTIA_KG_M2), strict=True):
     cost = START_RAD**2 * (1 + 4 * z**2) / (4 * z * w)
-    show.add(f"cost at the damping ratio {z:g} [rad^2 s]", found, cost)
+    show.add(f"cost at damping ratio {z:g} [rad^2 s]", found, cost)
 
 if show.plot:
     axes = show.axes("friction [N m s/rad]", "cost [rad^2 s]")
