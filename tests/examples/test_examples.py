@@ -21,6 +21,7 @@ LIBRARIES = {
     "argparse",
     "collections",
     "comparison",
+    "control",
     "flexura",
     "fmpy",
     "gymnasium",

@@ -119,6 +119,13 @@ def test_limits_hold_between_the_nodes_of_the_drives(case):
         assert run[f"joint/{k}/position"][-1] == pytest.approx(place, abs=2e-3)
 
 
+def test_a_small_deflection_takes_its_time():
+    limits = {"drive": [0.5], "deflection_m": 0.02}
+    run = fx.time_optimal("single-r", [0.0], [1.0], limits, intervals=40)
+    assert np.abs(run["link/1/tip_deflection"]).max() <= 0.02 * (1 + KEPT)
+    assert 0.7 < run.meta["duration_s"] < 2.0 and not run.meta["events"]
+
+
 def test_a_run_beyond_a_limit_is_labelled():
     limits = read_limits({"drive": [2.0], "speed": 3.0, "deflection_m": None}, 1)
     for peak, named in ((3.0 * (1 + 0.9 * KEPT), []), (3.1, ["joint/1/velocity"])):
@@ -134,7 +141,15 @@ def test_a_run_beyond_a_limit_is_labelled():
 
 
 @pytest.mark.parametrize(
-    ("limits", "key"), [({}, "limits.drive"), ({"drive": [1.0], "force": 1.0}, "limits.force")]
+    ("limits", "key"),
+    [
+        ({}, "limits.drive"),
+        ({"drive": [1.0], "force": 1.0}, "limits.force"),
+        # within these a motion would last thousands of periods
+        ({"drive": [1e-7]}, "limits.drive"),
+        ({"drive": [0.5], "speed": [1e-4]}, "limits.speed"),
+        ({"drive": [0.5], "deflection_m": 1e-6}, "limits.deflection_m"),
+    ],
 )
 def test_wrong_limits_are_named(limits, key):
     with pytest.raises(InputError) as caught:

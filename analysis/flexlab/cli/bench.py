@@ -20,6 +20,7 @@ from .. import rig as rigs
 from ..experiment import excitation, plan
 from ..experiment import run_experiment as steps
 from ..experiment.flash import RIG
+from ..experiment.gains import board_settings
 from ..experiment.stop_requests import watch_for_stop
 from ..identification.vibration.shapers import read_shaper, shaped
 from ..recordings.flex_calibration import read as read_calibration
@@ -331,7 +332,7 @@ def _run(rig: Path | None, ask: Any, options: BenchOptions, gains: Path | None =
         )
     refuse_taken(options.out, options.force)
     bench = rigs.load(rig or RIG)
-    settings = rigs.configuration(bench) | ({} if gains is None else plan.gains(gains))
+    settings = board_settings(bench, gains)
     asked = ask(bench, settings)
     steps.check(asked)
     if gains is not None:

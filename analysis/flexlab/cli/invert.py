@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -77,7 +78,7 @@ def invert(
         raise fx.InputError(
             f"expected one of {', '.join(given)}", key="path", value=", ".join(asked) or "none"
         )
-    _check_times(duration, step)
+    _check_numbers(duration, step, angle)
     t = np.linspace(0.0, duration, max(round(duration / step), 1) + 1)
     tip: Any
     if table is not None:
@@ -94,13 +95,16 @@ def invert(
         tip = lambda s: low + (high - low) * fx.signals.paths.smooth_rise(s / duration)
     with results(out, "invert", robot.stem, force=force) as draft:
         with progress_bars("invert") as report:
-            run = fx.invert(
-                described,
-                t,
-                tip,
-                least_squares=least_squares,
-                progress=lambda fraction: report("invert", fraction),
-            )
+            try:
+                run = fx.invert(
+                    described,
+                    t,
+                    tip,
+                    least_squares=least_squares,
+                    progress=lambda fraction: report("invert", fraction),
+                )
+            except fx.InputError as error:
+                raise _as_asked(error, asked[0], table) from None
         run.meta["manoeuvre"] = f"the path of {asked[0]}"
         run.save(draft.folder)
         write_toml(draft.folder / MANOEUVRE, fx.feedforward(run).spec())
@@ -132,10 +136,22 @@ def invert(
     report_saved(run, folder, json)
 
 
-def _check_times(duration: float, step: float) -> None:
+def _as_asked(error: fx.InputError, option: str, table: Path | None) -> fx.InputError:
+    """The error with the option or the file that the path is from."""
+    if error.key != "tip":
+        return error
+    if table is not None:
+        return error.in_file(str(table))
+    value = None if error.value == "a function" else error.value
+    return fx.InputError(error.expected, key=option, value=value)
+
+
+def _check_numbers(duration: float, step: float, angle: tuple[float, float] | None) -> None:
     for key, value in (("--duration", duration), ("--step", step)):
         if not 0 < value < 1e6:
             raise fx.InputError("expected a time above 0 in seconds", key=key, value=value)
+    if angle is not None and not np.isfinite(angle).all():
+        raise fx.InputError("expected two finite numbers", key="--angle", value=angle)
     if duration / step > 1e6:
         raise fx.InputError("expected at most a million rows", key="--step", value=step)
 
@@ -152,7 +168,9 @@ def _columns(path: Path) -> tuple[np.ndarray, Any]:
     """Times, and the path as `fx.invert` takes it, of a CSV file."""
     expected = "expected a CSV file of numbers with 2 or 3 columns, t and angle or t, x and y"
     try:
-        rows = np.genfromtxt(path, delimiter=",", comments="#", ndmin=2)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # of an empty file
+            rows = np.genfromtxt(path, delimiter=",", comments="#", ndmin=2)
     except (OSError, ValueError) as error:
         raise fx.InputError(f"{expected} ({error})", file=str(path)) from None
     if len(rows) and np.isnan(rows[0]).all():  # the names of the columns
@@ -162,4 +180,8 @@ def _columns(path: Path) -> tuple[np.ndarray, Any]:
     bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
     if len(bad):
         raise fx.InputError(f"{expected}; row {bad[0] + 1} has something else", file=str(path))
+    back = np.flatnonzero(np.diff(rows[:, 0]) <= 0)
+    if len(back):
+        text = f"expected ascending times in seconds; row {back[0] + 2} is not later"
+        raise fx.InputError(text, file=str(path), key="t", value=float(rows[back[0] + 1, 0]))
     return rows[:, 0], rows[:, 1] if rows.shape[1] == 2 else (rows[:, 1], rows[:, 2])

@@ -14,7 +14,7 @@ import flexura as fx
 
 from .. import rig as rigs
 from ..experiment import run_experiment as steps
-from ..experiment.plan import gains as read_gains
+from ..experiment.gains import board_settings
 from ..experiment.stop_requests import watch_for_stop
 from ..identification.identify_rig import Identified
 from ..identification.identify_rig import identify as identified
@@ -98,7 +98,7 @@ def learn(
         raise fx.InputError("expected 1 or more", key="--trials", value=trials)
     refuse_taken(out, force)
     setup = rigs.load(rig)
-    settings = rigs.configuration(setup) | ({} if gains is None else read_gains(gains))
+    settings = board_settings(setup, gains)
     asked = setup.manoeuvre
     if manoeuvre is not None:
         asked = fx.load_manoeuvre(manoeuvre, setup.rig.joints)

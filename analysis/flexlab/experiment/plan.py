@@ -16,11 +16,9 @@ import numpy as np
 
 import flexura as fx
 from flexura import signals
-from flexura.control import BOARD, load_gains
 from flexura.errors import InputError
-from flexura.io import find, read_toml
+from flexura.io import read_toml
 
-from ..board.protocol.declaration import CONFIG
 from ..board.protocol.player import VOLT_UNIT_V, Knots, drives, setpoints
 from ..rig import Check, RigSetup, check_capability
 from ..rig.board_axes import BoardAxis, board_axes
@@ -32,17 +30,6 @@ STEP = {"m": 0.005, "rad": 0.1}  # of a joint, where none is asked
 PERIOD_LOG2 = 3  # knots are 8 ms apart
 # checks of the rig that do not depend on the motion
 STATIC_CHECKS = ("current", "supply", "at rest")
-_TERMS = ("kp_", "ki_", "kd_", "kf_", "kg_", "kv_", "kc_", "jo_", "bo_", "observer_")
-GAINS = (
-    *(name for name in CONFIG if name.startswith(_TERMS)),
-    "derivative_Hz",
-    "deflection_Hz",
-    "setpoint_1_Hz",
-    "setpoint_2_Hz",
-    "feedback_2",
-)
-# The controller of an empty gains file, as in `flexura.Controller`.
-ALL_TERMS_OFF = dict.fromkeys(GAINS, 0.0) | {"derivative_Hz": 50.0, "deflection_Hz": 50.0}
 
 
 @dataclass(frozen=True)
@@ -65,39 +52,6 @@ class Plan:
     def failed(self) -> list[Check]:
         """The checks that failed."""
         return [check for check in self.checks if not check.passed]
-
-
-def gains(path: Path) -> dict[str, float]:
-    """Controller settings by the firmware's names, from a TOML file.
-
-    A gains file of the model or of `flexura tune` has a table [controller] and is complete: terms
-    that it does not name are off.
-
-    Args:
-        path: the file, or the name of a controller that comes with flexura.
-
-    Raises:
-        InputError: names file, key and value.
-    """
-    path = find(path, "controllers")
-    data, known = read_toml(path), GAINS
-    if "controller" in data:
-        data, known = ALL_TERMS_OFF | load_gains(path).board(), BOARD
-    for name, value in data.items():
-        if name not in known:
-            raise InputError(
-                f"expected a setting of the controllers: {', '.join(GAINS)}",
-                key=name,
-                value=value,
-                file=str(path),
-            )
-        item = CONFIG[name]
-        if not signals.is_finite(value) or not item.least <= value <= item.greatest:
-            expected = (
-                f"expected a number between {item.least:g} and {item.greatest:g} ({item.text})"
-            )
-            raise InputError(expected, key=name, value=value, file=str(path))
-    return {name: float(value) for name, value in data.items()}
 
 
 def inverse(

@@ -6,6 +6,7 @@ controller gives its voltage at a reference that is found by inversion (125).
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +24,7 @@ from .knowledge import Knowledge
 
 STEP_S = 0.002  # of the drives' inversion
 SLOWEST = 0.005  # of a joint's largest speed: below, it rests
-REACH_S = 0.08  # a joint that rests may be pushed so long before it moves, and after
+REACH_S = 0.08  # a joint that rests is pushed so long before it moves
 ROUND_S = 0.1  # in which a friction's sign changes
 SOFT = 0.3  # of a joint's own friction, over which the flank changes
 REACHES = 0.95  # of the largest voltage may be asked
@@ -71,10 +72,27 @@ def loops(
     return out
 
 
-def friction_side(velocity: np.ndarray) -> np.ndarray:
-    """The sign of a joint's velocity (T,), smooth, also shortly before it moves and after.
+def sticks_within(setup: RigSetup, settings: dict[str, float], axis: MotorAxis) -> float:
+    """How far from its set-point friction holds a joint, until its controller's gain moves it.
 
-    A joint at rest sticks, so that it may be pushed before. The force is there where it begins.
+    Args:
+        setup: the rig.
+        settings: the board's settings, by name.
+        axis: the joint, on a motor.
+
+    Returns:
+        The distance [m or rad]; the integral gain is not counted.
+    """
+    line, dead = joint_line(axis), setup.rig.driver.dead_zone_V or 0.0
+    gain = settings[f"kp_{axis.number}_V_{axis.unit}"]
+    return float((line.coulomb / line.force_per_V + dead) / gain) if gain else math.inf
+
+
+def friction_side(velocity: np.ndarray) -> np.ndarray:
+    """The sign of a joint's velocity (T,), smooth, also shortly before it moves.
+
+    A joint at rest sticks, so that it is pushed before it moves. After that it is not: a push as
+    large as its friction would let it slip in one trial and not in the next.
 
     Args:
         velocity: every STEP_S (T,).
@@ -84,12 +102,9 @@ def friction_side(velocity: np.ndarray) -> np.ndarray:
         return np.zeros(len(velocity))
     places = np.flatnonzero(moving)
     at = np.arange(len(velocity))
-    after = np.clip(np.searchsorted(places, at), 0, len(places) - 1)
-    before = np.clip(after - 1, 0, None)
-    near = np.where(
-        np.abs(at - places[before]) < np.abs(places[after] - at), places[before], places[after]
-    )
-    sign = np.where(np.abs(near - at) <= REACH_S / STEP_S, np.sign(velocity[near]), 0.0)
+    after = places[np.clip(np.searchsorted(places, at), 0, len(places) - 1)]
+    soon = (after >= at) & (after - at <= REACH_S / STEP_S)
+    sign = np.where(soon, np.sign(velocity[after]), 0.0)
     window = np.hanning(round(ROUND_S / STEP_S) + 2)[1:-1]
     padded = np.pad(sign, len(window), mode="edge")
     smooth = np.convolve(padded, window / window.sum(), mode="same")

@@ -16,6 +16,7 @@ from ..rig.board_axes import board_axes
 from ..rig.configuration import calibration
 from ..runs.formatting import number
 from ..runs.table import Styled, Table
+from .drives import sticks_within
 from .knowledge import NAMES
 from .learn import Learned, numbers_of
 from .task import Task
@@ -34,7 +35,9 @@ def resolution(task: Task) -> dict[str, float]:
     for axis in board_axes(task.settings):
         out[f"encoder_{axis.number}_count_m"] = float(reach[axis.number - 1] / axis.counts)
     for motor in motor_axes(setup.rig):
-        out[f"backlash_{motor.number}_m"] = float(reach[motor.number - 1] * motor.guide.backlash)
+        lever = float(reach[motor.number - 1])
+        out[f"backlash_{motor.number}_m"] = lever * motor.guide.backlash
+        out[f"friction_{motor.number}_m"] = lever * sticks_within(setup, task.settings, motor)
     return out
 
 
@@ -94,6 +97,8 @@ def table(learned: Learned, title: str) -> Table:
         "encoder_2_count_m": "a count of encoder 2",
         "backlash_1_m": "the play of joint 1",
         "backlash_2_m": "the play of joint 2",
+        "friction_1_m": "joint 1 sticks within",
+        "friction_2_m": "joint 2 sticks within",
     }
     seen = "; ".join(f"{words[name]}: {number(1e3 * size, 2)} mm" for name, size in limits.items())
     out.notes.append(f"what limits, at the tip: {seen}")

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import InputError
 from ..optional import load
 from .task import EPISODE_STEPS, Task
 
@@ -21,6 +22,15 @@ def _spaces(task: Task) -> tuple[Any, Any]:
         gymnasium.spaces.Box(-np.inf, np.inf, (task.size,), np.float32),
         gymnasium.spaces.Box(-high, high, dtype=np.float32),
     )
+
+
+def _torques(action: Any, count: int) -> np.ndarray:
+    """An action as torques (count, 2)."""
+    try:
+        return np.reshape(np.asarray(action, dtype=float), (count, 2))
+    except (TypeError, ValueError):
+        expected = f"expected torques of shape ({count}, 2) in N m"
+        raise InputError(expected, key="action", value=action) from None
 
 
 class Reach(gymnasium.Env):  # type: ignore[misc, name-defined]
@@ -64,7 +74,7 @@ class Reach(gymnasium.Env):  # type: ignore[misc, name-defined]
             Observation (size,), reward [m], whether the robot failed, False (the registered
             environment ends an episode after its steps), and `distance_m`.
         """
-        reward, failed, distance = self.task.step(np.reshape(action, (1, 2)), np.arange(1))
+        reward, failed, distance = self.task.step(_torques(action, 1), np.arange(1))
         about = {"distance_m": float(distance[0])}
         return self.task.observation()[0], float(reward[0]), bool(failed[0]), False, about
 
@@ -135,7 +145,7 @@ class ReachVector(vector.VectorEnv):  # type: ignore[misc, name-defined]
         going, begun = np.flatnonzero(~self._ended), np.flatnonzero(self._ended)
         reward, distance = np.zeros(self.num_envs), np.full(self.num_envs, np.nan)
         failed = np.zeros(self.num_envs, dtype=bool)
-        torque = np.reshape(actions, (self.num_envs, 2))[going]
+        torque = _torques(actions, self.num_envs)[going]
         reward[going], failed[going], distance[going] = self.task.step(torque, going)
         self._steps[going] += 1
         over = ~failed & (self._steps >= self.max_episode_steps)

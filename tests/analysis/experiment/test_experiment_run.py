@@ -17,6 +17,7 @@ from flexlab.board.protocol import frames, messages
 from flexlab.board.protocol.declaration import DECLARATION, Fault
 from flexlab.cli.bench_tables import live_table, result_table, selftest_table
 from flexlab.experiment import plan as plans
+from flexlab.experiment.gains import gains as read_gains
 from flexlab.experiment.run_experiment import Hooks, OpenBoard, check, conduct
 from flexlab.recordings import recording
 from flexlab.recordings.run_from_recording import UNEXPLAINED, knots_from, run_from_recording
@@ -138,7 +139,7 @@ def test_step_uses_the_gains_that_it_was_given(tmp_path):
         (tmp_path / "gains.toml").write_text(
             f"kp_1_V_m = {kp}\nki_1_V_m_s = 0.0\nkv_1_V_s_m = 0.0\nkc_1_V = 0.0\n"
         )
-        settings = SETTINGS | plans.gains(tmp_path / "gains.toml")
+        settings = SETTINGS | read_gains(tmp_path / "gains.toml")
         run = experiment(plans.step(BENCH, settings, (0.003, 0.05), 2.0), tmp_path / f"{kp}").run
         first = np.flatnonzero(run["joint/1/reference"] > 0.0015)[0]
         assert run.t[first] == pytest.approx(0.2, abs=0.011) and run[
@@ -364,7 +365,7 @@ def test_wrong_gains_are_refused_by_file_key_and_value(tmp_path, text, key, valu
     path = tmp_path / "gains.toml"
     path.write_text(text)
     with pytest.raises(fx.InputError) as raised:
-        plans.gains(path)
+        read_gains(path)
     assert (raised.value.file, raised.value.key, raised.value.value) == (str(path), key, value)
 
 

@@ -74,13 +74,19 @@ def test_the_rig_of_type_iv_learns(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)
 def test_a_rig_of_two_motors_learns(tmp_path, monkeypatch):
-    """A count of its sensor is 2.4 mm at the tip, and its joints stick at the end."""
+    """10 times less in 6 trials; a count of its sensor is 2.4 mm at the tip.
+
+    By the rig file's gains friction holds joint 2 within 24 mrad, which is 7 mm at the tip.
+    """
     monkeypatch.chdir(tmp_path)
     manoeuvre = shipped_files("manoeuvres")["rig-rr-reach"].read_text()
     assert run(["bench", "excite", "rig-rr", "--emulated", "--out", "excited"])[0] == 0
-    errors, _ = learned_on("rig-rr", manoeuvre, 4, tmp_path, "--model", "excited")
-    assert min(errors) < errors[0] / 4 and max(errors) <= 1.5 * errors[0]
+    more = ["--model", "excited", "--gains", "rig-rr-stiff"]
+    errors, found = learned_on("rig-rr", manoeuvre, 6, tmp_path, *more)
+    assert min(errors) < errors[0] / 10 and max(errors) <= 1.5 * errors[0]
+    assert found["resolution"]["friction_2_m"] < 2.5e-3
 
 
 @pytest.mark.slow

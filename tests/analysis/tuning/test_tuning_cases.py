@@ -190,10 +190,11 @@ def test_the_emulated_rig_does_what_the_simulation_says(tmp_path):
     from boards import elf
     from experiments import BENCH, SETTINGS, experiment
     from flexlab.experiment import plan as plans
+    from flexlab.experiment.gains import gains as read_gains
     from flexlab.experiment.run_experiment import open_board
 
     file = CONTROLLERS / "rig-steps.toml"
-    plan = plans.step(BENCH, SETTINGS | plans.gains(file), (0.10, np.pi / 4), 5.0, 0.0)
+    plan = plans.step(BENCH, SETTINGS | read_gains(file), (0.10, np.pi / 4), 5.0, 0.0)
     run = experiment(plan, tmp_path / "step", opened=open_board(BENCH, None, 1, elf())).run
     assert run.meta["emulated"] and run.meta["complete"]
     at = 0.2
@@ -237,10 +238,11 @@ def test_a_gains_file_is_the_whole_law_on_the_bench_too():
     """What it does not name is off, whatever the rig file says; limits that it does not name are
     the rig's."""
     from flexlab.experiment import plan as plans
+    from flexlab.experiment.gains import gains as read_gains
 
     bench = rig.load(ROOT / "firmware" / "rig.toml")
     given, own = gains.load(CONTROLLERS / "rig-steps.toml"), rig.configuration(bench)
-    told = own | plans.gains(CONTROLLERS / "rig-steps.toml")
+    told = own | read_gains(CONTROLLERS / "rig-steps.toml")
     assert own["kv_1_V_s_m"] != 0 and told["kv_1_V_s_m"] == told["kc_1_V"] == told["kv_2"] == 0
     assert all(told[name] == value for name, value in given.settings.items())
     assert told["speed_max_1_m_s"] == own["speed_max_1_m_s"] and told["deflection_Hz"] == 50

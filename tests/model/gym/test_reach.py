@@ -124,10 +124,11 @@ def test_what_the_task_cannot_have_is_refused(options, said):
         gym.Task(**options)
 
 
-def test_a_torque_that_is_no_number_is_refused(many):
+@pytest.mark.parametrize("action", [np.full((6, 2), np.nan), np.zeros((5, 2)), "ab", None])
+def test_what_is_no_torque_of_each_robot_is_refused(many, action):
     many.reset(seed=1)
     with pytest.raises(InputError, match="action"):
-        many.step(np.full((6, 2), np.nan))
+        many.step(action)
 
 
 def test_without_gymnasium_one_sentence_says_what_to_install():

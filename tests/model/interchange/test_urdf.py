@@ -392,6 +392,7 @@ REFUSED = [
         "joint elbow.*no way leads from link world",
     ),
     ('<mass value="1"/>', '<mass value="heavy"/>', "link upper_link: <mass> value.*heavy"),
+    ('<mass value="1"/>', "", "link upper_link: <inertial>.*<mass>"),
     ('<mass value="1"/>', '<mass value="-1"/>', "link upper_link: mass.*0 or more"),
     ('xyz="0 0 -0.5"', 'xyz="0 0"', "link upper_link: <origin> xyz.*3 finite numbers"),
     ('iyy="0.083"', 'iyy="nan"', "link upper_link: <inertia> iyy"),

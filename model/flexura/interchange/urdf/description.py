@@ -144,7 +144,9 @@ class _Reader:
             return Inertial(0.0, np.zeros(3), np.zeros((3, 3)))
         place, axes = self.frame(element, where)
         mass, inertia = element.find("mass"), element.find("inertia")
-        value = 0.0 if mass is None else float(self.numbers(mass, "value", where, "nan")[0])
+        if mass is None:
+            raise self.error(f"{where}: <inertial>", "expected a <mass> in it")
+        value = float(self.numbers(mass, "value", where, "nan")[0])
         if value < 0:
             raise self.error(f"{where}: mass", "expected a mass of 0 or more", value)
         own = np.zeros((3, 3))

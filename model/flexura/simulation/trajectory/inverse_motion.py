@@ -84,7 +84,8 @@ class TipProblem:
         c, before, share, kept = first, np.inf, 1.0, (first, np.zeros_like(first))
         for count in range(1, MOST + 1):
             try:
-                step = self._step(mesh, c, wanted, start, end)
+                with np.errstate(over="ignore", invalid="ignore"):  # what overshoots is halved
+                    step = self._step(mesh, c, wanted, start, end)
             except np.linalg.LinAlgError:
                 step = np.full_like(c, np.nan)
             size = float(np.abs(step).max())

@@ -12,6 +12,7 @@ from ...errors import InputError
 from ...io import Run, Tables, array, number
 
 KEPT = 1e-3  # of a limit: what a motion may exceed it by
+LIMITED = {"drive": "drive", "velocity": "speed", "tip_deflection": "deflection_m"}  # by channel
 
 
 @dataclass(frozen=True)
@@ -34,9 +35,16 @@ class Limits:
         of += [(name, self.deflection_m) for name in run if name.endswith("/tip_deflection")]
         return {name: np.abs(run[name]) / most for name, most in of if np.isfinite(most)}
 
+    def nearest(self, run: Run) -> tuple[str, float]:
+        """The channel of a Run that comes nearest to its limit or exceeds it most, and the share of
+        the limit that it reaches."""
+        peaks = {name: float(share.max()) for name, share in self.shares(run).items()}
+        name = max(peaks, key=peaks.__getitem__)
+        return name, peaks[name]
+
     def excess(self, run: Run) -> float:
         """The largest share of a limit by which a Run exceeds it; below 0: it keeps all."""
-        return float(max(share.max() for share in self.shares(run).values())) - 1.0
+        return self.nearest(run)[1] - 1.0
 
     def tightened(self, run: Run, by: Limits) -> Limits:
         """Limits of speeds and deflections that are lower by what a Run exceeds those of `by`."""
@@ -73,7 +81,7 @@ def read_limits(limits: Any, joints: int) -> Limits:
     Raises:
         InputError: a key or a value is not what is expected.
     """
-    known = ("drive", "speed", "deflection_m")
+    known = tuple(LIMITED.values())
     if not isinstance(limits, Mapping):
         raise InputError(f"expected a table with {', '.join(known)}", key="limits", value=limits)
     for key in limits:

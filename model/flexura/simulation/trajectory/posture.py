@@ -5,16 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...errors import FlexuraError, InputError
+from ...errors import InputError
 from ...io import array
 from ...system import RobotLike, System, assemble, static
 from .tip_output import PLACE, TipPath, output_kind
 
 STEPS = 40  # of Newton's method
 CLOSE = 1e-12  # m or rad
-STRETCHED = 0.01  # rad: an elbow's angle
-ELBOW = 0.5  # rad
 LONGEST = 0.3  # m or rad: a step of a joint
+BENT = 0.5  # rad: an elbow from which the search begins where it fails from a straight one
 
 
 def inverse_kinematics(
@@ -30,15 +29,14 @@ def inverse_kinematics(
         tip: x and y [m] of a robot with two joints; with one, the polar angle [rad] seen from its
             axis, or the place along its rail [m]. Or rows of these, (T, 2) or (T,).
         joints: (links,), where the search begins [m or rad], by default their start: it decides on
-            which side the elbow is. An arm that is stretched there begins with its elbow bent to
-            the left.
+            which side the elbow is. Where nothing is found from a straight elbow, it begins with
+            the elbow bent to the left, and then to the right.
 
     Returns:
         q (n,), or (T, n) for rows.
 
     Raises:
-        InputError: an argument is not what is expected.
-        FlexuraError: no posture was found: the tip cannot be there.
+        InputError: an argument is not what is expected, or the tip cannot be there.
     """
     system = exact_system(robot)
     kind, angle = output_kind(system)
@@ -70,57 +68,63 @@ def exact_system(robot: RobotLike) -> System:
 
 
 def postures(system: System, path: TipPath, places: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Postures (T, n) with the tip at `places` (T, m), one after another from q (n,) on."""
-    out, before = [], None
-    for place in places:
-        if before is None:
-            q = _first(system, path, place, q)
-        elif not _near(place, before):
-            q = _approach(system, path, place, q)
+    """Postures (T, n) with the tip at `places` (T, m), one after another from q (n,) on.
+
+    Raises: InputError: none was found for a place.
+    """
+    out: list[np.ndarray] = []
+    for k, place in enumerate(places):
+        found = None
+        if k > 0 and _near(place, places[k - 1]):
+            found = _newton(system, path, place, out[-1])
         else:
-            q = _newton(system, path, place, place, q)
-        before = place
-        out.append(q)
+            for start in [out[-1]] if out else _starts(system, q):
+                found = _approach(system, path, place, start)
+                if found is not None:
+                    break
+        if found is None:
+            raise InputError(
+                "expected a place within reach, at which the joints can move the tip in every "
+                "direction: no posture was found",
+                key="tip",
+                value=tuple(float(f"{x:.6g}") for x in place),
+            )
+        out.append(found)
     return np.array(out)
 
 
-def _first(system: System, path: TipPath, place: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """A posture with the tip at a place (m,), from q (n,) on, or, if the arm is stretched there and
-    cannot move its tip towards the place, from q with the elbow bent to the left."""
-    try:
-        return _approach(system, path, place, q)
-    except FlexuraError:
-        rows = [
-            i
-            for i, x in zip(system.joint_rows, system.robot.links, strict=True)
-            if x.joint.type == "R" and not x.joint.locked
-        ]
-        if len(rows) < 2 or abs(np.sin(q[rows[-1]])) > STRETCHED:
-            raise
-        joints = q.copy()
-        joints[rows[-1]] += ELBOW
-        return _approach(system, path, place, static(system, joints[system.joint_rows]))
+def _starts(system: System, q: np.ndarray) -> list[np.ndarray]:
+    """Where a search begins: q (n,), and the same with the last joint turned either way."""
+    free = np.flatnonzero(~system.locked)
+    out = [q]
+    if len(free) == 2 and system.robot.links[free[1]].joint.type == "R":
+        for side in (BENT, -BENT):
+            turned = q.copy()
+            turned[system.joint_rows[free[1]]] += side
+            out.append(turned)
+    return out
 
 
 def _near(place: np.ndarray, before: np.ndarray) -> bool:
     return bool(np.abs(place - before).max() < LONGEST / 3)
 
 
-def _approach(system: System, path: TipPath, place: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """A posture with the tip at a place (m,), on a straight way there from the tip at q (n,)."""
+def _approach(system: System, path: TipPath, place: np.ndarray, q: np.ndarray) -> np.ndarray | None:
+    """A posture with the tip at a place (m,), on a straight way there from the tip at q (n,); None
+    where there is none."""
     zero = np.zeros((1, system.n))
     _, _, _, _, tip, slope = system.equations.force_derivatives(q[None], zero, zero)
     off = path.deviation(tip, slope, place[None])[0][0]
     ways = max(2, int(np.ceil(np.abs(off).max() / (LONGEST / 6))))
+    found: np.ndarray | None = q
     for share in np.linspace(0, 1, ways + 1)[1:]:
-        q = _newton(system, path, place + (1 - share) * off, place, q)
-    return q
+        if found is not None:
+            found = _newton(system, path, place + (1 - share) * off, found)
+    return found
 
 
-def _newton(
-    system: System, path: TipPath, place: np.ndarray, end: np.ndarray, q: np.ndarray
-) -> np.ndarray:
-    """A posture with the tip at a place (m,), which is on the way to `end` (m,), from q (n,) on."""
+def _newton(system: System, path: TipPath, place: np.ndarray, q: np.ndarray) -> np.ndarray | None:
+    """A posture with the tip at a place (m,), near q (n,); None where there is none."""
     zero, joints = np.zeros((1, system.n)), system.joint_rows
     free = joints[~system.locked]
     rows = np.concatenate([system.elastic_rows, free])
@@ -141,9 +145,4 @@ def _newton(
         q[rows] -= step * min(1.0, LONGEST / max(longest, 1e-300))
         if longest < CLOSE:
             return q
-    where, here = (", ".join(f"{x:.6g}" for x in xs) for xs in (end, place))
-    way = "" if here == where else f"; the straight way there ends before {here}"
-    raise FlexuraError(
-        f"no posture found with the tip at {where}: it is out of reach, or the joints cannot move "
-        f"it in every direction there{way}"
-    )
+    return None

@@ -15,7 +15,7 @@ from ...signals import Drive, polynomial
 from ...system import RobotLike, System, assemble, static
 from ..approximate_inverse import rigid_robot
 from ..dynamics import inverse, simulate
-from .limits import KEPT, Limits, read_limits
+from .limits import KEPT, LIMITED, Limits, read_limits
 from .plant_motion import METHOD, PERIODS, RTOL, Plant, deflection_slope, linear_drive
 from .posture import exact_system
 from .shortest_motion import SETTLED, ShortestMotion
@@ -42,6 +42,7 @@ BAND = (
     1.0,
 )  # of `robust`: the plants between which the motion is robust
 CAREFUL = 1.15  # of the first guess's time: its drives are below their limits
+MOST_PERIODS = 200  # of the first mode, which a motion may last: its drives have fewer intervals
 
 
 def time_optimal(
@@ -79,7 +80,8 @@ def time_optimal(
         mended.
 
     Raises:
-        InputError: an argument is not what is expected.
+        InputError: an argument is not what is expected, or no motion of some 200 periods of the
+            first mode keeps the limits.
         FlexuraError: no such motion was found.
     """
     system = exact_system(robot)
@@ -95,10 +97,10 @@ def time_optimal(
     if not np.any(np.abs(last - first)[~system.locked] > 0):
         raise InputError("expected an end other than the start", key="end", value=end)
     ends = static(system, first), static(system, last)
+    T, count = _first_time(Plant(system, *ends, np.ones(1), 1.0), bounds), 0
     nominal = Plant(system, *ends, _unshaped(system, *ends, bounds), NOTHING)
     robots = share > 0 and len(nominal.unshaped) > 0
     plants = _band(nominal, share, bounds) if robots else [nominal]
-    T, count = _first_time(nominal, bounds), 0
     levels = [k for k in (m // 4, m // 2) if k >= COARSE] + [m]
     for level in levels:  # coarse ones first
         shortest = ShortestMotion(plants, bounds, level)
@@ -181,7 +183,7 @@ def _solved(
 ) -> tuple[np.ndarray, float]:
     """The shortest motion from a smooth one on, which may be longer than T."""
     for _ in range(LONGER):
-        found = shortest.solve(_smooth_drives(plant, T, shortest.m)[0], T, settled)
+        found = shortest.solve(_smooth_drives(plant, T, shortest.m), T, settled)
         if found:
             return found
         T *= CAREFUL
@@ -192,29 +194,42 @@ def _solved(
 
 def _first_time(plant: Plant, limits: Limits) -> float:
     """A time in which the joints can go a smooth way within the limits."""
-    T = 1.0
+    T, most = 1.0, np.inf
+    if len(plant.system.elastic_rows):
+        most = MOST_PERIODS * 2 * np.pi / plant.modes[0][plant.joints]
     for _ in range(30):
-        u, speeds = _smooth_drives(plant, T, FIRST)
-        share = float(max((np.abs(u) / limits.drive).max(), (speeds / limits.speed).max() ** 2))
+        name, share = limits.nearest(_smooth(plant, T, FIRST))
+        share = share**2 if name.endswith("velocity") else share
         if 0.4 < share <= 1.0:
             break
         T *= float(np.clip(CAREFUL * np.sqrt(share), 0.1, 10.0))
+        if share > 1.0 and most < T:
+            break
     if not share <= 1.0:
-        raise FlexuraError("the drives cannot hold the robot on its way: expected higher limits")
+        within = f" in {MOST_PERIODS} periods of the first mode" if most < T else ""
+        raise InputError(
+            f"expected more: {name} stays within this, and the joints cannot go their way{within}",
+            key=f"limits.{LIMITED[name.rpartition('/')[2]]}",
+        )
     return T
 
 
-def _smooth_drives(plant: Plant, T: float, m: int) -> tuple[np.ndarray, np.ndarray]:
-    """Drives (m + 1, links) of the robot whose joints go a smooth way, and largest speeds."""
+def _smooth(plant: Plant, T: float, m: int) -> Run:
+    """The robot whose joints go a smooth way, at m + 1 times."""
     system, rows = plant.system, plant.system.joint_rows
     motion = [
         None if locked else polynomial(float(b), T, float(a))
         for a, b, locked in zip(plant.start[rows], plant.end[rows], system.locked, strict=True)
     ]
-    run = inverse(system, np.linspace(0.0, T, m + 1), motion, rtol=1e-6)
-    u = np.column_stack([run[f"joint/{i + 1}/drive"] for i in range(len(rows))])
+    return inverse(system, np.linspace(0.0, T, m + 1), motion, rtol=1e-6)
+
+
+def _smooth_drives(plant: Plant, T: float, m: int) -> np.ndarray:
+    """Drives (m + 1, links) of the robot whose joints go a smooth way."""
+    run = _smooth(plant, T, m)
+    u = np.column_stack([run[f"joint/{i + 1}/drive"] for i in range(len(plant.system.joint_rows))])
     u[0], u[-1] = plant.hold
-    return u, np.array([np.abs(run[f"joint/{i + 1}/velocity"]).max() for i in range(len(rows))])
+    return u
 
 
 def _unshaped(system: System, start: np.ndarray, end: np.ndarray, limits: Limits) -> np.ndarray:

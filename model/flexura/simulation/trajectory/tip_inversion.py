@@ -31,6 +31,7 @@ GOOD = 1e-9  # of the tip's reach: a deviation that small is good enough
 RTOL = 1e-9  # of the runs that judge
 SMOOTH = 2e-9  # m or rad: what a cubic spline through the rows of a Run may be off by
 MOST_ROWS = 20_001
+ROWS = 20  # at least, before the path and after it
 EXACT = 1e-6  # of the reach: a nearest motion that is off by less follows the path
 SINGULAR = 0.02  # smallest over largest singular value of the tip by the joints: a singular posture
 
@@ -67,9 +68,9 @@ def invert(
         (start and end of the path), and `zeros_1_s`, the slowest transmission zeros at the start.
 
     Raises:
-        InputError: an argument is not what is expected.
-        FlexuraError: the tip cannot be there; a transmission zero forbids it; or the motion is too
-            quick. The message says which.
+        InputError: an argument is not what is expected, or the tip cannot be there.
+        FlexuraError: a transmission zero forbids it, or the path begins in a singular posture. The
+            message says which.
     """
     system, times = exact_system(robot), check_times(t)
     flag(least_squares, "least_squares")
@@ -267,8 +268,9 @@ def output_times(times: np.ndarray, span: np.ndarray, signals: list[Signal]) -> 
     from scipy.interpolate import CubicSpline
 
     step = float(np.median(np.diff(times)))
-    before = times[0] - step * np.arange(1, int((times[0] - span[0]) / step) + 1)[::-1]
-    after = times[-1] + step * np.arange(1, int((span[1] - times[-1]) / step) + 1)
+    first, last = (min(step, way / ROWS) for way in (times[0] - span[0], span[1] - times[-1]))
+    before = times[0] - first * np.arange(1, int((times[0] - span[0]) / first + 1e-9) + 1)[::-1]
+    after = times[-1] + last * np.arange(1, int((span[1] - times[-1]) / last + 1e-9) + 1)
     rows = np.concatenate([before, times, after])
     position = lambda t: np.column_stack([values(signal, t) for signal in signals])
     while True:
