@@ -91,8 +91,7 @@ def crosscheck(
                 progress=report,
             )
         review = cross.save(check, draft.folder).name
-        stopped = check.simulation.interrupted or check.twin.interrupted
-        folder = draft.keep(interrupted=stopped)
+        folder = draft.keep(interrupted=check.interrupted)
     print_results(
         json,
         lambda: tables.check_table(check),
@@ -106,8 +105,12 @@ def crosscheck(
         f"look at it: flexura review {folder / 'simulation'} {folder / 'twin'}",
     )
     _advise(check, tolerance)
+    if check.interrupted:
+        if check.complete:
+            warn("interrupted before the twin's own error was known")
+        raise typer.Exit(130)
     if not check.passed:
-        raise typer.Exit(130 if stopped else 1)
+        raise typer.Exit(1)
 
 
 def _advise(check: cross.Check, tolerance: float) -> None:

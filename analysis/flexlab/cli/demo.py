@@ -37,7 +37,9 @@ def demo(
     with results(out, "demo", force=force) as draft:
         with progress_bars("native", "twin", "emulated") as report:
             done = demonstrate(draft.folder, report)
-        stopped = any(run.interrupted for run in done.runs)
+        stopped = any(run.interrupted for run in done.runs) or (
+            done.check is not None and done.check.interrupted
+        )
         folder = draft.keep(interrupted=stopped)
         done = done.moved(draft.folder, folder)
     drawn = done.picture if isinstance(done.picture, Path) else None

@@ -25,7 +25,8 @@ class Check:
     """Both runs, their deviations by channel, and what the twin's step adds to them.
 
     `own_error`: by channel the error of the twin's own step, relative to the channel's largest
-    magnitude; empty if it was not estimated.
+    magnitude; empty if it was not estimated. `interrupted`: Ctrl-C ended one of the runs, or the
+    estimate of that error.
     """
 
     simulation: fx.Run
@@ -33,6 +34,7 @@ class Check:
     rows: list[Deviation]
     tolerance: float
     own_error: Mapping[str, float] = field(default_factory=dict)
+    interrupted: bool = False
 
     def verdict(self, channel: str) -> str:
         """One of "within" and "beyond" the tolerance, and "open".
@@ -125,15 +127,24 @@ def crosscheck(
         )
 
     other = simulated(step_s, part=0.6 if own_error else 1.0)
+    interrupted = native.interrupted or other.interrupted
+
+    def again(step: float) -> fx.Run:
+        run = simulated(step, 0.6, 0.4)
+        if run.interrupted:
+            raise KeyboardInterrupt
+        return run
+
     errors: dict[str, float] = {}
     if own_error and other.complete and native.complete:
-        other, errors = step_error.refined(
-            native, other, lambda step: simulated(step, 0.6, 0.4), tolerance, fixed=bool(step_s)
-        )
+        try:
+            other, errors = step_error.refined(native, other, again, tolerance, fixed=bool(step_s))
+        except KeyboardInterrupt:
+            interrupted = True
     report("twin", 1.0)
     for run in (native, other):
         run.meta["manoeuvre"] = manoeuvre.name
-    return Check(native, other, rows(native, other), tolerance, errors)
+    return Check(native, other, rows(native, other), tolerance, errors, interrupted)
 
 
 def save(check: Check, folder: Path) -> Path:

@@ -184,6 +184,11 @@ def _joined(parts: list[Run], asked: list[np.ndarray], begins: list[float]) -> R
         "complete": all(run.complete for run in parts),
         "wall_s": sum(run.meta["wall_s"] for run in parts),
         "steps": sum(run.meta["steps"] for run in parts),
+        "events": [
+            event | {"t": event["t"] + begin}
+            for run, begin in zip(parts, begins, strict=False)  # the last may not be reached
+            for event in run.meta["events"]
+        ],
     }
     on_clock = [run.t[rows] + begin for run, rows, begin in zip(parts, asked, begins)]
     return judged(Run(np.concatenate(on_clock), values, first.units, meta))

@@ -170,13 +170,13 @@ def simulate(
         first.meta["start"] = begins
         if not kinds or not first.complete:
             return first
-        return extrapolate(
-            first,
-            {
-                kind: run(k, {kind: LENGTH_FACTOR}, first.meta["step_s"])
-                for k, kind in enumerate(kinds, 1)
-            },
-        )
+        longer: dict[str, Run] = {}
+        for k, kind in enumerate(kinds, 1):
+            longer[kind] = run(k, {kind: LENGTH_FACTOR}, first.meta["step_s"])
+            if longer[kind].interrupted:
+                first.meta.update(complete=False, events=longer[kind].meta["events"])
+                return first
+        return extrapolate(first, longer)
 
 
 def _run(
@@ -197,7 +197,7 @@ def _run(
     for attempt in range(tries):
         model, steps = new(), plan_steps(t, longest / 2**attempt, forced=tries == 1)
         try:
-            record, done, wall = _solve(model, act, steps, progress)
+            record, done, wall, interrupted = _solve(model, act, steps, progress)
             break
         except DidNotConverge:
             if attempt == tries - 1:
@@ -213,8 +213,8 @@ def _run(
         "source": "twin",
         "program": f"Exudyn {exu.__version__} ({program})",
         "robot": model.robot.to_dict(),
-        "complete": done == steps.count,
-        "events": [],
+        "complete": done == steps.count and not interrupted,
+        "events": [_interruption(done * steps.length)] if interrupted else [],
         "wall_s": wall,
         "steps": done,
         "step_s": steps.length,
@@ -301,8 +301,8 @@ def _settings(
 
 def _solve(
     model: TwinModel, act: Actuation, steps: Steps, progress: Callable[[float], None] | None
-) -> tuple[Record, int, float]:
-    """Run Exudyn; returns the record, the steps done, and seconds taken."""
+) -> tuple[Record, int, float, bool]:
+    """Run Exudyn; the record, the steps done, seconds taken, and whether Ctrl-C ended it."""
     record: Record = ([], [], [], [], [])
     force = exu.OutputVariableType.Force
     errors: list[BaseException] = []
@@ -354,7 +354,12 @@ def _solve(
                 raise _failure(model.mbs, done, steps, failed)
     if errors:
         raise errors[0]
-    return record, done, time.perf_counter() - began
+    return record, done, time.perf_counter() - began, interrupted.is_set()
+
+
+def _interruption(t: float) -> dict[str, Any]:
+    """The event of a run that Ctrl-C ended at t [s], as native runs have it."""
+    return {"t": t, "level": "WARN", "name": "interrupted", "text": "interrupted"}
 
 
 def _check_on_links(model: TwinModel, q: Any, t: float) -> None:
