@@ -130,10 +130,7 @@ def crosscheck(
     interrupted = native.interrupted or other.interrupted
 
     def again(step: float) -> fx.Run:
-        run = simulated(step, 0.6, 0.4)
-        if run.interrupted:
-            raise KeyboardInterrupt
-        return run
+        return simulated(step, 0.6, 0.4).uninterrupted()
 
     errors: dict[str, float] = {}
     if own_error and other.complete and native.complete:

@@ -145,6 +145,7 @@ class StripModel:
             run = self._on_the_stepper(system, q0, values, rtol)
         else:
             run = self._behind_gears(system, q0, values)
+        run.uninterrupted()
         kept = slice(len(times) - len(self.t), None)
         channels = run.channels | {"strip/sensed": self._sensed(system, run)}
         return fx.Run(

@@ -135,7 +135,9 @@ def drive_inverse(
 
     fine = np.arange(0.0, t[-1] + STEP_S / 2, STEP_S)
     courses = [CubicSpline(t, column) for column in motions.T]
-    links = fx.inverse(system, fine, [signals.table(t, column) for column in motions.T])
+    links = fx.inverse(
+        system, fine, [signals.table(t, column) for column in motions.T]
+    ).uninterrupted()
     references, checks = motions.copy(), [_sensor_range(setup, settings, links)]
     controllers = loops(setup, settings)
     for axis in motor_axes(setup.rig):

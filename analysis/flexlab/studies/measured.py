@@ -182,7 +182,7 @@ def replayed(system: fx.System, experiment: fx.Run, rtol: float = 1e-6) -> fx.Ru
         The Run, with the gauge's channel.
     """
     motion = smoothing_spline(experiment.t, experiment[encoder(system.robot)])
-    run = fx.simulate(system, experiment.t, fx.Drive.prescribed(motion), rtol=rtol)
+    run = fx.simulate(system, experiment.t, fx.Drive.prescribed(motion), rtol=rtol).uninterrupted()
     length = system.robot.links[0].length_m
     angle = 2 * run["link/1/tip_deflection"] / length - 2 / 3 * run["link/1/tip_slope"]
     return fx.Run(run.t, run.channels | {GAUGE: angle}, run.units | {GAUGE: "rad"}, run.meta)

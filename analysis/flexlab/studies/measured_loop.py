@@ -67,7 +67,7 @@ def closed_loop(fit: MeasuredFit, data: Path) -> Loop | None:
     robot = fit.found.robot.replace(start)
     per_m = _strain_by_deflection(fit.found.robot) * fit.found.values[f"{GAUGE}.gain"]
     law = _Law(log, per_m, float(log.states[0, 0]))
-    run = fx.simulate(robot, log.t, fx.Sampled(law, RATE_HZ))
+    run = fx.simulate(robot, log.t, fx.Sampled(law, RATE_HZ)).uninterrupted()
     if not run.complete:
         raise fx.InputError("the simulation of the closed loop did not end", file=str(path))
     gauge, current = np.array(law.said[: len(log.t)]).T

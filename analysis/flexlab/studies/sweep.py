@@ -149,11 +149,9 @@ def _row(work: _Work) -> Row:
             start=case.manoeuvre.start,
             loads=case.manoeuvre.loads,
             payloads=case.manoeuvre.payloads,
-        )
+        ).uninterrupted()
     except fx.FlexuraError as error:
         return row | {"complete": False, "error": str(error)}
-    if run.interrupted:
-        raise KeyboardInterrupt
     later = run.t >= case.from_s - 1e-9
     for i, link in enumerate(robot.links, 1):
         if link.flexible:

@@ -87,7 +87,7 @@ class DesignedTask(Task):
             law = tuned.sampled(self.robots[0], refs)
             run = fx.simulate(
                 system, asked.t, law, rtol=self.rtol, start=asked.start, loads=asked.loads
-            )
+            ).uninterrupted()
         except (InputError, fx.NumericalError):
             return nothing, 0.0
         if not run.complete:

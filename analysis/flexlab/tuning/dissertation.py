@@ -152,7 +152,7 @@ def _shortest(task: Task) -> tuple[float, ...]:
         joints[i] = replace(joints[i], kp=1e9, ki=0.0, kd=0.0)  # type: ignore[arg-type]  # at its limit until it is there
         run = fx.simulate(
             system, task.manoeuvre.t, replace(controller, joints=tuple(joints)), rtol=1e-5
-        )
+        ).uninterrupted()
         y = run[f"joint/{i + 1}/position"]
         there = (y - y[0]) / (run[f"joint/{i + 1}/reference"][-1] - y[0]) >= 0.98
         times.append(float(run.t[there.argmax()]) if there.any() else float("nan"))

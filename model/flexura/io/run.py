@@ -146,6 +146,19 @@ class Run:
         """Whether Ctrl-C ended the run."""
         return any(event["text"] == "interrupted" for event in self.meta.get("events", []))
 
+    def uninterrupted(self) -> Run:
+        """This Run, for a search, to which a part of a run would look like a failure.
+
+        Returns:
+            The same Run.
+
+        Raises:
+            KeyboardInterrupt: Ctrl-C ended the run.
+        """
+        if self.interrupted:
+            raise KeyboardInterrupt
+        return self
+
     @property
     def stopped(self) -> bool:
         """Whether the run was stopped from outside: by Ctrl-C, or as its wall time was over."""

@@ -3,7 +3,9 @@
 import json
 import os
 import random
+import signal
 import string
+import threading
 
 import numpy as np
 import pyarrow as pa
@@ -369,3 +371,28 @@ def test_a_sensor_may_have_any_unit(tmp_path):
     Run(ROWS[:2], {"sensor/x": np.ones(2)}, {"sensor/x": "furlong/h 2"}).save(tmp_path)
     again = Run.read(tmp_path)
     assert again.units == {"sensor/x": "furlong/h 2"} and list(again) == ["sensor/x"]
+
+
+def test_a_part_of_a_run_ends_a_search():
+    """Where many runs are made, one that Ctrl-C ended must not count as one that failed."""
+    run = fx.simulate("rig", [0.0, 0.01])
+    assert run.uninterrupted() is run
+    ended = fx.simulate("rig", np.linspace(0.0, 0.1, 11), lambda t: stop_at(t, 0.05))
+    assert ended.interrupted and not ended.complete
+    with pytest.raises(KeyboardInterrupt):
+        ended.uninterrupted()
+
+
+def stop_at(t, end):
+    if t >= end:
+        signal.raise_signal(signal.SIGINT)
+    return [0.0, 0.0]
+
+
+@pytest.mark.parametrize("after_s", [0.3, 0.6])
+def test_ctrl_c_ends_a_search_of_runs(after_s):
+    """Once, the least time went on with the part of a motion."""
+    threading.Timer(after_s, lambda: signal.raise_signal(signal.SIGINT)).start()
+    with pytest.raises(KeyboardInterrupt):
+        while True:
+            fx.time_optimal("single-r", [0.0], [0.5], {"drive": [1.0]}, intervals=40)

@@ -56,7 +56,7 @@ def with_losses(
         system, t, fx.Drive.force(*acting), q0=q0, rtol=rtol, progress=progress
     )
     run = solve(forces)
-    if all(lossless(axis) for axis, _ in lines):
+    if run.interrupted or all(lossless(axis) for axis, _ in lines):
         return run
     run.meta["gear_loss_rounds"] = None
     for rounds in range(1, ROUNDS + 1):
@@ -64,7 +64,7 @@ def with_losses(
             signals.sum([force, signals.table(t, -lost)])
             for force, lost in zip(forces, losses(system, run, lines), strict=True)
         ]
-        before, run = run, solve(acting)
+        before, run = run, solve(acting).uninterrupted()
         if all(
             np.abs(run[name] - before[name]).max() <= CLOSE * np.ptp(run[name])
             for name in (f"joint/{axis.number}/position" for axis, _ in lines)

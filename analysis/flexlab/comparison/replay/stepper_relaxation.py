@@ -112,7 +112,7 @@ def simulate_with_stepper(
                 q0=q0,
                 rtol=rtol,
                 method=method,
-            )
+            ).uninterrupted()
         except FlexuraError:  # what was assumed has grown beyond all bounds
             break
         # the last row of an incomplete run is at the instant of its end

@@ -89,7 +89,7 @@ def compare(
         runs = []
         for factor in PAYLOADS:
             robot = task.robot if factor == 1 else task.with_payload(factor)
-            run = fx.simulate(robot, t, motion.drive, rtol=rtol)
+            run = fx.simulate(robot, t, motion.drive, rtol=rtol).uninterrupted()
             if not run.complete:
                 texts = "; ".join(event["text"] for event in run.meta["events"])
                 raise fx.FlexuraError(f"{method.name}, payload x {factor:g}: {texts}")

@@ -67,7 +67,7 @@ def trials(task: Task, count: int = TRIALS) -> list[Trial]:
         run = fx.invert(described, t, (asked[:, 0], asked[:, 1]))
         before, drive = -float(run.t[0]), following_run(task, run)
         rows = np.append(0.0, before + t) if before > 0 else t
-        did = fx.simulate(task.robot, rows, drive, rtol=RTOL)
+        did = fx.simulate(task.robot, rows, drive, rtol=RTOL).uninterrupted()
         lacks = wanted - np.column_stack([did["tip/x"], did["tip/y"]])[-len(t) :]
         out.append(Trial(drive, before, float(np.hypot(*lacks.T).max())))
         asked = asked + basis @ np.linalg.lstsq(basis, lacks, rcond=None)[0]

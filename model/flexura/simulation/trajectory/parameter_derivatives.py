@@ -76,7 +76,7 @@ def parameter_derivatives(
         if q0 is not None
         else (static(system) if any(system.robot.gravity_m_s2) else system.start())
     )
-    run = simulate(system, np.append(t[0], at), forces, start, rtol=RTOL)
+    run = simulate(system, np.append(t[0], at), forces, start, rtol=RTOL).uninterrupted()
     if run.states is None or len(run) <= len(at):
         raise InputError("expected a run that comes to its end", key="t_eval")
     n, rows = system.n, system.free_rows

@@ -146,6 +146,7 @@ def answer(
     t = stage_times(fine)
     drive = Drive.force(*(linear_drive(nodes, column) for column in u.T))
     run = simulate(system, np.append(0.0, t), drive, plant.start, rtol=RTOL, method=METHOD)
+    run.uninterrupted()
     if len(run) <= len(t) or run.states is None or not np.isfinite(run.states).all():
         return None
     n, rows = system.n, system.free_rows

@@ -260,6 +260,7 @@ def _unshaped(system: System, start: np.ndarray, end: np.ndarray, limits: Limits
     drive = Drive.force(*(linear_drive(times, column) for column in values.T))
     later = span + np.linspace(h, PERIODS * 2 * np.pi / omega, 400)
     run = simulate(system, np.append(0.0, later), drive, plant.start, rtol=RTOL, method=METHOD)
+    run.uninterrupted()
     return np.asarray(np.abs(_bends(run, plant)[1:]).max(axis=0))
 
 
@@ -278,7 +279,8 @@ def _drive(u: np.ndarray, T: float) -> Drive:
 def _simulated(plant: Plant, u: np.ndarray, T: float) -> Run:
     """The motion under drives (m + 1, links), with `ROWS` rows in each interval."""
     rows = np.linspace(0.0, T, ROWS * (len(u) - 1) + 1)
-    return simulate(plant.system, rows, _drive(u, T), plant.start, rtol=RTOL, method=METHOD)
+    run = simulate(plant.system, rows, _drive(u, T), plant.start, rtol=RTOL, method=METHOD)
+    return run.uninterrupted()
 
 
 def _recorded(plants: list[Plant], u: np.ndarray, T: float, count: int, share: float) -> Run:
@@ -303,4 +305,5 @@ def _residual(plant: Plant, drive: Drive, T: float) -> float:
     span = PERIODS * 2 * np.pi / plant.modes[0][plant.joints]
     later = np.concatenate([[0.0], T + np.linspace(0.0, span, 400)])
     after = simulate(plant.system, later, drive, plant.start, rtol=RTOL, method=METHOD)
+    after.uninterrupted()
     return float(np.abs(_bends(after, plant)[1:]).max())
