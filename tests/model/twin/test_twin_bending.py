@@ -130,7 +130,7 @@ def test_a_slider_on_a_bent_link(stiffness, published):
 
         damped, held = arm.replace({"link.1.damping.beta_s": 0.2}), stand(signals.constant(0.1))
         settle = solve.plan_steps(np.array([0.0, 4.0]), 2e-3, forced=True)
-        (_, q, v, *_), _, _ = solve._solve(
+        (_, q, v, *_), *_ = solve._solve(
             new(damped, held),
             actuation(held, arm.start, np.zeros(2), np.array([0.0, 1.0])),
             settle,
