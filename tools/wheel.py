@@ -10,12 +10,18 @@ allow: on an older system it is installed on more machines. Of the platforms in 
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import subprocess
 import sys
 import zipfile
 from pathlib import Path
+from typing import Any
+
+fcntl: Any = None  # of Unix
+with contextlib.suppress(ImportError):
+    import fcntl
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -36,7 +42,10 @@ def build(folder: Path, root: Path = ROOT) -> Path:
     shutil.rmtree(raw, ignore_errors=True)
     pip = [sys.executable, "-m", "pip", "wheel", "-q", "--disable-pip-version-check"]
     dated = os.environ | {"SOURCE_DATE_EPOCH": moment(root)}
-    run([*pip, "--no-deps", "--no-build-isolation", "-w", str(raw), str(root)], env=dated)
+    with open(root / "pyproject.toml") as lock:  # one build of a checkout at a time
+        if fcntl is not None:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        run([*pip, "--no-deps", "--no-build-isolation", "-w", str(raw), str(root)], env=dated)
     (wheel,) = raw.glob("*.whl")
     if sys.platform == "linux":
         repaired = raw / "repaired"
