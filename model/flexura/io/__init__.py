@@ -49,7 +49,7 @@ from .seal import (
 )
 from .shipped import find, shipped_files
 from .toml_files import Tables, changed, index_of, read_toml, write_toml
-from .trust import DOUBTED, REFUSED, balance_events, judged
+from .trust import DOUBTED, REFUSED, balance_events, interruption, judged
 from .validation import FORMAT, MOST_LETTERS, check_format, explain, is_name
 
 __all__ = [
@@ -84,6 +84,7 @@ __all__ = [
     "flag",
     "function_of",
     "index_of",
+    "interruption",
     "is_name",
     "judged",
     "kind",

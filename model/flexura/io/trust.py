@@ -32,6 +32,18 @@ def judged(run: Run) -> Run:
     return run
 
 
+def interruption(t: float) -> Tables:
+    """The event of a run that Ctrl-C ended; `Run.interrupted` finds it.
+
+    Args:
+        t: when [s].
+
+    Returns:
+        The event.
+    """
+    return {"t": t, "level": "WARN", "name": "interrupted", "text": "interrupted"}
+
+
 def balance_events(error: float, end: float) -> list[Tables]:
     """The event of a balance (102), if there is something to be said.
 

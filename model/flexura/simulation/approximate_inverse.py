@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from .. import core
 from ..errors import FlexuraError, InputError
-from ..io import Run
+from ..io import Run, interruption
 from ..robot import Robot
 from ..signals import COLUMNS, Drive, Signal
 from ..system import System, assemble
@@ -164,14 +164,7 @@ def shoot_by_bisection(
             if progress is not None:
                 progress((b - t[0]) / (t[-1] - t[0]))
     except KeyboardInterrupt:
-        events.append(
-            {
-                "t": float(t[len(states) - 1]),
-                "level": "WARN",
-                "name": "interrupted",
-                "text": "interrupted",
-            }
-        )
+        events.append(interruption(float(t[len(states) - 1])))
     z, rows_done = np.array(states), len(states)
     forces.append(forces[-1] if forces else np.zeros(len(rows)))
     meta = {

@@ -10,7 +10,7 @@ import numpy as np
 
 from .. import core
 from ..control import Backlash, Controller, DriveFunction, Sampled
-from ..io import Tables
+from ..io import Tables, interruption
 from ..signals import Drive
 from .problem import Problem, Progress, Solution
 from .recorder import limit_event
@@ -104,8 +104,7 @@ class _Integration:
         if late:
             events = [self._budget_event("wall_time", about)]
         if interrupted or about["status"] == "interrupted":
-            name = "interrupted"
-            events = [{"t": about["t"], "level": "WARN", "name": name, "text": name}]
+            events = [interruption(about["t"])]
         meta: Tables = {
             "steps": about["steps"],
             "rejected": about["rejected"],

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import FlexuraError, InputError, guarded
-from ..io import Run, array, check_progress, choice, flag, judged, number, whole
+from ..io import Run, array, check_progress, choice, flag, interruption, judged, number, whole
 from ..optional import Optional
 from ..robot import MAX_ELEMENTS, Robot, robot_of
 from ..signals import LoadsLike, PayloadsLike, as_loads, as_payloads
@@ -214,7 +214,7 @@ def _run(
         "program": f"Exudyn {exu.__version__} ({program})",
         "robot": model.robot.to_dict(),
         "complete": done == steps.count and not interrupted,
-        "events": [_interruption(done * steps.length)] if interrupted else [],
+        "events": [interruption(done * steps.length)] if interrupted else [],
         "wall_s": wall,
         "steps": done,
         "step_s": steps.length,
@@ -355,11 +355,6 @@ def _solve(
     if errors:
         raise errors[0]
     return record, done, time.perf_counter() - began, interrupted.is_set()
-
-
-def _interruption(t: float) -> dict[str, Any]:
-    """The event of a run that Ctrl-C ended at t [s], as native runs have it."""
-    return {"t": t, "level": "WARN", "name": "interrupted", "text": "interrupted"}
 
 
 def _check_on_links(model: TwinModel, q: Any, t: float) -> None:

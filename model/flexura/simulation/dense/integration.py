@@ -10,7 +10,7 @@ import numpy as np
 
 from ...control import DriveFunction, Sampled
 from ...errors import numerical_failure
-from ...io import STATIONS, Tables
+from ...io import STATIONS, Tables, interruption
 from ...signals import Drive
 from ...system import System
 from ..problem import Problem, Progress, Solution
@@ -126,8 +126,7 @@ class Integration:
                 self._show(self.t[:1], lambda s: self.z)
                 complete = len(self.t) == 1 or self._go()
         except KeyboardInterrupt:
-            name = "interrupted"
-            self.events.append({"t": self.now, "level": "WARN", "name": name, "text": name})
+            self.events.append(interruption(self.now))
         except Exception as error:
             why = numerical_failure(error)
             if why is None:
