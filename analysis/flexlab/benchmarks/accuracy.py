@@ -7,6 +7,7 @@ tolerances within 10 % of each other, because single runs scatter with their fir
 
 from __future__ import annotations
 
+import math
 import time
 from typing import Any
 
@@ -48,12 +49,14 @@ def measured(
         limit_s: processor time after which the run is given up [s].
 
     Returns:
-        (error, evaluations), or None if the run fails or takes too long.
+        (error, evaluations): the error is infinite if the run fails. None if it takes too long.
     """
     try:
         answer = native.run(problem, system, rtol, method, limit_s=limit_s)
-    except (native.TooSlow, fx.FlexuraError, RuntimeError):
+    except native.TooSlow:
         return None
+    except (fx.FlexuraError, RuntimeError):
+        return math.inf, 0
     return error(answer.channels, exact), answer.evaluations
 
 
@@ -65,24 +68,22 @@ def errors(problem: Problem) -> Row:
     """
     system, exact = native.system(problem.robot), native.converged(problem)
     size = scale(exact)
-    rows: list[Row] = []
-    for rtol in TOLERANCES:
-        found = measured(problem, system, exact, rtol)
-        rows.append(
-            {
-                "rtol": rtol,
-                "error": None if found is None else found[0],
-                "passes": None if found is None else found[1],
-            }
-        )
-    usual = measured(problem, system, exact, native.default_rtol())
-    default = {"error": None if usual is None else usual[0]}
+
+    def at(rtol: float) -> Row:
+        off, count = measured(problem, system, exact, rtol) or (math.inf, 0)
+        done = math.isfinite(off)
+        return {
+            "rtol": rtol,
+            "error": off if done else None,
+            "passes": count if done else None,
+        }
+
     return {
         "name": problem.name,
         "scale": size,
         "undamped": problem.undamped,
-        "errors": rows,
-        "default": default,
+        "errors": [at(rtol) for rtol in TOLERANCES],
+        "default": at(native.default_rtol()),
     }
 
 
@@ -148,13 +149,15 @@ def beyond(rows: list[Row]) -> list[str]:
                     f"asked {MAX_ERROR_OVER_RTOL:g}"
                 )
         usual = row["default"]["error"]
-        if usual is not None and usual > MAX_DEFAULT_ERROR:
+        if usual is None:
+            out.append(f"{row['name']}: fails by default")
+        elif usual > MAX_DEFAULT_ERROR:
             out.append(f"{row['name']}: {usual:.1e} by default, asked {MAX_DEFAULT_ERROR:g}")
     return out
 
 
 def slower(rows: list[Row]) -> list[str]:
-    """Sentences about errors for which "auto" takes more evaluations than the limit.
+    """Sentences about errors for which "auto" takes more evaluations than the limit, or fails.
 
     Args:
         rows: rows of `passes`.
@@ -165,14 +168,10 @@ def slower(rows: list[Row]) -> list[str]:
             counts = {
                 method: count for method, count in each["passes"].items() if count is not None
             }
-            auto, best = counts.pop("auto", None), min(counts.values(), default=None)
-            if (
-                auto is not None
-                and best is not None
-                and auto > MAX_PASS_RATIO * best + EXTRA_PASSES
-            ):
+            auto, best = counts.pop("auto", math.inf), min(counts.values(), default=math.inf)
+            if auto > MAX_PASS_RATIO * best + EXTRA_PASSES:
                 out.append(
-                    f"{row['name']}: {auto} evaluations for an error of {each['error']:g}, the "
-                    f"cheapest method {best}"
+                    f"{row['name']}: {auto:g} evaluations for an error of {each['error']:g}, the "
+                    f"cheapest method {best:g}"
                 )
     return out

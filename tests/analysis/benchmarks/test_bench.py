@@ -232,6 +232,31 @@ def test_accuracy_says_what_is_beyond_what_is_asked():
     assert len(said) == 3 and all(line.startswith("a:") for line in said)
 
 
+def test_passes_say_where_auto_is_dear_or_fails():
+    at = lambda error, **passes: {"error": error, "passes": passes}
+    row = {
+        "name": "a",
+        "passes": [
+            at(1e-2, auto=300, implicit=100),  # just within
+            at(1e-3, auto=301, implicit=100),
+            at(1e-4, auto=None, explicit=5000),
+            at(1e-5, auto=None, explicit=None),  # no method gets there
+        ],
+    }
+    said = accuracy.slower([row])
+    assert len(said) == 2 and "0.001" in said[0] and "0.0001" in said[1]
+
+
+def test_a_run_that_fails_is_not_one_that_takes_too_long():
+    """The energies of `payload` do not balance at this tolerance: tighter ones are still tried."""
+    problem = MOTIONS["payload"]
+    system, exact = native.system(problem.robot), native.converged(problem)
+    at = lambda rtol, limit: accuracy.measured(problem, system, exact, rtol, "auto", limit)
+    assert at(3.3e-2, 30.0) == (np.inf, 0)
+    assert at(1e-2, 30.0)[0] < 0.1
+    assert at(1e-2, 1e-9) is None
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name, p in MOTIONS.items() if p.available])
 def test_tighter_tolerances_come_closer(name):
