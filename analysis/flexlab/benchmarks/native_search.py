@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +14,7 @@ from .native import Answer, TooSlow
 from .problems.problem import Channels, Problem, error
 
 RTOLS = (3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 3e-7, 1e-7, 3e-8, 1e-8)
+BETWEEN = (2.0, 1.4)  # times a tolerance that holds: tried before the next looser one is given up
 LIMIT_S = 30.0  # processor time of a run while nothing better is known
 PATIENCE = 4.0  # times the best so far: a longer run is given up
 # runs shorter than REPEAT_BELOW_S are timed again so often
@@ -77,6 +79,8 @@ def loosest_tolerance(
 ) -> Setting | None:
     """The loosest tolerance at which a method holds an error, the next tighter one included.
 
+    Of `RTOLS`, and of two between that one and the next looser one.
+
     Args:
         problem: what is run.
         system: its assembled robot.
@@ -106,6 +110,13 @@ def loosest_tolerance(
             break
     if candidate is None:
         return None
+    for factor in BETWEEN if candidate[0] < RTOLS[0] else ():
+        rtol = factor * candidate[0]
+        with suppress(TooSlow, fx.FlexuraError, RuntimeError):
+            answer = native.run(problem, system, rtol, method, limit_s=limit_s)
+            if (error_found := error(answer.channels, exact)) <= target:
+                candidate = rtol, error_found, answer
+                break
     rtol, error_found, answer = candidate
     repeats = REPEATS if answer.seconds < REPEAT_BELOW_S else 0
     seconds = min(

@@ -85,13 +85,18 @@ def test_the_cheapest_setting_holds_the_error():
 
 def test_a_lucky_hit_does_not_count(monkeypatch):
     errors = dict(zip(native_search.RTOLS, [1.0, 5e-4, 2e-3, 8e-4, 7e-4] + [1e-9] * 9, strict=True))
+    third = native_search.RTOLS[3]
+    errors |= {2.0 * third: 1.5e-3, 1.4 * third: 9e-4}  # between it and the next looser one
     answer = lambda problem, system, rtol, method, **keys: native.Answer(
         1.0, 10, method, {"off": np.array(errors[rtol])}
     )
     monkeypatch.setattr(native_search.native, "run", answer)
     monkeypatch.setattr(native_search, "error", lambda channels, exact: float(channels["off"]))
     found = native_search.loosest_tolerance(None, None, {}, 1e-3, "implicit", 1.0)
-    assert found.rtol == native_search.RTOLS[3] and found.error == 8e-4
+    assert found.rtol == 1.4 * third and found.error == 9e-4
+    errors[1.4 * third] = 1.1e-3
+    found = native_search.loosest_tolerance(None, None, {}, 1e-3, "implicit", 1.0)
+    assert found.rtol == third and found.error == 8e-4
 
 
 def test_the_error_is_that_of_places_and_deflections_over_the_largest_deflection():
